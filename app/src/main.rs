@@ -1,0 +1,2 @@
+//! phantom3
+fn main() {}

@@ -1,0 +1,2 @@
+//! io-driver
+fn main() {}
