@@ -1,0 +1,286 @@
+//! The application's side of the socket: finding the driver and getting its memory.
+//!
+//! Every way in which this can fail has its own variant in [`AttachError`], whose message says what was
+//! found and what to do.
+
+use crate::handshake::{self, Answer, Request, RequestKind, Verdict};
+use crate::layout::{ABI_VERSION, LAYOUT_HASH, MAGIC};
+use crate::segment::{CommanderMemory, DriverView, SegmentError};
+use crate::socket;
+use rustix::net::sockopt::{Timeout, set_socket_timeout};
+use rustix::net::{AddressFamily, SocketAddrUnix, SocketFlags, SocketType};
+use std::io;
+use std::os::fd::{AsFd, OwnedFd};
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use thiserror::Error;
+
+/// A driver answers within microseconds; one that does not within this time is stopped or hung.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// What an application holds of the driver.
+#[derive(Debug)]
+pub struct Attachment {
+    /// The driver's segment.
+    pub driver: DriverView,
+    /// The commander's segment; `None` for an observer.
+    pub commander: Option<CommanderMemory>,
+    /// Keep it: the lease ends when it is dropped.
+    pub connection: Connection,
+    /// Process id of the driver.
+    pub driver_pid: u64,
+}
+
+/// The open connection, which *is* the lease.
+#[derive(Debug)]
+pub struct Connection(OwnedFd);
+
+impl Connection {
+    /// Whether the driver still lives; never blocks.
+    pub fn is_open(&self) -> bool {
+        socket::is_open(&self.0)
+    }
+}
+
+/// Why there is no attachment.
+#[derive(Debug, Error)]
+pub enum AttachError {
+    /// Nothing lies at the path.
+    #[error(
+        "no driver is running: {socket} does not exist; start one with `io-driver run --config FILE`, or name another socket"
+    )]
+    NoDriver {
+        /// Where it was looked for.
+        socket: PathBuf,
+    },
+    /// A socket lies there, and nobody listens.
+    #[error(
+        "the driver is gone: {socket} is left over from one that died; start it again with `io-driver run --config FILE` (it replaces the socket)"
+    )]
+    DriverGone {
+        /// Where it was looked for.
+        socket: PathBuf,
+    },
+    /// The file system does not let us in.
+    #[error(
+        "no permission to use {socket}: it has mode {mode:04o}, owner {owner} and group {group}, and you are user {user}; join the group or ask for access"
+    )]
+    NoPermission {
+        /// Where it was looked for.
+        socket: PathBuf,
+        /// Permission bits of the socket, or of the directory that hides it.
+        mode: u32,
+        /// User id of its owner.
+        owner: u32,
+        /// Group id of its group.
+        group: u32,
+        /// Our own user id.
+        user: u32,
+    },
+    /// Something else lies at the path.
+    #[error("{socket} is not a driver's socket: {detail}; name another one")]
+    NotADriver {
+        /// Where it was looked for.
+        socket: PathBuf,
+        /// What was found.
+        detail: String,
+    },
+    /// The driver speaks another major version.
+    #[error(
+        "the driver speaks ABI version {found}, this program {expected}; install both from the same release"
+    )]
+    WrongVersion {
+        /// The driver's.
+        found: String,
+        /// Ours.
+        expected: String,
+    },
+    /// Same version, other layout.
+    #[error(
+        "the driver's memory layout is 0x{found:016x}, this program's 0x{expected:016x}, though both say ABI {version}; one of them is a modified build: rebuild both from the same source"
+    )]
+    WrongLayout {
+        /// The driver's.
+        found: u64,
+        /// Ours.
+        expected: u64,
+        /// The version both claim.
+        version: String,
+    },
+    /// Somebody commands already.
+    #[error(
+        "the devices are commanded by process {pid} ({name}) already; end it first, or attach as an observer"
+    )]
+    LeaseHeld {
+        /// The holder's process id.
+        pid: u64,
+        /// Its name.
+        name: String,
+    },
+    /// The driver listens and does not answer.
+    #[error(
+        "the driver at {socket} does not answer within {seconds} s; it may be stopped (see `ps`), continue or kill it"
+    )]
+    NoAnswer {
+        /// Where it was asked.
+        socket: PathBuf,
+        /// How long.
+        seconds: u64,
+    },
+    /// It refused for a reason of its own.
+    #[error("the driver refused: {0}")]
+    Refused(String),
+    /// What it handed over is not usable.
+    #[error(transparent)]
+    Segment(#[from] SegmentError),
+    /// The system refused something else.
+    #[error("cannot {what} at {socket}: {source}")]
+    System {
+        /// What was tried.
+        what: &'static str,
+        /// Where.
+        socket: PathBuf,
+        /// What the kernel said.
+        source: io::Error,
+    },
+}
+
+/// Attaches as an observer: any number may.
+pub fn observe(socket: &Path, name: &str) -> Result<Attachment, AttachError> {
+    attach(socket, &Request::new(RequestKind::Observe, name))
+}
+
+/// Attaches as *the* commander.
+pub fn command(socket: &Path, name: &str) -> Result<Attachment, AttachError> {
+    attach(socket, &Request::new(RequestKind::Command, name))
+}
+
+/// Asks the driver to stop. Returns its process id; it ends by itself soon after.
+pub fn stop(socket: &Path, name: &str) -> Result<u64, AttachError> {
+    exchange(socket, &Request::new(RequestKind::Stop, name)).map(|(answer, ..)| answer.driver_pid)
+}
+
+/// Asks the driver to leave its fault state.
+pub fn clear_fault(socket: &Path, name: &str) -> Result<(), AttachError> {
+    exchange(socket, &Request::new(RequestKind::ClearFault, name)).map(|_| ())
+}
+
+/// Attaches with a request of any content; what [`observe`] and [`command`] do, and tests that lie.
+pub fn attach(socket: &Path, request: &Request) -> Result<Attachment, AttachError> {
+    let (answer, fds, connection) = exchange(socket, request)?;
+    let mut fds = fds.into_iter();
+    let driver =
+        fds.next().ok_or_else(|| AttachError::Refused("it granted and handed over nothing".into()))?;
+    let driver = DriverView::map(driver.as_fd())?;
+    let commander = fds.next().map(|fd| CommanderMemory::map(fd.as_fd())).transpose()?;
+    if request.kind == RequestKind::Command as u64 && commander.is_none() {
+        return Err(AttachError::Refused("it granted the lease and handed over no memory for it".into()));
+    }
+    Ok(Attachment { driver, commander, connection: Connection(connection), driver_pid: answer.driver_pid })
+}
+
+fn exchange(socket: &Path, request: &Request) -> Result<(Answer, Vec<OwnedFd>, OwnedFd), AttachError> {
+    let connection = connect(socket)?;
+    socket::send(connection.as_fd(), request, &[]).map_err(|error| talk_error(socket, error))?;
+    let (answer, fds) =
+        socket::receive::<Answer>(connection.as_fd()).map_err(|error| talk_error(socket, error))?;
+    judge(socket, &answer)?;
+    Ok((answer, fds, connection))
+}
+
+/// Turns an answer into our error. The driver's own words are compared here too: it may be the older one
+/// of the two and not know better.
+fn judge(socket: &Path, answer: &Answer) -> Result<(), AttachError> {
+    if answer.magic != MAGIC {
+        let detail = format!("it answered with magic 0x{:016x}, expected 0x{MAGIC:016x}", answer.magic);
+        return Err(AttachError::NotADriver { socket: socket.into(), detail });
+    }
+    let found = handshake::version_text(answer.abi_version);
+    let expected = handshake::version_text(ABI_VERSION);
+    let verdict = Verdict::from_word(answer.verdict);
+    if !handshake::is_compatible(answer.abi_version) || verdict == Some(Verdict::WrongVersion) {
+        return Err(AttachError::WrongVersion { found, expected });
+    }
+    if answer.layout_hash != LAYOUT_HASH || verdict == Some(Verdict::WrongLayout) {
+        let found = answer.layout_hash;
+        return Err(AttachError::WrongLayout { found, expected: LAYOUT_HASH, version: expected });
+    }
+    match verdict {
+        Some(Verdict::Granted) => Ok(()),
+        Some(Verdict::LeaseHeld) => Err(AttachError::LeaseHeld {
+            pid: answer.holder_pid,
+            name: handshake::name_text(&answer.holder_name),
+        }),
+        Some(Verdict::Crowded) => {
+            Err(AttachError::Refused("it has too many connections; close some observers".into()))
+        }
+        Some(Verdict::NoSegment) => {
+            Err(AttachError::Refused("it could not create shared memory; see its log for the cause".into()))
+        }
+        Some(other) => Err(AttachError::Refused(format!("it did not understand the request ({other:?})"))),
+        None => Err(AttachError::Refused(format!("it gave the unknown verdict {}", answer.verdict))),
+    }
+}
+
+fn connect(path: &Path) -> Result<OwnedFd, AttachError> {
+    let system = |what, errno: rustix::io::Errno| AttachError::System {
+        what,
+        socket: path.into(),
+        source: errno.into(),
+    };
+    let address = SocketAddrUnix::new(path).map_err(|errno| system("use the name", errno))?;
+    let socket =
+        rustix::net::socket_with(AddressFamily::UNIX, SocketType::STREAM, SocketFlags::CLOEXEC, None)
+            .map_err(|errno| system("open a socket", errno))?;
+    for timeout in [Timeout::Send, Timeout::Recv] {
+        set_socket_timeout(&socket, timeout, Some(ANSWER_TIMEOUT))
+            .map_err(|errno| system("set a time-out on the socket", errno))?;
+    }
+    rustix::net::connect(&socket, &address).map_err(|errno| connect_error(path, errno))?;
+    Ok(socket)
+}
+
+fn connect_error(path: &Path, errno: rustix::io::Errno) -> AttachError {
+    use rustix::io::Errno;
+    let socket = path.to_path_buf();
+    match errno {
+        Errno::NOENT | Errno::NOTDIR => AttachError::NoDriver { socket },
+        Errno::CONNREFUSED if is_socket(path) => AttachError::DriverGone { socket },
+        Errno::CONNREFUSED => AttachError::NotADriver { socket, detail: "it is not a socket".into() },
+        Errno::ACCESS | Errno::PERM => no_permission(path),
+        Errno::AGAIN => AttachError::NoAnswer { socket, seconds: ANSWER_TIMEOUT.as_secs() },
+        Errno::PROTOTYPE => AttachError::NotADriver { socket, detail: "it is not a stream socket".into() },
+        other => AttachError::System { what: "connect", socket, source: other.into() },
+    }
+}
+
+fn is_socket(path: &Path) -> bool {
+    use std::os::unix::fs::FileTypeExt;
+    std::fs::metadata(path).is_ok_and(|meta| meta.file_type().is_socket())
+}
+
+/// Names the first thing on the path that we can see: the socket, or the directory that hides it.
+fn no_permission(path: &Path) -> AttachError {
+    let seen = path.ancestors().find_map(|place| std::fs::metadata(place).ok().map(|meta| (place, meta)));
+    let (socket, mode, owner, group) = match seen {
+        Some((place, meta)) => {
+            (place.to_path_buf(), meta.permissions().mode() & 0o7777, meta.uid(), meta.gid())
+        }
+        None => (path.to_path_buf(), 0, 0, 0),
+    };
+    AttachError::NoPermission { socket, mode, owner, group, user: rustix::process::geteuid().as_raw() }
+}
+
+fn talk_error(path: &Path, error: io::Error) -> AttachError {
+    let socket = path.to_path_buf();
+    match error.kind() {
+        io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut => {
+            AttachError::NoAnswer { socket, seconds: ANSWER_TIMEOUT.as_secs() }
+        }
+        io::ErrorKind::UnexpectedEof | io::ErrorKind::ConnectionReset | io::ErrorKind::BrokenPipe => {
+            AttachError::NotADriver { socket, detail: "it closed the connection without an answer".into() }
+        }
+        _ => AttachError::System { what: "talk to the driver", socket, source: error },
+    }
+}

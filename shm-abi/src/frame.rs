@@ -1,0 +1,257 @@
+//! What the driver tells: one [`Frame`] per tick, holding all devices, so that nobody mixes ticks.
+//!
+//! Units and frames: SI; positions and forces in the device's base frame D. Every field is eight bytes,
+//! so that a frame is an array of words without padding.
+
+use crate::layout::{MAX_DEVICES, assert_layout};
+use bytemuck::{Pod, Zeroable};
+
+/// One tick of the driver, all devices.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Frame {
+    /// Number of the tick, counted from the driver's start; skipped deadlines are counted too.
+    pub tick: u64,
+    /// When the tick was due, CLOCK_MONOTONIC [ns].
+    pub deadline_ns: u64,
+    /// When the driver had read the devices, CLOCK_MONOTONIC [ns].
+    pub read_ns: u64,
+    /// A [`DriverState`].
+    pub state: u64,
+    /// A [`FaultReason`].
+    pub fault: u64,
+    /// Number of the lease that commands this tick; 0: nobody.
+    pub lease: u64,
+    /// Share of the commanded force that reaches the motors if the reply is in time, 0 to 1.
+    pub authority: f64,
+    /// Ticks since the lease first had full authority; negative before. The scripted hand's clock.
+    pub run_tick: i64,
+    /// How many of `devices` exist.
+    pub device_count: u64,
+    /// What became of the tick before this one.
+    pub previous: Outcome,
+    /// Room for later minor versions; zero.
+    pub reserved: u64,
+    /// The devices; those beyond `device_count` are zero.
+    pub devices: [DeviceFrame; MAX_DEVICES],
+}
+
+assert_layout!(Frame: 2680, 8 {
+    tick: u64 = 0,
+    deadline_ns: u64 = 8,
+    read_ns: u64 = 16,
+    state: u64 = 24,
+    fault: u64 = 32,
+    lease: u64 = 40,
+    authority: f64 = 48,
+    run_tick: i64 = 56,
+    device_count: u64 = 64,
+    previous: Outcome = 72,
+    reserved: u64 = 112,
+    devices: [DeviceFrame; MAX_DEVICES] = 120,
+});
+
+/// How the tick before this frame's ended.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Outcome {
+    /// A [`ReplyKind`].
+    pub reply: u64,
+    /// The tick whose command drove the motors; meaningless while `authority` is 0.
+    pub command_tick: u64,
+    /// The share of the commanded force that was let through.
+    pub authority: f64,
+    /// From the frame's doorbell to the accepted reply [ns]; 0 where there was none.
+    pub round_trip_ns: u64,
+    /// When the motors were written, CLOCK_MONOTONIC [ns].
+    pub written_ns: u64,
+}
+
+assert_layout!(Outcome: 40, 8 {
+    reply: u64 = 0,
+    command_tick: u64 = 8,
+    authority: f64 = 16,
+    round_trip_ns: u64 = 24,
+    written_ns: u64 = 32,
+});
+
+/// One device in a [`Frame`].
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct DeviceFrame {
+    /// Bit 0: the position is valid.
+    pub flags: u64,
+    /// Bit `i`: button `i` is pressed.
+    pub buttons: u64,
+    /// Encoder counts, extended beyond the counter's width: three joints, three gimbal axes.
+    pub encoder_counts: [i64; 6],
+    /// Joint angles [rad], in the same order.
+    pub joint_angle_rad: [f64; 6],
+    /// The tip in the base frame D [m].
+    pub position_m_measured: [f64; 3],
+    /// Orientation of the gimbal's last link in D, w x y z; identity where there is no instrumented gimbal.
+    pub orientation_wxyz_measured: [f64; 4],
+    /// The force on the user asked for in the tick before, in D [N].
+    pub force_on_user_n_commanded: [f64; 3],
+    /// The force on the user that the motors were made to render in the tick before, in D [N].
+    pub force_on_user_n_applied: [f64; 3],
+    /// The motor values written in the tick before, as the hardware got them.
+    pub motor_codes: [i64; 3],
+    /// Room for later minor versions; zero.
+    pub reserved: [u64; 10],
+}
+
+assert_layout!(DeviceFrame: 320, 8 {
+    flags: u64 = 0,
+    buttons: u64 = 8,
+    encoder_counts: [i64; 6] = 16,
+    joint_angle_rad: [f64; 6] = 64,
+    position_m_measured: [f64; 3] = 112,
+    orientation_wxyz_measured: [f64; 4] = 136,
+    force_on_user_n_commanded: [f64; 3] = 168,
+    force_on_user_n_applied: [f64; 3] = 192,
+    motor_codes: [i64; 3] = 216,
+    reserved: [u64; 10] = 240,
+});
+
+/// [`DeviceFrame::flags`]: the position is valid.
+pub const DEVICE_POSITION_VALID: u64 = 1;
+
+/// The driver's state machine.
+#[repr(u64)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DriverState {
+    /// Devices are being opened.
+    Starting = 0,
+    /// Devices run but do not know where they are yet.
+    Zeroing = 1,
+    /// Positions are valid, motors are off.
+    Idle = 2,
+    /// A lease gives fresh commands.
+    Active = 3,
+    /// Motors are off until somebody asks for them again; see [`FaultReason`].
+    Fault = 4,
+}
+
+impl DriverState {
+    /// The state behind a word, if it is one.
+    pub fn from_word(word: u64) -> Option<Self> {
+        [Self::Starting, Self::Zeroing, Self::Idle, Self::Active, Self::Fault]
+            .into_iter()
+            .find(|state| *state as u64 == word)
+    }
+
+    /// The name a person reads.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Starting => "starting",
+            Self::Zeroing => "zeroing",
+            Self::Idle => "idle",
+            Self::Active => "active",
+            Self::Fault => "fault",
+        }
+    }
+}
+
+/// Why the driver is in [`DriverState::Fault`].
+#[repr(u64)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FaultReason {
+    /// It is not.
+    None = 0,
+    /// A device could not be read.
+    DeviceRead = 1,
+    /// A device could not be written.
+    DeviceWrite = 2,
+    /// A device reported a position that is not finite.
+    PositionNotFinite = 3,
+    /// A motor value came out not finite.
+    MotorNotFinite = 4,
+    /// The loop panicked.
+    Panic = 5,
+}
+
+impl FaultReason {
+    /// The reason behind a word, if it is one.
+    pub fn from_word(word: u64) -> Option<Self> {
+        [
+            Self::None,
+            Self::DeviceRead,
+            Self::DeviceWrite,
+            Self::PositionNotFinite,
+            Self::MotorNotFinite,
+            Self::Panic,
+        ]
+        .into_iter()
+        .find(|reason| *reason as u64 == word)
+    }
+
+    /// The sentence a person reads.
+    pub fn sentence(self) -> &'static str {
+        match self {
+            Self::None => "no fault",
+            Self::DeviceRead => "a device could not be read",
+            Self::DeviceWrite => "a device could not be written",
+            Self::PositionNotFinite => "a device reported a position that is not finite",
+            Self::MotorNotFinite => "a motor value came out not finite",
+            Self::Panic => "the driver's loop panicked",
+        }
+    }
+}
+
+/// What became of a tick's reply.
+#[repr(u64)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ReplyKind {
+    /// Nobody holds the lease.
+    NoLease = 0,
+    /// A valid command arrived within the budget.
+    Fresh = 1,
+    /// None arrived; an earlier one, still young enough, was used again.
+    Held = 2,
+    /// None arrived and the last one is too old: the force ramps to zero.
+    Expired = 3,
+}
+
+impl ReplyKind {
+    /// The kind behind a word, if it is one.
+    pub fn from_word(word: u64) -> Option<Self> {
+        [Self::NoLease, Self::Fresh, Self::Held, Self::Expired].into_iter().find(|kind| *kind as u64 == word)
+    }
+}
+
+impl Frame {
+    /// The devices that exist. A count beyond the array is cut to it.
+    pub fn present_devices(&self) -> &[DeviceFrame] {
+        let count = usize::try_from(self.device_count).unwrap_or(MAX_DEVICES).min(MAX_DEVICES);
+        &self.devices[..count]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn enumerations_survive_the_way_through_a_word_and_strangers_are_refused() {
+        for word in 0..5 {
+            assert_eq!(DriverState::from_word(word).map(|s| s as u64), Some(word));
+        }
+        for word in 0..6 {
+            assert_eq!(FaultReason::from_word(word).map(|r| r as u64), Some(word));
+        }
+        for word in 0..4 {
+            assert_eq!(ReplyKind::from_word(word).map(|r| r as u64), Some(word));
+        }
+        assert_eq!(DriverState::from_word(5), None);
+        assert_eq!(FaultReason::from_word(u64::MAX), None);
+        assert_eq!(ReplyKind::from_word(4), None);
+    }
+
+    #[test]
+    fn an_absurd_device_count_is_cut_to_the_array() {
+        let mut frame = Frame::zeroed();
+        frame.device_count = u64::MAX;
+        assert_eq!(frame.present_devices().len(), MAX_DEVICES);
+    }
+}

@@ -1,0 +1,243 @@
+//! What is said over the socket before a descriptor changes hands.
+//!
+//! The application sends one [`Request`], the driver answers with one [`Answer`] and, where it grants,
+//! the descriptors. Both messages begin with magic, ABI version and layout hash and never change their
+//! size, so that any two versions understand each other well enough to part with a clear message.
+//! Afterwards the connection carries nothing: a lease lasts as long as it stays open.
+
+use crate::layout::{
+    ABI_MAJOR, ABI_MINOR, ABI_VERSION, CommanderSegment, DriverSegment, LAYOUT_HASH, MAGIC, NAME_BYTES,
+    assert_layout,
+};
+use bytemuck::{Pod, Zeroable};
+
+/// What the application wants.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub struct Request {
+    /// [`MAGIC`].
+    pub magic: u64,
+    /// The application's [`ABI_VERSION`].
+    pub abi_version: u64,
+    /// The application's [`LAYOUT_HASH`].
+    pub layout_hash: u64,
+    /// A [`RequestKind`].
+    pub kind: u64,
+    /// Who asks: UTF-8, padded with zeros.
+    pub name: [u8; NAME_BYTES],
+    /// Zero.
+    pub reserved: [u64; 4],
+}
+
+assert_layout!(Request: 128, 8 {
+    magic: u64 = 0,
+    abi_version: u64 = 8,
+    layout_hash: u64 = 16,
+    kind: u64 = 24,
+    name: [u8; NAME_BYTES] = 32,
+    reserved: [u64; 4] = 96,
+});
+
+/// What the driver says to it.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub struct Answer {
+    /// [`MAGIC`].
+    pub magic: u64,
+    /// The driver's [`ABI_VERSION`].
+    pub abi_version: u64,
+    /// The driver's [`LAYOUT_HASH`].
+    pub layout_hash: u64,
+    /// Bytes of the driver's segment.
+    pub driver_segment_bytes: u64,
+    /// Bytes of the commander's segment.
+    pub commander_segment_bytes: u64,
+    /// A [`Verdict`].
+    pub verdict: u64,
+    /// Number of the granted lease; 0: none.
+    pub lease: u64,
+    /// Process id of the driver.
+    pub driver_pid: u64,
+    /// Process id of whoever holds the lease; 0: nobody.
+    pub holder_pid: u64,
+    /// Its name: UTF-8, padded with zeros.
+    pub holder_name: [u8; NAME_BYTES],
+    /// Zero.
+    pub reserved: [u64; 7],
+}
+
+assert_layout!(Answer: 192, 8 {
+    magic: u64 = 0,
+    abi_version: u64 = 8,
+    layout_hash: u64 = 16,
+    driver_segment_bytes: u64 = 24,
+    commander_segment_bytes: u64 = 32,
+    verdict: u64 = 40,
+    lease: u64 = 48,
+    driver_pid: u64 = 56,
+    holder_pid: u64 = 64,
+    holder_name: [u8; NAME_BYTES] = 72,
+    reserved: [u64; 7] = 136,
+});
+
+/// What can be asked for.
+#[repr(u64)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RequestKind {
+    /// To read the driver's segment.
+    Observe = 1,
+    /// To read it and to command the devices.
+    Command = 2,
+    /// That the driver stops.
+    Stop = 3,
+    /// That the driver leaves its fault state.
+    ClearFault = 4,
+}
+
+impl RequestKind {
+    /// The kind behind a word, if it is one.
+    pub fn from_word(word: u64) -> Option<Self> {
+        [Self::Observe, Self::Command, Self::Stop, Self::ClearFault]
+            .into_iter()
+            .find(|kind| *kind as u64 == word)
+    }
+}
+
+/// How the driver decided.
+#[repr(u64)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// As asked; descriptors follow where there are any.
+    Granted = 1,
+    /// This is not a request of this protocol.
+    WrongMagic = 2,
+    /// The two were built for different ABI versions.
+    WrongVersion = 3,
+    /// Same version, different layout: one of them is a modified build.
+    WrongLayout = 4,
+    /// Somebody commands already.
+    LeaseHeld = 5,
+    /// The driver does not know this kind of request.
+    UnknownKind = 6,
+    /// The driver has too many connections.
+    Crowded = 7,
+    /// The driver could not make a segment.
+    NoSegment = 8,
+}
+
+impl Verdict {
+    /// The verdict behind a word, if it is one.
+    pub fn from_word(word: u64) -> Option<Self> {
+        [
+            Self::Granted,
+            Self::WrongMagic,
+            Self::WrongVersion,
+            Self::WrongLayout,
+            Self::LeaseHeld,
+            Self::UnknownKind,
+            Self::Crowded,
+            Self::NoSegment,
+        ]
+        .into_iter()
+        .find(|verdict| *verdict as u64 == word)
+    }
+}
+
+impl Request {
+    /// A request of this version.
+    pub fn new(kind: RequestKind, name: &str) -> Self {
+        let kind = kind as u64;
+        Self {
+            magic: MAGIC,
+            abi_version: ABI_VERSION,
+            layout_hash: LAYOUT_HASH,
+            kind,
+            name: name_bytes(name),
+            reserved: [0; 4],
+        }
+    }
+
+    /// Whether the two sides speak of the same thing.
+    pub fn check(&self) -> Result<RequestKind, Verdict> {
+        if self.magic != MAGIC {
+            return Err(Verdict::WrongMagic);
+        }
+        if !is_compatible(self.abi_version) {
+            return Err(Verdict::WrongVersion);
+        }
+        if self.layout_hash != LAYOUT_HASH {
+            return Err(Verdict::WrongLayout);
+        }
+        RequestKind::from_word(self.kind).ok_or(Verdict::UnknownKind)
+    }
+}
+
+impl Answer {
+    /// An answer of this version, nothing granted.
+    pub fn new(verdict: Verdict) -> Self {
+        Self {
+            magic: MAGIC,
+            abi_version: ABI_VERSION,
+            layout_hash: LAYOUT_HASH,
+            driver_segment_bytes: size_of::<DriverSegment>() as u64,
+            commander_segment_bytes: size_of::<CommanderSegment>() as u64,
+            verdict: verdict as u64,
+            driver_pid: u64::from(std::process::id()),
+            ..Self::zeroed()
+        }
+    }
+}
+
+/// Two builds can share memory when their major versions are equal; the layout hash has the last word.
+pub fn is_compatible(version: u64) -> bool {
+    version >> 32 == u64::from(ABI_MAJOR)
+}
+
+/// A version as a person reads it.
+pub fn version_text(version: u64) -> String {
+    format!("{}.{}", version >> 32, version & u64::from(u32::MAX))
+}
+
+/// This build's version as a person reads it.
+pub fn own_version_text() -> String {
+    format!("{ABI_MAJOR}.{ABI_MINOR}")
+}
+
+/// A name as it travels: cut at a character, padded with zeros.
+pub fn name_bytes(name: &str) -> [u8; NAME_BYTES] {
+    let mut bytes = [0; NAME_BYTES];
+    let mut length = name.len().min(NAME_BYTES);
+    while !name.is_char_boundary(length) {
+        length -= 1;
+    }
+    bytes[..length].copy_from_slice(&name.as_bytes()[..length]);
+    bytes
+}
+
+/// A name as it came: whatever is not a printable character is replaced.
+pub fn name_text(bytes: &[u8; NAME_BYTES]) -> String {
+    let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(NAME_BYTES);
+    String::from_utf8_lossy(&bytes[..end]).chars().map(|c| if c.is_control() { '?' } else { c }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_mismatch_has_its_own_verdict() {
+        let good = Request::new(RequestKind::Command, "test");
+        assert_eq!(good.check(), Ok(RequestKind::Command));
+        assert_eq!(Request { magic: 1, ..good }.check(), Err(Verdict::WrongMagic));
+        assert_eq!(Request { abi_version: 2 << 32, ..good }.check(), Err(Verdict::WrongVersion));
+        assert_eq!(Request { layout_hash: !LAYOUT_HASH, ..good }.check(), Err(Verdict::WrongLayout));
+        assert_eq!(Request { kind: 99, ..good }.check(), Err(Verdict::UnknownKind));
+    }
+
+    #[test]
+    fn a_name_is_cut_between_characters_and_cleaned_of_controls() {
+        let long = "ä".repeat(NAME_BYTES);
+        assert_eq!(name_text(&name_bytes(&long)), "ä".repeat(NAME_BYTES / 2));
+        assert_eq!(name_text(&name_bytes("a\u{1b}[2J")), "a?[2J");
+    }
+}

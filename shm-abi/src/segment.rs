@@ -1,0 +1,552 @@
+//! The two segments as memory: created, sealed, mapped.
+//!
+//! Model: the driver creates both memfds and maps its own writable. Sealing forbids shrinking and growing,
+//! so nobody can cause SIGBUS, and for the driver's segment also every further writable mapping. Whoever
+//! receives a descriptor checks seals and size before touching a byte.
+//!
+//! Invariant of the `unsafe` here: a mapping lives as long as the value that hands out references into it,
+//! is as long as the segment type, page-aligned, and the type is made of atomic words only, for which
+//! every bit pattern and every concurrent change is valid.
+
+use crate::command::Command;
+use crate::doorbell::{self, WaitMode};
+use crate::frame::Frame;
+use crate::layout::{
+    ABI_VERSION, CommanderSegment, DeviceDescription, DriverSegment, LAYOUT_HASH, MAGIC, MAX_DEVICES,
+    NAME_BYTES, RING_COMMANDS, RING_FRAMES,
+};
+use crate::seqlock::{self, Torn};
+use bytemuck::Zeroable;
+use memmap2::{MmapOptions, MmapRaw};
+use rustix::fs::{MemfdFlags, SealFlags};
+use std::fs::File;
+use std::io;
+use std::marker::PhantomData;
+use std::ops::Deref;
+use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+use thiserror::Error;
+
+/// Which clock moves the ticks.
+#[repr(u64)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ClockMode {
+    /// CLOCK_MONOTONIC, two processes.
+    Real = 0,
+    /// Two processes; a tick ends when both have done their part.
+    Lockstep = 1,
+    /// One process, as fast as the machine allows.
+    Virtual = 2,
+}
+
+impl ClockMode {
+    /// The mode behind a word, if it is one.
+    pub fn from_word(word: u64) -> Option<Self> {
+        [Self::Real, Self::Lockstep, Self::Virtual].into_iter().find(|mode| *mode as u64 == word)
+    }
+
+    /// The name a person reads.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Real => "real",
+            Self::Lockstep => "lockstep",
+            Self::Virtual => "virtual",
+        }
+    }
+}
+
+/// What a driver says of itself once.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DriverInfo {
+    /// Length of a tick [ns].
+    pub period_ns: u64,
+    /// How long it waits for a reply [ns]; u64::MAX: for ever.
+    pub reply_budget_ns: u64,
+    /// How many ticks an old command may still drive the motors.
+    pub max_command_age_ticks: u64,
+    /// Ticks from no force to all of it for a new lease.
+    pub ramp_in_ticks: u64,
+    /// Ticks from all force to none once commands fail.
+    pub ramp_out_ticks: u64,
+    /// Which clock moves the ticks.
+    pub clock_mode: ClockMode,
+    /// How it waits for a reply.
+    pub wait_mode: WaitMode,
+    /// The CPU of its loop.
+    pub cpu: Option<usize>,
+    /// The devices, [`MAX_DEVICES`] at most.
+    pub devices: Vec<DeviceInfo>,
+}
+
+/// What a device is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DeviceInfo {
+    /// Name from the driver's configuration; cut to [`NAME_BYTES`] bytes.
+    pub name: String,
+    /// Kind, such as "premium".
+    pub kind: String,
+    /// The largest force [N]; infinite: no limit.
+    pub peak_force_n: f64,
+    /// The force it can hold for ever [N].
+    pub continuous_force_n: f64,
+    /// Smallest corner of the workspace in the base frame D [m].
+    pub workspace_min_m: [f64; 3],
+    /// Its largest corner [m].
+    pub workspace_max_m: [f64; 3],
+}
+
+/// A descriptor is not a segment of this contract.
+#[derive(Debug, Error)]
+pub enum SegmentError {
+    /// The kernel refused.
+    #[error("cannot {what} a shared segment: {source}")]
+    System {
+        /// What was tried.
+        what: &'static str,
+        /// What the kernel said.
+        source: io::Error,
+    },
+    /// It can still change its size.
+    #[error(
+        "the segment handed over is not sealed (found {found}, expected at least {expected}); do not trust this driver"
+    )]
+    NotSealed {
+        /// The seals found.
+        found: u32,
+        /// The seals needed.
+        expected: u32,
+    },
+    /// It is shorter or longer than the contract says.
+    #[error(
+        "the segment handed over has {found} bytes, expected {expected}; rebuild both sides from one version"
+    )]
+    WrongSize {
+        /// Bytes found.
+        found: u64,
+        /// Bytes expected.
+        expected: u64,
+    },
+    /// Its first words are wrong.
+    #[error(
+        "the segment's {what} is 0x{found:x}, expected 0x{expected:x}; rebuild both sides from one version"
+    )]
+    WrongHeader {
+        /// Which word.
+        what: &'static str,
+        /// The word found.
+        found: u64,
+        /// The word expected.
+        expected: u64,
+    },
+}
+
+/// Why a frame could not be had.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum FrameUnavailable {
+    /// Its tick has not come.
+    #[error("frame {0} is not published yet")]
+    NotYet(u64),
+    /// The ring has gone round.
+    #[error("frame {0} has been overwritten")]
+    Overwritten(u64),
+    /// It was being overwritten.
+    #[error("frame {0} was torn")]
+    Torn(u64),
+}
+
+/// The driver's segment, in the driver.
+#[derive(Debug)]
+pub struct DriverMemory {
+    map: Mapping<DriverSegment>,
+    fd: OwnedFd,
+}
+
+impl DriverMemory {
+    /// Creates, fills in and seals it; every page is touched.
+    pub fn create(info: &DriverInfo) -> Result<Self, SegmentError> {
+        let fd = create_memfd(c"phantom3-driver", size_of::<DriverSegment>())?;
+        let map = Mapping::<DriverSegment>::writable(&fd)?;
+        describe(&map, info);
+        // After our own mapping stands, nobody gets another writable one.
+        seal(&fd, SealFlags::SHRINK | SealFlags::GROW | SealFlags::FUTURE_WRITE | SealFlags::SEAL)?;
+        Ok(Self { map, fd })
+    }
+
+    /// Writes frame `k`. Call [`ring`](Self::ring) next.
+    #[inline]
+    pub fn write_frame(&self, frame: &Frame) {
+        let slot = &self.map.frames[slot_of(frame.tick, RING_FRAMES)];
+        seqlock::write(&slot.sequence, &slot.words, words_of(frame), frame.tick);
+    }
+
+    /// Announces frame `tick` and wakes the commander if it sleeps.
+    #[inline]
+    pub fn ring(&self, tick: u64, commander: Option<&CommanderView>) {
+        match commander {
+            Some(view) => doorbell::ring(&self.map.bell, tick, &view.map.bell.owner_sleeps),
+            None => doorbell::ring(&self.map.bell, tick, &NOBODY_SLEEPS),
+        }
+    }
+
+    /// The descriptor to hand over.
+    pub fn fd(&self) -> BorrowedFd<'_> {
+        self.fd.as_fd()
+    }
+}
+
+impl Deref for DriverMemory {
+    type Target = DriverSegment;
+    fn deref(&self) -> &DriverSegment {
+        &self.map
+    }
+}
+
+static NOBODY_SLEEPS: AtomicU64 = AtomicU64::new(0);
+
+/// The driver's segment, everywhere else: read-only.
+#[derive(Debug)]
+pub struct DriverView {
+    map: Mapping<DriverSegment>,
+}
+
+impl DriverView {
+    /// Maps a descriptor that was handed over, after checking seals, size and header.
+    pub fn map(fd: BorrowedFd<'_>) -> Result<Self, SegmentError> {
+        check(fd, size_of::<DriverSegment>(), SealFlags::SHRINK | SealFlags::GROW)?;
+        let map = Mapping::<DriverSegment>::read_only(&fd)?;
+        let header = &map.header;
+        expect("magic", &header.magic, MAGIC)?;
+        expect("ABI version", &header.abi_version, ABI_VERSION)?;
+        expect("layout hash", &header.layout_hash, LAYOUT_HASH)?;
+        expect("ready word", &header.ready, 1)?;
+        Ok(Self { map })
+    }
+
+    /// What the driver says of itself. Values that are no such thing are replaced by the harmless one.
+    pub fn info(&self) -> DriverInfo {
+        let header = &self.map.header;
+        let count = usize::try_from(get(&header.device_count)).unwrap_or(MAX_DEVICES).min(MAX_DEVICES);
+        DriverInfo {
+            period_ns: get(&header.period_ns).max(1),
+            reply_budget_ns: get(&header.reply_budget_ns),
+            max_command_age_ticks: get(&header.max_command_age_ticks),
+            ramp_in_ticks: get(&header.ramp_in_ticks),
+            ramp_out_ticks: get(&header.ramp_out_ticks),
+            clock_mode: ClockMode::from_word(get(&header.clock_mode)).unwrap_or(ClockMode::Real),
+            wait_mode: WaitMode::from_word(get(&header.wait_mode)).unwrap_or(WaitMode::Futex),
+            cpu: get(&header.cpu_plus_one).checked_sub(1).and_then(|cpu| usize::try_from(cpu).ok()),
+            devices: self.map.devices[..count].iter().map(DeviceInfo::from_description).collect(),
+        }
+    }
+
+    /// The tick of the newest frame.
+    #[inline]
+    pub fn latest_tick(&self) -> Option<u64> {
+        doorbell::latest(&self.map.bell)
+    }
+
+    /// Reads frame `tick` whole into `frame`, or says why it cannot be had.
+    #[inline]
+    pub fn read_frame(&self, tick: u64, frame: &mut Frame) -> Result<(), FrameUnavailable> {
+        let slot = &self.map.frames[slot_of(tick, RING_FRAMES)];
+        let stamp = seqlock::read(&slot.sequence, &slot.words, words_of_mut(frame))
+            .map_err(|Torn| FrameUnavailable::Torn(tick))?;
+        match stamp.cmp(&seqlock::stamp(tick)) {
+            std::cmp::Ordering::Equal => Ok(()),
+            std::cmp::Ordering::Less => Err(FrameUnavailable::NotYet(tick)),
+            std::cmp::Ordering::Greater => Err(FrameUnavailable::Overwritten(tick)),
+        }
+    }
+
+    /// Reads the newest frame. `None`: there is none, or a few tries in a row were overtaken.
+    pub fn read_latest(&self) -> Option<Frame> {
+        const TRIES: usize = 8;
+        let mut frame = Frame::zeroed();
+        for _ in 0..TRIES {
+            let tick = self.latest_tick()?;
+            if self.read_frame(tick, &mut frame).is_ok() {
+                return Some(frame);
+            }
+        }
+        None
+    }
+
+    /// Sleeps until there is a newer frame than `seen`, or `timeout` passes, or a signal comes. The driver
+    /// wakes only the commander, whose memory is passed here; observers had better sleep by the clock.
+    pub fn sleep_for_frame(&self, seen: Option<u64>, own: &CommanderMemory, timeout: Duration) {
+        doorbell::sleep(&self.map.bell, seen, &own.map.bell.owner_sleeps, timeout);
+    }
+}
+
+impl Deref for DriverView {
+    type Target = DriverSegment;
+    /// The segment; it is mapped read-only, so a store through one of its atomics ends in SIGSEGV.
+    fn deref(&self) -> &DriverSegment {
+        &self.map
+    }
+}
+
+/// The commander's segment, in the application that holds the lease.
+#[derive(Debug)]
+pub struct CommanderMemory {
+    map: Mapping<CommanderSegment>,
+    lease: u64,
+}
+
+impl CommanderMemory {
+    /// Maps a descriptor that was handed over, after checking seals, size and header.
+    pub fn map(fd: BorrowedFd<'_>) -> Result<Self, SegmentError> {
+        check(fd, size_of::<CommanderSegment>(), SealFlags::SHRINK | SealFlags::GROW)?;
+        let map = Mapping::<CommanderSegment>::writable(&fd)?;
+        expect("magic", &map.header.magic, MAGIC)?;
+        expect("layout hash", &map.header.layout_hash, LAYOUT_HASH)?;
+        let lease = get(&map.header.lease);
+        Ok(Self { map, lease })
+    }
+
+    /// The number to put into every command.
+    pub fn lease(&self) -> u64 {
+        self.lease
+    }
+
+    /// Answers a tick and wakes the driver if it sleeps.
+    #[inline]
+    pub fn publish(&self, command: &Command, driver: &DriverView) {
+        let slot = &self.map.commands[slot_of(command.tick, RING_COMMANDS)];
+        seqlock::write(&slot.sequence, &slot.words, words_of(command), command.tick);
+        doorbell::ring(&self.map.bell, command.tick, &driver.map.bell.owner_sleeps);
+    }
+}
+
+impl Deref for CommanderMemory {
+    type Target = CommanderSegment;
+    fn deref(&self) -> &CommanderSegment {
+        &self.map
+    }
+}
+
+/// The commander's segment, in the driver: read-only.
+#[derive(Debug)]
+pub struct CommanderView {
+    map: Mapping<CommanderSegment>,
+    lease: u64,
+}
+
+impl CommanderView {
+    /// Creates the segment for one lease. Returns the driver's view and the descriptor to hand over.
+    pub fn create(lease: u64) -> Result<(Self, OwnedFd), SegmentError> {
+        let fd = create_memfd(c"phantom3-commander", size_of::<CommanderSegment>())?;
+        let writable = Mapping::<CommanderSegment>::writable(&fd)?;
+        let header = &writable.header;
+        put(&header.magic, MAGIC);
+        put(&header.abi_version, ABI_VERSION);
+        put(&header.layout_hash, LAYOUT_HASH);
+        put(&header.segment_bytes, size_of::<CommanderSegment>() as u64);
+        put(&header.lease, lease);
+        seal(&fd, SealFlags::SHRINK | SealFlags::GROW | SealFlags::SEAL)?;
+        let map = Mapping::<CommanderSegment>::read_only(&fd)?;
+        Ok((Self { map, lease }, fd))
+    }
+
+    /// Number of the lease; the driver's own knowledge, not read from the segment.
+    pub fn lease(&self) -> u64 {
+        self.lease
+    }
+
+    /// The tick that the commander says it answered last.
+    #[inline]
+    pub fn latest_tick(&self) -> Option<u64> {
+        doorbell::latest(&self.map.bell)
+    }
+
+    /// Reads whatever stands in the slot of `tick`; an allegation.
+    #[inline]
+    pub fn read_command(&self, tick: u64, command: &mut Command) -> Result<(), Torn> {
+        let slot = &self.map.commands[slot_of(tick, RING_COMMANDS)];
+        seqlock::read(&slot.sequence, &slot.words, words_of_mut(command)).map(|_| ())
+    }
+
+    /// Sleeps until the commander rings, `timeout` passes or a signal comes.
+    pub fn sleep_for_command(&self, seen: Option<u64>, own: &DriverMemory, timeout: Duration) {
+        doorbell::sleep(&self.map.bell, seen, &own.map.bell.owner_sleeps, timeout);
+    }
+
+    /// Wakes the driver's own loop out of [`sleep_for_command`](Self::sleep_for_command).
+    pub fn wake_sleeper(&self) {
+        doorbell::wake(&self.map.bell);
+    }
+}
+
+impl DeviceInfo {
+    fn from_description(from: &DeviceDescription) -> Self {
+        Self {
+            name: text_of(&from.name),
+            kind: text_of(&from.kind),
+            peak_force_n: f64::from_bits(get(&from.peak_force_n)),
+            continuous_force_n: f64::from_bits(get(&from.continuous_force_n)),
+            workspace_min_m: from.workspace_min_m.each_ref().map(|word| f64::from_bits(get(word))),
+            workspace_max_m: from.workspace_max_m.each_ref().map(|word| f64::from_bits(get(word))),
+        }
+    }
+
+    fn write_to(&self, to: &DeviceDescription) {
+        put_text(&to.name, &self.name);
+        put_text(&to.kind, &self.kind);
+        put(&to.peak_force_n, self.peak_force_n.to_bits());
+        put(&to.continuous_force_n, self.continuous_force_n.to_bits());
+        for axis in 0..3 {
+            put(&to.workspace_min_m[axis], self.workspace_min_m[axis].to_bits());
+            put(&to.workspace_max_m[axis], self.workspace_max_m[axis].to_bits());
+        }
+    }
+}
+
+fn describe(segment: &DriverSegment, info: &DriverInfo) {
+    assert!(info.devices.len() <= MAX_DEVICES, "at most {MAX_DEVICES} devices");
+    let header = &segment.header;
+    put(&header.magic, MAGIC);
+    put(&header.abi_version, ABI_VERSION);
+    put(&header.layout_hash, LAYOUT_HASH);
+    put(&header.segment_bytes, size_of::<DriverSegment>() as u64);
+    put(&header.driver_pid, u64::from(std::process::id()));
+    put(&header.period_ns, info.period_ns);
+    put(&header.reply_budget_ns, info.reply_budget_ns);
+    put(&header.max_command_age_ticks, info.max_command_age_ticks);
+    put(&header.ramp_in_ticks, info.ramp_in_ticks);
+    put(&header.ramp_out_ticks, info.ramp_out_ticks);
+    put(&header.clock_mode, info.clock_mode as u64);
+    put(&header.wait_mode, info.wait_mode as u64);
+    put(&header.cpu_plus_one, info.cpu.map_or(0, |cpu| cpu as u64 + 1));
+    put(&header.device_count, info.devices.len() as u64);
+    for (device, to) in info.devices.iter().zip(&segment.devices) {
+        device.write_to(to);
+    }
+    touch_every_page(segment);
+    header.ready.store(1, Ordering::Release);
+}
+
+/// A page of a memfd exists only once it was written; the loop must not be the first.
+fn touch_every_page(segment: &DriverSegment) {
+    for slot in &segment.frames {
+        put(&slot.sequence, 0);
+    }
+}
+
+fn slot_of(tick: u64, slots: usize) -> usize {
+    // Both rings are powers of two, so the cut of the cast does not matter.
+    tick as usize & (slots - 1)
+}
+
+fn words_of<P: bytemuck::Pod>(payload: &P) -> &[u64] {
+    bytemuck::cast_slice(std::slice::from_ref(payload))
+}
+
+fn words_of_mut<P: bytemuck::Pod>(payload: &mut P) -> &mut [u64] {
+    bytemuck::cast_slice_mut(std::slice::from_mut(payload))
+}
+
+fn get(word: &AtomicU64) -> u64 {
+    word.load(Ordering::Acquire)
+}
+
+fn put(word: &AtomicU64, value: u64) {
+    word.store(value, Ordering::Relaxed);
+}
+
+fn put_text(words: &[AtomicU64], text: &str) {
+    let mut bytes = [0u8; NAME_BYTES];
+    let room = words.len() * 8;
+    let mut length = text.len().min(room);
+    while !text.is_char_boundary(length) {
+        length -= 1;
+    }
+    bytes[..length].copy_from_slice(&text.as_bytes()[..length]);
+    for (word, chunk) in words.iter().zip(bytes.chunks_exact(8)) {
+        put(word, u64::from_le_bytes(chunk.try_into().expect("chunks of eight")));
+    }
+}
+
+fn text_of(words: &[AtomicU64]) -> String {
+    let bytes: Vec<u8> =
+        words.iter().flat_map(|word| get(word).to_le_bytes()).take_while(|byte| *byte != 0).collect();
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+fn expect(what: &'static str, word: &AtomicU64, expected: u64) -> Result<(), SegmentError> {
+    match get(word) {
+        found if found == expected => Ok(()),
+        found => Err(SegmentError::WrongHeader { what, found, expected }),
+    }
+}
+
+fn create_memfd(name: &std::ffi::CStr, bytes: usize) -> Result<OwnedFd, SegmentError> {
+    let fd = rustix::fs::memfd_create(name, MemfdFlags::CLOEXEC | MemfdFlags::ALLOW_SEALING)
+        .map_err(|errno| SegmentError::System { what: "create", source: errno.into() })?;
+    rustix::fs::ftruncate(&fd, bytes as u64)
+        .map_err(|errno| SegmentError::System { what: "size", source: errno.into() })?;
+    Ok(fd)
+}
+
+fn seal(fd: &OwnedFd, seals: SealFlags) -> Result<(), SegmentError> {
+    rustix::fs::fcntl_add_seals(fd, seals)
+        .map_err(|errno| SegmentError::System { what: "seal", source: errno.into() })
+}
+
+fn check(fd: BorrowedFd<'_>, bytes: usize, needed: SealFlags) -> Result<(), SegmentError> {
+    let seals = rustix::fs::fcntl_get_seals(fd)
+        .map_err(|errno| SegmentError::System { what: "read the seals of", source: errno.into() })?;
+    if !seals.contains(needed) {
+        return Err(SegmentError::NotSealed { found: seals.bits(), expected: needed.bits() });
+    }
+    let found = rustix::fs::fstat(fd)
+        .map_err(|errno| SegmentError::System { what: "measure", source: errno.into() })?
+        .st_size as u64;
+    if found != bytes as u64 {
+        return Err(SegmentError::WrongSize { found, expected: bytes as u64 });
+    }
+    Ok(())
+}
+
+/// A segment type: `repr(C)`, atomic words only, alignment at most a page.
+trait Segment {}
+impl Segment for DriverSegment {}
+impl Segment for CommanderSegment {}
+
+/// A shared mapping seen as a segment.
+#[derive(Debug)]
+struct Mapping<T> {
+    map: MmapRaw,
+    segment: PhantomData<T>,
+}
+
+impl<T: Segment> Mapping<T> {
+    fn writable(fd: &impl AsFd) -> Result<Self, SegmentError> {
+        Self::new(fd, |options, file| options.map_raw(file))
+    }
+
+    fn read_only(fd: &impl AsFd) -> Result<Self, SegmentError> {
+        Self::new(fd, |options, file| options.map_raw_read_only(file))
+    }
+
+    fn new(
+        fd: &impl AsFd,
+        map: impl Fn(&MmapOptions, &File) -> io::Result<MmapRaw>,
+    ) -> Result<Self, SegmentError> {
+        let system = |source| SegmentError::System { what: "map", source };
+        let file = File::from(fd.as_fd().try_clone_to_owned().map_err(system)?);
+        // Populated at once: a first touch inside a tick would be a page fault.
+        let map = map(MmapOptions::new().len(size_of::<T>()).populate(), &file).map_err(system)?;
+        Ok(Self { map, segment: PhantomData })
+    }
+}
+
+impl<T: Segment> Deref for Mapping<T> {
+    type Target = T;
+    #[allow(unsafe_code)]
+    fn deref(&self) -> &T {
+        // SAFETY: the invariant in this file's head: length, alignment and lifetime are this value's, and a
+        // `Segment` is atomic words, valid for every bit pattern under every concurrent change.
+        unsafe { &*self.map.as_ptr().cast::<T>() }
+    }
+}

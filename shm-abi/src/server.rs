@@ -1,0 +1,402 @@
+//! The driver's side of the socket: who may see the segments, and who commands.
+//!
+//! Model: one thread, which is not the real-time loop, polls the listening socket and all connections.
+//! Exactly one connection holds the lease; it ends when the connection does, however that happens. For
+//! each lease a fresh commander's segment is made, so that a former holder that still writes writes into
+//! memory nobody reads. What happens is returned as [`ServerEvent`]s, for the owner to pass to the loop.
+//!
+//! Invariant: nothing a client sends or withholds blocks the thread; a client that connects and says
+//! nothing is dropped after [`PATIENCE`].
+
+use crate::handshake::{self, Answer, Request, RequestKind, Verdict};
+use crate::segment::{CommanderView, DriverMemory};
+use crate::socket;
+use bytemuck::Zeroable;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::FlockOperation;
+use rustix::net::RecvFlags;
+use std::fs::{File, Permissions};
+use std::io;
+use std::os::fd::{AsFd, BorrowedFd};
+use std::os::unix::fs::{DirBuilderExt, PermissionsExt};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+use thiserror::Error;
+
+/// Connections at once, the commander's included.
+pub const MAX_CONNECTIONS: usize = 64;
+/// How long a new connection may take to say what it wants.
+pub const PATIENCE: Duration = Duration::from_secs(1);
+/// After a failed accept (no descriptors left, say) the listener rests this long instead of spinning.
+const ACCEPT_REST: Duration = Duration::from_millis(100);
+/// Owner and group may use the socket.
+const SOCKET_MODE: u32 = 0o660;
+
+/// What the driver's loop has to know.
+#[derive(Debug)]
+pub enum ServerEvent {
+    /// A new commander; read its segment from now on.
+    LeaseGranted {
+        /// Its segment.
+        view: CommanderView,
+        /// Its process id.
+        pid: u64,
+        /// Its name.
+        name: String,
+    },
+    /// The commander's connection ended.
+    LeaseEnded {
+        /// Number of its lease.
+        lease: u64,
+    },
+    /// A would-be commander was refused because somebody commands already.
+    LeaseRefused,
+    /// Somebody asks the driver to stop.
+    StopRequested {
+        /// Who.
+        pid: u64,
+    },
+    /// Somebody asks the driver to leave its fault state.
+    ClearFaultRequested,
+    /// A segment for a lease could not be made.
+    Trouble {
+        /// Why.
+        message: String,
+    },
+}
+
+/// Why the driver cannot listen.
+#[derive(Debug, Error)]
+pub enum BindError {
+    /// Another driver does.
+    #[error("another driver is running at {socket}; stop it with `io-driver stop`, or use another socket")]
+    AlreadyRunning {
+        /// Where.
+        socket: PathBuf,
+    },
+    /// The file system refused.
+    #[error("cannot {what} {path}: {source}; choose another place with --socket or {variable}", variable = crate::endpoint::SOCKET_VARIABLE)]
+    System {
+        /// What was tried.
+        what: &'static str,
+        /// On what.
+        path: PathBuf,
+        /// What the kernel said.
+        source: io::Error,
+    },
+}
+
+/// The listening driver.
+#[derive(Debug)]
+pub struct Server {
+    listener: UnixListener,
+    path: PathBuf,
+    /// Held as long as the driver lives; the kernel lets go of it however the driver dies.
+    _lock: File,
+    connections: Vec<Connection>,
+    next_lease: u64,
+    accept_after: Option<Instant>,
+}
+
+#[derive(Debug)]
+struct Connection {
+    stream: UnixStream,
+    pid: u64,
+    stage: Stage,
+}
+
+#[derive(Debug)]
+enum Stage {
+    /// Has sent so many bytes of its request.
+    Asking { bytes: [u8; size_of::<Request>()], filled: usize, since: Instant },
+    /// Got the driver's segment, or its answer; nothing more is expected.
+    Served,
+    /// Holds the lease.
+    Commanding { lease: u64, name: String },
+    /// To be forgotten.
+    Gone,
+}
+
+impl Server {
+    /// Listens at `path`. A socket left over from a driver that died is replaced.
+    pub fn bind(path: &Path) -> Result<Self, BindError> {
+        let failed = |what, path: &Path| {
+            let path = path.to_path_buf();
+            move |source| BindError::System { what, path, source }
+        };
+        if let Some(directory) = path.parent().filter(|directory| !directory.as_os_str().is_empty()) {
+            std::fs::DirBuilder::new()
+                .recursive(true)
+                .mode(0o750)
+                .create(directory)
+                .map_err(failed("create the directory", directory))?;
+        }
+        let lock = lock(path)?;
+        // The socket gets its mode before it gets its name: there is no moment at which it is too open.
+        let unnamed = suffixed(path, &format!(".{}", std::process::id()));
+        let _ = std::fs::remove_file(&unnamed);
+        let listener = UnixListener::bind(&unnamed).map_err(failed("listen at", &unnamed))?;
+        let ready = std::fs::set_permissions(&unnamed, Permissions::from_mode(SOCKET_MODE))
+            .and_then(|()| listener.set_nonblocking(true))
+            .and_then(|()| std::fs::rename(&unnamed, path));
+        if let Err(source) = ready {
+            let _ = std::fs::remove_file(&unnamed);
+            return Err(failed("listen at", path)(source));
+        }
+        let path = path.to_path_buf();
+        Ok(Self { listener, path, _lock: lock, connections: Vec::new(), next_lease: 1, accept_after: None })
+    }
+
+    /// Where it listens.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Waits up to `timeout` for something to happen, deals with it and appends what the loop must know.
+    pub fn poll(
+        &mut self,
+        memory: &DriverMemory,
+        timeout: Duration,
+        events: &mut Vec<ServerEvent>,
+    ) -> io::Result<()> {
+        let (newcomer, talking) = self.wait(timeout)?;
+        for index in talking {
+            self.listen_to(index, memory, events);
+        }
+        self.drop_the_silent();
+        self.connections.retain(|connection| !matches!(connection.stage, Stage::Gone));
+        if newcomer {
+            self.accept();
+        }
+        Ok(())
+    }
+
+    fn wait(&self, timeout: Duration) -> io::Result<(bool, Vec<usize>)> {
+        let accepting = self.accept_after.is_none_or(|after| Instant::now() >= after);
+        let mut fds: Vec<PollFd<'_>> = self
+            .connections
+            .iter()
+            .map(|c| PollFd::new(&c.stream, PollFlags::IN | PollFlags::RDHUP))
+            .collect();
+        if accepting {
+            fds.push(PollFd::new(&self.listener, PollFlags::IN));
+        }
+        let timeout = Timespec { tv_sec: timeout.as_secs() as i64, tv_nsec: timeout.subsec_nanos().into() };
+        match poll(&mut fds, Some(&timeout)) {
+            Ok(_) => {}
+            Err(rustix::io::Errno::INTR) => return Ok((false, Vec::new())),
+            Err(errno) => return Err(errno.into()),
+        }
+        let newcomer = accepting && fds.pop().is_some_and(|fd| !fd.revents().is_empty());
+        let talking =
+            fds.iter().enumerate().filter(|(_, fd)| !fd.revents().is_empty()).map(|(index, _)| index);
+        Ok((newcomer, talking.collect()))
+    }
+
+    fn accept(&mut self) {
+        self.accept_after = None;
+        let Ok((stream, _)) = self.listener.accept() else {
+            self.accept_after = Some(Instant::now() + ACCEPT_REST);
+            return;
+        };
+        let pid = peer_pid(&stream);
+        if stream.set_nonblocking(true).is_err() {
+            return;
+        }
+        if self.connections.len() >= MAX_CONNECTIONS {
+            let _ = socket::send(stream.as_fd(), &Answer::new(Verdict::Crowded), &[]);
+            return;
+        }
+        let stage = Stage::Asking { bytes: [0; size_of::<Request>()], filled: 0, since: Instant::now() };
+        self.connections.push(Connection { stream, pid, stage });
+    }
+
+    /// Reads what a connection has to say; the end of a lease shows here too.
+    fn listen_to(&mut self, index: usize, memory: &DriverMemory, events: &mut Vec<ServerEvent>) {
+        let connection = &mut self.connections[index];
+        match connection.receive() {
+            Heard::Nothing => {}
+            Heard::End => {
+                if let Stage::Commanding { lease, .. } = connection.stage {
+                    events.push(ServerEvent::LeaseEnded { lease });
+                }
+                connection.stage = Stage::Gone;
+            }
+            Heard::Request(request) => {
+                let stage = self.serve(index, &request, memory, events);
+                self.connections[index].stage = stage;
+            }
+        }
+    }
+
+    fn serve(
+        &mut self,
+        index: usize,
+        request: &Request,
+        memory: &DriverMemory,
+        events: &mut Vec<ServerEvent>,
+    ) -> Stage {
+        let kind = match request.check() {
+            Ok(kind) => kind,
+            Err(verdict) => return self.refuse(index, verdict),
+        };
+        let pid = self.connections[index].pid;
+        match kind {
+            RequestKind::Observe => self.answer(index, &Answer::new(Verdict::Granted), &[memory.fd()]),
+            RequestKind::Command => self.lease_to(index, handshake::name_text(&request.name), memory, events),
+            RequestKind::Stop => {
+                events.push(ServerEvent::StopRequested { pid });
+                self.answer(index, &Answer::new(Verdict::Granted), &[])
+            }
+            RequestKind::ClearFault => {
+                events.push(ServerEvent::ClearFaultRequested);
+                self.answer(index, &Answer::new(Verdict::Granted), &[])
+            }
+        }
+    }
+
+    fn lease_to(
+        &mut self,
+        index: usize,
+        name: String,
+        memory: &DriverMemory,
+        events: &mut Vec<ServerEvent>,
+    ) -> Stage {
+        if self.holder().is_some() {
+            events.push(ServerEvent::LeaseRefused);
+            return self.refuse(index, Verdict::LeaseHeld);
+        }
+        let lease = self.next_lease;
+        let (view, fd) = match CommanderView::create(lease) {
+            Ok(made) => made,
+            Err(error) => {
+                events.push(ServerEvent::Trouble { message: error.to_string() });
+                return self.refuse(index, Verdict::NoSegment);
+            }
+        };
+        let answer = Answer { lease, ..Answer::new(Verdict::Granted) };
+        match self.answer(index, &answer, &[memory.fd(), fd.as_fd()]) {
+            Stage::Served => {
+                self.next_lease += 1;
+                let pid = self.connections[index].pid;
+                events.push(ServerEvent::LeaseGranted { view, pid, name: name.clone() });
+                Stage::Commanding { lease, name }
+            }
+            failed => failed,
+        }
+    }
+
+    fn refuse(&self, index: usize, verdict: Verdict) -> Stage {
+        let mut answer = Answer::new(verdict);
+        if let Some((pid, name)) = self.holder() {
+            answer.holder_pid = pid;
+            answer.holder_name = handshake::name_bytes(name);
+        }
+        self.answer(index, &answer, &[]);
+        Stage::Gone
+    }
+
+    /// Answers, and says what becomes of the connection.
+    fn answer(&self, index: usize, answer: &Answer, fds: &[BorrowedFd<'_>]) -> Stage {
+        match socket::send(self.connections[index].stream.as_fd(), answer, fds) {
+            Ok(()) => Stage::Served,
+            Err(_) => Stage::Gone,
+        }
+    }
+
+    fn holder(&self) -> Option<(u64, &str)> {
+        self.connections.iter().find_map(|connection| match &connection.stage {
+            Stage::Commanding { name, .. } => Some((connection.pid, name.as_str())),
+            _ => None,
+        })
+    }
+
+    fn drop_the_silent(&mut self) {
+        for connection in &mut self.connections {
+            if matches!(connection.stage, Stage::Asking { since, .. } if since.elapsed() > PATIENCE) {
+                connection.stage = Stage::Gone;
+            }
+        }
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.path);
+        let _ = std::fs::remove_file(suffixed(&self.path, LOCK_SUFFIX));
+    }
+}
+
+enum Heard {
+    Nothing,
+    Request(Request),
+    End,
+}
+
+impl Connection {
+    fn receive(&mut self) -> Heard {
+        let Stage::Asking { bytes, filled, .. } = &mut self.stage else {
+            // Nothing is expected any more: whatever comes is thrown away, only the end matters.
+            let mut waste = [0u8; 256];
+            return match rustix::net::recv(&self.stream, &mut waste, RecvFlags::empty()) {
+                Ok((_, 0)) => Heard::End,
+                Ok(_) => Heard::Nothing,
+                Err(errno) => heard_error(errno),
+            };
+        };
+        match rustix::net::recv(&self.stream, &mut bytes[*filled..], RecvFlags::empty()) {
+            Ok((_, 0)) => return Heard::End,
+            Ok((_, more)) => *filled += more,
+            Err(errno) => return heard_error(errno),
+        }
+        if *filled < bytes.len() {
+            return Heard::Nothing;
+        }
+        let mut request = Request::zeroed();
+        bytemuck::bytes_of_mut(&mut request).copy_from_slice(bytes);
+        Heard::Request(request)
+    }
+}
+
+fn heard_error(errno: rustix::io::Errno) -> Heard {
+    use rustix::io::Errno;
+    if errno == Errno::AGAIN || errno == Errno::INTR { Heard::Nothing } else { Heard::End }
+}
+
+fn peer_pid(stream: &UnixStream) -> u64 {
+    rustix::net::sockopt::socket_peercred(stream).map_or(0, |cred| cred.pid.as_raw_nonzero().get() as u64)
+}
+
+const LOCK_SUFFIX: &str = ".lock";
+
+/// Takes the lock that says a driver lives here. The lock file may be removed and remade by a driver that
+/// is just ending, so that the name is compared again after the lock was taken.
+fn lock(path: &Path) -> Result<File, BindError> {
+    let name = suffixed(path, LOCK_SUFFIX);
+    let failed = |source| BindError::System { what: "lock", path: name.clone(), source };
+    const TRIES: usize = 16;
+    for _ in 0..TRIES {
+        let file = File::options().create(true).truncate(false).write(true).open(&name).map_err(failed)?;
+        match rustix::fs::flock(&file, FlockOperation::NonBlockingLockExclusive) {
+            Ok(()) => {}
+            Err(rustix::io::Errno::WOULDBLOCK) => {
+                return Err(BindError::AlreadyRunning { socket: path.to_path_buf() });
+            }
+            Err(errno) => return Err(failed(errno.into())),
+        }
+        use std::os::unix::fs::MetadataExt;
+        let held = file.metadata().map_err(failed)?;
+        if std::fs::metadata(&name).is_ok_and(|named| (named.dev(), named.ino()) == (held.dev(), held.ino()))
+        {
+            return Ok(file);
+        }
+    }
+    Err(BindError::AlreadyRunning { socket: path.to_path_buf() })
+}
+
+fn suffixed(path: &Path, suffix: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_os_string();
+    name.push(suffix);
+    PathBuf::from(name)
+}
