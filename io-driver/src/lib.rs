@@ -1,1 +1,31 @@
-//! Crate.
+//! The hard real-time driver: device I/O, kinematics, safety, and the frames that everybody reads.
+//!
+//! Problem: a haptic device has to be read and written every millisecond whatever the application does, and
+//! whatever it does must not hurt anybody.
+//!
+//! One tick is [`cycle::Cycle`]: read all devices, publish the frame, take the reply, limit, write. Who
+//! moves the clock is somebody else's: [`real_loop`] in the driver's own process, or an application that
+//! runs the driver on a virtual clock. Devices lie behind [`device::Device`], mechanisms behind
+//! [`kinematics::Mechanism`], the decision how much force is let through in [`safety`].
+
+#![forbid(unsafe_code)]
+#![deny(missing_docs)]
+
+pub mod cli;
+pub mod config;
+pub mod cycle;
+pub mod device;
+pub mod device_file;
+pub mod driver;
+pub mod encoders;
+pub mod kinematics;
+pub mod mail;
+pub mod meter;
+pub mod motors;
+pub mod open;
+pub mod real_loop;
+pub mod safety;
+pub mod sim;
+pub mod status;
+pub mod table;
+pub mod toml_report;

@@ -1,2 +1,7 @@
-//! io-driver
-fn main() {}
+//! The haptic driver; see `io-driver --help`.
+
+#![forbid(unsafe_code)]
+
+fn main() -> std::process::ExitCode {
+    io_driver::cli::main()
+}

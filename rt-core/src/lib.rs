@@ -1,1 +1,38 @@
-//! Crate.
+//! What every hard real-time loop on Linux needs, and nothing about haptics.
+//!
+//! Problem: a loop that must act every millisecond is lost to details of the operating system:
+//! a page fault, a frequency change, a log line, a signal, a promotion that silently did nothing.
+//! Each module here deals with one of them.
+//!
+//! | before the loop | inside the loop | when it ends |
+//! |---|---|---|
+//! | [`setup`]: scheduling, CPU, memory, each read back | [`periodic`]: wake on an absolute grid | [`signals`]: asked to stop, as a flag |
+//! | [`cpu`]: which CPUs there are | [`histogram`]: latencies without allocation | [`epitaph`]: a dying process says why |
+//! | [`process`]: die with the parent | [`log`]: messages formatted by another thread | [`usage`]: faults and switches it suffered |
+//!
+//! [`clock`] is under all of them, and [`alloc_guard`] lets a test show that a loop does not allocate.
+//!
+//! Invariants: what a module marks as fit for the loop neither allocates nor locks nor opens a file
+//! nor panics; `unsafe` code lives in the private module `sys` alone; nothing is assumed from a
+//! return code that can be read back from the kernel.
+
+#![deny(unsafe_code)]
+
+pub mod alloc_guard;
+pub mod clock;
+pub mod cpu;
+pub mod epitaph;
+pub mod histogram;
+pub mod log;
+pub mod periodic;
+pub mod process;
+pub mod schedule;
+pub mod setup;
+pub mod signals;
+pub mod usage;
+
+#[allow(unsafe_code, reason = "the one place for system calls that no safe crate wraps")]
+mod sys;
+
+#[cfg(test)]
+mod test_child;

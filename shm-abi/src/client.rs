@@ -4,7 +4,7 @@
 //! found and what to do.
 
 use crate::handshake::{self, Answer, Request, RequestKind, Verdict};
-use crate::layout::{ABI_VERSION, LAYOUT_HASH, MAGIC};
+use crate::layout::{LAYOUT_HASH, MAGIC};
 use crate::segment::{CommanderMemory, DriverView, SegmentError};
 use crate::socket;
 use rustix::net::sockopt::{Timeout, set_socket_timeout};
@@ -182,29 +182,35 @@ pub fn attach(socket: &Path, request: &Request) -> Result<Attachment, AttachErro
 
 fn exchange(socket: &Path, request: &Request) -> Result<(Answer, Vec<OwnedFd>, OwnedFd), AttachError> {
     let connection = connect(socket)?;
-    socket::send(connection.as_fd(), request, &[]).map_err(|error| talk_error(socket, error))?;
-    let (answer, fds) =
-        socket::receive::<Answer>(connection.as_fd()).map_err(|error| talk_error(socket, error))?;
-    judge(socket, &answer)?;
+    // A driver that has no place for us answers unasked and hangs up: its answer counts for more than our
+    // broken pipe.
+    match socket::send(connection.as_fd(), request, &[]) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => return Err(talk_error(socket, error)),
+        _ => {}
+    }
+    let (answer, fds) = socket::receive::<Answer>(connection.as_fd(), ANSWER_TIMEOUT)
+        .map_err(|error| talk_error(socket, error))?;
+    judge(socket, request, &answer)?;
     Ok((answer, fds, connection))
 }
 
 /// Turns an answer into our error. The driver's own words are compared here too: it may be the older one
 /// of the two and not know better.
-fn judge(socket: &Path, answer: &Answer) -> Result<(), AttachError> {
+fn judge(socket: &Path, request: &Request, answer: &Answer) -> Result<(), AttachError> {
     if answer.magic != MAGIC {
         let detail = format!("it answered with magic 0x{:016x}, expected 0x{MAGIC:016x}", answer.magic);
         return Err(AttachError::NotADriver { socket: socket.into(), detail });
     }
     let found = handshake::version_text(answer.abi_version);
-    let expected = handshake::version_text(ABI_VERSION);
+    // What was claimed is what was refused: a test that lies must read its own lie.
+    let expected = handshake::version_text(request.abi_version);
     let verdict = Verdict::from_word(answer.verdict);
     if !handshake::is_compatible(answer.abi_version) || verdict == Some(Verdict::WrongVersion) {
         return Err(AttachError::WrongVersion { found, expected });
     }
     if answer.layout_hash != LAYOUT_HASH || verdict == Some(Verdict::WrongLayout) {
         let found = answer.layout_hash;
-        return Err(AttachError::WrongLayout { found, expected: LAYOUT_HASH, version: expected });
+        return Err(AttachError::WrongLayout { found, expected: request.layout_hash, version: expected });
     }
     match verdict {
         Some(Verdict::Granted) => Ok(()),
@@ -237,7 +243,8 @@ fn connect(path: &Path) -> Result<OwnedFd, AttachError> {
         set_socket_timeout(&socket, timeout, Some(ANSWER_TIMEOUT))
             .map_err(|errno| system("set a time-out on the socket", errno))?;
     }
-    rustix::net::connect(&socket, &address).map_err(|errno| connect_error(path, errno))?;
+    rustix::io::retry_on_intr(|| rustix::net::connect(&socket, &address))
+        .map_err(|errno| connect_error(path, errno))?;
     Ok(socket)
 }
 

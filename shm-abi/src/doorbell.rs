@@ -52,10 +52,12 @@ pub fn ring(bell: &Bell, k: u64, sleeps: &AtomicU64) {
     }
 }
 
-/// Wakes whoever sleeps on `bell`, without a new value: so that it looks at something else.
+/// Wakes everybody who sleeps on `bell`, without a new value: so that they look at something else. The
+/// word does not change, so that this is lost on somebody who is just about to sleep: whoever relies on it
+/// bounds the sleep by a time-out.
 pub fn wake(bell: &Bell) {
-    // The word is ours and mapped; the only errors are those of a bad address.
-    let _ = futex::wake(&bell.doorbell, futex::Flags::empty(), u32::MAX);
+    // The word is mapped; the only errors are those of a bad address.
+    let _ = futex::wake(&bell.doorbell, futex::Flags::empty(), EVERYBODY);
 }
 
 /// The number of the newest complete value.
@@ -69,13 +71,20 @@ pub fn sleep(bell: &Bell, seen: Option<u64>, own_flag: &AtomicU64, timeout: Dura
     let expected = bell.doorbell.load(Ordering::Acquire);
     raise_flag(own_flag);
     if latest(bell) == seen {
-        let timeout =
-            futex::Timespec { tv_sec: timeout.as_secs() as i64, tv_nsec: timeout.subsec_nanos().into() };
+        let timeout = futex::Timespec {
+            // "For ever" must not become negative: the kernel would refuse, and the caller would spin.
+            tv_sec: i64::try_from(timeout.as_secs()).unwrap_or(i64::MAX),
+            tv_nsec: timeout.subsec_nanos().into(),
+        };
         // Every outcome (woken, changed, interrupted, timed out) means the same: look again.
         let _ = futex::wait(&bell.doorbell, futex::Flags::empty(), expected, Some(&timeout));
     }
     own_flag.store(0, Ordering::Relaxed);
 }
+
+/// The kernel reads the number of sleepers to wake as a signed one: -1 would wake a single one, and an
+/// observer that sleeps on the same word could take the commander's turn.
+const EVERYBODY: u32 = i32::MAX as u32;
 
 /// Publishes the number of a value that stands.
 pub fn announce<W: Word>(latest_plus_one: &W, k: u64) {

@@ -217,7 +217,12 @@ pub fn name_bytes(name: &str) -> [u8; NAME_BYTES] {
 /// A name as it came: whatever is not a printable character is replaced.
 pub fn name_text(bytes: &[u8; NAME_BYTES]) -> String {
     let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(NAME_BYTES);
-    String::from_utf8_lossy(&bytes[..end]).chars().map(|c| if c.is_control() { '?' } else { c }).collect()
+    printable(&bytes[..end])
+}
+
+/// Foreign text that may go to a terminal.
+pub(crate) fn printable(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).chars().map(|c| if c.is_control() { '?' } else { c }).collect()
 }
 
 #[cfg(test)]

@@ -37,7 +37,10 @@ pub const HISTOGRAM_BUCKETS: usize = 1024;
 pub const EPITAPH_WORDS: usize = 32;
 /// Bytes of a device's or client's name, padded with zeros.
 pub const NAME_BYTES: usize = 64;
+/// The same in words.
+pub const NAME_WORDS: usize = 8;
 
+const _: () = assert!(NAME_WORDS * 8 == NAME_BYTES);
 const _: () = assert!(size_of::<Frame>() == FRAME_WORDS * 8);
 const _: () = assert!(size_of::<Command>() == COMMAND_WORDS * 8);
 const _: () = assert!(RING_FRAMES.is_power_of_two() && RING_COMMANDS.is_power_of_two());
@@ -145,7 +148,7 @@ pub struct DriverHeader {
     pub wait_mode: AtomicU64,
     /// CPU of the driver's loop plus one; 0: any.
     pub cpu_plus_one: AtomicU64,
-    /// Bit `i` set: real-time guarantee `i` of the driver was obtained.
+    /// Room for later minor versions; zero.
     pub reserved: AtomicU64,
     /// 1 once everything above stands; written last.
     pub ready: AtomicU64,
@@ -247,7 +250,7 @@ assert_layout!(Counters: 128, 64 {
 #[derive(Debug, Default)]
 pub struct DeviceDescription {
     /// UTF-8, padded with zeros.
-    pub name: [AtomicU64; NAME_BYTES / 8],
+    pub name: [AtomicU64; NAME_WORDS],
     /// UTF-8, padded with zeros: the kind, such as "premium" or "ideal".
     pub kind: [AtomicU64; 2],
     /// Bits of an f64: the largest force [N]; infinite where there is no limit.
@@ -263,7 +266,7 @@ pub struct DeviceDescription {
 }
 
 assert_layout!(DeviceDescription: 192, 64 {
-    name: [AtomicU64; NAME_BYTES / 8] = 0,
+    name: [AtomicU64; NAME_WORDS] = 0,
     kind: [AtomicU64; 2] = 64,
     peak_force_n: AtomicU64 = 80,
     continuous_force_n: AtomicU64 = 88,
@@ -420,7 +423,7 @@ mod tests {
         assert_eq!(LAYOUT_HASH, PUBLISHED_LAYOUT_HASH, "now 0x{LAYOUT_HASH:016x}");
     }
 
-    const PUBLISHED_LAYOUT_HASH: u64 = 0;
+    const PUBLISHED_LAYOUT_HASH: u64 = 0xab00_2f00_64a4_e9e4;
 
     #[test]
     fn the_hash_notices_a_renamed_field_and_a_moved_one() {

@@ -11,6 +11,7 @@
 use crate::command::Command;
 use crate::doorbell::{self, WaitMode};
 use crate::frame::Frame;
+use crate::handshake;
 use crate::layout::{
     ABI_VERSION, CommanderSegment, DeviceDescription, DriverSegment, LAYOUT_HASH, MAGIC, MAX_DEVICES,
     NAME_BYTES, RING_COMMANDS, RING_FRAMES,
@@ -18,7 +19,8 @@ use crate::layout::{
 use crate::seqlock::{self, Torn};
 use bytemuck::Zeroable;
 use memmap2::{MmapOptions, MmapRaw};
-use rustix::fs::{MemfdFlags, SealFlags};
+use rustix::fs::{FallocateFlags, MemfdFlags, SealFlags};
+use rustix::io::Errno;
 use std::fs::File;
 use std::io;
 use std::marker::PhantomData;
@@ -163,7 +165,7 @@ pub struct DriverMemory {
 }
 
 impl DriverMemory {
-    /// Creates, fills in and seals it; every page is touched.
+    /// Creates, fills in and seals it.
     pub fn create(info: &DriverInfo) -> Result<Self, SegmentError> {
         let fd = create_memfd(c"phantom3-driver", size_of::<DriverSegment>())?;
         let map = Mapping::<DriverSegment>::writable(&fd)?;
@@ -217,7 +219,7 @@ impl DriverView {
         let map = Mapping::<DriverSegment>::read_only(&fd)?;
         let header = &map.header;
         expect("magic", &header.magic, MAGIC)?;
-        expect("ABI version", &header.abi_version, ABI_VERSION)?;
+        expect_compatible(&header.abi_version)?;
         expect("layout hash", &header.layout_hash, LAYOUT_HASH)?;
         expect("ready word", &header.ready, 1)?;
         Ok(Self { map })
@@ -249,6 +251,9 @@ impl DriverView {
     /// Reads frame `tick` whole into `frame`, or says why it cannot be had.
     #[inline]
     pub fn read_frame(&self, tick: u64, frame: &mut Frame) -> Result<(), FrameUnavailable> {
+        if tick > LAST_TICK {
+            return Err(FrameUnavailable::NotYet(tick));
+        }
         let slot = &self.map.frames[slot_of(tick, RING_FRAMES)];
         let stamp = seqlock::read(&slot.sequence, &slot.words, words_of_mut(frame))
             .map_err(|Torn| FrameUnavailable::Torn(tick))?;
@@ -300,6 +305,7 @@ impl CommanderMemory {
         check(fd, size_of::<CommanderSegment>(), SealFlags::SHRINK | SealFlags::GROW)?;
         let map = Mapping::<CommanderSegment>::writable(&fd)?;
         expect("magic", &map.header.magic, MAGIC)?;
+        expect_compatible(&map.header.abi_version)?;
         expect("layout hash", &map.header.layout_hash, LAYOUT_HASH)?;
         let lease = get(&map.header.lease);
         Ok(Self { map, lease })
@@ -372,7 +378,8 @@ impl CommanderView {
         doorbell::sleep(&self.map.bell, seen, &own.map.bell.owner_sleeps, timeout);
     }
 
-    /// Wakes the driver's own loop out of [`sleep_for_command`](Self::sleep_for_command).
+    /// Wakes the driver's own loop out of [`sleep_for_command`](Self::sleep_for_command). If it is only about
+    /// to sleep, it misses this (see [`doorbell::wake`]) and sleeps for its whole time-out.
     pub fn wake_sleeper(&self) {
         doorbell::wake(&self.map.bell);
     }
@@ -422,16 +429,12 @@ fn describe(segment: &DriverSegment, info: &DriverInfo) {
     for (device, to) in info.devices.iter().zip(&segment.devices) {
         device.write_to(to);
     }
-    touch_every_page(segment);
     header.ready.store(1, Ordering::Release);
 }
 
-/// A page of a memfd exists only once it was written; the loop must not be the first.
-fn touch_every_page(segment: &DriverSegment) {
-    for slot in &segment.frames {
-        put(&slot.sequence, 0);
-    }
-}
+/// The stamps of later ticks would be those of early ones again (after 292 million years at 1 kHz, so that
+/// only an allegation names one).
+const LAST_TICK: u64 = (u64::MAX >> 1) - 1;
 
 fn slot_of(tick: u64, slots: usize) -> usize {
     // Both rings are powers of two, so the cut of the cast does not matter.
@@ -470,7 +473,7 @@ fn put_text(words: &[AtomicU64], text: &str) {
 fn text_of(words: &[AtomicU64]) -> String {
     let bytes: Vec<u8> =
         words.iter().flat_map(|word| get(word).to_le_bytes()).take_while(|byte| *byte != 0).collect();
-    String::from_utf8_lossy(&bytes).into_owned()
+    handshake::printable(&bytes)
 }
 
 fn expect(what: &'static str, word: &AtomicU64, expected: u64) -> Result<(), SegmentError> {
@@ -480,11 +483,27 @@ fn expect(what: &'static str, word: &AtomicU64, expected: u64) -> Result<(), Seg
     }
 }
 
+/// A minor version only adds what an older reader may ignore.
+fn expect_compatible(version: &AtomicU64) -> Result<(), SegmentError> {
+    match get(version) {
+        found if handshake::is_compatible(found) => Ok(()),
+        found => Err(SegmentError::WrongHeader { what: "ABI version", found, expected: ABI_VERSION }),
+    }
+}
+
 fn create_memfd(name: &std::ffi::CStr, bytes: usize) -> Result<OwnedFd, SegmentError> {
-    let fd = rustix::fs::memfd_create(name, MemfdFlags::CLOEXEC | MemfdFlags::ALLOW_SEALING)
+    let flags = MemfdFlags::CLOEXEC | MemfdFlags::ALLOW_SEALING;
+    let fd = rustix::fs::memfd_create(name, flags | MemfdFlags::NOEXEC_SEAL)
+        .or_else(|errno| match errno {
+            // Linux before 6.3 does not know the flag; a hardened one later on insists on it.
+            Errno::INVAL => rustix::fs::memfd_create(name, flags),
+            other => Err(other),
+        })
         .map_err(|errno| SegmentError::System { what: "create", source: errno.into() })?;
-    rustix::fs::ftruncate(&fd, bytes as u64)
-        .map_err(|errno| SegmentError::System { what: "size", source: errno.into() })?;
+    // Not only sized: a page that does not exist yet costs a page fault inside a tick, and SIGBUS if there
+    // is no memory left by then.
+    rustix::fs::fallocate(&fd, FallocateFlags::empty(), 0, bytes as u64)
+        .map_err(|errno| SegmentError::System { what: "reserve the memory of", source: errno.into() })?;
     Ok(fd)
 }
 

@@ -6,7 +6,8 @@
 //! memory nobody reads. What happens is returned as [`ServerEvent`]s, for the owner to pass to the loop.
 //!
 //! Invariant: nothing a client sends or withholds blocks the thread; a client that connects and says
-//! nothing is dropped after [`PATIENCE`].
+//! nothing is dropped after [`PATIENCE`], and one that says more than its request, at once: what nobody
+//! reads may hold a copy of the connection itself, and so a lease that its holder's death does not end.
 
 use crate::handshake::{self, Answer, Request, RequestKind, Verdict};
 use crate::segment::{CommanderView, DriverMemory};
@@ -14,11 +15,12 @@ use crate::socket;
 use bytemuck::Zeroable;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::FlockOperation;
-use rustix::net::RecvFlags;
-use std::fs::{File, Permissions};
+use rustix::io::Errno;
+use rustix::net::{AddressFamily, RecvFlags, SocketAddrUnix, SocketFlags, SocketType};
+use std::fs::{File, Metadata, Permissions};
 use std::io;
 use std::os::fd::{AsFd, BorrowedFd};
-use std::os::unix::fs::{DirBuilderExt, PermissionsExt};
+use std::os::unix::fs::{DirBuilderExt, FileTypeExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -26,6 +28,8 @@ use thiserror::Error;
 
 /// Connections at once, the commander's included.
 pub const MAX_CONNECTIONS: usize = 64;
+/// Of these, observers: however many look on, somebody can still command, stop and clear a fault.
+pub const MAX_OBSERVERS: usize = 60;
 /// How long a new connection may take to say what it wants.
 pub const PATIENCE: Duration = Duration::from_secs(1);
 /// After a failed accept (no descriptors left, say) the listener rests this long instead of spinning.
@@ -92,8 +96,10 @@ pub enum BindError {
 pub struct Server {
     listener: UnixListener,
     path: PathBuf,
+    /// Which file `path` named when it was made.
+    identity: Option<Identity>,
     /// Held as long as the driver lives; the kernel lets go of it however the driver dies.
-    _lock: File,
+    lock: File,
     connections: Vec<Connection>,
     next_lease: u64,
     accept_after: Option<Instant>,
@@ -110,7 +116,9 @@ struct Connection {
 enum Stage {
     /// Has sent so many bytes of its request.
     Asking { bytes: [u8; size_of::<Request>()], filled: usize, since: Instant },
-    /// Got the driver's segment, or its answer; nothing more is expected.
+    /// Got the driver's segment.
+    Observing,
+    /// Got an answer and nothing to keep.
     Served,
     /// Holds the lease.
     Commanding { lease: u64, name: String },
@@ -133,6 +141,7 @@ impl Server {
                 .map_err(failed("create the directory", directory))?;
         }
         let lock = lock(path)?;
+        make_sure_nobody_listens(path)?;
         // The socket gets its mode before it gets its name: there is no moment at which it is too open.
         let unnamed = suffixed(path, &format!(".{}", std::process::id()));
         let _ = std::fs::remove_file(&unnamed);
@@ -145,7 +154,9 @@ impl Server {
             return Err(failed("listen at", path)(source));
         }
         let path = path.to_path_buf();
-        Ok(Self { listener, path, _lock: lock, connections: Vec::new(), next_lease: 1, accept_after: None })
+        let identity = std::fs::symlink_metadata(&path).ok().map(|meta| identity_of(&meta));
+        let connections = Vec::new();
+        Ok(Self { listener, path, identity, lock, connections, next_lease: 1, accept_after: None })
     }
 
     /// Where it listens.
@@ -173,6 +184,7 @@ impl Server {
     }
 
     fn wait(&self, timeout: Duration) -> io::Result<(bool, Vec<usize>)> {
+        let timeout = timespec(self.next_duty().map_or(timeout, |duty| duty.min(timeout)));
         let accepting = self.accept_after.is_none_or(|after| Instant::now() >= after);
         let mut fds: Vec<PollFd<'_>> = self
             .connections
@@ -182,10 +194,9 @@ impl Server {
         if accepting {
             fds.push(PollFd::new(&self.listener, PollFlags::IN));
         }
-        let timeout = Timespec { tv_sec: timeout.as_secs() as i64, tv_nsec: timeout.subsec_nanos().into() };
         match poll(&mut fds, Some(&timeout)) {
             Ok(_) => {}
-            Err(rustix::io::Errno::INTR) => return Ok((false, Vec::new())),
+            Err(Errno::INTR) => return Ok((false, Vec::new())),
             Err(errno) => return Err(errno.into()),
         }
         let newcomer = accepting && fds.pop().is_some_and(|fd| !fd.revents().is_empty());
@@ -194,11 +205,29 @@ impl Server {
         Ok((newcomer, talking.collect()))
     }
 
+    /// How long until something has to be done though nobody says anything.
+    fn next_duty(&self) -> Option<Duration> {
+        let now = Instant::now();
+        let silence_ends = self.connections.iter().filter_map(|connection| match connection.stage {
+            Stage::Asking { since, .. } => Some(since + PATIENCE),
+            _ => None,
+        });
+        let rest_ends = self.accept_after.filter(|after| *after > now);
+        silence_ends.chain(rest_ends).min().map(|duty| duty.saturating_duration_since(now))
+    }
+
     fn accept(&mut self) {
         self.accept_after = None;
-        let Ok((stream, _)) = self.listener.accept() else {
-            self.accept_after = Some(Instant::now() + ACCEPT_REST);
-            return;
+        let stream = match self.listener.accept() {
+            Ok((stream, _)) => stream,
+            // Whoever knocked has left again.
+            Err(e) if matches!(e.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::ConnectionAborted) => {
+                return;
+            }
+            Err(_) => {
+                self.accept_after = Some(Instant::now() + ACCEPT_REST);
+                return;
+            }
         };
         let pid = peer_pid(&stream);
         if stream.set_nonblocking(true).is_err() {
@@ -243,7 +272,7 @@ impl Server {
         };
         let pid = self.connections[index].pid;
         match kind {
-            RequestKind::Observe => self.answer(index, &Answer::new(Verdict::Granted), &[memory.fd()]),
+            RequestKind::Observe => self.let_observe(index, memory),
             RequestKind::Command => self.lease_to(index, handshake::name_text(&request.name), memory, events),
             RequestKind::Stop => {
                 events.push(ServerEvent::StopRequested { pid });
@@ -256,6 +285,17 @@ impl Server {
         }
     }
 
+    fn let_observe(&self, index: usize, memory: &DriverMemory) -> Stage {
+        let observers = self.connections.iter().filter(|c| matches!(c.stage, Stage::Observing)).count();
+        if observers >= MAX_OBSERVERS {
+            return self.refuse(index, Verdict::Crowded);
+        }
+        match self.answer(index, &Answer::new(Verdict::Granted), &[memory.fd()]) {
+            Stage::Served => Stage::Observing,
+            failed => failed,
+        }
+    }
+
     fn lease_to(
         &mut self,
         index: usize,
@@ -263,6 +303,7 @@ impl Server {
         memory: &DriverMemory,
         events: &mut Vec<ServerEvent>,
     ) -> Stage {
+        self.end_lease_of_the_dead(events);
         if self.holder().is_some() {
             events.push(ServerEvent::LeaseRefused);
             return self.refuse(index, Verdict::LeaseHeld);
@@ -297,6 +338,19 @@ impl Server {
         Stage::Gone
     }
 
+    /// Between two looks at all connections a holder may have died and its successor asked already: the
+    /// successor must not be told that the dead one commands.
+    fn end_lease_of_the_dead(&mut self, events: &mut Vec<ServerEvent>) {
+        for connection in &mut self.connections {
+            if let Stage::Commanding { lease, .. } = connection.stage
+                && connection.is_over()
+            {
+                events.push(ServerEvent::LeaseEnded { lease });
+                connection.stage = Stage::Gone;
+            }
+        }
+    }
+
     /// Answers, and says what becomes of the connection.
     fn answer(&self, index: usize, answer: &Answer, fds: &[BorrowedFd<'_>]) -> Stage {
         match socket::send(self.connections[index].stream.as_fd(), answer, fds) {
@@ -323,8 +377,9 @@ impl Server {
 
 impl Drop for Server {
     fn drop(&mut self) {
-        let _ = std::fs::remove_file(&self.path);
-        let _ = std::fs::remove_file(suffixed(&self.path, LOCK_SUFFIX));
+        remove_if(&self.path, self.identity);
+        let lock = self.lock.metadata().ok().map(|meta| identity_of(&meta));
+        remove_if(&suffixed(&self.path, LOCK_SUFFIX), lock);
     }
 }
 
@@ -337,13 +392,8 @@ enum Heard {
 impl Connection {
     fn receive(&mut self) -> Heard {
         let Stage::Asking { bytes, filled, .. } = &mut self.stage else {
-            // Nothing is expected any more: whatever comes is thrown away, only the end matters.
-            let mut waste = [0u8; 256];
-            return match rustix::net::recv(&self.stream, &mut waste, RecvFlags::empty()) {
-                Ok((_, 0)) => Heard::End,
-                Ok(_) => Heard::Nothing,
-                Err(errno) => heard_error(errno),
-            };
+            // Nothing is expected any more: this is the end, or a client that does not keep to the protocol.
+            return Heard::End;
         };
         match rustix::net::recv(&self.stream, &mut bytes[*filled..], RecvFlags::empty()) {
             Ok((_, 0)) => return Heard::End,
@@ -357,11 +407,23 @@ impl Connection {
         bytemuck::bytes_of_mut(&mut request).copy_from_slice(bytes);
         Heard::Request(request)
     }
+
+    /// Whether the other end hung up; never blocks.
+    fn is_over(&self) -> bool {
+        let mut fds = [PollFd::new(&self.stream, PollFlags::RDHUP)];
+        poll(&mut fds, Some(&timespec(Duration::ZERO))).is_ok_and(|ready| ready > 0)
+    }
 }
 
-fn heard_error(errno: rustix::io::Errno) -> Heard {
-    use rustix::io::Errno;
+fn heard_error(errno: Errno) -> Heard {
     if errno == Errno::AGAIN || errno == Errno::INTR { Heard::Nothing } else { Heard::End }
+}
+
+fn timespec(duration: Duration) -> Timespec {
+    Timespec {
+        tv_sec: i64::try_from(duration.as_secs()).unwrap_or(i64::MAX),
+        tv_nsec: duration.subsec_nanos().into(),
+    }
 }
 
 fn peer_pid(stream: &UnixStream) -> u64 {
@@ -377,22 +439,62 @@ fn lock(path: &Path) -> Result<File, BindError> {
     let failed = |source| BindError::System { what: "lock", path: name.clone(), source };
     const TRIES: usize = 16;
     for _ in 0..TRIES {
-        let file = File::options().create(true).truncate(false).write(true).open(&name).map_err(failed)?;
+        // The owner's alone: whoever could open it could hold the lock and keep every driver from starting.
+        let mut options = File::options();
+        let file =
+            options.create(true).truncate(false).write(true).mode(0o600).open(&name).map_err(failed)?;
         match rustix::fs::flock(&file, FlockOperation::NonBlockingLockExclusive) {
             Ok(()) => {}
-            Err(rustix::io::Errno::WOULDBLOCK) => {
+            Err(Errno::WOULDBLOCK) => {
                 return Err(BindError::AlreadyRunning { socket: path.to_path_buf() });
             }
             Err(errno) => return Err(failed(errno.into())),
         }
-        use std::os::unix::fs::MetadataExt;
-        let held = file.metadata().map_err(failed)?;
-        if std::fs::metadata(&name).is_ok_and(|named| (named.dev(), named.ino()) == (held.dev(), held.ino()))
-        {
+        let held = identity_of(&file.metadata().map_err(failed)?);
+        if std::fs::symlink_metadata(&name).is_ok_and(|named| identity_of(&named) == held) {
             return Ok(file);
         }
     }
     Err(BindError::AlreadyRunning { socket: path.to_path_buf() })
+}
+
+/// The lock keeps our own kind apart; this also spares whatever else lies at the path: a file that somebody
+/// named by mistake, and a living socket whose lock file was swept away.
+fn make_sure_nobody_listens(path: &Path) -> Result<(), BindError> {
+    let system = |source| BindError::System { what: "listen at", path: path.to_path_buf(), source };
+    match std::fs::symlink_metadata(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        Err(error) => return Err(system(error)),
+        Ok(meta) if !meta.file_type().is_socket() => {
+            let found = "something that is not a socket lies there, and it is left alone";
+            return Err(system(io::Error::new(io::ErrorKind::AlreadyExists, found)));
+        }
+        Ok(_) => {}
+    }
+    let address = SocketAddrUnix::new(path).map_err(|errno| system(errno.into()))?;
+    let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
+    let probe = rustix::net::socket_with(AddressFamily::UNIX, SocketType::STREAM, flags, None)
+        .map_err(|errno| system(errno.into()))?;
+    match rustix::net::connect(&probe, &address) {
+        Err(Errno::CONNREFUSED | Errno::NOENT) => Ok(()),
+        // A full queue belongs to somebody who lives but does not look.
+        Ok(()) | Err(Errno::AGAIN) => Err(BindError::AlreadyRunning { socket: path.to_path_buf() }),
+        Err(errno) => Err(system(errno.into())),
+    }
+}
+
+/// Device and inode: the same file, whatever its name.
+type Identity = (u64, u64);
+
+fn identity_of(meta: &Metadata) -> Identity {
+    (meta.dev(), meta.ino())
+}
+
+/// Removes a name only while it still names our file: another driver may have taken the place since.
+fn remove_if(path: &Path, ours: Option<Identity>) {
+    if std::fs::symlink_metadata(path).is_ok_and(|meta| Some(identity_of(&meta)) == ours) {
+        let _ = std::fs::remove_file(path);
+    }
 }
 
 fn suffixed(path: &Path, suffix: &str) -> PathBuf {

@@ -1,6 +1,7 @@
 //! Messages with descriptors over a Unix stream socket.
 
 use bytemuck::Pod;
+use rustix::io::retry_on_intr;
 use rustix::net::{
     RecvAncillaryBuffer, RecvAncillaryMessage, RecvFlags, SendAncillaryBuffer, SendAncillaryMessage,
     SendFlags, recvmsg, sendmsg,
@@ -8,6 +9,7 @@ use rustix::net::{
 use std::io::{self, IoSlice, IoSliceMut};
 use std::mem::MaybeUninit;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::time::{Duration, Instant};
 
 /// At most this many descriptors travel with a message.
 const MAX_DESCRIPTORS: usize = 2;
@@ -21,13 +23,15 @@ pub(crate) fn send<M: Pod>(socket: BorrowedFd<'_>, message: &M, fds: &[BorrowedF
         control.push(SendAncillaryMessage::ScmRights(fds));
     }
     let bytes = bytemuck::bytes_of(message);
-    let sent = sendmsg(socket, &[IoSlice::new(bytes)], &mut control, SendFlags::NOSIGNAL)?;
+    let sent = retry_on_intr(|| sendmsg(socket, &[IoSlice::new(bytes)], &mut control, SendFlags::NOSIGNAL))?;
     if sent == bytes.len() { Ok(()) } else { Err(io::ErrorKind::WriteZero.into()) }
 }
 
-/// Receives one message of exactly `M`'s size, and the descriptors that came with it. Blocks as long as
-/// the socket's receive time-out allows.
-pub(crate) fn receive<M: Pod>(socket: BorrowedFd<'_>) -> io::Result<(M, Vec<OwnedFd>)> {
+/// Receives one message of exactly `M`'s size, and the descriptors that came with it. Waits for `patience`
+/// in all, and beyond that once as long as the socket's receive time-out allows: a sender that drips byte
+/// after byte does not hold us for ever.
+pub(crate) fn receive<M: Pod>(socket: BorrowedFd<'_>, patience: Duration) -> io::Result<(M, Vec<OwnedFd>)> {
+    let started = Instant::now();
     let mut message = M::zeroed();
     let bytes = bytemuck::bytes_of_mut(&mut message);
     let mut fds = Vec::new();
@@ -37,6 +41,9 @@ pub(crate) fn receive<M: Pod>(socket: BorrowedFd<'_>) -> io::Result<(M, Vec<Owne
             0 => return Err(io::ErrorKind::UnexpectedEof.into()),
             more => filled += more,
         }
+        if filled < bytes.len() && started.elapsed() > patience {
+            return Err(io::ErrorKind::TimedOut.into());
+        }
     }
     Ok((message, fds))
 }
@@ -44,7 +51,10 @@ pub(crate) fn receive<M: Pod>(socket: BorrowedFd<'_>) -> io::Result<(M, Vec<Owne
 fn receive_some(socket: BorrowedFd<'_>, into: &mut [u8], fds: &mut Vec<OwnedFd>) -> io::Result<usize> {
     let mut space = [MaybeUninit::uninit(); rustix::cmsg_space!(ScmRights(MAX_DESCRIPTORS))];
     let mut control = RecvAncillaryBuffer::new(&mut space);
-    let received = recvmsg(socket, &mut [IoSliceMut::new(into)], &mut control, RecvFlags::CMSG_CLOEXEC)?;
+    // With a time-out set, the kernel interrupts even for a stop and continue from the terminal.
+    let received = retry_on_intr(|| {
+        recvmsg(socket, &mut [IoSliceMut::new(into)], &mut control, RecvFlags::CMSG_CLOEXEC)
+    })?;
     for message in control.drain() {
         if let RecvAncillaryMessage::ScmRights(arrived) = message {
             fds.extend(arrived);

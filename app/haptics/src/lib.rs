@@ -1,2 +1,60 @@
-//! Crate.
+//! Contact of fingers with surfaces by the Friction Cone Algorithm, as a pure library.
+//!
+//! Problem: every tick a device reports where each finger is (its HIP, the haptic interaction
+//! point); the force the user must feel has to come back within microseconds, with friction that
+//! neither drifts nor chatters.
+//!
+//! Model: while the HIP is inside an object, a god-object stays on the object's surface. It rests
+//! while it lies inside the friction circle, where the friction cone at the HIP meets the surface,
+//! and is drawn to the circle's rim when it does not. The spring between the two is the force
+//! (N. Melder, *Multi-Finger Manipulation Physics for Haptic Rendering*, ch. 4.1-4.2.1 and 7.5.3;
+//! cited as `melder#4.6`). Where a printed equation is wrong, its item says `corrected` and how.
+//!
+//! Layers, each usable alone:
+//! - [`FrictionLaw`] / [`Friction`]: does it hold, and if not, how far does it slide;
+//! - [`Surface`] / [`Plane`], [`Sphere`], [`Shape`]: where is the surface;
+//! - [`FrictionCone`]: one god-object on any surface under any law;
+//! - [`Finger`]: all contacts of one finger with all entities, in the world frame.
+//!
+//! Frames and signs: W world, B body; a suffix names the frame (`hip_B`), a pose `X_WB` maps B to
+//! W. SI units, `f64`, y up. Normals leave the material. A force always says on whom it acts.
+//!
+//! Invariants: a step never allocates, panics, reads a clock or loops without a constant bound; it
+//! returns finite values for every input; contacts never pull.
+//!
+//! Cost: one tick of one finger is linear in the number of entities; a contact takes one round
+//! while it sticks, two on a plane and a handful on a curved surface while it slides.
 #![forbid(unsafe_code)]
+#![deny(missing_docs)]
+// Names carry their frame (`hip_B`, `X_WB`), which is worth more here than the case lint.
+#![allow(non_snake_case)]
+
+mod classic;
+mod contact;
+mod entity;
+mod error;
+mod finger;
+mod frame;
+mod friction;
+mod friction_cone;
+mod friction_law;
+mod plane;
+mod shape;
+mod slide;
+mod sphere;
+mod surface;
+mod tangent_view;
+
+pub use classic::classic_god_object;
+pub use contact::Contact;
+pub use entity::Entity;
+pub use error::ParameterError;
+pub use finger::{ContactState, Finger, FingerOutput};
+pub use friction::{Friction, RESTICK_MARGIN};
+pub use friction_cone::{ConeForce, ConeInput, FrictionCone};
+pub use friction_law::{FrictionLaw, FrictionQuery, FrictionState};
+pub use plane::Plane;
+pub use shape::Shape;
+pub use slide::MAX_SLIDE_ROUNDS;
+pub use sphere::Sphere;
+pub use surface::{Feature, Surface, SurfacePoint};

@@ -1,2 +1,60 @@
-//! Crate.
+//! Scenes: which fingers and entities a run starts with, and the files that say so.
+//!
+//! Problem: a scene file is written by hand, so it is wrong at first. Whoever reads the message
+//! must be able to mend the file without reading this code.
+//!
+//! Model: [`Scene::parse`] turns TOML text into plain validated data, or into one
+//! [`SceneError`] that names file, line, key, what was found and what is allowed. [`Layout`] does
+//! the same for the file that says where the devices stand. Nothing here renders or moves:
+//! the numbers are handed to the crates that do.
+//!
+//! Frames: W world (right-handed, y up), B entity, D device base. A pose `X_WB` takes points
+//! of B into W. SI throughout; quaternions are written w, x, y, z.
+//!
+//! Invariants of what is returned: every number is finite, directions and quaternions have unit
+//! length, stiffness and sizes are positive, names are unique and safe as CSV column names.
+//!
+//! ```
+//! use std::path::Path;
+//! use world::{Scene, ShapeSpec};
+//!
+//! let text = r#"
+//!     [[finger]]
+//!     [[entity]]
+//!     shape = { kind = "sphere", radius_m = 0.05 }
+//! "#;
+//! let scene = Scene::parse(text, Path::new("ball.toml"))?;
+//! assert_eq!(scene.name, "ball");
+//! assert_eq!(scene.fingers[0].name, "f0");
+//! assert_eq!(scene.entities[0].shape, ShapeSpec::Sphere { radius_m: 0.05 });
+//! # Ok::<(), world::SceneError>(())
+//! ```
 #![forbid(unsafe_code)]
+#![deny(missing_docs)]
+
+mod document;
+mod entity;
+mod error;
+mod finger;
+mod friction;
+mod layout;
+mod names;
+mod pose;
+mod reader;
+mod scene;
+mod shape;
+mod source;
+mod vocabulary;
+
+pub use entity::SceneEntity;
+pub use error::{Location, SceneError};
+pub use finger::SceneFinger;
+pub use friction::FrictionSpec;
+pub use layout::Layout;
+pub use names::MAX_NAME_BYTES;
+pub use scene::Scene;
+pub use shape::ShapeSpec;
+pub use source::MAX_FILE_BYTES;
+
+/// Fingers in a scene, devices in a layout, and haptic devices of one driver: at most this many.
+pub const MAX_DEVICES: usize = 8;

@@ -1,0 +1,62 @@
+//! An object as the haptic step sees it: where it is, what it is made of.
+
+use nalgebra::Isometry3;
+
+use crate::error::{ParameterError, above_zero, at_least_zero};
+use crate::friction::Friction;
+use crate::shape::Shape;
+
+/// An object that fingers can touch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Entity {
+    /// Its shape, in its own frame B.
+    pub shape: Shape,
+    /// Its pose in this tick.
+    pub X_WB: Isometry3<f64>,
+    /// Its pose in the last tick. The finger's last position is taken through it: otherwise a
+    /// moving object sweeps past a resting finger unnoticed.
+    pub previous_X_WB: Isometry3<f64>,
+    /// k \[N/m\], > 0.
+    pub stiffness_n_per_m: f64,
+    /// b \[N s/m\], >= 0.
+    pub damping_n_s_per_m: f64,
+    /// Friction of its surface.
+    pub friction: Friction,
+}
+
+impl Entity {
+    /// An entity at rest at `X_WB`, without damping or friction.
+    ///
+    /// Errors: a stiffness that is not finite or not positive.
+    pub fn new(
+        shape: impl Into<Shape>,
+        X_WB: Isometry3<f64>,
+        stiffness_n_per_m: f64,
+    ) -> Result<Self, ParameterError> {
+        Ok(Self {
+            shape: shape.into(),
+            X_WB,
+            previous_X_WB: X_WB,
+            stiffness_n_per_m: above_zero("stiffness_n_per_m", stiffness_n_per_m)?,
+            damping_n_s_per_m: 0.0,
+            friction: Friction::None,
+        })
+    }
+
+    /// With this friction. Errors: a coefficient out of range.
+    pub fn with_friction(self, friction: Friction) -> Result<Self, ParameterError> {
+        Ok(Self { friction: friction.validated()?, ..self })
+    }
+
+    /// With this damping. Errors: a value that is not finite or negative.
+    pub fn with_damping(self, damping_n_s_per_m: f64) -> Result<Self, ParameterError> {
+        let damping_n_s_per_m = at_least_zero("damping_n_s_per_m", damping_n_s_per_m)?;
+        Ok(Self { damping_n_s_per_m, ..self })
+    }
+
+    /// One tick on: the current pose becomes the previous one.
+    pub fn move_to(&mut self, X_WB: Isometry3<f64>) {
+        self.previous_X_WB = self.X_WB;
+        self.X_WB = X_WB;
+    }
+}

@@ -1,0 +1,182 @@
+//! One finger against all entities: sums what its contacts render.
+//!
+//! Model: every entity has its own slot with its own god-object, so that a finger in a corner feels
+//! both walls. Forces add. What a single line of a recording can show (entity, god-object, state)
+//! is that of the primary contact: the one with the largest force, the lowest index among equals.
+//!
+//! Frames: world. Cost: linear in the number of entities; slots are allocated once, in `new`.
+//!
+//! A HIP that is not finite counts as lifted: zero force, all contacts end, and the next finite HIP
+//! is treated as the first. The god-object reported is then the last finite HIP.
+
+use nalgebra::Vector3;
+
+use crate::contact::{Contact, Slot, Sweep};
+use crate::entity::Entity;
+use crate::error::{ParameterError, at_least_zero};
+use crate::frame::is_finite;
+use crate::friction_law::FrictionState;
+use crate::surface::Feature;
+
+/// A finger and its contacts.
+#[derive(Debug, Clone)]
+pub struct Finger {
+    radius_m: f64,
+    previous_hip_W: Option<Vector3<f64>>,
+    last_finite_hip_W: Vector3<f64>,
+    slots: Box<[Slot]>,
+}
+
+/// What a finger's friction does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum ContactState {
+    /// Touches nothing.
+    #[default]
+    Free,
+    /// The primary contact holds.
+    Stick,
+    /// The primary contact slides.
+    Slip,
+}
+
+impl From<FrictionState> for ContactState {
+    fn from(state: FrictionState) -> Self {
+        match state {
+            FrictionState::Stick => Self::Stick,
+            FrictionState::Slip => Self::Slip,
+        }
+    }
+}
+
+/// What a finger feels in one tick, in the world frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FingerOutput {
+    /// Force the device renders \[N\], over all contacts.
+    pub force_on_user_W: Vector3<f64>,
+    /// God-object of the primary contact; the HIP in free space \[m\].
+    pub god_object_W: Vector3<f64>,
+    /// Index of the primary contact's entity.
+    pub entity: Option<usize>,
+    /// What the primary contact's god-object rests on.
+    pub feature: Feature,
+    /// What the primary contact's friction does.
+    pub friction: ContactState,
+}
+
+impl Finger {
+    /// A finger of this radius (0 for a point) for scenes of up to `capacity` entities.
+    ///
+    /// Entities beyond the capacity are not felt. Errors: a radius not finite or negative.
+    pub fn new(radius_m: f64, capacity: usize) -> Result<Self, ParameterError> {
+        Ok(Self {
+            radius_m: at_least_zero("radius_m", radius_m)?,
+            previous_hip_W: None,
+            last_finite_hip_W: Vector3::zeros(),
+            slots: vec![Slot::default(); capacity].into(),
+        })
+    }
+
+    /// Radius \[m\].
+    pub fn radius_m(&self) -> f64 {
+        self.radius_m
+    }
+
+    /// How many entities it has slots for.
+    pub fn capacity(&self) -> usize {
+        self.slots.len()
+    }
+
+    /// One tick: the HIP is at `hip_W`, the entities at their current poses.
+    ///
+    /// An entity is known by its index: call [`Self::forget`] when another one takes its place. A
+    /// `dt_s` that is not positive leaves out damping and speed-dependent friction.
+    pub fn step(&mut self, entities: &[Entity], hip_W: &Vector3<f64>, dt_s: f64) -> FingerOutput {
+        if !is_finite(hip_W) {
+            self.reset();
+            return free(self.last_finite_hip_W);
+        }
+        let sweep = Sweep {
+            previous_hip_W: self.previous_hip_W,
+            hip_W: *hip_W,
+            finger_radius_m: self.radius_m,
+            dt_s,
+        };
+        self.previous_hip_W = Some(*hip_W);
+        self.last_finite_hip_W = *hip_W;
+        let mut total = Total::default();
+        for (index, (slot, entity)) in self.slots.iter_mut().zip(entities).enumerate() {
+            if let Some(contact) = slot.step(index, entity, &sweep) {
+                total.add(contact);
+            }
+        }
+        // Entities that are gone take their contacts along.
+        for slot in self.slots.iter_mut().skip(entities.len()) {
+            *slot = Slot::default();
+        }
+        total.output(hip_W)
+    }
+
+    /// The contacts of the last tick, in order of their entities.
+    pub fn contacts(&self) -> impl Iterator<Item = &Contact> {
+        self.slots.iter().filter_map(|slot| slot.contact.as_ref())
+    }
+
+    /// The contact of the last tick with one entity.
+    pub fn contact(&self, entity: usize) -> Option<&Contact> {
+        self.slots.get(entity)?.contact.as_ref()
+    }
+
+    /// Ends the contact with one entity, because it is gone or another one has its index.
+    pub fn forget(&mut self, entity: usize) {
+        if let Some(slot) = self.slots.get_mut(entity) {
+            *slot = Slot::default();
+        }
+    }
+
+    /// Ends all contacts and forgets where the finger was: the next step is a first one.
+    pub fn reset(&mut self) {
+        self.previous_hip_W = None;
+        self.slots.fill(Slot::default());
+    }
+}
+
+/// Sum and primary contact of a tick.
+#[derive(Default)]
+struct Total {
+    force_on_user_W: Vector3<f64>,
+    primary: Option<Contact>,
+}
+
+impl Total {
+    fn add(&mut self, contact: Contact) {
+        self.force_on_user_W += contact.force_on_user_W;
+        let is_larger = |than: &Contact| contact.force_on_user_W.norm() > than.force_on_user_W.norm();
+        if self.primary.as_ref().is_none_or(is_larger) {
+            self.primary = Some(contact);
+        }
+    }
+
+    fn output(&self, hip_W: &Vector3<f64>) -> FingerOutput {
+        let Some(primary) = &self.primary else { return free(*hip_W) };
+        // Finite forces can overflow in the sum; zero is the safe one.
+        let force_on_user_W =
+            if is_finite(&self.force_on_user_W) { self.force_on_user_W } else { Vector3::zeros() };
+        FingerOutput {
+            force_on_user_W,
+            god_object_W: primary.god_object_W,
+            entity: Some(primary.entity),
+            feature: primary.feature,
+            friction: primary.friction.into(),
+        }
+    }
+}
+
+fn free(hip_W: Vector3<f64>) -> FingerOutput {
+    FingerOutput {
+        force_on_user_W: Vector3::zeros(),
+        god_object_W: hip_W,
+        entity: None,
+        feature: Feature::None,
+        friction: ContactState::Free,
+    }
+}

@@ -1,0 +1,147 @@
+//! The Friction Cone Algorithm: one god-object on one surface.
+//!
+//! Problem: render friction without drift, chatter or a velocity estimate. The god-object stays
+//! where it is while the HIP's friction cone, of half-angle atan(mu), contains it; otherwise it is
+//! drawn to the cone's rim (Melder ch. 4.1).
+//!
+//! Model: the law is asked first whether the god-object holds; if not, it slides in the same tick
+//! with the sliding coefficient (ch. 4.1.1). The force is `k (load n + (G - S))`, which is the
+//! corrected eq. 4.7 written so that its normal part is exactly `k d`: `k (G - H)` would carry the
+//! rounding of G and, on a curved surface, whatever the last projection left.
+//!
+//! Frames and signs: object frame B. `force_on_user` is what the device renders and points out of
+//! the material; `force_on_object` is its negative, the one printed as eq. 4.7.
+//!
+//! Damping: `N = max(0, k d + b v)` with v the speed of approach along the normal; the friction
+//! circle has the radius `mu N / k`. While the contact sticks, `-b` times the tangential velocity
+//! is added, and the sum cut to the cone; in slip it is left out, so that sliding ratios are exact.
+//!
+//! Invariants: contacts never pull; the tangential force stays within the cone of the law.
+//! Cost: one look while it sticks, see [`crate::MAX_SLIDE_ROUNDS`] while it slides.
+
+use nalgebra::Vector3;
+
+use crate::friction_law::{FrictionLaw, FrictionQuery, FrictionState};
+use crate::slide::slide;
+use crate::surface::{Surface, SurfacePoint};
+use crate::tangent_view::{TangentView, tangential};
+
+/// State of one contact.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrictionCone {
+    god_object: SurfacePoint,
+    state: FrictionState,
+}
+
+/// What a contact is told in one tick, in the object's frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ConeInput {
+    /// HIP \[m\], inside the surface.
+    pub hip_B: Vector3<f64>,
+    /// Velocity of the HIP relative to the object \[m/s\]; used by damping only.
+    pub hip_velocity_B: Vector3<f64>,
+    /// k \[N/m\], > 0.
+    pub stiffness_n_per_m: f64,
+    /// b \[N s/m\], >= 0.
+    pub damping_n_s_per_m: f64,
+    /// Length of the tick \[s\]; used by speed-dependent friction only.
+    pub dt_s: f64,
+}
+
+impl ConeInput {
+    /// Damping over stiffness \[s\].
+    pub(crate) fn damping_s(&self) -> f64 {
+        self.damping_n_s_per_m / self.stiffness_n_per_m
+    }
+}
+
+/// What a contact answers, in the object's frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ConeForce {
+    /// Force the device renders \[N\]; points out of the material.
+    pub force_on_user_B: Vector3<f64>,
+    /// Its normal part N \[N\], >= 0.
+    pub normal_force_n: f64,
+    /// Depth of the HIP below the god-object's tangent plane \[m\].
+    pub depth_m: f64,
+    /// Moves of the god-object in this tick: 0 at rest, at most [`crate::MAX_SLIDE_ROUNDS`].
+    pub rounds: u32,
+}
+
+impl ConeForce {
+    /// Force of the user on the object \[N\] (Melder eq. 4.7).
+    pub fn force_on_object_B(&self) -> Vector3<f64> {
+        -self.force_on_user_B
+    }
+}
+
+impl FrictionCone {
+    /// A contact that begins at a surface point, and holds there if its law lets it.
+    pub fn new(entry: SurfacePoint) -> Self {
+        Self { god_object: entry, state: FrictionState::Stick }
+    }
+
+    /// Where the god-object is, with the outward normal there.
+    pub fn god_object(&self) -> &SurfacePoint {
+        &self.god_object
+    }
+
+    /// Whether it holds or slides.
+    pub fn state(&self) -> FrictionState {
+        self.state
+    }
+
+    /// One tick with the HIP inside the surface; the caller ends the contact when it leaves.
+    pub fn update<S: Surface + ?Sized, L: FrictionLaw + ?Sized>(
+        &mut self,
+        surface: &S,
+        friction: &L,
+        input: &ConeInput,
+    ) -> ConeForce {
+        let view = TangentView::new(surface, &self.god_object, input);
+        if friction.holds(&self.hold_query(&view, input.dt_s)) {
+            self.state = FrictionState::Stick;
+            let limit_m = friction.ratio_limit(FrictionState::Stick, 0.0) * view.load_m;
+            return answer(&view, &stuck_tangential(&view, limit_m, input), 0, input);
+        }
+        // Breakaway and first slide share the tick: the static coefficient is never slid with.
+        self.state = FrictionState::Slip;
+        let slid = slide(surface, friction, input, &mut self.god_object, view);
+        answer(&slid.view, &slid.tangential_B, slid.rounds, input)
+    }
+
+    /// A slide ends within `rest_m` of the rim. Asked to the last bit, a resting finger would
+    /// change between stick and slip with the rounding, so the question forgives as much.
+    fn hold_query(&self, view: &TangentView, dt_s: f64) -> FrictionQuery {
+        FrictionQuery {
+            state: self.state,
+            gap_m: (view.gap_m - view.rest_m).max(0.0),
+            load_m: view.load_m,
+            travel_m: 0.0,
+            dt_s,
+        }
+    }
+}
+
+/// Spring and damper of a held contact, cut to the cone.
+fn stuck_tangential(view: &TangentView, limit_m: f64, input: &ConeInput) -> Vector3<f64> {
+    if input.damping_n_s_per_m == 0.0 {
+        return cut_to(view.lag_B, limit_m);
+    }
+    let velocity_B = tangential(&input.hip_velocity_B, &view.normal_B);
+    cut_to(view.lag_B - velocity_B * input.damping_s(), limit_m)
+}
+
+/// `v`, shortened to `limit` if it is longer.
+fn cut_to(v: Vector3<f64>, limit: f64) -> Vector3<f64> {
+    let length = v.norm();
+    if length > limit { v * (limit / length) } else { v }
+}
+
+fn answer(view: &TangentView, tangential_B: &Vector3<f64>, rounds: u32, input: &ConeInput) -> ConeForce {
+    let k = input.stiffness_n_per_m;
+    // Corrected: of the user on the object the printed sign is right, the device renders this.
+    //= melder#4.7
+    let force_on_user_B = (view.normal_B * view.load_m + tangential_B) * k;
+    ConeForce { force_on_user_B, normal_force_n: k * view.load_m, depth_m: view.depth_m, rounds }
+}

@@ -1,0 +1,155 @@
+//! Slides a god-object along a surface until friction holds it.
+//!
+//! Problem: on a plane the rim of the friction circle is one step away (Melder eq. 4.6). On a
+//! curved surface the step leaves the surface; brought back (eq. 4.12-4.14), the god-object has
+//! another normal, another depth and another circle. One projection per tick, as printed, leaves a
+//! drag on frictionless spheres and sliding ratios off by 1e-3 at ordinary speeds.
+//!
+//! Model: repeat tangent plane, slide, settle until the law asks for no further slide. With H at
+//! distance rho from the centre of a sphere of radius r, the error shrinks per round by
+//! `1 - (rho / r)(cos phi - mu sin phi)` only, which deep inside is hardly at all. The slide asked
+//! for is therefore used as a residual of a secant search along the path: the first step is the
+//! plain one, later steps are divided by the slope seen in the last. Signed residuals take
+//! overshoots back within the tick.
+//!
+//! Invariants: the god-object ends on the surface. The tangential force is that of the rim asked
+//! for, even when the bound ends the search early; then the god-object goes on next tick.
+//!
+//! Cost: at most [`MAX_SLIDE_ROUNDS`] rounds; one move on a plane, three to five at 5 mm depth in a
+//! ball of 0.1 m, and at most 34 in 4 million random slides inside it, down to rho = 1e-4 r.
+
+use nalgebra::Vector3;
+
+use crate::friction_cone::ConeInput;
+use crate::friction_law::{FrictionLaw, FrictionQuery, FrictionState};
+use crate::surface::{Surface, SurfacePoint};
+use crate::tangent_view::TangentView;
+
+/// Bound on the moves of one slide in one tick.
+pub const MAX_SLIDE_ROUNDS: u32 = 64;
+
+/// Where a slide ended.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Slid {
+    pub(crate) view: TangentView,
+    /// Tangential force over stiffness, on the user \[m\].
+    pub(crate) tangential_B: Vector3<f64>,
+    pub(crate) rounds: u32,
+}
+
+/// Moves `god_object` until `friction` asks for no more, starting from what `view` shows.
+pub(crate) fn slide<S: Surface + ?Sized, L: FrictionLaw + ?Sized>(
+    surface: &S,
+    friction: &L,
+    input: &ConeInput,
+    god_object: &mut SurfacePoint,
+    view: TangentView,
+) -> Slid {
+    let start_B = god_object.point_B;
+    let mut round = Round::new(view, &Vector3::zeros(), friction, &start_B, god_object, input);
+    if round.is_inside_the_circle() {
+        return Slid { view, tangential_B: view.lag_B, rounds: 0 };
+    }
+    let mut secant = Secant::default();
+    for rounds in 1..=MAX_SLIDE_ROUNDS {
+        let step_m = secant.step(round.asked_m, round.view.depth_m);
+        *god_object = surface.settle(god_object, &round.target_B(step_m));
+        let view = TangentView::new(surface, god_object, input);
+        round = Round::new(view, &round.direction_B, friction, &start_B, god_object, input);
+        if round.asked_m.is_nan() || round.asked_m.abs() <= view.rest_m {
+            return round.finished(rounds);
+        }
+    }
+    round.finished(MAX_SLIDE_ROUNDS)
+}
+
+/// One look at the contact during a slide.
+struct Round {
+    view: TangentView,
+    /// Against the motion, in the tangent plane.
+    direction_B: Vector3<f64>,
+    gap_m: f64,
+    /// What the law still asks for, signed.
+    asked_m: f64,
+}
+
+impl Round {
+    fn new<L: FrictionLaw + ?Sized>(
+        view: TangentView,
+        direction_before_B: &Vector3<f64>,
+        friction: &L,
+        start_B: &Vector3<f64>,
+        god_object: &SurfacePoint,
+        input: &ConeInput,
+    ) -> Self {
+        let (direction_B, gap_m) = view.signed_gap(direction_before_B);
+        let back_B = start_B - god_object.point_B;
+        // The chord, since that is what two recorded positions over dt show as speed.
+        let travel_m = back_B.norm().copysign(back_B.dot(&direction_B));
+        let query = FrictionQuery {
+            state: FrictionState::Slip,
+            gap_m,
+            load_m: view.load_m,
+            travel_m,
+            dt_s: input.dt_s,
+        };
+        Self { view, direction_B, gap_m, asked_m: friction.slide(&query) }
+    }
+
+    /// In slip, but nothing to slide: it stays, and stays in slip until the law catches it.
+    ///
+    /// A gap of zero does move: onto S, which is where the frictionless god-object belongs even
+    /// if the HIP only went deeper.
+    fn is_inside_the_circle(&self) -> bool {
+        self.asked_m < 0.0 || (self.asked_m == 0.0 && self.gap_m > 0.0) || self.asked_m.is_nan()
+    }
+
+    /// The point of the tangent plane `step_m` closer to S.
+    fn target_B(&self, step_m: f64) -> Vector3<f64> {
+        let radius_m = self.gap_m - step_m;
+        if radius_m == 0.0 {
+            return self.view.surface_point_B;
+        }
+        //= melder#4.6
+        self.view.surface_point_B + self.direction_B * radius_m
+    }
+
+    /// The force belongs to the rim that the law asks for; what is left to slide is rounding, or
+    /// the debt of a search that met its bound, and must not leave the friction cone.
+    fn finished(&self, rounds: u32) -> Slid {
+        let radius_m = self.gap_m - self.asked_m;
+        Slid { view: self.view, tangential_B: self.direction_B * radius_m, rounds }
+    }
+}
+
+/// Divides each asked-for slide by the slope that the last step showed.
+///
+/// After a change of sign this interpolates, so the step stays within the last one. Where the
+/// residual grew although the step was right (past the steepest point of a sphere, seen from deep
+/// inside) the steps double instead.
+struct Secant {
+    /// Slide asked for and step made, one round ago.
+    last: Option<(f64, f64)>,
+    gain: f64,
+}
+
+impl Default for Secant {
+    fn default() -> Self {
+        Self { last: None, gain: 1.0 }
+    }
+}
+
+impl Secant {
+    /// Next step. It exceeds both the slide asked for and the depth, which stands for the size of
+    /// the surroundings, never: a slope taken from noise must not fling the god-object away.
+    fn step(&mut self, asked_m: f64, depth_m: f64) -> f64 {
+        if let Some((asked_before_m, step_m)) = self.last {
+            let slope = (asked_before_m - asked_m) / step_m;
+            self.gain = if slope > f64::MIN_POSITIVE { 1.0 / slope } else { 2.0 * self.gain };
+        }
+        let longest_m = asked_m.abs().max(depth_m);
+        let step_m = (asked_m * self.gain).max(-longest_m).min(longest_m);
+        self.last = Some((asked_m, step_m));
+        step_m
+    }
+}

@@ -1,0 +1,81 @@
+//! What the Friction Cone Algorithm asks of a surface.
+//!
+//! Problem: the algorithm needs to know when a finger is inside, where it came in, and how to bring
+//! a god-object that moved along its tangent plane back onto a curved surface (Melder ch. 4.2.1).
+//!
+//! Frames and signs: everything in the object's own frame B; normals leave the material; signed
+//! distances are negative inside and zero on the surface, and zero counts as contact.
+//!
+//! Invariants an implementation keeps: normals have unit length for every input, also at points
+//! where no normal exists (a documented, fixed direction); no allocation, no panic, bounded time.
+
+use nalgebra::Vector3;
+
+/// What kind of surface piece a god-object rests on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Feature {
+    /// No contact.
+    #[default]
+    None,
+    /// A smooth surface.
+    Surface,
+}
+
+/// A point of a surface and the outward unit normal there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfacePoint {
+    /// Position in the object's frame \[m\].
+    pub point_B: Vector3<f64>,
+    /// Outward unit normal in the object's frame.
+    pub normal_B: Vector3<f64>,
+    /// The piece of the surface it lies on.
+    pub feature: Feature,
+}
+
+/// A surface that fingers can touch: implement it to plug in your own.
+pub trait Surface {
+    /// Distance to the surface \[m\], negative inside. Only sign and zero must be exact.
+    fn signed_distance(&self, point_B: &Vector3<f64>) -> f64;
+
+    /// The surface point nearest to a point on either side.
+    fn nearest(&self, point_B: &Vector3<f64>) -> SurfacePoint;
+
+    /// Where the segment `from_B -> to_B` enters the material, if it ends there.
+    ///
+    /// Entry means `d(from) > 0 >= d(to)`: a tick that lands exactly on the surface counts (the
+    /// printed strict product of Melder eq. 7.21 misses it). A segment that passes right through
+    /// and ends outside is *not* an entry: a contact lives only while the HIP is inside, so such a
+    /// contact would end in the very tick in which it began, and its spring would span the whole
+    /// object. Whoever needs it felt must tick faster than the object is thin.
+    fn entry(&self, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<SurfacePoint>;
+
+    /// Brings a god-object that left `from` along its tangent plane back onto the surface.
+    ///
+    /// `from` lets surfaces of many pieces start their walk where the god-object was.
+    fn settle(&self, from: &SurfacePoint, on_tangent_plane_B: &Vector3<f64>) -> SurfacePoint;
+
+    /// Offset of the tangent plane at a surface point, `normal . x <= offset` being inside \[m\].
+    ///
+    /// Shapes that know it better than through the rounded point override it; the normal force is
+    /// only as exact as this number.
+    fn tangent_offset(&self, at: &SurfacePoint) -> f64 {
+        at.normal_B.dot(&at.point_B)
+    }
+
+    /// The surface on which the centre of a ball of radius `radius_m` rolls: a spherical finger
+    /// touches this shape as its centre touches the grown one.
+    fn grown(&self, radius_m: f64) -> Self
+    where
+        Self: Sized;
+}
+
+/// `v` at unit length, or +y where it has none.
+///
+/// Below `SMALLEST_LENGTH_M` squares underflow and the quotient would not be a unit vector.
+pub(crate) fn direction_or_up(v: &Vector3<f64>) -> Vector3<f64> {
+    let length = v.norm();
+    if length > SMALLEST_LENGTH_M && length.is_finite() { v / length } else { Vector3::y() }
+}
+
+/// Shorter vectors have no direction: their squared length loses digits to underflow.
+pub(crate) const SMALLEST_LENGTH_M: f64 = 1e-140;

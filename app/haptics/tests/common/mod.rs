@@ -1,0 +1,78 @@
+//! What the integration tests share: a deterministic noise source and ways to read an output.
+#![allow(dead_code, non_snake_case)]
+
+use haptics::{Entity, Finger, FingerOutput, Friction, Plane, Shape, Sphere};
+use nalgebra::{Isometry3, Vector3};
+
+/// Ticks at 1 kHz, as in the thesis.
+pub(crate) const DT: f64 = 1e-3;
+/// Melder ch. 8.1: 500 N/m (printed as "500Nm"), 5 mm deep, mu_s = 0.7, mu_d = 0.3.
+pub(crate) const K: f64 = 500.0;
+pub(crate) const DEPTH: f64 = 5e-3;
+pub(crate) const MU_S: f64 = 0.7;
+pub(crate) const MU_D: f64 = 0.3;
+
+pub(crate) fn stiction() -> Friction {
+    Friction::stiction(MU_S, MU_D).unwrap()
+}
+
+pub(crate) fn table(friction: Friction) -> Entity {
+    entity(Plane::new(Vector3::y(), 0.0).unwrap(), friction)
+}
+
+pub(crate) fn ball(radius_m: f64, friction: Friction) -> Entity {
+    entity(Sphere::new(radius_m).unwrap(), friction)
+}
+
+pub(crate) fn entity(shape: impl Into<Shape>, friction: Friction) -> Entity {
+    Entity::new(shape, Isometry3::identity(), K).unwrap().with_friction(friction).unwrap()
+}
+
+pub(crate) fn point_finger() -> Finger {
+    Finger::new(0.0, 4).unwrap()
+}
+
+/// |F_t| / F_n for a contact with this outward normal.
+pub(crate) fn ratio(out: &FingerOutput, normal: &Vector3<f64>) -> f64 {
+    let normal_force = out.force_on_user_W.dot(normal);
+    (out.force_on_user_W - normal * normal_force).norm() / normal_force
+}
+
+/// A point of a great circle of radius `rho`, `phi` from the top.
+pub(crate) fn on_circle(rho: f64, phi: f64) -> Vector3<f64> {
+    Vector3::new(rho * phi.sin(), rho * phi.cos(), 0.0)
+}
+
+/// Angle of the god-object behind the HIP that just satisfies `mu` on a sphere of radius r with the
+/// HIP at rho: sine rule in the triangle centre, god-object, HIP, whose angle at the god-object is
+/// atan(mu). `None` where the cone at the HIP holds every point of the sphere.
+pub(crate) fn sphere_lag(mu: f64, r: f64, rho: f64) -> Option<f64> {
+    let sine = mu * r / (rho * (1.0 + mu * mu).sqrt());
+    (sine <= 1.0).then(|| sine.asin() - mu.atan())
+}
+
+/// SplitMix64 with Box and Muller's transform: small, seeded, the same everywhere.
+pub(crate) struct Noise(pub(crate) u64);
+
+impl Noise {
+    pub(crate) fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.uniform()
+    }
+
+    pub(crate) fn gaussian(&mut self) -> f64 {
+        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
+        radius * (std::f64::consts::TAU * self.uniform()).cos()
+    }
+
+    pub(crate) fn vector(&mut self, sigma: f64) -> Vector3<f64> {
+        Vector3::new(self.gaussian(), self.gaussian(), self.gaussian()) * sigma
+    }
+}

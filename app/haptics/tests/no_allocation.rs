@@ -1,0 +1,60 @@
+//! A step never allocates: counted over ticks that touch, slide and leave.
+#![allow(non_snake_case)]
+
+mod common;
+
+use common::*;
+use haptics::{Finger, Friction};
+use nalgebra::Vector3;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+/// The system's allocator, counting the calls of each thread.
+struct Counting;
+
+thread_local! {
+    static CALLS: Cell<u64> = const { Cell::new(0) };
+}
+
+// SAFETY: every call is handed on unchanged to `System`, which keeps the contract; counting
+// touches a thread-local without destructor and without allocation.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        CALLS.set(CALLS.get() + 1);
+        // SAFETY: the caller keeps `alloc`'s contract for this very layout.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, block: *mut u8, layout: Layout) {
+        CALLS.set(CALLS.get() + 1);
+        // SAFETY: `block` came from `System.alloc` with this layout, through `alloc` above.
+        unsafe { System.dealloc(block, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+#[test]
+fn a_step_never_allocates() {
+    let entities = [table(stiction()), ball(0.02, Friction::coulomb_viscous(0.3, 1.0).unwrap())];
+    let mut finger = Finger::new(0.001, entities.len()).unwrap();
+    let mut noise = Noise(9);
+    let (mut free, mut stuck, mut slid, mut both) = (0, 0, 0, 0);
+    let before = CALLS.get();
+    for i in 0..100_000 {
+        let t = f64::from(i) * DT;
+        let hip = Vector3::new(0.03 * (2.0 * t).sin(), 0.02 * (3.0 * t).cos(), 0.0) + noise.vector(1e-4);
+        let out = finger.step(&entities, &hip, DT);
+        match out.friction {
+            haptics::ContactState::Free => free += 1,
+            haptics::ContactState::Stick => stuck += 1,
+            haptics::ContactState::Slip => slid += 1,
+        }
+        both += u32::from(finger.contacts().count() == 2);
+    }
+    assert_eq!(CALLS.get() - before, 0);
+    assert!(free > 1000 && stuck > 100 && slid > 1000 && both > 1000, "{free} {stuck} {slid} {both}");
+    drop(vec![0u8; 16]);
+    assert!(CALLS.get() > before, "the counter counts");
+}

@@ -1,0 +1,166 @@
+//! What holds for every input: finite, within the cone, out of the material.
+#![allow(non_snake_case)]
+
+mod common;
+
+use common::*;
+use haptics::{
+    ConeInput, ContactState, Entity, Finger, Friction, FrictionCone, FrictionState, MAX_SLIDE_ROUNDS, Plane,
+    Shape, Sphere, Surface,
+};
+use nalgebra::{Isometry3, Vector3};
+use proptest::prelude::*;
+
+fn any_friction() -> impl Strategy<Value = Friction> {
+    let mu = prop_oneof![Just(0.0), 0.0..3.0f64];
+    let mu_v = prop_oneof![Just(0.0), (-3.0..6.0f64).prop_map(|e| 10f64.powf(e))];
+    prop_oneof![
+        Just(Friction::None),
+        mu.clone().prop_map(|mu| Friction::Coulomb { mu }),
+        (mu.clone(), 0.0..=1.0f64).prop_map(|(mu_s, part)| Friction::Stiction { mu_s, mu_d: mu_s * part }),
+        mu_v.clone().prop_map(|mu_v_s_per_m| Friction::Viscous { mu_v_s_per_m }),
+        (mu, mu_v).prop_map(|(mu, mu_v_s_per_m)| Friction::CoulombViscous { mu, mu_v_s_per_m }),
+    ]
+}
+
+fn any_shape() -> impl Strategy<Value = Shape> {
+    prop_oneof![
+        (0.001..0.2f64).prop_map(|r| Sphere::new(r).unwrap().into()),
+        (prop::array::uniform3(-1.0..1.0f64), -0.05..0.05f64)
+            .prop_filter_map("a direction", |(n, offset)| Plane::new(Vector3::from(n), offset).ok())
+            .prop_map(Shape::from),
+    ]
+}
+
+/// The largest ratio the law allows to a contact without viscous friction.
+fn static_ratio(friction: &Friction) -> Option<f64> {
+    match *friction {
+        Friction::None => Some(0.0),
+        Friction::Coulomb { mu } => Some(mu),
+        Friction::Stiction { mu_s, .. } => Some(mu_s),
+        _ => None,
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40000))]
+
+    #[test]
+    fn contacts_never_pull_and_stay_within_their_cone(
+        shape in any_shape(), friction in any_friction(), damping in prop_oneof![Just(0.0), 0.0..20.0f64],
+        turn in prop::array::uniform3(-3.0..3.0f64), seed: u64, step in -5.0..-1.0f64,
+    ) {
+        let X_WB = Isometry3::new(Vector3::new(0.01, -0.02, 0.03), Vector3::from(turn));
+        let entity = Entity { X_WB, previous_X_WB: X_WB, friction, damping_n_s_per_m: damping, ..entity(shape, friction) };
+        let mut finger = point_finger();
+        let mut noise = Noise(seed);
+        let mut hip = X_WB.translation.vector;
+        for _ in 0..300 {
+            hip += noise.vector(10f64.powf(step));
+            let out = finger.step(&[entity], &hip, DT);
+            let Some(contact) = finger.contact(0) else { continue };
+            prop_assert!(contact.normal_force_n >= 0.0);
+            let normal_force = out.force_on_user_W.dot(&contact.normal_W);
+            let tangential = (out.force_on_user_W - contact.normal_W * normal_force).norm();
+            // Forces are rounded against their own size, rotated once.
+            let rounding = 1e-14 * out.force_on_user_W.norm();
+            prop_assert!((normal_force - contact.normal_force_n).abs() <= rounding);
+            prop_assert!(normal_force >= -rounding);
+            if let Some(mu) = static_ratio(&friction) {
+                prop_assert!(tangential <= mu * contact.normal_force_n + rounding, "{tangential} {mu} {contact:?}");
+            }
+            // And the god-object is on the surface.
+            let at_B = X_WB.inverse_transform_point(&contact.god_object_W.into()).coords;
+            prop_assert!(shape.signed_distance(&at_B).abs() <= 1e-15 * (1.0 + hip.norm()));
+        }
+    }
+
+    /// Also with a HIP deep in a small ball, where slides are longest.
+    #[test]
+    fn a_slide_that_meets_its_bound_goes_on_and_comes_to_rest(
+        mu in 0.0..0.5f64, rho in -6.0..-0.1f64, phi in 0.0..3.13f64,
+    ) {
+        let sphere = Sphere::new(0.01).unwrap();
+        let rho = 0.01 * 10f64.powf(rho);
+        let law = Friction::Coulomb { mu };
+        let mut cone = FrictionCone::new(sphere.nearest(&Vector3::y()));
+        let input = ConeInput { hip_B: on_circle(rho, phi), hip_velocity_B: Vector3::zeros(),
+            stiffness_n_per_m: K, damping_n_s_per_m: 0.0, dt_s: DT };
+        let mut rounds = 0;
+        for _ in 0..4 {
+            rounds = cone.update(&sphere, &law, &input).rounds;
+        }
+        prop_assert!(cone.state() == FrictionState::Stick || rounds < MAX_SLIDE_ROUNDS);
+    }
+
+    #[test]
+    fn every_finite_input_gives_a_finite_output(
+        shape in any_shape(), friction in any_friction(),
+        hips in prop::collection::vec(prop::array::uniform3(any_size()), 1..20),
+        shift in prop::array::uniform3(any_size()), k in any_size(), b in any_size(), dt in any_size(), r in 0.0..0.1f64,
+    ) {
+        let mut entity = Entity { stiffness_n_per_m: k, damping_n_s_per_m: b, ..entity(shape, friction) };
+        let mut finger = Finger::new(r, 2).unwrap();
+        for hip in hips {
+            let out = finger.step(&[entity, entity], &Vector3::from(hip), dt);
+            prop_assert!(out.force_on_user_W.iter().all(|x| x.is_finite()), "{out:?}");
+            prop_assert!(out.god_object_W.iter().all(|x| x.is_finite()), "{out:?}");
+            entity.move_to(Isometry3::translation(shift[0], shift[1], shift[2]));
+        }
+    }
+}
+
+/// Ordinary numbers, and those at which arithmetic ends.
+fn any_size() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        4 => -0.1..0.1f64,
+        1 => prop::num::f64::NORMAL | prop::num::f64::SUBNORMAL | prop::num::f64::ZERO,
+        1 => prop::sample::select(vec![f64::MAX, f64::MIN, f64::MIN_POSITIVE, 5e-324, -0.0, 1e154, 1e-160]),
+    ]
+}
+
+#[test]
+fn a_hip_that_is_not_finite_counts_as_lifted() {
+    let entities = [table(Friction::coulomb(1.0).unwrap())];
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let mut finger = point_finger();
+        let place = |x: f64| Vector3::new(x, -DEPTH, 0.0);
+        finger.step(&entities, &place(0.0), DT);
+        let out = finger.step(&entities, &Vector3::new(0.0, bad, 0.0), DT);
+        assert_eq!(out.force_on_user_W, Vector3::zeros());
+        assert_eq!(out.god_object_W, place(0.0), "the last finite HIP");
+        assert_eq!((out.entity, out.friction), (None, ContactState::Free));
+        assert_eq!(finger.contacts().count(), 0);
+        let out = finger.step(&entities, &place(1e-3), DT);
+        assert_eq!(out.god_object_W, Vector3::new(1e-3, 0.0, 0.0), "then it begins anew");
+    }
+}
+
+#[test]
+fn a_pose_that_is_not_finite_is_not_felt() {
+    let mut entity = table(stiction());
+    let mut finger = point_finger();
+    entity.move_to(Isometry3::translation(0.0, f64::NAN, 0.0));
+    let out = finger.step(&[entity], &Vector3::new(0.0, -DEPTH, 0.0), DT);
+    assert_eq!((out.entity, out.force_on_user_W), (None, Vector3::zeros()));
+    entity.move_to(Isometry3::identity());
+    let out = finger.step(&[entity], &Vector3::new(0.0, -DEPTH, 0.0), DT);
+    assert_eq!(out.force_on_user_W.y, K * DEPTH);
+}
+
+#[test]
+fn entities_beyond_the_capacity_are_not_felt() {
+    let mut finger = Finger::new(0.0, 1).unwrap();
+    assert_eq!(finger.capacity(), 1);
+    let far = Entity { X_WB: Isometry3::translation(0.0, -1.0, 0.0), ..table(stiction()) };
+    assert_eq!(finger.step(&[far, table(stiction())], &Vector3::new(0.0, -DEPTH, 0.0), DT).entity, None);
+    assert!(Finger::new(-1e-3, 1).is_err());
+}
+
+#[test]
+fn forces_that_overflow_in_their_sum_become_zero() {
+    let wall = Entity { stiffness_n_per_m: 1e308, ..table(Friction::None) };
+    let hip = Vector3::new(0.0, -1.5, 0.0);
+    assert_eq!(point_finger().step(&[wall], &hip, DT).force_on_user_W.y, 1.5e308);
+    assert_eq!(point_finger().step(&[wall, wall], &hip, DT).force_on_user_W, Vector3::zeros());
+}

@@ -1,0 +1,84 @@
+//! A TOML text whose parts still know where they stand in it.
+
+use std::ops::Range;
+use std::path::Path;
+
+use toml::Spanned;
+use toml::de::DeTable;
+
+use crate::error::{Location, SceneError};
+
+/// The text and the name of the file it came from: what a byte offset needs to become a line.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Document<'d> {
+    file: &'d Path,
+    text: &'d str,
+}
+
+impl<'d> Document<'d> {
+    pub(crate) fn new(text: &'d str, file: &'d Path) -> Self {
+        Self { file, text }
+    }
+
+    pub(crate) fn file(&self) -> &'d Path {
+        self.file
+    }
+
+    /// The text as a tree of values, each with the range of bytes it was written in.
+    pub(crate) fn parse(&self) -> Result<Spanned<DeTable<'d>>, SceneError> {
+        DeTable::parse(self.text).map_err(|error| self.syntax_error(error.span(), error.message()))
+    }
+
+    pub(crate) fn line(&self, offset: usize) -> usize {
+        line_of(self.text.as_bytes(), offset)
+    }
+
+    pub(crate) fn location(&self, offset: usize, key: String) -> Box<Location> {
+        Box::new(Location { file: self.file.into(), line: self.line(offset), key })
+    }
+
+    fn syntax_error(&self, span: Option<Range<usize>>, message: &str) -> SceneError {
+        let offset = span.map_or(0, |span| span.start);
+        SceneError::Syntax {
+            file: self.file.into(),
+            line: self.line(offset),
+            column: column_of(self.text.as_bytes(), offset),
+            message: message.lines().collect::<Vec<_>>().join("; "),
+        }
+    }
+}
+
+/// The line, counted from 1, of the byte at `offset`; past the end: the last line.
+pub(crate) fn line_of(text: &[u8], offset: usize) -> usize {
+    1 + before(text, offset).iter().filter(|&&byte| byte == b'\n').count()
+}
+
+/// The column in characters, counted from 1. Bytes that continue a character do not count.
+fn column_of(text: &[u8], offset: usize) -> usize {
+    let line = before(text, offset).rsplit(|&byte| byte == b'\n').next().unwrap_or_default();
+    1 + line.iter().filter(|&&byte| byte & 0b1100_0000 != 0b1000_0000).count()
+}
+
+fn before(text: &[u8], offset: usize) -> &[u8] {
+    &text[..offset.min(text.len())]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_and_columns_count_from_one_and_in_characters() {
+        let text = "a\nä = x".as_bytes();
+        assert_eq!((line_of(text, 0), column_of(text, 0)), (1, 1));
+        assert_eq!((line_of(text, 2), column_of(text, 2)), (2, 1));
+        let offset_of_x = text.len() - 1;
+        assert_eq!((line_of(text, offset_of_x), column_of(text, offset_of_x)), (2, 5));
+    }
+
+    #[test]
+    fn an_offset_past_the_end_is_on_the_last_line() {
+        assert_eq!(line_of(b"a\nb\n", 99), 3);
+        assert_eq!(column_of(b"a\nb", 99), 2);
+    }
+}

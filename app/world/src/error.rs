@@ -1,0 +1,218 @@
+//! What can be wrong with a scene or layout file, one variant per cause.
+//!
+//! Every message stands alone in a terminal: `file:line: key: found ...; allowed: ...`. The
+//! `file:line` form is the one editors jump to.
+
+use std::fmt;
+use std::io;
+use std::path::PathBuf;
+
+/// Where in a file a value stands, or should stand.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Location {
+    /// The file, as it was named to us.
+    pub file: PathBuf,
+    /// Line, counted from 1. For a missing key: where the table that lacks it begins.
+    pub line: usize,
+    /// Full path of the key, such as `entity[1].shape.radius_m`; list positions count from 0.
+    pub key: String,
+}
+
+impl fmt::Display for Location {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(out, "{}:{}: {}", self.file.display(), self.line, self.key)
+    }
+}
+
+/// Why a scene or layout file was refused.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SceneError {
+    /// There is no such file.
+    #[error("{}: no such file; name an existing TOML file", file.display())]
+    NotFound {
+        /// The file asked for.
+        file: PathBuf,
+    },
+    /// The file is there, but the system does not let us read it.
+    #[error("{}: cannot be read: {cause}", file.display())]
+    Unreadable {
+        /// The file asked for.
+        file: PathBuf,
+        /// What the system said.
+        #[source]
+        cause: io::Error,
+    },
+    /// The file is far larger than any scene.
+    #[error("{}: larger than {limit_bytes} bytes, which is the most this file may have", file.display())]
+    TooLarge {
+        /// The file asked for.
+        file: PathBuf,
+        /// The most that is read.
+        limit_bytes: u64,
+    },
+    /// The file is not text.
+    #[error("{}:{line}: byte {offset_bytes} is not UTF-8 text; save the file as UTF-8", file.display())]
+    NotUtf8 {
+        /// The file asked for.
+        file: PathBuf,
+        /// Line of the first byte that is not UTF-8, counted from 1.
+        line: usize,
+        /// Offset of that byte from the start of the file.
+        offset_bytes: usize,
+    },
+    /// The text is not TOML.
+    #[error("{}:{line}:{column}: not valid TOML: {message}", file.display())]
+    Syntax {
+        /// The file.
+        file: PathBuf,
+        /// Line, counted from 1.
+        line: usize,
+        /// Column in characters, counted from 1.
+        column: usize,
+        /// What the TOML parser said, on one line.
+        message: String,
+    },
+    /// A key that no version knows.
+    #[error("{at}: unknown key{}; allowed: {allowed}", did_you_mean(.suggestion.as_deref()))]
+    UnknownKey {
+        /// Where it stands.
+        at: Box<Location>,
+        /// The keys that may stand there.
+        allowed: String,
+        /// The key that was probably meant.
+        suggestion: Option<String>,
+    },
+    /// A key of the scene format that this version does not implement.
+    #[error("{at}: this key is not available in this version; available: {available}")]
+    KeyNotAvailable {
+        /// Where it stands.
+        at: Box<Location>,
+        /// The keys that may stand there.
+        available: String,
+    },
+    /// A kind (of shape, of friction) that no version knows.
+    #[error("{at}: unknown {what} `{found}`{}; allowed: {allowed}", did_you_mean(.suggestion.as_deref()))]
+    UnknownKind {
+        /// Where it stands.
+        at: Box<Location>,
+        /// What is being chosen: `shape kind` or `friction model`.
+        what: &'static str,
+        /// The word that was found.
+        found: String,
+        /// The words that may stand there.
+        allowed: String,
+        /// The word that was probably meant.
+        suggestion: Option<String>,
+    },
+    /// A kind of the scene format that this version does not implement.
+    #[error("{at}: {what} `{found}` is not available in this version; available: {available}")]
+    KindNotAvailable {
+        /// Where it stands.
+        at: Box<Location>,
+        /// What is being chosen: `shape kind` or `friction model`.
+        what: &'static str,
+        /// The word that was found.
+        found: String,
+        /// The words that may stand there.
+        available: String,
+    },
+    /// A key that must be there is not.
+    #[error("{at}: missing; allowed: {allowed}")]
+    MissingKey {
+        /// Where it should stand.
+        at: Box<Location>,
+        /// What may stand there.
+        allowed: String,
+    },
+    /// A value of another type, such as a string for a number.
+    #[error("{at}: found {found}; allowed: {allowed}")]
+    WrongType {
+        /// Where it stands.
+        at: Box<Location>,
+        /// What was found.
+        found: String,
+        /// What may stand there.
+        allowed: String,
+    },
+    /// A number that is NaN or infinite.
+    #[error("{at}: found {found}, which is not a finite number; allowed: {allowed}")]
+    NotFinite {
+        /// Where it stands.
+        at: Box<Location>,
+        /// What was found.
+        found: String,
+        /// What may stand there.
+        allowed: String,
+    },
+    /// A value of the right type outside its range.
+    #[error("{at}: found {found}; allowed: {allowed}")]
+    OutOfRange {
+        /// Where it stands.
+        at: Box<Location>,
+        /// What was found.
+        found: String,
+        /// What may stand there.
+        allowed: String,
+    },
+    /// A direction of length zero.
+    #[error("{at}: found the zero vector; allowed: a vector with a direction, of any length above 0")]
+    NoDirection {
+        /// Where it stands.
+        at: Box<Location>,
+    },
+    /// An orientation that is no rotation.
+    #[error(
+        "{at}: found a quaternion of length {length}; allowed: w, x, y, z of length 1 (within {tolerance})"
+    )]
+    NotARotation {
+        /// Where it stands.
+        at: Box<Location>,
+        /// Its length.
+        length: f64,
+        /// The difference from 1 that is taken as rounding in the file.
+        tolerance: f64,
+    },
+    /// A name that would break the header of a recording.
+    #[error("{at}: found the name {found}; allowed: 1 to {limit_bytes} of the characters A-Z a-z 0-9 _ -")]
+    BadName {
+        /// Where it stands.
+        at: Box<Location>,
+        /// The name, quoted.
+        found: String,
+        /// The most characters a name may have.
+        limit_bytes: usize,
+    },
+    /// A name or device index that was already taken.
+    #[error("{at}: found {found}, already taken on line {first_line}; allowed: a value used only once")]
+    Duplicate {
+        /// Where the second one stands.
+        at: Box<Location>,
+        /// The value, and whether it is a default.
+        found: String,
+        /// Line of the first one.
+        first_line: usize,
+    },
+    /// More list entries than there can be.
+    #[error("{at}: found {found} entries; allowed: at most {limit}")]
+    TooMany {
+        /// Where the first entry too many stands.
+        at: Box<Location>,
+        /// How many there are.
+        found: usize,
+        /// How many there may be.
+        limit: usize,
+    },
+    /// A scene nobody can touch.
+    #[error("{}: no [[finger]]; allowed: 1 to {limit} of them", file.display())]
+    NoFinger {
+        /// The file.
+        file: PathBuf,
+        /// How many there may be.
+        limit: usize,
+    },
+}
+
+fn did_you_mean(suggestion: Option<&str>) -> String {
+    suggestion.map_or_else(String::new, |word| format!(" (did you mean {word}?)"))
+}

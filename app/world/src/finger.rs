@@ -1,0 +1,73 @@
+//! A finger of a scene: a haptic interaction point and the device that moves it.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Point3;
+
+use crate::MAX_DEVICES;
+use crate::error::SceneError;
+use crate::names::Names;
+use crate::reader::{Bound, Table};
+use crate::vocabulary::Vocabulary;
+
+/// One `[[finger]]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SceneFinger {
+    /// Unique among the fingers; default f0, f1, ... by position in the list.
+    pub name: String,
+    /// 0 for a point, above 0 for a spherical volumetric finger; default 0.
+    pub radius_m: f64,
+    /// Where the finger rests without hand or device; world frame, default the origin.
+    pub start_m: Point3<f64>,
+    /// Index of the haptic device that moves it; unique, default its position in the list.
+    pub device: usize,
+}
+
+impl SceneFinger {
+    /// Reads all `[[finger]]`s of a scene.
+    pub(crate) fn read_all(scene: &Table<'_>) -> Result<Vec<Self>, SceneError> {
+        let tables = scene.tables_up_to(MAX_DEVICES, "finger")?;
+        if tables.is_empty() {
+            return Err(SceneError::NoFinger { file: scene.document().file().into(), limit: MAX_DEVICES });
+        }
+        let (mut names, mut devices) = (Names::default(), BTreeMap::new());
+        let read = |(i, table)| Self::read(table, i, &mut names, &mut devices);
+        tables.iter().enumerate().map(read).collect()
+    }
+
+    fn read(
+        table: &Table<'_>,
+        i: usize,
+        names: &mut Names,
+        devices: &mut BTreeMap<usize, usize>,
+    ) -> Result<Self, SceneError> {
+        table.check_keys(&KEYS)?;
+        Ok(Self {
+            name: names.claim(table, format!("f{i}"))?,
+            radius_m: table.number_or("radius_m", Bound::NotNegative, 0.0)?,
+            start_m: table.numbers_or("start_m", [0.0; 3])?.into(),
+            device: claim_device(table, i, devices)?,
+        })
+    }
+}
+
+/// The device of the finger at position `i`; `devices` holds the offset of each that is taken.
+fn claim_device(
+    table: &Table<'_>,
+    i: usize,
+    devices: &mut BTreeMap<usize, usize>,
+) -> Result<usize, SceneError> {
+    let (device, offset, note) = match table.get("device") {
+        Some(value) => (value.index(MAX_DEVICES)?, value.offset(), ""),
+        None => (i, table.offset(), " (the default, its position in the list)"),
+    };
+    match devices.insert(device, offset) {
+        None => Ok(device),
+        Some(first) => {
+            let (found, first_line) = (format!("{device}{note}"), table.document().line(first));
+            Err(SceneError::Duplicate { at: table.at("device"), found, first_line })
+        }
+    }
+}
+
+const KEYS: Vocabulary = Vocabulary { available: &["name", "radius_m", "start_m", "device"], later: &[] };

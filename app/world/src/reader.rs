@@ -1,0 +1,281 @@
+//! Takes typed values out of a TOML tree, so that every refusal is a message of ours.
+//!
+//! A derived deserialiser stops at the first surprise with a message of its own and no key path.
+//! Here a [`Table`] and a [`Value`] know their path and place, and each accessor says in full
+//! what it would have accepted.
+
+use std::fmt;
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use crate::document::Document;
+use crate::error::{Location, SceneError};
+use crate::vocabulary::{Verdict, Vocabulary};
+
+/// A table and where it stands.
+#[derive(Debug, Clone)]
+pub(crate) struct Table<'d> {
+    document: Document<'d>,
+    path: String,
+    offset: usize,
+    entries: &'d DeTable<'d>,
+}
+
+impl<'d> Table<'d> {
+    /// The whole file.
+    pub(crate) fn root(document: Document<'d>, root: &'d Spanned<DeTable<'d>>) -> Self {
+        Self { document, path: String::new(), offset: 0, entries: root.get_ref() }
+    }
+
+    pub(crate) fn document(&self) -> &Document<'d> {
+        &self.document
+    }
+
+    /// Where it begins, in bytes from the start of the file.
+    pub(crate) fn offset(&self) -> usize {
+        self.offset
+    }
+
+    /// Refuses the first key, in the order of the file, that is not available.
+    pub(crate) fn check_keys(&self, keys: &Vocabulary) -> Result<(), SceneError> {
+        let mut written: Vec<_> = self.entries.keys().collect();
+        written.sort_by_key(|key| key.span().start);
+        written.into_iter().try_for_each(|key| {
+            let at = || self.document.location(key.span().start, self.path_of(key.get_ref()));
+            match keys.judge(key.get_ref()) {
+                Verdict::Available(_) => Ok(()),
+                Verdict::Later => Err(SceneError::KeyNotAvailable { at: at(), available: keys.list() }),
+                Verdict::Unknown(suggestion) => {
+                    Err(SceneError::UnknownKey { at: at(), allowed: keys.list(), suggestion })
+                }
+            }
+        })
+    }
+
+    pub(crate) fn get(&self, key: &str) -> Option<Value<'d>> {
+        let value = self.entries.get(key)?;
+        Some(Value { document: self.document, path: self.path_of(key), value })
+    }
+
+    /// The value of `key`; `allowed` says what may stand there if nothing does.
+    pub(crate) fn require(&self, key: &str, allowed: impl fmt::Display) -> Result<Value<'d>, SceneError> {
+        self.get(key).ok_or_else(|| SceneError::MissingKey { at: self.at(key), allowed: allowed.to_string() })
+    }
+
+    pub(crate) fn number(&self, key: &str, bound: Bound) -> Result<f64, SceneError> {
+        self.require(key, bound)?.number(bound)
+    }
+
+    pub(crate) fn number_or(&self, key: &str, bound: Bound, default: f64) -> Result<f64, SceneError> {
+        self.get(key).map_or(Ok(default), |value| value.number(bound))
+    }
+
+    pub(crate) fn numbers_or<const N: usize>(
+        &self,
+        key: &str,
+        default: [f64; N],
+    ) -> Result<[f64; N], SceneError> {
+        self.get(key).map_or(Ok(default), |value| value.numbers())
+    }
+
+    /// The tables of a list such as `[[finger]]`; none if the key is absent.
+    pub(crate) fn tables(&self, key: &str) -> Result<Vec<Table<'d>>, SceneError> {
+        self.get(key).map_or(Ok(Vec::new()), |value| value.tables(key))
+    }
+
+    /// The tables of a list that can only be so long; refused at the first entry too many.
+    pub(crate) fn tables_up_to(&self, limit: usize, key: &str) -> Result<Vec<Table<'d>>, SceneError> {
+        let tables = self.tables(key)?;
+        let Some(first_too_many) = tables.get(limit) else { return Ok(tables) };
+        let at = self.document.location(first_too_many.offset, first_too_many.path.clone());
+        Err(SceneError::TooMany { at, found: tables.len(), limit })
+    }
+
+    /// Where `key` stands in this table, or where the table begins if it has no such key.
+    pub(crate) fn at(&self, key: &str) -> Box<Location> {
+        let offset = self.entries.get(key).map_or(self.offset, |value| value.span().start);
+        self.document.location(offset, self.path_of(key))
+    }
+
+    fn path_of(&self, key: &str) -> String {
+        let dot = if self.path.is_empty() { "" } else { "." };
+        format!("{}{dot}{}", self.path, shown_key(key))
+    }
+}
+
+/// A value and where it stands.
+#[derive(Debug, Clone)]
+pub(crate) struct Value<'d> {
+    document: Document<'d>,
+    path: String,
+    value: &'d Spanned<DeValue<'d>>,
+}
+
+impl<'d> Value<'d> {
+    /// For messages only: finding the line counts from the start of the file.
+    pub(crate) fn at(&self) -> Box<Location> {
+        self.document.location(self.value.span().start, self.path.clone())
+    }
+
+    /// Where it begins, in bytes from the start of the file.
+    pub(crate) fn offset(&self) -> usize {
+        self.value.span().start
+    }
+
+    /// A finite number within `bound`; integers count as numbers.
+    pub(crate) fn number(&self, bound: Bound) -> Result<f64, SceneError> {
+        let number: f64 = match self.value.get_ref() {
+            DeValue::Float(float) => float.as_str().parse().unwrap_or(f64::NAN),
+            DeValue::Integer(_) => self.integer().ok_or_else(|| self.out_of_range(WIDE_INTEGER))? as f64,
+            _ => return Err(self.wrong_type(bound)),
+        };
+        if !number.is_finite() {
+            let (found, allowed) = (self.found(), bound.to_string());
+            Err(SceneError::NotFinite { at: self.at(), found, allowed })
+        } else if bound.holds(number) {
+            Ok(number)
+        } else {
+            Err(self.out_of_range(bound))
+        }
+    }
+
+    /// Exactly `N` finite numbers.
+    pub(crate) fn numbers<const N: usize>(&self) -> Result<[f64; N], SceneError> {
+        let allowed = format!("an array of {N} numbers");
+        let DeValue::Array(items) = self.value.get_ref() else { return Err(self.wrong_type(allowed)) };
+        if items.len() != N {
+            return Err(self.wrong_type(allowed));
+        }
+        let mut numbers = [0.0; N];
+        for (i, (number, value)) in numbers.iter_mut().zip(items.iter()).enumerate() {
+            *number = self.item(i, value).number(Bound::Any)?;
+        }
+        Ok(numbers)
+    }
+
+    /// A whole number below `limit`.
+    pub(crate) fn index(&self, limit: usize) -> Result<usize, SceneError> {
+        let allowed = format!("a whole number from 0 to {}", limit - 1);
+        let DeValue::Integer(_) = self.value.get_ref() else { return Err(self.wrong_type(allowed)) };
+        let index = self.integer().and_then(|integer| usize::try_from(integer).ok());
+        index.filter(|index| *index < limit).ok_or_else(|| self.out_of_range(allowed))
+    }
+
+    /// A string that is not empty.
+    pub(crate) fn text(&self, allowed: &str) -> Result<&'d str, SceneError> {
+        match self.value.get_ref() {
+            DeValue::String(text) if !text.is_empty() => Ok(text),
+            DeValue::String(_) => Err(self.out_of_range(allowed)),
+            _ => Err(self.wrong_type(allowed)),
+        }
+    }
+
+    /// One of the words that this version implements.
+    pub(crate) fn choose(&self, what: &'static str, words: &Vocabulary) -> Result<&'static str, SceneError> {
+        let available = words.list();
+        let word = self.text(&available)?;
+        let found = || shortened(word).escape_debug().to_string();
+        match words.judge(word) {
+            Verdict::Available(word) => Ok(word),
+            Verdict::Later => {
+                Err(SceneError::KindNotAvailable { at: self.at(), what, found: found(), available })
+            }
+            Verdict::Unknown(suggestion) => {
+                let (at, found, allowed) = (self.at(), found(), available);
+                Err(SceneError::UnknownKind { at, what, found, allowed, suggestion })
+            }
+        }
+    }
+
+    pub(crate) fn table(&self, allowed: &str) -> Result<Table<'d>, SceneError> {
+        let DeValue::Table(entries) = self.value.get_ref() else { return Err(self.wrong_type(allowed)) };
+        let (path, offset) = (self.path.clone(), self.value.span().start);
+        Ok(Table { document: self.document, path, offset, entries })
+    }
+
+    fn tables(&self, key: &str) -> Result<Vec<Table<'d>>, SceneError> {
+        let allowed = format!("a list of tables, each under its own [[{key}]]");
+        let DeValue::Array(items) = self.value.get_ref() else { return Err(self.wrong_type(allowed)) };
+        items.iter().enumerate().map(|(i, value)| self.item(i, value).table(&allowed)).collect()
+    }
+
+    pub(crate) fn out_of_range(&self, allowed: impl fmt::Display) -> SceneError {
+        SceneError::OutOfRange { at: self.at(), found: self.found(), allowed: allowed.to_string() }
+    }
+
+    fn wrong_type(&self, allowed: impl fmt::Display) -> SceneError {
+        SceneError::WrongType { at: self.at(), found: self.found(), allowed: allowed.to_string() }
+    }
+
+    fn item(&self, i: usize, value: &'d Spanned<DeValue<'d>>) -> Value<'d> {
+        Value { document: self.document, path: format!("{}[{i}]", self.path), value }
+    }
+
+    fn integer(&self) -> Option<i64> {
+        let DeValue::Integer(integer) = self.value.get_ref() else { return None };
+        i64::from_str_radix(integer.as_str(), integer.radix()).ok()
+    }
+
+    /// The value in words, short enough for a message.
+    fn found(&self) -> String {
+        match self.value.get_ref() {
+            DeValue::String(text) => format!("the string {}", quoted(text)),
+            DeValue::Integer(integer) => shortened(&integer.to_string()),
+            DeValue::Float(float) => shortened(float.as_str()),
+            DeValue::Boolean(truth) => format!("the boolean {truth}"),
+            DeValue::Datetime(date) => format!("the date {date}"),
+            DeValue::Array(items) => format!("an array of length {}", items.len()),
+            DeValue::Table(_) => "a table".into(),
+        }
+    }
+}
+
+/// The range a number must lie in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Bound {
+    Any,
+    NotNegative,
+    Positive,
+}
+
+impl Bound {
+    fn holds(self, number: f64) -> bool {
+        match self {
+            Self::Any => true,
+            Self::NotNegative => number >= 0.0,
+            Self::Positive => number > 0.0,
+        }
+    }
+}
+
+impl fmt::Display for Bound {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.write_str(match self {
+            Self::Any => "a number",
+            Self::NotNegative => "a number, 0 or more",
+            Self::Positive => "a number above 0",
+        })
+    }
+}
+
+/// A string as it would be written in the file, control characters escaped, cut if it is long.
+pub(crate) fn quoted(text: &str) -> String {
+    format!("{:?}", shortened(text))
+}
+
+fn shortened(text: &str) -> String {
+    match text.char_indices().nth(LONGEST_SHOWN_CHARS) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text.into(),
+    }
+}
+
+fn shown_key(key: &str) -> String {
+    let is_bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if !key.is_empty() && key.chars().all(is_bare) { shortened(key) } else { quoted(key) }
+}
+
+const WIDE_INTEGER: &str = "an integer of at most 64 bits, or a number with a point or an exponent";
+/// A message stays one readable line, whatever the file holds.
+const LONGEST_SHOWN_CHARS: usize = 60;

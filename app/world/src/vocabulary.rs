@@ -1,0 +1,128 @@
+//! The words a place in a file knows: those this version can do, those a later one will.
+//!
+//! The scene format is fixed as a whole, so that a file says the same in every version. A word
+//! of the format that this version does not implement is told apart from a typing error.
+
+/// The words of one place: the keys of a table, or the kinds one may choose from.
+#[derive(Debug)]
+pub(crate) struct Vocabulary {
+    /// What this version implements, in the order of the documentation.
+    pub(crate) available: &'static [&'static str],
+    /// What the format knows and this version does not implement.
+    pub(crate) later: &'static [&'static str],
+}
+
+/// What a vocabulary says about a word.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) enum Verdict {
+    /// The word, as one of ours.
+    Available(&'static str),
+    /// Of the format, but not of this version.
+    Later,
+    /// Unknown; perhaps with the word that was meant, formatted for the reader.
+    Unknown(Option<String>),
+}
+
+impl Vocabulary {
+    /// What may be written, for the reader.
+    pub(crate) fn list(&self) -> String {
+        self.available.join(", ")
+    }
+
+    pub(crate) fn judge(&self, word: &str) -> Verdict {
+        if let Some(known) = self.available.iter().find(|known| **known == word) {
+            Verdict::Available(known)
+        } else if self.later.contains(&word) {
+            Verdict::Later
+        } else {
+            Verdict::Unknown(self.suggest(word))
+        }
+    }
+
+    /// The nearest known word, if it is near enough to be what was meant.
+    fn suggest(&self, word: &str) -> Option<String> {
+        let lower = word.to_lowercase();
+        let known = self.available.iter().chain(self.later);
+        let (meant, _) = known
+            .filter_map(|known| likeness(&lower, known).map(|distance| (*known, distance)))
+            .min_by_key(|(_, distance)| *distance)?;
+        let note = if self.later.contains(&meant) { ", which is not available in this version" } else { "" };
+        Some(format!("`{meant}`{note}"))
+    }
+}
+
+/// Edits from `word` to `known`, if they are few; a known word that begins with `word` counts
+/// as near, because leaving off the unit (`stiffness` for `stiffness_n_per_m`) is the usual slip.
+fn likeness(word: &str, known: &str) -> Option<usize> {
+    if word.len() > LONGEST_GUESS_BYTES {
+        return None;
+    }
+    let edits = edit_distance(word, known);
+    let few = 1 + known.len().min(word.len()) / 4;
+    if edits <= few {
+        Some(edits)
+    } else {
+        let is_stem = word.len() >= SHORTEST_STEM_BYTES && known.starts_with(word);
+        is_stem.then_some(few + 1)
+    }
+}
+
+/// Insertions, deletions, replacements and swaps of neighbours that turn `a` into `b`
+/// (optimal string alignment).
+fn edit_distance(a: &str, b: &str) -> usize {
+    let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
+    let mut before_last = vec![0; b.len() + 1];
+    let mut last: Vec<usize> = (0..=b.len()).collect();
+    for i in 0..a.len() {
+        let mut row = vec![i + 1];
+        for j in 0..b.len() {
+            let replaced = last[j] + usize::from(a[i] != b[j]);
+            let mut best = replaced.min(last[j + 1] + 1).min(row[j] + 1);
+            if i > 0 && j > 0 && a[i] == b[j - 1] && a[i - 1] == b[j] {
+                best = best.min(before_last[j - 1] + 1);
+            }
+            row.push(best);
+        }
+        before_last = std::mem::replace(&mut last, row);
+    }
+    last[b.len()]
+}
+
+/// No known word is near this length; the bound keeps a megabyte of nonsense cheap.
+const LONGEST_GUESS_BYTES: usize = 64;
+/// Shorter beginnings fit too many words.
+const SHORTEST_STEM_BYTES: usize = 3;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WORDS: Vocabulary =
+        Vocabulary { available: &["radius_m", "stiffness_n_per_m", "name"], later: &["mass_kg"] };
+
+    #[test]
+    fn edits_count_swaps_of_neighbours_once() {
+        assert_eq!(edit_distance("raduis_m", "radius_m"), 1);
+        assert_eq!(edit_distance("", "abc"), 3);
+        assert_eq!(edit_distance("kitten", "sitting"), 3);
+        assert_eq!(edit_distance("same", "same"), 0);
+    }
+
+    #[test]
+    fn a_slip_is_recognised_and_nonsense_is_not() {
+        let meant = |word| WORDS.judge(word);
+        assert_eq!(meant("radius"), Verdict::Unknown(Some("`radius_m`".into())));
+        assert_eq!(meant("Name"), Verdict::Unknown(Some("`name`".into())));
+        assert_eq!(meant("stiffness"), Verdict::Unknown(Some("`stiffness_n_per_m`".into())));
+        assert_eq!(meant("wobble"), Verdict::Unknown(None));
+        assert_eq!(meant(&"n".repeat(1 << 20)), Verdict::Unknown(None));
+    }
+
+    #[test]
+    fn a_word_of_a_later_version_is_told_apart_from_a_slip() {
+        assert_eq!(WORDS.judge("mass_kg"), Verdict::Later);
+        let suggestion = "`mass_kg`, which is not available in this version".to_owned();
+        assert_eq!(WORDS.judge("mass_gk"), Verdict::Unknown(Some(suggestion)));
+        assert_eq!(WORDS.judge("name"), Verdict::Available("name"));
+    }
+}

@@ -1,0 +1,74 @@
+//! Reading scene files from a disk that holds more than scene files.
+
+use std::fs;
+use std::path::Path;
+
+use world::{Layout, MAX_FILE_BYTES, Scene, SceneError};
+
+/// A file in a directory of its own; what it holds is `bytes`.
+fn refused(bytes: &[u8]) -> String {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let file = dir.path().join("s.toml");
+    fs::write(&file, bytes).expect("write");
+    let message = Scene::load(&file).expect_err("the file is wrong").to_string();
+    message.replace(&dir.path().display().to_string(), "dir")
+}
+
+#[test]
+fn a_scene_file_on_disk_is_read_and_its_hand_stands_beside_it() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let file = dir.path().join("s.toml");
+    // With the mark some editors put in front, and their line ends.
+    fs::write(&file, "\u{feff}hand = \"h.csv\"\r\n[[finger]]\r\n").expect("write");
+    let scene = Scene::load(&file).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(scene.hand, Some(dir.path().join("h.csv")));
+}
+
+#[test]
+fn a_file_that_is_not_there_is_named() {
+    let error = Scene::load("no/such.toml").expect_err("it is not there");
+    assert_eq!(error.to_string(), "no/such.toml: no such file; name an existing TOML file");
+    assert!(matches!(Layout::load("no/such.toml"), Err(SceneError::NotFound { .. })));
+}
+
+#[test]
+fn a_directory_is_refused_with_what_the_system_says() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let error = Scene::load(dir.path()).expect_err("a directory is no scene");
+    assert!(matches!(error, SceneError::Unreadable { .. }), "{error}");
+}
+
+#[test]
+fn bytes_that_are_not_utf8_are_refused_with_their_line() {
+    let message = refused(b"name = \"a\"\nhand = \"\xff.csv\"\n");
+    assert_eq!(message, "dir/s.toml:2: byte 19 is not UTF-8 text; save the file as UTF-8");
+}
+
+#[test]
+fn a_file_beyond_the_limit_is_refused_and_one_at_it_is_read() {
+    let mut bytes = b"[[finger]]\n# A long comment".to_vec();
+    bytes.resize(MAX_FILE_BYTES as usize, b'.');
+    let at_limit = String::from_utf8(bytes.clone()).expect("ASCII");
+    assert!(Scene::parse(&at_limit, Path::new("s.toml")).is_ok());
+    bytes.push(b'.');
+    let message = "dir/s.toml: larger than 16777216 bytes, which is the most this file may have";
+    assert_eq!(refused(&bytes), message);
+}
+
+#[test]
+fn lines_are_counted_right_after_a_byte_order_mark_and_windows_line_ends() {
+    let message = refused("\u{feff}name = \"a\"\r\n[[finger]]\r\nradius = 1\r\n".as_bytes());
+    assert_eq!(
+        message,
+        "dir/s.toml:3: finger[0].radius: unknown key (did you mean `radius_m`?); allowed: name, \
+         radius_m, start_m, device"
+    );
+}
+
+#[test]
+fn ten_thousand_entities_are_read() {
+    let entity = "[[entity]]\nshape = { kind = \"sphere\", radius_m = 0.01 }\n";
+    let text = format!("[[finger]]\n{}", entity.repeat(10_000));
+    let scene = Scene::parse(&text, Path::new("shelf.toml")).expect("nothing is wrong");
+    assert_eq!(scene.entities.last().map(|entity| entity.name.as_str()), Some("e9999"));
+}

@@ -1,0 +1,207 @@
+//! Wrong values: types, ranges, directions, numbers of fingers; and layouts.
+
+use crate::{layout_refused, refused, with_entity, with_finger, with_shape, with_top};
+
+#[test]
+fn a_value_of_the_wrong_type_is_named_with_what_was_found() {
+    refused(
+        &with_shape("{ kind = \"sphere\", radius_m = \"0.05\" }"),
+        "s.toml:4: entity[0].shape.radius_m: found the string \"0.05\"; allowed: a number above 0",
+    );
+    refused(
+        &with_shape("{ kind = \"sphere\", radius_m = true }"),
+        "s.toml:4: entity[0].shape.radius_m: found the boolean true; allowed: a number above 0",
+    );
+    refused(&with_shape("{ kind = 3 }"), "s.toml:4: entity[0].shape.kind: found 3; allowed: plane, sphere");
+    refused(
+        &with_shape("\"sphere\""),
+        "s.toml:4: entity[0].shape: found the string \"sphere\"; allowed: a table such as { kind \
+         = \"sphere\", radius_m = 0.05 }",
+    );
+    refused(
+        &with_top("gravity_m_s2 = true"),
+        "s.toml:2: gravity_m_s2: found the boolean true; allowed: an array of 3 numbers",
+    );
+    refused(
+        "name = 1979-05-27\n[[finger]]\n",
+        "s.toml:1: name: found the date 1979-05-27; allowed: a string that is not empty",
+    );
+    refused(
+        &with_top("gravity_m_s2 = -9.81"),
+        "s.toml:2: gravity_m_s2: found -9.81; allowed: an array of 3 numbers",
+    );
+    refused(
+        &with_top("gravity_m_s2 = [0, -9.81]"),
+        "s.toml:2: gravity_m_s2: found an array of length 2; allowed: an array of 3 numbers",
+    );
+    refused(
+        &with_finger("start_m = [0, {}, 0]"),
+        "s.toml:4: finger[0].start_m[1]: found a table; allowed: a number",
+    );
+    refused(
+        &with_finger("device = 1.0"),
+        "s.toml:4: finger[0].device: found 1.0; allowed: a whole number from 0 to 7",
+    );
+    refused(
+        &with_entity("friction = \"none\""),
+        "s.toml:8: entity[0].friction: found the string \"none\"; allowed: a table such as { \
+         model = \"coulomb\", mu = 0.5 }",
+    );
+    refused(
+        &with_entity("friction = { model = \"coulomb\", mu = [1] }"),
+        "s.toml:8: entity[0].friction.mu: found an array of length 1; allowed: a number, 0 or more",
+    );
+    refused(
+        "[finger]\n",
+        "s.toml:1: finger: found a table; allowed: a list of tables, each under its own [[finger]]",
+    );
+    refused(
+        "finger = [1]\n",
+        "s.toml:1: finger[0]: found 1; allowed: a list of tables, each under its own [[finger]]",
+    );
+    refused(
+        "hand = 5\n[[finger]]\n",
+        "s.toml:1: hand: found 5; allowed: the path of a CSV file, relative to this file",
+    );
+}
+
+#[test]
+fn a_number_that_is_not_finite_is_refused() {
+    refused(
+        &with_shape("{ kind = \"sphere\", radius_m = nan }"),
+        "s.toml:4: entity[0].shape.radius_m: found nan, which is not a finite number; allowed: a \
+         number above 0",
+    );
+    refused(
+        &with_finger("start_m = [0.0, 0.0, -inf]"),
+        "s.toml:4: finger[0].start_m[2]: found -inf, which is not a finite number; allowed: a \
+         number",
+    );
+    refused(
+        &with_entity("stiffness_n_per_m = 1e999"),
+        "s.toml:8: entity[0].stiffness_n_per_m: found 1e999, which is not a finite number; \
+         allowed: a number above 0",
+    );
+    refused(
+        &with_entity("position_m = [1, 99999999999999999999, 1]"),
+        "s.toml:8: entity[0].position_m[1]: found 99999999999999999999; allowed: an integer of \
+         at most 64 bits, or a number with a point or an exponent",
+    );
+}
+
+#[test]
+fn a_number_outside_its_range_is_refused() {
+    refused(
+        &with_shape("{ kind = \"sphere\", radius_m = -0.05 }"),
+        "s.toml:4: entity[0].shape.radius_m: found -0.05; allowed: a number above 0",
+    );
+    refused(
+        &with_shape("{ kind = \"sphere\", radius_m = 0 }"),
+        "s.toml:4: entity[0].shape.radius_m: found 0; allowed: a number above 0",
+    );
+    refused(
+        &with_finger("radius_m = -1e-3"),
+        "s.toml:4: finger[0].radius_m: found -1e-3; allowed: a number, 0 or more",
+    );
+    refused(
+        &with_entity("stiffness_n_per_m = 0.0"),
+        "s.toml:8: entity[0].stiffness_n_per_m: found 0.0; allowed: a number above 0",
+    );
+    refused(
+        &with_entity("damping_n_s_per_m = -1"),
+        "s.toml:8: entity[0].damping_n_s_per_m: found -1; allowed: a number, 0 or more",
+    );
+    refused(
+        &with_entity("friction = { model = \"coulomb\", mu = -0.5 }"),
+        "s.toml:8: entity[0].friction.mu: found -0.5; allowed: a number, 0 or more",
+    );
+    refused(
+        &with_entity("friction = { model = \"stiction\", mu_s = 0.3, mu_d = 0.7 }"),
+        "s.toml:8: entity[0].friction.mu_d: found 0.7; allowed: a number from 0 to mu_s = 0.3",
+    );
+    refused(
+        &with_finger("device = 8"),
+        "s.toml:4: finger[0].device: found 8; allowed: a whole number from 0 to 7",
+    );
+    refused(
+        &with_finger("device = -1"),
+        "s.toml:4: finger[0].device: found -1; allowed: a whole number from 0 to 7",
+    );
+    refused(
+        &with_top("hand = \"\""),
+        "s.toml:2: hand: found the string \"\"; allowed: the path of a CSV file, relative to \
+         this file",
+    );
+    refused(
+        "name = \"\"\n[[finger]]\n",
+        "s.toml:1: name: found the string \"\"; allowed: a string that is not empty",
+    );
+}
+
+#[test]
+fn a_plane_without_a_direction_is_refused() {
+    refused(
+        &with_shape("{ kind = \"plane\", normal = [0, 0.0, -0.0], offset_m = 0 }"),
+        "s.toml:4: entity[0].shape.normal: found the zero vector; allowed: a vector with a \
+         direction, of any length above 0",
+    );
+    refused(
+        &with_shape("{ kind = \"plane\", normal = [0, 1e-320, 0], offset_m = 1 }"),
+        "s.toml:4: entity[0].shape.offset_m: found 1; allowed: a number whose quotient by the \
+         length of normal is finite",
+    );
+}
+
+#[test]
+fn a_quaternion_that_is_no_rotation_is_refused() {
+    refused(
+        &with_entity("orientation_wxyz = [0, 0, 0, 0]"),
+        "s.toml:8: entity[0].orientation_wxyz: found a quaternion of length 0; allowed: w, x, y, \
+         z of length 1 (within 0.001)",
+    );
+    refused(
+        &with_entity("orientation_wxyz = [1, 0, 1, 0]"),
+        "s.toml:8: entity[0].orientation_wxyz: found a quaternion of length 1.4142135623730951; \
+         allowed: w, x, y, z of length 1 (within 0.001)",
+    );
+    refused(
+        &with_entity("orientation_wxyz = [0, 0, 1]"),
+        "s.toml:8: entity[0].orientation_wxyz: found an array of length 3; allowed: an array of \
+         4 numbers",
+    );
+}
+
+#[test]
+fn a_scene_has_one_to_eight_fingers() {
+    refused("name = \"a\"\n", "s.toml: no [[finger]]; allowed: 1 to 8 of them");
+    refused("finger = []\n", "s.toml: no [[finger]]; allowed: 1 to 8 of them");
+    refused(&"[[finger]]\n".repeat(9), "s.toml:9: finger[8]: found 9 entries; allowed: at most 8");
+}
+
+#[test]
+fn a_layout_is_refused_in_the_same_way() {
+    layout_refused(
+        "[[devices]]\n",
+        "l.toml:1: devices: unknown key (did you mean `device`?); allowed: device",
+    );
+    layout_refused(
+        "[[device]]\nposition = [0, 0, 0]\n",
+        "l.toml:2: device[0].position: unknown key (did you mean `position_m`?); allowed: \
+         position_m, orientation_wxyz",
+    );
+    layout_refused(
+        "[[device]]\n[[device]]\nposition_m = [0, 0, nan]\n",
+        "l.toml:3: device[1].position_m[2]: found nan, which is not a finite number; allowed: a \
+         number",
+    );
+    layout_refused(
+        "[[device]]\norientation_wxyz = [0, 0, 0, 2]\n",
+        "l.toml:2: device[0].orientation_wxyz: found a quaternion of length 2; allowed: w, x, y, \
+         z of length 1 (within 0.001)",
+    );
+    layout_refused(&"[[device]]\n".repeat(9), "l.toml:9: device[8]: found 9 entries; allowed: at most 8");
+    layout_refused(
+        "device = 1\n",
+        "l.toml:1: device: found 1; allowed: a list of tables, each under its own [[device]]",
+    );
+}

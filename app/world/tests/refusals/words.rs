@@ -1,0 +1,259 @@
+//! Wrong words: syntax, keys, kinds and names.
+
+use std::path::Path;
+
+use world::Scene;
+
+use crate::{refused, with_entity, with_finger, with_shape, with_top};
+
+const ENTITY_KEYS: &str =
+    "name, shape, position_m, orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction";
+
+#[test]
+fn text_that_is_not_toml_is_refused_with_line_and_column() {
+    refused(
+        "name = \"a\"\ngravity_m_s2 = [0.0, -9.81\n",
+        "s.toml:2:27: not valid TOML: unclosed array, expected `]`",
+    );
+    refused("name = \"a\"\nname = \"b\"\n", "s.toml:2:1: not valid TOML: duplicate key");
+    refused("name = \n", "s.toml:1:8: not valid TOML: string values must be quoted, expected literal string");
+    refused(
+        "ä = 1\n",
+        "s.toml:1:1: not valid TOML: invalid unquoted key, expected letters, numbers, `-`, `_`",
+    );
+    refused("[[finger]\n", "s.toml:1:10: not valid TOML: unclosed array table, expected `]`");
+}
+
+#[test]
+fn an_unknown_key_is_refused_with_what_was_probably_meant() {
+    refused(
+        &with_top("gravity = [0.0, 0.0, 0.0]"),
+        "s.toml:2: gravity: unknown key (did you mean `gravity_m_s2`?); allowed: name, \
+         gravity_m_s2, hand, finger, entity",
+    );
+    refused(
+        &with_finger("raduis_m = 0.01"),
+        "s.toml:4: finger[0].raduis_m: unknown key (did you mean `radius_m`?); allowed: name, \
+         radius_m, start_m, device",
+    );
+    refused(
+        &with_entity("colour = \"red\""),
+        "s.toml:8: entity[0].colour: unknown key; allowed: name, shape, position_m, \
+         orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction",
+    );
+    refused(
+        &with_entity("stifness_n_per_m = 1"),
+        "s.toml:8: entity[0].stifness_n_per_m: unknown key (did you mean `stiffness_n_per_m`?); \
+         allowed: name, shape, position_m, orientation_wxyz, stiffness_n_per_m, \
+         damping_n_s_per_m, friction",
+    );
+    refused(
+        &with_entity("\"two words\" = 1"),
+        "s.toml:8: entity[0].\"two words\": unknown key; allowed: name, shape, position_m, \
+         orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction",
+    );
+    refused(
+        &with_shape("{ kind = \"sphere\", radius_m = 1, normal = [0, 1, 0] }"),
+        "s.toml:4: entity[0].shape.normal: unknown key; allowed: kind, radius_m",
+    );
+    refused(
+        "[[finger]]\n[[entitys]]\n",
+        "s.toml:2: entitys: unknown key (did you mean `entity`?); allowed: name, gravity_m_s2, \
+         hand, finger, entity",
+    );
+}
+
+#[test]
+fn of_several_unknown_keys_the_first_in_the_file_is_named() {
+    refused(
+        "zebra = 1\napple = 2\n[[finger]]\n",
+        "s.toml:1: zebra: unknown key; allowed: name, gravity_m_s2, hand, finger, entity",
+    );
+}
+
+#[test]
+fn a_key_of_the_format_that_this_version_lacks_is_told_apart_from_an_unknown_one() {
+    for key in [
+        "velocity_m_s = [0, 0, 0]",
+        "angular_velocity_rad_s = [0, 0, 0]",
+        "mass_kg = 0.1",
+        "inertia_kg_m2 = [1, 1, 1]",
+        "rotation_locked = true",
+        "centre_of_mass_m = [0, 0, 0]",
+    ] {
+        let name = key.split(' ').next().unwrap_or_default();
+        let message = format!(
+            "s.toml:8: entity[0].{name}: this key is not available in this version; \
+             available: {ENTITY_KEYS}"
+        );
+        refused(&with_entity(key), &message);
+    }
+    refused(
+        &with_entity("mass = 0.1"),
+        "s.toml:8: entity[0].mass: unknown key (did you mean `mass_kg`, which is not available \
+         in this version?); allowed: name, shape, position_m, orientation_wxyz, \
+         stiffness_n_per_m, damping_n_s_per_m, friction",
+    );
+}
+
+#[test]
+fn a_shape_kind_that_this_version_lacks_is_told_apart_from_an_unknown_one() {
+    for kind in ["box", "cylinder", "cone", "torus", "capsule", "ellipsoid", "mesh", "nurbs", "csg"] {
+        let message = format!(
+            "s.toml:4: entity[0].shape.kind: shape kind `{kind}` is not available in this version; \
+             available: plane, sphere"
+        );
+        refused(&with_shape(&format!("{{ kind = \"{kind}\", size_m = [1, 1, 1] }}")), &message);
+    }
+    refused(
+        &with_shape("{ kind = \"shpere\", radius_m = 1 }"),
+        "s.toml:4: entity[0].shape.kind: unknown shape kind `shpere` (did you mean `sphere`?); \
+         allowed: plane, sphere",
+    );
+    refused(
+        &with_shape("{ kind = \"boxx\" }"),
+        "s.toml:4: entity[0].shape.kind: unknown shape kind `boxx` (did you mean `box`, which is \
+         not available in this version?); allowed: plane, sphere",
+    );
+    refused(
+        &with_shape("{ kind = \"a\\nb\" }"),
+        "s.toml:4: entity[0].shape.kind: unknown shape kind `a\\nb`; allowed: plane, sphere",
+    );
+}
+
+#[test]
+fn a_friction_model_that_this_version_lacks_is_told_apart_from_an_unknown_one() {
+    for model in ["stribeck", "karnopp", "dahl", "lugre", "curve"] {
+        let message = format!(
+            "s.toml:8: entity[0].friction.model: friction model `{model}` is not available in this \
+             version; available: none, coulomb, stiction, viscous, coulomb-viscous"
+        );
+        refused(&with_entity(&format!("friction = {{ model = \"{model}\" }}")), &message);
+    }
+    refused(
+        &with_entity("friction = { model = \"Coulomb\", mu = 1 }"),
+        "s.toml:8: entity[0].friction.model: unknown friction model `Coulomb` (did you mean \
+         `coulomb`?); allowed: none, coulomb, stiction, viscous, coulomb-viscous",
+    );
+    refused(
+        &with_entity("friction = { model = \"glue\" }"),
+        "s.toml:8: entity[0].friction.model: unknown friction model `glue`; allowed: none, \
+         coulomb, stiction, viscous, coulomb-viscous",
+    );
+}
+
+#[test]
+fn a_missing_key_is_named_with_what_may_stand_there() {
+    refused(
+        "[[finger]]\n\n[[entity]]\nname = \"a\"\n",
+        "s.toml:3: entity[0].shape: missing; allowed: a table such as { kind = \"sphere\", \
+         radius_m = 0.05 }",
+    );
+    refused(
+        &with_shape("{ radius_m = 1 }"),
+        "s.toml:4: entity[0].shape.kind: missing; allowed: plane, sphere",
+    );
+    refused(
+        &with_shape("{ kind = \"sphere\" }"),
+        "s.toml:4: entity[0].shape.radius_m: missing; allowed: a number above 0",
+    );
+    refused(
+        &with_shape("{ kind = \"plane\", offset_m = 0 }"),
+        "s.toml:4: entity[0].shape.normal: missing; allowed: an array of 3 numbers",
+    );
+    refused(
+        &with_shape("{ kind = \"plane\", normal = [0, 1, 0] }"),
+        "s.toml:4: entity[0].shape.offset_m: missing; allowed: a number",
+    );
+    refused(
+        &with_entity("friction = { mu = 0.5 }"),
+        "s.toml:8: entity[0].friction.model: missing; allowed: none, coulomb, stiction, viscous, \
+         coulomb-viscous",
+    );
+    refused(
+        &with_entity("friction = { model = \"stiction\", mu_s = 0.5 }"),
+        "s.toml:8: entity[0].friction.mu_d: missing; allowed: a number, 0 or more",
+    );
+    refused(
+        &with_entity("friction = { model = \"coulomb-viscous\", mu = 0.5 }"),
+        "s.toml:8: entity[0].friction.mu_v_s_per_m: missing; allowed: a number, 0 or more",
+    );
+}
+
+#[test]
+fn a_name_that_would_break_a_recording_is_refused() {
+    refused(
+        &with_finger("name = \"left hand\""),
+        "s.toml:4: finger[0].name: found the name \"left hand\"; allowed: 1 to 64 of the \
+         characters A-Z a-z 0-9 _ -",
+    );
+    refused(
+        &with_finger("name = \"a,b\""),
+        "s.toml:4: finger[0].name: found the name \"a,b\"; allowed: 1 to 64 of the characters \
+         A-Z a-z 0-9 _ -",
+    );
+    refused(
+        &with_finger("name = \"\""),
+        "s.toml:4: finger[0].name: found the string \"\"; allowed: 1 to 64 of the characters A-Z \
+         a-z 0-9 _ -",
+    );
+    refused(
+        "[[finger]]\n[[entity]]\nname = \"kopf\\n\"\n",
+        "s.toml:3: entity[0].name: found the name \"kopf\\n\"; allowed: 1 to 64 of the \
+         characters A-Z a-z 0-9 _ -",
+    );
+    refused(
+        &with_finger(&format!("name = \"{}\"", "n".repeat(65))),
+        "s.toml:4: finger[0].name: found the name \
+         \"nnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnn...\"; allowed: 1 to 64 \
+         of the characters A-Z a-z 0-9 _ -",
+    );
+}
+
+#[test]
+fn a_name_or_device_given_twice_is_refused_with_the_line_of_the_first() {
+    refused(
+        "[[finger]]\nname = \"a\"\n[[finger]]\nname = \"a\"\n",
+        "s.toml:4: finger[1].name: found \"a\", already taken on line 2; allowed: a value used \
+         only once",
+    );
+    refused(
+        "[[finger]]\nname = \"f1\"\n\n[[finger]]\n",
+        "s.toml:4: finger[1].name: found \"f1\" (the default name), already taken on line 2; \
+         allowed: a value used only once",
+    );
+    refused(
+        "[[finger]]\ndevice = 2\n[[finger]]\ndevice = 2\n",
+        "s.toml:4: finger[1].device: found 2, already taken on line 2; allowed: a value used \
+         only once",
+    );
+    refused(
+        "[[finger]]\ndevice = 1\n[[finger]]\n",
+        "s.toml:3: finger[1].device: found 1 (the default, its position in the list), already \
+         taken on line 2; allowed: a value used only once",
+    );
+    let entity = "[[entity]]\nname = \"e\"\nshape = { kind = \"sphere\", radius_m = 1 }\n";
+    refused(
+        &format!("[[finger]]\n{entity}{entity}"),
+        "s.toml:6: entity[1].name: found \"e\", already taken on line 3; allowed: a value used \
+         only once",
+    );
+}
+
+#[test]
+fn a_message_stays_one_short_line_whatever_the_file_holds() {
+    let long = "x\\n".repeat(10_000);
+    for text in [
+        format!("\"{long}\" = 1\n"),
+        format!("name = \"a\"\n[[finger]]\nname = \"{long}\"\n"),
+        with_top(&format!("hand = {{ a = \"{}\" }}", "é".repeat(1000))),
+        with_finger(&format!("name = \"a{}\"", "é".repeat(1000))),
+        with_shape(&format!("{{ kind = \"{long}\" }}")),
+        with_shape(&format!("{{ kind = \"sphere\", radius_m = \"{long}\" }}")),
+        with_shape(&format!("{{ kind = \"sphere\", radius_m = -{} }}", "1".repeat(10_000))),
+    ] {
+        let error = Scene::parse(&text, Path::new("s.toml")).expect_err("the scene is wrong");
+        let message = error.to_string();
+        assert!(!message.contains('\n') && message.len() < 400, "{message}");
+    }
+}

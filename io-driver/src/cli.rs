@@ -1,0 +1,164 @@
+//! The command line of `io-driver`, which `phantom3 driver` offers as well.
+//!
+//! Exit status: 0 done; 2 bad usage or bad input, nothing was started; 3 a fault during the run.
+
+use crate::config::DriverConfig;
+use crate::driver::{self, RunOptions};
+use crate::status::Status;
+use clap::{Args, Parser, Subcommand};
+use shm_abi::client::{self, AttachError};
+use shm_abi::endpoint;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Duration;
+
+/// Bad usage or bad input.
+pub const EXIT_USAGE: u8 = 2;
+/// A fault during the run.
+pub const EXIT_FAULT: u8 = 3;
+
+/// Drives haptic devices in real time and shares them through memory.
+#[derive(Debug, Parser)]
+#[command(name = "io-driver", version, after_help = AFTER_HELP)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: DriverCommand,
+}
+
+const AFTER_HELP: &str = "Exit status: 0 done; 2 bad usage or input, nothing was started; 3 a fault during the run.\n\
+The socket lies at $PHANTOM3_SOCKET, or driver.sock in $RUNTIME_DIRECTORY, $XDG_RUNTIME_DIR/phantom3 or /run/phantom3.";
+
+/// What can be asked of the driver.
+#[derive(Debug, Subcommand)]
+pub enum DriverCommand {
+    /// Run a driver until a signal or `stop` ends it
+    Run(RunArgs),
+    /// Show what a running driver is doing
+    Status(StatusArgs),
+    /// Ask a running driver to stop
+    Stop(SocketArgs),
+    /// Ask a running driver to leave its fault state
+    ClearFault(SocketArgs),
+}
+
+/// Arguments of `run`.
+#[derive(Debug, Args)]
+pub struct RunArgs {
+    /// Driver configuration (TOML)
+    #[arg(long, value_name = "FILE")]
+    config: PathBuf,
+    /// Refuse to start when a real-time guarantee is missing
+    #[arg(long)]
+    strict: bool,
+    /// Say nothing but errors
+    #[arg(long)]
+    quiet: bool,
+    /// Listen here instead
+    #[arg(long, value_name = "PATH")]
+    socket: Option<PathBuf>,
+    /// End when this process, which must be the parent, ends
+    #[arg(long, value_name = "PID", hide = true)]
+    parent: Option<u32>,
+}
+
+/// Arguments of `status`.
+#[derive(Debug, Args)]
+pub struct StatusArgs {
+    #[command(flatten)]
+    socket: SocketArgs,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+    /// Print a line (with --json: an object) every second until interrupted
+    #[arg(long)]
+    watch: bool,
+}
+
+/// Where the driver is.
+#[derive(Debug, Args)]
+pub struct SocketArgs {
+    /// The driver's socket
+    #[arg(long, value_name = "PATH")]
+    socket: Option<PathBuf>,
+}
+
+impl SocketArgs {
+    fn path(&self) -> PathBuf {
+        self.socket.clone().unwrap_or_else(endpoint::for_application)
+    }
+}
+
+/// Runs the program with the process's own arguments.
+pub fn main() -> ExitCode {
+    execute(Cli::parse().command)
+}
+
+/// Runs one command.
+pub fn execute(command: DriverCommand) -> ExitCode {
+    match command {
+        DriverCommand::Run(args) => run(args),
+        DriverCommand::Status(args) => report(status(&args)),
+        DriverCommand::Stop(args) => report(stop(&args.path())),
+        DriverCommand::ClearFault(args) => report(client::clear_fault(&args.path(), "io-driver")),
+    }
+}
+
+fn run(args: RunArgs) -> ExitCode {
+    let config = match DriverConfig::load(&args.config) {
+        Ok(config) => config,
+        Err(error) => return fail(&error, EXIT_USAGE),
+    };
+    let options = RunOptions { strict: args.strict, quiet: args.quiet, parent: args.parent, socket: args.socket };
+    match driver::run(&config, &options) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => fail(&error, if error.is_fault() { EXIT_FAULT } else { EXIT_USAGE }),
+    }
+}
+
+fn stop(socket: &Path) -> Result<(), AttachError> {
+    // The lease need not be ours, nor free: whoever may open the socket may stop the motors.
+    let pid = client::stop(socket, "io-driver")?;
+    println!("driver (process {pid}) stops");
+    Ok(())
+}
+
+fn status(args: &StatusArgs) -> Result<(), AttachError> {
+    let attachment = client::observe(&args.socket.path(), "io-driver status")?;
+    loop {
+        let status = Status::of(&attachment.driver, attachment.driver_pid);
+        let text = match (args.json, args.watch) {
+            (true, _) => serde_json::to_string(&status).unwrap_or_default(),
+            (false, true) => status.line(),
+            (false, false) => status.to_string(),
+        };
+        // A closed pipe is how `| head` says that it has seen enough.
+        if print_line(&text).is_err() || !args.watch {
+            return Ok(());
+        }
+        if !attachment.connection.is_open() {
+            let words = rt_core::epitaph::read(&attachment.driver.epitaph);
+            println!("the driver has ended{}", words.map_or_else(String::new, |words| format!(": {words}")));
+            return Ok(());
+        }
+        std::thread::sleep(Duration::from_secs(1));
+    }
+}
+
+fn print_line(text: &str) -> std::io::Result<()> {
+    use std::io::Write;
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{text}")?;
+    out.flush()
+}
+
+fn report(result: Result<(), AttachError>) -> ExitCode {
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => fail(&error, EXIT_USAGE),
+    }
+}
+
+fn fail(error: &dyn std::error::Error, code: u8) -> ExitCode {
+    eprintln!("io-driver: {error}");
+    ExitCode::from(code)
+}

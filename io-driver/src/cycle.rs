@@ -1,0 +1,329 @@
+//! One tick of the driver: read all devices, tell, take the reply, write all motors.
+//!
+//! Problem: the same tick has to run under three clocks (two processes in real time, two in lockstep, one
+//! process on a virtual clock), and every way it can go wrong has to end in zero force.
+//!
+//! Model: the owner of the clock calls [`Cycle::sense`], waits as it likes while asking
+//! [`Cycle::take_reply`], then calls [`Cycle::actuate`]. What the commander wrote is an allegation: it is
+//! validated before a number of it is used, and what is not believed is counted and otherwise as if it had
+//! not come.
+//!
+//! Frames and signs: forces are forces on the user in each device's base frame D.
+//! Invariants: a motor value is finite and within the device's peak whatever the commander writes; when a
+//! lease ends its force ramps out before another lease's begins; `sense` and `actuate` alternate.
+//! Cost: linear in the devices; no allocation, lock, system call (but a wake-up, if the commander sleeps) or
+//! panic.
+
+use crate::device::{Device, TickTime};
+use crate::meter::{bump, record};
+use crate::safety::{Safety, limit_force};
+use bytemuck::Zeroable;
+use nalgebra::Vector3;
+use rt_core::clock::monotonic_ns;
+use shm_abi::{Command, CommanderView, DriverMemory, DriverSegment, FaultReason, Frame, MAX_DEVICES, Outcome, ReplyKind};
+use std::sync::Arc;
+
+/// How old a reply may be to count as fresh: none in the same tick, one in the next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Freshness(pub u64);
+
+/// The driver's state from tick to tick.
+pub struct Cycle {
+    memory: Arc<DriverMemory>,
+    devices: Vec<Box<dyn Device>>,
+    safety: Safety,
+    period_ns: u64,
+    freshness: Freshness,
+    /// The lease whose commands are obeyed.
+    lease: Option<CommanderView>,
+    /// A lease that waits for the former's force to ramp out.
+    next_lease: Option<CommanderView>,
+    /// The lease ended; its force still ramps out.
+    is_ending: bool,
+    reply: Reply,
+    frame: Frame,
+    started_ns: u64,
+    rang_ns: u64,
+}
+
+/// The newest command of the lease that was believed.
+struct Reply {
+    command: Command,
+    /// Its tick; `None` before the first.
+    tick: Option<u64>,
+    /// The last number on the commander's bell that was looked into, so that no lie is read twice.
+    seen: Option<u64>,
+    /// Where a command is read to before it is believed.
+    candidate: Command,
+    /// From the doorbell to the reply that answers this tick.
+    round_trip_ns: u64,
+}
+
+impl Cycle {
+    /// A driver over its memory. The memory's description must list the same devices.
+    pub fn new(memory: Arc<DriverMemory>, devices: Vec<Box<dyn Device>>, safety: Safety, period_ns: u64, freshness: Freshness) -> Self {
+        assert!(devices.len() <= MAX_DEVICES, "the configuration allows at most {MAX_DEVICES} devices");
+        let mut frame = Frame::zeroed();
+        frame.device_count = devices.len() as u64;
+        Self {
+            memory,
+            devices,
+            safety,
+            period_ns,
+            freshness,
+            lease: None,
+            next_lease: None,
+            is_ending: false,
+            reply: Reply::none(),
+            frame,
+            started_ns: 0,
+            rang_ns: 0,
+        }
+    }
+
+    /// The driver's segment.
+    pub fn memory(&self) -> &DriverMemory {
+        &self.memory
+    }
+
+    /// The lease that is obeyed.
+    pub fn lease(&self) -> Option<&CommanderView> {
+        self.lease.as_ref().filter(|_| !self.is_ending)
+    }
+
+    /// The state machine.
+    pub fn safety(&self) -> &Safety {
+        &self.safety
+    }
+
+    /// The tick that was sensed last.
+    pub fn tick(&self) -> u64 {
+        self.frame.tick
+    }
+
+    /// A new commander. It is obeyed once the former's force is gone. Returns a lease that will never be
+    /// obeyed any more, for dropping elsewhere.
+    pub fn grant(&mut self, lease: CommanderView) -> Option<CommanderView> {
+        self.next_lease.replace(lease)
+    }
+
+    /// The commander is gone: its force ramps out, beginning with the next motor values.
+    pub fn end_lease(&mut self, number: u64) -> Option<CommanderView> {
+        if self.lease.as_ref().is_some_and(|lease| lease.lease() == number) {
+            self.is_ending = true;
+        }
+        self.next_lease.take_if(|lease| lease.lease() == number)
+    }
+
+    /// Changes leases when the former's force is gone. Returns the former, for dropping elsewhere.
+    pub fn change_lease(&mut self) -> Option<CommanderView> {
+        let may_change = self.lease.is_none() || (self.is_ending && self.safety.is_released());
+        if !may_change || (self.lease.is_none() && self.next_lease.is_none()) {
+            return None;
+        }
+        let former = std::mem::replace(&mut self.lease, self.next_lease.take());
+        self.is_ending = false;
+        self.reply.forget();
+        self.safety.begin_lease();
+        former
+    }
+
+    /// Somebody asked to leave the fault state.
+    pub fn clear_fault(&mut self) {
+        self.safety.clear_fault();
+    }
+
+    /// Reads all devices and publishes the frame of `tick`, which was due at `deadline_ns`.
+    pub fn sense(&mut self, tick: u64, deadline_ns: u64) {
+        self.started_ns = monotonic_ns();
+        let time = TickTime { tick, period_ns: self.period_ns, run_tick: self.safety.run_tick(tick) };
+        let all_valid = self.read_devices(time);
+        self.safety.set_positions_valid(all_valid);
+        self.describe(time, deadline_ns);
+        self.memory.write_frame(&self.frame);
+        self.rang_ns = monotonic_ns();
+        self.memory.ring(tick, self.lease.as_ref());
+        self.reply.round_trip_ns = 0;
+    }
+
+    /// Takes in whatever the commander has written; whether the motors can be written now.
+    pub fn take_reply(&mut self) -> bool {
+        let tick = self.frame.tick;
+        let Some(lease) = self.lease.as_ref().filter(|_| !self.is_ending) else { return true };
+        let latest = lease.latest_tick();
+        if latest != self.reply.seen {
+            self.reply.seen = latest;
+            self.reply.examine(lease, latest, tick, self.frame.device_count, &self.memory);
+            if self.reply.tick == Some(tick) {
+                self.reply.round_trip_ns = monotonic_ns().saturating_sub(self.rang_ns).max(1);
+                record(&self.memory.round_trip_ns, self.reply.round_trip_ns);
+            }
+        }
+        self.reply.age(tick).is_some_and(|age| age <= self.freshness.0)
+    }
+
+    /// The tick last answered, as far as the commander's bell has been looked at.
+    pub fn seen_reply(&self) -> Option<u64> {
+        self.reply.seen
+    }
+
+    /// Writes all motors for this tick with the newest command that may still be used.
+    pub fn actuate(&mut self) {
+        let actuated_ns = monotonic_ns();
+        let reply = self.judge_reply();
+        let authority = self.safety.advance(reply);
+        self.write_devices(authority);
+        let written_ns = monotonic_ns();
+        self.frame.previous = Outcome {
+            reply: reply as u64,
+            command_tick: self.reply.tick.unwrap_or(0),
+            authority,
+            round_trip_ns: self.reply.round_trip_ns,
+            written_ns,
+        };
+        self.count(reply);
+        let sensing = self.rang_ns.saturating_sub(self.started_ns);
+        record(&self.memory.cycle_ns, sensing + written_ns.saturating_sub(actuated_ns));
+    }
+
+    /// Motors off, now and whatever has happened.
+    pub fn release(&mut self) {
+        for device in &mut self.devices {
+            device.release();
+        }
+    }
+
+    /// Enters the fault state from outside the tick.
+    pub fn fault(&mut self, reason: FaultReason) {
+        if self.safety.enter_fault(reason) {
+            bump(&self.memory.counters.faults);
+        }
+        self.release();
+    }
+
+    fn read_devices(&mut self, time: TickTime) -> bool {
+        let mut all_valid = true;
+        for index in 0..self.devices.len() {
+            let reading = self.devices[index].read(time).and_then(|reading| {
+                if reading.is_finite() { Ok(reading) } else { Err(FaultReason::PositionNotFinite) }
+            });
+            match reading {
+                Ok(reading) => {
+                    reading.write_to(&mut self.frame.devices[index]);
+                    all_valid &= reading.is_valid;
+                }
+                Err(reason) => {
+                    // The last good position stays in the frame, marked as not to be trusted.
+                    self.frame.devices[index].flags = 0;
+                    all_valid = false;
+                    self.fault(reason);
+                }
+            }
+        }
+        all_valid
+    }
+
+    fn describe(&mut self, time: TickTime, deadline_ns: u64) {
+        let frame = &mut self.frame;
+        frame.tick = time.tick;
+        frame.deadline_ns = deadline_ns;
+        frame.read_ns = monotonic_ns();
+        frame.state = self.safety.state() as u64;
+        frame.fault = self.safety.fault() as u64;
+        frame.lease = self.lease.as_ref().filter(|_| !self.is_ending).map_or(0, CommanderView::lease);
+        frame.authority = self.safety.authority();
+        frame.run_tick = time.run_tick;
+    }
+
+    fn judge_reply(&self) -> ReplyKind {
+        match (&self.lease, self.is_ending) {
+            (Some(_), false) => self.safety.judge(self.reply.age(self.frame.tick), self.freshness.0),
+            _ => ReplyKind::NoLease,
+        }
+    }
+
+    fn write_devices(&mut self, authority: f64) {
+        let mut fault = None;
+        for (index, device) in self.devices.iter_mut().enumerate() {
+            let commanded = self.reply.force(index);
+            let (limited, was_cut) = limit_force(commanded, device.info().peak_force_n);
+            if was_cut && authority > 0.0 {
+                bump(&self.memory.counters.forces_limited);
+            }
+            // Not `limited * 0.0`: that would leave a negative zero or, for a fault, anything at all.
+            let force = if authority > 0.0 { limited * authority } else { Vector3::zeros() };
+            let frame = &mut self.frame.devices[index];
+            frame.force_on_user_n_commanded = commanded.into();
+            match device.write(force) {
+                Ok(written) => {
+                    frame.force_on_user_n_applied = written.force_on_user_n.into();
+                    frame.motor_codes = written.motor_codes;
+                }
+                Err(reason) => {
+                    frame.force_on_user_n_applied = [0.0; 3];
+                    fault = Some(reason);
+                }
+            }
+        }
+        if let Some(reason) = fault {
+            self.fault(reason);
+        }
+    }
+
+    fn count(&self, reply: ReplyKind) {
+        let counters = &self.memory.counters;
+        bump(&counters.ticks);
+        match reply {
+            ReplyKind::NoLease => return,
+            ReplyKind::Fresh => bump(&counters.replies_fresh),
+            // Until the first command of a lease nobody has promised anything.
+            ReplyKind::Held | ReplyKind::Expired if self.reply.tick.is_some() => bump(&counters.replies_missed),
+            ReplyKind::Held | ReplyKind::Expired => return,
+        }
+        bump(&counters.ticks_commanded);
+    }
+}
+
+impl Drop for Cycle {
+    fn drop(&mut self) {
+        self.release();
+    }
+}
+
+impl Reply {
+    fn none() -> Self {
+        let command = Command::zeroed();
+        Self { command, tick: None, seen: None, candidate: command, round_trip_ns: 0 }
+    }
+
+    fn forget(&mut self) {
+        *self = Self::none();
+    }
+
+    /// Believes the command that the bell announces, or counts why not.
+    fn examine(&mut self, lease: &CommanderView, latest: Option<u64>, tick: u64, devices: u64, told: &DriverSegment) {
+        let Some(answered) = latest else { return };
+        // An answer to a tick that has not come, or one older than what we have, is no answer.
+        if answered > tick || self.tick.is_some_and(|newest| answered <= newest) {
+            return bump(&told.counters.commands_refused);
+        }
+        if lease.read_command(answered, &mut self.candidate).is_err() {
+            return bump(&told.counters.commands_torn);
+        }
+        match self.candidate.validate(answered, lease.lease(), devices) {
+            Ok(()) => {
+                self.command = self.candidate;
+                self.tick = Some(answered);
+            }
+            Err(_) => bump(&told.counters.commands_refused),
+        }
+    }
+
+    fn age(&self, tick: u64) -> Option<u64> {
+        self.tick.map(|answered| tick.saturating_sub(answered))
+    }
+
+    fn force(&self, device: usize) -> Vector3<f64> {
+        Vector3::from(self.command.devices[device].force_on_user_n)
+    }
+}

@@ -1,0 +1,107 @@
+//! What moves under a finger: one module per way of reaching it, behind one small trait.
+//!
+//! A device is read once and written once a tick, by the loop, so neither may allocate, lock or wait. It
+//! gets a force on the user that is already limited and finite, in its own base frame D, and tells what
+//! its motors were really made to render.
+
+pub mod encoder_trace;
+pub mod ideal;
+pub mod replay;
+
+use nalgebra::Vector3;
+use shm_abi::segment::DeviceInfo;
+use shm_abi::{DeviceFrame, FaultReason};
+
+/// The tick in which a device is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TickTime {
+    /// Number of the tick.
+    pub tick: u64,
+    /// Length of a tick [ns].
+    pub period_ns: u64,
+    /// Ticks since a lease first had full authority; negative before. The clock of scripted hands.
+    pub run_tick: i64,
+}
+
+impl TickTime {
+    /// Time since full authority [s]; zero before.
+    pub fn run_time_s(&self) -> f64 {
+        run_time_s(self.run_tick, self.period_ns)
+    }
+}
+
+/// Time of a run's tick [s]: the correctly rounded quotient, so that tick 3 at 1 kHz is 0.003.
+pub fn run_time_s(run_tick: i64, period_ns: u64) -> f64 {
+    let ns = u128::from(run_tick.max(0).unsigned_abs()) * u128::from(period_ns);
+    ns as f64 / 1e9
+}
+
+/// What a device says of one tick. All in the base frame D, SI.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// Whether the position can be trusted; false until the device has been zeroed.
+    pub is_valid: bool,
+    /// The tip [m].
+    pub position_m: Vector3<f64>,
+    /// The gimbal's last link, w x y z; identity where there is none.
+    pub orientation_wxyz: [f64; 4],
+    /// Encoder counts, extended: three joints, three gimbal axes.
+    pub encoder_counts: [i64; 6],
+    /// Joint angles in the same order [rad].
+    pub joint_angle_rad: [f64; 6],
+    /// Bit `i`: button `i` is pressed.
+    pub buttons: u64,
+}
+
+impl Reading {
+    /// A valid reading of a position and nothing else.
+    pub fn at(position_m: Vector3<f64>) -> Self {
+        Self {
+            is_valid: true,
+            position_m,
+            orientation_wxyz: [1.0, 0.0, 0.0, 0.0],
+            encoder_counts: [0; 6],
+            joint_angle_rad: [0.0; 6],
+            buttons: 0,
+        }
+    }
+
+    /// Whether every number of it is finite.
+    pub fn is_finite(&self) -> bool {
+        self.position_m.iter().chain(&self.orientation_wxyz).chain(&self.joint_angle_rad).all(|n| n.is_finite())
+    }
+
+    /// Puts it into the frame.
+    pub fn write_to(&self, frame: &mut DeviceFrame) {
+        frame.flags = if self.is_valid { shm_abi::frame::DEVICE_POSITION_VALID } else { 0 };
+        frame.buttons = self.buttons;
+        frame.encoder_counts = self.encoder_counts;
+        frame.joint_angle_rad = self.joint_angle_rad;
+        frame.position_m_measured = self.position_m.into();
+        frame.orientation_wxyz_measured = self.orientation_wxyz;
+    }
+}
+
+/// What the motors were made to do.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Written {
+    /// The force on the user that this amounts to, in D [N].
+    pub force_on_user_n: Vector3<f64>,
+    /// The values the hardware got.
+    pub motor_codes: [i64; 3],
+}
+
+/// A haptic device as the loop sees it.
+pub trait Device: Send {
+    /// What it is.
+    fn info(&self) -> &DeviceInfo;
+
+    /// Reads where it is. An error is a fault: it ends in zero force on all devices.
+    fn read(&mut self, time: TickTime) -> Result<Reading, FaultReason>;
+
+    /// Makes it render a force on the user, which is finite and within the device's peak.
+    fn write(&mut self, force_on_user_n: Vector3<f64>) -> Result<Written, FaultReason>;
+
+    /// Motors off, whatever state it is in; must not fail. Called on every way out.
+    fn release(&mut self);
+}

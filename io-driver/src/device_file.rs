@@ -1,0 +1,170 @@
+//! Describes a device in a TOML file: every number that differs between two laboratories.
+//!
+//! Problem: individual devices differ by up to a fifth, wiring is not public, and a changed cable
+//! must not need a compiler.
+//! Model: `kind` says which tables the file has. A `premium` has `[linkage]`, `[encoders]` and
+//! `[motors]`; an `ideal` device has nothing. What a simulation needs beyond these gets a table
+//! of its own.
+//! Units: each key carries its own.
+//! Invariants: a value of type [`DeviceFile`] has been checked: all numbers are finite and in
+//! their range, limits are ordered, the home pose is within them, and the inverse kinematics is
+//! unique. Unknown keys are refused. Files are not opened here.
+//! Cost: start-up only.
+
+use std::path::Path;
+
+use serde::Deserialize;
+use thiserror::Error;
+use toml::Spanned;
+
+use crate::encoders::{EncoderSpec, JointMap};
+use crate::kinematics::{Ideal, Kinematics, Premium};
+use crate::motors::{MotorMap, MotorSpec};
+use crate::toml_report::{TomlReport, TomlText};
+
+mod ideal;
+mod premium;
+
+/// Names of the files that come with the program, see [`builtin`].
+pub const BUILTIN_NAMES: [&str; 2] = ["premium-1.5", "ideal"];
+
+/// A checked device description.
+#[derive(Debug, Clone, PartialEq)]
+pub enum DeviceFile {
+    /// `kind = "premium"`.
+    Premium(Box<PremiumFile>),
+    /// `kind = "ideal"`.
+    Ideal(IdealFile),
+}
+
+/// A PHANToM Premium with three actuated joints.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PremiumFile {
+    /// For people.
+    pub name: String,
+    /// Largest force on the user, for an instant.
+    pub peak_force_n: f64,
+    /// Largest force on the user, for ever.
+    pub continuous_force_n: f64,
+    /// Where the tip is meant to be.
+    pub workspace: Workspace,
+    /// Links and stops.
+    pub mechanism: Premium,
+    /// From raw counters to joint angles.
+    pub encoders: EncoderSpec,
+    /// From joint torques to converter codes.
+    pub motors: MotorSpec,
+}
+
+/// A device without mechanism, counters and motors.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IdealFile {
+    /// For people.
+    pub name: String,
+    /// Largest force on the user, if there is to be one.
+    pub peak_force_n: Option<f64>,
+}
+
+/// A box in the base frame D.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Workspace {
+    /// Full edge lengths, metres.
+    pub size_m: [f64; 3],
+    /// Centre, metres.
+    pub centre_m: [f64; 3],
+}
+
+/// Why a text is not a device description.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum DeviceFileError {
+    /// Not TOML, a key missing or unknown, or a value of the wrong type.
+    #[error(transparent)]
+    Malformed(TomlReport),
+    /// A kind of device this driver does not know.
+    #[error(transparent)]
+    UnknownKind(TomlReport),
+    /// A value that no device has, or that contradicts another one.
+    #[error(transparent)]
+    Value(TomlReport),
+}
+
+/// The first look at a file; `kind` decides about everything else.
+#[derive(Deserialize)]
+struct Kind {
+    kind: Spanned<String>,
+}
+
+impl DeviceFile {
+    /// Reads and checks a description; `file` is only named in errors, never opened.
+    ///
+    /// # Errors
+    /// [`DeviceFileError`] names file, line and key of the first mistake, what was found and what
+    /// is allowed.
+    pub fn parse(text: &str, file: &Path) -> Result<Self, DeviceFileError> {
+        let toml = TomlText::new(text, file);
+        let Kind { kind } = toml.read().map_err(DeviceFileError::Malformed)?;
+        match kind.get_ref().as_str() {
+            "premium" => premium::read(&toml).map(|premium| Self::Premium(Box::new(premium))),
+            "ideal" => ideal::read(&toml).map(Self::Ideal),
+            other => {
+                let report = toml.refuse(kind.span(), format_args!("{other:?}"), r#""premium" or "ideal""#);
+                Err(DeviceFileError::UnknownKind(report))
+            }
+        }
+    }
+
+    /// For people.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Premium(premium) => &premium.name,
+            Self::Ideal(ideal) => &ideal.name,
+        }
+    }
+
+    /// Geometry of the device.
+    pub fn kinematics(&self) -> Kinematics {
+        match self {
+            Self::Premium(premium) => Kinematics::Premium(premium.mechanism),
+            Self::Ideal(_) => Kinematics::Ideal(Ideal),
+        }
+    }
+
+    /// Largest force on the user, if the device has a limit.
+    pub fn peak_force_n(&self) -> Option<f64> {
+        match self {
+            Self::Premium(premium) => Some(premium.peak_force_n),
+            Self::Ideal(ideal) => ideal.peak_force_n,
+        }
+    }
+}
+
+impl PremiumFile {
+    /// From extended counts to joint angles, not yet zeroed.
+    pub fn joint_map(&self) -> JointMap {
+        JointMap::new(&self.encoders)
+    }
+
+    /// From joint torques to converter codes.
+    pub fn motor_map(&self) -> MotorMap {
+        MotorMap::new(&self.motors)
+    }
+}
+
+impl Workspace {
+    /// Whether a position of the tip in the base frame lies inside.
+    pub fn contains(&self, tip_m: [f64; 3]) -> bool {
+        (0..3).all(|i| (tip_m[i] - self.centre_m[i]).abs() <= 0.5 * self.size_m[i])
+    }
+}
+
+/// Text of a description that comes with the program, so that an installed one finds it.
+pub fn builtin(name: &str) -> Option<&'static str> {
+    match name {
+        "premium-1.5" => Some(include_str!("../../config/driver/devices/premium-1.5.toml")),
+        "ideal" => Some(include_str!("../../config/driver/devices/ideal.toml")),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests;

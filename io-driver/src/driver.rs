@@ -1,0 +1,354 @@
+//! The driver as a process: sets itself up, starts the loop in a thread of its own, serves the socket.
+//!
+//! Model: everything that can fail or allocate happens before the loop's first tick or in this thread.
+//! The order is: open the devices, set up the loop's thread and look at what was obtained, make the
+//! memory, listen, go. Whatever ends the process, the loop writes zero first.
+
+use crate::config::{DriverConfig, ReplyMode};
+use crate::cycle::{Cycle, Freshness};
+use crate::device::Device;
+use crate::mail::{Letter, Sender, mail};
+use crate::meter::bump;
+use crate::open::{OpenError, open_devices};
+use crate::real_loop::{Ended, RealLoop, Shared};
+use crate::safety::{Ramps, Safety};
+use rt_core::epitaph::{EpitaphKind, EpitaphRef, install_fatal_handlers, install_panic_hook};
+use rt_core::log::{LogLevel, LogLine, RtLogDrain};
+use rt_core::setup::{SetupGuards, SetupReport, SetupRequest};
+use rt_core::signals::StopSignals;
+use shm_abi::DriverMemory;
+use shm_abi::doorbell::WaitMode;
+use shm_abi::segment::{ClockMode, DriverInfo, SegmentError};
+use shm_abi::server::{BindError, Server, ServerEvent};
+use std::io;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc;
+use std::thread::JoinHandle;
+use std::time::Duration;
+use thiserror::Error;
+
+/// How often the socket's thread looks at signals and at the log when nothing else happens.
+const POLL: Duration = Duration::from_millis(20);
+/// Records that may wait for the log's slow side.
+const LOG_CAPACITY: usize = 1024;
+/// Touched in advance, so that no call chain of the loop is the first to need a page of stack.
+const STACK_BYTES: usize = 256 * 1024;
+
+/// What a run is to do besides its configuration.
+#[derive(Debug, Clone, Default)]
+pub struct RunOptions {
+    /// Refuse to start when a real-time guarantee is missing.
+    pub strict: bool,
+    /// Say nothing but errors.
+    pub quiet: bool,
+    /// End when this process, the parent, ends.
+    pub parent: Option<u32>,
+    /// Listen here, whatever the configuration says.
+    pub socket: Option<PathBuf>,
+}
+
+/// Why a driver did not run, or not to its end.
+#[derive(Debug, Error)]
+pub enum RunError {
+    /// A device cannot be had.
+    #[error(transparent)]
+    Open(#[from] OpenError),
+    /// There is no shared memory.
+    #[error(transparent)]
+    Segment(#[from] SegmentError),
+    /// It cannot listen.
+    #[error(transparent)]
+    Bind(#[from] BindError),
+    /// `--strict`, and something is missing.
+    #[error("--strict: not every real-time guarantee was obtained, so nothing was started:\n{0}")]
+    Strict(SetupReport),
+    /// The system refused something.
+    #[error("cannot {what}: {source}")]
+    System {
+        /// What was tried.
+        what: &'static str,
+        /// What it said.
+        source: io::Error,
+    },
+    /// The parent had ended before its child was ready.
+    #[error("{0}")]
+    Orphaned(String),
+    /// The loop panicked.
+    #[error("the driver's loop panicked; the motors were written zero: {0}")]
+    Panicked(String),
+}
+
+impl RunError {
+    /// Whether something failed during the run, rather than before it.
+    pub fn is_fault(&self) -> bool {
+        matches!(self, Self::Panicked(_))
+    }
+}
+
+/// The driver's tick, where signal handlers and panic hooks find it.
+static TICK: AtomicU64 = AtomicU64::new(0);
+
+/// Runs a driver until a signal, a request over the socket or a panic ends it.
+///
+/// # Errors
+/// Whatever kept it from starting, and a panic of its loop.
+pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> {
+    let signals = StopSignals::install().map_err(|source| RunError::System { what: "catch signals", source })?;
+    if let Some(parent) = options.parent {
+        rt_core::process::die_with_parent(parent, rustix::process::Signal::TERM.as_raw())
+            .map_err(|error| RunError::Orphaned(error.to_string()))?;
+    }
+    let devices = open_devices(config)?;
+    let shared = Shared::default();
+    let (report, starter) = spawn_loop(config, &shared)?;
+    tell_guarantees(&report, options)?;
+    let wait_mode = choose_wait_mode(config, &report);
+    let memory = Arc::new(DriverMemory::create(&describe(config, &devices, wait_mode))?);
+    install_last_words(&memory)?;
+    let path = options.socket.clone().or_else(|| config.socket.clone());
+    let server = Server::bind(&path.unwrap_or_else(shm_abi::endpoint::for_driver))?;
+    say(options, format_args!("listening at {}", server.path().display()));
+    let (sender, inbox) = mail();
+    let (log, drain) = rt_core::log::channel(LOG_CAPACITY);
+    let cycle = make_cycle(config, Arc::clone(&memory), devices);
+    let thread = starter.start(RealLoop::new(config, wait_mode, cycle, inbox, log, shared.clone(), &TICK));
+    let mut service = Service { server, sender, drain, memory, signals, shared, options };
+    let served = service.serve();
+    service.finish(thread, served)
+}
+
+/// The state machine and devices of a configuration over a memory; what every clock runs.
+pub fn make_cycle(config: &DriverConfig, memory: Arc<DriverMemory>, devices: Vec<Box<dyn Device>>) -> Cycle {
+    let safety = Safety::new(Ramps {
+        in_ticks: config.safety.ramp_in_ticks,
+        out_ticks: config.safety.ramp_out_ticks,
+        max_command_age_ticks: config.safety.max_command_age_ticks,
+    });
+    let freshness = match config.reply.mode {
+        ReplyMode::OnArrival | ReplyMode::FixedPhase => Freshness(0),
+        ReplyMode::NextTick => Freshness(1),
+    };
+    Cycle::new(memory, devices, safety, config.period_ns, freshness)
+}
+
+/// What the header of the driver's segment says.
+pub fn describe(config: &DriverConfig, devices: &[Box<dyn Device>], wait_mode: WaitMode) -> DriverInfo {
+    DriverInfo {
+        period_ns: config.period_ns,
+        reply_budget_ns: match config.clock {
+            ClockMode::Real => config.reply.budget_ns,
+            ClockMode::Lockstep | ClockMode::Virtual => u64::MAX,
+        },
+        max_command_age_ticks: config.safety.max_command_age_ticks,
+        ramp_in_ticks: config.safety.ramp_in_ticks,
+        ramp_out_ticks: config.safety.ramp_out_ticks,
+        clock_mode: config.clock,
+        wait_mode,
+        cpu: loop_cpu(config),
+        devices: devices.iter().map(|device| device.info().clone()).collect(),
+    }
+}
+
+/// The configured CPU, else the last one, where the fewest interrupts land; none on a single-CPU machine,
+/// which the application needs as well.
+fn loop_cpu(config: &DriverConfig) -> Option<usize> {
+    if config.clock != ClockMode::Real {
+        return config.real_time.cpu;
+    }
+    let online = rt_core::cpu::online_cpus();
+    config.real_time.cpu.or_else(|| online.last().copied().filter(|_| online.len() > 1))
+}
+
+fn setup_request(config: &DriverConfig) -> SetupRequest {
+    // In lockstep nothing is on time by design, so nothing is asked for.
+    if config.clock != ClockMode::Real {
+        return SetupRequest::default();
+    }
+    SetupRequest {
+        fifo_priority: config.real_time.priority,
+        cpu: loop_cpu(config),
+        lock_memory: config.real_time.lock_memory,
+        prefault_stack_bytes: STACK_BYTES,
+        prefault_heap_bytes: 0,
+        timer_slack_ns: Some(1),
+        dma_latency_us: Some(0),
+    }
+}
+
+/// Spinning is right only on a CPU of one's own with real-time rights; else it starves whom it waits for.
+fn choose_wait_mode(config: &DriverConfig, report: &SetupReport) -> WaitMode {
+    if config.clock != ClockMode::Real {
+        return WaitMode::Futex;
+    }
+    let owns_cpu = loop_cpu(config).is_some() && config.real_time.priority.is_some();
+    let obtained = ["scheduling", "cpu"].iter().all(|name| report.find(name).is_some_and(|item| item.obtained));
+    config.real_time.wait.unwrap_or(if owns_cpu && obtained { WaitMode::Spin } else { WaitMode::Futex })
+}
+
+/// The loop's thread, set up and waiting for its loop.
+struct Starter {
+    send: mpsc::SyncSender<RealLoop>,
+    thread: JoinHandle<Ended>,
+}
+
+impl Starter {
+    fn start(self, real_loop: RealLoop) -> JoinHandle<Ended> {
+        // It fails only if the thread is gone, which joining it will tell.
+        let _ = self.send.send(real_loop);
+        self.thread
+    }
+}
+
+/// Starts the thread and sets it up; what is obtained must be known before the memory is described.
+fn spawn_loop(config: &DriverConfig, shared: &Shared) -> Result<(SetupReport, Starter), RunError> {
+    let request = setup_request(config);
+    let (send_report, receive_report) = mpsc::sync_channel(1);
+    let (send, receive) = mpsc::sync_channel::<RealLoop>(1);
+    let ended = Arc::clone(&shared.ended);
+    let body = move || {
+        let (report, guards) = rt_core::setup::apply(&request);
+        let _ = send_report.send(report);
+        let end = run_when_told(&receive, guards);
+        ended.store(true, Ordering::Release);
+        end
+    };
+    let thread = std::thread::Builder::new()
+        .name("driver-loop".into())
+        .spawn(body)
+        .map_err(|source| RunError::System { what: "start the loop's thread", source })?;
+    let report = receive_report.recv().map_err(|_| RunError::Panicked("during its set-up".into()))?;
+    Ok((report, Starter { send, thread }))
+}
+
+/// The guards are kept as long as the loop runs.
+fn run_when_told(receive: &mpsc::Receiver<RealLoop>, _guards: SetupGuards) -> Ended {
+    match receive.recv() {
+        Ok(real_loop) => real_loop.run(),
+        // The start failed elsewhere, which was told there.
+        Err(_) => Ended::Stopped,
+    }
+}
+
+fn tell_guarantees(report: &SetupReport, options: &RunOptions) -> Result<(), RunError> {
+    if options.strict && !report.all_obtained() {
+        return Err(RunError::Strict(report.clone()));
+    }
+    say(options, format_args!("real-time guarantees:\n{report}"));
+    Ok(())
+}
+
+/// Signal handlers and the panic hook write into the segment for as long as the process lives, so its
+/// memory is kept that long.
+fn install_last_words(memory: &Arc<DriverMemory>) -> Result<(), RunError> {
+    let kept: &'static Arc<DriverMemory> = Box::leak(Box::new(Arc::clone(memory)));
+    install_panic_hook(&kept.epitaph, &TICK);
+    install_fatal_handlers(&kept.epitaph, &TICK)
+        .map_err(|source| RunError::System { what: "catch fatal signals", source })
+}
+
+fn say(options: &RunOptions, message: std::fmt::Arguments<'_>) {
+    if !options.quiet {
+        eprintln!("io-driver: {message}");
+    }
+}
+
+/// The socket's thread.
+struct Service<'a> {
+    server: Server,
+    sender: Sender,
+    drain: RtLogDrain,
+    memory: Arc<DriverMemory>,
+    signals: StopSignals,
+    shared: Shared,
+    options: &'a RunOptions,
+}
+
+impl Service<'_> {
+    /// Serves until something asks the driver to stop; returns what.
+    fn serve(&mut self) -> Result<String, RunError> {
+        let mut events = Vec::new();
+        loop {
+            self.server
+                .poll(&self.memory, POLL, &mut events)
+                .map_err(|source| RunError::System { what: "wait at the socket", source })?;
+            for event in events.drain(..) {
+                if let Some(reason) = self.pass_on(event) {
+                    return Ok(reason);
+                }
+            }
+            self.sender.clear_waste();
+            self.write_log();
+            if let Some(signal) = self.signals.requested() {
+                return Ok(format!("signal {signal}"));
+            }
+            if self.shared.ended.load(Ordering::Acquire) {
+                return Ok("the loop ended".into());
+            }
+        }
+    }
+
+    /// Returns why to stop, if the event says so.
+    fn pass_on(&mut self, event: ServerEvent) -> Option<String> {
+        match event {
+            ServerEvent::LeaseGranted { view, pid, name } => {
+                bump(&self.memory.counters.leases_granted);
+                say(self.options, format_args!("lease {} to process {pid} ({name})", view.lease()));
+                self.post(Letter::Grant(view));
+            }
+            ServerEvent::LeaseEnded { lease } => {
+                say(self.options, format_args!("lease {lease} ended"));
+                self.post(Letter::End(lease));
+            }
+            ServerEvent::LeaseRefused => bump(&self.memory.counters.leases_refused),
+            ServerEvent::ClearFaultRequested => self.post(Letter::ClearFault),
+            ServerEvent::Trouble { message } => eprintln!("io-driver: {message}"),
+            ServerEvent::StopRequested { pid } => return Some(format!("request of process {pid}")),
+        }
+        None
+    }
+
+    /// The loop collects its mail every tick; if the queue is full it has stood still for long, and waiting
+    /// here is all that is left.
+    fn post(&mut self, letter: Letter) {
+        let mut letter = letter;
+        while let Err(returned) = self.sender.post(letter) {
+            if self.shared.ended.load(Ordering::Acquire) {
+                return;
+            }
+            letter = returned;
+            std::thread::sleep(POLL);
+        }
+    }
+
+    fn write_log(&mut self) {
+        let quiet = self.options.quiet;
+        self.drain.drain(|line: LogLine| {
+            if !quiet || line.level > LogLevel::Info {
+                eprintln!("io-driver: tick {}: {}", line.tick, line.text);
+            }
+        });
+        self.memory.counters.log_dropped.store(self.drain.lost(), Ordering::Relaxed);
+    }
+
+    /// Ends the loop, writes the last words and says how it was.
+    fn finish(mut self, thread: JoinHandle<Ended>, served: Result<String, RunError>) -> Result<(), RunError> {
+        self.shared.stop.store(true, Ordering::Relaxed);
+        let ended = thread.join();
+        self.write_log();
+        let reason = served?;
+        match ended {
+            Ok(Ended::Stopped) => {
+                let tick = TICK.load(Ordering::Relaxed);
+                EpitaphRef::new(&self.memory.epitaph).write(EpitaphKind::Stopped, tick, &reason);
+                say(self.options, format_args!("stopped in tick {tick}: {reason}; motors were written zero"));
+                Ok(())
+            }
+            Ok(Ended::Panicked) | Err(_) => {
+                let words = rt_core::epitaph::read(&self.memory.epitaph);
+                Err(RunError::Panicked(words.map_or_else(String::new, |words| words.to_string())))
+            }
+        }
+    }
+}

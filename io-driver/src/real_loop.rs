@@ -1,0 +1,234 @@
+//! The driver's loop in its own process: in real time, or in lockstep with the application.
+//!
+//! Model: wait for the tick, collect mail, read and tell, wait for the reply within its budget, write. In
+//! lockstep the budget is unlimited while somebody commands, and a tick begins as soon as the former is
+//! done; with nobody commanding, time goes on at the devices' rate.
+//!
+//! Invariant: whatever ends the loop (a request, a panic), the motors are written zero before anything else.
+//! Cost: in spin mode the timed wait is the only system call.
+
+use crate::config::{DriverConfig, ReplyMode};
+use crate::cycle::Cycle;
+use crate::mail::Inbox;
+use crate::meter::{add, record};
+use rt_core::clock::{monotonic_ns, sleep_until_ns};
+use rt_core::log::{LogLevel, RtLog};
+use rt_core::periodic::{Periodic, PeriodicConfig};
+use shm_abi::doorbell::WaitMode;
+use shm_abi::segment::ClockMode;
+use shm_abi::{DriverState, FaultReason};
+use std::hint::spin_loop;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Duration;
+
+/// How long a sleeping loop goes without looking at its mail and at requests to stop.
+const NAP: Duration = Duration::from_millis(10);
+
+/// What the loop and the rest of the process share.
+#[derive(Debug, Clone, Default)]
+pub struct Shared {
+    /// Somebody asked the loop to end.
+    pub stop: Arc<AtomicBool>,
+    /// The loop has ended.
+    pub ended: Arc<AtomicBool>,
+}
+
+/// How the loop ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ended {
+    /// It was asked to.
+    Stopped,
+    /// It panicked; the motors are off.
+    Panicked,
+}
+
+/// The loop and what it needs.
+pub struct RealLoop {
+    cycle: Cycle,
+    inbox: Inbox,
+    log: RtLog,
+    shared: Shared,
+    /// The current tick, for the epitaph.
+    tick: &'static AtomicU64,
+    clock: ClockMode,
+    wait_mode: WaitMode,
+    mode: ReplyMode,
+    budget_ns: u64,
+    periodic: Periodic,
+    lockstep_tick: u64,
+    logged_state: Option<DriverState>,
+}
+
+/// The beginning of a tick.
+struct Begin {
+    tick: u64,
+    deadline_ns: u64,
+    /// When a reply is too late.
+    reply_until_ns: u64,
+}
+
+impl RealLoop {
+    /// A loop that has not begun.
+    pub fn new(
+        config: &DriverConfig,
+        wait_mode: WaitMode,
+        cycle: Cycle,
+        inbox: Inbox,
+        log: RtLog,
+        shared: Shared,
+        tick: &'static AtomicU64,
+    ) -> Self {
+        let periodic = Periodic::new(PeriodicConfig {
+            period_ns: config.period_ns,
+            phase_offset_ns: config.real_time.phase_offset_ns,
+            spin_margin_ns: config.real_time.spin_margin_ns,
+        });
+        Self {
+            cycle,
+            inbox,
+            log,
+            shared,
+            tick,
+            clock: config.clock,
+            wait_mode,
+            mode: config.reply.mode,
+            budget_ns: config.reply.budget_ns,
+            periodic,
+            lockstep_tick: 0,
+            logged_state: None,
+        }
+    }
+
+    /// Runs until somebody asks it to end.
+    pub fn run(mut self) -> Ended {
+        let ended = match catch_unwind(AssertUnwindSafe(|| self.ticks())) {
+            Ok(()) => {
+                self.cycle.release();
+                Ended::Stopped
+            }
+            Err(_) => {
+                self.cycle.fault(FaultReason::Panic);
+                Ended::Panicked
+            }
+        };
+        self.shared.ended.store(true, Ordering::Release);
+        ended
+    }
+
+    fn ticks(&mut self) {
+        while let Some(begin) = self.wait_for_tick() {
+            self.inbox.deliver(&mut self.cycle);
+            self.cycle.sense(begin.tick, begin.deadline_ns);
+            self.wait_for_reply(begin.reply_until_ns);
+            self.cycle.actuate();
+            self.log_state(begin.tick);
+        }
+    }
+
+    /// `None`: somebody asked the loop to end.
+    fn wait_for_tick(&mut self) -> Option<Begin> {
+        let begin = match self.clock {
+            ClockMode::Lockstep => self.wait_in_lockstep(),
+            ClockMode::Real | ClockMode::Virtual => self.wait_in_real_time()?,
+        };
+        self.tick.store(begin.tick, Ordering::Relaxed);
+        (!self.is_stopping()).then_some(begin)
+    }
+
+    fn wait_in_real_time(&mut self) -> Option<Begin> {
+        let mut wake = self.periodic.wait();
+        while wake.interrupted {
+            if self.is_stopping() {
+                return None;
+            }
+            wake = self.periodic.wait();
+        }
+        let memory = self.cycle.memory();
+        record(&memory.wake_error_ns, wake.latency_ns());
+        add(&memory.counters.overruns, wake.skipped);
+        let reply_until_ns = wake.deadline_ns + self.budget_ns;
+        Some(Begin { tick: wake.tick, deadline_ns: wake.deadline_ns, reply_until_ns })
+    }
+
+    fn wait_in_lockstep(&mut self) -> Begin {
+        self.lockstep_tick += 1;
+        if self.cycle.lease().is_none() {
+            // Nobody commands: go on at the devices' rate instead of racing.
+            self.periodic.wait();
+        }
+        Begin { tick: self.lockstep_tick, deadline_ns: monotonic_ns(), reply_until_ns: u64::MAX }
+    }
+
+    fn wait_for_reply(&mut self, until_ns: u64) {
+        if self.mode == ReplyMode::NextTick && self.clock == ClockMode::Real {
+            self.cycle.take_reply();
+            return;
+        }
+        match self.clock {
+            ClockMode::Lockstep => self.wait_without_limit(),
+            ClockMode::Real | ClockMode::Virtual => self.wait_within(until_ns),
+        }
+        if self.mode == ReplyMode::FixedPhase && self.clock == ClockMode::Real {
+            self.wait_for_phase(until_ns);
+        }
+    }
+
+    fn wait_within(&mut self, until_ns: u64) {
+        while !self.cycle.take_reply() {
+            let now = monotonic_ns();
+            if now >= until_ns {
+                return;
+            }
+            match self.wait_mode {
+                WaitMode::Spin => spin_loop(),
+                WaitMode::Futex => self.sleep_for_reply(Duration::from_nanos(until_ns - now)),
+            }
+        }
+    }
+
+    /// In lockstep a tick has no other end than the reply, the end of the lease or of the driver.
+    fn wait_without_limit(&mut self) {
+        while !self.cycle.take_reply() && !self.is_stopping() {
+            self.sleep_for_reply(NAP);
+            self.inbox.deliver(&mut self.cycle);
+        }
+    }
+
+    fn sleep_for_reply(&self, timeout: Duration) {
+        if let Some(lease) = self.cycle.lease() {
+            lease.sleep_for_command(self.cycle.seen_reply(), self.cycle.memory(), timeout);
+        }
+    }
+
+    /// The motors are written at the same phase whether the reply came early, late or not at all.
+    fn wait_for_phase(&self, phase_ns: u64) {
+        match self.wait_mode {
+            WaitMode::Spin => {
+                while monotonic_ns() < phase_ns {
+                    spin_loop();
+                }
+            }
+            WaitMode::Futex => {
+                sleep_until_ns(phase_ns);
+            }
+        }
+    }
+
+    fn log_state(&mut self, tick: u64) {
+        let safety = self.cycle.safety();
+        let state = safety.state();
+        if self.logged_state.replace(state) == Some(state) {
+            return;
+        }
+        match state {
+            DriverState::Fault => self.log.push(LogLevel::Error, tick, safety.fault().sentence(), &[]),
+            other => self.log.push(LogLevel::Info, tick, other.name(), &[]),
+        }
+    }
+
+    fn is_stopping(&self) -> bool {
+        self.shared.stop.load(Ordering::Relaxed)
+    }
+}

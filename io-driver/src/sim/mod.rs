@@ -1,0 +1,3 @@
+//! Simulated devices and hands.
+
+pub mod script;

@@ -1,0 +1,248 @@
+//! What a running driver is doing, for people and for programs.
+
+use crate::meter;
+use rt_core::histogram::{Histogram, Summary};
+use serde::Serialize;
+use shm_abi::segment::{ClockMode, DriverInfo};
+use shm_abi::{DriverState, DriverView, FaultReason, Frame};
+use std::fmt;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// A driver at one moment. Units are in the names.
+#[derive(Debug, Clone, Serialize)]
+pub struct Status {
+    /// Process id.
+    pub driver_pid: u64,
+    /// Which clock moves the ticks.
+    pub clock: &'static str,
+    /// Ticks per second.
+    pub rate_hz: f64,
+    /// How long it waits for a reply; `None`: for ever.
+    pub reply_budget_ns: Option<u64>,
+    /// How it waits: "spin" or "futex".
+    pub wait: &'static str,
+    /// CPU of the loop.
+    pub cpu: Option<usize>,
+    /// Number of the newest tick.
+    pub tick: Option<u64>,
+    /// State of the driver.
+    pub state: &'static str,
+    /// Why it is in the fault state.
+    pub fault: Option<&'static str>,
+    /// Lease in force; 0: none.
+    pub lease: u64,
+    /// Share of the force that is let through.
+    pub authority: f64,
+    /// Counts since the start.
+    pub counters: CounterStatus,
+    /// How late the loop woke.
+    pub wake_error_ns: Percentiles,
+    /// Its own work in a tick.
+    pub cycle_ns: Percentiles,
+    /// From frame to reply.
+    pub round_trip_ns: Percentiles,
+    /// The devices.
+    pub devices: Vec<DeviceStatus>,
+    /// Last words, if it has died.
+    pub epitaph: Option<String>,
+}
+
+/// The driver's counters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct CounterStatus {
+    /// Ticks done.
+    pub ticks: u64,
+    /// Deadlines skipped.
+    pub overruns: u64,
+    /// Ticks under a lease.
+    pub ticks_commanded: u64,
+    /// Of these, answered in time.
+    pub replies_fresh: u64,
+    /// Of these, not answered in time.
+    pub replies_missed: u64,
+    /// Torn commands.
+    pub commands_torn: u64,
+    /// Commands not believed.
+    pub commands_refused: u64,
+    /// Forces cut to a peak.
+    pub forces_limited: u64,
+    /// Leases granted.
+    pub leases_granted: u64,
+    /// Would-be commanders refused.
+    pub leases_refused: u64,
+    /// Faults entered.
+    pub faults: u64,
+}
+
+/// A histogram in short; `None` without values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Percentiles {
+    /// Values.
+    pub count: u64,
+    /// Half are not above this.
+    pub p50: u64,
+    /// 99 % are not above this.
+    pub p99: u64,
+    /// 99.9 % are not above this.
+    pub p999: u64,
+    /// None is above this.
+    pub max: u64,
+}
+
+/// A device at that moment.
+#[derive(Debug, Clone, Serialize)]
+pub struct DeviceStatus {
+    /// Name.
+    pub name: String,
+    /// Kind.
+    pub kind: String,
+    /// Whether the position can be trusted.
+    pub position_valid: bool,
+    /// The tip in the base frame [m].
+    pub position_m: [f64; 3],
+    /// The force on the user that the motors render [N].
+    pub force_on_user_n_applied: [f64; 3],
+    /// The largest force it may render [N]; `None`: no limit.
+    pub peak_force_n: Option<f64>,
+}
+
+impl Status {
+    /// Looks at a driver.
+    pub fn of(driver: &DriverView, driver_pid: u64) -> Self {
+        let info = driver.info();
+        let frame = driver.read_latest();
+        let state = frame.and_then(|f| DriverState::from_word(f.state)).unwrap_or(DriverState::Starting);
+        let fault = frame.and_then(|f| FaultReason::from_word(f.fault)).filter(|f| *f != FaultReason::None);
+        Self {
+            driver_pid,
+            clock: info.clock_mode.name(),
+            rate_hz: 1e9 / info.period_ns as f64,
+            reply_budget_ns: (info.reply_budget_ns != u64::MAX).then_some(info.reply_budget_ns),
+            wait: info.wait_mode.name(),
+            cpu: info.cpu,
+            tick: frame.map(|f| f.tick),
+            state: state.name(),
+            fault: fault.map(FaultReason::sentence),
+            lease: frame.map_or(0, |f| f.lease),
+            authority: frame.map_or(0.0, |f| f.authority),
+            counters: CounterStatus::of(driver),
+            wake_error_ns: Percentiles::of(&meter::read(&driver.wake_error_ns)),
+            cycle_ns: Percentiles::of(&meter::read(&driver.cycle_ns)),
+            round_trip_ns: Percentiles::of(&meter::read(&driver.round_trip_ns)),
+            devices: devices(&info, frame.as_ref()),
+            epitaph: rt_core::epitaph::read(&driver.epitaph).map(|words| words.to_string()),
+        }
+    }
+
+    /// One line, for watching.
+    pub fn line(&self) -> String {
+        let tips: Vec<String> = self.devices.iter().map(DeviceStatus::short).collect();
+        format!(
+            "tick {} {} lease {} overruns {} missed {} | {}",
+            self.tick.unwrap_or(0),
+            self.state,
+            self.lease,
+            self.counters.overruns,
+            self.counters.replies_missed,
+            tips.join(" | "),
+        )
+    }
+}
+
+impl CounterStatus {
+    /// Reads a driver's counters.
+    pub fn of(driver: &DriverView) -> Self {
+        let get = |word: &AtomicU64| word.load(Ordering::Relaxed);
+        let c = &driver.counters;
+        Self {
+            ticks: get(&c.ticks),
+            overruns: get(&c.overruns),
+            ticks_commanded: get(&c.ticks_commanded),
+            replies_fresh: get(&c.replies_fresh),
+            replies_missed: get(&c.replies_missed),
+            commands_torn: get(&c.commands_torn),
+            commands_refused: get(&c.commands_refused),
+            forces_limited: get(&c.forces_limited),
+            leases_granted: get(&c.leases_granted),
+            leases_refused: get(&c.leases_refused),
+            faults: get(&c.faults),
+        }
+    }
+}
+
+impl Percentiles {
+    /// A histogram in short; zeros where nothing was recorded.
+    pub fn of(histogram: &Histogram) -> Self {
+        let Summary { count, p50, p99, p999, max } = histogram.summary();
+        Self { count, p50, p99, p999, max }
+    }
+}
+
+impl fmt::Display for Percentiles {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.count == 0 {
+            return f.write_str("nothing recorded");
+        }
+        let us = |ns: u64| format!("{:.2}", ns as f64 / 1e3);
+        write!(f, "p50 {}  p99 {}  p99.9 {}  max {} us", us(self.p50), us(self.p99), us(self.p999), us(self.max))
+    }
+}
+
+impl DeviceStatus {
+    fn short(&self) -> String {
+        let [x, y, z] = self.position_m.map(|m| m * 1e3);
+        let force = nalgebra::Vector3::from(self.force_on_user_n_applied).norm();
+        format!("{} ({x:.1}, {y:.1}, {z:.1}) mm {force:.2} N", self.name)
+    }
+}
+
+fn devices(info: &DriverInfo, frame: Option<&Frame>) -> Vec<DeviceStatus> {
+    let states = frame.map_or(&[][..], Frame::present_devices);
+    info.devices
+        .iter()
+        .enumerate()
+        .map(|(index, device)| {
+            let state = states.get(index);
+            DeviceStatus {
+                name: device.name.clone(),
+                kind: device.kind.clone(),
+                position_valid: state.is_some_and(|s| s.flags & shm_abi::frame::DEVICE_POSITION_VALID != 0),
+                position_m: state.map_or([0.0; 3], |s| s.position_m_measured),
+                force_on_user_n_applied: state.map_or([0.0; 3], |s| s.force_on_user_n_applied),
+                peak_force_n: Some(device.peak_force_n).filter(|peak| peak.is_finite()),
+            }
+        })
+        .collect()
+}
+
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let cpu = self.cpu.map_or_else(|| "any CPU".into(), |cpu| format!("CPU {cpu}"));
+        writeln!(f, "driver      process {}, {} clock, {} Hz, {cpu}, {} wait", self.driver_pid, self.clock, self.rate_hz, self.wait)?;
+        let fault = self.fault.map_or_else(String::new, |why| format!(": {why}"));
+        writeln!(f, "state       {}{fault}, lease {}, authority {:.2}", self.state, self.lease, self.authority)?;
+        let c = &self.counters;
+        writeln!(f, "ticks       {} done, {} overruns", c.ticks, c.overruns)?;
+        writeln!(f, "replies     {} fresh, {} missed, {} torn, {} refused", c.replies_fresh, c.replies_missed, c.commands_torn, c.commands_refused)?;
+        writeln!(f, "leases      {} granted, {} refused", c.leases_granted, c.leases_refused)?;
+        writeln!(f, "safety      {} forces limited, {} faults", c.forces_limited, c.faults)?;
+        writeln!(f, "wake error  {}", self.wake_error_ns)?;
+        writeln!(f, "cycle       {}", self.cycle_ns)?;
+        write!(f, "round trip  {}", self.round_trip_ns)?;
+        for device in &self.devices {
+            let valid = if device.position_valid { "" } else { " (position not valid)" };
+            write!(f, "\ndevice      {} [{}]{valid}", device.short(), device.kind)?;
+        }
+        if let Some(words) = &self.epitaph {
+            write!(f, "\nlast words  {words}")?;
+        }
+        Ok(())
+    }
+}
+
+/// Whether two looks at a driver in real time show that it moves.
+pub fn is_ticking(driver: &DriverView, wait: std::time::Duration) -> bool {
+    let before = driver.latest_tick();
+    std::thread::sleep(wait);
+    driver.info().clock_mode != ClockMode::Real || driver.latest_tick() != before
+}

@@ -1,0 +1,83 @@
+//! Which CPUs there are for this process.
+//!
+//! Problem: a container or a task set may offer fewer CPUs than the machine has, and a loop must
+//! know whether it has one of its own before it spins.
+//! Model: the affinity mask of the process's main thread, which the kernel keeps within the CPUs
+//! that are online and allowed. Threads that were pinned afterwards do not count.
+//! Cost: one system call and one allocation: for set-up. [`current_cpu`] is fit for the loop.
+
+use nix::errno::Errno;
+use nix::sched::{CpuSet, sched_getaffinity, sched_getcpu};
+use nix::unistd::{Pid, getpid};
+
+/// The CPUs this process may run on, ascending; never empty.
+#[must_use]
+pub fn online_cpus() -> Vec<usize> {
+    match affinity(getpid()) {
+        Ok(cpus) if !cpus.is_empty() => cpus,
+        // A machine with more CPUs than the mask holds (1024): the one we are on is certain.
+        _ => vec![current_cpu()],
+    }
+}
+
+/// The CPU that the calling thread runs on now; it may be another one right after, unless pinned.
+#[must_use]
+pub fn current_cpu() -> usize {
+    // Fails only on kernels before 2.6.19.
+    sched_getcpu().unwrap_or(0)
+}
+
+/// The CPUs in a list of the kernel's format, such as `0-3,8`; None if it is not one.
+#[must_use]
+pub fn parse_cpu_list(list: &str) -> Option<Vec<usize>> {
+    let mut cpus = Vec::new();
+    for part in list.trim().split(',').filter(|part| !part.is_empty()) {
+        let (first, last) = part.split_once('-').unwrap_or((part, part));
+        let (first, last): (usize, usize) = (first.trim().parse().ok()?, last.trim().parse().ok()?);
+        if last < first || last >= MOST_CPUS {
+            return None;
+        }
+        cpus.extend(first..=last);
+    }
+    Some(cpus)
+}
+
+/// Far above the largest machine Linux knows (8192): a wrong number must not fill the memory.
+const MOST_CPUS: usize = 1 << 16;
+
+/// The affinity mask of a thread; 0 is the calling one.
+pub(crate) fn affinity(thread: Pid) -> Result<Vec<usize>, Errno> {
+    let mask = sched_getaffinity(thread)?;
+    Ok((0..CpuSet::count()).filter(|cpu| mask.is_set(*cpu) == Ok(true)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_current_cpu_is_one_of_ours() {
+        let cpus = online_cpus();
+        assert!(cpus.is_sorted() && cpus.contains(&current_cpu()), "{cpus:?}");
+    }
+
+    #[test]
+    fn as_many_cpus_are_listed_as_the_standard_library_counts() {
+        // It looks at the same mask; a cgroup quota may make it count fewer.
+        assert!(online_cpus().len() >= std::thread::available_parallelism().unwrap().get());
+    }
+
+    #[test]
+    fn cpu_lists_are_read_as_the_kernel_writes_them() {
+        assert_eq!(parse_cpu_list("\n"), Some(vec![]));
+        assert_eq!(parse_cpu_list("3\n"), Some(vec![3]));
+        assert_eq!(parse_cpu_list("0-2,5,7-8\n"), Some(vec![0, 1, 2, 5, 7, 8]));
+    }
+
+    #[test]
+    fn what_is_no_cpu_list_is_refused() {
+        for garbage in ["x", "1-", "-1", "3-1", "0-99999999999", "0-4000000"] {
+            assert_eq!(parse_cpu_list(garbage), None, "{garbage}");
+        }
+    }
+}

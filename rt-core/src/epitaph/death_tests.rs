@@ -1,0 +1,127 @@
+//! Real deaths: a child process dies, the parent reads its epitaph and its exit status.
+
+use super::*;
+use crate::sys::shared_words;
+use crate::test_child;
+use nix::sys::memfd::{MFdFlags, memfd_create};
+use nix::sys::resource::{Resource, setrlimit};
+use std::fs::File;
+use std::os::fd::AsRawFd;
+use std::os::unix::fs::FileExt;
+use std::os::unix::process::ExitStatusExt;
+use std::process::ExitStatus;
+
+const TEST: &str = "epitaph::death_tests::a_death_leaves_an_epitaph_and_its_true_exit_status";
+const CELL_PATH: &str = "RT_CORE_TEST_EPITAPH";
+
+static TICK: AtomicU64 = AtomicU64::new(77);
+
+#[test]
+fn a_death_leaves_an_epitaph_and_its_true_exit_status() {
+    if let Some(role) = test_child::role(TEST) {
+        die(&role);
+    }
+    // abort(3): the signal is sent, not raised by the CPU.
+    let (status, epitaph) = death_by("abort");
+    assert_eq!(status.signal(), Some(libc::SIGABRT));
+    assert_eq!(epitaph.unwrap().to_string(), "killed by signal 6 in tick 77: SIGABRT: abort");
+
+    // A signal sent by another process.
+    let (status, epitaph) = death_by("raise");
+    assert_eq!(status.signal(), Some(libc::SIGFPE));
+    assert_eq!(epitaph.unwrap().kind, EpitaphKind::Signal(libc::SIGFPE));
+
+    // A fault, by an instruction that the CPU refuses.
+    let (status, epitaph) = death_by("illegal");
+    assert_eq!(status.signal(), Some(libc::SIGILL));
+    let text = epitaph.unwrap().text;
+    assert!(text.starts_with("SIGILL: illegal instruction at address 0x"), "{text}");
+}
+
+/// The standard library's own check still gets the fault and aborts with its message, after the
+/// epitaph said what came first; that the handler ran at all shows it has a stack of its own.
+#[test]
+fn a_stack_overflow_leaves_an_epitaph_too() {
+    let (status, epitaph) = death_by("overflow");
+    assert_eq!(status.signal(), Some(libc::SIGABRT));
+    assert_eq!(epitaph.unwrap().kind, EpitaphKind::Signal(libc::SIGSEGV));
+}
+
+#[test]
+fn the_last_act_comes_before_the_epitaph() {
+    let (_, epitaph) = death_by("last act");
+    // The last act advances the tick that the epitaph then quotes.
+    assert_eq!(epitaph.unwrap().tick, 78);
+}
+
+#[test]
+fn a_panic_leaves_place_and_message_and_reaches_the_former_hook() {
+    let (status, epitaph) = death_by("panic");
+    // The former hook exits with this code.
+    assert_eq!(status.code(), Some(55));
+    let epitaph = epitaph.unwrap();
+    assert_eq!((epitaph.kind, epitaph.tick), (EpitaphKind::Panic, 77));
+    assert!(epitaph.text.contains("death_tests.rs:") && epitaph.text.ends_with(": joint 3 is lost"));
+}
+
+#[test]
+fn being_killed_outright_leaves_none() {
+    let (status, epitaph) = death_by("kill");
+    assert_eq!((status.signal(), epitaph), (Some(libc::SIGKILL), None));
+}
+
+#[test]
+fn a_second_set_of_handlers_is_refused() {
+    let (status, _) = death_by("twice");
+    assert_eq!(status.code(), Some(0));
+}
+
+/// The child shares the cell through a memory file that the parent holds.
+fn death_by(role: &str) -> (ExitStatus, Option<Epitaph>) {
+    let file = File::from(memfd_create("epitaph", MFdFlags::MFD_CLOEXEC).unwrap());
+    file.set_len(size_of::<EpitaphWords>() as u64).unwrap();
+    let path = format!("/proc/{}/fd/{}", std::process::id(), file.as_raw_fd());
+    let status = test_child::command(TEST, role).env(CELL_PATH, path).status().unwrap();
+    let mut bytes = [0; size_of::<EpitaphWords>()];
+    file.read_exact_at(&mut bytes, 0).unwrap();
+    let words = bytes.as_chunks().0.iter().map(|word| AtomicU64::new(u64::from_ne_bytes(*word)));
+    let words: Vec<AtomicU64> = words.collect();
+    (status, read(words.as_slice().try_into().unwrap()))
+}
+
+fn die(role: &str) -> ! {
+    // No core file for a death that is meant.
+    setrlimit(Resource::RLIMIT_CORE, 0, 0).unwrap();
+    let path = std::env::var(CELL_PATH).unwrap();
+    let cell = shared_words::map(&File::options().read(true).write(true).open(path).unwrap());
+    match role {
+        "panic" => die_by_panic(cell),
+        "last act" => shared_words::install_with_last_act(cell, &TICK, last_act).unwrap(),
+        _ => install_fatal_handlers(cell, &TICK).unwrap(),
+    }
+    match role {
+        "raise" => nix::sys::signal::raise(nix::sys::signal::Signal::SIGFPE).unwrap(),
+        "illegal" => shared_words::execute_illegal_instruction(),
+        "overflow" => assert_ne!(overflow_stack(0), 0),
+        "kill" => nix::sys::signal::raise(nix::sys::signal::Signal::SIGKILL).unwrap(),
+        "twice" => std::process::exit(i32::from(install_fatal_handlers(cell, &TICK).is_ok())),
+        _ => std::process::abort(),
+    }
+    std::process::exit(99)
+}
+
+fn die_by_panic(cell: &'static EpitaphWords) {
+    std::panic::set_hook(Box::new(|_| std::process::exit(55)));
+    install_panic_hook(cell, &TICK);
+    panic!("joint {} is lost", std::hint::black_box(3));
+}
+
+fn last_act() {
+    TICK.fetch_add(1, Ordering::Relaxed);
+}
+
+#[expect(unconditional_recursion, reason = "it is meant to die")]
+fn overflow_stack(depth: u64) -> u64 {
+    let frame = std::hint::black_box([depth; 512]);
+    overflow_stack(depth + 1) + std::hint::black_box(frame)[7]
+}

@@ -1,0 +1,97 @@
+//! Requests to stop, as a flag that a loop looks at.
+//!
+//! Problem: a signal's default action ends the process in the middle of a tick, motors on.
+//! Model: SIGTERM, SIGINT and SIGHUP set one word; the loop reads it each tick and ends in order.
+//! If ending hangs, the *same* SIGTERM or SIGINT once more ends the process at once, by the default
+//! action and with its exit status. A different one does not: a terminal sends SIGINT to parent and
+//! child alike, a parent then sends its child SIGTERM, and systemd may send SIGHUP right after
+//! SIGTERM; none of these means "now".
+//! Invariants: installed for the rest of the process. A signal ends the sleep of the thread that
+//! happens to receive it, not of all: a loop that sleeps long has to wake by itself. SIGPIPE stays
+//! ignored, as Rust's start-up code leaves it: a write to a closed socket is an error, not a death.
+//! Cost: one relaxed load a tick.
+
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::flag;
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// Whether this process was asked to stop.
+#[derive(Clone, Debug)]
+pub struct StopSignals {
+    /// Number of the latest signal, 0 before the first.
+    signal: Arc<AtomicUsize>,
+}
+
+impl StopSignals {
+    /// Installs the handlers. Clone the result for other threads; a second installation works too.
+    ///
+    /// # Errors
+    /// What sigaction(2) reports.
+    pub fn install() -> io::Result<Self> {
+        let signal = Arc::new(AtomicUsize::new(0));
+        for number in [SIGTERM, SIGINT] {
+            let came_before = Arc::new(AtomicBool::new(false));
+            // Actions run in this order: the first signal finds the flag down, the second up.
+            flag::register_conditional_default(number, Arc::clone(&came_before))?;
+            flag::register(number, came_before)?;
+        }
+        for number in [SIGTERM, SIGINT, SIGHUP] {
+            flag::register_usize(number, Arc::clone(&signal), number as usize)?;
+        }
+        Ok(Self { signal })
+    }
+
+    /// The signal that asked this process to stop, the latest if there were several. Fit for the
+    /// loop.
+    #[must_use]
+    pub fn requested(&self) -> Option<i32> {
+        match self.signal.load(Ordering::Relaxed) {
+            0 => None,
+            number => Some(number as i32),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_child;
+    use nix::sys::signal::{Signal, raise};
+    use std::os::unix::process::ExitStatusExt;
+    use std::process::ExitStatus;
+
+    const TEST: &str = "signals::tests::stop_signals_set_the_flag_and_repeated_ones_kill";
+
+    /// In child processes: the handlers are for good, and the runner's own Ctrl-C must keep working.
+    #[test]
+    fn stop_signals_set_the_flag_and_repeated_ones_kill() {
+        if let Some(role) = test_child::role(TEST) {
+            play(&role);
+        }
+        for once in ["SIGTERM", "SIGINT", "SIGHUP"] {
+            let number = once.parse::<Signal>().unwrap() as i32;
+            assert_eq!(outcome(once).code(), Some(number), "{once} is a request");
+        }
+        assert_eq!(outcome("").code(), Some(0), "no signal, no request");
+        assert_eq!(outcome("SIGTERM SIGTERM").signal(), Some(SIGTERM));
+        assert_eq!(outcome("SIGINT SIGINT").signal(), Some(SIGINT));
+        assert_eq!(outcome("SIGINT SIGTERM").code(), Some(SIGTERM), "still a request");
+        assert_eq!(outcome("SIGTERM SIGHUP SIGHUP").code(), Some(SIGHUP), "still a request");
+    }
+
+    /// Receives the signals and exits with the number of the one requested.
+    fn play(signals: &str) -> ! {
+        let stop = StopSignals::install().unwrap();
+        assert_eq!(stop.requested(), None);
+        for name in signals.split_whitespace() {
+            raise(name.parse().unwrap()).unwrap();
+        }
+        std::process::exit(stop.requested().unwrap_or(0))
+    }
+
+    fn outcome(signals: &str) -> ExitStatus {
+        test_child::command(TEST, signals).status().unwrap()
+    }
+}

@@ -1,0 +1,145 @@
+//! Handlers for the signals that kill: last act, last words, then the death that was due.
+//!
+//! Problem: a segmentation fault in the driver must still zero the motors and say why, yet the exit
+//! status, the core dump and the message of a debugger or of Rust's own stack-overflow check must
+//! stay what they would have been.
+//! Model: the handler runs the owner's last act, writes the epitaph and then steps aside. A fault
+//! that the CPU raised is repeated under the former action, so that action sees the true address; a
+//! signal that was sent (`abort`, `kill`) is raised again under the default action.
+//! Invariants: async-signal-safe: no allocation, no lock, no I/O. Runs on the alternate stack that
+//! the standard library gives every thread it starts, so that a stack overflow is handled too.
+//! Two threads that fault at once both come here; the first one's epitaph stays.
+//! Cost: a few hundred nanoseconds besides the last act.
+
+use crate::epitaph::{EpitaphKind, EpitaphRef, EpitaphWords, FixedText};
+use std::fmt::Write as _;
+use std::io;
+use std::mem::MaybeUninit;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Those whose default action is to kill with a core dump and that mean "this program is broken".
+const FATAL_SIGNALS: [(libc::c_int, &str); 5] = [
+    (libc::SIGSEGV, "SIGSEGV: invalid memory reference"),
+    (libc::SIGBUS, "SIGBUS: memory that cannot be reached"),
+    (libc::SIGILL, "SIGILL: illegal instruction"),
+    (libc::SIGFPE, "SIGFPE: arithmetic fault"),
+    (libc::SIGABRT, "SIGABRT: abort"),
+];
+
+/// What the handlers need; set once, before the first handler is installed.
+struct Fatal {
+    cell: &'static EpitaphWords,
+    tick: &'static AtomicU64,
+    last_act: Option<fn()>,
+    former: [libc::sigaction; FATAL_SIGNALS.len()],
+}
+
+static FATAL: OnceLock<Fatal> = OnceLock::new();
+
+/// Lets SIGSEGV, SIGBUS, SIGILL, SIGFPE and SIGABRT write an epitaph before they kill.
+///
+/// `tick` is read when it happens. Exit status and core dump stay what they would have been.
+///
+/// # Errors
+/// `AlreadyExists` on a second call in one process; the first call's cell stays in force.
+pub fn install_fatal_handlers(cell: &'static EpitaphWords, tick: &'static AtomicU64) -> io::Result<()> {
+    install(cell, tick, None)
+}
+
+/// As [`install_fatal_handlers`], with a last act that runs before the epitaph is written: the place
+/// to write zero torque to registers that are already mapped.
+///
+/// # Errors
+/// As [`install_fatal_handlers`].
+///
+/// # Safety
+/// `last_act` runs inside a signal handler, in a process that is already broken, on a stack of a few
+/// kilobytes, possibly on several threads at once. It must be async-signal-safe (signal-safety(7)):
+/// plain or atomic loads and stores to memory that stays mapped, no allocation, no lock, no panic.
+pub unsafe fn install_fatal_handlers_with(
+    cell: &'static EpitaphWords,
+    tick: &'static AtomicU64,
+    last_act: fn(),
+) -> io::Result<()> {
+    install(cell, tick, Some(last_act))
+}
+
+fn install(cell: &'static EpitaphWords, tick: &'static AtomicU64, last_act: Option<fn()>) -> io::Result<()> {
+    let mut former = [default_action(); FATAL_SIGNALS.len()];
+    for ((signal, _), former) in FATAL_SIGNALS.iter().zip(&mut former) {
+        *former = current_action(*signal)?;
+    }
+    let set = FATAL.set(Fatal { cell, tick, last_act, former });
+    set.map_err(|_| io::Error::new(io::ErrorKind::AlreadyExists, "fatal handlers are already installed"))?;
+    FATAL_SIGNALS.iter().try_for_each(|(signal, _)| set_action(*signal, &handler_action()))
+}
+
+extern "C" fn on_fatal(signal: libc::c_int, info: *mut libc::siginfo_t, _context: *mut libc::c_void) {
+    let Some(fatal) = FATAL.get() else { return };
+    if let Some(last_act) = fatal.last_act {
+        last_act();
+    }
+    // SAFETY: with SA_SIGINFO the kernel passes a valid record that lives as long as the handler.
+    let info = unsafe { &*info };
+    // si_code is positive when the kernel raised the signal for what the thread did, sigaction(2).
+    let raised_by_fault = info.si_code > 0;
+    fatal.write_epitaph(signal, raised_by_fault.then_some(info));
+    fatal.step_aside(signal, raised_by_fault);
+}
+
+impl Fatal {
+    fn write_epitaph(&self, signal: libc::c_int, fault: Option<&libc::siginfo_t>) {
+        let mut text = FixedText::new();
+        let name =
+            FATAL_SIGNALS.iter().find(|(number, _)| *number == signal).map_or("signal", |(_, name)| name);
+        let _ = text.write_str(name);
+        if let Some(info) = fault {
+            // SAFETY: a fault's record carries an address.
+            let address = unsafe { info.si_addr() };
+            let _ = write!(text, " at address {:#x}", address.addr());
+        }
+        let tick = self.tick.load(Ordering::Relaxed);
+        EpitaphRef::new(self.cell).write(EpitaphKind::Signal(signal), tick, text.as_str());
+    }
+
+    /// After this the handler returns: a fault happens again under the former action, a raised
+    /// signal waits (it is blocked in here) and then kills.
+    fn step_aside(&self, signal: libc::c_int, raised_by_fault: bool) {
+        let former = FATAL_SIGNALS.iter().position(|(number, _)| *number == signal).map(|i| self.former[i]);
+        let next = if raised_by_fault { former } else { None };
+        let _ = set_action(signal, &next.unwrap_or_else(default_action));
+        if !raised_by_fault {
+            // SAFETY: takes no pointer; raise(3) is async-signal-safe.
+            unsafe { libc::raise(signal) };
+        }
+    }
+}
+
+/// Every other signal waits: a stop request must not interrupt the last act.
+fn handler_action() -> libc::sigaction {
+    let mut action = default_action();
+    action.sa_sigaction = on_fatal as *const () as libc::sighandler_t;
+    action.sa_flags = libc::SA_SIGINFO | libc::SA_ONSTACK;
+    // SAFETY: the mask is ours and valid.
+    unsafe { libc::sigfillset(&mut action.sa_mask) };
+    action
+}
+
+fn default_action() -> libc::sigaction {
+    // SAFETY: all zero is a valid sigaction: SIG_DFL, empty mask, no flags.
+    unsafe { MaybeUninit::zeroed().assume_init() }
+}
+
+fn current_action(signal: libc::c_int) -> io::Result<libc::sigaction> {
+    let mut action = default_action();
+    // SAFETY: a null new action only asks; `action` is ours.
+    let result = unsafe { libc::sigaction(signal, std::ptr::null(), &mut action) };
+    if result == 0 { Ok(action) } else { Err(io::Error::last_os_error()) }
+}
+
+fn set_action(signal: libc::c_int, action: &libc::sigaction) -> io::Result<()> {
+    // SAFETY: `action` is valid: our async-signal-safe handler, the default, or what was there before.
+    let result = unsafe { libc::sigaction(signal, action, std::ptr::null_mut()) };
+    if result == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
+}

@@ -1,0 +1,91 @@
+//! What several of the tests need: an example driver, and values that betray a mixture.
+
+#![allow(dead_code, reason = "each test binary uses its own part")]
+
+use bytemuck::Zeroable;
+use shm_abi::doorbell::WaitMode;
+use shm_abi::layout::{COMMAND_WORDS, FRAME_WORDS};
+use shm_abi::segment::{ClockMode, DeviceInfo, DriverInfo};
+use shm_abi::{Command, Frame};
+use std::time::{Duration, Instant};
+
+/// Long enough for the slowest machine; whoever waits longer hangs.
+pub const HANG: Duration = Duration::from_secs(60);
+
+/// A driver with two devices.
+pub fn info() -> DriverInfo {
+    DriverInfo {
+        period_ns: 1_000_000,
+        reply_budget_ns: 300_000,
+        max_command_age_ticks: 5,
+        ramp_in_ticks: 200,
+        ramp_out_ticks: 50,
+        clock_mode: ClockMode::Real,
+        wait_mode: WaitMode::Futex,
+        cpu: Some(1),
+        devices: vec![device("thumb"), device("index")],
+    }
+}
+
+fn device(name: &str) -> DeviceInfo {
+    DeviceInfo {
+        name: name.into(),
+        kind: "ideal".into(),
+        peak_force_n: 8.5,
+        continuous_force_n: 1.4,
+        workspace_min_m: [-0.2, -0.1, -0.1],
+        workspace_max_m: [0.2, 0.3, 0.1],
+    }
+}
+
+/// A frame whose every word is a function of its tick.
+pub fn frame(tick: u64) -> Frame {
+    let mut frame = Frame::zeroed();
+    let words: &mut [u64; FRAME_WORDS] = bytemuck::cast_mut(&mut frame);
+    fill(words, tick);
+    frame
+}
+
+/// Whether every word of `found` is that of frame `tick`.
+pub fn is_frame(found: &Frame, tick: u64) -> bool {
+    let words: &[u64; FRAME_WORDS] = bytemuck::cast_ref(found);
+    is_filled(words, tick)
+}
+
+/// A command whose every word is a function of its tick.
+pub fn command(tick: u64) -> Command {
+    let mut command = Command::zeroed();
+    let words: &mut [u64; COMMAND_WORDS] = bytemuck::cast_mut(&mut command);
+    fill(words, tick);
+    command
+}
+
+/// Whether every word of `found` is that of command `tick`.
+pub fn is_command(found: &Command, tick: u64) -> bool {
+    let words: &[u64; COMMAND_WORDS] = bytemuck::cast_ref(found);
+    is_filled(words, tick)
+}
+
+fn fill(words: &mut [u64], tick: u64) {
+    for (place, word) in words.iter_mut().enumerate() {
+        *word = word_of(tick, place);
+    }
+}
+
+fn is_filled(words: &[u64], tick: u64) -> bool {
+    words.iter().enumerate().all(|(place, word)| *word == word_of(tick, place))
+}
+
+/// Differs between any two ticks at every place; the first word is the tick itself.
+fn word_of(tick: u64, place: usize) -> u64 {
+    tick.wrapping_mul(2 * place as u64 + 1) ^ (place as u64) << 48
+}
+
+/// Calls `done` until it says so; panics after [`HANG`].
+pub fn wait_until(what: &str, mut done: impl FnMut() -> bool) {
+    let start = Instant::now();
+    while !done() {
+        assert!(start.elapsed() < HANG, "waited {HANG:?} in vain until {what}");
+        std::thread::yield_now();
+    }
+}
