@@ -63,7 +63,7 @@ fn check(guarantee: &Guarantee, in_force: bool) {
     }
 }
 
-/// A helper thread that inherited the priority would preempt the loop that started it.
+/// A thread that inherited the priority would preempt the loop that started it.
 fn check_that_children_are_not_real_time() {
     let stat = std::thread::spawn(|| read_to_string("/proc/thread-self/stat").unwrap()).join().unwrap();
     let policy = stat.rsplit_once(')').unwrap().1.split_whitespace().nth(41 - 3).unwrap().to_owned();

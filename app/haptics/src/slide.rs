@@ -16,7 +16,7 @@
 //! for, even when the bound ends the search early; then the god-object goes on next tick.
 //!
 //! Cost: at most [`MAX_SLIDE_ROUNDS`] rounds; one move on a plane, three to five at 5 mm depth in a
-//! ball of 0.1 m, and at most 34 in 4 million random slides inside it, down to rho = 1e-4 r.
+//! ball of 0.1 m; 4 million random slides down to rho = 1e-4 r took at most 34.
 
 use nalgebra::Vector3;
 

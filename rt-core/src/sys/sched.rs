@@ -14,7 +14,7 @@ pub(crate) struct Policy {
 
 /// Makes the calling thread `SCHED_FIFO`; threads and processes that it starts are not.
 ///
-/// A helper thread that inherited the priority would preempt the very loop that started it, hence
+/// A thread that inherited the priority would preempt the very loop that started it, hence
 /// `SCHED_RESET_ON_FORK`.
 pub(crate) fn set_fifo(priority: u8) -> Result<()> {
     let param = libc::sched_param { sched_priority: i32::from(priority) };

@@ -10,10 +10,10 @@ use shm_abi::{Command, Frame};
 use std::time::{Duration, Instant};
 
 /// Long enough for the slowest machine; whoever waits longer hangs.
-pub const HANG: Duration = Duration::from_secs(60);
+pub(crate) const HANG: Duration = Duration::from_secs(60);
 
 /// A driver with two devices.
-pub fn info() -> DriverInfo {
+pub(crate) fn info() -> DriverInfo {
     DriverInfo {
         period_ns: 1_000_000,
         reply_budget_ns: 300_000,
@@ -39,7 +39,7 @@ fn device(name: &str) -> DeviceInfo {
 }
 
 /// A frame whose every word is a function of its tick.
-pub fn frame(tick: u64) -> Frame {
+pub(crate) fn frame(tick: u64) -> Frame {
     let mut frame = Frame::zeroed();
     let words: &mut [u64; FRAME_WORDS] = bytemuck::cast_mut(&mut frame);
     fill(words, tick);
@@ -47,13 +47,13 @@ pub fn frame(tick: u64) -> Frame {
 }
 
 /// Whether every word of `found` is that of frame `tick`.
-pub fn is_frame(found: &Frame, tick: u64) -> bool {
+pub(crate) fn is_frame(found: &Frame, tick: u64) -> bool {
     let words: &[u64; FRAME_WORDS] = bytemuck::cast_ref(found);
     is_filled(words, tick)
 }
 
 /// A command whose every word is a function of its tick.
-pub fn command(tick: u64) -> Command {
+pub(crate) fn command(tick: u64) -> Command {
     let mut command = Command::zeroed();
     let words: &mut [u64; COMMAND_WORDS] = bytemuck::cast_mut(&mut command);
     fill(words, tick);
@@ -61,7 +61,7 @@ pub fn command(tick: u64) -> Command {
 }
 
 /// Whether every word of `found` is that of command `tick`.
-pub fn is_command(found: &Command, tick: u64) -> bool {
+pub(crate) fn is_command(found: &Command, tick: u64) -> bool {
     let words: &[u64; COMMAND_WORDS] = bytemuck::cast_ref(found);
     is_filled(words, tick)
 }
@@ -82,7 +82,7 @@ fn word_of(tick: u64, place: usize) -> u64 {
 }
 
 /// Calls `done` until it says so; panics after [`HANG`].
-pub fn wait_until(what: &str, mut done: impl FnMut() -> bool) {
+pub(crate) fn wait_until(what: &str, mut done: impl FnMut() -> bool) {
     let start = Instant::now();
     while !done() {
         assert!(start.elapsed() < HANG, "waited {HANG:?} in vain until {what}");
