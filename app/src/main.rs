@@ -1,2 +1,7 @@
-//! phantom3
-fn main() {}
+//! Haptic rendering for several fingers; see `phantom3 --help`.
+
+#![forbid(unsafe_code)]
+
+fn main() -> std::process::ExitCode {
+    phantom3::cli::main()
+}

@@ -44,7 +44,7 @@ pub enum DriverCommand {
 /// Arguments of `run`.
 #[derive(Debug, Args)]
 pub struct RunArgs {
-    /// Driver configuration (TOML)
+    /// Driver configuration (TOML); `-` reads standard input
     #[arg(long, value_name = "FILE")]
     config: PathBuf,
     /// Refuse to start when a real-time guarantee is missing
@@ -104,7 +104,11 @@ pub fn execute(command: DriverCommand) -> ExitCode {
 }
 
 fn run(args: RunArgs) -> ExitCode {
-    let config = match DriverConfig::load(&args.config) {
+    let loaded = match args.config.to_str() {
+        Some("-") => DriverConfig::load_from_stdin(),
+        _ => DriverConfig::load(&args.config),
+    };
+    let config = match loaded {
         Ok(config) => config,
         Err(error) => return fail(&error, EXIT_USAGE),
     };

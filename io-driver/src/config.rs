@@ -5,6 +5,8 @@
 //! Model: TOML. Relative paths are relative to the file. Everything but the devices has a default.
 //! Units: in the names of the keys; SI.
 
+mod toml_text;
+
 use crate::toml_report::{Allowed, SpannedList, TomlReport, TomlText};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::Deserialize;
@@ -140,6 +142,23 @@ impl DriverConfig {
         let text = std::fs::read_to_string(file)
             .map_err(|source| ConfigError::Unreadable { file: file.into(), source })?;
         Ok(Self::parse(&text, file)?)
+    }
+
+    /// Reads standard input, which a parent process may use instead of a file; paths in it are relative to
+    /// the current directory.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub fn load_from_stdin() -> Result<Self, ConfigError> {
+        let file = Path::new("<standard input>");
+        let text = io::read_to_string(io::stdin())
+            .map_err(|source| ConfigError::Unreadable { file: file.into(), source })?;
+        Ok(Self::parse(&text, file)?)
+    }
+
+    /// Writes it down so that [`parse`](Self::parse) gives the same back.
+    pub fn to_toml(&self) -> String {
+        toml_text::write(self)
     }
 
     /// Reads a text; `file` is named in reports, and its directory resolves relative paths.
@@ -509,5 +528,21 @@ mod tests {
         assert!(parse(&nine).expect_err("nine").contains("found 9 devices, allowed: 1 to 8"));
         let unknown = parse("rate = 5\n[[device]]\nbackend = \"ideal\"").expect_err("unknown");
         assert!(unknown.starts_with("lab/driver.toml:1: `rate`: unknown field `rate`"), "{unknown}");
+    }
+
+    #[test]
+    fn what_is_written_down_is_read_back_the_same() {
+        let text = "rate_hz = 3000\nclock = \"lockstep\"\nsocket = \"/run/x\"\n\
+            [real_time]\ncpu = 1\npriority = 0\nlock_memory = false\nphase_offset_us = 12.345\nwait = \"spin\"\n\
+            [reply]\nmode = \"next-tick\"\nbudget_us = 99.5\n\
+            [safety]\nmax_command_age_ticks = 7\nramp_in_ms = 33.3\nramp_out_ms = 4\n\
+            [[device]]\nname = \"a \\\"quoted\\\" name\"\nbackend = \"ideal\"\nhand = \"/h.csv\"\nfinger = \"thumb\"\n\
+            start_m = [0.1, -0.2, 1e-9]\nbase_position_m = [1, 2, 3]\nbase_orientation_wxyz = [0.6, 0.8, 0, 0]\n\
+            peak_force_n = 8.5\n\
+            [[device]]\nbackend = \"replay\"\ndescription = \"premium-1.5\"\ntrace = \"/t.csv\"\n";
+        let config = parse(text).expect("good");
+        assert_eq!(parse(&config.to_toml()).expect("good as well"), config);
+        let plain = parse("[[device]]\nbackend = \"ideal\"\n").expect("good");
+        assert_eq!(parse(&plain.to_toml()).expect("good as well"), plain);
     }
 }

@@ -254,6 +254,16 @@ fn say(options: &RunOptions, message: std::fmt::Arguments<'_>) {
     }
 }
 
+/// A parent that was killed cannot remove the directory that it made for this driver's socket.
+fn tidy_up(server: Server, options: &RunOptions) {
+    let directory = server.path().parent().map(std::path::Path::to_path_buf);
+    drop(server);
+    if let (Some(directory), Some(_)) = (directory, options.parent) {
+        // It fails, rightly, if anything else lies in it.
+        let _ = std::fs::remove_dir(directory);
+    }
+}
+
 /// The socket's thread.
 struct Service<'a> {
     server: Server,
@@ -337,6 +347,7 @@ impl Service<'_> {
         self.shared.stop.store(true, Ordering::Relaxed);
         let ended = thread.join();
         self.write_log();
+        tidy_up(self.server, self.options);
         let reason = served?;
         match ended {
             Ok(Ended::Stopped) => {

@@ -170,6 +170,25 @@ impl CounterStatus {
     }
 }
 
+impl CounterStatus {
+    /// What was counted after `before`.
+    pub fn since(&self, before: &Self) -> Self {
+        Self {
+            ticks: self.ticks.saturating_sub(before.ticks),
+            overruns: self.overruns.saturating_sub(before.overruns),
+            ticks_commanded: self.ticks_commanded.saturating_sub(before.ticks_commanded),
+            replies_fresh: self.replies_fresh.saturating_sub(before.replies_fresh),
+            replies_missed: self.replies_missed.saturating_sub(before.replies_missed),
+            commands_torn: self.commands_torn.saturating_sub(before.commands_torn),
+            commands_refused: self.commands_refused.saturating_sub(before.commands_refused),
+            forces_limited: self.forces_limited.saturating_sub(before.forces_limited),
+            leases_granted: self.leases_granted.saturating_sub(before.leases_granted),
+            leases_refused: self.leases_refused.saturating_sub(before.leases_refused),
+            faults: self.faults.saturating_sub(before.faults),
+        }
+    }
+}
+
 impl Percentiles {
     /// A histogram in short; zeros where nothing was recorded.
     pub fn of(histogram: &Histogram) -> Self {

@@ -51,6 +51,10 @@ fn check_in_force(request: &SetupRequest, cpu: usize) -> SetupReport {
     let (priority, policy) = (fields[40 - 3], fields[41 - 3]);
     check(item("scheduling"), (priority, policy) == ("1", "1"));
 
+    // Neither needs rights; glibc alone can be told to keep its pages.
+    assert!(item("stack prefaulted").obtained, "{report}");
+    assert!(item("heap prefaulted").obtained || !cfg!(target_env = "gnu"), "{report}");
+
     check(item("dma latency"), guards.holds_dma_latency());
     check_that_children_are_not_real_time();
     report

@@ -1,1 +1,10 @@
-//! Whole-system tests.
+//! What the whole-system tests share: the programs under test as child processes.
+//!
+//! The tests pass without a device, root, a display or real-time rights. None asserts on wall-clock time
+//! except with a wide margin that is explained where it stands.
+
+#![forbid(unsafe_code)]
+
+pub mod driver;
+pub mod programs;
+pub mod recording;

@@ -186,6 +186,8 @@ mod tests {
         assert_eq!(locked.found, "5616 KiB locked, 5404 KiB resident");
         assert!(!judge_lock(Ok(()), UNLOCKED, None).obtained, "accepted, not applied");
         assert!(!judge_lock(Ok(()), "", None).obtained, "nothing to read");
+        let partly = "VmLck:\t     100 kB\nVmRSS:\t    5404 kB\n";
+        assert!(!judge_lock(Ok(()), partly, None).obtained, "some of it only");
     }
 
     #[test]

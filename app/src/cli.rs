@@ -1,0 +1,252 @@
+//! The command line of `phantom3`.
+//!
+//! Exit status: 0 done; 2 bad usage or bad input, nothing was started; 3 a fault during the run, the
+//! recording up to it is complete; 128 + n: signal n ended the run, the recording up to it is complete.
+
+use crate::demo;
+use crate::outcome::{RunFailure, Stop};
+use crate::report::Report;
+use crate::rig::Rig;
+use crate::run::{self, Attach, RunPlan};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use io_driver::config::period_of;
+use rt_core::signals::StopSignals;
+use shm_abi::endpoint;
+use shm_abi::segment::ClockMode;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Duration;
+use world::{Layout, Scene};
+
+const EXIT_USAGE: u8 = 2;
+const DEFAULT_RATE_HZ: f64 = 1000.0;
+/// A day: longer runs are asked for by repeating them.
+const MAX_SECONDS: f64 = 86_400.0;
+
+const AFTER_HELP: &str = "Without a command the default scene is played for ten seconds.\n\n\
+Exit status: 0 done; 2 bad usage or bad input, nothing was started; 3 a fault during the run; \
+128 + n: ended by signal n. Whatever was recorded until then is complete on disk.";
+
+/// Haptic rendering with friction cones for several fingers.
+#[derive(Debug, Parser)]
+#[command(name = "phantom3", version, after_help = AFTER_HELP)]
+pub struct Cli {
+    /// Open no window; this version has none to open
+    #[arg(long, global = true)]
+    headless: bool,
+    #[command(subcommand)]
+    command: Option<AppCommand>,
+}
+
+#[derive(Debug, Subcommand)]
+enum AppCommand {
+    /// Play a scene with a scripted hand
+    Run(RunArgs),
+    /// Drive the devices: what `io-driver` does, in this program
+    #[command(subcommand)]
+    Driver(io_driver::cli::DriverCommand),
+}
+
+#[derive(Debug, Args)]
+struct RunArgs {
+    /// The scene (TOML)
+    scene: PathBuf,
+    /// What the fingers do (CSV); default: the scene's own hand, else they rest at their start
+    #[arg(long, value_name = "CSV")]
+    hand: Option<PathBuf>,
+    /// How the hand moves the devices
+    #[arg(long, value_enum, default_value_t = HandMode::Kinematic)]
+    hand_mode: HandMode,
+    /// What moves time
+    #[arg(long, value_enum, default_value_t = Clock::Real)]
+    clock: Clock,
+    /// Write every tick here (CSV)
+    #[arg(long, value_name = "CSV")]
+    record: Option<PathBuf>,
+    /// How long; default: as long as the hand file, at least 1 s
+    #[arg(long, value_name = "S", value_parser = parse_seconds)]
+    seconds: Option<f64>,
+    /// Ticks per second [default: 1000]
+    #[arg(long, value_name = "HZ", value_parser = parse_rate)]
+    rate_hz: Option<f64>,
+    /// Seed of everything random; nothing is, in this version
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Where the devices stand in the world (TOML)
+    #[arg(long, value_name = "FILE")]
+    layout: Option<PathBuf>,
+    /// Use the devices of a driver that runs already, at this socket or the usual place
+    #[arg(long, value_name = "SOCKET", num_args = 0..=1, default_missing_value = "", conflicts_with_all = ["hand", "rate_hz"])]
+    attach: Option<PathBuf>,
+    /// With --attach: how long to wait for the driver's return, should it end
+    #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = parse_grace)]
+    grace: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum HandMode {
+    /// The fingers follow the hand file exactly
+    Kinematic,
+    /// A simulated hand pulls a simulated device (not available in this version)
+    Impedance,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Clock {
+    /// One process, as fast as the machine allows; repeatable
+    Virtual,
+    /// Two processes; a tick ends when both have done their part
+    Lockstep,
+    /// Two processes in real time
+    Real,
+}
+
+impl From<Clock> for ClockMode {
+    fn from(clock: Clock) -> Self {
+        match clock {
+            Clock::Virtual => Self::Virtual,
+            Clock::Lockstep => Self::Lockstep,
+            Clock::Real => Self::Real,
+        }
+    }
+}
+
+/// Runs the program with the process's own arguments.
+pub fn main() -> ExitCode {
+    match Cli::parse().command {
+        Some(AppCommand::Driver(command)) => io_driver::cli::execute(command),
+        Some(AppCommand::Run(args)) => conclude(run_scene(&args)),
+        None => conclude(run_demo()),
+    }
+}
+
+fn run_demo() -> Result<(Report, Stop), RunFailure> {
+    let signals = install_signals()?;
+    let demo = demo::unpack(period_of(DEFAULT_RATE_HZ))?;
+    run::run(&demo.rig, &demo::plan(), &signals)
+}
+
+fn run_scene(args: &RunArgs) -> Result<(Report, Stop), RunFailure> {
+    let signals = install_signals()?;
+    let rig = make_rig(args)?;
+    run::run(&rig, &make_plan(args)?, &signals)
+}
+
+fn install_signals() -> Result<StopSignals, RunFailure> {
+    StopSignals::install().map_err(|error| RunFailure::Start(format!("cannot catch signals: {error}")))
+}
+
+fn make_rig(args: &RunArgs) -> Result<Rig, RunFailure> {
+    let wrong = |error: &dyn std::fmt::Display| RunFailure::Start(error.to_string());
+    if args.hand_mode == HandMode::Impedance {
+        return Err(wrong(&"--hand-mode impedance is not available in this version; available: kinematic"));
+    }
+    let mut scene = Scene::load(&args.scene).map_err(|error| wrong(&error))?;
+    if args.attach.is_some() {
+        // The devices are the fingers; nothing follows a script.
+        scene.hand = None;
+    }
+    let layout = args.layout.as_ref().map(Layout::load).transpose().map_err(|error| wrong(&error))?;
+    let period_ns = period_of(args.rate_hz.unwrap_or(DEFAULT_RATE_HZ));
+    Rig::new(&args.scene, scene, layout.unwrap_or_default(), args.hand.as_deref(), period_ns)
+        .map_err(|error| wrong(&error))
+}
+
+fn make_plan(args: &RunArgs) -> Result<RunPlan, RunFailure> {
+    if args.attach.is_some() && args.clock == Clock::Virtual {
+        return Err(RunFailure::Start("--attach and --clock virtual exclude each other: a driver that runs has its own clock".into()));
+    }
+    refuse_to_overwrite_input(args)?;
+    let attach = args.attach.as_ref().map(|socket| Attach {
+        socket: if socket.as_os_str().is_empty() { endpoint::for_application() } else { socket.clone() },
+        grace: Duration::from_secs_f64(args.grace),
+    });
+    Ok(RunPlan { clock: args.clock.into(), seconds: args.seconds, record: args.record.clone(), attach })
+}
+
+fn refuse_to_overwrite_input(args: &RunArgs) -> Result<(), RunFailure> {
+    let Some(record) = &args.record else { return Ok(()) };
+    let same = |other: &Path| {
+        matches!((record.canonicalize(), other.canonicalize()), (Ok(a), Ok(b)) if a == b)
+    };
+    let inputs = [Some(&args.scene), args.hand.as_ref(), args.layout.as_ref()];
+    match inputs.into_iter().flatten().find(|input| same(input)) {
+        Some(input) => Err(RunFailure::Start(format!(
+            "--record {} would overwrite the input {}; name another file",
+            record.display(),
+            input.display()
+        ))),
+        None => Ok(()),
+    }
+}
+
+fn conclude(result: Result<(Report, Stop), RunFailure>) -> ExitCode {
+    match result {
+        Ok((report, stop)) => {
+            print_report(&report);
+            match stop {
+                Stop::Finished => ExitCode::SUCCESS,
+                Stop::Signal(signal) => {
+                    eprintln!("phantom3: ended by signal {signal} before its time");
+                    ExitCode::from(128u8.saturating_add(u8::try_from(signal).unwrap_or(0)))
+                }
+            }
+        }
+        Err(failure) => {
+            eprintln!("phantom3: {failure}");
+            ExitCode::from(failure.exit_status())
+        }
+    }
+}
+
+/// A closed pipe is no reason to fail: the run is done.
+fn print_report(report: &Report) {
+    use std::io::Write;
+    let _ = writeln!(std::io::stdout(), "{report}");
+}
+
+fn parse_seconds(text: &str) -> Result<f64, String> {
+    parse_number(text, "seconds", f64::MIN_POSITIVE, MAX_SECONDS)
+}
+
+fn parse_rate(text: &str) -> Result<f64, String> {
+    parse_number(text, "Hz", 10.0, 20_000.0)
+}
+
+fn parse_grace(text: &str) -> Result<f64, String> {
+    parse_number(text, "seconds", 0.0, 3600.0)
+}
+
+fn parse_number(text: &str, unit: &str, min: f64, max: f64) -> Result<f64, String> {
+    let allowed = if min == f64::MIN_POSITIVE {
+        format!("more than 0, at most {max} {unit}")
+    } else {
+        format!("{min} to {max} {unit}")
+    };
+    match text.parse::<f64>() {
+        Ok(number) if (min..=max).contains(&number) => Ok(number),
+        _ => Err(format!("found {text}, allowed: {allowed}")),
+    }
+}
+
+// The exit status of a usage error is clap's own, which is the contract's.
+const _: () = assert!(EXIT_USAGE == 2);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn numbers_out_of_range_name_what_is_allowed() {
+        assert_eq!(parse_rate("0").unwrap_err(), "found 0, allowed: 10 to 20000 Hz");
+        assert_eq!(parse_seconds("0").unwrap_err(), "found 0, allowed: more than 0, at most 86400 seconds");
+        assert_eq!(parse_seconds("nan").unwrap_err(), "found nan, allowed: more than 0, at most 86400 seconds");
+        assert_eq!(parse_seconds("-1").unwrap_err(), "found -1, allowed: more than 0, at most 86400 seconds");
+    }
+}

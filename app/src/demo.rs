@@ -1,0 +1,77 @@
+//! What happens without arguments: the default scene, felt for ten seconds in real time.
+
+use crate::outcome::RunFailure;
+use crate::rig::{Rig, RigError};
+use crate::run::{Attach, RunPlan};
+use shm_abi::client::{self, AttachError};
+use shm_abi::endpoint;
+use shm_abi::segment::ClockMode;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use tempfile::TempDir;
+use world::{Layout, Scene};
+
+const SCENE: &str = include_str!("../../config/scenes/default.toml");
+const HAND: &str = include_str!("../../config/hands/default.csv");
+const SCENE_NAME: &str = "config/scenes/default.toml (built in)";
+/// How long it lasts, whatever the hand file says.
+const SECONDS: f64 = 10.0;
+const RECORDING: &str = "phantom3-demo.csv";
+
+/// The default scene; its hand file lies in a directory of its own, for the driver to read.
+pub struct Demo {
+    /// The rig.
+    pub rig: Rig,
+    _directory: TempDir,
+}
+
+/// Unpacks the default scene.
+///
+/// # Errors
+/// If there is no room for temporary files.
+pub fn unpack(period_ns: u64) -> Result<Demo, RunFailure> {
+    let no_room = |error: std::io::Error| RunFailure::Start(format!("cannot unpack the default scene: {error}"));
+    let directory = tempfile::Builder::new().prefix("phantom3-demo-").tempdir().map_err(no_room)?;
+    let hand = directory.path().join("default.csv");
+    std::fs::write(&hand, HAND).map_err(no_room)?;
+    let rig = default_rig(&hand, period_ns).map_err(|error| RunFailure::Start(error.to_string()))?;
+    Ok(Demo { rig, _directory: directory })
+}
+
+fn default_rig(hand: &Path, period_ns: u64) -> Result<Rig, RigError> {
+    let file = Path::new(SCENE_NAME);
+    let scene = Scene::parse(SCENE, file)?;
+    Rig::new(file, scene, Layout::default(), Some(hand), period_ns)
+}
+
+/// Uses a driver that runs and is free; starts one of our own otherwise, and says why.
+pub fn plan() -> RunPlan {
+    let socket = endpoint::for_application();
+    let attach = match client::observe(&socket, "phantom3 looks around") {
+        Ok(seen) if seen.driver.read_latest().is_some_and(|frame| frame.lease != 0) => {
+            eprintln!("phantom3: the driver at {} is commanded by somebody else; starting one of our own", socket.display());
+            None
+        }
+        Ok(_) => {
+            eprintln!("phantom3: using the driver at {}; its devices are the fingers", socket.display());
+            Some(Attach { socket, grace: Duration::from_secs(2) })
+        }
+        Err(AttachError::NoDriver { .. } | AttachError::DriverGone { .. }) => {
+            eprintln!("phantom3: no driver is running; starting one of our own with ideal devices");
+            None
+        }
+        Err(error) => {
+            eprintln!("phantom3: {error}; starting a driver of our own");
+            None
+        }
+    };
+    RunPlan { clock: ClockMode::Real, seconds: Some(SECONDS), record: Some(recording_place()), attach }
+}
+
+/// Here, if one may write here, else among the temporary files.
+fn recording_place() -> PathBuf {
+    let here = PathBuf::from(RECORDING);
+    let writable = std::fs::File::options().append(true).create(true).open(&here).is_ok();
+    let place = if writable { here } else { std::env::temp_dir().join(RECORDING) };
+    std::path::absolute(&place).unwrap_or(place)
+}

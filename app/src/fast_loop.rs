@@ -1,0 +1,207 @@
+//! The fast thread's turn in a tick, whatever moves the clock: read the frame, step, answer, record.
+//!
+//! Invariants: rows are in order and each is complete: it leaves only once the following frame has told
+//! what the motors were made to do. A row that the queue has no room for is counted, never waited for,
+//! except where the clock itself waits (virtual, lockstep).
+//! Cost: bounded; no allocation, no system call but the wake-up of a sleeping driver.
+
+use crate::fast_step::FastStep;
+use crate::row::Row;
+use bytemuck::Zeroable;
+use rtrb::Producer;
+use shm_abi::{Command, CommanderMemory, DriverState, DriverView, Frame};
+
+/// How far a missed frame is searched for in the ring: the next one is nearly always among these.
+const SEARCH_TICKS: u64 = 64;
+
+/// What the fast thread does with a full queue.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WhenFull {
+    /// Count the row as lost: real time does not wait.
+    Drop,
+    /// Wait for room: the clock waits too.
+    Wait,
+}
+
+/// What a frame meant for the run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Turn {
+    /// Answered.
+    Answered,
+    /// Not for this lease (yet, or any more), or not readable: nothing was done.
+    Skipped,
+    /// The run's last row is out.
+    Finished,
+    /// The driver is in its fault state; the word is the reason.
+    Fault(u64),
+}
+
+/// The fast thread's state.
+pub struct FastLoop {
+    step: FastStep,
+    rows: Producer<Row>,
+    when_full: WhenFull,
+    /// Rows that the run shall have.
+    total_ticks: u64,
+    period_ns: u64,
+    /// When t = 0 was due; fixed by the first lease.
+    base_ns: Option<u64>,
+    /// Added to the lease's own run tick; fixed by each lease's first row.
+    offset_ticks: Option<u64>,
+    /// The row that waits for what the motors did, and the driver's tick it belongs to.
+    pending: Option<(u64, Row)>,
+    frame: Frame,
+    following: Frame,
+    command: Command,
+    row: Row,
+    /// What happened so far.
+    pub tally: Tally,
+}
+
+/// Counts of a run, kept by the fast thread.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Tally {
+    /// Frames answered.
+    pub answered: u64,
+    /// Frames of the ring that were published and not seen in time.
+    pub frames_missed: u64,
+    /// Rows handed over for recording.
+    pub rows: u64,
+    /// Rows lost because the slow side was too slow.
+    pub rows_lost: u64,
+    /// The largest force computed for any finger [N].
+    pub peak_force_n: f64,
+    /// The largest force any device was made to render [N].
+    pub peak_applied_n: f64,
+}
+
+impl FastLoop {
+    /// A run of `total_ticks` rows.
+    pub fn new(step: FastStep, rows: Producer<Row>, when_full: WhenFull, total_ticks: u64, period_ns: u64) -> Self {
+        Self {
+            step,
+            rows,
+            when_full,
+            total_ticks,
+            period_ns,
+            base_ns: None,
+            offset_ticks: None,
+            pending: None,
+            frame: Frame::zeroed(),
+            following: Frame::zeroed(),
+            command: Command::zeroed(),
+            row: Row::empty(),
+            tally: Tally::default(),
+        }
+    }
+
+    /// Takes the frame of `tick`, steps and answers.
+    pub fn turn(&mut self, tick: u64, driver: &DriverView, commander: &CommanderMemory) -> Turn {
+        if driver.read_frame(tick, &mut self.frame).is_err() {
+            return Turn::Skipped;
+        }
+        self.complete_pending(driver);
+        if self.frame.state == DriverState::Fault as u64 {
+            return Turn::Fault(self.frame.fault);
+        }
+        if self.frame.lease != commander.lease() {
+            return Turn::Skipped;
+        }
+        self.answer(commander, driver);
+        self.keep_row();
+        if self.is_finished() { Turn::Finished } else { Turn::Answered }
+    }
+
+    /// The frame read last.
+    pub fn frame(&self) -> &Frame {
+        &self.frame
+    }
+
+    /// Ticks of the run so far; zero before t = 0.
+    pub fn run_ticks(&self) -> u64 {
+        let of_lease = self.frame.run_tick.max(0).unsigned_abs();
+        self.offset_ticks.map_or(0, |offset| offset.saturating_add(of_lease))
+    }
+
+    /// The connection was lost: no contact survives it. The run's time goes on meanwhile.
+    pub fn reset(&mut self) {
+        self.step.reset();
+        self.pending = None;
+        self.offset_ticks = None;
+    }
+
+    fn answer(&mut self, commander: &CommanderMemory, driver: &DriverView) {
+        self.command = Command::zero(self.frame.tick, commander.lease(), self.frame.device_count);
+        self.step.step(&self.frame, &mut self.command, &mut self.row);
+        commander.publish(&self.command, driver);
+        self.tally.answered += 1;
+    }
+
+    fn keep_row(&mut self) {
+        if self.frame.run_tick < 0 {
+            return;
+        }
+        self.place_in_time();
+        self.row.run_tick = self.run_ticks();
+        if self.row.run_tick < self.total_ticks {
+            self.pending = Some((self.frame.tick, self.row));
+            for finger in &self.row.fingers {
+                self.tally.peak_force_n = self.tally.peak_force_n.max(finger.force_on_user.norm());
+            }
+        }
+    }
+
+    /// The first lease's t = 0 is the run's; a later lease's is as much later as its deadline is.
+    fn place_in_time(&mut self) {
+        if self.offset_ticks.is_some() {
+            return;
+        }
+        let of_lease = self.frame.run_tick.max(0).unsigned_abs();
+        let lease_zero_ns = self.frame.deadline_ns.saturating_sub(of_lease.saturating_mul(self.period_ns));
+        let base_ns = *self.base_ns.get_or_insert(lease_zero_ns);
+        let later_ns = lease_zero_ns.saturating_sub(base_ns);
+        self.offset_ticks = Some((later_ns + self.period_ns / 2) / self.period_ns);
+    }
+
+    fn is_finished(&self) -> bool {
+        self.frame.run_tick >= 0 && self.pending.is_none() && self.run_ticks() >= self.total_ticks
+    }
+
+    fn complete_pending(&mut self, driver: &DriverView) {
+        let Some((tick, mut row)) = self.pending.take() else { return };
+        if self.frame.tick == tick + 1 {
+            self.step.complete(&mut row, &self.frame);
+        } else {
+            self.find_following(tick, driver);
+            self.step.complete(&mut row, &self.following);
+        }
+        for finger in &row.fingers {
+            self.tally.peak_applied_n = self.tally.peak_applied_n.max(finger.applied_on_user.norm());
+        }
+        self.push(row);
+    }
+
+    /// Frames were missed; the one after `tick` still lies in the ring, unless the driver skipped it.
+    fn find_following(&mut self, tick: u64, driver: &DriverView) {
+        self.tally.frames_missed += self.frame.tick.saturating_sub(tick + 1);
+        let last = self.frame.tick.min(tick + SEARCH_TICKS);
+        for candidate in tick + 1..last {
+            if driver.read_frame(candidate, &mut self.following).is_ok() {
+                return;
+            }
+        }
+        self.following = self.frame;
+    }
+
+    fn push(&mut self, row: Row) {
+        if self.when_full == WhenFull::Wait {
+            while self.rows.is_full() && !self.rows.is_abandoned() {
+                std::thread::yield_now();
+            }
+        }
+        match self.rows.push(row) {
+            Ok(()) => self.tally.rows += 1,
+            Err(_) => self.tally.rows_lost += 1,
+        }
+    }
+}

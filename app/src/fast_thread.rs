@@ -1,0 +1,212 @@
+//! The fast thread: waits for the driver's frames and answers each in the same tick.
+//!
+//! Model: time-triggered. The frame says when it was due, so the thread sleeps until shortly before the
+//! next is due and only then spins on the doorbell; where it has no CPU of its own it sleeps on the
+//! doorbell itself. With rights it runs under SCHED_FIFO on a CPU that is not the driver's.
+//!
+//! Invariant: it never spins for longer than two ticks on end, so that a driver that stopped does not
+//! leave a CPU burning.
+//! Cost: between frames one or two system calls; in the step none.
+
+use crate::fast_loop::{FastLoop, Turn};
+use rt_core::clock::{monotonic_ns, sleep_until_ns};
+use rt_core::histogram::Histogram;
+use rt_core::setup::{SetupReport, SetupRequest};
+use shm_abi::doorbell::WaitMode;
+use shm_abi::segment::{ClockMode, DriverInfo};
+use shm_abi::{CommanderMemory, DriverView};
+use std::hint::spin_loop;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc;
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// Below the driver's priority: it must be able to run whatever happens here.
+const FIFO_PRIORITY: u8 = 70;
+/// How long before the frame is due sleeping turns into spinning, at most half a tick.
+const SPIN_MARGIN_NS: u64 = 100_000;
+/// How long a sleep on the doorbell lasts without a look at requests to stop.
+const NAP: Duration = Duration::from_millis(20);
+/// A driver that publishes nothing for so long is stopped or gone.
+const SILENCE_NS: u64 = 5_000_000_000;
+const STACK_BYTES: usize = 256 * 1024;
+
+/// What the fast thread and the slow one share.
+#[derive(Debug, Clone, Default)]
+pub struct FastShared {
+    /// Somebody asked the fast thread to end.
+    pub stop: Arc<AtomicBool>,
+    /// Ticks of the run so far.
+    pub run_ticks: Arc<AtomicU64>,
+}
+
+/// Why the fast thread ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FastEnd {
+    /// The run is over.
+    Finished,
+    /// It was asked to.
+    Stopped,
+    /// The driver is in its fault state, for this reason.
+    Fault(u64),
+    /// The driver publishes nothing any more.
+    Silent,
+}
+
+/// What is left when it has ended.
+pub struct FastRemains {
+    /// The loop's state.
+    pub fast: FastLoop,
+    /// The driver's memory.
+    pub driver: DriverView,
+    /// How long the fast step took.
+    pub step_ns: Histogram,
+    /// Why it ended.
+    pub end: FastEnd,
+}
+
+/// Starts it. Returns what of its set-up was obtained.
+///
+/// # Errors
+/// If the thread cannot be started.
+pub fn start(
+    fast: FastLoop,
+    driver: DriverView,
+    commander: CommanderMemory,
+    shared: FastShared,
+) -> std::io::Result<(SetupReport, JoinHandle<FastRemains>)> {
+    let info = driver.info();
+    let (send, receive) = mpsc::sync_channel(1);
+    let thread = std::thread::Builder::new().name("fast".into()).spawn(move || {
+        let (report, _guards) = rt_core::setup::apply(&setup_request(&info));
+        let wait = choose_wait_mode(&info, &report);
+        let _ = send.send(report);
+        FastThread::new(fast, driver, commander, shared, &info, wait).run()
+    })?;
+    let report = receive.recv().map_err(|_| std::io::Error::other("the fast thread panicked in its set-up"))?;
+    Ok((report, thread))
+}
+
+/// A CPU that is not the driver's, if there is one.
+fn own_cpu(info: &DriverInfo) -> Option<usize> {
+    let online = rt_core::cpu::online_cpus();
+    online.into_iter().rev().find(|cpu| Some(*cpu) != info.cpu)
+}
+
+fn setup_request(info: &DriverInfo) -> SetupRequest {
+    if info.clock_mode != ClockMode::Real {
+        return SetupRequest::default();
+    }
+    SetupRequest {
+        fifo_priority: Some(FIFO_PRIORITY),
+        cpu: own_cpu(info),
+        lock_memory: true,
+        prefault_stack_bytes: STACK_BYTES,
+        prefault_heap_bytes: 0,
+        timer_slack_ns: Some(1),
+        dma_latency_us: None,
+    }
+}
+
+/// Spinning is right only where it cannot starve the driver: on another CPU, with real-time rights.
+fn choose_wait_mode(info: &DriverInfo, report: &SetupReport) -> WaitMode {
+    let obtained = ["scheduling", "cpu"].iter().all(|name| report.find(name).is_some_and(|item| item.obtained));
+    let apart = info.cpu.is_some() && own_cpu(info).is_some();
+    if info.clock_mode == ClockMode::Real && obtained && apart { WaitMode::Spin } else { WaitMode::Futex }
+}
+
+struct FastThread {
+    fast: FastLoop,
+    driver: DriverView,
+    commander: CommanderMemory,
+    shared: FastShared,
+    wait: WaitMode,
+    period_ns: u64,
+    margin_ns: u64,
+    step_ns: Histogram,
+    seen: Option<u64>,
+    /// When the next frame is due, if that is known.
+    due_ns: Option<u64>,
+}
+
+impl FastThread {
+    fn new(
+        fast: FastLoop,
+        driver: DriverView,
+        commander: CommanderMemory,
+        shared: FastShared,
+        info: &DriverInfo,
+        wait: WaitMode,
+    ) -> Self {
+        let period_ns = info.period_ns;
+        let margin_ns = SPIN_MARGIN_NS.min(period_ns / 2);
+        let step_ns = Histogram::new();
+        Self { fast, driver, commander, shared, wait, period_ns, margin_ns, step_ns, seen: None, due_ns: None }
+    }
+
+    fn run(mut self) -> FastRemains {
+        let end = loop {
+            match self.wait_for_frame() {
+                Ok(tick) => {
+                    if let Some(end) = self.turn(tick) {
+                        break end;
+                    }
+                }
+                Err(end) => break end,
+            }
+        };
+        FastRemains { fast: self.fast, driver: self.driver, step_ns: self.step_ns, end }
+    }
+
+    fn turn(&mut self, tick: u64) -> Option<FastEnd> {
+        let begun = monotonic_ns();
+        let turn = self.fast.turn(tick, &self.driver, &self.commander);
+        self.seen = Some(tick);
+        self.due_ns = Some(self.fast.frame().deadline_ns + self.period_ns);
+        match turn {
+            Turn::Answered => {
+                self.step_ns.record(monotonic_ns() - begun);
+                self.shared.run_ticks.store(self.fast.run_ticks(), Ordering::Relaxed);
+                None
+            }
+            Turn::Skipped => None,
+            Turn::Finished => Some(FastEnd::Finished),
+            Turn::Fault(reason) => Some(FastEnd::Fault(reason)),
+        }
+    }
+
+    fn wait_for_frame(&mut self) -> Result<u64, FastEnd> {
+        let begun = monotonic_ns();
+        if self.wait == WaitMode::Spin {
+            self.spin_for_frame();
+        }
+        loop {
+            match self.driver.latest_tick() {
+                latest if latest == self.seen => {}
+                Some(tick) => return Ok(tick),
+                None => {}
+            }
+            if self.shared.stop.load(Ordering::Relaxed) {
+                return Err(FastEnd::Stopped);
+            }
+            if monotonic_ns().saturating_sub(begun) > SILENCE_NS {
+                return Err(FastEnd::Silent);
+            }
+            self.driver.sleep_for_frame(self.seen, &self.commander, NAP);
+        }
+    }
+
+    /// Returns with the next frame, or when it is long overdue.
+    fn spin_for_frame(&self) {
+        let Some(due_ns) = self.due_ns else { return };
+        let until_ns = due_ns + 2 * self.period_ns;
+        let sleep_until = due_ns.saturating_sub(self.margin_ns);
+        if monotonic_ns() < sleep_until {
+            sleep_until_ns(sleep_until);
+        }
+        while self.driver.latest_tick() == self.seen && monotonic_ns() < until_ns {
+            spin_loop();
+        }
+    }
+}

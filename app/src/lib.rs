@@ -1,0 +1,29 @@
+//! The application Phantom3: fingers, scenes and the threads that make them felt.
+//!
+//! Problem: haptic rendering must answer the driver's every frame within the same tick, while files,
+//! progress and people take the time they take.
+//!
+//! One tick is [`fast_step::FastStep`], pure; [`fast_loop::FastLoop`] puts it between the driver's frame and
+//! the command that answers it. Who moves the clock: [`virtual_clock`] in one process, [`two_processes`]
+//! with [`fast_thread`] in real time or in lockstep. The slow side is [`slow`].
+
+#![forbid(unsafe_code)]
+#![deny(missing_docs)]
+
+pub mod child;
+pub mod cli;
+pub mod demo;
+pub mod fast_loop;
+pub mod fast_step;
+pub mod fast_thread;
+pub mod mount;
+pub mod outcome;
+pub mod progress;
+pub mod recording;
+pub mod report;
+pub mod rig;
+pub mod row;
+pub mod run;
+pub mod slow;
+pub mod two_processes;
+pub mod virtual_clock;

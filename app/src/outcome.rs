@@ -1,0 +1,56 @@
+//! How a run can end.
+
+use crate::recording::RecordingError;
+use shm_abi::FaultReason;
+use shm_abi::client::AttachError;
+use thiserror::Error;
+
+/// Why a run stopped without anything being wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stop {
+    /// It is over.
+    Finished,
+    /// This signal asked for it.
+    Signal(i32),
+}
+
+/// What went wrong.
+#[derive(Debug, Error)]
+pub enum RunFailure {
+    /// It could not be started.
+    #[error("{0}")]
+    Start(String),
+    /// The driver could not be attached to.
+    #[error(transparent)]
+    Attach(#[from] AttachError),
+    /// The driver is in its fault state.
+    #[error("the driver is in its fault state: {0}; the motors are off")]
+    DriverFault(&'static str),
+    /// The driver is gone.
+    #[error("the driver is gone: {0}")]
+    DriverGone(String),
+    /// The driver publishes no frames any more.
+    #[error("the driver has published no frame for {seconds} s though its process lives; it may be stopped")]
+    DriverSilent {
+        /// For how long.
+        seconds: f64,
+    },
+    /// The recording cannot be written.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+}
+
+impl RunFailure {
+    /// The fault behind a word of the frame.
+    pub fn driver_fault(word: u64) -> Self {
+        Self::DriverFault(FaultReason::from_word(word).map_or("an unknown reason", FaultReason::sentence))
+    }
+
+    /// The exit status of the run contract: 2 nothing was started, 3 a fault during the run.
+    pub fn exit_status(&self) -> u8 {
+        match self {
+            Self::Start(_) | Self::Attach(_) | Self::Recording(RecordingError::Create { .. }) => 2,
+            _ => 3,
+        }
+    }
+}

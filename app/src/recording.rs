@@ -1,0 +1,294 @@
+//! The recording of a run as CSV: a header, then one row per fast tick.
+//!
+//! Model: rows are formatted into a buffer and written in whole rows. Numbers are printed so that reading
+//! them back gives the same f64 (the shortest such text).
+//! Invariant: whatever goes wrong, the file on disk ends with a complete row: a write that failed half way
+//! (a full disk) is cut back to the last row that fits.
+//! Units: SI; world frame; forces are forces on the user.
+
+use crate::row::{FingerRow, Row};
+use haptics::{ContactState, Feature};
+use io_driver::device::run_time_s;
+use nalgebra::Vector3;
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::{self, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Written at once when this much has come together.
+const CHUNK_BYTES: usize = 256 * 1024;
+
+/// Why a recording could not be made, or not to its end.
+#[derive(Debug, Error)]
+pub enum RecordingError {
+    /// The file cannot be made.
+    #[error("cannot create the recording {file}: {source}")]
+    Create {
+        /// Which.
+        file: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// It cannot be written any further.
+    #[error("cannot write the recording {file}: {source}; it is complete up to t = {until_s} s ({rows} rows)")]
+    Write {
+        /// Which.
+        file: PathBuf,
+        /// What the system said.
+        source: io::Error,
+        /// Time of the last row on disk.
+        until_s: f64,
+        /// Rows on disk.
+        rows: u64,
+    },
+}
+
+/// The names that a recording's columns and cells are made of.
+#[derive(Debug, Clone)]
+pub struct Names {
+    /// The fingers.
+    pub fingers: Vec<String>,
+    /// The entities.
+    pub entities: Vec<String>,
+}
+
+/// A recording being written.
+#[derive(Debug)]
+pub struct Recording {
+    file: File,
+    path: PathBuf,
+    names: Names,
+    period_ns: u64,
+    /// Whole rows that are not on disk yet.
+    buffer: String,
+    /// End of each of these rows in the buffer, and its tick.
+    ends: Vec<(usize, u64)>,
+    written_bytes: u64,
+    rows: u64,
+    last_tick: u64,
+}
+
+impl Recording {
+    /// Creates the file, or empties it, and writes the header.
+    ///
+    /// # Errors
+    /// If the file cannot be made or its first line not be written.
+    pub fn create(path: &Path, names: Names, period_ns: u64) -> Result<Self, RecordingError> {
+        let file = File::create(path).map_err(|source| RecordingError::Create { file: path.into(), source })?;
+        let mut recording = Self {
+            file,
+            path: path.into(),
+            buffer: String::with_capacity(2 * CHUNK_BYTES),
+            ends: Vec::new(),
+            written_bytes: 0,
+            rows: 0,
+            last_tick: 0,
+            period_ns,
+            names,
+        };
+        recording.buffer = header(&recording.names);
+        recording.flush().map_err(|error| match error {
+            RecordingError::Write { file, source, .. } => RecordingError::Create { file, source },
+            other => other,
+        })?;
+        Ok(recording)
+    }
+
+    /// Where it lies.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Appends a row.
+    ///
+    /// # Errors
+    /// If the rows before it, or it, cannot be written.
+    pub fn append(&mut self, row: &Row) -> Result<(), RecordingError> {
+        write_row(&mut self.buffer, row, &self.names, self.period_ns);
+        self.ends.push((self.buffer.len(), row.run_tick));
+        if self.buffer.len() >= CHUNK_BYTES { self.flush() } else { Ok(()) }
+    }
+
+    /// Writes everything out to the disk itself. Returns the number of rows.
+    ///
+    /// # Errors
+    /// If that fails.
+    pub fn finish(mut self) -> Result<u64, RecordingError> {
+        self.flush()?;
+        match self.file.sync_data() {
+            Ok(()) => Ok(self.rows),
+            // A pipe or a character device has no disk to reach.
+            Err(error) if error.kind() == io::ErrorKind::InvalidInput => Ok(self.rows),
+            Err(source) => Err(self.failed(source)),
+        }
+    }
+
+    fn flush(&mut self) -> Result<(), RecordingError> {
+        let mut done = 0;
+        let bytes = self.buffer.as_bytes();
+        let failure = loop {
+            if done == bytes.len() {
+                break None;
+            }
+            match self.file.write(&bytes[done..]) {
+                Ok(0) => break Some(io::ErrorKind::WriteZero.into()),
+                Ok(more) => done += more,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => break Some(error),
+            }
+        };
+        self.keep_whole_rows(done);
+        self.buffer.clear();
+        self.ends.clear();
+        failure.map_or(Ok(()), |source| Err(self.failed(source)))
+    }
+
+    /// Counts what reached the file and cuts a row that did so only in part.
+    fn keep_whole_rows(&mut self, done: usize) {
+        let whole = self.ends.iter().take_while(|(end, _)| *end <= done).count();
+        let mut kept = if done == self.buffer.len() { done } else { 0 };
+        if whole > 0 {
+            let (end, tick) = self.ends[whole - 1];
+            self.rows += whole as u64;
+            self.last_tick = tick;
+            kept = kept.max(end);
+        }
+        self.written_bytes += kept as u64;
+        if kept < done {
+            // If even this fails, the message still says how many rows are good.
+            let _ = self.file.set_len(self.written_bytes);
+            let _ = self.file.seek(SeekFrom::Start(self.written_bytes));
+        }
+    }
+
+    fn failed(&self, source: io::Error) -> RecordingError {
+        let until_s = run_time_s(self.last_tick as i64, self.period_ns);
+        RecordingError::Write { file: self.path.clone(), source, until_s, rows: self.rows }
+    }
+}
+
+/// The names of all columns.
+fn header(names: &Names) -> String {
+    let mut line = String::from("t");
+    for finger in &names.fingers {
+        for quantity in ["hip", "god", "force"] {
+            push_axes(&mut line, finger, quantity);
+        }
+        for quantity in ["entity", "feature", "friction"] {
+            let _ = write!(line, ",{finger}_{quantity}");
+        }
+        push_axes(&mut line, finger, "applied");
+    }
+    line.push('\n');
+    line
+}
+
+fn push_axes(line: &mut String, finger: &str, quantity: &str) {
+    for axis in ["x", "y", "z"] {
+        let _ = write!(line, ",{finger}_{quantity}_{axis}");
+    }
+}
+
+fn write_row(line: &mut String, row: &Row, names: &Names, period_ns: u64) {
+    let _ = write!(line, "{:?}", run_time_s(row.run_tick as i64, period_ns));
+    for (_, finger) in names.fingers.iter().zip(&row.fingers) {
+        write_finger(line, finger, names);
+    }
+    line.push('\n');
+}
+
+fn write_finger(line: &mut String, finger: &FingerRow, names: &Names) {
+    for vector in [&finger.hip, &finger.god_object, &finger.force_on_user] {
+        write_vector(line, vector);
+    }
+    let entity = finger.entity.and_then(|index| names.entities.get(index as usize));
+    let (feature, friction) = (feature_name(finger.feature), friction_name(finger.friction));
+    let _ = write!(line, ",{},{feature},{friction}", entity.map_or("", String::as_str));
+    write_vector(line, &finger.applied_on_user);
+}
+
+/// `{:?}` of an f64 is the shortest text that reads back as the same number.
+fn write_vector(line: &mut String, vector: &Vector3<f64>) {
+    for component in vector {
+        let _ = write!(line, ",{component:?}");
+    }
+}
+
+fn feature_name(feature: Feature) -> &'static str {
+    match feature {
+        Feature::None => "none",
+        Feature::Surface => "surface",
+    }
+}
+
+fn friction_name(friction: ContactState) -> &'static str {
+    match friction {
+        ContactState::Free => "free",
+        ContactState::Stick => "stick",
+        ContactState::Slip => "slip",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names() -> Names {
+        Names { fingers: vec!["a".into(), "b".into()], entities: vec!["table".into()] }
+    }
+
+    fn row(run_tick: u64, number: f64) -> Row {
+        let mut row = Row { run_tick, ..Row::empty() };
+        row.fingers[0].hip = Vector3::new(number, -0.0, 1e-300);
+        row.fingers[1].entity = Some(0);
+        row
+    }
+
+    #[test]
+    fn every_row_has_the_header_s_columns_and_numbers_read_back_as_they_were() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let path = directory.path().join("r.csv");
+        let mut recording = Recording::create(&path, names(), 1_000_000).expect("created");
+        recording.append(&row(3, 0.1 + 0.2)).expect("appended");
+        assert_eq!(recording.finish().expect("finished"), 1);
+        let text = std::fs::read_to_string(&path).expect("readable");
+        let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+        assert_eq!(lines.len(), 2);
+        assert_eq!(lines[0].len(), 1 + 2 * 15);
+        assert_eq!(lines[1].len(), lines[0].len());
+        assert_eq!(lines[0][..4], ["t", "a_hip_x", "a_hip_y", "a_hip_z"]);
+        assert_eq!(lines[1][0], "0.003");
+        let back: Vec<u64> = lines[1][1..4].iter().map(|n| n.parse::<f64>().expect("a number").to_bits()).collect();
+        assert_eq!(back, [0.1 + 0.2, -0.0, 1e-300f64].map(f64::to_bits));
+        let at = |name: &str| lines[0].iter().position(|column| *column == name).expect("a column");
+        assert_eq!(lines[1][at("a_entity")], "");
+        assert_eq!(lines[1][at("b_entity")], "table");
+        assert_eq!(lines[1][at("b_feature")], "none");
+        assert_eq!(lines[1][at("b_friction")], "free");
+    }
+
+    #[test]
+    fn a_full_disk_leaves_complete_rows_and_says_how_many() {
+        // /dev/full refuses every byte: the header already fails, as on a disk full from the start.
+        let error = Recording::create(Path::new("/dev/full"), names(), 1_000_000).expect_err("full");
+        assert!(error.to_string().starts_with("cannot create the recording /dev/full: No space left"), "{error}");
+    }
+
+    #[test]
+    fn a_row_that_reached_the_file_only_in_part_is_cut_off() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let path = directory.path().join("r.csv");
+        let mut recording = Recording::create(&path, names(), 1_000_000).expect("created");
+        recording.append(&row(0, 1.0)).expect("appended");
+        recording.append(&row(1, 2.0)).expect("appended");
+        let bytes = recording.buffer.clone().into_bytes();
+        let half = recording.ends[0].0 + 5;
+        recording.file.write_all(&bytes[..half]).expect("written");
+        recording.keep_whole_rows(half);
+        let text = std::fs::read_to_string(&path).expect("readable");
+        assert_eq!(text.lines().count(), 2, "header and one row");
+        assert!(text.ends_with('\n'));
+        assert_eq!((recording.rows, recording.last_tick), (1, 0));
+    }
+}

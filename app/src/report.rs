@@ -1,0 +1,115 @@
+//! What a run tells at its end, a line each; the README explains the lines.
+
+use crate::fast_loop::Tally;
+use io_driver::meter;
+use io_driver::status::{CounterStatus, Percentiles};
+use rt_core::histogram::Histogram;
+use rt_core::setup::SetupReport;
+use shm_abi::DriverView;
+use std::fmt;
+use std::path::PathBuf;
+
+/// The end of a run in figures.
+pub struct Report {
+    /// Which clock moved the ticks.
+    pub clock: &'static str,
+    /// Length of a tick [ns].
+    pub period_ns: u64,
+    /// Who drove the devices.
+    pub driver: String,
+    /// The fast thread's counts.
+    pub tally: Tally,
+    /// The driver's.
+    pub counters: CounterStatus,
+    /// The driver's timing and ours; none on a clock that is not real.
+    pub timing: Option<Timing>,
+    /// What was obtained: the driver's words, and the fast thread's.
+    pub guarantees: Option<(String, SetupReport)>,
+    /// Where the recording lies, and its rows.
+    pub recording: Option<(PathBuf, u64)>,
+}
+
+/// Durations of a run.
+pub struct Timing {
+    /// How late the driver's loop woke.
+    pub wake_error: Percentiles,
+    /// The driver's own work in a tick.
+    pub cycle: Percentiles,
+    /// From frame to reply, seen by the driver.
+    pub round_trip: Percentiles,
+    /// The fast step.
+    pub step: Percentiles,
+}
+
+/// The driver's histograms at the start of a run, to subtract.
+pub struct Baseline {
+    wake_error: Histogram,
+    cycle: Histogram,
+    round_trip: Histogram,
+    counters: CounterStatus,
+}
+
+impl Baseline {
+    /// Reads them.
+    pub fn of(driver: &DriverView) -> Self {
+        Self {
+            wake_error: meter::read(&driver.wake_error_ns),
+            cycle: meter::read(&driver.cycle_ns),
+            round_trip: meter::read(&driver.round_trip_ns),
+            counters: CounterStatus::of(driver),
+        }
+    }
+
+    /// What has come since.
+    pub fn timing(&self, driver: &DriverView, step_ns: &Histogram) -> Timing {
+        let since = |before: &Histogram, block| Percentiles::of(&meter::since(before, &meter::read(block)));
+        Timing {
+            wake_error: since(&self.wake_error, &driver.wake_error_ns),
+            cycle: since(&self.cycle, &driver.cycle_ns),
+            round_trip: since(&self.round_trip, &driver.round_trip_ns),
+            step: Percentiles::of(step_ns),
+        }
+    }
+
+    /// What has been counted since.
+    pub fn counters(&self, driver: &DriverView) -> CounterStatus {
+        CounterStatus::of(driver).since(&self.counters)
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (tally, counters) = (&self.tally, &self.counters);
+        writeln!(f, "clock        {}, {:.6} kHz", self.clock, 1e6 / self.period_ns as f64)?;
+        writeln!(f, "driver       {}", self.driver)?;
+        writeln!(f, "ticks        {} under our lease, {} answered", counters.ticks_commanded, tally.answered)?;
+        writeln!(f, "overruns     {} deadlines skipped by the driver, {} frames missed here", counters.overruns, tally.frames_missed)?;
+        writeln!(
+            f,
+            "replies      {} in time, {} missed, {} torn, {} refused",
+            counters.replies_fresh, counters.replies_missed, counters.commands_torn, counters.commands_refused
+        )?;
+        if let Some(timing) = &self.timing {
+            writeln!(f, "wake error   {}", timing.wake_error)?;
+            writeln!(f, "driver work  {}", timing.cycle)?;
+            writeln!(f, "round trip   {}", timing.round_trip)?;
+            writeln!(f, "fast step    {}", timing.step)?;
+        }
+        writeln!(f, "peak force   {:.3} N computed, {:.3} N rendered", tally.peak_force_n, tally.peak_applied_n)?;
+        if let Some((driver, fast)) = &self.guarantees {
+            writeln!(f, "guarantees of the driver's loop")?;
+            writeln!(f, "{}", driver.trim_end())?;
+            writeln!(f, "guarantees of the fast thread")?;
+            writeln!(f, "{}", fast.to_string().trim_end())?;
+        }
+        match &self.recording {
+            Some((path, rows)) if tally.rows_lost == 0 => {
+                write!(f, "recording    {} ({rows} rows)", path.display())
+            }
+            Some((path, rows)) => {
+                write!(f, "recording    {} ({rows} rows, {} LOST: the disk was too slow)", path.display(), tally.rows_lost)
+            }
+            None => write!(f, "recording    none; --record FILE makes one"),
+        }
+    }
+}

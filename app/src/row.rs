@@ -1,0 +1,40 @@
+//! What one fast tick leaves behind for slower eyes: the recording's row.
+
+use haptics::{ContactState, Feature};
+use nalgebra::Vector3;
+use shm_abi::MAX_DEVICES;
+
+/// One fast tick of a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Row {
+    /// Ticks since the first one at full authority.
+    pub run_tick: u64,
+    /// The fingers; those that do not exist are zero.
+    pub fingers: [FingerRow; MAX_DEVICES],
+}
+
+/// One finger in it; world frame, SI.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct FingerRow {
+    /// The haptic interaction point [m].
+    pub hip: Vector3<f64>,
+    /// The god-object; the HIP in free space [m].
+    pub god_object: Vector3<f64>,
+    /// What rendering computed [N].
+    pub force_on_user: Vector3<f64>,
+    /// What the device was made to render after ramps, limits and converters [N].
+    pub applied_on_user: Vector3<f64>,
+    /// Index of the touched entity.
+    pub entity: Option<u32>,
+    /// What of it is touched.
+    pub feature: Feature,
+    /// What the friction does.
+    pub friction: ContactState,
+}
+
+impl Row {
+    /// A row of nothing.
+    pub fn empty() -> Self {
+        Self { run_tick: 0, fingers: [FingerRow::default(); MAX_DEVICES] }
+    }
+}

@@ -1,0 +1,164 @@
+//! A scripted run from start to report.
+
+use crate::child::DriverChild;
+use crate::fast_loop::{FastLoop, WhenFull};
+use crate::outcome::{RunFailure, Stop};
+use crate::progress::Progress;
+use crate::recording::Recording;
+use crate::report::{Baseline, Report};
+use crate::rig::Rig;
+use crate::slow::{ROW_QUEUE, SlowSide};
+use crate::two_processes::{self, Source};
+use crate::virtual_clock;
+use rt_core::signals::StopSignals;
+use rtrb::RingBuffer;
+use shm_abi::client;
+use shm_abi::segment::{ClockMode, DriverInfo};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// What a run is to do with its rig.
+#[derive(Debug, Clone)]
+pub struct RunPlan {
+    /// Which clock moves the ticks.
+    pub clock: ClockMode,
+    /// How long; `None`: as the rig says.
+    pub seconds: Option<f64>,
+    /// Where to record.
+    pub record: Option<PathBuf>,
+    /// Use the driver that listens here, and its devices, instead of a child with ideal ones.
+    pub attach: Option<Attach>,
+}
+
+/// A driver that runs already.
+#[derive(Debug, Clone)]
+pub struct Attach {
+    /// Its socket.
+    pub socket: PathBuf,
+    /// How long to wait for its return, should it end.
+    pub grace: Duration,
+}
+
+/// Runs. What is recorded before a failure is complete on disk.
+///
+/// # Errors
+/// Whatever kept the run from starting or from going on.
+pub fn run(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Report, Stop), RunFailure> {
+    match plan.clock {
+        ClockMode::Virtual => run_virtual(rig, plan, signals),
+        ClockMode::Real | ClockMode::Lockstep => run_two_processes(rig, plan, signals),
+    }
+}
+
+/// The parts that every clock needs.
+struct Parts {
+    fast: FastLoop,
+    slow: SlowSide,
+    progress: Progress,
+}
+
+impl Parts {
+    fn new(rig: &Rig, plan: &RunPlan, period_ns: u64) -> Result<Self, RunFailure> {
+        let seconds = plan.seconds.unwrap_or_else(|| rig.default_seconds());
+        let total_ticks = (seconds * 1e9 / period_ns as f64).round() as u64;
+        let when_full = if plan.clock == ClockMode::Real { WhenFull::Drop } else { WhenFull::Wait };
+        let step = rig.fast_step().map_err(|error| RunFailure::Start(error.to_string()))?;
+        let (producer, consumer) = RingBuffer::new(ROW_QUEUE);
+        let record = |path: &PathBuf| Recording::create(path, rig.names(), period_ns);
+        let recording = plan.record.as_ref().map(record).transpose()?;
+        Ok(Self {
+            fast: FastLoop::new(step, producer, when_full, total_ticks, period_ns),
+            slow: SlowSide::new(consumer, recording),
+            progress: Progress::new(total_ticks, period_ns),
+        })
+    }
+}
+
+fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Report, Stop), RunFailure> {
+    let Parts { mut fast, mut slow, mut progress } = Parts::new(rig, plan, rig.period_ns)?;
+    let config = rig.driver_config(ClockMode::Virtual);
+    let result = virtual_clock::run(&config, &mut fast, &mut slow, &mut progress, signals);
+    progress.end();
+    let (result, rows) = close(result, slow)?;
+    let (tally, stop, driver) = result;
+    let report = Report {
+        clock: ClockMode::Virtual.name(),
+        period_ns: rig.period_ns,
+        driver: "in this process".into(),
+        tally,
+        counters: io_driver::status::CounterStatus::of(&driver),
+        timing: None,
+        guarantees: None,
+        recording: plan.record.clone().zip(rows),
+    };
+    Ok((report, stop))
+}
+
+fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Report, Stop), RunFailure> {
+    let (mut source, attachment) = connect(rig, plan)?;
+    let info = attachment.driver.info();
+    check_devices(rig, &info)?;
+    let driver_name = describe(&source, attachment.driver_pid, &info);
+    let driver_guarantees = String::new();
+    let baseline = Baseline::of(&attachment.driver);
+    let step_rig = Rig { period_ns: info.period_ns, ..rig.clone() };
+    let Parts { fast, mut slow, mut progress } = Parts::new(&step_rig, plan, info.period_ns)?;
+    let result = two_processes::run(&mut source, attachment, fast, &mut slow, &mut progress, signals);
+    progress.end();
+    let (end, rows) = close(result, slow)?;
+    let is_real = info.clock_mode == ClockMode::Real;
+    let report = Report {
+        clock: info.clock_mode.name(),
+        period_ns: info.period_ns,
+        driver: driver_name,
+        tally: end.tally,
+        counters: baseline.counters(&end.driver),
+        timing: is_real.then(|| baseline.timing(&end.driver, &end.step_ns)),
+        guarantees: is_real.then_some((driver_guarantees, end.fast_report)),
+        recording: plan.record.clone().zip(rows),
+    };
+    Ok((report, end.stop))
+}
+
+/// Closes the recording whatever happened; a failure of the run comes before one of the recording.
+fn close<T>(result: Result<T, RunFailure>, slow: SlowSide) -> Result<(T, Option<u64>), RunFailure> {
+    let closed = slow.finish();
+    let value = result?;
+    Ok((value, closed?))
+}
+
+fn connect(rig: &Rig, plan: &RunPlan) -> Result<(Source, client::Attachment), RunFailure> {
+    match &plan.attach {
+        Some(Attach { socket, grace }) => {
+            let attachment = client::command(socket, "phantom3")?;
+            Ok((Source::Running { socket: socket.clone(), grace: *grace }, attachment))
+        }
+        None => {
+            let mut child = DriverChild::start(&rig.driver_config(plan.clock))?;
+            let attachment = child.attach("phantom3")?;
+            Ok((Source::Child(child), attachment))
+        }
+    }
+}
+
+fn check_devices(rig: &Rig, info: &DriverInfo) -> Result<(), RunFailure> {
+    let (needed, found) = (rig.device_count(), info.devices.len());
+    if needed <= found {
+        return Ok(());
+    }
+    Err(RunFailure::Start(format!(
+        "{}: the scene's fingers need {needed} devices, the driver has {found}; \
+         take fingers out of the scene, or add devices to the driver's configuration",
+        rig.scene_file.display()
+    )))
+}
+
+fn describe(source: &Source, pid: u64, info: &DriverInfo) -> String {
+    let kinds: Vec<&str> = info.devices.iter().map(|device| device.kind.as_str()).collect();
+    let whose = match source {
+        Source::Child(_) => "our own child",
+        Source::Running { .. } => "was running",
+    };
+    let cpu = info.cpu.map_or_else(|| "any CPU".into(), |cpu| format!("CPU {cpu}"));
+    format!("process {pid}, {whose}, {cpu}, {} wait, devices: {}", info.wait_mode.name(), kinds.join(", "))
+}

@@ -1,0 +1,165 @@
+//! A run against a driver in a process of its own, in real time or in lockstep.
+//!
+//! Model: the fast thread answers frames; this thread is the slow one: it writes the recording, shows the
+//! progress and watches the connection, which is how the end of the driver is noticed. A driver that was
+//! there before us may be restarted: the run goes on with it if it is back within the grace time.
+
+use crate::child::DriverChild;
+use crate::fast_loop::{FastLoop, Tally};
+use crate::fast_thread::{self, FastEnd, FastRemains, FastShared};
+use crate::outcome::{RunFailure, Stop};
+use crate::progress::Progress;
+use crate::slow::SlowSide;
+use rt_core::histogram::Histogram;
+use rt_core::setup::SetupReport;
+use rt_core::signals::StopSignals;
+use shm_abi::DriverView;
+use shm_abi::client::{self, Attachment, Connection};
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// The slow thread's own period.
+const SLOW_PERIOD: Duration = Duration::from_millis(10);
+
+/// Where the driver comes from.
+pub enum Source {
+    /// Our own child, which nobody restarts.
+    Child(DriverChild),
+    /// One that was there before us.
+    Running {
+        /// Its socket.
+        socket: PathBuf,
+        /// How long to wait for its return.
+        grace: Duration,
+    },
+}
+
+/// What is known after the run.
+pub struct TwoProcessEnd {
+    /// Counts.
+    pub tally: Tally,
+    /// Why it stopped.
+    pub stop: Stop,
+    /// The driver's memory.
+    pub driver: DriverView,
+    /// What the fast thread obtained.
+    pub fast_report: SetupReport,
+    /// How long its step took.
+    pub step_ns: Histogram,
+}
+
+/// Runs to the end.
+///
+/// # Errors
+/// If the driver cannot be attached to, faults or goes away for good, or the recording cannot be written.
+pub fn run(
+    source: &mut Source,
+    attachment: Attachment,
+    fast: FastLoop,
+    slow: &mut SlowSide,
+    progress: &mut Progress,
+    signals: &StopSignals,
+) -> Result<TwoProcessEnd, RunFailure> {
+    let mut attachment = attachment;
+    let mut fast = fast;
+    loop {
+        let (report, connection, watched) = run_attached(attachment, fast, slow, progress, signals)?;
+        let remains = watched.remains;
+        let tally = remains.fast.tally;
+        let stop = match watched.end {
+            WatchEnd::Fast(FastEnd::Finished) => Stop::Finished,
+            WatchEnd::Signal(signal) => Stop::Signal(signal),
+            WatchEnd::Fast(FastEnd::Fault(reason)) => return Err(RunFailure::driver_fault(reason)),
+            WatchEnd::Fast(FastEnd::Silent) => return Err(RunFailure::DriverSilent { seconds: 5.0 }),
+            WatchEnd::Recording(error) => return Err(error.into()),
+            WatchEnd::DriverGone | WatchEnd::Fast(FastEnd::Stopped) => {
+                let words = last_words(&remains.driver);
+                drop(connection);
+                progress.end();
+                attachment = reattach(source, &words, signals)?;
+                fast = remains.fast;
+                fast.reset();
+                continue;
+            }
+        };
+        let FastRemains { driver, step_ns, .. } = remains;
+        return Ok(TwoProcessEnd { tally, stop, driver, fast_report: report, step_ns });
+    }
+}
+
+/// Why watching ended.
+enum WatchEnd {
+    Fast(FastEnd),
+    Signal(i32),
+    DriverGone,
+    Recording(crate::recording::RecordingError),
+}
+
+struct Watched {
+    end: WatchEnd,
+    remains: FastRemains,
+}
+
+fn run_attached(
+    attachment: Attachment,
+    fast: FastLoop,
+    slow: &mut SlowSide,
+    progress: &mut Progress,
+    signals: &StopSignals,
+) -> Result<(SetupReport, Connection, Watched), RunFailure> {
+    let Attachment { driver, commander, connection, .. } = attachment;
+    let commander = commander.ok_or_else(|| RunFailure::Start("the driver gave no lease".into()))?;
+    let shared = FastShared::default();
+    let (report, thread) = fast_thread::start(fast, driver, commander, shared.clone())
+        .map_err(|error| RunFailure::Start(format!("cannot start the fast thread: {error}")))?;
+    let end = loop {
+        if let Err(error) = slow.step() {
+            break Some(WatchEnd::Recording(error));
+        }
+        if thread.is_finished() {
+            break None;
+        }
+        if let Some(signal) = signals.requested() {
+            break Some(WatchEnd::Signal(signal));
+        }
+        if !connection.is_open() {
+            break Some(WatchEnd::DriverGone);
+        }
+        progress.show(shared.run_ticks.load(Ordering::Relaxed));
+        std::thread::sleep(SLOW_PERIOD);
+    };
+    shared.stop.store(true, Ordering::Relaxed);
+    let remains = thread.join().map_err(|_| RunFailure::DriverGone("the fast thread panicked".into()))?;
+    let end = end.unwrap_or(WatchEnd::Fast(remains.end));
+    Ok((report, connection, Watched { end, remains }))
+}
+
+fn last_words(driver: &DriverView) -> String {
+    rt_core::epitaph::read(&driver.epitaph)
+        .map_or_else(|| "it was killed, or crashed without last words".into(), |words| words.to_string())
+}
+
+fn reattach(source: &mut Source, words: &str, signals: &StopSignals) -> Result<Attachment, RunFailure> {
+    let (socket, grace) = match source {
+        Source::Child(child) => {
+            let status = child.end().map_or_else(String::new, |status| format!(" ({status})"));
+            return Err(RunFailure::DriverGone(format!("{words}{status}")));
+        }
+        Source::Running { socket, grace } => (socket, *grace),
+    };
+    eprintln!("phantom3: the driver is gone: {words}; waiting up to {grace:?} for its return");
+    let begun = Instant::now();
+    loop {
+        match client::command(socket, "phantom3") {
+            Ok(attachment) => {
+                eprintln!("phantom3: the driver is back (process {}); the run goes on", attachment.driver_pid);
+                return Ok(attachment);
+            }
+            Err(error) if begun.elapsed() > grace || signals.requested().is_some() => {
+                return Err(RunFailure::DriverGone(format!("{words}; after {grace:?}: {error}")));
+            }
+            Err(_) => std::thread::sleep(SLOW_PERIOD),
+        }
+    }
+}

@@ -1,0 +1,80 @@
+/* The C side of tests/c_client.rs.
+ *
+ *     c_client SOCKET command N   answers ticks 0 to N - 1, each after checking its frame word by word
+ *     c_client SOCKET observe N   waits for frame N - 1 and checks it
+ *     c_client SOCKET version     claims to be of ABI version 99.7
+ */
+#include "phantom3_client.h"
+
+#include <stdlib.h>
+
+/* The same function as `word_of` in tests/common/mod.rs: every word tells its tick and its place. */
+static uint64_t word_of(uint64_t tick, uint64_t place) { return (tick * (2 * place + 1)) ^ (place << 48); }
+
+static int is_whole(const PhantomFrame *frame, uint64_t tick) {
+    uint64_t words[PHANTOM_FRAME_WORDS];
+    memcpy(words, frame, sizeof words);
+    for (uint64_t place = 0; place < PHANTOM_FRAME_WORDS; place++)
+        if (words[place] != word_of(tick, place)) return 0;
+    return 1;
+}
+
+static void wait_for(const PhantomAttachment *driver, uint64_t tick) {
+    for (;;) {
+        uint64_t seen = phantom_latest_tick(driver->segment);
+        if (seen != PHANTOM_NO_TICK && seen >= tick) return;
+        if (!phantom_is_attached(driver)) {
+            fprintf(stderr, "the driver is gone at tick %llu\n", (unsigned long long)tick);
+            exit(1);
+        }
+        phantom_sleep_for_frame(driver, seen, 1000 * 1000 * 1000);
+    }
+}
+
+static void read_whole(const PhantomAttachment *driver, uint64_t tick, PhantomFrame *frame) {
+    wait_for(driver, tick);
+    PhantomRead read = phantom_read_frame(driver->segment, tick, frame);
+    if (read == PHANTOM_READ_OK && is_whole(frame, tick)) return;
+    fprintf(stderr, "frame %llu: read %d, or not whole\n", (unsigned long long)tick, (int)read);
+    exit(1);
+}
+
+static void answer(const PhantomAttachment *driver, const PhantomFrame *frame) {
+    PhantomCommand command = phantom_answer_to(frame, driver->lease);
+    command.device_count = 2;
+    for (int device = 0; device < 2; device++)
+        for (int axis = 0; axis < 3; axis++)
+            command.devices[device].force_on_user_n[axis] = (double)frame->tick + 10.0 * device + axis;
+    phantom_publish(driver, &command);
+}
+
+int main(int argc, char **argv) {
+    if (argc < 3) return 2;
+    int commands = !strcmp(argv[2], "command");
+    PhantomRequest request =
+        phantom_request(commands ? PHANTOM_REQUEST_KIND_COMMAND : PHANTOM_REQUEST_KIND_OBSERVE, "c_client");
+    if (!strcmp(argv[2], "version")) request.abi_version = (UINT64_C(99) << 32) | 7;
+
+    PhantomAttachment driver;
+    char error[PHANTOM_ERROR_BYTES];
+    if (phantom_attach_with(argv[1], &request, &driver, error)) {
+        fprintf(stderr, "%s\n", error);
+        return 1;
+    }
+    uint64_t ticks = argc > 3 ? strtoull(argv[3], NULL, 10) : 1;
+    PhantomFrame frame;
+    if (commands) {
+        for (uint64_t tick = 0; tick < ticks; tick++) {
+            read_whole(&driver, tick, &frame);
+            answer(&driver, &frame);
+        }
+        /* Still attached, so that the driver reads the last answer under our lease. */
+        while (phantom_is_attached(&driver)) usleep(1000);
+    } else {
+        read_whole(&driver, ticks - 1, &frame);
+        if (phantom_read_frame(driver.segment, ticks + PHANTOM_RING_FRAMES, &frame) != PHANTOM_READ_NOT_YET) return 3;
+    }
+    printf("%llu ticks whole\n", (unsigned long long)ticks);
+    phantom_detach(&driver);
+    return 0;
+}

@@ -1,0 +1,115 @@
+//! A driver as a child process with a socket of its own.
+
+use crate::programs;
+use shm_abi::client::{self, AttachError, Attachment};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Child, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// Long enough for the most loaded machine; only a hang takes longer.
+pub const HANG: Duration = Duration::from_secs(60);
+
+/// A driver that is killed when dropped.
+#[derive(Debug)]
+pub struct Driver {
+    /// The process.
+    pub child: Child,
+    socket: PathBuf,
+    _directory: TempDir,
+}
+
+impl Driver {
+    /// Starts one with this configuration and waits until it listens.
+    pub fn start(config: &str) -> Self {
+        let directory = tempfile::tempdir().expect("a directory");
+        let socket = directory.path().join("driver.sock");
+        let child = spawn(config, &socket);
+        let driver = Self { child, socket, _directory: directory };
+        driver.wait_until_it_listens();
+        driver
+    }
+
+    /// Starts another one at the same socket, after this one has ended.
+    pub fn restart(&mut self, config: &str) {
+        self.child = spawn(config, &self.socket);
+        self.wait_until_it_listens();
+    }
+
+    /// Where it listens.
+    pub fn socket(&self) -> &Path {
+        &self.socket
+    }
+
+    /// Takes the lease, waiting for a former holder's end to be noticed.
+    pub fn command(&self) -> Attachment {
+        let begun = Instant::now();
+        loop {
+            match client::command(&self.socket, "test") {
+                Err(AttachError::LeaseHeld { .. }) if begun.elapsed() < HANG => {
+                    std::thread::sleep(Duration::from_millis(1));
+                }
+                other => return other.expect("the lease"),
+            }
+        }
+    }
+
+    /// Looks on.
+    pub fn observe(&self) -> Attachment {
+        client::observe(&self.socket, "test").expect("an observer's place")
+    }
+
+    /// Waits for its end.
+    pub fn wait(&mut self) -> ExitStatus {
+        wait_or_kill(&mut self.child)
+    }
+
+    fn wait_until_it_listens(&self) {
+        let begun = Instant::now();
+        while client::observe(&self.socket, "test").is_err() {
+            assert!(begun.elapsed() < HANG, "the driver does not listen");
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+}
+
+impl Drop for Driver {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn spawn(config: &str, socket: &Path) -> Child {
+    let mut child = programs::io_driver()
+        .args(["run", "--config", "-", "--quiet", "--socket"])
+        .arg(socket)
+        .stdin(Stdio::piped())
+        .spawn()
+        .expect("the driver starts");
+    child.stdin.take().expect("piped").write_all(config.as_bytes()).expect("it reads its configuration");
+    child
+}
+
+/// Waits for a child's end; one that hangs is killed and fails the test.
+pub fn wait_or_kill(child: &mut Child) -> ExitStatus {
+    let begun = Instant::now();
+    loop {
+        if let Some(status) = child.try_wait().expect("our child") {
+            return status;
+        }
+        if begun.elapsed() > HANG {
+            let _ = child.kill();
+            panic!("process {} hangs", child.id());
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// A configuration of `devices` resting ideal devices with a peak of 8.5 N, without real-time rights, so
+/// that tests may run side by side.
+pub fn resting(clock: &str, devices: usize) -> String {
+    let device = "[[device]]\nbackend = \"ideal\"\npeak_force_n = 8.5\n";
+    format!("clock = \"{clock}\"\n[real_time]\npriority = 0\nlock_memory = false\n{}", device.repeat(devices))
+}
