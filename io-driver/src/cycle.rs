@@ -53,6 +53,8 @@ struct Reply {
     tick: Option<u64>,
     /// The last number on the commander's bell that was looked into, so that no lie is read twice.
     seen: Option<u64>,
+    /// The driver's tick in which that was done.
+    examined_in: u64,
     /// Where a command is read to before it is believed.
     candidate: Command,
     /// From the doorbell to the reply that answers this tick.
@@ -151,8 +153,11 @@ impl Cycle {
         let tick = self.frame.tick;
         let Some(lease) = self.lease.as_ref().filter(|_| !self.is_ending) else { return true };
         let latest = lease.latest_tick();
-        if latest != self.reply.seen {
+        // A bell that named this tick before the tick had come was refused then and may be right now.
+        let has_come = latest == Some(tick) && self.reply.examined_in != tick;
+        if latest != self.reply.seen || has_come {
             self.reply.seen = latest;
+            self.reply.examined_in = tick;
             self.reply.examine(lease, latest, tick, self.frame.device_count, &self.memory);
             if self.reply.tick == Some(tick) {
                 self.reply.round_trip_ns = monotonic_ns().saturating_sub(self.rang_ns).max(1);
@@ -293,7 +298,7 @@ impl Drop for Cycle {
 impl Reply {
     fn none() -> Self {
         let command = Command::zeroed();
-        Self { command, tick: None, seen: None, candidate: command, round_trip_ns: 0 }
+        Self { command, tick: None, seen: None, examined_in: 0, candidate: command, round_trip_ns: 0 }
     }
 
     fn forget(&mut self) {

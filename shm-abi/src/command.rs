@@ -34,7 +34,7 @@ assert_layout!(Command: 288, 8 {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct DeviceCommand {
-    /// The force on the user, in the device's base frame D [N].
+    /// The force on the user, in the device's base frame D (N).
     pub force_on_user_n: [f64; 3],
     /// Room for later minor versions; zero.
     pub reserved: u64,

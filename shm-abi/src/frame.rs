@@ -12,9 +12,9 @@ use bytemuck::{Pod, Zeroable};
 pub struct Frame {
     /// Number of the tick, counted from the driver's start; skipped deadlines are counted too.
     pub tick: u64,
-    /// When the tick was due, CLOCK_MONOTONIC [ns].
+    /// When the tick was due, CLOCK_MONOTONIC (ns).
     pub deadline_ns: u64,
-    /// When the driver had read the devices, CLOCK_MONOTONIC [ns].
+    /// When the driver had read the devices, CLOCK_MONOTONIC (ns).
     pub read_ns: u64,
     /// A [`DriverState`].
     pub state: u64,
@@ -61,9 +61,9 @@ pub struct Outcome {
     pub command_tick: u64,
     /// The share of the commanded force that was let through.
     pub authority: f64,
-    /// From the frame's doorbell to the accepted reply [ns]; 0 where there was none.
+    /// From the frame's doorbell to the accepted reply (ns); 0 where there was none.
     pub round_trip_ns: u64,
-    /// When the motors were written, CLOCK_MONOTONIC [ns].
+    /// When the motors were written, CLOCK_MONOTONIC (ns).
     pub written_ns: u64,
 }
 
@@ -85,15 +85,15 @@ pub struct DeviceFrame {
     pub buttons: u64,
     /// Encoder counts, extended beyond the counter's width: three joints, three gimbal axes.
     pub encoder_counts: [i64; 6],
-    /// Joint angles [rad], in the same order.
+    /// Joint angles (rad), in the same order.
     pub joint_angle_rad: [f64; 6],
-    /// The tip in the base frame D [m].
+    /// The tip in the base frame D (m).
     pub position_m_measured: [f64; 3],
     /// Orientation of the gimbal's last link in D, w x y z; identity where there is no instrumented gimbal.
     pub orientation_wxyz_measured: [f64; 4],
-    /// The force on the user asked for in the tick before, in D [N].
+    /// The force on the user asked for in the tick before, in D (N).
     pub force_on_user_n_commanded: [f64; 3],
-    /// The force on the user that the motors were made to render in the tick before, in D [N].
+    /// The force on the user that the motors were made to render in the tick before, in D (N).
     pub force_on_user_n_applied: [f64; 3],
     /// The motor values written in the tick before, as the hardware got them.
     pub motor_codes: [i64; 3],

@@ -130,9 +130,9 @@ pub struct DriverHeader {
     pub segment_bytes: AtomicU64,
     /// Process id of the driver.
     pub driver_pid: AtomicU64,
-    /// Length of a tick [ns].
+    /// Length of a tick (ns).
     pub period_ns: AtomicU64,
-    /// How long the driver waits for a reply within a tick [ns]; u64::MAX: for ever (lockstep).
+    /// How long the driver waits for a reply within a tick (ns); u64::MAX: for ever (lockstep).
     pub reply_budget_ns: AtomicU64,
     /// How many ticks an old command may still drive the motors.
     pub max_command_age_ticks: AtomicU64,
@@ -253,13 +253,13 @@ pub struct DeviceDescription {
     pub name: [AtomicU64; NAME_WORDS],
     /// UTF-8, padded with zeros: the kind, such as "premium" or "ideal".
     pub kind: [AtomicU64; 2],
-    /// Bits of an f64: the largest force [N]; infinite where there is no limit.
+    /// Bits of an f64: the largest force (N); infinite where there is no limit.
     pub peak_force_n: AtomicU64,
-    /// Bits of an f64: the force it can hold for ever [N].
+    /// Bits of an f64: the force it can hold for ever (N).
     pub continuous_force_n: AtomicU64,
-    /// Bits of f64s: the smallest corner of the workspace in D [m].
+    /// Bits of f64s: the smallest corner of the workspace in D (m).
     pub workspace_min_m: [AtomicU64; 3],
-    /// Bits of f64s: its largest corner [m].
+    /// Bits of f64s: its largest corner (m).
     pub workspace_max_m: [AtomicU64; 3],
     /// Room for later minor versions; zero.
     pub reserved: [AtomicU64; 6],
@@ -281,9 +281,9 @@ assert_layout!(DeviceDescription: 192, 64 {
 pub struct HistogramBlock {
     /// Values recorded.
     pub count: AtomicU64,
-    /// The largest [ns].
+    /// The largest (ns).
     pub max_ns: AtomicU64,
-    /// Their sum [ns].
+    /// Their sum (ns).
     pub sum_ns: AtomicU64,
     /// Fills the cache line.
     pub reserved: [AtomicU64; 5],

@@ -61,9 +61,9 @@ impl ClockMode {
 /// What a driver says of itself once.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DriverInfo {
-    /// Length of a tick [ns].
+    /// Length of a tick (ns).
     pub period_ns: u64,
-    /// How long it waits for a reply [ns]; u64::MAX: for ever.
+    /// How long it waits for a reply (ns); u64::MAX: for ever.
     pub reply_budget_ns: u64,
     /// How many ticks an old command may still drive the motors.
     pub max_command_age_ticks: u64,
@@ -88,13 +88,13 @@ pub struct DeviceInfo {
     pub name: String,
     /// Kind, such as "premium".
     pub kind: String,
-    /// The largest force [N]; infinite: no limit.
+    /// The largest force (N); infinite: no limit.
     pub peak_force_n: f64,
-    /// The force it can hold for ever [N].
+    /// The force it can hold for ever (N).
     pub continuous_force_n: f64,
-    /// Smallest corner of the workspace in the base frame D [m].
+    /// Smallest corner of the workspace in the base frame D (m).
     pub workspace_min_m: [f64; 3],
-    /// Its largest corner [m].
+    /// Its largest corner (m).
     pub workspace_max_m: [f64; 3],
 }
 
@@ -567,5 +567,22 @@ impl<T: Segment> Deref for Mapping<T> {
         // SAFETY: the invariant in this file's head: length, alignment and lifetime are this value's, and a
         // `Segment` is atomic words, valid for every bit pattern under every concurrent change.
         unsafe { &*self.map.as_ptr().cast::<T>() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::MetadataExt;
+
+    #[test]
+    fn every_page_of_a_segment_exists_before_it_is_mapped() {
+        /// What stat(2) counts in, whatever the file system's block is.
+        const STAT_BLOCK: u64 = 512;
+        for bytes in [size_of::<DriverSegment>(), size_of::<CommanderSegment>()] {
+            let meta = File::from(create_memfd(c"test", bytes).unwrap()).metadata().unwrap();
+            assert_eq!(meta.size(), bytes as u64);
+            assert!(meta.blocks() * STAT_BLOCK >= meta.size(), "{} blocks", meta.blocks());
+        }
     }
 }

@@ -8,7 +8,7 @@
 //! [`Torn`], not a data race. The sequence names *which* value stands, so that a reader of a ring also
 //! learns that it was lapped.
 //!
-//! Invariant: if [`read`] returns `Ok`, every word belongs to one [`write`]. Proven over all
+//! Invariant: if [`read`] returns `Ok`, every word belongs to one [`write()`]. Proven over all
 //! interleavings by the loom test, which runs these very functions over loom's atomics.
 //!
 //! Cost: one pass over the words; no loop besides. Retrying is the caller's, and bounded there.

@@ -184,7 +184,7 @@ impl Server {
     }
 
     fn wait(&self, timeout: Duration) -> io::Result<(bool, Vec<usize>)> {
-        let timeout = timespec(timeout);
+        let timeout = timespec(self.next_duty().map_or(timeout, |duty| duty.min(timeout)));
         let accepting = self.accept_after.is_none_or(|after| Instant::now() >= after);
         let mut fds: Vec<PollFd<'_>> = self
             .connections

@@ -68,6 +68,8 @@ int main(int argc, char **argv) {
             read_whole(&driver, tick, &frame);
             answer(&driver, &frame);
         }
+        if (ticks > PHANTOM_RING_FRAMES && phantom_read_frame(driver.segment, 0, &frame) != PHANTOM_READ_OVERWRITTEN)
+            return 3;
         /* Still attached, so that the driver reads the last answer under our lease. */
         while (phantom_is_attached(&driver)) usleep(1000);
     } else {

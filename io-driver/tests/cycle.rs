@@ -1,0 +1,321 @@
+//! The driver's tick, without a clock: a commander in the same process answers, is late, lies or leaves.
+
+use bytemuck::Zeroable;
+use io_driver::cycle::{Cycle, Freshness};
+use io_driver::device::{Device, Reading, TickTime, Written};
+use io_driver::safety::{Ramps, Safety};
+use nalgebra::Vector3;
+use shm_abi::doorbell::WaitMode;
+use shm_abi::segment::{ClockMode, DeviceInfo, DriverInfo};
+use shm_abi::{
+    Command, CommanderMemory, CommanderView, DriverMemory, DriverState, DriverView, FaultReason, Frame, ReplyKind,
+};
+use std::os::fd::AsFd;
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
+
+const PERIOD_NS: u64 = 1_000_000;
+const RAMPS: Ramps = Ramps { in_ticks: 4, out_ticks: 2, max_command_age_ticks: 2 };
+const PEAK_N: f64 = 8.5;
+
+/// What a device is made to do by the test, and what it was made to do by the driver.
+#[derive(Default)]
+struct Log {
+    forces: Vec<Vector3<f64>>,
+    next_reading: Option<Result<Reading, FaultReason>>,
+    fail_write: bool,
+    releases: u32,
+}
+
+struct TestDevice {
+    info: DeviceInfo,
+    log: Arc<Mutex<Log>>,
+}
+
+impl Device for TestDevice {
+    fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    fn read(&mut self, _time: TickTime) -> Result<Reading, FaultReason> {
+        let planned = self.log.lock().unwrap().next_reading.take();
+        planned.unwrap_or(Ok(Reading::at(Vector3::new(0.1, 0.2, 0.3))))
+    }
+
+    fn write(&mut self, force_on_user_n: Vector3<f64>) -> Result<Written, FaultReason> {
+        let mut log = self.log.lock().unwrap();
+        log.forces.push(force_on_user_n);
+        if log.fail_write { Err(FaultReason::DeviceWrite) } else { Ok(Written { force_on_user_n, motor_codes: [0; 3] }) }
+    }
+
+    fn release(&mut self) {
+        self.log.lock().unwrap().releases += 1;
+    }
+}
+
+struct Bench {
+    cycle: Cycle,
+    view: DriverView,
+    log: Arc<Mutex<Log>>,
+    tick: u64,
+}
+
+impl Bench {
+    fn new(freshness: u64) -> Self {
+        let info = DeviceInfo {
+            name: "d".into(),
+            kind: "test".into(),
+            peak_force_n: PEAK_N,
+            continuous_force_n: PEAK_N,
+            workspace_min_m: [-1.0; 3],
+            workspace_max_m: [1.0; 3],
+        };
+        let memory = DriverMemory::create(&DriverInfo {
+            period_ns: PERIOD_NS,
+            reply_budget_ns: u64::MAX,
+            max_command_age_ticks: RAMPS.max_command_age_ticks,
+            ramp_in_ticks: RAMPS.in_ticks,
+            ramp_out_ticks: RAMPS.out_ticks,
+            clock_mode: ClockMode::Virtual,
+            wait_mode: WaitMode::Spin,
+            cpu: None,
+            devices: vec![info.clone()],
+        })
+        .unwrap();
+        let view = DriverView::map(memory.fd()).unwrap();
+        let log = Arc::new(Mutex::new(Log::default()));
+        let device = TestDevice { info, log: Arc::clone(&log) };
+        let safety = Safety::new(RAMPS);
+        let cycle = Cycle::new(Arc::new(memory), vec![Box::new(device)], safety, PERIOD_NS, Freshness(freshness));
+        Self { cycle, view, log, tick: 0 }
+    }
+
+    fn lease(&mut self, number: u64) -> CommanderMemory {
+        let (view, fd) = CommanderView::create(number).unwrap();
+        assert!(self.cycle.grant(view).is_none());
+        CommanderMemory::map(fd.as_fd()).unwrap()
+    }
+
+    /// One tick; `answer` gets the frame and may publish. Returns the frame and the force written.
+    fn tick(&mut self, answer: impl FnOnce(&Frame, &DriverView)) -> (Frame, Vector3<f64>) {
+        self.tick += 1;
+        self.cycle.change_lease();
+        self.cycle.sense(self.tick, self.tick * PERIOD_NS);
+        let mut frame = Frame::zeroed();
+        self.view.read_frame(self.tick, &mut frame).unwrap();
+        answer(&frame, &self.view);
+        self.cycle.take_reply();
+        self.cycle.actuate();
+        (frame, *self.log.lock().unwrap().forces.last().unwrap())
+    }
+
+    fn silent_tick(&mut self) -> (Frame, Vector3<f64>) {
+        self.tick(|_, _| {})
+    }
+
+    /// Answers until the force is let through in full.
+    fn ramp_in(&mut self, commander: &CommanderMemory, force: [f64; 3]) {
+        while self.tick(|frame, view| publish(commander, view, frame.tick, force)).0.authority < 1.0 {}
+    }
+
+    fn counter(&self, pick: impl Fn(&shm_abi::layout::Counters) -> &std::sync::atomic::AtomicU64) -> u64 {
+        pick(&self.view.counters).load(Ordering::Relaxed)
+    }
+}
+
+fn command(commander: &CommanderMemory, tick: u64, force: [f64; 3]) -> Command {
+    let mut command = Command::zero(tick, commander.lease(), 1);
+    command.devices[0].force_on_user_n = force;
+    command
+}
+
+fn publish(commander: &CommanderMemory, view: &DriverView, tick: u64, force: [f64; 3]) {
+    commander.publish(&command(commander, tick, force), view);
+}
+
+const UP: [f64; 3] = [0.0, 2.0, 0.0];
+
+#[test]
+fn a_reply_drives_the_motors_of_the_same_tick() {
+    let mut bench = Bench::new(0);
+    let commander = bench.lease(1);
+    bench.ramp_in(&commander, UP);
+    let (_, force) = bench.tick(|frame, view| publish(&commander, view, frame.tick, [0.5, 0.0, 0.0]));
+    assert_eq!(force, Vector3::new(0.5, 0.0, 0.0));
+    let (frame, _) = bench.silent_tick();
+    assert_eq!(frame.previous.reply, ReplyKind::Fresh as u64);
+    assert_eq!(frame.previous.command_tick, frame.tick - 1);
+    assert_eq!(frame.devices[0].force_on_user_n_applied, [0.5, 0.0, 0.0]);
+    assert_eq!(frame.devices[0].position_m_measured, [0.1, 0.2, 0.3]);
+}
+
+#[test]
+fn in_next_tick_mode_the_reply_to_the_former_tick_is_fresh() {
+    let mut bench = Bench::new(1);
+    let commander = bench.lease(1);
+    bench.ramp_in(&commander, UP);
+    let mut former = bench.tick;
+    for _ in 0..20 {
+        let (frame, force) = bench.tick(|frame, view| publish(&commander, view, frame.tick - 1, UP));
+        assert_eq!(force, Vector3::from(UP));
+        assert_eq!(frame.tick, former + 1);
+        former = frame.tick;
+    }
+    assert_eq!(bench.counter(|c| &c.replies_missed), 0);
+}
+
+#[test]
+fn without_replies_the_force_is_held_then_ramps_to_zero_and_stays_there() {
+    let mut bench = Bench::new(0);
+    let commander = bench.lease(1);
+    bench.ramp_in(&commander, UP);
+    let share: Vec<f64> = (0..8).map(|_| bench.silent_tick().1.y / UP[1]).collect();
+    // Two ticks of age are allowed, then two ticks of ramp.
+    assert_eq!(share, [1.0, 1.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    assert_eq!(bench.counter(|c| &c.replies_missed), 8);
+    // A fresh reply brings it back, from zero.
+    let back: Vec<f64> = (0..6)
+        .map(|_| bench.tick(|frame, view| publish(&commander, view, frame.tick, UP)).1.y / UP[1])
+        .collect();
+    assert_eq!(back, [0.0, 0.25, 0.5, 0.75, 1.0, 1.0]);
+}
+
+#[test]
+fn a_late_reply_is_better_than_an_older_one() {
+    let mut bench = Bench::new(0);
+    let commander = bench.lease(1);
+    bench.ramp_in(&commander, UP);
+    let (late, _) = bench.silent_tick();
+    let (_, force) = bench.tick(|_, view| publish(&commander, view, late.tick, [1.0, 0.0, 0.0]));
+    assert_eq!(force, Vector3::new(1.0, 0.0, 0.0), "one tick old, and held");
+}
+
+#[test]
+fn when_a_lease_ends_its_force_ramps_out_before_the_next_lease_begins() {
+    let mut bench = Bench::new(0);
+    let first = bench.lease(1);
+    bench.ramp_in(&first, UP);
+    bench.cycle.end_lease(1);
+    let second = bench.lease(2);
+    let answer = |frame: &Frame, view: &DriverView| {
+        publish(&first, view, frame.tick, [7.0, 0.0, 0.0]);
+        publish(&second, view, frame.tick, [0.0, 0.0, 3.0]);
+    };
+    let (frame, force) = bench.tick(answer);
+    assert_eq!((frame.lease, force), (0, Vector3::new(0.0, 1.0, 0.0)), "half of the first lease's last force");
+    let (frame, force) = bench.tick(answer);
+    assert_eq!((frame.lease, force), (0, Vector3::zeros()));
+    let forces: Vec<f64> = (0..5).map(|_| bench.tick(answer).1.z / 3.0).collect();
+    assert_eq!(forces, [0.0, 0.25, 0.5, 0.75, 1.0], "the second lease ramps in; the first is not heard any more");
+    assert_eq!(bench.silent_tick().0.lease, 2);
+}
+
+#[test]
+fn a_lease_that_ends_before_it_began_is_forgotten() {
+    let mut bench = Bench::new(0);
+    let first = bench.lease(1);
+    bench.ramp_in(&first, UP);
+    let _second = bench.lease(2);
+    assert!(bench.cycle.end_lease(2).is_some(), "handed back for dropping");
+    assert_eq!(bench.silent_tick().0.lease, 1);
+    assert_eq!(bench.cycle.lease().map(CommanderView::lease), Some(1));
+}
+
+#[test]
+fn what_is_not_believed_is_counted_and_has_no_effect() {
+    let mut bench = Bench::new(0);
+    let commander = bench.lease(3);
+    bench.ramp_in(&commander, UP);
+    let mut lie = |change: fn(&mut Command)| {
+        bench.ramp_in(&commander, UP);
+        let refused = bench.counter(|c| &c.commands_refused);
+        let (_, force) = bench.tick(|frame, view| {
+            let mut wrong = command(&commander, frame.tick, [5.0, 0.0, 0.0]);
+            change(&mut wrong);
+            commander.publish(&wrong, view);
+        });
+        assert_eq!(force, Vector3::from(UP), "the last good command is held");
+        assert_eq!(bench.counter(|c| &c.commands_refused), refused + 1);
+    };
+    lie(|c| c.devices[0].force_on_user_n[2] = f64::NAN);
+    lie(|c| c.devices[0].force_on_user_n[0] = f64::INFINITY);
+    lie(|c| c.lease = 2);
+    lie(|c| c.device_count = 2);
+    lie(|c| c.tick += 1);
+    lie(|c| c.tick = u64::MAX - 1);
+}
+
+#[test]
+fn an_answer_given_too_early_does_not_hide_the_right_one() {
+    let mut bench = Bench::new(0);
+    let commander = bench.lease(1);
+    bench.ramp_in(&commander, UP);
+    bench.tick(|frame, view| publish(&commander, view, frame.tick + 1, UP));
+    let (_, force) = bench.tick(|frame, view| publish(&commander, view, frame.tick, [1.0, 0.0, 0.0]));
+    assert_eq!(force, Vector3::new(1.0, 0.0, 0.0));
+}
+
+#[test]
+fn a_force_above_the_peak_is_cut_to_it_in_its_direction() {
+    let mut bench = Bench::new(0);
+    let commander = bench.lease(1);
+    bench.ramp_in(&commander, [f64::MAX, 0.0, -f64::MAX]);
+    let (_, force) = bench.tick(|frame, view| publish(&commander, view, frame.tick, [30.0, 0.0, -40.0]));
+    // Two roundings on the way.
+    assert!((force - Vector3::new(0.6, 0.0, -0.8) * PEAK_N).norm() < 1e-14 * PEAK_N);
+    assert!(bench.counter(|c| &c.forces_limited) > 0);
+}
+
+#[test]
+fn a_device_that_cannot_be_read_or_written_means_zero_force_until_somebody_clears_it() {
+    let causes: [(fn(&mut Log), FaultReason); 3] = [
+        (|log| log.next_reading = Some(Err(FaultReason::DeviceRead)), FaultReason::DeviceRead),
+        (
+            |log| log.next_reading = Some(Ok(Reading::at(Vector3::new(f64::NAN, 0.0, 0.0)))),
+            FaultReason::PositionNotFinite,
+        ),
+        (|log| log.fail_write = true, FaultReason::DeviceWrite),
+    ];
+    for (cause, reason) in causes {
+        let mut bench = Bench::new(0);
+        let commander = bench.lease(1);
+        bench.ramp_in(&commander, UP);
+        cause(&mut bench.log.lock().unwrap());
+        bench.tick(|frame, view| publish(&commander, view, frame.tick, UP));
+        bench.log.lock().unwrap().fail_write = false;
+        for _ in 0..10 {
+            let (frame, force) = bench.tick(|frame, view| publish(&commander, view, frame.tick, UP));
+            assert_eq!(frame.state, DriverState::Fault as u64);
+            assert_eq!(frame.fault, reason as u64);
+            assert_eq!(force, Vector3::zeros());
+        }
+        assert!(bench.log.lock().unwrap().releases > 0, "the motors were switched off as well");
+        assert_eq!(bench.counter(|c| &c.faults), 1);
+        bench.cycle.clear_fault();
+        bench.ramp_in(&commander, UP);
+        let (frame, force) = bench.tick(|frame, view| publish(&commander, view, frame.tick, UP));
+        assert_eq!((frame.state, force), (DriverState::Active as u64, Vector3::from(UP)));
+    }
+}
+
+#[test]
+fn until_the_position_is_valid_the_driver_is_zeroing_and_renders_nothing() {
+    let mut bench = Bench::new(0);
+    let commander = bench.lease(1);
+    for _ in 0..10 {
+        let unknown = Reading { is_valid: false, ..Reading::at(Vector3::zeros()) };
+        bench.log.lock().unwrap().next_reading = Some(Ok(unknown));
+        let (frame, force) = bench.tick(|frame, view| publish(&commander, view, frame.tick, UP));
+        assert_eq!((frame.state, frame.devices[0].flags), (DriverState::Zeroing as u64, 0));
+        assert_eq!(force, Vector3::zeros());
+    }
+    bench.ramp_in(&commander, UP);
+}
+
+#[test]
+fn dropping_the_cycle_switches_the_motors_off() {
+    let bench = Bench::new(0);
+    let log = Arc::clone(&bench.log);
+    drop(bench);
+    assert!(log.lock().unwrap().releases > 0);
+}
