@@ -10,9 +10,11 @@ use crate::rig::Rig;
 use crate::run::{self, Attach, RunPlan};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use io_driver::config::period_of;
+use io_driver::say::say;
 use rt_core::signals::StopSignals;
 use shm_abi::endpoint;
 use shm_abi::segment::ClockMode;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
@@ -64,22 +66,22 @@ struct RunArgs {
     #[arg(long, value_name = "CSV")]
     record: Option<PathBuf>,
     /// How long; default: as long as the hand file, at least 1 s
-    #[arg(long, value_name = "S", value_parser = parse_seconds)]
+    #[arg(long, value_name = "S", value_parser = parse_seconds, allow_negative_numbers = true)]
     seconds: Option<f64>,
     /// Ticks per second [default: 1000]
-    #[arg(long, value_name = "HZ", value_parser = parse_rate)]
+    #[arg(long, value_name = "HZ", value_parser = parse_rate, allow_negative_numbers = true)]
     rate_hz: Option<f64>,
     /// Seed of everything random; nothing is, in this version
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse_seed, allow_negative_numbers = true)]
     seed: u64,
     /// Where the devices stand in the world (TOML)
     #[arg(long, value_name = "FILE")]
     layout: Option<PathBuf>,
-    /// Use the devices of a driver that runs already, at this socket or the usual place
+    /// Use the devices of a driver that runs already, at this socket or the usual place; goes after the scene
     #[arg(long, value_name = "SOCKET", num_args = 0..=1, default_missing_value = "", conflicts_with_all = ["hand", "rate_hz"])]
     attach: Option<PathBuf>,
     /// With --attach: how long to wait for the driver's return, should it end
-    #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = parse_grace)]
+    #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = parse_grace, allow_negative_numbers = true)]
     grace: f64,
 }
 
@@ -129,7 +131,7 @@ fn run_demo() -> Result<(Report, Stop), RunFailure> {
 fn run_scene(args: &RunArgs) -> Result<(Report, Stop), RunFailure> {
     let signals = install_signals()?;
     let rig = make_rig(args)?;
-    run::run(&rig, &make_plan(args)?, &signals)
+    run::run(&rig, &make_plan(args, &rig)?, &signals)
 }
 
 fn install_signals() -> Result<StopSignals, RunFailure> {
@@ -152,11 +154,11 @@ fn make_rig(args: &RunArgs) -> Result<Rig, RunFailure> {
         .map_err(|error| wrong(&error))
 }
 
-fn make_plan(args: &RunArgs) -> Result<RunPlan, RunFailure> {
+fn make_plan(args: &RunArgs, rig: &Rig) -> Result<RunPlan, RunFailure> {
     if args.attach.is_some() && args.clock == Clock::Virtual {
         return Err(RunFailure::Start("--attach and --clock virtual exclude each other: a driver that runs has its own clock".into()));
     }
-    refuse_to_overwrite_input(args)?;
+    refuse_to_overwrite_input(args, rig)?;
     let attach = args.attach.as_ref().map(|socket| Attach {
         socket: if socket.as_os_str().is_empty() { endpoint::for_application() } else { socket.clone() },
         grace: Duration::from_secs_f64(args.grace),
@@ -164,13 +166,12 @@ fn make_plan(args: &RunArgs) -> Result<RunPlan, RunFailure> {
     Ok(RunPlan { clock: args.clock.into(), seconds: args.seconds, record: args.record.clone(), attach })
 }
 
-fn refuse_to_overwrite_input(args: &RunArgs) -> Result<(), RunFailure> {
+fn refuse_to_overwrite_input(args: &RunArgs, rig: &Rig) -> Result<(), RunFailure> {
     let Some(record) = &args.record else { return Ok(()) };
-    let same = |other: &Path| {
-        matches!((record.canonicalize(), other.canonicalize()), (Ok(a), Ok(b)) if a == b)
-    };
-    let inputs = [Some(&args.scene), args.hand.as_ref(), args.layout.as_ref()];
-    match inputs.into_iter().flatten().find(|input| same(input)) {
+    // The hand that counts may be the one that the scene names.
+    let hand = rig.hand.as_ref().map(|hand| &hand.path);
+    let inputs = [Some(&args.scene), args.hand.as_ref(), hand, args.layout.as_ref()];
+    match inputs.into_iter().flatten().find(|input| is_same_file(record, input)) {
         Some(input) => Err(RunFailure::Start(format!(
             "--record {} would overwrite the input {}; name another file",
             record.display(),
@@ -180,6 +181,12 @@ fn refuse_to_overwrite_input(args: &RunArgs) -> Result<(), RunFailure> {
     }
 }
 
+/// By inode: links of both kinds lead to the same bytes.
+fn is_same_file(a: &Path, b: &Path) -> bool {
+    let identity = |path: &Path| path.metadata().map(|file| (file.dev(), file.ino()));
+    matches!((identity(a), identity(b)), (Ok(a), Ok(b)) if a == b)
+}
+
 fn conclude(result: Result<(Report, Stop), RunFailure>) -> ExitCode {
     match result {
         Ok((report, stop)) => {
@@ -187,13 +194,13 @@ fn conclude(result: Result<(Report, Stop), RunFailure>) -> ExitCode {
             match stop {
                 Stop::Finished => ExitCode::SUCCESS,
                 Stop::Signal(signal) => {
-                    eprintln!("phantom3: ended by signal {signal} before its time");
+                    say(format_args!("phantom3: ended by signal {signal} before its time"));
                     ExitCode::from(128u8.saturating_add(u8::try_from(signal).unwrap_or(0)))
                 }
             }
         }
         Err(failure) => {
-            eprintln!("phantom3: {failure}");
+            say(format_args!("phantom3: {failure}"));
             ExitCode::from(failure.exit_status())
         }
     }
@@ -215,6 +222,10 @@ fn parse_rate(text: &str) -> Result<f64, String> {
 
 fn parse_grace(text: &str) -> Result<f64, String> {
     parse_number(text, "seconds", 0.0, 3600.0)
+}
+
+fn parse_seed(text: &str) -> Result<u64, String> {
+    text.parse().map_err(|_| format!("found {text}, allowed: a whole number from 0 to {}", u64::MAX))
 }
 
 fn parse_number(text: &str, unit: &str, min: f64, max: f64) -> Result<f64, String> {

@@ -3,6 +3,7 @@
 use crate::outcome::RunFailure;
 use crate::rig::{Rig, RigError};
 use crate::run::{Attach, RunPlan};
+use io_driver::say::say;
 use shm_abi::client::{self, AttachError};
 use shm_abi::endpoint;
 use shm_abi::segment::ClockMode;
@@ -49,19 +50,19 @@ pub fn plan() -> RunPlan {
     let socket = endpoint::for_application();
     let attach = match client::observe(&socket, "phantom3 looks around") {
         Ok(seen) if seen.driver.read_latest().is_some_and(|frame| frame.lease != 0) => {
-            eprintln!("phantom3: the driver at {} is commanded by somebody else; starting one of our own", socket.display());
+            say(format_args!("phantom3: the driver at {} is commanded by somebody else; starting one of our own", socket.display()));
             None
         }
         Ok(_) => {
-            eprintln!("phantom3: using the driver at {}; its devices are the fingers", socket.display());
+            say(format_args!("phantom3: using the driver at {}; its devices are the fingers", socket.display()));
             Some(Attach { socket, grace: Duration::from_secs(2) })
         }
         Err(AttachError::NoDriver { .. } | AttachError::DriverGone { .. }) => {
-            eprintln!("phantom3: no driver is running; starting one of our own with ideal devices");
+            say(format_args!("phantom3: no driver is running; starting one of our own with ideal devices"));
             None
         }
         Err(error) => {
-            eprintln!("phantom3: {error}; starting a driver of our own");
+            say(format_args!("phantom3: {error}; starting a driver of our own"));
             None
         }
     };

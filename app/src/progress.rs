@@ -50,7 +50,7 @@ impl Progress {
     /// Ends the line, so that what follows begins on one of its own.
     pub fn end(&mut self) {
         if std::mem::take(&mut self.is_open) {
-            eprintln!();
+            let _ = writeln!(std::io::stderr());
         }
     }
 }

@@ -23,7 +23,7 @@ const CHUNK_BYTES: usize = 256 * 1024;
 #[derive(Debug, Error)]
 pub enum RecordingError {
     /// The file cannot be made.
-    #[error("cannot create the recording {file}: {source}")]
+    #[error("cannot create the recording {file}: {source}; name a file in a directory that exists and can be written")]
     Create {
         /// Which.
         file: PathBuf,

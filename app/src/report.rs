@@ -97,8 +97,10 @@ impl fmt::Display for Report {
         }
         writeln!(f, "peak force   {:.3} N computed, {:.3} N rendered", tally.peak_force_n, tally.peak_applied_n)?;
         if let Some((driver, fast)) = &self.guarantees {
-            writeln!(f, "guarantees of the driver's loop")?;
-            writeln!(f, "{}", driver.trim_end())?;
+            if !driver.trim().is_empty() {
+                writeln!(f, "guarantees of the driver's loop")?;
+                writeln!(f, "{}", driver.trim_end())?;
+            }
             writeln!(f, "guarantees of the fast thread")?;
             writeln!(f, "{}", fast.to_string().trim_end())?;
         }

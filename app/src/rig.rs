@@ -22,13 +22,26 @@ pub enum RigError {
     /// The hand file.
     #[error(transparent)]
     Hand(#[from] HandError),
-    /// A file cannot be read.
-    #[error("cannot read the hand file {file}: {source}")]
+    /// The hand file cannot be read.
+    #[error("cannot read the hand file {file}, named by {named_by}: {source}; name a CSV file that can be read")]
     Unreadable {
         /// Which.
         file: PathBuf,
+        /// Who asks for it.
+        named_by: String,
         /// What the system said.
         source: io::Error,
+    },
+    /// The hand file is a pipe, a directory or a device.
+    #[error(
+        "the hand file {file}, named by {named_by}, is not a regular file; \
+         allowed: a file, since every device reads it from its beginning"
+    )]
+    NotAFile {
+        /// Which.
+        file: PathBuf,
+        /// Who asks for it.
+        named_by: String,
     },
     /// The scene holds something that rendering refuses.
     #[error("{file}: {what}: {source}")]
@@ -86,7 +99,12 @@ impl Rig {
         hand: Option<&Path>,
         period_ns: u64,
     ) -> Result<Self, RigError> {
-        let hand = hand.or(scene.hand.as_deref()).map(|path| check_hand(path, &scene)).transpose()?;
+        let named = match (hand, &scene.hand) {
+            (Some(path), _) => Some((path, "--hand".to_owned())),
+            (None, Some(path)) => Some((path.as_path(), scene_file.display().to_string())),
+            (None, None) => None,
+        };
+        let hand = named.map(|(path, named_by)| check_hand(path, &named_by, &scene)).transpose()?;
         let rig = Self { scene_file: scene_file.into(), scene, layout, hand, period_ns };
         rig.fast_step()?;
         Ok(rig)
@@ -160,7 +178,8 @@ impl Rig {
             self.hand.as_ref().map(|hand| (hand.path.clone(), finger.name.clone()))
         });
         DeviceConfig {
-            name: finger.map_or_else(|| format!("unused{index}"), |finger| finger.name.clone()),
+            // No finger can be called so: brackets are not allowed in a name.
+            name: finger.map_or_else(|| format!("(unused {index})"), |finger| finger.name.clone()),
             backend: Backend::Ideal {
                 hand,
                 start_m: finger.map_or_else(nalgebra::Vector3::zeros, |finger| finger.start_m.coords),
@@ -204,8 +223,11 @@ impl Rig {
 }
 
 /// Reads the hand file as the driver will, so that its mistakes are told here, by this process.
-fn check_hand(path: &Path, scene: &Scene) -> Result<HandFile, RigError> {
-    let unreadable = |source| RigError::Unreadable { file: path.into(), source };
+fn check_hand(path: &Path, named_by: &str, scene: &Scene) -> Result<HandFile, RigError> {
+    let unreadable = |source| RigError::Unreadable { file: path.into(), named_by: named_by.into(), source };
+    if !path.metadata().map_err(unreadable)?.is_file() {
+        return Err(RigError::NotAFile { file: path.into(), named_by: named_by.into() });
+    }
     let text = std::fs::read_to_string(path).map_err(unreadable)?;
     let fingers: Vec<&str> = scene.fingers.iter().map(|finger| finger.name.as_str()).collect();
     let script = HandScript::parse(&text, path, &fingers)?;

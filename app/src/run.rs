@@ -61,6 +61,12 @@ impl Parts {
     fn new(rig: &Rig, plan: &RunPlan, period_ns: u64) -> Result<Self, RunFailure> {
         let seconds = plan.seconds.unwrap_or_else(|| rig.default_seconds());
         let total_ticks = (seconds * 1e9 / period_ns as f64).round() as u64;
+        if total_ticks == 0 {
+            return Err(RunFailure::Start(format!(
+                "--seconds {seconds} is less than half a tick; allowed: at least one tick, {} s",
+                period_ns as f64 / 1e9
+            )));
+        }
         let when_full = if plan.clock == ClockMode::Real { WhenFull::Drop } else { WhenFull::Wait };
         let step = rig.fast_step().map_err(|error| RunFailure::Start(error.to_string()))?;
         let (producer, consumer) = RingBuffer::new(ROW_QUEUE);
@@ -99,7 +105,6 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
     let info = attachment.driver.info();
     check_devices(rig, &info)?;
     let driver_name = describe(&source, attachment.driver_pid, &info);
-    let driver_guarantees = String::new();
     let baseline = Baseline::of(&attachment.driver);
     let step_rig = Rig { period_ns: info.period_ns, ..rig.clone() };
     let Parts { fast, mut slow, mut progress } = Parts::new(&step_rig, plan, info.period_ns)?;
@@ -114,7 +119,7 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
         tally: end.tally,
         counters: baseline.counters(&end.driver),
         timing: is_real.then(|| baseline.timing(&end.driver, &end.step_ns)),
-        guarantees: is_real.then_some((driver_guarantees, end.fast_report)),
+        guarantees: is_real.then_some((info.setup_report, end.fast_report)),
         recording: plan.record.clone().zip(rows),
     };
     Ok((report, end.stop))
@@ -134,10 +139,23 @@ fn connect(rig: &Rig, plan: &RunPlan) -> Result<(Source, client::Attachment), Ru
             Ok((Source::Running { socket: socket.clone(), grace: *grace }, attachment))
         }
         None => {
+            refuse_unwritable_name(rig)?;
             let mut child = DriverChild::start(&rig.driver_config(plan.clock))?;
             let attachment = child.attach("phantom3")?;
             Ok((Source::Child(child), attachment))
         }
+    }
+}
+
+/// The child's configuration is TOML, which is UTF-8.
+fn refuse_unwritable_name(rig: &Rig) -> Result<(), RunFailure> {
+    match &rig.hand {
+        Some(hand) if hand.path.to_str().is_none() => Err(RunFailure::Start(format!(
+            "the path of the hand file {} is not UTF-8, and the driver's configuration cannot hold it; \
+             rename it, or use --clock virtual",
+            hand.path.display()
+        ))),
+        _ => Ok(()),
     }
 }
 

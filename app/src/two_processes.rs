@@ -10,6 +10,7 @@ use crate::fast_thread::{self, FastEnd, FastRemains, FastShared};
 use crate::outcome::{RunFailure, Stop};
 use crate::progress::Progress;
 use crate::slow::SlowSide;
+use io_driver::say::say;
 use rt_core::histogram::Histogram;
 use rt_core::setup::SetupReport;
 use rt_core::signals::StopSignals;
@@ -148,12 +149,12 @@ fn reattach(source: &mut Source, words: &str, signals: &StopSignals) -> Result<A
         }
         Source::Running { socket, grace } => (socket, *grace),
     };
-    eprintln!("phantom3: the driver is gone: {words}; waiting up to {grace:?} for its return");
+    say(format_args!("phantom3: the driver is gone: {words}; waiting up to {grace:?} for its return"));
     let begun = Instant::now();
     loop {
         match client::command(socket, "phantom3") {
             Ok(attachment) => {
-                eprintln!("phantom3: the driver is back (process {}); the run goes on", attachment.driver_pid);
+                say(format_args!("phantom3: the driver is back (process {}); the run goes on", attachment.driver_pid));
                 return Ok(attachment);
             }
             Err(error) if begun.elapsed() > grace || signals.requested().is_some() => {

@@ -4,6 +4,7 @@
 
 use crate::config::DriverConfig;
 use crate::driver::{self, RunOptions};
+use crate::say::say;
 use crate::status::Status;
 use clap::{Args, Parser, Subcommand};
 use shm_abi::client::{self, AttachError};
@@ -122,7 +123,8 @@ fn run(args: RunArgs) -> ExitCode {
 fn stop(socket: &Path) -> Result<(), AttachError> {
     // The lease need not be ours, nor free: whoever may open the socket may stop the motors.
     let pid = client::stop(socket, "io-driver")?;
-    println!("driver (process {pid}) stops");
+    // It stops, whether or not somebody reads that.
+    let _ = print_line(&format!("driver (process {pid}) stops"));
     Ok(())
 }
 
@@ -141,7 +143,8 @@ fn status(args: &StatusArgs) -> Result<(), AttachError> {
         }
         if !attachment.connection.is_open() {
             let words = rt_core::epitaph::read(&attachment.driver.epitaph);
-            println!("the driver has ended{}", words.map_or_else(String::new, |words| format!(": {words}")));
+            let words = words.map_or_else(String::new, |words| format!(": {words}"));
+            let _ = print_line(&format!("the driver has ended{words}"));
             return Ok(());
         }
         std::thread::sleep(Duration::from_secs(1));
@@ -163,6 +166,6 @@ fn report(result: Result<(), AttachError>) -> ExitCode {
 }
 
 fn fail(error: &dyn std::error::Error, code: u8) -> ExitCode {
-    eprintln!("io-driver: {error}");
+    say(format_args!("io-driver: {error}"));
     ExitCode::from(code)
 }

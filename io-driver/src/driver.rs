@@ -12,6 +12,7 @@ use crate::meter::bump;
 use crate::open::{OpenError, open_devices};
 use crate::real_loop::{Ended, RealLoop, Shared};
 use crate::safety::{Ramps, Safety};
+use crate::say;
 use rt_core::epitaph::{EpitaphKind, EpitaphRef, install_fatal_handlers, install_panic_hook};
 use rt_core::log::{LogLevel, LogLine, RtLogDrain};
 use rt_core::setup::{SetupGuards, SetupReport, SetupRequest};
@@ -105,7 +106,8 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
     let (report, starter) = spawn_loop(config, &shared)?;
     tell_guarantees(&report, options)?;
     let wait_mode = choose_wait_mode(config, &report);
-    let memory = Arc::new(DriverMemory::create(&describe(config, &devices, wait_mode))?);
+    let info = DriverInfo { setup_report: report.to_string(), ..describe(config, &devices, wait_mode) };
+    let memory = Arc::new(DriverMemory::create(&info)?);
     install_last_words(&memory)?;
     let path = options.socket.clone().or_else(|| config.socket.clone());
     let server = Server::bind(&path.unwrap_or_else(shm_abi::endpoint::for_driver))?;
@@ -133,7 +135,7 @@ pub fn make_cycle(config: &DriverConfig, memory: Arc<DriverMemory>, devices: Vec
     Cycle::new(memory, devices, safety, config.period_ns, freshness)
 }
 
-/// What the header of the driver's segment says.
+/// What the header of the driver's segment says, but for the set-up report.
 pub fn describe(config: &DriverConfig, devices: &[Box<dyn Device>], wait_mode: WaitMode) -> DriverInfo {
     DriverInfo {
         period_ns: config.period_ns,
@@ -148,6 +150,7 @@ pub fn describe(config: &DriverConfig, devices: &[Box<dyn Device>], wait_mode: W
         wait_mode,
         cpu: loop_cpu(config),
         devices: devices.iter().map(|device| device.info().clone()).collect(),
+        setup_report: String::new(),
     }
 }
 
@@ -250,7 +253,7 @@ fn install_last_words(memory: &Arc<DriverMemory>) -> Result<(), RunError> {
 
 fn say(options: &RunOptions, message: std::fmt::Arguments<'_>) {
     if !options.quiet {
-        eprintln!("io-driver: {message}");
+        say::say(format_args!("io-driver: {message}"));
     }
 }
 
@@ -313,7 +316,7 @@ impl Service<'_> {
             }
             ServerEvent::LeaseRefused => bump(&self.memory.counters.leases_refused),
             ServerEvent::ClearFaultRequested => self.post(Letter::ClearFault),
-            ServerEvent::Trouble { message } => eprintln!("io-driver: {message}"),
+            ServerEvent::Trouble { message } => say::say(format_args!("io-driver: {message}")),
             ServerEvent::StopRequested { pid } => return Some(format!("request of process {pid}")),
         }
         None
@@ -336,7 +339,7 @@ impl Service<'_> {
         let quiet = self.options.quiet;
         self.drain.drain(|line: LogLine| {
             if !quiet || line.level > LogLevel::Info {
-                eprintln!("io-driver: tick {}: {}", line.tick, line.text);
+                say::say(format_args!("io-driver: tick {}: {}", line.tick, line.text));
             }
         });
         self.memory.counters.log_dropped.store(self.drain.lost(), Ordering::Relaxed);

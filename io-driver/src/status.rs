@@ -43,6 +43,8 @@ pub struct Status {
     pub round_trip_ns: Percentiles,
     /// The devices.
     pub devices: Vec<DeviceStatus>,
+    /// Which real-time guarantees its loop obtained, a line each.
+    pub guarantees: Vec<String>,
     /// Last words, if it has died.
     pub epitaph: Option<String>,
 }
@@ -130,6 +132,7 @@ impl Status {
             cycle_ns: Percentiles::of(&meter::read(&driver.cycle_ns)),
             round_trip_ns: Percentiles::of(&meter::read(&driver.round_trip_ns)),
             devices: devices(&info, frame.as_ref()),
+            guarantees: info.setup_report.lines().map(|line| line.trim().to_owned()).collect(),
             epitaph: rt_core::epitaph::read(&driver.epitaph).map(|words| words.to_string()),
         }
     }
@@ -251,6 +254,9 @@ impl fmt::Display for Status {
         for device in &self.devices {
             let valid = if device.position_valid { "" } else { " (position not valid)" };
             write!(f, "\ndevice      {} [{}]{valid}", device.short(), device.kind)?;
+        }
+        for line in &self.guarantees {
+            write!(f, "\nguarantee   {line}")?;
         }
         if let Some(words) = &self.epitaph {
             write!(f, "\nlast words  {words}")?;

@@ -80,6 +80,7 @@ impl Bench {
             wait_mode: WaitMode::Spin,
             cpu: None,
             devices: vec![info.clone()],
+            setup_report: String::new(),
         })
         .unwrap();
         let view = DriverView::map(memory.fd()).unwrap();

@@ -54,6 +54,9 @@
 // Words of the epitaph.
 #define PHANTOM_EPITAPH_WORDS 32
 
+// Words of the set-up report.
+#define PhantomREPORT_WORDS 512
+
 // Bytes of a device's or client's name, padded with zeros.
 #define PHANTOM_NAME_BYTES 64
 
@@ -244,9 +247,9 @@ typedef struct PHANTOM_ALIGNED(64) PhantomDriverHeader {
   uint64_t segment_bytes;
   // Process id of the driver.
   uint64_t driver_pid;
-  // Length of a tick [ns].
+  // Length of a tick (ns).
   uint64_t period_ns;
-  // How long the driver waits for a reply within a tick [ns]; u64::MAX: for ever (lockstep).
+  // How long the driver waits for a reply within a tick (ns); u64::MAX: for ever (lockstep).
   uint64_t reply_budget_ns;
   // How many ticks an old command may still drive the motors.
   uint64_t max_command_age_ticks;
@@ -318,13 +321,13 @@ typedef struct PHANTOM_ALIGNED(64) PhantomDeviceDescription {
   uint64_t name[PHANTOM_NAME_WORDS];
   // UTF-8, padded with zeros: the kind, such as "premium" or "ideal".
   uint64_t kind[2];
-  // Bits of an f64: the largest force [N]; infinite where there is no limit.
+  // Bits of an f64: the largest force (N); infinite where there is no limit.
   uint64_t peak_force_n;
-  // Bits of an f64: the force it can hold for ever [N].
+  // Bits of an f64: the force it can hold for ever (N).
   uint64_t continuous_force_n;
-  // Bits of f64s: the smallest corner of the workspace in D [m].
+  // Bits of f64s: the smallest corner of the workspace in D (m).
   uint64_t workspace_min_m[3];
-  // Bits of f64s: its largest corner [m].
+  // Bits of f64s: its largest corner (m).
   uint64_t workspace_max_m[3];
   // Room for later minor versions; zero.
   uint64_t reserved[6];
@@ -334,9 +337,9 @@ typedef struct PHANTOM_ALIGNED(64) PhantomDeviceDescription {
 typedef struct PHANTOM_ALIGNED(64) PhantomHistogramBlock {
   // Values recorded.
   uint64_t count;
-  // The largest [ns].
+  // The largest (ns).
   uint64_t max_ns;
-  // Their sum [ns].
+  // Their sum (ns).
   uint64_t sum_ns;
   // Fills the cache line.
   uint64_t reserved[5];
@@ -370,6 +373,9 @@ typedef struct PHANTOM_ALIGNED(64) PhantomDriverSegment {
   struct PhantomHistogramBlock round_trip_ns;
   // The driver's last words.
   uint64_t epitaph[PHANTOM_EPITAPH_WORDS];
+  // Which real-time guarantees the driver's loop obtained, a line each: UTF-8, padded with zeros;
+  // constant once `header.ready` is set.
+  uint64_t setup_report[PhantomREPORT_WORDS];
   // Frame `k` lies in slot `k % RING_FRAMES`.
   struct PhantomFrameSlot frames[PHANTOM_RING_FRAMES];
 } PhantomDriverSegment;
@@ -418,9 +424,9 @@ typedef struct PhantomOutcome {
   uint64_t command_tick;
   // The share of the commanded force that was let through.
   double authority;
-  // From the frame's doorbell to the accepted reply [ns]; 0 where there was none.
+  // From the frame's doorbell to the accepted reply (ns); 0 where there was none.
   uint64_t round_trip_ns;
-  // When the motors were written, CLOCK_MONOTONIC [ns].
+  // When the motors were written, CLOCK_MONOTONIC (ns).
   uint64_t written_ns;
 } PhantomOutcome;
 
@@ -432,15 +438,15 @@ typedef struct PhantomDeviceFrame {
   uint64_t buttons;
   // Encoder counts, extended beyond the counter's width: three joints, three gimbal axes.
   int64_t encoder_counts[6];
-  // Joint angles [rad], in the same order.
+  // Joint angles (rad), in the same order.
   double joint_angle_rad[6];
-  // The tip in the base frame D [m].
+  // The tip in the base frame D (m).
   double position_m_measured[3];
   // Orientation of the gimbal's last link in D, w x y z; identity where there is no instrumented gimbal.
   double orientation_wxyz_measured[4];
-  // The force on the user asked for in the tick before, in D [N].
+  // The force on the user asked for in the tick before, in D (N).
   double force_on_user_n_commanded[3];
-  // The force on the user that the motors were made to render in the tick before, in D [N].
+  // The force on the user that the motors were made to render in the tick before, in D (N).
   double force_on_user_n_applied[3];
   // The motor values written in the tick before, as the hardware got them.
   int64_t motor_codes[3];
@@ -452,9 +458,9 @@ typedef struct PhantomDeviceFrame {
 typedef struct PhantomFrame {
   // Number of the tick, counted from the driver's start; skipped deadlines are counted too.
   uint64_t tick;
-  // When the tick was due, CLOCK_MONOTONIC [ns].
+  // When the tick was due, CLOCK_MONOTONIC (ns).
   uint64_t deadline_ns;
-  // When the driver had read the devices, CLOCK_MONOTONIC [ns].
+  // When the driver had read the devices, CLOCK_MONOTONIC (ns).
   uint64_t read_ns;
   // A [`DriverState`].
   uint64_t state;
@@ -478,7 +484,7 @@ typedef struct PhantomFrame {
 
 // What one device shall do.
 typedef struct PhantomDeviceCommand {
-  // The force on the user, in the device's base frame D [N].
+  // The force on the user, in the device's base frame D (N).
   double force_on_user_n[3];
   // Room for later minor versions; zero.
   uint64_t reserved;
@@ -541,7 +547,7 @@ typedef struct PhantomAnswer {
 } PhantomAnswer;
 
 // Hash of every type, name, size and offset of the contract; both sides must agree on it.
-#define PHANTOM_LAYOUT_HASH UINT64_C(0xab002f0064a4e9e4)
+#define PHANTOM_LAYOUT_HASH UINT64_C(0x85688db9fa628dbf)
 
 #ifdef __cplusplus
 #define PHANTOM_ASSERT(what) static_assert(what, #what)
@@ -551,7 +557,7 @@ typedef struct PhantomAnswer {
 #define PHANTOM_ALIGNOF(type) _Alignof(type)
 #endif
 
-PHANTOM_ASSERT(sizeof(PhantomDriverSegment) == 11036928);
+PHANTOM_ASSERT(sizeof(PhantomDriverSegment) == 11041024);
 PHANTOM_ASSERT(PHANTOM_ALIGNOF(PhantomDriverSegment) == 64);
 PHANTOM_ASSERT(offsetof(PhantomDriverSegment, header) == 0);
 PHANTOM_ASSERT(offsetof(PhantomDriverSegment, bell) == 128);
@@ -561,7 +567,8 @@ PHANTOM_ASSERT(offsetof(PhantomDriverSegment, wake_error_ns) == 1856);
 PHANTOM_ASSERT(offsetof(PhantomDriverSegment, cycle_ns) == 10112);
 PHANTOM_ASSERT(offsetof(PhantomDriverSegment, round_trip_ns) == 18368);
 PHANTOM_ASSERT(offsetof(PhantomDriverSegment, epitaph) == 26624);
-PHANTOM_ASSERT(offsetof(PhantomDriverSegment, frames) == 26880);
+PHANTOM_ASSERT(offsetof(PhantomDriverSegment, setup_report) == 26880);
+PHANTOM_ASSERT(offsetof(PhantomDriverSegment, frames) == 30976);
 
 PHANTOM_ASSERT(sizeof(PhantomDriverHeader) == 128);
 PHANTOM_ASSERT(PHANTOM_ALIGNOF(PhantomDriverHeader) == 64);

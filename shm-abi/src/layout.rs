@@ -35,6 +35,8 @@ pub const COMMAND_WORDS: usize = 36;
 pub const HISTOGRAM_BUCKETS: usize = 1024;
 /// Words of the epitaph.
 pub const EPITAPH_WORDS: usize = 32;
+/// Words of the set-up report.
+pub const REPORT_WORDS: usize = 512;
 /// Bytes of a device's or client's name, padded with zeros.
 pub const NAME_BYTES: usize = 64;
 /// The same in words.
@@ -100,11 +102,14 @@ pub struct DriverSegment {
     pub round_trip_ns: HistogramBlock,
     /// The driver's last words.
     pub epitaph: [AtomicU64; EPITAPH_WORDS],
+    /// Which real-time guarantees the driver's loop obtained, a line each: UTF-8, padded with zeros;
+    /// constant once `header.ready` is set.
+    pub setup_report: [AtomicU64; REPORT_WORDS],
     /// Frame `k` lies in slot `k % RING_FRAMES`.
     pub frames: [FrameSlot; RING_FRAMES],
 }
 
-assert_layout!(DriverSegment: 11036928, 64 {
+assert_layout!(DriverSegment: 11041024, 64 {
     header: DriverHeader = 0,
     bell: Bell = 128,
     counters: Counters = 192,
@@ -113,7 +118,8 @@ assert_layout!(DriverSegment: 11036928, 64 {
     cycle_ns: HistogramBlock = 10112,
     round_trip_ns: HistogramBlock = 18368,
     epitaph: [AtomicU64; EPITAPH_WORDS] = 26624,
-    frames: [FrameSlot; RING_FRAMES] = 26880,
+    setup_report: [AtomicU64; REPORT_WORDS] = 26880,
+    frames: [FrameSlot; RING_FRAMES] = 30976,
 });
 
 /// The start of the driver's segment.
@@ -419,11 +425,12 @@ mod tests {
     #[test]
     fn the_layout_is_the_one_that_was_published() {
         // A failure here means that old programs would be refused: raise ABI_MAJOR, note it in the
-        // CHANGELOG, then update the constant here and the one in the C header.
+        // CHANGELOG, then update the constant here and make the C header anew:
+        // `PHANTOM3_BLESS=1 cargo test -p shm-abi --test c_header`.
         assert_eq!(LAYOUT_HASH, PUBLISHED_LAYOUT_HASH, "now 0x{LAYOUT_HASH:016x}");
     }
 
-    const PUBLISHED_LAYOUT_HASH: u64 = 0xab00_2f00_64a4_e9e4;
+    const PUBLISHED_LAYOUT_HASH: u64 = 0x8568_8db9_fa62_8dbf;
 
     #[test]
     fn the_hash_notices_a_renamed_field_and_a_moved_one() {

@@ -14,7 +14,7 @@ use crate::frame::Frame;
 use crate::handshake;
 use crate::layout::{
     ABI_VERSION, CommanderSegment, DeviceDescription, DriverSegment, LAYOUT_HASH, MAGIC, MAX_DEVICES,
-    NAME_BYTES, RING_COMMANDS, RING_FRAMES,
+    RING_COMMANDS, RING_FRAMES,
 };
 use crate::seqlock::{self, Torn};
 use bytemuck::Zeroable;
@@ -79,12 +79,14 @@ pub struct DriverInfo {
     pub cpu: Option<usize>,
     /// The devices, [`MAX_DEVICES`] at most.
     pub devices: Vec<DeviceInfo>,
+    /// Which real-time guarantees its loop obtained, a line each; cut to 4096 bytes.
+    pub setup_report: String,
 }
 
 /// What a device is.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DeviceInfo {
-    /// Name from the driver's configuration; cut to [`NAME_BYTES`] bytes.
+    /// Name from the driver's configuration; cut to 64 bytes.
     pub name: String,
     /// Kind, such as "premium".
     pub kind: String,
@@ -239,6 +241,7 @@ impl DriverView {
             wait_mode: WaitMode::from_word(get(&header.wait_mode)).unwrap_or(WaitMode::Futex),
             cpu: get(&header.cpu_plus_one).checked_sub(1).and_then(|cpu| usize::try_from(cpu).ok()),
             devices: self.map.devices[..count].iter().map(DeviceInfo::from_description).collect(),
+            setup_report: lines_of(&self.map.setup_report),
         }
     }
 
@@ -429,6 +432,7 @@ fn describe(segment: &DriverSegment, info: &DriverInfo) {
     for (device, to) in info.devices.iter().zip(&segment.devices) {
         device.write_to(to);
     }
+    put_text(&segment.setup_report, &info.setup_report);
     header.ready.store(1, Ordering::Release);
 }
 
@@ -457,23 +461,35 @@ fn put(word: &AtomicU64, value: u64) {
     word.store(value, Ordering::Relaxed);
 }
 
+/// Cuts at a character and pads with zeros.
 fn put_text(words: &[AtomicU64], text: &str) {
-    let mut bytes = [0u8; NAME_BYTES];
     let room = words.len() * 8;
     let mut length = text.len().min(room);
     while !text.is_char_boundary(length) {
         length -= 1;
     }
-    bytes[..length].copy_from_slice(&text.as_bytes()[..length]);
-    for (word, chunk) in words.iter().zip(bytes.chunks_exact(8)) {
-        put(word, u64::from_le_bytes(chunk.try_into().expect("chunks of eight")));
+    let bytes = &text.as_bytes()[..length];
+    for (index, word) in words.iter().enumerate() {
+        let mut eight = [0; 8];
+        let rest = bytes.get(index * 8..).unwrap_or_default();
+        let filled = rest.len().min(8);
+        eight[..filled].copy_from_slice(&rest[..filled]);
+        put(word, u64::from_le_bytes(eight));
     }
 }
 
 fn text_of(words: &[AtomicU64]) -> String {
-    let bytes: Vec<u8> =
-        words.iter().flat_map(|word| get(word).to_le_bytes()).take_while(|byte| *byte != 0).collect();
-    handshake::printable(&bytes)
+    handshake::printable(&bytes_of(words))
+}
+
+/// As [`text_of`], keeping the ends of lines.
+fn lines_of(words: &[AtomicU64]) -> String {
+    let lines: Vec<String> = bytes_of(words).split(|byte| *byte == b'\n').map(handshake::printable).collect();
+    lines.join("\n")
+}
+
+fn bytes_of(words: &[AtomicU64]) -> Vec<u8> {
+    words.iter().flat_map(|word| get(word).to_le_bytes()).take_while(|byte| *byte != 0).collect()
 }
 
 fn expect(what: &'static str, word: &AtomicU64, expected: u64) -> Result<(), SegmentError> {

@@ -218,7 +218,7 @@ fn one_ring_wakes_everybody_who_sleeps_on_the_bell() {
         for own in [&other, &commander] {
             let view = &view;
             scope.spawn(move || {
- sleep_until(0, || view.latest_tick(), |seen, t| view.sleep_for_frame(seen, own, t));
+                sleep_until(0, || view.latest_tick(), |seen, t| view.sleep_for_frame(seen, own, t));
             });
             wait_until("it sleeps", || own.bell.owner_sleeps.load(Ordering::Relaxed) == 1);
             // From the flag to the kernel's queue. If this is too short, the test checks less, but holds.

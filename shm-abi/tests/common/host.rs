@@ -1,6 +1,6 @@
 //! A server that polls in the background, so that the blocking client can talk to it from the test.
 
-use crate::common::{HANG, info};
+use super::{HANG, info};
 use shm_abi::DriverMemory;
 use shm_abi::server::{Server, ServerEvent};
 use std::path::{Path, PathBuf};

@@ -2,6 +2,10 @@
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
+pub(crate) mod desk;
+pub(crate) mod fake;
+pub(crate) mod host;
+
 use bytemuck::Zeroable;
 use shm_abi::doorbell::WaitMode;
 use shm_abi::layout::{COMMAND_WORDS, FRAME_WORDS};
@@ -24,6 +28,7 @@ pub(crate) fn info() -> DriverInfo {
         wait_mode: WaitMode::Futex,
         cpu: Some(1),
         devices: vec![device("thumb"), device("index")],
+        setup_report: "  obtained  cpu: CPU 1\n  MISSING   kernel: wanted PREEMPT_RT\n".into(),
     }
 }
 
@@ -79,6 +84,16 @@ fn is_filled(words: &[u64], tick: u64) -> bool {
 /// Differs between any two ticks at every place; the first word is the tick itself.
 fn word_of(tick: u64, place: usize) -> u64 {
     tick.wrapping_mul(2 * place as u64 + 1) ^ (place as u64) << 48
+}
+
+/// A directory for a socket; it goes with the value.
+pub(crate) fn directory() -> tempfile::TempDir {
+    tempfile::tempdir().unwrap()
+}
+
+/// Both sides' process id, where they are one process.
+pub(crate) fn own_pid() -> u64 {
+    u64::from(std::process::id())
 }
 
 /// Calls `done` until it says so; panics after [`HANG`].

@@ -1,0 +1,72 @@
+//! A server and its clients in one thread, and the plain sockets that talk to it.
+
+use super::{HANG, directory, info};
+use bytemuck::Zeroable;
+use shm_abi::DriverMemory;
+use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
+use shm_abi::server::{Server, ServerEvent};
+use std::io::{Read, Write};
+use std::os::unix::net::UnixStream;
+use std::time::Duration;
+
+/// For a poll that need not wait for anything.
+pub(crate) const SHORT: Duration = Duration::from_millis(10);
+
+/// A server that is polled by hand, for what depends on the order of things.
+pub(crate) struct Desk {
+    pub(crate) memory: DriverMemory,
+    pub(crate) server: Server,
+    pub(crate) events: Vec<ServerEvent>,
+    /// Removed with this value.
+    _directory: tempfile::TempDir,
+}
+
+impl Desk {
+    pub(crate) fn open() -> Self {
+        let directory = directory();
+        let server = Server::bind(&directory.path().join("driver.sock")).unwrap();
+        Self {
+            memory: DriverMemory::create(&info()).unwrap(),
+            server,
+            events: Vec::new(),
+            _directory: directory,
+        }
+    }
+
+    pub(crate) fn poll(&mut self, timeout: Duration) {
+        self.server.poll(&self.memory, timeout, &mut self.events).unwrap();
+    }
+
+    /// Connects and lets the server accept.
+    pub(crate) fn connect(&mut self) -> UnixStream {
+        let stream = UnixStream::connect(self.server.path()).unwrap();
+        self.poll(HANG);
+        stream
+    }
+
+    pub(crate) fn granted(&mut self, kind: RequestKind) -> UnixStream {
+        let mut stream = self.connect();
+        stream.write_all(bytemuck::bytes_of(&Request::new(kind, "raw"))).unwrap();
+        self.poll(HANG);
+        assert_eq!(verdict(&mut stream), Some(Verdict::Granted));
+        stream
+    }
+}
+
+/// The verdict of the answer that lies ready; `None` if the connection was closed without one.
+pub(crate) fn verdict(stream: &mut UnixStream) -> Option<Verdict> {
+    stream.set_read_timeout(Some(HANG)).unwrap();
+    let mut answer = Answer::zeroed();
+    stream.read_exact(bytemuck::bytes_of_mut(&mut answer)).ok()?;
+    Verdict::from_word(answer.verdict)
+}
+
+/// Whether the server has hung up; nothing else may lie ready.
+pub(crate) fn is_closed(stream: &mut UnixStream) -> bool {
+    stream.set_read_timeout(Some(HANG)).unwrap();
+    // With something of ours unread on the other side, the end comes as a reset.
+    match stream.read(&mut [0; 1]) {
+        Ok(read) => read == 0,
+        Err(error) => error.kind() == std::io::ErrorKind::ConnectionReset,
+    }
+}

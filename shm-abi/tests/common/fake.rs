@@ -1,0 +1,32 @@
+//! Drivers that lie: a socket on which the test itself answers.
+
+use shm_abi::handshake::Request;
+use std::io::Read;
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::Path;
+
+/// Serves so many connections, each by `talk`, which closes it by returning.
+pub(crate) fn fake_server(
+    socket: &Path,
+    connections: usize,
+    talk: impl Fn(UnixStream) + Send + 'static,
+) -> std::thread::JoinHandle<()> {
+    let listener = UnixListener::bind(socket).unwrap();
+    std::thread::spawn(move || listener.incoming().take(connections).for_each(|stream| talk(stream.unwrap())))
+}
+
+/// Waits for the whole request.
+pub(crate) fn hear(stream: &mut UnixStream) {
+    stream.read_exact(&mut [0; size_of::<Request>()]).unwrap();
+}
+
+/// Sends bytes and descriptors in one go.
+pub(crate) fn send(stream: &UnixStream, bytes: &[u8], fds: &[std::os::fd::BorrowedFd<'_>]) {
+    use rustix::net::{SendAncillaryBuffer, SendAncillaryMessage, SendFlags};
+    let mut space = [std::mem::MaybeUninit::uninit(); rustix::cmsg_space!(ScmRights(4))];
+    let mut control = SendAncillaryBuffer::new(&mut space);
+    assert!(control.push(SendAncillaryMessage::ScmRights(fds)));
+    let sent =
+        rustix::net::sendmsg(stream, &[std::io::IoSlice::new(bytes)], &mut control, SendFlags::empty());
+    assert_eq!(sent, Ok(bytes.len()));
+}

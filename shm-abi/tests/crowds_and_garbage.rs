@@ -1,0 +1,150 @@
+//! Clients in any number, clients that say nothing, too much, too slowly or nonsense.
+
+mod common;
+
+use common::desk::{Desk, SHORT, is_closed, verdict};
+use common::fake::fake_server;
+use common::host::Host;
+use common::{HANG, directory, wait_until};
+use shm_abi::client::{self, AttachError};
+use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
+use shm_abi::server::{MAX_CONNECTIONS, MAX_OBSERVERS, PATIENCE};
+use std::io::Write;
+use std::os::unix::net::UnixStream;
+use std::time::{Duration, Instant};
+
+#[test]
+fn observers_in_any_number_leave_room_for_a_commander_and_a_stop() {
+    let directory = directory();
+    let host = Host::start(directory.path());
+    let observers: Vec<_> =
+        (0..MAX_OBSERVERS).map(|_| client::observe(&host.socket, "looker").unwrap()).collect();
+    let refusal = client::observe(&host.socket, "one too many").unwrap_err();
+    let crowded = "the driver refused: it has too many connections; close some observers";
+    assert_eq!(refusal.to_string(), crowded);
+    let commander = client::command(&host.socket, "hand").unwrap();
+    client::stop(&host.socket, "test").unwrap();
+    drop(observers);
+    wait_until("a place is free again", || client::observe(&host.socket, "looker").is_ok());
+    drop(commander);
+}
+
+#[test]
+fn the_connection_after_the_last_is_told_so_even_before_it_asks() {
+    let mut desk = Desk::open();
+    let silent: Vec<_> = (0..MAX_CONNECTIONS).map(|_| desk.connect()).collect();
+    let mut last = desk.connect();
+    assert_eq!(verdict(&mut last), Some(Verdict::Crowded));
+    assert!(is_closed(&mut last));
+    drop(silent);
+}
+
+#[test]
+fn an_answer_that_came_before_the_request_was_sent_counts() {
+    let directory = directory();
+    let socket = directory.path().join("driver.sock");
+    // Whether the client meets a closed connection when it sends is chance; many rounds, to meet it.
+    const ROUNDS: usize = 2000;
+    let server = fake_server(&socket, ROUNDS, |mut stream| {
+        stream.write_all(bytemuck::bytes_of(&Answer::new(Verdict::Crowded))).unwrap();
+    });
+    for _ in 0..ROUNDS {
+        let error = client::observe(&socket, "test").unwrap_err();
+        assert!(matches!(error, AttachError::Refused(_)), "{error}");
+    }
+    server.join().unwrap();
+}
+
+#[test]
+fn a_silent_client_is_dropped_when_patience_ends_however_long_the_poll_may_last() {
+    let mut desk = Desk::open();
+    let start = Instant::now();
+    let mut silent = desk.connect();
+    wait_until("it is dropped", || {
+        desk.poll(Duration::MAX);
+        start.elapsed() > PATIENCE
+    });
+    desk.poll(SHORT);
+    assert!(is_closed(&mut silent));
+    assert!(desk.events.is_empty());
+}
+
+#[test]
+fn a_poll_without_end_waits_for_whoever_comes() {
+    let mut desk = Desk::open();
+    let mut stream = UnixStream::connect(desk.server.path()).unwrap();
+    desk.poll(Duration::MAX);
+    stream.write_all(bytemuck::bytes_of(&Request::new(RequestKind::Observe, "raw"))).unwrap();
+    desk.poll(Duration::MAX);
+    assert_eq!(verdict(&mut stream), Some(Verdict::Granted));
+}
+
+#[test]
+fn a_request_that_comes_byte_by_byte_is_a_request() {
+    let mut desk = Desk::open();
+    let mut stream = desk.connect();
+    for byte in bytemuck::bytes_of(&Request::new(RequestKind::Observe, "slow")) {
+        stream.write_all(&[*byte]).unwrap();
+        desk.poll(SHORT);
+    }
+    assert_eq!(verdict(&mut stream), Some(Verdict::Granted));
+}
+
+#[test]
+fn half_a_request_followed_by_the_end_is_forgotten() {
+    let mut desk = Desk::open();
+    let mut stream = desk.connect();
+    stream.write_all(&bytemuck::bytes_of(&Request::new(RequestKind::Command, "half"))[..64]).unwrap();
+    desk.poll(HANG);
+    drop(stream);
+    desk.poll(HANG);
+    assert!(desk.events.is_empty());
+    desk.granted(RequestKind::Command);
+}
+
+#[test]
+fn garbage_is_answered_and_hung_up_on() {
+    let mut desk = Desk::open();
+    let mut stream = desk.connect();
+    stream.write_all(&[b'G'; size_of::<Request>()]).unwrap();
+    desk.poll(HANG);
+    assert_eq!(verdict(&mut stream), Some(Verdict::WrongMagic));
+    desk.poll(SHORT);
+    assert!(is_closed(&mut stream));
+}
+
+#[test]
+fn no_bytes_but_a_true_request_are_ever_granted() {
+    use proptest::prelude::*;
+    // The runner may call its check again and again, but not with a mutable capture.
+    let desk = std::cell::RefCell::new(Desk::open());
+    let true_head = bytemuck::bytes_of(&Request::new(RequestKind::Observe, ""))[..24].to_vec();
+    // Nothing, or the beginning of a true request so that the later checks are reached, then anything.
+    let bytes = (0usize..=24, prop::collection::vec(any::<u8>(), 0..300)).prop_map(move |(kept, noise)| {
+        let mut bytes = true_head[..kept].to_vec();
+        bytes.extend(noise);
+        bytes
+    });
+    // The chance that noise makes a true kind of request is 2^-61.
+    let config = ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() };
+    let mut runner = proptest::test_runner::TestRunner::new(config);
+    runner
+        .run(&(bytes, 1usize..200), |(bytes, piece)| {
+            let mut desk = desk.borrow_mut();
+            let mut stream = UnixStream::connect(desk.server.path()).unwrap();
+            desk.poll(HANG);
+            for piece in bytes.chunks(piece) {
+                // The server may have hung up already.
+                let _ = stream.write_all(piece);
+                desk.poll(Duration::ZERO);
+            }
+            let _ = stream.shutdown(std::net::Shutdown::Write);
+            desk.poll(Duration::ZERO);
+            prop_assert_ne!(verdict(&mut stream), Some(Verdict::Granted));
+            prop_assert!(desk.events.is_empty(), "{:?}", desk.events);
+            Ok(())
+        })
+        .unwrap();
+    // And it is none the worse for it.
+    desk.into_inner().granted(RequestKind::Command);
+}

@@ -1,0 +1,220 @@
+//! What needs a process of its own: death by signal, another user, a limit of the whole process. Each test
+//! runs this binary again, with the body below and a variable that says which part of it.
+
+mod common;
+
+use bytemuck::Zeroable;
+use common::fake::{hear, send};
+use common::host::Host;
+use common::{HANG, directory, frame, info, is_frame, wait_until};
+use shm_abi::client;
+use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
+use shm_abi::server::{Server, ServerEvent};
+use shm_abi::{DriverMemory, Frame};
+use std::fs::{File, Permissions};
+use std::io::Write;
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+const BODY: &str = "SHM_ABI_TEST_BODY";
+const SOCKET: &str = "SHM_ABI_TEST_SOCKET";
+
+fn process(binary: &Path, body: &str, socket: &Path) -> std::process::Command {
+    let mut command = std::process::Command::new(binary);
+    command.args(["--exact", "body_of_another_process", "--nocapture"]);
+    command.env(BODY, body).env(SOCKET, socket).stdout(std::process::Stdio::piped());
+    command
+}
+
+fn own_binary() -> PathBuf {
+    std::env::current_exe().unwrap()
+}
+
+#[test]
+fn body_of_another_process() {
+    let Some(socket) = std::env::var_os(SOCKET).map(PathBuf::from) else { return };
+    match std::env::var(BODY).unwrap().as_str() {
+        "driver" => {
+            let _server = Server::bind(&socket).unwrap();
+            println!("\nbound");
+            std::thread::sleep(HANG);
+        }
+        "commander" => {
+            let _attached = client::command(&socket, "doomed").unwrap();
+            println!("\nattached");
+            std::thread::sleep(HANG);
+        }
+        "observer" => match client::observe(&socket, "other") {
+            Ok(_) => println!("\nattached"),
+            Err(error) => println!("\nrefused: {error}"),
+        },
+        "driver without descriptors" => serve_without_descriptors(&socket),
+        other => panic!("no such body: {other}"),
+    }
+}
+
+/// The line that begins like this, of those that the other process prints.
+fn line(child: &mut std::process::Child, beginning: &str) -> String {
+    use std::io::BufRead;
+    let output = std::io::BufReader::new(child.stdout.as_mut().unwrap());
+    let found = output.lines().map(Result::unwrap).find(|line| line.starts_with(beginning));
+    found.unwrap_or_else(|| panic!("the other process ended without saying {beginning}"))
+}
+
+#[test]
+fn a_driver_killed_with_9_leaves_a_socket_that_clients_recognise_and_the_next_driver_replaces() {
+    let directory = directory();
+    let socket = directory.path().join("driver.sock");
+    let mut driver = process(&own_binary(), "driver", &socket).spawn().unwrap();
+    line(&mut driver, "bound");
+    driver.kill().unwrap();
+    driver.wait().unwrap();
+    assert_eq!(
+        client::observe(&socket, "test").unwrap_err().to_string(),
+        format!(
+            "the driver is gone: {} is left over from one that died; start it again with `io-driver run --config \
+             FILE` (it replaces the socket)",
+            socket.display()
+        )
+    );
+    let host = Host::start(directory.path());
+    client::observe(&host.socket, "test").unwrap();
+}
+
+#[test]
+fn a_commander_killed_with_9_ends_its_lease() {
+    let directory = directory();
+    let host = Host::start(directory.path());
+    let mut commander = process(&own_binary(), "commander", &host.socket).spawn().unwrap();
+    line(&mut commander, "attached");
+    let granted = host.event();
+    assert!(matches!(&granted, ServerEvent::LeaseGranted { pid, name, .. }
+        if *pid == u64::from(commander.id()) && name == "doomed"));
+    commander.kill().unwrap();
+    commander.wait().unwrap();
+    assert!(matches!(host.event(), ServerEvent::LeaseEnded { lease: 1 }));
+}
+
+#[test]
+fn a_client_that_is_stopped_and_continued_while_it_waits_attaches_all_the_same() {
+    let directory = directory();
+    let socket = directory.path().join("driver.sock");
+    let memory = DriverMemory::create(&info()).unwrap();
+    let listener = UnixListener::bind(&socket).unwrap();
+    let mut client = process(&own_binary(), "observer", &socket).spawn().unwrap();
+    let (mut stream, _) = listener.accept().unwrap();
+    hear(&mut stream);
+    let pid = rustix::process::Pid::from_child(&client);
+    for signal in [rustix::process::Signal::STOP, rustix::process::Signal::CONT] {
+        // To be asleep in the kernel when it comes. If this is too short, the test checks less, but holds.
+        std::thread::sleep(Duration::from_millis(100));
+        rustix::process::kill_process(pid, signal).unwrap();
+    }
+    std::thread::sleep(Duration::from_millis(100));
+    send(&stream, bytemuck::bytes_of(&Answer::new(Verdict::Granted)), &[memory.fd()]);
+    line(&mut client, "attached");
+    client.wait().unwrap();
+}
+
+#[test]
+fn a_user_without_permission_is_told_mode_owner_group_and_own_id() {
+    use std::os::unix::process::CommandExt;
+    const NOBODY: u32 = 65534;
+    let directory = directory();
+    let _host = Host::start(directory.path());
+    let socket = directory.path().join("driver.sock");
+    let message = |what: &Path, mode: u32, user: u32| {
+        let meta = what.metadata().unwrap();
+        format!(
+            "no permission to use {}: it has mode {mode:04o}, owner {} and group {}, and you are user {user}; join \
+             the group or ask for access",
+            what.display(),
+            meta.uid(),
+            meta.gid()
+        )
+    };
+    let own_uid = rustix::process::geteuid();
+    if !own_uid.is_root() {
+        // Without a second user: one's own socket, closed even to its owner.
+        std::fs::set_permissions(&socket, Permissions::from_mode(0o000)).unwrap();
+        let error = client::observe(&socket, "test").unwrap_err();
+        assert_eq!(error.to_string(), message(&socket, 0, own_uid.as_raw()));
+        println!("skipped: the view of another user, which needs root");
+        return;
+    }
+    // Where the other user can run it.
+    let binary = directory.path().join("test");
+    std::fs::copy(own_binary(), &binary).unwrap();
+    let refusal = |directory_mode: u32| {
+        std::fs::set_permissions(directory.path(), Permissions::from_mode(directory_mode)).unwrap();
+        let shared = tempfile::Builder::new().permissions(Permissions::from_mode(0o755)).tempdir().unwrap();
+        let binary_outside = shared.path().join("test");
+        std::fs::copy(&binary, &binary_outside).unwrap();
+        let mut command = process(&binary_outside, "observer", &socket);
+        let mut child = command.uid(NOBODY).gid(NOBODY).current_dir("/").spawn().unwrap();
+        let line = line(&mut child, "refused: ");
+        child.wait().unwrap();
+        line
+    };
+    assert_eq!(refusal(0o755), format!("refused: {}", message(&socket, 0o660, NOBODY)));
+    assert_eq!(refusal(0o700), format!("refused: {}", message(directory.path(), 0o700, NOBODY)));
+}
+
+/// Runs in a process of its own, for the limit is the whole process'.
+fn serve_without_descriptors(socket: &Path) {
+    use rustix::process::{Resource, Rlimit, setrlimit};
+    let memory = DriverMemory::create(&info()).unwrap();
+    let mut server = Server::bind(socket).unwrap();
+    let mut events = Vec::new();
+    // Beyond the numbers in use now there is room for a single one: the client's end.
+    let next = std::os::fd::AsRawFd::as_raw_fd(&File::open("/dev/null").unwrap()) as u64;
+    let limit = |current| {
+        let maximum = rustix::process::getrlimit(Resource::Nofile).maximum;
+        setrlimit(Resource::Nofile, Rlimit { current: Some(current), maximum }).unwrap();
+    };
+    limit(next + 1);
+    let client = UnixStream::connect(socket).unwrap();
+    let start = Instant::now();
+    let mut polls = 0;
+    while start.elapsed() < Duration::from_millis(500) {
+        server.poll(&memory, Duration::from_millis(500), &mut events).unwrap();
+        polls += 1;
+    }
+    // Two polls each rest of 100 ms: one that fails to accept, one that sleeps. A spinning server makes
+    // hundreds of thousands.
+    assert!(polls < 50, "it spins: {polls} polls");
+    limit(next + 8);
+    drop(client);
+    let mut newcomer = UnixStream::connect(socket).unwrap();
+    newcomer.write_all(bytemuck::bytes_of(&Request::new(RequestKind::Stop, "late"))).unwrap();
+    wait_until("the newcomer is served", || {
+        server.poll(&memory, HANG, &mut events).unwrap();
+        !events.is_empty()
+    });
+    println!("\nserved after {polls} polls");
+}
+
+#[test]
+fn a_server_out_of_descriptors_rests_and_then_serves_again() {
+    let directory = directory();
+    let socket = directory.path().join("driver.sock");
+    let mut server = process(&own_binary(), "driver without descriptors", &socket).spawn().unwrap();
+    line(&mut server, "served");
+    server.wait().unwrap();
+}
+
+#[test]
+fn frames_of_a_dead_driver_can_still_be_read() {
+    let directory = directory();
+    let host = Host::start(directory.path());
+    host.memory.write_frame(&frame(1));
+    host.memory.ring(1, None);
+    let attached = client::observe(&host.socket, "historian").unwrap();
+    drop(host);
+    wait_until("the end is noticed", || !attached.connection.is_open());
+    let mut found = Frame::zeroed();
+    attached.driver.read_frame(1, &mut found).unwrap();
+    assert!(is_frame(&found, 1));
+}

@@ -1,0 +1,234 @@
+//! Clients and drivers of different make: whoever is refused reads what was found and what to do.
+
+mod common;
+
+use common::fake::{fake_server, hear, send};
+use common::host::Host;
+use common::{directory, info};
+use shm_abi::client::{self, AttachError};
+use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
+use shm_abi::{DriverMemory, DriverView, LAYOUT_HASH};
+use std::fs::File;
+use std::io::Write;
+use std::os::fd::AsFd;
+use std::os::unix::fs::FileExt;
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::time::Duration;
+
+fn refusal_of(request: &Request) -> String {
+    let directory = directory();
+    let host = Host::start(directory.path());
+    let error = client::attach(&host.socket, request).unwrap_err();
+    assert!(host.events.try_recv().is_err(), "a refused client is none of the loop's business");
+    error.to_string()
+}
+
+#[test]
+fn a_driver_refuses_every_other_make_of_client_by_name() {
+    let good = Request::new(RequestKind::Observe, "test");
+    assert_eq!(
+        refusal_of(&Request { abi_version: (3 << 32) | 4, ..good }),
+        "the driver speaks ABI version 1.0, this program 3.4; install both from the same release"
+    );
+    assert_eq!(
+        refusal_of(&Request { layout_hash: 0xbad, ..good }),
+        format!(
+            "the driver's memory layout is 0x{LAYOUT_HASH:016x}, this program's 0x0000000000000bad, though both \
+             say ABI 1.0; one of them is a modified build: rebuild both from the same source"
+        )
+    );
+    assert_eq!(
+        refusal_of(&Request { kind: 77, ..good }),
+        "the driver refused: it did not understand the request (UnknownKind)"
+    );
+    assert_eq!(
+        refusal_of(&Request { magic: 1, ..good }),
+        "the driver refused: it did not understand the request (WrongMagic)"
+    );
+}
+
+#[test]
+fn another_minor_version_is_no_reason_to_refuse() {
+    let directory = directory();
+    let host = Host::start(directory.path());
+    let newer = Request {
+        abi_version: shm_abi::ABI_VERSION + 1,
+        ..Request::new(RequestKind::Observe, "newer by a minor version")
+    };
+    client::attach(&host.socket, &newer).unwrap();
+    let older_driver = forged_driver(|header| header[8] += 1, SHRINK_AND_GROW);
+    DriverView::map(older_driver.as_fd()).unwrap();
+}
+
+/// What the client makes of a driver that answers like this.
+fn error_about(talk: impl Fn(UnixStream) + Send + 'static) -> AttachError {
+    let directory = directory();
+    let socket = directory.path().join("driver.sock");
+    let server = fake_server(&socket, 1, talk);
+    let error = client::command(&socket, "test").unwrap_err();
+    server.join().unwrap();
+    error
+}
+
+/// The same, in words; the socket's place is replaced by SOCKET.
+fn message_about(answer: Answer) -> String {
+    let directory = directory();
+    let socket = directory.path().join("driver.sock");
+    let server = fake_server(&socket, 1, move |mut stream| {
+        hear(&mut stream);
+        stream.write_all(bytemuck::bytes_of(&answer)).unwrap();
+    });
+    let error = client::command(&socket, "test").unwrap_err();
+    server.join().unwrap();
+    error.to_string().replace(socket.to_str().unwrap(), "SOCKET")
+}
+
+#[test]
+fn a_client_refuses_every_other_make_of_driver_by_name() {
+    let granted = Answer::new(Verdict::Granted);
+    let cases = [
+        (
+            Answer { abi_version: (2 << 32) | 5, ..granted },
+            "the driver speaks ABI version 2.5, this program 1.0; install both from the same release"
+                .to_string(),
+        ),
+        (
+            Answer { layout_hash: 0xbad, ..granted },
+            format!(
+                "the driver's memory layout is 0x0000000000000bad, this program's 0x{LAYOUT_HASH:016x}, though \
+                 both say ABI 1.0; one of them is a modified build: rebuild both from the same source"
+            ),
+        ),
+        (
+            Answer { magic: 0x21, ..granted },
+            "SOCKET is not a driver's socket: it answered with magic 0x0000000000000021, expected \
+             0x334d4f544e414850; name another one"
+                .into(),
+        ),
+        (Answer { verdict: 99, ..granted }, "the driver refused: it gave the unknown verdict 99".into()),
+        (
+            Answer::new(Verdict::NoSegment),
+            "the driver refused: it could not create shared memory; see its log for the cause".into(),
+        ),
+        (granted, "the driver refused: it granted and handed over nothing".into()),
+    ];
+    for (answer, message) in cases {
+        assert_eq!(message_about(answer), message);
+    }
+}
+
+#[test]
+fn a_socket_that_says_nothing_and_closes_is_no_drivers() {
+    for talk in [|_: UnixStream| (), |mut stream: UnixStream| hear(&mut stream)] {
+        let error = error_about(talk);
+        assert!(matches!(error, AttachError::NotADriver { .. }), "{error:?}");
+        let message = error.to_string();
+        assert!(
+            message.ends_with(
+                "is not a driver's socket: it closed the connection without an answer; name another one"
+            ),
+            "{message}"
+        );
+    }
+}
+
+#[test]
+fn a_driver_that_does_not_answer_is_reported_as_such() {
+    let directory = directory();
+    let socket = directory.path().join("driver.sock");
+    // Bound and never looked at, as by a stopped process.
+    let _listener = UnixListener::bind(&socket).unwrap();
+    let error = client::observe(&socket, "test").unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        format!(
+            "the driver at {} does not answer within 2 s; it may be stopped (see `ps`), continue or kill it",
+            socket.display()
+        )
+    );
+}
+
+#[test]
+fn a_driver_that_drips_its_answer_does_not_hold_the_client_for_ever() {
+    let error = error_about(|mut stream| {
+        // Each byte comes in time; all of them would take a minute.
+        let answer = Answer::new(Verdict::Granted);
+        for byte in bytemuck::bytes_of(&answer) {
+            if stream.write_all(&[*byte]).is_err() {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(300));
+        }
+        panic!("the client waited for the whole of it");
+    });
+    assert!(matches!(error, AttachError::NoAnswer { .. }), "{error:?}");
+}
+
+const SHRINK_AND_GROW: rustix::fs::SealFlags =
+    rustix::fs::SealFlags::SHRINK.union(rustix::fs::SealFlags::GROW);
+
+/// A copy of a true driver's segment with its first bytes changed.
+fn forged_driver(change: impl Fn(&mut [u8; 128]), seals: rustix::fs::SealFlags) -> File {
+    let memory = DriverMemory::create(&info()).unwrap();
+    let original = File::from(memory.fd().try_clone_to_owned().unwrap());
+    let mut head = [0; 128];
+    original.read_exact_at(&mut head, 0).unwrap();
+    change(&mut head);
+    let copy = memfd(size_of::<shm_abi::DriverSegment>() as u64, rustix::fs::SealFlags::empty());
+    copy.write_all_at(&head, 0).unwrap();
+    rustix::fs::fcntl_add_seals(&copy, seals).unwrap();
+    copy
+}
+
+fn memfd(bytes: u64, seals: rustix::fs::SealFlags) -> File {
+    let flags = rustix::fs::MemfdFlags::CLOEXEC | rustix::fs::MemfdFlags::ALLOW_SEALING;
+    let file = File::from(rustix::fs::memfd_create(c"forged", flags).unwrap());
+    file.set_len(bytes).unwrap();
+    rustix::fs::fcntl_add_seals(&file, seals).unwrap();
+    file
+}
+
+/// What the client makes of a driver that grants and hands these over.
+fn message_about_files(files: Vec<File>) -> String {
+    error_about(move |mut stream| {
+        hear(&mut stream);
+        let fds: Vec<_> = files.iter().map(AsFd::as_fd).collect();
+        send(&stream, bytemuck::bytes_of(&Answer::new(Verdict::Granted)), &fds);
+    })
+    .to_string()
+}
+
+#[test]
+fn a_descriptor_that_is_no_segment_is_refused_before_it_is_touched() {
+    let bytes = size_of::<shm_abi::DriverSegment>() as u64;
+    assert_eq!(
+        message_about_files(vec![memfd(bytes, rustix::fs::SealFlags::SHRINK)]),
+        "the segment handed over is not sealed (found 2, expected at least 6); do not trust this driver"
+    );
+    assert_eq!(
+        message_about_files(vec![memfd(4096, SHRINK_AND_GROW)]),
+        format!(
+            "the segment handed over has 4096 bytes, expected {bytes}; rebuild both sides from one version"
+        )
+    );
+    assert_eq!(
+        message_about_files(vec![memfd(bytes, SHRINK_AND_GROW)]),
+        "the segment's magic is 0x0, expected 0x334d4f544e414850; rebuild both sides from one version"
+    );
+    assert_eq!(
+        message_about_files(vec![File::open("/dev/null").unwrap()]),
+        "cannot read the seals of a shared segment: Invalid argument (os error 22)"
+    );
+    let wrong_header = |at: usize| {
+        message_about_files(vec![forged_driver(move |header| header[at] ^= 0x40, SHRINK_AND_GROW)])
+    };
+    assert!(wrong_header(12).starts_with("the segment's ABI version is 0x4100000000, expected 0x100000000;"));
+    assert!(wrong_header(16).starts_with("the segment's layout hash is 0x"));
+    assert!(wrong_header(120).starts_with("the segment's ready word is 0x41, expected 0x1;"));
+    assert_eq!(
+        message_about_files(vec![forged_driver(|_| (), SHRINK_AND_GROW)]),
+        "the driver refused: it granted the lease and handed over no memory for it"
+    );
+    let more_than_asked = (0..4).map(|_| memfd(bytes, rustix::fs::SealFlags::empty())).collect();
+    assert!(message_about_files(more_than_asked).contains("is not sealed"));
+}

@@ -1,0 +1,76 @@
+//! What nobody may do to the memory that was handed over, and what a bad neighbour can spoil.
+
+mod common;
+
+use bytemuck::Zeroable;
+use common::{command, info};
+use shm_abi::{Command, CommanderMemory, CommanderView, DriverMemory, DriverView};
+use std::fs::File;
+use std::os::fd::AsFd;
+use std::os::unix::fs::FileExt;
+
+#[test]
+fn whoever_is_handed_the_drivers_segment_can_neither_write_nor_resize_it() {
+    let memory = DriverMemory::create(&info()).unwrap();
+    let bytes = size_of::<shm_abi::DriverSegment>() as u64;
+    let file = File::from(memory.fd().try_clone_to_owned().unwrap());
+    let denied = |what: &str, result: std::io::Result<()>| {
+        let error = result.expect_err(what);
+        assert_eq!(error.raw_os_error(), Some(rustix::io::Errno::PERM.raw_os_error()), "{what}: {error}");
+    };
+    denied("map writable", memmap2::MmapOptions::new().len(4096).map_raw(&file).map(|_| ()));
+    denied("write", file.write_at(&[1], 0).map(|_| ()));
+    denied("shrink", file.set_len(bytes - 4096));
+    denied("grow", file.set_len(bytes + 4096));
+    let hole = rustix::fs::FallocateFlags::PUNCH_HOLE | rustix::fs::FallocateFlags::KEEP_SIZE;
+    denied("punch a hole", rustix::fs::fallocate(&file, hole, 0, 4096).map_err(Into::into));
+    let reopened = File::options()
+        .read(true)
+        .write(true)
+        .open(format!("/proc/self/fd/{}", std::os::fd::AsRawFd::as_raw_fd(&file)));
+    denied("write through a new description", reopened.and_then(|file| file.write_at(&[1], 0)).map(|_| ()));
+    denied("unseal", rustix::fs::fcntl_add_seals(&file, rustix::fs::SealFlags::WRITE).map_err(Into::into));
+}
+
+#[test]
+fn a_read_only_mapping_of_the_drivers_segment_cannot_be_made_writable() {
+    let memory = DriverMemory::create(&info()).unwrap();
+    let map = memmap2::MmapOptions::new().len(4096).map_raw_read_only(&memory.fd()).unwrap();
+    // SAFETY: the page is this test's own mapping; even if made writable, nothing refers to it.
+    let changed =
+        unsafe { rustix::mm::mprotect(map.as_mut_ptr().cast(), 4096, rustix::mm::MprotectFlags::WRITE) };
+    assert_eq!(changed, Err(rustix::io::Errno::ACCESS));
+}
+
+#[test]
+fn a_commander_that_punches_a_hole_into_its_memory_only_erases_its_commands() {
+    let memory = DriverMemory::create(&info()).unwrap();
+    let driver = DriverView::map(memory.fd()).unwrap();
+    let (view, fd) = CommanderView::create(1).unwrap();
+    let commander = CommanderMemory::map(fd.as_fd()).unwrap();
+    commander.publish(&command(2), &driver);
+    let hole = rustix::fs::FallocateFlags::PUNCH_HOLE | rustix::fs::FallocateFlags::KEEP_SIZE;
+    rustix::fs::fallocate(&fd, hole, 0, size_of::<shm_abi::CommanderSegment>() as u64).unwrap();
+    let mut found = command(9);
+    view.read_command(2, &mut found).unwrap();
+    assert_eq!((view.latest_tick(), found), (None, Command::zeroed()));
+    assert_eq!(view.lease(), 1, "the driver's own knowledge");
+    assert!(File::from(fd).set_len(0).is_err(), "but it cannot shrink it, which would be SIGBUS");
+}
+
+#[test]
+fn what_the_driver_says_of_itself_is_cleaned_before_it_is_shown() {
+    let mut odd = info();
+    odd.devices[0].name = "a\u{1b}[2J".into();
+    odd.devices[1].name = "ä".repeat(40);
+    let memory = DriverMemory::create(&odd).unwrap();
+    let devices = DriverView::map(memory.fd()).unwrap().info().devices;
+    assert_eq!(devices[0].name, "a?[2J");
+    assert_eq!(devices[1].name, "ä".repeat(32), "cut between characters");
+    let order = std::sync::atomic::Ordering::Relaxed;
+    memory.header.device_count.store(u64::MAX, order);
+    memory.header.wait_mode.store(99, order);
+    memory.header.period_ns.store(0, order);
+    let info = DriverView::map(memory.fd()).unwrap().info();
+    assert_eq!((info.devices.len(), info.period_ns), (shm_abi::MAX_DEVICES, 1));
+}
