@@ -126,8 +126,12 @@ fn private_directory() -> std::io::Result<TempDir> {
     let mut builder = tempfile::Builder::new();
     builder.prefix("phantom3-");
     let runtime = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from).filter(|path| path.is_absolute());
-    match runtime.map(|path| builder.tempdir_in(path)) {
-        Some(Ok(directory)) => Ok(directory),
-        _ => builder.tempdir(),
-    }
+    let wanted = runtime.into_iter().chain([std::env::temp_dir()]).filter(|place| leaves_room_for_a_socket(place));
+    let made = wanted.map(|place| builder.tempdir_in(place)).find_map(Result::ok);
+    made.map_or_else(|| builder.tempdir_in("/tmp"), Ok)
+}
+
+/// The kernel takes 107 bytes of a socket's name.
+fn leaves_room_for_a_socket(place: &Path) -> bool {
+    place.as_os_str().len() + "/phantom3-123456/driver.sock".len() <= 107
 }

@@ -31,7 +31,7 @@ pub struct Demo {
 /// # Errors
 /// If there is no room for temporary files.
 pub fn unpack(period_ns: u64) -> Result<Demo, RunFailure> {
-    let no_room = |error: std::io::Error| RunFailure::Start(format!("cannot unpack the default scene: {error}"));
+    let no_room = |error: std::io::Error| RunFailure::Start(format!("cannot unpack the default scene: {error}; set TMPDIR to a directory that can be written"));
     let directory = tempfile::Builder::new().prefix("phantom3-demo-").tempdir().map_err(no_room)?;
     let hand = directory.path().join("default.csv");
     std::fs::write(&hand, HAND).map_err(no_room)?;

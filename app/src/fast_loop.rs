@@ -48,6 +48,8 @@ pub struct FastLoop {
     base_ns: Option<u64>,
     /// Added to the lease's own run tick; fixed by each lease's first row.
     offset_ticks: Option<u64>,
+    /// The run's first tick that no row has told of.
+    next_tick: u64,
     /// The row that waits for what the motors did, and the driver's tick it belongs to.
     pending: Option<(u64, Row)>,
     frame: Frame,
@@ -86,6 +88,7 @@ impl FastLoop {
             period_ns,
             base_ns: None,
             offset_ticks: None,
+            next_tick: 0,
             pending: None,
             frame: Frame::zeroed(),
             following: Frame::zeroed(),
@@ -143,6 +146,7 @@ impl FastLoop {
         }
         self.place_in_time();
         self.row.run_tick = self.run_ticks();
+        self.next_tick = self.row.run_tick + 1;
         if self.row.run_tick < self.total_ticks {
             self.pending = Some((self.frame.tick, self.row));
             for finger in &self.row.fingers {
@@ -151,7 +155,8 @@ impl FastLoop {
         }
     }
 
-    /// The first lease's t = 0 is the run's; a later lease's is as much later as its deadline is.
+    /// The first lease's t = 0 is the run's; a later lease's is as much later as its deadline is, except
+    /// that time never goes back, which in lockstep, where ticks are shorter than their length, it would.
     fn place_in_time(&mut self) {
         if self.offset_ticks.is_some() {
             return;
@@ -160,7 +165,8 @@ impl FastLoop {
         let lease_zero_ns = self.frame.deadline_ns.saturating_sub(of_lease.saturating_mul(self.period_ns));
         let base_ns = *self.base_ns.get_or_insert(lease_zero_ns);
         let later_ns = lease_zero_ns.saturating_sub(base_ns);
-        self.offset_ticks = Some((later_ns + self.period_ns / 2) / self.period_ns);
+        let later_ticks = (later_ns + self.period_ns / 2) / self.period_ns;
+        self.offset_ticks = Some(later_ticks.max(self.next_tick.saturating_sub(of_lease)));
     }
 
     fn is_finished(&self) -> bool {

@@ -23,8 +23,8 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 /// Below the driver's priority: it must be able to run whatever happens here.
-const FIFO_PRIORITY: u8 = 70;
-/// How long before the frame is due sleeping turns into spinning, at most half a tick.
+pub const FIFO_PRIORITY: u8 = 70;
+/// Above the usual lateness of a sleep.
 const SPIN_MARGIN_NS: u64 = 100_000;
 /// How long a sleep on the doorbell lasts without a look at requests to stop.
 const NAP: Duration = Duration::from_millis(20);
@@ -66,6 +66,11 @@ pub struct FastRemains {
     pub end: FastEnd,
 }
 
+/// How long before the frame is due sleeping turns into spinning: at most half a tick.
+pub fn spin_margin_ns(period_ns: u64) -> u64 {
+    SPIN_MARGIN_NS.min(period_ns / 2)
+}
+
 /// Starts it. Returns what of its set-up was obtained.
 ///
 /// # Errors
@@ -86,6 +91,17 @@ pub fn start(
     })?;
     let report = receive.recv().map_err(|_| std::io::Error::other("the fast thread panicked in its set-up"))?;
     Ok((report, thread))
+}
+
+/// What to say if the driver spins on the only CPU that is left to us: we run only once it has given up, as it
+/// does for a second at a time.
+pub fn shares_a_spinning_cpu(info: &DriverInfo) -> Option<String> {
+    let spins = info.clock_mode == ClockMode::Real && info.wait_mode == WaitMode::Spin;
+    let cpu = info.cpu.filter(|_| spins && own_cpu(info).is_none())?;
+    Some(format!(
+        "the driver spins on CPU {cpu}, the only one open to this program: some replies in each second will be late; \
+         remedy: open another CPU to it (taskset, cpuset), or set wait = \"futex\" in the driver's [real_time]"
+    ))
 }
 
 /// A CPU that is not the driver's, if there is one.
@@ -140,7 +156,7 @@ impl FastThread {
         wait: WaitMode,
     ) -> Self {
         let period_ns = info.period_ns;
-        let margin_ns = SPIN_MARGIN_NS.min(period_ns / 2);
+        let margin_ns = spin_margin_ns(period_ns);
         let step_ns = Histogram::new();
         Self { fast, driver, commander, shared, wait, period_ns, margin_ns, step_ns, seen: None, due_ns: None }
     }
@@ -163,7 +179,7 @@ impl FastThread {
         let begun = monotonic_ns();
         let turn = self.fast.turn(tick, &self.driver, &self.commander);
         self.seen = Some(tick);
-        self.due_ns = Some(self.fast.frame().deadline_ns + self.period_ns);
+        self.due_ns = Some(self.fast.frame().deadline_ns.saturating_add(self.period_ns));
         match turn {
             Turn::Answered => {
                 self.step_ns.record(monotonic_ns() - begun);
@@ -200,9 +216,12 @@ impl FastThread {
     /// Returns with the next frame, or when it is long overdue.
     fn spin_for_frame(&self) {
         let Some(due_ns) = self.due_ns else { return };
+        let now = monotonic_ns();
+        // The driver says when; a wrong word of its must not put this thread to sleep for ever.
+        let due_ns = due_ns.min(now + self.period_ns);
         let until_ns = due_ns + 2 * self.period_ns;
         let sleep_until = due_ns.saturating_sub(self.margin_ns);
-        if monotonic_ns() < sleep_until {
+        if now < sleep_until {
             sleep_until_ns(sleep_until);
         }
         while self.driver.latest_tick() == self.seen && monotonic_ns() < until_ns {

@@ -1,8 +1,10 @@
 //! How a run can end.
 
 use crate::recording::RecordingError;
+use io_driver::open::OpenError;
 use shm_abi::FaultReason;
 use shm_abi::client::AttachError;
+use shm_abi::segment::SegmentError;
 use thiserror::Error;
 
 /// Why a run stopped without anything being wrong.
@@ -23,6 +25,12 @@ pub enum RunFailure {
     /// The driver could not be attached to.
     #[error(transparent)]
     Attach(#[from] AttachError),
+    /// There is no shared memory.
+    #[error(transparent)]
+    Segment(#[from] SegmentError),
+    /// A device of the virtual clock's driver cannot be had.
+    #[error(transparent)]
+    Device(#[from] OpenError),
     /// The driver is in its fault state.
     #[error("the driver is in its fault state: {0}; the motors are off")]
     DriverFault(&'static str),
@@ -49,7 +57,7 @@ impl RunFailure {
     /// The exit status of the run contract: 2 nothing was started, 3 a fault during the run.
     pub fn exit_status(&self) -> u8 {
         match self {
-            Self::Start(_) | Self::Attach(_) | Self::Recording(RecordingError::Create { .. }) => 2,
+            Self::Start(_) | Self::Attach(_) | Self::Segment(_) | Self::Device(_) | Self::Recording(RecordingError::Create { .. }) => 2,
             _ => 3,
         }
     }

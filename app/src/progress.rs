@@ -26,11 +26,6 @@ impl Progress {
 
     /// Shows it, if it is time to.
     pub fn show(&mut self, run_ticks: u64) {
-        self.show_with(run_ticks, || String::new());
-    }
-
-    /// Shows it with a remark, which is made only then.
-    pub fn show_with(&mut self, run_ticks: u64, remark: impl FnOnce() -> String) {
         let pause = if self.on_terminal { ON_TERMINAL } else { ELSEWHERE };
         if self.last.elapsed() < pause {
             return;
@@ -39,7 +34,7 @@ impl Progress {
         let seconds = |ticks: u64| run_time_s(ticks as i64, self.period_ns);
         let done = run_ticks.min(self.total_ticks);
         let percent = 100 * done / self.total_ticks.max(1);
-        let line = format!("{:7.2} s of {:.2} s  {percent:3} %{}", seconds(done), seconds(self.total_ticks), remark());
+        let line = format!("{:7.2} s of {:.2} s  {percent:3} %", seconds(done), seconds(self.total_ticks));
         let mut out = std::io::stderr().lock();
         // Nobody to tell is no reason to stop.
         let _ = if self.on_terminal { write!(out, "\r{line}\x1b[K") } else { writeln!(out, "{line}") };

@@ -5,7 +5,7 @@ use crate::fast_step::{DeviceFinger, FastStep};
 use crate::mount::Mount;
 use crate::recording::Names;
 use haptics::{Entity, Finger, Friction, ParameterError, Plane, Shape, Sphere};
-use io_driver::config::{Backend, DeviceConfig, DriverConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig};
+use io_driver::config::{Backend, DeviceConfig, DriverConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig, usual_spin_margin_ns};
 use io_driver::sim::script::{HandError, HandScript};
 use shm_abi::segment::ClockMode;
 use std::io;
@@ -150,6 +150,7 @@ impl Rig {
         let period_ns = self.period_ns;
         let ticks = |ms: u64| (ms * 1_000_000 / period_ns).max(1);
         let usual = rt_core::periodic::PeriodicConfig::hybrid(period_ns);
+        let reply = ReplyConfig { mode: ReplyMode::OnArrival, budget_ns: period_ns / 2 };
         DriverConfig {
             period_ns,
             clock,
@@ -159,10 +160,10 @@ impl Rig {
                 priority: Some(80),
                 lock_memory: true,
                 phase_offset_ns: usual.phase_offset_ns % period_ns,
-                spin_margin_ns: usual.spin_margin_ns,
+                spin_margin_ns: usual_spin_margin_ns(period_ns, reply.budget_ns),
                 wait: None,
             },
-            reply: ReplyConfig { mode: ReplyMode::OnArrival, budget_ns: period_ns / 2 },
+            reply,
             safety: SafetyConfig {
                 max_command_age_ticks: 5,
                 ramp_in_ticks: ticks(200),

@@ -7,11 +7,10 @@ use crate::progress::Progress;
 use crate::recording::Recording;
 use crate::report::{Baseline, Report};
 use crate::rig::Rig;
-use crate::slow::{ROW_QUEUE, SlowSide};
+use crate::slow::{SlowSide, row_queue};
 use crate::two_processes::{self, Source};
 use crate::virtual_clock;
 use rt_core::signals::StopSignals;
-use rtrb::RingBuffer;
 use shm_abi::client;
 use shm_abi::segment::{ClockMode, DriverInfo};
 use std::path::PathBuf;
@@ -69,7 +68,7 @@ impl Parts {
         }
         let when_full = if plan.clock == ClockMode::Real { WhenFull::Drop } else { WhenFull::Wait };
         let step = rig.fast_step().map_err(|error| RunFailure::Start(error.to_string()))?;
-        let (producer, consumer) = RingBuffer::new(ROW_QUEUE);
+        let (producer, consumer) = row_queue();
         let record = |path: &PathBuf| Recording::create(path, rig.names(), period_ns);
         let recording = plan.record.as_ref().map(record).transpose()?;
         Ok(Self {

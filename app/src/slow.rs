@@ -2,10 +2,19 @@
 
 use crate::recording::{Recording, RecordingError};
 use crate::row::Row;
-use rtrb::Consumer;
+use rtrb::{Consumer, Producer, RingBuffer};
 
 /// Rows that may wait: eight seconds at 1 kHz, so that a slow disk costs nothing.
 pub const ROW_QUEUE: usize = 8192;
+
+/// The queue between fast and slow side. Each place has been written to once: where memory is not locked, the
+/// first touch would otherwise be a page fault of the fast thread, every few ticks for eight seconds.
+pub fn row_queue() -> (Producer<Row>, Consumer<Row>) {
+    let (mut producer, mut consumer) = RingBuffer::new(ROW_QUEUE);
+    while producer.push(Row::empty()).is_ok() {}
+    while consumer.pop().is_ok() {}
+    (producer, consumer)
+}
 
 /// The slow side of a run.
 pub struct SlowSide {

@@ -13,7 +13,6 @@ use io_driver::driver::{describe, make_cycle};
 use io_driver::open::open_devices;
 use rt_core::signals::StopSignals;
 use shm_abi::doorbell::WaitMode;
-use shm_abi::segment::SegmentError;
 use shm_abi::{CommanderMemory, CommanderView, DriverMemory, DriverView};
 use std::os::fd::AsFd;
 use std::sync::Arc;
@@ -35,12 +34,12 @@ pub fn run(
     progress: &mut Progress,
     signals: &StopSignals,
 ) -> Result<(Tally, Stop, DriverView), RunFailure> {
-    let devices = open_devices(config).map_err(|error| RunFailure::Start(error.to_string()))?;
+    let devices = open_devices(config)?;
     let info = describe(config, &devices, WaitMode::Spin);
-    let memory = Arc::new(DriverMemory::create(&info).map_err(no_memory)?);
-    let driver = DriverView::map(memory.fd()).map_err(no_memory)?;
-    let (view, fd) = CommanderView::create(LEASE).map_err(no_memory)?;
-    let commander = CommanderMemory::map(fd.as_fd()).map_err(no_memory)?;
+    let memory = Arc::new(DriverMemory::create(&info)?);
+    let driver = DriverView::map(memory.fd())?;
+    let (view, fd) = CommanderView::create(LEASE)?;
+    let commander = CommanderMemory::map(fd.as_fd())?;
     let mut cycle = make_cycle(config, memory, devices);
     cycle.grant(view);
     cycle.change_lease();
@@ -63,8 +62,4 @@ pub fn run(
         }
     }
     unreachable!("ticks do not run out")
-}
-
-fn no_memory(error: SegmentError) -> RunFailure {
-    RunFailure::Start(error.to_string())
 }

@@ -171,6 +171,7 @@ impl DriverConfig {
         let rate_hz = raw.rate_hz.as_ref().map_or(Ok(1000.0), |rate| toml.number(rate, RATE))?;
         let period_ns = period_of(rate_hz);
         let directory = file.parent().unwrap_or(Path::new("."));
+        let reply = raw.reply.validate(&toml, period_ns)?;
         Ok(Self {
             period_ns,
             clock: match raw.clock.unwrap_or(RawClock::Real) {
@@ -178,8 +179,8 @@ impl DriverConfig {
                 RawClock::Lockstep => ClockMode::Lockstep,
             },
             socket: raw.socket.map(|path| directory.join(path)),
-            real_time: raw.real_time.validate(&toml, period_ns)?,
-            reply: raw.reply.validate(&toml, period_ns)?,
+            real_time: raw.real_time.validate(&toml, period_ns, reply.budget_ns)?,
+            reply,
             safety: raw.safety.validate(&toml, period_ns)?,
             devices: devices(&raw.device, &toml, directory)?,
         })
@@ -189,6 +190,14 @@ impl DriverConfig {
 /// The whole number of nanoseconds nearest to a rate's period.
 pub fn period_of(rate_hz: f64) -> u64 {
     (1e9 / rate_hz).round() as u64
+}
+
+/// The spin margin if nobody says. However the replies fail, a tick then sleeps for at least a quarter of
+/// what the budget leaves: a loop that spun until the budget's end and from there on to the next deadline would
+/// never sleep, and the kernel would throttle it (5 % of each second) and starve all else on its CPU.
+pub fn usual_spin_margin_ns(period_ns: u64, budget_ns: u64) -> u64 {
+    let rest_ns = period_ns.saturating_sub(budget_ns);
+    rt_core::periodic::PeriodicConfig::hybrid(period_ns).spin_margin_ns.min(rest_ns / 4 * 3)
 }
 
 const RATE: Allowed = Allowed { min: 10.0, max: 20_000.0, unit: "Hz" };
@@ -235,7 +244,7 @@ enum RawWait {
 }
 
 impl RawRealTime {
-    fn validate(self, toml: &TomlText<'_>, period_ns: u64) -> Result<RealTime, TomlReport> {
+    fn validate(self, toml: &TomlText<'_>, period_ns: u64, budget_ns: u64) -> Result<RealTime, TomlReport> {
         let usual = rt_core::periodic::PeriodicConfig::hybrid(period_ns);
         let within_period = Allowed { min: 0.0, max: period_ns as f64 / 1e3, unit: "us" };
         let us = |key: &Option<Spanned<f64>>, default_ns: u64| match key {
@@ -243,7 +252,7 @@ impl RawRealTime {
             None => Ok(default_ns),
         };
         let phase_offset_ns = us(&self.phase_offset_us, usual.phase_offset_ns % period_ns)?;
-        let spin_margin_ns = us(&self.spin_margin_us, usual.spin_margin_ns)?;
+        let spin_margin_ns = us(&self.spin_margin_us, usual_spin_margin_ns(period_ns, budget_ns))?;
         let cpu = self.cpu.map(|cpu| toml.integer(&cpu, 0..=4095)).transpose()?;
         // 0 switches real-time scheduling off; 99 is left to the kernel's own threads.
         let priority = self.priority.map(|priority| toml.integer(&priority, 0..=98)).transpose()?.unwrap_or(80);

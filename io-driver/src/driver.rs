@@ -22,7 +22,7 @@ use shm_abi::doorbell::WaitMode;
 use shm_abi::segment::{ClockMode, DriverInfo, SegmentError};
 use shm_abi::server::{BindError, Server, ServerEvent};
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc;
@@ -98,8 +98,13 @@ static TICK: AtomicU64 = AtomicU64::new(0);
 pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> {
     let signals = StopSignals::install().map_err(|source| RunError::System { what: "catch signals", source })?;
     if let Some(parent) = options.parent {
-        rt_core::process::die_with_parent(parent, rustix::process::Signal::TERM.as_raw())
-            .map_err(|error| RunError::Orphaned(error.to_string()))?;
+        // Not SIGTERM, which ends the process at once when it comes twice: a parent of several threads can die
+        // twice to the kernel, first the thread that started this process, then the one that inherited it.
+        rt_core::process::die_with_parent(parent, rustix::process::Signal::HUP.as_raw())
+            .map_err(|error| {
+                options.socket.as_deref().map(remove_directory_of);
+                RunError::Orphaned(error.to_string())
+            })?;
     }
     let devices = open_devices(config)?;
     let shared = Shared::default();
@@ -180,12 +185,15 @@ fn setup_request(config: &DriverConfig) -> SetupRequest {
     }
 }
 
-/// Spinning is right only on a CPU of one's own with real-time rights; else it starves whom it waits for.
+/// Spinning is right only with real-time rights on one CPU of several; else it starves whom it waits for. A
+/// driver that is confined to a single CPU cannot know where the application is, so it does not spin unless
+/// told to.
 fn choose_wait_mode(config: &DriverConfig, report: &SetupReport) -> WaitMode {
     if config.clock != ClockMode::Real {
         return WaitMode::Futex;
     }
-    let owns_cpu = loop_cpu(config).is_some() && config.real_time.priority.is_some();
+    let leaves_a_cpu = rt_core::cpu::online_cpus().len() > 1;
+    let owns_cpu = loop_cpu(config).is_some() && leaves_a_cpu && config.real_time.priority.is_some();
     let obtained = ["scheduling", "cpu"].iter().all(|name| report.find(name).is_some_and(|item| item.obtained));
     config.real_time.wait.unwrap_or(if owns_cpu && obtained { WaitMode::Spin } else { WaitMode::Futex })
 }
@@ -238,7 +246,7 @@ fn tell_guarantees(report: &SetupReport, options: &RunOptions) -> Result<(), Run
     if options.strict && !report.all_obtained() {
         return Err(RunError::Strict(report.clone()));
     }
-    say(options, format_args!("real-time guarantees:\n{report}"));
+    say(options, format_args!("real-time guarantees:\n{}", report.to_string().trim_end()));
     Ok(())
 }
 
@@ -257,12 +265,19 @@ fn say(options: &RunOptions, message: std::fmt::Arguments<'_>) {
     }
 }
 
-/// A parent that was killed cannot remove the directory that it made for this driver's socket.
+/// Removes the socket, and with it what a parent that was killed cannot remove.
 fn tidy_up(server: Server, options: &RunOptions) {
-    let directory = server.path().parent().map(std::path::Path::to_path_buf);
+    let path = server.path().to_path_buf();
     drop(server);
-    if let (Some(directory), Some(_)) = (directory, options.parent) {
-        // It fails, rightly, if anything else lies in it.
+    if options.parent.is_some() {
+        remove_directory_of(&path);
+    }
+}
+
+/// The directory that a parent made for its child's socket, and nothing else.
+fn remove_directory_of(socket: &Path) {
+    if let Some(directory) = socket.parent() {
+        // It fails, rightly, if anything lies in it.
         let _ = std::fs::remove_dir(directory);
     }
 }

@@ -4,8 +4,11 @@
 //! lockstep the budget is unlimited while somebody commands, and a tick begins as soon as the former is
 //! done; with nobody commanding, time goes on at the devices' rate.
 //!
+//! A loop that spins for replies and gets none for a while sleeps for them instead, for a second: a stopped
+//! application leaves no CPU burning, and one that cannot run because of the spinning gets to run.
+//!
 //! Invariant: whatever ends the loop (a request, a panic), the motors are written zero before anything else.
-//! Cost: in spin mode the timed wait is the only system call.
+//! Cost: in spin mode the timed wait is the only system call, while replies come.
 
 use crate::config::{DriverConfig, ReplyMode};
 use crate::cycle::Cycle;
@@ -25,6 +28,12 @@ use std::time::Duration;
 
 /// How long a sleeping loop goes without looking at its mail and at requests to stop.
 const NAP: Duration = Duration::from_millis(10);
+
+/// Spinning without any reply for so long does no good. As long as an old command may drive the motors by
+/// default at 1 kHz; many times what a reply takes, and rare even among stalls of a virtual machine.
+const PATIENCE_NS: u64 = 5_000_000;
+/// How long it sleeps for replies after that before it tries spinning again.
+const RETREAT_NS: u64 = 1_000_000_000;
 
 /// What the loop and the rest of the process share.
 #[derive(Debug, Clone, Default)]
@@ -56,6 +65,11 @@ pub struct RealLoop {
     wait_mode: WaitMode,
     mode: ReplyMode,
     budget_ns: u64,
+    /// Ticks on end that a commander left unanswered, and how many of them are enough.
+    unanswered_ticks: u64,
+    patience_ticks: u64,
+    /// Until then replies are slept for, whatever the wait mode.
+    retreat_until_ns: u64,
     periodic: Periodic,
     lockstep_tick: u64,
     logged_state: Option<DriverState>,
@@ -95,6 +109,9 @@ impl RealLoop {
             wait_mode,
             mode: config.reply.mode,
             budget_ns: config.reply.budget_ns,
+            unanswered_ticks: 0,
+            patience_ticks: PATIENCE_NS.div_ceil(config.period_ns),
+            retreat_until_ns: 0,
             periodic,
             lockstep_tick: 0,
             logged_state: None,
@@ -176,15 +193,24 @@ impl RealLoop {
     }
 
     fn wait_within(&mut self, until_ns: u64) {
+        let wait_mode = if until_ns < self.retreat_until_ns { WaitMode::Futex } else { self.wait_mode };
         while !self.cycle.take_reply() {
             let now = monotonic_ns();
             if now >= until_ns {
-                return;
+                return self.note_unanswered(now);
             }
-            match self.wait_mode {
+            match wait_mode {
                 WaitMode::Spin => spin_loop(),
                 WaitMode::Futex => self.sleep_for_reply(Duration::from_nanos(until_ns - now)),
             }
+        }
+        self.unanswered_ticks = 0;
+    }
+
+    fn note_unanswered(&mut self, now: u64) {
+        self.unanswered_ticks += 1;
+        if self.unanswered_ticks >= self.patience_ticks {
+            self.retreat_until_ns = now + RETREAT_NS;
         }
     }
 

@@ -5,9 +5,10 @@
 //! parent that ended *before* the request leaves no signal, so the parent's id is checked after it.
 //! Invariants: after `Ok` the signal comes whenever the parent ends; after `Err` nothing is changed.
 //! Beware: to the kernel the parent is the *thread* that started the child; start it from one that
-//! lives as long as the process. Changing credentials, or executing a program with set-user-id bit
-//! or file capabilities, clears the request: make it in the program itself, not between fork and
-//! exec.
+//! lives as long as the process. When that thread ends before the others, as it may under SIGKILL,
+//! the child passes to one of them and the signal comes again at its end: choose a signal that may
+//! come twice. Changing credentials, or executing a program with set-user-id bit or file
+//! capabilities, clears the request: make it in the program itself, not between fork and exec.
 
 use nix::errno::Errno;
 use nix::sys::prctl::{get_pdeathsig, set_pdeathsig};

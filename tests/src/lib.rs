@@ -5,6 +5,11 @@
 
 #![forbid(unsafe_code)]
 
+pub mod bare_loop;
 pub mod driver;
+pub mod faults;
 pub mod programs;
 pub mod recording;
+pub mod workplace;
+pub mod slices;
+pub mod threads;

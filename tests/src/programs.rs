@@ -13,6 +13,11 @@ pub fn io_driver() -> Command {
     Command::new(program("io-driver-under-test"))
 }
 
+/// The bare reference loop, ready for arguments.
+pub fn bare_loop() -> Command {
+    Command::new(program("bare-loop"))
+}
+
 /// What a finished program said, for asserting on.
 pub fn said(output: &Output) -> (Option<i32>, String, String) {
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();

@@ -1,5 +1,6 @@
 //! A recording read back.
 
+use nalgebra::Vector3;
 use std::path::Path;
 
 /// Columns by name.
@@ -46,8 +47,79 @@ impl Table {
     }
 
     /// Three columns `{name}_x|y|z`.
-    pub fn vectors(&self, name: &str) -> Vec<nalgebra::Vector3<f64>> {
+    pub fn vectors(&self, name: &str) -> Vec<Vector3<f64>> {
         let [x, y, z] = ["x", "y", "z"].map(|axis| self.numbers(&format!("{name}_{axis}")));
-        (0..self.len()).map(|row| nalgebra::Vector3::new(x[row], y[row], z[row])).collect()
+        (0..self.len()).map(|row| Vector3::new(x[row], y[row], z[row])).collect()
+    }
+
+    /// The names of all columns.
+    pub fn columns(&self) -> &[String] {
+        &self.columns
+    }
+
+    /// The rows as they are written, cell by cell.
+    pub fn rows(&self) -> &[Vec<String>] {
+        &self.rows
+    }
+
+    /// All columns of a finger.
+    pub fn finger(&self, name: &str) -> Vec<Sample> {
+        let t = self.numbers("t");
+        let vectors = ["hip", "god", "force", "applied"].map(|what| self.vectors(&format!("{name}_{what}")));
+        let texts = ["entity", "feature", "friction"].map(|what| self.texts(&format!("{name}_{what}")));
+        let sample = |row: usize| {
+            let [hip, god, force, applied] = vectors.each_ref().map(|column| column[row]);
+            let [entity, feature, friction] = texts.each_ref().map(|column| column[row].to_owned());
+            Sample { t: t[row], hip, god, force, applied, entity, feature, friction }
+        };
+        (0..self.len()).map(sample).collect()
+    }
+}
+
+/// One finger in one row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sample {
+    /// Time of the row [s].
+    pub t: f64,
+    /// Haptic interaction point [m].
+    pub hip: Vector3<f64>,
+    /// God-object [m].
+    pub god: Vector3<f64>,
+    /// What rendering computed, on the user [N].
+    pub force: Vector3<f64>,
+    /// What the device rendered, on the user [N].
+    pub applied: Vector3<f64>,
+    /// The touched entity's name, or nothing.
+    pub entity: String,
+    /// What of it is touched.
+    pub feature: String,
+    /// `free`, `stick` or `slip`.
+    pub friction: String,
+}
+
+impl Sample {
+    /// What holds in every row of an ideal device at full authority: a free finger's god-object is its HIP
+    /// bit for bit and nothing is felt; a touching one says what it touches; what is computed is rendered.
+    pub fn check(&self) {
+        let texts = (self.entity.as_str(), self.feature.as_str(), self.friction.as_str());
+        if self.friction == "free" {
+            assert_eq!(texts, ("", "none", "free"), "{self:?}");
+            assert_eq!((self.god, self.force), (self.hip, Vector3::zeros()), "{self:?}");
+        } else {
+            assert!(!self.entity.is_empty() && self.feature == "surface", "{self:?}");
+            assert!(["stick", "slip"].contains(&self.friction.as_str()), "{self:?}");
+        }
+        assert_eq!(self.applied, self.force, "{self:?}");
+    }
+
+    /// The force's part along the unit vector `normal`, and the rest of it.
+    pub fn split(&self, normal: &Vector3<f64>) -> (f64, Vector3<f64>) {
+        let along = self.force.dot(normal);
+        (along, self.force - normal * along)
+    }
+
+    /// Whether it touches anything.
+    pub fn touches(&self) -> bool {
+        self.friction != "free"
     }
 }

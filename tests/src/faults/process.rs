@@ -1,0 +1,135 @@
+//! Processes to be stopped, killed and asked after.
+
+use crate::driver::wait_or_kill;
+use crate::programs;
+use rustix::process::{Pid, Signal, kill_process};
+use std::io::Read;
+use std::process::{Child, Command, Stdio};
+
+/// A program's end and everything it said.
+#[derive(Debug)]
+pub struct End {
+    /// Exit status; `None` if a signal killed it.
+    pub status: Option<i32>,
+    /// The signal that killed it.
+    pub signal: Option<i32>,
+    /// Standard output.
+    pub out: String,
+    /// Standard error.
+    pub err: String,
+}
+
+/// A running program; killed when dropped.
+#[derive(Debug)]
+pub struct Running {
+    child: Child,
+}
+
+impl Running {
+    /// Starts it. It must not say more than a pipe holds, 64 KiB, before it ends.
+    pub fn start(command: &mut Command) -> Self {
+        let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).stdin(Stdio::null()).spawn();
+        Self { child: child.expect("the program starts") }
+    }
+
+    /// Its process id.
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// Sends a signal.
+    pub fn signal(&self, signal: Signal) {
+        send(self.id(), signal);
+    }
+
+    /// Kills it, and returns when it is dead.
+    pub fn kill(mut self) {
+        self.child.kill().expect("our own child");
+        self.child.wait().expect("our own child");
+    }
+
+    /// Fails the test with the program's words if it has ended.
+    pub fn must_run(&mut self) {
+        if self.child.try_wait().expect("our own child").is_some() {
+            panic!("it ended by itself: {:?}", self.end());
+        }
+    }
+
+    /// Waits for its end.
+    pub fn end(&mut self) -> End {
+        use std::os::unix::process::ExitStatusExt;
+        let status = wait_or_kill(&mut self.child);
+        let text = |pipe: Option<&mut dyn Read>| {
+            let mut bytes = Vec::new();
+            pipe.expect("piped").read_to_end(&mut bytes).expect("readable");
+            String::from_utf8_lossy(&bytes).into_owned()
+        };
+        let out = text(self.child.stdout.as_mut().map(|pipe| pipe as _));
+        let err = text(self.child.stderr.as_mut().map(|pipe| pipe as _));
+        End { status: status.code(), signal: status.signal(), out, err }
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Sends a signal to a process that lives.
+pub fn send(process: u32, signal: Signal) {
+    let pid = Pid::from_raw(process.cast_signed()).expect("a process id");
+    kill_process(pid, signal).expect("it lives");
+}
+
+/// Whether a process lives; one that has died and that nobody has asked after does not.
+pub fn is_alive(process: u32) -> bool {
+    state_and_parent(process).is_some_and(|(state, _)| !matches!(state, 'Z' | 'X'))
+}
+
+/// The living children of a process.
+pub fn children_of(process: u32) -> Vec<u32> {
+    processes().filter(|id| is_alive(*id) && state_and_parent(*id).is_some_and(|(_, parent)| parent == process)).collect()
+}
+
+/// A process that has this text in its environment; one that has ended has none.
+pub fn with_environment(text: &str) -> Option<u32> {
+    let has = |id: &u32| {
+        let environment = std::fs::read(format!("/proc/{id}/environ")).unwrap_or_default();
+        environment.windows(text.len()).any(|window| window == text.as_bytes())
+    };
+    processes().find(has)
+}
+
+fn processes() -> impl Iterator<Item = u32> {
+    let all = std::fs::read_dir("/proc").expect("/proc").flatten();
+    all.filter_map(|entry| entry.file_name().to_str()?.parse().ok())
+}
+
+/// The name in the middle may hold anything, even parentheses: what follows it is counted from its end.
+fn state_and_parent(process: u32) -> Option<(char, u32)> {
+    let text = std::fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
+    let mut fields = text.get(text.rfind(')')? + 1..)?.split_whitespace();
+    Some((fields.next()?.chars().next()?, fields.next()?.parse().ok()?))
+}
+
+/// Names the role of a test program that another one started.
+const ROLE_VARIABLE: &str = "PHANTOM3_TEST_ROLE";
+
+/// This very test program again, running only the test `name`, which finds its [`role`] there.
+pub fn myself(name: &str, role: &str) -> Command {
+    let mut command = Command::new(std::env::current_exe().expect("the test knows its own file"));
+    command.args(["--exact", name, "--nocapture", "--test-threads", "1"]).env(ROLE_VARIABLE, role);
+    command
+}
+
+/// What another test program started this one for; `None`: nobody did.
+pub fn role() -> Option<String> {
+    std::env::var(ROLE_VARIABLE).ok()
+}
+
+/// `io-driver` with these arguments, at this socket, to its end.
+pub fn io_driver(arguments: &[&str], socket: &std::path::Path) -> End {
+    Running::start(programs::io_driver().args(arguments).arg("--socket").arg(socket)).end()
+}

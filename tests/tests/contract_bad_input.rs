@@ -1,0 +1,391 @@
+//! Every mistake in a command line or a file: status 2, one message that a stranger can act on, and nothing
+//! half-started.
+
+use std::ffi::{OsStr, OsString};
+use std::os::unix::ffi::OsStrExt;
+use std::os::unix::fs::PermissionsExt;
+use std::os::unix::process::CommandExt;
+use std::path::Path;
+use system_tests::workplace::{Running, Said, Workplace};
+
+const SCENE: &str = "[[finger]]\n[[entity]]\nname = \"table\"\n\
+    shape = { kind = \"plane\", normal = [0.0, 1.0, 0.0], offset_m = 0.0 }\n";
+const HAND: &str = "t,f0_x,f0_y,f0_z\n0,0,0,0\n1,0,0,0\n";
+/// A recording that must not be lost.
+const PRECIOUS: &str = "an earlier recording\n";
+
+/// A workplace with a good scene, a good hand and an earlier recording.
+fn workplace() -> Workplace {
+    let place = Workplace::new();
+    place.write("scene.toml", SCENE);
+    place.write("hand.csv", HAND);
+    place.write("out.csv", PRECIOUS);
+    place
+}
+
+/// Runs and checks everything that must hold for whatever is wrong.
+fn refused(place: &Workplace, arguments: &[impl AsRef<OsStr>]) -> String {
+    let before = place.snapshot();
+    let said = place.run(arguments);
+    let asked: Vec<_> = arguments.iter().map(|argument| argument.as_ref().to_string_lossy()).collect();
+    check_refusal(&said, &format!("phantom3 {}", asked.join(" ")));
+    assert!(place.snapshot() == before, "phantom3 {}: files have changed", asked.join(" "));
+    assert_eq!(place.processes(), Vec::<u32>::new(), "phantom3 {}: left behind", asked.join(" "));
+    said.err
+}
+
+fn check_refusal(said: &Said, asked: &str) {
+    assert_eq!(said.status, Some(2), "{asked}\n{}", said.err);
+    assert_eq!(said.out, "", "{asked}");
+    let is_ours = said.err.starts_with("phantom3: ") && said.err.lines().count() == 1;
+    // What clap says ends in its advice to ask for help.
+    let is_claps =
+        said.err.starts_with("error: ") && said.err.contains("For more information, try '--help'.");
+    assert!(is_ours || is_claps, "{asked}: not one clear message:\n{}", said.err);
+    assert!(!said.err.contains("panicked"), "{asked}\n{}", said.err);
+}
+
+fn assert_says(message: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(message.contains(part), "`{part}` is missing in: {message}");
+    }
+}
+
+/// The clocks that start something: one process, or two.
+const CLOCKS: [&str; 2] = ["virtual", "real"];
+
+#[test]
+fn a_scene_that_is_wrong_is_refused_with_file_line_key_finding_and_remedy() {
+    let entity = |rest: &str| format!("{SCENE}{rest}\n");
+    let shape = |shape: &str| format!("[[finger]]\n[[entity]]\nshape = {shape}\n");
+    let cases: Vec<(String, &[&str])> = vec![
+        ("x = = 1".into(), &["scene.toml:1:5: not valid TOML"]),
+        ("[[finger]".into(), &["scene.toml:1:", "not valid TOML"]),
+        (String::new(), &["scene.toml: no [[finger]]", "allowed: 1 to 8"]),
+        ("[[finger]]\n".repeat(9), &["scene.toml:9: finger[8]", "9 entries", "at most 8"]),
+        (
+            "[[finger]]\n[[figner]]\n".into(),
+            &["scene.toml:2: figner", "unknown key", "did you mean `finger`"],
+        ),
+        ("[[finger]]\nradius = 1\n".into(), &["scene.toml:2: finger[0].radius", "unknown key", "`radius_m`"]),
+        (
+            "[[finger]]\nradius_m = \"1\"\n".into(),
+            &["scene.toml:2: finger[0].radius_m", "the string \"1\"", "a number, 0 or more"],
+        ),
+        ("[[finger]]\nradius_m = nan\n".into(), &["finger[0].radius_m", "found nan", "a number, 0 or more"]),
+        (
+            "[[finger]]\nradius_m = -inf\n".into(),
+            &["finger[0].radius_m", "found -inf", "a number, 0 or more"],
+        ),
+        (
+            "[[finger]]\nradius_m = -0.01\n".into(),
+            &["scene.toml:2: finger[0].radius_m", "found -0.01", "0 or more"],
+        ),
+        (
+            "[[finger]]\nstart_m = [0.0, 1.0]\n".into(),
+            &["finger[0].start_m", "an array of length 2", "an array of 3 numbers"],
+        ),
+        ("[[finger]]\nstart_m = [0.0, nan, 0.0]\n".into(), &["finger[0].start_m[1]", "found nan"]),
+        ("[[finger]]\nname = \"a,b\"\n".into(), &["finger[0].name", "\"a,b\"", "A-Z a-z 0-9 _ -"]),
+        (
+            "[[finger]]\nname = \"a\"\n[[finger]]\nname = \"a\"\n".into(),
+            &["scene.toml:4: finger[1].name", "\"a\"", "line 2"],
+        ),
+        (
+            "[[finger]]\nname = \"f1\"\n[[finger]]\n".into(),
+            &["finger[1].name", "\"f1\" (the default name)", "line 2"],
+        ),
+        ("[[finger]]\ndevice = 8\n".into(), &["finger[0].device", "found 8", "0 to 7"]),
+        ("[[finger]]\n[[entity]]\n".into(), &["scene.toml:2: entity[0].shape", "missing"]),
+        (entity("name = \"b\""), &["scene.toml:5", "not valid TOML", "duplicate key"]),
+        (
+            entity(&format!(
+                "[[entity]]\nname = \"table\"\n{}",
+                "shape = { kind = \"sphere\", radius_m = 1.0 }"
+            )),
+            &["entity[1].name", "\"table\"", "line 3"],
+        ),
+        (
+            entity("mass_kg = 0.1"),
+            &["scene.toml:5: entity[0].mass_kg", "not available in this version", "available: name, shape"],
+        ),
+        (
+            entity("velocity_m_s = [0.0, 0.0, 0.0]"),
+            &["entity[0].velocity_m_s", "not available in this version"],
+        ),
+        (entity("stiffness_n_per_m = 0"), &["entity[0].stiffness_n_per_m", "found 0", "above 0"]),
+        (entity("damping_n_s_per_m = -1"), &["entity[0].damping_n_s_per_m", "found -1", "0 or more"]),
+        (
+            entity("orientation_wxyz = [1.0, 1.0, 0.0, 0.0]"),
+            &["entity[0].orientation_wxyz", "length 1.414", "of length 1"],
+        ),
+        (entity("friction = 0.5"), &["entity[0].friction", "found 0.5", "{ model = \"coulomb\", mu = 0.5 }"]),
+        (
+            entity("friction = { model = \"columb\", mu = 0.5 }"),
+            &["friction.model", "`columb`", "did you mean `coulomb`"],
+        ),
+        (
+            entity("friction = { model = \"lugre\" }"),
+            &[
+                "scene.toml:5: entity[0].friction.model",
+                "`lugre` is not available",
+                "none, coulomb, stiction",
+            ],
+        ),
+        (
+            entity("friction = { model = \"coulomb\" }"),
+            &["entity[0].friction.mu", "missing", "a number, 0 or more"],
+        ),
+        (entity("friction = { model = \"coulomb\", mu = -0.1 }"), &["entity[0].friction.mu", "found -0.1"]),
+        (
+            entity("friction = { model = \"stiction\", mu_s = 0.3, mu_d = 0.7 }"),
+            &["friction.mu_d", "found 0.7", "from 0 to mu_s = 0.3"],
+        ),
+        (
+            shape("{ kind = \"box\", size_m = [1.0, 1.0, 1.0] }"),
+            &["scene.toml:3: entity[0].shape.kind", "`box` is not available", "available: plane, sphere"],
+        ),
+        (shape("{ kind = \"spehre\", radius_m = 1.0 }"), &["`spehre`", "did you mean `sphere`"]),
+        (
+            shape("{ kind = \"sphere\", radius_m = 0.0 }"),
+            &["entity[0].shape.radius_m", "found 0.0", "above 0"],
+        ),
+        (
+            shape("{ kind = \"plane\", normal = [0.0, 0.0, 0.0], offset_m = 0.0 }"),
+            &["entity[0].shape.normal", "zero vector", "a direction"],
+        ),
+    ];
+    let later = ["cylinder", "cone", "torus", "capsule", "ellipsoid", "mesh", "nurbs", "csg"];
+    let place = workplace();
+    for (index, (scene, parts)) in cases.iter().enumerate() {
+        place.write("scene.toml", scene);
+        let clock = CLOCKS[index % 2];
+        assert_says(&refused(&place, &["run", "scene.toml", "--clock", clock, "--record", "out.csv"]), parts);
+    }
+    for kind in later {
+        place.write("scene.toml", shape(&format!("{{ kind = \"{kind}\" }}")));
+        let message = refused(&place, &["run", "scene.toml", "--record", "out.csv"]);
+        assert_says(
+            &message,
+            &[&format!("`{kind}` is not available in this version; available: plane, sphere")],
+        );
+    }
+    for model in ["stribeck", "karnopp", "dahl", "curve"] {
+        place.write("scene.toml", entity(&format!("friction = {{ model = \"{model}\" }}")));
+        let message = refused(&place, &["run", "scene.toml", "--record", "out.csv"]);
+        assert_says(
+            &message,
+            &[&format!("`{model}` is not available in this version; available: none, coulomb")],
+        );
+    }
+}
+
+#[test]
+fn a_hand_that_is_wrong_is_refused_with_file_line_column_finding_and_remedy() {
+    let cases: &[(&str, &[&str])] = &[
+        ("", &["hand.csv:1", "an empty file", "a header line"]),
+        ("\n\n", &["hand.csv:1", "an empty file"]),
+        ("t,f0_x,f0_y,f0_z\n", &["hand.csv:1", "end of the file after the header", "at least one row"]),
+        ("f0_x,f0_y,f0_z\n1,2,3\n", &["hand.csv:1", "`f0_x`", "`t`"]),
+        ("t\n0\n", &["hand.csv:1", "no columns beside the time", "f0"]),
+        ("t,f0_x,f0_y\n0,1,2\n", &["hand.csv:1", "`f0_z`", "all three coordinates"]),
+        ("t,f7_x,f7_y,f7_z\n0,1,2,3\n", &["hand.csv:1", "`f7_x`", "f0"]),
+        ("t,f0_x,f0_x,f0_y,f0_z\n0,1,2,3,4\n", &["hand.csv:1", "`f0_x`", "different"]),
+        (
+            "t,f0_x,f0_y,f0_z\n0,1,2,3\n0,1,2,3\n",
+            &["hand.csv:3", "column `t`", "found 0 s after 0 s", "later"],
+        ),
+        ("t,f0_x,f0_y,f0_z\n1,1,2,3\n0.5,1,2,3\n", &["hand.csv:3", "column `t`", "0.5 s after 1 s"]),
+        ("t,f0_x,f0_y,f0_z\n0,1,two,3\n", &["hand.csv:2", "column `f0_y`", "`two`", "a finite number"]),
+        ("t,f0_x,f0_y,f0_z\n0,1,nan,3\n", &["hand.csv:2", "column `f0_y`", "`nan`", "a finite number"]),
+        ("t,f0_x,f0_y,f0_z\n0,1,inf,3\n", &["hand.csv:2", "column `f0_y`", "`inf`", "a finite number"]),
+        ("t,f0_x,f0_y,f0_z\n0,1,1e300,3\n", &["hand.csv:2", "`1e300`", "1e15"]),
+        ("t,f0_x,f0_y,f0_z\n0,1,,3\n", &["hand.csv:2", "column `f0_y`", "nothing"]),
+        ("t,f0_x,f0_y,f0_z\n0,1,2\n", &["hand.csv:2", "3 cells", "allowed: 4"]),
+        ("t,f0_x,f0_y,f0_z\n0,1,2,3,4\n", &["hand.csv:2", "5 cells", "allowed: 4"]),
+        ("t,f0_x,f0_y,f0_z\n0,1,2,3\n\n1,1,2,3\n", &["hand.csv:3", "0 cells"]),
+        ("t;f0_x;f0_y;f0_z\n0;1;2;3\n", &["hand.csv:1", "`t;f0_x;f0_y;f0_z`", "`t`"]),
+    ];
+    let place = workplace();
+    for (index, (hand, parts)) in cases.iter().enumerate() {
+        place.write("hand.csv", hand);
+        let clock = CLOCKS[index % 2];
+        let message = refused(
+            &place,
+            &["run", "scene.toml", "--hand", "hand.csv", "--clock", clock, "--record", "out.csv"],
+        );
+        assert_says(&message, parts);
+    }
+    place.write("hand.csv", [0x74, 0xff, 0xfe]);
+    assert_says(&refused(&place, &["run", "scene.toml", "--hand", "hand.csv"]), &["hand.csv", "UTF-8"]);
+}
+
+#[test]
+fn a_hand_that_cannot_be_read_is_refused_and_the_message_says_who_asked_for_it() {
+    let place = workplace();
+    for clock in CLOCKS {
+        let with = |hand: &str| {
+            refused(&place, &["run", "scene.toml", "--hand", hand, "--clock", clock, "--record", "out.csv"])
+        };
+        assert_says(&with("none.csv"), &["none.csv", "--hand", "No such file"]);
+        assert_says(&with("."), &["the hand file .", "not a regular file"]);
+        // Every device reads the file for itself, which a pipe would not survive, and zeros never end.
+        assert_says(&with("/dev/zero"), &["/dev/zero", "not a regular file", "allowed: a file"]);
+    }
+    place.write("scene.toml", format!("hand = \"none.csv\"\n{SCENE}"));
+    let message = refused(&place, &["run", "scene.toml", "--record", "out.csv"]);
+    assert_says(&message, &["none.csv", "named by scene.toml", "No such file"]);
+}
+
+#[test]
+fn a_command_line_that_is_wrong_is_refused_with_what_was_found_and_what_is_allowed() {
+    let cases: &[(&[&str], &[&str])] = &[
+        (&["--rate-hz", "0"], &["--rate-hz", "found 0", "10 to 20000 Hz"]),
+        (&["--rate-hz", "-1000"], &["--rate-hz", "found -1000", "10 to 20000 Hz"]),
+        (&["--rate-hz", "abc"], &["--rate-hz", "found abc", "10 to 20000 Hz"]),
+        (&["--rate-hz", "1e9"], &["--rate-hz", "found 1e9", "10 to 20000 Hz"]),
+        (&["--rate-hz", "nan"], &["--rate-hz", "found nan", "10 to 20000 Hz"]),
+        (&["--rate-hz"], &["--rate-hz", "a value is required"]),
+        (&["--seconds", "0"], &["--seconds", "found 0", "more than 0"]),
+        (&["--seconds", "-1"], &["--seconds", "found -1", "more than 0"]),
+        (&["--seconds", "nan"], &["--seconds", "found nan", "at most 86400"]),
+        (&["--seconds", "inf"], &["--seconds", "found inf", "at most 86400"]),
+        (
+            &["--seconds", "1e-9", "--clock", "virtual"],
+            &["--seconds 0.000000001", "at least one tick, 0.001 s"],
+        ),
+        (&["--clock", "foo"], &["'foo'", "--clock", "virtual, lockstep, real"]),
+        (
+            &["--hand-mode", "impedance"],
+            &["--hand-mode impedance is not available in this version", "kinematic"],
+        ),
+        (&["--hand-mode", "foo"], &["'foo'", "--hand-mode", "kinematic"]),
+        (&["--seed", "x"], &["--seed", "found x", "a whole number from 0"]),
+        (&["--seed", "-1"], &["--seed", "found -1", "a whole number from 0"]),
+        (&["--layout", "none.toml"], &["none.toml", "no such file"]),
+        (&["--layout", "scene.toml"], &["scene.toml:1: finger", "unknown key", "allowed: device"]),
+        (&["--attach", "none.sock"], &["none.sock", "no driver is running", "io-driver run"]),
+        (&["--attach", "hand.csv"], &["hand.csv", "not a driver's socket"]),
+        (&["--attach", "."], &["not a driver's socket"]),
+        (&["--attach", "none.sock", "--clock", "virtual"], &["--attach", "--clock virtual"]),
+        (&["--attach", "none.sock", "--hand", "hand.csv"], &["--attach", "--hand"]),
+        (&["--attach", "none.sock", "--rate-hz", "1000"], &["--attach", "--rate-hz"]),
+        (&["--grace", "-1"], &["--grace", "found -1", "0 to 3600"]),
+        (&["--wobble"], &["--wobble"]),
+        (&["another.toml"], &["another.toml"]),
+    ];
+    let place = workplace();
+    for (more, parts) in cases {
+        let arguments = [&["run", "scene.toml", "--record", "out.csv"], *more].concat();
+        assert_says(&refused(&place, &arguments), parts);
+    }
+    assert_says(&refused(&place, &["run"]), &["<SCENE>"]);
+    assert_says(&refused(&place, &["frobnicate"]), &["frobnicate"]);
+    assert_says(&refused(&place, &["scene.toml"]), &["scene.toml"]);
+}
+
+#[test]
+fn a_scene_that_cannot_be_read_is_refused() {
+    let place = workplace();
+    place.write("binary.toml", [0x7f, b'E', b'L', b'F', 2, 1, 1, 0, 0xff, 0xfe]);
+    std::fs::create_dir(place.path("directory.toml")).expect("a directory");
+    let long = "a/".repeat(3000) + "scene.toml";
+    let name = "n".repeat(300);
+    let cases: [(&str, &[&str]); 6] = [
+        ("none.toml", &["none.toml: no such file"]),
+        ("", &["a value is required for '<SCENE>'"]),
+        ("directory.toml", &["directory.toml: cannot be read", "directory"]),
+        ("binary.toml", &["binary.toml:1", "not UTF-8 text"]),
+        (&long, &["cannot be read", "too long"]),
+        (&name, &["cannot be read", "too long"]),
+    ];
+    for (scene, parts) in cases {
+        assert_says(&refused(&place, &["run", scene, "--record", "out.csv"]), parts);
+    }
+    assert_says(&refused(&place, &["run", "/dev/zero"]), &["/dev/zero", "larger than 16777216 bytes"]);
+}
+
+#[test]
+fn names_of_files_need_not_be_text() {
+    let place = workplace();
+    let named = |bytes: &[u8]| OsString::from(OsStr::from_bytes(bytes));
+    let (missing, scene, hand) = (named(b"\xffnone.toml"), named(b"\xffscene.toml"), named(b"\xffhand.csv"));
+    assert_says(&refused(&place, &[named(b"run"), missing]), &["none.toml: no such file"]);
+    place.write(&scene, SCENE);
+    place.write(&hand, HAND);
+    let run = |clock: &str| {
+        [named(b"run"), scene.clone(), "--clock".into(), clock.into(), "--seconds".into(), "0.1".into()]
+    };
+    let said = place.run(run("virtual").iter().cloned().chain(["--hand".into(), hand.clone()]));
+    assert_eq!((said.status, said.err.as_str()), (Some(0), ""));
+    let said = place.run(run("lockstep"));
+    assert_eq!((said.status, said.err.as_str()), (Some(0), ""));
+    // Only the way to the driver, a TOML text, is closed to such names.
+    let arguments: Vec<OsString> = run("real").into_iter().chain(["--hand".into(), hand]).collect();
+    assert_says(&refused(&place, &arguments), &["hand.csv is not UTF-8", "rename it"]);
+}
+
+#[test]
+fn a_recording_that_cannot_be_made_or_would_destroy_an_input_is_refused() {
+    let place = workplace();
+    let scene = place.write("named.toml", format!("hand = \"own.csv\"\n{SCENE}"));
+    place.write("own.csv", HAND);
+    place.write("layout.toml", "");
+    std::os::unix::fs::symlink(&scene, place.path("symbolic.csv")).expect("a link");
+    std::fs::hard_link(place.path("own.csv"), place.path("hard.csv")).expect("a link");
+    let long = "n".repeat(300);
+    for clock in CLOCKS {
+        let onto = |record: &str, more: &[&str]| {
+            refused(&place, &[&["run", "named.toml", "--clock", clock, "--record", record], more].concat())
+        };
+        assert_says(
+            &onto("none/out.csv", &[]),
+            &["none/out.csv", "No such file or directory", "a directory that exists"],
+        );
+        assert_says(&onto(".", &[]), &["cannot create the recording .", "Is a directory"]);
+        assert_says(&onto("", &[]), &["a value is required for '--record"]);
+        assert_says(&onto("own.csv/out.csv", &[]), &["own.csv/out.csv", "Not a directory"]);
+        assert_says(&onto(&long, &[]), &["too long"]);
+        assert_says(&onto("named.toml", &[]), &["overwrite the input named.toml", "name another"]);
+        assert_says(&onto("./named.toml", &[]), &["overwrite the input named.toml"]);
+        assert_says(&onto("symbolic.csv", &[]), &["overwrite the input named.toml"]);
+        assert_says(&onto("own.csv", &[]), &["overwrite the input", "own.csv", "name another"]);
+        assert_says(&onto("hard.csv", &[]), &["overwrite the input", "own.csv"]);
+        assert_says(&onto("hand.csv", &["--hand", "hand.csv"]), &["overwrite the input hand.csv"]);
+        assert_says(&onto("layout.toml", &["--layout", "layout.toml"]), &["overwrite the input layout.toml"]);
+    }
+}
+
+/// Permissions do not hold for root, who therefore tries as nobody, with a copy of the program that nobody
+/// may start.
+#[test]
+fn what_permissions_forbid_is_refused() {
+    let place = workplace();
+    let mode = |path: &Path, bits: u32| {
+        std::fs::set_permissions(path, std::fs::Permissions::from_mode(bits)).expect("our own file");
+    };
+    let copy = place.path("program");
+    std::fs::copy(place.phantom3().get_program(), &copy).expect("a copy");
+    mode(&copy, 0o755);
+    mode(&place.write("locked.toml", SCENE), 0o000);
+    mode(&place.path(""), 0o555);
+    let try_it = |arguments: &[&str]| {
+        let mut program = place.prepare(std::process::Command::new(&copy));
+        if rustix::process::geteuid().is_root() {
+            const NOBODY: u32 = 65534;
+            program.uid(NOBODY).gid(NOBODY);
+        }
+        program.args(arguments);
+        let said = Running::start(program).wait();
+        check_refusal(&said, &arguments.join(" "));
+        said.err
+    };
+    assert_says(&try_it(&["run", "locked.toml"]), &["locked.toml: cannot be read", "Permission denied"]);
+    for clock in CLOCKS {
+        let hand = try_it(&["run", "scene.toml", "--clock", clock, "--hand", "locked.toml"]);
+        assert_says(&hand, &["locked.toml", "Permission denied"]);
+    }
+    let record = try_it(&["run", "scene.toml", "--clock", "virtual", "--record", "new.csv"]);
+    assert_says(&record, &["cannot create the recording new.csv", "Permission denied", "can be written"]);
+    mode(&place.path(""), 0o755);
+}

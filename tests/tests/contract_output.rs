@@ -1,0 +1,166 @@
+//! What happens to a recording when its disk fails, and to a run when nobody reads what it says.
+
+use std::process::{Command, Stdio};
+use system_tests::recording::Table;
+use system_tests::workplace::{Running, Said, Workplace};
+
+/// With as many fingers as there may be, so that a disk fills up fast.
+fn workplace() -> Workplace {
+    let place = Workplace::new();
+    place.write("scene.toml", "[[finger]]\n".repeat(8));
+    place
+}
+
+/// A shell script with the program as `$0` and `phantom3 run scene.toml` and these arguments as `"$@"`.
+fn shell(place: &Workplace, script: &str, arguments: &[&str]) -> Said {
+    let mut shell = place.prepare(Command::new("sh"));
+    shell
+        .arg("-c")
+        .arg(script)
+        .arg(place.phantom3().get_program())
+        .args(["run", "scene.toml"])
+        .args(arguments);
+    Running::start(shell).wait()
+}
+
+#[test]
+fn a_recording_that_cannot_even_begin_stops_the_run_before_it_starts() {
+    for clock in ["virtual", "lockstep", "real"] {
+        let place = workplace();
+        let said = place.run(["run", "scene.toml", "--clock", clock, "--record", "/dev/full"]);
+        // The header did not fit: nothing ran, so it is bad input, not a fault during the run.
+        assert_eq!((said.status, said.out.as_str()), (Some(2), ""), "{}", said.err);
+        assert!(
+            said.err.contains("cannot create the recording /dev/full: No space left on device"),
+            "{}",
+            said.err
+        );
+        assert_eq!(said.err.lines().count(), 1, "{}", said.err);
+        assert_eq!(place.processes(), Vec::<u32>::new());
+    }
+}
+
+/// Status 3, one message that says how far the recording goes, and a file that goes exactly so far.
+fn assert_recorded_up_to_the_fault(place: &Workplace, said: &Said, cause: &str) {
+    assert_eq!((said.status, said.out.as_str()), (Some(3), ""), "{}", said.err);
+    // A slow machine shows progress before.
+    let messages: Vec<&str> = said.err.lines().filter(|line| !line.ends_with('%')).collect();
+    let [message] = messages[..] else { panic!("not one message:\n{}", said.err) };
+    assert!(
+        message.starts_with("phantom3: cannot write the recording ") && message.contains(cause),
+        "{message}"
+    );
+    let (_, promise) = message.split_once("it is complete up to t = ").expect("how far it goes");
+    let (until, rows) = promise.split_once(" s (").expect("the time and the rows");
+    let table = Table::read(&place.path("out.csv"));
+    assert!(table.len() > 100, "it got going: {} rows", table.len());
+    assert_eq!(table.texts("t").last(), Some(&until), "{message}");
+    assert_eq!(format!("{} rows)", table.len()), rows, "{message}");
+    let times = table.numbers("t");
+    assert!(times.windows(2).all(|pair| pair[0] < pair[1]) && times[0] == 0.0, "rows are in order from 0 on");
+    assert_eq!(place.processes(), Vec::<u32>::new());
+}
+
+#[test]
+fn a_file_that_may_not_grow_any_more_ends_with_a_complete_row_and_status_3() {
+    // The shared memory of a driver counts as a file too, some 10 MB, so the limit leaves room for that:
+    // 20 MB or 40 MB, as the shell's blocks have 512 or 1024 bytes.
+    let script = "trap '' XFSZ; ulimit -f 40000; exec \"$0\" \"$@\"";
+    for clock in ["virtual", "lockstep"] {
+        let place = workplace();
+        let said = shell(&place, script, &["--clock", clock, "--seconds", "120", "--record", "out.csv"]);
+        assert_recorded_up_to_the_fault(&place, &said, "File too large");
+    }
+}
+
+#[test]
+fn a_disk_that_fills_up_leaves_a_recording_that_ends_with_a_complete_row() {
+    let mount = "mkdir small && mount -t tmpfs -o size=900k tmpfs small";
+    let is_possible = |place: &Workplace| {
+        let mut unshare = place.prepare(Command::new("unshare"));
+        unshare.args(["--user", "--map-root-user", "--mount", "sh", "-c", mount]);
+        unshare.stderr(Stdio::null()).status().is_ok_and(|status| status.success())
+    };
+    if !is_possible(&workplace()) {
+        eprintln!(
+            "skipped: no small disk can be mounted here; the test with a limited file covers the same path"
+        );
+        return;
+    }
+    // A disk of its own, which only these processes see; what is on it is copied out at the end.
+    let inside = format!("{mount} && \"$0\" \"$@\"; end=$?; cp small/out.csv out.csv; exit $end");
+    for clock in ["virtual", "lockstep"] {
+        let place = workplace();
+        let script = format!("exec unshare --user --map-root-user --mount sh -c '{inside}' \"$0\" \"$@\"");
+        let said =
+            shell(&place, &script, &["--clock", clock, "--seconds", "20", "--record", "small/out.csv"]);
+        assert_recorded_up_to_the_fault(&place, &said, "No space left on device");
+    }
+}
+
+#[test]
+fn a_reader_who_has_gone_changes_neither_the_run_nor_its_status() {
+    let good = ["--seconds", "0.5", "--record", "out.csv", "--clock"];
+    let bad = ["--hand", "none.csv", "--clock"];
+    for redirection in ["2>/dev/full", "2>&-", ">/dev/full", ">&-", ">/dev/full 2>&1", ">&- 2>&- <&-"] {
+        let script = format!("exec \"$0\" \"$@\" {redirection}");
+        for clock in ["virtual", "lockstep", "real"] {
+            let place = workplace();
+            let said = shell(&place, &script, &[&good[..], &[clock]].concat());
+            assert_eq!(said.status, Some(0), "{redirection} on the {clock} clock: {}", said.err);
+            assert!(!Table::read(&place.path("out.csv")).is_empty(), "{redirection} on the {clock} clock");
+            let said = shell(&place, &script, &[&bad[..], &[clock]].concat());
+            assert_eq!(said.status, Some(2), "{redirection} on the {clock} clock: {}", said.err);
+            assert_eq!(place.processes(), Vec::<u32>::new());
+        }
+    }
+}
+
+#[test]
+fn closed_pipes_change_neither_the_run_nor_its_status() {
+    for (hand, status) in [("hand.csv", 0), ("none.csv", 2)] {
+        let place = workplace();
+        place.write("hand.csv", "t,f0_x,f0_y,f0_z\n0,0,0,0\n");
+        let mut program = place.phantom3();
+        program.args(["run", "scene.toml", "--seconds", "0.5", "--hand", hand]);
+        let mut child = program.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
+        // Whoever read has seen enough, as in `| head -0`.
+        drop((child.stdout.take(), child.stderr.take()));
+        assert_eq!(child.wait().expect("our child").code(), Some(status));
+    }
+}
+
+#[test]
+fn a_place_for_temporary_files_that_is_missing_or_too_long_for_a_socket_does_not_matter() {
+    let long = "d".repeat(120);
+    for name in ["missing", &long] {
+        let place = workplace();
+        if name == long {
+            std::fs::create_dir(place.path(name)).expect("a directory");
+        }
+        let mut program = place.phantom3();
+        program.env("TMPDIR", place.path(name)).args([
+            "run",
+            "scene.toml",
+            "--clock",
+            "lockstep",
+            "--seconds",
+            "0.1",
+        ]);
+        let said = Running::start(program).wait();
+        assert_eq!((said.status, said.err.as_str()), (Some(0), ""));
+    }
+}
+
+#[test]
+fn a_recording_may_go_into_a_pipe() {
+    let place = workplace();
+    let said = shell(
+        &place,
+        "\"$0\" \"$@\" | cat",
+        &["--clock", "virtual", "--seconds", "0.2", "--record", "/dev/stdout"],
+    );
+    assert_eq!((said.status, said.err.as_str()), (Some(0), ""));
+    let rows = said.out.lines().filter(|line| line.starts_with("0.")).count();
+    assert_eq!(rows, 200, "{}", said.out);
+}

@@ -1,0 +1,220 @@
+//! The driver is killed, asked to stop, or not alone: the application says so, waits if it was told to, and
+//! its recording is complete up to there.
+
+use bytemuck::Zeroable;
+use rt_core::epitaph::{self, EpitaphKind};
+use rustix::process::Signal;
+use shm_abi::client::{self, AttachError};
+use shm_abi::{DriverView, Frame};
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+use system_tests::faults::press::{self, FORCE_N, Press, Table, terminate};
+use system_tests::faults::process::{self, Running, children_of, io_driver};
+use system_tests::faults::ring::RingLog;
+use system_tests::programs;
+use system_tests::recording;
+
+/// Ticks of a run that are waited for before something happens to it.
+const SOME: i64 = 200;
+
+/// Waits until a run has lasted some ticks.
+fn wait_for_some_run(driver: &DriverView) {
+    let started = |frame: &Frame| frame.run_tick >= SOME;
+    RingLog::begin(driver).follow(driver, "t = 0", |_| driver.read_latest().as_ref().is_some_and(started));
+}
+
+/// The times of all rows, which must be whole and in order, each with the whole force computed.
+fn checked_times(path: &std::path::Path) -> Vec<f64> {
+    let table = recording::Table::read(path);
+    let t = table.numbers("t");
+    for (row, pair) in t.windows(2).enumerate() {
+        assert!(pair[0] < pair[1], "row {row}: {pair:?}");
+    }
+    // The spring's law is rounded twice.
+    assert!(table.vectors("f0_force").iter().all(|force| (force.norm() - FORCE_N).abs() < 1e-12));
+    t
+}
+
+#[test]
+fn an_app_whose_own_driver_is_killed_says_so_and_its_recording_is_complete() {
+    for clock in ["real", "lockstep"] {
+        let table = Table::new();
+        let mut app = Running::start(table.app(clock).args(["--seconds", "80000", "--record", "out.csv"]));
+        let observer = table.observe_child();
+        wait_for_some_run(&observer.driver);
+        let children = children_of(app.id());
+        assert_eq!(children.len(), 1);
+        process::send(children[0], Signal::KILL);
+        let end = app.end();
+        assert_eq!(end.status, Some(3), "{end:?}");
+        let message = "the driver is gone: it was killed, or crashed without last words (signal: 9";
+        assert!(end.err.contains(message), "{end:?}");
+        assert_eq!(table.left_behind(), Vec::<PathBuf>::new());
+        table.wait_until_abandoned();
+        let t = checked_times(&table.path("out.csv"));
+        let told = published_run_ticks(&observer.driver);
+        let rows = t.len() as u64;
+        // A row is complete once the frame after it has told what the motors did: the last frame is none.
+        match clock {
+            "lockstep" => assert_eq!(rows, told, "in lockstep no frame is missed"),
+            _ => assert!(rows > 0 && rows <= told, "{rows} rows, {told} ticks"),
+        }
+    }
+}
+
+/// How many ticks of the run had passed when the last frame was published.
+fn published_run_ticks(driver: &DriverView) -> u64 {
+    let mut frame = Frame::zeroed();
+    driver.read_frame(driver.latest_tick().expect("frames"), &mut frame).expect("nobody writes any more");
+    frame.run_tick.unsigned_abs()
+}
+
+#[test]
+fn a_run_goes_on_when_its_driver_is_killed_and_restarted() {
+    // A restart takes some 20 ms: the real run is long enough to be there, the other one passes faster.
+    for (clock, seconds) in [("real", "3"), ("lockstep", "60")] {
+        let mut press = Press::start(clock);
+        let mut app = Running::start(press.app().args(["--seconds", seconds, "--record", "out.csv", "--grace", "10"]));
+        wait_for_some_run(&press.observer.driver);
+        press.driver.child.kill().expect("our own child");
+        press.driver.wait();
+        let before = published_run_ticks(&press.observer.driver);
+        app.must_run();
+        press.driver.restart(&press::config(clock));
+        let second = press.driver.observe();
+        let end = app.end();
+        assert_eq!(end.status, Some(0), "{end:?}");
+        assert!(end.err.contains("the driver is gone") && end.err.contains("the driver is back"), "{end:?}");
+        assert!(end.err.contains(&format!("process {}", press.driver.child.id())), "{end:?}");
+        let t = checked_times(&press.path("out.csv"));
+        let after = t.iter().filter(|t| **t * 2000.0 > before as f64).count();
+        assert!(after > 0, "{clock}: nothing after {before} ticks, {:?}", t.last());
+        // The last tick of the run, less what may be missed in real time.
+        let length: f64 = seconds.parse().expect("a number");
+        assert!(t.last().is_some_and(|last| *last < length && *last > 0.9 * length), "{:?}", t.last());
+        let fresh = second.driver.counters.replies_fresh.load(Ordering::Relaxed);
+        assert!(fresh >= after as u64, "{fresh} answers, {after} rows");
+    }
+}
+
+#[test]
+fn a_driver_that_does_not_come_back_in_time_ends_the_run() {
+    let mut press = Press::start("real");
+    let mut app =
+        Running::start(press.app().args(["--seconds", "80000", "--record", "out.csv", "--grace", "0.2"]));
+    wait_for_some_run(&press.observer.driver);
+    press.driver.child.kill().expect("our own child");
+    press.driver.wait();
+    let end = app.end();
+    assert_eq!(end.status, Some(3), "{end:?}");
+    let gone = "the driver is gone: it was killed, or crashed without last words";
+    assert!(end.err.contains(&format!("{gone}; waiting up to 200ms for its return")), "{end:?}");
+    assert!(end.err.contains(&format!("{gone}; after 200ms: the driver is gone:")), "{end:?}");
+    assert!(!checked_times(&press.path("out.csv")).is_empty());
+}
+
+/// While it waits for the driver's return, it still listens.
+#[test]
+fn an_app_that_waits_for_its_driver_can_be_asked_to_end() {
+    let mut press = Press::start("real");
+    let mut app =
+        Running::start(press.app().args(["--seconds", "80000", "--record", "out.csv", "--grace", "3600"]));
+    wait_for_some_run(&press.observer.driver);
+    press.driver.child.kill().expect("our own child");
+    press.driver.wait();
+    // Before or after it has noticed.
+    app.signal(Signal::TERM);
+    let end = app.end();
+    assert!(matches!(end.status, Some(3 | 143)), "{end:?}");
+    assert!(!checked_times(&press.path("out.csv")).is_empty());
+}
+
+#[test]
+fn a_driver_that_is_asked_to_stop_leaves_last_words_and_nothing_else() {
+    type Ask = fn(&Press) -> String;
+    let signals: [Ask; 4] = [
+        |press| ask_by_signal(press, Signal::TERM),
+        |press| ask_by_signal(press, Signal::INT),
+        |press| ask_by_signal(press, Signal::HUP),
+        |press| {
+            let end = io_driver(&["stop"], press.driver.socket());
+            assert_eq!(end.status, Some(0), "{end:?}");
+            assert_eq!(end.out, format!("driver (process {}) stops\n", press.driver.child.id()));
+            "request of process ".into()
+        },
+    ];
+    for clock in ["real", "lockstep"] {
+        for ask in signals {
+            let mut press = Press::start(clock);
+            let mut app = Running::start(
+                press.app().args(["--seconds", "80000", "--record", "out.csv", "--grace", "0"]),
+            );
+            wait_for_some_run(&press.observer.driver);
+            let reason = ask(&press);
+            assert_eq!(press.driver.wait().code(), Some(0));
+            let words = epitaph::read(&press.observer.driver.epitaph).expect("last words");
+            assert_eq!((words.kind, words.complete), (EpitaphKind::Stopped, true));
+            assert!(words.text.starts_with(&reason), "{words}");
+            let last = press.observer.driver.latest_tick().expect("frames");
+            // The tick that it was waiting for when it was asked, or the one it was in.
+            assert!(words.tick >= last, "{words}, last frame {last}");
+            assert!(!press.driver.socket().exists());
+            let directory = press.driver.socket().parent().expect("a directory");
+            assert_eq!(std::fs::read_dir(directory).expect("a directory").count(), 0);
+            let end = app.end();
+            assert_eq!(end.status, Some(3), "{end:?}");
+            assert!(end.err.contains(&format!("the driver is gone: stopped in tick {}", words.tick)), "{end:?}");
+            assert!(!checked_times(&press.path("out.csv")).is_empty());
+        }
+    }
+}
+
+fn ask_by_signal(press: &Press, signal: Signal) -> String {
+    process::send(press.driver.child.id(), signal);
+    format!("signal {}", signal.as_raw())
+}
+
+#[test]
+fn a_second_driver_at_the_same_socket_is_refused_and_the_first_goes_on() {
+    let mut press = Press::start("real");
+    let app = press.start_app();
+    let mut log = RingLog::begin(&press.observer.driver);
+    log.follow_to_force(&press.observer.driver);
+    let file = press.path("driver.toml");
+    std::fs::write(&file, press::config("real")).expect("a configuration");
+    let mut second = programs::io_driver();
+    second.args(["run", "--config"]).arg(&file).arg("--socket").arg(press.driver.socket());
+    let end = Running::start(&mut second).end();
+    assert_eq!(end.status, Some(2), "{end:?}");
+    let message = format!("another driver is running at {}", press.driver.socket().display());
+    assert!(end.err.contains(&message), "{end:?}");
+    log.follow_to_force(&press.observer.driver);
+    press.driver_must_live();
+    terminate(app);
+    let answer = client::observe(press.driver.socket(), "test").expect("the first one still listens");
+    assert_eq!(answer.driver_pid, u64::from(press.driver.child.id()));
+}
+
+#[test]
+fn what_a_killed_driver_leaves_is_told_to_clients_and_does_not_hinder_the_next() {
+    let mut press = Press::start("real");
+    press.driver.child.kill().expect("our own child");
+    press.driver.wait();
+    assert!(press.driver.socket().exists(), "nobody took it away");
+    let found = client::observe(press.driver.socket(), "test").err();
+    assert!(matches!(found, Some(AttachError::DriverGone { .. })), "{found:?}");
+    let end = Running::start(press.app().args(["--seconds", "1"])).end();
+    assert_eq!(end.status, Some(2), "{end:?}");
+    let message = format!("the driver is gone: {} is left over from one that died", press.driver.socket().display());
+    assert!(end.err.contains(&message), "{end:?}");
+    for arguments in [&["stop"][..], &["status"], &["clear-fault"]] {
+        let end = io_driver(arguments, press.driver.socket());
+        assert_eq!(end.status, Some(2), "{end:?}");
+        assert!(end.err.contains("is left over from one that died"), "{end:?}");
+    }
+    press.driver.restart(&press::config("real"));
+    press.observer = press.driver.observe();
+    let app = press.start_app();
+    RingLog::begin(&press.observer.driver).follow_to_force(&press.observer.driver);
+    terminate(app);
+}

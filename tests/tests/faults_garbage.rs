@@ -1,0 +1,461 @@
+//! The commander's memory holds anything at all: the driver believes what is whole, fresh and finite, counts
+//! the rest, and never makes a device render what it cannot.
+
+use bytemuck::Zeroable;
+use io_driver::config::DriverConfig;
+use io_driver::cycle::Cycle;
+use io_driver::device::{Device, Reading, TickTime, Written};
+use io_driver::driver::{describe, make_cycle};
+use io_driver::open::open_devices;
+use nalgebra::Vector3;
+use shm_abi::client::Attachment;
+use shm_abi::doorbell::WaitMode;
+use shm_abi::segment::{ClockMode, DeviceInfo};
+use shm_abi::seqlock::stamp;
+use shm_abi::{
+    Command, CommanderMemory, CommanderSegment, CommanderView, DriverMemory, DriverView, FaultReason, Frame,
+    ReplyKind,
+};
+use std::os::fd::AsFd;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use system_tests::driver::Driver;
+use system_tests::faults::commander::Commander;
+use system_tests::faults::random::Random;
+use system_tests::faults::ring::{RingLog, Told};
+
+const PEAK_N: f64 = 8.5;
+const DEVICES: usize = 2;
+const LEASE: u64 = 7;
+
+/// Bits that a careless reader trips over.
+fn word(random: &mut Random, tick: u64) -> u64 {
+    let small = random.below(4);
+    match random.below(16) {
+        0 => f64::NAN.to_bits(),
+        1 => f64::INFINITY.to_bits(),
+        2 => f64::NEG_INFINITY.to_bits(),
+        3 => f64::MAX.to_bits(),
+        4 => (-1e308f64).to_bits(),
+        5 => (-0.0f64).to_bits(),
+        6 => 1, // the smallest number there is
+        7 => 0,
+        8 => u64::MAX - small,
+        9 => tick.wrapping_add(small).wrapping_sub(2),
+        10 => stamp(tick).wrapping_add(small).wrapping_sub(2),
+        11 => LEASE.wrapping_add(small).wrapping_sub(1),
+        12 => random.unit().to_bits(),
+        13 => (random.unit() * 1e3).to_bits(),
+        _ => random.word(),
+    }
+}
+
+/// Mostly forces that a finger could feel, sometimes some that no device can render.
+fn force(random: &mut Random) -> [f64; 3] {
+    let size = [1.0, 20.0, 1e9, 1e308][usize::try_from(random.below(4)).expect("small")];
+    std::array::from_fn(|_| random.unit() * size)
+}
+
+fn honest_command(random: &mut Random, tick: u64, lease: u64, devices: usize) -> Command {
+    let mut command = Command::zero(tick, lease, devices as u64);
+    for device in &mut command.devices[..devices] {
+        device.force_on_user_n = force(random);
+    }
+    command
+}
+
+/// A command that is right but for some words, and lies in a slot that is right but perhaps for its sequence.
+fn forge(random: &mut Random, to: &CommanderSegment, tick: u64, lease: u64, devices: usize) {
+    let command = honest_command(random, tick, lease, devices);
+    let mut words: Vec<u64> = bytemuck::cast_slice::<Command, u64>(&[command]).to_vec();
+    for _ in 0..random.below(3) {
+        let at = random.below(words.len() as u64) as usize;
+        // Among the first words are the tick, the lease, the count and the first device's force.
+        let at = if random.once_in(2) { at % 8 } else { at };
+        words[at] = word(random, tick);
+    }
+    let slot = &to.commands[tick as usize % to.commands.len()];
+    for (word, value) in slot.words.iter().zip(words) {
+        word.store(value, Ordering::Relaxed);
+    }
+    let sequence = if random.once_in(4) { word(random, tick) } else { stamp(tick) };
+    slot.sequence.store(sequence, Ordering::Release);
+    let rung = if random.once_in(8) { word(random, tick) } else { tick + 1 };
+    to.bell.latest_plus_one.store(rung, Ordering::Release);
+    to.bell.doorbell.store(rung as u32, Ordering::Release);
+}
+
+/// Any words anywhere, the head and the bell included.
+fn scribble(random: &mut Random, to: &CommanderSegment, tick: u64) {
+    for _ in 0..=random.below(20) {
+        let value = word(random, tick);
+        let slot = &to.commands[random.below(4) as usize];
+        let place: &AtomicU64 = match random.below(32) {
+            0 => &to.bell.latest_plus_one,
+            1 => &to.bell.owner_sleeps,
+            2 => &to.bell.reserved[random.below(5) as usize],
+            3 => &to.header.magic,
+            4 => &to.header.lease,
+            5 => &to.header.abi_version,
+            6..10 => &slot.sequence,
+            _ => &slot.words[random.below(slot.words.len() as u64) as usize],
+        };
+        place.store(value, Ordering::Relaxed);
+        to.bell.doorbell.store(random.word() as u32, Ordering::Relaxed);
+    }
+}
+
+/// One thing that a commander gone mad may do.
+fn rave(random: &mut Random, to: &CommanderMemory, driver: &DriverView, tick: u64, lease: u64, devices: usize) {
+    match random.below(8) {
+        0 => {}
+        1 | 2 => to.publish(&honest_command(random, tick, lease, devices), driver),
+        3 => {
+            let other = tick.wrapping_add(random.below(8)).saturating_sub(6);
+            to.publish(&honest_command(random, other, lease, devices), driver);
+        }
+        4 | 5 => forge(random, to, tick, lease, devices),
+        _ => scribble(random, to, tick),
+    }
+}
+
+/// What the driver should make of it, slow and obvious: its rules in the order in which they are written down.
+#[derive(Default)]
+struct Oracle {
+    bell: Option<u64>,
+    looked_in: u64,
+    /// The newest command that deserved to be believed.
+    believed: Option<Command>,
+    torn: u64,
+    refused: u64,
+}
+
+impl Oracle {
+    fn look(&mut self, memory: &CommanderSegment, tick: u64) {
+        let bell = memory.bell.latest_plus_one.load(Ordering::Relaxed).checked_sub(1);
+        let is_news = bell != self.bell || (bell == Some(tick) && self.looked_in != tick);
+        if !is_news {
+            return;
+        }
+        (self.bell, self.looked_in) = (bell, tick);
+        let Some(answered) = bell else { return };
+        let newest = self.believed.as_ref().map(|command| command.tick);
+        if answered > tick || newest.is_some_and(|newest| answered <= newest) {
+            self.refused += 1;
+            return;
+        }
+        let slot = &memory.commands[(answered % 4) as usize];
+        if slot.sequence.load(Ordering::Relaxed) % 2 == 1 {
+            self.torn += 1;
+            return;
+        }
+        let words: Vec<u64> = slot.words.iter().map(|word| word.load(Ordering::Relaxed)).collect();
+        let command: Command = bytemuck::cast_slice(&words)[0];
+        let forces = command.devices[..DEVICES].iter().flat_map(|device| device.force_on_user_n);
+        let is_ours = (command.tick, command.lease, command.device_count) == (answered, LEASE, DEVICES as u64);
+        if is_ours && forces.into_iter().all(f64::is_finite) {
+            self.believed = Some(command);
+        } else {
+            self.refused += 1;
+        }
+    }
+
+    /// What a device has to render at full authority.
+    fn whole_force(&self, device: usize) -> Vector3<f64> {
+        let Some(command) = &self.believed else { return Vector3::zeros() };
+        let force = Vector3::from(command.devices[device].force_on_user_n);
+        let largest = force.amax();
+        if largest == 0.0 {
+            return force;
+        }
+        // The square of what is large is infinite; hence in units of the largest component.
+        let direction = force / largest;
+        let length = direction.norm();
+        if largest > PEAK_N / length { direction * (PEAK_N / length) } else { force }
+    }
+}
+
+/// A driver's tick on the virtual clock, and the mapping that its commander fills.
+struct Bench {
+    cycle: Cycle,
+    view: DriverView,
+    commander: CommanderMemory,
+    tick: u64,
+}
+
+impl Bench {
+    fn new(text: &str, directory: &Path, devices: Option<Vec<Box<dyn Device>>>) -> Self {
+        let mut config = DriverConfig::parse(text, &directory.join("driver.toml")).expect("a configuration");
+        config.clock = ClockMode::Virtual;
+        let devices = devices.unwrap_or_else(|| open_devices(&config).expect("devices"));
+        let info = describe(&config, &devices, WaitMode::Futex);
+        let memory = Arc::new(DriverMemory::create(&info).expect("memory"));
+        let view = DriverView::map(memory.fd()).expect("our own");
+        let mut cycle = make_cycle(&config, memory, devices);
+        let (lease, fd) = CommanderView::create(LEASE).expect("memory");
+        let commander = CommanderMemory::map(fd.as_fd()).expect("our own");
+        assert!(cycle.grant(lease).is_none());
+        cycle.change_lease();
+        Self { cycle, view, commander, tick: 0 }
+    }
+
+    /// One tick; the commander does something before each of the driver's looks.
+    fn tick(&mut self, looks: u64, mut act: impl FnMut(&CommanderMemory, &DriverView, u64)) {
+        self.tick += 1;
+        self.cycle.sense(self.tick, self.tick * 1_000_000);
+        for _ in 0..looks {
+            act(&self.commander, &self.view, self.tick);
+            self.cycle.take_reply();
+        }
+        self.cycle.actuate();
+    }
+
+    /// The newest frame, which tells what the motors were made to do in the tick before.
+    fn frame(&self) -> Frame {
+        let mut frame = Frame::zeroed();
+        self.view.read_frame(self.tick, &mut frame).expect("the newest frame");
+        frame
+    }
+
+    /// After all that, somebody who keeps to the rules is obeyed: full authority, and exactly that force.
+    fn check_that_honesty_is_rewarded(&mut self) {
+        let command = |tick| {
+            let mut command = Command::zero(tick, LEASE, DEVICES as u64);
+            command.devices[..DEVICES].iter_mut().for_each(|device| device.force_on_user_n = [0.0, 1.0, 0.0]);
+            command
+        };
+        for _ in 0..20 {
+            self.tick(1, |commander, driver, tick| commander.publish(&command(tick), driver));
+        }
+        let frame = self.frame();
+        assert_eq!((frame.previous.authority, frame.previous.reply), (1.0, ReplyKind::Fresh as u64));
+        assert_eq!(frame.devices[1].force_on_user_n_commanded, [0.0, 1.0, 0.0]);
+    }
+}
+
+const SAFETY: &str = "[safety]\nmax_command_age_ticks = 3\nramp_in_ms = 10\nramp_out_ms = 5\n";
+
+/// A device that refuses to be written what its documentation says it never is.
+struct Strict {
+    info: DeviceInfo,
+    written: Arc<AtomicU64>,
+}
+
+impl Device for Strict {
+    fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    fn read(&mut self, _time: TickTime) -> Result<Reading, FaultReason> {
+        Ok(Reading::at(Vector3::new(0.1, 0.2, 0.3)))
+    }
+
+    fn write(&mut self, force_on_user_n: Vector3<f64>) -> Result<Written, FaultReason> {
+        // Of a direction of length 1 but for rounding: a few ulp.
+        assert!(force_on_user_n.norm() <= PEAK_N * (1.0 + 1e-15), "{force_on_user_n:?}");
+        assert!(force_on_user_n.iter().all(|component| component.is_finite()));
+        self.written.fetch_add(u64::from(force_on_user_n != Vector3::zeros()), Ordering::Relaxed);
+        Ok(Written { force_on_user_n, motor_codes: [0; 3] })
+    }
+
+    fn release(&mut self) {}
+}
+
+fn strict(written: &Arc<AtomicU64>) -> Box<dyn Device> {
+    let info = DeviceInfo {
+        name: "strict".into(),
+        kind: "test".into(),
+        peak_force_n: PEAK_N,
+        continuous_force_n: PEAK_N,
+        workspace_min_m: [-1.0; 3],
+        workspace_max_m: [1.0; 3],
+    };
+    Box::new(Strict { info, written: Arc::clone(written) })
+}
+
+#[test]
+fn a_million_ticks_of_garbage_move_the_motors_only_as_a_whole_fresh_finite_command_says() {
+    let written = Arc::default();
+    let device = "[[device]]\nbackend = \"ideal\"\n".repeat(DEVICES);
+    let devices = (0..DEVICES).map(|_| strict(&written)).collect();
+    let mut bench = Bench::new(&format!("{SAFETY}{device}"), Path::new("/"), Some(devices));
+    let mut random = Random::seeded(6);
+    let mut oracle = Oracle::default();
+    let mut log = RingLog::begin(&bench.view);
+    let (mut believed_in, mut expected) = (0u64, None);
+    for _ in 0..1_000_000 {
+        let looks = random.below(4);
+        bench.tick(looks, |commander, driver, tick| {
+            rave(&mut random, commander, driver, tick, LEASE, DEVICES);
+            oracle.look(commander, tick);
+        });
+        if let Some(expected) = &expected {
+            check_outcome(&bench.frame(), expected);
+        }
+        expected = Some(Expected::by(&oracle));
+        believed_in += u64::from(oracle.believed.is_some_and(|command| command.tick == bench.tick));
+        if bench.tick % 1000 == 0 {
+            log.catch_up(&bench.view);
+            log.check_promise(&bench.view);
+            log.forget();
+        }
+    }
+    let counters = &bench.view.counters;
+    let count = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
+    assert_eq!(count(&counters.commands_torn), oracle.torn);
+    assert_eq!(count(&counters.commands_refused), oracle.refused);
+    assert_eq!(count(&counters.replies_fresh), believed_in);
+    assert_eq!(count(&counters.ticks), 1_000_000);
+    assert_eq!(count(&counters.faults), 0);
+    // The garbage is worth something only if each kind of it came often, and so did what is none.
+    let enough = [believed_in, oracle.torn, oracle.refused, count(&counters.forces_limited), written.load(Ordering::Relaxed)];
+    assert!(enough.iter().all(|count| *count > 10_000), "{enough:?}");
+    bench.check_that_honesty_is_rewarded();
+}
+
+/// What the oracle expects the next frame to tell of this tick. The share that was let through is the
+/// driver's to say (its promise is checked apart); these are the whole forces.
+struct Expected {
+    believed: Option<Command>,
+    forces: [Vector3<f64>; DEVICES],
+}
+
+impl Expected {
+    fn by(oracle: &Oracle) -> Self {
+        Self { believed: oracle.believed, forces: std::array::from_fn(|device| oracle.whole_force(device)) }
+    }
+}
+
+fn check_outcome(frame: &Frame, expected: &Expected) {
+    let outcome = frame.previous;
+    assert!((0.0..=1.0).contains(&outcome.authority), "{outcome:?}");
+    assert_eq!(outcome.command_tick, expected.believed.map_or(0, |command| command.tick));
+    for (device, whole) in frame.devices.iter().zip(expected.forces) {
+        let applied = Vector3::from(device.force_on_user_n_applied);
+        let wanted = whole * outcome.authority;
+        // Some ten roundings on either side, relative to the whole; and the smallest number there is, which
+        // is what an underflow may lose.
+        let tolerance = 1e-14 * whole.norm() + f64::from_bits(1);
+        assert!((applied - wanted).norm() <= tolerance, "{applied:?} instead of {wanted:?}, {outcome:?}");
+    }
+}
+
+#[test]
+fn garbage_never_makes_a_motor_code_of_more_than_twelve_bits() {
+    let directory = tempfile::tempdir().expect("a directory");
+    // Around the home pose and back, so that the Jacobian is not the same all the time.
+    let trace: String = (0..200).map(|row| format!("{},{},{},{}\n", f64::from(row) * 0.1, row % 50, row % 70, row % 90)).collect();
+    std::fs::write(directory.path().join("trace.csv"), format!("t,c0,c1,c2\n{trace}")).expect("a trace");
+    let device = "[[device]]\nbackend = \"replay\"\ndescription = \"premium-1.5\"\ntrace = \"trace.csv\"\n";
+    let mut bench = Bench::new(&format!("{SAFETY}{}", device.repeat(DEVICES)), directory.path(), None);
+    let mut random = Random::seeded(8);
+    let mut extremes = (i64::MAX, i64::MIN);
+    for _ in 0..200_000 {
+        bench.tick(1, |commander, driver, tick| rave(&mut random, commander, driver, tick, LEASE, DEVICES));
+        let frame = bench.frame();
+        for device in frame.present_devices() {
+            for code in device.motor_codes {
+                // Nothing was written before the first tick, and 0 is no code that rest would give.
+                assert!((0..4096).contains(&code), "{code}");
+                let at_rest = frame.tick == 1 || frame.previous.authority > 0.0 || code == 2048;
+                assert!(at_rest, "code {code} without authority");
+                extremes = if frame.tick > 1 { (extremes.0.min(code), extremes.1.max(code)) } else { extremes };
+            }
+            let force = Vector3::from(device.force_on_user_n_applied).norm();
+            // Half a code on each of three axes of at most 8.6 N over 2048 codes.
+            assert!(force <= PEAK_N + 0.004, "{force} N");
+        }
+    }
+    assert!(extremes.0 < 200 && extremes.1 > 3896, "the converters were hardly used: {extremes:?}");
+    assert_eq!(bench.view.counters.faults.load(Ordering::Relaxed), 0);
+    bench.check_that_honesty_is_rewarded();
+}
+
+fn config(clock: &str) -> String {
+    let device = format!("[[device]]\nbackend = \"ideal\"\npeak_force_n = {PEAK_N}\n");
+    format!(
+        "rate_hz = 4000\nclock = \"{clock}\"\n[real_time]\npriority = 0\nlock_memory = false\n\
+         [reply]\nbudget_us = 200\n{SAFETY}{}",
+        device.repeat(DEVICES)
+    )
+}
+
+/// A thread raves at full speed while the driver, another process, reads: now everything can be torn for real.
+fn a_concurrent_madman(clock: &str, frames: usize) {
+    let mut driver = Driver::start(&config(clock));
+    let observer = driver.observe();
+    let Attachment { driver: view, commander, connection, .. } = driver.command();
+    let commander = commander.expect("the lease");
+    let (stop, answers) = (AtomicBool::new(false), AtomicU32::new(0));
+    let mut log = RingLog::begin(&observer.driver);
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            let mut random = Random::seeded(9);
+            while !stop.load(Ordering::Relaxed) {
+                let tick = view.latest_tick().unwrap_or(0);
+                rave(&mut random, &commander, &view, tick, commander.lease(), DEVICES);
+                answers.fetch_add(1, Ordering::Relaxed);
+            }
+        });
+        // A panic here must not leave the thread running, which the scope would wait for.
+        let seen = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            let mut pushing = 0;
+            let mut count = 0;
+            while count < frames {
+                log.follow_for(&observer.driver, 100);
+                check_limits(&log);
+                pushing += log.told.iter().filter(|told| told.is_pushing()).count();
+                count += log.told.len();
+                log.forget();
+            }
+            assert!(pushing > frames / 100, "{pushing} of {count} frames told of a force");
+            // The madman does not stop when its lease ends.
+            drop(connection);
+            log.follow(&observer.driver, "the end of the lease", |told| {
+                told.last().is_some_and(|last| last.lease == 0 && !last.is_pushing())
+            });
+            log.forget();
+            log.follow_for(&observer.driver, 100);
+            log.check_silence_from(0);
+        }));
+        stop.store(true, Ordering::Relaxed);
+        seen.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+    });
+    assert!(answers.load(Ordering::Relaxed) > 1000);
+    assert_eq!(driver.child.try_wait().expect("our child"), None);
+    let counters = &observer.driver.counters;
+    assert_eq!(counters.faults.load(Ordering::Relaxed), 0);
+    assert!(counters.commands_torn.load(Ordering::Relaxed) > 0);
+    assert!(counters.commands_refused.load(Ordering::Relaxed) > 0);
+    assert!(counters.forces_limited.load(Ordering::Relaxed) > 0);
+    honest_successor(&driver);
+}
+
+fn check_limits(log: &RingLog) {
+    for told in &log.told {
+        // A few ulp of rounding.
+        assert!(told.applied_n <= PEAK_N * (1.0 + 1e-15), "{told:?}");
+        assert!((0.0..=1.0).contains(&told.authority), "{told:?}");
+    }
+}
+
+/// Whoever comes next is obeyed to the letter.
+fn honest_successor(driver: &Driver) {
+    let view = driver.observe().driver;
+    let mut log = RingLog::begin(&view);
+    let _commander = Commander::start(driver.command(), [1.0, 0.0, 0.0]);
+    let obeyed = |told: &Told| told.authority == 1.0 && told.first_applied_n == [1.0, 0.0, 0.0];
+    log.follow(&view, "obedience", |told| told.iter().any(obeyed));
+}
+
+#[test]
+fn a_commander_gone_mad_at_full_speed_does_not_hurt_a_driver_in_real_time() {
+    // Two seconds and more.
+    a_concurrent_madman("real", 8000);
+}
+
+#[test]
+fn a_commander_gone_mad_at_full_speed_does_not_hurt_a_driver_in_lockstep() {
+    a_concurrent_madman("lockstep", 20_000);
+}

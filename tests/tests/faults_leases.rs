@@ -1,0 +1,139 @@
+//! Several want something of one driver: former holders that still write, others that want the lease, and
+//! many that only look.
+
+use bytemuck::Zeroable;
+use shm_abi::{DriverView, Frame};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Duration;
+use system_tests::driver::Driver;
+use system_tests::faults::commander::{Commander, answer};
+use system_tests::faults::press::{Press, terminate};
+use system_tests::faults::process::{Running, io_driver};
+use system_tests::faults::ring::RingLog;
+
+/// A former holder keeps its mapping and goes on answering every tick, under its own lease's number and under
+/// its successor's. Nobody reads that memory any more.
+fn a_late_writer(clock: &str) {
+    let driver = Driver::start(&system_tests::faults::press::config(clock));
+    let observer = driver.observe();
+    let mut log = RingLog::begin(&observer.driver);
+    let former = Commander::start(driver.command(), [0.0, 3.0, 0.0]);
+    log.follow_to_force(&observer.driver);
+    let former = former.retire();
+    let (stop, writes) = (AtomicBool::new(false), AtomicU64::new(0));
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            while !stop.load(Ordering::Relaxed) {
+                let lease = former.lease() + writes.fetch_add(1, Ordering::Relaxed) % 2;
+                answer(&observer.driver, &former, lease, [0.0, 3.0, 0.0]);
+                std::thread::sleep(Duration::from_micros(50));
+            }
+        });
+        let seen = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            // While nobody commands.
+            log.follow(&observer.driver, "rest", |told| told.last().is_some_and(|last| !last.is_pushing()));
+            log.check_promise(&observer.driver);
+            log.forget();
+            log.follow_for(&observer.driver, 200);
+            log.check_silence_from(0);
+            // While somebody else does.
+            let successor = Commander::start(driver.command(), [1.0, 0.0, 0.0]);
+            log.follow(&observer.driver, "the successor's force", |told| {
+                told.iter().filter(|told| told.first_applied_n == [1.0, 0.0, 0.0]).count() > 200
+            });
+            for told in &log.told {
+                let [_, y, z] = told.first_applied_n;
+                assert_eq!((y, z), (0.0, 0.0), "{told:?}");
+            }
+            log.check_promise(&observer.driver);
+            drop(successor);
+        }));
+        stop.store(true, Ordering::Relaxed);
+        seen.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+    });
+    assert!(writes.load(Ordering::Relaxed) > 100);
+    assert_eq!(observer.driver.counters.commands_refused.load(Ordering::Relaxed), 0, "nobody even looked");
+}
+
+#[test]
+fn what_a_former_holder_writes_is_ignored_in_real_time() {
+    a_late_writer("real");
+}
+
+#[test]
+fn what_a_former_holder_writes_is_ignored_in_lockstep() {
+    a_late_writer("lockstep");
+}
+
+#[test]
+fn a_second_app_is_told_who_commands_and_the_first_goes_on() {
+    for clock in ["real", "lockstep"] {
+        let mut press = Press::start(clock);
+        let holder = press.start_app();
+        let mut log = RingLog::begin(&press.observer.driver);
+        log.follow_to_force(&press.observer.driver);
+        let end = Running::start(press.app().args(["--seconds", "1", "--record", "second.csv"])).end();
+        assert_eq!(end.status, Some(2), "{end:?}");
+        let message = format!("the devices are commanded by process {} (phantom3) already", holder.id());
+        assert!(end.err.contains(&message), "{end:?}");
+        assert!(!press.path("second.csv").exists(), "nothing was started");
+        let counters = &press.observer.driver.counters;
+        assert_eq!(counters.leases_refused.load(Ordering::Relaxed), 1);
+        log.follow_to_force(&press.observer.driver);
+        press.driver_must_live();
+        terminate(holder);
+    }
+}
+
+/// Reads frames as an observer would that draws them, as fast as it can without starving the others.
+fn look_on(driver: &DriverView, stop: &AtomicBool) -> u64 {
+    let mut frame = Frame::zeroed();
+    let mut read = 0;
+    while !stop.load(Ordering::Relaxed) {
+        let latest = driver.latest_tick().unwrap_or(0);
+        for tick in latest.saturating_sub(5)..=latest {
+            if driver.read_frame(tick, &mut frame).is_ok() {
+                assert_eq!(frame.tick, tick);
+                read += 1;
+            }
+        }
+        std::thread::sleep(Duration::from_micros(200));
+    }
+    read
+}
+
+#[test]
+fn any_number_of_observers_disturbs_nobody() {
+    const OBSERVERS: usize = 20;
+    let mut press = Press::start("lockstep");
+    let observers: Vec<_> = (0..OBSERVERS).map(|_| press.driver.observe()).collect();
+    let stop = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let looking: Vec<_> = observers.iter().map(|o| scope.spawn(|| look_on(&o.driver, &stop))).collect();
+        let seen = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            let mut app = Running::start(press.app().args(["--seconds", "10"]));
+            // Others come and go meanwhile.
+            for _ in 0..10 {
+                let end = io_driver(&["status", "--json"], press.driver.socket());
+                assert_eq!(end.status, Some(0), "{end:?}");
+                let status: serde_json::Value = serde_json::from_str(&end.out).expect("JSON");
+                assert_eq!(status["fault"], serde_json::Value::Null);
+            }
+            app.end()
+        }));
+        stop.store(true, Ordering::Relaxed);
+        let end = seen.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        assert_eq!(end.status, Some(0), "{end:?}");
+        for observer in looking {
+            assert!(observer.join().expect("frames are what they should be") > 100);
+        }
+    });
+    let counters = &press.observer.driver.counters;
+    let count = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
+    // 10 s at 2 kHz, and the ramp: in lockstep every tick is answered.
+    assert!(count(&counters.replies_fresh) >= 20_000);
+    assert_eq!(count(&counters.replies_missed), 0);
+    assert_eq!((count(&counters.commands_torn), count(&counters.commands_refused)), (0, 0));
+    assert_eq!((count(&counters.faults), count(&counters.leases_granted)), (0, 1));
+    press.driver_must_live();
+}

@@ -1,0 +1,294 @@
+//! The driver's tick and the application's turn leave the heap alone, whatever the other side does.
+//!
+//! Each is played over a hundred thousand ticks through everything that may happen in one, under an
+//! allocator that counts the calls of this thread. What belongs to other threads (granting leases, throwing
+//! mappings away, recording) is done here between the counted parts.
+
+use bytemuck::Zeroable;
+use haptics::ContactState;
+use io_driver::config::{DriverConfig, period_of};
+use io_driver::cycle::Cycle;
+use io_driver::device::{Device, Reading, TickTime, Written};
+use io_driver::driver::{describe, make_cycle};
+use io_driver::mail::{Inbox, Letter, Sender, mail};
+use io_driver::open::open_devices;
+use io_driver::status::CounterStatus;
+use nalgebra::Vector3;
+use phantom3::fast_loop::{FastLoop, Turn, WhenFull};
+use phantom3::rig::Rig;
+use rt_core::alloc_guard::{self, CountingAllocator};
+use rtrb::RingBuffer;
+use shm_abi::doorbell::WaitMode;
+use shm_abi::segment::{ClockMode, DeviceInfo};
+use shm_abi::{Command, CommanderMemory, CommanderView, DriverMemory, DriverState, DriverView, FaultReason};
+use std::os::fd::AsFd;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use world::{Layout, Scene};
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
+
+const TICKS: u64 = 100_000;
+/// A lease's life; a prime, so that the events below meet it in ever new phases.
+const LEASE_TICKS: u64 = 997;
+
+/// Tests that make mappings take turns, since one of them counts the mappings of the process.
+static MAPPINGS: Mutex<()> = Mutex::new(());
+
+fn in_turn() -> MutexGuard<'static, ()> {
+    MAPPINGS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn config_file(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../config").join(name)
+}
+
+#[test]
+fn the_drivers_tick_never_calls_the_heap_whatever_the_commander_does() {
+    let _turn = in_turn();
+    alloc_guard::assert_installed();
+    let mut play = Play::new();
+    for tick in 1..=TICKS {
+        play.prepare(tick);
+        let ((), heap_calls) = alloc_guard::count(|| play.tick(tick));
+        assert_eq!(heap_calls, 0, "in tick {tick}");
+    }
+    // All of it happened, or nothing has been shown.
+    let seen = CounterStatus::of(&play.driver);
+    assert_eq!(seen.ticks, TICKS);
+    for (name, count) in [
+        ("fresh", seen.replies_fresh),
+        ("missed", seen.replies_missed),
+        ("torn", seen.commands_torn),
+        ("refused", seen.commands_refused),
+        ("limited", seen.forces_limited),
+        ("faults", seen.faults),
+    ] {
+        assert!(count > TICKS / LEASE_TICKS / 2, "{name}: {seen:?}");
+    }
+    assert!(play.full_authority, "no lease came to full authority");
+}
+
+#[test]
+fn a_lease_that_ended_is_unmapped_by_the_socket_thread_and_not_by_the_loop() {
+    let _turn = in_turn();
+    let mut play = Play::new();
+    for lease in 1..100 {
+        let (view, _fd) = CommanderView::create(lease).unwrap();
+        play.sender.post(Letter::Grant(view)).unwrap();
+        if lease > 1 {
+            play.sender.post(Letter::End(lease - 1)).unwrap();
+        }
+        let before = mapped_commanders();
+        for tick in 0..3 {
+            play.tick(3 * lease + tick);
+        }
+        assert_eq!(mapped_commanders(), before, "the loop mapped or unmapped something at lease {lease}");
+        play.sender.clear_waste();
+        assert_eq!(mapped_commanders(), 1, "only the lease in force stays");
+    }
+}
+
+/// Lines of this process's map that show a commander's segment.
+fn mapped_commanders() -> usize {
+    let maps = std::fs::read_to_string("/proc/self/maps").unwrap();
+    maps.lines().filter(|line| line.contains("phantom3-commander")).count()
+}
+
+/// A driver's tick, and what surrounds it.
+struct Play {
+    cycle: Cycle,
+    inbox: Inbox,
+    sender: Sender,
+    driver: DriverView,
+    commander: Option<CommanderMemory>,
+    lease: u64,
+    devices: u64,
+    full_authority: bool,
+}
+
+impl Play {
+    /// Two ideal devices that follow a hand, two Premiums that replay a trace, and one that breaks.
+    fn new() -> Self {
+        let hand = "[[device]]\nbackend = \"ideal\"\nhand = \"../hands/default.csv\"\npeak_force_n = 8.5\n";
+        let premium = "[[device]]\nbackend = \"replay\"\ndescription = \"premium-1.5\"\ntrace = \"traces/circle.csv\"\n";
+        let text = format!("[safety]\nramp_in_ms = 50\n{}{}", hand.repeat(2), premium.repeat(2));
+        let config = DriverConfig::parse(&text, &config_file("driver/test.toml")).unwrap();
+        let mut devices = open_devices(&config).unwrap();
+        devices.push(Box::new(Breaking::new(devices[0].info().clone())));
+        let info = describe(&config, &devices, WaitMode::Spin);
+        let memory = Arc::new(DriverMemory::create(&info).unwrap());
+        let driver = DriverView::map(memory.fd()).unwrap();
+        let count = devices.len() as u64;
+        let cycle = make_cycle(&config, memory, devices);
+        let (sender, inbox) = mail();
+        Self {
+            cycle,
+            inbox,
+            sender,
+            driver,
+            commander: None,
+            lease: 0,
+            devices: count,
+            full_authority: false,
+        }
+    }
+
+    /// What the socket's thread and the commander do before the tick.
+    fn prepare(&mut self, tick: u64) {
+        if self.cycle.safety().state() == DriverState::Fault && tick.is_multiple_of(10) {
+            self.sender.post(Letter::ClearFault).unwrap();
+        }
+        if tick % LEASE_TICKS == 1 {
+            if self.lease > 0 {
+                self.sender.post(Letter::End(self.lease)).unwrap();
+            }
+            self.grant();
+            if self.lease.is_multiple_of(5) {
+                // The next one comes while the former still ramps out, and is replaced by another at once.
+                self.grant();
+            }
+        }
+        self.sender.clear_waste();
+    }
+
+    fn grant(&mut self) {
+        self.lease += 1;
+        let (view, fd) = CommanderView::create(self.lease).unwrap();
+        self.commander = Some(CommanderMemory::map(fd.as_fd()).unwrap());
+        self.sender.post(Letter::Grant(view)).unwrap();
+    }
+
+    /// The loop's own part, with the commander's answer in the middle of it.
+    fn tick(&mut self, tick: u64) {
+        self.inbox.deliver(&mut self.cycle);
+        self.cycle.sense(tick, tick * 1_000_000);
+        self.cycle.take_reply();
+        self.answer(tick);
+        self.cycle.take_reply();
+        self.cycle.actuate();
+        self.full_authority |= self.cycle.safety().authority() == 1.0;
+    }
+
+    /// Right mostly; else late, silent or garbage of every kind.
+    fn answer(&self, tick: u64) {
+        let Some(commander) = &self.commander else { return };
+        let mut command = Command::zero(tick, commander.lease(), self.devices);
+        for device in &mut command.devices[..self.devices as usize] {
+            device.force_on_user_n = [9.0, -1.0, 0.5 * (tick as f64 / 40.0).sin()];
+        }
+        match tick % 1009 {
+            // Silence, short enough to be held and long enough to expire.
+            100..103 | 200..220 => return,
+            300 => command.devices[3].force_on_user_n[1] = f64::NAN,
+            301 => command.lease += 1,
+            302 => command.device_count = u64::MAX,
+            303 => command.tick = tick + 7,
+            304 => command.tick = u64::MAX,
+            305 => command.tick = tick.saturating_sub(2),
+            306 => command.devices[0].force_on_user_n = [f64::MAX; 3],
+            _ => {}
+        }
+        commander.publish(&command, &self.driver);
+        if tick % 1009 == 307 {
+            // It dies in the middle of the next write, which it has announced already.
+            let slot = &commander.commands[tick as usize % commander.commands.len()];
+            slot.sequence.store(2 * tick + 1, Ordering::Relaxed);
+        }
+    }
+}
+
+/// A device that breaks now and then, in each way that a device may.
+struct Breaking {
+    info: DeviceInfo,
+    tick: u64,
+}
+
+impl Breaking {
+    fn new(info: DeviceInfo) -> Self {
+        Self { info, tick: 0 }
+    }
+}
+
+impl Device for Breaking {
+    fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    fn read(&mut self, time: TickTime) -> Result<Reading, FaultReason> {
+        self.tick = time.tick;
+        match time.tick % 1511 {
+            500 => Err(FaultReason::DeviceRead),
+            501 => Ok(Reading { is_valid: false, ..Reading::at(Vector3::zeros()) }),
+            1000 => Ok(Reading::at(Vector3::repeat(f64::NAN))),
+            _ => Ok(Reading::at(Vector3::zeros())),
+        }
+    }
+
+    fn write(&mut self, force_on_user_n: Vector3<f64>) -> Result<Written, FaultReason> {
+        match self.tick % 1511 {
+            1400 => Err(FaultReason::DeviceWrite),
+            _ => Ok(Written { force_on_user_n, motor_codes: [0; 3] }),
+        }
+    }
+
+    fn release(&mut self) {}
+}
+
+/// The default scene's hand touches, holds and slides for ten seconds: at 10 kHz a hundred thousand ticks.
+#[test]
+fn the_applications_turn_never_calls_the_heap_while_fingers_touch_hold_and_slide() {
+    let _turn = in_turn();
+    alloc_guard::assert_installed();
+    let period_ns = period_of(10_000.0);
+    let file = config_file("scenes/default.toml");
+    let rig = Rig::new(&file, Scene::load(&file).unwrap(), Layout::default(), None, period_ns).unwrap();
+    let config = rig.driver_config(ClockMode::Virtual);
+    let devices = open_devices(&config).unwrap();
+    let memory = Arc::new(DriverMemory::create(&describe(&config, &devices, WaitMode::Spin)).unwrap());
+    let driver = DriverView::map(memory.fd()).unwrap();
+    let mut cycle = make_cycle(&config, memory, devices);
+    let (view, fd) = CommanderView::create(1).unwrap();
+    let commander = CommanderMemory::map(fd.as_fd()).unwrap();
+    cycle.grant(view);
+    cycle.change_lease();
+    let (rows, mut taken) = RingBuffer::new(1024);
+    let mut fast = FastLoop::new(rig.fast_step().unwrap(), rows, WhenFull::Drop, TICKS, period_ns);
+    let (mut seen, mut answered) = ([0_u64; 3], 0);
+    for tick in 1..=TICKS {
+        cycle.sense(tick, tick * period_ns);
+        // Some frames are never looked at, so that the next turn searches the ring for what came of them.
+        if tick % 1013 > 3 {
+            let (turn, heap_calls) = alloc_guard::count(|| fast.turn(tick, &driver, &commander));
+            assert_eq!((turn, heap_calls), (Turn::Answered, 0), "in tick {tick}");
+            answered += 1;
+        }
+        cycle.take_reply();
+        cycle.actuate();
+        if tick == TICKS / 2 {
+            // As after the loss of the driver.
+            assert_eq!(alloc_guard::count(|| fast.reset()).1, 0);
+        }
+        // For a while nobody takes the rows, so that the queue runs full.
+        while tick % 10_000 < 5_000
+            && let Ok(row) = taken.pop()
+        {
+            for finger in &row.fingers[..2] {
+                seen[finger.friction as usize] += 1;
+            }
+        }
+    }
+    assert_eq!(fast.tally.answered, answered);
+    assert!(fast.tally.rows_lost > 0 && fast.tally.frames_missed > 0, "{:?}", fast.tally);
+    for state in [ContactState::Free, ContactState::Stick, ContactState::Slip] {
+        assert!(seen[state as usize] > TICKS / 100, "hardly ever {state:?}: {seen:?}");
+    }
+}
+
+#[test]
+fn a_tick_that_allocates_would_be_noticed() {
+    let (_, heap_calls) = alloc_guard::count(|| drop(std::hint::black_box(vec![Command::zeroed()])));
+    assert_eq!(heap_calls, 2, "one allocation, one release");
+}

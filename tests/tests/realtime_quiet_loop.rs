@@ -1,0 +1,290 @@
+//! The steady loops ask nothing of the kernel but to be woken: no other system call, no page fault.
+//!
+//! The driver spins for replies here, as it does on a CPU of its own with real-time rights, though it may
+//! have neither: then it is late more often, and what it asks of the kernel is the same.
+
+use shm_abi::client::Attachment;
+use shm_abi::{Command, DriverView};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::{Child, Command as Process, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+use system_tests::driver::{Driver, HANG, wait_or_kill};
+use system_tests::programs;
+use system_tests::threads::{PageFaults, ThreadOf};
+
+/// These tests keep two CPUs busy each: they take turns.
+static TURN: Mutex<()> = Mutex::new(());
+
+fn in_turn() -> MutexGuard<'static, ()> {
+    TURN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A driver of three resting devices that spins for replies, without real-time rights.
+const SPINNING: &str = "\
+[real_time]
+priority = 0
+lock_memory = false
+wait = \"spin\"
+[[device]]
+backend = \"ideal\"
+[[device]]
+backend = \"ideal\"
+[[device]]
+backend = \"ideal\"
+";
+
+/// Answers every frame, spinning, until told to stop.
+fn answer(attachment: &Attachment, stop: &AtomicBool) {
+    let commander = attachment.commander.as_ref().expect("the lease");
+    let mut seen = None;
+    while !stop.load(Ordering::Relaxed) {
+        let latest = attachment.driver.latest_tick();
+        if let Some(tick) = latest.filter(|_| latest != seen) {
+            commander.publish(&Command::zero(tick, commander.lease(), 3), &attachment.driver);
+            seen = latest;
+        }
+        std::hint::spin_loop();
+    }
+}
+
+/// Runs `f` while somebody commands.
+fn with_commander(driver: &Driver, f: impl FnOnce(&DriverView)) {
+    let attachment = driver.command();
+    let stop = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        // If `f` panics the answering must end too, or the scope never would.
+        let _stop_at_the_end = StopAtTheEnd(&stop);
+        scope.spawn(|| answer(&attachment, &stop));
+        f(&attachment.driver);
+    });
+}
+
+struct StopAtTheEnd<'a>(&'a AtomicBool);
+
+impl Drop for StopAtTheEnd<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Ticks answered in time.
+fn fresh(seen: &DriverView) -> u64 {
+    seen.counters.replies_fresh.load(Ordering::Relaxed)
+}
+
+/// Ticks done.
+fn done(seen: &DriverView) -> u64 {
+    seen.counters.ticks.load(Ordering::Relaxed)
+}
+
+/// Waits until a count has grown by `more`.
+fn wait_for(count: impl Fn() -> u64, more: u64) {
+    let (start, begun) = (count(), Instant::now());
+    while count() < start + more {
+        assert!(begun.elapsed() < HANG, "{} of {more} in {HANG:?}", count() - start);
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
+fn in_spin_mode_the_timed_wait_is_the_drivers_only_system_call() {
+    let _turn = in_turn();
+    let driver = Driver::start(SPINNING);
+    let thread = ThreadOf::find(driver.child.id(), "driver-loop");
+    with_commander(&driver, |seen| {
+        // A commander that takes its time to begin is slept for at first, for a second.
+        wait_for(|| fresh(seen), 1500);
+        check_calls("commanded", thread.tid, &["clock_nanosleep"], |window| wait_for(|| fresh(seen), window));
+    });
+    let seen = driver.observe().driver;
+    check_calls("idle", thread.tid, &["clock_nanosleep"], |window| wait_for(|| done(&seen), window));
+}
+
+/// With rights it sleeps until shortly before the frame is due, else on the doorbell; and it wakes the
+/// driver where that sleeps.
+#[test]
+fn the_applications_fast_thread_calls_nothing_but_waits_and_wakes() {
+    let _turn = in_turn();
+    let (driver, mut phantom3) = both_programs(true);
+    let thread = ThreadOf::find(phantom3.id(), "fast");
+    let seen = driver.observe().driver;
+    wait_for(|| fresh(&seen), 1500);
+    check_calls("fast thread", thread.tid, &["clock_nanosleep", "futex"], |window| {
+        wait_for(|| fresh(&seen), window);
+    });
+    let _ = phantom3.kill();
+    let _ = phantom3.wait();
+}
+
+/// Traces a thread while it does some thousand ticks. A driver that gets no reply for 5 ms sleeps for them
+/// for a second, which a busy machine brings about: one window of three without that will do, since a call
+/// that the loop makes by itself is in each of them.
+fn check_calls(what: &str, tid: u32, allowed: &[&str], run: impl Fn(u64)) {
+    const WINDOW: u64 = 2000;
+    let mut windows = Vec::new();
+    for _ in 0..3 {
+        let directory = tempfile::tempdir().expect("a directory");
+        let trace = directory.path().join("trace");
+        let Some(mut strace) = attach_strace(tid, &trace) else { return };
+        run(WINDOW);
+        detach_strace(&mut strace);
+        let calls = calls_in(&trace);
+        println!("{what}: system calls in some {WINDOW} ticks: {calls:?}");
+        // A tick that is late by most of a period does not sleep; being traced costs 50 us and more each.
+        assert!(calls.values().sum::<u64>() > WINDOW / 10, "strace did not watch: {calls:?}");
+        if calls.keys().all(|name| allowed.contains(&name.as_str())) {
+            return;
+        }
+        windows.push(calls);
+    }
+    panic!("{what}: system calls beside {allowed:?} in each of {windows:?}");
+}
+
+/// `None`, and why, where nothing can be traced.
+fn attach_strace(tid: u32, trace: &Path) -> Option<Child> {
+    let strace = Process::new("strace")
+        .arg("-o")
+        .arg(trace)
+        .args(["-p", &tid.to_string()])
+        .stderr(Stdio::null())
+        .spawn();
+    let Ok(mut strace) = strace else {
+        println!("skipped: strace is not installed; the kernel's own counters are tested elsewhere here");
+        return None;
+    };
+    let begun = Instant::now();
+    while std::fs::metadata(trace).map_or(0, |file| file.len()) == 0 {
+        if strace.try_wait().expect("our child").is_some() {
+            println!("skipped: strace may not trace; the kernel's own counters are tested elsewhere here");
+            return None;
+        }
+        assert!(begun.elapsed() < HANG, "strace sees nothing");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    Some(strace)
+}
+
+fn detach_strace(strace: &mut Child) {
+    let pid = rustix::process::Pid::from_child(strace);
+    rustix::process::kill_process(pid, rustix::process::Signal::INT).expect("our child");
+    wait_or_kill(strace);
+}
+
+/// How often each system call stands in a trace; the last line may be cut. The call that attaching
+/// interrupted is gone on with by the kernel under the name `restart_syscall`: it is none of the thread's own.
+fn calls_in(trace: &Path) -> BTreeMap<String, u64> {
+    let mut calls = BTreeMap::new();
+    for line in std::fs::read_to_string(trace).expect("a trace").lines() {
+        if let Some((name, _)) = line.split_once('(').filter(|(name, _)| *name != "restart_syscall") {
+            *calls.entry(name.to_owned()).or_insert(0) += 1;
+        }
+    }
+    calls
+}
+
+#[test]
+fn in_spin_mode_the_driver_sleeps_once_a_tick_and_neither_reads_nor_writes() {
+    let _turn = in_turn();
+    let driver = Driver::start(SPINNING);
+    let thread = ThreadOf::find(driver.child.id(), "driver-loop");
+    with_commander(&driver, |seen| {
+        wait_for(|| fresh(seen), 1500);
+        let mut windows = Vec::new();
+        // One window of three, as above.
+        for _ in 0..3 {
+            let (sleeps, io, ticks) = (thread.sleeps(), thread.reads_and_writes(), done(seen));
+            wait_for(|| fresh(seen), 2000);
+            let (sleeps, ticks) = (thread.sleeps() - sleeps, done(seen) - ticks);
+            println!("{sleeps} sleeps in {ticks} ticks");
+            assert_eq!(thread.reads_and_writes(), io, "it read or wrote a file");
+            // One more or less at either end, where the counters are not read at the same moment.
+            if sleeps <= ticks + 2 {
+                return;
+            }
+            windows.push((sleeps, ticks));
+        }
+        panic!("something beside the timed wait sleeps: {windows:?}");
+    });
+}
+
+/// Where it blocks, it blocks in one and the same system call.
+#[test]
+fn in_spin_mode_the_driver_blocks_in_no_other_call_than_the_timed_wait() {
+    let _turn = in_turn();
+    let driver = Driver::start(SPINNING);
+    let thread = ThreadOf::find(driver.child.id(), "driver-loop");
+    let mut blocked = BTreeMap::new();
+    // Without a commander the loop sleeps most of the time: each sample is a fair one.
+    let begun = Instant::now();
+    while blocked.values().sum::<u64>() < 500 && begun.elapsed() < HANG / 10 {
+        if let Some(call) = thread.blocked_in() {
+            *blocked.entry(call).or_insert(0) += 1;
+        }
+        std::thread::sleep(Duration::from_micros(313));
+    }
+    if blocked.is_empty() {
+        println!("skipped: the kernel does not tell in which call a thread is blocked");
+        return;
+    }
+    println!("blocked in (number of the call: samples): {blocked:?}");
+    assert_eq!(blocked.len(), 1, "{blocked:?}");
+}
+
+/// Both programs as they are used, with locked memory if the machine allows it.
+#[test]
+fn the_loops_of_both_programs_fault_no_page_once_warm() {
+    let _turn = in_turn();
+    for lock in [true, false] {
+        let (driver, mut phantom3) = both_programs(lock);
+        let threads =
+            [ThreadOf::find(driver.child.id(), "driver-loop"), ThreadOf::find(phantom3.id(), "fast")];
+        let seen = driver.observe().driver;
+        wait_for(|| fresh(&seen), 1000);
+        for thread in &threads {
+            check_that_nothing_faults(thread, || fresh(&seen));
+        }
+        let _ = phantom3.kill();
+        let _ = phantom3.wait();
+    }
+}
+
+/// The default scene and hand, with as much of the usual set-up as there are rights for.
+fn both_programs(lock: bool) -> (Driver, Child) {
+    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config");
+    let hand = config.join("hands/default.csv");
+    let device = format!("[[device]]\nbackend = \"ideal\"\nhand = {:?}\n", hand.to_str().expect("UTF-8"));
+    let driver = Driver::start(&format!("[real_time]\nlock_memory = {lock}\n{}", device.repeat(2)));
+    let phantom3 = programs::phantom3()
+        .args(["run", "--attach"])
+        .arg(driver.socket())
+        .arg(config.join("scenes/default.toml"))
+        .args(["--seconds", "600"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn();
+    (driver, phantom3.expect("the application starts"))
+}
+
+/// With locked memory no page may fault. Without, a page may be taken away and come back: once, not in
+/// each of three windows as a loop's own fault does.
+fn check_that_nothing_faults(thread: &ThreadOf, ticks: impl Fn() -> u64) {
+    let locked = thread.locked_kib() > 0;
+    if !locked {
+        println!("memory is not locked: one quiet window of three will do");
+    }
+    let mut windows = Vec::new();
+    for _ in 0..if locked { 1 } else { 3 } {
+        let before = thread.page_faults();
+        wait_for(&ticks, 2000);
+        let after = thread.page_faults();
+        windows.push(PageFaults { minor: after.minor - before.minor, major: after.major - before.major });
+        if windows.last() == Some(&PageFaults { minor: 0, major: 0 }) {
+            println!("thread {}, locked {locked}: no page fault in 2000 ticks", thread.tid);
+            return;
+        }
+    }
+    panic!("page faults in windows of 2000 ticks, locked {locked}: {windows:?}");
+}
