@@ -59,9 +59,9 @@ struct RunArgs {
     /// How the hand moves the devices
     #[arg(long, value_enum, default_value_t = HandMode::Kinematic)]
     hand_mode: HandMode,
-    /// What moves time
-    #[arg(long, value_enum, default_value_t = Clock::Real)]
-    clock: Clock,
+    /// What moves time [default: real; with --attach: the driver's own clock]
+    #[arg(long, value_enum)]
+    clock: Option<Clock>,
     /// Write every tick here (CSV)
     #[arg(long, value_name = "CSV")]
     record: Option<PathBuf>,
@@ -125,7 +125,7 @@ pub fn main() -> ExitCode {
 fn run_demo() -> Result<(Report, Stop), RunFailure> {
     let signals = install_signals()?;
     let demo = demo::unpack(period_of(DEFAULT_RATE_HZ))?;
-    run::run(&demo.rig, &demo::plan(), &signals)
+    run::run(&demo.rig, &demo::plan(&demo.rig), &signals)
 }
 
 fn run_scene(args: &RunArgs) -> Result<(Report, Stop), RunFailure> {
@@ -155,7 +155,7 @@ fn make_rig(args: &RunArgs) -> Result<Rig, RunFailure> {
 }
 
 fn make_plan(args: &RunArgs, rig: &Rig) -> Result<RunPlan, RunFailure> {
-    if args.attach.is_some() && args.clock == Clock::Virtual {
+    if args.attach.is_some() && args.clock == Some(Clock::Virtual) {
         return Err(RunFailure::Start("--attach and --clock virtual exclude each other: a driver that runs has its own clock".into()));
     }
     refuse_to_overwrite_input(args, rig)?;
@@ -163,7 +163,7 @@ fn make_plan(args: &RunArgs, rig: &Rig) -> Result<RunPlan, RunFailure> {
         socket: if socket.as_os_str().is_empty() { endpoint::for_application() } else { socket.clone() },
         grace: Duration::from_secs_f64(args.grace),
     });
-    Ok(RunPlan { clock: args.clock.into(), seconds: args.seconds, record: args.record.clone(), attach })
+    Ok(RunPlan { clock: args.clock.map(ClockMode::from), seconds: args.seconds, record: args.record.clone(), attach })
 }
 
 fn refuse_to_overwrite_input(args: &RunArgs, rig: &Rig) -> Result<(), RunFailure> {

@@ -6,7 +6,6 @@ use crate::run::{Attach, RunPlan};
 use io_driver::say::say;
 use shm_abi::client::{self, AttachError};
 use shm_abi::endpoint;
-use shm_abi::segment::ClockMode;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tempfile::TempDir;
@@ -46,11 +45,18 @@ fn default_rig(hand: &Path, period_ns: u64) -> Result<Rig, RigError> {
 }
 
 /// Uses a driver that runs and is free; starts one of our own otherwise, and says why.
-pub fn plan() -> RunPlan {
+pub fn plan(rig: &Rig) -> RunPlan {
     let socket = endpoint::for_application();
     let attach = match client::observe(&socket, "phantom3 looks around") {
         Ok(seen) if seen.driver.read_latest().is_some_and(|frame| frame.lease != 0) => {
             say(format_args!("phantom3: the driver at {} is commanded by somebody else; starting one of our own", socket.display()));
+            None
+        }
+        Ok(seen) if seen.driver.info().devices.len() < rig.device_count() => {
+            say(format_args!(
+                "phantom3: the driver at {} has too few devices for the default scene; starting one of our own",
+                socket.display()
+            ));
             None
         }
         Ok(_) => {
@@ -66,7 +72,7 @@ pub fn plan() -> RunPlan {
             None
         }
     };
-    RunPlan { clock: ClockMode::Real, seconds: Some(SECONDS), record: Some(recording_place()), attach }
+    RunPlan { clock: None, seconds: Some(SECONDS), record: Some(recording_place()), attach }
 }
 
 /// Here, if one may write here, else among the temporary files.

@@ -34,7 +34,12 @@ impl Progress {
         let seconds = |ticks: u64| run_time_s(ticks as i64, self.period_ns);
         let done = run_ticks.min(self.total_ticks);
         let percent = 100 * done / self.total_ticks.max(1);
-        let line = format!("{:7.2} s of {:.2} s  {percent:3} %", seconds(done), seconds(self.total_ticks));
+        let total = seconds(self.total_ticks);
+        let line = if run_ticks == 0 {
+            format!("   0.00 s of {total:.2} s  waiting for the force to ramp in (late replies hold it back)")
+        } else {
+            format!("{:7.2} s of {total:.2} s  {percent:3} %", seconds(done))
+        };
         let mut out = std::io::stderr().lock();
         // Nobody to tell is no reason to stop.
         let _ = if self.on_terminal { write!(out, "\r{line}\x1b[K") } else { writeln!(out, "{line}") };

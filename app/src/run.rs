@@ -9,7 +9,7 @@ use crate::report::{Baseline, Report};
 use crate::rig::Rig;
 use crate::slow::{SlowSide, row_queue};
 use crate::two_processes::{self, Source};
-use crate::virtual_clock;
+use crate::virtual_clock::VirtualDriver;
 use rt_core::signals::StopSignals;
 use shm_abi::client;
 use shm_abi::segment::{ClockMode, DriverInfo};
@@ -19,8 +19,8 @@ use std::time::Duration;
 /// What a run is to do with its rig.
 #[derive(Debug, Clone)]
 pub struct RunPlan {
-    /// Which clock moves the ticks.
-    pub clock: ClockMode,
+    /// Which clock moves the ticks; `None`: the running driver's own, real for a child.
+    pub clock: Option<ClockMode>,
     /// How long; `None`: as the rig says.
     pub seconds: Option<f64>,
     /// Where to record.
@@ -44,8 +44,8 @@ pub struct Attach {
 /// Whatever kept the run from starting or from going on.
 pub fn run(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Report, Stop), RunFailure> {
     match plan.clock {
-        ClockMode::Virtual => run_virtual(rig, plan, signals),
-        ClockMode::Real | ClockMode::Lockstep => run_two_processes(rig, plan, signals),
+        Some(ClockMode::Virtual) => run_virtual(rig, plan, signals),
+        _ => run_two_processes(rig, plan, signals),
     }
 }
 
@@ -57,7 +57,7 @@ struct Parts {
 }
 
 impl Parts {
-    fn new(rig: &Rig, plan: &RunPlan, period_ns: u64) -> Result<Self, RunFailure> {
+    fn new(rig: &Rig, plan: &RunPlan, clock: ClockMode, period_ns: u64) -> Result<Self, RunFailure> {
         let seconds = plan.seconds.unwrap_or_else(|| rig.default_seconds());
         let total_ticks = (seconds * 1e9 / period_ns as f64).round() as u64;
         if total_ticks == 0 {
@@ -66,7 +66,7 @@ impl Parts {
                 period_ns as f64 / 1e9
             )));
         }
-        let when_full = if plan.clock == ClockMode::Real { WhenFull::Drop } else { WhenFull::Wait };
+        let when_full = if clock == ClockMode::Real { WhenFull::Drop } else { WhenFull::Wait };
         let step = rig.fast_step().map_err(|error| RunFailure::Start(error.to_string()))?;
         let (producer, consumer) = row_queue();
         let record = |path: &PathBuf| Recording::create(path, rig.names(), period_ns);
@@ -80,18 +80,17 @@ impl Parts {
 }
 
 fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Report, Stop), RunFailure> {
-    let Parts { mut fast, mut slow, mut progress } = Parts::new(rig, plan, rig.period_ns)?;
-    let config = rig.driver_config(ClockMode::Virtual);
-    let result = virtual_clock::run(&config, &mut fast, &mut slow, &mut progress, signals);
+    let mut driver = VirtualDriver::open(&rig.driver_config(ClockMode::Virtual))?;
+    let Parts { mut fast, mut slow, mut progress } = Parts::new(rig, plan, ClockMode::Virtual, rig.period_ns)?;
+    let result = driver.run(&mut fast, &mut slow, &mut progress, signals);
     progress.end();
-    let (result, rows) = close(result, slow)?;
-    let (tally, stop, driver) = result;
+    let (stop, rows) = close(result, slow)?;
     let report = Report {
         clock: ClockMode::Virtual.name(),
         period_ns: rig.period_ns,
         driver: "in this process".into(),
-        tally,
-        counters: io_driver::status::CounterStatus::of(&driver),
+        tally: fast.tally,
+        counters: io_driver::status::CounterStatus::of(driver.view()),
         timing: None,
         guarantees: None,
         recording: plan.record.clone().zip(rows),
@@ -103,10 +102,11 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
     let (mut source, attachment) = connect(rig, plan)?;
     let info = attachment.driver.info();
     check_devices(rig, &info)?;
+    check_clock(plan, &info)?;
     let driver_name = describe(&source, attachment.driver_pid, &info);
     let baseline = Baseline::of(&attachment.driver);
     let step_rig = Rig { period_ns: info.period_ns, ..rig.clone() };
-    let Parts { fast, mut slow, mut progress } = Parts::new(&step_rig, plan, info.period_ns)?;
+    let Parts { fast, mut slow, mut progress } = Parts::new(&step_rig, plan, info.clock_mode, info.period_ns)?;
     let result = two_processes::run(&mut source, attachment, fast, &mut slow, &mut progress, signals);
     progress.end();
     let (end, rows) = close(result, slow)?;
@@ -139,7 +139,7 @@ fn connect(rig: &Rig, plan: &RunPlan) -> Result<(Source, client::Attachment), Ru
         }
         None => {
             refuse_unwritable_name(rig)?;
-            let mut child = DriverChild::start(&rig.driver_config(plan.clock))?;
+            let mut child = DriverChild::start(&rig.driver_config(plan.clock.unwrap_or(ClockMode::Real)))?;
             let attachment = child.attach("phantom3")?;
             Ok((Source::Child(child), attachment))
         }
@@ -168,6 +168,18 @@ fn check_devices(rig: &Rig, info: &DriverInfo) -> Result<(), RunFailure> {
          take fingers out of the scene, or add devices to the driver's configuration",
         rig.scene_file.display()
     )))
+}
+
+fn check_clock(plan: &RunPlan, info: &DriverInfo) -> Result<(), RunFailure> {
+    match plan.clock {
+        Some(wanted) if wanted != info.clock_mode => Err(RunFailure::Start(format!(
+            "the driver's clock is {}, --clock says {}; leave --clock out, or start the driver with `clock = \"{}\"`",
+            info.clock_mode.name(),
+            wanted.name(),
+            wanted.name()
+        ))),
+        _ => Ok(()),
+    }
 }
 
 fn describe(source: &Source, pid: u64, info: &DriverInfo) -> String {

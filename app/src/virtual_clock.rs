@@ -4,11 +4,12 @@
 //! processes; only the waiting is left out. Ticks are numbers, so that two runs with the same input write
 //! the same recording byte for byte.
 
-use crate::fast_loop::{FastLoop, Tally, Turn};
+use crate::fast_loop::{FastLoop, Turn};
 use crate::outcome::{RunFailure, Stop};
 use crate::progress::Progress;
 use crate::slow::SlowSide;
 use io_driver::config::DriverConfig;
+use io_driver::cycle::Cycle;
 use io_driver::driver::{describe, make_cycle};
 use io_driver::open::open_devices;
 use rt_core::signals::StopSignals;
@@ -23,43 +24,72 @@ const SLOW_EVERY: u64 = 40;
 /// The only lease there is.
 const LEASE: u64 = 1;
 
-/// Runs to the end.
-///
-/// # Errors
-/// A fault, or a recording that cannot be written.
-pub fn run(
-    config: &DriverConfig,
-    fast: &mut FastLoop,
-    slow: &mut SlowSide,
-    progress: &mut Progress,
-    signals: &StopSignals,
-) -> Result<(Tally, Stop, DriverView), RunFailure> {
-    let devices = open_devices(config)?;
-    let info = describe(config, &devices, WaitMode::Spin);
-    let memory = Arc::new(DriverMemory::create(&info)?);
-    let driver = DriverView::map(memory.fd())?;
-    let (view, fd) = CommanderView::create(LEASE)?;
-    let commander = CommanderMemory::map(fd.as_fd())?;
-    let mut cycle = make_cycle(config, memory, devices);
-    cycle.grant(view);
-    cycle.change_lease();
-    for tick in 1.. {
-        cycle.sense(tick, tick * config.period_ns);
-        let turn = fast.turn(tick, &driver, &commander);
-        cycle.take_reply();
-        cycle.actuate();
-        if tick % SLOW_EVERY == 0 {
-            slow.step()?;
-            progress.show(fast.run_ticks());
-        }
-        match turn {
-            Turn::Finished => return Ok((fast.tally, Stop::Finished, driver)),
-            Turn::Fault(reason) => return Err(RunFailure::driver_fault(reason)),
-            Turn::Answered | Turn::Skipped => {}
-        }
-        if let Some(signal) = signals.requested() {
-            return Ok((fast.tally, Stop::Signal(signal), driver));
-        }
+/// Both sides of the shared memory, in one process.
+pub struct VirtualDriver {
+    cycle: Cycle,
+    driver: DriverView,
+    commander: CommanderMemory,
+    period_ns: u64,
+}
+
+impl VirtualDriver {
+    /// Opens the devices and makes the memory.
+    ///
+    /// # Errors
+    /// If either cannot be had.
+    pub fn open(config: &DriverConfig) -> Result<Self, RunFailure> {
+        let devices = open_devices(config)?;
+        let info = describe(config, &devices, WaitMode::Spin);
+        let memory = Arc::new(DriverMemory::create(&info)?);
+        let driver = DriverView::map(memory.fd())?;
+        let (view, fd) = CommanderView::create(LEASE)?;
+        let commander = CommanderMemory::map(fd.as_fd())?;
+        let mut cycle = make_cycle(config, memory, devices);
+        cycle.grant(view);
+        cycle.change_lease();
+        Ok(Self { cycle, driver, commander, period_ns: config.period_ns })
     }
-    unreachable!("ticks do not run out")
+
+    /// The driver's memory, as an application sees it.
+    pub fn view(&self) -> &DriverView {
+        &self.driver
+    }
+
+    /// Runs to the end.
+    ///
+    /// # Errors
+    /// A fault, or a recording that cannot be written.
+    pub fn run(
+        &mut self,
+        fast: &mut FastLoop,
+        slow: &mut SlowSide,
+        progress: &mut Progress,
+        signals: &StopSignals,
+    ) -> Result<Stop, RunFailure> {
+        for tick in 1.. {
+            let turn = self.tick(tick, fast);
+            if tick % SLOW_EVERY == 0 {
+                slow.step()?;
+                progress.show(fast.run_ticks());
+            }
+            match turn {
+                Turn::Finished => break,
+                Turn::Fault(reason) => return Err(RunFailure::driver_fault(reason)),
+                Turn::Answered | Turn::Skipped => {}
+            }
+            if let Some(signal) = signals.requested() {
+                return Ok(Stop::Signal(signal));
+            }
+        }
+        Ok(Stop::Finished)
+    }
+
+    /// The driver reads and tells, the application answers, the driver writes.
+    fn tick(&mut self, tick: u64, fast: &mut FastLoop) -> Turn {
+        self.cycle.sense(tick, tick * self.period_ns);
+        let turn = fast.turn(tick, &self.driver, &self.commander);
+        self.cycle.take_reply();
+        self.cycle.actuate();
+        turn
+    }
 }

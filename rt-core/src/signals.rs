@@ -11,7 +11,7 @@
 //! ignored, as Rust's start-up code leaves it: a write to a closed socket is an error, not a death.
 //! Cost: one relaxed load a tick.
 
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
 use std::io;
 use std::sync::Arc;
@@ -40,6 +40,8 @@ impl StopSignals {
         for number in [SIGTERM, SIGINT, SIGHUP] {
             flag::register_usize(number, Arc::clone(&signal), number as usize)?;
         }
+        // Caught, so that a file that may not grow any more is a failed write, as a full disk is.
+        flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
         Ok(Self { signal })
     }
 
