@@ -38,7 +38,8 @@ impl DriverChild {
     /// If the process cannot be started.
     pub fn start(config: &DriverConfig) -> Result<Self, RunFailure> {
         let failed = |what: &str, error: std::io::Error| RunFailure::Start(format!("cannot {what}: {error}"));
-        let directory = private_directory().map_err(|error| failed("make a directory for the driver's socket", error))?;
+        let directory =
+            private_directory().map_err(|error| failed("make a directory for the driver's socket", error))?;
         let socket = directory.path().join("driver.sock");
         let program = std::env::current_exe().map_err(|error| failed("find this program", error))?;
         let mut child = Command::new(&program)
@@ -82,10 +83,14 @@ impl DriverChild {
                 other => return Ok(other?),
             }
             if let Ok(Some(status)) = self.child.try_wait() {
-                return Err(RunFailure::Start(format!("the driver did not start ({status}); see its message above")));
+                return Err(RunFailure::Start(format!(
+                    "the driver did not start ({status}); see its message above"
+                )));
             }
             if started.elapsed() > START_LIMIT {
-                return Err(RunFailure::Start(format!("the driver did not get ready within {START_LIMIT:?}")));
+                return Err(RunFailure::Start(format!(
+                    "the driver did not get ready within {START_LIMIT:?}"
+                )));
             }
             std::thread::sleep(PAUSE);
         }
@@ -126,7 +131,8 @@ fn private_directory() -> std::io::Result<TempDir> {
     let mut builder = tempfile::Builder::new();
     builder.prefix("phantom3-");
     let runtime = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from).filter(|path| path.is_absolute());
-    let wanted = runtime.into_iter().chain([std::env::temp_dir()]).filter(|place| leaves_room_for_a_socket(place));
+    let wanted =
+        runtime.into_iter().chain([std::env::temp_dir()]).filter(|place| leaves_room_for_a_socket(place));
     let made = wanted.map(|place| builder.tempdir_in(place)).find_map(Result::ok);
     made.map_or_else(|| builder.tempdir_in("/tmp"), Ok)
 }

@@ -156,14 +156,21 @@ fn make_rig(args: &RunArgs) -> Result<Rig, RunFailure> {
 
 fn make_plan(args: &RunArgs, rig: &Rig) -> Result<RunPlan, RunFailure> {
     if args.attach.is_some() && args.clock == Some(Clock::Virtual) {
-        return Err(RunFailure::Start("--attach and --clock virtual exclude each other: a driver that runs has its own clock".into()));
+        return Err(RunFailure::Start(
+            "--attach and --clock virtual exclude each other: a driver that runs has its own clock".into(),
+        ));
     }
     refuse_to_overwrite_input(args, rig)?;
     let attach = args.attach.as_ref().map(|socket| Attach {
         socket: if socket.as_os_str().is_empty() { endpoint::for_application() } else { socket.clone() },
         grace: Duration::from_secs_f64(args.grace),
     });
-    Ok(RunPlan { clock: args.clock.map(ClockMode::from), seconds: args.seconds, record: args.record.clone(), attach })
+    Ok(RunPlan {
+        clock: args.clock.map(ClockMode::from),
+        seconds: args.seconds,
+        record: args.record.clone(),
+        attach,
+    })
 }
 
 fn refuse_to_overwrite_input(args: &RunArgs, rig: &Rig) -> Result<(), RunFailure> {
@@ -257,7 +264,10 @@ mod tests {
     fn numbers_out_of_range_name_what_is_allowed() {
         assert_eq!(parse_rate("0").unwrap_err(), "found 0, allowed: 10 to 20000 Hz");
         assert_eq!(parse_seconds("0").unwrap_err(), "found 0, allowed: more than 0, at most 86400 seconds");
-        assert_eq!(parse_seconds("nan").unwrap_err(), "found nan, allowed: more than 0, at most 86400 seconds");
+        assert_eq!(
+            parse_seconds("nan").unwrap_err(),
+            "found nan, allowed: more than 0, at most 86400 seconds"
+        );
         assert_eq!(parse_seconds("-1").unwrap_err(), "found -1, allowed: more than 0, at most 86400 seconds");
     }
 }

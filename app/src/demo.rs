@@ -30,7 +30,11 @@ pub struct Demo {
 /// # Errors
 /// If there is no room for temporary files.
 pub fn unpack(period_ns: u64) -> Result<Demo, RunFailure> {
-    let no_room = |error: std::io::Error| RunFailure::Start(format!("cannot unpack the default scene: {error}; set TMPDIR to a directory that can be written"));
+    let no_room = |error: std::io::Error| {
+        RunFailure::Start(format!(
+            "cannot unpack the default scene: {error}; set TMPDIR to a directory that can be written"
+        ))
+    };
     let directory = tempfile::Builder::new().prefix("phantom3-demo-").tempdir().map_err(no_room)?;
     let hand = directory.path().join("default.csv");
     std::fs::write(&hand, HAND).map_err(no_room)?;
@@ -49,7 +53,10 @@ pub fn plan(rig: &Rig) -> RunPlan {
     let socket = endpoint::for_application();
     let attach = match client::observe(&socket, "phantom3 looks around") {
         Ok(seen) if seen.driver.read_latest().is_some_and(|frame| frame.lease != 0) => {
-            say(format_args!("phantom3: the driver at {} is commanded by somebody else; starting one of our own", socket.display()));
+            say(format_args!(
+                "phantom3: the driver at {} is commanded by somebody else; starting one of our own",
+                socket.display()
+            ));
             None
         }
         Ok(seen) if seen.driver.info().devices.len() < rig.device_count() => {
@@ -60,7 +67,10 @@ pub fn plan(rig: &Rig) -> RunPlan {
             None
         }
         Ok(_) => {
-            say(format_args!("phantom3: using the driver at {}; its devices are the fingers", socket.display()));
+            say(format_args!(
+                "phantom3: using the driver at {}; its devices are the fingers",
+                socket.display()
+            ));
             Some(Attach { socket, grace: Duration::from_secs(2) })
         }
         Err(AttachError::NoDriver { .. } | AttachError::DriverGone { .. }) => {

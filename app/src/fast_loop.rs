@@ -79,7 +79,13 @@ pub struct Tally {
 
 impl FastLoop {
     /// A run of `total_ticks` rows.
-    pub fn new(step: FastStep, rows: Producer<Row>, when_full: WhenFull, total_ticks: u64, period_ns: u64) -> Self {
+    pub fn new(
+        step: FastStep,
+        rows: Producer<Row>,
+        when_full: WhenFull,
+        total_ticks: u64,
+        period_ns: u64,
+    ) -> Self {
         Self {
             step,
             rows,

@@ -89,7 +89,8 @@ pub fn start(
         let _ = send.send(report);
         FastThread::new(fast, driver, commander, shared, &info, wait).run()
     })?;
-    let report = receive.recv().map_err(|_| std::io::Error::other("the fast thread panicked in its set-up"))?;
+    let report =
+        receive.recv().map_err(|_| std::io::Error::other("the fast thread panicked in its set-up"))?;
     Ok((report, thread))
 }
 
@@ -127,7 +128,8 @@ fn setup_request(info: &DriverInfo) -> SetupRequest {
 
 /// Spinning is right only where it cannot starve the driver: on another CPU, with real-time rights.
 fn choose_wait_mode(info: &DriverInfo, report: &SetupReport) -> WaitMode {
-    let obtained = ["scheduling", "cpu"].iter().all(|name| report.find(name).is_some_and(|item| item.obtained));
+    let obtained =
+        ["scheduling", "cpu"].iter().all(|name| report.find(name).is_some_and(|item| item.obtained));
     let apart = info.cpu.is_some() && own_cpu(info).is_some();
     if info.clock_mode == ClockMode::Real && obtained && apart { WaitMode::Spin } else { WaitMode::Futex }
 }
@@ -158,7 +160,18 @@ impl FastThread {
         let period_ns = info.period_ns;
         let margin_ns = spin_margin_ns(period_ns);
         let step_ns = Histogram::new();
-        Self { fast, driver, commander, shared, wait, period_ns, margin_ns, step_ns, seen: None, due_ns: None }
+        Self {
+            fast,
+            driver,
+            commander,
+            shared,
+            wait,
+            period_ns,
+            margin_ns,
+            step_ns,
+            seen: None,
+            due_ns: None,
+        }
     }
 
     fn run(mut self) -> FastRemains {
@@ -198,13 +211,14 @@ impl FastThread {
             self.spin_for_frame();
         }
         loop {
+            // First of all: while frames come in time, there is always one to go on with.
+            if self.shared.stop.load(Ordering::Relaxed) {
+                return Err(FastEnd::Stopped);
+            }
             match self.driver.latest_tick() {
                 latest if latest == self.seen => {}
                 Some(tick) => return Ok(tick),
                 None => {}
-            }
-            if self.shared.stop.load(Ordering::Relaxed) {
-                return Err(FastEnd::Stopped);
             }
             if monotonic_ns().saturating_sub(begun) > SILENCE_NS {
                 return Err(FastEnd::Silent);

@@ -57,7 +57,11 @@ impl RunFailure {
     /// The exit status of the run contract: 2 nothing was started, 3 a fault during the run.
     pub fn exit_status(&self) -> u8 {
         match self {
-            Self::Start(_) | Self::Attach(_) | Self::Segment(_) | Self::Device(_) | Self::Recording(RecordingError::Create { .. }) => 2,
+            Self::Start(_)
+            | Self::Attach(_)
+            | Self::Segment(_)
+            | Self::Device(_)
+            | Self::Recording(RecordingError::Create { .. }) => 2,
             _ => 3,
         }
     }

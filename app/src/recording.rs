@@ -23,7 +23,9 @@ const CHUNK_BYTES: usize = 256 * 1024;
 #[derive(Debug, Error)]
 pub enum RecordingError {
     /// The file cannot be made.
-    #[error("cannot create the recording {file}: {source}; name a file in a directory that exists and can be written")]
+    #[error(
+        "cannot create the recording {file}: {source}; name a file in a directory that exists and can be written"
+    )]
     Create {
         /// Which.
         file: PathBuf,
@@ -31,7 +33,9 @@ pub enum RecordingError {
         source: io::Error,
     },
     /// It cannot be written any further.
-    #[error("cannot write the recording {file}: {source}; it is complete up to t = {until_s} s ({rows} rows)")]
+    #[error(
+        "cannot write the recording {file}: {source}; it is complete up to t = {until_s} s ({rows} rows)"
+    )]
     Write {
         /// Which.
         file: PathBuf,
@@ -75,7 +79,8 @@ impl Recording {
     /// # Errors
     /// If the file cannot be made or its first line not be written.
     pub fn create(path: &Path, names: Names, period_ns: u64) -> Result<Self, RecordingError> {
-        let file = File::create(path).map_err(|source| RecordingError::Create { file: path.into(), source })?;
+        let file =
+            File::create(path).map_err(|source| RecordingError::Create { file: path.into(), source })?;
         let mut recording = Self {
             file,
             path: path.into(),
@@ -259,7 +264,8 @@ mod tests {
         assert_eq!(lines[1].len(), lines[0].len());
         assert_eq!(lines[0][..4], ["t", "a_hip_x", "a_hip_y", "a_hip_z"]);
         assert_eq!(lines[1][0], "0.003");
-        let back: Vec<u64> = lines[1][1..4].iter().map(|n| n.parse::<f64>().expect("a number").to_bits()).collect();
+        let back: Vec<u64> =
+            lines[1][1..4].iter().map(|n| n.parse::<f64>().expect("a number").to_bits()).collect();
         assert_eq!(back, [0.1 + 0.2, -0.0, 1e-300f64].map(f64::to_bits));
         let at = |name: &str| lines[0].iter().position(|column| *column == name).expect("a column");
         assert_eq!(lines[1][at("a_entity")], "");
@@ -272,7 +278,10 @@ mod tests {
     fn a_full_disk_leaves_complete_rows_and_says_how_many() {
         // /dev/full refuses every byte: the header already fails, as on a disk full from the start.
         let error = Recording::create(Path::new("/dev/full"), names(), 1_000_000).expect_err("full");
-        assert!(error.to_string().starts_with("cannot create the recording /dev/full: No space left"), "{error}");
+        assert!(
+            error.to_string().starts_with("cannot create the recording /dev/full: No space left"),
+            "{error}"
+        );
     }
 
     #[test]

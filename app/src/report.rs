@@ -82,12 +82,23 @@ impl fmt::Display for Report {
         let (tally, counters) = (&self.tally, &self.counters);
         writeln!(f, "clock        {}, {:.6} kHz", self.clock, 1e6 / self.period_ns as f64)?;
         writeln!(f, "driver       {}", self.driver)?;
-        writeln!(f, "ticks        {} under our lease, {} answered", counters.ticks_commanded, tally.answered)?;
-        writeln!(f, "overruns     {} deadlines skipped by the driver, {} frames missed here", counters.overruns, tally.frames_missed)?;
+        writeln!(
+            f,
+            "ticks        {} under our lease, {} answered",
+            counters.ticks_commanded, tally.answered
+        )?;
+        writeln!(
+            f,
+            "overruns     {} deadlines skipped by the driver, {} frames missed here",
+            counters.overruns, tally.frames_missed
+        )?;
         writeln!(
             f,
             "replies      {} in time, {} missed, {} torn, {} refused",
-            counters.replies_fresh, counters.replies_missed, counters.commands_torn, counters.commands_refused
+            counters.replies_fresh,
+            counters.replies_missed,
+            counters.commands_torn,
+            counters.commands_refused
         )?;
         if let Some(timing) = &self.timing {
             writeln!(f, "wake error   {}", timing.wake_error)?;
@@ -95,7 +106,11 @@ impl fmt::Display for Report {
             writeln!(f, "round trip   {}", timing.round_trip)?;
             writeln!(f, "fast step    {}", timing.step)?;
         }
-        writeln!(f, "peak force   {:.3} N computed, {:.3} N rendered", tally.peak_force_n, tally.peak_applied_n)?;
+        writeln!(
+            f,
+            "peak force   {:.3} N computed, {:.3} N rendered",
+            tally.peak_force_n, tally.peak_applied_n
+        )?;
         if let Some((driver, fast)) = &self.guarantees {
             if !driver.trim().is_empty() {
                 writeln!(f, "guarantees of the driver's loop")?;
@@ -112,7 +127,12 @@ impl fmt::Display for Report {
                 write!(f, "recording    {} ({rows} rows)", path.display())
             }
             Some((path, rows)) => {
-                write!(f, "recording    {} ({rows} rows, {} LOST: the disk was too slow)", path.display(), tally.rows_lost)
+                write!(
+                    f,
+                    "recording    {} ({rows} rows, {} LOST: the disk was too slow)",
+                    path.display(),
+                    tally.rows_lost
+                )
             }
             None => write!(f, "recording    none; --record FILE makes one"),
         }

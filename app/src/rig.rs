@@ -5,7 +5,9 @@ use crate::fast_step::{DeviceFinger, FastStep};
 use crate::mount::Mount;
 use crate::recording::Names;
 use haptics::{Entity, Finger, Friction, ParameterError, Plane, Shape, Sphere};
-use io_driver::config::{Backend, DeviceConfig, DriverConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig, usual_spin_margin_ns};
+use io_driver::config::{
+    Backend, DeviceConfig, DriverConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig, usual_spin_margin_ns,
+};
 use io_driver::sim::script::{HandError, HandScript};
 use shm_abi::segment::ClockMode;
 use std::io;
@@ -23,7 +25,9 @@ pub enum RigError {
     #[error(transparent)]
     Hand(#[from] HandError),
     /// The hand file cannot be read.
-    #[error("cannot read the hand file {file}, named by {named_by}: {source}; name a CSV file that can be read")]
+    #[error(
+        "cannot read the hand file {file}, named by {named_by}: {source}; name a CSV file that can be read"
+    )]
     Unreadable {
         /// Which.
         file: PathBuf,
@@ -175,9 +179,8 @@ impl Rig {
 
     fn ideal_device(&self, index: usize) -> DeviceConfig {
         let finger = self.scene.fingers.iter().find(|finger| finger.device == index);
-        let hand = finger.and_then(|finger| {
-            self.hand.as_ref().map(|hand| (hand.path.clone(), finger.name.clone()))
-        });
+        let hand =
+            finger.and_then(|finger| self.hand.as_ref().map(|hand| (hand.path.clone(), finger.name.clone())));
         DeviceConfig {
             // No finger can be called so: brackets are not allowed in a name.
             name: finger.map_or_else(|| format!("(unused {index})"), |finger| finger.name.clone()),
@@ -205,7 +208,9 @@ impl Rig {
             FrictionSpec::Coulomb { mu } => Friction::Coulomb { mu },
             FrictionSpec::Stiction { mu_s, mu_d } => Friction::Stiction { mu_s, mu_d },
             FrictionSpec::Viscous { mu_v_s_per_m } => Friction::Viscous { mu_v_s_per_m },
-            FrictionSpec::CoulombViscous { mu, mu_v_s_per_m } => Friction::CoulombViscous { mu, mu_v_s_per_m },
+            FrictionSpec::CoulombViscous { mu, mu_v_s_per_m } => {
+                Friction::CoulombViscous { mu, mu_v_s_per_m }
+            }
             ref other => return Err(self.not_available(format!("{}: friction {other:?}", what()))),
         };
         Entity::new(shape, spec.pose, spec.stiffness_n_per_m)

@@ -81,7 +81,8 @@ impl Parts {
 
 fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Report, Stop), RunFailure> {
     let mut driver = VirtualDriver::open(&rig.driver_config(ClockMode::Virtual))?;
-    let Parts { mut fast, mut slow, mut progress } = Parts::new(rig, plan, ClockMode::Virtual, rig.period_ns)?;
+    let Parts { mut fast, mut slow, mut progress } =
+        Parts::new(rig, plan, ClockMode::Virtual, rig.period_ns)?;
     let result = driver.run(&mut fast, &mut slow, &mut progress, signals);
     progress.end();
     let (stop, rows) = close(result, slow)?;
@@ -106,7 +107,8 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
     let driver_name = describe(&source, attachment.driver_pid, &info);
     let baseline = Baseline::of(&attachment.driver);
     let step_rig = Rig { period_ns: info.period_ns, ..rig.clone() };
-    let Parts { fast, mut slow, mut progress } = Parts::new(&step_rig, plan, info.clock_mode, info.period_ns)?;
+    let Parts { fast, mut slow, mut progress } =
+        Parts::new(&step_rig, plan, info.clock_mode, info.period_ns)?;
     let result = two_processes::run(&mut source, attachment, fast, &mut slow, &mut progress, signals);
     progress.end();
     let (end, rows) = close(result, slow)?;

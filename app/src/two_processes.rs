@@ -157,10 +157,18 @@ fn reattach(source: &mut Source, words: &str, signals: &StopSignals) -> Result<A
     loop {
         match client::command(socket, "phantom3") {
             Ok(attachment) => {
-                say(format_args!("phantom3: the driver is back (process {}); the run goes on", attachment.driver_pid));
+                say(format_args!(
+                    "phantom3: the driver is back (process {}); the run goes on",
+                    attachment.driver_pid
+                ));
                 return Ok(attachment);
             }
-            Err(error) if begun.elapsed() > grace || signals.requested().is_some() => {
+            Err(_) if signals.requested().is_some() => {
+                return Err(RunFailure::DriverGone(format!(
+                    "{words}; a signal ended the wait for its return"
+                )));
+            }
+            Err(error) if begun.elapsed() > grace => {
                 return Err(RunFailure::DriverGone(format!("{words}; after {grace:?}: {error}")));
             }
             Err(_) => std::thread::sleep(SLOW_PERIOD),

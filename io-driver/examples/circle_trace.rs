@@ -21,7 +21,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for row in 0..=(SECONDS / STEP_S) as u32 {
         let t = f64::from(row) * STEP_S;
         let joints = premium.mechanism.inverse(tip(t))?;
-        let [c0, c1, c2] = map.angles_to_counts(joints).map(|count| wrapped(count, premium.encoders.count_bits));
+        let [c0, c1, c2] =
+            map.angles_to_counts(joints).map(|count| wrapped(count, premium.encoders.count_bits));
         trace += &format!("{},{c0},{c1},{c2}\n", f64::from(row * 2) / 1000.0);
     }
     print!("{trace}");

@@ -113,7 +113,8 @@ fn run(args: RunArgs) -> ExitCode {
         Ok(config) => config,
         Err(error) => return fail(&error, EXIT_USAGE),
     };
-    let options = RunOptions { strict: args.strict, quiet: args.quiet, parent: args.parent, socket: args.socket };
+    let options =
+        RunOptions { strict: args.strict, quiet: args.quiet, parent: args.parent, socket: args.socket };
     match driver::run(&config, &options) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => fail(&error, if error.is_fault() { EXIT_FAULT } else { EXIT_USAGE }),

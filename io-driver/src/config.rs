@@ -255,7 +255,8 @@ impl RawRealTime {
         let spin_margin_ns = us(&self.spin_margin_us, usual_spin_margin_ns(period_ns, budget_ns))?;
         let cpu = self.cpu.map(|cpu| toml.integer(&cpu, 0..=4095)).transpose()?;
         // 0 switches real-time scheduling off; 99 is left to the kernel's own threads.
-        let priority = self.priority.map(|priority| toml.integer(&priority, 0..=98)).transpose()?.unwrap_or(80);
+        let priority =
+            self.priority.map(|priority| toml.integer(&priority, 0..=98)).transpose()?.unwrap_or(80);
         Ok(RealTime {
             cpu: cpu.map(|cpu| cpu as usize),
             priority: (priority > 0).then_some(priority as u8),
@@ -313,7 +314,9 @@ struct RawSafety {
 impl RawSafety {
     fn validate(self, toml: &TomlText<'_>, period_ns: u64) -> Result<SafetyConfig, TomlReport> {
         let ticks = |key: &Option<Spanned<f64>>, default_ms: f64, max: f64| {
-            let ms = key.as_ref().map_or(Ok(default_ms), |ms| toml.number(ms, Allowed { min: 0.0, max, unit: "ms" }))?;
+            let ms = key
+                .as_ref()
+                .map_or(Ok(default_ms), |ms| toml.number(ms, Allowed { min: 0.0, max, unit: "ms" }))?;
             Ok::<u64, TomlReport>(((ms * 1e6 / period_ns as f64).round() as u64).max(1))
         };
         let age = self.max_command_age_ticks.map(|age| toml.integer(&age, 0..=100)).transpose()?;
@@ -362,7 +365,11 @@ fn devices(
         let device = item.get_ref().validate(index, item.span(), toml, directory)?;
         if devices.iter().any(|other| other.name == device.name) {
             let span = item.get_ref().name.as_ref().map_or(item.span(), Spanned::span);
-            return Err(toml.refuse(span, format_args!("the name \"{}\" twice", device.name), "each name once"));
+            return Err(toml.refuse(
+                span,
+                format_args!("the name \"{}\" twice", device.name),
+                "each name once",
+            ));
         }
         devices.push(device);
     }
@@ -382,13 +389,16 @@ impl RawDevice {
             RawBackend::Ideal => self.ideal(&name, toml, directory)?,
             RawBackend::Replay => self.replay(span, toml, directory)?,
         };
-        let peak_force_n =
-            self.peak_force_n.as_ref().map(|peak| toml.number(peak, PEAK)).transpose()?;
+        let peak_force_n = self.peak_force_n.as_ref().map(|peak| toml.number(peak, PEAK)).transpose()?;
         Ok(DeviceConfig { name, backend, peak_force_n })
     }
 
     fn ideal(&self, name: &str, toml: &TomlText<'_>, directory: &Path) -> Result<Backend, TomlReport> {
-        self.refuse_foreign("ideal", &[("description", span_of(&self.description)), ("trace", span_of(&self.trace))], toml)?;
+        self.refuse_foreign(
+            "ideal",
+            &[("description", span_of(&self.description)), ("trace", span_of(&self.trace))],
+            toml,
+        )?;
         let finger = self.finger.as_ref().map_or_else(|| name.to_owned(), |finger| finger.get_ref().clone());
         let start = self.start_m.as_ref().map_or(Ok([0.0; 3]), |list| toml.numbers(list, PLACE))?;
         Ok(Backend::Ideal {
@@ -433,15 +443,18 @@ impl RawDevice {
         toml: &TomlText<'_>,
     ) -> Result<(), TomlReport> {
         match keys.iter().find_map(|(key, span)| span.clone().map(|span| (*key, span))) {
-            Some((key, span)) => {
-                Err(toml.refuse(span, format_args!("`{key}` in a device of backend \"{backend}\""), "not there"))
-            }
+            Some((key, span)) => Err(toml.refuse(
+                span,
+                format_args!("`{key}` in a device of backend \"{backend}\""),
+                "not there",
+            )),
             None => Ok(()),
         }
     }
 
     fn base(&self, toml: &TomlText<'_>) -> Result<Isometry3<f64>, TomlReport> {
-        let position = self.base_position_m.as_ref().map_or(Ok([0.0; 3]), |list| toml.numbers(list, PLACE))?;
+        let position =
+            self.base_position_m.as_ref().map_or(Ok([0.0; 3]), |list| toml.numbers(list, PLACE))?;
         let rotation = match &self.base_orientation_wxyz {
             None => UnitQuaternion::identity(),
             Some(list) => {
@@ -496,14 +509,23 @@ mod tests {
         let Backend::Ideal { hand: Some((path, finger)), .. } = &config.devices[0].backend else { panic!() };
         assert_eq!((path.as_path(), finger.as_str()), (Path::new("lab/h.csv"), "f0"));
         let Backend::Replay { description, trace } = &config.devices[1].backend else { panic!() };
-        assert_eq!((description.as_path(), trace.as_path()), (Path::new("premium-1.5"), Path::new("lab/t.csv")));
+        assert_eq!(
+            (description.as_path(), trace.as_path()),
+            (Path::new("premium-1.5"), Path::new("lab/t.csv"))
+        );
     }
 
     #[test]
     fn each_mistake_names_file_line_key_found_and_allowed() {
         let cases = [
-            ("rate_hz = 5\n[[device]]\nbackend = \"ideal\"", "lab/driver.toml:1: `rate_hz`: found 5, allowed: 10 to 20000 Hz"),
-            ("rate_hz = nan\n[[device]]\nbackend = \"ideal\"", "lab/driver.toml:1: `rate_hz`: found NaN, allowed: 10 to 20000 Hz"),
+            (
+                "rate_hz = 5\n[[device]]\nbackend = \"ideal\"",
+                "lab/driver.toml:1: `rate_hz`: found 5, allowed: 10 to 20000 Hz",
+            ),
+            (
+                "rate_hz = nan\n[[device]]\nbackend = \"ideal\"",
+                "lab/driver.toml:1: `rate_hz`: found NaN, allowed: 10 to 20000 Hz",
+            ),
             ("device = []", "lab/driver.toml:1: `device`: found 0 devices, allowed: 1 to 8"),
             (
                 "[[device]]\nbackend = \"replay\"\ntrace = \"t\"",

@@ -20,7 +20,9 @@ use crate::safety::{Safety, limit_force};
 use bytemuck::Zeroable;
 use nalgebra::Vector3;
 use rt_core::clock::monotonic_ns;
-use shm_abi::{Command, CommanderView, DriverMemory, DriverSegment, FaultReason, Frame, MAX_DEVICES, Outcome, ReplyKind};
+use shm_abi::{
+    Command, CommanderView, DriverMemory, DriverSegment, FaultReason, Frame, MAX_DEVICES, Outcome, ReplyKind,
+};
 use std::sync::Arc;
 
 /// How old a reply may be to count as fresh: none in the same tick, one in the next.
@@ -63,7 +65,13 @@ struct Reply {
 
 impl Cycle {
     /// A driver over its memory. The memory's description must list the same devices.
-    pub fn new(memory: Arc<DriverMemory>, devices: Vec<Box<dyn Device>>, safety: Safety, period_ns: u64, freshness: Freshness) -> Self {
+    pub fn new(
+        memory: Arc<DriverMemory>,
+        devices: Vec<Box<dyn Device>>,
+        safety: Safety,
+        period_ns: u64,
+        freshness: Freshness,
+    ) -> Self {
         assert!(devices.len() <= MAX_DEVICES, "the configuration allows at most {MAX_DEVICES} devices");
         let mut frame = Frame::zeroed();
         frame.device_count = devices.len() as u64;
@@ -282,7 +290,9 @@ impl Cycle {
             ReplyKind::NoLease => return,
             ReplyKind::Fresh => bump(&counters.replies_fresh),
             // Until the first command of a lease nobody has promised anything.
-            ReplyKind::Held | ReplyKind::Expired if self.reply.tick.is_some() => bump(&counters.replies_missed),
+            ReplyKind::Held | ReplyKind::Expired if self.reply.tick.is_some() => {
+                bump(&counters.replies_missed)
+            }
             ReplyKind::Held | ReplyKind::Expired => return,
         }
         bump(&counters.ticks_commanded);
@@ -306,7 +316,14 @@ impl Reply {
     }
 
     /// Believes the command that the bell announces, or counts why not.
-    fn examine(&mut self, lease: &CommanderView, latest: Option<u64>, tick: u64, devices: u64, told: &DriverSegment) {
+    fn examine(
+        &mut self,
+        lease: &CommanderView,
+        latest: Option<u64>,
+        tick: u64,
+        devices: u64,
+        told: &DriverSegment,
+    ) {
         let Some(answered) = latest else { return };
         // An answer to a tick that has not come, or one older than what we have, is no answer.
         if answered > tick || self.tick.is_some_and(|newest| answered <= newest) {

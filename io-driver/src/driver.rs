@@ -96,15 +96,17 @@ static TICK: AtomicU64 = AtomicU64::new(0);
 /// # Errors
 /// Whatever kept it from starting, and a panic of its loop.
 pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> {
-    let signals = StopSignals::install().map_err(|source| RunError::System { what: "catch signals", source })?;
+    let signals =
+        StopSignals::install().map_err(|source| RunError::System { what: "catch signals", source })?;
     if let Some(parent) = options.parent {
         // Not SIGTERM, which ends the process at once when it comes twice: a parent of several threads can die
         // twice to the kernel, first the thread that started this process, then the one that inherited it.
-        rt_core::process::die_with_parent(parent, rustix::process::Signal::HUP.as_raw())
-            .map_err(|error| {
+        rt_core::process::die_with_parent(parent, rustix::process::Signal::HUP.as_raw()).map_err(
+            |error| {
                 options.socket.as_deref().map(remove_directory_of);
                 RunError::Orphaned(error.to_string())
-            })?;
+            },
+        )?;
     }
     let devices = open_devices(config)?;
     let shared = Shared::default();
@@ -194,7 +196,8 @@ fn choose_wait_mode(config: &DriverConfig, report: &SetupReport) -> WaitMode {
     }
     let leaves_a_cpu = rt_core::cpu::online_cpus().len() > 1;
     let owns_cpu = loop_cpu(config).is_some() && leaves_a_cpu && config.real_time.priority.is_some();
-    let obtained = ["scheduling", "cpu"].iter().all(|name| report.find(name).is_some_and(|item| item.obtained));
+    let obtained =
+        ["scheduling", "cpu"].iter().all(|name| report.find(name).is_some_and(|item| item.obtained));
     config.real_time.wait.unwrap_or(if owns_cpu && obtained { WaitMode::Spin } else { WaitMode::Futex })
 }
 

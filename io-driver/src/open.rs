@@ -35,7 +35,9 @@ pub enum OpenError {
     #[error(transparent)]
     Description(#[from] DeviceFileError),
     /// The description has no mechanism that encoders could move.
-    #[error("device {device}: {file} describes an ideal device, which has no encoders; a replay needs a mechanism such as premium-1.5")]
+    #[error(
+        "device {device}: {file} describes an ideal device, which has no encoders; a replay needs a mechanism such as premium-1.5"
+    )]
     NoMechanism {
         /// Whose.
         device: String,
@@ -134,7 +136,9 @@ fn ideal_info(device: &DeviceConfig) -> DeviceInfo {
 
 fn premium_info(device: &DeviceConfig, premium: &PremiumFile) -> DeviceInfo {
     let corner = |sign: f64| {
-        std::array::from_fn(|axis| premium.workspace.centre_m[axis] + sign * 0.5 * premium.workspace.size_m[axis])
+        std::array::from_fn(|axis| {
+            premium.workspace.centre_m[axis] + sign * 0.5 * premium.workspace.size_m[axis]
+        })
     };
     DeviceInfo {
         name: device.name.clone(),

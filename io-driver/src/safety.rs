@@ -290,6 +290,10 @@ mod tests {
             assert_eq!(limit_force(Vector3::new(1.0, bad, 0.0), 8.5), (Vector3::zeros(), true));
         }
         let huge = Vector3::repeat(f64::MAX);
-        assert_eq!(limit_force(huge, f64::INFINITY), (huge, false), "no limit leaves everything finite alone");
+        assert_eq!(
+            limit_force(huge, f64::INFINITY),
+            (huge, false),
+            "no limit leaves everything finite alone"
+        );
     }
 }

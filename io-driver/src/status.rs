@@ -206,7 +206,14 @@ impl fmt::Display for Percentiles {
             return f.write_str("nothing recorded");
         }
         let us = |ns: u64| format!("{:.2}", ns as f64 / 1e3);
-        write!(f, "p50 {}  p99 {}  p99.9 {}  max {} us", us(self.p50), us(self.p99), us(self.p999), us(self.max))
+        write!(
+            f,
+            "p50 {}  p99 {}  p99.9 {}  max {} us",
+            us(self.p50),
+            us(self.p99),
+            us(self.p999),
+            us(self.max)
+        )
     }
 }
 
@@ -240,12 +247,24 @@ fn devices(info: &DriverInfo, frame: Option<&Frame>) -> Vec<DeviceStatus> {
 impl fmt::Display for Status {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let cpu = self.cpu.map_or_else(|| "any CPU".into(), |cpu| format!("CPU {cpu}"));
-        writeln!(f, "driver      process {}, {} clock, {} Hz, {cpu}, {} wait", self.driver_pid, self.clock, self.rate_hz, self.wait)?;
+        writeln!(
+            f,
+            "driver      process {}, {} clock, {} Hz, {cpu}, {} wait",
+            self.driver_pid, self.clock, self.rate_hz, self.wait
+        )?;
         let fault = self.fault.map_or_else(String::new, |why| format!(": {why}"));
-        writeln!(f, "state       {}{fault}, lease {}, authority {:.2}", self.state, self.lease, self.authority)?;
+        writeln!(
+            f,
+            "state       {}{fault}, lease {}, authority {:.2}",
+            self.state, self.lease, self.authority
+        )?;
         let c = &self.counters;
         writeln!(f, "ticks       {} done, {} overruns", c.ticks, c.overruns)?;
-        writeln!(f, "replies     {} fresh, {} missed, {} torn, {} refused", c.replies_fresh, c.replies_missed, c.commands_torn, c.commands_refused)?;
+        writeln!(
+            f,
+            "replies     {} fresh, {} missed, {} torn, {} refused",
+            c.replies_fresh, c.replies_missed, c.commands_torn, c.commands_refused
+        )?;
         writeln!(f, "leases      {} granted, {} refused", c.leases_granted, c.leases_refused)?;
         writeln!(f, "safety      {} forces limited, {} faults", c.forces_limited, c.faults)?;
         writeln!(f, "wake error  {}", self.wake_error_ns)?;

@@ -8,7 +8,8 @@ use nalgebra::Vector3;
 use shm_abi::doorbell::WaitMode;
 use shm_abi::segment::{ClockMode, DeviceInfo, DriverInfo};
 use shm_abi::{
-    Command, CommanderMemory, CommanderView, DriverMemory, DriverState, DriverView, FaultReason, Frame, ReplyKind,
+    Command, CommanderMemory, CommanderView, DriverMemory, DriverState, DriverView, FaultReason, Frame,
+    ReplyKind,
 };
 use std::os::fd::AsFd;
 use std::sync::atomic::Ordering;
@@ -45,7 +46,11 @@ impl Device for TestDevice {
     fn write(&mut self, force_on_user_n: Vector3<f64>) -> Result<Written, FaultReason> {
         let mut log = self.log.lock().unwrap();
         log.forces.push(force_on_user_n);
-        if log.fail_write { Err(FaultReason::DeviceWrite) } else { Ok(Written { force_on_user_n, motor_codes: [0; 3] }) }
+        if log.fail_write {
+            Err(FaultReason::DeviceWrite)
+        } else {
+            Ok(Written { force_on_user_n, motor_codes: [0; 3] })
+        }
     }
 
     fn release(&mut self) {
@@ -87,7 +92,8 @@ impl Bench {
         let log = Arc::new(Mutex::new(Log::default()));
         let device = TestDevice { info, log: Arc::clone(&log) };
         let safety = Safety::new(RAMPS);
-        let cycle = Cycle::new(Arc::new(memory), vec![Box::new(device)], safety, PERIOD_NS, Freshness(freshness));
+        let cycle =
+            Cycle::new(Arc::new(memory), vec![Box::new(device)], safety, PERIOD_NS, Freshness(freshness));
         Self { cycle, view, log, tick: 0 }
     }
 
@@ -203,11 +209,19 @@ fn when_a_lease_ends_its_force_ramps_out_before_the_next_lease_begins() {
         publish(&second, view, frame.tick, [0.0, 0.0, 3.0]);
     };
     let (frame, force) = bench.tick(answer);
-    assert_eq!((frame.lease, force), (0, Vector3::new(0.0, 1.0, 0.0)), "half of the first lease's last force");
+    assert_eq!(
+        (frame.lease, force),
+        (0, Vector3::new(0.0, 1.0, 0.0)),
+        "half of the first lease's last force"
+    );
     let (frame, force) = bench.tick(answer);
     assert_eq!((frame.lease, force), (0, Vector3::zeros()));
     let forces: Vec<f64> = (0..5).map(|_| bench.tick(answer).1.z / 3.0).collect();
-    assert_eq!(forces, [0.0, 0.25, 0.5, 0.75, 1.0], "the second lease ramps in; the first is not heard any more");
+    assert_eq!(
+        forces,
+        [0.0, 0.25, 0.5, 0.75, 1.0],
+        "the second lease ramps in; the first is not heard any more"
+    );
     assert_eq!(bench.silent_tick().0.lease, 2);
 }
 
@@ -269,7 +283,8 @@ fn a_force_above_the_peak_is_cut_to_it_in_its_direction() {
 
 #[test]
 fn a_device_that_cannot_be_read_or_written_means_zero_force_until_somebody_clears_it() {
-    let causes: [(fn(&mut Log), FaultReason); 3] = [
+    type Cause = (fn(&mut Log), FaultReason);
+    let causes: [Cause; 3] = [
         (|log| log.next_reading = Some(Err(FaultReason::DeviceRead)), FaultReason::DeviceRead),
         (
             |log| log.next_reading = Some(Ok(Reading::at(Vector3::new(f64::NAN, 0.0, 0.0)))),

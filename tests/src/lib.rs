@@ -10,6 +10,6 @@ pub mod driver;
 pub mod faults;
 pub mod programs;
 pub mod recording;
-pub mod workplace;
 pub mod slices;
 pub mod threads;
+pub mod workplace;

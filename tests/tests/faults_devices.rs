@@ -111,7 +111,9 @@ fn a_failing_device(clock: &str, mood: Mood, reason: FaultReason) {
     stage.log.catch_up(&stage.view);
     stage.log.forget();
     stage.strings[1].set(mood);
-    stage.log.follow(&stage.view, "the fault", |told| told.iter().any(|told| told.state == DriverState::Fault));
+    stage
+        .log
+        .follow(&stage.view, "the fault", |told| told.iter().any(|told| told.state == DriverState::Fault));
     stage.log.follow_for(&stage.view, 100);
     let first = stage.log.told.iter().position(|told| told.state == DriverState::Fault).expect("just seen");
     // The frame that tells the fault tells of the tick before it too, which may have been at full force.

@@ -107,7 +107,14 @@ fn scribble(random: &mut Random, to: &CommanderSegment, tick: u64) {
 }
 
 /// One thing that a commander gone mad may do.
-fn rave(random: &mut Random, to: &CommanderMemory, driver: &DriverView, tick: u64, lease: u64, devices: usize) {
+fn rave(
+    random: &mut Random,
+    to: &CommanderMemory,
+    driver: &DriverView,
+    tick: u64,
+    lease: u64,
+    devices: usize,
+) {
     match random.below(8) {
         0 => {}
         1 | 2 => to.publish(&honest_command(random, tick, lease, devices), driver),
@@ -153,7 +160,8 @@ impl Oracle {
         let words: Vec<u64> = slot.words.iter().map(|word| word.load(Ordering::Relaxed)).collect();
         let command: Command = bytemuck::cast_slice(&words)[0];
         let forces = command.devices[..DEVICES].iter().flat_map(|device| device.force_on_user_n);
-        let is_ours = (command.tick, command.lease, command.device_count) == (answered, LEASE, DEVICES as u64);
+        let is_ours =
+            (command.tick, command.lease, command.device_count) == (answered, LEASE, DEVICES as u64);
         if is_ours && forces.into_iter().all(f64::is_finite) {
             self.believed = Some(command);
         } else {
@@ -295,7 +303,7 @@ fn a_million_ticks_of_garbage_move_the_motors_only_as_a_whole_fresh_finite_comma
         }
         expected = Some(Expected::by(&oracle));
         believed_in += u64::from(oracle.believed.is_some_and(|command| command.tick == bench.tick));
-        if bench.tick % 1000 == 0 {
+        if bench.tick.is_multiple_of(1000) {
             log.catch_up(&bench.view);
             log.check_promise(&bench.view);
             log.forget();
@@ -309,7 +317,13 @@ fn a_million_ticks_of_garbage_move_the_motors_only_as_a_whole_fresh_finite_comma
     assert_eq!(count(&counters.ticks), 1_000_000);
     assert_eq!(count(&counters.faults), 0);
     // The garbage is worth something only if each kind of it came often, and so did what is none.
-    let enough = [believed_in, oracle.torn, oracle.refused, count(&counters.forces_limited), written.load(Ordering::Relaxed)];
+    let enough = [
+        believed_in,
+        oracle.torn,
+        oracle.refused,
+        count(&counters.forces_limited),
+        written.load(Ordering::Relaxed),
+    ];
     assert!(enough.iter().all(|count| *count > 10_000), "{enough:?}");
     bench.check_that_honesty_is_rewarded();
 }
@@ -345,7 +359,9 @@ fn check_outcome(frame: &Frame, expected: &Expected) {
 fn garbage_never_makes_a_motor_code_of_more_than_twelve_bits() {
     let directory = tempfile::tempdir().expect("a directory");
     // Around the home pose and back, so that the Jacobian is not the same all the time.
-    let trace: String = (0..200).map(|row| format!("{},{},{},{}\n", f64::from(row) * 0.1, row % 50, row % 70, row % 90)).collect();
+    let trace: String = (0..200)
+        .map(|row| format!("{},{},{},{}\n", f64::from(row) * 0.1, row % 50, row % 70, row % 90))
+        .collect();
     std::fs::write(directory.path().join("trace.csv"), format!("t,c0,c1,c2\n{trace}")).expect("a trace");
     let device = "[[device]]\nbackend = \"replay\"\ndescription = \"premium-1.5\"\ntrace = \"trace.csv\"\n";
     let mut bench = Bench::new(&format!("{SAFETY}{}", device.repeat(DEVICES)), directory.path(), None);
@@ -360,7 +376,8 @@ fn garbage_never_makes_a_motor_code_of_more_than_twelve_bits() {
                 assert!((0..4096).contains(&code), "{code}");
                 let at_rest = frame.tick == 1 || frame.previous.authority > 0.0 || code == 2048;
                 assert!(at_rest, "code {code} without authority");
-                extremes = if frame.tick > 1 { (extremes.0.min(code), extremes.1.max(code)) } else { extremes };
+                extremes =
+                    if frame.tick > 1 { (extremes.0.min(code), extremes.1.max(code)) } else { extremes };
             }
             let force = Vector3::from(device.force_on_user_n_applied).norm();
             // Half a code on each of three axes of at most 8.6 N over 2048 codes.

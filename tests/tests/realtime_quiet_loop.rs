@@ -3,6 +3,7 @@
 //! The driver spins for replies here, as it does on a CPU of its own with real-time rights, though it may
 //! have neither: then it is late more often, and what it asks of the kernel is the same.
 
+use rustix::process::{Pid, Signal, kill_process};
 use shm_abi::client::Attachment;
 use shm_abi::{Command, DriverView};
 use std::collections::BTreeMap;
@@ -168,8 +169,7 @@ fn attach_strace(tid: u32, trace: &Path) -> Option<Child> {
 }
 
 fn detach_strace(strace: &mut Child) {
-    let pid = rustix::process::Pid::from_child(strace);
-    rustix::process::kill_process(pid, rustix::process::Signal::INT).expect("our child");
+    kill_process(Pid::from_child(strace), Signal::INT).expect("our child");
     wait_or_kill(strace);
 }
 
@@ -231,6 +231,23 @@ fn in_spin_mode_the_driver_blocks_in_no_other_call_than_the_timed_wait() {
     }
     println!("blocked in (number of the call: samples): {blocked:?}");
     assert_eq!(blocked.len(), 1, "{blocked:?}");
+}
+
+/// A fast thread that always finds the next frame there must look at requests to stop all the same.
+#[test]
+fn a_run_ends_when_asked_though_every_frame_comes_in_time() {
+    let _turn = in_turn();
+    let (driver, mut phantom3) = both_programs(true);
+    let seen = driver.observe().driver;
+    wait_for(|| fresh(&seen), 500);
+    let before = fresh(&seen);
+    kill_process(Pid::from_child(&phantom3), Signal::TERM).expect("our child");
+    assert_eq!(wait_or_kill(&mut phantom3).code(), Some(128 + Signal::TERM.as_raw()));
+    let after = fresh(&seen) - before;
+    println!("{after} ticks were answered after the signal");
+    // The slow thread looks every 10 ms, which is ten ticks, and gets the CPU within some more on a busy
+    // machine.
+    assert!(after < 500, "{after} ticks were still answered");
 }
 
 /// Both programs as they are used, with locked memory if the machine allows it.

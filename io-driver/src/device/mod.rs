@@ -68,7 +68,11 @@ impl Reading {
 
     /// Whether every number of it is finite.
     pub fn is_finite(&self) -> bool {
-        self.position_m.iter().chain(&self.orientation_wxyz).chain(&self.joint_angle_rad).all(|n| n.is_finite())
+        self.position_m
+            .iter()
+            .chain(&self.orientation_wxyz)
+            .chain(&self.joint_angle_rad)
+            .all(|n| n.is_finite())
     }
 
     /// Puts it into the frame.

@@ -49,7 +49,8 @@ impl Hosted {
         let tick: &'static AtomicU64 = Box::leak(Box::default());
         let cycle = make_cycle(&config, Arc::clone(&memory), devices);
         let real_loop = RealLoop::new(&config, WaitMode::Futex, cycle, inbox, log, shared.clone(), tick);
-        let desk = Desk { server, sender, _drain: drain, memory: Arc::clone(&memory), shared: shared.clone() };
+        let desk =
+            Desk { server, sender, _drain: drain, memory: Arc::clone(&memory), shared: shared.clone() };
         Self {
             memory,
             socket,

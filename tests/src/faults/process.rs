@@ -1,10 +1,12 @@
 //! Processes to be stopped, killed and asked after.
 
-use crate::driver::wait_or_kill;
+use crate::driver::{HANG, wait_or_kill};
 use crate::programs;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::{Pid, Signal, kill_process};
 use std::io::Read;
 use std::process::{Child, Command, Stdio};
+use std::time::Instant;
 
 /// A program's end and everything it said.
 #[derive(Debug)]
@@ -23,13 +25,15 @@ pub struct End {
 #[derive(Debug)]
 pub struct Running {
     child: Child,
+    /// What it has said on standard error, as far as that was listened to.
+    heard: String,
 }
 
 impl Running {
     /// Starts it. It must not say more than a pipe holds, 64 KiB, before it ends.
     pub fn start(command: &mut Command) -> Self {
         let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).stdin(Stdio::null()).spawn();
-        Self { child: child.expect("the program starts") }
+        Self { child: child.expect("the program starts"), heard: String::new() }
     }
 
     /// Its process id.
@@ -55,6 +59,23 @@ impl Running {
         }
     }
 
+    /// Waits until it has said this on standard error.
+    pub fn hear(&mut self, words: &str) {
+        let pipe = self.child.stderr.as_mut().expect("piped");
+        let begun = Instant::now();
+        while !self.heard.contains(words) {
+            assert!(begun.elapsed() < HANG, "it has only said {:?}", self.heard);
+            let mut ready = [PollFd::new(pipe, PollFlags::IN)];
+            let pause = Timespec { tv_sec: 0, tv_nsec: 100_000_000 };
+            if poll(&mut ready, Some(&pause)).is_ok_and(|ready| ready > 0) {
+                let mut bytes = [0; 4096];
+                let read = pipe.read(&mut bytes).expect("readable");
+                assert!(read > 0, "it ended and has only said {:?}", self.heard);
+                self.heard += &String::from_utf8_lossy(&bytes[..read]);
+            }
+        }
+    }
+
     /// Waits for its end.
     pub fn end(&mut self) -> End {
         use std::os::unix::process::ExitStatusExt;
@@ -65,7 +86,7 @@ impl Running {
             String::from_utf8_lossy(&bytes).into_owned()
         };
         let out = text(self.child.stdout.as_mut().map(|pipe| pipe as _));
-        let err = text(self.child.stderr.as_mut().map(|pipe| pipe as _));
+        let err = std::mem::take(&mut self.heard) + &text(self.child.stderr.as_mut().map(|pipe| pipe as _));
         End { status: status.code(), signal: status.signal(), out, err }
     }
 }
@@ -90,7 +111,9 @@ pub fn is_alive(process: u32) -> bool {
 
 /// The living children of a process.
 pub fn children_of(process: u32) -> Vec<u32> {
-    processes().filter(|id| is_alive(*id) && state_and_parent(*id).is_some_and(|(_, parent)| parent == process)).collect()
+    processes()
+        .filter(|id| is_alive(*id) && state_and_parent(*id).is_some_and(|(_, parent)| parent == process))
+        .collect()
 }
 
 /// A process that has this text in its environment; one that has ended has none.

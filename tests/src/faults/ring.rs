@@ -19,6 +19,8 @@ pub struct Told {
     pub tick: u64,
     /// The lease in it.
     pub lease: u64,
+    /// Ticks of the run in it; negative before.
+    pub run_tick: i64,
     /// The driver's state in it.
     pub state: DriverState,
     /// What became of the reply in the tick before.
@@ -45,6 +47,7 @@ impl Told {
         Self {
             tick: frame.tick,
             lease: frame.lease,
+            run_tick: frame.run_tick,
             state: DriverState::from_word(frame.state).expect("a state"),
             reply: ReplyKind::from_word(frame.previous.reply).expect("a kind of reply"),
             command_tick: frame.previous.command_tick,
