@@ -291,7 +291,7 @@ impl Cycle {
             ReplyKind::Fresh => bump(&counters.replies_fresh),
             // Until the first command of a lease nobody has promised anything.
             ReplyKind::Held | ReplyKind::Expired if self.reply.tick.is_some() => {
-                bump(&counters.replies_missed)
+                bump(&counters.replies_missed);
             }
             ReplyKind::Held | ReplyKind::Expired => return,
         }

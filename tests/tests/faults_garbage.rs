@@ -367,7 +367,7 @@ fn garbage_never_makes_a_motor_code_of_more_than_twelve_bits() {
     let mut bench = Bench::new(&format!("{SAFETY}{}", device.repeat(DEVICES)), directory.path(), None);
     let mut random = Random::seeded(8);
     let mut extremes = (i64::MAX, i64::MIN);
-    for _ in 0..200_000 {
+    for _ in 0..1_000_000 {
         bench.tick(1, |commander, driver, tick| rave(&mut random, commander, driver, tick, LEASE, DEVICES));
         let frame = bench.frame();
         for device in frame.present_devices() {

@@ -20,11 +20,6 @@ impl Random {
         Self(seed)
     }
 
-    /// Another sequence, told apart from this one by `number`.
-    pub fn fork(&mut self, number: u64) -> Self {
-        Self(self.word() ^ number)
-    }
-
     /// Any word.
     pub fn word(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
