@@ -71,9 +71,9 @@ pub struct Tally {
     pub rows: u64,
     /// Rows lost because the slow side was too slow.
     pub rows_lost: u64,
-    /// The largest force computed for any finger [N].
+    /// The largest force computed for any finger (N).
     pub peak_force_n: f64,
-    /// The largest force any device was made to render [N].
+    /// The largest force any device was made to render (N).
     pub peak_applied_n: f64,
 }
 

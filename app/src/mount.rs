@@ -20,19 +20,19 @@ impl Mount {
         Self { X_WD: (X_WD != Isometry3::identity()).then_some(X_WD) }
     }
 
-    /// A point of the base frame in the world [m].
+    /// A point of the base frame in the world (m).
     pub fn point_to_world(&self, p_D: [f64; 3]) -> Vector3<f64> {
         let p_D = Vector3::from(p_D);
         self.X_WD.map_or(p_D, |pose| (pose * Point3::from(p_D)).coords)
     }
 
-    /// A force of the base frame in the world [N].
+    /// A force of the base frame in the world (N).
     pub fn force_to_world(&self, f_D: [f64; 3]) -> Vector3<f64> {
         let f_D = Vector3::from(f_D);
         self.X_WD.map_or(f_D, |pose| pose.rotation * f_D)
     }
 
-    /// A force of the world in the base frame [N].
+    /// A force of the world in the base frame (N).
     pub fn force_to_device(&self, f_W: Vector3<f64>) -> [f64; 3] {
         self.X_WD.map_or(f_W, |pose| pose.rotation.inverse() * f_W).into()
     }

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 pub struct Report {
     /// Which clock moved the ticks.
     pub clock: &'static str,
-    /// Length of a tick [ns].
+    /// Length of a tick (ns).
     pub period_ns: u64,
     /// Who drove the devices.
     pub driver: String,

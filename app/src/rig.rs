@@ -78,7 +78,7 @@ pub struct Rig {
     pub layout: Layout,
     /// The hand file, and how long it lasts.
     pub hand: Option<HandFile>,
-    /// Length of a tick [ns].
+    /// Length of a tick (ns).
     pub period_ns: u64,
 }
 
@@ -87,7 +87,7 @@ pub struct Rig {
 pub struct HandFile {
     /// Where it lies; absolute, since the driver reads it too.
     pub path: PathBuf,
-    /// Its duration [s].
+    /// Its duration (s).
     pub duration_s: f64,
 }
 

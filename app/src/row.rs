@@ -16,13 +16,13 @@ pub struct Row {
 /// One finger in it; world frame, SI.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FingerRow {
-    /// The haptic interaction point [m].
+    /// The haptic interaction point (m).
     pub hip: Vector3<f64>,
-    /// The god-object; the HIP in free space [m].
+    /// The god-object; the HIP in free space (m).
     pub god_object: Vector3<f64>,
-    /// What rendering computed [N].
+    /// What rendering computed (N).
     pub force_on_user: Vector3<f64>,
-    /// What the device was made to render after ramps, limits and converters [N].
+    /// What the device was made to render after ramps, limits and converters (N).
     pub applied_on_user: Vector3<f64>,
     /// Index of the touched entity.
     pub entity: Option<u32>,

@@ -21,7 +21,7 @@ use toml::Spanned;
 /// What a driver is to do, validated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DriverConfig {
-    /// Length of a tick [ns].
+    /// Length of a tick (ns).
     pub period_ns: u64,
     /// Which clock moves the ticks.
     pub clock: ClockMode,
@@ -46,9 +46,9 @@ pub struct RealTime {
     pub priority: Option<u8>,
     /// Lock all memory.
     pub lock_memory: bool,
-    /// Phase of the tick against whole periods of the clock [ns].
+    /// Phase of the tick against whole periods of the clock (ns).
     pub phase_offset_ns: u64,
-    /// How long before the deadline sleeping turns into spinning [ns].
+    /// How long before the deadline sleeping turns into spinning (ns).
     pub spin_margin_ns: u64,
     /// How to wait for replies; `None`: whatever suits what was obtained.
     pub wait: Option<WaitMode>,
@@ -70,7 +70,7 @@ pub enum ReplyMode {
 pub struct ReplyConfig {
     /// When the motors are written.
     pub mode: ReplyMode,
-    /// How long after the tick's deadline a reply is still in time [ns].
+    /// How long after the tick's deadline a reply is still in time (ns).
     pub budget_ns: u64,
 }
 
@@ -79,9 +79,9 @@ pub struct ReplyConfig {
 pub struct SafetyConfig {
     /// How many ticks an old command may still drive the motors.
     pub max_command_age_ticks: u64,
-    /// From no force to all of it for a new lease [ticks].
+    /// From no force to all of it for a new lease (ticks).
     pub ramp_in_ticks: u64,
-    /// From all force to none once commands fail [ticks].
+    /// From all force to none once commands fail (ticks).
     pub ramp_out_ticks: u64,
 }
 
@@ -92,7 +92,7 @@ pub struct DeviceConfig {
     pub name: String,
     /// How it is reached.
     pub backend: Backend,
-    /// Overrides the peak of its description [N].
+    /// Overrides the peak of its description (N).
     pub peak_force_n: Option<f64>,
 }
 
@@ -103,7 +103,7 @@ pub enum Backend {
     Ideal {
         /// The hand file and the finger in it.
         hand: Option<(PathBuf, String)>,
-        /// Where the tip rests without a script, in the world W [m].
+        /// Where the tip rests without a script, in the world W (m).
         start_m: Vector3<f64>,
         /// X_WD, where the base stands.
         base_in_world: Isometry3<f64>,

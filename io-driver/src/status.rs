@@ -100,11 +100,11 @@ pub struct DeviceStatus {
     pub kind: String,
     /// Whether the position can be trusted.
     pub position_valid: bool,
-    /// The tip in the base frame [m].
+    /// The tip in the base frame (m).
     pub position_m: [f64; 3],
-    /// The force on the user that the motors render [N].
+    /// The force on the user that the motors render (N).
     pub force_on_user_n_applied: [f64; 3],
-    /// The largest force it may render [N]; `None`: no limit.
+    /// The largest force it may render (N); `None`: no limit.
     pub peak_force_n: Option<f64>,
 }
 

@@ -79,15 +79,15 @@ impl Table {
 /// One finger in one row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sample {
-    /// Time of the row [s].
+    /// Time of the row (s).
     pub t: f64,
-    /// Haptic interaction point [m].
+    /// Haptic interaction point (m).
     pub hip: Vector3<f64>,
-    /// God-object [m].
+    /// God-object (m).
     pub god: Vector3<f64>,
-    /// What rendering computed, on the user [N].
+    /// What rendering computed, on the user (N).
     pub force: Vector3<f64>,
-    /// What the device rendered, on the user [N].
+    /// What the device rendered, on the user (N).
     pub applied: Vector3<f64>,
     /// The touched entity's name, or nothing.
     pub entity: String,

@@ -75,12 +75,12 @@ impl ThreadOf {
         fs::read_to_string(self.directory.join("syscall")).ok()?.split_whitespace().next()?.parse().ok()
     }
 
-    /// How long it has been on a CPU [ns]; `None`: the kernel does not tell.
+    /// How long it has been on a CPU (ns); `None`: the kernel does not tell.
     pub fn cpu_ns(&self) -> Option<u64> {
         fs::read_to_string(self.directory.join("schedstat")).ok()?.split_whitespace().next()?.parse().ok()
     }
 
-    /// Memory of its process that is locked [KiB].
+    /// Memory of its process that is locked (KiB).
     pub fn locked_kib(&self) -> u64 {
         self.status("VmLck:")
     }

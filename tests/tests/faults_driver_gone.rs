@@ -56,7 +56,8 @@ fn an_app_whose_own_driver_is_killed_says_so_and_its_recording_is_complete() {
         let rows = t.len() as u64;
         // A row is complete once the frame after it has told what the motors did: the last frame is none.
         match clock {
-            "lockstep" => assert_eq!(rows, told, "in lockstep no frame is missed"),
+            // No frame is missed, but the last may have come when the end had been noticed already.
+            "lockstep" => assert!(rows == told || rows + 1 == told, "{rows} rows, {told} ticks"),
             _ => assert!(rows > 0 && rows <= told, "{rows} rows, {told} ticks"),
         }
     }

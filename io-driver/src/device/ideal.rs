@@ -18,7 +18,7 @@ use shm_abi::segment::DeviceInfo;
 pub enum Hand {
     /// A script, and the finger in it that this device is.
     Scripted(HandPlayer, usize),
-    /// Nobody; it rests here, in W [m].
+    /// Nobody; it rests here, in W (m).
     Resting(Vector3<f64>),
 }
 

@@ -17,20 +17,20 @@ use shm_abi::{DeviceFrame, FaultReason};
 pub struct TickTime {
     /// Number of the tick.
     pub tick: u64,
-    /// Length of a tick [ns].
+    /// Length of a tick (ns).
     pub period_ns: u64,
     /// Ticks since a lease first had full authority; negative before. The clock of scripted hands.
     pub run_tick: i64,
 }
 
 impl TickTime {
-    /// Time since full authority [s]; zero before.
+    /// Time since full authority (s); zero before.
     pub fn run_time_s(&self) -> f64 {
         run_time_s(self.run_tick, self.period_ns)
     }
 }
 
-/// Time of a run's tick [s]: the correctly rounded quotient, so that tick 3 at 1 kHz is 0.003.
+/// Time of a run's tick (s): the correctly rounded quotient, so that tick 3 at 1 kHz is 0.003.
 pub fn run_time_s(run_tick: i64, period_ns: u64) -> f64 {
     let ns = u128::from(run_tick.max(0).unsigned_abs()) * u128::from(period_ns);
     ns as f64 / 1e9
@@ -41,13 +41,13 @@ pub fn run_time_s(run_tick: i64, period_ns: u64) -> f64 {
 pub struct Reading {
     /// Whether the position can be trusted; false until the device has been zeroed.
     pub is_valid: bool,
-    /// The tip [m].
+    /// The tip (m).
     pub position_m: Vector3<f64>,
     /// The gimbal's last link, w x y z; identity where there is none.
     pub orientation_wxyz: [f64; 4],
     /// Encoder counts, extended: three joints, three gimbal axes.
     pub encoder_counts: [i64; 6],
-    /// Joint angles in the same order [rad].
+    /// Joint angles in the same order (rad).
     pub joint_angle_rad: [f64; 6],
     /// Bit `i`: button `i` is pressed.
     pub buttons: u64,
@@ -89,7 +89,7 @@ impl Reading {
 /// What the motors were made to do.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Written {
-    /// The force on the user that this amounts to, in D [N].
+    /// The force on the user that this amounts to, in D (N).
     pub force_on_user_n: Vector3<f64>,
     /// The values the hardware got.
     pub motor_codes: [i64; 3],

@@ -16,7 +16,7 @@ pub struct Commander {
 }
 
 impl Commander {
-    /// Begins; all devices get the force [N].
+    /// Begins; all devices get the force (N).
     pub fn start(attachment: Attachment, force_on_user_n: [f64; 3]) -> Self {
         let Attachment { driver, commander, connection, .. } = attachment;
         let commander = commander.expect("the lease");
@@ -55,7 +55,7 @@ impl Drop for Commander {
     }
 }
 
-/// Answers the newest frame under this lease with the same force for all devices [N].
+/// Answers the newest frame under this lease with the same force for all devices (N).
 pub fn answer(driver: &DriverView, commander: &CommanderMemory, lease: u64, force_on_user_n: [f64; 3]) {
     let Some(tick) = driver.latest_tick() else { return };
     let devices = driver.info().devices.len();

@@ -10,9 +10,9 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// Stiffness times depth [N].
+/// Stiffness times depth (N).
 pub const FORCE_N: f64 = 4.0;
-/// The device's peak [N].
+/// The device's peak (N).
 pub const PEAK_N: f64 = 8.5;
 
 const SCENE: &str = "\

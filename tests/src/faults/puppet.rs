@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 pub enum Call {
     /// Its position, in this tick.
     Read(u64),
-    /// A force on the user [N].
+    /// A force on the user (N).
     Write(Vector3<f64>),
     /// Motors off.
     Release,

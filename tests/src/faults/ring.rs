@@ -29,9 +29,9 @@ pub struct Told {
     pub command_tick: u64,
     /// The share of it that was let through.
     pub authority: f64,
-    /// The largest force that any device rendered in the tick before [N].
+    /// The largest force that any device rendered in the tick before (N).
     pub applied_n: f64,
-    /// The first device's [N].
+    /// The first device's (N).
     pub first_applied_n: [f64; 3],
 }
 
