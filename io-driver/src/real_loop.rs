@@ -65,7 +65,7 @@ pub struct RealLoop {
     wait_mode: WaitMode,
     mode: ReplyMode,
     budget_ns: u64,
-    /// Ticks on end that a commander left unanswered, and how many of them are enough.
+    /// Ticks on end that a commander which had begun left unanswered, and how many of them are enough.
     unanswered_ticks: u64,
     patience_ticks: u64,
     /// Until then replies are slept for, whatever the wait mode.
@@ -193,11 +193,14 @@ impl RealLoop {
     }
 
     fn wait_within(&mut self, until_ns: u64) {
-        let wait_mode = if until_ns < self.retreat_until_ns { WaitMode::Futex } else { self.wait_mode };
+        // A commander that has yet to begin takes as long as it takes.
+        let has_begun = self.cycle.seen_reply().is_some();
+        let may_spin = has_begun && until_ns >= self.retreat_until_ns;
+        let wait_mode = if may_spin { self.wait_mode } else { WaitMode::Futex };
         while !self.cycle.take_reply() {
             let now = monotonic_ns();
             if now >= until_ns {
-                return self.note_unanswered(now);
+                return self.note_unanswered(has_begun, now);
             }
             match wait_mode {
                 WaitMode::Spin => spin_loop(),
@@ -207,8 +210,8 @@ impl RealLoop {
         self.unanswered_ticks = 0;
     }
 
-    fn note_unanswered(&mut self, now: u64) {
-        self.unanswered_ticks += 1;
+    fn note_unanswered(&mut self, has_begun: bool, now: u64) {
+        self.unanswered_ticks += u64::from(has_begun);
         if self.unanswered_ticks >= self.patience_ticks {
             self.retreat_until_ns = now + RETREAT_NS;
         }

@@ -3,6 +3,7 @@
 use io_driver::real_loop::Ended;
 use nalgebra::Vector3;
 use shm_abi::client;
+use shm_abi::segment::ClockMode;
 use shm_abi::{DriverState, DriverView, FaultReason, Frame};
 use std::sync::atomic::Ordering;
 use system_tests::driver::HANG;
@@ -166,7 +167,10 @@ fn check_zero_in_the_same_tick(stage: &Stage, mood: Mood) {
         calls.iter().filter_map(force).collect()
     };
     assert!(forces(&calls[released..]).iter().all(|force| *force == Vector3::zeros()));
-    assert_eq!(forces(&calls[..released]).last(), Some(&Vector3::from(FORCE)), "at full force until then");
+    if stage.view.info().clock_mode == ClockMode::Lockstep {
+        // In real time replies may have been late, and the force on its way down or up.
+        assert_eq!(forces(&calls[..released]).last(), Some(&Vector3::from(FORCE)));
+    }
     if mood != Mood::Unwritable {
         // A reading that fails is known before anything is written: the tick itself is at zero.
         assert!(matches!(calls[released - 1], Call::Read(_)), "{:?}", calls[released - 1]);

@@ -31,7 +31,9 @@ fn a_late_writer(clock: &str) {
         });
         let seen = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
             // While nobody commands.
-            log.follow(&observer.driver, "rest", |told| told.last().is_some_and(|last| !last.is_pushing()));
+            log.follow(&observer.driver, "the end of the lease and of its force", |told| {
+                told.last().is_some_and(|last| last.lease == 0 && !last.is_pushing())
+            });
             log.check_promise(&observer.driver);
             log.forget();
             log.follow_for(&observer.driver, 200);

@@ -193,6 +193,13 @@ fn a_driver_whose_commander_stalls_stops_spinning_for_it() {
     let thread = ThreadOf::find(driver.child.id(), "driver-loop");
     let stalled = driver.command();
     let ticks = || stalled.driver.counters.ticks.load(Ordering::Relaxed);
+    // It answers until one of its answers comes in time, and never again.
+    let commander = stalled.commander.as_ref().expect("the lease");
+    wait_until(|| {
+        let tick = stalled.driver.latest_tick().unwrap_or(0);
+        commander.publish(&shm_abi::Command::zero(tick, commander.lease(), 2), &stalled.driver);
+        stalled.driver.counters.replies_fresh.load(Ordering::Relaxed) > 0
+    });
     let begun = ticks();
     wait_until(|| ticks() > begun + 100);
     let (before, Some(cpu_ns)) = (ticks(), thread.cpu_ns()) else {
