@@ -112,7 +112,7 @@ fn run_attached(
     let Attachment { driver, commander, connection, .. } = attachment;
     let commander = commander.ok_or_else(|| RunFailure::Start("the driver gave no lease".into()))?;
     if let Some(warning) = fast_thread::shares_a_spinning_cpu(&driver.info()) {
-        eprintln!("phantom3: {warning}");
+        say(format_args!("phantom3: {warning}"));
     }
     let shared = FastShared::default();
     let (report, thread) = fast_thread::start(fast, driver, commander, shared.clone())

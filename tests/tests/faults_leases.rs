@@ -20,6 +20,11 @@ fn a_late_writer(clock: &str) {
     let former = Commander::start(driver.command(), [0.0, 3.0, 0.0]);
     log.follow_to_force(&observer.driver);
     let former = former.retire();
+    // Until the driver has noticed, the lease is in force.
+    log.follow(&observer.driver, "the end of the lease and of its force", |told| {
+        told.last().is_some_and(|last| last.lease == 0 && !last.is_pushing())
+    });
+    log.check_promise(&observer.driver);
     let (stop, writes) = (AtomicBool::new(false), AtomicU64::new(0));
     std::thread::scope(|scope| {
         scope.spawn(|| {
@@ -31,10 +36,6 @@ fn a_late_writer(clock: &str) {
         });
         let seen = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
             // While nobody commands.
-            log.follow(&observer.driver, "the end of the lease and of its force", |told| {
-                told.last().is_some_and(|last| last.lease == 0 && !last.is_pushing())
-            });
-            log.check_promise(&observer.driver);
             log.forget();
             log.follow_for(&observer.driver, 200);
             log.check_silence_from(0);
