@@ -63,7 +63,7 @@ pub enum RunError {
     #[error(transparent)]
     Bind(#[from] BindError),
     /// `--strict`, and something is missing.
-    #[error("--strict: not every real-time guarantee was obtained, so nothing was started:\n{0}")]
+    #[error("--strict: not every real-time guarantee was obtained, so nothing was started:\n{}", .0.to_string().trim_end())]
     Strict(SetupReport),
     /// The system refused something.
     #[error("cannot {what}: {source}")]
