@@ -6,7 +6,7 @@ use crate::mount::Mount;
 use crate::recording::Names;
 use haptics::{Entity, Finger, Friction, ParameterError, Plane, Shape, Sphere};
 use io_driver::config::{
-    Backend, DeviceConfig, DriverConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig, usual_spin_margin_ns,
+    Backend, DeviceConfig, DriverConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig,
 };
 use io_driver::sim::script::{HandError, HandScript};
 use shm_abi::segment::ClockMode;
@@ -152,27 +152,14 @@ impl Rig {
     /// A driver whose ideal devices are the scripted hand's fingers.
     pub fn driver_config(&self, clock: ClockMode) -> DriverConfig {
         let period_ns = self.period_ns;
-        let ticks = |ms: u64| (ms * 1_000_000 / period_ns).max(1);
-        let usual = rt_core::periodic::PeriodicConfig::hybrid(period_ns);
         let reply = ReplyConfig { mode: ReplyMode::OnArrival, budget_ns: period_ns / 2 };
         DriverConfig {
             period_ns,
             clock,
             socket: None,
-            real_time: RealTime {
-                cpu: None,
-                priority: Some(80),
-                lock_memory: true,
-                phase_offset_ns: usual.phase_offset_ns % period_ns,
-                spin_margin_ns: usual_spin_margin_ns(period_ns, reply.budget_ns),
-                wait: None,
-            },
+            real_time: RealTime::usual(period_ns, reply.budget_ns),
             reply,
-            safety: SafetyConfig {
-                max_command_age_ticks: 5,
-                ramp_in_ticks: ticks(200),
-                ramp_out_ticks: ticks(10),
-            },
+            safety: SafetyConfig::usual(period_ns),
             devices: (0..self.device_count()).map(|index| self.ideal_device(index)).collect(),
         }
     }
@@ -190,6 +177,7 @@ impl Rig {
                 base_in_world: self.layout.pose(index),
             },
             peak_force_n: None,
+            compensates_gravity: false,
         }
     }
 

@@ -2,11 +2,14 @@
 //!
 //! Exit status: 0 done; 2 bad usage or bad input, nothing was started; 3 a fault during the run.
 
+mod emulate;
+
 use crate::config::DriverConfig;
-use crate::driver::{self, RunOptions};
+use crate::driver::{self, Fit, RunOptions};
 use crate::say::say;
 use crate::status::Status;
 use clap::{Args, Parser, Subcommand};
+use emulate::EmulateArgs;
 use shm_abi::client::{self, AttachError};
 use shm_abi::endpoint;
 use std::path::{Path, PathBuf};
@@ -40,6 +43,10 @@ pub enum DriverCommand {
     Stop(SocketArgs),
     /// Ask a running driver to leave its fault state
     ClearFault(SocketArgs),
+    /// Switch all motors off at once and keep them off until `clear-fault`
+    EmergencyStop(SocketArgs),
+    /// Play a card with counters, converters and amplifiers, for a driver without hardware
+    Emulate(EmulateArgs),
 }
 
 /// Arguments of `run`.
@@ -94,17 +101,28 @@ pub fn main() -> ExitCode {
     execute(Cli::parse().command)
 }
 
+/// The same, with something of one's own around each device.
+pub fn main_with(fit: Fit) -> ExitCode {
+    execute_with(Cli::parse().command, Some(fit))
+}
+
 /// Runs one command.
 pub fn execute(command: DriverCommand) -> ExitCode {
+    execute_with(command, None)
+}
+
+fn execute_with(command: DriverCommand, fit: Option<Fit>) -> ExitCode {
     match command {
-        DriverCommand::Run(args) => run(args),
+        DriverCommand::Run(args) => run(args, fit),
         DriverCommand::Status(args) => report(status(&args)),
         DriverCommand::Stop(args) => report(stop(&args.path())),
         DriverCommand::ClearFault(args) => report(client::clear_fault(&args.path(), "io-driver")),
+        DriverCommand::EmergencyStop(args) => report(client::emergency_stop(&args.path(), "io-driver")),
+        DriverCommand::Emulate(args) => emulate::run(&args),
     }
 }
 
-fn run(args: RunArgs) -> ExitCode {
+fn run(args: RunArgs, fit: Option<Fit>) -> ExitCode {
     let loaded = match args.config.to_str() {
         Some("-") => DriverConfig::load_from_stdin(),
         _ => DriverConfig::load(&args.config),
@@ -113,8 +131,8 @@ fn run(args: RunArgs) -> ExitCode {
         Ok(config) => config,
         Err(error) => return fail(&error, EXIT_USAGE),
     };
-    let options =
-        RunOptions { strict: args.strict, quiet: args.quiet, parent: args.parent, socket: args.socket };
+    let RunArgs { strict, quiet, parent, socket, .. } = args;
+    let options = RunOptions { fit, strict, quiet, parent, socket };
     match driver::run(&config, &options) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => fail(&error, if error.is_fault() { EXIT_FAULT } else { EXIT_USAGE }),
@@ -166,7 +184,7 @@ fn report(result: Result<(), AttachError>) -> ExitCode {
     }
 }
 
-fn fail(error: &dyn std::error::Error, code: u8) -> ExitCode {
+pub(crate) fn fail(error: &dyn std::error::Error, code: u8) -> ExitCode {
     say(format_args!("io-driver: {error}"));
     ExitCode::from(code)
 }

@@ -5,13 +5,23 @@
 //! Model: TOML. Relative paths are relative to the file. Everything but the devices has a default.
 //! Units: in the names of the keys; SI.
 
+mod device;
+mod real_time;
+mod reply;
+mod safety;
 mod toml_text;
 
-use crate::toml_report::{Allowed, SpannedList, TomlReport, TomlText};
-use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+pub use device::{Backend, DeviceConfig};
+pub use real_time::{OverrunPolicy, RealTime, SpinMargin, longest_spin_margin_ns};
+pub use reply::{ReplyConfig, ReplyMode};
+pub use safety::{Commissioning, SafetyConfig};
+
+use crate::toml_report::{Allowed, TomlReport, TomlText};
+use device::RawDevice;
+use real_time::RawRealTime;
+use reply::RawReply;
+use safety::RawSafety;
 use serde::Deserialize;
-use shm_abi::MAX_DEVICES;
-use shm_abi::doorbell::WaitMode;
 use shm_abi::segment::ClockMode;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -35,86 +45,6 @@ pub struct DriverConfig {
     pub safety: SafetyConfig,
     /// The devices, in the order of the frame.
     pub devices: Vec<DeviceConfig>,
-}
-
-/// What is asked of the operating system.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RealTime {
-    /// CPU of the loop; `None`: the last one, if there are several.
-    pub cpu: Option<usize>,
-    /// SCHED_FIFO priority of the loop; `None`: no real-time scheduling.
-    pub priority: Option<u8>,
-    /// Lock all memory.
-    pub lock_memory: bool,
-    /// Phase of the tick against whole periods of the clock (ns).
-    pub phase_offset_ns: u64,
-    /// How long before the deadline sleeping turns into spinning (ns).
-    pub spin_margin_ns: u64,
-    /// How to wait for replies; `None`: whatever suits what was obtained.
-    pub wait: Option<WaitMode>,
-}
-
-/// When the motors are written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ReplyMode {
-    /// As soon as the reply to this tick is there.
-    OnArrival,
-    /// At a fixed time after the tick began, so that the application's jitter stays out of the loop delay.
-    FixedPhase,
-    /// At once, with the reply to the tick before, as the thesis does.
-    NextTick,
-}
-
-/// How to wait for replies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ReplyConfig {
-    /// When the motors are written.
-    pub mode: ReplyMode,
-    /// How long after the tick's deadline a reply is still in time (ns).
-    pub budget_ns: u64,
-}
-
-/// Ages and ramps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SafetyConfig {
-    /// How many ticks an old command may still drive the motors.
-    pub max_command_age_ticks: u64,
-    /// From no force to all of it for a new lease (ticks).
-    pub ramp_in_ticks: u64,
-    /// From all force to none once commands fail (ticks).
-    pub ramp_out_ticks: u64,
-}
-
-/// One device.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DeviceConfig {
-    /// Its name in reports.
-    pub name: String,
-    /// How it is reached.
-    pub backend: Backend,
-    /// Overrides the peak of its description (N).
-    pub peak_force_n: Option<f64>,
-}
-
-/// How a device is reached.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Backend {
-    /// No mechanism: the scripted hand's position goes straight through.
-    Ideal {
-        /// The hand file and the finger in it.
-        hand: Option<(PathBuf, String)>,
-        /// Where the tip rests without a script, in the world W (m).
-        start_m: Vector3<f64>,
-        /// X_WD, where the base stands.
-        base_in_world: Isometry3<f64>,
-    },
-    /// A recorded encoder trace through a described mechanism.
-    Replay {
-        /// The description: a built-in's name or a file.
-        description: PathBuf,
-        /// The trace.
-        trace: PathBuf,
-    },
 }
 
 /// Why there is no configuration.
@@ -172,6 +102,7 @@ impl DriverConfig {
         let period_ns = period_of(rate_hz);
         let directory = file.parent().unwrap_or(Path::new("."));
         let reply = raw.reply.validate(&toml, period_ns)?;
+        let devices = device::devices(&raw.device, &toml, directory)?;
         Ok(Self {
             period_ns,
             clock: match raw.clock.unwrap_or(RawClock::Real) {
@@ -181,8 +112,8 @@ impl DriverConfig {
             socket: raw.socket.map(|path| directory.join(path)),
             real_time: raw.real_time.validate(&toml, period_ns, reply.budget_ns)?,
             reply,
-            safety: raw.safety.validate(&toml, period_ns)?,
-            devices: devices(&raw.device, &toml, directory)?,
+            safety: raw.safety.validate(&toml, period_ns, &devices)?,
+            devices,
         })
     }
 }
@@ -190,14 +121,6 @@ impl DriverConfig {
 /// The whole number of nanoseconds nearest to a rate's period.
 pub fn period_of(rate_hz: f64) -> u64 {
     (1e9 / rate_hz).round() as u64
-}
-
-/// The spin margin if nobody says. However the replies fail, a tick then sleeps for at least a quarter of
-/// what the budget leaves: a loop that spun until the budget's end and from there on to the next deadline would
-/// never sleep, and the kernel would throttle it (5 % of each second) and starve all else on its CPU.
-pub fn usual_spin_margin_ns(period_ns: u64, budget_ns: u64) -> u64 {
-    let rest_ns = period_ns.saturating_sub(budget_ns);
-    rt_core::periodic::PeriodicConfig::hybrid(period_ns).spin_margin_ns.min(rest_ns / 4 * 3)
 }
 
 const RATE: Allowed = Allowed { min: 10.0, max: 20_000.0, unit: "Hz" };
@@ -224,261 +147,9 @@ enum RawClock {
     Lockstep,
 }
 
-#[derive(Deserialize, Default)]
-#[serde(deny_unknown_fields)]
-struct RawRealTime {
-    cpu: Option<Spanned<i64>>,
-    priority: Option<Spanned<i64>>,
-    lock_memory: Option<bool>,
-    phase_offset_us: Option<Spanned<f64>>,
-    spin_margin_us: Option<Spanned<f64>>,
-    wait: Option<RawWait>,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum RawWait {
-    Auto,
-    Spin,
-    Futex,
-}
-
-impl RawRealTime {
-    fn validate(self, toml: &TomlText<'_>, period_ns: u64, budget_ns: u64) -> Result<RealTime, TomlReport> {
-        let usual = rt_core::periodic::PeriodicConfig::hybrid(period_ns);
-        let within_period = Allowed { min: 0.0, max: period_ns as f64 / 1e3, unit: "us" };
-        let us = |key: &Option<Spanned<f64>>, default_ns: u64| match key {
-            Some(number) => toml.number(number, within_period).map(ns_of_us),
-            None => Ok(default_ns),
-        };
-        let phase_offset_ns = us(&self.phase_offset_us, usual.phase_offset_ns % period_ns)?;
-        let spin_margin_ns = us(&self.spin_margin_us, usual_spin_margin_ns(period_ns, budget_ns))?;
-        let cpu = self.cpu.map(|cpu| toml.integer(&cpu, 0..=4095)).transpose()?;
-        // 0 switches real-time scheduling off; 99 is left to the kernel's own threads.
-        let priority =
-            self.priority.map(|priority| toml.integer(&priority, 0..=98)).transpose()?.unwrap_or(80);
-        Ok(RealTime {
-            cpu: cpu.map(|cpu| cpu as usize),
-            priority: (priority > 0).then_some(priority as u8),
-            lock_memory: self.lock_memory.unwrap_or(true),
-            phase_offset_ns,
-            spin_margin_ns,
-            wait: match self.wait.unwrap_or(RawWait::Auto) {
-                RawWait::Auto => None,
-                RawWait::Spin => Some(WaitMode::Spin),
-                RawWait::Futex => Some(WaitMode::Futex),
-            },
-        })
-    }
-}
-
-#[derive(Deserialize, Default)]
-#[serde(deny_unknown_fields)]
-struct RawReply {
-    mode: Option<RawReplyMode>,
-    budget_us: Option<Spanned<f64>>,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum RawReplyMode {
-    SameTick,
-    FixedPhase,
-    NextTick,
-}
-
-impl RawReply {
-    fn validate(self, toml: &TomlText<'_>, period_ns: u64) -> Result<ReplyConfig, TomlReport> {
-        let within_period = Allowed { min: 1.0, max: 0.9 * period_ns as f64 / 1e3, unit: "us" };
-        let budget_ns = match self.budget_us {
-            Some(number) => ns_of_us(toml.number(&number, within_period)?),
-            None => period_ns / 2,
-        };
-        let mode = match self.mode.unwrap_or(RawReplyMode::SameTick) {
-            RawReplyMode::SameTick => ReplyMode::OnArrival,
-            RawReplyMode::FixedPhase => ReplyMode::FixedPhase,
-            RawReplyMode::NextTick => ReplyMode::NextTick,
-        };
-        Ok(ReplyConfig { mode, budget_ns })
-    }
-}
-
-#[derive(Deserialize, Default)]
-#[serde(deny_unknown_fields)]
-struct RawSafety {
-    max_command_age_ticks: Option<Spanned<i64>>,
-    ramp_in_ms: Option<Spanned<f64>>,
-    ramp_out_ms: Option<Spanned<f64>>,
-}
-
-impl RawSafety {
-    fn validate(self, toml: &TomlText<'_>, period_ns: u64) -> Result<SafetyConfig, TomlReport> {
-        let ticks = |key: &Option<Spanned<f64>>, default_ms: f64, max: f64| {
-            let ms = key
-                .as_ref()
-                .map_or(Ok(default_ms), |ms| toml.number(ms, Allowed { min: 0.0, max, unit: "ms" }))?;
-            Ok::<u64, TomlReport>(((ms * 1e6 / period_ns as f64).round() as u64).max(1))
-        };
-        let age = self.max_command_age_ticks.map(|age| toml.integer(&age, 0..=100)).transpose()?;
-        Ok(SafetyConfig {
-            max_command_age_ticks: age.map_or(5, |age| age as u64),
-            ramp_in_ticks: ticks(&self.ramp_in_ms, 200.0, 10_000.0)?,
-            ramp_out_ticks: ticks(&self.ramp_out_ms, 10.0, 1000.0)?,
-        })
-    }
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawDevice {
-    name: Option<Spanned<String>>,
-    backend: Spanned<RawBackend>,
-    description: Option<Spanned<PathBuf>>,
-    trace: Option<Spanned<PathBuf>>,
-    hand: Option<Spanned<PathBuf>>,
-    finger: Option<Spanned<String>>,
-    start_m: Option<SpannedList>,
-    base_position_m: Option<SpannedList>,
-    base_orientation_wxyz: Option<SpannedList>,
-    peak_force_n: Option<Spanned<f64>>,
-}
-
-#[derive(Deserialize, Clone, Copy)]
-#[serde(rename_all = "kebab-case")]
-enum RawBackend {
-    Ideal,
-    Replay,
-}
-
-fn devices(
-    raw: &Spanned<Vec<Spanned<RawDevice>>>,
-    toml: &TomlText<'_>,
-    directory: &Path,
-) -> Result<Vec<DeviceConfig>, TomlReport> {
-    let list = raw.get_ref();
-    if list.is_empty() || list.len() > MAX_DEVICES {
-        let allowed = format!("1 to {MAX_DEVICES}");
-        return Err(toml.refuse(raw.span(), format_args!("{} devices", list.len()), allowed));
-    }
-    let mut devices: Vec<DeviceConfig> = Vec::with_capacity(list.len());
-    for (index, item) in list.iter().enumerate() {
-        let device = item.get_ref().validate(index, item.span(), toml, directory)?;
-        if devices.iter().any(|other| other.name == device.name) {
-            let span = item.get_ref().name.as_ref().map_or(item.span(), Spanned::span);
-            return Err(toml.refuse(
-                span,
-                format_args!("the name \"{}\" twice", device.name),
-                "each name once",
-            ));
-        }
-        devices.push(device);
-    }
-    Ok(devices)
-}
-
-impl RawDevice {
-    fn validate(
-        &self,
-        index: usize,
-        span: std::ops::Range<usize>,
-        toml: &TomlText<'_>,
-        directory: &Path,
-    ) -> Result<DeviceConfig, TomlReport> {
-        let name = self.name.as_ref().map_or_else(|| format!("f{index}"), |name| name.get_ref().clone());
-        let backend = match self.backend.get_ref() {
-            RawBackend::Ideal => self.ideal(&name, toml, directory)?,
-            RawBackend::Replay => self.replay(span, toml, directory)?,
-        };
-        let peak_force_n = self.peak_force_n.as_ref().map(|peak| toml.number(peak, PEAK)).transpose()?;
-        Ok(DeviceConfig { name, backend, peak_force_n })
-    }
-
-    fn ideal(&self, name: &str, toml: &TomlText<'_>, directory: &Path) -> Result<Backend, TomlReport> {
-        self.refuse_foreign(
-            "ideal",
-            &[("description", span_of(&self.description)), ("trace", span_of(&self.trace))],
-            toml,
-        )?;
-        let finger = self.finger.as_ref().map_or_else(|| name.to_owned(), |finger| finger.get_ref().clone());
-        let start = self.start_m.as_ref().map_or(Ok([0.0; 3]), |list| toml.numbers(list, PLACE))?;
-        Ok(Backend::Ideal {
-            hand: self.hand.as_ref().map(|hand| (directory.join(hand.get_ref()), finger)),
-            start_m: Vector3::from(start),
-            base_in_world: self.base(toml)?,
-        })
-    }
-
-    fn replay(
-        &self,
-        span: std::ops::Range<usize>,
-        toml: &TomlText<'_>,
-        directory: &Path,
-    ) -> Result<Backend, TomlReport> {
-        let foreign = [
-            ("hand", span_of(&self.hand)),
-            ("finger", span_of(&self.finger)),
-            ("start_m", span_of(&self.start_m)),
-            ("base_position_m", span_of(&self.base_position_m)),
-            ("base_orientation_wxyz", span_of(&self.base_orientation_wxyz)),
-        ];
-        self.refuse_foreign("replay", &foreign, toml)?;
-        let needed = |key: &Option<Spanned<PathBuf>>, name: &str| {
-            key.as_ref().map(|path| path.get_ref().clone()).ok_or_else(|| {
-                let found = format!("no key `{name}` in a replay device");
-                toml.refuse(span.clone(), found, format_args!("`{name} = \"FILE\"`"))
-            })
-        };
-        let description = needed(&self.description, "description")?;
-        let description = match crate::device_file::builtin(&description.to_string_lossy()) {
-            Some(_) => description,
-            None => directory.join(description),
-        };
-        Ok(Backend::Replay { description, trace: directory.join(needed(&self.trace, "trace")?) })
-    }
-
-    fn refuse_foreign(
-        &self,
-        backend: &str,
-        keys: &[(&str, Option<std::ops::Range<usize>>)],
-        toml: &TomlText<'_>,
-    ) -> Result<(), TomlReport> {
-        match keys.iter().find_map(|(key, span)| span.clone().map(|span| (*key, span))) {
-            Some((key, span)) => Err(toml.refuse(
-                span,
-                format_args!("`{key}` in a device of backend \"{backend}\""),
-                "not there",
-            )),
-            None => Ok(()),
-        }
-    }
-
-    fn base(&self, toml: &TomlText<'_>) -> Result<Isometry3<f64>, TomlReport> {
-        let position =
-            self.base_position_m.as_ref().map_or(Ok([0.0; 3]), |list| toml.numbers(list, PLACE))?;
-        let rotation = match &self.base_orientation_wxyz {
-            None => UnitQuaternion::identity(),
-            Some(list) => {
-                let [w, x, y, z] = toml.numbers(list, QUATERNION)?;
-                UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-6).ok_or_else(|| {
-                    toml.refuse(list.span(), "a quaternion of no length", "w, x, y, z of a rotation")
-                })?
-            }
-        };
-        Ok(Isometry3::from_parts(Translation3::from(Vector3::from(position)), rotation))
-    }
-}
-
-fn span_of<T>(key: &Option<Spanned<T>>) -> Option<std::ops::Range<usize>> {
-    key.as_ref().map(Spanned::span)
-}
-
 fn ns_of_us(us: f64) -> u64 {
     (us * 1e3).round() as u64
 }
-
-const PLACE: Allowed = Allowed { min: -100.0, max: 100.0, unit: "m" };
-const QUATERNION: Allowed = Allowed { min: -2.0, max: 2.0, unit: "(w, x, y, z)" };
-const PEAK: Allowed = Allowed { min: 0.0, max: 1000.0, unit: "N" };
 
 #[cfg(test)]
 mod tests {
@@ -494,8 +165,10 @@ mod tests {
         assert_eq!(config.period_ns, 1_000_000);
         assert_eq!(config.clock, ClockMode::Real);
         assert_eq!(config.reply, ReplyConfig { mode: ReplyMode::OnArrival, budget_ns: 500_000 });
-        let SafetyConfig { max_command_age_ticks, ramp_in_ticks, ramp_out_ticks } = config.safety;
+        assert_eq!(config.safety, SafetyConfig::usual(1_000_000));
+        let SafetyConfig { max_command_age_ticks, ramp_in_ticks, ramp_out_ticks, .. } = config.safety;
         assert_eq!((max_command_age_ticks, ramp_in_ticks, ramp_out_ticks), (5, 200, 10));
+        assert_eq!(config.real_time.spin_margin, SpinMargin::Calibrated { at_most_ns: 200_000 });
         assert_eq!(config.devices[0].name, "f0");
     }
 

@@ -9,17 +9,20 @@
 //! not come.
 //!
 //! Frames and signs: forces are forces on the user in each device's base frame D.
-//! Invariants: a motor value is finite and within the device's peak whatever the commander writes; when a
+//! Invariants: a motor value is finite and within the device's limits whatever the commander writes; when a
 //! lease ends its force ramps out before another lease's begins; `sense` and `actuate` alternate.
 //! Cost: linear in the devices; no allocation, lock, system call (but a wake-up, if the commander sleeps) or
 //! panic.
 
-use crate::device::{Device, TickTime};
+use crate::device::{Device, Effort, TickTime};
 use crate::meter::{bump, record};
-use crate::safety::{Safety, limit_force};
+use crate::safety::switches::{Inputs, Switches};
+use crate::safety::{Guard, Limits, Safety};
 use bytemuck::Zeroable;
 use nalgebra::Vector3;
 use rt_core::clock::monotonic_ns;
+use shm_abi::frame::{LIMIT_HEAT, LIMIT_PEAK, LIMIT_SLEW, LIMIT_WORKSPACE};
+use shm_abi::layout::Counters;
 use shm_abi::{
     Command, CommanderView, DriverMemory, DriverSegment, FaultReason, Frame, MAX_DEVICES, Outcome, ReplyKind,
 };
@@ -29,10 +32,24 @@ use std::sync::Arc;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Freshness(pub u64);
 
+/// What keeps the devices from doing harm.
+#[derive(Debug)]
+pub struct Protection {
+    /// How much is let through.
+    pub safety: Safety,
+    /// The switches that a person has in hand.
+    pub switches: Switches,
+    /// Beyond its workspace a device's force fades out over this distance (m); positive.
+    pub workspace_margin_m: f64,
+}
+
 /// The driver's state from tick to tick.
 pub struct Cycle {
     memory: Arc<DriverMemory>,
     devices: Vec<Box<dyn Device>>,
+    /// One for each device.
+    guards: Vec<Guard>,
+    switches: Switches,
     safety: Safety,
     period_ns: u64,
     freshness: Freshness,
@@ -68,16 +85,23 @@ impl Cycle {
     pub fn new(
         memory: Arc<DriverMemory>,
         devices: Vec<Box<dyn Device>>,
-        safety: Safety,
+        protection: Protection,
         period_ns: u64,
         freshness: Freshness,
     ) -> Self {
+        let Protection { safety, switches, workspace_margin_m } = protection;
         assert!(devices.len() <= MAX_DEVICES, "the configuration allows at most {MAX_DEVICES} devices");
         let mut frame = Frame::zeroed();
         frame.device_count = devices.len() as u64;
+        let guards = devices
+            .iter()
+            .map(|device| Guard::new(Limits::of(device.info(), workspace_margin_m), period_ns))
+            .collect();
         Self {
             memory,
             devices,
+            guards,
+            switches,
             safety,
             period_ns,
             freshness,
@@ -141,6 +165,8 @@ impl Cycle {
     /// Somebody asked to leave the fault state.
     pub fn clear_fault(&mut self) {
         self.safety.clear_fault();
+        self.devices.iter_mut().for_each(|device| device.rearm());
+        self.guards.iter_mut().for_each(Guard::lose_sight);
     }
 
     /// Reads all devices and publishes the frame of `tick`, which was due at `deadline_ns`.
@@ -149,6 +175,7 @@ impl Cycle {
         let time = TickTime { tick, period_ns: self.period_ns, run_tick: self.safety.run_tick(tick) };
         let all_valid = self.read_devices(time);
         self.safety.set_positions_valid(all_valid);
+        self.read_switches();
         self.describe(time, deadline_ns);
         self.memory.write_frame(&self.frame);
         self.rang_ns = monotonic_ns();
@@ -224,6 +251,7 @@ impl Cycle {
                 Ok(reading) => {
                     reading.write_to(&mut self.frame.devices[index]);
                     all_valid &= reading.is_valid;
+                    self.watch_speed(index, time.tick, reading.position_m);
                 }
                 Err(reason) => {
                     // The last good position stays in the frame, marked as not to be trusted.
@@ -234,6 +262,24 @@ impl Cycle {
             }
         }
         all_valid
+    }
+
+    fn watch_speed(&mut self, device: usize, tick: u64, position: Vector3<f64>) {
+        match self.guards[device].observe(tick, position) {
+            Ok(velocity) => self.frame.devices[device].velocity_m_per_s_estimated = velocity.into(),
+            // A hand may be as fast as it likes as long as no motor drives it.
+            Err(FaultReason::Overspeed) if self.safety.is_released() => {}
+            Err(reason) => self.fault(reason),
+        }
+    }
+
+    fn read_switches(&mut self) {
+        let inputs: Inputs = self.switches.read(&self.frame);
+        self.frame.inputs = inputs.0;
+        self.safety.set_attended(inputs.is_attended());
+        if inputs.is_emergency() {
+            self.fault(FaultReason::EmergencyStop);
+        }
     }
 
     fn describe(&mut self, time: TickTime, deadline_ns: u64) {
@@ -259,24 +305,24 @@ impl Cycle {
         let mut fault = None;
         for (index, device) in self.devices.iter_mut().enumerate() {
             let commanded = self.reply.force(index);
-            let (limited, was_cut) = limit_force(commanded, device.info().peak_force_n);
-            if was_cut && authority > 0.0 {
-                bump(&self.memory.counters.forces_limited);
-            }
-            // Not `limited * 0.0`: that would leave a negative zero or, for a fault, anything at all.
-            let force = if authority > 0.0 { limited * authority } else { Vector3::zeros() };
+            let restrained = self.guards[index].restrain(commanded, authority);
+            let effort = Effort { force_on_user_n: restrained.force_on_user_n, gravity_share: authority };
             let frame = &mut self.frame.devices[index];
             frame.force_on_user_n_commanded = commanded.into();
-            match device.write(force) {
+            frame.limits = restrained.limits;
+            match device.write(effort) {
                 Ok(written) => {
                     frame.force_on_user_n_applied = written.force_on_user_n.into();
                     frame.motor_codes = written.motor_codes;
+                    frame.limits |= written.limits;
+                    frame.motor_heat = written.motor_heat;
                 }
                 Err(reason) => {
                     frame.force_on_user_n_applied = [0.0; 3];
                     fault = Some(reason);
                 }
             }
+            count_limits(&self.memory.counters, frame.limits);
         }
         if let Some(reason) = fault {
             self.fault(reason);
@@ -286,6 +332,9 @@ impl Cycle {
     fn count(&self, reply: ReplyKind) {
         let counters = &self.memory.counters;
         bump(&counters.ticks);
+        if self.lease.is_some() && !Inputs(self.frame.inputs).is_attended() {
+            bump(&counters.ticks_unattended);
+        }
         match reply {
             ReplyKind::NoLease => return,
             ReplyKind::Fresh => bump(&counters.replies_fresh),
@@ -296,6 +345,20 @@ impl Cycle {
             ReplyKind::Held | ReplyKind::Expired => return,
         }
         bump(&counters.ticks_commanded);
+    }
+}
+
+fn count_limits(counters: &Counters, limits: u64) {
+    let counted = [
+        (LIMIT_PEAK, &counters.forces_limited),
+        (LIMIT_WORKSPACE, &counters.forces_faded),
+        (LIMIT_SLEW, &counters.forces_slewed),
+        (LIMIT_HEAT, &counters.forces_derated),
+    ];
+    for (limit, counter) in counted {
+        if limits & limit != 0 {
+            bump(counter);
+        }
     }
 }
 

@@ -2,8 +2,8 @@
 //!
 //! Problem: individual devices differ by up to a fifth, wiring is not public, and a changed cable
 //! must not need a compiler.
-//! Model: `kind` says which tables the file has. A `premium` has `[linkage]`, `[encoders]` and
-//! `[motors]`; an `ideal` device has nothing. What a simulation needs beyond these gets a table
+//! Model: `kind` says which tables the file has. A `premium` has `[linkage]`, `[encoders]`,
+//! `[motors]` and, if gravity is to be compensated, `[bodies]`; an `ideal` device has nothing. What a simulation needs beyond these gets a table
 //! of its own.
 //! Units: each key carries its own.
 //! Invariants: a value of type [`DeviceFile`] has been checked: all numbers are finite and in
@@ -18,6 +18,8 @@ use thiserror::Error;
 use toml::Spanned;
 
 use crate::encoders::{EncoderSpec, JointMap};
+use crate::heat::HeatSpec;
+use crate::kinematics::gravity::{Bodies, Gravity};
 use crate::kinematics::{Ideal, Kinematics, Premium};
 use crate::motors::{MotorMap, MotorSpec};
 use crate::toml_report::{TomlReport, TomlText};
@@ -54,6 +56,14 @@ pub struct PremiumFile {
     pub encoders: EncoderSpec,
     /// From joint torques to converter codes.
     pub motors: MotorSpec,
+    /// What the motors stand.
+    pub heat: HeatSpec,
+    /// How fast a force may grow (N/s).
+    pub slew_n_per_s: f64,
+    /// The tip's speed that is a fault (m/s).
+    pub speed_limit_m_per_s: f64,
+    /// What moves; needed to compensate gravity.
+    pub bodies: Option<Bodies>,
 }
 
 /// A device without mechanism, counters and motors.
@@ -142,6 +152,11 @@ impl PremiumFile {
     /// From extended counts to joint angles, not yet zeroed.
     pub fn joint_map(&self) -> JointMap {
         JointMap::new(&self.encoders)
+    }
+
+    /// What holds the arm's own weight, if its bodies are described.
+    pub fn gravity(&self) -> Option<Gravity> {
+        self.bodies.as_ref().map(|bodies| Gravity::new(self.mechanism.link_lengths_m(), bodies))
     }
 
     /// From joint torques to converter codes.

@@ -4,18 +4,20 @@
 //! The order is: open the devices, set up the loop's thread and look at what was obtained, make the
 //! memory, listen, go. Whatever ends the process, the loop writes zero first.
 
-use crate::config::{DriverConfig, ReplyMode};
-use crate::cycle::{Cycle, Freshness};
+use crate::config::{DriverConfig, ReplyMode, SpinMargin};
+use crate::cycle::{Cycle, Freshness, Protection};
 use crate::device::Device;
 use crate::mail::{Letter, Sender, mail};
 use crate::meter::bump;
 use crate::open::{OpenError, open_devices};
-use crate::real_loop::{Ended, RealLoop, Shared};
+use crate::real_loop::{Ended, RealLoop, Shared, Waiting};
 use crate::safety::{Ramps, Safety};
 use crate::say;
+use rt_core::calibrate;
 use rt_core::epitaph::{EpitaphKind, EpitaphRef, install_fatal_handlers, install_panic_hook};
+use rt_core::histogram::Histogram;
 use rt_core::log::{LogLevel, LogLine, RtLogDrain};
-use rt_core::setup::{SetupGuards, SetupReport, SetupRequest};
+use rt_core::setup::{Guarantee, SetupGuards, SetupReport, SetupRequest};
 use rt_core::signals::StopSignals;
 use shm_abi::DriverMemory;
 use shm_abi::doorbell::WaitMode;
@@ -40,6 +42,8 @@ const STACK_BYTES: usize = 256 * 1024;
 /// What a run is to do besides its configuration.
 #[derive(Debug, Clone, Default)]
 pub struct RunOptions {
+    /// What to put between the driver and each of its devices, such as a recorder or a fault.
+    pub fit: Option<Fit>,
     /// Refuse to start when a real-time guarantee is missing.
     pub strict: bool,
     /// Say nothing but errors.
@@ -49,6 +53,9 @@ pub struct RunOptions {
     /// Listen here, whatever the configuration says.
     pub socket: Option<PathBuf>,
 }
+
+/// Puts something of one's own in the place of a device, usually around it.
+pub type Fit = fn(Box<dyn Device>) -> Box<dyn Device>;
 
 /// Why a driver did not run, or not to its end.
 #[derive(Debug, Error)]
@@ -109,10 +116,15 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
         )?;
     }
     let devices = open_devices(config)?;
+    let devices = match options.fit {
+        Some(fit) => devices.into_iter().map(fit).collect(),
+        None => devices,
+    };
     let shared = Shared::default();
-    let (report, starter) = spawn_loop(config, &shared)?;
+    let (report, spin_margin_ns, starter) = spawn_loop(config, &shared)?;
     tell_guarantees(&report, options)?;
     let wait_mode = choose_wait_mode(config, &report);
+    let waiting = Waiting { reply: wait_mode, spin_margin_ns };
     let info = DriverInfo { setup_report: report.to_string(), ..describe(config, &devices, wait_mode) };
     let memory = Arc::new(DriverMemory::create(&info)?);
     install_last_words(&memory)?;
@@ -122,7 +134,7 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
     let (sender, inbox) = mail();
     let (log, drain) = rt_core::log::channel(LOG_CAPACITY);
     let cycle = make_cycle(config, Arc::clone(&memory), devices);
-    let thread = starter.start(RealLoop::new(config, wait_mode, cycle, inbox, log, shared.clone(), &TICK));
+    let thread = starter.start(RealLoop::new(config, waiting, cycle, inbox, log, shared.clone(), &TICK));
     let mut service = Service { server, sender, drain, memory, signals, shared, options };
     let served = service.serve();
     service.finish(thread, served)
@@ -139,7 +151,12 @@ pub fn make_cycle(config: &DriverConfig, memory: Arc<DriverMemory>, devices: Vec
         ReplyMode::OnArrival | ReplyMode::FixedPhase => Freshness(0),
         ReplyMode::NextTick => Freshness(1),
     };
-    Cycle::new(memory, devices, safety, config.period_ns, freshness)
+    let protection = Protection {
+        safety,
+        switches: config.safety.switches,
+        workspace_margin_m: config.safety.workspace_margin_m,
+    };
+    Cycle::new(memory, devices, protection, config.period_ns, freshness)
 }
 
 /// What the header of the driver's segment says, but for the set-up report.
@@ -155,6 +172,7 @@ pub fn describe(config: &DriverConfig, devices: &[Box<dyn Device>], wait_mode: W
         ramp_out_ticks: config.safety.ramp_out_ticks,
         clock_mode: config.clock,
         wait_mode,
+        is_commissioning: config.safety.commissioning.is_some(),
         cpu: loop_cpu(config),
         devices: devices.iter().map(|device| device.info().clone()).collect(),
         setup_report: String::new(),
@@ -216,14 +234,17 @@ impl Starter {
 }
 
 /// Starts the thread and sets it up; what is obtained must be known before the memory is described.
-fn spawn_loop(config: &DriverConfig, shared: &Shared) -> Result<(SetupReport, Starter), RunError> {
+fn spawn_loop(config: &DriverConfig, shared: &Shared) -> Result<(SetupReport, u64, Starter), RunError> {
     let request = setup_request(config);
     let (send_report, receive_report) = mpsc::sync_channel(1);
     let (send, receive) = mpsc::sync_channel::<RealLoop>(1);
     let ended = Arc::clone(&shared.ended);
+    let margin =
+        if config.clock == ClockMode::Real { config.real_time.spin_margin } else { SpinMargin::Fixed(0) };
     let body = move || {
-        let (report, guards) = rt_core::setup::apply(&request);
-        let _ = send_report.send(report);
+        let (mut report, guards) = rt_core::setup::apply(&request);
+        let spin_margin_ns = settle_spin_margin(margin, &mut report);
+        let _ = send_report.send((report, spin_margin_ns));
         let end = run_when_told(&receive, guards);
         ended.store(true, Ordering::Release);
         end
@@ -232,9 +253,41 @@ fn spawn_loop(config: &DriverConfig, shared: &Shared) -> Result<(SetupReport, St
         .name("driver-loop".into())
         .spawn(body)
         .map_err(|source| RunError::System { what: "start the loop's thread", source })?;
-    let report = receive_report.recv().map_err(|_| RunError::Panicked("during its set-up".into()))?;
-    Ok((report, Starter { send, thread }))
+    let (report, spin_margin_ns) =
+        receive_report.recv().map_err(|_| RunError::Panicked("during its set-up".into()))?;
+    Ok((report, spin_margin_ns, Starter { send, thread }))
 }
+
+/// Measures on the thread that calls, which has to be set up as it will run.
+fn settle_spin_margin(margin: SpinMargin, report: &mut SetupReport) -> u64 {
+    match margin {
+        SpinMargin::Fixed(ns) => ns,
+        SpinMargin::Calibrated { at_most_ns } => {
+            let lateness = calibrate::sleep_lateness(CALIBRATION_SLEEPS);
+            let chosen = calibrate::spin_margin_ns(&lateness, at_most_ns);
+            report.guarantees.push(judge_spin_margin(&lateness, chosen));
+            chosen
+        }
+    }
+}
+
+fn judge_spin_margin(lateness: &Histogram, chosen_ns: u64) -> Guarantee {
+    let us = |ns: u64| ns as f64 / 1e3;
+    let wanted_ns = calibrate::wanted_margin_ns(lateness);
+    let p99 = lateness.percentile(0.99).unwrap_or(0);
+    let remedy = (wanted_ns > chosen_ns).then(|| {
+        "sleeps end later than spinning can make up for; `io-driver doctor` looks for the cause".to_owned()
+    });
+    Guarantee::circumstance(
+        "spin margin",
+        "what late sleeps need",
+        format!("{:.0} us; 99 of 100 sleeps end within {:.0} us", us(chosen_ns), us(p99)),
+        remedy,
+    )
+}
+
+/// Enough for a p99; some 200 ms.
+const CALIBRATION_SLEEPS: usize = 300;
 
 /// The guards are kept as long as the loop runs.
 fn run_when_told(receive: &mpsc::Receiver<RealLoop>, _guards: SetupGuards) -> Ended {
@@ -334,6 +387,10 @@ impl Service<'_> {
             }
             ServerEvent::LeaseRefused => bump(&self.memory.counters.leases_refused),
             ServerEvent::ClearFaultRequested => self.post(Letter::ClearFault),
+            ServerEvent::EmergencyStopRequested { pid } => {
+                say(self.options, format_args!("emergency stop, asked for by process {pid}"));
+                self.post(Letter::EmergencyStop);
+            }
             ServerEvent::Trouble { message } => say::say(format_args!("io-driver: {message}")),
             ServerEvent::StopRequested { pid } => return Some(format!("request of process {pid}")),
         }

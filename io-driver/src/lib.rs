@@ -6,9 +6,10 @@
 //! One tick is [`cycle::Cycle`]: read all devices, publish the frame, take the reply, limit, write. Who
 //! moves the clock is somebody else's: [`real_loop`] in the driver's own process, or an application that
 //! runs the driver on a virtual clock. Devices lie behind [`device::Device`], mechanisms behind
-//! [`kinematics::Mechanism`], the decision how much force is let through in [`safety`].
+//! [`kinematics::Mechanism`], the decision how much force is let through in [`safety`]. [`emulator`] is a
+//! program of its own: hardware for those who have none.
 
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 #![deny(missing_docs)]
 
 pub mod cli;
@@ -16,8 +17,11 @@ pub mod config;
 pub mod cycle;
 pub mod device;
 pub mod device_file;
+pub mod drive;
 pub mod driver;
+pub mod emulator;
 pub mod encoders;
+pub mod heat;
 pub mod kinematics;
 pub mod mail;
 pub mod meter;

@@ -5,7 +5,7 @@
 
 use crate::cycle::Cycle;
 use rtrb::{Consumer, Producer, RingBuffer};
-use shm_abi::CommanderView;
+use shm_abi::{CommanderView, FaultReason};
 
 /// More than can ever be on the way: the socket's thread posts a handful in its poll, the loop collects
 /// them every tick.
@@ -20,6 +20,8 @@ pub enum Letter {
     End(u64),
     /// Leave the fault state.
     ClearFault,
+    /// All motors off, now.
+    EmergencyStop,
 }
 
 /// The socket thread's end.
@@ -64,6 +66,10 @@ impl Inbox {
                 Letter::End(lease) => cycle.end_lease(lease),
                 Letter::ClearFault => {
                     cycle.clear_fault();
+                    None
+                }
+                Letter::EmergencyStop => {
+                    cycle.fault(FaultReason::EmergencyStop);
                     None
                 }
             };

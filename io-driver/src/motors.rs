@@ -27,10 +27,6 @@ pub struct MotorSpec {
     pub torque_constant_nm_per_a: f64,
     /// Current at full scale of the converter.
     pub peak_current_a: f64,
-    /// Current the motor stands for ever.
-    pub continuous_current_a: f64,
-    /// How slowly the winding warms.
-    pub winding_time_constant_s: f64,
     /// Width of the converter, 2 to 16.
     pub dac_bits: u32,
 }
@@ -72,14 +68,22 @@ impl MotorMap {
 
     /// Codes for joint torques in N m.
     pub fn command(&self, joint_torque: [f64; 3]) -> MotorCommand {
+        self.command_within(joint_torque, [f64::INFINITY; 3])
+    }
+
+    /// Codes for joint torques in N m, of which none takes more than the allowed current (A), to half a step.
+    pub fn command_within(&self, joint_torque: [f64; 3], allowed_a: [f64; 3]) -> MotorCommand {
         let steps = self.steps(joint_torque);
         // A sum is finite only if all are; overflow of huge ones ends in the same safe place.
         if !steps.iter().map(|s| s.abs()).sum::<f64>().is_finite() {
             return MotorCommand { codes: self.zero_codes(), scale: 0.0 };
         }
-        let largest = steps.iter().fold(0.0_f64, |max, s| max.max(s.abs()));
-        let range = f64::from(self.zero - 1);
-        let scale = if largest > range { range / largest } else { 1.0 };
+        let full = f64::from(self.zero - 1);
+        let scale = steps.iter().zip(allowed_a).fold(1.0_f64, |scale, (steps, allowed_a)| {
+            // `max` takes the number of the two: a range that is none allows nothing.
+            let range = full.min((allowed_a / self.step_a).max(0.0));
+            if steps.abs() <= range { scale } else { scale.min(range / steps.abs()) }
+        });
         MotorCommand { codes: steps.map(|s| self.code(scale * s)), scale }
     }
 
@@ -140,8 +144,6 @@ mod tests {
         reduction: [175.0 / 13.0, 11.3, 11.3],
         torque_constant_nm_per_a: 0.0234,
         peak_current_a: 5.5,
-        continuous_current_a: 1.24,
-        winding_time_constant_s: 12.0,
         dac_bits: 12,
     };
 
@@ -189,6 +191,18 @@ mod tests {
                 assert_eq!(map().command(torque), MotorCommand { codes: [2048; 3], scale: 0.0 });
             }
         }
+    }
+
+    #[test]
+    fn no_motor_takes_more_than_it_is_allowed_and_all_are_scaled_alike() {
+        let step = map().torque_per_step();
+        let torque = [1000.0 * step[0], 500.0 * step[1], 0.0];
+        let command = map().command_within(torque, [f64::INFINITY, 100.0 * 5.5 / 2048.0, 0.0]);
+        // The second motor has a fifth of what it wants, so the first gets a fifth too; signs as in the file.
+        assert_eq!(command.codes, [2248, 1948, 2048]);
+        assert!((command.scale - 0.2).abs() < 1e-15);
+        assert_eq!(map().command_within(torque, [f64::NAN; 3]).codes, [2048; 3]);
+        assert_eq!(map().command_within(torque, [-1.0; 3]).codes, [2048; 3]);
     }
 
     #[test]

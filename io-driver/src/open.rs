@@ -2,10 +2,13 @@
 
 use crate::config::{Backend, DeviceConfig, DriverConfig};
 use crate::device::Device;
+use crate::device::arm::Arm;
+use crate::device::emulated::{Channels, EmulatedDevice};
 use crate::device::encoder_trace::{EncoderReplay, EncoderTrace, TraceError};
 use crate::device::ideal::{Hand, IdealDevice};
 use crate::device::replay::ReplayDevice;
 use crate::device_file::{self, DeviceFile, DeviceFileError, PremiumFile};
+use crate::emulator::card::{Card, CardError};
 use crate::sim::script::{HandError, HandPlayer, HandScript};
 use shm_abi::segment::DeviceInfo;
 use std::io;
@@ -34,9 +37,45 @@ pub enum OpenError {
     /// The description is wrong.
     #[error(transparent)]
     Description(#[from] DeviceFileError),
+    /// The emulated card cannot be had.
+    #[error("device {device}: {source}")]
+    Card {
+        /// Whose.
+        device: String,
+        /// Why.
+        source: CardError,
+    },
+    /// More registers than a dying process can switch off.
+    #[error("device {device}: {source}")]
+    Registers {
+        /// Whose.
+        device: String,
+        /// How many there may be.
+        source: rt_core::last_act::NoRoom,
+    },
+    /// Gravity cannot be compensated without masses.
+    #[error(
+        "device {device}: `gravity_compensation` needs a table [bodies] in {file}, as in the built-in premium-1.5"
+    )]
+    NoBodies {
+        /// Whose.
+        device: String,
+        /// Which.
+        file: PathBuf,
+    },
+    /// An emulated card has four converters.
+    #[error("device {device}: {file} names motor channel {channel}; an emulated card has 0 to 3")]
+    NoConverter {
+        /// Whose.
+        device: String,
+        /// Which.
+        file: PathBuf,
+        /// The channel.
+        channel: u8,
+    },
     /// The description has no mechanism that encoders could move.
     #[error(
-        "device {device}: {file} describes an ideal device, which has no encoders; a replay needs a mechanism such as premium-1.5"
+        "device {device}: {file} describes an ideal device, which has no encoders; a replay or an emulated card needs a mechanism such as premium-1.5"
     )]
     NoMechanism {
         /// Whose.
@@ -61,10 +100,54 @@ fn open(device: &DeviceConfig, config: &DriverConfig) -> Result<Box<dyn Device>,
                 Some((file, finger)) => scripted(device, file, finger, config, *start_m)?,
                 None => Hand::Resting(*start_m),
             };
-            Ok(Box::new(IdealDevice::new(ideal_info(device), *base_in_world, hand)))
+            let info = commissioned(ideal_info(device), config);
+            Ok(Box::new(IdealDevice::new(info, *base_in_world, hand)))
         }
-        Backend::Replay { description, trace } => replay(device, description, trace),
+        Backend::Replay { description, trace } => {
+            let premium = mechanism(device, description)?;
+            let trace = EncoderTrace::parse(&read(device, trace)?, trace, premium.encoders.count_bits)?;
+            let info = commissioned(premium_info(device, &premium), config);
+            let arm = Arm::new(&premium, device.compensates_gravity);
+            Ok(Box::new(ReplayDevice::new(info, EncoderReplay::new(trace), arm)))
+        }
+        Backend::Emulated { description, card } => {
+            let premium = mechanism(device, description)?;
+            let info = commissioned(premium_info(device, &premium), config);
+            emulated(device, description, card, &premium, info)
+        }
     }
+}
+
+/// In commissioning every device is told to be weak and slow, which its guard then enforces.
+fn commissioned(info: DeviceInfo, config: &DriverConfig) -> DeviceInfo {
+    match config.safety.commissioning {
+        None => info,
+        Some(limits) => DeviceInfo {
+            peak_force_n: info.peak_force_n.min(limits.force_n),
+            continuous_force_n: info.continuous_force_n.min(limits.force_n),
+            speed_limit_m_per_s: info.speed_limit_m_per_s.min(limits.speed_m_per_s),
+            ..info
+        },
+    }
+}
+
+fn emulated(
+    device: &DeviceConfig,
+    description: &Path,
+    card: &Path,
+    premium: &PremiumFile,
+    info: DeviceInfo,
+) -> Result<Box<dyn Device>, OpenError> {
+    let name = || device.name.clone();
+    if let Some(channel) = premium.motors.channel.into_iter().find(|channel| *channel > 3) {
+        return Err(OpenError::NoConverter { device: name(), file: description.into(), channel });
+    }
+    let hold = Card::take(card).map_err(|source| OpenError::Card { device: name(), source })?;
+    let channels = Channels { encoders: premium.encoders.channel, motors: premium.motors.channel };
+    let arm = Arm::new(premium, device.compensates_gravity);
+    let device = EmulatedDevice::new(info, hold, arm, channels)
+        .map_err(|source| OpenError::Registers { device: name(), source })?;
+    Ok(Box::new(device))
 }
 
 /// The hand file may hold other fingers' columns: those of all devices that share it are known.
@@ -92,18 +175,15 @@ fn scripted(
     })
 }
 
-fn replay(device: &DeviceConfig, description: &Path, trace: &Path) -> Result<Box<dyn Device>, OpenError> {
-    let premium = match describe(device, description)? {
-        DeviceFile::Premium(premium) => premium,
-        DeviceFile::Ideal(_) => {
-            return Err(OpenError::NoMechanism { device: device.name.clone(), file: description.into() });
+fn mechanism(device: &DeviceConfig, description: &Path) -> Result<PremiumFile, OpenError> {
+    let name = || device.name.clone();
+    match describe(device, description)? {
+        DeviceFile::Premium(premium) if device.compensates_gravity && premium.bodies.is_none() => {
+            Err(OpenError::NoBodies { device: name(), file: description.into() })
         }
-    };
-    let trace = EncoderTrace::parse(&read(device, trace)?, trace, premium.encoders.count_bits)?;
-    let info = premium_info(device, &premium);
-    let kinematics = crate::kinematics::Kinematics::Premium(premium.mechanism);
-    let replay = EncoderReplay::new(trace);
-    Ok(Box::new(ReplayDevice::new(info, replay, kinematics, &premium.encoders, &premium.motors)))
+        DeviceFile::Premium(premium) => Ok(*premium),
+        DeviceFile::Ideal(_) => Err(OpenError::NoMechanism { device: name(), file: description.into() }),
+    }
 }
 
 fn describe(device: &DeviceConfig, description: &Path) -> Result<DeviceFile, OpenError> {
@@ -131,6 +211,8 @@ fn ideal_info(device: &DeviceConfig) -> DeviceInfo {
         continuous_force_n: peak_force_n,
         workspace_min_m: [f64::NEG_INFINITY; 3],
         workspace_max_m: [f64::INFINITY; 3],
+        slew_n_per_s: f64::INFINITY,
+        speed_limit_m_per_s: f64::INFINITY,
     }
 }
 
@@ -147,5 +229,7 @@ fn premium_info(device: &DeviceConfig, premium: &PremiumFile) -> DeviceInfo {
         continuous_force_n: premium.continuous_force_n,
         workspace_min_m: corner(-1.0),
         workspace_max_m: corner(1.0),
+        slew_n_per_s: premium.slew_n_per_s,
+        speed_limit_m_per_s: premium.speed_limit_m_per_s,
     }
 }

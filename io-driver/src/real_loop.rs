@@ -10,7 +10,7 @@
 //! Invariant: whatever ends the loop (a request, a panic), the motors are written zero before anything else.
 //! Cost: in spin mode the timed wait is the only system call, while replies come.
 
-use crate::config::{DriverConfig, ReplyMode};
+use crate::config::{DriverConfig, OverrunPolicy, ReplyMode};
 use crate::cycle::Cycle;
 use crate::mail::Inbox;
 use crate::meter::{add, record};
@@ -44,6 +44,15 @@ pub struct Shared {
     pub ended: Arc<AtomicBool>,
 }
 
+/// How the loop waits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Waiting {
+    /// For replies.
+    pub reply: WaitMode,
+    /// How long before a deadline it stops sleeping (ns).
+    pub spin_margin_ns: u64,
+}
+
 /// How the loop ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ended {
@@ -65,6 +74,10 @@ pub struct RealLoop {
     wait_mode: WaitMode,
     mode: ReplyMode,
     budget_ns: u64,
+    period_ns: u64,
+    overrun: OverrunPolicy,
+    /// When the current tick was due.
+    deadline_ns: u64,
     /// Ticks on end that a commander which had begun left unanswered, and how many of them are enough.
     unanswered_ticks: u64,
     patience_ticks: u64,
@@ -79,7 +92,7 @@ pub struct RealLoop {
 struct Begin {
     tick: u64,
     deadline_ns: u64,
-    /// When a reply is too late.
+    /// When a reply is too late; for a tick that is made up for, at once.
     reply_until_ns: u64,
 }
 
@@ -87,7 +100,7 @@ impl RealLoop {
     /// A loop that has not begun.
     pub fn new(
         config: &DriverConfig,
-        wait_mode: WaitMode,
+        waiting: Waiting,
         cycle: Cycle,
         inbox: Inbox,
         log: RtLog,
@@ -97,8 +110,12 @@ impl RealLoop {
         let periodic = Periodic::new(PeriodicConfig {
             period_ns: config.period_ns,
             phase_offset_ns: config.real_time.phase_offset_ns,
-            spin_margin_ns: config.real_time.spin_margin_ns,
+            spin_margin_ns: waiting.spin_margin_ns,
         });
+        let periodic = match config.real_time.overrun {
+            OverrunPolicy::CatchUp(ticks) => periodic.catching_up(ticks),
+            OverrunPolicy::Skip | OverrunPolicy::Fault(_) => periodic,
+        };
         Self {
             cycle,
             inbox,
@@ -106,9 +123,12 @@ impl RealLoop {
             shared,
             tick,
             clock: config.clock,
-            wait_mode,
+            wait_mode: waiting.reply,
             mode: config.reply.mode,
             budget_ns: config.reply.budget_ns,
+            period_ns: config.period_ns,
+            overrun: config.real_time.overrun,
+            deadline_ns: 0,
             unanswered_ticks: 0,
             patience_ticks: PATIENCE_NS.div_ceil(config.period_ns),
             retreat_until_ns: 0,
@@ -165,7 +185,12 @@ impl RealLoop {
         let memory = self.cycle.memory();
         record(&memory.wake_error_ns, wake.latency_ns());
         add(&memory.counters.overruns, wake.skipped);
-        let reply_until_ns = wake.deadline_ns + self.budget_ns;
+        if matches!(self.overrun, OverrunPolicy::Fault(most) if wake.skipped > most) {
+            self.cycle.fault(FaultReason::Overrun);
+        }
+        self.deadline_ns = wake.deadline_ns;
+        let is_made_up_for = wake.latency_ns() >= self.period_ns;
+        let reply_until_ns = wake.deadline_ns + if is_made_up_for { 0 } else { self.budget_ns };
         Some(Begin { tick: wake.tick, deadline_ns: wake.deadline_ns, reply_until_ns })
     }
 
@@ -210,8 +235,10 @@ impl RealLoop {
         self.unanswered_ticks = 0;
     }
 
+    /// A tick that is made up for is over before anybody could answer it, and says nothing.
     fn note_unanswered(&mut self, has_begun: bool, now: u64) {
-        self.unanswered_ticks += u64::from(has_begun);
+        let had_time = now.saturating_sub(self.deadline_ns) < self.period_ns;
+        self.unanswered_ticks += u64::from(has_begun && had_time);
         if self.unanswered_ticks >= self.patience_ticks {
             self.retreat_until_ns = now + RETREAT_NS;
         }

@@ -1,8 +1,9 @@
 //! The driver's tick, without a clock: a commander in the same process answers, is late, lies or leaves.
 
 use bytemuck::Zeroable;
-use io_driver::cycle::{Cycle, Freshness};
-use io_driver::device::{Device, Reading, TickTime, Written};
+use io_driver::cycle::{Cycle, Freshness, Protection};
+use io_driver::device::{Device, Effort, Reading, TickTime, Written};
+use io_driver::safety::switches::Switches;
 use io_driver::safety::{Ramps, Safety};
 use nalgebra::Vector3;
 use shm_abi::doorbell::WaitMode;
@@ -43,13 +44,14 @@ impl Device for TestDevice {
         planned.unwrap_or(Ok(Reading::at(Vector3::new(0.1, 0.2, 0.3))))
     }
 
-    fn write(&mut self, force_on_user_n: Vector3<f64>) -> Result<Written, FaultReason> {
+    fn write(&mut self, effort: Effort) -> Result<Written, FaultReason> {
+        let force_on_user_n = effort.force_on_user_n;
         let mut log = self.log.lock().unwrap();
         log.forces.push(force_on_user_n);
         if log.fail_write {
             Err(FaultReason::DeviceWrite)
         } else {
-            Ok(Written { force_on_user_n, motor_codes: [0; 3] })
+            Ok(Written { force_on_user_n, ..Written::default() })
         }
     }
 
@@ -74,6 +76,8 @@ impl Bench {
             continuous_force_n: PEAK_N,
             workspace_min_m: [-1.0; 3],
             workspace_max_m: [1.0; 3],
+            slew_n_per_s: f64::INFINITY,
+            speed_limit_m_per_s: f64::INFINITY,
         };
         let memory = DriverMemory::create(&DriverInfo {
             period_ns: PERIOD_NS,
@@ -83,6 +87,7 @@ impl Bench {
             ramp_out_ticks: RAMPS.out_ticks,
             clock_mode: ClockMode::Virtual,
             wait_mode: WaitMode::Spin,
+            is_commissioning: false,
             cpu: None,
             devices: vec![info.clone()],
             setup_report: String::new(),
@@ -91,9 +96,13 @@ impl Bench {
         let view = DriverView::map(memory.fd()).unwrap();
         let log = Arc::new(Mutex::new(Log::default()));
         let device = TestDevice { info, log: Arc::clone(&log) };
-        let safety = Safety::new(RAMPS);
+        let protection = Protection {
+            safety: Safety::new(RAMPS),
+            switches: Switches::default(),
+            workspace_margin_m: 0.02,
+        };
         let cycle =
-            Cycle::new(Arc::new(memory), vec![Box::new(device)], safety, PERIOD_NS, Freshness(freshness));
+            Cycle::new(Arc::new(memory), vec![Box::new(device)], protection, PERIOD_NS, Freshness(freshness));
         Self { cycle, view, log, tick: 0 }
     }
 

@@ -1,7 +1,7 @@
 //! The committed example: a Premium 1.5 that repeats a recorded trace.
 
 use io_driver::config::DriverConfig;
-use io_driver::device::TickTime;
+use io_driver::device::{Effort, TickTime};
 use io_driver::open::open_devices;
 use nalgebra::Vector3;
 use std::path::Path;
@@ -40,12 +40,12 @@ fn what_is_said_to_be_rendered_is_the_force_to_the_converters_resolution() {
     let mut device = open();
     device.read(time(0)).expect("a reading");
     let wanted = Vector3::new(1.0, -0.5, 0.25);
-    let written = device.write(wanted).expect("written");
+    let written = device.write(Effort { force_on_user_n: wanted, gravity_share: 0.0 }).expect("written");
     assert_ne!(written.motor_codes, [2048; 3]);
     // Half a step of 5.5 A / 2048 through 23.4 mN m/A and a reduction of at most 13.5 over the 0.17 m link
     // is 2.5 mN an axis; three axes, and the lever arms are not all equal.
     assert!((written.force_on_user_n - wanted).norm() < 8e-3, "{written:?}");
     assert_ne!(written.force_on_user_n, wanted, "it is the rounded one");
-    let zero = device.write(Vector3::zeros()).expect("written");
+    let zero = device.write(Effort::default()).expect("written");
     assert_eq!((zero.force_on_user_n, zero.motor_codes), (Vector3::zeros(), [2048; 3]));
 }

@@ -26,7 +26,7 @@ mod panic_hook;
 #[cfg(test)]
 mod death_tests;
 
-pub use crate::sys::fatal::{install_fatal_handlers, install_fatal_handlers_with};
+pub use crate::sys::fatal::install_fatal_handlers;
 pub use panic_hook::install_panic_hook;
 
 pub(crate) use fixed_text::FixedText;

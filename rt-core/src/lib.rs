@@ -10,7 +10,7 @@
 //! | [`cpu`]: which CPUs there are | [`histogram`]: latencies without allocation | [`epitaph`]: a dying process says why |
 //! | [`process`]: die with the parent | [`log`]: messages formatted by another thread | [`usage`]: faults and switches it suffered |
 //!
-//! [`clock`] is under all of them, and [`alloc_guard`] lets a test show that a loop does not allocate.
+//! [`calibrate`] measures how long a loop has to spin. [`last_act`] is what a dying process still stores to the hardware. [`clock`] is under all of them, and [`alloc_guard`] lets a test show that a loop does not allocate.
 //!
 //! Invariants: what a module marks as fit for the loop neither allocates nor locks nor opens a file
 //! nor panics; `unsafe` code lives in the private module `sys` alone; nothing is assumed from a
@@ -19,10 +19,12 @@
 #![deny(unsafe_code)]
 
 pub mod alloc_guard;
+pub mod calibrate;
 pub mod clock;
 pub mod cpu;
 pub mod epitaph;
 pub mod histogram;
+pub mod last_act;
 pub mod log;
 pub mod periodic;
 pub mod process;

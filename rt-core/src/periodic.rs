@@ -5,8 +5,8 @@
 //! Model: sleep until `spin_margin` before the deadline, then spin to it. What the deadlines are is
 //! [`Schedule`]'s business. The phase moves the deadlines off the kernel's own timer tick, which
 //! fires on whole milliseconds.
-//! Invariants: a completed wait is never early and less than one period late: what it missed before
-//! that is in `skipped`. The tick number stays tied to absolute time. A signal ends the sleep.
+//! Invariants: a completed wait is never early and less than one period late, save in a loop that catches
+//! up: what it missed before that is in `skipped`. The tick number stays tied to absolute time. A signal ends the sleep.
 //! Cost: one system call a tick, none when the deadline is within the margin; no allocation.
 
 use crate::clock::{monotonic_ns, sleep_until_ns};
@@ -66,7 +66,8 @@ pub struct Wake {
 }
 
 impl Wake {
-    /// How long after the deadline the wait ended; below one period, 0 after an interrupted wait.
+    /// How long after the deadline the wait ended; below one period unless the loop catches up, 0 after an
+    /// interrupted wait.
     #[must_use]
     pub fn latency_ns(&self) -> u64 {
         self.woke_ns.saturating_sub(self.deadline_ns)
@@ -82,6 +83,13 @@ impl Periodic {
     pub fn new(config: PeriodicConfig) -> Self {
         let schedule = Schedule::new(config.period_ns, config.phase_offset_ns);
         Self { schedule, spin_margin_ns: config.spin_margin_ns, started: false }
+    }
+
+    /// The same, but of deadlines that have passed at most the last `ticks` are served all the same, at once
+    /// and one after another; their lateness then is a period or more.
+    #[must_use]
+    pub fn catching_up(self, ticks: u64) -> Self {
+        Self { schedule: self.schedule.catching_up(ticks), ..self }
     }
 
     /// Begins (again) with tick 1 at the first grid point after `now` on the monotonic clock.

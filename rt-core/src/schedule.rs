@@ -4,9 +4,10 @@
 //! burst of late ticks after a stall, and both lose the tie between tick number and time.
 //! Model: deadlines are the points `n * period + phase` of the clock. Tick numbers count them from
 //! [`Schedule::start`]: tick 1 is due at the first grid point after it. Points that pass by a full
-//! period or more are skipped and counted, never caught up.
+//! period or more are skipped and counted; a schedule may be told to catch up with the last few of
+//! them instead, which then are handed out late.
 //! Invariants: every deadline lies on the grid; `deadline = first deadline + (tick - 1) * period`;
-//! a deadline handed out lies less than a period in the past.
+//! a deadline handed out lies less than a period in the past, and `catch_up` periods more.
 //! Cost: one division. Fit for the loop.
 
 /// Absolute deadlines on a fixed grid.
@@ -16,6 +17,7 @@ pub struct Schedule {
     phase_ns: u64,
     next_deadline_ns: u64,
     tick: u64,
+    catch_up: u64,
 }
 
 /// A deadline that has been reached.
@@ -38,9 +40,15 @@ impl Schedule {
     pub fn new(period_ns: u64, phase_offset_ns: u64) -> Self {
         assert!(period_ns > 0, "a periodic loop needs a period above zero");
         let phase_ns = phase_offset_ns % period_ns;
-        let mut schedule = Self { period_ns, phase_ns, next_deadline_ns: 0, tick: 0 };
+        let mut schedule = Self { period_ns, phase_ns, next_deadline_ns: 0, tick: 0, catch_up: 0 };
         schedule.start(0);
         schedule
+    }
+
+    /// The same, but of deadlines that have passed at most the last `ticks` are handed out all the same.
+    #[must_use]
+    pub fn catching_up(self, ticks: u64) -> Self {
+        Self { catch_up: ticks, ..self }
     }
 
     /// Begins (again) with tick 1 at the first grid point after `now`.
@@ -69,7 +77,8 @@ impl Schedule {
     /// Called before the deadline is reached it hands out that deadline all the same: whether to
     /// wait is the caller's business.
     pub fn advance(&mut self, now: u64) -> Due {
-        let skipped = now.saturating_sub(self.next_deadline_ns) / self.period_ns;
+        let passed = now.saturating_sub(self.next_deadline_ns) / self.period_ns;
+        let skipped = passed.saturating_sub(self.catch_up);
         let deadline_ns = self.next_deadline_ns + skipped * self.period_ns;
         self.next_deadline_ns = deadline_ns + self.period_ns;
         self.tick += 1 + skipped;
@@ -85,6 +94,19 @@ mod tests {
     /// A second at most; the largest clock value leaves room for every step below.
     const PERIODS: std::ops::Range<u64> = 1..1_000_000_000;
     const TIMES: std::ops::Range<u64> = 0..1 << 60;
+
+    #[test]
+    fn a_schedule_that_catches_up_hands_out_the_last_few_and_skips_the_rest() {
+        let mut schedule = Schedule::new(10, 0).catching_up(3);
+        schedule.start(0);
+        assert_eq!(schedule.advance(10), Due { tick: 1, deadline_ns: 10, skipped: 0 });
+        // At 75 the deadlines 20 to 70 are due: six, of which the last is not late by a period.
+        assert_eq!(schedule.advance(75), Due { tick: 4, deadline_ns: 40, skipped: 2 });
+        for tick in 5..=7 {
+            assert_eq!(schedule.advance(76), Due { tick, deadline_ns: 10 * tick, skipped: 0 });
+        }
+        assert_eq!(schedule.next_deadline_ns(), 80, "and it is on time again");
+    }
 
     #[test]
     fn the_first_deadline_is_the_next_grid_point_strictly_ahead() {

@@ -28,7 +28,7 @@
 #define PHANTOM_ABI_MAJOR 1
 
 // Raised when something is added that an old reader may ignore.
-#define PHANTOM_ABI_MINOR 0
+#define PHANTOM_ABI_MINOR 1
 
 // Both, the major in the upper half.
 #define PHANTOM_ABI_VERSION (((uint64_t)PHANTOM_ABI_MAJOR << 32) | (uint64_t)PHANTOM_ABI_MINOR)
@@ -63,8 +63,35 @@
 // The same in words.
 #define PHANTOM_NAME_WORDS 8
 
+// [`DriverHeader::flags`]: forces and speeds are cut to those of commissioning.
+#define PhantomDRIVER_COMMISSIONING 1
+
 // [`DeviceFrame::flags`]: the position is valid.
 #define PHANTOM_DEVICE_POSITION_VALID 1
+
+// [`Frame::inputs`]: an emergency stop is pressed.
+#define PhantomINPUT_EMERGENCY_STOP 1
+
+// [`Frame::inputs`]: there is a dead-man's switch.
+#define PhantomINPUT_DEAD_MAN_PRESENT 2
+
+// [`Frame::inputs`]: and somebody holds it.
+#define PhantomINPUT_DEAD_MAN_HELD 4
+
+// [`DeviceFrame::limits`]: the force was not finite or beyond the device's peak.
+#define PhantomLIMIT_PEAK 1
+
+// [`DeviceFrame::limits`]: the tip was outside the workspace.
+#define PhantomLIMIT_WORKSPACE 2
+
+// [`DeviceFrame::limits`]: the force grew faster than it may.
+#define PhantomLIMIT_SLEW 4
+
+// [`DeviceFrame::limits`]: a motor was warm.
+#define PhantomLIMIT_HEAT 8
+
+// [`DeviceFrame::limits`]: a motor was asked for more than its converter or amplifier gives.
+#define PhantomLIMIT_SATURATION 16
 
 // The driver's state machine.
 enum PhantomDriverState
@@ -109,6 +136,16 @@ enum PhantomFaultReason
   PHANTOM_FAULT_REASON_MOTOR_NOT_FINITE = 4,
   // The loop panicked.
   PHANTOM_FAULT_REASON_PANIC = 5,
+  // Since 1.1. A device moved faster than it may.
+  PHANTOM_FAULT_REASON_OVERSPEED = 6,
+  // Since 1.1. A position jumped farther in a tick than anything can move.
+  PHANTOM_FAULT_REASON_POSITION_JUMP = 7,
+  // Since 1.1. An emergency stop was pressed, or asked for over the socket.
+  PHANTOM_FAULT_REASON_EMERGENCY_STOP = 8,
+  // Since 1.1. An amplifier switched itself off: its watchdog was not served, or it refused a value.
+  PHANTOM_FAULT_REASON_AMPLIFIER_TRIPPED = 9,
+  // Since 1.1. More deadlines in a row were missed than the configuration allows.
+  PHANTOM_FAULT_REASON_OVERRUN = 10,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -155,6 +192,8 @@ enum PhantomRequestKind
   PHANTOM_REQUEST_KIND_STOP = 3,
   // That the driver leaves its fault state.
   PHANTOM_REQUEST_KIND_CLEAR_FAULT = 4,
+  // Since 1.1. That all motors are switched off at once and stay so until the fault is cleared.
+  PHANTOM_REQUEST_KIND_EMERGENCY_STOP = 5,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -265,8 +304,8 @@ typedef struct PHANTOM_ALIGNED(64) PhantomDriverHeader {
   uint64_t wait_mode;
   // CPU of the driver's loop plus one; 0: any.
   uint64_t cpu_plus_one;
-  // Room for later minor versions; zero.
-  uint64_t reserved;
+  // Since 1.1. Bit 0: commissioning, with little force; see [`DRIVER_COMMISSIONING`].
+  uint64_t flags;
   // 1 once everything above stands; written last.
   uint64_t ready;
 } PhantomDriverHeader;
@@ -311,8 +350,14 @@ typedef struct PHANTOM_ALIGNED(64) PhantomCounters {
   uint64_t faults;
   // Log records dropped.
   uint64_t log_dropped;
-  // Room for later minor versions; zero.
-  uint64_t reserved[4];
+  // Since 1.1. Forces that grew slower than commanded.
+  uint64_t forces_slewed;
+  // Since 1.1. Forces cut because motors were warm.
+  uint64_t forces_derated;
+  // Since 1.1. Forces cut outside the workspace.
+  uint64_t forces_faded;
+  // Since 1.1. Ticks without force because the dead-man's switch was not held.
+  uint64_t ticks_unattended;
 } PhantomCounters;
 
 // What a device is.
@@ -329,8 +374,12 @@ typedef struct PHANTOM_ALIGNED(64) PhantomDeviceDescription {
   uint64_t workspace_min_m[3];
   // Bits of f64s: its largest corner (m).
   uint64_t workspace_max_m[3];
+  // Since 1.1. Bits of an f64: how fast a force may grow (N/s); infinite: no limit, 0: the driver is 1.0.
+  uint64_t slew_n_per_s;
+  // Since 1.1. Bits of an f64: the tip's speed that is a fault (m/s); infinite: none, 0: the driver is 1.0.
+  uint64_t speed_limit_m_per_s;
   // Room for later minor versions; zero.
-  uint64_t reserved[6];
+  uint64_t reserved[4];
 } PhantomDeviceDescription;
 
 // A histogram of nanoseconds with one writer.
@@ -450,8 +499,14 @@ typedef struct PhantomDeviceFrame {
   double force_on_user_n_applied[3];
   // The motor values written in the tick before, as the hardware got them.
   int64_t motor_codes[3];
+  // Since 1.1. How fast the tip moves, in D (m/s), estimated from the positions.
+  double velocity_m_per_s_estimated[3];
+  // Since 1.1. Bits of `LIMIT_...`: what came between commanded and applied force in the tick before.
+  uint64_t limits;
+  // Since 1.1. Warmth of the warmest motor: 1 is what its continuous current would reach.
+  double motor_heat;
   // Room for later minor versions; zero.
-  uint64_t reserved[10];
+  uint64_t reserved[5];
 } PhantomDeviceFrame;
 
 // One tick of the driver, all devices.
@@ -476,8 +531,8 @@ typedef struct PhantomFrame {
   uint64_t device_count;
   // What became of the tick before this one.
   struct PhantomOutcome previous;
-  // Room for later minor versions; zero.
-  uint64_t reserved;
+  // Since 1.1. Bits of `INPUT_...`: what the switches say that guard the motors.
+  uint64_t inputs;
   // The devices; those beyond `device_count` are zero.
   struct PhantomDeviceFrame devices[PHANTOM_MAX_DEVICES];
 } PhantomFrame;
@@ -586,7 +641,7 @@ PHANTOM_ASSERT(offsetof(PhantomDriverHeader, device_count) == 80);
 PHANTOM_ASSERT(offsetof(PhantomDriverHeader, clock_mode) == 88);
 PHANTOM_ASSERT(offsetof(PhantomDriverHeader, wait_mode) == 96);
 PHANTOM_ASSERT(offsetof(PhantomDriverHeader, cpu_plus_one) == 104);
-PHANTOM_ASSERT(offsetof(PhantomDriverHeader, reserved) == 112);
+PHANTOM_ASSERT(offsetof(PhantomDriverHeader, flags) == 112);
 PHANTOM_ASSERT(offsetof(PhantomDriverHeader, ready) == 120);
 
 PHANTOM_ASSERT(sizeof(PhantomBell) == 64);
@@ -611,7 +666,10 @@ PHANTOM_ASSERT(offsetof(PhantomCounters, leases_granted) == 64);
 PHANTOM_ASSERT(offsetof(PhantomCounters, leases_refused) == 72);
 PHANTOM_ASSERT(offsetof(PhantomCounters, faults) == 80);
 PHANTOM_ASSERT(offsetof(PhantomCounters, log_dropped) == 88);
-PHANTOM_ASSERT(offsetof(PhantomCounters, reserved) == 96);
+PHANTOM_ASSERT(offsetof(PhantomCounters, forces_slewed) == 96);
+PHANTOM_ASSERT(offsetof(PhantomCounters, forces_derated) == 104);
+PHANTOM_ASSERT(offsetof(PhantomCounters, forces_faded) == 112);
+PHANTOM_ASSERT(offsetof(PhantomCounters, ticks_unattended) == 120);
 
 PHANTOM_ASSERT(sizeof(PhantomDeviceDescription) == 192);
 PHANTOM_ASSERT(PHANTOM_ALIGNOF(PhantomDeviceDescription) == 64);
@@ -621,7 +679,9 @@ PHANTOM_ASSERT(offsetof(PhantomDeviceDescription, peak_force_n) == 80);
 PHANTOM_ASSERT(offsetof(PhantomDeviceDescription, continuous_force_n) == 88);
 PHANTOM_ASSERT(offsetof(PhantomDeviceDescription, workspace_min_m) == 96);
 PHANTOM_ASSERT(offsetof(PhantomDeviceDescription, workspace_max_m) == 120);
-PHANTOM_ASSERT(offsetof(PhantomDeviceDescription, reserved) == 144);
+PHANTOM_ASSERT(offsetof(PhantomDeviceDescription, slew_n_per_s) == 144);
+PHANTOM_ASSERT(offsetof(PhantomDeviceDescription, speed_limit_m_per_s) == 152);
+PHANTOM_ASSERT(offsetof(PhantomDeviceDescription, reserved) == 160);
 
 PHANTOM_ASSERT(sizeof(PhantomHistogramBlock) == 8256);
 PHANTOM_ASSERT(PHANTOM_ALIGNOF(PhantomHistogramBlock) == 64);
@@ -668,7 +728,7 @@ PHANTOM_ASSERT(offsetof(PhantomFrame, authority) == 48);
 PHANTOM_ASSERT(offsetof(PhantomFrame, run_tick) == 56);
 PHANTOM_ASSERT(offsetof(PhantomFrame, device_count) == 64);
 PHANTOM_ASSERT(offsetof(PhantomFrame, previous) == 72);
-PHANTOM_ASSERT(offsetof(PhantomFrame, reserved) == 112);
+PHANTOM_ASSERT(offsetof(PhantomFrame, inputs) == 112);
 PHANTOM_ASSERT(offsetof(PhantomFrame, devices) == 120);
 
 PHANTOM_ASSERT(sizeof(PhantomOutcome) == 40);
@@ -688,7 +748,10 @@ PHANTOM_ASSERT(offsetof(PhantomDeviceFrame, orientation_wxyz_measured) == 136);
 PHANTOM_ASSERT(offsetof(PhantomDeviceFrame, force_on_user_n_commanded) == 168);
 PHANTOM_ASSERT(offsetof(PhantomDeviceFrame, force_on_user_n_applied) == 192);
 PHANTOM_ASSERT(offsetof(PhantomDeviceFrame, motor_codes) == 216);
-PHANTOM_ASSERT(offsetof(PhantomDeviceFrame, reserved) == 240);
+PHANTOM_ASSERT(offsetof(PhantomDeviceFrame, velocity_m_per_s_estimated) == 240);
+PHANTOM_ASSERT(offsetof(PhantomDeviceFrame, limits) == 264);
+PHANTOM_ASSERT(offsetof(PhantomDeviceFrame, motor_heat) == 272);
+PHANTOM_ASSERT(offsetof(PhantomDeviceFrame, reserved) == 280);
 
 PHANTOM_ASSERT(sizeof(PhantomCommand) == 288);
 PHANTOM_ASSERT(offsetof(PhantomCommand, tick) == 0);

@@ -166,6 +166,11 @@ pub fn clear_fault(socket: &Path, name: &str) -> Result<(), AttachError> {
     exchange(socket, &Request::new(RequestKind::ClearFault, name)).map(|_| ())
 }
 
+/// Asks the driver to switch all motors off at once. They stay off until [`clear_fault`].
+pub fn emergency_stop(socket: &Path, name: &str) -> Result<(), AttachError> {
+    exchange(socket, &Request::new(RequestKind::EmergencyStop, name)).map(|_| ())
+}
+
 /// Attaches with a request of any content; what [`observe`] and [`command`] do, and tests that lie.
 pub fn attach(socket: &Path, request: &Request) -> Result<Attachment, AttachError> {
     let (answer, fds, connection) = exchange(socket, request)?;

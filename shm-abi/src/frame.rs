@@ -30,8 +30,8 @@ pub struct Frame {
     pub device_count: u64,
     /// What became of the tick before this one.
     pub previous: Outcome,
-    /// Room for later minor versions; zero.
-    pub reserved: u64,
+    /// Since 1.1. Bits of `INPUT_...`: what the switches say that guard the motors.
+    pub inputs: u64,
     /// The devices; those beyond `device_count` are zero.
     pub devices: [DeviceFrame; MAX_DEVICES],
 }
@@ -47,7 +47,7 @@ assert_layout!(Frame: 2680, 8 {
     run_tick: i64 = 56,
     device_count: u64 = 64,
     previous: Outcome = 72,
-    reserved: u64 = 112,
+    reserved: u64 = 112 => { inputs: u64 = 112, },
     devices: [DeviceFrame; MAX_DEVICES] = 120,
 });
 
@@ -97,8 +97,14 @@ pub struct DeviceFrame {
     pub force_on_user_n_applied: [f64; 3],
     /// The motor values written in the tick before, as the hardware got them.
     pub motor_codes: [i64; 3],
+    /// Since 1.1. How fast the tip moves, in D (m/s), estimated from the positions.
+    pub velocity_m_per_s_estimated: [f64; 3],
+    /// Since 1.1. Bits of `LIMIT_...`: what came between commanded and applied force in the tick before.
+    pub limits: u64,
+    /// Since 1.1. Warmth of the warmest motor: 1 is what its continuous current would reach.
+    pub motor_heat: f64,
     /// Room for later minor versions; zero.
-    pub reserved: [u64; 10],
+    pub reserved: [u64; 5],
 }
 
 assert_layout!(DeviceFrame: 320, 8 {
@@ -111,11 +117,34 @@ assert_layout!(DeviceFrame: 320, 8 {
     force_on_user_n_commanded: [f64; 3] = 168,
     force_on_user_n_applied: [f64; 3] = 192,
     motor_codes: [i64; 3] = 216,
-    reserved: [u64; 10] = 240,
+    reserved: [u64; 10] = 240 => {
+        velocity_m_per_s_estimated: [f64; 3] = 240,
+        limits: u64 = 264,
+        motor_heat: f64 = 272,
+        reserved: [u64; 5] = 280,
+    },
 });
 
 /// [`DeviceFrame::flags`]: the position is valid.
 pub const DEVICE_POSITION_VALID: u64 = 1;
+
+/// [`Frame::inputs`]: an emergency stop is pressed.
+pub const INPUT_EMERGENCY_STOP: u64 = 1;
+/// [`Frame::inputs`]: there is a dead-man's switch.
+pub const INPUT_DEAD_MAN_PRESENT: u64 = 2;
+/// [`Frame::inputs`]: and somebody holds it.
+pub const INPUT_DEAD_MAN_HELD: u64 = 4;
+
+/// [`DeviceFrame::limits`]: the force was not finite or beyond the device's peak.
+pub const LIMIT_PEAK: u64 = 1;
+/// [`DeviceFrame::limits`]: the tip was outside the workspace.
+pub const LIMIT_WORKSPACE: u64 = 2;
+/// [`DeviceFrame::limits`]: the force grew faster than it may.
+pub const LIMIT_SLEW: u64 = 4;
+/// [`DeviceFrame::limits`]: a motor was warm.
+pub const LIMIT_HEAT: u64 = 8;
+/// [`DeviceFrame::limits`]: a motor was asked for more than its converter or amplifier gives.
+pub const LIMIT_SATURATION: u64 = 16;
 
 /// The driver's state machine.
 #[repr(u64)]
@@ -169,21 +198,38 @@ pub enum FaultReason {
     MotorNotFinite = 4,
     /// The loop panicked.
     Panic = 5,
+    /// Since 1.1. A device moved faster than it may.
+    Overspeed = 6,
+    /// Since 1.1. A position jumped farther in a tick than anything can move.
+    PositionJump = 7,
+    /// Since 1.1. An emergency stop was pressed, or asked for over the socket.
+    EmergencyStop = 8,
+    /// Since 1.1. An amplifier switched itself off: its watchdog was not served, or it refused a value.
+    AmplifierTripped = 9,
+    /// Since 1.1. More deadlines in a row were missed than the configuration allows.
+    Overrun = 10,
+}
+
+impl FaultReason {
+    const ALL: [Self; 11] = [
+        Self::None,
+        Self::DeviceRead,
+        Self::DeviceWrite,
+        Self::PositionNotFinite,
+        Self::MotorNotFinite,
+        Self::Panic,
+        Self::Overspeed,
+        Self::PositionJump,
+        Self::EmergencyStop,
+        Self::AmplifierTripped,
+        Self::Overrun,
+    ];
 }
 
 impl FaultReason {
     /// The reason behind a word, if it is one.
     pub fn from_word(word: u64) -> Option<Self> {
-        [
-            Self::None,
-            Self::DeviceRead,
-            Self::DeviceWrite,
-            Self::PositionNotFinite,
-            Self::MotorNotFinite,
-            Self::Panic,
-        ]
-        .into_iter()
-        .find(|reason| *reason as u64 == word)
+        Self::ALL.into_iter().find(|reason| *reason as u64 == word)
     }
 
     /// The sentence a person reads.
@@ -195,6 +241,11 @@ impl FaultReason {
             Self::PositionNotFinite => "a device reported a position that is not finite",
             Self::MotorNotFinite => "a motor value came out not finite",
             Self::Panic => "the driver's loop panicked",
+            Self::Overspeed => "a device moved faster than it may",
+            Self::PositionJump => "a position jumped farther in a tick than anything can move",
+            Self::EmergencyStop => "an emergency stop was pressed",
+            Self::AmplifierTripped => "an amplifier switched itself off",
+            Self::Overrun => "too many deadlines in a row were missed",
         }
     }
 }
@@ -237,7 +288,7 @@ mod tests {
         for word in 0..5 {
             assert_eq!(DriverState::from_word(word).map(|s| s as u64), Some(word));
         }
-        for word in 0..6 {
+        for word in 0..FaultReason::ALL.len() as u64 {
             assert_eq!(FaultReason::from_word(word).map(|r| r as u64), Some(word));
         }
         for word in 0..4 {

@@ -92,12 +92,14 @@ pub enum RequestKind {
     Stop = 3,
     /// That the driver leaves its fault state.
     ClearFault = 4,
+    /// Since 1.1. That all motors are switched off at once and stay so until the fault is cleared.
+    EmergencyStop = 5,
 }
 
 impl RequestKind {
     /// The kind behind a word, if it is one.
     pub fn from_word(word: u64) -> Option<Self> {
-        [Self::Observe, Self::Command, Self::Stop, Self::ClearFault]
+        [Self::Observe, Self::Command, Self::Stop, Self::ClearFault, Self::EmergencyStop]
             .into_iter()
             .find(|kind| *kind as u64 == word)
     }

@@ -5,8 +5,9 @@
 //! of those assertions is hashed into [`LAYOUT_HASH`], which both sides compare before anything is mapped.
 //!
 //! Version rule: a change that an old reader would misread raises [`ABI_MAJOR`]; one that only fills
-//! `reserved` words, which old readers ignore, raises [`ABI_MINOR`] and leaves the hash alone by keeping
-//! the names and places of what stood there.
+//! `reserved` words, which old readers ignore, raises [`ABI_MINOR`] and leaves the hash alone: the hash is
+//! over the layout as the major version's first minor published it, see `assert_layout!`. A value added to an
+//! enumeration is such a change too; an old reader takes one that it does not know for a stranger.
 
 use crate::command::Command;
 use crate::frame::Frame;
@@ -17,7 +18,7 @@ pub const MAGIC: u64 = 0x334D_4F54_4E41_4850;
 /// Raised when an old reader would misread.
 pub const ABI_MAJOR: u32 = 1;
 /// Raised when something is added that an old reader may ignore.
-pub const ABI_MINOR: u32 = 0;
+pub const ABI_MINOR: u32 = 1;
 /// Both, the major in the upper half.
 pub const ABI_VERSION: u64 = ((ABI_MAJOR as u64) << 32) | ABI_MINOR as u64;
 
@@ -50,19 +51,50 @@ const _: () = assert!(RING_FRAMES.is_power_of_two() && RING_COMMANDS.is_power_of
 const _: () = assert!(cfg!(target_endian = "little"), "the ABI is little-endian");
 
 /// Checks size, alignment, type and offset of every field at compile time and writes them down as text.
+///
+/// What a minor version made of reserved words stands behind an arrow: `reserved: [u64; 3] = 16 => { heat:
+/// f64 = 16, reserved: [u64; 2] = 24, }`. The text, and with it the layout hash, keeps the words as they were
+/// published, so that readers of the older version are not refused; what is checked is what stands there now.
 macro_rules! assert_layout {
-    ($type:ident: $size:literal, $align:literal { $($field:ident: $field_type:ty = $offset:literal,)+ }) => {
+    ($type:ident: $size:literal, $align:literal { $($entries:tt)+ }) => {
+        assert_layout!(@walk $type, $size, $align, [], [], [], $($entries)+);
+    };
+    (@walk $type:ident, $size:literal, $align:literal, [$($now:tt)*], [$($text:tt)*], [$($span:tt)*],
+        $field:ident: $was:ty = $offset:literal => { $($new:ident: $new_type:ty = $new_offset:literal,)+ },
+        $($rest:tt)*) => {
+        assert_layout!(@walk $type, $size, $align,
+            [$($now)* $({ $new, $new_type, $new_offset })+],
+            [$($text)* { $field, $was, $offset }],
+            [$($span)* { $field, $was, $($new_type),+ }],
+            $($rest)*);
+    };
+    (@walk $type:ident, $size:literal, $align:literal, [$($now:tt)*], [$($text:tt)*], [$($span:tt)*],
+        $field:ident: $field_type:ty = $offset:literal, $($rest:tt)*) => {
+        assert_layout!(@walk $type, $size, $align,
+            [$($now)* { $field, $field_type, $offset }],
+            [$($text)* { $field, $field_type, $offset }],
+            [$($span)*],
+            $($rest)*);
+    };
+    (@walk $type:ident, $size:literal, $align:literal,
+        [$({ $now:ident, $now_type:ty, $now_offset:literal })+],
+        [$({ $field:ident, $field_type:ty, $offset:literal })+],
+        [$({ $was:ident, $was_type:ty, $($new_type:ty),+ })*],) => {
         const _: () = {
             assert!(size_of::<$type>() == $size, concat!("size of ", stringify!($type)));
             assert!(align_of::<$type>() == $align, concat!("alignment of ", stringify!($type)));
             $(assert!(
-                std::mem::offset_of!($type, $field) == $offset,
-                concat!("offset of ", stringify!($type), ".", stringify!($field))
+                std::mem::offset_of!($type, $now) == $now_offset,
+                concat!("offset of ", stringify!($type), ".", stringify!($now))
             );)+
+            $(assert!(
+                size_of::<$was_type>() == 0 $(+ size_of::<$new_type>())+,
+                concat!("what became of ", stringify!($type), ".", stringify!($was))
+            );)*
             #[allow(dead_code)]
             fn every_field_is_listed(value: &$type) {
-                let $type { $($field),+ } = value;
-                $(let _: &$field_type = $field;)+
+                let $type { $($now),+ } = value;
+                $(let _: &$now_type = $now;)+
             }
         };
         impl $crate::layout::Described for $type {
@@ -154,11 +186,14 @@ pub struct DriverHeader {
     pub wait_mode: AtomicU64,
     /// CPU of the driver's loop plus one; 0: any.
     pub cpu_plus_one: AtomicU64,
-    /// Room for later minor versions; zero.
-    pub reserved: AtomicU64,
+    /// Since 1.1. Bit 0: commissioning, with little force; see [`DRIVER_COMMISSIONING`].
+    pub flags: AtomicU64,
     /// 1 once everything above stands; written last.
     pub ready: AtomicU64,
 }
+
+/// [`DriverHeader::flags`]: forces and speeds are cut to those of commissioning.
+pub const DRIVER_COMMISSIONING: u64 = 1;
 
 assert_layout!(DriverHeader: 128, 64 {
     magic: AtomicU64 = 0,
@@ -175,7 +210,7 @@ assert_layout!(DriverHeader: 128, 64 {
     clock_mode: AtomicU64 = 88,
     wait_mode: AtomicU64 = 96,
     cpu_plus_one: AtomicU64 = 104,
-    reserved: AtomicU64 = 112,
+    reserved: AtomicU64 = 112 => { flags: AtomicU64 = 112, },
     ready: AtomicU64 = 120,
 });
 
@@ -231,8 +266,14 @@ pub struct Counters {
     pub faults: AtomicU64,
     /// Log records dropped.
     pub log_dropped: AtomicU64,
-    /// Room for later minor versions; zero.
-    pub reserved: [AtomicU64; 4],
+    /// Since 1.1. Forces that grew slower than commanded.
+    pub forces_slewed: AtomicU64,
+    /// Since 1.1. Forces cut because motors were warm.
+    pub forces_derated: AtomicU64,
+    /// Since 1.1. Forces cut outside the workspace.
+    pub forces_faded: AtomicU64,
+    /// Since 1.1. Ticks without force because the dead-man's switch was not held.
+    pub ticks_unattended: AtomicU64,
 }
 
 assert_layout!(Counters: 128, 64 {
@@ -248,7 +289,12 @@ assert_layout!(Counters: 128, 64 {
     leases_refused: AtomicU64 = 72,
     faults: AtomicU64 = 80,
     log_dropped: AtomicU64 = 88,
-    reserved: [AtomicU64; 4] = 96,
+    reserved: [AtomicU64; 4] = 96 => {
+        forces_slewed: AtomicU64 = 96,
+        forces_derated: AtomicU64 = 104,
+        forces_faded: AtomicU64 = 112,
+        ticks_unattended: AtomicU64 = 120,
+    },
 });
 
 /// What a device is.
@@ -267,8 +313,12 @@ pub struct DeviceDescription {
     pub workspace_min_m: [AtomicU64; 3],
     /// Bits of f64s: its largest corner (m).
     pub workspace_max_m: [AtomicU64; 3],
+    /// Since 1.1. Bits of an f64: how fast a force may grow (N/s); infinite: no limit, 0: the driver is 1.0.
+    pub slew_n_per_s: AtomicU64,
+    /// Since 1.1. Bits of an f64: the tip's speed that is a fault (m/s); infinite: none, 0: the driver is 1.0.
+    pub speed_limit_m_per_s: AtomicU64,
     /// Room for later minor versions; zero.
-    pub reserved: [AtomicU64; 6],
+    pub reserved: [AtomicU64; 4],
 }
 
 assert_layout!(DeviceDescription: 192, 64 {
@@ -278,7 +328,11 @@ assert_layout!(DeviceDescription: 192, 64 {
     continuous_force_n: AtomicU64 = 88,
     workspace_min_m: [AtomicU64; 3] = 96,
     workspace_max_m: [AtomicU64; 3] = 120,
-    reserved: [AtomicU64; 6] = 144,
+    reserved: [AtomicU64; 6] = 144 => {
+        slew_n_per_s: AtomicU64 = 144,
+        speed_limit_m_per_s: AtomicU64 = 152,
+        reserved: [AtomicU64; 4] = 160,
+    },
 });
 
 /// A histogram of nanoseconds with one writer.

@@ -13,8 +13,8 @@ use crate::doorbell::{self, WaitMode};
 use crate::frame::Frame;
 use crate::handshake;
 use crate::layout::{
-    ABI_VERSION, CommanderSegment, DeviceDescription, DriverSegment, LAYOUT_HASH, MAGIC, MAX_DEVICES,
-    RING_COMMANDS, RING_FRAMES,
+    ABI_VERSION, CommanderSegment, DRIVER_COMMISSIONING, DeviceDescription, DriverSegment, LAYOUT_HASH,
+    MAGIC, MAX_DEVICES, RING_COMMANDS, RING_FRAMES,
 };
 use crate::seqlock::{self, Torn};
 use bytemuck::Zeroable;
@@ -71,6 +71,8 @@ pub struct DriverInfo {
     pub ramp_in_ticks: u64,
     /// Ticks from all force to none once commands fail.
     pub ramp_out_ticks: u64,
+    /// Whether forces and speeds are cut to those of commissioning.
+    pub is_commissioning: bool,
     /// Which clock moves the ticks.
     pub clock_mode: ClockMode,
     /// How it waits for a reply.
@@ -98,6 +100,10 @@ pub struct DeviceInfo {
     pub workspace_min_m: [f64; 3],
     /// Its largest corner (m).
     pub workspace_max_m: [f64; 3],
+    /// How fast a force may grow (N/s); infinite: no limit.
+    pub slew_n_per_s: f64,
+    /// The tip's speed that is a fault (m/s); infinite: none.
+    pub speed_limit_m_per_s: f64,
 }
 
 /// A descriptor is not a segment of this contract.
@@ -238,6 +244,7 @@ impl DriverView {
             ramp_in_ticks: get(&header.ramp_in_ticks),
             ramp_out_ticks: get(&header.ramp_out_ticks),
             clock_mode: ClockMode::from_word(get(&header.clock_mode)).unwrap_or(ClockMode::Real),
+            is_commissioning: get(&header.flags) & DRIVER_COMMISSIONING != 0,
             wait_mode: WaitMode::from_word(get(&header.wait_mode)).unwrap_or(WaitMode::Futex),
             cpu: get(&header.cpu_plus_one).checked_sub(1).and_then(|cpu| usize::try_from(cpu).ok()),
             devices: self.map.devices[..count].iter().map(DeviceInfo::from_description).collect(),
@@ -397,6 +404,8 @@ impl DeviceInfo {
             continuous_force_n: f64::from_bits(get(&from.continuous_force_n)),
             workspace_min_m: from.workspace_min_m.each_ref().map(|word| f64::from_bits(get(word))),
             workspace_max_m: from.workspace_max_m.each_ref().map(|word| f64::from_bits(get(word))),
+            slew_n_per_s: limit_of(&from.slew_n_per_s),
+            speed_limit_m_per_s: limit_of(&from.speed_limit_m_per_s),
         }
     }
 
@@ -409,7 +418,15 @@ impl DeviceInfo {
             put(&to.workspace_min_m[axis], self.workspace_min_m[axis].to_bits());
             put(&to.workspace_max_m[axis], self.workspace_max_m[axis].to_bits());
         }
+        put(&to.slew_n_per_s, self.slew_n_per_s.to_bits());
+        put(&to.speed_limit_m_per_s, self.speed_limit_m_per_s.to_bits());
     }
+}
+
+/// A limit that a 1.0 driver does not tell is none.
+fn limit_of(word: &AtomicU64) -> f64 {
+    let limit = f64::from_bits(get(word));
+    if limit == 0.0 { f64::INFINITY } else { limit }
 }
 
 fn describe(segment: &DriverSegment, info: &DriverInfo) {
@@ -427,6 +444,7 @@ fn describe(segment: &DriverSegment, info: &DriverInfo) {
     put(&header.ramp_out_ticks, info.ramp_out_ticks);
     put(&header.clock_mode, info.clock_mode as u64);
     put(&header.wait_mode, info.wait_mode as u64);
+    put(&header.flags, if info.is_commissioning { DRIVER_COMMISSIONING } else { 0 });
     put(&header.cpu_plus_one, info.cpu.map_or(0, |cpu| cpu as u64 + 1));
     put(&header.device_count, info.devices.len() as u64);
     for (device, to) in info.devices.iter().zip(&segment.devices) {

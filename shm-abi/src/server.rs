@@ -63,6 +63,11 @@ pub enum ServerEvent {
     },
     /// Somebody asks the driver to leave its fault state.
     ClearFaultRequested,
+    /// Somebody asks for all motors off, now.
+    EmergencyStopRequested {
+        /// Who.
+        pid: u64,
+    },
     /// A segment for a lease could not be made.
     Trouble {
         /// Why.
@@ -280,6 +285,10 @@ impl Server {
             }
             RequestKind::ClearFault => {
                 events.push(ServerEvent::ClearFaultRequested);
+                self.answer(index, &Answer::new(Verdict::Granted), &[])
+            }
+            RequestKind::EmergencyStop => {
+                events.push(ServerEvent::EmergencyStopRequested { pid });
                 self.answer(index, &Answer::new(Verdict::Granted), &[])
             }
         }

@@ -108,12 +108,14 @@ fn layouts(source: &str) -> Vec<Layout> {
     blocks.map(|block| layout(block.split("});").next().unwrap())).collect()
 }
 
-/// `Name: size, align {` and then a line `field: type = offset,` each.
+/// `Name: size, align {` and then a line `field: type = offset,` each, or `field: ... => { ... },` for reserved
+/// words that a minor version has filled: what is in the braces stands there now.
 fn layout(block: &str) -> Layout {
     let (head, body) = block.split_once('{').unwrap();
     let (name, numbers) = head.split_once(':').unwrap();
     let (size, align) = numbers.split_once(',').unwrap();
-    let fields = body.lines().filter_map(|line| {
+    let body = body.replace("=> {", "=>\n").replace("},", "\n");
+    let fields = body.lines().filter(|line| !line.ends_with("=>")).filter_map(|line| {
         let (field, rest) = line.trim().split_once(':')?;
         let (_, offset) = rest.trim_end_matches(',').rsplit_once('=')?;
         Some((field.to_string(), offset.trim().to_string()))

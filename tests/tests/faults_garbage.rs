@@ -4,7 +4,7 @@
 use bytemuck::Zeroable;
 use io_driver::config::DriverConfig;
 use io_driver::cycle::Cycle;
-use io_driver::device::{Device, Reading, TickTime, Written};
+use io_driver::device::{Device, Effort, Reading, TickTime, Written};
 use io_driver::driver::{describe, make_cycle};
 use io_driver::open::open_devices;
 use nalgebra::Vector3;
@@ -259,12 +259,12 @@ impl Device for Strict {
         Ok(Reading::at(Vector3::new(0.1, 0.2, 0.3)))
     }
 
-    fn write(&mut self, force_on_user_n: Vector3<f64>) -> Result<Written, FaultReason> {
+    fn write(&mut self, effort: Effort) -> Result<Written, FaultReason> {
         // Of a direction of length 1 but for rounding: a few ulp.
         assert!(force_on_user_n.norm() <= PEAK_N * (1.0 + 1e-15), "{force_on_user_n:?}");
         assert!(force_on_user_n.iter().all(|component| component.is_finite()));
         self.written.fetch_add(u64::from(force_on_user_n != Vector3::zeros()), Ordering::Relaxed);
-        Ok(Written { force_on_user_n, motor_codes: [0; 3] })
+        Ok(Written { force_on_user_n: effort.force_on_user_n, ..Written::default() })
     }
 
     fn release(&mut self) {}
@@ -278,6 +278,8 @@ fn strict(written: &Arc<AtomicU64>) -> Box<dyn Device> {
         continuous_force_n: PEAK_N,
         workspace_min_m: [-1.0; 3],
         workspace_max_m: [1.0; 3],
+        slew_n_per_s: f64::INFINITY,
+        speed_limit_m_per_s: f64::INFINITY,
     };
     Box::new(Strict { info, written: Arc::clone(written) })
 }

@@ -8,7 +8,7 @@ use bytemuck::Zeroable;
 use haptics::ContactState;
 use io_driver::config::{DriverConfig, period_of};
 use io_driver::cycle::Cycle;
-use io_driver::device::{Device, Reading, TickTime, Written};
+use io_driver::device::{Device, Effort, Reading, TickTime, Written};
 use io_driver::driver::{describe, make_cycle};
 use io_driver::mail::{Inbox, Letter, Sender, mail};
 use io_driver::open::open_devices;
@@ -227,10 +227,10 @@ impl Device for Breaking {
         }
     }
 
-    fn write(&mut self, force_on_user_n: Vector3<f64>) -> Result<Written, FaultReason> {
+    fn write(&mut self, effort: Effort) -> Result<Written, FaultReason> {
         match self.tick % 1511 {
             1400 => Err(FaultReason::DeviceWrite),
-            _ => Ok(Written { force_on_user_n, motor_codes: [0; 3] }),
+            _ => Ok(Written { force_on_user_n: effort.force_on_user_n, ..Written::default() }),
         }
     }
 

@@ -1,6 +1,7 @@
 //! Writes a configuration down as TOML.
 
-use super::{Backend, DeviceConfig, DriverConfig, ReplyMode};
+use super::{Backend, Commissioning, DeviceConfig, DriverConfig, OverrunPolicy, ReplyMode, SpinMargin};
+use crate::safety::switches::{Switch, Switches};
 use shm_abi::doorbell::WaitMode;
 use std::fmt::Write as _;
 use toml::Value;
@@ -30,7 +31,18 @@ fn head(text: &mut String, config: &DriverConfig) -> std::fmt::Result {
     writeln!(text, "priority = {}", real_time.priority.unwrap_or(0))?;
     writeln!(text, "lock_memory = {}", real_time.lock_memory)?;
     writeln!(text, "phase_offset_us = {:?}", real_time.phase_offset_ns as f64 / 1e3)?;
-    writeln!(text, "spin_margin_us = {:?}", real_time.spin_margin_ns as f64 / 1e3)?;
+    if let SpinMargin::Fixed(ns) = real_time.spin_margin {
+        writeln!(text, "spin_margin_us = {:?}", ns as f64 / 1e3)?;
+    }
+    let (policy, ticks) = match real_time.overrun {
+        OverrunPolicy::Skip => ("skip", None),
+        OverrunPolicy::CatchUp(ticks) => ("catch-up", Some(ticks)),
+        OverrunPolicy::Fault(ticks) => ("fault", Some(ticks)),
+    };
+    writeln!(text, "overrun = {}", quoted(policy))?;
+    if let Some(ticks) = ticks {
+        writeln!(text, "overrun_ticks = {ticks}")?;
+    }
     writeln!(text, "wait = {}", quoted(real_time.wait.map_or("auto", WaitMode::name)))?;
     writeln!(text, "[reply]")?;
     writeln!(text, "mode = {}", quoted(mode_name(config.reply.mode)))?;
@@ -38,13 +50,30 @@ fn head(text: &mut String, config: &DriverConfig) -> std::fmt::Result {
     writeln!(text, "[safety]")?;
     writeln!(text, "max_command_age_ticks = {}", config.safety.max_command_age_ticks)?;
     writeln!(text, "ramp_in_ms = {:?}", config.safety.ramp_in_ticks as f64 * period_ms)?;
-    writeln!(text, "ramp_out_ms = {:?}", config.safety.ramp_out_ticks as f64 * period_ms)
+    writeln!(text, "ramp_out_ms = {:?}", config.safety.ramp_out_ticks as f64 * period_ms)?;
+    writeln!(text, "workspace_margin_mm = {:?}", config.safety.workspace_margin_m * 1e3)?;
+    let Switches { emergency_stop, dead_man } = &config.safety.switches;
+    for (key, switch) in [("emergency_stop", emergency_stop), ("dead_man", dead_man)] {
+        if let Some(Switch { device, button, normally_closed }) = switch {
+            let device = quoted(&config.devices[*device].name);
+            let wiring = format_args!("normally_closed = {normally_closed}").to_string();
+            writeln!(text, "{key} = {{ device = {device}, button = {button}, {wiring} }}")?;
+        }
+    }
+    if let Some(Commissioning { force_n, speed_m_per_s }) = config.safety.commissioning {
+        writeln!(text, "commissioning = true\ncommissioning_force_n = {force_n:?}")?;
+        writeln!(text, "commissioning_speed_m_per_s = {speed_m_per_s:?}")?;
+    }
+    Ok(())
 }
 
 fn write_device(text: &mut String, device: &DeviceConfig) -> std::fmt::Result {
     writeln!(text, "[[device]]\nname = {}", quoted(&device.name))?;
     if let Some(peak_force_n) = device.peak_force_n {
         writeln!(text, "peak_force_n = {peak_force_n:?}")?;
+    }
+    if device.compensates_gravity {
+        writeln!(text, "gravity_compensation = true")?;
     }
     match &device.backend {
         Backend::Ideal { hand, start_m, base_in_world } => {
@@ -62,6 +91,11 @@ fn write_device(text: &mut String, device: &DeviceConfig) -> std::fmt::Result {
             writeln!(text, "backend = \"replay\"")?;
             writeln!(text, "description = {}", quoted(&description.to_string_lossy()))?;
             writeln!(text, "trace = {}", quoted(&trace.to_string_lossy()))
+        }
+        Backend::Emulated { description, card } => {
+            writeln!(text, "backend = \"emulated\"")?;
+            writeln!(text, "description = {}", quoted(&description.to_string_lossy()))?;
+            writeln!(text, "card = {}", quoted(&card.to_string_lossy()))
         }
     }
 }

@@ -7,7 +7,7 @@
 //! time since full authority; before that it rests at the script's start. Without a script it rests at a
 //! fixed point. X_WD says where the base stands, as it would for a real device.
 
-use super::{Device, Reading, TickTime, Written};
+use super::{Device, Effort, Reading, TickTime, Written};
 use crate::sim::script::HandPlayer;
 use nalgebra::{Isometry3, Point3, Vector3};
 use shm_abi::FaultReason;
@@ -59,8 +59,8 @@ impl Device for IdealDevice {
         Ok(Reading::at(in_base))
     }
 
-    fn write(&mut self, force_on_user_n: Vector3<f64>) -> Result<Written, FaultReason> {
-        Ok(Written { force_on_user_n, motor_codes: [0; 3] })
+    fn write(&mut self, effort: Effort) -> Result<Written, FaultReason> {
+        Ok(Written { force_on_user_n: effort.force_on_user_n, ..Written::default() })
     }
 
     fn release(&mut self) {}

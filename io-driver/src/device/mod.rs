@@ -4,6 +4,8 @@
 //! gets a force on the user that is already limited and finite, in its own base frame D, and tells what
 //! its motors were really made to render.
 
+pub mod arm;
+pub mod emulated;
 pub mod encoder_trace;
 pub mod ideal;
 pub mod replay;
@@ -86,6 +88,15 @@ impl Reading {
     }
 }
 
+/// What a device is asked to do in a tick.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Effort {
+    /// The force on the user, finite and within the device's peak, in D (N).
+    pub force_on_user_n: Vector3<f64>,
+    /// How much of its own weight it may hold up, 0 to 1.
+    pub gravity_share: f64,
+}
+
 /// What the motors were made to do.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Written {
@@ -93,6 +104,10 @@ pub struct Written {
     pub force_on_user_n: Vector3<f64>,
     /// The values the hardware got.
     pub motor_codes: [i64; 3],
+    /// Bits of `LIMIT_...`: what the device itself had to cut.
+    pub limits: u64,
+    /// Warmth of the warmest motor; see [`crate::heat`].
+    pub motor_heat: f64,
 }
 
 /// A haptic device as the loop sees it.
@@ -103,9 +118,13 @@ pub trait Device: Send {
     /// Reads where it is. An error is a fault: it ends in zero force on all devices.
     fn read(&mut self, time: TickTime) -> Result<Reading, FaultReason>;
 
-    /// Makes it render a force on the user, which is finite and within the device's peak.
-    fn write(&mut self, force_on_user_n: Vector3<f64>) -> Result<Written, FaultReason>;
+    /// Makes it render a force on the user.
+    fn write(&mut self, effort: Effort) -> Result<Written, FaultReason>;
 
     /// Motors off, whatever state it is in; must not fail. Called on every way out.
     fn release(&mut self);
+
+    /// Somebody asked to leave the fault state: what switched itself off may be switched on again, without
+    /// force. The next `read` tells whether it could.
+    fn rearm(&mut self) {}
 }

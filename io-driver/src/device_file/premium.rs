@@ -10,6 +10,8 @@ use toml::Spanned;
 
 use super::{DeviceFileError, PremiumFile, Workspace};
 use crate::encoders::EncoderSpec;
+use crate::heat::HeatSpec;
+use crate::kinematics::gravity::Bodies;
 use crate::kinematics::{Interval, JointLimits, Mechanism, Premium};
 use crate::motors::MotorSpec;
 use crate::toml_report::{Allowed, SpannedList, TomlReport, TomlText};
@@ -25,11 +27,14 @@ struct Raw {
     name: String,
     peak_force_n: Spanned<f64>,
     continuous_force_n: Spanned<f64>,
+    slew_n_per_s: Spanned<f64>,
+    speed_limit_m_per_s: Spanned<f64>,
     workspace_m: SpannedList,
     workspace_centre_m: SpannedList,
     linkage: Linkage,
     encoders: Encoders,
     motors: Motors,
+    bodies: Option<RawBodies>,
 }
 
 #[derive(Deserialize)]
@@ -58,9 +63,23 @@ struct Motors {
     peak_current_a: Spanned<f64>,
     continuous_current_a: Spanned<f64>,
     winding_time_constant_s: Spanned<f64>,
+    housing_time_constant_s: Spanned<f64>,
+    winding_share: Spanned<f64>,
     dac_bits: Whole,
     sign: WholeList,
     channel: WholeList,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawBodies {
+    mass_a_kg: Spanned<f64>,
+    mass_c_kg: Spanned<f64>,
+    mass_be_kg: Spanned<f64>,
+    mass_df_kg: Spanned<f64>,
+    l3_m: Spanned<f64>,
+    l5_m: Spanned<f64>,
+    l6_m: Spanned<f64>,
 }
 
 pub(super) fn read(toml: &TomlText<'_>) -> Result<PremiumFile, DeviceFileError> {
@@ -82,6 +101,10 @@ fn check(toml: &TomlText<'_>, raw: Raw) -> Result<PremiumFile, TomlReport> {
         mechanism,
         encoders: encoders(toml, &raw.encoders, reduction, home)?,
         motors: motors(toml, &raw.motors, reduction)?,
+        heat: heat(toml, &raw.motors)?,
+        slew_n_per_s: toml.number(&raw.slew_n_per_s, SLEW)?,
+        speed_limit_m_per_s: toml.number(&raw.speed_limit_m_per_s, SPEED)?,
+        bodies: raw.bodies.as_ref().map(|bodies| weigh(toml, bodies)).transpose()?,
     })
 }
 
@@ -142,22 +165,36 @@ fn encoders(
 }
 
 fn motors(toml: &TomlText<'_>, raw: &Motors, reduction: [f64; 3]) -> Result<MotorSpec, TomlReport> {
-    let peak_current_a = toml.number(&raw.peak_current_a, CURRENT)?;
     Ok(MotorSpec {
         channel: channels(toml, &raw.channel)?,
         sign: signs(toml, &raw.sign)?,
         reduction,
         torque_constant_nm_per_a: toml.number(&raw.torque_constant_nm_per_a, TORQUE_CONSTANT)?,
-        peak_current_a,
-        continuous_current_a: up_to(
-            toml,
-            &raw.continuous_current_a,
-            CURRENT,
-            "peak_current_a",
-            peak_current_a,
-        )?,
-        winding_time_constant_s: toml.number(&raw.winding_time_constant_s, TIME_CONSTANT)?,
+        peak_current_a: toml.number(&raw.peak_current_a, CURRENT)?,
         dac_bits: toml.integer(&raw.dac_bits, 8..=16)? as u32,
+    })
+}
+
+fn heat(toml: &TomlText<'_>, raw: &Motors) -> Result<HeatSpec, TomlReport> {
+    let peak_a = toml.number(&raw.peak_current_a, CURRENT)?;
+    let continuous_a = up_to(toml, &raw.continuous_current_a, CURRENT, "peak_current_a", peak_a)?;
+    Ok(HeatSpec {
+        continuous_current_a: continuous_a,
+        winding_time_constant_s: toml.number(&raw.winding_time_constant_s, TIME_CONSTANT)?,
+        housing_time_constant_s: toml.number(&raw.housing_time_constant_s, TIME_CONSTANT)?,
+        winding_share: toml.number(&raw.winding_share, SHARE)?,
+    })
+}
+
+fn weigh(toml: &TomlText<'_>, raw: &RawBodies) -> Result<Bodies, TomlReport> {
+    Ok(Bodies {
+        mass_a_kg: toml.number(&raw.mass_a_kg, MASS)?,
+        mass_c_kg: toml.number(&raw.mass_c_kg, MASS)?,
+        mass_be_kg: toml.number(&raw.mass_be_kg, MASS)?,
+        mass_df_kg: toml.number(&raw.mass_df_kg, MASS)?,
+        l3_m: toml.number(&raw.l3_m, LEVER)?,
+        l5_m: toml.number(&raw.l5_m, LEVER)?,
+        l6_m: toml.number(&raw.l6_m, LEVER)?,
     })
 }
 
@@ -224,6 +261,11 @@ const REDUCTION: Allowed = Allowed { min: 0.1, max: 1000.0, unit: "motor turns p
 const ANGLE: Allowed = Allowed { min: -TAU, max: TAU, unit: "rad" };
 const CURRENT: Allowed = Allowed { min: 1e-3, max: 100.0, unit: "A" };
 const TORQUE_CONSTANT: Allowed = Allowed { min: 1e-4, max: 10.0, unit: "N m/A" };
+const SLEW: Allowed = Allowed { min: 10.0, max: 1e6, unit: "N/s" };
+const SPEED: Allowed = Allowed { min: 0.01, max: 20.0, unit: "m/s" };
+const SHARE: Allowed = Allowed { min: 0.0, max: 1.0, unit: "of the thermal resistance" };
+const MASS: Allowed = Allowed { min: 0.0, max: 10.0, unit: "kg" };
+const LEVER: Allowed = Allowed { min: -1.0, max: 1.0, unit: "m" };
 const TIME_CONSTANT: Allowed = Allowed { min: 0.1, max: 10_000.0, unit: "s" };
 
 /// Beyond a quarter turn of turret or elbow a position of the tip has two poses, and the inverse

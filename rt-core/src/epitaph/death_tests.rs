@@ -48,10 +48,11 @@ fn a_stack_overflow_leaves_an_epitaph_too() {
 }
 
 #[test]
-fn the_last_act_comes_before_the_epitaph() {
-    let (_, epitaph) = death_by("last act");
-    // The last act advances the tick that the epitaph then quotes.
-    assert_eq!(epitaph.unwrap().tick, 78);
+fn the_last_act_is_performed_too() {
+    let (_, words) = words_after("last act");
+    assert_eq!(words[REGISTER].load(Ordering::Relaxed), 2048);
+    let (_, words) = words_after("abort");
+    assert_eq!(words[REGISTER].load(Ordering::Relaxed), 0, "where nothing is guarded nothing is stored");
 }
 
 #[test]
@@ -78,6 +79,14 @@ fn a_second_set_of_handlers_is_refused() {
 
 /// The child shares the cell through a memory file that the parent holds.
 fn death_by(role: &str) -> (ExitStatus, Option<Epitaph>) {
+    let (status, words) = words_after(role);
+    (status, read(&words))
+}
+
+/// The last of the words, which no short text reaches.
+const REGISTER: usize = 31;
+
+fn words_after(role: &str) -> (ExitStatus, EpitaphWords) {
     let file = File::from(memfd_create("epitaph", MFdFlags::MFD_CLOEXEC).unwrap());
     file.set_len(size_of::<EpitaphWords>() as u64).unwrap();
     let path = format!("/proc/{}/fd/{}", std::process::id(), file.as_raw_fd());
@@ -86,7 +95,7 @@ fn death_by(role: &str) -> (ExitStatus, Option<Epitaph>) {
     file.read_exact_at(&mut bytes, 0).unwrap();
     let words = bytes.as_chunks().0.iter().map(|word| AtomicU64::new(u64::from_ne_bytes(*word)));
     let words: Vec<AtomicU64> = words.collect();
-    (status, read(words.as_slice().try_into().unwrap()))
+    (status, words.try_into().unwrap())
 }
 
 fn die(role: &str) -> ! {
@@ -96,7 +105,10 @@ fn die(role: &str) -> ! {
     let cell = shared_words::map(&File::options().read(true).write(true).open(path).unwrap());
     match role {
         "panic" => die_by_panic(cell),
-        "last act" => shared_words::install_with_last_act(cell, &TICK, last_act).unwrap(),
+        "last act" => {
+            crate::last_act::guard(shared_words::low_half(&cell[REGISTER]), 2048).unwrap();
+            install_fatal_handlers(cell, &TICK).unwrap();
+        }
         _ => install_fatal_handlers(cell, &TICK).unwrap(),
     }
     match role {
@@ -114,10 +126,6 @@ fn die_by_panic(cell: &'static EpitaphWords) {
     std::panic::set_hook(Box::new(|_| std::process::exit(55)));
     install_panic_hook(cell, &TICK);
     panic!("joint {} is lost", std::hint::black_box(3));
-}
-
-fn last_act() {
-    TICK.fetch_add(1, Ordering::Relaxed);
 }
 
 #[expect(unconditional_recursion, reason = "it is meant to die")]

@@ -27,12 +27,8 @@ impl Guarantee {
     }
 
     /// One that the machine's owner decides.
-    pub(super) fn circumstance(
-        name: &'static str,
-        wanted: &str,
-        found: String,
-        remedy: Option<String>,
-    ) -> Self {
+    #[must_use]
+    pub fn circumstance(name: &'static str, wanted: &str, found: String, remedy: Option<String>) -> Self {
         let asked = Self::asked(name, wanted.to_owned(), found, remedy);
         Self { circumstance: true, ..asked }
     }

@@ -3,7 +3,7 @@
 //! Problem: a segmentation fault in the driver must still zero the motors and say why, yet the exit
 //! status, the core dump and the message of a debugger or of Rust's own stack-overflow check must
 //! stay what they would have been.
-//! Model: the handler runs the owner's last act, writes the epitaph and then steps aside. A fault
+//! Model: the handler performs the last act ([`crate::last_act`]), writes the epitaph and then steps aside. A fault
 //! that the CPU raised is repeated under the former action, so that action sees the true address; a
 //! signal that was sent (`abort`, `kill`) is raised again under the default action.
 //! Invariants: async-signal-safe: no allocation, no lock, no I/O. Runs on the alternate stack that
@@ -31,7 +31,6 @@ const FATAL_SIGNALS: [(libc::c_int, &str); 5] = [
 struct Fatal {
     cell: &'static EpitaphWords,
     tick: &'static AtomicU64,
-    last_act: Option<fn()>,
     former: [libc::sigaction; FATAL_SIGNALS.len()],
 }
 
@@ -44,42 +43,18 @@ static FATAL: OnceLock<Fatal> = OnceLock::new();
 /// # Errors
 /// `AlreadyExists` on a second call in one process; the first call's cell stays in force.
 pub fn install_fatal_handlers(cell: &'static EpitaphWords, tick: &'static AtomicU64) -> io::Result<()> {
-    install(cell, tick, None)
-}
-
-/// As [`install_fatal_handlers`], with a last act that runs before the epitaph is written: the place
-/// to write zero torque to registers that are already mapped.
-///
-/// # Errors
-/// As [`install_fatal_handlers`].
-///
-/// # Safety
-/// `last_act` runs inside a signal handler, in a process that is already broken, on a stack of a few
-/// kilobytes, possibly on several threads at once. It must be async-signal-safe (signal-safety(7)):
-/// plain or atomic loads and stores to memory that stays mapped, no allocation, no lock, no panic.
-pub unsafe fn install_fatal_handlers_with(
-    cell: &'static EpitaphWords,
-    tick: &'static AtomicU64,
-    last_act: fn(),
-) -> io::Result<()> {
-    install(cell, tick, Some(last_act))
-}
-
-fn install(cell: &'static EpitaphWords, tick: &'static AtomicU64, last_act: Option<fn()>) -> io::Result<()> {
     let mut former = [default_action(); FATAL_SIGNALS.len()];
     for ((signal, _), former) in FATAL_SIGNALS.iter().zip(&mut former) {
         *former = current_action(*signal)?;
     }
-    let set = FATAL.set(Fatal { cell, tick, last_act, former });
+    let set = FATAL.set(Fatal { cell, tick, former });
     set.map_err(|_| io::Error::new(io::ErrorKind::AlreadyExists, "fatal handlers are already installed"))?;
     FATAL_SIGNALS.iter().try_for_each(|(signal, _)| set_action(*signal, &handler_action()))
 }
 
 extern "C" fn on_fatal(signal: libc::c_int, info: *mut libc::siginfo_t, _context: *mut libc::c_void) {
     let Some(fatal) = FATAL.get() else { return };
-    if let Some(last_act) = fatal.last_act {
-        last_act();
-    }
+    crate::last_act::perform();
     // SAFETY: with SA_SIGINFO the kernel passes a valid record that lives as long as the handler.
     let info = unsafe { &*info };
     // si_code is positive when the kernel raised the signal for what the thread did, sigaction(2).

@@ -1,13 +1,16 @@
 //! Safe wrappers round the few system and C library calls that no safe crate offers.
 //!
-//! Each file holds one concern and hides it behind functions that cannot be misused; the one
-//! exception, [`fatal::install_fatal_handlers_with`], is `unsafe` and says what it asks for.
+//! Each file holds one concern and hides it behind functions that cannot be misused.
 
 pub(crate) mod counting_allocator;
 pub(crate) mod fatal;
 pub(crate) mod malloc;
 pub(crate) mod sched;
 pub(crate) mod stack;
+
+mod static_registers;
+
+pub(crate) use static_registers::static_register;
 
 #[cfg(test)]
 pub(crate) mod shared_words;

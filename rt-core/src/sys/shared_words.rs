@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::os::fd::AsRawFd;
-use std::sync::atomic::AtomicU64;
+use std::sync::atomic::{AtomicU32, AtomicU64};
 
 /// Maps the file's first 256 bytes shared and writable, for the rest of the process.
 pub(crate) fn map(file: &File) -> &'static [AtomicU64; 32] {
@@ -15,15 +15,10 @@ pub(crate) fn map(file: &File) -> &'static [AtomicU64; 32] {
     unsafe { &*address.cast() }
 }
 
-/// [`install_fatal_handlers_with`](super::fatal::install_fatal_handlers_with) for a last act that
-/// only touches an atomic.
-pub(crate) fn install_with_last_act(
-    cell: &'static [AtomicU64; 32],
-    tick: &'static AtomicU64,
-    last_act: fn(),
-) -> std::io::Result<()> {
-    // SAFETY: the tests' last acts are one atomic addition.
-    unsafe { super::fatal::install_fatal_handlers_with(cell, tick, last_act) }
+/// The low half of a word, as a register.
+pub(crate) fn low_half(word: &AtomicU64) -> &AtomicU32 {
+    // SAFETY: aligned, inside the word, and atomic; little-endian machines have the low half first.
+    unsafe { &*std::ptr::from_ref(word).cast() }
 }
 
 /// Makes the CPU raise SIGILL.

@@ -26,6 +26,7 @@ pub(crate) fn info() -> DriverInfo {
         ramp_out_ticks: 50,
         clock_mode: ClockMode::Real,
         wait_mode: WaitMode::Futex,
+        is_commissioning: false,
         cpu: Some(1),
         devices: vec![device("thumb"), device("index")],
         setup_report: "  obtained  cpu: CPU 1\n  MISSING   kernel: wanted PREEMPT_RT\n".into(),
@@ -40,6 +41,8 @@ fn device(name: &str) -> DeviceInfo {
         continuous_force_n: 1.4,
         workspace_min_m: [-0.2, -0.1, -0.1],
         workspace_max_m: [0.2, 0.3, 0.1],
+        slew_n_per_s: f64::INFINITY,
+        speed_limit_m_per_s: f64::INFINITY,
     }
 }
 

@@ -7,7 +7,7 @@ use io_driver::config::DriverConfig;
 use io_driver::device::Device;
 use io_driver::driver::{describe, make_cycle};
 use io_driver::mail::{Letter, Sender, mail};
-use io_driver::real_loop::{Ended, RealLoop, Shared};
+use io_driver::real_loop::{Ended, RealLoop, Shared, Waiting};
 use rt_core::log::RtLogDrain;
 use shm_abi::DriverMemory;
 use shm_abi::doorbell::WaitMode;
@@ -48,7 +48,8 @@ impl Hosted {
         let shared = Shared::default();
         let tick: &'static AtomicU64 = Box::leak(Box::default());
         let cycle = make_cycle(&config, Arc::clone(&memory), devices);
-        let real_loop = RealLoop::new(&config, WaitMode::Futex, cycle, inbox, log, shared.clone(), tick);
+        let waiting = Waiting { reply: WaitMode::Futex, spin_margin_ns: 0 };
+        let real_loop = RealLoop::new(&config, waiting, cycle, inbox, log, shared.clone(), tick);
         let desk =
             Desk { server, sender, _drain: drain, memory: Arc::clone(&memory), shared: shared.clone() };
         Self {
@@ -119,6 +120,7 @@ fn letter_of(event: ServerEvent) -> Option<Letter> {
     match event {
         ServerEvent::LeaseGranted { view, .. } => Some(Letter::Grant(view)),
         ServerEvent::LeaseEnded { lease } => Some(Letter::End(lease)),
+        ServerEvent::EmergencyStopRequested { .. } => Some(Letter::EmergencyStop),
         ServerEvent::ClearFaultRequested => Some(Letter::ClearFault),
         ServerEvent::LeaseRefused | ServerEvent::StopRequested { .. } | ServerEvent::Trouble { .. } => None,
     }

@@ -1,6 +1,6 @@
 //! A device that does what a test says, and remembers what it was made to do.
 
-use io_driver::device::{Device, Reading, TickTime, Written};
+use io_driver::device::{Device, Effort, Reading, TickTime, Written};
 use nalgebra::Vector3;
 use shm_abi::FaultReason;
 use shm_abi::segment::DeviceInfo;
@@ -55,6 +55,8 @@ impl Strings {
             continuous_force_n: peak_force_n,
             workspace_min_m: [-1.0; 3],
             workspace_max_m: [1.0; 3],
+            slew_n_per_s: f64::INFINITY,
+            speed_limit_m_per_s: f64::INFINITY,
         };
         Box::new(Puppet { info, strings: self.clone() })
     }
@@ -101,13 +103,13 @@ impl Device for Puppet {
         }
     }
 
-    fn write(&mut self, force_on_user_n: Vector3<f64>) -> Result<Written, FaultReason> {
+    fn write(&mut self, effort: Effort) -> Result<Written, FaultReason> {
         let mut state = self.strings.state();
-        state.calls.push(Call::Write(force_on_user_n));
+        state.calls.push(Call::Write(effort.force_on_user_n));
         match state.mood {
             Mood::Unwritable => Err(FaultReason::DeviceWrite),
             Mood::PanicsWhenWritten => panic!("a puppet that panics when it is written"),
-            _ => Ok(Written { force_on_user_n, motor_codes: [0; 3] }),
+            _ => Ok(Written { force_on_user_n: effort.force_on_user_n, ..Written::default() }),
         }
     }
 

@@ -4,7 +4,8 @@
 //! is let through, the *authority*, is a level counted in ramp ticks, so that full is exactly 1 and zero
 //! exactly 0. A fresh reply raises it by one; a reply that is missing while the last one is still young
 //! holds it; one that is too old, or a lease that ended, lowers it by a ramp of its own; a fault drops it to
-//! zero at once.
+//! zero at once. Where there is a dead-man's switch and nobody holds it, the level sinks as for a reply that is
+//! too old, and rises again, from wherever it is, once it is held.
 //!
 //! Invariants: authority is 0 unless a lease gave a valid command; it never jumps up; a new lease begins
 //! only after the former's force has ramped to zero; Fault is left only on request.
@@ -31,6 +32,7 @@ pub struct Safety {
     level: u64,
     fault: FaultReason,
     positions_valid: bool,
+    attended: bool,
     commanded: bool,
     run_started_at: Option<u64>,
 }
@@ -44,6 +46,7 @@ impl Safety {
             level: 0,
             fault: FaultReason::None,
             positions_valid: false,
+            attended: true,
             commanded: false,
             run_started_at: None,
         }
@@ -79,6 +82,11 @@ impl Safety {
         self.positions_valid = valid;
     }
 
+    /// Says whether a dead-man's switch is held, or there is none. Call before the frame is published.
+    pub fn set_attended(&mut self, attended: bool) {
+        self.attended = attended;
+    }
+
     /// Ticks since this lease first had full authority, counted at the start of `tick`; -1 before.
     pub fn run_tick(&mut self, tick: u64) -> i64 {
         if self.run_started_at.is_none() && self.level == self.ramps.in_ticks {
@@ -109,20 +117,23 @@ impl Safety {
             self.release();
             return 0.0;
         }
-        self.commanded = matches!(reply, ReplyKind::Fresh | ReplyKind::Held);
+        self.commanded = self.attended && matches!(reply, ReplyKind::Fresh | ReplyKind::Held);
         match reply {
+            _ if !self.attended => self.sink(),
             ReplyKind::Fresh => {
                 let now = self.authority();
                 self.level = (self.level + 1).min(self.ramps.in_ticks);
                 now
             }
             ReplyKind::Held => self.authority(),
-            ReplyKind::Expired | ReplyKind::NoLease => {
-                let step = self.ramps.in_ticks.div_ceil(self.ramps.out_ticks);
-                self.level = self.level.saturating_sub(step);
-                self.authority()
-            }
+            ReplyKind::Expired | ReplyKind::NoLease => self.sink(),
         }
+    }
+
+    fn sink(&mut self) -> f64 {
+        let step = self.ramps.in_ticks.div_ceil(self.ramps.out_ticks);
+        self.level = self.level.saturating_sub(step);
+        self.authority()
     }
 
     /// Enters the fault state; returns whether that is new. The first reason stands.
@@ -146,26 +157,9 @@ impl Safety {
     }
 }
 
-/// Cuts a force to a device's peak, keeping its direction. Returns whether it had to. A force that is not
-/// finite is a defect of the caller's and becomes zero.
-pub fn limit_force(force: nalgebra::Vector3<f64>, peak_n: f64) -> (nalgebra::Vector3<f64>, bool) {
-    if !force.iter().all(|component| component.is_finite()) {
-        return (nalgebra::Vector3::zeros(), true);
-    }
-    // The largest component is divided out first: the square of a large finite force is infinite.
-    let largest = force.amax();
-    if largest == 0.0 {
-        return (force, false);
-    }
-    let direction = force / largest;
-    let norm = direction.norm();
-    if largest <= peak_n / norm { (force, false) } else { (direction * (peak_n / norm), true) }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Vector3;
     use proptest::prelude::*;
 
     const RAMPS: Ramps = Ramps { in_ticks: 200, out_ticks: 10, max_command_age_ticks: 5 };
@@ -246,6 +240,21 @@ mod tests {
         assert_eq!(safety.state(), DriverState::Zeroing);
     }
 
+    #[test]
+    fn a_dead_mans_switch_that_is_let_go_ramps_the_force_out_and_held_again_it_ramps_in() {
+        let mut safety = active(RAMPS);
+        safety.set_attended(false);
+        for tick in 1..=10 {
+            // As for an expired reply: integers over 200, one rounding of the quotient.
+            assert!((safety.advance(ReplyKind::Fresh) - (1.0 - f64::from(tick) / 10.0)).abs() < 1e-15);
+        }
+        assert_eq!(safety.state(), DriverState::Idle);
+        safety.set_attended(true);
+        assert_eq!(safety.advance(ReplyKind::Fresh), 0.0);
+        assert_eq!(safety.advance(ReplyKind::Fresh), 1.0 / 200.0);
+        assert_eq!(safety.state(), DriverState::Active);
+    }
+
     proptest! {
         #[test]
         fn authority_stays_in_range_and_never_jumps_up(
@@ -264,36 +273,5 @@ mod tests {
                 former = now;
             }
         }
-
-        #[test]
-        fn a_limited_force_keeps_its_direction_and_respects_the_peak(
-            x in proptest::num::f64::NORMAL, y in proptest::num::f64::NORMAL, z in proptest::num::f64::NORMAL,
-            peak in 0.0..100.0f64,
-        ) {
-            let force = Vector3::new(x, y, z);
-            let (limited, was_cut) = limit_force(force, peak);
-            // Four roundings (two divisions, the norm, a product) of half an ulp each.
-            prop_assert!(limited.norm() <= peak * (1.0 + 1e-15));
-            if was_cut {
-                let unit = force / force.amax();
-                let turned = limited.cross(&unit).norm();
-                prop_assert!(turned <= 1e-14 * peak * unit.norm());
-            } else {
-                prop_assert_eq!(limited, force);
-            }
-        }
-    }
-
-    #[test]
-    fn a_force_that_is_not_finite_becomes_zero() {
-        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-            assert_eq!(limit_force(Vector3::new(1.0, bad, 0.0), 8.5), (Vector3::zeros(), true));
-        }
-        let huge = Vector3::repeat(f64::MAX);
-        assert_eq!(
-            limit_force(huge, f64::INFINITY),
-            (huge, false),
-            "no limit leaves everything finite alone"
-        );
     }
 }

@@ -1,0 +1,249 @@
+//! `[[device]]`: how each device is reached.
+
+use crate::toml_report::{Allowed, SpannedList, TomlReport, TomlText};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use serde::Deserialize;
+use shm_abi::MAX_DEVICES;
+use std::path::{Path, PathBuf};
+use toml::Spanned;
+
+/// One device.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DeviceConfig {
+    /// Its name in reports.
+    pub name: String,
+    /// How it is reached.
+    pub backend: Backend,
+    /// Overrides the peak of its description (N).
+    pub peak_force_n: Option<f64>,
+    /// Its motors hold up its own weight while somebody commands.
+    pub compensates_gravity: bool,
+}
+
+/// How a device is reached.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Backend {
+    /// No mechanism: the scripted hand's position goes straight through.
+    Ideal {
+        /// The hand file and the finger in it.
+        hand: Option<(PathBuf, String)>,
+        /// Where the tip rests without a script, in the world W (m).
+        start_m: Vector3<f64>,
+        /// X_WD, where the base stands.
+        base_in_world: Isometry3<f64>,
+    },
+    /// A recorded encoder trace through a described mechanism.
+    Replay {
+        /// The description: a built-in's name or a file.
+        description: PathBuf,
+        /// The trace.
+        trace: PathBuf,
+    },
+    /// A card of registers that a process of its own emulates, amplifiers with watchdog included.
+    Emulated {
+        /// The description: a built-in's name or a file.
+        description: PathBuf,
+        /// The file of registers that both processes map.
+        card: PathBuf,
+    },
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawDevice {
+    name: Option<Spanned<String>>,
+    backend: Spanned<RawBackend>,
+    description: Option<Spanned<PathBuf>>,
+    trace: Option<Spanned<PathBuf>>,
+    card: Option<Spanned<PathBuf>>,
+    gravity_compensation: Option<Spanned<bool>>,
+    hand: Option<Spanned<PathBuf>>,
+    finger: Option<Spanned<String>>,
+    start_m: Option<SpannedList>,
+    base_position_m: Option<SpannedList>,
+    base_orientation_wxyz: Option<SpannedList>,
+    peak_force_n: Option<Spanned<f64>>,
+}
+
+#[derive(Deserialize, Clone, Copy)]
+#[serde(rename_all = "kebab-case")]
+enum RawBackend {
+    Ideal,
+    Replay,
+    Emulated,
+}
+
+pub(super) fn devices(
+    raw: &Spanned<Vec<Spanned<RawDevice>>>,
+    toml: &TomlText<'_>,
+    directory: &Path,
+) -> Result<Vec<DeviceConfig>, TomlReport> {
+    let list = raw.get_ref();
+    if list.is_empty() || list.len() > MAX_DEVICES {
+        let allowed = format!("1 to {MAX_DEVICES}");
+        return Err(toml.refuse(raw.span(), format_args!("{} devices", list.len()), allowed));
+    }
+    let mut devices: Vec<DeviceConfig> = Vec::with_capacity(list.len());
+    for (index, item) in list.iter().enumerate() {
+        let device = item.get_ref().validate(index, item.span(), toml, directory)?;
+        if devices.iter().any(|other| other.name == device.name) {
+            let span = item.get_ref().name.as_ref().map_or(item.span(), Spanned::span);
+            return Err(toml.refuse(
+                span,
+                format_args!("the name \"{}\" twice", device.name),
+                "each name once",
+            ));
+        }
+        devices.push(device);
+    }
+    Ok(devices)
+}
+
+impl RawDevice {
+    pub(super) fn validate(
+        &self,
+        index: usize,
+        span: std::ops::Range<usize>,
+        toml: &TomlText<'_>,
+        directory: &Path,
+    ) -> Result<DeviceConfig, TomlReport> {
+        let name = self.name.as_ref().map_or_else(|| format!("f{index}"), |name| name.get_ref().clone());
+        let backend = match self.backend.get_ref() {
+            RawBackend::Ideal => self.ideal(&name, toml, directory)?,
+            RawBackend::Replay => self.replay(span, toml, directory)?,
+            RawBackend::Emulated => self.emulated(span, toml, directory)?,
+        };
+        let peak_force_n = self.peak_force_n.as_ref().map(|peak| toml.number(peak, PEAK)).transpose()?;
+        let compensates_gravity = self.gravity_compensation.as_ref().is_some_and(|key| *key.get_ref());
+        Ok(DeviceConfig { name, backend, peak_force_n, compensates_gravity })
+    }
+
+    fn ideal(&self, name: &str, toml: &TomlText<'_>, directory: &Path) -> Result<Backend, TomlReport> {
+        self.refuse_foreign(
+            "ideal",
+            &[
+                ("description", span_of(&self.description)),
+                ("trace", span_of(&self.trace)),
+                ("card", span_of(&self.card)),
+                ("gravity_compensation", span_of(&self.gravity_compensation)),
+            ],
+            toml,
+        )?;
+        let finger = self.finger.as_ref().map_or_else(|| name.to_owned(), |finger| finger.get_ref().clone());
+        let start = self.start_m.as_ref().map_or(Ok([0.0; 3]), |list| toml.numbers(list, PLACE))?;
+        Ok(Backend::Ideal {
+            hand: self.hand.as_ref().map(|hand| (directory.join(hand.get_ref()), finger)),
+            start_m: Vector3::from(start),
+            base_in_world: self.base(toml)?,
+        })
+    }
+
+    fn replay(
+        &self,
+        span: std::ops::Range<usize>,
+        toml: &TomlText<'_>,
+        directory: &Path,
+    ) -> Result<Backend, TomlReport> {
+        self.refuse_foreign("replay", &[("card", span_of(&self.card))], toml)?;
+        self.refuse_foreign("replay", &self.keys_of_ideal(), toml)?;
+        let trace = self.needed("replay", &self.trace, "trace", &span, toml)?;
+        Ok(Backend::Replay {
+            description: self.description("replay", &span, toml, directory)?,
+            trace: directory.join(trace),
+        })
+    }
+
+    fn emulated(
+        &self,
+        span: std::ops::Range<usize>,
+        toml: &TomlText<'_>,
+        directory: &Path,
+    ) -> Result<Backend, TomlReport> {
+        self.refuse_foreign("emulated", &[("trace", span_of(&self.trace))], toml)?;
+        self.refuse_foreign("emulated", &self.keys_of_ideal(), toml)?;
+        let card = self.needed("emulated", &self.card, "card", &span, toml)?;
+        Ok(Backend::Emulated {
+            description: self.description("emulated", &span, toml, directory)?,
+            card: directory.join(card),
+        })
+    }
+
+    fn keys_of_ideal(&self) -> [(&'static str, Option<std::ops::Range<usize>>); 5] {
+        [
+            ("hand", span_of(&self.hand)),
+            ("finger", span_of(&self.finger)),
+            ("start_m", span_of(&self.start_m)),
+            ("base_position_m", span_of(&self.base_position_m)),
+            ("base_orientation_wxyz", span_of(&self.base_orientation_wxyz)),
+        ]
+    }
+
+    fn needed(
+        &self,
+        backend: &str,
+        key: &Option<Spanned<PathBuf>>,
+        name: &str,
+        span: &std::ops::Range<usize>,
+        toml: &TomlText<'_>,
+    ) -> Result<PathBuf, TomlReport> {
+        key.as_ref().map(|path| path.get_ref().clone()).ok_or_else(|| {
+            let article = if backend.starts_with('e') { "an" } else { "a" };
+            let found = format!("no key `{name}` in {article} {backend} device");
+            toml.refuse(span.clone(), found, format_args!("`{name} = \"FILE\"`"))
+        })
+    }
+
+    /// A built-in's name stays what it is; else a file.
+    fn description(
+        &self,
+        backend: &str,
+        span: &std::ops::Range<usize>,
+        toml: &TomlText<'_>,
+        directory: &Path,
+    ) -> Result<PathBuf, TomlReport> {
+        let description = self.needed(backend, &self.description, "description", span, toml)?;
+        Ok(match crate::device_file::builtin(&description.to_string_lossy()) {
+            Some(_) => description,
+            None => directory.join(description),
+        })
+    }
+
+    fn refuse_foreign(
+        &self,
+        backend: &str,
+        keys: &[(&str, Option<std::ops::Range<usize>>)],
+        toml: &TomlText<'_>,
+    ) -> Result<(), TomlReport> {
+        match keys.iter().find_map(|(key, span)| span.clone().map(|span| (*key, span))) {
+            Some((key, span)) => Err(toml.refuse(
+                span,
+                format_args!("`{key}` in a device of backend \"{backend}\""),
+                "not there",
+            )),
+            None => Ok(()),
+        }
+    }
+
+    fn base(&self, toml: &TomlText<'_>) -> Result<Isometry3<f64>, TomlReport> {
+        let position =
+            self.base_position_m.as_ref().map_or(Ok([0.0; 3]), |list| toml.numbers(list, PLACE))?;
+        let rotation = match &self.base_orientation_wxyz {
+            None => UnitQuaternion::identity(),
+            Some(list) => {
+                let [w, x, y, z] = toml.numbers(list, QUATERNION)?;
+                UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-6).ok_or_else(|| {
+                    toml.refuse(list.span(), "a quaternion of no length", "w, x, y, z of a rotation")
+                })?
+            }
+        };
+        Ok(Isometry3::from_parts(Translation3::from(Vector3::from(position)), rotation))
+    }
+}
+
+fn span_of<T>(key: &Option<Spanned<T>>) -> Option<std::ops::Range<usize>> {
+    key.as_ref().map(Spanned::span)
+}
+
+const PLACE: Allowed = Allowed { min: -100.0, max: 100.0, unit: "m" };
+const QUATERNION: Allowed = Allowed { min: -2.0, max: 2.0, unit: "(w, x, y, z)" };
+const PEAK: Allowed = Allowed { min: 0.0, max: 1000.0, unit: "N" };

@@ -1,0 +1,69 @@
+//! What every arm with counters and motors has in common, whatever carries its registers.
+//!
+//! Model: raw counters, extended beyond their width, become joint angles and the tip; a force becomes codes.
+//! Invariant: `read` comes before `render` in a tick; codes are for the pose that was read last.
+
+use super::{Effort, Reading, TickTime, Written};
+use crate::device_file::PremiumFile;
+use crate::drive::Drive;
+use crate::encoders::{EncoderExtender, JointMap};
+use crate::kinematics::{Kinematics, Mechanism};
+use shm_abi::FaultReason;
+
+/// An arm.
+#[derive(Debug)]
+pub struct Arm {
+    extender: EncoderExtender,
+    map: JointMap,
+    kinematics: Kinematics,
+    drive: Drive,
+    joints: [f64; 3],
+    last_tick: Option<u64>,
+}
+
+impl Arm {
+    /// An arm of this description; `holds_its_weight`: gravity is compensated, if the bodies are described.
+    pub fn new(premium: &PremiumFile, holds_its_weight: bool) -> Self {
+        let kinematics = Kinematics::Premium(premium.mechanism);
+        let gravity = premium.gravity().filter(|_| holds_its_weight);
+        Self {
+            extender: EncoderExtender::new(premium.encoders.count_bits),
+            map: JointMap::new(&premium.encoders),
+            kinematics,
+            drive: Drive::new(kinematics, &premium.motors, premium.heat, gravity),
+            joints: premium.encoders.home_joint_angles_rad,
+            last_tick: None,
+        }
+    }
+
+    /// Takes the raw counters of a tick. The pose of the first is the home pose.
+    pub fn read(&mut self, raw: [i64; 3], time: TickTime) -> Reading {
+        let counts = self.extender.extend(raw);
+        match self.last_tick.replace(time.tick) {
+            None => self.map.zero_at(counts),
+            Some(last) => {
+                let elapsed = i64::try_from(time.tick.saturating_sub(last)).unwrap_or(i64::MAX);
+                self.drive.pass(super::run_time_s(elapsed, time.period_ns));
+            }
+        }
+        self.joints = self.map.counts_to_angles(counts);
+        let mut reading = Reading::at(self.kinematics.forward(self.joints));
+        reading.encoder_counts[..3].copy_from_slice(&counts);
+        reading.joint_angle_rad[..3].copy_from_slice(&self.joints);
+        reading
+    }
+
+    /// Codes for an effort in the pose that was read.
+    ///
+    /// # Errors
+    /// A torque that is not a number.
+    pub fn render(&mut self, effort: Effort) -> Result<([u16; 3], Written), FaultReason> {
+        self.drive.render(self.joints, effort)
+    }
+
+    /// The codes of zero torque; the motors get them now.
+    pub fn release(&mut self) -> [u16; 3] {
+        self.drive.release();
+        self.drive.zero_codes()
+    }
+}

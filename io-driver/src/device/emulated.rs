@@ -1,0 +1,134 @@
+//! An arm on an emulated card: the same path as real registers, and an amplifier that checks every value.
+//!
+//! Model: counters, buttons and status are read, codes and enable written, as words of a mapping. Amplifiers are
+//! on only while some force may be let through. A card whose emulator stands still cannot be read.
+//! Invariants: a process that dies by a signal stores zero torque and switches the amplifiers off, whichever of
+//! its threads it was.
+
+use super::arm::Arm;
+use super::{Device, Effort, Reading, TickTime, Written};
+use crate::emulator::card::{Card, DriversCard, QUEUE, STATUS_TRIPPED};
+use rt_core::clock::monotonic_ns;
+use rt_core::last_act;
+use shm_abi::FaultReason;
+use shm_abi::segment::DeviceInfo;
+use std::sync::atomic::Ordering;
+
+/// A card that shows no life for so long is gone (ns). Stalls of a virtual machine are shorter.
+const PATIENCE_NS: u64 = 200_000_000;
+
+/// The device.
+#[derive(Debug)]
+pub struct EmulatedDevice {
+    info: DeviceInfo,
+    hold: DriversCard,
+    arm: Arm,
+    channels: Channels,
+    heartbeat: u64,
+    alive_ns: u64,
+}
+
+/// Which registers belong to the joints.
+#[derive(Debug, Clone, Copy)]
+pub struct Channels {
+    /// Counters.
+    pub encoders: [u8; 3],
+    /// Converters; below 4.
+    pub motors: [u8; 3],
+}
+
+impl EmulatedDevice {
+    /// An arm on a card that this driver holds, switched off.
+    ///
+    /// # Errors
+    /// If no more registers can be switched off by a dying process.
+    pub fn new(
+        info: DeviceInfo,
+        hold: DriversCard,
+        arm: Arm,
+        channels: Channels,
+    ) -> Result<Self, last_act::NoRoom> {
+        let mut device = Self { info, hold, arm, channels, heartbeat: 0, alive_ns: monotonic_ns() };
+        last_act::guard(&device.card().outputs.enable, 0)?;
+        let zero = u32::from(device.arm.release()[0]);
+        for channel in channels.motors {
+            last_act::guard(&device.card().outputs.codes[usize::from(channel)], zero)?;
+        }
+        device.release();
+        device.rearm();
+        Ok(device)
+    }
+
+    fn card(&self) -> &'static Card {
+        self.hold.card
+    }
+
+    fn is_alive(&mut self) -> bool {
+        let heartbeat = self.card().inputs.heartbeat.load(Ordering::Acquire);
+        let now = monotonic_ns();
+        if heartbeat != self.heartbeat {
+            self.heartbeat = heartbeat;
+            self.alive_ns = now;
+        }
+        now.saturating_sub(self.alive_ns) <= PATIENCE_NS
+    }
+
+    fn store(&self, codes: [u16; 3], enable: bool) {
+        last_act::store_unless_dying(|| {
+            let outputs = &self.card().outputs;
+            let number = outputs.written.load(Ordering::Relaxed).wrapping_add(1);
+            let record = &self.card().queue[(number % QUEUE as u64) as usize];
+            let mut packed = 0;
+            for (channel, code) in self.channels.motors.iter().zip(codes) {
+                packed |= u64::from(code) << (16 * u32::from(*channel));
+                outputs.codes[usize::from(*channel)].store(u32::from(code), Ordering::Relaxed);
+            }
+            record.number.store(0, Ordering::Release);
+            record.time_ns.store(monotonic_ns(), Ordering::Relaxed);
+            record.codes.store(packed, Ordering::Relaxed);
+            record.flags.store(u64::from(enable), Ordering::Relaxed);
+            record.number.store(number, Ordering::Release);
+            outputs.enable.store(u32::from(enable), Ordering::Release);
+            outputs.written.store(number, Ordering::Release);
+        });
+    }
+}
+
+impl Device for EmulatedDevice {
+    fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    fn read(&mut self, time: TickTime) -> Result<Reading, FaultReason> {
+        let inputs = &self.card().inputs;
+        let raw = self
+            .channels
+            .encoders
+            .map(|channel| i64::from(inputs.counters[usize::from(channel)].load(Ordering::Relaxed)));
+        // Read whatever the status says: the counters go on, and nobody has to zero anew.
+        let mut reading = self.arm.read(raw, time);
+        reading.buttons = u64::from(inputs.buttons.load(Ordering::Relaxed));
+        if !self.is_alive() {
+            return Err(FaultReason::DeviceRead);
+        }
+        if inputs.status.load(Ordering::Acquire) & STATUS_TRIPPED != 0 {
+            return Err(FaultReason::AmplifierTripped);
+        }
+        Ok(reading)
+    }
+
+    fn write(&mut self, effort: Effort) -> Result<Written, FaultReason> {
+        let (codes, written) = self.arm.render(effort)?;
+        self.store(codes, effort.gravity_share > 0.0);
+        Ok(written)
+    }
+
+    fn release(&mut self) {
+        let zero = self.arm.release();
+        self.store(zero, false);
+    }
+
+    fn rearm(&mut self) {
+        self.card().outputs.arm.fetch_add(1, Ordering::AcqRel);
+    }
+}

@@ -1,0 +1,195 @@
+//! From a force on the user to converter codes, within what motors and amplifiers stand.
+//!
+//! Model: joint torque `tau = J^T F + share * tau_gravity`; codes by [`MotorMap`]. If a motor would need more
+//! than its amplifier gives or than its warmth allows, all three get the same smaller part, so that the force
+//! keeps its direction. The currents then warm the motors ([`Heat`]) until the next codes.
+//! Frames and signs: forces on the user in D.
+//! Invariants: codes are always valid ones; the rendered force that is told is what the codes amount to, less
+//! what holds the arm's own weight. Where the Jacobian is too near a singularity to tell the force apart from
+//! the codes, the force before rounding is told.
+//! Cost: one Jacobian and its inverse; no allocation.
+
+use crate::device::{Effort, Written};
+use crate::heat::{Heat, HeatSpec};
+use crate::kinematics::gravity::Gravity;
+use crate::kinematics::{Kinematics, Mechanism};
+use crate::motors::{MotorMap, MotorSpec};
+use nalgebra::Vector3;
+use shm_abi::FaultReason;
+use shm_abi::frame::{LIMIT_HEAT, LIMIT_SATURATION};
+
+/// Below this ratio of singular values a rounding error of a code would be blown up beyond meaning.
+const TELLABLE: f64 = 1e-3;
+
+/// The motors of an arm and how warm they are.
+#[derive(Debug, Clone)]
+pub struct Drive {
+    kinematics: Kinematics,
+    motors: MotorMap,
+    peak_current_a: f64,
+    heat: [Heat; 3],
+    /// What holds the arm's own weight, if that is wanted.
+    gravity: Option<Gravity>,
+    current_a: [f64; 3],
+}
+
+impl Drive {
+    /// Motors of which nobody knows how warm they are.
+    pub fn new(kinematics: Kinematics, motors: &MotorSpec, heat: HeatSpec, gravity: Option<Gravity>) -> Self {
+        Self {
+            kinematics,
+            motors: MotorMap::new(motors),
+            peak_current_a: motors.peak_current_a,
+            heat: [Heat::unknown(heat); 3],
+            gravity,
+            current_a: [0.0; 3],
+        }
+    }
+
+    /// The codes of zero torque.
+    pub fn zero_codes(&self) -> [u16; 3] {
+        self.motors.zero_codes()
+    }
+
+    /// Time went by (s) with the currents of the last codes.
+    pub fn pass(&mut self, elapsed_s: f64) {
+        for (heat, current_a) in self.heat.iter_mut().zip(self.current_a) {
+            heat.flow(current_a, elapsed_s);
+        }
+    }
+
+    /// The motors are off.
+    pub fn release(&mut self) {
+        self.current_a = [0.0; 3];
+    }
+
+    /// Codes for an effort in a pose, and what they amount to.
+    ///
+    /// # Errors
+    /// [`FaultReason::MotorNotFinite`] if a torque is not a number.
+    pub fn render(&mut self, joints: [f64; 3], effort: Effort) -> Result<([u16; 3], Written), FaultReason> {
+        let weight = self.holding_torque(joints, effort.gravity_share);
+        let wanted = Vector3::from(self.kinematics.joint_torque(joints, effort.force_on_user_n));
+        let torque = wanted + weight;
+        if !torque.iter().all(|t| t.is_finite()) {
+            return Err(FaultReason::MotorNotFinite);
+        }
+        let allowed = self.heat.map(|heat| heat.allowed_current_a(self.peak_current_a));
+        let command = self.motors.command_within(torque.into(), allowed);
+        self.current_a = self.motors.current_a(command.codes);
+        let residual =
+            Vector3::from(self.motors.joint_torque(command.codes)) - weight - wanted * command.scale;
+        let written = Written {
+            force_on_user_n: self.rendered(joints, effort.force_on_user_n * command.scale, residual),
+            motor_codes: command.codes.map(i64::from),
+            limits: self.limits(command.scale, allowed),
+            motor_heat: self.heat.iter().map(Heat::rise).fold(0.0, f64::max),
+        };
+        Ok((command.codes, written))
+    }
+
+    fn holding_torque(&self, joints: [f64; 3], share: f64) -> Vector3<f64> {
+        match &self.gravity {
+            Some(gravity) if share > 0.0 => Vector3::from(gravity.holding_torque(joints)) * share,
+            _ => Vector3::zeros(),
+        }
+    }
+
+    /// The force that was scaled, and what the torques that are left over add to it.
+    fn rendered(&self, joints: [f64; 3], scaled: Vector3<f64>, residual: Vector3<f64>) -> Vector3<f64> {
+        if self.kinematics.singularity(joints).inverse_condition() < TELLABLE {
+            return scaled;
+        }
+        let transposed = self.kinematics.jacobian(joints).transpose();
+        transposed.try_inverse().map_or(scaled, |inverse| scaled + inverse * residual)
+    }
+
+    fn limits(&self, scale: f64, allowed_a: [f64; 3]) -> u64 {
+        let is_warm = allowed_a.iter().any(|allowed| *allowed < self.peak_current_a);
+        match (scale < 1.0, is_warm) {
+            (false, _) => 0,
+            (true, true) => LIMIT_HEAT,
+            (true, false) => LIMIT_SATURATION,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device_file::{DeviceFile, builtin};
+    use std::path::Path;
+
+    fn drive(with_gravity: bool) -> Drive {
+        let text = builtin("premium-1.5").unwrap();
+        let DeviceFile::Premium(premium) = DeviceFile::parse(text, Path::new("premium-1.5")).unwrap() else {
+            panic!("a premium")
+        };
+        let gravity = premium.gravity().filter(|_| with_gravity);
+        Drive::new(Kinematics::Premium(premium.mechanism), &premium.motors, premium.heat, gravity)
+    }
+
+    fn push(force: Vector3<f64>) -> Effort {
+        Effort { force_on_user_n: force, gravity_share: 1.0 }
+    }
+
+    const JOINTS: [f64; 3] = [0.1, 0.2, 0.3];
+
+    #[test]
+    fn what_is_told_is_what_the_codes_amount_to_with_and_without_weight() {
+        for with_gravity in [false, true] {
+            let mut drive = drive(with_gravity);
+            let force = Vector3::new(0.7, -0.3, 1.1);
+            let (_, written) = drive.render(JOINTS, push(force)).unwrap();
+            // Half a step of each converter: 0.035 mN m over levers of 0.05 to 0.3 m, some 5 mN.
+            assert!((written.force_on_user_n - force).norm() < 5e-3, "{with_gravity} {written:?}");
+            assert_eq!(written.limits, 0);
+        }
+    }
+
+    #[test]
+    fn the_weight_is_held_on_top_of_the_force_and_only_by_its_share() {
+        let mut with = drive(true);
+        let mut without = drive(false);
+        let torque = |codes| Vector3::from(drive(false).motors.joint_torque(codes));
+        let (codes_with, _) = with.render(JOINTS, push(Vector3::zeros())).unwrap();
+        let (codes_without, _) = without.render(JOINTS, push(Vector3::zeros())).unwrap();
+        let expected = Vector3::from(with.gravity.unwrap().holding_torque(JOINTS));
+        let step = with.motors.torque_per_step()[0];
+        assert!((torque(codes_with) - torque(codes_without) - expected).amax() <= step, "to a step");
+        let none = Effort { force_on_user_n: Vector3::zeros(), gravity_share: 0.0 };
+        assert_eq!(with.render(JOINTS, none).unwrap().0, with.zero_codes());
+    }
+
+    #[test]
+    fn a_long_strong_push_warms_the_motors_and_is_cut_back_in_its_own_direction() {
+        let mut drive = drive(false);
+        let force = Vector3::new(0.0, -6.0, 3.0);
+        let mut last = None;
+        for _ in 0..60_000 {
+            drive.pass(1e-3);
+            let (_, written) = drive.render(JOINTS, push(force)).unwrap();
+            // Half a converter step, 1.3 mA, on 1.24 A.
+            assert!(written.motor_heat < 1.0022, "{}", written.motor_heat);
+            last = Some(written);
+        }
+        let written = last.unwrap();
+        assert_eq!(written.limits, LIMIT_HEAT);
+        assert!(written.force_on_user_n.norm() < 0.5 * force.norm(), "{written:?}");
+        let turned = written.force_on_user_n.normalize().cross(&force.normalize()).norm();
+        // Half a converter step of 5 mN on some 2 N.
+        assert!(turned < 5e-3, "{turned}");
+    }
+
+    #[test]
+    fn beyond_the_amplifiers_range_it_says_so() {
+        let (_, written) = drive(false).render([0.0; 3], push(Vector3::y() * 50.0)).unwrap();
+        assert_eq!(written.limits, LIMIT_SATURATION);
+    }
+
+    #[test]
+    fn a_torque_that_is_not_a_number_is_a_fault() {
+        let result = drive(false).render([f64::NAN, 0.0, 0.0], push(Vector3::x()));
+        assert_eq!(result.unwrap_err(), FaultReason::MotorNotFinite);
+    }
+}

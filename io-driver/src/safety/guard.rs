@@ -1,0 +1,177 @@
+//! One device's chain of limits, between what was commanded and what its motors are asked for.
+//!
+//! Model: peak, workspace edge, authority, slew rate, in this order: the slew rate bounds what all the others
+//! may make of a force from tick to tick, and none of them can make it longer.
+//! Frames and signs: forces on the user and positions in the device's base frame D.
+//! Invariants: whatever is commanded, what comes out is finite and within the peak; with no authority it is
+//! exactly zero.
+//! Cost: constant; no allocation, no panic.
+
+use super::peak::limit_force;
+use super::slew::Slew;
+use super::speed::Speed;
+use super::workspace::Edge;
+use nalgebra::Vector3;
+use shm_abi::FaultReason;
+use shm_abi::frame::{LIMIT_PEAK, LIMIT_SLEW, LIMIT_WORKSPACE};
+use shm_abi::segment::DeviceInfo;
+
+/// What one device may be made to do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Longest force (N); infinite: none.
+    pub peak_n: f64,
+    /// How fast a force may grow (N/s); infinite: at once.
+    pub slew_n_per_s: f64,
+    /// Speed of the tip that is a fault (m/s); infinite: none.
+    pub speed_m_per_s: f64,
+    /// Where force is let through.
+    pub edge: Edge,
+}
+
+impl Limits {
+    /// Those that a device's description tells, with a margin around its workspace (m).
+    pub fn of(info: &DeviceInfo, margin_m: f64) -> Self {
+        let edge = Edge { min_m: info.workspace_min_m.into(), max_m: info.workspace_max_m.into(), margin_m };
+        Self {
+            peak_n: info.peak_force_n,
+            slew_n_per_s: info.slew_n_per_s,
+            speed_m_per_s: info.speed_limit_m_per_s,
+            edge,
+        }
+    }
+}
+
+/// The chain of one device.
+#[derive(Debug, Clone)]
+pub struct Guard {
+    limits: Limits,
+    slew: Slew,
+    speed: Speed,
+    period_s: f64,
+    position: Vector3<f64>,
+}
+
+/// What is left of a command.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Restrained {
+    /// The force on the user to ask of the motors, in D (N).
+    pub force_on_user_n: Vector3<f64>,
+    /// Bits of `LIMIT_...`: what had to act.
+    pub limits: u64,
+}
+
+impl Guard {
+    /// A device at rest without force.
+    pub fn new(limits: Limits, period_ns: u64) -> Self {
+        Self {
+            limits,
+            slew: Slew::new(limits.slew_n_per_s),
+            speed: Speed::new(limits.speed_m_per_s, period_ns),
+            period_s: period_ns as f64 / 1e9,
+            position: Vector3::zeros(),
+        }
+    }
+
+    /// Takes the tip's position in a tick; returns its velocity (m/s).
+    ///
+    /// # Errors
+    /// That it moved faster than it may.
+    pub fn observe(&mut self, tick: u64, position: Vector3<f64>) -> Result<Vector3<f64>, FaultReason> {
+        self.position = position;
+        self.speed.observe(tick, position)
+    }
+
+    /// The position is not known; the next one is compared with nothing.
+    pub fn lose_sight(&mut self) {
+        self.speed.forget();
+    }
+
+    /// What may be asked of the motors, given the share of the force that is let through.
+    pub fn restrain(&mut self, commanded: Vector3<f64>, authority: f64) -> Restrained {
+        // Not `commanded * 0.0`: that leaves a negative zero or, for a fault, anything at all.
+        if authority <= 0.0 {
+            self.release();
+            return Restrained { force_on_user_n: Vector3::zeros(), limits: 0 };
+        }
+        let (within_peak, is_cut) = limit_force(commanded, self.limits.peak_n);
+        let share = self.limits.edge.share(self.position);
+        let is_outside = share < 1.0;
+        let faded = if is_outside { within_peak * share } else { within_peak };
+        // One tick's step however many were skipped: a longer one would be felt as a blow.
+        let (force, is_slewed) = self.slew.follow(faded * authority, self.period_s);
+        let bit = |acted: bool, bit: u64| if acted { bit } else { 0 };
+        let limits = bit(is_cut, LIMIT_PEAK) | bit(is_outside, LIMIT_WORKSPACE) | bit(is_slewed, LIMIT_SLEW);
+        Restrained { force_on_user_n: force, limits }
+    }
+
+    /// The force is gone, whatever it was.
+    pub fn release(&mut self) {
+        self.slew.release();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const MS: u64 = 1_000_000;
+
+    fn limits() -> Limits {
+        let edge = Edge { min_m: Vector3::repeat(-0.1), max_m: Vector3::repeat(0.1), margin_m: 0.02 };
+        Limits { peak_n: 8.5, slew_n_per_s: 2000.0, speed_m_per_s: 1.5, edge }
+    }
+
+    #[test]
+    fn each_limit_that_acts_is_told() {
+        let mut guard = Guard::new(limits(), MS);
+        guard.observe(1, Vector3::zeros()).unwrap();
+        let small = guard.restrain(Vector3::x(), 1.0);
+        assert_eq!(small, Restrained { force_on_user_n: Vector3::x(), limits: 0 });
+        let step = guard.restrain(Vector3::x() * 9.0, 1.0);
+        assert_eq!(step.limits, LIMIT_PEAK | LIMIT_SLEW);
+        assert_eq!(step.force_on_user_n, Vector3::x() * 3.0);
+        let mut outside = Guard::new(limits(), MS);
+        outside.observe(1, Vector3::x() * 0.11).unwrap();
+        let faded = outside.restrain(Vector3::x(), 1.0);
+        assert_eq!(faded.limits, LIMIT_WORKSPACE);
+        assert!((faded.force_on_user_n.x - 0.5).abs() < 1e-14, "half of it in mid margin, to rounding");
+    }
+
+    #[test]
+    fn without_authority_there_is_exactly_nothing_and_force_grows_from_there_again() {
+        let mut guard = Guard::new(limits(), MS);
+        for _ in 0..10 {
+            guard.restrain(Vector3::x() * 8.0, 1.0);
+        }
+        let none = guard.restrain(Vector3::new(-8.0, f64::NAN, 1.0), 0.0);
+        assert_eq!(none, Restrained { force_on_user_n: Vector3::zeros(), limits: 0 });
+        assert!(none.force_on_user_n.iter().all(|c| c.is_sign_positive()), "and no negative zero");
+        assert_eq!(guard.restrain(Vector3::x() * 8.0, 1.0).force_on_user_n, Vector3::x() * 2.0);
+    }
+
+    proptest! {
+        #[test]
+        fn whatever_is_commanded_stays_finite_within_the_peak_and_the_step(
+            commands in proptest::collection::vec(
+                (prop::array::uniform3(any::<f64>()), 0.0..1.0f64, prop::array::uniform3(-0.2..0.2f64)), 1..60),
+        ) {
+            let mut guard = Guard::new(limits(), MS);
+            let mut last = Vector3::zeros();
+            for (tick, (force, authority, position)) in commands.into_iter().enumerate() {
+                let _ = guard.observe(tick as u64, position.into());
+                let out = guard.restrain(force.into(), authority).force_on_user_n;
+                prop_assert!(out.iter().all(|c| c.is_finite()));
+                // A few roundings of numbers below 10.
+                prop_assert!(out.norm() <= 8.5 + 1e-13);
+                prop_assert!(out.norm() <= last_norm(&last) + 2.0 + 1e-13);
+                last = out;
+            }
+        }
+    }
+
+    fn last_norm(last: &Vector3<f64>) -> f64 {
+        last.norm()
+    }
+}
