@@ -260,11 +260,12 @@ impl Device for Strict {
     }
 
     fn write(&mut self, effort: Effort) -> Result<Written, FaultReason> {
+        let force_on_user_n = effort.force_on_user_n;
         // Of a direction of length 1 but for rounding: a few ulp.
         assert!(force_on_user_n.norm() <= PEAK_N * (1.0 + 1e-15), "{force_on_user_n:?}");
         assert!(force_on_user_n.iter().all(|component| component.is_finite()));
         self.written.fetch_add(u64::from(force_on_user_n != Vector3::zeros()), Ordering::Relaxed);
-        Ok(Written { force_on_user_n: effort.force_on_user_n, ..Written::default() })
+        Ok(Written { force_on_user_n, ..Written::default() })
     }
 
     fn release(&mut self) {}
