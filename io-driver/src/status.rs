@@ -3,10 +3,14 @@
 use crate::meter;
 use rt_core::histogram::{Histogram, Summary};
 use serde::Serialize;
+use shm_abi::frame::{
+    INPUT_DEAD_MAN_HELD, INPUT_DEAD_MAN_PRESENT, INPUT_EMERGENCY_STOP, LIMIT_HEAT, LIMIT_PEAK,
+    LIMIT_SATURATION, LIMIT_SLEW, LIMIT_WORKSPACE,
+};
 use shm_abi::segment::{ClockMode, DriverInfo};
 use shm_abi::{DriverState, DriverView, FaultReason, Frame};
 use std::fmt;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::Ordering;
 
 /// A driver at one moment. Units are in the names.
 #[derive(Debug, Clone, Serialize)]
@@ -33,6 +37,12 @@ pub struct Status {
     pub lease: u64,
     /// Share of the force that is let through.
     pub authority: f64,
+    /// Whether forces and speeds are cut to those of a first trial.
+    pub commissioning: bool,
+    /// Whether an emergency stop is pressed.
+    pub emergency_stop_pressed: bool,
+    /// Whether somebody holds the dead-man's switch; `None`: there is none.
+    pub dead_man_held: Option<bool>,
     /// Counts since the start.
     pub counters: CounterStatus,
     /// How late the loop woke.
@@ -49,31 +59,60 @@ pub struct Status {
     pub epitaph: Option<String>,
 }
 
-/// The driver's counters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct CounterStatus {
+/// The driver's counters, each under its name in the driver's segment.
+macro_rules! counters {
+    ($($(#[$doc:meta])* $name:ident,)+) => {
+        /// The driver's counters.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+        pub struct CounterStatus {
+            $($(#[$doc])* pub $name: u64,)+
+        }
+
+        impl CounterStatus {
+            /// Reads a driver's counters.
+            pub fn of(driver: &DriverView) -> Self {
+                Self { $($name: driver.counters.$name.load(Ordering::Relaxed),)+ }
+            }
+
+            /// What was counted after `before`.
+            pub fn since(&self, before: &Self) -> Self {
+                Self { $($name: self.$name.saturating_sub(before.$name),)+ }
+            }
+        }
+    };
+}
+
+counters! {
     /// Ticks done.
-    pub ticks: u64,
+    ticks,
     /// Deadlines skipped.
-    pub overruns: u64,
+    overruns,
     /// Ticks under a lease.
-    pub ticks_commanded: u64,
+    ticks_commanded,
     /// Of these, answered in time.
-    pub replies_fresh: u64,
+    replies_fresh,
     /// Of these, not answered in time.
-    pub replies_missed: u64,
+    replies_missed,
     /// Torn commands.
-    pub commands_torn: u64,
+    commands_torn,
     /// Commands not believed.
-    pub commands_refused: u64,
+    commands_refused,
     /// Forces cut to a peak.
-    pub forces_limited: u64,
+    forces_limited,
+    /// Forces that grew slower than commanded.
+    forces_slewed,
+    /// Forces cut because motors were warm.
+    forces_derated,
+    /// Forces cut outside the workspace.
+    forces_faded,
+    /// Ticks without force because the dead-man's switch was not held.
+    ticks_unattended,
     /// Leases granted.
-    pub leases_granted: u64,
+    leases_granted,
     /// Would-be commanders refused.
-    pub leases_refused: u64,
+    leases_refused,
     /// Faults entered.
-    pub faults: u64,
+    faults,
 }
 
 /// A histogram in short; `None` without values.
@@ -102,8 +141,16 @@ pub struct DeviceStatus {
     pub position_valid: bool,
     /// The tip in the base frame (m).
     pub position_m: [f64; 3],
+    /// Its velocity (m/s), estimated.
+    pub velocity_m_per_s: [f64; 3],
+    /// Bit `i`: button `i` is pressed.
+    pub buttons: u64,
     /// The force on the user that the motors render (N).
     pub force_on_user_n_applied: [f64; 3],
+    /// What came between that and the force commanded.
+    pub limits: Vec<&'static str>,
+    /// Warmth of the warmest motor; 1 is the rated.
+    pub motor_heat: f64,
     /// The largest force it may render (N); `None`: no limit.
     pub peak_force_n: Option<f64>,
 }
@@ -115,6 +162,7 @@ impl Status {
         let frame = driver.read_latest();
         let state = frame.and_then(|f| DriverState::from_word(f.state)).unwrap_or(DriverState::Starting);
         let fault = frame.and_then(|f| FaultReason::from_word(f.fault)).filter(|f| *f != FaultReason::None);
+        let inputs = frame.map_or(0, |f| f.inputs);
         Self {
             driver_pid,
             clock: info.clock_mode.name(),
@@ -127,6 +175,10 @@ impl Status {
             fault: fault.map(FaultReason::sentence),
             lease: frame.map_or(0, |f| f.lease),
             authority: frame.map_or(0.0, |f| f.authority),
+            commissioning: info.is_commissioning,
+            emergency_stop_pressed: inputs & INPUT_EMERGENCY_STOP != 0,
+            dead_man_held: (inputs & INPUT_DEAD_MAN_PRESENT != 0)
+                .then_some(inputs & INPUT_DEAD_MAN_HELD != 0),
             counters: CounterStatus::of(driver),
             wake_error_ns: Percentiles::of(&meter::read(&driver.wake_error_ns)),
             cycle_ns: Percentiles::of(&meter::read(&driver.cycle_ns)),
@@ -135,6 +187,19 @@ impl Status {
             guarantees: info.setup_report.lines().map(|line| line.trim().to_owned()).collect(),
             epitaph: rt_core::epitaph::read(&driver.epitaph).map(|words| words.to_string()),
         }
+    }
+
+    fn write_switches(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.emergency_stop_pressed {
+            writeln!(f, "switches    emergency stop pressed")?;
+        }
+        if let Some(held) = self.dead_man_held {
+            writeln!(f, "switches    dead-man's switch {}", if held { "held" } else { "let go: no force" })?;
+        }
+        if self.commissioning {
+            writeln!(f, "mode        commissioning: little force, little speed")?;
+        }
+        Ok(())
     }
 
     /// One line, for watching.
@@ -149,46 +214,6 @@ impl Status {
             self.counters.replies_missed,
             tips.join(" | "),
         )
-    }
-}
-
-impl CounterStatus {
-    /// Reads a driver's counters.
-    pub fn of(driver: &DriverView) -> Self {
-        let get = |word: &AtomicU64| word.load(Ordering::Relaxed);
-        let c = &driver.counters;
-        Self {
-            ticks: get(&c.ticks),
-            overruns: get(&c.overruns),
-            ticks_commanded: get(&c.ticks_commanded),
-            replies_fresh: get(&c.replies_fresh),
-            replies_missed: get(&c.replies_missed),
-            commands_torn: get(&c.commands_torn),
-            commands_refused: get(&c.commands_refused),
-            forces_limited: get(&c.forces_limited),
-            leases_granted: get(&c.leases_granted),
-            leases_refused: get(&c.leases_refused),
-            faults: get(&c.faults),
-        }
-    }
-}
-
-impl CounterStatus {
-    /// What was counted after `before`.
-    pub fn since(&self, before: &Self) -> Self {
-        Self {
-            ticks: self.ticks.saturating_sub(before.ticks),
-            overruns: self.overruns.saturating_sub(before.overruns),
-            ticks_commanded: self.ticks_commanded.saturating_sub(before.ticks_commanded),
-            replies_fresh: self.replies_fresh.saturating_sub(before.replies_fresh),
-            replies_missed: self.replies_missed.saturating_sub(before.replies_missed),
-            commands_torn: self.commands_torn.saturating_sub(before.commands_torn),
-            commands_refused: self.commands_refused.saturating_sub(before.commands_refused),
-            forces_limited: self.forces_limited.saturating_sub(before.forces_limited),
-            leases_granted: self.leases_granted.saturating_sub(before.leases_granted),
-            leases_refused: self.leases_refused.saturating_sub(before.leases_refused),
-            faults: self.faults.saturating_sub(before.faults),
-        }
     }
 }
 
@@ -225,6 +250,18 @@ impl DeviceStatus {
     }
 }
 
+/// The names of the bits of a device's `limits`.
+fn names_of(limits: u64) -> Vec<&'static str> {
+    let names = [
+        (LIMIT_PEAK, "peak"),
+        (LIMIT_WORKSPACE, "workspace"),
+        (LIMIT_SLEW, "slew"),
+        (LIMIT_HEAT, "heat"),
+        (LIMIT_SATURATION, "saturation"),
+    ];
+    names.into_iter().filter(|(bit, _)| limits & bit != 0).map(|(_, name)| name).collect()
+}
+
 fn devices(info: &DriverInfo, frame: Option<&Frame>) -> Vec<DeviceStatus> {
     let states = frame.map_or(&[][..], Frame::present_devices);
     info.devices
@@ -237,7 +274,11 @@ fn devices(info: &DriverInfo, frame: Option<&Frame>) -> Vec<DeviceStatus> {
                 kind: device.kind.clone(),
                 position_valid: state.is_some_and(|s| s.flags & shm_abi::frame::DEVICE_POSITION_VALID != 0),
                 position_m: state.map_or([0.0; 3], |s| s.position_m_measured),
+                velocity_m_per_s: state.map_or([0.0; 3], |s| s.velocity_m_per_s_estimated),
+                buttons: state.map_or(0, |s| s.buttons),
                 force_on_user_n_applied: state.map_or([0.0; 3], |s| s.force_on_user_n_applied),
+                limits: names_of(state.map_or(0, |s| s.limits)),
+                motor_heat: state.map_or(0.0, |s| s.motor_heat),
                 peak_force_n: Some(device.peak_force_n).filter(|peak| peak.is_finite()),
             }
         })
@@ -266,13 +307,24 @@ impl fmt::Display for Status {
             c.replies_fresh, c.replies_missed, c.commands_torn, c.commands_refused
         )?;
         writeln!(f, "leases      {} granted, {} refused", c.leases_granted, c.leases_refused)?;
-        writeln!(f, "safety      {} forces limited, {} faults", c.forces_limited, c.faults)?;
+        writeln!(
+            f,
+            "safety      {} faults; forces cut: {} to a peak, {} in growth, {} outside, {} by warmth",
+            c.faults, c.forces_limited, c.forces_slewed, c.forces_faded, c.forces_derated
+        )?;
+        self.write_switches(f)?;
         writeln!(f, "wake error  {}", self.wake_error_ns)?;
         writeln!(f, "cycle       {}", self.cycle_ns)?;
         write!(f, "round trip  {}", self.round_trip_ns)?;
         for device in &self.devices {
             let valid = if device.position_valid { "" } else { " (position not valid)" };
             write!(f, "\ndevice      {} [{}]{valid}", device.short(), device.kind)?;
+            if device.motor_heat > 0.0 {
+                write!(f, ", motors at {:.0} % of their warmth", 100.0 * device.motor_heat)?;
+            }
+            if !device.limits.is_empty() {
+                write!(f, ", limited by {}", device.limits.join(" and "))?;
+            }
         }
         for line in &self.guarantees {
             write!(f, "\nguarantee   {line}")?;

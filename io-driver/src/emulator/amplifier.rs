@@ -333,7 +333,8 @@ mod tests {
     #[test]
     fn each_limit_trips_it_and_is_counted_apart() {
         let zero = Value { time_ns: MS, codes: [2048; 3], enable: true };
-        let wrongs: [(Value, fn(&Tally) -> u64); 5] = [
+        type Count = fn(&Tally) -> u64;
+        let wrongs: [(Value, Count); 5] = [
             (Value { codes: [0, 2048, 2048], ..zero }, |tally| tally.bad_codes),
             (Value { codes: [2048, 4096, 2048], ..zero }, |tally| tally.bad_codes),
             (Value { codes: [2048, 2100, 2048], enable: false, ..zero }, |tally| tally.torque_while_off),
