@@ -13,6 +13,7 @@ use crate::open::{OpenError, open_devices};
 use crate::real_loop::{Ended, RealLoop, Shared};
 use crate::safety::{Ramps, Safety};
 use crate::say;
+use crate::supervisor::Supervisor;
 use rt_core::epitaph::{EpitaphKind, EpitaphRef, install_fatal_handlers, install_panic_hook};
 use rt_core::log::{LogLevel, LogLine, RtLogDrain};
 use rt_core::setup::{SetupGuards, SetupReport, SetupRequest};
@@ -123,7 +124,9 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
     let (log, drain) = rt_core::log::channel(LOG_CAPACITY);
     let cycle = make_cycle(config, Arc::clone(&memory), devices);
     let thread = starter.start(RealLoop::new(config, wait_mode, cycle, inbox, log, shared.clone(), &TICK));
-    let mut service = Service { server, sender, drain, memory, signals, shared, options };
+    let supervisor = Supervisor::from_environment(config.clock, options.parent.is_some());
+    supervisor.ready(&format!("listening at {}", server.path().display()));
+    let mut service = Service { server, sender, drain, memory, signals, shared, options, supervisor };
     let served = service.serve();
     service.finish(thread, served)
 }
@@ -285,6 +288,14 @@ fn remove_directory_of(socket: &Path) {
     }
 }
 
+/// For the service manager; the rest is told by `io-driver status`.
+fn status_line(memory: &DriverMemory) -> String {
+    let get = |word: &AtomicU64| word.load(Ordering::Relaxed);
+    let c = &memory.counters;
+    let [ticks, overruns, leases, faults] = [&c.ticks, &c.overruns, &c.leases_granted, &c.faults].map(get);
+    format!("{ticks} ticks, {overruns} overruns, {leases} leases granted, {faults} faults")
+}
+
 /// The socket's thread.
 struct Service<'a> {
     server: Server,
@@ -294,6 +305,7 @@ struct Service<'a> {
     signals: StopSignals,
     shared: Shared,
     options: &'a RunOptions,
+    supervisor: Supervisor,
 }
 
 impl Service<'_> {
@@ -311,6 +323,7 @@ impl Service<'_> {
             }
             self.sender.clear_waste();
             self.write_log();
+            self.supervisor.turn(TICK.load(Ordering::Relaxed), || status_line(&self.memory));
             if let Some(signal) = self.signals.requested() {
                 return Ok(format!("signal {signal}"));
             }
@@ -365,6 +378,7 @@ impl Service<'_> {
 
     /// Ends the loop, writes the last words and says how it was.
     fn finish(mut self, thread: JoinHandle<Ended>, served: Result<String, RunError>) -> Result<(), RunError> {
+        self.supervisor.stopping(served.as_deref().unwrap_or("a fault of the socket"));
         self.shared.stop.store(true, Ordering::Relaxed);
         let ended = thread.join();
         self.write_log();
