@@ -109,6 +109,8 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
             },
         )?;
     }
+    // Its socket is made here, while sockets may be made.
+    let supervisor = Supervisor::from_environment(config.clock, options.parent.is_some());
     let devices = open_devices(config)?;
     let shared = Shared::default();
     let (report, starter) = spawn_loop(config, &shared)?;
@@ -124,7 +126,6 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
     let (log, drain) = rt_core::log::channel(LOG_CAPACITY);
     let cycle = make_cycle(config, Arc::clone(&memory), devices);
     let thread = starter.start(RealLoop::new(config, wait_mode, cycle, inbox, log, shared.clone(), &TICK));
-    let supervisor = Supervisor::from_environment(config.clock, options.parent.is_some());
     supervisor.ready(&format!("listening at {}", server.path().display()));
     let mut service = Service { server, sender, drain, memory, signals, shared, options, supervisor };
     let served = service.serve();
@@ -197,8 +198,10 @@ fn choose_wait_mode(config: &DriverConfig, report: &SetupReport) -> WaitMode {
     if config.clock != ClockMode::Real {
         return WaitMode::Futex;
     }
-    let leaves_a_cpu = rt_core::cpu::online_cpus().len() > 1;
-    let owns_cpu = loop_cpu(config).is_some() && leaves_a_cpu && config.real_time.priority.is_some();
+    let cpu = loop_cpu(config);
+    // Not by number: an isolated CPU is not among those that the process was started on.
+    let leaves_a_cpu = rt_core::cpu::online_cpus().into_iter().any(|other| Some(other) != cpu);
+    let owns_cpu = cpu.is_some() && leaves_a_cpu && config.real_time.priority.is_some();
     let obtained =
         ["scheduling", "cpu"].iter().all(|name| report.find(name).is_some_and(|item| item.obtained));
     config.real_time.wait.unwrap_or(if owns_cpu && obtained { WaitMode::Spin } else { WaitMode::Futex })

@@ -3,13 +3,18 @@
 //! Problem: a loop that hangs leaves its process alive, and who watches only processes sees nothing wrong.
 //! Model (sd_notify(3)): `READY=1` once the driver listens, `STATUS=` now and then, `STOPPING=1` at the end, and
 //! `WATCHDOG=1` only while the loop's tick counter advances. Without `NOTIFY_SOCKET` nothing happens at all.
-//! Invariant: only the socket's thread speaks, never the loop.
+//! Invariants: only the socket's thread speaks, never the loop; it makes its one socket at the start, because a
+//! driver that has given up its rights can make none; it never waits for systemd.
 //! Cost: some datagrams a second.
 
 use crate::say::say;
-use sd_notify::NotifyState;
+use rustix::net::{SendAncillaryBuffer, SendFlags, sendmsg};
 use shm_abi::segment::ClockMode;
-use std::io;
+use std::ffi::{OsStr, OsString};
+use std::io::{self, IoSlice};
+use std::os::linux::net::SocketAddrExt;
+use std::os::unix::ffi::OsStrExt;
+use std::os::unix::net::{SocketAddr, UnixDatagram};
 use std::time::{Duration, Instant};
 
 /// How often `systemctl status` learns something new.
@@ -21,49 +26,91 @@ const PETS_PER_TIMEOUT: u32 = 4;
 /// The service manager that started this process, if one did.
 #[derive(Debug)]
 pub struct Supervisor {
-    /// `None`: nobody listens.
-    schedule: Option<Schedule>,
+    listener: Option<Listener>,
+}
+
+#[derive(Debug)]
+struct Listener {
+    socket: UnixDatagram,
+    schedule: Schedule,
 }
 
 impl Supervisor {
     /// Whoever the environment names. A child that an application started is not the service, whatever
     /// environment it inherited.
     pub fn from_environment(clock: ClockMode, is_child: bool) -> Self {
-        let listens = std::env::var_os("NOTIFY_SOCKET").is_some_and(|socket| !socket.is_empty());
-        let schedule = (listens && !is_child)
-            .then(|| Schedule::new(sd_notify::watchdog_enabled(), clock, Instant::now()));
-        Self { schedule }
+        let name = std::env::var_os("NOTIFY_SOCKET").filter(|name| !name.is_empty() && !is_child);
+        let listener = name.and_then(|name| match connect(&name) {
+            Ok(socket) => {
+                Some(Listener { socket, schedule: Schedule::new(watchdog(), clock, Instant::now()) })
+            }
+            Err(error) => {
+                // It waits for a word in vain and will end the driver; the journal should tell why.
+                say(format_args!(
+                    "io-driver: cannot reach the service manager at {}: {error}",
+                    name.display()
+                ));
+                None
+            }
+        });
+        Self { listener }
     }
 
     /// The driver listens and its loop runs.
     pub fn ready(&self, status: &str) {
-        // Whoever waits for this in vain ends the driver, and then it should stand in the journal why.
-        if let Err(error) = self.tell(&[NotifyState::Ready, NotifyState::Status(status)]) {
-            say(format_args!("io-driver: cannot tell the service manager that the driver is ready: {error}"));
-        }
+        self.tell(&format!("READY=1\nSTATUS={status}"));
     }
 
     /// To be called often, with the loop's newest tick; says what is due.
     pub fn turn(&mut self, tick: u64, status: impl FnOnce() -> String) {
-        let Some(schedule) = &mut self.schedule else { return };
-        let due = schedule.due(tick, Instant::now());
-        // A datagram that is lost is followed by the next one.
+        let Some(listener) = &mut self.listener else { return };
+        let due = listener.schedule.due(tick, Instant::now());
         if due.pet {
-            let _ = self.tell(&[NotifyState::Watchdog]);
+            self.tell("WATCHDOG=1");
         }
         if due.status {
-            let _ = self.tell(&[NotifyState::Status(&status())]);
+            self.tell(&format!("STATUS={}", status()));
         }
     }
 
     /// The driver ends, for this reason.
     pub fn stopping(&self, reason: &str) {
-        let _ = self.tell(&[NotifyState::Stopping, NotifyState::Status(reason)]);
+        self.tell(&format!("STOPPING=1\nSTATUS={reason}"));
     }
 
-    fn tell(&self, states: &[NotifyState<'_>]) -> io::Result<()> {
-        if self.schedule.is_some() { sd_notify::notify(states) } else { Ok(()) }
+    /// A datagram that is lost is followed by the next one.
+    fn tell(&self, words: &str) {
+        if let Some(listener) = &self.listener {
+            let bytes = [IoSlice::new(words.as_bytes())];
+            let flags = SendFlags::NOSIGNAL | SendFlags::DONTWAIT;
+            let _ = sendmsg(&listener.socket, &bytes, &mut SendAncillaryBuffer::default(), flags);
+        }
     }
+}
+
+/// A name that begins with `@` lies in no directory.
+fn connect(name: &OsStr) -> io::Result<UnixDatagram> {
+    let address = match name.as_bytes().strip_prefix(b"@") {
+        Some(name) => SocketAddr::from_abstract_name(name)?,
+        None => SocketAddr::from_pathname(name)?,
+    };
+    let socket = UnixDatagram::unbound()?;
+    socket.connect_addr(&address)?;
+    Ok(socket)
+}
+
+/// After how long without a sign of life systemd loses patience with this process; `None`: never.
+fn watchdog() -> Option<Duration> {
+    watchdog_from(std::env::var_os("WATCHDOG_USEC"), std::env::var_os("WATCHDOG_PID"), std::process::id())
+}
+
+fn watchdog_from(timeout_us: Option<OsString>, pid: Option<OsString>, own_pid: u32) -> Option<Duration> {
+    let number = |text: OsString| text.to_str()?.parse::<u64>().ok();
+    // Somebody else's, inherited.
+    if pid.is_some_and(|pid| number(pid) != Some(own_pid.into())) {
+        return None;
+    }
+    timeout_us.and_then(number).filter(|us| *us > 0).map(Duration::from_micros)
 }
 
 /// What is to be said now.
@@ -153,5 +200,17 @@ mod tests {
         let mut schedule = Schedule::new(None, ClockMode::Real, begin);
         let told: u32 = (1..=2500).map(|at| u32::from(schedule.due(0, begin + MS * at).status)).sum();
         assert_eq!(told, 2, "one each second");
+    }
+
+    #[test]
+    fn the_watchdog_counts_if_it_is_this_processes_own() {
+        let timeout = |us: &str, pid: Option<&str>| watchdog_from(Some(us.into()), pid.map(Into::into), 42);
+        assert_eq!(timeout("2000000", Some("42")), Some(Duration::from_secs(2)));
+        assert_eq!(timeout("2000000", None), Some(Duration::from_secs(2)));
+        assert_eq!(timeout("2000000", Some("43")), None, "inherited");
+        for nonsense in ["", "0", "-1", "soon"] {
+            assert_eq!(timeout(nonsense, Some("42")), None, "{nonsense}");
+        }
+        assert_eq!(watchdog_from(None, None, 42), None);
     }
 }
