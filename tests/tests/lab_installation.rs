@@ -230,6 +230,7 @@ fn every_command_of_the_readme_exists() {
         let (program, rest) = match words[..] {
             ["io-driver", ref rest @ ..] => (io_driver(), rest),
             ["phantom3", ref rest @ ..] => (phantom3(), rest),
+            ["taskset", "--cpu-list", _, "phantom3", ref rest @ ..] => (phantom3(), rest),
             ["config/system/install.sh", ref rest @ ..] => (Lab::bare().installer(), rest),
             _ => continue,
         };

@@ -293,6 +293,20 @@ fn without_systemd_or_as_an_applications_child_it_tells_nobody() {
     assert!(words.recv(&mut [0; 64]).is_err(), "it told somebody");
 }
 
+/// The last step of the README, with the programs as installed; `--attach` without a socket finds the service.
+#[test]
+fn a_scene_is_felt_through_the_service() {
+    let service = Service::start(&[]);
+    service.hear_until("READY=1");
+    let mut phantom3 = Command::new(service.lab.path("/usr/local/bin/phantom3"));
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/scenes/plane.toml");
+    phantom3.arg("run").arg(scene).args(["--attach", "--headless", "--seconds", "0.2"]);
+    phantom3.env("RUNTIME_DIRECTORY", service.run.path()).env_remove("PHANTOM3_SOCKET");
+    let (status, out, err) = said(&phantom3.output().expect("it runs"));
+    assert_eq!(status, Some(0), "{err}");
+    assert!(out.contains(&format!("process {}, was running", service.child.id())), "{out}");
+}
+
 /// A call that the filter bars fails with EPERM in the laboratory and nowhere else, so it is looked for here.
 #[test]
 fn every_system_call_of_the_driver_passes_the_units_filter() {
@@ -312,6 +326,7 @@ fn every_system_call_of_the_driver_passes_the_units_filter() {
     // Without -D: strace is the child, which passes on the signal's effect and the exit status.
     let mut service = Service::start(&["strace", "-f", "-qq", "-e", "signal=none", "-o", trace_path]);
     service.hear_until("READY=1");
+    service.hear_until("WATCHDOG=1");
     succeed(&mut service.io_driver("status"));
     succeed(&mut service.io_driver("stop"));
     assert_eq!(wait_or_kill(&mut service.child).code(), Some(0));
@@ -336,7 +351,8 @@ fn calls_allowed() -> Option<BTreeSet<String>> {
     for line in &unit["Service"]["SystemCallFilter"] {
         let (removes, groups) = line.strip_prefix('~').map_or((false, line.as_str()), |rest| (true, rest));
         for group in groups.split(' ') {
-            for call in members(group)? {
+            let calls = if group.starts_with('@') { members(group)? } else { [group.to_owned()].into() };
+            for call in calls {
                 if removes {
                     allowed.remove(&call)
                 } else {
