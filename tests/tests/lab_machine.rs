@@ -368,7 +368,10 @@ fn the_cards_are_known_by_their_numbers_and_no_others() {
     // A PLX 9050 on somebody else's board, another chip of the vendor, another Mesa card.
     for other in [
         ["0x10b5", "0x9050", "0x1234", "0x0001"],
+        ["0x10b5", "0x9050", "0x1234", "0x9050"],
+        ["0x10b5", "0x9050", "0x10b5", "0x1067"],
         ["0x10b5", "0x9054", "0x10b5", "0x9050"],
+        ["0x2718", "0x9050", "0x10b5", "0x9050"],
         ["0x2718", "0x5126", "0x2718", "0x5126"],
     ] {
         assert!(card("add", other).is_empty(), "{other:?}");
