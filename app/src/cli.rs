@@ -8,6 +8,7 @@ use crate::outcome::{RunFailure, Stop};
 use crate::report::Report;
 use crate::rig::Rig;
 use crate::run::{self, Attach, RunPlan};
+use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use io_driver::config::period_of;
 use io_driver::say::say;
@@ -78,7 +79,7 @@ struct RunArgs {
     #[arg(long, value_name = "FILE")]
     layout: Option<PathBuf>,
     /// Use the devices of a driver that runs already, at this socket or the usual place; goes after the scene
-    #[arg(long, value_name = "SOCKET", num_args = 0..=1, default_missing_value = "", conflicts_with_all = ["hand", "rate_hz"])]
+    #[arg(long, value_name = "SOCKET", num_args = 0..=1, default_missing_value = "", value_parser = path_or_nothing(), conflicts_with_all = ["hand", "rate_hz"])]
     attach: Option<PathBuf>,
     /// With --attach: how long to wait for the driver's return, should it end
     #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = parse_grace, allow_negative_numbers = true)]
@@ -136,6 +137,11 @@ fn run_scene(args: &RunArgs) -> Result<(Report, Stop), RunFailure> {
 
 fn install_signals() -> Result<StopSignals, RunFailure> {
     StopSignals::install().map_err(|error| RunFailure::Start(format!("cannot catch signals: {error}")))
+}
+
+/// Clap's own paths are never empty, not even by default.
+fn path_or_nothing() -> impl TypedValueParser<Value = PathBuf> {
+    OsStringValueParser::new().map(PathBuf::from)
 }
 
 fn make_rig(args: &RunArgs) -> Result<Rig, RunFailure> {

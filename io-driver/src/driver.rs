@@ -13,6 +13,7 @@ use crate::open::{OpenError, open_devices};
 use crate::real_loop::{Ended, RealLoop, Shared, Waiting};
 use crate::safety::{Ramps, Safety};
 use crate::say;
+use crate::supervisor::Supervisor;
 use rt_core::calibrate;
 use rt_core::epitaph::{EpitaphKind, EpitaphRef, install_fatal_handlers, install_panic_hook};
 use rt_core::histogram::Histogram;
@@ -115,6 +116,8 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
             },
         )?;
     }
+    // Its socket is made here, while sockets may be made.
+    let supervisor = Supervisor::from_environment(config.clock, options.parent.is_some());
     let devices = open_devices(config)?;
     let devices = match options.fit {
         Some(fit) => devices.into_iter().map(fit).collect(),
@@ -135,7 +138,8 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
     let (log, drain) = rt_core::log::channel(LOG_CAPACITY);
     let cycle = make_cycle(config, Arc::clone(&memory), devices);
     let thread = starter.start(RealLoop::new(config, waiting, cycle, inbox, log, shared.clone(), &TICK));
-    let mut service = Service { server, sender, drain, memory, signals, shared, options };
+    supervisor.ready(&format!("listening at {}", server.path().display()));
+    let mut service = Service { server, sender, drain, memory, signals, shared, options, supervisor };
     let served = service.serve();
     service.finish(thread, served)
 }
@@ -212,8 +216,10 @@ fn choose_wait_mode(config: &DriverConfig, report: &SetupReport) -> WaitMode {
     if config.clock != ClockMode::Real {
         return WaitMode::Futex;
     }
-    let leaves_a_cpu = rt_core::cpu::online_cpus().len() > 1;
-    let owns_cpu = loop_cpu(config).is_some() && leaves_a_cpu && config.real_time.priority.is_some();
+    let cpu = loop_cpu(config);
+    // Not by number: an isolated CPU is not among those that the process was started on.
+    let leaves_a_cpu = rt_core::cpu::online_cpus().into_iter().any(|other| Some(other) != cpu);
+    let owns_cpu = cpu.is_some() && leaves_a_cpu && config.real_time.priority.is_some();
     let obtained =
         ["scheduling", "cpu"].iter().all(|name| report.find(name).is_some_and(|item| item.obtained));
     config.real_time.wait.unwrap_or(if owns_cpu && obtained { WaitMode::Spin } else { WaitMode::Futex })
@@ -338,6 +344,14 @@ fn remove_directory_of(socket: &Path) {
     }
 }
 
+/// For the service manager; the rest is told by `io-driver status`.
+fn status_line(memory: &DriverMemory) -> String {
+    let get = |word: &AtomicU64| word.load(Ordering::Relaxed);
+    let c = &memory.counters;
+    let [ticks, overruns, leases, faults] = [&c.ticks, &c.overruns, &c.leases_granted, &c.faults].map(get);
+    format!("{ticks} ticks, {overruns} overruns, {leases} leases granted, {faults} faults")
+}
+
 /// The socket's thread.
 struct Service<'a> {
     server: Server,
@@ -347,6 +361,7 @@ struct Service<'a> {
     signals: StopSignals,
     shared: Shared,
     options: &'a RunOptions,
+    supervisor: Supervisor,
 }
 
 impl Service<'_> {
@@ -364,6 +379,7 @@ impl Service<'_> {
             }
             self.sender.clear_waste();
             self.write_log();
+            self.supervisor.turn(TICK.load(Ordering::Relaxed), || status_line(&self.memory));
             if let Some(signal) = self.signals.requested() {
                 return Ok(format!("signal {signal}"));
             }
@@ -422,6 +438,7 @@ impl Service<'_> {
 
     /// Ends the loop, writes the last words and says how it was.
     fn finish(mut self, thread: JoinHandle<Ended>, served: Result<String, RunError>) -> Result<(), RunError> {
+        self.supervisor.stopping(served.as_deref().unwrap_or("a fault of the socket"));
         self.shared.stop.store(true, Ordering::Relaxed);
         let ended = thread.join();
         self.write_log();

@@ -32,5 +32,6 @@ pub mod safety;
 pub mod say;
 pub mod sim;
 pub mod status;
+pub mod supervisor;
 pub mod table;
 pub mod toml_report;

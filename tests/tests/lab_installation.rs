@@ -1,0 +1,263 @@
+//! `config/system/install.sh`: what it puts where, and that it takes away no more than it brought.
+
+use io_driver::config::DriverConfig;
+use std::collections::BTreeSet;
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
+use std::process::Command;
+use system_tests::lab::{Lab, PREFIX, sources, succeed, tool, walk};
+use system_tests::programs::{io_driver, phantom3, said};
+
+const DRIVER_TOML: &str = "/etc/phantom3/driver.toml";
+const MACHINE_CONF: &str = "/etc/phantom3/machine.conf";
+
+#[test]
+fn installing_a_second_time_changes_nothing() {
+    let lab = Lab::bare();
+    let first = lab.install(&["--cpu", "1"]);
+    let before = lab.files("/");
+    let second = lab.install(&[]);
+    assert!(first.contains("installed ") && first.contains("reboot"), "{first}");
+    assert!(second.contains("everything is in its place already"), "{second}");
+    assert_eq!(before, lab.files("/"));
+}
+
+#[test]
+fn uninstalling_leaves_nothing_but_what_was_there_before() {
+    let lab = Lab::bare();
+    lab.write("/etc/udev/rules.d/10-others.rules", "# somebody else's\n");
+    let before = lab.files("/");
+    lab.install(&["--cpu", "1"]);
+    assert!(lab.files("/").len() > before.len() + 15);
+    lab.install(&["--uninstall"]);
+    assert_eq!(before, lab.files("/"));
+}
+
+#[test]
+fn an_edited_file_is_kept_and_a_newer_version_put_beside_it() {
+    let lab = Lab::bare();
+    lab.install(&["--cpu", "1"]);
+    let edited = lab.read(DRIVER_TOML).replace("rate_hz = 1000", "rate_hz = 2000");
+    lab.write(DRIVER_TOML, &edited);
+    let new = format!("{DRIVER_TOML}.new");
+
+    lab.install(&[]);
+    assert!(!lab.path(&new).exists(), "there is nothing new");
+    // Another CPU makes for a new version of the file.
+    for _ in 0..2 {
+        lab.install(&["--cpu", "2"]);
+        assert_eq!(lab.read(DRIVER_TOML), edited);
+        assert!(lab.read(&new).contains("\ncpu = 2\n") && lab.read(&new).contains("rate_hz = 1000"));
+    }
+    let said = lab.install(&["--uninstall"]);
+    assert!(said.contains("kept (edited)") && said.contains("driver.toml"), "{said}");
+    let left: Vec<String> = lab.files("/").into_keys().collect();
+    assert_eq!(left, ["/etc", "/etc/phantom3", DRIVER_TOML]);
+    assert_eq!(lab.read(DRIVER_TOML), edited);
+}
+
+#[test]
+fn what_was_never_ours_is_not_overwritten_either() {
+    let lab = Lab::bare();
+    lab.write(MACHINE_CONF, "LOOP_CPU=2\n");
+    lab.install(&[]);
+    assert_eq!(lab.read(MACHINE_CONF), "LOOP_CPU=2\n");
+    assert!(lab.read(DRIVER_TOML).contains("\ncpu = 2\n"), "the number was taken from what was there");
+    lab.install(&["--uninstall"]);
+    assert_eq!(lab.read(MACHINE_CONF), "LOOP_CPU=2\n");
+}
+
+#[test]
+fn purging_removes_what_was_edited_as_well() {
+    let lab = Lab::bare();
+    lab.install(&["--cpu", "1"]);
+    lab.write(DRIVER_TOML, "# edited\n");
+    lab.install(&["--uninstall", "--purge"]);
+    assert!(lab.files("/").is_empty());
+}
+
+#[test]
+fn a_newer_version_replaces_what_was_not_edited_and_removes_what_it_no_longer_has() {
+    let newer = tempfile::tempdir().expect("a directory");
+    succeed(Command::new("cp").arg("-R").arg(sources()).arg(newer.path()));
+    let newer = newer.path().join("system");
+    let installer = fs::read_to_string(newer.join("install.sh")).expect("there");
+    let without: String = installer
+        .lines()
+        .filter(|line| !line.contains("/tuned.conf"))
+        .map(|line| format!("{line}\n"))
+        .collect();
+    fs::write(newer.join("install.sh"), without).expect("a file");
+    fs::write(newer.join("modprobe.d/phantom3.conf"), "# newer\n").expect("a file");
+
+    let lab = Lab::bare();
+    lab.install(&["--cpu", "1"]);
+    succeed(&mut lab.installer_of(&newer));
+    assert_eq!(lab.read("/etc/modprobe.d/phantom3.conf"), "# newer\n");
+    assert!(!lab.path("/etc/tuned/phantom3/tuned.conf").exists());
+    lab.install(&["--uninstall"]);
+    assert!(lab.files("/").is_empty(), "directories of files that went before are remembered");
+}
+
+#[test]
+fn a_dry_run_names_every_file_and_changes_nothing() {
+    let lab = Lab::bare();
+    let said = lab.install(&["--dry-run", "--cpu", "1"]);
+    assert!(lab.files("/").is_empty());
+    lab.install(&["--cpu", "1"]);
+    let (before, would) = (lab.files("/"), lab.install(&["--uninstall", "--dry-run"]));
+    assert_eq!(before, lab.files("/"));
+    for file in installed_files(&lab).filter(|file| !file.ends_with("/installed")) {
+        let real = lab.path(&file).display().to_string();
+        assert!(said.contains(&format!("would: installed {real}\n")), "{file}: {said}");
+        assert!(would.contains(&format!("would: removed {real}\n")), "{file}: {would}");
+    }
+}
+
+#[test]
+fn every_file_of_the_sources_is_installed_and_explained() {
+    let installer = fs::read_to_string(sources().join("install.sh")).expect("there");
+    let readme = fs::read_to_string(sources().join("README.md")).expect("there");
+    walk(&sources(), &mut |path| {
+        let name = path.strip_prefix(sources()).expect("below").display().to_string();
+        if path.is_file() && name != "install.sh" {
+            assert!(installer.contains(&format!("$source_dir/{name}\"")), "{name} is not installed");
+            assert!(
+                name == "README.md" || readme.contains(&name),
+                "the README does not tell what {name} is for"
+            );
+        }
+    });
+}
+
+#[test]
+fn every_path_that_an_installed_file_names_is_there_under_any_prefix() {
+    for prefix in [PREFIX, "/opt/phantom3"] {
+        let lab = Lab::bare();
+        lab.install(&["--cpu", "1", "--prefix", prefix]);
+        let mut seen = 0;
+        // The manifest names the directories as well.
+        let is_text = |file: &String| !file.ends_with(".md") && !file.ends_with("/installed");
+        for file in installed_files(&lab).filter(is_text) {
+            let text = lab.read(&file);
+            assert!(prefix == PREFIX || !text.contains(PREFIX), "{file} names the default prefix");
+            for path in paths_below(&text, prefix).chain(paths_below(&text, "/etc/phantom3/")) {
+                assert!(lab.path(path).is_file(), "{file} names {path:?}, which is not installed");
+                seen += 1;
+            }
+        }
+        // Four programs in the units and rules, and the configuration, at the least.
+        assert!(seen > 10, "{seen}");
+    }
+}
+
+#[test]
+fn programs_may_be_executed_and_configuration_read_by_everybody() {
+    let lab = Lab::bare();
+    lab.install(&["--cpu", "1"]);
+    for file in installed_files(&lab) {
+        let mode = fs::metadata(lab.path(&file)).expect("installed").permissions().mode() & 0o777;
+        let is_program = file.contains("/bin/") || file.contains("/libexec/");
+        // The manifest takes its mode from the umask.
+        if !file.ends_with("/installed") {
+            assert_eq!(mode, if is_program { 0o755 } else { 0o644 }, "{file}");
+        }
+    }
+}
+
+#[test]
+fn the_driver_and_the_machine_agree_on_the_cpu() {
+    let lab = Lab::bare();
+    let cpu_of_driver =
+        || DriverConfig::load(&lab.path(DRIVER_TOML)).expect("a good configuration").real_time.cpu;
+    for (arguments, cpu) in
+        [(&["--cpu", "3"][..], 3), (&[][..], 3), (&["--cpu", "2", "--fast-cpu", "1"][..], 2)]
+    {
+        lab.install(arguments);
+        assert_eq!(cpu_of_driver(), Some(cpu));
+        assert!(lab.read(MACHINE_CONF).contains(&format!("\nLOOP_CPU={cpu}\n")));
+    }
+    assert!(lab.read(MACHINE_CONF).contains("\nFAST_CPU=1\n"));
+    // Somebody edits one of the two; the next installation brings the other into line.
+    lab.write(MACHINE_CONF, "LOOP_CPU=7\n");
+    lab.install(&[]);
+    assert_eq!(cpu_of_driver(), Some(7));
+}
+
+#[test]
+fn bad_usage_is_refused_before_anything_is_changed() {
+    let empty = tempfile::tempdir().expect("a directory");
+    let empty = empty.path().to_str().expect("plain");
+    let cases: [(&[&str], &str); 6] = [
+        (&["--binaries", empty], "cargo build --release --workspace"),
+        (&["--cpu", "two"], "--cpu: found `two`, allowed: the number of a CPU"),
+        (&["--prefix", "here"], "--prefix: found `here`, allowed: an absolute path"),
+        (&["--prefix", "/a|b"], "--prefix: found `/a|b`, allowed: an absolute path"),
+        (&["--frobnicate"], "unknown option --frobnicate"),
+        (&["--uninstall"], "nothing is installed"),
+    ];
+    for (arguments, expected) in cases {
+        let lab = Lab::bare();
+        let (status, _, err) = said(&lab.installer().args(arguments).output().expect("it runs"));
+        assert_eq!(status, Some(2), "{arguments:?}: {err}");
+        assert!(err.contains(expected), "{arguments:?}: {err}");
+        assert!(lab.files("/").is_empty());
+    }
+}
+
+#[test]
+fn the_scripts_are_plain_posix_shell() {
+    let scripts = ["install.sh", "libexec/phantom3-machine", "libexec/phantom3-card", "grub.d/phantom3.cfg"];
+    for script in scripts.map(|name| sources().join(name)) {
+        succeed(Command::new("sh").arg("-n").arg(&script));
+        if let Some(mut shellcheck) = tool("shellcheck", "the other tests here run the scripts") {
+            succeed(shellcheck.args(["--shell", "sh"]).arg(&script));
+        }
+    }
+}
+
+/// Told here, and made elsewhere.
+const TOLD_IN_ADVANCE: [&str; 2] = ["doctor", "commission"];
+
+#[test]
+fn every_command_of_the_readme_exists() {
+    let readme = fs::read_to_string(sources().join("README.md")).expect("there");
+    let mut tried = BTreeSet::new();
+    for line in readme.split("```").skip(1).step_by(2).flat_map(str::lines) {
+        let line = line.strip_prefix("sudo ").unwrap_or(line).split('#').next().unwrap_or("");
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let (program, rest) = match words[..] {
+            ["io-driver", ref rest @ ..] => (io_driver(), rest),
+            ["phantom3", ref rest @ ..] => (phantom3(), rest),
+            ["taskset", "--cpu-list", _, "phantom3", ref rest @ ..] => (phantom3(), rest),
+            ["config/system/install.sh", ref rest @ ..] => (Lab::bare().installer(), rest),
+            _ => continue,
+        };
+        if rest.first().is_some_and(|command| TOLD_IN_ADVANCE.contains(command)) {
+            continue;
+        }
+        let mut program = program;
+        let help = succeed(
+            program.args(rest.iter().take_while(|word| !word.starts_with('-')).take(1)).arg("--help"),
+        );
+        for option in rest.iter().filter(|word| word.starts_with("--")) {
+            assert!(help.contains(option), "{line}: {option} is unknown");
+        }
+        tried.insert(line.trim().to_owned());
+    }
+    assert!(tried.len() >= 5, "{tried:?}");
+}
+
+fn installed_files(lab: &Lab) -> impl Iterator<Item = String> + '_ {
+    lab.files("/").into_keys().filter(|file| lab.path(file).is_file())
+}
+
+/// The paths in a text that begin like this, as far as they are more than the beginning.
+fn paths_below<'a>(text: &'a str, beginning: &'a str) -> impl Iterator<Item = &'a Path> {
+    text.match_indices(beginning).filter_map(move |(at, _)| {
+        let rest = &text[at..];
+        let end = rest.find(|c: char| c.is_whitespace() || "\"';:`)".contains(c)).unwrap_or(rest.len());
+        (end > beginning.len() + 1).then(|| Path::new(&rest[..end]))
+    })
+}
