@@ -105,10 +105,9 @@ pub fn shares_a_spinning_cpu(info: &DriverInfo) -> Option<String> {
     ))
 }
 
-/// A CPU that is not the driver's, if there is one.
+/// A CPU that is not the driver's, if there is one; an isolated one if there is another.
 fn own_cpu(info: &DriverInfo) -> Option<usize> {
-    let online = rt_core::cpu::online_cpus();
-    online.into_iter().rev().find(|cpu| Some(*cpu) != info.cpu)
+    rt_core::cpu::loop_cpus().into_iter().rev().find(|cpu| Some(*cpu) != info.cpu)
 }
 
 fn setup_request(info: &DriverInfo) -> SetupRequest {

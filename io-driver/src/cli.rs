@@ -2,13 +2,15 @@
 //!
 //! Exit status: 0 done; 2 bad usage or bad input, nothing was started; 3 a fault during the run.
 
+mod commission;
 mod emulate;
 
-use crate::config::DriverConfig;
+use crate::config::{Commissioning, DriverConfig};
 use crate::driver::{self, Fit, RunOptions};
 use crate::say::say;
 use crate::status::Status;
 use clap::{Args, Parser, Subcommand};
+use commission::CommissionArgs;
 use emulate::EmulateArgs;
 use shm_abi::client::{self, AttachError};
 use shm_abi::endpoint;
@@ -45,6 +47,8 @@ pub enum DriverCommand {
     ClearFault(SocketArgs),
     /// Switch all motors off at once and keep them off until `clear-fault`
     EmergencyStop(SocketArgs),
+    /// Try a device for the first time: do its counters and motors turn the right way?
+    Commission(CommissionArgs),
     /// Play a card with counters, converters and amplifiers, for a driver without hardware
     Emulate(EmulateArgs),
 }
@@ -58,6 +62,9 @@ pub struct RunArgs {
     /// Refuse to start when a real-time guarantee is missing
     #[arg(long)]
     strict: bool,
+    /// Little force and little speed, for the first trial of a device
+    #[arg(long)]
+    commissioning: bool,
     /// Say nothing but errors
     #[arg(long)]
     quiet: bool,
@@ -118,6 +125,7 @@ fn execute_with(command: DriverCommand, fit: Option<Fit>) -> ExitCode {
         DriverCommand::Stop(args) => report(stop(&args.path())),
         DriverCommand::ClearFault(args) => report(client::clear_fault(&args.path(), "io-driver")),
         DriverCommand::EmergencyStop(args) => report(client::emergency_stop(&args.path(), "io-driver")),
+        DriverCommand::Commission(args) => commission::run(&args),
         DriverCommand::Emulate(args) => emulate::run(&args),
     }
 }
@@ -127,10 +135,13 @@ fn run(args: RunArgs, fit: Option<Fit>) -> ExitCode {
         Some("-") => DriverConfig::load_from_stdin(),
         _ => DriverConfig::load(&args.config),
     };
-    let config = match loaded {
+    let mut config = match loaded {
         Ok(config) => config,
         Err(error) => return fail(&error, EXIT_USAGE),
     };
+    if args.commissioning {
+        config.safety.commissioning.get_or_insert(Commissioning::USUAL);
+    }
     let RunArgs { strict, quiet, parent, socket, .. } = args;
     let options = RunOptions { fit, strict, quiet, parent, socket };
     match driver::run(&config, &options) {

@@ -183,14 +183,14 @@ pub fn describe(config: &DriverConfig, devices: &[Box<dyn Device>], wait_mode: W
     }
 }
 
-/// The configured CPU, else the last one, where the fewest interrupts land; none on a single-CPU machine,
-/// which the application needs as well.
+/// The configured CPU, else the last isolated one, else the last one, where the fewest interrupts land; none on a
+/// single-CPU machine, which the application needs as well.
 fn loop_cpu(config: &DriverConfig) -> Option<usize> {
     if config.clock != ClockMode::Real {
         return config.real_time.cpu;
     }
-    let online = rt_core::cpu::online_cpus();
-    config.real_time.cpu.or_else(|| online.last().copied().filter(|_| online.len() > 1))
+    let cpus = rt_core::cpu::loop_cpus();
+    config.real_time.cpu.or_else(|| cpus.last().copied().filter(|_| cpus.len() > 1))
 }
 
 fn setup_request(config: &DriverConfig) -> SetupRequest {

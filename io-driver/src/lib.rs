@@ -13,6 +13,7 @@
 #![deny(missing_docs)]
 
 pub mod cli;
+pub mod commission;
 pub mod config;
 pub mod cycle;
 pub mod device;

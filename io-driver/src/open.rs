@@ -175,7 +175,11 @@ fn scripted(
     })
 }
 
-fn mechanism(device: &DeviceConfig, description: &Path) -> Result<PremiumFile, OpenError> {
+/// The mechanism that a device's description tells.
+///
+/// # Errors
+/// If it cannot be read, is wrong, or has none.
+pub fn mechanism(device: &DeviceConfig, description: &Path) -> Result<PremiumFile, OpenError> {
     let name = || device.name.clone();
     match describe(device, description)? {
         DeviceFile::Premium(premium) if device.compensates_gravity && premium.bodies.is_none() => {

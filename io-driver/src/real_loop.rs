@@ -10,7 +10,7 @@
 //! Invariant: whatever ends the loop (a request, a panic), the motors are written zero before anything else.
 //! Cost: in spin mode the timed wait is the only system call, while replies come.
 
-use crate::config::{DriverConfig, OverrunPolicy, ReplyMode};
+use crate::config::{DriverConfig, OverrunPolicy, ReplyMode, SpinMargin};
 use crate::cycle::Cycle;
 use crate::mail::Inbox;
 use crate::meter::{add, record};
@@ -112,6 +112,10 @@ impl RealLoop {
             phase_offset_ns: config.real_time.phase_offset_ns,
             spin_margin_ns: waiting.spin_margin_ns,
         });
+        let periodic = match config.real_time.spin_margin {
+            SpinMargin::Calibrated { at_most_ns } => periodic.learning(at_most_ns),
+            SpinMargin::Fixed(_) => periodic,
+        };
         let periodic = match config.real_time.overrun {
             OverrunPolicy::CatchUp(ticks) => periodic.catching_up(ticks),
             OverrunPolicy::Skip | OverrunPolicy::Fault(_) => periodic,

@@ -7,7 +7,7 @@
 //! Cost: one system call and one allocation: for set-up. [`current_cpu`] is fit for the loop.
 
 use nix::errno::Errno;
-use nix::sched::{CpuSet, sched_getaffinity, sched_getcpu};
+use nix::sched::{CpuSet, sched_getaffinity, sched_getcpu, sched_setaffinity};
 use nix::unistd::{Pid, getpid};
 
 /// The CPUs this process may run on, ascending; never empty.
@@ -18,6 +18,35 @@ pub fn online_cpus() -> Vec<usize> {
         // A machine with more CPUs than the mask holds (1024): the one we are on is certain.
         _ => vec![current_cpu()],
     }
+}
+
+/// The CPUs that a loop may be given, the best last: those that this process may run on, then those that the
+/// kernel keeps free of everybody who does not ask for them (isolcpus) and that it may move to. Never empty.
+#[must_use]
+pub fn loop_cpus() -> Vec<usize> {
+    let online = online_cpus();
+    let isolated = std::fs::read_to_string("/sys/devices/system/cpu/isolated").unwrap_or_default();
+    let isolated = parse_cpu_list(&isolated).unwrap_or_default();
+    let (mut ordinary, mut kept_free) = (online, Vec::new());
+    for cpu in isolated {
+        let is_open = ordinary.contains(&cpu);
+        if is_open || may_move_to(cpu) {
+            ordinary.retain(|other| *other != cpu);
+            kept_free.push(cpu);
+        }
+    }
+    ordinary.extend(kept_free);
+    ordinary
+}
+
+/// Tried by a thread of its own: a container may forbid what the machine has.
+fn may_move_to(cpu: usize) -> bool {
+    let attempt = std::thread::spawn(move || {
+        let mut mask = CpuSet::new();
+        mask.set(cpu).and_then(|()| sched_setaffinity(Pid::from_raw(0), &mask)).is_ok()
+            && affinity(Pid::from_raw(0)) == Ok(vec![cpu])
+    });
+    attempt.join().unwrap_or(false)
 }
 
 /// The CPU that the calling thread runs on now; it may be another one right after, unless pinned.
@@ -54,6 +83,15 @@ pub(crate) fn affinity(thread: Pid) -> Result<Vec<usize>, Errno> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_loop_may_be_given_every_cpu_of_ours_and_is_not_given_one_that_is_not_there() {
+        let cpus = loop_cpus();
+        for cpu in online_cpus() {
+            assert!(cpus.contains(&cpu) && may_move_to(cpu));
+        }
+        assert!(!may_move_to(1023) || cpus.len() > 1000);
+    }
 
     #[test]
     fn the_current_cpu_is_one_of_ours() {

@@ -10,7 +10,9 @@
 //! | [`cpu`]: which CPUs there are | [`histogram`]: latencies without allocation | [`epitaph`]: a dying process says why |
 //! | [`process`]: die with the parent | [`log`]: messages formatted by another thread | [`usage`]: faults and switches it suffered |
 //!
-//! [`calibrate`] measures how long a loop has to spin. [`last_act`] is what a dying process still stores to the hardware. [`clock`] is under all of them, and [`alloc_guard`] lets a test show that a loop does not allocate.
+//! [`calibrate`] measures how long a loop has to spin, and [`spin_margin`] learns it. [`last_act`] is what a
+//! dying process still stores to the hardware. [`clock`] is under all of them, and [`alloc_guard`] lets a test
+//! show that a loop does not allocate.
 //!
 //! Invariants: what a module marks as fit for the loop neither allocates nor locks nor opens a file
 //! nor panics; `unsafe` code lives in the private module `sys` alone; nothing is assumed from a
@@ -31,6 +33,7 @@ pub mod process;
 pub mod schedule;
 pub mod setup;
 pub mod signals;
+pub mod spin_margin;
 pub mod usage;
 
 #[allow(unsafe_code, reason = "the one place for system calls that no safe crate wraps")]

@@ -11,6 +11,7 @@
 
 use crate::clock::{monotonic_ns, sleep_until_ns};
 use crate::schedule::Schedule;
+use crate::spin_margin::SpinMargin;
 use std::hint::spin_loop;
 
 /// How a loop wakes.
@@ -45,7 +46,7 @@ impl PeriodicConfig {
 #[derive(Clone, Debug)]
 pub struct Periodic {
     schedule: Schedule,
-    spin_margin_ns: u64,
+    margin: SpinMargin,
     started: bool,
 }
 
@@ -82,7 +83,19 @@ impl Periodic {
     #[must_use]
     pub fn new(config: PeriodicConfig) -> Self {
         let schedule = Schedule::new(config.period_ns, config.phase_offset_ns);
-        Self { schedule, spin_margin_ns: config.spin_margin_ns, started: false }
+        Self { schedule, margin: SpinMargin::fixed(config.spin_margin_ns), started: false }
+    }
+
+    /// The same, but the spin margin grows where sleeps end too late for it, up to `at_most_ns`.
+    #[must_use]
+    pub fn learning(self, at_most_ns: u64) -> Self {
+        Self { margin: SpinMargin::growing(self.margin.ns(), at_most_ns), ..self }
+    }
+
+    /// How long before a deadline sleeping ends now (ns).
+    #[must_use]
+    pub fn spin_margin_ns(&self) -> u64 {
+        self.margin.ns()
     }
 
     /// The same, but of deadlines that have passed at most the last `ticks` are served all the same, at once
@@ -111,13 +124,14 @@ impl Periodic {
             self.start(now);
         }
         let deadline_ns = self.schedule.next_deadline_ns();
-        let sleep_until = deadline_ns.saturating_sub(self.spin_margin_ns);
+        let sleep_until = deadline_ns.saturating_sub(self.margin.ns());
         if now < sleep_until {
             let slept = sleep_until_ns(sleep_until);
             now = monotonic_ns();
             if !slept && now < deadline_ns {
                 return self.interrupted(now);
             }
+            self.margin.learn(now > deadline_ns);
         }
         while now < deadline_ns {
             spin_loop();
