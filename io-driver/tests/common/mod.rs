@@ -1,0 +1,160 @@
+//! A driver's cycle without a clock, and a device that does what the test says.
+
+#![allow(dead_code, unreachable_pub, reason = "each test uses some of it")]
+
+use bytemuck::Zeroable;
+use io_driver::cycle::{Cycle, Freshness, Protection};
+use io_driver::device::{Device, Effort, Reading, TickTime, Written};
+use io_driver::safety::switches::Switches;
+use io_driver::safety::{Ramps, Safety};
+use nalgebra::Vector3;
+use shm_abi::doorbell::WaitMode;
+use shm_abi::segment::{ClockMode, DeviceInfo, DriverInfo};
+use shm_abi::{Command, CommanderMemory, CommanderView, DriverMemory, DriverView, FaultReason, Frame};
+use std::os::fd::AsFd;
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
+
+pub const PERIOD_NS: u64 = 1_000_000;
+pub const RAMPS: Ramps = Ramps { in_ticks: 4, out_ticks: 2, max_command_age_ticks: 2 };
+pub const PEAK_N: f64 = 8.5;
+
+/// What a device is made to do by the test, and what it was made to do by the driver.
+#[derive(Default)]
+pub struct Log {
+    pub forces: Vec<Vector3<f64>>,
+    pub next_reading: Option<Result<Reading, FaultReason>>,
+    pub fail_write: bool,
+    pub releases: u32,
+    pub rearms: u32,
+}
+
+pub struct TestDevice {
+    pub info: DeviceInfo,
+    pub log: Arc<Mutex<Log>>,
+}
+
+impl Device for TestDevice {
+    fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    fn read(&mut self, _time: TickTime) -> Result<Reading, FaultReason> {
+        let planned = self.log.lock().unwrap().next_reading.take();
+        planned.unwrap_or(Ok(Reading::at(Vector3::new(0.1, 0.2, 0.3))))
+    }
+
+    fn write(&mut self, effort: Effort) -> Result<Written, FaultReason> {
+        let force_on_user_n = effort.force_on_user_n;
+        let mut log = self.log.lock().unwrap();
+        log.forces.push(force_on_user_n);
+        if log.fail_write {
+            Err(FaultReason::DeviceWrite)
+        } else {
+            Ok(Written { force_on_user_n, ..Written::default() })
+        }
+    }
+
+    fn release(&mut self) {
+        self.log.lock().unwrap().releases += 1;
+    }
+
+    fn rearm(&mut self) {
+        self.log.lock().unwrap().rearms += 1;
+    }
+}
+
+/// A driver's cycle and the test's ends of it.
+pub struct Bench {
+    pub cycle: Cycle,
+    pub view: DriverView,
+    pub log: Arc<Mutex<Log>>,
+    pub tick: u64,
+}
+
+/// A device without limits but its peak.
+pub fn usual_device() -> DeviceInfo {
+    DeviceInfo {
+        name: "d".into(),
+        kind: "test".into(),
+        peak_force_n: PEAK_N,
+        continuous_force_n: PEAK_N,
+        workspace_min_m: [-1.0; 3],
+        workspace_max_m: [1.0; 3],
+        slew_n_per_s: f64::INFINITY,
+        speed_limit_m_per_s: f64::INFINITY,
+    }
+}
+
+impl Bench {
+    pub fn new(freshness: u64) -> Self {
+        Self::with(freshness, usual_device(), Switches::default())
+    }
+
+    /// One with a device and switches of the test's own.
+    pub fn with(freshness: u64, info: DeviceInfo, switches: Switches) -> Self {
+        let memory = DriverMemory::create(&DriverInfo {
+            period_ns: PERIOD_NS,
+            reply_budget_ns: u64::MAX,
+            max_command_age_ticks: RAMPS.max_command_age_ticks,
+            ramp_in_ticks: RAMPS.in_ticks,
+            ramp_out_ticks: RAMPS.out_ticks,
+            clock_mode: ClockMode::Virtual,
+            wait_mode: WaitMode::Spin,
+            is_commissioning: false,
+            cpu: None,
+            devices: vec![info.clone()],
+            setup_report: String::new(),
+        })
+        .unwrap();
+        let view = DriverView::map(memory.fd()).unwrap();
+        let log = Arc::new(Mutex::new(Log::default()));
+        let device = TestDevice { info, log: Arc::clone(&log) };
+        let protection = Protection { safety: Safety::new(RAMPS), switches, workspace_margin_m: 0.02 };
+        let cycle =
+            Cycle::new(Arc::new(memory), vec![Box::new(device)], protection, PERIOD_NS, Freshness(freshness));
+        Self { cycle, view, log, tick: 0 }
+    }
+
+    pub fn lease(&mut self, number: u64) -> CommanderMemory {
+        let (view, fd) = CommanderView::create(number).unwrap();
+        assert!(self.cycle.grant(view).is_none());
+        CommanderMemory::map(fd.as_fd()).unwrap()
+    }
+
+    /// One tick; `answer` gets the frame and may publish. Returns the frame and the force written.
+    pub fn tick(&mut self, answer: impl FnOnce(&Frame, &DriverView)) -> (Frame, Vector3<f64>) {
+        self.tick += 1;
+        self.cycle.change_lease();
+        self.cycle.sense(self.tick, self.tick * PERIOD_NS);
+        let mut frame = Frame::zeroed();
+        self.view.read_frame(self.tick, &mut frame).unwrap();
+        answer(&frame, &self.view);
+        self.cycle.take_reply();
+        self.cycle.actuate();
+        (frame, *self.log.lock().unwrap().forces.last().unwrap())
+    }
+
+    pub fn silent_tick(&mut self) -> (Frame, Vector3<f64>) {
+        self.tick(|_, _| {})
+    }
+
+    /// Answers until the force is let through in full.
+    pub fn ramp_in(&mut self, commander: &CommanderMemory, force: [f64; 3]) {
+        while self.tick(|frame, view| publish(commander, view, frame.tick, force)).0.authority < 1.0 {}
+    }
+
+    pub fn counter(&self, pick: impl Fn(&shm_abi::layout::Counters) -> &std::sync::atomic::AtomicU64) -> u64 {
+        pick(&self.view.counters).load(Ordering::Relaxed)
+    }
+}
+
+pub fn command(commander: &CommanderMemory, tick: u64, force: [f64; 3]) -> Command {
+    let mut command = Command::zero(tick, commander.lease(), 1);
+    command.devices[0].force_on_user_n = force;
+    command
+}
+
+pub fn publish(commander: &CommanderMemory, view: &DriverView, tick: u64, force: [f64; 3]) {
+    commander.publish(&command(commander, tick, force), view);
+}

@@ -1,0 +1,169 @@
+//! The driver's guards in its tick: what each lets through, what it tells, what it is left by.
+
+mod common;
+
+use common::{Bench, publish, usual_device};
+use io_driver::device::Reading;
+use io_driver::safety::switches::{Switch, Switches};
+use nalgebra::Vector3;
+use shm_abi::frame::{
+    INPUT_DEAD_MAN_HELD, INPUT_DEAD_MAN_PRESENT, INPUT_EMERGENCY_STOP, LIMIT_PEAK, LIMIT_SLEW,
+    LIMIT_WORKSPACE,
+};
+use shm_abi::segment::DeviceInfo;
+use shm_abi::{CommanderMemory, DriverState, FaultReason, Frame};
+
+const UP: [f64; 3] = [0.0, 2.0, 0.0];
+
+fn bench(info: DeviceInfo) -> Bench {
+    Bench::with(0, info, Switches::default())
+}
+
+/// A tick at that position with those buttons, answered with that force.
+fn tick_at(
+    bench: &mut Bench,
+    commander: &CommanderMemory,
+    position: Vector3<f64>,
+    buttons: u64,
+    force: [f64; 3],
+) -> (Frame, Vector3<f64>) {
+    bench.log.lock().unwrap().next_reading = Some(Ok(Reading { buttons, ..Reading::at(position) }));
+    bench.tick(|frame, view| publish(commander, view, frame.tick, force))
+}
+
+fn rest() -> Vector3<f64> {
+    Vector3::new(0.1, 0.2, 0.3)
+}
+
+#[test]
+fn a_step_of_the_command_becomes_a_ramp_and_its_end_is_an_end() {
+    let mut bench = bench(DeviceInfo { slew_n_per_s: 1000.0, ..usual_device() });
+    let commander = bench.lease(1);
+    bench.ramp_in(&commander, [0.0; 3]);
+    let forces: Vec<f64> =
+        (0..4).map(|_| tick_at(&mut bench, &commander, rest(), 0, [0.0, 3.0, 0.0]).1.y).collect();
+    assert_eq!(forces, [1.0, 2.0, 3.0, 3.0]);
+    let (frame, force) = tick_at(&mut bench, &commander, rest(), 0, [0.0; 3]);
+    assert_eq!((force, frame.devices[0].limits), (Vector3::zeros(), 0));
+    assert_eq!(bench.counter(|c| &c.forces_slewed), 2);
+    tick_at(&mut bench, &commander, rest(), 0, [9.0, 0.0, 0.0]);
+    let told = bench.silent_tick().0.devices[0].limits;
+    assert_eq!(told, LIMIT_SLEW | LIMIT_PEAK, "the frame after tells what acted");
+}
+
+#[test]
+fn outside_the_workspace_the_force_fades_and_inside_it_is_back() {
+    let mut bench =
+        bench(DeviceInfo { workspace_min_m: [-0.5; 3], workspace_max_m: [0.1, 0.5, 0.5], ..usual_device() });
+    let commander = bench.lease(1);
+    bench.ramp_in(&commander, UP);
+    for (x, share) in [(0.1, 1.0), (0.105, 0.75), (0.11, 0.5), (0.12, 0.0), (0.4, 0.0), (0.09, 1.0)] {
+        let (_, force) = tick_at(&mut bench, &commander, Vector3::new(x, 0.2, 0.3), 0, UP);
+        // One difference of numbers near 0.1 over 0.02: some ulps of 1e-16 / 0.02.
+        assert!((force.y - 2.0 * share).abs() < 1e-13, "at {x}: {force}");
+        assert_eq!(bench.silent_tick().0.devices[0].limits & LIMIT_WORKSPACE != 0, share < 1.0);
+    }
+    assert!(bench.counter(|c| &c.forces_faded) >= 4);
+}
+
+#[test]
+fn a_device_that_is_too_fast_is_a_fault_while_a_force_drives_it_and_none_before() {
+    let mut bench = bench(DeviceInfo { speed_limit_m_per_s: 1.0, ..usual_device() });
+    let at = |tick: u64| Vector3::x() * (1.2e-3 * tick as f64);
+    for tick in 0..20 {
+        bench.log.lock().unwrap().next_reading = Some(Ok(Reading::at(at(tick))));
+        assert_eq!(bench.silent_tick().0.state, DriverState::Idle as u64, "a hand may");
+    }
+    let commander = bench.lease(1);
+    let mut ticks = 20;
+    let state = loop {
+        let (frame, force) = tick_at(&mut bench, &commander, at(ticks), 0, UP);
+        ticks += 1;
+        if frame.state != DriverState::Idle as u64 && frame.state != DriverState::Active as u64 {
+            assert_eq!(force, Vector3::zeros());
+            break frame;
+        }
+        assert!(ticks < 30, "nobody noticed");
+    };
+    assert_eq!((state.state, state.fault), (DriverState::Fault as u64, FaultReason::Overspeed as u64));
+}
+
+#[test]
+fn the_velocity_is_told_in_the_frame() {
+    let mut bench = bench(usual_device());
+    for tick in 0..20 {
+        bench.log.lock().unwrap().next_reading =
+            Some(Ok(Reading::at(Vector3::new(0.3, -0.2, 0.1) * (1e-3 * f64::from(tick)))));
+        let (frame, _) = bench.silent_tick();
+        let velocity = Vector3::from(frame.devices[0].velocity_m_per_s_estimated);
+        // Differences of numbers below 0.01 over 1 ms.
+        assert!(tick == 0 || (velocity - Vector3::new(0.3, -0.2, 0.1)).norm() < 1e-13);
+    }
+}
+
+#[test]
+fn a_position_that_jumps_is_a_fault_even_without_a_force() {
+    let mut bench = bench(DeviceInfo { speed_limit_m_per_s: 1.0, ..usual_device() });
+    bench.silent_tick();
+    bench.log.lock().unwrap().next_reading = Some(Ok(Reading::at(rest() + Vector3::x() * 0.05)));
+    let (frame, _) = bench.silent_tick();
+    assert_eq!(frame.fault, FaultReason::PositionJump as u64);
+    bench.cycle.clear_fault();
+    assert_eq!(bench.silent_tick().0.state, DriverState::Idle as u64, "what was before is forgotten");
+}
+
+#[test]
+fn an_emergency_stop_is_zero_at_once_and_is_not_left_while_it_is_pressed() {
+    let stop = Switch { device: 0, button: 3, normally_closed: true };
+    let switches = Switches { emergency_stop: Some(stop), dead_man: None };
+    let mut bench = Bench::with(0, usual_device(), switches);
+    const CLOSED: u64 = 0b1000;
+    let commander = bench.lease(1);
+    for _ in 0..10 {
+        tick_at(&mut bench, &commander, rest(), CLOSED, UP);
+    }
+    assert_eq!(tick_at(&mut bench, &commander, rest(), CLOSED, UP).1, Vector3::from(UP));
+    let (frame, force) = tick_at(&mut bench, &commander, rest(), 0, UP);
+    assert_eq!((frame.fault, force), (FaultReason::EmergencyStop as u64, Vector3::zeros()));
+    assert_eq!(frame.inputs, INPUT_EMERGENCY_STOP);
+    assert!(bench.log.lock().unwrap().releases > 0);
+    bench.cycle.clear_fault();
+    let (frame, force) = tick_at(&mut bench, &commander, rest(), 0, UP);
+    assert_eq!((frame.fault, force), (FaultReason::EmergencyStop as u64, Vector3::zeros()));
+    for _ in 0..5 {
+        let (frame, force) = tick_at(&mut bench, &commander, rest(), CLOSED, UP);
+        assert_eq!(
+            (frame.state, force),
+            (DriverState::Fault as u64, Vector3::zeros()),
+            "until it is asked for"
+        );
+    }
+    bench.cycle.clear_fault();
+    assert_eq!(bench.log.lock().unwrap().rearms, 2);
+    let mut last = Vector3::zeros();
+    for _ in 0..6 {
+        last = tick_at(&mut bench, &commander, rest(), CLOSED, UP).1;
+    }
+    assert_eq!(last, Vector3::from(UP));
+}
+
+#[test]
+fn a_dead_mans_switch_lets_force_through_while_it_is_held() {
+    let switch = Switch { device: 0, button: 0, normally_closed: false };
+    let switches = Switches { emergency_stop: None, dead_man: Some(switch) };
+    let mut bench = Bench::with(0, usual_device(), switches);
+    let commander = bench.lease(1);
+    for _ in 0..20 {
+        let (frame, force) = tick_at(&mut bench, &commander, rest(), 0, UP);
+        assert_eq!((force, frame.inputs), (Vector3::zeros(), INPUT_DEAD_MAN_PRESENT));
+        assert_eq!(frame.state, DriverState::Idle as u64);
+    }
+    let held: Vec<f64> = (0..6).map(|_| tick_at(&mut bench, &commander, rest(), 1, UP).1.y / 2.0).collect();
+    assert_eq!(held, [0.0, 0.25, 0.5, 0.75, 1.0, 1.0]);
+    let (frame, force) = tick_at(&mut bench, &commander, rest(), 0, UP);
+    assert_eq!(frame.inputs & INPUT_DEAD_MAN_HELD, 0);
+    assert_eq!(force.y, 1.0, "half of it, on the way out");
+    assert_eq!(tick_at(&mut bench, &commander, rest(), 0, UP).1, Vector3::zeros());
+    assert_eq!(bench.counter(|c| &c.ticks_unattended), 22);
+    assert_eq!(bench.counter(|c| &c.faults), 0);
+}
