@@ -22,8 +22,11 @@ fn die(clock: &'static str, sabotage: &str, strike: impl FnOnce(&Stand)) -> Deat
     let mut stand = Stand::start(Setup::new(clock).sabotaged(sabotage));
     let app = stand.start_app();
     stand.wait_for_force();
+    // In real time a stall of the machine may have let the force go meanwhile; it comes back.
+    stand.amplifiers.settle();
+    wait_for("a force", || stand.amplifiers.are_enabled());
     let before = stand.amplifiers.tally();
-    assert!(before.energised > 0 && stand.amplifiers.are_enabled());
+    assert!(before.energised > 0);
     strike(&stand);
     let end = stand.driver.end();
     let words = epitaph::read(&stand.view().epitaph);
@@ -48,14 +51,28 @@ impl Death {
         self.stand.amplifiers.settle();
         self.stand.amplifiers.check_off("last act");
         let tally = self.stand.amplifiers.tally();
-        assert_eq!(tally.switched_off, self.switched_off_before + 1, "{tally:?}");
+        let acts = u64::from(self.died_pushing());
+        assert_eq!(tally.switched_off, self.switched_off_before + acts, "{tally:?}");
         assert_eq!(tally.watchdog_trips, self.trips_before, "{tally:?}");
     }
 
     /// Nobody could do anything any more: the amplifiers' own watchdog did.
     fn check_watchdog(&self) {
+        if !self.died_pushing() {
+            return self.check_released();
+        }
         wait_for("the watchdog", || self.stand.amplifiers.tally().watchdog_trips == self.trips_before + 1);
         wait_for("the trip", || self.stand.amplifiers.have_tripped());
+    }
+
+    /// Whether its last value had the amplifiers on. In lockstep it had: no stall lets the force go.
+    fn died_pushing(&self) -> bool {
+        let pushed = !self.stand.amplifiers.were_told_off();
+        assert!(pushed || self.stand.setup.clock == "real", "it let go by itself");
+        if !pushed {
+            eprintln!("the machine stood still just before the strike: no force was on");
+        }
+        pushed
     }
 
     fn finish(self) -> Seen {
@@ -158,7 +175,7 @@ fn a_driver_that_is_asked_to_stop_says_off_to_its_amplifiers() {
 fn forbidden_values_of_a_device_switch_the_amplifiers_off_until_somebody_clears_the_fault() {
     let forbidden = [
         ("nan", FaultReason::PositionNotFinite),
-        ("leap", FaultReason::Overspeed),
+        ("leap", FaultReason::PositionJump),
         ("unreadable", FaultReason::DeviceRead),
         ("unwritable", FaultReason::DeviceWrite),
     ];
