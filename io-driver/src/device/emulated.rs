@@ -16,6 +16,8 @@ use std::sync::atomic::Ordering;
 
 /// A card that shows no life for so long is gone (ns). Stalls of a virtual machine are shorter.
 const PATIENCE_NS: u64 = 200_000_000;
+/// Amplifiers that were armed anew may take so long to say that they are no longer tripped (ns).
+const ARMING_NS: u64 = 200_000_000;
 
 /// The device.
 #[derive(Debug)]
@@ -26,6 +28,7 @@ pub struct EmulatedDevice {
     channels: Channels,
     heartbeat: u64,
     alive_ns: u64,
+    armed_ns: u64,
 }
 
 /// Which registers belong to the joints.
@@ -48,7 +51,7 @@ impl EmulatedDevice {
         arm: Arm,
         channels: Channels,
     ) -> Result<Self, last_act::NoRoom> {
-        let mut device = Self { info, hold, arm, channels, heartbeat: 0, alive_ns: monotonic_ns() };
+        let mut device = Self { info, hold, arm, channels, heartbeat: 0, alive_ns: monotonic_ns(), armed_ns: 0 };
         last_act::guard(&device.card().outputs.enable, 0)?;
         let zero = u32::from(device.arm.release()[0]);
         for channel in channels.motors {
@@ -112,7 +115,11 @@ impl Device for EmulatedDevice {
             return Err(FaultReason::DeviceRead);
         }
         if inputs.status.load(Ordering::Acquire) & STATUS_TRIPPED != 0 {
-            return Err(FaultReason::AmplifierTripped);
+            // Until they have answered, nothing is let through, and nobody has to ask twice.
+            reading.is_valid = false;
+            if monotonic_ns().saturating_sub(self.armed_ns) > ARMING_NS {
+                return Err(FaultReason::AmplifierTripped);
+            }
         }
         Ok(reading)
     }
@@ -129,6 +136,7 @@ impl Device for EmulatedDevice {
     }
 
     fn rearm(&mut self) {
+        self.armed_ns = monotonic_ns();
         self.card().outputs.arm.fetch_add(1, Ordering::AcqRel);
     }
 }

@@ -1,6 +1,7 @@
 //! What the fault tests share: the ring as a witness, processes to kill, a finger that is pressed into a
 //! table, a driver whose devices the test itself makes up, and garbage that can be had again.
 
+pub mod amplifiers;
 pub mod commander;
 pub mod hosted;
 pub mod press;
@@ -8,3 +9,5 @@ pub mod process;
 pub mod puppet;
 pub mod random;
 pub mod ring;
+pub mod saboteur;
+pub mod stand;

@@ -1,0 +1,259 @@
+//! The driver dies in every way it can, with a force on: what the amplifiers were told, and what they did.
+
+use rt_core::epitaph::{self, Epitaph, EpitaphKind};
+use rustix::process::Signal;
+use shm_abi::{DriverState, FaultReason, client};
+use std::sync::atomic::Ordering;
+use system_tests::faults::amplifiers::{Seen, wait_for};
+use system_tests::faults::process::End;
+use system_tests::faults::stand::{Setup, Stand};
+
+/// Any death: the amplifiers were on before it.
+struct Death {
+    stand: Stand,
+    end: End,
+    words: Option<Epitaph>,
+    trips_before: u64,
+    switched_off_before: u64,
+}
+
+/// A driver at full force to which something happens.
+fn die(clock: &'static str, sabotage: &str, strike: impl FnOnce(&Stand)) -> Death {
+    let mut stand = Stand::start(Setup::new(clock).sabotaged(sabotage));
+    let app = stand.start_app();
+    stand.wait_for_force();
+    // In real time a stall of the machine may have let the force go meanwhile; it comes back.
+    stand.amplifiers.settle();
+    wait_for("a force", || stand.amplifiers.are_enabled());
+    let before = stand.amplifiers.tally();
+    assert!(before.energised > 0);
+    strike(&stand);
+    let end = stand.driver.end();
+    let words = epitaph::read(&stand.view().epitaph);
+    drop(app);
+    let (trips_before, switched_off_before) = (before.watchdog_trips, before.switched_off);
+    Death { stand, end, words, trips_before, switched_off_before }
+}
+
+impl Death {
+    /// Zero was the last value written, and it says off: nothing was left to the watchdog.
+    fn check_released(&self) {
+        self.stand.amplifiers.settle();
+        self.stand.amplifiers.check_off("released");
+        assert!(self.stand.amplifiers.were_told_off());
+        let tally = self.stand.amplifiers.tally();
+        assert_eq!(tally.switched_off, self.switched_off_before, "{tally:?}");
+        assert_eq!(tally.watchdog_trips, self.trips_before, "{tally:?}");
+    }
+
+    /// The registers were cleared behind the last value's back.
+    fn check_last_act(&self) {
+        self.stand.amplifiers.settle();
+        self.stand.amplifiers.check_off("last act");
+        let tally = self.stand.amplifiers.tally();
+        let acts = u64::from(self.died_pushing());
+        assert_eq!(tally.switched_off, self.switched_off_before + acts, "{tally:?}");
+        assert_eq!(tally.watchdog_trips, self.trips_before, "{tally:?}");
+    }
+
+    /// Nobody could do anything any more: the amplifiers' own watchdog did.
+    fn check_watchdog(&self) {
+        if !self.died_pushing() {
+            return self.check_released();
+        }
+        wait_for("the watchdog", || self.stand.amplifiers.tally().watchdog_trips == self.trips_before + 1);
+        wait_for("the trip", || self.stand.amplifiers.have_tripped());
+    }
+
+    /// Whether its last value had the amplifiers on. In lockstep it had: no stall lets the force go.
+    fn died_pushing(&self) -> bool {
+        let pushed = !self.stand.amplifiers.were_told_off();
+        assert!(pushed || self.stand.setup.clock == "real", "it let go by itself");
+        if !pushed {
+            eprintln!("the machine stood still just before the strike: no force was on");
+        }
+        pushed
+    }
+
+    fn finish(self) -> Seen {
+        self.stand.finish_after_death()
+    }
+}
+
+#[test]
+fn a_driver_whose_loop_panics_leaves_an_epitaph_exit_status_3_and_zero_torque() {
+    for clock in ["real", "lockstep"] {
+        for act in ["panic", "panic-before-write", "panic-after-write"] {
+            let death = die(clock, &format!("{act}@button20"), |stand| stand.amplifiers.press(1 << 20));
+            assert_eq!((death.end.status, death.end.signal), (Some(3), None), "{:?}", death.end);
+            let words = death.words.as_ref().expect("an epitaph");
+            assert_eq!(words.kind, EpitaphKind::Panic, "{words}");
+            assert!(words.complete && words.tick > 0, "{words}");
+            assert!(words.text.contains("saboteur.rs") && words.text.contains("sabotage"), "{words}");
+            let told = "the driver's loop panicked; the motors were written zero: panicked in tick";
+            assert!(death.end.err.contains(told), "{:?}", death.end);
+            death.check_released();
+            death.finish();
+        }
+    }
+}
+
+/// A real fault of the CPU: Rust's own message and its SIGABRT come after the last act, and the epitaph tells of
+/// the first signal.
+#[test]
+fn a_driver_whose_loop_overflows_its_stack_switches_off_by_its_last_act() {
+    for clock in ["real", "lockstep"] {
+        let death = die(clock, "overflow@button20", |stand| stand.amplifiers.press(1 << 20));
+        assert_eq!((death.end.status, death.end.signal), (None, Some(6)), "{:?}", death.end);
+        let words = death.words.as_ref().expect("an epitaph");
+        assert_eq!(words.kind, EpitaphKind::Signal(11), "{words}");
+        assert!(words.text.starts_with("SIGSEGV: invalid memory reference at address"), "{words}");
+        death.check_last_act();
+        death.finish();
+    }
+}
+
+#[test]
+fn a_driver_that_is_killed_by_a_signal_that_can_be_caught_switches_off_by_its_last_act() {
+    let from_within: [(&str, i32); 2] = [("segv", 11), ("abort", 6)];
+    for clock in ["real", "lockstep"] {
+        for (act, signal) in from_within {
+            let death = die(clock, &format!("{act}@button20"), |stand| stand.amplifiers.press(1 << 20));
+            check_signal_death(death, signal);
+        }
+        for signal in [Signal::SEGV, Signal::BUS, Signal::ILL, Signal::FPE, Signal::ABORT] {
+            check_signal_death(die(clock, "", |stand| stand.driver.signal(signal)), signal.as_raw());
+        }
+    }
+}
+
+fn check_signal_death(death: Death, signal: i32) {
+    assert_eq!((death.end.status, death.end.signal), (None, Some(signal)), "{:?}", death.end);
+    let words = death.words.as_ref().expect("an epitaph");
+    assert_eq!((words.kind, words.complete), (EpitaphKind::Signal(signal), true), "{words}");
+    death.check_last_act();
+    death.finish();
+}
+
+/// Nothing inside the process can help here.
+#[test]
+fn a_driver_that_is_killed_or_exits_without_a_word_is_the_watchdogs() {
+    for clock in ["real", "lockstep"] {
+        let death = die(clock, "", |stand| stand.driver.signal(Signal::KILL));
+        assert_eq!((death.end.signal, death.words.is_none()), (Some(9), true), "{:?}", death.end);
+        death.check_watchdog();
+        death.finish();
+        let death = die(clock, "exit@button20", |stand| stand.amplifiers.press(1 << 20));
+        assert_eq!(death.end.status, Some(0), "{:?}", death.end);
+        death.check_watchdog();
+        death.finish();
+    }
+}
+
+#[test]
+fn a_driver_that_is_asked_to_stop_says_off_to_its_amplifiers() {
+    for clock in ["real", "lockstep"] {
+        for signal in [Signal::TERM, Signal::INT, Signal::HUP] {
+            let death = die(clock, "", |stand| stand.driver.signal(signal));
+            assert_eq!(death.end.status, Some(0), "{:?}", death.end);
+            assert_eq!(death.words.as_ref().map(|words| words.kind), Some(EpitaphKind::Stopped));
+            death.check_released();
+            death.finish();
+        }
+        let death = die(clock, "", |stand| {
+            client::stop(&stand.socket(), "test").expect("it is told");
+        });
+        assert_eq!(death.end.status, Some(0), "{:?}", death.end);
+        death.check_released();
+        death.finish();
+    }
+}
+
+/// What the device says is no position, or none that a hand could have come to, or nothing at all: the driver
+/// lives, the motors are off in the same tick, and come back only on request.
+#[test]
+fn forbidden_values_of_a_device_switch_the_amplifiers_off_until_somebody_clears_the_fault() {
+    let forbidden = [
+        ("nan", FaultReason::PositionNotFinite),
+        ("leap", FaultReason::PositionJump),
+        ("unreadable", FaultReason::DeviceRead),
+        ("unwritable", FaultReason::DeviceWrite),
+    ];
+    for clock in ["real", "lockstep"] {
+        for (act, reason) in forbidden {
+            let stand = Stand::start(Setup::new(clock).sabotaged(&format!("{act}@button20")));
+            let app = stand.start_app();
+            stand.wait_for_force();
+            stand.amplifiers.press(1 << 20);
+            wait_for_fault(&stand, reason);
+            stand.amplifiers.settle();
+            stand.amplifiers.check_off(act);
+            let tally = stand.amplifiers.tally();
+            assert_eq!((tally.switched_off, tally.watchdog_trips), (0, 0), "{act}: {tally:?}");
+            drop(app);
+            bring_back(&stand);
+            stand.finish();
+        }
+    }
+}
+
+/// The loop stands still with a force on. The amplifiers switch themselves off; the loop that goes on finds them
+/// tripped, and does not switch them on again until somebody asks.
+#[test]
+fn a_loop_that_hangs_is_the_watchdogs_and_a_loop_that_goes_on_finds_the_amplifiers_tripped() {
+    for clock in ["real", "lockstep"] {
+        let mut setup = Setup::new(clock).sabotaged("hang:1500@button20");
+        setup.limits.watchdog_ms = 500;
+        let stand = Stand::start(setup);
+        let app = stand.start_app();
+        stand.wait_for_force();
+        let before = stand.amplifiers.tally();
+        stand.amplifiers.press(1 << 20);
+        stand.amplifiers.wait_for_trip(before);
+        wait_for_fault(&stand, FaultReason::AmplifierTripped);
+        wait_for("off", || !stand.amplifiers.are_enabled());
+        stand.amplifiers.check_off("after the hang");
+        drop(app);
+        bring_back(&stand);
+        let seen = stand.finish();
+        assert_eq!(seen.tally.watchdog_trips, before.watchdog_trips + 1);
+    }
+}
+
+#[test]
+fn a_driver_that_is_stopped_and_continued_finds_its_amplifiers_tripped() {
+    for clock in ["real", "lockstep"] {
+        let stand = Stand::start(Setup::new(clock));
+        let app = stand.start_app();
+        stand.wait_for_force();
+        let before = stand.amplifiers.tally();
+        stand.driver.signal(Signal::STOP);
+        stand.amplifiers.wait_for_trip(before);
+        stand.driver.signal(Signal::CONT);
+        wait_for_fault(&stand, FaultReason::AmplifierTripped);
+        wait_for("off", || !stand.amplifiers.are_enabled());
+        drop(app);
+        bring_back(&stand);
+        stand.finish();
+    }
+}
+
+fn wait_for_fault(stand: &Stand, reason: FaultReason) {
+    wait_for("the fault", || {
+        let frame = stand.view().read_latest();
+        frame.is_some_and(|f| f.state == DriverState::Fault as u64 && f.fault == reason as u64)
+    });
+    assert_eq!(stand.view().counters.faults.load(Ordering::Relaxed), 1, "{reason:?}");
+}
+
+/// Somebody looks, lets go of the buttons, clears the fault, and a new application works.
+fn bring_back(stand: &Stand) {
+    stand.amplifiers.press(0);
+    client::clear_fault(&stand.socket(), "test").expect("it is told");
+    wait_for("the end of the fault", || {
+        stand.view().read_latest().is_some_and(|frame| frame.state != DriverState::Fault as u64)
+    });
+    let app = stand.start_app();
+    stand.wait_for_force();
+    drop(app);
+}
