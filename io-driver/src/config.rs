@@ -220,6 +220,22 @@ mod tests {
                 "[real_time]\npriority = 99\n[[device]]\nbackend = \"ideal\"",
                 "lab/driver.toml:2: `real_time.priority`: found 99, allowed: a whole number from 0 to 98",
             ),
+            (
+                "[safety]\ndead_man = { device = \"foot\", button = 0 }\n[[device]]\nbackend = \"ideal\"",
+                "lab/driver.toml:2: `safety.dead_man.device`: found no device \"foot\", allowed: f0",
+            ),
+            (
+                "[safety]\nemergency_stop = { device = \"f0\", button = 64 }\n[[device]]\nbackend = \"ideal\"",
+                "lab/driver.toml:2: `safety.emergency_stop.button`: found 64, allowed: a whole number from 0 to 63",
+            ),
+            (
+                "[[device]]\nbackend = \"emulated\"\ndescription = \"premium-1.5\"",
+                "lab/driver.toml:1: `device[0]`: found no key `card` in an emulated device, allowed: `card = \"FILE\"`",
+            ),
+            (
+                "[[device]]\nbackend = \"ideal\"\ngravity_compensation = true",
+                "lab/driver.toml:3: `device[0].gravity_compensation`: found `gravity_compensation` in a device of backend \"ideal\", allowed: not there",
+            ),
         ];
         for (text, expected) in cases {
             assert_eq!(parse(text).expect_err(text), expected);
@@ -238,12 +254,17 @@ mod tests {
     fn what_is_written_down_is_read_back_the_same() {
         let text = "rate_hz = 3000\nclock = \"lockstep\"\nsocket = \"/run/x\"\n\
             [real_time]\ncpu = 1\npriority = 0\nlock_memory = false\nphase_offset_us = 12.345\nwait = \"spin\"\n\
+            overruns = { policy = \"catch-up\", ticks = 3 }\n\
             [reply]\nmode = \"next-tick\"\nbudget_us = 99.5\n\
             [safety]\nmax_command_age_ticks = 7\nramp_in_ms = 33.3\nramp_out_ms = 4\n\
+            workspace_margin_mm = 12.5\ncommissioning = true\ncommissioning_force_n = 0.4\n\
+            emergency_stop = { device = \"b\", button = 3, normally_closed = true }\n\
+            dead_man = { device = \"b\", button = 0 }\n\
             [[device]]\nname = \"a \\\"quoted\\\" name\"\nbackend = \"ideal\"\nhand = \"/h.csv\"\nfinger = \"thumb\"\n\
             start_m = [0.1, -0.2, 1e-9]\nbase_position_m = [1, 2, 3]\nbase_orientation_wxyz = [0.6, 0.8, 0, 0]\n\
             peak_force_n = 8.5\n\
-            [[device]]\nbackend = \"replay\"\ndescription = \"premium-1.5\"\ntrace = \"/t.csv\"\n";
+            [[device]]\nname = \"b\"\nbackend = \"replay\"\ndescription = \"premium-1.5\"\ntrace = \"/t.csv\"\n\
+            [[device]]\nbackend = \"emulated\"\ndescription = \"premium-1.5\"\ncard = \"/c\"\ngravity_compensation = true\n";
         let config = parse(text).expect("good");
         assert_eq!(parse(&config.to_toml()).expect("good as well"), config);
         let plain = parse("[[device]]\nbackend = \"ideal\"\n").expect("good");

@@ -84,8 +84,8 @@ pub(super) struct RawRealTime {
     lock_memory: Option<bool>,
     phase_offset_us: Option<Spanned<f64>>,
     spin_margin_us: Option<Spanned<f64>>,
-    overrun: Option<RawOverrun>,
-    overrun_ticks: Option<Spanned<i64>>,
+    #[serde(default)]
+    overruns: RawOverruns,
     wait: Option<RawWait>,
 }
 
@@ -100,12 +100,33 @@ enum RawWait {
 /// As many as an old command may drive the motors.
 const USUAL_OVERRUN_TICKS: u64 = 5;
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields)]
+struct RawOverruns {
+    #[serde(default)]
+    policy: RawPolicy,
+    ticks: Option<Spanned<i64>>,
+}
+
+#[derive(Deserialize, Default)]
 #[serde(rename_all = "kebab-case")]
-enum RawOverrun {
+enum RawPolicy {
+    #[default]
     Skip,
     CatchUp,
     Fault,
+}
+
+impl RawOverruns {
+    fn validate(&self, toml: &TomlText<'_>) -> Result<OverrunPolicy, TomlReport> {
+        let ticks = self.ticks.as_ref().map(|ticks| toml.integer(ticks, 0..=1000)).transpose()?;
+        let ticks = ticks.map_or(USUAL_OVERRUN_TICKS, |ticks| ticks as u64);
+        Ok(match self.policy {
+            RawPolicy::Skip => OverrunPolicy::Skip,
+            RawPolicy::CatchUp => OverrunPolicy::CatchUp(ticks),
+            RawPolicy::Fault => OverrunPolicy::Fault(ticks),
+        })
+    }
 }
 
 impl RawRealTime {
@@ -122,8 +143,6 @@ impl RawRealTime {
         };
         let phase_offset_ns = us(&self.phase_offset_us)?.unwrap_or(usual.phase_offset_ns);
         let spin_margin = us(&self.spin_margin_us)?.map_or(usual.spin_margin, SpinMargin::Fixed);
-        let overrun_ticks = self.overrun_ticks.map(|ticks| toml.integer(&ticks, 0..=1000)).transpose()?;
-        let overrun_ticks = overrun_ticks.map_or(USUAL_OVERRUN_TICKS, |ticks| ticks as u64);
         let cpu = self.cpu.map(|cpu| toml.integer(&cpu, 0..=4095)).transpose()?;
         // 0 switches real-time scheduling off; 99 is left to the kernel's own threads.
         let priority =
@@ -134,11 +153,7 @@ impl RawRealTime {
             lock_memory: self.lock_memory.unwrap_or(true),
             phase_offset_ns,
             spin_margin,
-            overrun: match self.overrun.unwrap_or(RawOverrun::Skip) {
-                RawOverrun::Skip => OverrunPolicy::Skip,
-                RawOverrun::CatchUp => OverrunPolicy::CatchUp(overrun_ticks),
-                RawOverrun::Fault => OverrunPolicy::Fault(overrun_ticks),
-            },
+            overrun: self.overruns.validate(toml)?,
             wait: match self.wait.unwrap_or(RawWait::Auto) {
                 RawWait::Auto => None,
                 RawWait::Spin => Some(WaitMode::Spin),

@@ -39,10 +39,8 @@ fn head(text: &mut String, config: &DriverConfig) -> std::fmt::Result {
         OverrunPolicy::CatchUp(ticks) => ("catch-up", Some(ticks)),
         OverrunPolicy::Fault(ticks) => ("fault", Some(ticks)),
     };
-    writeln!(text, "overrun = {}", quoted(policy))?;
-    if let Some(ticks) = ticks {
-        writeln!(text, "overrun_ticks = {ticks}")?;
-    }
+    let ticks = ticks.map_or_else(String::new, |ticks| format!(", ticks = {ticks}"));
+    writeln!(text, "overruns = {{ policy = {}{ticks} }}", quoted(policy))?;
     writeln!(text, "wait = {}", quoted(real_time.wait.map_or("auto", WaitMode::name)))?;
     writeln!(text, "[reply]")?;
     writeln!(text, "mode = {}", quoted(mode_name(config.reply.mode)))?;

@@ -51,7 +51,8 @@ impl EmulatedDevice {
         arm: Arm,
         channels: Channels,
     ) -> Result<Self, last_act::NoRoom> {
-        let mut device = Self { info, hold, arm, channels, heartbeat: 0, alive_ns: monotonic_ns(), armed_ns: 0 };
+        let mut device =
+            Self { info, hold, arm, channels, heartbeat: 0, alive_ns: monotonic_ns(), armed_ns: 0 };
         last_act::guard(&device.card().outputs.enable, 0)?;
         let zero = u32::from(device.arm.release()[0]);
         for channel in channels.motors {

@@ -170,7 +170,9 @@ impl Amplifiers {
 
     /// Waits until the amplifiers have switched themselves off since the tally was `before`.
     pub fn wait_for_trip(&self, before: Tally) {
-        wait_for("the watchdog", || self.tally().watchdog_trips > before.watchdog_trips && self.have_tripped());
+        wait_for("the watchdog", || {
+            self.tally().watchdog_trips > before.watchdog_trips && self.have_tripped()
+        });
     }
 
     /// Ends the emulator once it has judged every value, and checks that all were good and none was lost. No

@@ -39,10 +39,17 @@ pub enum Mood {
 #[derive(Debug, Clone, Default)]
 pub struct Strings(Arc<Mutex<State>>);
 
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct State {
     mood: Mood,
+    position_m: Vector3<f64>,
     calls: Vec<Call>,
+}
+
+impl Default for State {
+    fn default() -> Self {
+        Self { mood: Mood::default(), position_m: Vector3::new(0.1, 0.2, 0.3), calls: Vec::new() }
+    }
 }
 
 impl Strings {
@@ -64,6 +71,11 @@ impl Strings {
     /// How it behaves from now on.
     pub fn set(&self, mood: Mood) {
         self.state().mood = mood;
+    }
+
+    /// Where its tip is from now on (m).
+    pub fn move_to(&self, position_m: Vector3<f64>) {
+        self.state().position_m = position_m;
     }
 
     /// Everything that was asked of it so far.
@@ -99,7 +111,7 @@ impl Device for Puppet {
             Mood::Unreadable => Err(FaultReason::DeviceRead),
             Mood::Astray => Ok(Reading::at(Vector3::new(0.0, f64::NAN, 0.0))),
             Mood::PanicsWhenRead => panic!("a puppet that panics when it is read"),
-            _ => Ok(Reading::at(Vector3::new(0.1, 0.2, 0.3))),
+            _ => Ok(Reading::at(state.position_m)),
         }
     }
 
