@@ -8,6 +8,7 @@
 //! |---|---|---|
 //! | [`setup`]: scheduling, CPU, memory, each read back | [`periodic`]: wake on an absolute grid | [`signals`]: asked to stop, as a flag |
 //! | [`cpu`]: which CPUs there are | [`histogram`]: latencies without allocation | [`epitaph`]: a dying process says why |
+//! | [`privileges`], [`sandbox`]: give up what the loop does not need | | |
 //! | [`process`]: die with the parent | [`log`]: messages formatted by another thread | [`usage`]: faults and switches it suffered |
 //!
 //! [`clock`] is under all of them, and [`alloc_guard`] lets a test show that a loop does not allocate.
@@ -19,13 +20,16 @@
 #![deny(unsafe_code)]
 
 pub mod alloc_guard;
+mod call_names;
 pub mod clock;
 pub mod cpu;
 pub mod epitaph;
 pub mod histogram;
 pub mod log;
 pub mod periodic;
+pub mod privileges;
 pub mod process;
+pub mod sandbox;
 pub mod schedule;
 pub mod setup;
 pub mod signals;

@@ -3,10 +3,12 @@
 //! Each file holds one concern and hides it behind functions that cannot be misused; the one
 //! exception, [`fatal::install_fatal_handlers_with`], is `unsafe` and says what it asks for.
 
+pub(crate) mod capability;
 pub(crate) mod counting_allocator;
 pub(crate) mod fatal;
 pub(crate) mod malloc;
 pub(crate) mod sched;
+pub(crate) mod seccomp;
 pub(crate) mod stack;
 
 #[cfg(test)]
