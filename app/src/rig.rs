@@ -6,7 +6,8 @@ use crate::mount::Mount;
 use crate::recording::Names;
 use haptics::{Entity, Finger, Friction, ParameterError, Plane, Shape, Sphere};
 use io_driver::config::{
-    Backend, DeviceConfig, DriverConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig, usual_spin_margin_ns,
+    Backend, DeviceConfig, DriverConfig, ProcessConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig,
+    usual_spin_margin_ns,
 };
 use io_driver::sim::script::{HandError, HandScript};
 use shm_abi::segment::ClockMode;
@@ -173,6 +174,7 @@ impl Rig {
                 ramp_in_ticks: ticks(200),
                 ramp_out_ticks: ticks(10),
             },
+            process: ProcessConfig::default(),
             devices: (0..self.device_count()).map(|index| self.ideal_device(index)).collect(),
         }
     }

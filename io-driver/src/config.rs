@@ -33,6 +33,8 @@ pub struct DriverConfig {
     pub reply: ReplyConfig,
     /// How to be safe.
     pub safety: SafetyConfig,
+    /// What the process may do.
+    pub process: ProcessConfig,
     /// The devices, in the order of the frame.
     pub devices: Vec<DeviceConfig>,
 }
@@ -83,6 +85,21 @@ pub struct SafetyConfig {
     pub ramp_in_ticks: u64,
     /// From all force to none once commands fail (ticks).
     pub ramp_out_ticks: u64,
+}
+
+/// What the process may do once it is set up.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ProcessConfig {
+    /// Shut out all system calls that are not needed.
+    pub sandbox: bool,
+    /// Whom a driver that root started becomes: `NAME` or `UID`, with `:GROUP` if it is not the user's own.
+    pub user: Option<String>,
+}
+
+impl Default for ProcessConfig {
+    fn default() -> Self {
+        Self { sandbox: true, user: None }
+    }
 }
 
 /// One device.
@@ -182,6 +199,7 @@ impl DriverConfig {
             real_time: raw.real_time.validate(&toml, period_ns, reply.budget_ns)?,
             reply,
             safety: raw.safety.validate(&toml, period_ns)?,
+            process: raw.process.validate(),
             devices: devices(&raw.device, &toml, directory)?,
         })
     }
@@ -214,6 +232,8 @@ struct RawConfig {
     reply: RawReply,
     #[serde(default)]
     safety: RawSafety,
+    #[serde(default)]
+    process: RawProcess,
     device: Spanned<Vec<Spanned<RawDevice>>>,
 }
 
@@ -325,6 +345,21 @@ impl RawSafety {
             ramp_in_ticks: ticks(&self.ramp_in_ms, 200.0, 10_000.0)?,
             ramp_out_ticks: ticks(&self.ramp_out_ms, 10.0, 1000.0)?,
         })
+    }
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields)]
+struct RawProcess {
+    sandbox: Option<bool>,
+    user: Option<String>,
+}
+
+impl RawProcess {
+    /// Whether there is such a user is found out at the start, on the machine that it starts on.
+    fn validate(self) -> ProcessConfig {
+        let usual = ProcessConfig::default();
+        ProcessConfig { sandbox: self.sandbox.unwrap_or(usual.sandbox), user: self.user }
     }
 }
 
@@ -567,6 +602,7 @@ mod tests {
             [real_time]\ncpu = 1\npriority = 0\nlock_memory = false\nphase_offset_us = 12.345\nwait = \"spin\"\n\
             [reply]\nmode = \"next-tick\"\nbudget_us = 99.5\n\
             [safety]\nmax_command_age_ticks = 7\nramp_in_ms = 33.3\nramp_out_ms = 4\n\
+            [process]\nsandbox = false\nuser = \"lab:audio\"\n\
             [[device]]\nname = \"a \\\"quoted\\\" name\"\nbackend = \"ideal\"\nhand = \"/h.csv\"\nfinger = \"thumb\"\n\
             start_m = [0.1, -0.2, 1e-9]\nbase_position_m = [1, 2, 3]\nbase_orientation_wxyz = [0.6, 0.8, 0, 0]\n\
             peak_force_n = 8.5\n\

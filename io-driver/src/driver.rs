@@ -2,7 +2,7 @@
 //!
 //! Model: everything that can fail or allocate happens before the loop's first tick or in this thread.
 //! The order is: open the devices, set up the loop's thread and look at what was obtained, make the
-//! memory, listen, go. Whatever ends the process, the loop writes zero first.
+//! memory, give up all rights, listen, shut the sandbox, go. Whatever ends the process, the loop writes zero first.
 
 use crate::config::{DriverConfig, ReplyMode};
 use crate::cycle::{Cycle, Freshness};
@@ -12,9 +12,11 @@ use crate::meter::bump;
 use crate::open::{OpenError, open_devices};
 use crate::real_loop::{Ended, RealLoop, Shared};
 use crate::safety::{Ramps, Safety};
+use crate::sandbox;
 use crate::say;
 use rt_core::epitaph::{EpitaphKind, EpitaphRef, install_fatal_handlers, install_panic_hook};
 use rt_core::log::{LogLevel, LogLine, RtLogDrain};
+use rt_core::privileges::{Keep, User, UserError, reduce_thread};
 use rt_core::setup::{SetupGuards, SetupReport, SetupRequest};
 use rt_core::signals::StopSignals;
 use shm_abi::DriverMemory;
@@ -62,6 +64,9 @@ pub enum RunError {
     /// It cannot listen.
     #[error(transparent)]
     Bind(#[from] BindError),
+    /// There is no such user, or it cannot become that user.
+    #[error("`user` in [process]: {0}")]
+    User(#[from] UserError),
     /// `--strict`, and something is missing.
     #[error("--strict: not every real-time guarantee was obtained, so nothing was started:\n{}", .0.to_string().trim_end())]
     Strict(SetupReport),
@@ -98,6 +103,44 @@ static TICK: AtomicU64 = AtomicU64::new(0);
 pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> {
     let signals =
         StopSignals::install().map_err(|source| RunError::System { what: "catch signals", source })?;
+    let user = sandbox::user_to_become(&config.process)?;
+    die_with_parent(options)?;
+    let devices = open_devices(config)?;
+    let shared = Shared::default();
+    let (mut report, starter) = spawn_loop(config, &shared)?;
+    refuse_if_strict(&report, options)?;
+    let wait_mode = choose_wait_mode(config, &report);
+    let memory = Arc::new(DriverMemory::create(&describe(config, &devices, wait_mode))?);
+    if config.process.sandbox {
+        sandbox::say_panics_plainly();
+    }
+    install_last_words(&memory)?;
+    let path = options.socket.clone().or_else(|| config.socket.clone());
+    let path = path.unwrap_or_else(shm_abi::endpoint::for_driver);
+    give_up_rights(user.as_ref(), &path, &mut report, &starter)?;
+    if user.is_some() {
+        // The kernel forgets the request when the user changes.
+        die_with_parent(options)?;
+    }
+    refuse_if_strict(&report, options)?;
+    let server = Server::bind(&path)?;
+    let (sender, inbox) = mail();
+    let (log, drain) = rt_core::log::channel(LOG_CAPACITY);
+    let cycle = make_cycle(config, Arc::clone(&memory), devices);
+    let real_loop = RealLoop::new(config, wait_mode, cycle, inbox, log, shared.clone(), &TICK);
+    report.guarantees.push(sandbox::shut(&config.process));
+    memory.tell_setup_report(&report.to_string());
+    refuse_if_strict(&report, options)?;
+    say(options, format_args!("real-time guarantees:\n{}", report.to_string().trim_end()));
+    say(options, format_args!("listening at {}", server.path().display()));
+    let thread = starter.start(real_loop);
+    let mut service = Service { server, sender, drain, memory, signals, shared, options };
+    let served = service.serve();
+    service.finish(thread, served)
+}
+
+/// Makes this process end with its parent, if it is to.
+fn die_with_parent(options: &RunOptions) -> Result<(), RunError> {
     if let Some(parent) = options.parent {
         // Not SIGTERM, which ends the process at once when it comes twice: a parent of several threads can die
         // twice to the kernel, first the thread that started this process, then the one that inherited it.
@@ -108,24 +151,7 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
             },
         )?;
     }
-    let devices = open_devices(config)?;
-    let shared = Shared::default();
-    let (report, starter) = spawn_loop(config, &shared)?;
-    tell_guarantees(&report, options)?;
-    let wait_mode = choose_wait_mode(config, &report);
-    let info = DriverInfo { setup_report: report.to_string(), ..describe(config, &devices, wait_mode) };
-    let memory = Arc::new(DriverMemory::create(&info)?);
-    install_last_words(&memory)?;
-    let path = options.socket.clone().or_else(|| config.socket.clone());
-    let server = Server::bind(&path.unwrap_or_else(shm_abi::endpoint::for_driver))?;
-    say(options, format_args!("listening at {}", server.path().display()));
-    let (sender, inbox) = mail();
-    let (log, drain) = rt_core::log::channel(LOG_CAPACITY);
-    let cycle = make_cycle(config, Arc::clone(&memory), devices);
-    let thread = starter.start(RealLoop::new(config, wait_mode, cycle, inbox, log, shared.clone(), &TICK));
-    let mut service = Service { server, sender, drain, memory, signals, shared, options };
-    let served = service.serve();
-    service.finish(thread, served)
+    Ok(())
 }
 
 /// The state machine and devices of a configuration over a memory; what every clock runs.
@@ -203,14 +229,28 @@ fn choose_wait_mode(config: &DriverConfig, report: &SetupReport) -> WaitMode {
 
 /// The loop's thread, set up and waiting for its loop.
 struct Starter {
-    send: mpsc::SyncSender<RealLoop>,
+    send: mpsc::SyncSender<Order>,
     thread: JoinHandle<Ended>,
 }
 
+/// What the loop's thread is to do next.
+enum Order {
+    /// Give up its rights, which only it can, and drop the sender when that is done.
+    GiveUpRights(Keep, mpsc::SyncSender<()>),
+    /// Run the loop to its end.
+    Run(Box<RealLoop>),
+}
+
 impl Starter {
+    fn give_up_rights(&self, keep: Keep) {
+        let (send_done, done) = mpsc::sync_channel(0);
+        // Both fail only if the thread is gone, which joining it will tell.
+        let _ = self.send.send(Order::GiveUpRights(keep, send_done));
+        let _ = done.recv();
+    }
+
     fn start(self, real_loop: RealLoop) -> JoinHandle<Ended> {
-        // It fails only if the thread is gone, which joining it will tell.
-        let _ = self.send.send(real_loop);
+        let _ = self.send.send(Order::Run(Box::new(real_loop)));
         self.thread
     }
 }
@@ -219,7 +259,7 @@ impl Starter {
 fn spawn_loop(config: &DriverConfig, shared: &Shared) -> Result<(SetupReport, Starter), RunError> {
     let request = setup_request(config);
     let (send_report, receive_report) = mpsc::sync_channel(1);
-    let (send, receive) = mpsc::sync_channel::<RealLoop>(1);
+    let (send, receive) = mpsc::sync_channel::<Order>(1);
     let ended = Arc::clone(&shared.ended);
     let body = move || {
         let (report, guards) = rt_core::setup::apply(&request);
@@ -237,19 +277,33 @@ fn spawn_loop(config: &DriverConfig, shared: &Shared) -> Result<(SetupReport, St
 }
 
 /// The guards are kept as long as the loop runs.
-fn run_when_told(receive: &mpsc::Receiver<RealLoop>, _guards: SetupGuards) -> Ended {
-    match receive.recv() {
-        Ok(real_loop) => real_loop.run(),
-        // The start failed elsewhere, which was told there.
-        Err(_) => Ended::Stopped,
+fn run_when_told(receive: &mpsc::Receiver<Order>, _guards: SetupGuards) -> Ended {
+    loop {
+        match receive.recv() {
+            Ok(Order::GiveUpRights(keep, _done)) => reduce_thread(keep),
+            Ok(Order::Run(real_loop)) => return real_loop.run(),
+            // The start failed elsewhere, which was told there.
+            Err(_) => return Ended::Stopped,
+        }
     }
 }
 
-fn tell_guarantees(report: &SetupReport, options: &RunOptions) -> Result<(), RunError> {
+fn give_up_rights(
+    user: Option<&User>,
+    socket: &Path,
+    report: &mut SetupReport,
+    starter: &Starter,
+) -> Result<(), RunError> {
+    if let Some(user) = user {
+        sandbox::make_directory_for(user, socket);
+    }
+    Ok(sandbox::give_up_rights(user, report, |keep| starter.give_up_rights(keep))?)
+}
+
+fn refuse_if_strict(report: &SetupReport, options: &RunOptions) -> Result<(), RunError> {
     if options.strict && !report.all_obtained() {
         return Err(RunError::Strict(report.clone()));
     }
-    say(options, format_args!("real-time guarantees:\n{}", report.to_string().trim_end()));
     Ok(())
 }
 

@@ -146,6 +146,9 @@ mod tests {
     fn a_call_is_named_where_the_name_is_known() {
         assert_eq!(text(libc::SYS_socket, NATIVE), format!("{} (socket)", libc::SYS_socket));
         assert_eq!(text(9999, NATIVE), "9999");
-        assert_eq!(text(libc::SYS_socket, NATIVE ^ 1), format!("{} of another architecture", libc::SYS_socket));
+        assert_eq!(
+            text(libc::SYS_socket, NATIVE ^ 1),
+            format!("{} of another architecture", libc::SYS_socket)
+        );
     }
 }

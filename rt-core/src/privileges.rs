@@ -167,7 +167,10 @@ mod tests {
 
     #[test]
     fn one_thread_that_keeps_something_spoils_the_whole() {
-        assert_eq!(found(vec![thread("a"), thread("b")], None), (true, "no capability, no new ones, user 1000".into()));
+        assert_eq!(
+            found(vec![thread("a"), thread("b")], None),
+            (true, "no capability, no new ones, user 1000".into())
+        );
         let able = ThreadStatus { capabilities: 1 << 14, ..thread("b") };
         assert_eq!(found(vec![thread("a"), able], None), (false, "capabilities 0x4000 in thread b".into()));
         let open = ThreadStatus { no_new_privileges: false, ..thread("b") };

@@ -101,9 +101,10 @@ fn missing(count: usize, failure: &Failure) -> Guarantee {
             "no filter (this kernel has none)".to_owned(),
             "use a kernel with CONFIG_SECCOMP_FILTER, 4.17 or newer".to_owned(),
         ),
-        Failure::NotInstalled(NotInstalled::Refused(errno)) => {
-            (format!("no filter ({errno})"), "look for a sandbox round this process that forbids its own".to_owned())
-        }
+        Failure::NotInstalled(NotInstalled::Refused(errno)) => (
+            format!("no filter ({errno})"),
+            "look for a sandbox round this process that forbids its own".to_owned(),
+        ),
         Failure::NotInstalled(NotInstalled::Thread(tid)) => (
             "no filter".to_owned(),
             format!("thread {tid} was started with a filter of its own; start it without"),
@@ -148,9 +149,7 @@ fn rules_of(only: Only) -> Result<Vec<SeccompRule>, seccompiler::BackendError> {
         Only::OneOf(argument, values) => {
             values.iter().map(|value| rule(argument, SeccompCmpOp::Eq, *value)).collect()
         }
-        Only::Without(argument, bits) => {
-            Ok(vec![rule(argument, SeccompCmpOp::MaskedEq(bits.into()), 0)?])
-        }
+        Only::Without(argument, bits) => Ok(vec![rule(argument, SeccompCmpOp::MaskedEq(bits.into()), 0)?]),
         Only::OwnProcess(argument) => Ok(vec![rule(argument, SeccompCmpOp::Eq, std::process::id())?]),
     }
 }
@@ -182,7 +181,9 @@ mod tests {
     #[test]
     fn a_call_that_is_listed_twice_is_no_filter() {
         let call = AllowedCall { name: "close", number: libc::SYS_close, only: Only::Any, reason: "" };
-        assert!(matches!(compile(&[call, call]), Err(Failure::Uncompilable(why)) if why == "close is listed twice"));
+        assert!(
+            matches!(compile(&[call, call]), Err(Failure::Uncompilable(why)) if why == "close is listed twice")
+        );
     }
 
     #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]

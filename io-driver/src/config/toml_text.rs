@@ -38,7 +38,9 @@ fn head(text: &mut String, config: &DriverConfig) -> std::fmt::Result {
     writeln!(text, "[safety]")?;
     writeln!(text, "max_command_age_ticks = {}", config.safety.max_command_age_ticks)?;
     writeln!(text, "ramp_in_ms = {:?}", config.safety.ramp_in_ticks as f64 * period_ms)?;
-    writeln!(text, "ramp_out_ms = {:?}", config.safety.ramp_out_ticks as f64 * period_ms)
+    writeln!(text, "ramp_out_ms = {:?}", config.safety.ramp_out_ticks as f64 * period_ms)?;
+    writeln!(text, "[process]\nsandbox = {}", config.process.sandbox)?;
+    config.process.user.iter().try_for_each(|user| writeln!(text, "user = {}", quoted(user)))
 }
 
 fn write_device(text: &mut String, device: &DeviceConfig) -> std::fmt::Result {

@@ -59,7 +59,10 @@ impl ThreadStatus {
             uids: ids("Uid:"),
             gids: ids("Gid:"),
             groups: ids("Groups:"),
-            capabilities: ["CapInh:", "CapPrm:", "CapEff:", "CapAmb:"].map(set).iter().fold(0, |all, s| all | s),
+            capabilities: ["CapInh:", "CapPrm:", "CapEff:", "CapAmb:"]
+                .map(set)
+                .iter()
+                .fold(0, |all, s| all | s),
             bounding: set("CapBnd:"),
             no_new_privileges: field("NoNewPrivs:") == "1",
             seccomp: field("Seccomp:").parse().unwrap_or(0),

@@ -19,7 +19,9 @@ pub struct User {
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum UserError {
     /// Nobody is called so.
-    #[error("there is no {what} \"{name}\" on this machine; use a name that `getent` knows, or numbers: \"UID:GID\"")]
+    #[error(
+        "there is no {what} \"{name}\" on this machine; use a name that `getent` knows, or numbers: \"UID:GID\""
+    )]
     Unknown {
         /// "user" or "group".
         what: &'static str,
@@ -39,7 +41,9 @@ pub enum UserError {
         name: String,
     },
     /// The kernel refused.
-    #[error("cannot become user \"{name}\" (uid {uid}, gid {gid}) as user {own}: {cause}; start as root, or as that user")]
+    #[error(
+        "cannot become user \"{name}\" (uid {uid}, gid {gid}) as user {own}: {cause}; start as root, or as that user"
+    )]
     Refused {
         /// What was given.
         name: String,
@@ -84,9 +88,8 @@ impl User {
     /// Whether the process is this user already, and cannot be another.
     #[must_use]
     pub fn is_own(&self) -> bool {
-        getresuid().is_ok_and(|own| {
-            [own.real, own.effective, own.saved].iter().all(|uid| uid.as_raw() == self.uid)
-        })
+        getresuid()
+            .is_ok_and(|own| [own.real, own.effective, own.saved].iter().all(|uid| uid.as_raw() == self.uid))
     }
 
     /// Becomes this user, with all threads and for good; the former user's other groups go too.
@@ -102,7 +105,8 @@ impl User {
         }
         let (uid, gid) = (Uid::from_raw(self.uid), Gid::from_raw(self.gid));
         // The C library does these for every thread; the group first, while there is the right to.
-        let done = setgroups(&[gid]).and_then(|()| setresgid(gid, gid, gid)).and_then(|()| setresuid(uid, uid, uid));
+        let done =
+            setgroups(&[gid]).and_then(|()| setresgid(gid, gid, gid)).and_then(|()| setresuid(uid, uid, uid));
         let own = geteuid().as_raw();
         done.map_err(|cause| UserError::Refused {
             name: self.name.clone(),
@@ -141,7 +145,9 @@ mod tests {
     #[test]
     fn what_cannot_be_meant_is_refused_with_what_to_write() {
         let message = |text: &str| User::look_up(text).unwrap_err().to_string();
-        assert!(message("no such user").starts_with("there is no user \"no such user\" on this machine; use"));
+        assert!(
+            message("no such user").starts_with("there is no user \"no such user\" on this machine; use")
+        );
         assert!(message("4711:no such group").starts_with("there is no group \"no such group\""));
         assert_eq!(User::look_up("3999999999"), Err(UserError::NoGroup { uid: 3_999_999_999 }));
         assert_eq!(User::look_up("root"), Err(UserError::Root { name: "root".into() }));
