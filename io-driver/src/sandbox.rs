@@ -11,6 +11,7 @@ pub mod allowed_calls;
 
 use crate::config::ProcessConfig;
 use crate::say;
+use allowed_calls::{ALLOWED_CALLS, REFUSED_CALLS};
 use rt_core::privileges::{self, Keep, User, UserError};
 use rt_core::setup::{Guarantee, SetupReport};
 use std::path::Path;
@@ -64,7 +65,7 @@ pub fn give_up_rights(
 /// Shuts out all system calls that are not allowed, from now on and in every thread; or says that they are not.
 pub fn shut(config: &ProcessConfig) -> Guarantee {
     if config.sandbox {
-        return rt_core::sandbox::shut(allowed_calls::ALLOWED_CALLS);
+        return rt_core::sandbox::shut(ALLOWED_CALLS, REFUSED_CALLS);
     }
     Guarantee {
         name: "system calls",

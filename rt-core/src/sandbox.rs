@@ -7,6 +7,11 @@
 //! [`epitaph`](crate::epitaph) run: last act, last words with the call's name, death. Whether the filter is in
 //! force is read back from the kernel for every thread.
 //!
+//!
+//! SIGSYS cannot be caught while it is blocked: the kernel then kills at once, without last act. The C library
+//! blocks all signals while it starts a thread or a process. The calls that do that are therefore *refused*, by an
+//! error, instead of being fatal.
+//!
 //! Invariants: for good. A call made in another architecture's way (`int 0x80`, x32) is as forbidden as one
 //! that is not listed. Nothing is installed if the list cannot be compiled.
 //! Cost: a call without conditions is let through by a table in the kernel (5.11 or newer), one with conditions
@@ -18,7 +23,7 @@ use crate::sys::seccomp::{NotInstalled, install};
 use nix::errno::Errno;
 use seccompiler::{
     BpfProgram, SeccompAction, SeccompCmpArgLen, SeccompCmpOp, SeccompCondition, SeccompFilter, SeccompRule,
-    TargetArch,
+    TargetArch, sock_filter,
 };
 use std::collections::BTreeMap;
 use std::io;
@@ -36,6 +41,15 @@ pub struct AllowedCall {
     pub reason: &'static str,
 }
 
+/// A system call that fails with EPERM.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RefusedCall {
+    /// Its name.
+    pub name: &'static str,
+    /// `libc::SYS_...`.
+    pub number: libc::c_long,
+}
+
 /// Which arguments of a call are let through. Arguments count from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Only {
@@ -49,9 +63,9 @@ pub enum Only {
     OwnProcess(u8),
 }
 
-/// Lets nothing but `calls` through from now on, in every thread.
-pub fn shut(calls: &[AllowedCall]) -> Guarantee {
-    let installed = compile(calls).and_then(|program| {
+/// Lets nothing but `calls` through from now on, in every thread; all others are fatal, or `refused`.
+pub fn shut(calls: &[AllowedCall], refused: &[RefusedCall]) -> Guarantee {
+    let installed = compile(calls, refused).and_then(|program| {
         // Opened first: reading is allowed then, opening probably not.
         let files = ThreadFiles::open().map_err(|error| Failure::Unreadable(error.to_string()))?;
         install(&program).map_err(Failure::NotInstalled)?;
@@ -85,7 +99,7 @@ fn judge(count: usize, threads: io::Result<Vec<ThreadStatus>>) -> Guarantee {
                 format!("no filter in thread {}", thread.name),
                 Some("the kernel accepted but did not apply it"),
             ),
-            None => (format!("{count} allowed, all others are fatal"), None),
+            None => (format!("{count} allowed, all others are fatal or refused"), None),
         },
     };
     Guarantee::asked("system calls", wanted(count), found, remedy.map(str::to_owned))
@@ -113,24 +127,45 @@ fn missing(count: usize, failure: &Failure) -> Guarantee {
     Guarantee::asked("system calls", wanted(count), found, Some(remedy))
 }
 
-fn compile(calls: &[AllowedCall]) -> Result<BpfProgram, Failure> {
-    let refused = |error: seccompiler::BackendError| Failure::Uncompilable(error.to_string());
-    let architecture = TargetArch::try_from(std::env::consts::ARCH).map_err(refused)?;
+fn compile(calls: &[AllowedCall], refused: &[RefusedCall]) -> Result<BpfProgram, Failure> {
+    let impossible = |error: seccompiler::BackendError| Failure::Uncompilable(error.to_string());
+    let architecture = TargetArch::try_from(std::env::consts::ARCH).map_err(impossible)?;
     let mut rules = BTreeMap::new();
     for call in calls {
-        if rules.insert(i64_of(call.number), rules_of(call.only).map_err(refused)?).is_some() {
+        if rules.insert(i64_of(call.number), rules_of(call.only).map_err(impossible)?).is_some() {
             return Err(Failure::Uncompilable(format!("{} is listed twice", call.name)));
         }
     }
     let filter = SeccompFilter::new(rules, SeccompAction::Trap, SeccompAction::Allow, architecture);
-    let mut program: BpfProgram = filter.and_then(TryInto::try_into).map_err(refused)?;
+    let mut program: BpfProgram = filter.and_then(TryInto::try_into).map_err(impossible)?;
     // The library kills outright for another architecture, which leaves no time for a last act.
     for instruction in &mut program {
         if instruction.k == libc::SECCOMP_RET_KILL_PROCESS {
             instruction.k = libc::SECCOMP_RET_TRAP;
         }
     }
+    program.splice(ARCHITECTURE_CHECK..ARCHITECTURE_CHECK, refusals(refused));
     Ok(program)
+}
+
+/// Instructions at the beginning that look at the architecture and have returned if it is another one.
+const ARCHITECTURE_CHECK: usize = 3;
+
+/// What the library cannot express: a second verdict, by two instructions for each call. All jumps of the
+/// program are relative, so that it may stand before the rest.
+fn refusals(refused: &[RefusedCall]) -> Vec<sock_filter> {
+    const LOAD_WORD: u16 = (libc::BPF_LD | libc::BPF_W | libc::BPF_ABS) as u16;
+    const IF_EQUAL: u16 = (libc::BPF_JMP | libc::BPF_JEQ | libc::BPF_K) as u16;
+    const RETURN: u16 = (libc::BPF_RET | libc::BPF_K) as u16;
+    /// Where `struct seccomp_data` has the number of the call.
+    const NUMBER: u32 = 0;
+    let instruction = |code, if_not: u8, k| sock_filter { code, jt: 0, jf: if_not, k };
+    let mut program = vec![instruction(LOAD_WORD, 0, NUMBER)];
+    for call in refused {
+        program.push(instruction(IF_EQUAL, 1, call.number as u32));
+        program.push(instruction(RETURN, 0, libc::SECCOMP_RET_ERRNO | libc::EPERM as u32));
+    }
+    program
 }
 
 #[allow(clippy::useless_conversion, clippy::allow_attributes, reason = "narrower on 32-bit machines")]
@@ -182,7 +217,7 @@ mod tests {
     fn a_call_that_is_listed_twice_is_no_filter() {
         let call = AllowedCall { name: "close", number: libc::SYS_close, only: Only::Any, reason: "" };
         assert!(
-            matches!(compile(&[call, call]), Err(Failure::Uncompilable(why)) if why == "close is listed twice")
+            matches!(compile(&[call, call], &[]), Err(Failure::Uncompilable(why)) if why == "close is listed twice")
         );
     }
 
@@ -190,7 +225,7 @@ mod tests {
     #[test]
     fn nothing_is_killed_without_its_last_act() {
         let call = AllowedCall { name: "close", number: libc::SYS_close, only: Only::Any, reason: "" };
-        let program = compile(&[call]).unwrap_or_default();
+        let program = compile(&[call], &[]).unwrap_or_default();
         assert!(!program.is_empty());
         assert!(program.iter().all(|instruction| instruction.k != libc::SECCOMP_RET_KILL_PROCESS));
     }

@@ -1,6 +1,6 @@
 //! Every system call that the running driver may make, and what needs it.
 //!
-//! What is not here ends the process: SIGSYS, zero torque, last words. In particular: no file is opened, no
+//! What is not here ends the process (SIGSYS, zero torque, last words) or is refused. In particular: no file is opened, no
 //! program or thread started, no socket made, no device asked anything (`ioctl`), no memory made executable, no
 //! signal sent to others, no right changed.
 //!
@@ -8,8 +8,8 @@
 //! therefore their order does not matter. `tests/tests/privilege_full_life.rs` lives through everything that
 //! a driver can live through under this list, and shows which entries that takes.
 
-use rt_core::sandbox::AllowedCall;
 use rt_core::sandbox::Only::{self, Any, OneOf, OwnProcess, Without};
+use rt_core::sandbox::{AllowedCall, RefusedCall};
 
 /// The list.
 pub const ALLOWED_CALLS: &[AllowedCall] = &[
@@ -80,6 +80,17 @@ pub const ALLOWED_CALLS: &[AllowedCall] = &[
     call("getpid", libc::SYS_getpid, Any, "raise, abort"),
     call("gettid", libc::SYS_gettid, Any, "raise, abort; the standard library's message of a stack overflow"),
     call("tgkill", libc::SYS_tgkill, OwnProcess(0), "raise, abort: only ever at itself"),
+];
+
+/// They start threads and processes. The C library makes them with all signals blocked, when SIGSYS would kill
+/// without a last act; so they fail, and whoever wanted a thread ends in the ordinary way of an error or a panic.
+pub const REFUSED_CALLS: &[RefusedCall] = &[
+    RefusedCall { name: "clone", number: libc::SYS_clone },
+    RefusedCall { name: "clone3", number: libc::SYS_clone3 },
+    #[cfg(target_arch = "x86_64")]
+    RefusedCall { name: "fork", number: libc::SYS_fork },
+    #[cfg(target_arch = "x86_64")]
+    RefusedCall { name: "vfork", number: libc::SYS_vfork },
 ];
 
 const fn call(name: &'static str, number: libc::c_long, only: Only, reason: &'static str) -> AllowedCall {
