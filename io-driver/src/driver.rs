@@ -39,6 +39,10 @@ const LOG_CAPACITY: usize = 1024;
 /// Touched in advance, so that no call chain of the loop is the first to need a page of stack.
 const STACK_BYTES: usize = 256 * 1024;
 
+/// It is no real-time guarantee, so `--strict` does not mind.
+const STARTED_AS_ROOT: &str = "warning: started as root and stays root, though without any capability; name an \
+     ordinary user with `user = \"NAME\"` in [process], or start as one";
+
 /// What a run is to do besides its configuration.
 #[derive(Debug, Clone, Default)]
 pub struct RunOptions {
@@ -123,6 +127,9 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
         die_with_parent(options)?;
     }
     refuse_if_strict(&report, options)?;
+    if rustix::process::geteuid().is_root() {
+        say(options, format_args!("{STARTED_AS_ROOT}"));
+    }
     let server = Server::bind(&path)?;
     let (sender, inbox) = mail();
     let (log, drain) = rt_core::log::channel(LOG_CAPACITY);

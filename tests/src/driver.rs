@@ -30,6 +30,11 @@ impl Driver {
     pub fn start_as(config: &str, command: Command) -> Self {
         let directory = tempfile::tempdir().expect("a directory");
         let socket = directory.path().join("driver.sock");
+        Self::start_at(config, command, directory, socket)
+    }
+
+    /// The same at a socket of one's own, which lies in or below the directory.
+    pub fn start_at(config: &str, command: Command, directory: TempDir, socket: PathBuf) -> Self {
         let child = spawn_as(config, &socket, command);
         let driver = Self { child, socket, _directory: directory };
         driver.wait_until_it_listens();

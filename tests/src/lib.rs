@@ -12,5 +12,6 @@ pub mod intruder;
 pub mod programs;
 pub mod recording;
 pub mod slices;
+pub mod strangers;
 pub mod threads;
 pub mod workplace;
