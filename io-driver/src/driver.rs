@@ -119,6 +119,11 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
         sandbox::say_panics_plainly();
     }
     install_last_words(&memory)?;
+    let (sender, inbox) = mail();
+    let (log, drain) = rt_core::log::channel(LOG_CAPACITY);
+    let cycle = make_cycle(config, Arc::clone(&memory), devices);
+    let real_loop = RealLoop::new(config, wait_mode, cycle, inbox, log, shared.clone(), &TICK);
+    // From here on nothing new that the loop touches: it would not be locked.
     let path = options.socket.clone().or_else(|| config.socket.clone());
     let path = path.unwrap_or_else(shm_abi::endpoint::for_driver);
     give_up_rights(user.as_ref(), &path, &mut report, &starter)?;
@@ -131,10 +136,6 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
         say(options, format_args!("{STARTED_AS_ROOT}"));
     }
     let server = Server::bind(&path)?;
-    let (sender, inbox) = mail();
-    let (log, drain) = rt_core::log::channel(LOG_CAPACITY);
-    let cycle = make_cycle(config, Arc::clone(&memory), devices);
-    let real_loop = RealLoop::new(config, wait_mode, cycle, inbox, log, shared.clone(), &TICK);
     report.guarantees.push(sandbox::shut(&config.process));
     memory.tell_setup_report(&report.to_string());
     refuse_if_strict(&report, options)?;

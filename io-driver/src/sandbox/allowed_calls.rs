@@ -1,8 +1,8 @@
 //! Every system call that the running driver may make, and what needs it.
 //!
-//! What is not here ends the process (SIGSYS, zero torque, last words) or is refused. In particular: no file is opened, no
-//! program or thread started, no socket made, no device asked anything (`ioctl`), no memory made executable, no
-//! signal sent to others, no right changed.
+//! What is not here ends the process (SIGSYS, zero torque, last words) or is refused. In particular: no file
+//! is opened, no program or thread started, no socket made, no device asked anything (`ioctl`), no memory made
+//! executable, no signal sent to others, no right changed.
 //!
 //! The loop's own calls have no conditions, so that the kernel lets them through without running the filter;
 //! therefore their order does not matter. `tests/tests/privilege_full_life.rs` lives through everything that
@@ -35,7 +35,7 @@ pub const ALLOWED_CALLS: &[AllowedCall] = &[
         "the kernel's own: a wait goes on after stop and continue",
     ),
     // The socket.
-    call(POLL_NAME, POLL, Any, "the service's wait for clients"),
+    call("ppoll", libc::SYS_ppoll, Any, "the service's wait for clients"),
     call("accept4", libc::SYS_accept4, Any, "a client comes"),
     call("getsockopt", libc::SYS_getsockopt, Any, "which process it is (SO_PEERCRED)"),
     call("recvfrom", libc::SYS_recvfrom, Any, "its request"),
@@ -68,8 +68,12 @@ pub const ALLOWED_CALLS: &[AllowedCall] = &[
     ),
     // The end.
     call("statx", libc::SYS_statx, Any, "whether the socket's name is still ours before it is removed"),
-    call(UNLINK_NAME, UNLINK, Any, "removing the socket and its lock"),
-    call(RMDIR_NAME, RMDIR, Any, "removing the directory that a parent made for the socket"),
+    #[cfg(target_arch = "x86_64")]
+    call("unlink", libc::SYS_unlink, Any, "removing the socket and its lock"),
+    #[cfg(target_arch = "x86_64")]
+    call("rmdir", libc::SYS_rmdir, Any, "removing the directory that a parent made for the socket"),
+    #[cfg(not(target_arch = "x86_64"))]
+    call("unlinkat", libc::SYS_unlinkat, Any, "both of these, where there are no calls for them alone"),
     call("exit", libc::SYS_exit, Any, "the loop's thread ends"),
     call("exit_group", libc::SYS_exit_group, Any, "the process ends"),
     // Signals and violent ends.
@@ -77,7 +81,7 @@ pub const ALLOWED_CALLS: &[AllowedCall] = &[
     call("rt_sigprocmask", libc::SYS_rt_sigprocmask, Any, "raise, abort, the end of a thread"),
     call("rt_sigreturn", libc::SYS_rt_sigreturn, Any, "back from a handler"),
     call("sigaltstack", libc::SYS_sigaltstack, Any, "a thread that ends gives its signal stack back"),
-    call("getpid", libc::SYS_getpid, Any, "raise, abort"),
+    call("getpid", libc::SYS_getpid, Any, "our id in each answer to a client; raise, abort"),
     call("gettid", libc::SYS_gettid, Any, "raise, abort; the standard library's message of a stack overflow"),
     call("tgkill", libc::SYS_tgkill, OwnProcess(0), "raise, abort: only ever at itself"),
 ];
@@ -100,15 +104,3 @@ const fn call(name: &'static str, number: libc::c_long, only: Only, reason: &'st
 const PROT_EXEC: u32 = libc::PROT_EXEC as u32;
 /// The last one is the standard library's check of a descriptor before it is closed, in debug builds.
 const FCNTL: &[u32] = &[libc::F_ADD_SEALS as u32, libc::F_DUPFD_CLOEXEC as u32, libc::F_GETFD as u32];
-
-const POLL_NAME: &str = "ppoll";
-const POLL: libc::c_long = libc::SYS_ppoll;
-
-#[cfg(target_arch = "x86_64")]
-const UNLINK_NAME: &str = "unlink";
-#[cfg(target_arch = "x86_64")]
-const UNLINK: libc::c_long = libc::SYS_unlink;
-#[cfg(target_arch = "x86_64")]
-const RMDIR_NAME: &str = "rmdir";
-#[cfg(target_arch = "x86_64")]
-const RMDIR: libc::c_long = libc::SYS_rmdir;
