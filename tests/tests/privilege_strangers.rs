@@ -78,7 +78,7 @@ fn play(target: &str) -> ! {
     for (what, result) in attempts {
         match result {
             Err(error) if is_refusal(&error) => println!("\nrefused: {what}: {error}"),
-            other => println!("\nnot refused: {what}: {other:?}"),
+            other => println!("\ngranted: {what}: {other:?}"),
         }
     }
     std::process::exit(0)
