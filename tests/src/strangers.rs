@@ -38,7 +38,10 @@ impl Stranger {
     pub fn of(program: &Path) -> Self {
         let directory = open_directory();
         let copy = directory.path().join("program");
-        std::fs::copy(program, &copy).expect("a copy");
+        // Not by this process: while another thread starts a child, that child would hold the copy open for
+        // writing, and nobody may execute what is being written.
+        let copied = Command::new("cp").arg(program).arg(&copy).status().expect("there is `cp`");
+        assert!(copied.success(), "a copy of {}", program.display());
         Self { program: copy, _directory: directory }
     }
 

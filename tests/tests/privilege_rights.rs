@@ -279,7 +279,8 @@ fn play_parent() -> ! {
     }
     // What is killed cannot tidy up.
     drop(directory);
-    eprintln!("driver is up: {}", driver.id());
+    // In one piece.
+    io_driver::say::say(format_args!("driver is up: {}", driver.id()));
     std::thread::sleep(HANG);
     std::process::exit(1)
 }
