@@ -21,6 +21,7 @@ use crate::privileges::{ThreadFiles, ThreadStatus};
 use crate::setup::Guarantee;
 use crate::sys::seccomp::{NotInstalled, install};
 use nix::errno::Errno;
+use nix::sys::prctl::set_no_new_privs;
 use seccompiler::{
     BpfProgram, SeccompAction, SeccompCmpArgLen, SeccompCmpOp, SeccompCondition, SeccompFilter, SeccompRule,
     TargetArch, sock_filter,
@@ -68,6 +69,8 @@ pub fn shut(calls: &[AllowedCall], refused: &[RefusedCall]) -> Guarantee {
     let installed = compile(calls, refused).and_then(|program| {
         // Opened first: reading is allowed then, opening probably not.
         let files = ThreadFiles::open().map_err(|error| Failure::Unreadable(error.to_string()))?;
+        // The kernel demands it of whoever has no rights; if it fails, so does what follows.
+        let _ = set_no_new_privs();
         install(&program).map_err(Failure::NotInstalled)?;
         Ok(files)
     });

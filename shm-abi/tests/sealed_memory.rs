@@ -91,7 +91,7 @@ fn an_observer_of_the_same_user_can_spoil_neither_the_memory_nor_the_next_observ
     // Not executable, or, before Linux 6.3, executable and no program.
     assert!(std::process::Command::new(&path).spawn().is_err());
     // It may close the file to itself by name; descriptors that are handed over are not asked for permission.
-    file.set_permissions(std::fs::Permissions::from_mode(0)).unwrap();
+    file.set_permissions(std::fs::Permissions::from_mode(0o000)).unwrap();
     rustix::fs::flock(&file, rustix::fs::FlockOperation::NonBlockingLockExclusive).unwrap();
     memory.write_frame(&common::frame(1));
     memory.ring(1, None);
