@@ -102,7 +102,7 @@ fn a_driver_lives_through_everything_under_the_filter_and_ends_in_order() {
 fn an_allowed_call_is_one_that_a_driver_makes_or_is_rare_for_a_reason() {
     let directory = tempfile::tempdir().expect("a directory");
     let trace = directory.path().join("trace");
-    let Some(command) = traced(programs::io_driver(), &trace) else { return };
+    let Some(command) = traced(&programs::io_driver(), &trace) else { return };
     let config = press::config("real").replace("priority = 0\nlock_memory = false", "priority = 1");
     let mut driver = Driver::start_as(&config, command);
     live(&mut driver);
@@ -121,7 +121,7 @@ fn an_allowed_call_is_one_that_a_driver_makes_or_is_rare_for_a_reason() {
     assert!(unlisted.is_empty(), "{unlisted:?}");
 }
 
-fn traced(program: Command, trace: &Path) -> Option<Command> {
+fn traced(program: &Command, trace: &Path) -> Option<Command> {
     let tried = Command::new("strace").args(["-o", "/dev/null", "true"]).stderr(Stdio::null()).status();
     if !tried.is_ok_and(|status| status.success()) {
         println!(
