@@ -6,7 +6,7 @@ use crate::mount::Mount;
 use crate::recording::Names;
 use haptics::{Entity, Finger, Friction, ParameterError, Plane, Shape, Sphere};
 use io_driver::config::{
-    Backend, DeviceConfig, DriverConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig,
+    Backend, DeviceConfig, DriverConfig, ProcessConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig,
 };
 use io_driver::sim::script::{HandError, HandScript};
 use shm_abi::segment::ClockMode;
@@ -160,6 +160,7 @@ impl Rig {
             real_time: RealTime::usual(period_ns, reply.budget_ns),
             reply,
             safety: SafetyConfig::usual(period_ns),
+            process: ProcessConfig::default(),
             devices: (0..self.device_count()).map(|index| self.ideal_device(index)).collect(),
         }
     }

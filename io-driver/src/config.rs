@@ -6,18 +6,21 @@
 //! Units: in the names of the keys; SI.
 
 mod device;
+mod process;
 mod real_time;
 mod reply;
 mod safety;
 mod toml_text;
 
 pub use device::{Backend, DeviceConfig};
+pub use process::ProcessConfig;
 pub use real_time::{OverrunPolicy, RealTime, SpinMargin, longest_spin_margin_ns};
 pub use reply::{ReplyConfig, ReplyMode};
 pub use safety::{Commissioning, SafetyConfig};
 
 use crate::toml_report::{Allowed, TomlReport, TomlText};
 use device::RawDevice;
+use process::RawProcess;
 use real_time::RawRealTime;
 use reply::RawReply;
 use safety::RawSafety;
@@ -43,6 +46,8 @@ pub struct DriverConfig {
     pub reply: ReplyConfig,
     /// How to be safe.
     pub safety: SafetyConfig,
+    /// What the process may do.
+    pub process: ProcessConfig,
     /// The devices, in the order of the frame.
     pub devices: Vec<DeviceConfig>,
 }
@@ -113,6 +118,7 @@ impl DriverConfig {
             real_time: raw.real_time.validate(&toml, period_ns, reply.budget_ns)?,
             reply,
             safety: raw.safety.validate(&toml, period_ns, &devices)?,
+            process: raw.process.validate(),
             devices,
         })
     }
@@ -137,6 +143,8 @@ struct RawConfig {
     reply: RawReply,
     #[serde(default)]
     safety: RawSafety,
+    #[serde(default)]
+    process: RawProcess,
     device: Spanned<Vec<Spanned<RawDevice>>>,
 }
 

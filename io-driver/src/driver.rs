@@ -2,7 +2,7 @@
 //!
 //! Model: everything that can fail or allocate happens before the loop's first tick or in this thread.
 //! The order is: open the devices, set up the loop's thread and look at what was obtained, make the
-//! memory, listen, go. Whatever ends the process, the loop writes zero first.
+//! memory, give up all rights, listen, shut the sandbox, go. Whatever ends the process, the loop writes zero first.
 
 use crate::config::{DriverConfig, ReplyMode, SpinMargin};
 use crate::cycle::{Cycle, Freshness, Protection};
@@ -12,12 +12,14 @@ use crate::meter::bump;
 use crate::open::{OpenError, open_devices};
 use crate::real_loop::{Ended, RealLoop, Shared, Waiting};
 use crate::safety::{Ramps, Safety};
+use crate::sandbox;
 use crate::say;
 use crate::supervisor::Supervisor;
 use rt_core::calibrate;
 use rt_core::epitaph::{EpitaphKind, EpitaphRef, install_fatal_handlers, install_panic_hook};
 use rt_core::histogram::Histogram;
 use rt_core::log::{LogLevel, LogLine, RtLogDrain};
+use rt_core::privileges::{Keep, User, UserError, reduce_thread};
 use rt_core::setup::{Guarantee, SetupGuards, SetupReport, SetupRequest};
 use rt_core::signals::StopSignals;
 use shm_abi::DriverMemory;
@@ -39,6 +41,10 @@ const POLL: Duration = Duration::from_millis(20);
 const LOG_CAPACITY: usize = 1024;
 /// Touched in advance, so that no call chain of the loop is the first to need a page of stack.
 const STACK_BYTES: usize = 256 * 1024;
+
+/// It is no real-time guarantee, so `--strict` does not mind.
+const STARTED_AS_ROOT: &str = "warning: started as root and stays root, though without any capability; name an \
+     ordinary user with `user = \"NAME\"` in [process], or start as one";
 
 /// What a run is to do besides its configuration.
 #[derive(Debug, Clone, Default)]
@@ -70,6 +76,9 @@ pub enum RunError {
     /// It cannot listen.
     #[error(transparent)]
     Bind(#[from] BindError),
+    /// There is no such user, or it cannot become that user.
+    #[error("`user` in [process]: {0}")]
+    User(#[from] UserError),
     /// `--strict`, and something is missing.
     #[error("--strict: not every real-time guarantee was obtained, so nothing was started:\n{}", .0.to_string().trim_end())]
     Strict(SetupReport),
@@ -106,6 +115,56 @@ static TICK: AtomicU64 = AtomicU64::new(0);
 pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> {
     let signals =
         StopSignals::install().map_err(|source| RunError::System { what: "catch signals", source })?;
+    let user = sandbox::user_to_become(&config.process)?;
+    die_with_parent(options)?;
+    // Its socket is made here, while sockets may be made.
+    let supervisor = Supervisor::from_environment(config.clock, options.parent.is_some());
+    let devices = open_devices(config)?;
+    let devices = match options.fit {
+        Some(fit) => devices.into_iter().map(fit).collect(),
+        None => devices,
+    };
+    let shared = Shared::default();
+    let (mut report, spin_margin_ns, starter) = spawn_loop(config, &shared)?;
+    refuse_if_strict(&report, options)?;
+    let wait_mode = choose_wait_mode(config, &report);
+    let waiting = Waiting { reply: wait_mode, spin_margin_ns };
+    let memory = Arc::new(DriverMemory::create(&describe(config, &devices, wait_mode))?);
+    if config.process.sandbox {
+        sandbox::say_panics_plainly();
+    }
+    install_last_words(&memory)?;
+    let (sender, inbox) = mail();
+    let (log, drain) = rt_core::log::channel(LOG_CAPACITY);
+    let cycle = make_cycle(config, Arc::clone(&memory), devices);
+    let real_loop = RealLoop::new(config, waiting, cycle, inbox, log, shared.clone(), &TICK);
+    // From here on nothing new that the loop touches: it would not be locked.
+    let path = options.socket.clone().or_else(|| config.socket.clone());
+    let path = path.unwrap_or_else(shm_abi::endpoint::for_driver);
+    give_up_rights(user.as_ref(), &path, &mut report, &starter)?;
+    if user.is_some() {
+        // The kernel forgets the request when the user changes.
+        die_with_parent(options)?;
+    }
+    refuse_if_strict(&report, options)?;
+    if rustix::process::geteuid().is_root() {
+        say(options, format_args!("{STARTED_AS_ROOT}"));
+    }
+    let server = Server::bind(&path)?;
+    report.guarantees.push(sandbox::shut(&config.process));
+    memory.tell_setup_report(&report.to_string());
+    refuse_if_strict(&report, options)?;
+    say(options, format_args!("real-time guarantees:\n{}", report.to_string().trim_end()));
+    say(options, format_args!("listening at {}", server.path().display()));
+    let thread = starter.start(real_loop);
+    supervisor.ready(&format!("listening at {}", server.path().display()));
+    let mut service = Service { server, sender, drain, memory, signals, shared, options, supervisor };
+    let served = service.serve();
+    service.finish(thread, served)
+}
+
+/// Makes this process end with its parent, if it is to.
+fn die_with_parent(options: &RunOptions) -> Result<(), RunError> {
     if let Some(parent) = options.parent {
         // Not SIGTERM, which ends the process at once when it comes twice: a parent of several threads can die
         // twice to the kernel, first the thread that started this process, then the one that inherited it.
@@ -116,32 +175,7 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
             },
         )?;
     }
-    // Its socket is made here, while sockets may be made.
-    let supervisor = Supervisor::from_environment(config.clock, options.parent.is_some());
-    let devices = open_devices(config)?;
-    let devices = match options.fit {
-        Some(fit) => devices.into_iter().map(fit).collect(),
-        None => devices,
-    };
-    let shared = Shared::default();
-    let (report, spin_margin_ns, starter) = spawn_loop(config, &shared)?;
-    tell_guarantees(&report, options)?;
-    let wait_mode = choose_wait_mode(config, &report);
-    let waiting = Waiting { reply: wait_mode, spin_margin_ns };
-    let info = DriverInfo { setup_report: report.to_string(), ..describe(config, &devices, wait_mode) };
-    let memory = Arc::new(DriverMemory::create(&info)?);
-    install_last_words(&memory)?;
-    let path = options.socket.clone().or_else(|| config.socket.clone());
-    let server = Server::bind(&path.unwrap_or_else(shm_abi::endpoint::for_driver))?;
-    say(options, format_args!("listening at {}", server.path().display()));
-    let (sender, inbox) = mail();
-    let (log, drain) = rt_core::log::channel(LOG_CAPACITY);
-    let cycle = make_cycle(config, Arc::clone(&memory), devices);
-    let thread = starter.start(RealLoop::new(config, waiting, cycle, inbox, log, shared.clone(), &TICK));
-    supervisor.ready(&format!("listening at {}", server.path().display()));
-    let mut service = Service { server, sender, drain, memory, signals, shared, options, supervisor };
-    let served = service.serve();
-    service.finish(thread, served)
+    Ok(())
 }
 
 /// The state machine and devices of a configuration over a memory; what every clock runs.
@@ -227,14 +261,28 @@ fn choose_wait_mode(config: &DriverConfig, report: &SetupReport) -> WaitMode {
 
 /// The loop's thread, set up and waiting for its loop.
 struct Starter {
-    send: mpsc::SyncSender<RealLoop>,
+    send: mpsc::SyncSender<Order>,
     thread: JoinHandle<Ended>,
 }
 
+/// What the loop's thread is to do next.
+enum Order {
+    /// Give up its rights, which only it can, and drop the sender when that is done.
+    GiveUpRights(Keep, mpsc::SyncSender<()>),
+    /// Run the loop to its end.
+    Run(Box<RealLoop>),
+}
+
 impl Starter {
+    fn give_up_rights(&self, keep: Keep) {
+        let (send_done, done) = mpsc::sync_channel(0);
+        // Both fail only if the thread is gone, which joining it will tell.
+        let _ = self.send.send(Order::GiveUpRights(keep, send_done));
+        let _ = done.recv();
+    }
+
     fn start(self, real_loop: RealLoop) -> JoinHandle<Ended> {
-        // It fails only if the thread is gone, which joining it will tell.
-        let _ = self.send.send(real_loop);
+        let _ = self.send.send(Order::Run(Box::new(real_loop)));
         self.thread
     }
 }
@@ -243,7 +291,7 @@ impl Starter {
 fn spawn_loop(config: &DriverConfig, shared: &Shared) -> Result<(SetupReport, u64, Starter), RunError> {
     let request = setup_request(config);
     let (send_report, receive_report) = mpsc::sync_channel(1);
-    let (send, receive) = mpsc::sync_channel::<RealLoop>(1);
+    let (send, receive) = mpsc::sync_channel::<Order>(1);
     let ended = Arc::clone(&shared.ended);
     let margin =
         if config.clock == ClockMode::Real { config.real_time.spin_margin } else { SpinMargin::Fixed(0) };
@@ -296,19 +344,33 @@ fn judge_spin_margin(lateness: &Histogram, chosen_ns: u64) -> Guarantee {
 const CALIBRATION_SLEEPS: usize = 300;
 
 /// The guards are kept as long as the loop runs.
-fn run_when_told(receive: &mpsc::Receiver<RealLoop>, _guards: SetupGuards) -> Ended {
-    match receive.recv() {
-        Ok(real_loop) => real_loop.run(),
-        // The start failed elsewhere, which was told there.
-        Err(_) => Ended::Stopped,
+fn run_when_told(receive: &mpsc::Receiver<Order>, _guards: SetupGuards) -> Ended {
+    loop {
+        match receive.recv() {
+            Ok(Order::GiveUpRights(keep, _done)) => reduce_thread(keep),
+            Ok(Order::Run(real_loop)) => return real_loop.run(),
+            // The start failed elsewhere, which was told there.
+            Err(_) => return Ended::Stopped,
+        }
     }
 }
 
-fn tell_guarantees(report: &SetupReport, options: &RunOptions) -> Result<(), RunError> {
+fn give_up_rights(
+    user: Option<&User>,
+    socket: &Path,
+    report: &mut SetupReport,
+    starter: &Starter,
+) -> Result<(), RunError> {
+    if let Some(user) = user {
+        sandbox::make_directory_for(user, socket);
+    }
+    Ok(sandbox::give_up_rights(user, report, |keep| starter.give_up_rights(keep))?)
+}
+
+fn refuse_if_strict(report: &SetupReport, options: &RunOptions) -> Result<(), RunError> {
     if options.strict && !report.all_obtained() {
         return Err(RunError::Strict(report.clone()));
     }
-    say(options, format_args!("real-time guarantees:\n{}", report.to_string().trim_end()));
     Ok(())
 }
 

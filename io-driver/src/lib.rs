@@ -30,6 +30,7 @@ pub mod motors;
 pub mod open;
 pub mod real_loop;
 pub mod safety;
+pub mod sandbox;
 pub mod say;
 pub mod sim;
 pub mod status;

@@ -8,6 +8,7 @@
 //! |---|---|---|
 //! | [`setup`]: scheduling, CPU, memory, each read back | [`periodic`]: wake on an absolute grid | [`signals`]: asked to stop, as a flag |
 //! | [`cpu`]: which CPUs there are | [`histogram`]: latencies without allocation | [`epitaph`]: a dying process says why |
+//! | [`privileges`], [`sandbox`]: give up what the loop does not need | | |
 //! | [`process`]: die with the parent | [`log`]: messages formatted by another thread | [`usage`]: faults and switches it suffered |
 //!
 //! [`calibrate`] measures how long a loop has to spin, and [`spin_margin`] learns it. [`last_act`] is what a
@@ -29,7 +30,9 @@ pub mod histogram;
 pub mod last_act;
 pub mod log;
 pub mod periodic;
+pub mod privileges;
 pub mod process;
+pub mod sandbox;
 pub mod schedule;
 pub mod setup;
 pub mod signals;
@@ -38,6 +41,8 @@ pub mod usage;
 
 #[allow(unsafe_code, reason = "the one place for system calls that no safe crate wraps")]
 mod sys;
+
+mod call_names;
 
 #[cfg(test)]
 mod test_child;

@@ -183,6 +183,12 @@ impl DriverMemory {
         Ok(Self { map, fd })
     }
 
+    /// Replaces the set-up report. Only before the segment is handed over for the first time: a reader takes
+    /// the text as it stands.
+    pub fn tell_setup_report(&self, report: &str) {
+        put_text(&self.map.setup_report, report);
+    }
+
     /// Writes frame `k`. Call [`ring`](Self::ring) next.
     #[inline]
     pub fn write_frame(&self, frame: &Frame) {

@@ -223,21 +223,20 @@ impl Server {
 
     fn accept(&mut self) {
         self.accept_after = None;
-        let stream = match self.listener.accept() {
-            Ok((stream, _)) => stream,
+        // Not the standard library's: it takes an `ioctl` more to make the connection non-blocking, and a driver
+        // in its sandbox has none.
+        let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
+        let accepted = rustix::io::retry_on_intr(|| rustix::net::accept_with(&self.listener, flags));
+        let stream = match accepted {
+            Ok(stream) => UnixStream::from(stream),
             // Whoever knocked has left again.
-            Err(e) if matches!(e.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::ConnectionAborted) => {
-                return;
-            }
+            Err(Errno::AGAIN | Errno::CONNABORTED) => return,
             Err(_) => {
                 self.accept_after = Some(Instant::now() + ACCEPT_REST);
                 return;
             }
         };
         let pid = peer_pid(&stream);
-        if stream.set_nonblocking(true).is_err() {
-            return;
-        }
         if self.connections.len() >= MAX_CONNECTIONS {
             let _ = socket::send(stream.as_fd(), &Answer::new(Verdict::Crowded), &[]);
             return;

@@ -74,3 +74,29 @@ fn what_the_driver_says_of_itself_is_cleaned_before_it_is_shown() {
     let info = DriverView::map(memory.fd()).unwrap().info();
     assert_eq!((info.devices.len(), info.period_ns), (shm_abi::MAX_DEVICES, 1));
 }
+
+/// What an observer of the driver's own user can still do to the file itself: nothing that anybody notices.
+#[test]
+fn an_observer_of_the_same_user_can_spoil_neither_the_memory_nor_the_next_observers_view() {
+    use std::os::unix::fs::PermissionsExt;
+    let memory = DriverMemory::create(&info()).unwrap();
+    let file = File::from(memory.fd().try_clone_to_owned().unwrap());
+    let path = format!("/proc/self/fd/{}", std::os::fd::AsRawFd::as_raw_fd(&file));
+    let truncated = File::options().write(true).truncate(true).open(&path);
+    assert_eq!(truncated.unwrap_err().raw_os_error(), Some(rustix::io::Errno::PERM.raw_os_error()));
+    let reopened = File::options().read(true).write(true).open(&path).unwrap();
+    // SAFETY: if this succeeds, the mapping is never touched.
+    let mapped = unsafe { memmap2::MmapOptions::new().len(4096).map_mut(&reopened) };
+    assert_eq!(mapped.unwrap_err().raw_os_error(), Some(rustix::io::Errno::PERM.raw_os_error()));
+    // Not executable, or, before Linux 6.3, executable and no program.
+    assert!(std::process::Command::new(&path).spawn().is_err());
+    // It may close the file to itself by name; descriptors that are handed over are not asked for permission.
+    file.set_permissions(std::fs::Permissions::from_mode(0o000)).unwrap();
+    rustix::fs::flock(&file, rustix::fs::FlockOperation::NonBlockingLockExclusive).unwrap();
+    memory.write_frame(&common::frame(1));
+    memory.ring(1, None);
+    let next = DriverView::map(memory.fd()).unwrap();
+    let mut found = common::frame(9);
+    next.read_frame(1, &mut found).unwrap();
+    assert!(common::is_frame(&found, 1));
+}

@@ -4,7 +4,7 @@ use crate::programs;
 use shm_abi::client::{self, AttachError, Attachment};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::{Child, ExitStatus, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
@@ -23,9 +23,19 @@ pub struct Driver {
 impl Driver {
     /// Starts one with this configuration and waits until it listens.
     pub fn start(config: &str) -> Self {
+        Self::start_as(config, programs::io_driver())
+    }
+
+    /// The same with a command line, environment or starter of its own, behind which the usual arguments come.
+    pub fn start_as(config: &str, command: Command) -> Self {
         let directory = tempfile::tempdir().expect("a directory");
         let socket = directory.path().join("driver.sock");
-        let child = spawn(config, &socket);
+        Self::start_at(config, command, directory, socket)
+    }
+
+    /// The same at a socket of one's own, which lies in or below the directory.
+    pub fn start_at(config: &str, command: Command, directory: TempDir, socket: PathBuf) -> Self {
+        let child = spawn_as(config, &socket, command);
         let driver = Self { child, socket, _directory: directory };
         driver.wait_until_it_listens();
         driver
@@ -82,7 +92,12 @@ impl Drop for Driver {
 }
 
 fn spawn(config: &str, socket: &Path) -> Child {
-    let mut child = programs::io_driver()
+    spawn_as(config, socket, programs::io_driver())
+}
+
+fn spawn_as(config: &str, socket: &Path, command: Command) -> Child {
+    let mut command = command;
+    let mut child = command
         .args(["run", "--config", "-", "--quiet", "--socket"])
         .arg(socket)
         .stdin(Stdio::piped())

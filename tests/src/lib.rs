@@ -8,9 +8,11 @@
 pub mod bare_loop;
 pub mod driver;
 pub mod faults;
+pub mod intruder;
 pub mod lab;
 pub mod programs;
 pub mod recording;
 pub mod slices;
+pub mod strangers;
 pub mod threads;
 pub mod workplace;

@@ -62,7 +62,8 @@ fn head(text: &mut String, config: &DriverConfig) -> std::fmt::Result {
         writeln!(text, "commissioning = true\ncommissioning_force_n = {force_n:?}")?;
         writeln!(text, "commissioning_speed_m_per_s = {speed_m_per_s:?}")?;
     }
-    Ok(())
+    writeln!(text, "[process]\nsandbox = {}", config.process.sandbox)?;
+    config.process.user.iter().try_for_each(|user| writeln!(text, "user = {}", quoted(user)))
 }
 
 fn write_device(text: &mut String, device: &DeviceConfig) -> std::fmt::Result {

@@ -62,7 +62,7 @@ fn judge_lock(asked: nix::Result<()>, status: &str, limit: Option<u64>) -> Guara
         (_, Some(limit)) => Some(format!(
             "raise RLIMIT_MEMLOCK from {} KiB to unlimited (memlock in /etc/security/limits.d, \
              LimitMEMLOCK=infinity in a systemd unit), or give the program the capability: setcap \
-             cap_ipc_lock=ep",
+             cap_ipc_lock,cap_sys_resource=ep",
             limit / 1024
         )),
         (Err(Errno::ENOMEM), None) => Some("free memory: not everything fits".to_owned()),

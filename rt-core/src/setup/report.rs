@@ -22,7 +22,7 @@ pub struct Guarantee {
 
 impl Guarantee {
     /// One that the process asked for. The remedy is dropped if there is nothing to remedy.
-    pub(super) fn asked(name: &'static str, wanted: String, found: String, remedy: Option<String>) -> Self {
+    pub(crate) fn asked(name: &'static str, wanted: String, found: String, remedy: Option<String>) -> Self {
         Self { name, wanted, found, obtained: remedy.is_none(), remedy, circumstance: false }
     }
 

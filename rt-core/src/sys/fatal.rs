@@ -11,6 +11,7 @@
 //! Two threads that fault at once both come here; the first one's epitaph stays.
 //! Cost: a few hundred nanoseconds besides the last act.
 
+use crate::call_names::ForbiddenCall;
 use crate::epitaph::{EpitaphKind, EpitaphRef, EpitaphWords, FixedText};
 use std::fmt::Write as _;
 use std::io;
@@ -19,12 +20,13 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Those whose default action is to kill with a core dump and that mean "this program is broken".
-const FATAL_SIGNALS: [(libc::c_int, &str); 5] = [
+const FATAL_SIGNALS: [(libc::c_int, &str); 6] = [
     (libc::SIGSEGV, "SIGSEGV: invalid memory reference"),
     (libc::SIGBUS, "SIGBUS: memory that cannot be reached"),
     (libc::SIGILL, "SIGILL: illegal instruction"),
     (libc::SIGFPE, "SIGFPE: arithmetic fault"),
     (libc::SIGABRT, "SIGABRT: abort"),
+    (libc::SIGSYS, "SIGSYS: forbidden system call"),
 ];
 
 /// What the handlers need; set once, before the first handler is installed.
@@ -36,7 +38,7 @@ struct Fatal {
 
 static FATAL: OnceLock<Fatal> = OnceLock::new();
 
-/// Lets SIGSEGV, SIGBUS, SIGILL, SIGFPE and SIGABRT write an epitaph before they kill.
+/// Lets SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT and SIGSYS write an epitaph before they kill.
 ///
 /// `tick` is read when it happens. Exit status and core dump stay what they would have been.
 ///
@@ -58,9 +60,11 @@ extern "C" fn on_fatal(signal: libc::c_int, info: *mut libc::siginfo_t, _context
     // SAFETY: with SA_SIGINFO the kernel passes a valid record that lives as long as the handler.
     let info = unsafe { &*info };
     // si_code is positive when the kernel raised the signal for what the thread did, sigaction(2).
-    let raised_by_fault = info.si_code > 0;
-    fatal.write_epitaph(signal, raised_by_fault.then_some(info));
-    fatal.step_aside(signal, raised_by_fault);
+    let raised_by_kernel = info.si_code > 0;
+    fatal.write_epitaph(signal, raised_by_kernel.then_some(info));
+    // A fault happens again when the handler returns. A forbidden system call does not: the thread would go on
+    // behind it.
+    fatal.step_aside(signal, raised_by_kernel && signal != libc::SIGSYS);
 }
 
 impl Fatal {
@@ -69,7 +73,9 @@ impl Fatal {
         let name =
             FATAL_SIGNALS.iter().find(|(number, _)| *number == signal).map_or("signal", |(_, name)| name);
         let _ = text.write_str(name);
-        if let Some(info) = fault {
+        if let Some(info) = fault.filter(|_| signal == libc::SIGSYS) {
+            let _ = write!(text, " {}", forbidden_call(info));
+        } else if let Some(info) = fault {
             // SAFETY: a fault's record carries an address.
             let address = unsafe { info.si_addr() };
             let _ = write!(text, " at address {:#x}", address.addr());
@@ -89,6 +95,27 @@ impl Fatal {
             unsafe { libc::raise(signal) };
         }
     }
+}
+
+/// The part of a siginfo that a system call filter fills in (sigaction(2): si_call_addr, si_syscall, si_arch).
+#[repr(C)]
+struct CallInfo {
+    signal: libc::c_int,
+    errno: libc::c_int,
+    code: libc::c_int,
+    address: *const libc::c_void,
+    number: libc::c_int,
+    architecture: libc::c_uint,
+}
+
+const _: () = assert!(size_of::<CallInfo>() <= size_of::<libc::siginfo_t>());
+const _: () = assert!(align_of::<CallInfo>() <= align_of::<libc::siginfo_t>());
+
+/// The call that a SIGSYS raised by the kernel is about.
+fn forbidden_call(info: &libc::siginfo_t) -> ForbiddenCall {
+    // SAFETY: the record of a SIGSYS from the kernel has this layout; size and alignment are asserted above.
+    let call = unsafe { &*(&raw const *info).cast::<CallInfo>() };
+    ForbiddenCall { number: call.number, architecture: call.architecture }
 }
 
 /// Every other signal waits: a stop request must not interrupt the last act.

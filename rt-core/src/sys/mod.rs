@@ -2,10 +2,12 @@
 //!
 //! Each file holds one concern and hides it behind functions that cannot be misused.
 
+pub(crate) mod capability;
 pub(crate) mod counting_allocator;
 pub(crate) mod fatal;
 pub(crate) mod malloc;
 pub(crate) mod sched;
+pub(crate) mod seccomp;
 pub(crate) mod stack;
 
 mod static_registers;
