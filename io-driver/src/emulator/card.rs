@@ -141,19 +141,12 @@ pub enum CardError {
     },
 }
 
-/// A driver's hold on a card; no other driver gets it meanwhile.
+/// A driver's hold on a card, until its process ends: the mapping, which stays, keeps the lock.
 #[derive(Debug)]
 pub struct DriversCard {
     /// The registers.
     pub card: &'static Card,
-    lock: File,
-}
-
-impl Drop for DriversCard {
-    /// The mapping, which stays, would keep the lock.
-    fn drop(&mut self) {
-        let _ = self.lock.unlock();
-    }
+    _lock: File,
 }
 
 impl Card {
@@ -199,7 +192,7 @@ impl Card {
     pub fn take(path: &Path) -> Result<DriversCard, CardError> {
         let (card, file) = open_file(path)?;
         match file.try_lock() {
-            Ok(()) => Ok(DriversCard { card, lock: file }),
+            Ok(()) => Ok(DriversCard { card, _lock: file }),
             Err(TryLockError::WouldBlock) => Err(CardError::Taken { file: path.into() }),
             Err(TryLockError::Error(source)) => {
                 Err(CardError::System { what: "lock", file: path.into(), source })
@@ -262,14 +255,14 @@ mod tests {
     }
 
     #[test]
-    fn a_card_has_one_driver_at_a_time() {
+    fn a_card_has_one_driver() {
         let (_directory, path) = place();
         Card::create(&path).unwrap();
         let first = Card::take(&path).unwrap();
         let refused = Card::take(&path).unwrap_err().to_string();
         assert!(refused.ends_with("belongs to another driver; one card has one driver"), "{refused}");
         drop(first);
-        Card::take(&path).unwrap();
+        assert!(matches!(Card::take(&path), Err(CardError::Taken { .. })), "while its process lives");
     }
 
     #[test]

@@ -26,7 +26,7 @@ pub enum Act {
     PanicAfterWrite,
     /// The loop's stack overflows: a fault that the CPU raises, on the loop's own thread.
     Overflow,
-    /// A SIGSEGV on any thread.
+    /// A SIGSEGV, raised by the loop's own thread.
     Segv,
     /// `abort`, on the loop's own thread.
     Abort,
@@ -151,8 +151,7 @@ impl Saboteur {
                 black_box(overflow(0));
             }
             Act::Segv => {
-                let own = rustix::process::getpid();
-                let _ = rustix::process::kill_process(own, rustix::process::Signal::SEGV);
+                let _ = signal_hook::low_level::raise(rustix::process::Signal::SEGV.as_raw());
             }
             Act::Abort => std::process::abort(),
             Act::Exit => std::process::exit(0),
