@@ -3,6 +3,7 @@
 //! Exit status: 0 done; 2 bad usage or bad input, nothing was started; 3 a fault during the run.
 
 use crate::config::DriverConfig;
+use crate::doctor::cli::{self as doctor, DoctorArgs};
 use crate::driver::{self, RunOptions};
 use crate::say::say;
 use crate::status::Status;
@@ -40,6 +41,8 @@ pub enum DriverCommand {
     Stop(SocketArgs),
     /// Ask a running driver to leave its fault state
     ClearFault(SocketArgs),
+    /// Say whether this machine is ready for real time, and what to do about it
+    Doctor(DoctorArgs),
 }
 
 /// Arguments of `run`.
@@ -100,6 +103,7 @@ pub fn execute(command: DriverCommand) -> ExitCode {
         DriverCommand::Run(args) => run(args),
         DriverCommand::Status(args) => report(status(&args)),
         DriverCommand::Stop(args) => report(stop(&args.path())),
+        DriverCommand::Doctor(args) => doctor::run(&args),
         DriverCommand::ClearFault(args) => report(client::clear_fault(&args.path(), "io-driver")),
     }
 }

@@ -16,6 +16,7 @@ pub mod config;
 pub mod cycle;
 pub mod device;
 pub mod device_file;
+pub mod doctor;
 pub mod driver;
 pub mod encoders;
 pub mod kinematics;

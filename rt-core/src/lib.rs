@@ -10,6 +10,7 @@
 //! | [`cpu`]: which CPUs there are | [`histogram`]: latencies without allocation | [`epitaph`]: a dying process says why |
 //! | [`process`]: die with the parent | [`log`]: messages formatted by another thread | [`usage`]: faults and switches it suffered |
 //!
+//! [`doctor`] says whether the machine is ready for any of this.
 //! [`clock`] is under all of them, and [`alloc_guard`] lets a test show that a loop does not allocate.
 //!
 //! Invariants: what a module marks as fit for the loop neither allocates nor locks nor opens a file
@@ -21,6 +22,7 @@
 pub mod alloc_guard;
 pub mod clock;
 pub mod cpu;
+pub mod doctor;
 pub mod epitaph;
 pub mod histogram;
 pub mod log;
