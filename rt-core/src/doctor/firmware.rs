@@ -86,13 +86,16 @@ fn smi(machine: &Machine<'_>) -> Judged {
     }
 }
 
+/// No machine runs longer (s).
+const CENTURY_S: f64 = 3.2e9;
+
 /// Some come while the machine starts; what counts is how often they come later.
 fn judge_smi_rate(machine: &Machine<'_>, count: u32) -> Judged {
     const UPTIME: &str = "/proc/uptime";
     let text = machine.line(UPTIME)?;
     let seconds = text.split(' ').next().and_then(|word| word.parse::<f64>().ok());
     let seconds =
-        seconds.filter(|s| s.is_finite() && *s > 0.0).ok_or_else(|| Obstacle::garbled(UPTIME, &text))?;
+        seconds.filter(|s| *s > 0.0 && *s < CENTURY_S).ok_or_else(|| Obstacle::garbled(UPTIME, &text))?;
     let per_hour = f64::from(count) / (seconds / 3600.0).max(1.0);
     let found = format!("{count} since boot, {per_hour:.0} an hour");
     // A few hundred come at boot, so a young machine is not blamed for them.

@@ -14,7 +14,8 @@
 //! placed=ok asked=ok policy=1 priority=80 limit=99
 //! ```
 //! A path that ends in `/` is a directory (those that hold a file need no entry), `denied` hides a
-//! path and all below it. Contents go up to the next entry.
+//! path and all below it, `removed` takes away what an earlier entry put there. Contents go up to the next
+//! entry.
 
 use super::machine::{FileStatus, Tree};
 use super::probe::{GapProbe, LockProbe, Probes, PromotionProbe};
@@ -85,12 +86,17 @@ impl RecordedMachine {
         let mut status =
             FileStatus { mode: if is_directory { 0o755 } else { 0o644 }, uid: 0, gid: 0, is_directory };
         while let Some(word) = words.next() {
-            let value = if word == "denied" { "" } else { words.next().unwrap_or_default() };
+            let value =
+                if matches!(word, "denied" | "removed") { "" } else { words.next().unwrap_or_default() };
             let number =
                 |radix| u32::from_str_radix(value, radix).map_err(|e| format!("{head}: {value}: {e}"));
             match word {
                 "denied" => {
                     self.files.insert(path.to_owned(), Entry::Denied);
+                    return Ok(());
+                }
+                "removed" => {
+                    self.remove(path);
                     return Ok(());
                 }
                 "mode" => status.mode = number(8)?,

@@ -45,7 +45,12 @@ fn throttling(machine: &Machine<'_>) -> Judged {
     if guarantee.obtained {
         return Ok(Judgement::pass(guarantee.found));
     }
-    let step = Step::sysctl("never stop a real-time thread", "kernel.sched_rt_runtime_us", -1, runtime_us);
+    let step = Step::sysctl(
+        "never stop a real-time thread (one that runs wild then keeps its CPU)",
+        "kernel.sched_rt_runtime_us",
+        -1,
+        runtime_us,
+    );
     let remedy = Remedy::steps("sysctl kernel.sched_rt_runtime_us=-1", [step]);
     Ok(match runtime_us {
         0 => Judgement::fail("0: no real-time thread may run at all", remedy),

@@ -34,7 +34,7 @@ pub(super) fn affinity(machine: &Machine<'_>) -> Judged {
     if movable.is_empty() {
         return judge_managed(machine, &managed);
     }
-    let mut found = format!("{}: {}", movable.len(), names(&movable));
+    let mut found = format!("{} that can be moved: {}", movable.len(), names(&movable));
     if !managed.is_empty() {
         found += &format!("; and {} managed ones, which cannot be moved: {}", managed.len(), names(&managed));
     }

@@ -38,7 +38,7 @@ pub(super) fn write(script: &mut Script, machine: &Machine<'_>, steps: &[Step], 
         script.comment(
             "Add them to GRUB_CMDLINE_LINUX_DEFAULT in /etc/default/grub; undo: take them out again:",
         );
-        script.comment(&format!("  {line}"));
+        script.comment(&line);
         script.comment("then: grub-mkconfig -o /boot/grub/grub.cfg (grub2-mkconfig -o /boot/grub2/grub.cfg)");
     } else if exists("/etc/kernel/cmdline") {
         one_line_file(script, "/etc/kernel/cmdline", &line, names);
@@ -49,7 +49,7 @@ pub(super) fn write(script: &mut Script, machine: &Machine<'_>, steps: &[Step], 
         script.comment(
             "No boot loader was found that this plan knows; whatever starts the kernel should give it:",
         );
-        script.comment(&format!("  {line}"));
+        script.comment(&line);
     }
 }
 

@@ -33,7 +33,7 @@ fn limits(script: &mut Script, machine: &Machine<'_>, names: &PlanNames) {
     script.explain("for members of the group, from their next login on", &format!("rm {path}"));
     script.file(&path, &[format!("@{group} - rtprio 95"), format!("@{group} - memlock unlimited")]);
     script.comment("Or, for the program whoever runs it, again after each build; undo: setcap -r PROGRAM:");
-    script.comment(&format!("  setcap cap_sys_nice,cap_ipc_lock=ep {}", quoted(program)));
+    script.comment(&format!("setcap cap_sys_nice,cap_ipc_lock=ep {}", quoted(program)));
     let units = machine.names("/etc/systemd/system").unwrap_or_default();
     let is_ours = |unit: &&String| {
         unit.ends_with(".service")
@@ -94,7 +94,14 @@ fn udev(script: &mut Script, steps: &[Step], names: &PlanNames) {
         .collect();
     script.file(&path, &lines);
     script.line("udevadm control --reload");
-    script.line("udevadm trigger --action=add --subsystem-match=misc --subsystem-match=pci");
+    // Of all devices only the kinds that the rules are about.
+    let is_pci = |rule: &str| rule.contains("SUBSYSTEM==\"pci\"");
+    if rules.iter().any(|(_, rule)| is_pci(rule)) {
+        script.line("udevadm trigger --action=add --subsystem-match=pci");
+    }
+    if rules.iter().any(|(_, rule)| !is_pci(rule)) {
+        script.line("udevadm trigger --action=add --subsystem-match=misc");
+    }
 }
 
 fn directories(script: &mut Script, steps: &[Step], names: &PlanNames) {
