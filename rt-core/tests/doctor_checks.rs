@@ -432,6 +432,18 @@ fn firmware() {
             "yes (KVM Box)",
             &format!("{VIRTUAL}=== /sys/class/dmi/id/product_name\nKVM Box\n"),
         ),
+        (
+            "firmware.virtualisation",
+            Warn,
+            "yes (QEMU Virtual Machine)",
+            "=== /sys/class/dmi/id/product_name\nQEMU Virtual Machine\n",
+        ),
+        (
+            "firmware.virtualisation",
+            Pass,
+            "none seen",
+            "=== /sys/class/dmi/id/product_name\nPrecision 3660\n",
+        ),
         ("firmware.virtualisation", Warn, "yes (xen)", "=== /sys/hypervisor/type\nxen\n"),
         ("firmware.virtualisation", Unreadable, "makes no sense", "=== /proc/cpuinfo\nnothing\n"),
         ("firmware.steal", Pass, "none since boot", ""),

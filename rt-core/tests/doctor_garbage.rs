@@ -58,7 +58,10 @@ fn is_a_process_name(path: &str) -> bool {
 /// Names and versions, in which any word may stand; whether they are text is checked.
 fn is_free_text(path: &str) -> bool {
     let names = ["/proc/cmdline", "/proc/sys/kernel/version", "/proc/sys/kernel/osrelease"];
-    is_a_process_name(path) || names.contains(&path) || path.contains("/cpuidle/") && path.ends_with("/name")
+    is_a_process_name(path)
+        || path.starts_with("/sys/class/dmi/")
+        || names.contains(&path)
+        || path.contains("/cpuidle/") && path.ends_with("/name")
 }
 
 /// What decides nothing: the distribution's name is for the remedy, these two say what is managed.

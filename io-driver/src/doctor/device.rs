@@ -133,29 +133,36 @@ fn enabled(machine: &Machine<'_>, card: &Card) -> Judged {
     if users > 0 {
         return Ok(Judgement::pass("yes"));
     }
-    let rule = format!("{}, ATTR{{enable}}=\"1\"", card.udev_match());
     let put = Step {
         what: format!("enable the {}", card.model.name),
         action: Action::Put { path: path.clone(), value: "1".into(), former: "0".into(), lasting: false },
     };
-    let udev = Step::udev(&format!("enable the {} at each boot", card.model.name), rule);
-    Ok(Judgement::fail("no", Remedy::steps(format!("echo 1 > {path}"), [put, udev])))
+    Ok(Judgement::fail("no", Remedy::steps(format!("echo 1 > {path}"), [put, enable_at_boot(card)])))
+}
+
+fn enable_at_boot(card: &Card) -> Step {
+    let rule = format!("{}, ATTR{{enable}}=\"1\"", card.udev_match());
+    Step::udev(&format!("enable the {} at each boot", card.model.name), rule)
 }
 
 fn owner(machine: &Machine<'_>, card: &Card) -> Judged {
     match machine.link_name(&card.file("driver")).as_deref() {
         None => Ok(Judgement::pass("no kernel driver")),
         Some("vfio-pci") => Ok(Judgement::pass("vfio-pci, which hands it over")),
+        // A driver that lets go of its card disables it.
         Some(driver) => {
             let text = format!(
-                "echo {} > /sys/bus/pci/drivers/{driver}/unbind, and \"blacklist {driver}\" in /etc/modprobe.d",
+                "echo {} > /sys/bus/pci/drivers/{driver}/unbind, enable the card again, and \"blacklist {driver}\" in /etc/modprobe.d",
                 card.address
             );
             let step = Step {
                 what: format!("take the {} from the kernel's driver", card.model.name),
                 action: Action::Unbind { address: card.address.clone(), driver: driver.to_owned() },
             };
-            Ok(Judgement::fail(format!("kernel driver {driver}"), Remedy::steps(text, [step])))
+            Ok(Judgement::fail(
+                format!("kernel driver {driver}"),
+                Remedy::steps(text, [step, enable_at_boot(card)]),
+            ))
         }
     }
 }

@@ -271,7 +271,7 @@ impl Machine<'_> {
         Ok(line.split_whitespace().filter_map(value).next_back())
     }
 
-    /// Whether the CPU says that a hypervisor runs it; only x86 says so.
+    /// Whether a hypervisor runs it: x86 CPUs say so, Xen has a file, and elsewhere the firmware names itself.
     ///
     /// # Errors
     /// Why that cannot be known.
@@ -282,7 +282,20 @@ impl Machine<'_> {
             matches!(key.trim(), "flags" | "Features").then(|| flags.to_owned())
         });
         let flags = flags.ok_or_else(|| Obstacle::garbled("/proc/cpuinfo", &info))?;
-        Ok(flags.split_whitespace().any(|flag| flag == "hypervisor") || self.exists("/sys/hypervisor/type"))
+        let flagged = flags.split_whitespace().any(|flag| flag == "hypervisor");
+        Ok(flagged || self.exists("/sys/hypervisor/type") || self.is_called_virtual()?)
+    }
+
+    /// By the names that hypervisors give to their make-believe firmware.
+    fn is_called_virtual(&self) -> Result<bool, Obstacle> {
+        const NAMES: [&str; 7] = ["Virtual Machine", "VirtualBox", "VMware", "QEMU", "KVM", "Xen", "Bochs"];
+        for file in ["/sys/class/dmi/id/product_name", "/sys/class/dmi/id/sys_vendor"] {
+            let text = self.text_if_any(file)?.unwrap_or_default();
+            if NAMES.iter().any(|name| text.contains(name)) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 }
 

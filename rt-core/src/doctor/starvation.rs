@@ -94,9 +94,14 @@ fn unreadable_server(machine: &Machine<'_>, obstacle: &Obstacle, path: &str, ste
             Remedy::steps(text, [Step::by_hand(text)]),
         );
     }
-    let text =
-        format!("as root, with debugfs mounted (mount -t debugfs none /sys/kernel/debug): echo 0 > {path}");
-    Judgement::unreadable(obstacle.to_string(), Remedy::steps(text, [step]))
+    const MOUNT: &str = "mount -t debugfs none /sys/kernel/debug";
+    let (text, what) = match obstacle {
+        Obstacle::Absent(_) => {
+            (format!("as root: {MOUNT}; echo 0 > {path}"), format!("{} (before: {MOUNT})", step.what))
+        }
+        _ => (format!("as root: echo 0 > {path}"), step.what),
+    };
+    Judgement::unreadable(obstacle.to_string(), Remedy::steps(text, [Step { what, action: step.action }]))
 }
 
 fn rt_group(machine: &Machine<'_>) -> Judged {

@@ -34,7 +34,7 @@ kernel.timer_migration = 0
 END
 
 # == Settings of the running kernel
-# reserve nothing for ordinary threads on this CPU; undo: put 50000000 /sys/kernel/debug/sched/fair_server/cpu1/runtime
+# reserve nothing for ordinary threads on this CPU (before: mount -t debugfs none /sys/kernel/debug); undo: put 50000000 /sys/kernel/debug/sched/fair_server/cpu1/runtime
 put 0 /sys/kernel/debug/sched/fair_server/cpu1/runtime
 # send interrupt 25 (ACPI:Ged) elsewhere; undo: put 0-1 /proc/irq/25/smp_affinity_list
 put 0 /proc/irq/25/smp_affinity_list
