@@ -472,7 +472,7 @@ fn firmware() {
         // Somebody else may have been the cause: another thread, or the hypervisor.
         (
             "firmware.latency",
-            Warn,
+            Unreadable,
             "other threads ran 2 times",
             gaps("largest_ns=900000 long_gaps=4 fifo=1 preemptions=2"),
         ),

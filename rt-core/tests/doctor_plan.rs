@@ -4,7 +4,7 @@ mod machines;
 
 use machines::{complaints, examine, load, load_with, spec};
 use rt_core::cpu::parse_cpu_list;
-use rt_core::doctor::Verdict::{Unreadable, Warn};
+use rt_core::doctor::Verdict::Unreadable;
 use rt_core::doctor::cpus::{list_of, mask_of};
 use rt_core::doctor::machine::{Machine, Tree};
 use rt_core::doctor::plan::{self, PlanNames};
@@ -185,6 +185,17 @@ fn tuned_gets_a_profile_instead_of_files_beside_it() {
     assert!(!script.contains("/etc/sysctl.d") && script.contains("tuned-adm profile phantom3"));
 }
 
+/// Its script must not stop halfway at a command that is not there.
+#[test]
+fn without_systemd_and_udev_their_commands_are_not_called() {
+    let script = plan_of(&load_with("debian-laptop", "=== /run/systemd removed\n=== /run/udev removed\n"), 7);
+    let called = commands(&script);
+    for command in ["systemctl", "systemd-tmpfiles", "udevadm"] {
+        assert!(!called.iter().any(|line| line.starts_with(command)), "{script}");
+    }
+    assert!(script.contains("# echo performance > /sys/devices/system/cpu/cpu7/cpufreq/scaling_governor"));
+}
+
 #[test]
 fn a_unit_of_the_loop_gets_a_drop_in() {
     let script =
@@ -292,8 +303,11 @@ fn doing_what_the_laptops_plan_says_leaves_only_what_no_script_can_mend() {
     // By hand: the other kernel.
     machine.set("/proc/sys/kernel/version", "#1 SMP PREEMPT_RT Debian\n");
     let left = complaints(&examine(&machine, &spec(7)));
-    let expected =
-        [("starvation.fair_server", Unreadable), ("firmware.smi", Unreadable), ("firmware.latency", Warn)];
+    let expected = [
+        ("starvation.fair_server", Unreadable),
+        ("firmware.smi", Unreadable),
+        ("firmware.latency", Unreadable),
+    ];
     assert_eq!(left, expected);
 }
 

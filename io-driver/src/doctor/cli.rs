@@ -52,8 +52,10 @@ Verdicts:
 Ask as the user who will run the driver: rights are that user's. Ask again as root to see what only root may read.
 The groups are kernel, starvation, privilege, interference, power, firmware, memory, device, segment.
 
-The fix plan is to be read first: `io-driver doctor --fix-plan > plan.sh`, keep what you want, `sudo sh plan.sh`. \
-Each part says what it does and how to undo it. What changes the kernel's command line takes effect at the next boot.
+The fix plan is a script to be read before it is run; each part says what it does and how to undo it. What changes \
+the kernel's command line takes effect at the next boot:
+  io-driver doctor --fix-plan > plan.sh
+  sudo sh plan.sh
 
 Exit status: 0 nothing fails; 1 something fails, whichever way it is printed; 2 bad usage or input.";
 

@@ -167,8 +167,12 @@ fn numa_balancing(machine: &Machine<'_>) -> Judged {
         Some(0) => Ok(Judgement::pass("off")),
         // 2 moves pages between kinds of memory.
         Some(mode @ 1..=3) => {
-            let step =
-                Step::sysctl("do not unmap pages to watch their use", "kernel.numa_balancing", 0, mode);
+            let step = Step::sysctl(
+                "do not unmap pages to watch their use",
+                "kernel.numa_balancing",
+                0,
+                mode.into(),
+            );
             Ok(Judgement::warn(
                 format!("on ({mode})"),
                 Remedy::steps("sysctl kernel.numa_balancing=0", [step]),

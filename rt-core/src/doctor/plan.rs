@@ -4,7 +4,7 @@
 //! line, sysctl, udev, ...) are merged into one of our own name, so that undoing is removing it. Every
 //! section says in comments what it does and how to undo it.
 //! Invariants: valid for `sh -n` whatever lies in the machine's files, since foreign text goes into
-//! comments as one harmless line, or through [`quoted`]; no file of another name than ours is
+//! comments as one harmless line, or is quoted; no file of another name than ours is
 //! overwritten, but values under `/sys` and `/proc`; nothing is removed.
 
 mod boot;
@@ -128,6 +128,11 @@ impl Script {
         lines.iter().for_each(|line| self.line(&one_line(line, 4000)));
         self.line("END");
     }
+}
+
+/// Whether this machine runs systemd.
+fn has_systemd(machine: &Machine<'_>) -> bool {
+    machine.exists("/run/systemd/system")
 }
 
 /// A word as the shell takes it literally.

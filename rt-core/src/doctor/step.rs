@@ -85,7 +85,7 @@ impl Step {
     }
 
     /// A sysctl.
-    pub fn sysctl(what: &str, key: &'static str, value: impl ToString, former: impl ToString) -> Self {
+    pub fn sysctl(what: &str, key: &'static str, value: i64, former: i64) -> Self {
         let (value, former) = (value.to_string(), former.to_string());
         Self { what: what.into(), action: Action::Sysctl { key, value, former } }
     }

@@ -60,23 +60,11 @@ put 1 /proc/irq/default_smp_affinity
 put 1 /sys/devices/virtual/workqueue/cpumask
 # keep PCIe links awake; undo: put default /sys/module/pcie_aspm/parameters/policy
 put performance /sys/module/pcie_aspm/parameters/policy
-# the same after each boot; undo: systemctl disable phantom3-settings.service && rm /etc/systemd/system/phantom3-settings.service
-mkdir -p /etc/systemd/system
-cat > /etc/systemd/system/phantom3-settings.service <<'END'
-[Unit]
-Description=Settings for a real-time loop
-After=sys-kernel-debug.mount
-[Service]
-Type=oneshot
-ExecStart=-/bin/sh -c 'echo 0 > /sys/kernel/debug/sched/fair_server/cpu1/runtime'
-ExecStart=-/bin/sh -c 'echo 1 > /proc/irq/default_smp_affinity'
-ExecStart=-/bin/sh -c 'echo 1 > /sys/devices/virtual/workqueue/cpumask'
-ExecStart=-/bin/sh -c 'echo performance > /sys/module/pcie_aspm/parameters/policy'
-[Install]
-WantedBy=multi-user.target
-END
-systemctl daemon-reload
-systemctl enable phantom3-settings.service
+# This machine does not run systemd: let whatever it runs at boot do the same, that is
+# echo 0 > /sys/kernel/debug/sched/fair_server/cpu1/runtime
+# echo 1 > /proc/irq/default_smp_affinity
+# echo 1 > /sys/devices/virtual/workqueue/cpumask
+# echo performance > /sys/module/pcie_aspm/parameters/policy
 
 # == Last
 # The kernel's command line takes effect at the next boot, a new group at the next login.

@@ -2,7 +2,7 @@
 
 use super::super::machine::Machine;
 use super::super::step::{Action, Step};
-use super::{PlanNames, Script, is_plain, quoted};
+use super::{PlanNames, Script, has_systemd, is_plain, quoted};
 
 pub(super) fn write(script: &mut Script, machine: &Machine<'_>, steps: &[Step], names: &PlanNames) {
     let needs_group =
@@ -14,8 +14,8 @@ pub(super) fn write(script: &mut Script, machine: &Machine<'_>, steps: &[Step], 
         limits(script, machine, names);
     }
     unbind(script, steps, names);
-    udev(script, steps, names);
-    directories(script, steps, names);
+    udev(script, machine, steps, names);
+    directories(script, machine, steps, names);
 }
 
 fn group(script: &mut Script, names: &PlanNames) {
@@ -45,7 +45,9 @@ fn limits(script: &mut Script, machine: &Machine<'_>, names: &PlanNames) {
         script.explain(&format!("the same for {unit}"), &format!("rm {path}"));
         let lines = ["[Service]", "LimitRTPRIO=95", "LimitMEMLOCK=infinity"];
         script.file(&path, &lines.map(str::to_owned));
-        script.line("systemctl daemon-reload");
+        if has_systemd(machine) {
+            script.line("systemctl daemon-reload");
+        }
     }
 }
 
@@ -73,7 +75,7 @@ fn unbind(script: &mut Script, steps: &[Step], names: &PlanNames) {
     script.file(&path, &lines);
 }
 
-fn udev(script: &mut Script, steps: &[Step], names: &PlanNames) {
+fn udev(script: &mut Script, machine: &Machine<'_>, steps: &[Step], names: &PlanNames) {
     let rules: Vec<(&str, &String)> = steps
         .iter()
         .filter_map(|step| match &step.action {
@@ -93,6 +95,10 @@ fn udev(script: &mut Script, steps: &[Step], names: &PlanNames) {
         .map(|(_, rule)| rule.replace("GROUP=\"realtime\"", &format!("GROUP=\"{}\"", names.group)))
         .collect();
     script.file(&path, &lines);
+    if !machine.exists("/run/udev") {
+        script.comment("udev does not run here now; it will read the rules when it does.");
+        return;
+    }
     script.line("udevadm control --reload");
     // Of all devices only the kinds that the rules are about.
     let is_pci = |rule: &str| rule.contains("SUBSYSTEM==\"pci\"");
@@ -104,7 +110,7 @@ fn udev(script: &mut Script, steps: &[Step], names: &PlanNames) {
     }
 }
 
-fn directories(script: &mut Script, steps: &[Step], names: &PlanNames) {
+fn directories(script: &mut Script, machine: &Machine<'_>, steps: &[Step], names: &PlanNames) {
     let lines: Vec<String> = steps
         .iter()
         .filter_map(|step| match &step.action {
@@ -119,6 +125,11 @@ fn directories(script: &mut Script, steps: &[Step], names: &PlanNames) {
     }
     let path = format!("/etc/tmpfiles.d/{}.conf", names.prefix);
     script.section("Directories");
+    if !has_systemd(machine) {
+        script.comment("This machine does not run systemd: let whatever it runs at boot make, in the words of tmpfiles.d,");
+        lines.iter().for_each(|line| script.comment(line));
+        return;
+    }
     script.explain("made at each boot", &format!("rm {path}"));
     script.file(&path, &lines);
     script.line(&format!("systemd-tmpfiles --create {}", quoted(&path)));

@@ -4,23 +4,30 @@
 
 use super::super::machine::Machine;
 use super::super::step::{Action, Step};
-use super::{PlanNames, Script, is_plain, quoted};
+use super::{PlanNames, Script, has_systemd, is_plain, quoted};
 
 pub(super) fn write(script: &mut Script, machine: &Machine<'_>, steps: &[Step], names: &PlanNames) {
-    let has_tuned = ["/usr/sbin/tuned-adm", "/usr/bin/tuned-adm"].iter().any(|path| machine.exists(path));
-    services(script, steps);
+    let has_tuned = has_tuned(machine);
+    services(script, machine, steps);
     sysctl(script, steps, names, has_tuned);
     puts(script, steps);
     if has_tuned {
         tuned(script, steps, names);
     }
-    lasting_puts(script, steps, names, has_tuned);
+    lasting_puts(script, machine, steps, names);
     modules(script, steps);
 }
 
-fn services(script: &mut Script, steps: &[Step]) {
+fn services(script: &mut Script, machine: &Machine<'_>, steps: &[Step]) {
     for step in steps {
         match &step.action {
+            Action::Stop { unit } if !has_systemd(machine) => {
+                script.section(&format!("Service {unit}"));
+                script.comment(&format!(
+                    "This machine does not run systemd. {}: stop it your own way.",
+                    step.what
+                ));
+            }
             Action::Stop { unit } => {
                 script.section(&format!("Service {unit}"));
                 script.explain(&step.what, &format!("systemctl enable --now {unit}"));
@@ -93,31 +100,38 @@ fn puts(script: &mut Script, steps: &[Step]) {
     }
 }
 
-fn lasting_puts(script: &mut Script, steps: &[Step], names: &PlanNames, has_tuned: bool) {
-    let taken = |put: &Put<'_>| has_tuned && put.path.starts_with("/sys/");
-    let lines: Vec<String> = puts_of(steps)
-        .filter(|put| put.lasting && !taken(put))
-        .map(|put| format!("ExecStart=-/bin/sh -c 'echo {} > {}'", put.value, put.path))
-        .collect();
-    if lines.is_empty() {
+fn lasting_puts(script: &mut Script, machine: &Machine<'_>, steps: &[Step], names: &PlanNames) {
+    let taken = |put: &Put<'_>| has_tuned(machine) && put.path.starts_with("/sys/");
+    let puts: Vec<Put<'_>> = puts_of(steps).filter(|put| put.lasting && !taken(put)).collect();
+    if puts.is_empty() {
+        return;
+    }
+    if !has_systemd(machine) {
+        script
+            .comment("This machine does not run systemd: let whatever it runs at boot do the same, that is");
+        puts.iter().for_each(|put| script.comment(&format!("echo {} > {}", put.value, put.path)));
         return;
     }
     let unit = format!("{}-settings.service", names.prefix);
     let path = format!("/etc/systemd/system/{unit}");
-    let head = [
-        "[Unit]",
-        "Description=Settings for a real-time loop",
-        "After=sys-kernel-debug.mount",
-        "[Service]",
-        "Type=oneshot",
-    ];
-    let foot = ["[Install]", "WantedBy=multi-user.target"];
-    let all: Vec<String> =
-        head.map(str::to_owned).into_iter().chain(lines).chain(foot.map(str::to_owned)).collect();
     script.explain("the same after each boot", &format!("systemctl disable {unit} && rm {path}"));
-    script.file(&path, &all);
+    script.file(&path, &unit_lines(&puts));
     script.line("systemctl daemon-reload");
     script.line(&format!("systemctl enable {unit}"));
+}
+
+/// A unit that writes all values once; one that is refused does not keep it from the others.
+fn unit_lines(puts: &[Put<'_>]) -> Vec<String> {
+    let head = ["[Unit]", "Description=Settings for a real-time loop", "After=sys-kernel-debug.mount"];
+    let service = ["[Service]", "Type=oneshot"];
+    let install = ["[Install]", "WantedBy=multi-user.target"];
+    let write = |put: &Put<'_>| format!("ExecStart=-/bin/sh -c 'echo {} > {}'", put.value, put.path);
+    let texts = |lines: &[&str]| -> Vec<String> { lines.iter().map(|line| (*line).to_owned()).collect() };
+    [texts(&head), texts(&service), puts.iter().map(write).collect(), texts(&install)].concat()
+}
+
+fn has_tuned(machine: &Machine<'_>) -> bool {
+    ["/usr/sbin/tuned-adm", "/usr/bin/tuned-adm"].iter().any(|path| machine.exists(path))
 }
 
 fn tuned(script: &mut Script, steps: &[Step], names: &PlanNames) {
