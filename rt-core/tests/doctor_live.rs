@@ -11,7 +11,11 @@ use rt_core::doctor::{self, Verdict};
 use std::fs::{self, Permissions};
 use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 use std::time::Duration;
+
+/// Locked memory is the whole process's: only one test at a time probes.
+static PROBING: Mutex<()> = Mutex::new(());
 
 /// A directory that goes with the test.
 struct Scratch(PathBuf);
@@ -77,6 +81,7 @@ fn links_modes_and_directories_are_told_apart() {
 /// Whatever this machine grants, each probe comes to an end and leaves this thread as it was.
 #[test]
 fn the_probes_come_back_and_leave_nothing_behind() {
+    let _alone = PROBING.lock().unwrap();
     let of_thread = || {
         let status = fs::read_to_string("/proc/thread-self/status").unwrap();
         let stat = fs::read_to_string("/proc/thread-self/stat").unwrap();
@@ -104,6 +109,7 @@ fn the_probes_come_back_and_leave_nothing_behind() {
 
 #[test]
 fn this_machine_gets_a_verdict_for_every_check() {
+    let _alone = PROBING.lock().unwrap();
     let cpu = *rt_core::cpu::online_cpus().last().unwrap();
     let (tree, probes, spec) = (LiveTree::default(), LiveProbes, spec(cpu));
     let findings = doctor::examine(&Machine { tree: &tree, probes: &probes, spec: &spec });
