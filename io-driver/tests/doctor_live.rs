@@ -152,7 +152,7 @@ fn the_configuration_chooses_the_loop_and_the_option_its_cpu() {
 #[test]
 fn bad_usage_is_told_with_what_is_allowed() {
     let cases: [(&[&str], &str); 5] = [
-        (&["--cpu", "4095"], "CPU 4095 is not open to this process; allowed: "),
+        (&["--cpu", "4095"], "found CPU 4095, allowed: those that are online, 0"),
         (&["--cpu", "two"], "invalid value 'two'"),
         (&["--json", "--fix-plan"], "cannot be used with"),
         (&["--config", "/nowhere/driver.toml"], "cannot read /nowhere/driver.toml"),

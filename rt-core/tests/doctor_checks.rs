@@ -196,8 +196,8 @@ fn privilege() {
             "=== probe promotion\nplaced=22 asked=ok policy=1 priority=80 limit=95\n",
         ),
         ("privilege.promotion", Fail, "unreadable", "=== probe promotion\nnonsense\n"),
-        ("privilege.irq_threads", Pass, "1 interrupt threads on this CPU, highest 50, the loop 80", ""),
-        ("privilege.irq_threads", Pass, "no interrupt threads", "=== /proc/72 removed\n"),
+        ("privilege.irq_threads", Pass, "1 on this CPU, highest 50; the loop 80", ""),
+        ("privilege.irq_threads", Pass, "none on this CPU", "=== /proc/72 removed\n"),
         ("privilege.irq_threads", Unreadable, "makes no sense", "=== /proc/72/stat\nnonsense\n"),
         ("privilege.irq_threads", Unreadable, "permission denied", "=== /proc/72/status denied\n"),
     ]);
@@ -218,7 +218,7 @@ fn interference() {
     check(&[
         ("interference.irq_affinity", Pass, "none", "=== /proc/irq/31 removed\n"),
         ("interference.irq_affinity", Pass, "isolcpus=managed_irq keeps them quiet", ""),
-        ("interference.irq_affinity", Warn, "1 managed ones, which cannot be moved: 31 nvme0q4", PLAIN),
+        ("interference.irq_affinity", Warn, "managed, which cannot be moved: 1 (31 nvme0q4)", PLAIN),
         ("interference.irq_affinity", Warn, "40 iwlwifi", WIFI),
         // No handler: nobody would be interrupted.
         ("interference.irq_affinity", Pass, "none", "=== /proc/irq/31/nvme0q4 removed\n"),
@@ -226,7 +226,7 @@ fn interference() {
         (
             "interference.irq_affinity",
             Pass,
-            "1 managed",
+            "managed, which cannot be moved: 1",
             "=== /proc/irq/31/smp_affinity_list mode 0644\n3\n=== /sys/kernel/debug/irq/irqs/31\ndstate: 0x3\n  IRQD_AFFINITY_MANAGED\n",
         ),
         (
@@ -535,4 +535,16 @@ fn on_a_machine_with_one_cpu_nothing_is_sent_to_another() {
         assert!(judgement.remedy.as_ref().unwrap().steps.is_empty(), "{judgement:?}");
     }
     assert_eq!(complaints(&findings).len(), 2);
+}
+
+/// Rather move the loop than boot again.
+#[test]
+fn where_another_cpu_is_isolated_the_remedy_names_it() {
+    let findings = examine(&load_with("lab-rt", ""), &spec(2));
+    let remedy = find(&findings, "kernel.isolcpus").judgement.remedy.as_ref().unwrap();
+    assert!(
+        remedy
+            .text
+            .starts_with("set real_time.cpu = 3 in the driver's configuration; or boot with isolcpus=")
+    );
 }

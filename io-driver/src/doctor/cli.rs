@@ -5,6 +5,7 @@ use crate::config::DriverConfig;
 use crate::driver::loop_cpu;
 use crate::say::say;
 use clap::Args;
+use rt_core::cpu::parse_cpu_list;
 use rt_core::doctor::live::{LiveProbes, LiveTree};
 use rt_core::doctor::machine::{LoopSpec, Machine};
 use rt_core::doctor::plan::{self, PlanNames};
@@ -95,13 +96,9 @@ fn subject(args: &DoctorArgs) -> Result<(LoopSpec, PathBuf), String> {
         Some(file) => DriverConfig::load(file).map_err(|error| error.to_string())?,
         None => defaults()?,
     };
-    let online = rt_core::cpu::online_cpus();
     // A machine with a single CPU has no loop of its own; its only CPU is what there is to ask about.
-    let cpu = args.cpu.or_else(|| loop_cpu(&config)).unwrap_or(online[0]);
-    if !online.contains(&cpu) {
-        let usable: Vec<String> = online.iter().map(usize::to_string).collect();
-        return Err(format!("CPU {cpu} is not open to this process; allowed: {}", usable.join(", ")));
-    }
+    let cpu = args.cpu.or_else(|| loop_cpu(&config)).unwrap_or_else(rt_core::cpu::current_cpu);
+    check_online(cpu)?;
     let spec = LoopSpec {
         cpu,
         priority: config.real_time.priority,
@@ -110,6 +107,17 @@ fn subject(args: &DoctorArgs) -> Result<(LoopSpec, PathBuf), String> {
     };
     let socket = config.socket.unwrap_or_else(endpoint::for_application);
     Ok((spec, std::path::absolute(&socket).unwrap_or(socket)))
+}
+
+/// By the machine's list, not by this process's affinity, from which the kernel leaves isolated CPUs out.
+fn check_online(cpu: usize) -> Result<(), String> {
+    let list = std::fs::read_to_string("/sys/devices/system/cpu/online").unwrap_or_default();
+    match parse_cpu_list(&list) {
+        Some(online) if !online.is_empty() && !online.contains(&cpu) => {
+            Err(format!("found CPU {cpu}, allowed: those that are online, {}", list.trim()))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// What a configuration that says nothing but a device would have.

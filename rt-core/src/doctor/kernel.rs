@@ -154,9 +154,19 @@ fn covered(
     wanted.push(cpu);
     wanted.sort_unstable();
     let value = format!("{flags}{}", list_of(&wanted));
-    let text = format!("boot with {key}={value}");
+    let text = format!("{}boot with {key}={value}", instead(key, listed));
     let step = Step::boot(what, key, value, machine.boot_parameter(key)?);
     Ok(Judgement::warn(found, Remedy::steps(text, [step])))
+}
+
+/// Where another CPU is isolated already, the loop should rather move there.
+fn instead(key: &str, listed: &[usize]) -> String {
+    match listed.last() {
+        Some(other) if key == "isolcpus" => {
+            format!("set real_time.cpu = {other} in the driver's configuration; or ")
+        }
+        _ => String::new(),
+    }
 }
 
 fn clocksource(machine: &Machine<'_>) -> Judged {

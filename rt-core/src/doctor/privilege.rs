@@ -35,7 +35,7 @@ pub const GROUP: Group = Group {
         },
         Check {
             id: "privilege.irq_threads",
-            title: "priority against interrupts",
+            title: "interrupt threads",
             why: "Interrupt threads above the loop's priority preempt it; at the same priority they wait for each other.",
             run: irq_threads,
         },
@@ -139,13 +139,8 @@ fn irq_threads(machine: &Machine<'_>) -> Judged {
     let highest = threads.iter().map(|thread| thread.priority).max();
     let Some(worst) = above.iter().max_by_key(|thread| thread.priority) else {
         let found = highest.map_or_else(
-            || "no interrupt threads on this CPU".to_owned(),
-            |highest| {
-                format!(
-                    "{} interrupt threads on this CPU, highest {highest}, the loop {priority}",
-                    threads.len()
-                )
-            },
+            || "none on this CPU".to_owned(),
+            |highest| format!("{} on this CPU, highest {highest}; the loop {priority}", threads.len()),
         );
         return Ok(Judgement::pass(found));
     };

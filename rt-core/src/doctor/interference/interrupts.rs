@@ -34,9 +34,9 @@ pub(super) fn affinity(machine: &Machine<'_>) -> Judged {
     if movable.is_empty() {
         return judge_managed(machine, &managed);
     }
-    let mut found = format!("{} that can be moved: {}", movable.len(), names(&movable));
+    let mut found = format!("{} ({})", movable.len(), names(&movable));
     if !managed.is_empty() {
-        found += &format!("; and {} managed ones, which cannot be moved: {}", managed.len(), names(&managed));
+        found += &format!("; managed, which cannot be moved: {} ({})", managed.len(), names(&managed));
     }
     let puts = movable.iter().map(|interrupt| put(interrupt, &others));
     let boot = machine.boot_parameter("irqaffinity")?;
@@ -61,7 +61,7 @@ fn put(interrupt: &Interrupt, others: &str) -> Step {
 /// With `isolcpus=managed_irq` the kernel keeps them away as long as a housekeeping CPU can serve.
 fn judge_managed(machine: &Machine<'_>, managed: &[Interrupt]) -> Judged {
     let isolation = machine.boot_parameter("isolcpus")?;
-    let found = format!("{} managed ones, which cannot be moved: {}", managed.len(), names(managed));
+    let found = format!("managed, which cannot be moved: {} ({})", managed.len(), names(managed));
     if isolation.as_deref().is_some_and(|value| value.split(',').any(|word| word == "managed_irq")) {
         return Ok(Judgement::pass(format!("{found}; isolcpus=managed_irq keeps them quiet")));
     }
