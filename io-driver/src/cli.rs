@@ -6,6 +6,7 @@ mod commission;
 mod emulate;
 
 use crate::config::{Commissioning, DriverConfig};
+use crate::doctor::cli::{self as doctor, DoctorArgs};
 use crate::driver::{self, Fit, RunOptions};
 use crate::say::say;
 use crate::status::Status;
@@ -51,6 +52,8 @@ pub enum DriverCommand {
     Commission(CommissionArgs),
     /// Play a card with counters, converters and amplifiers, for a driver without hardware
     Emulate(EmulateArgs),
+    /// Say whether this machine is ready for real time, and what to do about it
+    Doctor(DoctorArgs),
 }
 
 /// Arguments of `run`.
@@ -123,6 +126,7 @@ fn execute_with(command: DriverCommand, fit: Option<Fit>) -> ExitCode {
         DriverCommand::Run(args) => run(args, fit),
         DriverCommand::Status(args) => report(status(&args)),
         DriverCommand::Stop(args) => report(stop(&args.path())),
+        DriverCommand::Doctor(args) => doctor::run(&args),
         DriverCommand::ClearFault(args) => report(client::clear_fault(&args.path(), "io-driver")),
         DriverCommand::EmergencyStop(args) => report(client::emergency_stop(&args.path(), "io-driver")),
         DriverCommand::Commission(args) => commission::run(&args),

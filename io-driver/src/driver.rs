@@ -219,7 +219,7 @@ pub fn describe(config: &DriverConfig, devices: &[Box<dyn Device>], wait_mode: W
 
 /// The configured CPU, else the last isolated one, else the last one, where the fewest interrupts land; none on a
 /// single-CPU machine, which the application needs as well.
-fn loop_cpu(config: &DriverConfig) -> Option<usize> {
+pub(crate) fn loop_cpu(config: &DriverConfig) -> Option<usize> {
     if config.clock != ClockMode::Real {
         return config.real_time.cpu;
     }

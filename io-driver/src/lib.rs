@@ -18,6 +18,7 @@ pub mod config;
 pub mod cycle;
 pub mod device;
 pub mod device_file;
+pub mod doctor;
 pub mod drive;
 pub mod driver;
 pub mod emulator;

@@ -14,6 +14,7 @@
 //! [`calibrate`] measures how long a loop has to spin, and [`spin_margin`] learns it. [`last_act`] is what a
 //! dying process still stores to the hardware. [`clock`] is under all of them, and [`alloc_guard`] lets a test
 //! show that a loop does not allocate.
+//! [`doctor`] says whether the machine is ready for any of this.
 //!
 //! Invariants: what a module marks as fit for the loop neither allocates nor locks nor opens a file
 //! nor panics; `unsafe` code lives in the private module `sys` alone; nothing is assumed from a
@@ -25,6 +26,7 @@ pub mod alloc_guard;
 pub mod calibrate;
 pub mod clock;
 pub mod cpu;
+pub mod doctor;
 pub mod epitaph;
 pub mod histogram;
 pub mod last_act;

@@ -13,13 +13,13 @@
 //! memory and heap. Threads started afterwards inherit the CPU (start them first, or place them) but
 //! not the policy.
 
-mod kernel;
-mod latency;
+pub(crate) mod kernel;
+pub(crate) mod latency;
 mod limits;
-mod memory;
-mod placement;
+pub(crate) mod memory;
+pub(crate) mod placement;
 mod report;
-mod scheduling;
+pub(crate) mod scheduling;
 
 pub use report::{Guarantee, SetupReport};
 

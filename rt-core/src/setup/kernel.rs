@@ -13,7 +13,7 @@ pub(super) fn circumstances(cpu: Option<usize>) -> Vec<Guarantee> {
     let read = |path: &str| read_to_string(path).ok();
     let release = read("/proc/sys/kernel/osrelease").unwrap_or_default();
     let cpu = cpu.unwrap_or_else(current_cpu);
-    let server = format!("/sys/kernel/debug/sched/fair_server/cpu{cpu}/runtime");
+    let server = fair_server_file(cpu);
     let mut guarantees = vec![
         judge_kernel(
             read("/sys/kernel/realtime").as_deref(),
@@ -30,7 +30,7 @@ pub(super) fn circumstances(cpu: Option<usize>) -> Vec<Guarantee> {
 }
 
 /// `realtime` is the sysfs file, which some real-time kernels lack; `version` is uname's.
-fn judge_kernel(realtime: Option<&str>, version: &str, release: &str) -> Guarantee {
+pub(crate) fn judge_kernel(realtime: Option<&str>, version: &str, release: &str) -> Guarantee {
     let named = ["PREEMPT_RT", "PREEMPT RT"].iter().any(|name| version.contains(name));
     let obtained = named || realtime.is_some_and(|text| text.trim() == "1");
     let remedy = (!obtained).then(|| "install and boot a PREEMPT_RT kernel".to_owned());
@@ -39,7 +39,7 @@ fn judge_kernel(realtime: Option<&str>, version: &str, release: &str) -> Guarant
 }
 
 /// `runtime` of -1 switches throttling off; one that fills the period has the same effect.
-fn judge_throttling(runtime: Option<&str>, period: Option<&str>) -> Guarantee {
+pub(crate) fn judge_throttling(runtime: Option<&str>, period: Option<&str>) -> Guarantee {
     let number = |text: Option<&str>| text.and_then(|text| text.trim().parse::<i64>().ok());
     let (found, obtained) = match (number(runtime), number(period)) {
         (Some(runtime), _) if runtime < 0 => ("off".to_owned(), true),
@@ -56,11 +56,16 @@ fn judge_throttling(runtime: Option<&str>, period: Option<&str>) -> Guarantee {
     Guarantee::circumstance("rt throttling", "off", found, remedy)
 }
 
+/// Where the share of a CPU's fair server stands.
+pub(crate) fn fair_server_file(cpu: usize) -> String {
+    format!("/sys/kernel/debug/sched/fair_server/cpu{cpu}/runtime")
+}
+
 /// First kernel whose scheduler reserves time for ordinary threads on every CPU.
 const FIRST_WITH_FAIR_SERVER: (u32, u32) = (6, 12);
 
 /// None for kernels that have no fair server.
-fn judge_fair_server(release: &str, runtime: Option<&str>, path: &str) -> Option<Guarantee> {
+pub(crate) fn judge_fair_server(release: &str, runtime: Option<&str>, path: &str) -> Option<Guarantee> {
     if version_of(release)? < FIRST_WITH_FAIR_SERVER {
         return None;
     }

@@ -25,7 +25,7 @@ fn judge_timer_slack(wanted_ns: u64, asked: Result<()>, found: Result<i32>) -> G
     Guarantee::asked("timer slack", format!("at most {wanted_ns} ns"), found, remedy)
 }
 
-const DMA_LATENCY: &str = "/dev/cpu_dma_latency";
+pub(crate) const DMA_LATENCY: &str = "/dev/cpu_dma_latency";
 
 /// Keeps CPUs out of sleep states that take longer than this to leave, as long as the file is open.
 pub(super) fn limit_dma_latency(wanted_us: i32) -> (Guarantee, Option<File>) {
@@ -36,7 +36,7 @@ pub(super) fn limit_dma_latency(wanted_us: i32) -> (Guarantee, Option<File>) {
 }
 
 /// The request, and the limit in force with it: the least that any program asks for.
-fn open_request(wanted_us: i32) -> io::Result<(File, i32)> {
+pub(crate) fn open_request(wanted_us: i32) -> io::Result<(File, i32)> {
     let mut file = File::options().read(true).write(true).open(DMA_LATENCY)?;
     file.write_all(&wanted_us.to_ne_bytes())?;
     let mut in_force = [0; size_of::<i32>()];

@@ -35,6 +35,22 @@ pub(super) fn prepare(request: &SetupRequest) -> Vec<Guarantee> {
 
 /// Locks all memory, as far as the limits allow.
 fn lock() -> Guarantee {
+    let Locking { asked, status, limit } = lock_all();
+    judge_lock(asked, &status, limit)
+}
+
+/// What came of asking for locked memory.
+pub(crate) struct Locking {
+    /// What the kernel answered.
+    pub(crate) asked: nix::Result<()>,
+    /// `/proc/self/status` afterwards.
+    pub(crate) status: String,
+    /// The limit in force (bytes); none if nothing limits this process.
+    pub(crate) limit: Option<u64>,
+}
+
+/// Asks, and reads back.
+pub(crate) fn lock_all() -> Locking {
     let limit = raise_soft_limit(Resource::RLIMIT_MEMLOCK);
     let status = read_to_string("/proc/self/status").unwrap_or_default();
     let unlimited = limit == RLIM_INFINITY || may_lock_without_limit(&status);
@@ -45,11 +61,11 @@ fn lock() -> Guarantee {
         mlockall(MlockAllFlags::MCL_CURRENT)
     };
     let status = read_to_string("/proc/self/status").unwrap_or_default();
-    judge_lock(asked, &status, if unlimited { None } else { Some(limit) })
+    Locking { asked, status, limit: if unlimited { None } else { Some(limit) } }
 }
 
 /// `limit` in bytes, or none if nothing limits this process.
-fn judge_lock(asked: nix::Result<()>, status: &str, limit: Option<u64>) -> Guarantee {
+pub(crate) fn judge_lock(asked: nix::Result<()>, status: &str, limit: Option<u64>) -> Guarantee {
     let (locked, resident) = (kib(status, "VmLck:"), kib(status, "VmRSS:"));
     let covered =
         matches!((locked, resident), (Some(locked), Some(resident)) if locked > 0 && locked >= resident);
@@ -73,7 +89,7 @@ fn judge_lock(asked: nix::Result<()>, status: &str, limit: Option<u64>) -> Guara
 }
 
 /// Whether the effective capabilities in a `/proc/self/status` include CAP_IPC_LOCK.
-fn may_lock_without_limit(status: &str) -> bool {
+pub(crate) fn may_lock_without_limit(status: &str) -> bool {
     const CAP_IPC_LOCK: u32 = 14;
     let capabilities = field(status, "CapEff:").and_then(|text| u64::from_str_radix(text, 16).ok());
     capabilities.is_some_and(|bits| bits >> CAP_IPC_LOCK & 1 == 1)
@@ -84,7 +100,7 @@ fn kib(status: &str, key: &str) -> Option<u64> {
 }
 
 /// The first word behind `key` in a `/proc/self/status`.
-fn field<'a>(status: &'a str, key: &str) -> Option<&'a str> {
+pub(crate) fn field<'a>(status: &'a str, key: &str) -> Option<&'a str> {
     status.lines().find_map(|line| line.strip_prefix(key))?.split_whitespace().next()
 }
 

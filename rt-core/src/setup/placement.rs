@@ -10,9 +10,9 @@ use std::fs::read_to_string;
 const CALLING_THREAD: Pid = Pid::from_raw(0);
 
 /// CPUs that the boot loader's `isolcpus=` took out of load balancing.
-const ISOLATED_AT_BOOT: &str = "/sys/devices/system/cpu/isolated";
+pub(crate) const ISOLATED_AT_BOOT: &str = "/sys/devices/system/cpu/isolated";
 /// CPUs in isolated partitions of cgroup v2, made at run time; kernel 6.8 or newer.
-const ISOLATED_AT_RUN_TIME: &str = "/sys/fs/cgroup/cpuset.cpus.isolated";
+pub(crate) const ISOLATED_AT_RUN_TIME: &str = "/sys/fs/cgroup/cpuset.cpus.isolated";
 
 /// Pins the calling thread.
 pub(super) fn run_on(cpu: usize) -> Guarantee {
@@ -21,7 +21,7 @@ pub(super) fn run_on(cpu: usize) -> Guarantee {
     judge_placement(cpu, asked, affinity(CALLING_THREAD), &former)
 }
 
-fn pin(cpu: usize) -> Result<(), Errno> {
+pub(crate) fn pin(cpu: usize) -> Result<(), Errno> {
     let mut mask = CpuSet::new();
     mask.set(cpu)?;
     sched_setaffinity(CALLING_THREAD, &mask)

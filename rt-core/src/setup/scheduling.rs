@@ -10,12 +10,33 @@ use std::fmt;
 
 /// Promotes the calling thread.
 pub(super) fn make_fifo(priority: u8) -> Guarantee {
-    let limit = raise_soft_limit(Resource::RLIMIT_RTPRIO);
-    let asked = set_fifo(priority);
-    judge_fifo(priority, asked, current_policy(), limit)
+    let Promotion { asked, found, rtprio_limit } = promote(priority);
+    judge_fifo(priority, asked, found, rtprio_limit)
 }
 
-fn judge_fifo(priority: u8, asked: Result<()>, found: Result<Policy>, rtprio_limit: u64) -> Guarantee {
+/// What came of asking for `SCHED_FIFO`.
+pub(crate) struct Promotion {
+    /// What the kernel answered.
+    pub(crate) asked: Result<()>,
+    /// The policy in force afterwards.
+    pub(crate) found: Result<Policy>,
+    /// The limit in force.
+    pub(crate) rtprio_limit: u64,
+}
+
+/// Asks, and reads back.
+pub(crate) fn promote(priority: u8) -> Promotion {
+    let rtprio_limit = raise_soft_limit(Resource::RLIMIT_RTPRIO);
+    let asked = set_fifo(priority);
+    Promotion { asked, found: current_policy(), rtprio_limit }
+}
+
+pub(crate) fn judge_fifo(
+    priority: u8,
+    asked: Result<()>,
+    found: Result<Policy>,
+    rtprio_limit: u64,
+) -> Guarantee {
     let wanted = Policy { policy: libc::SCHED_FIFO, priority: i32::from(priority) };
     let remedy = (found != Ok(wanted)).then(|| remedy(priority, asked, rtprio_limit));
     let found = found.map_or_else(|error| format!("unreadable ({error})"), |policy| policy.to_string());

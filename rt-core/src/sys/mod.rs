@@ -6,6 +6,7 @@ pub(crate) mod capability;
 pub(crate) mod counting_allocator;
 pub(crate) mod fatal;
 pub(crate) mod malloc;
+pub(crate) mod mapped_word;
 pub(crate) mod sched;
 pub(crate) mod seccomp;
 pub(crate) mod stack;

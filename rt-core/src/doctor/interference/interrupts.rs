@@ -1,0 +1,135 @@
+//! Device interrupts: where they go now, and where those of new devices will go.
+//!
+//! A *managed* interrupt belongs to a queue of a device that has one for each CPU (NVMe, network
+//! cards); nobody may move it. Kernels from 6.11 on show that by a read-only affinity file, older ones
+//! by refusing to take the write.
+
+use super::super::cpus::{list_of, parse_mask, without};
+use super::super::machine::{Machine, Obstacle, if_any, one_line};
+use super::super::step::{Action, Step};
+use super::super::{Judged, Judgement, Remedy};
+use super::mask_without_the_cpu;
+
+/// A device interrupt that goes to the loop's CPU.
+struct Interrupt {
+    number: String,
+    name: String,
+    movable: bool,
+    /// The CPUs that it may go to.
+    allowed: String,
+}
+
+pub(super) fn affinity(machine: &Machine<'_>) -> Judged {
+    let interrupts = interrupts_on(machine)?;
+    if interrupts.is_empty() {
+        return Ok(Judgement::pass("none"));
+    }
+    let (movable, managed): (Vec<_>, Vec<_>) =
+        interrupts.into_iter().partition(|interrupt| interrupt.movable);
+    let others = list_of(&without(&machine.online_cpus()?, machine.spec.cpu));
+    if others.is_empty() {
+        let found = format!("{} interrupts, and there is no other CPU", movable.len() + managed.len());
+        return Ok(Judgement::warn(found, Remedy::words("use a machine with two CPUs")));
+    }
+    if movable.is_empty() {
+        return judge_managed(machine, &managed);
+    }
+    let mut found = format!("{} ({})", movable.len(), names(&movable));
+    if !managed.is_empty() {
+        found += &format!("; managed, which cannot be moved: {} ({})", managed.len(), names(&managed));
+    }
+    let puts = movable.iter().map(|interrupt| put(interrupt, &others));
+    let boot = machine.boot_parameter("irqaffinity")?;
+    let boot = Step::boot("send interrupts to the other CPUs from the start", "irqaffinity", &others, boot);
+    let text =
+        format!("echo {others} > /proc/irq/N/smp_affinity_list for each; at boot: irqaffinity={others}");
+    Ok(Judgement::warn(found, Remedy::steps(text, [boot].into_iter().chain(puts))))
+}
+
+fn put(interrupt: &Interrupt, others: &str) -> Step {
+    Step {
+        what: format!("send interrupt {} ({}) elsewhere", interrupt.number, interrupt.name),
+        action: Action::Put {
+            path: format!("/proc/irq/{}/smp_affinity_list", interrupt.number),
+            value: others.to_owned(),
+            former: interrupt.allowed.clone(),
+            lasting: false,
+        },
+    }
+}
+
+/// With `isolcpus=managed_irq` the kernel keeps them away as long as a housekeeping CPU can serve.
+fn judge_managed(machine: &Machine<'_>, managed: &[Interrupt]) -> Judged {
+    let isolation = machine.boot_parameter("isolcpus")?;
+    let found = format!("managed, which cannot be moved: {} ({})", managed.len(), names(managed));
+    if isolation.as_deref().is_some_and(|value| value.split(',').any(|word| word == "managed_irq")) {
+        return Ok(Judgement::pass(format!("{found}; isolcpus=managed_irq keeps them quiet")));
+    }
+    let cpu = machine.spec.cpu;
+    let value = format!("managed_irq,domain,{cpu}");
+    let text =
+        format!("boot with isolcpus={value}; they fire only for what this CPU itself asks of the device");
+    let step = Step::boot("keep managed interrupts off the CPU where possible", "isolcpus", value, isolation);
+    Ok(Judgement::warn(found, Remedy::steps(text, [step])))
+}
+
+fn names(interrupts: &[Interrupt]) -> String {
+    const SHOWN: usize = 6;
+    let shown = interrupts.iter().take(SHOWN);
+    let mut names: Vec<String> = shown.map(|i| format!("{} {}", i.number, i.name)).collect();
+    if interrupts.len() > SHOWN {
+        names.push(format!("{} more", interrupts.len() - SHOWN));
+    }
+    names.join(", ")
+}
+
+fn interrupts_on(machine: &Machine<'_>) -> Result<Vec<Interrupt>, Obstacle> {
+    let names = machine.tree.list("/proc/irq").map_err(|_| Obstacle::Absent("/proc/irq".into()))?;
+    let mut numbers: Vec<u32> = names.iter().filter_map(|name| name.parse().ok()).collect();
+    numbers.sort_unstable();
+    let mut found = Vec::new();
+    for number in numbers {
+        found.extend(interrupt_on(machine, number)?);
+    }
+    Ok(found)
+}
+
+/// None if nobody handles it, or if it does not go to the loop's CPU.
+fn interrupt_on(machine: &Machine<'_>, number: u32) -> Result<Option<Interrupt>, Obstacle> {
+    let directory = format!("/proc/irq/{number}");
+    let (allowed_file, effective_file) =
+        (format!("{directory}/smp_affinity_list"), format!("{directory}/effective_affinity_list"));
+    let Some(name) = handler(machine, &directory)? else { return Ok(None) };
+    // Freed while we looked.
+    let Some(allowed) = if_any(machine.cpu_list(&allowed_file))? else { return Ok(None) };
+    // Empty before the interrupt is started.
+    let effective = if_any(machine.cpu_list(&effective_file))?.filter(|cpus| !cpus.is_empty());
+    if !effective.as_ref().unwrap_or(&allowed).contains(&machine.spec.cpu) {
+        return Ok(None);
+    }
+    let movable = machine.status(&allowed_file)?.mode & 0o200 != 0 && !is_marked_managed(machine, number);
+    let allowed = list_of(&allowed);
+    Ok(Some(Interrupt { number: number.to_string(), name, movable, allowed }))
+}
+
+/// The name of the first handler, which is a directory among the files.
+fn handler(machine: &Machine<'_>, directory: &str) -> Result<Option<String>, Obstacle> {
+    let is_handler = |name: &String| {
+        machine.status(&format!("{directory}/{name}")).is_ok_and(|status| status.is_directory)
+    };
+    Ok(machine.names(directory)?.into_iter().find(is_handler).map(|name| one_line(&name, 30)))
+}
+
+/// Only root can see that, and not under lockdown.
+fn is_marked_managed(machine: &Machine<'_>, number: u32) -> bool {
+    let state = machine.text(&format!("/sys/kernel/debug/irq/irqs/{number}"));
+    state.is_ok_and(|state| state.contains("IRQD_AFFINITY_MANAGED"))
+}
+
+pub(super) fn default_affinity(machine: &Machine<'_>) -> Judged {
+    const MASK: &str = "/proc/irq/default_smp_affinity";
+    let mask = machine.line(MASK)?;
+    let cpus = parse_mask(&mask).filter(|cpus| !cpus.is_empty());
+    let cpus = cpus.ok_or_else(|| Obstacle::garbled(MASK, &mask))?;
+    mask_without_the_cpu(machine, MASK, &cpus, &mask, "send new devices' interrupts elsewhere")
+}

@@ -1,0 +1,136 @@
+//! What lets an ordinary user run the loop: a group, limits, udev rules, directories, cards set free.
+
+use super::super::machine::Machine;
+use super::super::step::{Action, Step};
+use super::{PlanNames, Script, has_systemd, is_plain, quoted};
+
+pub(super) fn write(script: &mut Script, machine: &Machine<'_>, steps: &[Step], names: &PlanNames) {
+    let needs_group =
+        |step: &Step| matches!(step.action, Action::Limits | Action::Udev { .. } | Action::Directory { .. });
+    if steps.iter().any(needs_group) {
+        group(script, names);
+    }
+    if steps.iter().any(|step| step.action == Action::Limits) {
+        limits(script, machine, names);
+    }
+    unbind(script, steps, names);
+    udev(script, machine, steps, names);
+    directories(script, machine, steps, names);
+}
+
+fn group(script: &mut Script, names: &PlanNames) {
+    let group = &names.group;
+    script.section("Group of those who may run the loop");
+    script.explain("makes the group, and whoever called sudo a member", &format!("groupdel {group}"));
+    script.line(&format!("getent group {group} >/dev/null || groupadd --system {group}"));
+    script.line(&format!("[ -z \"${{SUDO_USER:-}}\" ] || usermod -aG {group} \"$SUDO_USER\""));
+}
+
+fn limits(script: &mut Script, machine: &Machine<'_>, names: &PlanNames) {
+    let PlanNames { prefix, group, program, .. } = names;
+    let path = format!("/etc/security/limits.d/90-{prefix}.conf");
+    script.section("Rights: real-time priority and locked memory");
+    script.explain("for members of the group, from their next login on", &format!("rm {path}"));
+    script.file(&path, &[format!("@{group} - rtprio 95"), format!("@{group} - memlock unlimited")]);
+    script.comment("Or, for the program whoever runs it, again after each build; undo: setcap -r PROGRAM:");
+    script.comment(&format!("setcap cap_sys_nice,cap_ipc_lock=ep {}", quoted(program)));
+    let units = machine.names("/etc/systemd/system").unwrap_or_default();
+    let is_ours = |unit: &&String| {
+        unit.ends_with(".service")
+            && **unit != format!("{prefix}-settings.service")
+            && names.unit_prefixes.iter().any(|prefix| unit.starts_with(prefix.as_str()))
+    };
+    for unit in units.iter().filter(is_ours).filter(|unit| is_plain(unit)) {
+        let path = format!("/etc/systemd/system/{unit}.d/{prefix}-rights.conf");
+        script.explain(&format!("the same for {unit}"), &format!("rm {path}"));
+        let lines = ["[Service]", "LimitRTPRIO=95", "LimitMEMLOCK=infinity"];
+        script.file(&path, &lines.map(str::to_owned));
+        if has_systemd(machine) {
+            script.line("systemctl daemon-reload");
+        }
+    }
+}
+
+fn unbind(script: &mut Script, steps: &[Step], names: &PlanNames) {
+    let bound: Vec<(&str, &str, &str)> = steps
+        .iter()
+        .filter_map(|step| match &step.action {
+            Action::Unbind { address, driver } if is_plain(address) && is_plain(driver) => {
+                Some((step.what.as_str(), address.as_str(), driver.as_str()))
+            }
+            _ => None,
+        })
+        .collect();
+    let Some((_, _, first)) = bound.first() else { return };
+    script.section("Cards that a kernel driver holds");
+    for (what, address, driver) in &bound {
+        script.explain(what, &format!("put {address} /sys/bus/pci/drivers/{driver}/bind"));
+        script.line(&format!("put {address} /sys/bus/pci/drivers/{driver}/unbind"));
+    }
+    let mut drivers: Vec<&str> = bound.iter().map(|(_, _, driver)| *driver).collect();
+    drivers.dedup();
+    let path = format!("/etc/modprobe.d/{}.conf", names.prefix);
+    script.explain("not loaded at the next boot", &format!("rm {path} && modprobe {first}"));
+    let lines: Vec<String> = drivers.iter().map(|driver| format!("blacklist {driver}")).collect();
+    script.file(&path, &lines);
+}
+
+fn udev(script: &mut Script, machine: &Machine<'_>, steps: &[Step], names: &PlanNames) {
+    let rules: Vec<(&str, &String)> = steps
+        .iter()
+        .filter_map(|step| match &step.action {
+            Action::Udev { rule } => Some((step.what.as_str(), rule)),
+            _ => None,
+        })
+        .collect();
+    if rules.is_empty() {
+        return;
+    }
+    let path = format!("/etc/udev/rules.d/70-{}.rules", names.prefix);
+    script.section("Device files");
+    rules.iter().for_each(|(what, _)| script.comment(what));
+    script.explain("rules for udev", &format!("rm {path} && udevadm control --reload"));
+    let lines: Vec<String> = rules
+        .iter()
+        .map(|(_, rule)| rule.replace("GROUP=\"realtime\"", &format!("GROUP=\"{}\"", names.group)))
+        .collect();
+    script.file(&path, &lines);
+    if !machine.exists("/run/udev") {
+        script.comment("udev does not run here now; it will read the rules when it does.");
+        return;
+    }
+    script.line("udevadm control --reload");
+    // Of all devices only the kinds that the rules are about.
+    let is_pci = |rule: &str| rule.contains("SUBSYSTEM==\"pci\"");
+    if rules.iter().any(|(_, rule)| is_pci(rule)) {
+        script.line("udevadm trigger --action=add --subsystem-match=pci");
+    }
+    if rules.iter().any(|(_, rule)| !is_pci(rule)) {
+        script.line("udevadm trigger --action=add --subsystem-match=misc");
+    }
+}
+
+fn directories(script: &mut Script, machine: &Machine<'_>, steps: &[Step], names: &PlanNames) {
+    let lines: Vec<String> = steps
+        .iter()
+        .filter_map(|step| match &step.action {
+            Action::Directory { path, mode } if is_plain(path) => {
+                Some(format!("d {path} {mode:04o} root {} -", names.group))
+            }
+            _ => None,
+        })
+        .collect();
+    if lines.is_empty() {
+        return;
+    }
+    let path = format!("/etc/tmpfiles.d/{}.conf", names.prefix);
+    script.section("Directories");
+    if !has_systemd(machine) {
+        script.comment("This machine does not run systemd: let whatever it runs at boot make, in the words of tmpfiles.d,");
+        lines.iter().for_each(|line| script.comment(line));
+        return;
+    }
+    script.explain("made at each boot", &format!("rm {path}"));
+    script.file(&path, &lines);
+    script.line(&format!("systemd-tmpfiles --create {}", quoted(&path)));
+}
