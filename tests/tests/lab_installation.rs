@@ -217,9 +217,6 @@ fn the_scripts_are_plain_posix_shell() {
     }
 }
 
-/// Told here, and made elsewhere.
-const TOLD_IN_ADVANCE: [&str; 2] = ["doctor", "commission"];
-
 #[test]
 fn every_command_of_the_readme_exists() {
     let readme = fs::read_to_string(sources().join("README.md")).expect("there");
@@ -234,9 +231,6 @@ fn every_command_of_the_readme_exists() {
             ["config/system/install.sh", ref rest @ ..] => (Lab::bare().installer(), rest),
             _ => continue,
         };
-        if rest.first().is_some_and(|command| TOLD_IN_ADVANCE.contains(command)) {
-            continue;
-        }
         let mut program = program;
         let help = succeed(
             program.args(rest.iter().take_while(|word| !word.starts_with('-')).take(1)).arg("--help"),
