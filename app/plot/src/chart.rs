@@ -42,13 +42,16 @@ impl Series {
         Self { colour: Some(palette::colour(index)), ..self }
     }
 
-    /// The unbroken stretches of points, as the look joins them.
-    pub(crate) fn strokes(&self) -> Vec<Vec<(f64, f64)>> {
+    /// The unbroken stretches of points, as the look joins them, without what runs along the floor.
+    pub(crate) fn strokes(&self, floor: Option<f64>) -> Vec<Vec<(f64, f64)>> {
         let stretches = self.points.split(|(x, y)| !x.is_finite() || !y.is_finite());
-        let stretches = stretches.filter(|stretch| !stretch.is_empty());
-        match self.look {
-            Look::Steps => stretches.map(steps).collect(),
-            Look::Line | Look::Dashed | Look::Dots => stretches.map(<[_]>::to_vec).collect(),
+        let drawn = stretches.filter(|stretch| !stretch.is_empty()).map(|stretch| match self.look {
+            Look::Steps => steps(stretch),
+            Look::Line | Look::Dashed | Look::Dots => stretch.to_vec(),
+        });
+        match floor {
+            Some(floor) => drawn.flat_map(|stroke| above(&stroke, floor)).collect(),
+            None => drawn.collect(),
         }
     }
 }
@@ -56,6 +59,28 @@ impl Series {
 fn steps(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let corners = points.windows(2).flat_map(|pair| [pair[0], (pair[1].0, pair[0].1)]);
     corners.chain(points.last().copied()).collect()
+}
+
+/// The parts of a stroke that rise above the floor, with their feet on it.
+fn above(stroke: &[(f64, f64)], floor: f64) -> Vec<Vec<(f64, f64)>> {
+    let low = |index: usize| stroke.get(index).is_none_or(|point| point.1 <= floor);
+    let hidden = |index: usize| low(index.wrapping_sub(1)) && low(index) && low(index + 1);
+    let mut parts = vec![Vec::new()];
+    for (index, point) in stroke.iter().enumerate() {
+        if hidden(index) {
+            parts.push(Vec::new());
+        } else {
+            if let Some(part) = parts.last_mut() {
+                part.push(*point);
+            }
+            // Down and up again are two feet: the way between them lies on the floor.
+            if low(index) && low(index + 1) {
+                parts.push(Vec::new());
+            }
+        }
+    }
+    parts.retain(|part| !part.is_empty());
+    parts
 }
 
 /// Axes with series; a panel of a [`Figure`](crate::Figure).
@@ -98,13 +123,22 @@ mod tests {
     #[test]
     fn steps_hold_each_value_until_the_next() {
         let series = Series::new("s", Look::Steps, vec![(0.0, 1.0), (2.0, 5.0), (3.0, 0.0)]);
-        assert_eq!(series.strokes(), [[(0.0, 1.0), (2.0, 1.0), (2.0, 5.0), (3.0, 5.0), (3.0, 0.0)]]);
+        assert_eq!(series.strokes(None), [[(0.0, 1.0), (2.0, 1.0), (2.0, 5.0), (3.0, 5.0), (3.0, 0.0)]]);
+    }
+
+    #[test]
+    fn nothing_is_drawn_along_the_floor_of_a_logarithmic_axis() {
+        let at = |ys: &[f64]| ys.iter().enumerate().map(|(i, y)| (i as f64, *y)).collect::<Vec<_>>();
+        let series = Series::new("s", Look::Line, at(&[0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 7.0]));
+        let strokes = series.strokes(Some(0.1));
+        assert_eq!(strokes, [vec![(1.0, 0.0), (2.0, 5.0), (3.0, 0.0)], vec![(5.0, 0.0), (6.0, 7.0)]]);
+        assert!(Series::new("s", Look::Line, at(&[0.0; 4])).strokes(Some(0.1)).is_empty());
     }
 
     #[test]
     fn a_value_that_is_no_number_breaks_the_line() {
         let points = vec![(0.0, 1.0), (1.0, f64::NAN), (2.0, 3.0), (3.0, 4.0)];
-        let strokes = Series::new("s", Look::Line, points).strokes();
+        let strokes = Series::new("s", Look::Line, points).strokes(None);
         assert_eq!(strokes, [vec![(0.0, 1.0)], vec![(2.0, 3.0), (3.0, 4.0)]]);
     }
 }

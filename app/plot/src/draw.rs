@@ -1,6 +1,6 @@
 //! A chart onto an area, whatever is behind it.
 
-use crate::axis::FittedAxis;
+use crate::axis::{FittedAxis, Scale};
 use crate::chart::{Chart, Look};
 use crate::font;
 use crate::legend;
@@ -17,9 +17,10 @@ const TITLE: u32 = 17;
 const TITLE_ROW: i32 = 28;
 const AXIS_NAME: u32 = 15;
 const MARK: u32 = 14;
-const LEFT: i32 = 82;
+const LEFT: i32 = 78;
 const BELOW: i32 = 52;
-const RIM: i32 = 18;
+const RIM: i32 = 42;
+const AIR: i32 = 8;
 
 /// How many pixels one unit of the description is.
 #[derive(Debug, Clone, Copy)]
@@ -56,24 +57,28 @@ pub(crate) fn chart<DB: DrawingBackend>(
     let mut area = area.clone();
     if !chart.title.is_empty() {
         let (top, rest) = area.split_vertically(sheet.px(TITLE_ROW));
-        let at = (sheet.px(LEFT), sheet.px(6));
+        let at = (sheet.px(LEFT + AIR), sheet.px(6));
         draw_text(&top, &chart.title, at, TITLE, sheet)?;
         area = rest;
     }
     let (strip, body) = area.split_vertically(legend::height(chart, &area, sheet) + sheet.px(4));
-    legend::draw(chart, &strip, sheet.px(LEFT), sheet)?;
+    legend::draw(chart, &strip, sheet.px(LEFT + AIR), sheet)?;
     let xs = chart.series.iter().flat_map(|series| series.points.iter().map(|point| point.0));
     let ys = chart.series.iter().flat_map(|series| series.points.iter().map(|point| point.1));
     let (x, y) = (chart.x.fit(xs), chart.y.fit(ys));
     let mut context = ChartBuilder::on(&body)
         .margin_right(sheet.px(RIM))
-        .margin_top(sheet.px(RIM / 3))
+        .margin_left(sheet.px(AIR))
+        .margin_top(sheet.px(AIR))
+        .margin_bottom(sheet.px(AIR))
         .x_label_area_size(sheet.px(BELOW))
         .y_label_area_size(sheet.px(LEFT))
         .build_cartesian_2d(x, y)
         .map_err(|error| error.to_string())?;
     mesh(chart, &mut context, sheet)?;
-    (0..chart.series.len()).try_for_each(|index| series(chart, index, &mut context, sheet))
+    // On a logarithmic axis "none" has no place: nothing is drawn along the rim.
+    let floor = (y.scale == Scale::Log).then_some(y.from);
+    (0..chart.series.len()).try_for_each(|index| series(chart, index, floor, &mut context, sheet))
 }
 
 pub(crate) fn draw_text<DB: DrawingBackend>(
@@ -110,12 +115,13 @@ fn mesh<DB: DrawingBackend>(chart: &Chart, context: &mut Context<'_, DB>, sheet:
 fn series<DB: DrawingBackend>(
     chart: &Chart,
     index: usize,
+    floor: Option<f64>,
     context: &mut Context<'_, DB>,
     sheet: Sheet,
 ) -> Result<(), String> {
     let (series, colour) = (&chart.series[index], chart.colour(index));
     let stroke = sheet.line(colour, 1.7);
-    for points in series.strokes() {
+    for points in series.strokes(floor) {
         let drawn = match series.look {
             Look::Line | Look::Steps if points.len() > 1 => {
                 context.draw_series(LineSeries::new(points, stroke)).map(|_| ())

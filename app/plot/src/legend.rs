@@ -42,7 +42,7 @@ pub(crate) fn draw<DB: DrawingBackend>(
     for entry in layout(chart, area, sheet) {
         let (x, y) = (left + entry.left, entry.row * sheet.px(ROW) + sheet.px(ROW) / 2);
         sample(area, (x, y), sheet.px(SAMPLE), chart, entry.series, sheet)?;
-        let at = (x + sheet.px(SAMPLE + GAP), y - sheet.px(TEXT as i32) / 2);
+        let at = (x + sheet.px(SAMPLE + GAP), y - sheet.px(TEXT as i32 / 2 - 2));
         let text = Text::new(chart.series[entry.series].name.clone(), at, font::style(sheet.text(TEXT), INK));
         area.draw(&text).map_err(|error| error.to_string())?;
     }
