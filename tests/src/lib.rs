@@ -8,6 +8,7 @@
 pub mod bare_loop;
 pub mod driver;
 pub mod faults;
+pub mod jitter;
 pub mod programs;
 pub mod recording;
 pub mod slices;

@@ -47,7 +47,11 @@ impl Axis {
 
     /// What stands beside the axis.
     pub(crate) fn label(&self) -> String {
-        if self.unit.is_empty() { self.quantity.clone() } else { format!("{} ({})", self.quantity, self.unit) }
+        if self.unit.is_empty() {
+            self.quantity.clone()
+        } else {
+            format!("{} ({})", self.quantity, self.unit)
+        }
     }
 
     /// The axis with its ends, which are finite and apart whatever the data are.
@@ -55,9 +59,10 @@ impl Axis {
         let usable = |value: &f64| value.is_finite() && (self.scale == Scale::Linear || *value > 0.0);
         let ends = self.range.filter(|(from, to)| usable(from) && usable(to) && from < to);
         let (from, to) = ends.unwrap_or_else(|| {
-            let (low, high) = data
-                .filter(usable)
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+            let (low, high) =
+                data.filter(usable).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+                    (low.min(value), high.max(value))
+                });
             match self.scale {
                 Scale::Linear => ticks::around(low, high),
                 Scale::Log => ticks::decades_around(low, high),
@@ -125,7 +130,10 @@ mod tests {
         for axis in [Axis::linear("x", ""), Axis::log("x", "")] {
             for data in [vec![], vec![f64::NAN], vec![0.0], vec![3.0, 3.0]] {
                 let fitted = axis.fit(data.into_iter());
-                assert!(fitted.from.is_finite() && fitted.to.is_finite() && fitted.from < fitted.to, "{fitted:?}");
+                assert!(
+                    fitted.from.is_finite() && fitted.to.is_finite() && fitted.from < fitted.to,
+                    "{fitted:?}"
+                );
             }
         }
     }

@@ -8,8 +8,8 @@ use crate::palette::{FINE_GRID, GRID, INK, Rgb};
 use crate::ticks;
 use plotters::coord::Shift;
 use plotters::prelude::{
-    Cartesian2d, ChartBuilder, ChartContext, Circle, Color, DashedLineSeries, DrawingArea, DrawingBackend, LineSeries,
-    PathElement, RGBColor, ShapeStyle, Text,
+    Cartesian2d, ChartBuilder, ChartContext, Circle, Color, DashedLineSeries, DrawingArea, DrawingBackend,
+    LineSeries, PathElement, RGBColor, ShapeStyle, Text,
 };
 
 /// Of text and rims (px, unscaled).
@@ -94,7 +94,11 @@ pub(crate) fn draw_text<DB: DrawingBackend>(
 
 type Context<'a, DB> = ChartContext<'a, DB, Cartesian2d<FittedAxis, FittedAxis>>;
 
-fn mesh<DB: DrawingBackend>(chart: &Chart, context: &mut Context<'_, DB>, sheet: Sheet) -> Result<(), String> {
+fn mesh<DB: DrawingBackend>(
+    chart: &Chart,
+    context: &mut Context<'_, DB>,
+    sheet: Sheet,
+) -> Result<(), String> {
     let number = |value: &f64| ticks::text(*value);
     context
         .configure_mesh()

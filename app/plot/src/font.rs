@@ -11,8 +11,7 @@ pub(crate) const FAMILY: &str = "sans-serif";
 
 /// Makes the font known to the drawing library; doing it again changes nothing.
 pub(crate) fn register() -> Result<(), PlotError> {
-    register_font(FAMILY, FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT)
-        .map_err(|_| PlotError::Font)
+    register_font(FAMILY, FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT).map_err(|_| PlotError::Font)
 }
 
 /// Text of this height (px) in this colour.

@@ -24,11 +24,7 @@ struct Entry {
 }
 
 /// How high the strip is (px).
-pub(crate) fn height<DB: DrawingBackend>(
-    chart: &Chart,
-    area: &DrawingArea<DB, Shift>,
-    sheet: Sheet,
-) -> i32 {
+pub(crate) fn height<DB: DrawingBackend>(chart: &Chart, area: &DrawingArea<DB, Shift>, sheet: Sheet) -> i32 {
     layout(chart, area, sheet).last().map_or(0, |entry| (entry.row + 1) * sheet.px(ROW))
 }
 
@@ -55,7 +51,9 @@ fn layout<DB: DrawingBackend>(chart: &Chart, area: &DrawingArea<DB, Shift>, shee
     let room = area.dim_in_pixel().0 as i32 - sheet.px(110);
     let mut entries: Vec<Entry> = Vec::new();
     let (mut row, mut left) = (0, 0);
-    for (series, name) in chart.series.iter().map(|s| &s.name).enumerate().filter(|(_, name)| !name.is_empty()) {
+    for (series, name) in
+        chart.series.iter().map(|s| &s.name).enumerate().filter(|(_, name)| !name.is_empty())
+    {
         let text = area.estimate_text_size(name, &style).map_or(0, |(width, _)| width);
         let width = sheet.px(SAMPLE + 3 * GAP) + (f64::from(text) * AIR) as i32;
         if left > 0 && left + width > room {

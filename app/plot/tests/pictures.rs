@@ -5,13 +5,24 @@ use plot::{Axis, Chart, Figure, Look, PlotError, Series};
 fn chart() -> Chart {
     Chart::new("latency", Axis::log("latency", "us"), Axis::log("share of all", ""))
         .with(Series::new("ours", Look::Steps, vec![(0.02, 0.9), (0.05, 0.1), (1.0, 0.001), (2.0, 0.0)]))
-        .with(Series::new("a <reference> & more", Look::Dashed, vec![(10.0, 0.5), (40.0, 0.02), (900.0, 1e-5)]))
+        .with(Series::new(
+            "a <reference> & more",
+            Look::Dashed,
+            vec![(10.0, 0.5), (40.0, 0.02), (900.0, 1e-5)],
+        ))
 }
 
 #[test]
 fn an_svg_holds_title_axes_with_units_and_legend_as_text() {
     let svg = Figure::new("Wake-up", vec![chart()]).note("on a quiet machine").svg().unwrap();
-    for text in ["Wake-up", "on a quiet machine", "latency (us)", "share of all", "ours", "&lt;reference&gt; &amp; more"] {
+    for text in [
+        "Wake-up",
+        "on a quiet machine",
+        "latency (us)",
+        "share of all",
+        "ours",
+        "&lt;reference&gt; &amp; more",
+    ] {
         assert!(svg.contains(text), "{text}\n{svg}");
     }
     assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"));
@@ -36,7 +47,8 @@ fn a_png_has_twice_the_size_of_the_svg_and_ink_of_every_series() {
 #[test]
 fn nothing_to_show_is_an_empty_chart_and_no_failure() {
     let empty = Chart::new("", Axis::linear("time", "s"), Axis::log("latency", "us"));
-    let strange = empty.clone().with(Series::new("", Look::Line, vec![(f64::NAN, 1.0), (0.0, f64::INFINITY)]));
+    let strange =
+        empty.clone().with(Series::new("", Look::Line, vec![(f64::NAN, 1.0), (0.0, f64::INFINITY)]));
     for panels in [vec![], vec![empty], vec![strange]] {
         let figure = Figure::new("nothing", panels);
         assert!(figure.svg().is_ok() && figure.png().is_ok());
