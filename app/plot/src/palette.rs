@@ -1,12 +1,20 @@
-//! Colours that people with any colour vision tell apart (Okabe and Ito 2008), without the yellow, which is
-//! hard to see on white.
+//! Colours that people with any colour vision tell apart (after Okabe and Ito 2008), without the
+//! yellow, which is hard to see on white.
 
 /// Red, green, blue.
 pub type Rgb = (u8, u8, u8);
 
-/// Blue, vermilion, green, purple, sky, orange, black.
-pub const COLOURS: [Rgb; 7] =
-    [(0, 114, 178), (213, 94, 0), (0, 158, 115), (170, 68, 153), (86, 180, 233), (230, 159, 0), (40, 40, 40)];
+/// Blue, vermilion, green, purple, sky, orange, black, olive.
+pub const COLOURS: [Rgb; 8] = [
+    (0, 114, 178),
+    (213, 94, 0),
+    (0, 158, 115),
+    (170, 68, 153),
+    (86, 180, 233),
+    (230, 159, 0),
+    (40, 40, 40),
+    (140, 130, 30),
+];
 
 /// Text and axes.
 pub(crate) const INK: Rgb = (40, 40, 40);

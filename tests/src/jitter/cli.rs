@@ -4,6 +4,7 @@ use crate::jitter::bank::Bank;
 use crate::jitter::compare::compare;
 use crate::jitter::cyclictest;
 use crate::jitter::document::{Document, Surroundings};
+use crate::jitter::driver_slice::DriverSlice;
 use crate::jitter::error::{EXIT_FAULT, EXIT_GATE, JitterError};
 use crate::jitter::gate::{Gate, LEAST_RUNS};
 use crate::jitter::live::Live;
@@ -46,18 +47,24 @@ fn measure(options: &Measure) -> Result<ExitCode, JitterError> {
     if let Some(gate) = &gate {
         refuse_a_hopeless_gate(gate, &plan)?;
     }
+    let attached = plan.attach.as_deref().map(DriverSlice::attach).transpose()?;
+    let cpu = match &attached {
+        Some(driver) => driver.view().info().cpu,
+        None => plan.config.real_time.cpu,
+    };
     let origin = Origin::now();
     let out = options.out.clone().unwrap_or_else(|| PathBuf::from(format!("jitter-{}", origin.file_name())));
     let mut saver = Saver::new(&out, Duration::from_secs(options.save_every))?;
-    let surroundings = surroundings(&plan);
+    let surroundings = surroundings(&plan, cpu);
     if !options.quiet {
         surroundings.notes.iter().for_each(|note| say(format_args!("jitter: {note}")));
     }
-    let cpus = roles::keep_off(plan.config.real_time.cpu);
+    let cpus = roles::keep_off(cpu);
     let live = Live::new(options.quiet, expected(&plan), plan.runs);
     let bank = Bank::new(origin, options.worst);
     let (document, end) = {
         let mut session = Session::new(&plan, cpus, &signals, bank, surroundings, &mut saver, live);
+        session.look_on_at(attached);
         let end = session.run();
         (Document::new(&session.bank, &session.surroundings, &end_words(&end)), end)
     };
@@ -94,8 +101,8 @@ fn refuse_a_hopeless_gate(gate: &Gate, plan: &Plan) -> Result<(), JitterError> {
     }
 }
 
-fn surroundings(plan: &Plan) -> Surroundings {
-    let mut machine = machine::describe(plan.config.real_time.cpu);
+fn surroundings(plan: &Plan, cpu: Option<usize>) -> Surroundings {
+    let mut machine = machine::describe(cpu);
     if matches!(plan.reference, Reference::Cyclictest(_))
         && let Some(version) = cyclictest::version()
     {

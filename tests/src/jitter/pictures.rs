@@ -8,8 +8,8 @@ use plot::{Axis, Chart, Figure, Look, Series};
 use rt_core::histogram::{BUCKETS, bucket_lower};
 use std::path::Path;
 
-/// Buckets drawn as one: four steps an octave are fine enough to see a shape and coarse enough to see it.
-const GROUP: usize = 8;
+/// Buckets drawn as one: two steps an octave; finer ones make a thicket of rare values.
+const GROUP: usize = 16;
 /// Nothing is faster than reading the clock.
 const LEAST_US: f64 = 0.01;
 
@@ -25,7 +25,8 @@ pub fn write(document: &Document, directory: &Path) -> Result<(), JitterError> {
     let all: Vec<(&str, &Document)> = vec![("", document)];
     write("histogram", with_notes(Figure::new("Latency histogram", vec![histogram(&all)]), document))?;
     write("tail", with_notes(Figure::new("Latency tail", vec![tail(&all)]), document))?;
-    write("timeline", with_notes(Figure::new("Latency over time", timelines(document)), document))
+    let over_time = Figure { panel_height: 260, ..Figure::new("Latency over time", timelines(document)) };
+    write("timeline", with_notes(over_time, document))
 }
 
 /// Both results overlaid: for each metric of both a panel with the tails.
@@ -75,7 +76,7 @@ fn every<'a>(
 }
 
 fn histogram(documents: &[(&str, &Document)]) -> Chart {
-    let share = Axis::log("share of the values, a quarter octave each", "");
+    let share = Axis::log("share of the values, half an octave each", "");
     let mut chart = Chart::new("", Axis::log("latency", "us"), share);
     for (name, series, place) in every(documents) {
         chart.series.push(styled(Series::new(&name, Look::Steps, shares(series)), place));
@@ -95,7 +96,7 @@ fn tail_axes(title: &str) -> Chart {
     Chart::new(title, Axis::log("latency", "us"), Axis::log("share of the values above it", ""))
 }
 
-/// Seven colours for eight metrics: the driver's own histograms are dashed.
+/// What nearly coincides with another is dashed, so that both are seen.
 fn styled(series: Series, place: usize) -> Series {
     let dashed = matches!(Metric::ALL[place], Metric::DriverWake | Metric::Cycle | Metric::ForceAge);
     let look = if dashed && series.look == Look::Line { Look::Dashed } else { series.look };
@@ -142,6 +143,10 @@ fn timelines(document: &Document) -> Vec<Chart> {
         s if s < 3.0 * 86_400.0 => ("h", 3600.0),
         _ => ("d", 86_400.0),
     };
+    let values = document.series.iter().flat_map(|series| &series.timeline);
+    let highest = values.map(|row| row.max_ns as f64 / 1e3).fold(1.0, f64::max);
+    // The same for all panels, so that they can be compared.
+    let us = Axis::log("latency", "us").within(LEAST_US, 10_f64.powf(highest.log10().ceil()));
     let shown = [
         Metric::HybridWake,
         Metric::ReferenceWake,
@@ -154,15 +159,12 @@ fn timelines(document: &Document) -> Vec<Chart> {
         let line = |name: &str, look, value: fn(&Row) -> u64| {
             Series::new(name, look, over_time(&series.timeline, seconds, value))
         };
-        let axes = (
-            Axis::linear("time", unit).within(0.0, (longest / seconds).max(1e-3)),
-            Axis::log("latency", "us"),
-        );
+        let time = Axis::linear("time", unit).within(0.0, (longest / seconds).max(1e-3));
         Some(
-            Chart::new(metric.name(), axes.0, axes.1)
+            Chart::new(metric.name(), time, us.clone())
                 .with(line("p50", Look::Line, |row| row.p50_ns).coloured(0))
                 .with(line("p99", Look::Dashed, |row| row.p99_ns).coloured(2))
-                .with(line("max", Look::Dots, |row| row.max_ns).coloured(1)),
+                .with(Series::new("max", Look::Dots, greatest(&series.timeline, seconds)).coloured(1)),
         )
     };
     shown.into_iter().filter_map(panel).collect()
@@ -181,6 +183,12 @@ fn over_time(rows: &[Row], seconds: f64, value: fn(&Row) -> u64) -> Vec<(f64, f6
         last_end = row.to_s;
     }
     points
+}
+
+/// In the middle of each row: the row does not tell when.
+fn greatest(rows: &[Row], seconds: f64) -> Vec<(f64, f64)> {
+    let middle = |row: &Row| (row.from_s + row.to_s) / 2.0 / seconds;
+    rows.iter().map(|row| (middle(row), (row.max_ns as f64 / 1e3).max(LEAST_US))).collect()
 }
 
 #[cfg(test)]

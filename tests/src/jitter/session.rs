@@ -50,6 +50,8 @@ pub struct Session<'a> {
     saver: &'a mut Saver,
     live: Live,
     load: Option<Load>,
+    /// A driver that is only looked on at.
+    attached: Option<DriverSlice>,
 }
 
 impl<'a> Session<'a> {
@@ -63,7 +65,12 @@ impl<'a> Session<'a> {
         saver: &'a mut Saver,
         live: Live,
     ) -> Self {
-        Self { plan, cpus, signals, bank, surroundings, saver, live, load: None }
+        Self { plan, cpus, signals, bank, surroundings, saver, live, load: None, attached: None }
+    }
+
+    /// Instead of taking turns it looks on at this driver.
+    pub fn look_on_at(&mut self, driver: Option<DriverSlice>) {
+        self.attached = driver;
     }
 
     /// Measures to the end.
@@ -81,8 +88,8 @@ impl<'a> Session<'a> {
         if let Some(load) = &self.plan.load {
             self.load = Some(Load::start(load, self.saver.directory(), &self.cpus)?);
         }
-        match self.plan.attach.clone() {
-            Some(socket) => self.look_on(&socket),
+        match self.attached.take() {
+            Some(slice) => self.look_on(slice),
             None => self.take_turns(),
         }
     }
@@ -165,8 +172,8 @@ impl<'a> Session<'a> {
         self.observe(&mut slice, self.plan.slice)
     }
 
-    fn look_on(&mut self, socket: &std::path::Path) -> Result<End, JitterError> {
-        let mut slice = DriverSlice::attach(socket)?;
+    fn look_on(&mut self, slice: DriverSlice) -> Result<End, JitterError> {
+        let mut slice = slice;
         if slice.view().info().clock_mode != ClockMode::Real {
             let clock = slice.view().info().clock_mode.name();
             self.note(format!("the driver's clock is {clock}: its latencies mean little"));

@@ -43,7 +43,7 @@ fn trimmed(count: usize) -> usize {
     for k in 0..count / 2 {
         below += log_term.exp();
         if 2.0 * below > 0.05 {
-            return k;
+            return k.saturating_sub(1);
         }
         log_term += ((count - k) as f64).ln() - ((k + 1) as f64).ln();
     }
