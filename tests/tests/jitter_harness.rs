@@ -156,7 +156,7 @@ fn the_end_of_a_driver_that_it_looks_on_at_is_a_fault_with_results() {
     ];
     let running = Running::start(jitter(&place, &arguments));
     wait_until("nothing was saved on the way", || place.path("out/result.json").exists());
-    shm_abi::client::stop(&socket.as_ref() as &Path, "test").expect("it stops");
+    shm_abi::client::stop(Path::new(&socket), "test").expect("it stops");
     driver.wait();
     let said = running.wait();
     assert_eq!(said.status, Some(3));

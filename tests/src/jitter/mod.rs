@@ -12,7 +12,7 @@
 //! | every frame of the ring | [`observer`] |
 //! | load | [`load`] |
 //! | what is kept, in bounded memory | [`bank`], [`timeline`], [`worst`] |
-//! | why: the kernel's books around an event | [`circumstances`], [`proc_books`], [`machine`] |
+//! | why: the kernel's books around an event | [`circumstances`], [`proc_books`], [`neighbours`], [`machine`] |
 //! | results | [`document`], [`save`], [`table`], [`sheets`], [`pictures`] |
 //! | verdicts | [`compare`], [`gate`], [`spread`] |
 //!
@@ -35,6 +35,7 @@ pub mod load;
 pub mod loop_slice;
 pub mod machine;
 pub mod metric;
+pub mod neighbours;
 pub mod observer;
 pub mod options;
 pub mod origin;

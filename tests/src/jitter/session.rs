@@ -14,6 +14,7 @@ use crate::jitter::live::Live;
 use crate::jitter::load::Load;
 use crate::jitter::loop_slice::LoopSlice;
 use crate::jitter::metric::Style;
+use crate::jitter::neighbours::Neighbours;
 use crate::jitter::plan::{Plan, Reference, WARM_UP};
 use crate::jitter::save::Saver;
 use crate::jitter::waiting_loop::Wait;
@@ -50,6 +51,7 @@ pub struct Session<'a> {
     saver: &'a mut Saver,
     live: Live,
     load: Option<Load>,
+    neighbours: Neighbours,
     /// A driver that is only looked on at.
     attached: Option<DriverSlice>,
 }
@@ -65,7 +67,18 @@ impl<'a> Session<'a> {
         saver: &'a mut Saver,
         live: Live,
     ) -> Self {
-        Self { plan, cpus, signals, bank, surroundings, saver, live, load: None, attached: None }
+        Self {
+            plan,
+            cpus,
+            signals,
+            bank,
+            surroundings,
+            saver,
+            live,
+            load: None,
+            neighbours: Neighbours::default(),
+            attached: None,
+        }
     }
 
     /// Instead of taking turns it looks on at this driver.
@@ -111,7 +124,7 @@ impl<'a> Session<'a> {
                     Err(error) => {
                         failures += 1;
                         self.bank.count(style, "slices_failed", 1);
-                        self.note(format!("run {run}, {}: {error}", style.name()));
+                        self.note(&format!("run {run}, {}: {error}", style.name()));
                         if failures >= FAILURES_ON_END {
                             return Err(JitterError::Fault(format!(
                                 "{FAILURES_ON_END} slices on end failed: {error}"
@@ -127,6 +140,10 @@ impl<'a> Session<'a> {
     fn slice(&mut self, run: usize, style: Style) -> Result<(), JitterError> {
         self.bank.begin_slice(run);
         self.live.begin_slice(run, style);
+        let real_time = &self.plan.config.real_time;
+        for newcomer in self.neighbours.newcomers(real_time.cpu, real_time.priority) {
+            self.note(&newcomer);
+        }
         let mut begun_ns = monotonic_ns();
         let outcome = match (style, &self.plan.reference) {
             (Style::Hybrid, _) => self.loop_slice(Wait::Hybrid, style, &mut begun_ns),
@@ -176,7 +193,7 @@ impl<'a> Session<'a> {
         let mut slice = slice;
         if slice.view().info().clock_mode != ClockMode::Real {
             let clock = slice.view().info().clock_mode.name();
-            self.note(format!("the driver's clock is {clock}: its latencies mean little"));
+            self.note(&format!("the driver's clock is {clock}: its latencies mean little"));
         }
         self.remember_guarantees(slice.view());
         slice.forget();
@@ -212,19 +229,19 @@ impl<'a> Session<'a> {
         std::thread::sleep(self.plan.poll);
         self.live.show(&self.bank);
         for casualty in self.load.as_mut().map(Load::casualties).unwrap_or_default() {
-            self.note(casualty);
+            self.note(&casualty);
         }
         if self.saver.is_due() {
             let document = Document::new(&self.bank, &self.surroundings, "running");
             if let Some(trouble) = self.saver.save(&document) {
-                self.note(trouble);
+                self.note(&trouble);
             }
         }
         self.signals.requested().is_none()
     }
 
-    fn note(&mut self, note: String) {
-        self.live.tell(&note);
+    fn note(&mut self, note: &str) {
+        self.live.tell(note);
         // Days of trouble must not fill the memory.
         if self.surroundings.notes.len() < 200 {
             self.surroundings.notes.push(format!("{}: {note}", crate::jitter::origin::utc_now()));
