@@ -2,7 +2,7 @@
 //!
 //! Problem: a number alone explains nothing. A page fault, a preemption, an interrupt storm, or time that the
 //! hypervisor took: each leaves a trace in a counter, if one looks before and after.
-//! Model: [`Books`] is one look at the loop's thread and its CPU. The last [`KEPT`] looks are kept; an event
+//! Model: [`Books`] is one look at the loop's thread and its CPU. The last few looks are kept; an event
 //! is explained by the differences between the last look before it began and the first after it ended.
 //! Limits, told with every event: the counters of *all* that happened in that interval, some tens of
 //! milliseconds, not of the event alone; steal time comes in ticks of the kernel (10 ms as a rule).

@@ -16,6 +16,8 @@ const PLAIN_SHORT: Duration = Duration::from_secs(15);
 const PLAIN_LONG: Duration = Duration::from_secs(600);
 const LONG: Duration = Duration::from_secs(3600);
 
+const UNKNOWN_WIDTH: usize = 100;
+
 /// How much is said.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Manner {
@@ -94,7 +96,8 @@ impl Live {
             return;
         }
         let width =
-            rustix::termios::tcgetwinsize(std::io::stderr()).map_or(100, |size| usize::from(size.ws_col));
+            rustix::termios::tcgetwinsize(std::io::stderr()).map_or(0, |size| usize::from(size.ws_col));
+        let width = if width == 0 { UNKNOWN_WIDTH } else { width };
         // A line that wraps would be two, and the cursor would not find the first again.
         let cut = |line: &String| line.chars().take(width.max(20) - 1).collect::<String>();
         let up = if self.lines > 0 { format!("\x1b[{}A", self.lines) } else { String::new() };

@@ -2,13 +2,14 @@
 //!
 //! Model: the whole JSON file is written beside the former one, brought to disk, and then takes its place: a crash
 //! after four days leaves the state of a minute ago. A disk that is full or gone is told once, and
-//! again when it changes its mind; the measurement goes on in memory.
+//! again when it changes its mind; the measurement goes on in memory, and does not wait for the disk.
 
 use crate::jitter::document::Document;
 use crate::jitter::error::JitterError;
 use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// Where results go.
@@ -19,6 +20,8 @@ pub struct Saver {
     last: Instant,
     /// What went wrong the last time.
     trouble: Option<String>,
+    /// A write on its way.
+    writer: Option<JoinHandle<Option<String>>>,
 }
 
 impl Saver {
@@ -32,7 +35,7 @@ impl Saver {
         if directory.join(RESULT).exists() {
             return Err(refuse("it holds results already; name another directory".into()));
         }
-        Ok(Self { directory: directory.into(), every, last: Instant::now(), trouble: None })
+        Ok(Self { directory: directory.into(), every, last: Instant::now(), trouble: None, writer: None })
     }
 
     /// The directory.
@@ -40,16 +43,34 @@ impl Saver {
         &self.directory
     }
 
-    /// Whether it is time.
+    /// Whether it is time, and the last write is done.
     pub fn is_due(&self) -> bool {
-        self.last.elapsed() >= self.every
+        self.writer.is_none() && self.last.elapsed() >= self.every
     }
 
-    /// Writes; returns what is to be told, if that has changed.
-    pub fn save(&mut self, document: &Document) -> Option<String> {
+    /// Writes beside the measurement: a disk may take longer than the driver's ring is long.
+    pub fn begin_save(&mut self, document: &Document) {
         self.last = Instant::now();
-        let trouble = write_atomically(&self.directory.join(RESULT), document.to_json().as_bytes()).err();
-        let trouble = trouble.map(|error| error.to_string());
+        let (file, text) = (self.directory.join(RESULT), document.to_json());
+        self.writer = Some(std::thread::spawn(move || trouble(&file, &text)));
+    }
+
+    /// What is to be told of a write that has ended meanwhile.
+    pub fn news(&mut self) -> Option<String> {
+        let writer = self.writer.take_if(|writer| writer.is_finished())?;
+        self.judge(writer.join().unwrap_or_else(|_| Some("the writing thread panicked".into())))
+    }
+
+    /// Writes now; returns what went wrong, told before or not.
+    pub fn save(&mut self, document: &Document) -> Option<String> {
+        if let Some(writer) = self.writer.take() {
+            // What it says is out of date in a moment.
+            let _ = writer.join();
+        }
+        trouble(&self.directory.join(RESULT), &document.to_json())
+    }
+
+    fn judge(&mut self, trouble: Option<String>) -> Option<String> {
         if trouble == self.trouble {
             return None;
         }
@@ -63,6 +84,10 @@ impl Saver {
         self.trouble = trouble;
         Some(message)
     }
+}
+
+fn trouble(file: &Path, text: &str) -> Option<String> {
+    write_atomically(file, text.as_bytes()).err().map(|error| error.to_string())
 }
 
 /// Name of the file with everything.
@@ -97,13 +122,21 @@ mod tests {
         let parent = tempfile::tempdir().unwrap();
         let directory = parent.path().join("out");
         let mut saver = Saver::new(&directory, Duration::from_secs(1)).unwrap();
-        assert_eq!(saver.save(&document(&[])), None);
+        let mut save = || {
+            saver.begin_save(&document(&[]));
+            while saver.writer.as_ref().is_some_and(|writer| !writer.is_finished()) {
+                std::thread::yield_now();
+            }
+            saver.news()
+        };
+        assert_eq!(save(), None);
         std::fs::remove_dir_all(&directory).unwrap();
-        assert!(saver.save(&document(&[])).unwrap().contains("goes on in memory"));
-        assert_eq!(saver.save(&document(&[])), None, "said already");
+        assert!(save().unwrap().contains("goes on in memory"));
+        assert_eq!(save(), None, "said already");
         std::fs::create_dir(&directory).unwrap();
-        assert!(saver.save(&document(&[])).unwrap().contains("written again"));
+        assert!(save().unwrap().contains("written again"));
         assert!(Document::load(&directory.join(RESULT)).is_ok());
+        assert_eq!(saver.save(&document(&[])), None);
     }
 
     #[test]

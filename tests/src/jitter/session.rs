@@ -232,10 +232,10 @@ impl<'a> Session<'a> {
             self.note(&casualty);
         }
         if self.saver.is_due() {
-            let document = Document::new(&self.bank, &self.surroundings, "running");
-            if let Some(trouble) = self.saver.save(&document) {
-                self.note(&trouble);
-            }
+            self.saver.begin_save(&Document::new(&self.bank, &self.surroundings, "running"));
+        }
+        if let Some(news) = self.saver.news() {
+            self.note(&news);
         }
         self.signals.requested().is_none()
     }

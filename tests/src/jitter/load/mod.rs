@@ -1,7 +1,7 @@
 //! Load that disturbs a real-time loop the way an ordinary machine does.
 //!
 //! Model: each worker is a process of its own, niced, that dies with this one, whatever kills it. All are bounded:
-//! memory to [`memory::BYTES`], disk to one nameless file of [`disk::BYTES`] that vanishes with its process, forks and
+//! memory to 64 MiB, disk to one nameless file of 64 MiB that vanishes with its process, forks and
 //! packets to a rate, packets to 127.0.0.1.
 //! Invariant: when a [`Load`] is dropped, its processes are gone.
 
