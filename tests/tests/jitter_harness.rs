@@ -235,6 +235,7 @@ fn what_makes_no_sense_is_refused_before_anything_starts() {
         (vec!["--styles", "hybrid,luck"], "allowed: hybrid, reference, driver"),
         (vec!["--load", "coffee"], "allowed: memory, disk, fork, loopback"),
         (vec!["--cpu", "4095"], "open to this process are"),
+        (vec!["--phase-us", "1001"], "allowed are 0 to 1000"),
         (vec!["--config", "none.toml"], "none.toml"),
         (vec!["--rate-hz", "0"], "rate_hz"),
         (vec!["--out", "old"], "holds results already"),

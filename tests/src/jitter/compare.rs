@@ -16,6 +16,9 @@ const RESOLUTION: f64 = 0.05;
 /// Fewer runs have no spread worth the name.
 const LEAST_RUNS: usize = 3;
 
+/// Never twice the same, and no circumstance that somebody changed.
+const VOLATILE: &str = "load average at start";
+
 /// What can be said of one percentile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Finding {
@@ -25,6 +28,8 @@ pub enum Finding {
     Worse,
     /// The difference is within the spread.
     NoneShown,
+    /// The maximum: it grows with the length of a run, and on most machines it is somebody else's.
+    NotJudged,
     /// Too few runs, or too few values in a run for this percentile.
     TooFew,
 }
@@ -84,6 +89,7 @@ fn line(a: &Series, b: &Series, level: Level) -> Line {
     };
     let (before, after) = (spread(a), spread(b));
     let finding = match (before, after) {
+        _ if level == Level::Max => Finding::NotJudged,
         (Some(a), Some(b)) if a.count >= LEAST_RUNS && b.count >= LEAST_RUNS => find(a, b),
         _ => Finding::TooFew,
     };
@@ -104,7 +110,8 @@ fn differing(
     a: &BTreeMap<String, String>,
     b: &BTreeMap<String, String>,
 ) -> Vec<(String, String, String)> {
-    let keys: std::collections::BTreeSet<&String> = a.keys().chain(b.keys()).collect();
+    let keys: std::collections::BTreeSet<&String> =
+        a.keys().chain(b.keys()).filter(|key| *key != VOLATILE).collect();
     let get =
         |of: &BTreeMap<String, String>, key: &String| of.get(key).cloned().unwrap_or_else(|| "-".into());
     let pairs = keys.into_iter().map(|key| (format!("{what}: {key}"), get(a, key), get(b, key)));
@@ -140,6 +147,7 @@ impl Finding {
             Self::Better => "BETTER",
             Self::Worse => "WORSE",
             Self::NoneShown => "no difference shown",
+            Self::NotJudged => "not judged",
             Self::TooFew => "too few runs or values",
         }
     }
@@ -231,8 +239,10 @@ mod tests {
         let of = |level| found.lines.iter().find(|line| line.level == level).unwrap().finding;
         assert_eq!(of(Level::P99), Finding::NoneShown);
         assert_eq!(of(Level::P999), Finding::TooFew, "200 values have no 99.9th percentile");
+        assert_eq!(of(Level::Max), Finding::NotJudged);
         let two = document(&[(Metric::HybridWake, &runs([20_000; 5])[..2])]);
-        assert!(compare(&a, &two).lines.iter().all(|line| line.finding == Finding::TooFew));
+        let lines = compare(&a, &two).lines;
+        assert!(lines.iter().all(|line| line.level == Level::Max || line.finding == Finding::TooFew));
     }
 
     #[test]

@@ -23,12 +23,12 @@ pub enum Metric {
     /// From frame to command.
     #[serde(rename = "driver.round_trip")]
     RoundTrip,
-    /// From encoders to motors of the same tick.
-    #[serde(rename = "driver.end_to_end")]
-    EndToEnd,
     /// Age of the encoders behind the motors' force.
     #[serde(rename = "driver.force_age")]
     ForceAge,
+    /// From encoders to motors of the same tick.
+    #[serde(rename = "driver.end_to_end")]
+    EndToEnd,
 }
 
 impl Metric {
@@ -40,8 +40,8 @@ impl Metric {
         Self::DeadlineToRead,
         Self::Cycle,
         Self::RoundTrip,
-        Self::EndToEnd,
         Self::ForceAge,
+        Self::EndToEnd,
     ];
 
     /// Its name in files.

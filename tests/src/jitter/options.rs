@@ -69,7 +69,7 @@ pub struct Measure {
     #[arg(long, value_enum, default_value_t = ReferenceChoice::Auto, conflicts_with = "attach")]
     pub reference: ReferenceChoice,
     /// Look on at a driver that runs already, at this socket or the usual place; nothing else is started
-    #[arg(long, value_name = "SOCKET", num_args = 0..=1, default_missing_value = "", conflicts_with_all = ["load", "gate", "config", "scene", "rate_hz", "cpu", "priority"])]
+    #[arg(long, value_name = "SOCKET", num_args = 0..=1, default_missing_value = "", conflicts_with_all = ["load", "gate", "config", "scene", "rate_hz", "cpu", "priority", "phase_us", "spin_margin_us"])]
     pub attach: Option<PathBuf>,
     /// Driver configuration (TOML) [default: two ideal devices that follow the default scene's hand]
     #[arg(long, value_name = "FILE", conflicts_with = "rate_hz")]
@@ -86,6 +86,12 @@ pub struct Measure {
     /// SCHED_FIFO priority of the measured loop, 0: none [default: the configuration's, else 80]
     #[arg(long, value_name = "P", value_parser = clap::value_parser!(u8).range(0..=98))]
     pub priority: Option<u8>,
+    /// Phase of the deadlines against whole milliseconds, in microseconds [default: the configuration's, else 370]
+    #[arg(long, value_name = "US")]
+    pub phase_us: Option<u64>,
+    /// How long before the deadline sleeping turns into spinning, in microseconds [default: the configuration's, else 150]
+    #[arg(long, value_name = "US")]
+    pub spin_margin_us: Option<u64>,
     /// Load the machine meanwhile: memory, disk, fork, loopback
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub load: Vec<String>,

@@ -166,6 +166,19 @@ fn driver_config(options: &Measure, scene: &DefaultScene) -> Result<DriverConfig
     if let Some(priority) = options.priority {
         config.real_time.priority = (priority > 0).then_some(priority);
     }
+    let within = |name: &str, us: u64| match us.checked_mul(1000).filter(|ns| *ns <= config.period_ns) {
+        Some(ns) => Ok(ns),
+        None => {
+            let most = config.period_ns / 1000;
+            Err(JitterError::Usage(format!("--{name} {us}: allowed are 0 to {most}, a whole period")))
+        }
+    };
+    if let Some(us) = options.phase_us {
+        config.real_time.phase_offset_ns = within("phase-us", us)?;
+    }
+    if let Some(us) = options.spin_margin_us {
+        config.real_time.spin_margin_ns = within("spin-margin-us", us)?;
+    }
     Ok(config)
 }
 
