@@ -317,7 +317,7 @@ fn settle_spin_margin(margin: SpinMargin, report: &mut SetupReport) -> u64 {
     match margin {
         SpinMargin::Fixed(ns) => ns,
         SpinMargin::Calibrated { at_most_ns } => {
-            let lateness = calibrate::sleep_lateness(CALIBRATION_SLEEPS);
+            let lateness = calibrate::sleep_lateness(calibrate::SLEEPS);
             let chosen = calibrate::spin_margin_ns(&lateness, at_most_ns);
             report.guarantees.push(judge_spin_margin(&lateness, chosen));
             chosen
@@ -339,9 +339,6 @@ fn judge_spin_margin(lateness: &Histogram, chosen_ns: u64) -> Guarantee {
         remedy,
     )
 }
-
-/// Enough for a p99; some 200 ms.
-const CALIBRATION_SLEEPS: usize = 300;
 
 /// The guards are kept as long as the loop runs.
 fn run_when_told(receive: &mpsc::Receiver<Order>, _guards: SetupGuards) -> Ended {

@@ -116,6 +116,8 @@ impl RealLoop {
             SpinMargin::Calibrated { at_most_ns } => periodic.learning(at_most_ns),
             SpinMargin::Fixed(_) => periodic,
         };
+        let steps_aside = config.real_time.phase_steps_aside && config.clock == ClockMode::Real;
+        let periodic = if steps_aside { periodic.stepping_aside() } else { periodic };
         let periodic = match config.real_time.overrun {
             OverrunPolicy::CatchUp(ticks) => periodic.catching_up(ticks),
             OverrunPolicy::Skip | OverrunPolicy::Fault(_) => periodic,

@@ -18,6 +18,9 @@ const ALLOWANCE_NS: u64 = 20_000;
 /// Not a divisor of the kernel's tick, so that the sleeps end at many phases of it (ns).
 const INTERVAL_NS: u64 = 730_000;
 
+/// Sleeps that are enough for a p99; some 200 ms.
+pub const SLEEPS: usize = 300;
+
 /// How late so many sleeps of the calling thread end. One that a signal cuts short is not counted.
 #[must_use]
 pub fn sleep_lateness(sleeps: usize) -> Histogram {

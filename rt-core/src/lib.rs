@@ -11,7 +11,8 @@
 //! | [`privileges`], [`sandbox`]: give up what the loop does not need | | |
 //! | [`process`]: die with the parent | [`log`]: messages formatted by another thread | [`usage`]: faults and switches it suffered |
 //!
-//! [`calibrate`] measures how long a loop has to spin, and [`spin_margin`] learns it. [`last_act`] is what a
+//! [`calibrate`] measures how long a loop has to spin, [`spin_margin`] learns it, and [`phase_keeper`] steps
+//! aside from what comes at the same phase. [`last_act`] is what a
 //! dying process still stores to the hardware. [`clock`] is under all of them, and [`alloc_guard`] lets a test
 //! show that a loop does not allocate.
 //! [`doctor`] says whether the machine is ready for any of this.
@@ -32,6 +33,7 @@ pub mod histogram;
 pub mod last_act;
 pub mod log;
 pub mod periodic;
+pub mod phase_keeper;
 pub mod privileges;
 pub mod process;
 pub mod sandbox;

@@ -4,12 +4,13 @@
 //! throttled by the kernel.
 //! Model: sleep until `spin_margin` before the deadline, then spin to it. What the deadlines are is
 //! [`Schedule`]'s business. The phase moves the deadlines off the kernel's own timer tick, which
-//! fires on whole milliseconds.
+//! fires on whole milliseconds; a loop may be let to find a quiet phase by itself.
 //! Invariants: a completed wait is never early and less than one period late, save in a loop that catches
 //! up: what it missed before that is in `skipped`. The tick number stays tied to absolute time. A signal ends the sleep.
 //! Cost: one system call a tick, none when the deadline is within the margin; no allocation.
 
 use crate::clock::{monotonic_ns, sleep_until_ns};
+use crate::phase_keeper::{self, DISTURBED_NS, PhaseKeeper};
 use crate::schedule::Schedule;
 use crate::spin_margin::SpinMargin;
 use std::hint::spin_loop;
@@ -47,6 +48,9 @@ impl PeriodicConfig {
 pub struct Periodic {
     schedule: Schedule,
     margin: SpinMargin,
+    /// None: the phase stays what it is.
+    phase: Option<PhaseKeeper>,
+    period_ns: u64,
     started: bool,
 }
 
@@ -83,7 +87,15 @@ impl Periodic {
     #[must_use]
     pub fn new(config: PeriodicConfig) -> Self {
         let schedule = Schedule::new(config.period_ns, config.phase_offset_ns);
-        Self { schedule, margin: SpinMargin::fixed(config.spin_margin_ns), started: false }
+        let margin = SpinMargin::fixed(config.spin_margin_ns);
+        Self { schedule, margin, phase: None, period_ns: config.period_ns, started: false }
+    }
+
+    /// The same, but its deadlines step aside from what happens at the same phase; see
+    /// [`phase_keeper`](crate::phase_keeper). A tick in which they do is longer by 0.382 of a period.
+    #[must_use]
+    pub fn stepping_aside(self) -> Self {
+        Self { phase: Some(PhaseKeeper::default()), ..self }
     }
 
     /// The same, but the spin margin grows where sleeps end too late for it, up to `at_most_ns`.
@@ -133,11 +145,24 @@ impl Periodic {
             }
             self.margin.learn(now > deadline_ns);
         }
+        let spins = now < deadline_ns;
         while now < deadline_ns {
             spin_loop();
             now = monotonic_ns();
         }
-        self.completed(now)
+        let wake = self.completed(now);
+        if spins {
+            self.mind_phase(now - deadline_ns);
+        }
+        wake
+    }
+
+    /// After a spin that ended so late: the next deadline may have to move.
+    fn mind_phase(&mut self, late_ns: u64) {
+        let moves = self.phase.as_mut().is_some_and(|keeper| keeper.learn(late_ns > DISTURBED_NS));
+        if moves {
+            self.schedule.shift(phase_keeper::step_ns(self.period_ns));
+        }
     }
 
     /// Skips by the time of waking, not of going to sleep: a stall inside the sleep is the commonest.

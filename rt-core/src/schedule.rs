@@ -6,7 +6,8 @@
 //! [`Schedule::start`]: tick 1 is due at the first grid point after it. Points that pass by a full
 //! period or more are skipped and counted; a schedule may be told to catch up with the last few of
 //! them instead, which then are handed out late.
-//! Invariants: every deadline lies on the grid; `deadline = first deadline + (tick - 1) * period`;
+//! Invariants: every deadline lies on the grid; `deadline = first deadline + (tick - 1) * period`, unless the
+//! grid was moved in between;
 //! a deadline handed out lies less than a period in the past, and `catch_up` periods more.
 //! Cost: one division. Fit for the loop.
 
@@ -60,6 +61,12 @@ impl Schedule {
         };
     }
 
+    /// Moves the grid, and the next deadline with it, to `by_ns` later. Tick numbers go on.
+    pub fn shift(&mut self, by_ns: u64) {
+        self.next_deadline_ns += by_ns;
+        self.phase_ns = (self.phase_ns + by_ns) % self.period_ns;
+    }
+
     /// The deadline to wait for.
     #[must_use]
     pub fn next_deadline_ns(&self) -> u64 {
@@ -94,6 +101,18 @@ mod tests {
     /// A second at most; the largest clock value leaves room for every step below.
     const PERIODS: std::ops::Range<u64> = 1..1_000_000_000;
     const TIMES: std::ops::Range<u64> = 0..1 << 60;
+
+    #[test]
+    fn a_grid_that_is_moved_makes_one_tick_longer_and_goes_on_from_there() {
+        let mut schedule = Schedule::new(10, 3);
+        schedule.start(0);
+        assert_eq!(schedule.advance(3).deadline_ns, 3);
+        schedule.shift(4);
+        assert_eq!(schedule.advance(17), Due { tick: 2, deadline_ns: 17, skipped: 0 });
+        assert_eq!(schedule.advance(27), Due { tick: 3, deadline_ns: 27, skipped: 0 });
+        schedule.start(100);
+        assert_eq!(schedule.next_deadline_ns(), 107, "the phase is the new one");
+    }
 
     #[test]
     fn a_schedule_that_catches_up_hands_out_the_last_few_and_skips_the_rest() {

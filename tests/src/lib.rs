@@ -9,6 +9,7 @@ pub mod bare_loop;
 pub mod driver;
 pub mod faults;
 pub mod intruder;
+pub mod jitter;
 pub mod lab;
 pub mod programs;
 pub mod recording;

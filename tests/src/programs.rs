@@ -46,6 +46,11 @@ pub fn bare_loop() -> Command {
     Command::new(program("bare-loop"))
 }
 
+/// The latency harness, ready for arguments.
+pub fn jitter() -> Command {
+    Command::new(program("jitter"))
+}
+
 /// What a finished program said, for asserting on.
 pub fn said(output: &Output) -> (Option<i32>, String, String) {
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();

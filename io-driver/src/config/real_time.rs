@@ -18,6 +18,8 @@ pub struct RealTime {
     pub lock_memory: bool,
     /// Phase of the tick against whole periods of the clock (ns).
     pub phase_offset_ns: u64,
+    /// Whether that phase may change, to step aside from what interrupts at the same phase.
+    pub phase_steps_aside: bool,
     /// When sleeping turns into spinning.
     pub spin_margin: SpinMargin,
     /// What to do about deadlines that were missed.
@@ -57,6 +59,7 @@ impl RealTime {
             priority: Some(80),
             lock_memory: true,
             phase_offset_ns: PeriodicConfig::hybrid(period_ns).phase_offset_ns % period_ns,
+            phase_steps_aside: true,
             spin_margin: SpinMargin::Calibrated { at_most_ns: longest_spin_margin_ns(period_ns, budget_ns) },
             overrun: OverrunPolicy::Skip,
             wait: None,
@@ -141,7 +144,7 @@ impl RawRealTime {
         let us = |key: &Option<Spanned<f64>>| {
             key.as_ref().map(|number| toml.number(number, within_period).map(ns_of_us)).transpose()
         };
-        let phase_offset_ns = us(&self.phase_offset_us)?.unwrap_or(usual.phase_offset_ns);
+        let phase_offset_ns = us(&self.phase_offset_us)?;
         let spin_margin = us(&self.spin_margin_us)?.map_or(usual.spin_margin, SpinMargin::Fixed);
         let cpu = self.cpu.map(|cpu| toml.integer(&cpu, 0..=4095)).transpose()?;
         // 0 switches real-time scheduling off; 99 is left to the kernel's own threads.
@@ -151,7 +154,9 @@ impl RawRealTime {
             cpu: cpu.map(|cpu| cpu as usize),
             priority: (priority > 0).then_some(priority as u8),
             lock_memory: self.lock_memory.unwrap_or(true),
-            phase_offset_ns,
+            phase_offset_ns: phase_offset_ns.unwrap_or(usual.phase_offset_ns),
+            // Whoever names a phase means it.
+            phase_steps_aside: phase_offset_ns.is_none(),
             spin_margin,
             overrun: self.overruns.validate(toml)?,
             wait: match self.wait.unwrap_or(RawWait::Auto) {

@@ -30,7 +30,9 @@ fn head(text: &mut String, config: &DriverConfig) -> std::fmt::Result {
     }
     writeln!(text, "priority = {}", real_time.priority.unwrap_or(0))?;
     writeln!(text, "lock_memory = {}", real_time.lock_memory)?;
-    writeln!(text, "phase_offset_us = {:?}", real_time.phase_offset_ns as f64 / 1e3)?;
+    if !real_time.phase_steps_aside {
+        writeln!(text, "phase_offset_us = {:?}", real_time.phase_offset_ns as f64 / 1e3)?;
+    }
     if let SpinMargin::Fixed(ns) = real_time.spin_margin {
         writeln!(text, "spin_margin_us = {:?}", ns as f64 / 1e3)?;
     }
