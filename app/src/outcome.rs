@@ -51,7 +51,7 @@ pub enum RunFailure {
 impl RunFailure {
     /// The fault behind a word of the frame.
     pub fn driver_fault(word: u64) -> Self {
-        Self::DriverFault(FaultReason::from_word(word).map_or("an unknown reason", FaultReason::sentence))
+        Self::DriverFault(FaultReason::sentence_for(word))
     }
 
     /// The exit status of the run contract: 2 nothing was started, 3 a fault during the run.

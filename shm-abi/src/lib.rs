@@ -28,6 +28,7 @@ pub mod segment;
 pub mod seqlock;
 pub mod server;
 
+mod enumeration;
 mod socket;
 
 pub use command::{Command, CommandRefusal, DeviceCommand};
