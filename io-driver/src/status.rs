@@ -347,3 +347,25 @@ pub fn is_ticking(driver: &DriverView, wait: std::time::Duration) -> bool {
     std::thread::sleep(wait);
     driver.info().clock_mode != ClockMode::Real || driver.latest_tick() != before
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::DriverConfig;
+    use crate::driver::describe;
+    use bytemuck::Zeroable;
+    use shm_abi::DriverMemory;
+    use shm_abi::doorbell::WaitMode;
+
+    #[test]
+    fn a_fault_and_a_state_of_a_later_version_are_told_as_what_they_are() {
+        let config = DriverConfig::parse("[[device]]\nbackend = \"ideal\"\n", "test.toml".as_ref()).unwrap();
+        let devices = crate::open::open_devices(&config).unwrap();
+        let memory = DriverMemory::create(&describe(&config, &devices, WaitMode::Futex)).unwrap();
+        memory.write_frame(&Frame { state: 77, fault: 99, ..Frame::zeroed() });
+        memory.ring(0, None);
+        let status = Status::of(&DriverView::map(memory.fd()).unwrap(), 1).to_string();
+        let line = "state       unknown: a fault of a kind this version does not know (99), lease 0";
+        assert!(status.contains(line), "{status}");
+    }
+}

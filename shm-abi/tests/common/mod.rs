@@ -2,8 +2,10 @@
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
+pub(crate) mod c_header;
 pub(crate) mod desk;
 pub(crate) mod fake;
+pub(crate) mod golden;
 pub(crate) mod host;
 
 use bytemuck::Zeroable;
