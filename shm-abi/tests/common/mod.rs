@@ -2,6 +2,7 @@
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
+pub(crate) mod c_compiler;
 pub(crate) mod c_header;
 pub(crate) mod desk;
 pub(crate) mod fake;
