@@ -4,6 +4,8 @@
 //! every version to the values below and write the same bytes. The layout hash does not see the values of
 //! enumerations and flags: `tests/golden/values.txt` does.
 //!
+//! The values are read from the committed C header, which `tests/c_header.rs` holds equal to the sources.
+//!
 //! A new minor version adds a directory and lines, by `PHANTOM3_BLESS=1 cargo test -p shm-abi --test golden`;
 //! what stands there of an older version never changes.
 
