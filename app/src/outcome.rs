@@ -5,6 +5,7 @@ use io_driver::open::OpenError;
 use shm_abi::FaultReason;
 use shm_abi::client::AttachError;
 use shm_abi::segment::SegmentError;
+use std::borrow::Cow;
 use thiserror::Error;
 
 /// Why a run stopped without anything being wrong.
@@ -33,7 +34,7 @@ pub enum RunFailure {
     Device(#[from] OpenError),
     /// The driver is in its fault state.
     #[error("the driver is in its fault state: {0}; the motors are off")]
-    DriverFault(&'static str),
+    DriverFault(Cow<'static, str>),
     /// The driver is gone.
     #[error("the driver is gone: {0}")]
     DriverGone(String),
@@ -51,7 +52,7 @@ pub enum RunFailure {
 impl RunFailure {
     /// The fault behind a word of the frame.
     pub fn driver_fault(word: u64) -> Self {
-        Self::DriverFault(FaultReason::from_word(word).map_or("an unknown reason", FaultReason::sentence))
+        Self::DriverFault(FaultReason::sentence_for(word))
     }
 
     /// The exit status of the run contract: 2 nothing was started, 3 a fault during the run.

@@ -9,6 +9,7 @@ use shm_abi::frame::{
 };
 use shm_abi::segment::{ClockMode, DriverInfo};
 use shm_abi::{DriverState, DriverView, FaultReason, Frame};
+use std::borrow::Cow;
 use std::fmt;
 use std::sync::atomic::Ordering;
 
@@ -32,7 +33,7 @@ pub struct Status {
     /// State of the driver.
     pub state: &'static str,
     /// Why it is in the fault state.
-    pub fault: Option<&'static str>,
+    pub fault: Option<Cow<'static, str>>,
     /// Lease in force; 0: none.
     pub lease: u64,
     /// Share of the force that is let through.
@@ -160,8 +161,7 @@ impl Status {
     pub fn of(driver: &DriverView, driver_pid: u64) -> Self {
         let info = driver.info();
         let frame = driver.read_latest();
-        let state = frame.and_then(|f| DriverState::from_word(f.state)).unwrap_or(DriverState::Starting);
-        let fault = frame.and_then(|f| FaultReason::from_word(f.fault)).filter(|f| *f != FaultReason::None);
+        let fault = frame.map(|f| f.fault).filter(|word| *word != FaultReason::None as u64);
         let inputs = frame.map_or(0, |f| f.inputs);
         Self {
             driver_pid,
@@ -171,8 +171,8 @@ impl Status {
             wait: info.wait_mode.name(),
             cpu: info.cpu,
             tick: frame.map(|f| f.tick),
-            state: state.name(),
-            fault: fault.map(FaultReason::sentence),
+            state: frame.map_or(DriverState::Starting.name(), |f| state_name(f.state)),
+            fault: fault.map(FaultReason::sentence_for),
             lease: frame.map_or(0, |f| f.lease),
             authority: frame.map_or(0.0, |f| f.authority),
             commissioning: info.is_commissioning,
@@ -293,7 +293,7 @@ impl fmt::Display for Status {
             "driver      process {}, {} clock, {} Hz, {cpu}, {} wait",
             self.driver_pid, self.clock, self.rate_hz, self.wait
         )?;
-        let fault = self.fault.map_or_else(String::new, |why| format!(": {why}"));
+        let fault = self.fault.as_ref().map_or_else(String::new, |why| format!(": {why}"));
         writeln!(
             f,
             "state       {}{fault}, lease {}, authority {:.2}",
@@ -336,9 +336,36 @@ impl fmt::Display for Status {
     }
 }
 
+/// A state of a later version is none of those that we know.
+fn state_name(word: u64) -> &'static str {
+    DriverState::from_word(word).map_or("unknown", DriverState::name)
+}
+
 /// Whether two looks at a driver in real time show that it moves.
 pub fn is_ticking(driver: &DriverView, wait: std::time::Duration) -> bool {
     let before = driver.latest_tick();
     std::thread::sleep(wait);
     driver.info().clock_mode != ClockMode::Real || driver.latest_tick() != before
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::DriverConfig;
+    use crate::driver::describe;
+    use bytemuck::Zeroable;
+    use shm_abi::DriverMemory;
+    use shm_abi::doorbell::WaitMode;
+
+    #[test]
+    fn a_fault_and_a_state_of_a_later_version_are_told_as_what_they_are() {
+        let config = DriverConfig::parse("[[device]]\nbackend = \"ideal\"\n", "test.toml".as_ref()).unwrap();
+        let devices = crate::open::open_devices(&config).unwrap();
+        let memory = DriverMemory::create(&describe(&config, &devices, WaitMode::Futex)).unwrap();
+        memory.write_frame(&Frame { state: 77, fault: 99, ..Frame::zeroed() });
+        memory.ring(0, None);
+        let status = Status::of(&DriverView::map(memory.fd()).unwrap(), 1).to_string();
+        let line = "state       unknown: a fault of a kind this version does not know (99), lease 0";
+        assert!(status.contains(line), "{status}");
+    }
 }

@@ -88,21 +88,31 @@ static inline uint64_t phantom_latest_tick(const PhantomDriverSegment *segment) 
     return __atomic_load_n(&segment->bell.latest_plus_one, __ATOMIC_ACQUIRE) - 1;
 }
 
-/* Reads frame `tick` whole, or says why it cannot be had; `frame` is undefined then. */
+/* The words of a frame that mean something: the devices come last in it, and their number never changes. */
+static inline size_t phantom_frame_words(const PhantomDriverSegment *segment) {
+    uint64_t count = __atomic_load_n(&segment->header.device_count, __ATOMIC_RELAXED);
+    if (count > PHANTOM_MAX_DEVICES) count = PHANTOM_MAX_DEVICES;
+    return (offsetof(PhantomFrame, devices) + (size_t)count * sizeof(PhantomDeviceFrame)) / sizeof(uint64_t);
+}
+
+/* Reads frame `tick` whole, or says why it cannot be had; `frame` is unchanged then. Devices that the driver has
+ * not are zero. */
 static inline PhantomRead phantom_read_frame(const PhantomDriverSegment *segment, uint64_t tick,
                                              PhantomFrame *frame) {
     const PhantomFrameSlot *slot = &segment->frames[tick % PHANTOM_RING_FRAMES];
+    const size_t used = phantom_frame_words(segment);
     uint64_t words[PHANTOM_FRAME_WORDS];
     if (tick >= UINT64_MAX / 2) return PHANTOM_READ_NOT_YET;
     uint64_t before = __atomic_load_n(&slot->sequence, __ATOMIC_ACQUIRE);
     if (before & 1) return PHANTOM_READ_TORN;
-    for (size_t i = 0; i < PHANTOM_FRAME_WORDS; i++) words[i] = __atomic_load_n(&slot->words[i], __ATOMIC_RELAXED);
+    for (size_t i = 0; i < used; i++) words[i] = __atomic_load_n(&slot->words[i], __ATOMIC_RELAXED);
     /* Whoever saw a word of a later write must also see that write's odd sequence. */
     __atomic_thread_fence(__ATOMIC_ACQUIRE);
     if (__atomic_load_n(&slot->sequence, __ATOMIC_RELAXED) != before) return PHANTOM_READ_TORN;
     if (before < phantom_stamp(tick)) return PHANTOM_READ_NOT_YET;
     if (before > phantom_stamp(tick)) return PHANTOM_READ_OVERWRITTEN;
-    memcpy(frame, words, sizeof *frame);
+    memcpy(frame, words, used * sizeof *words);
+    memset((char *)frame + used * sizeof *words, 0, sizeof *frame - used * sizeof *words);
     return PHANTOM_READ_OK;
 }
 

@@ -64,34 +64,34 @@
 #define PHANTOM_NAME_WORDS 8
 
 // [`DriverHeader::flags`]: forces and speeds are cut to those of commissioning.
-#define PhantomDRIVER_COMMISSIONING 1
+#define PHANTOM_DRIVER_COMMISSIONING 1
 
 // [`DeviceFrame::flags`]: the position is valid.
 #define PHANTOM_DEVICE_POSITION_VALID 1
 
 // [`Frame::inputs`]: an emergency stop is pressed.
-#define PhantomINPUT_EMERGENCY_STOP 1
+#define PHANTOM_INPUT_EMERGENCY_STOP 1
 
 // [`Frame::inputs`]: there is a dead-man's switch.
-#define PhantomINPUT_DEAD_MAN_PRESENT 2
+#define PHANTOM_INPUT_DEAD_MAN_PRESENT 2
 
 // [`Frame::inputs`]: and somebody holds it.
-#define PhantomINPUT_DEAD_MAN_HELD 4
+#define PHANTOM_INPUT_DEAD_MAN_HELD 4
 
 // [`DeviceFrame::limits`]: the force was not finite or beyond the device's peak.
-#define PhantomLIMIT_PEAK 1
+#define PHANTOM_LIMIT_PEAK 1
 
 // [`DeviceFrame::limits`]: the tip was outside the workspace.
-#define PhantomLIMIT_WORKSPACE 2
+#define PHANTOM_LIMIT_WORKSPACE 2
 
 // [`DeviceFrame::limits`]: the force grew faster than it may.
-#define PhantomLIMIT_SLEW 4
+#define PHANTOM_LIMIT_SLEW 4
 
 // [`DeviceFrame::limits`]: a motor was warm.
-#define PhantomLIMIT_HEAT 8
+#define PHANTOM_LIMIT_HEAT 8
 
 // [`DeviceFrame::limits`]: a motor was asked for more than its converter or amplifier gives.
-#define PhantomLIMIT_SATURATION 16
+#define PHANTOM_LIMIT_SATURATION 16
 
 // The driver's state machine.
 enum PhantomDriverState
@@ -118,7 +118,8 @@ typedef uint64_t PhantomDriverState;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// Why the driver is in [`DriverState::Fault`].
+// Why the driver is in [`DriverState::Fault`]. Minor versions add reasons: a reader that meets a number which
+// it does not know takes it for a fault all the same, and tells the number.
 enum PhantomFaultReason
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint64_t

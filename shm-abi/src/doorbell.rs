@@ -12,6 +12,7 @@
 //! Invariant: a sleeper that saw an old number is woken by the next ring (loom test).
 //! Cost: ringing is two stores, a fence and a load; one system call more if the flag is up.
 
+use crate::enumeration::from_word;
 use crate::layout::Bell;
 use crate::seqlock::Word;
 use rustix::thread::futex;
@@ -28,12 +29,9 @@ pub enum WaitMode {
     Futex = 1,
 }
 
-impl WaitMode {
-    /// The mode behind a word, if it is one.
-    pub fn from_word(word: u64) -> Option<Self> {
-        [Self::Spin, Self::Futex].into_iter().find(|mode| *mode as u64 == word)
-    }
+from_word!(WaitMode { Spin, Futex });
 
+impl WaitMode {
     /// The name a person reads.
     pub fn name(self) -> &'static str {
         match self {

@@ -3,8 +3,10 @@
 //! Units and frames: SI; positions and forces in the device's base frame D. Every field is eight bytes,
 //! so that a frame is an array of words without padding.
 
+use crate::enumeration::from_word;
 use crate::layout::{MAX_DEVICES, assert_layout};
 use bytemuck::{Pod, Zeroable};
+use std::borrow::Cow;
 
 /// One tick of the driver, all devices.
 #[repr(C)]
@@ -162,14 +164,9 @@ pub enum DriverState {
     Fault = 4,
 }
 
-impl DriverState {
-    /// The state behind a word, if it is one.
-    pub fn from_word(word: u64) -> Option<Self> {
-        [Self::Starting, Self::Zeroing, Self::Idle, Self::Active, Self::Fault]
-            .into_iter()
-            .find(|state| *state as u64 == word)
-    }
+from_word!(DriverState { Starting, Zeroing, Idle, Active, Fault });
 
+impl DriverState {
     /// The name a person reads.
     pub fn name(self) -> &'static str {
         match self {
@@ -182,7 +179,8 @@ impl DriverState {
     }
 }
 
-/// Why the driver is in [`DriverState::Fault`].
+/// Why the driver is in [`DriverState::Fault`]. Minor versions add reasons: a reader that meets a number which
+/// it does not know takes it for a fault all the same, and tells the number.
 #[repr(u64)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FaultReason {
@@ -210,28 +208,21 @@ pub enum FaultReason {
     Overrun = 10,
 }
 
-impl FaultReason {
-    const ALL: [Self; 11] = [
-        Self::None,
-        Self::DeviceRead,
-        Self::DeviceWrite,
-        Self::PositionNotFinite,
-        Self::MotorNotFinite,
-        Self::Panic,
-        Self::Overspeed,
-        Self::PositionJump,
-        Self::EmergencyStop,
-        Self::AmplifierTripped,
-        Self::Overrun,
-    ];
-}
+from_word!(FaultReason {
+    None,
+    DeviceRead,
+    DeviceWrite,
+    PositionNotFinite,
+    MotorNotFinite,
+    Panic,
+    Overspeed,
+    PositionJump,
+    EmergencyStop,
+    AmplifierTripped,
+    Overrun,
+});
 
 impl FaultReason {
-    /// The reason behind a word, if it is one.
-    pub fn from_word(word: u64) -> Option<Self> {
-        Self::ALL.into_iter().find(|reason| *reason as u64 == word)
-    }
-
     /// The sentence a person reads.
     pub fn sentence(self) -> &'static str {
         match self {
@@ -246,6 +237,14 @@ impl FaultReason {
             Self::EmergencyStop => "an emergency stop was pressed",
             Self::AmplifierTripped => "an amplifier switched itself off",
             Self::Overrun => "too many deadlines in a row were missed",
+        }
+    }
+
+    /// The sentence for a word of a frame, whichever version wrote it.
+    pub fn sentence_for(word: u64) -> Cow<'static, str> {
+        match Self::from_word(word) {
+            Some(reason) => reason.sentence().into(),
+            None => format!("a fault of a kind this version does not know ({word})").into(),
         }
     }
 }
@@ -264,12 +263,7 @@ pub enum ReplyKind {
     Expired = 3,
 }
 
-impl ReplyKind {
-    /// The kind behind a word, if it is one.
-    pub fn from_word(word: u64) -> Option<Self> {
-        [Self::NoLease, Self::Fresh, Self::Held, Self::Expired].into_iter().find(|kind| *kind as u64 == word)
-    }
-}
+from_word!(ReplyKind { NoLease, Fresh, Held, Expired });
 
 impl Frame {
     /// The devices that exist. A count beyond the array is cut to it.
@@ -288,7 +282,7 @@ mod tests {
         for word in 0..5 {
             assert_eq!(DriverState::from_word(word).map(|s| s as u64), Some(word));
         }
-        for word in 0..FaultReason::ALL.len() as u64 {
+        for word in 0..11 {
             assert_eq!(FaultReason::from_word(word).map(|r| r as u64), Some(word));
         }
         for word in 0..4 {
@@ -297,6 +291,12 @@ mod tests {
         assert_eq!(DriverState::from_word(5), None);
         assert_eq!(FaultReason::from_word(u64::MAX), None);
         assert_eq!(ReplyKind::from_word(4), None);
+    }
+
+    #[test]
+    fn a_fault_of_a_later_version_is_told_by_its_number() {
+        assert_eq!(FaultReason::sentence_for(8), "an emergency stop was pressed");
+        assert_eq!(FaultReason::sentence_for(11), "a fault of a kind this version does not know (11)");
     }
 
     #[test]

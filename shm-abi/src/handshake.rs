@@ -5,6 +5,7 @@
 //! size, so that any two versions understand each other well enough to part with a clear message.
 //! Afterwards the connection carries nothing: a lease lasts as long as it stays open.
 
+use crate::enumeration::from_word;
 use crate::layout::{
     ABI_MAJOR, ABI_MINOR, ABI_VERSION, CommanderSegment, DriverSegment, LAYOUT_HASH, MAGIC, NAME_BYTES,
     assert_layout,
@@ -96,14 +97,7 @@ pub enum RequestKind {
     EmergencyStop = 5,
 }
 
-impl RequestKind {
-    /// The kind behind a word, if it is one.
-    pub fn from_word(word: u64) -> Option<Self> {
-        [Self::Observe, Self::Command, Self::Stop, Self::ClearFault, Self::EmergencyStop]
-            .into_iter()
-            .find(|kind| *kind as u64 == word)
-    }
-}
+from_word!(RequestKind { Observe, Command, Stop, ClearFault, EmergencyStop });
 
 /// How the driver decided.
 #[repr(u64)]
@@ -127,23 +121,16 @@ pub enum Verdict {
     NoSegment = 8,
 }
 
-impl Verdict {
-    /// The verdict behind a word, if it is one.
-    pub fn from_word(word: u64) -> Option<Self> {
-        [
-            Self::Granted,
-            Self::WrongMagic,
-            Self::WrongVersion,
-            Self::WrongLayout,
-            Self::LeaseHeld,
-            Self::UnknownKind,
-            Self::Crowded,
-            Self::NoSegment,
-        ]
-        .into_iter()
-        .find(|verdict| *verdict as u64 == word)
-    }
-}
+from_word!(Verdict {
+    Granted,
+    WrongMagic,
+    WrongVersion,
+    WrongLayout,
+    LeaseHeld,
+    UnknownKind,
+    Crowded,
+    NoSegment,
+});
 
 impl Request {
     /// A request of this version.

@@ -4,10 +4,8 @@
 //! give wrong values but never undefined behaviour. Every offset is asserted at compile time, and the text
 //! of those assertions is hashed into [`LAYOUT_HASH`], which both sides compare before anything is mapped.
 //!
-//! Version rule: a change that an old reader would misread raises [`ABI_MAJOR`]; one that only fills
-//! `reserved` words, which old readers ignore, raises [`ABI_MINOR`] and leaves the hash alone: the hash is
-//! over the layout as the major version's first minor published it, see `assert_layout!`. A value added to an
-//! enumeration is such a change too; an old reader takes one that it does not know for a stranger.
+//! The hash is over the layout as the major version's first minor published it, see `assert_layout!`; what
+//! raises which number, and how a field is added, is told in the [crate's documentation](crate#versions).
 
 use crate::command::Command;
 use crate::frame::Frame;
@@ -478,8 +476,8 @@ mod tests {
 
     #[test]
     fn the_layout_is_the_one_that_was_published() {
-        // A failure here means that old programs would be refused: raise ABI_MAJOR, note it in the
-        // CHANGELOG, then update the constant here and make the C header anew:
+        // A failure here means that old programs would be refused. If that is meant, raise ABI_MAJOR, give it a
+        // row in the CHANGELOG, then update the constant here and make the C header anew:
         // `PHANTOM3_BLESS=1 cargo test -p shm-abi --test c_header`.
         assert_eq!(LAYOUT_HASH, PUBLISHED_LAYOUT_HASH, "now 0x{LAYOUT_HASH:016x}");
     }

@@ -10,7 +10,8 @@
 
 use crate::command::Command;
 use crate::doorbell::{self, WaitMode};
-use crate::frame::Frame;
+use crate::enumeration::from_word;
+use crate::frame::{DeviceFrame, Frame};
 use crate::handshake;
 use crate::layout::{
     ABI_VERSION, CommanderSegment, DRIVER_COMMISSIONING, DeviceDescription, DriverSegment, LAYOUT_HASH,
@@ -42,12 +43,9 @@ pub enum ClockMode {
     Virtual = 2,
 }
 
-impl ClockMode {
-    /// The mode behind a word, if it is one.
-    pub fn from_word(word: u64) -> Option<Self> {
-        [Self::Real, Self::Lockstep, Self::Virtual].into_iter().find(|mode| *mode as u64 == word)
-    }
+from_word!(ClockMode { Real, Lockstep, Virtual });
 
+impl ClockMode {
     /// The name a person reads.
     pub fn name(self) -> &'static str {
         match self {
@@ -149,6 +147,12 @@ pub enum SegmentError {
         /// The word expected.
         expected: u64,
     },
+    /// The driver has more devices than a frame has room for.
+    #[error("there are {found} devices, and a driver can have {MAX_DEVICES} at most; start a second driver")]
+    TooManyDevices {
+        /// Devices that were listed.
+        found: usize,
+    },
 }
 
 /// Why a frame could not be had.
@@ -170,17 +174,22 @@ pub enum FrameUnavailable {
 pub struct DriverMemory {
     map: Mapping<DriverSegment>,
     fd: OwnedFd,
+    /// How much of a frame is written.
+    frame_words: usize,
 }
 
 impl DriverMemory {
     /// Creates, fills in and seals it.
     pub fn create(info: &DriverInfo) -> Result<Self, SegmentError> {
+        if info.devices.len() > MAX_DEVICES {
+            return Err(SegmentError::TooManyDevices { found: info.devices.len() });
+        }
         let fd = create_memfd(c"phantom3-driver", size_of::<DriverSegment>())?;
         let map = Mapping::<DriverSegment>::writable(&fd)?;
         describe(&map, info);
         // After our own mapping stands, nobody gets another writable one.
         seal(&fd, SealFlags::SHRINK | SealFlags::GROW | SealFlags::FUTURE_WRITE | SealFlags::SEAL)?;
-        Ok(Self { map, fd })
+        Ok(Self { map, fd, frame_words: frame_words(info.devices.len()) })
     }
 
     /// Replaces the set-up report. Only before the segment is handed over for the first time: a reader takes
@@ -189,11 +198,13 @@ impl DriverMemory {
         put_text(&self.map.setup_report, report);
     }
 
-    /// Writes frame `k`. Call [`ring`](Self::ring) next.
+    /// Writes frame `k`. Call [`ring`](Self::ring) next. Devices beyond those of the description are not
+    /// written: their words stay zero for as long as the memory lives, so that a reader may as well read all.
     #[inline]
     pub fn write_frame(&self, frame: &Frame) {
         let slot = &self.map.frames[slot_of(frame.tick, RING_FRAMES)];
-        seqlock::write(&slot.sequence, &slot.words, words_of(frame), frame.tick);
+        let used = self.frame_words;
+        seqlock::write(&slot.sequence, &slot.words[..used], &words_of(frame)[..used], frame.tick);
     }
 
     /// Announces frame `tick` and wakes the commander if it sleeps.
@@ -224,6 +235,8 @@ static NOBODY_SLEEPS: AtomicU64 = AtomicU64::new(0);
 #[derive(Debug)]
 pub struct DriverView {
     map: Mapping<DriverSegment>,
+    /// How much of a frame is read.
+    frame_words: usize,
 }
 
 impl DriverView {
@@ -236,13 +249,19 @@ impl DriverView {
         expect_compatible(&header.abi_version)?;
         expect("layout hash", &header.layout_hash, LAYOUT_HASH)?;
         expect("ready word", &header.ready, 1)?;
-        Ok(Self { map })
+        let frame_words = frame_words(device_count(&map));
+        Ok(Self { map, frame_words })
+    }
+
+    /// The driver's minor version. What later ones than this added reads as zero.
+    pub fn abi_minor(&self) -> u32 {
+        // The major half was checked when the memory was mapped; the cut takes it away.
+        get(&self.map.header.abi_version) as u32
     }
 
     /// What the driver says of itself. Values that are no such thing are replaced by the harmless one.
     pub fn info(&self) -> DriverInfo {
         let header = &self.map.header;
-        let count = usize::try_from(get(&header.device_count)).unwrap_or(MAX_DEVICES).min(MAX_DEVICES);
         DriverInfo {
             period_ns: get(&header.period_ns).max(1),
             reply_budget_ns: get(&header.reply_budget_ns),
@@ -253,7 +272,10 @@ impl DriverView {
             is_commissioning: get(&header.flags) & DRIVER_COMMISSIONING != 0,
             wait_mode: WaitMode::from_word(get(&header.wait_mode)).unwrap_or(WaitMode::Futex),
             cpu: get(&header.cpu_plus_one).checked_sub(1).and_then(|cpu| usize::try_from(cpu).ok()),
-            devices: self.map.devices[..count].iter().map(DeviceInfo::from_description).collect(),
+            devices: self.map.devices[..device_count(&self.map)]
+                .iter()
+                .map(DeviceInfo::from_description)
+                .collect(),
             setup_report: lines_of(&self.map.setup_report),
         }
     }
@@ -264,14 +286,17 @@ impl DriverView {
         doorbell::latest(&self.map.bell)
     }
 
-    /// Reads frame `tick` whole into `frame`, or says why it cannot be had.
+    /// Reads frame `tick` whole into `frame`, or says why it cannot be had; `frame` is of no use then. Devices
+    /// beyond those that the driver described are zero, whatever stood in `frame`.
     #[inline]
     pub fn read_frame(&self, tick: u64, frame: &mut Frame) -> Result<(), FrameUnavailable> {
         if tick > LAST_TICK {
             return Err(FrameUnavailable::NotYet(tick));
         }
         let slot = &self.map.frames[slot_of(tick, RING_FRAMES)];
-        let stamp = seqlock::read(&slot.sequence, &slot.words, words_of_mut(frame))
+        let (used, beyond) = words_of_mut(frame).split_at_mut(self.frame_words);
+        beyond.fill(0);
+        let stamp = seqlock::read(&slot.sequence, &slot.words[..used.len()], used)
             .map_err(|Torn| FrameUnavailable::Torn(tick))?;
         match stamp.cmp(&seqlock::stamp(tick)) {
             std::cmp::Ordering::Equal => Ok(()),
@@ -436,7 +461,6 @@ fn limit_of(word: &AtomicU64) -> f64 {
 }
 
 fn describe(segment: &DriverSegment, info: &DriverInfo) {
-    assert!(info.devices.len() <= MAX_DEVICES, "at most {MAX_DEVICES} devices");
     let header = &segment.header;
     put(&header.magic, MAGIC);
     put(&header.abi_version, ABI_VERSION);
@@ -463,6 +487,16 @@ fn describe(segment: &DriverSegment, info: &DriverInfo) {
 /// The stamps of later ticks would be those of early ones again (after 292 million years at 1 kHz, so that
 /// only an allegation names one).
 const LAST_TICK: u64 = (u64::MAX >> 1) - 1;
+
+/// The devices of a driver; a count beyond the array is cut to it.
+fn device_count(segment: &DriverSegment) -> usize {
+    usize::try_from(get(&segment.header.device_count)).unwrap_or(MAX_DEVICES).min(MAX_DEVICES)
+}
+
+/// The words of a frame that mean something where so many devices exist: they come last in it.
+const fn frame_words(devices: usize) -> usize {
+    (std::mem::offset_of!(Frame, devices) + devices * size_of::<DeviceFrame>()) / size_of::<u64>()
+}
 
 fn slot_of(tick: u64, slots: usize) -> usize {
     // Both rings are powers of two, so the cut of the cast does not matter.

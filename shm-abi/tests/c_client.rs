@@ -16,22 +16,24 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// `$CC`, or the linker driver that Rust itself needs.
-fn compiler() -> std::process::Command {
-    let named = std::env::var("CC").unwrap_or_else(|_| "cc".into());
-    // "ccache gcc" is a usual value.
-    let mut words = named.split_whitespace();
-    let mut compiler = std::process::Command::new(words.next().expect("CC is empty"));
-    compiler.args(words).arg("-I").arg(root().join("include"));
-    compiler
+/// The C compiler, looking for today's headers; `None` if there is none.
+fn compiler() -> Option<std::process::Command> {
+    let mut compiler = common::c_compiler::compiler()?;
+    compiler.arg("-I").arg(root().join("include"));
+    Some(compiler)
 }
 
-fn compile(directory: &Path) -> PathBuf {
+fn compile(directory: &Path) -> Option<PathBuf> {
     let program = directory.join("c_client");
-    let compiled =
-        compiler().args(FLAGS).arg(root().join("tests/c_client.c")).arg("-o").arg(&program).output().unwrap();
+    let compiled = compiler()?
+        .args(FLAGS)
+        .arg(root().join("tests/c_client.c"))
+        .arg("-o")
+        .arg(&program)
+        .output()
+        .unwrap();
     assert!(compiled.status.success(), "{}", String::from_utf8_lossy(&compiled.stderr));
-    program
+    Some(program)
 }
 
 struct Driver {
@@ -48,14 +50,11 @@ impl Driver {
         Self { memory: DriverMemory::create(&info()).unwrap(), server, events: Vec::new(), directory }
     }
 
-    fn client(&self, arguments: &[&str]) -> Child {
-        std::process::Command::new(compile(self.directory.path()))
-            .arg(self.server.path())
-            .args(arguments)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap()
+    /// `None` without a compiler.
+    fn client(&self, arguments: &[&str]) -> Option<Child> {
+        let mut program = std::process::Command::new(compile(self.directory.path())?);
+        program.arg(self.server.path()).args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
+        Some(program.spawn().unwrap())
     }
 
     fn poll(&mut self) {
@@ -94,7 +93,7 @@ impl Driver {
 fn a_c_commander_answers_every_tick_under_its_lease() {
     const TICKS: u64 = 6_000; // more than once round the ring of frames
     let mut driver = Driver::start();
-    let client = driver.client(&["command", &TICKS.to_string()]);
+    let Some(client) = driver.client(&["command", &TICKS.to_string()]) else { return };
     let view = driver.lease();
     let mut command = Command::zeroed();
     for tick in 0..TICKS {
@@ -122,7 +121,7 @@ fn a_c_commander_answers_every_tick_under_its_lease() {
 fn a_c_observer_reads_frames_without_a_lease() {
     let mut driver = Driver::start();
     (0..10).for_each(|tick| driver.publish(tick, None));
-    let client = driver.client(&["observe", "10"]);
+    let Some(client) = driver.client(&["observe", "10"]) else { return };
     let output = driver.serve_until_it_ends(client);
     assert_eq!(String::from_utf8_lossy(&output.stdout), "10 ticks whole\n", "{output:?}");
     assert!(driver.events.is_empty(), "{:?}", driver.events);
@@ -131,7 +130,7 @@ fn a_c_observer_reads_frames_without_a_lease() {
 #[test]
 fn a_c_client_of_another_version_prints_both_versions_and_what_to_do() {
     let mut driver = Driver::start();
-    let client = driver.client(&["version"]);
+    let Some(client) = driver.client(&["version"]) else { return };
     let output = driver.serve_until_it_ends(client);
     assert_eq!(output.status.code(), Some(1));
     assert_eq!(
@@ -144,7 +143,8 @@ fn a_c_client_of_another_version_prints_both_versions_and_what_to_do() {
 fn the_headers_compile_on_their_own_and_as_cpp() {
     for header in ["phantom3_shm.h", "phantom3_client.h"] {
         for language in [["-x", "c", "-std=c11"], ["-x", "c++", "-std=c++17"]] {
-            let output = compiler()
+            let Some(mut compiler) = compiler() else { return };
+            let output = compiler
                 .args(language)
                 .args(["-Wall", "-Wextra", "-Werror", "-fsyntax-only", "-include"])
                 .arg(root().join("include").join(header))

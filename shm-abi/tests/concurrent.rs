@@ -7,13 +7,13 @@
 mod common;
 
 use bytemuck::Zeroable;
-use common::{HANG, command, frame, info, is_command, is_frame, wait_until};
+use common::{HANG, command, frame, info, info_of, is_command, is_frame, is_frame_of, wait_until};
 use proptest::prelude::*;
 use shm_abi::layout::RING_COMMANDS;
 use shm_abi::server::{Server, ServerEvent};
 use shm_abi::{
-    Command, CommanderMemory, CommanderView, DriverMemory, DriverView, Frame, FrameUnavailable, RING_FRAMES,
-    client,
+    Command, CommanderMemory, CommanderView, DriverMemory, DriverView, Frame, FrameUnavailable, MAX_DEVICES,
+    RING_FRAMES, client,
 };
 use std::os::fd::AsFd;
 use std::path::PathBuf;
@@ -29,7 +29,11 @@ struct Shared {
 }
 
 fn shared() -> Shared {
-    let memory = DriverMemory::create(&info()).unwrap();
+    shared_with(common::DEVICES)
+}
+
+fn shared_with(devices: usize) -> Shared {
+    let memory = DriverMemory::create(&info_of(devices)).unwrap();
     let view = DriverView::map(memory.fd()).unwrap();
     let (commander_view, fd) = CommanderView::create(1).unwrap();
     let commander = CommanderMemory::map(fd.as_fd()).unwrap();
@@ -50,7 +54,7 @@ fn count(counter: &AtomicU64) {
 }
 
 /// Reads one frame at a distance from the newest and checks that the answer is the truth.
-fn read_and_judge(view: &DriverView, distance: i64, first: u64, tally: &Tally) {
+fn read_and_judge(view: &DriverView, distance: i64, first: u64, devices: usize, tally: &Tally) {
     const RING: u64 = RING_FRAMES as u64;
     /// The writer works on at most one frame that is not announced, and on a weakly ordered machine its
     /// beginning may be seen before the announcement of the frame before.
@@ -58,12 +62,13 @@ fn read_and_judge(view: &DriverView, distance: i64, first: u64, tally: &Tally) {
     let before = view.latest_tick();
     let newest = before.unwrap_or(first);
     let Some(tick) = newest.checked_add_signed(distance) else { return };
-    let mut found = Frame::zeroed();
+    // What stood there before must not be seen.
+    let mut found = frame(!tick);
     let read = view.read_frame(tick, &mut found);
     let after = view.latest_tick().unwrap_or(first);
     match read {
         Ok(()) => {
-            assert!(is_frame(&found, tick), "frame {tick} is a mixture: {found:?}");
+            assert!(is_frame_of(&found, tick, devices), "frame {tick} is a mixture: {found:?}");
             count(&tally.whole);
         }
         Err(FrameUnavailable::NotYet(which)) => {
@@ -100,10 +105,11 @@ proptest! {
     fn readers_at_any_distance_see_whole_frames_and_true_reasons(
         first in 0u64..1 << 40,
         lag in 0..RING_FRAMES as i64,
+        devices in 0..=MAX_DEVICES,
     ) {
         const FRAMES: u64 = 4 * RING_FRAMES as u64;
         let ring = RING_FRAMES as i64;
-        let Shared { memory, view, .. } = shared();
+        let Shared { memory, view, .. } = shared_with(devices);
         let done = AtomicBool::new(false);
         let tally = Tally::default();
         std::thread::scope(|scope| {
@@ -112,9 +118,9 @@ proptest! {
                 let (view, done, tally) = (&view, &done, &tally);
                 scope.spawn(move || {
                     while !done.load(Ordering::Relaxed) {
-                        read_and_judge(view, distance, first, tally);
+                        read_and_judge(view, distance, first, devices, tally);
                     }
-                    read_and_judge(view, distance, first, tally);
+                    read_and_judge(view, distance, first, devices, tally);
                 });
             }
             for tick in first..first + FRAMES {
@@ -263,6 +269,27 @@ fn a_frame_that_was_never_written_is_not_there_yet_whatever_its_number() {
         assert_eq!(view.read_frame(tick, &mut found), Err(FrameUnavailable::NotYet(tick)));
     }
     assert_eq!(view.read_latest(), None);
+}
+
+#[test]
+fn devices_that_a_driver_has_not_are_zero_whatever_stood_in_the_readers_frame() {
+    for devices in [0, 1, 3, MAX_DEVICES] {
+        let Shared { memory, view, .. } = shared_with(devices);
+        // A frame of a former driver that had more devices, and a count that lies.
+        let mut found = frame(1);
+        memory.write_frame(&frame(2));
+        view.read_frame(2, &mut found).unwrap();
+        assert!(is_frame_of(&found, 2, devices), "{devices} devices: {found:?}");
+        // A reader of 1.0 copies the whole slot.
+        let slot = &memory.frames[2].words;
+        let mut whole = Frame::zeroed();
+        for (word, shared) in
+            bytemuck::cast_mut::<_, [u64; shm_abi::layout::FRAME_WORDS]>(&mut whole).iter_mut().zip(slot)
+        {
+            *word = shared.load(Ordering::Relaxed);
+        }
+        assert!(is_frame_of(&whole, 2, devices), "{devices} devices: {whole:?}");
+    }
 }
 
 const CHILD_SOCKET: &str = "SHM_ABI_TEST_COMMANDER_SOCKET";

@@ -153,6 +153,36 @@ fn the_reply_that_the_driver_finds_announced_is_whole_and_answers_its_tick() {
     assert!(exchanged > 0);
 }
 
+/// As `DriverMemory::write_frame` does where not all devices exist: the end of the slot is never written, and a
+/// reader takes only the beginning, or, being older, the whole slot.
+#[test]
+fn a_value_that_fills_only_the_beginning_of_its_slot_is_read_whole_by_short_and_long_readers() {
+    const USED: usize = 2;
+    let read_whole = explore_counting(|read_whole| {
+        let slot: Arc<(LoomWord, [LoomWord; USED + 1])> = Arc::default();
+        let write = |slot: &(LoomWord, [LoomWord; USED + 1]), k| {
+            seqlock::write(&slot.0, &slot.1[..USED], &payload(k), k);
+        };
+        write(&slot, 0);
+        let writer = {
+            let slot = slot.clone();
+            thread::spawn(move || write(&slot, 1))
+        };
+        let mut short = [0; USED];
+        if let Ok(found) = seqlock::read(&slot.0, &slot.1[..USED], &mut short) {
+            assert_eq!(short, payload((found - 2) / 2), "mixed value");
+            read_whole.fetch_add(1, Ordering::Relaxed);
+        }
+        let mut long = [u64::MAX; USED + 1];
+        if let Ok(found) = seqlock::read(&slot.0, &slot.1, &mut long) {
+            let [first, second] = payload((found - 2) / 2);
+            assert_eq!(long, [first, second, 0], "mixed value, or a stranger behind it");
+        }
+        writer.join().unwrap();
+    });
+    assert!(read_whole > 0);
+}
+
 /// A word whose writer dies: after so many stores, the rest never happen.
 #[derive(Default)]
 struct MortalWord {

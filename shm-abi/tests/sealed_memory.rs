@@ -3,7 +3,7 @@
 mod common;
 
 use bytemuck::Zeroable;
-use common::{command, info};
+use common::{command, info, info_of};
 use shm_abi::{Command, CommanderMemory, CommanderView, DriverMemory, DriverView};
 use std::fs::File;
 use std::os::fd::AsFd;
@@ -99,4 +99,13 @@ fn an_observer_of_the_same_user_can_spoil_neither_the_memory_nor_the_next_observ
     let mut found = common::frame(9);
     next.read_frame(1, &mut found).unwrap();
     assert!(common::is_frame(&found, 1));
+}
+
+#[test]
+fn more_devices_than_a_frame_has_room_for_are_an_error_that_names_the_limit() {
+    let error = DriverMemory::create(&info_of(shm_abi::MAX_DEVICES + 1)).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "there are 9 devices, and a driver can have 8 at most; start a second driver"
+    );
 }

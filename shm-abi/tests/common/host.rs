@@ -2,6 +2,7 @@
 
 use super::{HANG, info};
 use shm_abi::DriverMemory;
+use shm_abi::segment::DriverInfo;
 use shm_abi::server::{Server, ServerEvent};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -20,8 +21,12 @@ pub(crate) struct Host {
 
 impl Host {
     pub(crate) fn start(directory: &Path) -> Self {
+        Self::start_with(directory, &info())
+    }
+
+    pub(crate) fn start_with(directory: &Path, info: &DriverInfo) -> Self {
         let socket = directory.join("driver.sock");
-        let memory = Arc::new(DriverMemory::create(&info()).unwrap());
+        let memory = Arc::new(DriverMemory::create(info).unwrap());
         let mut server = Server::bind(&socket).unwrap();
         let stop = Arc::new(AtomicBool::new(false));
         let (sender, events) = channel();

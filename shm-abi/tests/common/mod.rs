@@ -2,12 +2,16 @@
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
+pub(crate) mod c_compiler;
+pub(crate) mod c_header;
 pub(crate) mod desk;
 pub(crate) mod fake;
+pub(crate) mod golden;
 pub(crate) mod host;
 
 use bytemuck::Zeroable;
 use shm_abi::doorbell::WaitMode;
+use shm_abi::frame::DeviceFrame;
 use shm_abi::layout::{COMMAND_WORDS, FRAME_WORDS};
 use shm_abi::segment::{ClockMode, DeviceInfo, DriverInfo};
 use shm_abi::{Command, Frame};
@@ -15,6 +19,9 @@ use std::time::{Duration, Instant};
 
 /// Long enough for the slowest machine; whoever waits longer hangs.
 pub(crate) const HANG: Duration = Duration::from_secs(60);
+
+/// How many devices [`info`] has.
+pub(crate) const DEVICES: usize = 2;
 
 /// A driver with two devices.
 pub(crate) fn info() -> DriverInfo {
@@ -33,6 +40,11 @@ pub(crate) fn info() -> DriverInfo {
     }
 }
 
+/// A driver with so many devices.
+pub(crate) fn info_of(devices: usize) -> DriverInfo {
+    DriverInfo { devices: (0..devices).map(|index| device(&format!("device {index}"))).collect(), ..info() }
+}
+
 fn device(name: &str) -> DeviceInfo {
     DeviceInfo {
         name: name.into(),
@@ -46,7 +58,7 @@ fn device(name: &str) -> DeviceInfo {
     }
 }
 
-/// A frame whose every word is a function of its tick.
+/// A frame whose every word is a function of its tick, those of devices that do not exist included.
 pub(crate) fn frame(tick: u64) -> Frame {
     let mut frame = Frame::zeroed();
     let words: &mut [u64; FRAME_WORDS] = bytemuck::cast_mut(&mut frame);
@@ -54,10 +66,16 @@ pub(crate) fn frame(tick: u64) -> Frame {
     frame
 }
 
-/// Whether every word of `found` is that of frame `tick`.
+/// Whether every word of `found` is that of frame `tick` of a driver as [`info`] describes it.
 pub(crate) fn is_frame(found: &Frame, tick: u64) -> bool {
+    is_frame_of(found, tick, DEVICES)
+}
+
+/// Whether `found` is frame `tick` of a driver with so many devices, and zero behind them.
+pub(crate) fn is_frame_of(found: &Frame, tick: u64, devices: usize) -> bool {
     let words: &[u64; FRAME_WORDS] = bytemuck::cast_ref(found);
-    is_filled(words, tick)
+    let existing = (std::mem::offset_of!(Frame, devices) + devices * size_of::<DeviceFrame>()) / 8;
+    is_filled(&words[..existing], tick) && words[existing..].iter().all(|word| *word == 0)
 }
 
 /// A command whose every word is a function of its tick.
