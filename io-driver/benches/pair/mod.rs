@@ -20,6 +20,7 @@ pub(crate) const PREMIUM: &str =
 
 /// A driver and its commander, as under the virtual clock.
 pub(crate) struct Pair {
+    #[allow(dead_code, reason = "not every bench serves it")]
     pub(crate) memory: Arc<DriverMemory>,
     pub(crate) cycle: Cycle,
     pub(crate) driver: DriverView,
