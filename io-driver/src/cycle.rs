@@ -16,6 +16,7 @@
 
 use crate::device::{Device, Effort, TickTime};
 use crate::meter::{bump, record};
+use crate::reply::Reply;
 use crate::safety::switches::{Inputs, Switches};
 use crate::safety::{Guard, Limits, Safety};
 use bytemuck::Zeroable;
@@ -23,9 +24,7 @@ use nalgebra::Vector3;
 use rt_core::clock::monotonic_ns;
 use shm_abi::frame::{LIMIT_HEAT, LIMIT_PEAK, LIMIT_SLEW, LIMIT_WORKSPACE};
 use shm_abi::layout::Counters;
-use shm_abi::{
-    Command, CommanderView, DriverMemory, DriverSegment, FaultReason, Frame, MAX_DEVICES, Outcome, ReplyKind,
-};
+use shm_abi::{CommanderView, DriverMemory, FaultReason, Frame, MAX_DEVICES, Outcome, ReplyKind};
 use std::sync::Arc;
 
 /// How old a reply may be to count as fresh: none in the same tick, one in the next.
@@ -63,21 +62,6 @@ pub struct Cycle {
     frame: Frame,
     started_ns: u64,
     rang_ns: u64,
-}
-
-/// The newest command of the lease that was believed.
-struct Reply {
-    command: Command,
-    /// Its tick; `None` before the first.
-    tick: Option<u64>,
-    /// The last number on the commander's bell that was looked into, so that no lie is read twice.
-    seen: Option<u64>,
-    /// The driver's tick in which that was done.
-    examined_in: u64,
-    /// Where a command is read to before it is believed.
-    candidate: Command,
-    /// From the doorbell to the reply that answers this tick.
-    round_trip_ns: u64,
 }
 
 impl Cycle {
@@ -365,50 +349,5 @@ fn count_limits(counters: &Counters, limits: u64) {
 impl Drop for Cycle {
     fn drop(&mut self) {
         self.release();
-    }
-}
-
-impl Reply {
-    fn none() -> Self {
-        let command = Command::zeroed();
-        Self { command, tick: None, seen: None, examined_in: 0, candidate: command, round_trip_ns: 0 }
-    }
-
-    fn forget(&mut self) {
-        *self = Self::none();
-    }
-
-    /// Believes the command that the bell announces, or counts why not.
-    fn examine(
-        &mut self,
-        lease: &CommanderView,
-        latest: Option<u64>,
-        tick: u64,
-        devices: u64,
-        told: &DriverSegment,
-    ) {
-        let Some(answered) = latest else { return };
-        // An answer to a tick that has not come, or one older than what we have, is no answer.
-        if answered > tick || self.tick.is_some_and(|newest| answered <= newest) {
-            return bump(&told.counters.commands_refused);
-        }
-        if lease.read_command(answered, &mut self.candidate).is_err() {
-            return bump(&told.counters.commands_torn);
-        }
-        match self.candidate.validate(answered, lease.lease(), devices) {
-            Ok(()) => {
-                self.command = self.candidate;
-                self.tick = Some(answered);
-            }
-            Err(_) => bump(&told.counters.commands_refused),
-        }
-    }
-
-    fn age(&self, tick: u64) -> Option<u64> {
-        self.tick.map(|answered| tick.saturating_sub(answered))
-    }
-
-    fn force(&self, device: usize) -> Vector3<f64> {
-        Vector3::from(self.command.devices[device].force_on_user_n)
     }
 }

@@ -1,6 +1,4 @@
 //! A driver in which something makes a forbidden system call dies at once, says of what, and leaves nothing.
-//!
-//! To be added where the emulated amplifier is: that the last codes ever written are zero.
 
 use rt_core::epitaph::{self, EpitaphKind};
 use rustix::process::Signal;

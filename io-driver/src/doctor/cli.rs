@@ -2,7 +2,7 @@
 
 use super::{examine, segment, to_json};
 use crate::config::DriverConfig;
-use crate::driver::loop_cpu;
+use crate::loop_thread::loop_cpu;
 use crate::say::say;
 use clap::Args;
 use rt_core::cpu::parse_cpu_list;
