@@ -163,6 +163,11 @@ impl RealLoop {
     fn ticks(&mut self) {
         while let Some(begin) = self.wait_for_tick() {
             self.inbox.deliver(&mut self.cycle);
+            if self.takes_former_reply() {
+                // Before the new tick is told: its own reply, however quick, drives the next one's motors, so
+                // that the delay is one tick always.
+                self.cycle.take_reply();
+            }
             self.cycle.sense(begin.tick, begin.deadline_ns);
             self.wait_for_reply(begin.reply_until_ns);
             self.cycle.actuate();
@@ -210,8 +215,7 @@ impl RealLoop {
     }
 
     fn wait_for_reply(&mut self, until_ns: u64) {
-        if self.mode == ReplyMode::NextTick && self.clock == ClockMode::Real {
-            self.cycle.take_reply();
+        if self.takes_former_reply() {
             return;
         }
         match self.clock {
@@ -221,6 +225,10 @@ impl RealLoop {
         if self.mode == ReplyMode::FixedPhase && self.clock == ClockMode::Real {
             self.wait_for_phase(until_ns);
         }
+    }
+
+    fn takes_former_reply(&self) -> bool {
+        self.mode == ReplyMode::NextTick && self.clock == ClockMode::Real
     }
 
     fn wait_within(&mut self, until_ns: u64) {

@@ -1,0 +1,94 @@
+//! When the motors are written: on arrival of the reply, at a fixed phase, or at once with the reply before.
+//!
+//! The frames tell for each tick when it was due, which tick's command drove the motors, and when they were
+//! written. Asserted are orders of events and, between the modes, medians on either side of the budget, half a
+//! millisecond apart: no stall of a shared machine moves a median so far.
+
+use bytemuck::Zeroable;
+use shm_abi::{DriverView, Frame, ReplyKind};
+use system_tests::driver::Driver;
+use system_tests::faults::amplifiers::wait_for;
+use system_tests::faults::commander::Commander;
+
+const BUDGET_NS: u64 = 500_000;
+const TICKS: u64 = 600;
+
+/// A tick and what the frame after it tells of it.
+struct Done {
+    tick: u64,
+    deadline_ns: u64,
+    after: Frame,
+}
+
+impl Done {
+    /// From the deadline to the motors.
+    fn written_after_ns(&self) -> u64 {
+        self.after.previous.written_ns - self.deadline_ns
+    }
+}
+
+/// Ticks that were answered, in a mode. Those without an answer in time are left out: they are another test's.
+fn answered(mode: &str) -> Vec<Done> {
+    let driver = Driver::start(&format!(
+        "[real_time]\npriority = 0\nlock_memory = false\n[reply]\nmode = \"{mode}\"\nbudget_us = 500\n\
+         [[device]]\nbackend = \"ideal\"\npeak_force_n = 8.5\n"
+    ));
+    let observer = driver.observe();
+    let commander = Commander::start(driver.command(), [0.0, 1.0, 0.0]);
+    let view = &observer.driver;
+    wait_for("the whole force", || view.read_latest().is_some_and(|frame| frame.authority == 1.0));
+    let first = view.latest_tick().expect("a tick");
+    wait_for("enough ticks", || view.latest_tick() > Some(first + TICKS));
+    drop(commander);
+    let done: Vec<Done> = (first..first + TICKS).filter_map(|tick| read(view, tick)).collect();
+    assert!(done.len() as u64 > TICKS / 2, "{mode}: {} of {TICKS} ticks answered", done.len());
+    done
+}
+
+fn read(view: &DriverView, tick: u64) -> Option<Done> {
+    let (mut frame, mut after) = (Frame::zeroed(), Frame::zeroed());
+    view.read_frame(tick, &mut frame).ok()?;
+    view.read_frame(tick + 1, &mut after).ok()?;
+    let is_fresh = after.previous.reply == ReplyKind::Fresh as u64;
+    is_fresh.then_some(Done { tick, deadline_ns: frame.deadline_ns, after })
+}
+
+fn median(done: &[Done], of: impl Fn(&Done) -> u64) -> u64 {
+    let mut values: Vec<u64> = done.iter().map(of).collect();
+    values.sort_unstable();
+    values[values.len() / 2]
+}
+
+#[test]
+fn on_arrival_the_motors_are_written_as_soon_as_the_same_ticks_reply_is_there() {
+    let done = answered("same-tick");
+    for tick in &done {
+        assert_eq!(tick.after.previous.command_tick, tick.tick);
+        assert!(tick.after.previous.round_trip_ns > 0);
+    }
+    let waited_ns = median(&done, |tick| tick.written_after_ns() - tick.after.previous.round_trip_ns);
+    assert!(median(&done, Done::written_after_ns) < BUDGET_NS);
+    assert!(waited_ns < BUDGET_NS / 2, "nothing is waited for but the reply: {waited_ns} ns");
+}
+
+#[test]
+fn at_a_fixed_phase_no_reply_is_applied_before_its_time() {
+    let done = answered("fixed-phase");
+    for tick in &done {
+        assert_eq!(tick.after.previous.command_tick, tick.tick);
+        assert!(tick.written_after_ns() >= BUDGET_NS, "tick {} at {}", tick.tick, tick.written_after_ns());
+    }
+    assert!(
+        median(&done, |tick| tick.after.previous.round_trip_ns) < BUDGET_NS,
+        "the replies were there before"
+    );
+}
+
+#[test]
+fn in_next_tick_mode_the_reply_before_drives_the_motors_at_once() {
+    let done = answered("next-tick");
+    for tick in &done {
+        assert_eq!(tick.after.previous.command_tick + 1, tick.tick, "a delay of one tick, always");
+    }
+    assert!(median(&done, Done::written_after_ns) < BUDGET_NS, "no reply is waited for");
+}
