@@ -11,7 +11,6 @@
 
 use crate::kinematics::{Kinematics, Mechanism};
 use crate::motors::MotorSpec;
-use crate::safety::slew::Slew;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -41,31 +40,56 @@ pub struct Value {
     pub enable: bool,
 }
 
-/// What was seen so far.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Tally {
+/// Names each count once: the fields of [`Tally`], in the order of the words in the card.
+macro_rules! tally {
+    ($($(#[$doc:meta])* $name:ident,)+) => {
+        /// What was seen so far.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+        pub struct Tally {
+            $($(#[$doc])* pub $name: u64,)+
+        }
+
+        impl Tally {
+            /// How many counts there are.
+            pub const WORDS: usize = [$(stringify!($name)),+].len();
+
+            /// The counts in the order of the fields, as they lie in the card.
+            pub fn to_words(&self) -> [u64; Self::WORDS] {
+                [$(self.$name),+]
+            }
+
+            /// Back from the card.
+            pub fn from_words(words: [u64; Self::WORDS]) -> Self {
+                let [$($name),+] = words;
+                Self { $($name),+ }
+            }
+        }
+    };
+}
+
+tally! {
     /// Values that were checked.
-    pub checked: u64,
+    checked,
     /// Values that were overwritten before they could be.
-    pub lost: u64,
+    lost,
     /// Values with the amplifiers on and any torque.
-    pub energised: u64,
+    energised,
     /// Codes that no converter has.
-    pub bad_codes: u64,
+    bad_codes,
     /// Torque asked for with the amplifiers off.
-    pub torque_while_off: u64,
+    torque_while_off,
     /// Forces beyond the peak.
-    pub beyond_peak: u64,
+    beyond_peak,
     /// Forces that grew too fast.
-    pub beyond_step: u64,
+    beyond_step,
     /// Times the watchdog was not served.
-    pub watchdog_trips: u64,
+    watchdog_trips,
     /// Times it was switched off by a register alone, as a dying driver does.
-    pub switched_off: u64,
+    switched_off,
     /// The longest force at the tip (uN).
-    pub largest_force_un: u64,
+    largest_force_un,
     /// Number of the first value that was wrong; 0: none.
-    pub first_wrong: u64,
+    first_wrong,
 }
 
 /// The amplifiers of one arm.
@@ -74,58 +98,12 @@ pub struct Amplifier {
     spec: AmplifierSpec,
     value: Value,
     is_tripped: bool,
-    growth: Slew,
+    /// The force before this one; the next may grow from there.
+    last_force: Vector3<f64>,
     tally: Tally,
 }
 
 impl Tally {
-    /// The counts in the order of the fields, as they lie in the card.
-    pub fn to_words(&self) -> [u64; 11] {
-        [
-            self.checked,
-            self.lost,
-            self.energised,
-            self.bad_codes,
-            self.torque_while_off,
-            self.beyond_peak,
-            self.beyond_step,
-            self.watchdog_trips,
-            self.switched_off,
-            self.largest_force_un,
-            self.first_wrong,
-        ]
-    }
-
-    /// Back from the card.
-    pub fn from_words(words: [u64; 11]) -> Self {
-        let [
-            checked,
-            lost,
-            energised,
-            bad_codes,
-            torque_while_off,
-            beyond_peak,
-            beyond_step,
-            watchdog_trips,
-            switched_off,
-            largest_force_un,
-            first_wrong,
-        ] = words;
-        Self {
-            checked,
-            lost,
-            energised,
-            bad_codes,
-            torque_while_off,
-            beyond_peak,
-            beyond_step,
-            watchdog_trips,
-            switched_off,
-            largest_force_un,
-            first_wrong,
-        }
-    }
-
     /// Values that were wrong.
     pub fn wrong(&self) -> u64 {
         self.bad_codes + self.torque_while_off + self.beyond_peak + self.beyond_step
@@ -136,8 +114,7 @@ impl Amplifier {
     /// Off, without a value.
     pub fn new(spec: AmplifierSpec) -> Self {
         let value = Value { time_ns: 0, codes: [zero_code(&spec.motors); 3], enable: false };
-        // A step of one per second of one: what is followed is the step per value.
-        Self { spec, value, is_tripped: false, growth: Slew::new(spec.step_n), tally: Tally::default() }
+        Self { spec, value, is_tripped: false, last_force: Vector3::zeros(), tally: Tally::default() }
     }
 
     /// What was seen so far.
@@ -186,7 +163,7 @@ impl Amplifier {
     pub fn arm(&mut self) {
         self.is_tripped = false;
         self.value.enable = false;
-        self.growth.release();
+        self.last_force = Vector3::zeros();
     }
 
     /// Joint torques that the motors make now (N m).
@@ -205,7 +182,7 @@ impl Amplifier {
         let has_torque = value.codes.iter().any(|code| *code != zero);
         if !value.enable {
             tally.torque_while_off += u64::from(has_torque);
-            self.growth.release();
+            self.last_force = Vector3::zeros();
             return;
         }
         tally.energised += u64::from(has_torque);
@@ -218,8 +195,9 @@ impl Amplifier {
         let tally = &mut self.tally;
         tally.largest_force_un = tally.largest_force_un.max((force.norm() * 1e6) as u64);
         tally.beyond_peak += u64::from(force.norm() > self.spec.peak_n + RESOLUTION_N);
-        let (allowed, _) = self.growth.follow(force, 1.0);
-        tally.beyond_step += u64::from((force - allowed).norm() > RESOLUTION_N);
+        let growth_n = distance_to_shorter_ones(self.last_force, force);
+        tally.beyond_step += u64::from(growth_n > self.spec.step_n + RESOLUTION_N);
+        self.last_force = force;
     }
 
     /// The force at the tip; none where the pose cannot tell.
@@ -239,6 +217,19 @@ impl Amplifier {
             let current_a = (f64::from(codes[j]) - zero) / zero * peak_current_a;
             f64::from(sign[j]) * reduction[j] * torque_constant_nm_per_a * current_a
         })
+    }
+}
+
+/// How far a force is from the nearest one that only shortens the last: by the three cases of a point beside a
+/// segment, and not by the driver's own limiter.
+fn distance_to_shorter_ones(last: Vector3<f64>, force: Vector3<f64>) -> f64 {
+    let along = force.dot(&last);
+    if along <= 0.0 {
+        force.norm()
+    } else if along >= last.norm_squared() {
+        (force - last).norm()
+    } else {
+        force.cross(&last).norm() / last.norm()
     }
 }
 
@@ -365,7 +356,7 @@ mod tests {
 
     #[test]
     fn the_tally_survives_the_way_through_the_card() {
-        let words: [u64; 11] = std::array::from_fn(|i| i as u64 + 1);
+        let words: [u64; Tally::WORDS] = std::array::from_fn(|i| i as u64 + 1);
         assert_eq!(Tally::from_words(words).to_words(), words);
     }
 }
