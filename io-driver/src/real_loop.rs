@@ -86,6 +86,7 @@ pub struct RealLoop {
     periodic: Periodic,
     lockstep_tick: u64,
     logged_state: Option<DriverState>,
+    logged_phase_steps: u64,
 }
 
 /// The beginning of a tick.
@@ -141,6 +142,7 @@ impl RealLoop {
             periodic,
             lockstep_tick: 0,
             logged_state: None,
+            logged_phase_steps: 0,
         }
     }
 
@@ -200,6 +202,7 @@ impl RealLoop {
             self.cycle.fault(FaultReason::Overrun);
         }
         self.deadline_ns = wake.deadline_ns;
+        self.log_phase(wake.tick);
         let is_made_up_for = wake.latency_ns() >= self.period_ns;
         let reply_until_ns = wake.deadline_ns + if is_made_up_for { 0 } else { self.budget_ns };
         Some(Begin { tick: wake.tick, deadline_ns: wake.deadline_ns, reply_until_ns })
@@ -283,6 +286,15 @@ impl RealLoop {
             WaitMode::Futex => {
                 sleep_until_ns(phase_ns);
             }
+        }
+    }
+
+    fn log_phase(&mut self, tick: u64) {
+        let steps = self.periodic.phase_steps();
+        if self.logged_phase_steps != steps {
+            self.logged_phase_steps = steps;
+            let sentence = "deadlines step aside from what interrupts this CPU at their phase";
+            self.log.push(LogLevel::Info, tick, sentence, &[]);
         }
     }
 

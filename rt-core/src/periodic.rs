@@ -50,6 +50,7 @@ pub struct Periodic {
     margin: SpinMargin,
     /// None: the phase stays what it is.
     phase: Option<PhaseKeeper>,
+    phase_steps: u64,
     period_ns: u64,
     started: bool,
 }
@@ -88,7 +89,7 @@ impl Periodic {
     pub fn new(config: PeriodicConfig) -> Self {
         let schedule = Schedule::new(config.period_ns, config.phase_offset_ns);
         let margin = SpinMargin::fixed(config.spin_margin_ns);
-        Self { schedule, margin, phase: None, period_ns: config.period_ns, started: false }
+        Self { schedule, margin, phase: None, phase_steps: 0, period_ns: config.period_ns, started: false }
     }
 
     /// The same, but its deadlines step aside from what happens at the same phase; see
@@ -102,6 +103,12 @@ impl Periodic {
     #[must_use]
     pub fn learning(self, at_most_ns: u64) -> Self {
         Self { margin: SpinMargin::growing(self.margin.ns(), at_most_ns), ..self }
+    }
+
+    /// How often its deadlines have stepped aside so far.
+    #[must_use]
+    pub fn phase_steps(&self) -> u64 {
+        self.phase_steps
     }
 
     /// How long before a deadline sleeping ends now (ns).
@@ -162,6 +169,7 @@ impl Periodic {
         let moves = self.phase.as_mut().is_some_and(|keeper| keeper.learn(late_ns > DISTURBED_NS));
         if moves {
             self.schedule.shift(phase_keeper::step_ns(self.period_ns));
+            self.phase_steps += 1;
         }
     }
 
@@ -210,6 +218,23 @@ mod tests {
         for spin_margin_ns in [0, 150_000, MS] {
             check_waits(PeriodicConfig { period_ns: MS, phase_offset_ns: 370_000, spin_margin_ns });
         }
+    }
+
+    #[test]
+    fn a_loop_that_learns_and_steps_aside_counts_its_ticks_and_says_when_it_stepped() {
+        let mut periodic = Periodic::new(PeriodicConfig::hybrid(MS)).learning(MS / 2).stepping_aside();
+        let (mut last, mut steps) = (periodic.wait(), 0);
+        for _ in 0..600 {
+            // The step is taken after a wait, for the next one.
+            let stepped_ns = (periodic.phase_steps() - steps) * phase_keeper::step_ns(MS);
+            steps = periodic.phase_steps();
+            let wake = periodic.wait();
+            assert_eq!(wake.tick, last.tick + 1 + wake.skipped);
+            assert_eq!(wake.deadline_ns, last.deadline_ns + (1 + wake.skipped) * MS + stepped_ns);
+            assert!(wake.woke_ns >= wake.deadline_ns, "early");
+            last = wake;
+        }
+        assert!((150_000..=MS / 2).contains(&periodic.spin_margin_ns()));
     }
 
     #[test]
