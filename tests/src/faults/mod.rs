@@ -3,7 +3,12 @@
 
 pub mod amplifiers;
 pub mod commander;
+pub mod campaign;
+pub mod heal;
 pub mod hosted;
+pub mod knock;
+pub mod madman;
+pub mod plan;
 pub mod press;
 pub mod process;
 pub mod puppet;

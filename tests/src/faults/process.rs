@@ -52,6 +52,18 @@ impl Running {
         self.child.wait().expect("our own child");
     }
 
+    /// Lets it go on if it was stopped.
+    pub fn go_on(&mut self) {
+        if !self.has_ended() {
+            self.signal(Signal::CONT);
+        }
+    }
+
+    /// Whether it has ended.
+    pub fn has_ended(&mut self) -> bool {
+        self.child.try_wait().expect("our own child").is_some()
+    }
+
     /// Fails the test with the program's words if it has ended.
     pub fn must_run(&mut self) {
         if self.child.try_wait().expect("our own child").is_some() {

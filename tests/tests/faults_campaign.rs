@@ -1,0 +1,122 @@
+//! The fault campaign: random faults, alone and together, against real processes on a card whose amplifiers
+//! check every value.
+//!
+//! ```text
+//! cargo test --release -p system-tests --test faults_campaign campaign -- --nocapture
+//! ```
+//! plays a minute of it and prints a table. `CAMPAIGN_SECONDS=3600` plays an hour, `CAMPAIGN_RUNS=500` so many
+//! runs whatever the time, `CAMPAIGN_SEED=0x...` begins with another run: the one whose seed a failure tells,
+//! with `CAMPAIGN_RUNS=1` it alone. What happens in a run is drawn from its seed and from nothing else; when a
+//! blow falls within a tick is up to the machine.
+
+use rt_core::setup::SetupRequest;
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+use system_tests::faults::campaign::{self, HOG_TEST};
+use system_tests::faults::heal::Account;
+use system_tests::faults::plan::Plan;
+use system_tests::faults::process::{Running, myself, role};
+use system_tests::faults::random::Random;
+
+/// Where the usual campaign begins, so that a checkout that passes passes again.
+const USUAL_SEED: u64 = 0x0070_6861_6e74_6f6d;
+/// As long as a campaign lasts if nobody says.
+const USUAL_SECONDS: u64 = 60;
+/// Begins the line on which a run says what it saw.
+const TELLS: &str = "the run saw ";
+
+fn number(variable: &str) -> Option<u64> {
+    let text = std::env::var(variable).ok()?;
+    let parsed = match text.strip_prefix("0x") {
+        Some(digits) => u64::from_str_radix(digits, 16),
+        None => text.parse(),
+    };
+    Some(parsed.unwrap_or_else(|error| panic!("{variable}={text}: {error}")))
+}
+
+/// What a kind of strike went through.
+#[derive(Default)]
+struct Line {
+    runs: u64,
+    account: Account,
+}
+
+#[test]
+fn campaign() {
+    let first = number("CAMPAIGN_SEED").unwrap_or(USUAL_SEED);
+    let runs = number("CAMPAIGN_RUNS");
+    let seconds = number("CAMPAIGN_SECONDS").unwrap_or(if runs.is_some() { u64::MAX } else { USUAL_SECONDS });
+    let (begun, mut seed, mut seeds) = (Instant::now(), first, Random::new(first));
+    let (mut total, mut table) = (Line::default(), BTreeMap::<&str, Line>::new());
+    while total.runs < runs.unwrap_or(u64::MAX) && begun.elapsed() < Duration::from_secs(seconds) {
+        let plan = Plan::of(seed);
+        let account = play(&plan);
+        total.runs += 1;
+        total.account.add(account);
+        for name in plan.strikes.iter().map(|(_, strike, _)| strike.name()) {
+            let line = table.entry(name).or_default();
+            line.runs += 1;
+            line.account.add(account);
+        }
+        seed = seeds.word();
+    }
+    assert!(total.runs > 0);
+    print(&table, &total, begun.elapsed());
+}
+
+/// In a process of its own: a run that hangs or crashes takes nothing with it.
+fn play(plan: &Plan) -> Account {
+    println!("{plan}");
+    let end = Running::start(&mut myself("the_run_of_one_plan", &plan.seed.to_string())).end();
+    let account = end.out.split(TELLS).nth(1).and_then(|text| Account::from_line(text.lines().next()?));
+    match account.filter(|_| end.status == Some(0)) {
+        Some(account) => account,
+        None => panic!(
+            "the run failed: {plan}\nplay it again: CAMPAIGN_SEED=0x{:016x} CAMPAIGN_RUNS=1 cargo test --release \
+             -p system-tests --test faults_campaign campaign -- --nocapture\n{:?}\n{}\n{}",
+            plan.seed, end.status, end.out, end.err
+        ),
+    }
+}
+
+fn print(table: &BTreeMap<&str, Line>, total: &Line, took: Duration) {
+    println!("{:<24}{:>6}{:>12}{:>10}{:>8}{:>8}{:>8}", "in runs with", "runs", "values", "longest N", "trips", "last", "deaths");
+    for (name, line) in table.iter().map(|(name, line)| (*name, line)).chain([("all", total)]) {
+        let Account { written, largest_force_un, trips, last_acts, deaths, .. } = line.account;
+        let longest_n = largest_force_un as f64 / 1e6;
+        println!("{name:<24}{:>6}{written:>12}{longest_n:>10.3}{trips:>8}{last_acts:>8}{deaths:>8}", line.runs);
+    }
+    let Account { written, checked, judged_again, cleared, .. } = total.account;
+    println!(
+        "{} runs in {:.0} s: {written} values, {checked} checked by the amplifiers, {judged_again} judged once \
+         more, none wrong, none lost; {cleared} faults cleared",
+        total.runs,
+        took.as_secs_f64()
+    );
+}
+
+/// Not a test of its own: one run, for the test above.
+#[test]
+fn the_run_of_one_plan() {
+    let Some(seed) = role() else { return };
+    let plan = Plan::of(seed.parse().expect("a seed"));
+    println!("{TELLS}{}", campaign::run(&plan).to_line());
+}
+
+/// Not a test of its own: a thread that takes a CPU with more right than anybody, for a bounded time.
+#[test]
+fn the_hog() {
+    let Some(words) = role() else { return };
+    assert_eq!(HOG_TEST, "the_hog");
+    let (cpu, ms) = words.split_once(' ').expect("a CPU and a time");
+    let request =
+        SetupRequest { fifo_priority: Some(90), cpu: cpu.parse().ok(), ..SetupRequest::default() };
+    let until = Instant::now() + Duration::from_millis(ms.parse().expect("a time"));
+    let (report, _guards) = rt_core::setup::apply(&request);
+    if !report.all_obtained() {
+        return println!("skipped: no right to take a CPU\n{report}");
+    }
+    while Instant::now() < until {
+        std::hint::spin_loop();
+    }
+}
