@@ -12,6 +12,7 @@
 use rt_core::setup::SetupRequest;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
+use system_tests::driver::HANG;
 use system_tests::faults::campaign::{self, HOG_TEST};
 use system_tests::faults::heal::Account;
 use system_tests::faults::plan::Plan;
@@ -67,7 +68,7 @@ fn campaign() {
 /// In a process of its own: a run that hangs or crashes takes nothing with it.
 fn play(plan: &Plan) -> Account {
     println!("{plan}");
-    let end = Running::start(&mut myself("the_run_of_one_plan", &plan.seed.to_string())).end();
+    let end = Running::start(&mut myself("the_run_of_one_plan", &plan.seed.to_string())).end_within(4 * HANG);
     let account = end.out.split(TELLS).nth(1).and_then(|text| Account::from_line(text.lines().next()?));
     match account.filter(|_| end.status == Some(0)) {
         Some(account) => account,

@@ -11,7 +11,6 @@ use nalgebra::Vector3;
 use shm_abi::client::Attachment;
 use shm_abi::doorbell::WaitMode;
 use shm_abi::segment::{ClockMode, DeviceInfo};
-use shm_abi::seqlock::stamp;
 use shm_abi::{
     Command, CommanderMemory, CommanderSegment, CommanderView, DriverMemory, DriverView, FaultReason, Frame,
     ReplyKind,

@@ -47,6 +47,13 @@ struct Run {
     undisturbed: bool,
 }
 
+/// One more than the highest descriptor of a process that lives.
+fn descriptors_of(process: u32) -> Option<u64> {
+    let entries = std::fs::read_dir(format!("/proc/{process}/fd")).ok()?.flatten();
+    let highest: u64 = entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok()).max()?;
+    Some(highest + 1)
+}
+
 fn sleep_us(us: u64) {
     std::thread::sleep(Duration::from_micros(us));
 }
@@ -269,7 +276,9 @@ impl Run {
     fn no_descriptors(&mut self) {
         let pid = Pid::from_raw(self.ward.stand.driver.id().cast_signed()).expect("a process id");
         let limit = |current| prlimit(Some(pid), Resource::Nofile, Rlimit { current, maximum: Some(1024) });
-        if self.ward.stand.driver.has_ended() || limit(Some(0)).is_err() {
+        // As many as it has: below that even `poll` would refuse, which no limit set beforehand can cause.
+        let Some(open) = descriptors_of(self.ward.stand.driver.id()) else { return };
+        if limit(Some(open)).is_err() {
             return;
         }
         let crowd = knock::crowd(&self.ward.stand.socket(), 10);

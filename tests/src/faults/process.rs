@@ -1,12 +1,12 @@
 //! Processes to be stopped, killed and asked after.
 
-use crate::driver::{HANG, wait_or_kill};
+use crate::driver::{HANG, wait_or_kill_after};
 use crate::programs;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::{Pid, Signal, kill_process};
 use std::io::Read;
 use std::process::{Child, Command, Stdio};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// A program's end and everything it said.
 #[derive(Debug)]
@@ -90,8 +90,13 @@ impl Running {
 
     /// Waits for its end.
     pub fn end(&mut self) -> End {
+        self.end_within(HANG)
+    }
+
+    /// Waits for the end of one that may take longer.
+    pub fn end_within(&mut self, patience: Duration) -> End {
         use std::os::unix::process::ExitStatusExt;
-        let status = wait_or_kill(&mut self.child);
+        let status = wait_or_kill_after(&mut self.child, patience);
         let text = |pipe: Option<&mut dyn Read>| {
             let mut bytes = Vec::new();
             pipe.expect("piped").read_to_end(&mut bytes).expect("readable");
