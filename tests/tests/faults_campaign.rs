@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 use system_tests::driver::HANG;
 use system_tests::faults::campaign::{self, HOG_TEST};
 use system_tests::faults::heal::Account;
-use system_tests::faults::plan::Plan;
+use system_tests::faults::plan::{Plan, Strike, Then};
 use system_tests::faults::process::{Running, myself, role};
 use system_tests::faults::random::Random;
 
@@ -81,11 +81,17 @@ fn play(plan: &Plan) -> Account {
 }
 
 fn print(table: &BTreeMap<&str, Line>, total: &Line, took: Duration) {
-    println!("{:<24}{:>6}{:>12}{:>10}{:>8}{:>8}{:>8}", "in runs with", "runs", "values", "longest N", "trips", "last", "deaths");
+    println!(
+        "{:<24}{:>6}{:>12}{:>10}{:>8}{:>8}{:>8}",
+        "in runs with", "runs", "values", "longest N", "trips", "last", "deaths"
+    );
     for (name, line) in table.iter().map(|(name, line)| (*name, line)).chain([("all", total)]) {
         let Account { written, largest_force_un, trips, last_acts, deaths, .. } = line.account;
         let longest_n = largest_force_un as f64 / 1e6;
-        println!("{name:<24}{:>6}{written:>12}{longest_n:>10.3}{trips:>8}{last_acts:>8}{deaths:>8}", line.runs);
+        println!(
+            "{name:<24}{:>6}{written:>12}{longest_n:>10.3}{trips:>8}{last_acts:>8}{deaths:>8}",
+            line.runs
+        );
     }
     let Account { written, checked, judged_again, cleared, .. } = total.account;
     println!(
@@ -110,8 +116,7 @@ fn the_hog() {
     let Some(words) = role() else { return };
     assert_eq!(HOG_TEST, "the_hog");
     let (cpu, ms) = words.split_once(' ').expect("a CPU and a time");
-    let request =
-        SetupRequest { fifo_priority: Some(90), cpu: cpu.parse().ok(), ..SetupRequest::default() };
+    let request = SetupRequest { fifo_priority: Some(90), cpu: cpu.parse().ok(), ..SetupRequest::default() };
     let until = Instant::now() + Duration::from_millis(ms.parse().expect("a time"));
     let (report, _guards) = rt_core::setup::apply(&request);
     if !report.all_obtained() {
@@ -119,5 +124,19 @@ fn the_hog() {
     }
     while Instant::now() < until {
         std::hint::spin_loop();
+    }
+}
+
+/// So that none depends on being drawn.
+#[test]
+fn every_kind_of_strike_alone_in_both_clocks() {
+    for clock in ["real", "lockstep"] {
+        for strike in Strike::each() {
+            let strikes = vec![(3000, strike, Then::Heal)];
+            let plan = Plan { seed: 1, clock, peak_n: 8.5, slew_n_per_s: 400.0, strikes };
+            println!("{plan}");
+            let account = campaign::run(&plan);
+            assert!(account.written > 0 && account.largest_force_un > 1_000_000, "{plan}: {account:?}");
+        }
     }
 }

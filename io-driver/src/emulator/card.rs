@@ -169,8 +169,12 @@ impl Card {
         options.read(true).write(true).create_new(true).mode(0o600);
         let file = options.open(path).map_err(system("make"))?;
         // Blocks are taken now: a full file system is told here instead of by a SIGBUS later.
-        rustix::fs::fallocate(&file, rustix::fs::FallocateFlags::empty(), 0, size_of::<Self>() as u64)
-            .map_err(|error| system("make room for")(error.into()))?;
+        let room = size_of::<Self>() as u64;
+        if let Err(error) = rustix::fs::fallocate(&file, rustix::fs::FallocateFlags::empty(), 0, room) {
+            // What is no card is in everybody's way.
+            let _ = std::fs::remove_file(path);
+            return Err(system("make room for")(error.into()));
+        }
         let card = map(&file).map_err(system("map"))?;
         card.inputs.pid.store(std::process::id(), Ordering::Relaxed);
         card.magic.store(MAGIC, Ordering::Release);

@@ -62,18 +62,18 @@ impl Run {
     fn strike(&mut self, strike: Strike, then: Then) {
         let stays = then != Then::Heal;
         match strike {
-            Strike::KillApp => self.signal_app(Signal::KILL),
+            Strike::KillApp => self.kill_app(stays),
             Strike::KillAppStarting(us) => {
                 self.signal_app(Signal::KILL);
                 self.ward.app.end();
                 self.ward.app = self.ward.stand.start_app();
                 sleep_us(us);
-                self.signal_app(Signal::KILL);
+                self.kill_app(stays);
             }
             Strike::KillAppEnding(us) => {
                 self.signal_app(Signal::TERM);
                 sleep_us(us);
-                self.signal_app(Signal::KILL);
+                self.kill_app(stays);
             }
             Strike::StopApp(ms) => self.stop_app(ms, stays),
             Strike::UpgradeApp => self.upgrade_app(),
@@ -129,6 +129,13 @@ impl Run {
     fn signal_app(&mut self, signal: Signal) {
         if !self.ward.app.has_ended() {
             self.ward.app.signal(signal);
+        }
+    }
+
+    fn kill_app(&mut self, stays: bool) {
+        self.signal_app(Signal::KILL);
+        if !stays {
+            self.ward.app.end();
         }
     }
 
@@ -202,7 +209,9 @@ impl Run {
         loop {
             match client::command(&self.ward.stand.socket(), "campaign") {
                 Ok(attachment) => return Some(attachment),
-                Err(AttachError::LeaseHeld { .. }) if begun.elapsed() < Duration::from_secs(10) => sleep_us(500),
+                Err(AttachError::LeaseHeld { .. }) if begun.elapsed() < Duration::from_secs(10) => {
+                    sleep_us(500)
+                }
                 Err(error) => {
                     assert!(!self.undisturbed, "{error}");
                     return None;
@@ -344,7 +353,9 @@ impl Run {
         }
         let view = &self.ward.stand.observer.driver;
         let driver = &mut self.ward.stand.driver;
-        wait_for("the sabotage", || driver.has_ended() || view.counters.faults.load(Ordering::Relaxed) > before);
+        wait_for("the sabotage", || {
+            driver.has_ended() || view.counters.faults.load(Ordering::Relaxed) > before
+        });
     }
 
     /// In real time the loop goes on; in lockstep as long as its commander does.

@@ -60,8 +60,11 @@ impl Account {
 
     /// As one line between two processes.
     pub fn to_line(&self) -> String {
-        let Self { written, checked, judged_again, largest_force_un, trips, last_acts, deaths, cleared } = self;
-        format!("{written} {checked} {judged_again} {largest_force_un} {trips} {last_acts} {deaths} {cleared}")
+        let Self { written, checked, judged_again, largest_force_un, trips, last_acts, deaths, cleared } =
+            self;
+        format!(
+            "{written} {checked} {judged_again} {largest_force_un} {trips} {last_acts} {deaths} {cleared}"
+        )
     }
 
     /// Back from a line.
@@ -95,14 +98,8 @@ impl Ward {
         let stand = Stand::start(setup);
         let app = stand.start_app();
         let account = Account::default();
-        let mut ward = Self {
-            stand,
-            app,
-            account,
-            may_die: false,
-            emulator_is_dead: false,
-            driver_was_buried: false,
-        };
+        let mut ward =
+            Self { stand, app, account, may_die: false, emulator_is_dead: false, driver_was_buried: false };
         ward.heal();
         ward
     }
@@ -177,8 +174,15 @@ impl Ward {
     fn wait_for_force(&mut self) {
         let begun = Instant::now();
         let mut log = RingLog::begin(self.stand.view());
-        while !log.told.iter().any(is_whole) {
-            assert!(begun.elapsed() < HANG, "no force; last {:?}, {:?}", log.told.last(), self.stand.amplifiers);
+        // Of commands since then: the dead are obeyed for some ticks more.
+        let mut since = self.stand.view().latest_tick().unwrap_or(0);
+        while log.told.iter().filter(|told| is_whole(told) && told.command_tick > since).count() < ENOUGH {
+            assert!(
+                begun.elapsed() < HANG,
+                "no force; last {:?}, {:?}",
+                log.told.last(),
+                self.stand.amplifiers
+            );
             std::thread::sleep(Duration::from_micros(500));
             if self.stand.driver.has_ended() {
                 self.replace_dead_driver();
@@ -187,6 +191,7 @@ impl Ward {
                 let Some(observer) = self.stand.try_to_observe() else { continue };
                 self.stand.observer = observer;
                 log = RingLog::begin(self.stand.view());
+                since = 0;
             }
             if self.app.has_ended() {
                 self.app = self.stand.start_app();
@@ -215,6 +220,9 @@ impl Ward {
         account
     }
 }
+
+/// Frames of the whole force after which it is there.
+const ENOUGH: usize = 5;
 
 /// A copy of `phantom3` under another name, as an upgrade would put it there.
 pub fn another_phantom3(stand: &Stand, version: u64) -> std::process::Command {

@@ -2,8 +2,8 @@
 //! table, a driver whose devices the test itself makes up, and garbage that can be had again.
 
 pub mod amplifiers;
-pub mod commander;
 pub mod campaign;
+pub mod commander;
 pub mod heal;
 pub mod hosted;
 pub mod knock;
@@ -15,4 +15,5 @@ pub mod puppet;
 pub mod random;
 pub mod ring;
 pub mod saboteur;
+pub mod scarcity;
 pub mod stand;

@@ -109,8 +109,7 @@ impl Plan {
             .map(|_| {
                 let delay_us = random.below(6000);
                 let strike = Strike::draw(&mut random, clock);
-                let then =
-                    if random.once_in(3) { Then::Next(random.below(4000)) } else { Then::Heal };
+                let then = if random.once_in(3) { Then::Next(random.below(4000)) } else { Then::Heal };
                 (delay_us, strike, then)
             })
             .collect();
@@ -153,6 +152,37 @@ impl Strike {
             25 => Self::StopEmulator(1 + random.below(300)),
             _ => Self::KillEmulator,
         }
+    }
+
+    /// One of each kind.
+    pub fn each() -> Vec<Self> {
+        let mut each = vec![
+            Self::KillApp,
+            Self::KillAppStarting(5000),
+            Self::KillAppEnding(500),
+            Self::StopApp(60),
+            Self::UpgradeApp,
+            Self::SecondApp,
+            Self::ForeignApp,
+            Self::Crowd,
+            Self::Madman(150),
+            Self::FormerHolder,
+            Self::KillDriver,
+            Self::KillDriverStarting(5000),
+            Self::KillDriverEnding(1000),
+            Self::StopDriver(300),
+            Self::EndDriver,
+            Self::EndDriverTwice(1000),
+            Self::SecondDriver,
+            Self::NoDescriptors,
+            Self::EmergencyStop,
+            Self::Hog(300),
+            Self::StopEmulator(300),
+            Self::KillEmulator,
+        ];
+        each.extend([4, 6, 7, 8, 11].map(Self::Signal));
+        each.extend((0..SABOTAGES.len() as u32).map(|index| Self::Sabotage(FIRST_BUTTON + index)));
+        each
     }
 
     /// Its kind, for a table.

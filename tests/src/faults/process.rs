@@ -4,8 +4,9 @@ use crate::driver::{HANG, wait_or_kill_after};
 use crate::programs;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::{Pid, Signal, kill_process};
-use std::io::Read;
+use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 /// A program's end and everything it said.
@@ -88,6 +89,18 @@ impl Running {
         }
     }
 
+    /// The lines of its standard output, as they come; the channel ends with them. Its [`end`](Self::end) then
+    /// knows of none.
+    pub fn take_lines(&mut self) -> Receiver<String> {
+        let pipe = self.child.stdout.take().expect("taken once");
+        let (send, receive) = channel();
+        // It ends with the pipe, and the pipe with the program.
+        std::thread::spawn(move || {
+            BufReader::new(pipe).lines().map_while(Result::ok).try_for_each(|line| send.send(line))
+        });
+        receive
+    }
+
     /// Waits for its end.
     pub fn end(&mut self) -> End {
         self.end_within(HANG)
@@ -99,7 +112,9 @@ impl Running {
         let status = wait_or_kill_after(&mut self.child, patience);
         let text = |pipe: Option<&mut dyn Read>| {
             let mut bytes = Vec::new();
-            pipe.expect("piped").read_to_end(&mut bytes).expect("readable");
+            if let Some(pipe) = pipe {
+                pipe.read_to_end(&mut bytes).expect("readable");
+            }
             String::from_utf8_lossy(&bytes).into_owned()
         };
         let out = text(self.child.stdout.as_mut().map(|pipe| pipe as _));
