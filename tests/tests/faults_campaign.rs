@@ -9,12 +9,12 @@
 //! with `CAMPAIGN_RUNS=1` it alone. What happens in a run is drawn from its seed and from nothing else; when a
 //! blow falls within a tick is up to the machine.
 
-use rt_core::setup::SetupRequest;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 use system_tests::driver::HANG;
 use system_tests::faults::campaign::{self, HOG_TEST};
 use system_tests::faults::heal::Account;
+use system_tests::faults::hog;
 use system_tests::faults::plan::{Plan, Strike, Then};
 use system_tests::faults::process::{Running, myself, role};
 use system_tests::faults::random::Random;
@@ -110,20 +110,12 @@ fn the_run_of_one_plan() {
     println!("{TELLS}{}", campaign::run(&plan).to_line());
 }
 
-/// Not a test of its own: a thread that takes a CPU with more right than anybody, for a bounded time.
+/// Not a test of its own: the hog of a run.
 #[test]
 fn the_hog() {
-    let Some(words) = role() else { return };
     assert_eq!(HOG_TEST, "the_hog");
-    let (cpu, ms) = words.split_once(' ').expect("a CPU and a time");
-    let request = SetupRequest { fifo_priority: Some(90), cpu: cpu.parse().ok(), ..SetupRequest::default() };
-    let until = Instant::now() + Duration::from_millis(ms.parse().expect("a time"));
-    let (report, _guards) = rt_core::setup::apply(&request);
-    if !report.all_obtained() {
-        return println!("skipped: no right to take a CPU\n{report}");
-    }
-    while Instant::now() < until {
-        std::hint::spin_loop();
+    if let Some(words) = role() {
+        println!("{}", hog::take(&words));
     }
 }
 

@@ -210,7 +210,7 @@ impl Run {
             match client::command(&self.ward.stand.socket(), "campaign") {
                 Ok(attachment) => return Some(attachment),
                 Err(AttachError::LeaseHeld { .. }) if begun.elapsed() < Duration::from_secs(10) => {
-                    sleep_us(500)
+                    sleep_us(500);
                 }
                 Err(error) => {
                     assert!(!self.undisturbed, "{error}");

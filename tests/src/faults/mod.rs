@@ -5,6 +5,7 @@ pub mod amplifiers;
 pub mod campaign;
 pub mod commander;
 pub mod heal;
+pub mod hog;
 pub mod hosted;
 pub mod knock;
 pub mod madman;
