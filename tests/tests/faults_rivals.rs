@@ -20,7 +20,7 @@ fn a_second_driver_of_the_same_card_is_refused_wherever_it_listens_and_the_first
         let mut elsewhere = stand.driver_command();
         elsewhere.arg("--socket").arg(stand.path("other.sock"));
         let same_place = stand.driver_command();
-        for mut command in [same_place, without_first_socket(elsewhere)] {
+        for mut command in [same_place, without_first_socket(&elsewhere)] {
             let end = Running::start(&mut command).end();
             assert_eq!(end.status, Some(2), "{end:?}");
             assert!(end.err.contains("belongs to another driver; one card has one driver"), "{end:?}");
@@ -37,7 +37,7 @@ fn a_second_driver_of_the_same_card_is_refused_wherever_it_listens_and_the_first
 }
 
 /// `--socket` may be given once.
-fn without_first_socket(command: std::process::Command) -> std::process::Command {
+fn without_first_socket(command: &std::process::Command) -> std::process::Command {
     let mut arguments: Vec<_> = command.get_args().map(std::ffi::OsStr::to_os_string).collect();
     let first = arguments.iter().position(|argument| argument == "--socket").expect("one");
     arguments.drain(first..first + 2);
@@ -77,9 +77,9 @@ fn an_app_is_upgraded_under_a_running_driver_and_no_device_is_zeroed_anew() {
             wait_for("a movement", || counts(stand.view())[..3].iter().map(|c| c.abs()).sum::<i64>() > moved);
             // Killed, and asked to end: the successor finds the same driver.
             if upgrade % 2 == 0 {
-                old.kill()
+                old.kill();
             } else {
-                drop(end_app(old))
+                drop(end_app(old));
             }
             wait_for("the end of the force", || !stand.amplifiers.are_enabled());
             // What was written last is at work until the emulator has seen it.

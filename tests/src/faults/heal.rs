@@ -139,14 +139,15 @@ impl Ward {
     /// Off by the driver's own doing wherever it could do anything; else by the watchdog.
     fn check_what_is_left(&self, end: &End) {
         let amplifiers = &self.stand.amplifiers;
-        // A second signal of the same kind is how somebody says "now"; before there are handlers it is the first.
-        let could_act = end.signal.is_none_or(|signal| ![1, 2, 9, 15].contains(&signal));
+        // Before there are handlers the first request ends it, and then the registers are what the former left.
+        let had_handlers = self.stand.observer.driver_pid == u64::from(self.stand.driver.id());
+        let could_act =
+            end.signal.is_none_or(|signal| signal != 9 && (had_handlers || ![1, 15].contains(&signal)));
         if could_act {
             amplifiers.check_off(&format!("{:?} {:?}", end.status, end.signal));
         }
         assert!(matches!(end.status, None | Some(0 | 3)), "{end:?}");
-        let is_looked_at = self.stand.observer.driver_pid == u64::from(self.stand.driver.id());
-        if end.status == Some(3) && is_looked_at {
+        if end.status == Some(3) && had_handlers {
             let words = epitaph::read(&self.stand.view().epitaph).expect("an epitaph");
             assert_eq!(words.kind, EpitaphKind::Panic, "{words}");
         }

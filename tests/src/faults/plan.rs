@@ -57,13 +57,14 @@ pub enum Strike {
 }
 
 /// What each button does to the driver's loop, from button 8 on.
-pub const SABOTAGES: [&str; 11] = [
+pub const SABOTAGES: [&str; 12] = [
     "panic",
     "panic-before-write",
     "panic-after-write",
     "overflow",
     "segv",
     "abort",
+    "forbidden-call",
     "nan",
     "leap",
     "unreadable",

@@ -28,6 +28,8 @@ pub enum Act {
     Overflow,
     /// A SIGSEGV, raised by the loop's own thread.
     Segv,
+    /// A system call that a driver has no use for: it could send any process a signal.
+    ForbiddenCall,
     /// `abort`, on the loop's own thread.
     Abort,
     /// The process exits without a word.
@@ -98,6 +100,7 @@ impl Act {
             "panic-after-write" => Self::PanicAfterWrite,
             "overflow" => Self::Overflow,
             "segv" => Self::Segv,
+            "forbidden-call" => Self::ForbiddenCall,
             "abort" => Self::Abort,
             "exit" => Self::Exit,
             "nan" => Self::Nan,
@@ -152,6 +155,10 @@ impl Saboteur {
             }
             Act::Segv => {
                 let _ = signal_hook::low_level::raise(rustix::process::Signal::SEGV.as_raw());
+            }
+            Act::ForbiddenCall => {
+                let own = rustix::process::getpid();
+                let _ = rustix::process::kill_process(own, rustix::process::Signal::SEGV);
             }
             Act::Abort => std::process::abort(),
             Act::Exit => std::process::exit(0),
