@@ -27,6 +27,9 @@ pub const CHANNELS: usize = 8;
 /// Values that wait for being checked: a minute at 1 kHz.
 pub const QUEUE: usize = 1 << 16;
 
+/// [`Record::flags`]: where the arming that a value follows begins.
+pub const ARM_SHIFT: u32 = 32;
+
 /// [`Inputs::status`]: the amplifiers have switched themselves off.
 pub const STATUS_TRIPPED: u32 = 1;
 
@@ -72,7 +75,7 @@ pub struct Record {
     pub time_ns: AtomicU64,
     /// Codes of channels 0 to 3, 16 bits each, the first lowest.
     pub codes: AtomicU64,
-    /// Bit 0: the amplifiers are to be on. The rest: the pose that the codes are for does not matter.
+    /// Bit 0: the amplifiers are to be on. From [`ARM_SHIFT`] on: what [`Outputs::arm`] was.
     pub flags: AtomicU64,
 }
 

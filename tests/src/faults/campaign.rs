@@ -21,6 +21,9 @@ use std::time::{Duration, Instant};
 /// Name of the test that plays [`hog`] when it is started as a process of its own.
 pub const HOG_TEST: &str = "the_hog";
 
+/// How long a stop lasts that comes at a start or at an end (ms).
+const STOP_MS: u64 = 40;
+
 /// Plays a plan to its end.
 pub fn run(plan: &Plan) -> Account {
     let mut setup = Setup::new(plan.clock).sabotaged(&Plan::sabotage());
@@ -76,6 +79,18 @@ impl Run {
                 self.kill_app(stays);
             }
             Strike::StopApp(ms) => self.stop_app(ms, stays),
+            Strike::StopAppStarting(us) => {
+                self.signal_app(Signal::KILL);
+                self.ward.app.end();
+                self.ward.app = self.ward.stand.start_app();
+                sleep_us(us);
+                self.stop_app(STOP_MS, stays);
+            }
+            Strike::StopAppEnding(us) => {
+                self.signal_app(Signal::TERM);
+                sleep_us(us);
+                self.stop_app(STOP_MS, stays);
+            }
             Strike::UpgradeApp => self.upgrade_app(),
             Strike::SecondApp => self.second_app(),
             Strike::ForeignApp => knock::all_foreigners(&self.ward.stand.socket(), self.undisturbed),
@@ -108,6 +123,17 @@ impl Run {
                 sleep_us(us);
                 self.signal_driver(Signal::KILL);
             }
+            Strike::StopDriverStarting(us) => {
+                self.signal_driver(Signal::KILL);
+                self.ward.replace_driver();
+                sleep_us(us);
+                return self.pause_driver(stays);
+            }
+            Strike::StopDriverEnding(us) => {
+                self.signal_driver(Signal::TERM);
+                sleep_us(us);
+                self.pause_driver(stays);
+            }
             Strike::EndDriver => self.signal_driver(Signal::TERM),
             Strike::EndDriverTwice(us) => {
                 self.signal_driver(Signal::TERM);
@@ -123,6 +149,14 @@ impl Run {
             // A stopped one does not hear until it goes on.
             self.ward.stand.driver.go_on();
             self.ward.bury_driver();
+        }
+    }
+
+    fn pause_driver(&mut self, stays: bool) {
+        self.signal_driver(Signal::STOP);
+        if !stays {
+            sleep_us(STOP_MS * 1000);
+            self.signal_driver(Signal::CONT);
         }
     }
 

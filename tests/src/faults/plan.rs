@@ -14,6 +14,10 @@ pub enum Strike {
     KillAppEnding(u64),
     /// It stands still so long (ms).
     StopApp(u64),
+    /// It stands still, so long after it was started (us).
+    StopAppStarting(u64),
+    /// It is asked to end, and stands still so long afterwards (us).
+    StopAppEnding(u64),
     /// Another copy of it, in another place, takes over.
     UpgradeApp,
     /// A second one wants the lease.
@@ -34,6 +38,10 @@ pub enum Strike {
     KillDriverEnding(u64),
     /// It stands still so long (ms).
     StopDriver(u64),
+    /// It stands still, so long after it was started (us).
+    StopDriverStarting(u64),
+    /// It is asked to stop, and stands still so long afterwards (us).
+    StopDriverEnding(u64),
     /// It is asked to stop.
     EndDriver,
     /// It is asked by the same signal twice, so long apart (us), which ends it at once.
@@ -127,7 +135,7 @@ impl Plan {
 impl Strike {
     fn draw(random: &mut Random, clock: &str) -> Self {
         let us = |random: &mut Random| random.below(25_000);
-        match random.below(27) {
+        match random.below(31) {
             0 | 1 => Self::KillApp,
             2 => Self::KillAppStarting(us(random)),
             3 => Self::KillAppEnding(us(random) / 5),
@@ -151,6 +159,10 @@ impl Strike {
             24 => Self::EmergencyStop,
             25 if clock == "real" && random.once_in(3) => Self::Hog(50 + random.below(250)),
             25 => Self::StopEmulator(1 + random.below(300)),
+            26 => Self::StopAppStarting(us(random)),
+            27 => Self::StopAppEnding(us(random) / 5),
+            28 => Self::StopDriverStarting(us(random)),
+            29 => Self::StopDriverEnding(us(random)),
             _ => Self::KillEmulator,
         }
     }
@@ -162,6 +174,8 @@ impl Strike {
             Self::KillAppStarting(5000),
             Self::KillAppEnding(500),
             Self::StopApp(60),
+            Self::StopAppStarting(5000),
+            Self::StopAppEnding(500),
             Self::UpgradeApp,
             Self::SecondApp,
             Self::ForeignApp,
@@ -172,6 +186,8 @@ impl Strike {
             Self::KillDriverStarting(5000),
             Self::KillDriverEnding(1000),
             Self::StopDriver(300),
+            Self::StopDriverStarting(5000),
+            Self::StopDriverEnding(1000),
             Self::EndDriver,
             Self::EndDriverTwice(1000),
             Self::SecondDriver,
@@ -193,6 +209,8 @@ impl Strike {
             Self::KillAppStarting(_) => "app killed starting",
             Self::KillAppEnding(_) => "app killed ending",
             Self::StopApp(_) => "app stopped",
+            Self::StopAppStarting(_) => "app stopped starting",
+            Self::StopAppEnding(_) => "app stopped ending",
             Self::UpgradeApp => "app upgraded",
             Self::SecondApp => "second app",
             Self::ForeignApp => "foreign app",
@@ -203,6 +221,8 @@ impl Strike {
             Self::KillDriverStarting(_) => "driver killed starting",
             Self::KillDriverEnding(_) => "driver killed ending",
             Self::StopDriver(_) => "driver stopped",
+            Self::StopDriverStarting(_) => "driver stopped starting",
+            Self::StopDriverEnding(_) => "driver stopped ending",
             Self::EndDriver => "driver ended",
             Self::EndDriverTwice(_) => "driver ended twice",
             Self::Signal(_) => "driver signalled",
@@ -241,6 +261,6 @@ mod tests {
     fn every_kind_of_strike_is_drawn() {
         let names: std::collections::BTreeSet<_> =
             (0..3000).flat_map(|seed| Plan::of(seed).strikes).map(|(_, strike, _)| strike.name()).collect();
-        assert_eq!(names.len(), 23 + SABOTAGES.len(), "{names:?}");
+        assert_eq!(names.len(), 27 + SABOTAGES.len(), "{names:?}");
     }
 }
