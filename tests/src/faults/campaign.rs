@@ -26,7 +26,7 @@ const STOP_MS: u64 = 40;
 
 /// Plays a plan to its end.
 pub fn run(plan: &Plan) -> Account {
-    let mut setup = Setup::new(plan.clock).sabotaged(&Plan::sabotage());
+    let mut setup = Setup::new(plan.clock).sabotaged(&plan.sabotage());
     setup.limits.peak_n = plan.peak_n;
     setup.limits.slew_n_per_s = plan.slew_n_per_s;
     let mut run = Run { ward: Ward::open(setup), random: Random::new(!plan.seed), undisturbed: true };

@@ -126,9 +126,11 @@ impl Plan {
     }
 
     /// The sabotage that the driver has to be prepared for: everything, by its button.
-    pub fn sabotage() -> String {
+    pub fn sabotage(&self) -> String {
         let item = |(index, act): (usize, &&str)| format!("{act}@button{}", FIRST_BUTTON + index as u32);
-        SABOTAGES.iter().enumerate().map(item).collect::<Vec<_>>().join(",")
+        let items = SABOTAGES.iter().enumerate().map(item);
+        let pace = (self.clock == "lockstep").then(|| "pace@0".to_owned());
+        items.chain(pace).collect::<Vec<_>>().join(",")
     }
 }
 
