@@ -51,7 +51,10 @@ fn campaign() {
     let (mut total, mut table) = (Line::default(), BTreeMap::<&str, Line>::new());
     while total.runs < runs.unwrap_or(u64::MAX) && begun.elapsed() < Duration::from_secs(seconds) {
         let plan = Plan::of(seed);
-        let account = play(&plan);
+        let account = play(&plan).unwrap_or_else(|failure| {
+            print(&table, &total, begun.elapsed());
+            panic!("{failure}");
+        });
         total.runs += 1;
         total.account.add(account);
         for name in plan.strikes.iter().map(|(_, strike, _)| strike.name()) {
@@ -66,18 +69,17 @@ fn campaign() {
 }
 
 /// In a process of its own: a run that hangs or crashes takes nothing with it.
-fn play(plan: &Plan) -> Account {
+fn play(plan: &Plan) -> Result<Account, String> {
     println!("{plan}");
     let end = Running::start(&mut myself("the_run_of_one_plan", &plan.seed.to_string())).end_within(4 * HANG);
     let account = end.out.split(TELLS).nth(1).and_then(|text| Account::from_line(text.lines().next()?));
-    match account.filter(|_| end.status == Some(0)) {
-        Some(account) => account,
-        None => panic!(
+    account.filter(|_| end.status == Some(0)).ok_or_else(|| {
+        format!(
             "the run failed: {plan}\nplay it again: CAMPAIGN_SEED=0x{:016x} CAMPAIGN_RUNS=1 cargo test --release \
              -p system-tests --test faults_campaign campaign -- --nocapture\n{:?}\n{}\n{}",
             plan.seed, end.status, end.out, end.err
-        ),
-    }
+        )
+    })
 }
 
 fn print(table: &BTreeMap<&str, Line>, total: &Line, took: Duration) {

@@ -5,7 +5,7 @@
 //! there is a queue of all values ever written, since a register shows only the last.
 //! The file belongs into memory (`/dev/shm`, `$XDG_RUNTIME_DIR`): on a disk, writing back its pages would stop
 //! the driver's loop.
-//! Who writes what: the emulator all of [`Inputs`] but the buttons, which are anybody's finger, and [`Tally`];
+//! Who writes what: the emulator all of [`Inputs`] but the buttons, which are anybody's finger, and [`TallyWords`];
 //! the driver, one at a time, [`Outputs`] and the queue.
 //! Invariant of the `unsafe` here: a mapping is never unmapped, is as long as [`Card`], page-aligned, and made
 //! of atomic words only, for which every bit pattern and every concurrent change is valid. Whoever shortens the
