@@ -94,6 +94,12 @@ fn an_app_is_upgraded_under_a_running_driver_and_no_device_is_zeroed_anew() {
             for (before, after) in before.iter().zip(at_lease) {
                 assert!((before - after).abs() <= 1, "{before} counts, then {after}");
             }
+            // Counts go on whatever is called zero; angles do not. A count is a tenth of a milliradian.
+            let angle = stand.view().read_latest().expect("frames").devices[0].joint_angle_rad;
+            let far = angle[..3].iter().zip(counts(stand.view())).all(|(angle, count)| {
+                (angle.abs() - count.abs() as f64 * ANGLE_OF_A_COUNT).abs() < 0.3 * angle.abs() + 1e-3
+            });
+            assert!(far, "zeroed anew: {angle:?} rad at {:?} counts", counts(stand.view()));
             moved = before[..3].iter().map(|count| count.abs()).sum();
             assert!(moved > 0, "it was pushed away");
             log.check_promise(stand.view());
@@ -109,6 +115,9 @@ fn an_app_is_upgraded_under_a_running_driver_and_no_device_is_zeroed_anew() {
         stand.finish();
     }
 }
+
+/// 2 pi / 4096 edges / a reduction of 11.3 to 13.5 (rad).
+const ANGLE_OF_A_COUNT: f64 = 1.24e-4;
 
 fn counts(driver: &DriverView) -> [i64; 6] {
     driver.read_latest().expect("frames").devices[0].encoder_counts
@@ -126,7 +135,9 @@ fn counts_in(driver: &DriverView, tick: u64) -> Option<[i64; 6]> {
 /// that stands still means is shown in `faults_driver_dies` without any right.
 #[test]
 fn a_hog_on_the_drivers_cpu_is_the_watchdogs_and_the_driver_comes_back() {
-    let stand = Stand::start(Setup::new("real"));
+    let mut setup = Setup::new("real");
+    setup.limits.watchdog_ms = 150;
+    let stand = Stand::start(setup);
     let app = stand.start_app();
     stand.wait_for_force();
     let Some(cpu) = stand.view().info().cpu else {

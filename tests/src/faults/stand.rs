@@ -25,8 +25,8 @@ pub const RATE_HZ: f64 = 2000.0;
 /// over 0.17 m, thrice (N).
 pub const CODE_N: f64 = 0.01;
 
-/// A watchdog for real time (ms): a stall of a virtual machine must not trip it, a dead driver must.
-pub const WATCHDOG_MS: u64 = 150;
+/// A watchdog for real time (ms): a stall of a loaded virtual machine must not trip it, a dead driver must.
+pub const WATCHDOG_MS: u64 = 500;
 /// One for lockstep (ms), where a tick lasts as long as both sides need.
 pub const LOCKSTEP_WATCHDOG_MS: u64 = 1000;
 
