@@ -3,7 +3,7 @@
 //! Problem: a signal's default action ends the process in the middle of a tick, motors on.
 //! Model: SIGTERM, SIGINT and SIGHUP set one word; the loop reads it each tick and ends in order.
 //! If ending hangs, the *same* SIGTERM or SIGINT once more ends the process at once, by the default
-//! action and with its exit status. A different one does not: a terminal sends SIGINT to parent and
+//! action and with its exit status, after the last act ([`crate::last_act`]). A different one does not: a terminal sends SIGINT to parent and
 //! child alike, a parent then sends its child SIGTERM, and systemd may send SIGHUP right after
 //! SIGTERM; none of these means "now".
 //! Invariants: installed for the rest of the process. A signal ends the sleep of the thread that
@@ -34,6 +34,7 @@ impl StopSignals {
         for number in [SIGTERM, SIGINT] {
             let came_before = Arc::new(AtomicBool::new(false));
             // Actions run in this order: the first signal finds the flag down, the second up.
+            crate::sys::at_once::perform_last_act_if(number, Arc::clone(&came_before))?;
             flag::register_conditional_default(number, Arc::clone(&came_before))?;
             flag::register(number, came_before)?;
         }

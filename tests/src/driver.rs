@@ -109,12 +109,17 @@ fn spawn_as(config: &str, socket: &Path, command: Command) -> Child {
 
 /// Waits for a child's end; one that hangs is killed and fails the test.
 pub fn wait_or_kill(child: &mut Child) -> ExitStatus {
+    wait_or_kill_after(child, HANG)
+}
+
+/// The same for one that may take longer.
+pub fn wait_or_kill_after(child: &mut Child, patience: Duration) -> ExitStatus {
     let begun = Instant::now();
     loop {
         if let Some(status) = child.try_wait().expect("our child") {
             return status;
         }
-        if begun.elapsed() > HANG {
+        if begun.elapsed() > patience {
             let _ = child.kill();
             panic!("process {} hangs", child.id());
         }

@@ -1,9 +1,8 @@
 //! `io-driver` by itself: refusing to start, and being watched.
 
-use std::io::{BufRead, BufReader};
-use std::process::Stdio;
-use system_tests::driver::{Driver, resting, wait_or_kill};
-use system_tests::programs::{io_driver, said};
+use system_tests::driver::{Driver, HANG, resting};
+use system_tests::faults::process::{self, End, Running};
+use system_tests::programs::io_driver;
 
 #[test]
 fn strict_refuses_to_start_without_a_guarantee_and_leaves_nothing_behind() {
@@ -14,9 +13,9 @@ fn strict_refuses_to_start_without_a_guarantee_and_leaves_nothing_behind() {
         .expect("written");
     let mut command = io_driver();
     command.args(["run", "--strict", "--config"]).arg(&config).arg("--socket").arg(&socket);
-    let (status, out, err) = said(&command.output().expect("it runs"));
-    assert_eq!(status, Some(2), "{err}");
-    assert_eq!(out, "");
+    // One that starts in spite of it is stopped by its time limit.
+    let End { status, out, err, .. } = Running::start(&mut command).end();
+    assert_eq!((status, out.as_str()), (Some(2), ""), "{err}");
     assert!(err.starts_with("io-driver: --strict: not every real-time guarantee was obtained"), "{err}");
     assert!(err.contains("MISSING   cpu: wanted 4095"), "{err}");
     assert!(!socket.exists() && !socket.parent().expect("a directory").exists());
@@ -27,21 +26,22 @@ fn watching_prints_a_line_a_second_until_the_driver_ends_and_says_how_it_ended()
     for json in [false, true] {
         let mut driver = Driver::start(&resting("real", 2));
         let mut watch = io_driver();
-        watch.args(["status", "--watch", "--socket"]).arg(driver.socket()).stdout(Stdio::piped());
+        watch.args(["status", "--watch", "--socket"]).arg(driver.socket());
         if json {
             watch.arg("--json");
         }
-        let mut watch = watch.spawn().expect("it starts");
-        let mut lines = BufReader::new(watch.stdout.take().expect("piped")).lines();
-        let mut next = || lines.next().expect("a line").expect("text");
+        let mut watch = Running::start(&mut watch);
+        let heard = watch.take_lines();
+        let next = || heard.recv_timeout(HANG).expect("a line in time");
         let ticks: Vec<u64> = (0..2).map(|_| tick_of(&next(), json)).collect();
         assert!(ticks[1] > ticks[0], "{ticks:?}");
-        let stop = io_driver().args(["stop", "--socket"]).arg(driver.socket()).output().expect("it runs");
-        assert_eq!(said(&stop).0, Some(0));
+        let stop = process::io_driver(&["stop"], driver.socket());
+        assert_eq!(stop.status, Some(0), "{stop:?}");
         assert_eq!(driver.wait().code(), Some(0));
-        let last = lines.by_ref().map_while(Result::ok).last().expect("a last line");
+        let last = std::iter::from_fn(|| heard.recv_timeout(HANG).ok()).last().expect("a last line");
         assert!(last.starts_with("the driver has ended: stopped in tick"), "{last}");
-        assert_eq!(wait_or_kill(&mut watch).code(), Some(0));
+        let end = watch.end();
+        assert_eq!(end.status, Some(0), "{end:?}");
     }
 }
 

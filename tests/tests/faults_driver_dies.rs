@@ -19,7 +19,11 @@ struct Death {
 
 /// A driver at full force to which something happens.
 fn die(clock: &'static str, sabotage: &str, strike: impl FnOnce(&Stand)) -> Death {
-    let mut stand = Stand::start(Setup::new(clock).sabotaged(sabotage));
+    die_in(Setup::new(clock).sabotaged(sabotage), strike)
+}
+
+fn die_in(setup: Setup, strike: impl FnOnce(&Stand)) -> Death {
+    let mut stand = Stand::start(setup);
     let app = stand.start_app();
     stand.wait_for_force();
     // In real time a stall of the machine may have let the force go meanwhile; it comes back.
@@ -133,6 +137,53 @@ fn check_signal_death(death: Death, signal: i32) {
     assert_eq!((words.kind, words.complete), (EpitaphKind::Signal(signal), true), "{words}");
     death.check_last_act();
     death.finish();
+}
+
+/// Shut out by the kernel, the call ends the driver: with its last act, and words that name the call.
+#[test]
+fn a_driver_that_makes_a_forbidden_call_in_its_loop_switches_off_by_its_last_act() {
+    for clock in ["real", "lockstep"] {
+        let death = die(clock, "forbidden-call@button20", |stand| stand.amplifiers.press(1 << 20));
+        // Where the kernel shuts out nothing, the call is made, and is a signal like any other.
+        assert!(matches!(death.end.signal, Some(31 | 11)), "{:?}", death.end);
+        assert!(death.words.is_some());
+        death.check_last_act();
+        death.finish();
+    }
+}
+
+/// The loop hangs with a force on, so that the driver cannot end in order, and somebody insists: the amplifiers
+/// do not have to wait for their watchdog.
+#[test]
+fn a_driver_that_is_told_twice_to_stop_while_its_loop_hangs_switches_off_by_its_last_act() {
+    for clock in ["real", "lockstep"] {
+        for signal in [Signal::TERM, Signal::INT] {
+            let mut setup = Setup::new(clock).sabotaged("hang:60000@button20");
+            setup.limits.watchdog_ms = 60_000;
+            let death = die_in(setup, |stand| {
+                stand.amplifiers.press(1 << 20);
+                let ticks = || stand.view().latest_tick();
+                // It hangs when no frame comes any more; 100 ms are 200 ticks.
+                wait_for("the hang", || {
+                    let before = ticks();
+                    std::thread::sleep(std::time::Duration::from_millis(100));
+                    ticks() == before
+                });
+                stand.driver.signal(signal);
+                // It is heard within a poll of 20 ms; heard too late, the second is the first.
+                std::thread::sleep(std::time::Duration::from_millis(100));
+                stand.driver.signal(signal);
+            });
+            assert_eq!(
+                (death.end.status, death.end.signal),
+                (None, Some(signal.as_raw())),
+                "{:?}",
+                death.end
+            );
+            death.check_last_act();
+            death.finish();
+        }
+    }
 }
 
 /// Nothing inside the process can help here.

@@ -7,7 +7,7 @@
 
 use super::arm::Arm;
 use super::{Device, Effort, Reading, TickTime, Written};
-use crate::emulator::card::{Card, DriversCard, QUEUE, STATUS_TRIPPED};
+use crate::emulator::card::{ARM_SHIFT, Card, DriversCard, QUEUE, STATUS_TRIPPED};
 use rt_core::clock::monotonic_ns;
 use rt_core::last_act;
 use shm_abi::FaultReason;
@@ -90,10 +90,18 @@ impl EmulatedDevice {
             record.number.store(0, Ordering::Release);
             record.time_ns.store(monotonic_ns(), Ordering::Relaxed);
             record.codes.store(packed, Ordering::Relaxed);
-            record.flags.store(u64::from(enable), Ordering::Relaxed);
+            let arm = u64::from(outputs.arm.load(Ordering::Relaxed));
+            record.flags.store(arm << ARM_SHIFT | u64::from(enable), Ordering::Relaxed);
             record.number.store(number, Ordering::Release);
-            outputs.enable.store(u32::from(enable), Ordering::Release);
+            // On before the value that says so, off after it: a register that is off while the last value says on
+            // was switched off by a last act.
+            if enable {
+                outputs.enable.store(1, Ordering::Release);
+            }
             outputs.written.store(number, Ordering::Release);
+            if !enable {
+                outputs.enable.store(0, Ordering::Release);
+            }
         });
     }
 }

@@ -27,6 +27,9 @@ pub const CHANNELS: usize = 8;
 /// Values that wait for being checked: a minute at 1 kHz.
 pub const QUEUE: usize = 1 << 16;
 
+/// [`Record::flags`]: where the arming that a value follows begins.
+pub const ARM_SHIFT: u32 = 32;
+
 /// [`Inputs::status`]: the amplifiers have switched themselves off.
 pub const STATUS_TRIPPED: u32 = 1;
 
@@ -72,7 +75,7 @@ pub struct Record {
     pub time_ns: AtomicU64,
     /// Codes of channels 0 to 3, 16 bits each, the first lowest.
     pub codes: AtomicU64,
-    /// Bit 0: the amplifiers are to be on. The rest: the pose that the codes are for does not matter.
+    /// Bit 0: the amplifiers are to be on. From [`ARM_SHIFT`] on: what [`Outputs::arm`] was.
     pub flags: AtomicU64,
 }
 
@@ -169,8 +172,12 @@ impl Card {
         options.read(true).write(true).create_new(true).mode(0o600);
         let file = options.open(path).map_err(system("make"))?;
         // Blocks are taken now: a full file system is told here instead of by a SIGBUS later.
-        rustix::fs::fallocate(&file, rustix::fs::FallocateFlags::empty(), 0, size_of::<Self>() as u64)
-            .map_err(|error| system("make room for")(error.into()))?;
+        let room = size_of::<Self>() as u64;
+        if let Err(error) = rustix::fs::fallocate(&file, rustix::fs::FallocateFlags::empty(), 0, room) {
+            // What is no card is in everybody's way.
+            let _ = std::fs::remove_file(path);
+            return Err(system("make room for")(error.into()));
+        }
         let card = map(&file).map_err(system("map"))?;
         card.inputs.pid.store(std::process::id(), Ordering::Relaxed);
         card.magic.store(MAGIC, Ordering::Release);

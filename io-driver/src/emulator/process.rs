@@ -1,7 +1,7 @@
 //! `io-driver emulate`: plays a card until a signal ends it, then says what it saw.
 
 use super::amplifier::{Amplifier, AmplifierSpec, Tally, Value};
-use super::card::{Card, QUEUE, Record, STATUS_TRIPPED};
+use super::card::{ARM_SHIFT, Card, QUEUE, Record, STATUS_TRIPPED};
 use super::motion::{Motion, Pose};
 use crate::device_file::PremiumFile;
 use crate::kinematics::Kinematics;
@@ -76,12 +76,8 @@ impl Emulator {
 
     /// Takes what was written, lets time pass to `now_ns`, tells.
     pub fn turn(&mut self, now_ns: u64) {
-        let arm = self.card.outputs.arm.load(Ordering::Acquire);
-        if arm != self.arm {
-            self.arm = arm;
-            self.amplifier.arm();
-        }
         let taken = self.take_values();
+        self.take_arming();
         // A register that is off by itself, not because a value that says so is still on its way.
         let is_on = self.card.outputs.enable.load(Ordering::Acquire) == 1;
         self.amplifier.pass(now_ns, is_on || taken > 0);
@@ -106,11 +102,30 @@ impl Emulator {
         while self.checked < written {
             self.checked += 1;
             match self.card.record(self.checked) {
-                Some(record) => self.amplifier.take(self.value_of(record), self.pose.joints),
+                Some(record) => {
+                    // Before this value and after all others, however late it is looked at.
+                    self.arm_if_newer((record.flags.load(Ordering::Relaxed) >> ARM_SHIFT) as u32);
+                    self.amplifier.take(self.value_of(record), self.pose.joints);
+                }
                 None => self.amplifier.lose(1),
             }
         }
         self.checked - before
+    }
+
+    /// Armed with no value after it yet. If one has come meanwhile, that one tells whether it is before or after.
+    fn take_arming(&mut self) {
+        let arm = self.card.outputs.arm.load(Ordering::Acquire);
+        if self.card.outputs.written.load(Ordering::Acquire) == self.checked {
+            self.arm_if_newer(arm);
+        }
+    }
+
+    fn arm_if_newer(&mut self, arm: u32) {
+        if arm.wrapping_sub(self.arm).cast_signed() > 0 {
+            self.arm = arm;
+            self.amplifier.arm();
+        }
     }
 
     fn value_of(&self, record: &Record) -> Value {
@@ -139,4 +154,74 @@ impl Emulator {
 /// What the amplifiers of a card have seen so far.
 pub fn tally_of(card: &Card) -> Tally {
     Tally::from_words(std::array::from_fn(|i| card.tally.words[i].load(Ordering::Relaxed)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device_file::{DeviceFile, builtin};
+    use crate::emulator::card::ARM_SHIFT;
+    use std::path::Path;
+
+    const MS: u64 = 1_000_000;
+
+    fn emulator(card: &'static Card) -> Emulator {
+        let text = builtin("premium-1.5").unwrap();
+        let Ok(DeviceFile::Premium(premium)) = DeviceFile::parse(text, Path::new("premium-1.5")) else {
+            panic!("it is built in");
+        };
+        // A step of a tenth of a newton a value.
+        let play = Play { peak_n: 8.5, step_n: 0.1, watchdog_ns: 1000 * MS, poll_ns: MS };
+        Emulator::new(card, *premium, Motion::Rest, play)
+    }
+
+    /// As a driver writes it, at most twelve converter steps, about a tenth of a newton, above the last.
+    fn write(card: &Card, code: u64, enable: bool) {
+        let number = card.outputs.written.load(Ordering::Relaxed) + 1;
+        let record = &card.queue[(number % QUEUE as u64) as usize];
+        let arm = u64::from(card.outputs.arm.load(Ordering::Relaxed));
+        record.time_ns.store(monotonic_ns(), Ordering::Relaxed);
+        record.codes.store(2048 | code << 16 | 2048 << 32, Ordering::Relaxed);
+        record.flags.store(arm << ARM_SHIFT | u64::from(enable), Ordering::Relaxed);
+        record.number.store(number, Ordering::Relaxed);
+        card.outputs.enable.store(u32::from(enable), Ordering::Relaxed);
+        card.outputs.written.store(number, Ordering::Release);
+    }
+
+    fn ramp(card: &Card) {
+        for step in 0..20 {
+            write(card, 2048 + 10 * step, true);
+        }
+    }
+
+    /// An emulator that was kept from running finds a force, its end, an arming and another force at once.
+    #[test]
+    fn an_arming_falls_between_the_values_that_it_came_between_however_late_it_is_seen() {
+        let directory = tempfile::tempdir().unwrap();
+        let card = Card::create(&directory.path().join("card")).unwrap();
+        let mut emulator = emulator(card);
+        ramp(card);
+        emulator.turn(monotonic_ns());
+        // These go on where the ramp ended; those after the arming begin at nothing.
+        write(card, 2048 + 200, true);
+        write(card, 2048, false);
+        card.outputs.arm.fetch_add(1, Ordering::AcqRel);
+        ramp(card);
+        emulator.turn(monotonic_ns());
+        let tally = tally_of(card);
+        assert_eq!((tally.checked, tally.wrong(), tally.switched_off), (42, 0, 0), "{tally:?}");
+    }
+
+    #[test]
+    fn an_arming_without_a_value_after_it_counts_too() {
+        let directory = tempfile::tempdir().unwrap();
+        let card = Card::create(&directory.path().join("card")).unwrap();
+        let mut emulator = emulator(card);
+        write(card, 0, true);
+        emulator.turn(monotonic_ns());
+        assert_eq!(card.inputs.status.load(Ordering::Relaxed), STATUS_TRIPPED, "no converter has that code");
+        card.outputs.arm.fetch_add(1, Ordering::AcqRel);
+        emulator.turn(monotonic_ns());
+        assert_eq!(card.inputs.status.load(Ordering::Relaxed), 0);
+    }
 }

@@ -2,6 +2,7 @@
 //!
 //! Each file holds one concern and hides it behind functions that cannot be misused.
 
+pub(crate) mod at_once;
 pub(crate) mod capability;
 pub(crate) mod counting_allocator;
 pub(crate) mod fatal;

@@ -1,12 +1,13 @@
 //! Processes to be stopped, killed and asked after.
 
-use crate::driver::{HANG, wait_or_kill};
+use crate::driver::{HANG, wait_or_kill_after};
 use crate::programs;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::{Pid, Signal, kill_process};
-use std::io::Read;
+use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Command, Stdio};
-use std::time::Instant;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
 
 /// A program's end and everything it said.
 #[derive(Debug)]
@@ -52,6 +53,18 @@ impl Running {
         self.child.wait().expect("our own child");
     }
 
+    /// Lets it go on if it was stopped.
+    pub fn go_on(&mut self) {
+        if !self.has_ended() {
+            self.signal(Signal::CONT);
+        }
+    }
+
+    /// Whether it has ended.
+    pub fn has_ended(&mut self) -> bool {
+        self.child.try_wait().expect("our own child").is_some()
+    }
+
     /// Fails the test with the program's words if it has ended.
     pub fn must_run(&mut self) {
         if self.child.try_wait().expect("our own child").is_some() {
@@ -76,13 +89,32 @@ impl Running {
         }
     }
 
+    /// The lines of its standard output, as they come; the channel ends with them. Its [`end`](Self::end) then
+    /// knows of none.
+    pub fn take_lines(&mut self) -> Receiver<String> {
+        let pipe = self.child.stdout.take().expect("taken once");
+        let (send, receive) = channel();
+        // It ends with the pipe, and the pipe with the program.
+        std::thread::spawn(move || {
+            BufReader::new(pipe).lines().map_while(Result::ok).try_for_each(|line| send.send(line))
+        });
+        receive
+    }
+
     /// Waits for its end.
     pub fn end(&mut self) -> End {
+        self.end_within(HANG)
+    }
+
+    /// Waits for the end of one that may take longer.
+    pub fn end_within(&mut self, patience: Duration) -> End {
         use std::os::unix::process::ExitStatusExt;
-        let status = wait_or_kill(&mut self.child);
+        let status = wait_or_kill_after(&mut self.child, patience);
         let text = |pipe: Option<&mut dyn Read>| {
             let mut bytes = Vec::new();
-            pipe.expect("piped").read_to_end(&mut bytes).expect("readable");
+            if let Some(pipe) = pipe {
+                pipe.read_to_end(&mut bytes).expect("readable");
+            }
             String::from_utf8_lossy(&bytes).into_owned()
         };
         let out = text(self.child.stdout.as_mut().map(|pipe| pipe as _));

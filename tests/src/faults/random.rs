@@ -20,6 +20,11 @@ impl Random {
         Self(seed)
     }
 
+    /// Begins at this seed, whatever the environment says.
+    pub fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
     /// Any word.
     pub fn word(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);

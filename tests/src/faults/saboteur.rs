@@ -28,6 +28,8 @@ pub enum Act {
     Overflow,
     /// A SIGSEGV, raised by the loop's own thread.
     Segv,
+    /// A system call that a driver has no use for: it could send any process a signal.
+    ForbiddenCall,
     /// `abort`, on the loop's own thread.
     Abort,
     /// The process exits without a word.
@@ -42,6 +44,9 @@ pub enum Act {
     Unwritable,
     /// The loop stands still.
     Hang(Duration),
+    /// From now on each reading takes some 0.1 ms: in lockstep ticks would else come faster than a minute's
+    /// queue of a card holds them while its emulator stands still.
+    Pace,
 }
 
 /// When.
@@ -98,6 +103,7 @@ impl Act {
             "panic-after-write" => Self::PanicAfterWrite,
             "overflow" => Self::Overflow,
             "segv" => Self::Segv,
+            "forbidden-call" => Self::ForbiddenCall,
             "abort" => Self::Abort,
             "exit" => Self::Exit,
             "nan" => Self::Nan,
@@ -105,6 +111,7 @@ impl Act {
             "unreadable" => Self::Unreadable,
             "unwritable" => Self::Unwritable,
             "hang" => Self::Hang(time),
+            "pace" => Self::Pace,
             _ => return None,
         })
     }
@@ -116,6 +123,7 @@ pub struct Saboteur {
     plan: Vec<Sabotage>,
     /// What is to be done when this tick's force is written.
     at_write: Option<Act>,
+    is_paced: bool,
 }
 
 impl Saboteur {
@@ -129,7 +137,7 @@ impl Saboteur {
         match std::env::var(SABOTAGE_VARIABLE) {
             Ok(text) if !ENGAGED.swap(true, Ordering::Relaxed) => {
                 let plan = Sabotage::plan(&text).expect("a plan");
-                Box::new(Self { inner, plan, at_write: None })
+                Box::new(Self { inner, plan, at_write: None, is_paced: false })
             }
             _ => inner,
         }
@@ -153,6 +161,10 @@ impl Saboteur {
             Act::Segv => {
                 let _ = signal_hook::low_level::raise(rustix::process::Signal::SEGV.as_raw());
             }
+            Act::ForbiddenCall => {
+                let own = rustix::process::getpid();
+                let _ = rustix::process::kill_process(own, rustix::process::Signal::SEGV);
+            }
             Act::Abort => std::process::abort(),
             Act::Exit => std::process::exit(0),
             Act::Nan => {
@@ -163,6 +175,7 @@ impl Saboteur {
             }
             Act::Unreadable => return Err(FaultReason::DeviceRead),
             Act::Hang(time) => std::thread::sleep(time),
+            Act::Pace => self.is_paced = true,
             Act::PanicBeforeWrite | Act::PanicAfterWrite | Act::Unwritable => self.at_write = Some(act),
         }
         Ok(reading)
@@ -175,6 +188,9 @@ impl Device for Saboteur {
     }
 
     fn read(&mut self, time: TickTime) -> Result<Reading, FaultReason> {
+        if self.is_paced {
+            std::thread::sleep(PACE);
+        }
         let reading = self.inner.read(time)?;
         match self.due(time.tick, reading.buttons) {
             Some(act) => self.spoil(act, reading),
@@ -202,6 +218,9 @@ impl Device for Saboteur {
         self.inner.rearm();
     }
 }
+
+/// With what a sleep takes besides, 10,000 ticks a second at most: the queue holds six seconds.
+const PACE: Duration = Duration::from_micros(50);
 
 /// Never returns: each call needs a page more of a stack that ends.
 #[expect(unconditional_recursion, reason = "that is the sabotage")]

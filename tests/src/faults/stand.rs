@@ -25,10 +25,10 @@ pub const RATE_HZ: f64 = 2000.0;
 /// over 0.17 m, thrice (N).
 pub const CODE_N: f64 = 0.01;
 
-/// A watchdog for real time (ms): a stall of a virtual machine must not trip it, a dead driver must.
-pub const WATCHDOG_MS: u64 = 150;
+/// A watchdog for real time (ms): a stall of a loaded virtual machine must not trip it, a dead driver must.
+pub const WATCHDOG_MS: u64 = 500;
 /// One for lockstep (ms), where a tick lasts as long as both sides need.
-pub const LOCKSTEP_WATCHDOG_MS: u64 = 2000;
+pub const LOCKSTEP_WATCHDOG_MS: u64 = 1000;
 
 const SCENE: &str = "\
 [[finger]]
@@ -144,6 +144,13 @@ impl Stand {
     pub fn restart_driver(&mut self) {
         self.driver = Running::start(&mut self.driver_command());
         self.observer = observe(&self.socket(), &mut self.driver);
+    }
+
+    /// Looks on at the present driver, if it listens.
+    pub fn try_to_observe(&self) -> Option<Attachment> {
+        let attachment = client::observe(&self.socket(), "test").ok()?;
+        // Not one that died a moment ago.
+        (attachment.driver_pid == u64::from(self.driver.id())).then_some(attachment)
     }
 
     /// Plays a card again after the former emulator was killed. No driver may live.

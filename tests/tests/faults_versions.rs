@@ -1,0 +1,83 @@
+//! Programs of different releases meet: whoever cannot share memory parts with a message, and nobody else notices.
+
+use bytemuck::Zeroable;
+use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
+use shm_abi::{ABI_MAJOR, ABI_MINOR, LAYOUT_HASH};
+use std::io::{Read, Write};
+use std::os::unix::net::UnixListener;
+use system_tests::faults::knock::{self, foreigners};
+use system_tests::faults::press::Table;
+use system_tests::faults::process::Running;
+use system_tests::faults::ring::{RingLog, Told};
+use system_tests::faults::stand::{Setup, Stand};
+
+#[test]
+fn apps_of_other_versions_are_refused_with_both_versions_while_the_devices_are_commanded() {
+    for clock in ["real", "lockstep"] {
+        let mut stand = Stand::start(Setup::new(clock));
+        let app = stand.start_app();
+        stand.wait_for_force();
+        let mut log = RingLog::begin(stand.view());
+        for foreigner in foreigners() {
+            let answer = knock::ask(&stand.socket(), &foreigner.request).expect("an answer");
+            knock::check(&foreigner, &answer);
+        }
+        log.follow_for(stand.view(), 50);
+        log.check_promise(stand.view());
+        assert!(log.told.iter().any(Told::is_pushing));
+        assert!(log.told.iter().all(|told| told.lease == 1), "no lease was given or taken");
+        drop(app);
+        stand.driver.must_run();
+        stand.finish();
+    }
+}
+
+/// A minor version adds requests and changes no memory; the layout has the last word.
+#[test]
+fn an_app_of_another_minor_version_with_the_same_layout_is_served() {
+    let stand = Stand::start(Setup::new("real"));
+    let observe = Request::new(RequestKind::Observe, "newer");
+    let newer = u64::from(ABI_MAJOR) << 32 | u64::from(ABI_MINOR + 1);
+    let answer = knock::ask(&stand.socket(), &Request { abi_version: newer, ..observe }).expect("an answer");
+    assert_eq!(Verdict::from_word(answer.verdict), Some(Verdict::Granted));
+    stand.finish();
+}
+
+/// What a driver of another release says, and what the application makes of it.
+#[test]
+fn an_app_that_meets_a_driver_of_another_version_says_which_both_are() {
+    let own = Answer::new(Verdict::Granted);
+    let newer = u64::from(ABI_MAJOR + 1) << 32;
+    let (theirs, ours) = (format!("{}.0", ABI_MAJOR + 1), format!("{ABI_MAJOR}.{ABI_MINOR}"));
+    let cases = [
+        (
+            Answer { abi_version: newer, verdict: Verdict::WrongVersion as u64, ..own },
+            [theirs.clone(), ours.clone()],
+        ),
+        // One that does not even know that it should have refused.
+        (Answer { abi_version: newer, ..own }, [theirs, ours]),
+        (
+            Answer { layout_hash: !LAYOUT_HASH, verdict: Verdict::WrongLayout as u64, ..own },
+            [format!("0x{:016x}", !LAYOUT_HASH), format!("0x{LAYOUT_HASH:016x}")],
+        ),
+        (Answer { magic: 0x5048, ..own }, ["is not a driver's socket".into(), "name another one".into()]),
+    ];
+    for (answer, expected) in cases {
+        let table = Table::new();
+        let socket = table.path("driver.sock");
+        let listener = UnixListener::bind(&socket).expect("a socket");
+        let driver = std::thread::spawn(move || {
+            let (mut stream, _) = listener.accept().expect("a client");
+            let mut request = Request::zeroed();
+            stream.read_exact(bytemuck::bytes_of_mut(&mut request)).expect("a request");
+            stream.write_all(bytemuck::bytes_of(&answer)).expect("it is told");
+        });
+        let mut app = table.app("real");
+        let end = Running::start(app.args(["--seconds", "1", "--attach"]).arg(&socket)).end();
+        driver.join().expect("it was asked");
+        assert_eq!((end.status, end.out.as_str()), (Some(2), ""), "{end:?}");
+        for words in expected {
+            assert!(end.err.contains(&words), "{words}: {end:?}");
+        }
+    }
+}
