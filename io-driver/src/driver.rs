@@ -83,6 +83,11 @@ pub enum RunError {
     /// The parent had ended before its child was ready.
     #[error("{0}")]
     Orphaned(String),
+    /// The loop did not end when it was asked to.
+    #[error(
+        "the driver's loop hangs in tick {0} and did not end within 2 s; the motors were switched off behind its back"
+    )]
+    Hung(u64),
     /// The loop panicked.
     #[error("the driver's loop panicked; the motors were written zero: {0}")]
     Panicked(String),
@@ -91,7 +96,7 @@ pub enum RunError {
 impl RunError {
     /// Whether something failed during the run, rather than before it.
     pub fn is_fault(&self) -> bool {
-        matches!(self, Self::Panicked(_))
+        matches!(self, Self::Panicked(_) | Self::Hung(_))
     }
 }
 

@@ -18,8 +18,12 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
+/// A loop that was asked to end does so within a tick. A stall of the machine is shorter than this, and so is the
+/// patience of whoever stops a driver whose motors push.
+const PATIENCE: Duration = Duration::from_secs(2);
+const HUNG: &str = "the loop hangs; the motors were switched off behind its back";
 /// How often the socket's thread looks at signals and at the log when nothing else happens.
 const POLL: Duration = Duration::from_millis(20);
 
@@ -115,11 +119,20 @@ impl Service<'_> {
     ) -> Result<(), RunError> {
         self.supervisor.stopping(served.as_deref().unwrap_or("a fault of the socket"));
         self.shared.stop.store(true, Ordering::Relaxed);
-        let ended = thread.join();
+        let has_ended = wait_for_end(&thread);
+        if !has_ended {
+            // It will not do it any more, and must not undo it.
+            rt_core::last_act::perform();
+        }
         self.write_log();
         tidy_up(self.server, self.options);
         let reason = served?;
-        match ended {
+        if !has_ended {
+            let tick = TICK.load(Ordering::Relaxed);
+            EpitaphRef::new(&self.memory.epitaph).write(EpitaphKind::Fault, tick, HUNG);
+            return Err(RunError::Hung(tick));
+        }
+        match thread.join() {
             Ok(Ended::Stopped) => {
                 let tick = TICK.load(Ordering::Relaxed);
                 EpitaphRef::new(&self.memory.epitaph).write(EpitaphKind::Stopped, tick, &reason);
@@ -132,6 +145,15 @@ impl Service<'_> {
             }
         }
     }
+}
+
+/// Whether the loop ended in time.
+fn wait_for_end(thread: &JoinHandle<Ended>) -> bool {
+    let begun = Instant::now();
+    while !thread.is_finished() && begun.elapsed() < PATIENCE {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    thread.is_finished()
 }
 
 /// For the service manager; the rest is told by `io-driver status`.

@@ -272,6 +272,36 @@ fn a_loop_that_hangs_is_the_watchdogs_and_a_loop_that_goes_on_finds_the_amplifie
 }
 
 #[test]
+fn a_driver_whose_loop_hangs_for_ever_is_stopped_all_the_same_with_the_motors_off() {
+    for clock in ["real", "lockstep"] {
+        // A watchdog that does not come: the driver has to do it.
+        let mut setup = Setup::new(clock).sabotaged("hang:600000@button20");
+        setup.limits.watchdog_ms = 600_000;
+        let mut stand = Stand::start(setup);
+        let app = stand.start_app();
+        stand.wait_for_force();
+        stand.amplifiers.press(1 << 20);
+        wait_for("a loop that stands", || {
+            let tick = stand.view().latest_tick();
+            std::thread::sleep(std::time::Duration::from_millis(100));
+            stand.view().latest_tick() == tick
+        });
+        assert!(stand.amplifiers.are_enabled(), "the force stays");
+        client::stop(&stand.socket(), "test").expect("it is told");
+        let end = stand.driver.end();
+        assert_eq!(end.status, Some(3), "{end:?}");
+        assert!(end.err.contains("the driver's loop hangs"), "{end:?}");
+        let words = epitaph::read(&stand.view().epitaph).expect("an epitaph");
+        assert_eq!(words.kind, EpitaphKind::Fault, "{words}");
+        stand.amplifiers.settle();
+        stand.amplifiers.check_off("a hung loop");
+        drop(app);
+        let seen = stand.finish_after_death();
+        assert_eq!((seen.tally.watchdog_trips, seen.tally.switched_off), (0, 1));
+    }
+}
+
+#[test]
 fn a_driver_that_is_stopped_and_continued_finds_its_amplifiers_tripped() {
     for clock in ["real", "lockstep"] {
         let stand = Stand::start(Setup::new(clock));

@@ -2,7 +2,9 @@
 //! CPU.
 
 use bytemuck::Zeroable;
+use io_driver::device_file::{self, DeviceFile};
 use shm_abi::{DriverState, DriverView, Frame, client};
+use std::path::Path;
 use std::sync::atomic::Ordering;
 use system_tests::faults::amplifiers::{emulate, wait_for};
 use system_tests::faults::heal::another_phantom3;
@@ -94,12 +96,7 @@ fn an_app_is_upgraded_under_a_running_driver_and_no_device_is_zeroed_anew() {
             for (before, after) in before.iter().zip(at_lease) {
                 assert!((before - after).abs() <= 1, "{before} counts, then {after}");
             }
-            // Counts go on whatever is called zero; angles do not. A count is a tenth of a milliradian.
-            let angle = stand.view().read_latest().expect("frames").devices[0].joint_angle_rad;
-            let far = angle[..3].iter().zip(counts(stand.view())).all(|(angle, count)| {
-                (angle.abs() - count.abs() as f64 * ANGLE_OF_A_COUNT).abs() < 0.3 * angle.abs() + 1e-3
-            });
-            assert!(far, "zeroed anew: {angle:?} rad at {:?} counts", counts(stand.view()));
+            check_zero(stand.view());
             moved = before[..3].iter().map(|count| count.abs()).sum();
             assert!(moved > 0, "it was pushed away");
             log.check_promise(stand.view());
@@ -116,8 +113,21 @@ fn an_app_is_upgraded_under_a_running_driver_and_no_device_is_zeroed_anew() {
     }
 }
 
-/// 2 pi / 4096 edges / a reduction of 11.3 to 13.5 (rad).
-const ANGLE_OF_A_COUNT: f64 = 1.24e-4;
+/// Counts go on whatever is called zero; angles do not. The emulator's counters began at zero, at home, so an
+/// angle is its count's for ever.
+fn check_zero(driver: &DriverView) {
+    let text = device_file::builtin("premium-1.5").expect("it is built in");
+    let Ok(DeviceFile::Premium(premium)) = DeviceFile::parse(text, Path::new("premium-1.5")) else {
+        panic!("a premium")
+    };
+    let device = driver.read_latest().expect("frames").devices[0];
+    let [a, b, c, ..] = device.encoder_counts;
+    let expected = premium.joint_map().counts_to_angles([a, b, c]);
+    for (found, expected) in device.joint_angle_rad.iter().zip(expected) {
+        // The same product; a count is 1.2e-4 rad.
+        assert!((found - expected).abs() < 1e-9, "zeroed anew: {device:?}");
+    }
+}
 
 fn counts(driver: &DriverView) -> [i64; 6] {
     driver.read_latest().expect("frames").devices[0].encoder_counts
