@@ -27,19 +27,19 @@ pub struct EmulateArgs {
     #[arg(long, value_name = "FILE", conflicts_with = "viscosity")]
     trace: Option<PathBuf>,
     /// Yield to the motors like an arm in treacle of this viscosity (N m s/rad), instead of standing still
-    #[arg(long = "yield", value_name = "NMS")]
+    #[arg(long = "yield", value_name = "NMS", allow_negative_numbers = true)]
     viscosity: Option<f64>,
     /// The amplifiers switch off after so much silence of the driver
-    #[arg(long, value_name = "MS", default_value_t = 10.0)]
+    #[arg(long, value_name = "MS", default_value_t = 10.0, allow_negative_numbers = true)]
     watchdog_ms: f64,
     /// Refuse forces beyond this [default: the description's peak]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     peak_n: Option<f64>,
     /// Refuse forces that grow by more than this from one value to the next [default: any]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     step_n: Option<f64>,
     /// Look at the registers so often
-    #[arg(long, value_name = "US", default_value_t = 500.0)]
+    #[arg(long, value_name = "US", default_value_t = 500.0, allow_negative_numbers = true)]
     poll_us: f64,
 }
 
@@ -60,8 +60,8 @@ fn play(args: &EmulateArgs) -> Result<ExitCode, Box<dyn Error>> {
     let premium = describe(&args.description)?;
     let motion = motion(args, &premium)?;
     let play = Play {
-        peak_n: args.peak_n.unwrap_or(premium.peak_force_n),
-        step_n: args.step_n.unwrap_or(f64::INFINITY),
+        peak_n: limit("--peak-n", args.peak_n.unwrap_or(premium.peak_force_n))?,
+        step_n: limit("--step-n", args.step_n.unwrap_or(f64::INFINITY))?,
         watchdog_ns: positive("--watchdog-ms", args.watchdog_ms, 1e6)?,
         poll_ns: positive("--poll-us", args.poll_us, 1e3)?,
     };
@@ -103,6 +103,15 @@ fn motion(args: &EmulateArgs, premium: &PremiumFile) -> Result<Motion, Box<dyn E
 
 fn read(file: &Path) -> Result<String, Box<dyn Error>> {
     std::fs::read_to_string(file).map_err(|error| format!("cannot read {}: {error}", file.display()).into())
+}
+
+/// Not a number would let everything pass.
+fn limit(option: &str, newtons: f64) -> Result<f64, Box<dyn Error>> {
+    if newtons >= 0.0 {
+        Ok(newtons)
+    } else {
+        Err(format!("{option}: found {newtons}, allowed: 0 N and more").into())
+    }
 }
 
 /// Nanoseconds of a positive number of `unit_ns`, up to a day.

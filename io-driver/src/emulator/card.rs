@@ -116,6 +116,12 @@ pub enum CardError {
         /// What the system said.
         source: io::Error,
     },
+    /// There is none.
+    #[error("there is no emulated card {file}; start `io-driver emulate --card {file}` first")]
+    Missing {
+        /// Which.
+        file: PathBuf,
+    },
     /// It is something else.
     #[error(
         "{file} is no emulated card of this version (found {found}, expected {expected}); start `io-driver emulate --card {file}` of the same release first"
@@ -228,7 +234,11 @@ const HEARTBEATS: Duration = Duration::from_millis(200);
 
 fn open_file(path: &Path) -> Result<(&'static Card, File), CardError> {
     let system = |what| move |source| CardError::System { what, file: path.into(), source };
-    let file = OpenOptions::new().read(true).write(true).open(path).map_err(system("open"))?;
+    let opened = OpenOptions::new().read(true).write(true).open(path);
+    let file = opened.map_err(|source| match source.kind() {
+        io::ErrorKind::NotFound => CardError::Missing { file: path.into() },
+        _ => system("open")(source),
+    })?;
     let bytes = file.metadata().map_err(system("look at"))?.len();
     let no_card = |found: String, expected: String| CardError::NoCard { file: path.into(), found, expected };
     if bytes != size_of::<Card>() as u64 {
@@ -275,7 +285,7 @@ mod tests {
     #[test]
     fn what_is_no_card_is_refused_with_what_was_found() {
         let (_directory, path) = place();
-        assert!(Card::take(&path).unwrap_err().to_string().starts_with("cannot open the emulated card"));
+        assert!(Card::take(&path).unwrap_err().to_string().starts_with("there is no emulated card"));
         std::fs::write(&path, b"no card").unwrap();
         let short = Card::take(&path).unwrap_err().to_string();
         assert!(short.contains("found 7 bytes"), "{short}");
