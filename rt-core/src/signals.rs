@@ -2,8 +2,8 @@
 //!
 //! Problem: a signal's default action ends the process in the middle of a tick, motors on.
 //! Model: SIGTERM, SIGINT and SIGHUP set one word; the loop reads it each tick and ends in order.
-//! If ending hangs, the *same* SIGTERM or SIGINT once more ends the process at once, by the default
-//! action and with its exit status. A different one does not: a terminal sends SIGINT to parent and
+//! If ending hangs, the *same* SIGTERM or SIGINT once more performs the last act ([`crate::last_act`]) and ends
+//! the process at once, by the default action and with its exit status. A different one does not: a terminal sends SIGINT to parent and
 //! child alike, a parent then sends its child SIGTERM, and systemd may send SIGHUP right after
 //! SIGTERM; none of these means "now".
 //! Invariants: installed for the rest of the process. A signal ends the sleep of the thread that
@@ -11,6 +11,7 @@
 //! ignored, as Rust's start-up code leaves it: a write to a closed socket is an error, not a death.
 //! Cost: one relaxed load a tick.
 
+use crate::sys::signal_action::on_signal_if;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
 use std::io;
@@ -34,6 +35,7 @@ impl StopSignals {
         for number in [SIGTERM, SIGINT] {
             let came_before = Arc::new(AtomicBool::new(false));
             // Actions run in this order: the first signal finds the flag down, the second up.
+            on_signal_if(number, Arc::clone(&came_before), crate::last_act::perform)?;
             flag::register_conditional_default(number, Arc::clone(&came_before))?;
             flag::register(number, came_before)?;
         }

@@ -9,6 +9,7 @@ pub(crate) mod malloc;
 pub(crate) mod mapped_word;
 pub(crate) mod sched;
 pub(crate) mod seccomp;
+pub(crate) mod signal_action;
 pub(crate) mod stack;
 
 mod static_registers;
