@@ -207,6 +207,10 @@ mod tests {
                 "rate_hz = nan\n[[device]]\nbackend = \"ideal\"",
                 "lab/driver.toml:1: `rate_hz`: found NaN, allowed: 10 to 20000 Hz",
             ),
+            (
+                "[safety]\ndead_man = { device = \"f0\", button = 0, normally_closed = true }\n[[device]]\nbackend = \"ideal\"",
+                "lab/driver.toml:2: `safety.dead_man.normally_closed`: found true, allowed: false: held has to close the circuit, or a cut wire would hold it",
+            ),
             ("device = []", "lab/driver.toml:1: `device`: found 0 devices, allowed: 1 to 8"),
             (
                 "[[device]]\nbackend = \"replay\"\ntrace = \"t\"",

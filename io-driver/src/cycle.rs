@@ -146,8 +146,12 @@ impl Cycle {
         former
     }
 
-    /// Somebody asked to leave the fault state.
+    /// Somebody asked to leave the fault state. Without a fault nothing happens: amplifiers must not be armed anew
+    /// under force, nor the guards made to forget what they watch.
     pub fn clear_fault(&mut self) {
+        if self.safety.fault() == FaultReason::None {
+            return;
+        }
         self.safety.clear_fault();
         self.devices.iter_mut().for_each(|device| device.rearm());
         self.guards.iter_mut().for_each(Guard::lose_sight);

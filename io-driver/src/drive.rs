@@ -31,6 +31,8 @@ pub struct Drive {
     /// What holds the arm's own weight, if that is wanted.
     gravity: Option<Gravity>,
     current_a: [f64; 3],
+    /// The motors were switched off since the time that was last accounted for.
+    is_released: bool,
 }
 
 impl Drive {
@@ -43,6 +45,7 @@ impl Drive {
             heat: [Heat::unknown(heat); 3],
             gravity,
             current_a: [0.0; 3],
+            is_released: false,
         }
     }
 
@@ -51,16 +54,20 @@ impl Drive {
         self.motors.zero_codes()
     }
 
-    /// Time went by (s) with the currents of the last codes.
+    /// Time went by (s) with the currents of the last codes. If the motors were released meanwhile nobody knows
+    /// when, and all of it counts as with currents: a fault that follows a stall comes at its end.
     pub fn pass(&mut self, elapsed_s: f64) {
         for (heat, current_a) in self.heat.iter_mut().zip(self.current_a) {
             heat.flow(current_a, elapsed_s);
         }
+        if std::mem::take(&mut self.is_released) {
+            self.current_a = [0.0; 3];
+        }
     }
 
-    /// The motors are off.
+    /// The motors are off from now on.
     pub fn release(&mut self) {
-        self.current_a = [0.0; 3];
+        self.is_released = true;
     }
 
     /// Codes for an effort in a pose, and what they amount to.
@@ -77,6 +84,7 @@ impl Drive {
         let allowed = self.heat.map(|heat| heat.allowed_current_a(self.peak_current_a));
         let command = self.motors.command_within(torque.into(), allowed);
         self.current_a = self.motors.current_a(command.codes);
+        self.is_released = false;
         let residual =
             Vector3::from(self.motors.joint_torque(command.codes)) - weight - wanted * command.scale;
         let written = Written {
@@ -179,6 +187,28 @@ mod tests {
         let turned = written.force_on_user_n.normalize().cross(&force.normalize()).norm();
         // Half a converter step of 5 mN on some 2 N.
         assert!(turned < 5e-3, "{turned}");
+    }
+
+    /// A loop that stalled held its last codes all the while, whatever it does first when it wakes.
+    #[test]
+    fn a_release_does_not_undo_the_warmth_of_the_time_before_it() {
+        let motor_heat = |is_released: bool| {
+            let mut drive = drive(false);
+            drive.render(JOINTS, push(Vector3::y() * 6.0)).unwrap();
+            if is_released {
+                drive.release();
+            }
+            drive.pass(5.0);
+            drive.render(JOINTS, Effort::default()).unwrap().1.motor_heat
+        };
+        assert_eq!(motor_heat(true), motor_heat(false));
+        let mut drive = drive(false);
+        drive.render(JOINTS, push(Vector3::y() * 6.0)).unwrap();
+        drive.release();
+        drive.pass(1e-3);
+        let before = drive.heat[1].rise();
+        drive.pass(1.0);
+        assert!(drive.heat[1].rise() < before, "off, it cools");
     }
 
     #[test]

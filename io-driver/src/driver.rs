@@ -153,9 +153,8 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
     say(options, format_args!("listening at {}", server.path().display()));
     let thread = starter.start(real_loop);
     supervisor.ready(&format!("listening at {}", server.path().display()));
-    let mut service = Service { server, sender, drain, memory, signals, shared, options, supervisor };
-    let served = service.serve();
-    service.finish(thread, served)
+    let service = Service { server, sender, drain, memory, signals, shared, options, supervisor };
+    service.run(thread)
 }
 
 /// Makes this process end with its parent, if it is to.

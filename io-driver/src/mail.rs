@@ -58,9 +58,13 @@ impl Sender {
 }
 
 impl Inbox {
-    /// Collects all mail, at the start of a tick.
+    /// Collects all mail, at the start of a tick. An emergency stop comes last, whatever else is there: who asked to
+    /// leave a fault in the same tick cannot have known of it.
     pub fn deliver(&mut self, cycle: &mut Cycle) {
-        while let Ok(letter) = self.letters.pop() {
+        let mut is_emergency = false;
+        // Bounded by what was there when it began, so that a flood of letters takes turns with ticks.
+        for _ in 0..self.letters.slots() {
+            let Ok(letter) = self.letters.pop() else { break };
             let waste = match letter {
                 Letter::Grant(view) => cycle.grant(view),
                 Letter::End(lease) => cycle.end_lease(lease),
@@ -69,11 +73,14 @@ impl Inbox {
                     None
                 }
                 Letter::EmergencyStop => {
-                    cycle.fault(FaultReason::EmergencyStop);
+                    is_emergency = true;
                     None
                 }
             };
             self.throw_away(waste);
+        }
+        if is_emergency {
+            cycle.fault(FaultReason::EmergencyStop);
         }
         let former = cycle.change_lease();
         self.throw_away(former);

@@ -107,13 +107,14 @@ fn open(device: &DeviceConfig, config: &DriverConfig) -> Result<Box<dyn Device>,
             let premium = mechanism(device, description)?;
             let trace = EncoderTrace::parse(&read(device, trace)?, trace, premium.encoders.count_bits)?;
             let info = commissioned(premium_info(device, &premium), config);
-            let arm = Arm::new(&premium, device.compensates_gravity);
+            let arm = Arm::new(&premium, holds_its_weight(device, config));
             Ok(Box::new(ReplayDevice::new(info, EncoderReplay::new(trace), arm)))
         }
         Backend::Emulated { description, card } => {
             let premium = mechanism(device, description)?;
             let info = commissioned(premium_info(device, &premium), config);
-            emulated(device, description, card, &premium, info)
+            let arm = Arm::new(&premium, holds_its_weight(device, config));
+            emulated(device, description, card, &premium, info, arm)
         }
     }
 }
@@ -131,12 +132,19 @@ fn commissioned(info: DeviceInfo, config: &DriverConfig) -> DeviceInfo {
     }
 }
 
+/// Not in commissioning: the torques that hold an arm up are no force that a guard could cut, and a motor whose
+/// sign nobody has tried yet would drive the arm with them.
+fn holds_its_weight(device: &DeviceConfig, config: &DriverConfig) -> bool {
+    device.compensates_gravity && config.safety.commissioning.is_none()
+}
+
 fn emulated(
     device: &DeviceConfig,
     description: &Path,
     card: &Path,
     premium: &PremiumFile,
     info: DeviceInfo,
+    arm: Arm,
 ) -> Result<Box<dyn Device>, OpenError> {
     let name = || device.name.clone();
     if let Some(channel) = premium.motors.channel.into_iter().find(|channel| *channel > 3) {
@@ -144,7 +152,6 @@ fn emulated(
     }
     let hold = Card::take(card).map_err(|source| OpenError::Card { device: name(), source })?;
     let channels = Channels { encoders: premium.encoders.channel, motors: premium.motors.channel };
-    let arm = Arm::new(premium, device.compensates_gravity);
     let device = EmulatedDevice::new(info, hold, arm, channels)
         .map_err(|source| OpenError::Registers { device: name(), source })?;
     Ok(Box::new(device))
@@ -235,5 +242,35 @@ fn premium_info(device: &DeviceConfig, premium: &PremiumFile) -> DeviceInfo {
         workspace_max_m: corner(1.0),
         slew_n_per_s: premium.slew_n_per_s,
         speed_limit_m_per_s: premium.speed_limit_m_per_s,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::{Effort, TickTime};
+
+    /// An arm in a replay, told to hold its weight and nothing else: the codes that come out.
+    fn codes(commissioning: bool) -> [i64; 3] {
+        let name = format!("phantom3-open-{}-{commissioning}.csv", std::process::id());
+        let trace = std::env::temp_dir().join(name);
+        std::fs::write(&trace, "t,c0,c1,c2\n0,0,0,0\n").unwrap();
+        let text = format!(
+            "[safety]\ncommissioning = {commissioning}\n[[device]]\nbackend = \"replay\"\n\
+             description = \"premium-1.5\"\ntrace = {trace:?}\ngravity_compensation = true\n"
+        );
+        let config = DriverConfig::parse(&text, Path::new("driver.toml")).unwrap();
+        let devices = open_devices(&config);
+        std::fs::remove_file(&trace).unwrap();
+        let device = &mut devices.unwrap()[0];
+        device.read(TickTime { tick: 1, period_ns: 1_000_000, run_tick: 0 }).unwrap();
+        let effort = Effort { gravity_share: 1.0, ..Effort::default() };
+        device.write(effort).unwrap().motor_codes
+    }
+
+    #[test]
+    fn an_arm_in_commissioning_does_not_hold_its_weight_with_motors_that_nobody_has_tried() {
+        assert_ne!(codes(false), [2048; 3], "the weight can be felt in the zeroing pose");
+        assert_eq!(codes(true), [2048; 3]);
     }
 }

@@ -14,6 +14,7 @@ use rt_core::log::{LogLevel, LogLine, RtLogDrain};
 use rt_core::signals::StopSignals;
 use shm_abi::DriverMemory;
 use shm_abi::server::{Server, ServerEvent};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -40,8 +41,14 @@ pub(crate) struct Service<'a> {
 }
 
 impl Service<'_> {
+    /// Serves to the end, and sees to it that the loop writes zero then.
+    pub(crate) fn run(mut self, thread: JoinHandle<Ended>) -> Result<(), RunError> {
+        let served = caught(|| self.serve());
+        self.finish(thread, served)
+    }
+
     /// Serves until something asks the driver to stop; returns what.
-    pub(crate) fn serve(&mut self) -> Result<String, RunError> {
+    fn serve(&mut self) -> Result<String, RunError> {
         let mut events = Vec::new();
         loop {
             self.server
@@ -112,11 +119,7 @@ impl Service<'_> {
     }
 
     /// Ends the loop, writes the last words and says how it was.
-    pub(crate) fn finish(
-        mut self,
-        thread: JoinHandle<Ended>,
-        served: Result<String, RunError>,
-    ) -> Result<(), RunError> {
+    fn finish(mut self, thread: JoinHandle<Ended>, served: Result<String, RunError>) -> Result<(), RunError> {
         self.supervisor.stopping(served.as_deref().unwrap_or("a fault of the socket"));
         self.shared.stop.store(true, Ordering::Relaxed);
         let has_ended = wait_for_end(&thread);
@@ -156,6 +159,13 @@ fn wait_for_end(thread: &JoinHandle<Ended>) -> bool {
     thread.is_finished()
 }
 
+/// A panic here is an ending like any other: unwound further it would end the process, and the loop in the middle of
+/// a tick.
+fn caught(serve: impl FnOnce() -> Result<String, RunError>) -> Result<String, RunError> {
+    let result = catch_unwind(AssertUnwindSafe(serve));
+    result.unwrap_or_else(|_| Err(RunError::Panicked("the socket's thread panicked".into())))
+}
+
 /// For the service manager; the rest is told by `io-driver status`.
 fn status_line(memory: &DriverMemory) -> String {
     let get = |word: &AtomicU64| word.load(Ordering::Relaxed);
@@ -185,5 +195,17 @@ pub(crate) fn remove_directory_of(socket: &Path) {
     if let Some(directory) = socket.parent() {
         // It fails, rightly, if anything lies in it.
         let _ = std::fs::remove_dir(directory);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_of_the_service_is_an_end_that_still_stops_the_loop() {
+        let end = caught(|| panic!("no room for a line of the log"));
+        assert!(end.is_err_and(|error| error.is_fault()));
+        assert_eq!(caught(|| Ok("asked to".into())).ok().as_deref(), Some("asked to"));
     }
 }

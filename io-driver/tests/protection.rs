@@ -2,8 +2,10 @@
 
 mod common;
 
+use bytemuck::Zeroable;
 use common::{Bench, publish, usual_device};
 use io_driver::device::Reading;
+use io_driver::mail::{Letter, mail};
 use io_driver::safety::switches::{Switch, Switches};
 use nalgebra::Vector3;
 use shm_abi::frame::{
@@ -110,6 +112,38 @@ fn a_position_that_jumps_is_a_fault_even_without_a_force() {
     assert_eq!(frame.fault, FaultReason::PositionJump as u64);
     bench.cycle.clear_fault();
     assert_eq!(bench.silent_tick().0.state, DriverState::Idle as u64, "what was before is forgotten");
+}
+
+/// Else whoever may ask for it could switch amplifiers under force, and blind the guards once a tick.
+#[test]
+fn asking_to_leave_a_fault_that_is_none_changes_nothing() {
+    let mut bench = bench(DeviceInfo { speed_limit_m_per_s: 1.0, ..usual_device() });
+    let commander = bench.lease(1);
+    bench.ramp_in(&commander, UP);
+    let mut frame = Frame::zeroed();
+    for tick in 0..20 {
+        bench.cycle.clear_fault();
+        frame = tick_at(&mut bench, &commander, rest() + Vector3::x() * (1.2e-3 * f64::from(tick)), 0, UP).0;
+        if frame.fault != 0 {
+            break;
+        }
+    }
+    assert_eq!(frame.fault, FaultReason::Overspeed as u64);
+    assert_eq!(bench.log.lock().unwrap().rearms, 0);
+}
+
+/// Who asked to leave some other fault cannot have known of it.
+#[test]
+fn an_emergency_stop_outlasts_a_request_to_leave_a_fault_of_the_same_tick() {
+    for letters in [[Letter::EmergencyStop, Letter::ClearFault], [Letter::ClearFault, Letter::EmergencyStop]]
+    {
+        let mut bench = bench(usual_device());
+        let (mut sender, mut inbox) = mail();
+        bench.cycle.fault(FaultReason::DeviceRead);
+        letters.into_iter().for_each(|letter| sender.post(letter).unwrap());
+        inbox.deliver(&mut bench.cycle);
+        assert_eq!(bench.silent_tick().0.fault, FaultReason::EmergencyStop as u64);
+    }
 }
 
 #[test]

@@ -6,11 +6,12 @@
 //! Model: whoever maps hardware registers [`guard`]s those that switch it off, with the value that does.
 //! [`perform`] says that it has begun and then stores them all. The writer asks [`has_begun`] before it
 //! stores a value and again after: before, it stores nothing any more; after, it stores the safe values once
-//! more ([`store_unless_dying`]). Whichever way the two interleave, the safe values are stored last.
+//! more ([`store_unless_dying`]). Between its stores and that second look stands a full fence. Whichever way the
+//! two interleave, the safe values are stored last.
 //! Invariants: [`perform`] and [`has_begun`] are async-signal-safe; a guarded register stays guarded.
-//! Cost: a load for the writer; as many stores as there are registers for the last act.
+//! Cost: two loads and a fence (some 10 ns) for the writer; as many stores as there are registers for the last act.
 
-use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicU32, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicU32, AtomicUsize, Ordering, fence};
 use thiserror::Error;
 
 /// Registers that can be guarded in one process: eight devices with eight each.
@@ -93,6 +94,9 @@ impl LastAct {
             return;
         }
         store();
+        // A plain store may wait in the CPU while a later load overtakes it: the dying thread would store the safe
+        // values in between, and this one would follow them. The fence lets it arrive first.
+        fence(Ordering::SeqCst);
         if self.begun.load(Ordering::SeqCst) {
             self.perform();
         }
@@ -155,6 +159,40 @@ mod tests {
             });
             assert_eq!(motor.load(Ordering::SeqCst), 2048);
         }
+    }
+
+    /// Plain stores, as devices make them: they may still be on their way in the writer's CPU when it looks
+    /// whether the last act has begun. The moment counts in nanoseconds, so both meet at the same word each time,
+    /// one or the other a little later.
+    #[test]
+    fn a_plain_store_that_is_still_on_its_way_does_not_follow_the_safe_value() {
+        const ROUNDS: u32 = 20_000;
+        let acts: Vec<(LastAct, &AtomicU32)> = (0..ROUNDS).map(|_| (LastAct::new(), leak(2048))).collect();
+        let arrived = AtomicU32::new(0);
+        let meet = |round: u32, delay: u32| {
+            arrived.fetch_add(1, Ordering::SeqCst);
+            while arrived.load(Ordering::SeqCst) < 2 * (round + 1) {
+                std::hint::spin_loop();
+            }
+            (0..delay).for_each(|_| std::hint::spin_loop());
+        };
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                for (round, (act, motor)) in (0..).zip(&acts) {
+                    // The register's line is here when the writer stores to it.
+                    act.guard(motor, 2048).unwrap();
+                    motor.store(2048, Ordering::SeqCst);
+                    meet(round, round % 7);
+                    act.perform();
+                }
+            });
+            for (round, (act, motor)) in (0..).zip(&acts) {
+                meet(round, round % 11);
+                act.store_unless_begun(|| motor.store(2300, Ordering::Relaxed));
+            }
+        });
+        let undone = acts.iter().filter(|(_, motor)| motor.load(Ordering::SeqCst) != 2048).count();
+        assert_eq!(undone, 0, "of {ROUNDS} last acts were undone");
     }
 
     #[test]

@@ -2,15 +2,16 @@
 //!
 //! Problem: a signal's default action ends the process in the middle of a tick, motors on.
 //! Model: SIGTERM, SIGINT and SIGHUP set one word; the loop reads it each tick and ends in order.
-//! If ending hangs, the *same* SIGTERM or SIGINT once more ends the process at once, by the default
-//! action and with its exit status, after the last act ([`crate::last_act`]). A different one does not: a terminal sends SIGINT to parent and
-//! child alike, a parent then sends its child SIGTERM, and systemd may send SIGHUP right after
-//! SIGTERM; none of these means "now".
+//! If ending hangs, the *same* SIGTERM or SIGINT once more performs the last act ([`crate::last_act`]) and ends
+//! the process at once, by the default action and with its exit status. A different one does not: a
+//! terminal sends SIGINT to parent and child alike, a parent then sends its child SIGTERM, and systemd may
+//! send SIGHUP right after SIGTERM; none of these means "now".
 //! Invariants: installed for the rest of the process. A signal ends the sleep of the thread that
 //! happens to receive it, not of all: a loop that sleeps long has to wake by itself. SIGPIPE stays
 //! ignored, as Rust's start-up code leaves it: a write to a closed socket is an error, not a death.
 //! Cost: one relaxed load a tick.
 
+use crate::sys::at_once::perform_last_act_if;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
 use std::io;
@@ -34,7 +35,7 @@ impl StopSignals {
         for number in [SIGTERM, SIGINT] {
             let came_before = Arc::new(AtomicBool::new(false));
             // Actions run in this order: the first signal finds the flag down, the second up.
-            crate::sys::at_once::perform_last_act_if(number, Arc::clone(&came_before))?;
+            perform_last_act_if(number, Arc::clone(&came_before))?;
             flag::register_conditional_default(number, Arc::clone(&came_before))?;
             flag::register(number, came_before)?;
         }

@@ -76,8 +76,7 @@ pub(super) struct RawSafety {
 struct RawSwitch {
     device: Spanned<String>,
     button: Spanned<i64>,
-    #[serde(default)]
-    normally_closed: bool,
+    normally_closed: Option<Spanned<bool>>,
 }
 
 impl RawSafety {
@@ -108,7 +107,11 @@ impl RawSafety {
             workspace_margin_m: margin_mm.map_or(usual.workspace_margin_m, |mm| mm / 1e3),
             switches: Switches {
                 emergency_stop: switch(&self.emergency_stop)?,
-                dead_man: switch(&self.dead_man)?,
+                dead_man: self
+                    .dead_man
+                    .as_ref()
+                    .map(|raw| raw.validate_dead_man(toml, devices))
+                    .transpose()?,
             },
             commissioning: self.commissioning.then(|| Commissioning {
                 force_n: force_n.unwrap_or(Commissioning::USUAL.force_n),
@@ -119,6 +122,17 @@ impl RawSafety {
 }
 
 impl RawSwitch {
+    /// Held is what closes the circuit: else a wire that is cut would hold the switch for ever.
+    fn validate_dead_man(&self, toml: &TomlText<'_>, devices: &[DeviceConfig]) -> Result<Switch, TomlReport> {
+        match &self.normally_closed {
+            Some(key) if *key.get_ref() => {
+                let allowed = "false: held has to close the circuit, or a cut wire would hold it".to_owned();
+                Err(toml.refuse(key.span(), "true".to_owned(), allowed))
+            }
+            _ => self.validate(toml, devices),
+        }
+    }
+
     fn validate(&self, toml: &TomlText<'_>, devices: &[DeviceConfig]) -> Result<Switch, TomlReport> {
         let name = self.device.get_ref();
         let Some(device) = devices.iter().position(|device| device.name == *name) else {
@@ -127,6 +141,10 @@ impl RawSwitch {
             return Err(toml.refuse(self.device.span(), found, names.join(", ")));
         };
         let button = toml.integer(&self.button, 0..=63)? as u32;
-        Ok(Switch { device, button, normally_closed: self.normally_closed })
+        Ok(Switch {
+            device,
+            button,
+            normally_closed: self.normally_closed.as_ref().is_some_and(|key| *key.get_ref()),
+        })
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! Model: three channels with converters of some bits. Each value is checked against limits that the driver
 //! knows nothing of: the codes' range, the force at the tip that the torques amount to in the pose of the
-//! moment, how fast that force grew, and how warm the motors are by the amplifier's own reckoning. A value that
-//! fails trips the amplifiers, and so does silence for longer than the watchdog waits while they are on. Tripped
+//! moment (where the pose can tell, which it cannot near a singular one), and how fast that force grew. How warm the
+//! motors are is not checked. A value that fails trips the amplifiers, and so does silence for longer than the watchdog waits while they are on. Tripped
 //! they give no current until they are armed anew.
 //! Frames and signs: forces on the user in the device's base frame D.
 //! Invariants: no current flows while off or tripped; every value is counted once, as good or under what was

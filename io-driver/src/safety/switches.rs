@@ -1,8 +1,8 @@
 //! The switches that guard the motors: emergency stop and dead-man, wired to buttons of the devices.
 //!
-//! Model: a switch is a button of a device. One that is normally closed reads 1 at rest, so that a broken wire
-//! reads as pressed (emergency stop) or, for a dead-man's switch, as let go whichever way it is wired: held is
-//! what closes the circuit.
+//! Model: a switch is a button of a device. An emergency stop that is normally closed reads 1 at rest, so that a
+//! broken wire reads as pressed. A dead-man's switch is held by what closes the circuit, so that a broken wire reads
+//! as let go; the configuration refuses one that is normally closed.
 //! Signs: an emergency stop that is pressed is a fault, whose leaving has to be asked for; a dead-man's switch
 //! that is let go ramps the force out, and holding it again ramps it in.
 //! Cost: two comparisons.

@@ -55,6 +55,19 @@ fn the_last_act_is_performed_too() {
     assert_eq!(words[REGISTER].load(Ordering::Relaxed), 0, "where nothing is guarded nothing is stored");
 }
 
+/// Whoever asks twice waits for no orderly end, so the motors have to be off by then.
+#[test]
+fn a_second_stop_signal_kills_and_performs_the_last_act() {
+    let (status, words) = words_after("stop");
+    assert_eq!(
+        (status.code(), words[REGISTER].load(Ordering::Relaxed)),
+        (Some(99), 3000),
+        "one is a request"
+    );
+    let (status, words) = words_after("stop twice");
+    assert_eq!((status.signal(), words[REGISTER].load(Ordering::Relaxed)), (Some(libc::SIGTERM), 2048));
+}
+
 #[test]
 fn a_panic_leaves_place_and_message_and_reaches_the_former_hook() {
     let (status, epitaph) = death_by("panic");
@@ -109,6 +122,7 @@ fn die(role: &str) -> ! {
             crate::last_act::guard(shared_words::low_half(&cell[REGISTER]), 2048).unwrap();
             install_fatal_handlers(cell, &TICK).unwrap();
         }
+        "stop" | "stop twice" => die_by_stop_signals(cell, if role == "stop" { 1 } else { 2 }),
         _ => install_fatal_handlers(cell, &TICK).unwrap(),
     }
     match role {
@@ -119,6 +133,15 @@ fn die(role: &str) -> ! {
         "twice" => std::process::exit(i32::from(install_fatal_handlers(cell, &TICK).is_ok())),
         _ => std::process::abort(),
     }
+    std::process::exit(99)
+}
+
+fn die_by_stop_signals(cell: &'static EpitaphWords, times: usize) -> ! {
+    let register = shared_words::low_half(&cell[REGISTER]);
+    register.store(3000, Ordering::Relaxed);
+    crate::last_act::guard(register, 2048).unwrap();
+    let _stop = crate::signals::StopSignals::install().unwrap();
+    (0..times).for_each(|_| nix::sys::signal::raise(nix::sys::signal::Signal::SIGTERM).unwrap());
     std::process::exit(99)
 }
 
