@@ -93,7 +93,7 @@ impl Periodic {
     }
 
     /// The same, but its deadlines step aside from what happens at the same phase; see
-    /// [`phase_keeper`](crate::phase_keeper). A tick in which they do is longer by 0.382 of a period.
+    /// [`phase_keeper`]. A tick in which they do is longer by 0.382 of a period.
     #[must_use]
     pub fn stepping_aside(self) -> Self {
         Self { phase: Some(PhaseKeeper::default()), ..self }
