@@ -253,8 +253,10 @@ impl Cycle {
     }
 
     fn watch_speed(&mut self, device: usize, tick: u64, position: Vector3<f64>) {
-        match self.guards[device].observe(tick, position) {
-            Ok(velocity) => self.frame.devices[device].velocity_m_per_s_estimated = velocity.into(),
+        let observed = self.guards[device].observe(tick, position);
+        self.frame.devices[device].velocity_m_per_s_estimated = self.guards[device].velocity().into();
+        match observed {
+            Ok(()) => {}
             // A hand may be as fast as it likes as long as no motor drives it.
             Err(FaultReason::Overspeed) if self.safety.is_released() => {}
             Err(reason) => self.fault(reason),

@@ -14,8 +14,9 @@
 //! solution is exact. Below a rise of 0.9 the amplifier's peak is allowed; from there to 1 the square of the
 //! allowed current falls linearly to the one under which the rise stays (at most the continuous one; less while
 //! a warm housing still warms a cooler winding), so the rise approaches 1 and never passes it.
-//! A driver that starts cannot know what the motors had before. It takes the worst: the housing as warm as it
-//! may be, the winding cool.
+//! A driver that starts cannot know what the motors had before. It takes the housing for as warm as it may be and the
+//! winding for cool, which it is after a minute or so. One that starts again within seconds may therefore let the rise
+//! pass 1 by the winding's share `s` at most, until the winding has cooled: some of its time constants.
 //! Invariants: `rise` is finite and at least 0; the continuous current is always allowed to a motor that never
 //! had more.
 //! Cost: two exponentials if the time between two calls changes, else none.

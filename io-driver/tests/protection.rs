@@ -104,6 +104,19 @@ fn the_velocity_is_told_in_the_frame() {
 }
 
 #[test]
+fn the_velocity_is_told_too_when_a_hand_is_faster_than_a_force_may_make_it() {
+    let mut bench = bench(DeviceInfo { speed_limit_m_per_s: 1.0, ..usual_device() });
+    let mut told = 0.0;
+    for tick in 0..20 {
+        let position = Vector3::x() * (1.2e-3 * f64::from(tick));
+        bench.log.lock().unwrap().next_reading = Some(Ok(Reading::at(position)));
+        told = bench.silent_tick().0.devices[0].velocity_m_per_s_estimated[0];
+    }
+    // A quotient of differences of numbers below 0.1.
+    assert!((told - 1.2).abs() < 1e-12, "{told}");
+}
+
+#[test]
 fn a_position_that_jumps_is_a_fault_even_without_a_force() {
     let mut bench = bench(DeviceInfo { speed_limit_m_per_s: 1.0, ..usual_device() });
     bench.silent_tick();

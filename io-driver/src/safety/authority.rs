@@ -136,11 +136,12 @@ impl Safety {
         self.authority()
     }
 
-    /// Enters the fault state; returns whether that is new. The first reason stands.
+    /// Enters the fault state; returns whether that is new. The first reason stands, save that an emergency stop
+    /// takes the place of any: who would leave another fault has to see that somebody wants it off.
     pub fn enter_fault(&mut self, reason: FaultReason) -> bool {
         self.release();
         let new = self.fault == FaultReason::None;
-        if new {
+        if new || reason == FaultReason::EmergencyStop {
             self.fault = reason;
         }
         new
@@ -227,6 +228,10 @@ mod tests {
             assert_eq!(safety.advance(ReplyKind::Fresh), 0.0);
             assert_eq!(safety.state(), DriverState::Fault);
         }
+        assert!(!safety.enter_fault(FaultReason::EmergencyStop));
+        assert_eq!(safety.fault(), FaultReason::EmergencyStop, "but a person's wish takes its place");
+        assert!(!safety.enter_fault(FaultReason::Panic));
+        assert_eq!(safety.fault(), FaultReason::EmergencyStop);
         safety.clear_fault();
         assert_eq!(safety.advance(ReplyKind::Fresh), 0.0, "and then it ramps in again");
         assert_eq!(safety.advance(ReplyKind::Fresh), 1.0 / 200.0);

@@ -73,13 +73,18 @@ impl Guard {
         }
     }
 
-    /// Takes the tip's position in a tick; returns its velocity (m/s).
+    /// Takes the tip's position in a tick.
     ///
     /// # Errors
     /// That it moved faster than it may.
-    pub fn observe(&mut self, tick: u64, position: Vector3<f64>) -> Result<Vector3<f64>, FaultReason> {
+    pub fn observe(&mut self, tick: u64, position: Vector3<f64>) -> Result<(), FaultReason> {
         self.position = position;
-        self.speed.observe(tick, position)
+        self.speed.observe(tick, position).map(drop)
+    }
+
+    /// How fast the tip moves (m/s), fault or not.
+    pub fn velocity(&self) -> Vector3<f64> {
+        self.speed.velocity()
     }
 
     /// The position is not known; the next one is compared with nothing.

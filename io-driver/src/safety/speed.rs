@@ -76,7 +76,7 @@ impl Speed {
 
     /// Over the youngest positions that span the window, or over all there are. A position that is older than
     /// the window because ticks were skipped is taken if there is no other.
-    fn velocity(&self) -> Vector3<f64> {
+    pub(super) fn velocity(&self) -> Vector3<f64> {
         let (tick, position) = self.places[self.newest];
         let mut oldest = (tick, position);
         for back in 1..self.filled {
