@@ -237,8 +237,12 @@ mod tests {
                 "lab/driver.toml:2: `safety.dead_man.device`: found no device \"foot\", allowed: f0",
             ),
             (
-                "[safety]\nemergency_stop = { device = \"f0\", button = 64 }\n[[device]]\nbackend = \"ideal\"",
-                "lab/driver.toml:2: `safety.emergency_stop.button`: found 64, allowed: a whole number from 0 to 63",
+                "[safety]\nemergency_stop = { device = \"f0\", button = 32 }\n[[device]]\nbackend = \"emulated\"\ndescription = \"premium-1.5\"\ncard = \"c\"",
+                "lab/driver.toml:2: `safety.emergency_stop.button`: found 32, allowed: a whole number from 0 to 31",
+            ),
+            (
+                "[safety]\nemergency_stop = { device = \"f0\", button = 0 }\n[[device]]\nbackend = \"ideal\"",
+                "lab/driver.toml:2: `safety.emergency_stop.device`: found device \"f0\", which has no buttons, allowed: a device with the switch on its card",
             ),
             (
                 "[[device]]\nbackend = \"emulated\"\ndescription = \"premium-1.5\"",
@@ -275,8 +279,8 @@ mod tests {
             [[device]]\nname = \"a \\\"quoted\\\" name\"\nbackend = \"ideal\"\nhand = \"/h.csv\"\nfinger = \"thumb\"\n\
             start_m = [0.1, -0.2, 1e-9]\nbase_position_m = [1, 2, 3]\nbase_orientation_wxyz = [0.6, 0.8, 0, 0]\n\
             peak_force_n = 8.5\n\
-            [[device]]\nname = \"b\"\nbackend = \"replay\"\ndescription = \"premium-1.5\"\ntrace = \"/t.csv\"\n\
-            [[device]]\nbackend = \"emulated\"\ndescription = \"premium-1.5\"\ncard = \"/c\"\ngravity_compensation = true\n";
+            [[device]]\nbackend = \"replay\"\ndescription = \"premium-1.5\"\ntrace = \"/t.csv\"\n\
+            [[device]]\nname = \"b\"\nbackend = \"emulated\"\ndescription = \"premium-1.5\"\ncard = \"/c\"\ngravity_compensation = true\n";
         let config = parse(text).expect("good");
         assert_eq!(parse(&config.to_toml()).expect("good as well"), config);
         let plain = parse("[[device]]\nbackend = \"ideal\"\n").expect("good");

@@ -48,6 +48,16 @@ pub enum Backend {
     },
 }
 
+impl Backend {
+    /// How many buttons such a device may have; `None`: none, so that no switch could be wired to it.
+    pub(super) fn buttons(&self) -> Option<i64> {
+        match self {
+            Self::Ideal { .. } | Self::Replay { .. } => None,
+            Self::Emulated { .. } => Some(32),
+        }
+    }
+}
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawDevice {

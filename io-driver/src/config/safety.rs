@@ -140,7 +140,11 @@ impl RawSwitch {
             let found = format_args!("no device \"{name}\"").to_string();
             return Err(toml.refuse(self.device.span(), found, names.join(", ")));
         };
-        let button = toml.integer(&self.button, 0..=63)? as u32;
+        let Some(buttons) = devices[device].backend.buttons() else {
+            let found = format_args!("device \"{name}\", which has no buttons").to_string();
+            return Err(toml.refuse(self.device.span(), found, "a device with the switch on its card"));
+        };
+        let button = toml.integer(&self.button, 0..=buttons - 1)? as u32;
         Ok(Switch {
             device,
             button,
