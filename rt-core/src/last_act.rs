@@ -171,8 +171,11 @@ mod tests {
         let arrived = AtomicU32::new(0);
         let meet = |round: u32, delay: u32| {
             arrived.fetch_add(1, Ordering::SeqCst);
+            let mut spins = 0;
             while arrived.load(Ordering::SeqCst) < 2 * (round + 1) {
-                std::hint::spin_loop();
+                spins += 1;
+                // Where the other thread has no CPU of its own it gets ours.
+                if spins % 10_000 == 0 { std::thread::yield_now() } else { std::hint::spin_loop() }
             }
             (0..delay).for_each(|_| std::hint::spin_loop());
         };
