@@ -7,7 +7,7 @@ use rt_core::signals::StopSignals;
 use shm_abi::client;
 use std::time::Duration;
 use system_tests::faults::hosted::Hosted;
-use system_tests::faults::process::{End, io_driver};
+use system_tests::faults::process::{End, Running, io_driver};
 use system_tests::faults::puppet::Strings;
 use system_tests::faults::stand::{Setup, Stand};
 use system_tests::programs;
@@ -128,6 +128,24 @@ fn a_tip_that_goes_where_the_hand_moves_it_passes_and_another_does_not() {
         });
         assert_eq!(verdict.unwrap(), expected);
     }
+}
+
+#[test]
+fn a_driver_that_is_stopped_ends_the_session_instead_of_holding_it() {
+    let stand = stand();
+    let config = stand.path("driver.toml");
+    let mut command = programs::io_driver();
+    command.args(["commission", "--motors-only", "--yes", "--config"]).arg(&config);
+    let mut session = Running::start(command.arg("--socket").arg(stand.socket()));
+    let lines = session.take_lines();
+    assert!(lines.iter().any(|line| line.contains("turret ...")), "it begins with the turret");
+    stand.driver.signal(rustix::process::Signal::STOP);
+    let end = session.end();
+    stand.driver.signal(rustix::process::Signal::CONT);
+    assert_eq!(end.status, Some(3), "{end:?}");
+    assert!(end.err.contains("the driver has told nothing for 5 s"), "{end:?}");
+    // Its amplifiers have tripped meanwhile, which is a fault of the driver's that comes after.
+    stand.finish();
 }
 
 #[test]

@@ -10,6 +10,7 @@ use crate::kinematics::{Kinematics, Mechanism};
 use nalgebra::Vector3;
 use rt_core::signals::StopSignals;
 use shm_abi::client::{Attachment, Connection};
+use shm_abi::frame::DEVICE_POSITION_VALID;
 use shm_abi::{Command, CommanderMemory, DriverState, DriverView, FaultReason, Frame, FrameUnavailable};
 use std::time::{Duration, Instant};
 use thiserror::Error;
@@ -28,6 +29,12 @@ pub enum SessionError {
     /// The driver ended.
     #[error("the driver has ended")]
     DriverGone,
+    /// The driver is there and tells nothing.
+    #[error("the driver has told nothing for {0} s; it may be stopped (see `ps`)")]
+    Silent(u64),
+    /// The position is not known.
+    #[error("the device does not know where it is; put it into its zeroing pose and see `io-driver status`")]
+    NotZeroed,
     /// A signal or a person ended it.
     #[error("interrupted; the motors are off")]
     Interrupted,
@@ -60,6 +67,8 @@ pub struct Session<'a> {
 const PATIENCE: Duration = Duration::from_secs(60);
 /// How long the ramp of a new lease may take, a dead-man's switch being looked for included.
 const UNTIL_AUTHORITY: Duration = Duration::from_secs(20);
+/// A driver tells a frame in each tick.
+const SILENCE: Duration = Duration::from_secs(5);
 const NAP: Duration = Duration::from_millis(20);
 
 impl<'a> Session<'a> {
@@ -170,6 +179,7 @@ impl<'a> Session<'a> {
 
     /// Waits for the next frame, and looks whether anything ended the session.
     fn next_frame(&mut self) -> Result<(), SessionError> {
+        let begun = Instant::now();
         loop {
             if self.signals.requested().is_some() {
                 return Err(SessionError::Interrupted);
@@ -179,6 +189,9 @@ impl<'a> Session<'a> {
             if latest == self.seen {
                 if !self.connection.is_open() {
                     return Err(SessionError::DriverGone);
+                }
+                if begun.elapsed() > SILENCE {
+                    return Err(SessionError::Silent(SILENCE.as_secs()));
                 }
                 continue;
             }
@@ -195,6 +208,9 @@ impl<'a> Session<'a> {
             Some(DriverState::Fault) => {
                 let reason = FaultReason::from_word(self.frame.fault);
                 Err(SessionError::Fault(reason.map_or("for a reason of its own", FaultReason::sentence)))
+            }
+            _ if self.frame.devices[self.device].flags & DEVICE_POSITION_VALID == 0 => {
+                Err(SessionError::NotZeroed)
             }
             _ => Ok(()),
         }
