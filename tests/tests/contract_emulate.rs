@@ -1,12 +1,11 @@
 //! `io-driver emulate` as a user meets it: wrong words are refused, and a driver without a card says what to do.
 
-use std::process::Stdio;
+use system_tests::faults::process::{End, Running};
 use system_tests::programs;
 
 fn refused(arguments: &[&str]) -> String {
-    let mut command = programs::io_driver();
-    let output = command.args(arguments).stdin(Stdio::null()).output().expect("it runs");
-    let (status, out, err) = programs::said(&output);
+    // One that is not refused would play for ever; its end is waited for with a limit.
+    let End { status, out, err, .. } = Running::start(programs::io_driver().args(arguments)).end();
     assert_eq!((status, out.as_str()), (Some(2), ""), "{arguments:?}: {err}");
     err
 }
