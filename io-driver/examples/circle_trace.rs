@@ -13,7 +13,7 @@ const RADIUS_M: f64 = 0.03;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let text = builtin("premium-1.5").ok_or("no such description")?;
-    let DeviceFile::Premium(premium) = DeviceFile::parse(text, Path::new("premium-1.5"))? else {
+    let DeviceFile::Arm(premium) = DeviceFile::parse(text, Path::new("premium-1.5"))? else {
         return Err("not a Premium".into());
     };
     let map = premium.joint_map();

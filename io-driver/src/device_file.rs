@@ -19,8 +19,8 @@ use toml::Spanned;
 
 use crate::encoders::{EncoderSpec, JointMap};
 use crate::heat::HeatSpec;
-use crate::kinematics::gravity::{Bodies, Gravity};
-use crate::kinematics::{Ideal, Kinematics, Premium};
+use crate::kinematics::gravity::Gravity;
+use crate::kinematics::{Ideal, Kinematics};
 use crate::motors::{MotorMap, MotorSpec};
 use crate::toml_report::{TomlReport, TomlText};
 
@@ -33,15 +33,17 @@ pub const BUILTIN_NAMES: [&str; 2] = ["premium-1.5", "ideal"];
 /// A checked device description.
 #[derive(Debug, Clone, PartialEq)]
 pub enum DeviceFile {
-    /// `kind = "premium"`.
-    Premium(Box<PremiumFile>),
+    /// Every kind that has joints, counters and motors.
+    Arm(Box<ArmFile>),
     /// `kind = "ideal"`.
     Ideal(IdealFile),
 }
 
-/// A PHANToM Premium with three actuated joints.
+/// An arm with three actuated joints.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PremiumFile {
+pub struct ArmFile {
+    /// The word in the file, for programs.
+    pub kind: &'static str,
     /// For people.
     pub name: String,
     /// Largest force on the user, for an instant.
@@ -51,7 +53,7 @@ pub struct PremiumFile {
     /// Where the tip is meant to be.
     pub workspace: Workspace,
     /// Links and stops.
-    pub mechanism: Premium,
+    pub mechanism: Kinematics,
     /// From raw counters to joint angles.
     pub encoders: EncoderSpec,
     /// From joint torques to converter codes.
@@ -62,8 +64,8 @@ pub struct PremiumFile {
     pub slew_n_per_s: f64,
     /// The tip's speed that is a fault (m/s).
     pub speed_limit_m_per_s: f64,
-    /// What moves; needed to compensate gravity.
-    pub bodies: Option<Bodies>,
+    /// What holds the arm's own weight, if its bodies are described.
+    pub gravity: Option<Gravity>,
 }
 
 /// A device without mechanism, counters and motors.
@@ -114,7 +116,7 @@ impl DeviceFile {
         let toml = TomlText::new(text, file);
         let Kind { kind } = toml.read().map_err(DeviceFileError::Malformed)?;
         match kind.get_ref().as_str() {
-            "premium" => premium::read(&toml).map(|premium| Self::Premium(Box::new(premium))),
+            "premium" => premium::read(&toml).map(|premium| Self::Arm(Box::new(premium))),
             "ideal" => ideal::read(&toml).map(Self::Ideal),
             other => {
                 let report = toml.refuse(kind.span(), format_args!("{other:?}"), r#""premium" or "ideal""#);
@@ -126,7 +128,7 @@ impl DeviceFile {
     /// For people.
     pub fn name(&self) -> &str {
         match self {
-            Self::Premium(premium) => &premium.name,
+            Self::Arm(arm) => &arm.name,
             Self::Ideal(ideal) => &ideal.name,
         }
     }
@@ -134,7 +136,7 @@ impl DeviceFile {
     /// Geometry of the device.
     pub fn kinematics(&self) -> Kinematics {
         match self {
-            Self::Premium(premium) => Kinematics::Premium(premium.mechanism),
+            Self::Arm(arm) => arm.mechanism,
             Self::Ideal(_) => Kinematics::Ideal(Ideal),
         }
     }
@@ -142,21 +144,16 @@ impl DeviceFile {
     /// Largest force on the user, if the device has a limit.
     pub fn peak_force_n(&self) -> Option<f64> {
         match self {
-            Self::Premium(premium) => Some(premium.peak_force_n),
+            Self::Arm(arm) => Some(arm.peak_force_n),
             Self::Ideal(ideal) => ideal.peak_force_n,
         }
     }
 }
 
-impl PremiumFile {
+impl ArmFile {
     /// From extended counts to joint angles, not yet zeroed.
     pub fn joint_map(&self) -> JointMap {
         JointMap::new(&self.encoders)
-    }
-
-    /// What holds the arm's own weight, if its bodies are described.
-    pub fn gravity(&self) -> Option<Gravity> {
-        self.bodies.as_ref().map(|bodies| Gravity::new(self.mechanism.link_lengths_m(), bodies))
     }
 
     /// From joint torques to converter codes.

@@ -7,7 +7,7 @@ use crate::device::emulated::{Channels, EmulatedDevice};
 use crate::device::encoder_trace::{EncoderReplay, EncoderTrace, TraceError};
 use crate::device::ideal::{Hand, IdealDevice};
 use crate::device::replay::ReplayDevice;
-use crate::device_file::{self, DeviceFile, DeviceFileError, PremiumFile};
+use crate::device_file::{self, ArmFile, DeviceFile, DeviceFileError};
 use crate::emulator::card::{Card, CardError};
 use crate::sim::script::{HandError, HandPlayer, HandScript};
 use shm_abi::segment::DeviceInfo;
@@ -106,13 +106,13 @@ fn open(device: &DeviceConfig, config: &DriverConfig) -> Result<Box<dyn Device>,
         Backend::Replay { description, trace } => {
             let premium = mechanism(device, description)?;
             let trace = EncoderTrace::parse(&read(device, trace)?, trace, premium.encoders.count_bits)?;
-            let info = commissioned(premium_info(device, &premium), config);
+            let info = commissioned(arm_info(device, &premium), config);
             let arm = Arm::new(&premium, holds_its_weight(device, config));
             Ok(Box::new(ReplayDevice::new(info, EncoderReplay::new(trace), arm)))
         }
         Backend::Emulated { description, card } => {
             let premium = mechanism(device, description)?;
-            let info = commissioned(premium_info(device, &premium), config);
+            let info = commissioned(arm_info(device, &premium), config);
             let arm = Arm::new(&premium, holds_its_weight(device, config));
             emulated(device, description, card, &premium, info, arm)
         }
@@ -142,7 +142,7 @@ fn emulated(
     device: &DeviceConfig,
     description: &Path,
     card: &Path,
-    premium: &PremiumFile,
+    premium: &ArmFile,
     info: DeviceInfo,
     arm: Arm,
 ) -> Result<Box<dyn Device>, OpenError> {
@@ -186,13 +186,13 @@ fn scripted(
 ///
 /// # Errors
 /// If it cannot be read, is wrong, or has none.
-pub fn mechanism(device: &DeviceConfig, description: &Path) -> Result<PremiumFile, OpenError> {
+pub fn mechanism(device: &DeviceConfig, description: &Path) -> Result<ArmFile, OpenError> {
     let name = || device.name.clone();
     match describe(device, description)? {
-        DeviceFile::Premium(premium) if device.compensates_gravity && premium.bodies.is_none() => {
+        DeviceFile::Arm(premium) if device.compensates_gravity && premium.gravity.is_none() => {
             Err(OpenError::NoBodies { device: name(), file: description.into() })
         }
-        DeviceFile::Premium(premium) => Ok(*premium),
+        DeviceFile::Arm(premium) => Ok(*premium),
         DeviceFile::Ideal(_) => Err(OpenError::NoMechanism { device: name(), file: description.into() }),
     }
 }
@@ -227,7 +227,7 @@ fn ideal_info(device: &DeviceConfig) -> DeviceInfo {
     }
 }
 
-fn premium_info(device: &DeviceConfig, premium: &PremiumFile) -> DeviceInfo {
+fn arm_info(device: &DeviceConfig, premium: &ArmFile) -> DeviceInfo {
     let corner = |sign: f64| {
         std::array::from_fn(|axis| {
             premium.workspace.centre_m[axis] + sign * 0.5 * premium.workspace.size_m[axis]
@@ -235,7 +235,7 @@ fn premium_info(device: &DeviceConfig, premium: &PremiumFile) -> DeviceInfo {
     };
     DeviceInfo {
         name: device.name.clone(),
-        kind: "premium".into(),
+        kind: premium.kind.into(),
         peak_force_n: device.peak_force_n.unwrap_or(premium.peak_force_n).min(premium.peak_force_n),
         continuous_force_n: premium.continuous_force_n,
         workspace_min_m: corner(-1.0),

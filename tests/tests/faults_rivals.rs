@@ -117,7 +117,7 @@ fn an_app_is_upgraded_under_a_running_driver_and_no_device_is_zeroed_anew() {
 /// angle is its count's for ever.
 fn check_zero(driver: &DriverView) {
     let text = device_file::builtin("premium-1.5").expect("it is built in");
-    let Ok(DeviceFile::Premium(premium)) = DeviceFile::parse(text, Path::new("premium-1.5")) else {
+    let Ok(DeviceFile::Arm(premium)) = DeviceFile::parse(text, Path::new("premium-1.5")) else {
         panic!("a premium")
     };
     let device = driver.read_latest().expect("frames").devices[0];

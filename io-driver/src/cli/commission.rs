@@ -5,8 +5,7 @@ use crate::commission::hand_check::HandVerdict;
 use crate::commission::motor_check::MotorVerdict;
 use crate::commission::session::Session;
 use crate::config::{Backend, DriverConfig};
-use crate::device_file::PremiumFile;
-use crate::kinematics::Kinematics;
+use crate::device_file::ArmFile;
 use crate::open;
 use clap::Args;
 use rt_core::signals::StopSignals;
@@ -87,7 +86,7 @@ fn commission(args: &CommissionArgs) -> Result<bool, Failure> {
         }
     }
     prompt(args, "Now the motors. Let go of the arm, stay clear of it").map_err(during)?;
-    let kinematics = Kinematics::Premium(premium.mechanism);
+    let kinematics = premium.mechanism;
     let per_count = premium.joint_map().rad_per_count();
     let tell = |joint: usize| say(&format!("  {} ...", JOINTS[joint]));
     let verdicts = session.check_motors(&kinematics, per_count, tell).map_err(during)?;
@@ -150,7 +149,7 @@ fn choose(config: &DriverConfig, name: Option<&str>) -> Result<usize, String> {
     }
 }
 
-fn describe(config: &DriverConfig, device: usize) -> Result<PremiumFile, Box<dyn Error>> {
+fn describe(config: &DriverConfig, device: usize) -> Result<ArmFile, Box<dyn Error>> {
     let device = &config.devices[device];
     match &device.backend {
         Backend::Emulated { description, .. } => Ok(open::mechanism(device, description)?),

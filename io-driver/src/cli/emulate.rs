@@ -2,7 +2,7 @@
 
 use super::{EXIT_FAULT, EXIT_USAGE, fail, print_line};
 use crate::device::encoder_trace::{EncoderReplay, EncoderTrace};
-use crate::device_file::{self, DeviceFile, PremiumFile};
+use crate::device_file::{self, ArmFile, DeviceFile};
 use crate::emulator::card::Card;
 use crate::emulator::motion::Motion;
 use crate::emulator::process::{Emulator, Play};
@@ -74,20 +74,20 @@ fn play(args: &EmulateArgs) -> Result<ExitCode, Box<dyn Error>> {
     Ok(if is_good { ExitCode::SUCCESS } else { ExitCode::from(EXIT_FAULT) })
 }
 
-fn describe(name: &str) -> Result<PremiumFile, Box<dyn Error>> {
+fn describe(name: &str) -> Result<ArmFile, Box<dyn Error>> {
     let text = match device_file::builtin(name) {
         Some(text) => text.to_owned(),
         None => read(Path::new(name))?,
     };
     match DeviceFile::parse(&text, Path::new(name))? {
-        DeviceFile::Premium(premium) => Ok(*premium),
+        DeviceFile::Arm(premium) => Ok(*premium),
         DeviceFile::Ideal(_) => {
             Err(format!("{name} describes no mechanism; a card needs one, such as premium-1.5").into())
         }
     }
 }
 
-fn motion(args: &EmulateArgs, premium: &PremiumFile) -> Result<Motion, Box<dyn Error>> {
+fn motion(args: &EmulateArgs, premium: &ArmFile) -> Result<Motion, Box<dyn Error>> {
     if let Some(file) = &args.trace {
         let trace = EncoderTrace::parse(&read(file)?, file, premium.encoders.count_bits)?;
         return Ok(Motion::Trace(EncoderReplay::new(trace)));

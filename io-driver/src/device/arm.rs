@@ -4,7 +4,7 @@
 //! Invariant: `read` comes before `render` in a tick; codes are for the pose that was read last.
 
 use super::{Effort, Reading, TickTime, Written};
-use crate::device_file::PremiumFile;
+use crate::device_file::ArmFile;
 use crate::drive::Drive;
 use crate::encoders::{EncoderExtender, JointMap};
 use crate::kinematics::{Kinematics, Mechanism};
@@ -23,9 +23,9 @@ pub struct Arm {
 
 impl Arm {
     /// An arm of this description; `holds_its_weight`: gravity is compensated, if the bodies are described.
-    pub fn new(premium: &PremiumFile, holds_its_weight: bool) -> Self {
-        let kinematics = Kinematics::Premium(premium.mechanism);
-        let gravity = premium.gravity().filter(|_| holds_its_weight);
+    pub fn new(premium: &ArmFile, holds_its_weight: bool) -> Self {
+        let kinematics = premium.mechanism;
+        let gravity = premium.gravity.filter(|_| holds_its_weight);
         Self {
             extender: EncoderExtender::new(premium.encoders.count_bits),
             map: JointMap::new(&premium.encoders),

@@ -8,11 +8,11 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{DeviceFileError, PremiumFile, Workspace};
+use super::{ArmFile, DeviceFileError, Workspace};
 use crate::encoders::EncoderSpec;
 use crate::heat::HeatSpec;
-use crate::kinematics::gravity::Bodies;
-use crate::kinematics::{Interval, JointLimits, Mechanism, Premium};
+use crate::kinematics::gravity::{Bodies, Gravity};
+use crate::kinematics::{Interval, JointLimits, Kinematics, Mechanism, Premium};
 use crate::motors::MotorSpec;
 use crate::toml_report::{Allowed, SpannedList, TomlReport, TomlText};
 
@@ -82,29 +82,33 @@ struct RawBodies {
     l6_m: Spanned<f64>,
 }
 
-pub(super) fn read(toml: &TomlText<'_>) -> Result<PremiumFile, DeviceFileError> {
+pub(super) fn read(toml: &TomlText<'_>) -> Result<ArmFile, DeviceFileError> {
     let raw: Raw = toml.read().map_err(DeviceFileError::Malformed)?;
     check(toml, raw).map_err(DeviceFileError::Value)
 }
 
-fn check(toml: &TomlText<'_>, raw: Raw) -> Result<PremiumFile, TomlReport> {
+fn check(toml: &TomlText<'_>, raw: Raw) -> Result<ArmFile, TomlReport> {
     let peak_force_n = toml.number(&raw.peak_force_n, FORCE)?;
     let continuous_force_n = up_to(toml, &raw.continuous_force_n, FORCE, "peak_force_n", peak_force_n)?;
     let mechanism = linkage(toml, &raw.linkage)?;
     let reduction = toml.numbers(&raw.linkage.cable_reduction, REDUCTION)?;
     let home = home(toml, &raw.linkage, &mechanism)?;
-    Ok(PremiumFile {
+    Ok(ArmFile {
+        kind: "premium",
         name: raw.name,
         peak_force_n,
         continuous_force_n,
         workspace: workspace(toml, &raw.workspace_m, &raw.workspace_centre_m, &mechanism, home)?,
-        mechanism,
+        mechanism: Kinematics::Premium(mechanism),
         encoders: encoders(toml, &raw.encoders, reduction, home)?,
         motors: motors(toml, &raw.motors, reduction)?,
         heat: heat(toml, &raw.motors)?,
         slew_n_per_s: toml.number(&raw.slew_n_per_s, SLEW)?,
         speed_limit_m_per_s: toml.number(&raw.speed_limit_m_per_s, SPEED)?,
-        bodies: raw.bodies.as_ref().map(|bodies| weigh(toml, bodies)).transpose()?,
+        gravity: match &raw.bodies {
+            Some(bodies) => Some(Gravity::new(mechanism.link_lengths_m(), &weigh(toml, bodies)?)),
+            None => None,
+        },
     })
 }
 

@@ -13,9 +13,9 @@ fn parse(text: &str) -> Result<DeviceFile, DeviceFileError> {
     DeviceFile::parse(text, Path::new("lab/left.toml"))
 }
 
-fn premium() -> PremiumFile {
+fn premium() -> ArmFile {
     match parse(PREMIUM) {
-        Ok(DeviceFile::Premium(premium)) => *premium,
+        Ok(DeviceFile::Arm(premium)) => *premium,
         other => panic!("{other:?}"),
     }
 }
@@ -43,7 +43,8 @@ fn the_builtin_files_are_good_and_no_others_exist() {
 #[test]
 fn the_premium_is_the_one_of_the_paper() {
     let premium = premium();
-    assert_eq!(premium.mechanism.link_lengths_m(), [0.215, 0.170]);
+    let Kinematics::Premium(mechanism) = premium.mechanism else { panic!("its kind says so") };
+    assert_eq!(mechanism.link_lengths_m(), [0.215, 0.170]);
     assert_eq!(premium.encoders.reduction, [175.0 / 13.0, 11.3, 11.3]);
     assert_eq!(premium.motors.reduction, premium.encoders.reduction);
     assert_eq!((premium.peak_force_n, premium.continuous_force_n), (8.5, 1.4));
@@ -65,7 +66,7 @@ fn the_stops_are_the_published_degrees() {
 
 #[test]
 fn most_of_the_workspace_is_within_the_stops() {
-    let PremiumFile { mechanism, workspace, .. } = premium();
+    let ArmFile { mechanism, workspace, .. } = premium();
     let inside = (0..9261).filter(|k| {
         let steps = [k % 21, k / 21 % 21, k / 441].map(|i| f64::from(i) / 20.0 - 0.5);
         let tip: [f64; 3] = std::array::from_fn(|i| workspace.centre_m[i] + workspace.size_m[i] * steps[i]);

@@ -245,22 +245,22 @@ const RESOLUTION_N: f64 = 0.05;
 mod tests {
     use super::*;
     use crate::device::Effort;
-    use crate::device_file::{DeviceFile, PremiumFile, builtin};
+    use crate::device_file::{ArmFile, DeviceFile, builtin};
     use crate::drive::Drive;
     use std::path::Path;
 
     const MS: u64 = 1_000_000;
 
-    fn premium() -> PremiumFile {
+    fn premium() -> ArmFile {
         match DeviceFile::parse(builtin("premium-1.5").unwrap(), Path::new("premium-1.5")) {
-            Ok(DeviceFile::Premium(premium)) => *premium,
+            Ok(DeviceFile::Arm(premium)) => *premium,
             other => panic!("{other:?}"),
         }
     }
 
     fn amplifier() -> Amplifier {
         let premium = premium();
-        let kinematics = Kinematics::Premium(premium.mechanism);
+        let kinematics = premium.mechanism;
         Amplifier::new(AmplifierSpec {
             motors: premium.motors,
             kinematics,
@@ -272,7 +272,7 @@ mod tests {
 
     fn codes(force: Vector3<f64>) -> [u16; 3] {
         let premium = premium();
-        let kinematics = Kinematics::Premium(premium.mechanism);
+        let kinematics = premium.mechanism;
         let mut drive = Drive::new(kinematics, &premium.motors, premium.heat, None);
         drive.render([0.0; 3], Effort { force_on_user_n: force, gravity_share: 0.0 }).unwrap().0
     }
@@ -287,7 +287,7 @@ mod tests {
         let force = Vector3::new(1.0, -2.0, 0.5);
         amplifier.take(value(MS, force), [0.0; 3]);
         let torque = amplifier.joint_torque();
-        let expected = Kinematics::Premium(premium().mechanism).joint_torque([0.0; 3], force);
+        let expected = premium().mechanism.joint_torque([0.0; 3], force);
         for j in 0..3 {
             // Half a converter step: 5.5 A / 2048 * 23.4 mN m/A * 13.5 / 2.
             assert!((torque[j] - expected[j]).abs() < 4.3e-4, "joint {j}");

@@ -3,8 +3,7 @@
 use super::amplifier::{Amplifier, AmplifierSpec, Tally, Value};
 use super::card::{ARM_SHIFT, Card, QUEUE, Record, STATUS_TRIPPED};
 use super::motion::{Motion, Pose};
-use crate::device_file::PremiumFile;
-use crate::kinematics::Kinematics;
+use crate::device_file::ArmFile;
 use rt_core::clock::{monotonic_ns, sleep_until_ns};
 use rt_core::signals::StopSignals;
 use std::sync::atomic::Ordering;
@@ -26,7 +25,7 @@ pub struct Play {
 #[derive(Debug)]
 pub struct Emulator {
     card: &'static Card,
-    premium: PremiumFile,
+    premium: ArmFile,
     amplifier: Amplifier,
     motion: Motion,
     pose: Pose,
@@ -38,10 +37,10 @@ pub struct Emulator {
 
 impl Emulator {
     /// A card at home that nobody has written to.
-    pub fn new(card: &'static Card, premium: PremiumFile, motion: Motion, play: Play) -> Self {
+    pub fn new(card: &'static Card, premium: ArmFile, motion: Motion, play: Play) -> Self {
         let amplifier = Amplifier::new(AmplifierSpec {
             motors: premium.motors,
-            kinematics: Kinematics::Premium(premium.mechanism),
+            kinematics: premium.mechanism,
             peak_n: play.peak_n,
             step_n: play.step_n,
             watchdog_ns: play.watchdog_ns,
@@ -167,7 +166,7 @@ mod tests {
 
     fn emulator(card: &'static Card) -> Emulator {
         let text = builtin("premium-1.5").unwrap();
-        let Ok(DeviceFile::Premium(premium)) = DeviceFile::parse(text, Path::new("premium-1.5")) else {
+        let Ok(DeviceFile::Arm(premium)) = DeviceFile::parse(text, Path::new("premium-1.5")) else {
             panic!("it is built in");
         };
         // A step of a tenth of a newton a value.

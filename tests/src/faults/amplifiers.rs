@@ -7,11 +7,10 @@
 use crate::driver::HANG;
 use crate::faults::process::{End, Running};
 use crate::programs;
-use io_driver::device_file::{DeviceFile, PremiumFile, builtin};
+use io_driver::device_file::{ArmFile, DeviceFile, builtin};
 use io_driver::emulator::amplifier::{Amplifier, AmplifierSpec, Tally, Value};
 use io_driver::emulator::card::{Card, QUEUE, STATUS_TRIPPED};
 use io_driver::emulator::process::tally_of;
-use io_driver::kinematics::Kinematics;
 use rustix::process::Signal;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -56,16 +55,16 @@ impl Limits {
         let premium = self.premium();
         Amplifier::new(AmplifierSpec {
             motors: premium.motors,
-            kinematics: Kinematics::Premium(premium.mechanism),
+            kinematics: premium.mechanism,
             peak_n: self.peak_n,
             step_n: self.step_n(),
             watchdog_ns: u64::MAX,
         })
     }
 
-    fn premium(&self) -> PremiumFile {
+    fn premium(&self) -> ArmFile {
         match DeviceFile::parse(&self.description(), Path::new("<test>")) {
-            Ok(DeviceFile::Premium(premium)) => *premium,
+            Ok(DeviceFile::Arm(premium)) => *premium,
             other => panic!("{other:?}"),
         }
     }
