@@ -6,8 +6,9 @@
 use crate::demo;
 use crate::outcome::{RunFailure, Stop};
 use crate::report::Report;
-use crate::rig::Rig;
+use crate::rig::{HandMode, Rig};
 use crate::run::{self, Attach, RunPlan};
+use crate::simulated::SimulatedDevices;
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use io_driver::config::period_of;
@@ -58,8 +59,14 @@ struct RunArgs {
     #[arg(long, value_name = "CSV")]
     hand: Option<PathBuf>,
     /// How the hand moves the devices
-    #[arg(long, value_enum, default_value_t = HandMode::Kinematic)]
-    hand_mode: HandMode,
+    #[arg(long, value_enum, default_value_t = HandModeName::Kinematic)]
+    hand_mode: HandModeName,
+    /// With --hand-mode impedance: how the hand pulls, a built-in's name or a file (TOML); nobody: nobody holds them
+    #[arg(long, value_name = "HAND", default_value = "pen-grip")]
+    hand_model: PathBuf,
+    /// With --hand-mode impedance: which device is simulated, a built-in's name or a description (TOML)
+    #[arg(long, value_name = "DEVICE", default_value = "premium-1.5")]
+    device: PathBuf,
     /// What moves time [default: real; with --attach: the driver's own clock]
     #[arg(long, value_enum)]
     clock: Option<Clock>,
@@ -72,7 +79,7 @@ struct RunArgs {
     /// Ticks per second [default: 1000]
     #[arg(long, value_name = "HZ", value_parser = parse_rate, allow_negative_numbers = true)]
     rate_hz: Option<f64>,
-    /// Seed of everything random; nothing is, in this version
+    /// Seed of everything random: with --hand-mode impedance the hand's tremor and the sensors' noise
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse_seed, allow_negative_numbers = true)]
     seed: u64,
     /// Where the devices stand in the world (TOML)
@@ -87,10 +94,10 @@ struct RunArgs {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum HandMode {
+enum HandModeName {
     /// The fingers follow the hand file exactly
     Kinematic,
-    /// A simulated hand pulls a simulated device (not available in this version)
+    /// A simulated hand pulls simulated devices, with their weight, friction, encoders and motors
     Impedance,
 }
 
@@ -146,9 +153,17 @@ fn path_or_nothing() -> impl TypedValueParser<Value = PathBuf> {
 
 fn make_rig(args: &RunArgs) -> Result<Rig, RunFailure> {
     let wrong = |error: &dyn std::fmt::Display| RunFailure::Start(error.to_string());
-    if args.hand_mode == HandMode::Impedance {
-        return Err(wrong(&"--hand-mode impedance is not available in this version; available: kinematic"));
-    }
+    let hand_mode = match args.hand_mode {
+        HandModeName::Kinematic => HandMode::Kinematic,
+        HandModeName::Impedance if args.attach.is_some() => {
+            return Err(wrong(&"--attach and --hand-mode impedance exclude each other: the devices of a driver that runs are moved by whoever holds them"));
+        }
+        HandModeName::Impedance => HandMode::Impedance(SimulatedDevices {
+            description: args.device.clone(),
+            hand_model: args.hand_model.clone(),
+            seed: args.seed,
+        }),
+    };
     let mut scene = Scene::load(&args.scene).map_err(|error| wrong(&error))?;
     if args.attach.is_some() {
         // The devices are the fingers; nothing follows a script.
@@ -156,7 +171,7 @@ fn make_rig(args: &RunArgs) -> Result<Rig, RunFailure> {
     }
     let layout = args.layout.as_ref().map(Layout::load).transpose().map_err(|error| wrong(&error))?;
     let period_ns = period_of(args.rate_hz.unwrap_or(DEFAULT_RATE_HZ));
-    Rig::new(&args.scene, scene, layout.unwrap_or_default(), args.hand.as_deref(), period_ns)
+    Rig::new(&args.scene, scene, layout, args.hand.as_deref(), hand_mode, period_ns)
         .map_err(|error| wrong(&error))
 }
 

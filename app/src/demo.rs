@@ -1,15 +1,16 @@
 //! What happens without arguments: the default scene, felt for ten seconds in real time.
 
 use crate::outcome::RunFailure;
-use crate::rig::{Rig, RigError};
+use crate::rig::{HandMode, Rig, RigError};
 use crate::run::{Attach, RunPlan};
+use crate::simulated::SimulatedDevices;
 use io_driver::say::say;
 use shm_abi::client::{self, AttachError};
 use shm_abi::endpoint;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tempfile::TempDir;
-use world::{Layout, Scene};
+use world::Scene;
 
 const SCENE: &str = include_str!("../../config/scenes/default.toml");
 const HAND: &str = include_str!("../../config/hands/default.csv");
@@ -45,7 +46,8 @@ pub fn unpack(period_ns: u64) -> Result<Demo, RunFailure> {
 fn default_rig(hand: &Path, period_ns: u64) -> Result<Rig, RigError> {
     let file = Path::new(SCENE_NAME);
     let scene = Scene::parse(SCENE, file)?;
-    Rig::new(file, scene, Layout::default(), Some(hand), period_ns)
+    let hand_mode = HandMode::Impedance(SimulatedDevices::default());
+    Rig::new(file, scene, None, Some(hand), hand_mode, period_ns)
 }
 
 /// Uses a driver that runs and is free; starts one of our own otherwise, and says why.
@@ -74,7 +76,7 @@ pub fn plan(rig: &Rig) -> RunPlan {
             Some(Attach { socket, grace: Duration::from_secs(2) })
         }
         Err(AttachError::NoDriver { .. } | AttachError::DriverGone { .. }) => {
-            say(format_args!("phantom3: no driver is running; starting one of our own with ideal devices"));
+            say(format_args!("phantom3: no driver is running; starting one of our own with simulated PHANToM Premiums"));
             None
         }
         Err(error) => {

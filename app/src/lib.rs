@@ -24,6 +24,7 @@ pub mod report;
 pub mod rig;
 pub mod row;
 pub mod run;
+pub mod simulated;
 pub mod slow;
 pub mod two_processes;
 pub mod virtual_clock;

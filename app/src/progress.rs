@@ -1,4 +1,4 @@
-//! A line that says how far a run has come: rewritten in place on a terminal, else now and then.
+//! A line that says how far something has come: rewritten in place on a terminal, else now and then.
 
 use io_driver::device::run_time_s;
 use std::io::{IsTerminal, Write};
@@ -7,39 +7,29 @@ use std::time::{Duration, Instant};
 const ON_TERMINAL: Duration = Duration::from_millis(200);
 const ELSEWHERE: Duration = Duration::from_secs(10);
 
-/// The line.
+/// A line that is told anew again and again.
 #[derive(Debug)]
-pub struct Progress {
-    total_ticks: u64,
-    period_ns: u64,
+pub struct StatusLine {
     on_terminal: bool,
-    last: Instant,
+    last: Option<Instant>,
     is_open: bool,
 }
 
-impl Progress {
-    /// A line for a run of so many ticks.
-    pub fn new(total_ticks: u64, period_ns: u64) -> Self {
-        let on_terminal = std::io::stderr().is_terminal();
-        Self { total_ticks, period_ns, on_terminal, last: Instant::now(), is_open: false }
+impl Default for StatusLine {
+    fn default() -> Self {
+        Self { on_terminal: std::io::stderr().is_terminal(), last: None, is_open: false }
     }
+}
 
-    /// Shows it, if it is time to.
-    pub fn show(&mut self, run_ticks: u64) {
+impl StatusLine {
+    /// Shows what `line` makes, if it is time to.
+    pub fn show(&mut self, line: impl FnOnce() -> String) {
         let pause = if self.on_terminal { ON_TERMINAL } else { ELSEWHERE };
-        if self.last.elapsed() < pause {
+        if self.last.is_some_and(|last| last.elapsed() < pause) {
             return;
         }
-        self.last = Instant::now();
-        let seconds = |ticks: u64| run_time_s(ticks as i64, self.period_ns);
-        let done = run_ticks.min(self.total_ticks);
-        let percent = 100 * done / self.total_ticks.max(1);
-        let total = seconds(self.total_ticks);
-        let line = if run_ticks == 0 {
-            format!("   0.00 s of {total:.2} s  waiting for the force to ramp in (late replies hold it back)")
-        } else {
-            format!("{:7.2} s of {total:.2} s  {percent:3} %", seconds(done))
-        };
+        self.last = Some(Instant::now());
+        let line = line();
         let mut out = std::io::stderr().lock();
         // Nobody to tell is no reason to stop.
         let _ = if self.on_terminal { write!(out, "\r{line}\x1b[K") } else { writeln!(out, "{line}") };
@@ -55,8 +45,46 @@ impl Progress {
     }
 }
 
-impl Drop for Progress {
+impl Drop for StatusLine {
     fn drop(&mut self) {
         self.end();
+    }
+}
+
+/// The line of a run.
+#[derive(Debug)]
+pub struct Progress {
+    total_ticks: u64,
+    period_ns: u64,
+    line: StatusLine,
+}
+
+impl Progress {
+    /// A line for a run of so many ticks; the first is shown after a while.
+    pub fn new(total_ticks: u64, period_ns: u64) -> Self {
+        let mut line = StatusLine::default();
+        line.last = Some(Instant::now());
+        Self { total_ticks, period_ns, line }
+    }
+
+    /// Shows it, if it is time to.
+    pub fn show(&mut self, run_ticks: u64) {
+        let (total_ticks, period_ns) = (self.total_ticks, self.period_ns);
+        self.line.show(|| {
+            let seconds = |ticks: u64| run_time_s(ticks as i64, period_ns);
+            let done = run_ticks.min(total_ticks);
+            let percent = 100 * done / total_ticks.max(1);
+            let total = seconds(total_ticks);
+            if run_ticks == 0 {
+                format!("   0.00 s of {total:.2} s  waiting for the force to ramp in (late replies hold it back)")
+            } else {
+                format!("{:7.2} s of {total:.2} s  {percent:3} %", seconds(done))
+            }
+        });
+    }
+
+    /// Ends the line, so that what follows begins on one of its own.
+    pub fn end(&mut self) {
+        self.line.end();
     }
 }

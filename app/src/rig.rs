@@ -4,11 +4,17 @@
 use crate::fast_step::{DeviceFinger, FastStep};
 use crate::mount::Mount;
 use crate::recording::Names;
+use crate::simulated::{SimulatedDevices, SimulationError, base_for_path};
 use haptics::{Entity, Finger, Friction, ParameterError, Plane, Shape, Sphere};
 use io_driver::config::{
     Backend, DeviceConfig, DriverConfig, ProcessConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig,
+    Wish,
 };
+use io_driver::device_file::Workspace;
+use io_driver::open::{OpenError, open_devices};
+use io_driver::say::say;
 use io_driver::sim::script::{HandError, HandScript};
+use nalgebra::{Isometry3, Vector3};
 use shm_abi::segment::ClockMode;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -47,6 +53,12 @@ pub enum RigError {
         /// Who asks for it.
         named_by: String,
     },
+    /// The devices cannot be simulated.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// The simulated devices cannot be had.
+    #[error(transparent)]
+    Device(#[from] OpenError),
     /// The scene holds something that rendering refuses.
     #[error("{file}: {what}: {source}")]
     Refused {
@@ -74,12 +86,26 @@ pub struct Rig {
     pub scene_file: PathBuf,
     /// The scene.
     pub scene: Scene,
-    /// Where the devices stand.
-    pub layout: Layout,
+    /// Where the devices stand; `None`: nobody has said.
+    pub layout: Option<Layout>,
+    /// How the hand moves the devices.
+    pub hand_mode: HandMode,
     /// The hand file, and how long it lasts.
     pub hand: Option<HandFile>,
     /// Length of a tick (ns).
     pub period_ns: u64,
+    /// X_WD of each device; beyond the list the world's origin.
+    bases: Vec<Isometry3<f64>>,
+}
+
+/// How the hand moves the devices that are not real.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum HandMode {
+    /// The fingers follow it exactly.
+    #[default]
+    Kinematic,
+    /// It pulls simulated devices.
+    Impedance(SimulatedDevices),
 }
 
 /// A checked hand file.
@@ -89,6 +115,8 @@ pub struct HandFile {
     pub path: PathBuf,
     /// Its duration (s).
     pub duration_s: f64,
+    /// Corners of the box that each finger's path fills, in W (m); `None` without a path.
+    pub bounds: Vec<Option<[Vector3<f64>; 2]>>,
 }
 
 impl Rig {
@@ -99,8 +127,9 @@ impl Rig {
     pub fn new(
         scene_file: &Path,
         scene: Scene,
-        layout: Layout,
+        layout: Option<Layout>,
         hand: Option<&Path>,
+        hand_mode: HandMode,
         period_ns: u64,
     ) -> Result<Self, RigError> {
         let named = match (hand, &scene.hand) {
@@ -109,9 +138,51 @@ impl Rig {
             (None, None) => None,
         };
         let hand = named.map(|(path, named_by)| check_hand(path, &named_by, &scene)).transpose()?;
-        let rig = Self { scene_file: scene_file.into(), scene, layout, hand, period_ns };
+        let mut rig = Self { scene_file: scene_file.into(), scene, layout, hand_mode, bases: Vec::new(), hand, period_ns };
+        rig.bases = rig.place_bases()?;
         rig.fast_step()?;
+        if matches!(rig.hand_mode, HandMode::Impedance(_)) {
+            // What the driver would find wrong is found here, before anything is started.
+            open_devices(&rig.driver_config(ClockMode::Virtual))?;
+        }
         Ok(rig)
+    }
+
+    /// Where a device stands, X_WD.
+    pub fn base_in_world(&self, device: usize) -> Isometry3<f64> {
+        self.bases.get(device).copied().unwrap_or_else(Isometry3::identity)
+    }
+
+    fn place_bases(&self) -> Result<Vec<Isometry3<f64>>, RigError> {
+        let devices = 0..self.device_count();
+        match (&self.layout, &self.hand_mode) {
+            (Some(layout), _) => Ok(devices.map(|device| layout.pose(device)).collect()),
+            (None, HandMode::Kinematic) => Ok(Vec::new()),
+            (None, HandMode::Impedance(simulated)) => {
+                let workspace = simulated.arm()?.workspace;
+                Ok(devices.map(|device| self.base_near_path(device, &workspace)).collect())
+            }
+        }
+    }
+
+    /// So that the finger's path lies within the workspace.
+    fn base_near_path(&self, device: usize, workspace: &Workspace) -> Isometry3<f64> {
+        let Some(index) = self.scene.fingers.iter().position(|finger| finger.device == device) else {
+            return Isometry3::identity();
+        };
+        let finger = &self.scene.fingers[index];
+        let bounds = self.hand.as_ref().and_then(|hand| hand.bounds.get(index).copied().flatten());
+        let [lowest, highest] = bounds.unwrap_or([finger.start_m.coords; 2]);
+        let base = base_for_path(lowest, highest, workspace);
+        if base != Isometry3::identity() {
+            let [x, y, z]: [f64; 3] = base.translation.vector.into();
+            say(format_args!(
+                "phantom3: the device of finger {} stands at [{x:.4}, {y:.4}, {z:.4}] m, so that the hand's path lies in \
+                 its workspace; --layout says otherwise",
+                finger.name
+            ));
+        }
+        base
     }
 
     /// The rendering of this scene.
@@ -124,7 +195,7 @@ impl Rig {
         let fingers = self.scene.fingers.iter().map(|finger| {
             let made = Finger::new(finger.radius_m, entities.len())
                 .map_err(|source| self.refused(format!("finger {}", finger.name), source))?;
-            let mount = Mount::new(self.layout.pose(finger.device));
+            let mount = Mount::new(self.base_in_world(finger.device));
             Ok(DeviceFinger { finger: made, device: finger.device, mount })
         });
         let fingers: Vec<DeviceFinger> = fingers.collect::<Result<_, RigError>>()?;
@@ -149,7 +220,7 @@ impl Rig {
         self.hand.as_ref().map_or(1.0, |hand| hand.duration_s.max(1.0))
     }
 
-    /// A driver whose ideal devices are the scripted hand's fingers.
+    /// A driver whose devices are the scripted hand's fingers.
     pub fn driver_config(&self, clock: ClockMode) -> DriverConfig {
         let period_ns = self.period_ns;
         let reply = ReplyConfig { mode: ReplyMode::OnArrival, budget_ns: period_ns / 2 };
@@ -161,24 +232,30 @@ impl Rig {
             reply,
             safety: SafetyConfig::usual(period_ns),
             process: ProcessConfig::default(),
-            devices: (0..self.device_count()).map(|index| self.ideal_device(index)).collect(),
+            devices: (0..self.device_count()).map(|index| self.device(index)).collect(),
         }
     }
 
-    fn ideal_device(&self, index: usize) -> DeviceConfig {
+    fn device(&self, index: usize) -> DeviceConfig {
         let finger = self.scene.fingers.iter().find(|finger| finger.device == index);
         let hand =
             finger.and_then(|finger| self.hand.as_ref().map(|hand| (hand.path.clone(), finger.name.clone())));
+        let wish = Wish {
+            hand,
+            start_m: finger.map_or_else(Vector3::zeros, |finger| finger.start_m.coords),
+            base_in_world: self.base_in_world(index),
+        };
+        let (backend, compensates_gravity) = match &self.hand_mode {
+            // A device that is no finger's needs no hand.
+            HandMode::Impedance(simulated) if finger.is_some() => (simulated_backend(simulated, wish), true),
+            _ => (Backend::Ideal(wish), false),
+        };
         DeviceConfig {
             // No finger can be called so: brackets are not allowed in a name.
             name: finger.map_or_else(|| format!("(unused {index})"), |finger| finger.name.clone()),
-            backend: Backend::Ideal {
-                hand,
-                start_m: finger.map_or_else(nalgebra::Vector3::zeros, |finger| finger.start_m.coords),
-                base_in_world: self.layout.pose(index),
-            },
+            backend,
             peak_force_n: None,
-            compensates_gravity: false,
+            compensates_gravity,
         }
     }
 
@@ -217,6 +294,16 @@ impl Rig {
     }
 }
 
+fn simulated_backend(simulated: &SimulatedDevices, wish: Wish) -> Backend {
+    Backend::Simulated {
+        description: simulated.description_for_driver(),
+        wish,
+        hand_model: simulated.hand_for_driver(),
+        seed: simulated.seed,
+        tremor: true,
+    }
+}
+
 /// Reads the hand file as the driver will, so that its mistakes are told here, by this process.
 fn check_hand(path: &Path, named_by: &str, scene: &Scene) -> Result<HandFile, RigError> {
     let unreadable = |source| RigError::Unreadable { file: path.into(), named_by: named_by.into(), source };
@@ -227,5 +314,6 @@ fn check_hand(path: &Path, named_by: &str, scene: &Scene) -> Result<HandFile, Ri
     let fingers: Vec<&str> = scene.fingers.iter().map(|finger| finger.name.as_str()).collect();
     let script = HandScript::parse(&text, path, &fingers)?;
     let path = std::path::absolute(path).map_err(unreadable)?;
-    Ok(HandFile { path, duration_s: script.duration_s() })
+    let bounds = (0..fingers.len()).map(|finger| script.bounds(finger)).collect();
+    Ok(HandFile { path, duration_s: script.duration_s(), bounds })
 }

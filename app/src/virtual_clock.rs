@@ -8,7 +8,7 @@ use crate::fast_loop::{FastLoop, Turn};
 use crate::outcome::{RunFailure, Stop};
 use crate::progress::Progress;
 use crate::slow::SlowSide;
-use io_driver::config::DriverConfig;
+use io_driver::config::{DriverConfig, ReplyMode};
 use io_driver::cycle::Cycle;
 use io_driver::driver::{describe, make_cycle};
 use io_driver::open::open_devices;
@@ -30,6 +30,7 @@ pub struct VirtualDriver {
     driver: DriverView,
     commander: CommanderMemory,
     period_ns: u64,
+    mode: ReplyMode,
 }
 
 impl VirtualDriver {
@@ -47,7 +48,7 @@ impl VirtualDriver {
         let mut cycle = make_cycle(config, memory, devices);
         cycle.grant(view);
         cycle.change_lease();
-        Ok(Self { cycle, driver, commander, period_ns: config.period_ns })
+        Ok(Self { cycle, driver, commander, period_ns: config.period_ns, mode: config.reply.mode })
     }
 
     /// The driver's memory, as an application sees it.
@@ -84,9 +85,17 @@ impl VirtualDriver {
         Ok(Stop::Finished)
     }
 
-    /// The driver reads and tells, the application answers, the driver writes.
-    fn tick(&mut self, tick: u64, fast: &mut FastLoop) -> Turn {
-        self.cycle.sense(tick, tick * self.period_ns);
+    /// The driver reads and tells, the application answers, the driver writes; or, where replies are for the next
+    /// tick, it writes what the application answered to the tick before.
+    pub fn tick(&mut self, tick: u64, fast: &mut FastLoop) -> Turn {
+        let deadline_ns = tick * self.period_ns;
+        if self.mode == ReplyMode::NextTick {
+            self.cycle.take_reply();
+            self.cycle.sense(tick, deadline_ns);
+            self.cycle.actuate();
+            return fast.turn(tick, &self.driver, &self.commander);
+        }
+        self.cycle.sense(tick, deadline_ns);
         let turn = fast.turn(tick, &self.driver, &self.commander);
         self.cycle.take_reply();
         self.cycle.actuate();

@@ -1,6 +1,8 @@
 //! From configuration to devices that can be read: files are opened here and nowhere later.
 
-use crate::config::{Backend, DeviceConfig, DriverConfig};
+mod simulated;
+
+use crate::config::{Backend, DeviceConfig, DriverConfig, Wish};
 use crate::device::Device;
 use crate::device::arm::Arm;
 use crate::device::emulated::{Channels, EmulatedDevice};
@@ -9,10 +11,13 @@ use crate::device::ideal::{Hand, IdealDevice};
 use crate::device::replay::ReplayDevice;
 use crate::device_file::{self, ArmFile, DeviceFile, DeviceFileError};
 use crate::emulator::card::{Card, CardError};
+use crate::sim::hand::model::HandModelError;
 use crate::sim::script::{HandError, HandPlayer, HandScript};
+use crate::sim::tip_board::TipBoard;
 use shm_abi::segment::DeviceInfo;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use thiserror::Error;
 
 /// Why a device cannot be had.
@@ -37,6 +42,32 @@ pub enum OpenError {
     /// The description is wrong.
     #[error(transparent)]
     Description(#[from] DeviceFileError),
+    /// The description of a hand is wrong.
+    #[error(transparent)]
+    HandModel(#[from] HandModelError),
+    /// The description does not say how the arm moves.
+    #[error(
+        "device {device}: {file} has no table [simulation], so the arm cannot be simulated; add it, see the built-in premium-1.5"
+    )]
+    NoSimulation {
+        /// Whose.
+        device: String,
+        /// Which.
+        file: PathBuf,
+    },
+    /// The arm cannot be where its hand begins.
+    #[error(
+        "device {device}: the hand begins at {start_m:?} m in the world, which this arm cannot reach from its base: {why}; \
+         move the base (`base_position_m`, or the run's --layout) or the hand"
+    )]
+    OutOfReach {
+        /// Whose.
+        device: String,
+        /// Where, in W.
+        start_m: [f64; 3],
+        /// Why not.
+        why: String,
+    },
     /// The emulated card cannot be had.
     #[error("device {device}: {source}")]
     Card {
@@ -90,19 +121,25 @@ pub enum OpenError {
 /// # Errors
 /// The first that cannot be had, and why.
 pub fn open_devices(config: &DriverConfig) -> Result<Vec<Box<dyn Device>>, OpenError> {
-    config.devices.iter().map(|device| open(device, config)).collect()
+    let board = Arc::new(TipBoard::default());
+    config.devices.iter().map(|device| open(device, config, &board)).collect()
 }
 
-fn open(device: &DeviceConfig, config: &DriverConfig) -> Result<Box<dyn Device>, OpenError> {
+fn open(
+    device: &DeviceConfig,
+    config: &DriverConfig,
+    board: &Arc<TipBoard>,
+) -> Result<Box<dyn Device>, OpenError> {
     match &device.backend {
-        Backend::Ideal { hand, start_m, base_in_world } => {
-            let hand = match hand {
-                Some((file, finger)) => scripted(device, file, finger, config, *start_m)?,
-                None => Hand::Resting(*start_m),
+        Backend::Ideal(wish) => {
+            let hand = match script(device, wish, config)? {
+                Some((player, finger)) => Hand::Scripted(player, finger),
+                None => Hand::Resting(wish.start_m),
             };
             let info = commissioned(ideal_info(device), config);
-            Ok(Box::new(IdealDevice::new(info, *base_in_world, hand)))
+            Ok(Box::new(IdealDevice::new(info, wish.base_in_world, hand)))
         }
+        Backend::Simulated { .. } => simulated::open(device, config, board),
         Backend::Replay { description, trace } => {
             let premium = mechanism(device, description)?;
             let trace = EncoderTrace::parse(&read(device, trace)?, trace, premium.encoders.count_bits)?;
@@ -157,29 +194,21 @@ fn emulated(
     Ok(Box::new(device))
 }
 
+/// The script of a finger, and its place in it; `None`: it has none.
+///
 /// The hand file may hold other fingers' columns: those of all devices that share it are known.
-fn scripted(
+fn script(
     device: &DeviceConfig,
-    file: &Path,
-    finger: &str,
+    wish: &Wish,
     config: &DriverConfig,
-    start_m: nalgebra::Vector3<f64>,
-) -> Result<Hand, OpenError> {
-    let fingers: Vec<&str> = config
-        .devices
-        .iter()
-        .filter_map(|other| match &other.backend {
-            Backend::Ideal { hand: Some((path, name)), .. } if path == file => Some(name.as_str()),
-            _ => None,
-        })
-        .collect();
+) -> Result<Option<(HandPlayer, usize)>, OpenError> {
+    let Some((file, finger)) = &wish.hand else { return Ok(None) };
+    let wishes = config.devices.iter().filter_map(|other| other.backend.wish()?.hand.as_ref());
+    let fingers: Vec<&str> =
+        wishes.filter(|(path, _)| path == file).map(|(_, name)| name.as_str()).collect();
     let script = HandScript::parse(&read(device, file)?, file, &fingers)?;
-    let index = fingers.iter().position(|name| *name == finger).unwrap_or(0);
-    Ok(if script.is_scripted(index) {
-        Hand::Scripted(HandPlayer::new(script), index)
-    } else {
-        Hand::Resting(start_m)
-    })
+    let index = fingers.iter().position(|name| name == finger).unwrap_or(0);
+    Ok(script.is_scripted(index).then(|| (HandPlayer::new(script), index)))
 }
 
 /// The mechanism that a device's description tells.

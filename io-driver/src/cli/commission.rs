@@ -153,7 +153,7 @@ fn describe(config: &DriverConfig, device: usize) -> Result<ArmFile, Box<dyn Err
     let device = &config.devices[device];
     match &device.backend {
         Backend::Emulated { description, .. } => Ok(open::mechanism(device, description)?),
-        Backend::Ideal { .. } | Backend::Replay { .. } => {
+        Backend::Ideal(_) | Backend::Simulated { .. } | Backend::Replay { .. } => {
             Err(format!("device {} has no motors that could be tried", device.name).into())
         }
     }

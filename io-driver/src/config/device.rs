@@ -1,5 +1,6 @@
 //! `[[device]]`: how each device is reached.
 
+use crate::sim::hand::model as hand_model;
 use crate::toml_report::{Allowed, SpannedList, TomlReport, TomlText};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::Deserialize;
@@ -24,13 +25,19 @@ pub struct DeviceConfig {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Backend {
     /// No mechanism: the scripted hand's position goes straight through.
-    Ideal {
-        /// The hand file and the finger in it.
-        hand: Option<(PathBuf, String)>,
-        /// Where the tip rests without a script, in the world W (m).
-        start_m: Vector3<f64>,
-        /// X_WD, where the base stands.
-        base_in_world: Isometry3<f64>,
+    Ideal(Wish),
+    /// A described mechanism, simulated in the driver's process, and a hand that pulls it where the wish says.
+    Simulated {
+        /// The description: a built-in's name or a file.
+        description: PathBuf,
+        /// Where the hand wants to be.
+        wish: Wish,
+        /// How it pulls: a built-in hand's name or a file; `None`: nobody holds the arm.
+        hand_model: Option<PathBuf>,
+        /// Of everything random.
+        seed: u64,
+        /// Whether the hand trembles.
+        tremor: bool,
     },
     /// A recorded encoder trace through a described mechanism.
     Replay {
@@ -48,12 +55,31 @@ pub enum Backend {
     },
 }
 
+/// Where a scripted or simulated finger shall be.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Wish {
+    /// The hand file and the finger in it.
+    pub hand: Option<(PathBuf, String)>,
+    /// Where the tip rests without a script, in the world W (m).
+    pub start_m: Vector3<f64>,
+    /// X_WD, where the base stands.
+    pub base_in_world: Isometry3<f64>,
+}
+
 impl Backend {
+    /// Where its finger shall be, if a script may say so.
+    pub fn wish(&self) -> Option<&Wish> {
+        match self {
+            Self::Ideal(wish) | Self::Simulated { wish, .. } => Some(wish),
+            Self::Replay { .. } | Self::Emulated { .. } => None,
+        }
+    }
+
     /// How many buttons such a device may have; `None`: none, so that no switch could be wired to it.
     pub(super) fn buttons(&self) -> Option<i64> {
         match self {
-            Self::Ideal { .. } | Self::Replay { .. } => None,
-            Self::Emulated { .. } => Some(32),
+            Self::Ideal(_) | Self::Replay { .. } => None,
+            Self::Emulated { .. } | Self::Simulated { .. } => Some(32),
         }
     }
 }
@@ -67,6 +93,9 @@ pub(super) struct RawDevice {
     trace: Option<Spanned<PathBuf>>,
     card: Option<Spanned<PathBuf>>,
     gravity_compensation: Option<Spanned<bool>>,
+    hand_model: Option<Spanned<PathBuf>>,
+    seed: Option<Spanned<i64>>,
+    tremor: Option<Spanned<bool>>,
     hand: Option<Spanned<PathBuf>>,
     finger: Option<Spanned<String>>,
     start_m: Option<SpannedList>,
@@ -79,6 +108,7 @@ pub(super) struct RawDevice {
 #[serde(rename_all = "kebab-case")]
 enum RawBackend {
     Ideal,
+    Simulated,
     Replay,
     Emulated,
 }
@@ -120,6 +150,7 @@ impl RawDevice {
         let name = self.name.as_ref().map_or_else(|| format!("f{index}"), |name| name.get_ref().clone());
         let backend = match self.backend.get_ref() {
             RawBackend::Ideal => self.ideal(&name, toml, directory)?,
+            RawBackend::Simulated => self.simulated(&name, span, toml, directory)?,
             RawBackend::Replay => self.replay(span, toml, directory)?,
             RawBackend::Emulated => self.emulated(span, toml, directory)?,
         };
@@ -139,9 +170,45 @@ impl RawDevice {
             ],
             toml,
         )?;
+        self.refuse_foreign("ideal", &self.keys_of_simulated(), toml)?;
+        Ok(Backend::Ideal(self.wish(name, toml, directory)?))
+    }
+
+    fn simulated(
+        &self,
+        name: &str,
+        span: std::ops::Range<usize>,
+        toml: &TomlText<'_>,
+        directory: &Path,
+    ) -> Result<Backend, TomlReport> {
+        let foreign = [("trace", span_of(&self.trace)), ("card", span_of(&self.card))];
+        self.refuse_foreign("simulated", &foreign, toml)?;
+        Ok(Backend::Simulated {
+            description: self.description("simulated", &span, toml, directory)?,
+            wish: self.wish(name, toml, directory)?,
+            hand_model: self.hand_model(directory),
+            seed: match &self.seed {
+                Some(seed) => toml.integer(seed, 0..=i64::MAX)?.unsigned_abs(),
+                None => 0,
+            },
+            tremor: self.tremor.as_ref().is_none_or(|key| *key.get_ref()),
+        })
+    }
+
+    /// `"nobody"` is none; a built-in's name stays what it is; else a file.
+    fn hand_model(&self, directory: &Path) -> Option<PathBuf> {
+        let Some(model) = &self.hand_model else { return Some(DEFAULT_HAND.into()) };
+        match model.get_ref().to_str() {
+            Some("nobody") => None,
+            Some(name) if hand_model::builtin(name).is_some() => Some(name.into()),
+            _ => Some(directory.join(model.get_ref())),
+        }
+    }
+
+    fn wish(&self, name: &str, toml: &TomlText<'_>, directory: &Path) -> Result<Wish, TomlReport> {
         let finger = self.finger.as_ref().map_or_else(|| name.to_owned(), |finger| finger.get_ref().clone());
         let start = self.start_m.as_ref().map_or(Ok([0.0; 3]), |list| toml.numbers(list, PLACE))?;
-        Ok(Backend::Ideal {
+        Ok(Wish {
             hand: self.hand.as_ref().map(|hand| (directory.join(hand.get_ref()), finger)),
             start_m: Vector3::from(start),
             base_in_world: self.base(toml)?,
@@ -155,7 +222,8 @@ impl RawDevice {
         directory: &Path,
     ) -> Result<Backend, TomlReport> {
         self.refuse_foreign("replay", &[("card", span_of(&self.card))], toml)?;
-        self.refuse_foreign("replay", &self.keys_of_ideal(), toml)?;
+        self.refuse_foreign("replay", &self.keys_of_wish(), toml)?;
+        self.refuse_foreign("replay", &self.keys_of_simulated(), toml)?;
         let trace = self.needed("replay", &self.trace, "trace", &span, toml)?;
         Ok(Backend::Replay {
             description: self.description("replay", &span, toml, directory)?,
@@ -170,7 +238,8 @@ impl RawDevice {
         directory: &Path,
     ) -> Result<Backend, TomlReport> {
         self.refuse_foreign("emulated", &[("trace", span_of(&self.trace))], toml)?;
-        self.refuse_foreign("emulated", &self.keys_of_ideal(), toml)?;
+        self.refuse_foreign("emulated", &self.keys_of_wish(), toml)?;
+        self.refuse_foreign("emulated", &self.keys_of_simulated(), toml)?;
         let card = self.needed("emulated", &self.card, "card", &span, toml)?;
         Ok(Backend::Emulated {
             description: self.description("emulated", &span, toml, directory)?,
@@ -178,7 +247,15 @@ impl RawDevice {
         })
     }
 
-    fn keys_of_ideal(&self) -> [(&'static str, Option<std::ops::Range<usize>>); 5] {
+    fn keys_of_simulated(&self) -> [(&'static str, Option<std::ops::Range<usize>>); 3] {
+        [
+            ("hand_model", span_of(&self.hand_model)),
+            ("seed", span_of(&self.seed)),
+            ("tremor", span_of(&self.tremor)),
+        ]
+    }
+
+    fn keys_of_wish(&self) -> [(&'static str, Option<std::ops::Range<usize>>); 5] {
         [
             ("hand", span_of(&self.hand)),
             ("finger", span_of(&self.finger)),
@@ -253,6 +330,9 @@ impl RawDevice {
 fn span_of<T>(key: &Option<Spanned<T>>) -> Option<std::ops::Range<usize>> {
     key.as_ref().map(Spanned::span)
 }
+
+/// Who holds a simulated arm, unless the configuration says.
+const DEFAULT_HAND: &str = "pen-grip";
 
 const PLACE: Allowed = Allowed { min: -100.0, max: 100.0, unit: "m" };
 const QUATERNION: Allowed = Allowed { min: -2.0, max: 2.0, unit: "(w, x, y, z)" };

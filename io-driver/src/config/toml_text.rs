@@ -1,6 +1,6 @@
 //! Writes a configuration down as TOML.
 
-use super::{Backend, Commissioning, DeviceConfig, DriverConfig, OverrunPolicy, ReplyMode, SpinMargin};
+use super::{Backend, Commissioning, DeviceConfig, DriverConfig, OverrunPolicy, ReplyMode, SpinMargin, Wish};
 use crate::safety::switches::{Switch, Switches};
 use shm_abi::doorbell::WaitMode;
 use std::fmt::Write as _;
@@ -77,16 +77,16 @@ fn write_device(text: &mut String, device: &DeviceConfig) -> std::fmt::Result {
         writeln!(text, "gravity_compensation = true")?;
     }
     match &device.backend {
-        Backend::Ideal { hand, start_m, base_in_world } => {
+        Backend::Ideal(wish) => {
             writeln!(text, "backend = \"ideal\"")?;
-            if let Some((hand, finger)) = hand {
-                writeln!(text, "hand = {}\nfinger = {}", quoted(&hand.to_string_lossy()), quoted(finger))?;
-            }
-            let base = base_in_world.translation.vector;
-            let turn = base_in_world.rotation.quaternion();
-            writeln!(text, "start_m = {:?}", start_m.as_slice())?;
-            writeln!(text, "base_position_m = {:?}", base.as_slice())?;
-            writeln!(text, "base_orientation_wxyz = {:?}", [turn.w, turn.i, turn.j, turn.k])
+            write_wish(text, wish)
+        }
+        Backend::Simulated { description, wish, hand_model, seed, tremor } => {
+            writeln!(text, "backend = \"simulated\"")?;
+            writeln!(text, "description = {}", quoted(&description.to_string_lossy()))?;
+            let model = hand_model.as_ref().map_or("nobody".into(), |model| model.to_string_lossy());
+            writeln!(text, "hand_model = {}\nseed = {seed}\ntremor = {tremor}", quoted(&model))?;
+            write_wish(text, wish)
         }
         Backend::Replay { description, trace } => {
             writeln!(text, "backend = \"replay\"")?;
@@ -99,6 +99,16 @@ fn write_device(text: &mut String, device: &DeviceConfig) -> std::fmt::Result {
             writeln!(text, "card = {}", quoted(&card.to_string_lossy()))
         }
     }
+}
+
+fn write_wish(text: &mut String, wish: &Wish) -> std::fmt::Result {
+    if let Some((hand, finger)) = &wish.hand {
+        writeln!(text, "hand = {}\nfinger = {}", quoted(&hand.to_string_lossy()), quoted(finger))?;
+    }
+    let turn = wish.base_in_world.rotation.quaternion();
+    writeln!(text, "start_m = {:?}", wish.start_m.as_slice())?;
+    writeln!(text, "base_position_m = {:?}", wish.base_in_world.translation.vector.as_slice())?;
+    writeln!(text, "base_orientation_wxyz = {:?}", [turn.w, turn.i, turn.j, turn.k])
 }
 
 fn mode_name(mode: ReplyMode) -> &'static str {

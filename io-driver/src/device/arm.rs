@@ -19,6 +19,8 @@ pub struct Arm {
     drive: Drive,
     joints: [f64; 3],
     last_tick: Option<u64>,
+    /// The counters read zero in the home pose, whatever the pose of the first reading.
+    is_zeroed: bool,
 }
 
 impl Arm {
@@ -33,13 +35,20 @@ impl Arm {
             drive: Drive::new(kinematics, &premium.motors, premium.heat, gravity),
             joints: premium.encoders.home_joint_angles_rad,
             last_tick: None,
+            is_zeroed: false,
         }
+    }
+
+    /// An arm whose counters read zero in the home pose.
+    pub fn already_zeroed(self) -> Self {
+        Self { is_zeroed: true, ..self }
     }
 
     /// Takes the raw counters of a tick. The pose of the first is the home pose.
     pub fn read(&mut self, raw: [i64; 3], time: TickTime) -> Reading {
         let counts = self.extender.extend(raw);
         match self.last_tick.replace(time.tick) {
+            None if self.is_zeroed => {}
             None => self.map.zero_at(counts),
             Some(last) => {
                 let elapsed = i64::try_from(time.tick.saturating_sub(last)).unwrap_or(i64::MAX);

@@ -9,6 +9,7 @@ pub mod emulated;
 pub mod encoder_trace;
 pub mod ideal;
 pub mod replay;
+pub mod simulated;
 
 use nalgebra::Vector3;
 use shm_abi::segment::DeviceInfo;

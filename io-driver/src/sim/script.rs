@@ -91,6 +91,14 @@ impl HandScript {
         self.times_s.last().map_or(0.0, |last| last.max(0.0))
     }
 
+    /// Lowest and highest corner of the box that a finger's path fills (m); `None` without a script.
+    pub fn bounds(&self, finger: usize) -> Option<[Vector3<f64>; 2]> {
+        let slot = self.slot(finger)?;
+        let first = self.point(0, slot);
+        let grown = (1..self.times_s.len()).map(|row| self.point(row, slot));
+        Some(grown.fold([first, first], |[low, high], p| [low.inf(&p), high.sup(&p)]))
+    }
+
     /// Whether a finger has a script.
     pub fn is_scripted(&self, finger: usize) -> bool {
         self.slot(finger).is_some()

@@ -1,0 +1,131 @@
+//! Simulated devices for the fingers of a scene: which arm, whose hand, and where the arms stand.
+//!
+//! Model: where no layout says where the devices stand, each stands at the world's origin if its finger's whole path
+//! lies within its workspace there; else its base is moved, without turning it, by the smallest distance that
+//! brings the path into the workspace, or the middle of the path to the middle of the workspace along an axis on
+//! which it is too long.
+//! Frames: bases in W.
+
+use io_driver::device_file::{self, ArmFile, DeviceFile, DeviceFileError, Workspace};
+use nalgebra::{Isometry3, Vector3};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// A hand that is held back by a surface, or follows late, leaves its path by some millimetres (m).
+const SLACK_M: f64 = 0.01;
+
+/// What is simulated where no driver runs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SimulatedDevices {
+    /// The arm's description: a built-in's name or a file.
+    pub description: PathBuf,
+    /// How the hand pulls: a built-in's name or a file, or `nobody`.
+    pub hand_model: PathBuf,
+    /// Of tremor and noise.
+    pub seed: u64,
+}
+
+impl Default for SimulatedDevices {
+    fn default() -> Self {
+        Self { description: "premium-1.5".into(), hand_model: "pen-grip".into(), seed: 0 }
+    }
+}
+
+/// Why nothing can be simulated.
+#[derive(Debug, Error)]
+pub enum SimulationError {
+    /// The description cannot be read.
+    #[error("cannot read the device's description {file}: {source}; name a file, or one of {}", device_file::BUILTIN_NAMES.join(", "))]
+    Unreadable {
+        /// Which.
+        file: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The description is wrong.
+    #[error(transparent)]
+    Description(#[from] DeviceFileError),
+    /// An ideal device is not simulated.
+    #[error("{file} describes an ideal device, which has nothing to simulate; use --hand-mode kinematic, or an arm such as premium-1.5")]
+    Ideal {
+        /// Which.
+        file: PathBuf,
+    },
+}
+
+impl SimulatedDevices {
+    /// The description.
+    ///
+    /// # Errors
+    /// If it cannot be read, is wrong or describes no arm.
+    pub fn arm(&self) -> Result<ArmFile, SimulationError> {
+        let file = &self.description;
+        let text = match device_file::builtin(&file.to_string_lossy()) {
+            Some(text) => text.to_owned(),
+            None => std::fs::read_to_string(file)
+                .map_err(|source| SimulationError::Unreadable { file: file.clone(), source })?,
+        };
+        match DeviceFile::parse(&text, file)? {
+            DeviceFile::Arm(arm) => Ok(*arm),
+            DeviceFile::Ideal(_) => Err(SimulationError::Ideal { file: file.clone() }),
+        }
+    }
+
+    /// The description, so that the driver finds it from wherever it runs.
+    pub fn description_for_driver(&self) -> PathBuf {
+        absolute(&self.description, device_file::builtin(&self.description.to_string_lossy()).is_some())
+    }
+
+    /// The hand's model, or none for nobody.
+    pub fn hand_for_driver(&self) -> Option<PathBuf> {
+        let name = self.hand_model.to_string_lossy();
+        let is_builtin = io_driver::sim::hand::model::builtin(&name).is_some();
+        (name != "nobody").then(|| absolute(&self.hand_model, is_builtin))
+    }
+}
+
+fn absolute(file: &Path, is_builtin: bool) -> PathBuf {
+    if is_builtin { file.into() } else { std::path::absolute(file).unwrap_or_else(|_| file.into()) }
+}
+
+/// X_WD of a device whose finger's path has these corners in W (m).
+pub fn base_for_path(lowest: Vector3<f64>, highest: Vector3<f64>, workspace: &Workspace) -> Isometry3<f64> {
+    let shift = |axis: usize| {
+        let half = 0.5 * workspace.size_m[axis] - SLACK_M;
+        let (min, max) = (workspace.centre_m[axis] - half, workspace.centre_m[axis] + half);
+        // From the base that has the path's end at the workspace's end, to the one that has its beginning there.
+        let (least, most) = (highest[axis] - max, lowest[axis] - min);
+        if least <= most { 0.0f64.clamp(least, most) } else { 0.5 * (least + most) }
+    };
+    Isometry3::translation(shift(0), shift(1), shift(2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WORKSPACE: Workspace = Workspace { size_m: [0.4, 0.2, 0.2], centre_m: [0.0, 0.1, 0.0] };
+
+    fn base(lowest: [f64; 3], highest: [f64; 3]) -> Vector3<f64> {
+        base_for_path(lowest.into(), highest.into(), &WORKSPACE).translation.vector
+    }
+
+    #[test]
+    fn a_path_within_the_workspace_leaves_the_base_at_the_origin() {
+        assert_eq!(base([-0.1, 0.02, -0.05], [0.1, 0.15, 0.05]), Vector3::zeros());
+    }
+
+    #[test]
+    fn a_path_that_leaves_it_moves_the_base_no_farther_than_needed() {
+        // 5 cm too far to the right and 3 cm too deep, with a centimetre of slack: the workspace's ends are at 0.19
+        // and 0.01.
+        let moved = base([0.0, -0.02, 0.0], [0.24, 0.1, 0.0]);
+        assert!((moved - Vector3::new(0.05, -0.03, 0.0)).norm() < 1e-15, "{moved}");
+    }
+
+    #[test]
+    fn a_path_that_is_too_long_is_put_in_the_middle() {
+        let moved = base([-0.1, 0.1, -0.2], [0.1, 0.1, 0.4]);
+        assert!((moved - Vector3::new(0.0, 0.0, 0.1)).norm() < 1e-15, "{moved}");
+    }
+}

@@ -1,0 +1,99 @@
+//! A case of the study: one way of replying, rate, damping and hand.
+
+use clap::ValueEnum;
+use io_driver::config::ReplyMode;
+use nalgebra::{Unit, Vector3};
+use std::path::PathBuf;
+
+/// A case.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Case {
+    /// How the driver waits for replies.
+    pub mode: Mode,
+    /// Ticks per second (Hz).
+    pub rate_hz: f64,
+    /// Contact damping of the wall (N s/m).
+    pub damping_n_s_per_m: f64,
+    /// Who holds the arm.
+    pub hand: PathBuf,
+}
+
+/// How the driver waits for replies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Mode {
+    /// Motors are written when the reply is there, microseconds after the reading.
+    SameTick,
+    /// Motors are written half a tick after the reading.
+    FixedPhase,
+    /// Motors are written a tick after the reading, as in the thesis.
+    NextTick,
+}
+
+/// The wall's normal, in the device's frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Axis {
+    /// To the right.
+    X,
+    /// Up: the wall is a table.
+    Y,
+    /// To the user.
+    Z,
+}
+
+impl Case {
+    /// Length of a tick (s).
+    pub fn period_s(&self) -> f64 {
+        1.0 / self.rate_hz
+    }
+
+    /// The hand's name for people.
+    pub fn hand_name(&self) -> String {
+        self.hand.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+    }
+}
+
+impl Mode {
+    /// The configuration's word for it.
+    pub fn reply_mode(self) -> ReplyMode {
+        match self {
+            Self::SameTick => ReplyMode::OnArrival,
+            Self::FixedPhase => ReplyMode::FixedPhase,
+            Self::NextTick => ReplyMode::NextTick,
+        }
+    }
+
+    /// The name that a person reads and writes.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::SameTick => "same-tick",
+            Self::FixedPhase => "fixed-phase",
+            Self::NextTick => "next-tick",
+        }
+    }
+}
+
+impl Axis {
+    /// Away from the wall.
+    pub fn normal(self) -> Unit<Vector3<f64>> {
+        match self {
+            Self::X => Vector3::x_axis(),
+            Self::Y => Vector3::y_axis(),
+            Self::Z => Vector3::z_axis(),
+        }
+    }
+}
+
+/// All of them, the rate changing fastest.
+pub fn all(modes: &[Mode], rates_hz: &[f64], dampings: &[f64], hands: &[PathBuf]) -> Vec<Case> {
+    let mut cases = Vec::new();
+    for hand in hands {
+        for &damping_n_s_per_m in dampings {
+            for &mode in modes {
+                for &rate_hz in rates_hz {
+                    cases.push(Case { mode, rate_hz, damping_n_s_per_m, hand: hand.clone() });
+                }
+            }
+        }
+    }
+    cases
+}

@@ -1,0 +1,107 @@
+//! Finds the largest stiffness below the first one that does not settle.
+//!
+//! Model: from the least one up by a factor until one fails; then halving, on a logarithmic scale, between the last
+//! that settled and the one that failed. A stiffness above a failed one is never asked for: an island of quiet
+//! beyond a buzz is of no use to anybody.
+
+/// The least stiffness that is tried (N/m).
+pub const LEAST_N_PER_M: f64 = 50.0;
+/// The largest (N/m).
+pub const MOST_N_PER_M: f64 = 100_000.0;
+/// From one to the next on the way up.
+const FACTOR: f64 = 1.25;
+/// Ends when the two ends are so near.
+const RESOLUTION: f64 = 1.01;
+
+/// The way to the answer.
+#[derive(Debug, Clone, Default)]
+pub struct Search {
+    settled: Option<f64>,
+    failed: Option<f64>,
+}
+
+/// The answer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Found {
+    /// This one settles, one a percent larger does not (N/m).
+    Limit(f64),
+    /// Not even the least one settles.
+    None,
+    /// All of them settle.
+    All,
+}
+
+impl Search {
+    /// What to try next; `None`: it is found.
+    pub fn next(&self) -> Option<f64> {
+        match (self.settled, self.failed) {
+            (None, None) => Some(LEAST_N_PER_M),
+            (Some(settled), None) if settled >= MOST_N_PER_M => None,
+            (Some(settled), None) => Some((settled * FACTOR).min(MOST_N_PER_M)),
+            (Some(settled), Some(failed)) if failed / settled > RESOLUTION => Some((settled * failed).sqrt()),
+            _ => None,
+        }
+    }
+
+    /// What came of it.
+    pub fn learn(&mut self, stiffness: f64, settles: bool) {
+        *(if settles { &mut self.settled } else { &mut self.failed }) = Some(stiffness);
+    }
+
+    /// The answer.
+    pub fn found(&self) -> Found {
+        match (self.settled, self.failed) {
+            (None, _) => Found::None,
+            (Some(settled), Some(_)) => Found::Limit(settled),
+            (Some(_), None) => Found::All,
+        }
+    }
+}
+
+impl Found {
+    /// For plots and comparisons (N/m).
+    pub fn n_per_m(self) -> Option<f64> {
+        match self {
+            Self::Limit(stiffness) => Some(stiffness),
+            Self::None => None,
+            Self::All => Some(MOST_N_PER_M),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn search(settles: impl Fn(f64) -> bool) -> (Found, usize) {
+        let mut search = Search::default();
+        let mut tries = 0;
+        while let Some(stiffness) = search.next() {
+            search.learn(stiffness, settles(stiffness));
+            tries += 1;
+        }
+        (search.found(), tries)
+    }
+
+    #[test]
+    fn a_limit_is_found_within_a_percent() {
+        for limit in [51.0, 333.0, 2222.0, 98_000.0] {
+            let (found, tries) = search(|k| k <= limit);
+            let Found::Limit(found) = found else { panic!("{found:?}") };
+            assert!(found <= limit && limit <= found * RESOLUTION, "{found} {limit}");
+            assert!(tries < 50, "{tries}");
+        }
+    }
+
+    #[test]
+    fn the_ends_are_told() {
+        assert_eq!(search(|_| false).0, Found::None);
+        assert_eq!(search(|_| true).0, Found::All);
+    }
+
+    #[test]
+    fn quiet_beyond_a_buzz_does_not_count() {
+        let Found::Limit(found) = search(|k| !(400.0..900.0).contains(&k)).0 else { panic!() };
+        assert!((396.0..400.0).contains(&found), "{found}");
+    }
+}

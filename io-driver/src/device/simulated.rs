@@ -1,0 +1,198 @@
+//! An arm that is simulated in this process, held by a simulated hand.
+//!
+//! Model: the same path as a real device, from raw counters and to converter codes; behind them moves
+//! [`SimulatedArm`], pulled by a hand that wants to be where its script says. Between two readings the time of the
+//! ticks passes, with the former codes until the new ones took effect: as long after the reading as the clock
+//! that is driven says, or on a virtual clock as the way of replying says ([`Latency`]).
+//! Frames: the script is in W, everything else in the device's base frame D.
+//! Cost: that of the arm, some microseconds a millisecond; no allocation.
+
+use super::arm::Arm;
+use super::{Device, Effort, Reading, TickTime, Written};
+use crate::sim::arm::{NobodyHolds, SimulatedArm, Truth};
+use crate::sim::hand::{Felt, ImpedanceHand};
+use crate::sim::script::HandPlayer;
+use crate::sim::tip_board::TipBoard;
+use nalgebra::{Isometry3, Point3, Vector3};
+use rt_core::clock::monotonic_ns;
+use shm_abi::FaultReason;
+use shm_abi::segment::DeviceInfo;
+use std::sync::Arc;
+
+/// When after the reading of a tick its motor values take effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Latency {
+    /// When they are really written.
+    Measured,
+    /// So long after (ns), whatever this process takes.
+    Nominal(u64),
+}
+
+/// Who holds the arm.
+#[derive(Debug)]
+pub enum Holder {
+    /// Nobody: the arm falls, or its motors hold it.
+    Nobody,
+    /// A hand.
+    Hand(Box<HeldBy>),
+}
+
+/// A hand and what it wants.
+#[derive(Debug)]
+pub struct HeldBy {
+    /// How it pulls.
+    pub hand: ImpedanceHand,
+    /// Where it wants to be.
+    pub wish: Wish,
+    /// Where its partners are.
+    pub board: Arc<TipBoard>,
+    /// Which place on the board is its own.
+    pub place: usize,
+}
+
+/// Where a hand wants to be.
+#[derive(Debug)]
+pub enum Wish {
+    /// Where a script, written in W, has this finger.
+    Scripted(HandPlayer, usize),
+    /// Here, in W (m).
+    Resting(Vector3<f64>),
+}
+
+/// The device.
+#[derive(Debug)]
+pub struct SimulatedDevice {
+    info: DeviceInfo,
+    arm: Arm,
+    plant: SimulatedArm,
+    holder: Holder,
+    /// X_WD.
+    base_in_world: Isometry3<f64>,
+    latency: Latency,
+    last_tick: Option<u64>,
+    read_at_ns: u64,
+    /// What the amplifiers get, and how long after the last reading (ns).
+    pending: Option<(u64, Drive)>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Drive {
+    Codes([u16; 3]),
+    Off,
+}
+
+impl SimulatedDevice {
+    /// A device whose base stands at X_WD.
+    pub fn new(
+        info: DeviceInfo,
+        arm: Arm,
+        plant: SimulatedArm,
+        holder: Holder,
+        base_in_world: Isometry3<f64>,
+        latency: Latency,
+    ) -> Self {
+        Self {
+            info,
+            arm,
+            plant,
+            holder,
+            base_in_world,
+            latency,
+            last_tick: None,
+            read_at_ns: 0,
+            pending: None,
+        }
+    }
+
+    /// What really is, which no encoder tells.
+    pub fn truth(&self) -> Truth {
+        self.plant.truth()
+    }
+
+    /// Lets the time since the last reading pass.
+    fn pass(&mut self, elapsed_ns: u64) {
+        let seconds = |ns: u64| ns as f64 / 1e9;
+        let Some((after_ns, drive)) = self.pending.take() else {
+            return self.advance(seconds(elapsed_ns));
+        };
+        let before_ns = after_ns.min(elapsed_ns);
+        self.advance(seconds(before_ns));
+        match drive {
+            Drive::Codes(codes) => self.plant.command(codes),
+            Drive::Off => self.plant.switch_off(),
+        }
+        self.advance(seconds(elapsed_ns - before_ns));
+    }
+
+    fn advance(&mut self, dt_s: f64) {
+        match &mut self.holder {
+            Holder::Nobody => self.plant.advance(dt_s, &mut NobodyHolds),
+            Holder::Hand(held) => self.plant.advance(dt_s, &mut held.hand),
+        }
+    }
+
+    /// The hand learns where it should be by now, what it feels, and where its partners are.
+    fn tell_hand(&mut self, time: TickTime, elapsed_s: f64) -> u64 {
+        let Holder::Hand(held) = &mut self.holder else { return 0 };
+        let truth = self.plant.truth();
+        let to_base = |p_W: Vector3<f64>| self.base_in_world.inverse_transform_point(&Point3::from(p_W)).coords;
+        let (wanted_W, buttons) = match &mut held.wish {
+            Wish::Scripted(player, finger) => {
+                let at_s = time.run_time_s();
+                let rest = Vector3::zeros();
+                (player.position(*finger, at_s).unwrap_or(rest), player.buttons(*finger, at_s))
+            }
+            Wish::Resting(at) => (*at, 0),
+        };
+        held.board.tell(held.place, (self.base_in_world * Point3::from(truth.tip)).coords);
+        let felt = Felt {
+            force_on_user_D: -held.hand.force_on_tip(truth.tip, truth.tip_velocity),
+            partners_centroid_D: held.board.others(held.place).map(to_base),
+        };
+        held.hand.intend(to_base(wanted_W), felt, elapsed_s);
+        buttons
+    }
+
+    fn latency_ns(&self) -> u64 {
+        match self.latency {
+            Latency::Measured => monotonic_ns().saturating_sub(self.read_at_ns),
+            Latency::Nominal(ns) => ns,
+        }
+    }
+}
+
+impl Device for SimulatedDevice {
+    fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    fn read(&mut self, time: TickTime) -> Result<Reading, FaultReason> {
+        let ticks = self.last_tick.replace(time.tick).map_or(0, |last| time.tick.saturating_sub(last));
+        let elapsed_ns = ticks.saturating_mul(time.period_ns);
+        self.pass(elapsed_ns);
+        self.read_at_ns = monotonic_ns();
+        let buttons = self.tell_hand(time, elapsed_ns as f64 / 1e9);
+        let mut reading = self.arm.read(self.plant.counters(), time);
+        reading.buttons = buttons;
+        if self.plant.is_tripped() {
+            return Err(FaultReason::AmplifierTripped);
+        }
+        Ok(reading)
+    }
+
+    fn write(&mut self, effort: Effort) -> Result<Written, FaultReason> {
+        let (codes, written) = self.arm.render(effort)?;
+        let drive = if effort.gravity_share > 0.0 { Drive::Codes(codes) } else { Drive::Off };
+        self.pending = Some((self.latency_ns(), drive));
+        Ok(written)
+    }
+
+    fn release(&mut self) {
+        self.arm.release();
+        self.pending = Some((self.latency_ns(), Drive::Off));
+    }
+
+    fn rearm(&mut self) {
+        self.plant.rearm();
+    }
+}

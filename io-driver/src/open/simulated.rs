@@ -1,0 +1,98 @@
+//! Opening a simulated arm: its pose where the hand begins, its hand, and when its motors take effect.
+
+use super::{OpenError, arm_info, commissioned, holds_its_weight, mechanism, read, script};
+use crate::config::{Backend, DeviceConfig, DriverConfig, ReplyMode, Wish};
+use crate::device::Device;
+use crate::device::arm::Arm;
+use crate::device::simulated::{HeldBy, Holder, Latency, SimulatedDevice, Wish as HandWish};
+use crate::device_file::ArmFile;
+use crate::kinematics::Mechanism;
+use crate::sim::arm::SimulatedArm;
+use crate::sim::hand::ImpedanceHand;
+use crate::sim::hand::model::{self, HandModel};
+use crate::sim::tip_board::TipBoard;
+use nalgebra::{Point3, Vector3};
+use shm_abi::segment::ClockMode;
+use std::path::Path;
+use std::sync::Arc;
+
+/// From reading to writing where time is only counted: a round trip and the work of a tick, as measured on an idle
+/// machine with the fast thread on a CPU of its own.
+const ROUND_TRIP_NS: u64 = 5_000;
+
+pub(super) fn open(
+    device: &DeviceConfig,
+    config: &DriverConfig,
+    board: &Arc<TipBoard>,
+) -> Result<Box<dyn Device>, OpenError> {
+    let Backend::Simulated { description, wish, hand_model, seed, tremor } = &device.backend else {
+        unreachable!("the caller has looked");
+    };
+    let file = mechanism(device, description)?;
+    let place = config.devices.iter().position(|other| other.name == device.name).unwrap_or(0);
+    let seed = seed.wrapping_add(place as u64);
+    let wanted = match script(device, wish, config)? {
+        Some((player, finger)) => HandWish::Scripted(player, finger),
+        None => HandWish::Resting(wish.start_m),
+    };
+    let (wanted, start_W) = beginning(wanted, wish);
+    let start_D = wish.base_in_world.inverse_transform_point(&Point3::from(start_W)).coords;
+    let joints = pose(device, &file, start_W, start_D)?;
+    let no_simulation = || OpenError::NoSimulation { device: device.name.clone(), file: description.clone() };
+    let plant = SimulatedArm::new(&file, joints, seed).ok_or_else(no_simulation)?;
+    let holder = match hand_model {
+        None => Holder::Nobody,
+        Some(model) => Holder::Hand(Box::new(HeldBy {
+            hand: ImpedanceHand::new(&hand(device, model)?, start_D, seed),
+            wish: wanted,
+            board: Arc::clone(board),
+            place,
+        })),
+    };
+    let info = commissioned(arm_info(device, &file), config);
+    let arm = Arm::new(&file, holds_its_weight(device, config)).already_zeroed();
+    Ok(Box::new(SimulatedDevice::new(info, arm, plant, holder, wish.base_in_world, latency(config))))
+}
+
+/// Where the hand is at first, in W.
+fn beginning(mut wanted: HandWish, wish: &Wish) -> (HandWish, Vector3<f64>) {
+    let start = match &mut wanted {
+        HandWish::Scripted(player, finger) => player.position(*finger, 0.0),
+        HandWish::Resting(at) => Some(*at),
+    };
+    (wanted, start.unwrap_or(wish.start_m))
+}
+
+fn pose(
+    device: &DeviceConfig,
+    file: &ArmFile,
+    start_W: Vector3<f64>,
+    start_D: Vector3<f64>,
+) -> Result<[f64; 3], OpenError> {
+    let out_of_reach =
+        |why: String| OpenError::OutOfReach { device: device.name.clone(), start_m: start_W.into(), why };
+    let joints = file.mechanism.inverse(start_D).map_err(|error| out_of_reach(error.to_string()))?;
+    let excess = file.mechanism.joint_limits().excess(joints);
+    if excess > 0.0 {
+        return Err(out_of_reach(format!("a joint would be {excess:.3} rad beyond its stop")));
+    }
+    Ok(joints)
+}
+
+fn hand(device: &DeviceConfig, name: &Path) -> Result<HandModel, OpenError> {
+    let text = match model::builtin(&name.to_string_lossy()) {
+        Some(text) => text.to_owned(),
+        None => read(device, name)?,
+    };
+    Ok(HandModel::parse(&text, name)?)
+}
+
+/// In real time what is measured; else what the way of replying says. With replies in the next tick the motors are
+/// written at its beginning, a round trip after its reading.
+fn latency(config: &DriverConfig) -> Latency {
+    match (config.clock, config.reply.mode) {
+        (ClockMode::Real, _) => Latency::Measured,
+        (_, ReplyMode::FixedPhase) => Latency::Nominal(config.reply.budget_ns),
+        (_, ReplyMode::OnArrival | ReplyMode::NextTick) => Latency::Nominal(ROUND_TRIP_NS),
+    }
+}
