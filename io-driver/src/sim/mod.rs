@@ -9,4 +9,5 @@ pub mod motor;
 pub mod noise;
 pub mod script;
 pub mod spec;
+pub mod split_mix;
 pub mod tip_board;
