@@ -9,10 +9,12 @@ use crate::report::Report;
 use crate::rig::{HandMode, Rig};
 use crate::run::{self, Attach, RunPlan};
 use crate::simulated::SimulatedDevices;
+use crate::study::{self, StudyCommand};
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use io_driver::config::period_of;
 use io_driver::say::say;
+use io_driver::sim::hand::model_file::Firmness;
 use rt_core::signals::StopSignals;
 use shm_abi::endpoint;
 use shm_abi::segment::ClockMode;
@@ -46,6 +48,9 @@ pub struct Cli {
 enum AppCommand {
     /// Play a scene with a scripted hand
     Run(RunArgs),
+    /// Answer a question about the whole system with a table and a picture
+    #[command(subcommand)]
+    Study(StudyCommand),
     /// Drive the devices: what `io-driver` does, in this program
     #[command(subcommand)]
     Driver(io_driver::cli::DriverCommand),
@@ -64,6 +69,9 @@ struct RunArgs {
     /// With --hand-mode impedance: how the hand pulls, a built-in's name or a file (TOML); nobody: nobody holds them
     #[arg(long, value_name = "HAND", default_value = "pen-grip")]
     hand_model: PathBuf,
+    /// With --hand-mode impedance: how tightly the hand holds: light, usual, firm
+    #[arg(long, value_name = "HOW", default_value = "usual", value_parser = parse_firmness)]
+    firmness: Firmness,
     /// With --hand-mode impedance: which device is simulated, a built-in's name or a description (TOML)
     #[arg(long, value_name = "DEVICE", default_value = "premium-1.5")]
     device: PathBuf,
@@ -126,6 +134,10 @@ pub fn main() -> ExitCode {
     match Cli::parse().command {
         Some(AppCommand::Driver(command)) => io_driver::cli::execute(command),
         Some(AppCommand::Run(args)) => conclude(run_scene(&args)),
+        Some(AppCommand::Study(command)) => {
+            let result = install_signals().and_then(|signals| study::execute(&command, &signals));
+            result.map_or_else(|failure| failed(&failure), stopped)
+        }
         None => conclude(run_demo()),
     }
 }
@@ -161,6 +173,8 @@ fn make_rig(args: &RunArgs) -> Result<Rig, RunFailure> {
         HandModeName::Impedance => HandMode::Impedance(SimulatedDevices {
             description: args.device.clone(),
             hand_model: args.hand_model.clone(),
+            firmness: args.firmness,
+            trembles: true,
             seed: args.seed,
         }),
     };
@@ -219,19 +233,25 @@ fn conclude(result: Result<(Report, Stop), RunFailure>) -> ExitCode {
     match result {
         Ok((report, stop)) => {
             print_report(&report);
-            match stop {
-                Stop::Finished => ExitCode::SUCCESS,
-                Stop::Signal(signal) => {
-                    say(format_args!("phantom3: ended by signal {signal} before its time"));
-                    ExitCode::from(128u8.saturating_add(u8::try_from(signal).unwrap_or(0)))
-                }
-            }
+            stopped(stop)
         }
-        Err(failure) => {
-            say(format_args!("phantom3: {failure}"));
-            ExitCode::from(failure.exit_status())
+        Err(failure) => failed(&failure),
+    }
+}
+
+fn stopped(stop: Stop) -> ExitCode {
+    match stop {
+        Stop::Finished => ExitCode::SUCCESS,
+        Stop::Signal(signal) => {
+            say(format_args!("phantom3: ended by signal {signal} before its time"));
+            ExitCode::from(128u8.saturating_add(u8::try_from(signal).unwrap_or(0)))
         }
     }
+}
+
+fn failed(failure: &RunFailure) -> ExitCode {
+    say(format_args!("phantom3: {failure}"));
+    ExitCode::from(failure.exit_status())
 }
 
 /// A closed pipe is no reason to fail: the run is done.
@@ -242,6 +262,10 @@ fn print_report(report: &Report) {
 
 fn parse_seconds(text: &str) -> Result<f64, String> {
     parse_number(text, "seconds", f64::MIN_POSITIVE, MAX_SECONDS)
+}
+
+fn parse_firmness(text: &str) -> Result<Firmness, String> {
+    Firmness::from_name(text).ok_or_else(|| format!("found {text}, allowed: light, usual, firm"))
 }
 
 fn parse_rate(text: &str) -> Result<f64, String> {

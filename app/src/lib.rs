@@ -26,5 +26,6 @@ pub mod row;
 pub mod run;
 pub mod simulated;
 pub mod slow;
+pub mod study;
 pub mod two_processes;
 pub mod virtual_clock;

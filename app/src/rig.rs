@@ -247,7 +247,7 @@ impl Rig {
         };
         let (backend, compensates_gravity) = match &self.hand_mode {
             // A device that is no finger's needs no hand.
-            HandMode::Impedance(simulated) if finger.is_some() => (simulated_backend(simulated, wish), true),
+            HandMode::Impedance(simulated) if finger.is_some() => (simulated.backend(wish), true),
             _ => (Backend::Ideal(wish), false),
         };
         DeviceConfig {
@@ -291,16 +291,6 @@ impl Rig {
 
     fn not_available(&self, what: String) -> RigError {
         RigError::NotAvailable { file: self.scene_file.clone(), what }
-    }
-}
-
-fn simulated_backend(simulated: &SimulatedDevices, wish: Wish) -> Backend {
-    Backend::Simulated {
-        description: simulated.description_for_driver(),
-        wish,
-        hand_model: simulated.hand_for_driver(),
-        seed: simulated.seed,
-        tremor: true,
     }
 }
 

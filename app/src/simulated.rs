@@ -7,6 +7,10 @@
 //! Frames: bases in W.
 
 use io_driver::device_file::{self, ArmFile, DeviceFile, DeviceFileError, Workspace};
+use io_driver::config::{Backend, HandChoice, Wish};
+use io_driver::sim::hand::HandModel;
+use io_driver::sim::hand::model_file::{self, Firmness};
+use io_driver::toml_report::TomlReport;
 use nalgebra::{Isometry3, Vector3};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -21,30 +25,41 @@ pub struct SimulatedDevices {
     pub description: PathBuf,
     /// How the hand pulls: a built-in's name or a file, or `nobody`.
     pub hand_model: PathBuf,
+    /// How tightly it holds.
+    pub firmness: Firmness,
+    /// Whether it trembles.
+    pub trembles: bool,
     /// Of tremor and noise.
     pub seed: u64,
 }
 
 impl Default for SimulatedDevices {
     fn default() -> Self {
-        Self { description: "premium-1.5".into(), hand_model: "pen-grip".into(), seed: 0 }
+        Self { description: "premium-1.5".into(), hand_model: "pen-grip".into(), firmness: Firmness::Usual, trembles: true, seed: 0 }
     }
 }
 
 /// Why nothing can be simulated.
 #[derive(Debug, Error)]
 pub enum SimulationError {
-    /// The description cannot be read.
-    #[error("cannot read the device's description {file}: {source}; name a file, or one of {}", device_file::BUILTIN_NAMES.join(", "))]
+    /// A file cannot be read.
+    #[error("cannot read the {what} {file}: {source}; name a file, or one of {builtins}")]
     Unreadable {
         /// Which.
         file: PathBuf,
+        /// What it is.
+        what: &'static str,
+        /// What there is besides files.
+        builtins: String,
         /// What the system said.
         source: std::io::Error,
     },
     /// The description is wrong.
     #[error(transparent)]
     Description(#[from] DeviceFileError),
+    /// The hand's model is wrong.
+    #[error(transparent)]
+    Hand(#[from] TomlReport),
     /// An ideal device is not simulated.
     #[error("{file} describes an ideal device, which has nothing to simulate; use --hand-mode kinematic, or an arm such as premium-1.5")]
     Ideal {
@@ -62,8 +77,7 @@ impl SimulatedDevices {
         let file = &self.description;
         let text = match device_file::builtin(&file.to_string_lossy()) {
             Some(text) => text.to_owned(),
-            None => std::fs::read_to_string(file)
-                .map_err(|source| SimulationError::Unreadable { file: file.clone(), source })?,
+            None => read(file, "device's description", &device_file::BUILTIN_NAMES)?,
         };
         match DeviceFile::parse(&text, file)? {
             DeviceFile::Arm(arm) => Ok(*arm),
@@ -71,19 +85,45 @@ impl SimulatedDevices {
         }
     }
 
-    /// The description, so that the driver finds it from wherever it runs.
-    pub fn description_for_driver(&self) -> PathBuf {
-        absolute(&self.description, device_file::builtin(&self.description.to_string_lossy()).is_some())
+    /// The hand; `None`: nobody.
+    ///
+    /// # Errors
+    /// If its model cannot be read or is wrong.
+    pub fn hand(&self) -> Result<Option<HandModel>, SimulationError> {
+        let file = &self.hand_model;
+        let name = file.to_string_lossy();
+        let text = match model_file::builtin(&name) {
+            _ if name == "nobody" => return Ok(None),
+            Some(text) => text.to_owned(),
+            None => read(file, "hand's model", &model_file::BUILTIN_NAMES)?,
+        };
+        Ok(Some(model_file::parse(&text, file, self.firmness)?))
     }
 
-    /// The hand's model, or none for nobody.
-    pub fn hand_for_driver(&self) -> Option<PathBuf> {
+    /// Such a device in a driver's configuration.
+    pub fn backend(&self, wish: Wish) -> Backend {
         let name = self.hand_model.to_string_lossy();
-        let is_builtin = io_driver::sim::hand::model::builtin(&name).is_some();
-        (name != "nobody").then(|| absolute(&self.hand_model, is_builtin))
+        let is_builtin = model_file::builtin(&name).is_some();
+        let holder = (name != "nobody").then(|| HandChoice {
+            model: absolute(&self.hand_model, is_builtin),
+            firmness: self.firmness,
+            trembles: self.trembles,
+        });
+        let is_builtin = device_file::builtin(&self.description.to_string_lossy()).is_some();
+        Backend::Simulated { description: absolute(&self.description, is_builtin), wish, holder, seed: self.seed }
     }
 }
 
+fn read(file: &Path, what: &'static str, builtins: &[&str]) -> Result<String, SimulationError> {
+    std::fs::read_to_string(file).map_err(|source| SimulationError::Unreadable {
+        file: file.into(),
+        what,
+        builtins: builtins.join(", "),
+        source,
+    })
+}
+
+/// So that the driver finds it from wherever it runs.
 fn absolute(file: &Path, is_builtin: bool) -> PathBuf {
     if is_builtin { file.into() } else { std::path::absolute(file).unwrap_or_else(|_| file.into()) }
 }

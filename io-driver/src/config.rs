@@ -12,7 +12,7 @@ mod reply;
 mod safety;
 mod toml_text;
 
-pub use device::{Backend, DeviceConfig, Wish};
+pub use device::{Backend, DeviceConfig, HandChoice, Wish};
 pub use process::ProcessConfig;
 pub use real_time::{OverrunPolicy, RealTime, SpinMargin, longest_spin_margin_ns};
 pub use reply::{ReplyConfig, ReplyMode};

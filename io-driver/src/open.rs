@@ -2,6 +2,8 @@
 
 mod simulated;
 
+pub use simulated::ROUND_TRIP_NS;
+
 use crate::config::{Backend, DeviceConfig, DriverConfig, Wish};
 use crate::device::Device;
 use crate::device::arm::Arm;
@@ -11,7 +13,7 @@ use crate::device::ideal::{Hand, IdealDevice};
 use crate::device::replay::ReplayDevice;
 use crate::device_file::{self, ArmFile, DeviceFile, DeviceFileError};
 use crate::emulator::card::{Card, CardError};
-use crate::sim::hand::model::HandModelError;
+use crate::toml_report::TomlReport;
 use crate::sim::script::{HandError, HandPlayer, HandScript};
 use crate::sim::tip_board::TipBoard;
 use shm_abi::segment::DeviceInfo;
@@ -44,7 +46,7 @@ pub enum OpenError {
     Description(#[from] DeviceFileError),
     /// The description of a hand is wrong.
     #[error(transparent)]
-    HandModel(#[from] HandModelError),
+    HandModel(#[from] TomlReport),
     /// The description does not say how the arm moves.
     #[error(
         "device {device}: {file} has no table [simulation], so the arm cannot be simulated; add it, see the built-in premium-1.5"

@@ -1,6 +1,6 @@
 //! `[[device]]`: how each device is reached.
 
-use crate::sim::hand::model as hand_model;
+use crate::sim::hand::model_file::{self, Firmness};
 use crate::toml_report::{Allowed, SpannedList, TomlReport, TomlText};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::Deserialize;
@@ -32,12 +32,10 @@ pub enum Backend {
         description: PathBuf,
         /// Where the hand wants to be.
         wish: Wish,
-        /// How it pulls: a built-in hand's name or a file; `None`: nobody holds the arm.
-        hand_model: Option<PathBuf>,
+        /// Who pulls; `None`: nobody holds the arm.
+        holder: Option<HandChoice>,
         /// Of everything random.
         seed: u64,
-        /// Whether the hand trembles.
-        tremor: bool,
     },
     /// A recorded encoder trace through a described mechanism.
     Replay {
@@ -53,6 +51,17 @@ pub enum Backend {
         /// The file of registers that both processes map.
         card: PathBuf,
     },
+}
+
+/// Which simulated hand, and how it holds.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct HandChoice {
+    /// A built-in hand's name or a file.
+    pub model: PathBuf,
+    /// How tightly.
+    pub firmness: Firmness,
+    /// Whether it trembles.
+    pub trembles: bool,
 }
 
 /// Where a scripted or simulated finger shall be.
@@ -94,8 +103,9 @@ pub(super) struct RawDevice {
     card: Option<Spanned<PathBuf>>,
     gravity_compensation: Option<Spanned<bool>>,
     hand_model: Option<Spanned<PathBuf>>,
-    seed: Option<Spanned<i64>>,
+    firmness: Option<Spanned<String>>,
     tremor: Option<Spanned<bool>>,
+    seed: Option<Spanned<i64>>,
     hand: Option<Spanned<PathBuf>>,
     finger: Option<Spanned<String>>,
     start_m: Option<SpannedList>,
@@ -186,23 +196,31 @@ impl RawDevice {
         Ok(Backend::Simulated {
             description: self.description("simulated", &span, toml, directory)?,
             wish: self.wish(name, toml, directory)?,
-            hand_model: self.hand_model(directory),
+            holder: self.holder(toml, directory)?,
             seed: match &self.seed {
                 Some(seed) => toml.integer(seed, 0..=i64::MAX)?.unsigned_abs(),
                 None => 0,
             },
-            tremor: self.tremor.as_ref().is_none_or(|key| *key.get_ref()),
         })
     }
 
     /// `"nobody"` is none; a built-in's name stays what it is; else a file.
-    fn hand_model(&self, directory: &Path) -> Option<PathBuf> {
-        let Some(model) = &self.hand_model else { return Some(DEFAULT_HAND.into()) };
-        match model.get_ref().to_str() {
-            Some("nobody") => None,
-            Some(name) if hand_model::builtin(name).is_some() => Some(name.into()),
-            _ => Some(directory.join(model.get_ref())),
-        }
+    fn holder(&self, toml: &TomlText<'_>, directory: &Path) -> Result<Option<HandChoice>, TomlReport> {
+        let usual = PathBuf::from(DEFAULT_HAND);
+        let named = self.hand_model.as_ref().map_or(&usual, Spanned::get_ref);
+        let model = match named.to_str() {
+            Some("nobody") => return Ok(None),
+            Some(name) if model_file::builtin(name).is_some() => name.into(),
+            _ => directory.join(named),
+        };
+        let firmness = match &self.firmness {
+            None => Firmness::Usual,
+            Some(word) => Firmness::from_name(word.get_ref()).ok_or_else(|| {
+                toml.refuse(word.span(), format_args!("{:?}", word.get_ref()), "\"light\", \"usual\" or \"firm\"")
+            })?,
+        };
+        let trembles = self.tremor.as_ref().is_none_or(|key| *key.get_ref());
+        Ok(Some(HandChoice { model, firmness, trembles }))
     }
 
     fn wish(&self, name: &str, toml: &TomlText<'_>, directory: &Path) -> Result<Wish, TomlReport> {
@@ -247,11 +265,12 @@ impl RawDevice {
         })
     }
 
-    fn keys_of_simulated(&self) -> [(&'static str, Option<std::ops::Range<usize>>); 3] {
+    fn keys_of_simulated(&self) -> [(&'static str, Option<std::ops::Range<usize>>); 4] {
         [
             ("hand_model", span_of(&self.hand_model)),
-            ("seed", span_of(&self.seed)),
+            ("firmness", span_of(&self.firmness)),
             ("tremor", span_of(&self.tremor)),
+            ("seed", span_of(&self.seed)),
         ]
     }
 

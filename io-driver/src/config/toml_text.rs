@@ -1,6 +1,6 @@
 //! Writes a configuration down as TOML.
 
-use super::{Backend, Commissioning, DeviceConfig, DriverConfig, OverrunPolicy, ReplyMode, SpinMargin, Wish};
+use super::{Backend, Commissioning, DeviceConfig, DriverConfig, HandChoice, OverrunPolicy, ReplyMode, SpinMargin, Wish};
 use crate::safety::switches::{Switch, Switches};
 use shm_abi::doorbell::WaitMode;
 use std::fmt::Write as _;
@@ -81,11 +81,17 @@ fn write_device(text: &mut String, device: &DeviceConfig) -> std::fmt::Result {
             writeln!(text, "backend = \"ideal\"")?;
             write_wish(text, wish)
         }
-        Backend::Simulated { description, wish, hand_model, seed, tremor } => {
+        Backend::Simulated { description, wish, holder, seed } => {
             writeln!(text, "backend = \"simulated\"")?;
             writeln!(text, "description = {}", quoted(&description.to_string_lossy()))?;
-            let model = hand_model.as_ref().map_or("nobody".into(), |model| model.to_string_lossy());
-            writeln!(text, "hand_model = {}\nseed = {seed}\ntremor = {tremor}", quoted(&model))?;
+            match holder {
+                None => writeln!(text, "hand_model = \"nobody\"")?,
+                Some(HandChoice { model, firmness, trembles }) => {
+                    writeln!(text, "hand_model = {}", quoted(&model.to_string_lossy()))?;
+                    writeln!(text, "firmness = {}\ntremor = {trembles}", quoted(firmness.name()))?;
+                }
+            }
+            writeln!(text, "seed = {seed}")?;
             write_wish(text, wish)
         }
         Backend::Replay { description, trace } => {

@@ -140,7 +140,7 @@ impl SimulatedDevice {
             Wish::Scripted(player, finger) => {
                 let at_s = time.run_time_s();
                 let rest = Vector3::zeros();
-                (player.position(*finger, at_s).unwrap_or(rest), player.buttons(*finger, at_s))
+                (player.position(*finger, at_s).unwrap_or(rest), 0)
             }
             Wish::Resting(at) => (*at, 0),
         };

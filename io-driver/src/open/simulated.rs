@@ -1,31 +1,29 @@
 //! Opening a simulated arm: its pose where the hand begins, its hand, and when its motors take effect.
 
 use super::{OpenError, arm_info, commissioned, holds_its_weight, mechanism, read, script};
-use crate::config::{Backend, DeviceConfig, DriverConfig, ReplyMode, Wish};
+use crate::config::{Backend, DeviceConfig, DriverConfig, HandChoice, ReplyMode, Wish};
 use crate::device::Device;
 use crate::device::arm::Arm;
 use crate::device::simulated::{HeldBy, Holder, Latency, SimulatedDevice, Wish as HandWish};
 use crate::device_file::ArmFile;
 use crate::kinematics::Mechanism;
 use crate::sim::arm::SimulatedArm;
-use crate::sim::hand::ImpedanceHand;
-use crate::sim::hand::model::{self, HandModel};
+use crate::sim::hand::{HandModel, ImpedanceHand, model_file};
 use crate::sim::tip_board::TipBoard;
 use nalgebra::{Point3, Vector3};
 use shm_abi::segment::ClockMode;
-use std::path::Path;
 use std::sync::Arc;
 
 /// From reading to writing where time is only counted: a round trip and the work of a tick, as measured on an idle
 /// machine with the fast thread on a CPU of its own.
-const ROUND_TRIP_NS: u64 = 5_000;
+pub const ROUND_TRIP_NS: u64 = 5_000;
 
 pub(super) fn open(
     device: &DeviceConfig,
     config: &DriverConfig,
     board: &Arc<TipBoard>,
 ) -> Result<Box<dyn Device>, OpenError> {
-    let Backend::Simulated { description, wish, hand_model, seed, tremor } = &device.backend else {
+    let Backend::Simulated { description, wish, holder, seed } = &device.backend else {
         unreachable!("the caller has looked");
     };
     let file = mechanism(device, description)?;
@@ -40,10 +38,10 @@ pub(super) fn open(
     let joints = pose(device, &file, start_W, start_D)?;
     let no_simulation = || OpenError::NoSimulation { device: device.name.clone(), file: description.clone() };
     let plant = SimulatedArm::new(&file, joints, seed).ok_or_else(no_simulation)?;
-    let holder = match hand_model {
+    let holder = match holder {
         None => Holder::Nobody,
-        Some(model) => Holder::Hand(Box::new(HeldBy {
-            hand: ImpedanceHand::new(&hand(device, model)?, start_D, seed),
+        Some(choice) => Holder::Hand(Box::new(HeldBy {
+            hand: ImpedanceHand::new(&hand(device, choice)?.in_base(&wish.base_in_world.rotation), start_D, seed),
             wish: wanted,
             board: Arc::clone(board),
             place,
@@ -79,12 +77,17 @@ fn pose(
     Ok(joints)
 }
 
-fn hand(device: &DeviceConfig, name: &Path) -> Result<HandModel, OpenError> {
-    let text = match model::builtin(&name.to_string_lossy()) {
+fn hand(device: &DeviceConfig, choice: &HandChoice) -> Result<HandModel, OpenError> {
+    let HandChoice { model, firmness, trembles } = choice;
+    let text = match model_file::builtin(&model.to_string_lossy()) {
         Some(text) => text.to_owned(),
-        None => read(device, name)?,
+        None => read(device, model)?,
     };
-    Ok(HandModel::parse(&text, name)?)
+    let mut hand = model_file::parse(&text, model, *firmness)?;
+    if !trembles {
+        hand.tremor.rms_m = Vector3::zeros();
+    }
+    Ok(hand)
 }
 
 /// In real time what is measured; else what the way of replying says. With replies in the next tick the motors are

@@ -2,8 +2,10 @@
 
 use clap::ValueEnum;
 use io_driver::config::ReplyMode;
+use io_driver::sim::hand::model_file::Firmness;
 use nalgebra::{Unit, Vector3};
 use std::path::PathBuf;
+use std::str::FromStr;
 
 /// A case.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,7 +17,16 @@ pub struct Case {
     /// Contact damping of the wall (N s/m).
     pub damping_n_s_per_m: f64,
     /// Who holds the arm.
-    pub hand: PathBuf,
+    pub hand: Hand,
+}
+
+/// Who holds the arm, and how tightly: `NAME` or `NAME:FIRMNESS`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hand {
+    /// A built-in hand's name, a file, or `nobody`.
+    pub model: PathBuf,
+    /// How tightly.
+    pub firmness: Firmness,
 }
 
 /// How the driver waits for replies.
@@ -46,9 +57,26 @@ impl Case {
         1.0 / self.rate_hz
     }
 
-    /// The hand's name for people.
-    pub fn hand_name(&self) -> String {
-        self.hand.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+impl Hand {
+    /// For people.
+    pub fn name(&self) -> String {
+        let model = self.model.file_stem().unwrap_or_default().to_string_lossy();
+        if model == "nobody" { model.into_owned() } else { format!("{model} {}", self.firmness.name()) }
+    }
+}
+
+impl FromStr for Hand {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let Some((model, word)) = text.rsplit_once(':') else {
+            return Ok(Self { model: text.into(), firmness: Firmness::Usual });
+        };
+        let firmness = Firmness::from_name(word)
+            .ok_or_else(|| format!("found {word} behind the colon, allowed: light, usual, firm"))?;
+        Ok(Self { model: model.into(), firmness })
     }
 }
 
@@ -84,7 +112,7 @@ impl Axis {
 }
 
 /// All of them, the rate changing fastest.
-pub fn all(modes: &[Mode], rates_hz: &[f64], dampings: &[f64], hands: &[PathBuf]) -> Vec<Case> {
+pub fn all(modes: &[Mode], rates_hz: &[f64], dampings: &[f64], hands: &[Hand]) -> Vec<Case> {
     let mut cases = Vec::new();
     for hand in hands {
         for &damping_n_s_per_m in dampings {

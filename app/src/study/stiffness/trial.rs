@@ -18,14 +18,18 @@ use crate::virtual_clock::VirtualDriver;
 use bytemuck::Zeroable;
 use haptics::{Entity, Finger, Plane};
 use io_driver::config::{
-    Backend, DeviceConfig, DriverConfig, ProcessConfig, RealTime, ReplyConfig, SafetyConfig, Wish, period_of,
+    DeviceConfig, DriverConfig, ProcessConfig, RealTime, ReplyConfig, SafetyConfig, Wish, period_of,
 };
+use io_driver::open::ROUND_TRIP_NS;
+use io_driver::sim::hand::HandModel;
 use nalgebra::{Isometry3, Vector3};
 use shm_abi::segment::ClockMode;
 use shm_abi::{DriverState, Frame};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
+/// From the reading to the motors where they are written in the same tick (s).
+pub const ROUND_TRIP_S: f64 = ROUND_TRIP_NS as f64 / 1e9;
 /// How far behind the surface the hand wants to be at first (m).
 const PRESS_M: f64 = 2e-3;
 /// When the push comes, after full authority (s).
@@ -98,7 +102,7 @@ impl Bench {
         Ok(Self {
             plant,
             axis,
-            description: simulated.description_for_driver(),
+            description: simulated.description,
             script,
             _directory: directory,
         })
@@ -135,11 +139,32 @@ impl Bench {
             .map_err(|error| RunFailure::Start(error.to_string()))
     }
 
+    /// The hand of a case; `None`: nobody.
+    ///
+    /// # Errors
+    /// If its model cannot be had.
+    pub fn hand_model(&self, case: &Case) -> Result<Option<HandModel>, RunFailure> {
+        self.simulated(case).hand().map_err(|error| RunFailure::Start(error.to_string()))
+    }
+
+    fn simulated(&self, case: &Case) -> SimulatedDevices {
+        SimulatedDevices {
+            description: self.description.clone(),
+            hand_model: case.hand.model.clone(),
+            firmness: case.hand.firmness,
+            trembles: false,
+            seed: 0,
+        }
+    }
+
     fn config(&self, case: &Case) -> DriverConfig {
         let period_ns = period_of(case.rate_hz);
         let reply = ReplyConfig { mode: case.mode.reply_mode(), budget_ns: period_ns / 2 };
-        let hand_model =
-            SimulatedDevices { hand_model: case.hand.clone(), ..SimulatedDevices::default() }.hand_for_driver();
+        let wish = Wish {
+            hand: Some((self.script.clone(), "f0".into())),
+            start_m: self.plant.tip_m,
+            base_in_world: Isometry3::identity(),
+        };
         DriverConfig {
             period_ns,
             clock: ClockMode::Virtual,
@@ -150,17 +175,7 @@ impl Bench {
             process: ProcessConfig::default(),
             devices: vec![DeviceConfig {
                 name: "f0".into(),
-                backend: Backend::Simulated {
-                    description: self.description.clone(),
-                    wish: Wish {
-                        hand: Some((self.script.clone(), "f0".into())),
-                        start_m: self.plant.tip_m,
-                        base_in_world: Isometry3::identity(),
-                    },
-                    hand_model,
-                    seed: 0,
-                    tremor: false,
-                },
+                backend: self.simulated(case).backend(wish),
                 peak_force_n: None,
                 compensates_gravity: true,
             }],

@@ -1,0 +1,108 @@
+//! The study's answers as a table for people and as CSV.
+
+use super::Answer;
+use super::search::{Found, LEAST_N_PER_M, MOST_N_PER_M};
+use super::trial::Bench;
+use std::fmt::Write as _;
+use std::io;
+use std::path::Path;
+use thiserror::Error;
+
+/// The results could not be written.
+#[derive(Debug, Error)]
+#[error("cannot write {file}: {source}; name a directory that can be written with --out")]
+pub struct TableError {
+    file: std::path::PathBuf,
+    source: io::Error,
+}
+
+/// What the columns mean and why they differ.
+const EXPLANATION: &str = "\
+largest   stiffness (N/m) up to which every wall that was tried was quiet 2 s after the push: no counter moves by 2
+linear    the sampled linear loop of this arm and hand, without friction and encoder steps
+damped    (b + b1 + B) / (T/2 + td): phase against all damping there is; a rule of thumb
+passive   2 (b - B) / T: quiet under any hand whatever; 0: the wall damps more than the arm
+friction  2 f_c / count: below it friction takes more than an encoder's step gives
+Where `largest` is above `linear`, friction holds what the loop would blow up: 40 mN on a step of 0.03 mm. Where it is
+below, encoder steps, the wall's end (it only pushes) and the limits of amplifier and driver keep an oscillation of
+some counts alive that the linear loop knows nothing of. `passive` asks for more than this one hand; `damped` takes
+the grasp's damper for a rigid one.
+";
+
+/// For people.
+pub fn text(bench: &Bench, answers: &[Answer]) -> String {
+    let plant = &bench.plant;
+    let mut text = String::new();
+    // Writing to a string cannot fail.
+    let _ = writeln!(
+        text,
+        "arm along {:?}: {:.0} g with rotors, viscous {:.2} N s/m, friction {:.0} mN, a count is {:.4} mm, amplifiers {:.0} Hz\n",
+        bench.axis,
+        plant.mass_kg * 1e3,
+        plant.viscous_n_s_per_m,
+        plant.coulomb_n * 1e3,
+        plant.count_m * 1e3,
+        plant.amplifier_hz
+    );
+    let _ = writeln!(
+        text,
+        "{:<16} {:>7} {:<12} {:>6} {:>8} {:>8} {:>8} {:>8} {:>8}",
+        "hand", "damping", "reply", "Hz", "largest", "linear", "damped", "passive", "friction"
+    );
+    for Answer { case, found, theory } in answers {
+        let _ = writeln!(
+            text,
+            "{:<16} {:>7.1} {:<12} {:>6.0} {:>8} {:>8} {:>8.0} {:>8.0} {:>8.0}",
+            case.hand.name(),
+            case.damping_n_s_per_m,
+            case.mode.name(),
+            case.rate_hz,
+            shown(*found),
+            shown(theory.linear),
+            theory.damped,
+            theory.passive,
+            theory.friction
+        );
+    }
+    text + "\n" + EXPLANATION
+}
+
+fn shown(found: Found) -> String {
+    match found {
+        Found::Limit(stiffness) => format!("{stiffness:.0}"),
+        Found::None => format!("<{LEAST_N_PER_M:.0}"),
+        Found::All => format!(">={MOST_N_PER_M:.0}"),
+    }
+}
+
+/// For programs. A limit that was not reached is empty where none is stable, the largest tried where all are.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn write_csv(file: &Path, bench: &Bench, answers: &[Answer]) -> Result<(), TableError> {
+    std::fs::write(file, csv(bench, answers)).map_err(|source| TableError { file: file.into(), source })
+}
+
+fn csv(bench: &Bench, answers: &[Answer]) -> String {
+    let mut text = String::from(
+        "hand,axis,damping_n_s_per_m,reply,rate_hz,largest_n_per_m,linear_n_per_m,damped_n_per_m,passive_n_per_m,friction_n_per_m\n",
+    );
+    let number = |found: Found| found.n_per_m().map_or_else(String::new, |n| n.to_string());
+    for Answer { case, found, theory } in answers {
+        let _ = writeln!(
+            text,
+            "{},{:?},{},{},{},{},{},{},{},{}",
+            case.hand.name(),
+            bench.axis,
+            case.damping_n_s_per_m,
+            case.mode.name(),
+            case.rate_hz,
+            number(*found),
+            number(theory.linear),
+            theory.damped,
+            theory.passive,
+            theory.friction
+        );
+    }
+    text
+}
