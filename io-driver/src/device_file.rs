@@ -22,6 +22,7 @@ use crate::heat::HeatSpec;
 use crate::kinematics::gravity::Gravity;
 use crate::kinematics::{Ideal, Kinematics};
 use crate::motors::{MotorMap, MotorSpec};
+use crate::sim::spec::SimulationSpec;
 use crate::toml_report::{TomlReport, TomlText};
 
 mod ideal;
@@ -66,6 +67,8 @@ pub struct ArmFile {
     pub speed_limit_m_per_s: f64,
     /// What holds the arm's own weight, if its bodies are described.
     pub gravity: Option<Gravity>,
+    /// What a simulation needs beyond the above, if it is described.
+    pub simulation: Option<SimulationSpec>,
 }
 
 /// A device without mechanism, counters and motors.

@@ -12,7 +12,7 @@ use super::{ArmFile, DeviceFileError, Workspace};
 use crate::encoders::EncoderSpec;
 use crate::heat::HeatSpec;
 use crate::kinematics::gravity::{Bodies, Gravity};
-use crate::kinematics::{Interval, JointLimits, Kinematics, Mechanism, Premium};
+use crate::kinematics::{Interval, JointConvention, JointLimits, Kinematics, Mechanism, Premium};
 use crate::motors::MotorSpec;
 use crate::toml_report::{Allowed, SpannedList, TomlReport, TomlText};
 
@@ -106,9 +106,14 @@ fn check(toml: &TomlText<'_>, raw: Raw) -> Result<ArmFile, TomlReport> {
         slew_n_per_s: toml.number(&raw.slew_n_per_s, SLEW)?,
         speed_limit_m_per_s: toml.number(&raw.speed_limit_m_per_s, SPEED)?,
         gravity: match &raw.bodies {
-            Some(bodies) => Some(Gravity::new(mechanism.link_lengths_m(), &weigh(toml, bodies)?)),
+            Some(bodies) => Some(Gravity::new(
+                mechanism.link_lengths_m(),
+                &weigh(toml, bodies)?,
+                JointConvention::LINKAGE,
+            )),
             None => None,
         },
+        simulation: None,
     })
 }
 

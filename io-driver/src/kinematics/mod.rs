@@ -17,11 +17,13 @@ use thiserror::Error;
 pub mod conditioning;
 pub mod gravity;
 pub mod ideal;
+pub mod joint_convention;
 pub mod joint_limits;
 pub mod premium;
 
 pub use conditioning::Conditioning;
 pub use ideal::Ideal;
+pub use joint_convention::JointConvention;
 pub use joint_limits::{Interval, JointLimits};
 pub use premium::Premium;
 
