@@ -10,14 +10,14 @@ use haptics::ContactState;
 use io_driver::config::period_of;
 use nalgebra::{Rotation3, Vector3};
 use phantom3::fast_step::FastStep;
-use phantom3::rig::Rig;
+use phantom3::rig::{HandMode, Rig};
 use phantom3::row::Row;
 use shm_abi::frame::DEVICE_POSITION_VALID;
 use shm_abi::{Command, Frame};
 use std::f64::consts::TAU;
 use std::hint::black_box;
 use std::path::Path;
-use world::{Layout, Scene};
+use world::Scene;
 
 /// Ticks of one round of a movement, which then repeats.
 const ROUND: usize = 256;
@@ -28,7 +28,7 @@ const BALL_RADIUS_M: f64 = 0.04;
 fn default_scene() -> FastStep {
     let file = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../config/scenes/default.toml"));
     let scene = Scene::load(file).expect("the default scene");
-    let rig = Rig::new(file, scene, Layout::default(), None, period_of(1000.0)).expect("a rig");
+    let rig = Rig::new(file, scene, None, None, HandMode::Kinematic, period_of(1000.0)).expect("a rig");
     rig.fast_step().expect("rendering")
 }
 

@@ -168,7 +168,9 @@ fn make_rig(args: &RunArgs) -> Result<Rig, RunFailure> {
     let hand_mode = match args.hand_mode {
         HandModeName::Kinematic => HandMode::Kinematic,
         HandModeName::Impedance if args.attach.is_some() => {
-            return Err(wrong(&"--attach and --hand-mode impedance exclude each other: the devices of a driver that runs are moved by whoever holds them"));
+            return Err(wrong(
+                &"--attach and --hand-mode impedance exclude each other: the devices of a driver that runs are moved by whoever holds them",
+            ));
         }
         HandModeName::Impedance => HandMode::Impedance(SimulatedDevices {
             description: args.device.clone(),

@@ -76,7 +76,9 @@ pub fn plan(rig: &Rig) -> RunPlan {
             Some(Attach { socket, grace: Duration::from_secs(2) })
         }
         Err(AttachError::NoDriver { .. } | AttachError::DriverGone { .. }) => {
-            say(format_args!("phantom3: no driver is running; starting one of our own with simulated PHANToM Premiums"));
+            say(format_args!(
+                "phantom3: no driver is running; starting one of our own with simulated PHANToM Premiums"
+            ));
             None
         }
         Err(error) => {

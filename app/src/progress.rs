@@ -76,7 +76,9 @@ impl Progress {
             let percent = 100 * done / total_ticks.max(1);
             let total = seconds(total_ticks);
             if run_ticks == 0 {
-                format!("   0.00 s of {total:.2} s  waiting for the force to ramp in (late replies hold it back)")
+                format!(
+                    "   0.00 s of {total:.2} s  waiting for the force to ramp in (late replies hold it back)"
+                )
             } else {
                 format!("{:7.2} s of {total:.2} s  {percent:3} %", seconds(done))
             }

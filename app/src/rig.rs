@@ -7,8 +7,7 @@ use crate::recording::Names;
 use crate::simulated::{SimulatedDevices, SimulationError, base_for_path};
 use haptics::{Entity, Finger, Friction, ParameterError, Plane, Shape, Sphere};
 use io_driver::config::{
-    Backend, DeviceConfig, DriverConfig, ProcessConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig,
-    Wish,
+    Backend, DeviceConfig, DriverConfig, ProcessConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig, Wish,
 };
 use io_driver::device_file::Workspace;
 use io_driver::open::{OpenError, open_devices};
@@ -138,7 +137,15 @@ impl Rig {
             (None, None) => None,
         };
         let hand = named.map(|(path, named_by)| check_hand(path, &named_by, &scene)).transpose()?;
-        let mut rig = Self { scene_file: scene_file.into(), scene, layout, hand_mode, bases: Vec::new(), hand, period_ns };
+        let mut rig = Self {
+            scene_file: scene_file.into(),
+            scene,
+            layout,
+            hand_mode,
+            bases: Vec::new(),
+            hand,
+            period_ns,
+        };
         rig.bases = rig.place_bases()?;
         rig.fast_step()?;
         if matches!(rig.hand_mode, HandMode::Impedance(_)) {
@@ -146,6 +153,12 @@ impl Rig {
             open_devices(&rig.driver_config(ClockMode::Virtual))?;
         }
         Ok(rig)
+    }
+
+    /// The same at another tick length (ns): the running driver's.
+    #[must_use]
+    pub fn at_period(self, period_ns: u64) -> Self {
+        Self { period_ns, ..self }
     }
 
     /// Where a device stands, X_WD.

@@ -106,7 +106,7 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
     check_clock(plan, &info)?;
     let driver_name = describe(&source, attachment.driver_pid, &info);
     let baseline = Baseline::of(&attachment.driver);
-    let step_rig = Rig { period_ns: info.period_ns, ..rig.clone() };
+    let step_rig = rig.clone().at_period(info.period_ns);
     let Parts { fast, mut slow, mut progress } =
         Parts::new(&step_rig, plan, info.clock_mode, info.period_ns)?;
     let result = two_processes::run(&mut source, attachment, fast, &mut slow, &mut progress, signals);

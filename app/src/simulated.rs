@@ -6,8 +6,8 @@
 //! which it is too long.
 //! Frames: bases in W.
 
-use io_driver::device_file::{self, ArmFile, DeviceFile, DeviceFileError, Workspace};
 use io_driver::config::{Backend, HandChoice, Wish};
+use io_driver::device_file::{self, ArmFile, DeviceFile, DeviceFileError, Workspace};
 use io_driver::sim::hand::HandModel;
 use io_driver::sim::hand::model_file::{self, Firmness};
 use io_driver::toml_report::TomlReport;
@@ -35,7 +35,13 @@ pub struct SimulatedDevices {
 
 impl Default for SimulatedDevices {
     fn default() -> Self {
-        Self { description: "premium-1.5".into(), hand_model: "pen-grip".into(), firmness: Firmness::Usual, trembles: true, seed: 0 }
+        Self {
+            description: "premium-1.5".into(),
+            hand_model: "pen-grip".into(),
+            firmness: Firmness::Usual,
+            trembles: true,
+            seed: 0,
+        }
     }
 }
 
@@ -61,7 +67,9 @@ pub enum SimulationError {
     #[error(transparent)]
     Hand(#[from] TomlReport),
     /// An ideal device is not simulated.
-    #[error("{file} describes an ideal device, which has nothing to simulate; use --hand-mode kinematic, or an arm such as premium-1.5")]
+    #[error(
+        "{file} describes an ideal device, which has nothing to simulate; use --hand-mode kinematic, or an arm such as premium-1.5"
+    )]
     Ideal {
         /// Which.
         file: PathBuf,
@@ -110,7 +118,12 @@ impl SimulatedDevices {
             trembles: self.trembles,
         });
         let is_builtin = device_file::builtin(&self.description.to_string_lossy()).is_some();
-        Backend::Simulated { description: absolute(&self.description, is_builtin), wish, holder, seed: self.seed }
+        Backend::Simulated {
+            description: absolute(&self.description, is_builtin),
+            wish,
+            holder,
+            seed: self.seed,
+        }
     }
 }
 

@@ -187,7 +187,9 @@ mod tests {
              [[device]]\nbackend = \"replay\"\ndescription = \"premium-1.5\"\ntrace = \"t.csv\"\n",
         )
         .expect("good");
-        let Backend::Ideal(Wish { hand: Some((path, finger)), .. }) = &config.devices[0].backend else { panic!() };
+        let Backend::Ideal(Wish { hand: Some((path, finger)), .. }) = &config.devices[0].backend else {
+            panic!()
+        };
         assert_eq!((path.as_path(), finger.as_str()), (Path::new("lab/h.csv"), "f0"));
         let Backend::Replay { description, trace } = &config.devices[1].backend else { panic!() };
         assert_eq!(

@@ -13,9 +13,9 @@ use crate::device::ideal::{Hand, IdealDevice};
 use crate::device::replay::ReplayDevice;
 use crate::device_file::{self, ArmFile, DeviceFile, DeviceFileError};
 use crate::emulator::card::{Card, CardError};
-use crate::toml_report::TomlReport;
 use crate::sim::script::{HandError, HandPlayer, HandScript};
 use crate::sim::tip_board::TipBoard;
+use crate::toml_report::TomlReport;
 use shm_abi::segment::DeviceInfo;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -206,8 +206,7 @@ fn script(
 ) -> Result<Option<(HandPlayer, usize)>, OpenError> {
     let Some((file, finger)) = &wish.hand else { return Ok(None) };
     let wishes = config.devices.iter().filter_map(|other| other.backend.wish()?.hand.as_ref());
-    let fingers: Vec<&str> =
-        wishes.filter(|(path, _)| path == file).map(|(_, name)| name.as_str()).collect();
+    let fingers: Vec<&str> = wishes.filter(|(path, _)| path == file).map(|(_, name)| name.as_str()).collect();
     let script = HandScript::parse(&read(device, file)?, file, &fingers)?;
     let index = fingers.iter().position(|name| name == finger).unwrap_or(0);
     Ok(script.is_scripted(index).then(|| (HandPlayer::new(script), index)))

@@ -216,7 +216,11 @@ impl RawDevice {
         let firmness = match &self.firmness {
             None => Firmness::Usual,
             Some(word) => Firmness::from_name(word.get_ref()).ok_or_else(|| {
-                toml.refuse(word.span(), format_args!("{:?}", word.get_ref()), "\"light\", \"usual\" or \"firm\"")
+                toml.refuse(
+                    word.span(),
+                    format_args!("{:?}", word.get_ref()),
+                    "\"light\", \"usual\" or \"firm\"",
+                )
             })?,
         };
         let trembles = self.tremor.as_ref().is_none_or(|key| *key.get_ref());

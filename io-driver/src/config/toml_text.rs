@@ -1,6 +1,9 @@
 //! Writes a configuration down as TOML.
 
-use super::{Backend, Commissioning, DeviceConfig, DriverConfig, HandChoice, OverrunPolicy, ReplyMode, SpinMargin, Wish};
+use super::{
+    Backend, Commissioning, DeviceConfig, DriverConfig, HandChoice, OverrunPolicy, ReplyMode, SpinMargin,
+    Wish,
+};
 use crate::safety::switches::{Switch, Switches};
 use shm_abi::doorbell::WaitMode;
 use std::fmt::Write as _;

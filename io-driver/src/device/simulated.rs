@@ -7,6 +7,8 @@
 //! Frames: the script is in W, everything else in the device's base frame D.
 //! Cost: that of the arm, some microseconds a millisecond; no allocation.
 
+#![allow(non_snake_case)] // Frames are capital letters: a point p_W is in the world.
+
 use super::arm::Arm;
 use super::{Device, Effort, Reading, TickTime, Written};
 use crate::sim::arm::{NobodyHolds, SimulatedArm, Truth};
@@ -135,7 +137,8 @@ impl SimulatedDevice {
     fn tell_hand(&mut self, time: TickTime, elapsed_s: f64) -> u64 {
         let Holder::Hand(held) = &mut self.holder else { return 0 };
         let truth = self.plant.truth();
-        let to_base = |p_W: Vector3<f64>| self.base_in_world.inverse_transform_point(&Point3::from(p_W)).coords;
+        let to_base =
+            |p_W: Vector3<f64>| self.base_in_world.inverse_transform_point(&Point3::from(p_W)).coords;
         let (wanted_W, buttons) = match &mut held.wish {
             Wish::Scripted(player, finger) => {
                 let at_s = time.run_time_s();
@@ -171,7 +174,7 @@ impl Device for SimulatedDevice {
         let elapsed_ns = ticks.saturating_mul(time.period_ns);
         self.pass(elapsed_ns);
         self.read_at_ns = monotonic_ns();
-        let buttons = self.tell_hand(time, elapsed_ns as f64 / 1e9);
+        let buttons = self.tell_hand(time, elapsed_ns.max(time.period_ns) as f64 / 1e9);
         let mut reading = self.arm.read(self.plant.counters(), time);
         reading.buttons = buttons;
         if self.plant.is_tripped() {

@@ -1,5 +1,7 @@
 //! Opening a simulated arm: its pose where the hand begins, its hand, and when its motors take effect.
 
+#![allow(non_snake_case)] // Frames are capital letters: a point p_W is in the world.
+
 use super::{OpenError, arm_info, commissioned, holds_its_weight, mechanism, read, script};
 use crate::config::{Backend, DeviceConfig, DriverConfig, HandChoice, ReplyMode, Wish};
 use crate::device::Device;
@@ -41,7 +43,11 @@ pub(super) fn open(
     let holder = match holder {
         None => Holder::Nobody,
         Some(choice) => Holder::Hand(Box::new(HeldBy {
-            hand: ImpedanceHand::new(&hand(device, choice)?.in_base(&wish.base_in_world.rotation), start_D, seed),
+            hand: ImpedanceHand::new(
+                &hand(device, choice)?.in_base(&wish.base_in_world.rotation),
+                start_D,
+                seed,
+            ),
             wish: wanted,
             board: Arc::clone(board),
             place,

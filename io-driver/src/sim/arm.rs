@@ -39,7 +39,7 @@ pub trait TipLoad {
     /// The force on the tip (N) when it is here (m) and this fast (m/s), in D.
     fn force_on_tip(&self, tip: Vector3<f64>, velocity: Vector3<f64>) -> Vector3<f64>;
 
-    /// Goes on by `dt_s`, with the tip here and this fast.
+    /// Goes on by `dt_s`, in which the tip moves evenly from here (m) this fast (m/s).
     fn advance(&mut self, tip: Vector3<f64>, velocity: Vector3<f64>, dt_s: f64);
 }
 
@@ -213,13 +213,13 @@ impl SimulatedArm {
 
     fn step(&mut self, dt_s: f64, hand: &mut impl TipLoad) {
         let drive = self.turn_motors(dt_s);
+        let tip = self.kinematics.forward(self.links.angles.into());
         match self.spec.cable {
             None => self.step_rigid(drive, dt_s, hand),
             Some(cable) => self.step_elastic(&cable, drive, dt_s, hand),
         }
-        let joints = self.links.angles.into();
-        let velocity = self.kinematics.jacobian(joints) * self.links.rates;
-        hand.advance(self.kinematics.forward(joints), velocity, dt_s);
+        let moved = self.kinematics.forward(self.links.angles.into()) - tip;
+        hand.advance(tip, moved / dt_s, dt_s);
     }
 
     /// The motors' torques on their joints (N m).

@@ -22,6 +22,7 @@ mod tremor;
 
 use nalgebra::Vector3;
 
+use super::arm::TipLoad;
 pub use grip::{Felt, GripSpec};
 use impedance::{Impedance, Moving};
 pub use impedance::{ImpedanceSpec, SpringDamper};
@@ -89,5 +90,15 @@ impl ImpedanceHand {
     /// The tip as the grasp sees it: the fingertip's own trembling taken away.
     fn against_fingertip(&self, tip_D: Vector3<f64>, tip_velocity_D: Vector3<f64>) -> Moving {
         Moving { at: tip_D - self.trembling.at, velocity: tip_velocity_D - self.trembling.velocity }
+    }
+}
+
+impl TipLoad for ImpedanceHand {
+    fn force_on_tip(&self, tip_D: Vector3<f64>, velocity_D: Vector3<f64>) -> Vector3<f64> {
+        self.force_on_tip(tip_D, velocity_D)
+    }
+
+    fn advance(&mut self, tip_D: Vector3<f64>, velocity_D: Vector3<f64>, dt_s: f64) {
+        self.advance(tip_D, velocity_D, dt_s);
     }
 }

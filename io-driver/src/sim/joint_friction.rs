@@ -32,8 +32,7 @@ impl JointFriction {
         // Mobility by blocks: the turret by itself, the other two joints together.
         let (m11, m22, m23, m33) = (inertia[(0, 0)], inertia[(1, 1)], inertia[(1, 2)], inertia[(2, 2)]);
         let determinant = m22 * m33 - m23 * m23;
-        let (w11, w22, w23, w33) =
-            (1.0 / m11, m33 / determinant, -m23 / determinant, m22 / determinant);
+        let (w11, w22, w23, w33) = (1.0 / m11, m33 / determinant, -m23 / determinant, m22 / determinant);
         let most = self.torque_nm.map(|torque| torque * dt_s);
         let mut p = self.impulse;
         p.x = (-rates.x / w11).clamp(-most[0], most[0]);

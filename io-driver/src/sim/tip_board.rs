@@ -3,6 +3,8 @@
 //! Model: each simulated device writes its own place and reads the others', all in the loop's thread; the words are
 //! atomic only because devices are sent to that thread. A place that nobody wrote is nobody's.
 
+#![allow(non_snake_case)] // Frames are capital letters: a point p_W is in the world.
+
 use nalgebra::Vector3;
 use shm_abi::MAX_DEVICES;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -56,7 +56,6 @@ impl Case {
     pub fn period_s(&self) -> f64 {
         1.0 / self.rate_hz
     }
-
 }
 
 impl Hand {

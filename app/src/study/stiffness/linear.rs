@@ -99,7 +99,10 @@ impl Loop {
         let bandwidth = std::f64::consts::TAU * self.amplifier_hz;
         generator[(4, STATES)] = bandwidth;
         let map = (generator * dt_s).exp();
-        (map.fixed_view::<STATES, STATES>(0, 0).into_owned(), map.fixed_view::<STATES, 1>(0, STATES).into_owned())
+        (
+            map.fixed_view::<STATES, STATES>(0, 0).into_owned(),
+            map.fixed_view::<STATES, 1>(0, STATES).into_owned(),
+        )
     }
 
     fn rates(&self) -> Flow {
@@ -166,7 +169,9 @@ mod tests {
     fn a_mass_with_a_damper_follows_the_closed_form_of_the_sampled_wall() {
         // For m, b and a wall sampled with T, the characteristic polynomial by hand, with a = exp(-b T / m):
         // z^2 + (K c1 - 1 - a) z + a + K c2 = 0, stable while a + K c2 < 1 (Jury). c1 + c2 are the ZOH's.
-        for (mass, damping, period) in [(0.05, 1.0, 1e-3), (0.05, 0.2, 1e-3), (0.2, 3.0, 0.5e-3), (0.03, 0.5, 4e-3)] {
+        for (mass, damping, period) in
+            [(0.05, 1.0, 1e-3), (0.05, 0.2, 1e-3), (0.2, 3.0, 0.5e-3), (0.03, 0.5, 4e-3)]
+        {
             let system = Loop { mass_kg: mass, viscous_n_s_per_m: damping, period_s: period, ..FREE };
             let a = f64::exp(-damping * period / mass);
             let lag = mass / damping;
@@ -195,8 +200,7 @@ mod tests {
 
     #[test]
     fn damping_of_the_wall_and_of_a_hand_help() {
-        let hand =
-            Hand { mass_kg: 0.2, grasp: Vector2::new(500.0, 3.0), arm: Vector2::new(100.0, 6.0) };
+        let hand = Hand { mass_kg: 0.2, grasp: Vector2::new(500.0, 3.0), arm: Vector2::new(100.0, 6.0) };
         assert!(limit(&Loop { hand: Some(hand), ..FREE }) > 1.5 * limit(&FREE));
         assert!(limit(&Loop { damping_n_s_per_m: 5.0, ..FREE }) > 2.0 * limit(&FREE));
     }

@@ -34,8 +34,9 @@ fn chart(title: &str, answers: &[&Answer]) -> Chart {
         let of_mode = || answers.iter().filter(|answer| answer.case.mode == mode);
         let measured: Vec<_> =
             of_mode().filter_map(|answer| Some((answer.case.rate_hz, answer.found.n_per_m()?))).collect();
-        let linear: Vec<_> =
-            of_mode().filter_map(|answer| Some((answer.case.rate_hz, answer.theory.linear.n_per_m()?))).collect();
+        let linear: Vec<_> = of_mode()
+            .filter_map(|answer| Some((answer.case.rate_hz, answer.theory.linear.n_per_m()?)))
+            .collect();
         if measured.is_empty() && linear.is_empty() {
             return chart;
         }

@@ -99,13 +99,7 @@ impl Bench {
         let directory = tempfile::Builder::new().prefix("phantom3-study-").tempdir().map_err(no_room)?;
         let script = directory.path().join("push.csv");
         std::fs::write(&script, push_script(&plant, axis, push_m)).map_err(no_room)?;
-        Ok(Self {
-            plant,
-            axis,
-            description: simulated.description,
-            script,
-            _directory: directory,
-        })
+        Ok(Self { plant, axis, description: simulated.description, script, _directory: directory })
     }
 
     /// A trial at this stiffness (N/m).
@@ -134,7 +128,7 @@ impl Bench {
         let normal = self.axis.normal();
         let offset = self.plant.tip_m.dot(&normal);
         Plane::new(normal.into_inner(), offset)
-            .and_then(|plane| Entity::new(plane.into(), Isometry3::identity(), stiffness))
+            .and_then(|plane| Entity::new(plane, Isometry3::identity(), stiffness))
             .and_then(|entity| entity.with_damping(damping))
             .map_err(|error| RunFailure::Start(error.to_string()))
     }
@@ -219,10 +213,5 @@ fn push_script(plant: &Plant, axis: Axis, push_m: f64) -> String {
         format!("{t_s},{x},{y},{z}\n")
     };
     let pushed = PRESS_M + push_m;
-    format!(
-        "t,f0_x,f0_y,f0_z\n{}{}{}",
-        row(0.0, PRESS_M),
-        row(PUSH_S, PRESS_M),
-        row(PUSH_S + 1e-3, pushed)
-    )
+    format!("t,f0_x,f0_y,f0_z\n{}{}{}", row(0.0, PRESS_M), row(PUSH_S, PRESS_M), row(PUSH_S + 1e-3, pushed))
 }
