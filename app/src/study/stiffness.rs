@@ -54,6 +54,9 @@ pub struct StiffnessArgs {
     /// The wall's normal, in the device's frame
     #[arg(long, value_enum, default_value_t = Axis::Y)]
     axis: Axis,
+    /// How deep behind the surface the hand wants to be at first (mm); negative: above it, so that it taps
+    #[arg(long, value_name = "MM", default_value_t = 2.0, value_parser = parse_press, allow_negative_numbers = true)]
+    press_mm: f64,
     /// How much deeper the hand wants to be after its push (mm)
     #[arg(long, value_name = "MM", default_value_t = 1.0, value_parser = parse_push)]
     push_mm: f64,
@@ -70,8 +73,10 @@ pub struct StiffnessArgs {
 pub struct Answer {
     /// The case.
     pub case: Case,
-    /// What the simulation said.
-    pub found: Found,
+    /// Up to where the simulation settled below two counts.
+    pub settled: Found,
+    /// Up to where nothing flickered either.
+    pub quiet: Found,
     /// What theory says.
     pub theory: bounds::Theory,
 }
@@ -82,7 +87,8 @@ pub struct Answer {
 /// Bad arguments, and results that cannot be written.
 pub fn execute(args: &StiffnessArgs, signals: &StopSignals) -> Result<Stop, RunFailure> {
     let start = |error: &dyn std::fmt::Display| RunFailure::Start(error.to_string());
-    let bench = Bench::new(&args.device, args.axis, args.push_mm * 1e-3).map_err(|error| start(&error))?;
+    let bench = Bench::new(&args.device, args.axis, [args.press_mm * 1e-3, args.push_mm * 1e-3])
+        .map_err(|error| start(&error))?;
     let cases = case::all(&args.modes, &args.rates, &args.dampings, &args.hands);
     for case in &cases {
         // Whatever is wrong with the arguments is said before the first long run.
@@ -152,14 +158,16 @@ fn vec_of_none<T>(count: usize) -> Vec<Option<T>> {
 }
 
 fn answer(bench: &Bench, case: &Case, signals: &StopSignals) -> Result<Answer, RunFailure> {
-    let mut search = Search::default();
-    while let Some(stiffness) = search.next() {
-        if signals.requested().is_some() {
-            break;
-        }
-        search.learn(stiffness, bench.open(case, stiffness)?.run()?.settles());
+    // What is quiet has settled, so what is known of one helps the other.
+    let (mut settled, mut quiet) = (Search::default(), Search::default());
+    while signals.requested().is_none() {
+        let Some(stiffness) = quiet.next().or_else(|| settled.next()) else { break };
+        let outcome = bench.open(case, stiffness)?.run()?;
+        quiet.learn(stiffness, outcome.is_quiet());
+        settled.learn(stiffness, outcome.settles());
     }
-    Ok(Answer { case: case.clone(), found: search.found(), theory: bounds::Theory::of(bench, case)? })
+    let theory = bounds::Theory::of(bench, case)?;
+    Ok(Answer { case: case.clone(), settled: settled.found(), quiet: quiet.found(), theory })
 }
 
 fn parse_rate(text: &str) -> Result<f64, String> {
@@ -168,6 +176,10 @@ fn parse_rate(text: &str) -> Result<f64, String> {
 
 fn parse_damping(text: &str) -> Result<f64, String> {
     within(text, 0.0, 100.0, "N s/m")
+}
+
+fn parse_press(text: &str) -> Result<f64, String> {
+    within(text, -20.0, 20.0, "mm")
 }
 
 fn parse_push(text: &str) -> Result<f64, String> {

@@ -237,12 +237,11 @@ impl SimulatedArm {
         let begin = self.links;
         let half = self.moved(begin, begin, self.accelerations(begin, drive, hand), 0.5 * dt_s);
         let acceleration = self.accelerations(half, drive, hand);
-        let rates = begin.rates + acceleration * dt_s;
-        let inertia = self.inertia(half.angles);
-        let rates = rates + self.friction.hold(&inertia, rates, dt_s);
-        // The midpoint rule's path, and what the friction took of it.
-        let angles = begin.angles + (half.rates + (rates - begin.rates - acceleration * dt_s)) * dt_s;
-        self.links = Motion { angles, rates };
+        let free = begin.rates + acceleration * dt_s;
+        let held = self.friction.hold(&self.inertia(half.angles), free, dt_s);
+        // The midpoint's path; what the friction took, it took evenly, so half of it counts for the path.
+        let angles = begin.angles + (half.rates + 0.5 * held) * dt_s;
+        self.links = Motion { angles, rates: free + held };
         self.shafts = self.links;
     }
 
@@ -256,7 +255,7 @@ impl SimulatedArm {
         let free = shafts.rates + of_shafts * dt_s;
         let held = self.friction.hold(&Matrix3::from_diagonal(&self.rotors), free, dt_s);
         self.shafts =
-            Motion { angles: shafts.angles + (half_shafts.rates + held) * dt_s, rates: free + held };
+            Motion { angles: shafts.angles + (half_shafts.rates + 0.5 * held) * dt_s, rates: free + held };
     }
 
     /// From `begin` with the rates of `along` and these accelerations.

@@ -33,7 +33,7 @@ fn chart(title: &str, answers: &[&Answer]) -> Chart {
     let with_modes = modes.into_iter().enumerate().fold(empty, |chart, (index, mode)| {
         let of_mode = || answers.iter().filter(|answer| answer.case.mode == mode);
         let measured: Vec<_> =
-            of_mode().filter_map(|answer| Some((answer.case.rate_hz, answer.found.n_per_m()?))).collect();
+            of_mode().filter_map(|answer| Some((answer.case.rate_hz, answer.settled.n_per_m()?))).collect();
         let linear: Vec<_> = of_mode()
             .filter_map(|answer| Some((answer.case.rate_hz, answer.theory.linear.n_per_m()?)))
             .collect();

@@ -43,9 +43,16 @@ impl Search {
         }
     }
 
-    /// What came of it.
+    /// What came of a stiffness, asked for or not: what is known already better is kept.
     pub fn learn(&mut self, stiffness: f64, settles: bool) {
-        *(if settles { &mut self.settled } else { &mut self.failed }) = Some(stiffness);
+        let lowest_failed = self.failed.unwrap_or(f64::INFINITY);
+        if !settles {
+            self.failed = Some(stiffness.min(lowest_failed));
+            // What settled above it is an island.
+            self.settled = self.settled.filter(|settled| *settled < stiffness);
+        } else if stiffness < lowest_failed {
+            self.settled = Some(self.settled.map_or(stiffness, |settled| settled.max(stiffness)));
+        }
     }
 
     /// The answer.

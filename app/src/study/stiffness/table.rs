@@ -46,18 +46,19 @@ pub fn text(bench: &Bench, answers: &[Answer]) -> String {
     );
     let _ = writeln!(
         text,
-        "{:<16} {:>7} {:<12} {:>6} {:>8} {:>8} {:>8} {:>8} {:>8}",
-        "hand", "damping", "reply", "Hz", "largest", "linear", "damped", "passive", "friction"
+        "{:<16} {:>7} {:<12} {:>6} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}",
+        "hand", "damping", "reply", "Hz", "settled", "quiet", "linear", "damped", "passive", "friction"
     );
-    for Answer { case, found, theory } in answers {
+    for Answer { case, settled, quiet, theory } in answers {
         let _ = writeln!(
             text,
-            "{:<16} {:>7.1} {:<12} {:>6.0} {:>8} {:>8} {:>8.0} {:>8.0} {:>8.0}",
+            "{:<16} {:>7.1} {:<12} {:>6.0} {:>8} {:>8} {:>8} {:>8.0} {:>8.0} {:>8.0}",
             case.hand.name(),
             case.damping_n_s_per_m,
             case.mode.name(),
             case.rate_hz,
-            shown(*found),
+            shown(*settled),
+            shown(*quiet),
             shown(theory.linear),
             theory.damped,
             theory.passive,
@@ -85,19 +86,20 @@ pub fn write_csv(file: &Path, bench: &Bench, answers: &[Answer]) -> Result<(), T
 
 fn csv(bench: &Bench, answers: &[Answer]) -> String {
     let mut text = String::from(
-        "hand,axis,damping_n_s_per_m,reply,rate_hz,largest_n_per_m,linear_n_per_m,damped_n_per_m,passive_n_per_m,friction_n_per_m\n",
+        "hand,axis,damping_n_s_per_m,reply,rate_hz,settled_n_per_m,quiet_n_per_m,linear_n_per_m,damped_n_per_m,passive_n_per_m,friction_n_per_m\n",
     );
     let number = |found: Found| found.n_per_m().map_or_else(String::new, |n| n.to_string());
-    for Answer { case, found, theory } in answers {
+    for Answer { case, settled, quiet, theory } in answers {
         let _ = writeln!(
             text,
-            "{},{:?},{},{},{},{},{},{},{},{}",
+            "{},{:?},{},{},{},{},{},{},{},{},{}",
             case.hand.name(),
             bench.axis,
             case.damping_n_s_per_m,
             case.mode.name(),
             case.rate_hz,
-            number(*found),
+            number(*settled),
+            number(*quiet),
             number(theory.linear),
             theory.damped,
             theory.passive,

@@ -1,8 +1,8 @@
 //! One trial: a hand pushes against a wall, and either it settles or it buzzes.
 //!
 //! Model: an arm in its home pose, held by a hand whose tremor is left out, in front of a wall through the tip. The hand
-//! wants to be [`PRESS_M`] behind the surface; half a second after full authority it wants to be as much deeper as
-//! its push. What counts is what the counters say from two seconds after the push on, for a quarter of a second: it has
+//! wants to be some millimetres behind the surface, or above it; half a second after full authority it wants to be
+//! deeper by its push. What counts is what the counters say from two seconds after the push on, for a quarter of a second: it has
 //! settled if no joint's counter moves by two counts or more.
 //! The whole system runs: driver cycle with all its limits, shared memory, fast step; only the waiting is left out.
 
@@ -30,8 +30,6 @@ use tempfile::TempDir;
 
 /// From the reading to the motors where they are written in the same tick (s).
 pub const ROUND_TRIP_S: f64 = ROUND_TRIP_NS as f64 / 1e9;
-/// How far behind the surface the hand wants to be at first (m).
-const PRESS_M: f64 = 2e-3;
 /// When the push comes, after full authority (s).
 const PUSH_S: f64 = 0.5;
 /// How long it has to settle (s).
@@ -40,6 +38,8 @@ const SETTLE_S: f64 = 2.0;
 const LOOK_S: f64 = 0.25;
 /// What a settled counter moves by less than.
 const COUNTS: i64 = 2;
+/// What a quiet counter changes at most meanwhile: eight times a second, as a hand that gives way makes it.
+const CHANGES: u32 = 2;
 
 /// What all trials share.
 #[derive(Debug)]
@@ -66,23 +66,31 @@ pub struct Trial {
 pub struct Outcome {
     /// By how much the counter of the worst joint moved while it was looked at.
     pub ripple_counts: i64,
+    /// How often it changed.
+    pub changes: u32,
     /// The driver ended in its fault state: the arm was too fast.
     pub is_fault: bool,
 }
 
 impl Outcome {
-    /// Whether the wall is quiet.
+    /// Whether nothing buzzes either: a counter may creep over a count, but not flicker.
+    pub fn is_quiet(&self) -> bool {
+        self.settles() && self.changes <= CHANGES
+    }
+
+    /// Whether what moves is less than two counts.
     pub fn settles(&self) -> bool {
         !self.is_fault && self.ripple_counts < COUNTS
     }
 }
 
 impl Bench {
-    /// Trials of this arm against walls of this normal with this push (m).
+    /// Trials of this arm against walls of this normal, with a hand that wants to be this deep and then this much deeper
+    /// (m).
     ///
     /// # Errors
     /// If the arm cannot be simulated, or there is no room for a temporary file.
-    pub fn new(device: &Path, axis: Axis, push_m: f64) -> Result<Self, RunFailure> {
+    pub fn new(device: &Path, axis: Axis, push_m: [f64; 2]) -> Result<Self, RunFailure> {
         let simulated = SimulatedDevices { description: device.into(), ..SimulatedDevices::default() };
         let arm = simulated.arm().map_err(|error| RunFailure::Start(error.to_string()))?;
         let plant = Plant::of(&arm, axis).ok_or_else(|| {
@@ -184,34 +192,58 @@ impl Trial {
     /// None for what a wall does to an arm; that is an outcome.
     pub fn run(mut self) -> Result<Outcome, RunFailure> {
         let mut frame = Frame::zeroed();
-        let mut seen: Option<[(i64, i64); 3]> = None;
+        let mut seen: Option<[Counter; 3]> = None;
         for tick in 1..=self.ticks {
             let turn = self.driver.tick(tick, &mut self.fast);
             if matches!(turn, Turn::Fault(_)) {
-                return Ok(Outcome { ripple_counts: i64::MAX, is_fault: true });
+                return Ok(Outcome { ripple_counts: i64::MAX, changes: u32::MAX, is_fault: true });
             }
             let is_read = self.driver.view().read_frame(tick, &mut frame).is_ok();
             if is_read && frame.state == DriverState::Active as u64 && frame.run_tick >= self.look_from {
                 let counts = &frame.devices[0].encoder_counts;
-                let ends = seen.get_or_insert_with(|| std::array::from_fn(|j| (counts[j], counts[j])));
-                for (end, count) in ends.iter_mut().zip(counts) {
-                    *end = (end.0.min(*count), end.1.max(*count));
-                }
+                let counters = seen.get_or_insert_with(|| std::array::from_fn(|j| Counter::at(counts[j])));
+                counters.iter_mut().zip(counts).for_each(|(counter, count)| counter.take(*count));
             }
         }
-        let ripple = seen.map(|ends| ends.map(|(least, most)| most - least).into_iter().max().unwrap_or(0));
         // Full authority that never came is no quiet wall.
-        Ok(Outcome { ripple_counts: ripple.unwrap_or(i64::MAX), is_fault: ripple.is_none() })
+        let Some(counters) = seen else {
+            return Ok(Outcome { ripple_counts: i64::MAX, changes: u32::MAX, is_fault: true });
+        };
+        Ok(Outcome {
+            ripple_counts: counters.iter().map(|counter| counter.most - counter.least).max().unwrap_or(0),
+            changes: counters.iter().map(|counter| counter.changes).max().unwrap_or(0),
+            is_fault: false,
+        })
+    }
+}
+
+/// What a counter did.
+#[derive(Debug, Clone, Copy)]
+struct Counter {
+    last: i64,
+    least: i64,
+    most: i64,
+    changes: u32,
+}
+
+impl Counter {
+    fn at(count: i64) -> Self {
+        Self { last: count, least: count, most: count, changes: 0 }
+    }
+
+    fn take(&mut self, count: i64) {
+        self.changes += u32::from(count != self.last);
+        *self = Self { last: count, least: self.least.min(count), most: self.most.max(count), ..*self };
     }
 }
 
 /// The hand presses, and then a little more.
-fn push_script(plant: &Plant, axis: Axis, push_m: f64) -> String {
+fn push_script(plant: &Plant, axis: Axis, [press_m, push_m]: [f64; 2]) -> String {
     let normal: Vector3<f64> = axis.normal().into_inner();
     let row = |t_s: f64, depth_m: f64| {
         let [x, y, z]: [f64; 3] = (plant.tip_m - normal * depth_m).into();
         format!("{t_s},{x},{y},{z}\n")
     };
-    let pushed = PRESS_M + push_m;
-    format!("t,f0_x,f0_y,f0_z\n{}{}{}", row(0.0, PRESS_M), row(PUSH_S, PRESS_M), row(PUSH_S + 1e-3, pushed))
+    let pushed = press_m + push_m;
+    format!("t,f0_x,f0_y,f0_z\n{}{}{}", row(0.0, press_m), row(PUSH_S, press_m), row(PUSH_S + 1e-3, pushed))
 }
