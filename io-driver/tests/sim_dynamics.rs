@@ -57,7 +57,7 @@ fn premium() -> Dynamics {
 fn mechanism() -> Premium {
     let degrees = |min: f64, max: f64| Interval { min: min.to_radians(), max: max.to_radians() };
     let joints = [degrees(-90.0, 90.0), degrees(-61.0, 113.0), degrees(-23.0, 167.0)];
-    Premium::new(LINKS, JointLimits { joints, elbow: degrees(-53.0, 54.0) })
+    Premium::new(LINKS, JointLimits { joints, elbow: degrees(-53.0, 54.0), elbow_sign: -1.0 })
 }
 
 fn any_joints() -> impl Strategy<Value = [f64; 3]> {
