@@ -50,10 +50,11 @@ pub enum Backend {
 
 impl Backend {
     /// How many buttons such a device may have; `None`: none, so that no switch could be wired to it.
+    /// Whether a hand file has the buttons is seen when it is opened.
     pub(super) fn buttons(&self) -> Option<i64> {
         match self {
-            Self::Ideal { .. } | Self::Replay { .. } => None,
-            Self::Emulated { .. } => Some(32),
+            Self::Ideal { hand: None, .. } | Self::Replay { .. } => None,
+            Self::Ideal { hand: Some(_), .. } | Self::Emulated { .. } => Some(32),
         }
     }
 }
