@@ -51,6 +51,8 @@ pub(super) struct Moving {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Impedance {
     spec: ImpedanceSpec,
+    /// Of both springs beside each other (m/N): six quotients a step would cost as much as all the rest.
+    compliance: Vector3<f64>,
     mass: Moving,
     transitions: [Transition; 3],
     /// What the transitions are for (s).
@@ -86,8 +88,10 @@ impl Moving {
 impl Impedance {
     /// At rest at `start`.
     pub(super) fn new(spec: ImpedanceSpec, start: Vector3<f64>) -> Self {
+        let stiffness = spec.grasp.stiffness_n_per_m + spec.arm.stiffness_n_per_m;
         Self {
             spec,
+            compliance: stiffness.map(f64::recip),
             mass: Moving::resting(start),
             transitions: spec.transitions(USUAL_STEP_S),
             step_s: USUAL_STEP_S,
@@ -116,8 +120,8 @@ impl Impedance {
             let (b1, b2) = (grasp.damping_n_s_per_m[i], arm.damping_n_s_per_m[i]);
             let pull = b1 * tip.velocity[i] + b2 * intended.velocity[i];
             // The even motion that the mass would settle into; measured from the intended point, so that rest is exact.
-            let drift = (k1 * tip.velocity[i] + k2 * intended.velocity[i]) / (k1 + k2);
-            let lean = (k1 * (tip.at[i] - intended.at[i]) + pull - (b1 + b2) * drift) / (k1 + k2);
+            let drift = (k1 * tip.velocity[i] + k2 * intended.velocity[i]) * self.compliance[i];
+            let lean = (k1 * (tip.at[i] - intended.at[i]) + pull - (b1 + b2) * drift) * self.compliance[i];
             let settled = intended.at[i] + lean;
             let (offset, speed) =
                 self.transitions[i].apply(self.mass.at[i] - settled, self.mass.velocity[i] - drift);
