@@ -244,7 +244,7 @@ mod tests {
             ),
             (
                 "[safety]\nemergency_stop = { device = \"f0\", button = 0 }\n[[device]]\nbackend = \"ideal\"",
-                "lab/driver.toml:2: `safety.emergency_stop.device`: found device \"f0\", which has no buttons, allowed: a device with the switch on its card",
+                "lab/driver.toml:2: `safety.emergency_stop.device`: found device \"f0\", which has no buttons, allowed: a device with the switch on its card, or a script with a column of buttons",
             ),
             (
                 "[[device]]\nbackend = \"emulated\"\ndescription = \"premium-1.5\"",

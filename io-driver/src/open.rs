@@ -35,6 +35,18 @@ pub enum OpenError {
         /// What the system said.
         source: io::Error,
     },
+    /// A switch on a button that the hand file does not tell of: it would never be pressed.
+    #[error(
+        "device {device}: a switch is wired to its buttons, but {file} has no column `{finger}_buttons`; add it, or remove the switch from [safety]"
+    )]
+    NoButtons {
+        /// Whose.
+        device: String,
+        /// Which.
+        file: PathBuf,
+        /// The finger in it.
+        finger: String,
+    },
     /// The hand file is wrong.
     #[error(transparent)]
     Hand(#[from] HandError),
@@ -209,7 +221,19 @@ fn script(
     let fingers: Vec<&str> = wishes.filter(|(path, _)| path == file).map(|(_, name)| name.as_str()).collect();
     let script = HandScript::parse(&read(device, file)?, file, &fingers)?;
     let index = fingers.iter().position(|name| name == finger).unwrap_or(0);
+    if has_switch(device, config) && !script.has_buttons(index) {
+        let (device, finger) = (device.name.clone(), finger.clone());
+        return Err(OpenError::NoButtons { device, file: file.clone(), finger });
+    }
     Ok(script.is_scripted(index).then(|| (HandPlayer::new(script), index)))
+}
+
+fn has_switch(device: &DeviceConfig, config: &DriverConfig) -> bool {
+    let switches = &config.safety.switches;
+    [switches.emergency_stop, switches.dead_man]
+        .iter()
+        .flatten()
+        .any(|switch| config.devices[switch.device].name == device.name)
 }
 
 /// The mechanism that a device's description tells.
@@ -302,5 +326,26 @@ mod tests {
     fn an_arm_in_commissioning_does_not_hold_its_weight_with_motors_that_nobody_has_tried() {
         assert_ne!(codes(false), [2048; 3], "the weight can be felt in the zeroing pose");
         assert_eq!(codes(true), [2048; 3]);
+    }
+
+    /// An ideal device with a dead-man's switch and this hand file.
+    fn switched(columns: &str) -> Result<Vec<Box<dyn Device>>, OpenError> {
+        let directory = tempfile::tempdir().unwrap();
+        std::fs::write(directory.path().join("hand.csv"), columns).unwrap();
+        let text = "[safety]\ndead_man = { device = \"f0\", button = 3 }\n\
+                    [[device]]\nbackend = \"ideal\"\nhand = \"hand.csv\"\n";
+        let config = DriverConfig::parse(text, &directory.path().join("driver.toml")).unwrap();
+        open_devices(&config)
+    }
+
+    #[test]
+    fn a_switch_on_an_ideal_device_needs_a_script_with_buttons() {
+        let devices = switched("t,f0_x,f0_y,f0_z,f0_buttons\n0,0,0,0,8\n");
+        let time = TickTime { tick: 1, period_ns: 1_000_000, run_tick: 0 };
+        assert_eq!(devices.unwrap()[0].read(time).unwrap().buttons, 8);
+        let Err(refused) = switched("t,f0_x,f0_y,f0_z\n0,0,0,0\n") else { panic!("opened") };
+        let message = refused.to_string();
+        assert!(message.contains("device f0: a switch") && message.contains("hand.csv"), "{message}");
+        assert!(message.contains("no column `f0_buttons`"), "{message}");
     }
 }

@@ -24,6 +24,9 @@ pub use time_cursor::TimeCursor;
 /// microseconds, exactly representable, and its square is still finite.
 pub const MAX_MAGNITUDE: f64 = 1e15;
 
+/// Line of the first row: the header has line 1.
+const FIRST_ROW_LINE: usize = 2;
+
 /// The place of a mistake.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
@@ -165,18 +168,32 @@ impl<'a> TableReader<'a> {
         self.place(1, column)
     }
 
+    /// Place of a cell, for errors of the caller; rows count from 0.
+    pub fn cell_place(&self, row: usize, column: &str) -> Place {
+        self.place(row + FIRST_ROW_LINE, column)
+    }
+
     /// Reads all rows.
     ///
     /// # Errors
     /// [`TableError`] at the first cell that is not allowed.
     pub fn rows(&self, allowed: &Cells) -> Result<TimeTable, TableError> {
-        let columns = self.header.len() - 1;
+        self.rows_of(|_| allowed.clone())
+    }
+
+    /// Reads all rows; each column, by its name, has cells of its own kind.
+    ///
+    /// # Errors
+    /// [`TableError`] at the first cell that is not allowed.
+    pub fn rows_of(&self, allowed: impl Fn(&str) -> Cells) -> Result<TimeTable, TableError> {
+        let allowed: Vec<Cells> = self.columns().iter().map(|column| allowed(column)).collect();
+        let columns = allowed.len();
         let mut table = TimeTable { times_s: Vec::new(), cells: Vec::new(), columns };
         if self.rows.is_empty() {
             return Err(TableError::NoRows { at: self.place(1, "") });
         }
         for (index, row) in self.rows.split('\n').enumerate() {
-            self.row(index + 2, row, allowed, &mut table)?;
+            self.row(index + FIRST_ROW_LINE, row, &allowed, &mut table)?;
         }
         Ok(table)
     }
@@ -196,7 +213,13 @@ impl<'a> TableReader<'a> {
         })
     }
 
-    fn row(&self, line: usize, row: &str, allowed: &Cells, table: &mut TimeTable) -> Result<(), TableError> {
+    fn row(
+        &self,
+        line: usize,
+        row: &str,
+        allowed: &[Cells],
+        table: &mut TimeTable,
+    ) -> Result<(), TableError> {
         if row.trim().is_empty() {
             return Err(self.row_length(line, row));
         }
@@ -208,7 +231,7 @@ impl<'a> TableReader<'a> {
                 self.check_time(line, time_s, table.times_s.last().copied())?;
                 table.times_s.push(time_s);
             } else {
-                table.cells.push(self.cell(line, name, cell, allowed)?);
+                table.cells.push(self.cell(line, name, cell, &allowed[index - 1])?);
             }
         }
         if cells.next().is_some() { Err(self.row_length(line, row)) } else { Ok(()) }

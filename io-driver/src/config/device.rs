@@ -85,10 +85,11 @@ impl Backend {
     }
 
     /// How many buttons such a device may have; `None`: none, so that no switch could be wired to it.
+    /// Whether a hand file has the buttons is seen when it is opened.
     pub(super) fn buttons(&self) -> Option<i64> {
         match self {
-            Self::Ideal(_) | Self::Replay { .. } => None,
-            Self::Emulated { .. } | Self::Simulated { .. } => Some(32),
+            Self::Ideal(Wish { hand: None, .. }) | Self::Replay { .. } => None,
+            Self::Ideal(_) | Self::Emulated { .. } | Self::Simulated { .. } => Some(32),
         }
     }
 }

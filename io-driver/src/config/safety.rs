@@ -142,7 +142,8 @@ impl RawSwitch {
         };
         let Some(buttons) = devices[device].backend.buttons() else {
             let found = format_args!("device \"{name}\", which has no buttons").to_string();
-            return Err(toml.refuse(self.device.span(), found, "a device with the switch on its card"));
+            let allowed = "a device with the switch on its card, or a script with a column of buttons";
+            return Err(toml.refuse(self.device.span(), found, allowed));
         };
         let button = toml.integer(&self.button, 0..=buttons - 1)? as u32;
         Ok(Switch {

@@ -143,7 +143,8 @@ impl SimulatedDevice {
             Wish::Scripted(player, finger) => {
                 let at_s = time.run_time_s();
                 let rest = Vector3::zeros();
-                (player.position(*finger, at_s).unwrap_or(rest), 0)
+                let buttons = player.buttons(*finger, at_s).unwrap_or(0);
+                (player.position(*finger, at_s).unwrap_or(rest), u64::from(buttons))
             }
             Wish::Resting(at) => (*at, 0),
         };

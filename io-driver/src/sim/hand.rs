@@ -23,6 +23,7 @@ mod tremor;
 use nalgebra::Vector3;
 
 use super::arm::TipLoad;
+use grip::Grip;
 pub use grip::{Felt, GripSpec};
 use impedance::{Impedance, Moving};
 pub use impedance::{ImpedanceSpec, SpringDamper};
@@ -38,6 +39,8 @@ pub struct ImpedanceHand {
     impedance: Impedance,
     intention: Intention,
     tremor: Option<Tremor>,
+    grip: Option<Grip>,
+    tip_D: Vector3<f64>,
     /// The intended point, on its even way through the tick.
     intended: Moving,
     /// The fingertip against the hand's mass, likewise, and where that is at the tick's end.
@@ -48,11 +51,14 @@ pub struct ImpedanceHand {
 impl ImpedanceHand {
     /// At rest at `start_D` (m). Fingers of one hand get different seeds.
     pub fn new(model: &HandModel, start_D: Vector3<f64>, seed: u64) -> Self {
+        let stiffness = model.impedance.static_stiffness();
         let trembles = model.tremor.rms_m != Vector3::zeros();
         Self {
             impedance: Impedance::new(model.impedance, start_D),
             intention: Intention::new(model.intention, start_D),
             tremor: trembles.then(|| Tremor::new(&model.tremor, seed)),
+            grip: model.minds_slip.then(|| Grip::new(model.grip, stiffness, model.intention)),
+            tip_D: start_D,
             intended: Moving::resting(start_D),
             trembling: Moving::resting(Vector3::zeros()),
             trembled: Vector3::zeros(),
@@ -60,8 +66,9 @@ impl ImpedanceHand {
     }
 
     /// A tick of `dt_s` > 0 begins: where the finger wants to be (m), and what it felt in the tick before.
-    pub fn intend(&mut self, wanted_D: Vector3<f64>, _felt: Felt, dt_s: f64) {
-        self.intended = self.intention.step(wanted_D, dt_s);
+    pub fn intend(&mut self, wanted_D: Vector3<f64>, felt: Felt, dt_s: f64) {
+        let shift_D = self.grip.as_mut().map(|grip| grip.step(self.tip_D, felt, dt_s));
+        self.intended = self.intention.step(wanted_D + shift_D.unwrap_or_default(), dt_s);
         if let Some(tremor) = &mut self.tremor {
             let before = std::mem::replace(&mut self.trembled, tremor.step(dt_s));
             self.trembling = Moving { at: before, velocity: (self.trembled - before) / dt_s };
@@ -79,6 +86,7 @@ impl ImpedanceHand {
         self.impedance.advance(self.against_fingertip(tip_D, tip_velocity_D), self.intended, dt_s);
         self.intended = self.intended.after(dt_s);
         self.trembling = self.trembling.after(dt_s);
+        self.tip_D = tip_D;
     }
 
     /// Stiffness (N/m) and damping (N s/m) of the grasp at the tip, per axis: what an implicit integrator asks for.

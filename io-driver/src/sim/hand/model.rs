@@ -51,3 +51,40 @@ impl HandModel {
         Self { impedance, tremor, ..self.clone() }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::model_file::{Firmness, builtin, parse};
+    use super::*;
+    use nalgebra::Rotation3;
+    use std::f64::consts::FRAC_PI_2;
+    use std::path::Path;
+
+    fn pen() -> HandModel {
+        parse(builtin("pen-grip").unwrap(), Path::new("pen-grip"), Firmness::Usual).unwrap()
+    }
+
+    #[test]
+    fn a_straight_base_changes_nothing_and_a_quarter_turn_exchanges_axes() {
+        assert_eq!(pen().in_base(&UnitQuaternion::identity()), pen());
+        // D's x axis is the user's -z, D's z axis the user's x.
+        let quarter = UnitQuaternion::from_scaled_axis(Vector3::y() * FRAC_PI_2);
+        let (straight, turned) = (pen().impedance, pen().in_base(&quarter).impedance);
+        let exchanged = |v: Vector3<f64>| Vector3::new(v.z, v.y, v.x);
+        // cos(90 degrees) is 6e-17, its square nothing.
+        assert!((turned.mass_kg - exchanged(straight.mass_kg)).norm() < 1e-15);
+        let (of, to) = (straight.grasp.stiffness_n_per_m, turned.grasp.stiffness_n_per_m);
+        assert!((to - exchanged(of)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn any_turn_keeps_the_diagonal_of_the_turned_matrix() {
+        let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.3, -0.8, 0.5));
+        let rotation: Rotation3<f64> = turn.to_rotation_matrix();
+        let stiffness = pen().impedance.arm.stiffness_n_per_m;
+        let turned = rotation.inverse() * nalgebra::Matrix3::from_diagonal(&stiffness) * rotation;
+        let kept = pen().in_base(&turn).impedance.arm.stiffness_n_per_m;
+        // Some products of numbers of 300.
+        assert!((kept - turned.diagonal()).norm() < 1e-11);
+    }
+}

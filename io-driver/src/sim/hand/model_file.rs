@@ -140,6 +140,7 @@ struct RawGrip {
     minds_slip: bool,
     believed_friction: Spanned<f64>,
     margin: Spanned<f64>,
+    spare_n: Spanned<f64>,
     latency_s: Spanned<f64>,
     rise_n_per_s: Spanned<f64>,
     ease_n_per_s: Spanned<f64>,
@@ -163,6 +164,7 @@ const AMPLITUDE: Allowed = Allowed { min: 0.0, max: 0.01, unit: "m" };
 const TREMOR_BAND: Allowed = Allowed { min: 0.5, max: 30.0, unit: "Hz" };
 const FRICTION: Allowed = Allowed { min: 0.05, max: 3.0, unit: "(friction coefficient)" };
 const MARGIN: Allowed = Allowed { min: 0.05, max: 2.0, unit: "(share)" };
+const SPARE: Allowed = Allowed { min: 0.0, max: 5.0, unit: "N" };
 const LATENCY: Allowed = Allowed { min: 0.0, max: 1.0, unit: "s" };
 const FORCE_RATE: Allowed = Allowed { min: 0.1, max: 100.0, unit: "N/s" };
 const FORCE: Allowed = Allowed { min: 0.1, max: 50.0, unit: "N" };
@@ -233,10 +235,95 @@ impl RawGrip {
         Ok(GripSpec {
             believed_friction: toml.number(&self.believed_friction, FRICTION)?,
             margin: toml.number(&self.margin, MARGIN)?,
+            spare_n: toml.number(&self.spare_n, SPARE)?,
             latency_s: toml.number(&self.latency_s, LATENCY)?,
             rise_n_per_s: toml.number(&self.rise_n_per_s, FORCE_RATE)?,
             ease_n_per_s: toml.number(&self.ease_n_per_s, FORCE_RATE)?,
             max_force_n: toml.number(&self.max_force_n, FORCE)?,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ALL: [Firmness; 3] = [Firmness::Light, Firmness::Usual, Firmness::Firm];
+
+    fn read(text: &str) -> Result<HandModel, String> {
+        parse(text, Path::new("lab/hand.toml"), Firmness::Usual).map_err(|report| report.to_string())
+    }
+
+    fn built_in(name: &str, firmness: Firmness) -> HandModel {
+        parse(builtin(name).unwrap(), Path::new(name), firmness).unwrap()
+    }
+
+    #[test]
+    fn the_builtin_files_are_good_at_every_firmness_and_no_others_exist() {
+        for name in BUILTIN_NAMES {
+            let [light, usual, firm] = ALL.map(|firmness| built_in(name, firmness));
+            for axis in 0..3 {
+                let stiffness = [&light, &usual, &firm].map(|model| model.impedance.static_stiffness()[axis]);
+                assert!(stiffness.is_sorted() && stiffness[0] < stiffness[2], "{name}: {stiffness:?}");
+            }
+            assert!(!usual.minds_slip && usual.tremor.rms_m.norm() > 0.0);
+            assert_eq!(firm.name, format!("{}, firm", usual.name));
+        }
+        assert_eq!(builtin("fist"), None);
+    }
+
+    #[test]
+    fn the_pen_grip_has_the_numbers_of_the_paper() {
+        let pen = built_in("pen-grip", Firmness::Usual).impedance;
+        assert_eq!(pen.mass_kg, Vector3::new(0.218, 0.269, 0.204));
+        assert_eq!(pen.grasp.stiffness_n_per_m, Vector3::new(379.5, 552.4, 769.9));
+        assert_eq!(pen.grasp.damping_n_s_per_m, Vector3::new(1.839, 3.609, 0.776));
+        assert_eq!(pen.arm.stiffness_n_per_m, Vector3::new(78.75, 105.3, 271.7));
+        assert_eq!(pen.arm.damping_n_s_per_m, Vector3::new(4.645, 6.430, 18.06));
+    }
+
+    #[test]
+    fn the_fingertip_spans_what_was_measured_on_fingers() {
+        let ends = [(Firmness::Light, 200.0, 2.0), (Firmness::Firm, 1500.0, 6.0)];
+        for (firmness, stiffness, damping) in ends {
+            let tip = built_in("fingertip", firmness).impedance;
+            assert!((0.005..=0.006).contains(&tip.mass_kg.x));
+            // The factors are written with three digits.
+            assert!((tip.static_stiffness().x / stiffness - 1.0).abs() < 0.005, "{firmness:?}");
+            assert!((tip.arm.damping_n_s_per_m.x / damping - 1.0).abs() < 0.005, "{firmness:?}");
+        }
+    }
+
+    #[test]
+    fn each_mistake_names_file_line_key_found_and_allowed() {
+        let pen = builtin("pen-grip").unwrap();
+        let line = |needle: &str| 1 + pen[..pen.find(needle).unwrap()].matches('\n').count();
+        for (from, to, key, found) in [
+            ("0.218,", "218.0,", "impedance.mass_kg[0]", "found 218, allowed: 0.001 to 10 kg"),
+            ("[379.5, 552.4, 769.9]", "[379.5]", "impedance.grasp_stiffness_n_per_m", "found 1 values"),
+            ("bandwidth_hz = 5.0", "bandwidth_hz = 500.0", "intention.bandwidth_hz", "0.1 to 30 Hz"),
+            ("band_hz = [8.0, 12.0]", "band_hz = [12.0, 8.0]", "tremor.band_hz", "the lower frequency first"),
+            ("latency_s = 0.075", "latency_s = 75", "grip.latency_s", "found 75, allowed: 0 to 1 s"),
+            ("minds_slip = false", "minds_slip = 0", "grip.minds_slip", "boolean"),
+            ("margin = 0.4", "margn = 0.4", "grip.margn", "margin"),
+            ("arm_stiffness_times = 1.5", "arm_stiffness_times = nan", "firm.arm_stiffness_times", "NaN"),
+        ] {
+            assert_eq!(pen.matches(from).count(), 1, "{from}");
+            let message = read(&pen.replace(from, to)).unwrap_err();
+            let place = format!("lab/hand.toml:{}: `{key}`: ", line(from));
+            assert!(message.starts_with(&place) && message.contains(found), "{message} // {place} {found}");
+        }
+    }
+
+    #[test]
+    fn without_a_tremor_the_hand_is_calm_and_firmness_has_a_name() {
+        let pen = builtin("pen-grip").unwrap();
+        let (start, end) = (pen.find("[tremor]").unwrap(), pen.find("[grip]").unwrap());
+        let calm = read(&format!("{}{}", &pen[..start], &pen[end..])).unwrap();
+        assert_eq!(calm.tremor.rms_m, Vector3::zeros());
+        for firmness in ALL {
+            assert_eq!(Firmness::from_name(firmness.name()), Some(firmness));
+        }
+        assert_eq!(Firmness::from_name("tight"), None);
     }
 }

@@ -121,3 +121,91 @@ fn cosine_and_sine(angle: f64) -> [f64; 2] {
     }
     [cosine, angle * sine]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CALM: TremorSpec = TremorSpec { rms_m: Vector3::new(5e-5, 3e-5, 2e-5), band_hz: [8.0, 12.0] };
+
+    /// Positions at 1 kHz after it has swollen.
+    fn samples(seed: u64, count: usize) -> Vec<Vector3<f64>> {
+        let mut tremor = Tremor::new(&CALM, seed);
+        (0..count + 1000).map(|_| tremor.step(1e-3)).skip(1000).collect()
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_bytes_on_every_platform_and_another_seed_others() {
+        let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+        for byte in samples(42, 10_000).iter().flatten().flat_map(|n| n.to_bits().to_le_bytes()) {
+            hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+        }
+        // FNV-1a of what this code gave when it was written; only sums, products, quotients and roots are in it.
+        assert_eq!(hash, 13_144_528_826_769_656_779);
+        assert_ne!(samples(42, 1), samples(43, 1));
+    }
+
+    #[test]
+    fn its_power_lies_in_the_band_and_its_amplitude_is_the_wanted_one() {
+        // 40 s at 1 kHz: bins of 1/40 Hz, coarse enough for a slow transform of the few that matter.
+        let samples = samples(1, 40_000);
+        for axis in 0..3 {
+            let square = samples.iter().map(|p| p[axis] * p[axis]).sum::<f64>() / samples.len() as f64;
+            // Sinusoids 0.57 Hz apart on average beat; over 40 s the mean square is off by some percent.
+            assert!((square.sqrt() / CALM.rms_m[axis] - 1.0).abs() < 0.05, "{axis}: {}", square.sqrt());
+            let in_band: f64 = (316..=484).map(|bin| power(&samples, axis, bin)).sum();
+            // 7.9 to 12.1 Hz; what a rectangular window of 40 s leaks beyond it is below 2 %.
+            assert!(in_band / square > 0.98, "{axis}: {}", in_band / square);
+            let lowest: f64 = (316..=400).map(|bin| power(&samples, axis, bin)).sum();
+            // Three of seven sinusoids lie below 10 Hz for certain, four with luck.
+            assert!((0.35..0.65).contains(&(lowest / square)), "{axis}: {}", lowest / square);
+        }
+    }
+
+    /// Mean square of one frequency, bins of 1/40 Hz.
+    fn power(samples: &[Vector3<f64>], axis: usize, bin: usize) -> f64 {
+        let turn = std::f64::consts::TAU * bin as f64 / samples.len() as f64;
+        let (mut c, mut s) = (0.0, 0.0);
+        for (index, p) in samples.iter().enumerate() {
+            let (sine, cosine) = (turn * index as f64).sin_cos();
+            (c, s) = (c + p[axis] * cosine, s + p[axis] * sine);
+        }
+        2.0 * (c * c + s * s) / (samples.len() as f64).powi(2)
+    }
+
+    #[test]
+    fn axes_tremble_independently() {
+        let samples = samples(3, 40_000);
+        for (a, b) in [(0, 1), (1, 2), (2, 0)] {
+            let product = samples.iter().map(|p| p[a] * p[b]).sum::<f64>() / samples.len() as f64;
+            // Pairs of sinusoids of 0.1 Hz apart or so are what is left after 40 s, some of 49.
+            assert!((product / (CALM.rms_m[a] * CALM.rms_m[b])).abs() < 0.15, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn it_swells_from_rest_and_neither_grows_nor_fades_in_hours() {
+        let mut tremor = Tremor::new(&CALM, 5);
+        // First tick: 1/500 of what it can be at most.
+        assert!(tremor.step(1e-3).norm() < 1e-3 * CALM.rms_m.norm() * (2.0 * WAVES as f64).sqrt() * 2.01);
+        for _ in 0..10_000_000 {
+            tremor.step(1e-3);
+        }
+        for wave in tremor.waves.iter().flatten() {
+            let [c, s] = wave.pointer;
+            assert!((c.hypot(s) - 1.0).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn a_changed_tick_goes_on_where_it_was_at_the_same_frequency() {
+        let (mut fast, mut slow) = (Tremor::new(&CALM, 9), Tremor::new(&CALM, 9));
+        for _ in 0..2000 {
+            fast.step(0.5e-3);
+            let halved = fast.step(0.5e-3);
+            let difference = (halved - slow.step(1e-3)).norm();
+            // 4000 products of one rounding each, of amplitudes of 50 um.
+            assert!(difference < 1e-16, "{difference}");
+        }
+    }
+}
