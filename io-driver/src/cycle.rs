@@ -14,13 +14,12 @@
 //! Cost: linear in the devices; no allocation, lock, system call (but a wake-up, if the commander sleeps) or
 //! panic.
 
-use crate::device::{Device, Effort, TickTime};
+use crate::device::{Device, Effort, Reading, TickTime};
 use crate::meter::{bump, record};
 use crate::reply::Reply;
 use crate::safety::switches::{Inputs, Switches};
 use crate::safety::{Guard, Limits, Safety};
 use bytemuck::Zeroable;
-use nalgebra::Vector3;
 use rt_core::clock::monotonic_ns;
 use shm_abi::frame::{LIMIT_HEAT, LIMIT_PEAK, LIMIT_SLEW, LIMIT_WORKSPACE};
 use shm_abi::layout::Counters;
@@ -239,11 +238,15 @@ impl Cycle {
                 Ok(reading) => {
                     reading.write_to(&mut self.frame.devices[index]);
                     all_valid &= reading.is_valid;
-                    self.watch_speed(index, time.tick, reading.position_m);
+                    self.watch_speed(index, time.tick, &reading);
                 }
                 Err(reason) => {
-                    // The last good position stays in the frame, marked as not to be trusted.
-                    self.frame.devices[index].flags = 0;
+                    // The last good position stays in the frame, marked as not to be trusted; nobody knows how
+                    // fast it changes.
+                    let frame = &mut self.frame.devices[index];
+                    frame.flags = 0;
+                    frame.velocity_m_per_s_estimated = [0.0; 3];
+                    frame.joint_velocity_rad_per_s_estimated = [0.0; 3];
                     all_valid = false;
                     self.fault(reason);
                 }
@@ -252,10 +255,8 @@ impl Cycle {
         all_valid
     }
 
-    fn watch_speed(&mut self, device: usize, tick: u64, position: Vector3<f64>) {
-        let observed = self.guards[device].observe(tick, position);
-        self.frame.devices[device].velocity_m_per_s_estimated = self.guards[device].velocity().into();
-        match observed {
+    fn watch_speed(&mut self, device: usize, tick: u64, reading: &Reading) {
+        match self.guards[device].observe(tick, reading.position_m, reading.velocity_m_per_s) {
             Ok(()) => {}
             // A hand may be as fast as it likes as long as no motor drives it.
             Err(FaultReason::Overspeed) if self.safety.is_released() => {}

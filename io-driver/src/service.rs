@@ -89,6 +89,9 @@ impl Service<'_> {
                 say(self.options, format_args!("emergency stop, asked for by process {pid}"));
                 self.post(Letter::EmergencyStop);
             }
+            ServerEvent::ZeroRequested { pid, devices } => {
+                say(self.options, format_args!("process {pid} asks to zero devices (bits {devices:#x})"));
+            }
             ServerEvent::Trouble { message } => say::say(format_args!("io-driver: {message}")),
             ServerEvent::StopRequested { pid } => return Some(format!("request of process {pid}")),
         }

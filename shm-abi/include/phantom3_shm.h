@@ -28,7 +28,7 @@
 #define PHANTOM_ABI_MAJOR 1
 
 // Raised when something is added that an old reader may ignore.
-#define PHANTOM_ABI_MINOR 1
+#define PHANTOM_ABI_MINOR 2
 
 // Both, the major in the upper half.
 #define PHANTOM_ABI_VERSION (((uint64_t)PHANTOM_ABI_MAJOR << 32) | (uint64_t)PHANTOM_ABI_MINOR)
@@ -68,6 +68,9 @@
 
 // [`DeviceFrame::flags`]: the position is valid.
 #define PHANTOM_DEVICE_POSITION_VALID 1
+
+// [`DeviceFrame::flags`]: since 1.2. An instrumented gimbal measures the orientation.
+#define PHANTOM_DEVICE_ORIENTATION_MEASURED 2
 
 // [`Frame::inputs`]: an emergency stop is pressed.
 #define PHANTOM_INPUT_EMERGENCY_STOP 1
@@ -195,6 +198,9 @@ enum PhantomRequestKind
   PHANTOM_REQUEST_KIND_CLEAR_FAULT = 4,
   // Since 1.1. That all motors are switched off at once and stay so until the fault is cleared.
   PHANTOM_REQUEST_KIND_EMERGENCY_STOP = 5,
+  // Since 1.2. That devices are taken to be in their home pose, in which they lie now; see
+  // [`Request::devices`].
+  PHANTOM_REQUEST_KIND_ZERO = 6,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -482,7 +488,7 @@ typedef struct PhantomOutcome {
 
 // One device in a [`Frame`].
 typedef struct PhantomDeviceFrame {
-  // Bit 0: the position is valid.
+  // Bits of `DEVICE_...`: bit 0, the position is valid; since 1.2 bit 1, the orientation is measured.
   uint64_t flags;
   // Bit `i`: button `i` is pressed.
   uint64_t buttons;
@@ -500,14 +506,17 @@ typedef struct PhantomDeviceFrame {
   double force_on_user_n_applied[3];
   // The motor values written in the tick before, as the hardware got them.
   int64_t motor_codes[3];
-  // Since 1.1. How fast the tip moves, in D (m/s), estimated from the positions.
+  // Since 1.1. How fast the tip moves, in D (m/s), estimated from the positions; since 1.2 from the counts.
   double velocity_m_per_s_estimated[3];
   // Since 1.1. Bits of `LIMIT_...`: what came between commanded and applied force in the tick before.
   uint64_t limits;
   // Since 1.1. Warmth of the warmest motor: 1 is what its continuous current would reach.
   double motor_heat;
+  // Since 1.2. How fast each actuated joint turns (rad/s), estimated from its counts; m/s where the device has
+  // metres for joint angles.
+  double joint_velocity_rad_per_s_estimated[3];
   // Room for later minor versions; zero.
-  uint64_t reserved[5];
+  uint64_t reserved[2];
 } PhantomDeviceFrame;
 
 // One tick of the driver, all devices.
@@ -572,8 +581,10 @@ typedef struct PhantomRequest {
   uint64_t kind;
   // Who asks: UTF-8, padded with zeros.
   uint8_t name[PHANTOM_NAME_BYTES];
+  // Since 1.2. Bit `i`: device `i` is meant; 0: all are. Only [`RequestKind::Zero`] looks at it.
+  uint64_t devices;
   // Zero.
-  uint64_t reserved[4];
+  uint64_t reserved[3];
 } PhantomRequest;
 
 // What the driver says to it.
@@ -752,7 +763,8 @@ PHANTOM_ASSERT(offsetof(PhantomDeviceFrame, motor_codes) == 216);
 PHANTOM_ASSERT(offsetof(PhantomDeviceFrame, velocity_m_per_s_estimated) == 240);
 PHANTOM_ASSERT(offsetof(PhantomDeviceFrame, limits) == 264);
 PHANTOM_ASSERT(offsetof(PhantomDeviceFrame, motor_heat) == 272);
-PHANTOM_ASSERT(offsetof(PhantomDeviceFrame, reserved) == 280);
+PHANTOM_ASSERT(offsetof(PhantomDeviceFrame, joint_velocity_rad_per_s_estimated) == 280);
+PHANTOM_ASSERT(offsetof(PhantomDeviceFrame, reserved) == 304);
 
 PHANTOM_ASSERT(sizeof(PhantomCommand) == 288);
 PHANTOM_ASSERT(offsetof(PhantomCommand, tick) == 0);
@@ -771,7 +783,8 @@ PHANTOM_ASSERT(offsetof(PhantomRequest, abi_version) == 8);
 PHANTOM_ASSERT(offsetof(PhantomRequest, layout_hash) == 16);
 PHANTOM_ASSERT(offsetof(PhantomRequest, kind) == 24);
 PHANTOM_ASSERT(offsetof(PhantomRequest, name) == 32);
-PHANTOM_ASSERT(offsetof(PhantomRequest, reserved) == 96);
+PHANTOM_ASSERT(offsetof(PhantomRequest, devices) == 96);
+PHANTOM_ASSERT(offsetof(PhantomRequest, reserved) == 104);
 
 PHANTOM_ASSERT(sizeof(PhantomAnswer) == 192);
 PHANTOM_ASSERT(offsetof(PhantomAnswer, magic) == 0);

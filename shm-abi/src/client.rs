@@ -128,6 +128,19 @@ pub enum AttachError {
         /// How long.
         seconds: u64,
     },
+    /// It is too old for what was asked.
+    #[error(
+        "the driver speaks version {found} of the shared-memory contract and does not know requests of kind \
+         {kind}, this program speaks {expected}; start the driver that belongs to this program"
+    )]
+    UnknownRequest {
+        /// The driver's version.
+        found: String,
+        /// The request's kind, as a number.
+        kind: u64,
+        /// Our version.
+        expected: String,
+    },
     /// It refused for a reason of its own.
     #[error("the driver refused: {0}")]
     Refused(String),
@@ -169,6 +182,17 @@ pub fn clear_fault(socket: &Path, name: &str) -> Result<(), AttachError> {
 /// Asks the driver to switch all motors off at once. They stay off until [`clear_fault`].
 pub fn emergency_stop(socket: &Path, name: &str) -> Result<(), AttachError> {
     exchange(socket, &Request::new(RequestKind::EmergencyStop, name)).map(|_| ())
+}
+
+/// Tells the driver that devices lie in their home pose now: bit `i` of `devices` means device `i`, 0 all of
+/// them.
+///
+/// # Errors
+/// [`AttachError::UnknownRequest`] from a driver of before 1.2, and whatever else may go wrong on the way. That it
+/// was heard does not say that it was done: the driver's state and the devices' flags tell.
+pub fn zero(socket: &Path, name: &str, devices: u64) -> Result<(), AttachError> {
+    let request = Request { devices, ..Request::new(RequestKind::Zero, name) };
+    exchange(socket, &request).map(|_| ())
 }
 
 /// Attaches with a request of any content; what [`observe`] and [`command`] do, and tests that lie.
@@ -228,6 +252,9 @@ fn judge(socket: &Path, request: &Request, answer: &Answer) -> Result<(), Attach
         }
         Some(Verdict::NoSegment) => {
             Err(AttachError::Refused("it could not create shared memory; see its log for the cause".into()))
+        }
+        Some(Verdict::UnknownKind) => {
+            Err(AttachError::UnknownRequest { found, kind: request.kind, expected })
         }
         Some(other) => Err(AttachError::Refused(format!("it did not understand the request ({other:?})"))),
         None => Err(AttachError::Refused(format!("it gave the unknown verdict {}", answer.verdict))),

@@ -81,7 +81,7 @@ assert_layout!(Outcome: 40, 8 {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct DeviceFrame {
-    /// Bit 0: the position is valid.
+    /// Bits of `DEVICE_...`: bit 0, the position is valid; since 1.2 bit 1, the orientation is measured.
     pub flags: u64,
     /// Bit `i`: button `i` is pressed.
     pub buttons: u64,
@@ -99,14 +99,17 @@ pub struct DeviceFrame {
     pub force_on_user_n_applied: [f64; 3],
     /// The motor values written in the tick before, as the hardware got them.
     pub motor_codes: [i64; 3],
-    /// Since 1.1. How fast the tip moves, in D (m/s), estimated from the positions.
+    /// Since 1.1. How fast the tip moves, in D (m/s), estimated from the positions; since 1.2 from the counts.
     pub velocity_m_per_s_estimated: [f64; 3],
     /// Since 1.1. Bits of `LIMIT_...`: what came between commanded and applied force in the tick before.
     pub limits: u64,
     /// Since 1.1. Warmth of the warmest motor: 1 is what its continuous current would reach.
     pub motor_heat: f64,
+    /// Since 1.2. How fast each actuated joint turns (rad/s), estimated from its counts; m/s where the device has
+    /// metres for joint angles.
+    pub joint_velocity_rad_per_s_estimated: [f64; 3],
     /// Room for later minor versions; zero.
-    pub reserved: [u64; 5],
+    pub reserved: [u64; 2],
 }
 
 assert_layout!(DeviceFrame: 320, 8 {
@@ -123,12 +126,15 @@ assert_layout!(DeviceFrame: 320, 8 {
         velocity_m_per_s_estimated: [f64; 3] = 240,
         limits: u64 = 264,
         motor_heat: f64 = 272,
-        reserved: [u64; 5] = 280,
+        joint_velocity_rad_per_s_estimated: [f64; 3] = 280,
+        reserved: [u64; 2] = 304,
     },
 });
 
 /// [`DeviceFrame::flags`]: the position is valid.
 pub const DEVICE_POSITION_VALID: u64 = 1;
+/// [`DeviceFrame::flags`]: since 1.2. An instrumented gimbal measures the orientation.
+pub const DEVICE_ORIENTATION_MEASURED: u64 = 2;
 
 /// [`Frame::inputs`]: an emergency stop is pressed.
 pub const INPUT_EMERGENCY_STOP: u64 = 1;

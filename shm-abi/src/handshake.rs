@@ -26,8 +26,10 @@ pub struct Request {
     pub kind: u64,
     /// Who asks: UTF-8, padded with zeros.
     pub name: [u8; NAME_BYTES],
+    /// Since 1.2. Bit `i`: device `i` is meant; 0: all are. Only [`RequestKind::Zero`] looks at it.
+    pub devices: u64,
     /// Zero.
-    pub reserved: [u64; 4],
+    pub reserved: [u64; 3],
 }
 
 assert_layout!(Request: 128, 8 {
@@ -36,7 +38,10 @@ assert_layout!(Request: 128, 8 {
     layout_hash: u64 = 16,
     kind: u64 = 24,
     name: [u8; NAME_BYTES] = 32,
-    reserved: [u64; 4] = 96,
+    reserved: [u64; 4] = 96 => {
+        devices: u64 = 96,
+        reserved: [u64; 3] = 104,
+    },
 });
 
 /// What the driver says to it.
@@ -95,9 +100,12 @@ pub enum RequestKind {
     ClearFault = 4,
     /// Since 1.1. That all motors are switched off at once and stay so until the fault is cleared.
     EmergencyStop = 5,
+    /// Since 1.2. That devices are taken to be in their home pose, in which they lie now; see
+    /// [`Request::devices`].
+    Zero = 6,
 }
 
-from_word!(RequestKind { Observe, Command, Stop, ClearFault, EmergencyStop });
+from_word!(RequestKind { Observe, Command, Stop, ClearFault, EmergencyStop, Zero });
 
 /// How the driver decided.
 #[repr(u64)]
@@ -142,7 +150,8 @@ impl Request {
             layout_hash: LAYOUT_HASH,
             kind,
             name: name_bytes(name),
-            reserved: [0; 4],
+            devices: 0,
+            reserved: [0; 3],
         }
     }
 

@@ -16,7 +16,7 @@ pub const MAGIC: u64 = 0x334D_4F54_4E41_4850;
 /// Raised when an old reader would misread.
 pub const ABI_MAJOR: u32 = 1;
 /// Raised when something is added that an old reader may ignore.
-pub const ABI_MINOR: u32 = 1;
+pub const ABI_MINOR: u32 = 2;
 /// Both, the major in the upper half.
 pub const ABI_VERSION: u64 = ((ABI_MAJOR as u64) << 32) | ABI_MINOR as u64;
 

@@ -68,6 +68,13 @@ pub enum ServerEvent {
         /// Who.
         pid: u64,
     },
+    /// Somebody says that devices lie in their home pose now.
+    ZeroRequested {
+        /// Who.
+        pid: u64,
+        /// Bit `i`: device `i` does; 0: all do.
+        devices: u64,
+    },
     /// A segment for a lease could not be made.
     Trouble {
         /// Why.
@@ -288,6 +295,10 @@ impl Server {
             }
             RequestKind::EmergencyStop => {
                 events.push(ServerEvent::EmergencyStopRequested { pid });
+                self.answer(index, &Answer::new(Verdict::Granted), &[])
+            }
+            RequestKind::Zero => {
+                events.push(ServerEvent::ZeroRequested { pid, devices: request.devices });
                 self.answer(index, &Answer::new(Verdict::Granted), &[])
             }
         }

@@ -29,7 +29,7 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 
 /// Every version of the major one in force, with its minor number.
-const VERSIONS: [(&str, u32); 2] = [("1.0", 0), ("1.1", 1)];
+const VERSIONS: [(&str, u32); 3] = [("1.0", 0), ("1.1", 1), ("1.2", 2)];
 
 fn blesses() -> bool {
     std::env::var_os("PHANTOM3_BLESS").is_some()
@@ -107,7 +107,8 @@ fn device_frame(minor: u32, first: usize) -> DeviceFrame {
         velocity_m_per_s_estimated: if minor >= 1 { reals(first + 30) } else { [0.0; 3] },
         limits: if minor >= 1 { count(n + 33) } else { 0 },
         motor_heat: if minor >= 1 { real(first + 34) } else { 0.0 },
-        reserved: [0; 5],
+        joint_velocity_rad_per_s_estimated: if minor >= 2 { reals(first + 35) } else { [0.0; 3] },
+        reserved: [0; 2],
     }
 }
 
@@ -129,7 +130,8 @@ fn request(minor: u32) -> Request {
         layout_hash: LAYOUT_HASH,
         kind: RequestKind::Command as u64,
         name: name_bytes(NAME),
-        reserved: [0; 4],
+        devices: if minor >= 2 { count(13) } else { 0 },
+        reserved: [0; 3],
     }
 }
 
@@ -262,6 +264,7 @@ fn no_two_values_of_an_enumeration_and_no_two_bits_of_a_word_of_flags_are_the_sa
         "CLOCK_MODE_",
         "WAIT_MODE_",
         "INPUT_",
+        "DEVICE_",
         "LIMIT_",
     ] {
         let prefix = format!("PHANTOM_{prefix}");

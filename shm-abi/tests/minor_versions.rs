@@ -11,7 +11,8 @@ use common::c_header::{CHeader, current_version};
 use common::fake::{fake_server, hear, send};
 use common::golden::Golden;
 use common::host::Host;
-use common::{HANG, directory, info_of, wait_until};
+use common::{HANG, directory, info_of, own_pid, wait_until};
+use shm_abi::handshake::{Answer, Verdict};
 use shm_abi::segment::DriverInfo;
 use shm_abi::server::ServerEvent;
 use shm_abi::{
@@ -24,7 +25,8 @@ use std::path::Path;
 use std::process::{Child, Stdio};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-const OLD: &str = "1.0";
+/// The versions before the one in force.
+const OLDER: [&str; 2] = ["1.0", "1.1"];
 /// The tick in the golden frame.
 const TICK: u64 = 1001;
 
@@ -138,23 +140,32 @@ fn golden_host(directory: &Path) -> Host {
 }
 
 #[test]
-fn an_observer_built_with_the_headers_of_1_0_reads_every_field_it_knows_from_a_driver_of_today() {
-    let directory = directory();
-    let Some(program) = reader_of(OLD, directory.path()) else { return };
-    let host = golden_host(directory.path());
-    let printed = printed(start(&program, &host.socket, &["observe", &TICK.to_string()]));
-    assert!(printed.starts_with("built for 1.0\n"), "{printed}");
-    assert_read(&printed, OLD, &current_version());
-    // A reason that 1.0 does not list: a fault it is all the same.
-    assert!(printed.contains(&format!("PhantomFrame.state = {}\n", DriverState::Fault as u64)));
-    assert!(printed.ends_with(&format!("a fault of kind {}\n", FaultReason::Overrun as u64)), "{printed}");
+fn an_observer_built_with_older_headers_reads_every_field_it_knows_from_a_driver_of_today() {
+    for old in OLDER {
+        let directory = directory();
+        let Some(program) = reader_of(old, directory.path()) else { return };
+        let host = golden_host(directory.path());
+        let printed = printed(start(&program, &host.socket, &["observe", &TICK.to_string()]));
+        assert!(printed.starts_with(&format!("built for {old}\n")), "{printed}");
+        assert_read(&printed, old, &current_version());
+        // A reason that 1.0 does not list: a fault it is all the same.
+        assert!(printed.contains(&format!("PhantomFrame.state = {}\n", DriverState::Fault as u64)));
+        assert!(
+            printed.ends_with(&format!("a fault of kind {}\n", FaultReason::Overrun as u64)),
+            "{printed}"
+        );
+    }
 }
 
 #[test]
-fn a_commander_built_with_the_headers_of_1_0_gets_the_lease_and_its_commands_are_believed() {
+fn a_commander_built_with_older_headers_gets_the_lease_and_its_commands_are_believed() {
+    OLDER.iter().for_each(|old| command_as(old));
+}
+
+fn command_as(old: &str) {
     const COUNT: u64 = 50;
     let directory = directory();
-    let Some(program) = reader_of(OLD, directory.path()) else { return };
+    let Some(program) = reader_of(old, directory.path()) else { return };
     let host = golden_host(directory.path());
     let child = start(&program, &host.socket, &["command", &TICK.to_string(), &COUNT.to_string()]);
     let ServerEvent::LeaseGranted { view, name, .. } = host.event() else { panic!("no lease") };
@@ -166,7 +177,7 @@ fn a_commander_built_with_the_headers_of_1_0_gets_the_lease_and_its_commands_are
         assert_answer(&view, &host.memory, &frame);
     }
     drop(host);
-    assert!(printed(child).starts_with("built for 1.0\n"));
+    assert!(printed(child).starts_with(&format!("built for {old}\n")));
 }
 
 /// Waits for the answer to `frame`; it must be believed and command the position as force.
@@ -186,19 +197,20 @@ fn assert_answer(view: &CommanderView, memory: &DriverMemory, frame: &Frame) {
     }
 }
 
-/// The two segments of a driver of 1.0, forged.
+/// The two segments of a driver of an older version, forged.
 struct OldDriver {
+    version: &'static str,
     header: CHeader,
     driver: File,
     commander: File,
 }
 
 impl OldDriver {
-    fn forge() -> Self {
-        let header = CHeader::of(OLD);
+    fn forge(version: &'static str) -> Self {
+        let header = CHeader::of(version);
         let driver = memfd(header.size_of("PhantomDriverSegment"));
         let at = |field| header.offset_of("PhantomDriverSegment", field) as u64;
-        let golden = |structure| Golden::committed(OLD, structure).bytes;
+        let golden = |structure| Golden::committed(version, structure).bytes;
         let put = |offset: u64, bytes: &[u8]| driver.write_all_at(bytes, offset).unwrap();
         put(at("header"), &golden("PhantomDriverHeader"));
         put(at("counters"), &golden("PhantomCounters"));
@@ -220,8 +232,11 @@ impl OldDriver {
         );
         let commander = memfd(header.size_of("PhantomCommanderSegment"));
         let answer = golden("PhantomAnswer");
-        let words =
-            [("magic", shm_abi::layout::MAGIC), ("abi_version", 1 << 32), ("layout_hash", LAYOUT_HASH)];
+        let words = [
+            ("magic", shm_abi::layout::MAGIC),
+            ("abi_version", (1 << 32) | minor_of(version)),
+            ("layout_hash", LAYOUT_HASH),
+        ];
         for (field, word) in words {
             let offset = header.offset_of("PhantomCommanderHeader", field) as u64;
             commander.write_all_at(&word.to_le_bytes(), offset).unwrap();
@@ -229,15 +244,15 @@ impl OldDriver {
         let lease = header.offset_of("PhantomAnswer", "lease");
         let offset = header.offset_of("PhantomCommanderHeader", "lease") as u64;
         commander.write_all_at(&answer[lease..lease + 8], offset).unwrap();
-        Self { header, driver, commander }
+        Self { version, header, driver, commander }
     }
 
     /// Hands both segments to so many clients, whatever they ask for.
     fn serve(&self, socket: &Path, clients: usize) -> std::thread::JoinHandle<()> {
         let (driver, commander) = (self.driver.try_clone().unwrap(), self.commander.try_clone().unwrap());
+        let answer = Golden::committed(self.version, "PhantomAnswer").bytes;
         fake_server(socket, clients, move |mut stream| {
             hear(&mut stream);
-            let answer = Golden::committed(OLD, "PhantomAnswer").bytes;
             send(&stream, &answer, &[driver.as_fd(), commander.as_fd()]);
         })
     }
@@ -257,6 +272,10 @@ impl OldDriver {
     }
 }
 
+fn minor_of(version: &str) -> u64 {
+    version.split_once('.').unwrap().1.parse().unwrap()
+}
+
 fn memfd(bytes: usize) -> File {
     use rustix::fs::{MemfdFlags, SealFlags};
     let flags = MemfdFlags::CLOEXEC | MemfdFlags::ALLOW_SEALING;
@@ -267,31 +286,41 @@ fn memfd(bytes: usize) -> File {
 }
 
 #[test]
-fn a_rust_client_of_today_reads_sensible_values_from_a_driver_of_1_0_and_commands_it() {
+fn a_rust_client_of_today_reads_sensible_values_from_an_older_driver_and_commands_it() {
+    OLDER.into_iter().for_each(command_older);
+}
+
+fn command_older(version: &'static str) {
     let directory = directory();
     let socket = directory.path().join("driver.sock");
-    let old = OldDriver::forge();
+    let old = OldDriver::forge(version);
     let serving = old.serve(&socket, 1);
     let attached = client::command(&socket, "today").unwrap();
     serving.join().unwrap();
 
-    assert_eq!(attached.driver.abi_minor(), 0);
+    let minor = minor_of(version);
+    assert_eq!(u64::from(attached.driver.abi_minor()), minor);
+    let is_first = minor == 0;
     let DriverInfo { devices, is_commissioning, period_ns, .. } = attached.driver.info();
-    assert_eq!((devices.len(), period_ns, is_commissioning), (MAX_DEVICES, 1006, false));
+    assert_eq!((devices.len(), period_ns, is_commissioning), (MAX_DEVICES, 1006, !is_first));
     for device in &devices {
         assert_eq!((device.name.as_str(), device.peak_force_n), ("golden", 11.5));
-        assert_eq!((device.slew_n_per_s, device.speed_limit_m_per_s), (f64::INFINITY, f64::INFINITY));
+        assert_eq!(device.slew_n_per_s.is_infinite(), is_first, "not told");
+        assert_eq!(device.speed_limit_m_per_s.is_infinite(), is_first, "not told");
     }
     let frame = attached.driver.read_latest().unwrap();
-    assert_eq!(frame, golden_frame(OLD));
-    assert_eq!(frame.inputs, 0, "no switches");
-    assert_eq!(FaultReason::from_word(frame.fault), Some(FaultReason::Panic));
+    assert_eq!(frame, golden_frame(version));
+    assert_eq!(frame.inputs == 0, is_first, "no switches");
+    let fault = if is_first { FaultReason::Panic } else { FaultReason::Overrun };
+    assert_eq!(FaultReason::from_word(frame.fault), Some(fault));
     for device in frame.present_devices() {
         let absent = (device.velocity_m_per_s_estimated, device.limits, device.motor_heat);
-        assert_eq!(absent, ([0.0; 3], 0, 0.0));
+        assert_eq!(absent == ([0.0; 3], 0, 0.0), is_first);
+        assert_eq!(device.joint_velocity_rad_per_s_estimated, [0.0; 3], "since 1.2");
     }
     let commander = attached.commander.unwrap();
-    let mut command: Command = bytemuck::pod_read_unaligned(&Golden::committed(OLD, "PhantomCommand").bytes);
+    let mut command: Command =
+        bytemuck::pod_read_unaligned(&Golden::committed(version, "PhantomCommand").bytes);
     command.tick = TICK;
     command.lease = commander.lease();
     commander.publish(&command, &attached.driver);
@@ -300,21 +329,55 @@ fn a_rust_client_of_today_reads_sensible_values_from_a_driver_of_1_0_and_command
 }
 
 #[test]
-fn a_c_client_of_today_reads_zero_where_a_driver_of_1_0_says_nothing_and_commands_it() {
+fn a_c_client_of_today_reads_zero_where_an_older_driver_says_nothing_and_commands_it() {
+    OLDER.into_iter().for_each(command_older_from_c);
+}
+
+fn command_older_from_c(version: &'static str) {
     let directory = directory();
     let Some(program) = reader_of(&current_version(), directory.path()) else { return };
     let socket = directory.path().join("driver.sock");
-    let old = OldDriver::forge();
+    let old = OldDriver::forge(version);
     // This server hangs up at once, so that a commander ends by itself.
     let serving = old.serve(&socket, 2);
     let printed_by = |what: &str| printed(start(&program, &socket, &[what, &TICK.to_string()]));
     let observed = printed_by("observe");
     assert!(observed.starts_with(&format!("built for {}\n", current_version())));
-    assert_read(&observed, &current_version(), OLD);
-    assert!(observed.contains("PhantomFrame.inputs = 0\n"));
-    assert_read(&printed_by("command"), &current_version(), OLD);
+    assert_read(&observed, &current_version(), version);
+    assert!(observed.contains("PhantomFrame.devices[0].joint_velocity_rad_per_s_estimated[0] = 0\n"));
+    assert_read(&printed_by("command"), &current_version(), version);
     serving.join().unwrap();
     let command: Command = bytemuck::pod_read_unaligned(&old.command(TICK));
     assert_eq!(command.validate(TICK, 1007, MAX_DEVICES as u64), Ok(()));
-    assert_eq!(command.devices[7].force_on_user_n, golden_frame(OLD).devices[7].position_m_measured);
+    assert_eq!(command.devices[7].force_on_user_n, golden_frame(version).devices[7].position_m_measured);
+}
+
+#[test]
+fn asking_a_driver_of_before_1_2_to_zero_is_refused_with_both_versions() {
+    let directory = directory();
+    let socket = directory.path().join("driver.sock");
+    let serving = fake_server(&socket, 1, |mut stream| {
+        hear(&mut stream);
+        let abi_version = (1 << 32) | 1;
+        let answer = Answer { abi_version, ..Answer::new(Verdict::UnknownKind) };
+        send(&stream, bytemuck::bytes_of(&answer), &[]);
+    });
+    let refusal = client::zero(&socket, "today", 0).unwrap_err();
+    serving.join().unwrap();
+    assert_eq!(
+        refusal.to_string(),
+        "the driver speaks version 1.1 of the shared-memory contract and does not know requests of kind 6, this \
+         program speaks 1.2; start the driver that belongs to this program"
+    );
+}
+
+#[test]
+fn a_request_to_zero_names_its_devices_and_who_asks() {
+    let directory = directory();
+    let host = Host::start(directory.path());
+    for mask in [0, 0b101] {
+        client::zero(&host.socket, "today", mask).unwrap();
+        let ServerEvent::ZeroRequested { pid, devices } = host.event() else { panic!("not heard") };
+        assert_eq!((pid, devices), (own_pid(), mask));
+    }
 }

@@ -1,6 +1,7 @@
 //! What every arm with counters and motors has in common, whatever carries its registers.
 //!
-//! Model: raw counters, extended beyond their width, become joint angles and the tip; a force becomes codes.
+//! Model: raw counters, extended beyond their width, become joint angles and the tip, and their changes its velocity,
+//! `J q'` with each joint's velocity estimated from its own counts; a force becomes codes.
 //! Invariant: `read` comes before `render` in a tick; codes are for the pose that was read last.
 
 use super::{Effort, Reading, TickTime, Written};
@@ -8,6 +9,8 @@ use crate::device_file::ArmFile;
 use crate::drive::Drive;
 use crate::encoders::{EncoderExtender, JointMap};
 use crate::kinematics::{Kinematics, Mechanism};
+use crate::velocity::VelocityEstimator;
+use nalgebra::Vector3;
 use shm_abi::FaultReason;
 
 /// An arm.
@@ -15,6 +18,7 @@ use shm_abi::FaultReason;
 pub struct Arm {
     extender: EncoderExtender,
     map: JointMap,
+    velocity: VelocityEstimator,
     kinematics: Kinematics,
     drive: Drive,
     joints: [f64; 3],
@@ -31,6 +35,7 @@ impl Arm {
         Self {
             extender: EncoderExtender::new(premium.encoders.count_bits),
             map: JointMap::new(&premium.encoders),
+            velocity: VelocityEstimator::of_counts(),
             kinematics,
             drive: Drive::new(kinematics, &premium.motors, premium.heat, gravity),
             joints: premium.encoders.home_joint_angles_rad,
@@ -56,10 +61,25 @@ impl Arm {
             }
         }
         self.joints = self.map.counts_to_angles(counts);
+        let rates = self.joint_rates(counts, time);
         let mut reading = Reading::at(self.kinematics.forward(self.joints));
+        reading.velocity_m_per_s = self.kinematics.jacobian(self.joints) * Vector3::from(rates);
+        reading.joint_velocity_rad_per_s = rates;
         reading.encoder_counts[..3].copy_from_slice(&counts);
         reading.joint_angle_rad[..3].copy_from_slice(&self.joints);
         reading
+    }
+
+    /// Of the counts, so that zeroing moves nothing.
+    fn joint_rates(&mut self, counts: [i64; 3], time: TickTime) -> [f64; 3] {
+        let counts_per_s = self.velocity.observe(time, counts.map(|count| count as f64));
+        let rad_per_count = self.map.rad_per_count();
+        std::array::from_fn(|j| rad_per_count[j] * counts_per_s[j])
+    }
+
+    /// What was read so far says nothing about how fast it moves.
+    pub fn forget_motion(&mut self) {
+        self.velocity.forget();
     }
 
     /// Codes for an effort in the pose that was read.

@@ -5,11 +5,12 @@
 //!
 //! Model: the tip is where the hand script, which is written in the world frame W, has the finger at the
 //! time since full authority; before that it rests at the script's start. Without a script it rests at a
-//! fixed point. X_WD says where the base stands, as it would for a real device. What the script says of the
-//! fingertip's orientation and of buttons goes through as well.
+//! fixed point. Its velocity is the plain difference of two ticks, to the last bit. X_WD says where the base stands, as
+//! it would for a real device. What the script says of the fingertip's orientation and of buttons goes through as well.
 
 use super::{Device, Effort, Reading, TickTime, Written};
 use crate::sim::script::HandPlayer;
+use crate::velocity::VelocityEstimator;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use shm_abi::FaultReason;
 use shm_abi::segment::DeviceInfo;
@@ -30,13 +31,14 @@ pub struct IdealDevice {
     /// Takes points of W to D; `None` leaves them bit for bit as they are.
     world_to_base: Option<Isometry3<f64>>,
     hand: Hand,
+    velocity: VelocityEstimator,
 }
 
 impl IdealDevice {
     /// A device whose base stands at X_WD.
     pub fn new(info: DeviceInfo, base_in_world: Isometry3<f64>, hand: Hand) -> Self {
         let world_to_base = (base_in_world != Isometry3::identity()).then(|| base_in_world.inverse());
-        Self { info, world_to_base, hand }
+        Self { info, world_to_base, hand, velocity: VelocityEstimator::of_exact_places() }
     }
 }
 
@@ -58,7 +60,8 @@ impl Device for IdealDevice {
             Some(transform) => (transform * Point3::from(in_world)).coords,
             None => in_world,
         };
-        let mut reading = Reading::at(in_base);
+        let velocity_m_per_s = self.velocity.observe(time, in_base.into()).into();
+        let mut reading = Reading { velocity_m_per_s, ..Reading::at(in_base) };
         if let Hand::Scripted(player, finger) = &mut self.hand {
             reading.buttons = u64::from(player.buttons(*finger, time_s).unwrap_or(0));
             if let Some(turn) = player.orientation(*finger, time_s) {
@@ -76,6 +79,10 @@ impl Device for IdealDevice {
     }
 
     fn release(&mut self) {}
+
+    fn rearm(&mut self) {
+        self.velocity.forget();
+    }
 }
 
 fn wxyz(turn: &UnitQuaternion<f64>) -> [f64; 4] {

@@ -46,25 +46,31 @@ pub struct Reading {
     pub is_valid: bool,
     /// The tip (m).
     pub position_m: Vector3<f64>,
+    /// How fast the tip moves (m/s), estimated.
+    pub velocity_m_per_s: Vector3<f64>,
     /// The gimbal's last link, w x y z; identity where there is none.
     pub orientation_wxyz: [f64; 4],
     /// Encoder counts, extended: three joints, three gimbal axes.
     pub encoder_counts: [i64; 6],
     /// Joint angles in the same order (rad).
     pub joint_angle_rad: [f64; 6],
+    /// How fast the three joints turn (rad/s), estimated; zero where there are none.
+    pub joint_velocity_rad_per_s: [f64; 3],
     /// Bit `i`: button `i` is pressed.
     pub buttons: u64,
 }
 
 impl Reading {
-    /// A valid reading of a position and nothing else.
+    /// A valid reading of a position at rest and nothing else.
     pub fn at(position_m: Vector3<f64>) -> Self {
         Self {
             is_valid: true,
             position_m,
+            velocity_m_per_s: Vector3::zeros(),
             orientation_wxyz: [1.0, 0.0, 0.0, 0.0],
             encoder_counts: [0; 6],
             joint_angle_rad: [0.0; 6],
+            joint_velocity_rad_per_s: [0.0; 3],
             buttons: 0,
         }
     }
@@ -75,6 +81,8 @@ impl Reading {
             .iter()
             .chain(&self.orientation_wxyz)
             .chain(&self.joint_angle_rad)
+            .chain(&self.velocity_m_per_s)
+            .chain(&self.joint_velocity_rad_per_s)
             .all(|n| n.is_finite())
     }
 
@@ -85,6 +93,8 @@ impl Reading {
         frame.encoder_counts = self.encoder_counts;
         frame.joint_angle_rad = self.joint_angle_rad;
         frame.position_m_measured = self.position_m.into();
+        frame.velocity_m_per_s_estimated = self.velocity_m_per_s.into();
+        frame.joint_velocity_rad_per_s_estimated = self.joint_velocity_rad_per_s;
         frame.orientation_wxyz_measured = self.orientation_wxyz;
     }
 }

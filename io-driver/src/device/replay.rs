@@ -44,4 +44,8 @@ impl Device for ReplayDevice {
     fn release(&mut self) {
         self.arm.release();
     }
+
+    fn rearm(&mut self) {
+        self.arm.forget_motion();
+    }
 }

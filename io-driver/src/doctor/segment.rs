@@ -116,9 +116,11 @@ fn socket(_: &Machine<'_>, _: &str, answer: &Answer) -> Judged {
     Ok(match answer {
         Ok(pid) => Judgement::pass(format!("driver, process {pid}, answers")),
         Err(AttachError::NoDriver { .. }) => Judgement::pass("no driver is running"),
-        Err(AttachError::WrongVersion { .. } | AttachError::WrongLayout { .. }) => {
-            Judgement::pass("a driver answers")
-        }
+        Err(
+            AttachError::WrongVersion { .. }
+            | AttachError::WrongLayout { .. }
+            | AttachError::UnknownRequest { .. },
+        ) => Judgement::pass("a driver answers"),
         Err(AttachError::DriverGone { socket }) => {
             let text = "start the driver again: it replaces the socket";
             let step =

@@ -122,6 +122,9 @@ fn letter_of(event: ServerEvent) -> Option<Letter> {
         ServerEvent::LeaseEnded { lease } => Some(Letter::End(lease)),
         ServerEvent::EmergencyStopRequested { .. } => Some(Letter::EmergencyStop),
         ServerEvent::ClearFaultRequested => Some(Letter::ClearFault),
-        ServerEvent::LeaseRefused | ServerEvent::StopRequested { .. } | ServerEvent::Trouble { .. } => None,
+        ServerEvent::LeaseRefused
+        | ServerEvent::StopRequested { .. }
+        | ServerEvent::ZeroRequested { .. }
+        | ServerEvent::Trouble { .. } => None,
     }
 }
