@@ -7,6 +7,7 @@ use crate::recording::Names;
 use haptics::{Entity, Finger, Friction, ParameterError, Plane, Shape, Sphere};
 use io_driver::config::{
     Backend, DeviceConfig, DriverConfig, ProcessConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig,
+    Zeroing,
 };
 use io_driver::sim::script::{HandError, HandScript};
 use shm_abi::segment::ClockMode;
@@ -179,6 +180,7 @@ impl Rig {
             },
             peak_force_n: None,
             compensates_gravity: false,
+            zeroing: Zeroing::AtStart,
         }
     }
 

@@ -3,7 +3,7 @@
 //! Problem: individual devices differ by up to a fifth, wiring is not public, and a changed cable
 //! must not need a compiler.
 //! Model: `kind` says which tables the file has. A `premium` has `[linkage]`, `[encoders]`,
-//! `[motors]` and, if gravity is to be compensated, `[bodies]`; an `ideal` device has nothing. What a simulation needs beyond these gets a table
+//! `[motors]` if gravity is to be compensated `[bodies]`, and with an instrumented gimbal `[gimbal]`; an `ideal` device has nothing. What a simulation needs beyond these gets a table
 //! of its own.
 //! Units: each key carries its own.
 //! Invariants: a value of type [`DeviceFile`] has been checked: all numbers are finite and in
@@ -24,6 +24,7 @@ use crate::kinematics::{Ideal, Kinematics};
 use crate::motors::{MotorMap, MotorSpec};
 use crate::toml_report::{TomlReport, TomlText};
 
+mod gimbal;
 mod ideal;
 mod premium;
 
@@ -56,6 +57,8 @@ pub struct ArmFile {
     pub mechanism: Kinematics,
     /// From raw counters to joint angles.
     pub encoders: EncoderSpec,
+    /// From raw counters to the angles of an instrumented gimbal, if there is one.
+    pub gimbal: Option<EncoderSpec>,
     /// From joint torques to converter codes.
     pub motors: MotorSpec,
     /// What the motors stand.

@@ -41,3 +41,4 @@ pub mod status;
 pub mod supervisor;
 pub mod table;
 pub mod toml_report;
+pub mod zeroing;

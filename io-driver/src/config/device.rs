@@ -1,5 +1,6 @@
 //! `[[device]]`: how each device is reached.
 
+use super::zeroing::Zeroing;
 use crate::toml_report::{Allowed, SpannedList, TomlReport, TomlText};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::Deserialize;
@@ -18,6 +19,8 @@ pub struct DeviceConfig {
     pub peak_force_n: Option<f64>,
     /// Its motors hold up its own weight while somebody commands.
     pub compensates_gravity: bool,
+    /// How it learns where it is, if it has counters.
+    pub zeroing: Zeroing,
 }
 
 /// How a device is reached.
@@ -56,6 +59,15 @@ impl Backend {
             Self::Emulated { .. } => Some(32),
         }
     }
+
+    /// A trace begins in the zeroing pose. Of an arm whose counters are alive while drivers come and go, only a
+    /// person knows.
+    fn usual_zeroing(&self) -> Zeroing {
+        match self {
+            Self::Ideal { .. } | Self::Replay { .. } => Zeroing::AtStart,
+            Self::Emulated { .. } => Zeroing::Ask,
+        }
+    }
 }
 
 #[derive(Deserialize)]
@@ -67,6 +79,7 @@ pub(super) struct RawDevice {
     trace: Option<Spanned<PathBuf>>,
     card: Option<Spanned<PathBuf>>,
     gravity_compensation: Option<Spanned<bool>>,
+    zeroing: Option<Spanned<Zeroing>>,
     hand: Option<Spanned<PathBuf>>,
     finger: Option<Spanned<String>>,
     start_m: Option<SpannedList>,
@@ -125,7 +138,8 @@ impl RawDevice {
         };
         let peak_force_n = self.peak_force_n.as_ref().map(|peak| toml.number(peak, PEAK)).transpose()?;
         let compensates_gravity = self.gravity_compensation.as_ref().is_some_and(|key| *key.get_ref());
-        Ok(DeviceConfig { name, backend, peak_force_n, compensates_gravity })
+        let zeroing = self.zeroing.as_ref().map_or(backend.usual_zeroing(), |key| *key.get_ref());
+        Ok(DeviceConfig { name, backend, peak_force_n, compensates_gravity, zeroing })
     }
 
     fn ideal(&self, name: &str, toml: &TomlText<'_>, directory: &Path) -> Result<Backend, TomlReport> {
@@ -136,6 +150,7 @@ impl RawDevice {
                 ("trace", span_of(&self.trace)),
                 ("card", span_of(&self.card)),
                 ("gravity_compensation", span_of(&self.gravity_compensation)),
+                ("zeroing", span_of(&self.zeroing)),
             ],
             toml,
         )?;

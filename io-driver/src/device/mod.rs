@@ -10,7 +10,9 @@ pub mod encoder_trace;
 pub mod ideal;
 pub mod replay;
 
-use nalgebra::Vector3;
+use crate::zeroing::ZeroState;
+use nalgebra::{UnitQuaternion, Vector3};
+use shm_abi::frame::{DEVICE_ORIENTATION_MEASURED, DEVICE_POSITION_VALID};
 use shm_abi::segment::DeviceInfo;
 use shm_abi::{DeviceFrame, FaultReason};
 
@@ -47,6 +49,8 @@ pub struct Reading {
     pub position_m: Vector3<f64>,
     /// The gimbal's last link, w x y z; identity where there is none.
     pub orientation_wxyz: [f64; 4],
+    /// Whether a gimbal measures it.
+    pub is_orientation_measured: bool,
     /// Encoder counts, extended: three joints, three gimbal axes.
     pub encoder_counts: [i64; 6],
     /// Joint angles in the same order (rad).
@@ -62,10 +66,17 @@ impl Reading {
             is_valid: true,
             position_m,
             orientation_wxyz: [1.0, 0.0, 0.0, 0.0],
+            is_orientation_measured: false,
             encoder_counts: [0; 6],
             joint_angle_rad: [0.0; 6],
             buttons: 0,
         }
+    }
+
+    /// The same with an orientation that was measured.
+    pub fn with_orientation(self, orientation: UnitQuaternion<f64>) -> Self {
+        let [x, y, z, w] = orientation.coords.into();
+        Self { orientation_wxyz: [w, x, y, z], is_orientation_measured: true, ..self }
     }
 
     /// Whether every number of it is finite.
@@ -79,7 +90,9 @@ impl Reading {
 
     /// Puts it into the frame.
     pub fn write_to(&self, frame: &mut DeviceFrame) {
-        frame.flags = if self.is_valid { shm_abi::frame::DEVICE_POSITION_VALID } else { 0 };
+        let flag = |is_set: bool, bit: u64| if is_set { bit } else { 0 };
+        frame.flags = flag(self.is_valid, DEVICE_POSITION_VALID)
+            | flag(self.is_orientation_measured, DEVICE_ORIENTATION_MEASURED);
         frame.buttons = self.buttons;
         frame.encoder_counts = self.encoder_counts;
         frame.joint_angle_rad = self.joint_angle_rad;
@@ -127,4 +140,15 @@ pub trait Device: Send {
     /// Somebody asked to leave the fault state: what switched itself off may be switched on again, without
     /// force. The next `read` tells whether it could.
     fn rearm(&mut self) {}
+
+    /// Whether it knows where it is. What has no counters always does.
+    fn zero_state(&self) -> ZeroState {
+        ZeroState::Innate
+    }
+
+    /// The pose that was read last is its zeroing pose.
+    fn zero(&mut self) {}
+
+    /// Its counters may have lost their place; until it is zeroed, it does not know where it is.
+    fn lose_zero(&mut self) {}
 }

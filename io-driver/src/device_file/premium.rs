@@ -8,7 +8,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{ArmFile, DeviceFileError, Workspace};
+use super::{ArmFile, DeviceFileError, Workspace, gimbal};
 use crate::encoders::EncoderSpec;
 use crate::heat::HeatSpec;
 use crate::kinematics::gravity::{Bodies, Gravity};
@@ -35,6 +35,7 @@ struct Raw {
     encoders: Encoders,
     motors: Motors,
     bodies: Option<RawBodies>,
+    gimbal: Option<gimbal::RawGimbal>,
 }
 
 #[derive(Deserialize)]
@@ -93,6 +94,7 @@ fn check(toml: &TomlText<'_>, raw: Raw) -> Result<ArmFile, TomlReport> {
     let mechanism = linkage(toml, &raw.linkage)?;
     let reduction = toml.numbers(&raw.linkage.cable_reduction, REDUCTION)?;
     let home = home(toml, &raw.linkage, &mechanism)?;
+    let encoders = encoders(toml, &raw.encoders, reduction, home)?;
     Ok(ArmFile {
         kind: "premium",
         name: raw.name,
@@ -100,7 +102,8 @@ fn check(toml: &TomlText<'_>, raw: Raw) -> Result<ArmFile, TomlReport> {
         continuous_force_n,
         workspace: workspace(toml, &raw.workspace_m, &raw.workspace_centre_m, &mechanism, home)?,
         mechanism: Kinematics::Premium(mechanism),
-        encoders: encoders(toml, &raw.encoders, reduction, home)?,
+        gimbal: raw.gimbal.as_ref().map(|raw| gimbal::check(toml, raw, &encoders)).transpose()?,
+        encoders,
         motors: motors(toml, &raw.motors, reduction)?,
         heat: heat(toml, &raw.motors)?,
         slew_n_per_s: toml.number(&raw.slew_n_per_s, SLEW)?,
