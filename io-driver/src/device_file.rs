@@ -172,6 +172,17 @@ impl Workspace {
     }
 }
 
+/// The zeroing pose of a kind of device in words, unless its description's `home_joint_angles_rad` say otherwise.
+pub fn home_pose(kind: &str) -> &'static str {
+    match kind {
+        "premium" => {
+            "turret straight ahead, upper arm level, forearm hanging straight down, a gimbal straight \
+             (where `home_joint_angles_rad` of its description are zero)"
+        }
+        _ => "the pose of `home_joint_angles_rad` in its description",
+    }
+}
+
 /// Text of a description that comes with the program, so that an installed one finds it.
 pub fn builtin(name: &str) -> Option<&'static str> {
     match name {

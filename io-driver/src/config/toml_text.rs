@@ -1,6 +1,6 @@
 //! Writes a configuration down as TOML.
 
-use super::{Backend, Commissioning, DeviceConfig, DriverConfig, OverrunPolicy, ReplyMode, SpinMargin};
+use super::{Backend, Commissioning, DeviceConfig, DriverConfig, OverrunPolicy, ReplyMode, SpinMargin, Zeroing};
 use crate::safety::switches::{Switch, Switches};
 use shm_abi::doorbell::WaitMode;
 use std::fmt::Write as _;
@@ -75,6 +75,10 @@ fn write_device(text: &mut String, device: &DeviceConfig) -> std::fmt::Result {
     }
     if device.compensates_gravity {
         writeln!(text, "gravity_compensation = true")?;
+    }
+    if !matches!(device.backend, Backend::Ideal { .. }) {
+        let zeroing = if device.zeroing == Zeroing::Ask { "ask" } else { "at-start" };
+        writeln!(text, "zeroing = {}", quoted(zeroing))?;
     }
     match &device.backend {
         Backend::Ideal { hand, start_m, base_in_world } => {
