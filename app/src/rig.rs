@@ -9,6 +9,7 @@ use io_driver::config::{
     Backend, DeviceConfig, DriverConfig, ProcessConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig,
     Zeroing,
 };
+use io_driver::device::Extras;
 use io_driver::sim::script::{HandError, HandScript};
 use shm_abi::segment::ClockMode;
 use std::io;
@@ -132,9 +133,11 @@ impl Rig {
         Ok(FastStep::new(fingers, entities, self.period_ns))
     }
 
-    /// What the recording's columns are called.
-    pub fn names(&self) -> Names {
+    /// What the recording's columns are called, for devices that tell so much.
+    pub fn names(&self, devices: &[Extras]) -> Names {
+        let of = |device: usize| devices.get(device).copied().unwrap_or_default();
         Names {
+            extras: self.scene.fingers.iter().map(|finger| of(finger.device)).collect(),
             fingers: self.scene.fingers.iter().map(|finger| finger.name.clone()).collect(),
             entities: self.scene.entities.iter().map(|entity| entity.name.clone()).collect(),
         }

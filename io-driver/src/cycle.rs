@@ -14,7 +14,7 @@
 //! Cost: linear in the devices; no allocation, lock, system call (but a wake-up, if the commander sleeps) or
 //! panic.
 
-use crate::device::{Device, Effort, Reading, TickTime};
+use crate::device::{Device, Effort, Extras, Reading, TickTime};
 use crate::meter::{bump, record};
 use crate::reply::Reply;
 use crate::safety::switches::{Inputs, Switches};
@@ -24,7 +24,8 @@ use bytemuck::Zeroable;
 use nalgebra::Vector3;
 use rt_core::clock::monotonic_ns;
 use shm_abi::frame::{
-    DEVICE_NOT_ZEROED, DEVICE_POSITION_VALID, LIMIT_HEAT, LIMIT_PEAK, LIMIT_SLEW, LIMIT_WORKSPACE,
+    DEVICE_HAS_BUTTONS, DEVICE_NOT_ZEROED, DEVICE_POSITION_VALID, LIMIT_HEAT, LIMIT_PEAK, LIMIT_SLEW,
+    LIMIT_WORKSPACE,
 };
 use shm_abi::layout::Counters;
 use shm_abi::{CommanderView, DriverMemory, FaultReason, Frame, MAX_DEVICES, Outcome, ReplyKind};
@@ -180,6 +181,11 @@ impl Cycle {
         self.zero_verdict = Some(verdict);
     }
 
+    /// What the devices tell besides their positions.
+    pub fn extras(&self) -> Vec<Extras> {
+        self.devices.iter().map(|device| device.extras()).collect()
+    }
+
     /// The devices that have to be zeroed.
     pub fn not_zeroed(&self) -> DeviceSet {
         let bit = |(index, device): (usize, &Box<dyn Device>)| {
@@ -282,6 +288,9 @@ impl Cycle {
                     self.zeros.lose_sight(index);
                     self.fault(reason);
                 }
+            }
+            if self.devices[index].extras().buttons {
+                self.frame.devices[index].flags |= DEVICE_HAS_BUTTONS;
             }
             if self.devices[index].zero_state() == ZeroState::Needed {
                 let flags = &mut self.frame.devices[index].flags;

@@ -59,6 +59,8 @@ pub struct ArmFile {
     pub encoders: EncoderSpec,
     /// From raw counters to the angles of an instrumented gimbal, if there is one.
     pub gimbal: Option<EncoderSpec>,
+    /// How many buttons its handle has.
+    pub buttons: u32,
     /// From joint torques to converter codes.
     pub motors: MotorSpec,
     /// What the motors stand.

@@ -158,6 +158,7 @@ fn emulated(
     let channels = Channels {
         encoders: premium.encoders.channel,
         gimbal: premium.gimbal.map(|gimbal| gimbal.channel),
+        buttons: premium.buttons,
         motors: premium.motors.channel,
     };
     let device = EmulatedDevice::new(info, hold, arm, channels)

@@ -4,8 +4,9 @@ use crate::meter;
 use rt_core::histogram::{Histogram, Summary};
 use serde::Serialize;
 use shm_abi::frame::{
-    DEVICE_NOT_ZEROED, DEVICE_ORIENTATION_MEASURED, DEVICE_POSITION_VALID, INPUT_DEAD_MAN_HELD, INPUT_DEAD_MAN_PRESENT, INPUT_EMERGENCY_STOP, LIMIT_HEAT, LIMIT_PEAK,
-    LIMIT_SATURATION, LIMIT_SLEW, LIMIT_WORKSPACE,
+    DEVICE_NOT_ZEROED, DEVICE_ORIENTATION_MEASURED, DEVICE_POSITION_VALID, INPUT_DEAD_MAN_HELD,
+    INPUT_DEAD_MAN_PRESENT, INPUT_EMERGENCY_STOP, LIMIT_HEAT, LIMIT_PEAK, LIMIT_SATURATION, LIMIT_SLEW,
+    LIMIT_WORKSPACE,
 };
 use shm_abi::segment::{ClockMode, DriverInfo};
 use shm_abi::{DriverState, DriverView, FaultReason, Frame};
@@ -329,7 +330,8 @@ impl fmt::Display for Status {
             write!(f, "\ndevice      {} [{}]{valid}", device.short(), device.kind)?;
             if device.zero_needed {
                 let name = &device.name;
-                let how = format_args!("bring it into its zeroing pose, then `io-driver zero --device {name}`");
+                let how =
+                    format_args!("bring it into its zeroing pose, then `io-driver zero --device {name}`");
                 write!(f, ", not zeroed: {how}")?;
             }
             if device.motor_heat > 0.0 {

@@ -76,6 +76,9 @@
 // ([`client::zero`](crate::client::zero)).
 #define PHANTOM_DEVICE_NOT_ZEROED 4
 
+// [`DeviceFrame::flags`]: since 1.2. Its `buttons` mean something.
+#define PHANTOM_DEVICE_HAS_BUTTONS 8
+
 // [`Frame::inputs`]: an emergency stop is pressed.
 #define PHANTOM_INPUT_EMERGENCY_STOP 1
 
@@ -493,7 +496,7 @@ typedef struct PhantomOutcome {
 // One device in a [`Frame`].
 typedef struct PhantomDeviceFrame {
   // Bits of `DEVICE_...`: bit 0, the position is valid; since 1.2 bit 1, the orientation is measured,
-  // and bit 2, it has to be zeroed.
+  // bit 2, it has to be zeroed, bit 3, it has buttons.
   uint64_t flags;
   // Bit `i`: button `i` is pressed.
   uint64_t buttons;

@@ -82,7 +82,7 @@ assert_layout!(Outcome: 40, 8 {
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct DeviceFrame {
     /// Bits of `DEVICE_...`: bit 0, the position is valid; since 1.2 bit 1, the orientation is measured,
-    /// and bit 2, it has to be zeroed.
+    /// bit 2, it has to be zeroed, bit 3, it has buttons.
     pub flags: u64,
     /// Bit `i`: button `i` is pressed.
     pub buttons: u64,
@@ -139,6 +139,8 @@ pub const DEVICE_ORIENTATION_MEASURED: u64 = 2;
 /// [`DeviceFrame::flags`]: since 1.2. It does not know where it is until somebody asks to zero it
 /// ([`client::zero`](crate::client::zero)).
 pub const DEVICE_NOT_ZEROED: u64 = 4;
+/// [`DeviceFrame::flags`]: since 1.2. Its `buttons` mean something.
+pub const DEVICE_HAS_BUTTONS: u64 = 8;
 
 /// [`Frame::inputs`]: an emergency stop is pressed.
 pub const INPUT_EMERGENCY_STOP: u64 = 1;

@@ -71,7 +71,9 @@ pub(super) enum ZeroError {
     Interrupted,
     #[error("standard input has ended; --yes goes on without it")]
     NoInput,
-    #[error("device {device} did not stand still for half a second within {seconds} s; hold it, or let it rest")]
+    #[error(
+        "device {device} did not stand still for half a second within {seconds} s; hold it, or let it rest"
+    )]
     Moving { device: String, seconds: f64 },
     #[error("the driver refused, and nothing has changed: {0}; its log says more")]
     Refused(String),
@@ -98,8 +100,11 @@ impl ZeroError {
 
 /// A driver tells a frame in each tick.
 const SILENCE: Duration = Duration::from_secs(5);
-/// The driver collects its mail in each tick.
-const ANSWER: Duration = Duration::from_secs(3);
+/// So long the driver is asked: it counts readings instead of time, and one that misses ticks takes longer to believe
+/// that an arm rests.
+const ANSWER: Duration = Duration::from_secs(5);
+/// How long each time; it collects its mail in each tick.
+const TURN: Duration = Duration::from_millis(200);
 /// How often the frames are looked at for rest.
 const LOOK: Duration = Duration::from_millis(10);
 
@@ -158,8 +163,7 @@ impl<'a> Zeroing<'a> {
             };
         }
         let find = |name: &String| {
-            let unknown =
-                || ZeroError::NoSuchDevice { found: name.clone(), allowed: self.names.join(", ") };
+            let unknown = || ZeroError::NoSuchDevice { found: name.clone(), allowed: self.names.join(", ") };
             let index = self.names.iter().position(|other| other == name).ok_or_else(unknown)?;
             if counts(&index) { Ok(index) } else { Err(ZeroError::Innate(name.clone())) }
         };
@@ -180,7 +184,12 @@ impl<'a> Zeroing<'a> {
         }
         if !yes && std::io::stdin().is_terminal() {
             say("Press Enter when it is there.");
-            std::io::stdin().lock().lines().next().ok_or(ZeroError::NoInput)?.map_err(|_| ZeroError::NoInput)?;
+            std::io::stdin()
+                .lock()
+                .lines()
+                .next()
+                .ok_or(ZeroError::NoInput)?
+                .map_err(|_| ZeroError::NoInput)?;
         }
         self.wait_for_rest(devices, wait_s)?;
         let before = self.frame;
@@ -257,14 +266,19 @@ impl<'a> Zeroing<'a> {
         }
     }
 
-    /// Asks, and looks at every frame after that.
+    /// Asks, and looks at every frame after that. A zero that was refused changed nothing, so that it may be asked for
+    /// again.
     fn ask(&mut self, devices: &[usize]) -> Result<(), ZeroError> {
         let bits = devices.iter().fold(0, |bits, index| bits | 1 << index);
         let mut seen = self.driver().latest_tick().unwrap_or(0);
-        client::zero(self.socket, "io-driver zero", bits)?;
         let mut was_withheld = vec![false; devices.len()];
-        let asked = Instant::now();
-        while asked.elapsed() < ANSWER {
+        let (began, mut asked) = (Instant::now(), None);
+        while began.elapsed() < ANSWER {
+            let is_due = asked.is_none_or(|asked: Instant| asked.elapsed() > TURN);
+            if is_due && !self.was_granted(devices, &was_withheld) {
+                client::zero(self.socket, "io-driver zero", bits)?;
+                asked = Some(Instant::now());
+            }
             self.next_frame(seen)?;
             let latest = self.frame;
             for tick in seen + 1..=latest.tick {
@@ -277,22 +291,24 @@ impl<'a> Zeroing<'a> {
             seen = latest.tick;
             self.frame = latest;
             let is_fault = latest.state == DriverState::Fault as u64;
-            let is_done = |index: &usize| {
-                let flags = self.device(*index).flags;
-                flags & DEVICE_NOT_ZEROED == 0 && (is_fault || flags & DEVICE_POSITION_VALID != 0)
-            };
-            if was_withheld.iter().all(|was| *was) && devices.iter().all(is_done) {
+            let is_valid = |index: &usize| is_fault || self.device(*index).flags & DEVICE_POSITION_VALID != 0;
+            if self.was_granted(devices, &was_withheld) && devices.iter().all(is_valid) {
                 return Ok(());
             }
         }
-        Err(self.why_not(devices, was_withheld.iter().all(|was| *was)))
+        Err(self.why_not(self.was_granted(devices, &was_withheld)))
     }
 
-    fn why_not(&self, devices: &[usize], was_withheld: bool) -> ZeroError {
+    /// Not valid since it was asked, and knowing where they are.
+    fn was_granted(&self, devices: &[usize], was_withheld: &[bool]) -> bool {
+        was_withheld.iter().all(|was| *was) && !devices.iter().any(|index| self.needs(*index))
+    }
+
+    fn why_not(&self, was_granted: bool) -> ZeroError {
         if let Err(commanded) = self.refuse_if_commanded() {
             return commanded;
         }
-        if was_withheld && devices.iter().all(|index| !self.needs(*index)) && self.frame.lease != 0 {
+        if was_granted && self.frame.lease != 0 {
             return ZeroError::Unseen;
         }
         ZeroError::Refused("a device moved in that moment, or could not be read".into())

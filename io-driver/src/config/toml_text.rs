@@ -1,6 +1,8 @@
 //! Writes a configuration down as TOML.
 
-use super::{Backend, Commissioning, DeviceConfig, DriverConfig, OverrunPolicy, ReplyMode, SpinMargin, Zeroing};
+use super::{
+    Backend, Commissioning, DeviceConfig, DriverConfig, OverrunPolicy, ReplyMode, SpinMargin, Zeroing,
+};
 use crate::safety::switches::{Switch, Switches};
 use shm_abi::doorbell::WaitMode;
 use std::fmt::Write as _;

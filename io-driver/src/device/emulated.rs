@@ -7,7 +7,7 @@
 //! its threads it was.
 
 use super::arm::Arm;
-use super::{Device, Effort, Reading, TickTime, Written};
+use super::{Device, Effort, Extras, Reading, TickTime, Written};
 use crate::emulator::card::{ARM_SHIFT, Card, DriversCard, QUEUE, STATUS_TRIPPED};
 use crate::zeroing::ZeroState;
 use rt_core::clock::monotonic_ns;
@@ -42,6 +42,8 @@ pub struct Channels {
     pub encoders: [u8; 3],
     /// Counters of an instrumented gimbal.
     pub gimbal: Option<[u8; 3]>,
+    /// How many buttons the handle has.
+    pub buttons: u32,
     /// Converters; below 4.
     pub motors: [u8; 3],
 }
@@ -167,6 +169,10 @@ impl Device for EmulatedDevice {
     fn rearm(&mut self) {
         self.armed_ns = monotonic_ns();
         self.card().outputs.arm.fetch_add(1, Ordering::AcqRel);
+    }
+
+    fn extras(&self) -> Extras {
+        Extras { orientation: self.channels.gimbal.is_some(), buttons: self.channels.buttons > 0 }
     }
 
     fn zero_state(&self) -> ZeroState {

@@ -12,7 +12,7 @@ pub mod replay;
 
 use crate::zeroing::ZeroState;
 use nalgebra::{UnitQuaternion, Vector3};
-use shm_abi::frame::{DEVICE_ORIENTATION_MEASURED, DEVICE_POSITION_VALID};
+use shm_abi::frame::{DEVICE_HAS_BUTTONS, DEVICE_ORIENTATION_MEASURED, DEVICE_POSITION_VALID};
 use shm_abi::segment::DeviceInfo;
 use shm_abi::{DeviceFrame, FaultReason};
 
@@ -101,6 +101,25 @@ impl Reading {
     }
 }
 
+/// What a device tells besides its position.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Extras {
+    /// How its last link is turned.
+    pub orientation: bool,
+    /// Which buttons are pressed.
+    pub buttons: bool,
+}
+
+impl Extras {
+    /// As the flags of a frame tell it.
+    pub fn of(flags: u64) -> Self {
+        Self {
+            orientation: flags & DEVICE_ORIENTATION_MEASURED != 0,
+            buttons: flags & DEVICE_HAS_BUTTONS != 0,
+        }
+    }
+}
+
 /// What a device is asked to do in a tick.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Effort {
@@ -140,6 +159,11 @@ pub trait Device: Send {
     /// Somebody asked to leave the fault state: what switched itself off may be switched on again, without
     /// force. The next `read` tells whether it could.
     fn rearm(&mut self) {}
+
+    /// What it tells besides its position, always the same.
+    fn extras(&self) -> Extras {
+        Extras::default()
+    }
 
     /// Whether it knows where it is. What has no counters always does.
     fn zero_state(&self) -> ZeroState {

@@ -39,6 +39,11 @@ pub(super) fn check(
     })
 }
 
+/// `buttons`: how many the handle has.
+pub(super) fn buttons(toml: &TomlText<'_>, key: Option<&Spanned<i64>>) -> Result<u32, TomlReport> {
+    key.map_or(Ok(0), |number| Ok(toml.integer(number, 0..=32)? as u32))
+}
+
 fn channels(
     toml: &TomlText<'_>,
     list: &Spanned<Vec<Spanned<i64>>>,
@@ -101,6 +106,17 @@ mod tests {
         assert_eq!((gimbal.channel, gimbal.sign, gimbal.counts_per_rev), ([3, 4, 5], [1, -1, 1], 4000));
         assert_eq!(gimbal.count_bits, arm.encoders.count_bits, "the same card");
         assert_eq!(gimbal.home_joint_angles_rad, [0.0, 0.25, 0.0]);
+    }
+
+    #[test]
+    fn a_handle_has_the_buttons_that_its_description_says_and_else_none() {
+        assert_eq!(parse("").unwrap().buttons, 0);
+        let with = |line: &str| {
+            let text = format!("{line}\n{}", builtin("premium-1.5").unwrap());
+            DeviceFile::parse(&text, Path::new("handle.toml"))
+        };
+        assert!(matches!(with("buttons = 2"), Ok(DeviceFile::Arm(arm)) if arm.buttons == 2));
+        assert!(with("buttons = 33").unwrap_err().to_string().contains("33"));
     }
 
     #[test]

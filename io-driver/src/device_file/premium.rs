@@ -36,6 +36,7 @@ struct Raw {
     motors: Motors,
     bodies: Option<RawBodies>,
     gimbal: Option<gimbal::RawGimbal>,
+    buttons: Option<Whole>,
 }
 
 #[derive(Deserialize)]
@@ -103,6 +104,7 @@ fn check(toml: &TomlText<'_>, raw: Raw) -> Result<ArmFile, TomlReport> {
         workspace: workspace(toml, &raw.workspace_m, &raw.workspace_centre_m, &mechanism, home)?,
         mechanism: Kinematics::Premium(mechanism),
         gimbal: raw.gimbal.as_ref().map(|raw| gimbal::check(toml, raw, &encoders)).transpose()?,
+        buttons: gimbal::buttons(toml, raw.buttons.as_ref())?,
         encoders,
         motors: motors(toml, &raw.motors, reduction)?,
         heat: heat(toml, &raw.motors)?,

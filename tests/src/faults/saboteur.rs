@@ -4,7 +4,7 @@
 //! and when, such as `panic@500,hang:300@button20`: in tick 500, or as soon as button 20 of the card is pressed,
 //! which a test presses by a word of the shared file. Each is done once, and by the first device alone.
 
-use io_driver::device::{Device, Effort, Reading, TickTime, Written};
+use io_driver::device::{Device, Effort, Extras, Reading, TickTime, Written};
 use io_driver::zeroing::ZeroState;
 use nalgebra::Vector3;
 use shm_abi::FaultReason;
@@ -186,6 +186,10 @@ impl Saboteur {
 impl Device for Saboteur {
     fn info(&self) -> &DeviceInfo {
         self.inner.info()
+    }
+
+    fn extras(&self) -> Extras {
+        self.inner.extras()
     }
 
     fn zero_state(&self) -> ZeroState {
