@@ -26,6 +26,12 @@ impl Mount {
         self.X_WD.map_or(p_D, |pose| (pose * Point3::from(p_D)).coords)
     }
 
+    /// A velocity of a point in the base frame in the world (m/s).
+    pub fn velocity_to_world(&self, v_D: [f64; 3]) -> Vector3<f64> {
+        let v_D = Vector3::from(v_D);
+        self.X_WD.map_or(v_D, |pose| pose.rotation * v_D)
+    }
+
     /// A force of the base frame in the world (N).
     pub fn force_to_world(&self, f_D: [f64; 3]) -> Vector3<f64> {
         let f_D = Vector3::from(f_D);
@@ -56,6 +62,7 @@ mod tests {
         let mount = Mount::new(Isometry3::identity());
         for p in [[0.1, -0.0, 1e-300], [0.3, 0.2, 0.7]] {
             assert_eq!(mount.point_to_world(p).map(f64::to_bits), Vector3::from(p).map(f64::to_bits));
+            assert_eq!(mount.velocity_to_world(p).map(f64::to_bits), Vector3::from(p).map(f64::to_bits));
             assert_eq!(mount.force_to_device(Vector3::from(p)).map(f64::to_bits), p.map(f64::to_bits));
         }
         assert_eq!(mount.orientation_to_world([0.1, 0.2, 0.3, 0.4]), [0.1, 0.2, 0.3, 0.4]);
@@ -82,6 +89,7 @@ mod tests {
         // A rotation by quaternion rounds a handful of times: some ulp of the largest number, 1.
         let close = |a: Vector3<f64>, b: Vector3<f64>| (a - b).norm() < 1e-15;
         assert!(close(mount.point_to_world([1.0, 0.0, 0.0]), Vector3::new(0.0, 0.5, -1.0)));
+        assert!(close(mount.velocity_to_world([1.0, 0.0, 0.0]), Vector3::new(0.0, 0.0, -1.0)));
         assert!(close(mount.force_to_world([1.0, 0.0, 0.0]), Vector3::new(0.0, 0.0, -1.0)));
         assert!(close(mount.force_to_device(Vector3::new(0.0, 0.0, -1.0)).into(), Vector3::x()));
     }

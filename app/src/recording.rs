@@ -308,8 +308,8 @@ mod tests {
     #[test]
     fn only_a_device_that_tells_more_has_more_columns() {
         let extras = vec![Extras::default(), Extras { orientation: true, buttons: true }];
+        let plain = header(&names());
         let names = Names { extras, ..names() };
-        let plain = header(&super::tests::names());
         let added = ",b_qw,b_qx,b_qy,b_qz,b_buttons\n";
         assert_eq!(header(&names), plain.trim_end().to_owned() + added, "behind the last finger's others");
         let mut told = row(0, 1.0);

@@ -21,7 +21,6 @@ use crate::safety::switches::{Inputs, Switches};
 use crate::safety::{Guard, Limits, Safety};
 use crate::zeroing::{DeviceSet, ZeroRefusal, ZeroState, ZeroWatch};
 use bytemuck::Zeroable;
-use nalgebra::Vector3;
 use rt_core::clock::monotonic_ns;
 use shm_abi::frame::{
     DEVICE_HAS_BUTTONS, DEVICE_NOT_ZEROED, DEVICE_POSITION_VALID, LIMIT_HEAT, LIMIT_PEAK, LIMIT_SLEW,
@@ -282,8 +281,12 @@ impl Cycle {
             match reading {
                 Ok(reading) => all_valid &= self.take_reading(index, time.tick, reading),
                 Err(reason) => {
-                    // The last good position stays in the frame, marked as not to be trusted.
-                    self.frame.devices[index].flags = 0;
+                    // The last good position stays in the frame, marked as not to be trusted; nobody knows how
+                    // fast it changes.
+                    let frame = &mut self.frame.devices[index];
+                    frame.flags = 0;
+                    frame.velocity_m_per_s_estimated = [0.0; 3];
+                    frame.joint_velocity_rad_per_s_estimated = [0.0; 3];
                     all_valid = false;
                     self.zeros.lose_sight(index);
                     self.fault(reason);
@@ -305,22 +308,19 @@ impl Cycle {
     fn take_reading(&mut self, index: usize, tick: u64, reading: Reading) -> bool {
         self.zeros.observe(index, reading.encoder_counts);
         let knows = self.devices[index].zero_state() != ZeroState::Needed && !self.zeros.is_withheld(index);
-        let reading = Reading { is_valid: reading.is_valid && knows, ..reading };
+        let reading = if knows { reading } else { reading.unknown() };
         reading.write_to(&mut self.frame.devices[index]);
         if knows {
-            self.watch_speed(index, tick, reading.position_m);
+            self.watch_speed(index, tick, &reading);
         } else {
             // Where it is then will have nothing to do with where it seems to be now.
             self.guards[index].lose_sight();
-            self.frame.devices[index].velocity_m_per_s_estimated = [0.0; 3];
         }
         reading.is_valid
     }
 
-    fn watch_speed(&mut self, device: usize, tick: u64, position: Vector3<f64>) {
-        let observed = self.guards[device].observe(tick, position);
-        self.frame.devices[device].velocity_m_per_s_estimated = self.guards[device].velocity().into();
-        match observed {
+    fn watch_speed(&mut self, device: usize, tick: u64, reading: &Reading) {
+        match self.guards[device].observe(tick, reading.position_m, reading.velocity_m_per_s) {
             Ok(()) => {}
             // A hand may be as fast as it likes as long as no motor drives it.
             Err(FaultReason::Overspeed) if self.safety.is_released() => {}

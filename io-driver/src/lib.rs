@@ -41,4 +41,5 @@ pub mod status;
 pub mod supervisor;
 pub mod table;
 pub mod toml_report;
+pub mod velocity;
 pub mod zeroing;

@@ -193,7 +193,7 @@ fn a_driver_that_answers_is_named() {
     check_segment(&socket, &seen(4242), &expected);
 }
 
-fn seen(pid: u64) -> segment::Answer {
+fn seen(pid: u64) -> Answer {
     Ok(segment::Seen { pid, not_zeroed: Vec::new() })
 }
 

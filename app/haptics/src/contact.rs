@@ -12,7 +12,7 @@
 use nalgebra::Vector3;
 
 use crate::entity::Entity;
-use crate::frame::{is_finite, point_into_body, point_into_world, vector_into_world};
+use crate::frame::{is_finite, point_into_body, point_into_world, vector_into_body, vector_into_world};
 use crate::friction_cone::{ConeForce, ConeInput, FrictionCone};
 use crate::friction_law::FrictionState;
 use crate::shape::Shape;
@@ -54,6 +54,8 @@ impl Contact {
 pub(crate) struct Sweep {
     pub(crate) previous_hip_W: Option<Vector3<f64>>,
     pub(crate) hip_W: Vector3<f64>,
+    /// If it is known better than by the difference of the two.
+    pub(crate) hip_velocity_W: Option<Vector3<f64>>,
     pub(crate) finger_radius_m: f64,
     pub(crate) dt_s: f64,
 }
@@ -86,7 +88,13 @@ impl Slot {
         if surface.signed_distance(&hip_B) > 0.0 {
             return None;
         }
-        let input = cone_input(entity, hip_B, previous_B, sweep.dt_s);
+        let input = ConeInput {
+            hip_B,
+            hip_velocity_B: hip_velocity(entity, hip_B, previous_B, sweep),
+            stiffness_n_per_m: entity.stiffness_n_per_m,
+            damping_n_s_per_m: entity.damping_n_s_per_m,
+            dt_s: sweep.dt_s,
+        };
         let begin = || FrictionCone::new(begin(&surface, previous_B, &hip_B));
         let cone = self.cone.get_or_insert_with(begin);
         let force = cone.update(&surface, &entity.friction, &input);
@@ -102,24 +110,27 @@ fn begin(surface: &Shape, previous_B: Option<Vector3<f64>>, hip_B: &Vector3<f64>
     entered.unwrap_or_else(|| surface.nearest(hip_B))
 }
 
-fn cone_input(
+/// Seen from the entity, so that a finger riding along on a moving one is not damped.
+///
+/// Of the difference of two positions in B the entity's part is exact, since its poses are. Only the HIP's own part,
+/// the difference of two positions in W, is replaced where something better is known; where that is the very same
+/// difference, no bit changes.
+fn hip_velocity(
     entity: &Entity,
     hip_B: Vector3<f64>,
     previous_B: Option<Vector3<f64>>,
-    dt_s: f64,
-) -> ConeInput {
-    // Seen from the entity, so that a finger riding along on a moving one is not damped.
-    let hip_velocity_B = match previous_B {
-        Some(previous_B) if dt_s > 0.0 => (hip_B - previous_B) / dt_s,
-        _ => Vector3::zeros(),
+    sweep: &Sweep,
+) -> Vector3<f64> {
+    let (Some(previous_B), Some(previous_W)) = (previous_B, sweep.previous_hip_W) else {
+        return Vector3::zeros();
     };
-    ConeInput {
-        hip_B,
-        hip_velocity_B,
-        stiffness_n_per_m: entity.stiffness_n_per_m,
-        damping_n_s_per_m: entity.damping_n_s_per_m,
-        dt_s,
+    if sweep.dt_s.is_nan() || sweep.dt_s <= 0.0 {
+        return Vector3::zeros();
     }
+    let difference_B = (hip_B - previous_B) / sweep.dt_s;
+    let Some(velocity_W) = sweep.hip_velocity_W else { return difference_B };
+    let correction_W = velocity_W - (sweep.hip_W - previous_W) / sweep.dt_s;
+    difference_B + vector_into_body(&entity.X_WB, &correction_W)
 }
 
 fn in_world(entity_index: usize, entity: &Entity, cone: &FrictionCone, force: &ConeForce) -> Contact {

@@ -16,6 +16,7 @@ use crate::entity::Entity;
 use crate::error::{ParameterError, at_least_zero};
 use crate::frame::is_finite;
 use crate::friction_law::FrictionState;
+use crate::hip::Hip;
 use crate::surface::Feature;
 
 /// A finger and its contacts.
@@ -86,11 +87,23 @@ impl Finger {
         self.slots.len()
     }
 
-    /// One tick: the HIP is at `hip_W`, the entities at their current poses.
+    /// One tick: the HIP is where `hip` says, the entities at their current poses.
     ///
     /// An entity is known by its index: call [`Self::forget`] when another one takes its place. A
-    /// `dt_s` that is not positive leaves out damping and speed-dependent friction.
-    pub fn step(&mut self, entities: &[Entity], hip_W: &Vector3<f64>, dt_s: f64) -> FingerOutput {
+    /// `dt_s` that is not positive leaves out damping and speed-dependent friction. `hip` may be a [`Hip`] with a
+    /// velocity, which damping then goes by, or `&Vector3`, a position alone.
+    pub fn step(&mut self, entities: &[Entity], hip: impl Into<Hip>, dt_s: f64) -> FingerOutput {
+        let Hip { position_W: hip_W, velocity_W } = hip.into();
+        self.step_to(entities, &hip_W, velocity_W.filter(is_finite), dt_s)
+    }
+
+    fn step_to(
+        &mut self,
+        entities: &[Entity],
+        hip_W: &Vector3<f64>,
+        hip_velocity_W: Option<Vector3<f64>>,
+        dt_s: f64,
+    ) -> FingerOutput {
         if !is_finite(hip_W) {
             self.reset();
             return free(self.last_finite_hip_W);
@@ -98,6 +111,7 @@ impl Finger {
         let sweep = Sweep {
             previous_hip_W: self.previous_hip_W,
             hip_W: *hip_W,
+            hip_velocity_W,
             finger_radius_m: self.radius_m,
             dt_s,
         };

@@ -28,6 +28,11 @@ pub(crate) fn vector_into_world(X_WB: &Isometry3<f64>, v_B: &Vector3<f64>) -> Ve
     if is_identity(&X_WB.rotation) { *v_B } else { X_WB.rotation * v_B }
 }
 
+/// v_B of a free vector v_W.
+pub(crate) fn vector_into_body(X_WB: &Isometry3<f64>, v_W: &Vector3<f64>) -> Vector3<f64> {
+    if is_identity(&X_WB.rotation) { *v_W } else { X_WB.rotation.inverse_transform_vector(v_W) }
+}
+
 fn is_identity(q: &UnitQuaternion<f64>) -> bool {
     q.i == 0.0 && q.j == 0.0 && q.k == 0.0
 }

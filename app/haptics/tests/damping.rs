@@ -4,8 +4,8 @@
 mod common;
 
 use common::*;
-use haptics::{ContactState, Entity, Friction};
-use nalgebra::{Isometry3, Vector3};
+use haptics::{ContactState, Entity, Friction, Hip};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 const B: f64 = 2.0;
 
@@ -71,4 +71,70 @@ fn riding_along_on_a_moving_entity_is_not_damped() {
         // Positions of up to 0.5 m are rounded to 5.6e-17, differences over dt to 2e-13.
         assert!((out.force_on_user_W - Vector3::new(0.0, K * DEPTH, 0.0)).norm() < 2e-12);
     }
+}
+
+/// A HIP at `y` that moves with this velocity along y, as far as anybody knows.
+fn known(y: f64, velocity: f64) -> Hip {
+    Hip { position_W: Vector3::new(0.0, y, 0.0), velocity_W: Some(Vector3::y() * velocity) }
+}
+
+#[test]
+fn a_velocity_that_is_known_takes_the_place_of_the_difference() {
+    let entity = damped(Friction::None);
+    let mut finger = point_finger();
+    let mut force = |hip: Hip| finger.step(&[entity], hip, DT).force_on_user_W.y;
+    assert_eq!(force(known(-5.00e-3, -0.3)), 2.5, "a first tick has no speed, whatever is said");
+    // Sums of numbers below 3: some ulps, and a difference of positions over dt that cancels to 1e-18 / 1e-3 times b.
+    assert!((force(known(-5.01e-3, -0.3)) - (2.505 + B * 0.3)).abs() < 1e-14);
+    assert!((force(known(-5.01e-3, 0.0)) - 2.505).abs() < 1e-14);
+    let unknown = Hip { velocity_W: None, ..known(-5.00e-3, 0.0) };
+    assert!((force(unknown) - (2.5 - B * 0.01)).abs() < 1e-14, "the difference");
+    let nonsense = Hip { velocity_W: Some(Vector3::repeat(f64::NAN)), ..known(-5.01e-3, 0.0) };
+    assert!((force(nonsense) - (2.505 + B * 0.01)).abs() < 1e-14, "the difference");
+}
+
+#[test]
+fn a_velocity_that_is_the_difference_changes_no_bit() {
+    let entity = damped(stiction());
+    let (mut told, mut alone) = (point_finger(), point_finger());
+    let mut noise = Noise(5);
+    let mut previous: Option<Vector3<f64>> = None;
+    for _ in 0..2000 {
+        let hip = Vector3::new(0.0, -DEPTH, 0.0) + noise.vector(1e-3);
+        let velocity_W = previous.replace(hip).map(|previous| (hip - previous) / DT);
+        let with = told.step(&[entity], Hip { position_W: hip, velocity_W }, DT).force_on_user_W;
+        let without = alone.step(&[entity], &hip, DT).force_on_user_W;
+        assert_eq!(with.map(f64::to_bits), without.map(f64::to_bits));
+    }
+}
+
+#[test]
+fn a_known_velocity_is_taken_against_the_entitys_own_motion_and_turn() {
+    let velocity = Vector3::new(0.3, 0.4, -0.1);
+    let turn = |tick: i32| UnitQuaternion::from_scaled_axis(Vector3::new(0.2, 0.1, -0.3) * f64::from(tick));
+    let mut entity =
+        Entity { X_WB: Isometry3::from_parts(Default::default(), turn(0)), ..damped(stiction()) };
+    let mut finger = point_finger();
+    // Below the table's surface, which turns with it.
+    let hip_at = |tick: i32| {
+        let shift = velocity * (f64::from(tick) * DT);
+        shift + turn(tick) * Vector3::new(0.0, -DEPTH, 0.0)
+    };
+    let difference = |tick: i32| (hip_at(tick) - hip_at(tick - 1)) / DT;
+    finger.step(&[entity], &hip_at(0), DT);
+    for tick in 1..200 {
+        let shift = velocity * (f64::from(tick) * DT);
+        entity.move_to(Isometry3::from_parts(shift.into(), turn(tick)));
+        let along = finger.clone().step(&[entity], known_in(hip_at(tick), difference(tick)), DT);
+        let normal = turn(tick) * Vector3::y();
+        // Positions of up to 0.1 m are rounded to 1.4e-17, differences over dt and turned to some 1e-13.
+        assert!((along.force_on_user_W - normal * (K * DEPTH)).norm() < 1e-12, "rides along");
+        let pressing = difference(tick) - normal * 0.1;
+        let pressed = finger.step(&[entity], known_in(hip_at(tick), pressing), DT);
+        assert!((pressed.force_on_user_W.dot(&normal) - (K * DEPTH + B * 0.1)).abs() < 1e-12);
+    }
+}
+
+fn known_in(position_W: Vector3<f64>, velocity_W: Vector3<f64>) -> Hip {
+    Hip { position_W, velocity_W: Some(velocity_W) }
 }

@@ -1,6 +1,7 @@
 //! What every arm with counters and motors has in common, whatever carries its registers.
 //!
-//! Model: raw counters, extended beyond their width, become joint angles and the tip; a force becomes codes.
+//! Model: raw counters, extended beyond their width, become joint angles and the tip, and their changes its velocity,
+//! `J q'` with each joint's velocity estimated from its own counts; a force becomes codes.
 //! Counters tell the pose only once the arm has been zeroed; until then it seems to be at home and is not valid.
 //! An instrumented gimbal's counters are read, extended and zeroed together with the joints'.
 //! Invariant: `read` comes before `render` in a tick; codes are for the pose that was read last.
@@ -11,7 +12,9 @@ use crate::device_file::ArmFile;
 use crate::drive::Drive;
 use crate::encoders::{EncoderExtender, JointMap};
 use crate::kinematics::{Kinematics, Mechanism, gimbal};
+use crate::velocity::VelocityEstimator;
 use crate::zeroing::ZeroState;
+use nalgebra::Vector3;
 use shm_abi::FaultReason;
 
 /// An arm.
@@ -25,6 +28,7 @@ pub struct Arm {
     gimbal: Option<JointMap>,
     zeroing: Zeroing,
     is_zeroed: bool,
+    velocity: VelocityEstimator,
     kinematics: Kinematics,
     drive: Drive,
     joints: [f64; 3],
@@ -43,6 +47,7 @@ impl Arm {
             gimbal: premium.gimbal.as_ref().map(JointMap::new),
             zeroing: Zeroing::AtStart,
             is_zeroed: false,
+            velocity: VelocityEstimator::of_counts(),
             kinematics,
             drive: Drive::new(kinematics, &premium.motors, premium.heat, gravity),
             joints: premium.encoders.home_joint_angles_rad,
@@ -77,6 +82,9 @@ impl Arm {
         }
         let mut reading = Reading::at(self.kinematics.forward(self.joints));
         reading.is_valid = self.is_zeroed;
+        let rates = self.joint_rates(joint_counts, time);
+        reading.velocity_m_per_s = self.kinematics.jacobian(self.joints) * Vector3::from(rates);
+        reading.joint_velocity_rad_per_s = rates;
         reading.encoder_counts = counts;
         reading.joint_angle_rad[..3].copy_from_slice(&self.joints);
         if let Some(map) = self.gimbal.filter(|_| gimbal.is_some()) {
@@ -107,6 +115,7 @@ impl Arm {
     /// The counters may have lost their place.
     pub fn lose_zero(&mut self) {
         self.is_zeroed = false;
+        self.forget_motion();
     }
 
     fn extend(&mut self, raw: [i64; 3], gimbal: Option<[i64; 3]>) -> [i64; 6] {
@@ -119,6 +128,18 @@ impl Arm {
             self.lose_zero();
         }
         counts
+    }
+
+    /// Of the counts, so that zeroing moves nothing.
+    fn joint_rates(&mut self, counts: [i64; 3], time: TickTime) -> [f64; 3] {
+        let counts_per_s = self.velocity.observe(time, counts.map(|count| count as f64));
+        let rad_per_count = self.map.rad_per_count();
+        std::array::from_fn(|j| rad_per_count[j] * counts_per_s[j])
+    }
+
+    /// What was read so far says nothing about how fast it moves.
+    pub fn forget_motion(&mut self) {
+        self.velocity.forget();
     }
 
     /// Codes for an effort in the pose that was read.

@@ -168,6 +168,7 @@ impl Device for EmulatedDevice {
 
     fn rearm(&mut self) {
         self.armed_ns = monotonic_ns();
+        self.arm.forget_motion();
         self.card().outputs.arm.fetch_add(1, Ordering::AcqRel);
     }
 

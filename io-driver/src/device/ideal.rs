@@ -5,10 +5,11 @@
 //!
 //! Model: the tip is where the hand script, which is written in the world frame W, has the finger at the
 //! time since full authority; before that it rests at the script's start. Without a script it rests at a
-//! fixed point. X_WD says where the base stands, as it would for a real device.
+//! fixed point. Its velocity is the plain difference of two ticks, to the last bit. X_WD says where the base stands, as it would for a real device.
 
 use super::{Device, Effort, Reading, TickTime, Written};
 use crate::sim::script::HandPlayer;
+use crate::velocity::VelocityEstimator;
 use nalgebra::{Isometry3, Point3, Vector3};
 use shm_abi::FaultReason;
 use shm_abi::segment::DeviceInfo;
@@ -29,13 +30,14 @@ pub struct IdealDevice {
     /// Takes points of W to D; `None` leaves them bit for bit as they are.
     world_to_base: Option<Isometry3<f64>>,
     hand: Hand,
+    velocity: VelocityEstimator,
 }
 
 impl IdealDevice {
     /// A device whose base stands at X_WD.
     pub fn new(info: DeviceInfo, base_in_world: Isometry3<f64>, hand: Hand) -> Self {
         let world_to_base = (base_in_world != Isometry3::identity()).then(|| base_in_world.inverse());
-        Self { info, world_to_base, hand }
+        Self { info, world_to_base, hand, velocity: VelocityEstimator::of_exact_places() }
     }
 }
 
@@ -56,7 +58,8 @@ impl Device for IdealDevice {
             Some(transform) => (transform * Point3::from(in_world)).coords,
             None => in_world,
         };
-        Ok(Reading::at(in_base))
+        let velocity_m_per_s = self.velocity.observe(time, in_base.into()).into();
+        Ok(Reading { velocity_m_per_s, ..Reading::at(in_base) })
     }
 
     fn write(&mut self, effort: Effort) -> Result<Written, FaultReason> {
@@ -64,4 +67,8 @@ impl Device for IdealDevice {
     }
 
     fn release(&mut self) {}
+
+    fn rearm(&mut self) {
+        self.velocity.forget();
+    }
 }

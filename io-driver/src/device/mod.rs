@@ -47,6 +47,8 @@ pub struct Reading {
     pub is_valid: bool,
     /// The tip (m).
     pub position_m: Vector3<f64>,
+    /// How fast the tip moves (m/s), estimated.
+    pub velocity_m_per_s: Vector3<f64>,
     /// The gimbal's last link, w x y z; identity where there is none.
     pub orientation_wxyz: [f64; 4],
     /// Whether a gimbal measures it.
@@ -55,20 +57,24 @@ pub struct Reading {
     pub encoder_counts: [i64; 6],
     /// Joint angles in the same order (rad).
     pub joint_angle_rad: [f64; 6],
+    /// How fast the three joints turn (rad/s), estimated; zero where there are none.
+    pub joint_velocity_rad_per_s: [f64; 3],
     /// Bit `i`: button `i` is pressed.
     pub buttons: u64,
 }
 
 impl Reading {
-    /// A valid reading of a position and nothing else.
+    /// A valid reading of a position at rest and nothing else.
     pub fn at(position_m: Vector3<f64>) -> Self {
         Self {
             is_valid: true,
             position_m,
+            velocity_m_per_s: Vector3::zeros(),
             orientation_wxyz: [1.0, 0.0, 0.0, 0.0],
             is_orientation_measured: false,
             encoder_counts: [0; 6],
             joint_angle_rad: [0.0; 6],
+            joint_velocity_rad_per_s: [0.0; 3],
             buttons: 0,
         }
     }
@@ -79,12 +85,20 @@ impl Reading {
         Self { orientation_wxyz: [w, x, y, z], is_orientation_measured: true, ..self }
     }
 
+    /// The same of a device that does not know where it is: nobody may take its numbers for a pose or a motion.
+    pub fn unknown(self) -> Self {
+        let (velocity_m_per_s, joint_velocity_rad_per_s) = (Vector3::zeros(), [0.0; 3]);
+        Self { is_valid: false, velocity_m_per_s, joint_velocity_rad_per_s, ..self }
+    }
+
     /// Whether every number of it is finite.
     pub fn is_finite(&self) -> bool {
         self.position_m
             .iter()
             .chain(&self.orientation_wxyz)
             .chain(&self.joint_angle_rad)
+            .chain(&self.velocity_m_per_s)
+            .chain(&self.joint_velocity_rad_per_s)
             .all(|n| n.is_finite())
     }
 
@@ -97,6 +111,8 @@ impl Reading {
         frame.encoder_counts = self.encoder_counts;
         frame.joint_angle_rad = self.joint_angle_rad;
         frame.position_m_measured = self.position_m.into();
+        frame.velocity_m_per_s_estimated = self.velocity_m_per_s.into();
+        frame.joint_velocity_rad_per_s_estimated = self.joint_velocity_rad_per_s;
         frame.orientation_wxyz_measured = self.orientation_wxyz;
     }
 }

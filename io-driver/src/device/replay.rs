@@ -57,4 +57,8 @@ impl Device for ReplayDevice {
     fn lose_zero(&mut self) {
         self.arm.lose_zero();
     }
+
+    fn rearm(&mut self) {
+        self.arm.forget_motion();
+    }
 }

@@ -73,18 +73,18 @@ impl Guard {
         }
     }
 
-    /// Takes the tip's position in a tick.
+    /// Takes the tip's position (m) and estimated velocity (m/s) in a tick.
     ///
     /// # Errors
     /// That it moved faster than it may.
-    pub fn observe(&mut self, tick: u64, position: Vector3<f64>) -> Result<(), FaultReason> {
+    pub fn observe(
+        &mut self,
+        tick: u64,
+        position: Vector3<f64>,
+        velocity: Vector3<f64>,
+    ) -> Result<(), FaultReason> {
         self.position = position;
-        self.speed.observe(tick, position).map(drop)
-    }
-
-    /// How fast the tip moves (m/s), fault or not.
-    pub fn velocity(&self) -> Vector3<f64> {
-        self.speed.velocity()
+        self.speed.observe(tick, position, velocity)
     }
 
     /// The position is not known; the next one is compared with nothing.
@@ -131,14 +131,14 @@ mod tests {
     #[test]
     fn each_limit_that_acts_is_told() {
         let mut guard = Guard::new(limits(), MS);
-        guard.observe(1, Vector3::zeros()).unwrap();
+        guard.observe(1, Vector3::zeros(), Vector3::zeros()).unwrap();
         let small = guard.restrain(Vector3::x(), 1.0);
         assert_eq!(small, Restrained { force_on_user_n: Vector3::x(), limits: 0 });
         let step = guard.restrain(Vector3::x() * 9.0, 1.0);
         assert_eq!(step.limits, LIMIT_PEAK | LIMIT_SLEW);
         assert_eq!(step.force_on_user_n, Vector3::x() * 3.0);
         let mut outside = Guard::new(limits(), MS);
-        outside.observe(1, Vector3::x() * 0.11).unwrap();
+        outside.observe(1, Vector3::x() * 0.11, Vector3::zeros()).unwrap();
         let faded = outside.restrain(Vector3::x(), 1.0);
         assert_eq!(faded.limits, LIMIT_WORKSPACE);
         assert!((faded.force_on_user_n.x - 0.5).abs() < 1e-14, "half of it in mid margin, to rounding");
@@ -165,7 +165,7 @@ mod tests {
             let mut guard = Guard::new(limits(), MS);
             let mut last = Vector3::zeros();
             for (tick, (force, authority, position)) in commands.into_iter().enumerate() {
-                let _ = guard.observe(tick as u64, position.into());
+                let _ = guard.observe(tick as u64, position.into(), Vector3::zeros());
                 let out = guard.restrain(force.into(), authority).force_on_user_n;
                 prop_assert!(out.iter().all(|c| c.is_finite()));
                 // A few roundings of numbers below 10.

@@ -7,6 +7,7 @@ use io_driver::cycle::{Cycle, Freshness, Protection};
 use io_driver::device::{Device, Effort, Reading, TickTime, Written};
 use io_driver::safety::switches::Switches;
 use io_driver::safety::{Ramps, Safety};
+use io_driver::velocity::VelocityEstimator;
 use io_driver::zeroing::ZeroState;
 use nalgebra::Vector3;
 use shm_abi::doorbell::WaitMode;
@@ -34,7 +35,9 @@ pub struct Log {
     pub needs_zero: Option<bool>,
 }
 
+/// Its velocity is the plain difference of its positions.
 pub struct TestDevice {
+    pub velocity: VelocityEstimator,
     pub info: DeviceInfo,
     pub log: Arc<Mutex<Log>>,
 }
@@ -44,10 +47,13 @@ impl Device for TestDevice {
         &self.info
     }
 
-    fn read(&mut self, _time: TickTime) -> Result<Reading, FaultReason> {
+    fn read(&mut self, time: TickTime) -> Result<Reading, FaultReason> {
         let planned = self.log.lock().unwrap().next_reading.take();
         let encoder_counts = self.log.lock().unwrap().counts;
-        planned.unwrap_or(Ok(Reading { encoder_counts, ..Reading::at(Vector3::new(0.1, 0.2, 0.3)) }))
+        let usual = Reading { encoder_counts, ..Reading::at(Vector3::new(0.1, 0.2, 0.3)) };
+        let reading = planned.unwrap_or(Ok(usual))?;
+        let velocity_m_per_s = self.velocity.observe(time, reading.position_m.into()).into();
+        Ok(Reading { velocity_m_per_s, ..reading })
     }
 
     fn write(&mut self, effort: Effort) -> Result<Written, FaultReason> {
@@ -66,6 +72,7 @@ impl Device for TestDevice {
     }
 
     fn rearm(&mut self) {
+        self.velocity.forget();
         self.log.lock().unwrap().rearms += 1;
     }
 
@@ -132,7 +139,8 @@ impl Bench {
         .unwrap();
         let view = DriverView::map(memory.fd()).unwrap();
         let log = Arc::new(Mutex::new(Log::default()));
-        let device = TestDevice { info, log: Arc::clone(&log) };
+        let device =
+            TestDevice { velocity: VelocityEstimator::of_exact_places(), info, log: Arc::clone(&log) };
         let protection = Protection { safety: Safety::new(RAMPS), switches, workspace_margin_m: 0.02 };
         let cycle =
             Cycle::new(Arc::new(memory), vec![Box::new(device)], protection, PERIOD_NS, Freshness(freshness));
