@@ -1,5 +1,6 @@
 //! What happens without arguments: the default scene, felt for ten seconds in real time.
 
+use crate::not_zeroed;
 use crate::outcome::RunFailure;
 use crate::rig::{HandMode, Rig, RigError};
 use crate::run::{Attach, RunPlan};
@@ -68,13 +69,19 @@ pub fn plan(rig: &Rig) -> RunPlan {
             ));
             None
         }
-        Ok(_) => {
-            say(format_args!(
-                "phantom3: using the driver at {}; its devices are the fingers",
-                socket.display()
-            ));
-            Some(Attach { socket, grace: Duration::from_secs(2) })
-        }
+        Ok(seen) => match not_zeroed::words(&seen.driver, &socket) {
+            Some(words) => {
+                say(format_args!("phantom3: {words}; starting a driver of our own with ideal devices"));
+                None
+            }
+            None => {
+                say(format_args!(
+                    "phantom3: using the driver at {}; its devices are the fingers",
+                    socket.display()
+                ));
+                Some(Attach { socket, grace: Duration::from_secs(2) })
+            }
+        },
         Err(AttachError::NoDriver { .. } | AttachError::DriverGone { .. }) => {
             say(format_args!(
                 "phantom3: no driver is running; starting one of our own with simulated PHANToM Premiums"

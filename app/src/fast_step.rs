@@ -95,21 +95,28 @@ impl DeviceFinger {
         driver_estimates: bool,
     ) -> FingerRow {
         let hip = self.mount.point_to_world(device.position_m_measured);
+        let orientation_wxyz = self.mount.orientation_to_world(device.orientation_wxyz_measured);
+        let seen = FingerRow {
+            hip,
+            god_object: hip,
+            orientation_wxyz,
+            buttons: device.buttons,
+            ..FingerRow::default()
+        };
         if device.flags & DEVICE_POSITION_VALID == 0 {
             self.finger.reset();
-            return FingerRow { hip, god_object: hip, ..FingerRow::default() };
+            return seen;
         }
         let velocity =
             driver_estimates.then(|| self.mount.velocity_to_world(device.velocity_m_per_s_estimated));
         let output = self.finger.step(entities, Hip { position_W: hip, velocity_W: velocity }, dt_s);
         FingerRow {
-            hip,
             god_object: output.god_object_W,
             force_on_user: finite_or_zero(output.force_on_user_W),
-            applied_on_user: Vector3::zeros(),
             entity: output.entity.map(|index| index as u32),
             feature: output.feature,
             friction: output.friction,
+            ..seen
         }
     }
 }

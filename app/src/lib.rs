@@ -17,6 +17,7 @@ pub mod fast_loop;
 pub mod fast_step;
 pub mod fast_thread;
 pub mod mount;
+mod not_zeroed;
 pub mod outcome;
 pub mod progress;
 pub mod recording;

@@ -5,7 +5,7 @@
 
 #![allow(non_snake_case)] // Frames are capital letters: X_WD takes D to W.
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Quaternion, Vector3};
 
 /// The pose of a device's base.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,6 +38,14 @@ impl Mount {
         self.X_WD.map_or(f_D, |pose| pose.rotation * f_D)
     }
 
+    /// An orientation told in the base frame, in the world; w x y z.
+    pub fn orientation_to_world(&self, q_D: [f64; 4]) -> [f64; 4] {
+        let Some(pose) = self.X_WD else { return q_D };
+        let [w, x, y, z] = q_D;
+        let q_W = pose.rotation.into_inner() * Quaternion::new(w, x, y, z);
+        [q_W.w, q_W.i, q_W.j, q_W.k]
+    }
+
     /// A force of the world in the base frame (N).
     pub fn force_to_device(&self, f_W: Vector3<f64>) -> [f64; 3] {
         self.X_WD.map_or(f_W, |pose| pose.rotation.inverse() * f_W).into()
@@ -57,6 +65,20 @@ mod tests {
             assert_eq!(mount.velocity_to_world(p).map(f64::to_bits), Vector3::from(p).map(f64::to_bits));
             assert_eq!(mount.force_to_device(Vector3::from(p)).map(f64::to_bits), p.map(f64::to_bits));
         }
+        assert_eq!(mount.orientation_to_world([0.1, 0.2, 0.3, 0.4]), [0.1, 0.2, 0.3, 0.4]);
+    }
+
+    #[test]
+    fn a_turned_base_turns_an_orientation_from_the_left() {
+        let turn = |axis, angle| UnitQuaternion::from_axis_angle(&axis, angle);
+        let (base, gimbal) = (turn(Vector3::y_axis(), 0.7), turn(Vector3::x_axis(), -0.4));
+        let mount = Mount::new(Isometry3::from_parts(Translation3::identity(), base));
+        let q = gimbal.quaternion();
+        let [w, x, y, z] = mount.orientation_to_world([q.w, q.i, q.j, q.k]);
+        let found = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
+        let down = -Vector3::y();
+        // Rotations of a unit vector by rounded quaternions.
+        assert!((found * down - base * (gimbal * down)).norm() < 1e-15);
     }
 
     #[test]

@@ -8,7 +8,7 @@
 
 use crate::row::{FingerRow, Row};
 use haptics::{ContactState, Feature};
-use io_driver::device::run_time_s;
+use io_driver::device::{Extras, run_time_s};
 use nalgebra::Vector3;
 use std::fmt::Write as _;
 use std::fs::File;
@@ -53,8 +53,16 @@ pub enum RecordingError {
 pub struct Names {
     /// The fingers.
     pub fingers: Vec<String>,
+    /// What their devices tell besides positions; fingers beyond the list: nothing.
+    pub extras: Vec<Extras>,
     /// The entities.
     pub entities: Vec<String>,
+}
+
+impl Names {
+    fn extras_of(&self, finger: usize) -> Extras {
+        self.extras.get(finger).copied().unwrap_or_default()
+    }
 }
 
 /// A recording being written.
@@ -176,7 +184,7 @@ impl Recording {
 /// The names of all columns.
 fn header(names: &Names) -> String {
     let mut line = String::from("t");
-    for finger in &names.fingers {
+    for (index, finger) in names.fingers.iter().enumerate() {
         for quantity in ["hip", "god", "force"] {
             push_axes(&mut line, finger, quantity);
         }
@@ -184,9 +192,20 @@ fn header(names: &Names) -> String {
             let _ = write!(line, ",{finger}_{quantity}");
         }
         push_axes(&mut line, finger, "applied");
+        push_extras(&mut line, finger, names.extras_of(index));
     }
     line.push('\n');
     line
+}
+
+/// Only where there is something to tell: recordings of all other devices stay as they are.
+fn push_extras(line: &mut String, finger: &str, extras: Extras) {
+    for component in ["qw", "qx", "qy", "qz"].into_iter().filter(|_| extras.orientation) {
+        let _ = write!(line, ",{finger}_{component}");
+    }
+    if extras.buttons {
+        let _ = write!(line, ",{finger}_buttons");
+    }
 }
 
 fn push_axes(line: &mut String, finger: &str, quantity: &str) {
@@ -197,8 +216,9 @@ fn push_axes(line: &mut String, finger: &str, quantity: &str) {
 
 fn write_row(line: &mut String, row: &Row, names: &Names, period_ns: u64) {
     let _ = write!(line, "{:?}", run_time_s(row.run_tick as i64, period_ns));
-    for (_, finger) in names.fingers.iter().zip(&row.fingers) {
+    for (index, (_, finger)) in names.fingers.iter().zip(&row.fingers).enumerate() {
         write_finger(line, finger, names);
+        write_extras(line, finger, names.extras_of(index));
     }
     line.push('\n');
 }
@@ -211,6 +231,17 @@ fn write_finger(line: &mut String, finger: &FingerRow, names: &Names) {
     let (feature, friction) = (feature_name(finger.feature), friction_name(finger.friction));
     let _ = write!(line, ",{},{feature},{friction}", entity.map_or("", String::as_str));
     write_vector(line, &finger.applied_on_user);
+}
+
+fn write_extras(line: &mut String, finger: &FingerRow, extras: Extras) {
+    if extras.orientation {
+        for component in finger.orientation_wxyz {
+            let _ = write!(line, ",{component:?}");
+        }
+    }
+    if extras.buttons {
+        let _ = write!(line, ",{}", finger.buttons);
+    }
 }
 
 /// `{:?}` of an f64 is the shortest text that reads back as the same number.
@@ -240,7 +271,7 @@ mod tests {
     use super::*;
 
     fn names() -> Names {
-        Names { fingers: vec!["a".into(), "b".into()], entities: vec!["table".into()] }
+        Names { fingers: vec!["a".into(), "b".into()], extras: Vec::new(), entities: vec!["table".into()] }
     }
 
     fn row(run_tick: u64, number: f64) -> Row {
@@ -272,6 +303,22 @@ mod tests {
         assert_eq!(lines[1][at("b_entity")], "table");
         assert_eq!(lines[1][at("b_feature")], "none");
         assert_eq!(lines[1][at("b_friction")], "free");
+    }
+
+    #[test]
+    fn only_a_device_that_tells_more_has_more_columns() {
+        let extras = vec![Extras::default(), Extras { orientation: true, buttons: true }];
+        let plain = header(&names());
+        let names = Names { extras, ..names() };
+        let added = ",b_qw,b_qx,b_qy,b_qz,b_buttons\n";
+        assert_eq!(header(&names), plain.trim_end().to_owned() + added, "behind the last finger's others");
+        let mut told = row(0, 1.0);
+        told.fingers[1].orientation_wxyz = [0.5, -0.5, 0.5, -0.5];
+        told.fingers[1].buttons = 5;
+        let mut line = String::new();
+        write_row(&mut line, &told, &names, 1_000_000);
+        assert!(line.ends_with(",0.5,-0.5,0.5,-0.5,5\n"), "{line}");
+        assert_eq!(line.matches(',').count(), header(&names).matches(',').count());
     }
 
     #[test]

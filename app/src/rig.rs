@@ -8,7 +8,9 @@ use crate::simulated::{SimulatedDevices, SimulationError, base_for_path};
 use haptics::{Entity, Finger, Friction, ParameterError, Plane, Shape, Sphere};
 use io_driver::config::{
     Backend, DeviceConfig, DriverConfig, ProcessConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig, Wish,
+    Zeroing,
 };
+use io_driver::device::Extras;
 use io_driver::device_file::Workspace;
 use io_driver::open::{OpenError, open_devices};
 use io_driver::say::say;
@@ -215,9 +217,11 @@ impl Rig {
         Ok(FastStep::new(fingers, entities, self.period_ns))
     }
 
-    /// What the recording's columns are called.
-    pub fn names(&self) -> Names {
+    /// What the recording's columns are called, for devices that tell so much.
+    pub fn names(&self, devices: &[Extras]) -> Names {
+        let of = |device: usize| devices.get(device).copied().unwrap_or_default();
         Names {
+            extras: self.scene.fingers.iter().map(|finger| of(finger.device)).collect(),
             fingers: self.scene.fingers.iter().map(|finger| finger.name.clone()).collect(),
             entities: self.scene.entities.iter().map(|entity| entity.name.clone()).collect(),
         }
@@ -269,6 +273,7 @@ impl Rig {
             backend,
             peak_force_n: None,
             compensates_gravity,
+            zeroing: Zeroing::Known,
         }
     }
 

@@ -24,6 +24,10 @@ pub struct FingerRow {
     pub force_on_user: Vector3<f64>,
     /// What the device was made to render after ramps, limits and converters (N).
     pub applied_on_user: Vector3<f64>,
+    /// How its device's last link is turned, w x y z; recorded where a gimbal measures it.
+    pub orientation_wxyz: [f64; 4],
+    /// Bit `i`: button `i` of its device is pressed; recorded where it has buttons.
+    pub buttons: u64,
     /// Index of the touched entity.
     pub entity: Option<u32>,
     /// What of it is touched.

@@ -2,6 +2,7 @@
 
 use crate::child::DriverChild;
 use crate::fast_loop::{FastLoop, WhenFull};
+use crate::not_zeroed;
 use crate::outcome::{RunFailure, Stop};
 use crate::progress::Progress;
 use crate::recording::Recording;
@@ -10,7 +11,9 @@ use crate::rig::Rig;
 use crate::slow::{SlowSide, row_queue};
 use crate::two_processes::{self, Source};
 use crate::virtual_clock::VirtualDriver;
+use io_driver::device::Extras;
 use rt_core::signals::StopSignals;
+use shm_abi::DriverView;
 use shm_abi::client;
 use shm_abi::segment::{ClockMode, DriverInfo};
 use std::path::PathBuf;
@@ -57,7 +60,13 @@ struct Parts {
 }
 
 impl Parts {
-    fn new(rig: &Rig, plan: &RunPlan, clock: ClockMode, period_ns: u64) -> Result<Self, RunFailure> {
+    fn new(
+        rig: &Rig,
+        plan: &RunPlan,
+        clock: ClockMode,
+        period_ns: u64,
+        devices: &[Extras],
+    ) -> Result<Self, RunFailure> {
         let seconds = plan.seconds.unwrap_or_else(|| rig.default_seconds());
         let total_ticks = (seconds * 1e9 / period_ns as f64).round() as u64;
         if total_ticks == 0 {
@@ -69,7 +78,7 @@ impl Parts {
         let when_full = if clock == ClockMode::Real { WhenFull::Drop } else { WhenFull::Wait };
         let step = rig.fast_step().map_err(|error| RunFailure::Start(error.to_string()))?;
         let (producer, consumer) = row_queue();
-        let record = |path: &PathBuf| Recording::create(path, rig.names(), period_ns);
+        let record = |path: &PathBuf| Recording::create(path, rig.names(devices), period_ns);
         let recording = plan.record.as_ref().map(record).transpose()?;
         Ok(Self {
             fast: FastLoop::new(step, producer, when_full, total_ticks, period_ns),
@@ -82,7 +91,7 @@ impl Parts {
 fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Report, Stop), RunFailure> {
     let mut driver = VirtualDriver::open(&rig.driver_config(ClockMode::Virtual))?;
     let Parts { mut fast, mut slow, mut progress } =
-        Parts::new(rig, plan, ClockMode::Virtual, rig.period_ns)?;
+        Parts::new(rig, plan, ClockMode::Virtual, rig.period_ns, &driver.extras())?;
     let result = driver.run(&mut fast, &mut slow, &mut progress, signals);
     progress.end();
     let (stop, rows) = close(result, slow)?;
@@ -103,12 +112,14 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
     let (mut source, attachment) = connect(rig, plan)?;
     let info = attachment.driver.info();
     check_devices(rig, &info)?;
+    check_zeroed(&source, &attachment.driver)?;
     check_clock(plan, &info)?;
+    let extras = extras_of(&attachment.driver);
     let driver_name = describe(&source, attachment.driver_pid, &info);
     let baseline = Baseline::of(&attachment.driver);
     let step_rig = rig.clone().at_period(info.period_ns);
     let Parts { fast, mut slow, mut progress } =
-        Parts::new(&step_rig, plan, info.clock_mode, info.period_ns)?;
+        Parts::new(&step_rig, plan, info.clock_mode, info.period_ns, &extras)?;
     let result = two_processes::run(&mut source, attachment, fast, &mut slow, &mut progress, signals);
     progress.end();
     let (end, rows) = close(result, slow)?;
@@ -170,6 +181,22 @@ fn check_devices(rig: &Rig, info: &DriverInfo) -> Result<(), RunFailure> {
          take fingers out of the scene, or add devices to the driver's configuration",
         rig.scene_file.display()
     )))
+}
+
+/// What the devices of a driver tell besides positions; in every frame the same.
+fn extras_of(driver: &DriverView) -> Vec<Extras> {
+    let frame = not_zeroed::first_frame(driver);
+    let flags = frame.iter().flat_map(|frame| frame.present_devices()).map(|device| device.flags);
+    flags.map(Extras::of).collect()
+}
+
+/// Nobody would be told why nothing can be felt.
+fn check_zeroed(source: &Source, driver: &DriverView) -> Result<(), RunFailure> {
+    let Source::Running { socket, .. } = source else { return Ok(()) };
+    match not_zeroed::words(driver, socket) {
+        Some(words) => Err(RunFailure::Start(words)),
+        None => Ok(()),
+    }
 }
 
 fn check_clock(plan: &RunPlan, info: &DriverInfo) -> Result<(), RunFailure> {

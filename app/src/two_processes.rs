@@ -7,6 +7,7 @@
 use crate::child::DriverChild;
 use crate::fast_loop::{FastLoop, Tally};
 use crate::fast_thread::{self, FastEnd, FastRemains, FastShared};
+use crate::not_zeroed;
 use crate::outcome::{RunFailure, Stop};
 use crate::progress::Progress;
 use crate::slow::SlowSide;
@@ -16,7 +17,7 @@ use rt_core::setup::SetupReport;
 use rt_core::signals::StopSignals;
 use shm_abi::DriverView;
 use shm_abi::client::{self, Attachment, Connection};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
@@ -153,9 +154,10 @@ fn reattach(source: &mut Source, words: &str, signals: &StopSignals) -> Result<A
         Source::Running { socket, grace } => (socket, *grace),
     };
     say(format_args!("phantom3: the driver is gone: {words}; waiting up to {grace:?} for its return"));
-    let begun = Instant::now();
+    let mut begun = Instant::now();
+    let mut told = false;
     loop {
-        match client::command(socket, "phantom3") {
+        let error = match come_back(socket) {
             Ok(attachment) => {
                 say(format_args!(
                     "phantom3: the driver is back (process {}); the run goes on",
@@ -163,15 +165,38 @@ fn reattach(source: &mut Source, words: &str, signals: &StopSignals) -> Result<A
                 ));
                 return Ok(attachment);
             }
-            Err(_) if signals.requested().is_some() => {
-                return Err(RunFailure::DriverGone(format!(
-                    "{words}; a signal ended the wait for its return"
-                )));
-            }
-            Err(error) if begun.elapsed() > grace => {
-                return Err(RunFailure::DriverGone(format!("{words}; after {grace:?}: {error}")));
-            }
-            Err(_) => std::thread::sleep(SLOW_PERIOD),
+            Err(error) => error,
+        };
+        if signals.requested().is_some() {
+            return Err(RunFailure::DriverGone(format!("{words}; a signal ended the wait for its return")));
         }
+        if !told && let Absence::NotZeroed(words) = &error {
+            // A person has to walk there.
+            say(format_args!("phantom3: the driver is back: {words}; waiting up to {grace:?} for that"));
+            (told, begun) = (true, Instant::now());
+        }
+        if begun.elapsed() > grace {
+            return Err(RunFailure::DriverGone(format!("{words}; after {grace:?}: {error}")));
+        }
+        std::thread::sleep(SLOW_PERIOD);
+    }
+}
+
+/// Why a run cannot go on yet.
+#[derive(Debug, thiserror::Error)]
+enum Absence {
+    #[error(transparent)]
+    Gone(#[from] client::AttachError),
+    #[error("{0}")]
+    NotZeroed(String),
+}
+
+/// The lease of a driver whose devices know where they are. Looked at before the lease is asked for: who zeroes
+/// them should not find somebody in command.
+fn come_back(socket: &Path) -> Result<Attachment, Absence> {
+    let observer = client::observe(socket, "phantom3")?;
+    match not_zeroed::words(&observer.driver, socket) {
+        Some(words) => Err(Absence::NotZeroed(words)),
+        None => Ok(client::command(socket, "phantom3")?),
     }
 }

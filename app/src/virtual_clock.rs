@@ -10,6 +10,7 @@ use crate::progress::Progress;
 use crate::slow::SlowSide;
 use io_driver::config::{DriverConfig, ReplyMode};
 use io_driver::cycle::Cycle;
+use io_driver::device::Extras;
 use io_driver::driver::{describe, make_cycle};
 use io_driver::open::open_devices;
 use rt_core::signals::StopSignals;
@@ -54,6 +55,11 @@ impl VirtualDriver {
     /// The driver's memory, as an application sees it.
     pub fn view(&self) -> &DriverView {
         &self.driver
+    }
+
+    /// What the devices tell besides their positions.
+    pub fn extras(&self) -> Vec<Extras> {
+        self.cycle.extras()
     }
 
     /// Runs to the end.

@@ -4,6 +4,7 @@
 
 mod commission;
 mod emulate;
+mod zero;
 
 use crate::config::{Commissioning, DriverConfig};
 use crate::doctor::cli::{self as doctor, DoctorArgs};
@@ -18,6 +19,7 @@ use shm_abi::endpoint;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
+use zero::ZeroArgs;
 
 /// Bad usage or bad input.
 pub const EXIT_USAGE: u8 = 2;
@@ -48,6 +50,8 @@ pub enum DriverCommand {
     ClearFault(SocketArgs),
     /// Switch all motors off at once and keep them off until `clear-fault`
     EmergencyStop(SocketArgs),
+    /// Tell devices that they are in their zeroing pose
+    Zero(ZeroArgs),
     /// Try a device for the first time: do its counters and motors turn the right way?
     Commission(CommissionArgs),
     /// Play a card with counters, converters and amplifiers, for a driver without hardware
@@ -129,6 +133,7 @@ fn execute_with(command: DriverCommand, fit: Option<Fit>) -> ExitCode {
         DriverCommand::Doctor(args) => doctor::run(&args),
         DriverCommand::ClearFault(args) => report(client::clear_fault(&args.path(), "io-driver")),
         DriverCommand::EmergencyStop(args) => report(client::emergency_stop(&args.path(), "io-driver")),
+        DriverCommand::Zero(args) => zero::run(&args),
         DriverCommand::Commission(args) => commission::run(&args),
         DriverCommand::Emulate(args) => emulate::run(&args),
     }

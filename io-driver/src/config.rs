@@ -11,12 +11,14 @@ mod real_time;
 mod reply;
 mod safety;
 mod toml_text;
+mod zeroing;
 
 pub use device::{Backend, DeviceConfig, HandChoice, Wish};
 pub use process::ProcessConfig;
 pub use real_time::{OverrunPolicy, RealTime, SpinMargin, longest_spin_margin_ns};
 pub use reply::{ReplyConfig, ReplyMode};
 pub use safety::{Commissioning, SafetyConfig};
+pub use zeroing::Zeroing;
 
 use crate::toml_report::{Allowed, TomlReport, TomlText};
 use device::RawDevice;

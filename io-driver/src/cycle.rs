@@ -14,14 +14,18 @@
 //! Cost: linear in the devices; no allocation, lock, system call (but a wake-up, if the commander sleeps) or
 //! panic.
 
-use crate::device::{Device, Effort, Reading, TickTime};
+use crate::device::{Device, Effort, Extras, Reading, TickTime};
 use crate::meter::{bump, record};
 use crate::reply::Reply;
 use crate::safety::switches::{Inputs, Switches};
 use crate::safety::{Guard, Limits, Safety};
+use crate::zeroing::{DeviceSet, ZeroRefusal, ZeroState, ZeroWatch};
 use bytemuck::Zeroable;
 use rt_core::clock::monotonic_ns;
-use shm_abi::frame::{LIMIT_HEAT, LIMIT_PEAK, LIMIT_SLEW, LIMIT_WORKSPACE};
+use shm_abi::frame::{
+    DEVICE_HAS_BUTTONS, DEVICE_NOT_ZEROED, DEVICE_POSITION_VALID, LIMIT_HEAT, LIMIT_PEAK, LIMIT_SLEW,
+    LIMIT_WORKSPACE,
+};
 use shm_abi::layout::Counters;
 use shm_abi::{CommanderView, DriverMemory, FaultReason, Frame, MAX_DEVICES, Outcome, ReplyKind};
 use std::sync::Arc;
@@ -49,6 +53,9 @@ pub struct Cycle {
     guards: Vec<Guard>,
     switches: Switches,
     safety: Safety,
+    zeros: ZeroWatch,
+    /// What became of the last request to zero, until somebody asks.
+    zero_verdict: Option<Result<DeviceSet, ZeroRefusal>>,
     period_ns: u64,
     freshness: Freshness,
     /// The lease whose commands are obeyed.
@@ -86,6 +93,8 @@ impl Cycle {
             guards,
             switches,
             safety,
+            zeros: ZeroWatch::new(period_ns),
+            zero_verdict: None,
             period_ns,
             freshness,
             lease: None,
@@ -156,10 +165,45 @@ impl Cycle {
         self.guards.iter_mut().for_each(Guard::lose_sight);
     }
 
+    /// Somebody says that these devices (none named: all that count) are in their zeroing pose. What became of it
+    /// is told by [`zero_verdict`](Self::zero_verdict).
+    pub fn zero(&mut self, asked: DeviceSet) {
+        let states = self.devices.iter().map(|device| device.zero_state());
+        let verdict = self.zeros.choose(asked, !self.safety.may_zero(), states);
+        if let Ok(chosen) = verdict {
+            for index in (0..self.devices.len()).filter(|index| chosen.has(*index)) {
+                self.devices[index].zero();
+                self.guards[index].lose_sight();
+            }
+            self.zeros.withhold(chosen);
+        }
+        self.zero_verdict = Some(verdict);
+    }
+
+    /// What the devices tell besides their positions.
+    pub fn extras(&self) -> Vec<Extras> {
+        self.devices.iter().map(|device| device.extras()).collect()
+    }
+
+    /// The devices that have to be zeroed.
+    pub fn not_zeroed(&self) -> DeviceSet {
+        let bit = |(index, device): (usize, &Box<dyn Device>)| {
+            u64::from(device.zero_state() == ZeroState::Needed) << index
+        };
+        DeviceSet(self.devices.iter().enumerate().map(bit).fold(0, |bits, bit| bits | bit))
+    }
+
+    /// What became of the last request to zero; told once.
+    pub fn zero_verdict(&mut self) -> Option<Result<DeviceSet, ZeroRefusal>> {
+        self.zero_verdict.take()
+    }
+
     /// Reads all devices and publishes the frame of `tick`, which was due at `deadline_ns`.
     pub fn sense(&mut self, tick: u64, deadline_ns: u64) {
         self.started_ns = monotonic_ns();
         let time = TickTime { tick, period_ns: self.period_ns, run_tick: self.safety.run_tick(tick) };
+        let answered = self.lease().and(self.reply.tick);
+        self.zeros.begin_tick(tick, answered);
         let all_valid = self.read_devices(time);
         self.safety.set_positions_valid(all_valid);
         self.read_switches();
@@ -235,11 +279,7 @@ impl Cycle {
                 if reading.is_finite() { Ok(reading) } else { Err(FaultReason::PositionNotFinite) }
             });
             match reading {
-                Ok(reading) => {
-                    reading.write_to(&mut self.frame.devices[index]);
-                    all_valid &= reading.is_valid;
-                    self.watch_speed(index, time.tick, &reading);
-                }
+                Ok(reading) => all_valid &= self.take_reading(index, time.tick, reading),
                 Err(reason) => {
                     // The last good position stays in the frame, marked as not to be trusted; nobody knows how
                     // fast it changes.
@@ -248,11 +288,35 @@ impl Cycle {
                     frame.velocity_m_per_s_estimated = [0.0; 3];
                     frame.joint_velocity_rad_per_s_estimated = [0.0; 3];
                     all_valid = false;
+                    self.zeros.lose_sight(index);
                     self.fault(reason);
                 }
             }
+            if self.devices[index].extras().buttons {
+                self.frame.devices[index].flags |= DEVICE_HAS_BUTTONS;
+            }
+            if self.devices[index].zero_state() == ZeroState::Needed {
+                let flags = &mut self.frame.devices[index].flags;
+                *flags = *flags & !DEVICE_POSITION_VALID | DEVICE_NOT_ZEROED;
+                all_valid = false;
+            }
         }
         all_valid
+    }
+
+    /// Returns whether its position can be trusted.
+    fn take_reading(&mut self, index: usize, tick: u64, reading: Reading) -> bool {
+        self.zeros.observe(index, reading.encoder_counts);
+        let knows = self.devices[index].zero_state() != ZeroState::Needed && !self.zeros.is_withheld(index);
+        let reading = if knows { reading } else { reading.unknown() };
+        reading.write_to(&mut self.frame.devices[index]);
+        if knows {
+            self.watch_speed(index, tick, &reading);
+        } else {
+            // Where it is then will have nothing to do with where it seems to be now.
+            self.guards[index].lose_sight();
+        }
+        reading.is_valid
     }
 
     fn watch_speed(&mut self, device: usize, tick: u64, reading: &Reading) {
@@ -260,7 +324,13 @@ impl Cycle {
             Ok(()) => {}
             // A hand may be as fast as it likes as long as no motor drives it.
             Err(FaultReason::Overspeed) if self.safety.is_released() => {}
-            Err(reason) => self.fault(reason),
+            Err(reason) => {
+                if reason == FaultReason::PositionJump {
+                    // Nothing moves like that: its counters do not tell where it is any more.
+                    self.devices[device].lose_zero();
+                }
+                self.fault(reason);
+            }
         }
     }
 

@@ -3,8 +3,8 @@
 //! Problem: individual devices differ by up to a fifth, wiring is not public, and a changed cable
 //! must not need a compiler.
 //! Model: `kind` says which tables the file has. An arm (`premium`, `wooden-haptics`) has `[linkage]`, `[encoders]`,
-//! `[motors]` and, if gravity is to be compensated, `[bodies]`; if it is to be simulated, moments of inertia in
-//! `[bodies]` and a table `[simulation]`. An `ideal` device has nothing.
+//! `[motors]`, if gravity is to be compensated `[bodies]`, and with an instrumented gimbal `[gimbal]`; if it is to be
+//! simulated, moments of inertia in `[bodies]` and a table `[simulation]`. An `ideal` device has nothing.
 //! Units: each key carries its own.
 //! Invariants: a value of type [`DeviceFile`] has been checked: all numbers are finite and in
 //! their range, limits are ordered, the home pose is within them, and the inverse kinematics is
@@ -27,6 +27,7 @@ use crate::toml_report::{TomlReport, TomlText};
 
 mod arm;
 mod bodies;
+mod gimbal;
 mod ideal;
 mod premium;
 mod simulation;
@@ -62,6 +63,10 @@ pub struct ArmFile {
     pub mechanism: Kinematics,
     /// From raw counters to joint angles.
     pub encoders: EncoderSpec,
+    /// From raw counters to the angles of an instrumented gimbal, if there is one.
+    pub gimbal: Option<EncoderSpec>,
+    /// How many buttons its handle has.
+    pub buttons: u32,
     /// From joint torques to converter codes.
     pub motors: MotorSpec,
     /// What the motors stand.
@@ -180,6 +185,17 @@ impl Workspace {
     /// Whether a position of the tip in the base frame lies inside.
     pub fn contains(&self, tip_m: [f64; 3]) -> bool {
         (0..3).all(|i| (tip_m[i] - self.centre_m[i]).abs() <= 0.5 * self.size_m[i])
+    }
+}
+
+/// The zeroing pose of a kind of device in words, unless its description's `home_joint_angles_rad` say otherwise.
+pub fn home_pose(kind: &str) -> &'static str {
+    match kind {
+        "premium" => {
+            "turret straight ahead, upper arm level, forearm hanging straight down, a gimbal straight \
+             (where `home_joint_angles_rad` of its description are zero)"
+        }
+        _ => "the pose of `home_joint_angles_rad` in its description",
     }
 }
 

@@ -32,11 +32,11 @@ pub struct EncoderSpec {
     pub home_joint_angles_rad: [f64; 3],
 }
 
-/// Counts beyond the width of a counter that wraps.
+/// Counts of `N` counters beyond the width at which they wrap.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct EncoderExtender {
+pub struct EncoderExtender<const N: usize = 3> {
     bits: u32,
-    counts: [i64; 3],
+    counts: [i64; N],
 }
 
 /// Linear map between extended counts and joint angles.
@@ -47,17 +47,17 @@ pub struct JointMap {
     home_counts: [i64; 3],
 }
 
-impl EncoderExtender {
+impl<const N: usize> EncoderExtender<N> {
     /// For counters of `bits` bits, 1 to 63 (others are taken as the nearest of these).
     ///
     /// The first readings are taken as signed numbers, since nobody knows how often the counters
     /// wrapped before.
     pub fn new(bits: u32) -> Self {
-        Self { bits: bits.clamp(1, 63), counts: [0; 3] }
+        Self { bits: bits.clamp(1, 63), counts: [0; N] }
     }
 
     /// Takes the raw readings of a tick; bits above the width are ignored.
-    pub fn extend(&mut self, raw: [i64; 3]) -> [i64; 3] {
+    pub fn extend(&mut self, raw: [i64; N]) -> [i64; N] {
         let unused = 64 - self.bits;
         for (count, raw) in self.counts.iter_mut().zip(raw) {
             // Shifting up and back down keeps `bits` bits and spreads the sign.
@@ -68,7 +68,7 @@ impl EncoderExtender {
     }
 
     /// The extended counts after the last readings.
-    pub fn counts(&self) -> [i64; 3] {
+    pub fn counts(&self) -> [i64; N] {
         self.counts
     }
 }
@@ -105,6 +105,11 @@ impl JointMap {
             // `as` saturates, and makes zero of NaN.
             self.home_counts[j].saturating_add(from_home.round() as i64)
         })
+    }
+
+    /// The angles of the zeroing pose.
+    pub fn home_angles_rad(&self) -> [f64; 3] {
+        self.home_joints_rad
     }
 
     /// Angle of one count of each joint, with the sign of the counter.

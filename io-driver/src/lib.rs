@@ -42,3 +42,4 @@ pub mod supervisor;
 pub mod table;
 pub mod toml_report;
 pub mod velocity;
+pub mod zeroing;

@@ -4,6 +4,7 @@
 //! longer needs travel back, because unmapping is a system call.
 
 use crate::cycle::Cycle;
+use crate::zeroing::DeviceSet;
 use rtrb::{Consumer, Producer, RingBuffer};
 use shm_abi::{CommanderView, FaultReason};
 
@@ -20,6 +21,8 @@ pub enum Letter {
     End(u64),
     /// Leave the fault state.
     ClearFault,
+    /// These devices are in their zeroing pose; none named: all that count.
+    Zero(DeviceSet),
     /// All motors off, now.
     EmergencyStop,
 }
@@ -70,6 +73,10 @@ impl Inbox {
                 Letter::End(lease) => cycle.end_lease(lease),
                 Letter::ClearFault => {
                     cycle.clear_fault();
+                    None
+                }
+                Letter::Zero(devices) => {
+                    cycle.zero(devices);
                     None
                 }
                 Letter::EmergencyStop => {

@@ -158,13 +158,13 @@ fn open(
             let premium = mechanism(device, description)?;
             let trace = EncoderTrace::parse(&read(device, trace)?, trace, premium.encoders.count_bits)?;
             let info = commissioned(arm_info(device, &premium), config);
-            let arm = Arm::new(&premium, holds_its_weight(device, config));
+            let arm = arm(device, config, &premium);
             Ok(Box::new(ReplayDevice::new(info, EncoderReplay::new(trace), arm)))
         }
         Backend::Emulated { description, card } => {
             let premium = mechanism(device, description)?;
             let info = commissioned(arm_info(device, &premium), config);
-            let arm = Arm::new(&premium, holds_its_weight(device, config));
+            let arm = arm(device, config, &premium);
             emulated(device, description, card, &premium, info, arm)
         }
     }
@@ -181,6 +181,10 @@ fn commissioned(info: DeviceInfo, config: &DriverConfig) -> DeviceInfo {
             ..info
         },
     }
+}
+
+fn arm(device: &DeviceConfig, config: &DriverConfig, description: &ArmFile) -> Arm {
+    Arm::new(description, holds_its_weight(device, config)).with_zeroing(device.zeroing)
 }
 
 /// Not in commissioning: the torques that hold an arm up are no force that a guard could cut, and a motor whose
@@ -202,7 +206,12 @@ fn emulated(
         return Err(OpenError::NoConverter { device: name(), file: description.into(), channel });
     }
     let hold = Card::take(card).map_err(|source| OpenError::Card { device: name(), source })?;
-    let channels = Channels { encoders: premium.encoders.channel, motors: premium.motors.channel };
+    let channels = Channels {
+        encoders: premium.encoders.channel,
+        gimbal: premium.gimbal.map(|gimbal| gimbal.channel),
+        buttons: premium.buttons,
+        motors: premium.motors.channel,
+    };
     let device = EmulatedDevice::new(info, hold, arm, channels)
         .map_err(|source| OpenError::Registers { device: name(), source })?;
     Ok(Box::new(device))

@@ -14,12 +14,13 @@ use crate::config::{DriverConfig, OverrunPolicy, ReplyMode, SpinMargin};
 use crate::cycle::Cycle;
 use crate::mail::Inbox;
 use crate::meter::{add, record};
+use crate::zeroing::DeviceSet;
 use rt_core::clock::{monotonic_ns, sleep_until_ns};
 use rt_core::log::{LogLevel, RtLog};
 use rt_core::periodic::{Periodic, PeriodicConfig};
 use shm_abi::doorbell::WaitMode;
 use shm_abi::segment::ClockMode;
-use shm_abi::{DriverState, FaultReason};
+use shm_abi::{DriverState, FaultReason, MAX_DEVICES};
 use std::hint::spin_loop;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -86,6 +87,7 @@ pub struct RealLoop {
     periodic: Periodic,
     lockstep_tick: u64,
     logged_state: Option<DriverState>,
+    logged_not_zeroed: DeviceSet,
     logged_phase_steps: u64,
 }
 
@@ -142,6 +144,7 @@ impl RealLoop {
             periodic,
             lockstep_tick: 0,
             logged_state: None,
+            logged_not_zeroed: DeviceSet(0),
             logged_phase_steps: 0,
         }
     }
@@ -164,7 +167,7 @@ impl RealLoop {
 
     fn ticks(&mut self) {
         while let Some(begin) = self.wait_for_tick() {
-            self.inbox.deliver(&mut self.cycle);
+            self.collect_mail(begin.tick);
             if self.takes_former_reply() {
                 // Before the new tick is told: its own reply, however quick, drives the next one's motors, so
                 // that the delay is one tick always.
@@ -174,6 +177,7 @@ impl RealLoop {
             self.wait_for_reply(begin.reply_until_ns);
             self.cycle.actuate();
             self.log_state(begin.tick);
+            self.log_zeros(begin.tick);
         }
     }
 
@@ -265,7 +269,7 @@ impl RealLoop {
     fn wait_without_limit(&mut self) {
         while !self.cycle.take_reply() && !self.is_stopping() {
             self.sleep_for_reply(NAP);
-            self.inbox.deliver(&mut self.cycle);
+            self.collect_mail(self.lockstep_tick);
         }
     }
 
@@ -307,6 +311,29 @@ impl RealLoop {
         match state {
             DriverState::Fault => self.log.push(LogLevel::Error, tick, safety.fault().sentence(), &[]),
             other => self.log.push(LogLevel::Info, tick, other.name(), &[]),
+        }
+    }
+
+    fn collect_mail(&mut self, tick: u64) {
+        self.inbox.deliver(&mut self.cycle);
+        match self.cycle.zero_verdict() {
+            None => {}
+            Some(Ok(_)) => self.log.push(LogLevel::Info, tick, "zeroed", &[]),
+            Some(Err(refusal)) => {
+                let (words, number) = refusal.for_log();
+                self.log.push(LogLevel::Warning, tick, words, number.as_slice());
+            }
+        }
+    }
+
+    fn log_zeros(&mut self, tick: u64) {
+        let not_zeroed = self.cycle.not_zeroed();
+        let new = DeviceSet(not_zeroed.0 & !self.logged_not_zeroed.0);
+        self.logged_not_zeroed = not_zeroed;
+        for device in (0..MAX_DEVICES).filter(|device| new.has(*device)) {
+            let words =
+                "device {} does not know where it is: bring it into its zeroing pose, then `io-driver zero`";
+            self.log.push(LogLevel::Warning, tick, words, &[device as f64]);
         }
     }
 

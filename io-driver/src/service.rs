@@ -9,6 +9,7 @@ use crate::meter::bump;
 use crate::real_loop::{Ended, Shared};
 use crate::say;
 use crate::supervisor::Supervisor;
+use crate::zeroing::DeviceSet;
 use rt_core::epitaph::{EpitaphKind, EpitaphRef};
 use rt_core::log::{LogLevel, LogLine, RtLogDrain};
 use rt_core::signals::StopSignals;
@@ -91,6 +92,7 @@ impl Service<'_> {
             }
             ServerEvent::ZeroRequested { pid, devices } => {
                 say(self.options, format_args!("process {pid} asks to zero devices (bits {devices:#x})"));
+                self.post(Letter::Zero(DeviceSet(devices)));
             }
             ServerEvent::Trouble { message } => say::say(format_args!("io-driver: {message}")),
             ServerEvent::StopRequested { pid } => return Some(format!("request of process {pid}")),

@@ -4,8 +4,9 @@ use crate::meter;
 use rt_core::histogram::{Histogram, Summary};
 use serde::Serialize;
 use shm_abi::frame::{
-    INPUT_DEAD_MAN_HELD, INPUT_DEAD_MAN_PRESENT, INPUT_EMERGENCY_STOP, LIMIT_HEAT, LIMIT_PEAK,
-    LIMIT_SATURATION, LIMIT_SLEW, LIMIT_WORKSPACE,
+    DEVICE_NOT_ZEROED, DEVICE_ORIENTATION_MEASURED, DEVICE_POSITION_VALID, INPUT_DEAD_MAN_HELD,
+    INPUT_DEAD_MAN_PRESENT, INPUT_EMERGENCY_STOP, LIMIT_HEAT, LIMIT_PEAK, LIMIT_SATURATION, LIMIT_SLEW,
+    LIMIT_WORKSPACE,
 };
 use shm_abi::segment::{ClockMode, DriverInfo};
 use shm_abi::{DriverState, DriverView, FaultReason, Frame};
@@ -140,6 +141,10 @@ pub struct DeviceStatus {
     pub kind: String,
     /// Whether the position can be trusted.
     pub position_valid: bool,
+    /// Whether it does not know where it is until it is zeroed.
+    pub zero_needed: bool,
+    /// Orientation of the gimbal's last link in the base frame, w x y z; `None`: not measured.
+    pub orientation_wxyz: Option<[f64; 4]>,
     /// The tip in the base frame (m).
     pub position_m: [f64; 3],
     /// Its velocity (m/s), estimated.
@@ -272,7 +277,11 @@ fn devices(info: &DriverInfo, frame: Option<&Frame>) -> Vec<DeviceStatus> {
             DeviceStatus {
                 name: device.name.clone(),
                 kind: device.kind.clone(),
-                position_valid: state.is_some_and(|s| s.flags & shm_abi::frame::DEVICE_POSITION_VALID != 0),
+                position_valid: state.is_some_and(|s| s.flags & DEVICE_POSITION_VALID != 0),
+                zero_needed: state.is_some_and(|s| s.flags & DEVICE_NOT_ZEROED != 0),
+                orientation_wxyz: state
+                    .filter(|s| s.flags & DEVICE_ORIENTATION_MEASURED != 0)
+                    .map(|s| s.orientation_wxyz_measured),
                 position_m: state.map_or([0.0; 3], |s| s.position_m_measured),
                 velocity_m_per_s: state.map_or([0.0; 3], |s| s.velocity_m_per_s_estimated),
                 buttons: state.map_or(0, |s| s.buttons),
@@ -319,6 +328,12 @@ impl fmt::Display for Status {
         for device in &self.devices {
             let valid = if device.position_valid { "" } else { " (position not valid)" };
             write!(f, "\ndevice      {} [{}]{valid}", device.short(), device.kind)?;
+            if device.zero_needed {
+                let name = &device.name;
+                let how =
+                    format_args!("bring it into its zeroing pose, then `io-driver zero --device {name}`");
+                write!(f, ", not zeroed: {how}")?;
+            }
             if device.motor_heat > 0.0 {
                 write!(f, ", motors at {:.0} % of their warmth", 100.0 * device.motor_heat)?;
             }
@@ -334,6 +349,14 @@ impl fmt::Display for Status {
         }
         Ok(())
     }
+}
+
+/// Names of the devices that have to be zeroed; as long as there is one, no device gets force.
+pub fn not_zeroed(driver: &DriverView) -> Vec<String> {
+    let Some(frame) = driver.read_latest() else { return Vec::new() };
+    let needs = |(_, state): &(_, &shm_abi::DeviceFrame)| state.flags & DEVICE_NOT_ZEROED != 0;
+    let devices = driver.info().devices.into_iter().zip(frame.present_devices());
+    devices.filter(needs).map(|(device, _)| device.name).collect()
 }
 
 /// A state of a later version is none of those that we know.

@@ -190,7 +190,19 @@ fn a_driver_that_answers_is_named() {
         ("segment.abi", Pass, "the driver's too"),
         ("segment.reach", Pass, "mode 0660, owner 1000, group 1000: the owner, the group and root"),
     ];
-    check_segment(&socket, &Ok(4242), &expected);
+    check_segment(&socket, &seen(4242), &expected);
+}
+
+fn seen(pid: u64) -> Answer {
+    Ok(segment::Seen { pid, not_zeroed: Vec::new() })
+}
+
+#[test]
+fn devices_that_wait_to_be_zeroed_are_told_and_are_no_obstacle() {
+    check_segment("", &seen(1), &[("segment.zeroed", Pass, "every device knows where it is")]);
+    let waiting = segment::Seen { pid: 1, not_zeroed: vec!["left".into(), "right".into()] };
+    check_segment("", &Ok(waiting), &[("segment.zeroed", Warn, "not zeroed: left, right")]);
+    check_segment("", &no_driver(), &[("segment.zeroed", Pass, "no driver was asked")]);
 }
 
 #[test]
@@ -271,9 +283,9 @@ fn the_directory_is_judged_by_who_may_write_there() {
 #[test]
 fn a_socket_that_every_user_can_reach_is_told() {
     let open = format!("=== {SOCKET} mode 0666 uid 1000 gid 1000\n");
-    check_segment(&open, &Ok(1), &[("segment.reach", Pass, "mode 0666")]);
+    check_segment(&open, &seen(1), &[("segment.reach", Pass, "mode 0666")]);
     let passable = "=== /run/user/1000/ mode 0755\n=== /run/user/1000/phantom3/ mode 0755\n";
-    check_segment(&(open + passable), &Ok(1), &[("segment.reach", Warn, "every user of this machine")]);
+    check_segment(&(open + passable), &seen(1), &[("segment.reach", Warn, "every user of this machine")]);
 }
 
 fn whole(recorded: &RecordedMachine) -> Vec<Finding> {

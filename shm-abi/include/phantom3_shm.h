@@ -72,6 +72,13 @@
 // [`DeviceFrame::flags`]: since 1.2. An instrumented gimbal measures the orientation.
 #define PHANTOM_DEVICE_ORIENTATION_MEASURED 2
 
+// [`DeviceFrame::flags`]: since 1.2. It does not know where it is until somebody asks to zero it
+// ([`client::zero`](crate::client::zero)).
+#define PHANTOM_DEVICE_NOT_ZEROED 4
+
+// [`DeviceFrame::flags`]: since 1.2. Its `buttons` mean something.
+#define PHANTOM_DEVICE_HAS_BUTTONS 8
+
 // [`Frame::inputs`]: an emergency stop is pressed.
 #define PHANTOM_INPUT_EMERGENCY_STOP 1
 
@@ -488,7 +495,8 @@ typedef struct PhantomOutcome {
 
 // One device in a [`Frame`].
 typedef struct PhantomDeviceFrame {
-  // Bits of `DEVICE_...`: bit 0, the position is valid; since 1.2 bit 1, the orientation is measured.
+  // Bits of `DEVICE_...`: bit 0, the position is valid; since 1.2 bit 1, the orientation is measured,
+  // bit 2, it has to be zeroed, bit 3, it has buttons.
   uint64_t flags;
   // Bit `i`: button `i` is pressed.
   uint64_t buttons;

@@ -81,7 +81,8 @@ assert_layout!(Outcome: 40, 8 {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct DeviceFrame {
-    /// Bits of `DEVICE_...`: bit 0, the position is valid; since 1.2 bit 1, the orientation is measured.
+    /// Bits of `DEVICE_...`: bit 0, the position is valid; since 1.2 bit 1, the orientation is measured,
+    /// bit 2, it has to be zeroed, bit 3, it has buttons.
     pub flags: u64,
     /// Bit `i`: button `i` is pressed.
     pub buttons: u64,
@@ -135,6 +136,11 @@ assert_layout!(DeviceFrame: 320, 8 {
 pub const DEVICE_POSITION_VALID: u64 = 1;
 /// [`DeviceFrame::flags`]: since 1.2. An instrumented gimbal measures the orientation.
 pub const DEVICE_ORIENTATION_MEASURED: u64 = 2;
+/// [`DeviceFrame::flags`]: since 1.2. It does not know where it is until somebody asks to zero it
+/// ([`client::zero`](crate::client::zero)).
+pub const DEVICE_NOT_ZEROED: u64 = 4;
+/// [`DeviceFrame::flags`]: since 1.2. Its `buttons` mean something.
+pub const DEVICE_HAS_BUTTONS: u64 = 8;
 
 /// [`Frame::inputs`]: an emergency stop is pressed.
 pub const INPUT_EMERGENCY_STOP: u64 = 1;

@@ -165,3 +165,18 @@ fn wrong_words_are_refused_with_what_is_missing() {
     let stranger = said(&["--config", &config, "--device", "f9"]);
     assert!(stranger.contains("no device \"f9\"; --device one of f0"), "{stranger}");
 }
+
+#[test]
+fn an_arm_that_has_to_be_zeroed_is_zeroed_before_its_motors_are_tried() {
+    let stand = Stand::start(Setup {
+        config: "commissioning = true\n".into(),
+        emulator: vec!["--yield", "1"],
+        zeroing: "ask",
+        ..Setup::new("real")
+    });
+    let end = commission(&stand);
+    assert_eq!(end.status, Some(0), "{end:?}");
+    let words = ["First its zeroing pose.", "f0: zeroed at counts", "All motors turn the right way."];
+    assert!(words.iter().all(|words| end.out.contains(words)), "{end:?}");
+    stand.finish();
+}

@@ -13,6 +13,7 @@ use io_driver::driver::{describe, make_cycle};
 use io_driver::mail::{Inbox, Letter, Sender, mail};
 use io_driver::open::open_devices;
 use io_driver::status::CounterStatus;
+use io_driver::zeroing::{DeviceSet, ZeroState};
 use nalgebra::Vector3;
 use phantom3::fast_loop::{FastLoop, Turn, WhenFull};
 use phantom3::rig::Rig;
@@ -68,6 +69,7 @@ fn the_drivers_tick_never_calls_the_heap_whatever_the_commander_does() {
     ] {
         assert!(count > TICKS / LEASE_TICKS / 2, "{name}: {seen:?}");
     }
+    assert!(play.zeros.into_iter().all(|count| count > 10), "{:?}", play.zeros);
     assert!(play.full_authority, "no lease came to full authority");
 }
 
@@ -107,6 +109,8 @@ struct Play {
     lease: u64,
     devices: u64,
     full_authority: bool,
+    /// Zeros that were granted and refused.
+    zeros: [u64; 2],
 }
 
 impl Play {
@@ -133,6 +137,7 @@ impl Play {
             lease: 0,
             devices: count,
             full_authority: false,
+            zeros: [0; 2],
         }
     }
 
@@ -140,6 +145,11 @@ impl Play {
     fn prepare(&mut self, tick: u64) {
         if self.cycle.safety().state() == DriverState::Fault && tick.is_multiple_of(10) {
             self.sender.post(Letter::ClearFault).unwrap();
+        }
+        if tick % 37 == 0 {
+            // The one that breaks; sometimes all, of which two move.
+            let asked = if tick % 2 == 0 { 1 << 4 } else { 0 };
+            self.sender.post(Letter::Zero(DeviceSet(asked))).unwrap();
         }
         if tick % LEASE_TICKS == 1 {
             if self.lease > 0 {
@@ -164,6 +174,9 @@ impl Play {
     /// The loop's own part, with the commander's answer in the middle of it.
     fn tick(&mut self, tick: u64) {
         self.inbox.deliver(&mut self.cycle);
+        if let Some(verdict) = self.cycle.zero_verdict() {
+            self.zeros[usize::from(verdict.is_err())] += 1;
+        }
         self.cycle.sense(tick, tick * 1_000_000);
         self.cycle.take_reply();
         self.answer(tick);
@@ -204,11 +217,12 @@ impl Play {
 struct Breaking {
     info: DeviceInfo,
     tick: u64,
+    needs_zero: bool,
 }
 
 impl Breaking {
     fn new(info: DeviceInfo) -> Self {
-        Self { info, tick: 0 }
+        Self { info, tick: 0, needs_zero: false }
     }
 }
 
@@ -221,6 +235,11 @@ impl Device for Breaking {
         self.tick = time.tick;
         match time.tick % 1511 {
             500 => Err(FaultReason::DeviceRead),
+            // It loses its place.
+            700 => {
+                self.needs_zero = true;
+                Ok(Reading::at(Vector3::zeros()))
+            }
             501 => Ok(Reading { is_valid: false, ..Reading::at(Vector3::zeros()) }),
             1000 => Ok(Reading::at(Vector3::repeat(f64::NAN))),
             _ => Ok(Reading::at(Vector3::zeros())),
@@ -235,6 +254,14 @@ impl Device for Breaking {
     }
 
     fn release(&mut self) {}
+
+    fn zero_state(&self) -> ZeroState {
+        if self.needs_zero { ZeroState::Needed } else { ZeroState::Zeroed }
+    }
+
+    fn zero(&mut self) {
+        self.needs_zero = false;
+    }
 }
 
 /// The default scene's hand touches, holds and slides for ten seconds: at 10 kHz a hundred thousand ticks.

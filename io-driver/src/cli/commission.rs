@@ -1,5 +1,6 @@
 //! `io-driver commission`.
 
+use super::zero::Zeroing;
 use super::{EXIT_FAULT, EXIT_USAGE, SocketArgs, fail, print_line};
 use crate::commission::hand_check::HandVerdict;
 use crate::commission::motor_check::MotorVerdict;
@@ -36,8 +37,8 @@ pub struct CommissionArgs {
 }
 
 const AFTER_HELP: &str = "First start the driver with little force: io-driver run --config FILE --commissioning\n\
-Then you move the tip along each axis and the counters have to agree; then each motor pushes for some\n\
-seconds with less than 0.5 N, and its joint has to turn the right way. Stay clear of the arm's reach, with a\n\
+If the device has to be zeroed, that comes first. Then you move the tip along each axis and the counters have\n\
+to agree; then each motor pushes for some seconds with less than 0.5 N, and its joint has to turn the right way. Stay clear of the arm's reach, with a\n\
 hand on the emergency stop (or ready for Ctrl-C, which ends in zero force).\n\
 Exit status: 0 all signs and channels are right; 2 bad usage or input; 3 something is wrong, or a fault.";
 
@@ -73,6 +74,7 @@ fn commission(args: &CommissionArgs) -> Result<bool, Failure> {
     let config = DriverConfig::load(&args.config).map_err(usage)?;
     let device = choose(&config, args.device.as_deref()).map_err(usage)?;
     let premium = describe(&config, device).map_err(usage)?;
+    zero_first(args, device, &signals)?;
     let attachment = client::command(&args.socket.path(), "io-driver commission").map_err(usage)?;
     let mut session = Session::new(attachment, device, &signals).map_err(usage)?;
     let mut all_right = true;
@@ -100,6 +102,20 @@ fn commission(args: &CommissionArgs) -> Result<bool, Failure> {
     }
     Ok(all_right)
 }
+
+/// Positions that mean nothing cannot be compared with a hand.
+fn zero_first(args: &CommissionArgs, device: usize, signals: &StopSignals) -> Result<(), Failure> {
+    let socket = args.socket.path();
+    let mut zeroing = Zeroing::attach(&socket, signals).map_err(usage)?;
+    if !zeroing.needs(device) {
+        return Ok(());
+    }
+    say("First its zeroing pose.");
+    zeroing.zero(&[device], UNTIL_REST_S, args.yes).map_err(during)
+}
+
+/// How long a person may take to bring an arm into its zeroing pose (s).
+const UNTIL_REST_S: f64 = 300.0;
 
 fn try_axis(args: &CommissionArgs, session: &mut Session<'_>, axis: usize) -> Result<bool, Box<dyn Error>> {
     prompt(args, &format!("Then move the tip 5 cm {}", AXES[axis]))?;

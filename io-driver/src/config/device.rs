@@ -1,5 +1,6 @@
 //! `[[device]]`: how each device is reached.
 
+use super::zeroing::Zeroing;
 use crate::sim::hand::model_file::{self, Firmness};
 use crate::toml_report::{Allowed, SpannedList, TomlReport, TomlText};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
@@ -19,6 +20,8 @@ pub struct DeviceConfig {
     pub peak_force_n: Option<f64>,
     /// Its motors hold up its own weight while somebody commands.
     pub compensates_gravity: bool,
+    /// How it learns where it is, if it has counters.
+    pub zeroing: Zeroing,
 }
 
 /// How a device is reached.
@@ -92,6 +95,16 @@ impl Backend {
             Self::Ideal(_) | Self::Emulated { .. } | Self::Simulated { .. } => Some(32),
         }
     }
+
+    /// A trace begins in the zeroing pose. Those of a simulated arm read zero there. Of an arm whose counters are
+    /// alive while drivers come and go, only a person knows.
+    fn usual_zeroing(&self) -> Zeroing {
+        match self {
+            Self::Ideal(_) | Self::Replay { .. } => Zeroing::AtStart,
+            Self::Simulated { .. } => Zeroing::Known,
+            Self::Emulated { .. } => Zeroing::Ask,
+        }
+    }
 }
 
 #[derive(Deserialize)]
@@ -107,6 +120,7 @@ pub(super) struct RawDevice {
     firmness: Option<Spanned<String>>,
     tremor: Option<Spanned<bool>>,
     seed: Option<Spanned<i64>>,
+    zeroing: Option<Spanned<Zeroing>>,
     hand: Option<Spanned<PathBuf>>,
     finger: Option<Spanned<String>>,
     start_m: Option<SpannedList>,
@@ -167,7 +181,8 @@ impl RawDevice {
         };
         let peak_force_n = self.peak_force_n.as_ref().map(|peak| toml.number(peak, PEAK)).transpose()?;
         let compensates_gravity = self.gravity_compensation.as_ref().is_some_and(|key| *key.get_ref());
-        Ok(DeviceConfig { name, backend, peak_force_n, compensates_gravity })
+        let zeroing = self.zeroing.as_ref().map_or(backend.usual_zeroing(), |key| *key.get_ref());
+        Ok(DeviceConfig { name, backend, peak_force_n, compensates_gravity, zeroing })
     }
 
     fn ideal(&self, name: &str, toml: &TomlText<'_>, directory: &Path) -> Result<Backend, TomlReport> {
@@ -178,6 +193,7 @@ impl RawDevice {
                 ("trace", span_of(&self.trace)),
                 ("card", span_of(&self.card)),
                 ("gravity_compensation", span_of(&self.gravity_compensation)),
+                ("zeroing", span_of(&self.zeroing)),
             ],
             toml,
         )?;

@@ -79,6 +79,9 @@ fn write_device(text: &mut String, device: &DeviceConfig) -> std::fmt::Result {
     if device.compensates_gravity {
         writeln!(text, "gravity_compensation = true")?;
     }
+    if !matches!(device.backend, Backend::Ideal { .. }) {
+        writeln!(text, "zeroing = {}", quoted(device.zeroing.name()))?;
+    }
     match &device.backend {
         Backend::Ideal(wish) => {
             writeln!(text, "backend = \"ideal\"")?;

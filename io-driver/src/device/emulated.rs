@@ -1,13 +1,15 @@
 //! An arm on an emulated card: the same path as real registers, and an amplifier that checks every value.
 //!
 //! Model: counters, buttons and status are read, codes and enable written, as words of a mapping. Amplifiers are
-//! on only while some force may be let through. A card whose emulator stands still cannot be read.
+//! on only while some force may be let through. A card whose emulator stands still cannot be read; one that was
+//! switched off and on meanwhile counts from anywhere, and its arm has to be zeroed again.
 //! Invariants: a process that dies by a signal stores zero torque and switches the amplifiers off, whichever of
 //! its threads it was.
 
 use super::arm::Arm;
-use super::{Device, Effort, Reading, TickTime, Written};
+use super::{Device, Effort, Extras, Reading, TickTime, Written};
 use crate::emulator::card::{ARM_SHIFT, Card, DriversCard, QUEUE, STATUS_TRIPPED};
+use crate::zeroing::ZeroState;
 use rt_core::clock::monotonic_ns;
 use rt_core::last_act;
 use shm_abi::FaultReason;
@@ -26,6 +28,8 @@ pub struct EmulatedDevice {
     hold: DriversCard,
     arm: Arm,
     channels: Channels,
+    /// The card's, when it was opened or last looked at.
+    session: u32,
     heartbeat: u64,
     alive_ns: u64,
     armed_ns: u64,
@@ -36,6 +40,10 @@ pub struct EmulatedDevice {
 pub struct Channels {
     /// Counters.
     pub encoders: [u8; 3],
+    /// Counters of an instrumented gimbal.
+    pub gimbal: Option<[u8; 3]>,
+    /// How many buttons the handle has.
+    pub buttons: u32,
     /// Converters; below 4.
     pub motors: [u8; 3],
 }
@@ -51,8 +59,17 @@ impl EmulatedDevice {
         arm: Arm,
         channels: Channels,
     ) -> Result<Self, last_act::NoRoom> {
-        let mut device =
-            Self { info, hold, arm, channels, heartbeat: 0, alive_ns: monotonic_ns(), armed_ns: 0 };
+        let mut device = Self {
+            info,
+            hold,
+            arm,
+            channels,
+            session: 0,
+            heartbeat: 0,
+            alive_ns: monotonic_ns(),
+            armed_ns: 0,
+        };
+        device.session = device.card().inputs.session.load(Ordering::Acquire);
         last_act::guard(&device.card().outputs.enable, 0)?;
         let zero = u32::from(device.arm.release()[0]);
         for channel in channels.motors {
@@ -113,13 +130,18 @@ impl Device for EmulatedDevice {
 
     fn read(&mut self, time: TickTime) -> Result<Reading, FaultReason> {
         let inputs = &self.card().inputs;
-        let raw = self
-            .channels
-            .encoders
-            .map(|channel| i64::from(inputs.counters[usize::from(channel)].load(Ordering::Relaxed)));
+        let session = inputs.session.load(Ordering::Acquire);
+        let count = |channel: u8| i64::from(inputs.counters[usize::from(channel)].load(Ordering::Relaxed));
+        let (raw, gimbal) =
+            (self.channels.encoders.map(count), self.channels.gimbal.map(|own| own.map(count)));
         // Read whatever the status says: the counters go on, and nobody has to zero anew.
-        let mut reading = self.arm.read(raw, time);
+        let mut reading = self.arm.read_with_gimbal(raw, gimbal, time);
         reading.buttons = u64::from(inputs.buttons.load(Ordering::Relaxed));
+        if session != self.session {
+            self.session = session;
+            self.arm.lose_zero();
+            return Err(FaultReason::DeviceRead);
+        }
         if !self.is_alive() {
             return Err(FaultReason::DeviceRead);
         }
@@ -148,5 +170,21 @@ impl Device for EmulatedDevice {
         self.armed_ns = monotonic_ns();
         self.arm.forget_motion();
         self.card().outputs.arm.fetch_add(1, Ordering::AcqRel);
+    }
+
+    fn extras(&self) -> Extras {
+        Extras { orientation: self.channels.gimbal.is_some(), buttons: self.channels.buttons > 0 }
+    }
+
+    fn zero_state(&self) -> ZeroState {
+        self.arm.zero_state()
+    }
+
+    fn zero(&mut self) {
+        self.arm.zero();
+    }
+
+    fn lose_zero(&mut self) {
+        self.arm.lose_zero();
     }
 }

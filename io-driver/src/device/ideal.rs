@@ -8,7 +8,7 @@
 //! fixed point. Its velocity is the plain difference of two ticks, to the last bit. X_WD says where the base stands, as
 //! it would for a real device. What the script says of the fingertip's orientation and of buttons goes through as well.
 
-use super::{Device, Effort, Reading, TickTime, Written};
+use super::{Device, Effort, Extras, Reading, TickTime, Written};
 use crate::sim::script::HandPlayer;
 use crate::velocity::VelocityEstimator;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
@@ -65,6 +65,7 @@ impl Device for IdealDevice {
         if let Hand::Scripted(player, finger) = &mut self.hand {
             reading.buttons = u64::from(player.buttons(*finger, time_s).unwrap_or(0));
             if let Some(turn) = player.orientation(*finger, time_s) {
+                reading.is_orientation_measured = true;
                 reading.orientation_wxyz = wxyz(&match &self.world_to_base {
                     Some(transform) => transform.rotation * turn,
                     None => turn,
@@ -82,6 +83,12 @@ impl Device for IdealDevice {
 
     fn rearm(&mut self) {
         self.velocity.forget();
+    }
+
+    fn extras(&self) -> Extras {
+        let Hand::Scripted(player, finger) = &self.hand else { return Extras::default() };
+        let script = player.script();
+        Extras { orientation: script.has_orientation(*finger), buttons: script.has_buttons(*finger) }
     }
 }
 
@@ -120,6 +127,7 @@ mod tests {
     fn orientation_and_buttons_of_the_script_go_through_bit_for_bit() {
         let expected = Reading {
             orientation_wxyz: [0.8, 0.0, 0.6, 0.0],
+            is_orientation_measured: true,
             buttons: 5,
             ..Reading::at(Vector3::new(1.0, 2.0, 3.0))
         };

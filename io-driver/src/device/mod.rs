@@ -11,7 +11,9 @@ pub mod ideal;
 pub mod replay;
 pub mod simulated;
 
-use nalgebra::Vector3;
+use crate::zeroing::ZeroState;
+use nalgebra::{UnitQuaternion, Vector3};
+use shm_abi::frame::{DEVICE_HAS_BUTTONS, DEVICE_ORIENTATION_MEASURED, DEVICE_POSITION_VALID};
 use shm_abi::segment::DeviceInfo;
 use shm_abi::{DeviceFrame, FaultReason};
 
@@ -50,6 +52,8 @@ pub struct Reading {
     pub velocity_m_per_s: Vector3<f64>,
     /// The gimbal's last link, w x y z; identity where there is none.
     pub orientation_wxyz: [f64; 4],
+    /// Whether a gimbal measures it.
+    pub is_orientation_measured: bool,
     /// Encoder counts, extended: three joints, three gimbal axes.
     pub encoder_counts: [i64; 6],
     /// Joint angles in the same order (rad).
@@ -68,11 +72,24 @@ impl Reading {
             position_m,
             velocity_m_per_s: Vector3::zeros(),
             orientation_wxyz: [1.0, 0.0, 0.0, 0.0],
+            is_orientation_measured: false,
             encoder_counts: [0; 6],
             joint_angle_rad: [0.0; 6],
             joint_velocity_rad_per_s: [0.0; 3],
             buttons: 0,
         }
+    }
+
+    /// The same with an orientation that was measured.
+    pub fn with_orientation(self, orientation: UnitQuaternion<f64>) -> Self {
+        let [x, y, z, w] = orientation.coords.into();
+        Self { orientation_wxyz: [w, x, y, z], is_orientation_measured: true, ..self }
+    }
+
+    /// The same of a device that does not know where it is: nobody may take its numbers for a pose or a motion.
+    pub fn unknown(self) -> Self {
+        let (velocity_m_per_s, joint_velocity_rad_per_s) = (Vector3::zeros(), [0.0; 3]);
+        Self { is_valid: false, velocity_m_per_s, joint_velocity_rad_per_s, ..self }
     }
 
     /// Whether every number of it is finite.
@@ -88,7 +105,9 @@ impl Reading {
 
     /// Puts it into the frame.
     pub fn write_to(&self, frame: &mut DeviceFrame) {
-        frame.flags = if self.is_valid { shm_abi::frame::DEVICE_POSITION_VALID } else { 0 };
+        let flag = |is_set: bool, bit: u64| if is_set { bit } else { 0 };
+        frame.flags = flag(self.is_valid, DEVICE_POSITION_VALID)
+            | flag(self.is_orientation_measured, DEVICE_ORIENTATION_MEASURED);
         frame.buttons = self.buttons;
         frame.encoder_counts = self.encoder_counts;
         frame.joint_angle_rad = self.joint_angle_rad;
@@ -96,6 +115,25 @@ impl Reading {
         frame.velocity_m_per_s_estimated = self.velocity_m_per_s.into();
         frame.joint_velocity_rad_per_s_estimated = self.joint_velocity_rad_per_s;
         frame.orientation_wxyz_measured = self.orientation_wxyz;
+    }
+}
+
+/// What a device tells besides its position.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Extras {
+    /// How its last link is turned.
+    pub orientation: bool,
+    /// Which buttons are pressed.
+    pub buttons: bool,
+}
+
+impl Extras {
+    /// As the flags of a frame tell it.
+    pub fn of(flags: u64) -> Self {
+        Self {
+            orientation: flags & DEVICE_ORIENTATION_MEASURED != 0,
+            buttons: flags & DEVICE_HAS_BUTTONS != 0,
+        }
     }
 }
 
@@ -138,4 +176,20 @@ pub trait Device: Send {
     /// Somebody asked to leave the fault state: what switched itself off may be switched on again, without
     /// force. The next `read` tells whether it could.
     fn rearm(&mut self) {}
+
+    /// What it tells besides its position, always the same.
+    fn extras(&self) -> Extras {
+        Extras::default()
+    }
+
+    /// Whether it knows where it is. What has no counters always does.
+    fn zero_state(&self) -> ZeroState {
+        ZeroState::Innate
+    }
+
+    /// The pose that was read last is its zeroing pose.
+    fn zero(&mut self) {}
+
+    /// Its counters may have lost their place; until it is zeroed, it does not know where it is.
+    fn lose_zero(&mut self) {}
 }

@@ -6,6 +6,7 @@
 use super::arm::Arm;
 use super::encoder_trace::EncoderReplay;
 use super::{Device, Effort, Reading, TickTime, Written};
+use crate::zeroing::ZeroState;
 use shm_abi::FaultReason;
 use shm_abi::segment::DeviceInfo;
 
@@ -43,6 +44,18 @@ impl Device for ReplayDevice {
 
     fn release(&mut self) {
         self.arm.release();
+    }
+
+    fn zero_state(&self) -> ZeroState {
+        self.arm.zero_state()
+    }
+
+    fn zero(&mut self) {
+        self.arm.zero();
+    }
+
+    fn lose_zero(&mut self) {
+        self.arm.lose_zero();
     }
 
     fn rearm(&mut self) {

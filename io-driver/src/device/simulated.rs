@@ -10,12 +10,13 @@
 #![allow(non_snake_case)] // Frames are capital letters: a point p_W is in the world.
 
 use super::arm::Arm;
-use super::{Device, Effort, Reading, TickTime, Written};
+use super::{Device, Effort, Extras, Reading, TickTime, Written};
 use crate::sim::arm::{NobodyHolds, SimulatedArm, Truth};
 use crate::sim::hand::{Felt, ImpedanceHand};
 use crate::sim::script::HandPlayer;
 use crate::sim::tip_board::TipBoard;
-use nalgebra::{Isometry3, Point3, Vector3};
+use crate::zeroing::ZeroState;
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use rt_core::clock::monotonic_ns;
 use shm_abi::FaultReason;
 use shm_abi::segment::DeviceInfo;
@@ -59,6 +60,39 @@ pub enum Wish {
     Scripted(HandPlayer, usize),
     /// Here, in W (m).
     Resting(Vector3<f64>),
+}
+
+/// How the hand turns the handle, and what it presses.
+#[derive(Debug, Clone, Copy)]
+struct Handle {
+    orientation_W: UnitQuaternion<f64>,
+    buttons: u64,
+}
+
+impl Default for Handle {
+    fn default() -> Self {
+        Self { orientation_W: UnitQuaternion::identity(), buttons: 0 }
+    }
+}
+
+impl Wish {
+    /// Where the tip is wanted, in W (m), and the handle.
+    fn at(&mut self, time_s: f64) -> (Vector3<f64>, Handle) {
+        match self {
+            Self::Resting(at) => (*at, Handle::default()),
+            Self::Scripted(player, finger) => {
+                // `open` makes sure that the finger is in the script.
+                let at = player.position(*finger, time_s).unwrap_or_default();
+                let orientation_W = player.orientation(*finger, time_s).unwrap_or_default();
+                let buttons = player.buttons(*finger, time_s).map_or(0, u64::from);
+                (at, Handle { orientation_W, buttons })
+            }
+        }
+    }
+
+    fn has_buttons(&self) -> bool {
+        matches!(self, Self::Scripted(player, finger) if player.script().has_buttons(*finger))
+    }
 }
 
 /// The device.
@@ -134,27 +168,19 @@ impl SimulatedDevice {
     }
 
     /// The hand learns where it should be by now, what it feels, and where its partners are.
-    fn tell_hand(&mut self, time: TickTime, elapsed_s: f64) -> u64 {
-        let Holder::Hand(held) = &mut self.holder else { return 0 };
+    fn tell_hand(&mut self, time: TickTime, elapsed_s: f64) -> Handle {
+        let Holder::Hand(held) = &mut self.holder else { return Handle::default() };
         let truth = self.plant.truth();
         let to_base =
             |p_W: Vector3<f64>| self.base_in_world.inverse_transform_point(&Point3::from(p_W)).coords;
-        let (wanted_W, buttons) = match &mut held.wish {
-            Wish::Scripted(player, finger) => {
-                let at_s = time.run_time_s();
-                let rest = Vector3::zeros();
-                let buttons = player.buttons(*finger, at_s).unwrap_or(0);
-                (player.position(*finger, at_s).unwrap_or(rest), u64::from(buttons))
-            }
-            Wish::Resting(at) => (*at, 0),
-        };
+        let (wanted_W, handle) = held.wish.at(time.run_time_s());
         held.board.tell(held.place, (self.base_in_world * Point3::from(truth.tip)).coords);
         let felt = Felt {
             force_on_user_D: -held.hand.force_on_tip(truth.tip, truth.tip_velocity),
             partners_centroid_D: held.board.others(held.place).map(to_base),
         };
         held.hand.intend(to_base(wanted_W), felt, elapsed_s);
-        buttons
+        handle
     }
 
     fn latency_ns(&self) -> u64 {
@@ -175,9 +201,11 @@ impl Device for SimulatedDevice {
         let elapsed_ns = ticks.saturating_mul(time.period_ns);
         self.pass(elapsed_ns);
         self.read_at_ns = monotonic_ns();
-        let buttons = self.tell_hand(time, elapsed_ns.max(time.period_ns) as f64 / 1e9);
-        let mut reading = self.arm.read(self.plant.counters(), time);
-        reading.buttons = buttons;
+        let handle = self.tell_hand(time, elapsed_ns.max(time.period_ns) as f64 / 1e9);
+        let turned = self.base_in_world.rotation.inverse() * handle.orientation_W;
+        let gimbal = self.plant.gimbal_counters(turned);
+        let mut reading = self.arm.read_with_gimbal(self.plant.counters(), gimbal, time);
+        reading.buttons = handle.buttons;
         if self.plant.is_tripped() {
             return Err(FaultReason::AmplifierTripped);
         }
@@ -198,5 +226,22 @@ impl Device for SimulatedDevice {
 
     fn rearm(&mut self) {
         self.plant.rearm();
+    }
+
+    fn extras(&self) -> Extras {
+        let Holder::Hand(held) = &self.holder else { return Extras::default() };
+        Extras { orientation: self.plant.has_gimbal(), buttons: held.wish.has_buttons() }
+    }
+
+    fn zero_state(&self) -> ZeroState {
+        self.arm.zero_state()
+    }
+
+    fn zero(&mut self) {
+        self.arm.zero();
+    }
+
+    fn lose_zero(&mut self) {
+        self.arm.lose_zero();
     }
 }

@@ -12,7 +12,7 @@ use toml::Spanned;
 
 use super::bodies::{self, RawBodies};
 use super::simulation::{self, RawSimulation};
-use super::{ArmFile, DeviceFileError, Workspace};
+use super::{ArmFile, DeviceFileError, Workspace, gimbal};
 use crate::encoders::EncoderSpec;
 use crate::heat::HeatSpec;
 use crate::kinematics::{Interval, JointConvention, JointLimits, Kinematics, Mechanism};
@@ -61,6 +61,8 @@ struct Raw<L> {
     motors: Motors,
     bodies: Option<Spanned<RawBodies>>,
     simulation: Option<Spanned<RawSimulation>>,
+    gimbal: Option<gimbal::RawGimbal>,
+    buttons: Option<Whole>,
 }
 
 #[derive(Deserialize)]
@@ -100,6 +102,7 @@ fn check<L: LinkageTable>(toml: &TomlText<'_>, raw: Raw<L>) -> Result<ArmFile, T
     let reduction = toml.numbers(joints.cable_reduction, REDUCTION)?;
     let home = home(toml, joints.home_joint_angles_rad, &mechanism)?;
     let weights = bodies::check(toml, raw.bodies.as_ref(), links_m, L::CONVENTION)?;
+    let encoders = encoders(toml, &raw.encoders, reduction, home)?;
     Ok(ArmFile {
         kind: L::KIND,
         name: raw.name,
@@ -107,7 +110,9 @@ fn check<L: LinkageTable>(toml: &TomlText<'_>, raw: Raw<L>) -> Result<ArmFile, T
         continuous_force_n,
         workspace: workspace(toml, &raw.workspace_m, &raw.workspace_centre_m, &mechanism, home)?,
         mechanism,
-        encoders: encoders(toml, &raw.encoders, reduction, home)?,
+        gimbal: raw.gimbal.as_ref().map(|raw| gimbal::check(toml, raw, &encoders)).transpose()?,
+        buttons: gimbal::buttons(toml, raw.buttons.as_ref())?,
+        encoders,
         motors: motors(toml, &raw.motors, reduction)?,
         heat: heat(toml, &raw.motors)?,
         slew_n_per_s: toml.number(&raw.slew_n_per_s, SLEW)?,

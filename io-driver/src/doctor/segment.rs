@@ -1,6 +1,7 @@
 //! The driver's socket: is there a place for it, does anybody listen, does it speak our version, who may come?
 
 use super::user::User;
+use crate::status;
 use rt_core::doctor::machine::{FileStatus, Machine, Obstacle};
 use rt_core::doctor::step::{Action, Step};
 use rt_core::doctor::{Finding, Judged, Judgement, Remedy};
@@ -8,12 +9,24 @@ use shm_abi::client::{self, AttachError};
 use shm_abi::handshake::own_version_text;
 use std::path::Path;
 
-/// What a driver answered: its process id, or why there is no answer.
-pub type Answer = Result<u64, AttachError>;
+/// What a driver answered, or why there is no answer.
+pub type Answer = Result<Seen, AttachError>;
+
+/// A driver that answered.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Seen {
+    /// Its process id.
+    pub pid: u64,
+    /// Its devices that do not know where they are.
+    pub not_zeroed: Vec<String>,
+}
 
 /// Asks the driver at a socket who it is, as an observer: no lease, and gone again at once.
 pub fn ask(socket: &Path) -> Answer {
-    client::observe(socket, "io-driver doctor").map(|attachment| attachment.driver_pid)
+    client::observe(socket, "io-driver doctor").map(|attachment| Seen {
+        pid: attachment.driver_pid,
+        not_zeroed: status::not_zeroed(&attachment.driver),
+    })
 }
 
 const GROUP: &str = "segment";
@@ -25,7 +38,7 @@ struct SegmentCheck {
     run: fn(&Machine<'_>, &str, &Answer) -> Judged,
 }
 
-const CHECKS: [SegmentCheck; 4] = [
+const CHECKS: [SegmentCheck; 5] = [
     SegmentCheck {
         id: "segment.directory",
         title: "runtime directory",
@@ -50,9 +63,15 @@ const CHECKS: [SegmentCheck; 4] = [
         why: "Whoever can open the socket can command the motors and stop the driver.",
         run: reach,
     },
+    SegmentCheck {
+        id: "segment.zeroed",
+        title: "zeroed devices",
+        why: "As long as one device does not know where it is, none gets force.",
+        run: zeroed,
+    },
 ];
 
-/// The four questions about a socket.
+/// The questions about a socket and who listens there.
 pub fn examine(machine: &Machine<'_>, socket: &str, answer: &Answer) -> Vec<Finding> {
     let ask = |check: &SegmentCheck| {
         let judgement = (check.run)(machine, socket, answer).unwrap_or_else(Judgement::from);
@@ -114,7 +133,7 @@ fn absent_directory(machine: &Machine<'_>, path: &str) -> Judged {
 
 fn socket(_: &Machine<'_>, _: &str, answer: &Answer) -> Judged {
     Ok(match answer {
-        Ok(pid) => Judgement::pass(format!("driver, process {pid}, answers")),
+        Ok(seen) => Judgement::pass(format!("driver, process {}, answers", seen.pid)),
         Err(AttachError::NoDriver { .. }) => Judgement::pass("no driver is running"),
         Err(
             AttachError::WrongVersion { .. }
@@ -175,6 +194,19 @@ fn version(_: &Machine<'_>, _: &str, answer: &Answer) -> Judged {
             "the driver did not say",
             Remedy::words("see the line before: who listens there, and may you ask?"),
         ),
+    })
+}
+
+fn zeroed(_: &Machine<'_>, _: &str, answer: &Answer) -> Judged {
+    Ok(match answer {
+        Ok(seen) if seen.not_zeroed.is_empty() => Judgement::pass("every device knows where it is"),
+        Ok(seen) => {
+            let names = seen.not_zeroed.join(", ");
+            let text = "bring each into its zeroing pose, then `io-driver zero`";
+            let step = Step::by_hand(format!("not zeroed: {names}: {text}"));
+            Judgement::warn(format!("not zeroed: {names}"), Remedy::steps(text, [step]))
+        }
+        Err(_) => Judgement::pass("no driver was asked"),
     })
 }
 

@@ -5,7 +5,8 @@
 //! there is a queue of all values ever written, since a register shows only the last.
 //! The file belongs into memory (`/dev/shm`, `$XDG_RUNTIME_DIR`): on a disk, writing back its pages would stop
 //! the driver's loop.
-//! Who writes what: the emulator all of [`Inputs`] but the buttons, which are anybody's finger, and [`TallyWords`];
+//! Who writes what: the emulator all of [`Inputs`] but the buttons, and [`TallyWords`]; anybody the
+//! buttons and [`Hand`], as a finger would;
 //! the driver, one at a time, [`Outputs`] and the queue.
 //! Invariant of the `unsafe` here: a mapping is never unmapped, is as long as [`Card`], page-aligned, and made
 //! of atomic words only, for which every bit pattern and every concurrent change is valid. Whoever shortens the
@@ -16,12 +17,12 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io;
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicI32, AtomicU32, AtomicU64, Ordering};
 use std::time::Duration;
 use thiserror::Error;
 
 /// "PHCARD" and a version.
-pub const MAGIC: u64 = 0x0001_4452_4143_4850;
+pub const MAGIC: u64 = 0x0002_4452_4143_4850;
 /// Counters and converters.
 pub const CHANNELS: usize = 8;
 /// Values that wait for being checked: a minute at 1 kHz.
@@ -45,8 +46,8 @@ pub struct Inputs {
     pub status: AtomicU32,
     /// Process id of the emulator.
     pub pid: AtomicU32,
-    /// Fills up.
-    pub reserved: AtomicU32,
+    /// Another number each time that the card was switched on: the counters began anew then.
+    pub session: AtomicU32,
     /// Grows while the emulator lives.
     pub heartbeat: AtomicU64,
 }
@@ -79,6 +80,14 @@ pub struct Record {
     pub flags: AtomicU64,
 }
 
+/// A hand that turns the arm, as far as it goes beyond what the emulator itself does. Like the buttons, anybody's.
+#[repr(C, align(64))]
+#[derive(Debug)]
+pub struct Hand {
+    /// Counts by which each counter is turned.
+    pub counts: [AtomicI32; CHANNELS],
+}
+
 /// What the amplifiers have seen; see [`super::amplifier::Tally`].
 #[repr(C, align(64))]
 #[derive(Debug)]
@@ -97,6 +106,8 @@ pub struct Card {
     pub inputs: Inputs,
     /// What the card is told.
     pub outputs: Outputs,
+    /// What turns the arm besides its motors.
+    pub hand: Hand,
     /// What the amplifiers have seen.
     pub tally: TallyWords,
     /// Every value, by its number.
@@ -186,6 +197,7 @@ impl Card {
         }
         let card = map(&file).map_err(system("map"))?;
         card.inputs.pid.store(std::process::id(), Ordering::Relaxed);
+        card.inputs.session.store(new_session(), Ordering::Relaxed);
         card.magic.store(MAGIC, Ordering::Release);
         Ok(card)
     }
@@ -227,6 +239,12 @@ impl Card {
         let record = &self.queue[(number % QUEUE as u64) as usize];
         (record.number.load(Ordering::Acquire) == number).then_some(record)
     }
+}
+
+/// Not that of the card before: no two are made within a microsecond of a day by the same process.
+fn new_session() -> u32 {
+    let us = rt_core::clock::monotonic_ns() / 1000;
+    (us as u32 ^ std::process::id().rotate_left(16)) | 1
 }
 
 /// Longer than an emulator takes between two heartbeats.
@@ -291,7 +309,7 @@ mod tests {
         assert!(short.contains("found 7 bytes"), "{short}");
         std::fs::write(&path, vec![0; size_of::<Card>()]).unwrap();
         let empty = Card::take(&path).unwrap_err().to_string();
-        assert!(empty.contains("found 0x0, expected 0x1445241434850"), "{empty}");
+        assert!(empty.contains("found 0x0, expected 0x2445241434850"), "{empty}");
     }
 
     #[test]

@@ -30,8 +30,15 @@ pub struct Pose {
 }
 
 impl Motion {
-    /// Goes on to `time_s` by `dt_s`, with these joint torques (N m).
-    pub fn pass(&mut self, time_s: f64, dt_s: f64, torque: [f64; 3], encoders: &EncoderSpec) -> Pose {
+    /// Goes on to `time_s` by `dt_s`, with these joint torques (N m), while a hand turns it by so many counts more.
+    pub fn pass(
+        &mut self,
+        time_s: f64,
+        dt_s: f64,
+        torque: [f64; 3],
+        hand: [i64; 3],
+        encoders: &EncoderSpec,
+    ) -> Pose {
         let map = JointMap::new(encoders);
         let counts = match self {
             Self::Rest => [0; 3],
@@ -44,6 +51,7 @@ impl Motion {
                 map.angles_to_counts(*joints)
             }
         };
+        let counts: [i64; 3] = std::array::from_fn(|joint| counts[joint] + hand[joint]);
         Pose {
             counters: counts.map(|count| wrapped(count, encoders.count_bits) as u32),
             joints: map.counts_to_angles(counts),
@@ -67,7 +75,7 @@ mod tests {
     #[test]
     fn a_yielding_arm_turns_by_torque_over_viscosity() {
         let mut motion = Motion::Yielding { viscosity_nm_s: 2.0, joints: [0.0; 3] };
-        let pose = motion.pass(0.1, 0.1, [0.2, 0.2, -0.4], &ENCODERS);
+        let pose = motion.pass(0.1, 0.1, [0.2, 0.2, -0.4], [0; 3], &ENCODERS);
         let count = std::f64::consts::TAU / 40_960.0;
         for (found, wanted) in pose.joints.into_iter().zip([0.01, 0.01, -0.02]) {
             assert!((found - wanted).abs() <= 0.5 * count, "half a count");
@@ -78,7 +86,10 @@ mod tests {
 
     #[test]
     fn an_arm_at_rest_stays() {
-        let pose = Motion::Rest.pass(3.0, 1.0, [1.0; 3], &ENCODERS);
+        let pose = Motion::Rest.pass(3.0, 1.0, [1.0; 3], [0; 3], &ENCODERS);
         assert_eq!(pose, Pose { counters: [0; 3], joints: [0.0; 3] });
+        let turned = Motion::Rest.pass(3.0, 1.0, [0.0; 3], [0, 0, -1], &ENCODERS);
+        assert_eq!(turned.counters, [0, 0, 65_535], "until a hand turns it");
+        assert!(turned.joints[2] < 0.0);
     }
 }

@@ -4,6 +4,7 @@ use super::amplifier::{Amplifier, AmplifierSpec, Tally, Value};
 use super::card::{ARM_SHIFT, Card, QUEUE, Record, STATUS_TRIPPED};
 use super::motion::{Motion, Pose};
 use crate::device_file::ArmFile;
+use crate::encoders::wrapped;
 use rt_core::clock::{monotonic_ns, sleep_until_ns};
 use rt_core::signals::StopSignals;
 use std::sync::atomic::Ordering;
@@ -47,7 +48,7 @@ impl Emulator {
         });
         let now = monotonic_ns();
         let mut motion = motion;
-        let pose = motion.pass(0.0, 0.0, [0.0; 3], &premium.encoders);
+        let pose = motion.pass(0.0, 0.0, [0.0; 3], [0; 3], &premium.encoders);
         let mut emulator = Self {
             card,
             premium,
@@ -85,7 +86,8 @@ impl Emulator {
             (seconds(now_ns - self.began_ns), seconds(now_ns.saturating_sub(self.passed_ns)));
         self.passed_ns = now_ns;
         let torque = self.amplifier.joint_torque();
-        self.pose = self.motion.pass(time_s, dt_s, torque, &self.premium.encoders);
+        let hand = self.turned_by_hand(self.premium.encoders.channel);
+        self.pose = self.motion.pass(time_s, dt_s, torque, hand, &self.premium.encoders);
         self.tell();
     }
 
@@ -136,10 +138,21 @@ impl Emulator {
         }
     }
 
+    fn turned_by_hand(&self, channels: [u8; 3]) -> [i64; 3] {
+        let hand = &self.card.hand.counts;
+        channels.map(|channel| i64::from(hand[usize::from(channel)].load(Ordering::Relaxed)))
+    }
+
     fn tell(&mut self) {
         let inputs = &self.card.inputs;
         for (channel, counter) in self.premium.encoders.channel.iter().zip(self.pose.counters) {
             inputs.counters[usize::from(*channel)].store(counter, Ordering::Relaxed);
+        }
+        if let Some(gimbal) = &self.premium.gimbal {
+            for (channel, count) in gimbal.channel.iter().zip(self.turned_by_hand(gimbal.channel)) {
+                let counter = wrapped(count, gimbal.count_bits) as u32;
+                inputs.counters[usize::from(*channel)].store(counter, Ordering::Relaxed);
+            }
         }
         let status = if self.amplifier.is_tripped() { STATUS_TRIPPED } else { 0 };
         inputs.status.store(status, Ordering::Relaxed);

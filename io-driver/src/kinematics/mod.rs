@@ -15,6 +15,7 @@ use nalgebra::{Matrix3, Vector3};
 use thiserror::Error;
 
 pub mod conditioning;
+pub mod gimbal;
 pub mod gravity;
 pub mod ideal;
 pub mod joint_convention;

@@ -54,7 +54,7 @@ pub(super) fn open(
         })),
     };
     let info = commissioned(arm_info(device, &file), config);
-    let arm = Arm::new(&file, holds_its_weight(device, config)).already_zeroed();
+    let arm = Arm::new(&file, holds_its_weight(device, config)).with_zeroing(device.zeroing);
     Ok(Box::new(SimulatedDevice::new(info, arm, plant, holder, wish.base_in_world, latency(config))))
 }
 

@@ -7,6 +7,9 @@
 //! zero at once. Where there is a dead-man's switch and nobody holds it, the level sinks as for a reply that is
 //! too old, and rises again, from wherever it is, once it is held.
 //!
+//! `Zeroing` is left by positions that are valid, entered by ones that are not: when a driver starts whose devices
+//! have to be zeroed, and when a fault is cleared that cost them their zero.
+//!
 //! Invariants: authority is 0 unless a lease gave a valid command; it never jumps up; a new lease begins
 //! only after the former's force has ramped to zero; Fault is left only on request.
 //! Cost: a few comparisons a tick.
@@ -70,6 +73,12 @@ impl Safety {
             (FaultReason::None, true, false) => DriverState::Idle,
             _ => DriverState::Fault,
         }
+    }
+
+    /// Whether devices may be zeroed: nothing is let through, and nobody is being obeyed who could count on the
+    /// positions that will change.
+    pub fn may_zero(&self) -> bool {
+        self.is_released() && !self.commanded
     }
 
     /// Why it is in the fault state.
@@ -243,6 +252,31 @@ mod tests {
         safety.set_positions_valid(false);
         assert_eq!(safety.advance(ReplyKind::Fresh), 0.0);
         assert_eq!(safety.state(), DriverState::Zeroing);
+    }
+
+    #[test]
+    fn devices_may_be_zeroed_only_while_nobody_is_obeyed() {
+        let mut safety = Safety::new(RAMPS);
+        assert!(safety.may_zero(), "before anything is known");
+        safety.set_positions_valid(true);
+        safety.begin_lease();
+        safety.advance(ReplyKind::Fresh);
+        // The first tick of a ramp lets nothing through yet, and is one of somebody who is obeyed.
+        assert_eq!((safety.state(), safety.may_zero()), (DriverState::Active, false));
+        let mut safety = active(RAMPS);
+        safety.advance(ReplyKind::Expired);
+        assert_eq!((safety.state(), safety.may_zero()), (DriverState::Idle, false), "it still ramps out");
+        for _ in 0..10 {
+            safety.advance(ReplyKind::Expired);
+        }
+        assert!(safety.may_zero());
+        let mut safety = active(RAMPS);
+        safety.enter_fault(FaultReason::PositionJump);
+        assert!(safety.may_zero());
+        safety.set_positions_valid(false);
+        safety.clear_fault();
+        safety.advance(ReplyKind::Fresh);
+        assert_eq!((safety.state(), safety.may_zero()), (DriverState::Zeroing, true));
     }
 
     #[test]

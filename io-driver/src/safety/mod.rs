@@ -7,6 +7,7 @@
 //! | workspace edge | [`workspace`] | fading the force out beyond it |
 //! | slew rate | [`slew`] | letting a force grow only so fast; it may vanish at once |
 //! | device speed, position jumps | [`speed`] | a fault |
+//! | rest, before a pose is taken for the zeroing pose | [`stillness`] | refusing a zero |
 //! | switches: emergency stop, dead-man | [`switches`] | a fault; the share |
 //! | warmth of the motors | [`crate::heat`], in the device | cutting the current |
 //!
@@ -17,6 +18,7 @@ pub mod guard;
 pub mod peak;
 pub mod slew;
 pub mod speed;
+pub mod stillness;
 pub mod switches;
 pub mod workspace;
 

@@ -25,9 +25,9 @@ use super::motor::MotorPlant;
 use super::noise::Noise;
 use super::spec::{CableSpec, SimulationSpec};
 use crate::device_file::ArmFile;
-use crate::kinematics::{Interval, JointLimits, Kinematics, Mechanism};
+use crate::kinematics::{Interval, JointLimits, Kinematics, Mechanism, gimbal};
 use crate::motors::MotorMap;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 /// The longest step (s): a hundredth of the period of the stiffest spring that a description may have.
 pub const STEP_S: f64 = 62.5e-6;
@@ -85,6 +85,7 @@ pub struct SimulatedArm {
     map: MotorMap,
     motors: [MotorPlant; 3],
     encoders: EncoderPlant,
+    gimbal: Option<EncoderPlant>,
     friction: JointFriction,
     noise: Noise,
     links: Motion,
@@ -120,6 +121,7 @@ impl SimulatedArm {
             map: MotorMap::new(&file.motors),
             motors: std::array::from_fn(|_| motor.clone()),
             encoders: EncoderPlant::new(&file.encoders, spec.noise.encoder_counts_rms),
+            gimbal: file.gimbal.as_ref().map(|gimbal| EncoderPlant::new(gimbal, 0.0)),
             friction: JointFriction::new(spec.coulomb_nm),
             noise: Noise::new(seed),
             links: rest,
@@ -162,6 +164,18 @@ impl SimulatedArm {
     /// Raw counters now.
     pub fn counters(&mut self) -> [i64; 3] {
         self.encoders.raw(self.shafts.angles.into(), &mut self.noise)
+    }
+
+    /// Raw counters of an instrumented gimbal, if there is one, whose last link is turned like this in D.
+    pub fn gimbal_counters(&mut self, orientation: UnitQuaternion<f64>) -> Option<[i64; 3]> {
+        let carrier = gimbal::carrier(&self.kinematics, self.links.angles.into());
+        let encoders = self.gimbal.as_ref()?;
+        Some(encoders.raw(gimbal::angles(carrier, orientation), &mut self.noise))
+    }
+
+    /// Whether there is an instrumented gimbal.
+    pub fn has_gimbal(&self) -> bool {
+        self.gimbal.is_some()
     }
 
     /// Angle of a count of each joint (rad), with its sign.

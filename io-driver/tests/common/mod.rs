@@ -8,6 +8,7 @@ use io_driver::device::{Device, Effort, Reading, TickTime, Written};
 use io_driver::safety::switches::Switches;
 use io_driver::safety::{Ramps, Safety};
 use io_driver::velocity::VelocityEstimator;
+use io_driver::zeroing::ZeroState;
 use nalgebra::Vector3;
 use shm_abi::doorbell::WaitMode;
 use shm_abi::segment::{ClockMode, DeviceInfo, DriverInfo};
@@ -28,6 +29,10 @@ pub struct Log {
     pub fail_write: bool,
     pub releases: u32,
     pub rearms: u32,
+    /// Its counters.
+    pub counts: [i64; 6],
+    /// Whether it has to be zeroed; `None`: never.
+    pub needs_zero: Option<bool>,
 }
 
 /// Its velocity is the plain difference of its positions.
@@ -44,7 +49,9 @@ impl Device for TestDevice {
 
     fn read(&mut self, time: TickTime) -> Result<Reading, FaultReason> {
         let planned = self.log.lock().unwrap().next_reading.take();
-        let reading = planned.unwrap_or(Ok(Reading::at(Vector3::new(0.1, 0.2, 0.3))))?;
+        let encoder_counts = self.log.lock().unwrap().counts;
+        let usual = Reading { encoder_counts, ..Reading::at(Vector3::new(0.1, 0.2, 0.3)) };
+        let reading = planned.unwrap_or(Ok(usual))?;
         let velocity_m_per_s = self.velocity.observe(time, reading.position_m.into()).into();
         Ok(Reading { velocity_m_per_s, ..reading })
     }
@@ -67,6 +74,23 @@ impl Device for TestDevice {
     fn rearm(&mut self) {
         self.velocity.forget();
         self.log.lock().unwrap().rearms += 1;
+    }
+
+    fn zero_state(&self) -> ZeroState {
+        match self.log.lock().unwrap().needs_zero {
+            None => ZeroState::Innate,
+            Some(true) => ZeroState::Needed,
+            Some(false) => ZeroState::Zeroed,
+        }
+    }
+
+    fn zero(&mut self) {
+        self.log.lock().unwrap().needs_zero = Some(false);
+    }
+
+    fn lose_zero(&mut self) {
+        let needs = &mut self.log.lock().unwrap().needs_zero;
+        *needs = needs.map(|_| true);
     }
 }
 

@@ -1,7 +1,7 @@
 //! A stand to which anything may happen, and how everything is brought back to the whole force.
 //!
-//! Model: whoever is stopped goes on, whoever is dead is started again, a fault is cleared as a person would
-//! clear it, until the finger is pressed with the whole force. What the amplifiers did about a dead driver is
+//! Model: whoever is stopped goes on, whoever is dead is started again, a fault is cleared and a zero given as a
+//! person would, until the finger is pressed with the whole force. What the amplifiers did about a dead driver is
 //! checked before it gets a successor.
 
 use crate::driver::HANG;
@@ -203,6 +203,11 @@ impl Ward {
                 let _ = client::clear_fault(&self.stand.socket(), "test");
                 self.account.cleared += 1;
                 std::thread::sleep(Duration::from_millis(5));
+            }
+            if log.told.last().is_some_and(|told| told.state == DriverState::Zeroing) {
+                // A position that jumped cost the zero. The arm rests at home; refused until it has rested long enough.
+                let _ = client::zero(&self.stand.socket(), "test", 0);
+                std::thread::sleep(Duration::from_millis(20));
             }
         }
         log.check_promise(self.stand.view());

@@ -8,6 +8,7 @@ use io_driver::device::Device;
 use io_driver::driver::{describe, make_cycle};
 use io_driver::mail::{Letter, Sender, mail};
 use io_driver::real_loop::{Ended, RealLoop, Shared, Waiting};
+use io_driver::zeroing::DeviceSet;
 use rt_core::log::RtLogDrain;
 use shm_abi::DriverMemory;
 use shm_abi::doorbell::WaitMode;
@@ -122,9 +123,7 @@ fn letter_of(event: ServerEvent) -> Option<Letter> {
         ServerEvent::LeaseEnded { lease } => Some(Letter::End(lease)),
         ServerEvent::EmergencyStopRequested { .. } => Some(Letter::EmergencyStop),
         ServerEvent::ClearFaultRequested => Some(Letter::ClearFault),
-        ServerEvent::LeaseRefused
-        | ServerEvent::StopRequested { .. }
-        | ServerEvent::ZeroRequested { .. }
-        | ServerEvent::Trouble { .. } => None,
+        ServerEvent::ZeroRequested { devices, .. } => Some(Letter::Zero(DeviceSet(devices))),
+        ServerEvent::LeaseRefused | ServerEvent::StopRequested { .. } | ServerEvent::Trouble { .. } => None,
     }
 }

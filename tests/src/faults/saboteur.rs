@@ -4,7 +4,8 @@
 //! and when, such as `panic@500,hang:300@button20`: in tick 500, or as soon as button 20 of the card is pressed,
 //! which a test presses by a word of the shared file. Each is done once, and by the first device alone.
 
-use io_driver::device::{Device, Effort, Reading, TickTime, Written};
+use io_driver::device::{Device, Effort, Extras, Reading, TickTime, Written};
+use io_driver::zeroing::ZeroState;
 use nalgebra::Vector3;
 use shm_abi::FaultReason;
 use shm_abi::segment::DeviceInfo;
@@ -185,6 +186,22 @@ impl Saboteur {
 impl Device for Saboteur {
     fn info(&self) -> &DeviceInfo {
         self.inner.info()
+    }
+
+    fn extras(&self) -> Extras {
+        self.inner.extras()
+    }
+
+    fn zero_state(&self) -> ZeroState {
+        self.inner.zero_state()
+    }
+
+    fn zero(&mut self) {
+        self.inner.zero();
+    }
+
+    fn lose_zero(&mut self) {
+        self.inner.lose_zero();
     }
 
     fn read(&mut self, time: TickTime) -> Result<Reading, FaultReason> {

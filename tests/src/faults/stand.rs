@@ -51,6 +51,8 @@ pub struct Setup {
     pub sabotage: String,
     /// Further lines of the driver's configuration, before its device.
     pub config: String,
+    /// How the arm, which is at home, learns that it is.
+    pub zeroing: &'static str,
     /// Further arguments of the emulator.
     pub emulator: Vec<&'static str>,
 }
@@ -61,7 +63,14 @@ impl Setup {
         let watchdog_ms = if clock == "real" { WATCHDOG_MS } else { LOCKSTEP_WATCHDOG_MS };
         // 0.2 N a value: the honest force never grows faster, and a mad one always would.
         let limits = Limits { peak_n: 8.5, slew_n_per_s: 400.0, rate_hz: RATE_HZ, watchdog_ms };
-        Self { clock, limits, sabotage: String::new(), config: String::new(), emulator: Vec::new() }
+        Self {
+            clock,
+            limits,
+            sabotage: String::new(),
+            config: String::new(),
+            zeroing: "at-start",
+            emulator: Vec::new(),
+        }
     }
 
     /// The same with this sabotage.
@@ -228,8 +237,8 @@ fn config(setup: &Setup) -> String {
          [reply]\nbudget_us = 400\n\
          [safety]\nmax_command_age_ticks = 40\nramp_in_ms = 5\nramp_out_ms = 4\n\
          {}\n\
-         [[device]]\nbackend = \"emulated\"\ndescription = \"arm.toml\"\ncard = \"card\"\n",
-        setup.clock, setup.config
+         [[device]]\nbackend = \"emulated\"\ndescription = \"arm.toml\"\ncard = \"card\"\nzeroing = \"{}\"\n",
+        setup.clock, setup.config, setup.zeroing
     )
 }
 

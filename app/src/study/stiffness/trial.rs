@@ -18,7 +18,7 @@ use crate::virtual_clock::VirtualDriver;
 use bytemuck::Zeroable;
 use haptics::{Entity, Finger, Plane};
 use io_driver::config::{
-    DeviceConfig, DriverConfig, ProcessConfig, RealTime, ReplyConfig, SafetyConfig, Wish, period_of,
+    DeviceConfig, DriverConfig, ProcessConfig, RealTime, ReplyConfig, SafetyConfig, Wish, Zeroing, period_of,
 };
 use io_driver::open::ROUND_TRIP_NS;
 use io_driver::sim::hand::HandModel;
@@ -180,6 +180,7 @@ impl Bench {
                 backend: self.simulated(case).backend(wish),
                 peak_force_n: None,
                 compensates_gravity: true,
+                zeroing: Zeroing::Known,
             }],
         }
     }

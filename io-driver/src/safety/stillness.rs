@@ -1,0 +1,113 @@
+//! Whether an arm stands still: only then can the pose that it is in be taken for its zeroing pose.
+//!
+//! Problem: whoever zeroes an arm holds it by hand; a zero taken in the middle of a movement is a wrong one.
+//! Model: the counters stay within [`COUNTS`] of where the present rest began, for [`REST_NS`] of readings on end.
+//! A slow drift leaves that band sooner or later and begins a new rest.
+//! Units: counts; a count of a Premium is 0.03 mm at the tip, so two are less than a hand trembles in the air, and
+//! more than a flickering counter shows.
+//! Invariant: readings are counted, not time, so that ticks that were skipped prove nothing.
+//! Cost: six comparisons; no allocation.
+
+/// How far a counter may stray.
+pub const COUNTS: u64 = 2;
+/// For how long (ns).
+pub const REST_NS: u64 = 500_000_000;
+
+/// One device's rest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Stillness {
+    needed: u64,
+    readings: u64,
+    began_at: [i64; 6],
+}
+
+impl Stillness {
+    /// A device of which nothing is known, read once in each period.
+    pub fn new(period_ns: u64) -> Self {
+        Self { needed: REST_NS.div_ceil(period_ns.max(1)).max(1), readings: 0, began_at: [0; 6] }
+    }
+
+    /// Takes the counters of a tick.
+    pub fn observe(&mut self, counts: [i64; 6]) {
+        let rests = |(count, began): (&i64, &i64)| count.abs_diff(*began) <= COUNTS;
+        if self.readings > 0 && counts.iter().zip(&self.began_at).all(rests) {
+            self.readings += 1;
+        } else {
+            self.readings = 1;
+            self.began_at = counts;
+        }
+    }
+
+    /// It could not be read: nobody knows what it did meanwhile.
+    pub fn lose_sight(&mut self) {
+        self.readings = 0;
+    }
+
+    /// Whether it has rested long enough.
+    pub fn is_still(&self) -> bool {
+        self.readings >= self.needed
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+
+    fn at(count: i64) -> [i64; 6] {
+        [7, count, -3, 0, 0, 0]
+    }
+
+    #[test]
+    fn half_a_second_within_two_counts_is_still_and_a_third_count_begins_anew() {
+        let mut still = Stillness::new(MS);
+        for tick in 0..500 {
+            assert!(!still.is_still(), "{tick}");
+            still.observe(at(100 + [0, 2, -2, 1][tick % 4]));
+        }
+        assert!(still.is_still());
+        still.observe(at(103));
+        assert!(!still.is_still());
+        (0..499).for_each(|_| still.observe(at(103)));
+        assert!(still.is_still());
+    }
+
+    #[test]
+    fn the_same_time_at_every_rate() {
+        for period_ns in [MS, MS / 2, MS / 8, 7 * MS, 1000 * MS] {
+            let mut still = Stillness::new(period_ns);
+            let mut ticks = 0;
+            while !still.is_still() {
+                still.observe(at(0));
+                ticks += 1;
+            }
+            assert!((REST_NS..REST_NS + period_ns).contains(&(ticks * period_ns)), "{period_ns} {ticks}");
+        }
+    }
+
+    #[test]
+    fn a_drift_that_is_slow_is_no_rest_and_a_gimbal_that_swings_is_none_either() {
+        let mut still = Stillness::new(MS);
+        for tick in 0..5000 {
+            still.observe(at(tick / 100));
+            assert!(!still.is_still(), "a count each 0.1 s");
+        }
+        for tick in 0..1000 {
+            still.observe([0, 0, 0, 0, tick / 50, 0]);
+            assert!(!still.is_still());
+        }
+    }
+
+    #[test]
+    fn a_reading_that_fails_begins_anew_and_no_count_is_too_far() {
+        let mut still = Stillness::new(MS);
+        (0..500).for_each(|_| still.observe(at(i64::MIN)));
+        assert!(still.is_still());
+        still.lose_sight();
+        assert!(!still.is_still());
+        still.observe(at(i64::MAX));
+        still.observe(at(i64::MIN));
+        assert!(!still.is_still());
+    }
+}
