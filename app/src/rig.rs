@@ -124,7 +124,7 @@ impl Rig {
         let fingers = self.scene.fingers.iter().map(|finger| {
             let made = Finger::new(finger.radius_m, entities.len())
                 .map_err(|source| self.refused(format!("finger {}", finger.name), source))?;
-            let mount = Mount::new(self.layout.pose(finger.device));
+            let mount = Mount::placed(&self.layout.placement(finger.device));
             Ok(DeviceFinger { finger: made, device: finger.device, mount })
         });
         let fingers: Vec<DeviceFinger> = fingers.collect::<Result<_, RigError>>()?;

@@ -26,11 +26,12 @@ impl Spread {
         // At least three rows, or there would be fewer than three singular values.
         let rows = points.len().max(3);
         let cloud = DMatrix::from_fn(rows, 3, |i, j| points.get(i).map_or(0.0, |p| p[j] - centre[j]));
-        // The small factor of QR has the cloud's own singular values and directions.
-        let r: Matrix3<f64> = cloud.qr().r().fixed_view::<3, 3>(0, 0).into_owned();
-        let svd = r.svd(false, true);
-        let directions = svd.v_t.map_or_else(Matrix3::identity, |v_t| v_t.transpose());
-        let singular_values_m: [f64; 3] = svd.singular_values.into();
+        // The small factor of QR has the cloud's own singular values and directions. Of dynamic size, since the fixed
+        // one takes the way through the Gram matrix.
+        let svd = cloud.qr().r().svd(false, true);
+        let rows: Option<DMatrix<f64>> = svd.v_t;
+        let directions = rows.map_or_else(Matrix3::identity, |v_t| Matrix3::from_fn(|i, k| v_t[(k, i)]));
+        let singular_values_m = [0, 1, 2].map(|k| svd.singular_values[k]);
         let rms_m = singular_values_m.map(|value| value / count.sqrt());
         Self { centre, singular_values_m, rms_m, directions }
     }
