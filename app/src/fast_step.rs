@@ -123,7 +123,7 @@ impl DeviceFinger {
         let hip = self.mount.point_to_world(device.position_m_measured);
         if device.flags & DEVICE_POSITION_VALID == 0 {
             self.finger.reset();
-            return FingerRow { hip, god_object: hip, ..FingerRow::empty() };
+            return FingerRow { hip, god_object: hip, ..FingerRow::default() };
         }
         let output = self.finger.step(entities, &hip, dt_s);
         FingerRow {
