@@ -12,6 +12,7 @@ use nalgebra::Vector3;
 use rt_core::signals::StopSignals;
 use shm_abi::client::{self, AttachError, Attachment};
 use shm_abi::frame::DEVICE_POSITION_VALID;
+use shm_abi::layout::RING_FRAMES;
 use shm_abi::{DeviceFrame, DriverView, Frame, FrameUnavailable};
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
