@@ -3,6 +3,7 @@
 //! Exit status: 0 done; 2 bad usage or bad input, nothing was started; 3 a fault during the run, the
 //! recording up to it is complete; 128 + n: signal n ended the run, the recording up to it is complete.
 
+use crate::calibrate::{self, CalibrateArgs, default_layout};
 use crate::demo;
 use crate::outcome::{RunFailure, Stop};
 use crate::report::Report;
@@ -48,6 +49,8 @@ pub struct Cli {
 enum AppCommand {
     /// Play a scene with a scripted hand
     Run(RunArgs),
+    /// Find where a device stands, from points that it and another one measured together
+    Calibrate(CalibrateArgs),
     /// Answer a question about the whole system with a table and a picture
     #[command(subcommand)]
     Study(StudyCommand),
@@ -90,7 +93,7 @@ struct RunArgs {
     /// Seed of everything random: with --hand-mode impedance the hand's tremor and the sensors' noise
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse_seed, allow_negative_numbers = true)]
     seed: u64,
-    /// Where the devices stand in the world (TOML)
+    /// Where the devices stand in the world (TOML) [with --attach: what `calibrate --write` wrote, if it is there]
     #[arg(long, value_name = "FILE")]
     layout: Option<PathBuf>,
     /// Use the devices of a driver that runs already, at this socket or the usual place; goes after the scene
@@ -133,6 +136,7 @@ impl From<Clock> for ClockMode {
 pub fn main() -> ExitCode {
     match Cli::parse().command {
         Some(AppCommand::Driver(command)) => io_driver::cli::execute(command),
+        Some(AppCommand::Calibrate(args)) => calibrate::run(&args),
         Some(AppCommand::Run(args)) => conclude(run_scene(&args)),
         Some(AppCommand::Study(command)) => {
             let result = install_signals().and_then(|signals| study::execute(&command, &signals));
@@ -185,10 +189,38 @@ fn make_rig(args: &RunArgs) -> Result<Rig, RunFailure> {
         // The devices are the fingers; nothing follows a script.
         scene.hand = None;
     }
-    let layout = args.layout.as_ref().map(Layout::load).transpose().map_err(|error| wrong(&error))?;
+    let layout = find_layout(args)?;
     let period_ns = period_of(args.rate_hz.unwrap_or(DEFAULT_RATE_HZ));
     Rig::new(&args.scene, scene, layout, args.hand.as_deref(), hand_mode, period_ns)
         .map_err(|error| wrong(&error))
+}
+
+/// Where the devices stand: as said; real ones, of which nothing is said, as they were calibrated.
+fn find_layout(args: &RunArgs) -> Result<Option<Layout>, RunFailure> {
+    let wrong = |error: &dyn std::fmt::Display| RunFailure::Start(error.to_string());
+    let Some(file) = &args.layout else {
+        if args.attach.is_none() {
+            return Ok(None);
+        }
+        let Some((file, layout)) = default_layout::load().map_err(|error| wrong(&error))? else {
+            return Ok(None);
+        };
+        say(format_args!(
+            "phantom3: the devices stand as {} says; --layout names another file",
+            file.display()
+        ));
+        return Ok(Some(layout));
+    };
+    let layout = Layout::load(file).map_err(|error| wrong(&error))?;
+    let affine = (0..world::MAX_DEVICES).find(|index| layout.placement(*index).rigid().is_none());
+    match affine {
+        Some(index) if args.attach.is_none() => Err(wrong(&format_args!(
+            "{}: device {index} has a matrix, which corrects a real device's geometry; a scripted hand moves ideal \
+             devices, which need none: leave out the matrix, or attach to real devices with --attach",
+            file.display()
+        ))),
+        _ => Ok(Some(layout)),
+    }
 }
 
 fn make_plan(args: &RunArgs, rig: &Rig) -> Result<RunPlan, RunFailure> {
@@ -226,7 +258,7 @@ fn refuse_to_overwrite_input(args: &RunArgs, rig: &Rig) -> Result<(), RunFailure
 }
 
 /// By inode: links of both kinds lead to the same bytes.
-fn is_same_file(a: &Path, b: &Path) -> bool {
+pub(crate) fn is_same_file(a: &Path, b: &Path) -> bool {
     let identity = |path: &Path| path.metadata().map(|file| (file.dev(), file.ino()));
     matches!((identity(a), identity(b)), (Ok(a), Ok(b)) if a == b)
 }

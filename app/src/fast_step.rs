@@ -9,12 +9,15 @@
 //! position is not valid gets zero force and forgets its contacts.
 //! Cost: linear in fingers times entities.
 
+#![allow(non_snake_case)] // Frames are capital letters: tip_D is the tip in D.
+
 use crate::mount::Mount;
 use crate::row::{FingerRow, Row};
 use haptics::{Entity, Finger, Hip};
 use nalgebra::Vector3;
 use shm_abi::frame::DEVICE_POSITION_VALID;
 use shm_abi::{Command, DeviceFrame, Frame};
+use world::Layout;
 
 /// A finger and the device that is it.
 #[derive(Debug, Clone)]
@@ -35,6 +38,8 @@ pub struct FastStep {
     period_s: f64,
     last_tick: Option<u64>,
     driver_estimates: bool,
+    /// Where each finger's tip was in its device's base (m), if that was known.
+    tips_D: Vec<Option<[f64; 3]>>,
 }
 
 /// The first minor version of the shared-memory contract whose frames tell velocities.
@@ -43,7 +48,9 @@ const MINOR_WITH_VELOCITIES: u32 = 1;
 impl FastStep {
     /// Fingers that have touched nothing yet.
     pub fn new(fingers: Vec<DeviceFinger>, entities: Vec<Entity>, period_ns: u64) -> Self {
-        Self { fingers, entities, period_s: period_ns as f64 / 1e9, last_tick: None, driver_estimates: false }
+        let tips_D = vec![None; fingers.len()];
+        let period_s = period_ns as f64 / 1e9;
+        Self { fingers, entities, period_s, last_tick: None, driver_estimates: false, tips_D }
     }
 
     /// Which minor version of the contract the driver speaks: until that is told, nothing is expected of it that
@@ -60,8 +67,10 @@ impl FastStep {
         let dt_s = ticks as f64 * self.period_s;
         row.run_tick = frame.run_tick.max(0).unsigned_abs();
         let devices = frame.present_devices();
-        for (finger, row) in self.fingers.iter_mut().zip(&mut row.fingers) {
+        for ((finger, row), tip_D) in self.fingers.iter_mut().zip(&mut row.fingers).zip(&mut self.tips_D) {
             let Some(device) = devices.get(finger.device) else { continue };
+            let is_valid = device.flags & DEVICE_POSITION_VALID != 0;
+            *tip_D = is_valid.then_some(device.position_m_measured);
             *row = finger.step(device, &self.entities, dt_s, self.driver_estimates);
             command.devices[finger.device].force_on_user_n = finger.mount.force_to_device(row.force_on_user);
         }
@@ -77,14 +86,49 @@ impl FastStep {
         }
     }
 
+    /// Takes the devices' placements from a layout, between two ticks: the camera that they are attached to has
+    /// moved. Says whether it did.
+    ///
+    /// A finger that touches feels the move as one of its own hand, and its contacts live on: the god-objects stay
+    /// where they are on their surfaces, and friction drags or holds. That only holds for moves that a hand could make
+    /// in a tick. A finger put further would be pulled back by a spring of any length, or be through a thin wall; so
+    /// while any finger touches, a layout that moves one of them by more than `MOST_CARRIED_M_PER_S` allows is refused
+    /// as a whole (the devices' places relative to each other are the calibration and may not change on the way), and
+    /// the caller offers one that is nearer. If none touches, any layout is taken; after a far move nobody is swept
+    /// through what lies between: the next step is a first one.
+    pub fn set_layout(&mut self, layout: &Layout) -> bool {
+        let mount_of = |finger: &DeviceFinger| Mount::placed(&layout.placement(finger.device));
+        let carried_m = |(finger, tip_D): (&DeviceFinger, &Option<[f64; 3]>)| {
+            let (to, from) = (mount_of(finger), finger.mount);
+            tip_D.map_or(0.0, |tip_D| (to.point_to_world(tip_D) - from.point_to_world(tip_D)).norm())
+        };
+        let furthest_m = self.fingers.iter().zip(&self.tips_D).map(carried_m).fold(0.0, f64::max);
+        let is_near = furthest_m <= MOST_CARRIED_M_PER_S * self.period_s;
+        let touches = self.fingers.iter().any(|finger| finger.finger.contacts().next().is_some());
+        if touches && !is_near {
+            return false;
+        }
+        for finger in &mut self.fingers {
+            finger.mount = mount_of(finger);
+            if !is_near {
+                finger.finger.reset();
+            }
+        }
+        true
+    }
+
     /// Forgets all contacts: the connection to the devices was lost meanwhile.
     pub fn reset(&mut self) {
         self.last_tick = None;
+        self.tips_D.fill(None);
         for finger in &mut self.fingers {
             finger.finger.reset();
         }
     }
 }
+
+/// How fast the devices may be carried through the world while a finger touches: a hand's own fastest.
+const MOST_CARRIED_M_PER_S: f64 = 1.0;
 
 impl DeviceFinger {
     fn step(
@@ -127,7 +171,7 @@ fn finite_or_zero(force: Vector3<f64>) -> Vector3<f64> {
 }
 
 #[cfg(test)]
-mod tests {
+mod damping_tests {
     use super::*;
     use bytemuck::Zeroable;
     use haptics::Plane;
@@ -183,5 +227,96 @@ mod tests {
         assert!((after_a_gap - (K * 2.1e-3 + B * 0.1)).abs() < 1e-12, "1 mm in ten ticks");
         step.meet_driver(1);
         assert!((force(&mut step, 13, -2.2e-3, 0.0) - K * 2.2e-3).abs() < 1e-12, "1.1 tells");
+    }
+}
+
+#[cfg(test)]
+mod layout_tests {
+    use super::*;
+    use bytemuck::Zeroable;
+    use haptics::{Friction, Plane, Shape};
+    use nalgebra::Isometry3;
+    use std::path::Path;
+
+    const PERIOD_NS: u64 = 1_000_000;
+
+    /// Two fingers 0.1 m apart over a table with much friction, attached to the camera.
+    fn step_and_layout() -> (FastStep, Layout) {
+        let text = "master = 0\nattached_to = \"camera\"\n[[device]]\n[[device]]\nposition_m = [0.1, 0, 0]\n";
+        let layout = Layout::parse(text, Path::new("l.toml")).unwrap();
+        let table: Shape = Plane::new([0.0, 1.0, 0.0].into(), 0.0).unwrap().into();
+        let table = Entity::new(table, Isometry3::identity(), 1000.0).unwrap();
+        let table = table.with_friction(Friction::Coulomb { mu: 2.0 }).unwrap();
+        let finger = |device| DeviceFinger {
+            finger: Finger::new(0.0, 1).unwrap(),
+            device,
+            mount: Mount::placed(&layout.placement(device)),
+        };
+        (FastStep::new(vec![finger(0), finger(1)], vec![table], PERIOD_NS), layout)
+    }
+
+    fn frame(tick: u64, tip_D: [f64; 3]) -> Frame {
+        let mut frame = Frame::zeroed();
+        (frame.tick, frame.device_count) = (tick, 2);
+        for device in &mut frame.devices[..2] {
+            (device.flags, device.position_m_measured) = (DEVICE_POSITION_VALID, tip_D);
+        }
+        frame
+    }
+
+    fn feel(step: &mut FastStep, tick: u64, tip_D: [f64; 3]) -> Row {
+        let (mut command, mut row) = (Command::zeroed(), Row::empty());
+        step.step(&frame(tick, tip_D), &mut command, &mut row);
+        row
+    }
+
+    const ABOVE: [f64; 3] = [0.0, 0.01, 0.0];
+    const INSIDE: [f64; 3] = [0.0, -0.005, 0.0];
+
+    fn at(x: f64, y: f64) -> Isometry3<f64> {
+        Isometry3::translation(x, y, 0.0)
+    }
+
+    #[test]
+    fn a_camera_that_moves_like_a_hand_carries_touching_fingers_along_and_keeps_their_contacts() {
+        let (mut step, layout) = step_and_layout();
+        feel(&mut step, 1, ABOVE);
+        let before = feel(&mut step, 2, INSIDE).fingers[0];
+        let mut row = Row::empty();
+        for tick in 1..=4 {
+            assert!(step.set_layout(&layout.clone().with_camera(at(tick as f64 * 0.9e-3, 0.0))));
+            row = feel(&mut step, 2 + tick, INSIDE);
+        }
+        for (index, finger) in row.fingers[..2].iter().enumerate() {
+            let x = index as f64 * 0.1;
+            // A sum of two numbers of about 0.1.
+            assert!((finger.hip.x - x - 3.6e-3).abs() < 1e-15);
+            // mu d = 10 mm: the god-object sticks where the finger came in, and the spring of 3.6 mm is felt.
+            assert!((finger.god_object.x - x).abs() < 1e-15, "{finger:?}");
+            // 1000 N/m, depth 5 mm.
+            assert!((finger.force_on_user - Vector3::new(-3.6, 5.0, 0.0)).norm() < 1e-12, "{finger:?}");
+        }
+        assert_eq!(before.god_object.y, row.fingers[0].god_object.y);
+    }
+
+    #[test]
+    fn a_jump_is_refused_while_a_finger_touches_and_changes_nothing() {
+        let (mut step, layout) = step_and_layout();
+        feel(&mut step, 1, ABOVE);
+        let before = feel(&mut step, 2, INSIDE);
+        assert!(!step.set_layout(&layout.with_camera(at(0.0, 0.5))));
+        assert_eq!(feel(&mut step, 3, INSIDE).fingers[..2], before.fingers[..2]);
+    }
+
+    #[test]
+    fn a_jump_in_free_space_sweeps_nobody_through_the_table() {
+        let (mut step, layout) = step_and_layout();
+        feel(&mut step, 1, ABOVE);
+        // To 0.3 m aside and 3 mm into the table. Swept, the finger would have come in near x = 0.23, and the spring
+        // to there would be felt; as a first step it comes in straight above.
+        assert!(step.set_layout(&layout.with_camera(at(0.3, -0.013))));
+        let finger = feel(&mut step, 2, ABOVE).fingers[0];
+        assert!((finger.hip - Vector3::new(0.3, -0.003, 0.0)).norm() < 1e-15);
+        assert!((finger.force_on_user - Vector3::new(0.0, 3.0, 0.0)).norm() < 1e-12, "{finger:?}");
     }
 }

@@ -168,6 +168,13 @@ impl Rig {
         self.bases.get(device).copied().unwrap_or_else(Isometry3::identity)
     }
 
+    fn mount(&self, device: usize) -> Mount {
+        match &self.layout {
+            Some(layout) => Mount::placed(&layout.placement(device)),
+            None => Mount::new(self.base_in_world(device)),
+        }
+    }
+
     fn place_bases(&self) -> Result<Vec<Isometry3<f64>>, RigError> {
         let devices = 0..self.device_count();
         match (&self.layout, &self.hand_mode) {
@@ -210,7 +217,7 @@ impl Rig {
         let fingers = self.scene.fingers.iter().map(|finger| {
             let made = Finger::new(finger.radius_m, entities.len())
                 .map_err(|source| self.refused(format!("finger {}", finger.name), source))?;
-            let mount = Mount::new(self.base_in_world(finger.device));
+            let mount = self.mount(finger.device);
             Ok(DeviceFinger { finger: made, device: finger.device, mount })
         });
         let fingers: Vec<DeviceFinger> = fingers.collect::<Result<_, RigError>>()?;

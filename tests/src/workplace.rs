@@ -150,6 +150,14 @@ impl Running {
         Self { child, out, err }
     }
 
+    /// What it has said on standard error until now.
+    pub fn said_so_far(&self) -> String {
+        use std::os::unix::fs::FileExt;
+        let mut bytes = vec![0; 1 << 16];
+        let length = self.err.read_at(&mut bytes, 0).expect("our own file");
+        String::from_utf8_lossy(&bytes[..length]).into_owned()
+    }
+
     /// Waits for its end.
     pub fn wait(self) -> Said {
         let Self { mut child, out, err } = self;

@@ -173,6 +173,31 @@ pub enum SceneError {
         /// The difference from 1 that is taken as rounding in the file.
         tolerance: f64,
     },
+    /// A matrix that no device's placement has.
+    #[error(
+        "{at}: found a matrix that stretches by {least:.3} to {most:.3} and makes a unit cube's volume {volume:.3}; allowed: stretches from {} to {}, and a positive volume (no reflection)",
+        .allowed[0], .allowed[1]
+    )]
+    NotAPlacement {
+        /// Where it stands.
+        at: Box<Location>,
+        /// Smallest singular value.
+        least: f64,
+        /// Largest singular value.
+        most: f64,
+        /// Determinant.
+        volume: f64,
+        /// What the singular values may be.
+        allowed: [f64; 2],
+    },
+    /// Two ways to say how a device is turned.
+    #[error(
+        "{at}: found beside `orientation_wxyz`; allowed: one of the two, a matrix holds the turn as well"
+    )]
+    MatrixAndOrientation {
+        /// Where the matrix stands.
+        at: Box<Location>,
+    },
     /// A name that would break the header of a recording.
     #[error("{at}: found the name {found}; allowed: 1 to {limit_bytes} of the characters A-Z a-z 0-9 _ -")]
     BadName {

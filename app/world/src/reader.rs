@@ -60,7 +60,12 @@ impl<'d> Table<'d> {
 
     /// The value of `key`; `allowed` says what may stand there if nothing does.
     pub(crate) fn require(&self, key: &str, allowed: impl fmt::Display) -> Result<Value<'d>, SceneError> {
-        self.get(key).ok_or_else(|| SceneError::MissingKey { at: self.at(key), allowed: allowed.to_string() })
+        self.get(key).ok_or_else(|| self.missing(key, allowed))
+    }
+
+    /// That `key` should be there, and what could stand there.
+    pub(crate) fn missing(&self, key: &str, allowed: impl fmt::Display) -> SceneError {
+        SceneError::MissingKey { at: self.at(key), allowed: allowed.to_string() }
     }
 
     pub(crate) fn number(&self, key: &str, bound: Bound) -> Result<f64, SceneError> {
@@ -152,6 +157,20 @@ impl<'d> Value<'d> {
             *number = self.item(i, value).number(Bound::Any)?;
         }
         Ok(numbers)
+    }
+
+    /// `N` rows of `N` finite numbers.
+    pub(crate) fn rows<const N: usize>(&self) -> Result<[[f64; N]; N], SceneError> {
+        let allowed = format!("an array of {N} rows of {N} numbers");
+        let DeValue::Array(items) = self.value.get_ref() else { return Err(self.wrong_type(allowed)) };
+        if items.len() != N {
+            return Err(self.wrong_type(allowed));
+        }
+        let mut rows = [[0.0; N]; N];
+        for (i, (row, value)) in rows.iter_mut().zip(items.iter()).enumerate() {
+            *row = self.item(i, value).numbers()?;
+        }
+        Ok(rows)
     }
 
     /// A whole number below `limit`.

@@ -182,12 +182,13 @@ fn a_scene_has_one_to_eight_fingers() {
 fn a_layout_is_refused_in_the_same_way() {
     layout_refused(
         "[[devices]]\n",
-        "l.toml:1: devices: unknown key (did you mean `device`?); allowed: device",
+        "l.toml:1: devices: unknown key (did you mean `device`?); allowed: device, master, \
+         attached_to, camera",
     );
     layout_refused(
         "[[device]]\nposition = [0, 0, 0]\n",
         "l.toml:2: device[0].position: unknown key (did you mean `position_m`?); allowed: \
-         position_m, orientation_wxyz",
+         position_m, orientation_wxyz, matrix",
     );
     layout_refused(
         "[[device]]\n[[device]]\nposition_m = [0, 0, nan]\n",
@@ -203,5 +204,67 @@ fn a_layout_is_refused_in_the_same_way() {
     layout_refused(
         "device = 1\n",
         "l.toml:1: device: found 1; allowed: a list of tables, each under its own [[device]]",
+    );
+}
+
+#[test]
+fn a_matrix_must_be_one_that_a_device_can_have() {
+    let device = |rest: &str| format!("[[device]]\n{rest}\n");
+    layout_refused(
+        &device("matrix = [[1, 0, 0], [0, 1, 0]]"),
+        "l.toml:2: device[0].matrix: found an array of length 2; allowed: an array of 3 rows of 3 numbers",
+    );
+    layout_refused(
+        &device("matrix = [[1, 0, 0], [0, 1, inf], [0, 0, 1]]"),
+        "l.toml:2: device[0].matrix[1][2]: found inf, which is not a finite number; allowed: a number",
+    );
+    let stretches = "allowed: stretches from 0.5 to 2, and a positive volume (no reflection)";
+    for (matrix, found) in [
+        (
+            "[[1, 0, 0], [0, 1, 0], [0, 0, 0]]",
+            "stretches by 0.000 to 1.000 and makes a unit cube's volume 0.000",
+        ),
+        (
+            "[[1, 0, 0], [0, 1, 0], [0, 0, -1]]",
+            "stretches by 1.000 to 1.000 and makes a unit cube's volume -1.000",
+        ),
+        (
+            "[[1000, 0, 0], [0, 1000, 0], [0, 0, 1000]]",
+            "stretches by 1000.000 to 1000.000 and makes a unit cube's volume 1000000000.000",
+        ),
+        (
+            "[[0.4, 0, 0], [0, 1, 0], [0, 0, 1]]",
+            "stretches by 0.400 to 1.000 and makes a unit cube's volume 0.400",
+        ),
+    ] {
+        layout_refused(
+            &device(&format!("matrix = {matrix}")),
+            &format!("l.toml:2: device[0].matrix: found a matrix that {found}; {stretches}"),
+        );
+    }
+    layout_refused(
+        &device("orientation_wxyz = [1, 0, 0, 0]\nmatrix = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]"),
+        "l.toml:3: device[0].matrix: found beside `orientation_wxyz`; allowed: one of the two, a matrix holds the turn as well",
+    );
+}
+
+#[test]
+fn master_and_camera_go_together() {
+    layout_refused("master = 8\n", "l.toml:1: master: found 8; allowed: a whole number from 0 to 7");
+    layout_refused(
+        "attached_to = \"camera\"\n",
+        "l.toml:1: master: missing; allowed: the index of the device that is attached",
+    );
+    layout_refused(
+        "master = 0\nattached_to = \"desk\"\n",
+        "l.toml:2: attached_to: unknown place `desk`; allowed: world, camera",
+    );
+    layout_refused(
+        "master = 0\n[camera]\n",
+        "l.toml:1: attached_to: missing; allowed: \"camera\", since there is a [camera]",
+    );
+    layout_refused(
+        "master = 0\nattached_to = \"camera\"\n[camera]\nmatrix = 1\n",
+        "l.toml:4: camera.matrix: unknown key; allowed: position_m, orientation_wxyz",
     );
 }

@@ -1,0 +1,124 @@
+//! Pairs of points, and the files that hold them.
+//!
+//! Model: six numbers a line, the fiducial's x, y, z and the other device's, in metres, separated by commas,
+//! semicolons or white space; what MATLAB's `save -ascii` writes and its `load` reads (Melder figure 5.2). A first
+//! line of words is a header. Blank lines and comments (`%`, `#`) do not count. Lines keep their numbers, so that
+//! a suspect pair can be looked up.
+
+use nalgebra::Vector3;
+
+use crate::error::{CalibrationError, PairsError};
+
+/// One point, measured by both devices.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pair {
+    /// Where it stands in its file, from 1.
+    pub line: usize,
+    /// As the fiducial measured it, in its base frame F (m).
+    pub fiducial: Vector3<f64>,
+    /// As the other device measured it, in its base frame N (m).
+    pub other: Vector3<f64>,
+}
+
+/// The most pairs a file may have: more than a quarter of an hour of every tick at 1 kHz.
+pub const MAX_PAIRS: usize = 1_000_000;
+/// No desktop device reaches so far (m): such numbers are millimetres or counts.
+pub const MAX_EXTENT_M: f64 = 5.0;
+/// Points within such a box (m) are a device that nobody moved: directions would be those of its noise.
+pub const MIN_EXTENT_M: f64 = 0.005;
+
+/// Reads the pairs of a text.
+///
+/// # Errors
+/// [`PairsError`] names the line of the first mistake and what is allowed there.
+pub fn parse_pairs(text: &str) -> Result<Vec<Pair>, PairsError> {
+    let text = text.trim_start_matches('\u{feff}');
+    let lines = text.lines().enumerate().map(|(index, line)| (index + 1, content(line)));
+    let mut rows = lines.filter(|(_, line)| !line.is_empty()).peekable();
+    // Words before the first row are names of columns.
+    rows.next_if(|(_, line)| is_header(line));
+    let mut pairs = Vec::new();
+    for (line, text) in rows {
+        if pairs.len() == MAX_PAIRS {
+            return Err(PairsError::TooMany { line, limit: MAX_PAIRS });
+        }
+        pairs.push(parse_row(line, text)?);
+    }
+    Ok(pairs)
+}
+
+fn parse_row(line: usize, text: &str) -> Result<Pair, PairsError> {
+    let found = cells(text).count();
+    if found != 6 {
+        return Err(PairsError::RowLength { line, found });
+    }
+    let mut numbers = [0.0; 6];
+    for (column, (number, cell)) in numbers.iter_mut().zip(cells(text)).enumerate() {
+        *number = parse_cell(cell).ok_or_else(|| PairsError::BadCell {
+            line,
+            column: COLUMNS[column],
+            found: cell.chars().take(LONGEST_QUOTE).collect(),
+        })?;
+    }
+    let [xf, yf, zf, xn, yn, zn] = numbers;
+    Ok(Pair { line, fiducial: Vector3::new(xf, yf, zf), other: Vector3::new(xn, yn, zn) })
+}
+
+fn parse_cell(cell: &str) -> Option<f64> {
+    cell.parse().ok().filter(|number: &f64| number.is_finite())
+}
+
+/// A line without its comment.
+fn content(line: &str) -> &str {
+    line.find(['%', '#']).map_or(line, |at| &line[..at]).trim()
+}
+
+/// With commas or semicolons an empty cell is a mistake; white space alone may be of any width.
+fn cells(line: &str) -> impl Iterator<Item = &str> {
+    let by_mark = line.contains([',', ';']);
+    let parts: Vec<&str> = if by_mark {
+        line.split([',', ';']).map(str::trim).collect()
+    } else {
+        line.split_whitespace().collect()
+    };
+    parts.into_iter()
+}
+
+/// Names, none of which is a number: half a header is a broken row.
+fn is_header(line: &str) -> bool {
+    cells(line).all(|cell| cell.parse::<f64>().is_err() && cell.contains(char::is_alphabetic))
+}
+
+/// Refuses what no transform can be found from, whichever it is.
+pub(crate) fn check(pairs: &[Pair]) -> Result<(), CalibrationError> {
+    for pair in pairs {
+        if !pair.fiducial.iter().chain(pair.other.iter()).all(|number| number.is_finite()) {
+            return Err(CalibrationError::NotFinite { line: pair.line });
+        }
+    }
+    check_extent("fiducial", pairs, |pair| pair.fiducial)?;
+    check_extent("other device", pairs, |pair| pair.other)
+}
+
+fn check_extent(
+    whose: &'static str,
+    pairs: &[Pair],
+    point: impl Fn(&Pair) -> Vector3<f64>,
+) -> Result<(), CalibrationError> {
+    let Some(first) = pairs.first().map(&point) else { return Ok(()) };
+    let corners = |(low, high): (Vector3<f64>, Vector3<f64>), p: Vector3<f64>| (low.inf(&p), high.sup(&p));
+    let (low, high) = pairs.iter().map(&point).fold((first, first), corners);
+    let extent_m = (high - low).norm();
+    let furthest_m = low.amax().max(high.amax());
+    if extent_m > MAX_EXTENT_M || furthest_m > MAX_EXTENT_M {
+        return Err(CalibrationError::TooWide { whose, found: extent_m.max(furthest_m) });
+    }
+    if extent_m < MIN_EXTENT_M {
+        return Err(CalibrationError::HardlyMoved { whose, extent_m });
+    }
+    Ok(())
+}
+
+const COLUMNS: [&str; 6] = ["fiducial x", "fiducial y", "fiducial z", "other x", "other y", "other z"];
+/// Enough of a cell to find it again.
+const LONGEST_QUOTE: usize = 40;

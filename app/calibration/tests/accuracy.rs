@@ -1,0 +1,111 @@
+//! Whether the standard errors told are those that repeated calibrations show.
+
+mod support;
+
+use calibration::{Fit, Model, Transform, calibrate};
+use nalgebra::{Rotation3, Vector3};
+use support::{WIDE, affine_truth, pairs_of, rigid_truth};
+
+const SEEDS: u64 = 400;
+/// The RMS of 400 Gaussian errors is known to 1 / sqrt(800) = 3.5 %; four times that.
+const SPREAD_OF_RMS: f64 = 0.14;
+
+/// RMS over many calibrations of an error divided by what was predicted for it: 1 if the prediction is right.
+fn ratio(
+    truth: &Transform,
+    model: Model,
+    edges: [f64; 3],
+    error: impl Fn(&Fit) -> [f64; 3],
+    predicted: impl Fn(&Fit) -> [f64; 3],
+) -> [f64; 3] {
+    let mut squares = [0.0; 3];
+    for seed in 0..SEEDS {
+        let pairs = pairs_of(truth, 60, edges, 2e-4, 1000 + seed);
+        let fit = calibrate(&pairs, model).expect("good pairs").all;
+        let (errors, predictions) = (error(&fit), predicted(&fit));
+        for k in 0..3 {
+            squares[k] += (errors[k] / predictions[k]).powi(2) / SEEDS as f64;
+        }
+    }
+    squares.map(f64::sqrt)
+}
+
+#[track_caller]
+fn assert_right(ratios: [f64; 3]) {
+    for ratio in ratios {
+        assert!((ratio - 1.0).abs() < SPREAD_OF_RMS, "{ratios:?}");
+    }
+}
+
+/// How far the fit is turned, about the directions of the spread (rad).
+fn turned(fit: &Fit, truth: &Transform) -> [f64; 3] {
+    let off = fit.transform.matrix * truth.matrix.transpose();
+    let about_axes = Rotation3::from_matrix(&off).scaled_axis();
+    (fit.spread_other.directions.transpose() * truth.matrix.transpose() * about_axes).into()
+}
+
+#[test]
+fn a_rigid_fit_errs_as_much_as_it_says() {
+    let truth = rigid_truth();
+    for edges in [WIDE, [0.3, 0.1, 0.02]] {
+        let accuracy = |fit: &Fit| fit.accuracy.expect("60 pairs");
+        let rotation = |fit: &Fit| accuracy(fit).rotation_rad;
+        assert_right(ratio(&truth, Model::Rigid, edges, |fit| turned(fit, &truth), rotation));
+        let origin = |fit: &Fit| (fit.transform.position - truth.position).into();
+        assert_right(ratio(&truth, Model::Rigid, edges, origin, |fit| accuracy(fit).position_m));
+        let middle = |fit: &Fit| {
+            let centre = fit.spread_other.centre;
+            (fit.transform.apply(&centre) - truth.apply(&centre)).into()
+        };
+        assert_right(ratio(&truth, Model::Rigid, edges, middle, |fit| [accuracy(fit).middle_m; 3]));
+    }
+}
+
+#[test]
+fn an_affine_fit_errs_as_much_as_it_says() {
+    let truth = affine_truth();
+    let accuracy = |fit: &Fit| fit.accuracy.expect("60 pairs");
+    let origin = |fit: &Fit| (fit.transform.position - truth.position).into();
+    assert_right(ratio(&truth, Model::Affine, WIDE, origin, |fit| accuracy(fit).position_m));
+    let stretched = |fit: &Fit| {
+        let off = fit.transform.matrix - truth.matrix;
+        [0, 1, 2].map(|k| (off * fit.spread_other.directions.column(k)).x)
+    };
+    let stretch = |fit: &Fit| accuracy(fit).stretch.expect("an affine fit");
+    assert_right(ratio(&truth, Model::Affine, WIDE, stretched, stretch));
+    // Turning is the antisymmetric part of what is off, seen along the directions of the spread.
+    let rotation = |fit: &Fit| {
+        let u = fit.spread_other.directions;
+        let off =
+            u.transpose() * rigid_truth().matrix.transpose() * (fit.transform.matrix - truth.matrix) * u;
+        [(2, 1), (0, 2), (1, 0)].map(|(i, j)| (off[(i, j)] - off[(j, i)]) / 2.0)
+    };
+    assert_right(ratio(&truth, Model::Affine, WIDE, rotation, |fit| accuracy(fit).rotation_rad));
+}
+
+#[test]
+fn the_noise_of_the_pairs_is_estimated_without_bias() {
+    let noise_of = |seed| {
+        let fit =
+            calibrate(&pairs_of(&rigid_truth(), 6, WIDE, 2e-4, seed), Model::Rigid).expect("good pairs").all;
+        fit.accuracy.expect("12 degrees of freedom").noise_m.powi(2)
+    };
+    let mean = (0..SEEDS).map(noise_of).sum::<f64>() / SEEDS as f64;
+    // Relative spread of a variance of 12 degrees of freedom over 400 seeds: sqrt(2 / 12 / 400) = 2 %; four times that.
+    assert!((mean / 4e-8 - 1.0).abs() < 0.08, "{mean}");
+}
+
+#[test]
+fn a_fit_that_needed_every_pair_says_nothing_about_its_accuracy() {
+    let pairs = pairs_of(&affine_truth(), 4, WIDE, 0.0, 2);
+    assert_eq!(calibrate(&pairs, Model::Affine).expect("four points").all.accuracy, None);
+}
+
+#[test]
+fn the_scale_between_the_devices_is_told_by_a_rigid_fit() {
+    let rigid = rigid_truth();
+    let truth = Transform { matrix: rigid.matrix * 1.025, position: Vector3::zeros() };
+    let fit = calibrate(&pairs_of(&truth, 100, WIDE, 0.0, 4), Model::Rigid).expect("good pairs").all;
+    // Exact but for rounding: Umeyama's scale is the least-squares one.
+    assert!((fit.scale - 1.025).abs() < 1e-12, "{}", fit.scale);
+}
