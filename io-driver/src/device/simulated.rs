@@ -22,6 +22,10 @@ use shm_abi::FaultReason;
 use shm_abi::segment::DeviceInfo;
 use std::sync::Arc;
 
+/// A driver that stalls for longer than this finds the world where it was after it (ns): nobody ran it meanwhile. Short
+/// against the amplifiers' watchdogs, which have to watch the driver's work and not this machine's.
+const LONGEST_STALL_NS: u64 = 5_000_000;
+
 /// When after the reading of a tick its motor values take effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Latency {
@@ -198,7 +202,7 @@ impl Device for SimulatedDevice {
 
     fn read(&mut self, time: TickTime) -> Result<Reading, FaultReason> {
         let ticks = self.last_tick.replace(time.tick).map_or(0, |last| time.tick.saturating_sub(last));
-        let elapsed_ns = ticks.saturating_mul(time.period_ns);
+        let elapsed_ns = ticks.saturating_mul(time.period_ns).min(time.period_ns.max(LONGEST_STALL_NS));
         self.pass(elapsed_ns);
         self.read_at_ns = monotonic_ns();
         let handle = self.tell_hand(time, elapsed_ns.max(time.period_ns) as f64 / 1e9);

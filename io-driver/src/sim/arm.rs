@@ -11,9 +11,10 @@
 //!
 //! With cables that stretch, rotors and links are two bodies for each joint with a spring and a damper between
 //! them, and the encoders see the rotors. Coulomb friction acts where the motors are.
-//! Everything smooth is integrated by the explicit midpoint rule at [`STEP_S`] or less; then the friction takes what
-//! it needs to hold the joints, or all it has, as an impulse within the step, so that a joint that sticks does not
-//! creep ([`super::joint_friction`]).
+//! Steps of [`STEP_S`] or less: the rates change by the acceleration at the step's middle, and the friction takes from
+//! them what it needs to hold the joints, or all it has ([`super::joint_friction`]); the angles change by the mean of the
+//! rates before and after, so that a joint that sticks does not creep. For a spring this keeps the area of phase space,
+//! and with it the energy to second order for ever.
 //! Frames and signs: base frame D; a positive torque turns its joint towards a larger angle.
 //! Invariants: no input makes it allocate or panic. Time that is asked for in one call beyond [`LONGEST_S`] does not
 //! pass: the world of a simulated arm stands still while nobody runs it.
@@ -31,7 +32,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 /// The longest step (s): a hundredth of the period of the stiffest spring that a description may have.
 pub const STEP_S: f64 = 62.5e-6;
-/// The longest time that passes in one call (s).
+/// The longest time that passes in one call (s): the tick of the slowest driver.
 pub const LONGEST_S: f64 = 0.1;
 
 /// Whoever holds the tip.
@@ -101,6 +102,18 @@ pub struct SimulatedArm {
 struct Motion {
     angles: Vector3<f64>,
     rates: Vector3<f64>,
+}
+
+impl Motion {
+    /// With this acceleration for a while, to first order.
+    fn drifted(self, acceleration: Vector3<f64>, dt_s: f64) -> Self {
+        Self { angles: self.angles + self.rates * dt_s, rates: self.rates + acceleration * dt_s }
+    }
+
+    /// After a step that ends with these rates, and changed them evenly.
+    fn arriving(self, rates: Vector3<f64>, dt_s: f64) -> Self {
+        Self { angles: self.angles + 0.5 * (self.rates + rates) * dt_s, rates }
+    }
 }
 
 impl SimulatedArm {
@@ -249,32 +262,22 @@ impl SimulatedArm {
 
     fn step_rigid(&mut self, drive: Vector3<f64>, dt_s: f64, hand: &impl TipLoad) {
         let begin = self.links;
-        let half = self.moved(begin, begin, self.accelerations(begin, drive, hand), 0.5 * dt_s);
-        let acceleration = self.accelerations(half, drive, hand);
-        let free = begin.rates + acceleration * dt_s;
+        let half = begin.drifted(self.accelerations(begin, drive, hand), 0.5 * dt_s);
+        let free = begin.rates + self.accelerations(half, drive, hand) * dt_s;
         let held = self.friction.hold(&self.inertia(half.angles), free, dt_s);
-        // The midpoint's path; what the friction took, it took evenly, so half of it counts for the path.
-        let angles = begin.angles + (half.rates + 0.5 * held) * dt_s;
-        self.links = Motion { angles, rates: free + held };
+        self.links = begin.arriving(free + held, dt_s);
         self.shafts = self.links;
     }
 
     fn step_elastic(&mut self, cable: &CableSpec, drive: Vector3<f64>, dt_s: f64, hand: &impl TipLoad) {
         let (links, shafts) = (self.links, self.shafts);
         let [of_links, of_shafts] = self.elastic(cable, links, shafts, drive, hand);
-        let half_links = self.moved(links, links, of_links, 0.5 * dt_s);
-        let half_shafts = self.moved(shafts, shafts, of_shafts, 0.5 * dt_s);
-        let [of_links, of_shafts] = self.elastic(cable, half_links, half_shafts, drive, hand);
-        self.links = self.moved(links, half_links, of_links, dt_s);
+        let half = [links.drifted(of_links, 0.5 * dt_s), shafts.drifted(of_shafts, 0.5 * dt_s)];
+        let [of_links, of_shafts] = self.elastic(cable, half[0], half[1], drive, hand);
         let free = shafts.rates + of_shafts * dt_s;
         let held = self.friction.hold(&Matrix3::from_diagonal(&self.rotors), free, dt_s);
-        self.shafts =
-            Motion { angles: shafts.angles + (half_shafts.rates + 0.5 * held) * dt_s, rates: free + held };
-    }
-
-    /// From `begin` with the rates of `along` and these accelerations.
-    fn moved(&self, begin: Motion, along: Motion, acceleration: Vector3<f64>, dt_s: f64) -> Motion {
-        Motion { angles: begin.angles + along.rates * dt_s, rates: begin.rates + acceleration * dt_s }
+        self.links = links.arriving(links.rates + of_links * dt_s, dt_s);
+        self.shafts = shafts.arriving(free + held, dt_s);
     }
 
     fn inertia(&self, angles: Vector3<f64>) -> Matrix3<f64> {
