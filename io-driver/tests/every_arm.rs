@@ -50,6 +50,8 @@ fn replayed(directory: &Path, name: &str, counts: [i64; 3]) -> Box<dyn Device> {
 fn there_are_arms_of_both_kinds() {
     let kinds: Vec<&str> = arms().iter().map(|(_, arm)| arm.kind).collect();
     assert_eq!(kinds, ["premium", "wooden-haptics"]);
+    // As long as shared memory has room for.
+    assert!(kinds.iter().all(|kind| kind.len() <= 16), "{kinds:?}");
 }
 
 #[test]

@@ -3,8 +3,8 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use io_driver::kinematics::gravity::Bodies;
-use io_driver::kinematics::{Interval, JointConvention, JointLimits, Mechanism, Premium};
+use io_driver::kinematics::gravity::{Bodies, GRAVITY_M_PER_S2};
+use io_driver::kinematics::{Interval, JointConvention, JointLimits, Mechanism, Premium, WoodenHaptics};
 use io_driver::sim::dynamics::{Dynamics, Inertias};
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
@@ -74,6 +74,23 @@ fn any_convention() -> impl Strategy<Value = JointConvention> {
 
 fn moved(joints: [f64; 3], direction: [f64; 3], by: f64) -> [f64; 3] {
     std::array::from_fn(|j| joints[j] + by * direction[j])
+}
+
+/// An arm whose only mass is a kilogram in the middle of a forearm of twice the length: at the tip of the real one.
+fn point_mass_at_the_tip([l1, l2]: [f64; 2], convention: JointConvention) -> Dynamics {
+    let none = [0.0; 3];
+    let bodies = Bodies {
+        mass_a_kg: 1.0,
+        mass_c_kg: 0.0,
+        mass_be_kg: 0.0,
+        mass_df_kg: 0.0,
+        l3_m: 0.0,
+        l5_m: 0.0,
+        l6_m: 0.0,
+    };
+    let inertias =
+        Inertias { a_kg_m2: none, c_kg_m2: none, be_kg_m2: none, df_kg_m2: none, base_yy_kg_m2: 0.0 };
+    Dynamics::new([l1, 2.0 * l2], &bodies, &inertias, convention)
 }
 
 /// Derivative of M along a direction of joint space, by central differences.
@@ -272,6 +289,27 @@ proptest! {
             + Vector3::from(mechanism.joint_torque(joints, force));
         // 7 J along up to 5.2 rad/s, cut off (5.2 * 1e-5)^2 / 6, rounding 1e-15 / 1e-5.
         prop_assert!((slope - torque.dot(&Vector3::from(direction))).abs() < 7.0 * 5.2 * 1e-9, "{slope}");
+    }
+
+    /// Ties the dynamics to each mechanism's kinematics, conventions of its joints included.
+    #[test]
+    fn a_mass_at_the_tip_is_seen_through_the_jacobian(joints in any_joints()) {
+        let wooden = WoodenHaptics::new([0.080, 0.205, 0.245], [0.220, 0.080], JointLimits::UNBOUNDED);
+        let premium = mechanism();
+        let arms: [(&dyn Mechanism, Dynamics); 2] = [
+            (&premium, point_mass_at_the_tip(premium.link_lengths_m(), Premium::CONVENTION)),
+            (&wooden, point_mass_at_the_tip(wooden.link_lengths_m(), WoodenHaptics::CONVENTION)),
+        ];
+        for (arm, dynamics) in arms {
+            let jacobian = arm.jacobian(joints);
+            // Products of two numbers below 0.45 m, a handful of roundings each.
+            let error = (dynamics.mass_matrix(joints) - jacobian.transpose() * jacobian).amax();
+            prop_assert!(error < 32.0 * f64::EPSILON * 0.45 * 0.45, "{error}");
+            let weight = arm.joint_torque(joints, Vector3::y() * GRAVITY_M_PER_S2);
+            for (held, weight) in dynamics.holding_torque(joints).into_iter().zip(weight) {
+                prop_assert!((held - weight).abs() < 32.0 * f64::EPSILON * 4.5, "{held} {weight}");
+            }
+        }
     }
 
     #[test]
