@@ -2,9 +2,9 @@
 //!
 //! Problem: individual devices differ by up to a fifth, wiring is not public, and a changed cable
 //! must not need a compiler.
-//! Model: `kind` says which tables the file has. An arm (`premium`, `wooden-haptics`) has `[linkage]`, `[encoders]`,
-//! `[motors]` and, if gravity is to be compensated, `[bodies]`; if it is to be simulated, moments of inertia in
-//! `[bodies]` and a table `[simulation]`. An `ideal` device has nothing.
+//! Model: `kind` says which tables the file has. An arm (`premium`, `wooden-haptics`) has `[linkage]`,
+//! `[encoders]`, `[motors]` and, if gravity is to be compensated, `[bodies]`; if it is to be simulated,
+//! moments of inertia in `[bodies]` and a table `[simulation]`. An `ideal` device has nothing.
 //! Units: each key carries its own.
 //! Invariants: a value of type [`DeviceFile`] has been checked: all numbers are finite and in
 //! their range, limits are ordered, the home pose is within them, and the inverse kinematics is

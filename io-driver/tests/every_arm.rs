@@ -1,5 +1,5 @@
-//! Whatever arm a description tells of goes the whole way: counters, tip, force, weight, codes; played back from a
-//! trace and on an emulated card.
+//! Whatever arm a description tells of goes the whole way: counters, tip, force, weight, codes; played back
+//! from a trace and on an emulated card.
 
 use io_driver::config::DriverConfig;
 use io_driver::device::{Device, Effort, TickTime};
