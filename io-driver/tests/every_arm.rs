@@ -1,5 +1,5 @@
-//! Whatever arm a description tells of goes the whole way: counters, tip, force, weight, codes; played back from a
-//! trace and on an emulated card.
+//! Whatever arm a description tells of goes the whole way: counters, tip, force, weight, codes; played back
+//! from a trace and on an emulated card.
 
 use io_driver::config::DriverConfig;
 use io_driver::device::{Device, Effort, TickTime};
@@ -50,6 +50,8 @@ fn replayed(directory: &Path, name: &str, counts: [i64; 3]) -> Box<dyn Device> {
 fn there_are_arms_of_both_kinds() {
     let kinds: Vec<&str> = arms().iter().map(|(_, arm)| arm.kind).collect();
     assert_eq!(kinds, ["premium", "wooden-haptics"]);
+    // As long as shared memory has room for.
+    assert!(kinds.iter().all(|kind| kind.len() <= 16), "{kinds:?}");
 }
 
 #[test]

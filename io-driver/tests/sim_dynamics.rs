@@ -1,10 +1,10 @@
-//! Mass, Coriolis and weight of the Premium 1.5 against the paper's numbers, against loose bodies, and against each
-//! other.
+//! Mass, Coriolis and weight of the Premium 1.5 against the paper's numbers, against loose bodies, and
+//! against each other.
 
 use std::f64::consts::FRAC_PI_2;
 
-use io_driver::kinematics::gravity::Bodies;
-use io_driver::kinematics::{Interval, JointConvention, JointLimits, Mechanism, Premium};
+use io_driver::kinematics::gravity::{Bodies, GRAVITY_M_PER_S2};
+use io_driver::kinematics::{Interval, JointConvention, JointLimits, Mechanism, Premium, WoodenHaptics};
 use io_driver::sim::dynamics::{Dynamics, Inertias};
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
@@ -46,8 +46,9 @@ const STEP: f64 = 1e-5;
 /// an angle: their third derivatives are below eight times it.
 const LARGEST_KG_M2: f64 = 5e-3;
 
-/// Error of a central difference of an element of M: cut off `h^2 / 6` times the third derivative along a direction of
-/// at most 3 rad/s a joint, so (2 * 3 * sqrt 2)^3 at most; rounding, ten units of the element over `2 h`.
+/// Error of a central difference of an element of M: cut off `h^2 / 6` times the third derivative along a
+/// direction of at most 3 rad/s a joint, so (2 * 3 * sqrt 2)^3 at most; rounding, ten units of the element
+/// over `2 h`.
 const SLOPE_ERROR: f64 = LARGEST_KG_M2 * (STEP * STEP / 6.0 * 620.0 + 10.0 * f64::EPSILON / (2.0 * STEP));
 
 fn premium() -> Dynamics {
@@ -76,6 +77,24 @@ fn moved(joints: [f64; 3], direction: [f64; 3], by: f64) -> [f64; 3] {
     std::array::from_fn(|j| joints[j] + by * direction[j])
 }
 
+/// An arm whose only mass is a kilogram in the middle of a forearm of twice the length: at the tip of the
+/// real one.
+fn point_mass_at_the_tip([l1, l2]: [f64; 2], convention: JointConvention) -> Dynamics {
+    let none = [0.0; 3];
+    let bodies = Bodies {
+        mass_a_kg: 1.0,
+        mass_c_kg: 0.0,
+        mass_be_kg: 0.0,
+        mass_df_kg: 0.0,
+        l3_m: 0.0,
+        l5_m: 0.0,
+        l6_m: 0.0,
+    };
+    let inertias =
+        Inertias { a_kg_m2: none, c_kg_m2: none, be_kg_m2: none, df_kg_m2: none, base_yy_kg_m2: 0.0 };
+    Dynamics::new([l1, 2.0 * l2], &bodies, &inertias, convention)
+}
+
 /// Derivative of M along a direction of joint space, by central differences.
 fn slope(dynamics: &Dynamics, joints: [f64; 3], direction: [f64; 3]) -> Matrix3<f64> {
     let at = |h: f64| dynamics.mass_matrix(moved(joints, direction, h));
@@ -86,8 +105,8 @@ fn axis(j: usize) -> [f64; 3] {
     std::array::from_fn(|k| if k == j { 1.0 } else { 0.0 })
 }
 
-/// The masses that a push on the tip along x, y, z meets: the free tip's `1 / (e^T J M^-1 J^T e)`, and the one of a
-/// tip led along the axis without stepping aside, `e^T J^-T M J^-1 e`.
+/// The masses that a push on the tip along x, y, z meets: the free tip's `1 / (e^T J M^-1 J^T e)`, and the
+/// one of a tip led along the axis without stepping aside, `e^T J^-T M J^-1 e`.
 fn apparent_masses_kg(mass_matrix: Matrix3<f64>, joints: [f64; 3]) -> (Vector3<f64>, Vector3<f64>) {
     let jacobian = mechanism().jacobian(joints);
     let mobility = jacobian * mass_matrix.try_inverse().unwrap() * jacobian.transpose();
@@ -110,7 +129,8 @@ fn at_home_the_tip_weighs_what_the_paper_says() {
     let grams = free * 1e3;
     // Two digits are known.
     assert!((grams - Vector3::new(77.0, 52.0, 32.0)).amax() < 0.5, "{grams}");
-    // At home both M and J are diagonal, so a push along an axis moves the tip along it: the definitions agree.
+    // At home both M and J are diagonal, so a push along an axis moves the tip along it: the definitions
+    // agree.
     assert!((led - free).amax() < 1e-12, "{led}");
 }
 
@@ -120,8 +140,8 @@ fn at_home_with_rotors_the_tip_weighs_what_the_data_sheet_says_but_sideways() {
     let grams = apparent_masses_kg(mass, [0.0; 3]).0 * 1e3;
     assert!((grams - Vector3::new(81.0, 55.0, 37.0)).amax() < 0.5, "{grams}");
     assert!(grams.y < 75.0 && grams.z < 75.0, "{grams}");
-    // Sideways the whole turret turns. 81 g are 8 % more than the sheet's 75 g, which names no direction; units
-    // differ among each other by up to 20 %.
+    // Sideways the whole turret turns. 81 g are 8 % more than the sheet's 75 g, which names no direction;
+    // units differ among each other by up to 20 %.
     assert!(grams.x < 1.2 * 75.0, "{grams}");
 }
 
@@ -166,8 +186,8 @@ fn free_motion_keeps_its_energy_with_and_without_weight() {
             state = runge_kutta(&dynamics, state, weight, dt);
             turned = turned.max(state.0[1].abs());
         }
-        // The recurrence is of fourth order: 2 s of some (w dt)^4 = (5e-4)^4 per radian turned, 1e-12 of the energy; ten times
-        // that for the rounding of 40,000 steps.
+        // The recurrence is of fourth order: 2 s of some (w dt)^4 = (5e-4)^4 per radian turned, 1e-12 of the
+        // energy; ten times that for the rounding of 40,000 steps.
         assert!((energy(state) / before - 1.0).abs() < 1e-11, "{}", energy(state) / before - 1.0);
         assert!(turned > 1.0, "it has moved: {turned}");
     }
@@ -213,8 +233,8 @@ proptest! {
         let dynamics = Dynamics::new(LINKS, &BODIES, &INERTIAS, convention);
         let (angles, rates_of_linkage) = (convention.linkage_angles(joints), convention.turned(rates));
         let expected = rigid_bodies::kinetic_energy(&bodies, angles, rates_of_linkage);
-        // Speeds by differences of length 1e-5: 3^3 (1e-5)^2 / 6 = 5e-10 of them, rounding 1e-16 / 1e-5 of 1 m; the energy
-        // has their squares, and is at most half of 5e-3 * 27 J.
+        // Speeds by differences of length 1e-5: 3^3 (1e-5)^2 / 6 = 5e-10 of them, rounding 1e-16 / 1e-5 of 1
+        // m; the energy has their squares, and is at most half of 5e-3 * 27 J.
         let tolerance = 4.0 * 0.5 * LARGEST_KG_M2 * 27.0 * 1e-9;
         prop_assert!((dynamics.kinetic_energy(joints, rates) - expected).abs() < tolerance);
     }
@@ -272,6 +292,27 @@ proptest! {
             + Vector3::from(mechanism.joint_torque(joints, force));
         // 7 J along up to 5.2 rad/s, cut off (5.2 * 1e-5)^2 / 6, rounding 1e-15 / 1e-5.
         prop_assert!((slope - torque.dot(&Vector3::from(direction))).abs() < 7.0 * 5.2 * 1e-9, "{slope}");
+    }
+
+    /// Ties the dynamics to each mechanism's kinematics, conventions of its joints included.
+    #[test]
+    fn a_mass_at_the_tip_is_seen_through_the_jacobian(joints in any_joints()) {
+        let wooden = WoodenHaptics::new([0.080, 0.205, 0.245], [0.220, 0.080], JointLimits::UNBOUNDED);
+        let premium = mechanism();
+        let arms: [(&dyn Mechanism, Dynamics); 2] = [
+            (&premium, point_mass_at_the_tip(premium.link_lengths_m(), Premium::CONVENTION)),
+            (&wooden, point_mass_at_the_tip(wooden.link_lengths_m(), WoodenHaptics::CONVENTION)),
+        ];
+        for (arm, dynamics) in arms {
+            let jacobian = arm.jacobian(joints);
+            // Products of two numbers below 0.45 m, a handful of roundings each.
+            let error = (dynamics.mass_matrix(joints) - jacobian.transpose() * jacobian).amax();
+            prop_assert!(error < 32.0 * f64::EPSILON * 0.45 * 0.45, "{error}");
+            let weight = arm.joint_torque(joints, Vector3::y() * GRAVITY_M_PER_S2);
+            for (held, weight) in dynamics.holding_torque(joints).into_iter().zip(weight) {
+                prop_assert!((held - weight).abs() < 32.0 * f64::EPSILON * 4.5, "{held} {weight}");
+            }
+        }
     }
 
     #[test]

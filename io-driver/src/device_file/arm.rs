@@ -1,8 +1,8 @@
 //! The file of an arm: what every kind with joints, counters and motors has in common.
 //!
-//! Model: serde reads the tables below, each function turns one of them into values. A kind brings its own table
-//! `[linkage]`. Ranges are wide enough for any desktop device; they catch millimetres for metres and degrees for
-//! radians.
+//! Model: serde reads the tables below, each function turns one of them into values. A kind brings its own
+//! table `[linkage]`. Ranges are wide enough for any desktop device; they catch millimetres for metres and
+//! degrees for radians.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 

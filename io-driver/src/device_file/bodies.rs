@@ -1,5 +1,5 @@
-//! The table `[bodies]`: masses and their centres for the compensation of gravity, and moments of inertia if the arm
-//! is to be simulated.
+//! The table `[bodies]`: masses and their centres for the compensation of gravity, and moments of inertia if
+//! the arm is to be simulated.
 
 use serde::Deserialize;
 use toml::Spanned;

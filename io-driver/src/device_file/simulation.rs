@@ -53,8 +53,8 @@ pub(super) fn check(
     dynamics: Option<Dynamics>,
 ) -> Result<SimulationSpec, TomlReport> {
     let Some(dynamics) = dynamics else {
-        let allowed = "only together with a table [bodies] that gives `inertia_a_kg_m2` and its four fellows, as in \
-                       the built-in premium-1.5";
+        let allowed = "only together with a table [bodies] that gives `inertia_a_kg_m2` and its four \
+                       fellows, as in the built-in premium-1.5";
         return Err(toml.refuse(
             table.span(),
             "a table [simulation] of an arm without moments of inertia",

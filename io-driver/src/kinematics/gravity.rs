@@ -6,8 +6,8 @@
 //! V = g [ (m_a l1 + m_c l1 / 2 + m_be l5) sin theta2 - (m_a l2 / 2 + m_c l3 - m_df l6) cos theta3 ]
 //! ```
 //!
-//! with each body's centre as [`Bodies`] says; the torques that hold it are its derivatives. The turret carries no
-//! weight.
+//! with each body's centre as [`Bodies`] says; the torques that hold it are its derivatives. The turret
+//! carries no weight.
 //! Frames and signs: base frame D, y up; heights above the shoulder. Joints are the mechanism's own, see
 //! [`JointConvention`]; a positive torque turns its joint towards a larger angle.
 //! Cost: a sine and a cosine each.
@@ -20,9 +20,10 @@ pub const GRAVITY_M_PER_S2: f64 = 9.806_65;
 
 /// Masses and where their centres are, by the paper's letters.
 ///
-/// `a` is the forearm, its centre halfway; `c` the link parallel to the upper arm, its centre halfway and `l3` further
-/// along the forearm; `be` the upper arm with its motor, its centre `l5` out on it; `df` the link that drives the
-/// forearm, with its motor, its centre `l6` on the other side of the shoulder than the forearm's.
+/// `a` is the forearm, its centre halfway; `c` the link parallel to the upper arm, its centre halfway and
+/// `l3` further along the forearm; `be` the upper arm with its motor, its centre `l5` out on it; `df` the
+/// link that drives the forearm, with its motor, its centre `l6` from the shoulder, away from where the
+/// forearm points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bodies {
     /// Forearm (kg).

@@ -2,10 +2,10 @@
 //!
 //! Problem: arms of the same build count their angles from different poses and the other way round; their
 //! equations shall exist once.
-//! Model: `theta = sign q + offset` for each joint, with `q` the mechanism's own angle and `theta` the linkage's:
-//! turret from pointing at the user, upper arm above the horizontal, forearm forward of hanging.
-//! Invariant: signs are +1 or -1, so power stays the same: a torque, a rate or a row of a Jacobian changes sides by
-//! its sign alone.
+//! Model: `theta = sign q + offset` for each joint, with `q` the mechanism's own angle and `theta` the
+//! linkage's: turret from pointing at the user, upper arm above the horizontal, forearm forward of hanging.
+//! Invariant: signs are +1 or -1, so power stays the same: a torque, a rate or a row of a Jacobian changes
+//! sides by its sign alone.
 
 /// Sign and offset of each joint.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -54,8 +54,8 @@ impl JointLimits {
     pub const UNBOUNDED: Self =
         Self { joints: [Interval::UNBOUNDED; 3], elbow: Interval::UNBOUNDED, elbow_sign: -1.0 };
 
-    /// Bend of the elbow: `joints[2] - joints[1]`, or their sum if the upper arm counts the other way round. A torque
-    /// `t` of the elbow's stop acts as `t` on joint 2 and as `elbow_sign * t` on joint 1.
+    /// Bend of the elbow: `joints[2] - joints[1]`, or their sum if the upper arm counts the other way round.
+    /// A torque `t` of the elbow's stop acts as `t` on joint 2 and as `elbow_sign * t` on joint 1.
     pub fn elbow_angle(&self, joints: [f64; 3]) -> f64 {
         joints[2] + self.elbow_sign * joints[1]
     }

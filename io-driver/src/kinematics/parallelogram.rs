@@ -1,5 +1,5 @@
-//! The linkage that many haptic arms are built on: a turret, an upper arm, and a forearm that a parallelogram drives
-//! from the base.
+//! The linkage that many haptic arms are built on: a turret, an upper arm, and a forearm that a parallelogram
+//! drives from the base.
 //!
 //! Problem: a turret (`theta1`, about the vertical) carries an upper arm (`theta2` above the
 //! horizontal) and a forearm, which a parallelogram drives from the base, so that `theta3` is its
@@ -14,8 +14,8 @@
 //! z = z0 + rho cos theta1
 //! ```
 //!
-//! Frames and signs: base frame D, x right, y up, z to the user. Angles are the linkage's; a mechanism that counts
-//! them otherwise has a [`JointConvention`](super::JointConvention).
+//! Frames and signs: base frame D, x right, y up, z to the user. Angles are the linkage's; a mechanism that
+//! counts them otherwise has a [`JointConvention`](super::JointConvention).
 //! Singularities: `det J = rho l1 l2 cos(theta3 - theta2)` vanishes where the tip is on the
 //! turret's axis (`rho = 0`) and where the elbow is stretched or folded.
 //! Which inverse: in the plane of the arm the tip's distance `r` from the shoulder is

@@ -30,7 +30,8 @@ impl Premium {
         self.linkage.link_lengths_m()
     }
 
-    /// Largest distance of the tip from the shoulder; no joint torque vector is longer than this times the force.
+    /// Largest distance of the tip from the shoulder; no joint torque vector is longer than this times the
+    /// force.
     pub fn reach_m(&self) -> f64 {
         self.linkage.reach_m()
     }

@@ -23,8 +23,8 @@
 use super::encoder::EncoderPlant;
 use super::joint_friction::JointFriction;
 use super::motor::MotorPlant;
-use super::noise::Noise;
 use super::spec::{CableSpec, SimulationSpec};
+use super::split_mix::SplitMix64;
 use crate::device_file::ArmFile;
 use crate::kinematics::{Interval, JointLimits, Kinematics, Mechanism, gimbal};
 use crate::motors::MotorMap;
@@ -88,7 +88,7 @@ pub struct SimulatedArm {
     encoders: EncoderPlant,
     gimbal: Option<EncoderPlant>,
     friction: JointFriction,
-    noise: Noise,
+    noise: SplitMix64,
     links: Motion,
     /// The rotors' own motion, in joint angles; that of the links while cables are rigid.
     shafts: Motion,
@@ -105,11 +105,6 @@ struct Motion {
 }
 
 impl Motion {
-    /// With this acceleration for a while, to first order.
-    fn drifted(self, acceleration: Vector3<f64>, dt_s: f64) -> Self {
-        Self { angles: self.angles + self.rates * dt_s, rates: self.rates + acceleration * dt_s }
-    }
-
     /// After a step that ends with these rates, and changed them evenly.
     fn arriving(self, rates: Vector3<f64>, dt_s: f64) -> Self {
         Self { angles: self.angles + 0.5 * (self.rates + rates) * dt_s, rates }
@@ -136,7 +131,7 @@ impl SimulatedArm {
             encoders: EncoderPlant::new(&file.encoders, spec.noise.encoder_counts_rms),
             gimbal: file.gimbal.as_ref().map(|gimbal| EncoderPlant::new(gimbal, 0.0)),
             friction: JointFriction::new(spec.coulomb_nm),
-            noise: Noise::new(seed),
+            noise: SplitMix64::new(seed),
             links: rest,
             shafts: rest,
             current_noise_a: [0.0; 3],
@@ -262,7 +257,8 @@ impl SimulatedArm {
 
     fn step_rigid(&mut self, drive: Vector3<f64>, dt_s: f64, hand: &impl TipLoad) {
         let begin = self.links;
-        let half = begin.drifted(self.accelerations(begin, drive, hand), 0.5 * dt_s);
+        let inertia = self.inertia(begin.angles);
+        let half = self.half(begin, self.accelerations(begin, drive, hand), &inertia, dt_s);
         let free = begin.rates + self.accelerations(half, drive, hand) * dt_s;
         let held = self.friction.hold(&self.inertia(half.angles), free, dt_s);
         self.links = begin.arriving(free + held, dt_s);
@@ -271,13 +267,22 @@ impl SimulatedArm {
 
     fn step_elastic(&mut self, cable: &CableSpec, drive: Vector3<f64>, dt_s: f64, hand: &impl TipLoad) {
         let (links, shafts) = (self.links, self.shafts);
+        let rotors = Matrix3::from_diagonal(&self.rotors);
         let [of_links, of_shafts] = self.elastic(cable, links, shafts, drive, hand);
-        let half = [links.drifted(of_links, 0.5 * dt_s), shafts.drifted(of_shafts, 0.5 * dt_s)];
-        let [of_links, of_shafts] = self.elastic(cable, half[0], half[1], drive, hand);
+        let half_links = links.arriving(links.rates + of_links * (0.5 * dt_s), 0.5 * dt_s);
+        let half_shafts = self.half(shafts, of_shafts, &rotors, dt_s);
+        let [of_links, of_shafts] = self.elastic(cable, half_links, half_shafts, drive, hand);
         let free = shafts.rates + of_shafts * dt_s;
-        let held = self.friction.hold(&Matrix3::from_diagonal(&self.rotors), free, dt_s);
+        let held = self.friction.hold(&rotors, free, dt_s);
         self.links = links.arriving(links.rates + of_links * dt_s, dt_s);
         self.shafts = shafts.arriving(free + held, dt_s);
+    }
+
+    /// Where friction acts, at the middle of a step: what sticks does not seem to move there, either.
+    fn half(&self, begin: Motion, acceleration: Vector3<f64>, inertia: &Matrix3<f64>, dt_s: f64) -> Motion {
+        let free = begin.rates + acceleration * (0.5 * dt_s);
+        let mut friction = self.friction;
+        begin.arriving(free + friction.hold(inertia, free, 0.5 * dt_s), 0.5 * dt_s)
     }
 
     fn inertia(&self, angles: Vector3<f64>) -> Matrix3<f64> {
@@ -323,9 +328,10 @@ impl SimulatedArm {
         let own: [f64; 3] = std::array::from_fn(|joint| {
             push(self.limits.joints[joint], motion.angles[joint], motion.rates[joint])
         });
-        let bend = motion.angles[2] - motion.angles[1];
-        let elbow = push(self.limits.elbow, bend, motion.rates[2] - motion.rates[1]);
-        Vector3::new(own[0], own[1] - elbow, own[2] + elbow)
+        let sign = self.limits.elbow_sign;
+        let bend = self.limits.elbow_angle(motion.angles.into());
+        let elbow = push(self.limits.elbow, bend, motion.rates[2] + sign * motion.rates[1]);
+        Vector3::new(own[0], own[1] + sign * elbow, own[2] + elbow)
     }
 
     /// A stop pushes and never pulls.

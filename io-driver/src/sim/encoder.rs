@@ -4,7 +4,7 @@
 //! bits shows it: it wraps. The counters read zero in the home pose.
 //! Cost: a few operations per joint; a random number each, if there is noise.
 
-use super::noise::Noise;
+use super::split_mix::SplitMix64;
 use crate::encoders::{EncoderSpec, JointMap, wrapped};
 
 /// The encoders of an arm.
@@ -28,7 +28,7 @@ impl EncoderPlant {
     }
 
     /// Raw counters at these joint angles of the motors (rad).
-    pub fn raw(&self, joints_rad: [f64; 3], noise: &mut Noise) -> [i64; 3] {
+    pub fn raw(&self, joints_rad: [f64; 3], noise: &mut SplitMix64) -> [i64; 3] {
         let rad_per_count = self.map.rad_per_count();
         std::array::from_fn(|j| {
             let counts = (joints_rad[j] - self.home_rad[j]) / rad_per_count[j];
@@ -62,7 +62,7 @@ mod tests {
     fn without_noise_an_angle_comes_back_within_half_a_count_however_often_the_counter_wrapped() {
         let encoders = EncoderPlant::new(&SPEC, 0.0);
         let (mut extender, map) = (EncoderExtender::new(12), JointMap::new(&SPEC));
-        let mut noise = Noise::new(1);
+        let mut noise = SplitMix64::new(1);
         for step in 0..4000 {
             // A count is 1.5e-4 rad, so this wraps 12 bits three times and moves six counts a step.
             let joints = [0.1, 0.2, 0.3].map(|home| home + f64::from(step) * 1e-3 * 0.5);
@@ -77,7 +77,7 @@ mod tests {
     #[test]
     fn noise_has_the_spread_that_was_asked_for() {
         let encoders = EncoderPlant::new(&SPEC, 3.0);
-        let mut noise = Noise::new(7);
+        let mut noise = SplitMix64::new(7);
         let signed = |raw: i64| if raw >= 2048 { raw - 4096 } else { raw };
         let squares: f64 = (0..20_000)
             .map(|_| signed(encoders.raw(SPEC.home_joint_angles_rad, &mut noise)[0]) as f64)

@@ -6,7 +6,6 @@ pub mod encoder;
 pub mod hand;
 pub mod joint_friction;
 pub mod motor;
-pub mod noise;
 pub mod script;
 pub mod spec;
 pub mod split_mix;

@@ -1,7 +1,7 @@
 //! What a simulation has to know of an arm beyond what a driver does.
 //!
-//! Model: the table `[simulation]` of a device description, checked; what each number is for and where it comes from
-//! stands there.
+//! Model: the table `[simulation]` of a device description, checked; what each number is for and where it
+//! comes from stands there.
 //! Units: joint coordinates of the mechanism, SI, radians.
 //! Invariants: all numbers are finite and none is negative.
 

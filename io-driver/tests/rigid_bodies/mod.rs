@@ -1,5 +1,5 @@
-//! The same arm as loose bodies: where their centres are and how they are turned, from the drawing and nothing
-//! else. Slow and obvious; the oracle of the closed forms.
+//! The same arm as loose bodies: where their centres are and how they are turned, from the drawing and
+//! nothing else. Slow and obvious; the oracle of the closed forms.
 
 use io_driver::kinematics::gravity::Bodies;
 use io_driver::sim::dynamics::Inertias;
@@ -24,9 +24,9 @@ enum Link {
 
 /// The five bodies of an arm.
 ///
-/// The paper gives the moments of `be` and `df` about the shoulder. About their centres, which are what a moving
-/// body's energy wants, they are smaller by mass times lever squared (Steiner), but for the axis that goes
-/// through the shoulder and the centre.
+/// The paper gives the moments of `be` and `df` about the shoulder. About their centres, which are what a
+/// moving body's energy wants, they are smaller by mass times lever squared (Steiner), but for the axis that
+/// goes through the shoulder and the centre.
 pub(crate) fn bodies([l1, l2]: [f64; 2], bodies: &Bodies, inertias: &Inertias) -> [Body; 5] {
     let Bodies { mass_a_kg, mass_c_kg, mass_be_kg, mass_df_kg, l3_m, l5_m, l6_m } = *bodies;
     let steiner_be = mass_be_kg * l5_m * l5_m * Vector3::new(1.0, 1.0, 0.0);
@@ -44,8 +44,8 @@ pub(crate) fn bodies([l1, l2]: [f64; 2], bodies: &Bodies, inertias: &Inertias) -
 /// Near the cube root of the unit roundoff, where the two errors of a central difference meet.
 const STEP: f64 = 1e-5;
 
-/// Energy of the motion (J) at linkage angles that change at these rates: half mass times speed squared, and half
-/// moment times rate of turning squared, summed over the bodies; speeds by central differences.
+/// Energy of the motion (J) at linkage angles that change at these rates: half mass times speed squared, and
+/// half moment times rate of turning squared, summed over the bodies; speeds by central differences.
 pub(crate) fn kinetic_energy(bodies: &[Body; 5], angles: [f64; 3], rates: [f64; 3]) -> f64 {
     let at = |h: f64| std::array::from_fn(|j| angles[j] + h * rates[j]);
     bodies

@@ -1,4 +1,5 @@
-//! What the files that come with the program say of the devices, and whether their numbers agree with each other.
+//! What the files that come with the program say of the devices, and whether their numbers agree with each
+//! other.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -90,7 +91,8 @@ fn the_currents_and_encoders_of_the_wooden_arm_give_what_its_file_claims() {
     assert!((mm[0] - 0.043).abs() < 5e-4 && (mm[1] - 0.054).abs() < 5e-4, "{mm:?}");
 }
 
-/// Rotors included; the file estimates the moments of inertia. Between half of the Premium's 75 g and three times that.
+/// Rotors included; the file estimates the moments of inertia. Between half of the Premium's 75 g and three
+/// times that.
 #[test]
 fn the_tip_of_the_wooden_arm_weighs_what_a_wooden_arm_may_weigh() {
     let wooden = arm(WOODEN);

@@ -81,7 +81,8 @@ fn a_tip_that_is_pushed_goes_as_its_apparent_mass_says() {
     for (axis, grams) in [(Vector3::x(), 81.0), (Vector3::y(), 55.0), (Vector3::z(), 37.0)] {
         let mut arm = arm(&file, [0.0; 3]);
         let weight = arm.spec.dynamics.holding_torque([0.0; 3]);
-        let hold = arm.kinematics.jacobian([0.0; 3]).transpose().try_inverse().unwrap() * Vector3::from(weight);
+        let hold =
+            arm.kinematics.jacobian([0.0; 3]).transpose().try_inverse().unwrap() * Vector3::from(weight);
         let (force, time_s) = (0.05, 2e-3);
         arm.advance(time_s, &mut Push(hold + axis * force));
         let found = force * time_s / arm.truth().tip_velocity.dot(&axis);
@@ -158,7 +159,9 @@ fn nobody_pushes_an_arm_through_its_stops() {
     for name in ["premium-1.5", "wooden-haptics"] {
         // What swings along the force where there is no stop comes to rest.
         let file = changed(name, |spec| spec.viscous_nm_s = [0.02; 3]);
-        for direction in [Vector3::x(), -Vector3::x(), Vector3::y(), -Vector3::y(), Vector3::z(), -Vector3::z()] {
+        for direction in
+            [Vector3::x(), -Vector3::x(), Vector3::y(), -Vector3::y(), Vector3::z(), -Vector3::z()]
+        {
             let mut arm = arm(&file, file.encoders.home_joint_angles_rad);
             for _ in 0..3000 {
                 arm.advance(1e-3, &mut Push(direction * 10.0));
