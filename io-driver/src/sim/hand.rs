@@ -110,3 +110,80 @@ impl TipLoad for ImpedanceHand {
         self.advance(tip_D, velocity_D, dt_s);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::model_file::{Firmness, builtin, parse};
+    use super::*;
+    use std::path::Path;
+
+    const TICK_S: f64 = 1e-3;
+    const SUB_STEP_S: f64 = TICK_S / 16.0;
+
+    fn pen() -> HandModel {
+        parse(builtin("pen-grip").unwrap(), Path::new("pen-grip"), Firmness::Usual).unwrap()
+    }
+
+    /// A tip of 20 g that nothing holds but the hand, semi-implicitly; where it is after each tick.
+    fn free_tip(model: &HandModel, seed: u64, ticks: usize) -> Vec<Vector3<f64>> {
+        let mut hand = ImpedanceHand::new(model, Vector3::zeros(), seed);
+        let (mut at, mut velocity) = (Vector3::zeros(), Vector3::zeros());
+        let tick = |_| {
+            hand.intend(Vector3::zeros(), Felt::default(), TICK_S);
+            for _ in 0..16 {
+                velocity += hand.force_on_tip(at, velocity) * (SUB_STEP_S / 0.02);
+                hand.advance(at, velocity, SUB_STEP_S);
+                at += velocity * SUB_STEP_S;
+            }
+            at
+        };
+        (0..ticks).map(tick).collect()
+    }
+
+    #[test]
+    fn a_calm_hand_that_has_what_it_wants_does_exactly_nothing() {
+        let mut calm = pen();
+        calm.tremor.rms_m = Vector3::zeros();
+        assert!(free_tip(&calm, 1, 2000).iter().all(|at| *at == Vector3::zeros()));
+    }
+
+    #[test]
+    fn a_free_fingertip_trembles_as_the_model_says() {
+        let samples = free_tip(&pen(), 1, 20_000);
+        let last = &samples[2000..];
+        for axis in 0..3 {
+            let square = last.iter().map(|at| at[axis] * at[axis]).sum::<f64>() / last.len() as f64;
+            // 20 g on the grasp's spring swing at 22 to 31 Hz, which lifts 12 Hz by up to 1 / (1 - (12/22)^2) = 1.4 and
+            // 8 Hz by 1.15; the hand's own mass takes a tenth; beats of 18 s some percent.
+            let gain = square.sqrt() / pen().tremor.rms_m[axis];
+            assert!((0.95..1.45).contains(&gain), "axis {axis}: {gain}");
+        }
+        // It begins at rest: within the first tick nothing of size.
+        assert!(samples[0].norm() < 1e-7);
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_bits_and_another_seed_another_tremor() {
+        let bits = |seed| -> Vec<u64> {
+            free_tip(&pen(), seed, 500).iter().flatten().map(|number| number.to_bits()).collect()
+        };
+        assert!(bits(7) == bits(7));
+        assert!(bits(7) != bits(8));
+    }
+
+    #[test]
+    fn however_a_tick_is_divided_the_hand_arrives_at_the_same_place() {
+        let after = |sub_steps: u32| {
+            let mut hand = ImpedanceHand::new(&pen(), Vector3::zeros(), 3);
+            let tip = Vector3::new(1e-3, 0.0, -2e-3);
+            for _ in 0..500 {
+                hand.intend(Vector3::new(0.01, 0.02, 0.0), Felt::default(), TICK_S);
+                let dt_s = TICK_S / f64::from(sub_steps);
+                (0..sub_steps).for_each(|_| hand.advance(tip, Vector3::zeros(), dt_s));
+            }
+            hand.force_on_tip(tip, Vector3::zeros())
+        };
+        // The motion is exact for points that move evenly, so only rounding is left: 16,000 steps, forces of size one.
+        assert!((after(8) - after(32)).norm() < 1e-11, "{}", (after(8) - after(32)).norm());
+    }
+}
