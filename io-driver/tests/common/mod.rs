@@ -115,7 +115,8 @@ impl Bench {
         .unwrap();
         let view = DriverView::map(memory.fd()).unwrap();
         let log = Arc::new(Mutex::new(Log::default()));
-        let device = TestDevice { velocity: VelocityEstimator::of_exact_places(), info, log: Arc::clone(&log) };
+        let device =
+            TestDevice { velocity: VelocityEstimator::of_exact_places(), info, log: Arc::clone(&log) };
         let protection = Protection { safety: Safety::new(RAMPS), switches, workspace_margin_m: 0.02 };
         let cycle =
             Cycle::new(Arc::new(memory), vec![Box::new(device)], protection, PERIOD_NS, Freshness(freshness));
