@@ -26,7 +26,19 @@
 //! Cost: bounded by [`PLACES`] blocks of readings and by [`RUNGS`] fits: for three joints about 0.25 us at 1 kHz and
 //! 0.5 us from 2 kHz on; no allocation.
 //!
-//! What it is worth, against others and against truth: `cargo bench -p io-driver --bench velocity`.
+//! What it is worth against others, by the truth of known movements (error rms in mm/s at the tip of a Premium at
+//! 1 kHz, lag in ms in brackets; all of it: `cargo bench -p io-driver --bench velocity`):
+//!
+//! | movement | difference | mean of 4 ms | FOAW | Kalman | this |
+//! |---|---|---|---|---|---|
+//! | rest, noisy counts (at 8 kHz) | 27 (217) | 6.8 (6.7) | 5.8 (43) | 4.1 (2.6) | 2.4 (0.7) |
+//! | 5 mm/s | 14 | 5.5 | 0.6 | 3.0 | 0.9 |
+//! | strokes of a hand, 0.2 m/s | 19 | 4.9 (1.9) | 4.5 (6.9) | 3.0 (0.1) | 1.2 (0.1) |
+//! | the same, 1 m/s | 19 (0.5) | 30 (1.9) | 29 (1.9) | 10 (0.1) | 17 (0.3) |
+//! | tremor, 10 Hz, 0.1 mm | 13 | 4.9 (2.0) | 2.3 (8.0) | 3.5 | 1.8 (2.4) |
+//! | ring-down of a contact, 50 Hz, 0.2 mm | 14 | 9.3 (2.0) | 11 (2.3) | 17 (3.4) | 12 (2.2) |
+//!
+//! Its limit: what swings by a few counts at 100 Hz and more is over before a window can tell it from noise.
 
 use crate::device::TickTime;
 

@@ -75,7 +75,7 @@ fn a_resting_finger_in_a_damped_wall_does_not_hum() {
         // The mean of 30 ms is off by some 2 mm/s at 1 kHz: 10 mN, a tenth of the difference's and a third of the
         // spring's own step. More readings in that time make it less; those of the difference make it more.
         assert!(calm < 0.015 && calm < 0.12 * hum, "{rate_hz} Hz: {calm} of {hum}");
-        // What a finger just feels is some 10 mN at these frequencies; a peak is below two of the spring's steps.
+        // And a peak is below two of the spring's own steps.
         assert!(loudest < 2.0 * STIFFNESS * COUNT_M, "{rate_hz} Hz: {loudest}");
     }
 }
