@@ -47,8 +47,8 @@ fn ripple(rate_hz: u64, knows_velocity: bool) -> (f64, f64) {
         // The first pose is the home pose; the counters flicker from then on.
         let raw = if tick == 0 { [0; 3] } else { [coin.throw(), coin.throw(), coin.throw()] };
         let reading = arm.read(raw, TickTime { tick, period_ns, run_tick: 0 });
-        let velocity_W = knows_velocity.then_some(reading.velocity_m_per_s);
-        let hip = Hip { position_W: reading.position_m, velocity_W };
+        let velocity = knows_velocity.then_some(reading.velocity_m_per_s);
+        let hip = Hip { position_W: reading.position_m, velocity_W: velocity };
         let force = finger.step(&[wall], hip, period_ns as f64 / 1e9).force_on_user_W.y;
         let spring = STIFFNESS * (DEPTH_M - reading.position_m.y);
         // Until the window is open.
@@ -77,5 +77,26 @@ fn a_resting_finger_in_a_damped_wall_does_not_hum() {
         assert!(calm < 0.015 && calm < 0.12 * hum, "{rate_hz} Hz: {calm} of {hum}");
         // And a peak is below two of the spring's own steps.
         assert!(loudest < 2.0 * STIFFNESS * COUNT_M, "{rate_hz} Hz: {loudest}");
+    }
+}
+
+/// Calm is easy for a damper that does nothing.
+#[test]
+fn a_finger_that_presses_on_is_damped_as_its_speed_asks() {
+    let wall = Entity::new(Plane::new(Vector3::y(), 0.02).unwrap(), Isometry3::identity(), STIFFNESS);
+    let wall = wall.unwrap().with_damping(DAMPING).unwrap();
+    let (mut arm, mut finger) = (arm(), Finger::new(0.0, 1).unwrap());
+    for tick in 0..100 {
+        // The upper arm sinks by five counts a tick, which is 146 mm/s.
+        let reading =
+            arm.read([0, -5 * tick, 0], TickTime { tick: tick as u64, period_ns: 1_000_000, run_tick: 0 });
+        let hip = Hip { position_W: reading.position_m, velocity_W: Some(reading.velocity_m_per_s) };
+        let force = finger.step(&[wall], hip, 1e-3).force_on_user_W.y;
+        let damper = force - STIFFNESS * (0.02 - reading.position_m.y);
+        // The arc that the tip goes is level with its chord to the square of the angle, 0.07 rad.
+        assert!(
+            tick < 5 || (damper / (DAMPING * 5.0 * COUNT_M / 1e-3) - 1.0).abs() < 0.01,
+            "{tick}: {damper}"
+        );
     }
 }
