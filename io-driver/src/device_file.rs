@@ -2,9 +2,9 @@
 //!
 //! Problem: individual devices differ by up to a fifth, wiring is not public, and a changed cable
 //! must not need a compiler.
-//! Model: `kind` says which tables the file has. A `premium` has `[linkage]`, `[encoders]`,
-//! `[motors]` if gravity is to be compensated `[bodies]`, and with an instrumented gimbal `[gimbal]`; an `ideal` device has nothing. What a simulation needs beyond these gets a table
-//! of its own.
+//! Model: `kind` says which tables the file has. An arm (`premium`, `wooden-haptics`) has `[linkage]`, `[encoders]`,
+//! `[motors]`, with an instrumented gimbal `[gimbal]`, and, if gravity is to be compensated, `[bodies]`; if it is to be simulated, moments of inertia in
+//! `[bodies]` and a table `[simulation]`. An `ideal` device has nothing.
 //! Units: each key carries its own.
 //! Invariants: a value of type [`DeviceFile`] has been checked: all numbers are finite and in
 //! their range, limits are ordered, the home pose is within them, and the inverse kinematics is
@@ -22,14 +22,20 @@ use crate::heat::HeatSpec;
 use crate::kinematics::gravity::Gravity;
 use crate::kinematics::{Ideal, Kinematics};
 use crate::motors::{MotorMap, MotorSpec};
+use crate::sim::spec::SimulationSpec;
 use crate::toml_report::{TomlReport, TomlText};
 
+mod arm;
+mod bodies;
 mod gimbal;
 mod ideal;
 mod premium;
+mod simulation;
+mod wooden_haptics;
+use arm::LinkageTable;
 
 /// Names of the files that come with the program, see [`builtin`].
-pub const BUILTIN_NAMES: [&str; 2] = ["premium-1.5", "ideal"];
+pub const BUILTIN_NAMES: [&str; 3] = ["premium-1.5", "wooden-haptics", "ideal"];
 
 /// A checked device description.
 #[derive(Debug, Clone, PartialEq)]
@@ -71,6 +77,8 @@ pub struct ArmFile {
     pub speed_limit_m_per_s: f64,
     /// What holds the arm's own weight, if its bodies are described.
     pub gravity: Option<Gravity>,
+    /// What a simulation needs beyond the above, if it is described.
+    pub simulation: Option<SimulationSpec>,
 }
 
 /// A device without mechanism, counters and motors.
@@ -121,10 +129,12 @@ impl DeviceFile {
         let toml = TomlText::new(text, file);
         let Kind { kind } = toml.read().map_err(DeviceFileError::Malformed)?;
         match kind.get_ref().as_str() {
-            "premium" => premium::read(&toml).map(|premium| Self::Arm(Box::new(premium))),
+            premium::Linkage::KIND => read_arm::<premium::Linkage>(&toml),
+            wooden_haptics::Linkage::KIND => read_arm::<wooden_haptics::Linkage>(&toml),
             "ideal" => ideal::read(&toml).map(Self::Ideal),
             other => {
-                let report = toml.refuse(kind.span(), format_args!("{other:?}"), r#""premium" or "ideal""#);
+                let allowed = r#""premium", "wooden-haptics" or "ideal""#;
+                let report = toml.refuse(kind.span(), format_args!("{other:?}"), allowed);
                 Err(DeviceFileError::UnknownKind(report))
             }
         }
@@ -155,6 +165,10 @@ impl DeviceFile {
     }
 }
 
+fn read_arm<L: LinkageTable>(toml: &TomlText<'_>) -> Result<DeviceFile, DeviceFileError> {
+    arm::read::<L>(toml).map(|arm| DeviceFile::Arm(Box::new(arm)))
+}
+
 impl ArmFile {
     /// From extended counts to joint angles, not yet zeroed.
     pub fn joint_map(&self) -> JointMap {
@@ -181,6 +195,10 @@ pub fn home_pose(kind: &str) -> &'static str {
             "turret straight ahead, upper arm level, forearm hanging straight down, a gimbal straight \
              (where `home_joint_angles_rad` of its description are zero)"
         }
+        "wooden-haptics" => {
+            "turret straight ahead, upper arm upright, forearm level towards you \
+             (where `home_joint_angles_rad` of its description are 0, 0, pi/2)"
+        }
         _ => "the pose of `home_joint_angles_rad` in its description",
     }
 }
@@ -189,6 +207,7 @@ pub fn home_pose(kind: &str) -> &'static str {
 pub fn builtin(name: &str) -> Option<&'static str> {
     match name {
         "premium-1.5" => Some(include_str!("../../config/driver/devices/premium-1.5.toml")),
+        "wooden-haptics" => Some(include_str!("../../config/driver/devices/wooden-haptics.toml")),
         "ideal" => Some(include_str!("../../config/driver/devices/ideal.toml")),
         _ => None,
     }

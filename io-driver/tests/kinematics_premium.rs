@@ -13,7 +13,7 @@ const L2: f64 = 0.170;
 fn premium() -> Premium {
     let degrees = |min: f64, max: f64| Interval { min: min.to_radians(), max: max.to_radians() };
     let joints = [degrees(-90.0, 90.0), degrees(-61.0, 113.0), degrees(-23.0, 167.0)];
-    Premium::new([L1, L2], JointLimits { joints, elbow: degrees(-53.0, 54.0) })
+    Premium::new([L1, L2], JointLimits { joints, elbow: degrees(-53.0, 54.0), elbow_sign: -1.0 })
 }
 
 /// Positions are sums of three products of numbers below the reach, each rounded, then added to

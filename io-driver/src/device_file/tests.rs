@@ -7,22 +7,35 @@ use proptest::prelude::*;
 use super::*;
 use crate::kinematics::Mechanism;
 
+mod builtin;
+mod simulation;
+
 const PREMIUM: &str = include_str!("../../../config/driver/devices/premium-1.5.toml");
+const WOODEN: &str = include_str!("../../../config/driver/devices/wooden-haptics.toml");
 
 fn parse(text: &str) -> Result<DeviceFile, DeviceFileError> {
     DeviceFile::parse(text, Path::new("lab/left.toml"))
 }
 
-fn premium() -> ArmFile {
-    match parse(PREMIUM) {
-        Ok(DeviceFile::Arm(premium)) => *premium,
+fn arm(text: &str) -> ArmFile {
+    match parse(text) {
+        Ok(DeviceFile::Arm(arm)) => *arm,
         other => panic!("{other:?}"),
     }
 }
 
+fn premium() -> ArmFile {
+    arm(PREMIUM)
+}
+
 /// The message for the premium's file with the value of `key` replaced.
 fn message_with(table: &str, key: &str, value: &str) -> String {
-    let (before, rest) = PREMIUM.split_at(PREMIUM.find(table).unwrap());
+    message_of(PREMIUM, table, key, value)
+}
+
+/// The message for a good file with the value of `key` replaced.
+fn message_of(text: &str, table: &str, key: &str, value: &str) -> String {
+    let (before, rest) = text.split_at(text.find(table).unwrap());
     let start = rest.find(&format!("\n{key} =")).unwrap() + 1;
     let line_end = rest[start..].find('\n').unwrap() + start;
     let text = format!("{before}{}{key} = {value}{}", &rest[..start], &rest[line_end..]);
@@ -38,54 +51,6 @@ fn the_builtin_files_are_good_and_no_others_exist() {
         parse(builtin(name).unwrap()).unwrap();
     }
     assert_eq!(builtin("omni"), None);
-}
-
-#[test]
-fn the_premium_is_the_one_of_the_paper() {
-    let premium = premium();
-    let Kinematics::Premium(mechanism) = premium.mechanism else { panic!("its kind says so") };
-    assert_eq!(mechanism.link_lengths_m(), [0.215, 0.170]);
-    assert_eq!(premium.encoders.reduction, [175.0 / 13.0, 11.3, 11.3]);
-    assert_eq!(premium.motors.reduction, premium.encoders.reduction);
-    assert_eq!((premium.peak_force_n, premium.continuous_force_n), (8.5, 1.4));
-    assert_eq!(premium.joint_map().counts_to_angles([0; 3]), [0.0; 3]);
-    assert_eq!(premium.motor_map().zero_codes(), [2048; 3]);
-}
-
-#[test]
-fn the_stops_are_the_published_degrees() {
-    let limits = premium().mechanism.joint_limits();
-    let degrees = |i: crate::kinematics::Interval| [i.min.to_degrees(), i.max.to_degrees()];
-    let found = [limits.joints[0], limits.joints[1], limits.joints[2], limits.elbow].map(degrees);
-    let published = [[-90.0, 90.0], [-61.0, 113.0], [-23.0, 167.0], [-53.0, 54.0]];
-    for (found, published) in found.as_flattened().iter().zip(published.as_flattened()) {
-        // The file gives 16 digits.
-        assert!((found - published).abs() < 1e-13, "{found} {published}");
-    }
-}
-
-#[test]
-fn most_of_the_workspace_is_within_the_stops() {
-    let ArmFile { mechanism, workspace, .. } = premium();
-    let inside = (0..9261).filter(|k| {
-        let steps = [k % 21, k / 21 % 21, k / 441].map(|i| f64::from(i) / 20.0 - 0.5);
-        let tip: [f64; 3] = std::array::from_fn(|i| workspace.centre_m[i] + workspace.size_m[i] * steps[i]);
-        mechanism.inverse(tip.into()).is_ok_and(|q| mechanism.joint_limits().contains(q))
-    });
-    // The file claims nine tenths; corners are out of reach.
-    let part = inside.count() as f64 / 9261.0;
-    assert!(part > 0.9 && part < 1.0, "{part}");
-}
-
-#[test]
-fn the_current_the_file_claims_gives_the_forces_it_claims() {
-    let premium = premium();
-    let peak = premium.motor_map().peak_joint_torque();
-    // Home: x by the turret over l1, y by the upper arm l1, z by the forearm l2.
-    let forces_n = [peak[0] / 0.215, peak[1] / 0.215, peak[2] / 0.170];
-    for (found, claimed) in forces_n.iter().zip([8.1, 6.8, 8.6]) {
-        assert!((found - claimed).abs() < 0.05, "{forces_n:?}");
-    }
 }
 
 #[test]
@@ -107,7 +72,10 @@ fn an_ideal_device_has_no_motors() {
 #[test]
 fn an_unknown_or_missing_kind_lists_those_that_exist() {
     let message = parse("\nkind = 'omni'\n").unwrap_err().to_string();
-    assert_eq!(message, r#"lab/left.toml:2: `kind`: found "omni", allowed: "premium" or "ideal""#);
+    assert_eq!(
+        message,
+        r#"lab/left.toml:2: `kind`: found "omni", allowed: "premium", "wooden-haptics" or "ideal""#
+    );
     let message = parse("name = 'x'\n").unwrap_err().to_string();
     assert!(message.starts_with("lab/left.toml:1: ") && message.contains("kind"), "{message}");
 }
@@ -175,6 +143,38 @@ fn every_value_out_of_range_names_file_line_key_found_and_allowed() {
         ("[motors]", "continuous_current_a", "6", "found 6, allowed: at most `peak_current_a`, 5.5 A"),
         ("[motors]", "winding_time_constant_s", "0", "found 0, allowed: 0.1 to 10000 s"),
         ("[motors]", "dac_bits", "24", "`motors.dac_bits`: found 24, allowed: a whole number from 8 to 16"),
+        ("[bodies]", "mass_a_kg", "20.2", "`bodies.mass_a_kg`: found 20.2, allowed: 0 to 10 kg"),
+        (
+            "[bodies]",
+            "inertia_a_kg_m2",
+            "[1, 2]",
+            "`bodies.inertia_a_kg_m2`: found 2 values, allowed: exactly 3",
+        ),
+        (
+            "[bodies]",
+            "inertia_be_kg_m2",
+            "[0, 0, 11.09]",
+            "`bodies.inertia_be_kg_m2[2]`: found 11.09, allowed: 0 to 1 kg m^2",
+        ),
+        ("[bodies]", "inertia_base_yy_kg_m2", "-1e-4", "`bodies.inertia_base_yy_kg_m2`: found -0.0001"),
+        (
+            "[simulation]",
+            "coulomb_friction_nm",
+            "[0, -1, 0]",
+            "`simulation.coulomb_friction_nm[1]`: found -1, allowed: 0 to 10 N m",
+        ),
+        ("[simulation]", "viscous_friction_nm_s", "[0]", "found 1 values, allowed: exactly 3 values"),
+        ("[simulation]", "stop_stiffness_nm_per_rad", "0", "found 0, allowed: 0.1 to 100000 N m/rad"),
+        ("[simulation]", "stop_damping_nm_s", "nan", "`simulation.stop_damping_nm_s`: found NaN"),
+        (
+            "[simulation.motor]",
+            "rotor_inertia_kg_m2",
+            "10.3",
+            "`simulation.motor.rotor_inertia_kg_m2`: found 10.3, allowed: 0 to 0.01 kg m^2",
+        ),
+        ("[simulation.motor]", "inductance_h", "0.238", "found 0.238, allowed: 0 to 0.1 H"),
+        ("[simulation.motor]", "supply_v", "0", "found 0, allowed: 0.1 to 500 V"),
+        ("[simulation.motor]", "watchdog_s", "100", "found 100, allowed: 0.0001 to 10 s"),
     ] {
         let message = message_with(table, key, value);
         assert!(message.contains(expected), "{message}\nlacks {expected}");
@@ -209,19 +209,36 @@ fn a_limit_with_three_joints_but_one_number_is_named() {
 
 #[test]
 fn every_key_is_needed() {
-    let keys = PREMIUM.lines().filter(|line| line.contains(" = ") && !line.starts_with('#'));
-    let mut tried = 0;
-    for line in keys {
-        let without = PREMIUM.replacen(&format!("{line}\n"), "", 1);
-        assert!(parse(&without).is_err(), "nobody misses {line}");
-        tried += 1;
+    for text in [PREMIUM, WOODEN] {
+        let keys = text.lines().filter(|line| line.contains(" = ") && !line.starts_with('#'));
+        let mut tried = 0;
+        for line in keys {
+            let without = text.replacen(&format!("{line}\n"), "", 1);
+            assert!(parse(&without).is_err(), "nobody misses {line}");
+            tried += 1;
+        }
+        assert!(tried >= 45, "{tried}");
     }
-    assert!(tried >= 20, "{tried}");
+}
+
+#[test]
+fn the_wooden_arm_s_own_keys_are_checked_as_well() {
+    for (key, value, expected) in [
+        ("body_lengths_m", "[80, 205, 245]", "`linkage.body_lengths_m[0]`: found 80, allowed: 0.01 to 2 m"),
+        ("origin_m", "[0.22]", "`linkage.origin_m`: found 1 values, allowed: exactly 2 values"),
+        ("elbow_limits_rad", "[-0.1, 1]", "`linkage.elbow_limits_rad[0]`: found -0.1, allowed: 0 to 3.14"),
+        ("home_joint_angles_rad", "[0, 0, 0]", "their third plus their second within `elbow_limits_rad`"),
+    ] {
+        let message = message_of(WOODEN, "[linkage]", key, value);
+        assert!(message.contains(expected), "{message}\nlacks {expected}");
+    }
+    let message = parse(&WOODEN.replace("body_lengths_m", "link_lengths_m")).unwrap_err().to_string();
+    assert!(message.contains("unknown field `link_lengths_m`"), "{message}");
 }
 
 proptest! {
     #[test]
-    fn no_text_panics(text in any::<String>(), from in 0usize..6000, length in 0usize..40, patch in "[\\[\\]=.,'\"# \n0-9a-f-]{0,8}") {
+    fn no_text_panics(text in any::<String>(), from in 0usize..8000, length in 0usize..40, patch in "[\\[\\]=.,'\"# \n0-9a-f-]{0,8}") {
         let _ = parse(&text);
         // The good file with a piece cut out and another put in.
         let from = from.min(PREMIUM.len());

@@ -10,8 +10,8 @@ pub enum Motion {
     Rest,
     /// Where a trace says.
     Trace(EncoderReplay),
-    /// Wherever its motors push it, in treacle: each joint turns at torque / viscosity. No mass, no weight: the
-    /// simplest arm that shows a sign that is wrong.
+    /// Wherever its motors push it, in treacle: each joint turns at torque / viscosity, up to a radian from home. No
+    /// mass, no weight: the simplest arm that shows a sign that is wrong.
     Yielding {
         /// How much it resists (N m s/rad).
         viscosity_nm_s: f64,
@@ -44,8 +44,9 @@ impl Motion {
             Self::Rest => [0; 3],
             Self::Trace(replay) => replay.counts_at(time_s),
             Self::Yielding { viscosity_nm_s, joints } => {
-                for (joint, torque) in joints.iter_mut().zip(torque) {
-                    *joint = (*joint + dt_s * torque / *viscosity_nm_s).clamp(-1.0, 1.0);
+                let homes = encoders.home_joint_angles_rad;
+                for ((joint, torque), home) in joints.iter_mut().zip(torque).zip(homes) {
+                    *joint = (*joint + dt_s * torque / *viscosity_nm_s).clamp(home - 1.0, home + 1.0);
                 }
                 map.angles_to_counts(*joints)
             }

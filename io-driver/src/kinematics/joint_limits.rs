@@ -2,7 +2,8 @@
 //!
 //! Model: each joint has a stop at either end, and so has the angle between the last two links,
 //! because a parallelogram linkage carries both on the base: its third angle is absolute, and the
-//! links collide by the *difference* of two joints.
+//! links collide by the *difference* of two joints; or by their sum, where the mechanism counts the
+//! upper arm the other way round.
 //! Frames and signs: joint angles of the mechanism, radians (metres for the ideal device).
 //! Invariant: what is not a number is never inside.
 //! Cost: eight comparisons.
@@ -21,8 +22,10 @@ pub struct Interval {
 pub struct JointLimits {
     /// Of each joint.
     pub joints: [Interval; 3],
-    /// Of `joints[2] - joints[1]`, the bend of the elbow.
+    /// Of the bend of the elbow, see [`JointLimits::elbow_angle`].
     pub elbow: Interval,
+    /// How the upper arm counts in it: -1 or +1.
+    pub elbow_sign: f64,
 }
 
 impl Interval {
@@ -48,7 +51,14 @@ impl Interval {
 
 impl JointLimits {
     /// No stops at all.
-    pub const UNBOUNDED: Self = Self { joints: [Interval::UNBOUNDED; 3], elbow: Interval::UNBOUNDED };
+    pub const UNBOUNDED: Self =
+        Self { joints: [Interval::UNBOUNDED; 3], elbow: Interval::UNBOUNDED, elbow_sign: -1.0 };
+
+    /// Bend of the elbow: `joints[2] - joints[1]`, or their sum if the upper arm counts the other way round. A torque
+    /// `t` of the elbow's stop acts as `t` on joint 2 and as `elbow_sign * t` on joint 1.
+    pub fn elbow_angle(&self, joints: [f64; 3]) -> f64 {
+        joints[2] + self.elbow_sign * joints[1]
+    }
 
     /// Whether the mechanism can take these angles.
     pub fn contains(&self, joints: [f64; 3]) -> bool {
@@ -57,7 +67,7 @@ impl JointLimits {
 
     /// How far the worst joint (or the elbow) is beyond its stop; zero within all.
     pub fn excess(&self, joints: [f64; 3]) -> f64 {
-        let bend = self.elbow.excess(joints[2] - joints[1]);
+        let bend = self.elbow.excess(self.elbow_angle(joints));
         (0..3).map(|j| self.joints[j].excess(joints[j])).fold(bend, f64::max)
     }
 }
@@ -73,6 +83,7 @@ mod tests {
             Interval { min: 0.0, max: 3.0 },
         ],
         elbow: Interval { min: -0.5, max: 0.75 },
+        elbow_sign: -1.0,
     };
 
     #[test]
@@ -86,6 +97,14 @@ mod tests {
         // 2.0 - 0.0 is 1.25 more than the elbow bends; all numbers are exact in binary.
         assert_eq!(LIMITS.excess([0.0, 0.0, 2.0]), 1.25);
         assert!(!LIMITS.contains([0.0, 0.0, 2.0]));
+    }
+
+    #[test]
+    fn an_upper_arm_that_counts_the_other_way_round_bends_the_elbow_by_the_sum() {
+        let limits = JointLimits { elbow_sign: 1.0, ..LIMITS };
+        assert_eq!(limits.elbow_angle([9.0, 0.5, 0.25]), 0.75);
+        assert!(limits.contains([0.0, 0.5, 0.25]));
+        assert_eq!(limits.excess([0.0, 2.0, 0.25]), 1.5);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! position of the tip and the force on the user.
 //! Model: rigid links without clearance; the base stands still.
 //! Frames and signs: everything in the device's base frame D, x to the right, y up, z to the
-//! user, origin at the home position of the tip. A positive torque turns its joint towards a
+//! user, origin where the mechanism says. A positive torque turns its joint towards a
 //! larger angle. SI, radians; the joints of [`Ideal`] are metres.
 //! Invariants: no function panics, whatever it is given. [`Mechanism::joint_torque`] only ever
 //! multiplies by the transposed Jacobian, so it stays bounded in every singularity; nothing here
@@ -18,13 +18,19 @@ pub mod conditioning;
 pub mod gimbal;
 pub mod gravity;
 pub mod ideal;
+pub mod joint_convention;
 pub mod joint_limits;
+pub mod parallelogram;
 pub mod premium;
+pub mod wooden_haptics;
 
 pub use conditioning::Conditioning;
 pub use ideal::Ideal;
+pub use joint_convention::JointConvention;
 pub use joint_limits::{Interval, JointLimits};
+pub use parallelogram::Parallelogram;
 pub use premium::Premium;
+pub use wooden_haptics::WoodenHaptics;
 
 /// The geometry of a device with three actuated joints and a free gimbal at its tip.
 pub trait Mechanism: Send {
@@ -89,6 +95,8 @@ pub enum Unreachable {
 pub enum Kinematics {
     /// PHANToM Premium with three actuated joints.
     Premium(Premium),
+    /// An arm of the WoodenHaptics family.
+    WoodenHaptics(WoodenHaptics),
     /// Position goes straight through.
     Ideal(Ideal),
 }
@@ -97,6 +105,7 @@ impl Mechanism for Kinematics {
     fn forward(&self, joints: [f64; 3]) -> Vector3<f64> {
         match self {
             Self::Premium(premium) => premium.forward(joints),
+            Self::WoodenHaptics(arm) => arm.forward(joints),
             Self::Ideal(ideal) => ideal.forward(joints),
         }
     }
@@ -104,6 +113,7 @@ impl Mechanism for Kinematics {
     fn inverse(&self, tip: Vector3<f64>) -> Result<[f64; 3], Unreachable> {
         match self {
             Self::Premium(premium) => premium.inverse(tip),
+            Self::WoodenHaptics(arm) => arm.inverse(tip),
             Self::Ideal(ideal) => ideal.inverse(tip),
         }
     }
@@ -111,6 +121,7 @@ impl Mechanism for Kinematics {
     fn jacobian(&self, joints: [f64; 3]) -> Matrix3<f64> {
         match self {
             Self::Premium(premium) => premium.jacobian(joints),
+            Self::WoodenHaptics(arm) => arm.jacobian(joints),
             Self::Ideal(ideal) => ideal.jacobian(joints),
         }
     }
@@ -118,6 +129,7 @@ impl Mechanism for Kinematics {
     fn joint_limits(&self) -> JointLimits {
         match self {
             Self::Premium(premium) => premium.joint_limits(),
+            Self::WoodenHaptics(arm) => arm.joint_limits(),
             Self::Ideal(ideal) => ideal.joint_limits(),
         }
     }
@@ -125,6 +137,7 @@ impl Mechanism for Kinematics {
     fn singularity(&self, joints: [f64; 3]) -> Conditioning {
         match self {
             Self::Premium(premium) => premium.singularity(joints),
+            Self::WoodenHaptics(arm) => arm.singularity(joints),
             Self::Ideal(ideal) => ideal.singularity(joints),
         }
     }

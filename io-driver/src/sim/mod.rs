@@ -1,3 +1,5 @@
 //! Simulated devices and hands.
 
+pub mod dynamics;
 pub mod script;
+pub mod spec;
