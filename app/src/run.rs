@@ -13,9 +13,9 @@ use crate::two_processes::{self, Source};
 use crate::virtual_clock::VirtualDriver;
 use io_driver::device::Extras;
 use rt_core::signals::StopSignals;
-use shm_abi::DriverView;
 use shm_abi::client;
 use shm_abi::segment::{ClockMode, DriverInfo};
+use shm_abi::{DriverView, Frame};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -186,7 +186,7 @@ fn check_devices(rig: &Rig, info: &DriverInfo) -> Result<(), RunFailure> {
 /// What the devices of a driver tell besides positions; in every frame the same.
 fn extras_of(driver: &DriverView) -> Vec<Extras> {
     let frame = not_zeroed::first_frame(driver);
-    let flags = frame.iter().flat_map(|frame| frame.present_devices()).map(|device| device.flags);
+    let flags = frame.iter().flat_map(Frame::present_devices).map(|device| device.flags);
     flags.map(Extras::of).collect()
 }
 

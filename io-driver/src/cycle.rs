@@ -168,8 +168,12 @@ impl Cycle {
     /// Somebody says that these devices (none named: all that count) are in their zeroing pose. What became of it
     /// is told by [`zero_verdict`](Self::zero_verdict).
     pub fn zero(&mut self, asked: DeviceSet) {
-        let states = self.devices.iter().map(|device| device.zero_state());
-        let verdict = self.zeros.choose(asked, !self.safety.may_zero(), states);
+        let mut states = [ZeroState::Innate; MAX_DEVICES];
+        for (state, device) in states.iter_mut().zip(&self.devices) {
+            *state = device.zero_state();
+        }
+        let present = &states[..self.devices.len()];
+        let verdict = self.zeros.choose(asked, !self.safety.may_zero(), present);
         if let Ok(chosen) = verdict {
             for index in (0..self.devices.len()).filter(|index| chosen.has(*index)) {
                 self.devices[index].zero();
@@ -187,10 +191,9 @@ impl Cycle {
 
     /// The devices that have to be zeroed.
     pub fn not_zeroed(&self) -> DeviceSet {
-        let bit = |(index, device): (usize, &Box<dyn Device>)| {
-            u64::from(device.zero_state() == ZeroState::Needed) << index
-        };
-        DeviceSet(self.devices.iter().enumerate().map(bit).fold(0, |bits, bit| bits | bit))
+        let needs =
+            self.devices.iter().enumerate().filter(|(_, device)| device.zero_state() == ZeroState::Needed);
+        DeviceSet(needs.fold(0, |bits, (index, _)| bits | 1 << index))
     }
 
     /// What became of the last request to zero; told once.

@@ -195,6 +195,10 @@ pub fn home_pose(kind: &str) -> &'static str {
             "turret straight ahead, upper arm level, forearm hanging straight down, a gimbal straight \
              (where `home_joint_angles_rad` of its description are zero)"
         }
+        "wooden-haptics" => {
+            "turret straight ahead, upper arm upright, forearm level towards you \
+             (where `home_joint_angles_rad` of its description are 0, 0, pi/2)"
+        }
         _ => "the pose of `home_joint_angles_rad` in its description",
     }
 }

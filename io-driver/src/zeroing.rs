@@ -107,16 +107,15 @@ impl ZeroWatch {
         &self,
         asked: DeviceSet,
         is_commanded: bool,
-        states: impl ExactSizeIterator<Item = ZeroState> + Clone,
+        states: &[ZeroState],
     ) -> Result<DeviceSet, ZeroRefusal> {
         let present = (1u64 << states.len()) - 1;
         if asked.0 & !present != 0 {
             return Err(ZeroRefusal::NoSuchDevice);
         }
-        let innate = states
-            .clone()
-            .enumerate()
-            .fold(0, |bits, (device, state)| bits | u64::from(state == ZeroState::Innate) << device);
+        let is_innate =
+            |(device, state): (usize, &ZeroState)| u64::from(*state == ZeroState::Innate) << device;
+        let innate = states.iter().enumerate().map(is_innate).fold(0, |bits, bit| bits | bit);
         let chosen = DeviceSet(if asked.0 == 0 { present & !innate } else { asked.0 });
         if chosen.0 & innate != 0 || chosen.0 == 0 {
             return Err(ZeroRefusal::Innate);
@@ -169,7 +168,7 @@ mod tests {
     }
 
     fn choose(watch: &ZeroWatch, asked: u64, is_commanded: bool) -> Result<u64, ZeroRefusal> {
-        watch.choose(DeviceSet(asked), is_commanded, STATES.into_iter()).map(|chosen| chosen.0)
+        watch.choose(DeviceSet(asked), is_commanded, &STATES).map(|chosen| chosen.0)
     }
 
     #[test]
@@ -195,7 +194,7 @@ mod tests {
     #[test]
     fn devices_without_counters_have_nothing_to_zero() {
         let watch = resting();
-        let none = watch.choose(DeviceSet(0), false, [ZeroState::Innate].into_iter());
+        let none = watch.choose(DeviceSet(0), false, &[ZeroState::Innate]);
         assert_eq!(none, Err(ZeroRefusal::Innate));
     }
 

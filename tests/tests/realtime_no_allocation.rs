@@ -146,9 +146,9 @@ impl Play {
         if self.cycle.safety().state() == DriverState::Fault && tick.is_multiple_of(10) {
             self.sender.post(Letter::ClearFault).unwrap();
         }
-        if tick % 37 == 0 {
+        if tick.is_multiple_of(37) {
             // The one that breaks; sometimes all, of which two move.
-            let asked = if tick % 2 == 0 { 1 << 4 } else { 0 };
+            let asked = if tick.is_multiple_of(2) { 1 << 4 } else { 0 };
             self.sender.post(Letter::Zero(DeviceSet(asked))).unwrap();
         }
         if tick % LEASE_TICKS == 1 {

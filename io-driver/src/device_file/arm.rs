@@ -11,8 +11,9 @@ use serde::de::DeserializeOwned;
 use toml::Spanned;
 
 use super::bodies::{self, RawBodies};
+use super::gimbal::{self, RawGimbal};
 use super::simulation::{self, RawSimulation};
-use super::{ArmFile, DeviceFileError, Workspace, gimbal};
+use super::{ArmFile, DeviceFileError, Workspace};
 use crate::encoders::EncoderSpec;
 use crate::heat::HeatSpec;
 use crate::kinematics::{Interval, JointConvention, JointLimits, Kinematics, Mechanism};
@@ -61,7 +62,7 @@ struct Raw<L> {
     motors: Motors,
     bodies: Option<Spanned<RawBodies>>,
     simulation: Option<Spanned<RawSimulation>>,
-    gimbal: Option<gimbal::RawGimbal>,
+    gimbal: Option<RawGimbal>,
     buttons: Option<Whole>,
 }
 
@@ -101,8 +102,8 @@ fn check<L: LinkageTable>(toml: &TomlText<'_>, raw: Raw<L>) -> Result<ArmFile, T
     let joints = raw.linkage.joints();
     let reduction = toml.numbers(joints.cable_reduction, REDUCTION)?;
     let home = home(toml, joints.home_joint_angles_rad, &mechanism)?;
-    let weights = bodies::check(toml, raw.bodies.as_ref(), links_m, L::CONVENTION)?;
     let encoders = encoders(toml, &raw.encoders, reduction, home)?;
+    let weights = bodies::check(toml, raw.bodies.as_ref(), links_m, L::CONVENTION)?;
     Ok(ArmFile {
         kind: L::KIND,
         name: raw.name,
@@ -110,7 +111,7 @@ fn check<L: LinkageTable>(toml: &TomlText<'_>, raw: Raw<L>) -> Result<ArmFile, T
         continuous_force_n,
         workspace: workspace(toml, &raw.workspace_m, &raw.workspace_centre_m, &mechanism, home)?,
         mechanism,
-        gimbal: raw.gimbal.as_ref().map(|raw| gimbal::check(toml, raw, &encoders)).transpose()?,
+        gimbal: raw.gimbal.as_ref().map(|table| gimbal::check(toml, table, &encoders)).transpose()?,
         buttons: gimbal::buttons(toml, raw.buttons.as_ref())?,
         encoders,
         motors: motors(toml, &raw.motors, reduction)?,

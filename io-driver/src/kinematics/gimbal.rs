@@ -1,7 +1,7 @@
 //! Orientation of an instrumented gimbal's last link, from the joints of the arm and those of the gimbal.
 //!
 //! Problem: a thimble or a stylus turns about the tip without moving it; three more encoders tell how.
-//! Model: a chain of rotations, each about an axis that the former carries along:
+//! Model: a chain of rotations, each about an axis that the former carries along, in the linkage's angles:
 //!
 //! ```text
 //! R_DG = Ry(theta1) Rx(-theta3) Ry(yaw) Rx(pitch) Rz(roll)
@@ -63,6 +63,14 @@ mod tests {
         Kinematics::Premium(Premium::new([0.215, 0.170], JointLimits::UNBOUNDED))
     }
 
+    fn wooden() -> Kinematics {
+        Kinematics::WoodenHaptics(WoodenHaptics::new(
+            [0.080, 0.205, 0.245],
+            [0.220, 0.080],
+            JointLimits::UNBOUNDED,
+        ))
+    }
+
     /// Written out element by element, without a library's notion of a rotation.
     fn matrix(axis: usize, angle: f64) -> Matrix3<f64> {
         let (s, c) = angle.sin_cos();
@@ -97,12 +105,13 @@ mod tests {
             joints in prop::array::uniform3(-1.5..1.5_f64), step in -0.3..0.3_f64,
         ) {
             // Turning the forearm alone moves the tip on a circle about the elbow, in which the link's own
-            // downward direction, 170 mm of it, points from elbow to tip.
-            let kinematics = premium();
-            let tip_less_elbow = |joints| carrier(&kinematics, joints) * Vector3::new(0.0, -0.170, 0.0);
-            let other = [joints[0], joints[1], joints[2] + step];
-            let moved = kinematics.forward(other) - kinematics.forward(joints);
-            prop_assert!((tip_less_elbow(other) - tip_less_elbow(joints) - moved).amax() < 1e-14);
+            // downward direction, as long as the forearm, points from elbow to tip.
+            for (kinematics, forearm_m) in [(premium(), 0.170), (wooden(), 0.245)] {
+                let tip_less_elbow = |joints| carrier(&kinematics, joints) * Vector3::new(0.0, -forearm_m, 0.0);
+                let other = [joints[0], joints[1], joints[2] + step];
+                let moved = kinematics.forward(other) - kinematics.forward(joints);
+                prop_assert!((tip_less_elbow(other) - tip_less_elbow(joints) - moved).amax() < 1e-14);
+            }
         }
     }
 
