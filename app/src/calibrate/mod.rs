@@ -1,7 +1,7 @@
 //! `phantom3 calibrate`: where one device's base stands, from points that it and another one measured together.
 //!
-//! Model: pairs come from a file or from a running driver ([`live`]); the crate `calibration` fits them; what was
-//! found goes into a layout ([`layout_file`]), which a run with `--attach` reads ([`default_layout`]).
+//! Model: pairs come from a file or from a running driver (`live`); the crate `calibration` fits them; what was
+//! found goes into a layout (`layout_file`), which a run with `--attach` reads ([`default_layout`]).
 //! Output: what programs want (the layout, with `--json` the result) on standard output, what people want on standard
 //! error.
 //!
