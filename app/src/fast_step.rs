@@ -144,7 +144,7 @@ fn finite_or_zero(force: Vector3<f64>) -> Vector3<f64> {
 }
 
 #[cfg(test)]
-mod tests {
+mod carried {
     use super::*;
     use bytemuck::Zeroable;
     use haptics::{Friction, Plane, Shape};
