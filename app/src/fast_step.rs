@@ -171,7 +171,7 @@ fn finite_or_zero(force: Vector3<f64>) -> Vector3<f64> {
 }
 
 #[cfg(test)]
-mod damping_tests {
+mod damped {
     use super::*;
     use bytemuck::Zeroable;
     use haptics::Plane;
@@ -231,7 +231,7 @@ mod damping_tests {
 }
 
 #[cfg(test)]
-mod layout_tests {
+mod carried {
     use super::*;
     use bytemuck::Zeroable;
     use haptics::{Friction, Plane, Shape};

@@ -90,7 +90,7 @@ fn a_layout_on_standard_output_places_the_device_where_it_stands() {
         assert!(said.err.contains(word), "{word}: {}", said.err);
     }
     let figure = std::fs::read_to_string(place.path("r.svg")).expect("a figure");
-    assert!(figure.starts_with("<svg") || figure.starts_with("<?xml"), "{:.40}", figure);
+    assert!(figure.starts_with("<svg") || figure.starts_with("<?xml"), "{figure:.40}");
     assert!(!place.path("layout.toml").exists());
 }
 
@@ -223,7 +223,7 @@ fn bad_input_ends_with_status_2_and_says_what_to_do() {
     place.write("mm.csv", pairs_csv(100, &(Matrix3::identity() * 1000.0)));
     place.write(
         "line.csv",
-        (0..50).map(|i| format!("{} 0 0 0 {} 0\n", i, i).replace(' ', "e-2 ")).collect::<String>(),
+        (0..50).map(|i| format!("{i} 0 0 0 {i} 0\n").replace(' ', "e-2 ")).collect::<String>(),
     );
     place.write("bad.toml", "[[device]]\nwobble = 1\n");
     place.write("a.toml", "[[device]]\n");
@@ -365,6 +365,17 @@ fn a_live_calibration_makes_two_devices_meet_in_one_world() {
 }
 
 #[test]
+fn a_layout_that_cannot_be_written_is_not_lost() {
+    let place = Workplace::new();
+    place.write("pairs.csv", pairs_csv(300, &Matrix3::identity()));
+    // Below a file there is no directory.
+    let said = place.run(["calibrate", "--pairs", "pairs.csv", "--write", "pairs.csv/layout.toml"]);
+    assert_eq!(said.status, Some(2), "{said:?}");
+    assert!(said.err.contains("pairs.csv/layout.toml: cannot be written"), "{}", said.err);
+    assert_stands(&parse(&said.out), 1, &(truth()[0].inverse() * truth()[1]));
+}
+
+#[test]
 fn a_run_of_scripted_fingers_never_reads_the_calibrated_layout() {
     let place = Workplace::new();
     place.write("free.toml", SCENE);
@@ -395,6 +406,31 @@ fn devices_that_nobody_moves_or_that_are_not_there_are_refused() {
         assert_eq!((said.status, said.out.as_str()), (Some(2), ""), "{said:?}");
         assert!(said.err.contains(words), "{words}: {}", said.err);
     }
+}
+
+#[test]
+fn ticks_with_force_are_left_out_and_nothing_but_force_is_refused() {
+    let place = Workplace::new();
+    let driver = driver(&place);
+    // The whole path lies deep in a soft table.
+    let table = "[[entity]]\nname = \"table\"\nstiffness_n_per_m = 10.0\n\
+        shape = { kind = \"plane\", normal = [0.0, 1.0, 0.0], offset_m = 0.3 }\n";
+    place.write("free.toml", format!("{SCENE}{table}"));
+    let commander = commander(&place, &driver);
+    let observer = driver.observe();
+    let begun = Instant::now();
+    let is_pressed =
+        |frame: shm_abi::Frame| frame.devices[0].force_on_user_n_applied.iter().any(|f| f.abs() > 0.1);
+    while !observer.driver.read_latest().is_some_and(is_pressed) {
+        assert!(begun.elapsed() < HANG, "no force");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let said = Running::start(live(&place, &driver, &["--seconds", "1", "--save-pairs", "pairs.csv"])).wait();
+    assert_eq!(said.status, Some(2), "{said:?}");
+    assert_eq!(Table::read(&place.path("pairs.csv")).len(), 0, "none was kept");
+    assert!(said.err.contains("a device rendered force in every tick"), "{}", said.err);
+    signal(&commander, Signal::INT);
+    commander.wait();
 }
 
 /// Waits until its first line of progress tells of the pair that resting tips are.

@@ -16,7 +16,7 @@ use io_driver::status::CounterStatus;
 use io_driver::zeroing::{DeviceSet, ZeroState};
 use nalgebra::Vector3;
 use phantom3::fast_loop::{FastLoop, Turn, WhenFull};
-use phantom3::rig::Rig;
+use phantom3::rig::{HandMode, Rig};
 use rt_core::alloc_guard::{self, CountingAllocator};
 use rtrb::RingBuffer;
 use shm_abi::doorbell::WaitMode;
@@ -26,7 +26,7 @@ use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use world::{Layout, Scene};
+use world::Scene;
 
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;
@@ -271,7 +271,8 @@ fn the_applications_turn_never_calls_the_heap_while_fingers_touch_hold_and_slide
     alloc_guard::assert_installed();
     let period_ns = period_of(10_000.0);
     let file = config_file("scenes/default.toml");
-    let rig = Rig::new(&file, Scene::load(&file).unwrap(), Layout::default(), None, period_ns).unwrap();
+    let rig =
+        Rig::new(&file, Scene::load(&file).unwrap(), None, None, HandMode::Kinematic, period_ns).unwrap();
     let config = rig.driver_config(ClockMode::Virtual);
     let devices = open_devices(&config).unwrap();
     let memory = Arc::new(DriverMemory::create(&describe(&config, &devices, WaitMode::Spin)).unwrap());

@@ -35,7 +35,7 @@ struct Capsule {
     radius_m: f64,
 }
 
-/// What is in the way of other arms. Radii are measured off photographs, generously: tubes of 12 mm, a body with
+/// What is in the way of other arms. Radii are chosen: about those of the real arms, generously: tubes of 12 mm, a body with
 /// motors of 120 mm on a column.
 fn capsules(arm: &ArmFile, X_WD: &Isometry3<f64>, joints: [f64; 3]) -> [Capsule; 4] {
     let Kinematics::Premium(premium) = &arm.mechanism else { panic!("a Premium") };

@@ -1,7 +1,7 @@
 //! `phantom3 calibrate`: where one device's base stands, from points that it and another one measured together.
 //!
-//! Model: pairs come from a file or from a running driver ([`live`]); the crate `calibration` fits them; what was
-//! found goes into a layout ([`layout_file`]), which a run with `--attach` reads ([`default_layout`]).
+//! Model: pairs come from a file or from a running driver (`live`); the crate `calibration` fits them; what was
+//! found goes into a layout (`layout_file`), which a run with `--attach` reads ([`default_layout`]).
 //! Output: what programs want (the layout, with `--json` the result) on standard output, what people want on standard
 //! error.
 //!
@@ -204,11 +204,9 @@ fn run_to_end(args: &CalibrateArgs) -> Result<(), CalibrateFailure> {
     let text = layout_file::with_entry(&plan.base, plan.base_name(), args, &entry, &X_WN, used)?;
     let report = Report { origin: &origin, args, found: &found, used, X_WN: &X_WN, entry: &entry };
     say(format_args!("{report}"));
-    if let Some(file) = &args.plot {
-        draw(file, &pairs, &found, used)?;
-    }
     if let Some(file) = &plan.write {
-        layout_file::replace(file, &text)?;
+        // Whoever held two arms together for a minute shall not have to do it again for a full disk.
+        layout_file::replace(file, &text).inspect_err(|_| print(text.trim_end()))?;
         say(format_args!("layout       written to {}", file.display()));
     }
     if args.json {
@@ -216,7 +214,7 @@ fn run_to_end(args: &CalibrateArgs) -> Result<(), CalibrateFailure> {
     } else if plan.write.is_none() {
         print(text.trim_end());
     }
-    Ok(())
+    args.plot.as_ref().map_or(Ok(()), |file| draw(file, &pairs, &found, used))
 }
 
 /// What can be checked before anybody moves a device.
@@ -300,6 +298,8 @@ fn get_pairs(args: &CalibrateArgs) -> Result<(String, Vec<Pair>), CalibrateFailu
         other: args.device,
         seconds: args.seconds,
     };
+    // Found out now, not after a minute of holding two arms together.
+    args.save_pairs.as_ref().map_or(Ok(()), |file| save_pairs(file, &[]))?;
     let gathered = live::gather(&wish, &signals);
     if let Some(file) = &args.save_pairs {
         save_pairs(file, &gathered.pairs)?;
