@@ -150,7 +150,8 @@ impl Rig {
         };
         rig.bases = rig.place_bases()?;
         rig.fast_step()?;
-        if matches!(rig.hand_mode, HandMode::Impedance(_)) {
+        if let HandMode::Impedance(simulated) = &rig.hand_mode {
+            simulated.hand()?;
             // What the driver would find wrong is found here, before anything is started.
             open_devices(&rig.driver_config(ClockMode::Virtual))?;
         }

@@ -244,13 +244,14 @@ impl SimulatedArm {
         hand.advance(tip, moved / dt_s, dt_s);
     }
 
-    /// The motors' torques on their joints (N m).
+    /// The motors' mean torques on their joints in this step (N m).
     fn turn_motors(&mut self, dt_s: f64) -> Vector3<f64> {
         let mut torque = Vector3::zeros();
         for (joint, motor) in self.motors.iter_mut().enumerate() {
             let ratio = self.motor_sign[joint] * self.reduction[joint];
+            let before = motor.torque_nm();
             motor.advance(ratio * self.shafts.rates[joint], dt_s);
-            torque[joint] = ratio * motor.torque_nm();
+            torque[joint] = ratio * 0.5 * (before + motor.torque_nm());
         }
         torque
     }
