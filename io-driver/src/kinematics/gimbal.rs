@@ -173,7 +173,8 @@ mod tests {
         for n in 0..=steps {
             let wanted = std::array::from_fn(|i| from[i] + step[i] * f64::from(n));
             found = angles_after(found, carrier, orientation(carrier, wanted));
-            largest = found.iter().zip(wanted).map(|(a, b): (&f64, f64)| (a - b).abs()).fold(largest, f64::max);
+            largest =
+                found.iter().zip(wanted).map(|(a, b): (&f64, f64)| (a - b).abs()).fold(largest, f64::max);
         }
         largest
     }
