@@ -249,3 +249,6 @@ impl Device for SimulatedDevice {
         self.arm.lose_zero();
     }
 }
+
+#[cfg(test)]
+mod tests;
