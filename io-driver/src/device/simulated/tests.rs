@@ -159,6 +159,26 @@ fn a_hand_that_rests_somewhere_in_the_world_holds_the_tip_there_however_the_base
 }
 
 #[test]
+fn a_handle_that_the_script_turns_in_the_world_is_measured_in_the_base() {
+    let gimbal = "[gimbal]\ncounts_per_rev = 4000\nreduction = [10.0, 10.0, 10.0]\nsign = [1, 1, 1]\n\
+                  channel = [3, 4, 5]\nhome_angles_rad = [0.0, 0.0, 0.0]\n";
+    let text = format!("{}\n{gimbal}", builtin("premium-1.5").unwrap());
+    let Ok(DeviceFile::Arm(file)) = DeviceFile::parse(&text, Path::new("handle.toml")) else { panic!() };
+    let script = "t,f0_x,f0_y,f0_z,f0_qw,f0_qx,f0_qy,f0_qz\n0,0,0,0,0.8,0,0.6,0\n";
+    let script = HandScript::parse(script, Path::new("hand.csv"), &["f0"]).unwrap();
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.3, 0.5, -0.2));
+    let base = Isometry3::from_parts(Translation3::identity(), turn);
+    let wish = Wish::Scripted(HandPlayer::new(script), 0);
+    let holder = held(&pen(), Vector3::zeros(), wish, &Arc::new(TipBoard::default()));
+    let reading = device(&file, Vector3::zeros(), base, holder).read(tick(1)).unwrap();
+    let [w, x, y, z] = reading.orientation_wxyz;
+    let measured = UnitQuaternion::new_normalize(nalgebra::Quaternion::new(w, x, y, z));
+    let scripted = UnitQuaternion::new_normalize(nalgebra::Quaternion::new(0.8, 0.0, 0.6, 0.0));
+    // Half a count of 0.16 mrad in each of three axes.
+    assert!((turn * measured).angle_to(&scripted) < 3e-4, "{measured}");
+}
+
+#[test]
 fn when_the_scripts_time_jumps_back_the_hand_goes_back_no_faster_than_a_hand() {
     let script = "t,f0_x,f0_y,f0_z\n0,0,0,0\n0.3,0.1,0.05,0\n";
     let script = HandScript::parse(script, Path::new("hand.csv"), &["f0"]).unwrap();

@@ -122,8 +122,11 @@ fn a_tip_that_is_pushed_goes_as_its_apparent_mass_says() {
 
 #[test]
 fn a_force_that_the_motors_balance_moves_nothing() {
-    for name in ["premium-1.5", "wooden-haptics"] {
-        let file = smooth(name);
+    for (name, sign) in
+        [("premium-1.5", [1; 3]), ("premium-1.5", [-1, 1, -1]), ("wooden-haptics", [1, -1, 1])]
+    {
+        let mut file = smooth(name);
+        file.motors.sign = sign;
         for offset in INSIDE {
             let home = Vector3::from(file.encoders.home_joint_angles_rad);
             let joints: [f64; 3] = (home + 0.5 * Vector3::from(offset)).into();
@@ -330,4 +333,18 @@ fn amplifiers_that_were_never_switched_on_are_not_watched() {
     arm.command(file.motor_map().command([0.05, 0.0, 0.0]).codes);
     arm.advance(5e-3, &mut NobodyHolds);
     assert!(arm.truth().current_a[0] > 0.1, "they obey");
+}
+
+#[test]
+fn a_motor_that_turns_brakes_itself_whichever_way_round_it_is_built_in() {
+    // 1 V is all that the amplifiers have; 30 rad/s of the turret make 9.5 V of back-EMF.
+    for sign in [1, -1] {
+        let mut file = changed("premium-1.5", |spec| spec.motor.supply_v = 1.0);
+        file.motors.sign = [sign; 3];
+        let mut arm = thrown(&file, [0.0; 3], [30.0, 0.0, 0.0]);
+        arm.command(file.motor_map().command([0.0; 3]).codes);
+        arm.advance(1e-3, &mut NobodyHolds);
+        let truth = arm.truth();
+        assert!(f64::from(sign) * truth.current_a[0] < -1.0, "{sign}: {truth:?}");
+    }
 }
