@@ -220,7 +220,7 @@ impl SimulatedArm {
 
     /// Goes on by `dt_s`, in equal steps.
     pub fn advance(&mut self, dt_s: f64, hand: &mut impl TipLoad) {
-        if !(dt_s > 0.0) {
+        if dt_s.is_nan() || dt_s <= 0.0 {
             return;
         }
         let dt_s = dt_s.min(LONGEST_S);
