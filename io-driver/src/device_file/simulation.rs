@@ -1,7 +1,8 @@
 //! The table `[simulation]`: what a simulated arm needs beyond what a driver does.
 //!
-//! Invariant: springs and dampers are so soft against the inertias that they act on that steps of [`STEP_S`](crate::sim::arm::STEP_S) follow
-//! them; nothing has no inertia. Numbers that are each allowed by themselves would else make a motion without end.
+//! Invariant: springs and dampers are so soft against the inertias on which they act that steps of
+//! [`STEP_S`](crate::sim::arm::STEP_S) follow them; nothing has no inertia. Numbers that are each allowed by themselves
+//! would else make a motion without end.
 
 mod swiftness;
 
