@@ -137,7 +137,7 @@ fn score_of(name: &str, motion: &Motion, rate_hz: u64) -> Score {
     let (_, make) = RIVALS.iter().find(|(known, _)| *known == name).unwrap();
     let samples = course.samples(motion, rate_hz as f64, 1.0);
     let found = estimate(make().as_mut(), &course, &samples, 1_000_000_000 / rate_hz);
-    scores(&course, motion, &samples, &found)[1]
+    scores(|time_s| course.truth(motion, time_s), motion.is_steady, &samples, &found)[1]
 }
 
 fn motion(name: &str) -> &'static Motion {
