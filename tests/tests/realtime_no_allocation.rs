@@ -99,6 +99,12 @@ fn mapped_commanders() -> usize {
     maps.lines().filter(|line| line.contains("phantom3-commander")).count()
 }
 
+const SIMULATED: &str = "\
+[[device]]\nname = \"s0\"\nbackend = \"simulated\"\ndescription = \"premium-1.5\"\nhand_model = \"slip.toml\"\n\
+gravity_compensation = true\n
+[[device]]\nname = \"s1\"\nbackend = \"simulated\"\ndescription = \"wooden-haptics\"\nhand_model = \"fingertip\"\n
+[[device]]\nname = \"s2\"\nbackend = \"simulated\"\ndescription = \"premium-1.5\"\nhand_model = \"nobody\"\n";
+
 /// A driver's tick, and what surrounds it.
 struct Play {
     cycle: Cycle,
@@ -114,14 +120,16 @@ struct Play {
 }
 
 impl Play {
-    /// Two ideal devices that follow a hand, two Premiums that replay a trace, and one that breaks.
+    /// Two ideal devices that follow a hand, two Premiums that replay a trace, one that breaks, and three that are
+    /// simulated: held by a trembling hand that minds slip, by another kind of hand, and by nobody.
     fn new() -> Self {
         let hand = "[[device]]\nbackend = \"ideal\"\nhand = \"../hands/default.csv\"\npeak_force_n = 8.5\n";
         let premium = "[[device]]\nbackend = \"replay\"\ndescription = \"premium-1.5\"\ntrace = \"traces/circle.csv\"\n";
-        let text = format!("[safety]\nramp_in_ms = 50\n{}{}", hand.repeat(2), premium.repeat(2));
+        let text =
+            format!("[safety]\nramp_in_ms = 50\n{}{}{SIMULATED}", hand.repeat(2), premium.repeat(2));
         let config = DriverConfig::parse(&text, &config_file("driver/test.toml")).unwrap();
         let mut devices = open_devices(&config).unwrap();
-        devices.push(Box::new(Breaking::new(devices[0].info().clone())));
+        devices.insert(4, Box::new(Breaking::new(devices[0].info().clone())));
         let info = describe(&config, &devices, WaitMode::Spin);
         let memory = Arc::new(DriverMemory::create(&info).unwrap());
         let driver = DriverView::map(memory.fd()).unwrap();

@@ -37,11 +37,12 @@ pub struct Emulator {
     checked: u64,
     arm: u32,
     counter_offset: i64,
+    longest_stall_ns: u64,
 }
 
-/// An emulator that stalls for longer than this (ns) finds the world as it was after it: nobody saw the counters
-/// meanwhile, and no driver could have answered to them.
-const LONGEST_STALL_NS: u64 = 20_000_000;
+/// An emulator that stalls for longer than this (ns), and than two of its rounds, finds the world as it was after it:
+/// made up at once, what it missed would be a jump of the counters, and to a driver far too fast.
+const LONGEST_STALL_NS: u64 = 2_000_000;
 
 impl Emulator {
     /// A card at home that nobody has written to.
@@ -67,6 +68,7 @@ impl Emulator {
             checked: card.outputs.written.load(Ordering::Acquire),
             arm: card.outputs.arm.load(Ordering::Relaxed),
             counter_offset: play.counter_offset,
+            longest_stall_ns: LONGEST_STALL_NS.max(2 * play.poll_ns),
         };
         emulator.tell();
         emulator
@@ -84,7 +86,7 @@ impl Emulator {
 
     /// Takes what was written, lets time pass to `now_ns`, tells.
     pub fn turn(&mut self, now_ns: u64) {
-        self.passed_ns = self.passed_ns.max(now_ns.saturating_sub(LONGEST_STALL_NS));
+        self.passed_ns = self.passed_ns.max(now_ns.saturating_sub(self.longest_stall_ns));
         let taken = self.take_values(now_ns);
         self.take_arming();
         // A register that is off by itself, not because a value that says so is still on its way.
