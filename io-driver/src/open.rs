@@ -47,6 +47,15 @@ pub enum OpenError {
         /// The finger in it.
         finger: String,
     },
+    /// A switch on a button that nobody could press.
+    #[error(
+        "device {device}: a switch is wired to its buttons, but no script presses any; give it a hand and a hand file with a \
+         column of buttons, or remove the switch from [safety]"
+    )]
+    NobodyPresses {
+        /// Whose.
+        device: String,
+    },
     /// The hand file is wrong.
     #[error(transparent)]
     Hand(#[from] HandError),
@@ -361,6 +370,47 @@ mod tests {
                     [[device]]\nbackend = \"ideal\"\nhand = \"hand.csv\"\n";
         let config = DriverConfig::parse(text, &directory.path().join("driver.toml")).unwrap();
         open_devices(&config)
+    }
+
+    #[test]
+    fn a_switch_on_a_simulated_device_needs_a_hand_with_a_script_that_presses_it() {
+        let directory = tempfile::tempdir().unwrap();
+        std::fs::write(directory.path().join("hand.csv"), "t,f0_x,f0_y,f0_z,f0_buttons\n0,0,0,0,8\n")
+            .unwrap();
+        let open = |hand: &str| {
+            let text = format!(
+                "[safety]\nemergency_stop = {{ device = \"f0\", button = 3 }}\n[[device]]\nbackend = \"simulated\"\n\
+                 description = \"premium-1.5\"\n{hand}"
+            );
+            let config = DriverConfig::parse(&text, &directory.path().join("driver.toml")).unwrap();
+            open_devices(&config).map(drop).map_err(|refused| refused.to_string())
+        };
+        assert_eq!(open("hand = \"hand.csv\"\n"), Ok(()));
+        for nobody in ["", "hand_model = \"nobody\"\n", "hand_model = \"nobody\"\nhand = \"hand.csv\"\n"] {
+            let message = open(nobody).unwrap_err();
+            assert!(
+                message.starts_with("device f0: a switch is wired to its buttons, but no script"),
+                "{message}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_simulated_handle_that_nobody_holds_is_measured_all_the_same() {
+        let directory = tempfile::tempdir().unwrap();
+        let gimbal = "[gimbal]\ncounts_per_rev = 4000\nreduction = [1.0, 1.0, 2.0]\nsign = [1, 1, 1]\n\
+                      channel = [3, 4, 5]\nhome_angles_rad = [0.0, 0.0, 0.0]\n";
+        let arm = format!("{}\n{gimbal}", device_file::builtin("premium-1.5").unwrap());
+        std::fs::write(directory.path().join("handle.toml"), arm).unwrap();
+        for holder in ["nobody", "pen-grip"] {
+            let text = format!(
+                "[[device]]\nbackend = \"simulated\"\ndescription = \"handle.toml\"\nhand_model = \"{holder}\"\n"
+            );
+            let config = DriverConfig::parse(&text, &directory.path().join("driver.toml")).unwrap();
+            let device = &mut open_devices(&config).unwrap()[0];
+            let reading = device.read(TickTime { tick: 1, period_ns: 1_000_000, run_tick: -1 }).unwrap();
+            assert!(reading.is_orientation_measured && device.extras().orientation, "{holder}");
+        }
     }
 
     #[test]

@@ -37,20 +37,20 @@ pub struct Arm {
 
 impl Arm {
     /// An arm of this description; `holds_its_weight`: gravity is compensated, if the bodies are described.
-    pub fn new(premium: &ArmFile, holds_its_weight: bool) -> Self {
-        let kinematics = premium.mechanism;
-        let gravity = premium.gravity.filter(|_| holds_its_weight);
+    pub fn new(file: &ArmFile, holds_its_weight: bool) -> Self {
+        let kinematics = file.mechanism;
+        let gravity = file.gravity.filter(|_| holds_its_weight);
         Self {
-            extender: EncoderExtender::new(premium.encoders.count_bits),
-            doubtful_step: 1 << (premium.encoders.count_bits - 2),
-            map: JointMap::new(&premium.encoders),
-            gimbal: premium.gimbal.as_ref().map(JointMap::new),
+            extender: EncoderExtender::new(file.encoders.count_bits),
+            doubtful_step: 1 << (file.encoders.count_bits - 2),
+            map: JointMap::new(&file.encoders),
+            gimbal: file.gimbal.as_ref().map(JointMap::new),
             zeroing: Zeroing::AtStart,
             is_zeroed: false,
             velocity: VelocityEstimator::of_counts(),
             kinematics,
-            drive: Drive::new(kinematics, &premium.motors, premium.heat, gravity),
-            joints: premium.encoders.home_joint_angles_rad,
+            drive: Drive::new(kinematics, &file.motors, file.heat, gravity),
+            joints: file.encoders.home_joint_angles_rad,
             last_tick: None,
         }
     }

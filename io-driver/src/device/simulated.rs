@@ -233,8 +233,8 @@ impl Device for SimulatedDevice {
     }
 
     fn extras(&self) -> Extras {
-        let Holder::Hand(held) = &self.holder else { return Extras::default() };
-        Extras { orientation: self.plant.has_gimbal(), buttons: held.wish.has_buttons() }
+        let buttons = matches!(&self.holder, Holder::Hand(held) if held.wish.has_buttons());
+        Extras { orientation: self.plant.has_gimbal(), buttons }
     }
 
     fn zero_state(&self) -> ZeroState {
@@ -249,3 +249,6 @@ impl Device for SimulatedDevice {
         self.arm.lose_zero();
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -104,6 +104,8 @@ fn check<L: LinkageTable>(toml: &TomlText<'_>, raw: Raw<L>) -> Result<ArmFile, T
     let home = home(toml, joints.home_joint_angles_rad, &mechanism)?;
     let encoders = encoders(toml, &raw.encoders, reduction, home)?;
     let weights = bodies::check(toml, raw.bodies.as_ref(), links_m, L::CONVENTION)?;
+    let dynamics = weights.and_then(|weights| weights.dynamics);
+    let simulation = |table| simulation::check(toml, table, dynamics, &encoders);
     Ok(ArmFile {
         kind: L::KIND,
         name: raw.name,
@@ -113,18 +115,13 @@ fn check<L: LinkageTable>(toml: &TomlText<'_>, raw: Raw<L>) -> Result<ArmFile, T
         mechanism,
         gimbal: raw.gimbal.as_ref().map(|table| gimbal::check(toml, table, &encoders)).transpose()?,
         buttons: gimbal::buttons(toml, raw.buttons.as_ref())?,
-        encoders,
         motors: motors(toml, &raw.motors, reduction)?,
         heat: heat(toml, &raw.motors)?,
         slew_n_per_s: toml.number(&raw.slew_n_per_s, SLEW)?,
         speed_limit_m_per_s: toml.number(&raw.speed_limit_m_per_s, SPEED)?,
         gravity: weights.map(|weights| weights.gravity),
-        simulation: match &raw.simulation {
-            Some(table) => {
-                Some(simulation::check(toml, table, weights.and_then(|weights| weights.dynamics))?)
-            }
-            None => None,
-        },
+        simulation: raw.simulation.as_ref().map(simulation).transpose()?,
+        encoders,
     })
 }
 

@@ -1,8 +1,14 @@
 //! The table `[simulation]`: what a simulated arm needs beyond what a driver does.
+//!
+//! Invariant: springs and dampers are so soft against the inertias that they act on that steps of [`STEP_S`](crate::sim::arm::STEP_S) follow
+//! them; nothing has no inertia. Numbers that are each allowed by themselves would else make a motion without end.
+
+mod swiftness;
 
 use serde::Deserialize;
 use toml::Spanned;
 
+use crate::encoders::EncoderSpec;
 use crate::sim::dynamics::Dynamics;
 use crate::sim::spec::{CableSpec, MotorPlantSpec, NoiseSpec, SimulationSpec};
 use crate::toml_report::{Allowed, SpannedList, TomlReport, TomlText};
@@ -46,11 +52,13 @@ struct Noise {
     current_a_rms: Spanned<f64>,
 }
 
-/// Nothing can be simulated that has no inertia, so `dynamics` has to be there.
+/// Nothing can be simulated that has no inertia, so `dynamics` has to be there. `encoders` have the arm's reductions and
+/// the pose in which its inertia is looked at.
 pub(super) fn check(
     toml: &TomlText<'_>,
     table: &Spanned<RawSimulation>,
     dynamics: Option<Dynamics>,
+    encoders: &EncoderSpec,
 ) -> Result<SimulationSpec, TomlReport> {
     let Some(dynamics) = dynamics else {
         let allowed = "only together with a table [bodies] that gives `inertia_a_kg_m2` and its four \
@@ -62,6 +70,12 @@ pub(super) fn check(
         ));
     };
     let raw = table.get_ref();
+    let spec = read(toml, raw, dynamics)?;
+    swiftness::check(toml, table, &spec, encoders)?;
+    Ok(spec)
+}
+
+fn read(toml: &TomlText<'_>, raw: &RawSimulation, dynamics: Dynamics) -> Result<SimulationSpec, TomlReport> {
     Ok(SimulationSpec {
         dynamics,
         coulomb_nm: toml.numbers(&raw.coulomb_friction_nm, COULOMB)?,

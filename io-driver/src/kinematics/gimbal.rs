@@ -18,7 +18,7 @@
 
 use super::{Kinematics, Premium, WoodenHaptics};
 use nalgebra::{UnitQuaternion, Vector3};
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Orientation in D of the link that carries the gimbal; at home that of D.
 pub fn carrier(kinematics: &Kinematics, joints_rad: [f64; 3]) -> UnitQuaternion<f64> {
@@ -46,6 +46,32 @@ pub fn angles(carrier: UnitQuaternion<f64>, orientation: UnitQuaternion<f64>) ->
         return [0.0, sin_pitch.signum() * FRAC_PI_2, (-r[(0, 1)]).atan2(r[(0, 0)])];
     }
     [r[(0, 2)].atan2(r[(2, 2)]), sin_pitch.asin(), r[(1, 0)].atan2(r[(1, 1)])]
+}
+
+/// The same for a gimbal that had the `former` angles a moment ago: its axes do not leap. Each may turn round and round, the
+/// pitch may go through a quarter turn, and at one the yaw stays what it was. Right while no axis turns by a quarter
+/// turn in that moment.
+pub fn angles_after(
+    former: [f64; 3],
+    carrier: UnitQuaternion<f64>,
+    orientation: UnitQuaternion<f64>,
+) -> [f64; 3] {
+    let [mut yaw, pitch, mut roll] = angles(carrier, orientation);
+    if pitch.abs() == FRAC_PI_2 {
+        (yaw, roll) = (former[0], roll + pitch.signum() * former[0]);
+    }
+    // Turning all three half a turn round, the pitch backwards, is the same orientation.
+    let [one, other] = [[yaw, pitch, roll], [yaw + PI, PI - pitch, roll + PI]].map(|a| unwound(a, former));
+    if distance(one, former) <= distance(other, former) { one } else { other }
+}
+
+/// The same directions, each within half a turn of the former angle.
+fn unwound(angles: [f64; 3], former: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| angles[i] + TAU * ((former[i] - angles[i]) / TAU).round())
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum()
 }
 
 fn about(axis: Vector3<f64>, angle_rad: f64) -> UnitQuaternion<f64> {
@@ -137,5 +163,31 @@ mod tests {
             // An arc sine next to a quarter turn has the square root of an ulp.
             assert!(turned.angle_to(&again) < 1e-7, "{angles:?}");
         }
+    }
+    /// Turns a gimbal in steps of `step` from `from`, and gives the largest error of the angles that are found one
+    /// after the other from nothing but the orientation.
+    fn largest_error(from: [f64; 3], step: [f64; 3], steps: i32) -> f64 {
+        let carrier = UnitQuaternion::from_euler_angles(0.3, -0.8, 0.2);
+        let mut found = angles(carrier, orientation(carrier, from));
+        let mut largest = 0.0_f64;
+        for n in 0..=steps {
+            let wanted = std::array::from_fn(|i| from[i] + step[i] * f64::from(n));
+            found = angles_after(found, carrier, orientation(carrier, wanted));
+            largest =
+                found.iter().zip(wanted).map(|(a, b): (&f64, f64)| (a - b).abs()).fold(largest, f64::max);
+        }
+        largest
+    }
+
+    #[test]
+    fn the_angles_of_a_gimbal_that_turns_go_on_without_a_leap() {
+        // Beside a quarter turn of pitch yaw and roll are the quotients of numbers that are as small as its cosine,
+        // and an arc sine has the square root of an ulp.
+        for (axis, step) in [([0.03, 0.0, 0.0], 700), ([0.0, 0.0, -0.03], 700), ([0.02, 0.001, -0.03], 700)] {
+            assert!(largest_error([0.5, -0.4, 0.2], axis, step) < 1e-6, "{axis:?}");
+        }
+        // Through a quarter turn, and exactly onto it.
+        assert!(largest_error([0.5, 0.0, 0.2], [0.0, FRAC_PI_2 / 100.0, 0.0], 150) < 1e-6);
+        assert!(largest_error([-0.5, 0.0, 0.2], [0.0, -FRAC_PI_2 / 100.0, 0.0], 150) < 1e-6);
     }
 }

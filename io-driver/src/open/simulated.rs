@@ -2,7 +2,7 @@
 
 #![allow(non_snake_case)] // Frames are capital letters: a point p_W is in the world.
 
-use super::{OpenError, arm_info, commissioned, holds_its_weight, mechanism, read, script};
+use super::{OpenError, arm_info, commissioned, has_switch, holds_its_weight, mechanism, read, script};
 use crate::config::{Backend, DeviceConfig, DriverConfig, HandChoice, ReplyMode, Wish};
 use crate::device::Device;
 use crate::device::arm::Arm;
@@ -56,7 +56,11 @@ pub(super) fn open(
     // Nobody shall take it for a real one.
     let info = DeviceInfo { kind: "simulated".into(), ..commissioned(arm_info(device, &file), config) };
     let arm = Arm::new(&file, holds_its_weight(device, config)).with_zeroing(device.zeroing);
-    Ok(Box::new(SimulatedDevice::new(info, arm, plant, holder, wish.base_in_world, latency(config))))
+    let opened = SimulatedDevice::new(info, arm, plant, holder, wish.base_in_world, latency(config));
+    if has_switch(device, config) && !opened.extras().buttons {
+        return Err(OpenError::NobodyPresses { device: device.name.clone() });
+    }
+    Ok(Box::new(opened))
 }
 
 /// Where the hand is at first, in W.

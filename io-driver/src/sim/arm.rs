@@ -87,6 +87,8 @@ pub struct SimulatedArm {
     motors: [MotorPlant; 3],
     encoders: EncoderPlant,
     gimbal: Option<EncoderPlant>,
+    /// The gimbal's angles when it was read last (rad); its axes do not leap.
+    gimbal_rad: Option<[f64; 3]>,
     friction: JointFriction,
     noise: SplitMix64,
     links: Seen,
@@ -140,6 +142,12 @@ impl Seen {
 }
 
 impl Motion {
+    /// In the middle of a step, where it has these rates. The angles go by the rates of the beginning: with better
+    /// ones the rule would not keep the area of phase space.
+    fn midway(self, rates: Vector3<f64>, dt_s: f64) -> Self {
+        Self { angles: self.angles + self.rates * (0.5 * dt_s), rates }
+    }
+
     /// After a step that ends with these rates, and changed them evenly.
     fn arriving(self, rates: Vector3<f64>, dt_s: f64) -> Self {
         Self { angles: self.angles + 0.5 * (self.rates + rates) * dt_s, rates }
@@ -166,12 +174,13 @@ impl SimulatedArm {
             motors: std::array::from_fn(|_| motor.clone()),
             encoders: EncoderPlant::new(&file.encoders, spec.noise.encoder_counts_rms),
             gimbal: file.gimbal.as_ref().map(|gimbal| EncoderPlant::new(gimbal, 0.0)),
+            gimbal_rad: None,
             friction: JointFriction::new(spec.coulomb_nm),
             noise: SplitMix64::new(seed),
             links: Seen::of(&spec, &file.mechanism, &limits, rest),
             shafts: rest,
             current_noise_a: [0.0; 3],
-            silent_s: 0.0,
+            silent_s: f64::NEG_INFINITY,
             is_tripped: false,
         })
     }
@@ -214,7 +223,12 @@ impl SimulatedArm {
     pub fn gimbal_counters(&mut self, orientation: UnitQuaternion<f64>) -> Option<[i64; 3]> {
         let carrier = gimbal::carrier(&self.kinematics, self.links.motion.angles.into());
         let encoders = self.gimbal.as_ref()?;
-        Some(encoders.raw(gimbal::angles(carrier, orientation), &mut self.noise))
+        let angles = match self.gimbal_rad {
+            None => gimbal::angles(carrier, orientation),
+            Some(former) => gimbal::angles_after(former, carrier, orientation),
+        };
+        self.gimbal_rad = Some(angles);
+        Some(encoders.raw(angles, &mut self.noise))
     }
 
     /// Whether there is an instrumented gimbal.
@@ -305,7 +319,7 @@ impl SimulatedArm {
         let (links, shafts) = (self.links.motion, self.shafts);
         let rotors = Matrix3::from_diagonal(&self.rotors);
         let [of_links, of_shafts] = self.elastic(cable, &self.links, shafts, drive, hand);
-        let half_links = self.see(links.arriving(links.rates + of_links * (0.5 * dt_s), 0.5 * dt_s));
+        let half_links = self.see(links.midway(links.rates + of_links * (0.5 * dt_s), dt_s));
         let half_shafts = self.half(shafts, of_shafts, &rotors, dt_s);
         let [of_links, of_shafts] = self.elastic(cable, &half_links, half_shafts, drive, hand);
         let free = shafts.rates + of_shafts * dt_s;
@@ -318,7 +332,7 @@ impl SimulatedArm {
     fn half(&self, begin: Motion, acceleration: Vector3<f64>, inertia: &Matrix3<f64>, dt_s: f64) -> Motion {
         let free = begin.rates + acceleration * (0.5 * dt_s);
         let mut friction = self.friction;
-        begin.arriving(free + friction.hold(inertia, free, 0.5 * dt_s), 0.5 * dt_s)
+        begin.midway(free + friction.hold(inertia, free, 0.5 * dt_s), dt_s)
     }
 
     fn see(&self, motion: Motion) -> Seen {

@@ -39,11 +39,9 @@ fn some_moments_of_inertia_are_no_moments() {
     assert!(message.contains(expected), "{message}");
 }
 
-#[test]
-fn cable_and_noise_are_there_if_the_file_has_them() {
-    let without = premium().simulation.unwrap();
-    assert_eq!((without.cable, without.noise), (None, Default::default()));
-    let uncommented: String = PREMIUM
+/// With the tables that are comments in the built-in file.
+fn uncommented() -> String {
+    PREMIUM
         .lines()
         .map(|line| match line.strip_prefix("# ") {
             Some(key) if key.starts_with("[simulation.") || key.contains("_rms = ") => key,
@@ -51,7 +49,14 @@ fn cable_and_noise_are_there_if_the_file_has_them() {
             _ => line,
         })
         .flat_map(|line| [line, "\n"])
-        .collect();
+        .collect()
+}
+
+#[test]
+fn cable_and_noise_are_there_if_the_file_has_them() {
+    let without = premium().simulation.unwrap();
+    assert_eq!((without.cable, without.noise), (None, Default::default()));
+    let uncommented = uncommented();
     let with = arm(&uncommented).simulation.unwrap();
     assert_eq!(with.cable.unwrap().stiffness_nm_per_rad, [160.0, 160.0, 100.0]);
     assert_eq!((with.noise.encoder_counts_rms, with.noise.current_a_rms), (0.1, 0.003));
@@ -59,4 +64,61 @@ fn cable_and_noise_are_there_if_the_file_has_them() {
     assert!(message.contains("`simulation.cable.damping_nm_s[2]`: found -1, allowed: 0 to 100"), "{message}");
     let message = message_of(&uncommented, "[simulation.noise]", "encoder_counts_rms", "1000");
     assert!(message.contains("`simulation.noise.encoder_counts_rms`: found 1000"), "{message}");
+}
+
+#[test]
+fn what_no_step_of_the_simulation_could_follow_is_refused() {
+    let cable = uncommented();
+    for (text, table, key, value, words) in [
+        (
+            PREMIUM,
+            "[simulation]",
+            "stop_stiffness_nm_per_rad",
+            "1e5",
+            "stop_stiffness_nm_per_rad`: found 100000",
+        ),
+        (PREMIUM, "[simulation]", "stop_damping_nm_s", "50", "stop_damping_nm_s`: found 50"),
+        (
+            PREMIUM,
+            "[simulation]",
+            "viscous_friction_nm_s",
+            "[0, 0, 30]",
+            "viscous_friction_nm_s[2]`: found 30",
+        ),
+        (
+            &cable,
+            "[simulation.cable]",
+            "stiffness_nm_per_rad",
+            "[1, 2e4, 1]",
+            "stiffness_nm_per_rad[1]`: found 20000",
+        ),
+        (&cable, "[simulation.cable]", "damping_nm_s", "[0, 0, 5]", "damping_nm_s[2]`: found 5"),
+    ] {
+        let message = message_of(text, table, key, value);
+        assert!(
+            message.contains(words) && message.contains("which steps of 62.5 us can follow"),
+            "{message}"
+        );
+    }
+    let message = message_of(&cable, "[simulation.motor]", "rotor_inertia_kg_m2", "0");
+    assert!(message.contains("rotor_inertia_kg_m2`: found 0, allowed: more than 0"), "{message}");
+}
+
+#[test]
+fn an_arm_without_inertia_is_refused() {
+    let mut text = PREMIUM.replace("rotor_inertia_kg_m2 = 10.3e-7", "rotor_inertia_kg_m2 = 0");
+    assert!(parse(&text).is_ok(), "that of the links is enough");
+    for body in ["a", "c", "be", "df"] {
+        let line =
+            text.lines().find(|line| line.starts_with(&format!("inertia_{body}_kg_m2"))).unwrap().to_owned();
+        text = text.replace(&line, &format!("inertia_{body}_kg_m2 = [0, 0, 0]"));
+    }
+    let line = text.lines().find(|line| line.starts_with("inertia_base_yy_kg_m2")).unwrap().to_owned();
+    text = text.replace(&line, "inertia_base_yy_kg_m2 = 0");
+    assert!(parse(&text).is_ok(), "masses on levers are inertia, too");
+    for mass in ["mass_a_kg = 0.0202", "mass_c_kg = 0.0249"] {
+        text = text.replace(mass, &format!("{} 0", &mass[..11]));
+    }
+    let message = parse(&text).unwrap_err().to_string();
+    assert!(message.contains("`simulation`: found an arm that has no inertia"), "{message}");
 }
