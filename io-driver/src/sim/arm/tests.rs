@@ -92,7 +92,7 @@ fn an_arm_that_swings_on_a_stiff_spring_swings_on() {
     let mut arm = thrown(&file, [0.0; 3], [0.2, 0.3, -0.4]);
     let stiffness = 20e3;
     let of_all = |arm: &SimulatedArm| energy(arm) + 0.5 * stiffness * arm.truth().tip.norm_squared();
-    let motion = 0.5 * arm.links.rates.dot(&(arm.inertia(arm.links.angles) * arm.links.rates));
+    let motion = 0.5 * arm.shafts.rates.dot(&(arm.inertia(&arm.links) * arm.shafts.rates));
     let before = of_all(&arm);
     let mut largest = 0.0_f64;
     for _ in 0..3000 {
