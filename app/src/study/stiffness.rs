@@ -92,6 +92,7 @@ pub fn execute(args: &StiffnessArgs, signals: &StopSignals) -> Result<Stop, RunF
     let cases = case::all(&args.modes, &args.rates, &args.dampings, &args.hands);
     for case in &cases {
         // Whatever is wrong with the arguments is said before the first long run.
+        bench.hand_model(case)?;
         bench.open(case, search::LEAST_N_PER_M).map_err(|error| start(&error))?;
     }
     std::fs::create_dir_all(&args.out)

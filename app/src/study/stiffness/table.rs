@@ -18,15 +18,22 @@ pub struct TableError {
 
 /// What the columns mean and why they differ.
 const EXPLANATION: &str = "\
-largest   stiffness (N/m) up to which every wall that was tried was quiet 2 s after the push: no counter moves by 2
-linear    the sampled linear loop of this arm and hand, without friction and encoder steps
-damped    (b + b1 + B) / (T/2 + td): phase against all damping there is; a rule of thumb
-passive   2 (b - B) / T: quiet under any hand whatever; 0: the wall damps more than the arm
-friction  2 f_c / count: below it friction takes more than an encoder's step gives
-Where `largest` is above `linear`, friction holds what the loop would blow up: 40 mN on a step of 0.03 mm. Where it is
-below, encoder steps, the wall's end (it only pushes) and the limits of amplifier and driver keep an oscillation of
-some counts alive that the linear loop knows nothing of. `passive` asks for more than this one hand; `damped` takes
-the grasp's damper for a rigid one.
+All in N/m; each is the largest below the first that fails, within 1 %.
+settled   no counter moves by two counts or more from 2 s after the push on
+quiet     and none flickers between two counts, either
+linear    the sampled linear loop of this arm and this hand, without friction and encoder steps
+damped    (b + b1 + B) / (T/2 + td): the phase that holding and delay cost, against all damping; a rule of thumb
+passive   2 (b - B) / T: passive under any hand whatever; 0: the wall damps more than the arm
+friction  2 f_c / count: below it friction takes more than a step of the encoder gives
+
+Why they differ. `settled` is above `linear`, because friction holds what the loop would blow up: up to an amplitude
+of 4 f_c / (pi w b'), with b' the damping that is missing, which is about a count here. Without friction and encoder
+steps the simulation ends where `linear` does. `quiet` hardly depends on rate and delay: what flickers is a single
+count, whose force, stiffness times count, has to move the arm against friction both ways; `friction` promises
+that it cannot, and this arm stands about twice as much, as it depends on where between two counts it comes to rest. `passive` has to
+hold for every hand and has nothing but the arm's own damping; `damped` takes the grasp for a damper to the ground. Wall
+damping helps the linear loop, with the plain difference for a velocity, more than the system, whose estimate is
+calmer and some milliseconds late.
 ";
 
 /// For people.

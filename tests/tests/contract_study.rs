@@ -1,0 +1,84 @@
+//! `phantom3 study stiffness` as somebody meets it who has a question about the system.
+
+use rustix::process::{Pid, Signal, kill_process};
+use std::time::Duration;
+use system_tests::workplace::{Running, Workplace};
+
+const SMALL: [&str; 10] = [
+    "study",
+    "stiffness",
+    "--rates",
+    "1000",
+    "--modes",
+    "same-tick,next-tick",
+    "--dampings",
+    "0",
+    "--hands",
+    "pen-grip:light",
+];
+
+#[test]
+fn a_study_writes_table_csv_and_pictures_that_are_the_same_every_time() {
+    let place = Workplace::new();
+    let first = place.run([&SMALL[..], &["--out", "a", "--jobs", "2"]].concat());
+    assert_eq!(first.status, Some(0), "{}", first.err);
+    for word in ["settled", "quiet", "linear", "passive", "friction", "Why they differ", "a/stiffness.csv"] {
+        assert!(first.out.contains(word), "no `{word}` in:\n{}", first.out);
+    }
+    assert_eq!(place.run([&SMALL[..], &["--out", "b", "--jobs", "1"]].concat()).status, Some(0));
+    let read = |name: &str| std::fs::read(place.path(name)).expect(name);
+    for name in ["stiffness.csv", "stiffness.svg", "stiffness.png"] {
+        assert_eq!(read(&format!("a/{name}")), read(&format!("b/{name}")), "{name}");
+    }
+    let csv = String::from_utf8(read("a/stiffness.csv")).expect("text");
+    let mut lines = csv.lines();
+    let head: Vec<&str> = lines.next().expect("a header").split(',').collect();
+    let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows.len(), 2, "{csv}");
+    let number = |row: &[&str], name: &str| -> f64 {
+        row[head.iter().position(|column| *column == name).expect(name)].parse().expect("a number")
+    };
+    let settled: Vec<f64> = rows.iter().map(|row| number(row, "settled_n_per_m")).collect();
+    assert!(settled[0] > 1.5 * settled[1], "a tick of delay costs stiffness: {csv}");
+    assert!(rows.iter().all(|row| number(row, "linear_n_per_m") > number(row, "passive_n_per_m")), "{csv}");
+}
+
+#[test]
+fn whatever_is_wrong_is_told_before_the_first_trial() {
+    let place = Workplace::new();
+    place.write("a-file", "");
+    place.write("ideal.toml", "kind = \"ideal\"\nname = \"x\"\n");
+    let cases: [(&[&str], &[&str]); 9] = [
+        (&["--hands", "fist"], &["fist", "pen-grip", "fingertip"]),
+        (&["--hands", "pen-grip:hard"], &["hard", "light, usual, firm"]),
+        (&["--device", "omni"], &["omni", "premium-1.5", "wooden-haptics"]),
+        (&["--device", "ideal.toml"], &["ideal.toml", "nothing to simulate", "premium-1.5"]),
+        (&["--rates", "1"], &["found 1, allowed: 100 to 20000 Hz"]),
+        (&["--dampings", "nan"], &["found nan", "0 to 100 N s/m"]),
+        (&["--modes", "never"], &["never", "same-tick", "fixed-phase", "next-tick"]),
+        (&["--push-mm", "0"], &["found 0, allowed: 0.01 to 20 mm"]),
+        (&["--out", "a-file"], &["cannot make the directory a-file"]),
+    ];
+    for (arguments, words) in cases {
+        let said = place.run([&SMALL[..2], arguments].concat());
+        assert_eq!(said.status, Some(2), "{arguments:?}: {}", said.err);
+        for word in words {
+            assert!(said.err.contains(word), "{arguments:?} does not say `{word}`: {}", said.err);
+        }
+        assert!(!place.path("study-stiffness").exists(), "{arguments:?}");
+    }
+}
+
+#[test]
+fn ctrl_c_ends_a_study() {
+    let place = Workplace::new();
+    let mut program = place.phantom3();
+    program.args(["study", "stiffness"]);
+    let running = Running::start(program);
+    // By then it searches, or it is about to: either way it ends.
+    std::thread::sleep(Duration::from_millis(500));
+    kill_process(Pid::from_child(&running.child), Signal::INT).expect("it runs");
+    let said = running.wait();
+    assert_eq!(said.status, Some(130), "{}", said.err);
+    assert!(said.err.contains("ended by signal 2"), "{}", said.err);
+}
