@@ -256,10 +256,8 @@ impl SimulatedArm {
 
     /// Goes on by `dt_s`, in equal steps.
     pub fn advance(&mut self, dt_s: f64, hand: &mut impl TipLoad) {
-        if !(dt_s > 0.0) {
-            return;
-        }
-        let dt_s = dt_s.min(LONGEST_S);
+        // What is not a number is no time, either.
+        let dt_s = if dt_s > 0.0 { dt_s.min(LONGEST_S) } else { return };
         let steps = (dt_s / STEP_S * (1.0 - 1e-9)).ceil().max(1.0);
         for _ in 0..steps as u32 {
             self.step(dt_s / steps, hand);
