@@ -24,7 +24,10 @@ fn wrong_words_are_refused_with_what_was_found_and_what_is_allowed() {
         (&["--description", "nowhere.toml"], "cannot read nowhere.toml"),
         (&["--trace", "t.csv", "--yield", "1"], "cannot be used with"),
         (&["--simulated", "--yield", "1"], "cannot be used with"),
-        (&["--simulated", "--hold", "1,0,0"], "the hand begins at [1.0, 0.0, 0.0] m, which the arm does not reach"),
+        (
+            &["--simulated", "--hold", "1,0,0"],
+            "the hand begins at [1.0, 0.0, 0.0] m, which the arm does not reach",
+        ),
         (&["--simulated", "--hold", "1,0"], "found 1,0, allowed: three numbers of metres"),
         (&["--simulated", "--firmness", "weak"], "found weak, allowed: light, usual, firm"),
         (&["--simulated", "--hand-model", "none"], "cannot read none"),

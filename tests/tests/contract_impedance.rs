@@ -118,7 +118,8 @@ fn the_tip_lags_behind_the_wish_and_settles_on_it_within_what_friction_holds() {
 #[test]
 fn what_is_applied_is_what_was_computed_but_for_the_converters_steps() {
     let samples = felt(TABLE, &pressing(), "virtual", &[]);
-    let largest = samples.iter().map(|s| (s.applied - s.force).abs()).fold(Vector3::zeros(), |a, b| a.sup(&b));
+    let largest =
+        samples.iter().map(|s| (s.applied - s.force).abs()).fold(Vector3::zeros(), |a, b| a.sup(&b));
     println!("{largest:?}");
     // Off home the levers differ by some percent, and a force has a share on each joint.
     let step = Vector3::from(HALF_CODE_N).norm() * 1.2;
@@ -166,7 +167,12 @@ fn hands_and_devices_of_other_kinds_are_simulated() {
     model = model.replace("name = \"Pen grip\"", "name = \"Mine\"");
     let place = workplace(TABLE, &pressing());
     place.write("mine.toml", model);
-    record(&place, "real", "out.csv", &["--hand", "hand.csv", "--hand-model", "mine.toml", "--seconds", "0.2"]);
+    record(
+        &place,
+        "real",
+        "out.csv",
+        &["--hand", "hand.csv", "--hand-model", "mine.toml", "--seconds", "0.2"],
+    );
 }
 
 #[test]
@@ -194,7 +200,10 @@ fn eight_fingers_run() {
         for finger in 0..8 {
             let hip = table.finger(&format!("f{finger}"))[499].hip;
             // It rests on the table's surface, where its hand is.
-            assert!((hip - Vector3::new(0.02 * f64::from(finger), 0.1, 0.0)).norm() < 2e-3, "{finger}: {hip}");
+            assert!(
+                (hip - Vector3::new(0.02 * f64::from(finger), 0.1, 0.0)).norm() < 2e-3,
+                "{finger}: {hip}"
+            );
         }
     }
 }

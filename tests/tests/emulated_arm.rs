@@ -224,7 +224,8 @@ fn a_counter_with_the_wrong_sign_is_found_before_any_motor_is_tried() {
     describe_otherwise(&mut stand, "[encoders]", "sign = [1, 1, 1]", "sign = [-1, 1, 1]");
     let end = commission(&stand);
     assert_eq!(end.status, Some(3), "{end:?}");
-    let words = "to the right (x): WRONG, it was counted the other way; change the `sign` of the first counter";
+    let words =
+        "to the right (x): WRONG, it was counted the other way; change the `sign` of the first counter";
     assert!(end.out.contains(words) && end.out.contains("up (y): right"), "{end:?}");
     assert_eq!(stand.finish().tally.energised, 0, "no motor was tried");
 }
@@ -271,7 +272,8 @@ fn a_hand_file_moves_the_arm_and_presses_its_buttons() {
         "t,f0_x,f0_y,f0_z,f1_x,f1_y,f1_z,f1_buttons\n0,0,0,0,0,0,0,0\n1,0,0,0,0.05,0.02,0,2\n2,0,0,0,0.05,0.02,0,2\n",
     )
     .expect("a hand file");
-    let arguments = ["--hand", file.to_str().expect("text"), "--finger", "f1"].map(|word| &*word.to_owned().leak());
+    let arguments =
+        ["--hand", file.to_str().expect("text"), "--finger", "f1"].map(|word| &*word.to_owned().leak());
     let stand = stand_with(Setup { emulator: arguments.to_vec(), ..Setup::new("real") });
     // Within friction and weight of where the file leaves it, sideways 65 N/m.
     let end = Vector3::new(0.05, 0.02, 0.0);

@@ -98,7 +98,8 @@ fn a_driver_lives_through_everything_under_the_filter_and_ends_in_order() {
 }
 
 /// A device that this process simulates moves between the calls and makes none.
-const SIMULATED: &str = "[[device]]\nbackend = \"simulated\"\ndescription = \"premium-1.5\"\ngravity_compensation = true\n";
+const SIMULATED: &str =
+    "[[device]]\nbackend = \"simulated\"\ndescription = \"premium-1.5\"\ngravity_compensation = true\n";
 
 #[test]
 fn a_driver_that_simulates_its_arms_needs_no_call_that_others_do_not() {

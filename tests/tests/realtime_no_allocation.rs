@@ -106,9 +106,12 @@ fn simulated(directory: &Path) -> String {
     let file = directory.join("slip.toml");
     std::fs::write(&file, model).unwrap();
     let device = |arm: &str, hand: &str| {
-        format!("[[device]]\nbackend = \"simulated\"\ndescription = \"{arm}\"\nhand_model = {hand:?}\ngravity_compensation = true\n")
+        format!(
+            "[[device]]\nbackend = \"simulated\"\ndescription = \"{arm}\"\nhand_model = {hand:?}\ngravity_compensation = true\n"
+        )
     };
-    let hands = [("premium-1.5", file.to_str().unwrap()), ("wooden-haptics", "fingertip"), ("premium-1.5", "nobody")];
+    let hands =
+        [("premium-1.5", file.to_str().unwrap()), ("wooden-haptics", "fingertip"), ("premium-1.5", "nobody")];
     hands.map(|(arm, hand)| device(arm, hand)).concat()
 }
 

@@ -283,8 +283,7 @@ fn the_loops_of_both_programs_fault_no_page_once_warm() {
 }
 
 const IDEAL: &str = "backend = \"ideal\"";
-const SIMULATED: &str =
-    "backend = \"simulated\"\ndescription = \"premium-1.5\"\ngravity_compensation = true";
+const SIMULATED: &str = "backend = \"simulated\"\ndescription = \"premium-1.5\"\ngravity_compensation = true";
 
 /// The default scene and hand, with as much of the usual set-up as there are rights for.
 fn both_programs(lock: bool, backend: &str) -> (Driver, Child) {

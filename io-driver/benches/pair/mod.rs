@@ -43,7 +43,8 @@ impl Pair {
     /// The same at another rate (Hz).
     pub(crate) fn at_rate(rate_hz: u32, device: &str, count: usize) -> Self {
         let file = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../config/driver/bench.toml"));
-        let config = DriverConfig::parse(&format!("rate_hz = {rate_hz}\n{}", device.repeat(count)), file).expect("a configuration");
+        let config = DriverConfig::parse(&format!("rate_hz = {rate_hz}\n{}", device.repeat(count)), file)
+            .expect("a configuration");
         let devices = open_devices(&config).expect("devices");
         let info = describe(&config, &devices, WaitMode::Spin);
         let memory = Arc::new(DriverMemory::create(&info).expect("memory"));

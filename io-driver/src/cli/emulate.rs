@@ -181,7 +181,9 @@ fn script(file: &Path, finger: &str) -> Result<(HandScript, usize), Box<dyn Erro
         // What is wrong with the file comes before a finger that is not in it.
         None => Err(match HandScript::parse(&text, file, &named) {
             Err(error) if !named.is_empty() => error.into(),
-            _ => format!("{}: no finger {finger}; --finger one of {}", file.display(), named.join(", ")).into(),
+            _ => {
+                format!("{}: no finger {finger}; --finger one of {}", file.display(), named.join(", ")).into()
+            }
         }),
     }
 }
@@ -192,7 +194,10 @@ fn hand_model(args: &HolderArgs) -> Result<Option<HandModel>, Box<dyn Error>> {
         _ if name == "nobody" => return Ok(None),
         Some(text) => text.to_owned(),
         None => read(file).map_err(|error| {
-            format!("{error}; name a hand's model, or one of {}, nobody", model_file::BUILTIN_NAMES.join(", "))
+            format!(
+                "{error}; name a hand's model, or one of {}, nobody",
+                model_file::BUILTIN_NAMES.join(", ")
+            )
         })?,
     };
     let mut model = model_file::parse(&text, file, args.firmness)?;
@@ -209,7 +214,9 @@ fn parse_firmness(text: &str) -> Result<Firmness, String> {
 fn parse_place(text: &str) -> Result<Place, String> {
     let numbers: Vec<f64> = text.split(',').map_while(|part| part.trim().parse().ok()).collect();
     match <[f64; 3]>::try_from(numbers) {
-        Ok(place) if text.matches(',').count() == 2 && place.iter().all(|c| c.is_finite()) => Ok(Place(place)),
+        Ok(place) if text.matches(',').count() == 2 && place.iter().all(|c| c.is_finite()) => {
+            Ok(Place(place))
+        }
         _ => Err(format!("found {text}, allowed: three numbers of metres, as in 0.0,0.05,-0.02")),
     }
 }

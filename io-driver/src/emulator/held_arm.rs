@@ -42,10 +42,14 @@ pub struct HeldArm {
 #[derive(Debug, Error)]
 pub enum HeldArmError {
     /// The description is for real devices only.
-    #[error("the description says nothing of how the arm moves; it needs the table [simulation], as premium-1.5 has it")]
+    #[error(
+        "the description says nothing of how the arm moves; it needs the table [simulation], as premium-1.5 has it"
+    )]
     NoSimulation,
     /// It does not reach there.
-    #[error("the hand begins at {at_m:?} m, which the arm does not reach: {why}; choose a place in its workspace")]
+    #[error(
+        "the hand begins at {at_m:?} m, which the arm does not reach: {why}; choose a place in its workspace"
+    )]
     OutOfReach {
         /// Where.
         at_m: [f64; 3],
@@ -172,9 +176,12 @@ mod tests {
     }
 
     fn pen() -> HandModel {
-        let mut model =
-            model_file::parse(model_file::builtin("pen-grip").unwrap(), Path::new("pen-grip"), Firmness::Usual)
-                .unwrap();
+        let mut model = model_file::parse(
+            model_file::builtin("pen-grip").unwrap(),
+            Path::new("pen-grip"),
+            Firmness::Usual,
+        )
+        .unwrap();
         model.tremor.rms_m = Vector3::zeros();
         model
     }

@@ -92,6 +92,8 @@ pub struct SimulatedArm {
     links: Motion,
     /// The rotors' own motion, in joint angles; that of the links while cables are rigid.
     shafts: Motion,
+    /// Where the links have the tip (m).
+    tip: Vector3<f64>,
     current_noise_a: [f64; 3],
     silent_s: f64,
     is_tripped: bool,
@@ -134,6 +136,7 @@ impl SimulatedArm {
             noise: SplitMix64::new(seed),
             links: rest,
             shafts: rest,
+            tip: file.mechanism.forward(joints),
             current_noise_a: [0.0; 3],
             silent_s: 0.0,
             is_tripped: false,
@@ -197,7 +200,7 @@ impl SimulatedArm {
         Truth {
             joints,
             rates: self.links.rates.into(),
-            tip: self.kinematics.forward(joints),
+            tip: self.tip,
             tip_velocity: self.kinematics.jacobian(joints) * self.links.rates,
             current_a: std::array::from_fn(|joint| self.motors[joint].current_a()),
             motor_heat: self.motors.iter().map(MotorPlant::rise).fold(0.0, f64::max),
@@ -206,7 +209,7 @@ impl SimulatedArm {
 
     /// Goes on by `dt_s`, in equal steps.
     pub fn advance(&mut self, dt_s: f64, hand: &mut impl TipLoad) {
-        if !(dt_s > 0.0) {
+        if dt_s.is_nan() || dt_s <= 0.0 {
             return;
         }
         let dt_s = dt_s.min(LONGEST_S);
@@ -235,13 +238,12 @@ impl SimulatedArm {
 
     fn step(&mut self, dt_s: f64, hand: &mut impl TipLoad) {
         let drive = self.turn_motors(dt_s);
-        let tip = self.kinematics.forward(self.links.angles.into());
         match self.spec.cable {
             None => self.step_rigid(drive, dt_s, hand),
             Some(cable) => self.step_elastic(&cable, drive, dt_s, hand),
         }
-        let moved = self.kinematics.forward(self.links.angles.into()) - tip;
-        hand.advance(tip, moved / dt_s, dt_s);
+        let tip = std::mem::replace(&mut self.tip, self.kinematics.forward(self.links.angles.into()));
+        hand.advance(tip, (self.tip - tip) / dt_s, dt_s);
     }
 
     /// The motors' torques on their joints (N m).
@@ -258,9 +260,11 @@ impl SimulatedArm {
     fn step_rigid(&mut self, drive: Vector3<f64>, dt_s: f64, hand: &impl TipLoad) {
         let begin = self.links;
         let inertia = self.inertia(begin.angles);
-        let half = self.half(begin, self.accelerations(begin, drive, hand), &inertia, dt_s);
-        let free = begin.rates + self.accelerations(half, drive, hand) * dt_s;
-        let held = self.friction.hold(&self.inertia(half.angles), free, dt_s);
+        let at_begin = self.accelerations(begin, self.tip, &inertia, drive, hand);
+        let half = self.half(begin, at_begin, &inertia, dt_s);
+        let (inertia, tip) = (self.inertia(half.angles), self.kinematics.forward(half.angles.into()));
+        let free = begin.rates + self.accelerations(half, tip, &inertia, drive, hand) * dt_s;
+        let held = self.friction.hold(&inertia, free, dt_s);
         self.links = begin.arriving(free + held, dt_s);
         self.shafts = self.links;
     }
@@ -268,10 +272,11 @@ impl SimulatedArm {
     fn step_elastic(&mut self, cable: &CableSpec, drive: Vector3<f64>, dt_s: f64, hand: &impl TipLoad) {
         let (links, shafts) = (self.links, self.shafts);
         let rotors = Matrix3::from_diagonal(&self.rotors);
-        let [of_links, of_shafts] = self.elastic(cable, links, shafts, drive, hand);
+        let [of_links, of_shafts] = self.elastic(cable, links, self.tip, shafts, drive, hand);
         let half_links = links.arriving(links.rates + of_links * (0.5 * dt_s), 0.5 * dt_s);
         let half_shafts = self.half(shafts, of_shafts, &rotors, dt_s);
-        let [of_links, of_shafts] = self.elastic(cable, half_links, half_shafts, drive, hand);
+        let tip = self.kinematics.forward(half_links.angles.into());
+        let [of_links, of_shafts] = self.elastic(cable, half_links, tip, half_shafts, drive, hand);
         let free = shafts.rates + of_shafts * dt_s;
         let held = self.friction.hold(&rotors, free, dt_s);
         self.links = links.arriving(links.rates + of_links * dt_s, dt_s);
@@ -289,10 +294,17 @@ impl SimulatedArm {
         self.spec.dynamics.mass_matrix(angles.into()) + Matrix3::from_diagonal(&self.rotors)
     }
 
-    fn accelerations(&self, motion: Motion, drive: Vector3<f64>, hand: &impl TipLoad) -> Vector3<f64> {
+    fn accelerations(
+        &self,
+        motion: Motion,
+        tip: Vector3<f64>,
+        inertia: &Matrix3<f64>,
+        drive: Vector3<f64>,
+        hand: &impl TipLoad,
+    ) -> Vector3<f64> {
         let viscous = Vector3::from(self.spec.viscous_nm_s).component_mul(&motion.rates);
-        let torque = drive - viscous + self.torque_on_links(motion, hand);
-        solve(&self.inertia(motion.angles), torque)
+        let torque = drive - viscous + self.torque_on_links(motion, tip, hand);
+        solve(inertia, torque)
     }
 
     /// Of links and of shafts.
@@ -300,6 +312,7 @@ impl SimulatedArm {
         &self,
         cable: &CableSpec,
         links: Motion,
+        tip: Vector3<f64>,
         shafts: Motion,
         drive: Vector3<f64>,
         hand: &impl TipLoad,
@@ -308,15 +321,15 @@ impl SimulatedArm {
             + Vector3::from(cable.damping_nm_s).component_mul(&(shafts.rates - links.rates));
         let viscous = Vector3::from(self.spec.viscous_nm_s).component_mul(&shafts.rates);
         let mass = self.spec.dynamics.mass_matrix(links.angles.into());
-        let of_links = solve(&mass, pull + self.torque_on_links(links, hand));
+        let of_links = solve(&mass, pull + self.torque_on_links(links, tip, hand));
         [of_links, (drive - viscous - pull).component_div(&self.rotors)]
     }
 
     /// Weight, Coriolis and centrifugal torques, stops, and the hand.
-    fn torque_on_links(&self, motion: Motion, hand: &impl TipLoad) -> Vector3<f64> {
+    fn torque_on_links(&self, motion: Motion, tip: Vector3<f64>, hand: &impl TipLoad) -> Vector3<f64> {
         let joints = motion.angles.into();
         let jacobian = self.kinematics.jacobian(joints);
-        let force = hand.force_on_tip(self.kinematics.forward(joints), jacobian * motion.rates);
+        let force = hand.force_on_tip(tip, jacobian * motion.rates);
         let coriolis = self.spec.dynamics.coriolis(joints, motion.rates.into()) * motion.rates;
         let weight = Vector3::from(self.spec.dynamics.holding_torque(joints));
         jacobian.tr_mul(&force) - coriolis - weight + self.stops(motion)

@@ -37,8 +37,13 @@ impl JointFriction {
         let mut p = self.impulse;
         p.x = (-rates.x / w11).clamp(-most[0], most[0]);
         for _ in 0..ITERATIONS {
+            let before = p;
             p.y = (-(rates.y + w23 * p.z) / w22).clamp(-most[1], most[1]);
             p.z = (-(rates.z + w23 * p.y) / w33).clamp(-most[2], most[2]);
+            // Further rounds would find the same: soon so for joints that slide, or rest as in the step before.
+            if p == before {
+                break;
+            }
         }
         self.impulse = p;
         Vector3::new(w11 * p.x, w22 * p.y + w23 * p.z, w23 * p.y + w33 * p.z)
