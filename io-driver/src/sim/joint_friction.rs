@@ -5,7 +5,7 @@
 //! are sought together, by projected Gauss-Seidel, beginning with the last step's.
 //! Invariants: no joint gets more than its friction has; a joint whose needed impulse is within is stopped dead, so
 //! that an arm which sticks does not creep; friction never speeds the arm up.
-//! Cost: [`ITERATIONS`] rounds of three joints. The coupling of the last two joints is at most a third of the mean
+//! Cost: at most eight rounds of three joints. The coupling of the last two joints is at most a third of the mean
 //! of their inertias, so each round leaves a ninth of the error: eight rounds leave 2e-8.
 //! Reference: Moreau's impulses, as in Anitescu and Potra, Nonlinear Dynamics 14, 1997.
 
