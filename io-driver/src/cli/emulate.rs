@@ -14,7 +14,7 @@ use crate::sim::hand::HandModel;
 use crate::sim::hand::model_file::{self, Firmness};
 use crate::sim::script::{HandPlayer, HandScript};
 use clap::Args;
-use nalgebra::Vector3;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use rt_core::signals::StopSignals;
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -80,6 +80,9 @@ struct HolderArgs {
     /// Which finger of that file it is
     #[arg(long, value_name = "NAME", default_value = "f0", requires = "hand")]
     finger: String,
+    /// How the base stands in the world, as `base_orientation_wxyz` of the driver's configuration says [default: upright]
+    #[arg(long, value_name = "W,X,Y,Z", value_parser = parse_orientation, allow_negative_numbers = true, requires = "simulated")]
+    base_orientation: Option<UnitQuaternion<f64>>,
     /// Seed of tremor and noise
     #[arg(long, value_name = "N", default_value_t = 0, requires = "simulated")]
     seed: u64,
@@ -167,7 +170,8 @@ fn simulated(args: &HolderArgs, arm: &ArmFile) -> Result<(Motion, String), Box<d
     };
     let model = hand_model(args)?;
     let held_by = model.as_ref().map_or_else(|| "nobody".to_owned(), |model| model.name.clone());
-    let held = HeldArm::new(arm, wish, model.as_ref(), args.seed)?;
+    let arm = arm.clone().in_base(&args.base_orientation.unwrap_or_default());
+    let held = HeldArm::new(&arm, wish, model.as_ref(), args.seed)?;
     Ok((Motion::Simulated(Box::new(held)), format!(", held by: {held_by},")))
 }
 
@@ -212,13 +216,22 @@ fn parse_firmness(text: &str) -> Result<Firmness, String> {
 }
 
 fn parse_place(text: &str) -> Result<Place, String> {
-    let numbers: Vec<f64> = text.split(',').map_while(|part| part.trim().parse().ok()).collect();
-    match <[f64; 3]>::try_from(numbers) {
-        Ok(place) if text.matches(',').count() == 2 && place.iter().all(|c| c.is_finite()) => {
-            Ok(Place(place))
-        }
-        _ => Err(format!("found {text}, allowed: three numbers of metres, as in 0.0,0.05,-0.02")),
-    }
+    numbers(text)
+        .map(Place)
+        .ok_or_else(|| format!("found {text}, allowed: three numbers of metres, as in 0.0,0.05,-0.02"))
+}
+
+fn parse_orientation(text: &str) -> Result<UnitQuaternion<f64>, String> {
+    let given = numbers(text).map(|[w, x, y, z]| Quaternion::new(w, x, y, z));
+    given.filter(|q| (q.norm() - 1.0).abs() < 1e-3).map(UnitQuaternion::new_normalize).ok_or_else(|| {
+        format!("found {text}, allowed: w,x,y,z of a quaternion of length 1, as in 0.7071,0.0,0.0,0.7071")
+    })
+}
+
+/// So many finite numbers with commas between them.
+fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    numbers?.try_into().ok().filter(|numbers: &[f64; N]| numbers.iter().all(|n| n.is_finite()))
 }
 
 fn read(file: &Path) -> Result<String, Box<dyn Error>> {
@@ -241,5 +254,23 @@ fn positive(option: &str, number: f64, unit_ns: f64) -> Result<u64, Box<dyn Erro
         Ok(ns as u64)
     } else {
         Err(format!("{option}: found {number}, allowed: more than 0, at most a day").into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_and_an_orientation_are_as_many_numbers_as_they_have() {
+        assert_eq!(parse_place("0.1, -0.2,3e-2").unwrap().0, [0.1, -0.2, 0.03]);
+        let turn = parse_orientation("0.6,0,0,0.8").unwrap();
+        assert!((turn.w - 0.6).abs() < 1e-15 && (turn.k - 0.8).abs() < 1e-15);
+        for wrong in ["", "0.1,0.2", "0.1,0.2,0.3,0.4,0.5", "a,b,c", "0.1,0.2,inf", "0.1,,0.2", "nan,0,0"] {
+            assert!(parse_place(wrong).unwrap_err().contains("three numbers"), "{wrong}");
+        }
+        for wrong in ["1,0,0", "1,1,0,0", "0,0,0,0", "nan,0,0,1", "0.6,0,0,0.8,0"] {
+            assert!(parse_orientation(wrong).unwrap_err().contains("length 1"), "{wrong}");
+        }
     }
 }
