@@ -22,6 +22,12 @@ impl Default for StatusLine {
 }
 
 impl StatusLine {
+    /// A line whose first words may wait.
+    pub fn told_just_now() -> Self {
+        let on_terminal = std::io::stderr().is_terminal();
+        Self { on_terminal, last: Some(Instant::now()), is_open: false }
+    }
+
     /// Shows what `line` makes, if it is time to.
     pub fn show(&mut self, line: impl FnOnce() -> String) {
         let pause = if self.on_terminal { ON_TERMINAL } else { ELSEWHERE };
@@ -62,9 +68,7 @@ pub struct Progress {
 impl Progress {
     /// A line for a run of so many ticks; the first is shown after a while.
     pub fn new(total_ticks: u64, period_ns: u64) -> Self {
-        let mut line = StatusLine::default();
-        line.last = Some(Instant::now());
-        Self { total_ticks, period_ns, line }
+        Self { total_ticks, period_ns, line: StatusLine::told_just_now() }
     }
 
     /// Shows it, if it is time to.

@@ -151,8 +151,10 @@ impl Rig {
         rig.bases = rig.place_bases()?;
         rig.fast_step()?;
         if let HandMode::Impedance(simulated) = &rig.hand_mode {
+            // What the driver would find wrong is found here, before anything is started, and told in words of what
+            // was asked for: the driver knows of files only.
+            simulated.arm()?;
             simulated.hand()?;
-            // What the driver would find wrong is found here, before anything is started.
             open_devices(&rig.driver_config(ClockMode::Virtual))?;
         }
         Ok(rig)

@@ -7,7 +7,7 @@
 mod pair;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use pair::{IDEAL, PREMIUM, Pair};
+use pair::{IDEAL, PREMIUM, Pair, SIMULATED};
 use shm_abi::Frame;
 use std::hint::black_box;
 
@@ -21,6 +21,15 @@ fn cycles(criterion: &mut Criterion) {
     ] {
         let mut pair = Pair::new(device, count);
         group.bench_function(name, |bencher| bencher.iter(|| pair.tick()));
+    }
+}
+
+/// With the mechanics of the ticks' time in it: sixteen steps of each arm in a millisecond.
+fn simulated(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("driver cycle, simulated Premium in a pen grip");
+    for (rate_hz, count) in [(1000, 1), (1000, 3), (4000, 1), (4000, 3)] {
+        let mut pair = Pair::at_rate(rate_hz, SIMULATED, count);
+        group.bench_function(format!("{count} at {rate_hz} Hz"), |bencher| bencher.iter(|| pair.tick()));
     }
 }
 
@@ -57,5 +66,5 @@ fn memory(criterion: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, cycles, memory);
+criterion_group!(benches, cycles, simulated, memory);
 criterion_main!(benches);

@@ -164,6 +164,7 @@ fn ns_of_us(us: f64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::{Quaternion, UnitQuaternion};
 
     fn parse(text: &str) -> Result<DriverConfig, String> {
         DriverConfig::parse(text, Path::new("lab/driver.toml")).map_err(|report| report.to_string())
@@ -193,7 +194,7 @@ mod tests {
             panic!()
         };
         assert_eq!((path.as_path(), finger.as_str()), (Path::new("lab/h.csv"), "f0"));
-        let Backend::Replay { description, trace } = &config.devices[1].backend else { panic!() };
+        let Backend::Replay { description, trace, .. } = &config.devices[1].backend else { panic!() };
         assert_eq!(
             (description.as_path(), trace.as_path()),
             (Path::new("premium-1.5"), Path::new("lab/t.csv"))
@@ -256,6 +257,14 @@ mod tests {
                 "[[device]]\nbackend = \"ideal\"\ngravity_compensation = true",
                 "lab/driver.toml:3: `device[0].gravity_compensation`: found `gravity_compensation` in a device of backend \"ideal\", allowed: not there",
             ),
+            (
+                "[[device]]\nbackend = \"replay\"\nbase_position_m = [0, 0, 0.1]",
+                "lab/driver.toml:3: `device[0].base_position_m`: found `base_position_m` in a device of backend \"replay\", allowed: `base_orientation_wxyz` alone, by which its weight pulls; where it stands is a layout's matter",
+            ),
+            (
+                "[[device]]\nbackend = \"emulated\"\ndescription = \"premium-1.5\"\ncard = \"c\"\nbase_orientation_wxyz = [0, 0, 0, 0]",
+                "lab/driver.toml:5: `device[0].base_orientation_wxyz`: found a quaternion of length 0.000, allowed: w, x, y, z of a rotation, whose squares add up to 1",
+            ),
         ];
         for (text, expected) in cases {
             assert_eq!(parse(text).expect_err(text), expected);
@@ -284,10 +293,52 @@ mod tests {
             start_m = [0.1, -0.2, 1e-9]\nbase_position_m = [1, 2, 3]\nbase_orientation_wxyz = [0.6, 0.8, 0, 0]\n\
             peak_force_n = 8.5\n\
             [[device]]\nbackend = \"replay\"\ndescription = \"premium-1.5\"\ntrace = \"/t.csv\"\n\
-            [[device]]\nname = \"b\"\nbackend = \"emulated\"\ndescription = \"premium-1.5\"\ncard = \"/c\"\ngravity_compensation = true\n";
+            [[device]]\nname = \"b\"\nbackend = \"emulated\"\ndescription = \"premium-1.5\"\ncard = \"/c\"\ngravity_compensation = true\n\
+            base_orientation_wxyz = [0.892399101, -0.099045761, 0.239117618, -0.369643811]\n";
         let config = parse(text).expect("good");
         assert_eq!(parse(&config.to_toml()).expect("good as well"), config);
         let plain = parse("[[device]]\nbackend = \"ideal\"\n").expect("good");
         assert_eq!(parse(&plain.to_toml()).expect("good as well"), plain);
+    }
+
+    #[test]
+    fn an_arm_with_counters_may_lean_and_stands_upright_unless_told() {
+        let arm = |backend: &str, more: &str| {
+            let text = format!(
+                "[[device]]\nbackend = \"{backend}\"\ndescription = \"premium-1.5\"\n\
+                 {}\n{more}\n",
+                match backend {
+                    "replay" => "trace = \"t.csv\"",
+                    "emulated" => "card = \"c\"",
+                    _ => "",
+                }
+            );
+            parse(&text).map(|config| config.devices[0].backend.base_orientation())
+        };
+        let leaning = UnitQuaternion::new_normalize(Quaternion::new(0.6, 0.0, 0.0, 0.8));
+        for backend in ["replay", "emulated", "simulated"] {
+            assert_eq!(arm(backend, ""), Ok(UnitQuaternion::identity()), "{backend}");
+            let told = arm(backend, "base_orientation_wxyz = [0.6, 0, 0, 0.8]").expect("allowed");
+            // Lengths of (0.6, 0.8) to a rounding.
+            assert!(told.angle_to(&leaning) < 1e-15, "{backend}");
+            // Degrees, another order, a digit too few: never what an arm should be held up by.
+            let wrong = arm(backend, "base_orientation_wxyz = [0.6, 0, 0, 0.6]").expect_err("refused");
+            assert!(wrong.contains("found a quaternion of length 0.849"), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn an_orientation_that_was_written_down_is_read_back_bit_for_bit() {
+        for step in 0..200 {
+            let t = 0.031 * f64::from(step);
+            let [w, x, y, z] =
+                [t.cos(), t.sin() * 0.6, t.sin() * 0.64, t.sin() * 0.48].map(|n| (n * 1e6).round() / 1e6);
+            let text = format!(
+                "[[device]]\nbackend = \"emulated\"\ndescription = \"premium-1.5\"\ncard = \"/c\"\n\
+                 base_orientation_wxyz = [{w:?}, {x:?}, {y:?}, {z:?}]\n"
+            );
+            let config = parse(&text).expect("six digits are enough");
+            assert_eq!(parse(&config.to_toml()).expect("good as well"), config, "{step}");
+        }
     }
 }

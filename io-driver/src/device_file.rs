@@ -13,6 +13,7 @@
 
 use std::path::Path;
 
+use nalgebra::UnitQuaternion;
 use serde::Deserialize;
 use thiserror::Error;
 use toml::Spanned;
@@ -178,6 +179,19 @@ impl ArmFile {
     /// From joint torques to converter codes.
     pub fn motor_map(&self) -> MotorMap {
         MotorMap::new(&self.motors)
+    }
+
+    /// The same arm in a base that stands in the world like this (R_WD): its weight pulls along the world's -y. A
+    /// description by itself is of an arm that stands upright.
+    #[must_use]
+    pub fn in_base(self, base_in_world: &UnitQuaternion<f64>) -> Self {
+        let lean =
+            |spec: SimulationSpec| SimulationSpec { dynamics: spec.dynamics.in_base(base_in_world), ..spec };
+        Self {
+            gravity: self.gravity.map(|gravity| gravity.in_base(base_in_world)),
+            simulation: self.simulation.map(lean),
+            ..self
+        }
     }
 }
 

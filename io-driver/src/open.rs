@@ -163,14 +163,14 @@ fn open(
             Ok(Box::new(IdealDevice::new(info, wish.base_in_world, hand)))
         }
         Backend::Simulated { .. } => simulated::open(device, config, board),
-        Backend::Replay { description, trace } => {
+        Backend::Replay { description, trace, .. } => {
             let premium = mechanism(device, description)?;
             let trace = EncoderTrace::parse(&read(device, trace)?, trace, premium.encoders.count_bits)?;
             let info = commissioned(arm_info(device, &premium), config);
             let arm = arm(device, config, &premium);
             Ok(Box::new(ReplayDevice::new(info, EncoderReplay::new(trace), arm)))
         }
-        Backend::Emulated { description, card } => {
+        Backend::Emulated { description, card, .. } => {
             let premium = mechanism(device, description)?;
             let info = commissioned(arm_info(device, &premium), config);
             let arm = arm(device, config, &premium);
@@ -254,7 +254,7 @@ fn has_switch(device: &DeviceConfig, config: &DriverConfig) -> bool {
         .any(|switch| config.devices[switch.device].name == device.name)
 }
 
-/// The mechanism that a device's description tells.
+/// The mechanism that a device's description tells, in a base that stands as the configuration tells.
 ///
 /// # Errors
 /// If it cannot be read, is wrong, or has none.
@@ -264,7 +264,7 @@ pub fn mechanism(device: &DeviceConfig, description: &Path) -> Result<ArmFile, O
         DeviceFile::Arm(premium) if device.compensates_gravity && premium.gravity.is_none() => {
             Err(OpenError::NoBodies { device: name(), file: description.into() })
         }
-        DeviceFile::Arm(premium) => Ok(*premium),
+        DeviceFile::Arm(premium) => Ok(premium.in_base(&device.backend.base_orientation())),
         DeviceFile::Ideal(_) => Err(OpenError::NoMechanism { device: name(), file: description.into() }),
     }
 }
@@ -323,27 +323,43 @@ mod tests {
     use crate::device::{Effort, TickTime};
 
     /// An arm in a replay, told to hold its weight and nothing else: the codes that come out.
-    fn codes(commissioning: bool) -> [i64; 3] {
-        let name = format!("phantom3-open-{}-{commissioning}.csv", std::process::id());
-        let trace = std::env::temp_dir().join(name);
-        std::fs::write(&trace, "t,c0,c1,c2\n0,0,0,0\n").unwrap();
+    fn codes(commissioning: bool, more: &str) -> [i64; 3] {
+        let directory = tempfile::tempdir().unwrap();
+        std::fs::write(directory.path().join("trace.csv"), "t,c0,c1,c2\n0,0,0,0\n").unwrap();
         let text = format!(
             "[safety]\ncommissioning = {commissioning}\n[[device]]\nbackend = \"replay\"\n\
-             description = \"premium-1.5\"\ntrace = {trace:?}\ngravity_compensation = true\n"
+             description = \"premium-1.5\"\ntrace = \"trace.csv\"\ngravity_compensation = true\n{more}"
         );
-        let config = DriverConfig::parse(&text, Path::new("driver.toml")).unwrap();
-        let devices = open_devices(&config);
-        std::fs::remove_file(&trace).unwrap();
-        let device = &mut devices.unwrap()[0];
+        let config = DriverConfig::parse(&text, &directory.path().join("driver.toml")).unwrap();
+        let device = &mut open_devices(&config).unwrap()[0];
         device.read(TickTime { tick: 1, period_ns: 1_000_000, run_tick: 0 }).unwrap();
         let effort = Effort { gravity_share: 1.0, ..Effort::default() };
         device.write(effort).unwrap().motor_codes
     }
 
+    /// At home the upper arm's weight is -16 mN m, as its motor balances more than it weighs, and the forearm hangs.
+    #[test]
+    fn an_arm_that_lies_on_its_side_is_held_by_its_turret_and_upside_down_the_other_way_round() {
+        let upright = codes(false, "");
+        assert_eq!(codes(false, "base_orientation_wxyz = [1, 0, 0, 0]\n"), upright, "no word: upright");
+        assert!(upright[1] < 2048 && upright[0] == 2048 && upright[2] == 2048, "{upright:?}");
+        // Half a turn about the user's axis.
+        let overhead = codes(false, "base_orientation_wxyz = [0, 0, 0, 1]\n");
+        assert_eq!(overhead, upright.map(|code| 4096 - code));
+        // A quarter turn about it: the base's y is to the world's left, its x up.
+        let side = codes(false, "base_orientation_wxyz = [0.70710678, 0, 0, 0.70710678]\n");
+        assert!(side[0] < 2048 && side[1] == 2048 && side[2] == 2048, "{side:?}");
+        // The same the other way.
+        let other = codes(false, "base_orientation_wxyz = [0.70710678, 0, 0, -0.70710678]\n");
+        assert_eq!(other, side.map(|code| 4096 - code));
+    }
+
     #[test]
     fn an_arm_in_commissioning_does_not_hold_its_weight_with_motors_that_nobody_has_tried() {
-        assert_ne!(codes(false), [2048; 3], "the weight can be felt in the zeroing pose");
-        assert_eq!(codes(true), [2048; 3]);
+        assert_ne!(codes(false, ""), [2048; 3], "the weight can be felt in the zeroing pose");
+        assert_eq!(codes(true, ""), [2048; 3]);
+        // Nor in a base that may stand otherwise than told.
+        assert_eq!(codes(true, "base_orientation_wxyz = [0, 0, 0, 1]\n"), [2048; 3]);
     }
 
     /// An ideal device with a dead-man's switch and this hand file.

@@ -100,7 +100,8 @@ fn on_an_emulated_card_the_tip_yields_to_the_side_that_it_is_pushed_to() {
             let card = Card::create(&path).unwrap();
             let home = arm.encoders.home_joint_angles_rad;
             let motion = Motion::Yielding { viscosity_nm_s: 0.1, joints: home };
-            let play = Play { peak_n: 2.0, step_n: 2.0, watchdog_ns: u64::MAX, poll_ns: 1 };
+            let play =
+                Play { peak_n: 2.0, step_n: 2.0, watchdog_ns: u64::MAX, poll_ns: 1, counter_offset: 0 };
             let mut emulator = Emulator::new(card, arm.clone(), motion, play);
             let mut device = open(&format!(
                 "backend = \"emulated\"\nzeroing = \"at-start\"\ndescription = \"{name}\"\ncard = {path:?}\n"

@@ -6,7 +6,7 @@ use std::f64::consts::FRAC_PI_2;
 use io_driver::kinematics::gravity::{Bodies, GRAVITY_M_PER_S2};
 use io_driver::kinematics::{Interval, JointConvention, JointLimits, Mechanism, Premium, WoodenHaptics};
 use io_driver::sim::dynamics::{Dynamics, Inertias};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
 mod rigid_bodies;
@@ -71,6 +71,11 @@ fn any_rates() -> impl Strategy<Value = [f64; 3]> {
 
 fn any_convention() -> impl Strategy<Value = JointConvention> {
     prop::sample::select(vec![JointConvention::LINKAGE, OTHER])
+}
+
+/// Any way for a base to stand.
+fn any_base() -> impl Strategy<Value = UnitQuaternion<f64>> {
+    prop::array::uniform3(-3.0..3.0_f64).prop_map(|turn| UnitQuaternion::from_scaled_axis(turn.into()))
 }
 
 fn moved(joints: [f64; 3], direction: [f64; 3], by: f64) -> [f64; 3] {
@@ -265,15 +270,60 @@ proptest! {
     }
 
     #[test]
-    fn the_weight_is_the_slope_of_the_potential_energy(
-        joints in any_joints(), direction in any_rates(), convention in any_convention(),
+    fn the_weight_is_that_of_the_bodies_one_by_one_however_the_base_stands(
+        joints in any_joints(), convention in any_convention(), base in any_base(),
     ) {
-        let dynamics = Dynamics::new(LINKS, &BODIES, &INERTIAS, convention);
-        let at = |h: f64| dynamics.potential_energy(moved(joints, direction, h));
-        let slope = (at(STEP) - at(-STEP)) / (2.0 * STEP);
-        let torque = Vector3::from(dynamics.holding_torque(joints)).dot(&Vector3::from(direction));
-        // 0.1 J * 27 * (1e-5)^2 / 6, and rounding 1e-17 / 1e-5.
-        prop_assert!((slope - torque).abs() < 2e-10, "{slope} {torque}");
+        let bodies = rigid_bodies::bodies(LINKS, &BODIES, &INERTIAS);
+        let dynamics = Dynamics::new(LINKS, &BODIES, &INERTIAS, convention).in_base(&base);
+        let angles = convention.linkage_angles(joints);
+        let expected = rigid_bodies::potential_energy(&bodies, angles, &base.to_rotation_matrix());
+        // Five products of up to 0.1 J with places that are turned twice: a few dozen roundings.
+        prop_assert!((dynamics.potential_energy(joints) - expected).abs() < 64.0 * f64::EPSILON * 0.1);
+    }
+
+    #[test]
+    fn the_weight_is_the_slope_of_the_potential_energy(
+        joints in any_joints(), direction in any_rates(), convention in any_convention(), base in any_base(),
+    ) {
+        let upright = Dynamics::new(LINKS, &BODIES, &INERTIAS, convention);
+        for dynamics in [upright, upright.in_base(&base)] {
+            let at = |h: f64| dynamics.potential_energy(moved(joints, direction, h));
+            let slope = (at(STEP) - at(-STEP)) / (2.0 * STEP);
+            let torque = Vector3::from(dynamics.holding_torque(joints)).dot(&Vector3::from(direction));
+            // 0.1 J, third derivative at most (3 * sqrt 3)^3 = 140, times (1e-5)^2 / 6; rounding 1e-17 / 1e-5 thrice.
+            prop_assert!((slope - torque).abs() < 5e-10, "{slope} {torque}");
+        }
+    }
+
+    /// Turning the turret turns the world about the base's y, the other way round.
+    #[test]
+    fn in_a_leaning_base_the_turret_s_angle_turns_where_up_is(
+        joints in any_joints(), turret in -3.2..3.2_f64, base in any_base(),
+    ) {
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), turret);
+        let turned = premium().in_base(&(base * turn)).holding_torque(joints);
+        let moved = premium().in_base(&base).holding_torque([joints[0] + turret, joints[1], joints[2]]);
+        for (turned, moved) in turned.into_iter().zip(moved) {
+            prop_assert!((turned - moved).abs() < 64.0 * f64::EPSILON * 0.1, "{turned} {moved}");
+        }
+    }
+
+    /// Weight makes and loses no energy of a leaning arm that moves freely, either.
+    #[test]
+    fn a_leaning_arm_that_falls_keeps_its_energy(
+        joints in any_joints(), rates in any_rates(), base in any_base(),
+    ) {
+        let dynamics = premium().in_base(&base);
+        let energy = |(joints, rates)| {
+            dynamics.kinetic_energy(joints, rates) + dynamics.potential_energy(joints)
+        };
+        let mut motion = (joints, rates);
+        let before = energy(motion);
+        for _ in 0..200 {
+            motion = runge_kutta(&dynamics, motion, 1.0, 1e-4);
+        }
+        // Rates stay below 10 rad/s: (rate * step)^4 a radian turned, of at most 0.1 J; far above rounding.
+        prop_assert!((energy(motion) - before).abs() < 1e-11, "{}", energy(motion) - before);
     }
 
     /// At rest the energy of weight and push together has no slope but the motors' torque.
@@ -296,7 +346,8 @@ proptest! {
 
     /// Ties the dynamics to each mechanism's kinematics, conventions of its joints included.
     #[test]
-    fn a_mass_at_the_tip_is_seen_through_the_jacobian(joints in any_joints()) {
+    fn a_mass_at_the_tip_is_seen_through_the_jacobian(joints in any_joints(), base in any_base()) {
+        let up = base.inverse_transform_vector(&Vector3::y());
         let wooden = WoodenHaptics::new([0.080, 0.205, 0.245], [0.220, 0.080], JointLimits::UNBOUNDED);
         let premium = mechanism();
         let arms: [(&dyn Mechanism, Dynamics); 2] = [
@@ -308,15 +359,15 @@ proptest! {
             // Products of two numbers below 0.45 m, a handful of roundings each.
             let error = (dynamics.mass_matrix(joints) - jacobian.transpose() * jacobian).amax();
             prop_assert!(error < 32.0 * f64::EPSILON * 0.45 * 0.45, "{error}");
-            let weight = arm.joint_torque(joints, Vector3::y() * GRAVITY_M_PER_S2);
-            for (held, weight) in dynamics.holding_torque(joints).into_iter().zip(weight) {
+            let weight = arm.joint_torque(joints, up * GRAVITY_M_PER_S2);
+            for (held, weight) in dynamics.in_base(&base).holding_torque(joints).into_iter().zip(weight) {
                 prop_assert!((held - weight).abs() < 32.0 * f64::EPSILON * 4.5, "{held} {weight}");
             }
         }
     }
 
     #[test]
-    fn the_turret_s_angle_changes_nothing(joints in any_joints(), turret in -3.2..3.2_f64) {
+    fn upright_the_turret_s_angle_changes_nothing(joints in any_joints(), turret in -3.2..3.2_f64) {
         let turned = [turret, joints[1], joints[2]];
         prop_assert_eq!(premium().mass_matrix(turned), premium().mass_matrix(joints));
         prop_assert_eq!(premium().holding_torque(turned), premium().holding_torque(joints));

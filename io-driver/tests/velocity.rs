@@ -37,7 +37,7 @@ fn exact_places_give_the_plain_difference_bit_for_bit_however_many_ticks_were_sk
     for rate_hz in RATES_HZ {
         let period_s = (1_000_000_000 / rate_hz) as f64 / 1e9;
         let mut estimator = VelocityEstimator::of_exact_places();
-        let mut noise = Noise(3);
+        let mut noise = Noise::new(3);
         let mut last: Option<(u64, Vector3<f64>)> = None;
         let mut tick = 17;
         for _ in 0..1000 {
@@ -56,7 +56,7 @@ fn exact_places_give_the_plain_difference_bit_for_bit_however_many_ticks_were_sk
 fn of_a_parabola_it_is_the_slope_now_also_where_ticks_are_skipped() {
     for rate_hz in RATES_HZ {
         let mut estimator = VelocityEstimator::of_counts();
-        let mut noise = Noise(8);
+        let mut noise = Noise::new(8);
         let (mut tick, mut readings) = (5, 0);
         while readings < 300 {
             let t = tick as f64 / rate_hz as f64;
@@ -137,7 +137,7 @@ fn score_of(name: &str, motion: &Motion, rate_hz: u64) -> Score {
     let (_, make) = RIVALS.iter().find(|(known, _)| *known == name).unwrap();
     let samples = course.samples(motion, rate_hz as f64, 1.0);
     let found = estimate(make().as_mut(), &course, &samples, 1_000_000_000 / rate_hz);
-    scores(&course, motion, &samples, &found)[1]
+    scores(|time_s| course.truth(motion, time_s), motion.is_steady, &samples, &found)[1]
 }
 
 fn motion(name: &str) -> &'static Motion {

@@ -40,7 +40,7 @@ fn lead(
 ) {
     let course = Course::premium();
     let mut arm = Arm::new(&course.arm, false);
-    let mut noise = Noise(11);
+    let mut noise = Noise::new(11);
     for tick in 0..2 * rate_hz {
         let time_s = tick as f64 / rate_hz as f64;
         let joints = course.arm.mechanism.inverse(Vector3::x() * way_m(time_s)).unwrap();

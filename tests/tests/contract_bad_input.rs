@@ -255,11 +255,7 @@ fn a_command_line_that_is_wrong_is_refused_with_what_was_found_and_what_is_allow
             &["--seconds 0.000000001", "at least one tick, 0.001 s"],
         ),
         (&["--clock", "foo"], &["'foo'", "--clock", "virtual, lockstep, real"]),
-        (
-            &["--hand-mode", "impedance"],
-            &["--hand-mode impedance is not available in this version", "kinematic"],
-        ),
-        (&["--hand-mode", "foo"], &["'foo'", "--hand-mode", "kinematic"]),
+        (&["--hand-mode", "foo"], &["'foo'", "--hand-mode", "kinematic, impedance"]),
         (&["--seed", "x"], &["--seed", "found x", "a whole number from 0"]),
         (&["--seed", "-1"], &["--seed", "found -1", "a whole number from 0"]),
         (&["--layout", "none.toml"], &["none.toml", "no such file"]),

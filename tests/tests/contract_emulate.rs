@@ -14,7 +14,7 @@ fn refused(arguments: &[&str]) -> String {
 fn wrong_words_are_refused_with_what_was_found_and_what_is_allowed() {
     let place = tempfile::tempdir().unwrap();
     let card = place.path().join("card").to_string_lossy().into_owned();
-    let cases: [(&[&str], &str); 8] = [
+    let cases: [(&[&str], &str); 16] = [
         (&["--yield", "-3"], "--yield: found -3, allowed: 0.001 N m s/rad and more"),
         (&["--peak-n", "nan"], "--peak-n: found NaN, allowed: 0 N and more"),
         (&["--step-n", "-1"], "--step-n: found -1, allowed: 0 N and more"),
@@ -23,6 +23,17 @@ fn wrong_words_are_refused_with_what_was_found_and_what_is_allowed() {
         (&["--description", "ideal"], "ideal describes no mechanism"),
         (&["--description", "nowhere.toml"], "cannot read nowhere.toml"),
         (&["--trace", "t.csv", "--yield", "1"], "cannot be used with"),
+        (&["--simulated", "--yield", "1"], "cannot be used with"),
+        (
+            &["--simulated", "--hold", "1,0,0"],
+            "the hand begins at [1.0, 0.0, 0.0] m, which the arm does not reach",
+        ),
+        (&["--simulated", "--hold", "1,0"], "found 1,0, allowed: three numbers of metres"),
+        (&["--simulated", "--firmness", "weak"], "found weak, allowed: light, usual, firm"),
+        (&["--simulated", "--hand-model", "none"], "cannot read none"),
+        (&["--hold", "0,0,0"], "--simulated"),
+        (&["--simulated", "--hand", "Cargo.toml", "--finger", "f9"], "Cargo.toml"),
+        (&["--simulated", "--finger", "f9"], "--hand"),
     ];
     for (arguments, expected) in cases {
         let said = refused(&[&["emulate", "--card", &card], arguments].concat());

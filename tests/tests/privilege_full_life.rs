@@ -97,6 +97,22 @@ fn a_driver_lives_through_everything_under_the_filter_and_ends_in_order() {
     }
 }
 
+/// A device that this process simulates moves between the calls and makes none.
+const SIMULATED: &str =
+    "[[device]]\nbackend = \"simulated\"\ndescription = \"premium-1.5\"\ngravity_compensation = true\n";
+
+#[test]
+fn a_driver_that_simulates_its_arms_needs_no_call_that_others_do_not() {
+    for clock in ["real", "lockstep"] {
+        let mut driver = Driver::start(&format!("{}{}", press::config(clock), SIMULATED.repeat(2)));
+        live(&mut driver);
+        let frame = driver.observe().driver.read_latest().expect("a frame");
+        assert_eq!(frame.device_count, 3);
+        send(driver.child.id(), Signal::TERM);
+        assert_eq!(driver.wait().code(), Some(0), "{clock}");
+    }
+}
+
 /// With real-time rights as far as there are any, and told to stop over the socket.
 #[test]
 fn an_allowed_call_is_one_that_a_driver_makes_or_is_rare_for_a_reason() {

@@ -12,6 +12,7 @@ use io_driver::device::{Device, Effort, Reading, TickTime, Written};
 use io_driver::driver::{describe, make_cycle};
 use io_driver::mail::{Inbox, Letter, Sender, mail};
 use io_driver::open::open_devices;
+use io_driver::sim::hand::model_file;
 use io_driver::status::CounterStatus;
 use io_driver::zeroing::{DeviceSet, ZeroState};
 use nalgebra::Vector3;
@@ -99,6 +100,21 @@ fn mapped_commanders() -> usize {
     maps.lines().filter(|line| line.contains("phantom3-commander")).count()
 }
 
+/// A hand that minds slip, another hand, and nobody.
+fn simulated(directory: &Path) -> String {
+    let model = model_file::builtin("pen-grip").unwrap().replace("minds_slip = false", "minds_slip = true");
+    let file = directory.join("slip.toml");
+    std::fs::write(&file, model).unwrap();
+    let device = |arm: &str, hand: &str| {
+        format!(
+            "[[device]]\nbackend = \"simulated\"\ndescription = \"{arm}\"\nhand_model = {hand:?}\ngravity_compensation = true\n"
+        )
+    };
+    let hands =
+        [("premium-1.5", file.to_str().unwrap()), ("wooden-haptics", "fingertip"), ("premium-1.5", "nobody")];
+    hands.map(|(arm, hand)| device(arm, hand)).concat()
+}
+
 /// A driver's tick, and what surrounds it.
 struct Play {
     cycle: Cycle,
@@ -114,11 +130,14 @@ struct Play {
 }
 
 impl Play {
-    /// Two ideal devices that follow a hand, two Premiums that replay a trace, and one that breaks.
+    /// Two ideal devices that follow a hand, two Premiums that replay a trace, one that breaks, and three that are
+    /// simulated: held by a trembling hand that minds slip, by another kind of hand, and by nobody.
     fn new() -> Self {
         let hand = "[[device]]\nbackend = \"ideal\"\nhand = \"../hands/default.csv\"\npeak_force_n = 8.5\n";
         let premium = "[[device]]\nbackend = \"replay\"\ndescription = \"premium-1.5\"\ntrace = \"traces/circle.csv\"\n";
-        let text = format!("[safety]\nramp_in_ms = 50\n{}{}", hand.repeat(2), premium.repeat(2));
+        let directory = tempfile::tempdir().unwrap();
+        let simulated = simulated(directory.path());
+        let text = format!("[safety]\nramp_in_ms = 50\n{}{}{simulated}", hand.repeat(2), premium.repeat(2));
         let config = DriverConfig::parse(&text, &config_file("driver/test.toml")).unwrap();
         let mut devices = open_devices(&config).unwrap();
         devices.push(Box::new(Breaking::new(devices[0].info().clone())));
@@ -148,7 +167,7 @@ impl Play {
         }
         if tick.is_multiple_of(37) {
             // The one that breaks; sometimes all, of which two move.
-            let asked = if tick.is_multiple_of(2) { 1 << 4 } else { 0 };
+            let asked = if tick.is_multiple_of(2) { 1 << 7 } else { 0 };
             self.sender.post(Letter::Zero(DeviceSet(asked))).unwrap();
         }
         if tick % LEASE_TICKS == 1 {

@@ -23,7 +23,7 @@ fn in_turn() -> MutexGuard<'static, ()> {
     TURN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A driver of three resting devices that spins for replies, without real-time rights.
+/// A driver of three resting devices, one of them simulated, that spins for replies, without real-time rights.
 const SPINNING: &str = "\
 [real_time]
 priority = 0
@@ -34,7 +34,8 @@ backend = \"ideal\"
 [[device]]
 backend = \"ideal\"
 [[device]]
-backend = \"ideal\"
+backend = \"simulated\"
+description = \"premium-1.5\"
 ";
 
 /// Answers every frame, spinning, until told to stop.
@@ -134,7 +135,7 @@ fn in_spin_mode_the_timed_wait_is_the_drivers_only_system_call() {
 #[test]
 fn the_applications_fast_thread_calls_nothing_but_waits_and_wakes() {
     let _turn = in_turn();
-    let (driver, mut phantom3) = both_programs(true);
+    let (driver, mut phantom3) = both_programs(true, IDEAL);
     let thread = ThreadOf::find(phantom3.id(), "fast");
     let seen = driver.observe().driver;
     wait_for(|| fresh(&seen), 100);
@@ -250,7 +251,7 @@ fn in_spin_mode_the_driver_blocks_in_no_other_call_than_the_timed_wait() {
 #[test]
 fn a_run_ends_when_asked_though_every_frame_comes_in_time() {
     let _turn = in_turn();
-    let (driver, mut phantom3) = both_programs(true);
+    let (driver, mut phantom3) = both_programs(true, IDEAL);
     let seen = driver.observe().driver;
     wait_for(|| fresh(&seen), 500);
     let before = fresh(&seen);
@@ -267,8 +268,8 @@ fn a_run_ends_when_asked_though_every_frame_comes_in_time() {
 #[test]
 fn the_loops_of_both_programs_fault_no_page_once_warm() {
     let _turn = in_turn();
-    for lock in [true, false] {
-        let (driver, mut phantom3) = both_programs(lock);
+    for (lock, backend) in [(true, IDEAL), (false, IDEAL), (true, SIMULATED), (false, SIMULATED)] {
+        let (driver, mut phantom3) = both_programs(lock, backend);
         let threads =
             [ThreadOf::find(driver.child.id(), "driver-loop"), ThreadOf::find(phantom3.id(), "fast")];
         let seen = driver.observe().driver;
@@ -281,11 +282,14 @@ fn the_loops_of_both_programs_fault_no_page_once_warm() {
     }
 }
 
+const IDEAL: &str = "backend = \"ideal\"";
+const SIMULATED: &str = "backend = \"simulated\"\ndescription = \"premium-1.5\"\ngravity_compensation = true";
+
 /// The default scene and hand, with as much of the usual set-up as there are rights for.
-fn both_programs(lock: bool) -> (Driver, Child) {
+fn both_programs(lock: bool, backend: &str) -> (Driver, Child) {
     let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config");
     let hand = config.join("hands/default.csv");
-    let device = format!("[[device]]\nbackend = \"ideal\"\nhand = {:?}\n", hand.to_str().expect("UTF-8"));
+    let device = format!("[[device]]\n{backend}\nhand = {:?}\n", hand.to_str().expect("UTF-8"));
     let driver = Driver::start(&format!("[real_time]\nlock_memory = {lock}\n{}", device.repeat(2)));
     let phantom3 = programs::phantom3()
         .args(["run", "--attach"])

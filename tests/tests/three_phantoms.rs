@@ -2,6 +2,7 @@
 //!
 //! The figure is a photograph without numbers, so the poses are chosen here, by these tests' own measures: the cube
 //! that all three tips reach, and the distance between the arms, as capsules, over precision grasps of a 5 cm cube.
+//! How the driver's simulated arms stand there: `three_phantoms_driver.rs`.
 
 #![allow(non_snake_case)] // Frames are capital letters: X_WD takes D to W.
 
@@ -197,10 +198,23 @@ fn no_base_stands_in_front_where_the_hand_comes_from() {
 }
 
 #[test]
-fn the_drivers_configuration_names_three_devices_in_the_layouts_order() {
+fn the_drivers_arms_begin_in_the_middle_with_fingertips_three_centimetres_apart_and_do_not_meet() {
     let config = DriverConfig::load(&config("driver/three-phantoms.toml")).expect("in order");
-    let names: Vec<&str> = config.devices.iter().map(|device| device.name.as_str()).collect();
-    assert_eq!(names, ["thumb", "index", "middle"]);
+    let starts: Vec<[f64; 3]> = config
+        .devices
+        .iter()
+        .map(|device| device.backend.wish().expect("simulated").start_m.into())
+        .collect();
+    let grasp: [[f64; 3]; 3] = starts.try_into().expect("three");
+    for (i, j) in [(0, 1), (0, 2), (1, 2)] {
+        let apart_m = (Vector3::from(grasp[i]) - Vector3::from(grasp[j])).norm();
+        // The file has millimetres.
+        assert!((apart_m - 0.03).abs() < 1e-3, "{i} {j}: {apart_m} m");
+    }
+    let middle: Vector3<f64> = grasp.into_iter().map(Vector3::from).sum::<Vector3<f64>>() / 3.0;
+    assert!(middle.norm() < 1e-3, "{middle}");
+    let clearance_m = clearance(&premium(), &layout("right"), &grasp, &Isometry3::identity());
+    assert!(clearance_m.expect("each tip reaches its start, inside its workspace") > 5e-3, "{clearance_m:?}");
 }
 
 #[test]

@@ -69,6 +69,8 @@ pub struct Calibration {
     pub model: Model,
     /// The fit to all pairs.
     pub all: Fit,
+    /// Why the fit to all pairs is worth nothing, if outliers spoil it so much.
+    pub all_refused: Option<CalibrationError>,
     /// Pairs that do not belong.
     pub outliers: Outliers,
     /// The fit to the others, if there are outliers.
@@ -78,7 +80,8 @@ pub struct Calibration {
 /// Fits the pairs.
 ///
 /// # Errors
-/// Too few, not finite, probably not in metres, hardly moved, on a line, in a plane, mirrored.
+/// Too few, not finite, probably not in metres, hardly moved, on a line, in a plane, mirrored. What only outliers make
+/// so is told by [`Calibration::all_refused`].
 pub fn calibrate(pairs: &[Pair], model: Model) -> Result<Calibration, CalibrationError> {
     let needed = model.least_pairs();
     if pairs.len() < needed {
@@ -89,10 +92,12 @@ pub fn calibrate(pairs: &[Pair], model: Model) -> Result<Calibration, Calibratio
     // Outliers may neither hide that the others lie on a line nor make good points look so.
     refuse_mirrored(&sorted.kept, model)?;
     let honest = Fit::of(&sorted.kept, model)?;
+    honest.check(model)?;
     let has_outliers = sorted.kept.len() < pairs.len();
     let all = if has_outliers { Fit::of(pairs, model)? } else { honest.clone() };
     Ok(Calibration {
         model,
+        all_refused: all.check(model).err(),
         all,
         outliers: sorted.outliers,
         without_outliers: has_outliers.then_some(honest),
@@ -110,9 +115,14 @@ impl Fit {
         let residuals = Residuals::of(pairs, &transform);
         let square_sum = residuals.rms_m * residuals.rms_m * pairs.len() as f64;
         let accuracy = Accuracy::of(model, &transform, &spread_other, square_sum, pairs.len());
-        refuse_degenerate(model, &spread_other, accuracy.map_or(0.0, |accuracy| accuracy.noise_m))?;
         let scale = rigid::scale(pairs, &rigid.matrix);
         Ok(Self { count: pairs.len(), transform, residuals, spread_other, accuracy, scale })
+    }
+
+    /// Refuses points that reach no further than their noise.
+    fn check(&self, model: Model) -> Result<(), CalibrationError> {
+        let noise_m = self.accuracy.map_or(0.0, |accuracy| accuracy.noise_m);
+        refuse_degenerate(model, &self.spread_other, noise_m)
     }
 }
 

@@ -250,3 +250,15 @@ fn gathering_keeps_a_pair_for_each_place_and_says_where_to_move() {
     assert!(gathering.coverage().is_enough());
     assert!(!gathering.offer(Vector3::new(f64::NAN, 0.0, 0.0), Vector3::zeros()));
 }
+
+#[test]
+fn one_wild_pair_spoils_a_fit_to_all_and_not_one_without_it() {
+    let mut pairs = pairs_of(&rigid_truth(), 200, WIDE, 1e-4, 13);
+    pairs[16].fiducial.x += 2.0;
+    let found = calibrate(&pairs, Model::Rigid).expect("199 are good");
+    assert_eq!(found.outliers.listed.iter().map(|outlier| outlier.line).collect::<Vec<_>>(), [17]);
+    assert!(matches!(found.all_refused, Some(CalibrationError::Unrelated { .. })), "{:?}", found.all_refused);
+    let without = found.without_outliers.expect("there is one");
+    // 0.1 mm of noise in 199 pairs.
+    assert!((without.transform.position - rigid_truth().position).amax() < 1e-4);
+}

@@ -26,6 +26,12 @@ pub enum LayoutFileError {
     /// It cannot be read.
     #[error(transparent)]
     Read(#[from] SceneError),
+    /// It is a device, a pipe or a directory, which a new file would take the place of.
+    #[error("--write {}: found something else than a file; allowed: a file, or a name that is free", file.display())]
+    NotAFile {
+        /// What is there.
+        file: PathBuf,
+    },
     /// It cannot be edited.
     #[error("{}: cannot be edited: {detail}; write `device` as [[device]] tables", file.display())]
     NotEditable {
@@ -52,6 +58,17 @@ pub(super) fn read(file: &Path) -> Result<String, SceneError> {
     // Read as every layout is, bounded and checked, so that the messages are the same.
     Layout::load(file)?;
     fs::read_to_string(file).map_err(|cause| SceneError::Unreadable { file: file.into(), cause })
+}
+
+/// Refuses what a file may not take the place of: root could replace `/dev/null` for everybody.
+///
+/// # Errors
+/// There is something, and it is no file.
+pub(super) fn refuse_other_than_file(file: &Path) -> Result<(), LayoutFileError> {
+    match fs::metadata(file) {
+        Ok(found) if !found.is_file() => Err(LayoutFileError::NotAFile { file: file.into() }),
+        _ => Ok(()),
+    }
 }
 
 /// The text with another entry for the device; checked by reading it as a layout.

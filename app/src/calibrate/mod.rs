@@ -138,6 +138,20 @@ pub enum CalibrateFailure {
         /// Why.
         source: CalibrationError,
     },
+    /// Some pairs spoil all others.
+    #[error(
+        "{origin}: {source} This is the doing of {count} outliers, the first on line {line}: look at them, or leave them out with --reject-outliers"
+    )]
+    Spoilt {
+        /// Where the pairs come from.
+        origin: String,
+        /// What is wrong with all of them together.
+        source: CalibrationError,
+        /// How many do not belong.
+        count: usize,
+        /// Where the first is.
+        line: usize,
+    },
     /// An affine fit that is no device's.
     #[error(
         "the affine fit stretches by {:.3}, {:.3} and {:.3}; allowed: {} to {}. Are the right devices and units taken?",
@@ -198,6 +212,9 @@ fn run_to_end(args: &CalibrateArgs) -> Result<(), CalibrateFailure> {
     let model = if args.affine { Model::Affine } else { Model::Rigid };
     let found = calibrate(&pairs, model)
         .map_err(|source| CalibrateFailure::Fit { origin: origin.clone(), source })?;
+    if !args.reject_outliers {
+        refuse_spoilt(&found, &origin)?;
+    }
     let used = used_fit(&found, args.reject_outliers);
     let X_WN = plan.layout.placement(args.fiducial).then(&placement_of(used, model)?);
     let entry = plan.layout.entry_of(args.device, &X_WN);
@@ -240,6 +257,7 @@ impl Plan {
             other => other.clone(),
         };
         refuse_same_file(args, write.as_deref())?;
+        write.as_deref().map_or(Ok(()), layout_file::refuse_other_than_file)?;
         let edited = write.as_ref().filter(|file| file.exists());
         if let (Some(edited), Some(given)) = (edited, &args.layout)
             && !crate::cli::is_same_file(edited, given)
@@ -318,6 +336,13 @@ fn save_pairs(file: &Path, pairs: &[Pair]) -> Result<(), CalibrateFailure> {
         text.push('\n');
     }
     std::fs::write(file, text).map_err(|source| CalibrateFailure::Output { file: file.into(), source })
+}
+
+fn refuse_spoilt(found: &Calibration, origin: &str) -> Result<(), CalibrateFailure> {
+    let Some(source) = found.all_refused.clone() else { return Ok(()) };
+    let listed = &found.outliers.listed;
+    let line = listed.first().map_or(0, |outlier| outlier.line);
+    Err(CalibrateFailure::Spoilt { origin: origin.into(), source, count: listed.len(), line })
 }
 
 fn used_fit(found: &Calibration, reject_outliers: bool) -> &Fit {

@@ -49,9 +49,9 @@ impl fmt::Display for Report<'_> {
         let spread = &used.spread_other;
         writeln!(
             out,
-            "points       RMS extent {} mm along their main directions, condition {:.1}",
+            "points       RMS extent {} mm along their main directions, {}",
             three(spread.rms_m, 1e3, 1),
-            spread.condition()
+            condition(spread.condition())
         )?;
         self.write_accuracy(out)?;
         self.write_shape(out)?;
@@ -114,7 +114,10 @@ impl Report<'_> {
     fn write_outliers(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let listed = &self.found.outliers.listed;
         let Some(without) = &self.found.without_outliers else {
-            return writeln!(out, "outliers     none");
+            let few = self.found.outliers.threshold_m.is_infinite();
+            let word =
+                if few { "not looked for: too few pairs, or too many that do not belong" } else { "none" };
+            return writeln!(out, "outliers     {word}");
         };
         let lines: Vec<String> = listed
             .iter()
@@ -207,6 +210,11 @@ fn numbers(vector: &Vector3<f64>) -> [f64; 3] {
 fn difference(a: &Transform, b: &Transform, middle: &Vector3<f64>) -> (f64, f64) {
     let turn = a.rigid().rotation.angle_to(&b.rigid().rotation);
     (turn, (a.apply(middle) - b.apply(middle)).norm())
+}
+
+/// Beyond a million the points lie in a plane, and the digits are those of rounding.
+fn condition(condition: f64) -> String {
+    if condition < 1e6 { format!("condition {condition:.1}") } else { "in a plane".into() }
 }
 
 fn three(numbers: [f64; 3], factor: f64, digits: usize) -> String {

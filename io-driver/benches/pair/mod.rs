@@ -18,6 +18,11 @@ pub(crate) const IDEAL: &str = "[[device]]\nbackend = \"ideal\"\npeak_force_n = 
 pub(crate) const PREMIUM: &str =
     "[[device]]\nbackend = \"replay\"\ndescription = \"premium-1.5\"\ntrace = \"traces/circle.csv\"\n";
 
+/// An arm that this process simulates, in a pen grip that trembles.
+#[allow(dead_code, reason = "not every bench has one")]
+pub(crate) const SIMULATED: &str =
+    "[[device]]\nbackend = \"simulated\"\ndescription = \"premium-1.5\"\ngravity_compensation = true\n";
+
 /// A driver and its commander, as under the virtual clock.
 pub(crate) struct Pair {
     #[allow(dead_code, reason = "not every bench serves it")]
@@ -32,8 +37,14 @@ pub(crate) struct Pair {
 impl Pair {
     /// So many devices of one kind, under a lease with full authority.
     pub(crate) fn new(device: &str, count: usize) -> Self {
+        Self::at_rate(1000, device, count)
+    }
+
+    /// The same at another rate (Hz).
+    pub(crate) fn at_rate(rate_hz: u32, device: &str, count: usize) -> Self {
         let file = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../config/driver/bench.toml"));
-        let config = DriverConfig::parse(&device.repeat(count), file).expect("a configuration");
+        let config = DriverConfig::parse(&format!("rate_hz = {rate_hz}\n{}", device.repeat(count)), file)
+            .expect("a configuration");
         let devices = open_devices(&config).expect("devices");
         let info = describe(&config, &devices, WaitMode::Spin);
         let memory = Arc::new(DriverMemory::create(&info).expect("memory"));

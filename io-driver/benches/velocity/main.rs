@@ -1,18 +1,20 @@
 //! Estimates of velocity from encoder counts, against the truth and against each other.
 //!
-//! Run `cargo bench -p io-driver --bench velocity`. Every movement leads the tip of a Premium 1.5 along a line; its
-//! inverse kinematics and counters make counts of it. The first table is of the tip (mm/s), the second of the three
+//! Run `cargo bench -p io-driver --bench velocity`. Most movements lead the tip of a Premium 1.5 along a line; its
+//! inverse kinematics and counters make counts of it. The last ones are those of a simulated arm in a simulated hand. The first table is of the tip (mm/s), the second of the three
 //! joints together (mrad/s); each cell tells root mean square error, largest error and lag (ms). Then the time of a
 //! call for three joints, where a movement is rest and where it is a stroke.
 
 mod motion;
 mod rivals;
 mod score;
+mod simulated;
 
 use io_driver::device::TickTime;
 use motion::{Course, MOTIONS};
 use rivals::RIVALS;
 use score::{Score, estimate, scores};
+use simulated::{Ride, TASKS};
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -28,8 +30,9 @@ fn main() {
             print!("{:<25}", format!("{} kHz", rate / 1000));
             RIVALS.iter().for_each(|(name, _)| print!("{name:>18}"));
             println!();
-            for (motion, row) in MOTIONS.iter().zip(movements) {
-                print!("{:<25}", motion.name);
+            let names = MOTIONS.iter().map(|motion| motion.name).chain(TASKS.iter().map(|task| task.name));
+            for (name, row) in names.zip(movements) {
+                print!("{name:<25}");
                 row.iter().for_each(|score| print!("{:>18}", cell(&score[which])));
                 println!();
             }
@@ -53,11 +56,19 @@ fn at_rate(course: &Course, rate_hz: u32) -> Vec<Vec<[Score; 2]>> {
         let samples = course.samples(motion, f64::from(rate_hz), SECONDS);
         let score = |make: &rivals::Maker| {
             let found = estimate(make().as_mut(), course, &samples, period_ns);
-            scores(course, motion, &samples, &found)
+            scores(|time_s| course.truth(motion, time_s), motion.is_steady, &samples, &found)
         };
         RIVALS.iter().map(|(_, make)| score(make)).collect()
     };
-    MOTIONS.iter().map(row).collect()
+    let simulated_row = |task| {
+        let ride = Ride::new(&course.arm, task, f64::from(rate_hz), SECONDS);
+        let score = |make: &rivals::Maker| {
+            let found = estimate(make().as_mut(), course, &ride.samples, period_ns);
+            scores(|time_s| ride.truth(time_s), false, &ride.samples, &found)
+        };
+        RIVALS.iter().map(|(_, make)| score(make)).collect()
+    };
+    MOTIONS.iter().map(row).chain(TASKS.iter().map(simulated_row)).collect()
 }
 
 fn cell(score: &Score) -> String {

@@ -7,6 +7,7 @@
 use io_driver::device_file::{ArmFile, DeviceFile, builtin};
 use io_driver::encoders::JointMap;
 use io_driver::kinematics::Mechanism;
+use io_driver::sim::split_mix::SplitMix64;
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -136,7 +137,7 @@ impl Course {
 
     /// What the counters say, tick by tick.
     pub(crate) fn samples(&self, motion: &Motion, rate_hz: f64, seconds: f64) -> Vec<Sample> {
-        let mut noise = Noise(0x5EED);
+        let mut noise = Noise::new(0x5EED);
         let rad_per_count = self.map.rad_per_count();
         (0..(seconds * rate_hz) as u64)
             .map(|tick| {
@@ -154,16 +155,16 @@ impl Course {
     }
 }
 
-/// SplitMix64 with Box and Muller's transform: small, seeded, the same everywhere.
-pub(crate) struct Noise(pub(crate) u64);
+/// Normal numbers by Box and Muller's transform.
+pub(crate) struct Noise(SplitMix64);
 
 impl Noise {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(SplitMix64::new(seed))
+    }
+
     pub(crate) fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+        self.0.unit()
     }
 
     pub(crate) fn gaussian(&mut self) -> f64 {

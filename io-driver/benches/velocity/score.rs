@@ -1,6 +1,6 @@
 //! How far an estimate is from the truth.
 
-use crate::motion::{Course, Motion, Sample};
+use crate::motion::{Course, Sample};
 use crate::rivals::Estimator;
 use io_driver::device::TickTime;
 use io_driver::kinematics::Mechanism;
@@ -38,17 +38,17 @@ pub(crate) fn estimate(
     samples.iter().map(one).collect()
 }
 
-/// Scores of the joints together and of the tip.
+/// Scores of the joints together and of the tip, given the true velocities by time.
 pub(crate) fn scores(
-    course: &Course,
-    motion: &Motion,
+    truth: impl Fn(f64) -> (Vector3<f64>, Vector3<f64>),
+    is_steady: bool,
     samples: &[Sample],
     found: &[(Vector3<f64>, Vector3<f64>)],
 ) -> [Score; 2] {
     let judged: Vec<_> = samples.iter().zip(found).filter(|(sample, _)| sample.time_s > RUN_IN_S).collect();
     let error = |delay_s: f64, thin: usize| -> [Vec<f64>; 2] {
         let both = judged.iter().step_by(thin).map(|(sample, (joints, tip))| {
-            let (true_joints, true_tip) = course.truth(motion, sample.time_s - delay_s);
+            let (true_joints, true_tip) = truth(sample.time_s - delay_s);
             ((joints - true_joints).norm(), (tip - true_tip).norm())
         });
         let (joints, tip) = both.unzip();
@@ -64,7 +64,7 @@ pub(crate) fn scores(
         Score {
             rms: rms(&now[which]),
             max: now[which].iter().copied().fold(0.0, f64::max),
-            lag_s: (!motion.is_steady).then_some(best.0),
+            lag_s: (!is_steady).then_some(best.0),
         }
     })
 }

@@ -38,8 +38,9 @@ pub struct CommissionArgs {
 
 const AFTER_HELP: &str = "First start the driver with little force: io-driver run --config FILE --commissioning\n\
 If the device has to be zeroed, that comes first. Then you move the tip along each axis and the counters have\n\
-to agree; then each motor pushes for some seconds with less than 0.5 N, and its joint has to turn the right way. Stay clear of the arm's reach, with a\n\
-hand on the emergency stop (or ready for Ctrl-C, which ends in zero force).\n\
+to agree; then each motor pushes for some seconds with less than 0.5 N, and its joint has to turn the right way.\n\
+Meanwhile hold the tip loosely and still: let go, many arms fall by their weight. Keep the other hand on the\n\
+emergency stop (or ready for Ctrl-C, which ends in zero force).\n\
 Exit status: 0 all signs and channels are right; 2 bad usage or input; 3 something is wrong, or a fault.";
 
 const AXES: [&str; 3] = ["to the right (x)", "up (y)", "towards you (z)"];
@@ -87,7 +88,7 @@ fn commission(args: &CommissionArgs) -> Result<bool, Failure> {
             return Ok(false);
         }
     }
-    prompt(args, "Now the motors. Let go of the arm, stay clear of it").map_err(during)?;
+    prompt(args, "Now the motors. Hold the tip loosely and still, so that the arm's weight does not move it, and stay clear of the rest").map_err(during)?;
     let kinematics = premium.mechanism;
     let per_count = premium.joint_map().rad_per_count();
     let tell = |joint: usize| say(&format!("  {} ...", JOINTS[joint]));
@@ -146,7 +147,7 @@ fn motor_words(joint: usize, verdict: MotorVerdict) -> String {
             format!("WRONG, the {} turned instead; look at `channel` under [motors]", JOINTS[other])
         }
         MotorVerdict::Stuck => {
-            "did not turn; is it connected, switched on, free to move, and is the force enough against its friction?"
+            "did not turn; is it connected, switched on, free to move, held loosely enough, and is the force enough against its friction?"
                 .into()
         }
     }

@@ -2,12 +2,19 @@
 
 use super::{EXIT_FAULT, EXIT_USAGE, fail, print_line};
 use crate::device::encoder_trace::{EncoderReplay, EncoderTrace};
+use crate::device::simulated::Wish;
 use crate::device_file::{self, ArmFile, DeviceFile};
 use crate::emulator::card::Card;
+use crate::emulator::held_arm::HeldArm;
 use crate::emulator::motion::Motion;
 use crate::emulator::process::{Emulator, Play};
+use crate::kinematics::Mechanism;
 use crate::say::say;
+use crate::sim::hand::HandModel;
+use crate::sim::hand::model_file::{self, Firmness};
+use crate::sim::script::{HandPlayer, HandScript};
 use clap::Args;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use rt_core::signals::StopSignals;
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -29,6 +36,14 @@ pub struct EmulateArgs {
     /// Yield to the motors like an arm in treacle of this viscosity (N m s/rad), instead of standing still
     #[arg(long = "yield", value_name = "NMS", allow_negative_numbers = true)]
     viscosity: Option<f64>,
+    /// Move as an arm of this description does: with its mass, its weight and its friction, held by a hand
+    #[arg(long, conflicts_with_all = ["trace", "viscosity"])]
+    simulated: bool,
+    #[command(flatten)]
+    holder: HolderArgs,
+    /// The counters read this in the home pose, instead of zero
+    #[arg(long, value_name = "COUNTS", default_value_t = 0, allow_negative_numbers = true)]
+    counter_offset: i32,
     /// The amplifiers switch off after so much silence of the driver
     #[arg(long, value_name = "MS", default_value_t = 10.0, allow_negative_numbers = true)]
     watchdog_ms: f64,
@@ -42,6 +57,40 @@ pub struct EmulateArgs {
     #[arg(long, value_name = "US", default_value_t = 500.0, allow_negative_numbers = true)]
     poll_us: f64,
 }
+
+/// Who holds a simulated arm.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "With --simulated")]
+struct HolderArgs {
+    /// How the hand pulls, a built-in's name or a file (TOML); nobody: nobody holds the arm
+    #[arg(long, value_name = "HAND", default_value = "pen-grip", requires = "simulated")]
+    hand_model: PathBuf,
+    /// How tightly it holds: light, usual, firm
+    #[arg(long, value_name = "HOW", default_value = "usual", value_parser = parse_firmness, requires = "simulated")]
+    firmness: Firmness,
+    /// It does not tremble
+    #[arg(long, requires = "simulated")]
+    calm: bool,
+    /// Where it holds the tip (m), in the base's frame [default: the home position]
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_place, conflicts_with = "hand", allow_negative_numbers = true, requires = "simulated")]
+    hold: Option<Place>,
+    /// Where it takes the tip (CSV), in the base's frame
+    #[arg(long, value_name = "FILE", requires = "simulated")]
+    hand: Option<PathBuf>,
+    /// Which finger of that file it is
+    #[arg(long, value_name = "NAME", default_value = "f0", requires = "hand")]
+    finger: String,
+    /// How the base stands in the world, as `base_orientation_wxyz` of the driver's configuration says [default: upright]
+    #[arg(long, value_name = "W,X,Y,Z", value_parser = parse_orientation, allow_negative_numbers = true, requires = "simulated")]
+    base_orientation: Option<UnitQuaternion<f64>>,
+    /// Seed of tremor and noise
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "simulated")]
+    seed: u64,
+}
+
+/// A point (m).
+#[derive(Debug, Clone, Copy)]
+struct Place([f64; 3]);
 
 const AFTER_HELP: &str = "The driver's configuration names the card: backend = \"emulated\", card = \"FILE\".\n\
 When a signal ends it, it prints what its amplifiers have seen, as JSON.\n\
@@ -58,15 +107,16 @@ pub(super) fn run(args: &EmulateArgs) -> ExitCode {
 fn play(args: &EmulateArgs) -> Result<ExitCode, Box<dyn Error>> {
     let signals = StopSignals::install()?;
     let premium = describe(&args.description)?;
-    let motion = motion(args, &premium)?;
+    let (motion, held_by) = motion(args, &premium)?;
     let play = Play {
         peak_n: limit("--peak-n", args.peak_n.unwrap_or(premium.peak_force_n))?,
         step_n: limit("--step-n", args.step_n.unwrap_or(f64::INFINITY))?,
         watchdog_ns: positive("--watchdog-ms", args.watchdog_ms, 1e6)?,
         poll_ns: positive("--poll-us", args.poll_us, 1e3)?,
+        counter_offset: args.counter_offset.into(),
     };
     let card = Card::create(&args.card)?;
-    say(format_args!("io-driver: playing {} at {}", premium.name, args.card.display()));
+    say(format_args!("io-driver: playing {}{held_by} at {}", premium.name, args.card.display()));
     let tally = Emulator::new(card, premium, motion, play).run(play.poll_ns, &signals);
     let _ = std::fs::remove_file(&args.card);
     let _ = print_line(&serde_json::to_string(&tally)?);
@@ -87,7 +137,15 @@ fn describe(name: &str) -> Result<ArmFile, Box<dyn Error>> {
     }
 }
 
-fn motion(args: &EmulateArgs, premium: &ArmFile) -> Result<Motion, Box<dyn Error>> {
+/// And who holds the arm, in words.
+fn motion(args: &EmulateArgs, premium: &ArmFile) -> Result<(Motion, String), Box<dyn Error>> {
+    if args.simulated {
+        return simulated(&args.holder, premium);
+    }
+    Ok((unheld(args, premium)?, String::new()))
+}
+
+fn unheld(args: &EmulateArgs, premium: &ArmFile) -> Result<Motion, Box<dyn Error>> {
     if let Some(file) = &args.trace {
         let trace = EncoderTrace::parse(&read(file)?, file, premium.encoders.count_bits)?;
         return Ok(Motion::Trace(EncoderReplay::new(trace)));
@@ -99,6 +157,81 @@ fn motion(args: &EmulateArgs, premium: &ArmFile) -> Result<Motion, Box<dyn Error
         }
         Some(other) => Err(format!("--yield: found {other}, allowed: 0.001 N m s/rad and more").into()),
     }
+}
+
+fn simulated(args: &HolderArgs, arm: &ArmFile) -> Result<(Motion, String), Box<dyn Error>> {
+    let home = arm.mechanism.forward(arm.encoders.home_joint_angles_rad);
+    let wish = match &args.hand {
+        Some(file) => {
+            let (script, finger) = script(file, &args.finger)?;
+            Wish::Scripted(HandPlayer::new(script), finger)
+        }
+        None => Wish::Resting(args.hold.map_or(home, |Place(place)| place.into())),
+    };
+    let model = hand_model(args)?;
+    let held_by = model.as_ref().map_or_else(|| "nobody".to_owned(), |model| model.name.clone());
+    let arm = arm.clone().in_base(&args.base_orientation.unwrap_or_default());
+    let held = HeldArm::new(&arm, wish, model.as_ref(), args.seed)?;
+    Ok((Motion::Simulated(Box::new(held)), format!(", held by: {held_by},")))
+}
+
+/// A hand file tells of all fingers of a hand; here one of them is played.
+fn script(file: &Path, finger: &str) -> Result<(HandScript, usize), Box<dyn Error>> {
+    let text = read(file)?;
+    let header = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
+    let named: Vec<&str> = header.split(',').filter_map(|column| column.trim().strip_suffix("_x")).collect();
+    match named.iter().position(|name| *name == finger) {
+        Some(place) => Ok((HandScript::parse(&text, file, &named)?, place)),
+        // What is wrong with the file comes before a finger that is not in it.
+        None => Err(match HandScript::parse(&text, file, &named) {
+            Err(error) if !named.is_empty() => error.into(),
+            _ => {
+                format!("{}: no finger {finger}; --finger one of {}", file.display(), named.join(", ")).into()
+            }
+        }),
+    }
+}
+
+fn hand_model(args: &HolderArgs) -> Result<Option<HandModel>, Box<dyn Error>> {
+    let (file, name) = (&args.hand_model, args.hand_model.to_string_lossy());
+    let text = match model_file::builtin(&name) {
+        _ if name == "nobody" => return Ok(None),
+        Some(text) => text.to_owned(),
+        None => read(file).map_err(|error| {
+            format!(
+                "{error}; name a hand's model, or one of {}, nobody",
+                model_file::BUILTIN_NAMES.join(", ")
+            )
+        })?,
+    };
+    let mut model = model_file::parse(&text, file, args.firmness)?;
+    if args.calm {
+        model.tremor.rms_m = Vector3::zeros();
+    }
+    Ok(Some(model))
+}
+
+fn parse_firmness(text: &str) -> Result<Firmness, String> {
+    Firmness::from_name(text).ok_or_else(|| format!("found {text}, allowed: light, usual, firm"))
+}
+
+fn parse_place(text: &str) -> Result<Place, String> {
+    numbers(text)
+        .map(Place)
+        .ok_or_else(|| format!("found {text}, allowed: three numbers of metres, as in 0.0,0.05,-0.02"))
+}
+
+fn parse_orientation(text: &str) -> Result<UnitQuaternion<f64>, String> {
+    let given = numbers(text).map(|[w, x, y, z]| Quaternion::new(w, x, y, z));
+    given.filter(|q| (q.norm() - 1.0).abs() < 1e-3).map(UnitQuaternion::new_normalize).ok_or_else(|| {
+        format!("found {text}, allowed: w,x,y,z of a quaternion of length 1, as in 0.7071,0.0,0.0,0.7071")
+    })
+}
+
+/// So many finite numbers with commas between them.
+fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    numbers?.try_into().ok().filter(|numbers: &[f64; N]| numbers.iter().all(|n| n.is_finite()))
 }
 
 fn read(file: &Path) -> Result<String, Box<dyn Error>> {
@@ -121,5 +254,23 @@ fn positive(option: &str, number: f64, unit_ns: f64) -> Result<u64, Box<dyn Erro
         Ok(ns as u64)
     } else {
         Err(format!("{option}: found {number}, allowed: more than 0, at most a day").into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_and_an_orientation_are_as_many_numbers_as_they_have() {
+        assert_eq!(parse_place("0.1, -0.2,3e-2").unwrap().0, [0.1, -0.2, 0.03]);
+        let turn = parse_orientation("0.6,0,0,0.8").unwrap();
+        assert!((turn.w - 0.6).abs() < 1e-15 && (turn.k - 0.8).abs() < 1e-15);
+        for wrong in ["", "0.1,0.2", "0.1,0.2,0.3,0.4,0.5", "a,b,c", "0.1,0.2,inf", "0.1,,0.2", "nan,0,0"] {
+            assert!(parse_place(wrong).unwrap_err().contains("three numbers"), "{wrong}");
+        }
+        for wrong in ["1,0,0", "1,1,0,0", "0,0,0,0", "nan,0,0,1", "0.6,0,0,0.8,0"] {
+            assert!(parse_orientation(wrong).unwrap_err().contains("length 1"), "{wrong}");
+        }
     }
 }

@@ -46,6 +46,11 @@ pub enum SessionError {
         "no force was let through within {0} s; if there is a dead-man's switch, hold it (`io-driver status` tells)"
     )]
     NoAuthority(u64),
+    /// It moves while no motor pushes it.
+    #[error(
+        "the arm did not rest for half a second within {0} s; hold its tip loosely and still, with the forearm on a table"
+    )]
+    Restless(u64),
     /// The arm is where forces cannot be told.
     #[error("the arm is too near to a singular pose; move it to its home position and try again")]
     Singular,
@@ -125,12 +130,16 @@ impl<'a> Session<'a> {
             turned_rad: rad_per_count.map(|rad| TURNED_COUNTS * rad.abs()),
             ramp_ticks: ticks(3.0),
             rest_ticks: ticks(0.5),
+            rest_share: REST_SHARE,
         });
         let mut told = None;
         loop {
             self.next_frame()?;
             let joints = self.joints();
             let torque = check.step(joints);
+            if check.restless_ticks() > ticks(UNTIL_REST_S) {
+                return Err(SessionError::Restless(UNTIL_REST_S as u64));
+            }
             self.answer(force_for(kinematics, joints, torque)?);
             if let Some((joint, _)) = check.trying().filter(|(joint, _)| told != Some(*joint)) {
                 told = Some(joint);
@@ -225,6 +234,11 @@ impl<'a> Session<'a> {
 
 /// So far a joint has to turn: well above the flicker of a counter, a millimetre at the tip.
 const TURNED_COUNTS: f64 = 30.0;
+
+/// What a hand trembles, and a joint creeps, while it rests: a third of a millimetre at the tip.
+const REST_SHARE: f64 = 0.35;
+/// How long an arm may take to come to rest (s).
+const UNTIL_REST_S: f64 = 20.0;
 
 /// The force on the user that makes these joint torques.
 fn force_for(

@@ -46,6 +46,8 @@ pub enum Backend {
         description: PathBuf,
         /// The trace.
         trace: PathBuf,
+        /// R_WD, how its base stands, which its weight minds.
+        base_orientation: UnitQuaternion<f64>,
     },
     /// A card of registers that a process of its own emulates, amplifiers with watchdog included.
     Emulated {
@@ -53,6 +55,8 @@ pub enum Backend {
         description: PathBuf,
         /// The file of registers that both processes map.
         card: PathBuf,
+        /// R_WD, how its base stands, which its weight minds.
+        base_orientation: UnitQuaternion<f64>,
     },
 }
 
@@ -84,6 +88,16 @@ impl Backend {
         match self {
             Self::Ideal(wish) | Self::Simulated { wish, .. } => Some(wish),
             Self::Replay { .. } | Self::Emulated { .. } => None,
+        }
+    }
+
+    /// R_WD, how its base stands.
+    pub fn base_orientation(&self) -> UnitQuaternion<f64> {
+        match self {
+            Self::Ideal(wish) | Self::Simulated { wish, .. } => wish.base_in_world.rotation,
+            Self::Replay { base_orientation, .. } | Self::Emulated { base_orientation, .. } => {
+                *base_orientation
+            }
         }
     }
 
@@ -262,11 +276,13 @@ impl RawDevice {
     ) -> Result<Backend, TomlReport> {
         self.refuse_foreign("replay", &[("card", span_of(&self.card))], toml)?;
         self.refuse_foreign("replay", &self.keys_of_wish(), toml)?;
+        self.refuse_position("replay", toml)?;
         self.refuse_foreign("replay", &self.keys_of_simulated(), toml)?;
         let trace = self.needed("replay", &self.trace, "trace", &span, toml)?;
         Ok(Backend::Replay {
             description: self.description("replay", &span, toml, directory)?,
             trace: directory.join(trace),
+            base_orientation: self.orientation(toml)?,
         })
     }
 
@@ -278,11 +294,13 @@ impl RawDevice {
     ) -> Result<Backend, TomlReport> {
         self.refuse_foreign("emulated", &[("trace", span_of(&self.trace))], toml)?;
         self.refuse_foreign("emulated", &self.keys_of_wish(), toml)?;
+        self.refuse_position("emulated", toml)?;
         self.refuse_foreign("emulated", &self.keys_of_simulated(), toml)?;
         let card = self.needed("emulated", &self.card, "card", &span, toml)?;
         Ok(Backend::Emulated {
             description: self.description("emulated", &span, toml, directory)?,
             card: directory.join(card),
+            base_orientation: self.orientation(toml)?,
         })
     }
 
@@ -295,14 +313,23 @@ impl RawDevice {
         ]
     }
 
-    fn keys_of_wish(&self) -> [(&'static str, Option<std::ops::Range<usize>>); 5] {
+    fn keys_of_wish(&self) -> [(&'static str, Option<std::ops::Range<usize>>); 3] {
         [
             ("hand", span_of(&self.hand)),
             ("finger", span_of(&self.finger)),
             ("start_m", span_of(&self.start_m)),
-            ("base_position_m", span_of(&self.base_position_m)),
-            ("base_orientation_wxyz", span_of(&self.base_orientation_wxyz)),
         ]
+    }
+
+    /// Of a device with counters only its weight asks how it stands; a position would have no effect.
+    fn refuse_position(&self, backend: &str, toml: &TomlText<'_>) -> Result<(), TomlReport> {
+        self.base_position_m.as_ref().map_or(Ok(()), |list| {
+            Err(toml.refuse(
+                list.span(),
+                format_args!("`base_position_m` in a device of backend \"{backend}\""),
+                "`base_orientation_wxyz` alone, by which its weight pulls; where it stands is a layout's matter",
+            ))
+        })
     }
 
     fn needed(
@@ -354,18 +381,36 @@ impl RawDevice {
     fn base(&self, toml: &TomlText<'_>) -> Result<Isometry3<f64>, TomlReport> {
         let position =
             self.base_position_m.as_ref().map_or(Ok([0.0; 3]), |list| toml.numbers(list, PLACE))?;
-        let rotation = match &self.base_orientation_wxyz {
-            None => UnitQuaternion::identity(),
-            Some(list) => {
-                let [w, x, y, z] = toml.numbers(list, QUATERNION)?;
-                UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-6).ok_or_else(|| {
-                    toml.refuse(list.span(), "a quaternion of no length", "w, x, y, z of a rotation")
-                })?
-            }
-        };
-        Ok(Isometry3::from_parts(Translation3::from(Vector3::from(position)), rotation))
+        Ok(Isometry3::from_parts(Translation3::from(Vector3::from(position)), self.orientation(toml)?))
+    }
+
+    fn orientation(&self, toml: &TomlText<'_>) -> Result<UnitQuaternion<f64>, TomlReport> {
+        let Some(list) = &self.base_orientation_wxyz else { return Ok(UnitQuaternion::identity()) };
+        let [w, x, y, z] = toml.numbers(list, QUATERNION)?;
+        let quaternion = Quaternion::new(w, x, y, z);
+        let length = quaternion.norm();
+        if (length - 1.0).abs() > LENGTH_TOLERANCE {
+            let found = format_args!("a quaternion of length {length:.3}").to_string();
+            return Err(toml.refuse(
+                list.span(),
+                found,
+                "w, x, y, z of a rotation, whose squares add up to 1",
+            ));
+        }
+        if (length - 1.0).abs() <= UNIT_ROUNDING {
+            // As it is, so that what was written down is read back bit for bit.
+            return Ok(UnitQuaternion::new_unchecked(quaternion));
+        }
+        Ok(UnitQuaternion::new_normalize(quaternion))
     }
 }
+
+/// As in a layout: four digits after the point are a rotation; what is further from length 1 is more likely another
+/// order of components, or angles, and would push an arm the wrong way.
+const LENGTH_TOLERANCE: f64 = 1e-3;
+
+/// What rounding makes of the length of a quaternion that was brought to length 1.
+const UNIT_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 fn span_of<T>(key: &Option<Spanned<T>>) -> Option<std::ops::Range<usize>> {
     key.as_ref().map(Spanned::span)

@@ -5,6 +5,7 @@ use super::{
     Wish,
 };
 use crate::safety::switches::{Switch, Switches};
+use nalgebra::UnitQuaternion;
 use shm_abi::doorbell::WaitMode;
 use std::fmt::Write as _;
 use toml::Value;
@@ -100,15 +101,17 @@ fn write_device(text: &mut String, device: &DeviceConfig) -> std::fmt::Result {
             writeln!(text, "seed = {seed}")?;
             write_wish(text, wish)
         }
-        Backend::Replay { description, trace } => {
+        Backend::Replay { description, trace, base_orientation } => {
             writeln!(text, "backend = \"replay\"")?;
             writeln!(text, "description = {}", quoted(&description.to_string_lossy()))?;
-            writeln!(text, "trace = {}", quoted(&trace.to_string_lossy()))
+            writeln!(text, "trace = {}", quoted(&trace.to_string_lossy()))?;
+            write_orientation(text, base_orientation)
         }
-        Backend::Emulated { description, card } => {
+        Backend::Emulated { description, card, base_orientation } => {
             writeln!(text, "backend = \"emulated\"")?;
             writeln!(text, "description = {}", quoted(&description.to_string_lossy()))?;
-            writeln!(text, "card = {}", quoted(&card.to_string_lossy()))
+            writeln!(text, "card = {}", quoted(&card.to_string_lossy()))?;
+            write_orientation(text, base_orientation)
         }
     }
 }
@@ -117,9 +120,13 @@ fn write_wish(text: &mut String, wish: &Wish) -> std::fmt::Result {
     if let Some((hand, finger)) = &wish.hand {
         writeln!(text, "hand = {}\nfinger = {}", quoted(&hand.to_string_lossy()), quoted(finger))?;
     }
-    let turn = wish.base_in_world.rotation.quaternion();
     writeln!(text, "start_m = {:?}", wish.start_m.as_slice())?;
     writeln!(text, "base_position_m = {:?}", wish.base_in_world.translation.vector.as_slice())?;
+    write_orientation(text, &wish.base_in_world.rotation)
+}
+
+fn write_orientation(text: &mut String, orientation: &UnitQuaternion<f64>) -> std::fmt::Result {
+    let turn = orientation.quaternion();
     writeln!(text, "base_orientation_wxyz = {:?}", [turn.w, turn.i, turn.j, turn.k])
 }
 

@@ -68,9 +68,9 @@ pub enum Wish {
 
 /// How the hand turns the handle, and what it presses.
 #[derive(Debug, Clone, Copy)]
-struct Handle {
-    orientation_W: UnitQuaternion<f64>,
-    buttons: u64,
+pub(crate) struct Handle {
+    pub(crate) orientation_W: UnitQuaternion<f64>,
+    pub(crate) buttons: u64,
 }
 
 impl Default for Handle {
@@ -81,7 +81,7 @@ impl Default for Handle {
 
 impl Wish {
     /// Where the tip is wanted, in W (m), and the handle.
-    fn at(&mut self, time_s: f64) -> (Vector3<f64>, Handle) {
+    pub(crate) fn at(&mut self, time_s: f64) -> (Vector3<f64>, Handle) {
         match self {
             Self::Resting(at) => (*at, Handle::default()),
             Self::Scripted(player, finger) => {
@@ -94,7 +94,7 @@ impl Wish {
         }
     }
 
-    fn has_buttons(&self) -> bool {
+    pub(crate) fn has_buttons(&self) -> bool {
         matches!(self, Self::Scripted(player, finger) if player.script().has_buttons(*finger))
     }
 }

@@ -179,7 +179,7 @@ fn encoders(
     home_joint_angles_rad: [f64; 3],
 ) -> Result<EncoderSpec, TomlReport> {
     Ok(EncoderSpec {
-        channel: channels(toml, &raw.channel)?,
+        channel: channels(toml, &raw.channel, &[])?,
         counts_per_rev: toml.integer(&raw.counts_per_rev, 4..=10_000_000)? as u32,
         count_bits: toml.integer(&raw.count_bits, 8..=32)? as u32,
         sign: signs(toml, &raw.sign)?,
@@ -190,7 +190,7 @@ fn encoders(
 
 fn motors(toml: &TomlText<'_>, raw: &Motors, reduction: [f64; 3]) -> Result<MotorSpec, TomlReport> {
     Ok(MotorSpec {
-        channel: channels(toml, &raw.channel)?,
+        channel: channels(toml, &raw.channel, &[])?,
         sign: signs(toml, &raw.sign)?,
         reduction,
         torque_constant_nm_per_a: toml.number(&raw.torque_constant_nm_per_a, TORQUE_CONSTANT)?,
@@ -235,7 +235,8 @@ fn interval(toml: &TomlText<'_>, list: &SpannedList, allowed: Allowed) -> Result
     Err(toml.refuse(list.span(), format_args!("[{min}, {max}]"), "the smaller angle first"))
 }
 
-fn signs(toml: &TomlText<'_>, list: &WholeList) -> Result<[i8; 3], TomlReport> {
+/// +1 or -1 for each joint.
+pub(super) fn signs(toml: &TomlText<'_>, list: &WholeList) -> Result<[i8; 3], TomlReport> {
     let items: &[Whole; 3] = toml.exactly(list)?;
     let mut signs = [0; 3];
     for (sign, item) in signs.iter_mut().zip(items) {
@@ -248,17 +249,21 @@ fn signs(toml: &TomlText<'_>, list: &WholeList) -> Result<[i8; 3], TomlReport> {
     Ok(signs)
 }
 
-/// Three different channels: one motor answering for two joints would be a runaway.
-fn channels(toml: &TomlText<'_>, list: &WholeList) -> Result<[u8; 3], TomlReport> {
+/// Three different channels beside those that are taken: one motor answering for two joints would be a runaway.
+pub(super) fn channels(toml: &TomlText<'_>, list: &WholeList, taken: &[u8]) -> Result<[u8; 3], TomlReport> {
     let items: &[Whole; 3] = toml.exactly(list)?;
     let mut channels = [0; 3];
     for (index, item) in items.iter().enumerate() {
         let channel = toml.integer(item, 0..=MAX_CHANNEL)? as u8;
-        if channels[..index].contains(&channel) {
-            let found = format_args!("{channel} twice").to_string();
-            return Err(toml.refuse(item.span(), found, "a channel of its own for each joint"));
-        }
-        channels[index] = channel;
+        let found = match channel {
+            _ if taken.contains(&channel) => format!("{channel}, which another encoder has"),
+            _ if channels[..index].contains(&channel) => format!("{channel} twice"),
+            _ => {
+                channels[index] = channel;
+                continue;
+            }
+        };
+        return Err(toml.refuse(item.span(), found, "a channel of its own for each joint"));
     }
     Ok(channels)
 }

@@ -9,6 +9,7 @@ use std::f64::consts::TAU;
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::arm::{channels, signs};
 use crate::encoders::EncoderSpec;
 use crate::toml_report::{Allowed, SpannedList, TomlReport, TomlText};
 
@@ -30,7 +31,7 @@ pub(super) fn check(
     joints: &EncoderSpec,
 ) -> Result<EncoderSpec, TomlReport> {
     Ok(EncoderSpec {
-        channel: channels(toml, &raw.channel, joints.channel)?,
+        channel: channels(toml, &raw.channel, &joints.channel)?,
         counts_per_rev: toml.integer(&raw.counts_per_rev, 4..=10_000_000)? as u32,
         count_bits: joints.count_bits,
         sign: signs(toml, &raw.sign)?,
@@ -44,39 +45,6 @@ pub(super) fn buttons(toml: &TomlText<'_>, key: Option<&Spanned<i64>>) -> Result
     key.map_or(Ok(0), |number| Ok(toml.integer(number, 0..=32)? as u32))
 }
 
-fn channels(
-    toml: &TomlText<'_>,
-    list: &Spanned<Vec<Spanned<i64>>>,
-    taken: [u8; 3],
-) -> Result<[u8; 3], TomlReport> {
-    let items: &[Spanned<i64>; 3] = toml.exactly(list)?;
-    let mut channels = [0; 3];
-    for (index, item) in items.iter().enumerate() {
-        let channel = toml.integer(item, 0..=MAX_CHANNEL)? as u8;
-        if taken.contains(&channel) || channels[..index].contains(&channel) {
-            let found = format_args!("{channel}, which another encoder has").to_string();
-            return Err(toml.refuse(item.span(), found, "a channel of its own for each angle"));
-        }
-        channels[index] = channel;
-    }
-    Ok(channels)
-}
-
-fn signs(toml: &TomlText<'_>, list: &Spanned<Vec<Spanned<i64>>>) -> Result<[i8; 3], TomlReport> {
-    let items: &[Spanned<i64>; 3] = toml.exactly(list)?;
-    let mut signs = [0; 3];
-    for (sign, item) in signs.iter_mut().zip(items) {
-        *sign = match *item.get_ref() {
-            1 => 1,
-            -1 => -1,
-            other => return Err(toml.refuse(item.span(), other, "1 or -1")),
-        };
-    }
-    Ok(signs)
-}
-
-/// A card has eight registers.
-const MAX_CHANNEL: i64 = 7;
 /// An encoder may sit on the axis itself.
 const REDUCTION: Allowed = Allowed { min: 0.1, max: 1000.0, unit: "encoder turns per turn of the axis" };
 const ANGLE: Allowed = Allowed { min: -TAU, max: TAU, unit: "rad" };
@@ -123,7 +91,7 @@ mod tests {
     fn a_counter_that_is_taken_and_numbers_that_no_gimbal_has_are_refused() {
         for (from, to, words) in [
             ("[3, 4, 5]", "[3, 2, 5]", "2, which another encoder has"),
-            ("[3, 4, 5]", "[3, 4, 4]", "4, which another encoder has"),
+            ("[3, 4, 5]", "[3, 4, 4]", "4 twice"),
             ("[3, 4, 5]", "[3, 4, 8]", "8"),
             ("[1, -1, 1]", "[1, 0, 1]", "1 or -1"),
             ("[1.0, 1.0, 5.18]", "[1.0, 0.0, 5.18]", "encoder turns per turn of the axis"),

@@ -168,7 +168,12 @@ impl Amplifier {
 
     /// Joint torques that the motors make now (N m).
     pub fn joint_torque(&self) -> [f64; 3] {
-        if self.is_tripped || !self.value.enable { [0.0; 3] } else { self.torque_of(self.value.codes) }
+        self.codes().map_or([0.0; 3], |codes| self.torque_of(codes))
+    }
+
+    /// The codes that it regulates to; `None` while it is off or has tripped.
+    pub fn codes(&self) -> Option<[u16; 3]> {
+        (!self.is_tripped && self.value.enable).then_some(self.value.codes)
     }
 
     fn check(&mut self, value: Value, joints: [f64; 3]) {

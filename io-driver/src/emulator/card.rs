@@ -80,7 +80,8 @@ pub struct Record {
     pub flags: AtomicU64,
 }
 
-/// A hand that turns the arm, as far as it goes beyond what the emulator itself does. Like the buttons, anybody's.
+/// A hand that turns the arm, as far as it goes beyond what the emulator itself does. Like the buttons, anybody's. One
+/// that holds a simulated arm wants it to be turned by so much, and gets there as hands do.
 #[repr(C, align(64))]
 #[derive(Debug)]
 pub struct Hand {

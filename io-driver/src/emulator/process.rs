@@ -2,9 +2,9 @@
 
 use super::amplifier::{Amplifier, AmplifierSpec, Tally, Value};
 use super::card::{ARM_SHIFT, Card, QUEUE, Record, STATUS_TRIPPED};
-use super::motion::{Motion, Pose};
+use super::motion::{Given, Motion, Pose};
 use crate::device_file::ArmFile;
-use crate::encoders::wrapped;
+use crate::encoders::{EncoderSpec, wrapped};
 use rt_core::clock::{monotonic_ns, sleep_until_ns};
 use rt_core::signals::StopSignals;
 use std::sync::atomic::Ordering;
@@ -20,6 +20,8 @@ pub struct Play {
     pub watchdog_ns: u64,
     /// How often the registers are looked at (ns).
     pub poll_ns: u64,
+    /// What the counters show more than they would if they had been zero at home.
+    pub counter_offset: i64,
 }
 
 /// A card being played.
@@ -34,7 +36,13 @@ pub struct Emulator {
     passed_ns: u64,
     checked: u64,
     arm: u32,
+    counter_offset: i64,
+    longest_stall_ns: u64,
 }
+
+/// An emulator that stalls for longer than this (ns), and than two of its rounds, finds the world as it was after it:
+/// made up at once, what it missed would be a jump of the counters, and to a driver far too fast.
+const LONGEST_STALL_NS: u64 = 2_000_000;
 
 impl Emulator {
     /// A card at home that nobody has written to.
@@ -48,7 +56,7 @@ impl Emulator {
         });
         let now = monotonic_ns();
         let mut motion = motion;
-        let pose = motion.pass(0.0, 0.0, [0.0; 3], [0; 3], &premium.encoders);
+        let pose = motion.pass(0.0, 0.0, Given::default(), [0; 3], &premium.encoders);
         let mut emulator = Self {
             card,
             premium,
@@ -59,6 +67,8 @@ impl Emulator {
             passed_ns: now,
             checked: card.outputs.written.load(Ordering::Acquire),
             arm: card.outputs.arm.load(Ordering::Relaxed),
+            counter_offset: play.counter_offset,
+            longest_stall_ns: LONGEST_STALL_NS.max(2 * play.poll_ns),
         };
         emulator.tell();
         emulator
@@ -76,23 +86,29 @@ impl Emulator {
 
     /// Takes what was written, lets time pass to `now_ns`, tells.
     pub fn turn(&mut self, now_ns: u64) {
-        let taken = self.take_values();
+        self.passed_ns = self.passed_ns.max(now_ns.saturating_sub(self.longest_stall_ns));
+        let taken = self.take_values(now_ns);
         self.take_arming();
         // A register that is off by itself, not because a value that says so is still on its way.
         let is_on = self.card.outputs.enable.load(Ordering::Acquire) == 1;
         self.amplifier.pass(now_ns, is_on || taken > 0);
-        let seconds = |ns: u64| ns as f64 / 1e9;
-        let (time_s, dt_s) =
-            (seconds(now_ns - self.began_ns), seconds(now_ns.saturating_sub(self.passed_ns)));
-        self.passed_ns = now_ns;
-        let torque = self.amplifier.joint_torque();
-        let hand = self.turned_by_hand(self.premium.encoders.channel);
-        self.pose = self.motion.pass(time_s, dt_s, torque, hand, &self.premium.encoders);
+        self.live_until(now_ns);
         self.tell();
     }
 
+    /// Lets the arm move with what its amplifiers give now.
+    fn live_until(&mut self, until_ns: u64) {
+        let until_ns = until_ns.max(self.passed_ns);
+        let seconds = |ns: u64| ns as f64 / 1e9;
+        let (time_s, dt_s) = (seconds(until_ns - self.began_ns), seconds(until_ns - self.passed_ns));
+        self.passed_ns = until_ns;
+        let given = Given { torque_nm: self.amplifier.joint_torque(), codes: self.amplifier.codes() };
+        let hand = self.turned_by_hand(self.premium.encoders.channel);
+        self.pose = self.motion.pass(time_s, dt_s, given, hand, &self.premium.encoders);
+    }
+
     /// Returns how many there were.
-    fn take_values(&mut self) -> u64 {
+    fn take_values(&mut self, now_ns: u64) -> u64 {
         let before = self.checked;
         let written = self.card.outputs.written.load(Ordering::Acquire);
         let oldest = written.saturating_sub(QUEUE as u64);
@@ -105,8 +121,10 @@ impl Emulator {
             match self.card.record(self.checked) {
                 Some(record) => {
                     // Before this value and after all others, however late it is looked at.
+                    let value = self.value_of(record);
+                    self.live_until(value.time_ns.min(now_ns));
                     self.arm_if_newer((record.flags.load(Ordering::Relaxed) >> ARM_SHIFT) as u32);
-                    self.amplifier.take(self.value_of(record), self.pose.joints);
+                    self.amplifier.take(value, self.pose.joints);
                 }
                 None => self.amplifier.lose(1),
             }
@@ -144,15 +162,16 @@ impl Emulator {
     }
 
     fn tell(&mut self) {
-        let inputs = &self.card.inputs;
-        for (channel, counter) in self.premium.encoders.channel.iter().zip(self.pose.counters) {
-            inputs.counters[usize::from(*channel)].store(counter, Ordering::Relaxed);
-        }
+        let handle = self.motion.handle();
+        self.tell_counters(&self.premium.encoders, self.pose.counters.map(i64::from));
         if let Some(gimbal) = &self.premium.gimbal {
-            for (channel, count) in gimbal.channel.iter().zip(self.turned_by_hand(gimbal.channel)) {
-                let counter = wrapped(count, gimbal.count_bits) as u32;
-                inputs.counters[usize::from(*channel)].store(counter, Ordering::Relaxed);
-            }
+            let turned = self.turned_by_hand(gimbal.channel);
+            let own = handle.gimbal_counters.unwrap_or_default();
+            self.tell_counters(gimbal, std::array::from_fn(|axis| own[axis] + turned[axis]));
+        }
+        let inputs = &self.card.inputs;
+        if let Some(buttons) = handle.buttons {
+            inputs.buttons.store(buttons, Ordering::Relaxed);
         }
         let status = if self.amplifier.is_tripped() { STATUS_TRIPPED } else { 0 };
         inputs.status.store(status, Ordering::Relaxed);
@@ -160,6 +179,13 @@ impl Emulator {
             word.store(count, Ordering::Relaxed);
         }
         inputs.heartbeat.fetch_add(1, Ordering::Release);
+    }
+
+    fn tell_counters(&self, encoders: &EncoderSpec, counts: [i64; 3]) {
+        for (channel, count) in encoders.channel.iter().zip(counts) {
+            let counter = wrapped(count.wrapping_add(self.counter_offset), encoders.count_bits) as u32;
+            self.card.inputs.counters[usize::from(*channel)].store(counter, Ordering::Relaxed);
+        }
     }
 }
 
@@ -183,7 +209,7 @@ mod tests {
             panic!("it is built in");
         };
         // A step of a tenth of a newton a value.
-        let play = Play { peak_n: 8.5, step_n: 0.1, watchdog_ns: 1000 * MS, poll_ns: MS };
+        let play = Play { peak_n: 8.5, step_n: 0.1, watchdog_ns: 1000 * MS, poll_ns: MS, counter_offset: 0 };
         Emulator::new(card, *premium, Motion::Rest, play)
     }
 

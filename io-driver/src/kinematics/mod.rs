@@ -49,6 +49,11 @@ pub trait Mechanism: Send {
     /// per radian.
     fn jacobian(&self, joints: [f64; 3]) -> Matrix3<f64>;
 
+    /// Both, for whoever needs both at the same joints.
+    fn forward_and_jacobian(&self, joints: [f64; 3]) -> (Vector3<f64>, Matrix3<f64>) {
+        (self.forward(joints), self.jacobian(joints))
+    }
+
     /// Joint torques, N m, that make the tip push the user with `force_on_user`, N, while
     /// nothing accelerates.
     ///
@@ -123,6 +128,14 @@ impl Mechanism for Kinematics {
             Self::Premium(premium) => premium.jacobian(joints),
             Self::WoodenHaptics(arm) => arm.jacobian(joints),
             Self::Ideal(ideal) => ideal.jacobian(joints),
+        }
+    }
+
+    fn forward_and_jacobian(&self, joints: [f64; 3]) -> (Vector3<f64>, Matrix3<f64>) {
+        match self {
+            Self::Premium(premium) => premium.forward_and_jacobian(joints),
+            Self::WoodenHaptics(wooden) => wooden.forward_and_jacobian(joints),
+            Self::Ideal(ideal) => ideal.forward_and_jacobian(joints),
         }
     }
 

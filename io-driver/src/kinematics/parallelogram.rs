@@ -72,7 +72,11 @@ impl Parallelogram {
 
     /// Position of the tip at these angles.
     pub fn forward(&self, angles: [f64; 3]) -> Vector3<f64> {
-        let (l1, l2, p) = (self.upper_arm_m, self.forearm_m, self.pose(angles));
+        self.tip(&self.pose(angles))
+    }
+
+    fn tip(&self, p: &Pose) -> Vector3<f64> {
+        let (l1, l2) = (self.upper_arm_m, self.forearm_m);
         let y = self.shoulder_y_m - l2 * p.cos[2] + l1 * p.sin[1];
         Vector3::new(p.rho * p.sin[0], y, p.rho * p.cos[0] + self.shoulder_z_m)
     }
@@ -102,7 +106,17 @@ impl Parallelogram {
 
     /// Velocity of the tip per rate of each angle.
     pub fn jacobian(&self, angles: [f64; 3]) -> Matrix3<f64> {
-        let (l1, l2, p) = (self.upper_arm_m, self.forearm_m, self.pose(angles));
+        self.slopes(&self.pose(angles))
+    }
+
+    /// Both at once, for little more than one.
+    pub fn forward_and_jacobian(&self, angles: [f64; 3]) -> (Vector3<f64>, Matrix3<f64>) {
+        let pose = self.pose(angles);
+        (self.tip(&pose), self.slopes(&pose))
+    }
+
+    fn slopes(&self, p: &Pose) -> Matrix3<f64> {
+        let (l1, l2) = (self.upper_arm_m, self.forearm_m);
         let ([s1, s2, s3], [c1, c2, c3]) = (p.sin, p.cos);
         Matrix3::new(
             p.rho * c1,

@@ -50,6 +50,10 @@ impl Mechanism for Premium {
         self.linkage.jacobian(joints)
     }
 
+    fn forward_and_jacobian(&self, joints: [f64; 3]) -> (Vector3<f64>, Matrix3<f64>) {
+        self.linkage.forward_and_jacobian(joints)
+    }
+
     fn joint_limits(&self) -> JointLimits {
         self.limits
     }

@@ -68,11 +68,15 @@ impl Mechanism for WoodenHaptics {
     }
 
     fn jacobian(&self, joints: [f64; 3]) -> Matrix3<f64> {
-        let mut jacobian = self.linkage.jacobian(Self::CONVENTION.linkage_angles(joints));
+        self.forward_and_jacobian(joints).1
+    }
+
+    fn forward_and_jacobian(&self, joints: [f64; 3]) -> (Vector3<f64>, Matrix3<f64>) {
+        let (tip, mut jacobian) = self.linkage.forward_and_jacobian(Self::CONVENTION.linkage_angles(joints));
         for (mut column, sign) in jacobian.column_iter_mut().zip(Self::CONVENTION.sign) {
             column *= sign;
         }
-        jacobian
+        (tip, jacobian)
     }
 
     fn joint_limits(&self) -> JointLimits {

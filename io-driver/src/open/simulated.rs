@@ -13,7 +13,7 @@ use crate::sim::arm::SimulatedArm;
 use crate::sim::hand::{HandModel, ImpedanceHand, model_file};
 use crate::sim::tip_board::TipBoard;
 use nalgebra::{Point3, Vector3};
-use shm_abi::segment::ClockMode;
+use shm_abi::segment::{ClockMode, DeviceInfo};
 use std::sync::Arc;
 
 /// From reading to writing where time is only counted: a round trip and the work of a tick, as measured on an idle
@@ -53,7 +53,8 @@ pub(super) fn open(
             place,
         })),
     };
-    let info = commissioned(arm_info(device, &file), config);
+    // Nobody shall take it for a real one.
+    let info = DeviceInfo { kind: "simulated".into(), ..commissioned(arm_info(device, &file), config) };
     let arm = Arm::new(&file, holds_its_weight(device, config)).with_zeroing(device.zeroing);
     let opened = SimulatedDevice::new(info, arm, plant, holder, wish.base_in_world, latency(config));
     if has_switch(device, config) && !opened.extras().buttons {

@@ -13,16 +13,17 @@
 //! ```
 //!
 //! and C by Christoffel symbols of M. Rotors of motors are not included: they are the motors' matter.
-//! Frames and signs: base frame D, y up, its turret upright. Joints are the mechanism's own
+//! Frames and signs: base frame D, y along the turret's axis; it stands upright unless it is told otherwise
+//! ([`Dynamics::in_base`]), which only the weight minds. Joints are the mechanism's own
 //! ([`JointConvention`]); a positive torque turns its joint towards a larger angle. SI, radians.
 //! Invariants: `M` is symmetric and independent of the turret; `dM/dt - 2 C` is skew-symmetric, so the motion
 //! neither makes nor loses energy.
-//! Cost: two sine-cosine pairs a call; no loop, no allocation.
+//! Cost: two sine-cosine pairs a call, three for the weight; no loop, no allocation.
 //! Reference: Cavusoglu, Feygin, Tendick, A critical study of the mechanical and electrical properties of the
 //! PHANToM haptic interface, Presence 11(6), 2002. Transcriptions of its C have `+A cos(theta2 - theta3)` for
 //! what is `-A cos(theta2 - theta3)` in C32; the symbols of M decide.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::kinematics::JointConvention;
 use crate::kinematics::gravity::{Bodies, Gravity};
@@ -93,6 +94,11 @@ impl Dynamics {
             gravity: Gravity::new(links_m, bodies, convention),
             convention,
         }
+    }
+
+    /// The same arm in a base that stands in the world like this (R_WD).
+    pub fn in_base(self, base_in_world: &UnitQuaternion<f64>) -> Self {
+        Self { gravity: self.gravity.in_base(base_in_world), ..self }
     }
 
     /// Joint-space mass `M` (kg m^2): the torque per acceleration of each joint.

@@ -1,7 +1,7 @@
 //! The same arm as loose bodies: where their centres are and how they are turned, from the drawing and
 //! nothing else. Slow and obvious; the oracle of the closed forms.
 
-use io_driver::kinematics::gravity::Bodies;
+use io_driver::kinematics::gravity::{Bodies, GRAVITY_M_PER_S2};
 use io_driver::sim::dynamics::Inertias;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
@@ -60,6 +60,11 @@ pub(crate) fn kinetic_energy(bodies: &[Body; 5], angles: [f64; 3], rates: [f64; 
             0.5 * (body.mass_kg * velocity.norm_squared() + turning)
         })
         .sum()
+}
+
+/// Energy of the weight (J): each body's mass by its centre's height in the world above the shoulder.
+pub(crate) fn potential_energy(bodies: &[Body; 5], angles: [f64; 3], base_in_world: &Rotation3<f64>) -> f64 {
+    bodies.iter().map(|body| body.mass_kg * GRAVITY_M_PER_S2 * (base_in_world * body.centre(angles)).y).sum()
 }
 
 impl Body {

@@ -30,13 +30,13 @@ fn arm(file: &ArmFile, joints: [f64; 3]) -> SimulatedArm {
 
 fn thrown(file: &ArmFile, joints: [f64; 3], rates: [f64; 3]) -> SimulatedArm {
     let mut arm = arm(file, joints);
-    arm.links.rates = rates.into();
     arm.shafts.rates = rates.into();
+    arm.links = arm.see(arm.shafts);
     arm
 }
 
 fn energy(arm: &SimulatedArm) -> f64 {
-    let (joints, rates) = (arm.links.angles.into(), arm.links.rates);
+    let (joints, rates) = (arm.links.motion.angles.into(), arm.links.motion.rates);
     let rotors = 0.5 * arm.shafts.rates.dot(&arm.rotors.component_mul(&arm.shafts.rates));
     let dynamics = &arm.spec.dynamics;
     dynamics.kinetic_energy(joints, rates.into()) + dynamics.potential_energy(joints) + rotors
@@ -62,7 +62,7 @@ fn an_arm_that_is_thrown_keeps_its_energy() {
         let home = file.encoders.home_joint_angles_rad;
         let mut arm = thrown(&file, home, [1.5, 0.8, -0.6]);
         // Of the motion, against which the error counts; the weight's zero is anywhere.
-        let motion = 0.5 * arm.links.rates.dot(&(arm.inertia(arm.links.angles) * arm.links.rates));
+        let motion = 0.5 * arm.shafts.rates.dot(&(arm.inertia(&arm.links) * arm.shafts.rates));
         let before = energy(&arm);
         // A tenth of a second at up to 1.5 rad/s stays within the stops.
         for _ in 0..100 {
@@ -92,7 +92,7 @@ fn an_arm_that_swings_on_a_stiff_spring_swings_on() {
     let mut arm = thrown(&file, [0.0; 3], [0.2, 0.3, -0.4]);
     let stiffness = 20e3;
     let of_all = |arm: &SimulatedArm| energy(arm) + 0.5 * stiffness * arm.truth().tip.norm_squared();
-    let motion = 0.5 * arm.links.rates.dot(&(arm.inertia(arm.links.angles) * arm.links.rates));
+    let motion = 0.5 * arm.shafts.rates.dot(&(arm.inertia(&arm.links) * arm.shafts.rates));
     let before = of_all(&arm);
     let mut largest = 0.0_f64;
     for _ in 0..3000 {
@@ -161,7 +161,7 @@ fn an_arm_that_sticks_does_not_creep() {
         let mut arm = arm(&file, [0.1, 0.05, -0.05]);
         let mut push = Push(Vector3::new(0.015, 0.0, 0.0));
         (0..500).for_each(|_| arm.advance(1e-3, &mut push));
-        let rested = (arm.links, arm.shafts.angles);
+        let rested = (arm.links.motion, arm.shafts.angles);
         (0..20_000).for_each(|_| arm.advance(1e-3, &mut push));
         let crept = (arm.shafts.angles - rested.1).norm();
         // Rounding of angles near 0.1 in 320,000 steps, at worst all one way: 320,000 * 1.4e-17, and as much of rates.
@@ -173,7 +173,7 @@ fn an_arm_that_sticks_does_not_creep() {
 fn beyond_its_friction_an_arm_moves_and_by_its_friction_it_comes_to_rest() {
     let file = changed("premium-1.5", |spec| spec.viscous_nm_s = [0.0; 3]);
     let mut arm = thrown(&file, [0.0; 3], [0.8, 0.0, 0.0]);
-    let (inertia, friction) = (arm.inertia(Vector3::zeros())[(0, 0)], arm.spec.coulomb_nm[0]);
+    let (inertia, friction) = (arm.inertia(&arm.links)[(0, 0)], arm.spec.coulomb_nm[0]);
     let stops_s = 0.8 * inertia / friction;
     let turned = 0.5 * 0.8 * stops_s;
     for _ in 0..(stops_s * 1e3) as u32 + 2 {
@@ -216,14 +216,14 @@ fn a_cable_that_stretches_swings_where_two_masses_on_a_spring_do() {
     let mut arm = arm(&file, [0.0; 3]);
     let (of_link, of_rotor) = (arm.spec.dynamics.mass_matrix([0.0; 3])[(0, 0)], arm.rotors.x);
     let closed_hz = (150.0 * (1.0 / of_link + 1.0 / of_rotor)).sqrt() / std::f64::consts::TAU;
-    arm.links.angles.x = 1e-3;
+    arm.links = arm.see(Motion { angles: Vector3::x() * 1e-3, rates: Vector3::zeros() });
     let mut crossings = Vec::new();
     let (mut time_s, dt_s) = (0.0, 31.25e-6);
     let mut before = 1.0;
     while crossings.len() < 41 {
         arm.advance(dt_s, &mut NobodyHolds);
         time_s += dt_s;
-        let stretch = arm.links.angles.x - arm.shafts.angles.x;
+        let stretch = arm.links.motion.angles.x - arm.shafts.angles.x;
         if stretch.signum() != f64::signum(before) {
             crossings.push(time_s - dt_s * stretch / (stretch - before));
         }
@@ -246,7 +246,7 @@ fn counters_show_the_motor_and_not_the_link() {
     // Friction holds the motor; the link gives way by torque over stiffness.
     let force = 0.02;
     (0..1000).for_each(|_| arm.advance(1e-3, &mut Push(Vector3::x() * force)));
-    let stretch = arm.links.angles.x - arm.shafts.angles.x;
+    let stretch = arm.links.motion.angles.x - arm.shafts.angles.x;
     assert!((stretch - force * 0.215 / 50.0).abs() < 1e-3 * stretch, "{stretch}");
     assert_eq!(arm.counters()[0], 0, "86 urad are 0.8 of a count of the link, none of the motor");
 }

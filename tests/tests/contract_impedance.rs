@@ -1,0 +1,250 @@
+//! `--hand-mode impedance`: a hand pulls simulated devices, whose weight, friction, counters and motors can be felt
+//! in the recording.
+
+use nalgebra::Vector3;
+use system_tests::recording::{Sample, Table};
+use system_tests::workplace::{Said, Workplace, hand};
+
+/// Friction at the tip of a Premium (N), along each axis.
+const FRICTION_N: f64 = 0.04;
+/// Stiffness of the usual pen grip from the wish to the tip (N/m): grasp and arm in series, upwards.
+const HAND_N_PER_M: f64 = 552.4 * 105.3 / (552.4 + 105.3);
+/// A step of the converter (5.5 A / 2048 * 23.4 mN m/A) over the levers of an arm at home, half of it on each joint (N).
+const HALF_CODE_N: [f64; 3] = [
+    0.5 * 5.5 / 2048.0 * 0.0234 * 13.4615 / 0.215,
+    0.5 * 5.5 / 2048.0 * 0.0234 * 11.3 / 0.215,
+    0.5 * 5.5 / 2048.0 * 0.0234 * 11.3 / 0.170,
+];
+const WALL_N_PER_M: f64 = 1000.0;
+
+/// A run begins when its authority is full. Until then the hand carries the arm's weight: up to 0.1 N upwards, where its
+/// motors are heavier than it is, over the hand's stiffness.
+const SUNK_M: f64 = 0.1 / HAND_N_PER_M;
+
+/// A table at the height of 0.1 m, in the middle of the workspace.
+const TABLE: &str = "[[finger]]\nstart_m = [0.0, 0.1, 0.0]\n[[entity]]\nname = \"table\"\n\
+    shape = { kind = \"plane\", normal = [0.0, 1.0, 0.0], offset_m = 0.1 }\nstiffness_n_per_m = 1000.0\n\
+    friction = { model = \"coulomb\", mu = 0.5 }\n";
+
+/// From above the table to 10 mm below its surface, where the wish rests for three seconds.
+fn pressing() -> String {
+    hand([(0.0, [0.0, 0.11, 0.0]), (0.5, [0.0, 0.11, 0.0]), (1.5, [0.0, 0.09, 0.0]), (4.5, [0.0, 0.09, 0.0])])
+}
+
+/// Plays on this clock; everything must be in order.
+fn record(place: &Workplace, clock: &str, name: &str, more: &[&str]) -> Said {
+    let usual = ["run", "scene.toml", "--headless", "--hand-mode", "impedance", "--clock", clock];
+    let said = place.run(usual.iter().chain(&["--record", name]).chain(more));
+    assert_eq!(said.status, Some(0), "{clock} {more:?}: {}", said.err);
+    said
+}
+
+fn workplace(scene: &str, hand: &str) -> Workplace {
+    let place = Workplace::new();
+    place.write("scene.toml", scene);
+    if !hand.is_empty() {
+        place.write("hand.csv", hand);
+    }
+    place
+}
+
+/// What one finger felt.
+fn felt(scene: &str, hand: &str, clock: &str, more: &[&str]) -> Vec<Sample> {
+    let place = workplace(scene, hand);
+    let hand_file: &[&str] = if hand.is_empty() { &[] } else { &["--hand", "hand.csv"] };
+    record(&place, clock, "out.csv", &[hand_file, more].concat());
+    Table::read(&place.path("out.csv")).finger("f0")
+}
+
+fn bytes(place: &Workplace, name: &str) -> Vec<u8> {
+    std::fs::read(place.path(name)).expect("a recording")
+}
+
+#[test]
+fn two_virtual_runs_write_the_same_bytes_and_another_seed_trembles_otherwise() {
+    let place = workplace(TABLE, &pressing());
+    for (name, seed) in [("a.csv", "7"), ("b.csv", "7"), ("c.csv", "8")] {
+        record(&place, "virtual", name, &["--hand", "hand.csv", "--seed", seed]);
+    }
+    assert!(bytes(&place, "a.csv") == bytes(&place, "b.csv"), "the same");
+    assert!(bytes(&place, "a.csv") != bytes(&place, "c.csv"), "another seed");
+    let after_wish = |name: &str| Table::read(&place.path(name)).finger("f0").last().unwrap().hip;
+    // Both press into the same wall: what differs is tremor and where friction left the tip, tenths of a millimetre.
+    assert!((after_wish("a.csv") - after_wish("c.csv")).norm() < 2e-3);
+}
+
+/// On every clock, the wall's force on a hand that rests is that of two springs in series, hand and wall, within what
+/// the friction of the arm takes from either: a tip that sticks may be anywhere where
+/// |wall - hand| <= friction, so that |wall - k d| <= friction * k_wall / (k_wall + k_hand) < friction.
+#[test]
+fn a_hand_that_rests_in_a_wall_presses_with_its_own_stiffness_on_every_clock() {
+    let depth_m = 0.01;
+    let series = HAND_N_PER_M * WALL_N_PER_M / (HAND_N_PER_M + WALL_N_PER_M);
+    for clock in ["virtual", "lockstep", "real"] {
+        let samples = felt(TABLE, &pressing(), clock, &[]);
+        let resting: Vec<&Sample> = samples.iter().filter(|s| s.t > 2.5).collect();
+        assert!(resting.len() > 100, "{clock}: {} rows", resting.len());
+        let mean = resting.iter().map(|s| s.force.y).sum::<f64>() / resting.len() as f64;
+        let off = mean - series * depth_m;
+        println!("{clock}: {mean:.4} N of {:.4} N", series * depth_m);
+        // The weight that is not compensated for is none; the compensation's own rounding is half a converter step.
+        let band = FRICTION_N + HALF_CODE_N[1] * 2.0;
+        assert!(off.abs() <= band, "{clock}: {mean} N, {off} off, allowed {band}");
+        assert!(resting.iter().all(|s| s.touches()), "{clock}: it does not chatter");
+    }
+}
+
+#[test]
+fn the_tip_lags_behind_the_wish_and_settles_on_it_within_what_friction_holds() {
+    let scene = "[[finger]]\nstart_m = [0.0, 0.1, 0.0]\n";
+    let wish = |t: f64| Vector3::new(0.04 * ((t - 0.5) / 0.5).clamp(0.0, 1.0), 0.1, 0.0);
+    let path = hand([0.0, 0.5, 1.0, 4.0].map(|t| (t, wish(t).into())));
+    let samples = felt(scene, &path, "virtual", &[]);
+    let sunk = (samples[0].hip - wish(0.0)).norm();
+    assert!(sunk < SUNK_M, "it begins on it: {:?}", samples[0]);
+    let behind = samples.iter().map(|s| wish(s.t).x - s.hip.x).fold(0.0, f64::max);
+    // 80 mm/s through a hand of 5 Hz, which alone lags by 2 / w = 41 ms: 3.3 mm.
+    assert!((0.003..0.03).contains(&behind), "{behind}");
+    // Sideways grasp and arm have 65 N/m in series. A tip that friction holds stays anywhere within friction over that;
+    // the tremor, of 0.05 mm, comes on top.
+    let series = 379.5 * 78.75 / (379.5 + 78.75);
+    for s in samples.iter().filter(|s| s.t > 3.0) {
+        let off = (s.hip - wish(s.t)).x.abs();
+        assert!(off < FRICTION_N / series + 3e-4, "{off}: {s:?}");
+        assert_eq!(s.force, Vector3::zeros());
+    }
+}
+
+#[test]
+fn what_is_applied_is_what_was_computed_but_for_the_converters_steps() {
+    let samples = felt(TABLE, &pressing(), "virtual", &[]);
+    let largest =
+        samples.iter().map(|s| (s.applied - s.force).abs()).fold(Vector3::zeros(), |a, b| a.sup(&b));
+    println!("{largest:?}");
+    // Off home the levers differ by some percent, and a force has a share on each joint.
+    let step = Vector3::from(HALF_CODE_N).norm() * 1.2;
+    assert!(largest.norm() < 2.0 * step && largest.norm() > 0.1 * step, "{largest} {step}");
+    assert!(samples.iter().any(|s| s.force.y > 0.5), "it was pressed");
+}
+
+#[test]
+fn the_base_is_put_where_the_arm_reaches_the_path_and_that_is_said() {
+    let far = "[[finger]]\nstart_m = [3.0, 0.0, 0.0]\n";
+    let path = hand([(0.0, [3.0, 0.0, 0.0]), (1.0, [3.05, 0.02, 0.0])]);
+    let place = workplace(far, &path);
+    let said = record(&place, "virtual", "out.csv", &["--hand", "hand.csv"]);
+    let words = "phantom3: the device of finger f0 stands at [";
+    assert!(said.err.contains(words) && said.err.contains("--layout says otherwise"), "{}", said.err);
+    let hip = Table::read(&place.path("out.csv")).vectors("f0_hip");
+    assert!((hip[0] - Vector3::new(3.0, 0.0, 0.0)).norm() < SUNK_M, "{}", hip[0]);
+    let near = workplace(TABLE, "");
+    let said = record(&near, "virtual", "out.csv", &["--seconds", "0.1"]);
+    assert_eq!(said.err, "", "where nothing had to be moved nothing is said");
+}
+
+#[test]
+fn hands_and_devices_of_other_kinds_are_simulated() {
+    let pressed = |more: &[&str]| {
+        let samples = felt(TABLE, &pressing(), "virtual", more);
+        let resting: Vec<f64> = samples.iter().filter(|s| s.t > 3.0).map(|s| s.force.y).collect();
+        resting.iter().sum::<f64>() / resting.len() as f64
+    };
+    let usual = pressed(&[]);
+    let light = pressed(&["--firmness", "light"]);
+    let firm = pressed(&["--firmness", "firm"]);
+    // In series 60 and 142 N/m instead of 88, less what the wall takes; friction is 0.04 N of 0.8.
+    assert!(light < 0.85 * usual && firm > 1.25 * usual, "{light} {usual} {firm}");
+    let fingertip = pressed(&["--hand-model", "fingertip"]);
+    assert!((fingertip - usual).abs() > 0.05, "{fingertip} {usual}");
+    let wooden = pressed(&["--device", "wooden-haptics"]);
+    // The same hand in the same wall; that arm's friction is of the same size.
+    assert!((wooden - usual).abs() < 0.3, "{wooden} {usual}");
+    let mut model = std::fs::read_to_string(format!(
+        "{}/../config/hands/models/pen-grip.toml",
+        env!("CARGO_MANIFEST_DIR")
+    ))
+    .expect("it comes with the program");
+    model = model.replace("name = \"Pen grip\"", "name = \"Mine\"");
+    let place = workplace(TABLE, &pressing());
+    place.write("mine.toml", model);
+    record(
+        &place,
+        "real",
+        "out.csv",
+        &["--hand", "hand.csv", "--hand-model", "mine.toml", "--seconds", "0.2"],
+    );
+}
+
+#[test]
+fn nobody_lets_the_compensated_arm_hover() {
+    let samples = felt("[[finger]]\nstart_m = [0.0, 0.1, 0.0]\n", "", "virtual", &["--hand-model", "nobody"]);
+    // Until its motors come on, for 0.2 s, friction and inertia alone hold it.
+    let last = samples.last().expect("rows");
+    println!("{:?}", last.hip);
+    assert!((last.hip - samples[0].hip).norm() < 0.05, "{last:?}");
+}
+
+#[test]
+fn eight_fingers_run() {
+    let mut scene = String::new();
+    for finger in 0..8 {
+        let x = 0.02 * f64::from(finger);
+        scene += &format!("[[finger]]\nstart_m = [{x:?}, 0.1, 0.0]\n");
+    }
+    scene += &TABLE[TABLE.find("[[entity]]").unwrap()..];
+    for clock in ["virtual", "lockstep"] {
+        let place = workplace(&scene, "");
+        record(&place, clock, "out.csv", &["--seconds", "0.5"]);
+        let table = Table::read(&place.path("out.csv"));
+        assert_eq!(table.len(), 500);
+        for finger in 0..8 {
+            let hip = table.finger(&format!("f{finger}"))[499].hip;
+            // It rests on the table's surface, where its hand is.
+            assert!(
+                (hip - Vector3::new(0.02 * f64::from(finger), 0.1, 0.0)).norm() < 2e-3,
+                "{finger}: {hip}"
+            );
+        }
+    }
+}
+
+fn refused(place: &Workplace, more: &[&str]) -> String {
+    let before = place.snapshot();
+    let said = place.run([&["run", "scene.toml", "--hand-mode", "impedance"], more].concat());
+    assert_eq!((said.status, said.out.as_str()), (Some(2), ""), "{more:?}: {}", said.err);
+    assert!(place.snapshot() == before, "{more:?}: files have changed");
+    said.err
+}
+
+#[test]
+fn a_start_that_no_arm_reaches_is_refused_with_finger_place_and_remedy() {
+    let place = workplace(TABLE, "");
+    place.write("layout.toml", "[[device]]\nposition_m = [2.0, 0.0, 0.0]\n");
+    for clock in ["virtual", "real"] {
+        let said = refused(&place, &["--layout", "layout.toml", "--clock", clock, "--record", "out.csv"]);
+        for words in ["f0", "[0.0, 0.1, 0.0]", "reach", "--layout"] {
+            assert!(said.contains(words), "`{words}` is missing in: {said}");
+        }
+    }
+}
+
+#[test]
+fn wrong_names_are_refused_with_what_is_allowed() {
+    let place = workplace(TABLE, "");
+    place.write("wrong.toml", "name = \"x\"\n");
+    let cases: &[(&[&str], &[&str])] = &[
+        (&["--hand-model", "pengrip"], &["hand's model pengrip", "pen-grip, fingertip"]),
+        (&["--hand-model", "wrong.toml"], &["wrong.toml"]),
+        (&["--firmness", "strong"], &["--firmness", "found strong", "light, usual, firm"]),
+        (&["--device", "omni"], &["device's description omni", "premium-1.5", "wooden-haptics"]),
+        (&["--device", "ideal"], &["ideal", "--hand-mode kinematic", "premium-1.5"]),
+        (&["--device", "wrong.toml"], &["wrong.toml"]),
+        (&["--attach", "none.sock"], &["--attach", "--hand-mode impedance", "exclude each other"]),
+    ];
+    for (more, parts) in cases {
+        let said = refused(&place, more);
+        for part in *parts {
+            assert!(said.contains(part), "{more:?}: `{part}` is missing in: {said}");
+        }
+    }
+}
