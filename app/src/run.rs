@@ -28,7 +28,7 @@ pub struct RunPlan {
     pub seconds: Option<f64>,
     /// Where to record.
     pub record: Option<PathBuf>,
-    /// Use the driver that listens here, and its devices, instead of a child with ideal ones.
+    /// Use the driver that listens here, and its devices, instead of a child with the rig's.
     pub attach: Option<Attach>,
 }
 
