@@ -115,7 +115,8 @@ impl Report<'_> {
         let listed = &self.found.outliers.listed;
         let Some(without) = &self.found.without_outliers else {
             let few = self.found.outliers.threshold_m.is_infinite();
-            let word = if few { "not looked for: too few pairs, or too many that do not belong" } else { "none" };
+            let word =
+                if few { "not looked for: too few pairs, or too many that do not belong" } else { "none" };
             return writeln!(out, "outliers     {word}");
         };
         let lines: Vec<String> = listed
