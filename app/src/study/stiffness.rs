@@ -45,7 +45,7 @@ pub struct StiffnessArgs {
     /// Contact damping of the wall, N s/m
     #[arg(long, value_name = "B,...", value_delimiter = ',', default_values_t = [0.0, 2.0], value_parser = parse_damping)]
     dampings: Vec<f64>,
-    /// Hands: built-in names or files (TOML), with :light or :firm; nobody: nobody holds the arm
+    /// Hands: built-in names or files (TOML), with :light or :firm; nobody: nobody holds the arm, and nothing pushes it
     #[arg(long, value_name = "HAND,...", value_delimiter = ',', default_values = ["pen-grip:light", "pen-grip:firm"])]
     hands: Vec<case::Hand>,
     /// Which device is simulated: a built-in's name or a description (TOML)
