@@ -62,8 +62,7 @@ pub struct Progress {
 impl Progress {
     /// A line for a run of so many ticks; the first is shown after a while.
     pub fn new(total_ticks: u64, period_ns: u64) -> Self {
-        let mut line = StatusLine::default();
-        line.last = Some(Instant::now());
+        let line = StatusLine { last: Some(Instant::now()), ..StatusLine::default() };
         Self { total_ticks, period_ns, line }
     }
 
