@@ -70,14 +70,16 @@ struct RunArgs {
     #[arg(long, value_enum, default_value_t = HandModeName::Kinematic)]
     hand_mode: HandModeName,
     /// With --hand-mode impedance: how the hand pulls, a built-in's name or a file (TOML); nobody: nobody holds them
-    #[arg(long, value_name = "HAND", default_value = "pen-grip")]
-    hand_model: PathBuf,
-    /// With --hand-mode impedance: how tightly the hand holds: light, usual, firm
-    #[arg(long, value_name = "HOW", default_value = "usual", value_parser = parse_firmness)]
-    firmness: Firmness,
+    /// [default: pen-grip]
+    #[arg(long, value_name = "HAND")]
+    hand_model: Option<PathBuf>,
+    /// With --hand-mode impedance: how tightly the hand holds: light, usual, firm [default: usual]
+    #[arg(long, value_name = "HOW", value_parser = parse_firmness)]
+    firmness: Option<Firmness>,
     /// With --hand-mode impedance: which device is simulated, a built-in's name or a description (TOML)
-    #[arg(long, value_name = "DEVICE", default_value = "premium-1.5")]
-    device: PathBuf,
+    /// [default: premium-1.5]
+    #[arg(long, value_name = "DEVICE")]
+    device: Option<PathBuf>,
     /// What moves time [default: real; with --attach: the driver's own clock]
     #[arg(long, value_enum)]
     clock: Option<Clock>,
@@ -148,8 +150,12 @@ pub fn main() -> ExitCode {
 
 fn run_demo() -> Result<(Report, Stop), RunFailure> {
     let signals = install_signals()?;
-    let demo = demo::unpack(period_of(DEFAULT_RATE_HZ))?;
-    run::run(&demo.rig, &demo::plan(&demo.rig), &signals)
+    let mut demo = demo::unpack(period_of(DEFAULT_RATE_HZ))?;
+    let plan = demo::plan(&demo.rig);
+    if plan.attach.is_some() {
+        demo.rig.layout = calibrated_layout()?;
+    }
+    run::run(&demo.rig, &plan, &signals)
 }
 
 fn run_scene(args: &RunArgs) -> Result<(Report, Stop), RunFailure> {
@@ -176,14 +182,9 @@ fn make_rig(args: &RunArgs) -> Result<Rig, RunFailure> {
                 &"--attach and --hand-mode impedance exclude each other: the devices of a driver that runs are moved by whoever holds them",
             ));
         }
-        HandModeName::Impedance => HandMode::Impedance(SimulatedDevices {
-            description: args.device.clone(),
-            hand_model: args.hand_model.clone(),
-            firmness: args.firmness,
-            trembles: true,
-            seed: args.seed,
-        }),
+        HandModeName::Impedance => HandMode::Impedance(simulated_devices(args)),
     };
+    refuse_without_impedance(args)?;
     let mut scene = Scene::load(&args.scene).map_err(|error| wrong(&error))?;
     if args.attach.is_some() {
         // The devices are the fingers; nothing follows a script.
@@ -195,6 +196,32 @@ fn make_rig(args: &RunArgs) -> Result<Rig, RunFailure> {
         .map_err(|error| wrong(&error))
 }
 
+fn simulated_devices(args: &RunArgs) -> SimulatedDevices {
+    let usual = SimulatedDevices::default();
+    SimulatedDevices {
+        description: args.device.clone().unwrap_or(usual.description),
+        hand_model: args.hand_model.clone().unwrap_or(usual.hand_model),
+        firmness: args.firmness.unwrap_or(usual.firmness),
+        trembles: usual.trembles,
+        seed: args.seed,
+    }
+}
+
+/// A firm hand that is not there would be looked for in the recording in vain.
+fn refuse_without_impedance(args: &RunArgs) -> Result<(), RunFailure> {
+    let given = [
+        ("--hand-model", args.hand_model.is_some()),
+        ("--firmness", args.firmness.is_some()),
+        ("--device", args.device.is_some()),
+    ];
+    match given.into_iter().find(|(_, is_given)| *is_given) {
+        Some((name, _)) if args.hand_mode == HandModeName::Kinematic => Err(RunFailure::Start(format!(
+            "{name} is for simulated devices; add --hand-mode impedance, or leave it out"
+        ))),
+        _ => Ok(()),
+    }
+}
+
 /// Where the devices stand: as said; real ones, of which nothing is said, as they were calibrated.
 fn find_layout(args: &RunArgs) -> Result<Option<Layout>, RunFailure> {
     let wrong = |error: &dyn std::fmt::Display| RunFailure::Start(error.to_string());
@@ -202,25 +229,30 @@ fn find_layout(args: &RunArgs) -> Result<Option<Layout>, RunFailure> {
         if args.attach.is_none() {
             return Ok(None);
         }
-        let Some((file, layout)) = default_layout::load().map_err(|error| wrong(&error))? else {
-            return Ok(None);
-        };
-        say(format_args!(
-            "phantom3: the devices stand as {} says; --layout names another file",
-            file.display()
-        ));
-        return Ok(Some(layout));
+        return calibrated_layout();
     };
     let layout = Layout::load(file).map_err(|error| wrong(&error))?;
     let affine = (0..world::MAX_DEVICES).find(|index| layout.placement(*index).rigid().is_none());
     match affine {
         Some(index) if args.attach.is_none() => Err(wrong(&format_args!(
-            "{}: device {index} has a matrix, which corrects a real device's geometry; a scripted hand moves ideal \
-             devices, which need none: leave out the matrix, or attach to real devices with --attach",
+            "{}: device {index} has a matrix, which corrects a real device's geometry; ideal and simulated \
+             devices need none: leave out the matrix, or attach to real devices with --attach",
             file.display()
         ))),
         _ => Ok(Some(layout)),
     }
+}
+
+/// What `calibrate --write` wrote, if it is there.
+fn calibrated_layout() -> Result<Option<Layout>, RunFailure> {
+    let found = default_layout::load().map_err(|error| RunFailure::Start(error.to_string()))?;
+    Ok(found.map(|(file, layout)| {
+        say(format_args!(
+            "phantom3: the devices stand as {} says; `run --layout` names another file",
+            file.display()
+        ));
+        layout
+    }))
 }
 
 fn make_plan(args: &RunArgs, rig: &Rig) -> Result<RunPlan, RunFailure> {
@@ -246,7 +278,14 @@ fn refuse_to_overwrite_input(args: &RunArgs, rig: &Rig) -> Result<(), RunFailure
     let Some(record) = &args.record else { return Ok(()) };
     // The hand that counts may be the one that the scene names.
     let hand = rig.hand.as_ref().map(|hand| &hand.path);
-    let inputs = [Some(&args.scene), args.hand.as_ref(), hand, args.layout.as_ref()];
+    let inputs = [
+        Some(&args.scene),
+        args.hand.as_ref(),
+        hand,
+        args.layout.as_ref(),
+        args.hand_model.as_ref(),
+        args.device.as_ref(),
+    ];
     match inputs.into_iter().flatten().find(|input| is_same_file(record, input)) {
         Some(input) => Err(RunFailure::Start(format!(
             "--record {} would overwrite the input {}; name another file",
@@ -337,6 +376,18 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn what_is_for_simulated_devices_is_refused_where_none_are() {
+        for given in [["--firmness", "firm"], ["--hand-model", "fingertip"], ["--device", "premium-1.5"]] {
+            let words = ["phantom3", "run", "no-scene.toml"].into_iter().chain(given);
+            let Some(AppCommand::Run(args)) = Cli::try_parse_from(words).expect("good words").command else {
+                panic!("not a run");
+            };
+            let said = make_rig(&args).expect_err("kinematic").to_string();
+            assert!(said.starts_with(given[0]) && said.contains("--hand-mode impedance"), "{said}");
+        }
     }
 
     #[test]

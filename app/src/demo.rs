@@ -71,7 +71,9 @@ pub fn plan(rig: &Rig) -> RunPlan {
         }
         Ok(seen) => match not_zeroed::words(&seen.driver, &socket) {
             Some(words) => {
-                say(format_args!("phantom3: {words}; starting a driver of our own with ideal devices"));
+                say(format_args!(
+                    "phantom3: {words}; starting one of our own with simulated PHANToM Premiums"
+                ));
                 None
             }
             None => {
@@ -89,7 +91,9 @@ pub fn plan(rig: &Rig) -> RunPlan {
             None
         }
         Err(error) => {
-            say(format_args!("phantom3: {error}; starting a driver of our own"));
+            say(format_args!(
+                "phantom3: {error}; starting a driver of our own with simulated PHANToM Premiums"
+            ));
             None
         }
     };

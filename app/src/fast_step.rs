@@ -40,6 +40,8 @@ pub struct FastStep {
     driver_estimates: bool,
     /// Where each finger's tip was in its device's base (m), if that was known.
     tips_D: Vec<Option<[f64; 3]>>,
+    /// How far each finger was carried through the world since the last tick (m): no device's velocity tells of it.
+    carried_W: Vec<Vector3<f64>>,
 }
 
 /// The first minor version of the shared-memory contract whose frames tell velocities.
@@ -48,9 +50,9 @@ const MINOR_WITH_VELOCITIES: u32 = 1;
 impl FastStep {
     /// Fingers that have touched nothing yet.
     pub fn new(fingers: Vec<DeviceFinger>, entities: Vec<Entity>, period_ns: u64) -> Self {
-        let tips_D = vec![None; fingers.len()];
+        let (tips_D, carried_W) = (vec![None; fingers.len()], vec![Vector3::zeros(); fingers.len()]);
         let period_s = period_ns as f64 / 1e9;
-        Self { fingers, entities, period_s, last_tick: None, driver_estimates: false, tips_D }
+        Self { fingers, entities, period_s, last_tick: None, driver_estimates: false, tips_D, carried_W }
     }
 
     /// Which minor version of the contract the driver speaks: until that is told, nothing is expected of it that
@@ -67,11 +69,14 @@ impl FastStep {
         let dt_s = ticks as f64 * self.period_s;
         row.run_tick = frame.run_tick.max(0).unsigned_abs();
         let devices = frame.present_devices();
-        for ((finger, row), tip_D) in self.fingers.iter_mut().zip(&mut row.fingers).zip(&mut self.tips_D) {
+        let known = self.tips_D.iter_mut().zip(&mut self.carried_W);
+        for ((finger, row), (tip_D, carried_W)) in self.fingers.iter_mut().zip(&mut row.fingers).zip(known) {
             let Some(device) = devices.get(finger.device) else { continue };
             let is_valid = device.flags & DEVICE_POSITION_VALID != 0;
             *tip_D = is_valid.then_some(device.position_m_measured);
-            *row = finger.step(device, &self.entities, dt_s, self.driver_estimates);
+            let carried_W = std::mem::take(carried_W) / dt_s;
+            let velocity_W = self.driver_estimates.then(|| finger.velocity_W(device, carried_W));
+            *row = finger.step(device, &self.entities, dt_s, velocity_W);
             command.devices[finger.device].force_on_user_n = finger.mount.force_to_device(row.force_on_user);
         }
     }
@@ -98,17 +103,20 @@ impl FastStep {
     /// through what lies between: the next step is a first one.
     pub fn set_layout(&mut self, layout: &Layout) -> bool {
         let mount_of = |finger: &DeviceFinger| Mount::placed(&layout.placement(finger.device));
-        let carried_m = |(finger, tip_D): (&DeviceFinger, &Option<[f64; 3]>)| {
+        let carried = |finger: &DeviceFinger, tip_D: &Option<[f64; 3]>| {
             let (to, from) = (mount_of(finger), finger.mount);
-            tip_D.map_or(0.0, |tip_D| (to.point_to_world(tip_D) - from.point_to_world(tip_D)).norm())
+            tip_D.map_or(Vector3::zeros(), |tip_D| to.point_to_world(tip_D) - from.point_to_world(tip_D))
         };
-        let furthest_m = self.fingers.iter().zip(&self.tips_D).map(carried_m).fold(0.0, f64::max);
+        let both = self.fingers.iter().zip(&self.tips_D);
+        let furthest_m = both.map(|(finger, tip_D)| carried(finger, tip_D).norm()).fold(0.0, f64::max);
         let is_near = furthest_m <= MOST_CARRIED_M_PER_S * self.period_s;
         let touches = self.fingers.iter().any(|finger| finger.finger.contacts().next().is_some());
         if touches && !is_near {
             return false;
         }
-        for finger in &mut self.fingers {
+        for ((finger, tip_D), carried_W) in self.fingers.iter_mut().zip(&self.tips_D).zip(&mut self.carried_W)
+        {
+            *carried_W += carried(finger, tip_D);
             finger.mount = mount_of(finger);
             if !is_near {
                 finger.finger.reset();
@@ -121,6 +129,7 @@ impl FastStep {
     pub fn reset(&mut self) {
         self.last_tick = None;
         self.tips_D.fill(None);
+        self.carried_W.fill(Vector3::zeros());
         for finger in &mut self.fingers {
             finger.finger.reset();
         }
@@ -131,12 +140,19 @@ impl FastStep {
 const MOST_CARRIED_M_PER_S: f64 = 1.0;
 
 impl DeviceFinger {
+    /// The device's own velocity, and that with which it is carried (m/s). A device that stands still passes every bit
+    /// through.
+    fn velocity_W(&self, device: &DeviceFrame, carried_W: Vector3<f64>) -> Vector3<f64> {
+        let own_W = self.mount.velocity_to_world(device.velocity_m_per_s_estimated);
+        if carried_W == Vector3::zeros() { own_W } else { own_W + carried_W }
+    }
+
     fn step(
         &mut self,
         device: &DeviceFrame,
         entities: &[Entity],
         dt_s: f64,
-        driver_estimates: bool,
+        velocity_W: Option<Vector3<f64>>,
     ) -> FingerRow {
         let hip = self.mount.point_to_world(device.position_m_measured);
         let orientation_wxyz = self.mount.orientation_to_world(device.orientation_wxyz_measured);
@@ -151,9 +167,7 @@ impl DeviceFinger {
             self.finger.reset();
             return seen;
         }
-        let velocity =
-            driver_estimates.then(|| self.mount.velocity_to_world(device.velocity_m_per_s_estimated));
-        let output = self.finger.step(entities, Hip { position_W: hip, velocity_W: velocity }, dt_s);
+        let output = self.finger.step(entities, Hip { position_W: hip, velocity_W }, dt_s);
         FingerRow {
             god_object: output.god_object_W,
             force_on_user: finite_or_zero(output.force_on_user_W),
@@ -297,6 +311,22 @@ mod carried {
             assert!((finger.force_on_user - Vector3::new(-3.6, 5.0, 0.0)).norm() < 1e-12, "{finger:?}");
         }
         assert_eq!(before.god_object.y, row.fingers[0].god_object.y);
+    }
+
+    #[test]
+    fn a_finger_that_is_carried_into_a_damped_table_is_damped() {
+        let (step, layout) = step_and_layout();
+        let damped = step.entities[0].with_damping(5.0).unwrap();
+        let mut step = FastStep::new(step.fingers, vec![damped], PERIOD_NS);
+        step.meet_driver(MINOR_WITH_VELOCITIES);
+        feel(&mut step, 1, ABOVE);
+        feel(&mut step, 2, INSIDE);
+        assert!(step.set_layout(&layout.with_camera(at(0.0, -0.5e-3))));
+        // 0.5 m/s downwards, though the device says that it rests: 2.5 N beside the spring's 5.5 N; then it does rest.
+        for (tick, force) in [(3, 8.0), (4, 5.5)] {
+            let row = feel(&mut step, tick, INSIDE);
+            assert!((row.fingers[0].force_on_user.y - force).abs() < 1e-12, "{:?}", row.fingers[0]);
+        }
     }
 
     #[test]

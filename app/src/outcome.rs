@@ -44,6 +44,9 @@ pub enum RunFailure {
         /// For how long.
         seconds: f64,
     },
+    /// What a study found cannot be written.
+    #[error("{0}")]
+    Results(String),
     /// The recording cannot be written.
     #[error(transparent)]
     Recording(#[from] RecordingError),

@@ -7,7 +7,7 @@ use crate::outcome::{RunFailure, Stop};
 use crate::progress::Progress;
 use crate::recording::Recording;
 use crate::report::{Baseline, Report};
-use crate::rig::Rig;
+use crate::rig::{HandMode, Rig};
 use crate::slow::{SlowSide, row_queue};
 use crate::two_processes::{self, Source};
 use crate::virtual_clock::VirtualDriver;
@@ -28,7 +28,7 @@ pub struct RunPlan {
     pub seconds: Option<f64>,
     /// Where to record.
     pub record: Option<PathBuf>,
-    /// Use the driver that listens here, and its devices, instead of a child with ideal ones.
+    /// Use the driver that listens here, and its devices, instead of a child with the rig's.
     pub attach: Option<Attach>,
 }
 
@@ -161,14 +161,22 @@ fn connect(rig: &Rig, plan: &RunPlan) -> Result<(Source, client::Attachment), Ru
 
 /// The child's configuration is TOML, which is UTF-8.
 fn refuse_unwritable_name(rig: &Rig) -> Result<(), RunFailure> {
-    match &rig.hand {
-        Some(hand) if hand.path.to_str().is_none() => Err(RunFailure::Start(format!(
-            "the path of the hand file {} is not UTF-8, and the driver's configuration cannot hold it; \
-             rename it, or use --clock virtual",
-            hand.path.display()
-        ))),
-        _ => Ok(()),
-    }
+    let simulated = match &rig.hand_mode {
+        HandMode::Impedance(simulated) => Some(simulated),
+        HandMode::Kinematic => None,
+    };
+    let files = [
+        ("hand file", rig.hand.as_ref().map(|hand| &hand.path)),
+        ("hand's model", simulated.map(|simulated| &simulated.hand_model)),
+        ("device's description", simulated.map(|simulated| &simulated.description)),
+    ];
+    let unwritable = files.into_iter().find(|(_, file)| file.is_some_and(|file| file.to_str().is_none()));
+    let Some((what, Some(file))) = unwritable else { return Ok(()) };
+    Err(RunFailure::Start(format!(
+        "the path of the {what} {} is not UTF-8, and the driver's configuration cannot hold it; \
+         rename it, or use --clock virtual",
+        file.display()
+    )))
 }
 
 fn check_devices(rig: &Rig, info: &DriverInfo) -> Result<(), RunFailure> {

@@ -12,6 +12,7 @@ use io_driver::sim::hand::HandModel;
 use io_driver::sim::hand::model_file::{self, Firmness};
 use io_driver::toml_report::TomlReport;
 use nalgebra::{Isometry3, Vector3};
+use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -58,7 +59,7 @@ pub enum SimulationError {
         /// What there is besides files.
         builtins: String,
         /// What the system said.
-        source: std::io::Error,
+        source: io::Error,
     },
     /// The description is wrong.
     #[error(transparent)]
@@ -127,13 +128,28 @@ impl SimulatedDevices {
     }
 }
 
+/// A description has some kilobytes; whatever is larger is another file.
+const MAX_FILE_BYTES: u64 = 1 << 20;
+
 fn read(file: &Path, what: &'static str, builtins: &[&str]) -> Result<String, SimulationError> {
-    std::fs::read_to_string(file).map_err(|source| SimulationError::Unreadable {
+    read_bounded(file, MAX_FILE_BYTES).map_err(|source| SimulationError::Unreadable {
         file: file.into(),
         what,
         builtins: builtins.join(", "),
         source,
     })
+}
+
+/// The driver reads it again, which a pipe does not allow.
+fn read_bounded(file: &Path, most_bytes: u64) -> io::Result<String> {
+    let found = file.metadata()?;
+    if !found.is_file() && !found.is_dir() {
+        return Err(io::Error::other("it is no regular file"));
+    }
+    if found.len() > most_bytes {
+        return Err(io::Error::other(format!("it is larger than {most_bytes} bytes")));
+    }
+    std::fs::read_to_string(file)
 }
 
 /// So that the driver finds it from wherever it runs.
@@ -161,6 +177,16 @@ mod tests {
 
     fn base(lowest: [f64; 3], highest: [f64; 3]) -> Vector3<f64> {
         base_for_path(lowest.into(), highest.into(), &WORKSPACE).translation.vector
+    }
+
+    #[test]
+    fn what_never_ends_is_no_description() {
+        let endless = SimulatedDevices { description: "/dev/zero".into(), ..SimulatedDevices::default() };
+        let said = endless.arm().expect_err("no file").to_string();
+        assert!(
+            said.contains("/dev/zero: it is no regular file; name a file, or one of premium-1.5"),
+            "{said}"
+        );
     }
 
     #[test]

@@ -225,10 +225,12 @@ fn bad_input_ends_with_status_2_and_says_what_to_do() {
         "line.csv",
         (0..50).map(|i| format!("{i} 0 0 0 {i} 0\n").replace(' ', "e-2 ")).collect::<String>(),
     );
+    let far = "9e-1 0 0 -4e0 0 0\n";
+    place.write("spoilt.csv", pairs_csv(100, &Matrix3::identity()) + far);
     place.write("bad.toml", "[[device]]\nwobble = 1\n");
     place.write("a.toml", "[[device]]\n");
     place.write("b.toml", "[[device]]\n");
-    let cases: [(&[&str], &[&str]); 17] = [
+    let cases: [(&[&str], &[&str]); 19] = [
         (&[], &["--pairs", "--live"]),
         (&["--pairs", "none.csv"], &["none.csv: cannot be read"]),
         (&["--pairs", "."], &[".: cannot be read"]),
@@ -238,6 +240,11 @@ fn bad_input_ends_with_status_2_and_says_what_to_do() {
             &["--pairs", "mm.csv"],
             &["mm.csv: the points of the other device", "millimetres", "divide them by 1000"],
         ),
+        (
+            &["--pairs", "spoilt.csv"],
+            &["spoilt.csv: ", "found: 1, the first on line 101", "--reject-outliers"],
+        ),
+        (&["--pairs", "pairs.csv", "--write", "."], &["--write .: found something else than a file"]),
         (&["--pairs", "line.csv"], &["line.csv: the points lie on a line", "all three directions"]),
         (&["--pairs", "pairs.csv", "--device", "8"], &["found 8, allowed: a device's index, 0 to 7"]),
         (&["--pairs", "pairs.csv", "--device", "0"], &["--device 0 and --fiducial 0"]),
@@ -373,6 +380,18 @@ fn a_layout_that_cannot_be_written_is_not_lost() {
     assert_eq!(said.status, Some(2), "{said:?}");
     assert!(said.err.contains("pairs.csv/layout.toml: cannot be written"), "{}", said.err);
     assert_stands(&parse(&said.out), 1, &(truth()[0].inverse() * truth()[1]));
+}
+
+#[test]
+fn a_layout_that_did_not_fit_onto_the_disk_is_no_success() {
+    let place = Workplace::new();
+    place.write("pairs.csv", pairs_csv(300, &Matrix3::identity()));
+    let full = std::fs::File::options().write(true).open("/dev/full").expect("every Linux has one");
+    let mut program = place.phantom3();
+    let said = program.args(["calibrate", "--pairs", "pairs.csv"]).stdout(full).output().expect("it runs");
+    let err = String::from_utf8_lossy(&said.stderr);
+    assert_eq!(said.status.code(), Some(2), "{err}");
+    assert!(err.contains("standard output: cannot be written: No space left"), "{err}");
 }
 
 #[test]

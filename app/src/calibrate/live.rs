@@ -6,6 +6,7 @@
 //! A device that renders a force pulls on the joint that holds the end points together and bends its arm; such ticks
 //! are not kept, and whoever commands is named.
 
+use crate::progress::StatusLine;
 use calibration::{Coverage, Gathering, Pair};
 use io_driver::say::say;
 use nalgebra::Vector3;
@@ -14,7 +15,6 @@ use shm_abi::client::{self, AttachError, Attachment};
 use shm_abi::frame::DEVICE_POSITION_VALID;
 use shm_abi::layout::RING_FRAMES;
 use shm_abi::{DeviceFrame, DriverView, Frame, FrameUnavailable};
-use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use thiserror::Error;
@@ -100,7 +100,7 @@ struct Session {
     was_valid: [bool; 2],
     was_free: bool,
     has_warned: bool,
-    line: ProgressLine,
+    line: StatusLine,
 }
 
 impl Session {
@@ -125,7 +125,7 @@ impl Session {
             was_valid: [false; 2],
             was_free: false,
             has_warned: false,
-            line: ProgressLine::new(),
+            line: StatusLine::default(),
         })
     }
 
@@ -242,37 +242,4 @@ fn advice(coverage: &Coverage) -> String {
         None => "go on, to places where you have not been".into(),
     };
     format!("{:5} pairs, extent {a:.0}, {b:.0}, {c:.0} mm: {next}", coverage.count)
-}
-
-/// A line that is rewritten in place on a terminal, else written now and then.
-struct ProgressLine {
-    on_terminal: bool,
-    last: Option<Instant>,
-    is_open: bool,
-}
-
-impl ProgressLine {
-    fn new() -> Self {
-        Self { on_terminal: std::io::stderr().is_terminal(), last: None, is_open: false }
-    }
-
-    fn show(&mut self, words: impl Fn() -> String) {
-        let pause = Duration::from_millis(if self.on_terminal { 200 } else { 5000 });
-        if self.last.is_some_and(|last| last.elapsed() < pause) {
-            return;
-        }
-        self.last = Some(Instant::now());
-        let mut out = std::io::stderr().lock();
-        // Nobody to tell is no reason to stop.
-        let _ =
-            if self.on_terminal { write!(out, "\r{}\x1b[K", words()) } else { writeln!(out, "{}", words()) };
-        let _ = out.flush();
-        self.is_open = self.on_terminal;
-    }
-
-    fn end(&mut self) {
-        if std::mem::take(&mut self.is_open) {
-            let _ = writeln!(std::io::stderr());
-        }
-    }
 }

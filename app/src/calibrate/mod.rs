@@ -140,7 +140,7 @@ pub enum CalibrateFailure {
     },
     /// Some pairs spoil all others.
     #[error(
-        "{origin}: {source} This is the doing of {count} outliers, the first on line {line}: look at them, or leave them out with --reject-outliers"
+        "{origin}: {source} Without outliers (found: {count}, the first on line {line}) they do: look at those, or leave them out with --reject-outliers"
     )]
     Spoilt {
         /// Where the pairs come from.
@@ -223,13 +223,15 @@ fn run_to_end(args: &CalibrateArgs) -> Result<(), CalibrateFailure> {
     say(format_args!("{report}"));
     if let Some(file) = &plan.write {
         // Whoever held two arms together for a minute shall not have to do it again for a full disk.
-        layout_file::replace(file, &text).inspect_err(|_| print(text.trim_end()))?;
+        layout_file::replace(file, &text).inspect_err(|_| {
+            let _ = print(text.trim_end());
+        })?;
         say(format_args!("layout       written to {}", file.display()));
     }
     if args.json {
-        print(&report.json(plan.write.as_deref()));
+        print(&report.json(plan.write.as_deref()))?;
     } else if plan.write.is_none() {
-        print(text.trim_end());
+        print(text.trim_end())?;
     }
     args.plot.as_ref().map_or(Ok(()), |file| draw(file, &pairs, &found, used))
 }
@@ -302,8 +304,8 @@ fn refuse_same_file(args: &CalibrateArgs, write: Option<&Path>) -> Result<(), Ca
 /// The pairs, and where they come from in words.
 fn get_pairs(args: &CalibrateArgs) -> Result<(String, Vec<Pair>), CalibrateFailure> {
     if let Some(file) = &args.pairs {
-        let text = std::fs::read_to_string(file)
-            .map_err(|source| CalibrateFailure::Unreadable { file: file.clone(), source })?;
+        let text =
+            read_pairs(file).map_err(|source| CalibrateFailure::Unreadable { file: file.clone(), source })?;
         let pairs =
             parse_pairs(&text).map_err(|source| CalibrateFailure::Pairs { file: file.clone(), source })?;
         return Ok((file.display().to_string(), pairs));
@@ -325,6 +327,20 @@ fn get_pairs(args: &CalibrateArgs) -> Result<(String, Vec<Pair>), CalibrateFailu
     gathered.end?;
     Ok((wish.socket.display().to_string(), gathered.pairs))
 }
+
+/// Pipes are welcome; what never ends is not.
+fn read_pairs(file: &Path) -> io::Result<String> {
+    use std::io::Read;
+    let mut text = String::new();
+    std::fs::File::open(file)?.take(MAX_PAIRS_BYTES + 1).read_to_string(&mut text)?;
+    if text.len() as u64 > MAX_PAIRS_BYTES {
+        return Err(io::Error::other(format!("it is larger than {MAX_PAIRS_BYTES} bytes; take fewer lines")));
+    }
+    Ok(text)
+}
+
+/// Room for as many pairs as there may be, with all their digits.
+const MAX_PAIRS_BYTES: u64 = 256 << 20;
 
 /// Numbers as short as they can be read back exactly.
 fn save_pairs(file: &Path, pairs: &[Pair]) -> Result<(), CalibrateFailure> {
@@ -367,10 +383,15 @@ fn draw(file: &Path, pairs: &[Pair], found: &Calibration, used: &Fit) -> Result<
     std::fs::write(file, bytes).map_err(|source| CalibrateFailure::Output { file: file.into(), source })
 }
 
-/// A closed pipe is no reason to fail: the calibration is done.
-fn print(text: &str) {
+/// A closed pipe is no reason to fail: nobody wants to know. A full disk is: the result is lost.
+fn print(text: &str) -> Result<(), CalibrateFailure> {
     use std::io::Write;
-    let _ = writeln!(io::stdout(), "{text}");
+    match writeln!(io::stdout(), "{text}") {
+        Err(source) if source.kind() != io::ErrorKind::BrokenPipe => {
+            Err(CalibrateFailure::Output { file: "standard output".into(), source })
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Clap's own paths are never empty, not even by default.

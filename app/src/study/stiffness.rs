@@ -45,7 +45,7 @@ pub struct StiffnessArgs {
     /// Contact damping of the wall, N s/m
     #[arg(long, value_name = "B,...", value_delimiter = ',', default_values_t = [0.0, 2.0], value_parser = parse_damping)]
     dampings: Vec<f64>,
-    /// Hands: built-in names or files (TOML), with :light or :firm; nobody: nobody holds the arm
+    /// Hands: built-in names or files (TOML), with :light or :firm; nobody: nobody holds the arm, and nothing pushes it
     #[arg(long, value_name = "HAND,...", value_delimiter = ',', default_values = ["pen-grip:light", "pen-grip:firm"])]
     hands: Vec<case::Hand>,
     /// Which device is simulated: a built-in's name or a description (TOML)
@@ -98,15 +98,24 @@ pub fn execute(args: &StiffnessArgs, signals: &StopSignals) -> Result<Stop, RunF
     std::fs::create_dir_all(&args.out)
         .map_err(|error| start(&format!("cannot make the directory {}: {error}", args.out.display())))?;
     let jobs = args.jobs.or(std::thread::available_parallelism().ok()).map_or(1, usize::from);
-    say(format_args!("phantom3: {} cases, {jobs} at a time; a minute or so each way", cases.len()));
+    // Before minutes of work, not after them.
+    let writable = tempfile::tempfile_in(&args.out);
+    writable.map_err(|error| {
+        start(&format!(
+            "cannot write into {}: {error}; name a directory that can be written with --out",
+            args.out.display()
+        ))
+    })?;
+    say(format_args!("phantom3: {} cases, {jobs} at a time; some seconds each", cases.len()));
     let Some(answers) = answer_all(&bench, &cases, jobs, signals)? else {
         return Ok(Stop::Signal(signals.requested().unwrap_or(rustix::process::Signal::INT.as_raw())));
     };
     print(&table::text(&bench, &answers));
-    table::write_csv(&args.out.join("stiffness.csv"), &bench, &answers).map_err(|error| start(&error))?;
+    let late = |error: &dyn std::fmt::Display| RunFailure::Results(error.to_string());
+    table::write_csv(&args.out.join("stiffness.csv"), &bench, &answers).map_err(|error| late(&error))?;
     picture::figure(&bench, &answers)
         .write(&args.out.join("stiffness"))
-        .map_err(|error| start(&format!("cannot write the picture: {error}")))?;
+        .map_err(|error| late(&format_args!("cannot write the picture: {error}")))?;
     print(&format!("written      {}/stiffness.csv, .svg, .png\n", args.out.display()));
     Ok(Stop::Finished)
 }

@@ -1,10 +1,11 @@
 //! What theory says of a case.
 //!
 //! - The sampled linear loop ([`super::linear`]): exact for this hand and arm, but for friction and encoder steps.
-//! - Passivity (Colgate and Schenkel 1997): `K < 2 (b - B) / T`, with the arm's own viscous friction `b` and the wall's
-//!   damping `B`, holds against any hand whatever, and so is far below what a given hand stands.
-//! - With delay and a hand that damps, roughly `K < (b + b1 + B) / (T/2 + td)`: the phase that holding and delay cost
-//!   against all damping there is.
+//! - Passivity (Colgate and Schenkel 1997): `K < (b - B) / (T/2 + td)`, with the arm's own viscous friction `b` and the
+//!   wall's damping `B`, holds against any hand whatever, and so is far below what a given hand stands. Without delay it
+//!   is the well-known `2 (b - B) / T`. For whole ticks of delay the condition is `b > K T/2 (1 + 2 cos w) - B cos 2w` at
+//!   worst, which this implies; for a part `r` of a tick it is stricter by less than 8 %.
+//! - With a hand that damps, roughly `K < (b + b1 + B) / (T/2 + td)`: the same phase against all damping there is.
 //! - Friction against encoder steps (Abbott and Okamura 2005): below `2 f_c / count` the friction takes more than
 //!   rounding a position can give, so no oscillation of some counts keeps itself up.
 
@@ -53,11 +54,12 @@ impl Theory {
         };
         let amplifier_s = 1.0 / (std::f64::consts::TAU * plant.amplifier_hz);
         let late_s = f64::from(delay.0) * period_s + delay.1 + amplifier_s;
+        let lag_s = 0.5 * period_s + late_s;
         let held_by = hand.map_or(0.0, |hand| hand.grasp.y);
         Ok(Self {
             linear: limit(&system),
-            passive: (2.0 * (plant.viscous_n_s_per_m - damping) / period_s).max(0.0),
-            damped: (plant.viscous_n_s_per_m + held_by + damping) / (0.5 * period_s + late_s),
+            passive: ((plant.viscous_n_s_per_m - damping) / lag_s).max(0.0),
+            damped: (plant.viscous_n_s_per_m + held_by + damping) / lag_s,
             friction: 2.0 * plant.coulomb_n / plant.count_m,
         })
     }

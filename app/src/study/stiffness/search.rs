@@ -16,7 +16,8 @@ const RESOLUTION: f64 = 1.01;
 /// The way to the answer.
 #[derive(Debug, Clone, Default)]
 pub struct Search {
-    settled: Option<f64>,
+    /// All that settled, below the first that failed.
+    settled: Vec<f64>,
     failed: Option<f64>,
 }
 
@@ -34,7 +35,7 @@ pub enum Found {
 impl Search {
     /// What to try next; `None`: it is found.
     pub fn next(&self) -> Option<f64> {
-        match (self.settled, self.failed) {
+        match (self.highest_settled(), self.failed) {
             (None, None) => Some(LEAST_N_PER_M),
             (Some(settled), None) if settled >= MOST_N_PER_M => None,
             (Some(settled), None) => Some((settled * FACTOR).min(MOST_N_PER_M)),
@@ -49,15 +50,19 @@ impl Search {
         if !settles {
             self.failed = Some(stiffness.min(lowest_failed));
             // What settled above it is an island.
-            self.settled = self.settled.filter(|settled| *settled < stiffness);
+            self.settled.retain(|settled| *settled < stiffness);
         } else if stiffness < lowest_failed {
-            self.settled = Some(self.settled.map_or(stiffness, |settled| settled.max(stiffness)));
+            self.settled.push(stiffness);
         }
+    }
+
+    fn highest_settled(&self) -> Option<f64> {
+        self.settled.iter().copied().max_by(f64::total_cmp)
     }
 
     /// The answer.
     pub fn found(&self) -> Found {
-        match (self.settled, self.failed) {
+        match (self.highest_settled(), self.failed) {
             (None, _) => Found::None,
             (Some(settled), Some(_)) => Found::Limit(settled),
             (Some(_), None) => Found::All,
@@ -98,6 +103,17 @@ mod tests {
             assert!(found <= limit && limit <= found * RESOLUTION, "{found} {limit}");
             assert!(tries < 50, "{tries}");
         }
+    }
+
+    #[test]
+    fn a_failure_below_what_settled_keeps_what_settled_below_it() {
+        // Asked for by another search.
+        let mut search = Search::default();
+        for (k, settles) in [(1000.0, true), (1250.0, true), (1100.0, false)] {
+            search.learn(k, settles);
+        }
+        assert_eq!(search.found(), Found::Limit(1000.0));
+        assert_eq!(search.next(), Some(f64::sqrt(1000.0 * 1100.0)));
     }
 
     #[test]

@@ -18,13 +18,14 @@ pub struct TableError {
 
 /// What the columns mean and why they differ.
 const EXPLANATION: &str = "\
-All in N/m; each is the largest below the first that fails, within 1 %.
+All in N/m; the first three are the largest below the first that fails, within 1 %; tried in steps of 25 % on the way up.
 settled   no counter moves by two counts or more from 2 s after the push on
 quiet     and none flickers between two counts, either
 linear    the sampled linear loop of this arm and this hand, without friction and encoder steps
 damped    (b + b1 + B) / (T/2 + td): the phase that holding and delay cost, against all damping; a rule of thumb
-passive   2 (b - B) / T: passive under any hand whatever; 0: the wall damps more than the arm
+passive   (b - B) / (T/2 + td): passive under any hand whatever; 0: the wall damps more than the arm
 friction  2 f_c / count: below it friction takes more than a step of the encoder gives
+          b, f_c: of the arm; b1: of the grasp; B: of the wall; T: a tick; td: from reading to force, amplifier included
 
 Why they differ. `settled` is above `linear`, because friction holds what the loop would blow up: up to an amplitude
 of 4 f_c / (pi w b'), with b' the damping that is missing, which is about a count here. Without friction and encoder
@@ -43,7 +44,7 @@ pub fn text(bench: &Bench, answers: &[Answer]) -> String {
     // Writing to a string cannot fail.
     let _ = writeln!(
         text,
-        "arm along {:?}: {:.0} g with rotors, viscous {:.2} N s/m, friction {:.0} mN, a count is {:.4} mm, amplifiers {:.0} Hz\n",
+        "arm along {:?}: {:.0} g with rotors, viscous {:.3} N s/m, friction {:.0} mN, a count is {:.4} mm, amplifiers {:.0} Hz\n",
         bench.axis,
         plant.mass_kg * 1e3,
         plant.viscous_n_s_per_m,
