@@ -55,7 +55,7 @@ pub enum DriverCommand {
     /// Try a device for the first time: do its counters and motors turn the right way?
     Commission(CommissionArgs),
     /// Play a card with counters, converters and amplifiers, for a driver without hardware
-    Emulate(EmulateArgs),
+    Emulate(Box<EmulateArgs>),
     /// Say whether this machine is ready for real time, and what to do about it
     Doctor(DoctorArgs),
 }

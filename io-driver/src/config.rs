@@ -226,6 +226,14 @@ mod tests {
                 "lab/driver.toml:3: `device[0].trace`: found `trace` in a device of backend \"ideal\", allowed: not there",
             ),
             (
+                "[[device]]\nbackend = \"ideal\"\nfinger = \"f9\"",
+                "lab/driver.toml:3: `device[0].finger`: found `finger` without `hand`, allowed: both, or `start_m`",
+            ),
+            (
+                "[[device]]\nbackend = \"simulated\"\ndescription = \"premium-1.5\"\nhand_model = \"nobody\"\nfirmness = \"firm\"",
+                "lab/driver.toml:5: `device[0].firmness`: found `firmness` of a hand that is nobody's, allowed: not there",
+            ),
+            (
                 "[[device]]\nbackend = \"ideal\"\nname = \"a\"\n[[device]]\nbackend = \"ideal\"\nname = \"a\"",
                 "lab/driver.toml:6: `device[1].name`: found the name \"a\" twice, allowed: each name once",
             ),

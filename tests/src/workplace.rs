@@ -11,6 +11,7 @@ use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 use tempfile::TempDir;
 
 /// Marks the processes that descend from a workplace's program.
@@ -146,8 +147,8 @@ impl Running {
         let mut command = command;
         let [out, err] = [(); 2].map(|()| tempfile::tempfile().expect("a file"));
         let same = |file: &File| file.try_clone().expect("the same file");
-        let child = command.stdout(same(&out)).stderr(same(&err)).spawn().expect("the program starts");
-        Self { child, out, err }
+        command.stdout(same(&out)).stderr(same(&err));
+        Self { child: spawn(&mut command), out, err }
     }
 
     /// What it has said on standard error until now.
@@ -199,4 +200,18 @@ fn collect(directory: &Path, files: &mut BTreeMap<PathBuf, Vec<u8>>) {
             files.insert(path, content);
         }
     }
+}
+
+/// A copy of a program may still be open for writing in a child that another thread is just starting, which has not yet
+/// got to where such files are closed: the kernel then refuses to run the copy, for a moment.
+fn spawn(command: &mut Command) -> Child {
+    for _ in 0..100 {
+        match command.spawn() {
+            Err(error) if error.kind() == std::io::ErrorKind::ExecutableFileBusy => {
+                std::thread::sleep(Duration::from_millis(10));
+            }
+            started => return started.expect("the program starts"),
+        }
+    }
+    command.spawn().expect("the program starts")
 }

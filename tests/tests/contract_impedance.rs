@@ -73,6 +73,16 @@ fn two_virtual_runs_write_the_same_bytes_and_another_seed_trembles_otherwise() {
     assert!((after_wish("a.csv") - after_wish("c.csv")).norm() < 2e-3);
 }
 
+/// However long the driver waited for its commander before.
+#[test]
+fn two_lockstep_runs_write_the_same_bytes() {
+    let place = workplace(TABLE, &pressing());
+    for name in ["a.csv", "b.csv"] {
+        record(&place, "lockstep", name, &["--hand", "hand.csv", "--seconds", "1"]);
+    }
+    assert!(bytes(&place, "a.csv") == bytes(&place, "b.csv"));
+}
+
 /// On every clock, the wall's force on a hand that rests is that of two springs in series, hand and wall, within what
 /// the friction of the arm takes from either: a tip that sticks may be anywhere where
 /// |wall - hand| <= friction, so that |wall - k d| <= friction * k_wall / (k_wall + k_hand) < friction.

@@ -240,7 +240,17 @@ impl RawDevice {
         let usual = PathBuf::from(DEFAULT_HAND);
         let named = self.hand_model.as_ref().map_or(&usual, Spanned::get_ref);
         let model = match named.to_str() {
-            Some("nobody") => return Ok(None),
+            Some("nobody") => {
+                let of_a_hand = [("firmness", span_of(&self.firmness)), ("tremor", span_of(&self.tremor))];
+                return match of_a_hand.into_iter().find_map(|(key, span)| Some((key, span?))) {
+                    None => Ok(None),
+                    Some((key, span)) => Err(toml.refuse(
+                        span,
+                        format_args!("`{key}` of a hand that is nobody's"),
+                        "not there",
+                    )),
+                };
+            }
             Some(name) if model_file::builtin(name).is_some() => name.into(),
             _ => directory.join(named),
         };
@@ -259,6 +269,9 @@ impl RawDevice {
     }
 
     fn wish(&self, name: &str, toml: &TomlText<'_>, directory: &Path) -> Result<Wish, TomlReport> {
+        if let (None, Some(finger)) = (&self.hand, &self.finger) {
+            return Err(toml.refuse(finger.span(), "`finger` without `hand`", "both, or `start_m`"));
+        }
         let finger = self.finger.as_ref().map_or_else(|| name.to_owned(), |finger| finger.get_ref().clone());
         let start = self.start_m.as_ref().map_or(Ok([0.0; 3]), |list| toml.numbers(list, PLACE))?;
         Ok(Wish {

@@ -2,7 +2,8 @@
 //!
 //! Model: raw counters, extended beyond their width, become joint angles and the tip, and their changes its velocity,
 //! `J q'` with each joint's velocity estimated from its own counts; a force becomes codes.
-//! Counters tell the pose only once the arm has been zeroed; until then it seems to be at home and is not valid.
+//! Counters tell the pose only once the arm has been zeroed; until then its pose is that of the
+//! description's home, or the last that was known, and is not valid.
 //! An instrumented gimbal's counters are read, extended and zeroed together with the joints'.
 //! Invariant: `read` comes before `render` in a tick; codes are for the pose that was read last.
 

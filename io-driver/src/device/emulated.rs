@@ -137,8 +137,10 @@ impl Device for EmulatedDevice {
         // Read whatever the status says: the counters go on, and nobody has to zero anew.
         let mut reading = self.arm.read_with_gimbal(raw, gimbal, time);
         reading.buttons = u64::from(inputs.buttons.load(Ordering::Relaxed));
-        if session != self.session {
-            self.session = session;
+        // Before and after the counters: a card that was switched on between the two is another one as well.
+        let later = inputs.session.load(Ordering::Acquire);
+        if session != self.session || later != session {
+            self.session = later;
             self.arm.lose_zero();
             return Err(FaultReason::DeviceRead);
         }

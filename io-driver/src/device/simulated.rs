@@ -113,6 +113,10 @@ pub struct SimulatedDevice {
     read_at_ns: u64,
     /// What the amplifiers get, and how long after the last reading (ns).
     pending: Option<(u64, Drive)>,
+    /// Its world stands still until some force is let through.
+    is_waiting: bool,
+    /// What the counters say meanwhile, those of the gimbal too.
+    waiting_counters: Option<([i64; 3], Option<[i64; 3]>)>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -141,12 +145,36 @@ impl SimulatedDevice {
             last_tick: None,
             read_at_ns: 0,
             pending: None,
+            is_waiting: false,
+            waiting_counters: None,
         }
+    }
+
+    /// The same, whose world stands still until some force is let through: so a run is the same however long the
+    /// driver waited for its commander.
+    pub fn waiting_for_a_commander(self) -> Self {
+        Self { is_waiting: true, ..self }
     }
 
     /// What really is, which no encoder tells.
     pub fn truth(&self) -> Truth {
         self.plant.truth()
+    }
+
+    /// Lets the time since the last reading pass; what the hand does with the handle, and the counters.
+    fn go_on(&mut self, time: TickTime, elapsed_ns: u64) -> (Handle, ([i64; 3], Option<[i64; 3]>)) {
+        self.pass(elapsed_ns);
+        let handle = self.tell_hand(time, elapsed_ns.max(time.period_ns) as f64 / 1e9);
+        let turned = self.base_in_world.rotation.inverse() * handle.orientation_W;
+        let gimbal = self.plant.gimbal_counters(turned);
+        (handle, (self.plant.counters(), gimbal))
+    }
+
+    fn handle(&mut self, time: TickTime) -> Handle {
+        match &mut self.holder {
+            Holder::Nobody => Handle::default(),
+            Holder::Hand(held) => held.wish.at(time.run_time_s()).1,
+        }
     }
 
     /// Lets the time since the last reading pass.
@@ -203,12 +231,14 @@ impl Device for SimulatedDevice {
     fn read(&mut self, time: TickTime) -> Result<Reading, FaultReason> {
         let ticks = self.last_tick.replace(time.tick).map_or(0, |last| time.tick.saturating_sub(last));
         let elapsed_ns = ticks.saturating_mul(time.period_ns).min(time.period_ns.max(LONGEST_STALL_NS));
-        self.pass(elapsed_ns);
+        let (handle, counters) = match self.waiting_counters.filter(|_| self.is_waiting) {
+            Some(counters) => (self.handle(time), counters),
+            None => self.go_on(time, elapsed_ns),
+        };
+        // From here on: what the simulation took is nobody's latency.
         self.read_at_ns = monotonic_ns();
-        let handle = self.tell_hand(time, elapsed_ns.max(time.period_ns) as f64 / 1e9);
-        let turned = self.base_in_world.rotation.inverse() * handle.orientation_W;
-        let gimbal = self.plant.gimbal_counters(turned);
-        let mut reading = self.arm.read_with_gimbal(self.plant.counters(), gimbal, time);
+        self.waiting_counters = Some(counters);
+        let mut reading = self.arm.read_with_gimbal(counters.0, counters.1, time);
         reading.buttons = handle.buttons;
         if self.plant.is_tripped() {
             return Err(FaultReason::AmplifierTripped);
@@ -218,7 +248,9 @@ impl Device for SimulatedDevice {
 
     fn write(&mut self, effort: Effort) -> Result<Written, FaultReason> {
         let (codes, written) = self.arm.render(effort)?;
-        let drive = if effort.gravity_share > 0.0 { Drive::Codes(codes) } else { Drive::Off };
+        let is_on = effort.gravity_share > 0.0;
+        self.is_waiting &= !is_on;
+        let drive = if is_on { Drive::Codes(codes) } else { Drive::Off };
         self.pending = Some((self.latency_ns(), drive));
         Ok(written)
     }

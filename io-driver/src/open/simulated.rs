@@ -3,7 +3,7 @@
 #![allow(non_snake_case)] // Frames are capital letters: a point p_W is in the world.
 
 use super::{OpenError, arm_info, commissioned, has_switch, holds_its_weight, mechanism, read, script};
-use crate::config::{Backend, DeviceConfig, DriverConfig, HandChoice, ReplyMode, Wish};
+use crate::config::{Backend, DeviceConfig, DriverConfig, HandChoice, ReplyMode, Wish, Zeroing};
 use crate::device::Device;
 use crate::device::arm::Arm;
 use crate::device::simulated::{HeldBy, Holder, Latency, SimulatedDevice, Wish as HandWish};
@@ -11,6 +11,7 @@ use crate::device_file::ArmFile;
 use crate::kinematics::Mechanism;
 use crate::sim::arm::SimulatedArm;
 use crate::sim::hand::{HandModel, ImpedanceHand, model_file};
+use crate::sim::split_mix::SplitMix64;
 use crate::sim::tip_board::TipBoard;
 use nalgebra::{Point3, Vector3};
 use shm_abi::segment::{ClockMode, DeviceInfo};
@@ -30,7 +31,7 @@ pub(super) fn open(
     };
     let file = mechanism(device, description)?;
     let place = config.devices.iter().position(|other| other.name == device.name).unwrap_or(0);
-    let seed = seed.wrapping_add(place as u64);
+    let [of_plant, of_hand] = seeds(*seed, place);
     let wanted = match script(device, wish, config)? {
         Some((player, finger)) => HandWish::Scripted(player, finger),
         None => HandWish::Resting(wish.start_m),
@@ -39,14 +40,14 @@ pub(super) fn open(
     let start_D = wish.base_in_world.inverse_transform_point(&Point3::from(start_W)).coords;
     let joints = pose(device, &file, start_W, start_D)?;
     let no_simulation = || OpenError::NoSimulation { device: device.name.clone(), file: description.clone() };
-    let plant = SimulatedArm::new(&file, joints, seed).ok_or_else(no_simulation)?;
+    let plant = SimulatedArm::new(&file, joints, of_plant).ok_or_else(no_simulation)?;
     let holder = match holder {
         None => Holder::Nobody,
         Some(choice) => Holder::Hand(Box::new(HeldBy {
             hand: ImpedanceHand::new(
                 &hand(device, choice)?.in_base(&wish.base_in_world.rotation),
                 start_D,
-                seed,
+                of_hand,
             ),
             wish: wanted,
             board: Arc::clone(board),
@@ -60,6 +61,11 @@ pub(super) fn open(
     if has_switch(device, config) && !opened.extras().buttons {
         return Err(OpenError::NobodyPresses { device: device.name.clone() });
     }
+    // In lockstep the driver's idle ticks go by a clock that nobody can repeat.
+    let opened = match config.clock {
+        ClockMode::Lockstep => opened.waiting_for_a_commander(),
+        ClockMode::Real | ClockMode::Virtual => opened,
+    };
     Ok(Box::new(opened))
 }
 
@@ -70,6 +76,14 @@ fn beginning(mut wanted: HandWish, wish: &Wish) -> (HandWish, Vector3<f64>) {
         HandWish::Resting(at) => Some(*at),
     };
     (wanted, start.unwrap_or(wish.start_m))
+}
+
+/// Of arm and hand: no two devices of a driver, and no two seeds, share a stream.
+fn seeds(seed: u64, place: usize) -> [u64; 2] {
+    let mut of_driver = SplitMix64::new(seed);
+    let of_place = of_driver.next_u64() ^ SplitMix64::new(!(place as u64)).next_u64();
+    let mut of_device = SplitMix64::new(of_place);
+    [of_device.next_u64(), of_device.next_u64()]
 }
 
 fn pose(
@@ -84,6 +98,15 @@ fn pose(
     let excess = file.mechanism.joint_limits().excess(joints);
     if excess > 0.0 {
         return Err(out_of_reach(format!("a joint would be {excess:.3} rad beyond its stop")));
+    }
+    // Counters that say where they are have to say it within one turn of theirs.
+    let counts = file.joint_map().angles_to_counts(joints);
+    let half = 1i64 << (file.encoders.count_bits - 1);
+    if device.zeroing == Zeroing::Known && counts.iter().any(|count| !(-half..half).contains(count)) {
+        let bits = file.encoders.count_bits;
+        return Err(out_of_reach(format!(
+            "its counters of {bits} bits have wrapped there; zero it with `zeroing = \"ask\"`"
+        )));
     }
     Ok(joints)
 }

@@ -6,8 +6,8 @@
 //! accelerates and which one encoder count hardly moves. A jump is a position that nothing could have reached since
 //! the last one; it is looked for in the positions, which no estimate has smoothed.
 //! Invariants: time is counted in ticks of the schedule, so skipped ones do not make a movement look fast. A tick
-//! in which the loop steps aside ([`rt_core::phase_keeper`]) is 0.38 of a period longer than it counts: in a window
-//! of four ticks a movement then looks a tenth faster than it is.
+//! in which the loop steps aside ([`rt_core::phase_keeper`]) is 0.38 of a period longer than it counts: a movement
+//! then looks faster than it is by that part of the estimate's window, a tenth where that is four ticks.
 //! Cost: constant; no allocation.
 
 use nalgebra::Vector3;

@@ -40,9 +40,12 @@ fn chart(title: &str, answers: &[&Answer]) -> Chart {
         if measured.is_empty() && linear.is_empty() {
             return chart;
         }
+        // A line through one rate is no line.
+        let (whole, theory) =
+            if measured.len() > 1 { (Look::Line, Look::Dashed) } else { (Look::Dots, Look::Dots) };
         chart
-            .with(Series::new(mode.name(), Look::Line, measured).coloured(index))
-            .with(Series::new(&format!("{}, linear", mode.name()), Look::Dashed, linear).coloured(index))
+            .with(Series::new(mode.name(), whole, measured).coloured(index))
+            .with(Series::new(&format!("{}, linear", mode.name()), theory, linear).coloured(index))
     });
     let of_first = |answer: &&&Answer| answer.case.mode == answers[0].case.mode;
     let first = answers.iter().filter(of_first);
