@@ -21,7 +21,7 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::JointConvention;
+use super::{JointConvention, LinkagePose};
 
 /// Standard gravity (m/s^2).
 pub const GRAVITY_M_PER_S2: f64 = 9.806_65;
@@ -60,14 +60,12 @@ pub struct Gravity {
     up_D: Vector3<f64>,
 }
 
-/// The moment of weight (N m) in the arm's plane, which the turret turns, and the sines and cosines it is made of.
+/// The moment of weight (N m) in the arm's plane, which the turret turns.
 struct Moment {
     /// Away from the turret's axis, in the plane.
     ahead: f64,
     /// Along the turret's axis.
     along: f64,
-    sin: [f64; 3],
-    cos: [f64; 3],
 }
 
 impl Gravity {
@@ -91,7 +89,13 @@ impl Gravity {
 
     /// Joint torques (N m) under which the arm rests where it is.
     pub fn holding_torque(&self, joints: [f64; 3]) -> [f64; 3] {
-        let Moment { ahead, sin: [sin1, sin2, sin3], cos: [cos1, cos2, cos3], .. } = self.moment(joints);
+        self.holding_torque_at(&LinkagePose::at(self.convention.linkage_angles(joints)))
+    }
+
+    /// The same, for whoever has the sines and cosines.
+    pub fn holding_torque_at(&self, pose: &LinkagePose) -> [f64; 3] {
+        let LinkagePose { sin: [sin1, sin2, sin3], cos: [cos1, cos2, cos3] } = *pose;
+        let Moment { ahead, .. } = self.moment(pose);
         let up = self.up_D;
         let (up_ahead, up_across) = (up.x * sin1 + up.z * cos1, up.x * cos1 - up.z * sin1);
         self.convention.turned([
@@ -103,19 +107,17 @@ impl Gravity {
 
     /// Energy of the arm's weight (J), zero with all centres at the shoulder's height.
     pub fn potential_energy(&self, joints: [f64; 3]) -> f64 {
-        let Moment { ahead, along, sin: [sin1, ..], cos: [cos1, ..] } = self.moment(joints);
+        let pose = LinkagePose::at(self.convention.linkage_angles(joints));
+        let LinkagePose { sin: [sin1, ..], cos: [cos1, ..] } = pose;
+        let Moment { ahead, along } = self.moment(&pose);
         let up = self.up_D;
         (up.x * sin1 + up.z * cos1) * ahead + up.y * along
     }
 
-    fn moment(&self, joints: [f64; 3]) -> Moment {
-        let pairs = self.convention.linkage_angles(joints).map(f64::sin_cos);
-        let (sin, cos) = (pairs.map(|(sin, _)| sin), pairs.map(|(_, cos)| cos));
+    fn moment(&self, LinkagePose { sin, cos }: &LinkagePose) -> Moment {
         Moment {
             ahead: self.upper_arm_nm * cos[1] + self.forearm_nm * sin[2],
             along: self.upper_arm_nm * sin[1] - self.forearm_nm * cos[2],
-            sin,
-            cos,
         }
     }
 }

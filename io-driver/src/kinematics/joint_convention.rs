@@ -36,6 +36,23 @@ impl JointConvention {
     }
 }
 
+/// Sines and cosines of a linkage's angles, for whoever needs them more than once.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinkagePose {
+    /// Of turret, upper arm and forearm.
+    pub sin: [f64; 3],
+    /// Of the same.
+    pub cos: [f64; 3],
+}
+
+impl LinkagePose {
+    /// At these angles (rad).
+    pub fn at(angles: [f64; 3]) -> Self {
+        let pairs = angles.map(f64::sin_cos);
+        Self { sin: pairs.map(|(sin, _)| sin), cos: pairs.map(|(_, cos)| cos) }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

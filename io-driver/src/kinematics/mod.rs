@@ -26,7 +26,7 @@ pub mod wooden_haptics;
 
 pub use conditioning::Conditioning;
 pub use ideal::Ideal;
-pub use joint_convention::JointConvention;
+pub use joint_convention::{JointConvention, LinkagePose};
 pub use joint_limits::{Interval, JointLimits};
 pub use parallelogram::Parallelogram;
 pub use premium::Premium;

@@ -123,15 +123,14 @@ impl Seen {
     fn of(spec: &SimulationSpec, kinematics: &Kinematics, limits: &JointLimits, motion: Motion) -> Self {
         let (joints, rates) = (motion.angles.into(), motion.rates);
         let (tip, jacobian) = kinematics.forward_and_jacobian(joints);
-        let coriolis = spec.dynamics.coriolis(joints, rates.into()) * rates;
-        let weight = Vector3::from(spec.dynamics.holding_torque(joints));
+        let (mass, torque) = spec.dynamics.mass_and_torque(joints, rates.into());
         Self {
             motion,
             tip,
             tip_velocity: jacobian * rates,
             jacobian,
-            mass: spec.dynamics.mass_matrix(joints),
-            torque: stops(spec, limits, motion) - coriolis - weight,
+            mass,
+            torque: stops(spec, limits, motion) - torque,
         }
     }
 

@@ -25,8 +25,8 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use crate::kinematics::JointConvention;
 use crate::kinematics::gravity::{Bodies, Gravity};
+use crate::kinematics::{JointConvention, LinkagePose};
 
 /// Moments of inertia (kg m^2) about x, y, z of the pose in which the upper arm is level towards the user (z)
 /// and the forearm hangs (y).
@@ -103,9 +103,12 @@ impl Dynamics {
 
     /// Joint-space mass `M` (kg m^2): the torque per acceleration of each joint.
     pub fn mass_matrix(&self, joints: [f64; 3]) -> Matrix3<f64> {
-        let [_, theta2, theta3] = self.convention.linkage_angles(joints);
+        self.mass_matrix_at(&self.pose(joints))
+    }
+
+    fn mass_matrix_at(&self, pose: &LinkagePose) -> Matrix3<f64> {
+        let LinkagePose { sin: [_, sin2, sin3], cos: [_, cos2, cos3] } = *pose;
         let [c0, c2, c3] = self.turret;
-        let ((sin2, cos2), (sin3, cos3)) = (theta2.sin_cos(), theta3.sin_cos());
         // Double angles and the angle between the links come from these four, which saves half of the time.
         let m11 = c0
             + c2 * (cos2 * cos2 - sin2 * sin2)
@@ -118,12 +121,25 @@ impl Dynamics {
     /// Coriolis and centrifugal matrix `C` (N m s/rad), by Christoffel symbols: `C qd` are the torques that
     /// keep the joints at these rates (rad/s), and `dM/dt - 2 C` is skew-symmetric.
     pub fn coriolis(&self, joints: [f64; 3], rates: [f64; 3]) -> Matrix3<f64> {
-        let Slopes { half_m11: [a, b], m23 } = self.slopes(self.convention.linkage_angles(joints));
+        self.coriolis_at(&self.pose(joints), rates)
+    }
+
+    fn coriolis_at(&self, pose: &LinkagePose, rates: [f64; 3]) -> Matrix3<f64> {
+        let Slopes { half_m11: [a, b], m23 } = self.slopes(pose);
         let [w1, w2, w3] = self.convention.turned(rates);
         // M23 depends on theta2 - theta3 alone: its slopes along the two are opposite.
         let linkage =
             Matrix3::new(a * w2 + b * w3, a * w1, b * w1, -a * w1, 0.0, m23 * w3, -b * w1, -m23 * w2, 0.0);
         Matrix3::from_fn(|i, j| self.mirrored(i, j) * linkage[(i, j)])
+    }
+
+    /// All that the motion needs at once, for the price of one: the mass matrix, and the torques (N m) that keep the
+    /// joints at these rates (rad/s) against Coriolis and centrifugal forces and weight, `C qd + dV/dq`.
+    pub fn mass_and_torque(&self, joints: [f64; 3], rates: [f64; 3]) -> (Matrix3<f64>, Vector3<f64>) {
+        let pose = self.pose(joints);
+        let coriolis = self.coriolis_at(&pose, rates) * Vector3::from(rates);
+        let holding = Vector3::from(self.gravity.holding_torque_at(&pose));
+        (self.mass_matrix_at(&pose), coriolis + holding)
     }
 
     /// Joint torques (N m) that hold the arm against its weight.
@@ -142,9 +158,13 @@ impl Dynamics {
         self.gravity.potential_energy(joints)
     }
 
-    fn slopes(&self, [_, theta2, theta3]: [f64; 3]) -> Slopes {
+    fn pose(&self, joints: [f64; 3]) -> LinkagePose {
+        LinkagePose::at(self.convention.linkage_angles(joints))
+    }
+
+    fn slopes(&self, pose: &LinkagePose) -> Slopes {
+        let LinkagePose { sin: [_, sin2, sin3], cos: [_, cos2, cos3] } = *pose;
         let [_, c2, c3] = self.turret;
-        let ((sin2, cos2), (sin3, cos3)) = (theta2.sin_cos(), theta3.sin_cos());
         let along2 = -2.0 * c2 * sin2 * cos2 - self.coupling * sin2 * sin3;
         let along3 = -2.0 * c3 * sin3 * cos3 + self.coupling * cos2 * cos3;
         // sin 2x = 2 sin x cos x, and half of the slope -2 c sin 2x.
