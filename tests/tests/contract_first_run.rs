@@ -23,6 +23,7 @@ fn without_arguments_the_default_scene_is_felt_for_ten_seconds() {
         "guarantees",
         "recording",
     ];
+    assert!(said.out.contains("devices: simulated, simulated"), "{}", said.out);
     for line in lines {
         assert!(said.out.lines().any(|found| found.starts_with(line)), "no line `{line}` in:\n{}", said.out);
     }
