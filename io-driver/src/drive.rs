@@ -130,11 +130,11 @@ mod tests {
 
     fn drive(with_gravity: bool) -> Drive {
         let text = builtin("premium-1.5").unwrap();
-        let DeviceFile::Arm(premium) = DeviceFile::parse(text, Path::new("premium-1.5")).unwrap() else {
+        let DeviceFile::Arm(arm_file) = DeviceFile::parse(text, Path::new("premium-1.5")).unwrap() else {
             panic!("a premium")
         };
-        let gravity = premium.gravity.filter(|_| with_gravity);
-        Drive::new(premium.mechanism, &premium.motors, premium.heat, gravity)
+        let gravity = arm_file.gravity.filter(|_| with_gravity);
+        Drive::new(arm_file.mechanism, &arm_file.motors, arm_file.heat, gravity)
     }
 
     fn push(force: Vector3<f64>) -> Effort {

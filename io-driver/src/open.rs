@@ -164,17 +164,17 @@ fn open(
         }
         Backend::Simulated { .. } => simulated::open(device, config, board),
         Backend::Replay { description, trace, .. } => {
-            let premium = mechanism(device, description)?;
-            let trace = EncoderTrace::parse(&read(device, trace)?, trace, premium.encoders.count_bits)?;
-            let info = commissioned(arm_info(device, &premium), config);
-            let arm = arm(device, config, &premium);
+            let arm_file = mechanism(device, description)?;
+            let trace = EncoderTrace::parse(&read(device, trace)?, trace, arm_file.encoders.count_bits)?;
+            let info = commissioned(arm_info(device, &arm_file), config);
+            let arm = arm(device, config, &arm_file);
             Ok(Box::new(ReplayDevice::new(info, EncoderReplay::new(trace), arm)))
         }
         Backend::Emulated { description, card, .. } => {
-            let premium = mechanism(device, description)?;
-            let info = commissioned(arm_info(device, &premium), config);
-            let arm = arm(device, config, &premium);
-            emulated(device, description, card, &premium, info, arm)
+            let arm_file = mechanism(device, description)?;
+            let info = commissioned(arm_info(device, &arm_file), config);
+            let arm = arm(device, config, &arm_file);
+            emulated(device, description, card, &arm_file, info, arm)
         }
     }
 }
@@ -206,20 +206,20 @@ fn emulated(
     device: &DeviceConfig,
     description: &Path,
     card: &Path,
-    premium: &ArmFile,
+    arm_file: &ArmFile,
     info: DeviceInfo,
     arm: Arm,
 ) -> Result<Box<dyn Device>, OpenError> {
     let name = || device.name.clone();
-    if let Some(channel) = premium.motors.channel.into_iter().find(|channel| *channel > 3) {
+    if let Some(channel) = arm_file.motors.channel.into_iter().find(|channel| *channel > 3) {
         return Err(OpenError::NoConverter { device: name(), file: description.into(), channel });
     }
     let hold = Card::take(card).map_err(|source| OpenError::Card { device: name(), source })?;
     let channels = Channels {
-        encoders: premium.encoders.channel,
-        gimbal: premium.gimbal.map(|gimbal| gimbal.channel),
-        buttons: premium.buttons,
-        motors: premium.motors.channel,
+        encoders: arm_file.encoders.channel,
+        gimbal: arm_file.gimbal.map(|gimbal| gimbal.channel),
+        buttons: arm_file.buttons,
+        motors: arm_file.motors.channel,
     };
     let device = EmulatedDevice::new(info, hold, arm, channels)
         .map_err(|source| OpenError::Registers { device: name(), source })?;
@@ -261,10 +261,10 @@ fn has_switch(device: &DeviceConfig, config: &DriverConfig) -> bool {
 pub fn mechanism(device: &DeviceConfig, description: &Path) -> Result<ArmFile, OpenError> {
     let name = || device.name.clone();
     match describe(device, description)? {
-        DeviceFile::Arm(premium) if device.compensates_gravity && premium.gravity.is_none() => {
+        DeviceFile::Arm(arm_file) if device.compensates_gravity && arm_file.gravity.is_none() => {
             Err(OpenError::NoBodies { device: name(), file: description.into() })
         }
-        DeviceFile::Arm(premium) => Ok(premium.in_base(&device.backend.base_orientation())),
+        DeviceFile::Arm(arm_file) => Ok(arm_file.in_base(&device.backend.base_orientation())),
         DeviceFile::Ideal(_) => Err(OpenError::NoMechanism { device: name(), file: description.into() }),
     }
 }
@@ -299,21 +299,21 @@ fn ideal_info(device: &DeviceConfig) -> DeviceInfo {
     }
 }
 
-fn arm_info(device: &DeviceConfig, premium: &ArmFile) -> DeviceInfo {
+fn arm_info(device: &DeviceConfig, arm_file: &ArmFile) -> DeviceInfo {
     let corner = |sign: f64| {
         std::array::from_fn(|axis| {
-            premium.workspace.centre_m[axis] + sign * 0.5 * premium.workspace.size_m[axis]
+            arm_file.workspace.centre_m[axis] + sign * 0.5 * arm_file.workspace.size_m[axis]
         })
     };
     DeviceInfo {
         name: device.name.clone(),
-        kind: premium.kind.into(),
-        peak_force_n: device.peak_force_n.unwrap_or(premium.peak_force_n).min(premium.peak_force_n),
-        continuous_force_n: premium.continuous_force_n,
+        kind: arm_file.kind.into(),
+        peak_force_n: device.peak_force_n.unwrap_or(arm_file.peak_force_n).min(arm_file.peak_force_n),
+        continuous_force_n: arm_file.continuous_force_n,
         workspace_min_m: corner(-1.0),
         workspace_max_m: corner(1.0),
-        slew_n_per_s: premium.slew_n_per_s,
-        speed_limit_m_per_s: premium.speed_limit_m_per_s,
+        slew_n_per_s: arm_file.slew_n_per_s,
+        speed_limit_m_per_s: arm_file.speed_limit_m_per_s,
     }
 }
 

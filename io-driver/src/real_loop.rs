@@ -176,6 +176,9 @@ impl RealLoop {
             self.cycle.sense(begin.tick, begin.deadline_ns);
             self.wait_for_reply(begin.reply_until_ns);
             self.cycle.actuate();
+            if self.takes_former_reply() && self.clock == ClockMode::Lockstep {
+                self.wait_until_answered(begin.tick);
+            }
             self.log_state(begin.tick);
             self.log_zeros(begin.tick);
         }
@@ -235,7 +238,7 @@ impl RealLoop {
     }
 
     fn takes_former_reply(&self) -> bool {
-        self.mode == ReplyMode::NextTick && self.clock == ClockMode::Real
+        self.mode == ReplyMode::NextTick
     }
 
     fn wait_within(&mut self, until_ns: u64) {
@@ -270,6 +273,18 @@ impl RealLoop {
         while !self.cycle.take_reply() && !self.is_stopping() {
             self.sleep_for_reply(NAP);
             self.collect_mail(self.lockstep_tick);
+        }
+    }
+
+    /// The same where the motors are written already: the next tick's shall have a reply.
+    fn wait_until_answered(&mut self, tick: u64) {
+        while self.cycle.lease().is_some() && !self.is_stopping() {
+            self.cycle.take_reply();
+            if self.cycle.seen_reply() == Some(tick) {
+                return;
+            }
+            self.sleep_for_reply(NAP);
+            self.collect_mail(tick);
         }
     }
 

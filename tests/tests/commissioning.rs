@@ -27,17 +27,6 @@ fn commission(stand: &Stand) -> End {
     io_driver(&arguments, &stand.socket())
 }
 
-/// Rewires: the arm's counters and motors stay, what the driver believes of them changes.
-fn describe_otherwise(stand: &mut Stand, table: &str, from: &str, to: &str) {
-    let file = stand.path("arm.toml");
-    let text = std::fs::read_to_string(&file).unwrap();
-    let (before, after) = text.split_at(text.find(table).unwrap());
-    assert!(after.contains(from));
-    stand.stop_driver();
-    std::fs::write(&file, format!("{before}{}", after.replacen(from, to, 1))).unwrap();
-    stand.restart_driver();
-}
-
 #[test]
 fn motors_that_turn_the_right_way_pass_with_less_force_than_a_finger_holds() {
     let stand = stand();
@@ -55,7 +44,7 @@ fn motors_that_turn_the_right_way_pass_with_less_force_than_a_finger_holds() {
 #[test]
 fn a_reversed_motor_is_found_named_and_does_not_run_away() {
     let mut stand = stand();
-    describe_otherwise(&mut stand, "[motors]", "sign = [1, 1, 1]", "sign = [1, -1, 1]");
+    stand.describe_otherwise("[motors]", "sign = [1, 1, 1]", "sign = [1, -1, 1]");
     let end = commission(&stand);
     assert_eq!(end.status, Some(3), "{end:?}");
     let words = "upper arm: WRONG, it turned the other way; change the second `sign` under [motors]";
@@ -67,7 +56,7 @@ fn a_reversed_motor_is_found_named_and_does_not_run_away() {
 #[test]
 fn motors_that_are_plugged_into_each_others_place_are_found() {
     let mut stand = stand();
-    describe_otherwise(&mut stand, "[motors]", "channel = [0, 1, 2]", "channel = [0, 2, 1]");
+    stand.describe_otherwise("[motors]", "channel = [0, 1, 2]", "channel = [0, 2, 1]");
     let end = commission(&stand);
     assert_eq!(end.status, Some(3), "{end:?}");
     assert!(end.out.contains("upper arm: WRONG, the forearm turned instead"), "{end:?}");

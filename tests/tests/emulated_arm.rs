@@ -169,17 +169,6 @@ fn commission(stand: &Stand) -> End {
     End { out: said, ..end }
 }
 
-/// Rewires: the arm and its amplifiers stay, what the driver believes of them changes.
-fn describe_otherwise(stand: &mut Stand, table: &str, from: &str, to: &str) {
-    let file = stand.path("arm.toml");
-    let text = std::fs::read_to_string(&file).unwrap();
-    let (before, after) = text.split_at(text.find(table).unwrap());
-    assert!(after.contains(from));
-    stand.stop_driver();
-    std::fs::write(&file, format!("{before}{}", after.replacen(from, to, 1))).unwrap();
-    stand.restart_driver();
-}
-
 #[test]
 fn an_arm_with_weight_and_friction_in_a_persons_hand_passes_commissioning() {
     let stand = commissioning();
@@ -203,7 +192,7 @@ fn an_arm_with_weight_and_friction_in_a_persons_hand_passes_commissioning() {
 #[test]
 fn a_motor_with_the_wrong_sign_is_found_before_anything_runs_away() {
     let mut stand = commissioning();
-    describe_otherwise(&mut stand, "[motors]", "sign = [1, 1, 1]", "sign = [1, 1, -1]");
+    stand.describe_otherwise("[motors]", "sign = [1, 1, 1]", "sign = [1, 1, -1]");
     let mut log = RingLog::begin(stand.view());
     let config = stand.path("driver.toml").to_string_lossy().into_owned();
     let end = io_driver(&["commission", "--motors-only", "--yes", "--config", &config], &stand.socket());
@@ -221,7 +210,7 @@ fn a_motor_with_the_wrong_sign_is_found_before_anything_runs_away() {
 #[test]
 fn a_counter_with_the_wrong_sign_is_found_before_any_motor_is_tried() {
     let mut stand = commissioning();
-    describe_otherwise(&mut stand, "[encoders]", "sign = [1, 1, 1]", "sign = [-1, 1, 1]");
+    stand.describe_otherwise("[encoders]", "sign = [1, 1, 1]", "sign = [-1, 1, 1]");
     let end = commission(&stand);
     assert_eq!(end.status, Some(3), "{end:?}");
     let words =

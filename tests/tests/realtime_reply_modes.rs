@@ -29,8 +29,12 @@ impl Done {
 
 /// Ticks that were answered, in a mode. Those without an answer in time are left out: they are another test's.
 fn answered(mode: &str) -> Vec<Done> {
+    answered_on("real", mode)
+}
+
+fn answered_on(clock: &str, mode: &str) -> Vec<Done> {
     let driver = Driver::start(&format!(
-        "[real_time]\npriority = 0\nlock_memory = false\n[reply]\nmode = \"{mode}\"\nbudget_us = 500\n\
+        "clock = \"{clock}\"\n[real_time]\npriority = 0\nlock_memory = false\n[reply]\nmode = \"{mode}\"\nbudget_us = 500\n\
          [[device]]\nbackend = \"ideal\"\npeak_force_n = 8.5\n"
     ));
     let observer = driver.observe();
@@ -91,4 +95,13 @@ fn in_next_tick_mode_the_reply_before_drives_the_motors_at_once() {
         assert_eq!(tick.after.previous.command_tick + 1, tick.tick, "a delay of one tick, always");
     }
     assert!(median(&done, Done::written_after_ns) < BUDGET_NS, "no reply is waited for");
+}
+
+#[test]
+fn in_lockstep_a_reply_for_the_next_tick_is_waited_for_and_drives_that_one() {
+    let done = answered_on("lockstep", "next-tick");
+    for tick in &done {
+        assert_eq!(tick.after.previous.command_tick + 1, tick.tick, "a delay of one tick, always");
+    }
+    assert!(done.len() as u64 > TICKS - 2, "in lockstep every tick is answered: {}", done.len());
 }

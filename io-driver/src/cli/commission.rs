@@ -74,7 +74,7 @@ fn commission(args: &CommissionArgs) -> Result<bool, Failure> {
     let signals = StopSignals::install().map_err(usage)?;
     let config = DriverConfig::load(&args.config).map_err(usage)?;
     let device = choose(&config, args.device.as_deref()).map_err(usage)?;
-    let premium = describe(&config, device).map_err(usage)?;
+    let arm_file = describe(&config, device).map_err(usage)?;
     zero_first(args, device, &signals)?;
     let attachment = client::command(&args.socket.path(), "io-driver commission").map_err(usage)?;
     let mut session = Session::new(attachment, device, &signals).map_err(usage)?;
@@ -89,8 +89,8 @@ fn commission(args: &CommissionArgs) -> Result<bool, Failure> {
         }
     }
     prompt(args, "Now the motors. Hold the tip loosely and still, so that the arm's weight does not move it, and stay clear of the rest").map_err(during)?;
-    let kinematics = premium.mechanism;
-    let per_count = premium.joint_map().rad_per_count();
+    let kinematics = arm_file.mechanism;
+    let per_count = arm_file.joint_map().rad_per_count();
     let tell = |joint: usize| say(&format!("  {} ...", JOINTS[joint]));
     let verdicts = session.check_motors(&kinematics, per_count, tell).map_err(during)?;
     for (joint, verdict) in verdicts.into_iter().enumerate() {

@@ -106,18 +106,18 @@ pub(super) fn run(args: &EmulateArgs) -> ExitCode {
 
 fn play(args: &EmulateArgs) -> Result<ExitCode, Box<dyn Error>> {
     let signals = StopSignals::install()?;
-    let premium = describe(&args.description)?;
-    let (motion, held_by) = motion(args, &premium)?;
+    let arm_file = describe(&args.description)?;
+    let (motion, held_by) = motion(args, &arm_file)?;
     let play = Play {
-        peak_n: limit("--peak-n", args.peak_n.unwrap_or(premium.peak_force_n))?,
+        peak_n: limit("--peak-n", args.peak_n.unwrap_or(arm_file.peak_force_n))?,
         step_n: limit("--step-n", args.step_n.unwrap_or(f64::INFINITY))?,
         watchdog_ns: positive("--watchdog-ms", args.watchdog_ms, 1e6)?,
         poll_ns: positive("--poll-us", args.poll_us, 1e3)?,
         counter_offset: args.counter_offset.into(),
     };
     let card = Card::create(&args.card)?;
-    say(format_args!("io-driver: playing {}{held_by} at {}", premium.name, args.card.display()));
-    let tally = Emulator::new(card, premium, motion, play).run(play.poll_ns, &signals);
+    say(format_args!("io-driver: playing {}{held_by} at {}", arm_file.name, args.card.display()));
+    let tally = Emulator::new(card, arm_file, motion, play).run(play.poll_ns, &signals);
     let _ = std::fs::remove_file(&args.card);
     let _ = print_line(&serde_json::to_string(&tally)?);
     let is_good = tally.wrong() == 0 && tally.lost == 0;
@@ -130,7 +130,7 @@ fn describe(name: &str) -> Result<ArmFile, Box<dyn Error>> {
         None => read(Path::new(name))?,
     };
     match DeviceFile::parse(&text, Path::new(name))? {
-        DeviceFile::Arm(premium) => Ok(*premium),
+        DeviceFile::Arm(arm_file) => Ok(*arm_file),
         DeviceFile::Ideal(_) => {
             Err(format!("{name} describes no mechanism; a card needs one, such as premium-1.5").into())
         }
@@ -138,22 +138,22 @@ fn describe(name: &str) -> Result<ArmFile, Box<dyn Error>> {
 }
 
 /// And who holds the arm, in words.
-fn motion(args: &EmulateArgs, premium: &ArmFile) -> Result<(Motion, String), Box<dyn Error>> {
+fn motion(args: &EmulateArgs, arm_file: &ArmFile) -> Result<(Motion, String), Box<dyn Error>> {
     if args.simulated {
-        return simulated(&args.holder, premium);
+        return simulated(&args.holder, arm_file);
     }
-    Ok((unheld(args, premium)?, String::new()))
+    Ok((unheld(args, arm_file)?, String::new()))
 }
 
-fn unheld(args: &EmulateArgs, premium: &ArmFile) -> Result<Motion, Box<dyn Error>> {
+fn unheld(args: &EmulateArgs, arm_file: &ArmFile) -> Result<Motion, Box<dyn Error>> {
     if let Some(file) = &args.trace {
-        let trace = EncoderTrace::parse(&read(file)?, file, premium.encoders.count_bits)?;
+        let trace = EncoderTrace::parse(&read(file)?, file, arm_file.encoders.count_bits)?;
         return Ok(Motion::Trace(EncoderReplay::new(trace)));
     }
     match args.viscosity {
         None => Ok(Motion::Rest),
         Some(viscosity_nm_s) if viscosity_nm_s.is_finite() && viscosity_nm_s >= 1e-3 => {
-            Ok(Motion::Yielding { viscosity_nm_s, joints: premium.encoders.home_joint_angles_rad })
+            Ok(Motion::Yielding { viscosity_nm_s, joints: arm_file.encoders.home_joint_angles_rad })
         }
         Some(other) => Err(format!("--yield: found {other}, allowed: 0.001 N m s/rad and more").into()),
     }

@@ -258,16 +258,16 @@ mod tests {
 
     fn premium() -> ArmFile {
         match DeviceFile::parse(builtin("premium-1.5").unwrap(), Path::new("premium-1.5")) {
-            Ok(DeviceFile::Arm(premium)) => *premium,
+            Ok(DeviceFile::Arm(arm_file)) => *arm_file,
             other => panic!("{other:?}"),
         }
     }
 
     fn amplifier() -> Amplifier {
-        let premium = premium();
-        let kinematics = premium.mechanism;
+        let arm_file = premium();
+        let kinematics = arm_file.mechanism;
         Amplifier::new(AmplifierSpec {
-            motors: premium.motors,
+            motors: arm_file.motors,
             kinematics,
             peak_n: 8.5,
             step_n: 5.0,
@@ -276,9 +276,9 @@ mod tests {
     }
 
     fn codes(force: Vector3<f64>) -> [u16; 3] {
-        let premium = premium();
-        let kinematics = premium.mechanism;
-        let mut drive = Drive::new(kinematics, &premium.motors, premium.heat, None);
+        let arm_file = premium();
+        let kinematics = arm_file.mechanism;
+        let mut drive = Drive::new(kinematics, &arm_file.motors, arm_file.heat, None);
         drive.render([0.0; 3], Effort { force_on_user_n: force, gravity_share: 0.0 }).unwrap().0
     }
 

@@ -28,7 +28,7 @@ pub struct Play {
 #[derive(Debug)]
 pub struct Emulator {
     card: &'static Card,
-    premium: ArmFile,
+    arm_file: ArmFile,
     amplifier: Amplifier,
     motion: Motion,
     pose: Pose,
@@ -46,20 +46,20 @@ const LONGEST_STALL_NS: u64 = 2_000_000;
 
 impl Emulator {
     /// A card at home that nobody has written to.
-    pub fn new(card: &'static Card, premium: ArmFile, motion: Motion, play: Play) -> Self {
+    pub fn new(card: &'static Card, arm_file: ArmFile, motion: Motion, play: Play) -> Self {
         let amplifier = Amplifier::new(AmplifierSpec {
-            motors: premium.motors,
-            kinematics: premium.mechanism,
+            motors: arm_file.motors,
+            kinematics: arm_file.mechanism,
             peak_n: play.peak_n,
             step_n: play.step_n,
             watchdog_ns: play.watchdog_ns,
         });
         let now = monotonic_ns();
         let mut motion = motion;
-        let pose = motion.pass(0.0, 0.0, Given::default(), [0; 3], &premium.encoders);
+        let pose = motion.pass(0.0, 0.0, Given::default(), [0; 3], &arm_file.encoders);
         let mut emulator = Self {
             card,
-            premium,
+            arm_file,
             amplifier,
             motion,
             pose,
@@ -103,8 +103,8 @@ impl Emulator {
         let (time_s, dt_s) = (seconds(until_ns - self.began_ns), seconds(until_ns - self.passed_ns));
         self.passed_ns = until_ns;
         let given = Given { torque_nm: self.amplifier.joint_torque(), codes: self.amplifier.codes() };
-        let hand = self.turned_by_hand(self.premium.encoders.channel);
-        self.pose = self.motion.pass(time_s, dt_s, given, hand, &self.premium.encoders);
+        let hand = self.turned_by_hand(self.arm_file.encoders.channel);
+        self.pose = self.motion.pass(time_s, dt_s, given, hand, &self.arm_file.encoders);
     }
 
     /// Returns how many there were.
@@ -151,7 +151,11 @@ impl Emulator {
         let codes = record.codes.load(Ordering::Relaxed);
         Value {
             time_ns: record.time_ns.load(Ordering::Relaxed),
-            codes: self.premium.motors.channel.map(|channel| (codes >> (16 * u32::from(channel % 4))) as u16),
+            codes: self
+                .arm_file
+                .motors
+                .channel
+                .map(|channel| (codes >> (16 * u32::from(channel % 4))) as u16),
             enable: record.flags.load(Ordering::Relaxed) & 1 == 1,
         }
     }
@@ -163,8 +167,8 @@ impl Emulator {
 
     fn tell(&mut self) {
         let handle = self.motion.handle();
-        self.tell_counters(&self.premium.encoders, self.pose.counters.map(i64::from));
-        if let Some(gimbal) = &self.premium.gimbal {
+        self.tell_counters(&self.arm_file.encoders, self.pose.counters.map(i64::from));
+        if let Some(gimbal) = &self.arm_file.gimbal {
             let turned = self.turned_by_hand(gimbal.channel);
             let own = handle.gimbal_counters.unwrap_or_default();
             self.tell_counters(gimbal, std::array::from_fn(|axis| own[axis] + turned[axis]));
@@ -205,12 +209,12 @@ mod tests {
 
     fn emulator(card: &'static Card) -> Emulator {
         let text = builtin("premium-1.5").unwrap();
-        let Ok(DeviceFile::Arm(premium)) = DeviceFile::parse(text, Path::new("premium-1.5")) else {
+        let Ok(DeviceFile::Arm(arm_file)) = DeviceFile::parse(text, Path::new("premium-1.5")) else {
             panic!("it is built in");
         };
         // A step of a tenth of a newton a value.
         let play = Play { peak_n: 8.5, step_n: 0.1, watchdog_ns: 1000 * MS, poll_ns: MS, counter_offset: 0 };
-        Emulator::new(card, *premium, Motion::Rest, play)
+        Emulator::new(card, *arm_file, Motion::Rest, play)
     }
 
     /// As a driver writes it, at most twelve converter steps, about a tenth of a newton, above the last.

@@ -52,10 +52,10 @@ impl Limits {
     }
 
     fn judge(&self) -> Amplifier {
-        let premium = self.premium();
+        let arm_file = self.premium();
         Amplifier::new(AmplifierSpec {
-            motors: premium.motors,
-            kinematics: premium.mechanism,
+            motors: arm_file.motors,
+            kinematics: arm_file.mechanism,
             peak_n: self.peak_n,
             step_n: self.step_n(),
             watchdog_ns: u64::MAX,
@@ -64,7 +64,7 @@ impl Limits {
 
     fn premium(&self) -> ArmFile {
         match DeviceFile::parse(&self.description(), Path::new("<test>")) {
-            Ok(DeviceFile::Arm(premium)) => *premium,
+            Ok(DeviceFile::Arm(arm_file)) => *arm_file,
             other => panic!("{other:?}"),
         }
     }
@@ -206,7 +206,7 @@ impl Amplifiers {
         if !self.rests {
             return 0;
         }
-        let premium = self.limits.premium();
+        let arm_file = self.limits.premium();
         let mut judge = self.limits.judge();
         let written = self.written();
         let mut begun = written <= QUEUE as u64;
@@ -214,13 +214,13 @@ impl Amplifiers {
         for number in written.saturating_sub(QUEUE as u64 - 1).max(1)..=written {
             let record = self.card.record(number).expect("nobody writes any more");
             let packed = record.codes.load(Ordering::Relaxed);
-            let codes = premium.motors.channel.map(|channel| (packed >> (16 * u32::from(channel))) as u16);
+            let codes = arm_file.motors.channel.map(|channel| (packed >> (16 * u32::from(channel))) as u16);
             let enable = record.flags.load(Ordering::Relaxed) & 1 == 1;
             // The growth of a force is known from a value without any.
             begun |= codes == [ZERO_CODE as u16; 3];
             if begun {
                 let time_ns = record.time_ns.load(Ordering::Relaxed);
-                judge.take(Value { time_ns, codes, enable }, premium.encoders.home_joint_angles_rad);
+                judge.take(Value { time_ns, codes, enable }, arm_file.encoders.home_joint_angles_rad);
                 judged += 1;
             }
         }

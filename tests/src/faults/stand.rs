@@ -104,6 +104,18 @@ impl Stand {
         Self { setup, amplifiers, driver, observer, place }
     }
 
+    /// Rewires the arm: its counters, motors and amplifiers stay, what the driver believes of them changes, and it starts
+    /// anew.
+    pub fn describe_otherwise(&mut self, table: &str, from: &str, to: &str) {
+        let file = self.path("arm.toml");
+        let text = std::fs::read_to_string(&file).expect("the description");
+        let (before, after) = text.split_at(text.find(table).expect("the table is there"));
+        assert!(after.contains(from), "no `{from}` in {table}");
+        self.stop_driver();
+        std::fs::write(&file, format!("{before}{}", after.replacen(from, to, 1))).expect("it is written");
+        self.restart_driver();
+    }
+
     /// Where the driver listens.
     pub fn socket(&self) -> PathBuf {
         self.path("driver.sock")
