@@ -218,6 +218,67 @@ fn eight_fingers_run() {
     }
 }
 
+/// Two fingers hold a fixed ball between them, so large that it is flat to them, and are drawn up along it, where it is
+/// more slippery than they believe.
+#[test]
+fn fingers_that_slip_press_harder_if_their_hand_minds() {
+    let scene = "[[finger]]\nstart_m = [-0.52, 0.1, 0.0]\n[[finger]]\nstart_m = [0.52, 0.1, 0.0]\n\
+        [[entity]]\nname = \"ball\"\nshape = { kind = \"sphere\", radius_m = 0.5 }\nposition_m = [0.0, 0.1, 0.0]\n\
+        stiffness_n_per_m = 1000.0\nfriction = { model = \"coulomb\", mu = 0.25 }\n";
+    let row = |t: f64, x: f64, y: f64| format!("{t},{},{y},0,{x},{y},0\n", -x);
+    let wish: String =
+        [(0.0, 0.52, 0.1), (0.5, 0.48, 0.1), (1.5, 0.48, 0.1), (2.0, 0.48, 0.115), (4.0, 0.48, 0.115)]
+            .map(|(t, x, y)| row(t, x, y))
+            .concat();
+    let usual = io_driver::sim::hand::model_file::builtin("pen-grip").unwrap();
+    let grip = |minds: bool| {
+        let place = workplace(scene, &format!("t,f0_x,f0_y,f0_z,f1_x,f1_y,f1_z\n{wish}"));
+        assert!(usual.contains("minds_slip = false"));
+        place.write("hand.toml", usual.replace("minds_slip = false", &format!("minds_slip = {minds}")));
+        record(&place, "virtual", "out.csv", &["--hand", "hand.csv", "--hand-model", "hand.toml"]);
+        let table = Table::read(&place.path("out.csv"));
+        ["f0", "f1"].map(|finger| {
+            let samples = table.finger(finger);
+            let pressed = |from: f64, to: f64| {
+                let forces: Vec<f64> =
+                    samples.iter().filter(|s| (from..to).contains(&s.t)).map(|s| s.force.x.abs()).collect();
+                forces.iter().sum::<f64>() / forces.len() as f64
+            };
+            [pressed(1.2, 1.5), pressed(3.5, 4.0)]
+        })
+    };
+    let (calm, minding) = (grip(false), grip(true));
+    for (calm, minding) in calm.into_iter().zip(minding) {
+        // Before anything slips both hold as their script says, within what friction holds.
+        assert!((calm[0] - minding[0]).abs() < 2.0 * FRICTION_N, "{calm:?} {minding:?}");
+        // Friction of 0.25 where 0.6 was believed asks for more than twice the grip.
+        assert!(minding[1] > 1.5 * calm[1], "{calm:?} {minding:?}");
+    }
+}
+
+#[test]
+fn a_handle_that_the_hand_turns_is_recorded_as_its_encoders_measure_it() {
+    let turned = "t,f0_x,f0_y,f0_z,f0_qw,f0_qx,f0_qy,f0_qz,f0_buttons\n0,0,0.11,0,1,0,0,0,0\n\
+                  1,0,0.11,0,0.8,0,0.6,0,5\n2,0,0.11,0,0.8,0,0.6,0,5\n";
+    let place = workplace(TABLE, turned);
+    let gimbal = "[gimbal]\ncounts_per_rev = 4000\nreduction = [1.0, 1.0, 1.0]\nsign = [1, -1, 1]\n\
+                  channel = [3, 4, 5]\nhome_angles_rad = [0.0, 0.0, 0.0]\n";
+    let arm = format!("{}\n{gimbal}", io_driver::device_file::builtin("premium-1.5").unwrap());
+    place.write("arm.toml", arm);
+    record(&place, "virtual", "out.csv", &["--hand", "hand.csv", "--device", "arm.toml"]);
+    let table = Table::read(&place.path("out.csv"));
+    let last = |column: &str| -> f64 { table.texts(column).last().unwrap().parse().unwrap() };
+    let found = ["f0_qw", "f0_qx", "f0_qy", "f0_qz"].map(last);
+    // Half a count of each of the three, half of that in a quaternion; and the arm's own joints, which carry the
+    // gimbal, by less.
+    let most = 3.0 * 0.5 * std::f64::consts::TAU / 4000.0;
+    for (found, wanted) in found.into_iter().zip([0.8, 0.0, 0.6, 0.0]) {
+        assert!((found - wanted).abs() < most, "{found} {wanted}");
+    }
+    assert_eq!(last("f0_buttons"), 5.0);
+    assert_eq!(table.texts("f0_buttons")[0], "0");
+}
+
 fn refused(place: &Workplace, more: &[&str]) -> String {
     let before = place.snapshot();
     let said = place.run([&["run", "scene.toml", "--hand-mode", "impedance"], more].concat());
