@@ -95,3 +95,27 @@ fn a_trial_has_the_same_outcome_every_time() {
     assert!(outcomes.iter().all(|outcome| *outcome == outcomes[0]), "{outcomes:?}");
     assert!(!outcomes[0].settles(), "far beyond what this arm stands: {outcomes:?}");
 }
+
+#[test]
+fn the_rules_of_thumb_are_what_they_say() {
+    let bench = Bench::new(Path::new("premium-1.5"), Axis::Y, PUSH_M).expect("a bench");
+    // Viscous 2.3e-4 N m s/rad over a lever of 0.215 m; the light pen grip damps with 0.63 * 3.609 N s/m; the amplifiers
+    // are 1 / (2 pi 1000 Hz) late, a round trip 5 us.
+    let (own, grasp) = (2.3e-4 / 0.215f64.powi(2), 0.63 * 3.609);
+    let amplifier_s = 1.0 / (std::f64::consts::TAU * 1000.0);
+    for (mode, late_s) in [(Mode::SameTick, 5e-6), (Mode::FixedPhase, 0.25e-3), (Mode::NextTick, 0.505e-3)] {
+        let theory = |damping_n_s_per_m| {
+            Theory::of(&bench, &Case { damping_n_s_per_m, ..case(mode, 2000.0) }).expect("a model")
+        };
+        let phase_s = 0.25e-3 + late_s + amplifier_s;
+        let near = |found: f64, wanted: f64| (found / wanted - 1.0).abs() < 1e-9;
+        let (bare, damped) = (theory(0.0), theory(2.0));
+        assert!(near(bare.damped, (own + grasp) / phase_s), "{mode:?}: {bare:?}");
+        assert!(near(damped.damped, (own + grasp + 2.0) / phase_s), "{mode:?}: {damped:?}");
+        assert!(near(bare.passive, own / phase_s), "{mode:?}: {bare:?}");
+        assert_eq!(damped.passive, 0.0, "the wall damps more than the arm");
+        // Both are 0.04 N to the digits of the joint friction: 0.0086 N m.
+        let friction = 2.0 * (0.0086 / 0.215) / (std::f64::consts::TAU / 4096.0 / 11.3 * 0.215);
+        assert!(near(bare.friction, friction) && bare.friction == damped.friction, "{bare:?}");
+    }
+}

@@ -51,3 +51,27 @@ impl Plant {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulated::SimulatedDevices;
+
+    #[test]
+    fn a_premium_at_home_has_the_numbers_of_its_description_times_the_levers() {
+        let arm = SimulatedDevices::default().arm().unwrap();
+        // Apparent masses with rotors, in grams, and levers, as published; friction is the data sheet's everywhere.
+        for (axis, grams, lever_m, reduction) in
+            [(Axis::X, 81.0, 0.215, 175.0 / 13.0), (Axis::Y, 55.0, 0.215, 11.3), (Axis::Z, 37.0, 0.170, 11.3)]
+        {
+            let plant = Plant::of(&arm, axis).unwrap();
+            assert!((plant.mass_kg * 1e3 - grams).abs() < 0.6, "{axis:?}: {} kg", plant.mass_kg);
+            assert!((plant.coulomb_n - 0.04).abs() < 1e-4, "{axis:?}: {} N", plant.coulomb_n);
+            // 2.3e-4 and 1.4e-4 are rounded to two digits.
+            assert!((plant.viscous_n_s_per_m - 0.005).abs() < 2e-4, "{axis:?}: {}", plant.viscous_n_s_per_m);
+            let count_m = std::f64::consts::TAU / 4096.0 / reduction * lever_m;
+            assert!((plant.count_m / count_m - 1.0).abs() < 1e-12, "{axis:?}: {} m", plant.count_m);
+            assert_eq!((plant.tip_m, plant.amplifier_hz), (Vector3::zeros(), 1000.0));
+        }
+    }
+}
