@@ -146,6 +146,14 @@ pub enum CardError {
         /// What was expected.
         expected: String,
     },
+    /// It is something else, which is not replaced.
+    #[error(
+        "{file} is there already and is no emulated card of this version; name another file, or remove it"
+    )]
+    InTheWay {
+        /// Which.
+        file: PathBuf,
+    },
     /// A driver has it.
     #[error("the emulated card {file} belongs to another driver; one card has one driver")]
     Taken {
@@ -172,13 +180,16 @@ pub struct DriversCard {
 
 impl Card {
     /// Makes a card for an emulator, readable and writable for its owner only. One that nobody plays any more is
-    /// replaced.
+    /// replaced; anything else that has that name is somebody's, and stays.
     ///
     /// # Errors
-    /// If it is played by another process, or the system refuses.
+    /// If it is played by another process, if there is something else, or if the system refuses.
     pub fn create(path: &Path) -> Result<&'static Self, CardError> {
-        if let Ok(former) = Self::open(path) {
-            former.is_played(path)?;
+        match open_file(path, UNFINISHED) {
+            Ok((former, _)) => former.is_played(path)?,
+            Err(CardError::Missing { .. }) => {}
+            Err(CardError::NoCard { .. }) => return Err(CardError::InTheWay { file: path.into() }),
+            Err(error) => return Err(error),
         }
         let system = |what| move |source| CardError::System { what, file: path.into(), source };
         // A former driver may still hold the former file; it keeps that, under no name.
@@ -208,7 +219,7 @@ impl Card {
     /// # Errors
     /// If it is none, or the system refuses.
     pub fn open(path: &Path) -> Result<&'static Self, CardError> {
-        open_file(path).map(|(card, _)| card)
+        open_file(path, MAGIC).map(|(card, _)| card)
     }
 
     /// Maps a card for a driver.
@@ -216,7 +227,7 @@ impl Card {
     /// # Errors
     /// As [`open`](Self::open), and if another driver has it.
     pub fn take(path: &Path) -> Result<DriversCard, CardError> {
-        let (card, file) = open_file(path)?;
+        let (card, file) = open_file(path, MAGIC)?;
         match file.try_lock() {
             Ok(()) => Ok(DriversCard { card, _lock: file }),
             Err(TryLockError::WouldBlock) => Err(CardError::Taken { file: path.into() }),
@@ -251,21 +262,29 @@ fn new_session() -> u32 {
 /// Longer than an emulator takes between two heartbeats.
 const HEARTBEATS: Duration = Duration::from_millis(200);
 
-fn open_file(path: &Path) -> Result<(&'static Card, File), CardError> {
+/// Magic of a card whose emulator died while it made it.
+const UNFINISHED: u64 = 0;
+
+/// The card, if it is one, or has this other magic.
+fn open_file(path: &Path, or_magic: u64) -> Result<(&'static Card, File), CardError> {
     let system = |what| move |source| CardError::System { what, file: path.into(), source };
     let opened = OpenOptions::new().read(true).write(true).open(path);
     let file = opened.map_err(|source| match source.kind() {
         io::ErrorKind::NotFound => CardError::Missing { file: path.into() },
         _ => system("open")(source),
     })?;
-    let bytes = file.metadata().map_err(system("look at"))?.len();
+    let metadata = file.metadata().map_err(system("look at"))?;
     let no_card = |found: String, expected: String| CardError::NoCard { file: path.into(), found, expected };
+    if !metadata.is_file() {
+        return Err(no_card("a device or a pipe".into(), "a file".into()));
+    }
+    let bytes = metadata.len();
     if bytes != size_of::<Card>() as u64 {
         return Err(no_card(format!("{bytes} bytes"), size_of::<Card>().to_string()));
     }
     let card = map(&file).map_err(system("map"))?;
     let magic = card.magic.load(Ordering::Acquire);
-    if magic != MAGIC {
+    if magic != MAGIC && magic != or_magic {
         return Err(no_card(format!("0x{magic:x}"), format!("0x{MAGIC:x}")));
     }
     Ok((card, file))
@@ -311,6 +330,23 @@ mod tests {
         std::fs::write(&path, vec![0; size_of::<Card>()]).unwrap();
         let empty = Card::take(&path).unwrap_err().to_string();
         assert!(empty.contains("found 0x0, expected 0x2445241434850"), "{empty}");
+    }
+
+    #[test]
+    fn nothing_but_a_former_card_is_replaced() {
+        let (directory, path) = place();
+        std::fs::write(&path, b"a thesis").unwrap();
+        let refused = Card::create(&path).unwrap_err().to_string();
+        assert!(refused.contains("is there already") && refused.contains("name another file"), "{refused}");
+        assert_eq!(std::fs::read(&path).unwrap(), b"a thesis");
+        let link = directory.path().join("null");
+        std::os::unix::fs::symlink("/dev/null", &link).unwrap();
+        assert!(matches!(Card::create(&link), Err(CardError::InTheWay { .. })));
+        assert!(link.is_symlink());
+        assert!(Card::create(directory.path()).is_err());
+        // One whose emulator died before it was finished is in everybody's way.
+        std::fs::write(&path, vec![0; size_of::<Card>()]).unwrap();
+        Card::create(&path).unwrap();
     }
 
     #[test]
