@@ -39,6 +39,7 @@ mod friction;
 mod friction_cone;
 mod friction_law;
 mod hip;
+pub mod mesh;
 mod plane;
 mod shape;
 mod slide;
