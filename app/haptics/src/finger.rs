@@ -11,7 +11,7 @@
 
 use nalgebra::Vector3;
 
-use crate::contact::{Contact, Slot, Sweep};
+use crate::contact::{Contact, RAMP_IN_S, Slot, Sweep};
 use crate::entity::Entity;
 use crate::error::{ParameterError, at_least_zero};
 use crate::frame::is_finite;
@@ -23,6 +23,7 @@ use crate::surface::Feature;
 #[derive(Debug, Clone)]
 pub struct Finger {
     radius_m: f64,
+    ramp_in_s: f64,
     previous_hip_W: Option<Vector3<f64>>,
     last_finite_hip_W: Vector3<f64>,
     slots: Box<[Slot]>,
@@ -71,10 +72,18 @@ impl Finger {
     pub fn new(radius_m: f64, capacity: usize) -> Result<Self, ParameterError> {
         Ok(Self {
             radius_m: at_least_zero("radius_m", radius_m)?,
+            ramp_in_s: RAMP_IN_S,
             previous_hip_W: None,
             last_finite_hip_W: Vector3::zeros(),
             slots: vec![Slot::default(); capacity].into(),
         })
+    }
+
+    /// With another ramp for contacts that begin inside than [`RAMP_IN_S`]; 0 for none.
+    ///
+    /// Errors: a time not finite or negative.
+    pub fn with_ramp_in(self, ramp_in_s: f64) -> Result<Self, ParameterError> {
+        Ok(Self { ramp_in_s: at_least_zero("ramp_in_s", ramp_in_s)?, ..self })
     }
 
     /// Radius \[m\].
@@ -113,6 +122,7 @@ impl Finger {
             hip_W: *hip_W,
             hip_velocity_W,
             finger_radius_m: self.radius_m,
+            ramp_in_s: self.ramp_in_s,
             dt_s,
         };
         self.previous_hip_W = Some(*hip_W);

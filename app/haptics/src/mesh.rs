@@ -14,3 +14,7 @@ mod soup;
 
 pub use face::{Face, Link};
 pub use soup::TriangleSoup;
+
+/// A mesh, ready to be walked on.
+#[derive(Debug)]
+pub struct Mesh {}
