@@ -13,8 +13,9 @@
 //! with the margin of [`RESTICK_MARGIN`]; with `v_s -> 0` all of this becomes stiction. A curve so
 //! flat that no tick sees it jump (`L |mu'| < dt`) sticks and slides without any hysteresis.
 //!
-//! Where the curve falls faster than that, no quasi-static slider of any simulation is stable: at a
-//! HIP speed there, the contact sticks and slips by turns, as dry bearings do.
+//! Where the curve falls faster than `L |mu'| = dt / 2`, no steady slide at constant HIP speed is
+//! stable, as no slider without mass on a spring is: the contact sticks and slips by turns, as dry
+//! bearings do. Every tick of it is on the curve all the same.
 //!
 //! Search: in units `u = x / (v_s dt)` the solutions are the zeros of `h(u) = p - q u - r exp(-u^2)`,
 //! which falls and is convex up to `u1`, rises up to `u2`, then falls and is concave. So Newton's
@@ -105,12 +106,12 @@ impl FrictionLaw for Stribeck {
         if let Some(classical) = self.flat() {
             return classical.slide(query, memory);
         }
-        if !knows_time(query) {
+        if !knows_time(query) || query.load_m <= 0.0 {
             return query.gap_m - self.mu_s * query.load_m;
         }
         //= melder#4.8
         let balance = self.balance(query);
-        let excess_m = balance.pull(query.travel_m / balance.unit_m);
+        let excess_m = query.gap_m - query.load_m * self.ratio_at(query.travel_m / query.dt_s);
         if query.travel_m > 0.0 && excess_m.abs() <= ON_THE_CURVE * query.load_m {
             return excess_m;
         }
