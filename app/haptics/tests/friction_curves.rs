@@ -25,13 +25,8 @@ struct Drawn {
 }
 
 fn drawn_models() -> Vec<Drawn> {
-    let drawn = |name, friction: Friction, mu_s, slip: Box<dyn Fn(f64) -> f64>, steady_from, steepest| Drawn {
-        name,
-        friction,
-        mu_s,
-        slip,
-        steady_from,
-        steepest,
+    let drawn = |name, friction: Friction, mu_s, slip: Box<dyn Fn(f64) -> f64>, steady_from, steepest| {
+        Drawn { name, friction, mu_s, slip, steady_from, steepest }
     };
     let narrow = Stribeck::new(MU_S, MU_D, 0.05, 0.1).unwrap();
     let wide = Stribeck::new(MU_S, MU_D, 4.0, 0.02).unwrap();
@@ -77,14 +72,7 @@ fn drawn_models() -> Vec<Drawn> {
             0.0,
             0.2,
         ),
-        drawn(
-            "curve",
-            Friction::Curve(curve),
-            0.6,
-            Box::new(move |v| drawn_curve.ratio_at(v)),
-            0.0,
-            0.3,
-        ),
+        drawn("curve", Friction::Curve(curve), 0.6, Box::new(move |v| drawn_curve.ratio_at(v)), 0.0, 0.3),
         drawn(
             "reset integrator",
             Friction::reset_integrator(MU_S, MU_D, 0.0).unwrap(),

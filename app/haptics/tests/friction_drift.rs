@@ -20,11 +20,7 @@ struct Rest {
 /// Add a shape here and every model is watched on it.
 fn rests(friction: &Friction) -> [Rest; 2] {
     [
-        Rest {
-            name: "plane",
-            entity: table(friction.clone()),
-            mean_W: Vector3::new(0.02, -DEPTH, -0.01),
-        },
+        Rest { name: "plane", entity: table(friction.clone()), mean_W: Vector3::new(0.02, -DEPTH, -0.01) },
         Rest { name: "sphere", entity: ball(0.1, friction.clone()), mean_W: on_circle(0.1 - DEPTH, 0.3) },
     ]
 }
@@ -78,9 +74,8 @@ fn lags(friction: &Friction, spans: usize, ticks: u64) -> Vec<f64> {
     }
     let mean_W = Vector3::new(1.5e-3, -DEPTH, 0.0);
     let mut span = || {
-        let lag = (0..ticks).map(|_| {
-            1.5e-3 - finger.step(&entity, &(mean_W + noise.vector(SIGMA)), DT).god_object_W.x
-        });
+        let lag = (0..ticks)
+            .map(|_| 1.5e-3 - finger.step(&entity, &(mean_W + noise.vector(SIGMA)), DT).god_object_W.x);
         lag.sum::<f64>() / ticks as f64
     };
     (0..spans).map(|_| span()).collect()

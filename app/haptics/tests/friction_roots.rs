@@ -199,7 +199,8 @@ fn drawn_as_a_curve_the_classical_models_are_what_they_were() {
 fn a_stribeck_curve_drawn_in_fine_points_is_the_stribeck_curve() {
     // Flat enough to be slid on everywhere: v_s = 4 m/s, steps of at most 1 m/s.
     let law = Stribeck::new(MU_S, MU_D, 4.0, 0.02).unwrap();
-    let points: Vec<(f64, f64)> = (0..64).map(|i| f64::from(i) * 0.05).map(|v| (v, law.ratio_at(v))).collect();
+    let points: Vec<(f64, f64)> =
+        (0..64).map(|i| f64::from(i) * 0.05).map(|v| (v, law.ratio_at(v))).collect();
     let drawn = Friction::curve(MU_S, &points).unwrap();
     // A chord is off by at most (mu_s - mu_d) / v_s^2 (0.05 m/s)^2 / 4 = 1.6e-5, times 5 mm.
     let difference = largest_difference(&Friction::Stribeck(law), &drawn, 2e-4);

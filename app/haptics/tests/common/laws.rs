@@ -84,15 +84,31 @@ pub(crate) fn any_friction() -> impl Strategy<Value = Friction> {
         (mu(), part()).prop_map(|(mu_s, part)| Friction::Stiction { mu_s, mu_d: mu_s * part }),
         mu_v().prop_map(|mu_v_s_per_m| Friction::Viscous { mu_v_s_per_m }),
         (mu(), mu_v()).prop_map(|(mu, mu_v_s_per_m)| Friction::CoulombViscous { mu, mu_v_s_per_m }),
-        (mu(), part(), speed(), mu_v())
-            .prop_map(|(mu_s, part, v_s, mu_v)| Friction::stribeck(mu_s, mu_s * part, v_s, mu_v).unwrap()),
+        (mu(), part(), speed(), mu_v()).prop_map(|(mu_s, part, v_s, mu_v)| Friction::stribeck(
+            mu_s,
+            mu_s * part,
+            v_s,
+            mu_v
+        )
+        .unwrap()),
         (mu(), points).prop_map(|(above, points)| any_curve(above, &points)),
-        (mu(), part(), speed(), mu_v())
-            .prop_map(|(mu_s, part, v, mu_v)| Friction::karnopp(mu_s, mu_s * part, v, mu_v).unwrap()),
+        (mu(), part(), speed(), mu_v()).prop_map(|(mu_s, part, v, mu_v)| Friction::karnopp(
+            mu_s,
+            mu_s * part,
+            v,
+            mu_v
+        )
+        .unwrap()),
         mu().prop_map(|mu| Friction::dahl(mu).unwrap()),
         (mu(), 0.0..0.999f64).prop_map(|(mu, part)| Friction::hayward_armstrong(mu, part).unwrap()),
-        (mu(), part(), speed(), mu_v(), 0.0..20.0f64)
-            .prop_map(|(mu, part, v_s, mu_v, b)| Friction::lugre(mu, mu * part, v_s, mu_v, b).unwrap()),
+        (mu(), part(), speed(), mu_v(), 0.0..20.0f64).prop_map(|(mu, part, v_s, mu_v, b)| Friction::lugre(
+            mu,
+            mu * part,
+            v_s,
+            mu_v,
+            b
+        )
+        .unwrap()),
         (mu(), 1..=20usize, any::<u64>())
             .prop_map(|(mu, bonds, seed)| Friction::bristle(mu, bonds, seed).unwrap()),
         (mu(), part(), 0.0..20.0f64)
