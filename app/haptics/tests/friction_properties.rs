@@ -62,9 +62,10 @@ proptest! {
             prop_assert!((normal_force - contact.normal_force_n).abs() <= rounding, "no pull, no press");
             let god_before: Option<Vector3<f64>> = before.replace(contact.god_object_W);
             let Some(god_before) = god_before else { continue };
-            let god_speed = (contact.god_object_W - god_before).norm() / DT;
+            // A slide ends within 1e-12 of the load, and places are rounded: so much may its speed be off.
+            let slack = 2e-12 * contact.normal_force_n / K + 1e-16;
+            let god_speed = ((contact.god_object_W - god_before).norm() + slack) / DT;
             let most = bound(&friction, contact.normal_force_n, god_speed, moved.norm() / DT);
-            // A slide ends within 1e-12 of the load, which the viscous curve magnifies with its speed.
             let most = most * contact.normal_force_n * (1.0 + 1e-9) + rounding;
             // On a ball a search that met its bound is at another speed than it shows: see `slide.rs`.
             let is_exact = matches!(shape, Form::Plane(_)) || largest_ratio(&friction, 1.0).is_some();

@@ -46,7 +46,10 @@ proptest! {
             prop_assert!((normal_force - contact.normal_force_n).abs() <= rounding);
             prop_assert!(normal_force >= -rounding);
             if let Some(mu) = largest_ratio(&friction, contact.normal_force_n) {
-                prop_assert!(tangential <= mu * contact.normal_force_n + rounding, "{tangential} {mu} {contact:?}");
+                // What is felt beside the spring is added to a slide that ended within 1e-12 of the load.
+                let beside = if matches!(friction, Friction::LuGre(_)) { 2e-12 } else { 0.0 };
+                let limit = (mu + beside) * contact.normal_force_n;
+                prop_assert!(tangential <= limit + rounding, "{tangential} {mu} {contact:?}");
             }
             // And the god-object is on the surface.
             let at_B = X_WB.inverse_transform_point(&contact.god_object_W.into()).coords;
