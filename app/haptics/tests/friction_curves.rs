@@ -198,7 +198,8 @@ fn noise_of_two_millimetres_leaves_every_pair_on_the_curve() {
 #[test]
 fn the_steady_slide_of_models_with_a_strain_is_on_their_curve() {
     let stribeck = Stribeck::new(MU_S, MU_D, 0.05, 0.1).unwrap();
-    let steady: [(&str, Friction, &dyn Fn(f64) -> f64); 3] = [
+    type Steady<'c> = (&'c str, Friction, &'c dyn Fn(f64) -> f64);
+    let steady: [Steady<'_>; 3] = [
         ("dahl", Friction::dahl(0.5).unwrap(), &|_| 0.5),
         ("hayward-armstrong", Friction::hayward_armstrong(0.5, 0.6).unwrap(), &|_| 0.5),
         ("lugre", Friction::lugre(MU_S, MU_D, 0.05, 0.1, 0.5).unwrap(), &|v| stribeck.ratio_at(v)),

@@ -66,7 +66,8 @@ fn in_noise_the_god_objects_speed_over_the_hips_is_the_strain_over_its_limit() {
     // dw = alpha z |dx|: exact in every tick, since the step is implicit.
     let stick = 0.6;
     let alpha = move |part: f64| ((part - stick) / (1.0 - stick)).max(0.0);
-    let laws: [(Friction, Box<dyn Fn(f64) -> f64>); 2] = [
+    type Law = (Friction, Box<dyn Fn(f64) -> f64>);
+    let laws: [Law; 2] = [
         (Friction::dahl(MU).unwrap(), Box::new(|_| 1.0)),
         (Friction::hayward_armstrong(MU, stick).unwrap(), Box::new(alpha)),
     ];
