@@ -123,6 +123,7 @@ fn bristles_follow_bonds_that_are_places_also_when_the_motion_reverses() {
             let now = s - side * stretch;
             // Those that are whole have not moved, but for the rounding of many turns.
             let has_moved = (now - *place).abs() > 1e-9;
+            assert!(!(holds && has_moved), "tick {tick}: nothing snapped, and yet a bond moved");
             snaps += u32::from(has_moved);
             *place = now;
         }
