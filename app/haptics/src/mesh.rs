@@ -9,8 +9,10 @@
 //!
 //! Frames and signs: object frame B; vertices run counter-clockwise seen from outside, normals leave the material.
 
+mod bvh;
 mod face;
 mod soup;
 
+pub use bvh::{Bvh, Hit, Nearest, Triangles};
 pub use face::{Face, Link};
 pub use soup::TriangleSoup;
