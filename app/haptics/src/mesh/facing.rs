@@ -33,6 +33,7 @@ pub(crate) enum Facing<'m> {
 }
 
 impl<'m> Facing<'m> {
+    #[inline]
     pub(crate) fn of(mesh: &'m Mesh, place: &Place, hip_B: &Vector3<f64>) -> Self {
         match place.on {
             On::Face(side) => {
@@ -44,6 +45,7 @@ impl<'m> Facing<'m> {
         }
     }
 
+    #[inline]
     fn on_edge(
         mesh: &'m Mesh,
         side: Side,

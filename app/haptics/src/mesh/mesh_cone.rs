@@ -147,7 +147,7 @@ impl Touching {
             walk(mesh, &mut self.shadow, shadow, |query| query.gap_m, &Pull::default(), input)?;
         }
         let here = stand(mesh, &mut self.god_object, input)?;
-        let pull = self.grip.begin_tick(&here.view, input);
+        let pull = if has_friction { self.grip.begin_tick(&here.view, input) } else { Pull::default() };
         let (view, tangential_B, changes) = match self.grip.hold(friction, &here.view, &pull, input) {
             Some(tangential_B) => (here.view, tangential_B, 0),
             None => self.slide(mesh, friction, here, &pull, input)?,

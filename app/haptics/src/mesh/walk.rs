@@ -51,6 +51,7 @@ pub(crate) struct Walked {
 /// Where the god-object stands when the HIP has moved; `None` if it is free and gone.
 ///
 /// `place` may change without moving: from an edge to the face that now holds the HIP back.
+#[inline]
 pub(crate) fn stand<'m>(mesh: &'m Mesh, place: &mut Place, input: &ConeInput) -> Option<Stand<'m>> {
     for _ in 0..MAX_FLIGHTS {
         let facing = Facing::of(mesh, place, &input.hip_B);
@@ -72,6 +73,7 @@ pub(crate) fn stand<'m>(mesh: &'m Mesh, place: &mut Place, input: &ConeInput) ->
 }
 
 /// Moves `place` from where it stands until `asked` wants no further slide; `None` if it is free and gone.
+#[inline]
 pub(crate) fn walk<'m>(
     mesh: &'m Mesh,
     place: &mut Place,
@@ -110,6 +112,7 @@ struct Slide {
 }
 
 impl Slide {
+    #[inline]
     fn new(
         view: TangentView,
         back_B: &Vector3<f64>,
@@ -125,25 +128,30 @@ impl Slide {
     }
 
     /// Inside the friction circle, or as near to its rim as positions can tell.
+    #[inline]
     fn is_at_rest(&self) -> bool {
         self.asked_m.is_nan() || self.asked_m <= self.view.rest_m
     }
 
+    #[inline]
     fn target_B(&self) -> Vector3<f64> {
         self.view.surface_point_B + self.direction_B * self.radius_m()
     }
 
     /// Distance from the surface point at which the slide ends.
+    #[inline]
     fn radius_m(&self) -> f64 {
         self.view.gap_m - self.asked_m.min(self.view.gap_m)
     }
 
     /// It stays: the force is that of its gap, cut to the rim if a bound ended the walk early.
+    #[inline]
     fn rested(&self, changes: u32) -> Walked {
         let tangential_B = if self.asked_m > 0.0 { self.direction_B * self.radius_m() } else { self.view.lag_B };
         Walked { view: self.view, tangential_B, changes }
     }
 
+    #[inline]
     fn arrived(&self, changes: u32) -> Walked {
         Walked { view: self.view, tangential_B: self.direction_B * self.radius_m(), changes }
     }
@@ -156,30 +164,32 @@ struct Reached {
 }
 
 /// Goes straight through a face: to the target or to the first edge or vertex on the way.
+#[inline]
 fn cross_face(mesh: &Mesh, facet: &Facet<'_>, from_B: &Vector3<f64>, target_B: &Vector3<f64>) -> Reached {
     let way_B = target_B - from_B;
     let way_m2 = way_B.norm_squared();
     let corners_B = [0, 1, 2].map(|corner| facet.corner_B(mesh, corner));
-    let mut first = None;
+    let edges_B = [0, 1, 2].map(|edge| corners_B[next(edge)] - corners_B[edge]);
     let mut first_fraction = f64::INFINITY;
-    for edge in 0..3 {
-        let edge_B = corners_B[next(edge)] - corners_B[edge];
-        let inward_B = facet.inward_B(&edge_B);
+    let mut first = None;
+    // No branch but the last: which edge it is that is met, nothing can predict.
+    for (edge, edge_B) in edges_B.iter().enumerate() {
+        let inward_B = facet.inward_B(edge_B);
         // Distances from the edge, times its length: the Voronoi plane through the edge, Melder eq. 4.15-4.20 with the
         // offset corrected (the printed one is always 0).
         let gained = inward_B.dot(&way_B);
-        if gained >= 0.0 || gained * gained <= PARALLEL * PARALLEL * edge_B.norm_squared() * way_m2 {
-            continue;
-        }
         let left = inward_B.dot(&(from_B - corners_B[edge])).max(0.0);
-        if left + gained < 0.0 && left < -gained * first_fraction {
-            (first, first_fraction) = (Some((edge, edge_B)), -left / gained);
-        }
+        let leaves = gained * gained > PARALLEL * PARALLEL * edge_B.norm_squared() * way_m2;
+        let is_met = (gained < 0.0) & (left + gained < 0.0) & leaves;
+        let fraction = if is_met { left / -gained } else { f64::INFINITY };
+        first = if fraction < first_fraction { Some(edge) } else { first };
+        first_fraction = fraction.min(first_fraction);
     }
-    let Some((edge, edge_B)) = first else {
+    let Some(edge) = first else {
         return Reached { place: Place { point_B: *target_B, on: On::Face(facet.side) }, is_all_the_way: true };
     };
     let met_B = from_B + way_B * first_fraction;
+    let edge_B = edges_B[edge];
     let share = edge_B.dot(&(met_B - corners_B[edge])) / edge_B.norm_squared();
     Reached { place: on_edge(mesh, facet.side, edge, share), is_all_the_way: false }
 }
@@ -193,6 +203,7 @@ fn follow_edge(mesh: &Mesh, side: Side, edge: usize, target_B: &Vector3<f64>) ->
 }
 
 /// The place on an edge at this share of its length; near its ends, the vertex.
+#[inline]
 fn on_edge(mesh: &Mesh, side: Side, edge: usize, share: f64) -> Place {
     let facet = Facet::of(mesh, side);
     let at = |corner| Place { point_B: facet.corner_B(mesh, corner), on: On::Vertex(side, corner) };
@@ -222,6 +233,7 @@ fn fly(mesh: &Mesh, place: &Place, hip_B: &Vector3<f64>) -> Option<Place> {
     mesh.first_hit(&from_B, hip_B).map(|hit| Place::hit(&hit))
 }
 
+#[inline]
 fn view_of_face(facet: &Facet<'_>, place: &Place, input: &ConeInput) -> TangentView {
     TangentView::new(&place.point_B, facet.normal_B, facet.offset_m, input)
 }
