@@ -33,7 +33,7 @@ pub(crate) enum Facing<'m> {
 }
 
 impl<'m> Facing<'m> {
-    #[inline]
+    #[inline(always)]
     pub(crate) fn of(mesh: &'m Mesh, place: &Place, hip_B: &Vector3<f64>) -> Self {
         match place.on {
             On::Face(side) => {

@@ -94,7 +94,7 @@ impl MeshCone {
 
     /// Where the god-object is, with the normal and the feature there.
     pub fn god_object(&self) -> Option<SurfacePoint> {
-        self.touching.map(|touching| SurfacePoint {
+        self.touching.as_ref().map(|touching| SurfacePoint {
             point_B: touching.god_object.point_B,
             normal_B: touching.normal_B,
             feature: touching.god_object.feature(),
@@ -104,7 +104,7 @@ impl MeshCone {
 
     /// Whether friction holds it.
     pub fn state(&self) -> FrictionState {
-        self.touching.map_or(FrictionState::Stick, |touching| touching.grip.state)
+        self.touching.as_ref().map_or(FrictionState::Stick, |touching| touching.grip.state)
     }
 
     fn meet(

@@ -91,8 +91,14 @@ impl<'m> Facet<'m> {
     /// From the start of an edge to its end \[m\].
     #[inline]
     pub(crate) fn edge_B(&self, mesh: &Mesh, edge: usize) -> (Vector3<f64>, Vector3<f64>) {
-        let [start_B, end_B] = [edge, next(edge)].map(|corner| self.corner_B(mesh, corner));
-        (start_B, end_B - start_B)
+        let start_B = self.corner_B(mesh, edge);
+        (start_B, self.corner_B(mesh, next(edge)) - start_B)
+    }
+
+    #[inline]
+    pub(crate) fn corners_B(&self, mesh: &Mesh) -> [Vector3<f64>; 3] {
+        let [a, b, c] = self.face.vertices;
+        [mesh.vertices[a as usize], mesh.vertices[b as usize], mesh.vertices[c as usize]]
     }
 
     #[inline]

@@ -51,7 +51,7 @@ pub(crate) struct Walked {
 /// Where the god-object stands when the HIP has moved; `None` if it is free and gone.
 ///
 /// `place` may change without moving: from an edge to the face that now holds the HIP back.
-#[inline]
+#[inline(always)]
 pub(crate) fn stand<'m>(mesh: &'m Mesh, place: &mut Place, input: &ConeInput) -> Option<Stand<'m>> {
     for _ in 0..MAX_FLIGHTS {
         let facing = Facing::of(mesh, place, &input.hip_B);
@@ -112,7 +112,7 @@ struct Slide {
 }
 
 impl Slide {
-    #[inline]
+    #[inline(always)]
     fn new(
         view: TangentView,
         back_B: &Vector3<f64>,
@@ -164,12 +164,13 @@ struct Reached {
 }
 
 /// Goes straight through a face: to the target or to the first edge or vertex on the way.
-#[inline]
+#[inline(always)]
 fn cross_face(mesh: &Mesh, facet: &Facet<'_>, from_B: &Vector3<f64>, target_B: &Vector3<f64>) -> Reached {
     let way_B = target_B - from_B;
     let way_m2 = way_B.norm_squared();
-    let corners_B = [0, 1, 2].map(|corner| facet.corner_B(mesh, corner));
-    let edges_B = [0, 1, 2].map(|edge| corners_B[next(edge)] - corners_B[edge]);
+    let corners_B = facet.corners_B(mesh);
+    let [a_B, b_B, c_B] = corners_B;
+    let edges_B = [b_B - a_B, c_B - b_B, a_B - c_B];
     let mut first_fraction = f64::INFINITY;
     let mut first = None;
     // No branch but the last: which edge it is that is met, nothing can predict.
@@ -233,7 +234,7 @@ fn fly(mesh: &Mesh, place: &Place, hip_B: &Vector3<f64>) -> Option<Place> {
     mesh.first_hit(&from_B, hip_B).map(|hit| Place::hit(&hit))
 }
 
-#[inline]
+#[inline(always)]
 fn view_of_face(facet: &Facet<'_>, place: &Place, input: &ConeInput) -> TangentView {
     TangentView::new(&place.point_B, facet.normal_B, facet.offset_m, input)
 }
