@@ -163,7 +163,7 @@ impl Touching {
         &mut self,
         mesh: &Mesh,
         friction: &Friction,
-        from: Stand<'_>,
+        from: Stand,
         pull: &Pull,
         input: &ConeInput,
     ) -> Option<(TangentView, Vector3<f64>, u32)> {

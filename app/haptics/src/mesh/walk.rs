@@ -34,8 +34,8 @@ const MAX_FLIGHTS: u32 = 8;
 
 /// Where a god-object is, and what faces the HIP there.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Stand<'m> {
-    pub(crate) facing: Facing<'m>,
+pub(crate) struct Stand {
+    pub(crate) facing: Facing,
     pub(crate) view: TangentView,
 }
 
@@ -52,11 +52,11 @@ pub(crate) struct Walked {
 ///
 /// `place` may change without moving: from an edge to the face that now holds the HIP back.
 #[inline(always)]
-pub(crate) fn stand<'m>(mesh: &'m Mesh, place: &mut Place, input: &ConeInput) -> Option<Stand<'m>> {
+pub(crate) fn stand(mesh: &Mesh, place: &mut Place, input: &ConeInput) -> Option<Stand> {
     for _ in 0..MAX_FLIGHTS {
         let facing = Facing::of(mesh, place, &input.hip_B);
         let (on, view) = match facing {
-            Facing::Face(facet) => (On::Face(facet.side), view_of_face(&facet, place, input)),
+            Facing::Face(side) => (On::Face(side), view_of_face(mesh, side, place, input)),
             Facing::Edge(side, edge) => {
                 (On::Edge(side, edge), view_of_edge(mesh, side, edge, place, input))
             }
@@ -74,10 +74,10 @@ pub(crate) fn stand<'m>(mesh: &'m Mesh, place: &mut Place, input: &ConeInput) ->
 
 /// Moves `place` from where it stands until `asked` wants no further slide; `None` if it is free and gone.
 #[inline]
-pub(crate) fn walk<'m>(
-    mesh: &'m Mesh,
+pub(crate) fn walk(
+    mesh: &Mesh,
     place: &mut Place,
-    mut stand_now: Stand<'m>,
+    mut stand_now: Stand,
     asked: impl Fn(&FrictionQuery) -> f64,
     pull: &Pull,
     input: &ConeInput,
@@ -90,7 +90,7 @@ pub(crate) fn walk<'m>(
         }
         let target_B = slide.target_B();
         let reached = match stand_now.facing {
-            Facing::Face(facet) => cross_face(mesh, &facet, &place.point_B, &target_B),
+            Facing::Face(side) => cross_face(mesh, side, &place.point_B, &target_B),
             Facing::Edge(side, edge) => follow_edge(mesh, side, edge, &target_B),
             Facing::Vertex(..) | Facing::Free => return Some(slide.rested(changes)),
         };
@@ -165,7 +165,8 @@ struct Reached {
 
 /// Goes straight through a face: to the target or to the first edge or vertex on the way.
 #[inline(always)]
-fn cross_face(mesh: &Mesh, facet: &Facet<'_>, from_B: &Vector3<f64>, target_B: &Vector3<f64>) -> Reached {
+fn cross_face(mesh: &Mesh, side: Side, from_B: &Vector3<f64>, target_B: &Vector3<f64>) -> Reached {
+    let facet = Facet::of(mesh, side);
     let way_B = target_B - from_B;
     let way_m2 = way_B.norm_squared();
     let corners_B = facet.corners_B(mesh);
@@ -187,12 +188,12 @@ fn cross_face(mesh: &Mesh, facet: &Facet<'_>, from_B: &Vector3<f64>, target_B: &
         first_fraction = fraction.min(first_fraction);
     }
     let Some(edge) = first else {
-        return Reached { place: Place { point_B: *target_B, on: On::Face(facet.side) }, is_all_the_way: true };
+        return Reached { place: Place { point_B: *target_B, on: On::Face(side) }, is_all_the_way: true };
     };
     let met_B = from_B + way_B * first_fraction;
     let edge_B = edges_B[edge];
     let share = edge_B.dot(&(met_B - corners_B[edge])) / edge_B.norm_squared();
-    Reached { place: on_edge(mesh, facet.side, edge, share), is_all_the_way: false }
+    Reached { place: on_edge(mesh, side, edge, share), is_all_the_way: false }
 }
 
 /// Goes along an edge: to the target or to the vertex on the way.
@@ -235,7 +236,8 @@ fn fly(mesh: &Mesh, place: &Place, hip_B: &Vector3<f64>) -> Option<Place> {
 }
 
 #[inline(always)]
-fn view_of_face(facet: &Facet<'_>, place: &Place, input: &ConeInput) -> TangentView {
+fn view_of_face(mesh: &Mesh, side: Side, place: &Place, input: &ConeInput) -> TangentView {
+    let facet = Facet::of(mesh, side);
     TangentView::new(&place.point_B, facet.normal_B, facet.offset_m, input)
 }
 
