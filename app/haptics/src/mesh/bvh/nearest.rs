@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 
 use super::closest::{Closest, closest_on};
 use super::stack::Stack;
-use super::{Bvh, Triangles};
+use super::{Bvh, Rounded, Triangles, above};
 use crate::surface::Feature;
 
 /// The point of a mesh nearest to a given one.
@@ -35,22 +35,34 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
         let mut best =
             Closest { feature: Feature::Vertex, corner: 0, point_B: first, squared_distance: f64::MAX };
         let mut best_face = u32::MAX;
-        let mut stack = Stack::<f64>::new();
+        // No face comes nearer than its plane does; the slack is more than the rounding of both.
+        let slack = ROUNDING * (self.extent_m() + p_B.amax());
+        let mut reach = f64::INFINITY;
+        let rounded = Rounded::new(p_B);
+        // Finite: boxes of nothing are infinitely far away.
+        let mut limit = f32::MAX;
+        let mut stack = Stack::<f32>::new();
         while let Some((squared_distance, child)) = stack.pop() {
-            if squared_distance > best.squared_distance {
+            if squared_distance > limit {
                 continue;
             }
             if child.count() == 0 {
                 let node = &self.nodes[child.index()];
-                stack.push_sorted(node.squared_distances(p_B), &node.children, best.squared_distance);
+                stack.push_sorted(node.squared_distances(&rounded), &node.children, limit);
                 continue;
             }
             for index in child.index()..child.index() + child.count() {
                 let face = &triangles.faces[index];
+                let height = face.normal_B.dot(p_B) - face.offset_m;
+                if height.abs() > reach {
+                    continue;
+                }
                 let found = closest_on(face, &triangles.corners(face), p_B);
                 let (index, is_tie) = (index as u32, found.squared_distance == best.squared_distance);
                 if found.squared_distance < best.squared_distance || is_tie && index < best_face {
                     (best, best_face) = (found, index);
+                    reach = found.squared_distance.sqrt() + slack;
+                    limit = above(found.squared_distance).min(f32::MAX);
                 }
             }
         }
@@ -61,3 +73,6 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
         Nearest { face: best_face, feature, corner, point_B, distance_m: squared_distance.sqrt() }
     }
 }
+
+/// Ten times what is lost when a distance from a plane is computed, relative to the coordinates.
+const ROUNDING: f64 = 1e-14;
