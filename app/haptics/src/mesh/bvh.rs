@@ -53,8 +53,10 @@ pub struct Triangles<'a> {
 }
 
 impl<'a> Triangles<'a> {
+    #[inline(always)]
     fn corners(self, face: &Face) -> [Vector3<f64>; 3] {
-        face.vertices.map(|vertex| self.vertices[vertex as usize])
+        let [a, b, c] = face.vertices;
+        [self.vertices[a as usize], self.vertices[b as usize], self.vertices[c as usize]]
     }
 }
 
@@ -99,7 +101,10 @@ impl<const WIDTH: usize> Node<WIDTH> {
             }
         }
         // A difference, its square and two sums, each rounded by half a unit in the last place.
-        sum.map(|squared| squared * (1.0 - 4.0 * f32::EPSILON))
+        for squared in &mut sum {
+            *squared *= 1.0 - 4.0 * f32::EPSILON;
+        }
+        sum
     }
 }
 
@@ -110,11 +115,9 @@ struct Rounded {
 }
 
 impl Rounded {
+    #[inline]
     fn new(p: &Vector3<f64>) -> Self {
-        Self {
-            lower: std::array::from_fn(|axis| below(p[axis])),
-            upper: std::array::from_fn(|axis| above(p[axis])),
-        }
+        Self { lower: [below(p.x), below(p.y), below(p.z)], upper: [above(p.x), above(p.y), above(p.z)] }
     }
 }
 

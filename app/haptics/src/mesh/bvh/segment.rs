@@ -145,14 +145,14 @@ impl Line {
     }
 
     /// Whether it passes through a triangle, from either side; the rim counts.
-    #[inline]
+    #[inline(always)]
     fn meets(&self, corners: &[Vector3<f64>; 3]) -> bool {
-        let [a, b, c] = corners.map(|corner| self.across(&corner));
-        let sides = [a[0] * b[1] - a[1] * b[0], b[0] * c[1] - b[1] * c[0], c[0] * a[1] - c[1] * a[0]];
-        sides.iter().all(|&side| side >= 0.0) || sides.iter().all(|&side| side <= 0.0)
+        let [a, b, c] = [self.across(&corners[0]), self.across(&corners[1]), self.across(&corners[2])];
+        let (ab, bc, ca) = (a[0] * b[1] - a[1] * b[0], b[0] * c[1] - b[1] * c[0], c[0] * a[1] - c[1] * a[0]);
+        (ab >= 0.0) & (bc >= 0.0) & (ca >= 0.0) | (ab <= 0.0) & (bc <= 0.0) & (ca <= 0.0)
     }
 
-    #[inline]
+    #[inline(always)]
     fn across(&self, point: &Vector3<f64>) -> [f64; 2] {
         let [x, y, z] = self.axes;
         let relative = point - self.origin;
@@ -258,7 +258,10 @@ impl Slabs {
                 far[i] = smaller((farther[i] - self.origin_last[axis]) * self.inverse[axis], far[i]);
             }
         }
-        std::array::from_fn(|i| if near[i] <= far[i] { near[i] } else { f32::INFINITY })
+        for i in 0..WIDTH {
+            near[i] = if near[i] <= far[i] { near[i] } else { f32::INFINITY };
+        }
+        near
     }
 }
 
