@@ -89,7 +89,8 @@ impl<const WIDTH: usize> Node<WIDTH> {
     };
 
     /// Squared distances of a point from the boxes \[m^2\], too small rather than too large.
-    #[inline(always)]
+    // Inlined, the compiler takes the lanes apart again where they are sorted.
+    #[inline(never)]
     fn squared_distances(&self, p: &Rounded) -> [f32; WIDTH] {
         let mut sum = [0.0; WIDTH];
         for axis in 0..3 {

@@ -247,7 +247,8 @@ impl Slabs {
     }
 
     /// Fraction at which each child's box is entered, infinite if it is not met before `limit`.
-    #[inline(always)]
+    // Inlined, the compiler takes the lanes apart again where they are sorted.
+    #[inline(never)]
     fn entries<const WIDTH: usize>(&self, node: &Node<WIDTH>, limit: f32) -> [f32; WIDTH] {
         let (mut near, mut far) = ([0.0; WIDTH], [limit; WIDTH]);
         for axis in 0..3 {
