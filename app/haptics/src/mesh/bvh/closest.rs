@@ -23,20 +23,41 @@ pub(super) struct Closest {
     pub(super) squared_distance: f64,
 }
 
-pub(super) fn closest_on(face: &Face, corners: &[Vector3<f64>; 3], p: &Vector3<f64>) -> Closest {
+/// None may be answered if it is farther than the root of `at_most`, which saves half of the work.
+#[inline]
+pub(super) fn closest_on(
+    face: &Face,
+    corners: &[Vector3<f64>; 3],
+    p: &Vector3<f64>,
+    at_most: f64,
+) -> Option<Closest> {
     let edges = [corners[1] - corners[0], corners[2] - corners[1], corners[0] - corners[2]];
     let to_p = [p - corners[0], p - corners[1], p - corners[2]];
     let is_left_of = |i: usize| face.normal_B.dot(&edges[i].cross(&to_p[i])) > 0.0;
     if is_left_of(0) & is_left_of(1) & is_left_of(2) {
         let height = face.normal_B.dot(p) - face.offset_m;
         let point_B = p - face.normal_B * height;
-        return Closest { feature: Feature::Face, corner: 0, point_B, squared_distance: height * height };
+        return Some(Closest {
+            feature: Feature::Face,
+            corner: 0,
+            point_B,
+            squared_distance: height * height,
+        });
     }
     let squared_distance = |i: usize| squared_distance_from_edge(&edges[i], &to_p[i]);
     let (first, second, third) = (squared_distance(0), squared_distance(1), squared_distance(2));
-    let nearer = if second < first { 1 } else { 0 };
-    let edge = if third < smaller(first, second) { 2 } else { nearer };
-    closest_on_edge(face, corners, edge, p)
+    let least = smaller(smaller(first, second), third);
+    if least > at_most {
+        return None;
+    }
+    let edge = if least == first {
+        0
+    } else if least == second {
+        1
+    } else {
+        2
+    };
+    Some(closest_on_edge(face, corners, edge, p))
 }
 
 /// Good enough to choose an edge by.

@@ -48,7 +48,7 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
             }
             if child.count() == 0 {
                 let node = &self.nodes[child.index()];
-                stack.push_sorted(node.squared_distances(&rounded), &node.children, limit);
+                stack.push(&node.squared_distances(&rounded), &node.children, limit);
                 continue;
             }
             for index in child.index()..child.index() + child.count() {
@@ -57,7 +57,8 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
                 if height.abs() > reach {
                     continue;
                 }
-                let found = closest_on(face, &triangles.corners(face), p_B);
+                let found = closest_on(face, &triangles.corners(face), p_B, reach * reach);
+                let Some(found) = found else { continue };
                 let (index, is_tie) = (index as u32, found.squared_distance == best.squared_distance);
                 if found.squared_distance < best.squared_distance || is_tie && index < best_face {
                     (best, best_face) = (found, index);

@@ -59,7 +59,7 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
             }
             if child.count() == 0 {
                 let node = &self.nodes[child.index()];
-                stack.push_sorted(slabs.entries(node, limit), &node.children, limit);
+                stack.push(&slabs.entries(node, limit), &node.children, limit);
                 continue;
             }
             for index in child.index()..child.index() + child.count() {
@@ -117,15 +117,17 @@ impl Segment {
 
     /// Whether the face is as near as the tolerance: its plane may be one away, and so may its rim be.
     fn touches(&self, face: &Face, corners: &[Vector3<f64>; 3], fraction: f64) -> bool {
-        let point = self.from + self.path * fraction;
-        closest_on(face, corners, &point).squared_distance <= (2.0 * self.tolerance_m).powi(2)
+        let (point, at_most_m) = (self.from + self.path * fraction, 2.0 * self.tolerance_m);
+        let closest = closest_on(face, corners, &point, at_most_m * at_most_m);
+        closest.is_some_and(|closest| closest.squared_distance <= at_most_m * at_most_m)
     }
 
     /// Along a face the line leaves the place vague, the face does not: the point is brought onto it.
     fn hit(&self, triangles: Triangles<'_>, met: Met) -> Hit {
         let face = &triangles.faces[met.face as usize];
         let on_plane = self.from + self.path * met.fraction;
-        let point_B = closest_on(face, &triangles.corners(face), &on_plane).point_B;
+        let closest = closest_on(face, &triangles.corners(face), &on_plane, f64::INFINITY);
+        let point_B = closest.map_or(on_plane, |closest| closest.point_B);
         Hit { face: met.face, fraction: met.fraction, point_B, is_front: met.is_front }
     }
 }
