@@ -10,12 +10,13 @@ use super::{Bvh, Child, Rounded, above};
 impl<const WIDTH: usize> Bvh<WIDTH> {
     /// A lower bound of the distance from a point to any face, at most `at_most_m` \[m\].
     ///
-    /// 0 if nothing better is known; so it is for a point that is not finite. A smaller `at_most_m` is answered
+    /// Not more than 1e18 m. 0 if nothing better is known; so it is for a point that is not finite. A smaller `at_most_m` is answered
     /// faster.
     pub fn clearance(&self, p_B: &Vector3<f64>, at_most_m: f64) -> f64 {
         if !(at_most_m > 0.0 && p_B.iter().all(|coordinate| coordinate.is_finite())) {
             return 0.0;
         }
+        let at_most_m = at_most_m.min(FARTHEST_M);
         let limit = above(at_most_m * at_most_m).min(f32::MAX);
         let p = Rounded::new(p_B);
         let mut closed = Closed { entries: [(0.0, Child(0)); MOST_CLOSED], len: 1 };
@@ -65,6 +66,8 @@ impl Closed {
     }
 }
 
+/// More is not promised, since its square would not fit into `f32`.
+const FARTHEST_M: f64 = 1e18;
 /// Nodes that are opened at most.
 const MOST_OPENED: usize = 16;
 /// Each opened node takes one off and puts at most 8 on.
