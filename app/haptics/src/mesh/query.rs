@@ -16,7 +16,8 @@ impl Mesh {
 
     /// The point of the mesh nearest to a point on either side.
     ///
-    /// A point that is not finite, or 1e150 m away, is answered by a corner of face 0 at infinite distance.
+    /// A point that is not finite is answered by a corner of face 0, infinitely far away. Beyond 1000 extents the
+    /// answer is that for a point 1000 extents away in the same direction, with the point's own distance.
     pub fn nearest(&self, p_B: &Vector3<f64>) -> Nearest {
         self.bvh.nearest(self.triangles(), p_B)
     }
