@@ -26,7 +26,8 @@ fn build(c: &mut Criterion) {
         let mut group = c.benchmark_group("mesh build");
         group.throughput(Throughput::Elements(generated.faces.len() as u64));
         group.sample_size(10).measurement_time(Duration::from_secs(5));
-        for (input, soup) in [("generated", generated), ("shuffled", shuffled), ("own corners", own_corners)] {
+        for (input, soup) in [("generated", generated), ("shuffled", shuffled), ("own corners", own_corners)]
+        {
             group.bench_with_input(BenchmarkId::new(input, size), &soup, |b, soup| {
                 let build = |soup| Mesh::build(soup).expect("a sphere");
                 b.iter_batched(|| soup.clone(), build, BatchSize::LargeInput);

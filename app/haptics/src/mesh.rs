@@ -16,6 +16,7 @@ pub mod make;
 mod order;
 mod repair;
 mod report;
+mod sliver;
 mod soup;
 mod topology;
 mod winding;

@@ -3,7 +3,7 @@
 //! Model: each edge is entered at its lower-numbered vertex; sorted by the other one, the faces at an edge stand
 //! side by side. Vertices are numbered in spatial order by now, so this runs through memory in order.
 
-use super::repair::Triangle;
+use super::order::Triangle;
 use super::{Link, MAX_VALENCE, MeshError};
 use nalgebra::Vector3;
 
