@@ -19,6 +19,7 @@ mod report;
 mod sliver;
 mod soup;
 mod topology;
+mod touching;
 mod winding;
 
 pub use error::MeshError;

@@ -29,7 +29,7 @@ impl Mesh {
         order::sort_spatially(&mut triangles, &soup.vertices, &mut report.duplicate);
         let vertices = order::renumber(&mut triangles, &soup.vertices);
         drop(soup);
-        let mut links = topology::link(&triangles, &vertices)?;
+        let mut links = topology::link(&triangles, &vertices, &mut report.touching_edges)?;
         let sides = winding::orient(&mut triangles, &mut links, &vertices, &mut report);
         report_edges(&triangles, &links, &mut report);
         let faces: Box<[Face]> =
