@@ -2,7 +2,7 @@
 #![allow(non_snake_case)]
 
 use haptics::mesh::{Face, Finding, Mesh, MeshError, MeshReport, Sides, TriangleSoup, make};
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::Vector3;
 use proptest::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::{PI, TAU};
@@ -198,6 +198,20 @@ fn the_order_of_the_input_changes_nothing() {
     }
 }
 
+#[test]
+fn the_order_of_the_input_changes_nothing_where_all_faces_share_a_cell_of_the_curve() {
+    // Beside one face as large as this, the sphere lies in a cell and a half.
+    let mut soup = make::uv_sphere(16, 8, 1e-4);
+    let far = soup.vertices.len() as u32;
+    soup.vertices.extend([Vector3::x(), Vector3::y(), Vector3::z()].map(|v| v * 1e3));
+    soup.faces.push([far, far + 1, far + 2]);
+    let (mesh, _) = build(soup.clone());
+    for seed in 0..3 {
+        let (again, _) = build(make::shuffled(&soup, seed));
+        assert_eq!((mesh.vertices(), mesh.faces()), (again.vertices(), again.faces()));
+    }
+}
+
 fn counts(report: &MeshReport) -> [usize; 10] {
     [
         report.faces,
@@ -247,6 +261,7 @@ fn equal_vertices_are_merged_to_the_bit_and_minus_zero_is_zero() {
     assert_eq!(mesh.faces(), build(cube).0.faces());
 
     let mut soup = one_tetrahedron();
+    soup.vertices[0] = point(-0.0, 0.0, -0.0);
     soup.vertices.push(point(-0.0, 1.0, -0.0));
     soup.faces[3][0] = 4;
     let (mesh, report) = build(soup);
@@ -350,6 +365,22 @@ fn a_cavity_stays_a_cavity_also_in_a_file_that_is_inside_out() {
     let (mesh, report) = build(hollow);
     assert_eq!((report.cavities, report.inside_out), (found(1, 4), found(2, 0)));
     assert!((volume(&mesh) - expected).abs() < 1e-15, "rounding");
+}
+
+#[test]
+fn what_lies_in_a_cavity_is_solid_again() {
+    // Shells in one another, wound out, in, out; two of them, one inside out. The order along x differs from that of
+    // their size.
+    let shells = [1.0, 0.6, 0.3].map(|size| (Vector3::repeat(0.2 - 0.2 * size), size));
+    let beside = shells.map(|(at, size)| (at + Vector3::x() * 0.05 + Vector3::y() * 2.0, size));
+    let mut soup = tetrahedra(&[beside, shells].concat());
+    inside_out(&mut soup, 4..8);
+    inside_out(&mut soup, 12..16);
+    inside_out(&mut soup, 20..24);
+    let (mesh, report) = build(soup);
+    let expected = 2.0 * (1.0 - 0.6_f64.powi(3) + 0.3_f64.powi(3)) / 6.0;
+    assert!((volume(&mesh) - expected).abs() < 1e-14, "rounding");
+    assert_eq!((report.cavities, report.inside_out, report.components), (found(2, 4), found(3, 12), 6));
 }
 
 #[test]
@@ -507,18 +538,23 @@ fn a_vertex_with_more_faces_than_can_be_walked_round_is_refused() {
 }
 
 #[test]
-fn the_normal_of_a_needle_is_right() {
-    // 1 m long and 1 nm wide, turned about; its plane is known.
-    let turn = Rotation3::from_euler_angles(0.3, -0.7, 1.1);
-    let corners = [point(0.0, 0.0, 0.0), point(1.0, 0.0, 0.0), point(1.0, 1e-9, 0.0)];
-    for first in 0..3 {
-        let mut face = [0, 1, 2];
-        face.rotate_left(first);
-        let soup = TriangleSoup { vertices: corners.map(|v| turn * v).to_vec(), faces: vec![face] };
-        let (mesh, _) = build(soup);
-        let error = (mesh.faces()[0].normal_B - turn * Vector3::z()).norm();
-        // The corners themselves are rounded by 1e-16, which turns a plane 1e-9 wide by 1e-7.
-        assert!(error < 4e-7, "{error}");
+fn the_normal_of_a_needle_is_right_to_the_last_digits() {
+    // 10^12 times as long as wide. In whole units of 2^-40 m, so that the exact normal is known in integers; from
+    // the two long edges rounding would leave four digits of it.
+    let corners: [[i128; 3]; 3] = [
+        [0, 0, 0],
+        [(1 << 40) + 1, (1 << 39) + 3, (1 << 38) + 5],
+        [(1 << 40) + 4, (1 << 39) - 2, (1 << 38) + 12],
+    ];
+    let [e, f] = [1, 2].map(|i| corners[i]);
+    let exact = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
+    let exact = Vector3::from(exact.map(|x| x as f64)).normalize();
+    let vertices: Vec<_> =
+        corners.iter().map(|c| Vector3::from(c.map(|x| x as f64 / 2_f64.powi(40)))).collect();
+    for order in [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1]] {
+        let (mesh, _) = build(TriangleSoup { vertices: vertices.clone(), faces: vec![order] });
+        let normal = mesh.faces()[0].normal_B * if order == [0, 2, 1] { -1.0 } else { 1.0 };
+        assert!((normal - exact).norm() < 1e-15, "a few roundings");
     }
 }
 

@@ -8,7 +8,7 @@
 //!    lies within its box turns with it: so a cavity, wound inward, stays a cavity, also in a file that is inside
 //!    out as a whole.
 //!
-//! Cost: linear; step 3 also compares each closed part with the outermost ones.
+//! Cost: linear; step 3 also compares each closed part with those that it overlaps along x.
 
 use super::order::Triangle;
 use super::report::MeshReport;
@@ -92,6 +92,10 @@ impl Part {
         self.is_closed && self.is_orientable
     }
 
+    fn size_m(&self) -> f64 {
+        (self.high - self.low).sum()
+    }
+
     fn contains(&self, other: &Self) -> bool {
         (0..3).all(|i| self.low[i] < other.low[i] && other.high[i] < self.high[i])
     }
@@ -158,18 +162,18 @@ fn measure(states: &[State], triangles: &[Triangle], vertices: &[Vector3<f64>], 
     }
 }
 
+/// Sweeps along x; what may contain a part begins before it and has not ended. The largest of those that do is an
+/// outermost one: what contained that would contain the part too.
 fn turn_outward(parts: &mut [Part], report: &mut MeshReport) {
     let mut closed: Vec<usize> = (0..parts.len()).filter(|&i| parts[i].has_inside()).collect();
-    // What lies in a box comes after it. Stable, so parts of one size stay in spatial order.
-    let size = |i: usize| (parts[i].high - parts[i].low).sum();
-    closed.sort_by(|&i, &j| size(j).total_cmp(&size(i)));
-    let mut outermost: Vec<usize> = Vec::new();
+    closed.sort_by(|&i, &j| parts[i].low.x.total_cmp(&parts[j].low.x));
+    let mut begun: Vec<usize> = Vec::new();
     for i in closed {
-        let around = outermost.iter().copied().find(|&o| parts[o].contains(&parts[i]));
-        parts[i].is_inside_out = parts[around.unwrap_or(i)].volume < 0.0;
-        if around.is_none() {
-            outermost.push(i);
-        }
+        begun.retain(|&o| parts[o].high.x > parts[i].low.x);
+        let around = begun.iter().copied().filter(|&o| parts[o].contains(&parts[i]));
+        let outermost = around.max_by(|&o, &p| parts[o].size_m().total_cmp(&parts[p].size_m())).unwrap_or(i);
+        parts[i].is_inside_out = parts[outermost].volume < 0.0;
+        begun.push(i);
         let part = &parts[i];
         if part.is_inside_out {
             report.inside_out.note(part.first);
