@@ -221,18 +221,30 @@ fn on_edge(mesh: &Mesh, side: Side, edge: usize, share: f64) -> Place {
 
 /// Straight from where it was to the HIP through free space; `None` if nothing is in the way.
 ///
-/// The HIP is in front of all that meets here, so none of that is in the way; started a little off, rounding
-/// cannot say otherwise. On a face the neighbour behind a concave edge may be.
+/// The HIP is in front of all that meets here, so none of that is in the way, whatever rounding says. From a face the
+/// neighbour behind a concave edge may be: a start a little in front of the face is in front of that neighbour, too.
+#[cold]
 fn fly(mesh: &Mesh, place: &Place, hip_B: &Vector3<f64>) -> Option<Place> {
-    let from_B = match place.on {
-        On::Face(side) => {
-            let facet = Facet::of(mesh, side);
+    let (On::Face(side) | On::Edge(side, _) | On::Vertex(side, _)) = place.on;
+    let facet = Facet::of(mesh, side);
+    let vertices_of = |face: u32| mesh.faces[face as usize].vertices;
+    let hit = match place.on {
+        On::Face(_) => {
             let size_m = facet.edge_B(mesh, 0).1.norm();
-            place.point_B + facet.normal_B * (size_m * SNAP)
+            let from_B = place.point_B + facet.normal_B * (size_m * SNAP);
+            mesh.first_hit_of_others(&from_B, hip_B, |face| face == side.face)
         }
-        On::Edge(..) | On::Vertex(..) => place.point_B + (hip_B - place.point_B) * LIFT,
+        On::Edge(_, edge) => {
+            let ends = [edge, next(edge)].map(|corner| facet.face.vertices[corner]);
+            let has_both = |face| ends.iter().all(|end| vertices_of(face).contains(end));
+            mesh.first_hit_of_others(&place.point_B, hip_B, has_both)
+        }
+        On::Vertex(_, corner) => {
+            let tip = facet.face.vertices[corner];
+            mesh.first_hit_of_others(&place.point_B, hip_B, |face| vertices_of(face).contains(&tip))
+        }
     };
-    mesh.first_hit(&from_B, hip_B).map(|hit| Place::hit(&hit))
+    hit.map(|hit| Place::hit(&hit))
 }
 
 #[inline(always)]
@@ -276,5 +288,3 @@ fn view_from(
 const PARALLEL: f64 = 1e-10;
 /// Nearer to the end of an edge than this share of it is at the vertex.
 const SNAP: f64 = 1e-9;
-/// A god-object that lifts off an edge or a vertex flies from this share of its way on.
-const LIFT: f64 = 1e-6;
