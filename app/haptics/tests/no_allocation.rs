@@ -4,6 +4,7 @@
 mod common;
 
 use common::*;
+use haptics::mesh::{Mesh, make};
 use haptics::{Finger, Friction};
 use nalgebra::Vector3;
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -34,6 +35,28 @@ unsafe impl GlobalAlloc for Counting {
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
+
+#[test]
+fn a_step_on_a_mesh_never_allocates() {
+    let bumpy = std::sync::Arc::new(Mesh::build(make::bumpy_sphere(100, 51, 0.02)).unwrap().0);
+    let knot = std::sync::Arc::new(Mesh::build(make::klein_bottle(40, 20, 0.04)).unwrap().0);
+    let entities = [entity(bumpy, stiction()), entity(knot, Friction::coulomb(0.3).unwrap())];
+    let mut finger = Finger::new(0.0, entities.len()).unwrap();
+    let mut noise = Noise(10);
+    let (mut free, mut stuck, mut slid) = (0, 0, 0);
+    let before = CALLS.get();
+    for i in 0..100_000 {
+        let t = f64::from(i) * DT;
+        let hip = Vector3::new(0.025 * (2.0 * t).sin(), 0.025 * (3.0 * t).cos(), 0.01 * t.sin()) + noise.vector(1e-5);
+        match finger.step(&entities, &hip, DT).friction {
+            haptics::ContactState::Free => free += 1,
+            haptics::ContactState::Stick => stuck += 1,
+            haptics::ContactState::Slip => slid += 1,
+        }
+    }
+    assert_eq!(CALLS.get() - before, 0);
+    assert!(free > 1000 && stuck > 1000 && slid > 1000, "{free} {stuck} {slid}");
+}
 
 #[test]
 fn a_step_never_allocates() {
