@@ -255,6 +255,9 @@ fn feature_name(feature: Feature) -> &'static str {
     match feature {
         Feature::None => "none",
         Feature::Surface => "surface",
+        Feature::Face => "face",
+        Feature::Edge => "edge",
+        Feature::Vertex => "vertex",
     }
 }
 

@@ -23,10 +23,12 @@
 //! ```
 
 mod build;
+mod bvh;
 mod error;
 mod face;
 pub mod make;
 mod order;
+mod query;
 mod repair;
 mod report;
 mod sliver;
@@ -35,6 +37,7 @@ mod topology;
 mod touching;
 mod winding;
 
+pub use bvh::{Bvh, Hit, Nearest, Triangles};
 pub use error::MeshError;
 pub use face::{Face, Link};
 pub use report::{Finding, MeshReport};
@@ -50,6 +53,7 @@ pub const MAX_VALENCE: u32 = 16_384;
 pub struct Mesh {
     faces: Box<[Face]>,
     vertices: Box<[Vector3<f64>]>,
+    bvh: Bvh,
     sides: Sides,
     extent_m: f64,
 }

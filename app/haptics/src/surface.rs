@@ -19,6 +19,12 @@ pub enum Feature {
     None,
     /// A smooth surface.
     Surface,
+    /// A flat piece of a surface that has edges.
+    Face,
+    /// Where two pieces meet.
+    Edge,
+    /// Where edges meet.
+    Vertex,
 }
 
 /// A point of a surface and the outward unit normal there.

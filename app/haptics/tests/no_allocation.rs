@@ -4,6 +4,7 @@
 mod common;
 
 use common::*;
+use haptics::mesh::{Mesh, make};
 use haptics::{Finger, Friction};
 use nalgebra::Vector3;
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -57,4 +58,20 @@ fn a_step_never_allocates() {
     assert!(free > 1000 && stuck > 100 && slid > 1000 && both > 1000, "{free} {stuck} {slid} {both}");
     drop(vec![0u8; 16]);
     assert!(CALLS.get() > before, "the counter counts");
+}
+
+#[test]
+fn queries_of_a_mesh_never_allocate() {
+    let mesh = Mesh::build(make::bumpy_sphere(100, 50, 0.1)).unwrap().0;
+    let mut noise = Noise(10);
+    let (mut hits, mut inside) = (0, 0);
+    let before = CALLS.get();
+    for _ in 0..10_000 {
+        let (p, q) = (noise.vector(0.06), noise.vector(0.06));
+        hits += u32::from(mesh.first_hit(&p, &q).is_some());
+        inside += u32::from(mesh.is_inside(&p));
+        assert!(mesh.clearance(&p, 1.0) <= mesh.nearest(&p).distance_m);
+    }
+    assert_eq!(CALLS.get() - before, 0);
+    assert!(hits > 1000 && inside > 1000, "{hits} {inside}");
 }

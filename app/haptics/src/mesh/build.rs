@@ -13,7 +13,7 @@
 
 use super::order::Triangle;
 use super::repair::area_vector;
-use super::{Face, Link, Mesh, MeshError, MeshReport, TriangleSoup};
+use super::{Bvh, Face, Link, Mesh, MeshError, MeshReport, TriangleSoup};
 use super::{order, repair, topology, winding};
 use nalgebra::Vector3;
 
@@ -34,11 +34,13 @@ impl Mesh {
         report_edges(&triangles, &links, &mut report);
         let faces: Box<[Face]> =
             triangles.iter().zip(&links).map(|(triangle, links)| face(triangle, links, &vertices)).collect();
+        drop((triangles, links));
         report.faces = faces.len();
         report.vertices = vertices.len();
         let extent_m = vertices.iter().fold(0.0_f64, |extent, v| extent.max(v.amax()));
         let vertices = vertices.into_boxed_slice();
-        Ok((Self { faces, vertices, sides, extent_m }, report))
+        let bvh = Bvh::build(&faces, &vertices);
+        Ok((Self { faces, vertices, bvh, sides, extent_m }, report))
     }
 }
 
