@@ -8,25 +8,48 @@
 //! order of the input was.
 //!
 //! Frames and signs: object frame B; vertices run counter-clockwise seen from outside, normals leave the material.
+//!
+//! [`Mesh::build`] makes one of any [`TriangleSoup`], repairs what can be repaired and says so:
+//! ```
+//! use haptics::mesh::{Mesh, Sides, make};
+//!
+//! let mut soup = make::cuboid([0.1, 0.2, 0.3]);
+//! soup.faces[5].swap(1, 2);
+//! let (mesh, report) = Mesh::build(soup)?;
+//! assert_eq!(mesh.sides(), Sides::Solid);
+//! assert_eq!(report.flipped.first, Some(5));
+//! println!("{report}");
+//! # Ok::<(), haptics::mesh::MeshError>(())
+//! ```
 
 mod build;
 mod bvh;
+mod cone;
 mod error;
 mod face;
+mod facing;
+mod fan;
 pub mod make;
+mod mesh_cone;
 mod order;
+mod place;
 mod query;
 mod repair;
 mod report;
+mod sliver;
 mod soup;
 mod topology;
+mod touching;
+mod walk;
 mod winding;
 
 pub use bvh::{Bvh, Hit, Nearest, Triangles};
 pub use error::MeshError;
 pub use face::{Face, Link};
+pub use mesh_cone::{Beginning, MeshCone};
 pub use report::{Finding, MeshReport};
 pub use soup::TriangleSoup;
+pub use walk::MAX_FEATURE_CHANGES;
 
 use nalgebra::Vector3;
 use std::fmt;
