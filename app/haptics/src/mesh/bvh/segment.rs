@@ -124,8 +124,9 @@ impl Segment {
             return None;
         }
         let fraction = (before / (before - after)).clamp(0.0, 1.0);
-        // Behind the plane, or in it over the whole length: where the line meets the plane says nothing.
-        let is_vague = before <= 0.0 || before <= self.tolerance_m && after >= -self.tolerance_m;
+        // Behind the plane, not quite at it, or in it over the whole length: where the line meets it says nothing.
+        let is_vague =
+            before <= 0.0 || after > 0.0 || before <= self.tolerance_m && after >= -self.tolerance_m;
         let corners = triangles.corners(face);
         let is_met = if is_vague { self.touches(face, &corners, fraction) } else { line.meets(&corners) };
         is_met.then_some(Met { face: index, fraction, is_front })
