@@ -200,7 +200,7 @@ mod damped {
         let floor = Entity::new(Plane::new(Vector3::y(), 0.0).unwrap(), Isometry3::identity(), K);
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI);
         let finger = DeviceFinger {
-            finger: Finger::new(0.0, 1).unwrap(),
+            finger: Finger::new(0.0, 1).unwrap().with_ramp_in(0.0).unwrap(),
             device: 0,
             mount: Mount::new(Isometry3::from_parts(Vector3::zeros().into(), turn)),
         };
@@ -262,7 +262,7 @@ mod carried {
         let table = Entity::new(table, Isometry3::identity(), 1000.0).unwrap();
         let table = table.with_friction(Friction::Coulomb { mu: 2.0 }).unwrap();
         let finger = |device| DeviceFinger {
-            finger: Finger::new(0.0, 1).unwrap(),
+            finger: Finger::new(0.0, 1).unwrap().with_ramp_in(0.0).unwrap(),
             device,
             mount: Mount::placed(&layout.placement(device)),
         };
@@ -316,7 +316,7 @@ mod carried {
     #[test]
     fn a_finger_that_is_carried_into_a_damped_table_is_damped() {
         let (step, layout) = step_and_layout();
-        let damped = step.entities[0].with_damping(5.0).unwrap();
+        let damped = step.entities[0].clone().with_damping(5.0).unwrap();
         let mut step = FastStep::new(step.fingers, vec![damped], PERIOD_NS);
         step.meet_driver(MINOR_WITH_VELOCITIES);
         feel(&mut step, 1, ABOVE);

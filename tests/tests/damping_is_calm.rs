@@ -49,7 +49,7 @@ fn ripple(rate_hz: u64, knows_velocity: bool) -> (f64, f64) {
         let reading = arm.read(raw, TickTime { tick, period_ns, run_tick: 0 });
         let velocity = knows_velocity.then_some(reading.velocity_m_per_s);
         let hip = Hip { position_W: reading.position_m, velocity_W: velocity };
-        let force = finger.step(&[wall], hip, period_ns as f64 / 1e9).force_on_user_W.y;
+        let force = finger.step(std::slice::from_ref(&wall), hip, period_ns as f64 / 1e9).force_on_user_W.y;
         let spring = STIFFNESS * (DEPTH_M - reading.position_m.y);
         // Until the window is open.
         if tick > rate_hz * 30 / 1000 {
@@ -91,7 +91,7 @@ fn a_finger_that_presses_on_is_damped_as_its_speed_asks() {
         let reading =
             arm.read([0, -5 * tick, 0], TickTime { tick: tick as u64, period_ns: 1_000_000, run_tick: 0 });
         let hip = Hip { position_W: reading.position_m, velocity_W: Some(reading.velocity_m_per_s) };
-        let force = finger.step(&[wall], hip, 1e-3).force_on_user_W.y;
+        let force = finger.step(std::slice::from_ref(&wall), hip, 1e-3).force_on_user_W.y;
         let damper = force - STIFFNESS * (0.02 - reading.position_m.y);
         // The arc that the tip goes is level with its chord to the square of the angle, 0.07 rad.
         assert!(

@@ -1,9 +1,9 @@
 //! One finger against one entity: begins, updates and ends the contact.
 //!
-//! Model: a contact begins when the HIP is inside (on the surface counts) and lives until it is
-//! outside. It begins where the HIP's path entered, both ends taken through the pose the entity had
-//! at the time; a HIP that is inside without having entered (first tick, object placed over it)
-//! begins at the nearest surface point.
+//! Model: a contact begins where the HIP's path enters the material, both ends taken through the pose the entity had at
+//! the time: a moving entity must not sweep past a resting finger. It lives until the frictionless god-object is free:
+//! the HIP is outside, and was not pressed right through a thin part. A HIP that is inside without having entered
+//! (first tick, entity placed over it) begins at the nearest surface point, with the force ramped in.
 //!
 //! Frames: in and out in W; the god-object lives in B and so travels with the entity.
 //! Invariant: whatever is not finite ends the contact with zero force.
@@ -11,12 +11,14 @@
 
 use nalgebra::Vector3;
 
+use crate::algorithm::{Algorithm, ContactMemory, Touch, TouchInput};
 use crate::entity::Entity;
 use crate::frame::{is_finite, point_into_body, point_into_world, vector_into_body, vector_into_world};
-use crate::friction_cone::{ConeForce, ConeInput, FrictionCone};
+use crate::friction_cone::{ConeInput, FrictionCone};
 use crate::friction_law::FrictionState;
+use crate::mesh::{Beginning, Mesh, MeshCone};
 use crate::shape::Shape;
-use crate::surface::{Feature, Surface, SurfacePoint};
+use crate::surface::{Feature, Surface};
 
 /// What a finger feels of one entity in one tick, in the world frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,6 +59,7 @@ pub(crate) struct Sweep {
     /// If it is known better than by the difference of the two.
     pub(crate) hip_velocity_W: Option<Vector3<f64>>,
     pub(crate) finger_radius_m: f64,
+    pub(crate) ramp_in_s: f64,
     pub(crate) dt_s: f64,
 }
 
@@ -64,50 +67,123 @@ pub(crate) struct Sweep {
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Slot {
     cone: Option<FrictionCone>,
+    mesh: MeshCone,
+    own: ContactMemory,
+    /// How much of the force is rendered, 0 to 1.
+    strength: f64,
     pub(crate) contact: Option<Contact>,
 }
 
+/// A contact that begins inside reaches its whole force after this time \[s\]: slow enough that no hand is thrown, and
+/// shorter than the driver's own ramp, so that a run's first tick is not weaker than its last.
+pub const RAMP_IN_S: f64 = 0.1;
+
 impl Slot {
-    pub(crate) fn step(&mut self, index: usize, entity: &Entity, sweep: &Sweep) -> Option<Contact> {
+    pub(crate) fn step(&mut self, index: usize, entity: &Entity, sweep: &Sweep) -> Option<&Contact> {
         self.contact = self.touch(index, entity, sweep);
         if self.contact.is_none() {
             self.cone = None;
+            self.mesh.let_go();
         }
-        self.contact
+        self.contact.as_ref()
     }
 
     fn touch(&mut self, index: usize, entity: &Entity, sweep: &Sweep) -> Option<Contact> {
         let hip_B = point_into_body(&entity.X_WB, &sweep.hip_W);
+        if !is_finite(&hip_B) {
+            return None;
+        }
         let previous_B = sweep.previous_hip_W.map(|p_W| point_into_body(&entity.previous_X_WB, &p_W));
         let previous_B = previous_B.filter(is_finite);
-        let surface = entity.shape.grown(sweep.finger_radius_m);
-        // Not a number is outside, too.
-        if !is_finite(&hip_B) || surface.signed_distance(&hip_B).is_nan() {
-            return None;
-        }
-        if surface.signed_distance(&hip_B) > 0.0 {
-            return None;
-        }
-        let input = ConeInput {
+        let cone = ConeInput {
             hip_B,
             hip_velocity_B: hip_velocity(entity, hip_B, previous_B, sweep),
             stiffness_n_per_m: entity.stiffness_n_per_m,
             damping_n_s_per_m: entity.damping_n_s_per_m,
             dt_s: sweep.dt_s,
         };
-        let begin = || FrictionCone::new(begin(&surface, previous_B, &hip_B));
-        let cone = self.cone.get_or_insert_with(begin);
-        let force = cone.update(&surface, &entity.friction, &input);
-        let contact = in_world(index, entity, cone, &force);
-        let usable = is_finite(&contact.force_on_user_W) && is_finite(&contact.god_object_W);
-        usable.then_some(contact)
+        let input = TouchInput {
+            shape: &entity.shape,
+            friction: &entity.friction,
+            finger_radius_m: sweep.finger_radius_m,
+            previous_hip_B: previous_B,
+            cone,
+        };
+        let mut touch = match &entity.algorithm {
+            Algorithm::FrictionCone => self.touch_shape(&input),
+            Algorithm::Own(algorithm) => {
+                self.strength = 1.0;
+                algorithm.touch(&input, &mut self.own)
+            }
+        }?;
+        self.ramp(&mut touch, sweep);
+        in_world(index, entity, &touch)
     }
-}
 
-/// Where a contact begins.
-fn begin(surface: &Shape, previous_B: Option<Vector3<f64>>, hip_B: &Vector3<f64>) -> SurfacePoint {
-    let entered = previous_B.and_then(|previous_B| surface.entry(&previous_B, hip_B));
-    entered.unwrap_or_else(|| surface.nearest(hip_B))
+    fn touch_shape(&mut self, input: &TouchInput<'_>) -> Option<Touch> {
+        match input.shape {
+            Shape::Form(form) if input.finger_radius_m == 0.0 => self.touch_surface(form, input),
+            Shape::Form(form) => self.touch_surface(&form.grown(input.finger_radius_m)?, input),
+            Shape::Own(surface) if input.finger_radius_m == 0.0 => self.touch_surface(&**surface, input),
+            Shape::Mesh(mesh) if input.finger_radius_m == 0.0 => self.touch_mesh(mesh, input),
+            Shape::Mesh(_) | Shape::Own(_) => None,
+        }
+    }
+
+    fn touch_mesh(&mut self, mesh: &Mesh, input: &TouchInput<'_>) -> Option<Touch> {
+        let was_touching = self.mesh.is_touching();
+        let (force, beginning) = self.mesh.update(mesh, input.friction, input.previous_hip_B, &input.cone)?;
+        if !was_touching {
+            self.strength = if beginning == Beginning::WasInside { 0.0 } else { 1.0 };
+        }
+        Some(Touch {
+            god_object: self.mesh.god_object()?,
+            force_on_user_B: force.force_on_user_B,
+            normal_force_n: force.normal_force_n,
+            friction: self.mesh.state(),
+        })
+    }
+
+    fn touch_surface<S: Surface + ?Sized>(&mut self, surface: &S, input: &TouchInput<'_>) -> Option<Touch> {
+        let distance_m = surface.signed_distance(&input.cone.hip_B);
+        let cone = match &mut self.cone {
+            Some(cone) => cone,
+            None => {
+                let entry = |from_B| surface.entry(&from_B, &input.cone.hip_B);
+                let entered = input.previous_hip_B.and_then(entry);
+                if entered.is_none() && (distance_m > 0.0 || distance_m.is_nan()) {
+                    return None;
+                }
+                self.strength = if entered.is_some() { 1.0 } else { 0.0 };
+                let at = entered.unwrap_or_else(|| surface.nearest(&input.cone.hip_B));
+                self.cone.insert(FrictionCone::new(at))
+            }
+        };
+        // Not a number is outside, too.
+        let is_inside = distance_m <= 0.0;
+        if !is_inside && !cone.is_held_back(surface, &input.cone) {
+            return None;
+        }
+        let force = cone.update(surface, input.friction, &input.cone);
+        Some(Touch {
+            god_object: *cone.god_object(),
+            force_on_user_B: force.force_on_user_B,
+            normal_force_n: force.normal_force_n,
+            friction: cone.state(),
+        })
+    }
+
+    /// A contact that began inside comes on slowly.
+    fn ramp(&mut self, touch: &mut Touch, sweep: &Sweep) {
+        if self.strength >= 1.0 {
+            return;
+        }
+        let step = sweep.dt_s / sweep.ramp_in_s;
+        // Where time is unknown or no ramp wanted, there is none.
+        self.strength = if step > 0.0 { (self.strength + step).min(1.0) } else { 1.0 };
+        touch.force_on_user_B *= self.strength;
+        touch.normal_force_n *= self.strength;
+    }
 }
 
 /// Seen from the entity, so that a finger riding along on a moving one is not damped.
@@ -133,15 +209,16 @@ fn hip_velocity(
     difference_B + vector_into_body(&entity.X_WB, &correction_W)
 }
 
-fn in_world(entity_index: usize, entity: &Entity, cone: &FrictionCone, force: &ConeForce) -> Contact {
-    let god_object = cone.god_object();
-    Contact {
+fn in_world(entity_index: usize, entity: &Entity, touch: &Touch) -> Option<Contact> {
+    let god_object = &touch.god_object;
+    let contact = Contact {
         entity: entity_index,
-        force_on_user_W: vector_into_world(&entity.X_WB, &force.force_on_user_B),
-        normal_force_n: force.normal_force_n,
+        force_on_user_W: vector_into_world(&entity.X_WB, &touch.force_on_user_B),
+        normal_force_n: touch.normal_force_n,
         god_object_W: point_into_world(&entity.X_WB, &god_object.point_B),
         normal_W: vector_into_world(&entity.X_WB, &god_object.normal_B),
         feature: god_object.feature,
-        friction: cone.state(),
-    }
+        friction: touch.friction,
+    };
+    (is_finite(&contact.force_on_user_W) && is_finite(&contact.god_object_W)).then_some(contact)
 }

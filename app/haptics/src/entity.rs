@@ -2,12 +2,13 @@
 
 use nalgebra::Isometry3;
 
+use crate::algorithm::Algorithm;
 use crate::error::{ParameterError, above_zero, at_least_zero};
 use crate::friction::Friction;
 use crate::shape::Shape;
 
 /// An object that fingers can touch.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Entity {
     /// Its shape, in its own frame B.
     pub shape: Shape,
@@ -22,6 +23,8 @@ pub struct Entity {
     pub damping_n_s_per_m: f64,
     /// Friction of its surface.
     pub friction: Friction,
+    /// How contacts with it are rendered.
+    pub algorithm: Algorithm,
 }
 
 impl Entity {
@@ -40,6 +43,7 @@ impl Entity {
             stiffness_n_per_m: above_zero("stiffness_n_per_m", stiffness_n_per_m)?,
             damping_n_s_per_m: 0.0,
             friction: Friction::None,
+            algorithm: Algorithm::FrictionCone,
         })
     }
 
@@ -52,6 +56,11 @@ impl Entity {
     pub fn with_damping(self, damping_n_s_per_m: f64) -> Result<Self, ParameterError> {
         let damping_n_s_per_m = at_least_zero("damping_n_s_per_m", damping_n_s_per_m)?;
         Ok(Self { damping_n_s_per_m, ..self })
+    }
+
+    /// Rendered by this algorithm.
+    pub fn with_algorithm(self, algorithm: Algorithm) -> Self {
+        Self { algorithm, ..self }
     }
 
     /// One tick on: the current pose becomes the previous one.

@@ -11,7 +11,7 @@
 
 use nalgebra::Vector3;
 
-use crate::contact::{Contact, Slot, Sweep};
+use crate::contact::{Contact, RAMP_IN_S, Slot, Sweep};
 use crate::entity::Entity;
 use crate::error::{ParameterError, at_least_zero};
 use crate::frame::is_finite;
@@ -23,6 +23,7 @@ use crate::surface::Feature;
 #[derive(Debug, Clone)]
 pub struct Finger {
     radius_m: f64,
+    ramp_in_s: f64,
     previous_hip_W: Option<Vector3<f64>>,
     last_finite_hip_W: Vector3<f64>,
     slots: Box<[Slot]>,
@@ -71,10 +72,18 @@ impl Finger {
     pub fn new(radius_m: f64, capacity: usize) -> Result<Self, ParameterError> {
         Ok(Self {
             radius_m: at_least_zero("radius_m", radius_m)?,
+            ramp_in_s: RAMP_IN_S,
             previous_hip_W: None,
             last_finite_hip_W: Vector3::zeros(),
             slots: vec![Slot::default(); capacity].into(),
         })
+    }
+
+    /// With another ramp for contacts that begin inside than [`RAMP_IN_S`]; 0 for none.
+    ///
+    /// Errors: a time not finite or negative.
+    pub fn with_ramp_in(self, ramp_in_s: f64) -> Result<Self, ParameterError> {
+        Ok(Self { ramp_in_s: at_least_zero("ramp_in_s", ramp_in_s)?, ..self })
     }
 
     /// Radius \[m\].
@@ -113,6 +122,7 @@ impl Finger {
             hip_W: *hip_W,
             hip_velocity_W,
             finger_radius_m: self.radius_m,
+            ramp_in_s: self.ramp_in_s,
             dt_s,
         };
         self.previous_hip_W = Some(*hip_W);
@@ -127,7 +137,7 @@ impl Finger {
         for slot in self.slots.iter_mut().skip(entities.len()) {
             *slot = Slot::default();
         }
-        total.output(hip_W)
+        total.output(&self.slots, hip_W)
     }
 
     /// The contacts of the last tick, in order of their entities.
@@ -158,20 +168,22 @@ impl Finger {
 #[derive(Default)]
 struct Total {
     force_on_user_W: Vector3<f64>,
-    primary: Option<Contact>,
+    /// Square of the largest force, and whose it is.
+    primary: Option<(f64, usize)>,
 }
 
 impl Total {
-    fn add(&mut self, contact: Contact) {
+    fn add(&mut self, contact: &Contact) {
         self.force_on_user_W += contact.force_on_user_W;
-        let is_larger = |than: &Contact| contact.force_on_user_W.norm() > than.force_on_user_W.norm();
-        if self.primary.as_ref().is_none_or(is_larger) {
-            self.primary = Some(contact);
+        let force = contact.force_on_user_W.norm_squared();
+        if self.primary.is_none_or(|(largest, _)| force > largest) {
+            self.primary = Some((force, contact.entity));
         }
     }
 
-    fn output(&self, hip_W: &Vector3<f64>) -> FingerOutput {
-        let Some(primary) = &self.primary else { return free(*hip_W) };
+    fn output(&self, slots: &[Slot], hip_W: &Vector3<f64>) -> FingerOutput {
+        let primary = self.primary.and_then(|(_, entity)| slots[entity].contact.as_ref());
+        let Some(primary) = primary else { return free(*hip_W) };
         // Finite forces can overflow in the sum; zero is the safe one.
         let force_on_user_W =
             if is_finite(&self.force_on_user_W) { self.force_on_user_W } else { Vector3::zeros() };

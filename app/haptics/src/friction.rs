@@ -19,7 +19,9 @@
 //! tick. Cost: a few flops; no state.
 
 use crate::error::{ParameterError, at_least_zero};
-use crate::friction_law::{FrictionLaw, FrictionQuery, FrictionState};
+use crate::friction_law::{FrictionLaw, FrictionMemory, FrictionQuery, FrictionState};
+use crate::shared::Shared;
+use std::sync::Arc;
 
 /// How far below the dynamic friction circle a sliding contact must relax before it sticks again,
 /// as a fraction (the epsilon of Melder eq. 7.35).
@@ -30,7 +32,7 @@ use crate::friction_law::{FrictionLaw, FrictionQuery, FrictionState};
 pub const RESTICK_MARGIN: f64 = 0.02;
 
 /// Friction of an entity. The constructors refuse parameters outside their range.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub enum Friction {
     /// No friction: the classic god-object.
     #[default]
@@ -59,7 +61,14 @@ pub enum Friction {
         /// Viscous coefficient \[s/m\], >= 0.
         mu_v_s_per_m: f64,
     },
+    /// Somebody's own law.
+    Own(Shared<dyn OwnLaw>),
 }
+
+/// A [`FrictionLaw`] that an entity can share between threads.
+pub trait OwnLaw: FrictionLaw + std::fmt::Debug + Send + Sync {}
+
+impl<L: FrictionLaw + std::fmt::Debug + Send + Sync> OwnLaw for L {}
 
 impl Friction {
     /// Coulomb friction. Errors: `mu` not finite or negative.
@@ -82,22 +91,28 @@ impl Friction {
         Self::CoulombViscous { mu, mu_v_s_per_m }.validated()
     }
 
+    /// Somebody's own law.
+    pub fn own(law: impl OwnLaw + 'static) -> Self {
+        let law: Arc<dyn OwnLaw> = Arc::new(law);
+        Self::Own(law.into())
+    }
+
     /// The same friction, if its parameters are in range; for values built without a constructor.
     pub fn validated(self) -> Result<Self, ParameterError> {
-        match self {
-            Self::None => {}
-            Self::Coulomb { mu } => _ = at_least_zero("mu", mu)?,
+        match &self {
+            Self::None | Self::Own(_) => {}
+            Self::Coulomb { mu } => _ = at_least_zero("mu", *mu)?,
             Self::Stiction { mu_s, mu_d } => {
-                at_least_zero("mu_s", mu_s)?;
-                at_least_zero("mu_d", mu_d)?;
+                at_least_zero("mu_s", *mu_s)?;
+                at_least_zero("mu_d", *mu_d)?;
                 if mu_s < mu_d {
-                    return Err(ParameterError::StaticBelowDynamic { mu_s, mu_d });
+                    return Err(ParameterError::StaticBelowDynamic { mu_s: *mu_s, mu_d: *mu_d });
                 }
             }
-            Self::Viscous { mu_v_s_per_m } => _ = at_least_zero("mu_v_s_per_m", mu_v_s_per_m)?,
+            Self::Viscous { mu_v_s_per_m } => _ = at_least_zero("mu_v_s_per_m", *mu_v_s_per_m)?,
             Self::CoulombViscous { mu, mu_v_s_per_m } => {
-                at_least_zero("mu", mu)?;
-                at_least_zero("mu_v_s_per_m", mu_v_s_per_m)?;
+                at_least_zero("mu", *mu)?;
+                at_least_zero("mu_v_s_per_m", *mu_v_s_per_m)?;
             }
         }
         Ok(self)
@@ -106,7 +121,7 @@ impl Friction {
     /// (mu_s, mu_d, mu_v), of which every variant is a special case.
     fn coefficients(&self) -> (f64, f64, f64) {
         match *self {
-            Self::None => (0.0, 0.0, 0.0),
+            Self::None | Self::Own(_) => (0.0, 0.0, 0.0),
             Self::Coulomb { mu } => (mu, mu, 0.0),
             Self::Stiction { mu_s, mu_d } => (mu_s, mu_d, 0.0),
             Self::Viscous { mu_v_s_per_m } => (0.0, 0.0, mu_v_s_per_m),
@@ -116,7 +131,10 @@ impl Friction {
 }
 
 impl FrictionLaw for Friction {
-    fn holds(&self, query: &FrictionQuery) -> bool {
+    fn holds(&self, query: &FrictionQuery, memory: &mut FrictionMemory) -> bool {
+        if let Self::Own(law) = self {
+            return law.holds(query, memory);
+        }
         let (mu_s, mu_d, _) = self.coefficients();
         match (self, query.state) {
             (Self::Stiction { .. }, FrictionState::Slip) => caught_again(query, mu_d),
@@ -127,7 +145,10 @@ impl FrictionLaw for Friction {
         }
     }
 
-    fn slide(&self, query: &FrictionQuery) -> f64 {
+    fn slide(&self, query: &FrictionQuery, memory: &FrictionMemory) -> f64 {
+        if let Self::Own(law) = self {
+            return law.slide(query, memory);
+        }
         let (_, mu_d, mu_v) = self.coefficients();
         let coulomb_slide = query.gap_m - mu_d * query.load_m;
         if mu_v == 0.0 || query.dt_s.is_nan() || query.dt_s <= 0.0 {
@@ -139,13 +160,16 @@ impl FrictionLaw for Friction {
         (coulomb_slide - load_per_travel * query.travel_m) / (1.0 + load_per_travel)
     }
 
-    fn ratio_limit(&self, state: FrictionState, speed_m_s: f64) -> f64 {
-        let (mu_s, mu_d, mu_v) = self.coefficients();
-        //= melder#4.1
-        match state {
-            FrictionState::Stick => mu_s,
-            FrictionState::Slip => mu_d + mu_v * speed_m_s,
+    fn held_limit_m(&self, query: &FrictionQuery) -> f64 {
+        if let Self::Own(law) = self {
+            return law.held_limit_m(query);
         }
+        //= melder#4.1
+        self.coefficients().0 * query.load_m
+    }
+
+    fn drag_m(&self, query: &FrictionQuery, memory: &FrictionMemory) -> f64 {
+        if let Self::Own(law) = self { law.drag_m(query, memory) } else { 0.0 }
     }
 }
 
@@ -169,6 +193,10 @@ mod tests {
         FrictionQuery { state, gap_m, load_m: LOAD, dt_s: 1e-3, ..Default::default() }
     }
 
+    fn holds(law: &Friction, query: FrictionQuery) -> bool {
+        law.holds(&query, &mut FrictionMemory::default())
+    }
+
     #[test]
     fn constructors_refuse_what_no_material_has() {
         for bad in [-1e-9, f64::NAN, f64::INFINITY] {
@@ -188,8 +216,8 @@ mod tests {
     //= melder#4.2 type=test
     fn the_friction_circle_is_mu_times_the_load() {
         let law = Friction::coulomb(0.5).unwrap();
-        assert!(law.holds(&query(FrictionState::Stick, 0.5 * LOAD)));
-        assert!(!law.holds(&query(FrictionState::Stick, 0.5 * LOAD * (1.0 + 1e-15))));
+        assert!(holds(&law, query(FrictionState::Stick, 0.5 * LOAD)));
+        assert!(!holds(&law, query(FrictionState::Stick, 0.5 * LOAD * (1.0 + 1e-15))));
     }
 
     #[test]
@@ -199,22 +227,25 @@ mod tests {
     fn a_sliding_contact_sticks_again_only_clearly_inside_the_dynamic_circle() {
         let law = Friction::stiction(0.7, 0.3).unwrap();
         let rim = 0.3 * LOAD;
-        assert!(law.holds(&query(FrictionState::Slip, 0.979 * rim)));
-        assert!(!law.holds(&query(FrictionState::Slip, 0.981 * rim)));
-        assert!(law.slide(&query(FrictionState::Slip, 0.981 * rim)) < 0.0, "inside, hence unmoved");
-        assert!(law.holds(&query(FrictionState::Stick, 0.7 * LOAD)), "held, it bears the static limit");
+        assert!(holds(&law, query(FrictionState::Slip, 0.979 * rim)));
+        assert!(!holds(&law, query(FrictionState::Slip, 0.981 * rim)));
+        assert!(
+            law.slide(&query(FrictionState::Slip, 0.981 * rim), &FrictionMemory::default()) < 0.0,
+            "inside, hence unmoved"
+        );
+        assert!(holds(&law, query(FrictionState::Stick, 0.7 * LOAD)), "held, it bears the static limit");
     }
 
     #[test]
     fn small_coefficients_stick_again_too() {
         let law = Friction::stiction(1e-4, 1e-5).unwrap();
-        assert!(law.holds(&query(FrictionState::Slip, 0.9e-5 * LOAD)));
+        assert!(holds(&law, query(FrictionState::Slip, 0.9e-5 * LOAD)));
     }
 
     #[test]
     fn without_friction_nothing_holds() {
         for law in [Friction::None, Friction::coulomb(0.0).unwrap(), Friction::viscous(2.0).unwrap()] {
-            assert!(!law.holds(&query(FrictionState::Stick, 0.0)));
+            assert!(!holds(&law, query(FrictionState::Stick, 0.0)));
         }
     }
 
@@ -224,7 +255,7 @@ mod tests {
         for mu_v in [1e-3, 1.0, 1e3, 1e6] {
             let law = Friction::coulomb_viscous(0.3, mu_v).unwrap();
             let asked = FrictionQuery { travel_m: 2e-5, ..query(FrictionState::Slip, 4e-3) };
-            let x = law.slide(&asked);
+            let x = law.slide(&asked, &FrictionMemory::default());
             let left = 4e-3 - x;
             let right = LOAD * (0.3 + mu_v * (2e-5 + x) / 1e-3);
             // The subtraction of two terms of size mu_v L m / dt leaves their rounding.

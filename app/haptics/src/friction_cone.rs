@@ -21,22 +21,24 @@
 
 use nalgebra::Vector3;
 
-use crate::friction_law::{FrictionLaw, FrictionQuery, FrictionState};
+use crate::friction::Friction;
+use crate::friction_law::{FrictionLaw, FrictionMemory, FrictionState};
+use crate::grip::{Grip, Pull};
 use crate::slide::slide;
 use crate::surface::{Surface, SurfacePoint};
-use crate::tangent_view::{TangentView, tangential};
+use crate::tangent_view::TangentView;
 
 /// State of one contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrictionCone {
     god_object: SurfacePoint,
-    state: FrictionState,
+    grip: Grip,
 }
 
 /// What a contact is told in one tick, in the object's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConeInput {
-    /// HIP \[m\], inside the surface.
+    /// HIP \[m\], inside the surface or pressed right through it.
     pub hip_B: Vector3<f64>,
     /// Velocity of the HIP relative to the object \[m/s\]; used by damping only.
     pub hip_velocity_B: Vector3<f64>,
@@ -78,7 +80,7 @@ impl ConeForce {
 impl FrictionCone {
     /// A contact that begins at a surface point, and holds there if its law lets it.
     pub fn new(entry: SurfacePoint) -> Self {
-        Self { god_object: entry, state: FrictionState::Stick }
+        Self { god_object: entry, grip: Grip::default() }
     }
 
     /// Where the god-object is, with the outward normal there.
@@ -88,57 +90,46 @@ impl FrictionCone {
 
     /// Whether it holds or slides.
     pub fn state(&self) -> FrictionState {
-        self.state
+        self.grip.state
     }
 
-    /// One tick with the HIP inside the surface; the caller ends the contact when it leaves.
+    /// One tick with the HIP held back by the surface; the caller ends the contact when it is free.
     pub fn update<S: Surface + ?Sized, L: FrictionLaw + ?Sized>(
         &mut self,
         surface: &S,
         friction: &L,
         input: &ConeInput,
     ) -> ConeForce {
-        let view = TangentView::new(surface, &self.god_object, input);
-        if friction.holds(&self.hold_query(&view, input.dt_s)) {
-            self.state = FrictionState::Stick;
-            let limit_m = friction.ratio_limit(FrictionState::Stick, 0.0) * view.load_m;
-            return answer(&view, &stuck_tangential(&view, limit_m, input), 0, input);
+        let view = TangentView::of(surface, &self.god_object, input);
+        let pull = self.grip.begin_tick(&view, input);
+        if let Some(tangential_B) = self.grip.hold(friction, &view, &pull, input) {
+            return answer(&view, &tangential_B, 0, input);
         }
-        // Breakaway and first slide share the tick: the static coefficient is never slid with.
-        self.state = FrictionState::Slip;
-        let slid = slide(surface, friction, input, &mut self.god_object, view);
-        answer(&slid.view, &slid.tangential_B, slid.rounds, input)
+        let slid = slide(surface, friction, &mut self.god_object, view, &self.grip.memory, &pull, input);
+        let drag_B = self.grip.drag(friction, &slid.view, &pull, input);
+        answer(&slid.view, &(slid.tangential_B + drag_B), slid.rounds, input)
     }
 
-    /// A slide ends within `rest_m` of the rim. Asked to the last bit, a resting finger would
-    /// change between stick and slip with the rounding, so the question forgives as much.
-    fn hold_query(&self, view: &TangentView, dt_s: f64) -> FrictionQuery {
-        FrictionQuery {
-            state: self.state,
-            gap_m: (view.gap_m - view.rest_m).max(0.0),
-            load_m: view.load_m,
-            travel_m: 0.0,
-            dt_s,
-        }
+    /// Whether a HIP outside the material is still held back, because it was pressed right through.
+    ///
+    /// The frictionless god-object decides, since it is the nearest that a finger could come to the
+    /// HIP: friction must not hold a finger that is round the corner.
+    pub fn is_held_back<S: Surface + ?Sized>(&self, surface: &S, input: &ConeInput) -> bool {
+        let mut god_object = self.god_object;
+        let view = TangentView::of(surface, &god_object, input);
+        let (memory, pull) = (FrictionMemory::default(), Pull::default());
+        let slid = slide(surface, &Friction::None, &mut god_object, view, &memory, &pull, input);
+        slid.view.depth_m > 0.0 && surface.holds_outside(&god_object, slid.view.depth_m)
     }
 }
 
-/// Spring and damper of a held contact, cut to the cone.
-fn stuck_tangential(view: &TangentView, limit_m: f64, input: &ConeInput) -> Vector3<f64> {
-    if input.damping_n_s_per_m == 0.0 {
-        return cut_to(view.lag_B, limit_m);
-    }
-    let velocity_B = tangential(&input.hip_velocity_B, &view.normal_B);
-    cut_to(view.lag_B - velocity_B * input.damping_s(), limit_m)
-}
-
-/// `v`, shortened to `limit` if it is longer.
-fn cut_to(v: Vector3<f64>, limit: f64) -> Vector3<f64> {
-    let length = v.norm();
-    if length > limit { v * (limit / length) } else { v }
-}
-
-fn answer(view: &TangentView, tangential_B: &Vector3<f64>, rounds: u32, input: &ConeInput) -> ConeForce {
+#[inline]
+pub(crate) fn answer(
+    view: &TangentView,
+    tangential_B: &Vector3<f64>,
+    rounds: u32,
+    input: &ConeInput,
+) -> ConeForce {
     let k = input.stiffness_n_per_m;
     // Corrected: of the user on the object the printed sign is right, the device renders this.
     //= melder#4.7

@@ -10,7 +10,8 @@
 //! behind the surface point. A slide is positive towards it.
 //!
 //! Invariants a law keeps: finite answers for finite queries; no memory of its own, so that one law
-//! serves any number of contacts.
+//! serves any number of contacts. What it has to remember of a contact it keeps in that contact's
+//! [`FrictionMemory`].
 
 /// Whether a contact holds or slides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -35,23 +36,54 @@ pub struct FrictionQuery {
     pub travel_m: f64,
     /// Length of the tick \[s\]; not positive when unknown, and then speeds count as zero.
     pub dt_s: f64,
+    /// How far the HIP has moved along the tangent plane since the last tick \[m\], >= 0.
+    pub hip_travel_m: f64,
+    /// Stiffness of the contact \[N/m\], > 0: for models in newtons.
+    pub stiffness_n_per_m: f64,
 }
+
+impl FrictionQuery {
+    /// Speed of the HIP along the tangent plane \[m/s\]; zero where time is unknown.
+    pub fn hip_speed_m_s(&self) -> f64 {
+        if self.dt_s > 0.0 { self.hip_travel_m / self.dt_s } else { 0.0 }
+    }
+}
+
+/// What a law remembers of one contact: as many numbers as the hungriest model needs, all zero when
+/// the contact begins.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct FrictionMemory {
+    /// Whatever the law makes of them.
+    pub words: [f64; MEMORY_WORDS],
+}
+
+/// Numbers in a [`FrictionMemory`].
+pub const MEMORY_WORDS: usize = 24;
 
 /// A friction model: implement it to plug in your own.
 pub trait FrictionLaw {
     /// Does the god-object stay where it is? `true` ends the tick in [`FrictionState::Stick`].
-    fn holds(&self, query: &FrictionQuery) -> bool;
+    ///
+    /// Asked first and exactly once in a tick, so that this is the place to go on in `memory`.
+    fn holds(&self, query: &FrictionQuery, memory: &mut FrictionMemory) -> bool;
 
     /// How far the god-object still has to move towards the surface point \[m\].
     ///
-    /// Implicit in the tick: the answer `m` satisfies
+    /// Implicit in the tick: the answer `m` of a model with a curve satisfies
     /// `gap - m = load * mu((travel + m) / dt)`. Negative when the god-object has gone too far; a
     /// negative answer *before* it moved means that it lies inside the friction circle, and it then
     /// stays, still in slip. A curve that falls with speed has several roots: document the choice.
-    fn slide(&self, query: &FrictionQuery) -> f64;
+    fn slide(&self, query: &FrictionQuery, memory: &FrictionMemory) -> f64;
 
-    /// The largest ratio of tangential to normal force in this state at this speed \[m/s\].
+    /// Radius of the circle within which the god-object is held \[m\]: while the contact sticks, it
+    /// bounds spring and damping together.
+    fn held_limit_m(&self, query: &FrictionQuery) -> f64;
+
+    /// What is felt beside the spring, against the motion of the HIP \[m of spring\].
     ///
-    /// In [`FrictionState::Stick`] it bounds spring and damping together.
-    fn ratio_limit(&self, state: FrictionState, speed_m_s: f64) -> f64;
+    /// For models whose force depends on the speed in a way that no place of the god-object shows.
+    fn drag_m(&self, query: &FrictionQuery, memory: &FrictionMemory) -> f64 {
+        let _ = (query, memory);
+        0.0
+    }
 }

@@ -29,6 +29,7 @@
 // Names carry their frame (`hip_B`, `X_WB`), which is worth more here than the case lint.
 #![allow(non_snake_case)]
 
+mod algorithm;
 mod classic;
 mod contact;
 mod entity;
@@ -38,26 +39,30 @@ mod frame;
 mod friction;
 mod friction_cone;
 mod friction_law;
+mod grip;
 mod hip;
 pub mod mesh;
 mod plane;
 mod shape;
+mod shared;
 mod slide;
 mod sphere;
 mod surface;
 mod tangent_view;
 
+pub use algorithm::{Algorithm, CONTACT_WORDS, ContactAlgorithm, ContactMemory, Touch, TouchInput};
 pub use classic::classic_god_object;
-pub use contact::Contact;
+pub use contact::{Contact, RAMP_IN_S};
 pub use entity::Entity;
 pub use error::ParameterError;
 pub use finger::{ContactState, Finger, FingerOutput};
-pub use friction::{Friction, RESTICK_MARGIN};
+pub use friction::{Friction, OwnLaw, RESTICK_MARGIN};
 pub use friction_cone::{ConeForce, ConeInput, FrictionCone};
-pub use friction_law::{FrictionLaw, FrictionQuery, FrictionState};
+pub use friction_law::{FrictionLaw, FrictionMemory, FrictionQuery, FrictionState, MEMORY_WORDS};
 pub use hip::Hip;
 pub use plane::Plane;
-pub use shape::Shape;
+pub use shape::{Form, OwnSurface, Shape};
+pub use shared::Shared;
 pub use slide::MAX_SLIDE_ROUNDS;
 pub use sphere::Sphere;
 pub use surface::{Feature, Surface, SurfacePoint};

@@ -24,10 +24,15 @@
 
 mod build;
 mod bvh;
+mod cone;
 mod error;
 mod face;
+mod facing;
+mod fan;
 pub mod make;
+mod mesh_cone;
 mod order;
+mod place;
 mod query;
 mod repair;
 mod report;
@@ -35,13 +40,16 @@ mod sliver;
 mod soup;
 mod topology;
 mod touching;
+mod walk;
 mod winding;
 
 pub use bvh::{Bvh, Hit, Nearest, Triangles};
 pub use error::MeshError;
 pub use face::{Face, Link};
+pub use mesh_cone::{Beginning, MeshCone};
 pub use report::{Finding, MeshReport};
 pub use soup::TriangleSoup;
+pub use walk::MAX_FEATURE_CHANGES;
 
 use nalgebra::Vector3;
 use std::fmt;

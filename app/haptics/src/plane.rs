@@ -40,7 +40,7 @@ impl Plane {
     }
 
     fn at(&self, point_B: Vector3<f64>) -> SurfacePoint {
-        SurfacePoint { point_B, normal_B: self.normal_B, feature: Feature::Surface }
+        SurfacePoint { point_B, normal_B: self.normal_B, feature: Feature::Surface, piece: 0 }
     }
 }
 
@@ -80,8 +80,8 @@ impl Surface for Plane {
         self.offset_m
     }
 
-    fn grown(&self, radius_m: f64) -> Self {
-        Self { offset_m: self.offset_m + radius_m, ..*self }
+    fn grown(&self, radius_m: f64) -> Option<Self> {
+        Some(Self { offset_m: self.offset_m + radius_m, ..*self })
     }
 }
 
@@ -142,6 +142,6 @@ mod tests {
 
     #[test]
     fn a_ball_touches_a_plane_one_radius_earlier() {
-        assert_eq!(table().grown(0.01).signed_distance(&Vector3::new(0.0, 0.11, 0.0)), 0.0);
+        assert_eq!(table().grown(0.01).unwrap().signed_distance(&Vector3::new(0.0, 0.11, 0.0)), 0.0);
     }
 }

@@ -1,66 +1,106 @@
-//! The closed set of shapes an entity can have, dispatched without indirection.
+//! What an entity is shaped like: a closed form, a mesh, or somebody's own surface.
 //!
-//! Own shapes go through [`crate::FrictionCone`] directly, which takes any [`Surface`].
+//! Shapes are cheap to clone: what is large is shared.
+
+use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use crate::mesh::Mesh;
 use crate::plane::Plane;
+use crate::shared::Shared;
 use crate::sphere::Sphere;
 use crate::surface::{Surface, SurfacePoint};
 
 /// Shape of an entity, in the entity's frame B.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
+    /// A surface with a closed form.
+    Form(Form),
+    /// Triangles.
+    Mesh(Shared<Mesh>),
+    /// Somebody's own surface.
+    Own(Shared<dyn OwnSurface>),
+}
+
+/// A [`Surface`] that an entity can share between threads.
+pub trait OwnSurface: Surface + std::fmt::Debug + Send + Sync {}
+
+impl<S: Surface + std::fmt::Debug + Send + Sync> OwnSurface for S {}
+
+/// The closed forms, dispatched without indirection.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Form {
     /// A half-space.
     Plane(Plane),
     /// A ball around B's origin.
     Sphere(Sphere),
 }
 
-impl From<Plane> for Shape {
-    fn from(plane: Plane) -> Self {
-        Self::Plane(plane)
+impl Shape {
+    /// Somebody's own surface.
+    pub fn own(surface: impl OwnSurface + 'static) -> Self {
+        let surface: Arc<dyn OwnSurface> = Arc::new(surface);
+        Self::Own(surface.into())
+    }
+
+    /// Whether a finger of this radius can feel it: every shape is felt by points, some by balls.
+    pub fn is_felt_by(&self, finger_radius_m: f64) -> bool {
+        finger_radius_m == 0.0 || matches!(self, Self::Form(form) if form.grown(finger_radius_m).is_some())
     }
 }
 
-impl From<Sphere> for Shape {
-    fn from(sphere: Sphere) -> Self {
-        Self::Sphere(sphere)
+impl From<Arc<Mesh>> for Shape {
+    fn from(mesh: Arc<Mesh>) -> Self {
+        Self::Mesh(mesh.into())
     }
 }
 
-/// Asks whichever shape it is.
-macro_rules! ask {
-    ($shape:expr, $inner:ident => $answer:expr) => {
-        match $shape {
-            Shape::Plane($inner) => $answer,
-            Shape::Sphere($inner) => $answer,
+impl<F: Into<Form>> From<F> for Shape {
+    fn from(form: F) -> Self {
+        Self::Form(form.into())
+    }
+}
+
+/// Lists the closed forms once: how each becomes a [`Form`], and how a form asks whichever it is.
+macro_rules! forms {
+    ($($form:ident),*) => {
+        $(impl From<$form> for Form {
+            fn from(form: $form) -> Self {
+                Self::$form(form)
+            }
+        })*
+
+        impl Surface for Form {
+            fn signed_distance(&self, point_B: &Vector3<f64>) -> f64 {
+                match self { $(Self::$form(form) => form.signed_distance(point_B)),* }
+            }
+
+            fn nearest(&self, point_B: &Vector3<f64>) -> SurfacePoint {
+                match self { $(Self::$form(form) => form.nearest(point_B)),* }
+            }
+
+            fn entry(&self, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<SurfacePoint> {
+                match self { $(Self::$form(form) => form.entry(from_B, to_B)),* }
+            }
+
+            fn settle(&self, from: &SurfacePoint, on_tangent_plane_B: &Vector3<f64>) -> SurfacePoint {
+                match self { $(Self::$form(form) => form.settle(from, on_tangent_plane_B)),* }
+            }
+
+            fn tangent_offset(&self, at: &SurfacePoint) -> f64 {
+                match self { $(Self::$form(form) => form.tangent_offset(at)),* }
+            }
+
+            fn holds_outside(&self, at: &SurfacePoint, depth_m: f64) -> bool {
+                match self { $(Self::$form(form) => form.holds_outside(at, depth_m)),* }
+            }
+
+            fn grown(&self, radius_m: f64) -> Option<Self> {
+                match self { $(Self::$form(form) => form.grown(radius_m).map(Self::$form)),* }
+            }
         }
     };
 }
 
-impl Surface for Shape {
-    fn signed_distance(&self, point_B: &Vector3<f64>) -> f64 {
-        ask!(self, shape => shape.signed_distance(point_B))
-    }
-
-    fn nearest(&self, point_B: &Vector3<f64>) -> SurfacePoint {
-        ask!(self, shape => shape.nearest(point_B))
-    }
-
-    fn entry(&self, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<SurfacePoint> {
-        ask!(self, shape => shape.entry(from_B, to_B))
-    }
-
-    fn settle(&self, from: &SurfacePoint, on_tangent_plane_B: &Vector3<f64>) -> SurfacePoint {
-        ask!(self, shape => shape.settle(from, on_tangent_plane_B))
-    }
-
-    fn tangent_offset(&self, at: &SurfacePoint) -> f64 {
-        ask!(self, shape => shape.tangent_offset(at))
-    }
-
-    fn grown(&self, radius_m: f64) -> Self {
-        ask!(self, shape => shape.grown(radius_m).into())
-    }
-}
+forms!(Plane, Sphere);

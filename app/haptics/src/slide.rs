@@ -21,7 +21,8 @@
 use nalgebra::Vector3;
 
 use crate::friction_cone::ConeInput;
-use crate::friction_law::{FrictionLaw, FrictionQuery, FrictionState};
+use crate::friction_law::{FrictionLaw, FrictionMemory, FrictionQuery, FrictionState};
+use crate::grip::{Pull, query};
 use crate::surface::{Surface, SurfacePoint};
 use crate::tangent_view::TangentView;
 
@@ -41,21 +42,37 @@ pub(crate) struct Slid {
 pub(crate) fn slide<S: Surface + ?Sized, L: FrictionLaw + ?Sized>(
     surface: &S,
     friction: &L,
-    input: &ConeInput,
     god_object: &mut SurfacePoint,
     view: TangentView,
+    memory: &FrictionMemory,
+    pull: &Pull,
+    input: &ConeInput,
 ) -> Slid {
     let start_B = god_object.point_B;
-    let mut round = Round::new(view, &Vector3::zeros(), friction, &start_B, god_object, input);
+    let look = |view, direction_before_B: &Vector3<f64>, god_object: &SurfacePoint| {
+        let asked = |query: &_| friction.slide(query, memory);
+        Round::new(view, direction_before_B, asked, &(start_B - god_object.point_B), pull, input)
+    };
+    let mut round = look(view, &Vector3::zeros(), god_object);
     if round.is_inside_the_circle() {
         return Slid { view, tangential_B: view.lag_B, rounds: 0 };
     }
     let mut secant = Secant::default();
     for rounds in 1..=MAX_SLIDE_ROUNDS {
         let step_m = secant.step(round.asked_m, round.view.depth_m);
+        let piece_before = god_object.piece;
         *god_object = surface.settle(god_object, &round.target_B(step_m));
-        let view = TangentView::new(surface, god_object, input);
-        round = Round::new(view, &round.direction_B, friction, &start_B, god_object, input);
+        let view = TangentView::of(surface, god_object, input);
+        if god_object.piece != piece_before {
+            // Over an edge: nothing seen on the piece before says anything about this one.
+            secant = Secant::default();
+            round = look(view, &Vector3::zeros(), god_object);
+            if round.is_inside_the_circle() {
+                return Slid { view, tangential_B: view.lag_B, rounds };
+            }
+            continue;
+        }
+        round = look(view, &round.direction_B, god_object);
         if round.asked_m.is_nan() || round.asked_m.abs() <= view.rest_m {
             return round.finished(rounds);
         }
@@ -74,26 +91,20 @@ struct Round {
 }
 
 impl Round {
-    fn new<L: FrictionLaw + ?Sized>(
+    /// `back_B` leads from the god-object to where it was when the tick began.
+    fn new(
         view: TangentView,
         direction_before_B: &Vector3<f64>,
-        friction: &L,
-        start_B: &Vector3<f64>,
-        god_object: &SurfacePoint,
+        asked: impl Fn(&FrictionQuery) -> f64,
+        back_B: &Vector3<f64>,
+        pull: &Pull,
         input: &ConeInput,
     ) -> Self {
         let (direction_B, gap_m) = view.signed_gap(direction_before_B);
-        let back_B = start_B - god_object.point_B;
         // The chord, since that is what two recorded positions over dt show as speed.
         let travel_m = back_B.norm().copysign(back_B.dot(&direction_B));
-        let query = FrictionQuery {
-            state: FrictionState::Slip,
-            gap_m,
-            load_m: view.load_m,
-            travel_m,
-            dt_s: input.dt_s,
-        };
-        Self { view, direction_B, gap_m, asked_m: friction.slide(&query) }
+        let query = query(FrictionState::Slip, gap_m, travel_m, &view, pull, input);
+        Self { view, direction_B, gap_m, asked_m: asked(&query) }
     }
 
     /// In slip, but nothing to slide: it stays, and stays in slip until the law catches it.

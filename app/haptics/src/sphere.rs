@@ -45,23 +45,24 @@ impl Surface for Sphere {
         let normal_B = direction_or_up(point_B);
         //= melder#4.14
         //= melder#7.7
-        SurfacePoint { point_B: normal_B * self.radius_m, normal_B, feature: Feature::Surface }
+        SurfacePoint { point_B: normal_B * self.radius_m, normal_B, feature: Feature::Surface, piece: 0 }
     }
 
     fn entry(&self, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<SurfacePoint> {
         let (before, after) = (self.signed_distance(from_B), self.signed_distance(to_B));
-        if !(before > 0.0 && after <= 0.0) {
-            return None;
-        }
         let path = to_B - from_B;
         // |from + u path|^2 = r^2 for the nearer root, in the form that cancels least: the cross
         // product is the path's distance from the centre, times its length.
         let half_b = -from_B.dot(&path);
         let c = before * (from_B.norm() + self.radius_m);
         let reach_squared = path.norm_squared() * (self.radius_m * self.radius_m);
-        let root = (reach_squared - from_B.cross(&path).norm_squared()).max(0.0).sqrt();
-        let fraction = (c / (half_b + root)).min(1.0);
-        Some(self.nearest(&(from_B + path * fraction)))
+        let discriminant = reach_squared - from_B.cross(&path).norm_squared();
+        let fraction = c / (half_b + discriminant.max(0.0).sqrt());
+        let passes_through = discriminant > 0.0 && (0.0..=1.0).contains(&fraction);
+        if !(before > 0.0 && (after <= 0.0 || passes_through)) {
+            return None;
+        }
+        Some(self.nearest(&(from_B + path * fraction.min(1.0))))
     }
 
     fn settle(&self, _from: &SurfacePoint, on_tangent_plane_B: &Vector3<f64>) -> SurfacePoint {
@@ -75,8 +76,8 @@ impl Surface for Sphere {
         self.radius_m
     }
 
-    fn grown(&self, radius_m: f64) -> Self {
-        Self { radius_m: self.radius_m + radius_m }
+    fn grown(&self, radius_m: f64) -> Option<Self> {
+        Some(Self { radius_m: self.radius_m + radius_m })
     }
 }
 
@@ -125,8 +126,13 @@ mod tests {
     }
 
     #[test]
-    fn a_path_straight_through_is_no_entry() {
-        assert!(ball().entry(&Vector3::new(-0.2, 0.0, 0.0), &Vector3::new(0.2, 0.0, 0.0)).is_none());
+    fn a_path_straight_through_enters_on_the_near_side_and_one_beside_it_does_not() {
+        let (from, to) = (Vector3::new(-0.2, 0.0, 0.0), Vector3::new(0.2, 0.0, 0.0));
+        let entry = ball().entry(&from, &to).unwrap();
+        assert_eq!((entry.point_B, entry.normal_B), (Vector3::new(-0.1, 0.0, 0.0), -Vector3::x()));
+        let aside = Vector3::new(0.0, 0.1001, 0.0);
+        assert!(ball().entry(&(from + aside), &(to + aside)).is_none());
+        assert!(ball().entry(&to, &(to + to)).is_none(), "it leads away");
     }
 
     #[test]

@@ -34,8 +34,10 @@ pub struct SurfacePoint {
     pub point_B: Vector3<f64>,
     /// Outward unit normal in the object's frame.
     pub normal_B: Vector3<f64>,
-    /// The piece of the surface it lies on.
+    /// What kind of piece it lies on.
     pub feature: Feature,
+    /// Which of the surface's smooth pieces: 0 where there is only one.
+    pub piece: u32,
 }
 
 /// A surface that fingers can touch: implement it to plug in your own.
@@ -46,18 +48,18 @@ pub trait Surface {
     /// The surface point nearest to a point on either side.
     fn nearest(&self, point_B: &Vector3<f64>) -> SurfacePoint;
 
-    /// Where the segment `from_B -> to_B` enters the material, if it ends there.
+    /// Where the segment `from_B -> to_B` first enters the material.
     ///
-    /// Entry means `d(from) > 0 >= d(to)`: a tick that lands exactly on the surface counts (the
-    /// printed strict product of Melder eq. 7.21 misses it). A segment that passes right through
-    /// and ends outside is *not* an entry: a contact lives only while the HIP is inside, so such a
-    /// contact would end in the very tick in which it began, and its spring would span the whole
-    /// object. Whoever needs it felt must tick faster than the object is thin.
+    /// Entering means from `d > 0` to `d <= 0`: a segment that ends exactly on the surface counts
+    /// (the printed strict product of Melder eq. 7.21 misses it), and so does one that passes right
+    /// through. Whether the contact outlives such a tick is what [`Self::holds_outside`] tells.
     fn entry(&self, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<SurfacePoint>;
 
     /// Brings a god-object that left `from` along its tangent plane back onto the surface.
     ///
-    /// `from` lets surfaces of many pieces start their walk where the god-object was.
+    /// `from` lets surfaces of many pieces start their walk where the god-object was. A god-object
+    /// that went over an edge comes to lie *on* the edge, with the normal and the `piece` of the
+    /// one beyond: from there its slide starts anew.
     fn settle(&self, from: &SurfacePoint, on_tangent_plane_B: &Vector3<f64>) -> SurfacePoint;
 
     /// Offset of the tangent plane at a surface point, `normal . x <= offset` being inside \[m\].
@@ -68,9 +70,20 @@ pub trait Surface {
         at.normal_B.dot(&at.point_B)
     }
 
+    /// Whether a frictionless god-object that came to rest `at` stays there although the HIP,
+    /// `depth_m` below its tangent plane, is outside the material: pressed right through.
+    ///
+    /// True where `at` is a local minimum of the distance to the HIP: on flat pieces always, so that
+    /// nobody is pushed through a thin plate; on a ball never, since a HIP beyond it lies deeper
+    /// than the centre. What answers `false` lets go of every HIP that is outside.
+    fn holds_outside(&self, at: &SurfacePoint, depth_m: f64) -> bool {
+        let _ = (at, depth_m);
+        false
+    }
+
     /// The surface on which the centre of a ball of radius `radius_m` rolls: a spherical finger
-    /// touches this shape as its centre touches the grown one.
-    fn grown(&self, radius_m: f64) -> Self
+    /// touches this shape as its centre touches the grown one. `None` where that is not available.
+    fn grown(&self, radius_m: f64) -> Option<Self>
     where
         Self: Sized;
 }

@@ -133,9 +133,10 @@ fn a_hit_lies_on_its_face_and_on_the_segment() {
             let normal = mesh.faces()[hit.face as usize].normal_B;
             let scale = mesh.extent_m() + from.amax() + to.amax();
             // Ericson's regions are differences of products: on the plate's flanks, 200 times as long as high, they
-            // lose three digits.
+            // lose three digits, on slivers all.
+            let tolerance = if name == "slivers" { 1e-10 } else { 1e-12 };
             let off = (oracle::closest(&corners, &hit.point_B) - hit.point_B).norm();
-            assert!(off <= 1e-12 * scale, "{name}: {hit:?} {off}");
+            assert!(off <= tolerance * scale, "{name}: {hit:?} {off}");
             // Where the segment meets a plane under a small angle, roundings move the place along it.
             let slope = normal.dot(&(to - from).normalize()).abs();
             let on_segment = from + (to - from) * hit.fraction;

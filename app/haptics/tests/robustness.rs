@@ -5,8 +5,8 @@ mod common;
 
 use common::*;
 use haptics::{
-    ConeInput, ContactState, Entity, Finger, Friction, FrictionCone, FrictionState, MAX_SLIDE_ROUNDS, Plane,
-    Shape, Sphere, Surface,
+    ConeInput, ContactState, Entity, Finger, Form, Friction, FrictionCone, FrictionState, MAX_SLIDE_ROUNDS,
+    Plane, Sphere, Surface,
 };
 use nalgebra::{Isometry3, Vector3};
 use proptest::prelude::*;
@@ -23,12 +23,12 @@ fn any_friction() -> impl Strategy<Value = Friction> {
     ]
 }
 
-fn any_shape() -> impl Strategy<Value = Shape> {
+fn any_shape() -> impl Strategy<Value = Form> {
     prop_oneof![
         (0.001..0.2f64).prop_map(|r| Sphere::new(r).unwrap().into()),
         (prop::array::uniform3(-1.0..1.0f64), -0.05..0.05f64)
             .prop_filter_map("a direction", |(n, offset)| Plane::new(Vector3::from(n), offset).ok())
-            .prop_map(Shape::from),
+            .prop_map(Form::from),
     ]
 }
 
@@ -51,13 +51,13 @@ proptest! {
         turn in prop::array::uniform3(-3.0..3.0f64), seed: u64, step in -5.0..-1.0f64,
     ) {
         let X_WB = Isometry3::new(Vector3::new(0.01, -0.02, 0.03), Vector3::from(turn));
-        let entity = Entity { X_WB, previous_X_WB: X_WB, friction, damping_n_s_per_m: damping, ..entity(shape, friction) };
+        let entity = Entity { X_WB, previous_X_WB: X_WB, friction: friction.clone(), damping_n_s_per_m: damping, ..entity(shape, friction.clone()) };
         let mut finger = point_finger();
         let mut noise = Noise(seed);
         let mut hip = X_WB.translation.vector;
         for _ in 0..300 {
             hip += noise.vector(10f64.powf(step));
-            let out = finger.step(&[entity], &hip, DT);
+            let out = finger.step(&[entity.clone()], &hip, DT);
             let Some(contact) = finger.contact(0) else { continue };
             prop_assert!(contact.normal_force_n >= 0.0);
             let normal_force = out.force_on_user_W.dot(&contact.normal_W);
@@ -102,7 +102,7 @@ proptest! {
         let mut entity = Entity { stiffness_n_per_m: k, damping_n_s_per_m: b, ..entity(shape, friction) };
         let mut finger = Finger::new(r, 2).unwrap();
         for hip in hips {
-            let out = finger.step(&[entity, entity], &Vector3::from(hip), dt);
+            let out = finger.step(&[entity.clone(), entity.clone()], &Vector3::from(hip), dt);
             prop_assert!(out.force_on_user_W.iter().all(|x| x.is_finite()), "{out:?}");
             prop_assert!(out.god_object_W.iter().all(|x| x.is_finite()), "{out:?}");
             entity.move_to(Isometry3::translation(shift[0], shift[1], shift[2]));
@@ -141,10 +141,10 @@ fn a_pose_that_is_not_finite_is_not_felt() {
     let mut entity = table(stiction());
     let mut finger = point_finger();
     entity.move_to(Isometry3::translation(0.0, f64::NAN, 0.0));
-    let out = finger.step(&[entity], &Vector3::new(0.0, -DEPTH, 0.0), DT);
+    let out = finger.step(&[entity.clone()], &Vector3::new(0.0, -DEPTH, 0.0), DT);
     assert_eq!((out.entity, out.force_on_user_W), (None, Vector3::zeros()));
     entity.move_to(Isometry3::identity());
-    let out = finger.step(&[entity], &Vector3::new(0.0, -DEPTH, 0.0), DT);
+    let out = finger.step(&[entity.clone()], &Vector3::new(0.0, -DEPTH, 0.0), DT);
     assert_eq!(out.force_on_user_W.y, K * DEPTH);
 }
 
@@ -161,6 +161,6 @@ fn entities_beyond_the_capacity_are_not_felt() {
 fn forces_that_overflow_in_their_sum_become_zero() {
     let wall = Entity { stiffness_n_per_m: 1e308, ..table(Friction::None) };
     let hip = Vector3::new(0.0, -1.5, 0.0);
-    assert_eq!(point_finger().step(&[wall], &hip, DT).force_on_user_W.y, 1.5e308);
-    assert_eq!(point_finger().step(&[wall, wall], &hip, DT).force_on_user_W, Vector3::zeros());
+    assert_eq!(point_finger().step(&[wall.clone()], &hip, DT).force_on_user_W.y, 1.5e308);
+    assert_eq!(point_finger().step(&[wall.clone(), wall], &hip, DT).force_on_user_W, Vector3::zeros());
 }

@@ -39,7 +39,7 @@ fn it_breaks_away_within_one_tick_of_the_static_limit() {
     let tick = 1e-5; // rad: 1 mm/s
     for i in 0.. {
         let phi = f64::from(i) * tick;
-        let out = finger.step(&[entity], &on_circle(RHO, phi), DT);
+        let out = finger.step(&[entity.clone()], &on_circle(RHO, phi), DT);
         if out.friction == ContactState::Slip {
             assert!(phi > limit && phi - limit <= tick, "slipped at {phi}, limit {limit}");
             break;
@@ -58,7 +58,7 @@ fn sliding_it_bears_the_dynamic_coefficient() {
     let mut slips = 0;
     for i in 0..7000 {
         let phi = f64::from(i) * 1e-3; // 0.1 m/s
-        let out = finger.step(&[entity], &on_circle(RHO, phi), DT);
+        let out = finger.step(&[entity.clone()], &on_circle(RHO, phi), DT);
         if out.friction != ContactState::Slip {
             continue;
         }
@@ -103,9 +103,9 @@ fn a_held_god_object_rides_out_any_motion_within_the_cone() {
     let mut finger = point_finger();
     let reach = sphere_lag(0.5, R, RHO).unwrap() * 0.999;
     let mut noise = Noise(3);
-    finger.step(&[entity], &on_circle(RHO, 0.0), DT);
+    finger.step(&[entity.clone()], &on_circle(RHO, 0.0), DT);
     for _ in 0..10_000 {
-        let out = finger.step(&[entity], &on_circle(RHO, noise.between(-reach, reach)), DT);
+        let out = finger.step(&[entity.clone()], &on_circle(RHO, noise.between(-reach, reach)), DT);
         assert_eq!(out.god_object_W, Vector3::new(0.0, R, 0.0));
         assert_eq!(out.friction, ContactState::Stick);
     }
@@ -118,7 +118,7 @@ fn a_frictionless_slide_around_the_sphere_costs_no_work() {
     let (mut work, mut before) = (0.0, None);
     for i in 0..=6284 {
         let hip = on_circle(RHO, f64::from(i) * 1e-3);
-        let out = finger.step(&[entity], &hip, DT);
+        let out = finger.step(&[entity.clone()], &hip, DT);
         // No drag at all: the force is radial at the god-object.
         let off_axis = out.force_on_user_W.cross(&out.god_object_W).norm() / R;
         assert!(off_axis < 1e-15 * K * DEPTH * 10.0, "{off_axis}");
@@ -136,14 +136,14 @@ fn a_frictionless_slide_around_the_sphere_costs_no_work() {
 fn at_the_centre_the_god_object_is_on_top_and_then_stays_held() {
     let entity = ball(R, Friction::coulomb(0.5).unwrap());
     let mut finger = point_finger();
-    let out = finger.step(&[entity], &Vector3::zeros(), DT);
+    let out = finger.step(&[entity.clone()], &Vector3::zeros(), DT);
     assert_eq!(out.god_object_W, Vector3::new(0.0, R, 0.0));
     assert_eq!(out.force_on_user_W, Vector3::new(0.0, K * R, 0.0));
     // Within rho < r sin(atan mu) no god-object can leave the cone, wherever the HIP goes.
     let mut noise = Noise(4);
     for _ in 0..1000 {
         let hip = on_circle(0.99 * R * 0.5f64.atan().sin(), noise.between(-3.2, 3.2));
-        let out = finger.step(&[entity], &hip, DT);
+        let out = finger.step(&[entity.clone()], &hip, DT);
         assert_eq!((out.god_object_W, out.friction), (Vector3::new(0.0, R, 0.0), ContactState::Stick));
     }
 }
@@ -152,8 +152,8 @@ fn at_the_centre_the_god_object_is_on_top_and_then_stays_held() {
 fn a_tiny_ball_passed_in_one_tick_is_not_felt() {
     let entity = ball(1e-4, stiction());
     let mut finger = point_finger();
-    finger.step(&[entity], &Vector3::new(-1e-3, 0.0, 0.0), DT);
-    assert_eq!(finger.step(&[entity], &Vector3::new(1e-3, 0.0, 0.0), DT).entity, None);
+    finger.step(&[entity.clone()], &Vector3::new(-1e-3, 0.0, 0.0), DT);
+    assert_eq!(finger.step(&[entity.clone()], &Vector3::new(1e-3, 0.0, 0.0), DT).entity, None);
 }
 
 /// From a god-object `phi` behind a HIP at `rho`, one tick; (angle left, rounds, state).

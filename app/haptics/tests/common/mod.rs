@@ -29,7 +29,12 @@ pub(crate) fn entity(shape: impl Into<Shape>, friction: Friction) -> Entity {
 }
 
 pub(crate) fn point_finger() -> Finger {
-    Finger::new(0.0, 4).unwrap()
+    finger(0.0)
+}
+
+/// A finger that feels the whole force at once, also where it starts inside.
+pub(crate) fn finger(radius_m: f64) -> Finger {
+    Finger::new(radius_m, 4).unwrap().with_ramp_in(0.0).unwrap()
 }
 
 /// |F_t| / F_n for a contact with this outward normal.

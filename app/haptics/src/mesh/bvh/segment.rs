@@ -11,7 +11,8 @@
 //!
 //! A finger that came to lie inside by rounding must be caught by its next step. So a start up to a tolerance
 //! behind a face's plane counts as outside; there no line can tell through which face it went, but only one that is
-//! as close as the tolerance is meant, hence that is what is asked.
+//! as close as the tolerance is meant, hence that is what is asked. An end up to the tolerance in front counts as
+//! met: no finger is free where rounding could put it on either side of a sheet.
 //!
 //! Cost: a segment that ends far from the mesh or its box visits a few nodes; no bound holds for every segment.
 
@@ -46,6 +47,18 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
         from_B: &Vector3<f64>,
         to_B: &Vector3<f64>,
     ) -> Option<Hit> {
+        self.first_hit_of_others(triangles, sides, from_B, to_B, |_| false)
+    }
+
+    /// As [`Self::first_hit`], of the faces that `is_skipped` does not name.
+    pub fn first_hit_of_others(
+        &self,
+        triangles: Triangles<'_>,
+        sides: Sides,
+        from_B: &Vector3<f64>,
+        to_B: &Vector3<f64>,
+        is_skipped: impl Fn(u32) -> bool,
+    ) -> Option<Hit> {
         let segment = Segment::new(from_B, to_B, sides, self.extent_m());
         let clipped = Clipped::new(&segment, &self.lower_B, &self.upper_B)?;
         let line = Line::new(segment.path, clipped.end);
@@ -64,6 +77,9 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
             }
             for index in child.index()..child.index() + child.count() {
                 let Some(met) = segment.meets(triangles, index as u32, &line) else { continue };
+                if is_skipped(met.face) {
+                    continue;
+                }
                 if best.is_none_or(|best| (met.fraction, met.face) < (best.fraction, best.face)) {
                     best = Some(met);
                     limit = clipped.fraction(met.fraction);
@@ -104,12 +120,13 @@ impl Segment {
         if !is_front && self.sides == Sides::Sheet {
             (before, after) = (-before, -after);
         }
-        if !(before >= -self.tolerance_m && after < before && after <= 0.0) {
+        if !(before >= -self.tolerance_m && after < before && after <= self.tolerance_m) {
             return None;
         }
         let fraction = (before / (before - after)).clamp(0.0, 1.0);
-        // Behind the plane, or in it over the whole length: where the line meets the plane says nothing.
-        let is_vague = before <= 0.0 || before <= self.tolerance_m && after >= -self.tolerance_m;
+        // Behind the plane, not quite at it, or in it over the whole length: where the line meets it says nothing.
+        let is_vague =
+            before <= 0.0 || after > 0.0 || before <= self.tolerance_m && after >= -self.tolerance_m;
         let corners = triangles.corners(face);
         let is_met = if is_vague { self.touches(face, &corners, fraction) } else { line.meets(&corners) };
         is_met.then_some(Met { face: index, fraction, is_front })
