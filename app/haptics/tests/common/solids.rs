@@ -14,8 +14,8 @@ pub(crate) struct Solid {
     /// Within this distance of the origin in every coordinate \[m\].
     pub(crate) size_m: f64,
     /// Radius of the ring from which every surface point can be seen; 0 for a star-shaped solid.
-    ring_m: f64,
-    factors: Vector3<f64>,
+    pub(crate) ring_m: f64,
+    pub(crate) factors: Vector3<f64>,
 }
 
 impl Solid {
