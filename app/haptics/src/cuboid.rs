@@ -117,3 +117,66 @@ impl Surface for Cuboid {
         None
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn brick() -> Cuboid {
+        Cuboid::new([0.2, 0.1, 0.06]).unwrap()
+    }
+
+    #[test]
+    fn sizes_must_be_positive() {
+        for bad in [0.0, -0.1, f64::NAN, f64::INFINITY] {
+            assert!(Cuboid::new([0.1, bad, 0.1]).is_err());
+        }
+        assert_eq!(brick().size_m(), [0.2, 0.1, 0.06]);
+    }
+
+    #[test]
+    fn depth_is_that_below_the_nearest_face_and_at_the_centre_of_a_cube_that_is_the_top() {
+        let at = brick().nearest(&Vector3::new(-0.09, 0.02, 0.01));
+        assert_eq!(at.point_B, Vector3::new(-0.1, 0.02, 0.01));
+        assert_eq!((at.normal_B, at.piece, at.feature), (-Vector3::x(), 3, Feature::Face));
+        // One subtraction of numbers of 0.1.
+        assert!((brick().signed_distance(&Vector3::new(-0.09, 0.02, 0.01)) + 0.01).abs() < 1e-17);
+        assert_eq!(Cuboid::new([0.1; 3]).unwrap().nearest(&Vector3::zeros()).normal_B, Vector3::y());
+    }
+
+    #[test]
+    fn a_path_enters_through_the_face_it_meets_first_and_leaving_is_no_entry() {
+        let (above, below) = (Vector3::new(0.01, 0.15, 0.0), Vector3::new(0.01, -0.15, 0.0));
+        let down = brick().entry(&above, &below).unwrap();
+        assert_eq!((down.point_B, down.normal_B), (Vector3::new(0.01, 0.05, 0.0), Vector3::y()));
+        let up = brick().entry(&below, &above).unwrap();
+        assert_eq!((up.point_B, up.normal_B), (Vector3::new(0.01, -0.05, 0.0), -Vector3::y()));
+        assert!(brick().entry(&Vector3::zeros(), &above).is_none());
+        let beside = Vector3::new(0.1001, 0.0, 0.0);
+        assert!(brick().entry(&(above + beside), &(below + beside)).is_none());
+        // Over a corner: x reaches 0.1 at 1/3 of the way, y 0.05 at 1/2.
+        let corner = brick().entry(&Vector3::new(0.12, 0.07, 0.0), &Vector3::new(0.06, 0.03, 0.0)).unwrap();
+        assert_eq!((corner.normal_B, corner.point_B.y), (Vector3::y(), 0.05));
+        assert!((corner.point_B.x - 0.09).abs() < 1e-16, "two roundings of 0.1");
+    }
+
+    #[test]
+    fn landing_exactly_on_a_face_is_an_entry() {
+        let on = Vector3::new(0.0, 0.05, 0.0);
+        assert_eq!(brick().entry(&Vector3::new(0.0, 0.06, 0.0), &on).unwrap().point_B, on);
+        assert!(brick().entry(&on, &Vector3::zeros()).is_none(), "it was in contact already");
+    }
+
+    #[test]
+    fn over_an_edge_the_face_beyond_takes_over_where_the_path_crosses_it() {
+        let from = brick().nearest(&Vector3::new(0.08, 0.049, 0.0));
+        let over = brick().settle(&from, &Vector3::new(0.12, 0.05, 0.02));
+        assert_eq!(over.normal_B, Vector3::x());
+        assert!((over.point_B - Vector3::new(0.1, 0.05, 0.01)).norm() < 1e-16, "{over:?}");
+        // Beyond a corner the edge met first counts.
+        let corner = brick().settle(&from, &Vector3::new(0.12, 0.05, 0.09));
+        assert_eq!(corner.normal_B, Vector3::z());
+        let stays = brick().settle(&from, &Vector3::new(0.1, 0.05, 0.03));
+        assert_eq!((stays.normal_B, stays.point_B), (Vector3::y(), Vector3::new(0.1, 0.05, 0.03)));
+    }
+}

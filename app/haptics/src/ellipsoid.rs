@@ -161,3 +161,71 @@ impl Surface for Ellipsoid {
         None
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lozenge() -> Ellipsoid {
+        Ellipsoid::new([0.05, 0.02, 0.03]).unwrap()
+    }
+
+    #[test]
+    fn radii_must_be_positive_and_not_too_different() {
+        for bad in [0.0, -0.1, f64::NAN, f64::INFINITY, 0.1e-7] {
+            assert!(Ellipsoid::new([0.05, bad, 0.05]).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn of_equal_radii_it_is_a_ball() {
+        let ball = Ellipsoid::new([0.1; 3]).unwrap();
+        let at = ball.nearest(&Vector3::new(0.03, 0.0, -0.04));
+        assert!((at.point_B - Vector3::new(0.06, 0.0, -0.08)).norm() < 1e-16);
+        assert!((at.normal_B - Vector3::new(0.6, 0.0, -0.8)).norm() < 1e-15);
+        assert_eq!(ball.nearest(&Vector3::zeros()).normal_B, Vector3::y());
+    }
+
+    #[test]
+    fn on_an_axis_the_nearest_point_is_the_end_beyond_the_centre_of_curvature_and_beside_it_before() {
+        // The centre of curvature of the end of the longest axis lies at a - c^2 / a = 0.042.
+        let end = lozenge().nearest(&Vector3::new(0.043, 0.0, 0.0));
+        assert_eq!(end.point_B, Vector3::new(0.05, 0.0, 0.0));
+        // Nearer to the middle: x = a^2 p / (a^2 - c^2), on the positive side.
+        let side = lozenge().nearest(&Vector3::new(0.021, 0.0, 0.0));
+        let x = 0.0025 * 0.021 / 0.0021;
+        let expected = Vector3::new(x, 0.02 * (1.0 - (x / 0.05f64).powi(2)).sqrt(), 0.0);
+        assert!((side.point_B - expected).norm() < 1e-16, "{side:?}");
+        assert_eq!(lozenge().nearest(&Vector3::zeros()).point_B, Vector3::new(0.0, 0.02, 0.0));
+    }
+
+    #[test]
+    fn what_lies_on_a_normal_has_its_foot_as_nearest_point() {
+        for (a, b) in [(0.3f64, 0.7f64), (1.2, 2.0), (-2.0, 4.0), (1e-9, 1e-9)] {
+            let on = Vector3::new(0.05 * a.cos() * b.cos(), 0.02 * a.sin(), 0.03 * a.cos() * b.sin());
+            let normal = Vector3::new(on.x / 0.0025, on.y / 0.0004, on.z / 0.0009).normalize();
+            // Inside less than the smallest radius of curvature, c^2 / a = 8 mm.
+            for height in [-7e-3, -1e-6, 0.0, 1e-3, 10.0] {
+                let at = lozenge().nearest(&(on + normal * height));
+                assert!((at.point_B - on).norm() < 2e-15 * (1.0 + height), "{height} {at:?}");
+                assert!((at.normal_B - normal).norm() < 2e-13, "{height}");
+            }
+        }
+    }
+
+    #[test]
+    fn it_holds_who_is_pressed_through_its_flat_side_only() {
+        let flat = Ellipsoid::new([0.05, 1e-3, 0.05]).unwrap();
+        let (top, rim) = (flat.nearest(&(Vector3::y() * 2e-3)), flat.nearest(&(Vector3::x() * 0.1)));
+        // Radii of curvature: a^2 / c on top, c^2 / a at the rim.
+        assert!(flat.holds_outside(&top, 2.49) && !flat.holds_outside(&top, 2.51));
+        assert!(flat.holds_outside(&rim, 1.9e-5) && !flat.holds_outside(&rim, 2.1e-5));
+    }
+
+    #[test]
+    fn a_path_straight_through_enters_on_the_near_side() {
+        let at = lozenge().entry(&Vector3::new(0.03, 0.1, 0.0), &Vector3::new(0.03, -0.1, 0.0)).unwrap();
+        assert!((at.point_B - Vector3::new(0.03, 0.016, 0.0)).norm() < 1e-16);
+        assert!(lozenge().entry(&Vector3::new(0.0501, 0.1, 0.0), &Vector3::new(0.0501, -0.1, 0.0)).is_none());
+    }
+}
