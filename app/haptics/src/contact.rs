@@ -11,13 +11,15 @@
 
 use nalgebra::Vector3;
 
-use crate::algorithm::{Algorithm, ContactMemory, Touch, TouchInput};
+use crate::algorithm::{Algorithm, ContactAlgorithm, ContactMemory, Touch, TouchInput};
+use crate::classic_god_object::ClassicGodObject;
 use crate::entity::Entity;
 use crate::frame::{is_finite, point_into_body, point_into_world, vector_into_body, vector_into_world};
 use crate::friction_cone::{ConeInput, FrictionCone};
 use crate::friction_law::FrictionState;
 use crate::shape::Shape;
 use crate::surface::{Feature, Surface};
+use crate::vector_field::VectorField;
 
 /// What a finger feels of one entity in one tick, in the world frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -81,6 +83,7 @@ impl Slot {
         self.contact = self.touch(index, entity, sweep);
         if self.contact.is_none() {
             self.cone = None;
+            self.own = ContactMemory::default();
         }
         self.contact
     }
@@ -108,12 +111,20 @@ impl Slot {
         };
         let touch = match &entity.algorithm {
             Algorithm::FrictionCone => self.touch_shape(&input),
-            Algorithm::Own(algorithm) => {
-                self.strength = 1.0;
-                algorithm.touch(&input, &mut self.own)
-            }
+            Algorithm::VectorField => self.touch_by(&VectorField, &input),
+            Algorithm::ClassicGodObject => self.touch_by(&ClassicGodObject, &input),
+            Algorithm::Own(algorithm) => self.touch_by(&**algorithm, &input),
         }?;
         in_world(index, entity, &self.ramped(touch, sweep))
+    }
+
+    fn touch_by(&mut self, algorithm: &dyn ContactAlgorithm, input: &TouchInput<'_>) -> Option<Touch> {
+        let begins = self.contact.is_none();
+        let touch = algorithm.touch(input, &mut self.own)?;
+        if begins {
+            self.strength = if input.entry().is_some() { 1.0 } else { 0.0 };
+        }
+        Some(touch)
     }
 
     fn touch_shape(&mut self, input: &TouchInput<'_>) -> Option<Touch> {

@@ -30,7 +30,7 @@
 #![allow(non_snake_case)]
 
 mod algorithm;
-mod classic;
+mod classic_god_object;
 mod contact;
 mod entity;
 mod error;
@@ -49,9 +49,10 @@ mod slide;
 mod sphere;
 mod surface;
 mod tangent_view;
+mod vector_field;
 
 pub use algorithm::{Algorithm, CONTACT_WORDS, ContactAlgorithm, ContactMemory, Touch, TouchInput};
-pub use classic::classic_god_object;
+pub use classic_god_object::ClassicGodObject;
 pub use contact::{Contact, RAMP_IN_S};
 pub use entity::Entity;
 pub use error::ParameterError;
@@ -66,3 +67,4 @@ pub use shared::Shared;
 pub use slide::MAX_SLIDE_ROUNDS;
 pub use sphere::Sphere;
 pub use surface::{Feature, Surface, SurfacePoint};
+pub use vector_field::VectorField;
