@@ -11,26 +11,33 @@
 
 mod build;
 mod bvh;
+mod cone;
 mod error;
 mod face;
+mod facing;
+mod fan;
 pub mod make;
+mod mesh_cone;
 mod order;
+mod place;
 mod query;
 mod repair;
 mod report;
 mod soup;
 mod topology;
+mod walk;
 mod winding;
 
 pub use bvh::{Bvh, Hit, Nearest, Triangles};
 pub use error::MeshError;
 pub use face::{Face, Link};
+pub use mesh_cone::{Beginning, MeshCone};
 pub use report::{Finding, MeshReport};
 pub use soup::TriangleSoup;
-
-use std::fmt;
+pub use walk::MAX_FEATURE_CHANGES;
 
 use nalgebra::Vector3;
+use std::fmt;
 
 /// The most faces around a vertex: a walk goes round it within a tick.
 pub const MAX_VALENCE: u32 = 16_384;
