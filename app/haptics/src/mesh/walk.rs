@@ -56,9 +56,7 @@ pub(crate) fn stand<'m>(mesh: &'m Mesh, place: &mut Place, input: &ConeInput) ->
         let facing = Facing::of(mesh, place, &input.hip_B);
         let (on, view) = match facing {
             Facing::Face(facet) => (On::Face(facet.side), view_of_face(&facet, place, input)),
-            Facing::Edge(side, edge) => {
-                (On::Edge(side, edge), view_of_edge(mesh, side, edge, place, input))
-            }
+            Facing::Edge(side, edge) => (On::Edge(side, edge), view_of_edge(mesh, side, edge, place, input)),
             Facing::Vertex(side, corner) => (On::Vertex(side, corner), view_of_vertex(place, input)),
             Facing::Free => {
                 *place = fly(mesh, place, &input.hip_B)?;
@@ -98,7 +96,10 @@ pub(crate) fn walk<'m>(
         }
         stand_now = stand(mesh, place, input)?;
     }
-    Some(Slide::new(stand_now.view, &(start_B - place.point_B), &asked, pull, input).rested(MAX_FEATURE_CHANGES))
+    Some(
+        Slide::new(stand_now.view, &(start_B - place.point_B), &asked, pull, input)
+            .rested(MAX_FEATURE_CHANGES),
+    )
 }
 
 /// What friction asks of a god-object where it stands.
@@ -140,7 +141,8 @@ impl Slide {
 
     /// It stays: the force is that of its gap, cut to the rim if a bound ended the walk early.
     fn rested(&self, changes: u32) -> Walked {
-        let tangential_B = if self.asked_m > 0.0 { self.direction_B * self.radius_m() } else { self.view.lag_B };
+        let tangential_B =
+            if self.asked_m > 0.0 { self.direction_B * self.radius_m() } else { self.view.lag_B };
         Walked { view: self.view, tangential_B, changes }
     }
 
@@ -177,7 +179,10 @@ fn cross_face(mesh: &Mesh, facet: &Facet<'_>, from_B: &Vector3<f64>, target_B: &
         }
     }
     let Some((edge, edge_B)) = first else {
-        return Reached { place: Place { point_B: *target_B, on: On::Face(facet.side) }, is_all_the_way: true };
+        return Reached {
+            place: Place { point_B: *target_B, on: On::Face(facet.side) },
+            is_all_the_way: true,
+        };
     };
     let met_B = from_B + way_B * first_fraction;
     let share = edge_B.dot(&(met_B - corners_B[edge])) / edge_B.norm_squared();

@@ -1,6 +1,9 @@
 //! What the integration tests share: a deterministic noise source and ways to read an output.
 #![allow(dead_code, non_snake_case)]
 
+pub(crate) mod meshes;
+pub(crate) mod path;
+
 use haptics::{Entity, Finger, FingerOutput, Form, Friction, Plane, Shape, Sphere};
 use nalgebra::{Isometry3, Vector3};
 
