@@ -36,7 +36,7 @@ fn main() {
     let mut criterion =
         Criterion::default().sample_size(20).measurement_time(Duration::from_secs(2)).configure_from_args();
     for meridians in [SIZES[0], SIZES[3]] {
-        let shape = shape_of(make::uv_sphere(meridians, meridians / 2, path::R));
+        let shape = shape_of(make::uv_sphere(meridians, path::rings(meridians), path::R));
         for (name, friction) in frictions() {
             let entity = entity(&shape, friction, Algorithm::FrictionCone);
             phases(&mut criterion, &format!("{meridians} meridians, {name}"), &entity, path::smooth);

@@ -26,12 +26,12 @@ pub(crate) fn print() {
     build_times();
     header();
     for meridians in SIZES {
-        let ball = make::uv_sphere(meridians, meridians / 2, R);
+        let ball = make::uv_sphere(meridians, path::rings(meridians), R);
         rows(&format!("ball {}", triangles(&ball)), &ball, path::smooth, clock_ns);
     }
-    let million = make::uv_sphere(1000, 500, R);
+    let million = make::uv_sphere(1000, 501, R);
     rows("shuffled 1M", &make::shuffled(&million, 7), path::smooth, clock_ns);
-    let bumpy = make::bumpy_sphere(1000, 500, R);
+    let bumpy = make::bumpy_sphere(1000, 501, R);
     rows("bumpy 1M", &bumpy, path::bumpy, clock_ns);
     for (name, algorithm) in
         [("god-object 1M", Algorithm::ClassicGodObject), ("vector field 1M", Algorithm::VectorField)]
@@ -53,7 +53,7 @@ fn triangles(soup: &TriangleSoup) -> String {
 
 fn build_times() {
     for (name, shuffle) in [("as generated", false), ("shuffled", true)] {
-        let mut soup = make::uv_sphere(1000, 500, R);
+        let mut soup = make::uv_sphere(1000, 501, R);
         if shuffle {
             soup = make::shuffled(&soup, 7);
         }
@@ -120,7 +120,7 @@ fn cold(sizes: &[usize], clock_ns: u64) {
     println!("\nslide with cold caches ({} MiB streamed through before the tick)", EVICTED_BYTES >> 20);
     let mut stream = vec![1_u64; EVICTED_BYTES / 8];
     for &meridians in sizes {
-        let soup = make::uv_sphere(meridians, meridians / 2, R);
+        let soup = make::uv_sphere(meridians, path::rings(meridians), R);
         let name = format!("ball {}", triangles(&soup));
         let shape = shape_of(soup);
         for (friction_name, friction) in frictions() {

@@ -75,7 +75,10 @@ fn seek(mesh: &Mesh, start_B: Vector3<f64>, hip_B: &Vector3<f64>, hover_m: f64) 
     if constraints.is_empty() {
         return None;
     }
-    let target = constraints.nearest_to(hip_B, 0.0, SLACK * hover_m)?;
+    // Where planes are almost parallel rounding may leave no room: it has found a place all the same.
+    let target = constraints
+        .nearest_to(hip_B, 0.0, SLACK * hover_m)
+        .unwrap_or(Target { point_B: god_object_B, active: 3 });
     Some(Rest { hovering_B: god_object_B, at: surface_point(mesh, &target, hip_B, piece) })
 }
 
@@ -128,8 +131,9 @@ fn surface_point(mesh: &Mesh, target: &Target, hip_B: &Vector3<f64>, piece: u32)
 
 /// It rests when it moves less, in terms of the height at which it hovers.
 const REST: f64 = 1e-4;
-/// A constraint may be missed by this much, in the same terms: rounding of positions is 1e-7 of the height.
-const SLACK: f64 = 1e-5;
+/// A constraint may be missed by this much, in the same terms: rounding of positions is 1e-7 of the height, and up to
+/// 1e5 times as much where two planes meet that are almost parallel.
+const SLACK: f64 = 1e-2;
 /// Where things are in the contact's memory.
 const POINT: usize = 0;
 const IS_TOUCHING: usize = 7;

@@ -8,7 +8,7 @@ use haptics::mesh::{Mesh, TriangleSoup, make};
 use haptics::{Entity, Finger, FingerOutput, Friction, Shape};
 use nalgebra::Vector3;
 
-use crate::common::{DT, Noise, entity};
+use crate::common::{DT, Noise, entity, path};
 
 pub(crate) fn built(soup: TriangleSoup) -> Arc<Mesh> {
     Arc::new(Mesh::build(soup).unwrap().0)
@@ -31,11 +31,11 @@ pub(crate) fn star() -> Arc<Mesh> {
 }
 
 pub(crate) fn uv_sphere(meridians: usize) -> Arc<Mesh> {
-    built(make::uv_sphere(meridians, meridians / 2, 0.1))
+    built(make::uv_sphere(meridians, path::rings(meridians), 0.1))
 }
 
 pub(crate) fn bumpy_sphere(meridians: usize) -> Arc<Mesh> {
-    built(make::bumpy_sphere(meridians, meridians / 2, 0.1))
+    built(make::bumpy_sphere(meridians, path::rings(meridians), 0.1))
 }
 
 /// A prism whose first edge, along z through the origin, has this angle inside the material; up to 350 degrees.

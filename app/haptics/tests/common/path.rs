@@ -27,6 +27,12 @@ pub(crate) const STEP_M: f64 = 2e-4;
 const WINDING: f64 = 10.0;
 const START: (f64, f64) = (0.05, 0.0137);
 
+/// Rings of quads of a path's balls: `nu / 2 + 1`, so that 32, 100, 316 and 1000 meridians make 1024, 10,000, 99,856
+/// and 1,000,000 triangles.
+pub(crate) fn rings(meridians: usize) -> usize {
+    meridians / 2 + 1
+}
+
 /// What the finger does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Phase {
