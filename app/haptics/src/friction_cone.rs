@@ -123,6 +123,7 @@ impl FrictionCone {
     }
 }
 
+#[inline]
 pub(crate) fn answer(
     view: &TangentView,
     tangential_B: &Vector3<f64>,

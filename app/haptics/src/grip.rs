@@ -27,6 +27,7 @@ pub(crate) struct Pull {
 }
 
 impl Grip {
+    #[inline]
     pub(crate) fn begin_tick(&mut self, view: &TangentView, input: &ConeInput) -> Pull {
         let last_hip_B = self.last_hip_B.replace(input.hip_B).unwrap_or(input.hip_B);
         let moved_B = tangential(&(input.hip_B - last_hip_B), &view.normal_B);
@@ -36,6 +37,7 @@ impl Grip {
     /// The tangential spring, if friction holds the god-object; else the contact is in slip.
     ///
     /// Breakaway and first slide share the tick: the static coefficient is never slid with.
+    #[inline]
     pub(crate) fn hold<L: FrictionLaw + ?Sized>(
         &mut self,
         friction: &L,
@@ -72,6 +74,7 @@ impl Grip {
     }
 }
 
+#[inline]
 pub(crate) fn query(
     state: FrictionState,
     gap_m: f64,
@@ -92,6 +95,7 @@ pub(crate) fn query(
 }
 
 /// Spring and damper of a held contact, cut to the cone.
+#[inline]
 fn stuck_tangential(view: &TangentView, limit_m: f64, input: &ConeInput) -> Vector3<f64> {
     if input.damping_n_s_per_m == 0.0 {
         return cut_to(view.lag_B, limit_m);

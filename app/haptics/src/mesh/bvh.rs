@@ -53,8 +53,10 @@ pub struct Triangles<'a> {
 }
 
 impl<'a> Triangles<'a> {
+    #[inline(always)]
     fn corners(self, face: &Face) -> [Vector3<f64>; 3] {
-        face.vertices.map(|vertex| self.vertices[vertex as usize])
+        let [a, b, c] = face.vertices;
+        [self.vertices[a as usize], self.vertices[b as usize], self.vertices[c as usize]]
     }
 }
 
@@ -87,22 +89,51 @@ impl<const WIDTH: usize> Node<WIDTH> {
     };
 
     /// Squared distances of a point from the boxes \[m^2\], too small rather than too large.
-    ///
-    /// In `f64`, unlike the segment's test: with it a point far from a small mesh still tells the boxes apart.
-    #[inline(always)]
-    fn squared_distances(&self, p: &Vector3<f64>) -> [f64; WIDTH] {
+    // Inlined, the compiler takes the lanes apart again where they are sorted.
+    #[inline(never)]
+    fn squared_distances(&self, p: &Rounded) -> [f32; WIDTH] {
         let mut sum = [0.0; WIDTH];
         for axis in 0..3 {
             let (lower, upper) = (&self.bounds[0][axis], &self.bounds[1][axis]);
             for i in 0..WIDTH {
-                let outside = larger(f64::from(lower[i]) - p[axis], p[axis] - f64::from(upper[i]));
+                let outside = larger(lower[i] - p.upper[axis], p.lower[axis] - upper[i]);
                 let outside = larger(outside, 0.0);
                 sum[i] += outside * outside;
             }
         }
-        // Three squares and two sums, each rounded by half a unit in the last place.
-        sum.map(|squared| squared * (1.0 - 4.0 * f64::EPSILON))
+        // A difference, its square and two sums, each rounded by half a unit in the last place.
+        for squared in &mut sum {
+            *squared *= 1.0 - 4.0 * f32::EPSILON;
+        }
+        sum
     }
+}
+
+/// A point between two of `f32`.
+struct Rounded {
+    lower: [f32; 3],
+    upper: [f32; 3],
+}
+
+impl Rounded {
+    #[inline]
+    fn new(p: &Vector3<f64>) -> Self {
+        Self { lower: [below(p.x), below(p.y), below(p.z)], upper: [above(p.x), above(p.y), above(p.z)] }
+    }
+}
+
+/// The largest `f32` that is not above a number.
+#[inline]
+fn below(number: f64) -> f32 {
+    let nearest = number as f32;
+    if f64::from(nearest) > number { nearest.next_down() } else { nearest }
+}
+
+/// The smallest `f32` that is not below a number.
+#[inline]
+fn above(number: f64) -> f32 {
+    let nearest = number as f32;
+    if f64::from(nearest) < number { nearest.next_up() } else { nearest }
 }
 
 /// A child of a node: another node, or a run of faces.

@@ -94,7 +94,7 @@ impl MeshCone {
 
     /// Where the god-object is, with the normal and the feature there.
     pub fn god_object(&self) -> Option<SurfacePoint> {
-        self.touching.map(|touching| SurfacePoint {
+        self.touching.as_ref().map(|touching| SurfacePoint {
             point_B: touching.god_object.point_B,
             normal_B: touching.normal_B,
             feature: touching.god_object.feature(),
@@ -104,7 +104,7 @@ impl MeshCone {
 
     /// Whether friction holds it.
     pub fn state(&self) -> FrictionState {
-        self.touching.map_or(FrictionState::Stick, |touching| touching.grip.state)
+        self.touching.as_ref().map_or(FrictionState::Stick, |touching| touching.grip.state)
     }
 
     fn meet(
@@ -147,7 +147,7 @@ impl Touching {
             walk(mesh, &mut self.shadow, shadow, |query| query.gap_m, &Pull::default(), input)?;
         }
         let here = stand(mesh, &mut self.god_object, input)?;
-        let pull = self.grip.begin_tick(&here.view, input);
+        let pull = if has_friction { self.grip.begin_tick(&here.view, input) } else { Pull::default() };
         let (view, tangential_B, changes) = match self.grip.hold(friction, &here.view, &pull, input) {
             Some(tangential_B) => (here.view, tangential_B, 0),
             None => self.slide(mesh, friction, here, &pull, input)?,
@@ -163,7 +163,7 @@ impl Touching {
         &mut self,
         mesh: &Mesh,
         friction: &Friction,
-        from: Stand<'_>,
+        from: Stand,
         pull: &Pull,
         input: &ConeInput,
     ) -> Option<(TangentView, Vector3<f64>, u32)> {
