@@ -11,9 +11,9 @@
 
 use nalgebra::Vector3;
 
-use super::Mesh;
 use super::place::Place;
 use super::walk::{Stand, Walked, stand, walk};
+use super::Mesh;
 use crate::friction::Friction;
 use crate::friction_cone::{ConeForce, ConeInput, answer};
 use crate::friction_law::{FrictionLaw, FrictionState};
