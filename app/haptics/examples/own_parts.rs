@@ -6,8 +6,9 @@
 #![allow(non_snake_case)]
 
 use haptics::{
-    Algorithm, ContactAlgorithm, ContactMemory, Entity, Feature, Finger, Friction, FrictionLaw, FrictionMemory,
-    FrictionQuery, FrictionState, ParameterError, Plane, Shape, Sphere, Surface, SurfacePoint, Touch, TouchInput,
+    Algorithm, ContactAlgorithm, ContactMemory, Entity, Feature, Finger, Friction, FrictionLaw,
+    FrictionMemory, FrictionQuery, FrictionState, ParameterError, Plane, Shape, Sphere, Surface,
+    SurfacePoint, Touch, TouchInput,
 };
 use nalgebra::{Isometry3, Vector3};
 
@@ -19,7 +20,10 @@ pub(crate) fn main() -> Result<(), ParameterError> {
     let ball = Entity::new(Sphere::new(0.05)?, Isometry3::translation(0.02, -0.05, 0.0), 500.0)?
         .with_algorithm(Algorithm::own(Honey { time_constant_s: 0.02 }));
     for (name, entity) in [("egg carton", carton), ("ageing friction", table), ("honey", ball)] {
-        println!("{name}\n{:>8} {:>8} {:>8} {:>8} {:>8}  state", "t [ms]", "hip x", "god x", "F_x [N]", "F_y [N]");
+        println!(
+            "{name}\n{:>8} {:>8} {:>8} {:>8} {:>8}  state",
+            "t [ms]", "hip x", "god x", "F_x [N]", "F_y [N]"
+        );
         for (tick, hip, out) in drag(&entity)?.into_iter().step_by(25) {
             let (god, force) = (out.god_object_W, out.force_on_user_W);
             println!(
@@ -33,7 +37,9 @@ pub(crate) fn main() -> Result<(), ParameterError> {
 }
 
 /// Down to 3 mm below the plane y = 0, 0.15 s of rest, then sideways at 0.1 m/s for 0.3 s.
-pub(crate) fn drag(entity: &Entity) -> Result<Vec<(i32, Vector3<f64>, haptics::FingerOutput)>, ParameterError> {
+pub(crate) fn drag(
+    entity: &Entity,
+) -> Result<Vec<(i32, Vector3<f64>, haptics::FingerOutput)>, ParameterError> {
     let mut finger = Finger::new(0.0, 1)?;
     let step = |tick: i32| {
         let lowered = f64::from(tick.min(50)) / 50.0;
@@ -95,8 +101,9 @@ impl Surface for EggCarton {
         const STEPS: i32 = 16;
         let along = |share: f64| from_B + (to_B - from_B) * share;
         let share = |step: i32| f64::from(step) / f64::from(STEPS);
-        let first = (1..=STEPS)
-            .find(|&step| self.above(&along(share(step - 1))) > 0.0 && self.above(&along(share(step))) <= 0.0)?;
+        let first = (1..=STEPS).find(|&step| {
+            self.above(&along(share(step - 1))) > 0.0 && self.above(&along(share(step))) <= 0.0
+        })?;
         let (mut outside, mut inside) = (share(first - 1), share(first));
         for _ in 0..50 {
             let middle = 0.5 * (outside + inside);

@@ -68,7 +68,8 @@ fn is_inside(mesh: &Mesh, p: &Vector3<f64>) -> bool {
 #[test]
 fn no_mesh_sweeps_through_a_finger_at_rest() {
     let mut noise = Noise(4);
-    for (name, mesh) in [("cube", cube()), ("plate", plate()), ("star", star()), ("bumpy", bumpy_sphere(100))] {
+    for (name, mesh) in [("cube", cube()), ("plate", plate()), ("star", star()), ("bumpy", bumpy_sphere(100))]
+    {
         let mut inside = 0;
         for pass in 0..40 {
             // From 0.01 m/s to 2 m/s; the slow ones in ticks that are as long as they may be at 100 Hz.
@@ -98,7 +99,10 @@ fn a_thin_plate_carries_a_finger_along_at_any_speed() {
             // Its upper side passes the finger.
             let depth_m = -0.0091 + speed_m_s * t;
             let expected_n = if depth_m > 0.0 { K * depth_m } else { 0.0 };
-            assert!((out.force_on_user_W - Vector3::y() * expected_n).norm() < 1e-11, "{speed_m_s}, {t}: {out:?}");
+            assert!(
+                (out.force_on_user_W - Vector3::y() * expected_n).norm() < 1e-11,
+                "{speed_m_s}, {t}: {out:?}"
+            );
         }
     }
 }

@@ -96,7 +96,10 @@ fn encoder_noise_beside_an_edge_does_not_make_the_god_object_jump() {
             assert_eq!((out.entity, out.feature), (Some(0), feature), "{name}, tick {tick}: {hip:?}");
             let (moved, by) = ((out.god_object_W - last.god_object_W).norm(), (hip - last_hip).norm());
             if tick > 0 {
-                assert!(moved <= by + 1e-15, "{name}, tick {tick}: {hip:?} moved it by {moved}, itself by {by}");
+                assert!(
+                    moved <= by + 1e-15,
+                    "{name}, tick {tick}: {hip:?} moved it by {moved}, itself by {by}"
+                );
                 largest = largest.max(moved);
             }
             (last, last_hip) = (out, hip);

@@ -47,9 +47,10 @@ fn an_own_law_remembers_how_long_it_has_been_touched() {
     let law = Friction::own(Ageing { mu_fresh, mu_aged, ageing_s: 0.05 });
     let felt = drag(&table(law)).unwrap();
     let ratio_of = |out: &haptics::FingerOutput| out.force_on_user_W.x.abs() / out.force_on_user_W.y;
-    let (most, rest) = felt.iter().filter(|(_, _, out)| out.entity.is_some()).fold((0.0_f64, 0.0), |(most, _), tick| {
-        (most.max(ratio_of(&tick.2)), ratio_of(&tick.2))
-    });
+    let (most, rest) = felt
+        .iter()
+        .filter(|(_, _, out)| out.entity.is_some())
+        .fold((0.0_f64, 0.0), |(most, _), tick| (most.max(ratio_of(&tick.2)), ratio_of(&tick.2)));
     // 0.17 s of rest and more until it breaks away: all but e^-3.4 of the way from fresh to aged.
     assert!(most > 0.75 && most < mu_aged, "{most}");
     // Sliding, it is fresh in every tick: the ratio is asked for to 12 digits.
