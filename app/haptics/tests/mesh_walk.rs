@@ -24,8 +24,7 @@ fn sheet(triangles: &[[[f64; 3]; 3]]) -> TriangleSoup {
 /// A square of 0.2 m with this corner and these edges; the free side is where they turn counter-clockwise.
 fn square(corner: [f64; 3], one: [f64; 3], other: [f64; 3]) -> [[[f64; 3]; 3]; 2] {
     let [corner, one, other] = [corner, one, other].map(Vector3::from);
-    let [b, c, d] =
-        [corner + one * 0.2, corner + one * 0.2 + other * 0.2, corner + other * 0.2].map(Into::into);
+    let [b, c, d] = [corner + one * 0.2, corner + one * 0.2 + other * 0.2, corner + other * 0.2].map(Into::into);
     let a = corner.into();
     [[a, b, c], [a, c, d]]
 }
@@ -101,8 +100,7 @@ fn face_to_concave_edge_along_it_and_up_the_other_face() {
 #[test]
 fn edge_to_vertex_and_from_there_to_edge_face_and_free_space() {
     let room = mesh(corner_of_a_room(), Friction::None);
-    let to_vertex =
-        [[0.05, 0.01, 0.07], [0.05, -0.004, 0.07], [-0.003, -0.004, 0.07], [-0.003, -0.004, -0.002]];
+    let to_vertex = [[0.05, 0.01, 0.07], [0.05, -0.004, 0.07], [-0.003, -0.004, 0.07], [-0.003, -0.004, -0.002]];
     let vertex = go(&room, &to_vertex);
     assert_eq!(vertex.feature, Feature::Vertex);
     assert_near(vertex.god_object_W, [0.0; 3]);
