@@ -1,7 +1,8 @@
 //! What it costs to build a mesh, by its size and the order of the input.
 //!
 //! Run `cargo bench -p haptics --bench mesh_build`. `generated` comes in rows, `shuffled` has its faces and vertices in
-//! random order, `own corners` has three vertices of its own for each face, as STL has. All give the same mesh.
+//! random order, `own corners` has three vertices of its own for each face, as STL has. All give the same mesh, with its
+//! hierarchy of boxes.
 
 use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use haptics::mesh::{Mesh, TriangleSoup, make};

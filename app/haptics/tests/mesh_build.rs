@@ -140,7 +140,7 @@ fn solids_are_built_as_they_come_and_need_no_repair() {
             "{name}"
         );
         assert_eq!(report.components, 1, "{name}");
-        assert_eq!(mesh.extent_m(), soup.vertices.iter().map(|v| v.amax()).fold(0.0, f64::max), "{name}");
+        assert_eq!(mesh.extent_m(), soup.vertices.iter().map(Vector3::amax).fold(0.0, f64::max), "{name}");
     }
 }
 
@@ -151,7 +151,7 @@ fn normals_point_outward_for_the_volume_is_that_of_the_shape() {
         assert!((found / expected - 1.0).abs() < relative, "{found} m^3, {expected} m^3 expected: {why}");
     };
     let flat = |soup: TriangleSoup, expected: f64| {
-        close(&build(soup).0, expected, 1e-13, "flat faces: rounding only")
+        close(&build(soup).0, expected, 1e-13, "flat faces: rounding only");
     };
     flat(make::cuboid([0.1, 0.2, 0.3]), 0.1 * 0.2 * 0.3);
     flat(make::wedge(0.3, 0.1, 0.2), 0.5 * 0.1 * 0.1 * 0.3_f64.sin() * 0.2);
@@ -559,13 +559,16 @@ fn the_normal_of_a_needle_is_right_to_the_last_digits() {
 }
 
 proptest! {
+    // Faces of tetrahedra, so that some meshes are closed and some parts touch, and a few faces besides.
     #[test]
     fn any_triples_of_a_few_points_make_a_linked_mesh_or_an_error(
-        points in prop::collection::vec(prop::array::uniform3(-3_i8..=3), 1..9),
-        faces in prop::collection::vec(prop::array::uniform3(0_u32..9), 0..12),
+        points in prop::collection::vec(prop::array::uniform3(-3_i8..=3), 4..10),
+        tetrahedra in prop::collection::vec(prop::array::uniform4(0_u32..9), 0..4),
+        others in prop::collection::vec(prop::array::uniform3(0_u32..9), 0..4),
     ) {
-        let faces = faces.iter().map(|face| face.map(|v| v % points.len() as u32)).collect();
         let vertices = points.iter().map(|p| Vector3::from(p.map(|x| f64::from(x) * 0.1))).collect();
+        let sides = tetrahedra.iter().flat_map(|t| tetrahedron(0).map(|face| face.map(|v| t[v as usize])));
+        let faces = sides.chain(others).map(|face| face.map(|v| v % points.len() as u32)).collect();
         if let Ok((mesh, report)) = Mesh::build(TriangleSoup { vertices, faces }) {
             assert_linked(&mesh);
             prop_assert_eq!(report.faces, mesh.faces().len());

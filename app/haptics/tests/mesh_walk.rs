@@ -8,7 +8,8 @@ use std::sync::Arc;
 use common::*;
 use haptics::mesh::{Mesh, TriangleSoup, make};
 use haptics::{ContactState, Entity, Feature, Finger, FingerOutput, Friction};
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Vector3};
+use proptest::prelude::*;
 
 fn mesh(soup: TriangleSoup, friction: Friction) -> Entity {
     entity(Arc::new(Mesh::build(soup).unwrap().0), friction)
@@ -24,7 +25,8 @@ fn sheet(triangles: &[[[f64; 3]; 3]]) -> TriangleSoup {
 /// A square of 0.2 m with this corner and these edges; the free side is where they turn counter-clockwise.
 fn square(corner: [f64; 3], one: [f64; 3], other: [f64; 3]) -> [[[f64; 3]; 3]; 2] {
     let [corner, one, other] = [corner, one, other].map(Vector3::from);
-    let [b, c, d] = [corner + one * 0.2, corner + one * 0.2 + other * 0.2, corner + other * 0.2].map(Into::into);
+    let [b, c, d] =
+        [corner + one * 0.2, corner + one * 0.2 + other * 0.2, corner + other * 0.2].map(Into::into);
     let a = corner.into();
     [[a, b, c], [a, c, d]]
 }
@@ -100,7 +102,8 @@ fn face_to_concave_edge_along_it_and_up_the_other_face() {
 #[test]
 fn edge_to_vertex_and_from_there_to_edge_face_and_free_space() {
     let room = mesh(corner_of_a_room(), Friction::None);
-    let to_vertex = [[0.05, 0.01, 0.07], [0.05, -0.004, 0.07], [-0.003, -0.004, 0.07], [-0.003, -0.004, -0.002]];
+    let to_vertex =
+        [[0.05, 0.01, 0.07], [0.05, -0.004, 0.07], [-0.003, -0.004, 0.07], [-0.003, -0.004, -0.002]];
     let vertex = go(&room, &to_vertex);
     assert_eq!(vertex.feature, Feature::Vertex);
     assert_near(vertex.god_object_W, [0.0; 3]);
@@ -210,4 +213,41 @@ fn a_jump_over_many_triangles_goes_on_in_the_next_tick_and_never_lets_go() {
     });
     // 200 mm over triangles of half a millimetre.
     assert!((1..=10).contains(&ticks.count()));
+}
+
+#[test]
+fn another_mesh_in_the_same_place_is_met_anew() {
+    let fine = mesh(make::uv_sphere(100, 51, 0.1), stiction());
+    let coarse = mesh(make::cuboid([0.1; 3]), stiction());
+    let mut finger = point_finger();
+    let mut feel = |entity: &Entity, hip| finger.step(std::slice::from_ref(entity), &hip, DT);
+    feel(&fine, on_circle(0.101, 1.0));
+    assert_eq!(feel(&fine, on_circle(0.095, 1.0)).entity, Some(0));
+    assert_eq!(feel(&coarse, Vector3::new(0.048, 0.0, 0.0)).force_on_user_W, Vector3::x() * (K * (0.05 - 0.048)));
+    assert_eq!(feel(&fine, on_circle(0.12, 1.0)).entity, None);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    #[test]
+    fn every_input_gives_a_finite_output(
+        hips in prop::collection::vec(prop::array::uniform3(any_size()), 1..20),
+        shift in prop::array::uniform3(any_size()), k in any_size(), b in any_size(), dt in any_size(),
+    ) {
+        for soup in [make::cuboid([0.1; 3]), make::klein_bottle(20, 10, 0.1)] {
+            let mut entity = Entity { stiffness_n_per_m: k, damping_n_s_per_m: b, ..mesh(soup, stiction()) };
+            let mut finger = point_finger();
+            for hip in &hips {
+                let out = finger.step(std::slice::from_ref(&entity), &Vector3::from(*hip), dt);
+                prop_assert!(out.force_on_user_W.iter().all(|x| x.is_finite()), "{out:?}");
+                prop_assert!(out.god_object_W.iter().all(|x| x.is_finite()), "{out:?}");
+                entity.move_to(Isometry3::translation(shift[0], shift[1], shift[2]));
+            }
+        }
+    }
+}
+
+fn any_size() -> impl Strategy<Value = f64> {
+    prop_oneof![-0.1..0.1f64, any::<f64>()]
 }

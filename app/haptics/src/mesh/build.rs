@@ -34,6 +34,7 @@ impl Mesh {
         report_edges(&triangles, &links, &mut report);
         let faces: Box<[Face]> =
             triangles.iter().zip(&links).map(|(triangle, links)| face(triangle, links, &vertices)).collect();
+        drop((triangles, links));
         report.faces = faces.len();
         report.vertices = vertices.len();
         let extent_m = vertices.iter().fold(0.0_f64, |extent, v| extent.max(v.amax()));

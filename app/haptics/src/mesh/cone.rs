@@ -72,7 +72,11 @@ impl Cone {
         for (edge, edge_B) in [(corner, one_B), (previous(corner), other_B)] {
             let along = edge_B.dot(&self.to_hip_B);
             if along > 0.0 {
-                self.offer(along * along / edge_B.norm_squared(), facet.side, Nearest::Edge(facet.side, edge));
+                self.offer(
+                    along * along / edge_B.norm_squared(),
+                    facet.side,
+                    Nearest::Edge(facet.side, edge),
+                );
             }
         }
         let is_within = facet.inward_B(&one_B).dot(&self.to_hip_B) >= 0.0
@@ -89,7 +93,8 @@ impl Cone {
             Nearest::Face(side, _) | Nearest::Edge(side, _) => side.face,
             Nearest::Tip => u32::MAX,
         };
-        if reach_m2 > self.reach_m2 || (reach_m2 == self.reach_m2 && reach_m2 > 0.0 && side.face <= best_face) {
+        if reach_m2 > self.reach_m2 || (reach_m2 == self.reach_m2 && reach_m2 > 0.0 && side.face <= best_face)
+        {
             (self.reach_m2, self.nearest) = (reach_m2, nearest);
         }
     }

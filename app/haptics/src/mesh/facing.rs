@@ -37,7 +37,11 @@ impl Facing {
     pub(crate) fn of(mesh: &Mesh, place: &Place, hip_B: &Vector3<f64>) -> Self {
         match place.on {
             On::Face(side) => {
-                if is_in_front(mesh, Facet::of(mesh, side).depth_m(hip_B)) { Self::Free } else { Self::Face(side) }
+                if is_in_front(mesh, Facet::of(mesh, side).depth_m(hip_B)) {
+                    Self::Free
+                } else {
+                    Self::Face(side)
+                }
             }
             On::Edge(side, edge) => Self::on_edge(mesh, side, edge, &place.point_B, hip_B),
             On::Vertex(side, corner) => Self::at_vertex(mesh, side, corner, &place.point_B, hip_B),
@@ -45,13 +49,7 @@ impl Facing {
     }
 
     #[inline(always)]
-    fn on_edge(
-        mesh: &Mesh,
-        side: Side,
-        edge: usize,
-        point_B: &Vector3<f64>,
-        hip_B: &Vector3<f64>,
-    ) -> Self {
+    fn on_edge(mesh: &Mesh, side: Side, edge: usize, point_B: &Vector3<f64>, hip_B: &Vector3<f64>) -> Self {
         let here = Facet::of(mesh, side);
         let link = here.face.links[edge];
         let (_, edge_B) = here.edge_B(mesh, edge);
@@ -60,7 +58,11 @@ impl Facing {
         let here_depth_m = here.depth_m(hip_B);
         let Some(over) = side.across(link).map(|side| Facet::of(mesh, side)) else {
             // The rim of a sheet: beyond it there is nothing.
-            return if here_wants && !is_in_front(mesh, here_depth_m) { Self::Face(side) } else { Self::Free };
+            return if here_wants && !is_in_front(mesh, here_depth_m) {
+                Self::Face(side)
+            } else {
+                Self::Free
+            };
         };
         // Neighbours run along their edge in opposite directions, unless one of them is turned.
         let over_inward_B = over.inward_B(&if link.is_turned() { edge_B } else { -edge_B });

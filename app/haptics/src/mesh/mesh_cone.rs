@@ -11,9 +11,9 @@
 
 use nalgebra::Vector3;
 
+use super::Mesh;
 use super::place::Place;
 use super::walk::{Stand, Walked, stand, walk};
-use super::Mesh;
 use crate::friction::Friction;
 use crate::friction_cone::{ConeForce, ConeInput, answer};
 use crate::friction_law::{FrictionLaw, FrictionState};
@@ -24,6 +24,8 @@ use crate::tangent_view::TangentView;
 /// State of one finger towards one mesh.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct MeshCone {
+    /// Which mesh the rest is about: indices of another one would lead nowhere.
+    mesh: Option<usize>,
     touching: Option<Touching>,
     /// Where the HIP was in the last tick.
     last_hip_B: Option<Vector3<f64>>,
@@ -66,6 +68,11 @@ impl MeshCone {
         previous_hip_B: Option<Vector3<f64>>,
         input: &ConeInput,
     ) -> Option<(ConeForce, Beginning)> {
+        // Its faces stay where they are as long as it lives.
+        let mesh_here = Some(mesh.faces().as_ptr().addr());
+        if self.mesh != mesh_here {
+            *self = Self { mesh: mesh_here, ..Self::default() };
+        }
         let last_hip_B = self.last_hip_B.replace(input.hip_B);
         let mut beginning = Beginning::Came;
         if self.touching.is_none() {

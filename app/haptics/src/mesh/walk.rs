@@ -57,9 +57,7 @@ pub(crate) fn stand(mesh: &Mesh, place: &mut Place, input: &ConeInput) -> Option
         let facing = Facing::of(mesh, place, &input.hip_B);
         let (on, view) = match facing {
             Facing::Face(side) => (On::Face(side), view_of_face(mesh, side, place, input)),
-            Facing::Edge(side, edge) => {
-                (On::Edge(side, edge), view_of_edge(mesh, side, edge, place, input))
-            }
+            Facing::Edge(side, edge) => (On::Edge(side, edge), view_of_edge(mesh, side, edge, place, input)),
             Facing::Vertex(side, corner) => (On::Vertex(side, corner), view_of_vertex(place, input)),
             Facing::Free => {
                 *place = match rim(mesh, place) {
@@ -103,7 +101,10 @@ pub(crate) fn walk(
         }
         stand_now = stand(mesh, place, input)?;
     }
-    Some(Slide::new(stand_now.view, &(start_B - place.point_B), &asked, pull, input).rested(MAX_FEATURE_CHANGES))
+    Some(
+        Slide::new(stand_now.view, &(start_B - place.point_B), &asked, pull, input)
+            .rested(MAX_FEATURE_CHANGES),
+    )
 }
 
 /// What friction asks of a god-object where it stands.
@@ -150,7 +151,8 @@ impl Slide {
     /// It stays: the force is that of its gap, cut to the rim if a bound ended the walk early.
     #[inline]
     fn rested(&self, changes: u32) -> Walked {
-        let tangential_B = if self.asked_m > 0.0 { self.direction_B * self.radius_m() } else { self.view.lag_B };
+        let tangential_B =
+            if self.asked_m > 0.0 { self.direction_B * self.radius_m() } else { self.view.lag_B };
         Walked { view: self.view, tangential_B, changes }
     }
 

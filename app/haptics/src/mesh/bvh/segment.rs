@@ -39,7 +39,7 @@ pub struct Hit {
 impl<const WIDTH: usize> Bvh<WIDTH> {
     /// The first face that the segment `from_B -> to_B` enters; a sheet is entered from either side.
     ///
-    /// None if it is not finite, has no length, or the mesh is so far away that squares overflow (1e150 m).
+    /// None if it is not finite, has no length, or is so long that its rounding hides the mesh (1e12 of its sizes).
     pub fn first_hit(
         &self,
         triangles: Triangles<'_>,
@@ -124,8 +124,9 @@ impl Segment {
             return None;
         }
         let fraction = (before / (before - after)).clamp(0.0, 1.0);
-        // Behind the plane, or in it over the whole length: where the line meets the plane says nothing.
-        let is_vague = before <= 0.0 || before <= self.tolerance_m && after >= -self.tolerance_m;
+        // Behind the plane, not quite at it, or in it over the whole length: where the line meets it says nothing.
+        let is_vague =
+            before <= 0.0 || after > 0.0 || before <= self.tolerance_m && after >= -self.tolerance_m;
         let corners = triangles.corners(face);
         let is_met = if is_vague { self.touches(face, &corners, fraction) } else { line.meets(&corners) };
         is_met.then_some(Met { face: index, fraction, is_front })
@@ -200,6 +201,9 @@ impl Clipped {
         let extent = lower.amax().max(upper.amax());
         // The ends computed here are rounded relative to how far away the segment's are.
         let pad = BOX_PAD * (extent + from.amax() + to.amax());
+        if pad > extent {
+            return None;
+        }
         let (mut entry, mut exit) = (0.0, 1.0);
         for axis in 0..3 {
             let (low, high) = (lower[axis] - pad, upper[axis] + pad);
