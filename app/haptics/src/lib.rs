@@ -31,8 +31,8 @@
 
 mod algorithm;
 mod capsule;
-mod classic;
 mod cone;
+mod classic_god_object;
 mod contact;
 mod convex;
 mod cuboid;
@@ -62,8 +62,10 @@ mod torus;
 
 pub use algorithm::{Algorithm, CONTACT_WORDS, ContactAlgorithm, ContactMemory, Touch, TouchInput};
 pub use capsule::Capsule;
-pub use classic::classic_god_object;
 pub use cone::Cone;
+mod vector_field;
+
+pub use classic_god_object::ClassicGodObject;
 pub use contact::{Contact, RAMP_IN_S};
 pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
@@ -86,3 +88,4 @@ pub use slide::MAX_SLIDE_ROUNDS;
 pub use sphere::Sphere;
 pub use surface::{Feature, Surface, SurfacePoint};
 pub use torus::Torus;
+pub use vector_field::VectorField;

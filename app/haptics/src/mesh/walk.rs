@@ -60,7 +60,10 @@ pub(crate) fn stand(mesh: &Mesh, place: &mut Place, input: &ConeInput) -> Option
             Facing::Edge(side, edge) => (On::Edge(side, edge), view_of_edge(mesh, side, edge, place, input)),
             Facing::Vertex(side, corner) => (On::Vertex(side, corner), view_of_vertex(place, input)),
             Facing::Free => {
-                *place = fly(mesh, place, &input.hip_B)?;
+                *place = match rim(mesh, place) {
+                    Some(rim) => rim,
+                    None => fly(mesh, place, &input.hip_B)?,
+                };
                 continue;
             }
         };
@@ -221,21 +224,37 @@ fn on_edge(mesh: &Mesh, side: Side, edge: usize, share: f64) -> Place {
     Place { point_B: start_B + edge_B * share, on: On::Edge(side, edge) }
 }
 
+/// The edge or vertex that a place on a face happens to lie on, where a neighbour may hold what the face lets go.
+#[cold]
+fn rim(mesh: &Mesh, place: &Place) -> Option<Place> {
+    let On::Face(side) = place.on else { return None };
+    let facet = Facet::of(mesh, side);
+    let near_m = |edge_m: f64| (SNAP * edge_m).max(RIM * mesh.extent_m());
+    let edge = (0..3).find(|&edge| {
+        let (start_B, edge_B) = facet.edge_B(mesh, edge);
+        let edge_m = edge_B.norm();
+        facet.inward_B(&edge_B).dot(&(place.point_B - start_B)) <= edge_m * near_m(edge_m)
+    })?;
+    let near_m = near_m(facet.edge_B(mesh, edge).1.norm());
+    let is_at = |&corner: &usize| (facet.corner_B(mesh, corner) - place.point_B).amax() <= near_m;
+    let on = match [edge, next(edge)].iter().find(|&corner| is_at(corner)) {
+        Some(&corner) => On::Vertex(side, corner),
+        None => On::Edge(side, edge),
+    };
+    Some(Place { on, ..*place })
+}
+
 /// Straight from where it was to the HIP through free space; `None` if nothing is in the way.
 ///
-/// The HIP is in front of all that meets here, so none of that is in the way, whatever rounding says. From a face the
-/// neighbour behind a concave edge may be: a start a little in front of the face is in front of that neighbour, too.
+/// The HIP is in front of all that meets here, so none of that is in the way, whatever rounding says. Of a place on a
+/// face, only that face is here: on its rim it would have been taken for one on the edge.
 #[cold]
 fn fly(mesh: &Mesh, place: &Place, hip_B: &Vector3<f64>) -> Option<Place> {
     let (On::Face(side) | On::Edge(side, _) | On::Vertex(side, _)) = place.on;
     let facet = Facet::of(mesh, side);
     let vertices_of = |face: u32| mesh.faces[face as usize].vertices;
     let hit = match place.on {
-        On::Face(_) => {
-            let size_m = facet.edge_B(mesh, 0).1.norm();
-            let from_B = place.point_B + facet.normal_B * (size_m * SNAP);
-            mesh.first_hit_of_others(&from_B, hip_B, |face| face == side.face)
-        }
+        On::Face(_) => mesh.first_hit_of_others(&place.point_B, hip_B, |face| face == side.face),
         On::Edge(_, edge) => {
             let ends = [edge, next(edge)].map(|corner| facet.face.vertices[corner]);
             let has_both = |face| ends.iter().all(|end| vertices_of(face).contains(end));
@@ -290,3 +309,5 @@ fn view_from(
 const PARALLEL: f64 = 1e-10;
 /// Nearer to the end of an edge than this share of it is at the vertex.
 const SNAP: f64 = 1e-9;
+/// Nearer to an edge than this share of the mesh's extent is on it: a few times what [`Mesh::first_hit`] tolerates.
+const RIM: f64 = 4e-13;
