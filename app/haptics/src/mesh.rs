@@ -9,12 +9,71 @@
 //!
 //! Frames and signs: object frame B; vertices run counter-clockwise seen from outside, normals leave the material.
 
+mod build;
+mod error;
 mod face;
+pub mod make;
+mod order;
+mod repair;
+mod report;
 mod soup;
+mod topology;
+mod winding;
 
+pub use error::MeshError;
 pub use face::{Face, Link};
+pub use report::{Finding, MeshReport};
 pub use soup::TriangleSoup;
 
-/// A mesh, ready to be walked on.
-#[derive(Debug)]
-pub struct Mesh {}
+use nalgebra::Vector3;
+use std::fmt;
+
+/// The most faces around a vertex: a walk goes round it within a tick.
+pub const MAX_VALENCE: u32 = 16_384;
+
+/// A triangle mesh whose faces know their neighbours.
+pub struct Mesh {
+    faces: Box<[Face]>,
+    vertices: Box<[Vector3<f64>]>,
+    sides: Sides,
+    extent_m: f64,
+}
+
+/// From where a mesh can be felt.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sides {
+    /// Closed and orientable: it has an inside, and is felt from outside.
+    Solid,
+    /// Open, or not orientable as a Klein bottle is: felt from both sides.
+    Sheet,
+}
+
+impl Mesh {
+    /// In spatial order.
+    pub fn faces(&self) -> &[Face] {
+        &self.faces
+    }
+
+    /// In the object's frame B \[m\], in order of their first use by a face. All are used, no two are equal.
+    pub fn vertices(&self) -> &[Vector3<f64>] {
+        &self.vertices
+    }
+
+    /// Whether it has an inside.
+    pub fn sides(&self) -> Sides {
+        self.sides
+    }
+
+    /// Largest coordinate, without its sign \[m\]: what rounding errors are measured by.
+    pub fn extent_m(&self) -> f64 {
+        self.extent_m
+    }
+}
+
+/// Its size alone: a million faces would help nobody.
+impl fmt::Debug for Mesh {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [faces, vertices] = [self.faces.len(), self.vertices.len()];
+        write!(f, "Mesh {{ {faces} faces, {vertices} vertices, {:?} }}", self.sides)
+    }
+}
