@@ -147,16 +147,41 @@ impl<'d> Value<'d> {
 
     /// Exactly `N` finite numbers.
     pub(crate) fn numbers<const N: usize>(&self) -> Result<[f64; N], SceneError> {
-        let allowed = format!("an array of {N} numbers");
+        self.numbers_in(Bound::Any)
+    }
+
+    /// Exactly `N` finite numbers, each within `bound`.
+    pub(crate) fn numbers_in<const N: usize>(&self, bound: Bound) -> Result<[f64; N], SceneError> {
+        let allowed = format!("an array of {N} {}", bound.of_several());
         let DeValue::Array(items) = self.value.get_ref() else { return Err(self.wrong_type(allowed)) };
         if items.len() != N {
             return Err(self.wrong_type(allowed));
         }
         let mut numbers = [0.0; N];
         for (i, (number, value)) in numbers.iter_mut().zip(items.iter()).enumerate() {
-            *number = self.item(i, value).number(Bound::Any)?;
+            *number = self.item(i, value).number(bound)?;
         }
         Ok(numbers)
+    }
+
+    /// Finite numbers within `bound`, at least one of them.
+    pub(crate) fn list(&self, bound: Bound) -> Result<Vec<f64>, SceneError> {
+        let allowed = || format!("an array of {}, with at least one of them", bound.of_several());
+        match self.value.get_ref() {
+            DeValue::Array(items) if !items.is_empty() => {
+                items.iter().enumerate().map(|(i, value)| self.item(i, value).number(bound)).collect()
+            }
+            _ => Err(self.wrong_type(allowed())),
+        }
+    }
+
+    /// Factors along three axes: one number for all, or an array of three; above 0.
+    pub(crate) fn factors(&self) -> Result<[f64; 3], SceneError> {
+        match self.value.get_ref() {
+            DeValue::Array(items) if items.len() == 3 => self.numbers_in(Bound::Positive),
+            DeValue::Integer(_) | DeValue::Float(_) => Ok([self.number(Bound::Positive)?; 3]),
+            _ => Err(self.wrong_type("a number above 0, or an array of 3 numbers above 0")),
+        }
     }
 
     /// `N` rows of `N` finite numbers.
@@ -264,6 +289,14 @@ impl Bound {
             Self::Any => true,
             Self::NotNegative => number >= 0.0,
             Self::Positive => number > 0.0,
+        }
+    }
+
+    fn of_several(self) -> &'static str {
+        match self {
+            Self::Any => "numbers",
+            Self::NotNegative => "numbers, 0 or more",
+            Self::Positive => "numbers above 0",
         }
     }
 }
