@@ -16,6 +16,7 @@ use crate::entity::Entity;
 use crate::frame::{is_finite, point_into_body, point_into_world, vector_into_body, vector_into_world};
 use crate::friction_cone::{ConeInput, FrictionCone};
 use crate::friction_law::FrictionState;
+use crate::mesh::{Beginning, Mesh, MeshCone};
 use crate::shape::Shape;
 use crate::surface::{Feature, Surface};
 
@@ -66,6 +67,7 @@ pub(crate) struct Sweep {
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Slot {
     cone: Option<FrictionCone>,
+    mesh: MeshCone,
     own: ContactMemory,
     /// How much of the force is rendered, 0 to 1.
     strength: f64,
@@ -81,6 +83,7 @@ impl Slot {
         self.contact = self.touch(index, entity, sweep);
         if self.contact.is_none() {
             self.cone = None;
+            self.mesh.let_go();
         }
         self.contact
     }
@@ -121,8 +124,23 @@ impl Slot {
             Shape::Form(form) if input.finger_radius_m == 0.0 => self.touch_surface(form, input),
             Shape::Form(form) => self.touch_surface(&form.grown(input.finger_radius_m)?, input),
             Shape::Own(surface) if input.finger_radius_m == 0.0 => self.touch_surface(&**surface, input),
+            Shape::Mesh(mesh) if input.finger_radius_m == 0.0 => self.touch_mesh(mesh, input),
             Shape::Mesh(_) | Shape::Own(_) => None,
         }
+    }
+
+    fn touch_mesh(&mut self, mesh: &Mesh, input: &TouchInput<'_>) -> Option<Touch> {
+        let was_touching = self.mesh.is_touching();
+        let (force, beginning) = self.mesh.update(mesh, input.friction, input.previous_hip_B, &input.cone)?;
+        if !was_touching {
+            self.strength = if beginning == Beginning::WasInside { 0.0 } else { 1.0 };
+        }
+        Some(Touch {
+            god_object: self.mesh.god_object()?,
+            force_on_user_B: force.force_on_user_B,
+            normal_force_n: force.normal_force_n,
+            friction: self.mesh.state(),
+        })
     }
 
     fn touch_surface<S: Surface + ?Sized>(&mut self, surface: &S, input: &TouchInput<'_>) -> Option<Touch> {

@@ -10,20 +10,31 @@
 //! Frames and signs: object frame B; vertices run counter-clockwise seen from outside, normals leave the material.
 
 mod build;
+mod bvh;
+mod cone;
 mod error;
 mod face;
+mod facing;
+mod fan;
 pub mod make;
+mod mesh_cone;
 mod order;
+mod place;
+mod query;
 mod repair;
 mod report;
 mod soup;
 mod topology;
+mod walk;
 mod winding;
 
+pub use bvh::{Bvh, Hit, Nearest, Triangles};
 pub use error::MeshError;
 pub use face::{Face, Link};
+pub use mesh_cone::{Beginning, MeshCone};
 pub use report::{Finding, MeshReport};
 pub use soup::TriangleSoup;
+pub use walk::MAX_FEATURE_CHANGES;
 
 use nalgebra::Vector3;
 use std::fmt;
@@ -35,6 +46,7 @@ pub const MAX_VALENCE: u32 = 16_384;
 pub struct Mesh {
     faces: Box<[Face]>,
     vertices: Box<[Vector3<f64>]>,
+    bvh: Bvh,
     sides: Sides,
     extent_m: f64,
 }

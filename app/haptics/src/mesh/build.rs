@@ -12,7 +12,7 @@
 //! Cost: linear, but for sorting.
 
 use super::repair::{Triangle, area_vector};
-use super::{Face, Link, Mesh, MeshError, MeshReport, TriangleSoup};
+use super::{Bvh, Face, Link, Mesh, MeshError, MeshReport, TriangleSoup};
 use super::{order, repair, topology, winding};
 use nalgebra::Vector3;
 
@@ -37,7 +37,8 @@ impl Mesh {
         report.vertices = vertices.len();
         let extent_m = vertices.iter().fold(0.0_f64, |extent, v| extent.max(v.amax()));
         let vertices = vertices.into_boxed_slice();
-        Ok((Self { faces, vertices, sides, extent_m }, report))
+        let bvh = Bvh::build(&faces, &vertices);
+        Ok((Self { faces, vertices, bvh, sides, extent_m }, report))
     }
 }
 
