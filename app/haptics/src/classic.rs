@@ -24,6 +24,6 @@ pub fn classic_god_object(shape: &Shape, hip_B: &Vector3<f64>) -> Option<Vector3
             let at = if rho > 0.0 { hip_B * (r / rho) } else { Vector3::y() * r };
             (rho <= r).then_some(at)
         }
-        Shape::Mesh(_) | Shape::Own(_) => None,
+        Shape::Form(_) | Shape::Mesh(_) | Shape::Own(_) => None,
     }
 }

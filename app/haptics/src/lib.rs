@@ -30,8 +30,13 @@
 #![allow(non_snake_case)]
 
 mod algorithm;
+mod capsule;
 mod classic;
+mod cone;
 mod contact;
+mod convex;
+mod cuboid;
+mod cylinder;
 mod entity;
 mod error;
 mod finger;
@@ -39,6 +44,7 @@ mod frame;
 mod friction;
 mod friction_cone;
 mod friction_law;
+mod frustum;
 mod grip;
 mod hip;
 pub mod mesh;
@@ -51,8 +57,12 @@ mod surface;
 mod tangent_view;
 
 pub use algorithm::{Algorithm, CONTACT_WORDS, ContactAlgorithm, ContactMemory, Touch, TouchInput};
+pub use capsule::Capsule;
 pub use classic::classic_god_object;
+pub use cone::Cone;
 pub use contact::{Contact, RAMP_IN_S};
+pub use cuboid::Cuboid;
+pub use cylinder::Cylinder;
 pub use entity::Entity;
 pub use error::ParameterError;
 pub use finger::{ContactState, Finger, FingerOutput};

@@ -6,6 +6,10 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use crate::capsule::Capsule;
+use crate::cone::Cone;
+use crate::cuboid::Cuboid;
+use crate::cylinder::Cylinder;
 use crate::mesh::Mesh;
 use crate::plane::Plane;
 use crate::shared::Shared;
@@ -35,6 +39,14 @@ pub enum Form {
     Plane(Plane),
     /// A ball around B's origin.
     Sphere(Sphere),
+    /// A box.
+    Cuboid(Cuboid),
+    /// A cylinder with caps.
+    Cylinder(Cylinder),
+    /// A cone, whole or cut off, with caps.
+    Cone(Cone),
+    /// A cylinder with half balls on its ends.
+    Capsule(Capsule),
 }
 
 impl Shape {
@@ -103,4 +115,4 @@ macro_rules! forms {
     };
 }
 
-forms!(Plane, Sphere);
+forms!(Plane, Sphere, Cuboid, Cylinder, Cone, Capsule);
