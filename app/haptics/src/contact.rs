@@ -11,7 +11,8 @@
 
 use nalgebra::Vector3;
 
-use crate::algorithm::{Algorithm, ContactMemory, Touch, TouchInput};
+use crate::algorithm::{Algorithm, ContactAlgorithm, ContactMemory, Touch, TouchInput};
+use crate::classic_god_object::ClassicGodObject;
 use crate::entity::Entity;
 use crate::frame::{is_finite, point_into_body, point_into_world, vector_into_body, vector_into_world};
 use crate::friction_cone::{ConeInput, FrictionCone};
@@ -19,6 +20,7 @@ use crate::friction_law::FrictionState;
 use crate::mesh::{Beginning, Mesh, MeshCone};
 use crate::shape::Shape;
 use crate::surface::{Feature, Surface};
+use crate::vector_field::VectorField;
 
 /// What a finger feels of one entity in one tick, in the world frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,6 +85,7 @@ impl Slot {
         self.contact = self.touch(index, entity, sweep);
         if self.contact.is_none() {
             self.cone = None;
+            self.own = ContactMemory::default();
             self.mesh.let_go();
         }
         self.contact
@@ -111,12 +114,20 @@ impl Slot {
         };
         let touch = match &entity.algorithm {
             Algorithm::FrictionCone => self.touch_shape(&input),
-            Algorithm::Own(algorithm) => {
-                self.strength = 1.0;
-                algorithm.touch(&input, &mut self.own)
-            }
+            Algorithm::VectorField => self.touch_by(&VectorField, &input),
+            Algorithm::ClassicGodObject => self.touch_by(&ClassicGodObject, &input),
+            Algorithm::Own(algorithm) => self.touch_by(&**algorithm, &input),
         }?;
         in_world(index, entity, &self.ramped(touch, sweep))
+    }
+
+    fn touch_by(&mut self, algorithm: &dyn ContactAlgorithm, input: &TouchInput<'_>) -> Option<Touch> {
+        let begins = self.contact.is_none();
+        let touch = algorithm.touch(input, &mut self.own)?;
+        if begins {
+            self.strength = if input.entry().is_some() { 1.0 } else { 0.0 };
+        }
+        Some(touch)
     }
 
     fn touch_shape(&mut self, input: &TouchInput<'_>) -> Option<Touch> {

@@ -31,8 +31,8 @@
 
 mod algorithm;
 mod capsule;
-mod classic;
 mod cone;
+mod classic_god_object;
 mod contact;
 mod convex;
 mod cuboid;
@@ -55,11 +55,12 @@ mod slide;
 mod sphere;
 mod surface;
 mod tangent_view;
+mod vector_field;
 
 pub use algorithm::{Algorithm, CONTACT_WORDS, ContactAlgorithm, ContactMemory, Touch, TouchInput};
 pub use capsule::Capsule;
-pub use classic::classic_god_object;
 pub use cone::Cone;
+pub use classic_god_object::ClassicGodObject;
 pub use contact::{Contact, RAMP_IN_S};
 pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
@@ -76,3 +77,4 @@ pub use shared::Shared;
 pub use slide::MAX_SLIDE_ROUNDS;
 pub use sphere::Sphere;
 pub use surface::{Feature, Surface, SurfacePoint};
+pub use vector_field::VectorField;
