@@ -43,7 +43,6 @@ mod names;
 mod placement;
 mod pose;
 mod reader;
-mod scale;
 mod scene;
 mod shape;
 mod source;

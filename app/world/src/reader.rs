@@ -5,6 +5,7 @@
 //! what it would have accepted.
 
 use std::fmt;
+use std::ops::RangeInclusive;
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -74,6 +75,15 @@ impl<'d> Table<'d> {
 
     pub(crate) fn number_or(&self, key: &str, bound: Bound, default: f64) -> Result<f64, SceneError> {
         self.get(key).map_or(Ok(default), |value| value.number(bound))
+    }
+
+    pub(crate) fn whole_or(
+        &self,
+        key: &str,
+        range: RangeInclusive<u64>,
+        default: u64,
+    ) -> Result<u64, SceneError> {
+        self.get(key).map_or(Ok(default), |value| value.whole(range))
     }
 
     pub(crate) fn numbers_or<const N: usize>(
@@ -200,10 +210,15 @@ impl<'d> Value<'d> {
 
     /// A whole number below `limit`.
     pub(crate) fn index(&self, limit: usize) -> Result<usize, SceneError> {
-        let allowed = format!("a whole number from 0 to {}", limit - 1);
+        self.whole(0..=limit as u64 - 1).map(|index| index as usize)
+    }
+
+    /// A whole number within `range`.
+    fn whole(&self, range: RangeInclusive<u64>) -> Result<u64, SceneError> {
+        let allowed = format!("a whole number from {} to {}", range.start(), range.end());
         let DeValue::Integer(_) = self.value.get_ref() else { return Err(self.wrong_type(allowed)) };
-        let index = self.integer().and_then(|integer| usize::try_from(integer).ok());
-        index.filter(|index| *index < limit).ok_or_else(|| self.out_of_range(allowed))
+        let whole = self.integer().and_then(|integer| u64::try_from(integer).ok());
+        whole.filter(|whole| range.contains(whole)).ok_or_else(|| self.out_of_range(allowed))
     }
 
     /// A string that is not empty.

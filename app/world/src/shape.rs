@@ -7,7 +7,6 @@ use nalgebra::{Unit, Vector3};
 use crate::error::{Location, SceneError};
 use crate::pose::read_direction;
 use crate::reader::{Bound, Table, Value};
-use crate::scale::{IN_SIZE, scaled};
 use crate::vocabulary::Vocabulary;
 
 /// A shape with its sizes, as the scene file gives it. Sizes are above 0 unless it is said.
@@ -40,9 +39,9 @@ pub enum ShapeSpec {
     },
     /// A cone or the frustum of one around B's origin, its axis along y.
     Cone {
-        /// Of the circle at y = -length / 2.
+        /// Of the circle at y = -length / 2; one of the two may be 0, an apex.
         radius_bottom_m: f64,
-        /// Of the circle at y = length / 2; may be 0, the apex.
+        /// Of the circle at y = length / 2.
         radius_top_m: f64,
         /// Full length along y.
         length_m: f64,
@@ -68,11 +67,11 @@ pub enum ShapeSpec {
     },
     /// Triangles in a file of their own.
     Mesh(MeshSpec),
-    /// Another shape, drawn out along B's axes: what no other kind describes.
+    /// Another shape but a mesh, drawn out along B's axes.
     Scaled {
         /// The shape before.
         shape: Box<ShapeSpec>,
-        /// Factors along x, y and z.
+        /// Factors along x, y and z; above 0.
         scale: [f64; 3],
     },
 }
@@ -89,6 +88,22 @@ pub struct MeshSpec {
 }
 
 impl ShapeSpec {
+    /// Its `kind` in a scene file.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Plane { .. } => "plane",
+            Self::Sphere { .. } => "sphere",
+            Self::Box { .. } => "box",
+            Self::Cylinder { .. } => "cylinder",
+            Self::Cone { .. } => "cone",
+            Self::Torus { .. } => "torus",
+            Self::Capsule { .. } => "capsule",
+            Self::Ellipsoid { .. } => "ellipsoid",
+            Self::Mesh(_) => "mesh",
+            Self::Scaled { shape, .. } => shape.kind(),
+        }
+    }
+
     /// Reads the `shape` of an entity.
     pub(crate) fn read(entity: &Table<'_>) -> Result<Self, SceneError> {
         let table = entity.require("shape", EXAMPLE)?.table(EXAMPLE)?;
@@ -98,7 +113,10 @@ impl ShapeSpec {
         let shape = read(&table)?;
         let Some(value) = table.get("scale") else { return Ok(shape) };
         let scale = value.factors()?;
-        scaled(shape, scale).ok_or_else(|| value.out_of_range(IN_SIZE))
+        Ok(match shape {
+            ShapeSpec::Mesh(mesh) => ShapeSpec::Mesh(MeshSpec { scale, ..mesh }),
+            shape => ShapeSpec::Scaled { shape: Box::new(shape), scale },
+        })
     }
 }
 
@@ -143,12 +161,15 @@ fn read_cylinder(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
     Ok(ShapeSpec::Cylinder { radius_m: size(table, "radius_m")?, length_m: size(table, "length_m")? })
 }
 
+/// The tip may be at either end.
 fn read_cone(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
-    Ok(ShapeSpec::Cone {
-        radius_bottom_m: size(table, "radius_bottom_m")?,
-        radius_top_m: table.number("radius_top_m", Bound::NotNegative)?,
-        length_m: size(table, "length_m")?,
-    })
+    let radius_bottom_m = table.number("radius_bottom_m", Bound::NotNegative)?;
+    let radius_top_m = table.number("radius_top_m", Bound::NotNegative)?;
+    if radius_bottom_m == 0.0 && radius_top_m == 0.0 {
+        let allowed = "a number above 0, since radius_bottom_m is 0";
+        return Err(table.require("radius_top_m", "")?.out_of_range(allowed));
+    }
+    Ok(ShapeSpec::Cone { radius_bottom_m, radius_top_m, length_m: size(table, "length_m")? })
 }
 
 /// A tube thicker than its ring would pass through itself in the middle.
