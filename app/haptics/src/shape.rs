@@ -10,11 +10,14 @@ use crate::capsule::Capsule;
 use crate::cone::Cone;
 use crate::cuboid::Cuboid;
 use crate::cylinder::Cylinder;
+use crate::ellipsoid::Ellipsoid;
 use crate::mesh::Mesh;
 use crate::plane::Plane;
+use crate::scaled::Scaled;
 use crate::shared::Shared;
 use crate::sphere::Sphere;
 use crate::surface::{Surface, SurfacePoint};
+use crate::torus::Torus;
 
 /// Shape of an entity, in the entity's frame B.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,6 +50,12 @@ pub enum Form {
     Cone(Cone),
     /// A cylinder with half balls on its ends.
     Capsule(Capsule),
+    /// A tube bent to a ring.
+    Torus(Torus),
+    /// An ellipsoid.
+    Ellipsoid(Ellipsoid),
+    /// One of them scaled by different factors along its axes.
+    Scaled(Scaled),
 }
 
 impl Shape {
@@ -115,4 +124,4 @@ macro_rules! forms {
     };
 }
 
-forms!(Plane, Sphere, Cuboid, Cylinder, Cone, Capsule);
+forms!(Plane, Sphere, Cuboid, Cylinder, Cone, Capsule, Torus, Ellipsoid, Scaled);
