@@ -72,7 +72,10 @@ pub use ellipsoid::{Ellipsoid, LARGEST_RATIO};
 pub use entity::Entity;
 pub use error::ParameterError;
 pub use finger::{ContactState, Finger, FingerOutput};
-pub use friction::{Friction, OwnLaw, RESTICK_MARGIN};
+pub use friction::{
+    Bristles, Dahl, FixedCone, Friction, FrictionCurve, HaywardArmstrong, Karnopp, LuGre, MAX_BRISTLES,
+    MAX_CURVE_POINTS, OwnLaw, RESTICK_MARGIN, ResetIntegrator, Stribeck,
+};
 pub use friction_cone::{ConeForce, ConeInput, FrictionCone};
 pub use friction_law::{FrictionLaw, FrictionMemory, FrictionQuery, FrictionState, MEMORY_WORDS};
 pub use hip::Hip;
