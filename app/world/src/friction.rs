@@ -127,9 +127,9 @@ impl FrictionSpec {
     /// What Hayward's friction bears without any slide, if nothing is said: half of what it bears at all.
     pub const DEFAULT_STICK_FRACTION: f64 = 0.5;
     /// The most bristles of a contact, and how many there are if nothing is said.
-    pub const MAX_BRISTLES: usize = 20;
-    /// The most points of a curve.
-    pub const MAX_CURVE_POINTS: usize = 64;
+    pub const MAX_BRISTLES: usize = haptics::MAX_BRISTLES;
+    /// The most points of a curve; one more is kept for the speed 0.
+    pub const MAX_CURVE_POINTS: usize = haptics::MAX_CURVE_POINTS - 1;
 
     /// Reads the `friction` of an entity; none if there is no such key.
     pub(crate) fn read(entity: &Table<'_>) -> Result<Self, SceneError> {
