@@ -11,6 +11,9 @@ use nalgebra::Vector3;
 /// Concave polygons may have so many corners.
 pub(super) const MAX_CONCAVE_CORNERS: usize = 500;
 
+/// Of the polygon's area: a part of it that small is none.
+const ROUNDING: f64 = 1e-12;
+
 /// Appends the `corners.len() - 2` triangles of a polygon to `faces`.
 ///
 /// `None` if it crosses itself, or is concave and has too many corners. It must have at least three.
@@ -58,18 +61,21 @@ impl Outline<'_> {
     }
 
     fn cut_ears(&self, corners: &[u32], faces: &mut Vec<[u32; 3]>) -> Option<()> {
+        let rounding = ROUNDING * self.normal.norm_squared();
         let mut left = corners.to_vec();
         while left.len() > 3 {
             let around = |i: usize| [left[(i + left.len() - 1) % left.len()], left[i], left[(i + 1) % left.len()]];
             // Corners on a straight line leave a triangle without an area, once no proper ear is there.
             let ear = (0..left.len())
                 .find(|&i| self.turn(around(i)) > 0.0 && self.is_empty(around(i), &left))
-                .or_else(|| (0..left.len()).find(|&i| self.turn(around(i)) == 0.0))?;
+                .or_else(|| (0..left.len()).find(|&i| self.turn(around(i)).abs() <= rounding))?;
             faces.push(around(ear));
             left.remove(ear);
         }
-        faces.push([left[0], left[1], left[2]]);
-        Some(())
+        // Where ears have more area than the polygon, the rest runs the other way: it crosses itself.
+        let last = [left[0], left[1], left[2]];
+        faces.push(last);
+        (self.turn(last) >= -rounding).then_some(())
     }
 
     /// Whether no other corner lies in the triangle.
@@ -131,7 +137,7 @@ mod tests {
 
     #[test]
     fn a_polygon_that_crosses_itself_is_refused() {
-        // A pentagram turns twice around its middle, whatever is cut off.
+        // A pentagram turns twice around its middle.
         let star: Vec<[f64; 2]> =
             (0..5).map(|i| (f64::from(2 * i) * std::f64::consts::TAU / 5.0).sin_cos().into()).collect();
         assert_eq!(areas(&star), None);
