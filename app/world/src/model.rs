@@ -111,20 +111,21 @@ pub fn read_file(file: &Path) -> Result<Vec<u8>, ModelError> {
     if !metadata.is_file() {
         return Err(ModelError::NotAFile);
     }
-    let mut bytes = Vec::new();
+    check_size(metadata.len())?;
+    let mut bytes = Vec::with_capacity(metadata.len() as usize + 1);
     // A file that grows while it is read must not fill the memory either.
     File::open(file)
-        .and_then(|file| {
-            bytes.reserve_exact(metadata.len().min(MAX_MODEL_BYTES) as usize + 1);
-            file.take(MAX_MODEL_BYTES + 1).read_to_end(&mut bytes)
-        })
+        .and_then(|file| file.take(MAX_MODEL_BYTES + 1).read_to_end(&mut bytes))
         .map_err(unreadable)?;
-    match metadata.len().max(bytes.len() as u64) {
-        size if size > MAX_MODEL_BYTES => {
-            Err(ModelError::TooLarge { bytes: size, limit_bytes: MAX_MODEL_BYTES })
-        }
-        _ => Ok(bytes),
+    check_size(bytes.len() as u64)?;
+    Ok(bytes)
+}
+
+fn check_size(bytes: u64) -> Result<(), ModelError> {
+    if bytes <= MAX_MODEL_BYTES {
+        return Ok(());
     }
+    Err(ModelError::TooLarge { bytes, limit_bytes: MAX_MODEL_BYTES })
 }
 
 /// The triangles in `bytes`, whose format `file`'s name or they themselves say.
