@@ -59,12 +59,11 @@ mod sphere;
 mod surface;
 mod tangent_view;
 mod torus;
+mod vector_field;
 
 pub use algorithm::{Algorithm, CONTACT_WORDS, ContactAlgorithm, ContactMemory, Touch, TouchInput};
 pub use capsule::Capsule;
 pub use cone::Cone;
-mod vector_field;
-
 pub use classic_god_object::ClassicGodObject;
 pub use contact::{Contact, RAMP_IN_S};
 pub use cuboid::Cuboid;
