@@ -11,13 +11,16 @@
 
 use nalgebra::Vector3;
 
-use crate::algorithm::{Algorithm, ContactMemory, Touch, TouchInput};
+use crate::algorithm::{Algorithm, ContactAlgorithm, ContactMemory, Touch, TouchInput};
+use crate::classic_god_object::ClassicGodObject;
 use crate::entity::Entity;
 use crate::frame::{is_finite, point_into_body, point_into_world, vector_into_body, vector_into_world};
 use crate::friction_cone::{ConeInput, FrictionCone};
 use crate::friction_law::FrictionState;
+use crate::mesh::{Beginning, Mesh, MeshCone};
 use crate::shape::Shape;
 use crate::surface::{Feature, Surface};
+use crate::vector_field::VectorField;
 
 /// What a finger feels of one entity in one tick, in the world frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,6 +69,7 @@ pub(crate) struct Sweep {
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Slot {
     cone: Option<FrictionCone>,
+    mesh: MeshCone,
     own: ContactMemory,
     /// How much of the force is rendered, 0 to 1.
     strength: f64,
@@ -77,12 +81,14 @@ pub(crate) struct Slot {
 pub const RAMP_IN_S: f64 = 0.1;
 
 impl Slot {
-    pub(crate) fn step(&mut self, index: usize, entity: &Entity, sweep: &Sweep) -> Option<Contact> {
+    pub(crate) fn step(&mut self, index: usize, entity: &Entity, sweep: &Sweep) -> Option<&Contact> {
         self.contact = self.touch(index, entity, sweep);
         if self.contact.is_none() {
             self.cone = None;
+            self.own = ContactMemory::default();
+            self.mesh.let_go();
         }
-        self.contact
+        self.contact.as_ref()
     }
 
     fn touch(&mut self, index: usize, entity: &Entity, sweep: &Sweep) -> Option<Contact> {
@@ -106,14 +112,23 @@ impl Slot {
             previous_hip_B: previous_B,
             cone,
         };
-        let touch = match &entity.algorithm {
+        let mut touch = match &entity.algorithm {
             Algorithm::FrictionCone => self.touch_shape(&input),
-            Algorithm::Own(algorithm) => {
-                self.strength = 1.0;
-                algorithm.touch(&input, &mut self.own)
-            }
+            Algorithm::VectorField => self.touch_by(&VectorField, &input),
+            Algorithm::ClassicGodObject => self.touch_by(&ClassicGodObject, &input),
+            Algorithm::Own(algorithm) => self.touch_by(&**algorithm, &input),
         }?;
-        in_world(index, entity, &self.ramped(touch, sweep))
+        self.ramp(&mut touch, sweep);
+        in_world(index, entity, &touch)
+    }
+
+    fn touch_by(&mut self, algorithm: &dyn ContactAlgorithm, input: &TouchInput<'_>) -> Option<Touch> {
+        let begins = self.contact.is_none();
+        let touch = algorithm.touch(input, &mut self.own)?;
+        if begins {
+            self.strength = if input.entry().is_some() { 1.0 } else { 0.0 };
+        }
+        Some(touch)
     }
 
     fn touch_shape(&mut self, input: &TouchInput<'_>) -> Option<Touch> {
@@ -121,8 +136,23 @@ impl Slot {
             Shape::Form(form) if input.finger_radius_m == 0.0 => self.touch_surface(form, input),
             Shape::Form(form) => self.touch_surface(&form.grown(input.finger_radius_m)?, input),
             Shape::Own(surface) if input.finger_radius_m == 0.0 => self.touch_surface(&**surface, input),
+            Shape::Mesh(mesh) if input.finger_radius_m == 0.0 => self.touch_mesh(mesh, input),
             Shape::Mesh(_) | Shape::Own(_) => None,
         }
+    }
+
+    fn touch_mesh(&mut self, mesh: &Mesh, input: &TouchInput<'_>) -> Option<Touch> {
+        let was_touching = self.mesh.is_touching();
+        let (force, beginning) = self.mesh.update(mesh, input.friction, input.previous_hip_B, &input.cone)?;
+        if !was_touching {
+            self.strength = if beginning == Beginning::WasInside { 0.0 } else { 1.0 };
+        }
+        Some(Touch {
+            god_object: self.mesh.god_object()?,
+            force_on_user_B: force.force_on_user_B,
+            normal_force_n: force.normal_force_n,
+            friction: self.mesh.state(),
+        })
     }
 
     fn touch_surface<S: Surface + ?Sized>(&mut self, surface: &S, input: &TouchInput<'_>) -> Option<Touch> {
@@ -155,18 +185,15 @@ impl Slot {
     }
 
     /// A contact that began inside comes on slowly.
-    fn ramped(&mut self, touch: Touch, sweep: &Sweep) -> Touch {
+    fn ramp(&mut self, touch: &mut Touch, sweep: &Sweep) {
+        if self.strength >= 1.0 {
+            return;
+        }
         let step = sweep.dt_s / sweep.ramp_in_s;
         // Where time is unknown or no ramp wanted, there is none.
         self.strength = if step > 0.0 { (self.strength + step).min(1.0) } else { 1.0 };
-        if self.strength >= 1.0 {
-            return touch;
-        }
-        Touch {
-            force_on_user_B: touch.force_on_user_B * self.strength,
-            normal_force_n: touch.normal_force_n * self.strength,
-            ..touch
-        }
+        touch.force_on_user_B *= self.strength;
+        touch.normal_force_n *= self.strength;
     }
 }
 

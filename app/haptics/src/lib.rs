@@ -31,7 +31,7 @@
 
 mod algorithm;
 mod capsule;
-mod classic;
+mod classic_god_object;
 mod cone;
 mod contact;
 mod convex;
@@ -59,10 +59,11 @@ mod sphere;
 mod surface;
 mod tangent_view;
 mod torus;
+mod vector_field;
 
 pub use algorithm::{Algorithm, CONTACT_WORDS, ContactAlgorithm, ContactMemory, Touch, TouchInput};
 pub use capsule::Capsule;
-pub use classic::classic_god_object;
+pub use classic_god_object::ClassicGodObject;
 pub use cone::Cone;
 pub use contact::{Contact, RAMP_IN_S};
 pub use cuboid::Cuboid;
@@ -71,7 +72,10 @@ pub use ellipsoid::{Ellipsoid, LARGEST_RATIO};
 pub use entity::Entity;
 pub use error::ParameterError;
 pub use finger::{ContactState, Finger, FingerOutput};
-pub use friction::{Friction, OwnLaw, RESTICK_MARGIN};
+pub use friction::{
+    Bristles, Dahl, FixedCone, Friction, FrictionCurve, HaywardArmstrong, Karnopp, LuGre, MAX_BRISTLES,
+    MAX_CURVE_POINTS, OwnLaw, RESTICK_MARGIN, ResetIntegrator, Stribeck,
+};
 pub use friction_cone::{ConeForce, ConeInput, FrictionCone};
 pub use friction_law::{FrictionLaw, FrictionMemory, FrictionQuery, FrictionState, MEMORY_WORDS};
 pub use hip::Hip;
@@ -83,3 +87,4 @@ pub use slide::MAX_SLIDE_ROUNDS;
 pub use sphere::Sphere;
 pub use surface::{Feature, Surface, SurfacePoint};
 pub use torus::Torus;
+pub use vector_field::VectorField;

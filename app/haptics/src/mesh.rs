@@ -8,13 +8,99 @@
 //! order of the input was.
 //!
 //! Frames and signs: object frame B; vertices run counter-clockwise seen from outside, normals leave the material.
+//!
+//! [`Mesh::build`] makes one of any [`TriangleSoup`], repairs what can be repaired and says so:
+//! ```
+//! use haptics::mesh::{Mesh, Sides, make};
+//!
+//! let mut soup = make::cuboid([0.1, 0.2, 0.3]);
+//! soup.faces[5].swap(1, 2);
+//! let (mesh, report) = Mesh::build(soup)?;
+//! assert_eq!(mesh.sides(), Sides::Solid);
+//! assert_eq!(report.flipped.first, Some(5));
+//! println!("{report}");
+//! # Ok::<(), haptics::mesh::MeshError>(())
+//! ```
 
+mod build;
+mod bvh;
+mod cone;
+mod error;
 mod face;
+mod facing;
+mod fan;
+pub mod make;
+mod mesh_cone;
+mod order;
+mod place;
+mod query;
+mod repair;
+mod report;
+mod sliver;
 mod soup;
+mod topology;
+mod touching;
+mod walk;
+mod winding;
 
+pub use bvh::{Bvh, Hit, Nearest, Triangles};
+pub use error::MeshError;
 pub use face::{Face, Link};
+pub use mesh_cone::{Beginning, MeshCone};
+pub use report::{Finding, MeshReport};
 pub use soup::TriangleSoup;
+pub use walk::MAX_FEATURE_CHANGES;
 
-/// A mesh, ready to be walked on.
-#[derive(Debug)]
-pub struct Mesh {}
+use nalgebra::Vector3;
+use std::fmt;
+
+/// The most faces around a vertex: a walk goes round it within a tick.
+pub const MAX_VALENCE: u32 = 16_384;
+
+/// A triangle mesh whose faces know their neighbours.
+pub struct Mesh {
+    faces: Box<[Face]>,
+    vertices: Box<[Vector3<f64>]>,
+    bvh: Bvh,
+    sides: Sides,
+    extent_m: f64,
+}
+
+/// From where a mesh can be felt.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sides {
+    /// Closed and orientable: it has an inside, and is felt from outside.
+    Solid,
+    /// Open, or not orientable as a Klein bottle is: felt from both sides.
+    Sheet,
+}
+
+impl Mesh {
+    /// In spatial order.
+    pub fn faces(&self) -> &[Face] {
+        &self.faces
+    }
+
+    /// In the object's frame B \[m\], in order of their first use by a face. All are used, no two are equal.
+    pub fn vertices(&self) -> &[Vector3<f64>] {
+        &self.vertices
+    }
+
+    /// Whether it has an inside.
+    pub fn sides(&self) -> Sides {
+        self.sides
+    }
+
+    /// Largest coordinate, without its sign \[m\]: what rounding errors are measured by.
+    pub fn extent_m(&self) -> f64 {
+        self.extent_m
+    }
+}
+
+/// Its size alone: a million faces would help nobody.
+impl fmt::Debug for Mesh {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [faces, vertices] = [self.faces.len(), self.vertices.len()];
+        write!(f, "Mesh {{ {faces} faces, {vertices} vertices, {:?} }}", self.sides)
+    }
+}

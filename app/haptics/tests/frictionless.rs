@@ -4,7 +4,7 @@
 mod common;
 
 use common::*;
-use haptics::{ContactState, Friction, Plane, Shape, Sphere, classic_god_object};
+use haptics::{ContactState, Friction, Plane, Shape, Sphere};
 use nalgebra::Vector3;
 
 const LAWS: [Friction; 4] = [
@@ -41,7 +41,7 @@ fn on_planes_it_is_the_classic_god_object_bit_for_bit() {
             let mut touched = 0;
             for hip in walk(i, 0.1) {
                 let out = finger.step(&[entity(shape.clone(), law.clone())], &hip, DT);
-                let classic = classic_god_object(&shape, &hip);
+                let classic = closed_form_god_object(&shape, &hip);
                 assert_eq!(out.entity.is_some(), classic.is_some());
                 assert_eq!(bits(&out.god_object_W), bits(&classic.unwrap_or(hip)));
                 assert_ne!(out.friction, ContactState::Stick);
@@ -61,7 +61,7 @@ fn on_a_sphere_it_is_the_classic_god_object_to_the_tolerance_of_the_slide() {
         let mut compared = 0;
         for hip in walk(6, 0.1) {
             let out = finger.step(&[entity(shape.clone(), law.clone())], &hip, DT);
-            let classic = classic_god_object(&shape, &hip);
+            let classic = closed_form_god_object(&shape, &hip);
             assert_eq!(out.entity.is_some(), classic.is_some());
             let Some(classic) = classic else { continue };
             compared += 1;
@@ -83,6 +83,6 @@ fn pressing_straight_down_it_is_the_classic_god_object_bit_for_bit_too() {
     for i in 0..1000 {
         let hip = Vector3::new(0.3, -1e-3 * f64::from(i), 0.2);
         let out = finger.step(&[entity(shape.clone(), Friction::None)], &hip, DT);
-        assert_eq!(bits(&out.god_object_W), bits(&classic_god_object(&shape, &hip).unwrap()));
+        assert_eq!(bits(&out.god_object_W), bits(&closed_form_god_object(&shape, &hip).unwrap()));
     }
 }

@@ -1,7 +1,12 @@
 //! What the integration tests share: a deterministic noise source and ways to read an output.
 #![allow(dead_code, non_snake_case)]
 
-use haptics::{Entity, Finger, FingerOutput, Friction, Plane, Shape, Sphere};
+pub(crate) mod laws;
+
+pub(crate) mod meshes;
+pub(crate) mod path;
+
+use haptics::{Entity, Finger, FingerOutput, Form, Friction, Plane, Shape, Sphere};
 use nalgebra::{Isometry3, Vector3};
 
 /// Ticks at 1 kHz, as in the thesis.
@@ -54,6 +59,25 @@ pub(crate) fn on_circle(rho: f64, phi: f64) -> Vector3<f64> {
 pub(crate) fn sphere_lag(mu: f64, r: f64, rho: f64) -> Option<f64> {
     let sine = mu * r / (rho * (1.0 + mu * mu).sqrt());
     (sine <= 1.0).then(|| sine.asin() - mu.atan())
+}
+
+/// Where the frictionless god-object of a plane or a ball is, from the shape's equation alone; `None` outside.
+///
+/// The surface point nearest to the HIP. At a ball's centre it is the topmost point (+y).
+pub(crate) fn closed_form_god_object(shape: &Shape, hip_B: &Vector3<f64>) -> Option<Vector3<f64>> {
+    match shape {
+        Shape::Form(Form::Plane(plane)) => {
+            let (normal_B, offset_m) = (plane.normal_B(), plane.offset_m());
+            let depth_m = offset_m - normal_B.dot(hip_B);
+            (depth_m >= 0.0).then(|| hip_B + normal_B * depth_m)
+        }
+        Shape::Form(Form::Sphere(sphere)) => {
+            let (r, rho) = (sphere.radius_m(), hip_B.norm());
+            let at = if rho > 0.0 { hip_B * (r / rho) } else { Vector3::y() * r };
+            (rho <= r).then_some(at)
+        }
+        _ => panic!("no closed form for {shape:?}"),
+    }
 }
 
 /// SplitMix64 with Box and Muller's transform: small, seeded, the same everywhere.

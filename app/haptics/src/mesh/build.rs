@@ -1,0 +1,67 @@
+//! Makes a mesh of a triangle soup.
+//!
+//! Problem: files contain repeated vertices, faces without an area, faces wound the wrong way round and in any
+//! order; a walk over the mesh needs none of these.
+//!
+//! Model: validate, repair ([`repair`]), order in space ([`order`]), link ([`topology`]), wind ([`winding`]). What
+//! can be repaired without guessing is repaired and reported, the rest is refused with the first offender.
+//!
+//! Invariants of the result: every face has an area; links are mutual; the same geometry gives the same mesh,
+//! whatever the order of its faces and vertices was in the input.
+//!
+//! Cost: linear, but for sorting.
+
+use super::order::Triangle;
+use super::repair::area_vector;
+use super::{Bvh, Face, Link, Mesh, MeshError, MeshReport, TriangleSoup};
+use super::{order, repair, topology, winding};
+use nalgebra::Vector3;
+
+impl Mesh {
+    /// Builds a mesh, and says what had to be repaired.
+    ///
+    /// # Errors
+    /// When the input contradicts itself, or has a defect that cannot be repaired without guessing.
+    pub fn build(soup: TriangleSoup) -> Result<(Self, MeshReport), MeshError> {
+        soup.validate()?;
+        let mut report = MeshReport::default();
+        let mut triangles = repair::proper_triangles(&soup, &mut report)?;
+        order::sort_spatially(&mut triangles, &soup.vertices, &mut report.duplicate);
+        let vertices = order::renumber(&mut triangles, &soup.vertices);
+        drop(soup);
+        let mut links = topology::link(&triangles, &vertices, &mut report.touching_edges)?;
+        let sides = winding::orient(&mut triangles, &mut links, &vertices, &mut report);
+        report_edges(&triangles, &links, &mut report);
+        let faces: Box<[Face]> =
+            triangles.iter().zip(&links).map(|(triangle, links)| face(triangle, links, &vertices)).collect();
+        drop((triangles, links));
+        report.faces = faces.len();
+        report.vertices = vertices.len();
+        let extent_m = vertices.iter().fold(0.0_f64, |extent, v| extent.max(v.amax()));
+        let vertices = vertices.into_boxed_slice();
+        let bvh = Bvh::build(&faces, &vertices);
+        Ok((Self { faces, vertices, bvh, sides, extent_m }, report))
+    }
+}
+
+/// Its offset is the middle of those of its corners, so that none of them is further from the plane than needed.
+fn face(triangle: &Triangle, links: &[Link; 3], vertices: &[Vector3<f64>]) -> Face {
+    let corners = triangle.corners.map(|v| vertices[v as usize]);
+    let normal_B = area_vector(&corners).normalize();
+    let [a, b, c] = corners.map(|corner| normal_B.dot(&corner));
+    let offset_m = 0.5 * (a.min(b).min(c) + a.max(b).max(c));
+    Face { normal_B, offset_m, vertices: triangle.corners, links: *links }
+}
+
+fn report_edges(triangles: &[Triangle], links: &[[Link; 3]], report: &mut MeshReport) {
+    for (face, (triangle, own)) in triangles.iter().zip(links).enumerate() {
+        for link in own {
+            if link.is_boundary() {
+                report.boundary_edges.note(triangle.origin as usize);
+            } else if link.is_turned() && link.face() as usize > face {
+                let origin = triangle.origin.min(triangles[link.face() as usize].origin);
+                report.turned_edges.note(origin as usize);
+            }
+        }
+    }
+}

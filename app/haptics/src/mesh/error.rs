@@ -1,0 +1,117 @@
+//! Why no mesh can be made of a triangle soup.
+
+use super::soup::LARGEST_COORDINATE_M;
+use std::fmt;
+
+/// A defect that cannot be repaired. Faces and vertices are named by their index in the input, from 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum MeshError {
+    /// None at all, or more than indices can tell apart.
+    Number {
+        /// "faces" or "vertices".
+        what: &'static str,
+        /// How many there are.
+        found: usize,
+        /// The most there may be; the least is 1.
+        allowed: usize,
+    },
+    /// A coordinate that is not finite, or larger than anything that can be felt.
+    Coordinate {
+        /// The first vertex with such a coordinate.
+        vertex: usize,
+        /// Its coordinates (m).
+        value: [f64; 3],
+    },
+    /// A face refers to a vertex that is not there.
+    Index {
+        /// The first such face.
+        face: usize,
+        /// Its indices.
+        found: [u32; 3],
+        /// How many vertices there are.
+        vertices: usize,
+    },
+    /// Every face was degenerate.
+    NothingLeft {
+        /// How many faces there were.
+        faces: usize,
+    },
+    /// More than two faces meet at an edge, and there is no telling which one comes next.
+    NonManifold {
+        /// How many such edges there are.
+        edges: usize,
+        /// The first face at such an edge.
+        first_face: usize,
+        /// How many faces share that edge.
+        faces: usize,
+        /// Where that edge begins and ends (m).
+        ends_B: [[f64; 3]; 2],
+    },
+    /// More faces around a vertex than may be walked round within a tick.
+    Valence {
+        /// Where the vertex is (m).
+        at_B: [f64; 3],
+        /// How many faces meet there.
+        faces: usize,
+        /// The most there may be.
+        allowed: usize,
+    },
+}
+
+impl fmt::Display for MeshError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number { what, found, allowed } => {
+                write!(f, "the mesh has {found} {what}; allowed are 1 to {allowed}")
+            }
+            Self::Coordinate { vertex, value: [x, y, z] } => write!(
+                f,
+                "vertex {vertex} is at [{x}, {y}, {z}]; allowed are finite numbers of metres, at most \
+                 {LARGEST_COORDINATE_M:e} in size: correct the vertex or the unit"
+            ),
+            Self::Index { face, found: [a, b, c], vertices } => write!(
+                f,
+                "face {face} refers to vertices [{a}, {b}, {c}], but there are {vertices}, counted from 0: is the \
+                 file cut short?"
+            ),
+            Self::NothingLeft { faces } => write!(
+                f,
+                "none of the {faces} faces has an area; allowed is a mesh with at least one proper triangle: was \
+                 it scaled to nothing?"
+            ),
+            Self::NonManifold { edges, first_face, faces, ends_B: [a, b] } => write!(
+                f,
+                "{edges} edges are shared by more than two faces (first: face {first_face}, {faces} faces at the \
+                 edge from {a:?} to {b:?} m); allowed are one or two, or solid parts that touch along the edge: \
+                 remove inner walls, separate sheets that meet, wind faces outward"
+            ),
+            Self::Valence { at_B, faces, allowed } => write!(
+                f,
+                "{faces} faces meet at {at_B:?} m; allowed are {allowed} around a vertex: divide the fan by a ring"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for MeshError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_message_names_the_offender_what_was_found_and_what_is_allowed() {
+        let message = MeshError::Index { face: 7, found: [0, 1, 9], vertices: 8 }.to_string();
+        assert_eq!(
+            message,
+            "face 7 refers to vertices [0, 1, 9], but there are 8, counted from 0: is the file cut short?"
+        );
+        let message = MeshError::Coordinate { vertex: 3, value: [0.0, f64::NAN, 1.0] }.to_string();
+        assert!(message.starts_with("vertex 3 is at [0, NaN, 1]; allowed are finite"), "{message}");
+        let message =
+            MeshError::NonManifold { edges: 2, first_face: 5, faces: 4, ends_B: [[0.0; 3], [1.0; 3]] }
+                .to_string();
+        assert!(message.contains("first: face 5, 4 faces at the edge from [0.0, 0.0, 0.0]"), "{message}");
+    }
+}

@@ -1,0 +1,115 @@
+//! Which piece of the mesh holds the HIP back: the transitions that the movement of the HIP makes.
+//!
+//! Problem: a god-object on an edge or a vertex goes on along one of the faces that meet there, stays, or is free.
+//! Melder ch. 4.2.4.4-4.2.4.8 lists rules that disagree at acute edges, saddles and needles, and leaves vertex to
+//! face open.
+//!
+//! Model: seen from an edge or a vertex the surface is a wedge or a cone without end. Its point nearest to the HIP
+//! tells where to go: on a face, onto that face; on an edge, along it; at the tip, nowhere. And it tells, by the side of
+//! the surface that the HIP has there, whether the HIP is outside. For a convex edge that is "the nearest face plane
+//! wins" and "free when in front of either", for a concave one "free when in front of both".
+//!
+//! Frames and signs: object frame B; depths are positive behind a face.
+//! Invariant: free needs a HIP that is in front of a face; in doubt the god-object stays where it is.
+//! Cost: one face record on a face, two on an edge, one for each face around a vertex.
+
+use nalgebra::Vector3;
+
+use super::Mesh;
+use super::cone::{Cone, Nearest};
+use super::place::{Facet, On, Place, Side};
+
+/// What holds the HIP back.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Facing {
+    /// A face.
+    Face(Side),
+    /// A concave edge.
+    Edge(Side, usize),
+    /// A vertex.
+    Vertex(Side, usize),
+    /// Nothing: the HIP is in front of the surface here.
+    Free,
+}
+
+impl Facing {
+    #[inline(always)]
+    pub(crate) fn of(mesh: &Mesh, place: &Place, hip_B: &Vector3<f64>) -> Self {
+        match place.on {
+            On::Face(side) => {
+                if is_in_front(mesh, Facet::of(mesh, side).depth_m(hip_B)) {
+                    Self::Free
+                } else {
+                    Self::Face(side)
+                }
+            }
+            On::Edge(side, edge) => Self::on_edge(mesh, side, edge, &place.point_B, hip_B),
+            On::Vertex(side, corner) => Self::at_vertex(mesh, side, corner, &place.point_B, hip_B),
+        }
+    }
+
+    #[inline(always)]
+    fn on_edge(mesh: &Mesh, side: Side, edge: usize, point_B: &Vector3<f64>, hip_B: &Vector3<f64>) -> Self {
+        let here = Facet::of(mesh, side);
+        let link = here.face.links[edge];
+        let (_, edge_B) = here.edge_B(mesh, edge);
+        let to_hip_B = hip_B - point_B;
+        let here_wants = here.inward_B(&edge_B).dot(&to_hip_B) > 0.0;
+        let here_depth_m = here.depth_m(hip_B);
+        let Some(over) = side.across(link).map(|side| Facet::of(mesh, side)) else {
+            // The rim of a sheet: beyond it there is nothing.
+            return if here_wants && !is_in_front(mesh, here_depth_m) {
+                Self::Face(side)
+            } else {
+                Self::Free
+            };
+        };
+        // Neighbours run along their edge in opposite directions, unless one of them is turned.
+        let over_inward_B = over.inward_B(&if link.is_turned() { edge_B } else { -edge_B });
+        let over_wants = over_inward_B.dot(&to_hip_B) > 0.0;
+        let over_depth_m = over.depth_m(hip_B);
+        let is_concave = over_inward_B.dot(&here.normal_B) > 0.0;
+        let in_front = [is_in_front(mesh, here_depth_m), is_in_front(mesh, over_depth_m)];
+        let is_free = if is_concave { in_front == [true; 2] } else { in_front != [false; 2] };
+        if is_free {
+            return Self::Free;
+        }
+        match (here_wants && !in_front[0], over_wants && !in_front[1]) {
+            (true, false) => Self::Face(side),
+            (false, true) => Self::Face(over.side),
+            // On a convex edge by rounding only.
+            (false, false) => Self::Edge(side, edge),
+            // The lower index among equals, so that the result does not depend on where one came from.
+            (true, true) if (here_depth_m, side.face) <= (over_depth_m, over.side.face) => Self::Face(side),
+            (true, true) => Self::Face(over.side),
+        }
+    }
+
+    #[inline(never)]
+    fn at_vertex(
+        mesh: &Mesh,
+        side: Side,
+        corner: usize,
+        point_B: &Vector3<f64>,
+        hip_B: &Vector3<f64>,
+    ) -> Self {
+        let cone = Cone::around(mesh, side, corner, &(hip_B - point_B));
+        match cone.nearest {
+            Nearest::Face(side, depth_m) if !is_in_front(mesh, depth_m) => Self::Face(side),
+            Nearest::Face(..) => Self::Free,
+            Nearest::Edge(side, edge) => Self::on_edge(mesh, side, edge, point_B, hip_B),
+            Nearest::Tip if cone.is_behind(mesh, side, corner) => Self::Vertex(side, corner),
+            Nearest::Tip => Self::Free,
+        }
+    }
+}
+
+/// Whether a HIP at this depth is clearly in front of a face: by more than a path that ends there is met before it. A
+/// finger that rounding could put on either side of a sheet is in contact, without a force.
+#[inline]
+fn is_in_front(mesh: &Mesh, depth_m: f64) -> bool {
+    depth_m < -RELEASE * mesh.extent_m
+}
+
+/// A few times the tolerance of [`Mesh::first_hit`].
+const RELEASE: f64 = 4e-13;

@@ -1,0 +1,199 @@
+//! The Friction Cone Algorithm on a mesh: one finger in contact with it, or near it.
+//!
+//! Model: free, the HIP's path is cast against the mesh each tick, unless it is known that nothing is near. In contact,
+//! the god-object holds or walks. Beside it walks its shadow, the frictionless god-object: while the shadow is held
+//! back, so is the finger; when it is free, the finger is round the corner, and friction must not hold it.
+//!
+//! Frames: the mesh's own, B.
+//! Invariant: between two ticks the finger's path never crosses the mesh unnoticed, also where rounding put its end on
+//! the wrong side.
+//! Cost: free and far, one comparison; free and near, one query of the hierarchy; in contact, independent of the mesh.
+
+use nalgebra::Vector3;
+
+use super::Mesh;
+use super::place::Place;
+use super::walk::{Stand, Walked, stand, walk};
+use crate::friction::Friction;
+use crate::friction_cone::{ConeForce, ConeInput, answer};
+use crate::friction_law::{FrictionLaw, FrictionState};
+use crate::grip::{Grip, Pull};
+use crate::surface::SurfacePoint;
+use crate::tangent_view::TangentView;
+
+/// State of one finger towards one mesh.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct MeshCone {
+    /// Which mesh the rest is about: indices of another one would lead nowhere.
+    mesh: Option<usize>,
+    touching: Option<Touching>,
+    /// Where the HIP was in the last tick.
+    last_hip_B: Option<Vector3<f64>>,
+    clear: Clear,
+}
+
+/// A contact.
+#[derive(Debug, Clone, Copy)]
+struct Touching {
+    god_object: Place,
+    normal_B: Vector3<f64>,
+    /// The frictionless god-object; the same place where there is no friction.
+    shadow: Place,
+    grip: Grip,
+}
+
+/// A ball around a place that no face reaches into.
+#[derive(Debug, Clone, Copy)]
+struct Clear {
+    centre_B: Vector3<f64>,
+    radius_m: f64,
+}
+
+/// How a finger came to touch a mesh.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Beginning {
+    /// It touched already, or came from outside.
+    Came,
+    /// It was found inside.
+    WasInside,
+}
+
+impl MeshCone {
+    /// One tick; `None` while the finger is free. `previous_hip_B` is where the HIP was, taken through the pose that
+    /// the mesh had then.
+    pub fn update(
+        &mut self,
+        mesh: &Mesh,
+        friction: &Friction,
+        previous_hip_B: Option<Vector3<f64>>,
+        input: &ConeInput,
+    ) -> Option<(ConeForce, Beginning)> {
+        // Its faces stay where they are as long as it lives.
+        let mesh_here = Some(mesh.faces().as_ptr().addr());
+        if self.mesh != mesh_here {
+            *self = Self { mesh: mesh_here, ..Self::default() };
+        }
+        let last_hip_B = self.last_hip_B.replace(input.hip_B);
+        let mut beginning = Beginning::Came;
+        if self.touching.is_none() {
+            let (place, how) = self.meet(mesh, previous_hip_B, last_hip_B, &input.hip_B)?;
+            beginning = how;
+            self.touching = Some(Touching::new(place));
+        }
+        let force = self.touching.as_mut().and_then(|touching| touching.update(mesh, friction, input));
+        if force.is_none() {
+            self.touching = None;
+        }
+        force.map(|force| (force, beginning))
+    }
+
+    /// Whether a contact lives.
+    pub fn is_touching(&self) -> bool {
+        self.touching.is_some()
+    }
+
+    /// Ends a contact whose force nobody can use: the next tick is as a first one.
+    pub(crate) fn let_go(&mut self) {
+        if self.is_touching() {
+            *self = Self::default();
+        }
+    }
+
+    /// Where the god-object is, with the normal and the feature there.
+    pub fn god_object(&self) -> Option<SurfacePoint> {
+        self.touching.as_ref().map(|touching| SurfacePoint {
+            point_B: touching.god_object.point_B,
+            normal_B: touching.normal_B,
+            feature: touching.god_object.feature(),
+            piece: 0,
+        })
+    }
+
+    /// Whether friction holds it.
+    pub fn state(&self) -> FrictionState {
+        self.touching.as_ref().map_or(FrictionState::Stick, |touching| touching.grip.state)
+    }
+
+    fn meet(
+        &mut self,
+        mesh: &Mesh,
+        previous_hip_B: Option<Vector3<f64>>,
+        last_hip_B: Option<Vector3<f64>>,
+        hip_B: &Vector3<f64>,
+    ) -> Option<(Place, Beginning)> {
+        // A mesh that was placed elsewhere was not met on the way there.
+        let is_elsewhere = |from_B: &Vector3<f64>| {
+            last_hip_B.is_none_or(|last_B| (from_B - last_B).amax() > SAME_PLACE * mesh.extent_m())
+        };
+        let Some(from_B) = previous_hip_B.filter(|from_B| !is_elsewhere(from_B)) else {
+            self.clear = Clear::default();
+            // It is pushed out along the nearest face.
+            let was_inside = || (Place::nearest(&mesh.nearest(hip_B)), Beginning::WasInside);
+            return mesh.is_inside(hip_B).then(was_inside);
+        };
+        if self.clear.has(&from_B) && self.clear.has(hip_B) {
+            return None;
+        }
+        if let Some(hit) = mesh.first_hit(&from_B, hip_B) {
+            return Some((Place::hit(&hit), Beginning::Came));
+        }
+        self.clear = Clear { centre_B: *hip_B, radius_m: mesh.clearance(hip_B, mesh.extent_m()) };
+        None
+    }
+}
+
+impl Touching {
+    fn new(place: Place) -> Self {
+        Self { god_object: place, normal_B: Vector3::y(), shadow: place, grip: Grip::default() }
+    }
+
+    fn update(&mut self, mesh: &Mesh, friction: &Friction, input: &ConeInput) -> Option<ConeForce> {
+        let has_friction = !matches!(friction, Friction::None);
+        if has_friction {
+            let shadow = stand(mesh, &mut self.shadow, input)?;
+            walk(mesh, &mut self.shadow, shadow, |query| query.gap_m, &Pull::default(), input)?;
+        }
+        let here = stand(mesh, &mut self.god_object, input)?;
+        let pull = if has_friction { self.grip.begin_tick(&here.view, input) } else { Pull::default() };
+        let (view, tangential_B, changes) = match self.grip.hold(friction, &here.view, &pull, input) {
+            Some(tangential_B) => (here.view, tangential_B, 0),
+            None => self.slide(mesh, friction, here, &pull, input)?,
+        };
+        self.normal_B = view.normal_B;
+        if !has_friction {
+            self.shadow = self.god_object;
+        }
+        Some(answer(&view, &tangential_B, changes, input))
+    }
+
+    fn slide(
+        &mut self,
+        mesh: &Mesh,
+        friction: &Friction,
+        from: Stand,
+        pull: &Pull,
+        input: &ConeInput,
+    ) -> Option<(TangentView, Vector3<f64>, u32)> {
+        let asked = |query: &_| friction.slide(query, &self.grip.memory);
+        let Walked { view, tangential_B, changes } =
+            walk(mesh, &mut self.god_object, from, asked, pull, input)?;
+        let drag_B = self.grip.drag(friction, &view, pull, input);
+        Some((view, tangential_B + drag_B, changes))
+    }
+}
+
+impl Default for Clear {
+    /// A ball without a point in it: nothing is known.
+    fn default() -> Self {
+        Self { centre_B: Vector3::zeros(), radius_m: -1.0 }
+    }
+}
+
+impl Clear {
+    fn has(&self, point_B: &Vector3<f64>) -> bool {
+        self.radius_m > 0.0 && (point_B - self.centre_B).norm_squared() < self.radius_m * self.radius_m
+    }
+}
+
+/// Positions that differ by less than this share of the mesh are the same, seen through two equal poses.
+const SAME_PLACE: f64 = 1e-9;

@@ -1,0 +1,126 @@
+//! Where on a mesh a god-object is, and on which side of it.
+
+use nalgebra::Vector3;
+
+use super::face::{Face, Link};
+use super::{Hit, Mesh, Nearest};
+use crate::surface::Feature;
+
+/// A point of a mesh and the feature it lies on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Place {
+    pub(crate) point_B: Vector3<f64>,
+    pub(crate) on: On,
+}
+
+/// A feature of a mesh, told by one of its faces.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum On {
+    Face(Side),
+    /// The edge of this number of the face.
+    Edge(Side, usize),
+    /// The corner of this number of the face.
+    Vertex(Side, usize),
+}
+
+/// One of the two sides of a face: the back of a sheet can be felt, too.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Side {
+    pub(crate) face: u32,
+    pub(crate) is_back: bool,
+}
+
+/// One side of a face with its plane: what is in front of the plane is free.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Facet<'m> {
+    pub(crate) side: Side,
+    pub(crate) face: &'m Face,
+    /// Unit normal, towards the finger.
+    pub(crate) normal_B: Vector3<f64>,
+    pub(crate) offset_m: f64,
+}
+
+impl Place {
+    #[inline]
+    pub(crate) fn hit(hit: &Hit) -> Self {
+        Self { point_B: hit.point_B, on: On::Face(Side { face: hit.face, is_back: !hit.is_front }) }
+    }
+
+    pub(crate) fn nearest(nearest: &Nearest) -> Self {
+        let side = Side { face: nearest.face, is_back: false };
+        let on = match nearest.feature {
+            Feature::Edge => On::Edge(side, nearest.corner),
+            Feature::Vertex => On::Vertex(side, nearest.corner),
+            _ => On::Face(side),
+        };
+        Self { point_B: nearest.point_B, on }
+    }
+
+    pub(crate) fn feature(&self) -> Feature {
+        match self.on {
+            On::Face(_) => Feature::Face,
+            On::Edge(..) => Feature::Edge,
+            On::Vertex(..) => Feature::Vertex,
+        }
+    }
+}
+
+impl Side {
+    /// The side that one comes to across an edge; `None` where the mesh ends.
+    #[inline]
+    pub(crate) fn across(self, link: Link) -> Option<Self> {
+        (!link.is_boundary()).then(|| Self { face: link.face(), is_back: self.is_back != link.is_turned() })
+    }
+}
+
+impl<'m> Facet<'m> {
+    #[inline]
+    pub(crate) fn of(mesh: &'m Mesh, side: Side) -> Self {
+        let face = &mesh.faces[side.face as usize];
+        let (normal_B, offset_m) =
+            if side.is_back { (-face.normal_B, -face.offset_m) } else { (face.normal_B, face.offset_m) };
+        Self { side, face, normal_B, offset_m }
+    }
+
+    /// How far below the plane a point lies \[m\].
+    #[inline]
+    pub(crate) fn depth_m(&self, point_B: &Vector3<f64>) -> f64 {
+        self.offset_m - self.normal_B.dot(point_B)
+    }
+
+    /// From the start of an edge to its end \[m\].
+    #[inline]
+    pub(crate) fn edge_B(&self, mesh: &Mesh, edge: usize) -> (Vector3<f64>, Vector3<f64>) {
+        let start_B = self.corner_B(mesh, edge);
+        (start_B, self.corner_B(mesh, next(edge)) - start_B)
+    }
+
+    #[inline]
+    pub(crate) fn corners_B(&self, mesh: &Mesh) -> [Vector3<f64>; 3] {
+        let [a, b, c] = self.face.vertices;
+        [mesh.vertices[a as usize], mesh.vertices[b as usize], mesh.vertices[c as usize]]
+    }
+
+    #[inline]
+    pub(crate) fn corner_B(&self, mesh: &Mesh, corner: usize) -> Vector3<f64> {
+        mesh.vertices[self.face.vertices[corner] as usize]
+    }
+
+    /// Across an edge into the face, along its plane; as long as `edge_B`. The same for both sides.
+    #[inline]
+    pub(crate) fn inward_B(&self, edge_B: &Vector3<f64>) -> Vector3<f64> {
+        self.face.normal_B.cross(edge_B)
+    }
+}
+
+/// The corner after this one, which is also where the edge of this number ends.
+#[inline]
+pub(crate) fn next(corner: usize) -> usize {
+    if corner == 2 { 0 } else { corner + 1 }
+}
+
+/// The corner before this one, and the edge that leads from it to this one.
+#[inline]
+pub(crate) fn previous(corner: usize) -> usize {
+    if corner == 0 { 2 } else { corner - 1 }
+}

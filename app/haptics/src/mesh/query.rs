@@ -1,0 +1,51 @@
+//! What a mesh is asked: where a finger enters, what is nearest, how far it may still go.
+
+use nalgebra::Vector3;
+
+use super::{Hit, Mesh, Nearest, Sides, Triangles};
+
+impl Mesh {
+    /// The first face that the segment `from_B -> to_B` enters: from outside, or from either side of a sheet.
+    ///
+    /// No rounding lets it slip through where faces meet, nor past the surface in two steps: a start that lies up
+    /// to 1e-13 of the extent behind a face still counts as in front of it. None for a segment that is not finite
+    /// or has no length.
+    pub fn first_hit(&self, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<Hit> {
+        self.bvh.first_hit(self.triangles(), self.sides, from_B, to_B)
+    }
+
+    /// As [`Self::first_hit`], of the faces that `is_skipped` does not name.
+    pub(crate) fn first_hit_of_others(
+        &self,
+        from_B: &Vector3<f64>,
+        to_B: &Vector3<f64>,
+        is_skipped: impl Fn(u32) -> bool,
+    ) -> Option<Hit> {
+        self.bvh.first_hit_of_others(self.triangles(), self.sides, from_B, to_B, is_skipped)
+    }
+
+    /// The point of the mesh nearest to a point on either side.
+    ///
+    /// A point that is not finite is answered by a corner of face 0, infinitely far away. Beyond 1000 extents the
+    /// answer is that for a point 1000 extents away in the same direction, with the point's own distance.
+    pub fn nearest(&self, p_B: &Vector3<f64>) -> Nearest {
+        self.bvh.nearest(self.triangles(), p_B)
+    }
+
+    /// Whether a point is inside or on the surface. A sheet has no inside.
+    pub fn is_inside(&self, p_B: &Vector3<f64>) -> bool {
+        self.sides == Sides::Solid && self.bvh.is_inside(self.triangles(), p_B)
+    }
+
+    /// A lower bound of the distance from a point to the mesh, at most `at_most_m`; 0 if nothing better is known
+    /// \[m\].
+    ///
+    /// As long as a finger has moved less than this, it cannot have touched. Constant cost, whatever the mesh.
+    pub fn clearance(&self, p_B: &Vector3<f64>, at_most_m: f64) -> f64 {
+        self.bvh.clearance(p_B, at_most_m)
+    }
+
+    fn triangles(&self) -> Triangles<'_> {
+        Triangles { faces: &self.faces, vertices: &self.vertices }
+    }
+}

@@ -1,0 +1,133 @@
+//! What was found and repaired while a mesh was built.
+
+use std::fmt;
+
+/// How often something was found, and where first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Finding {
+    /// How often.
+    pub count: usize,
+    /// Index in the input of the first face or vertex concerned, from 0.
+    pub first: Option<usize>,
+}
+
+impl Finding {
+    /// Counts one more, at this index of the input.
+    pub(super) fn note(&mut self, index: usize) {
+        self.count += 1;
+        self.first = Some(self.first.map_or(index, |first| first.min(index)));
+    }
+}
+
+/// What a mesh is made of, and what had to be done to the input to make it.
+///
+/// Indices are those of the input, from 0: of faces, unless a field says vertices.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct MeshReport {
+    /// Faces of the mesh.
+    pub faces: usize,
+    /// Vertices of the mesh.
+    pub vertices: usize,
+    /// Parts that do not share an edge with one another.
+    pub components: usize,
+    /// Input vertices that were equal to an earlier one and were merged with it.
+    pub welded_vertices: Finding,
+    /// Input vertices that no face uses; left out.
+    pub unused_vertices: Finding,
+    /// Faces without an area; left out.
+    pub degenerate: Finding,
+    /// Faces divided in two, because a vertex lay on their edge, held there by a face without an area.
+    pub divided: Finding,
+    /// Faces with the same three vertices as an earlier one; left out.
+    pub duplicate: Finding,
+    /// Faces wound against most of their neighbours; turned over.
+    pub flipped: Finding,
+    /// Closed parts that were inside out as a whole; turned outward. The face is the first of the part.
+    pub inside_out: Finding,
+    /// Closed parts that face inward, as cavities do; left so.
+    pub cavities: Finding,
+    /// Edges along which parts touch, so that four or more faces share them; each face was joined to the next one
+    /// across the outside.
+    pub touching_edges: Finding,
+    /// Edges where the mesh ends: the rim of an open mesh, or a crack.
+    pub boundary_edges: Finding,
+    /// Edges across which inside and outside change places: the mesh cannot be oriented.
+    pub turned_edges: Finding,
+}
+
+impl MeshReport {
+    /// Whether the input was closed, wound consistently outward and free of defects.
+    ///
+    /// Merged vertices and cavities are no defects: STL has no other way to share a vertex, and hollow things exist.
+    pub fn is_clean(&self) -> bool {
+        let defects = [
+            self.unused_vertices,
+            self.degenerate,
+            self.divided,
+            self.duplicate,
+            self.flipped,
+            self.inside_out,
+            self.touching_edges,
+            self.boundary_edges,
+            self.turned_edges,
+        ];
+        defects.iter().all(|finding| finding.count == 0)
+    }
+}
+
+impl fmt::Display for MeshReport {
+    /// One line for the mesh, one for each kind of finding.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { faces, vertices, components, .. } = self;
+        write!(
+            f,
+            "{faces} faces, {vertices} vertices, {components} {}",
+            plural(*components, "part", "parts")
+        )?;
+        let lines = [
+            (self.welded_vertices, "vertex", "vertices", "equal to an earlier one: merged"),
+            (self.unused_vertices, "vertex", "vertices", "of no face: left out"),
+            (self.degenerate, "face", "faces", "without an area: left out"),
+            (self.divided, "face", "faces", "with a vertex on an edge: divided"),
+            (self.duplicate, "face", "faces", "given before: left out"),
+            (self.flipped, "face", "faces", "wound against the neighbours: turned over"),
+            (self.inside_out, "part", "parts", "inside out: turned"),
+            (self.cavities, "part", "parts", "facing inward: taken for a cavity"),
+            (self.touching_edges, "edge", "edges", "along which parts touch: joined across the outside"),
+            (self.boundary_edges, "edge", "edges", "of one face only: an open rim or a crack"),
+            (self.turned_edges, "edge", "edges", "where outside becomes inside: it cannot be oriented"),
+        ];
+        for (Finding { count, first }, one, many, what) in lines {
+            let Some(first) = first else { continue };
+            let of = if one == "vertex" { "vertex" } else { "face" };
+            write!(f, "\n{count} {} {what} (first: {of} {first})", plural(count, one, many))?;
+        }
+        Ok(())
+    }
+}
+
+fn plural(count: usize, one: &'static str, many: &'static str) -> &'static str {
+    if count == 1 { one } else { many }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_report_has_a_line_for_each_kind_of_finding() {
+        let mut report = MeshReport { faces: 12, vertices: 8, components: 1, ..MeshReport::default() };
+        assert!(report.is_clean());
+        assert_eq!(report.to_string(), "12 faces, 8 vertices, 1 part");
+        report.degenerate.note(9);
+        report.degenerate.note(4);
+        report.welded_vertices.note(2);
+        assert!(!report.is_clean());
+        assert_eq!(
+            report.to_string(),
+            "12 faces, 8 vertices, 1 part\n\
+             1 vertex equal to an earlier one: merged (first: vertex 2)\n\
+             2 faces without an area: left out (first: face 4)"
+        );
+    }
+}

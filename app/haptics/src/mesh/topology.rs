@@ -1,0 +1,147 @@
+//! Finds out which faces share an edge.
+//!
+//! Model: each edge is entered at its lower-numbered vertex; sorted by the other one, the faces at an edge stand
+//! side by side: one on a boundary, two inside, more where parts touch ([`touching`]). Vertices are numbered in spatial order by now, so this runs through memory in order.
+
+use super::order::Triangle;
+use super::report::Finding;
+use super::touching::pair_across_outside;
+use super::{Link, MAX_VALENCE, MeshError};
+use nalgebra::Vector3;
+
+/// The links of every face, as wound in the input.
+pub(super) fn link(
+    triangles: &[Triangle],
+    vertices: &[Vector3<f64>],
+    touching: &mut Finding,
+) -> Result<Vec<[Link; 3]>, MeshError> {
+    check_valences(triangles, vertices)?;
+    let (mut sides, starts) = sides_by_lower_vertex(triangles, vertices.len());
+    let mut links = vec![[Link::BOUNDARY; 3]; triangles.len()];
+    let mut crowded = Crowded::default();
+    for (lower, around) in starts.windows(2).enumerate() {
+        let around = &mut sides[around[0] as usize..around[1] as usize];
+        around.sort_unstable();
+        for edge in around.chunk_by(|a, b| a.upper() == b.upper()) {
+            match edge {
+                [_] => {}
+                [a, b] => join(&mut links, *a, *b),
+                many => match pair_across_outside(many, lower, triangles, vertices) {
+                    Some(pairs) => {
+                        pairs.iter().for_each(|&[a, b]| join(&mut links, a, b));
+                        touching.note(first_of_input(many, triangles));
+                    }
+                    None => crowded.note(many, lower, triangles, vertices),
+                },
+            }
+        }
+    }
+    crowded.into_result().map(|()| links)
+}
+
+/// A face's side of an edge. Packed, so that sorting compares one word: bits 32.. the edge's upper vertex, bit 0
+/// whether the face runs upward along it, between them 3 * face + edge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub(super) struct Side(u64);
+
+impl Side {
+    fn new(face: usize, edge: usize, from: u32, to: u32) -> Self {
+        Self(u64::from(from.max(to)) << 32 | ((3 * face + edge) as u64) << 1 | u64::from(from < to))
+    }
+
+    pub(super) fn upper(self) -> u32 {
+        (self.0 >> 32) as u32
+    }
+
+    pub(super) fn face(self) -> u32 {
+        (self.0 as u32 >> 1) / 3
+    }
+
+    fn edge(self) -> usize {
+        ((self.0 as u32 >> 1) % 3) as usize
+    }
+
+    pub(super) fn is_upward(self) -> bool {
+        self.0 & 1 == 1
+    }
+}
+
+// 3 * face + edge has 31 bits.
+const _: () = assert!(3 * Link::MAX_FACES < 1 << 31);
+
+/// All sides, grouped by the lower vertex v of their edge: `sides[starts[v]..starts[v + 1]]`.
+fn sides_by_lower_vertex(triangles: &[Triangle], vertices: usize) -> (Vec<Side>, Vec<u32>) {
+    let edges = |corners: &[u32; 3]| [0, 1, 2].map(|i| (corners[i], corners[(i + 1) % 3]));
+    let mut starts = vec![0_u32; vertices + 1];
+    for (from, to) in triangles.iter().flat_map(|t| edges(&t.corners)) {
+        starts[from.min(to) as usize] += 1;
+    }
+    let mut end = 0;
+    for start in &mut starts {
+        end += *start;
+        *start = end;
+    }
+    // Each start is now the group's end, and falls to its beginning as the group fills from behind.
+    let mut sides = vec![Side::default(); 3 * triangles.len()];
+    for (face, triangle) in triangles.iter().enumerate().rev() {
+        for (edge, (from, to)) in edges(&triangle.corners).into_iter().enumerate() {
+            let start = &mut starts[from.min(to) as usize];
+            *start -= 1;
+            sides[*start as usize] = Side::new(face, edge, from, to);
+        }
+    }
+    (sides, starts)
+}
+
+fn join(links: &mut [[Link; 3]], a: Side, b: Side) {
+    let turned = a.is_upward() == b.is_upward();
+    links[a.face() as usize][a.edge()] = Link::new(b.face(), b.edge() as u8, turned);
+    links[b.face() as usize][b.edge()] = Link::new(a.face(), a.edge() as u8, turned);
+}
+
+fn first_of_input(sides: &[Side], triangles: &[Triangle]) -> usize {
+    sides.iter().map(|side| triangles[side.face() as usize].origin as usize).min().unwrap_or(0)
+}
+
+fn check_valences(triangles: &[Triangle], vertices: &[Vector3<f64>]) -> Result<(), MeshError> {
+    let mut faces = vec![0_u32; vertices.len()];
+    for corner in triangles.iter().flat_map(|triangle| triangle.corners) {
+        faces[corner as usize] += 1;
+    }
+    match faces.iter().position(|&count| count > MAX_VALENCE) {
+        Some(vertex) => Err(MeshError::Valence {
+            at_B: vertices[vertex].into(),
+            faces: faces[vertex] as usize,
+            allowed: MAX_VALENCE as usize,
+        }),
+        None => Ok(()),
+    }
+}
+
+/// Edges at which it is not clear which face comes next.
+#[derive(Default)]
+struct Crowded {
+    edges: usize,
+    /// First face of the input at such an edge, number of faces there, the edge's ends.
+    first: Option<(usize, usize, [[f64; 3]; 2])>,
+}
+
+impl Crowded {
+    fn note(&mut self, sides: &[Side], lower: usize, triangles: &[Triangle], vertices: &[Vector3<f64>]) {
+        self.edges += 1;
+        let face = first_of_input(sides, triangles);
+        if self.first.is_none_or(|(first, ..)| face < first) {
+            let ends = [lower, sides[0].upper() as usize].map(|v| vertices[v].into());
+            self.first = Some((face, sides.len(), ends));
+        }
+    }
+
+    fn into_result(self) -> Result<(), MeshError> {
+        match self.first {
+            None => Ok(()),
+            Some((face, faces, ends_B)) => {
+                Err(MeshError::NonManifold { edges: self.edges, first_face: face, faces, ends_B })
+            }
+        }
+    }
+}

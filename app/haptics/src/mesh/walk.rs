@@ -1,0 +1,313 @@
+//! Walks a god-object over faces, edges and vertices towards where friction lets it rest.
+//!
+//! Problem: the god-object is drawn to the rim of the friction circle, and the way there may lead over many triangles.
+//! Placed on each edge until the next tick it would stick there (Melder ch. 7.5.4).
+//!
+//! Model: on a face the way to the rim is straight, and either ends in the face or meets an edge or a vertex. There,
+//! what faces the HIP is asked for anew, and the walk goes on from the same place. On a concave edge it goes along the
+//! edge, S being the foot of the HIP's perpendicular on it. A HIP in front of the surface lifts the god-object off: it
+//! flies straight to the HIP, and touches again where that way meets the mesh.
+//!
+//! Frames and signs: object frame B; forces are springs on the user \[m\].
+//! Invariants: the god-object is on the mesh. A frictionless walk never lengthens the spring, hence ends at a local
+//! minimum of the distance to the HIP.
+//! Cost: two to four face records a tick on small triangles; bounded by [`MAX_FEATURE_CHANGES`], at which the
+//! god-object waits where it is and goes on in the next tick.
+
+use nalgebra::Vector3;
+
+use super::Mesh;
+use super::facing::Facing;
+use super::place::{Facet, On, Place, Side, next};
+use crate::friction_cone::ConeInput;
+use crate::friction_law::{FrictionQuery, FrictionState};
+use crate::grip::{Pull, query};
+use crate::surface::direction_or_up;
+use crate::tangent_view::TangentView;
+
+/// Bound on the pieces of a mesh that a god-object comes to within one tick. Fingers at 0.5 m/s cross one
+/// triangle of 0.5 mm a tick; jumps of 0.1 m over such triangles are walked in two ticks.
+pub const MAX_FEATURE_CHANGES: u32 = 512;
+
+/// Bound on the flights of a god-object within one tick: each asks the hierarchy of boxes.
+const MAX_FLIGHTS: u32 = 8;
+
+/// Where a god-object is, and what faces the HIP there.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Stand {
+    pub(crate) facing: Facing,
+    pub(crate) view: TangentView,
+}
+
+/// Where a walk ended.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Walked {
+    pub(crate) view: TangentView,
+    /// Tangential force over stiffness, on the user \[m\].
+    pub(crate) tangential_B: Vector3<f64>,
+    pub(crate) changes: u32,
+}
+
+/// Where the god-object stands when the HIP has moved; `None` if it is free and gone.
+///
+/// `place` may change without moving: from an edge to the face that now holds the HIP back.
+#[inline(always)]
+pub(crate) fn stand(mesh: &Mesh, place: &mut Place, input: &ConeInput) -> Option<Stand> {
+    for _ in 0..MAX_FLIGHTS {
+        let facing = Facing::of(mesh, place, &input.hip_B);
+        let (on, view) = match facing {
+            Facing::Face(side) => (On::Face(side), view_of_face(mesh, side, place, input)),
+            Facing::Edge(side, edge) => (On::Edge(side, edge), view_of_edge(mesh, side, edge, place, input)),
+            Facing::Vertex(side, corner) => (On::Vertex(side, corner), view_of_vertex(place, input)),
+            Facing::Free => {
+                *place = match rim(mesh, place) {
+                    Some(rim) => rim,
+                    None => fly(mesh, place, &input.hip_B)?,
+                };
+                continue;
+            }
+        };
+        place.on = on;
+        return Some(Stand { facing, view });
+    }
+    None
+}
+
+/// Moves `place` from where it stands until `asked` wants no further slide; `None` if it is free and gone.
+#[inline]
+pub(crate) fn walk(
+    mesh: &Mesh,
+    place: &mut Place,
+    mut stand_now: Stand,
+    asked: impl Fn(&FrictionQuery) -> f64,
+    pull: &Pull,
+    input: &ConeInput,
+) -> Option<Walked> {
+    let start_B = place.point_B;
+    for changes in 0..MAX_FEATURE_CHANGES {
+        let slide = Slide::new(stand_now.view, &(start_B - place.point_B), &asked, pull, input);
+        if slide.is_at_rest() {
+            return Some(slide.rested(changes));
+        }
+        let target_B = slide.target_B();
+        let reached = match stand_now.facing {
+            Facing::Face(side) => cross_face(mesh, side, &place.point_B, &target_B),
+            Facing::Edge(side, edge) => follow_edge(mesh, side, edge, &target_B),
+            Facing::Vertex(..) | Facing::Free => return Some(slide.rested(changes)),
+        };
+        *place = reached.place;
+        if reached.is_all_the_way {
+            return Some(slide.arrived(changes + 1));
+        }
+        stand_now = stand(mesh, place, input)?;
+    }
+    Some(
+        Slide::new(stand_now.view, &(start_B - place.point_B), &asked, pull, input)
+            .rested(MAX_FEATURE_CHANGES),
+    )
+}
+
+/// What friction asks of a god-object where it stands.
+struct Slide {
+    view: TangentView,
+    /// Against the motion, in the tangent plane.
+    direction_B: Vector3<f64>,
+    asked_m: f64,
+}
+
+impl Slide {
+    #[inline(always)]
+    fn new(
+        view: TangentView,
+        back_B: &Vector3<f64>,
+        asked: &impl Fn(&FrictionQuery) -> f64,
+        pull: &Pull,
+        input: &ConeInput,
+    ) -> Self {
+        let (direction_B, gap_m) = view.signed_gap(&Vector3::zeros());
+        // The chord, since that is what two recorded positions over dt show as speed.
+        let travel_m = back_B.norm().copysign(back_B.dot(&direction_B));
+        let asked_m = asked(&query(FrictionState::Slip, gap_m, travel_m, &view, pull, input));
+        Self { view, direction_B, asked_m }
+    }
+
+    /// Inside the friction circle, or as near to its rim as positions can tell.
+    #[inline]
+    fn is_at_rest(&self) -> bool {
+        self.asked_m.is_nan() || self.asked_m <= self.view.rest_m
+    }
+
+    #[inline]
+    fn target_B(&self) -> Vector3<f64> {
+        self.view.surface_point_B + self.direction_B * self.radius_m()
+    }
+
+    /// Distance from the surface point at which the slide ends.
+    #[inline]
+    fn radius_m(&self) -> f64 {
+        self.view.gap_m - self.asked_m.min(self.view.gap_m)
+    }
+
+    /// It stays: the force is that of its gap, cut to the rim if a bound ended the walk early.
+    #[inline]
+    fn rested(&self, changes: u32) -> Walked {
+        let tangential_B =
+            if self.asked_m > 0.0 { self.direction_B * self.radius_m() } else { self.view.lag_B };
+        Walked { view: self.view, tangential_B, changes }
+    }
+
+    #[inline]
+    fn arrived(&self, changes: u32) -> Walked {
+        Walked { view: self.view, tangential_B: self.direction_B * self.radius_m(), changes }
+    }
+}
+
+/// How far a way led.
+struct Reached {
+    place: Place,
+    is_all_the_way: bool,
+}
+
+/// Goes straight through a face: to the target or to the first edge or vertex on the way.
+#[inline(always)]
+fn cross_face(mesh: &Mesh, side: Side, from_B: &Vector3<f64>, target_B: &Vector3<f64>) -> Reached {
+    let facet = Facet::of(mesh, side);
+    let way_B = target_B - from_B;
+    let way_m2 = way_B.norm_squared();
+    let corners_B = facet.corners_B(mesh);
+    let [a_B, b_B, c_B] = corners_B;
+    let edges_B = [b_B - a_B, c_B - b_B, a_B - c_B];
+    let mut first_fraction = f64::INFINITY;
+    let mut first = None;
+    // No branch but the last: which edge it is that is met, nothing can predict.
+    for (edge, edge_B) in edges_B.iter().enumerate() {
+        let inward_B = facet.inward_B(edge_B);
+        // Distances from the edge, times its length: the Voronoi plane through the edge, Melder eq. 4.15-4.20 with the
+        // offset corrected (the printed one is always 0).
+        let gained = inward_B.dot(&way_B);
+        let left = inward_B.dot(&(from_B - corners_B[edge])).max(0.0);
+        let leaves = gained * gained > PARALLEL * PARALLEL * edge_B.norm_squared() * way_m2;
+        let is_met = (gained < 0.0) & (left + gained < 0.0) & leaves;
+        let fraction = if is_met { left / -gained } else { f64::INFINITY };
+        first = if fraction < first_fraction { Some(edge) } else { first };
+        first_fraction = fraction.min(first_fraction);
+    }
+    let Some(edge) = first else {
+        return Reached { place: Place { point_B: *target_B, on: On::Face(side) }, is_all_the_way: true };
+    };
+    let met_B = from_B + way_B * first_fraction;
+    let edge_B = edges_B[edge];
+    let share = edge_B.dot(&(met_B - corners_B[edge])) / edge_B.norm_squared();
+    Reached { place: on_edge(mesh, side, edge, share), is_all_the_way: false }
+}
+
+/// Goes along an edge: to the target or to the vertex on the way.
+fn follow_edge(mesh: &Mesh, side: Side, edge: usize, target_B: &Vector3<f64>) -> Reached {
+    let (start_B, edge_B) = Facet::of(mesh, side).edge_B(mesh, edge);
+    let share = edge_B.dot(&(target_B - start_B)) / edge_B.norm_squared();
+    let place = on_edge(mesh, side, edge, share);
+    Reached { place, is_all_the_way: matches!(place.on, On::Edge(..)) }
+}
+
+/// The place on an edge at this share of its length; near its ends, the vertex.
+#[inline]
+fn on_edge(mesh: &Mesh, side: Side, edge: usize, share: f64) -> Place {
+    let facet = Facet::of(mesh, side);
+    let at = |corner| Place { point_B: facet.corner_B(mesh, corner), on: On::Vertex(side, corner) };
+    if share <= SNAP {
+        return at(edge);
+    }
+    if share >= 1.0 - SNAP {
+        return at(next(edge));
+    }
+    let (start_B, edge_B) = facet.edge_B(mesh, edge);
+    Place { point_B: start_B + edge_B * share, on: On::Edge(side, edge) }
+}
+
+/// The edge or vertex that a place on a face happens to lie on, where a neighbour may hold what the face lets go.
+#[cold]
+fn rim(mesh: &Mesh, place: &Place) -> Option<Place> {
+    let On::Face(side) = place.on else { return None };
+    let facet = Facet::of(mesh, side);
+    let near_m = |edge_m: f64| (SNAP * edge_m).max(RIM * mesh.extent_m());
+    let edge = (0..3).find(|&edge| {
+        let (start_B, edge_B) = facet.edge_B(mesh, edge);
+        let edge_m = edge_B.norm();
+        facet.inward_B(&edge_B).dot(&(place.point_B - start_B)) <= edge_m * near_m(edge_m)
+    })?;
+    let near_m = near_m(facet.edge_B(mesh, edge).1.norm());
+    let is_at = |&corner: &usize| (facet.corner_B(mesh, corner) - place.point_B).amax() <= near_m;
+    let on = match [edge, next(edge)].iter().find(|&corner| is_at(corner)) {
+        Some(&corner) => On::Vertex(side, corner),
+        None => On::Edge(side, edge),
+    };
+    Some(Place { on, ..*place })
+}
+
+/// Straight from where it was to the HIP through free space; `None` if nothing is in the way.
+///
+/// The HIP is in front of all that meets here, so none of that is in the way, whatever rounding says. Of a place on a
+/// face, only that face is here: on its rim it would have been taken for one on the edge.
+#[cold]
+fn fly(mesh: &Mesh, place: &Place, hip_B: &Vector3<f64>) -> Option<Place> {
+    let (On::Face(side) | On::Edge(side, _) | On::Vertex(side, _)) = place.on;
+    let facet = Facet::of(mesh, side);
+    let vertices_of = |face: u32| mesh.faces[face as usize].vertices;
+    let hit = match place.on {
+        On::Face(_) => mesh.first_hit_of_others(&place.point_B, hip_B, |face| face == side.face),
+        On::Edge(_, edge) => {
+            let ends = [edge, next(edge)].map(|corner| facet.face.vertices[corner]);
+            let has_both = |face| ends.iter().all(|end| vertices_of(face).contains(end));
+            mesh.first_hit_of_others(&place.point_B, hip_B, has_both)
+        }
+        On::Vertex(_, corner) => {
+            let tip = facet.face.vertices[corner];
+            mesh.first_hit_of_others(&place.point_B, hip_B, |face| vertices_of(face).contains(&tip))
+        }
+    };
+    hit.map(|hit| Place::hit(&hit))
+}
+
+#[inline(always)]
+fn view_of_face(mesh: &Mesh, side: Side, place: &Place, input: &ConeInput) -> TangentView {
+    let facet = Facet::of(mesh, side);
+    TangentView::new(&place.point_B, facet.normal_B, facet.offset_m, input)
+}
+
+/// On an edge S is the foot of the HIP's perpendicular, and the depth is measured from there.
+fn view_of_edge(mesh: &Mesh, side: Side, edge: usize, place: &Place, input: &ConeInput) -> TangentView {
+    let facet = Facet::of(mesh, side);
+    //= melder#4.21
+    let (start_B, edge_B) = facet.edge_B(mesh, edge);
+    //= melder#4.22
+    //= melder#4.23
+    let share = edge_B.dot(&(input.hip_B - start_B)) / edge_B.norm_squared();
+    //= melder#4.24
+    let foot_B = start_B + edge_B * share;
+    view_from(&foot_B, place, &facet.normal_B, input)
+}
+
+/// On a vertex nothing can slide: S is the vertex.
+fn view_of_vertex(place: &Place, input: &ConeInput) -> TangentView {
+    view_from(&place.point_B, place, &direction_or_up(&(place.point_B - input.hip_B)), input)
+}
+
+/// As seen from the point of an edge or vertex nearest to the HIP; `otherwise_B` is the normal where both coincide.
+fn view_from(
+    nearest_B: &Vector3<f64>,
+    place: &Place,
+    otherwise_B: &Vector3<f64>,
+    input: &ConeInput,
+) -> TangentView {
+    let out_B = nearest_B - input.hip_B;
+    let depth_m = out_B.norm();
+    let normal_B = if depth_m > 0.0 { direction_or_up(&out_B) } else { *otherwise_B };
+    TangentView::new(&place.point_B, normal_B, normal_B.dot(&input.hip_B) + depth_m, input)
+}
+
+/// A way that leaves an edge by less than this per length runs along it: its crossing would be rounding.
+const PARALLEL: f64 = 1e-10;
+/// Nearer to the end of an edge than this share of it is at the vertex.
+const SNAP: f64 = 1e-9;
+/// Nearer to an edge than this share of the mesh's extent is on it: a few times what [`Mesh::first_hit`] tolerates.
+const RIM: f64 = 4e-13;
