@@ -36,6 +36,22 @@ unsafe impl GlobalAlloc for Counting {
 static ALLOCATOR: Counting = Counting;
 
 #[test]
+fn no_friction_model_ever_allocates() {
+    for (name, friction) in laws::drift_free().into_iter().chain(laws::drifting()) {
+        let entities = [table(friction.clone()), ball(0.02, friction)];
+        let mut finger = point_finger();
+        let mut noise = Noise(10);
+        let before = CALLS.get();
+        for i in 0..5000 {
+            let t = f64::from(i) * DT;
+            let hip = Vector3::new(0.03 * (2.0 * t).sin(), 0.02 * (3.0 * t).cos(), 0.0) + noise.vector(1e-4);
+            finger.step(&entities, &hip, DT);
+        }
+        assert_eq!(CALLS.get() - before, 0, "{name}");
+    }
+}
+
+#[test]
 fn a_step_never_allocates() {
     let entities = [table(stiction()), ball(0.02, Friction::coulomb_viscous(0.3, 1.0).unwrap())];
     let mut finger = Finger::new(0.001, entities.len()).unwrap();

@@ -13,15 +13,17 @@
 //! with the margin of [`RESTICK_MARGIN`]; with `v_s -> 0` all of this becomes stiction. A curve so
 //! flat that no tick sees it jump (`L |mu'| < dt`) sticks and slides without any hysteresis.
 //!
-//! Where the curve falls faster than that, no quasi-static slider of any simulation is stable: at a
-//! HIP speed there, the contact sticks and slips by turns, as dry bearings do.
+//! Where the curve falls faster than `L |mu'| = dt / 2`, no steady slide at constant HIP speed is
+//! stable, as no slider without mass on a spring is: the contact sticks and slips by turns, as dry
+//! bearings do. Every tick of it is on the curve all the same.
 //!
-//! Search: in units `u = x / (v_s dt)` the solutions are the zeros of `h(u) = p - q u - r exp(-u^2)`,
-//! which falls and is convex up to `u1`, rises up to `u2`, then falls and is concave. So Newton's
-//! steps from 0 towards the near zero, and from `p / q` down to the far one, never pass it.
+//! Search: in units `u = x / (v_s dt)` the solutions are the zeros of `h(u) = p - q u - r exp(-u^2)`.
+//! Up to `u = 1 / sqrt(2)` it is convex, and a zero at which it falls is met by Newton's steps from 0;
+//! beyond it is concave, and one is met from `p / q` downwards. Neither can pass its zero, and where a
+//! step comes to a rise or to the other part, there was none.
 //!
-//! Invariants: `|F_t| <= (mu_s + mu_v v) N`. Cost: at most four searches of [`MAX_STEPS`] steps, in
-//! general of five.
+//! Invariants: `|F_t| <= (mu_s + mu_v v) N`. Cost: at most three searches of [`MAX_STEPS`] steps, in
+//! general of five, each with one exponential; the flatter the touch of two solutions, the longer.
 
 use super::RESTICK_MARGIN;
 use super::classical::Classical;
@@ -93,24 +95,22 @@ impl FrictionLaw for Stribeck {
         if !is_within || query.state == FrictionState::Stick || self.flat().is_some() || !knows_time(query) {
             return is_within;
         }
-        let balance = self.balance(query);
-        // The gap below which no slide goes on, if that is less than what rest can bear.
-        let Some((_, u2)) = balance.turning_points() else { return true };
-        let least_m = self.mu_d * query.load_m + balance.q * u2 + balance.r * (-u2 * u2).exp();
-        least_m >= self.held_limit_m(query)
-            || query.gap_m < least_m - RESTICK_MARGIN * self.mu_d * query.load_m
+        // The least at which a slide goes on, if that is less than what rest can bear.
+        let margin_m = RESTICK_MARGIN * self.mu_d * query.load_m;
+        let gap_m = (query.gap_m + margin_m).min(self.held_limit_m(query));
+        self.balance(&FrictionQuery { gap_m, travel_m: 0.0, ..*query }).far_solution().is_none()
     }
 
     fn slide(&self, query: &FrictionQuery, memory: &FrictionMemory) -> f64 {
         if let Some(classical) = self.flat() {
             return classical.slide(query, memory);
         }
-        if !knows_time(query) {
+        if !knows_time(query) || query.load_m <= 0.0 {
             return query.gap_m - self.mu_s * query.load_m;
         }
         //= melder#4.8
         let balance = self.balance(query);
-        let excess_m = balance.pull(query.travel_m / balance.unit_m);
+        let excess_m = query.gap_m - query.load_m * self.ratio_at(query.travel_m / query.dt_s);
         if query.travel_m > 0.0 && excess_m.abs() <= ON_THE_CURVE * query.load_m {
             return excess_m;
         }
@@ -135,67 +135,67 @@ struct Balance {
 }
 
 impl Balance {
-    fn pull(&self, u: f64) -> f64 {
-        self.p - self.q * u - self.r * (-u * u).exp()
-    }
-
-    fn slope(&self, u: f64) -> f64 {
-        2.0 * self.r * u * (-u * u).exp() - self.q
-    }
-
-    /// Where `h` begins to rise and where it falls again, if it rises at all: the solutions of
-    /// `u exp(-u^2) = c`. Its logarithm is concave, hence Newton's steps from outside stay outside.
-    fn turning_points(&self) -> Option<(f64, f64)> {
-        let c = self.q / (2.0 * self.r);
-        let height = (STEEPEST / c).ln();
-        if c.is_nan() || c <= 0.0 || height.is_nan() || height <= 0.0 {
-            return None;
-        }
-        let log_c = c.ln();
-        let above = |u: f64| u.ln() - u * u - log_c;
-        let slope = |u: f64| 1.0 / u - 2.0 * u;
-        let u1 = newton(c, above, slope);
-        // There the logarithm has sunk below `log_c`: its second derivative is below -2.
-        let u2 = newton(FRAC_1_SQRT_2 + height.sqrt(), above, slope);
-        Some((u1.min(FRAC_1_SQRT_2), u2.max(FRAC_1_SQRT_2)))
+    /// `h` and its slope.
+    fn at(&self, u: f64) -> (f64, f64) {
+        let fall = self.r * (-u * u).exp();
+        (self.p - self.q * u - fall, 2.0 * u * fall - self.q)
     }
 
     /// The solution that a slider meets which has moved by `start`; `None` if it comes to rest.
     fn first_met_from(&self, start: f64) -> Option<f64> {
-        // A curve that only falls changes from convex to concave here, and all below holds for it too.
-        let (u1, u2) = self.turning_points().unwrap_or((FRAC_1_SQRT_2, FRAC_1_SQRT_2));
-        let has_near = self.pull(0.0) >= 0.0 && self.pull(u1) <= 0.0;
-        let has_far = self.pull(u2) >= 0.0;
-        let is_sped_up = self.pull(start) >= 0.0;
-        let goes_far = if is_sped_up { start > u1 || !has_near } else { start >= u2 };
-        if goes_far && has_far {
-            let from = (self.p / self.q).max(u2);
-            return Some(newton(from, |u| self.pull(u), |u| self.slope(u)).max(u2));
+        let (pull, slope) = self.at(start);
+        let is_beyond = start > FRAC_1_SQRT_2;
+        if pull >= 0.0 {
+            // Past where the pull begins to grow, nothing stops it before the far solution.
+            let is_past_near = is_beyond || slope > 0.0;
+            let near = if is_past_near { None } else { self.near_solution() };
+            return near.or_else(|| self.far_solution()).or_else(|| self.near_solution());
         }
-        has_near.then(|| newton(0.0, |u| self.pull(u), |u| self.slope(u)).min(u1))
+        let far = if is_beyond && slope <= 0.0 { self.far_solution() } else { None };
+        far.or_else(|| self.near_solution())
     }
-}
 
-/// Newton's steps from one side of a zero that they cannot pass, since the function bends away.
-fn newton(from: f64, value: impl Fn(f64) -> f64, slope: impl Fn(f64) -> f64) -> f64 {
-    let mut u = from;
-    let sign = value(u).signum();
-    for _ in 0..MAX_STEPS {
-        let value = value(u);
-        let step = value / slope(u);
-        if value * sign <= 0.0 || !step.is_finite() {
-            break;
+    /// From 0 upwards, where `h` is convex.
+    fn near_solution(&self) -> Option<f64> {
+        let mut u = 0.0;
+        if self.at(u).0 < 0.0 {
+            return None;
         }
-        u -= step;
-        if step.abs() <= 2.0 * f64::EPSILON * u.abs() {
-            break;
+        for _ in 0..MAX_STEPS {
+            let (pull, slope) = self.at(u);
+            if pull <= 0.0 {
+                break;
+            }
+            let step = -pull / slope;
+            // Also if it is not a number.
+            if !(step > 0.0 && u + step <= FRAC_1_SQRT_2) {
+                return None;
+            }
+            u += step;
+            if step <= 2.0 * f64::EPSILON * u {
+                break;
+            }
         }
+        Some(u)
     }
-    u
+
+    /// From where there would be no fall left downwards, where `h` is concave.
+    fn far_solution(&self) -> Option<f64> {
+        let mut u = self.p / self.q;
+        for _ in 0..MAX_STEPS {
+            let (pull, slope) = self.at(u);
+            if !(slope < 0.0 && (FRAC_1_SQRT_2..f64::INFINITY).contains(&u)) {
+                return None;
+            }
+            let step = pull / slope;
+            if pull >= 0.0 || step <= 2.0 * f64::EPSILON * u {
+                break;
+            }
+            u -= step;
+        }
+        Some(u)
+    }
 }
 
 /// Where two solutions all but meet, each step only halves the distance: 64 reach rounding.
 const MAX_STEPS: u32 = 64;
-
-/// The largest value of `u exp(-u^2)`, at `1 / sqrt(2)`.
-const STEEPEST: f64 = 0.428_881_942_480_353_4;

@@ -1,6 +1,8 @@
 //! What the integration tests share: a deterministic noise source and ways to read an output.
 #![allow(dead_code, non_snake_case)]
 
+pub(crate) mod laws;
+
 use haptics::{Entity, Finger, FingerOutput, Form, Friction, Plane, Shape, Sphere};
 use nalgebra::{Isometry3, Vector3};
 
