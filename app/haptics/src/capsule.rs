@@ -75,3 +75,42 @@ impl Surface for Capsule {
         Some(Self { radius_m: self.radius_m + radius_m, ..*self })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pill() -> Capsule {
+        Capsule::new(0.01, 0.04).unwrap()
+    }
+
+    #[test]
+    fn the_radius_must_be_positive_and_the_length_may_be_zero() {
+        assert!(Capsule::new(0.0, 0.1).is_err() && Capsule::new(f64::NAN, 0.1).is_err());
+        assert!(Capsule::new(0.1, -0.1).is_err() && Capsule::new(0.1, f64::INFINITY).is_err());
+        let ball = Capsule::new(0.1, 0.0).unwrap();
+        assert_eq!(ball.signed_distance(&Vector3::new(0.0, 0.3, 0.4)), 0.4);
+    }
+
+    #[test]
+    fn distances_are_those_to_the_straight_part() {
+        assert_eq!(pill().signed_distance(&Vector3::new(0.03, 0.05, 0.04)), 0.03f64.hypot(0.05) - 0.01);
+        // One subtraction of numbers of 0.01.
+        assert!((pill().signed_distance(&Vector3::new(0.0, 0.01, 0.008)) + 0.002).abs() < 1e-17);
+        let at = pill().nearest(&Vector3::new(0.0, 0.01, 0.008));
+        assert_eq!((at.point_B, at.normal_B), (Vector3::new(0.0, 0.01, 0.01), Vector3::z()));
+        assert_eq!(pill().nearest(&Vector3::zeros()).normal_B, Vector3::x(), "on the axis");
+    }
+
+    #[test]
+    fn paths_enter_the_round_ends_too() {
+        let at = pill().entry(&Vector3::new(0.006, 0.1, 0.0), &Vector3::new(0.006, -0.1, 0.0)).unwrap();
+        assert!((at.point_B - Vector3::new(0.006, 0.028, 0.0)).norm() < 1e-16);
+        assert!(pill().entry(&Vector3::new(0.0101, 0.1, 0.0), &Vector3::new(0.0101, -0.1, 0.0)).is_none());
+    }
+
+    #[test]
+    fn a_ball_touches_it_as_its_centre_touches_a_thicker_one() {
+        assert_eq!(pill().grown(0.005), Some(Capsule::new(0.015, 0.04).unwrap()));
+    }
+}

@@ -226,3 +226,78 @@ fn any_tangent(normal_B: &Vector3<f64>) -> Vector3<f64> {
     let axis = normal_B.iamin();
     direction_or(&normal_B.cross(&Vector3::ith(axis, 1.0)), Vector3::x())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_stays_a_closed_form_becomes_that_form() {
+        let scaled = |form: Form, factors| Scaled::new(form, factors).unwrap();
+        let ball = Form::from(Sphere::new(0.1).unwrap());
+        assert_eq!(scaled(ball, [2.0; 3]), Sphere::new(0.2).unwrap().into());
+        assert_eq!(scaled(ball, [2.0, 1.0, 0.5]), Ellipsoid::new([0.2, 0.1, 0.05]).unwrap().into());
+        let cuboid = Cuboid::new([0.1, 0.2, 0.3]).unwrap().into();
+        assert_eq!(scaled(cuboid, [2.0, 1.0, 0.5]), Cuboid::new([0.2, 0.2, 0.15]).unwrap().into());
+        let can = Cylinder::new(0.1, 0.2).unwrap().into();
+        assert_eq!(scaled(can, [2.0, 3.0, 2.0]), Cylinder::new(0.2, 0.6000000000000001).unwrap().into());
+        let ring = Torus::new(0.1, 0.02).unwrap().into();
+        assert_eq!(scaled(ring, [2.0; 3]), Torus::new(0.2, 0.04).unwrap().into());
+        assert!(matches!(scaled(ring, [2.0, 1.0, 2.0]), Form::Scaled(_)));
+        // Twice scaled is scaled once, by the products, and back again it is what it was.
+        assert_eq!(scaled(scaled(ring, [2.0, 1.0, 2.0]), [0.5, 1.0, 0.5]), ring);
+        for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(Scaled::new(ring, [1.0, bad, 1.0]).is_err());
+        }
+    }
+
+    #[test]
+    fn a_scaled_plane_goes_through_the_scaled_points() {
+        let plane = Plane::new(Vector3::new(0.6, 0.8, 0.0), 0.05).unwrap();
+        let scaled = Scaled::new(plane.into(), [1.5, 0.5, 2.0]).unwrap();
+        for p in [Vector3::new(0.03, 0.04, 1.0), Vector3::new(-0.05, 0.1, 0.0)] {
+            // Products and sums of numbers of 0.1.
+            assert!(scaled.signed_distance(&p.component_mul(&Vector3::new(1.5, 0.5, 2.0))).abs() < 1e-16);
+        }
+    }
+
+    /// A cylinder of radius 30 mm, 1.5 times as wide along x and half as wide along z: an ellipse of 45 by 15 mm.
+    fn oval() -> Form {
+        Scaled::new(Cylinder::new(0.03, 0.1).unwrap().into(), [1.5, 1.0, 0.5]).unwrap()
+    }
+
+    #[test]
+    fn depth_is_measured_in_the_world_not_in_the_unscaled_frame() {
+        // Printed, the unscaled test's own point would do: the foot on the circle, carried back.
+        let hip = Vector3::new(0.027, 0.0, 0.007);
+        let at = oval().nearest(&hip);
+        let printed = Cylinder::new(0.03, 0.1).unwrap().nearest(&Vector3::new(0.018, 0.0, 0.014)).point_B;
+        let printed = printed.component_mul(&Vector3::new(1.5, 1.0, 0.5));
+        // The ellipse's own nearest point lies along its normal from the finger.
+        assert!((at.point_B - hip).cross(&at.normal_B).norm() < 1e-14);
+        assert!(((at.point_B.x / 0.045).powi(2) + (at.point_B.z / 0.015).powi(2) - 1.0).abs() < 1e-15);
+        assert!((printed - hip).norm() > 1.2 * (at.point_B - hip).norm(), "{printed} {at:?}");
+    }
+
+    #[test]
+    fn normals_map_by_the_inverse_transpose() {
+        let at = oval().nearest(&Vector3::new(0.1, 0.0, 0.03));
+        let normal = Vector3::new(at.point_B.x / 0.045f64.powi(2), 0.0, at.point_B.z / 0.015f64.powi(2));
+        assert!((at.normal_B - normal.normalize()).norm() < 1e-15, "{at:?}");
+        // Mapped as a vector it would lean the other way.
+        assert!(at.normal_B.z / at.normal_B.x > at.point_B.z / at.point_B.x);
+    }
+
+    #[test]
+    fn it_holds_who_is_pressed_through_its_caps_and_not_through_its_side() {
+        let coin = Scaled::new(Cylinder::new(0.03, 1e-3).unwrap().into(), [1.5, 1.0, 0.5]).unwrap();
+        let cap = coin.nearest(&Vector3::new(0.01, 4e-4, 0.0));
+        assert!(coin.holds_outside(&cap, 1.0));
+        let flat_side = oval().nearest(&Vector3::new(0.0, 0.0, 0.014));
+        // Radius of curvature of the ellipse there: a^2 / c = 0.135.
+        assert!(oval().holds_outside(&flat_side, 0.134) && !oval().holds_outside(&flat_side, 0.136));
+        let sharp_side = oval().nearest(&Vector3::new(0.044, 0.0, 0.0));
+        // c^2 / a = 0.005.
+        assert!(oval().holds_outside(&sharp_side, 4.9e-3) && !oval().holds_outside(&sharp_side, 5.1e-3));
+    }
+}

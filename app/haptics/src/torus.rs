@@ -133,3 +133,66 @@ impl Surface for Torus {
         Self::new(self.ring_radius_m, self.tube_radius_m + radius_m).ok()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ring() -> Torus {
+        Torus::new(0.05, 0.01).unwrap()
+    }
+
+    #[test]
+    fn a_ring_without_a_hole_is_refused_with_the_reason() {
+        for tube in [0.05, 0.06] {
+            let message = Torus::new(0.05, tube).unwrap_err().to_string();
+            assert!(message.contains("ring_radius_m is 0.05") && message.contains("hole"), "{message}");
+        }
+        for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(Torus::new(bad, 0.01).is_err() && Torus::new(0.05, bad).is_err());
+        }
+    }
+
+    #[test]
+    //= melder#7.16 type=test
+    //= melder#7.17 type=test
+    //= melder#7.18 type=test
+    fn the_tube_has_the_tubes_radius_and_lies_at_the_rings() {
+        let inside = |x, y, z| ring().signed_distance(&Vector3::new(x, y, z)) < 0.0;
+        // As printed the sphere would have the ring's radius: the hole would be filled.
+        assert!(!inside(0.0, 0.0, 0.0) && !inside(0.0, 0.0, 0.0399) && inside(0.0, 0.0, 0.0401));
+        assert!(inside(0.0599, 0.0, 0.0) && !inside(0.0601, 0.0, 0.0));
+        assert!(inside(0.03, 0.0099, 0.04) && !inside(0.03, 0.0101, 0.04));
+        // The quarter up: 3-4-5 around the middle line at (0.03, 0, 0.04).
+        let at = ring().nearest(&(Vector3::new(0.03, 0.0, 0.04) * 1.06 + Vector3::y() * 0.004));
+        let normal_B = Vector3::new(0.36, 0.8, 0.48);
+        assert!((at.normal_B - normal_B).norm() < 1e-14, "heights of 4 mm rounded against 50");
+        assert!((at.point_B - (Vector3::new(0.03, 0.0, 0.04) + normal_B * 0.01)).norm() < 1e-15);
+    }
+
+    #[test]
+    fn where_no_direction_exists_there_is_a_fixed_one() {
+        // On the axis: as if towards +x, and from there inward. On the middle line: up.
+        let axis = ring().nearest(&Vector3::zeros());
+        assert_eq!((axis.point_B, axis.normal_B), (Vector3::new(0.04, 0.0, 0.0), -Vector3::x()));
+        let middle = ring().nearest(&Vector3::new(0.0, 0.0, 0.05));
+        assert_eq!((middle.point_B, middle.normal_B), (Vector3::new(0.0, 0.01, 0.05), Vector3::y()));
+    }
+
+    #[test]
+    fn a_path_across_the_ring_enters_the_near_side_and_from_the_hole_the_far_one() {
+        let (left, right) = (Vector3::new(-0.1, 0.0, 0.0), Vector3::new(0.1, 0.0, 0.0));
+        assert!((ring().entry(&left, &right).unwrap().point_B.x + 0.06).abs() < 1e-16);
+        let far = ring().entry(&Vector3::zeros(), &right).unwrap();
+        assert!((far.point_B.x - 0.04).abs() < 1e-16 && far.normal_B.x < -0.999);
+        assert!(ring().entry(&(Vector3::y() * 0.1), &(Vector3::y() * -0.1)).is_none(), "through the hole");
+        let grazing = Vector3::y() * (0.01 - 1e-9);
+        assert!(ring().entry(&(left + grazing), &(right + grazing)).is_some(), "a nanometre deep");
+    }
+
+    #[test]
+    fn a_ball_that_fits_the_hole_feels_a_thicker_tube_and_another_none() {
+        assert_eq!(ring().grown(0.02), Some(Torus::new(0.05, 0.03).unwrap()));
+        assert_eq!(ring().grown(0.04), None);
+    }
+}

@@ -6,16 +6,29 @@ mod common;
 use common::laws::{any_friction, largest_ratio};
 use common::*;
 use haptics::{
-    ConeInput, ContactState, Entity, Finger, Form, Friction, FrictionCone, FrictionState, MAX_SLIDE_ROUNDS,
-    Plane, Sphere, Surface,
+    Capsule, Cone, ConeInput, ContactState, Cuboid, Cylinder, Ellipsoid, Entity, Finger, Form, Friction,
+    FrictionCone, FrictionState, MAX_SLIDE_ROUNDS, Plane, Scaled, Sphere, Surface, Torus,
 };
 use nalgebra::{Isometry3, Vector3};
 use proptest::prelude::*;
 
 fn any_shape() -> impl Strategy<Value = Form> {
+    let length = || (-3.0..-0.7f64).prop_map(|e| 10f64.powf(e));
+    let lengths = move || prop::array::uniform3(length());
+    let solid = prop_oneof![
+        lengths().prop_map(|size| Form::from(Cuboid::new(size).unwrap())),
+        lengths().prop_map(|[r, l, _]| Cylinder::new(r, l).unwrap().into()),
+        lengths().prop_map(|[bottom, top, l]| Cone::new(bottom, top, l).unwrap().into()),
+        lengths().prop_map(|[r, l, _]| Cone::new(0.0, r, l).unwrap().into()),
+        lengths().prop_map(|[r, l, _]| Capsule::new(r, l).unwrap().into()),
+        lengths().prop_map(|[tube, more, _]| Torus::new(tube + more, tube).unwrap().into()),
+        lengths().prop_map(|radii| Ellipsoid::new(radii).unwrap().into()),
+    ];
     prop_oneof![
-        (0.001..0.2f64).prop_map(|r| Sphere::new(r).unwrap().into()),
-        (prop::array::uniform3(-1.0..1.0f64), -0.05..0.05f64)
+        4 => solid.clone(),
+        2 => (solid, prop::array::uniform3(0.5..2.0f64)).prop_map(|(form, factors)| Scaled::new(form, factors).unwrap()),
+        1 => (0.001..0.2f64).prop_map(|r| Sphere::new(r).unwrap().into()),
+        1 => (prop::array::uniform3(-1.0..1.0f64), -0.05..0.05f64)
             .prop_filter_map("a direction", |(n, offset)| Plane::new(Vector3::from(n), offset).ok())
             .prop_map(Form::from),
     ]
