@@ -25,6 +25,17 @@ pub enum ParameterError {
         /// Dynamic coefficient found.
         mu_d: f64,
     },
+    /// A point of a friction curve that cannot follow the one before, or has no possible ratio.
+    CurvePoint {
+        /// Which point, from 0.
+        index: usize,
+        /// Its speed found.
+        speed_m_s: f64,
+        /// Its friction ratio found.
+        mu: f64,
+        /// What is allowed, in words.
+        allowed: &'static str,
+    },
     /// A vector that should give a direction has no usable length.
     NoDirection {
         /// Name of the parameter.
@@ -43,6 +54,9 @@ impl fmt::Display for ParameterError {
             Self::StaticBelowDynamic { mu_s, mu_d } => {
                 write!(f, "mu_s is {mu_s}; allowed is a finite number >= mu_d, which is {mu_d}")
             }
+            Self::CurvePoint { index, speed_m_s, mu, allowed } => {
+                write!(f, "point {index} of the curve is ({speed_m_s} m/s, {mu}); allowed are {allowed}")
+            }
             Self::NoDirection { parameter, value: [x, y, z] } => {
                 write!(f, "{parameter} is [{x}, {y}, {z}]; allowed is a finite vector that is not zero")
             }
@@ -57,6 +71,13 @@ pub(crate) fn at_least_zero(parameter: &'static str, value: f64) -> Result<f64, 
         return Ok(value);
     }
     Err(ParameterError::OutOfRange { parameter, value, allowed: "a finite number >= 0" })
+}
+
+/// Two friction coefficients, of which the static one is not the lower.
+pub(crate) fn static_at_least(mu_s: f64, mu_d: f64) -> Result<(), ParameterError> {
+    at_least_zero("mu_s", mu_s)?;
+    at_least_zero("mu_d", mu_d)?;
+    if mu_s < mu_d { Err(ParameterError::StaticBelowDynamic { mu_s, mu_d }) } else { Ok(()) }
 }
 
 pub(crate) fn above_zero(parameter: &'static str, value: f64) -> Result<f64, ParameterError> {

@@ -1,26 +1,52 @@
-//! The friction models with a closed form: none, Coulomb, stiction, viscous, Coulomb plus viscous.
+//! All friction models, under one name each.
 //!
-//! Problem: the friction circle of radius `mu * load` decides whether a god-object holds; with
-//! viscous friction the circle grows with the speed of the very motion that it decides about.
+//! Every model is a [`FrictionLaw`] of its own in `friction/`, usable alone; [`Friction`] is what an
+//! entity has. Unless a model says otherwise its friction is a ratio: the normal force scales it.
 //!
-//! Model: two coefficients for holding and sliding (Melder ch. 4.1.1) and a viscous term. The
-//! printed eq. 4.8, `mu_vd = mu_d + mu_v s` with the speed of the *last* tick, chatters as soon as
-//! `mu_v d / dt > 1/2`. Corrected: the speed is that of the move being computed. With D the gap, L
-//! the load, m the travel so far and x the move asked for,
+//! The god-object and friction models that were made for a mass on a table: the contact's spring, from
+//! god-object G to surface point S, is the stiffness that such models give to their bonds or bristles,
+//! and the strain of those is `S - G`. A model says when G holds and how far it slides; the force
+//! follows. Coulomb's jump at speed zero, which most of them were made to soften, is none here.
 //!
-//! ```text
-//! D - x = L (mu_d + mu_v (m + x) / dt)   =>   x = (D - L (mu_d + mu_v m / dt)) / (1 + mu_v L / dt)
-//! ```
-//!
-//! which is unique, exact and stable for every `mu_v >= 0`: the gap relaxes geometrically towards
-//! `L (mu_d + mu_v v)` with the ratio `c / (1 + c) < 1`, `c = mu_v L / dt`.
-//!
-//! Invariants: a frictionless law never holds, so that its god-object is the classic one, tick by
-//! tick. Cost: a few flops; no state.
+//! | model | sticks | sticks again | drifts under noise |
+//! |---|---|---|---|
+//! | none, viscous | never | - | - |
+//! | Coulomb, Coulomb and viscous | up to `mu N` | at once | no |
+//! | stiction | up to `mu_s N` | below `mu_d N`, with a margin | no |
+//! | Stribeck, curve | up to `mu_s N` | where no slide is in balance, with a margin | no |
+//! | Karnopp | up to `mu_s N` | at speeds up to `v_min` | no |
+//! | Dahl, LuGre | never | - | yes |
+//! | Hayward and Armstrong | up to a part of `mu N` | at once | no |
+//! | bristle | until a bond snaps | at once | no |
+//! | reset integrator | up to `mu_s N` | below `mu_d N`, without margin | no |
+//! | fixed cone | up to a force | as stiction, if that is its kind | no |
 
-use crate::error::{ParameterError, at_least_zero};
-use crate::friction_law::{FrictionLaw, FrictionMemory, FrictionQuery, FrictionState};
+mod bristle;
+mod classical;
+mod curve;
+mod dahl;
+mod fixed_cone;
+mod hayward;
+mod karnopp;
+mod lugre;
+mod reset_integrator;
+mod sliding;
+mod stribeck;
+
+pub use bristle::{Bristles, MAX_BRISTLES};
+pub use curve::{FrictionCurve, MAX_CURVE_POINTS};
+pub use dahl::Dahl;
+pub use fixed_cone::FixedCone;
+pub use hayward::HaywardArmstrong;
+pub use karnopp::Karnopp;
+pub use lugre::LuGre;
+pub use reset_integrator::ResetIntegrator;
+pub use stribeck::Stribeck;
+
+use crate::error::{ParameterError, at_least_zero, static_at_least};
+use crate::friction_law::{FrictionLaw, FrictionMemory, FrictionQuery};
 use crate::shared::Shared;
+use classical::Classical;
 use std::sync::Arc;
 
 /// How far below the dynamic friction circle a sliding contact must relax before it sticks again,
@@ -61,6 +87,24 @@ pub enum Friction {
         /// Viscous coefficient \[s/m\], >= 0.
         mu_v_s_per_m: f64,
     },
+    /// Falls from static to dynamic friction with speed.
+    Stribeck(Stribeck),
+    /// Drawn against speed, point by point.
+    Curve(FrictionCurve),
+    /// Stuck at low speeds.
+    Karnopp(Karnopp),
+    /// A strain that yields; it drifts under noise.
+    Dahl(Dahl),
+    /// A strain that yields from a limit on; it does not drift.
+    HaywardArmstrong(HaywardArmstrong),
+    /// Dahl's strain with Stribeck's curve; it drifts under noise.
+    LuGre(LuGre),
+    /// Bonds that snap and form anew at random.
+    Bristle(Bristles),
+    /// The bristles' force without their bonds.
+    ResetIntegrator(ResetIntegrator),
+    /// Independent of the normal force.
+    FixedCone(FixedCone),
     /// Somebody's own law.
     Own(Shared<dyn OwnLaw>),
 }
@@ -91,6 +135,58 @@ impl Friction {
         Self::CoulombViscous { mu, mu_v_s_per_m }.validated()
     }
 
+    /// Stribeck friction: see [`Stribeck::new`].
+    pub fn stribeck(mu_s: f64, mu_d: f64, v_s_m_s: f64, mu_v_s_per_m: f64) -> Result<Self, ParameterError> {
+        Stribeck::new(mu_s, mu_d, v_s_m_s, mu_v_s_per_m).map(Self::Stribeck)
+    }
+
+    /// Friction drawn against speed (m/s), with `mu_s` at rest: see [`FrictionCurve::new`].
+    pub fn curve(mu_s: f64, points: &[(f64, f64)]) -> Result<Self, ParameterError> {
+        FrictionCurve::new(mu_s, points).map(Self::Curve)
+    }
+
+    /// Karnopp's friction: see [`Karnopp::new`].
+    pub fn karnopp(mu_s: f64, mu_d: f64, v_min_m_s: f64, mu_v_s_per_m: f64) -> Result<Self, ParameterError> {
+        Karnopp::new(mu_s, mu_d, v_min_m_s, mu_v_s_per_m).map(Self::Karnopp)
+    }
+
+    /// Dahl's friction: see [`Dahl::new`].
+    pub fn dahl(mu: f64) -> Result<Self, ParameterError> {
+        Dahl::new(mu).map(Self::Dahl)
+    }
+
+    /// Hayward and Armstrong's friction: see [`HaywardArmstrong::new`].
+    pub fn hayward_armstrong(mu: f64, stick_fraction: f64) -> Result<Self, ParameterError> {
+        HaywardArmstrong::new(mu, stick_fraction).map(Self::HaywardArmstrong)
+    }
+
+    /// LuGre friction with the curve of [`Stribeck::new`]: see [`LuGre::new`].
+    pub fn lugre(
+        mu_s: f64,
+        mu_d: f64,
+        v_s_m_s: f64,
+        mu_v_s_per_m: f64,
+        damping_n_s_per_m: f64,
+    ) -> Result<Self, ParameterError> {
+        let steady = Stribeck::new(mu_s, mu_d, v_s_m_s, mu_v_s_per_m)?;
+        LuGre::new(steady, damping_n_s_per_m).map(Self::LuGre)
+    }
+
+    /// Bristles: see [`Bristles::new`].
+    pub fn bristle(mu: f64, bonds: usize, seed: u64) -> Result<Self, ParameterError> {
+        Bristles::new(mu, bonds, seed).map(Self::Bristle)
+    }
+
+    /// The reset integrator: see [`ResetIntegrator::new`].
+    pub fn reset_integrator(mu_s: f64, mu_d: f64, damping_n_s_per_m: f64) -> Result<Self, ParameterError> {
+        ResetIntegrator::new(mu_s, mu_d, damping_n_s_per_m).map(Self::ResetIntegrator)
+    }
+
+    /// Friction of a fixed force: see [`FixedCone::new`].
+    pub fn fixed_cone(friction_n: f64, static_n: Option<f64>) -> Result<Self, ParameterError> {
+        FixedCone::new(friction_n, static_n).map(Self::FixedCone)
+    }
+
     /// Somebody's own law.
     pub fn own(law: impl OwnLaw + 'static) -> Self {
         let law: Arc<dyn OwnLaw> = Arc::new(law);
@@ -98,169 +194,70 @@ impl Friction {
     }
 
     /// The same friction, if its parameters are in range; for values built without a constructor.
+    ///
+    /// The models that are types of their own cannot be built with other ones.
     pub fn validated(self) -> Result<Self, ParameterError> {
-        match &self {
-            Self::None | Self::Own(_) => {}
-            Self::Coulomb { mu } => _ = at_least_zero("mu", *mu)?,
-            Self::Stiction { mu_s, mu_d } => {
-                at_least_zero("mu_s", *mu_s)?;
-                at_least_zero("mu_d", *mu_d)?;
-                if mu_s < mu_d {
-                    return Err(ParameterError::StaticBelowDynamic { mu_s: *mu_s, mu_d: *mu_d });
-                }
-            }
-            Self::Viscous { mu_v_s_per_m } => _ = at_least_zero("mu_v_s_per_m", *mu_v_s_per_m)?,
+        match self {
+            Self::Coulomb { mu } => _ = at_least_zero("mu", mu)?,
+            Self::Stiction { mu_s, mu_d } => static_at_least(mu_s, mu_d)?,
+            Self::Viscous { mu_v_s_per_m } => _ = at_least_zero("mu_v_s_per_m", mu_v_s_per_m)?,
             Self::CoulombViscous { mu, mu_v_s_per_m } => {
-                at_least_zero("mu", *mu)?;
-                at_least_zero("mu_v_s_per_m", *mu_v_s_per_m)?;
+                at_least_zero("mu", mu)?;
+                at_least_zero("mu_v_s_per_m", mu_v_s_per_m)?;
             }
+            _ => {}
         }
         Ok(self)
     }
 
-    /// (mu_s, mu_d, mu_v), of which every variant is a special case.
-    fn coefficients(&self) -> (f64, f64, f64) {
+    /// The models that are given by coefficients alone.
+    fn classical(&self) -> Classical {
         match *self {
-            Self::None | Self::Own(_) => (0.0, 0.0, 0.0),
-            Self::Coulomb { mu } => (mu, mu, 0.0),
-            Self::Stiction { mu_s, mu_d } => (mu_s, mu_d, 0.0),
-            Self::Viscous { mu_v_s_per_m } => (0.0, 0.0, mu_v_s_per_m),
-            Self::CoulombViscous { mu, mu_v_s_per_m } => (mu, mu, mu_v_s_per_m),
+            Self::Coulomb { mu } => Classical::smooth(mu, 0.0),
+            Self::Stiction { mu_s, mu_d } => Classical::stiction(mu_s, mu_d),
+            Self::Viscous { mu_v_s_per_m } => Classical::smooth(0.0, mu_v_s_per_m),
+            Self::CoulombViscous { mu, mu_v_s_per_m } => Classical::smooth(mu, mu_v_s_per_m),
+            _ => Classical::smooth(0.0, 0.0),
         }
     }
+}
+
+/// Asks the law behind the name, without a call through a table.
+macro_rules! ask {
+    ($friction:expr, $law:ident => $answer:expr) => {
+        match $friction {
+            Friction::Stribeck($law) => $answer,
+            Friction::Curve($law) => $answer,
+            Friction::Karnopp($law) => $answer,
+            Friction::Dahl($law) => $answer,
+            Friction::HaywardArmstrong($law) => $answer,
+            Friction::LuGre($law) => $answer,
+            Friction::Bristle($law) => $answer,
+            Friction::ResetIntegrator($law) => $answer,
+            Friction::FixedCone($law) => $answer,
+            Friction::Own($law) => $answer,
+            classical => {
+                let $law = classical.classical();
+                $answer
+            }
+        }
+    };
 }
 
 impl FrictionLaw for Friction {
     fn holds(&self, query: &FrictionQuery, memory: &mut FrictionMemory) -> bool {
-        if let Self::Own(law) = self {
-            return law.holds(query, memory);
-        }
-        let (mu_s, mu_d, _) = self.coefficients();
-        match (self, query.state) {
-            (Self::Stiction { .. }, FrictionState::Slip) => caught_again(query, mu_d),
-            // A zero coefficient holds nothing, not even a gap of zero: the frictionless
-            // god-object is recomputed each tick, as the classic one is.
-            //= melder#4.2
-            _ => mu_s > 0.0 && query.gap_m <= mu_s * query.load_m,
-        }
+        ask!(self, law => law.holds(query, memory))
     }
 
     fn slide(&self, query: &FrictionQuery, memory: &FrictionMemory) -> f64 {
-        if let Self::Own(law) = self {
-            return law.slide(query, memory);
-        }
-        let (_, mu_d, mu_v) = self.coefficients();
-        let coulomb_slide = query.gap_m - mu_d * query.load_m;
-        if mu_v == 0.0 || query.dt_s.is_nan() || query.dt_s <= 0.0 {
-            return coulomb_slide;
-        }
-        // Corrected: implicit in the speed of this very move.
-        //= melder#4.8
-        let load_per_travel = mu_v * query.load_m / query.dt_s;
-        (coulomb_slide - load_per_travel * query.travel_m) / (1.0 + load_per_travel)
+        ask!(self, law => law.slide(query, memory))
     }
 
     fn held_limit_m(&self, query: &FrictionQuery) -> f64 {
-        if let Self::Own(law) = self {
-            return law.held_limit_m(query);
-        }
-        //= melder#4.1
-        self.coefficients().0 * query.load_m
+        ask!(self, law => law.held_limit_m(query))
     }
 
     fn drag_m(&self, query: &FrictionQuery, memory: &FrictionMemory) -> f64 {
-        if let Self::Own(law) = self { law.drag_m(query, memory) } else { 0.0 }
-    }
-}
-
-/// Melder eq. 7.34-7.36, corrected: the printed inequality points the other way, and its absolute
-/// epsilon never lets small coefficients stick again. Squared, so that no angle is needed.
-fn caught_again(query: &FrictionQuery, mu_d: f64) -> bool {
-    //= melder#7.34
-    //= melder#7.35
-    //= melder#7.36
-    let threshold = (1.0 - RESTICK_MARGIN) * mu_d * query.load_m;
-    query.gap_m * query.gap_m < threshold * threshold
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const LOAD: f64 = 5e-3;
-
-    fn query(state: FrictionState, gap_m: f64) -> FrictionQuery {
-        FrictionQuery { state, gap_m, load_m: LOAD, dt_s: 1e-3, ..Default::default() }
-    }
-
-    fn holds(law: &Friction, query: FrictionQuery) -> bool {
-        law.holds(&query, &mut FrictionMemory::default())
-    }
-
-    #[test]
-    fn constructors_refuse_what_no_material_has() {
-        for bad in [-1e-9, f64::NAN, f64::INFINITY] {
-            assert!(Friction::coulomb(bad).is_err());
-            assert!(Friction::stiction(bad, 0.1).is_err());
-            assert!(Friction::stiction(0.1, bad).is_err());
-            assert!(Friction::viscous(bad).is_err());
-            assert!(Friction::coulomb_viscous(0.1, bad).is_err());
-            assert!(Friction::coulomb_viscous(bad, 0.1).is_err());
-        }
-        let expected = ParameterError::StaticBelowDynamic { mu_s: 0.2, mu_d: 0.3 };
-        assert_eq!(Friction::stiction(0.2, 0.3), Err(expected));
-        assert!(Friction::stiction(0.3, 0.3).is_ok());
-    }
-
-    #[test]
-    //= melder#4.2 type=test
-    fn the_friction_circle_is_mu_times_the_load() {
-        let law = Friction::coulomb(0.5).unwrap();
-        assert!(holds(&law, query(FrictionState::Stick, 0.5 * LOAD)));
-        assert!(!holds(&law, query(FrictionState::Stick, 0.5 * LOAD * (1.0 + 1e-15))));
-    }
-
-    #[test]
-    //= melder#7.34 type=test
-    //= melder#7.35 type=test
-    //= melder#7.36 type=test
-    fn a_sliding_contact_sticks_again_only_clearly_inside_the_dynamic_circle() {
-        let law = Friction::stiction(0.7, 0.3).unwrap();
-        let rim = 0.3 * LOAD;
-        assert!(holds(&law, query(FrictionState::Slip, 0.979 * rim)));
-        assert!(!holds(&law, query(FrictionState::Slip, 0.981 * rim)));
-        assert!(
-            law.slide(&query(FrictionState::Slip, 0.981 * rim), &FrictionMemory::default()) < 0.0,
-            "inside, hence unmoved"
-        );
-        assert!(holds(&law, query(FrictionState::Stick, 0.7 * LOAD)), "held, it bears the static limit");
-    }
-
-    #[test]
-    fn small_coefficients_stick_again_too() {
-        let law = Friction::stiction(1e-4, 1e-5).unwrap();
-        assert!(holds(&law, query(FrictionState::Slip, 0.9e-5 * LOAD)));
-    }
-
-    #[test]
-    fn without_friction_nothing_holds() {
-        for law in [Friction::None, Friction::coulomb(0.0).unwrap(), Friction::viscous(2.0).unwrap()] {
-            assert!(!holds(&law, query(FrictionState::Stick, 0.0)));
-        }
-    }
-
-    #[test]
-    //= melder#4.8 type=test
-    fn the_viscous_slide_solves_its_implicit_equation() {
-        for mu_v in [1e-3, 1.0, 1e3, 1e6] {
-            let law = Friction::coulomb_viscous(0.3, mu_v).unwrap();
-            let asked = FrictionQuery { travel_m: 2e-5, ..query(FrictionState::Slip, 4e-3) };
-            let x = law.slide(&asked, &FrictionMemory::default());
-            let left = 4e-3 - x;
-            let right = LOAD * (0.3 + mu_v * (2e-5 + x) / 1e-3);
-            // The subtraction of two terms of size mu_v L m / dt leaves their rounding.
-            let tolerance = 4.0 * f64::EPSILON * (4e-3 + mu_v * LOAD * 2e-5 / 1e-3);
-            assert!((left - right).abs() <= tolerance, "mu_v {mu_v}: {left} vs {right}");
-        }
+        ask!(self, law => law.drag_m(query, memory))
     }
 }

@@ -115,12 +115,21 @@ impl FrictionCone {
     /// The frictionless god-object decides, since it is the nearest that a finger could come to the
     /// HIP: friction must not hold a finger that is round the corner.
     pub fn is_held_back<S: Surface + ?Sized>(&self, surface: &S, input: &ConeInput) -> bool {
-        let mut god_object = self.god_object;
-        let view = TangentView::of(surface, &god_object, input);
-        let (memory, pull) = (FrictionMemory::default(), Pull::default());
-        let slid = slide(surface, &Friction::None, &mut god_object, view, &memory, &pull, input);
-        slid.view.depth_m > 0.0 && surface.holds_outside(&god_object, slid.view.depth_m)
+        let (at, depth_m) = slide_without_friction(surface, self.god_object, input);
+        depth_m > 0.0 && surface.holds_outside(&at, depth_m)
     }
+}
+
+/// Where a frictionless god-object that begins at `at` comes to rest, and how deep the HIP lies below it.
+pub(crate) fn slide_without_friction<S: Surface + ?Sized>(
+    surface: &S,
+    mut at: SurfacePoint,
+    input: &ConeInput,
+) -> (SurfacePoint, f64) {
+    let view = TangentView::of(surface, &at, input);
+    let (memory, pull) = (FrictionMemory::default(), Pull::default());
+    let slid = slide(surface, &Friction::None, &mut at, view, &memory, &pull, input);
+    (at, slid.view.depth_m)
 }
 
 #[inline]

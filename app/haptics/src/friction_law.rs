@@ -38,6 +38,11 @@ pub struct FrictionQuery {
     pub dt_s: f64,
     /// How far the HIP has moved along the tangent plane since the last tick \[m\], >= 0.
     pub hip_travel_m: f64,
+    /// The part of the gap along that motion of the HIP \[m\]: negative while the HIP comes back
+    /// towards the god-object, zero where it has not moved.
+    pub gap_along_hip_m: f64,
+    /// How far the god-object moved in the last tick \[m\], >= 0; below what counts as rest, zero.
+    pub last_travel_m: f64,
     /// Stiffness of the contact \[N/m\], > 0: for models in newtons.
     pub stiffness_n_per_m: f64,
 }
@@ -76,7 +81,7 @@ pub trait FrictionLaw {
     fn slide(&self, query: &FrictionQuery, memory: &FrictionMemory) -> f64;
 
     /// Radius of the circle within which the god-object is held \[m\]: while the contact sticks, it
-    /// bounds spring and damping together.
+    /// bounds spring, damping and drag together.
     fn held_limit_m(&self, query: &FrictionQuery) -> f64;
 
     /// What is felt beside the spring, against the motion of the HIP \[m of spring\].

@@ -16,22 +16,28 @@ use crate::tangent_view::{TangentView, tangential};
 pub(crate) struct Grip {
     pub(crate) state: FrictionState,
     pub(crate) memory: FrictionMemory,
-    last_hip_B: Option<Vector3<f64>>,
+    /// Where the HIP and the god-object were when the last tick began.
+    last: Option<(Vector3<f64>, Vector3<f64>)>,
 }
 
-/// How the HIP has moved along the tangent plane since the last tick.
+/// How the HIP has moved along the tangent plane since the last tick, and the god-object in it.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Pull {
     moved_B: Vector3<f64>,
     pub(crate) travel_m: f64,
+    god_travel_m: f64,
 }
 
 impl Grip {
     #[inline]
     pub(crate) fn begin_tick(&mut self, view: &TangentView, input: &ConeInput) -> Pull {
-        let last_hip_B = self.last_hip_B.replace(input.hip_B).unwrap_or(input.hip_B);
-        let moved_B = tangential(&(input.hip_B - last_hip_B), &view.normal_B);
-        Pull { moved_B, travel_m: moved_B.norm() }
+        let now = (input.hip_B, view.surface_point_B + view.lag_B);
+        let last = self.last.replace(now).unwrap_or(now);
+        let moved_B = tangential(&(now.0 - last.0), &view.normal_B);
+        let god_travel_m = (now.1 - last.1).norm();
+        // Taken back from the lag, a god-object at rest moves by rounding.
+        let god_travel_m = if god_travel_m > view.rest_m { god_travel_m } else { 0.0 };
+        Pull { moved_B, travel_m: moved_B.norm(), god_travel_m }
     }
 
     /// The tangential spring, if friction holds the god-object; else the contact is in slip.
@@ -54,8 +60,8 @@ impl Grip {
             return None;
         }
         self.state = FrictionState::Stick;
-        let held_B = stuck_tangential(view, friction.held_limit_m(&query), input);
-        Some(held_B + self.drag(friction, view, pull, input))
+        let beside_B = self.drag(friction, view, pull, input) - damper(view, input);
+        Some(cut_to(view.lag_B + beside_B, friction.held_limit_m(&query)))
     }
 
     /// What the law renders beside the spring.
@@ -70,7 +76,11 @@ impl Grip {
             return Vector3::zeros();
         }
         let drag_m = friction.drag_m(&query(self.state, view.gap_m, 0.0, view, pull, input), &self.memory);
-        if drag_m == 0.0 { Vector3::zeros() } else { pull.moved_B * (-drag_m / pull.travel_m) }
+        if drag_m == 0.0 {
+            return Vector3::zeros();
+        }
+        // Along the plane that the god-object has reached: it must not press or pull.
+        tangential(&(pull.moved_B * (-drag_m / pull.travel_m)), &view.normal_B)
     }
 }
 
@@ -83,6 +93,7 @@ pub(crate) fn query(
     pull: &Pull,
     input: &ConeInput,
 ) -> FrictionQuery {
+    let along_m = -view.lag_B.dot(&pull.moved_B) / pull.travel_m;
     FrictionQuery {
         state,
         gap_m,
@@ -90,18 +101,19 @@ pub(crate) fn query(
         travel_m,
         dt_s: input.dt_s,
         hip_travel_m: pull.travel_m,
+        gap_along_hip_m: if pull.travel_m > 0.0 { along_m } else { 0.0 },
+        last_travel_m: pull.god_travel_m,
         stiffness_n_per_m: input.stiffness_n_per_m,
     }
 }
 
-/// Spring and damper of a held contact, cut to the cone.
+/// What the damper of the contact takes from a held spring (m).
 #[inline]
-fn stuck_tangential(view: &TangentView, limit_m: f64, input: &ConeInput) -> Vector3<f64> {
+fn damper(view: &TangentView, input: &ConeInput) -> Vector3<f64> {
     if input.damping_n_s_per_m == 0.0 {
-        return cut_to(view.lag_B, limit_m);
+        return Vector3::zeros();
     }
-    let velocity_B = tangential(&input.hip_velocity_B, &view.normal_B);
-    cut_to(view.lag_B - velocity_B * input.damping_s(), limit_m)
+    tangential(&input.hip_velocity_B, &view.normal_B) * input.damping_s()
 }
 
 /// `v`, shortened to `limit` if it is longer.

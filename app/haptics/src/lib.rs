@@ -30,8 +30,14 @@
 #![allow(non_snake_case)]
 
 mod algorithm;
+mod capsule;
+mod cone;
 mod classic_god_object;
 mod contact;
+mod convex;
+mod cuboid;
+mod cylinder;
+mod ellipsoid;
 mod entity;
 mod error;
 mod finger;
@@ -39,32 +45,47 @@ mod frame;
 mod friction;
 mod friction_cone;
 mod friction_law;
+mod frustum;
 mod grip;
 mod hip;
 pub mod mesh;
 mod plane;
+mod quartic;
+mod scaled;
 mod shape;
 mod shared;
 mod slide;
 mod sphere;
 mod surface;
 mod tangent_view;
-mod vector_field;
+mod torus;
 
 pub use algorithm::{Algorithm, CONTACT_WORDS, ContactAlgorithm, ContactMemory, Touch, TouchInput};
+pub use capsule::Capsule;
+pub use cone::Cone;
+mod vector_field;
+
 pub use classic_god_object::ClassicGodObject;
 pub use contact::{Contact, RAMP_IN_S};
+pub use cuboid::Cuboid;
+pub use cylinder::Cylinder;
+pub use ellipsoid::{Ellipsoid, LARGEST_RATIO};
 pub use entity::Entity;
 pub use error::ParameterError;
 pub use finger::{ContactState, Finger, FingerOutput};
-pub use friction::{Friction, OwnLaw, RESTICK_MARGIN};
+pub use friction::{
+    Bristles, Dahl, FixedCone, Friction, FrictionCurve, HaywardArmstrong, Karnopp, LuGre, MAX_BRISTLES,
+    MAX_CURVE_POINTS, OwnLaw, RESTICK_MARGIN, ResetIntegrator, Stribeck,
+};
 pub use friction_cone::{ConeForce, ConeInput, FrictionCone};
 pub use friction_law::{FrictionLaw, FrictionMemory, FrictionQuery, FrictionState, MEMORY_WORDS};
 pub use hip::Hip;
 pub use plane::Plane;
+pub use scaled::Scaled;
 pub use shape::{Form, OwnSurface, Shape};
 pub use shared::Shared;
 pub use slide::MAX_SLIDE_ROUNDS;
 pub use sphere::Sphere;
 pub use surface::{Feature, Surface, SurfacePoint};
+pub use torus::Torus;
 pub use vector_field::VectorField;

@@ -6,11 +6,18 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use crate::capsule::Capsule;
+use crate::cone::Cone;
+use crate::cuboid::Cuboid;
+use crate::cylinder::Cylinder;
+use crate::ellipsoid::Ellipsoid;
 use crate::mesh::Mesh;
 use crate::plane::Plane;
+use crate::scaled::Scaled;
 use crate::shared::Shared;
 use crate::sphere::Sphere;
 use crate::surface::{Surface, SurfacePoint};
+use crate::torus::Torus;
 
 /// Shape of an entity, in the entity's frame B.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,6 +42,20 @@ pub enum Form {
     Plane(Plane),
     /// A ball around B's origin.
     Sphere(Sphere),
+    /// A box.
+    Cuboid(Cuboid),
+    /// A cylinder with caps.
+    Cylinder(Cylinder),
+    /// A cone, whole or cut off, with caps.
+    Cone(Cone),
+    /// A cylinder with half balls on its ends.
+    Capsule(Capsule),
+    /// A tube bent to a ring.
+    Torus(Torus),
+    /// An ellipsoid.
+    Ellipsoid(Ellipsoid),
+    /// One of them scaled by different factors along its axes.
+    Scaled(Scaled),
 }
 
 impl Shape {
@@ -103,4 +124,4 @@ macro_rules! forms {
     };
 }
 
-forms!(Plane, Sphere);
+forms!(Plane, Sphere, Cuboid, Cylinder, Cone, Capsule, Torus, Ellipsoid, Scaled);

@@ -65,6 +65,11 @@ pub(crate) fn slide<S: Surface + ?Sized, L: FrictionLaw + ?Sized>(
         let view = TangentView::of(surface, god_object, input);
         if god_object.piece != piece_before {
             // Over an edge: nothing seen on the piece before says anything about this one.
+            if view.depth_m <= 0.0 {
+                // Beyond the edge nothing holds the finger back: at a sharp edge the god-object would change sides
+                // until the bound, and the side it ended on would decide whether there is contact.
+                return Slid { view, tangential_B: Vector3::zeros(), rounds };
+            }
             secant = Secant::default();
             round = look(view, &Vector3::zeros(), god_object);
             if round.is_inside_the_circle() {

@@ -2,6 +2,8 @@
 #![allow(non_snake_case)]
 
 mod common;
+#[path = "common/solids.rs"]
+mod solids;
 
 use common::*;
 use haptics::mesh::{Mesh, make};
@@ -56,6 +58,43 @@ fn a_step_on_a_mesh_never_allocates() {
     }
     assert_eq!(CALLS.get() - before, 0);
     assert!(free > 1000 && stuck > 1000 && slid > 1000, "{free} {stuck} {slid}");
+}
+
+#[test]
+fn no_shape_makes_a_step_allocate() {
+    for solid in solids::all() {
+        let entities = [entity(solid.form, stiction())];
+        let mut finger = point_finger();
+        let mut noise = Noise(8);
+        let (mut hip, mut touched) = (Vector3::y(), 0);
+        let before = CALLS.get();
+        for i in 0..20_000u32 {
+            // Also begins inside now and then, where the nearest point is searched for.
+            if i.is_multiple_of(100) {
+                finger.forget(0);
+            }
+            hip = hip * 0.99 + noise.vector(0.1 * solid.size_m);
+            touched += u32::from(finger.step(&entities, &hip, DT).entity.is_some());
+        }
+        assert_eq!(CALLS.get() - before, 0, "{}", solid.name);
+        assert!(touched > 500, "{}: {touched}", solid.name);
+    }
+}
+
+#[test]
+fn no_friction_model_ever_allocates() {
+    for (name, friction) in laws::drift_free().into_iter().chain(laws::drifting()) {
+        let entities = [table(friction.clone()), ball(0.02, friction)];
+        let mut finger = point_finger();
+        let mut noise = Noise(10);
+        let before = CALLS.get();
+        for i in 0..5000 {
+            let t = f64::from(i) * DT;
+            let hip = Vector3::new(0.03 * (2.0 * t).sin(), 0.02 * (3.0 * t).cos(), 0.0) + noise.vector(1e-4);
+            finger.step(&entities, &hip, DT);
+        }
+        assert_eq!(CALLS.get() - before, 0, "{name}");
+    }
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! What the integration tests share: a deterministic noise source and ways to read an output.
 #![allow(dead_code, non_snake_case)]
 
+pub(crate) mod laws;
+
 pub(crate) mod meshes;
 pub(crate) mod path;
 

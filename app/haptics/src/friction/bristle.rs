@@ -1,0 +1,114 @@
+//! The bristle model: bonds that stretch, snap and form anew at random places.
+//!
+//! Model (D. A. Haessig and B. Friedland 1991): N bonds are formed where the surfaces touch. Each
+//! stretches as the surfaces move; stretched beyond `delta_s` it snaps and a new one forms at a random
+//! distance, here uniform, between the old place and where the surface has got to. The friction force
+//! is the sum of the bonds' forces. Here each bond has the stiffness `k / N`, so that the force is the
+//! contact's spring stretched by their mean, and the god-object lies where that mean says.
+//!
+//! In steady sliding a bond's stretch y rises from a random y_0 < delta_s to delta_s. It is found below
+//! y as often as it began below y, so its density is `2 y / delta_s^2`: mean `2/3 delta_s`, variance
+//! `delta_s^2 / 18`. Hence `delta_s = 3/2 mu * load` gives the mean friction force `mu N`, with a
+//! standard deviation of `mu N / sqrt(8 N_bonds)`: one bond is a rasp, twenty are a fine file. Bonds
+//! formed together snap together: the first breakaway takes up to `3/2 mu N`.
+//!
+//! Bonds are numbers along the line from god-object to surface point. When that line turns, the bonds'
+//! deviations from their mean turn with it: mirrored at a reversal, projected in between. The random
+//! numbers depend on the seed and on how many were drawn: every run is the same.
+//!
+//! Invariants: `|F_t| <= 3/2 mu N`; while no bond snaps it holds. Cost: linear in the bonds.
+
+use crate::error::{ParameterError, at_least_zero};
+use crate::friction_law::{FrictionLaw, FrictionMemory, FrictionQuery, MEMORY_WORDS};
+
+/// The bristle model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bristles {
+    mu: f64,
+    bonds: usize,
+    seed: u64,
+}
+
+/// The most bonds of a contact.
+pub const MAX_BRISTLES: usize = 20;
+
+/// Words of the memory: first the bonds' stretches (m), then these.
+const MEAN: usize = MAX_BRISTLES;
+const DRAWN: usize = MAX_BRISTLES + 1;
+const _: () = assert!(DRAWN < MEMORY_WORDS);
+
+/// `delta_s` over the mean stretch of steady sliding.
+const SNAP_OVER_MEAN: f64 = 1.5;
+
+impl Bristles {
+    /// Mean friction coefficient, number of bonds, seed of the random numbers.
+    ///
+    /// Errors: `mu` not finite or negative, `bonds` not in 1 to 20.
+    pub fn new(mu: f64, bonds: usize, seed: u64) -> Result<Self, ParameterError> {
+        at_least_zero("mu", mu)?;
+        if !(1..=MAX_BRISTLES).contains(&bonds) {
+            let (parameter, allowed) = ("bonds", "a whole number from 1 to 20");
+            return Err(ParameterError::OutOfRange { parameter, value: bonds as f64, allowed });
+        }
+        Ok(Self { mu, bonds, seed })
+    }
+
+    /// Uniform in 0 to 1, 1 excluded.
+    fn draw(&self, drawn: &mut f64) -> f64 {
+        *drawn += 1.0;
+        (mix(self.seed ^ mix(*drawn as u64)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+impl FrictionLaw for Bristles {
+    fn holds(&self, query: &FrictionQuery, memory: &mut FrictionMemory) -> bool {
+        let snap_m = self.held_limit_m(query);
+        if snap_m.is_nan() || snap_m <= 0.0 {
+            *memory = FrictionMemory::default();
+            return false;
+        }
+        let turn = cosine_of_turn(memory.words[MEAN], query);
+        let mean_before_m = memory.words[MEAN];
+        let (mut drawn, mut sum_m, mut holds) = (memory.words[DRAWN], 0.0, true);
+        for stretch_m in &mut memory.words[..self.bonds] {
+            *stretch_m = query.gap_m + (*stretch_m - mean_before_m) * turn;
+            if stretch_m.abs() > snap_m || stretch_m.is_nan() {
+                *stretch_m = (self.draw(&mut drawn) * snap_m).copysign(*stretch_m);
+                holds = false;
+            }
+            sum_m += *stretch_m;
+        }
+        // Bonds that were bent forwards can leave more force than there was; it comes to rest then.
+        let mean_m = (sum_m / self.bonds as f64).min(query.gap_m);
+        let excess_m = sum_m / self.bonds as f64 - mean_m;
+        memory.words[..self.bonds].iter_mut().for_each(|stretch_m| *stretch_m -= excess_m);
+        memory.words[MEAN] = mean_m;
+        memory.words[DRAWN] = drawn;
+        holds
+    }
+
+    fn slide(&self, query: &FrictionQuery, memory: &FrictionMemory) -> f64 {
+        query.gap_m - memory.words[MEAN].min(self.held_limit_m(query))
+    }
+
+    fn held_limit_m(&self, query: &FrictionQuery) -> f64 {
+        SNAP_OVER_MEAN * self.mu * query.load_m
+    }
+}
+
+/// Between the lag before and the lag now, from the triangle of both and the path of the HIP.
+fn cosine_of_turn(before_m: f64, query: &FrictionQuery) -> f64 {
+    let (now_m, path_m) = (query.gap_m, query.hip_travel_m);
+    let twice = 2.0 * before_m * now_m;
+    let cosine = (before_m * before_m + now_m * now_m - path_m * path_m) / twice;
+    // Without a direction before or now there is no turn.
+    if cosine.is_nan() || twice <= 0.0 { 1.0 } else { cosine.clamp(-1.0, 1.0) }
+}
+
+/// SplitMix64 (G. Steele, D. Lea, C. Flood 2014) of a counter.
+fn mix(x: u64) -> u64 {
+    let z = x.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    let z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ (z >> 31)
+}
