@@ -1,7 +1,8 @@
 //! What it costs to build a mesh, by its size and the order of the input.
 //!
 //! Run `cargo bench -p haptics --bench mesh_build`. `generated` comes in rows, `shuffled` has its faces and vertices in
-//! random order, `own corners` has three vertices of its own for each face, as STL has. All give the same mesh.
+//! random order, `own corners` has three vertices of its own for each face, as STL has. All give the same mesh, with its
+//! hierarchy of boxes.
 
 use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use haptics::mesh::{Mesh, TriangleSoup, make};
@@ -26,7 +27,8 @@ fn build(c: &mut Criterion) {
         let mut group = c.benchmark_group("mesh build");
         group.throughput(Throughput::Elements(generated.faces.len() as u64));
         group.sample_size(10).measurement_time(Duration::from_secs(5));
-        for (input, soup) in [("generated", generated), ("shuffled", shuffled), ("own corners", own_corners)] {
+        for (input, soup) in [("generated", generated), ("shuffled", shuffled), ("own corners", own_corners)]
+        {
             group.bench_with_input(BenchmarkId::new(input, size), &soup, |b, soup| {
                 let build = |soup| Mesh::build(soup).expect("a sphere");
                 b.iter_batched(|| soup.clone(), build, BatchSize::LargeInput);

@@ -16,12 +16,16 @@ const QUERIES: usize = 4096;
 /// Distances from the surface \[m\].
 const HEIGHTS: [(&str, f64); 2] = [("20 mm off", 0.02), ("1 mm off", 1e-3)];
 
+/// A point and its normal, or two ends.
+type Pair = (Vector3<f64>, Vector3<f64>);
+type Query<'a> = &'a dyn Fn(&Vector3<f64>, &Vector3<f64>);
+
 fn bumpy_sphere() -> Mesh {
     Mesh::build(make::bumpy_sphere(1000, 500, 0.1)).expect("a mesh").0
 }
 
 /// Points of the surface, each with its outward direction: a great circle in steps of a tick, or all over.
-fn places(mesh: &Mesh, is_path: bool) -> Vec<(Vector3<f64>, Vector3<f64>)> {
+fn places(mesh: &Mesh, is_path: bool) -> Vec<Pair> {
     let tilted = Rotation3::from_euler_angles(0.7, 0.3, 0.5);
     let direction = |i: usize| {
         let i = i as f64;
@@ -53,15 +57,13 @@ fn queries<const WIDTH: usize>(criterion: &mut Criterion, mesh: &Mesh) {
     println!("width {WIDTH}: {:.1} bytes per triangle", tree.size_bytes() as f64 / mesh.faces().len() as f64);
     let triangles = Triangles { faces: mesh.faces(), vertices: mesh.vertices() };
     let width = format!("width {WIDTH}");
-    let mut run = |name: String,
-                   points: &[(Vector3<f64>, Vector3<f64>)],
-                   query: &dyn Fn(usize, &Vector3<f64>, &Vector3<f64>)| {
+    let mut run = |name: String, points: &[Pair], query: Query<'_>| {
         let mut i = 0;
         criterion.bench_function(&format!("{name}, {width}"), |bencher| {
             bencher.iter(|| {
                 i = (i + 1) % QUERIES;
-                let (point, normal) = &points[i];
-                query(i, point, normal);
+                let (first, second) = &points[i];
+                query(first, second);
             });
         });
     };
@@ -75,13 +77,13 @@ fn queries<const WIDTH: usize>(criterion: &mut Criterion, mesh: &Mesh) {
                 .enumerate()
                 .map(|(i, (point, normal))| (*point, point + sideways(i, normal)))
                 .collect();
-            run(format!("step {where_to}, {manner}"), &steps, &|_, from, to| {
+            run(format!("step {where_to}, {manner}"), &steps, &|from, to| {
                 black_box(tree.first_hit(triangles, Sides::Solid, from, to));
             });
-            run(format!("nearest {where_to}, {manner}"), &above, &|_, point, _| {
+            run(format!("nearest {where_to}, {manner}"), &above, &|point, _| {
                 black_box(tree.nearest(triangles, point));
             });
-            run(format!("clearance {where_to}, {manner}"), &above, &|_, point, _| {
+            run(format!("clearance {where_to}, {manner}"), &above, &|point, _| {
                 black_box(tree.clearance(point, 0.05));
             });
         }
@@ -89,12 +91,12 @@ fn queries<const WIDTH: usize>(criterion: &mut Criterion, mesh: &Mesh) {
             .iter()
             .map(|(point, normal)| (point + normal * (0.5 * STEP_M), point - normal * (0.5 * STEP_M)))
             .collect();
-        run(format!("step entering, {manner}"), &entering, &|_, from, to| {
+        run(format!("step entering, {manner}"), &entering, &|from, to| {
             black_box(tree.first_hit(triangles, Sides::Solid, from, to).expect("an entry"));
         });
         let long: Vec<_> =
             places.iter().map(|(point, normal)| (point + normal * 0.02, point - normal * 0.02)).collect();
-        run(format!("4 cm entering, {manner}"), &long, &|_, from, to| {
+        run(format!("4 cm entering, {manner}"), &long, &|from, to| {
             black_box(tree.first_hit(triangles, Sides::Solid, from, to).expect("an entry"));
         });
     }

@@ -81,14 +81,14 @@ pub(crate) struct Slot {
 pub const RAMP_IN_S: f64 = 0.1;
 
 impl Slot {
-    pub(crate) fn step(&mut self, index: usize, entity: &Entity, sweep: &Sweep) -> Option<Contact> {
+    pub(crate) fn step(&mut self, index: usize, entity: &Entity, sweep: &Sweep) -> Option<&Contact> {
         self.contact = self.touch(index, entity, sweep);
         if self.contact.is_none() {
             self.cone = None;
             self.own = ContactMemory::default();
             self.mesh.let_go();
         }
-        self.contact
+        self.contact.as_ref()
     }
 
     fn touch(&mut self, index: usize, entity: &Entity, sweep: &Sweep) -> Option<Contact> {
@@ -112,13 +112,14 @@ impl Slot {
             previous_hip_B: previous_B,
             cone,
         };
-        let touch = match &entity.algorithm {
+        let mut touch = match &entity.algorithm {
             Algorithm::FrictionCone => self.touch_shape(&input),
             Algorithm::VectorField => self.touch_by(&VectorField, &input),
             Algorithm::ClassicGodObject => self.touch_by(&ClassicGodObject, &input),
             Algorithm::Own(algorithm) => self.touch_by(&**algorithm, &input),
         }?;
-        in_world(index, entity, &self.ramped(touch, sweep))
+        self.ramp(&mut touch, sweep);
+        in_world(index, entity, &touch)
     }
 
     fn touch_by(&mut self, algorithm: &dyn ContactAlgorithm, input: &TouchInput<'_>) -> Option<Touch> {
@@ -184,18 +185,15 @@ impl Slot {
     }
 
     /// A contact that began inside comes on slowly.
-    fn ramped(&mut self, touch: Touch, sweep: &Sweep) -> Touch {
+    fn ramp(&mut self, touch: &mut Touch, sweep: &Sweep) {
+        if self.strength >= 1.0 {
+            return;
+        }
         let step = sweep.dt_s / sweep.ramp_in_s;
         // Where time is unknown or no ramp wanted, there is none.
         self.strength = if step > 0.0 { (self.strength + step).min(1.0) } else { 1.0 };
-        if self.strength >= 1.0 {
-            return touch;
-        }
-        Touch {
-            force_on_user_B: touch.force_on_user_B * self.strength,
-            normal_force_n: touch.normal_force_n * self.strength,
-            ..touch
-        }
+        touch.force_on_user_B *= self.strength;
+        touch.normal_force_n *= self.strength;
     }
 }
 

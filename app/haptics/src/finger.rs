@@ -137,7 +137,7 @@ impl Finger {
         for slot in self.slots.iter_mut().skip(entities.len()) {
             *slot = Slot::default();
         }
-        total.output(hip_W)
+        total.output(&self.slots, hip_W)
     }
 
     /// The contacts of the last tick, in order of their entities.
@@ -168,20 +168,22 @@ impl Finger {
 #[derive(Default)]
 struct Total {
     force_on_user_W: Vector3<f64>,
-    primary: Option<Contact>,
+    /// Square of the largest force, and whose it is.
+    primary: Option<(f64, usize)>,
 }
 
 impl Total {
-    fn add(&mut self, contact: Contact) {
+    fn add(&mut self, contact: &Contact) {
         self.force_on_user_W += contact.force_on_user_W;
-        let is_larger = |than: &Contact| contact.force_on_user_W.norm() > than.force_on_user_W.norm();
-        if self.primary.as_ref().is_none_or(is_larger) {
-            self.primary = Some(contact);
+        let force = contact.force_on_user_W.norm_squared();
+        if self.primary.is_none_or(|(largest, _)| force > largest) {
+            self.primary = Some((force, contact.entity));
         }
     }
 
-    fn output(&self, hip_W: &Vector3<f64>) -> FingerOutput {
-        let Some(primary) = &self.primary else { return free(*hip_W) };
+    fn output(&self, slots: &[Slot], hip_W: &Vector3<f64>) -> FingerOutput {
+        let primary = self.primary.and_then(|(_, entity)| slots[entity].contact.as_ref());
+        let Some(primary) = primary else { return free(*hip_W) };
         // Finite forces can overflow in the sum; zero is the safe one.
         let force_on_user_W =
             if is_finite(&self.force_on_user_W) { self.force_on_user_W } else { Vector3::zeros() };

@@ -7,6 +7,7 @@
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 /// p_B of a point p_W.
+#[inline]
 pub(crate) fn point_into_body(X_WB: &Isometry3<f64>, p_W: &Vector3<f64>) -> Vector3<f64> {
     let shift_W = &X_WB.translation.vector;
     let from_origin_W = if *shift_W == Vector3::zeros() { *p_W } else { p_W - shift_W };
@@ -17,6 +18,7 @@ pub(crate) fn point_into_body(X_WB: &Isometry3<f64>, p_W: &Vector3<f64>) -> Vect
 }
 
 /// p_W of a point p_B.
+#[inline]
 pub(crate) fn point_into_world(X_WB: &Isometry3<f64>, p_B: &Vector3<f64>) -> Vector3<f64> {
     let shift_W = &X_WB.translation.vector;
     let from_origin_W = vector_into_world(X_WB, p_B);
@@ -24,20 +26,24 @@ pub(crate) fn point_into_world(X_WB: &Isometry3<f64>, p_B: &Vector3<f64>) -> Vec
 }
 
 /// v_W of a free vector v_B.
+#[inline]
 pub(crate) fn vector_into_world(X_WB: &Isometry3<f64>, v_B: &Vector3<f64>) -> Vector3<f64> {
     if is_identity(&X_WB.rotation) { *v_B } else { X_WB.rotation * v_B }
 }
 
 /// v_B of a free vector v_W.
+#[inline]
 pub(crate) fn vector_into_body(X_WB: &Isometry3<f64>, v_W: &Vector3<f64>) -> Vector3<f64> {
     if is_identity(&X_WB.rotation) { *v_W } else { X_WB.rotation.inverse_transform_vector(v_W) }
 }
 
+#[inline]
 fn is_identity(q: &UnitQuaternion<f64>) -> bool {
     q.i == 0.0 && q.j == 0.0 && q.k == 0.0
 }
 
 /// No component is infinite or not a number.
+#[inline]
 pub(crate) fn is_finite(v: &Vector3<f64>) -> bool {
     v.iter().all(|x| x.is_finite())
 }

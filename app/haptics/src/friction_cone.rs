@@ -132,6 +132,7 @@ pub(crate) fn slide_without_friction<S: Surface + ?Sized>(
     (at, slid.view.depth_m)
 }
 
+#[inline]
 pub(crate) fn answer(
     view: &TangentView,
     tangential_B: &Vector3<f64>,

@@ -29,6 +29,7 @@ pub(crate) struct Pull {
 }
 
 impl Grip {
+    #[inline]
     pub(crate) fn begin_tick(&mut self, view: &TangentView, input: &ConeInput) -> Pull {
         let now = (input.hip_B, view.surface_point_B + view.lag_B);
         let last = self.last.replace(now).unwrap_or(now);
@@ -42,6 +43,7 @@ impl Grip {
     /// The tangential spring, if friction holds the god-object; else the contact is in slip.
     ///
     /// Breakaway and first slide share the tick: the static coefficient is never slid with.
+    #[inline]
     pub(crate) fn hold<L: FrictionLaw + ?Sized>(
         &mut self,
         friction: &L,
@@ -82,6 +84,7 @@ impl Grip {
     }
 }
 
+#[inline]
 pub(crate) fn query(
     state: FrictionState,
     gap_m: f64,
@@ -105,6 +108,7 @@ pub(crate) fn query(
 }
 
 /// What the damper of the contact takes from a held spring (m).
+#[inline]
 fn damper(view: &TangentView, input: &ConeInput) -> Vector3<f64> {
     if input.damping_n_s_per_m == 0.0 {
         return Vector3::zeros();

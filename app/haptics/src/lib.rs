@@ -58,12 +58,13 @@ mod slide;
 mod sphere;
 mod surface;
 mod tangent_view;
-mod vector_field;
 mod torus;
 
 pub use algorithm::{Algorithm, CONTACT_WORDS, ContactAlgorithm, ContactMemory, Touch, TouchInput};
 pub use capsule::Capsule;
 pub use cone::Cone;
+mod vector_field;
+
 pub use classic_god_object::ClassicGodObject;
 pub use contact::{Contact, RAMP_IN_S};
 pub use cuboid::Cuboid;
@@ -86,5 +87,5 @@ pub use shared::Shared;
 pub use slide::MAX_SLIDE_ROUNDS;
 pub use sphere::Sphere;
 pub use surface::{Feature, Surface, SurfacePoint};
-pub use vector_field::VectorField;
 pub use torus::Torus;
+pub use vector_field::VectorField;

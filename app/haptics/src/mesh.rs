@@ -8,6 +8,19 @@
 //! order of the input was.
 //!
 //! Frames and signs: object frame B; vertices run counter-clockwise seen from outside, normals leave the material.
+//!
+//! [`Mesh::build`] makes one of any [`TriangleSoup`], repairs what can be repaired and says so:
+//! ```
+//! use haptics::mesh::{Mesh, Sides, make};
+//!
+//! let mut soup = make::cuboid([0.1, 0.2, 0.3]);
+//! soup.faces[5].swap(1, 2);
+//! let (mesh, report) = Mesh::build(soup)?;
+//! assert_eq!(mesh.sides(), Sides::Solid);
+//! assert_eq!(report.flipped.first, Some(5));
+//! println!("{report}");
+//! # Ok::<(), haptics::mesh::MeshError>(())
+//! ```
 
 mod build;
 mod bvh;
@@ -23,8 +36,10 @@ mod place;
 mod query;
 mod repair;
 mod report;
+mod sliver;
 mod soup;
 mod topology;
+mod touching;
 mod walk;
 mod winding;
 

@@ -32,11 +32,13 @@ pub(crate) struct TangentView {
 }
 
 impl TangentView {
+    #[inline]
     pub(crate) fn of<S: Surface + ?Sized>(surface: &S, god_object: &SurfacePoint, input: &ConeInput) -> Self {
         Self::new(&god_object.point_B, god_object.normal_B, surface.tangent_offset(god_object), input)
     }
 
     /// From a god-object on the plane `normal . x = offset`.
+    #[inline]
     pub(crate) fn new(
         god_object_B: &Vector3<f64>,
         normal_B: Vector3<f64>,
@@ -61,6 +63,7 @@ impl TangentView {
     /// Having passed S, the lag points the other way; judged against the direction before, the gap
     /// is negative instead, which lets the slide take the overshoot back. Without that, friction
     /// would settle on the far rim and push along with the motion.
+    #[inline]
     pub(crate) fn signed_gap(&self, direction_before_B: &Vector3<f64>) -> (Vector3<f64>, f64) {
         if self.gap_m <= SMALLEST_LENGTH_M {
             let direction_B = tangential(direction_before_B, &self.normal_B);
@@ -79,10 +82,12 @@ impl TangentView {
 }
 
 /// The part of `v` across the unit vector `normal`.
+#[inline]
 pub(crate) fn tangential(v: &Vector3<f64>, normal: &Vector3<f64>) -> Vector3<f64> {
     v - normal * normal.dot(v)
 }
 
+#[inline]
 fn load(depth_m: f64, normal_B: &Vector3<f64>, input: &ConeInput) -> f64 {
     if depth_m.is_nan() || depth_m <= 0.0 {
         return 0.0;

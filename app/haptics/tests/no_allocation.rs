@@ -6,6 +6,7 @@ mod common;
 mod solids;
 
 use common::*;
+use haptics::mesh::{Mesh, make};
 use haptics::{Finger, Friction};
 use nalgebra::Vector3;
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -38,19 +39,25 @@ unsafe impl GlobalAlloc for Counting {
 static ALLOCATOR: Counting = Counting;
 
 #[test]
-fn no_friction_model_ever_allocates() {
-    for (name, friction) in laws::drift_free().into_iter().chain(laws::drifting()) {
-        let entities = [table(friction.clone()), ball(0.02, friction)];
-        let mut finger = point_finger();
-        let mut noise = Noise(10);
-        let before = CALLS.get();
-        for i in 0..5000 {
-            let t = f64::from(i) * DT;
-            let hip = Vector3::new(0.03 * (2.0 * t).sin(), 0.02 * (3.0 * t).cos(), 0.0) + noise.vector(1e-4);
-            finger.step(&entities, &hip, DT);
+fn a_step_on_a_mesh_never_allocates() {
+    let bumpy = std::sync::Arc::new(Mesh::build(make::bumpy_sphere(100, 51, 0.02)).unwrap().0);
+    let knot = std::sync::Arc::new(Mesh::build(make::klein_bottle(40, 20, 0.04)).unwrap().0);
+    let entities = [entity(bumpy, stiction()), entity(knot, Friction::coulomb(0.3).unwrap())];
+    let mut finger = Finger::new(0.0, entities.len()).unwrap();
+    let mut noise = Noise(10);
+    let (mut free, mut stuck, mut slid) = (0, 0, 0);
+    let before = CALLS.get();
+    for i in 0..100_000 {
+        let t = f64::from(i) * DT;
+        let hip = Vector3::new(0.025 * (2.0 * t).sin(), 0.025 * (3.0 * t).cos(), 0.01 * t.sin()) + noise.vector(1e-5);
+        match finger.step(&entities, &hip, DT).friction {
+            haptics::ContactState::Free => free += 1,
+            haptics::ContactState::Stick => stuck += 1,
+            haptics::ContactState::Slip => slid += 1,
         }
-        assert_eq!(CALLS.get() - before, 0, "{name}");
     }
+    assert_eq!(CALLS.get() - before, 0);
+    assert!(free > 1000 && stuck > 1000 && slid > 1000, "{free} {stuck} {slid}");
 }
 
 #[test]
@@ -71,6 +78,22 @@ fn no_shape_makes_a_step_allocate() {
         }
         assert_eq!(CALLS.get() - before, 0, "{}", solid.name);
         assert!(touched > 500, "{}: {touched}", solid.name);
+    }
+}
+
+#[test]
+fn no_friction_model_ever_allocates() {
+    for (name, friction) in laws::drift_free().into_iter().chain(laws::drifting()) {
+        let entities = [table(friction.clone()), ball(0.02, friction)];
+        let mut finger = point_finger();
+        let mut noise = Noise(10);
+        let before = CALLS.get();
+        for i in 0..5000 {
+            let t = f64::from(i) * DT;
+            let hip = Vector3::new(0.03 * (2.0 * t).sin(), 0.02 * (3.0 * t).cos(), 0.0) + noise.vector(1e-4);
+            finger.step(&entities, &hip, DT);
+        }
+        assert_eq!(CALLS.get() - before, 0, "{name}");
     }
 }
 
@@ -96,4 +119,20 @@ fn a_step_never_allocates() {
     assert!(free > 1000 && stuck > 100 && slid > 1000 && both > 1000, "{free} {stuck} {slid} {both}");
     drop(vec![0u8; 16]);
     assert!(CALLS.get() > before, "the counter counts");
+}
+
+#[test]
+fn queries_of_a_mesh_never_allocate() {
+    let mesh = Mesh::build(make::bumpy_sphere(100, 50, 0.1)).unwrap().0;
+    let mut noise = Noise(10);
+    let (mut hits, mut inside) = (0, 0);
+    let before = CALLS.get();
+    for _ in 0..10_000 {
+        let (p, q) = (noise.vector(0.06), noise.vector(0.06));
+        hits += u32::from(mesh.first_hit(&p, &q).is_some());
+        inside += u32::from(mesh.is_inside(&p));
+        assert!(mesh.clearance(&p, 1.0) <= mesh.nearest(&p).distance_m);
+    }
+    assert_eq!(CALLS.get() - before, 0);
+    assert!(hits > 1000 && inside > 1000, "{hits} {inside}");
 }

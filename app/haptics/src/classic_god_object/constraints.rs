@@ -41,6 +41,10 @@ impl Plane {
 }
 
 impl Constraints {
+    pub(super) fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
     /// Whether there was room for it.
     pub(super) fn add(&mut self, plane: Plane) -> bool {
         let Some(place) = self.planes.get_mut(self.count) else { return false };

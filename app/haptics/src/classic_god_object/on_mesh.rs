@@ -9,7 +9,8 @@
 //! face it is; the answer is taken from the planes themselves.
 //!
 //! Cost: at most [`MAX_DESCENTS`] times [`MAX_STEPS`] segments against the mesh; on a smooth one, three to six. In free
-//! space a question for inside, which finds a HIP that the mesh was placed over.
+//! space one segment. Only a finger's first tick asks whether it is inside: a mesh that is placed over a finger later
+//! is met when the finger has left it.
 
 use nalgebra::Vector3;
 
@@ -38,12 +39,15 @@ pub(super) fn touch(mesh: &Mesh, input: &TouchInput<'_>, memory: &mut ContactMem
     Some(Touch::frictionless(rest.at, way_B.norm(), &input.cone))
 }
 
-/// Where the HIP was when its last step met the mesh; out of the mesh, if it is inside without having entered.
+/// Where the HIP was when its last step met the mesh; out of the mesh, if it is inside in its first tick.
 fn begin(mesh: &Mesh, input: &TouchInput<'_>, hover_m: f64) -> Option<Vector3<f64>> {
-    let hip_B = &input.cone.hip_B;
-    let met = |from_B: &Vector3<f64>| mesh.first_hit(from_B, hip_B).is_some();
-    if let Some(from_B) = input.previous_hip_B.filter(met) {
-        return Some(from_B);
+    if let Some(from_B) = input.previous_hip_B {
+        let hit = mesh.first_hit(&from_B, &input.cone.hip_B)?;
+        let path_B = input.cone.hip_B - from_B;
+        let gone_m = path_B.norm() * hit.fraction;
+        // A HIP that stopped on the surface may be behind it by rounding: it came from further away.
+        let back_m = (hover_m - gone_m).max(0.0);
+        return Some(from_B - path_B * (back_m / path_B.norm()));
     }
     let at = input.is_inside().then(|| input.nearest())??;
     Some(at.point_B + at.normal_B * hover_m)
@@ -68,9 +72,14 @@ fn seek(mesh: &Mesh, start_B: Vector3<f64>, hip_B: &Vector3<f64>, hover_m: f64) 
             break;
         }
     }
-    let target = constraints.nearest_to(hip_B, 0.0, SLACK * hover_m)?;
-    let at = surface_point(mesh, &target, hip_B, piece)?;
-    Some(Rest { hovering_B: god_object_B, at })
+    if constraints.is_empty() {
+        return None;
+    }
+    // Where planes are almost parallel rounding may leave no room: it has found a place all the same.
+    let target = constraints
+        .nearest_to(hip_B, 0.0, SLACK * hover_m)
+        .unwrap_or(Target { point_B: god_object_B, active: 3 });
+    Some(Rest { hovering_B: god_object_B, at: surface_point(mesh, &target, hip_B, piece) })
 }
 
 /// Moves until nothing is in the way, or no room is left; answers with the last face met, too.
@@ -107,24 +116,24 @@ fn stop_above(plane: &Plane, from_B: &Vector3<f64>, goal_B: &Vector3<f64>, hover
     if fraction > 0.0 { from_B + (goal_B - from_B) * fraction.min(1.0) } else { *from_B }
 }
 
-/// `None` if no plane holds the god-object back from the HIP.
-fn surface_point(mesh: &Mesh, target: &Target, hip_B: &Vector3<f64>, piece: u32) -> Option<SurfacePoint> {
+/// A HIP right on the surface has a god-object, but no depth.
+fn surface_point(mesh: &Mesh, target: &Target, hip_B: &Vector3<f64>, piece: u32) -> SurfacePoint {
     let feature = match target.active {
-        0 => return None,
-        1 => Feature::Face,
+        0 | 1 => Feature::Face,
         2 => Feature::Edge,
         _ => Feature::Vertex,
     };
     let way_B = target.point_B - hip_B;
     let depth_m = way_B.norm();
-    let normal_B = if depth_m > 0.0 { way_B / depth_m } else { mesh.faces().get(piece as usize)?.normal_B };
-    Some(SurfacePoint { point_B: target.point_B, normal_B, feature, piece })
+    let normal_B = if depth_m > 0.0 { way_B / depth_m } else { mesh.faces()[piece as usize].normal_B };
+    SurfacePoint { point_B: target.point_B, normal_B, feature, piece }
 }
 
 /// It rests when it moves less, in terms of the height at which it hovers.
 const REST: f64 = 1e-4;
-/// A constraint may be missed by this much, in the same terms: rounding of positions is 1e-7 of the height.
-const SLACK: f64 = 1e-5;
+/// A constraint may be missed by this much, in the same terms: rounding of positions is 1e-7 of the height, and up to
+/// 1e5 times as much where two planes meet that are almost parallel.
+const SLACK: f64 = 1e-2;
 /// Where things are in the contact's memory.
 const POINT: usize = 0;
 const IS_TOUCHING: usize = 7;

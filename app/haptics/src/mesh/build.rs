@@ -11,7 +11,8 @@
 //!
 //! Cost: linear, but for sorting.
 
-use super::repair::{Triangle, area_vector};
+use super::order::Triangle;
+use super::repair::area_vector;
 use super::{Bvh, Face, Link, Mesh, MeshError, MeshReport, TriangleSoup};
 use super::{order, repair, topology, winding};
 use nalgebra::Vector3;
@@ -24,15 +25,16 @@ impl Mesh {
     pub fn build(soup: TriangleSoup) -> Result<(Self, MeshReport), MeshError> {
         soup.validate()?;
         let mut report = MeshReport::default();
-        let triangles = repair::proper_triangles(&soup, &mut report)?;
-        let mut triangles = order::sort_spatially(triangles, &soup.vertices, &mut report.duplicate);
+        let mut triangles = repair::proper_triangles(&soup, &mut report)?;
+        order::sort_spatially(&mut triangles, &soup.vertices, &mut report.duplicate);
         let vertices = order::renumber(&mut triangles, &soup.vertices);
         drop(soup);
-        let mut links = topology::link(&triangles, &vertices)?;
+        let mut links = topology::link(&triangles, &vertices, &mut report.touching_edges)?;
         let sides = winding::orient(&mut triangles, &mut links, &vertices, &mut report);
         report_edges(&triangles, &links, &mut report);
         let faces: Box<[Face]> =
             triangles.iter().zip(&links).map(|(triangle, links)| face(triangle, links, &vertices)).collect();
+        drop((triangles, links));
         report.faces = faces.len();
         report.vertices = vertices.len();
         let extent_m = vertices.iter().fold(0.0_f64, |extent, v| extent.max(v.amax()));

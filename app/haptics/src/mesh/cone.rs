@@ -4,12 +4,12 @@ use nalgebra::Vector3;
 
 use super::Mesh;
 use super::fan::{Sector, for_each_around};
-use super::place::{Facet, Side, next, previous};
+use super::place::{Side, next, previous};
 
 /// What the HIP sees of a cone.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Cone<'m> {
-    pub(crate) nearest: Nearest<'m>,
+pub(crate) struct Cone {
+    pub(crate) nearest: Nearest,
     /// From the tip to the HIP.
     to_hip_B: Vector3<f64>,
     /// Square of the distance from the tip to the nearest point: the larger, the nearer that point is to the HIP.
@@ -22,18 +22,18 @@ pub(crate) struct Cone<'m> {
 
 /// Where on a cone the point nearest to the HIP lies.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Nearest<'m> {
+pub(crate) enum Nearest {
     /// Inside this face, behind which the HIP lies by so much \[m\].
-    Face(Facet<'m>, f64),
+    Face(Side, f64),
     /// On the edge of this number of a face.
     Edge(Side, usize),
     /// At the vertex itself.
     Tip,
 }
 
-impl<'m> Cone<'m> {
+impl Cone {
     /// The cone of all faces around a corner; `to_hip_B` leads from there to the HIP.
-    pub(crate) fn around(mesh: &'m Mesh, side: Side, corner: usize, to_hip_B: &Vector3<f64>) -> Self {
+    pub(crate) fn around(mesh: &Mesh, side: Side, corner: usize, to_hip_B: &Vector3<f64>) -> Self {
         let mut cone = Self {
             nearest: Nearest::Tip,
             to_hip_B: *to_hip_B,
@@ -63,7 +63,7 @@ impl<'m> Cone<'m> {
         }
     }
 
-    fn look_at(&mut self, mesh: &'m Mesh, sector: &Sector<'m>) {
+    fn look_at(&mut self, mesh: &Mesh, sector: &Sector<'_>) {
         let Sector { facet, corner } = *sector;
         let depth_m = -facet.normal_B.dot(&self.to_hip_B);
         self.least_depth_m = self.least_depth_m.min(depth_m);
@@ -72,25 +72,29 @@ impl<'m> Cone<'m> {
         for (edge, edge_B) in [(corner, one_B), (previous(corner), other_B)] {
             let along = edge_B.dot(&self.to_hip_B);
             if along > 0.0 {
-                self.offer(along * along / edge_B.norm_squared(), facet.side, Nearest::Edge(facet.side, edge));
+                self.offer(
+                    along * along / edge_B.norm_squared(),
+                    facet.side,
+                    Nearest::Edge(facet.side, edge),
+                );
             }
         }
         let is_within = facet.inward_B(&one_B).dot(&self.to_hip_B) >= 0.0
             && facet.inward_B(&other_B).dot(&self.to_hip_B) <= 0.0;
         if is_within {
             let reach_m2 = self.to_hip_B.norm_squared() - depth_m * depth_m;
-            self.offer(reach_m2, facet.side, Nearest::Face(facet, depth_m));
+            self.offer(reach_m2, facet.side, Nearest::Face(facet.side, depth_m));
         }
     }
 
     /// The farther reach wins, the lower face among equals: where one started around the vertex must not matter.
-    fn offer(&mut self, reach_m2: f64, side: Side, nearest: Nearest<'m>) {
+    fn offer(&mut self, reach_m2: f64, side: Side, nearest: Nearest) {
         let best_face = match self.nearest {
-            Nearest::Face(facet, _) => facet.side.face,
-            Nearest::Edge(side, _) => side.face,
+            Nearest::Face(side, _) | Nearest::Edge(side, _) => side.face,
             Nearest::Tip => u32::MAX,
         };
-        if reach_m2 > self.reach_m2 || (reach_m2 == self.reach_m2 && reach_m2 > 0.0 && side.face <= best_face) {
+        if reach_m2 > self.reach_m2 || (reach_m2 == self.reach_m2 && reach_m2 > 0.0 && side.face <= best_face)
+        {
             (self.reach_m2, self.nearest) = (reach_m2, nearest);
         }
     }

@@ -37,9 +37,9 @@ pub enum MeshError {
         /// How many faces there were.
         faces: usize,
     },
-    /// More than two faces meet at an edge: there is no telling which one comes next.
+    /// More than two faces meet at an edge, and there is no telling which one comes next.
     NonManifold {
-        /// How many edges are shared by more than two faces.
+        /// How many such edges there are.
         edges: usize,
         /// The first face at such an edge.
         first_face: usize,
@@ -83,8 +83,8 @@ impl fmt::Display for MeshError {
             Self::NonManifold { edges, first_face, faces, ends_B: [a, b] } => write!(
                 f,
                 "{edges} edges are shared by more than two faces (first: face {first_face}, {faces} faces at the \
-                 edge from {a:?} to {b:?} m); allowed are one or two: remove inner walls, or move parts that touch \
-                 along an edge apart"
+                 edge from {a:?} to {b:?} m); allowed are one or two, or solid parts that touch along the edge: \
+                 remove inner walls, separate sheets that meet, wind faces outward"
             ),
             Self::Valence { at_B, faces, allowed } => write!(
                 f,

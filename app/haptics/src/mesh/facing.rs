@@ -21,9 +21,9 @@ use super::place::{Facet, On, Place, Side};
 
 /// What holds the HIP back.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Facing<'m> {
+pub(crate) enum Facing {
     /// A face.
-    Face(Facet<'m>),
+    Face(Side),
     /// A concave edge.
     Edge(Side, usize),
     /// A vertex.
@@ -32,25 +32,24 @@ pub(crate) enum Facing<'m> {
     Free,
 }
 
-impl<'m> Facing<'m> {
-    pub(crate) fn of(mesh: &'m Mesh, place: &Place, hip_B: &Vector3<f64>) -> Self {
+impl Facing {
+    #[inline(always)]
+    pub(crate) fn of(mesh: &Mesh, place: &Place, hip_B: &Vector3<f64>) -> Self {
         match place.on {
             On::Face(side) => {
-                let facet = Facet::of(mesh, side);
-                if facet.depth_m(hip_B) < 0.0 { Self::Free } else { Self::Face(facet) }
+                if is_in_front(mesh, Facet::of(mesh, side).depth_m(hip_B)) {
+                    Self::Free
+                } else {
+                    Self::Face(side)
+                }
             }
             On::Edge(side, edge) => Self::on_edge(mesh, side, edge, &place.point_B, hip_B),
             On::Vertex(side, corner) => Self::at_vertex(mesh, side, corner, &place.point_B, hip_B),
         }
     }
 
-    fn on_edge(
-        mesh: &'m Mesh,
-        side: Side,
-        edge: usize,
-        point_B: &Vector3<f64>,
-        hip_B: &Vector3<f64>,
-    ) -> Self {
+    #[inline(always)]
+    fn on_edge(mesh: &Mesh, side: Side, edge: usize, point_B: &Vector3<f64>, hip_B: &Vector3<f64>) -> Self {
         let here = Facet::of(mesh, side);
         let link = here.face.links[edge];
         let (_, edge_B) = here.edge_B(mesh, edge);
@@ -59,31 +58,36 @@ impl<'m> Facing<'m> {
         let here_depth_m = here.depth_m(hip_B);
         let Some(over) = side.across(link).map(|side| Facet::of(mesh, side)) else {
             // The rim of a sheet: beyond it there is nothing.
-            return if here_wants && here_depth_m >= 0.0 { Self::Face(here) } else { Self::Free };
+            return if here_wants && !is_in_front(mesh, here_depth_m) {
+                Self::Face(side)
+            } else {
+                Self::Free
+            };
         };
         // Neighbours run along their edge in opposite directions, unless one of them is turned.
         let over_inward_B = over.inward_B(&if link.is_turned() { edge_B } else { -edge_B });
         let over_wants = over_inward_B.dot(&to_hip_B) > 0.0;
         let over_depth_m = over.depth_m(hip_B);
         let is_concave = over_inward_B.dot(&here.normal_B) > 0.0;
-        let is_in_front = [here_depth_m < 0.0, over_depth_m < 0.0];
-        let is_free = if is_concave { is_in_front == [true; 2] } else { is_in_front != [false; 2] };
+        let in_front = [is_in_front(mesh, here_depth_m), is_in_front(mesh, over_depth_m)];
+        let is_free = if is_concave { in_front == [true; 2] } else { in_front != [false; 2] };
         if is_free {
             return Self::Free;
         }
-        match (here_wants && here_depth_m >= 0.0, over_wants && over_depth_m >= 0.0) {
-            (true, false) => Self::Face(here),
-            (false, true) => Self::Face(over),
+        match (here_wants && !in_front[0], over_wants && !in_front[1]) {
+            (true, false) => Self::Face(side),
+            (false, true) => Self::Face(over.side),
             // On a convex edge by rounding only.
             (false, false) => Self::Edge(side, edge),
             // The lower index among equals, so that the result does not depend on where one came from.
-            (true, true) if (here_depth_m, side.face) <= (over_depth_m, over.side.face) => Self::Face(here),
-            (true, true) => Self::Face(over),
+            (true, true) if (here_depth_m, side.face) <= (over_depth_m, over.side.face) => Self::Face(side),
+            (true, true) => Self::Face(over.side),
         }
     }
 
+    #[inline(never)]
     fn at_vertex(
-        mesh: &'m Mesh,
+        mesh: &Mesh,
         side: Side,
         corner: usize,
         point_B: &Vector3<f64>,
@@ -91,7 +95,7 @@ impl<'m> Facing<'m> {
     ) -> Self {
         let cone = Cone::around(mesh, side, corner, &(hip_B - point_B));
         match cone.nearest {
-            Nearest::Face(facet, depth_m) if depth_m >= 0.0 => Self::Face(facet),
+            Nearest::Face(side, depth_m) if !is_in_front(mesh, depth_m) => Self::Face(side),
             Nearest::Face(..) => Self::Free,
             Nearest::Edge(side, edge) => Self::on_edge(mesh, side, edge, point_B, hip_B),
             Nearest::Tip if cone.is_behind(mesh, side, corner) => Self::Vertex(side, corner),
@@ -99,3 +103,13 @@ impl<'m> Facing<'m> {
         }
     }
 }
+
+/// Whether a HIP at this depth is clearly in front of a face: by more than a path that ends there is met before it. A
+/// finger that rounding could put on either side of a sheet is in contact, without a force.
+#[inline]
+fn is_in_front(mesh: &Mesh, depth_m: f64) -> bool {
+    depth_m < -RELEASE * mesh.extent_m
+}
+
+/// A few times the tolerance of [`Mesh::first_hit`].
+const RELEASE: f64 = 4e-13;

@@ -13,7 +13,12 @@ pub(crate) struct Sector<'m> {
 /// Calls `visit` for every face around a corner, and says whether the fan is closed.
 ///
 /// From the given face on one way round; where the mesh ends, from there on the other way.
-pub(crate) fn for_each_around<'m>(mesh: &'m Mesh, side: Side, corner: usize, mut visit: impl FnMut(Sector<'m>)) -> bool {
+pub(crate) fn for_each_around<'m>(
+    mesh: &'m Mesh,
+    side: Side,
+    corner: usize,
+    mut visit: impl FnMut(Sector<'m>),
+) -> bool {
     let first = Sector { facet: Facet::of(mesh, side), corner };
     visit(first);
     let mut visited = 1;

@@ -11,9 +11,9 @@
 
 use nalgebra::Vector3;
 
+use super::Mesh;
 use super::place::Place;
 use super::walk::{Stand, Walked, stand, walk};
-use super::Mesh;
 use crate::friction::Friction;
 use crate::friction_cone::{ConeForce, ConeInput, answer};
 use crate::friction_law::{FrictionLaw, FrictionState};
@@ -24,6 +24,8 @@ use crate::tangent_view::TangentView;
 /// State of one finger towards one mesh.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct MeshCone {
+    /// Which mesh the rest is about: indices of another one would lead nowhere.
+    mesh: Option<usize>,
     touching: Option<Touching>,
     /// Where the HIP was in the last tick.
     last_hip_B: Option<Vector3<f64>>,
@@ -66,6 +68,11 @@ impl MeshCone {
         previous_hip_B: Option<Vector3<f64>>,
         input: &ConeInput,
     ) -> Option<(ConeForce, Beginning)> {
+        // Its faces stay where they are as long as it lives.
+        let mesh_here = Some(mesh.faces().as_ptr().addr());
+        if self.mesh != mesh_here {
+            *self = Self { mesh: mesh_here, ..Self::default() };
+        }
         let last_hip_B = self.last_hip_B.replace(input.hip_B);
         let mut beginning = Beginning::Came;
         if self.touching.is_none() {
@@ -94,7 +101,7 @@ impl MeshCone {
 
     /// Where the god-object is, with the normal and the feature there.
     pub fn god_object(&self) -> Option<SurfacePoint> {
-        self.touching.map(|touching| SurfacePoint {
+        self.touching.as_ref().map(|touching| SurfacePoint {
             point_B: touching.god_object.point_B,
             normal_B: touching.normal_B,
             feature: touching.god_object.feature(),
@@ -104,7 +111,7 @@ impl MeshCone {
 
     /// Whether friction holds it.
     pub fn state(&self) -> FrictionState {
-        self.touching.map_or(FrictionState::Stick, |touching| touching.grip.state)
+        self.touching.as_ref().map_or(FrictionState::Stick, |touching| touching.grip.state)
     }
 
     fn meet(
@@ -147,7 +154,7 @@ impl Touching {
             walk(mesh, &mut self.shadow, shadow, |query| query.gap_m, &Pull::default(), input)?;
         }
         let here = stand(mesh, &mut self.god_object, input)?;
-        let pull = self.grip.begin_tick(&here.view, input);
+        let pull = if has_friction { self.grip.begin_tick(&here.view, input) } else { Pull::default() };
         let (view, tangential_B, changes) = match self.grip.hold(friction, &here.view, &pull, input) {
             Some(tangential_B) => (here.view, tangential_B, 0),
             None => self.slide(mesh, friction, here, &pull, input)?,
@@ -163,7 +170,7 @@ impl Touching {
         &mut self,
         mesh: &Mesh,
         friction: &Friction,
-        from: Stand<'_>,
+        from: Stand,
         pull: &Pull,
         input: &ConeInput,
     ) -> Option<(TangentView, Vector3<f64>, u32)> {

@@ -41,6 +41,7 @@ pub(crate) struct Facet<'m> {
 }
 
 impl Place {
+    #[inline]
     pub(crate) fn hit(hit: &Hit) -> Self {
         Self { point_B: hit.point_B, on: On::Face(Side { face: hit.face, is_back: !hit.is_front }) }
     }
@@ -66,12 +67,14 @@ impl Place {
 
 impl Side {
     /// The side that one comes to across an edge; `None` where the mesh ends.
+    #[inline]
     pub(crate) fn across(self, link: Link) -> Option<Self> {
         (!link.is_boundary()).then(|| Self { face: link.face(), is_back: self.is_back != link.is_turned() })
     }
 }
 
 impl<'m> Facet<'m> {
+    #[inline]
     pub(crate) fn of(mesh: &'m Mesh, side: Side) -> Self {
         let face = &mesh.faces[side.face as usize];
         let (normal_B, offset_m) =
@@ -80,32 +83,44 @@ impl<'m> Facet<'m> {
     }
 
     /// How far below the plane a point lies \[m\].
+    #[inline]
     pub(crate) fn depth_m(&self, point_B: &Vector3<f64>) -> f64 {
         self.offset_m - self.normal_B.dot(point_B)
     }
 
     /// From the start of an edge to its end \[m\].
+    #[inline]
     pub(crate) fn edge_B(&self, mesh: &Mesh, edge: usize) -> (Vector3<f64>, Vector3<f64>) {
-        let [start_B, end_B] = [edge, next(edge)].map(|corner| self.corner_B(mesh, corner));
-        (start_B, end_B - start_B)
+        let start_B = self.corner_B(mesh, edge);
+        (start_B, self.corner_B(mesh, next(edge)) - start_B)
     }
 
+    #[inline]
+    pub(crate) fn corners_B(&self, mesh: &Mesh) -> [Vector3<f64>; 3] {
+        let [a, b, c] = self.face.vertices;
+        [mesh.vertices[a as usize], mesh.vertices[b as usize], mesh.vertices[c as usize]]
+    }
+
+    #[inline]
     pub(crate) fn corner_B(&self, mesh: &Mesh, corner: usize) -> Vector3<f64> {
         mesh.vertices[self.face.vertices[corner] as usize]
     }
 
     /// Across an edge into the face, along its plane; as long as `edge_B`. The same for both sides.
+    #[inline]
     pub(crate) fn inward_B(&self, edge_B: &Vector3<f64>) -> Vector3<f64> {
         self.face.normal_B.cross(edge_B)
     }
 }
 
 /// The corner after this one, which is also where the edge of this number ends.
+#[inline]
 pub(crate) fn next(corner: usize) -> usize {
     if corner == 2 { 0 } else { corner + 1 }
 }
 
 /// The corner before this one, and the edge that leads from it to this one.
+#[inline]
 pub(crate) fn previous(corner: usize) -> usize {
     if corner == 0 { 2 } else { corner - 1 }
 }

@@ -14,9 +14,20 @@ impl Mesh {
         self.bvh.first_hit(self.triangles(), self.sides, from_B, to_B)
     }
 
+    /// As [`Self::first_hit`], of the faces that `is_skipped` does not name.
+    pub(crate) fn first_hit_of_others(
+        &self,
+        from_B: &Vector3<f64>,
+        to_B: &Vector3<f64>,
+        is_skipped: impl Fn(u32) -> bool,
+    ) -> Option<Hit> {
+        self.bvh.first_hit_of_others(self.triangles(), self.sides, from_B, to_B, is_skipped)
+    }
+
     /// The point of the mesh nearest to a point on either side.
     ///
-    /// A point that is not finite, or 1e150 m away, is answered by a corner of face 0 at infinite distance.
+    /// A point that is not finite is answered by a corner of face 0, infinitely far away. Beyond 1000 extents the
+    /// answer is that for a point 1000 extents away in the same direction, with the point's own distance.
     pub fn nearest(&self, p_B: &Vector3<f64>) -> Nearest {
         self.bvh.nearest(self.triangles(), p_B)
     }

@@ -6,17 +6,11 @@
 //! tells apart. A face has no area if its height over its longest edge drowns in the rounding of its coordinates;
 //! this scales with the mesh and keeps the thinnest needle that can be told from a line.
 
+use super::order::{Curve, Triangle};
 use super::report::{Finding, MeshReport};
+use super::sliver::{Sliver, divide};
 use super::{MeshError, TriangleSoup};
 use nalgebra::Vector3;
-
-/// A face on its way into a mesh.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Triangle {
-    pub(super) corners: [u32; 3],
-    /// Its index in the input.
-    pub(super) origin: u32,
-}
 
 /// The faces that have an area, between vertices that are all different.
 pub(super) fn proper_triangles(
@@ -25,20 +19,37 @@ pub(super) fn proper_triangles(
 ) -> Result<Vec<Triangle>, MeshError> {
     let merged = weld(&soup.vertices, &mut report.welded_vertices);
     report.unused_vertices = unused(soup);
+    let curve = Curve::through(&soup.vertices);
     let mut triangles = Vec::with_capacity(soup.faces.len());
-    for (origin, face) in soup.faces.iter().enumerate() {
-        let corners = face.map(|v| merged[v as usize]);
-        if has_area(&corners.map(|v| soup.vertices[v as usize])) {
-            triangles.push(Triangle { corners, origin: origin as u32 });
-        } else {
-            report.degenerate.note(origin);
+    let mut slivers = Vec::new();
+    let mut block = [([0; 3], [Vector3::zeros(); 3]); BLOCK];
+    for (number, faces) in soup.faces.chunks(BLOCK).enumerate() {
+        for (face, (corners, points)) in faces.iter().zip(&mut block) {
+            *corners = face.map(|v| merged[v as usize]);
+            *points = corners.map(|v| soup.vertices[v as usize]);
+        }
+        for (i, (corners, points)) in block[..faces.len()].iter().enumerate() {
+            let origin = number * BLOCK + i;
+            if has_area(points) {
+                triangles.push(Triangle::new(*corners, points, origin as u32, &curve));
+            } else {
+                report.degenerate.note(origin);
+                slivers.extend(Sliver::new(*corners, points));
+            }
         }
     }
     if triangles.is_empty() {
         return Err(MeshError::NothingLeft { faces: soup.faces.len() });
     }
+    if !slivers.is_empty() {
+        divide(&mut triangles, slivers, &soup.vertices, &curve, &mut report.divided);
+    }
     Ok(triangles)
 }
+
+/// Faces whose points are fetched together: where their order is random each is a cache miss, and those of a block
+/// overlap.
+const BLOCK: usize = 64;
 
 /// For each vertex the first one equal to it.
 ///
@@ -95,7 +106,7 @@ pub(super) fn area_vector([a, b, c]: &[Vector3<f64>; 3]) -> Vector3<f64> {
     }
 }
 
-fn has_area(corners: &[Vector3<f64>; 3]) -> bool {
+pub(super) fn has_area(corners: &[Vector3<f64>; 3]) -> bool {
     let [a, b, c] = corners;
     let longest = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared()).sqrt();
     let height = area_vector(corners).norm() / longest;

@@ -46,6 +46,9 @@ pub struct MeshReport {
     pub inside_out: Finding,
     /// Closed parts that face inward, as cavities do; left so.
     pub cavities: Finding,
+    /// Edges along which parts touch, so that four or more faces share them; each face was joined to the next one
+    /// across the outside.
+    pub touching_edges: Finding,
     /// Edges where the mesh ends: the rim of an open mesh, or a crack.
     pub boundary_edges: Finding,
     /// Edges across which inside and outside change places: the mesh cannot be oriented.
@@ -64,6 +67,7 @@ impl MeshReport {
             self.duplicate,
             self.flipped,
             self.inside_out,
+            self.touching_edges,
             self.boundary_edges,
             self.turned_edges,
         ];
@@ -89,6 +93,7 @@ impl fmt::Display for MeshReport {
             (self.flipped, "face", "faces", "wound against the neighbours: turned over"),
             (self.inside_out, "part", "parts", "inside out: turned"),
             (self.cavities, "part", "parts", "facing inward: taken for a cavity"),
+            (self.touching_edges, "edge", "edges", "along which parts touch: joined across the outside"),
             (self.boundary_edges, "edge", "edges", "of one face only: an open rim or a crack"),
             (self.turned_edges, "edge", "edges", "where outside becomes inside: it cannot be oriented"),
         ];

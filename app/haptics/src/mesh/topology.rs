@@ -1,14 +1,20 @@
 //! Finds out which faces share an edge.
 //!
 //! Model: each edge is entered at its lower-numbered vertex; sorted by the other one, the faces at an edge stand
-//! side by side. Vertices are numbered in spatial order by now, so this runs through memory in order.
+//! side by side: one on a boundary, two inside, more where parts touch ([`touching`]). Vertices are numbered in spatial order by now, so this runs through memory in order.
 
-use super::repair::Triangle;
+use super::order::Triangle;
+use super::report::Finding;
+use super::touching::pair_across_outside;
 use super::{Link, MAX_VALENCE, MeshError};
 use nalgebra::Vector3;
 
 /// The links of every face, as wound in the input.
-pub(super) fn link(triangles: &[Triangle], vertices: &[Vector3<f64>]) -> Result<Vec<[Link; 3]>, MeshError> {
+pub(super) fn link(
+    triangles: &[Triangle],
+    vertices: &[Vector3<f64>],
+    touching: &mut Finding,
+) -> Result<Vec<[Link; 3]>, MeshError> {
     check_valences(triangles, vertices)?;
     let (mut sides, starts) = sides_by_lower_vertex(triangles, vertices.len());
     let mut links = vec![[Link::BOUNDARY; 3]; triangles.len()];
@@ -20,7 +26,13 @@ pub(super) fn link(triangles: &[Triangle], vertices: &[Vector3<f64>]) -> Result<
             match edge {
                 [_] => {}
                 [a, b] => join(&mut links, *a, *b),
-                many => crowded.note(many, lower, triangles, vertices),
+                many => match pair_across_outside(many, lower, triangles, vertices) {
+                    Some(pairs) => {
+                        pairs.iter().for_each(|&[a, b]| join(&mut links, a, b));
+                        touching.note(first_of_input(many, triangles));
+                    }
+                    None => crowded.note(many, lower, triangles, vertices),
+                },
             }
         }
     }
@@ -30,18 +42,18 @@ pub(super) fn link(triangles: &[Triangle], vertices: &[Vector3<f64>]) -> Result<
 /// A face's side of an edge. Packed, so that sorting compares one word: bits 32.. the edge's upper vertex, bit 0
 /// whether the face runs upward along it, between them 3 * face + edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
-struct Side(u64);
+pub(super) struct Side(u64);
 
 impl Side {
     fn new(face: usize, edge: usize, from: u32, to: u32) -> Self {
         Self(u64::from(from.max(to)) << 32 | ((3 * face + edge) as u64) << 1 | u64::from(from < to))
     }
 
-    fn upper(self) -> u32 {
+    pub(super) fn upper(self) -> u32 {
         (self.0 >> 32) as u32
     }
 
-    fn face(self) -> u32 {
+    pub(super) fn face(self) -> u32 {
         (self.0 as u32 >> 1) / 3
     }
 
@@ -49,7 +61,7 @@ impl Side {
         ((self.0 as u32 >> 1) % 3) as usize
     }
 
-    fn is_upward(self) -> bool {
+    pub(super) fn is_upward(self) -> bool {
         self.0 & 1 == 1
     }
 }
@@ -87,6 +99,10 @@ fn join(links: &mut [[Link; 3]], a: Side, b: Side) {
     links[b.face() as usize][b.edge()] = Link::new(a.face(), a.edge() as u8, turned);
 }
 
+fn first_of_input(sides: &[Side], triangles: &[Triangle]) -> usize {
+    sides.iter().map(|side| triangles[side.face() as usize].origin as usize).min().unwrap_or(0)
+}
+
 fn check_valences(triangles: &[Triangle], vertices: &[Vector3<f64>]) -> Result<(), MeshError> {
     let mut faces = vec![0_u32; vertices.len()];
     for corner in triangles.iter().flat_map(|triangle| triangle.corners) {
@@ -102,23 +118,21 @@ fn check_valences(triangles: &[Triangle], vertices: &[Vector3<f64>]) -> Result<(
     }
 }
 
-/// The edges that more than two faces share.
+/// Edges at which it is not clear which face comes next.
 #[derive(Default)]
 struct Crowded {
     edges: usize,
     /// First face of the input at such an edge, number of faces there, the edge's ends.
-    first: Option<(u32, usize, [[f64; 3]; 2])>,
+    first: Option<(usize, usize, [[f64; 3]; 2])>,
 }
 
 impl Crowded {
     fn note(&mut self, sides: &[Side], lower: usize, triangles: &[Triangle], vertices: &[Vector3<f64>]) {
         self.edges += 1;
-        for side in sides {
-            let face = triangles[side.face() as usize].origin;
-            if self.first.is_none_or(|(first, ..)| face < first) {
-                let ends = [lower, side.upper() as usize].map(|v| vertices[v].into());
-                self.first = Some((face, sides.len(), ends));
-            }
+        let face = first_of_input(sides, triangles);
+        if self.first.is_none_or(|(first, ..)| face < first) {
+            let ends = [lower, sides[0].upper() as usize].map(|v| vertices[v].into());
+            self.first = Some((face, sides.len(), ends));
         }
     }
 
@@ -126,7 +140,7 @@ impl Crowded {
         match self.first {
             None => Ok(()),
             Some((face, faces, ends_B)) => {
-                Err(MeshError::NonManifold { edges: self.edges, first_face: face as usize, faces, ends_B })
+                Err(MeshError::NonManifold { edges: self.edges, first_face: face, faces, ends_B })
             }
         }
     }

@@ -34,8 +34,8 @@ const MAX_FLIGHTS: u32 = 8;
 
 /// Where a god-object is, and what faces the HIP there.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Stand<'m> {
-    pub(crate) facing: Facing<'m>,
+pub(crate) struct Stand {
+    pub(crate) facing: Facing,
     pub(crate) view: TangentView,
 }
 
@@ -51,17 +51,19 @@ pub(crate) struct Walked {
 /// Where the god-object stands when the HIP has moved; `None` if it is free and gone.
 ///
 /// `place` may change without moving: from an edge to the face that now holds the HIP back.
-pub(crate) fn stand<'m>(mesh: &'m Mesh, place: &mut Place, input: &ConeInput) -> Option<Stand<'m>> {
+#[inline(always)]
+pub(crate) fn stand(mesh: &Mesh, place: &mut Place, input: &ConeInput) -> Option<Stand> {
     for _ in 0..MAX_FLIGHTS {
         let facing = Facing::of(mesh, place, &input.hip_B);
         let (on, view) = match facing {
-            Facing::Face(facet) => (On::Face(facet.side), view_of_face(&facet, place, input)),
-            Facing::Edge(side, edge) => {
-                (On::Edge(side, edge), view_of_edge(mesh, side, edge, place, input))
-            }
+            Facing::Face(side) => (On::Face(side), view_of_face(mesh, side, place, input)),
+            Facing::Edge(side, edge) => (On::Edge(side, edge), view_of_edge(mesh, side, edge, place, input)),
             Facing::Vertex(side, corner) => (On::Vertex(side, corner), view_of_vertex(place, input)),
             Facing::Free => {
-                *place = fly(mesh, place, &input.hip_B)?;
+                *place = match rim(mesh, place) {
+                    Some(rim) => rim,
+                    None => fly(mesh, place, &input.hip_B)?,
+                };
                 continue;
             }
         };
@@ -72,10 +74,11 @@ pub(crate) fn stand<'m>(mesh: &'m Mesh, place: &mut Place, input: &ConeInput) ->
 }
 
 /// Moves `place` from where it stands until `asked` wants no further slide; `None` if it is free and gone.
-pub(crate) fn walk<'m>(
-    mesh: &'m Mesh,
+#[inline]
+pub(crate) fn walk(
+    mesh: &Mesh,
     place: &mut Place,
-    mut stand_now: Stand<'m>,
+    mut stand_now: Stand,
     asked: impl Fn(&FrictionQuery) -> f64,
     pull: &Pull,
     input: &ConeInput,
@@ -88,7 +91,7 @@ pub(crate) fn walk<'m>(
         }
         let target_B = slide.target_B();
         let reached = match stand_now.facing {
-            Facing::Face(facet) => cross_face(mesh, &facet, &place.point_B, &target_B),
+            Facing::Face(side) => cross_face(mesh, side, &place.point_B, &target_B),
             Facing::Edge(side, edge) => follow_edge(mesh, side, edge, &target_B),
             Facing::Vertex(..) | Facing::Free => return Some(slide.rested(changes)),
         };
@@ -98,7 +101,10 @@ pub(crate) fn walk<'m>(
         }
         stand_now = stand(mesh, place, input)?;
     }
-    Some(Slide::new(stand_now.view, &(start_B - place.point_B), &asked, pull, input).rested(MAX_FEATURE_CHANGES))
+    Some(
+        Slide::new(stand_now.view, &(start_B - place.point_B), &asked, pull, input)
+            .rested(MAX_FEATURE_CHANGES),
+    )
 }
 
 /// What friction asks of a god-object where it stands.
@@ -110,6 +116,7 @@ struct Slide {
 }
 
 impl Slide {
+    #[inline(always)]
     fn new(
         view: TangentView,
         back_B: &Vector3<f64>,
@@ -125,25 +132,31 @@ impl Slide {
     }
 
     /// Inside the friction circle, or as near to its rim as positions can tell.
+    #[inline]
     fn is_at_rest(&self) -> bool {
         self.asked_m.is_nan() || self.asked_m <= self.view.rest_m
     }
 
+    #[inline]
     fn target_B(&self) -> Vector3<f64> {
         self.view.surface_point_B + self.direction_B * self.radius_m()
     }
 
     /// Distance from the surface point at which the slide ends.
+    #[inline]
     fn radius_m(&self) -> f64 {
         self.view.gap_m - self.asked_m.min(self.view.gap_m)
     }
 
     /// It stays: the force is that of its gap, cut to the rim if a bound ended the walk early.
+    #[inline]
     fn rested(&self, changes: u32) -> Walked {
-        let tangential_B = if self.asked_m > 0.0 { self.direction_B * self.radius_m() } else { self.view.lag_B };
+        let tangential_B =
+            if self.asked_m > 0.0 { self.direction_B * self.radius_m() } else { self.view.lag_B };
         Walked { view: self.view, tangential_B, changes }
     }
 
+    #[inline]
     fn arrived(&self, changes: u32) -> Walked {
         Walked { view: self.view, tangential_B: self.direction_B * self.radius_m(), changes }
     }
@@ -156,32 +169,36 @@ struct Reached {
 }
 
 /// Goes straight through a face: to the target or to the first edge or vertex on the way.
-fn cross_face(mesh: &Mesh, facet: &Facet<'_>, from_B: &Vector3<f64>, target_B: &Vector3<f64>) -> Reached {
+#[inline(always)]
+fn cross_face(mesh: &Mesh, side: Side, from_B: &Vector3<f64>, target_B: &Vector3<f64>) -> Reached {
+    let facet = Facet::of(mesh, side);
     let way_B = target_B - from_B;
     let way_m2 = way_B.norm_squared();
-    let corners_B = [0, 1, 2].map(|corner| facet.corner_B(mesh, corner));
-    let mut first = None;
+    let corners_B = facet.corners_B(mesh);
+    let [a_B, b_B, c_B] = corners_B;
+    let edges_B = [b_B - a_B, c_B - b_B, a_B - c_B];
     let mut first_fraction = f64::INFINITY;
-    for edge in 0..3 {
-        let edge_B = corners_B[next(edge)] - corners_B[edge];
-        let inward_B = facet.inward_B(&edge_B);
+    let mut first = None;
+    // No branch but the last: which edge it is that is met, nothing can predict.
+    for (edge, edge_B) in edges_B.iter().enumerate() {
+        let inward_B = facet.inward_B(edge_B);
         // Distances from the edge, times its length: the Voronoi plane through the edge, Melder eq. 4.15-4.20 with the
         // offset corrected (the printed one is always 0).
         let gained = inward_B.dot(&way_B);
-        if gained >= 0.0 || gained * gained <= PARALLEL * PARALLEL * edge_B.norm_squared() * way_m2 {
-            continue;
-        }
         let left = inward_B.dot(&(from_B - corners_B[edge])).max(0.0);
-        if left + gained < 0.0 && left < -gained * first_fraction {
-            (first, first_fraction) = (Some((edge, edge_B)), -left / gained);
-        }
+        let leaves = gained * gained > PARALLEL * PARALLEL * edge_B.norm_squared() * way_m2;
+        let is_met = (gained < 0.0) & (left + gained < 0.0) & leaves;
+        let fraction = if is_met { left / -gained } else { f64::INFINITY };
+        first = if fraction < first_fraction { Some(edge) } else { first };
+        first_fraction = fraction.min(first_fraction);
     }
-    let Some((edge, edge_B)) = first else {
-        return Reached { place: Place { point_B: *target_B, on: On::Face(facet.side) }, is_all_the_way: true };
+    let Some(edge) = first else {
+        return Reached { place: Place { point_B: *target_B, on: On::Face(side) }, is_all_the_way: true };
     };
     let met_B = from_B + way_B * first_fraction;
+    let edge_B = edges_B[edge];
     let share = edge_B.dot(&(met_B - corners_B[edge])) / edge_B.norm_squared();
-    Reached { place: on_edge(mesh, facet.side, edge, share), is_all_the_way: false }
+    Reached { place: on_edge(mesh, side, edge, share), is_all_the_way: false }
 }
 
 /// Goes along an edge: to the target or to the vertex on the way.
@@ -193,6 +210,7 @@ fn follow_edge(mesh: &Mesh, side: Side, edge: usize, target_B: &Vector3<f64>) ->
 }
 
 /// The place on an edge at this share of its length; near its ends, the vertex.
+#[inline]
 fn on_edge(mesh: &Mesh, side: Side, edge: usize, share: f64) -> Place {
     let facet = Facet::of(mesh, side);
     let at = |corner| Place { point_B: facet.corner_B(mesh, corner), on: On::Vertex(side, corner) };
@@ -206,23 +224,53 @@ fn on_edge(mesh: &Mesh, side: Side, edge: usize, share: f64) -> Place {
     Place { point_B: start_B + edge_B * share, on: On::Edge(side, edge) }
 }
 
-/// Straight from where it was to the HIP through free space; `None` if nothing is in the way.
-///
-/// The HIP is in front of all that meets here, so none of that is in the way; started a little off, rounding
-/// cannot say otherwise. On a face the neighbour behind a concave edge may be.
-fn fly(mesh: &Mesh, place: &Place, hip_B: &Vector3<f64>) -> Option<Place> {
-    let from_B = match place.on {
-        On::Face(side) => {
-            let facet = Facet::of(mesh, side);
-            let size_m = facet.edge_B(mesh, 0).1.norm();
-            place.point_B + facet.normal_B * (size_m * SNAP)
-        }
-        On::Edge(..) | On::Vertex(..) => place.point_B + (hip_B - place.point_B) * LIFT,
+/// The edge or vertex that a place on a face happens to lie on, where a neighbour may hold what the face lets go.
+#[cold]
+fn rim(mesh: &Mesh, place: &Place) -> Option<Place> {
+    let On::Face(side) = place.on else { return None };
+    let facet = Facet::of(mesh, side);
+    let near_m = |edge_m: f64| (SNAP * edge_m).max(RIM * mesh.extent_m());
+    let edge = (0..3).find(|&edge| {
+        let (start_B, edge_B) = facet.edge_B(mesh, edge);
+        let edge_m = edge_B.norm();
+        facet.inward_B(&edge_B).dot(&(place.point_B - start_B)) <= edge_m * near_m(edge_m)
+    })?;
+    let near_m = near_m(facet.edge_B(mesh, edge).1.norm());
+    let is_at = |&corner: &usize| (facet.corner_B(mesh, corner) - place.point_B).amax() <= near_m;
+    let on = match [edge, next(edge)].iter().find(|&corner| is_at(corner)) {
+        Some(&corner) => On::Vertex(side, corner),
+        None => On::Edge(side, edge),
     };
-    mesh.first_hit(&from_B, hip_B).map(|hit| Place::hit(&hit))
+    Some(Place { on, ..*place })
 }
 
-fn view_of_face(facet: &Facet<'_>, place: &Place, input: &ConeInput) -> TangentView {
+/// Straight from where it was to the HIP through free space; `None` if nothing is in the way.
+///
+/// The HIP is in front of all that meets here, so none of that is in the way, whatever rounding says. Of a place on a
+/// face, only that face is here: on its rim it would have been taken for one on the edge.
+#[cold]
+fn fly(mesh: &Mesh, place: &Place, hip_B: &Vector3<f64>) -> Option<Place> {
+    let (On::Face(side) | On::Edge(side, _) | On::Vertex(side, _)) = place.on;
+    let facet = Facet::of(mesh, side);
+    let vertices_of = |face: u32| mesh.faces[face as usize].vertices;
+    let hit = match place.on {
+        On::Face(_) => mesh.first_hit_of_others(&place.point_B, hip_B, |face| face == side.face),
+        On::Edge(_, edge) => {
+            let ends = [edge, next(edge)].map(|corner| facet.face.vertices[corner]);
+            let has_both = |face| ends.iter().all(|end| vertices_of(face).contains(end));
+            mesh.first_hit_of_others(&place.point_B, hip_B, has_both)
+        }
+        On::Vertex(_, corner) => {
+            let tip = facet.face.vertices[corner];
+            mesh.first_hit_of_others(&place.point_B, hip_B, |face| vertices_of(face).contains(&tip))
+        }
+    };
+    hit.map(|hit| Place::hit(&hit))
+}
+
+#[inline(always)]
+fn view_of_face(mesh: &Mesh, side: Side, place: &Place, input: &ConeInput) -> TangentView {
+    let facet = Facet::of(mesh, side);
     TangentView::new(&place.point_B, facet.normal_B, facet.offset_m, input)
 }
 
@@ -261,5 +309,5 @@ fn view_from(
 const PARALLEL: f64 = 1e-10;
 /// Nearer to the end of an edge than this share of it is at the vertex.
 const SNAP: f64 = 1e-9;
-/// A god-object that lifts off an edge or a vertex flies from this share of its way on.
-const LIFT: f64 = 1e-6;
+/// Nearer to an edge than this share of the mesh's extent is on it: a few times what [`Mesh::first_hit`] tolerates.
+const RIM: f64 = 4e-13;

@@ -8,9 +8,9 @@
 //!    lies within its box turns with it: so a cavity, wound inward, stays a cavity, also in a file that is inside
 //!    out as a whole.
 //!
-//! Cost: linear; step 3 also compares each closed part with the outermost ones.
+//! Cost: linear; step 3 also compares each closed part with those that it overlaps along x.
 
-use super::repair::Triangle;
+use super::order::Triangle;
 use super::report::MeshReport;
 use super::{Link, Sides};
 use nalgebra::Vector3;
@@ -22,135 +22,78 @@ pub(super) fn orient(
     vertices: &[Vector3<f64>],
     report: &mut MeshReport,
 ) -> Sides {
-    let mut turned_over = vec![false; triangles.len()];
-    let mut parts = Vec::new();
-    let members = agree(links, triangles, &mut turned_over, &mut parts, report);
-    let mut closed: Vec<Closed> = parts
-        .iter()
-        .filter(|part| part.is_closed && part.is_orientable)
-        .map(|part| Closed::new(&members[part.from..part.to], triangles, &turned_over, vertices))
-        .collect();
-    turn_outward(&mut closed, &mut turned_over, report);
-    apply(triangles, links, &turned_over);
+    let (mut states, mut parts) = flood(links);
+    count(&states, triangles, &mut parts);
+    for (state, triangle) in states.iter_mut().zip(&*triangles) {
+        state.is_turned_over = parts[state.part as usize].turns(*state);
+        if state.is_turned_over {
+            report.flipped.note(triangle.origin as usize);
+        }
+    }
+    measure(&states, triangles, vertices, &mut parts);
+    turn_outward(&mut parts, report);
+    states.iter_mut().for_each(|state| state.is_turned_over ^= parts[state.part as usize].is_inside_out);
+    apply(triangles, links, &states);
     report.components = parts.len();
-    if closed.len() == parts.len() { Sides::Solid } else { Sides::Sheet }
+    if parts.iter().all(Part::has_inside) { Sides::Solid } else { Sides::Sheet }
 }
 
-/// Faces that hang together: `members[from..to]`.
+/// Of a face.
+#[derive(Debug, Clone, Copy)]
+struct State {
+    part: u32,
+    is_turned_over: bool,
+}
+
+const UNSEEN: u32 = u32::MAX;
+
+/// Faces that hang together by edges.
+#[derive(Debug)]
 struct Part {
-    from: usize,
-    to: usize,
     is_closed: bool,
     is_orientable: bool,
-}
-
-/// Floods each part from its first face. Gives the faces, part by part.
-fn agree(
-    links: &[[Link; 3]],
-    triangles: &[Triangle],
-    turned_over: &mut [bool],
-    parts: &mut Vec<Part>,
-    report: &mut MeshReport,
-) -> Vec<u32> {
-    let mut members: Vec<u32> = Vec::with_capacity(links.len());
-    let mut seen = vec![false; links.len()];
-    for seed in 0..links.len() {
-        if seen[seed] {
-            continue;
-        }
-        let from = members.len();
-        let (is_closed, is_orientable) = flood(seed as u32, links, &mut seen, turned_over, &mut members);
-        let part = &members[from..];
-        if is_orientable {
-            keep_majority(part, turned_over);
-            let turned = part.iter().filter(|&&face| turned_over[face as usize]);
-            turned.for_each(|&face| report.flipped.note(triangles[face as usize].origin as usize));
-        } else {
-            part.iter().for_each(|&face| turned_over[face as usize] = false);
-        }
-        parts.push(Part { from, to: members.len(), is_closed, is_orientable });
-    }
-    members
-}
-
-/// Appends the part of `seed` to `members`, wound like it. Gives whether it is closed and orientable.
-fn flood(
-    seed: u32,
-    links: &[[Link; 3]],
-    seen: &mut [bool],
-    turned_over: &mut [bool],
-    members: &mut Vec<u32>,
-) -> (bool, bool) {
-    let (mut is_closed, mut is_orientable) = (true, true);
-    let mut next = members.len();
-    members.push(seed);
-    seen[seed as usize] = true;
-    while next < members.len() {
-        let face = members[next] as usize;
-        next += 1;
-        for link in links[face] {
-            if link.is_boundary() {
-                is_closed = false;
-                continue;
-            }
-            let neighbour = link.face() as usize;
-            let agreeing = turned_over[face] ^ link.is_turned();
-            if !seen[neighbour] {
-                seen[neighbour] = true;
-                turned_over[neighbour] = agreeing;
-                members.push(neighbour as u32);
-            } else if turned_over[neighbour] != agreeing {
-                is_orientable = false;
-            }
-        }
-    }
-    (is_closed, is_orientable)
-}
-
-/// On a tie the first face stays as it is: it was the seed.
-fn keep_majority(part: &[u32], turned_over: &mut [bool]) {
-    let turned = part.iter().filter(|&&face| turned_over[face as usize]).count();
-    if 2 * turned > part.len() {
-        turn_over(part, turned_over);
-    }
-}
-
-fn turn_over(part: &[u32], turned_over: &mut [bool]) {
-    part.iter().for_each(|&face| turned_over[face as usize] ^= true);
-}
-
-/// A closed part with an inside and an outside.
-struct Closed<'a> {
-    members: &'a [u32],
-    /// Of the input (face).
+    faces: usize,
+    /// How many of them the flood turned over, to be wound like the first.
+    turned_over: usize,
+    /// First face of the input.
     first: usize,
     low: Vector3<f64>,
     high: Vector3<f64>,
-    /// Times six \[m^3\]; negative if it is inside out.
+    /// Any point of it: volumes are measured from here, since from far away they would cancel.
+    apex: Option<Vector3<f64>>,
+    /// Times six (m^3); negative if it is inside out. Only of a closed part.
     volume: f64,
+    is_inside_out: bool,
 }
 
-impl<'a> Closed<'a> {
-    fn new(
-        members: &'a [u32],
-        triangles: &[Triangle],
-        turned_over: &[bool],
-        vertices: &[Vector3<f64>],
-    ) -> Self {
-        let corners = |face: u32| triangles[face as usize].corners.map(|v| vertices[v as usize]);
-        // From a point of the part: from far away, tetrahedra would cancel.
-        let apex = corners(members[0])[0];
-        let origins = members.iter().map(|&face| triangles[face as usize].origin as usize);
-        let mut part =
-            Self { members, first: origins.min().unwrap_or(0), low: apex, high: apex, volume: 0.0 };
-        for &face in members {
-            let [a, b, c] = corners(face);
-            part.low = part.low.inf(&a.inf(&b).inf(&c));
-            part.high = part.high.sup(&a.sup(&b).sup(&c));
-            let volume = (a - apex).dot(&(b - apex).cross(&(c - apex)));
-            part.volume += if turned_over[face as usize] { -volume } else { volume };
+impl Part {
+    fn new() -> Self {
+        Self {
+            is_closed: true,
+            is_orientable: true,
+            faces: 0,
+            turned_over: 0,
+            first: usize::MAX,
+            low: Vector3::repeat(f64::INFINITY),
+            high: Vector3::repeat(f64::NEG_INFINITY),
+            apex: None,
+            volume: 0.0,
+            is_inside_out: false,
         }
-        part
+    }
+
+    /// Whether a face that the flood left in this state is to be turned over: most faces stay as they are, on a
+    /// tie the first.
+    fn turns(&self, state: State) -> bool {
+        self.is_orientable && state.is_turned_over != (2 * self.turned_over > self.faces)
+    }
+
+    fn has_inside(&self) -> bool {
+        self.is_closed && self.is_orientable
+    }
+
+    fn size_m(&self) -> f64 {
+        (self.high - self.low).sum()
     }
 
     fn contains(&self, other: &Self) -> bool {
@@ -158,35 +101,99 @@ impl<'a> Closed<'a> {
     }
 }
 
-fn turn_outward(closed: &mut [Closed], turned_over: &mut [bool], report: &mut MeshReport) {
-    // What lies in a box comes after it. Stable, so parts of one size stay in spatial order.
-    closed.sort_by(|a, b| (b.high - b.low).sum().total_cmp(&(a.high - a.low).sum()));
-    let mut outermost: Vec<usize> = Vec::new();
-    for i in 0..closed.len() {
-        let around = outermost.iter().find(|&&o| closed[o].contains(&closed[i]));
-        let is_inside_out = closed[around.copied().unwrap_or(i)].volume < 0.0;
-        if is_inside_out {
-            report.inside_out.note(closed[i].first);
-            turn_over(closed[i].members, turned_over);
+/// Winds each part like its first face, and finds out on which this leaves a contradiction.
+fn flood(links: &[[Link; 3]]) -> (Vec<State>, Vec<Part>) {
+    let mut states = vec![State { part: UNSEEN, is_turned_over: false }; links.len()];
+    let mut parts = Vec::new();
+    let mut open = Vec::new();
+    for seed in 0..links.len() {
+        if states[seed].part != UNSEEN {
+            continue;
         }
-        if around.is_none() {
-            outermost.push(i);
+        let mut part = Part::new();
+        let number = parts.len() as u32;
+        states[seed].part = number;
+        open.push(seed as u32);
+        while let Some(face) = open.pop() {
+            for link in links[face as usize] {
+                if link.is_boundary() {
+                    part.is_closed = false;
+                    continue;
+                }
+                let agreeing = states[face as usize].is_turned_over ^ link.is_turned();
+                let beyond = &mut states[link.face() as usize];
+                if beyond.part == UNSEEN {
+                    *beyond = State { part: number, is_turned_over: agreeing };
+                    open.push(link.face());
+                } else {
+                    part.is_orientable &= beyond.is_turned_over == agreeing;
+                }
+            }
         }
-        if (closed[i].volume < 0.0) != is_inside_out {
-            report.cavities.note(closed[i].first);
+        parts.push(part);
+    }
+    (states, parts)
+}
+
+fn count(states: &[State], triangles: &[Triangle], parts: &mut [Part]) {
+    for (state, triangle) in states.iter().zip(triangles) {
+        let part = &mut parts[state.part as usize];
+        part.faces += 1;
+        part.turned_over += usize::from(state.is_turned_over);
+        part.first = part.first.min(triangle.origin as usize);
+    }
+}
+
+/// Boxes and volumes of the closed parts.
+fn measure(states: &[State], triangles: &[Triangle], vertices: &[Vector3<f64>], parts: &mut [Part]) {
+    for (state, triangle) in states.iter().zip(triangles) {
+        let part = &mut parts[state.part as usize];
+        if !part.has_inside() {
+            continue;
+        }
+        let [a, b, c] = triangle.corners.map(|v| vertices[v as usize]);
+        let apex = *part.apex.get_or_insert(a);
+        let volume = (a - apex).dot(&(b - apex).cross(&(c - apex)));
+        part.volume += if state.is_turned_over { -volume } else { volume };
+        for corner in [a, b, c] {
+            part.low = part.low.zip_map(&corner, |low, x| if x < low { x } else { low });
+            part.high = part.high.zip_map(&corner, |high, x| if x > high { x } else { high });
+        }
+    }
+}
+
+/// Sweeps along x; what may contain a part begins before it and has not ended. The largest of those that do is an
+/// outermost one: what contained that would contain the part too.
+fn turn_outward(parts: &mut [Part], report: &mut MeshReport) {
+    let mut closed: Vec<usize> = (0..parts.len()).filter(|&i| parts[i].has_inside()).collect();
+    closed.sort_by(|&i, &j| parts[i].low.x.total_cmp(&parts[j].low.x));
+    let mut begun: Vec<usize> = Vec::new();
+    for i in closed {
+        begun.retain(|&o| parts[o].high.x > parts[i].low.x);
+        let around = begun.iter().copied().filter(|&o| parts[o].contains(&parts[i]));
+        let outermost = around.max_by(|&o, &p| parts[o].size_m().total_cmp(&parts[p].size_m())).unwrap_or(i);
+        parts[i].is_inside_out = parts[outermost].volume < 0.0;
+        begun.push(i);
+        let part = &parts[i];
+        if part.is_inside_out {
+            report.inside_out.note(part.first);
+        }
+        if (part.volume < 0.0) != part.is_inside_out {
+            report.cavities.note(part.first);
         }
     }
 }
 
 /// Turning a face over exchanges its last two corners, and with them its first and last edges.
-fn apply(triangles: &mut [Triangle], links: &mut [[Link; 3]], turned_over: &[bool]) {
+fn apply(triangles: &mut [Triangle], links: &mut [[Link; 3]], states: &[State]) {
     for (face, own) in links.iter_mut().enumerate() {
+        let here = states[face].is_turned_over;
         for link in own.iter_mut().filter(|link| !link.is_boundary()) {
-            let beyond = turned_over[link.face() as usize];
+            let beyond = states[link.face() as usize].is_turned_over;
             let edge = if beyond { 2 - link.edge() } else { link.edge() };
-            *link = Link::new(link.face(), edge as u8, link.is_turned() ^ turned_over[face] ^ beyond);
+            *link = Link::new(link.face(), edge as u8, link.is_turned() ^ here ^ beyond);
         }
-        if turned_over[face] {
+        if here {
             own.swap(0, 2);
             triangles[face].corners.swap(1, 2);
         }

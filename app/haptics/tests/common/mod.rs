@@ -3,6 +3,9 @@
 
 pub(crate) mod laws;
 
+pub(crate) mod meshes;
+pub(crate) mod path;
+
 use haptics::{Entity, Finger, FingerOutput, Form, Friction, Plane, Shape, Sphere};
 use nalgebra::{Isometry3, Vector3};
 

@@ -11,7 +11,7 @@ use std::ops::Range;
 
 use nalgebra::Vector3;
 
-use super::{Bvh, Child, LONGEST_RUN, Node, STACK, larger, smaller};
+use super::{Bvh, Child, LONGEST_RUN, Node, STACK, above, below, larger, smaller};
 use crate::mesh::Face;
 
 impl<const WIDTH: usize> Bvh<WIDTH> {
@@ -214,12 +214,10 @@ impl Bounds {
 
     /// The smallest box in `f32` that contains a box in `f64`.
     fn outward(lower: &Vector3<f64>, upper: &Vector3<f64>) -> Self {
-        let (mut bounds, mut axis) = (Self { lower: [0.0; 4], upper: [0.0; 4] }, 0);
-        while axis < 3 {
-            let (low, high) = (lower[axis] as f32, upper[axis] as f32);
-            bounds.lower[axis] = if f64::from(low) > lower[axis] { low.next_down() } else { low };
-            bounds.upper[axis] = if f64::from(high) < upper[axis] { high.next_up() } else { high };
-            axis += 1;
+        let mut bounds = Self { lower: [0.0; 4], upper: [0.0; 4] };
+        for axis in 0..3 {
+            bounds.lower[axis] = below(lower[axis]);
+            bounds.upper[axis] = above(upper[axis]);
         }
         bounds
     }

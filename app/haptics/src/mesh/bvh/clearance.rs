@@ -5,18 +5,20 @@
 
 use nalgebra::Vector3;
 
-use super::{Bvh, Child};
+use super::{Bvh, Child, Rounded, above};
 
 impl<const WIDTH: usize> Bvh<WIDTH> {
     /// A lower bound of the distance from a point to any face, at most `at_most_m` \[m\].
     ///
-    /// 0 if nothing better is known; so it is for a point that is not finite. A smaller `at_most_m` is answered
+    /// Not more than 1e18 m. 0 if nothing better is known; so it is for a point that is not finite. A smaller `at_most_m` is answered
     /// faster.
     pub fn clearance(&self, p_B: &Vector3<f64>, at_most_m: f64) -> f64 {
         if !(at_most_m > 0.0 && p_B.iter().all(|coordinate| coordinate.is_finite())) {
             return 0.0;
         }
-        let limit = at_most_m * at_most_m;
+        let at_most_m = at_most_m.min(FARTHEST_M);
+        let limit = above(at_most_m * at_most_m).min(f32::MAX);
+        let p = Rounded::new(p_B);
         let mut closed = Closed { entries: [(0.0, Child(0)); MOST_CLOSED], len: 1 };
         for _ in 0..MOST_OPENED {
             let Some(nearest) = closed.nearest() else { return at_most_m };
@@ -26,7 +28,7 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
             }
             closed.remove(nearest);
             let node = &self.nodes[child.index()];
-            for (squared_distance, child) in node.squared_distances(p_B).into_iter().zip(node.children) {
+            for (squared_distance, child) in node.squared_distances(&p).into_iter().zip(node.children) {
                 if squared_distance < limit {
                     closed.add(squared_distance, child);
                 }
@@ -34,7 +36,9 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
         }
         match closed.nearest() {
             // The root was rounded to nearest.
-            Some(nearest) => (closed.entries[nearest].0.sqrt() * (1.0 - f64::EPSILON)).min(at_most_m),
+            Some(nearest) => {
+                (f64::from(closed.entries[nearest].0).sqrt() * (1.0 - f64::EPSILON)).min(at_most_m)
+            }
             None => at_most_m,
         }
     }
@@ -42,7 +46,7 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
 
 /// Boxes that are not opened yet, with their squared distances \[m^2\].
 struct Closed {
-    entries: [(f64, Child); MOST_CLOSED],
+    entries: [(f32, Child); MOST_CLOSED],
     len: usize,
 }
 
@@ -56,12 +60,14 @@ impl Closed {
         self.entries[index] = self.entries[self.len];
     }
 
-    fn add(&mut self, squared_distance: f64, child: Child) {
+    fn add(&mut self, squared_distance: f32, child: Child) {
         self.entries[self.len] = (squared_distance, child);
         self.len += 1;
     }
 }
 
+/// More is not promised, since its square would not fit into `f32`.
+const FARTHEST_M: f64 = 1e18;
 /// Nodes that are opened at most.
 const MOST_OPENED: usize = 16;
 /// Each opened node takes one off and puts at most 8 on.

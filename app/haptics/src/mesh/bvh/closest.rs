@@ -9,6 +9,7 @@
 
 use nalgebra::Vector3;
 
+use super::{larger, smaller};
 use crate::mesh::Face;
 use crate::surface::Feature;
 
@@ -22,47 +23,63 @@ pub(super) struct Closest {
     pub(super) squared_distance: f64,
 }
 
-pub(super) fn closest_on(face: &Face, corners: &[Vector3<f64>; 3], p: &Vector3<f64>) -> Closest {
-    let height = face.normal_B.dot(p) - face.offset_m;
-    let is_above = (0..3).all(|edge| {
-        let (from, to) = canonical(face, corners, edge);
-        let left = face.normal_B.dot(&(to.1 - from.1).cross(&(p - from.1)));
-        if from.0 == edge { left > 0.0 } else { left < 0.0 }
-    });
-    if is_above {
-        let point_B = p - face.normal_B * height;
-        return Closest { feature: Feature::Face, corner: 0, point_B, squared_distance: height * height };
-    }
-    let mut best = closest_on_edge(face, corners, 0, p);
-    for edge in 1..3 {
-        let other = closest_on_edge(face, corners, edge, p);
-        if other.squared_distance < best.squared_distance {
-            best = other;
-        }
-    }
-    best
-}
-
-fn closest_on_edge(face: &Face, corners: &[Vector3<f64>; 3], edge: usize, p: &Vector3<f64>) -> Closest {
-    let (from, to) = canonical(face, corners, edge);
-    let along = to.1 - from.1;
-    let reach = along.dot(&(p - from.1));
-    let length_squared = along.norm_squared();
-    let (feature, corner, point_B) = match reach {
-        reach if reach <= 0.0 => (Feature::Vertex, from.0, from.1),
-        reach if reach >= length_squared => (Feature::Vertex, to.0, to.1),
-        _ => (Feature::Edge, edge, from.1 + along * (reach / length_squared)),
-    };
-    Closest { feature, corner, point_B, squared_distance: (p - point_B).norm_squared() }
-}
-
-/// The ends of an edge, each with its corner, the vertex of lower index first.
-fn canonical(
+/// None may be answered if it is farther than the root of `at_most`, which saves half of the work.
+#[inline]
+pub(super) fn closest_on(
     face: &Face,
     corners: &[Vector3<f64>; 3],
-    edge: usize,
-) -> ((usize, Vector3<f64>), (usize, Vector3<f64>)) {
+    p: &Vector3<f64>,
+    at_most: f64,
+) -> Option<Closest> {
+    let edges = [corners[1] - corners[0], corners[2] - corners[1], corners[0] - corners[2]];
+    let to_p = [p - corners[0], p - corners[1], p - corners[2]];
+    let is_left_of = |i: usize| face.normal_B.dot(&edges[i].cross(&to_p[i])) > 0.0;
+    if is_left_of(0) & is_left_of(1) & is_left_of(2) {
+        let height = face.normal_B.dot(p) - face.offset_m;
+        let point_B = p - face.normal_B * height;
+        return Some(Closest {
+            feature: Feature::Face,
+            corner: 0,
+            point_B,
+            squared_distance: height * height,
+        });
+    }
+    let squared_distance = |i: usize| squared_distance_from_edge(&edges[i], &to_p[i]);
+    let (first, second, third) = (squared_distance(0), squared_distance(1), squared_distance(2));
+    let least = smaller(smaller(first, second), third);
+    if least > at_most {
+        return None;
+    }
+    let edge = if least == first {
+        0
+    } else if least == second {
+        1
+    } else {
+        2
+    };
+    Some(closest_on_edge(face, corners, edge, p))
+}
+
+/// Good enough to choose an edge by.
+#[inline(always)]
+fn squared_distance_from_edge(edge: &Vector3<f64>, to_p: &Vector3<f64>) -> f64 {
+    let along = smaller(larger(edge.dot(to_p) / edge.norm_squared(), 0.0), 1.0);
+    (to_p - edge * along).norm_squared()
+}
+
+/// From the vertex of lower index to the other.
+fn closest_on_edge(face: &Face, corners: &[Vector3<f64>; 3], edge: usize, p: &Vector3<f64>) -> Closest {
     let next = (edge + 1) % 3;
-    let (from, to) = ((edge, corners[edge]), (next, corners[next]));
-    if face.vertices[edge] < face.vertices[next] { (from, to) } else { (to, from) }
+    let (from, to) = if face.vertices[edge] < face.vertices[next] { (edge, next) } else { (next, edge) };
+    let along = corners[to] - corners[from];
+    let reach = along.dot(&(p - corners[from]));
+    let length_squared = along.norm_squared();
+    let (feature, corner, point_B) = if reach <= 0.0 {
+        (Feature::Vertex, from, corners[from])
+    } else if reach >= length_squared {
+        (Feature::Vertex, to, corners[to])
+    } else {
+        (Feature::Edge, edge, corners[from] + along * (reach / length_squared))
+    };
+    Closest { feature, corner, point_B, squared_distance: (p - point_B).norm_squared() }
 }

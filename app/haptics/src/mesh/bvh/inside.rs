@@ -9,6 +9,7 @@
 use nalgebra::Vector3;
 
 use super::{Bvh, Triangles};
+use crate::mesh::MAX_VALENCE;
 use crate::surface::Feature;
 
 impl<const WIDTH: usize> Bvh<WIDTH> {
@@ -41,8 +42,7 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
 fn normal_at_vertex(triangles: Triangles<'_>, first: u32, corner: usize) -> Vector3<f64> {
     let (mut face, mut corner) = (first, corner);
     let mut sum = Vector3::zeros();
-    // Links of a mesh lead back after at most all faces.
-    for _ in 0..triangles.faces.len() {
+    for _ in 0..MAX_VALENCE {
         let record = &triangles.faces[face as usize];
         let corners = triangles.corners(record);
         let (left, right) =

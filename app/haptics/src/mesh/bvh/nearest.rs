@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 
 use super::closest::{Closest, closest_on};
 use super::stack::Stack;
-use super::{Bvh, Triangles};
+use super::{Bvh, Rounded, Triangles, above};
 use crate::surface::Feature;
 
 /// The point of a mesh nearest to a given one.
@@ -28,36 +28,84 @@ pub struct Nearest {
 impl<const WIDTH: usize> Bvh<WIDTH> {
     /// The nearest point of the faces, of which there must be at least one.
     ///
-    /// A point that is not finite, or so far away that its squared distance is not (1e150 m), is answered by a
-    /// corner of the first face at infinite distance.
+    /// A point more than 1000 times as far away as the mesh is large is looked for as if it was that far away, in
+    /// the same direction: from there, too many faces look equally near. One that is not finite is answered by a
+    /// corner of the first face, infinitely far away.
     pub fn nearest(&self, triangles: Triangles<'_>, p_B: &Vector3<f64>) -> Nearest {
-        let first = triangles.corners(&triangles.faces[0])[0];
-        let mut best =
-            Closest { feature: Feature::Vertex, corner: 0, point_B: first, squared_distance: f64::MAX };
-        let mut best_face = u32::MAX;
-        let mut stack = Stack::<f64>::new();
+        let mut search = Search::new(triangles, p_B, self.extent_m());
+        let mut stack = Stack::<f32>::new();
+        let p = Rounded::new(&search.p_B);
         while let Some((squared_distance, child)) = stack.pop() {
-            if squared_distance > best.squared_distance {
+            if squared_distance > search.limit {
                 continue;
             }
             if child.count() == 0 {
                 let node = &self.nodes[child.index()];
-                stack.push_sorted(node.squared_distances(p_B), &node.children, best.squared_distance);
-                continue;
-            }
-            for index in child.index()..child.index() + child.count() {
-                let face = &triangles.faces[index];
-                let found = closest_on(face, &triangles.corners(face), p_B);
-                let (index, is_tie) = (index as u32, found.squared_distance == best.squared_distance);
-                if found.squared_distance < best.squared_distance || is_tie && index < best_face {
-                    (best, best_face) = (found, index);
+                stack.push(&node.squared_distances(&p), &node.children, search.limit);
+            } else {
+                for face in child.index()..child.index() + child.count() {
+                    search.consider(triangles, face as u32);
                 }
             }
         }
-        let Closest { feature, corner, point_B, squared_distance } = best;
-        if best_face == u32::MAX {
-            return Nearest { face: 0, feature, corner, point_B, distance_m: f64::INFINITY };
-        }
-        Nearest { face: best_face, feature, corner, point_B, distance_m: squared_distance.sqrt() }
+        search.result(p_B)
     }
 }
+
+/// The nearest point so far.
+struct Search {
+    p_B: Vector3<f64>,
+    best: Closest,
+    face: u32,
+    /// No face comes nearer than its plane does: faces whose planes are farther are dropped.
+    reach_m: f64,
+    slack_m: f64,
+    /// Squared distance that boxes must not exceed; below 0 when nothing is looked for \[m^2\].
+    limit: f32,
+}
+
+impl Search {
+    fn new(triangles: Triangles<'_>, p_B: &Vector3<f64>, extent_m: f64) -> Self {
+        let is_finite = p_B.iter().all(|coordinate| coordinate.is_finite());
+        let nearer = (FARTHEST * extent_m / p_B.amax()).min(1.0);
+        let point_B = triangles.corners(&triangles.faces[0])[0];
+        Self {
+            p_B: if nearer < 1.0 { p_B * nearer } else { *p_B },
+            best: Closest { feature: Feature::Vertex, corner: 0, point_B, squared_distance: f64::INFINITY },
+            face: 0,
+            reach_m: f64::INFINITY,
+            slack_m: ROUNDING * FARTHEST.min(1.0 + p_B.amax() / extent_m) * extent_m,
+            // Finite, since boxes of nothing are infinitely far away.
+            limit: if is_finite { f32::MAX } else { -1.0 },
+        }
+    }
+
+    #[inline(always)]
+    fn consider(&mut self, triangles: Triangles<'_>, index: u32) {
+        let face = &triangles.faces[index as usize];
+        let height = face.normal_B.dot(&self.p_B) - face.offset_m;
+        if height.abs() > self.reach_m {
+            return;
+        }
+        let at_most = self.reach_m * self.reach_m;
+        let Some(found) = closest_on(face, &triangles.corners(face), &self.p_B, at_most) else { return };
+        let (distance, best) = (found.squared_distance, self.best.squared_distance);
+        if distance < best || distance == best && index < self.face {
+            (self.best, self.face) = (found, index);
+            self.reach_m = distance.sqrt() + self.slack_m;
+            self.limit = above(distance).min(f32::MAX);
+        }
+    }
+
+    fn result(self, p_B: &Vector3<f64>) -> Nearest {
+        let Closest { feature, corner, point_B, squared_distance } = self.best;
+        let is_as_asked = self.p_B == *p_B || squared_distance == f64::INFINITY;
+        let distance_m = if is_as_asked { squared_distance.sqrt() } else { (p_B - point_B).norm() };
+        Nearest { face: self.face, feature, corner, point_B, distance_m }
+    }
+}
+
+/// Ten times what is lost when a distance from a plane is computed, relative to the coordinates.
+const ROUNDING: f64 = 1e-14;
+/// How many times the extent of the mesh a point may be away before it is brought nearer.
+const FARTHEST: f64 = 1000.0;

@@ -11,7 +11,8 @@
 //!
 //! A finger that came to lie inside by rounding must be caught by its next step. So a start up to a tolerance
 //! behind a face's plane counts as outside; there no line can tell through which face it went, but only one that is
-//! as close as the tolerance is meant, hence that is what is asked.
+//! as close as the tolerance is meant, hence that is what is asked. An end up to the tolerance in front counts as
+//! met: no finger is free where rounding could put it on either side of a sheet.
 //!
 //! Cost: a segment that ends far from the mesh or its box visits a few nodes; no bound holds for every segment.
 
@@ -38,13 +39,25 @@ pub struct Hit {
 impl<const WIDTH: usize> Bvh<WIDTH> {
     /// The first face that the segment `from_B -> to_B` enters; a sheet is entered from either side.
     ///
-    /// None if it is not finite, has no length, or the mesh is so far away that squares overflow (1e150 m).
+    /// None if it is not finite, has no length, or is so long that its rounding hides the mesh (1e12 of its sizes).
     pub fn first_hit(
         &self,
         triangles: Triangles<'_>,
         sides: Sides,
         from_B: &Vector3<f64>,
         to_B: &Vector3<f64>,
+    ) -> Option<Hit> {
+        self.first_hit_of_others(triangles, sides, from_B, to_B, |_| false)
+    }
+
+    /// As [`Self::first_hit`], of the faces that `is_skipped` does not name.
+    pub fn first_hit_of_others(
+        &self,
+        triangles: Triangles<'_>,
+        sides: Sides,
+        from_B: &Vector3<f64>,
+        to_B: &Vector3<f64>,
+        is_skipped: impl Fn(u32) -> bool,
     ) -> Option<Hit> {
         let segment = Segment::new(from_B, to_B, sides, self.extent_m());
         let clipped = Clipped::new(&segment, &self.lower_B, &self.upper_B)?;
@@ -59,11 +72,14 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
             }
             if child.count() == 0 {
                 let node = &self.nodes[child.index()];
-                stack.push_sorted(slabs.entries(node, limit), &node.children, limit);
+                stack.push(&slabs.entries(node, limit), &node.children, limit);
                 continue;
             }
             for index in child.index()..child.index() + child.count() {
                 let Some(met) = segment.meets(triangles, index as u32, &line) else { continue };
+                if is_skipped(met.face) {
+                    continue;
+                }
                 if best.is_none_or(|best| (met.fraction, met.face) < (best.fraction, best.face)) {
                     best = Some(met);
                     limit = clipped.fraction(met.fraction);
@@ -104,12 +120,13 @@ impl Segment {
         if !is_front && self.sides == Sides::Sheet {
             (before, after) = (-before, -after);
         }
-        if !(before >= -self.tolerance_m && after < before && after <= 0.0) {
+        if !(before >= -self.tolerance_m && after < before && after <= self.tolerance_m) {
             return None;
         }
         let fraction = (before / (before - after)).clamp(0.0, 1.0);
-        // Behind the plane, or in it over the whole length: where the line meets the plane says nothing.
-        let is_vague = before <= 0.0 || before <= self.tolerance_m && after >= -self.tolerance_m;
+        // Behind the plane, not quite at it, or in it over the whole length: where the line meets it says nothing.
+        let is_vague =
+            before <= 0.0 || after > 0.0 || before <= self.tolerance_m && after >= -self.tolerance_m;
         let corners = triangles.corners(face);
         let is_met = if is_vague { self.touches(face, &corners, fraction) } else { line.meets(&corners) };
         is_met.then_some(Met { face: index, fraction, is_front })
@@ -117,15 +134,17 @@ impl Segment {
 
     /// Whether the face is as near as the tolerance: its plane may be one away, and so may its rim be.
     fn touches(&self, face: &Face, corners: &[Vector3<f64>; 3], fraction: f64) -> bool {
-        let point = self.from + self.path * fraction;
-        closest_on(face, corners, &point).squared_distance <= (2.0 * self.tolerance_m).powi(2)
+        let (point, at_most_m) = (self.from + self.path * fraction, 2.0 * self.tolerance_m);
+        let closest = closest_on(face, corners, &point, at_most_m * at_most_m);
+        closest.is_some_and(|closest| closest.squared_distance <= at_most_m * at_most_m)
     }
 
     /// Along a face the line leaves the place vague, the face does not: the point is brought onto it.
     fn hit(&self, triangles: Triangles<'_>, met: Met) -> Hit {
         let face = &triangles.faces[met.face as usize];
         let on_plane = self.from + self.path * met.fraction;
-        let point_B = closest_on(face, &triangles.corners(face), &on_plane).point_B;
+        let closest = closest_on(face, &triangles.corners(face), &on_plane, f64::INFINITY);
+        let point_B = closest.map_or(on_plane, |closest| closest.point_B);
         Hit { face: met.face, fraction: met.fraction, point_B, is_front: met.is_front }
     }
 }
@@ -145,14 +164,14 @@ impl Line {
     }
 
     /// Whether it passes through a triangle, from either side; the rim counts.
-    #[inline]
+    #[inline(always)]
     fn meets(&self, corners: &[Vector3<f64>; 3]) -> bool {
-        let [a, b, c] = corners.map(|corner| self.across(&corner));
-        let sides = [a[0] * b[1] - a[1] * b[0], b[0] * c[1] - b[1] * c[0], c[0] * a[1] - c[1] * a[0]];
-        sides.iter().all(|&side| side >= 0.0) || sides.iter().all(|&side| side <= 0.0)
+        let [a, b, c] = [self.across(&corners[0]), self.across(&corners[1]), self.across(&corners[2])];
+        let (ab, bc, ca) = (a[0] * b[1] - a[1] * b[0], b[0] * c[1] - b[1] * c[0], c[0] * a[1] - c[1] * a[0]);
+        (ab >= 0.0) & (bc >= 0.0) & (ca >= 0.0) | (ab <= 0.0) & (bc <= 0.0) & (ca <= 0.0)
     }
 
-    #[inline]
+    #[inline(always)]
     fn across(&self, point: &Vector3<f64>) -> [f64; 2] {
         let [x, y, z] = self.axes;
         let relative = point - self.origin;
@@ -182,6 +201,9 @@ impl Clipped {
         let extent = lower.amax().max(upper.amax());
         // The ends computed here are rounded relative to how far away the segment's are.
         let pad = BOX_PAD * (extent + from.amax() + to.amax());
+        if pad > extent {
+            return None;
+        }
         let (mut entry, mut exit) = (0.0, 1.0);
         for axis in 0..3 {
             let (low, high) = (lower[axis] - pad, upper[axis] + pad);
@@ -247,7 +269,8 @@ impl Slabs {
     }
 
     /// Fraction at which each child's box is entered, infinite if it is not met before `limit`.
-    #[inline(always)]
+    // Inlined, the compiler takes the lanes apart again where they are sorted.
+    #[inline(never)]
     fn entries<const WIDTH: usize>(&self, node: &Node<WIDTH>, limit: f32) -> [f32; WIDTH] {
         let (mut near, mut far) = ([0.0; WIDTH], [limit; WIDTH]);
         for axis in 0..3 {
@@ -258,7 +281,10 @@ impl Slabs {
                 far[i] = smaller((farther[i] - self.origin_last[axis]) * self.inverse[axis], far[i]);
             }
         }
-        std::array::from_fn(|i| if near[i] <= far[i] { near[i] } else { f32::INFINITY })
+        for i in 0..WIDTH {
+            near[i] = if near[i] <= far[i] { near[i] } else { f32::INFINITY };
+        }
+        near
     }
 }
 

@@ -22,7 +22,7 @@ impl<Key: Copy + Default + PartialOrd> Stack<Key> {
 
     /// Puts those children on whose key is at most `limit`; the one with the smallest key comes off first.
     #[inline(always)]
-    pub(super) fn push_sorted<const N: usize>(&mut self, keys: [Key; N], children: &[Child; N], limit: Key) {
+    pub(super) fn push<const N: usize>(&mut self, keys: &[Key; N], children: &[Child; N], limit: Key) {
         let bottom = self.len;
         for i in 0..N {
             if keys[i] <= limit {

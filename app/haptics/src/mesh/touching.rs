@@ -1,0 +1,64 @@
+//! Parts that touch along an edge: four or more faces share it.
+//!
+//! Problem: a walk over the edge needs to know which of them comes next. Two cubes that stand edge to edge come as
+//! one with four faces at that edge; in a file that names no shared vertices nothing tells them apart.
+//!
+//! Model: around the edge, material and outside alternate. A finger lives in one of the outside wedges, so the two
+//! faces that bound the same wedge are neighbours: it cannot slip through where the parts touch. This is clear only
+//! if the faces, as wound in the input, do alternate; three faces, crossing sheets and coinciding faces do not.
+
+use super::order::Triangle;
+use super::repair::area_vector;
+use super::topology::Side;
+use nalgebra::Vector3;
+use std::f64::consts::TAU;
+
+/// The pairs of faces at an edge that bound the same piece of outside; `None` if that is not clear.
+///
+/// `lower` is the end of the edge with the lower number.
+pub(super) fn pair_across_outside(
+    sides: &[Side],
+    lower: usize,
+    triangles: &[Triangle],
+    vertices: &[Vector3<f64>],
+) -> Option<Vec<[Side; 2]>> {
+    let around = sorted_by_angle(sides, lower, triangles, vertices);
+    let next = |i: usize| around[(i + 1) % around.len()];
+    let mut pairs = Vec::with_capacity(sides.len() / 2);
+    for (i, &(angle, side)) in around.iter().enumerate() {
+        let (next_angle, next_side) = next(i);
+        let gap = (next_angle - angle).rem_euclid(TAU);
+        if gap < SMALLEST_GAP_RAD || side.is_upward() == next_side.is_upward() {
+            return None;
+        }
+        // The angle grows along the normal of a face that runs upward, so the outside lies ahead of it.
+        if side.is_upward() {
+            pairs.push([side, next_side]);
+        }
+    }
+    Some(pairs)
+}
+
+/// Nearer than this two faces are taken to coincide; normals of needles are hardly better.
+const SMALLEST_GAP_RAD: f64 = 1e-6;
+
+fn sorted_by_angle(
+    sides: &[Side],
+    lower: usize,
+    triangles: &[Triangle],
+    vertices: &[Vector3<f64>],
+) -> Vec<(f64, Side)> {
+    let along = vertices[sides[0].upper() as usize] - vertices[lower];
+    // Perpendicular to the edge and to the face, towards growing angles.
+    let ahead = |side: Side| {
+        let corners = triangles[side.face() as usize].corners.map(|v| vertices[v as usize]);
+        let normal = area_vector(&corners).normalize();
+        if side.is_upward() { normal } else { -normal }
+    };
+    let zero = ahead(sides[0]);
+    let quarter = along.cross(&zero).normalize();
+    let angle = |side: Side| ahead(side).dot(&quarter).atan2(ahead(side).dot(&zero));
+    let mut around: Vec<_> = sides.iter().map(|&side| (angle(side), side)).collect();
+    around.sort_by(|a, b| a.0.total_cmp(&b.0));
+    around
+}
