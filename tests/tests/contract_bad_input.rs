@@ -193,7 +193,10 @@ fn a_scene_that_is_wrong_is_refused_with_file_line_key_finding_and_remedy() {
     for key in ["mass_kg", "inertia_kg_m2", "rotation_locked", "centre_of_mass_m", "angular_velocity_rad_s"] {
         place.write("scene.toml", entity(&format!("{key} = 1")));
         let message = refused(&place, &["run", "scene.toml", "--record", "out.csv"]);
-        assert_says(&message, &[&format!("scene.toml:5: entity[0].{key}: this key is not available in this version")]);
+        assert_says(
+            &message,
+            &[&format!("scene.toml:5: entity[0].{key}: this key is not available in this version")],
+        );
     }
 }
 

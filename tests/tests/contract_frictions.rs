@@ -19,7 +19,12 @@ fn table(friction: &str) -> String {
 /// Onto the table, 5 mm into it, and then along it at this speed for 3 s, in a direction that is no axis.
 fn stroke(speed_m_s: f64) -> String {
     let at = |s: f64, y: f64| [0.8 * s, y, 0.6 * s];
-    hand([(0.0, at(0.0, 0.01)), (0.1, at(0.0, -DEPTH_M)), (0.2, at(0.0, -DEPTH_M)), (3.2, at(3.0 * speed_m_s, -DEPTH_M))])
+    hand([
+        (0.0, at(0.0, 0.01)),
+        (0.1, at(0.0, -DEPTH_M)),
+        (0.2, at(0.0, -DEPTH_M)),
+        (3.2, at(3.0 * speed_m_s, -DEPTH_M)),
+    ])
 }
 
 /// Tangential over normal force against the motion, in every row that presses.
@@ -159,7 +164,10 @@ fn what_holds_breaks_away_at_its_static_coefficient() {
         let step = speed_m_s * 1e-3 / DEPTH_M;
         assert!(peak <= mu_s + RATIO_TOLERANCE && peak > mu_s - step, "{friction}: {peak}");
         let before: Vec<_> = moving.take_while(|(_, ratio)| *ratio < mu_s - step).collect();
-        assert!(before.len() > 30 && before.iter().all(|(s, _)| s.friction == "stick"), "{friction}: held until then");
+        assert!(
+            before.len() > 30 && before.iter().all(|(s, _)| s.friction == "stick"),
+            "{friction}: held until then"
+        );
         assert!(before.iter().all(|(s, _)| (s.god.x, s.god.z) == (0.0, 0.0)), "{friction}: to the last bit");
     }
 }
@@ -183,7 +191,10 @@ fn a_hand_at_rest_is_held_and_not_pushed() {
         let samples = felt(&table(friction), &path, &[]);
         let still: Vec<&Sample> = samples.iter().filter(|s| s.t > 0.7).collect();
         let first = still.first().expect("rows").force;
-        assert!(still.iter().all(|s| s.force == first), "{friction}: a hand that rests feels a force that rests");
+        assert!(
+            still.iter().all(|s| s.force == first),
+            "{friction}: a hand that rests feels a force that rests"
+        );
         assert!(first.x < -0.1 && first.x > -0.75 * first.y, "{friction}: {first:?}");
     }
 }

@@ -104,7 +104,9 @@ fn a_quad_obj_with_negative_indices_is_the_same_cube() {
         let side = |bit: u32| if corner >> bit & 1 == 1 { HALF_M } else { -HALF_M };
         obj += &format!("v {} {} {} 1.0\r\n", side(0), side(1), side(2));
     }
-    for quad in ["-8 -6 -5 -7", "5/1/1 6/2/1 8/3/1 7/4/1", "1//2 2//2 6//2 5//2", "3 7 8 4", "1 5 7 3", "2 4 8 6"] {
+    for quad in
+        ["-8 -6 -5 -7", "5/1/1 6/2/1 8/3/1 7/4/1", "1//2 2//2 6//2 5//2", "3 7 8 4", "1 5 7 3", "2 4 8 6"]
+    {
         obj += &format!("f {quad}\r\n");
     }
     let path = around_the_cube();
@@ -145,7 +147,12 @@ const PIT: &str = "v -0.04 -0.04 -0.04\nv 0.04 -0.04 -0.04\nv 0.04 -0.04 0.04\nv
 fn a_god_object_rests_on_a_face_an_edge_and_a_vertex_of_a_pit() {
     // Onto a side of the pit, to the edge between two of its sides, to its tip: each time straight down at last.
     let over = |x: f64, z: f64, tip: f64| {
-        hand([(0.0, [x, 0.02, z]), (0.4, [x, tip - 0.003, z]), (0.8, [x, tip - 0.003, z]), (1.2, [x, 0.02, z])])
+        hand([
+            (0.0, [x, 0.02, z]),
+            (0.4, [x, tip - 0.003, z]),
+            (0.8, [x, tip - 0.003, z]),
+            (1.2, [x, 0.02, z]),
+        ])
     };
     let height = |x: f64, z: f64| -0.02 + 0.5 * x.abs().max(z.abs());
     // Slopes of one half: the normal of a side leans by atan(1/2).
@@ -176,7 +183,8 @@ fn a_bumpy_ball_pushes_outward_by_a_spring_and_lets_slide() {
     let arc = (0..=1000).map(|tick| (0.3 + f64::from(tick) * 1e-3, at(0.034, f64::from(tick) * 2e-3)));
     let path = hand([(0.0, at(0.06, 0.0))].into_iter().chain(arc));
     let friction = "friction = { model = \"stiction\", mu_s = 0.3, mu_d = 0.2 }\n";
-    let samples = felt_with(&[("b.stl", &bumpy)], &scene("kind = \"mesh\", file = \"b.stl\"", friction), &path);
+    let samples =
+        felt_with(&[("b.stl", &bumpy)], &scene("kind = \"mesh\", file = \"b.stl\"", friction), &path);
     let touching: Vec<&Sample> = samples.iter().filter(|s| s.touches()).collect();
     assert!(touching.len() > 900, "{}", touching.len());
     for s in &touching {
@@ -197,9 +205,24 @@ fn a_klein_bottle_has_no_inside_and_is_felt_from_both_sides() {
     place.write("klein.stl", Format::Stl.write(&make::klein_bottle(32, 16, 0.08)));
     place.write("scene.toml", mesh("klein.stl"));
     // Right through it, from above and from the side, and back.
-    let rows = [(0.0, [0.03, 0.06, 0.0]), (1.0, [0.03, -0.06, 0.001]), (2.0, [-0.06, 0.002, 0.03]), (3.0, [0.06, 0.0, 0.03])];
+    let rows = [
+        (0.0, [0.03, 0.06, 0.0]),
+        (1.0, [0.03, -0.06, 0.001]),
+        (2.0, [-0.06, 0.002, 0.03]),
+        (3.0, [0.06, 0.0, 0.03]),
+    ];
     place.write("hand.csv", hand(rows));
-    let said = place.run(["run", "scene.toml", "--hand", "hand.csv", "--clock", "virtual", "--headless", "--record", "out.csv"]);
+    let said = place.run([
+        "run",
+        "scene.toml",
+        "--hand",
+        "hand.csv",
+        "--clock",
+        "virtual",
+        "--headless",
+        "--record",
+        "out.csv",
+    ]);
     assert_eq!(said.status, Some(0), "{}", said.err);
     assert!(said.err.contains("cannot be oriented"), "whoever loads it is told: {}", said.err);
     assert!(!said.err.contains("merged"), "STL has no other way to share a vertex: {}", said.err);
@@ -233,17 +256,33 @@ fn a_broken_model_is_refused_with_scene_line_model_and_offender() {
         ("a.obj", (good.clone() + "f 1 2 99\n").into(), &["found vertex 99", "1 to 8"]),
         ("a.obj", (good.clone() + "f 1 2 0\n").into(), &["found vertex 0"]),
         ("a.obj", (good.clone() + "v 1 nan 0\n").into(), &["found `nan`", "a finite number"]),
-        ("a.obj", (good + "surf 0 1 0 1 1 2 3\n").into(), &["`surf`", "free-form", "export the model as a mesh"]),
+        (
+            "a.obj",
+            (good + "surf 0 1 0 1 1 2 3\n").into(),
+            &["`surf`", "free-form", "export the model as a mesh"],
+        ),
         ("a.obj", fins.into(), &["shared by more than two faces", "face 0 is on line 7"]),
         ("a.obj", b"v 0 0 0\nv 1 1 1\nv 2 2 2\nf 1 2 3\n".into(), &["none of the 1 faces has an area"]),
-        ("a.obj", b"v 0 0 0\nv 1e300 0 0\nv 0 1 0\nf 1 2 3\n".into(), &["vertex 1 is at [1", "correct the vertex or the unit"]),
+        (
+            "a.obj",
+            b"v 0 0 0\nv 1e300 0 0\nv 0 1 0\nf 1 2 3\n".into(),
+            &["vertex 1 is at [1", "correct the vertex or the unit"],
+        ),
         ("a.stl", stl[..stl.len() - 1].into(), &["byte 683", "after 11 of the 12 triangles", "cut short"]),
         ("a.stl", stl[..50].into(), &["byte 50", "at least 84 bytes"]),
         ("a.stl", [&stl[..80], &[13, 0, 0, 0], &stl[84..]].concat(), &["after 12 of the 13 triangles"]),
         ("a.stl", [&stl[..], b"more"].concat(), &["byte 684", "4 bytes behind the 12 triangles"]),
         ("a.stl", with_nan, &["byte 96", "corner 0 of triangle 0", "NaN"]),
-        ("a.stl", text[..text.rfind("endloop").expect("a loop")].into(), &["line ", "cut short", "`endloop`"]),
-        ("a.stl", text.replacen("endloop", "loop", 1).into(), &["line 7: found `loop`", "allowed: `endloop`"]),
+        (
+            "a.stl",
+            text[..text.rfind("endloop").expect("a loop")].into(),
+            &["line ", "cut short", "`endloop`"],
+        ),
+        (
+            "a.stl",
+            text.replacen("endloop", "loop", 1).into(),
+            &["line 7: found `loop`", "allowed: `endloop`"],
+        ),
         ("a.ply", b"ply\nformat ascii 1.0\n".into(), &["neither OBJ nor STL"]),
     ];
     for (name, bytes, parts) in cases {
@@ -271,7 +310,11 @@ fn a_model_that_cannot_be_read_is_refused() {
         place.write("scene.toml", mesh(file));
         let said = place.run(["run", "scene.toml", "--clock", "virtual", "--headless"]);
         assert_eq!(said.status, Some(2), "{}", said.err);
-        assert!(said.err.contains("scene.toml:5: entity[0].shape.file") && said.err.contains(part), "{}", said.err);
+        assert!(
+            said.err.contains("scene.toml:5: entity[0].shape.file") && said.err.contains(part),
+            "{}",
+            said.err
+        );
     }
 }
 
@@ -283,7 +326,8 @@ fn a_model_lies_relative_to_the_scene_file_and_not_to_where_one_stands() {
     }
     place.write("meshes/cube.obj", Format::Obj.write(&cube()));
     place.write("scenes/scene.toml", mesh("../meshes/cube.obj"));
-    let said = place.run(["run", "scenes/scene.toml", "--clock", "virtual", "--headless", "--seconds", "0.1"]);
+    let said =
+        place.run(["run", "scenes/scene.toml", "--clock", "virtual", "--headless", "--seconds", "0.1"]);
     assert_eq!((said.status, said.err.as_str()), (Some(0), ""));
 }
 
@@ -297,7 +341,8 @@ fn what_was_repaired_is_told_once_however_many_entities_use_it() {
     let spoilt = obj.replacen(&first, &format!("f {a} {c} {b}"), 1) + &format!("f {a} {b} {c}\nf 1 1 2\n");
     let place = Workplace::new();
     place.write("cube.obj", spoilt);
-    let again = "[[entity]]\nshape = { kind = \"mesh\", file = \"cube.obj\" }\nposition_m = [1.0, 0.0, 0.0]\n";
+    let again =
+        "[[entity]]\nshape = { kind = \"mesh\", file = \"cube.obj\" }\nposition_m = [1.0, 0.0, 0.0]\n";
     place.write("scene.toml", mesh("cube.obj") + again);
     let said = place.run(["run", "scene.toml", "--clock", "virtual", "--headless", "--seconds", "0.1"]);
     assert_eq!(said.status, Some(0), "{}", said.err);
@@ -305,7 +350,12 @@ fn what_was_repaired_is_told_once_however_many_entities_use_it() {
     assert!(lines.iter().all(|line| line.starts_with("phantom3: cube.obj: ")), "{}", said.err);
     assert!(lines[0].ends_with("12 faces, 8 vertices, 1 part"), "{}", said.err);
     for part in ["turned over", "given before", "without an area"] {
-        assert_eq!(lines.iter().filter(|line| line.contains(part)).count(), 1, "`{part}` once in: {}", said.err);
+        assert_eq!(
+            lines.iter().filter(|line| line.contains(part)).count(),
+            1,
+            "`{part}` once in: {}",
+            said.err
+        );
     }
 }
 
@@ -328,7 +378,9 @@ fn a_finger_with_a_radius_is_refused_on_a_mesh() {
     place.write("scene.toml", mesh("cube.obj").replace("start_m", "radius_m = 0.005\nstart_m"));
     let said = place.run(["run", "scene.toml", "--clock", "virtual", "--headless"]);
     assert_eq!(said.status, Some(2), "{}", said.err);
-    for part in ["scene.toml", "finger f0 has radius_m = 0.005", "entity thing, a mesh", "allowed: radius_m = 0"] {
+    for part in
+        ["scene.toml", "finger f0 has radius_m = 0.005", "entity thing, a mesh", "allowed: radius_m = 0"]
+    {
         assert!(said.err.contains(part), "`{part}` is missing in: {}", said.err);
     }
 }
@@ -336,11 +388,15 @@ fn a_finger_with_a_radius_is_refused_on_a_mesh() {
 #[test]
 fn the_other_algorithms_feel_a_mesh_without_friction() {
     let obj = Format::Obj.write(&cube());
-    let path = hand([(0.0, [0.003, 0.04, 0.002]), (0.3, [0.003, 0.0285, 0.002]), (1.0, [-0.013, 0.0281, 0.011])]);
+    let path =
+        hand([(0.0, [0.003, 0.04, 0.002]), (0.3, [0.003, 0.0285, 0.002]), (1.0, [-0.013, 0.0281, 0.011])]);
     for algorithm in ["friction-cone", "vector-field", "classic"] {
-        let friction = if algorithm == "friction-cone" { "" } else { "friction = { model = \"coulomb\", mu = 0.5 }\n" };
+        let friction =
+            if algorithm == "friction-cone" { "" } else { "friction = { model = \"coulomb\", mu = 0.5 }\n" };
         let rest = format!("algorithm = \"{algorithm}\"\n{friction}");
-        for shape in ["kind = \"mesh\", file = \"cube.obj\"", "kind = \"box\", size_m = [0.0625, 0.0625, 0.0625]"] {
+        for shape in
+            ["kind = \"mesh\", file = \"cube.obj\"", "kind = \"box\", size_m = [0.0625, 0.0625, 0.0625]"]
+        {
             let samples = felt_with(&[("cube.obj", &obj)], &scene(shape, &rest), &path);
             for s in &samples {
                 let expected = Vector3::y() * (1000.0 * (HALF_M - s.hip.y).max(0.0));

@@ -23,38 +23,66 @@ struct Kind {
 const KINDS: [Kind; 11] = [
     Kind {
         shape: "kind = \"box\", size_m = [0.06, 0.04, 0.1]",
-        places: &[([0.03, 0.004, -0.01], "face"), ([0.003, -0.02, 0.02], "face"), ([-0.01, 0.0, 0.05], "face")],
+        places: &[
+            ([0.03, 0.004, -0.01], "face"),
+            ([0.003, -0.02, 0.02], "face"),
+            ([-0.01, 0.0, 0.05], "face"),
+        ],
         normal: |p| largest(p, &[0.03, 0.02, 0.05]),
     },
     Kind {
         shape: "kind = \"cylinder\", radius_m = 0.03, length_m = 0.08",
-        places: &[([0.018, 0.01, -0.024], "surface"), ([0.007, 0.04, 0.01], "face"), ([0.0, -0.04, 0.01], "face")],
+        places: &[
+            ([0.018, 0.01, -0.024], "surface"),
+            ([0.007, 0.04, 0.01], "face"),
+            ([0.0, -0.04, 0.01], "face"),
+        ],
         normal: |p| if p.y.abs() >= 0.04 - NEAR_M { cap(p) } else { V::new(p.x, 0.0, p.z).normalize() },
     },
     // 3-4-5: it narrows by 0.03 over 0.04, so its side leans by exactly that.
     Kind {
         shape: "kind = \"cone\", radius_bottom_m = 0.05, radius_top_m = 0.02, length_m = 0.04",
-        places: &[([0.035, 0.0, 0.0], "surface"), ([0.0, 0.01, 0.0275], "surface"), ([0.01, 0.02, 0.0], "face")],
+        places: &[
+            ([0.035, 0.0, 0.0], "surface"),
+            ([0.0, 0.01, 0.0275], "surface"),
+            ([0.01, 0.02, 0.0], "face"),
+        ],
         normal: |p| if p.y.abs() >= 0.02 - NEAR_M { cap(p) } else { leaning(p) },
     },
     Kind {
         shape: "kind = \"cone\", radius_bottom_m = 0.06, radius_top_m = 0.0, length_m = 0.08",
-        places: &[([0.03, 0.0, 0.0], "surface"), ([0.0, 0.02, -0.015], "surface"), ([0.01, -0.04, 0.02], "face")],
+        places: &[
+            ([0.03, 0.0, 0.0], "surface"),
+            ([0.0, 0.02, -0.015], "surface"),
+            ([0.01, -0.04, 0.02], "face"),
+        ],
         normal: |p| if p.y <= -0.04 + NEAR_M { cap(p) } else { leaning(p) },
     },
     Kind {
         shape: "kind = \"torus\", ring_radius_m = 0.05, tube_radius_m = 0.02",
-        places: &[([0.07, 0.0, 0.0], "surface"), ([0.03, 0.02, -0.04], "surface"), ([0.0, -0.012, 0.034], "surface")],
+        places: &[
+            ([0.07, 0.0, 0.0], "surface"),
+            ([0.03, 0.02, -0.04], "surface"),
+            ([0.0, -0.012, 0.034], "surface"),
+        ],
         normal: |p| (p - V::new(p.x, 0.0, p.z).normalize() * 0.05).normalize(),
     },
     Kind {
         shape: "kind = \"capsule\", radius_m = 0.025, length_m = 0.06",
-        places: &[([0.025, 0.01, 0.0], "surface"), ([0.0, 0.055, 0.0], "surface"), ([0.015, -0.05, 0.0], "surface")],
+        places: &[
+            ([0.025, 0.01, 0.0], "surface"),
+            ([0.0, 0.055, 0.0], "surface"),
+            ([0.015, -0.05, 0.0], "surface"),
+        ],
         normal: |p| (p - V::new(0.0, p.y.clamp(-0.03, 0.03), 0.0)).normalize(),
     },
     Kind {
         shape: "kind = \"ellipsoid\", radii_m = [0.06, 0.03, 0.04]",
-        places: &[([0.0, 0.03, 0.0], "surface"), ([0.036, 0.0, 0.032], "surface"), ([0.036, -0.024, 0.0], "surface")],
+        places: &[
+            ([0.0, 0.03, 0.0], "surface"),
+            ([0.036, 0.0, 0.032], "surface"),
+            ([0.036, -0.024, 0.0], "surface"),
+        ],
         normal: |p| oval(p, &[0.06, 0.03, 0.04]),
     },
     // A lozenge: a ball scaled along two of its axes (Melder ch. 7.4.7).
@@ -76,8 +104,14 @@ const KINDS: [Kind; 11] = [
     // An oval column, which no other kind describes.
     Kind {
         shape: "kind = \"cylinder\", radius_m = 0.03, length_m = 0.08, scale = [2.0, 1.0, 1.0]",
-        places: &[([0.036, 0.01, 0.024], "surface"), ([0.0, 0.0, -0.03], "surface"), ([0.02, 0.04, 0.01], "face")],
-        normal: |p| if p.y.abs() >= 0.04 - NEAR_M { cap(p) } else { oval(&V::new(p.x, 0.0, p.z), &[0.06, 1.0, 0.03]) },
+        places: &[
+            ([0.036, 0.01, 0.024], "surface"),
+            ([0.0, 0.0, -0.03], "surface"),
+            ([0.02, 0.04, 0.01], "face"),
+        ],
+        normal: |p| {
+            if p.y.abs() >= 0.04 - NEAR_M { cap(p) } else { oval(&V::new(p.x, 0.0, p.z), &[0.06, 1.0, 0.03]) }
+        },
     },
 ];
 
@@ -98,7 +132,8 @@ fn oval(p: &V, radii: &[f64; 3]) -> V {
 }
 
 fn largest(p: &V, half: &[f64; 3]) -> V {
-    let axis = (0..3).max_by(|a, b| (p[*a].abs() / half[*a]).total_cmp(&(p[*b].abs() / half[*b]))).unwrap_or(0);
+    let axis =
+        (0..3).max_by(|a, b| (p[*a].abs() / half[*a]).total_cmp(&(p[*b].abs() / half[*b]))).unwrap_or(0);
     V::ith(axis, p[axis].signum())
 }
 
@@ -117,7 +152,11 @@ fn scene(shape: &str, rest: &str, finger: &str) -> String {
     format!(
         "[[finger]]\nstart_m = [0.0, 0.5, 0.0]\n{finger}\n[[entity]]\nname = \"thing\"\nshape = {{ {shape} }}\n\
          position_m = {:?}\norientation_wxyz = [{:?}, {:?}, {:?}, {:?}]\nstiffness_n_per_m = {STIFFNESS:?}\n{rest}",
-        pose.translation.vector.as_slice(), q.w, q.i, q.j, q.k
+        pose.translation.vector.as_slice(),
+        q.w,
+        q.i,
+        q.j,
+        q.k
     )
 }
 
@@ -161,7 +200,10 @@ fn check_press(s: &Sample, p: &V, n: &V, feature: &str, shape: &str) {
         assert_eq!(s.touches(), depth_m > 0.0, "{shape} at {p:?}: {s:?}");
     }
     let expected = n * (STIFFNESS * depth_m.max(0.0));
-    assert!((force - expected).norm() <= STIFFNESS * PLACE_TOLERANCE_M, "{shape}: {force:?} not {expected:?}: {s:?}");
+    assert!(
+        (force - expected).norm() <= STIFFNESS * PLACE_TOLERANCE_M,
+        "{shape}: {force:?} not {expected:?}: {s:?}"
+    );
     if s.touches() {
         assert!((god - p).norm() <= PLACE_TOLERANCE_M, "{shape}: god-object {god:?}, not {p:?}");
         assert_eq!(s.feature, feature, "{shape} at {p:?}: {s:?}");
@@ -181,8 +223,12 @@ fn each_shape_slides_at_mu_d_wherever_the_stroke_leads() {
             let n = normal(&p);
             let sideways = n.cross(&V::new(0.3, -0.5, 0.8)).normalize();
             let at = |height: f64, side: f64| in_world(p + n * height + sideways * side);
-            let path =
-                hand([(0.0, at(0.01, 0.0)), (0.1, at(-DEPTH_M, 0.0)), (0.2, at(-DEPTH_M, 0.0)), (1.2, at(-DEPTH_M, 0.0071))]);
+            let path = hand([
+                (0.0, at(0.01, 0.0)),
+                (0.1, at(-DEPTH_M, 0.0)),
+                (0.2, at(-DEPTH_M, 0.0)),
+                (1.2, at(-DEPTH_M, 0.0071)),
+            ]);
             let samples = felt(&scene(shape, stiction, ""), &path, &[]);
             let slipping: Vec<&Sample> = samples.iter().filter(|s| s.friction == "slip").collect();
             assert!(slipping.len() > 300, "{shape} at {place:?}: {} ticks in slip", slipping.len());
@@ -215,7 +261,16 @@ fn a_spherical_finger_rolls_a_radius_above_each_shape_that_it_can_feel() {
             let place = Workplace::new();
             place.write("scene.toml", &scene);
             place.write("hand.csv", &path);
-            let said = place.run(["run", "scene.toml", "--hand", "hand.csv", "--clock", "virtual", "--record", "out.csv"]);
+            let said = place.run([
+                "run",
+                "scene.toml",
+                "--hand",
+                "hand.csv",
+                "--clock",
+                "virtual",
+                "--record",
+                "out.csv",
+            ]);
             if said.status == Some(2) {
                 // Whoever cannot feel it is told so; which shapes these are is not this test's matter.
                 assert!(said.err.contains("cannot be felt by such a finger"), "{}", said.err);
@@ -226,7 +281,10 @@ fn a_spherical_finger_rolls_a_radius_above_each_shape_that_it_can_feel() {
                 let (hip, god, force) = in_body(s);
                 let depth_m = radius_m + n.dot(&(p - hip));
                 let expected = n * (STIFFNESS * depth_m.max(0.0));
-                assert!((force - expected).norm() <= STIFFNESS * PLACE_TOLERANCE_M, "{shape}: {force:?}, {expected:?}");
+                assert!(
+                    (force - expected).norm() <= STIFFNESS * PLACE_TOLERANCE_M,
+                    "{shape}: {force:?}, {expected:?}"
+                );
                 if s.touches() {
                     assert!((god - p - n * radius_m).norm() <= PLACE_TOLERANCE_M, "{shape}: {god:?}");
                 }
@@ -239,10 +297,19 @@ fn a_spherical_finger_rolls_a_radius_above_each_shape_that_it_can_feel() {
 #[test]
 fn a_finger_with_a_radius_is_refused_where_it_would_feel_nothing() {
     let place = Workplace::new();
-    place.write("scene.toml", scene("kind = \"torus\", ring_radius_m = 0.05, tube_radius_m = 0.02", "", "radius_m = 0.031"));
+    place.write(
+        "scene.toml",
+        scene("kind = \"torus\", ring_radius_m = 0.05, tube_radius_m = 0.02", "", "radius_m = 0.031"),
+    );
     let said = place.run(["run", "scene.toml", "--clock", "virtual", "--headless"]);
     assert_eq!(said.status, Some(2), "{}", said.err);
-    for part in ["scene.toml", "finger f0 has radius_m = 0.031", "entity thing, a torus", "radius_m = 0", "a smaller radius"] {
+    for part in [
+        "scene.toml",
+        "finger f0 has radius_m = 0.031",
+        "entity thing, a torus",
+        "radius_m = 0",
+        "a smaller radius",
+    ] {
         assert!(said.err.contains(part), "`{part}` is missing in: {}", said.err);
     }
 }
@@ -274,7 +341,10 @@ fn a_thin_plate_is_not_pushed_through() {
     for s in felt(&scene(shape, "", ""), &path, &[]) {
         let (hip, _, force) = in_body(&s);
         let expected = V::y() * (STIFFNESS * (0.0005 - hip.y).max(0.0));
-        assert!((force - expected).norm() <= STIFFNESS * PLACE_TOLERANCE_M, "{force:?} not {expected:?}: {s:?}");
+        assert!(
+            (force - expected).norm() <= STIFFNESS * PLACE_TOLERANCE_M,
+            "{force:?} not {expected:?}: {s:?}"
+        );
     }
 }
 

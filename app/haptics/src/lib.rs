@@ -31,8 +31,8 @@
 
 mod algorithm;
 mod capsule;
-mod cone;
 mod classic_god_object;
+mod cone;
 mod contact;
 mod convex;
 mod cuboid;

@@ -2,8 +2,8 @@
 
 use super::models::Models;
 use haptics::{
-    Algorithm, Capsule, Cone, Cuboid, Cylinder, Ellipsoid, Form, Friction, ParameterError, Plane, Scaled, Shape,
-    Sphere, Torus,
+    Algorithm, Capsule, Cone, Cuboid, Cylinder, Ellipsoid, Form, Friction, ParameterError, Plane, Scaled,
+    Shape, Sphere, Torus,
 };
 use std::sync::Arc;
 use world::{AlgorithmSpec, FrictionSpec, ShapeSpec};

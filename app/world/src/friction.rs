@@ -159,9 +159,7 @@ fn reader_of(model: &str) -> (&'static [&'static str], Read) {
         "stribeck" => (&["model", "mu_s", "mu_d", "v_s_m_s", "mu_v_s_per_m"], read_stribeck),
         "karnopp" => (&["model", "mu_s", "mu_d", "v_min_m_s", "mu_v_s_per_m"], read_karnopp),
         "dahl" => (&["model", "mu"], |table| Ok(FrictionSpec::Dahl { mu: coefficient(table, "mu")? })),
-        "lugre" => {
-            (&["model", "mu_s", "mu_d", "v_s_m_s", "mu_v_s_per_m", "damping_n_s_per_m"], read_lugre)
-        }
+        "lugre" => (&["model", "mu_s", "mu_d", "v_s_m_s", "mu_v_s_per_m", "damping_n_s_per_m"], read_lugre),
         "curve" => (&["model", "speed_m_s", "mu", "mu_s"], read_curve),
         "bristle" => (&["model", "mu", "bonds", "seed"], read_bristle),
         "reset-integrator" => (&["model", "mu_s", "mu_d", "damping_n_s_per_m"], read_reset_integrator),

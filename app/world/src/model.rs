@@ -53,7 +53,9 @@ pub enum ModelError {
         limit_bytes: u64,
     },
     /// Neither its name nor its content says what it is.
-    #[error("neither OBJ nor STL by its name, and it begins like neither; allowed: a file of one of these kinds")]
+    #[error(
+        "neither OBJ nor STL by its name, and it begins like neither; allowed: a file of one of these kinds"
+    )]
     UnknownFormat,
     /// Something wrong in a text.
     #[error("line {line}: found {found}; allowed: {allowed}")]

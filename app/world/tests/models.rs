@@ -44,11 +44,23 @@ fn every_way_to_write_a_tetrahedron_as_obj_is_the_same() {
         PLAIN.replace("f 1 2 4", "f 1/1/1 2/2/2 4/3/3 # with all"),
         PLAIN.replace("f 1 2 4", "f -4 -3 -1"),
         PLAIN.replace("f 1 2 4", "f 1 2 \\\n 4"),
-        PLAIN.replace("f 1 2 4", "usemtl no such\nmtllib none.mtl # nobody needs it\ng a b c\no thing\ns off\nf 1 2 4"),
+        PLAIN.replace(
+            "f 1 2 4",
+            "usemtl no such\nmtllib none.mtl # nobody needs it\ng a b c\no thing\ns off\nf 1 2 4",
+        ),
         PLAIN.replace("f 1 2 4", "vt 0 0\nvn 0 0 1\nl 1 2\np 1\n\n   \n# f 9 9 9\nf 1 2 4"),
         // Faces first: what they name comes later.
-        PLAIN.lines().rev().map(|line| format!("{line}\n")).filter(|line| line.starts_with('f')).collect::<String>()
-            + &PLAIN.lines().filter(|line| line.starts_with('v')).map(|line| format!("{line}\n")).collect::<String>(),
+        PLAIN
+            .lines()
+            .rev()
+            .map(|line| format!("{line}\n"))
+            .filter(|line| line.starts_with('f'))
+            .collect::<String>()
+            + &PLAIN
+                .lines()
+                .filter(|line| line.starts_with('v'))
+                .map(|line| format!("{line}\n"))
+                .collect::<String>(),
     ];
     let built = |soup: TriangleSoup| Mesh::build(soup).expect("a tetrahedron").0;
     let expected = built(plain);
@@ -69,7 +81,10 @@ fn polygons_become_triangles_of_the_same_outline() {
     // An arrowhead: the fan from its first corner would leave the outline.
     let arrowhead = "v 0 0 0\nv 2 -1 0\nv 0 2 0\nv -2 -1 0\nf 2 3 4 1\n";
     let faces = obj(arrowhead).faces;
-    assert!(faces.iter().all(|face| face.contains(&0) && face.contains(&2)), "cut from dent to tip: {faces:?}");
+    assert!(
+        faces.iter().all(|face| face.contains(&0) && face.contains(&2)),
+        "cut from dent to tip: {faces:?}"
+    );
 }
 
 #[test]
@@ -77,8 +92,14 @@ fn what_is_wrong_with_an_obj_is_told_with_its_line() {
     let corner = "corners such as 7, 7/2, 7//3 or 7/2/3 in whole numbers";
     let after = |line: &str| format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{line}\nf 1 2 3\n");
     let cases = [
-        ("v 1 2", "found a vertex of 2 numbers; allowed: three coordinates, and perhaps a weight or a colour behind them"),
-        ("v 1 2 3 4 5", "found a vertex of 5 numbers; allowed: three coordinates, and perhaps a weight or a colour behind them"),
+        (
+            "v 1 2",
+            "found a vertex of 2 numbers; allowed: three coordinates, and perhaps a weight or a colour behind them",
+        ),
+        (
+            "v 1 2 3 4 5",
+            "found a vertex of 5 numbers; allowed: three coordinates, and perhaps a weight or a colour behind them",
+        ),
         ("v 1 two 3", "found `two`; allowed: a finite number"),
         ("v 1 nan 3", "found `nan`; allowed: a finite number"),
         ("v 1 2 1e999", "found `1e999`; allowed: a finite number"),
@@ -88,7 +109,10 @@ fn what_is_wrong_with_an_obj_is_told_with_its_line() {
         ("f 1 2 0", "found vertex 0; allowed: 1 to 3, or -3 to -1, since there are 3 vertices"),
         ("f 1 2 -4", "found vertex -4; allowed: 1 to 3, or -3 to -1, since there are 3 vertices"),
         ("f 1 2 4", "found vertex 4; allowed: 1 to 3, or -3 to -1, since there are 3 vertices"),
-        ("f 1 2 99999999999", "found vertex 99999999999; allowed: 1 to 3, or -3 to -1, since there are 3 vertices"),
+        (
+            "f 1 2 99999999999",
+            "found vertex 99999999999; allowed: 1 to 3, or -3 to -1, since there are 3 vertices",
+        ),
         ("f 1 2 x", &format!("found `x`; allowed: {corner}")),
         ("f 1 2 3.0", &format!("found `3.0`; allowed: {corner}")),
         ("f 1 2 3/1/1/1", &format!("found `3/1/1/1`; allowed: {corner}")),
@@ -120,7 +144,10 @@ fn what_is_wrong_with_an_obj_is_told_with_its_line() {
     obj_refused("f 1 2 3\n", "line 1: found vertex 1; allowed: a vertex, but there is none");
     let bow_tie = "v 0 0 0\nv 1 1 0\nv 1 0 0\nv 0 1 0\nv 2 1 1\n\nf 1 2 3 4 5\n";
     let error = read_obj(bow_tie.as_bytes()).err().map(|error| error.to_string()).unwrap_or_default();
-    assert!(error.is_empty() || error.starts_with("line 7: found a face of 5 corners that cannot"), "{error}");
+    assert!(
+        error.is_empty() || error.starts_with("line 7: found a face of 5 corners that cannot"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -200,7 +227,10 @@ fn what_is_wrong_with_a_binary_stl_is_told_with_its_byte() {
     );
     for short in [&good[..83], b"", b"short"] {
         let message = read_stl(short).expect_err("too short").to_string();
-        assert!(message.starts_with(&format!("byte {}: found the end of the file", short.len())), "{message}");
+        assert!(
+            message.starts_with(&format!("byte {}: found the end of the file", short.len())),
+            "{message}"
+        );
         assert!(message.contains("at least 84 bytes, or a text that begins with `solid`"), "{message}");
     }
     let mut empty = with_count(0);

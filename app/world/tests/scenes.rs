@@ -88,7 +88,10 @@ fn what_is_left_out_takes_its_documented_default() {
 fn every_shape_kind_is_read() {
     for (written, expected) in [
         ("kind = \"box\", size_m = [1, 2, 3]", ShapeSpec::Box { size_m: [1.0, 2.0, 3.0] }),
-        ("kind = \"cylinder\", radius_m = 1, length_m = 2", ShapeSpec::Cylinder { radius_m: 1.0, length_m: 2.0 }),
+        (
+            "kind = \"cylinder\", radius_m = 1, length_m = 2",
+            ShapeSpec::Cylinder { radius_m: 1.0, length_m: 2.0 },
+        ),
         (
             "kind = \"cone\", radius_bottom_m = 1, radius_top_m = 0, length_m = 2",
             ShapeSpec::Cone { radius_bottom_m: 1.0, radius_top_m: 0.0, length_m: 2.0 },
@@ -97,7 +100,10 @@ fn every_shape_kind_is_read() {
             "kind = \"torus\", ring_radius_m = 2, tube_radius_m = 1",
             ShapeSpec::Torus { ring_radius_m: 2.0, tube_radius_m: 1.0 },
         ),
-        ("kind = \"capsule\", radius_m = 1, length_m = 0", ShapeSpec::Capsule { radius_m: 1.0, length_m: 0.0 }),
+        (
+            "kind = \"capsule\", radius_m = 1, length_m = 0",
+            ShapeSpec::Capsule { radius_m: 1.0, length_m: 0.0 },
+        ),
         ("kind = \"ellipsoid\", radii_m = [1, 2, 3]", ShapeSpec::Ellipsoid { radii_m: [1.0, 2.0, 3.0] }),
         (
             "kind = \"sphere\", radius_m = 1, scale = 2",
@@ -105,7 +111,10 @@ fn every_shape_kind_is_read() {
         ),
         (
             "kind = \"box\", size_m = [1, 1, 1], scale = [1, 2, 0.5]",
-            ShapeSpec::Scaled { shape: Box::new(ShapeSpec::Box { size_m: [1.0; 3] }), scale: [1.0, 2.0, 0.5] },
+            ShapeSpec::Scaled {
+                shape: Box::new(ShapeSpec::Box { size_m: [1.0; 3] }),
+                scale: [1.0, 2.0, 0.5],
+            },
         ),
     ] {
         let read = shape(&format!("{{ {written} }}"));
@@ -117,7 +126,9 @@ fn every_shape_kind_is_read() {
 #[test]
 fn a_mesh_file_is_relative_to_the_scene_file_and_knows_where_it_was_named() {
     let mesh = |rest: &str| {
-        let ShapeSpec::Mesh(mesh) = shape(&format!("{{ kind = \"mesh\", {rest} }}")) else { panic!("a mesh") };
+        let ShapeSpec::Mesh(mesh) = shape(&format!("{{ kind = \"mesh\", {rest} }}")) else {
+            panic!("a mesh")
+        };
         mesh
     };
     let plain = mesh("file = \"../meshes/a.obj\"");
@@ -216,7 +227,9 @@ fn the_models_with_an_inner_state_are_read_with_their_documented_defaults() {
         FrictionSpec::LuGre { mu_s, mu_d, v_s_m_s, mu_v_s_per_m: 0.0, damping_n_s_per_m: 0.0 }
     );
     assert_eq!(
-        friction("model = \"lugre\", mu_s = 0.7, mu_d = 0.3, v_s_m_s = 1, mu_v_s_per_m = 2, damping_n_s_per_m = 3"),
+        friction(
+            "model = \"lugre\", mu_s = 0.7, mu_d = 0.3, v_s_m_s = 1, mu_v_s_per_m = 2, damping_n_s_per_m = 3"
+        ),
         FrictionSpec::LuGre { mu_s, mu_d, v_s_m_s: 1.0, mu_v_s_per_m: 2.0, damping_n_s_per_m: 3.0 }
     );
     assert_eq!(
@@ -227,7 +240,10 @@ fn the_models_with_an_inner_state_are_read_with_their_documented_defaults() {
         friction("model = \"curve\", speed_m_s = [0.1], mu = [0.5]"),
         FrictionSpec::Curve { speed_m_s: vec![0.1], mu: vec![0.5], mu_s: 0.5 }
     );
-    assert_eq!(friction("model = \"bristle\", mu = 0.5"), FrictionSpec::Bristle { mu: 0.5, bonds: 20, seed: 0 });
+    assert_eq!(
+        friction("model = \"bristle\", mu = 0.5"),
+        FrictionSpec::Bristle { mu: 0.5, bonds: 20, seed: 0 }
+    );
     assert_eq!(
         friction("model = \"reset-integrator\", mu_s = 0.7, mu_d = 0.3"),
         FrictionSpec::ResetIntegrator { mu_s: 0.7, mu_d: 0.3, damping_n_s_per_m: 0.0 }

@@ -23,7 +23,8 @@ pub fn read_obj(bytes: &[u8]) -> Result<TriangleSoup, ModelError> {
     let mut begin = 0;
     for Polygon { line, end } in polygons {
         let corners = &corners[begin..end as usize];
-        triangulate(corners, &vertices, &mut faces).ok_or_else(|| indivisible(line as usize, corners.len()))?;
+        triangulate(corners, &vertices, &mut faces)
+            .ok_or_else(|| indivisible(line as usize, corners.len()))?;
         begin = end as usize;
     }
     if faces.is_empty() { Err(ModelError::NoTriangle) } else { Ok(TriangleSoup { vertices, faces }) }
@@ -56,12 +57,28 @@ pub(super) fn looks_like_obj(bytes: &[u8]) -> bool {
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 const IGNORED: [&[u8]; 18] = [
-    b"vt", b"vn", b"o", b"g", b"s", b"mg", b"l", b"p", b"usemtl", b"mtllib", b"usemap", b"maplib", b"shadow_obj",
-    b"trace_obj", b"bevel", b"c_interp", b"d_interp", b"lod",
+    b"vt",
+    b"vn",
+    b"o",
+    b"g",
+    b"s",
+    b"mg",
+    b"l",
+    b"p",
+    b"usemtl",
+    b"mtllib",
+    b"usemap",
+    b"maplib",
+    b"shadow_obj",
+    b"trace_obj",
+    b"bevel",
+    b"c_interp",
+    b"d_interp",
+    b"lod",
 ];
 const FREE_FORM: [&[u8]; 19] = [
-    b"cstype", b"deg", b"bmat", b"step", b"curv", b"curv2", b"surf", b"parm", b"trim", b"hole", b"scrv", b"sp",
-    b"end", b"con", b"vp", b"ctech", b"stech", b"bzp", b"bsp",
+    b"cstype", b"deg", b"bmat", b"step", b"curv", b"curv2", b"surf", b"parm", b"trim", b"hole", b"scrv",
+    b"sp", b"end", b"con", b"vp", b"ctech", b"stech", b"bzp", b"bsp",
 ];
 
 /// A face of the file.
@@ -129,7 +146,8 @@ impl Polygons {
     fn index(&self, line: usize, word: &[u8]) -> Result<u32, ModelError> {
         let mut parts = word.split(|&byte| byte == b'/');
         let vertex = parts.next().and_then(integer);
-        let others_are_sound = parts.clone().count() <= 2 && parts.all(|part| part.is_empty() || integer(part).is_some());
+        let others_are_sound =
+            parts.clone().count() <= 2 && parts.all(|part| part.is_empty() || integer(part).is_some());
         let Some(number) = vertex.filter(|_| others_are_sound) else {
             let allowed = "corners such as 7, 7/2, 7//3 or 7/2/3 in whole numbers".into();
             return Err(ModelError::Line { line, found: shown(word), allowed });

@@ -64,7 +64,8 @@ impl Outline<'_> {
         let rounding = ROUNDING * self.normal.norm_squared();
         let mut left = corners.to_vec();
         while left.len() > 3 {
-            let around = |i: usize| [left[(i + left.len() - 1) % left.len()], left[i], left[(i + 1) % left.len()]];
+            let around =
+                |i: usize| [left[(i + left.len() - 1) % left.len()], left[i], left[(i + 1) % left.len()]];
             // Corners on a straight line leave a triangle without an area, once no proper ear is there.
             let ear = (0..left.len())
                 .find(|&i| self.turn(around(i)) > 0.0 && self.is_empty(around(i), &left))
@@ -80,7 +81,8 @@ impl Outline<'_> {
 
     /// Whether no other corner lies in the triangle.
     fn is_empty(&self, triangle @ [a, b, c]: [u32; 3], corners: &[u32]) -> bool {
-        let is_corner = |p: u32| triangle.iter().any(|&t| self.vertices[t as usize] == self.vertices[p as usize]);
+        let is_corner =
+            |p: u32| triangle.iter().any(|&t| self.vertices[t as usize] == self.vertices[p as usize]);
         let is_inside = |p: u32| [[a, b, p], [b, c, p], [c, a, p]].into_iter().all(|t| self.turn(t) >= 0.0);
         !corners.iter().any(|&p| !is_corner(p) && is_inside(p))
     }

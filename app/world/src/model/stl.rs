@@ -72,9 +72,8 @@ fn check_length(bytes: &[u8]) -> Result<(), ModelError> {
     let length = bytes.len();
     let wrong = |offset, found, allowed| Err(ModelError::Byte { offset, found, allowed });
     let Some(count) = said_triangles(bytes) else {
-        let allowed = format!(
-            "a binary STL file of at least {HEADER_BYTES} bytes, or a text that begins with `solid`"
-        );
+        let allowed =
+            format!("a binary STL file of at least {HEADER_BYTES} bytes, or a text that begins with `solid`");
         return wrong(length, format!("the end of the file, which begins with {}", shown(bytes)), allowed);
     };
     let expected = HEADER_BYTES + count * TRIANGLE_BYTES;

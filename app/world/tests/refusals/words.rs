@@ -109,9 +109,8 @@ fn a_shape_kind_that_this_version_lacks_is_told_apart_from_an_unknown_one() {
         );
         refused(&with_shape(&format!("{{ kind = \"{kind}\", size_m = [1, 1, 1] }}")), &message);
     }
-    let unknown = |found: &str| {
-        format!("s.toml:4: entity[0].shape.kind: unknown shape kind {found}; allowed: {KINDS}")
-    };
+    let unknown =
+        |found: &str| format!("s.toml:4: entity[0].shape.kind: unknown shape kind {found}; allowed: {KINDS}");
     refused(
         &with_shape("{ kind = \"shpere\", radius_m = 1 }"),
         &unknown("`shpere` (did you mean `sphere`?)"),
