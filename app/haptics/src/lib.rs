@@ -31,8 +31,8 @@
 
 mod algorithm;
 mod capsule;
-mod classic_god_object;
 mod cone;
+mod classic_god_object;
 mod contact;
 mod convex;
 mod cuboid;
