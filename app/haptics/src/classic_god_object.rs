@@ -42,7 +42,8 @@ fn on_surface(surface: &dyn Surface, input: &TouchInput<'_>, memory: &mut Contac
         .or_else(|| is_inside.then(|| surface.nearest(hip_B)))?;
     let at = seek(surface, start, input);
     let depth_m = surface.tangent_offset(&at) - at.normal_B.dot(hip_B);
-    if !is_inside && !(depth_m > 0.0 && surface.holds_outside(&at, depth_m)) {
+    let is_pressed_through = depth_m > 0.0 && surface.holds_outside(&at, depth_m);
+    if !is_inside && !is_pressed_through {
         return None;
     }
     remember(memory, &at);

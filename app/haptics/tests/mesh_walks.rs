@@ -47,7 +47,10 @@ struct Seen {
     touching: usize,
     edges: usize,
     vertices: usize,
+    long_walks: usize,
 }
+
+const MOST_TICKS_OF_A_WALK: usize = 4;
 
 fn walk(ground: &Ground, mut roaming: Roaming, ticks: usize) -> Seen {
     let mesh = &ground.mesh;
@@ -56,7 +59,16 @@ fn walk(ground: &Ground, mut roaming: Roaming, ticks: usize) -> Seen {
     let mut seen = Seen::default();
     for tick in 0..ticks {
         let hip = roaming.next();
-        let out = step(&mut finger, &entity, &hip);
+        let mut out = step(&mut finger, &entity, &hip);
+        // A tick's walk is bounded: a god-object 0.1 m from its next place needs a few on triangles of half a
+        // millimetre.
+        for _ in 0..MOST_TICKS_OF_A_WALK {
+            if out.entity.is_none() || stuck(ground, &hip, &out).is_none() {
+                break;
+            }
+            seen.long_walks += 1;
+            out = step(&mut finger, &entity, &hip);
+        }
         let told = || format!("tick {tick}, HIP {hip:?}: {out:?}");
         assert!(
             out.force_on_user_W.iter().chain(out.god_object_W.iter()).all(|x| x.is_finite()),
@@ -110,6 +122,7 @@ fn check(name: &str, mesh: Arc<Mesh>, half_width_m: f64, step_m: f64, ticks: usi
     let seen = walk(&ground, Roaming::new(9, half_width_m, step_m), ticks);
     println!("{name}: {seen:?}");
     assert!(seen.touching > ticks / 50, "{name}: {seen:?}");
+    assert!(seen.long_walks <= seen.touching / 1000, "{name}: {seen:?}");
 }
 
 fn check_all(ticks: usize, meridians: usize) {
