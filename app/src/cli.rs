@@ -286,7 +286,7 @@ fn refuse_to_overwrite_input(args: &RunArgs, rig: &Rig) -> Result<(), RunFailure
         args.hand_model.as_ref(),
         args.device.as_ref(),
     ];
-    match inputs.into_iter().flatten().find(|input| is_same_file(record, input)) {
+    match inputs.into_iter().flatten().chain(rig.model_files()).find(|input| is_same_file(record, input)) {
         Some(input) => Err(RunFailure::Start(format!(
             "--record {} would overwrite the input {}; name another file",
             record.display(),

@@ -1,11 +1,17 @@
 //! From files and arguments to everything a run needs: whatever can be wrong with the input is found here,
 //! before anything is started.
 
+mod material;
+mod models;
+
+use self::material::Unfit;
+use self::models::Models;
 use crate::fast_step::{DeviceFinger, FastStep};
 use crate::mount::Mount;
 use crate::recording::Names;
 use crate::simulated::{SimulatedDevices, SimulationError, base_for_path};
-use haptics::{Entity, Finger, Friction, ParameterError, Plane, Shape, Sphere};
+use haptics::mesh::MeshError;
+use haptics::{Entity, Finger, ParameterError};
 use io_driver::config::{
     Backend, DeviceConfig, DriverConfig, ProcessConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig, Wish,
     Zeroing,
@@ -20,7 +26,8 @@ use shm_abi::segment::ClockMode;
 use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
-use world::{FrictionSpec, Layout, Scene, SceneEntity, SceneError, ShapeSpec};
+use world::model::ModelError;
+use world::{Layout, Location, Scene, SceneEntity, SceneError, SceneFinger, ShapeSpec};
 
 /// What is wrong with the input.
 #[derive(Debug, Error)]
@@ -70,6 +77,47 @@ pub enum RigError {
         /// Why.
         source: ParameterError,
     },
+    /// A model file cannot be read.
+    #[error("{at}: {}: {source}", .file.display())]
+    Model {
+        /// Where the scene names it.
+        at: Box<Location>,
+        /// The model's file.
+        file: PathBuf,
+        /// Why.
+        source: ModelError,
+    },
+    /// A model file's triangles make no mesh.
+    #[error("{at}: {}: {source}{place}", .file.display())]
+    Mesh {
+        /// Where the scene names it.
+        at: Box<Location>,
+        /// The model's file.
+        file: PathBuf,
+        /// Where in that file, if it is known.
+        place: String,
+        /// Why.
+        source: MeshError,
+    },
+    /// A finger with a radius meets a shape that has no surface for its centre to roll on.
+    #[error(
+        "{}: finger {finger} has radius_m = {radius_m}, and entity {entity}, a {kind}, cannot be felt by such a finger; \
+         allowed: radius_m = 0, which feels every shape{smaller}, or another shape", .file.display()
+    )]
+    NotFelt {
+        /// The scene's file.
+        file: PathBuf,
+        /// The finger's name.
+        finger: String,
+        /// Its radius (m).
+        radius_m: f64,
+        /// The entity's name.
+        entity: String,
+        /// The kind of its shape.
+        kind: &'static str,
+        /// Whether a smaller radius would do.
+        smaller: &'static str,
+    },
     /// Something of the grammar that this version has not got.
     #[error("{file}: {what} is not available in this version")]
     NotAvailable {
@@ -97,6 +145,7 @@ pub struct Rig {
     pub period_ns: u64,
     /// X_WD of each device; beyond the list the world's origin.
     bases: Vec<Isometry3<f64>>,
+    models: Models,
 }
 
 /// How the hand moves the devices that are not real.
@@ -141,6 +190,7 @@ impl Rig {
         let hand = named.map(|(path, named_by)| check_hand(path, &named_by, &scene)).transpose()?;
         let mut rig = Self {
             scene_file: scene_file.into(),
+            models: Models::load(&scene)?,
             scene,
             layout,
             hand_mode,
@@ -220,6 +270,7 @@ impl Rig {
         let fingers = self.scene.fingers.iter().map(|finger| {
             let made = Finger::new(finger.radius_m, entities.len())
                 .map_err(|source| self.refused(format!("finger {}", finger.name), source))?;
+            self.check_felt(&entities, finger)?;
             let mount = self.mount(finger.device);
             Ok(DeviceFinger { finger: made, device: finger.device, mount })
         });
@@ -290,27 +341,43 @@ impl Rig {
     fn entity(&self, spec: &SceneEntity) -> Result<Entity, RigError> {
         let what = || format!("entity {}", spec.name);
         let refused = |source| self.refused(what(), source);
-        let shape: Shape = match spec.shape {
-            ShapeSpec::Plane { normal, offset_m } => {
-                Plane::new(normal.into_inner(), offset_m).map_err(refused)?.into()
-            }
-            ShapeSpec::Sphere { radius_m } => Sphere::new(radius_m).map_err(refused)?.into(),
-            ref other => return Err(self.not_available(format!("{}: shape {other:?}", what()))),
+        let unfit = |unfit| match unfit {
+            Unfit::Refused(source) => refused(source),
+            Unfit::NotAvailable(it) => self.not_available(format!("{}: {it}", what())),
         };
-        let friction = match spec.friction {
-            FrictionSpec::None => Friction::None,
-            FrictionSpec::Coulomb { mu } => Friction::Coulomb { mu },
-            FrictionSpec::Stiction { mu_s, mu_d } => Friction::Stiction { mu_s, mu_d },
-            FrictionSpec::Viscous { mu_v_s_per_m } => Friction::Viscous { mu_v_s_per_m },
-            FrictionSpec::CoulombViscous { mu, mu_v_s_per_m } => {
-                Friction::CoulombViscous { mu, mu_v_s_per_m }
-            }
-            ref other => return Err(self.not_available(format!("{}: friction {other:?}", what()))),
-        };
+        let shape = material::shape(&spec.shape, &self.models).map_err(unfit)?;
+        let friction = material::friction(&spec.friction).map_err(unfit)?;
+        let algorithm = material::algorithm(spec.algorithm).map_err(unfit)?;
         Entity::new(shape, spec.pose, spec.stiffness_n_per_m)
             .and_then(|entity| entity.with_damping(spec.damping_n_s_per_m))
             .and_then(|entity| entity.with_friction(friction))
+            .map(|entity| entity.with_algorithm(algorithm))
             .map_err(refused)
+    }
+
+    /// A finger would pass through what it cannot feel, without a word.
+    fn check_felt(&self, entities: &[Entity], finger: &SceneFinger) -> Result<(), RigError> {
+        let not_felt = entities.iter().position(|entity| !entity.shape.is_felt_by(finger.radius_m));
+        let Some(index) = not_felt else { return Ok(()) };
+        let spec = &self.scene.entities[index];
+        // A ring is felt by balls that fit through its hole, a mesh by none.
+        let by_smaller = entities[index].shape.is_felt_by(1e-3 * finger.radius_m);
+        Err(RigError::NotFelt {
+            file: self.scene_file.clone(),
+            finger: finger.name.clone(),
+            radius_m: finger.radius_m,
+            entity: spec.name.clone(),
+            kind: spec.shape.kind(),
+            smaller: if by_smaller { ", a smaller radius" } else { "" },
+        })
+    }
+
+    /// The model files that it is made of.
+    pub fn model_files(&self) -> impl Iterator<Item = &PathBuf> {
+        self.scene.entities.iter().filter_map(|entity| match &entity.shape {
+            ShapeSpec::Mesh(mesh) => Some(&mesh.file),
+            _ => None,
+        })
     }
 
     fn refused(&self, what: String, source: ParameterError) -> RigError {

@@ -106,7 +106,8 @@ impl Sample {
             assert_eq!(texts, ("", "none", "free"), "{self:?}");
             assert_eq!((self.god, self.force), (self.hip, Vector3::zeros()), "{self:?}");
         } else {
-            assert!(!self.entity.is_empty() && self.feature == "surface", "{self:?}");
+            let is_feature = ["surface", "face", "edge", "vertex"].contains(&self.feature.as_str());
+            assert!(!self.entity.is_empty() && is_feature, "{self:?}");
             assert!(["stick", "slip"].contains(&self.friction.as_str()), "{self:?}");
         }
         assert_eq!(self.applied, self.force, "{self:?}");

@@ -4,7 +4,7 @@
 mod common;
 
 use common::*;
-use haptics::{Entity, Friction};
+use haptics::{ContactState, Entity, Friction};
 use nalgebra::Vector3;
 
 /// The noise of test 3 (m).
@@ -33,7 +33,7 @@ fn farthest(rest: &Rest, ticks: u64, seed: u64) -> f64 {
     let mut farthest: f64 = 0.0;
     for _ in 0..ticks {
         let out = finger.step(entity, &(rest.mean_W + noise.vector(SIGMA)), DT);
-        assert!(out.entity.is_some());
+        assert_eq!(out.friction, ContactState::Stick);
         farthest = farthest.max((out.god_object_W - put_down).amax());
     }
     farthest

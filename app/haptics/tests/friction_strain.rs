@@ -8,7 +8,7 @@
 mod common;
 
 use common::*;
-use haptics::{Finger, Friction, Stribeck};
+use haptics::{Finger, Friction, FrictionLaw, FrictionMemory, FrictionQuery, HaywardArmstrong, Stribeck};
 use nalgebra::Vector3;
 
 const MU: f64 = 0.5;
@@ -131,6 +131,10 @@ fn below_its_stick_strain_hayward_and_armstrongs_model_is_a_spring() {
     }
     let (_, god) = step(&mut finger, &entity, 0.7 * Z_MAX);
     assert!(god > 0.0, "beyond, it yields");
+    // Also if the law is asked for a slide of such a strain, as on a curved surface it may be.
+    let law = HaywardArmstrong::new(MU, 0.6).unwrap();
+    let query = FrictionQuery { gap_m: amplitude, load_m: DEPTH, hip_travel_m: 1e-3, ..Default::default() };
+    assert_eq!(law.slide(&query, &FrictionMemory::default()), 0.0);
 }
 
 #[test]

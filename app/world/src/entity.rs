@@ -25,6 +25,21 @@ pub struct SceneEntity {
     pub damping_n_s_per_m: f64,
     /// Default none.
     pub friction: FrictionSpec,
+    /// Default the Friction Cone Algorithm.
+    pub algorithm: AlgorithmSpec,
+}
+
+/// What works out the force of contacts with an entity.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum AlgorithmSpec {
+    /// The Friction Cone Algorithm.
+    #[default]
+    FrictionCone,
+    /// A force along the way to the nearest point of the surface, as haptics began; to compare with.
+    VectorField,
+    /// The god-object without friction; to compare with.
+    ClassicGodObject,
 }
 
 impl SceneEntity {
@@ -43,9 +58,24 @@ impl SceneEntity {
             stiffness_n_per_m: table.number_or("stiffness_n_per_m", Bound::Positive, stiffness_default)?,
             damping_n_s_per_m: table.number_or("damping_n_s_per_m", Bound::NotNegative, 0.0)?,
             friction: FrictionSpec::read(table)?,
+            algorithm: AlgorithmSpec::read(table)?,
         })
     }
 }
+
+impl AlgorithmSpec {
+    fn read(entity: &Table<'_>) -> Result<Self, SceneError> {
+        let Some(value) = entity.get("algorithm") else { return Ok(Self::default()) };
+        Ok(match value.choose("algorithm", &ALGORITHMS)? {
+            "vector-field" => Self::VectorField,
+            "classic" => Self::ClassicGodObject,
+            _ => Self::FrictionCone,
+        })
+    }
+}
+
+const ALGORITHMS: Vocabulary =
+    Vocabulary { available: &["friction-cone", "vector-field", "classic"], later: &[] };
 
 const KEYS: Vocabulary = Vocabulary {
     available: &[
@@ -56,6 +86,7 @@ const KEYS: Vocabulary = Vocabulary {
         "stiffness_n_per_m",
         "damping_n_s_per_m",
         "friction",
+        "algorithm",
     ],
     later: &[
         "velocity_m_s",

@@ -38,6 +38,7 @@ mod error;
 mod finger;
 mod friction;
 mod layout;
+pub mod model;
 mod names;
 mod placement;
 mod pose;
@@ -47,7 +48,7 @@ mod shape;
 mod source;
 mod vocabulary;
 
-pub use entity::SceneEntity;
+pub use entity::{AlgorithmSpec, SceneEntity};
 pub use error::{Location, SceneError};
 pub use finger::SceneFinger;
 pub use friction::FrictionSpec;
@@ -55,7 +56,7 @@ pub use layout::Layout;
 pub use names::MAX_NAME_BYTES;
 pub use placement::{Affine, LEAST_STRETCH, MOST_STRETCH, Placement};
 pub use scene::Scene;
-pub use shape::ShapeSpec;
+pub use shape::{MeshSpec, ShapeSpec};
 pub use source::MAX_FILE_BYTES;
 
 /// Fingers in a scene, devices in a layout, and haptic devices of one driver: at most this many.

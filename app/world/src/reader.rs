@@ -5,6 +5,7 @@
 //! what it would have accepted.
 
 use std::fmt;
+use std::ops::RangeInclusive;
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -74,6 +75,15 @@ impl<'d> Table<'d> {
 
     pub(crate) fn number_or(&self, key: &str, bound: Bound, default: f64) -> Result<f64, SceneError> {
         self.get(key).map_or(Ok(default), |value| value.number(bound))
+    }
+
+    pub(crate) fn whole_or(
+        &self,
+        key: &str,
+        range: RangeInclusive<u64>,
+        default: u64,
+    ) -> Result<u64, SceneError> {
+        self.get(key).map_or(Ok(default), |value| value.whole(range))
     }
 
     pub(crate) fn numbers_or<const N: usize>(
@@ -147,16 +157,41 @@ impl<'d> Value<'d> {
 
     /// Exactly `N` finite numbers.
     pub(crate) fn numbers<const N: usize>(&self) -> Result<[f64; N], SceneError> {
-        let allowed = format!("an array of {N} numbers");
+        self.numbers_in(Bound::Any)
+    }
+
+    /// Exactly `N` finite numbers, each within `bound`.
+    pub(crate) fn numbers_in<const N: usize>(&self, bound: Bound) -> Result<[f64; N], SceneError> {
+        let allowed = format!("an array of {N} {}", bound.of_several());
         let DeValue::Array(items) = self.value.get_ref() else { return Err(self.wrong_type(allowed)) };
         if items.len() != N {
             return Err(self.wrong_type(allowed));
         }
         let mut numbers = [0.0; N];
         for (i, (number, value)) in numbers.iter_mut().zip(items.iter()).enumerate() {
-            *number = self.item(i, value).number(Bound::Any)?;
+            *number = self.item(i, value).number(bound)?;
         }
         Ok(numbers)
+    }
+
+    /// Finite numbers within `bound`, at least one of them.
+    pub(crate) fn list(&self, bound: Bound) -> Result<Vec<f64>, SceneError> {
+        let allowed = || format!("an array of {}, with at least one of them", bound.of_several());
+        match self.value.get_ref() {
+            DeValue::Array(items) if !items.is_empty() => {
+                items.iter().enumerate().map(|(i, value)| self.item(i, value).number(bound)).collect()
+            }
+            _ => Err(self.wrong_type(allowed())),
+        }
+    }
+
+    /// Factors along three axes: one number for all, or an array of three; above 0.
+    pub(crate) fn factors(&self) -> Result<[f64; 3], SceneError> {
+        match self.value.get_ref() {
+            DeValue::Array(items) if items.len() == 3 => self.numbers_in(Bound::Positive),
+            DeValue::Integer(_) | DeValue::Float(_) => Ok([self.number(Bound::Positive)?; 3]),
+            _ => Err(self.wrong_type("a number above 0, or an array of 3 numbers above 0")),
+        }
     }
 
     /// `N` rows of `N` finite numbers.
@@ -175,10 +210,15 @@ impl<'d> Value<'d> {
 
     /// A whole number below `limit`.
     pub(crate) fn index(&self, limit: usize) -> Result<usize, SceneError> {
-        let allowed = format!("a whole number from 0 to {}", limit - 1);
+        self.whole(0..=limit as u64 - 1).map(|index| index as usize)
+    }
+
+    /// A whole number within `range`.
+    fn whole(&self, range: RangeInclusive<u64>) -> Result<u64, SceneError> {
+        let allowed = format!("a whole number from {} to {}", range.start(), range.end());
         let DeValue::Integer(_) = self.value.get_ref() else { return Err(self.wrong_type(allowed)) };
-        let index = self.integer().and_then(|integer| usize::try_from(integer).ok());
-        index.filter(|index| *index < limit).ok_or_else(|| self.out_of_range(allowed))
+        let whole = self.integer().and_then(|integer| u64::try_from(integer).ok());
+        whole.filter(|whole| range.contains(whole)).ok_or_else(|| self.out_of_range(allowed))
     }
 
     /// A string that is not empty.
@@ -264,6 +304,14 @@ impl Bound {
             Self::Any => true,
             Self::NotNegative => number >= 0.0,
             Self::Positive => number > 0.0,
+        }
+    }
+
+    fn of_several(self) -> &'static str {
+        match self {
+            Self::Any => "numbers",
+            Self::NotNegative => "numbers, 0 or more",
+            Self::Positive => "numbers above 0",
         }
     }
 }

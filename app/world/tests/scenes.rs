@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
-use world::{FrictionSpec, Layout, Scene, SceneEntity, ShapeSpec};
+use world::{AlgorithmSpec, FrictionSpec, Layout, Scene, SceneEntity, ShapeSpec};
 
 fn parsed(text: &str) -> Scene {
     Scene::parse(text, Path::new("dir/s.toml")).unwrap_or_else(|error| panic!("{error}"))
@@ -15,7 +15,7 @@ fn entity(keys: &str) -> SceneEntity {
 }
 
 fn shape(shape: &str) -> ShapeSpec {
-    parsed(&format!("[[finger]]\n[[entity]]\nshape = {shape}\n")).entities[0].shape
+    parsed(&format!("[[finger]]\n[[entity]]\nshape = {shape}\n")).entities.remove(0).shape
 }
 
 fn plane(normal: [f64; 3], offset_m: f64) -> ShapeSpec {
@@ -81,6 +81,70 @@ fn what_is_left_out_takes_its_documented_default() {
     assert_eq!(entity.pose, Isometry3::identity());
     assert_eq!((entity.stiffness_n_per_m, entity.damping_n_s_per_m), (1000.0, 0.0));
     assert_eq!(entity.friction, FrictionSpec::None);
+    assert_eq!(entity.algorithm, AlgorithmSpec::FrictionCone);
+}
+
+#[test]
+fn every_shape_kind_is_read() {
+    for (written, expected) in [
+        ("kind = \"box\", size_m = [1, 2, 3]", ShapeSpec::Box { size_m: [1.0, 2.0, 3.0] }),
+        (
+            "kind = \"cylinder\", radius_m = 1, length_m = 2",
+            ShapeSpec::Cylinder { radius_m: 1.0, length_m: 2.0 },
+        ),
+        (
+            "kind = \"cone\", radius_bottom_m = 1, radius_top_m = 0, length_m = 2",
+            ShapeSpec::Cone { radius_bottom_m: 1.0, radius_top_m: 0.0, length_m: 2.0 },
+        ),
+        (
+            "kind = \"torus\", ring_radius_m = 2, tube_radius_m = 1",
+            ShapeSpec::Torus { ring_radius_m: 2.0, tube_radius_m: 1.0 },
+        ),
+        (
+            "kind = \"capsule\", radius_m = 1, length_m = 0",
+            ShapeSpec::Capsule { radius_m: 1.0, length_m: 0.0 },
+        ),
+        ("kind = \"ellipsoid\", radii_m = [1, 2, 3]", ShapeSpec::Ellipsoid { radii_m: [1.0, 2.0, 3.0] }),
+        (
+            "kind = \"sphere\", radius_m = 1, scale = 2",
+            ShapeSpec::Scaled { shape: Box::new(ShapeSpec::Sphere { radius_m: 1.0 }), scale: [2.0; 3] },
+        ),
+        (
+            "kind = \"box\", size_m = [1, 1, 1], scale = [1, 2, 0.5]",
+            ShapeSpec::Scaled {
+                shape: Box::new(ShapeSpec::Box { size_m: [1.0; 3] }),
+                scale: [1.0, 2.0, 0.5],
+            },
+        ),
+    ] {
+        let read = shape(&format!("{{ {written} }}"));
+        assert_eq!(read, expected);
+        assert!(written.contains(&format!("\"{}\"", read.kind())));
+    }
+}
+
+#[test]
+fn a_mesh_file_is_relative_to_the_scene_file_and_knows_where_it_was_named() {
+    let mesh = |rest: &str| {
+        let ShapeSpec::Mesh(mesh) = shape(&format!("{{ kind = \"mesh\", {rest} }}")) else {
+            panic!("a mesh")
+        };
+        mesh
+    };
+    let plain = mesh("file = \"../meshes/a.obj\"");
+    assert_eq!((plain.file, plain.scale), (PathBuf::from("dir/../meshes/a.obj"), [1.0; 3]));
+    assert_eq!(plain.at.to_string(), "dir/s.toml:3: entity[0].shape.file");
+    assert_eq!(mesh("file = \"/b.stl\", scale = 0.001").scale, [0.001; 3]);
+    assert_eq!(mesh("file = \"/b.stl\", scale = 0.001").file, PathBuf::from("/b.stl"));
+    assert_eq!(mesh("file = \"b\", scale = [1, 2, 3]").scale, [1.0, 2.0, 3.0]);
+}
+
+#[test]
+fn every_algorithm_is_read() {
+    let algorithm = |name: &str| entity(&format!("algorithm = \"{name}\"")).algorithm;
+    assert_eq!(algorithm("friction-cone"), AlgorithmSpec::FrictionCone);
+    assert_eq!(algorithm("vector-field"), AlgorithmSpec::VectorField);
+    assert_eq!(algorithm("classic"), AlgorithmSpec::ClassicGodObject);
 }
 
 #[test]
@@ -142,6 +206,55 @@ fn every_friction_model_of_this_version_is_read() {
     assert_eq!(
         friction("model = \"coulomb-viscous\", mu = 0.5, mu_v_s_per_m = 2"),
         FrictionSpec::CoulombViscous { mu: 0.5, mu_v_s_per_m: 2.0 }
+    );
+}
+
+#[test]
+fn the_models_with_an_inner_state_are_read_with_their_documented_defaults() {
+    let friction = |table: &str| entity(&format!("friction = {{ {table} }}")).friction;
+    assert_eq!(
+        friction("model = \"stribeck\", mu_s = 0.7, mu_d = 0.3, v_s_m_s = 0.02"),
+        FrictionSpec::Stribeck { mu_s: 0.7, mu_d: 0.3, v_s_m_s: 0.02, mu_v_s_per_m: 0.0 }
+    );
+    assert_eq!(
+        friction("model = \"karnopp\", mu_s = 0.7, mu_d = 0.3"),
+        FrictionSpec::Karnopp { mu_s: 0.7, mu_d: 0.3, v_min_m_s: 0.005, mu_v_s_per_m: 0.0 }
+    );
+    assert_eq!(friction("model = \"dahl\", mu = 0.5"), FrictionSpec::Dahl { mu: 0.5 });
+    let (mu_s, mu_d, v_s_m_s) = (0.7, 0.3, 0.01);
+    assert_eq!(
+        friction("model = \"lugre\", mu_s = 0.7, mu_d = 0.3"),
+        FrictionSpec::LuGre { mu_s, mu_d, v_s_m_s, mu_v_s_per_m: 0.0, damping_n_s_per_m: 0.0 }
+    );
+    assert_eq!(
+        friction(
+            "model = \"lugre\", mu_s = 0.7, mu_d = 0.3, v_s_m_s = 1, mu_v_s_per_m = 2, damping_n_s_per_m = 3"
+        ),
+        FrictionSpec::LuGre { mu_s, mu_d, v_s_m_s: 1.0, mu_v_s_per_m: 2.0, damping_n_s_per_m: 3.0 }
+    );
+    assert_eq!(
+        friction("model = \"curve\", speed_m_s = [0, 0.1], mu = [0.5, 0.2], mu_s = 0.7"),
+        FrictionSpec::Curve { speed_m_s: vec![0.0, 0.1], mu: vec![0.5, 0.2], mu_s: 0.7 }
+    );
+    assert_eq!(
+        friction("model = \"curve\", speed_m_s = [0.1], mu = [0.5]"),
+        FrictionSpec::Curve { speed_m_s: vec![0.1], mu: vec![0.5], mu_s: 0.5 }
+    );
+    assert_eq!(
+        friction("model = \"bristle\", mu = 0.5"),
+        FrictionSpec::Bristle { mu: 0.5, bonds: 20, seed: 0 }
+    );
+    assert_eq!(
+        friction("model = \"reset-integrator\", mu_s = 0.7, mu_d = 0.3"),
+        FrictionSpec::ResetIntegrator { mu_s: 0.7, mu_d: 0.3, damping_n_s_per_m: 0.0 }
+    );
+    assert_eq!(
+        friction("model = \"hayward\", mu = 0.5"),
+        FrictionSpec::Hayward { mu: 0.5, stick_fraction: 0.5 }
+    );
+    assert_eq!(
+        friction("model = \"fixed-cone\", friction_n = 2"),
+        FrictionSpec::FixedCone { friction_n: 2.0, static_n: 2.0 }
     );
 }
 

@@ -12,7 +12,11 @@ fn a_value_of_the_wrong_type_is_named_with_what_was_found() {
         &with_shape("{ kind = \"sphere\", radius_m = true }"),
         "s.toml:4: entity[0].shape.radius_m: found the boolean true; allowed: a number above 0",
     );
-    refused(&with_shape("{ kind = 3 }"), "s.toml:4: entity[0].shape.kind: found 3; allowed: plane, sphere");
+    refused(
+        &with_shape("{ kind = 3 }"),
+        "s.toml:4: entity[0].shape.kind: found 3; allowed: plane, sphere, box, cylinder, cone, torus, capsule, \
+         ellipsoid, mesh",
+    );
     refused(
         &with_shape("\"sphere\""),
         "s.toml:4: entity[0].shape: found the string \"sphere\"; allowed: a table such as { kind \
@@ -266,5 +270,155 @@ fn master_and_camera_go_together() {
     layout_refused(
         "master = 0\nattached_to = \"camera\"\n[camera]\nmatrix = 1\n",
         "l.toml:4: camera.matrix: unknown key; allowed: position_m, orientation_wxyz",
+    );
+}
+
+#[test]
+fn a_size_that_no_shape_has_is_refused() {
+    for (shape, message) in [
+        ("{ kind = \"box\", size_m = [1, 0, 1] }", "size_m[1]: found 0; allowed: a number above 0"),
+        (
+            "{ kind = \"box\", size_m = [1, 1] }",
+            "size_m: found an array of length 2; allowed: an array of 3 numbers above 0",
+        ),
+        ("{ kind = \"box\", size_m = 1 }", "size_m: found 1; allowed: an array of 3 numbers above 0"),
+        (
+            "{ kind = \"cylinder\", radius_m = -1, length_m = 1 }",
+            "radius_m: found -1; allowed: a number above 0",
+        ),
+        (
+            "{ kind = \"cylinder\", radius_m = 1, length_m = 0 }",
+            "length_m: found 0; allowed: a number above 0",
+        ),
+        (
+            "{ kind = \"cone\", radius_bottom_m = 1, radius_top_m = -0.1, length_m = 1 }",
+            "radius_top_m: found -0.1; allowed: a number, 0 or more",
+        ),
+        (
+            "{ kind = \"cone\", radius_bottom_m = 0, radius_top_m = 0, length_m = 1 }",
+            "radius_top_m: found 0; allowed: a number above 0, since radius_bottom_m is 0",
+        ),
+        (
+            "{ kind = \"torus\", ring_radius_m = 1, tube_radius_m = 1 }",
+            "tube_radius_m: found 1; allowed: a number above 0 and below ring_radius_m = 1",
+        ),
+        (
+            "{ kind = \"capsule\", radius_m = 1, length_m = -1 }",
+            "length_m: found -1; allowed: a number, 0 or more",
+        ),
+        (
+            "{ kind = \"capsule\", radius_m = 0, length_m = 1 }",
+            "radius_m: found 0; allowed: a number above 0",
+        ),
+        (
+            "{ kind = \"ellipsoid\", radii_m = [1, nan, 1] }",
+            "radii_m[1]: found nan, which is not a finite number; allowed: a number above 0",
+        ),
+        (
+            "{ kind = \"mesh\", file = 1 }",
+            "file: found 1; allowed: the path of an OBJ or STL file, relative to this file",
+        ),
+        (
+            "{ kind = \"mesh\", file = \"\" }",
+            "file: found the string \"\"; allowed: the path of an OBJ or STL file, relative to this file",
+        ),
+        ("{ kind = \"mesh\", file = \"a.obj\", scale = 0 }", "scale: found 0; allowed: a number above 0"),
+        ("{ kind = \"sphere\", radius_m = 1, scale = -1 }", "scale: found -1; allowed: a number above 0"),
+        (
+            "{ kind = \"sphere\", radius_m = 1, scale = [1, 1, 0] }",
+            "scale[2]: found 0; allowed: a number above 0",
+        ),
+        (
+            "{ kind = \"sphere\", radius_m = 1, scale = [1, 1] }",
+            "scale: found an array of length 2; allowed: a number above 0, or an array of 3 numbers above 0",
+        ),
+        (
+            "{ kind = \"sphere\", radius_m = 1, scale = \"2\" }",
+            "scale: found the string \"2\"; allowed: a number above 0, or an array of 3 numbers above 0",
+        ),
+    ] {
+        refused(&with_shape(shape), &format!("s.toml:4: entity[0].shape.{message}"));
+    }
+}
+
+#[test]
+fn a_friction_that_no_surface_has_is_refused() {
+    for (friction, message) in [
+        ("model = \"stribeck\", mu_s = 0.5, mu_d = 0.3", "v_s_m_s: missing; allowed: a number above 0"),
+        (
+            "model = \"stribeck\", mu_s = 0.5, mu_d = 0.3, v_s_m_s = 0",
+            "v_s_m_s: found 0; allowed: a number above 0",
+        ),
+        (
+            "model = \"stribeck\", mu_s = 0.2, mu_d = 0.3, v_s_m_s = 1",
+            "mu_d: found 0.3; allowed: a number from 0 to mu_s = 0.2",
+        ),
+        ("model = \"karnopp\", mu_s = 0.5", "mu_d: missing; allowed: a number, 0 or more"),
+        (
+            "model = \"karnopp\", mu_s = 0.5, mu_d = 0.3, v_min_m_s = 0",
+            "v_min_m_s: found 0; allowed: a number above 0",
+        ),
+        ("model = \"dahl\"", "mu: missing; allowed: a number, 0 or more"),
+        ("model = \"dahl\", mu = 0.5, sigma = 1", "sigma: unknown key; allowed: model, mu"),
+        (
+            "model = \"lugre\", mu_s = 0.5, mu_d = 0.3, mu_v_s_per_m = -1",
+            "mu_v_s_per_m: found -1; allowed: a number, 0 or more",
+        ),
+        ("model = \"curve\", mu = [1]", "speed_m_s: missing; allowed: an array of rising numbers, 0 or more"),
+        (
+            "model = \"curve\", speed_m_s = [0]",
+            "mu: missing; allowed: an array with a coefficient for each speed",
+        ),
+        (
+            "model = \"curve\", speed_m_s = [], mu = []",
+            "speed_m_s: found an array of length 0; allowed: an array of numbers, 0 or more, with at least one of them",
+        ),
+        (
+            "model = \"curve\", speed_m_s = [0, 1], mu = [1]",
+            "mu: found an array of length 1; allowed: an array of 2 numbers, one for each of speed_m_s",
+        ),
+        (
+            "model = \"curve\", speed_m_s = [0, 1, 1], mu = [1, 1, 1]",
+            "speed_m_s: found an array of length 3; allowed: numbers, each larger than the one before",
+        ),
+        (
+            "model = \"curve\", speed_m_s = [-1], mu = [1]",
+            "speed_m_s[0]: found -1; allowed: a number, 0 or more",
+        ),
+        ("model = \"curve\", speed_m_s = [0], mu = [-1]", "mu[0]: found -1; allowed: a number, 0 or more"),
+        (
+            "model = \"curve\", speed_m_s = [0], mu = [0.5], mu_s = 0.4",
+            "mu_s: found 0.4; allowed: a number from the first of mu, 0.5, up",
+        ),
+        (
+            "model = \"bristle\", mu = 0.5, bonds = 21",
+            "bonds: found 21; allowed: a whole number from 1 to 20",
+        ),
+        (
+            "model = \"bristle\", mu = 0.5, bonds = 1.5",
+            "bonds: found 1.5; allowed: a whole number from 1 to 20",
+        ),
+        (
+            "model = \"hayward\", mu = 0.5, stick_fraction = 1",
+            "stick_fraction: found 1; allowed: a number from 0 up, below 1",
+        ),
+        (
+            "model = \"fixed-cone\", friction_n = 2, static_n = 1",
+            "static_n: found 1; allowed: a number from friction_n = 2 up",
+        ),
+        ("model = \"fixed-cone\", mu = 2", "mu: unknown key; allowed: model, friction_n, static_n"),
+    ] {
+        refused(
+            &with_entity(&format!("friction = {{ {friction} }}")),
+            &format!("s.toml:8: entity[0].friction.{message}"),
+        );
+    }
+    let rising: Vec<String> = (0..64).map(|i| i.to_string()).collect();
+    refused(
+        &with_entity(&format!(
+            "friction = {{ model = \"curve\", speed_m_s = [{}], mu = [1] }}",
+            rising.join(", ")
+        )),
+        "s.toml:8: entity[0].friction.speed_m_s: found an array of length 64; allowed: at most 63 numbers",
     );
 }

@@ -7,7 +7,7 @@ use world::Scene;
 use crate::{refused, with_entity, with_finger, with_shape, with_top};
 
 const ENTITY_KEYS: &str =
-    "name, shape, position_m, orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction";
+    "name, shape, position_m, orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction, algorithm";
 
 #[test]
 fn text_that_is_not_toml_is_refused_with_line_and_column() {
@@ -39,22 +39,22 @@ fn an_unknown_key_is_refused_with_what_was_probably_meant() {
     refused(
         &with_entity("colour = \"red\""),
         "s.toml:8: entity[0].colour: unknown key; allowed: name, shape, position_m, \
-         orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction",
+         orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction, algorithm",
     );
     refused(
         &with_entity("stifness_n_per_m = 1"),
         "s.toml:8: entity[0].stifness_n_per_m: unknown key (did you mean `stiffness_n_per_m`?); \
          allowed: name, shape, position_m, orientation_wxyz, stiffness_n_per_m, \
-         damping_n_s_per_m, friction",
+         damping_n_s_per_m, friction, algorithm",
     );
     refused(
         &with_entity("\"two words\" = 1"),
         "s.toml:8: entity[0].\"two words\": unknown key; allowed: name, shape, position_m, \
-         orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction",
+         orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction, algorithm",
     );
     refused(
         &with_shape("{ kind = \"sphere\", radius_m = 1, normal = [0, 1, 0] }"),
-        "s.toml:4: entity[0].shape.normal: unknown key; allowed: kind, radius_m",
+        "s.toml:4: entity[0].shape.normal: unknown key; allowed: kind, radius_m, scale",
     );
     refused(
         "[[finger]]\n[[entitys]]\n",
@@ -92,54 +92,93 @@ fn a_key_of_the_format_that_this_version_lacks_is_told_apart_from_an_unknown_one
         &with_entity("mass = 0.1"),
         "s.toml:8: entity[0].mass: unknown key (did you mean `mass_kg`, which is not available \
          in this version?); allowed: name, shape, position_m, orientation_wxyz, \
-         stiffness_n_per_m, damping_n_s_per_m, friction",
+         stiffness_n_per_m, damping_n_s_per_m, friction, algorithm",
     );
 }
+
+const KINDS: &str = "plane, sphere, box, cylinder, cone, torus, capsule, ellipsoid, mesh";
+const MODELS: &str = "none, coulomb, stiction, viscous, coulomb-viscous, stribeck, karnopp, dahl, lugre, curve, bristle, \
+                      reset-integrator, hayward, fixed-cone";
 
 #[test]
 fn a_shape_kind_that_this_version_lacks_is_told_apart_from_an_unknown_one() {
-    for kind in ["box", "cylinder", "cone", "torus", "capsule", "ellipsoid", "mesh", "nurbs", "csg"] {
+    for kind in ["nurbs", "csg"] {
         let message = format!(
             "s.toml:4: entity[0].shape.kind: shape kind `{kind}` is not available in this version; \
-             available: plane, sphere"
+             available: {KINDS}"
         );
         refused(&with_shape(&format!("{{ kind = \"{kind}\", size_m = [1, 1, 1] }}")), &message);
     }
+    let unknown =
+        |found: &str| format!("s.toml:4: entity[0].shape.kind: unknown shape kind {found}; allowed: {KINDS}");
     refused(
         &with_shape("{ kind = \"shpere\", radius_m = 1 }"),
-        "s.toml:4: entity[0].shape.kind: unknown shape kind `shpere` (did you mean `sphere`?); \
-         allowed: plane, sphere",
+        &unknown("`shpere` (did you mean `sphere`?)"),
     );
     refused(
-        &with_shape("{ kind = \"boxx\" }"),
-        "s.toml:4: entity[0].shape.kind: unknown shape kind `boxx` (did you mean `box`, which is \
-         not available in this version?); allowed: plane, sphere",
+        &with_shape("{ kind = \"nurb\" }"),
+        &unknown("`nurb` (did you mean `nurbs`, which is not available in this version?)"),
+    );
+    refused(&with_shape("{ kind = \"Mesh\" }"), &unknown("`Mesh` (did you mean `mesh`?)"));
+    refused(&with_shape("{ kind = \"a\\nb\" }"), &unknown("`a\\nb`"));
+}
+
+#[test]
+fn an_unknown_friction_model_is_refused_with_what_was_probably_meant() {
+    let unknown = |found: &str| {
+        format!("s.toml:8: entity[0].friction.model: unknown friction model {found}; allowed: {MODELS}")
+    };
+    refused(
+        &with_entity("friction = { model = \"Coulomb\", mu = 1 }"),
+        &unknown("`Coulomb` (did you mean `coulomb`?)"),
+    );
+    refused(&with_entity("friction = { model = \"glue\" }"), &unknown("`glue`"));
+}
+
+#[test]
+fn an_unknown_algorithm_is_refused_with_what_was_probably_meant() {
+    refused(
+        &with_entity("algorithm = \"vectorfield\""),
+        "s.toml:8: entity[0].algorithm: unknown algorithm `vectorfield` (did you mean `vector-field`?); allowed: \
+         friction-cone, vector-field, classic",
     );
     refused(
-        &with_shape("{ kind = \"a\\nb\" }"),
-        "s.toml:4: entity[0].shape.kind: unknown shape kind `a\\nb`; allowed: plane, sphere",
+        &with_entity("algorithm = 1"),
+        "s.toml:8: entity[0].algorithm: found 1; allowed: friction-cone, vector-field, classic",
     );
 }
 
 #[test]
-fn a_friction_model_that_this_version_lacks_is_told_apart_from_an_unknown_one() {
-    for model in ["stribeck", "karnopp", "dahl", "lugre", "curve"] {
-        let message = format!(
-            "s.toml:8: entity[0].friction.model: friction model `{model}` is not available in this \
-             version; available: none, coulomb, stiction, viscous, coulomb-viscous"
-        );
-        refused(&with_entity(&format!("friction = {{ model = \"{model}\" }}")), &message);
+fn each_shape_knows_its_own_keys() {
+    for (shape, message) in [
+        ("{ kind = \"box\", radius_m = 1 }", "radius_m: unknown key; allowed: kind, size_m, scale"),
+        (
+            "{ kind = \"cylinder\", radius_m = 1, length = 1 }",
+            "length: unknown key (did you mean `length_m`?); allowed: kind, radius_m, length_m, scale",
+        ),
+        (
+            "{ kind = \"cone\", radius_m = 1 }",
+            "radius_m: unknown key; allowed: kind, radius_bottom_m, radius_top_m, length_m, scale",
+        ),
+        (
+            "{ kind = \"torus\", radius_m = 1 }",
+            "radius_m: unknown key; allowed: kind, ring_radius_m, tube_radius_m, scale",
+        ),
+        ("{ kind = \"ellipsoid\", size_m = 1 }", "size_m: unknown key; allowed: kind, radii_m, scale"),
+        ("{ kind = \"mesh\", path = \"a.obj\" }", "path: unknown key; allowed: kind, file, scale"),
+        ("{ kind = \"cylinder\", radius_m = 1 }", "length_m: missing; allowed: a number above 0"),
+        ("{ kind = \"cone\", radius_bottom_m = 1 }", "radius_top_m: missing; allowed: a number, 0 or more"),
+        ("{ kind = \"torus\", ring_radius_m = 1 }", "tube_radius_m: missing; allowed: a number above 0"),
+        ("{ kind = \"capsule\", radius_m = 1 }", "length_m: missing; allowed: a number, 0 or more"),
+        ("{ kind = \"box\" }", "size_m: missing; allowed: an array of 3 numbers above 0"),
+        ("{ kind = \"ellipsoid\" }", "radii_m: missing; allowed: an array of 3 numbers above 0"),
+        (
+            "{ kind = \"mesh\" }",
+            "file: missing; allowed: the path of an OBJ or STL file, relative to this file",
+        ),
+    ] {
+        refused(&with_shape(shape), &format!("s.toml:4: entity[0].shape.{message}"));
     }
-    refused(
-        &with_entity("friction = { model = \"Coulomb\", mu = 1 }"),
-        "s.toml:8: entity[0].friction.model: unknown friction model `Coulomb` (did you mean \
-         `coulomb`?); allowed: none, coulomb, stiction, viscous, coulomb-viscous",
-    );
-    refused(
-        &with_entity("friction = { model = \"glue\" }"),
-        "s.toml:8: entity[0].friction.model: unknown friction model `glue`; allowed: none, \
-         coulomb, stiction, viscous, coulomb-viscous",
-    );
 }
 
 #[test]
@@ -151,7 +190,8 @@ fn a_missing_key_is_named_with_what_may_stand_there() {
     );
     refused(
         &with_shape("{ radius_m = 1 }"),
-        "s.toml:4: entity[0].shape.kind: missing; allowed: plane, sphere",
+        "s.toml:4: entity[0].shape.kind: missing; allowed: plane, sphere, box, cylinder, cone, torus, capsule, \
+         ellipsoid, mesh",
     );
     refused(
         &with_shape("{ kind = \"sphere\" }"),
@@ -168,7 +208,7 @@ fn a_missing_key_is_named_with_what_may_stand_there() {
     refused(
         &with_entity("friction = { mu = 0.5 }"),
         "s.toml:8: entity[0].friction.model: missing; allowed: none, coulomb, stiction, viscous, \
-         coulomb-viscous",
+         coulomb-viscous, stribeck, karnopp, dahl, lugre, curve, bristle, reset-integrator, hayward, fixed-cone",
     );
     refused(
         &with_entity("friction = { model = \"stiction\", mu_s = 0.5 }"),

@@ -1,0 +1,104 @@
+//! The meshes of a scene: each file is read and built once for all entities that use it alike.
+//!
+//! What was repaired is told once, what cannot be used is refused with the place in the scene and in the model.
+
+use super::RigError;
+use haptics::mesh::{Mesh, MeshError, MeshReport, TriangleSoup};
+use io_driver::say::say;
+use nalgebra::Vector3;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use world::model::{self, Format, ModelError};
+use world::{MeshSpec, Scene, ShapeSpec};
+
+/// From this size on it takes so long that somebody wonders: a third of a million triangles.
+const WORTH_A_LINE_BYTES: usize = 16 << 20;
+
+/// Meshes that are ready to be touched.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Models {
+    meshes: BTreeMap<Key, Arc<Mesh>>,
+}
+
+/// A file, and the bits of the factors along its axes.
+type Key = (PathBuf, [u64; 3]);
+
+impl Models {
+    /// Loads every mesh that the scene's entities use.
+    pub(super) fn load(scene: &Scene) -> Result<Self, RigError> {
+        let mut models = Self::default();
+        for entity in &scene.entities {
+            let ShapeSpec::Mesh(spec) = &entity.shape else { continue };
+            let key = key_of(spec);
+            if !models.meshes.contains_key(&key) {
+                models.meshes.insert(key, Arc::new(build(spec)?));
+            }
+        }
+        Ok(models)
+    }
+
+    /// A mesh that was loaded.
+    pub(super) fn mesh(&self, spec: &MeshSpec) -> Option<&Arc<Mesh>> {
+        self.meshes.get(&key_of(spec))
+    }
+}
+
+fn key_of(spec: &MeshSpec) -> Key {
+    (spec.file.clone(), spec.scale.map(f64::to_bits))
+}
+
+fn build(spec: &MeshSpec) -> Result<Mesh, RigError> {
+    let file = &spec.file;
+    let soup = read(file).map_err(|source| RigError::Model {
+        at: Box::new(spec.at.clone()),
+        file: file.clone(),
+        source,
+    })?;
+    let (mesh, report) = Mesh::build(scaled(soup, &spec.scale)).map_err(|source| RigError::Mesh {
+        at: Box::new(spec.at.clone()),
+        file: file.clone(),
+        place: place_of(&source, file),
+        source,
+    })?;
+    tell(file, &report);
+    Ok(mesh)
+}
+
+fn read(file: &Path) -> Result<TriangleSoup, ModelError> {
+    let bytes = model::read_file(file)?;
+    if bytes.len() >= WORTH_A_LINE_BYTES {
+        say(format_args!("phantom3: loading {} ({} MB)", file.display(), bytes.len() / 1_000_000));
+    }
+    model::read(file, &bytes)
+}
+
+fn scaled(mut soup: TriangleSoup, scale: &[f64; 3]) -> TriangleSoup {
+    if *scale != [1.0; 3] {
+        let scale = Vector3::from(*scale);
+        soup.vertices.iter_mut().for_each(|vertex| vertex.component_mul_assign(&scale));
+    }
+    soup
+}
+
+/// A mesh knows its faces by number, an author his text by line.
+fn place_of(error: &MeshError, file: &Path) -> String {
+    let MeshError::NonManifold { first_face, .. } = error else { return String::new() };
+    let line = model::read_file(file).ok().and_then(|bytes| {
+        (Format::of(file, &bytes) == Some(Format::Obj))
+            .then(|| model::line_of_face(&bytes, *first_face))
+            .flatten()
+    });
+    line.map_or_else(String::new, |line| format!(" (face {first_face} is on line {line})"))
+}
+
+/// Nothing about a mesh without defects.
+fn tell(file: &Path, report: &MeshReport) {
+    if report.is_clean() {
+        return;
+    }
+    for (index, line) in report.to_string().lines().enumerate() {
+        let indent = if index == 0 { "" } else { "  " };
+        say(format_args!("phantom3: {}: {indent}{line}", file.display()));
+    }
+}

@@ -1,0 +1,171 @@
+//! Triangles from model files: Wavefront OBJ and STL.
+//!
+//! Problem: such files come from everywhere, are cut short by full disks and written by programs that take liberties.
+//! Whoever gets a message must find the place in a file of a million lines.
+//!
+//! Model: [`load`] opens the file; [`read_obj`] and [`read_stl`] take bytes. Nothing in a file is believed: every number
+//! is checked to be one, every index to be in range, every length against what is there. What a reader returns is a
+//! [`TriangleSoup`] with finite coordinates and valid indices; whether it makes a mesh is
+//! [`haptics::mesh::Mesh::build`]'s business.
+//!
+//! Why parsers of our own: `tobj` 4.0 names neither line nor offender and cuts a concave polygon as a fan; `stl_io` 0.11
+//! takes a binary file whose header begins with "solid", which is common, for text.
+//!
+//! Units: the file's own; a scene's `scale` makes metres of them.
+//! Cost: one pass; a million triangles take a fraction of a second.
+
+mod obj;
+mod polygon;
+mod stl;
+
+pub use obj::{line_of_face, read_obj};
+pub use stl::read_stl;
+
+use haptics::mesh::TriangleSoup;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+
+/// The most a model file may have: a binary STL of twenty million triangles. The bound is there so that naming the
+/// wrong file ends in a message.
+pub const MAX_MODEL_BYTES: u64 = 1 << 30;
+
+/// Why a model file was refused. The file itself is named by whoever asked for it.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ModelError {
+    /// There is no such file.
+    #[error("no such file; name an existing OBJ or STL file")]
+    NotFound,
+    /// The file is there, but the system does not let us read it.
+    #[error("cannot be read: {0}")]
+    Unreadable(#[source] io::Error),
+    /// A directory, a pipe or a device.
+    #[error("not a regular file; name an OBJ or STL file")]
+    NotAFile,
+    /// Larger than any model we build.
+    #[error("{bytes} bytes; allowed: at most {limit_bytes}")]
+    TooLarge {
+        /// How large it is.
+        bytes: u64,
+        /// The most that is read.
+        limit_bytes: u64,
+    },
+    /// Neither its name nor its content says what it is.
+    #[error(
+        "neither OBJ nor STL by its name, and it begins like neither; allowed: a file of one of these kinds"
+    )]
+    UnknownFormat,
+    /// Something wrong in a text.
+    #[error("line {line}: found {found}; allowed: {allowed}")]
+    Line {
+        /// Counted from 1.
+        line: usize,
+        /// What was found.
+        found: String,
+        /// What may stand there.
+        allowed: String,
+    },
+    /// Something wrong in a binary file.
+    #[error("byte {offset}: found {found}; allowed: {allowed}")]
+    Byte {
+        /// Counted from 0.
+        offset: usize,
+        /// What was found.
+        found: String,
+        /// What may stand there.
+        allowed: String,
+    },
+    /// There is nothing to touch in it.
+    #[error("found no triangle in it; allowed: at least one")]
+    NoTriangle,
+}
+
+/// How a model is written down.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// Wavefront OBJ: text.
+    Obj,
+    /// STL: text or binary.
+    Stl,
+}
+
+impl Format {
+    /// By the file's ending, in any case; where that says nothing, by its content.
+    pub fn of(file: &Path, bytes: &[u8]) -> Option<Self> {
+        let ending = file.extension().unwrap_or_default();
+        if ending.eq_ignore_ascii_case("obj") {
+            Some(Self::Obj)
+        } else if ending.eq_ignore_ascii_case("stl") || stl::looks_like_stl(bytes) {
+            Some(Self::Stl)
+        } else {
+            obj::looks_like_obj(bytes).then_some(Self::Obj)
+        }
+    }
+}
+
+/// The bytes of a model file.
+///
+/// # Errors
+/// The file cannot be read, is none, or is too large.
+pub fn read_file(file: &Path) -> Result<Vec<u8>, ModelError> {
+    let metadata = file.metadata().map_err(unreadable)?;
+    if !metadata.is_file() {
+        return Err(ModelError::NotAFile);
+    }
+    check_size(metadata.len())?;
+    let mut bytes = Vec::with_capacity(metadata.len() as usize + 1);
+    // A file that grows while it is read must not fill the memory either.
+    File::open(file)
+        .and_then(|file| file.take(MAX_MODEL_BYTES + 1).read_to_end(&mut bytes))
+        .map_err(unreadable)?;
+    check_size(bytes.len() as u64)?;
+    Ok(bytes)
+}
+
+fn check_size(bytes: u64) -> Result<(), ModelError> {
+    if bytes <= MAX_MODEL_BYTES {
+        return Ok(());
+    }
+    Err(ModelError::TooLarge { bytes, limit_bytes: MAX_MODEL_BYTES })
+}
+
+/// The triangles in `bytes`, whose format `file`'s name or they themselves say.
+///
+/// # Errors
+/// The first thing found to be wrong, with its place.
+pub fn read(file: &Path, bytes: &[u8]) -> Result<TriangleSoup, ModelError> {
+    match Format::of(file, bytes).ok_or(ModelError::UnknownFormat)? {
+        Format::Obj => read_obj(bytes),
+        Format::Stl => read_stl(bytes),
+    }
+}
+
+/// The triangles in the file `file`.
+///
+/// # Errors
+/// As [`read_file`] and [`read`].
+pub fn load(file: &Path) -> Result<TriangleSoup, ModelError> {
+    read(file, &read_file(file)?)
+}
+
+fn unreadable(cause: io::Error) -> ModelError {
+    match cause.kind() {
+        io::ErrorKind::NotFound => ModelError::NotFound,
+        _ => ModelError::Unreadable(cause),
+    }
+}
+
+/// A number of a text file; not a number and infinity are none.
+fn number(word: &[u8]) -> Option<f64> {
+    let number: f64 = std::str::from_utf8(word).ok()?.parse().ok()?;
+    number.is_finite().then_some(number)
+}
+
+/// A piece of a file, short enough and harmless for a message.
+fn shown(bytes: &[u8]) -> String {
+    const LONGEST_BYTES: usize = 40;
+    let (shown, rest) = bytes.split_at(bytes.len().min(LONGEST_BYTES));
+    let dots = if rest.is_empty() { "" } else { "..." };
+    format!("`{}{dots}`", shown.escape_ascii())
+}

@@ -1,0 +1,265 @@
+//! Wavefront OBJ: vertices and polygons.
+//!
+//! Read: `v x y z` (with a weight or a colour behind it, ignored) and `f` with three or more corners `a`, `a/b`, `a//c`
+//! or `a/b/c`; negative indices count back from the last vertex. Polygons are divided into triangles. Ignored: texture
+//! coordinates, normals, groups, materials (their file need not be there), lines and points. Refused: free-form curves
+//! and surfaces, which have no polygons.
+//!
+//! A face may name a vertex that comes later in the file, so polygons are divided when all vertices are known.
+
+use super::polygon::{MAX_CONCAVE_CORNERS, triangulate};
+use super::{ModelError, number, shown};
+use haptics::mesh::TriangleSoup;
+use nalgebra::Vector3;
+use std::borrow::Cow;
+
+/// Reads an OBJ file.
+///
+/// # Errors
+/// The first thing found to be wrong, with its line.
+pub fn read_obj(bytes: &[u8]) -> Result<TriangleSoup, ModelError> {
+    let Polygons { vertices, corners, polygons } = Polygons::read(bytes)?;
+    let mut faces = Vec::with_capacity(polygons.len());
+    let mut begin = 0;
+    for Polygon { line, end } in polygons {
+        let corners = &corners[begin..end as usize];
+        triangulate(corners, &vertices, &mut faces)
+            .ok_or_else(|| indivisible(line as usize, corners.len()))?;
+        begin = end as usize;
+    }
+    if faces.is_empty() { Err(ModelError::NoTriangle) } else { Ok(TriangleSoup { vertices, faces }) }
+}
+
+/// The line on which the polygon begins that became triangle `face` (counted from 0) of what [`read_obj`] returns.
+///
+/// For messages: it reads the file once more.
+pub fn line_of_face(bytes: &[u8], face: usize) -> Option<usize> {
+    let mut triangles = 0;
+    let mut begin = 0;
+    for Polygon { line, end } in Polygons::read(bytes).ok()?.polygons {
+        triangles += (end - begin) as usize - 2;
+        if face < triangles {
+            return Some(line as usize);
+        }
+        begin = end;
+    }
+    None
+}
+
+/// Whether a file without a name would be taken for OBJ.
+pub(super) fn looks_like_obj(bytes: &[u8]) -> bool {
+    let text = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
+    let mut lines = text.split(|&byte| byte == b'\n').take(1000);
+    let first = lines.find_map(|line| words(line).next());
+    first.is_some_and(|word| word == b"v" || word == b"f" || IGNORED.contains(&word))
+}
+
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
+const IGNORED: [&[u8]; 18] = [
+    b"vt",
+    b"vn",
+    b"o",
+    b"g",
+    b"s",
+    b"mg",
+    b"l",
+    b"p",
+    b"usemtl",
+    b"mtllib",
+    b"usemap",
+    b"maplib",
+    b"shadow_obj",
+    b"trace_obj",
+    b"bevel",
+    b"c_interp",
+    b"d_interp",
+    b"lod",
+];
+const FREE_FORM: [&[u8]; 19] = [
+    b"cstype", b"deg", b"bmat", b"step", b"curv", b"curv2", b"surf", b"parm", b"trim", b"hole", b"scrv",
+    b"sp", b"end", b"con", b"vp", b"ctech", b"stech", b"bzp", b"bsp",
+];
+
+/// A face of the file.
+struct Polygon {
+    line: u32,
+    /// Behind its last corner.
+    end: u32,
+}
+
+/// What the file says, before polygons become triangles.
+#[derive(Default)]
+struct Polygons {
+    vertices: Vec<Vector3<f64>>,
+    /// Of all polygons, one after another.
+    corners: Vec<u32>,
+    polygons: Vec<Polygon>,
+}
+
+impl Polygons {
+    fn read(bytes: &[u8]) -> Result<Self, ModelError> {
+        let mut read = Self::default();
+        // Lines and indices of corners whose vertices have not come yet.
+        let mut awaited = Vec::new();
+        for (line, statement) in Statements::new(bytes) {
+            let mut words = words(&statement);
+            match words.next() {
+                Some(b"v") => read.vertices.push(vertex(line, words)?),
+                Some(b"f" | b"fo") => read.polygon(line, words, &mut awaited)?,
+                Some(word) if FREE_FORM.contains(&word) => return Err(free_form(line, word)),
+                Some(word) if !IGNORED.contains(&word) => return Err(unknown(line, word)),
+                _ => {}
+            }
+        }
+        let count = read.vertices.len();
+        match awaited.into_iter().find(|(_, index)| *index as usize >= count) {
+            Some((line, index)) => Err(out_of_range(line, &(u64::from(index) + 1).to_string(), count)),
+            None => Ok(read),
+        }
+    }
+
+    fn polygon<'l>(
+        &mut self,
+        line: usize,
+        words: impl Iterator<Item = &'l [u8]>,
+        awaited: &mut Vec<(usize, u32)>,
+    ) -> Result<(), ModelError> {
+        let begin = self.corners.len();
+        for word in words {
+            let index = self.index(line, word)?;
+            if index as usize >= self.vertices.len() {
+                awaited.push((line, index));
+            }
+            self.corners.push(index);
+        }
+        let count = self.corners.len() - begin;
+        if count < 3 {
+            let found = format!("a face of {count} corners");
+            return Err(ModelError::Line { line, found, allowed: "three corners or more".into() });
+        }
+        self.polygons.push(Polygon { line: line as u32, end: self.corners.len() as u32 });
+        Ok(())
+    }
+
+    /// The vertex that a corner such as `7`, `-1/2` or `7//3` names, counted from 0. It may not have come yet.
+    fn index(&self, line: usize, word: &[u8]) -> Result<u32, ModelError> {
+        let mut parts = word.split(|&byte| byte == b'/');
+        let vertex = parts.next().and_then(integer);
+        let others_are_sound =
+            parts.clone().count() <= 2 && parts.all(|part| part.is_empty() || integer(part).is_some());
+        let Some(number) = vertex.filter(|_| others_are_sound) else {
+            let allowed = "corners such as 7, 7/2, 7//3 or 7/2/3 in whole numbers".into();
+            return Err(ModelError::Line { line, found: shown(word), allowed });
+        };
+        let count = self.vertices.len();
+        let index = match number {
+            1.. => u32::try_from(number - 1).ok(),
+            0 => None,
+            // Counted back from the last vertex so far.
+            _ => usize::try_from(count as i64 + number).ok().map(|index| index as u32),
+        };
+        index.ok_or_else(|| out_of_range(line, &number.to_string(), count))
+    }
+}
+
+/// A whole number of a few digits; none is longer in a file that we read.
+fn integer(word: &[u8]) -> Option<i64> {
+    let (sign, digits) = match word {
+        [b'-', digits @ ..] => (-1, digits),
+        [b'+', digits @ ..] => (1, digits),
+        digits => (1, digits),
+    };
+    let is_number = (1..=15).contains(&digits.len()) && digits.iter().all(u8::is_ascii_digit);
+    is_number.then(|| sign * digits.iter().fold(0, |sum, digit| 10 * sum + i64::from(digit - b'0')))
+}
+
+/// Three coordinates; a weight, or a colour, may follow.
+fn vertex<'l>(line: usize, words: impl Iterator<Item = &'l [u8]>) -> Result<Vector3<f64>, ModelError> {
+    let mut coordinates = [0.0; 3];
+    let mut count = 0;
+    for word in words {
+        let Some(number) = number(word) else {
+            return Err(ModelError::Line { line, found: shown(word), allowed: "a finite number".into() });
+        };
+        if let Some(coordinate) = coordinates.get_mut(count) {
+            *coordinate = number;
+        }
+        count += 1;
+    }
+    if [3, 4, 6, 7].contains(&count) {
+        return Ok(coordinates.into());
+    }
+    let allowed = "three coordinates, and perhaps a weight or a colour behind them".into();
+    Err(ModelError::Line { line, found: format!("a vertex of {count} numbers"), allowed })
+}
+
+fn out_of_range(line: usize, index: &str, vertices: usize) -> ModelError {
+    let allowed = match vertices {
+        0 => "a vertex, but there is none".into(),
+        count => format!("1 to {count}, or -{count} to -1, since there are {count} vertices"),
+    };
+    ModelError::Line { line, found: format!("vertex {index}"), allowed }
+}
+
+fn free_form(line: usize, word: &[u8]) -> ModelError {
+    let found = format!("{}, which belongs to free-form curves and surfaces", shown(word));
+    let allowed = "polygons (`v` and `f`): export the model as a mesh".into();
+    ModelError::Line { line, found, allowed }
+}
+
+fn unknown(line: usize, word: &[u8]) -> ModelError {
+    let allowed = "statements of OBJ, such as `v`, `f`, `vn`, `g` or `usemtl`, or a comment after `#`".into();
+    ModelError::Line { line, found: shown(word), allowed }
+}
+
+fn indivisible(line: usize, corners: usize) -> ModelError {
+    let allowed = format!(
+        "faces whose outline does not cross itself, with at most {MAX_CONCAVE_CORNERS} corners where they are concave; \
+         export the model as triangles"
+    );
+    ModelError::Line { line, found: format!("a face of {corners} corners that cannot be divided"), allowed }
+}
+
+/// The words of a statement, up to a comment.
+fn words(statement: &[u8]) -> impl Iterator<Item = &[u8]> {
+    let code = statement.split(|&byte| byte == b'#').next().unwrap_or_default();
+    code.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
+}
+
+/// Lines with their numbers, counted from 1; one that ends in a backslash goes on in the next.
+struct Statements<'t> {
+    /// What has not been read.
+    rest: Option<&'t [u8]>,
+    line: usize,
+}
+
+impl<'t> Statements<'t> {
+    fn new(bytes: &'t [u8]) -> Self {
+        Self { rest: Some(bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes)), line: 0 }
+    }
+
+    fn next_line(&mut self) -> Option<&'t [u8]> {
+        let rest = self.rest?;
+        let end = rest.iter().position(|&byte| byte == b'\n');
+        self.rest = end.map(|end| &rest[end + 1..]);
+        self.line += 1;
+        Some(rest[..end.unwrap_or(rest.len())].trim_ascii_end())
+    }
+}
+
+impl<'t> Iterator for Statements<'t> {
+    type Item = (usize, Cow<'t, [u8]>);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let mut statement = Cow::Borrowed(self.next_line()?);
+        let begin = self.line;
+        while statement.ends_with(b"\\") {
+            let whole = statement.to_mut();
+            whole.pop();
+            whole.push(b' ');
+            whole.extend_from_slice(self.next_line().unwrap_or_default());
+        }
+        Some((begin, statement))
+    }
+}

@@ -1,0 +1,81 @@
+//! Whatever the bytes, a model file ends in triangles with valid indices or in a short message.
+
+use haptics::mesh::TriangleSoup;
+use proptest::prelude::*;
+use world::model::{ModelError, line_of_face, read_obj, read_stl};
+
+#[path = "../examples/make_mesh/written.rs"]
+mod written;
+
+fn ends_well(bytes: &[u8]) {
+    for read in [read_obj, read_stl] {
+        check(read(bytes));
+    }
+    if let Ok(soup) = read_obj(bytes) {
+        assert!(line_of_face(bytes, soup.faces.len() - 1).is_some());
+        assert_eq!(line_of_face(bytes, soup.faces.len()), None);
+    }
+}
+
+fn check(read: Result<TriangleSoup, ModelError>) {
+    match read {
+        Ok(soup) => {
+            assert!(!soup.faces.is_empty());
+            assert!(soup.vertices.iter().flatten().all(|x| x.is_finite()));
+            assert!(soup.faces.iter().flatten().all(|index| (*index as usize) < soup.vertices.len()));
+        }
+        Err(error) => {
+            let message = error.to_string();
+            assert!(message.len() < 400 && !message.contains('\n'), "{message}");
+        }
+    }
+}
+
+/// A small mesh in each format.
+fn good() -> impl Strategy<Value = Vec<u8>> {
+    let formats = [written::Format::Obj, written::Format::Stl, written::Format::StlText];
+    let (_, number, make) = written::KINDS[5];
+    prop::sample::select(formats.map(|format| format.write(&make(number, 0.04))).to_vec())
+}
+
+fn piece() -> impl Strategy<Value = Vec<u8>> {
+    let words = "v |f |vt |solid |facet |normal |outer |loop |vertex |endloop |endfacet |endsolid |0 |1 |-1 |2/1 |3//3 |\
+                 1e308 |-1e308 |5e-324 |nan |\n|\r\n|\\\n|#|/|\0|\u{feff}|-99 |12345678901234567890 ";
+    let words: Vec<Vec<u8>> = words.split('|').map(|word| word.as_bytes().to_vec()).collect();
+    prop_oneof![4 => prop::sample::select(words), 1 => prop::collection::vec(any::<u8>(), 0..9)]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(1000) })]
+
+    #[test]
+    fn any_bytes_end_in_triangles_or_a_message(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
+        ends_well(&bytes);
+    }
+
+    #[test]
+    fn any_row_of_pieces_ends_in_triangles_or_a_message(pieces in prop::collection::vec(piece(), 0..60)) {
+        ends_well(&pieces.concat());
+    }
+
+    #[test]
+    fn a_good_model_spoilt_anywhere_ends_in_triangles_or_a_message(
+        bytes in good(),
+        changes in prop::collection::vec((any::<prop::sample::Index>(), 0usize..9, piece()), 1..4),
+    ) {
+        let spoilt = changes.iter().fold(bytes, |bytes, (at, cut, with)| {
+            let at = at.index(bytes.len() + 1);
+            let rest = bytes.get(at + cut..).unwrap_or_default();
+            [&bytes[..at], with, rest].concat()
+        });
+        ends_well(&spoilt);
+    }
+
+    #[test]
+    fn a_good_model_cut_anywhere_ends_in_triangles_or_a_message(
+        bytes in good(),
+        at in any::<prop::sample::Index>(),
+    ) {
+        ends_well(&bytes[..at.index(bytes.len())]);
+    }
+}

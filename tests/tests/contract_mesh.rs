@@ -1,0 +1,406 @@
+//! Meshes, felt through scene file, model file, hand file and recording alone; and files that are none.
+
+use haptics::mesh::{TriangleSoup, make};
+use nalgebra::Vector3;
+use system_tests::recording::Sample;
+use system_tests::workplace::{Said, Workplace, hand};
+use written::Format;
+
+#[path = "../../app/world/examples/make_mesh/written.rs"]
+mod written;
+
+/// A scene around one thing.
+fn scene(shape: &str, rest: &str) -> String {
+    format!(
+        "[[finger]]\nstart_m = [0.0, 0.2, 0.0]\n[[entity]]\nname = \"thing\"\n\
+         shape = {{ {shape} }}\nstiffness_n_per_m = 1000.0\n{rest}"
+    )
+}
+
+fn mesh(file: &str) -> String {
+    scene(&format!("kind = \"mesh\", file = \"{file}\""), "")
+}
+
+/// Plays a scene beside these files; nothing may be said on standard error.
+fn felt_with(files: &[(&str, &[u8])], scene: &str, path: &str) -> Vec<Sample> {
+    let place = Workplace::new();
+    for (name, bytes) in files {
+        place.write(name, bytes);
+    }
+    let samples = place.play(scene, path, &[]).finger("f0");
+    samples.iter().for_each(Sample::check);
+    samples
+}
+
+/// A cube whose corners are exact in binary, in single precision and in decimals.
+const HALF_M: f64 = 0.03125;
+
+fn cube() -> TriangleSoup {
+    make::cuboid([2.0 * HALF_M; 3])
+}
+
+/// Over the top of the cube, across an edge of it, along its side, and away.
+fn around_the_cube() -> String {
+    hand([
+        (0.0, [0.003, 0.04, 0.002]),
+        (0.2, [0.003, 0.0285, 0.002]),
+        (0.6, [-0.013, 0.0281, 0.017]),
+        (1.2, [0.0271, 0.0277, 0.011]),
+        (1.6, [0.0302, 0.0269, 0.008]),
+        (2.4, [0.0287, -0.0151, -0.013]),
+        (2.6, [0.0411, -0.0151, -0.013]),
+    ])
+}
+
+const FRICTIONS: [&str; 3] = [
+    "",
+    "friction = { model = \"coulomb\", mu = 0.5 }\n",
+    "friction = { model = \"stiction\", mu_s = 0.6, mu_d = 0.3 }\n",
+];
+
+#[test]
+fn a_cube_of_triangles_feels_like_a_box_tick_by_tick() {
+    let obj = Format::Obj.write(&cube());
+    for friction in FRICTIONS {
+        let of_triangles = scene("kind = \"mesh\", file = \"cube.obj\"", friction);
+        let of_equations = scene("kind = \"box\", size_m = [0.0625, 0.0625, 0.0625]", friction);
+        let path = around_the_cube();
+        let meshes = felt_with(&[("cube.obj", &obj)], &of_triangles, &path);
+        let boxes = felt_with(&[], &of_equations, &path);
+        let touching = boxes.iter().filter(|s| s.touches()).count();
+        assert!(touching > 2000, "{touching}");
+        for (mesh, box_) in meshes.iter().zip(&boxes) {
+            // Both slides are exact but for rounding of centimetres, times the stiffness.
+            let difference_n = (mesh.force - box_.force).norm();
+            assert!(difference_n <= 1e-9, "{friction}: {difference_n} N apart\nmesh {mesh:?}\nbox  {box_:?}");
+            assert_eq!(mesh.friction, box_.friction, "mesh {mesh:?}\nbox  {box_:?}");
+        }
+    }
+}
+
+#[test]
+fn obj_and_both_kinds_of_stl_give_the_same_recording() {
+    let path = around_the_cube();
+    let play = |name: &str, format: Format| {
+        let place = Workplace::new();
+        place.write(name, format.write(&cube()));
+        place.play(&scene(&format!("kind = \"mesh\", file = \"{name}\""), FRICTIONS[2]), &path, &[]);
+        std::fs::read(place.path("out.csv")).expect("a recording")
+    };
+    let obj = play("cube.obj", Format::Obj);
+    assert!(obj == play("cube.stl", Format::Stl), "binary STL");
+    assert!(obj == play("cube.STL", Format::StlText), "text STL");
+    // Names that say nothing.
+    assert!(obj == play("cube", Format::Obj), "OBJ by content");
+    assert!(obj == play("cube.mesh", Format::Stl), "binary STL by content");
+    assert!(obj == play("obj", Format::StlText), "text STL by content");
+}
+
+#[test]
+fn a_quad_obj_with_negative_indices_is_the_same_cube() {
+    let mut obj = String::from("# six quads\r\nmtllib nowhere.mtl\r\no cube\r\n");
+    for corner in 0..8 {
+        let side = |bit: u32| if corner >> bit & 1 == 1 { HALF_M } else { -HALF_M };
+        obj += &format!("v {} {} {} 1.0\r\n", side(0), side(1), side(2));
+    }
+    for quad in
+        ["-8 -6 -5 -7", "5/1/1 6/2/1 8/3/1 7/4/1", "1//2 2//2 6//2 5//2", "3 7 8 4", "1 5 7 3", "2 4 8 6"]
+    {
+        obj += &format!("f {quad}\r\n");
+    }
+    let path = around_the_cube();
+    let quads = felt_with(&[("cube.obj", obj.as_bytes())], &mesh("cube.obj"), &path);
+    let triangles = felt_with(&[("cube.obj", &Format::Obj.write(&cube()))], &mesh("cube.obj"), &path);
+    for (a, b) in quads.iter().zip(&triangles) {
+        // Its diagonals may run the other way, which changes roundings.
+        assert!((a.force - b.force).norm() <= 1e-9, "{a:?}\n{b:?}");
+    }
+}
+
+#[test]
+fn scale_makes_metres_of_millimetres_and_stretches_along_the_axes() {
+    let path = around_the_cube();
+    let metres = felt_with(&[("a.obj", &Format::Obj.write(&cube()))], &mesh("a.obj"), &path);
+    let as_said = |bytes: &[u8], scale: &str| {
+        let scene = scene(&format!("kind = \"mesh\", file = \"a.obj\", scale = {scale}"), "");
+        felt_with(&[("a.obj", bytes)], &scene, &path)
+    };
+    let large = Format::Obj.write(&make::cuboid([62.5; 3]));
+    for scaled in [as_said(&large, "0.001"), as_said(&large, "[0.001, 0.001, 0.001]")] {
+        for (a, b) in metres.iter().zip(&scaled) {
+            assert!((a.force - b.force).norm() <= 1e-9, "{a:?}\n{b:?}");
+        }
+    }
+    let flat = Format::Obj.write(&make::cuboid([2.0 * HALF_M, 1.0, 4.0 * HALF_M]));
+    for (a, b) in metres.iter().zip(&as_said(&flat, "[1, 0.0625, 0.5]")) {
+        assert!((a.force - b.force).norm() <= 1e-9, "{a:?}\n{b:?}");
+    }
+}
+
+/// A block with a pit in its top: a pyramid upside down, whose tip lies 2 cm below the rim.
+const PIT: &str = "v -0.04 -0.04 -0.04\nv 0.04 -0.04 -0.04\nv 0.04 -0.04 0.04\nv -0.04 -0.04 0.04\n\
+    v -0.04 0 -0.04\nv 0.04 0 -0.04\nv 0.04 0 0.04\nv -0.04 0 0.04\nv 0 -0.02 0\n\
+    f 1 2 3 4\nf 1 5 6 2\nf 2 6 7 3\nf 3 7 8 4\nf 4 8 5 1\nf 9 6 5\nf 9 7 6\nf 9 8 7\nf 9 5 8\n";
+
+#[test]
+fn a_god_object_rests_on_a_face_an_edge_and_a_vertex_of_a_pit() {
+    // Onto a side of the pit, to the edge between two of its sides, to its tip: each time straight down at last.
+    let over = |x: f64, z: f64, tip: f64| {
+        hand([
+            (0.0, [x, 0.02, z]),
+            (0.4, [x, tip - 0.003, z]),
+            (0.8, [x, tip - 0.003, z]),
+            (1.2, [x, 0.02, z]),
+        ])
+    };
+    let height = |x: f64, z: f64| -0.02 + 0.5 * x.abs().max(z.abs());
+    // Slopes of one half: the normal of a side leans by atan(1/2).
+    let (n_up, n_in) = (1.0 / 1.25f64.sqrt(), 0.5 / 1.25f64.sqrt());
+    for (x, z, feature, normal) in [
+        (0.012, 0.003, "face", Vector3::new(-n_in, n_up, 0.0)),
+        // Between the sides towards +x and +z: the edge runs along (2, 1, 2), so the shortest way is across it.
+        (0.012, 0.012, "edge", Vector3::new(-1.0, 4.0, -1.0).normalize()),
+        (0.0, 0.0, "vertex", Vector3::y()),
+    ] {
+        let samples = felt_with(&[("pit.obj", PIT.as_bytes())], &mesh("pit.obj"), &over(x, z, height(x, z)));
+        let deep: Vec<&Sample> = samples.iter().filter(|s| s.t > 0.4 && s.t < 0.8).collect();
+        for s in &deep {
+            assert_eq!(s.feature, feature, "{s:?}");
+            // 3 mm straight below the surface: the way out is shorter by the cosine of its lean.
+            let expected = normal * (1000.0 * 0.003 * normal.y);
+            assert!((s.force - expected).norm() <= 1e-6, "{feature}: {:?}, not {expected:?}", s.force);
+        }
+        assert!(!samples.last().is_some_and(Sample::touches), "and lets go");
+    }
+}
+
+#[test]
+fn a_bumpy_ball_pushes_outward_by_its_depth_and_slides_at_mu_d() {
+    let bumpy = Format::Stl.write(&make::bumpy_sphere(48, 24, 0.04));
+    let arc = |reach: f64| {
+        (0..=1000).map(move |tick| {
+            let (angle, t) = (f64::from(tick) * 1e-3 * 2.0, f64::from(tick) * 1e-3);
+            (0.3 + t, [reach * angle.sin(), reach * angle.cos(), 0.003])
+        })
+    };
+    let approach = [(0.0, [0.0, 0.06, 0.003])];
+    let path = hand(approach.into_iter().chain(arc(0.034)));
+    let scene = scene(
+        "kind = \"mesh\", file = \"b.stl\"",
+        "friction = { model = \"stiction\", mu_s = 0.5, mu_d = 0.2 }\n",
+    );
+    let samples = felt_with(&[("b.stl", &bumpy)], &scene, &path);
+    let touching: Vec<&Sample> = samples.iter().filter(|s| s.touches()).collect();
+    assert!(touching.len() > 900, "{}", touching.len());
+    for s in &touching {
+        assert!(s.force.dot(&s.god) > 0.0, "outward: {s:?}");
+        let depth_m = (s.god - s.hip).norm();
+        // The spring between the two, on faces as on edges.
+        assert!((s.force.norm() - 1000.0 * depth_m).abs() <= 1e-9, "{s:?}");
+        assert!(depth_m < 0.02, "{s:?}");
+    }
+    assert!(touching.iter().filter(|s| s.friction == "slip").count() > 500);
+}
+
+#[test]
+fn a_klein_bottle_has_no_inside_and_is_felt_from_both_sides() {
+    let place = Workplace::new();
+    place.write("klein.stl", Format::Stl.write(&make::klein_bottle(32, 16, 0.08)));
+    place.write("scene.toml", mesh("klein.stl"));
+    // Right through it, from above and from the side, and back.
+    let rows = [
+        (0.0, [0.03, 0.06, 0.0]),
+        (1.0, [0.03, -0.06, 0.001]),
+        (2.0, [-0.06, 0.002, 0.03]),
+        (3.0, [0.06, 0.0, 0.03]),
+    ];
+    place.write("hand.csv", hand(rows));
+    let said = place.run([
+        "run",
+        "scene.toml",
+        "--hand",
+        "hand.csv",
+        "--clock",
+        "virtual",
+        "--headless",
+        "--record",
+        "out.csv",
+    ]);
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    assert!(said.err.contains("cannot be oriented"), "whoever loads it is told: {}", said.err);
+    let samples = system_tests::recording::Table::read(&place.path("out.csv")).finger("f0");
+    assert!(samples.iter().any(Sample::touches));
+    for s in samples.iter().filter(|s| s.touches()) {
+        assert!((s.force - (s.god - s.hip) * 1000.0).norm() <= 1e-9, "a spring and nothing else: {s:?}");
+    }
+}
+
+/// Runs a scene with a mesh whose file holds `bytes`.
+fn run_with(name: &str, bytes: &[u8]) -> Said {
+    let place = Workplace::new();
+    place.write(name, bytes);
+    place.write("scene.toml", mesh(name));
+    place.run(["run", "scene.toml", "--clock", "virtual", "--headless", "--seconds", "0.1"])
+}
+
+#[test]
+fn a_broken_model_is_refused_with_scene_line_model_and_offender() {
+    let good = String::from_utf8(Format::Obj.write(&cube())).expect("text");
+    let stl = Format::Stl.write(&cube());
+    let text = String::from_utf8(Format::StlText.write(&cube())).expect("text");
+    let with_nan = [&stl[..100], &f32::NAN.to_le_bytes(), &stl[104..]].concat();
+    // Three walls on one edge.
+    let fins = "v 0 0 0\nv 0 0 1\nv 1 0 0\nv 0 1 0\nv -1 -1 0\n\nf 1 2 3\nf 1 2 4\nf 1 2 5\n";
+    let cases: Vec<(&str, Vec<u8>, &[&str])> = vec![
+        ("a.obj", b"".into(), &["found no triangle"]),
+        ("a.obj", b"v 0 0 0\n".into(), &["found no triangle"]),
+        ("a.obj", good.replacen("v ", "w ", 1).into(), &["line 1: found `w`", "statements of OBJ"]),
+        ("a.obj", (good.clone() + "f 1 2 99\n").into(), &["found vertex 99", "1 to 8"]),
+        ("a.obj", (good.clone() + "f 1 2 0\n").into(), &["found vertex 0"]),
+        ("a.obj", (good.clone() + "v 1 nan 0\n").into(), &["found `nan`", "a finite number"]),
+        (
+            "a.obj",
+            (good + "surf 0 1 0 1 1 2 3\n").into(),
+            &["`surf`", "free-form", "export the model as a mesh"],
+        ),
+        ("a.obj", fins.into(), &["shared by more than two faces", "face 0 is on line 7"]),
+        ("a.obj", b"v 0 0 0\nv 1 1 1\nv 2 2 2\nf 1 2 3\n".into(), &["none of the 1 faces has an area"]),
+        (
+            "a.obj",
+            b"v 0 0 0\nv 1e300 0 0\nv 0 1 0\nf 1 2 3\n".into(),
+            &["vertex 1 is at [1", "correct the vertex or the unit"],
+        ),
+        ("a.stl", stl[..stl.len() - 1].into(), &["byte 683", "after 11 of the 12 triangles", "cut short"]),
+        ("a.stl", stl[..50].into(), &["byte 50", "at least 84 bytes"]),
+        ("a.stl", [&stl[..80], &[13, 0, 0, 0], &stl[84..]].concat(), &["after 12 of the 13 triangles"]),
+        ("a.stl", [&stl[..], b"more"].concat(), &["byte 684", "4 bytes behind the 12 triangles"]),
+        ("a.stl", with_nan, &["byte 96", "corner 0 of triangle 0", "NaN"]),
+        ("a.stl", text[..text.len() / 2].into(), &["line ", "cut short"]),
+        (
+            "a.stl",
+            text.replacen("endloop", "loop", 1).into(),
+            &["line 7: found `loop`", "allowed: `endloop`"],
+        ),
+        ("a.ply", b"ply\nformat ascii 1.0\n".into(), &["neither OBJ nor STL"]),
+    ];
+    for (name, bytes, parts) in cases {
+        let said = run_with(name, &bytes);
+        assert_eq!(said.status, Some(2), "{parts:?}: {}", said.err);
+        assert_eq!((said.out.as_str(), said.err.lines().count()), ("", 1), "one message: {}", said.err);
+        let place = format!("phantom3: scene.toml:5: entity[0].shape.file: {name}: ");
+        assert!(said.err.starts_with(&place), "{place}: {}", said.err);
+        for part in parts {
+            assert!(said.err.contains(part), "`{part}` is missing in: {}", said.err);
+        }
+    }
+}
+
+#[test]
+fn a_model_that_cannot_be_read_is_refused() {
+    let place = Workplace::new();
+    std::fs::create_dir(place.path("directory.obj")).expect("a directory");
+    for (file, part) in [
+        ("none.obj", "none.obj: no such file"),
+        ("directory.obj", "directory.obj: not a regular file"),
+        ("/dev/zero", "/dev/zero: not a regular file"),
+        ("scene.toml/a.obj", "scene.toml/a.obj: cannot be read"),
+    ] {
+        place.write("scene.toml", mesh(file));
+        let said = place.run(["run", "scene.toml", "--clock", "virtual", "--headless"]);
+        assert_eq!(said.status, Some(2), "{}", said.err);
+        assert!(
+            said.err.contains("scene.toml:5: entity[0].shape.file") && said.err.contains(part),
+            "{}",
+            said.err
+        );
+    }
+}
+
+#[test]
+fn a_model_lies_relative_to_the_scene_file_and_not_to_where_one_stands() {
+    let place = Workplace::new();
+    for directory in ["scenes", "meshes"] {
+        std::fs::create_dir(place.path(directory)).expect("a directory");
+    }
+    place.write("meshes/cube.obj", Format::Obj.write(&cube()));
+    place.write("scenes/scene.toml", mesh("../meshes/cube.obj"));
+    let said =
+        place.run(["run", "scenes/scene.toml", "--clock", "virtual", "--headless", "--seconds", "0.1"]);
+    assert_eq!((said.status, said.err.as_str()), (Some(0), ""));
+}
+
+#[test]
+fn what_was_repaired_is_told_once_however_many_entities_use_it() {
+    // A face turned over, one given twice, one without an area; used by two entities.
+    let obj = String::from_utf8(Format::Obj.write(&cube())).expect("text");
+    let first = obj.lines().find(|line| line.starts_with('f')).expect("a face").to_owned();
+    let numbers: Vec<&str> = first.split(' ').skip(1).collect();
+    let [a, b, c] = numbers[..] else { panic!("a triangle") };
+    let spoilt = obj.replacen(&first, &format!("f {a} {c} {b}"), 1) + &format!("f {a} {b} {c}\nf 1 1 2\n");
+    let place = Workplace::new();
+    place.write("cube.obj", spoilt);
+    let again =
+        "[[entity]]\nshape = { kind = \"mesh\", file = \"cube.obj\" }\nposition_m = [1.0, 0.0, 0.0]\n";
+    place.write("scene.toml", mesh("cube.obj") + again);
+    let said = place.run(["run", "scene.toml", "--clock", "virtual", "--headless", "--seconds", "0.1"]);
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    let lines: Vec<&str> = said.err.lines().collect();
+    assert!(lines.iter().all(|line| line.starts_with("phantom3: cube.obj: ")), "{}", said.err);
+    assert!(lines[0].ends_with("12 faces, 8 vertices, 1 part"), "{}", said.err);
+    for part in ["turned over", "given before", "without an area"] {
+        assert_eq!(
+            lines.iter().filter(|line| line.contains(part)).count(),
+            1,
+            "`{part}` once in: {}",
+            said.err
+        );
+    }
+}
+
+#[test]
+fn a_recording_does_not_overwrite_a_model() {
+    let place = Workplace::new();
+    let bytes = Format::Obj.write(&cube());
+    place.write("cube.obj", &bytes);
+    place.write("scene.toml", mesh("cube.obj"));
+    let said = place.run(["run", "scene.toml", "--clock", "virtual", "--headless", "--record", "cube.obj"]);
+    assert_eq!(said.status, Some(2), "{}", said.err);
+    assert!(said.err.contains("would overwrite the input cube.obj"), "{}", said.err);
+    assert_eq!(std::fs::read(place.path("cube.obj")).expect("still there"), bytes);
+}
+
+#[test]
+fn a_finger_with_a_radius_is_refused_on_a_mesh() {
+    let place = Workplace::new();
+    place.write("cube.obj", Format::Obj.write(&cube()));
+    place.write("scene.toml", mesh("cube.obj").replace("start_m", "radius_m = 0.005\nstart_m"));
+    let said = place.run(["run", "scene.toml", "--clock", "virtual", "--headless"]);
+    assert_eq!(said.status, Some(2), "{}", said.err);
+    for part in
+        ["scene.toml", "finger f0 has radius_m = 0.005", "entity thing, a mesh", "allowed: radius_m = 0"]
+    {
+        assert!(said.err.contains(part), "`{part}` is missing in: {}", said.err);
+    }
+}
+
+#[test]
+fn the_other_algorithms_feel_a_mesh_without_friction() {
+    let obj = Format::Obj.write(&cube());
+    let path =
+        hand([(0.0, [0.003, 0.04, 0.002]), (0.3, [0.003, 0.0285, 0.002]), (1.0, [-0.013, 0.0281, 0.011])]);
+    for algorithm in ["friction-cone", "vector-field", "classic"] {
+        let friction =
+            if algorithm == "friction-cone" { "" } else { "friction = { model = \"coulomb\", mu = 0.5 }\n" };
+        let rest = format!("algorithm = \"{algorithm}\"\n{friction}");
+        for shape in
+            ["kind = \"mesh\", file = \"cube.obj\"", "kind = \"box\", size_m = [0.0625, 0.0625, 0.0625]"]
+        {
+            let samples = felt_with(&[("cube.obj", &obj)], &scene(shape, &rest), &path);
+            for s in &samples {
+                let expected = Vector3::y() * (1000.0 * (HALF_M - s.hip.y).max(0.0));
+                assert!((s.force - expected).norm() <= 1e-9, "{algorithm} on {shape}: {s:?}");
+            }
+            assert!(samples.iter().filter(|s| s.touches()).count() > 700);
+        }
+    }
+}
