@@ -76,7 +76,12 @@ impl Grip {
         if pull.travel_m <= 0.0 {
             return Vector3::zeros();
         }
-        let drag_m = friction.drag_m(&query(self.state, spring_B.norm(), 0.0, view, pull, input), &self.memory);
+        let query = FrictionQuery {
+            // Of the spring that is rendered, which after a slide that met its bound is not the lag.
+            gap_along_hip_m: -spring_B.dot(&pull.moved_B) / pull.travel_m,
+            ..query(self.state, spring_B.norm(), 0.0, view, pull, input)
+        };
+        let drag_m = friction.drag_m(&query, &self.memory);
         if drag_m == 0.0 {
             return Vector3::zeros();
         }

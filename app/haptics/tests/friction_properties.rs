@@ -88,8 +88,10 @@ proptest! {
         }
         let forces: Vec<_> = (0..40).map(|_| finger.step(&entity, &hip, DT)).collect();
         if largest_ratio(&friction, 1.0).is_some() && !matches!(friction, Friction::LuGre(_) | Friction::Curve(_)) {
-            // One tick for what is felt beside the spring to end.
-            for pair in forces[1..].windows(2) {
+            // One tick for what is felt beside the spring to end. On a ball a slide changes the load, at
+            // which more bonds may snap, and then more; in the end they all bear it.
+            let settled = if matches!(friction, Friction::Bristle(_)) { 20 } else { 1 };
+            for pair in forces[settled..].windows(2) {
                 let difference = (pair[1].force_on_user_W - pair[0].force_on_user_W).norm();
                 prop_assert!(difference <= 1e-11 * K * 3e-3, "{difference}");
             }
