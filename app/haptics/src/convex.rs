@@ -8,8 +8,8 @@
 //! where there is none it either runs past the path's end or meets a rising level. Crossings of flat pieces are exact
 //! after one step each; curved ones converge quadratically.
 //!
-//! Cost: one level where the path is too short to reach the solid, at most [`MAX_ENTRY_ROUNDS`]. Only paths that graze
-//! a curved piece need more than six.
+//! Cost: one level where the path is too short to reach the solid, at most [`MAX_ENTRY_ROUNDS`]: paths that graze a curved
+//! piece take the most.
 
 use nalgebra::Vector3;
 

@@ -10,7 +10,8 @@
 //! Frames and signs: object frame B. Where the nearest point is not unique (the middle plane across the smallest
 //! radius, near the centre) it is the one on the positive side, of equal radii the first in the order y, x, z: at the
 //! centre of a ball +y. The signed distance is exact in sign and zero and first order between.
-//! Invariant: radii differ by at most [`LARGEST_RATIO`]. Cost: at most [`MAX_NEAREST_ROUNDS`] rounds, mostly 5.
+//! Invariant: radii differ by at most [`LARGEST_RATIO`]. Cost: at most [`MAX_NEAREST_ROUNDS`] rounds, mostly two
+//! or three.
 
 use nalgebra::Vector3;
 
@@ -31,7 +32,8 @@ pub struct Ellipsoid {
 /// The largest radius of an ellipsoid over its smallest one.
 pub const LARGEST_RATIO: f64 = 1e6;
 
-/// Bound on Newton's method for the nearest point; 10 million random points took at most 9.
+/// Bound on Newton's method for the nearest point; of 10 million random points in and around ellipsoids with radii up to
+/// a million times apart half took at most three rounds, and the worst 21.
 pub(crate) const MAX_NEAREST_ROUNDS: u32 = 32;
 
 impl Ellipsoid {

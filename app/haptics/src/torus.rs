@@ -9,7 +9,7 @@
 //! Invariants: the ring is wider than the tube is thick, so that there is a hole: otherwise the surface would meet
 //! itself in a dimple where no single normal exists. That holds for grown tori, too: a ball that does not fit through
 //! the hole cannot feel this shape.
-//! Cost: two square roots per question; an entry that is near enough to be possible solves a quartic, below 2 us.
+//! Cost: two square roots per question; an entry near enough to be possible solves a quartic.
 
 use nalgebra::Vector3;
 

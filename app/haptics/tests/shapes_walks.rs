@@ -27,7 +27,7 @@ impl Walk {
         self.u += 2e-3 * self.noise.gaussian();
         self.v += 2e-3 * self.noise.gaussian();
         // Mostly a few millimetres deep, now and then out.
-        let aim = 0.92 + 0.13 * f64::from((i / 200) % 4 == 0);
+        let aim = 0.92 + 0.13 * f64::from((i / 200).is_multiple_of(4));
         self.hip += (solid.point(self.u, self.v) * aim - self.hip) * 0.05 + self.noise.vector(1e-4);
         self.hip
     }

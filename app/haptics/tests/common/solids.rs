@@ -5,12 +5,15 @@ use haptics::{Capsule, Cone, Cuboid, Cylinder, Ellipsoid, Form, Plane, Scaled, S
 use nalgebra::Vector3;
 use std::f64::consts::{PI, TAU};
 
+/// Is a point in the material?
+pub(crate) type Contains = dyn Fn(&Vector3<f64>) -> bool;
+
 /// A shape and what is known of it without asking it.
 pub(crate) struct Solid {
     pub(crate) name: &'static str,
     pub(crate) form: Form,
     /// Is a point in the material?
-    pub(crate) contains: Box<dyn Fn(&Vector3<f64>) -> bool>,
+    pub(crate) contains: Box<Contains>,
     /// Within this distance of the origin in every coordinate \[m\].
     pub(crate) size_m: f64,
     /// Radius of the ring from which every surface point can be seen; 0 for a star-shaped solid.
