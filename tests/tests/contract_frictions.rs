@@ -75,9 +75,9 @@ fn each_model_slides_steadily_at_the_ratio_that_it_documents() {
         ("model = \"lugre\", mu_s = 0.7, mu_d = 0.3, v_s_m_s = 0.02, mu_v_s_per_m = 0.5", stribeck),
         ("model = \"reset-integrator\", mu_s = 0.7, mu_d = 0.3", |_| 0.3),
         ("model = \"fixed-cone\", friction_n = 1.0", |_| 1.0 / (STIFFNESS * DEPTH_M)),
-        // Falls by 0.2 over 0.1 m/s, then rises by 0.3 over 0.3 m/s.
-        ("model = \"curve\", speed_m_s = [0.0, 0.1, 0.4], mu = [0.5, 0.3, 0.6], mu_s = 0.7", |v| {
-            if v < 0.1 { 0.5 - 2.0 * v } else { 0.3 + (v - 0.1) }
+        // Rises by 0.2 over 0.1 m/s, then by 0.3 over 0.3 m/s.
+        ("model = \"curve\", speed_m_s = [0.0, 0.1, 0.4], mu = [0.3, 0.5, 0.8], mu_s = 0.7", |v| {
+            if v < 0.1 { 0.3 + 2.0 * v } else { 0.5 + (v - 0.1) }
         }),
         // One that begins above rest and ends below the stroke's speed.
         ("model = \"curve\", speed_m_s = [0.02, 0.2], mu = [0.4, 0.8]", |v| {
@@ -99,6 +99,19 @@ fn each_model_slides_steadily_at_the_ratio_that_it_documents() {
             }
         }
     }
+}
+
+#[test]
+fn a_falling_curve_is_followed_where_sliding_is_steady() {
+    // Down to 0.3 at 0.1 m/s, up again beyond.
+    let friction = "model = \"curve\", speed_m_s = [0.0, 0.1, 0.4], mu = [0.5, 0.3, 0.6], mu_s = 0.7";
+    for ratio in steady(friction, 0.29) {
+        assert!((ratio - 0.49).abs() <= 1e-8, "{ratio}");
+    }
+    // On the falling part nothing slides steadily: it sticks and slips, within the curve's limits.
+    let ratios = steady(friction, 0.011);
+    assert!(ratios.iter().all(|ratio| (0.0..=0.7 + RATIO_TOLERANCE).contains(ratio)));
+    assert!(ratios.iter().any(|ratio| *ratio > 0.6) && ratios.iter().any(|ratio| *ratio < 0.4));
 }
 
 #[test]

@@ -3,11 +3,13 @@
 //! Frames and signs: object frame B; sizes are whole edge lengths. Pieces are numbered +y, -y, +x, -x, +z, -z; where
 //! several faces are as near, the lowest number counts, so that a finger that begins at the centre is pushed up.
 //! The signed distance is that to the farthest face plane: exact inside and on the surface, a lower bound outside.
-//! Invariant: points it returns lie exactly on a face. Cost: a few comparisons per question.
+//! Grown by a ball's radius, edges and corners are round: the surface is that at the radius from the box, piece 6 where
+//! it is curved.
+//! Invariant: points it returns lie exactly on a face. Cost: a few comparisons per question, a square root if round.
 
 use nalgebra::Vector3;
 
-use crate::convex::{Level, first_entry};
+use crate::convex::{Level, direction_or, first_entry};
 use crate::error::{ParameterError, above_zero};
 use crate::surface::{Feature, Surface, SurfacePoint};
 
@@ -15,7 +17,12 @@ use crate::surface::{Feature, Surface, SurfacePoint};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cuboid {
     half_m: Vector3<f64>,
+    /// Radius of edges and corners, around the box \[m\].
+    rounding_m: f64,
 }
+
+/// Edges and corners of a grown box.
+const ROUND: u32 = 6;
 
 impl Cuboid {
     /// A box with these edge lengths along x, y, z.
@@ -25,34 +32,58 @@ impl Cuboid {
         for length_m in size_m {
             above_zero("size_m", 0.5 * length_m)?;
         }
-        Ok(Self { half_m: Vector3::from(size_m) * 0.5 })
+        Ok(Self { half_m: Vector3::from(size_m) * 0.5, rounding_m: 0.0 })
     }
 
-    /// Edge lengths along x, y, z \[m\].
+    /// Edge lengths along x, y, z \[m\], of a grown box those of the one within.
     pub fn size_m(&self) -> [f64; 3] {
         (self.half_m * 2.0).into()
     }
 
+    /// How far a point lies before the planes of the six faces.
     fn level(&self, point_B: &Vector3<f64>) -> Level {
         let height_m = |axis: usize| point_B[axis].abs() - self.half_m[axis];
-        let mut rank = 0;
-        for other in 1..3 {
-            if height_m(AXES[other]) > height_m(AXES[rank]) {
-                rank = other;
-            }
-        }
+        let farther = |rank: usize, other: usize| {
+            if height_m(AXES[other]) > height_m(AXES[rank]) { other } else { rank }
+        };
+        let rank = farther(farther(0, 1), 2);
         let axis = AXES[rank];
         let piece = 2 * rank as u32 + u32::from(point_B[axis] < 0.0);
-        Level { height_m: height_m(axis), gradient_B: normal(piece), piece }
+        Level { height_m: height_m(axis) - self.rounding_m, gradient_B: normal(piece), piece }
+    }
+
+    /// How far a point lies before the round surface: exact everywhere.
+    fn round_level(&self, point_B: &Vector3<f64>) -> Level {
+        let away_B = point_B - self.clamped(point_B);
+        if away_B.iter().filter(|x| **x != 0.0).count() < 2 {
+            return self.level(point_B);
+        }
+        let gradient_B = direction_or(&away_B, Vector3::y());
+        Level { height_m: away_B.norm() - self.rounding_m, gradient_B, piece: ROUND }
+    }
+
+    fn clamped(&self, point_B: &Vector3<f64>) -> Vector3<f64> {
+        point_B.zip_map(&self.half_m, |x, half| x.clamp(-half, half))
     }
 
     /// The point of a face nearest to `point_B`.
     fn on(&self, piece: u32, point_B: &Vector3<f64>) -> SurfacePoint {
         let normal_B = normal(piece);
         let axis = axis(piece);
-        let mut at_B = point_B.zip_map(&self.half_m, |x, half| x.clamp(-half, half));
-        at_B[axis] = normal_B[axis] * self.half_m[axis];
+        let mut at_B = self.clamped(point_B);
+        at_B[axis] = normal_B[axis] * (self.half_m[axis] + self.rounding_m);
         SurfacePoint { point_B: at_B, normal_B, feature: Feature::Face, piece }
+    }
+
+    /// The point of the round surface nearest to `point_B`.
+    fn on_round(&self, point_B: &Vector3<f64>) -> SurfacePoint {
+        let level = self.round_level(point_B);
+        if level.piece != ROUND {
+            return self.on(level.piece, point_B);
+        }
+        let normal_B = level.gradient_B;
+        let point_B = self.clamped(point_B) + normal_B * self.rounding_m;
+        SurfacePoint { point_B, normal_B, feature: Feature::Surface, piece: ROUND }
     }
 }
 
@@ -71,20 +102,31 @@ fn normal(piece: u32) -> Vector3<f64> {
 
 impl Surface for Cuboid {
     fn signed_distance(&self, point_B: &Vector3<f64>) -> f64 {
-        self.level(point_B).height_m
+        if self.rounding_m > 0.0 { self.round_level(point_B).height_m } else { self.level(point_B).height_m }
     }
 
     fn nearest(&self, point_B: &Vector3<f64>) -> SurfacePoint {
-        self.on(self.level(point_B).piece, point_B)
+        if self.rounding_m > 0.0 {
+            self.on_round(point_B)
+        } else {
+            self.on(self.level(point_B).piece, point_B)
+        }
     }
 
     fn entry(&self, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<SurfacePoint> {
+        if self.rounding_m > 0.0 {
+            let (point_B, _) = first_entry(from_B, to_B, |point_B| self.round_level(point_B))?;
+            return Some(self.on_round(&point_B));
+        }
         let (point_B, piece) = first_entry(from_B, to_B, |point_B| self.level(point_B))?;
         Some(self.on(piece, &point_B))
     }
 
     /// Straight over the face; on the first edge in the way the face beyond takes over.
     fn settle(&self, from: &SurfacePoint, on_tangent_plane_B: &Vector3<f64>) -> SurfacePoint {
+        if self.rounding_m > 0.0 {
+            return self.on_round(on_tangent_plane_B);
+        }
         let path_B = on_tangent_plane_B - from.point_B;
         let (mut fraction, mut piece) = (1.0, from.piece);
         for (rank, &axis) in AXES.iter().enumerate() {
@@ -105,16 +147,20 @@ impl Surface for Cuboid {
     }
 
     fn tangent_offset(&self, at: &SurfacePoint) -> f64 {
-        self.half_m[axis(at.piece)]
+        if at.piece == ROUND {
+            return self.half_m.dot(&at.normal_B.abs()) + self.rounding_m;
+        }
+        self.half_m[axis(at.piece)] + self.rounding_m
     }
 
-    /// Faces are flat: nobody is pushed through, however thin the box.
-    fn holds_outside(&self, _at: &SurfacePoint, _depth_m: f64) -> bool {
-        true
+    /// Faces are flat: nobody is pushed through, however thin the box. Whoever is deeper below a round edge than its
+    /// radius has gone past its middle.
+    fn holds_outside(&self, at: &SurfacePoint, _depth_m: f64) -> bool {
+        at.piece != ROUND
     }
 
-    fn grown(&self, _radius_m: f64) -> Option<Self> {
-        None
+    fn grown(&self, radius_m: f64) -> Option<Self> {
+        Some(Self { rounding_m: self.rounding_m + radius_m, ..*self })
     }
 }
 

@@ -24,6 +24,8 @@ pub struct Ellipsoid {
     radii_m: Vector3<f64>,
     /// Axis of the smallest radius.
     shortest: usize,
+    /// Thickness of the layer around it, for fingers with a radius \[m\].
+    layer_m: f64,
 }
 
 /// The largest radius of an ellipsoid over its smallest one.
@@ -46,10 +48,10 @@ impl Ellipsoid {
             return Err(ParameterError::OutOfRange { parameter: "radii_m", value: radii_m.max(), allowed });
         }
         let shortest = [1, 0, 2].into_iter().find(|&axis| radii_m[axis] == radii_m.min()).unwrap_or(1);
-        Ok(Self { radii_m, shortest })
+        Ok(Self { radii_m, shortest, layer_m: 0.0 })
     }
 
-    /// Radii along x, y, z \[m\].
+    /// Radii along x, y, z \[m\], of a grown one those of the ellipsoid within.
     pub fn radii_m(&self) -> [f64; 3] {
         self.radii_m.into()
     }
@@ -95,6 +97,41 @@ impl Ellipsoid {
         p.component_mul(ratios).component_mul(ratios).zip_map(&excess, |n, e| quotient(n, u + e))
     }
 
+    /// Of the ellipsoid without the layer.
+    fn nearest_within(&self, point_B: &Vector3<f64>) -> SurfacePoint {
+        let shortest_m = self.radii_m[self.shortest];
+        let x = self.nearest_over_shortest(&(point_B / shortest_m), &(self.radii_m / shortest_m));
+        let gauge = self.gauge(&(x * shortest_m));
+        let up_B = Vector3::y() * self.radii_m.y;
+        self.at(if gauge > 0.0 && gauge.is_finite() { x * (shortest_m / gauge) } else { up_B })
+    }
+
+    /// Signed distance to the ellipsoid without the layer, first order.
+    fn height(&self, point_B: &Vector3<f64>) -> f64 {
+        let scaled = point_B.component_div(&self.radii_m);
+        let gauge = scaled.norm();
+        let shortest_m = self.radii_m[self.shortest];
+        let height_m = (gauge - 1.0) * shortest_m;
+        // How many times less steep the gauge is here than along the smallest radius.
+        let stretch = gauge / scaled.component_div(&(self.radii_m / shortest_m)).norm();
+        if stretch > 1.0 && stretch.is_finite() { height_m * stretch } else { height_m }
+    }
+
+    fn gauge_level(&self, point_B: &Vector3<f64>) -> Level {
+        let shortest_m = self.radii_m[self.shortest];
+        let scaled = point_B.component_div(&self.radii_m);
+        let gauge = scaled.norm();
+        let gradient_B = scaled.component_div(&self.radii_m) * (shortest_m / gauge);
+        Level { height_m: (gauge - 1.0) * shortest_m, gradient_B, piece: 0 }
+    }
+
+    /// Before the layer: exact everywhere.
+    fn layer_level(&self, point_B: &Vector3<f64>) -> Level {
+        let within = self.nearest_within(point_B);
+        let height_m = within.normal_B.dot(&(point_B - within.point_B)) - self.layer_m;
+        Level { height_m, gradient_B: within.normal_B, piece: 0 }
+    }
+
     fn at(&self, point_B: Vector3<f64>) -> SurfacePoint {
         let normal_B = self.normal(&point_B);
         SurfacePoint { point_B, normal_B, feature: Feature::Surface, piece: 0 }
@@ -108,32 +145,20 @@ fn quotient(a: f64, b: f64) -> f64 {
 
 impl Surface for Ellipsoid {
     fn signed_distance(&self, point_B: &Vector3<f64>) -> f64 {
-        let scaled = point_B.component_div(&self.radii_m);
-        let gauge = scaled.norm();
-        let shortest_m = self.radii_m[self.shortest];
-        let height_m = (gauge - 1.0) * shortest_m;
-        // How many times less steep the gauge is here than along the smallest radius.
-        let stretch = gauge / scaled.component_div(&(self.radii_m / shortest_m)).norm();
-        if stretch > 1.0 && stretch.is_finite() { height_m * stretch } else { height_m }
+        if self.layer_m > 0.0 { self.layer_level(point_B).height_m } else { self.height(point_B) }
     }
 
     fn nearest(&self, point_B: &Vector3<f64>) -> SurfacePoint {
-        let shortest_m = self.radii_m[self.shortest];
-        let x = self.nearest_over_shortest(&(point_B / shortest_m), &(self.radii_m / shortest_m));
-        let gauge = self.gauge(&(x * shortest_m));
-        let up_B = Vector3::y() * self.radii_m.y;
-        self.at(if gauge > 0.0 && gauge.is_finite() { x * (shortest_m / gauge) } else { up_B })
+        let within = self.nearest_within(point_B);
+        SurfacePoint { point_B: within.point_B + within.normal_B * self.layer_m, ..within }
     }
 
     fn entry(&self, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<SurfacePoint> {
-        let shortest_m = self.radii_m[self.shortest];
-        let level = |point_B: &Vector3<f64>| {
-            let scaled = point_B.component_div(&self.radii_m);
-            let gauge = scaled.norm();
-            let gradient_B = scaled.component_div(&self.radii_m) * (shortest_m / gauge);
-            Level { height_m: (gauge - 1.0) * shortest_m, gradient_B, piece: 0 }
-        };
-        let (point_B, _) = first_entry(from_B, to_B, level)?;
+        if self.layer_m > 0.0 {
+            let (point_B, _) = first_entry(from_B, to_B, |point_B| self.layer_level(point_B))?;
+            return Some(self.nearest(&point_B));
+        }
+        let (point_B, _) = first_entry(from_B, to_B, |point_B| self.gauge_level(point_B))?;
         Some(self.at(point_B / self.gauge(&point_B)))
     }
 
@@ -143,22 +168,23 @@ impl Surface for Ellipsoid {
 
     /// The support function of an ellipsoid.
     fn tangent_offset(&self, at: &SurfacePoint) -> f64 {
-        self.radii_m.component_mul(&at.normal_B).norm()
+        self.radii_m.component_mul(&at.normal_B).norm() + self.layer_m
     }
 
     /// The smaller principal radius of curvature, from Gaussian and mean curvature.
     fn holds_outside(&self, at: &SurfacePoint, depth_m: f64) -> bool {
-        let h = self.tangent_offset(at);
+        let h = self.radii_m.component_mul(&at.normal_B).norm();
+        let within_B = at.point_B - at.normal_B * self.layer_m;
         let squares = self.radii_m.component_mul(&self.radii_m);
         let volume = self.radii_m.product();
         let gauss = (h * h / volume).powi(2);
-        let mean = h.powi(3) * (squares.sum() - at.point_B.norm_squared()) / (2.0 * volume * volume);
+        let mean = h.powi(3) * (squares.sum() - within_B.norm_squared()) / (2.0 * volume * volume);
         let sharpest = mean + (mean * mean - gauss).max(0.0).sqrt();
-        depth_m * sharpest < 1.0
+        (depth_m - self.layer_m) * sharpest < 1.0
     }
 
-    fn grown(&self, _radius_m: f64) -> Option<Self> {
-        None
+    fn grown(&self, radius_m: f64) -> Option<Self> {
+        Some(Self { layer_m: self.layer_m + radius_m, ..*self })
     }
 }
 

@@ -4,13 +4,15 @@
 //! outward normal `(normal_rho, normal_y)`, which slants where the radii differ. The solid is convex: how far a point
 //! lies before it is told by the farthest of side and cap.
 //!
-//! Frames and signs: object frame B, y up, centred, bottom at -length/2. Pieces: top, bottom, side; where several are
-//! as near, the first counts. On the axis the side lies towards +x.
+//! Grown by a ball's radius, its rims are round: the surface is that at the radius from the solid within.
+//!
+//! Frames and signs: object frame B, y up, centred, bottom at -length/2. Pieces: top, bottom, side, round rims; where
+//! several are as near, the first counts. On the axis the side lies towards +x.
 //! Invariant: points it returns lie on the side or a cap to rounding. Cost: a square root or two per question.
 
 use nalgebra::Vector3;
 
-use crate::convex::{Level, around_y, first_entry};
+use crate::convex::{Level, around_y, direction_or, first_entry};
 use crate::error::{ParameterError, above_zero, at_least_zero};
 use crate::surface::{Feature, Surface, SurfacePoint};
 
@@ -26,11 +28,15 @@ pub(crate) struct Frustum {
     slope: f64,
     normal_rho: f64,
     normal_y: f64,
+    /// Radius of the rims, around the solid \[m\].
+    rounding_m: f64,
 }
 
 pub(crate) const TOP: u32 = 0;
 pub(crate) const BOTTOM: u32 = 1;
 pub(crate) const SIDE: u32 = 2;
+pub(crate) const TOP_RIM: u32 = 3;
+pub(crate) const BOTTOM_RIM: u32 = 4;
 
 impl Frustum {
     /// Errors: a radius not finite or negative, both zero, a length not finite or not positive.
@@ -58,6 +64,7 @@ impl Frustum {
             slope,
             normal_rho: 1.0 / slant,
             normal_y: -slope / slant,
+            rounding_m: 0.0,
         })
     }
 
@@ -68,7 +75,7 @@ impl Frustum {
     }
 
     fn radius_of_cap(&self, piece: u32) -> f64 {
-        if piece == TOP { self.radius_top_m } else { self.radius_bottom_m }
+        if piece == TOP || piece == TOP_RIM { self.radius_top_m } else { self.radius_bottom_m }
     }
 
     /// How far a point lies before the side, along the side's normal \[m\].
@@ -124,6 +131,47 @@ impl Frustum {
         SurfacePoint { point_B, normal_B, feature: Feature::Face, piece }
     }
 
+    /// How far a point lies before the round surface: exact everywhere.
+    fn round_level(&self, point_B: &Vector3<f64>) -> Level {
+        let flat = self.level(point_B);
+        let over_rim = flat.height_m > 0.0 && self.is_over_rim(flat.piece, point_B);
+        if !over_rim {
+            return Level { height_m: flat.height_m - self.rounding_m, ..flat };
+        }
+        let rim_B = self.on(flat.piece, point_B).point_B;
+        let away_B = point_B - rim_B;
+        let gradient_B = direction_or(&away_B, flat.gradient_B);
+        let piece = if rim_B.y < 0.0 { BOTTOM_RIM } else { TOP_RIM };
+        Level { height_m: away_B.norm() - self.rounding_m, gradient_B, piece }
+    }
+
+    /// Whether the foot on a piece's plane or cone lies beyond that piece.
+    fn is_over_rim(&self, piece: u32, point_B: &Vector3<f64>) -> bool {
+        let rho_m = around_y(point_B).0;
+        if piece != SIDE {
+            return rho_m > self.radius_of_cap(piece);
+        }
+        let foot_y_m = point_B.y - self.normal_y * self.before_side(rho_m, point_B.y);
+        foot_y_m.abs() > self.half_length_m
+    }
+
+    /// The point of the round surface nearest to `point_B`.
+    fn on_round(&self, point_B: &Vector3<f64>) -> SurfacePoint {
+        let level = self.round_level(point_B);
+        let within = match level.piece {
+            TOP_RIM => self.on_cap(TOP, point_B),
+            BOTTOM_RIM => self.on_cap(BOTTOM, point_B),
+            piece => self.on(piece, point_B),
+        };
+        let is_rim = level.piece > SIDE;
+        SurfacePoint {
+            point_B: within.point_B + level.gradient_B * self.rounding_m,
+            normal_B: level.gradient_B,
+            feature: if is_rim { Feature::Surface } else { within.feature },
+            piece: level.piece,
+        }
+    }
+
     /// Along the side; over a rim the cap takes over where the path crosses it.
     fn settle_on_side(&self, from_B: &Vector3<f64>, target_B: &Vector3<f64>) -> SurfacePoint {
         let (rho_m, outward_B) = around_y(target_B);
@@ -170,20 +218,30 @@ fn leaves_circle(from_B: &Vector3<f64>, to_B: &Vector3<f64>, radius_m: f64) -> V
 
 impl Surface for Frustum {
     fn signed_distance(&self, point_B: &Vector3<f64>) -> f64 {
-        self.level(point_B).height_m
+        if self.rounding_m > 0.0 { self.round_level(point_B).height_m } else { self.level(point_B).height_m }
     }
 
     fn nearest(&self, point_B: &Vector3<f64>) -> SurfacePoint {
-        self.on(self.level(point_B).piece, point_B)
+        if self.rounding_m > 0.0 {
+            self.on_round(point_B)
+        } else {
+            self.on(self.level(point_B).piece, point_B)
+        }
     }
 
     fn entry(&self, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<SurfacePoint> {
+        if self.rounding_m > 0.0 {
+            let (point_B, _) = first_entry(from_B, to_B, |point_B| self.round_level(point_B))?;
+            return Some(self.on_round(&point_B));
+        }
         let (point_B, piece) = first_entry(from_B, to_B, |point_B| self.level(point_B))?;
         Some(self.on(piece, &point_B))
     }
 
     fn settle(&self, from: &SurfacePoint, on_tangent_plane_B: &Vector3<f64>) -> SurfacePoint {
-        if from.piece == SIDE {
+        if self.rounding_m > 0.0 {
+            self.on_round(on_tangent_plane_B)
+        } else if from.piece == SIDE {
             self.settle_on_side(&from.point_B, on_tangent_plane_B)
         } else {
             self.settle_on_cap(from.piece, &from.point_B, on_tangent_plane_B)
@@ -192,16 +250,29 @@ impl Surface for Frustum {
 
     /// All tangent planes of the side are as far from the middle of the axis.
     fn tangent_offset(&self, at: &SurfacePoint) -> f64 {
-        if at.piece == SIDE { self.normal_rho * self.radius_middle_m } else { self.half_length_m }
+        let within_m = match at.piece {
+            SIDE => self.normal_rho * self.radius_middle_m,
+            TOP | BOTTOM => self.half_length_m,
+            rim => {
+                let y_m = if rim == TOP_RIM { self.half_length_m } else { -self.half_length_m };
+                at.normal_B.x.hypot(at.normal_B.z) * self.radius_of_cap(rim) + at.normal_B.y * y_m
+            }
+        };
+        within_m + self.rounding_m
     }
 
-    /// Caps are flat; on the side the centre of curvature is where the normal meets the axis.
+    /// Caps are flat; on the side the centre of curvature is where the normal meets the axis. Whoever is deeper below
+    /// a round rim than its radius has gone past its middle.
     fn holds_outside(&self, at: &SurfacePoint, depth_m: f64) -> bool {
-        at.piece != SIDE || depth_m * self.normal_rho < self.radius_at(at.point_B.y)
+        match at.piece {
+            TOP | BOTTOM => true,
+            SIDE => depth_m * self.normal_rho < around_y(&at.point_B).0,
+            _ => false,
+        }
     }
 
-    fn grown(&self, _radius_m: f64) -> Option<Self> {
-        None
+    fn grown(&self, radius_m: f64) -> Option<Self> {
+        Some(Self { rounding_m: self.rounding_m + radius_m, ..*self })
     }
 }
 

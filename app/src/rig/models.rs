@@ -3,7 +3,7 @@
 //! What was repaired is told once, what cannot be used is refused with the place in the scene and in the model.
 
 use super::RigError;
-use haptics::mesh::{Mesh, MeshError, MeshReport, TriangleSoup};
+use haptics::mesh::{Finding, Mesh, MeshError, MeshReport, TriangleSoup};
 use io_driver::say::say;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
@@ -92,11 +92,12 @@ fn place_of(error: &MeshError, file: &Path) -> String {
     line.map_or_else(String::new, |line| format!(" (face {first_face} is on line {line})"))
 }
 
-/// Nothing about a mesh without defects.
+/// Nothing about a mesh without defects. That equal vertices were merged is none: STL has no other way to share them.
 fn tell(file: &Path, report: &MeshReport) {
     if report.is_clean() {
         return;
     }
+    let report = MeshReport { welded_vertices: Finding::default(), ..*report };
     for (index, line) in report.to_string().lines().enumerate() {
         let indent = if index == 0 { "" } else { "  " };
         say(format_args!("phantom3: {}: {indent}{line}", file.display()));

@@ -1,7 +1,7 @@
 //! Every closed form beside a slow and obvious description of the same solid, written from its equation alone.
 #![allow(dead_code, non_snake_case)]
 
-use haptics::{Capsule, Cone, Cuboid, Cylinder, Ellipsoid, Form, Plane, Scaled, Sphere, Torus};
+use haptics::{Capsule, Cone, Cuboid, Cylinder, Ellipsoid, Form, Plane, Scaled, Sphere, Surface, Torus};
 use nalgebra::Vector3;
 use std::f64::consts::{PI, TAU};
 
@@ -62,13 +62,13 @@ impl Solid {
 
     /// Distance from `p` to the surface: the best of a grid, refined.
     pub(crate) fn distance(&self, p: &Vector3<f64>) -> f64 {
-        let n = 48;
+        let n = 36;
         let mut grid: Vec<(f64, f64, f64)> = (0..n * n)
             .map(|i| (f64::from(i % n) / f64::from(n), f64::from(i / n) / f64::from(n)))
             .map(|(u, v)| ((self.point(u, v) - p).norm(), u, v))
             .collect();
         grid.sort_by(|a, b| a.0.total_cmp(&b.0));
-        grid[..6].iter().map(|&(_, u, v)| self.descend(p, (u, v), 0.02)).fold(f64::INFINITY, f64::min)
+        grid[..4].iter().map(|&(_, u, v)| self.descend(p, (u, v), 0.02)).fold(f64::INFINITY, f64::min)
     }
 
     /// `u`, `v` of a surface point.
@@ -163,6 +163,62 @@ pub(crate) fn scaled(name: &'static str, inner: Solid, factors: [f64; 3]) -> Sol
     Solid { ring_m: inner.ring_m, factors, ..solid(name, form, inner.size_m * factors.max(), contains) }
 }
 
+/// What the centre of a ball of this radius must not enter; `beside` tells the distance of a point outside the solid.
+fn grown(
+    name: &'static str,
+    inner: Solid,
+    radius_m: f64,
+    beside: impl Fn(&Vector3<f64>) -> f64 + 'static,
+) -> Solid {
+    let form = inner.form.grown(radius_m).unwrap();
+    let contains = move |p: &Vector3<f64>| (inner.contains)(p) || beside(p) <= radius_m;
+    Solid {
+        ring_m: inner.ring_m,
+        factors: inner.factors,
+        ..solid(name, form, inner.size_m + radius_m, contains)
+    }
+}
+
+fn grown_cuboid(size: [f64; 3], radius_m: f64) -> Solid {
+    let beside = move |p: &Vector3<f64>| {
+        (0..3).map(|i| (p[i].abs() - 0.5 * size[i]).max(0.0).powi(2)).sum::<f64>().sqrt()
+    };
+    grown("grown box", cuboid(size), radius_m, beside)
+}
+
+fn grown_cone(name: &'static str, bottom: f64, top: f64, l: f64, radius_m: f64) -> Solid {
+    // The outline in the half-plane through the axis: three straight pieces.
+    let outline = [(0.0, -0.5 * l), (bottom, -0.5 * l), (top, 0.5 * l), (0.0, 0.5 * l)];
+    let beside = move |p: &Vector3<f64>| {
+        let (x, y) = (rho(p), p.y);
+        let to_piece = |(a, b): ((f64, f64), (f64, f64))| {
+            let (dx, dy) = (b.0 - a.0, b.1 - a.1);
+            let length_squared = (dx * dx + dy * dy).max(1e-30);
+            let along = (((x - a.0) * dx + (y - a.1) * dy) / length_squared).clamp(0.0, 1.0);
+            (x - a.0 - along * dx).hypot(y - a.1 - along * dy)
+        };
+        (0..3).map(|i| to_piece((outline[i], outline[i + 1]))).fold(f64::INFINITY, f64::min)
+    };
+    let inner = if bottom == top { cylinder(bottom, l) } else { cone(bottom, top, l) };
+    grown(name, inner, radius_m, beside)
+}
+
+fn grown_ellipsoid(radii: [f64; 3], radius_m: f64) -> Solid {
+    let beside = move |p: &Vector3<f64>| {
+        // x_i = a_i^2 p_i / (t + a_i^2) lies on the ellipsoid for one t > 0. Sum of squares over a_i^2 minus one falls
+        // and is convex, so that Newton from 0 walks up to it; 20 steps are several more than it takes.
+        let mut t = 0.0;
+        for _ in 0..20 {
+            let terms: [f64; 3] = std::array::from_fn(|i| radii[i] * p[i] / (t + radii[i] * radii[i]));
+            let excess = terms.iter().map(|x| x * x).sum::<f64>() - 1.0;
+            let slope = (0..3).map(|i| 2.0 * terms[i] * terms[i] / (t + radii[i] * radii[i])).sum::<f64>();
+            t += excess / slope;
+        }
+        Vector3::from_fn(|i, _| p[i] * t / (t + radii[i] * radii[i])).norm()
+    };
+    grown("grown ellipsoid", ellipsoid(radii), radius_m, beside)
+}
+
 /// One of each, of a hand's size and of uneven proportions.
 pub(crate) fn all() -> Vec<Solid> {
     vec![
@@ -178,6 +234,11 @@ pub(crate) fn all() -> Vec<Solid> {
         scaled("elliptic cone", cone(0.04, 0.015, 0.07), [0.8, 1.0, 1.2]),
         scaled("scaled capsule", capsule(0.02, 0.05), [1.0, 1.5, 0.8]),
         scaled("scaled torus", torus(0.05, 0.015), [1.2, 1.5, 0.9]),
+        grown_cuboid([0.08, 0.02, 0.05], 0.008),
+        grown_cone("grown cylinder", 0.03, 0.03, 0.06, 0.006),
+        grown_cone("grown cone", 0.03, 0.012, 0.05, 0.006),
+        grown_cone("grown pointed cone", 0.0, 0.03, 0.05, 0.004),
+        grown_ellipsoid([0.05, 0.03, 0.015], 0.005),
     ]
 }
 
