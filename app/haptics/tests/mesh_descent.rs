@@ -62,8 +62,8 @@ fn check_all(seeds: std::ops::Range<u64>) {
         for seed in seeds.clone() {
             let compared = compare(&mesh, seed, 10_000, size, 1e-3);
             assert!(compared.touching > 200, "{name}: {compared:?}");
-            // Deep below a convex vertex two ways lead downhill, and each takes one. On flat sides never.
-            let few = if matches!(name, "ball" | "bumpy") { compared.touching / 50 } else { 0 };
+            // Over a convex edge two ways may lead downhill, and each takes one: deep in a ball now and then.
+            let few = compared.touching / if matches!(name, "ball" | "bumpy") { 50 } else { 1000 };
             assert!(compared.parted <= few, "{name}: {compared:?}");
         }
     }
@@ -76,7 +76,7 @@ fn on_small_meshes_the_walk_is_the_obvious_descent() {
 
 /// `cargo test --release -p haptics --test mesh_descent -- --ignored`
 #[test]
-#[ignore = "the long version, a minute"]
+#[ignore = "the long version, half a minute"]
 fn on_small_meshes_the_walk_is_the_obvious_descent_for_four_million_ticks() {
     check_all(100..150);
 }
