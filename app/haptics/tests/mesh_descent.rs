@@ -46,8 +46,7 @@ fn compare(mesh: &Arc<Mesh>, seed: u64, ticks: usize, size: f64, step_m: f64) ->
     compared
 }
 
-#[test]
-fn on_small_meshes_the_walk_is_the_obvious_descent() {
+fn check_all(seeds: std::ops::Range<u64>) {
     let ball = built(make::uv_sphere(8, 4, 0.1));
     let bumpy = built(make::bumpy_sphere(12, 6, 0.1));
     for (name, mesh, size) in [
@@ -60,12 +59,24 @@ fn on_small_meshes_the_walk_is_the_obvious_descent() {
         ("ball", ball, 0.07),
         ("bumpy", bumpy, 0.07),
     ] {
-        for seed in 0..2 {
+        for seed in seeds.clone() {
             let compared = compare(&mesh, seed, 10_000, size, 1e-3);
             assert!(compared.touching > 200, "{name}: {compared:?}");
-            // Deep below a convex vertex two ways lead downhill, and each takes one. On flat sides never.
-            let few = if matches!(name, "ball" | "bumpy") { compared.touching / 50 } else { 0 };
+            // Over a convex edge two ways may lead downhill, and each takes one: deep in a ball now and then.
+            let few = compared.touching / if matches!(name, "ball" | "bumpy") { 50 } else { 1000 };
             assert!(compared.parted <= few, "{name}: {compared:?}");
         }
     }
+}
+
+#[test]
+fn on_small_meshes_the_walk_is_the_obvious_descent() {
+    check_all(0..2);
+}
+
+/// `cargo test --release -p haptics --test mesh_descent -- --ignored`
+#[test]
+#[ignore = "the long version, half a minute"]
+fn on_small_meshes_the_walk_is_the_obvious_descent_for_four_million_ticks() {
+    check_all(100..150);
 }

@@ -10,7 +10,7 @@ mod mesh_oracle;
 use common::meshes::*;
 use common::*;
 use haptics::mesh::{Mesh, Sides, make};
-use haptics::{FingerOutput, Friction};
+use haptics::{Contact, FingerOutput, Friction};
 use mesh_oracle::{closest, corners};
 use nalgebra::Vector3;
 use std::sync::Arc;
@@ -131,6 +131,44 @@ fn check_all(ticks: usize, meridians: usize) {
     check("star", star(), 0.07, 5e-4, ticks);
     check("bumpy ball", bumpy_sphere(meridians), 0.09, 5e-4, ticks);
     check("Klein bottle", built(make::klein_bottle(64, 32, 0.1)), 0.1, 5e-4, ticks);
+}
+
+#[test]
+fn a_klein_bottle_is_felt_from_wherever_one_comes_and_never_pressed_through() {
+    let bottle = built(make::klein_bottle(128, 64, 0.1));
+    let entity = touchable(&bottle, Friction::None);
+    let mut noise = Noise(12);
+    let mut felt = 0;
+    for _ in 0..2000 {
+        let face = (noise.uniform() * bottle.faces().len() as f64) as usize;
+        let [a, b, c] = corners(&bottle, face);
+        let middle = (a + b + c) / 3.0;
+        // From either side: what is inside to one finger is outside to another.
+        let side = if noise.uniform() < 0.5 { 1.0 } else { -1.0 };
+        let normal = bottle.faces()[face].normal_B * side;
+        let mut finger = point_finger();
+        for i in -10..=20 {
+            let depth = 1e-4 * f64::from(i);
+            let was_touching = finger.contact(0).is_some();
+            let out = step(&mut finger, &entity, &(middle - normal * depth));
+            let contact = finger.contact(0);
+            let begins_here = |contact: &Contact| (contact.god_object_W - middle).norm() < 1.1e-4;
+            if !was_touching && contact.is_some_and(|contact| !begins_here(contact)) {
+                // Held by another sheet: where the neck runs through the belly.
+                break;
+            }
+            if i <= 0 {
+                continue;
+            }
+            felt += 1;
+            let contact = contact.unwrap_or_else(|| panic!("pressed through at {middle:?}, {depth}"));
+            assert!(contact.normal_W.dot(&normal) > 0.9, "on the side it came from: {contact:?}");
+            // Sheets bend: another place of the same side may be a little nearer.
+            let force_n = out.force_on_user_W.norm();
+            assert!(force_n <= K * depth * (1.0 + 1e-9) && force_n > 0.7 * K * depth, "{depth}: {force_n}");
+        }
+    }
+    assert!(felt > 20_000, "{felt}");
 }
 
 #[test]
