@@ -43,12 +43,10 @@ impl Cuboid {
     /// How far a point lies before the planes of the six faces.
     fn level(&self, point_B: &Vector3<f64>) -> Level {
         let height_m = |axis: usize| point_B[axis].abs() - self.half_m[axis];
-        let mut rank = 0;
-        for other in 1..3 {
-            if height_m(AXES[other]) > height_m(AXES[rank]) {
-                rank = other;
-            }
-        }
+        let farther = |rank: usize, other: usize| {
+            if height_m(AXES[other]) > height_m(AXES[rank]) { other } else { rank }
+        };
+        let rank = farther(farther(0, 1), 2);
         let axis = AXES[rank];
         let piece = 2 * rank as u32 + u32::from(point_B[axis] < 0.0);
         Level { height_m: height_m(axis) - self.rounding_m, gradient_B: normal(piece), piece }

@@ -106,7 +106,7 @@ impl FrictionCone {
             return answer(&view, &tangential_B, 0, input);
         }
         let slid = slide(surface, friction, &mut self.god_object, view, &self.grip.memory, &pull, input);
-        let drag_B = self.grip.drag(friction, &slid.view, &pull, input);
+        let drag_B = self.grip.drag(friction, &slid.tangential_B, &slid.view, &pull, input);
         answer(&slid.view, &(slid.tangential_B + drag_B), slid.rounds, input)
     }
 
@@ -140,6 +140,11 @@ pub(crate) fn answer(
     input: &ConeInput,
 ) -> ConeForce {
     let k = input.stiffness_n_per_m;
+    if view.load_m <= 0.0 {
+        // Touching without pressing is without force, whatever a law makes of it.
+        let force_on_user_B = Vector3::zeros();
+        return ConeForce { force_on_user_B, normal_force_n: 0.0, depth_m: view.depth_m, rounds };
+    }
     // Corrected: of the user on the object the printed sign is right, the device renders this.
     //= melder#4.7
     let force_on_user_B = (view.normal_B * view.load_m + tangential_B) * k;

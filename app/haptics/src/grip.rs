@@ -60,14 +60,15 @@ impl Grip {
             return None;
         }
         self.state = FrictionState::Stick;
-        let beside_B = self.drag(friction, view, pull, input) - damper(view, input);
+        let beside_B = self.drag(friction, &view.lag_B, view, pull, input) - damper(view, input);
         Some(cut_to(view.lag_B + beside_B, friction.held_limit_m(&query)))
     }
 
-    /// What the law renders beside the spring.
+    /// What the law renders beside the spring along the tangent.
     pub(crate) fn drag<L: FrictionLaw + ?Sized>(
         &self,
         friction: &L,
+        spring_B: &Vector3<f64>,
         view: &TangentView,
         pull: &Pull,
         input: &ConeInput,
@@ -75,7 +76,7 @@ impl Grip {
         if pull.travel_m <= 0.0 {
             return Vector3::zeros();
         }
-        let drag_m = friction.drag_m(&query(self.state, view.gap_m, 0.0, view, pull, input), &self.memory);
+        let drag_m = friction.drag_m(&query(self.state, spring_B.norm(), 0.0, view, pull, input), &self.memory);
         if drag_m == 0.0 {
             return Vector3::zeros();
         }
@@ -117,7 +118,7 @@ fn damper(view: &TangentView, input: &ConeInput) -> Vector3<f64> {
 }
 
 /// `v`, shortened to `limit` if it is longer.
-fn cut_to(v: Vector3<f64>, limit: f64) -> Vector3<f64> {
+pub(crate) fn cut_to(v: Vector3<f64>, limit: f64) -> Vector3<f64> {
     let length = v.norm();
     if length > limit { v * (limit / length) } else { v }
 }

@@ -31,8 +31,8 @@
 
 mod algorithm;
 mod capsule;
-mod cone;
 mod classic_god_object;
+mod cone;
 mod contact;
 mod convex;
 mod cuboid;
@@ -59,13 +59,12 @@ mod sphere;
 mod surface;
 mod tangent_view;
 mod torus;
+mod vector_field;
 
 pub use algorithm::{Algorithm, CONTACT_WORDS, ContactAlgorithm, ContactMemory, Touch, TouchInput};
 pub use capsule::Capsule;
-pub use cone::Cone;
-mod vector_field;
-
 pub use classic_god_object::ClassicGodObject;
+pub use cone::Cone;
 pub use contact::{Contact, RAMP_IN_S};
 pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;

@@ -112,13 +112,13 @@ impl Scaled {
         }
     }
 
-    fn into_unscaled(&self, point_B: &Vector3<f64>) -> Vector3<f64> {
+    fn without_scale(&self, point_B: &Vector3<f64>) -> Vector3<f64> {
         point_B.component_div(&self.factors)
     }
 
     fn unscaled_point(&self, at: &SurfacePoint) -> SurfacePoint {
         let normal_B = direction_or(&at.normal_B.component_mul(&self.factors), at.normal_B);
-        SurfacePoint { point_B: self.into_unscaled(&at.point_B), normal_B, ..*at }
+        SurfacePoint { point_B: self.without_scale(&at.point_B), normal_B, ..*at }
     }
 
     fn scaled_point(&self, at: &SurfacePoint) -> SurfacePoint {
@@ -151,7 +151,7 @@ impl Scaled {
     }
 
     fn nearest_unscaled(&self, point_B: &Vector3<f64>) -> SurfacePoint {
-        self.scaled_point(&self.surface().nearest(&self.into_unscaled(point_B)))
+        self.scaled_point(&self.surface().nearest(&self.without_scale(point_B)))
     }
 
     /// How the squared distance from the HIP bends along a tangent, by how it changes to either side; 2 for a plane.
@@ -168,7 +168,7 @@ impl Scaled {
 
 impl Surface for Scaled {
     fn signed_distance(&self, point_B: &Vector3<f64>) -> f64 {
-        self.surface().signed_distance(&self.into_unscaled(point_B)) * self.factors.min()
+        self.surface().signed_distance(&self.without_scale(point_B)) * self.factors.min()
     }
 
     fn nearest(&self, point_B: &Vector3<f64>) -> SurfacePoint {
@@ -184,12 +184,12 @@ impl Surface for Scaled {
     }
 
     fn entry(&self, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<SurfacePoint> {
-        let at = self.surface().entry(&self.into_unscaled(from_B), &self.into_unscaled(to_B))?;
+        let at = self.surface().entry(&self.without_scale(from_B), &self.without_scale(to_B))?;
         Some(self.scaled_point(&at))
     }
 
     fn settle(&self, from: &SurfacePoint, on_tangent_plane_B: &Vector3<f64>) -> SurfacePoint {
-        let target_U = self.into_unscaled(on_tangent_plane_B);
+        let target_U = self.without_scale(on_tangent_plane_B);
         self.scaled_point(&self.surface().settle(&self.unscaled_point(from), &target_U))
     }
 

@@ -22,7 +22,7 @@ use nalgebra::Vector3;
 
 use crate::friction_cone::ConeInput;
 use crate::friction_law::{FrictionLaw, FrictionMemory, FrictionQuery, FrictionState};
-use crate::grip::{Pull, query};
+use crate::grip::{Pull, cut_to, query};
 use crate::surface::{Surface, SurfacePoint};
 use crate::tangent_view::TangentView;
 
@@ -53,9 +53,14 @@ pub(crate) fn slide<S: Surface + ?Sized, L: FrictionLaw + ?Sized>(
         let asked = |query: &_| friction.slide(query, memory);
         Round::new(view, direction_before_B, asked, &(start_B - god_object.point_B), pull, input)
     };
+    let limit_m = |view: &TangentView| {
+        friction.held_limit_m(&query(FrictionState::Slip, view.gap_m, 0.0, view, pull, input))
+    };
+    let rested =
+        |view: TangentView, rounds| Slid { view, tangential_B: cut_to(view.lag_B, limit_m(&view)), rounds };
     let mut round = look(view, &Vector3::zeros(), god_object);
     if round.is_inside_the_circle() {
-        return Slid { view, tangential_B: view.lag_B, rounds: 0 };
+        return rested(view, 0);
     }
     let mut secant = Secant::default();
     for rounds in 1..=MAX_SLIDE_ROUNDS {
@@ -73,16 +78,21 @@ pub(crate) fn slide<S: Surface + ?Sized, L: FrictionLaw + ?Sized>(
             secant = Secant::default();
             round = look(view, &Vector3::zeros(), god_object);
             if round.is_inside_the_circle() {
-                return Slid { view, tangential_B: view.lag_B, rounds };
+                return rested(view, rounds);
             }
             continue;
         }
         round = look(view, &round.direction_B, god_object);
         if round.asked_m.is_nan() || round.asked_m.abs() <= view.rest_m {
-            return round.finished(rounds);
+            return round.arrived(rounds);
         }
     }
-    round.finished(MAX_SLIDE_ROUNDS)
+    // A god-object that went too far is inside its circle, and its own spring is felt, or none if it is past S.
+    let went_too_far = round.asked_m < 0.0;
+    if went_too_far && round.gap_m <= 0.0 {
+        return Slid { tangential_B: Vector3::zeros(), ..rested(round.view, MAX_SLIDE_ROUNDS) };
+    }
+    if went_too_far { rested(round.view, MAX_SLIDE_ROUNDS) } else { round.arrived(MAX_SLIDE_ROUNDS) }
 }
 
 /// One look at the contact during a slide.
@@ -130,10 +140,10 @@ impl Round {
         self.view.surface_point_B + self.direction_B * radius_m
     }
 
-    /// The force belongs to the rim that the law asks for; what is left to slide is rounding, or
-    /// the debt of a search that met its bound, and must not leave the friction cone.
-    fn finished(&self, rounds: u32) -> Slid {
-        let radius_m = self.gap_m - self.asked_m;
+    /// The force belongs to the rim that the law asks for; what is left to slide is rounding, or the debt of a search
+    /// that met its bound, and must not leave the friction cone, nor pull along with the motion.
+    fn arrived(&self, rounds: u32) -> Slid {
+        let radius_m = (self.gap_m - self.asked_m).max(0.0);
         Slid { view: self.view, tangential_B: self.direction_B * radius_m, rounds }
     }
 }

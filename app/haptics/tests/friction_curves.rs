@@ -8,7 +8,7 @@
 mod common;
 
 use common::*;
-use haptics::{ContactState, Friction, FrictionCurve, Karnopp, Stribeck};
+use haptics::{ContactState, Friction, FrictionCurve, FrictionState, Karnopp, Stribeck};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 
@@ -218,5 +218,40 @@ fn the_steady_slide_of_models_with_a_strain_is_on_their_curve() {
             let expected = curve(speed.abs());
             assert!((last.1 - expected).abs() < 1e-10, "{name}: {} at {speed} m/s", last.1);
         }
+    }
+}
+
+#[test]
+fn on_a_sphere_in_noise_every_pair_is_on_the_curve_too() {
+    for model in drawn_models() {
+        let r = 0.1;
+        let entity = [ball(r, model.friction.clone())];
+        let (mut finger, mut noise, mut before, mut slid) = (point_finger(), Noise(85), None, 0);
+        for i in 0..30_000 {
+            let hip = on_circle(r - DEPTH, 0.5 * (TAU * f64::from(i) * DT).sin()) + noise.vector(1e-3);
+            let out = finger.step(&entity, &hip, DT);
+            let Some(contact) = finger.contact(0) else { continue };
+            let Some(god_before) = before.replace(contact.god_object_W) else { continue };
+            let speed = (contact.god_object_W - god_before).norm() / DT;
+            let (ratio, load) = (ratio(&out, &contact.normal_W), contact.normal_force_n / K);
+            if contact.friction == FrictionState::Slip && speed > 1e-9 {
+                slid += 1;
+                // As on the plane; a normal is rounded too.
+                let tolerance = 1e-10 + 2e-16 / load + (1e-11 + 2e-16 / DT) * model.steepest;
+                let expected = (model.slip)(speed);
+                assert!(
+                    (ratio - expected).abs() <= tolerance,
+                    "{}: tick {i}, {ratio} at {speed}",
+                    model.name
+                );
+            } else {
+                assert!(
+                    ratio <= model.mu_s * (1.0 + 1e-10) + 1e-15 / load,
+                    "{}: {ratio} at rest",
+                    model.name
+                );
+            }
+        }
+        assert!(slid > 2000, "{}: {slid}", model.name);
     }
 }

@@ -5,7 +5,8 @@ mod common;
 
 use common::*;
 use haptics::{
-    ContactState, Friction, FrictionLaw, FrictionMemory, FrictionQuery, FrictionState, ParameterError,
+    Bristles, ContactState, Friction, FrictionLaw, FrictionMemory, FrictionQuery, FrictionState,
+    ParameterError,
 };
 use nalgebra::Vector3;
 
@@ -135,6 +136,22 @@ fn bristles_follow_bonds_that_are_places_also_when_the_motion_reverses() {
         assert!((god - mean).abs() < 1e-9, "the god-object is where the mean bond is");
     }
     assert!(crossings > 20 && snaps > 5_000, "{crossings} {snaps}");
+}
+
+#[test]
+fn bristles_that_snap_against_the_motion_leave_no_more_force_than_there_was() {
+    // The load has just fallen, so that the bond bent forwards is the only one too long.
+    let law = Bristles::new(MU_D, 3, 1).unwrap();
+    let mut memory = FrictionMemory::default();
+    memory.words[..3].copy_from_slice(&[-4.6e-4, 4.4e-4, 4.4e-4]);
+    let mean = 1.4e-4;
+    memory.words[20] = mean;
+    let query = FrictionQuery { gap_m: mean, load_m: 1e-3, dt_s: DT, ..Default::default() };
+    assert_eq!(law.held_limit_m(&query), 1.5 * MU_D * 1e-3, "between the two");
+    assert!(!law.holds(&query, &mut memory));
+    assert_eq!(law.slide(&query, &memory), 0.0, "it is not driven away from S");
+    let now: f64 = memory.words[..3].iter().sum::<f64>() / 3.0;
+    assert!((now - mean).abs() < 1e-18, "and its bonds agree with where it is");
 }
 
 #[test]

@@ -40,6 +40,26 @@ const BOUNDS: [(usize, f64, f64); 4] =
     [(32, 0.33, 0.49), (100, 0.065, 0.22), (316, 0.02, 0.0701), (1000, 0.008, 0.0225)];
 
 #[test]
+fn the_standard_path_is_what_it_says() {
+    let path = path::standard_path(path::smooth);
+    assert_eq!(path.len(), 16_000);
+    let of = |phase| path.iter().filter(move |(of, _)| *of == phase).map(|(_, hip)| *hip);
+    let slide: Vec<_> = of(Phase::Slide).collect();
+    for pair in slide.windows(2) {
+        // 0.2 mm of the surface are 0.19 mm at the HIP; a chord, and one midpoint per step, change it by a hundredth
+        // where the spiral turns most, near the poles.
+        let step_m = (pair[1] - pair[0]).norm();
+        assert!((step_m / (0.95 * path::STEP_M) - 1.0).abs() < 0.01, "{step_m}");
+    }
+    assert!(slide.iter().all(|hip| (R - hip.norm() - DEPTH).abs() < 1e-16));
+    assert!(of(Phase::Free).all(|hip| (hip.norm() - path::FREE_M).abs() < 1e-16));
+    let lowest = slide.last().unwrap().y / (R - DEPTH);
+    assert!((-1.0..-0.95).contains(&lowest), "from pole to pole: {lowest}");
+    // No leap between phases: 0.24 mm at most while free.
+    assert!(path.windows(2).all(|pair| (pair[1].1 - pair[0].1).norm() < 2.5e-4));
+}
+
+#[test]
 fn frictionless_forces_come_close_to_the_ball_s_and_do_not_jump() {
     for (meridians, most_rms_n, most_change_n) in BOUNDS {
         let slide = slide(meridians, Friction::None);

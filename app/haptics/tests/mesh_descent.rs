@@ -60,7 +60,7 @@ fn on_small_meshes_the_walk_is_the_obvious_descent() {
         ("ball", ball, 0.07),
         ("bumpy", bumpy, 0.07),
     ] {
-        for seed in 0..4 {
+        for seed in 0..2 {
             let compared = compare(&mesh, seed, 10_000, size, 1e-3);
             assert!(compared.touching > 200, "{name}: {compared:?}");
             // Deep below a convex vertex two ways lead downhill, and each takes one. On flat sides never.

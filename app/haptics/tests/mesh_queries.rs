@@ -8,7 +8,7 @@ use common::Noise;
 use haptics::Feature;
 use haptics::mesh::{Bvh, Mesh, Sides, TriangleSoup, Triangles, make};
 use mesh_oracle as oracle;
-use nalgebra::Vector3;
+use nalgebra::{Rotation3, Vector3};
 
 fn mesh(soup: TriangleSoup) -> Mesh {
     Mesh::build(soup).expect("a mesh").0
@@ -162,6 +162,21 @@ fn inside_is_where_the_mesh_goes_around_once() {
             let times = oracle::winding_number(&mesh, &p);
             assert_eq!(mesh.is_inside(&p), times > 0.5, "{name}: {p:?} {times}");
         }
+    }
+}
+
+/// Beyond an edge this sharp most directions are behind one of its faces. Tilted, so that the box does not help.
+#[test]
+fn beyond_a_sharp_edge_is_outside() {
+    let tilt = Rotation3::from_euler_angles(0.5, 0.6, 0.7);
+    let soup = make::wedge(0.3, 0.05, 0.1);
+    let vertices = soup.vertices.iter().map(|vertex| tilt * vertex).collect();
+    let mesh = mesh(TriangleSoup { vertices, ..soup });
+    let mut noise = Noise(17);
+    for _ in 0..5000 {
+        let p = tilt * (Vector3::z() * noise.between(-0.051, 0.051) + noise.vector(0.002));
+        let times = oracle::winding_number(&mesh, &p);
+        assert_eq!(mesh.is_inside(&p), times > 0.5, "{p:?} {times}");
     }
 }
 

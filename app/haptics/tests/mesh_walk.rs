@@ -223,7 +223,10 @@ fn another_mesh_in_the_same_place_is_met_anew() {
     let mut feel = |entity: &Entity, hip| finger.step(std::slice::from_ref(entity), &hip, DT);
     feel(&fine, on_circle(0.101, 1.0));
     assert_eq!(feel(&fine, on_circle(0.095, 1.0)).entity, Some(0));
-    assert_eq!(feel(&coarse, Vector3::new(0.048, 0.0, 0.0)).force_on_user_W, Vector3::x() * (K * (0.05 - 0.048)));
+    assert_eq!(
+        feel(&coarse, Vector3::new(0.048, 0.0, 0.0)).force_on_user_W,
+        Vector3::x() * (K * (0.05 - 0.048))
+    );
     assert_eq!(feel(&fine, on_circle(0.12, 1.0)).entity, None);
 }
 

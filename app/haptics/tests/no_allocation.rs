@@ -49,7 +49,8 @@ fn a_step_on_a_mesh_never_allocates() {
     let before = CALLS.get();
     for i in 0..100_000 {
         let t = f64::from(i) * DT;
-        let hip = Vector3::new(0.025 * (2.0 * t).sin(), 0.025 * (3.0 * t).cos(), 0.01 * t.sin()) + noise.vector(1e-5);
+        let hip = Vector3::new(0.025 * (2.0 * t).sin(), 0.025 * (3.0 * t).cos(), 0.01 * t.sin())
+            + noise.vector(1e-5);
         match finger.step(&entities, &hip, DT).friction {
             haptics::ContactState::Free => free += 1,
             haptics::ContactState::Stick => stuck += 1,

@@ -4,7 +4,7 @@
 mod common;
 
 use common::*;
-use haptics::{ContactState, Entity, Feature, Finger, FingerOutput, Friction, Plane};
+use haptics::{ContactState, Entity, Feature, FingerOutput, Friction, Plane};
 use nalgebra::{Isometry3, Vector3};
 use proptest::prelude::*;
 

@@ -59,9 +59,11 @@ proptest! {
             prop_assert!((normal_force - contact.normal_force_n).abs() <= rounding);
             prop_assert!(normal_force >= -rounding);
             if let Some(mu) = largest_ratio(&friction, contact.normal_force_n) {
-                // What is felt beside the spring is added to a slide that ended within 1e-12 of the load.
-                let beside = if matches!(friction, Friction::LuGre(_)) { 2e-12 } else { 0.0 };
-                let limit = (mu + beside) * contact.normal_force_n;
+                // What is felt beside the spring is added to a slide that ended within 1e-12 of the load, or
+                // within some roundings of a position.
+                let beside = 1e-12 * contact.normal_force_n + K * 1e-15 * hip.norm();
+                let beside = if matches!(friction, Friction::LuGre(_)) { 2.0 * beside } else { 0.0 };
+                let limit = mu * contact.normal_force_n + beside;
                 prop_assert!(tangential <= limit + rounding, "{tangential} {mu} {contact:?}");
             }
             // And the god-object is on the surface.

@@ -206,6 +206,23 @@ fn a_finger_through_a_thin_thing_in_one_tick_is_caught_but_not_one_through_a_sma
     assert_eq!(step(&mut finger, &entity, Vector3::new(0.0, -5e-3, 0.0)).entity, None);
 }
 
+/// Exactly through the middle the god-object has no reason to turn to either side; yet round things let go.
+#[test]
+fn a_finger_straight_through_the_middle_of_something_round_comes_out_free() {
+    for solid in solids::all() {
+        let (entity, mut finger) = (entity(solid.form, Friction::None), point_finger());
+        let (mut touched, mut out) = (0, None);
+        for i in -200..=400 {
+            let hip = Vector3::x() * (1e-2 * f64::from(i) * solid.size_m);
+            out = Some(step(&mut finger, &entity, hip));
+            touched += u32::from(out.is_some_and(|out| out.entity.is_some()));
+        }
+        let is_flat = solid.name.contains("box");
+        assert!(touched > 10, "{}: {touched}", solid.name);
+        assert_eq!(out.unwrap().entity.is_some(), is_flat, "{}", solid.name);
+    }
+}
+
 /// The god-object on a box never leaves the face it pressed, however near another one is.
 #[test]
 fn a_finger_in_a_corner_keeps_its_face_and_bears_its_force() {

@@ -18,6 +18,7 @@
 //!
 //! Invariants: `|F_t| <= 3/2 mu N`; while no bond snaps it holds. Cost: linear in the bonds.
 
+use super::sliding::within;
 use crate::error::{ParameterError, at_least_zero};
 use crate::friction_law::{FrictionLaw, FrictionMemory, FrictionQuery, MEMORY_WORDS};
 
@@ -88,7 +89,7 @@ impl FrictionLaw for Bristles {
     }
 
     fn slide(&self, query: &FrictionQuery, memory: &FrictionMemory) -> f64 {
-        query.gap_m - memory.words[MEAN].min(self.held_limit_m(query))
+        within(self.held_limit_m(query), query.gap_m - memory.words[MEAN], query)
     }
 
     fn held_limit_m(&self, query: &FrictionQuery) -> f64 {

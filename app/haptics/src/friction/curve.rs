@@ -13,7 +13,7 @@
 //! [`MAX_CURVE_POINTS`]; nothing is allocated after construction.
 
 use super::RESTICK_MARGIN;
-use super::sliding::{ON_THE_CURVE, knows_time, remember_speed, start_m};
+use super::sliding::{ON_THE_CURVE, knows_time, remember_speed, start_m, within};
 use crate::error::{ParameterError, at_least_zero};
 use crate::friction_law::{FrictionLaw, FrictionMemory, FrictionQuery, FrictionState};
 use std::sync::Arc;
@@ -160,7 +160,7 @@ impl FrictionLaw for FrictionCurve {
             Some(x) => x,
             // Friction that begins with zero holds nothing back on its way to S.
             None if self.points[0].1 == 0.0 => query.gap_m,
-            None => -query.travel_m,
+            None => within(self.held_limit_m(query), -query.travel_m, query),
         }
     }
 

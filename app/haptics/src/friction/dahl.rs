@@ -20,6 +20,7 @@
 //! Invariant: `|F_t| <= mu N`; when the load falls below what the strain asks for, the god-object
 //! slides. Cost: a few flops; no memory.
 
+use super::sliding::within;
 use crate::error::{ParameterError, at_least_zero};
 use crate::friction_law::{FrictionLaw, FrictionMemory, FrictionQuery};
 
@@ -43,7 +44,8 @@ impl FrictionLaw for Dahl {
 
     fn slide(&self, query: &FrictionQuery, _memory: &FrictionMemory) -> f64 {
         let limit_m = self.mu * query.load_m;
-        yielded(query, limit_m).max(query.gap_m - limit_m)
+        // When the load falls, what the strain asks for may be more than can be borne.
+        within(limit_m, yielded(query, limit_m), query)
     }
 
     fn held_limit_m(&self, query: &FrictionQuery) -> f64 {

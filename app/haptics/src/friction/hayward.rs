@@ -23,6 +23,7 @@
 //! Invariants: `|F_t| <= mu N`; within `z_stick` it holds, whatever the noise. Cost: one square root;
 //! no memory.
 
+use super::sliding::within;
 use crate::error::{ParameterError, at_least_zero};
 use crate::friction_law::{FrictionLaw, FrictionMemory, FrictionQuery};
 
@@ -72,7 +73,8 @@ impl FrictionLaw for HaywardArmstrong {
         if z_max_m.is_nan() || z_max_m <= 0.0 {
             return query.gap_m;
         }
-        query.gap_m - self.strain_m(query.gap_m + query.travel_m, query.hip_travel_m, z_max_m)
+        let strain_m = self.strain_m(query.gap_m + query.travel_m, query.hip_travel_m, z_max_m);
+        within(z_max_m, query.gap_m - strain_m, query)
     }
 
     fn held_limit_m(&self, query: &FrictionQuery) -> f64 {

@@ -21,6 +21,7 @@
 //! Invariant: `|F_t| <= (mu_s + mu_v v) N`. Cost: two exponentials; no memory.
 
 use super::dahl::yielded;
+use super::sliding::within;
 use super::stribeck::Stribeck;
 use crate::error::{ParameterError, at_least_zero};
 use crate::friction_law::{FrictionLaw, FrictionMemory, FrictionQuery};
@@ -59,9 +60,7 @@ impl FrictionLaw for LuGre {
     }
 
     fn slide(&self, query: &FrictionQuery, _memory: &FrictionMemory) -> f64 {
-        let yielded_m = yielded(query, self.strain_limit_m(query));
-        // When the load falls, what the strain asks for may be more than can be borne.
-        yielded_m.max(query.gap_m - self.held_limit_m(query))
+        within(self.held_limit_m(query), yielded(query, self.strain_limit_m(query)), query)
     }
 
     fn held_limit_m(&self, query: &FrictionQuery) -> f64 {

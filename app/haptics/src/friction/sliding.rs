@@ -34,6 +34,14 @@ pub(super) fn start_m(query: &FrictionQuery, memory: &FrictionMemory) -> f64 {
     if query.travel_m != 0.0 { query.travel_m.max(0.0) } else { memory.words[SPEED] * query.dt_s }
 }
 
+/// A move after which the gap is within `limit_m` to either side of S.
+///
+/// On a plane every model sees to that by itself. Round a needle a god-object can come to lie on the
+/// other side of where it was, and what it was to keep of its strain is then on the wrong side too.
+pub(super) fn within(limit_m: f64, slide_m: f64, query: &FrictionQuery) -> f64 {
+    slide_m.max(query.gap_m - limit_m).min(query.gap_m + limit_m)
+}
+
 pub(super) fn knows_time(query: &FrictionQuery) -> bool {
     query.dt_s > 0.0 && query.dt_s.is_finite()
 }

@@ -27,7 +27,7 @@
 
 use super::RESTICK_MARGIN;
 use super::classical::Classical;
-use super::sliding::{ON_THE_CURVE, knows_time, remember_speed, start_m};
+use super::sliding::{ON_THE_CURVE, knows_time, remember_speed, start_m, within};
 use crate::error::{ParameterError, above_zero, at_least_zero, static_at_least};
 use crate::friction_law::{FrictionLaw, FrictionMemory, FrictionQuery, FrictionState};
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -116,7 +116,7 @@ impl FrictionLaw for Stribeck {
         }
         match balance.first_met_from(start_m(query, memory) / balance.unit_m) {
             Some(u) => u * balance.unit_m - query.travel_m,
-            None => -query.travel_m,
+            None => within(self.held_limit_m(query), -query.travel_m, query),
         }
     }
 

@@ -177,7 +177,7 @@ impl Touching {
         let asked = |query: &_| friction.slide(query, &self.grip.memory);
         let Walked { view, tangential_B, changes } =
             walk(mesh, &mut self.god_object, from, asked, pull, input)?;
-        let drag_B = self.grip.drag(friction, &view, pull, input);
+        let drag_B = self.grip.drag(friction, &tangential_B, &view, pull, input);
         Some((view, tangential_B + drag_B, changes))
     }
 }

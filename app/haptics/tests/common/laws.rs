@@ -58,9 +58,9 @@ pub(crate) fn largest_ratio(friction: &Friction, normal_force_n: f64) -> Option<
         {
             return None;
         }
-        Friction::Stribeck(law) if law.ratio_at(1e3) > law.ratio_at(0.0) => return None,
+        Friction::Stribeck(law) if law.ratio_at(1e12) > law.ratio_at(0.0) => return None,
         Friction::Karnopp(law) if law.ratio_at(1.0) > law.ratio_at(0.0) => return None,
-        Friction::LuGre(law) if law.ratio_at(1e3) > law.ratio_at(0.0) => return None,
+        Friction::LuGre(law) if law.ratio_at(1e12) > law.ratio_at(0.0) => return None,
         Friction::Curve(law) => {
             return Some(law.points().iter().map(|point| point.1).fold(law.mu_s(), f64::max));
         }
