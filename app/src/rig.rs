@@ -1,16 +1,17 @@
 //! From files and arguments to everything a run needs: whatever can be wrong with the input is found here,
 //! before anything is started.
 
+mod error;
 mod material;
 mod models;
 
+pub use self::error::RigError;
 use self::material::Unfit;
 use self::models::Models;
 use crate::fast_step::{DeviceFinger, FastStep};
 use crate::mount::Mount;
 use crate::recording::Names;
-use crate::simulated::{SimulatedDevices, SimulationError, base_for_path};
-use haptics::mesh::MeshError;
+use crate::simulated::{SimulatedDevices, base_for_path};
 use haptics::{Entity, Finger, ParameterError};
 use io_driver::config::{
     Backend, DeviceConfig, DriverConfig, ProcessConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig, Wish,
@@ -18,115 +19,13 @@ use io_driver::config::{
 };
 use io_driver::device::Extras;
 use io_driver::device_file::Workspace;
-use io_driver::open::{OpenError, open_devices};
+use io_driver::open::open_devices;
 use io_driver::say::say;
-use io_driver::sim::script::{HandError, HandScript};
+use io_driver::sim::script::HandScript;
 use nalgebra::{Isometry3, Vector3};
 use shm_abi::segment::ClockMode;
-use std::io;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
-use world::model::ModelError;
-use world::{Layout, Location, Scene, SceneEntity, SceneError, SceneFinger, ShapeSpec};
-
-/// What is wrong with the input.
-#[derive(Debug, Error)]
-pub enum RigError {
-    /// The scene or the layout.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// The hand file.
-    #[error(transparent)]
-    Hand(#[from] HandError),
-    /// The hand file cannot be read.
-    #[error(
-        "cannot read the hand file {file}, named by {named_by}: {source}; name a CSV file that can be read"
-    )]
-    Unreadable {
-        /// Which.
-        file: PathBuf,
-        /// Who asks for it.
-        named_by: String,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// The hand file is a pipe, a directory or a device.
-    #[error(
-        "the hand file {file}, named by {named_by}, is not a regular file; \
-         allowed: a file, since every device reads it from its beginning"
-    )]
-    NotAFile {
-        /// Which.
-        file: PathBuf,
-        /// Who asks for it.
-        named_by: String,
-    },
-    /// The devices cannot be simulated.
-    #[error(transparent)]
-    Simulation(#[from] SimulationError),
-    /// The simulated devices cannot be had.
-    #[error(transparent)]
-    Device(#[from] OpenError),
-    /// The scene holds something that rendering refuses.
-    #[error("{file}: {what}: {source}")]
-    Refused {
-        /// The scene's file.
-        file: PathBuf,
-        /// The entity or finger.
-        what: String,
-        /// Why.
-        source: ParameterError,
-    },
-    /// A model file cannot be read.
-    #[error("{at}: {}: {source}", .file.display())]
-    Model {
-        /// Where the scene names it.
-        at: Box<Location>,
-        /// The model's file.
-        file: PathBuf,
-        /// Why.
-        source: ModelError,
-    },
-    /// A model file's triangles make no mesh.
-    #[error("{at}: {}: {source}{place}", .file.display())]
-    Mesh {
-        /// Where the scene names it.
-        at: Box<Location>,
-        /// The model's file.
-        file: PathBuf,
-        /// Where in that file, if it is known.
-        place: String,
-        /// Why.
-        source: MeshError,
-    },
-    /// A finger with a radius meets a shape that has no surface for its centre to roll on.
-    #[error(
-        "{}: finger {finger} has radius_m = {radius_m}, and entity {entity}, a {kind}, cannot be felt by such a finger; \
-         allowed: radius_m = 0, which feels every shape{smaller}, or another shape", .file.display()
-    )]
-    NotFelt {
-        /// The scene's file.
-        file: PathBuf,
-        /// The finger's name.
-        finger: String,
-        /// Its radius (m).
-        radius_m: f64,
-        /// The entity's name.
-        entity: String,
-        /// The kind of its shape.
-        kind: &'static str,
-        /// Whether a smaller radius would do.
-        smaller: &'static str,
-    },
-    /// Something of the grammar that this version has not got.
-    #[error("{file}: {what} is not available in this version")]
-    NotAvailable {
-        /// The scene's file.
-        file: PathBuf,
-        /// What.
-        what: String,
-    },
-}
+use world::{Layout, Scene, SceneEntity, SceneFinger, ShapeSpec};
 
 /// What a run needs, checked.
 #[derive(Debug, Clone)]

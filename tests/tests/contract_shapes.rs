@@ -20,7 +20,12 @@ struct Kind {
     normal: fn(&V) -> V,
 }
 
-const KINDS: [Kind; 11] = [
+const KINDS: [Kind; 12] = [
+    Kind {
+        shape: "kind = \"plane\", normal = [0.0, 3.0, 4.0], offset_m = 0.1",
+        places: &[([0.01, 0.012, 0.016], "surface"), ([-0.03, 0.0, 0.025], "surface")],
+        normal: |_| V::new(0.0, 0.6, 0.8),
+    },
     Kind {
         shape: "kind = \"box\", size_m = [0.06, 0.04, 0.1]",
         places: &[

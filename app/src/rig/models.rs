@@ -7,6 +7,7 @@ use haptics::mesh::{Finding, Mesh, MeshError, MeshReport, TriangleSoup};
 use io_driver::say::say;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use world::model::{self, Format, ModelError};
@@ -30,9 +31,8 @@ impl Models {
         let mut models = Self::default();
         for entity in &scene.entities {
             let ShapeSpec::Mesh(spec) = &entity.shape else { continue };
-            let key = key_of(spec);
-            if !models.meshes.contains_key(&key) {
-                models.meshes.insert(key, Arc::new(build(spec)?));
+            if let Entry::Vacant(place) = models.meshes.entry(key_of(spec)) {
+                place.insert(Arc::new(build(spec)?));
             }
         }
         Ok(models)
@@ -59,7 +59,7 @@ fn build(spec: &MeshSpec) -> Result<Mesh, RigError> {
         at: Box::new(spec.at.clone()),
         file: file.clone(),
         place: place_of(&source, file),
-        source,
+        source: Box::new(source),
     })?;
     tell(file, &report);
     Ok(mesh)

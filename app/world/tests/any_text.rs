@@ -6,6 +6,8 @@ use proptest::prelude::*;
 use world::{Layout, Scene};
 
 const GOOD: &str = include_str!("../../../config/scenes/default.toml");
+/// One of each shape, and many models of friction.
+const GALLERY: &str = include_str!("../../../config/scenes/shapes.toml");
 
 fn ends_well(text: &str) {
     let file = Path::new("any.toml");
@@ -38,7 +40,7 @@ fn is_sound(scene: &Scene) -> bool {
 fn piece() -> impl Strategy<Value = String> {
     let words = "[[finger]]|[[entity]]|[[device]]|[entity]|name|shape|kind|friction|model|normal|\
                  offset_m|radius_m|position_m|orientation_wxyz|device|hand|= |{|}|[|]|,|.|\n|\"|'|\"\"\"|\
-                 \"sphere\"|\"plane\"|\"box\"|\"stiction\"|mu_s|mu_d|1|0|-1|1e308|5e-324|nan|inf|-inf|0x|\
+                 \"sphere\"|\"plane\"|\"box\"|\"stiction\"|mu_s|mu_d|\"mesh\"|file|scale|\"torus\"|\"curve\"|speed_m_s|mu|algorithm|\"lugre\"|1|0|-1|1e308|5e-324|nan|inf|-inf|0x|\
                  true|1979-05-27|#|\\|\0|é|\u{feff}|[0,0,0]|[1,0,0,0]|[1e308,1e308,1e308]";
     let words: Vec<String> = words.split('|').map(str::to_owned).collect();
     prop_oneof![4 => prop::sample::select(words), 1 => any::<String>()]
@@ -73,6 +75,13 @@ proptest! {
     }
 
     #[test]
+    fn a_gallery_spoilt_anywhere_ends_in_a_scene_or_a_message(
+        changes in prop::collection::vec((any::<prop::sample::Index>(), 0usize..12, piece()), 1..4),
+    ) {
+        ends_well(&changes.iter().fold(GALLERY.to_owned(), |text, change| spoilt(change, &text)));
+    }
+
+    #[test]
     fn a_good_scene_with_its_lines_shuffled_ends_in_a_scene_or_a_message(
         lines in Just(GOOD.lines().map(str::to_owned).collect::<Vec<_>>()).prop_shuffle(),
     ) {
@@ -82,5 +91,7 @@ proptest! {
 
 #[test]
 fn the_good_scene_is_good() {
-    Scene::parse(GOOD, Path::new("default.toml")).unwrap_or_else(|error| panic!("{error}"));
+    for text in [GOOD, GALLERY] {
+        Scene::parse(text, Path::new("good.toml")).unwrap_or_else(|error| panic!("{error}"));
+    }
 }

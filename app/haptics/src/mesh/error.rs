@@ -67,7 +67,7 @@ impl fmt::Display for MeshError {
             }
             Self::Coordinate { vertex, value: [x, y, z] } => write!(
                 f,
-                "vertex {vertex} is at [{x}, {y}, {z}]; allowed are finite numbers of metres, at most \
+                "vertex {vertex} is at [{x:?}, {y:?}, {z:?}]; allowed are finite numbers of metres, at most \
                  {LARGEST_COORDINATE_M:e} in size: correct the vertex or the unit"
             ),
             Self::Index { face, found: [a, b, c], vertices } => write!(
@@ -108,7 +108,7 @@ mod tests {
             "face 7 refers to vertices [0, 1, 9], but there are 8, counted from 0: is the file cut short?"
         );
         let message = MeshError::Coordinate { vertex: 3, value: [0.0, f64::NAN, 1.0] }.to_string();
-        assert!(message.starts_with("vertex 3 is at [0, NaN, 1]; allowed are finite"), "{message}");
+        assert!(message.starts_with("vertex 3 is at [0.0, NaN, 1.0]; allowed are finite"), "{message}");
         let message =
             MeshError::NonManifold { edges: 2, first_face: 5, faces: 4, ends_B: [[0.0; 3], [1.0; 3]] }
                 .to_string();

@@ -96,7 +96,7 @@ fn not_finite(triangle: usize, corner: usize, vertex: &Vector3<f64>) -> ModelErr
     let [x, y, z] = (*vertex).into();
     ModelError::Byte {
         offset: HEADER_BYTES + triangle * TRIANGLE_BYTES + CORNERS_AT + 12 * corner,
-        found: format!("corner {corner} of triangle {triangle} (counted from 0) at [{x}, {y}, {z}]"),
+        found: format!("corner {corner} of triangle {triangle} (counted from 0) at [{x:?}, {y:?}, {z:?}]"),
         allowed: "finite numbers".into(),
     }
 }

@@ -1,0 +1,111 @@
+//! What can be wrong with the input of a run.
+
+use crate::simulated::SimulationError;
+use haptics::ParameterError;
+use haptics::mesh::MeshError;
+use io_driver::open::OpenError;
+use io_driver::sim::script::HandError;
+use std::io;
+use std::path::PathBuf;
+use thiserror::Error;
+use world::model::ModelError;
+use world::{Location, SceneError};
+
+/// What is wrong with the input.
+#[derive(Debug, Error)]
+pub enum RigError {
+    /// The scene or the layout.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The hand file.
+    #[error(transparent)]
+    Hand(#[from] HandError),
+    /// The hand file cannot be read.
+    #[error(
+        "cannot read the hand file {file}, named by {named_by}: {source}; name a CSV file that can be read"
+    )]
+    Unreadable {
+        /// Which.
+        file: PathBuf,
+        /// Who asks for it.
+        named_by: String,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The hand file is a pipe, a directory or a device.
+    #[error(
+        "the hand file {file}, named by {named_by}, is not a regular file; \
+         allowed: a file, since every device reads it from its beginning"
+    )]
+    NotAFile {
+        /// Which.
+        file: PathBuf,
+        /// Who asks for it.
+        named_by: String,
+    },
+    /// The devices cannot be simulated.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// The simulated devices cannot be had.
+    #[error(transparent)]
+    Device(#[from] OpenError),
+    /// The scene holds something that rendering refuses.
+    #[error("{file}: {what}: {source}")]
+    Refused {
+        /// The scene's file.
+        file: PathBuf,
+        /// The entity or finger.
+        what: String,
+        /// Why.
+        source: ParameterError,
+    },
+    /// A model file cannot be read.
+    #[error("{at}: {}: {source}", .file.display())]
+    Model {
+        /// Where the scene names it.
+        at: Box<Location>,
+        /// The model's file.
+        file: PathBuf,
+        /// Why.
+        source: ModelError,
+    },
+    /// A model file's triangles make no mesh.
+    #[error("{at}: {}: {source}{place}", .file.display())]
+    Mesh {
+        /// Where the scene names it.
+        at: Box<Location>,
+        /// The model's file.
+        file: PathBuf,
+        /// Where in that file, if it is known.
+        place: String,
+        /// Why.
+        source: Box<MeshError>,
+    },
+    /// A finger with a radius meets a shape that has no surface for its centre to roll on.
+    #[error(
+        "{}: finger {finger} has radius_m = {radius_m}, and entity {entity}, a {kind}, cannot be felt by such a finger; \
+         allowed: radius_m = 0, which feels every shape{smaller}, or another shape", .file.display()
+    )]
+    NotFelt {
+        /// The scene's file.
+        file: PathBuf,
+        /// The finger's name.
+        finger: String,
+        /// Its radius (m).
+        radius_m: f64,
+        /// The entity's name.
+        entity: String,
+        /// The kind of its shape.
+        kind: &'static str,
+        /// Whether a smaller radius would do.
+        smaller: &'static str,
+    },
+    /// Something of the grammar that this version has not got.
+    #[error("{file}: {what} is not available in this version")]
+    NotAvailable {
+        /// The scene's file.
+        file: PathBuf,
+        /// What.
+        what: String,
+    },
+}
