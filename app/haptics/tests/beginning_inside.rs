@@ -37,9 +37,9 @@ fn an_entity_placed_over_a_finger_ramps_in_and_its_next_visit_does_not() {
     // Below the finger, then put over it: both poses change, as for an entity that appears.
     let below = Isometry3::translation(0.0, -1.0, 0.0);
     (floor.X_WB, floor.previous_X_WB) = (below, below);
-    assert_eq!(finger.step(&[floor.clone()], &hip, DT).entity, None);
+    assert_eq!(finger.step(std::slice::from_ref(&floor), &hip, DT).entity, None);
     (floor.X_WB, floor.previous_X_WB) = (Isometry3::identity(), Isometry3::identity());
-    assert!(finger.step(&[floor.clone()], &hip, DT).force_on_user_W.y < 0.02 * K * DEPTH);
-    finger.step(&[floor.clone()], &Vector3::new(0.0, 1e-3, 0.0), DT);
+    assert!(finger.step(std::slice::from_ref(&floor), &hip, DT).force_on_user_W.y < 0.02 * K * DEPTH);
+    finger.step(std::slice::from_ref(&floor), &Vector3::new(0.0, 1e-3, 0.0), DT);
     assert_eq!(finger.step(&[floor], &hip, DT).force_on_user_W.y, K * DEPTH);
 }

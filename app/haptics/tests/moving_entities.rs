@@ -16,7 +16,7 @@ fn sweep(finger: &mut Finger, law: Friction) -> Option<haptics::FingerOutput> {
     for i in -19..=3 {
         // 5 m/s, with a slip along the wall's plane of 1 m/s.
         wall.move_to(Isometry3::translation(f64::from(i) * 5e-3 + 2e-3, f64::from(i) * 1e-3, 0.0));
-        let out = finger.step(&[wall.clone()], &Vector3::zeros(), DT);
+        let out = finger.step(std::slice::from_ref(&wall), &Vector3::zeros(), DT);
         if out.entity.is_some() {
             first = first.or(Some(out));
         }
@@ -43,11 +43,11 @@ fn a_ball_that_lands_on_a_resting_finger_is_felt_at_its_near_side() {
     ball.move_to(Isometry3::translation(0.0, 0.05, 0.0));
     ball.move_to(ball.X_WB);
     let mut finger = point_finger();
-    let mut out = finger.step(&[ball.clone()], &Vector3::zeros(), DT);
+    let mut out = finger.step(std::slice::from_ref(&ball), &Vector3::zeros(), DT);
     assert_eq!(out.entity, None);
     // One tick moves it beyond the finger's middle: the nearest point would be its far side.
     ball.move_to(Isometry3::translation(0.0, -0.005, 0.0));
-    out = finger.step(&[ball.clone()], &Vector3::zeros(), DT);
+    out = finger.step(std::slice::from_ref(&ball), &Vector3::zeros(), DT);
     assert!((out.god_object_W - Vector3::new(0.0, -0.025, 0.0)).norm() < 1e-17);
     assert!(out.force_on_user_W.y < 0.0, "it pushes the finger ahead, downward");
 }
@@ -56,13 +56,13 @@ fn a_ball_that_lands_on_a_resting_finger_is_felt_at_its_near_side() {
 fn a_held_god_object_travels_with_its_entity() {
     let mut table = table(stiction());
     let mut finger = point_finger();
-    finger.step(&[table.clone()], &Vector3::new(0.01, -DEPTH, 0.0), DT);
+    finger.step(std::slice::from_ref(&table), &Vector3::new(0.01, -DEPTH, 0.0), DT);
     let on_table = Vector3::new(0.01, 0.0, 0.0);
     for i in 1..1000 {
         let angle = f64::from(i) * 1e-3;
         table.move_to(Isometry3::new(Vector3::new(0.0, 0.1 * angle, 0.0), Vector3::z() * angle));
         let hip = table.X_WB * nalgebra::Point3::new(0.01, -DEPTH, 0.0);
-        let out = finger.step(&[table.clone()], &hip.coords, DT);
+        let out = finger.step(std::slice::from_ref(&table), &hip.coords, DT);
         let expected = table.X_WB * nalgebra::Point3::from(on_table);
         // A rotation there and back of positions of 0.1 m.
         assert!((out.god_object_W - expected.coords).norm() < 1e-16);

@@ -29,7 +29,7 @@ fn the_normal_force_on_the_user_is_stiffness_times_depth_exactly() {
         let hip = Vector3::new(noise.gaussian(), -noise.uniform(), noise.gaussian());
         let out = point_finger().step(&[table(stiction())], &hip, DT);
         assert_eq!(out.force_on_user_W.y, K * -hip.y, "positive, out of the material");
-        let out = point_finger().step(&[shifted.clone()], &hip, DT);
+        let out = point_finger().step(std::slice::from_ref(&shifted), &hip, DT);
         assert_eq!(out.force_on_user_W.y, K * (0.1 - hip.y));
     }
 }
@@ -72,28 +72,28 @@ fn backing_off_it_first_stays_in_slip_unmoved_and_then_sticks() {
     let entity = table(stiction());
     let mut finger = point_finger();
     for i in 0..=5000 {
-        finger.step(&[entity.clone()], &Vector3::new(i as f64 * 1e-6, -DEPTH, 0.0), DT);
+        finger.step(std::slice::from_ref(&entity), &Vector3::new(i as f64 * 1e-6, -DEPTH, 0.0), DT);
     }
     let at_rest = finger.contact(0).unwrap().god_object_W;
     let rim = MU_D * DEPTH;
     for back in [0.005, 0.01, 0.015, 0.019, 0.021, 0.03, 0.5] {
         let hip = Vector3::new(at_rest.x + rim * (1.0 - back), -DEPTH, 0.0);
-        let out = finger.step(&[entity.clone()], &hip, DT);
+        let out = finger.step(std::slice::from_ref(&entity), &hip, DT);
         let expected = if back < 0.02 { ContactState::Slip } else { ContactState::Stick };
         assert_eq!(out.friction, expected, "{back} inside the rim");
         assert_eq!(out.god_object_W, at_rest);
     }
     // Stuck again, it bears the static coefficient: half way between the two it still holds.
     let hip = Vector3::new(at_rest.x + 0.5 * DEPTH, -DEPTH, 0.0);
-    assert_eq!(finger.step(&[entity.clone()], &hip, DT).god_object_W, at_rest);
+    assert_eq!(finger.step(std::slice::from_ref(&entity), &hip, DT).god_object_W, at_rest);
 }
 
 #[test]
 fn a_tick_that_lands_exactly_on_the_surface_is_contact_without_force() {
     let entity = table(stiction()).with_damping(5.0).unwrap();
     let mut finger = point_finger();
-    finger.step(&[entity.clone()], &Vector3::new(0.0, 0.01, 0.0), DT);
-    let out = finger.step(&[entity.clone()], &Vector3::zeros(), DT);
+    finger.step(std::slice::from_ref(&entity), &Vector3::new(0.0, 0.01, 0.0), DT);
+    let out = finger.step(std::slice::from_ref(&entity), &Vector3::zeros(), DT);
     assert_eq!((out.entity, out.feature), (Some(0), Feature::Surface));
     assert_eq!(out.force_on_user_W, Vector3::zeros());
 }
@@ -102,8 +102,8 @@ fn a_tick_that_lands_exactly_on_the_surface_is_contact_without_force() {
 fn the_first_point_touched_is_where_the_path_entered() {
     let mut finger = point_finger();
     let entity = table(Friction::coulomb(1.0).unwrap());
-    finger.step(&[entity.clone()], &Vector3::new(0.0, 0.003, 0.0), DT);
-    let out = finger.step(&[entity.clone()], &Vector3::new(0.004, -0.005, 0.0), DT);
+    finger.step(std::slice::from_ref(&entity), &Vector3::new(0.0, 0.003, 0.0), DT);
+    let out = finger.step(std::slice::from_ref(&entity), &Vector3::new(0.004, -0.005, 0.0), DT);
     // 3/8 of the way; one rounding of the fraction and one of the product.
     assert!((out.god_object_W - Vector3::new(0.0015, 0.0, 0.0)).norm() < 1e-18);
     assert_eq!(out.friction, ContactState::Stick);
@@ -167,8 +167,8 @@ proptest! {
         let mut hip = Vector3::new(0.0, 0.002, 0.0);
         for _ in 0..200 {
             let hip_there = X.rotation * hip + X.translation.vector;
-            let a = fingers[0].step(&[here.clone()], &hip, DT);
-            for out in [fingers[1].step(&[there.clone()], &hip_there, DT), fingers[2].step(&[oblique.clone()], &hip_there, DT)] {
+            let a = fingers[0].step(std::slice::from_ref(&here), &hip, DT);
+            for out in [fingers[1].step(std::slice::from_ref(&there), &hip_there, DT), fingers[2].step(std::slice::from_ref(&oblique), &hip_there, DT)] {
                 prop_assert_eq!(out.friction, a.friction);
                 // Rounding of positions of size 3 is 4e-16 and enters a few times; the god-object
                 // inherits it from its entry on. Times K in the force.

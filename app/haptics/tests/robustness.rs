@@ -50,7 +50,7 @@ proptest! {
         for _ in 0..300 {
             let moved = noise.vector(10f64.powf(step));
             hip += moved;
-            let out = finger.step(&[entity.clone()], &hip, DT);
+            let out = finger.step(std::slice::from_ref(&entity), &hip, DT);
             let Some(contact) = finger.contact(0) else { continue };
             prop_assert!(contact.normal_force_n >= 0.0);
             let normal_force = out.force_on_user_W.dot(&contact.normal_W);
@@ -139,10 +139,10 @@ fn a_pose_that_is_not_finite_is_not_felt() {
     let mut entity = table(stiction());
     let mut finger = point_finger();
     entity.move_to(Isometry3::translation(0.0, f64::NAN, 0.0));
-    let out = finger.step(&[entity.clone()], &Vector3::new(0.0, -DEPTH, 0.0), DT);
+    let out = finger.step(std::slice::from_ref(&entity), &Vector3::new(0.0, -DEPTH, 0.0), DT);
     assert_eq!((out.entity, out.force_on_user_W), (None, Vector3::zeros()));
     entity.move_to(Isometry3::identity());
-    let out = finger.step(&[entity.clone()], &Vector3::new(0.0, -DEPTH, 0.0), DT);
+    let out = finger.step(std::slice::from_ref(&entity), &Vector3::new(0.0, -DEPTH, 0.0), DT);
     assert_eq!(out.force_on_user_W.y, K * DEPTH);
 }
 
@@ -159,6 +159,6 @@ fn entities_beyond_the_capacity_are_not_felt() {
 fn forces_that_overflow_in_their_sum_become_zero() {
     let wall = Entity { stiffness_n_per_m: 1e308, ..table(Friction::None) };
     let hip = Vector3::new(0.0, -1.5, 0.0);
-    assert_eq!(point_finger().step(&[wall.clone()], &hip, DT).force_on_user_W.y, 1.5e308);
+    assert_eq!(point_finger().step(std::slice::from_ref(&wall), &hip, DT).force_on_user_W.y, 1.5e308);
     assert_eq!(point_finger().step(&[wall.clone(), wall], &hip, DT).force_on_user_W, Vector3::zeros());
 }

@@ -18,11 +18,11 @@ const MU: f64 = 0.3;
 fn slide(law: Friction, mu: f64, ticks: usize) -> Vec<f64> {
     let entity = table(law);
     let mut finger = point_finger();
-    finger.step(&[entity.clone()], &Vector3::new(0.0, -DEPTH, 0.0), DT);
+    finger.step(std::slice::from_ref(&entity), &Vector3::new(0.0, -DEPTH, 0.0), DT);
     let start = mu * DEPTH;
     let mut gap = |n: usize| {
         let hip = Vector3::new(start + SPEED * DT * n as f64, -DEPTH, 0.0);
-        let out = finger.step(&[entity.clone()], &hip, DT);
+        let out = finger.step(std::slice::from_ref(&entity), &hip, DT);
         assert_eq!(out.force_on_user_W.y, K * DEPTH);
         -out.force_on_user_W.x / K
     };
@@ -103,16 +103,16 @@ fn the_explicit_form_as_printed_chatters_beyond_one_half() {
 fn stopping_it_relaxes_to_the_coulomb_circle_and_no_further() {
     let entity = table(Friction::coulomb_viscous(MU, 1.0).unwrap());
     let mut finger = point_finger();
-    finger.step(&[entity.clone()], &Vector3::new(0.0, -DEPTH, 0.0), DT);
+    finger.step(std::slice::from_ref(&entity), &Vector3::new(0.0, -DEPTH, 0.0), DT);
     let mut gap = 4e-3;
     let (c, rim) = (1.0 * DEPTH / DT, MU * DEPTH);
     for _ in 0..300 {
-        let out = finger.step(&[entity.clone()], &Vector3::new(4e-3, -DEPTH, 0.0), DT);
+        let out = finger.step(std::slice::from_ref(&entity), &Vector3::new(4e-3, -DEPTH, 0.0), DT);
         gap = rim + (gap - rim) * c / (1.0 + c);
         // Within 1e-12 of the depth it counts as resting and stops short of the recurrence.
         assert!((-out.force_on_user_W.x / K - gap).abs() < 1.01e-12 * DEPTH);
     }
-    let out = finger.step(&[entity.clone()], &Vector3::new(4e-3, -DEPTH, 0.0), DT);
+    let out = finger.step(std::slice::from_ref(&entity), &Vector3::new(4e-3, -DEPTH, 0.0), DT);
     assert_eq!(out.friction, ContactState::Stick, "within 1e-12 of the rim it rests");
 }
 
@@ -123,7 +123,7 @@ fn on_a_sphere_the_ratio_is_that_of_the_speed_of_the_god_object() {
     let mut finger = point_finger();
     let mut before = None;
     for i in 0..5000 {
-        let out = finger.step(&[entity.clone()], &on_circle(r - DEPTH, f64::from(i) * 1e-3), DT);
+        let out = finger.step(std::slice::from_ref(&entity), &on_circle(r - DEPTH, f64::from(i) * 1e-3), DT);
         let moved =
             before.replace(out.god_object_W).map_or(0.0, |p: Vector3<f64>| (out.god_object_W - p).norm());
         if finger.contact(0).unwrap().friction == FrictionState::Slip {
