@@ -98,9 +98,15 @@ impl Slot {
         }
         let previous_B = sweep.previous_hip_W.map(|p_W| point_into_body(&entity.previous_X_WB, &p_W));
         let previous_B = previous_B.filter(is_finite);
+        // Nobody else looks at it.
+        let is_asked_for = entity.damping_n_s_per_m != 0.0 || entity.algorithm != Algorithm::FrictionCone;
         let cone = ConeInput {
             hip_B,
-            hip_velocity_B: hip_velocity(entity, hip_B, previous_B, sweep),
+            hip_velocity_B: if is_asked_for {
+                hip_velocity(entity, hip_B, previous_B, sweep)
+            } else {
+                Vector3::zeros()
+            },
             stiffness_n_per_m: entity.stiffness_n_per_m,
             damping_n_s_per_m: entity.damping_n_s_per_m,
             dt_s: sweep.dt_s,

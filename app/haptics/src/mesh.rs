@@ -25,6 +25,7 @@
 mod build;
 mod bvh;
 mod cone;
+mod draw;
 mod error;
 mod face;
 mod facing;

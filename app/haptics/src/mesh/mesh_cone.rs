@@ -12,14 +12,14 @@
 use nalgebra::Vector3;
 
 use super::Mesh;
+use super::draw::{Against, Frictionless};
 use super::place::Place;
-use super::walk::{Stand, Walked, stand, walk};
+use super::walk::{Walked, stand, walk};
 use crate::friction::Friction;
 use crate::friction_cone::{ConeForce, ConeInput, answer};
-use crate::friction_law::{FrictionLaw, FrictionState};
-use crate::grip::{Grip, Pull};
+use crate::friction_law::FrictionState;
+use crate::grip::Grip;
 use crate::surface::SurfacePoint;
-use crate::tangent_view::TangentView;
 
 /// State of one finger towards one mesh.
 #[derive(Debug, Clone, Copy, Default)]
@@ -151,34 +151,28 @@ impl Touching {
         let has_friction = !matches!(friction, Friction::None);
         if has_friction {
             let shadow = stand(mesh, &mut self.shadow, input)?;
-            walk(mesh, &mut self.shadow, shadow, |query| query.gap_m, &Pull::default(), input)?;
+            walk(mesh, &mut self.shadow, shadow, &Frictionless, input)?;
         }
         let here = stand(mesh, &mut self.god_object, input)?;
-        let pull = if has_friction { self.grip.begin_tick(&here.view, input) } else { Pull::default() };
-        let (view, tangential_B, changes) = match self.grip.hold(friction, &here.view, &pull, input) {
-            Some(tangential_B) => (here.view, tangential_B, 0),
-            None => self.slide(mesh, friction, here, &pull, input)?,
-        };
-        self.normal_B = view.normal_B;
         if !has_friction {
+            let walked = walk(mesh, &mut self.god_object, here, &Frictionless, input)?;
             self.shadow = self.god_object;
+            self.grip.state = FrictionState::Slip;
+            return Some(self.answer(&walked, input));
         }
-        Some(answer(&view, &tangential_B, changes, input))
+        let pull = self.grip.begin_tick(&here.view, input);
+        if let Some(tangential_B) = self.grip.hold(friction, &here.view, &pull, input) {
+            return Some(self.answer(&Walked { view: here.view, tangential_B, changes: 0 }, input));
+        }
+        let draw = Against { friction, memory: &self.grip.memory, pull: &pull, input };
+        let mut walked = walk(mesh, &mut self.god_object, here, &draw, input)?;
+        walked.tangential_B += self.grip.drag(friction, &walked.tangential_B, &walked.view, &pull, input);
+        Some(self.answer(&walked, input))
     }
 
-    fn slide(
-        &mut self,
-        mesh: &Mesh,
-        friction: &Friction,
-        from: Stand,
-        pull: &Pull,
-        input: &ConeInput,
-    ) -> Option<(TangentView, Vector3<f64>, u32)> {
-        let asked = |query: &_| friction.slide(query, &self.grip.memory);
-        let Walked { view, tangential_B, changes } =
-            walk(mesh, &mut self.god_object, from, asked, pull, input)?;
-        let drag_B = self.grip.drag(friction, &tangential_B, &view, pull, input);
-        Some((view, tangential_B + drag_B, changes))
+    fn answer(&mut self, walked: &Walked, input: &ConeInput) -> ConeForce {
+        self.normal_B = walked.view.normal_B;
+        answer(&walked.view, &walked.tangential_B, walked.changes, input)
     }
 }
 

@@ -17,11 +17,10 @@
 use nalgebra::Vector3;
 
 use super::Mesh;
+use super::draw::{Draw, Drawn};
 use super::facing::Facing;
 use super::place::{Facet, On, Place, Side, next};
 use crate::friction_cone::ConeInput;
-use crate::friction_law::{FrictionQuery, FrictionState};
-use crate::grip::{Pull, query};
 use crate::surface::direction_or_up;
 use crate::tangent_view::TangentView;
 
@@ -73,93 +72,35 @@ pub(crate) fn stand(mesh: &Mesh, place: &mut Place, input: &ConeInput) -> Option
     None
 }
 
-/// Moves `place` from where it stands until `asked` wants no further slide; `None` if it is free and gone.
-#[inline]
+/// Moves `place` from where it stands until nothing draws it any further; `None` if it is free and gone.
+#[inline(always)]
 pub(crate) fn walk(
     mesh: &Mesh,
     place: &mut Place,
     mut stand_now: Stand,
-    asked: impl Fn(&FrictionQuery) -> f64,
-    pull: &Pull,
+    draw: &impl Draw,
     input: &ConeInput,
 ) -> Option<Walked> {
     let start_B = place.point_B;
-    for changes in 0..MAX_FEATURE_CHANGES {
-        let slide = Slide::new(stand_now.view, &(start_B - place.point_B), &asked, pull, input);
-        if slide.is_at_rest() {
-            return Some(slide.rested(changes));
+    for changes in 0..=MAX_FEATURE_CHANGES {
+        let Stand { facing, view } = stand_now;
+        let Drawn { target_B, is_at_rest, tangential_B } = draw.drawn(&view, &(start_B - place.point_B));
+        let walked = Walked { view, tangential_B, changes };
+        if is_at_rest || changes == MAX_FEATURE_CHANGES {
+            return Some(walked);
         }
-        let target_B = slide.target_B();
-        let reached = match stand_now.facing {
+        let reached = match facing {
             Facing::Face(side) => cross_face(mesh, side, &place.point_B, &target_B),
             Facing::Edge(side, edge) => follow_edge(mesh, side, edge, &target_B),
-            Facing::Vertex(..) | Facing::Free => return Some(slide.rested(changes)),
+            Facing::Vertex(..) | Facing::Free => return Some(walked),
         };
         *place = reached.place;
         if reached.is_all_the_way {
-            return Some(slide.arrived(changes + 1));
+            return Some(Walked { changes: changes + 1, ..walked });
         }
         stand_now = stand(mesh, place, input)?;
     }
-    Some(
-        Slide::new(stand_now.view, &(start_B - place.point_B), &asked, pull, input)
-            .rested(MAX_FEATURE_CHANGES),
-    )
-}
-
-/// What friction asks of a god-object where it stands.
-struct Slide {
-    view: TangentView,
-    /// Against the motion, in the tangent plane.
-    direction_B: Vector3<f64>,
-    asked_m: f64,
-}
-
-impl Slide {
-    #[inline(always)]
-    fn new(
-        view: TangentView,
-        back_B: &Vector3<f64>,
-        asked: &impl Fn(&FrictionQuery) -> f64,
-        pull: &Pull,
-        input: &ConeInput,
-    ) -> Self {
-        let (direction_B, gap_m) = view.signed_gap(&Vector3::zeros());
-        // The chord, since that is what two recorded positions over dt show as speed.
-        let travel_m = back_B.norm().copysign(back_B.dot(&direction_B));
-        let asked_m = asked(&query(FrictionState::Slip, gap_m, travel_m, &view, pull, input));
-        Self { view, direction_B, asked_m }
-    }
-
-    /// Inside the friction circle, or as near to its rim as positions can tell.
-    #[inline]
-    fn is_at_rest(&self) -> bool {
-        self.asked_m.is_nan() || self.asked_m <= self.view.rest_m
-    }
-
-    #[inline]
-    fn target_B(&self) -> Vector3<f64> {
-        self.view.surface_point_B + self.direction_B * self.radius_m()
-    }
-
-    /// Distance from the surface point at which the slide ends.
-    #[inline]
-    fn radius_m(&self) -> f64 {
-        self.view.gap_m - self.asked_m.min(self.view.gap_m)
-    }
-
-    /// It stays: the force is that of its gap, cut to the rim if a bound ended the walk early.
-    #[inline]
-    fn rested(&self, changes: u32) -> Walked {
-        let tangential_B =
-            if self.asked_m > 0.0 { self.direction_B * self.radius_m() } else { self.view.lag_B };
-        Walked { view: self.view, tangential_B, changes }
-    }
-
-    #[inline]
-    fn arrived(&self, changes: u32) -> Walked {
-        Walked { view: self.view, tangential_B: self.direction_B * self.radius_m(), changes }
-    }
+    None
 }
 
 /// How far a way led.
@@ -172,29 +113,35 @@ struct Reached {
 #[inline(always)]
 fn cross_face(mesh: &Mesh, side: Side, from_B: &Vector3<f64>, target_B: &Vector3<f64>) -> Reached {
     let facet = Facet::of(mesh, side);
-    let way_B = target_B - from_B;
-    let way_m2 = way_B.norm_squared();
     let corners_B = facet.corners_B(mesh);
     let [a_B, b_B, c_B] = corners_B;
     let edges_B = [b_B - a_B, c_B - b_B, a_B - c_B];
+    // Distances from the edges, times their lengths: the Voronoi planes through the edges, Melder eq. 4.15-4.20 with the
+    // offset corrected (the printed one is always 0).
+    let inwards_B = [facet.inward_B(&edges_B[0]), facet.inward_B(&edges_B[1]), facet.inward_B(&edges_B[2])];
+    let is_beyond = |edge: usize| inwards_B[edge].dot(&(target_B - corners_B[edge])) < 0.0;
+    let beyond = [is_beyond(0), is_beyond(1), is_beyond(2)];
+    let all_the_way =
+        Reached { place: Place { point_B: *target_B, on: On::Face(side) }, is_all_the_way: true };
+    if !(beyond[0] | beyond[1] | beyond[2]) {
+        return all_the_way;
+    }
+    let way_B = target_B - from_B;
+    let way_m2 = way_B.norm_squared();
     let mut first_fraction = f64::INFINITY;
     let mut first = None;
-    // No branch but the last: which edge it is that is met, nothing can predict.
-    for (edge, edge_B) in edges_B.iter().enumerate() {
-        let inward_B = facet.inward_B(edge_B);
-        // Distances from the edge, times its length: the Voronoi plane through the edge, Melder eq. 4.15-4.20 with the
-        // offset corrected (the printed one is always 0).
-        let gained = inward_B.dot(&way_B);
-        let left = inward_B.dot(&(from_B - corners_B[edge])).max(0.0);
-        let leaves = gained * gained > PARALLEL * PARALLEL * edge_B.norm_squared() * way_m2;
-        let is_met = (gained < 0.0) & (left + gained < 0.0) & leaves;
-        let fraction = if is_met { left / -gained } else { f64::INFINITY };
-        first = if fraction < first_fraction { Some(edge) } else { first };
-        first_fraction = fraction.min(first_fraction);
+    for edge in 0..3 {
+        let gained = inwards_B[edge].dot(&way_B);
+        let leaves = gained * gained > PARALLEL * PARALLEL * edges_B[edge].norm_squared() * way_m2;
+        if beyond[edge] & (gained < 0.0) & leaves {
+            let left = inwards_B[edge].dot(&(from_B - corners_B[edge])).max(0.0);
+            let fraction = left / -gained;
+            if fraction < first_fraction {
+                (first, first_fraction) = (Some(edge), fraction);
+            }
+        }
     }
-    let Some(edge) = first else {
-        return Reached { place: Place { point_B: *target_B, on: On::Face(side) }, is_all_the_way: true };
-    };
+    let Some(edge) = first else { return all_the_way };
     let met_B = from_B + way_B * first_fraction;
     let edge_B = edges_B[edge];
     let share = edge_B.dot(&(met_B - corners_B[edge])) / edge_B.norm_squared();
