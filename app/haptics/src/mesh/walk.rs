@@ -25,8 +25,8 @@ use crate::surface::direction_or_up;
 use crate::tangent_view::TangentView;
 
 /// Bound on the pieces of a mesh that a god-object comes to within one tick. Fingers at 0.5 m/s cross one
-/// triangle of 0.5 mm a tick; jumps of 0.1 m over such triangles are walked in two ticks.
-pub const MAX_FEATURE_CHANGES: u32 = 512;
+/// triangle of 0.5 mm a tick; a jump of 0.1 m over such triangles takes two ticks.
+pub const MAX_FEATURE_CHANGES: u32 = 256;
 
 /// Bound on the flights of a god-object within one tick: each asks the hierarchy of boxes.
 const MAX_FLIGHTS: u32 = 8;
