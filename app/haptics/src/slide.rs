@@ -12,7 +12,9 @@
 //! plain one, later steps are divided by the slope seen in the last. Signed residuals take
 //! overshoots back within the tick.
 //!
-//! Invariants: the god-object ends on the surface. The tangential force is that of the rim asked
+//! Invariants: the god-object ends on the surface, and no farther from the HIP than it began (unless the law asks for
+//! that): friction gives no energy to the spring. Deep inside, beyond the centre of curvature, a step could lead round
+//! the solid to a farther side; it is halved then, and a step back is left out. The tangential force is that of the rim asked
 //! for, even when the bound ends the search early; then the god-object goes on next tick.
 //!
 //! Cost: at most [`MAX_SLIDE_ROUNDS`] rounds; one move on a plane, three to five at 5 mm depth in a
@@ -56,17 +58,41 @@ pub(crate) fn slide<S: Surface + ?Sized, L: FrictionLaw + ?Sized>(
     let limit_m = |view: &TangentView| {
         friction.held_limit_m(&query(FrictionState::Slip, view.gap_m, 0.0, view, pull, input))
     };
-    let rested =
-        |view: TangentView, rounds| Slid { view, tangential_B: cut_to(view.lag_B, limit_m(&view)), rounds };
+    let rested = |round: &Round, rounds| {
+        // Where friction grows with speed, the circle that it rests in is larger than the one that holds.
+        let limit_m = limit_m(&round.view).max(round.gap_m - round.asked_m);
+        Slid { view: round.view, tangential_B: cut_to(round.view.lag_B, limit_m), rounds }
+    };
+    // A god-object that went too far is inside its circle, and its own spring is felt, or none if it is past S.
+    let went_too_far = |round: &Round, rounds| {
+        let slid = rested(round, rounds);
+        if round.gap_m > 0.0 { slid } else { Slid { tangential_B: Vector3::zeros(), ..slid } }
+    };
     let mut round = look(view, &Vector3::zeros(), god_object);
     if round.is_inside_the_circle() {
-        return rested(view, 0);
+        return rested(&round, 0);
     }
     let mut secant = Secant::default();
+    let stretch_at = |point_B: &Vector3<f64>| (point_B - input.hip_B).norm_squared();
+    // Bonds bent the other way may ask for a place beyond S.
+    let longest =
+        stretch_at(&round.target_B(round.asked_m)).max(stretch_at(&start_B)) * (1.0 + STRETCH_TOLERANCE);
+    let mut shortened = 1.0;
     for rounds in 1..=MAX_SLIDE_ROUNDS {
-        let step_m = secant.step(round.asked_m, round.view.depth_m);
+        let step_m = shortened * secant.step(round.asked_m, round.view.depth_m);
+        let moved = surface.settle(god_object, &round.target_B(step_m));
+        if stretch_at(&moved.point_B) > longest {
+            // Flung round the solid, to a farther side of it: a slide must not load the spring.
+            if round.asked_m < 0.0 && round.gap_m > 0.0 {
+                return went_too_far(&round, rounds);
+            }
+            shortened *= 0.5;
+            continue;
+        }
+        shortened = 1.0;
+        secant.made(round.asked_m, step_m);
         let piece_before = god_object.piece;
-        *god_object = surface.settle(god_object, &round.target_B(step_m));
+        *god_object = moved;
         let view = TangentView::of(surface, god_object, input);
         if god_object.piece != piece_before {
             // Over an edge: nothing seen on the piece before says anything about this one.
@@ -78,7 +104,7 @@ pub(crate) fn slide<S: Surface + ?Sized, L: FrictionLaw + ?Sized>(
             secant = Secant::default();
             round = look(view, &Vector3::zeros(), god_object);
             if round.is_inside_the_circle() {
-                return rested(view, rounds);
+                return rested(&round, rounds);
             }
             continue;
         }
@@ -87,12 +113,7 @@ pub(crate) fn slide<S: Surface + ?Sized, L: FrictionLaw + ?Sized>(
             return round.arrived(rounds);
         }
     }
-    // A god-object that went too far is inside its circle, and its own spring is felt, or none if it is past S.
-    let went_too_far = round.asked_m < 0.0;
-    if went_too_far && round.gap_m <= 0.0 {
-        return Slid { tangential_B: Vector3::zeros(), ..rested(round.view, MAX_SLIDE_ROUNDS) };
-    }
-    if went_too_far { rested(round.view, MAX_SLIDE_ROUNDS) } else { round.arrived(MAX_SLIDE_ROUNDS) }
+    if round.asked_m < 0.0 { went_too_far(&round, MAX_SLIDE_ROUNDS) } else { round.arrived(MAX_SLIDE_ROUNDS) }
 }
 
 /// One look at the contact during a slide.
@@ -169,13 +190,19 @@ impl Secant {
     /// Next step. It exceeds both the slide asked for and the depth, which stands for the size of
     /// the surroundings, never: a slope taken from noise must not fling the god-object away.
     fn step(&mut self, asked_m: f64, depth_m: f64) -> f64 {
-        if let Some((asked_before_m, step_m)) = self.last {
+        if let Some((asked_before_m, step_m)) = self.last.take() {
             let slope = (asked_before_m - asked_m) / step_m;
             self.gain = if slope > f64::MIN_POSITIVE { 1.0 / slope } else { 2.0 * self.gain };
         }
         let longest_m = asked_m.abs().max(depth_m);
-        let step_m = (asked_m * self.gain).max(-longest_m).min(longest_m);
+        (asked_m * self.gain).max(-longest_m).min(longest_m)
+    }
+
+    /// The step that was really made; before it, `step` answers the same again.
+    fn made(&mut self, asked_m: f64, step_m: f64) {
         self.last = Some((asked_m, step_m));
-        step_m
     }
 }
+
+/// A square of a length that counts as no longer than another: far above rounding, far below what is felt.
+const STRETCH_TOLERANCE: f64 = 1e-9;
