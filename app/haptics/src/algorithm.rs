@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 
 use crate::friction::Friction;
 use crate::friction_cone::ConeInput;
-use crate::friction_law::FrictionState;
+use crate::friction_law::{FrictionMemory, FrictionState};
 use crate::mesh::Mesh;
 use crate::shape::Shape;
 use crate::shared::Shared;
@@ -106,7 +106,14 @@ impl TouchInput<'_> {
             Shape::Form(form) if self.finger_radius_m == 0.0 => Some(ask(form)),
             Shape::Form(form) => form.grown(self.finger_radius_m).map(|grown| ask(&grown)),
             Shape::Own(surface) if self.finger_radius_m == 0.0 => Some(ask(&**surface)),
-            Shape::Own(_) | Shape::Mesh(_) => None,
+            Shape::Own(surface) => {
+                let (mut ask, mut answer) = (Some(ask), None);
+                surface.show_grown(self.finger_radius_m, &mut |grown| {
+                    answer = ask.take().map(|ask| ask(grown));
+                });
+                answer
+            }
+            Shape::Mesh(_) => None,
         }
     }
 }
@@ -164,16 +171,18 @@ impl Touch {
 pub struct ContactMemory {
     /// Whatever the algorithm makes of them.
     pub words: [f64; CONTACT_WORDS],
+    /// What the entity's [`Friction`] remembers of the contact, for algorithms that ask it.
+    pub friction: FrictionMemory,
 }
 
 /// Most algorithms remember a point; where it is kept is their own business.
 impl ContactMemory {
-    /// Three numbers from `first` on.
+    /// Three numbers from `first` on. Panics if there are not as many.
     pub fn vector(&self, first: usize) -> Vector3<f64> {
         Vector3::from_column_slice(&self.words[first..first + 3])
     }
 
-    /// Remembers three numbers from `first` on.
+    /// Remembers three numbers from `first` on. Panics if there are not as many.
     pub fn set_vector(&mut self, first: usize, v: &Vector3<f64>) {
         self.words[first..first + 3].copy_from_slice(v.as_slice());
     }

@@ -143,7 +143,8 @@ impl Slot {
             Shape::Form(form) => self.touch_surface(&form.grown(input.finger_radius_m)?, input),
             Shape::Own(surface) if input.finger_radius_m == 0.0 => self.touch_surface(&**surface, input),
             Shape::Mesh(mesh) if input.finger_radius_m == 0.0 => self.touch_mesh(mesh, input),
-            Shape::Mesh(_) | Shape::Own(_) => None,
+            Shape::Own(_) => input.of_surface(|grown| self.touch_surface(grown, input))?,
+            Shape::Mesh(_) => None,
         }
     }
 

@@ -30,7 +30,7 @@ impl Cuboid {
     /// Errors: a length that is not finite or not positive.
     pub fn new(size_m: [f64; 3]) -> Result<Self, ParameterError> {
         for length_m in size_m {
-            above_zero("size_m", 0.5 * length_m)?;
+            above_zero("size_m", length_m)?;
         }
         Ok(Self { half_m: Vector3::from(size_m) * 0.5, rounding_m: 0.0 })
     }
@@ -175,7 +175,8 @@ mod tests {
     #[test]
     fn sizes_must_be_positive() {
         for bad in [0.0, -0.1, f64::NAN, f64::INFINITY] {
-            assert!(Cuboid::new([0.1, bad, 0.1]).is_err());
+            let message = Cuboid::new([0.1, bad, 0.1]).unwrap_err().to_string();
+            assert!(message.starts_with(&format!("size_m is {bad};")), "as it was given: {message}");
         }
         assert_eq!(brick().size_m(), [0.2, 0.1, 0.06]);
     }

@@ -44,7 +44,9 @@ mod tests {
     #[test]
     fn sizes_must_be_positive() {
         for bad in [0.0, -0.1, f64::NAN, f64::INFINITY] {
-            assert!(Cylinder::new(bad, 0.1).is_err() && Cylinder::new(0.1, bad).is_err());
+            assert!(Cylinder::new(bad, 0.1).is_err());
+            let message = Cylinder::new(0.1, bad).unwrap_err().to_string();
+            assert!(message.starts_with(&format!("length_m is {bad};")), "as it was given: {message}");
         }
         assert_eq!((can().radius_m(), can().length_m()), (0.03, 0.08));
     }

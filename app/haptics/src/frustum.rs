@@ -47,7 +47,7 @@ impl Frustum {
     ) -> Result<Self, ParameterError> {
         at_least_zero("radius_bottom_m", radius_bottom_m)?;
         at_least_zero("radius_top_m", radius_top_m)?;
-        let half_length_m = above_zero("length_m", 0.5 * length_m)?;
+        let half_length_m = above_zero("length_m", length_m)? * 0.5;
         // Corrected: the printed half difference is no radius of the middle.
         //= melder#7.10
         let radius_middle_m =

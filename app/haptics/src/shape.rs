@@ -30,10 +30,19 @@ pub enum Shape {
     Own(Shared<dyn OwnSurface>),
 }
 
-/// A [`Surface`] that an entity can share between threads.
-pub trait OwnSurface: Surface + std::fmt::Debug + Send + Sync {}
+/// A [`Surface`] that an entity can share between threads: every surface is one that is `Debug`, `Send` and `Sync`.
+pub trait OwnSurface: Surface + std::fmt::Debug + Send + Sync {
+    /// Shows `ask` the surface grown by `radius_m` (m), see [`Surface::grown`]; `false` where there is none.
+    ///
+    /// Behind a pointer nothing of unknown size can be answered; shown, it needs no memory.
+    fn show_grown(&self, radius_m: f64, ask: &mut dyn FnMut(&dyn Surface)) -> bool;
+}
 
-impl<S: Surface + std::fmt::Debug + Send + Sync> OwnSurface for S {}
+impl<S: Surface + std::fmt::Debug + Send + Sync> OwnSurface for S {
+    fn show_grown(&self, radius_m: f64, ask: &mut dyn FnMut(&dyn Surface)) -> bool {
+        self.grown(radius_m).inspect(|grown| ask(grown)).is_some()
+    }
+}
 
 /// The closed forms, dispatched without indirection.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,7 +76,12 @@ impl Shape {
 
     /// Whether a finger of this radius can feel it: every shape is felt by points, some by balls.
     pub fn is_felt_by(&self, finger_radius_m: f64) -> bool {
-        finger_radius_m == 0.0 || matches!(self, Self::Form(form) if form.grown(finger_radius_m).is_some())
+        let is_point = finger_radius_m == 0.0;
+        match self {
+            Self::Form(form) => is_point || form.grown(finger_radius_m).is_some(),
+            Self::Mesh(_) => is_point,
+            Self::Own(surface) => is_point || surface.show_grown(finger_radius_m, &mut |_| {}),
+        }
     }
 }
 

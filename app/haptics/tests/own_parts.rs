@@ -9,7 +9,10 @@ mod example;
 use common::meshes::*;
 use common::*;
 use example::{Ageing, EggCarton, Honey, drag};
-use haptics::{Algorithm, ContactState, Friction, Shape, Sphere};
+use haptics::{
+    Algorithm, ConeInput, ContactAlgorithm, ContactMemory, ContactState, Friction, FrictionLaw,
+    FrictionQuery, Shape, Sphere, Surface, SurfacePoint, Touch, TouchInput,
+};
 use nalgebra::Vector3;
 
 #[test]
@@ -78,5 +81,101 @@ fn an_own_algorithm_renders_every_kind_of_shape_and_begins_anew_with_each_contac
         at(0.0, 0.12);
         let again = at(-0.01, 0.095);
         assert!(again.god_object_W.x < -0.009, "{name}: {again:?}");
+    }
+}
+
+/// A ball by another name, which the crate knows nothing of.
+#[derive(Debug)]
+struct OwnBall(Sphere);
+
+impl Surface for OwnBall {
+    fn signed_distance(&self, point_B: &Vector3<f64>) -> f64 {
+        self.0.signed_distance(point_B)
+    }
+
+    fn nearest(&self, point_B: &Vector3<f64>) -> SurfacePoint {
+        self.0.nearest(point_B)
+    }
+
+    fn entry(&self, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<SurfacePoint> {
+        self.0.entry(from_B, to_B)
+    }
+
+    fn settle(&self, from: &SurfacePoint, on_tangent_plane_B: &Vector3<f64>) -> SurfacePoint {
+        self.0.settle(from, on_tangent_plane_B)
+    }
+
+    fn tangent_offset(&self, at: &SurfacePoint) -> f64 {
+        self.0.tangent_offset(at)
+    }
+
+    fn grown(&self, radius_m: f64) -> Option<Self> {
+        self.0.grown(radius_m).map(Self)
+    }
+}
+
+#[test]
+fn an_own_shape_that_can_grow_is_felt_by_fingers_with_a_radius_as_a_closed_form_is() {
+    let ball = Sphere::new(0.1).unwrap();
+    assert!(Shape::own(OwnBall(ball)).is_felt_by(0.01));
+    assert!(!Shape::own(EggCarton { height_m: 2e-3, period_m: 0.03 }).is_felt_by(0.01));
+    for algorithm in [Algorithm::FrictionCone, Algorithm::VectorField, Algorithm::ClassicGodObject] {
+        let law = Friction::stiction(MU_S, MU_D).unwrap();
+        let own = entity(Shape::own(OwnBall(ball)), law.clone()).with_algorithm(algorithm.clone());
+        let form = entity(ball, law).with_algorithm(algorithm);
+        let (mut one, mut other) = (finger(0.01), finger(0.01));
+        for i in 0..300 {
+            let hip = on_circle(0.106 + 0.01 * (1.0 - f64::from(i.min(50)) / 50.0), 2e-3 * f64::from(i));
+            let felt = step(&mut one, &own, &hip);
+            assert_eq!(felt, step(&mut other, &form, &hip));
+            assert_eq!(felt.entity.is_some(), hip.norm() <= 0.11);
+        }
+    }
+}
+
+/// The vector field, which says of its contact what the entity's friction says.
+#[derive(Debug)]
+struct AsksTheLaw;
+
+impl ContactAlgorithm for AsksTheLaw {
+    fn touch(&self, input: &TouchInput<'_>, memory: &mut ContactMemory) -> Option<Touch> {
+        let ConeInput { hip_B, dt_s, .. } = input.cone;
+        let at = input.is_inside().then(|| input.nearest())??;
+        let load_m = at.normal_B.dot(&(at.point_B - hip_B));
+        let query = FrictionQuery { load_m, dt_s, ..Default::default() };
+        let friction = if input.friction.holds(&query, &mut memory.friction) {
+            haptics::FrictionState::Stick
+        } else {
+            haptics::FrictionState::Slip
+        };
+        Some(Touch { friction, ..Touch::frictionless(at, load_m, &input.cone) })
+    }
+}
+
+#[test]
+fn an_own_algorithm_keeps_the_memory_of_the_entitys_friction_for_one_contact() {
+    // It holds from the 11th tick of a contact on, which only the memory tells.
+    #[derive(Debug)]
+    struct Dries;
+    impl FrictionLaw for Dries {
+        fn holds(&self, query: &FrictionQuery, memory: &mut haptics::FrictionMemory) -> bool {
+            memory.words[23] += query.dt_s;
+            memory.words[23] > 10.5 * DT
+        }
+
+        fn slide(&self, query: &FrictionQuery, _memory: &haptics::FrictionMemory) -> f64 {
+            query.gap_m
+        }
+
+        fn held_limit_m(&self, query: &FrictionQuery) -> f64 {
+            query.load_m
+        }
+    }
+    let entity = table(Friction::own(Dries)).with_algorithm(Algorithm::own(AsksTheLaw));
+    let mut finger = point_finger();
+    for _ in 0..2 {
+        let held = (0..20).map(|_| step(&mut finger, &entity, &Vector3::new(0.0, -DEPTH, 0.0)).friction);
+        assert_eq!(held.filter(|state| *state == ContactState::Stick).count(), 10);
+        step(&mut finger, &entity, &Vector3::y());
     }
 }
