@@ -135,9 +135,8 @@ const AGE: usize = 0;
 
 impl FrictionLaw for Ageing {
     fn holds(&self, query: &FrictionQuery, memory: &mut FrictionMemory) -> bool {
+        let holds = query.gap_m <= self.held_limit_m(query, memory);
         let age_s = &mut memory.words[AGE];
-        let mu = self.mu_aged + (self.mu_fresh - self.mu_aged) * (-*age_s / self.ageing_s).exp();
-        let holds = query.gap_m <= mu * query.load_m;
         *age_s = if holds { *age_s + query.dt_s } else { 0.0 };
         holds
     }
@@ -146,9 +145,10 @@ impl FrictionLaw for Ageing {
         query.gap_m - self.mu_fresh * query.load_m
     }
 
-    /// Only `holds` knows the age; this bounds the damper, and the oldest contact's bound will do.
-    fn held_limit_m(&self, query: &FrictionQuery) -> f64 {
-        self.mu_aged * query.load_m
+    /// The older the contact, the more it bears.
+    fn held_limit_m(&self, query: &FrictionQuery, memory: &FrictionMemory) -> f64 {
+        let mu = self.mu_aged + (self.mu_fresh - self.mu_aged) * (-memory.words[AGE] / self.ageing_s).exp();
+        mu * query.load_m
     }
 }
 

@@ -253,8 +253,8 @@ impl FrictionLaw for Friction {
         ask!(self, law => law.slide(query, memory))
     }
 
-    fn held_limit_m(&self, query: &FrictionQuery) -> f64 {
-        ask!(self, law => law.held_limit_m(query))
+    fn held_limit_m(&self, query: &FrictionQuery, memory: &FrictionMemory) -> f64 {
+        ask!(self, law => law.held_limit_m(query, memory))
     }
 
     fn drag_m(&self, query: &FrictionQuery, memory: &FrictionMemory) -> f64 {

@@ -81,8 +81,8 @@ pub trait FrictionLaw {
     fn slide(&self, query: &FrictionQuery, memory: &FrictionMemory) -> f64;
 
     /// Radius of the circle within which the god-object is held \[m\]: while the contact sticks, it
-    /// bounds spring, damping and drag together.
-    fn held_limit_m(&self, query: &FrictionQuery) -> f64;
+    /// bounds spring, damping and drag together. Asked after `holds`, with the memory as that left it.
+    fn held_limit_m(&self, query: &FrictionQuery, memory: &FrictionMemory) -> f64;
 
     /// What is felt beside the spring, against the motion of the HIP \[m of spring\].
     ///

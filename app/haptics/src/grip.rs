@@ -61,7 +61,7 @@ impl Grip {
         }
         self.state = FrictionState::Stick;
         let beside_B = self.drag(friction, &view.lag_B, view, pull, input) - damper(view, input);
-        Some(cut_to(view.lag_B + beside_B, friction.held_limit_m(&query)))
+        Some(cut_to(view.lag_B + beside_B, friction.held_limit_m(&query, &self.memory)))
     }
 
     /// What the law renders beside the spring along the tangent.

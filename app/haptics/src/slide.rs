@@ -56,7 +56,7 @@ pub(crate) fn slide<S: Surface + ?Sized, L: FrictionLaw + ?Sized>(
         Round::new(view, direction_before_B, asked, &(start_B - god_object.point_B), pull, input)
     };
     let limit_m = |view: &TangentView| {
-        friction.held_limit_m(&query(FrictionState::Slip, view.gap_m, 0.0, view, pull, input))
+        friction.held_limit_m(&query(FrictionState::Slip, view.gap_m, 0.0, view, pull, input), memory)
     };
     let rested = |round: &Round, rounds| {
         // Where friction grows with speed, the circle that it rests in is larger than the one that holds.

@@ -147,7 +147,7 @@ fn bristles_that_snap_against_the_motion_leave_no_more_force_than_there_was() {
     let mean = 1.4e-4;
     memory.words[20] = mean;
     let query = FrictionQuery { gap_m: mean, load_m: 1e-3, dt_s: DT, ..Default::default() };
-    assert_eq!(law.held_limit_m(&query), 1.5 * MU_D * 1e-3, "between the two");
+    assert_eq!(law.held_limit_m(&query, &memory), 1.5 * MU_D * 1e-3, "between the two");
     assert!(!law.holds(&query, &mut memory));
     assert_eq!(law.slide(&query, &memory), 0.0, "it is not driven away from S");
     let now: f64 = memory.words[..3].iter().sum::<f64>() / 3.0;

@@ -118,7 +118,7 @@ proptest! {
         };
         let mut memory = FrictionMemory { words: memory };
         friction.holds(&query, &mut memory);
-        let answers = [friction.slide(&query, &memory), friction.drag_m(&query, &memory), friction.held_limit_m(&query)];
+        let answers = [friction.slide(&query, &memory), friction.drag_m(&query, &memory), friction.held_limit_m(&query, &memory)];
         prop_assert!(answers.iter().all(|x| x.is_finite()), "{answers:?}");
         prop_assert!(answers[1] >= 0.0 && answers[2] >= 0.0, "drag never drives");
         prop_assert!(memory.words.iter().all(|x| x.is_finite()));

@@ -62,6 +62,22 @@ fn an_own_law_remembers_how_long_it_has_been_touched() {
 }
 
 #[test]
+fn an_own_laws_limit_knows_its_memory_so_that_the_damper_stays_within_a_fresh_contacts_cone() {
+    let law = Friction::own(Ageing { mu_fresh: 0.2, mu_aged: 0.8, ageing_s: 0.5 });
+    let (table, mut finger) = (table(law).with_damping(20.0).unwrap(), point_finger());
+    let mut most = 0.0f64;
+    for i in 0..20 {
+        // 1 mm below the table and back and forth: 0.1 mm in a tick are 2 N of damping, ten times what is borne.
+        let out = step(&mut finger, &table, &Vector3::new(1e-4 * f64::from(i % 2), -1e-3, 0.0));
+        if out.friction == ContactState::Stick {
+            most = most.max(ratio(&out, &Vector3::y()));
+        }
+    }
+    // After 20 ms of 500 it bears 0.2 + 0.6 * 0.04 at most.
+    assert!((0.2..0.225).contains(&most), "{most}");
+}
+
+#[test]
 fn an_own_algorithm_renders_every_kind_of_shape_and_begins_anew_with_each_contact() {
     let honey = || Algorithm::own(Honey { time_constant_s: 0.02 });
     let ball = entity(Sphere::new(0.1).unwrap(), Friction::None).with_algorithm(honey());
@@ -167,7 +183,7 @@ fn an_own_algorithm_keeps_the_memory_of_the_entitys_friction_for_one_contact() {
             query.gap_m
         }
 
-        fn held_limit_m(&self, query: &FrictionQuery) -> f64 {
+        fn held_limit_m(&self, query: &FrictionQuery, _memory: &haptics::FrictionMemory) -> f64 {
             query.load_m
         }
     }

@@ -63,7 +63,7 @@ impl Bristles {
 
 impl FrictionLaw for Bristles {
     fn holds(&self, query: &FrictionQuery, memory: &mut FrictionMemory) -> bool {
-        let snap_m = self.held_limit_m(query);
+        let snap_m = self.held_limit_m(query, memory);
         if snap_m.is_nan() || snap_m <= 0.0 {
             *memory = FrictionMemory::default();
             return false;
@@ -89,10 +89,10 @@ impl FrictionLaw for Bristles {
     }
 
     fn slide(&self, query: &FrictionQuery, memory: &FrictionMemory) -> f64 {
-        within(self.held_limit_m(query), query.gap_m - memory.words[MEAN], query)
+        within(self.held_limit_m(query, memory), query.gap_m - memory.words[MEAN], query)
     }
 
-    fn held_limit_m(&self, query: &FrictionQuery) -> f64 {
+    fn held_limit_m(&self, query: &FrictionQuery, _memory: &FrictionMemory) -> f64 {
         SNAP_OVER_MEAN * self.mu * query.load_m
     }
 }

@@ -63,7 +63,7 @@ impl FrictionLaw for Classical {
         (coulomb_slide - load_per_travel * query.travel_m) / (1.0 + load_per_travel)
     }
 
-    fn held_limit_m(&self, query: &FrictionQuery) -> f64 {
+    fn held_limit_m(&self, query: &FrictionQuery, _memory: &FrictionMemory) -> f64 {
         //= melder#4.1
         self.mu_s * query.load_m
     }

@@ -135,7 +135,7 @@ fn check_point(before_m_s: Option<f64>, speed_m_s: f64, mu: f64) -> Result<(), &
 impl FrictionLaw for FrictionCurve {
     fn holds(&self, query: &FrictionQuery, memory: &mut FrictionMemory) -> bool {
         remember_speed(query, memory);
-        let limit_m = self.held_limit_m(query);
+        let limit_m = self.held_limit_m(query, memory);
         let is_within = self.mu_s > 0.0 && query.gap_m <= limit_m;
         if !is_within || query.state == FrictionState::Stick || !knows_time(query) {
             return is_within;
@@ -160,11 +160,11 @@ impl FrictionLaw for FrictionCurve {
             Some(x) => x,
             // Friction that begins with zero holds nothing back on its way to S.
             None if self.points[0].1 == 0.0 => query.gap_m,
-            None => within(self.held_limit_m(query), -query.travel_m, query),
+            None => within(self.held_limit_m(query, memory), -query.travel_m, query),
         }
     }
 
-    fn held_limit_m(&self, query: &FrictionQuery) -> f64 {
+    fn held_limit_m(&self, query: &FrictionQuery, _memory: &FrictionMemory) -> f64 {
         self.mu_s * query.load_m
     }
 }

@@ -48,7 +48,7 @@ impl FrictionLaw for Dahl {
         within(limit_m, yielded(query, limit_m), query)
     }
 
-    fn held_limit_m(&self, query: &FrictionQuery) -> f64 {
+    fn held_limit_m(&self, query: &FrictionQuery, _memory: &FrictionMemory) -> f64 {
         self.mu * query.load_m
     }
 }

@@ -37,18 +37,18 @@ impl FixedCone {
 }
 
 impl FrictionLaw for FixedCone {
-    fn holds(&self, query: &FrictionQuery, _memory: &mut FrictionMemory) -> bool {
+    fn holds(&self, query: &FrictionQuery, memory: &mut FrictionMemory) -> bool {
         if query.state == FrictionState::Slip && self.static_n > self.friction_n {
             return query.gap_m < (1.0 - RESTICK_MARGIN) * radius_m(self.friction_n, query);
         }
-        self.static_n > 0.0 && query.gap_m <= self.held_limit_m(query)
+        self.static_n > 0.0 && query.gap_m <= self.held_limit_m(query, memory)
     }
 
     fn slide(&self, query: &FrictionQuery, _memory: &FrictionMemory) -> f64 {
         query.gap_m - radius_m(self.friction_n, query)
     }
 
-    fn held_limit_m(&self, query: &FrictionQuery) -> f64 {
+    fn held_limit_m(&self, query: &FrictionQuery, _memory: &FrictionMemory) -> f64 {
         radius_m(self.static_n, query)
     }
 }

@@ -77,7 +77,7 @@ impl FrictionLaw for HaywardArmstrong {
         within(z_max_m, query.gap_m - strain_m, query)
     }
 
-    fn held_limit_m(&self, query: &FrictionQuery) -> f64 {
+    fn held_limit_m(&self, query: &FrictionQuery, _memory: &FrictionMemory) -> f64 {
         self.mu * query.load_m
     }
 }

@@ -45,19 +45,19 @@ impl Karnopp {
 }
 
 impl FrictionLaw for Karnopp {
-    fn holds(&self, query: &FrictionQuery, _memory: &mut FrictionMemory) -> bool {
+    fn holds(&self, query: &FrictionQuery, memory: &mut FrictionMemory) -> bool {
         //= melder#3.1
         let is_slow = query.state == FrictionState::Stick || query.hip_speed_m_s() <= self.v_min_m_s;
         // A gap is a magnitude.
         //= melder#3.2
-        is_slow && self.mu_s > 0.0 && query.gap_m <= self.held_limit_m(query)
+        is_slow && self.mu_s > 0.0 && query.gap_m <= self.held_limit_m(query, memory)
     }
 
     fn slide(&self, query: &FrictionQuery, memory: &FrictionMemory) -> f64 {
         self.slip.slide(query, memory)
     }
 
-    fn held_limit_m(&self, query: &FrictionQuery) -> f64 {
+    fn held_limit_m(&self, query: &FrictionQuery, _memory: &FrictionMemory) -> f64 {
         self.mu_s * query.load_m
     }
 }

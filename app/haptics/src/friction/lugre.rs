@@ -59,15 +59,15 @@ impl FrictionLaw for LuGre {
         false
     }
 
-    fn slide(&self, query: &FrictionQuery, _memory: &FrictionMemory) -> f64 {
-        within(self.held_limit_m(query), yielded(query, self.strain_limit_m(query)), query)
+    fn slide(&self, query: &FrictionQuery, memory: &FrictionMemory) -> f64 {
+        within(self.held_limit_m(query, memory), yielded(query, self.strain_limit_m(query)), query)
     }
 
-    fn held_limit_m(&self, query: &FrictionQuery) -> f64 {
+    fn held_limit_m(&self, query: &FrictionQuery, _memory: &FrictionMemory) -> f64 {
         self.steady.mu_s() * query.load_m
     }
 
-    fn drag_m(&self, query: &FrictionQuery, _memory: &FrictionMemory) -> f64 {
+    fn drag_m(&self, query: &FrictionQuery, memory: &FrictionMemory) -> f64 {
         let speed_m_s = query.hip_speed_m_s();
         let viscous_m = self.steady.mu_v_s_per_m() * speed_m_s * query.load_m;
         let limit_m = self.strain_limit_m(query);
@@ -75,7 +75,8 @@ impl FrictionLaw for LuGre {
             return viscous_m;
         }
         let strain_m_s = speed_m_s * (1.0 - query.gap_along_hip_m / limit_m);
-        let damping_m = strain_damping_m(self.damping_n_s_per_m, strain_m_s, self.held_limit_m(query), query);
+        let damping_m =
+            strain_damping_m(self.damping_n_s_per_m, strain_m_s, self.held_limit_m(query, memory), query);
         viscous_m + damping_m
     }
 }

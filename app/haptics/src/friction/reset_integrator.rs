@@ -37,9 +37,9 @@ impl ResetIntegrator {
 }
 
 impl FrictionLaw for ResetIntegrator {
-    fn holds(&self, query: &FrictionQuery, _memory: &mut FrictionMemory) -> bool {
+    fn holds(&self, query: &FrictionQuery, memory: &mut FrictionMemory) -> bool {
         match query.state {
-            FrictionState::Stick => self.mu_s > 0.0 && query.gap_m <= self.held_limit_m(query),
+            FrictionState::Stick => self.mu_s > 0.0 && query.gap_m <= self.held_limit_m(query, memory),
             FrictionState::Slip => query.gap_m < self.mu_d * query.load_m,
         }
     }
@@ -48,15 +48,20 @@ impl FrictionLaw for ResetIntegrator {
         query.gap_m - self.mu_d * query.load_m
     }
 
-    fn held_limit_m(&self, query: &FrictionQuery) -> f64 {
+    fn held_limit_m(&self, query: &FrictionQuery, _memory: &FrictionMemory) -> f64 {
         self.mu_s * query.load_m
     }
 
-    fn drag_m(&self, query: &FrictionQuery, _memory: &FrictionMemory) -> f64 {
+    fn drag_m(&self, query: &FrictionQuery, memory: &FrictionMemory) -> f64 {
         if query.state == FrictionState::Slip || self.damping_n_s_per_m == 0.0 {
             return 0.0;
         }
         // Stuck, the strain changes as fast as the HIP moves.
-        strain_damping_m(self.damping_n_s_per_m, query.hip_speed_m_s(), self.held_limit_m(query), query)
+        strain_damping_m(
+            self.damping_n_s_per_m,
+            query.hip_speed_m_s(),
+            self.held_limit_m(query, memory),
+            query,
+        )
     }
 }

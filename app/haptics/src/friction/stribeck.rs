@@ -91,13 +91,13 @@ impl Stribeck {
 impl FrictionLaw for Stribeck {
     fn holds(&self, query: &FrictionQuery, memory: &mut FrictionMemory) -> bool {
         remember_speed(query, memory);
-        let is_within = self.mu_s > 0.0 && query.gap_m <= self.held_limit_m(query);
+        let is_within = self.mu_s > 0.0 && query.gap_m <= self.held_limit_m(query, memory);
         if !is_within || query.state == FrictionState::Stick || self.flat().is_some() || !knows_time(query) {
             return is_within;
         }
         // The least at which a slide goes on, if that is less than what rest can bear.
         let margin_m = RESTICK_MARGIN * self.mu_d * query.load_m;
-        let gap_m = (query.gap_m + margin_m).min(self.held_limit_m(query));
+        let gap_m = (query.gap_m + margin_m).min(self.held_limit_m(query, memory));
         self.balance(&FrictionQuery { gap_m, travel_m: 0.0, ..*query }).far_solution().is_none()
     }
 
@@ -116,11 +116,11 @@ impl FrictionLaw for Stribeck {
         }
         match balance.first_met_from(start_m(query, memory) / balance.unit_m) {
             Some(u) => u * balance.unit_m - query.travel_m,
-            None => within(self.held_limit_m(query), -query.travel_m, query),
+            None => within(self.held_limit_m(query, memory), -query.travel_m, query),
         }
     }
 
-    fn held_limit_m(&self, query: &FrictionQuery) -> f64 {
+    fn held_limit_m(&self, query: &FrictionQuery, _memory: &FrictionMemory) -> f64 {
         self.mu_s * query.load_m
     }
 }

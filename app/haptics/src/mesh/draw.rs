@@ -60,7 +60,7 @@ impl<L: FrictionLaw + ?Sized> Draw for Against<'_, L> {
             target_B: view.surface_point_B + direction_B * radius_m,
             is_at_rest: is_inside || asked_m <= view.rest_m,
             tangential_B: if is_inside {
-                cut_to(view.lag_B, self.friction.held_limit_m(&query))
+                cut_to(view.lag_B, self.friction.held_limit_m(&query, self.memory))
             } else {
                 direction_B * radius_m
             },

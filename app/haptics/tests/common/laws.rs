@@ -68,7 +68,11 @@ pub(crate) fn largest_ratio(friction: &Friction, normal_force_n: f64) -> Option<
     }
     let load_m = normal_force_n / K;
     let query = FrictionQuery { load_m, stiffness_n_per_m: K, dt_s: 1e-3, ..Default::default() };
-    Some(if load_m > 0.0 { friction.held_limit_m(&query) / load_m } else { 0.0 })
+    Some(if load_m > 0.0 {
+        friction.held_limit_m(&query, &haptics::FrictionMemory::default()) / load_m
+    } else {
+        0.0
+    })
 }
 
 /// Any friction with parameters from nothing to far beyond any material's.
