@@ -25,7 +25,7 @@ use crate::surface::SurfacePoint;
 #[derive(Debug, Clone, Copy, Default)]
 pub struct MeshCone {
     /// Which mesh the rest is about: indices of another one would lead nowhere.
-    mesh: Option<usize>,
+    mesh: Option<u64>,
     touching: Option<Touching>,
     /// Where the HIP was in the last tick.
     last_hip_B: Option<Vector3<f64>>,
@@ -68,8 +68,7 @@ impl MeshCone {
         previous_hip_B: Option<Vector3<f64>>,
         input: &ConeInput,
     ) -> Option<(ConeForce, Beginning)> {
-        // Its faces stay where they are as long as it lives.
-        let mesh_here = Some(mesh.faces().as_ptr().addr());
+        let mesh_here = Some(mesh.identity);
         if self.mesh != mesh_here {
             *self = Self { mesh: mesh_here, ..Self::default() };
         }
