@@ -127,8 +127,7 @@ impl MeshCone {
         let Some(from_B) = previous_hip_B.filter(|from_B| !is_elsewhere(from_B)) else {
             self.clear = Clear::default();
             // It is pushed out along the nearest face.
-            let was_inside = || (Place::nearest(&mesh.nearest(hip_B)), Beginning::WasInside);
-            return mesh.is_inside(hip_B).then(was_inside);
+            return mesh.way_out(hip_B).map(|nearest| (Place::nearest(&nearest), Beginning::WasInside));
         };
         if self.clear.has(&from_B) && self.clear.has(hip_B) {
             return None;
