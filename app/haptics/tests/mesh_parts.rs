@@ -35,6 +35,23 @@ fn a_finger_does_not_get_from_one_cube_into_the_other_where_they_touch() {
 }
 
 #[test]
+fn let_go_by_one_of_two_overlapping_parts_a_finger_is_felt_to_be_inside_the_other() {
+    let mut soup = make::cuboid([0.1; 3]);
+    let other = soup.clone();
+    soup.vertices.extend(other.vertices.iter().map(|v| v + Vector3::new(0.05, 0.03, 0.04)));
+    soup.faces.extend(other.faces.iter().map(|face| face.map(|v| v + 8)));
+    let cubes = touchable(&built(soup), Friction::None);
+    let mut finger = point_finger();
+    for y in [0.06, 0.045] {
+        step(&mut finger, &cubes, &Vector3::new(-0.02, y, 0.0));
+    }
+    // Through the one cube and over its edge, all inside the other.
+    let out = step(&mut finger, &cubes, &Vector3::new(0.095, 0.045, 0.04));
+    assert_eq!(out.entity, Some(0));
+    assert!((out.force_on_user_W - Vector3::x() * (K * 0.005)).norm() < 1e-12, "{out:?}");
+}
+
+#[test]
 fn a_point_where_parts_touch_is_a_vertex_of_each() {
     let mesh = built(cubes_that_touch_at_a_corner());
     assert_eq!(mesh.vertices().len(), 16);

@@ -3,7 +3,6 @@
 use nalgebra::Vector3;
 
 use super::Mesh;
-use super::facing::RELEASE;
 use super::fan::{Sector, for_each_around};
 use super::place::{Side, next, previous};
 
@@ -51,7 +50,7 @@ impl Cone {
     /// its face's angle, which is what decides where no face or edge is nearer (Baerentzen and Aanaes 2005). A fan
     /// that is not closed has no behind.
     pub(crate) fn is_behind(&self, mesh: &Mesh, side: Side, corner: usize) -> bool {
-        if !self.is_closed || self.most_depth_m < 0.0 || self.is_in_all_planes(mesh) {
+        if !self.is_closed || self.most_depth_m < 0.0 {
             return false;
         }
         self.least_depth_m >= 0.0 || {
@@ -62,12 +61,6 @@ impl Cone {
             });
             normal_B.dot(&self.to_hip_B) <= 0.0
         }
-    }
-
-    /// In all of them at once, but not at the tip: beyond the corner of a fold, where rounding alone tells its sides.
-    fn is_in_all_planes(&self, mesh: &Mesh) -> bool {
-        let rounding_m = RELEASE * mesh.extent_m();
-        self.most_depth_m <= rounding_m && self.to_hip_B.amax() > FAR * rounding_m
     }
 
     fn look_at(&mut self, mesh: &Mesh, sector: &Sector<'_>) {
@@ -114,6 +107,3 @@ impl Sector<'_> {
         [next(self.corner), previous(self.corner)].map(|corner| self.facet.corner_B(mesh, corner) - at_B)
     }
 }
-
-/// No pit is so narrow that its walls rise by less than this part of the way down to its bottom.
-const FAR: f64 = 1e3;

@@ -114,4 +114,4 @@ fn is_in_front(mesh: &Mesh, depth_m: f64) -> bool {
 }
 
 /// A few times the tolerance of [`Mesh::first_hit`].
-pub(super) const RELEASE: f64 = 4e-13;
+const RELEASE: f64 = 4e-13;
