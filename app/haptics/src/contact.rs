@@ -151,8 +151,10 @@ impl Slot {
     fn touch_mesh(&mut self, mesh: &Mesh, input: &TouchInput<'_>) -> Option<Touch> {
         let was_touching = self.mesh.is_touching();
         let (force, beginning) = self.mesh.update(mesh, input.friction, input.previous_hip_B, &input.cone)?;
-        if !was_touching {
-            self.strength = if beginning == Beginning::WasInside { 0.0 } else { 1.0 };
+        match beginning {
+            Beginning::WasInside => self.strength = 0.0,
+            Beginning::Came if !was_touching => self.strength = 1.0,
+            Beginning::Came => {}
         }
         Some(Touch {
             god_object: self.mesh.god_object()?,

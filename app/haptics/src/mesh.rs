@@ -33,6 +33,7 @@ mod fan;
 pub mod make;
 mod mesh_cone;
 mod order;
+mod pinch;
 mod place;
 mod query;
 mod repair;
@@ -65,6 +66,8 @@ pub struct Mesh {
     bvh: Bvh,
     sides: Sides,
     extent_m: f64,
+    /// Of all meshes that this process has built, which. An address would be another mesh's as soon as this one is gone.
+    identity: u64,
 }
 
 /// From where a mesh can be felt.
@@ -82,7 +85,8 @@ impl Mesh {
         &self.faces
     }
 
-    /// In the object's frame B \[m\], in order of their first use by a face. All are used, no two are equal.
+    /// In the object's frame B \[m\], in order of their first use by a face. All are used. Two are equal only where
+    /// parts touch at that point alone: each of them has its own.
     pub fn vertices(&self) -> &[Vector3<f64>] {
         &self.vertices
     }

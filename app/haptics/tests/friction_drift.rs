@@ -3,6 +3,7 @@
 
 mod common;
 
+use common::meshes::{cube, touchable, uv_sphere};
 use common::*;
 use haptics::{ContactState, Entity, Friction};
 use nalgebra::Vector3;
@@ -18,8 +19,12 @@ struct Rest {
 }
 
 /// Add a shape here and every model is watched on it.
-fn rests(friction: &Friction) -> [Rest; 2] {
-    [
+fn rests(friction: &Friction) -> Vec<Rest> {
+    let on_mesh = |name, mesh, mean_W| Rest { name, entity: touchable(mesh, friction.clone()), mean_W };
+    vec![
+        // On a face, and on one of 10,000 whose neighbours lie within the noise.
+        on_mesh("mesh of a cube", &cube(), Vector3::new(0.02, 0.05 - DEPTH, -0.01)),
+        on_mesh("mesh of a ball", &uv_sphere(100), on_circle(0.1 - DEPTH, 0.3)),
         Rest { name: "plane", entity: table(friction.clone()), mean_W: Vector3::new(0.02, -DEPTH, -0.01) },
         Rest { name: "sphere", entity: ball(0.1, friction.clone()), mean_W: on_circle(0.1 - DEPTH, 0.3) },
     ]
@@ -52,7 +57,7 @@ fn three_minutes_of_noise_do_not_move_the_god_object() {
 /// 86.4 million ticks at 1 kHz for every model on every shape, each of them about a minute:
 /// `cargo test --release -p haptics --test friction_drift -- --ignored --nocapture`.
 #[test]
-#[ignore = "simulates 24 hours for every model and shape: about 20 minutes; see its comment for the command"]
+#[ignore = "simulates 24 hours for every model and shape: about 40 minutes; see its comment for the command"]
 fn twenty_four_hours_of_noise_do_not_drift() {
     for (name, friction) in laws::drift_free() {
         for rest in rests(&friction) {

@@ -7,7 +7,7 @@ use common::meshes::*;
 use common::path::{self, Phase};
 use common::*;
 use haptics::mesh::Mesh;
-use haptics::{ContactState, Feature, Friction};
+use haptics::{ContactState, Feature, Friction, Plane};
 use nalgebra::Vector3;
 use std::sync::Arc;
 
@@ -92,5 +92,37 @@ fn a_slide_over_an_edge_between_coplanar_faces_is_one_over_a_plane() {
         // Depths are rounded 0.05 m away from the origin there, times 500 N/m, and the slide's 1e-12.
         let off = (on_cube.force_on_user_W - on_table.force_on_user_W).norm();
         assert!(off < 1e-11, "{hip:?}: {off}");
+    }
+}
+
+#[test]
+fn every_friction_on_the_face_of_a_cube_is_that_on_a_plane_whatever_edges_run_through_the_face() {
+    // The face's two triangles meet along x = z. A slide that comes to that edge halfway must go on as if it was not there:
+    // laws that fall with speed would else catch the god-object on it.
+    for (name, friction) in laws::drift_free().into_iter().chain(laws::drifting()) {
+        let on_mesh = touchable(&cube(), friction.clone());
+        let on_plane = entity(Plane::new(Vector3::y(), 0.05).unwrap(), friction);
+        for seed in 0..10 {
+            let (mut on_mesh_feels, mut on_plane_feels, mut noise) =
+                (point_finger(), point_finger(), Noise(seed));
+            let (mut hip, mut step_m) = (Vector3::y() * 0.055, Vector3::y() * -1e-4);
+            for tick in 0..2000 {
+                step_m = (step_m + noise.vector(1e-5)) * 0.99 - Vector3::y() * (3e-3 * (hip.y - 0.049));
+                hip += step_m;
+                let [x, y, z] =
+                    [hip.x.clamp(-0.03, 0.03), hip.y.clamp(0.035, 0.06), hip.z.clamp(-0.03, 0.03)];
+                hip = Vector3::new(x, y, z);
+                let mesh = step(&mut on_mesh_feels, &on_mesh, &hip);
+                let plane = step(&mut on_plane_feels, &on_plane, &hip);
+                assert_eq!(
+                    (mesh.entity, mesh.friction),
+                    (plane.entity, plane.friction),
+                    "{name}, {seed}, {tick}"
+                );
+                // Some newtons, over a slide in two parts, to the tolerance that a curve's roots are found with.
+                let difference = (mesh.force_on_user_W - plane.force_on_user_W).norm();
+                assert!(difference < 1e-9, "{name}, {seed}, {tick}: {mesh:?} {plane:?}");
+            }
+        }
     }
 }

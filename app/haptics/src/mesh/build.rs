@@ -14,8 +14,12 @@
 use super::order::Triangle;
 use super::repair::area_vector;
 use super::{Bvh, Face, Link, Mesh, MeshError, MeshReport, TriangleSoup};
-use super::{order, repair, topology, winding};
+use super::{order, pinch, repair, topology, winding};
 use nalgebra::Vector3;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// How many meshes there have been.
+static BUILT: AtomicU64 = AtomicU64::new(0);
 
 impl Mesh {
     /// Builds a mesh, and says what had to be repaired.
@@ -27,10 +31,11 @@ impl Mesh {
         let mut report = MeshReport::default();
         let mut triangles = repair::proper_triangles(&soup, &mut report)?;
         order::sort_spatially(&mut triangles, &soup.vertices, &mut report.duplicate);
-        let vertices = order::renumber(&mut triangles, &soup.vertices);
+        let mut vertices = order::renumber(&mut triangles, &soup.vertices);
         drop(soup);
         let mut links = topology::link(&triangles, &vertices, &mut report.touching_edges)?;
         let sides = winding::orient(&mut triangles, &mut links, &vertices, &mut report);
+        pinch::part(&mut triangles, &links, &mut vertices);
         report_edges(&triangles, &links, &mut report);
         let faces: Box<[Face]> =
             triangles.iter().zip(&links).map(|(triangle, links)| face(triangle, links, &vertices)).collect();
@@ -40,7 +45,8 @@ impl Mesh {
         let extent_m = vertices.iter().fold(0.0_f64, |extent, v| extent.max(v.amax()));
         let vertices = vertices.into_boxed_slice();
         let bvh = Bvh::build(&faces, &vertices);
-        Ok((Self { faces, vertices, bvh, sides, extent_m }, report))
+        let identity = BUILT.fetch_add(1, Ordering::Relaxed);
+        Ok((Self { faces, vertices, bvh, sides, extent_m, identity }, report))
     }
 }
 

@@ -1,6 +1,7 @@
 //! Where a god-object is drawn to from where it stands: to the surface point, or only to the rim of the friction circle.
 
 use nalgebra::Vector3;
+use std::cell::Cell;
 
 use crate::friction_cone::ConeInput;
 use crate::friction_law::{FrictionLaw, FrictionMemory, FrictionQuery, FrictionState};
@@ -43,6 +44,9 @@ pub(crate) struct Against<'l, L: ?Sized> {
     pub(crate) memory: &'l FrictionMemory,
     pub(crate) pull: &'l Pull,
     pub(crate) input: &'l ConeInput,
+    /// Force ratio with which it already slides in this tick. A curve that falls with speed may hold what rests, but
+    /// not what slides: a god-object that comes to an edge halfway must not be caught there.
+    pub(crate) slides_with: Cell<Option<f64>>,
 }
 
 impl<L: FrictionLaw + ?Sized> Draw for Against<'_, L> {
@@ -52,10 +56,16 @@ impl<L: FrictionLaw + ?Sized> Draw for Against<'_, L> {
         // The chord, since that is what two recorded positions over dt show as speed.
         let travel_m = back_B.norm().copysign(back_B.dot(&direction_B));
         let query = self.query(view, gap_m, travel_m);
-        let asked_m = self.friction.slide(&query, self.memory);
+        let asked_m = match (self.friction.slide(&query, self.memory), self.slides_with.get()) {
+            (asked_m, Some(ratio)) if asked_m <= 0.0 => gap_m - ratio * view.load_m,
+            (asked_m, _) => asked_m,
+        };
         // To the rim, and not beyond the surface point.
         let radius_m = gap_m - asked_m.min(gap_m);
         let is_inside = asked_m.is_nan() || asked_m <= 0.0;
+        if !is_inside && view.load_m > 0.0 {
+            self.slides_with.set(Some(radius_m / view.load_m));
+        }
         Drawn {
             target_B: view.surface_point_B + direction_B * radius_m,
             is_at_rest: is_inside || asked_m <= view.rest_m,

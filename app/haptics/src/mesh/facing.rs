@@ -77,7 +77,9 @@ impl Facing {
         match (here_wants && !in_front[0], over_wants && !in_front[1]) {
             (true, false) => Self::Face(side),
             (false, true) => Self::Face(over.side),
-            // On a convex edge by rounding only.
+            // On a sharp edge by rounding only: beyond it, in both planes at once.
+            (false, false) if !is_concave && over_inward_B.dot(&here.inward_B(&edge_B)) > 0.0 => Self::Free,
+            // On a blunt one, too: right below it.
             (false, false) => Self::Edge(side, edge),
             // The lower index among equals, so that the result does not depend on where one came from.
             (true, true) if (here_depth_m, side.face) <= (over_depth_m, over.side.face) => Self::Face(side),

@@ -21,9 +21,9 @@ use std::f64::consts::{PI, TAU};
 
 /// A sphere of `nu >= 3` meridians and `nv >= 2` rings of quads from pole to pole, the poles on the y axis.
 ///
-/// The usual size is nv = nu / 2, that is nu / 2 + 1 points on a meridian: nu = 32, 100, 316, 1000 gives
-/// 2 nu nv = nu^2 = 1024, 10,000, 99,856, 1,000,000 triangles. At the poles one triangle of each quad has no area
-/// and is left out, so 2 nu (nv - 1) = nu^2 - 2 nu remain: 960, 9,800, 99,224, 998,000.
+/// It has 2 nu (nv - 1) triangles: at the poles one triangle of each quad has no area and is left out. The standard
+/// sizes have nv = nu / 2 + 1 rings, hence nu^2 triangles: nu = 32, 100, 316, 1000 gives 1024, 10,000, 99,856,
+/// 1,000,000. With nu / 2 rings they would be fewer: 960, 9,800, 99,224, 998,000.
 pub fn uv_sphere(nu: usize, nv: usize, radius_m: f64) -> TriangleSoup {
     globe(nu, nv, |_, _| radius_m)
 }

@@ -10,6 +10,7 @@
 //! Cost: free and far, one comparison; free and near, one query of the hierarchy; in contact, independent of the mesh.
 
 use nalgebra::Vector3;
+use std::cell::Cell;
 
 use super::Mesh;
 use super::draw::{Against, Frictionless};
@@ -25,7 +26,7 @@ use crate::surface::SurfacePoint;
 #[derive(Debug, Clone, Copy, Default)]
 pub struct MeshCone {
     /// Which mesh the rest is about: indices of another one would lead nowhere.
-    mesh: Option<usize>,
+    mesh: Option<u64>,
     touching: Option<Touching>,
     /// Where the HIP was in the last tick.
     last_hip_B: Option<Vector3<f64>>,
@@ -68,8 +69,7 @@ impl MeshCone {
         previous_hip_B: Option<Vector3<f64>>,
         input: &ConeInput,
     ) -> Option<(ConeForce, Beginning)> {
-        // Its faces stay where they are as long as it lives.
-        let mesh_here = Some(mesh.faces().as_ptr().addr());
+        let mesh_here = Some(mesh.identity);
         if self.mesh != mesh_here {
             *self = Self { mesh: mesh_here, ..Self::default() };
         }
@@ -80,7 +80,13 @@ impl MeshCone {
             beginning = how;
             self.touching = Some(Touching::new(place));
         }
-        let force = self.touching.as_mut().and_then(|touching| touching.update(mesh, friction, input));
+        let mut force = self.touching.as_mut().and_then(|touching| touching.update(mesh, friction, input));
+        if force.is_none() {
+            // Let go by one of two parts that overlap, it may be inside the other, whose faces it never came through.
+            beginning = Beginning::WasInside;
+            self.touching = found_inside(mesh, &input.hip_B).map(Touching::new);
+            force = self.touching.as_mut().and_then(|touching| touching.update(mesh, friction, input));
+        }
         if force.is_none() {
             self.touching = None;
         }
@@ -127,9 +133,7 @@ impl MeshCone {
         };
         let Some(from_B) = previous_hip_B.filter(|from_B| !is_elsewhere(from_B)) else {
             self.clear = Clear::default();
-            // It is pushed out along the nearest face.
-            let was_inside = || (Place::nearest(&mesh.nearest(hip_B)), Beginning::WasInside);
-            return mesh.is_inside(hip_B).then(was_inside);
+            return found_inside(mesh, hip_B).map(|place| (place, Beginning::WasInside));
         };
         if self.clear.has(&from_B) && self.clear.has(hip_B) {
             return None;
@@ -140,6 +144,11 @@ impl MeshCone {
         self.clear = Clear { centre_B: *hip_B, radius_m: mesh.clearance(hip_B, mesh.extent_m()) };
         None
     }
+}
+
+/// Where a finger that is inside is pushed out: along the nearest face.
+fn found_inside(mesh: &Mesh, hip_B: &Vector3<f64>) -> Option<Place> {
+    mesh.way_out(hip_B).map(|nearest| Place::nearest(&nearest))
 }
 
 impl Touching {
@@ -164,7 +173,8 @@ impl Touching {
         if let Some(tangential_B) = self.grip.hold(friction, &here.view, &pull, input) {
             return Some(self.answer(&Walked { view: here.view, tangential_B, changes: 0 }, input));
         }
-        let draw = Against { friction, memory: &self.grip.memory, pull: &pull, input };
+        let slides_with = Cell::new(None);
+        let draw = Against { friction, memory: &self.grip.memory, pull: &pull, input, slides_with };
         let mut walked = walk(mesh, &mut self.god_object, here, &draw, input)?;
         walked.tangential_B += self.grip.drag(friction, &walked.tangential_B, &walked.view, &pull, input);
         Some(self.answer(&walked, input))

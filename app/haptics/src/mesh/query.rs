@@ -37,6 +37,16 @@ impl Mesh {
         self.sides == Sides::Solid && self.bvh.is_inside(self.triangles(), p_B)
     }
 
+    /// A point of the surface through which to push out what is inside, at a cost that a tick can bear.
+    ///
+    /// The nearest one, unless very many are as near. `None` outside, hence always for a sheet.
+    pub fn way_out(&self, p_B: &Vector3<f64>) -> Option<Nearest> {
+        if self.sides == Sides::Sheet {
+            return None;
+        }
+        self.bvh.way_out(self.triangles(), p_B)
+    }
+
     /// A lower bound of the distance from a point to the mesh, at most `at_most_m`; 0 if nothing better is known
     /// \[m\].
     ///

@@ -32,6 +32,18 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
     /// the same direction: from there, too many faces look equally near. One that is not finite is answered by a
     /// corner of the first face, infinitely far away.
     pub fn nearest(&self, triangles: Triangles<'_>, p_B: &Vector3<f64>) -> Nearest {
+        self.nearest_of_visited(triangles, p_B, usize::MAX).0
+    }
+
+    /// As [`Self::nearest`], and `true`; or the nearest of what was seen when so many nodes and runs of faces had been
+    /// visited, and `false`.
+    pub(super) fn nearest_of_visited(
+        &self,
+        triangles: Triangles<'_>,
+        p_B: &Vector3<f64>,
+        most_visits: usize,
+    ) -> (Nearest, bool) {
+        let mut visits = 0;
         let mut search = Search::new(triangles, p_B, self.extent_m());
         let mut stack = Stack::<f32>::new();
         let p = Rounded::new(&search.p_B);
@@ -39,6 +51,10 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
             if squared_distance > search.limit {
                 continue;
             }
+            if visits == most_visits {
+                return (search.result(p_B), false);
+            }
+            visits += 1;
             if child.count() == 0 {
                 let node = &self.nodes[child.index()];
                 stack.push(&node.squared_distances(&p), &node.children, search.limit);
@@ -48,7 +64,7 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
                 }
             }
         }
-        search.result(p_B)
+        (search.result(p_B), true)
     }
 }
 
