@@ -128,7 +128,7 @@ pub(crate) struct Value<'d> {
 }
 
 impl<'d> Value<'d> {
-    /// For messages only: finding the line counts from the start of the file.
+    /// Its line and key, for messages.
     pub(crate) fn at(&self) -> Box<Location> {
         self.document.location(self.value.span().start, self.path.clone())
     }

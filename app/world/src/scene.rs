@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 
-use crate::document::Document;
+use crate::document::{Document, LineEnds};
 use crate::entity::SceneEntity;
 use crate::error::SceneError;
 use crate::finger::SceneFinger;
@@ -47,7 +47,8 @@ impl Scene {
     /// # Errors
     /// The first thing found to be wrong, with its place and what is allowed there.
     pub fn parse(text: &str, file: &Path) -> Result<Self, SceneError> {
-        let document = Document::new(text, file);
+        let lines = LineEnds::of(text);
+        let document = Document::new(text, &lines, file);
         let root = document.parse()?;
         let table = Table::root(document, &root);
         table.check_keys(&KEYS)?;
