@@ -230,6 +230,15 @@ impl<'d> Value<'d> {
         }
     }
 
+    /// The name of a file. A line break or an escape in it would spoil every message that names the file.
+    pub(crate) fn path(&self, allowed: &str) -> Result<&'d str, SceneError> {
+        let path = self.text(allowed)?;
+        if path.contains(char::is_control) {
+            return Err(self.out_of_range(format_args!("{allowed}, without control characters")));
+        }
+        Ok(path)
+    }
+
     /// One of the words that this version implements.
     pub(crate) fn choose(&self, what: &'static str, words: &Vocabulary) -> Result<&'static str, SceneError> {
         let available = words.list();

@@ -71,7 +71,7 @@ fn read_name(table: &Table<'_>, file: &Path) -> Result<String, SceneError> {
 
 fn read_hand(table: &Table<'_>, file: &Path) -> Result<Option<PathBuf>, SceneError> {
     let Some(value) = table.get("hand") else { return Ok(None) };
-    let hand = value.text("the path of a CSV file, relative to this file")?;
+    let hand = value.path("the path of a CSV file, relative to this file")?;
     Ok(Some(file.parent().unwrap_or(Path::new("")).join(hand)))
 }
 
