@@ -168,7 +168,7 @@ impl Rig {
             self.scene.entities.iter().map(|entity| self.entity(entity)).collect::<Result<_, _>>()?;
         let fingers = self.scene.fingers.iter().map(|finger| {
             let made = Finger::new(finger.radius_m, entities.len())
-                .map_err(|source| self.refused(format!("finger {}", finger.name), source))?;
+                .map_err(|source| self.refused(None, format!("finger {}", finger.name), source))?;
             self.check_felt(&entities, finger)?;
             let mount = self.mount(finger.device);
             Ok(DeviceFinger { finger: made, device: finger.device, mount })
@@ -239,7 +239,7 @@ impl Rig {
 
     fn entity(&self, spec: &SceneEntity) -> Result<Entity, RigError> {
         let what = || format!("entity {}", spec.name);
-        let refused = |source| self.refused(what(), source);
+        let refused = |source| self.refused(Some(spec.line), what(), source);
         let unfit = |unfit| match unfit {
             Unfit::Refused(source) => refused(source),
             Unfit::NotAvailable(it) => self.not_available(format!("{}: {it}", what())),
@@ -263,6 +263,7 @@ impl Rig {
         let by_smaller = entities[index].shape.is_felt_by(1e-3 * finger.radius_m);
         Err(RigError::NotFelt {
             file: self.scene_file.clone(),
+            line: spec.line,
             finger: finger.name.clone(),
             radius_m: finger.radius_m,
             entity: spec.name.clone(),
@@ -279,8 +280,8 @@ impl Rig {
         })
     }
 
-    fn refused(&self, what: String, source: ParameterError) -> RigError {
-        RigError::Refused { file: self.scene_file.clone(), what, source }
+    fn refused(&self, line: Option<usize>, what: String, source: ParameterError) -> RigError {
+        RigError::Refused { file: self.scene_file.clone(), line, what, source }
     }
 
     fn not_available(&self, what: String) -> RigError {

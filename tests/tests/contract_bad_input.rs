@@ -155,7 +155,7 @@ fn a_scene_that_is_wrong_is_refused_with_file_line_key_finding_and_remedy() {
         ),
         (
             shape("{ kind = \"sphere\", radius_m = 1e200, scale = 1e200 }"),
-            &["scene.toml: entity e0: radius_m is inf"],
+            &["scene.toml:2: entity e0: radius_m is inf"],
         ),
         (
             entity("friction = { model = \"stiction\", mu_s = 0.3, mu_d = 0.7 }"),

@@ -379,7 +379,7 @@ fn a_finger_with_a_radius_is_refused_on_a_mesh() {
     let said = place.run(["run", "scene.toml", "--clock", "virtual", "--headless"]);
     assert_eq!(said.status, Some(2), "{}", said.err);
     for part in
-        ["scene.toml", "finger f0 has radius_m = 0.005", "entity thing, a mesh", "allowed: radius_m = 0"]
+        ["scene.toml:4: finger f0 has radius_m = 0.005", "entity thing, a mesh", "allowed: radius_m = 0"]
     {
         assert!(said.err.contains(part), "`{part}` is missing in: {}", said.err);
     }

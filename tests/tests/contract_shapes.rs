@@ -300,6 +300,33 @@ fn a_spherical_finger_rolls_a_radius_above_each_shape_that_it_can_feel() {
 }
 
 #[test]
+fn a_spherical_finger_says_whether_it_rests_on_a_face_an_edge_or_a_corner() {
+    let half = 0.5 * 2f64.sqrt();
+    let third = 1.0 / 3f64.sqrt();
+    let cube = "kind = \"box\", size_m = [0.04, 0.04, 0.04]";
+    let cone = "kind = \"cone\", radius_bottom_m = 0.02, radius_top_m = 0.0, length_m = 0.04";
+    for (shape, place, normal, feature) in [
+        (cube, [0.003, 0.02, 0.002], [0.0, 1.0, 0.0], "face"),
+        (cube, [0.02, 0.02, 0.002], [half, half, 0.0], "edge"),
+        (cube, [0.02, 0.02, -0.02], [third, third, -third], "vertex"),
+        (cone, [0.0, 0.02, 0.0], [0.0, 1.0, 0.0], "vertex"),
+        (cone, [0.02, -0.02, 0.0], [half, -half, 0.0], "edge"),
+        (cone, [0.003, -0.02, 0.0], [0.0, -1.0, 0.0], "face"),
+    ] {
+        let (p, n) = (V::from(place), V::from(normal));
+        let at = |height_m: f64| in_world(p + n * height_m);
+        let path = hand([(0.0, at(0.02)), (0.5, at(0.005 - DEPTH_M)), (1.0, at(0.02))]);
+        let scene = scene(shape, "", "radius_m = 0.005");
+        let samples = Workplace::new().play(&scene, &path, &[]).finger("f0");
+        let touching: Vec<&Sample> = samples.iter().filter(|s| s.touches()).collect();
+        assert!(touching.len() > 30, "{shape}: {}", touching.len());
+        for s in touching {
+            assert_eq!(s.feature, feature, "{shape}: {s:?}");
+        }
+    }
+}
+
+#[test]
 fn a_finger_with_a_radius_is_refused_where_it_would_feel_nothing() {
     let place = Workplace::new();
     place.write(

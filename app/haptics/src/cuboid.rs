@@ -82,8 +82,11 @@ impl Cuboid {
             return self.on(level.piece, point_B);
         }
         let normal_B = level.gradient_B;
-        let point_B = self.clamped(point_B) + normal_B * self.rounding_m;
-        SurfacePoint { point_B, normal_B, feature: Feature::Surface, piece: ROUND }
+        let within_B = self.clamped(point_B);
+        // What a ball touches there is the box itself.
+        let beyond = point_B.zip_fold(&within_B, 0, |beyond, x, within| beyond + usize::from(x != within));
+        let feature = if beyond == 3 { Feature::Vertex } else { Feature::Edge };
+        SurfacePoint { point_B: within_B + normal_B * self.rounding_m, normal_B, feature, piece: ROUND }
     }
 }
 
@@ -189,6 +192,15 @@ mod tests {
         // One subtraction of numbers of 0.1.
         assert!((brick().signed_distance(&Vector3::new(-0.09, 0.02, 0.01)) + 0.01).abs() < 1e-17);
         assert_eq!(Cuboid::new([0.1; 3]).unwrap().nearest(&Vector3::zeros()).normal_B, Vector3::y());
+    }
+
+    #[test]
+    fn a_ball_beyond_an_edge_rests_on_the_edge_and_beyond_a_corner_on_the_corner() {
+        let grown = brick().grown(0.01).unwrap();
+        let feature = |x, y, z| grown.nearest(&Vector3::new(x, y, z)).feature;
+        assert_eq!(feature(0.02, 0.055, 0.0), Feature::Face);
+        assert_eq!(feature(0.105, 0.055, 0.0), Feature::Edge);
+        assert_eq!(feature(0.105, -0.055, 0.035), Feature::Vertex);
     }
 
     #[test]

@@ -163,11 +163,16 @@ impl Frustum {
             BOTTOM_RIM => self.on_cap(BOTTOM, point_B),
             piece => self.on(piece, point_B),
         };
-        let is_rim = level.piece > SIDE;
+        // What a ball touches there is the rim itself, or the tip.
+        let feature = match level.piece {
+            TOP_RIM | BOTTOM_RIM if self.radius_of_cap(level.piece) == 0.0 => Feature::Vertex,
+            TOP_RIM | BOTTOM_RIM => Feature::Edge,
+            _ => within.feature,
+        };
         SurfacePoint {
             point_B: within.point_B + level.gradient_B * self.rounding_m,
             normal_B: level.gradient_B,
-            feature: if is_rim { Feature::Surface } else { within.feature },
+            feature,
             piece: level.piece,
         }
     }

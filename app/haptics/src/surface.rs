@@ -11,7 +11,7 @@
 
 use nalgebra::Vector3;
 
-/// What kind of surface piece a god-object rests on.
+/// What kind of surface piece a god-object rests on; of a finger with a radius, what the finger touches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Feature {
     /// No contact.

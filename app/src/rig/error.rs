@@ -50,10 +50,12 @@ pub enum RigError {
     #[error(transparent)]
     Device(#[from] OpenError),
     /// The scene holds something that rendering refuses.
-    #[error("{file}: {what}: {source}")]
+    #[error("{}{}: {what}: {source}", .file.display(), on_line(*.line))]
     Refused {
         /// The scene's file.
         file: PathBuf,
+        /// Where the entity begins; `None` for a finger.
+        line: Option<usize>,
         /// The entity or finger.
         what: String,
         /// Why.
@@ -83,12 +85,14 @@ pub enum RigError {
     },
     /// A finger with a radius meets a shape that has no surface for its centre to roll on.
     #[error(
-        "{}: finger {finger} has radius_m = {radius_m}, and entity {entity}, a {kind}, cannot be felt by such a finger; \
+        "{}:{line}: finger {finger} has radius_m = {radius_m}, and entity {entity}, a {kind}, cannot be felt by such a finger; \
          allowed: radius_m = 0, which feels every shape{smaller}, or another shape", .file.display()
     )]
     NotFelt {
         /// The scene's file.
         file: PathBuf,
+        /// Where the entity begins.
+        line: usize,
         /// The finger's name.
         finger: String,
         /// Its radius (m).
@@ -108,4 +112,8 @@ pub enum RigError {
         /// What.
         what: String,
     },
+}
+
+fn on_line(line: Option<usize>) -> String {
+    line.map_or_else(String::new, |line| format!(":{line}"))
 }

@@ -13,11 +13,28 @@ use crate::error::{Location, SceneError};
 pub(crate) struct Document<'d> {
     file: &'d Path,
     text: &'d str,
+    lines: &'d LineEnds,
+}
+
+/// Where the lines of a text end, found once: ten thousand entities that keep their lines would otherwise count them
+/// ten thousand times from the start.
+#[derive(Debug)]
+pub(crate) struct LineEnds(Vec<usize>);
+
+impl LineEnds {
+    pub(crate) fn of(text: &str) -> Self {
+        Self(text.bytes().enumerate().filter(|&(_, byte)| byte == b'\n').map(|(offset, _)| offset).collect())
+    }
+
+    /// The line, counted from 1, of the byte at `offset`; past the end: the last line.
+    fn line(&self, offset: usize) -> usize {
+        1 + self.0.partition_point(|&end| end < offset)
+    }
 }
 
 impl<'d> Document<'d> {
-    pub(crate) fn new(text: &'d str, file: &'d Path) -> Self {
-        Self { file, text }
+    pub(crate) fn new(text: &'d str, lines: &'d LineEnds, file: &'d Path) -> Self {
+        Self { file, text, lines }
     }
 
     pub(crate) fn file(&self) -> &'d Path {
@@ -30,7 +47,7 @@ impl<'d> Document<'d> {
     }
 
     pub(crate) fn line(&self, offset: usize) -> usize {
-        line_of(self.text.as_bytes(), offset)
+        self.lines.line(offset)
     }
 
     pub(crate) fn location(&self, offset: usize, key: String) -> Box<Location> {
@@ -74,6 +91,17 @@ mod tests {
         assert_eq!((line_of(text, 2), column_of(text, 2)), (2, 1));
         let offset_of_x = text.len() - 1;
         assert_eq!((line_of(text, offset_of_x), column_of(text, offset_of_x)), (2, 5));
+    }
+
+    #[test]
+    fn lines_found_once_are_those_that_counting_finds() {
+        for text in ["", "\n", "a", "a\n\nb\n", "a\r\nb", "ä\nö"] {
+            let lines = LineEnds::of(text);
+            for offset in 0..text.len() + 2 {
+                let counted = line_of(text.as_bytes(), offset);
+                assert_eq!(lines.line(offset), counted, "byte {offset} of {text:?}");
+            }
+        }
     }
 
     #[test]

@@ -15,6 +15,8 @@ use crate::vocabulary::Vocabulary;
 pub struct SceneEntity {
     /// Unique among the entities; default e0, e1, ... by position in the list.
     pub name: String,
+    /// Where its `[[entity]]` stands in the file, for messages; counted from 1.
+    pub line: usize,
     /// In the entity's frame B.
     pub shape: ShapeSpec,
     /// `X_WB`, the pose of the entity's frame in the world; default identity.
@@ -53,6 +55,7 @@ impl SceneEntity {
         let stiffness_default = Self::DEFAULT_STIFFNESS_N_PER_M;
         Ok(Self {
             name: names.claim(table, format!("e{i}"))?,
+            line: table.document().line(table.offset()),
             shape: ShapeSpec::read(table)?,
             pose: read_pose(table)?,
             stiffness_n_per_m: table.number_or("stiffness_n_per_m", Bound::Positive, stiffness_default)?,

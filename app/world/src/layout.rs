@@ -26,7 +26,7 @@ use std::path::Path;
 use nalgebra::{Isometry3, Matrix3};
 
 use crate::MAX_DEVICES;
-use crate::document::Document;
+use crate::document::{Document, LineEnds};
 use crate::error::SceneError;
 use crate::placement::{LEAST_STRETCH, MOST_STRETCH, Placement, stretches};
 use crate::pose::read_pose;
@@ -59,7 +59,8 @@ impl Layout {
     /// # Errors
     /// The first thing found to be wrong, with its place and what is allowed there.
     pub fn parse(text: &str, file: &Path) -> Result<Self, SceneError> {
-        let document = Document::new(text, file);
+        let lines = LineEnds::of(text);
+        let document = Document::new(text, &lines, file);
         let root = document.parse()?;
         let table = Table::root(document, &root);
         table.check_keys(&Vocabulary { available: &KEYS, later: &[] })?;

@@ -11,8 +11,7 @@ use crate::reader::{Table, Value, quoted};
 /// The longest name, in characters (all are ASCII).
 pub const MAX_NAME_BYTES: usize = 64;
 
-/// The names given so far in one list, each with the byte offset where it was given. (A line is
-/// counted from the start of the file, so it is only worked out for a message.)
+/// The names given so far in one list, each with the byte offset where it was given.
 #[derive(Debug, Default)]
 pub(crate) struct Names {
     offset_of: BTreeMap<String, usize>,

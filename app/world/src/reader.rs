@@ -128,7 +128,7 @@ pub(crate) struct Value<'d> {
 }
 
 impl<'d> Value<'d> {
-    /// For messages only: finding the line counts from the start of the file.
+    /// Its line and key, for messages.
     pub(crate) fn at(&self) -> Box<Location> {
         self.document.location(self.value.span().start, self.path.clone())
     }
@@ -228,6 +228,15 @@ impl<'d> Value<'d> {
             DeValue::String(_) => Err(self.out_of_range(allowed)),
             _ => Err(self.wrong_type(allowed)),
         }
+    }
+
+    /// The name of a file. A line break or an escape in it would spoil every message that names the file.
+    pub(crate) fn path(&self, allowed: &str) -> Result<&'d str, SceneError> {
+        let path = self.text(allowed)?;
+        if path.contains(char::is_control) {
+            return Err(self.out_of_range(format_args!("{allowed}, without control characters")));
+        }
+        Ok(path)
     }
 
     /// One of the words that this version implements.

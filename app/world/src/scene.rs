@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 
-use crate::document::Document;
+use crate::document::{Document, LineEnds};
 use crate::entity::SceneEntity;
 use crate::error::SceneError;
 use crate::finger::SceneFinger;
@@ -47,7 +47,8 @@ impl Scene {
     /// # Errors
     /// The first thing found to be wrong, with its place and what is allowed there.
     pub fn parse(text: &str, file: &Path) -> Result<Self, SceneError> {
-        let document = Document::new(text, file);
+        let lines = LineEnds::of(text);
+        let document = Document::new(text, &lines, file);
         let root = document.parse()?;
         let table = Table::root(document, &root);
         table.check_keys(&KEYS)?;
@@ -70,7 +71,7 @@ fn read_name(table: &Table<'_>, file: &Path) -> Result<String, SceneError> {
 
 fn read_hand(table: &Table<'_>, file: &Path) -> Result<Option<PathBuf>, SceneError> {
     let Some(value) = table.get("hand") else { return Ok(None) };
-    let hand = value.text("the path of a CSV file, relative to this file")?;
+    let hand = value.path("the path of a CSV file, relative to this file")?;
     Ok(Some(file.parent().unwrap_or(Path::new("")).join(hand)))
 }
 

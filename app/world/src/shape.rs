@@ -196,7 +196,7 @@ fn read_mesh(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
     let allowed = "the path of an OBJ or STL file, relative to this file";
     let value = table.require("file", allowed)?;
     let beside = table.document().file().parent().unwrap_or(Path::new(""));
-    let file = beside.join(value.text(allowed)?);
+    let file = beside.join(value.path(allowed)?);
     Ok(ShapeSpec::Mesh(MeshSpec { file, scale: [1.0; 3], at: *value.at() }))
 }
 

@@ -1,6 +1,7 @@
 //! What a scene and a layout that are in order turn into.
 
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use world::{AlgorithmSpec, FrictionSpec, Layout, Scene, SceneEntity, ShapeSpec};
@@ -299,4 +300,24 @@ fn every_committed_scene_is_in_order_and_its_hand_file_exists() {
         assert_eq!(Some(scene.name.as_str()), file.file_stem().and_then(|stem| stem.to_str()));
         assert!(scene.hand.is_none_or(|hand| hand.is_file()), "{}", file.display());
     }
+}
+
+/// How long a scene of so many entities of this shape takes to read, at best.
+fn shortest_reading(shape: &str, entities: usize) -> Duration {
+    let text = format!("[[finger]]\n{}", format!("[[entity]]\nshape = {{ {shape} }}\n").repeat(entities));
+    let once = || {
+        let begin = Instant::now();
+        assert_eq!(Scene::parse(&text, Path::new("many.toml")).unwrap().entities.len(), entities);
+        begin.elapsed()
+    };
+    (0..3).map(|_| once()).min().unwrap()
+}
+
+#[test]
+fn ten_thousand_meshes_are_read_about_as_fast_as_ten_thousand_balls() {
+    let meshes = shortest_reading("kind = \"mesh\", file = \"cube.obj\"", 10_000);
+    let balls = shortest_reading("kind = \"sphere\", radius_m = 0.0123", 10_000);
+    // Each mesh keeps its line for messages. Were the lines counted from the start of the file for each, it would
+    // take more than ten times as long; four times leaves room for a busy machine.
+    assert!(meshes < 4 * balls, "{meshes:?} for meshes, {balls:?} for balls");
 }

@@ -67,6 +67,11 @@ fn a_value_of_the_wrong_type_is_named_with_what_was_found() {
         "hand = 5\n[[finger]]\n",
         "s.toml:1: hand: found 5; allowed: the path of a CSV file, relative to this file",
     );
+    refused(
+        "hand = \"a\\tb.csv\"\n[[finger]]\n",
+        "s.toml:1: hand: found the string \"a\\tb.csv\"; \
+         allowed: the path of a CSV file, relative to this file, without control characters",
+    );
 }
 
 #[test]
@@ -321,6 +326,11 @@ fn a_size_that_no_shape_has_is_refused() {
         (
             "{ kind = \"mesh\", file = \"\" }",
             "file: found the string \"\"; allowed: the path of an OBJ or STL file, relative to this file",
+        ),
+        (
+            "{ kind = \"mesh\", file = \"a\\nb\\u001b.obj\" }",
+            "file: found the string \"a\\nb\\u{1b}.obj\"; \
+             allowed: the path of an OBJ or STL file, relative to this file, without control characters",
         ),
         ("{ kind = \"mesh\", file = \"a.obj\", scale = 0 }", "scale: found 0; allowed: a number above 0"),
         ("{ kind = \"sphere\", radius_m = 1, scale = -1 }", "scale: found -1; allowed: a number above 0"),
