@@ -40,7 +40,8 @@ impl Coin {
 fn ripple(rate_hz: u64, knows_velocity: bool) -> (f64, f64) {
     let wall = Entity::new(Plane::new(Vector3::y(), DEPTH_M).unwrap(), Isometry3::identity(), STIFFNESS);
     let wall = wall.unwrap().with_damping(DAMPING).unwrap();
-    let (mut arm, mut finger, mut coin) = (arm(), Finger::new(0.0, 1).unwrap(), Coin(7));
+    let (mut arm, mut finger, mut coin) =
+        (arm(), Finger::new(0.0, 1).unwrap().with_ramp_in(0.0).unwrap(), Coin(7));
     let period_ns = 1_000_000_000 / rate_hz;
     let (mut squares, mut largest, mut count) = (0.0, 0.0_f64, 0.0);
     for tick in 0..rate_hz / 2 {
@@ -85,7 +86,7 @@ fn a_resting_finger_in_a_damped_wall_does_not_hum() {
 fn a_finger_that_presses_on_is_damped_as_its_speed_asks() {
     let wall = Entity::new(Plane::new(Vector3::y(), 0.02).unwrap(), Isometry3::identity(), STIFFNESS);
     let wall = wall.unwrap().with_damping(DAMPING).unwrap();
-    let (mut arm, mut finger) = (arm(), Finger::new(0.0, 1).unwrap());
+    let (mut arm, mut finger) = (arm(), Finger::new(0.0, 1).unwrap().with_ramp_in(0.0).unwrap());
     for tick in 0..100 {
         // The upper arm sinks by five counts a tick, which is 146 mm/s.
         let reading =
