@@ -7,7 +7,10 @@
 //! Frames: the mesh's own, B.
 //! Invariant: between two ticks the finger's path never crosses the mesh unnoticed, also where rounding put its end on
 //! the wrong side.
-//! Cost: free and far, one comparison; free and near, one query of the hierarchy; in contact, independent of the mesh.
+//! Limit: a god-object does not see other parts that overlap its own. Let go inside of one, a finger is found there, by
+//! the face nearest to it, unless that face is of another part.
+//! Cost: free and far, one comparison; free and near, one query of the hierarchy; in contact, independent of the mesh; let go or
+//! found inside, one bounded query more.
 
 use nalgebra::Vector3;
 use std::cell::Cell;
