@@ -13,7 +13,7 @@
 
 use crate::mount::Mount;
 use crate::row::{FingerRow, Row};
-use haptics::{Entity, Finger, Hip};
+use haptics::{Entity, Finger, Hip, RAMP_IN_S};
 use nalgebra::Vector3;
 use shm_abi::frame::DEVICE_POSITION_VALID;
 use shm_abi::{Command, DeviceFrame, Frame};
@@ -55,10 +55,18 @@ impl FastStep {
         Self { fingers, entities, period_s, last_tick: None, driver_estimates: false, tips_D, carried_W }
     }
 
-    /// Which minor version of the contract the driver speaks: until that is told, nothing is expected of it that
-    /// 1.0 did not have.
-    pub fn meet_driver(&mut self, abi_minor: u32) {
+    /// Which minor version of the contract the driver speaks, and over how many ticks it lets forces come on.
+    ///
+    /// Until that is told, nothing is expected of it that 1.0 did not have. A finger that is found inside an entity
+    /// when a run begins has its whole force before the driver lets all of it through: so a run's first row is like
+    /// its others.
+    pub fn meet_driver(&mut self, abi_minor: u32, ramp_in_ticks: u64) {
         self.driver_estimates = abi_minor >= MINOR_WITH_VELOCITIES;
+        let ramp_in_s = (0.5 * ramp_in_ticks as f64 * self.period_s).min(RAMP_IN_S);
+        for finger in &mut self.fingers {
+            // No product of an integer and a period is out of range.
+            let _ = finger.finger.set_ramp_in(ramp_in_s);
+        }
     }
 
     /// Renders a frame into the command that answers it, and into a row.
@@ -223,7 +231,7 @@ mod damped {
     #[test]
     fn damping_goes_by_what_the_driver_estimates_however_many_ticks_were_missed() {
         let mut step = step();
-        step.meet_driver(2);
+        step.meet_driver(2, 0);
         force(&mut step, 1, -1e-3, 0.0);
         for tick in [2, 3, 10] {
             // A sum of numbers near 1; the turn by pi leaves 1e-16 of each axis in the others.
@@ -234,12 +242,12 @@ mod damped {
     #[test]
     fn a_driver_that_tells_no_velocities_is_not_taken_for_one_at_rest() {
         let mut step = step();
-        step.meet_driver(0);
+        step.meet_driver(0, 0);
         force(&mut step, 1, -1.0e-3, 0.0);
         assert!((force(&mut step, 2, -1.1e-3, 0.0) - (K * 1.1e-3 + B * 0.1)).abs() < 1e-12);
         let after_a_gap = force(&mut step, 12, -2.1e-3, 0.0);
         assert!((after_a_gap - (K * 2.1e-3 + B * 0.1)).abs() < 1e-12, "1 mm in ten ticks");
-        step.meet_driver(1);
+        step.meet_driver(1, 0);
         assert!((force(&mut step, 13, -2.2e-3, 0.0) - K * 2.2e-3).abs() < 1e-12, "1.1 tells");
     }
 }
@@ -318,7 +326,7 @@ mod carried {
         let (step, layout) = step_and_layout();
         let damped = step.entities[0].clone().with_damping(5.0).unwrap();
         let mut step = FastStep::new(step.fingers, vec![damped], PERIOD_NS);
-        step.meet_driver(MINOR_WITH_VELOCITIES);
+        step.meet_driver(MINOR_WITH_VELOCITIES, 0);
         feel(&mut step, 1, ABOVE);
         feel(&mut step, 2, INSIDE);
         assert!(step.set_layout(&layout.with_camera(at(0.0, -0.5e-3))));

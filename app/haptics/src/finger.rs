@@ -82,8 +82,17 @@ impl Finger {
     /// With another ramp for contacts that begin inside than [`RAMP_IN_S`]; 0 for none.
     ///
     /// Errors: a time not finite or negative.
-    pub fn with_ramp_in(self, ramp_in_s: f64) -> Result<Self, ParameterError> {
-        Ok(Self { ramp_in_s: at_least_zero("ramp_in_s", ramp_in_s)?, ..self })
+    pub fn with_ramp_in(mut self, ramp_in_s: f64) -> Result<Self, ParameterError> {
+        self.set_ramp_in(ramp_in_s)?;
+        Ok(self)
+    }
+
+    /// As [`Self::with_ramp_in`], also between two ticks.
+    ///
+    /// Errors: a time not finite or negative, and nothing is changed.
+    pub fn set_ramp_in(&mut self, ramp_in_s: f64) -> Result<(), ParameterError> {
+        self.ramp_in_s = at_least_zero("ramp_in_s", ramp_in_s)?;
+        Ok(())
     }
 
     /// Radius \[m\].
