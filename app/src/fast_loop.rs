@@ -141,7 +141,7 @@ impl FastLoop {
 
     fn answer(&mut self, commander: &CommanderMemory, driver: &DriverView) {
         self.command = Command::zero(self.frame.tick, commander.lease(), self.frame.device_count);
-        self.step.meet_driver(driver.abi_minor(), driver.info().ramp_in_ticks);
+        self.step.meet_driver(driver.abi_minor(), driver.ramp_in_ticks());
         self.step.step(&self.frame, &mut self.command, &mut self.row);
         commander.publish(&self.command, driver);
         self.tally.answered += 1;

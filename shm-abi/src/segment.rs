@@ -259,6 +259,11 @@ impl DriverView {
         get(&self.map.header.abi_version) as u32
     }
 
+    /// Over how many ticks the driver lets forces come on; of [`Self::info`], without the heap.
+    pub fn ramp_in_ticks(&self) -> u64 {
+        get(&self.map.header.ramp_in_ticks)
+    }
+
     /// What the driver says of itself. Values that are no such thing are replaced by the harmless one.
     pub fn info(&self) -> DriverInfo {
         let header = &self.map.header;
