@@ -129,6 +129,7 @@ impl Slot {
     }
 
     fn touch_by(&mut self, algorithm: &dyn ContactAlgorithm, input: &TouchInput<'_>) -> Option<Touch> {
+        (self.cone, self.mesh) = (None, MeshCone::default());
         let begins = self.contact.is_none();
         let touch = algorithm.touch(input, &mut self.own)?;
         if begins {
@@ -149,6 +150,8 @@ impl Slot {
     }
 
     fn touch_mesh(&mut self, mesh: &Mesh, input: &TouchInput<'_>) -> Option<Touch> {
+        // Of another shape that the entity had.
+        self.cone = None;
         let was_touching = self.mesh.is_touching();
         let (force, beginning) = self.mesh.update(mesh, input.friction, input.previous_hip_B, &input.cone)?;
         match beginning {
@@ -165,6 +168,7 @@ impl Slot {
     }
 
     fn touch_surface<S: Surface + ?Sized>(&mut self, surface: &S, input: &TouchInput<'_>) -> Option<Touch> {
+        self.mesh.let_go();
         let distance_m = surface.signed_distance(&input.cone.hip_B);
         let cone = match &mut self.cone {
             Some(cone) => cone,

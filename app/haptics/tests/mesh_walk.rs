@@ -230,6 +230,19 @@ fn another_mesh_in_the_same_place_is_met_anew() {
     assert_eq!(feel(&fine, on_circle(0.12, 1.0)).entity, None);
 }
 
+#[test]
+fn an_entity_that_is_a_plane_for_a_while_is_met_anew_as_a_mesh() {
+    let cube = mesh(make::cuboid([0.1; 3]), stiction());
+    let mut finger = point_finger();
+    let mut feel = |entity: &Entity, hip| finger.step(std::slice::from_ref(entity), &hip, DT);
+    feel(&cube, Vector3::new(0.0, 0.06, 0.0));
+    feel(&cube, Vector3::new(0.0, 0.049, 0.0));
+    feel(&table(stiction()), Vector3::new(0.0, -0.001, 0.0));
+    // At another side of the cube: the contact of long ago would pull it back across.
+    let out = feel(&cube, Vector3::new(0.049, 0.0, 0.0));
+    assert_near(out.force_on_user_W, [K * (0.05 - 0.049), 0.0, 0.0]);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
