@@ -13,7 +13,7 @@
 
 use nalgebra::Vector3;
 
-use crate::surface::SMALLEST_LENGTH_M;
+use crate::surface::{SMALLEST_LENGTH_M, SurfacePoint};
 
 /// How far a point lies before a convex solid, in the measure of one of its pieces.
 #[derive(Debug, Clone, Copy)]
@@ -24,6 +24,44 @@ pub(crate) struct Level {
     pub(crate) gradient_B: Vector3<f64>,
     /// The piece that decides here.
     pub(crate) piece: u32,
+}
+
+/// A convex solid with sharp edges, which round off as it grows by a ball's radius.
+pub(crate) trait Edged {
+    /// Whether it has grown.
+    fn is_round(&self) -> bool;
+
+    /// How far a point lies before the solid with sharp edges.
+    fn sharp_level(&self, point_B: &Vector3<f64>) -> Level;
+
+    /// How far a point lies before the round surface: exact everywhere.
+    fn round_level(&self, point_B: &Vector3<f64>) -> Level;
+
+    /// The point of a piece nearest to `point_B`.
+    fn on(&self, piece: u32, point_B: &Vector3<f64>) -> SurfacePoint;
+
+    /// The point of the round surface nearest to `point_B`.
+    fn on_round(&self, point_B: &Vector3<f64>) -> SurfacePoint;
+
+    fn height_m(&self, point_B: &Vector3<f64>) -> f64 {
+        if self.is_round() { self.round_level(point_B) } else { self.sharp_level(point_B) }.height_m
+    }
+
+    fn nearest_point(&self, point_B: &Vector3<f64>) -> SurfacePoint {
+        if self.is_round() {
+            return self.on_round(point_B);
+        }
+        self.on(self.sharp_level(point_B).piece, point_B)
+    }
+
+    fn entered(&self, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<SurfacePoint> {
+        if self.is_round() {
+            let (point_B, _) = first_entry(from_B, to_B, |point_B| self.round_level(point_B))?;
+            return Some(self.on_round(&point_B));
+        }
+        let (point_B, piece) = first_entry(from_B, to_B, |point_B| self.sharp_level(point_B))?;
+        Some(self.on(piece, &point_B))
+    }
 }
 
 /// Point and piece where `from_B -> to_B` enters the solid; always some if it leads from outside to inside.

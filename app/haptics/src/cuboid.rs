@@ -9,7 +9,7 @@
 
 use nalgebra::Vector3;
 
-use crate::convex::{Level, direction_or, first_entry};
+use crate::convex::{Edged, Level, direction_or};
 use crate::error::{ParameterError, above_zero};
 use crate::surface::{Feature, Surface, SurfacePoint};
 
@@ -40,8 +40,18 @@ impl Cuboid {
         (self.half_m * 2.0).into()
     }
 
-    /// How far a point lies before the planes of the six faces.
-    fn level(&self, point_B: &Vector3<f64>) -> Level {
+    fn clamped(&self, point_B: &Vector3<f64>) -> Vector3<f64> {
+        point_B.zip_map(&self.half_m, |x, half| x.clamp(-half, half))
+    }
+}
+
+impl Edged for Cuboid {
+    fn is_round(&self) -> bool {
+        self.rounding_m > 0.0
+    }
+
+    /// The farthest of the planes of the six faces.
+    fn sharp_level(&self, point_B: &Vector3<f64>) -> Level {
         let height_m = |axis: usize| point_B[axis].abs() - self.half_m[axis];
         let farther = |rank: usize, other: usize| {
             if height_m(AXES[other]) > height_m(AXES[rank]) { other } else { rank }
@@ -52,21 +62,15 @@ impl Cuboid {
         Level { height_m: height_m(axis) - self.rounding_m, gradient_B: normal(piece), piece }
     }
 
-    /// How far a point lies before the round surface: exact everywhere.
     fn round_level(&self, point_B: &Vector3<f64>) -> Level {
         let away_B = point_B - self.clamped(point_B);
         if away_B.iter().filter(|x| **x != 0.0).count() < 2 {
-            return self.level(point_B);
+            return self.sharp_level(point_B);
         }
         let gradient_B = direction_or(&away_B, Vector3::y());
         Level { height_m: away_B.norm() - self.rounding_m, gradient_B, piece: ROUND }
     }
 
-    fn clamped(&self, point_B: &Vector3<f64>) -> Vector3<f64> {
-        point_B.zip_map(&self.half_m, |x, half| x.clamp(-half, half))
-    }
-
-    /// The point of a face nearest to `point_B`.
     fn on(&self, piece: u32, point_B: &Vector3<f64>) -> SurfacePoint {
         let normal_B = normal(piece);
         let axis = axis(piece);
@@ -75,7 +79,6 @@ impl Cuboid {
         SurfacePoint { point_B: at_B, normal_B, feature: Feature::Face, piece }
     }
 
-    /// The point of the round surface nearest to `point_B`.
     fn on_round(&self, point_B: &Vector3<f64>) -> SurfacePoint {
         let level = self.round_level(point_B);
         if level.piece != ROUND {
@@ -105,29 +108,20 @@ fn normal(piece: u32) -> Vector3<f64> {
 
 impl Surface for Cuboid {
     fn signed_distance(&self, point_B: &Vector3<f64>) -> f64 {
-        if self.rounding_m > 0.0 { self.round_level(point_B).height_m } else { self.level(point_B).height_m }
+        self.height_m(point_B)
     }
 
     fn nearest(&self, point_B: &Vector3<f64>) -> SurfacePoint {
-        if self.rounding_m > 0.0 {
-            self.on_round(point_B)
-        } else {
-            self.on(self.level(point_B).piece, point_B)
-        }
+        self.nearest_point(point_B)
     }
 
     fn entry(&self, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<SurfacePoint> {
-        if self.rounding_m > 0.0 {
-            let (point_B, _) = first_entry(from_B, to_B, |point_B| self.round_level(point_B))?;
-            return Some(self.on_round(&point_B));
-        }
-        let (point_B, piece) = first_entry(from_B, to_B, |point_B| self.level(point_B))?;
-        Some(self.on(piece, &point_B))
+        self.entered(from_B, to_B)
     }
 
     /// Straight over the face; on the first edge in the way the face beyond takes over.
     fn settle(&self, from: &SurfacePoint, on_tangent_plane_B: &Vector3<f64>) -> SurfacePoint {
-        if self.rounding_m > 0.0 {
+        if self.is_round() {
             return self.on_round(on_tangent_plane_B);
         }
         let path_B = on_tangent_plane_B - from.point_B;

@@ -12,7 +12,7 @@
 
 use nalgebra::Vector3;
 
-use crate::convex::{Level, around_y, direction_or, first_entry};
+use crate::convex::{Edged, Level, around_y, direction_or};
 use crate::error::{ParameterError, above_zero, at_least_zero};
 use crate::surface::{Feature, Surface, SurfacePoint};
 
@@ -88,25 +88,6 @@ impl Frustum {
         outward_B * self.normal_rho + Vector3::y() * self.normal_y
     }
 
-    fn level(&self, point_B: &Vector3<f64>) -> Level {
-        //= melder#7.12
-        let (rho_m, outward_B) = around_y(point_B);
-        //= melder#7.8
-        let before_cap_m = point_B.y.abs() - self.half_length_m;
-        let before_side_m = self.before_side(rho_m, point_B.y);
-        if before_side_m > before_cap_m {
-            let gradient_B = self.side_normal(&outward_B);
-            return Level { height_m: before_side_m, gradient_B, piece: SIDE };
-        }
-        let piece = if point_B.y < 0.0 { BOTTOM } else { TOP };
-        Level { height_m: before_cap_m, gradient_B: cap_normal(piece), piece }
-    }
-
-    /// The point of a piece nearest to `point_B`.
-    fn on(&self, piece: u32, point_B: &Vector3<f64>) -> SurfacePoint {
-        if piece == SIDE { self.on_side(point_B) } else { self.on_cap(piece, point_B) }
-    }
-
     fn on_side(&self, point_B: &Vector3<f64>) -> SurfacePoint {
         // Corrected: on the axis the printed quotient is 0/0, here it is +x.
         //= melder#7.14
@@ -131,20 +112,6 @@ impl Frustum {
         SurfacePoint { point_B, normal_B, feature: Feature::Face, piece }
     }
 
-    /// How far a point lies before the round surface: exact everywhere.
-    fn round_level(&self, point_B: &Vector3<f64>) -> Level {
-        let flat = self.level(point_B);
-        let over_rim = flat.height_m > 0.0 && self.is_over_rim(flat.piece, point_B);
-        if !over_rim {
-            return Level { height_m: flat.height_m - self.rounding_m, ..flat };
-        }
-        let rim_B = self.on(flat.piece, point_B).point_B;
-        let away_B = point_B - rim_B;
-        let gradient_B = direction_or(&away_B, flat.gradient_B);
-        let piece = if rim_B.y < 0.0 { BOTTOM_RIM } else { TOP_RIM };
-        Level { height_m: away_B.norm() - self.rounding_m, gradient_B, piece }
-    }
-
     /// Whether the foot on a piece's plane or cone lies beyond that piece.
     fn is_over_rim(&self, piece: u32, point_B: &Vector3<f64>) -> bool {
         let rho_m = around_y(point_B).0;
@@ -153,28 +120,6 @@ impl Frustum {
         }
         let foot_y_m = point_B.y - self.normal_y * self.before_side(rho_m, point_B.y);
         foot_y_m.abs() > self.half_length_m
-    }
-
-    /// The point of the round surface nearest to `point_B`.
-    fn on_round(&self, point_B: &Vector3<f64>) -> SurfacePoint {
-        let level = self.round_level(point_B);
-        let within = match level.piece {
-            TOP_RIM => self.on_cap(TOP, point_B),
-            BOTTOM_RIM => self.on_cap(BOTTOM, point_B),
-            piece => self.on(piece, point_B),
-        };
-        // What a ball touches there is the rim itself, or the tip.
-        let feature = match level.piece {
-            TOP_RIM | BOTTOM_RIM if self.radius_of_cap(level.piece) == 0.0 => Feature::Vertex,
-            TOP_RIM | BOTTOM_RIM => Feature::Edge,
-            _ => within.feature,
-        };
-        SurfacePoint {
-            point_B: within.point_B + level.gradient_B * self.rounding_m,
-            normal_B: level.gradient_B,
-            feature,
-            piece: level.piece,
-        }
     }
 
     /// Along the side; over a rim the cap takes over where the path crosses it.
@@ -205,6 +150,64 @@ impl Frustum {
     }
 }
 
+impl Edged for Frustum {
+    fn is_round(&self) -> bool {
+        self.rounding_m > 0.0
+    }
+
+    fn sharp_level(&self, point_B: &Vector3<f64>) -> Level {
+        //= melder#7.12
+        let (rho_m, outward_B) = around_y(point_B);
+        //= melder#7.8
+        let before_cap_m = point_B.y.abs() - self.half_length_m;
+        let before_side_m = self.before_side(rho_m, point_B.y);
+        if before_side_m > before_cap_m {
+            let gradient_B = self.side_normal(&outward_B);
+            return Level { height_m: before_side_m, gradient_B, piece: SIDE };
+        }
+        let piece = if point_B.y < 0.0 { BOTTOM } else { TOP };
+        Level { height_m: before_cap_m, gradient_B: cap_normal(piece), piece }
+    }
+
+    fn round_level(&self, point_B: &Vector3<f64>) -> Level {
+        let flat = self.sharp_level(point_B);
+        let over_rim = flat.height_m > 0.0 && self.is_over_rim(flat.piece, point_B);
+        if !over_rim {
+            return Level { height_m: flat.height_m - self.rounding_m, ..flat };
+        }
+        let rim_B = self.on(flat.piece, point_B).point_B;
+        let away_B = point_B - rim_B;
+        let gradient_B = direction_or(&away_B, flat.gradient_B);
+        let piece = if rim_B.y < 0.0 { BOTTOM_RIM } else { TOP_RIM };
+        Level { height_m: away_B.norm() - self.rounding_m, gradient_B, piece }
+    }
+
+    fn on(&self, piece: u32, point_B: &Vector3<f64>) -> SurfacePoint {
+        if piece == SIDE { self.on_side(point_B) } else { self.on_cap(piece, point_B) }
+    }
+
+    fn on_round(&self, point_B: &Vector3<f64>) -> SurfacePoint {
+        let level = self.round_level(point_B);
+        let within = match level.piece {
+            TOP_RIM => self.on_cap(TOP, point_B),
+            BOTTOM_RIM => self.on_cap(BOTTOM, point_B),
+            piece => self.on(piece, point_B),
+        };
+        // What a ball touches there is the rim itself, or the tip.
+        let feature = match level.piece {
+            TOP_RIM | BOTTOM_RIM if self.radius_of_cap(level.piece) == 0.0 => Feature::Vertex,
+            TOP_RIM | BOTTOM_RIM => Feature::Edge,
+            _ => within.feature,
+        };
+        SurfacePoint {
+            point_B: within.point_B + level.gradient_B * self.rounding_m,
+            normal_B: level.gradient_B,
+            feature,
+            piece: level.piece,
+        }
+    }
+}
+
 fn cap_normal(piece: u32) -> Vector3<f64> {
     if piece == BOTTOM { -Vector3::y() } else { Vector3::y() }
 }
@@ -223,28 +226,19 @@ fn leaves_circle(from_B: &Vector3<f64>, to_B: &Vector3<f64>, radius_m: f64) -> V
 
 impl Surface for Frustum {
     fn signed_distance(&self, point_B: &Vector3<f64>) -> f64 {
-        if self.rounding_m > 0.0 { self.round_level(point_B).height_m } else { self.level(point_B).height_m }
+        self.height_m(point_B)
     }
 
     fn nearest(&self, point_B: &Vector3<f64>) -> SurfacePoint {
-        if self.rounding_m > 0.0 {
-            self.on_round(point_B)
-        } else {
-            self.on(self.level(point_B).piece, point_B)
-        }
+        self.nearest_point(point_B)
     }
 
     fn entry(&self, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<SurfacePoint> {
-        if self.rounding_m > 0.0 {
-            let (point_B, _) = first_entry(from_B, to_B, |point_B| self.round_level(point_B))?;
-            return Some(self.on_round(&point_B));
-        }
-        let (point_B, piece) = first_entry(from_B, to_B, |point_B| self.level(point_B))?;
-        Some(self.on(piece, &point_B))
+        self.entered(from_B, to_B)
     }
 
     fn settle(&self, from: &SurfacePoint, on_tangent_plane_B: &Vector3<f64>) -> SurfacePoint {
-        if self.rounding_m > 0.0 {
+        if self.is_round() {
             self.on_round(on_tangent_plane_B)
         } else if from.piece == SIDE {
             self.settle_on_side(&from.point_B, on_tangent_plane_B)
