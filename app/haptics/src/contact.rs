@@ -17,6 +17,7 @@ use crate::entity::Entity;
 use crate::frame::{is_finite, point_into_body, point_into_world, vector_into_body, vector_into_world};
 use crate::friction_cone::{ConeInput, FrictionCone};
 use crate::friction_law::FrictionState;
+use crate::hip::Hip;
 use crate::mesh::{Beginning, Mesh, MeshCone};
 use crate::shape::Shape;
 use crate::surface::{Feature, Surface};
@@ -55,11 +56,9 @@ impl Contact {
 
 /// The finger's part of a tick.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Sweep {
+pub(crate) struct Sweep<'h> {
     pub(crate) previous_hip_W: Option<Vector3<f64>>,
-    pub(crate) hip_W: Vector3<f64>,
-    /// If it is known better than by the difference of the two.
-    pub(crate) hip_velocity_W: Option<Vector3<f64>>,
+    pub(crate) hip: &'h Hip,
     pub(crate) finger_radius_m: f64,
     pub(crate) ramp_in_s: f64,
     pub(crate) dt_s: f64,
@@ -81,18 +80,17 @@ pub(crate) struct Slot {
 pub const RAMP_IN_S: f64 = 0.1;
 
 impl Slot {
-    pub(crate) fn step(&mut self, index: usize, entity: &Entity, sweep: &Sweep) -> Option<&Contact> {
+    pub(crate) fn step(&mut self, index: usize, entity: &Entity, sweep: &Sweep<'_>) -> Option<&Contact> {
         self.contact = self.touch(index, entity, sweep);
         if self.contact.is_none() {
             self.cone = None;
-            self.own = ContactMemory::default();
             self.mesh.let_go();
         }
         self.contact.as_ref()
     }
 
-    fn touch(&mut self, index: usize, entity: &Entity, sweep: &Sweep) -> Option<Contact> {
-        let hip_B = point_into_body(&entity.X_WB, &sweep.hip_W);
+    fn touch(&mut self, index: usize, entity: &Entity, sweep: &Sweep<'_>) -> Option<Contact> {
+        let hip_B = point_into_body(&entity.X_WB, &sweep.hip.position_W);
         if !is_finite(&hip_B) {
             return None;
         }
@@ -118,19 +116,31 @@ impl Slot {
             previous_hip_B: previous_B,
             cone,
         };
-        let mut touch = match &entity.algorithm {
-            Algorithm::FrictionCone => self.touch_shape(&input),
-            Algorithm::VectorField => self.touch_by(&VectorField, &input),
-            Algorithm::ClassicGodObject => self.touch_by(&ClassicGodObject, &input),
-            Algorithm::Own(algorithm) => self.touch_by(&**algorithm, &input),
-        }?;
-        self.ramp(&mut touch, sweep);
-        in_world(index, entity, &touch)
+        // Apart from the others, whose answers take as long to copy as this one to find.
+        if let (Algorithm::FrictionCone, Shape::Mesh(mesh)) = (&entity.algorithm, &entity.shape) {
+            let touch = self.touch_mesh(mesh, &input)?;
+            return self.feel(index, entity, touch, sweep);
+        }
+        let touch = self.touch_by_any(entity, &input)?;
+        self.feel(index, entity, touch, sweep)
+    }
+
+    #[inline(never)]
+    fn touch_by_any(&mut self, entity: &Entity, input: &TouchInput<'_>) -> Option<Touch> {
+        match &entity.algorithm {
+            Algorithm::FrictionCone => self.touch_shape(input),
+            Algorithm::VectorField => self.touch_by(&VectorField, input),
+            Algorithm::ClassicGodObject => self.touch_by(&ClassicGodObject, input),
+            Algorithm::Own(algorithm) => self.touch_by(&**algorithm, input),
+        }
     }
 
     fn touch_by(&mut self, algorithm: &dyn ContactAlgorithm, input: &TouchInput<'_>) -> Option<Touch> {
         (self.cone, self.mesh) = (None, MeshCone::default());
         let begins = self.contact.is_none();
+        if begins {
+            self.own = ContactMemory::default();
+        }
         let touch = algorithm.touch(input, &mut self.own)?;
         if begins {
             self.strength = if input.entry().is_some() { 1.0 } else { 0.0 };
@@ -143,13 +153,16 @@ impl Slot {
             Shape::Form(form) if input.finger_radius_m == 0.0 => self.touch_surface(form, input),
             Shape::Form(form) => self.touch_surface(&form.grown(input.finger_radius_m)?, input),
             Shape::Own(surface) if input.finger_radius_m == 0.0 => self.touch_surface(&**surface, input),
-            Shape::Mesh(mesh) if input.finger_radius_m == 0.0 => self.touch_mesh(mesh, input),
             Shape::Own(_) => input.of_surface(|grown| self.touch_surface(grown, input))?,
             Shape::Mesh(_) => None,
         }
     }
 
+    #[inline(always)]
     fn touch_mesh(&mut self, mesh: &Mesh, input: &TouchInput<'_>) -> Option<Touch> {
+        if input.finger_radius_m != 0.0 {
+            return None;
+        }
         // Of another shape that the entity had.
         self.cone = None;
         let was_touching = self.mesh.is_touching();
@@ -198,15 +211,22 @@ impl Slot {
     }
 
     /// A contact that began inside comes on slowly.
-    fn ramp(&mut self, touch: &mut Touch, sweep: &Sweep) {
-        if self.strength >= 1.0 {
-            return;
+    #[inline(always)]
+    fn feel(
+        &mut self,
+        index: usize,
+        entity: &Entity,
+        mut touch: Touch,
+        sweep: &Sweep<'_>,
+    ) -> Option<Contact> {
+        if self.strength < 1.0 {
+            let step = sweep.dt_s / sweep.ramp_in_s;
+            // Where time is unknown or no ramp wanted, there is none.
+            self.strength = if step > 0.0 { (self.strength + step).min(1.0) } else { 1.0 };
+            touch.force_on_user_B *= self.strength;
+            touch.normal_force_n *= self.strength;
         }
-        let step = sweep.dt_s / sweep.ramp_in_s;
-        // Where time is unknown or no ramp wanted, there is none.
-        self.strength = if step > 0.0 { (self.strength + step).min(1.0) } else { 1.0 };
-        touch.force_on_user_B *= self.strength;
-        touch.normal_force_n *= self.strength;
+        in_world(index, entity, &touch)
     }
 }
 
@@ -219,7 +239,7 @@ fn hip_velocity(
     entity: &Entity,
     hip_B: Vector3<f64>,
     previous_B: Option<Vector3<f64>>,
-    sweep: &Sweep,
+    sweep: &Sweep<'_>,
 ) -> Vector3<f64> {
     let (Some(previous_B), Some(previous_W)) = (previous_B, sweep.previous_hip_W) else {
         return Vector3::zeros();
@@ -228,11 +248,12 @@ fn hip_velocity(
         return Vector3::zeros();
     }
     let difference_B = (hip_B - previous_B) / sweep.dt_s;
-    let Some(velocity_W) = sweep.hip_velocity_W else { return difference_B };
-    let correction_W = velocity_W - (sweep.hip_W - previous_W) / sweep.dt_s;
+    let Some(velocity_W) = sweep.hip.velocity_W.filter(is_finite) else { return difference_B };
+    let correction_W = velocity_W - (sweep.hip.position_W - previous_W) / sweep.dt_s;
     difference_B + vector_into_body(&entity.X_WB, &correction_W)
 }
 
+#[inline(always)]
 fn in_world(entity_index: usize, entity: &Entity, touch: &Touch) -> Option<Contact> {
     let god_object = &touch.god_object;
     let contact = Contact {

@@ -111,25 +111,18 @@ impl Finger {
     /// `dt_s` that is not positive leaves out damping and speed-dependent friction. `hip` may be a [`Hip`] with a
     /// velocity, which damping then goes by, or `&Vector3`, a position alone.
     pub fn step(&mut self, entities: &[Entity], hip: impl Into<Hip>, dt_s: f64) -> FingerOutput {
-        let Hip { position_W: hip_W, velocity_W } = hip.into();
-        self.step_to(entities, &hip_W, velocity_W.filter(is_finite), dt_s)
+        self.step_to(entities, &hip.into(), dt_s)
     }
 
-    fn step_to(
-        &mut self,
-        entities: &[Entity],
-        hip_W: &Vector3<f64>,
-        hip_velocity_W: Option<Vector3<f64>>,
-        dt_s: f64,
-    ) -> FingerOutput {
+    fn step_to(&mut self, entities: &[Entity], hip: &Hip, dt_s: f64) -> FingerOutput {
+        let hip_W = &hip.position_W;
         if !is_finite(hip_W) {
             self.reset();
             return free(self.last_finite_hip_W);
         }
         let sweep = Sweep {
             previous_hip_W: self.previous_hip_W,
-            hip_W: *hip_W,
-            hip_velocity_W,
+            hip,
             finger_radius_m: self.radius_m,
             ramp_in_s: self.ramp_in_s,
             dt_s,

@@ -257,6 +257,14 @@ impl FrictionLaw for Friction {
         ask!(self, law => law.held_limit_m(query, memory))
     }
 
+    fn drags(&self) -> bool {
+        match self {
+            Self::LuGre(_) | Self::ResetIntegrator(_) => true,
+            Self::Own(law) => law.drags(),
+            _ => false,
+        }
+    }
+
     fn drag_m(&self, query: &FrictionQuery, memory: &FrictionMemory) -> f64 {
         ask!(self, law => law.drag_m(query, memory))
     }

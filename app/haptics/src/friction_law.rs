@@ -84,6 +84,11 @@ pub trait FrictionLaw {
     /// bounds spring, damping and drag together. Asked after `holds`, with the memory as that left it.
     fn held_limit_m(&self, query: &FrictionQuery, memory: &FrictionMemory) -> f64;
 
+    /// Whether [`Self::drag_m`] can be anything but zero; where it cannot, nobody asks.
+    fn drags(&self) -> bool {
+        true
+    }
+
     /// What is felt beside the spring, against the motion of the HIP \[m of spring\].
     ///
     /// For models whose force depends on the speed in a way that no place of the god-object shows.

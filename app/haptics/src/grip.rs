@@ -73,7 +73,7 @@ impl Grip {
         pull: &Pull,
         input: &ConeInput,
     ) -> Vector3<f64> {
-        if pull.travel_m <= 0.0 {
+        if !friction.drags() || pull.travel_m <= 0.0 {
             return Vector3::zeros();
         }
         let query = FrictionQuery {

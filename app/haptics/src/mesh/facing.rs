@@ -19,90 +19,65 @@ use super::Mesh;
 use super::cone::{Cone, Nearest};
 use super::place::{Facet, On, Place, Side};
 
-/// What holds the HIP back.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Facing {
-    /// A face.
-    Face(Side),
-    /// A concave edge.
-    Edge(Side, usize),
-    /// A vertex.
-    Vertex(Side, usize),
-    /// Nothing: the HIP is in front of the surface here.
-    Free,
+/// What holds the HIP back: a face, a concave edge, a vertex; `None` if the HIP is in front of the surface here.
+#[inline(always)]
+pub(crate) fn facing(mesh: &Mesh, place: Place, hip_B: Vector3<f64>) -> Option<On> {
+    match place.on {
+        On::Face(side) => (!is_in_front(mesh, Facet::of(mesh, side).depth_m(&hip_B))).then_some(place.on),
+        On::Edge(side, edge) => on_edge(mesh, side, edge, place.point_B, hip_B),
+        On::Vertex(side, corner) => at_vertex(mesh, side, corner, place.point_B, hip_B),
+    }
 }
 
-impl Facing {
-    #[inline(always)]
-    pub(crate) fn of(mesh: &Mesh, place: &Place, hip_B: &Vector3<f64>) -> Self {
-        match place.on {
-            On::Face(side) => {
-                if is_in_front(mesh, Facet::of(mesh, side).depth_m(hip_B)) {
-                    Self::Free
-                } else {
-                    Self::Face(side)
-                }
-            }
-            On::Edge(side, edge) => Self::on_edge(mesh, side, edge, &place.point_B, hip_B),
-            On::Vertex(side, corner) => Self::at_vertex(mesh, side, corner, &place.point_B, hip_B),
-        }
+#[inline(always)]
+fn on_edge(mesh: &Mesh, side: Side, edge: usize, point_B: Vector3<f64>, hip_B: Vector3<f64>) -> Option<On> {
+    let here = Facet::of(mesh, side);
+    let link = here.face.links[edge];
+    let (_, edge_B) = here.edge_B(mesh, edge);
+    let to_hip_B = hip_B - point_B;
+    let here_inward_B = here.inward_B(&edge_B);
+    let here_wants = here_inward_B.dot(&to_hip_B) > 0.0;
+    let here_depth_m = here.depth_m(&hip_B);
+    let Some(over) = side.across(link).map(|side| Facet::of(mesh, side)) else {
+        // The rim of a sheet: beyond it there is nothing.
+        return (here_wants && !is_in_front(mesh, here_depth_m)).then_some(On::Face(side));
+    };
+    // Neighbours run along their edge in opposite directions, unless one of them is turned.
+    let over_inward_B = over.inward_B(&if link.is_turned() { edge_B } else { -edge_B });
+    let over_wants = over_inward_B.dot(&to_hip_B) > 0.0;
+    let over_depth_m = over.depth_m(&hip_B);
+    let is_concave = over_inward_B.dot(&here.normal_B) > 0.0;
+    let in_front = [is_in_front(mesh, here_depth_m), is_in_front(mesh, over_depth_m)];
+    let is_free = if is_concave { in_front == [true; 2] } else { in_front != [false; 2] };
+    if is_free {
+        return None;
     }
-
-    #[inline(always)]
-    fn on_edge(mesh: &Mesh, side: Side, edge: usize, point_B: &Vector3<f64>, hip_B: &Vector3<f64>) -> Self {
-        let here = Facet::of(mesh, side);
-        let link = here.face.links[edge];
-        let (_, edge_B) = here.edge_B(mesh, edge);
-        let to_hip_B = hip_B - point_B;
-        let here_wants = here.inward_B(&edge_B).dot(&to_hip_B) > 0.0;
-        let here_depth_m = here.depth_m(hip_B);
-        let Some(over) = side.across(link).map(|side| Facet::of(mesh, side)) else {
-            // The rim of a sheet: beyond it there is nothing.
-            return if here_wants && !is_in_front(mesh, here_depth_m) {
-                Self::Face(side)
-            } else {
-                Self::Free
-            };
-        };
-        // Neighbours run along their edge in opposite directions, unless one of them is turned.
-        let over_inward_B = over.inward_B(&if link.is_turned() { edge_B } else { -edge_B });
-        let over_wants = over_inward_B.dot(&to_hip_B) > 0.0;
-        let over_depth_m = over.depth_m(hip_B);
-        let is_concave = over_inward_B.dot(&here.normal_B) > 0.0;
-        let in_front = [is_in_front(mesh, here_depth_m), is_in_front(mesh, over_depth_m)];
-        let is_free = if is_concave { in_front == [true; 2] } else { in_front != [false; 2] };
-        if is_free {
-            return Self::Free;
-        }
-        match (here_wants && !in_front[0], over_wants && !in_front[1]) {
-            (true, false) => Self::Face(side),
-            (false, true) => Self::Face(over.side),
-            // On a sharp edge by rounding only: beyond it, in both planes at once.
-            (false, false) if !is_concave && over_inward_B.dot(&here.inward_B(&edge_B)) > 0.0 => Self::Free,
-            // On a blunt one, too: right below it.
-            (false, false) => Self::Edge(side, edge),
-            // The lower index among equals, so that the result does not depend on where one came from.
-            (true, true) if (here_depth_m, side.face) <= (over_depth_m, over.side.face) => Self::Face(side),
-            (true, true) => Self::Face(over.side),
-        }
+    match (here_wants && !in_front[0], over_wants && !in_front[1]) {
+        (true, false) => Some(On::Face(side)),
+        (false, true) => Some(On::Face(over.side)),
+        // On a sharp edge by rounding only: beyond it, in both planes at once.
+        (false, false) if !is_concave && over_inward_B.dot(&here_inward_B) > 0.0 => None,
+        // On a blunt one, too: right below it.
+        (false, false) => Some(On::Edge(side, edge)),
+        // The lower index among equals, so that the result does not depend on where one came from.
+        (true, true) if (here_depth_m, side.face) <= (over_depth_m, over.side.face) => Some(On::Face(side)),
+        (true, true) => Some(On::Face(over.side)),
     }
+}
 
-    #[inline(never)]
-    fn at_vertex(
-        mesh: &Mesh,
-        side: Side,
-        corner: usize,
-        point_B: &Vector3<f64>,
-        hip_B: &Vector3<f64>,
-    ) -> Self {
-        let cone = Cone::around(mesh, side, corner, &(hip_B - point_B));
-        match cone.nearest {
-            Nearest::Face(side, depth_m) if !is_in_front(mesh, depth_m) => Self::Face(side),
-            Nearest::Face(..) => Self::Free,
-            Nearest::Edge(side, edge) => Self::on_edge(mesh, side, edge, point_B, hip_B),
-            Nearest::Tip if cone.is_behind(mesh, side, corner) => Self::Vertex(side, corner),
-            Nearest::Tip => Self::Free,
-        }
+#[inline(never)]
+fn at_vertex(
+    mesh: &Mesh,
+    side: Side,
+    corner: usize,
+    point_B: Vector3<f64>,
+    hip_B: Vector3<f64>,
+) -> Option<On> {
+    let cone = Cone::around(mesh, side, corner, &(hip_B - point_B));
+    match cone.nearest {
+        Nearest::Face(side, depth_m) => (!is_in_front(mesh, depth_m)).then_some(On::Face(side)),
+        Nearest::Edge(side, edge) => on_edge(mesh, side, edge, point_B, hip_B),
+        Nearest::Tip => cone.is_behind(mesh, side, corner).then_some(On::Vertex(side, corner)),
     }
 }
 

@@ -65,6 +65,7 @@ pub enum Beginning {
 impl MeshCone {
     /// One tick; `None` while the finger is free. `previous_hip_B` is where the HIP was, taken through the pose that
     /// the mesh had then.
+    #[inline(never)]
     pub fn update(
         &mut self,
         mesh: &Mesh,
@@ -83,17 +84,26 @@ impl MeshCone {
             beginning = how;
             self.touching = Some(Touching::new(place));
         }
-        let mut force = self.touching.as_mut().and_then(|touching| touching.update(mesh, friction, input));
-        if force.is_none() {
-            // Let go by one of two parts that overlap, it may be inside the other, whose faces it never came through.
-            beginning = Beginning::WasInside;
-            self.touching = found_inside(mesh, &input.hip_B).map(Touching::new);
-            force = self.touching.as_mut().and_then(|touching| touching.update(mesh, friction, input));
+        match self.touching.as_mut()?.update(mesh, friction, input) {
+            Some(force) => Some((force, beginning)),
+            None => self.pass_on(mesh, friction, input),
         }
+    }
+
+    /// Let go by one of two parts that overlap, it may be inside the other, whose faces it never came through.
+    #[cold]
+    fn pass_on(
+        &mut self,
+        mesh: &Mesh,
+        friction: &Friction,
+        input: &ConeInput,
+    ) -> Option<(ConeForce, Beginning)> {
+        self.touching = found_inside(mesh, &input.hip_B).map(Touching::new);
+        let force = self.touching.as_mut()?.update(mesh, friction, input);
         if force.is_none() {
             self.touching = None;
         }
-        force.map(|force| (force, beginning))
+        Some((force?, Beginning::WasInside))
     }
 
     /// Whether a contact lives.
@@ -123,6 +133,7 @@ impl MeshCone {
         self.touching.as_ref().map_or(FrictionState::Stick, |touching| touching.grip.state)
     }
 
+    #[inline(never)]
     fn meet(
         &mut self,
         mesh: &Mesh,
@@ -159,31 +170,31 @@ impl Touching {
         Self { god_object: place, normal_B: Vector3::y(), shadow: place, grip: Grip::default() }
     }
 
+    #[inline(always)]
     fn update(&mut self, mesh: &Mesh, friction: &Friction, input: &ConeInput) -> Option<ConeForce> {
-        let has_friction = !matches!(friction, Friction::None);
-        if has_friction {
-            let shadow = stand(mesh, &mut self.shadow, input)?;
-            walk(mesh, &mut self.shadow, shadow, &Frictionless, input)?;
-        }
-        let here = stand(mesh, &mut self.god_object, input)?;
-        if !has_friction {
-            let walked = walk(mesh, &mut self.god_object, here, &Frictionless, input)?;
-            self.shadow = self.god_object;
+        let here = stand(mesh, self.god_object, input);
+        if matches!(friction, Friction::None) {
+            let walked = walk(mesh, here?, &Frictionless, input)?;
+            self.shadow = walked.place;
             self.grip.state = FrictionState::Slip;
             return Some(self.answer(&walked, input));
         }
-        let pull = self.grip.begin_tick(&here.view, input);
-        if let Some(tangential_B) = self.grip.hold(friction, &here.view, &pull, input) {
-            return Some(self.answer(&Walked { view: here.view, tangential_B, changes: 0 }, input));
+        let shadow = stand(mesh, self.shadow, input)?;
+        self.shadow = walk(mesh, shadow, &Frictionless, input)?.place;
+        let (place, view) = here?;
+        let pull = self.grip.begin_tick(&view, input);
+        if let Some(tangential_B) = self.grip.hold(friction, &view, &pull, input) {
+            return Some(self.answer(&Walked { place, view, tangential_B, changes: 0 }, input));
         }
         let slides_with = Cell::new(None);
         let draw = Against { friction, memory: &self.grip.memory, pull: &pull, input, slides_with };
-        let mut walked = walk(mesh, &mut self.god_object, here, &draw, input)?;
+        let mut walked = walk(mesh, (place, view), &draw, input)?;
         walked.tangential_B += self.grip.drag(friction, &walked.tangential_B, &walked.view, &pull, input);
         Some(self.answer(&walked, input))
     }
 
     fn answer(&mut self, walked: &Walked, input: &ConeInput) -> ConeForce {
+        self.god_object = walked.place;
         self.normal_B = walked.view.normal_B;
         answer(&walked.view, &walked.tangential_B, walked.changes, input)
     }

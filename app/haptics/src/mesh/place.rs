@@ -74,7 +74,7 @@ impl Side {
 }
 
 impl<'m> Facet<'m> {
-    #[inline]
+    #[inline(always)]
     pub(crate) fn of(mesh: &'m Mesh, side: Side) -> Self {
         let face = &mesh.faces[side.face as usize];
         let (normal_B, offset_m) =
@@ -83,31 +83,31 @@ impl<'m> Facet<'m> {
     }
 
     /// How far below the plane a point lies \[m\].
-    #[inline]
+    #[inline(always)]
     pub(crate) fn depth_m(&self, point_B: &Vector3<f64>) -> f64 {
         self.offset_m - self.normal_B.dot(point_B)
     }
 
     /// From the start of an edge to its end \[m\].
-    #[inline]
+    #[inline(always)]
     pub(crate) fn edge_B(&self, mesh: &Mesh, edge: usize) -> (Vector3<f64>, Vector3<f64>) {
         let start_B = self.corner_B(mesh, edge);
         (start_B, self.corner_B(mesh, next(edge)) - start_B)
     }
 
-    #[inline]
+    #[inline(always)]
     pub(crate) fn corners_B(&self, mesh: &Mesh) -> [Vector3<f64>; 3] {
         let [a, b, c] = self.face.vertices;
         [mesh.vertices[a as usize], mesh.vertices[b as usize], mesh.vertices[c as usize]]
     }
 
-    #[inline]
+    #[inline(always)]
     pub(crate) fn corner_B(&self, mesh: &Mesh, corner: usize) -> Vector3<f64> {
         mesh.vertices[self.face.vertices[corner] as usize]
     }
 
     /// Across an edge into the face, along its plane; as long as `edge_B`. The same for both sides.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn inward_B(&self, edge_B: &Vector3<f64>) -> Vector3<f64> {
         self.face.normal_B.cross(edge_B)
     }

@@ -18,7 +18,7 @@ use nalgebra::Vector3;
 
 use super::Mesh;
 use super::draw::{Draw, Drawn};
-use super::facing::Facing;
+use super::facing::facing;
 use super::place::{Facet, On, Place, Side, next};
 use crate::friction_cone::ConeInput;
 use crate::surface::direction_or_up;
@@ -31,133 +31,124 @@ pub const MAX_FEATURE_CHANGES: u32 = 256;
 /// Bound on the flights of a god-object within one tick: each asks the hierarchy of boxes.
 const MAX_FLIGHTS: u32 = 8;
 
-/// Where a god-object is, and what faces the HIP there.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Stand {
-    pub(crate) facing: Facing,
-    pub(crate) view: TangentView,
-}
-
 /// Where a walk ended.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Walked {
+    pub(crate) place: Place,
     pub(crate) view: TangentView,
     /// Tangential force over stiffness, on the user \[m\].
     pub(crate) tangential_B: Vector3<f64>,
     pub(crate) changes: u32,
 }
 
-/// Where the god-object stands when the HIP has moved; `None` if it is free and gone.
+/// Where the god-object stands when the HIP has moved, and what it sees; `None` if it is free and gone.
 ///
-/// `place` may change without moving: from an edge to the face that now holds the HIP back.
+/// Its place may change without moving: from an edge to the face that now holds the HIP back.
 #[inline(always)]
-pub(crate) fn stand(mesh: &Mesh, place: &mut Place, input: &ConeInput) -> Option<Stand> {
+pub(crate) fn stand(mesh: &Mesh, mut place: Place, input: &ConeInput) -> Option<(Place, TangentView)> {
+    let hip_B = input.hip_B;
     for _ in 0..MAX_FLIGHTS {
-        let facing = Facing::of(mesh, place, &input.hip_B);
-        let (on, view) = match facing {
-            Facing::Face(side) => (On::Face(side), view_of_face(mesh, side, place, input)),
-            Facing::Edge(side, edge) => (On::Edge(side, edge), view_of_edge(mesh, side, edge, place, input)),
-            Facing::Vertex(side, corner) => (On::Vertex(side, corner), view_of_vertex(place, input)),
-            Facing::Free => {
-                *place = match rim(mesh, place) {
-                    Some(rim) => rim,
-                    None => fly(mesh, place, &input.hip_B)?,
-                };
-                continue;
-            }
+        if let Some(on) = facing(mesh, place, hip_B) {
+            let (normal_B, offset_m) = match on {
+                On::Face(side) => plane_of_face(mesh, side),
+                On::Edge(side, edge) => plane_on_edge(mesh, side, edge, hip_B),
+                On::Vertex(..) => plane_at_vertex(place.point_B, hip_B),
+            };
+            place.on = on;
+            return Some((place, TangentView::new(&place.point_B, normal_B, offset_m, input)));
+        }
+        place = match rim(mesh, place) {
+            Some(rim) => rim,
+            None => fly(mesh, place, hip_B)?,
         };
-        place.on = on;
-        return Some(Stand { facing, view });
     }
     None
 }
 
-/// Moves `place` from where it stands until nothing draws it any further; `None` if it is free and gone.
+/// Goes on from where the god-object stands until nothing draws it any further; `None` if it is free and gone.
 #[inline(always)]
 pub(crate) fn walk(
     mesh: &Mesh,
-    place: &mut Place,
-    mut stand_now: Stand,
+    (mut place, mut view): (Place, TangentView),
     draw: &impl Draw,
     input: &ConeInput,
 ) -> Option<Walked> {
     let start_B = place.point_B;
-    for changes in 0..=MAX_FEATURE_CHANGES {
-        let Stand { facing, view } = stand_now;
+    let mut changes = 0;
+    loop {
         let Drawn { target_B, is_at_rest, tangential_B } = draw.drawn(&view, &(start_B - place.point_B));
-        let walked = Walked { view, tangential_B, changes };
-        if is_at_rest || changes == MAX_FEATURE_CHANGES {
-            return Some(walked);
+        if is_at_rest || changes == MAX_FEATURE_CHANGES || matches!(place.on, On::Vertex(..)) {
+            return Some(Walked { place, view, tangential_B, changes });
         }
-        let reached = match facing {
-            Facing::Face(side) => cross_face(mesh, side, &place.point_B, &target_B),
-            Facing::Edge(side, edge) => follow_edge(mesh, side, edge, &target_B),
-            Facing::Vertex(..) | Facing::Free => return Some(walked),
+        changes += 1;
+        let reached = match place.on {
+            On::Face(side) => cross_face(mesh, side, place.point_B, target_B),
+            On::Edge(side, edge) | On::Vertex(side, edge) => follow_edge(mesh, side, edge, target_B),
         };
-        *place = reached.place;
-        if reached.is_all_the_way {
-            return Some(Walked { changes: changes + 1, ..walked });
+        match reached {
+            Reached::Target(place) => return Some(Walked { place, view, tangential_B, changes }),
+            Reached::Rim(place_there) => (place, view) = stand(mesh, place_there, input)?,
         }
-        stand_now = stand(mesh, place, input)?;
     }
-    None
 }
 
 /// How far a way led.
-struct Reached {
-    place: Place,
-    is_all_the_way: bool,
+enum Reached {
+    Target(Place),
+    /// Only to an edge or a vertex.
+    Rim(Place),
 }
 
 /// Goes straight through a face: to the target or to the first edge or vertex on the way.
 #[inline(always)]
-fn cross_face(mesh: &Mesh, side: Side, from_B: &Vector3<f64>, target_B: &Vector3<f64>) -> Reached {
+fn cross_face(mesh: &Mesh, side: Side, from_B: Vector3<f64>, target_B: Vector3<f64>) -> Reached {
     let facet = Facet::of(mesh, side);
-    let corners_B = facet.corners_B(mesh);
-    let [a_B, b_B, c_B] = corners_B;
-    let edges_B = [b_B - a_B, c_B - b_B, a_B - c_B];
-    // Distances from the edges, times their lengths: the Voronoi planes through the edges, Melder eq. 4.15-4.20 with the
+    let [a_B, b_B, c_B] = facet.corners_B(mesh);
+    let met = |start_B, end_B| share_until_met(&facet, start_B, end_B, &from_B, &target_B);
+    let met = [met(&a_B, &b_B), met(&b_B, &c_B), met(&c_B, &a_B)];
+    let (edge, share) = if met[1] < met[0] { (1, met[1]) } else { (0, met[0]) };
+    let (edge, share) = if met[2] < share { (2, met[2]) } else { (edge, share) };
+    if share == f64::INFINITY {
+        return Reached::Target(Place { point_B: target_B, on: On::Face(side) });
+    }
+    let met_B = from_B + (target_B - from_B) * share;
+    let (start_B, edge_B) = facet.edge_B(mesh, edge);
+    let share = edge_B.dot(&(met_B - start_B)) / edge_B.norm_squared();
+    Reached::Rim(on_edge(mesh, side, edge, share))
+}
+
+/// The share of the way to the target at which it leaves a face over an edge; infinite if it does not.
+#[inline(always)]
+fn share_until_met(
+    facet: &Facet<'_>,
+    start_B: &Vector3<f64>,
+    end_B: &Vector3<f64>,
+    from_B: &Vector3<f64>,
+    target_B: &Vector3<f64>,
+) -> f64 {
+    let edge_B = end_B - start_B;
+    // Distances from the edge, times its length: the Voronoi plane through the edge, Melder eq. 4.15-4.20 with the
     // offset corrected (the printed one is always 0).
-    let inwards_B = [facet.inward_B(&edges_B[0]), facet.inward_B(&edges_B[1]), facet.inward_B(&edges_B[2])];
-    let is_beyond = |edge: usize| inwards_B[edge].dot(&(target_B - corners_B[edge])) < 0.0;
-    let beyond = [is_beyond(0), is_beyond(1), is_beyond(2)];
-    let all_the_way =
-        Reached { place: Place { point_B: *target_B, on: On::Face(side) }, is_all_the_way: true };
-    if !(beyond[0] | beyond[1] | beyond[2]) {
-        return all_the_way;
-    }
+    let inward_B = facet.inward_B(&edge_B);
     let way_B = target_B - from_B;
-    let way_m2 = way_B.norm_squared();
-    let mut first_fraction = f64::INFINITY;
-    let mut first = None;
-    for edge in 0..3 {
-        let gained = inwards_B[edge].dot(&way_B);
-        let leaves = gained * gained > PARALLEL * PARALLEL * edges_B[edge].norm_squared() * way_m2;
-        if beyond[edge] & (gained < 0.0) & leaves {
-            let left = inwards_B[edge].dot(&(from_B - corners_B[edge])).max(0.0);
-            let fraction = left / -gained;
-            if fraction < first_fraction {
-                (first, first_fraction) = (Some(edge), fraction);
-            }
-        }
-    }
-    let Some(edge) = first else { return all_the_way };
-    let met_B = from_B + way_B * first_fraction;
-    let edge_B = edges_B[edge];
-    let share = edge_B.dot(&(met_B - corners_B[edge])) / edge_B.norm_squared();
-    Reached { place: on_edge(mesh, side, edge, share), is_all_the_way: false }
+    let gained = inward_B.dot(&way_B);
+    let is_beyond = inward_B.dot(&(target_B - start_B)) < 0.0;
+    let leaves = gained * gained > PARALLEL * PARALLEL * edge_B.norm_squared() * way_B.norm_squared();
+    let left = inward_B.dot(&(from_B - start_B)).max(0.0);
+    if is_beyond & (gained < 0.0) & leaves { left / -gained } else { f64::INFINITY }
 }
 
 /// Goes along an edge: to the target or to the vertex on the way.
-fn follow_edge(mesh: &Mesh, side: Side, edge: usize, target_B: &Vector3<f64>) -> Reached {
+#[inline(never)]
+fn follow_edge(mesh: &Mesh, side: Side, edge: usize, target_B: Vector3<f64>) -> Reached {
     let (start_B, edge_B) = Facet::of(mesh, side).edge_B(mesh, edge);
     let share = edge_B.dot(&(target_B - start_B)) / edge_B.norm_squared();
     let place = on_edge(mesh, side, edge, share);
-    Reached { place, is_all_the_way: matches!(place.on, On::Edge(..)) }
+    if matches!(place.on, On::Edge(..)) { Reached::Target(place) } else { Reached::Rim(place) }
 }
 
 /// The place on an edge at this share of its length; near its ends, the vertex.
-#[inline]
+#[inline(always)]
 fn on_edge(mesh: &Mesh, side: Side, edge: usize, share: f64) -> Place {
     let facet = Facet::of(mesh, side);
     let at = |corner| Place { point_B: facet.corner_B(mesh, corner), on: On::Vertex(side, corner) };
@@ -173,7 +164,7 @@ fn on_edge(mesh: &Mesh, side: Side, edge: usize, share: f64) -> Place {
 
 /// The edge or vertex that a place on a face happens to lie on, where a neighbour may hold what the face lets go.
 #[cold]
-fn rim(mesh: &Mesh, place: &Place) -> Option<Place> {
+fn rim(mesh: &Mesh, place: Place) -> Option<Place> {
     let On::Face(side) = place.on else { return None };
     let facet = Facet::of(mesh, side);
     let near_m = |edge_m: f64| (SNAP * edge_m).max(RIM * mesh.extent_m());
@@ -188,7 +179,7 @@ fn rim(mesh: &Mesh, place: &Place) -> Option<Place> {
         Some(&corner) => On::Vertex(side, corner),
         None => On::Edge(side, edge),
     };
-    Some(Place { on, ..*place })
+    Some(Place { on, ..place })
 }
 
 /// Straight from where it was to the HIP through free space; `None` if nothing is in the way.
@@ -196,60 +187,62 @@ fn rim(mesh: &Mesh, place: &Place) -> Option<Place> {
 /// The HIP is in front of all that meets here, so none of that is in the way, whatever rounding says. Of a place on a
 /// face, only that face is here: on its rim it would have been taken for one on the edge.
 #[cold]
-fn fly(mesh: &Mesh, place: &Place, hip_B: &Vector3<f64>) -> Option<Place> {
+fn fly(mesh: &Mesh, place: Place, hip_B: Vector3<f64>) -> Option<Place> {
     let (On::Face(side) | On::Edge(side, _) | On::Vertex(side, _)) = place.on;
     let facet = Facet::of(mesh, side);
     let vertices_of = |face: u32| mesh.faces[face as usize].vertices;
     let hit = match place.on {
-        On::Face(_) => mesh.first_hit_of_others(&place.point_B, hip_B, |face| face == side.face),
+        On::Face(_) => mesh.first_hit_of_others(&place.point_B, &hip_B, |face| face == side.face),
         On::Edge(_, edge) => {
             let ends = [edge, next(edge)].map(|corner| facet.face.vertices[corner]);
             let has_both = |face| ends.iter().all(|end| vertices_of(face).contains(end));
-            mesh.first_hit_of_others(&place.point_B, hip_B, has_both)
+            mesh.first_hit_of_others(&place.point_B, &hip_B, has_both)
         }
         On::Vertex(_, corner) => {
             let tip = facet.face.vertices[corner];
-            mesh.first_hit_of_others(&place.point_B, hip_B, |face| vertices_of(face).contains(&tip))
+            mesh.first_hit_of_others(&place.point_B, &hip_B, |face| vertices_of(face).contains(&tip))
         }
     };
     hit.map(|hit| Place::hit(&hit))
 }
 
+/// The plane that the god-object sees on a face: its normal, and `normal . x` of its points.
 #[inline(always)]
-fn view_of_face(mesh: &Mesh, side: Side, place: &Place, input: &ConeInput) -> TangentView {
+fn plane_of_face(mesh: &Mesh, side: Side) -> (Vector3<f64>, f64) {
     let facet = Facet::of(mesh, side);
-    TangentView::new(&place.point_B, facet.normal_B, facet.offset_m, input)
+    (facet.normal_B, facet.offset_m)
 }
 
 /// On an edge S is the foot of the HIP's perpendicular, and the depth is measured from there.
-fn view_of_edge(mesh: &Mesh, side: Side, edge: usize, place: &Place, input: &ConeInput) -> TangentView {
+#[inline(never)]
+fn plane_on_edge(mesh: &Mesh, side: Side, edge: usize, hip_B: Vector3<f64>) -> (Vector3<f64>, f64) {
     let facet = Facet::of(mesh, side);
     //= melder#4.21
     let (start_B, edge_B) = facet.edge_B(mesh, edge);
     //= melder#4.22
     //= melder#4.23
-    let share = edge_B.dot(&(input.hip_B - start_B)) / edge_B.norm_squared();
+    let share = edge_B.dot(&(hip_B - start_B)) / edge_B.norm_squared();
     //= melder#4.24
     let foot_B = start_B + edge_B * share;
-    view_from(&foot_B, place, &facet.normal_B, input)
+    plane_through(&foot_B, &hip_B, &facet.normal_B)
 }
 
 /// On a vertex nothing can slide: S is the vertex.
-fn view_of_vertex(place: &Place, input: &ConeInput) -> TangentView {
-    view_from(&place.point_B, place, &direction_or_up(&(place.point_B - input.hip_B)), input)
+#[inline(never)]
+fn plane_at_vertex(vertex_B: Vector3<f64>, hip_B: Vector3<f64>) -> (Vector3<f64>, f64) {
+    plane_through(&vertex_B, &hip_B, &direction_or_up(&(vertex_B - hip_B)))
 }
 
 /// As seen from the point of an edge or vertex nearest to the HIP; `otherwise_B` is the normal where both coincide.
-fn view_from(
+fn plane_through(
     nearest_B: &Vector3<f64>,
-    place: &Place,
+    hip_B: &Vector3<f64>,
     otherwise_B: &Vector3<f64>,
-    input: &ConeInput,
-) -> TangentView {
-    let out_B = nearest_B - input.hip_B;
+) -> (Vector3<f64>, f64) {
+    let out_B = nearest_B - hip_B;
     let depth_m = out_B.norm();
     let normal_B = if depth_m > 0.0 { direction_or_up(&out_B) } else { *otherwise_B };
-    TangentView::new(&place.point_B, normal_B, normal_B.dot(&input.hip_B) + depth_m, input)
+    (normal_B, normal_B.dot(hip_B) + depth_m)
 }
 
 /// A way that leaves an edge by less than this per length runs along it: its crossing would be rounding.
