@@ -113,7 +113,7 @@ impl TouchInput<'_> {
                 });
                 answer
             }
-            Shape::Mesh(_) => None,
+            Shape::Mesh(_) | Shape::Csg(_) => None,
         }
     }
 }

@@ -11,7 +11,6 @@
 //! Cost: at most [`MAX_ROUNDS`] rounds. The error of a round on a sphere of radius r is `1 - rho / r` times the last, so
 //! that 5 mm below a ball of 0.1 m take about a dozen, and HIPs near the centre do not come to rest in one tick.
 
-mod constraints;
 mod on_mesh;
 
 use crate::algorithm::{ContactAlgorithm, ContactMemory, Touch, TouchInput};

@@ -13,12 +13,13 @@ use nalgebra::Vector3;
 
 use crate::algorithm::{Algorithm, ContactAlgorithm, ContactMemory, Touch, TouchInput};
 use crate::classic_god_object::ClassicGodObject;
+use crate::csg::CsgCone;
 use crate::entity::Entity;
 use crate::frame::{is_finite, point_into_body, point_into_world, vector_into_body, vector_into_world};
 use crate::friction_cone::{ConeInput, FrictionCone};
 use crate::friction_law::FrictionState;
 use crate::hip::Hip;
-use crate::mesh::{Beginning, Mesh, MeshCone};
+use crate::mesh::{Beginning, Mesh, MeshCone, RollingCone};
 use crate::shape::Shape;
 use crate::surface::{Feature, Surface};
 use crate::vector_field::VectorField;
@@ -69,6 +70,8 @@ pub(crate) struct Sweep<'h> {
 pub(crate) struct Slot {
     cone: Option<FrictionCone>,
     mesh: MeshCone,
+    rolling: RollingCone,
+    csg: CsgCone,
     own: ContactMemory,
     /// How much of the force is rendered, 0 to 1.
     strength: f64,
@@ -85,6 +88,8 @@ impl Slot {
         if self.contact.is_none() {
             self.cone = None;
             self.mesh.let_go();
+            self.rolling.let_go();
+            self.csg.let_go();
         }
         self.contact.as_ref()
     }
@@ -117,7 +122,10 @@ impl Slot {
             cone,
         };
         // Apart from the others, whose answers take as long to copy as this one to find.
-        if let (Algorithm::FrictionCone, Shape::Mesh(mesh)) = (&entity.algorithm, &entity.shape) {
+        let is_point = sweep.finger_radius_m == 0.0;
+        if let (Algorithm::FrictionCone, Shape::Mesh(mesh), true) =
+            (&entity.algorithm, &entity.shape, is_point)
+        {
             let touch = self.touch_mesh(mesh, &input)?;
             return self.feel(index, entity, touch, sweep);
         }
@@ -154,15 +162,19 @@ impl Slot {
             Shape::Form(form) => self.touch_surface(&form.grown(input.finger_radius_m)?, input),
             Shape::Own(surface) if input.finger_radius_m == 0.0 => self.touch_surface(&**surface, input),
             Shape::Own(_) => input.of_surface(|grown| self.touch_surface(grown, input))?,
-            Shape::Mesh(_) => None,
+            Shape::Mesh(mesh) => {
+                let touched = self.rolling.update(mesh, input);
+                self.begun(touched)
+            }
+            Shape::Csg(csg) => {
+                let touched = self.csg.update(csg, input);
+                self.begun(touched)
+            }
         }
     }
 
     #[inline(always)]
     fn touch_mesh(&mut self, mesh: &Mesh, input: &TouchInput<'_>) -> Option<Touch> {
-        if input.finger_radius_m != 0.0 {
-            return None;
-        }
         // Of another shape that the entity had.
         self.cone = None;
         let was_touching = self.mesh.is_touching();
@@ -210,6 +222,17 @@ impl Slot {
         })
     }
 
+    /// Takes note of how a contact began.
+    fn begun(&mut self, touched: Option<(Touch, Beginning)>) -> Option<Touch> {
+        let (touch, beginning) = touched?;
+        match beginning {
+            Beginning::WasInside => self.strength = 0.0,
+            Beginning::Came if self.contact.is_none() => self.strength = 1.0,
+            Beginning::Came => {}
+        }
+        Some(touch)
+    }
+
     /// A contact that began inside comes on slowly.
     #[inline(always)]
     fn feel(
@@ -219,6 +242,10 @@ impl Slot {
         mut touch: Touch,
         sweep: &Sweep<'_>,
     ) -> Option<Contact> {
+        entity.shading.turn(&entity.shape, &mut touch);
+        if let Some(height_map) = &entity.height_map {
+            height_map.raise(&entity.shape, entity.stiffness_n_per_m, &mut touch);
+        }
         if self.strength < 1.0 {
             let step = sweep.dt_s / sweep.ramp_in_s;
             // Where time is unknown or no ramp wanted, there is none.

@@ -1,11 +1,16 @@
 //! An object as the haptic step sees it: where it is, what it is made of.
 
+use std::sync::Arc;
+
 use nalgebra::Isometry3;
 
 use crate::algorithm::Algorithm;
 use crate::error::{ParameterError, above_zero, at_least_zero};
 use crate::friction::Friction;
+use crate::height_map::HeightMap;
+use crate::shading::Shading;
 use crate::shape::Shape;
+use crate::shared::Shared;
 
 /// An object that fingers can touch.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,6 +30,10 @@ pub struct Entity {
     pub friction: Friction,
     /// How contacts with it are rendered.
     pub algorithm: Algorithm,
+    /// Whether its facets feel smooth.
+    pub shading: Shading,
+    /// What stands out of its surface.
+    pub height_map: Option<Shared<HeightMap>>,
 }
 
 impl Entity {
@@ -44,6 +53,8 @@ impl Entity {
             damping_n_s_per_m: 0.0,
             friction: Friction::None,
             algorithm: Algorithm::FrictionCone,
+            shading: Shading::None,
+            height_map: None,
         })
     }
 
@@ -61,6 +72,16 @@ impl Entity {
     /// Rendered by this algorithm.
     pub fn with_algorithm(self, algorithm: Algorithm) -> Self {
         Self { algorithm, ..self }
+    }
+
+    /// With facets that feel like this.
+    pub fn with_shading(self, shading: Shading) -> Self {
+        Self { shading, ..self }
+    }
+
+    /// With these heights on its surface.
+    pub fn with_height_map(self, height_map: Arc<HeightMap>) -> Self {
+        Self { height_map: Some(height_map.into()), ..self }
     }
 
     /// One tick on: the current pose becomes the previous one.

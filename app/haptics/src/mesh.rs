@@ -38,6 +38,7 @@ mod place;
 mod query;
 mod repair;
 mod report;
+mod rolling;
 mod sliver;
 mod soup;
 mod topology;
@@ -50,6 +51,7 @@ pub use error::MeshError;
 pub use face::{Face, Link};
 pub use mesh_cone::{Beginning, MeshCone};
 pub use report::{Finding, MeshReport};
+pub(crate) use rolling::RollingCone;
 pub use soup::TriangleSoup;
 pub use walk::MAX_FEATURE_CHANGES;
 

@@ -8,6 +8,7 @@ use nalgebra::Vector3;
 
 use crate::capsule::Capsule;
 use crate::cone::Cone;
+use crate::csg::Csg;
 use crate::cuboid::Cuboid;
 use crate::cylinder::Cylinder;
 use crate::ellipsoid::Ellipsoid;
@@ -26,6 +27,8 @@ pub enum Shape {
     Form(Form),
     /// Triangles.
     Mesh(Shared<Mesh>),
+    /// A tree of closed forms.
+    Csg(Shared<Csg>),
     /// Somebody's own surface.
     Own(Shared<dyn OwnSurface>),
 }
@@ -79,7 +82,7 @@ impl Shape {
         let is_point = finger_radius_m == 0.0;
         match self {
             Self::Form(form) => is_point || form.grown(finger_radius_m).is_some(),
-            Self::Mesh(_) => is_point,
+            Self::Mesh(_) | Self::Csg(_) => is_point,
             Self::Own(surface) => is_point || surface.show_grown(finger_radius_m, &mut |_| {}),
         }
     }
@@ -88,6 +91,12 @@ impl Shape {
 impl From<Arc<Mesh>> for Shape {
     fn from(mesh: Arc<Mesh>) -> Self {
         Self::Mesh(mesh.into())
+    }
+}
+
+impl From<Arc<Csg>> for Shape {
+    fn from(csg: Arc<Csg>) -> Self {
+        Self::Csg(csg.into())
     }
 }
 

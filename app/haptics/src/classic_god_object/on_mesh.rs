@@ -14,8 +14,8 @@
 
 use nalgebra::Vector3;
 
-use super::constraints::{Constraints, Plane, Target};
 use crate::algorithm::{ContactMemory, Touch, TouchInput};
+use crate::constraints::{Constraints, Plane, Target};
 use crate::mesh::Mesh;
 use crate::surface::{Feature, SurfacePoint};
 

@@ -124,7 +124,7 @@ impl MeshCone {
             point_B: touching.god_object.point_B,
             normal_B: touching.normal_B,
             feature: touching.god_object.feature(),
-            piece: 0,
+            piece: touching.god_object.face(),
         })
     }
 

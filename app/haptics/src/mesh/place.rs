@@ -56,6 +56,12 @@ impl Place {
         Self { point_B: nearest.point_B, on }
     }
 
+    /// A face that it lies on.
+    pub(crate) fn face(&self) -> u32 {
+        let (On::Face(side) | On::Edge(side, _) | On::Vertex(side, _)) = self.on;
+        side.face
+    }
+
     pub(crate) fn feature(&self) -> Feature {
         match self.on {
             On::Face(_) => Feature::Face,

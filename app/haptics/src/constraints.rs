@@ -10,16 +10,16 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Planes that the god-object must not cross.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Constraints {
+pub(crate) struct Constraints {
     planes: [Plane; MAX_PLANES],
     count: usize,
 }
 
 /// In front: `normal . x >= offset`.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Plane {
-    pub(super) normal_B: Vector3<f64>,
-    pub(super) offset_m: f64,
+pub(crate) struct Plane {
+    pub(crate) normal_B: Vector3<f64>,
+    pub(crate) offset_m: f64,
 }
 
 /// Of more than three planes met in one descent, three at the most hold the god-object.
@@ -27,26 +27,26 @@ const MAX_PLANES: usize = 6;
 
 /// Where the god-object would like to be.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Target {
-    pub(super) point_B: Vector3<f64>,
+pub(crate) struct Target {
+    pub(crate) point_B: Vector3<f64>,
     /// Planes that hold it there.
-    pub(super) active: u32,
+    pub(crate) active: u32,
 }
 
 impl Plane {
     /// In front is positive \[m\].
-    pub(super) fn distance(&self, p_B: &Vector3<f64>) -> f64 {
+    pub(crate) fn distance(&self, p_B: &Vector3<f64>) -> f64 {
         self.normal_B.dot(p_B) - self.offset_m
     }
 }
 
 impl Constraints {
-    pub(super) fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.count == 0
     }
 
     /// Whether there was room for it.
-    pub(super) fn add(&mut self, plane: Plane) -> bool {
+    pub(crate) fn add(&mut self, plane: Plane) -> bool {
         let Some(place) = self.planes.get_mut(self.count) else { return false };
         *place = plane;
         self.count += 1;
@@ -54,7 +54,7 @@ impl Constraints {
     }
 
     /// The point nearest to `hip_B` at least `hover_m` in front of all planes; `None` if they leave no room.
-    pub(super) fn nearest_to(&self, hip_B: &Vector3<f64>, hover_m: f64, slack_m: f64) -> Option<Target> {
+    pub(crate) fn nearest_to(&self, hip_B: &Vector3<f64>, hover_m: f64, slack_m: f64) -> Option<Target> {
         let planes = &self.planes[..self.count];
         let lift = |plane: &Plane| hover_m - plane.distance(hip_B);
         let mut best: Option<(f64, Target)> = None;
