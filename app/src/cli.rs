@@ -6,6 +6,7 @@
 use crate::calibrate::{self, CalibrateArgs, default_layout};
 use crate::demo;
 use crate::outcome::{RunFailure, Stop};
+use crate::picture::{self, PlotArgs};
 use crate::report::Report;
 use crate::rig::{HandMode, Rig};
 use crate::run::{self, Attach, RunPlan};
@@ -51,6 +52,8 @@ enum AppCommand {
     Run(RunArgs),
     /// Find where a device stands, from points that it and another one measured together
     Calibrate(CalibrateArgs),
+    /// Draw a recording: what the fingers felt
+    Plot(PlotArgs),
     /// Answer a question about the whole system with a table and a picture
     #[command(subcommand)]
     Study(StudyCommand),
@@ -140,6 +143,9 @@ pub fn main() -> ExitCode {
         Some(AppCommand::Driver(command)) => io_driver::cli::execute(command),
         Some(AppCommand::Calibrate(args)) => calibrate::run(&args),
         Some(AppCommand::Run(args)) => conclude(run_scene(&args)),
+        Some(AppCommand::Plot(args)) => {
+            picture::execute(&args).map_or_else(|failure| failed(&failure), stopped)
+        }
         Some(AppCommand::Study(command)) => {
             let result = install_signals().and_then(|signals| study::execute(&command, &signals));
             result.map_or_else(|failure| failed(&failure), stopped)
