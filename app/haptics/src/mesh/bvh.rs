@@ -29,6 +29,8 @@ use nalgebra::Vector3;
 use super::Face;
 pub use nearest::Nearest;
 pub use segment::Hit;
+#[cfg(test)]
+pub(crate) use stack::POPPED;
 
 /// A hierarchy of boxes around the faces of a mesh.
 ///

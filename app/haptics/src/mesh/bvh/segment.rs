@@ -59,17 +59,44 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
         to_B: &Vector3<f64>,
         is_skipped: impl Fn(u32) -> bool,
     ) -> Option<Hit> {
-        let segment = Segment::new(from_B, to_B, sides, self.extent_m());
-        let clipped = Clipped::new(&segment, &self.lower_B, &self.upper_B)?;
+        self.first_of(triangles, &Segment::new(from_B, to_B, sides, self.extent_m()), is_skipped, usize::MAX)
+    }
+
+    /// As [`Self::first_hit`]; `None`, too, if this is not known when so many nodes and runs of faces have been visited.
+    pub(super) fn first_hit_of_visited(
+        &self,
+        triangles: Triangles<'_>,
+        sides: Sides,
+        from_B: &Vector3<f64>,
+        to_B: &Vector3<f64>,
+        most_visits: usize,
+    ) -> Option<Hit> {
+        self.first_of(triangles, &Segment::new(from_B, to_B, sides, self.extent_m()), |_| false, most_visits)
+    }
+
+    #[inline(always)]
+    fn first_of(
+        &self,
+        triangles: Triangles<'_>,
+        segment: &Segment,
+        is_skipped: impl Fn(u32) -> bool,
+        most_visits: usize,
+    ) -> Option<Hit> {
+        let clipped = Clipped::new(segment, &self.lower_B, &self.upper_B)?;
         let line = Line::new(segment.path, clipped.end);
         let slabs = Slabs::new(&clipped);
         let mut best: Option<Met> = None;
         let mut limit = 1.0;
+        let mut visits = 0;
         let mut stack = Stack::<f32>::new();
         while let Some((entered, child)) = stack.pop() {
             if entered > limit {
                 continue;
             }
+            if visits == most_visits {
+                return None;
+            }
+            visits += 1;
             if child.count() == 0 {
                 let node = &self.nodes[child.index()];
                 stack.push(&slabs.entries(node, limit), &node.children, limit);
