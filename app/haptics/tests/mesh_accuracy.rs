@@ -6,7 +6,7 @@ mod common;
 use common::meshes::*;
 use common::path::{self, Phase, R, RadiusAt};
 use common::*;
-use haptics::{Entity, Friction};
+use haptics::{Entity, Finger, Friction};
 use nalgebra::Vector3;
 
 /// HIP and force of every tick of the slide over the ball.
@@ -91,6 +91,38 @@ fn with_friction_the_slide_is_as_smooth_and_drags_with_its_coefficient() {
     let lag = sphere_lag(mu, R, R - DEPTH).unwrap();
     let expected = (mu.atan() + lag).tan();
     assert!((mean / expected - 1.0).abs() < 0.02, "{mean}, expected {expected}");
+}
+
+#[test]
+fn under_a_bumpy_ball_of_a_million_triangles_no_contact_is_lost_or_met_anew() {
+    let mesh = bumpy_sphere(1000);
+    for friction in [Friction::None, Friction::Coulomb { mu: 0.5 }] {
+        let ball = touchable(&mesh, friction);
+        // With a ramp: what is found inside begins with a hundredth of its force.
+        let mut finger = Finger::new(0.0, 1).unwrap();
+        let (mut leaps, mut last) = (0, None);
+        for (tick, (phase, hip)) in path::standard_path(path::bumpy).iter().enumerate() {
+            let out = step(&mut finger, &ball, hip);
+            if *phase != Phase::Slide {
+                continue;
+            }
+            assert_eq!(out.entity, Some(0), "{tick}");
+            let spring = (out.god_object_W - hip) * K;
+            if ball.friction == Friction::None {
+                // Roundings of 0.1 m, times 500 N/m.
+                assert!((out.force_on_user_W - spring).norm() < 1e-12, "{tick}: {out:?}");
+            } else {
+                // All of the depth's force, and of the rest no more than there is.
+                let [felt, most] = [out.force_on_user_W.norm(), spring.norm()];
+                assert!(felt > 0.8 * most && felt < most * (1.0 + 1e-9), "{tick}: {felt} of {most}");
+            }
+            // A god-object held in a dale comes over the saddle, and goes in one tick to where the HIP is by then.
+            let leap_m = last.map_or(0.0, |last: Vector3<f64>| (out.god_object_W - last).norm());
+            leaps += u32::from(leap_m > 5e-3);
+            last = Some(out.god_object_W);
+        }
+        assert!((1..=5).contains(&leaps), "{leaps}");
+    }
 }
 
 #[test]

@@ -103,10 +103,12 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
                 continue;
             }
             for index in child.index()..child.index() + child.count() {
-                let Some(met) = segment.meets(triangles, index as u32, &line) else { continue };
-                if is_skipped(met.face) {
+                // First, since of a thousand faces that share the place where the segment starts each would be near
+                // enough to be looked at closely.
+                if is_skipped(index as u32) {
                     continue;
                 }
+                let Some(met) = segment.meets(triangles, index as u32, &line) else { continue };
                 if best.is_none_or(|best| (met.fraction, met.face) < (best.fraction, best.face)) {
                     best = Some(met);
                     limit = clipped.fraction(met.fraction);
