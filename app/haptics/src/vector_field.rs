@@ -57,7 +57,9 @@ mod tests {
             for meridians in [100, 400] {
                 let ball = ball(meridians, algorithm.clone());
                 let mut finger = Finger::new(0.0, 1).unwrap().with_ramp_in(0.0).unwrap();
-                for offset in [Vector3::zeros(), Vector3::new(1e-9, 0.0, 0.0), Vector3::new(1e-5, -1e-5, 2e-5)] {
+                for offset in
+                    [Vector3::zeros(), Vector3::new(1e-9, 0.0, 0.0), Vector3::new(1e-5, -1e-5, 2e-5)]
+                {
                     let (popped, force) = tick(&mut finger, &ball, &offset);
                     // Two bounded queries of 1024 visits, four children each, and three segments of some tens; looked
                     // at in full, 10,000 faces are three times as many, and 160,000 fifty times.

@@ -293,6 +293,25 @@ fn nothing_slips_through_in_steps() {
 }
 
 #[test]
+fn a_segment_that_ends_on_a_face_up_to_rounding_has_met_it() {
+    for (name, mesh) in small_meshes() {
+        let mut noise = Noise(21);
+        for _ in 0..1000 {
+            let face = (noise.uniform() * mesh.faces().len() as f64) as usize;
+            let [a, b, c] = oracle::corners(&mesh, face);
+            let out = mesh.faces()[face].normal_B * mesh.extent_m();
+            // The middle of a face lies in its plane up to a rounding, a thousandth of the tolerance.
+            let on_it = (a + b + c) / 3.0;
+            let met = |height: f64| mesh.first_hit(&(on_it + out * 0.01), &(on_it + out * height));
+            assert!(met(0.5e-13).is_some() && met(-0.5e-13).is_some(), "{name}: {face}");
+            if matches!(name, "cube" | "plate" | "sphere") {
+                assert!(met(3e-13).is_none(), "{name}: {face}");
+            }
+        }
+    }
+}
+
+#[test]
 fn a_chain_of_steps_hits_where_the_long_segment_does() {
     let meshes = [
         ("cube", mesh(make::cuboid([0.05, 0.05, 0.05]))),
@@ -457,7 +476,10 @@ fn any_numbers_are_survived() {
                 nearest.point_B.amax() <= mesh.extent_m() && nearest.distance_m >= 0.0,
                 "{name}: {nearest:?}"
             );
+            let bounded = mesh.nearest(&from);
+            assert!(bounded.point_B.amax() <= mesh.extent_m() && bounded.distance_m >= nearest.distance_m);
             assert!((0.0..=1e30).contains(&mesh.clearance(&from, 1e30)), "{name}");
+            assert!(!(mesh.is_inside(&from) && from.amax() > mesh.extent_m()), "{name}");
             assert!(!(mesh.is_inside_unbounded(&from) && from.amax() > mesh.extent_m()), "{name}");
         }
     }
