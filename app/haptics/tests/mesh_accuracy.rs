@@ -98,7 +98,7 @@ fn the_largest_change_on_the_ball_of_100k_is_that_of_an_exact_descent() {
     let steps = [std::f64::consts::TAU / 316.0, std::f64::consts::PI / path::rings(316) as f64];
     let turn = felt[largest].1.angle(&felt[largest + 1].1);
     assert!((turn / steps[0].hypot(steps[1]) - 1.0).abs() < 2e-3, "{turn}");
-    // Without memory it would have gone two ticks earlier, and there with less force.
+    // Without memory it would have gone three ticks earlier, and there with less force.
     let nearest = felt.iter().map(|(hip, _)| (*hip, (mesh.nearest_unbounded(hip).point_B - hip) * K));
     let nearest_n = largest_change_n(&nearest.collect::<Vec<_>>());
     assert!((nearest_n - 0.069_763).abs() < 1e-6, "{nearest_n}");
