@@ -21,6 +21,7 @@ mod clearance;
 mod closest;
 mod inside;
 mod nearest;
+mod parts;
 mod segment;
 mod stack;
 

@@ -72,6 +72,18 @@ impl Mesh {
         self.bvh.way_out(self.triangles(), p_B)
     }
 
+    /// Ways out of what is inside, to be tried one after the other: that of [`Self::way_out`], and, where the nearest
+    /// face is of another part than the one that the point is inside of, or belongs to it in a roundabout way, faces
+    /// of that part. Each has a cost that a tick can bear, and none if it is not asked for.
+    pub(crate) fn ways_out(&self, p_B: &Vector3<f64>) -> impl Iterator<Item = Nearest> {
+        let may_be_inside = self.sides == Sides::Solid && self.bvh.is_within_box(p_B);
+        let found = may_be_inside.then(|| self.nearest_and_side(p_B));
+        let nearest = found.and_then(|(nearest, is_inside)| is_inside.then_some(nearest));
+        let of_parts = move || self.bvh.ways_out_of_parts(self.triangles(), p_B, &found?.0);
+        let of_parts = std::iter::once_with(of_parts).flatten().flatten();
+        nearest.into_iter().chain(of_parts.filter(|way| way.distance_m.is_finite()))
+    }
+
     /// A lower bound of the distance from a point to the mesh, at most `at_most_m`; 0 if nothing better is known
     /// \[m\].
     ///

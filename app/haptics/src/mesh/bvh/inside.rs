@@ -48,7 +48,8 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
         }
     }
 
-    fn is_within_box(&self, p_B: &Vector3<f64>) -> bool {
+    /// Whether a point is in the box around all faces, as what is inside must be.
+    pub fn is_within_box(&self, p_B: &Vector3<f64>) -> bool {
         (0..3).all(|axis| p_B[axis] >= self.lower_B[axis] && p_B[axis] <= self.upper_B[axis])
     }
 
@@ -62,7 +63,9 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
     ) -> Option<Nearest> {
         let [a, b, c] = triangles.corners(&triangles.faces[nearest.face as usize]);
         let beyond_B = p_B + ((a + b + c) / 3.0 - p_B) * BEYOND;
-        let first = self.first_hit_of_visited(triangles, Sides::Sheet, p_B, &beyond_B, MOST_VISITS)?;
+        let first = self
+            .first_hit_of_visited(triangles, Sides::Sheet, p_B, &beyond_B, |_| false, MOST_VISITS)
+            .ok()??;
         if first.is_front {
             return None;
         }

@@ -59,19 +59,23 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
         to_B: &Vector3<f64>,
         is_skipped: impl Fn(u32) -> bool,
     ) -> Option<Hit> {
-        self.first_of(triangles, &Segment::new(from_B, to_B, sides, self.extent_m()), is_skipped, usize::MAX)
+        let segment = Segment::new(from_B, to_B, sides, self.extent_m());
+        self.first_of(triangles, &segment, is_skipped, usize::MAX).unwrap_or(None)
     }
 
-    /// As [`Self::first_hit`]; `None`, too, if this is not known when so many nodes and runs of faces have been visited.
+    /// As [`Self::first_hit_of_others`]; an error if it is not known when so many nodes and runs of faces have been
+    /// visited.
     pub(super) fn first_hit_of_visited(
         &self,
         triangles: Triangles<'_>,
         sides: Sides,
         from_B: &Vector3<f64>,
         to_B: &Vector3<f64>,
+        is_skipped: impl Fn(u32) -> bool,
         most_visits: usize,
-    ) -> Option<Hit> {
-        self.first_of(triangles, &Segment::new(from_B, to_B, sides, self.extent_m()), |_| false, most_visits)
+    ) -> Result<Option<Hit>, TooManyVisits> {
+        let segment = Segment::new(from_B, to_B, sides, self.extent_m());
+        self.first_of(triangles, &segment, is_skipped, most_visits)
     }
 
     #[inline(always)]
@@ -81,8 +85,8 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
         segment: &Segment,
         is_skipped: impl Fn(u32) -> bool,
         most_visits: usize,
-    ) -> Option<Hit> {
-        let clipped = Clipped::new(segment, &self.lower_B, &self.upper_B)?;
+    ) -> Result<Option<Hit>, TooManyVisits> {
+        let Some(clipped) = Clipped::new(segment, &self.lower_B, &self.upper_B) else { return Ok(None) };
         let line = Line::new(segment.path, clipped.end);
         let slabs = Slabs::new(&clipped);
         let mut best: Option<Met> = None;
@@ -94,7 +98,7 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
                 continue;
             }
             if visits == most_visits {
-                return None;
+                return Err(TooManyVisits);
             }
             visits += 1;
             if child.count() == 0 {
@@ -115,9 +119,13 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
                 }
             }
         }
-        best.map(|met| segment.hit(triangles, met))
+        Ok(best.map(|met| segment.hit(triangles, met)))
     }
 }
+
+/// A query met its bound.
+#[derive(Debug)]
+pub(super) struct TooManyVisits;
 
 /// The segment and what its distances from planes are compared with.
 struct Segment {
