@@ -3,11 +3,11 @@
 //! Problem: inside one part, the nearest face may be of another part, which the point is outside of. By that face
 //! alone a finger that one part has let go would be free, deep inside the other.
 //!
-//! Model: a straight way leads from the point out of the mesh's box. Each face that it leaves through counts one, each that
-//! it enters through takes one off; what is left is how many parts the point is inside of. A way that meets first a face
-//! that it leaves through leaves a part that the point is inside of, and there it can be pushed out. Of several such ways
-//! the shortest is tried first. All must agree that the point is inside, since a way may by bad luck run through an edge, and
-//! a finger that is free must not be drawn.
+//! Model: a straight way leads from the point out of the mesh's box. Each face that it leaves through counts one, each
+//! that it enters through takes one off; what is left is how many parts the point is inside of. A way that meets first a
+//! face that it leaves through leaves a part that the point is inside of, and there it can be pushed out. Of several such
+//! ways the shortest is tried first. All must agree that the point is inside, since a way may by bad luck run through an
+//! edge, and a finger that is free must not be drawn.
 //!
 //! Cost: outside, one way, which leads away from the nearest face; inside [`WAYS`]. Each is followed over
 //! [`MOST_CROSSINGS`] at most, each of them one bounded query; what is not known then counts as outside.
@@ -39,8 +39,8 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
         Some(all)
     }
 
-    /// Where a way leaves a part that the point is inside of; infinitely far away if it enters another part first. `None` if
-    /// the point is inside of none, or too much is in the way.
+    /// Where a way leaves a part that the point is inside of; infinitely far away if it enters another part first. `None`
+    /// if the point is inside of none, or too much is in the way.
     fn left_along(
         &self,
         triangles: Triangles<'_>,
@@ -90,7 +90,8 @@ const WAYS: [[f64; 3]; 6] = [
 ];
 /// By this much of another way the one that leads away is tilted, so as not to run along a normal.
 const TILT: f64 = 0.1;
-/// So many extents away is out of the box, whose diagonal is 3.5 of them, on each of the ways, also on the shortest: 0.9.
+/// So many extents away is out of the box, whose diagonal is 3.5 of them, on each of the ways, also on the shortest,
+/// 0.9 long.
 const BEYOND: f64 = 4.0;
 /// Most faces that a way is followed through.
 const MOST_CROSSINGS: usize = 16;
