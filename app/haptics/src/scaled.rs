@@ -295,11 +295,12 @@ mod tests {
     #[test]
     fn a_point_inside_is_seen_from_all_six_sides_and_from_metres_or_millimetres_alike() {
         // Slender, small and large ones; a length that is 1 only if lengths are metres would show.
-        let forms: [(&dyn Fn(f64) -> Form, [f64; 3]); 4] = [
-            (&|s| Cylinder::new(0.002 * s, 0.5 * s).unwrap().into(), [0.0, 0.2, 0.0]),
-            (&|s| Cone::new(0.01 * s, 0.002 * s, 0.4 * s).unwrap().into(), [0.0, 0.1, 0.0]),
-            (&|s| Capsule::new(0.002 * s, 0.5 * s).unwrap().into(), [0.001, -0.2, 0.0]),
-            (&|s| Torus::new(0.3 * s, 0.01 * s).unwrap().into(), [-0.3, 0.002, 0.0]),
+        type FormOfSize = fn(f64) -> Form;
+        let forms: [(FormOfSize, [f64; 3]); 4] = [
+            (|s| Cylinder::new(0.002 * s, 0.5 * s).unwrap().into(), [0.0, 0.2, 0.0]),
+            (|s| Cone::new(0.01 * s, 0.002 * s, 0.4 * s).unwrap().into(), [0.0, 0.1, 0.0]),
+            (|s| Capsule::new(0.002 * s, 0.5 * s).unwrap().into(), [0.001, -0.2, 0.0]),
+            (|s| Torus::new(0.3 * s, 0.01 * s).unwrap().into(), [-0.3, 0.002, 0.0]),
         ];
         for (form, inside) in forms {
             let at = |s: f64| match Scaled::new(form(s), [1.5 / s, 1.0 / s, 0.5 / s]).unwrap() {
