@@ -46,6 +46,8 @@ mod touching;
 mod walk;
 mod winding;
 
+#[cfg(test)]
+pub(crate) use bvh::POPPED;
 pub use bvh::{Bvh, Hit, Nearest, Triangles};
 pub use error::MeshError;
 pub use face::{Face, Link};

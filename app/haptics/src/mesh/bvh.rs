@@ -21,6 +21,7 @@ mod clearance;
 mod closest;
 mod inside;
 mod nearest;
+mod parts;
 mod segment;
 mod stack;
 
@@ -29,6 +30,8 @@ use nalgebra::Vector3;
 use super::Face;
 pub use nearest::Nearest;
 pub use segment::Hit;
+#[cfg(test)]
+pub(crate) use stack::POPPED;
 
 /// A hierarchy of boxes around the faces of a mesh.
 ///
