@@ -12,7 +12,9 @@
 #![allow(non_snake_case)] // Frames are capital letters: tip_D is the tip in D.
 
 use crate::mount::Mount;
+use crate::passive_port::{Tick, keep_passive};
 use crate::row::{FingerRow, Row};
+use haptics::passivity::Passivity;
 use haptics::{Entity, Finger, Hip, RAMP_IN_S};
 use nalgebra::Vector3;
 use shm_abi::frame::DEVICE_POSITION_VALID;
@@ -42,6 +44,8 @@ pub struct FastStep {
     tips_D: Vec<Option<[f64; 3]>>,
     /// How far each finger was carried through the world since the last tick (m): no device's velocity tells of it.
     carried_W: Vec<Vector3<f64>>,
+    /// What keeps each finger passive, if anything does.
+    passivities: Vec<Option<Passivity>>,
 }
 
 /// The first minor version of the shared-memory contract whose frames tell velocities.
@@ -52,7 +56,26 @@ impl FastStep {
     pub fn new(fingers: Vec<DeviceFinger>, entities: Vec<Entity>, period_ns: u64) -> Self {
         let (tips_D, carried_W) = (vec![None; fingers.len()], vec![Vector3::zeros(); fingers.len()]);
         let period_s = period_ns as f64 / 1e9;
-        Self { fingers, entities, period_s, last_tick: None, driver_estimates: false, tips_D, carried_W }
+        let passivities = vec![None; fingers.len()];
+        Self {
+            fingers,
+            entities,
+            period_s,
+            last_tick: None,
+            driver_estimates: false,
+            tips_D,
+            carried_W,
+            passivities,
+        }
+    }
+
+    /// With fingers whose forces do not feed energy into the hand, one for each finger; `None`: as rendered.
+    #[must_use]
+    pub fn with_passivities(mut self, passivities: impl IntoIterator<Item = Option<Passivity>>) -> Self {
+        for (own, given) in self.passivities.iter_mut().zip(passivities) {
+            *own = given;
+        }
+        self
     }
 
     /// Which minor version of the contract the driver speaks, and over how many ticks it lets forces come on.
@@ -77,14 +100,20 @@ impl FastStep {
         let dt_s = ticks as f64 * self.period_s;
         row.run_tick = frame.run_tick.max(0).unsigned_abs();
         let devices = frame.present_devices();
-        let known = self.tips_D.iter_mut().zip(&mut self.carried_W);
-        for ((finger, row), (tip_D, carried_W)) in self.fingers.iter_mut().zip(&mut row.fingers).zip(known) {
+        let tick = Tick::new(frame, &self.entities, dt_s);
+        let known = self.tips_D.iter_mut().zip(&mut self.carried_W).zip(&mut self.passivities);
+        for ((finger, row), ((tip_D, carried_W), passivity)) in
+            self.fingers.iter_mut().zip(&mut row.fingers).zip(known)
+        {
             let Some(device) = devices.get(finger.device) else { continue };
             let is_valid = device.flags & DEVICE_POSITION_VALID != 0;
             *tip_D = is_valid.then_some(device.position_m_measured);
-            let carried_W = std::mem::take(carried_W) / dt_s;
-            let velocity_W = self.driver_estimates.then(|| finger.velocity_W(device, carried_W));
+            let carried_W = std::mem::take(carried_W);
+            let velocity_W = self.driver_estimates.then(|| finger.velocity_W(device, carried_W / dt_s));
             *row = finger.step(device, &self.entities, dt_s, velocity_W);
+            if let Some(passivity) = passivity {
+                keep_passive(passivity, finger, device, carried_W, &tick, row);
+            }
             command.devices[finger.device].force_on_user_n = finger.mount.force_to_device(row.force_on_user);
         }
     }
@@ -141,6 +170,7 @@ impl FastStep {
         for finger in &mut self.fingers {
             finger.finger.reset();
         }
+        self.passivities.iter_mut().flatten().for_each(Passivity::reset);
     }
 }
 

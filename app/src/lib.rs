@@ -20,6 +20,7 @@ pub mod fast_thread;
 pub mod mount;
 mod not_zeroed;
 pub mod outcome;
+pub mod passive_port;
 pub mod progress;
 pub mod recording;
 pub mod report;

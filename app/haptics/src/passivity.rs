@@ -102,15 +102,24 @@ impl PassivitySpec {
     /// rests without credit would not get its whole force. It does not go by the stiffness: a spring's own rounding,
     /// `k q^2 / 2`, is a microjoule, and would be used up by any touch.
     pub fn usual(period_s: f64) -> Self {
+        Self::for_motion(period_s, ACCELERATION_M_PER_S2, RESOLUTION_M)
+    }
+
+    /// The same for a tip of this largest acceleration \[m/s^2\], whose positions come in steps of this size \[m\].
+    pub fn for_motion(period_s: f64, acceleration_m_per_s2: f64, resolution_m: f64) -> Self {
         let unbound = Self {
             bound_j: 0.0,
             recovery_w: 0.0,
             device_friction_n: 0.0,
-            acceleration_m_per_s2: ACCELERATION_M_PER_S2,
-            resolution_m: RESOLUTION_M,
+            acceleration_m_per_s2,
+            resolution_m,
         };
-        let bound_j = FULL_FORCE_N * unbound.surprise_m(period_s, 1.0);
-        Self { bound_j, recovery_w: bound_j / RECOVERY_S, ..unbound }
+        unbound.with_bound(FULL_FORCE_N * unbound.surprise_m(period_s, 1.0))
+    }
+
+    /// With this bound \[J\], all of which is paid in ten seconds.
+    pub fn with_bound(self, bound_j: f64) -> Self {
+        Self { bound_j, recovery_w: bound_j / RECOVERY_S, ..self }
     }
 
     /// The same, if each number is in range.
