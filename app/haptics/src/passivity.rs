@@ -37,7 +37,8 @@
 //! ```
 //!
 //! since u grows by what is fed less what is paid, is at least -stored_j(i) in i, and at most bound_j in j: by choice
-//! of F, `u_j = u_(j-1) + F . d <= bound_j`. Should the finger be faster than that, the surprise `s`, by which a way is
+//! of F, `u_j = u_(j-1) + F . d <= bound_j`. Where forces come a tick late the larger of stored_j(i) and stored_j(i-1)
+//! counts, and each force is chosen within what the one before it leaves. Should the finger be faster than that, the surprise `s`, by which a way is
 //! longer than p + r, adds at most |F| s, and is forgiven: a finger is not left without its wall for a jolt. After
 //! `reset`, and at the very first tick, the finger is taken to have been at rest.
 //!
@@ -69,7 +70,7 @@ pub struct PassivitySpec {
     pub bound_j: f64,
     /// A debt is paid at this rate \[W\], >= 0.
     pub recovery_w: f64,
-    /// What the device's own friction takes from every motion \[N\], >= 0. Too large a number weakens the guarantee.
+    /// What the device's own friction takes from every motion before the hand gets anything \[N\], >= 0.
     pub device_friction_n: f64,
     /// The largest acceleration of the tip \[m/s^2\], >= 0.
     pub acceleration_m_per_s2: f64,
@@ -86,6 +87,8 @@ pub struct Passivity {
     energy_j: f64,
     /// What of it nobody has paid for; negative: credit (J).
     balance_j: f64,
+    /// What springs held in the last tick (J).
+    stored_j: f64,
     position_W: Option<Vector3<f64>>,
     /// Follows the position when it is a count away: what friction acts on.
     dragged_W: Vector3<f64>,
@@ -95,8 +98,8 @@ pub struct Passivity {
 }
 
 impl PassivitySpec {
-    /// The usual numbers at this length of a tick \[s\]: a device of the size of a Premium (8.5 N, counts of 0.03 mm),
-    /// without trust in its friction.
+    /// The usual numbers at this length of a tick \[s\]: those of a Premium (8.5 N, counts of 0.03 mm, 0.04 N of
+    /// friction).
     ///
     /// The bound is what the strongest force can feed in one tick that nobody foresaw, `F r`: with less, a finger that
     /// rests without credit would not get its whole force. It does not go by the stiffness: a spring's own rounding,
@@ -110,7 +113,7 @@ impl PassivitySpec {
         let unbound = Self {
             bound_j: 0.0,
             recovery_w: 0.0,
-            device_friction_n: 0.0,
+            device_friction_n: DEVICE_FRICTION_N,
             acceleration_m_per_s2,
             resolution_m,
         };
@@ -150,6 +153,7 @@ impl Passivity {
             period_s: above_zero("period_s", period_s)?,
             energy_j: 0.0,
             balance_j: 0.0,
+            stored_j: 0.0,
             position_W: None,
             dragged_W: Vector3::zeros(),
             acting_W: Vector3::zeros(),
@@ -185,7 +189,8 @@ impl Passivity {
         let force_W = if port.is_late {
             // What is on its way has been paid for in the tick before.
             let due_j = limit::most_j(&self.pending_W, &moved_W, surprise_m);
-            budget_j = (budget_j - due_j.max(0.0)).max(0.0);
+            let of_springs_j = self.spec.bound_j + self.stored_j;
+            budget_j = (budget_j - due_j.max(0.0)).clamp(0.0, of_springs_j);
             let surprise_m = self.spec.surprise_m(self.period_s, spread + 1.0);
             limit::nearest(port.force_on_user_W, moved_W, surprise_m, budget_j)
         } else {
@@ -208,7 +213,7 @@ impl Passivity {
     pub fn reset(&mut self) {
         self.position_W = None;
         (self.acting_W, self.pending_W) = (Vector3::zeros(), Vector3::zeros());
-        self.balance_j = self.balance_j.max(0.0);
+        (self.balance_j, self.stored_j) = (self.balance_j.max(0.0), 0.0);
     }
 
     /// Sums up the interval that ends now. Returns how far a usual tick of it went (m), and how many there were.
@@ -223,13 +228,16 @@ impl Passivity {
             Vector3::zeros()
         });
         let held_W = port.applied_on_user_W.filter(is_finite).unwrap_or(self.acting_W);
-        let fed_j = held_W.dot(&moved_W);
-        if fed_j.is_finite() {
+        let fed_j = held_W.dot(&moved_W).clamp(-MOST_J, MOST_J);
+        if !fed_j.is_nan() {
             self.energy_j += fed_j;
             self.balance_j += fed_j;
         }
         self.pay(port.position_W, ticks * self.period_s);
-        self.balance_j = self.balance_j.max(-port.stored_j()).min(self.spec.bound_j);
+        let before_j = std::mem::replace(&mut self.stored_j, port.stored_j());
+        // A force that is on its way was the springs' when it was chosen.
+        let credit_j = if port.is_late { self.stored_j.max(before_j) } else { self.stored_j };
+        self.balance_j = self.balance_j.max(-credit_j).min(self.spec.bound_j);
         (moved_W / ticks, ticks)
     }
 
@@ -261,9 +269,13 @@ impl Passivity {
 const FULL_FORCE_N: f64 = 8.5;
 /// Its whole peak on its tip's 60 g, nobody holding it: 140 (m/s^2).
 const ACCELERATION_M_PER_S2: f64 = 150.0;
+/// What moves a Premium's tip: pays for counts below 2 f / q = 2.7 N/mm, where rounding leaks k q / 2 for each metre (N).
+const DEVICE_FRICTION_N: f64 = 0.04;
 /// Counts of a Premium at its tip (m).
 const RESOLUTION_M: f64 = 3e-5;
 /// In this time a debt of the whole bound is paid (s): 0.2 mW, far below what keeps up a buzz that can be felt.
 const RECOVERY_S: f64 = 10.0;
 /// Faster than any hand (m/s).
 const MOST_M_PER_S: f64 = 20.0;
+/// More than anything feeds in a tick; sums of it stay finite (J).
+const MOST_J: f64 = 1e9;
