@@ -30,11 +30,20 @@ pub(crate) fn whirl(n_per_m: f64) -> Source {
     Box::new(move |x, _| (Vector3::new(x.z, 0.0, -x.x) * n_per_m, 0.0))
 }
 
-/// A wall whose force is turned by this angle (rad), as a shaded or embossed facet's, up to the whole of it tangential.
+/// A wall whose force is turned by this angle (rad): rubbed round it feeds one way and takes the other.
 pub(crate) fn leaning_wall(k: f64, angle: f64) -> Source {
     Box::new(move |x, _| {
         let size = k * (-x.y).max(0.0);
         (Vector3::new(angle.sin(), angle.cos(), 0.0) * size, 0.5 * size * size / k)
+    })
+}
+
+/// A wall whose force leans to and fro along x, as that of a shaded mesh with facets of this length (m) does.
+pub(crate) fn shaded_wall(k: f64, angle: f64, facet_m: f64) -> Source {
+    Box::new(move |x, _| {
+        let size = k * (-x.y).max(0.0);
+        let lean = angle * (std::f64::consts::TAU * x.x / facet_m).sin();
+        (Vector3::new(lean.sin(), lean.cos(), 0.0) * size, 0.5 * size * size / k)
     })
 }
 
