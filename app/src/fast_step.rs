@@ -283,6 +283,95 @@ mod damped {
 }
 
 #[cfg(test)]
+mod passive {
+    use super::*;
+    use bytemuck::Zeroable;
+    use haptics::Plane;
+    use haptics::passivity::PassivitySpec;
+    use nalgebra::{Isometry3, UnitQuaternion};
+
+    const PERIOD_NS: u64 = 1_000_000;
+    const K: f64 = 1000.0;
+
+    /// A finger over a floor, its device upside down, kept passive by a bound of 1 uJ.
+    fn step() -> FastStep {
+        let floor = Entity::new(Plane::new(Vector3::y(), 0.0).unwrap(), Isometry3::identity(), K).unwrap();
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI);
+        let finger = DeviceFinger {
+            finger: Finger::new(0.0, 1).unwrap().with_ramp_in(0.0).unwrap(),
+            device: 0,
+            mount: Mount::new(Isometry3::from_parts(Vector3::zeros().into(), turn)),
+        };
+        let spec = PassivitySpec::for_motion(1e-3, 0.0, 0.0).with_bound(1e-6);
+        let spec = PassivitySpec { device_friction_n: 0.0, ..spec };
+        FastStep::new(vec![finger], vec![floor], PERIOD_NS)
+            .with_passivities([Passivity::new(spec, 1e-3).ok()])
+    }
+
+    /// The finger at this height (m), where motors held this force upwards (N), of the command of that tick.
+    fn feel(
+        step: &mut FastStep,
+        tick: u64,
+        height: f64,
+        applied: f64,
+        command_tick: u64,
+    ) -> (FingerRow, f64) {
+        let mut frame = Frame::zeroed();
+        (frame.tick, frame.device_count) = (tick, 1);
+        (frame.previous.authority, frame.previous.command_tick) = (1.0, command_tick);
+        frame.devices[0].flags = DEVICE_POSITION_VALID;
+        frame.devices[0].position_m_measured[1] = -height;
+        frame.devices[0].force_on_user_n_applied[1] = -applied;
+        let (mut command, mut row) = (Command::zero(tick, 1, 1), Row::empty());
+        step.step(&frame, &mut command, &mut row);
+        (row.fingers[0], -command.devices[0].force_on_user_n[1])
+    }
+
+    #[test]
+    fn what_counts_is_the_force_that_the_motors_held_and_the_command_is_what_is_left() {
+        let mut step = step();
+        feel(&mut step, 1, 1e-3, 0.0, 0);
+        let (pressed, commanded) = feel(&mut step, 2, -1e-3, 0.0, 1);
+        assert_eq!((pressed.energy_j, pressed.controlled_n), (0.0, 0.0));
+        assert!((commanded - 1.0).abs() < 1e-12, "pressed in by 2 mm a tick, it takes energy: {commanded}");
+        // It wanted a newton, of which the driver let 0.4 N through; out by half a millimetre.
+        let (released, commanded) = feel(&mut step, 3, -0.5e-3, 0.4, 2);
+        assert!((released.energy_j - 0.2e-3).abs() < 1e-15, "{released:?}");
+        // More than the bound: nothing is left of 0.5 N.
+        assert_eq!((commanded, released.force_on_user), (0.0, Vector3::zeros()));
+        assert!((released.controlled_n - 0.5).abs() < 1e-12, "{released:?}");
+    }
+
+    #[test]
+    fn a_device_that_is_carried_does_no_work_and_one_that_is_lost_moved_nowhere() {
+        let mut step = step();
+        feel(&mut step, 1, -1e-3, 0.0, 0);
+        feel(&mut step, 2, -1e-3, 1.0, 1);
+        let camera = Isometry3::translation(0.0, 0.5e-3, 0.0);
+        let text = "attached_to = \"camera\"\n[[device]]\norientation_wxyz = [0, 0, 0, 1]\n";
+        let layout = Layout::parse(text, std::path::Path::new("l.toml")).unwrap();
+        assert!(step.set_layout(&layout.with_camera(camera)));
+        assert!(feel(&mut step, 3, -1e-3, 1.0, 2).0.energy_j.abs() < 1e-15);
+        let mut lost = Frame::zeroed();
+        (lost.tick, lost.device_count) = (4, 1);
+        step.step(&lost, &mut Command::zero(4, 1, 1), &mut Row::empty());
+        assert!(feel(&mut step, 5, -0.2e-3, 1.0, 4).0.energy_j.abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_driver_that_writes_a_tick_late_is_told_from_one_that_does_not() {
+        // Pressed in by 2 mm, then at rest for a tick: by now the one force is paid for, and the other is still to come.
+        let felt = [1, 0].map(|late| {
+            let mut step = step();
+            feel(&mut step, 1, 1e-3, 0.0, 1 - late);
+            feel(&mut step, 2, -1e-3, 0.0, 2 - late);
+            feel(&mut step, 3, -0.5e-3, 0.0, 3 - late).1
+        });
+        assert!(felt[0] <= felt[1], "{felt:?}");
+    }
+}
+
+#[cfg(test)]
 mod carried {
     use super::*;
     use bytemuck::Zeroable;
