@@ -124,8 +124,9 @@ fn the_numbers_of_the_scene_reach_the_finger() {
     let kept = energy(strict);
     assert!(kept <= 1e-6 + 1e-12, "{kept}");
     let paid = energy(&strict.replace("recovery_w = 0.0", "recovery_w = 1e-3"));
-    // Credit lasts to the last k d^2 / 2 = 60 uJ, 0.35 mm or 17 ms below the surface.
-    assert!(paid > kept + 5e-6, "1 mW for some milliseconds: {paid}");
+    // Credit lasts to the last k d^2 / 2 = 60 uJ, 0.35 mm or 17 ms below the surface; debts are paid from there on, and
+    // count while there is a force left that could make new ones.
+    assert!(paid > kept + 2e-6, "1 mW for some milliseconds: {paid}");
     let rubbed = energy(&strict.replace("device_friction_n = 0.0", "device_friction_n = 0.01"));
     assert!(rubbed > kept + 1e-6, "10 mN over some tenths of a millimetre: {rubbed}");
 }

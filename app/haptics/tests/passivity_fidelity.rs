@@ -16,6 +16,8 @@ use std::f64::consts::TAU;
 
 const RATES_HZ: [f64; 3] = [500.0, 1000.0, 4000.0];
 const SECONDS: f64 = 20.0;
+/// Where a finger is (m), by time (s).
+type Path<'a> = &'a dyn Fn(f64) -> Vector3<f64>;
 /// Positions come in steps of a Premium's counts (m).
 const COUNT_M: f64 = 3e-5;
 
@@ -37,7 +39,7 @@ struct Cost {
 }
 
 /// Runs a source along a path twice: seen only, and kept passive.
-fn cost(dt: f64, source: &mut Source, path: &dyn Fn(f64) -> Vector3<f64>) -> Cost {
+fn cost(dt: f64, source: &mut Source, path: Path<'_>) -> Cost {
     let usual = PassivitySpec::usual(dt);
     let mut seen = Passivity::new(PassivitySpec { bound_j: 1e9, ..usual }, dt).unwrap();
     let mut kept = Passivity::new(usual, dt).unwrap();
@@ -151,7 +153,7 @@ fn what_is_active_is_kept_to_its_bound_and_the_rest_is_left() {
         let dt = 1.0 / rate;
         let late = (3e-3 / dt) as usize;
         let spec = PassivitySpec::usual(dt);
-        let cases: [(&str, Source, &dyn Fn(f64) -> Vector3<f64>); 5] = [
+        let cases: [(&str, Source, Path); 5] = [
             ("no damping, 4 N/mm", sources::wall(4000.0), &pressing_and_sliding),
             ("3 ms late, 1 N/mm", sources::late_wall(1000.0, late), &pressing_and_sliding),
             ("turns in a circle", sources::whirl(100.0), &|t| circling(-t)),
@@ -178,7 +180,7 @@ fn brakes_and_shaded_facets_are_left() {
         let dt = 1.0 / rate;
         // Force against the turn is a brake. What a facet gives on one half it takes on the other, and that is less than
         // what the spring holds meanwhile.
-        let cases: [(&str, Source, &dyn Fn(f64) -> Vector3<f64>); 2] = [
+        let cases: [(&str, Source, Path); 2] = [
             ("turns against the finger", sources::whirl(100.0), &circling),
             ("shaded facets of 4 mm, 1 N/mm", sources::shaded_wall(1000.0, 0.2, 4e-3), &pressing_and_sliding),
         ];
