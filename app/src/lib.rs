@@ -21,6 +21,7 @@ pub mod mount;
 mod not_zeroed;
 pub mod outcome;
 pub mod picture;
+pub mod passive_port;
 pub mod progress;
 pub mod recording;
 pub mod report;

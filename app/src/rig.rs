@@ -12,6 +12,7 @@ use crate::fast_step::{DeviceFinger, FastStep};
 use crate::mount::Mount;
 use crate::recording::Names;
 use crate::simulated::{SimulatedDevices, base_for_path};
+use haptics::passivity::Passivity;
 use haptics::{Entity, Finger, ParameterError};
 use io_driver::config::{
     Backend, DeviceConfig, DriverConfig, ProcessConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig, Wish,
@@ -174,7 +175,14 @@ impl Rig {
             Ok(DeviceFinger { finger: made, device: finger.device, mount })
         });
         let fingers: Vec<DeviceFinger> = fingers.collect::<Result<_, RigError>>()?;
-        Ok(FastStep::new(fingers, entities, self.period_ns))
+        let passivities = self.scene.fingers.iter().map(|finger| {
+            let Some(spec) = &finger.passivity else { return Ok(None) };
+            let what = || format!("passivity of finger {}", finger.name);
+            let refused = |source| self.refused(None, what(), source);
+            material::passivity(spec, self.period_ns as f64 / 1e9).map(Some).map_err(refused)
+        });
+        let passivities: Vec<Option<Passivity>> = passivities.collect::<Result<_, RigError>>()?;
+        Ok(FastStep::new(fingers, entities, self.period_ns).with_passivities(passivities))
     }
 
     /// What the recording's columns are called, for devices that tell so much.
@@ -182,6 +190,7 @@ impl Rig {
         let of = |device: usize| devices.get(device).copied().unwrap_or_default();
         Names {
             extras: self.scene.fingers.iter().map(|finger| of(finger.device)).collect(),
+            passive: self.scene.fingers.iter().map(|finger| finger.passivity.is_some()).collect(),
             fingers: self.scene.fingers.iter().map(|finger| finger.name.clone()).collect(),
             entities: self.scene.entities.iter().map(|entity| entity.name.clone()).collect(),
         }

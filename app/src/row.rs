@@ -34,6 +34,10 @@ pub struct FingerRow {
     pub feature: Feature,
     /// What the friction does.
     pub friction: ContactState,
+    /// Energy fed into the hand up to this tick (J); zero where nobody keeps the finger passive.
+    pub energy_j: f64,
+    /// By how much that changed the force (N).
+    pub controlled_n: f64,
 }
 
 impl Row {

@@ -52,6 +52,7 @@ mod grip;
 mod height_map;
 mod hip;
 pub mod mesh;
+pub mod passivity;
 mod plane;
 mod quartic;
 mod scaled;

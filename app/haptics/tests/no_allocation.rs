@@ -7,6 +7,7 @@ mod solids;
 
 use common::*;
 use haptics::mesh::{Mesh, make};
+use haptics::passivity::{Passivity, PassivitySpec, Port};
 use haptics::{Finger, Friction};
 use nalgebra::Vector3;
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -120,6 +121,21 @@ fn a_step_never_allocates() {
     assert!(free > 1000 && stuck > 100 && slid > 1000 && both > 1000, "{free} {stuck} {slid} {both}");
     drop(vec![0u8; 16]);
     assert!(CALLS.get() > before, "the counter counts");
+}
+
+#[test]
+fn keeping_a_finger_passive_never_allocates() {
+    let mut passivity = Passivity::new(PassivitySpec::usual(DT), DT).unwrap();
+    let mut noise = Noise(12);
+    let (mut at, mut changed) = (Vector3::zeros(), 0);
+    let before = CALLS.get();
+    for i in 0..20_000u32 {
+        at = at * 0.99 + noise.vector(1e-4);
+        let port = Port { is_late: i % 3 == 0, ..Port::new(at, noise.vector(5.0), DT) };
+        changed += u32::from(passivity.step(&port).changed_n > 0.0);
+    }
+    assert_eq!(CALLS.get() - before, 0);
+    assert!(changed > 1000, "{changed}");
 }
 
 #[test]

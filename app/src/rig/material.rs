@@ -1,6 +1,7 @@
 //! From what a scene says of an entity to what rendering takes: shape, friction, algorithm.
 
 use super::models::Models;
+use haptics::passivity::{Passivity, PassivitySpec};
 use haptics::{
     Algorithm, Capsule, Cone, Cuboid, Cylinder, Ellipsoid, Form, Friction, ParameterError, Plane, Scaled,
     Shape, Sphere, Torus,
@@ -20,6 +21,23 @@ impl From<ParameterError> for Unfit {
     fn from(error: ParameterError) -> Self {
         Self::Refused(error)
     }
+}
+
+/// What keeps a finger passive at this length of a tick (s).
+pub(super) fn passivity(spec: &world::PassivitySpec, period_s: f64) -> Result<Passivity, ParameterError> {
+    let motion = PassivitySpec::usual(period_s);
+    let usual = PassivitySpec::for_motion(
+        period_s,
+        spec.acceleration_m_per_s2.unwrap_or(motion.acceleration_m_per_s2),
+        spec.resolution_m.unwrap_or(motion.resolution_m),
+    );
+    let wanted = usual.with_bound(spec.bound_j.unwrap_or(usual.bound_j));
+    let passivity = PassivitySpec {
+        recovery_w: spec.recovery_w.unwrap_or(wanted.recovery_w),
+        device_friction_n: spec.device_friction_n.unwrap_or(wanted.device_friction_n),
+        ..wanted
+    };
+    Passivity::new(passivity, period_s)
 }
 
 /// A shape; meshes are those that were loaded.

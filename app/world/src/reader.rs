@@ -256,6 +256,11 @@ impl<'d> Value<'d> {
         }
     }
 
+    /// `true` or `false`; `None`: it is something else.
+    pub(crate) fn truth(&self) -> Option<bool> {
+        if let DeValue::Boolean(truth) = self.value.get_ref() { Some(*truth) } else { None }
+    }
+
     pub(crate) fn table(&self, allowed: &str) -> Result<Table<'d>, SceneError> {
         let DeValue::Table(entries) = self.value.get_ref() else { return Err(self.wrong_type(allowed)) };
         let (path, offset) = (self.path.clone(), self.value.span().start);

@@ -34,7 +34,7 @@ fn an_unknown_key_is_refused_with_what_was_probably_meant() {
     refused(
         &with_finger("raduis_m = 0.01"),
         "s.toml:4: finger[0].raduis_m: unknown key (did you mean `radius_m`?); allowed: name, \
-         radius_m, start_m, device",
+         radius_m, start_m, device, passivity",
     );
     refused(
         &with_entity("colour = \"red\""),
