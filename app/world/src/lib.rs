@@ -44,6 +44,7 @@ mod placement;
 mod pose;
 mod reader;
 mod scene;
+mod shading;
 mod shape;
 mod source;
 mod vocabulary;
@@ -56,6 +57,7 @@ pub use layout::Layout;
 pub use names::MAX_NAME_BYTES;
 pub use placement::{Affine, LEAST_STRETCH, MOST_STRETCH, Placement};
 pub use scene::Scene;
+pub use shading::{ShadingFormSpec, ShadingSpec};
 pub use shape::{MeshSpec, ShapeSpec};
 pub use source::MAX_FILE_BYTES;
 
