@@ -22,7 +22,8 @@
 //!
 //! Frames and signs: object frame B; forces are on the user.
 //! Invariants: size of the force and friction angle are kept ([`ShadingForm::Rotate`]); the force is turned by a right angle
-//! at most; what is not finite leaves the force as it was.
+//! at most; a shaded normal that is none leaves
+//! the force as it was.
 //! Cost: the god-object's face and three vertex normals; in a region of activation also the face across the edge.
 
 mod at;
@@ -95,10 +96,9 @@ impl Shading {
         Ok(Self::BoxRegions(BoxRegions::of(cuboid, length_m)?, form))
     }
 
-    /// The unit normal that is felt at a surface point instead of the one there; `None` where it is that one.
-    pub fn normal_at(&self, shape: &Shape, at: &SurfacePoint) -> Option<Vector3<f64>> {
-        let (from_B, to_B) = self.turned(shape, at)?;
-        form::rotated(&at.normal_B, &from_B, &to_B)
+    /// The unit normal that is felt at a surface point instead of the one there.
+    pub fn normal_at(&self, shape: &Shape, at: &SurfacePoint) -> Vector3<f64> {
+        self.turned(shape, at, &at.normal_B, ShadingForm::Rotate)
     }
 
     /// How much memory is kept for it, whoever shares it.
@@ -114,16 +114,34 @@ impl Shading {
     #[inline(always)]
     pub(crate) fn turn(&self, shape: &Shape, touch: &mut Touch) {
         if !matches!(self, Self::None) {
-            self.turn_force(shape, touch);
+            // Copies: what is lent to a function that is not inlined has to live in memory, shaded or not.
+            touch.force_on_user_B = self.turned_force(shape, touch.god_object, touch.force_on_user_B);
         }
     }
 
     #[inline(never)]
-    fn turn_force(&self, shape: &Shape, touch: &mut Touch) {
-        let Some((from_B, to_B)) = self.turned(shape, &touch.god_object) else { return };
-        let form = self.form();
-        if let Some(turned_B) = form.turned(&touch.force_on_user_B, &from_B, &to_B) {
-            touch.force_on_user_B = turned_B;
+    fn turned_force(&self, shape: &Shape, at: SurfacePoint, force_B: Vector3<f64>) -> Vector3<f64> {
+        self.turned(shape, &at, &force_B, self.form())
+    }
+
+    /// A vector at a surface point, turned; as it was where nothing is shaded.
+    #[inline(always)]
+    fn turned(
+        &self,
+        shape: &Shape,
+        at: &SurfacePoint,
+        v_B: &Vector3<f64>,
+        form: ShadingForm,
+    ) -> Vector3<f64> {
+        match (self, shape) {
+            (Self::Interpolated(normals, _), Shape::Mesh(mesh)) => {
+                at::turned(&**normals, mesh, at, v_B, form)
+            }
+            (Self::Regions(regions, _), Shape::Mesh(mesh)) => at::turned(&**regions, mesh, at, v_B, form),
+            (Self::BoxRegions(regions, _), Shape::Form(shape::Form::Cuboid(cuboid))) => {
+                form.turned(v_B, &regions.turn(cuboid, at))
+            }
+            _ => *v_B,
         }
     }
 
@@ -131,19 +149,6 @@ impl Shading {
         match self {
             Self::None => ShadingForm::default(),
             Self::Interpolated(_, form) | Self::Regions(_, form) | Self::BoxRegions(_, form) => *form,
-        }
-    }
-
-    /// From which unit normal to which.
-    #[inline(always)]
-    fn turned(&self, shape: &Shape, at: &SurfacePoint) -> Option<(Vector3<f64>, Vector3<f64>)> {
-        match (self, shape) {
-            (Self::Interpolated(normals, _), Shape::Mesh(mesh)) => at::turned(&**normals, mesh, at),
-            (Self::Regions(regions, _), Shape::Mesh(mesh)) => at::turned(&**regions, mesh, at),
-            (Self::BoxRegions(regions, _), Shape::Form(shape::Form::Cuboid(cuboid))) => {
-                regions.turned(cuboid, at)
-            }
-            _ => None,
         }
     }
 }

@@ -22,7 +22,7 @@ fn of_face(mesh: &Mesh, face: usize, point_B: Vector3<f64>) -> SurfacePoint {
 /// The shaded normal at a point of a face.
 fn shaded(shading: &Shading, mesh: &Arc<Mesh>, face: usize, point_B: Vector3<f64>) -> Vector3<f64> {
     let shape = Shape::from(Arc::clone(mesh));
-    shading.normal_at(&shape, &of_face(mesh, face, point_B)).expect("a shaded normal")
+    shading.normal_at(&shape, &of_face(mesh, face, point_B))
 }
 
 fn corners(mesh: &Mesh, face: usize) -> Matrix3<f64> {

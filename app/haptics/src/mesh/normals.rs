@@ -75,9 +75,16 @@ impl VertexNormals {
     /// At the corners of a face, which must be one of the mesh's.
     #[inline(always)]
     pub(crate) fn at_corners(&self, index: usize, face: &Face) -> [Vector3<f64>; 3] {
+        // Written out: arrays that are mapped go through memory.
         match &self.corners {
-            None => face.vertices.map(|vertex| self.normals[vertex as usize]),
-            Some(corners) => corners[index].map(|corner| self.seen(corner)),
+            None => {
+                let [a, b, c] = face.vertices;
+                [self.normals[a as usize], self.normals[b as usize], self.normals[c as usize]]
+            }
+            Some(corners) => {
+                let [a, b, c] = corners[index];
+                [self.seen(a), self.seen(b), self.seen(c)]
+            }
         }
     }
 
@@ -100,6 +107,7 @@ impl VertexNormals {
         (is_closed && has_one_fan).then(|| self.at_corners(index as usize, face)[corner])
     }
 
+    #[inline(always)]
     fn seen(&self, corner: CornerNormal) -> Vector3<f64> {
         let normal_B = self.normals[corner.index()];
         if corner.is_behind() { -normal_B } else { normal_B }

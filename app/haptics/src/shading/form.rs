@@ -14,48 +14,59 @@ pub enum ShadingForm {
     Bisect,
 }
 
+/// From the surface's normal to the shaded one.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Turn {
+    /// Unit length.
+    pub(super) from_B: Vector3<f64>,
+    /// Any length.
+    pub(super) to_B: Vector3<f64>,
+}
+
 impl ShadingForm {
-    /// The force, turned; `None` where nothing sensible comes of it.
+    /// The force, turned; as it was where there is no sensible direction.
     #[inline(always)]
-    pub(super) fn turned(
-        self,
-        force_B: &Vector3<f64>,
-        from_B: &Vector3<f64>,
-        to_B: &Vector3<f64>,
-    ) -> Option<Vector3<f64>> {
+    pub(super) fn turned(self, force_B: &Vector3<f64>, turn: &Turn) -> Vector3<f64> {
         match self {
-            Self::Rotate => rotated(force_B, from_B, to_B),
-            Self::Bisect => bisected(force_B, to_B),
+            Self::Rotate => turn.rotated(force_B),
+            Self::Bisect => bisected(force_B, &turn.to_B).unwrap_or(*force_B),
         }
     }
 }
 
-/// Turned by the smallest rotation that takes one unit vector to the other, but by a right angle at most.
-#[inline(always)]
-pub(super) fn rotated(
-    v_B: &Vector3<f64>,
-    from_B: &Vector3<f64>,
-    to_B: &Vector3<f64>,
-) -> Option<Vector3<f64>> {
-    let mut cos = from_B.dot(to_B);
-    let mut axis_B = from_B.cross(to_B);
-    if cos < 0.0 {
-        // Farther, a force without friction would pull the finger in.
-        (cos, axis_B) = (0.0, axis_B.try_normalize(OPPOSITE)?);
+impl Turn {
+    /// Turned by the smallest rotation that takes one normal to the other, but by a right angle at most.
+    #[inline(always)]
+    fn rotated(&self, v_B: &Vector3<f64>) -> Vector3<f64> {
+        let Self { from_B, mut to_B } = *self;
+        let mut along = from_B.dot(&to_B);
+        if along < 0.0 {
+            // Farther, a force without friction would pull the finger in.
+            to_B -= from_B * along;
+            along = 0.0;
+        }
+        let length = to_B.norm();
+        // Not a number is no length, either.
+        if !(length > SMALLEST && length < f64::INFINITY) {
+            return *v_B;
+        }
+        // Two reflections make a rotation: at the plane of the one normal, and at that of the middle of both.
+        let middle_B = from_B * length + to_B;
+        let reflected_B = v_B - from_B * (2.0 * from_B.dot(v_B));
+        reflected_B - middle_B * (reflected_B.dot(&middle_B) / (length * (length + along)))
     }
-    // Rodrigues' formula with the axis as long as the angle's sine.
-    let turned_B = v_B * cos + axis_B.cross(v_B) + axis_B * (axis_B.dot(v_B) / (1.0 + cos));
-    turned_B.iter().all(|x| x.is_finite()).then_some(turned_B)
 }
 
 fn bisected(force_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<Vector3<f64>> {
+    let to_B = to_B.try_normalize(SMALLEST)?;
     let size_n = force_B.norm();
     //= melder#4.26
     let f1_B = to_B * size_n + force_B;
     //= melder#4.27
-    let turned_B = f1_B.try_normalize(OPPOSITE * size_n)? * size_n;
-    turned_B.iter().all(|x| x.is_finite()).then_some(turned_B)
+    f1_B.try_normalize(OPPOSITE * size_n).map(|direction_B| direction_B * size_n)
 }
 
-/// Nearer than this to opposite, two directions have no middle and no plane in common.
+/// Nearer than this to opposite, two directions have no middle.
 const OPPOSITE: f64 = 1e-9;
+/// Squares of shorter vectors underflow; a shaded normal may be weighted with areas, which can be tiny.
+const SMALLEST: f64 = 1e-150;

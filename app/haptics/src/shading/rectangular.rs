@@ -6,6 +6,7 @@
 
 use nalgebra::Vector3;
 
+use super::form::Turn;
 use super::regions::{drawn_to_vertex, mixed};
 use crate::cuboid::Cuboid;
 use crate::error::{ParameterError, above_zero};
@@ -26,7 +27,7 @@ impl BoxRegions {
         Ok(Self { length_m: above_zero("length_m", length_m)?.min(0.5 * x.min(y).min(z)) })
     }
 
-    pub(super) fn turned(&self, cuboid: &Cuboid, at: &SurfacePoint) -> Option<(Vector3<f64>, Vector3<f64>)> {
+    pub(super) fn turn(&self, cuboid: &Cuboid, at: &SurfacePoint) -> Turn {
         let half_m = Vector3::from(cuboid.size_m()) * 0.5;
         // Of a ball, what it touches.
         let touched_B = at.point_B.zip_map(&half_m, |x, half| x.clamp(-half, half));
@@ -43,7 +44,6 @@ impl BoxRegions {
         let edge_B = mixed(&side(axis), &distances, |edge| Some(side(beside[edge])));
         let corner_B = Vector3::from_fn(|axis, _| side(axis)[axis]).normalize();
         let [u, v] = distances;
-        let to_B = drawn_to_vertex(&edge_B, &corner_B, u.hypot(v)).try_normalize(f64::MIN_POSITIVE)?;
-        Some((at.normal_B, to_B))
+        Turn { from_B: at.normal_B, to_B: drawn_to_vertex(&edge_B, &corner_B, u.hypot(v)) }
     }
 }

@@ -22,7 +22,7 @@
 
 use nalgebra::Vector3;
 
-use super::at::Field;
+use super::at::{Field, corners_B};
 use crate::error::{ParameterError, above_zero};
 use crate::mesh::{Face, Mesh, VertexNormals};
 
@@ -76,12 +76,13 @@ impl Field for Regions {
         &self.normals
     }
 
-    fn normal(&self, mesh: &Mesh, index: usize, face: &Face, point_B: &Vector3<f64>) -> Vector3<f64> {
+    fn normal(&self, mesh: &Mesh, index: usize, face: &Face, point_B: &Vector3<f64>) -> Option<Vector3<f64>> {
         let triangle = Triangle::of(mesh, face);
         let l_m = self.length_m.min(triangle.inradius_m());
         let distances_m = triangle.distances_m(face, point_B);
-        if distances_m.iter().all(|&distance_m| distance_m >= l_m) {
-            return face.normal_B;
+        let [a_m, b_m, c_m] = distances_m;
+        if a_m.min(b_m).min(c_m) >= l_m {
+            return None;
         }
         let mut normal_B =
             mixed(&face.normal_B, &distances_m.map(|m| m / l_m), |edge| self.over(mesh, face, edge));
@@ -91,7 +92,7 @@ impl Field for Regions {
             let away_m = triangle.away_m(face, corner, point_B);
             normal_B = drawn_to_vertex(&normal_B, at_corner_B, away_m / reach_m);
         }
-        normal_B
+        Some(normal_B)
     }
 }
 
@@ -148,24 +149,26 @@ struct Triangle {
 impl Triangle {
     #[inline(always)]
     fn of(mesh: &Mesh, face: &Face) -> Self {
-        let corners_B = face.vertices.map(|vertex| mesh.vertices()[vertex as usize]);
+        let corners_B = corners_B(mesh, face);
         let [a_B, b_B, c_B] = corners_B;
-        let edges_B = [b_B - a_B, c_B - b_B, a_B - c_B];
-        Self { corners_B, edges_B, lengths_m: edges_B.map(|edge_B| edge_B.norm()) }
+        let [ab_B, bc_B, ca_B] = [b_B - a_B, c_B - b_B, a_B - c_B];
+        Self { corners_B, edges_B: [ab_B, bc_B, ca_B], lengths_m: [ab_B.norm(), bc_B.norm(), ca_B.norm()] }
     }
 
     #[inline(always)]
     fn inradius_m(&self) -> f64 {
-        self.edges_B[0].cross(&self.edges_B[1]).norm() / self.lengths_m.iter().sum::<f64>()
+        let [a_m, b_m, c_m] = self.lengths_m;
+        self.edges_B[0].cross(&self.edges_B[1]).norm() / (a_m + b_m + c_m)
     }
 
     /// From its edges, along its plane.
     #[inline(always)]
     fn distances_m(&self, face: &Face, point_B: &Vector3<f64>) -> [f64; 3] {
-        [0, 1, 2].map(|i| {
+        let from_edge_m = |i: usize| {
             let inward_B = face.normal_B.cross(&self.edges_B[i]);
             inward_B.dot(&(point_B - self.corners_B[i])) / self.lengths_m[i]
-        })
+        };
+        [from_edge_m(0), from_edge_m(1), from_edge_m(2)]
     }
 
     /// From a corner, along its plane.
