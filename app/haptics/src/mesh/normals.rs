@@ -140,7 +140,7 @@ impl VertexNormals {
                     let Side { face, is_back } = sector.facet.side;
                     corners[face as usize][sector.corner] = CornerNormal::new(place, is_back);
                     is_done[face as usize][sector.corner] = true;
-                    sum += sector.facet.normal_B * angles(mesh, sector.facet.face)[sector.corner];
+                    sum += sector.facet.normal_B * angle_at(mesh, &sector);
                 });
                 normals[place] = sum;
             }
@@ -237,6 +237,14 @@ fn angles(mesh: &Mesh, face: &Face) -> [f64; 3] {
     let at_a = doubled_area_m2.atan2(-ab_B.dot(&ca_B));
     let at_b = doubled_area_m2.atan2(-bc_B.dot(&ab_B));
     [at_a, at_b, (std::f64::consts::PI - at_a - at_b).max(0.0)]
+}
+
+/// The angle of a face at one of them (rad).
+fn angle_at(mesh: &Mesh, sector: &Sector<'_>) -> f64 {
+    let at_B = |corner: usize| mesh.vertices[sector.facet.face.vertices[corner] as usize];
+    let tip_B = at_B(sector.corner);
+    let (one_B, other_B) = (at_B(next(sector.corner)) - tip_B, at_B(previous(sector.corner)) - tip_B);
+    one_B.cross(&other_B).norm().atan2(one_B.dot(&other_B))
 }
 
 /// Sums of normals shorter than this, in radians of a face's angle, are rounding.
