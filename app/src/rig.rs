@@ -256,10 +256,11 @@ impl Rig {
         let shape = material::shape(&spec.shape, &self.models).map_err(unfit)?;
         let friction = material::friction(&spec.friction).map_err(unfit)?;
         let algorithm = material::algorithm(spec.algorithm).map_err(unfit)?;
+        let shading = material::shading(spec.shading, &spec.shape, &self.models).map_err(unfit)?;
         Entity::new(shape, spec.pose, spec.stiffness_n_per_m)
             .and_then(|entity| entity.with_damping(spec.damping_n_s_per_m))
             .and_then(|entity| entity.with_friction(friction))
-            .map(|entity| entity.with_algorithm(algorithm))
+            .map(|entity| entity.with_algorithm(algorithm).with_shading(shading))
             .map_err(refused)
     }
 

@@ -88,7 +88,7 @@ pub use height_map::HeightMap;
 pub use hip::Hip;
 pub use plane::Plane;
 pub use scaled::Scaled;
-pub use shading::Shading;
+pub use shading::{BoxRegions, Regions, Shading, ShadingForm};
 pub use shape::{Form, OwnSurface, Shape};
 pub use shared::Shared;
 pub use slide::MAX_SLIDE_ROUNDS;

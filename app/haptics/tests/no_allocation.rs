@@ -8,7 +8,7 @@ mod solids;
 use common::*;
 use haptics::mesh::{Mesh, make};
 use haptics::passivity::{Passivity, PassivitySpec, Port};
-use haptics::{Finger, Friction};
+use haptics::{Finger, Friction, Shading};
 use nalgebra::Vector3;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -60,6 +60,33 @@ fn a_step_on_a_mesh_never_allocates() {
     }
     assert_eq!(CALLS.get() - before, 0);
     assert!(free > 1000 && stuck > 1000 && slid > 1000, "{free} {stuck} {slid}");
+}
+
+#[test]
+fn shading_never_allocates() {
+    let bumpy = std::sync::Arc::new(Mesh::build(make::bumpy_sphere(50, 26, 0.02)).unwrap().0);
+    let cuboid = haptics::Cuboid::new([0.03; 3]).unwrap();
+    let form = haptics::ShadingForm::Rotate;
+    let shadings = [
+        Shading::interpolated(&bumpy, 0.3, form).unwrap(),
+        Shading::interpolated(&bumpy, 3.0, haptics::ShadingForm::Bisect).unwrap(),
+        Shading::regions(&bumpy, 1e-3, 3.0, form).unwrap(),
+    ];
+    let shaded = shadings.map(|shading| entity(bumpy.clone(), stiction()).with_shading(shading));
+    let of_box = Shading::box_regions(&cuboid, 1e-3, form).unwrap();
+    let entities: Vec<_> =
+        shaded.into_iter().chain([entity(cuboid, stiction()).with_shading(of_box)]).collect();
+    let mut finger = Finger::new(0.0, entities.len()).unwrap();
+    let (mut noise, mut touched) = (Noise(11), 0);
+    let before = CALLS.get();
+    for i in 0..50_000 {
+        let t = f64::from(i) * DT;
+        let hip = Vector3::new(0.025 * (2.0 * t).sin(), 0.025 * (3.0 * t).cos(), 0.01 * t.sin());
+        finger.step(&entities, &(hip + noise.vector(1e-5)), DT);
+        touched += finger.contacts().count();
+    }
+    assert_eq!(CALLS.get() - before, 0);
+    assert!(touched > 10_000, "{touched}");
 }
 
 #[test]

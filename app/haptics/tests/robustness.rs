@@ -4,10 +4,12 @@
 mod common;
 
 use common::laws::{any_friction, largest_ratio};
+use common::meshes::{bumpy_sphere, touchable};
 use common::*;
 use haptics::{
     Capsule, Cone, ConeInput, ContactState, Cuboid, Cylinder, Ellipsoid, Entity, Finger, Form, Friction,
-    FrictionCone, FrictionState, MAX_SLIDE_ROUNDS, Plane, Scaled, Sphere, Surface, Torus,
+    FrictionCone, FrictionState, MAX_SLIDE_ROUNDS, Plane, Scaled, Shading, ShadingForm, Sphere, Surface,
+    Torus,
 };
 use nalgebra::{Isometry3, Vector3};
 use proptest::prelude::*;
@@ -104,6 +106,48 @@ proptest! {
             prop_assert!(out.force_on_user_W.iter().all(|x| x.is_finite()), "{out:?}");
             prop_assert!(out.god_object_W.iter().all(|x| x.is_finite()), "{out:?}");
             entity.move_to(Isometry3::translation(shift[0], shift[1], shift[2]));
+        }
+    }
+}
+
+#[test]
+fn shaded_forces_stay_finite_and_as_large_as_they_were_for_every_input() {
+    let mesh = bumpy_sphere(16);
+    let cuboid = Cuboid::new([0.1; 3]).unwrap();
+    let odd = [0.0, -0.0, 5e-324, 1e-160, 1e-9, 0.05, 0.0999, 0.1, f64::INFINITY, f64::NAN];
+    let (rotate, bisect) = (ShadingForm::Rotate, ShadingForm::Bisect);
+    for (form, largest) in
+        [(rotate, 1e9), (bisect, 1e9), (rotate, 1e154), (bisect, 1e154), (rotate, f64::MAX)]
+    {
+        let plain = [touchable(&mesh, stiction()), entity(cuboid, stiction())];
+        let shaded = [
+            plain[0].clone().with_shading(Shading::interpolated(&mesh, 1.0, form).unwrap()),
+            plain[0].clone().with_shading(Shading::regions(&mesh, 1e-3, 3.0, form).unwrap()),
+            plain[1].clone().with_shading(Shading::box_regions(&cuboid, 1e-2, form).unwrap()),
+        ];
+        for (shaded, plain) in shaded.into_iter().zip([&plain[0], &plain[0], &plain[1]]) {
+            let (mut noise, mut fingers) = (Noise(12), [point_finger(), point_finger()]);
+            let mut touched = 0;
+            for i in 0..20_000 {
+                let pick = |noise: &mut Noise| {
+                    let pick = (noise.uniform() * (odd.len() + 1) as f64) as usize;
+                    odd.get(pick).copied().unwrap_or(largest)
+                };
+                let hip =
+                    if i % 4 == 0 { Vector3::from_fn(|_, _| pick(&mut noise)) } else { noise.vector(0.05) };
+                let felt = fingers[0].step(std::slice::from_ref(&shaded), &hip, DT).force_on_user_W;
+                let before = fingers[1].step(std::slice::from_ref(plain), &hip, DT).force_on_user_W;
+                assert!(felt.iter().all(|x| x.is_finite()), "{felt:?} at {hip:?}");
+                // Beyond that squares overflow, and contacts that have no finite force end.
+                if largest < 1e100 {
+                    assert!(
+                        (felt.norm() - before.norm()).abs() <= 1e-14 * before.norm(),
+                        "{felt:?} {before:?}"
+                    );
+                }
+                touched += u32::from(felt != Vector3::zeros());
+            }
+            assert!(touched > 2000, "{touched}");
         }
     }
 }

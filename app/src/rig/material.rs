@@ -1,13 +1,15 @@
-//! From what a scene says of an entity to what rendering takes: shape, friction, algorithm.
+//! From what a scene says of an entity to what rendering takes: shape, friction, algorithm, shading.
 
 use super::models::Models;
+use haptics::mesh::Mesh;
 use haptics::passivity::{Passivity, PassivitySpec};
 use haptics::{
     Algorithm, Capsule, Cone, Cuboid, Cylinder, Ellipsoid, Form, Friction, ParameterError, Plane, Scaled,
-    Shape, Sphere, Torus,
+    Shading, ShadingForm, Shape, Sphere, Torus,
 };
+use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
-use world::{AlgorithmSpec, FrictionSpec, ShapeSpec};
+use world::{AlgorithmSpec, FrictionSpec, ShadingFormSpec, ShadingSpec, ShapeSpec};
 
 /// Why something has no counterpart in rendering.
 pub(super) enum Unfit {
@@ -112,5 +114,43 @@ pub(super) fn algorithm(spec: AlgorithmSpec) -> Result<Algorithm, Unfit> {
         AlgorithmSpec::VectorField => Ok(Algorithm::VectorField),
         AlgorithmSpec::ClassicGodObject => Ok(Algorithm::ClassicGodObject),
         other => Err(Unfit::NotAvailable(format!("algorithm {other:?}"))),
+    }
+}
+
+/// How its facets feel; meshes are shaded when they are loaded.
+pub(super) fn shading(spec: ShadingSpec, shape: &ShapeSpec, models: &Models) -> Result<Shading, Unfit> {
+    let not_available = || Unfit::NotAvailable(format!("shading {spec:?} of a {}", shape.kind()));
+    match (spec, shape) {
+        (ShadingSpec::None, _) => Ok(Shading::None),
+        (_, ShapeSpec::Mesh(mesh)) => models.shading(mesh, spec).cloned().ok_or_else(not_available),
+        (ShadingSpec::Regions { length_m, crease_angle_deg, form }, ShapeSpec::Box { size_m }) => {
+            // All its edges are as sharp.
+            if crease_angle_deg.to_radians() < FRAC_PI_2 {
+                return Ok(Shading::None);
+            }
+            Ok(Shading::box_regions(&Cuboid::new(*size_m)?, length_m, shading_form(form))?)
+        }
+        _ => Err(not_available()),
+    }
+}
+
+/// That of a mesh.
+pub(super) fn mesh_shading(spec: ShadingSpec, mesh: &Mesh) -> Result<Shading, Unfit> {
+    Ok(match spec {
+        ShadingSpec::None => Shading::None,
+        ShadingSpec::Interpolated { crease_angle_deg, form } => {
+            Shading::interpolated(mesh, crease_angle_deg.to_radians(), shading_form(form))?
+        }
+        ShadingSpec::Regions { length_m, crease_angle_deg, form } => {
+            Shading::regions(mesh, length_m, crease_angle_deg.to_radians(), shading_form(form))?
+        }
+        other => return Err(Unfit::NotAvailable(format!("shading {other:?}"))),
+    })
+}
+
+fn shading_form(spec: ShadingFormSpec) -> ShadingForm {
+    match spec {
+        ShadingFormSpec::Bisect => ShadingForm::Bisect,
+        _ => ShadingForm::Rotate,
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! What was repaired is told once, what cannot be used is refused with the place in the scene and in the model.
 
-use super::RigError;
+use super::{RigError, material};
+use haptics::Shading;
 use haptics::mesh::{Finding, Mesh, MeshError, MeshReport, TriangleSoup};
 use io_driver::say::say;
 use nalgebra::Vector3;
@@ -11,7 +12,7 @@ use std::collections::btree_map::Entry;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use world::model::{self, Format, ModelError};
-use world::{MeshSpec, Scene, ShapeSpec};
+use world::{MeshSpec, Scene, ShadingSpec, ShapeSpec};
 
 /// From this size on it takes so long that somebody wonders: a third of a million triangles.
 const WORTH_A_LINE_BYTES: usize = 16 << 20;
@@ -20,6 +21,7 @@ const WORTH_A_LINE_BYTES: usize = 16 << 20;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Models {
     meshes: BTreeMap<Key, Arc<Mesh>>,
+    shadings: Vec<(Key, ShadingSpec, Shading)>,
 }
 
 /// A file, and the bits of the factors along its axes.
@@ -34,8 +36,27 @@ impl Models {
             if let Entry::Vacant(place) = models.meshes.entry(key_of(spec)) {
                 place.insert(Arc::new(build(spec)?));
             }
+            models.shade(spec, entity.shading);
         }
         Ok(models)
+    }
+
+    /// Shades a mesh, once for all entities that are shaded alike.
+    fn shade(&mut self, spec: &MeshSpec, shading: ShadingSpec) {
+        if shading == ShadingSpec::None || self.shading(spec, shading).is_some() {
+            return;
+        }
+        let mesh = &self.meshes[&key_of(spec)];
+        // What the reader of scenes let through is not refused; if it were, the entity would not be available.
+        if let Ok(made) = material::mesh_shading(shading, mesh) {
+            self.shadings.push((key_of(spec), shading, made));
+        }
+    }
+
+    /// The shading of a mesh that was loaded.
+    pub(super) fn shading(&self, spec: &MeshSpec, shading: ShadingSpec) -> Option<&Shading> {
+        let key = key_of(spec);
+        self.shadings.iter().find(|(of, by, _)| *of == key && *by == shading).map(|(.., made)| made)
     }
 
     /// A mesh that was loaded.

@@ -7,6 +7,7 @@ use crate::friction::FrictionSpec;
 use crate::names::Names;
 use crate::pose::read_pose;
 use crate::reader::{Bound, Table};
+use crate::shading::ShadingSpec;
 use crate::shape::ShapeSpec;
 use crate::vocabulary::Vocabulary;
 
@@ -29,6 +30,8 @@ pub struct SceneEntity {
     pub friction: FrictionSpec,
     /// Default the Friction Cone Algorithm.
     pub algorithm: AlgorithmSpec,
+    /// Default none.
+    pub shading: ShadingSpec,
 }
 
 /// What works out the force of contacts with an entity.
@@ -53,15 +56,18 @@ impl SceneEntity {
     pub(crate) fn read(table: &Table<'_>, i: usize, names: &mut Names) -> Result<Self, SceneError> {
         table.check_keys(&KEYS)?;
         let stiffness_default = Self::DEFAULT_STIFFNESS_N_PER_M;
+        let name = names.claim(table, format!("e{i}"))?;
+        let shape = ShapeSpec::read(table)?;
         Ok(Self {
-            name: names.claim(table, format!("e{i}"))?,
+            name,
             line: table.document().line(table.offset()),
-            shape: ShapeSpec::read(table)?,
             pose: read_pose(table)?,
             stiffness_n_per_m: table.number_or("stiffness_n_per_m", Bound::Positive, stiffness_default)?,
             damping_n_s_per_m: table.number_or("damping_n_s_per_m", Bound::NotNegative, 0.0)?,
             friction: FrictionSpec::read(table)?,
             algorithm: AlgorithmSpec::read(table)?,
+            shading: ShadingSpec::read(table, &shape)?,
+            shape,
         })
     }
 }
@@ -90,6 +96,7 @@ const KEYS: Vocabulary = Vocabulary {
         "damping_n_s_per_m",
         "friction",
         "algorithm",
+        "shading",
     ],
     later: &[
         "velocity_m_s",

@@ -45,6 +45,7 @@ mod placement;
 mod pose;
 mod reader;
 mod scene;
+mod shading;
 mod shape;
 mod source;
 mod vocabulary;
@@ -58,6 +59,7 @@ pub use names::MAX_NAME_BYTES;
 pub use passivity::PassivitySpec;
 pub use placement::{Affine, LEAST_STRETCH, MOST_STRETCH, Placement};
 pub use scene::Scene;
+pub use shading::{ShadingFormSpec, ShadingSpec};
 pub use shape::{MeshSpec, ShapeSpec};
 pub use source::MAX_FILE_BYTES;
 
