@@ -39,6 +39,7 @@ mod convex;
 mod csg;
 mod cuboid;
 mod cylinder;
+mod effects;
 mod ellipsoid;
 mod entity;
 mod error;
@@ -73,6 +74,10 @@ pub use contact::{Contact, RAMP_IN_S};
 pub use csg::Csg;
 pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
+pub use effects::{
+    Effects, Field, FieldKind, FingerEffects, Guide, HYSTERESIS_M, Limits, MAX_PATH_POINTS, MOST_FORCE_N, Magnetism,
+    Moment, Region, Track, Vibration,
+};
 pub use ellipsoid::{Ellipsoid, LARGEST_RATIO};
 pub use entity::Entity;
 pub use error::ParameterError;
