@@ -2,7 +2,8 @@
 //!
 //! Model: each finger's HIP is taken into the world, steps against the entities, and its force goes back
 //! into its device's base frame. Damping goes by the driver's estimate of the HIP's velocity; a driver of before
-//! 1.1 gives none, and then by the difference of its positions. The same step serves all three clocks.
+//! 1.1 gives none, and then by the difference of its positions. What is felt beside contacts (fields, guides, magnets,
+//! vibration) is added to their force. The same step serves all three clocks.
 //!
 //! Frames and signs: forces are forces on the user.
 //! Invariants: no allocation, clock, lock or panic; the command answers the frame's tick; a device whose
@@ -13,7 +14,7 @@
 
 use crate::mount::Mount;
 use crate::row::{FingerRow, Row};
-use haptics::{Entity, Finger, Hip, RAMP_IN_S};
+use haptics::{Effects, Entity, Field, Finger, FingerEffects, Guide, Hip, Moment, RAMP_IN_S};
 use nalgebra::Vector3;
 use shm_abi::frame::DEVICE_POSITION_VALID;
 use shm_abi::{Command, DeviceFrame, Frame};
@@ -35,6 +36,9 @@ pub struct DeviceFinger {
 pub struct FastStep {
     fingers: Vec<DeviceFinger>,
     entities: Vec<Entity>,
+    effects: Effects,
+    /// Of each finger.
+    finger_effects: Vec<FingerEffects>,
     period_s: f64,
     last_tick: Option<u64>,
     driver_estimates: bool,
@@ -52,7 +56,26 @@ impl FastStep {
     pub fn new(fingers: Vec<DeviceFinger>, entities: Vec<Entity>, period_ns: u64) -> Self {
         let (tips_D, carried_W) = (vec![None; fingers.len()], vec![Vector3::zeros(); fingers.len()]);
         let period_s = period_ns as f64 / 1e9;
-        Self { fingers, entities, period_s, last_tick: None, driver_estimates: false, tips_D, carried_W }
+        Self {
+            fingers,
+            entities,
+            effects: Effects::default(),
+            finger_effects: Vec::new(),
+            period_s,
+            last_tick: None,
+            driver_estimates: false,
+            tips_D,
+            carried_W,
+        }
+        .with_effects(Vec::new(), Vec::new())
+    }
+
+    /// With these fields and guides beside the entities, and what the entities' surfaces do.
+    #[must_use]
+    pub fn with_effects(mut self, fields: Vec<Field>, guides: Vec<Guide>) -> Self {
+        self.effects = Effects::new(fields, guides, &self.entities);
+        self.finger_effects = vec![FingerEffects::new(&self.effects); self.fingers.len()];
+        self
     }
 
     /// Which minor version of the contract the driver speaks, and over how many ticks it lets forces come on.
@@ -67,6 +90,9 @@ impl FastStep {
             // No product of an integer and a period is out of range.
             let _ = finger.finger.set_ramp_in(ramp_in_s);
         }
+        for felt in &mut self.finger_effects {
+            let _ = felt.set_ramp_in(ramp_in_s);
+        }
     }
 
     /// Renders a frame into the command that answers it, and into a row.
@@ -77,14 +103,22 @@ impl FastStep {
         let dt_s = ticks as f64 * self.period_s;
         row.run_tick = frame.run_tick.max(0).unsigned_abs();
         let devices = frame.present_devices();
-        let known = self.tips_D.iter_mut().zip(&mut self.carried_W);
-        for ((finger, row), (tip_D, carried_W)) in self.fingers.iter_mut().zip(&mut row.fingers).zip(known) {
+        let moment = Moment { t_s: row.run_tick as f64 * self.period_s, dt_s };
+        let known = self.tips_D.iter_mut().zip(&mut self.carried_W).zip(&mut self.finger_effects);
+        for ((finger, row), ((tip_D, carried_W), felt)) in
+            self.fingers.iter_mut().zip(&mut row.fingers).zip(known)
+        {
             let Some(device) = devices.get(finger.device) else { continue };
             let is_valid = device.flags & DEVICE_POSITION_VALID != 0;
             *tip_D = is_valid.then_some(device.position_m_measured);
             let carried_W = std::mem::take(carried_W) / dt_s;
             let velocity_W = self.driver_estimates.then(|| finger.velocity_W(device, carried_W));
             *row = finger.step(device, &self.entities, dt_s, velocity_W);
+            if !self.effects.is_empty() {
+                let hip = is_valid.then_some(Hip { position_W: row.hip, velocity_W });
+                let beside_W = finger.feel(felt, &self.effects, &self.entities, hip, moment);
+                row.force_on_user = finite_or_zero(row.force_on_user + beside_W);
+            }
             command.devices[finger.device].force_on_user_n = finger.mount.force_to_device(row.force_on_user);
         }
     }
@@ -122,12 +156,13 @@ impl FastStep {
         if touches && !is_near {
             return false;
         }
-        for ((finger, tip_D), carried_W) in self.fingers.iter_mut().zip(&self.tips_D).zip(&mut self.carried_W)
-        {
+        let known = self.tips_D.iter().zip(&mut self.carried_W).zip(&mut self.finger_effects);
+        for (finger, ((tip_D, carried_W), felt)) in self.fingers.iter_mut().zip(known) {
             *carried_W += carried(finger, tip_D);
             finger.mount = mount_of(finger);
             if !is_near {
                 finger.finger.reset();
+                felt.reset();
             }
         }
         true
@@ -141,6 +176,7 @@ impl FastStep {
         for finger in &mut self.fingers {
             finger.finger.reset();
         }
+        self.finger_effects.iter_mut().for_each(FingerEffects::reset);
     }
 }
 
@@ -183,6 +219,26 @@ impl DeviceFinger {
             feature: output.feature,
             friction: output.friction,
             ..seen
+        }
+    }
+}
+
+impl DeviceFinger {
+    /// The force of what is felt beside contacts (N); nothing without a `hip`.
+    fn feel(
+        &self,
+        felt: &mut FingerEffects,
+        effects: &Effects,
+        entities: &[Entity],
+        hip: Option<Hip>,
+        moment: Moment,
+    ) -> Vector3<f64> {
+        match hip {
+            Some(hip) => felt.step(effects, entities, &self.finger, hip, moment),
+            None => {
+                felt.reset();
+                Vector3::zeros()
+            }
         }
     }
 }

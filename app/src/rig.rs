@@ -1,6 +1,7 @@
 //! From files and arguments to everything a run needs: whatever can be wrong with the input is found here,
 //! before anything is started.
 
+mod effects;
 mod error;
 mod material;
 mod models;
@@ -174,7 +175,8 @@ impl Rig {
             Ok(DeviceFinger { finger: made, device: finger.device, mount })
         });
         let fingers: Vec<DeviceFinger> = fingers.collect::<Result<_, RigError>>()?;
-        Ok(FastStep::new(fingers, entities, self.period_ns))
+        let (fields, guides) = self.effects()?;
+        Ok(FastStep::new(fingers, entities, self.period_ns).with_effects(fields, guides))
     }
 
     /// What the recording's columns are called, for devices that tell so much.
@@ -247,11 +249,12 @@ impl Rig {
         let shape = material::shape(&spec.shape, &self.models).map_err(unfit)?;
         let friction = material::friction(&spec.friction).map_err(unfit)?;
         let algorithm = material::algorithm(spec.algorithm).map_err(unfit)?;
-        Entity::new(shape, spec.pose, spec.stiffness_n_per_m)
+        let entity = Entity::new(shape, spec.pose, spec.stiffness_n_per_m)
             .and_then(|entity| entity.with_damping(spec.damping_n_s_per_m))
             .and_then(|entity| entity.with_friction(friction))
             .map(|entity| entity.with_algorithm(algorithm))
-            .map_err(refused)
+            .map_err(refused)?;
+        self.with_surface_effects(entity, spec)
     }
 
     /// A finger would pass through what it cannot feel, without a word.

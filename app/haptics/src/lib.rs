@@ -52,6 +52,7 @@ mod frustum;
 mod grip;
 mod height_map;
 mod hip;
+mod material;
 pub mod mesh;
 mod plane;
 mod quartic;
@@ -75,8 +76,8 @@ pub use csg::Csg;
 pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
 pub use effects::{
-    Effects, Field, FieldKind, FingerEffects, Guide, HYSTERESIS_M, Limits, MAX_PATH_POINTS, MOST_FORCE_N, Magnetism,
-    Moment, Region, Track, Vibration,
+    Effects, Field, FieldKind, FingerEffects, Guide, HYSTERESIS_M, Limits, MAX_PATH_POINTS, MOST_FORCE_N,
+    Magnetism, Moment, Region, Track, Vibration,
 };
 pub use ellipsoid::{Ellipsoid, LARGEST_RATIO};
 pub use entity::Entity;
@@ -90,6 +91,7 @@ pub use friction_cone::{ConeForce, ConeInput, FrictionCone};
 pub use friction_law::{FrictionLaw, FrictionMemory, FrictionQuery, FrictionState, MEMORY_WORDS};
 pub use height_map::HeightMap;
 pub use hip::Hip;
+pub use material::Material;
 pub use plane::Plane;
 pub use scaled::Scaled;
 pub use shading::Shading;

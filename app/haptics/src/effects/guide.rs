@@ -71,8 +71,7 @@ impl Guide {
     /// Errors: a force that is not positive, not finite, or above [`MOST_FORCE_N`].
     pub fn with_force_limit(self, force_limit_n: f64) -> Result<Self, ParameterError> {
         let value = above_zero("force_limit_n", force_limit_n)?;
-        let force_limit_n =
-            not_above("force_limit_n", value, MOST_FORCE_N, "the most that any guide pulls")?;
+        let force_limit_n = not_above("force_limit_n", value, MOST_FORCE_N, "the most that any guide pulls")?;
         Ok(Self { force_limit_n, ..self })
     }
 
@@ -156,5 +155,4 @@ const CAPTURE_S: f64 = 0.05;
 /// How long letting go takes \[s\].
 const LET_GO_S: f64 = 0.02;
 
-const OF_CAPTURE: &str =
-    "0.2 mm below where it lets go, deadband_m + break_away_n / stiffness_n_per_m: it would be captured anew at once";
+const OF_CAPTURE: &str = "0.2 mm below where it lets go, deadband_m + break_away_n / stiffness_n_per_m: it would be captured anew at once";

@@ -73,11 +73,7 @@ impl Limits {
         not_above(parameter, value, self.damping_n_s_per_m(), OF_DAMPING)
     }
 
-    pub(super) fn check_stiffness(
-        &self,
-        parameter: &'static str,
-        value: f64,
-    ) -> Result<f64, ParameterError> {
+    pub(super) fn check_stiffness(&self, parameter: &'static str, value: f64) -> Result<f64, ParameterError> {
         not_above(parameter, at_least_zero(parameter, value)?, self.stiffness_n_per_m(), OF_STIFFNESS)
     }
 

@@ -95,9 +95,7 @@ fn nearest(shape: &Shape, point_B: &Vector3<f64>, within_m: f64) -> Option<Vecto
     }
     match shape {
         // Of both measures of distance only this sign is exact.
-        Shape::Form(form) => {
-            (form.signed_distance(point_B) > 0.0).then(|| form.nearest(point_B).point_B)
-        }
+        Shape::Form(form) => (form.signed_distance(point_B) > 0.0).then(|| form.nearest(point_B).point_B),
         Shape::Mesh(mesh) => {
             (mesh.clearance(point_B, within_m) < within_m).then(|| mesh.nearest(point_B).point_B)
         }

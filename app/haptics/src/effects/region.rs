@@ -38,11 +38,7 @@ impl Region {
     /// What is inside a form at this pose; within `rim_m` of its surface it fades.
     ///
     /// Errors: a rim that is not finite or not positive.
-    pub fn within(
-        form: impl Into<Form>,
-        X_WB: Isometry3<f64>,
-        rim_m: f64,
-    ) -> Result<Self, ParameterError> {
+    pub fn within(form: impl Into<Form>, X_WB: Isometry3<f64>, rim_m: f64) -> Result<Self, ParameterError> {
         Ok(Self { form: Some(form.into()), X_WB, rim_m: above_zero("rim_m", rim_m)? })
     }
 
