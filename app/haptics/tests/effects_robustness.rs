@@ -75,8 +75,8 @@ fn effects_never_allocate() {
     let before = CALLS.get();
     for i in 0..50_000 {
         let t = f64::from(i) * DT;
-        let hip =
-            Vector3::new(0.03 * (2.0 * t).sin(), 0.03 * (3.0 * t).cos(), 0.002 * t.sin()) + noise.vector(1e-5);
+        let hip = Vector3::new(0.03 * (2.0 * t).sin(), 0.03 * (3.0 * t).cos(), 0.002 * t.sin())
+            + noise.vector(1e-5);
         let (contact, beside) = felt.both(&hip);
         captured += u32::from(felt.state.is_captured(0));
         hummed += u32::from(contact != Vector3::zeros() && beside != Vector3::zeros());
