@@ -249,6 +249,9 @@ fn finite_or_zero(force: Vector3<f64>) -> Vector3<f64> {
 }
 
 #[cfg(test)]
+mod beside;
+
+#[cfg(test)]
 mod damped {
     use super::*;
     use bytemuck::Zeroable;

@@ -294,3 +294,25 @@ fn the_strongest_damper_is_calm_in_a_simulated_hand_on_a_simulated_arm() {
     // goes up to its bound of 10 N, or to what the motors have.
     assert!(swing < 0.25, "{swing} N of {stroke} N");
 }
+
+#[test]
+fn the_committed_scene_has_one_of_each_effect_and_each_is_felt() {
+    let config = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../config");
+    let read = |file: &str| std::fs::read_to_string(config.join(file)).expect("a file");
+    let scene = read("scenes/effects.toml").replace("../hands/effects.csv", "hand.csv");
+    let samples = felt(&scene, &read("hands/effects.csv"), &[]);
+    let beside = |s: &Sample| s.force + Vector3::y() * 0.2;
+    let any = |from: f64, to: f64, is: &dyn Fn(&Sample) -> bool| {
+        samples.iter().any(|s| (from..to).contains(&s.t) && is(s))
+    };
+    assert!(any(0.3, 1.0, &|s| beside(s).x < -0.4), "water: 3 N s/m at 0.15 m/s");
+    assert!(any(1.9, 2.1, &|s| s.entity.is_empty() && beside(s).norm() < 1e-9), "air");
+    assert!(any(2.5, 4.0, &|s| s.entity.is_empty() && beside(s).y < -0.99), "the magnet's pull");
+    let touching: Vec<f64> =
+        samples.iter().filter(|s| (4.1..4.9).contains(&s.t)).map(|s| beside(s).y).collect();
+    let [low, high] = [f64::min, f64::max].map(|of| touching.iter().copied().reduce(of).expect("rows"));
+    // 3 N and 0.3 N of vibration on either side.
+    assert!((low - 2.7).abs() < 0.01 && (high - 3.3).abs() < 0.01, "{low} {high}");
+    assert!(any(7.0, 8.0, &|s| beside(s).y < -2.4), "the rail holds up to 2.5 N");
+    assert!(any(7.9, 8.0, &|s| beside(s).norm() < 1e-9), "and then lets go");
+}

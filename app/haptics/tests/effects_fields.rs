@@ -197,7 +197,8 @@ fn ticks_that_were_missed_do_not_shake_a_mass() {
     let mut fifth = alone(Field::inertial(0.2, 10.0, Region::everywhere(), &limits()).unwrap());
     let mut noise = Noise(2);
     let (mut at, mut v) = (Vector3::zeros(), Vector3::zeros());
-    (every.beside(&at), fifth.beside(&at));
+    every.beside(&at);
+    fifth.beside(&at);
     for round in 0..200 {
         v += noise.vector(0.05);
         let mut force = Vector3::zeros();

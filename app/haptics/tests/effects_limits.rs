@@ -10,6 +10,7 @@ use effects::{Felt, limits, moving};
 use haptics::{Field, Guide, Limits, MOST_FORCE_N, Magnetism, ParameterError, Region, Track, Vibration};
 use nalgebra::Vector3;
 use std::collections::VecDeque;
+use std::f64::consts::FRAC_1_PI;
 
 fn limit_named_in(error: ParameterError, parameter: &str, limit: f64) {
     let said = error.to_string();
@@ -23,7 +24,7 @@ fn limits_are_what_their_formulas_say() {
     // pi/4 0.03 kg / 4 ms; 3 N s/m / 3 ms; 0.03 kg / (2 pi 10 Hz 1.5 ms); 0.4 / 1 ms.
     assert!((at_1_khz.damping_n_s_per_m() - 5.890_486).abs() < 1e-6);
     assert!((at_1_khz.stiffness_n_per_m() - 1000.0).abs() < 1e-9);
-    assert!((at_1_khz.mass_kg(10.0) - 0.318_310).abs() < 1e-6);
+    assert!((at_1_khz.mass_kg(10.0) - FRAC_1_PI).abs() < 1e-12);
     assert!((at_1_khz.mass_kg(1e6) - 0.015).abs() < 1e-12, "half the device's own");
     assert!((at_1_khz.frequency_hz() - 400.0).abs() < 1e-9);
     let heavy = at_1_khz.with_device_mass(0.3).unwrap();
@@ -118,7 +119,7 @@ fn swing(mut felt: Felt, mass_kg: f64, hand_n_s_per_m: f64, start_m: f64) -> (f6
             speeds.push_back(v);
         }
         let seen = if tick < 200 { &mut first_m_s } else { &mut end_m_s };
-        if tick < 200 || tick >= 1800 {
+        if !(200..1800).contains(&tick) {
             *seen = seen.max(v.abs());
         }
     }
