@@ -2,7 +2,8 @@
 //!
 //! Model: each finger's HIP is taken into the world, steps against the entities, and its force goes back
 //! into its device's base frame. Damping goes by the driver's estimate of the HIP's velocity; a driver of before
-//! 1.1 gives none, and then by the difference of its positions. The same step serves all three clocks.
+//! 1.1 gives none, and then by the difference of its positions. What is felt beside contacts (fields, guides, magnets,
+//! vibration) is added to their force. The same step serves all three clocks.
 //!
 //! Frames and signs: forces are forces on the user.
 //! Invariants: no allocation, clock, lock or panic; the command answers the frame's tick; a device whose
@@ -15,7 +16,7 @@ use crate::mount::Mount;
 use crate::passive_port::{Tick, keep_passive};
 use crate::row::{FingerRow, Row};
 use haptics::passivity::Passivity;
-use haptics::{Entity, Finger, Hip, RAMP_IN_S};
+use haptics::{Effects, Entity, Field, Finger, FingerEffects, Guide, Hip, Moment, RAMP_IN_S};
 use nalgebra::Vector3;
 use shm_abi::frame::DEVICE_POSITION_VALID;
 use shm_abi::{Command, DeviceFrame, Frame};
@@ -37,6 +38,9 @@ pub struct DeviceFinger {
 pub struct FastStep {
     fingers: Vec<DeviceFinger>,
     entities: Vec<Entity>,
+    effects: Effects,
+    /// Of each finger.
+    finger_effects: Vec<FingerEffects>,
     period_s: f64,
     last_tick: Option<u64>,
     driver_estimates: bool,
@@ -60,6 +64,8 @@ impl FastStep {
         Self {
             fingers,
             entities,
+            effects: Effects::default(),
+            finger_effects: Vec::new(),
             period_s,
             last_tick: None,
             driver_estimates: false,
@@ -67,6 +73,15 @@ impl FastStep {
             carried_W,
             passivities,
         }
+        .with_effects(Vec::new(), Vec::new())
+    }
+
+    /// With these fields and guides beside the entities, and what the entities' surfaces do.
+    #[must_use]
+    pub fn with_effects(mut self, fields: Vec<Field>, guides: Vec<Guide>) -> Self {
+        self.effects = Effects::new(fields, guides, &self.entities);
+        self.finger_effects = vec![FingerEffects::new(&self.effects); self.fingers.len()];
+        self
     }
 
     /// With fingers whose forces do not feed energy into the hand, one for each finger; `None`: as rendered.
@@ -90,6 +105,9 @@ impl FastStep {
             // No product of an integer and a period is out of range.
             let _ = finger.finger.set_ramp_in(ramp_in_s);
         }
+        for felt in &mut self.finger_effects {
+            let _ = felt.set_ramp_in(ramp_in_s);
+        }
     }
 
     /// Renders a frame into the command that answers it, and into a row.
@@ -101,8 +119,10 @@ impl FastStep {
         row.run_tick = frame.run_tick.max(0).unsigned_abs();
         let devices = frame.present_devices();
         let tick = Tick::new(frame, &self.entities, dt_s);
-        let known = self.tips_D.iter_mut().zip(&mut self.carried_W).zip(&mut self.passivities);
-        for ((finger, row), ((tip_D, carried_W), passivity)) in
+        let moment = Moment { t_s: row.run_tick as f64 * self.period_s, dt_s };
+        let states = self.finger_effects.iter_mut().zip(&mut self.passivities);
+        let known = self.tips_D.iter_mut().zip(&mut self.carried_W).zip(states);
+        for ((finger, row), ((tip_D, carried_W), (felt, passivity))) in
             self.fingers.iter_mut().zip(&mut row.fingers).zip(known)
         {
             let Some(device) = devices.get(finger.device) else { continue };
@@ -111,6 +131,11 @@ impl FastStep {
             let carried_W = std::mem::take(carried_W);
             let velocity_W = self.driver_estimates.then(|| finger.velocity_W(device, carried_W / dt_s));
             *row = finger.step(device, &self.entities, dt_s, velocity_W);
+            if !self.effects.is_empty() {
+                let hip = is_valid.then_some(Hip { position_W: row.hip, velocity_W });
+                let beside_W = finger.feel(felt, &self.effects, &self.entities, hip, moment);
+                row.force_on_user = finite_or_zero(row.force_on_user + beside_W);
+            }
             if let Some(passivity) = passivity {
                 keep_passive(passivity, finger, device, carried_W, &tick, row);
             }
@@ -151,12 +176,13 @@ impl FastStep {
         if touches && !is_near {
             return false;
         }
-        for ((finger, tip_D), carried_W) in self.fingers.iter_mut().zip(&self.tips_D).zip(&mut self.carried_W)
-        {
+        let known = self.tips_D.iter().zip(&mut self.carried_W).zip(&mut self.finger_effects);
+        for (finger, ((tip_D, carried_W), felt)) in self.fingers.iter_mut().zip(known) {
             *carried_W += carried(finger, tip_D);
             finger.mount = mount_of(finger);
             if !is_near {
                 finger.finger.reset();
+                felt.reset();
             }
         }
         true
@@ -171,6 +197,7 @@ impl FastStep {
             finger.finger.reset();
         }
         self.passivities.iter_mut().flatten().for_each(Passivity::reset);
+        self.finger_effects.iter_mut().for_each(FingerEffects::reset);
     }
 }
 
@@ -217,10 +244,33 @@ impl DeviceFinger {
     }
 }
 
+impl DeviceFinger {
+    /// The force of what is felt beside contacts (N); nothing without a `hip`.
+    fn feel(
+        &self,
+        felt: &mut FingerEffects,
+        effects: &Effects,
+        entities: &[Entity],
+        hip: Option<Hip>,
+        moment: Moment,
+    ) -> Vector3<f64> {
+        match hip {
+            Some(hip) => felt.step(effects, entities, &self.finger, hip, moment),
+            None => {
+                felt.reset();
+                Vector3::zeros()
+            }
+        }
+    }
+}
+
 /// The driver refuses a command that is not finite as a whole; zero for one finger is milder.
 fn finite_or_zero(force: Vector3<f64>) -> Vector3<f64> {
     if force.iter().all(|component| component.is_finite()) { force } else { Vector3::zeros() }
 }
+
+#[cfg(test)]
+mod beside;
 
 #[cfg(test)]
 mod damped {

@@ -1,6 +1,7 @@
 //! From files and arguments to everything a run needs: whatever can be wrong with the input is found here,
 //! before anything is started.
 
+mod effects;
 mod error;
 mod material;
 mod models;
@@ -182,7 +183,9 @@ impl Rig {
             material::passivity(spec, self.period_ns as f64 / 1e9).map(Some).map_err(refused)
         });
         let passivities: Vec<Option<Passivity>> = passivities.collect::<Result<_, RigError>>()?;
-        Ok(FastStep::new(fingers, entities, self.period_ns).with_passivities(passivities))
+        let (fields, guides) = self.effects()?;
+        let step = FastStep::new(fingers, entities, self.period_ns);
+        Ok(step.with_effects(fields, guides).with_passivities(passivities))
     }
 
     /// What the recording's columns are called, for devices that tell so much.
@@ -257,11 +260,12 @@ impl Rig {
         let friction = material::friction(&spec.friction).map_err(unfit)?;
         let algorithm = material::algorithm(spec.algorithm).map_err(unfit)?;
         let shading = material::shading(spec.shading, &spec.shape, &self.models).map_err(unfit)?;
-        Entity::new(shape, spec.pose, spec.stiffness_n_per_m)
+        let entity = Entity::new(shape, spec.pose, spec.stiffness_n_per_m)
             .and_then(|entity| entity.with_damping(spec.damping_n_s_per_m))
             .and_then(|entity| entity.with_friction(friction))
             .map(|entity| entity.with_algorithm(algorithm).with_shading(shading))
-            .map_err(refused)
+            .map_err(refused)?;
+        self.with_surface_effects(entity, spec)
     }
 
     /// A finger would pass through what it cannot feel, without a word.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::Isometry3;
 
 use crate::algorithm::Algorithm;
+use crate::effects::{Magnetism, Vibration};
 use crate::error::{ParameterError, above_zero, at_least_zero};
 use crate::friction::Friction;
 use crate::height_map::HeightMap;
@@ -34,6 +35,10 @@ pub struct Entity {
     pub shading: Shading,
     /// What stands out of its surface.
     pub height_map: Option<Shared<HeightMap>>,
+    /// How it attracts fingers that are near.
+    pub magnetism: Option<Magnetism>,
+    /// How it hums while it is touched.
+    pub vibration: Option<Vibration>,
 }
 
 impl Entity {
@@ -55,6 +60,8 @@ impl Entity {
             algorithm: Algorithm::FrictionCone,
             shading: Shading::None,
             height_map: None,
+            magnetism: None,
+            vibration: None,
         })
     }
 
@@ -82,6 +89,16 @@ impl Entity {
     /// With these heights on its surface.
     pub fn with_height_map(self, height_map: Arc<HeightMap>) -> Self {
         Self { height_map: Some(height_map.into()), ..self }
+    }
+
+    /// With a surface that attracts; of shapes that [`Magnetism::suits`].
+    pub fn with_magnetism(self, magnetism: Magnetism) -> Self {
+        Self { magnetism: Some(magnetism), ..self }
+    }
+
+    /// With a surface that hums.
+    pub fn with_vibration(self, vibration: Vibration) -> Self {
+        Self { vibration: Some(vibration), ..self }
     }
 
     /// One tick on: the current pose becomes the previous one.

@@ -39,6 +39,7 @@ mod convex;
 mod csg;
 mod cuboid;
 mod cylinder;
+mod effects;
 mod ellipsoid;
 mod entity;
 mod error;
@@ -51,6 +52,7 @@ mod frustum;
 mod grip;
 mod height_map;
 mod hip;
+mod material;
 pub mod mesh;
 pub mod passivity;
 mod plane;
@@ -74,6 +76,10 @@ pub use contact::{Contact, RAMP_IN_S};
 pub use csg::Csg;
 pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
+pub use effects::{
+    Effects, Field, FieldKind, FingerEffects, Guide, HYSTERESIS_M, Limits, MAX_PATH_POINTS, MOST_FORCE_N,
+    Magnetism, Moment, Region, Track, Vibration,
+};
 pub use ellipsoid::{Ellipsoid, LARGEST_RATIO};
 pub use entity::Entity;
 pub use error::ParameterError;
@@ -86,6 +92,7 @@ pub use friction_cone::{ConeForce, ConeInput, FrictionCone};
 pub use friction_law::{FrictionLaw, FrictionMemory, FrictionQuery, FrictionState, MEMORY_WORDS};
 pub use height_map::HeightMap;
 pub use hip::Hip;
+pub use material::Material;
 pub use plane::Plane;
 pub use scaled::Scaled;
 pub use shading::{BoxRegions, Regions, Shading, ShadingForm};

@@ -53,7 +53,7 @@ pub(super) fn shape(spec: &ShapeSpec, models: &Models) -> Result<Shape, Unfit> {
     }
 }
 
-fn form(spec: &ShapeSpec) -> Result<Form, Unfit> {
+pub(super) fn form(spec: &ShapeSpec) -> Result<Form, Unfit> {
     Ok(match *spec {
         ShapeSpec::Plane { normal, offset_m } => Plane::new(normal.into_inner(), offset_m)?.into(),
         ShapeSpec::Sphere { radius_m } => Sphere::new(radius_m)?.into(),

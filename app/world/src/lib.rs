@@ -33,11 +33,15 @@
 #![deny(missing_docs)]
 
 mod document;
+mod effects;
 mod entity;
 mod error;
+mod field;
 mod finger;
 mod friction;
+mod guide;
 mod layout;
+mod material;
 pub mod model;
 mod names;
 mod passivity;
@@ -50,10 +54,13 @@ mod shape;
 mod source;
 mod vocabulary;
 
+pub use effects::{MagnetismSpec, VibrationSpec};
 pub use entity::{AlgorithmSpec, SceneEntity};
 pub use error::{Location, SceneError};
+pub use field::{FieldKindSpec, FieldSpec, MAX_FIELDS};
 pub use finger::SceneFinger;
 pub use friction::FrictionSpec;
+pub use guide::{GuideSpec, MAX_GUIDES, TrackSpec};
 pub use layout::Layout;
 pub use names::MAX_NAME_BYTES;
 pub use passivity::PassivitySpec;

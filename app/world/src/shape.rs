@@ -104,6 +104,22 @@ impl ShapeSpec {
         }
     }
 
+    /// Whether it has a closed form, so that the depth of a point in it is known without a search.
+    pub fn is_closed_form(&self) -> bool {
+        match self {
+            Self::Plane { .. }
+            | Self::Sphere { .. }
+            | Self::Box { .. }
+            | Self::Cylinder { .. }
+            | Self::Cone { .. }
+            | Self::Torus { .. }
+            | Self::Capsule { .. }
+            | Self::Ellipsoid { .. } => true,
+            Self::Scaled { shape, .. } => shape.is_closed_form(),
+            _ => false,
+        }
+    }
+
     /// Reads the `shape` of an entity.
     pub(crate) fn read(entity: &Table<'_>) -> Result<Self, SceneError> {
         let table = entity.require("shape", EXAMPLE)?.table(EXAMPLE)?;
