@@ -25,7 +25,7 @@ use io_driver::sim::script::HandScript;
 use nalgebra::{Isometry3, Vector3};
 use shm_abi::segment::ClockMode;
 use std::path::{Path, PathBuf};
-use world::{Layout, Scene, SceneEntity, SceneFinger, ShapeSpec};
+use world::{AlgorithmSpec, Layout, Scene, SceneEntity, SceneFinger, ShapeSpec};
 
 /// What a run needs, checked.
 #[derive(Debug, Clone)]
@@ -242,8 +242,12 @@ impl Rig {
         let refused = |source| self.refused(Some(spec.line), what(), source);
         let unfit = |unfit| match unfit {
             Unfit::Refused(source) => refused(source),
+            Unfit::NoSolid(source) => {
+                RigError::NoSolid { file: self.scene_file.clone(), line: spec.line, what: what(), source }
+            }
             Unfit::NotAvailable(it) => self.not_available(format!("{}: {it}", what())),
         };
+        self.check_rendered(spec, what())?;
         let shape = material::shape(&spec.shape, &self.models).map_err(unfit)?;
         let friction = material::friction(&spec.friction).map_err(unfit)?;
         let algorithm = material::algorithm(spec.algorithm).map_err(unfit)?;
@@ -252,6 +256,19 @@ impl Rig {
             .and_then(|entity| entity.with_friction(friction))
             .map(|entity| entity.with_algorithm(algorithm))
             .map_err(refused)
+    }
+
+    /// The algorithms to compare with know surfaces, and trees have none of their own.
+    fn check_rendered(&self, spec: &SceneEntity, what: String) -> Result<(), RigError> {
+        let found = match spec.algorithm {
+            AlgorithmSpec::VectorField => "vector-field",
+            AlgorithmSpec::ClassicGodObject => "classic",
+            _ => return Ok(()),
+        };
+        if !material::is_csg(&spec.shape) {
+            return Ok(());
+        }
+        Err(RigError::NotRendered { file: self.scene_file.clone(), line: spec.line, what, found })
     }
 
     /// A finger would pass through what it cannot feel, without a word.

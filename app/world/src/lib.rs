@@ -32,6 +32,7 @@
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
 
+mod csg;
 mod document;
 mod entity;
 mod error;
@@ -48,6 +49,7 @@ mod shape;
 mod source;
 mod vocabulary;
 
+pub use csg::{CsgChild, CsgOp, CsgSpec};
 pub use entity::{AlgorithmSpec, SceneEntity};
 pub use error::{Location, SceneError};
 pub use finger::SceneFinger;

@@ -85,11 +85,6 @@ impl God {
         (0..super::near::MAX_NEAR).filter(move |index| active >> index & 1 == 1)
     }
 
-    /// The normal of a patch that it is on, to its own side.
-    fn normal(&self, index: usize, look: &Look) -> Vector3<f64> {
-        if self.sides >> index & 1 == 1 { -look.normal_B } else { look.normal_B }
-    }
-
     fn look_around(&mut self, csg: &Csg, wish_m: f64) {
         let near = Neighbourhood::around(csg, &self.point_B, wish_m.max(COMMON * csg.extent_m));
         let active = self.held_by().filter_map(|index| near.position(self.near.number(index)));
