@@ -7,7 +7,7 @@ mod trees;
 
 use common::meshes::Roaming;
 use common::*;
-use haptics::{Finger, Friction};
+use haptics::{Feature, Finger, Friction};
 use nalgebra::Vector3;
 use trees::{Tree, built, touchable};
 
@@ -79,5 +79,64 @@ fn without_friction_the_god_object_is_the_nearest_free_place_around() {
         }
         eprintln!("{name}: {looked} {worst}");
         assert!(looked > 1000, "{name}: {looked}");
+    }
+}
+
+/// Approaches aimed at edges and corners: points where the answer of the expression changes in several directions.
+#[test]
+fn nothing_leaks_at_edges_and_corners() {
+    let mut noise = Noise(13);
+    for Tree { name, tree, contains, size_m } in trees::all() {
+        let entity = touchable(&tree, Friction::None);
+        let csg = built(&tree);
+        // Edges are found by pushing a finger about: wherever a god-object rests on one.
+        let mut places = Vec::new();
+        let mut finger = point_finger();
+        let mut roaming = Roaming::new(17, size_m, 3e-4);
+        for _ in 0..100_000 {
+            let out = step(&mut finger, &entity, &roaming.next());
+            if matches!(out.feature, Feature::Edge | Feature::Vertex) {
+                places.push(out.god_object_W);
+            }
+            // Of convex edges the god-object only passes by: where it changes the patch.
+            if let Some(contact) = finger.contact(0) {
+                let god = contact.god_object_W;
+                let around = (0..4).map(|_| god + noise.vector(1e-4)).filter(|p| contains(p)).count();
+                if around <= 1 {
+                    places.push(god);
+                }
+            }
+        }
+        assert!(places.len() > 100, "{name}: {}", places.len());
+        let (mut approaches, mut met) = (0, 0);
+        while approaches < 40_000 {
+            let aim = places[(noise.uniform() * places.len() as f64) as usize];
+            let [beside_m, length_m] =
+                [(-17.0, -4.0), (-4.5, -2.0)].map(|(a, b)| 10f64.powf(noise.between(a, b)));
+            let offset = noise.vector(beside_m);
+            let way = noise.vector(1.0).normalize() * length_m;
+            let from = aim + offset + way;
+            if contains(&from) {
+                approaches += 1;
+                continue;
+            }
+            approaches += 1;
+            let mut finger = point_finger();
+            step(&mut finger, &entity, &from);
+            for share in [0.5, 0.9, 1.0, 1.1, 1.5, 2.0] {
+                let hip = from - way * share;
+                let out = step(&mut finger, &entity, &hip);
+                let where_ = || format!("{name} {approaches} {aim:?} {offset:?} {way:?} {share} {out:?}");
+                match finger.contact(0) {
+                    Some(contact) => {
+                        met += 1;
+                        let height = csg.signed_distance(&contact.god_object_W);
+                        assert!(height.abs() < 1e-12, "{height} {}", where_());
+                    }
+                    None => assert!(!contains(&hip), "{}", where_()),
+                }
+            }
+        }
+        assert!(met > 10_000, "{name}: {met}");
     }
 }

@@ -40,16 +40,21 @@ impl Neighbourhood {
     pub(super) fn around(csg: &Csg, anchor_B: &Vector3<f64>, wish_m: f64) -> Self {
         let smallest_m = SMALLEST * csg.extent_m;
         let mut radius_m = wish_m.max(smallest_m);
-        loop {
-            let is_smallest = radius_m <= smallest_m;
-            match gather(csg, anchor_B, radius_m, is_smallest) {
+        for _ in 0..MAX_TRIES {
+            match gather(csg, anchor_B, radius_m, false) {
                 Ok(neighbourhood) => return neighbourhood,
-                Err(too_many_from_m) => {
-                    // Below the ninth, or half as much if they are all as near.
-                    radius_m = (too_many_from_m * JUST_BELOW).min(0.5 * radius_m).max(smallest_m);
-                }
+                // Below the ninth, or a part of it if they are all as near.
+                Err(ninth_m) => radius_m = (ninth_m * JUST_BELOW).min(0.25 * radius_m),
+            }
+            if radius_m <= smallest_m {
+                break;
             }
         }
+        gather(csg, anchor_B, smallest_m, true).unwrap_or(Self::nowhere(anchor_B))
+    }
+
+    fn nowhere(anchor_B: &Vector3<f64>) -> Self {
+        Self { anchor_B: *anchor_B, radius_m: 0.0, patches: [0; MAX_NEAR], count: 0, table: NOTHING }
     }
 
     pub(super) fn holds(&self, point_B: &Vector3<f64>, reach_m: f64) -> bool {
@@ -98,8 +103,7 @@ impl Neighbourhood {
 
 /// The patches within a radius, or from which distance on there would be too many.
 fn gather(csg: &Csg, anchor_B: &Vector3<f64>, radius_m: f64, keep_eight: bool) -> Result<Neighbourhood, f64> {
-    let mut here =
-        Neighbourhood { anchor_B: *anchor_B, radius_m, patches: [0; MAX_NEAR], count: 0, table: [0; 4] };
+    let mut here = Neighbourhood { radius_m, ..Neighbourhood::nowhere(anchor_B) };
     let mut crowd = Crowd::default();
     let mut stack = [[0; 4]; STACK];
     let mut top = 0;
@@ -220,6 +224,8 @@ const SIDES: [Table; MAX_NEAR] = [
     [0, u64::MAX, 0, u64::MAX],
     [0, 0, u64::MAX, u64::MAX],
 ];
+/// Bound on the sizes that are tried: from a metre to the smallest in quarters takes fewer.
+const MAX_TRIES: u32 = 16;
 /// No neighbourhood is smaller, in terms of the solid's extent.
 const SMALLEST: f64 = 1e-8;
 /// So that the ninth nearest is outside.

@@ -85,6 +85,19 @@ impl God {
         (0..super::near::MAX_NEAR).filter(move |index| active >> index & 1 == 1)
     }
 
+    /// The patches that hold it, by number.
+    #[inline]
+    fn held_patches(&self) -> [u16; 3] {
+        let mut numbers = [u16::MAX; 3];
+        for (place, index) in numbers.iter_mut().zip(self.held_by()) {
+            *place = self.near.number(index);
+        }
+        if numbers[1] != u16::MAX {
+            numbers.sort_unstable();
+        }
+        numbers
+    }
+
     fn look_around(&mut self, csg: &Csg, wish_m: f64) {
         let near = Neighbourhood::around(csg, &self.point_B, wish_m.max(COMMON * csg.extent_m));
         let active = self.held_by().filter_map(|index| near.position(self.near.number(index)));
@@ -250,7 +263,7 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
             longest *= 1.0 + STRETCH_TOLERANCE;
         }
         let step_m = shortened * secant.step(round.asked_m, round.view.depth_m);
-        let before = *god;
+        let (before_B, held_before) = (god.point_B, god.held_patches());
         let moved = advance(csg, god, &round.target_B(step_m), longest, &input.hip_B);
         if moved == Moved::TooFar {
             if round.asked_m < 0.0 && round.gap_m > 0.0 {
@@ -262,13 +275,12 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
         shortened = 1.0;
         secant.made(round.asked_m, step_m);
         view = stand(csg, god, input)?;
-        let is_same =
-            moved == Moved::There && god.active == before.active && god.near.anchor_B == before.near.anchor_B;
+        let is_same = moved == Moved::There && god.held_patches() == held_before;
         if is_same {
             round = look(view, &round.direction_B, &god.point_B);
             continue;
         }
-        let is_stalled = (god.point_B - before.point_B).amax() <= csg.tolerance_m();
+        let is_stalled = (god.point_B - before_B).amax() <= csg.tolerance_m();
         stalls = if is_stalled { stalls + 1 } else { 0 };
         round = look(view, &Vector3::zeros(), &god.point_B);
         if stalls >= MAX_STALLS {
