@@ -78,9 +78,9 @@ fn every_leaf_alone_feels_as_its_form() {
             let (alone, tree) =
                 (entity(form, friction.clone()), touchable(&CsgTree::union([form]), friction.clone()));
             // Slides end within 1e-12 of the load. A scaled patch is come back to by another way than the scaled form,
-            // and friction holds wherever that leads: a nanometre beside, times K.
+            // and friction holds wherever that leads: to second order of a tick's 0.1 mm, over radii of 30 mm, times K.
             let is_scaled = matches!(form, Form::Ellipsoid(_) | Form::Scaled(_));
-            let tolerance = if is_scaled && friction != Friction::None { 2e-6 } else { 1e-12 };
+            let tolerance = if is_scaled && friction != Friction::None { 2e-4 } else { 1e-12 };
             let mut noise = Noise(3);
             let mut worst = 0.0f64;
             // Presses of a few millimetres with a stroke to the side, all around.

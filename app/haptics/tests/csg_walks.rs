@@ -133,7 +133,8 @@ fn nothing_leaks_at_edges_and_corners() {
                         let height = csg.signed_distance(&contact.god_object_W);
                         assert!(height.abs() < 1e-12, "{height} {}", where_());
                     }
-                    None => assert!(!contains(&hip), "{}", where_()),
+                    // A HIP that rounding could put on either side may be free.
+                    None => assert!(!contains(&hip) || csg.signed_distance(&hip) > -1e-12, "{}", where_()),
                 }
             }
         }

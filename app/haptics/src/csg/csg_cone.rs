@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use super::Csg;
 use super::hit::first_hit;
 use super::near::Neighbourhood;
-use super::walk::{God, Walked, holds_outside, stand, walk};
+use super::walk::{God, RELEASE, Walked, holds_outside, stand, walk};
 use super::way_out::way_out;
 use crate::algorithm::{Touch, TouchInput};
 use crate::friction::Friction;
@@ -116,7 +116,13 @@ impl CsgCone {
         }
         let is_inside =
             if near.holds(hip_B, 0.0) { near.is_solid(near.sides(csg, hip_B)) } else { csg.is_inside(hip_B) };
-        if is_inside { found_inside() } else { None }
+        if !is_inside {
+            return None;
+        }
+        // Let go on the surface by rounding, it comes back to the contact that it had.
+        let was_on_surface = csg.signed_distance(from_B).abs() <= RELEASE * csg.extent_m;
+        let how = if was_on_surface { Beginning::Came } else { Beginning::WasInside };
+        way_out(csg, hip_B).map(|god| (god, how))
     }
 }
 

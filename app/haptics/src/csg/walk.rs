@@ -434,7 +434,7 @@ pub(super) fn holds_outside(csg: &Csg, god: &God, view: &TangentView, input: &Co
 }
 
 /// A HIP this far in front of a patch is free, in terms of the extent: more than a path that ends there is met before it.
-const RELEASE: f64 = 4e-12;
+pub(super) const RELEASE: f64 = 4e-12;
 /// Radius of a common neighbourhood, in terms of the extent.
 const COMMON: f64 = 0.02;
 /// A neighbourhood is asked for this much larger than the way.
