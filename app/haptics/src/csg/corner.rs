@@ -116,11 +116,11 @@ impl Corner {
         }
         let mut reached = 1u64 << start;
         for _ in 0..self.count {
-            for i in 0..self.count {
+            for (i, outside) in OUTSIDE.iter().enumerate().take(self.count) {
                 // Cells that differ in patch i lie 2^i apart.
                 let apart = 1 << i;
-                reached |= (reached & OUTSIDE[i]) << apart & free;
-                reached |= (reached & !OUTSIDE[i]) >> apart & free;
+                reached |= (reached & outside) << apart & free;
+                reached |= (reached & !outside) >> apart & free;
             }
         }
         reached

@@ -43,8 +43,9 @@ impl Neighbourhood {
         for _ in 0..MAX_TRIES {
             match gather(csg, anchor_B, radius_m, false) {
                 Ok(neighbourhood) => return neighbourhood,
-                // Below the ninth, or a part of it if they are all as near.
-                Err(ninth_m) => radius_m = (ninth_m * JUST_BELOW).min(0.25 * radius_m),
+                // Just below the ninth, or a part of it if that cannot be told.
+                Err(ninth_m) if ninth_m < radius_m => radius_m = ninth_m * JUST_BELOW,
+                Err(_) => radius_m *= 0.25,
             }
             if radius_m <= smallest_m {
                 break;

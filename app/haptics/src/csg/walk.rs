@@ -85,6 +85,11 @@ impl God {
         (0..super::near::MAX_NEAR).filter(move |index| active >> index & 1 == 1)
     }
 
+    /// Whether it rests on one curved patch, inside of it.
+    fn is_in_hollow(&self, csg: &Csg) -> bool {
+        self.active.count_ones() == 1 && self.active & self.sides != 0 && !self.is_on_planes(csg)
+    }
+
     /// The patches that hold it, by number.
     #[inline]
     fn held_patches(&self) -> [u16; 3] {
@@ -264,7 +269,11 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
         }
         let step_m = shortened * secant.step(round.asked_m, round.view.depth_m);
         let (before_B, held_before) = (god.point_B, god.held_patches());
-        let moved = advance(csg, god, &round.target_B(step_m), longest, &input.hip_B);
+        // From within a bore, the HIP far behind its wall, tangents overshoot; the wall's nearest place is known.
+        let foot_B = || settle(csg, god, god.active, &input.hip_B, &input.hip_B);
+        let is_foot = is_first && round.asked_m == round.gap_m && god.is_in_hollow(csg);
+        let target_B = if is_foot { foot_B() } else { round.target_B(step_m) };
+        let moved = advance(csg, god, &target_B, longest, &input.hip_B);
         if moved == Moved::TooFar {
             if round.asked_m < 0.0 && round.gap_m > 0.0 {
                 return Some(went_too_far(&round, rounds));
@@ -273,7 +282,9 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
             continue;
         }
         shortened = 1.0;
-        secant.made(round.asked_m, step_m);
+        if !is_foot {
+            secant.made(round.asked_m, step_m);
+        }
         view = stand(csg, god, input)?;
         let is_same = moved == Moved::There && god.held_patches() == held_before;
         if is_same {
@@ -342,7 +353,8 @@ fn advance(csg: &Csg, god: &mut God, target_B: &Vector3<f64>, longest: f64, hip_
             let met_B = from_B + (moved_B - from_B) * crossed_at;
             let onto = god.active | 1 << index;
             let mut edge_B = settle(csg, god, onto, &met_B, hip_B);
-            if !((edge_B - met_B).norm() <= (moved_B - from_B).norm()) {
+            let off_m = (edge_B - met_B).norm();
+            if off_m.is_nan() || off_m > (moved_B - from_B).norm() {
                 // They hardly meet.
                 edge_B = settle(csg, god, god.active, &met_B, hip_B);
             }
