@@ -105,8 +105,9 @@ fn collect(part: CsgPart, united: &mut Vec<CsgPart>, taken: &mut Vec<CsgPart>) {
 fn path(height_m: f64) -> Vec<Vector3<f64>> {
     let at = |i: usize| {
         let t = i as f64 * 2e-4 / 0.045;
-        // Lifted every 30 mm: a finger that fell into a bore would stay there with its HIP far beyond the wall.
-        let lift_m = if i % 150 < 10 { 8e-3 } else { 0.0 };
+        // Lifted every 40 mm: a finger that fell into a bore would stay there with its HIP far beyond the wall.
+        let lift_m = 8e-3 * (std::f64::consts::PI * (i % 200) as f64 / 20.0).sin().max(0.0);
+        let lift_m = if i % 200 < 20 { lift_m } else { 0.0 };
         Vector3::new(0.045 * t.sin(), 5e-3 + height_m + lift_m, 0.045 * (0.618 * t).cos())
     };
     // From above, and up again.

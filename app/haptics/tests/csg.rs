@@ -6,7 +6,7 @@ mod common;
 mod trees;
 
 use common::*;
-use haptics::{CsgTree, Finger, Friction};
+use haptics::{Csg, CsgPart, CsgTree, Finger, Friction, Plane, Surface};
 use nalgebra::Vector3;
 use trees::{Tree, built, cuboid, touchable, v};
 
@@ -89,4 +89,71 @@ fn a_box_of_planes_is_the_box() {
         }
         assert!(touched > 20_000, "{touched}");
     }
+}
+
+/// More flanks than a neighbourhood lists meet in the tip.
+#[test]
+fn nothing_leaks_at_a_tip_of_many_flanks() {
+    let flanks = |count: u32| {
+        (0..count).map(move |i| {
+            let angle = std::f64::consts::TAU * f64::from(i) / f64::from(count);
+            CsgPart::from(Plane::new(v(angle.cos(), 1.0, angle.sin()), 0.02).unwrap())
+        })
+    };
+    let mut noise = Noise(4);
+    for count in [3, 4, 5, 8, 12, 24] {
+        let tree = CsgTree::intersection(flanks(count).chain([cuboid([0.1; 3]).into()]));
+        let csg = built(&tree);
+        for friction in [Friction::None, stiction()] {
+            let entity = touchable(&tree, friction);
+            let mut met = 0;
+            for _ in 0..2000 {
+                let aim = v(0.0, 0.02, 0.0) + noise.vector(1e-5);
+                let from = aim + noise.vector(1e-2);
+                let mut finger = point_finger();
+                for share in [0.0, 0.8, 1.0, 1.2, 1.5, 2.0] {
+                    let hip = from.lerp(&aim, share);
+                    step(&mut finger, &entity, &hip);
+                    match finger.contact(0) {
+                        Some(contact) => {
+                            met += 1;
+                            let height = csg.signed_distance(&contact.god_object_W);
+                            // With twelve flanks and more, the tip is as blunt as the smallest neighbourhood.
+                            let tolerance = if count > 8 { 1e-8 } else { 1e-12 };
+                            assert!(height.abs() < tolerance, "{count} {height} {contact:?}");
+                        }
+                        None => assert!(csg.signed_distance(&hip) > -1e-12, "{count} {from:?} {hip:?}"),
+                    }
+                }
+            }
+            assert!(met > 1000, "{met}");
+        }
+    }
+}
+
+#[test]
+fn what_is_no_solid_is_refused_with_what_is_allowed() {
+    let ball = || CsgPart::from(trees::ball(0.05));
+    let says = |tree: CsgTree, text: &str| {
+        let message = Csg::build(&tree).unwrap_err().to_string();
+        assert!(message.contains(text), "{message}");
+    };
+    says(CsgTree::union(Vec::<CsgPart>::new()), "no parts; allowed is at least one");
+    says(CsgTree::union((0..257).map(|_| ball())), "more than 256 leaves");
+    let nested = (0..16).fold(ball(), |inner, _| CsgTree::union([inner]).into());
+    says(CsgTree::union([nested]), "more than 16 trees lie within each other");
+    says(CsgTree::union([ball().scaled([1.0, 0.0, 1.0])]), "scale is 0");
+    says(CsgTree::union([CsgPart::at(trees::ball(0.05), v(f64::NAN, 0.0, 0.0))]), "not finite");
+    let grown = Surface::grown(&cuboid([0.1; 3]), 0.01).unwrap();
+    says(CsgTree::union([grown]), "grown by a ball's radius");
+    let deepest = (0..15).fold(ball(), |inner, _| CsgTree::union([inner]).into());
+    assert!(Csg::build(&CsgTree::union([deepest])).is_ok());
+}
+
+#[test]
+fn fingers_with_a_radius_do_not_feel_trees() {
+    let entity = touchable(&trees::bored_box().tree, Friction::None);
+    assert!(entity.shape.is_felt_by(0.0) && !entity.shape.is_felt_by(1e-3));
+    let mut finger = finger(1e-3);
+    assert_eq!(step(&mut finger, &entity, &v(0.04, 0.0, 0.0)).entity, None);
 }

@@ -99,7 +99,7 @@ fn step(finger: &mut Finger, entity: &Entity, hip: &Vector3<f64>) -> FingerOutpu
     finger.step(std::slice::from_ref(entity), hip, DT)
 }
 
-/// The mean and the median difference of forces, in terms of the mean force, under a finger that roams.
+/// The median difference of forces, in terms of the mean force, under a finger that roams.
 fn difference(tree: &Tree, mesh: &Arc<Mesh>, friction: &Friction) -> f64 {
     let (exact, meshed) =
         (touchable(&tree.tree, friction.clone()), entity(Shape::from(Arc::clone(mesh)), friction.clone()));

@@ -164,7 +164,7 @@ fn walk_freely(csg: &Csg, god: &mut God, input: &ConeInput) -> Option<Walked> {
     holds_outside(csg, god, &walked.view, input).then_some(walked)
 }
 
-/// A neighbourhood is asked for this much larger than a tick's path.
-const LARGER: f64 = 8.0;
+/// A neighbourhood is asked for this much larger than a tick's path, at least.
+const LARGER: f64 = 1.5;
 /// Radius of a common neighbourhood, in terms of the extent.
 const COMMON: f64 = 0.02;

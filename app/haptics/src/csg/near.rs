@@ -231,3 +231,65 @@ const MAX_TRIES: u32 = 16;
 const SMALLEST: f64 = 1e-8;
 /// So that the ninth nearest is outside.
 const JUST_BELOW: f64 = 1.0 - 1e-9;
+
+#[cfg(test)]
+mod tests {
+    use super::super::{CsgPart, CsgTree};
+    use super::*;
+    use crate::cuboid::Cuboid;
+    use crate::plane::Plane;
+    use crate::sphere::Sphere;
+
+    /// A block of bricks with a ball taken out of its middle.
+    fn bricks() -> Csg {
+        let brick = Cuboid::new([0.02; 3]).unwrap();
+        let grid = (0..27).map(|i| {
+            let place = Vector3::new(f64::from(i % 3), f64::from(i / 3 % 3), f64::from(i / 9)) * 0.02;
+            CsgPart::at(brick, place - Vector3::repeat(0.02))
+        });
+        let block = CsgTree::union(grid);
+        Csg::build(&CsgTree::difference([CsgPart::from(block), Sphere::new(0.025).unwrap().into()])).unwrap()
+    }
+
+    #[test]
+    fn bricks_side_by_side_share_their_planes() {
+        // Four planes for each axis, and the ball.
+        assert_eq!(bricks().patch_count(), 13);
+    }
+
+    #[test]
+    fn within_a_neighbourhood_the_table_says_what_the_tree_says() {
+        let csg = bricks();
+        let spread = |i: u32, step: f64| 2.0 * (f64::from(i) * step).fract() - 1.0;
+        let point = |i: u32| Vector3::new(spread(i, 0.618_034), spread(i, 0.414_214), spread(i, 0.732_051));
+        for i in 0..2000 {
+            let near = Neighbourhood::around(&csg, &(point(i) * 0.035), 0.004);
+            assert!(near.count() <= MAX_NEAR);
+            for j in 0..20 {
+                let p = near.anchor_B + point(7 * i + j) * (near.radius_m / 3f64.sqrt());
+                assert_eq!(near.is_solid(near.sides(&csg, &p)), csg.is_inside(&p), "{p:?} {near:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn where_more_than_eight_patches_meet_the_ball_is_as_small_as_it_can_be() {
+        let flank = |i: u32| {
+            let angle = f64::from(i) * 0.5;
+            CsgPart::from(Plane::new(Vector3::new(angle.cos(), 1.0, angle.sin()), 0.0).unwrap())
+        };
+        let pyramid = Csg::build(&CsgTree::intersection((0..12).map(flank))).unwrap();
+        let beside = Neighbourhood::around(&pyramid, &Vector3::new(0.01, -0.02, 0.0), 0.1);
+        assert!(beside.count() == MAX_NEAR && beside.radius_m > 1e-3, "{beside:?}");
+        let at_tip = Neighbourhood::around(&pyramid, &Vector3::zeros(), 0.1);
+        assert_eq!((at_tip.count(), at_tip.radius_m), (MAX_NEAR, SMALLEST * pyramid.extent_m));
+    }
+
+    #[test]
+    fn what_is_not_a_number_has_a_neighbourhood_too() {
+        for bad in [f64::NAN, f64::INFINITY, f64::MAX] {
+            let near = Neighbourhood::around(&bricks(), &Vector3::repeat(bad), bad);
+            assert!(near.count() <= MAX_NEAR);
+        }
+    }
+}

@@ -421,7 +421,8 @@ fn correction(looks: &[Option<Look>; 3]) -> Vector3<f64> {
 /// Whether a god-object at rest is a minimum of the distance to a HIP that is outside: pressed through a flat part it
 /// is, pressed through a ball it is not, and the finger is let go as from a ball alone.
 pub(super) fn holds_outside(csg: &Csg, god: &God, view: &TangentView, input: &ConeInput) -> bool {
-    if god.is_on_planes(csg) || god.active.count_ones() > 2 {
+    // A hollow holds like a plane.
+    if god.is_on_planes(csg) || god.active.count_ones() > 2 || god.is_in_hollow(csg) {
         return true;
     }
     let sharpest_m = god
