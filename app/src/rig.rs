@@ -27,7 +27,7 @@ use io_driver::sim::script::HandScript;
 use nalgebra::{Isometry3, Vector3};
 use shm_abi::segment::ClockMode;
 use std::path::{Path, PathBuf};
-use world::{Layout, Scene, SceneEntity, SceneFinger, ShapeSpec};
+use world::{AlgorithmSpec, Layout, Scene, SceneEntity, SceneFinger, ShapeSpec};
 
 /// What a run needs, checked.
 #[derive(Debug, Clone)]
@@ -252,10 +252,8 @@ impl Rig {
     fn entity(&self, spec: &SceneEntity) -> Result<Entity, RigError> {
         let what = || format!("entity {}", spec.name);
         let refused = |source| self.refused(Some(spec.line), what(), source);
-        let unfit = |unfit| match unfit {
-            Unfit::Refused(source) => refused(source),
-            Unfit::NotAvailable(it) => self.not_available(format!("{}: {it}", what())),
-        };
+        let unfit = |unfit| self.unfit(spec.line, what(), unfit);
+        self.check_rendered(spec, what())?;
         let shape = material::shape(&spec.shape, &self.models).map_err(unfit)?;
         let friction = material::friction(&spec.friction).map_err(unfit)?;
         let algorithm = material::algorithm(spec.algorithm).map_err(unfit)?;
@@ -266,6 +264,19 @@ impl Rig {
             .map(|entity| entity.with_algorithm(algorithm).with_shading(shading))
             .map_err(refused)?;
         self.with_surface_effects(entity, spec)
+    }
+
+    /// The algorithms to compare with know surfaces, and trees have none of their own.
+    fn check_rendered(&self, spec: &SceneEntity, what: String) -> Result<(), RigError> {
+        let found = match spec.algorithm {
+            AlgorithmSpec::VectorField => "vector-field",
+            AlgorithmSpec::ClassicGodObject => "classic",
+            _ => return Ok(()),
+        };
+        if !material::is_csg(&spec.shape) {
+            return Ok(());
+        }
+        Err(RigError::NotRendered { file: self.scene_file.clone(), line: spec.line, what, found })
     }
 
     /// A finger would pass through what it cannot feel, without a word.
@@ -296,6 +307,15 @@ impl Rig {
 
     fn refused(&self, line: Option<usize>, what: String, source: ParameterError) -> RigError {
         RigError::Refused { file: self.scene_file.clone(), line, what, source }
+    }
+
+    /// Why something that begins in this line of the scene has no counterpart in rendering.
+    fn unfit(&self, line: usize, what: String, unfit: Unfit) -> RigError {
+        match unfit {
+            Unfit::Refused(source) => self.refused(Some(line), what, source),
+            Unfit::NoSolid(source) => RigError::NoSolid { file: self.scene_file.clone(), line, what, source },
+            Unfit::NotAvailable(it) => self.not_available(format!("{what}: {it}")),
+        }
     }
 
     fn not_available(&self, what: String) -> RigError {

@@ -70,6 +70,7 @@ impl TouchInput<'_> {
     pub fn is_inside(&self) -> bool {
         match self.shape {
             Shape::Mesh(mesh) => self.finger_radius_m == 0.0 && mesh.is_inside(&self.cone.hip_B),
+            Shape::Csg(csg) => self.finger_radius_m == 0.0 && csg.is_inside(&self.cone.hip_B),
             _ => self.of_surface(|surface| surface.signed_distance(&self.cone.hip_B) <= 0.0).unwrap_or(false),
         }
     }
@@ -105,7 +106,7 @@ impl TouchInput<'_> {
         }
     }
 
-    /// Asks the surface on which the finger's centre rolls; `None` for a mesh, and if it cannot feel the shape.
+    /// Asks the surface on which the finger's centre rolls; `None` for a mesh or a tree of shapes, and if it cannot feel the shape.
     pub fn of_surface<R>(&self, ask: impl FnOnce(&dyn Surface) -> R) -> Option<R> {
         match self.shape {
             Shape::Form(form) if self.finger_radius_m == 0.0 => Some(ask(form)),

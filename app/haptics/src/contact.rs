@@ -194,6 +194,7 @@ impl Slot {
 
     fn touch_surface<S: Surface + ?Sized>(&mut self, surface: &S, input: &TouchInput<'_>) -> Option<Touch> {
         self.mesh.let_go();
+        self.csg.let_go();
         let distance_m = surface.signed_distance(&input.cone.hip_B);
         let cone = match &mut self.cone {
             Some(cone) => cone,

@@ -73,7 +73,7 @@ pub use capsule::Capsule;
 pub use classic_god_object::ClassicGodObject;
 pub use cone::Cone;
 pub use contact::{Contact, RAMP_IN_S};
-pub use csg::Csg;
+pub use csg::{Csg, CsgError, CsgOp, CsgPart, CsgTree, MAX_DEPTH, MAX_LEAVES, PartShape};
 pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
 pub use effects::{

@@ -4,6 +4,8 @@
 mod common;
 #[path = "common/solids.rs"]
 mod solids;
+#[path = "common/trees.rs"]
+mod trees;
 
 use common::*;
 use haptics::mesh::{Mesh, make};
@@ -87,6 +89,29 @@ fn shading_never_allocates() {
     }
     assert_eq!(CALLS.get() - before, 0);
     assert!(touched > 10_000, "{touched}");
+}
+
+#[test]
+fn no_tree_of_shapes_makes_a_step_allocate() {
+    for tree in trees::all() {
+        for friction in [Friction::None, stiction()] {
+            let entities = [trees::touchable(&tree.tree, friction)];
+            let mut finger = point_finger();
+            let mut noise = Noise(8);
+            let (mut hip, mut touched) = (Vector3::y(), 0);
+            let before = CALLS.get();
+            for i in 0..20_000u32 {
+                // Also begins inside now and then, where the nearest way out is searched for.
+                if i.is_multiple_of(100) {
+                    finger.forget(0);
+                }
+                hip = hip * 0.99 + noise.vector(0.1 * tree.size_m);
+                touched += u32::from(finger.step(&entities, &hip, DT).entity.is_some());
+            }
+            assert_eq!(CALLS.get() - before, 0, "{}", tree.name);
+            assert!(touched > 500, "{}: {touched}", tree.name);
+        }
+    }
 }
 
 #[test]

@@ -2,6 +2,8 @@
 #![allow(non_snake_case)]
 
 mod common;
+#[path = "common/trees.rs"]
+mod trees;
 
 use common::laws::{any_friction, largest_ratio};
 use common::meshes::{bumpy_sphere, touchable};
@@ -148,6 +150,51 @@ fn shaded_forces_stay_finite_and_as_large_as_they_were_for_every_input() {
                 touched += u32::from(felt != Vector3::zeros());
             }
             assert!(touched > 2000, "{touched}");
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn every_finite_input_to_a_tree_gives_a_finite_output(
+        which in 0..7usize, friction in any_friction(),
+        hips in prop::collection::vec(prop::array::uniform3(any_size()), 1..20),
+        shift in prop::array::uniform3(any_size()), k in any_size(), b in any_size(), dt in any_size(),
+    ) {
+        let tree = &trees::all()[which];
+        let mut entity =
+            Entity { stiffness_n_per_m: k, damping_n_s_per_m: b, ..trees::touchable(&tree.tree, friction) };
+        let mut finger = Finger::new(0.0, 2).unwrap();
+        for hip in hips {
+            let out = finger.step(&[entity.clone(), entity.clone()], &Vector3::from(hip), dt);
+            prop_assert!(out.force_on_user_W.iter().all(|x| x.is_finite()), "{out:?}");
+            prop_assert!(out.god_object_W.iter().all(|x| x.is_finite()), "{out:?}");
+            entity.move_to(Isometry3::translation(shift[0], shift[1], shift[2]));
+        }
+    }
+
+    /// With every friction law: within its cone, out of the material, on the boundary.
+    #[test]
+    fn a_contact_with_a_tree_stays_within_the_friction_cone(
+        which in 0..7usize, friction in any_friction(),
+        hips in prop::collection::vec(prop::array::uniform3(-1.1..1.1f64), 2..40),
+    ) {
+        let tree = &trees::all()[which];
+        let entity = trees::touchable(&tree.tree, friction.clone());
+        let csg = trees::built(&tree.tree);
+        let mut finger = Finger::new(0.0, 1).unwrap().with_ramp_in(0.0).unwrap();
+        for hip in hips {
+            finger.step(std::slice::from_ref(&entity), &(Vector3::from(hip) * tree.size_m), DT);
+            let Some(contact) = finger.contact(0) else { continue };
+            let normal_n = contact.force_on_user_W.dot(&contact.normal_W);
+            let tangential_n = (contact.force_on_user_W - contact.normal_W * normal_n).norm();
+            prop_assert!(normal_n >= -1e-12, "{contact:?}");
+            if let Some(mu) = largest_ratio(&friction, contact.normal_force_n) {
+                // LuGre's damping stands beside the spring within a circle that a slide may miss by its rest.
+                let slack = if matches!(friction, Friction::LuGre(_)) { 1e-9 } else { 1e-11 };
+                prop_assert!(tangential_n <= mu * contact.normal_force_n + slack * (1.0 + normal_n), "{mu} {contact:?}");
+            }
+            prop_assert!(csg.signed_distance(&contact.god_object_W).abs() < 1e-12, "{contact:?}");
         }
     }
 }

@@ -48,13 +48,6 @@ impl Rig {
     fn limits(&self, device_mass_kg: f64) -> Result<Limits, ParameterError> {
         Limits::at(self.period_ns as f64 / 1e9)?.with_device_mass(device_mass_kg)
     }
-
-    fn unfit(&self, line: usize, what: String, unfit: Unfit) -> RigError {
-        match unfit {
-            Unfit::Refused(source) => self.refused(Some(line), what, source),
-            Unfit::NotAvailable(part) => self.not_available(part),
-        }
-    }
 }
 
 fn field(spec: &FieldSpec, limits: Result<Limits, ParameterError>) -> Result<Field, Unfit> {

@@ -1,8 +1,8 @@
 //! What can be wrong with the input of a run.
 
 use crate::simulated::SimulationError;
-use haptics::ParameterError;
 use haptics::mesh::MeshError;
+use haptics::{CsgError, ParameterError};
 use io_driver::open::OpenError;
 use io_driver::sim::script::HandError;
 use std::io;
@@ -60,6 +60,33 @@ pub enum RigError {
         what: String,
         /// Why.
         source: ParameterError,
+    },
+    /// The parts of a shape make no solid.
+    #[error("{}:{line}: {what}: {source}", .file.display())]
+    NoSolid {
+        /// The scene's file.
+        file: PathBuf,
+        /// Where the entity begins.
+        line: usize,
+        /// The entity.
+        what: String,
+        /// Why.
+        source: CsgError,
+    },
+    /// An algorithm that cannot render a shape of this kind.
+    #[error(
+        "{}:{line}: {what} is a csg, which algorithm {found} cannot render; allowed: friction-cone, which without friction \
+         is the classic god-object", .file.display()
+    )]
+    NotRendered {
+        /// The scene's file.
+        file: PathBuf,
+        /// Where the entity begins.
+        line: usize,
+        /// The entity.
+        what: String,
+        /// The algorithm.
+        found: &'static str,
     },
     /// A model file cannot be read.
     #[error("{at}: {}: {source}", .file.display())]

@@ -4,17 +4,20 @@ use super::models::Models;
 use haptics::mesh::Mesh;
 use haptics::passivity::{Passivity, PassivitySpec};
 use haptics::{
-    Algorithm, Capsule, Cone, Cuboid, Cylinder, Ellipsoid, Form, Friction, ParameterError, Plane, Scaled,
-    Shading, ShadingForm, Shape, Sphere, Torus,
+    Algorithm, Capsule, Cone, Csg, CsgError, CsgPart, CsgTree, Cuboid, Cylinder, Ellipsoid, Form, Friction,
+    ParameterError, Plane, Scaled, Shading, ShadingForm, Shape, Sphere, Torus,
 };
+use nalgebra::Isometry3;
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
-use world::{AlgorithmSpec, FrictionSpec, ShadingFormSpec, ShadingSpec, ShapeSpec};
+use world::{AlgorithmSpec, CsgOp, CsgSpec, FrictionSpec, ShadingFormSpec, ShadingSpec, ShapeSpec};
 
 /// Why something has no counterpart in rendering.
 pub(super) enum Unfit {
     /// Its numbers are refused.
     Refused(ParameterError),
+    /// Its parts make no solid.
+    NoSolid(CsgError),
     /// This version has not got it.
     NotAvailable(String),
 }
@@ -42,6 +45,12 @@ pub(super) fn passivity(spec: &world::PassivitySpec, period_s: f64) -> Result<Pa
     Passivity::new(passivity, period_s)
 }
 
+impl From<CsgError> for Unfit {
+    fn from(error: CsgError) -> Self {
+        Self::NoSolid(error)
+    }
+}
+
 /// A shape; meshes are those that were loaded.
 pub(super) fn shape(spec: &ShapeSpec, models: &Models) -> Result<Shape, Unfit> {
     match spec {
@@ -49,8 +58,39 @@ pub(super) fn shape(spec: &ShapeSpec, models: &Models) -> Result<Shape, Unfit> {
             Some(mesh) => Ok(Arc::clone(mesh).into()),
             None => Err(Unfit::NotAvailable(format!("shape {spec:?}"))),
         },
+        spec if is_csg(spec) => {
+            // As the only part of a tree it may be scaled like any other.
+            let tree = CsgTree::union([part(spec, Isometry3::identity())?]);
+            Ok(Arc::new(Csg::build(&tree)?).into())
+        }
         spec => Ok(Shape::Form(form(spec)?)),
     }
+}
+
+/// Whether a shape is joined of others, scaled or not.
+pub(super) fn is_csg(spec: &ShapeSpec) -> bool {
+    match spec {
+        ShapeSpec::Scaled { shape, .. } => is_csg(shape),
+        spec => matches!(spec, ShapeSpec::Csg(_)),
+    }
+}
+
+fn part(spec: &ShapeSpec, pose: Isometry3<f64>) -> Result<CsgPart, Unfit> {
+    match spec {
+        ShapeSpec::Csg(spec) => Ok(CsgPart::tree(tree(spec)?, pose)),
+        ShapeSpec::Scaled { shape, scale } if is_csg(shape) => Ok(part(shape, pose)?.scaled(*scale)),
+        spec => Ok(CsgPart::new(form(spec)?, pose)),
+    }
+}
+
+fn tree(spec: &CsgSpec) -> Result<CsgTree, Unfit> {
+    let parts =
+        spec.children.iter().map(|child| part(&child.shape, child.pose)).collect::<Result<Vec<_>, _>>()?;
+    Ok(match spec.op {
+        CsgOp::Union => CsgTree::union(parts),
+        CsgOp::Intersection => CsgTree::intersection(parts),
+        CsgOp::Difference => CsgTree::difference(parts),
+    })
 }
 
 pub(super) fn form(spec: &ShapeSpec) -> Result<Form, Unfit> {

@@ -32,6 +32,7 @@
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
 
+mod csg;
 mod document;
 mod effects;
 mod entity;
@@ -54,6 +55,7 @@ mod shape;
 mod source;
 mod vocabulary;
 
+pub use csg::{CsgChild, CsgOp, CsgSpec};
 pub use effects::{MagnetismSpec, VibrationSpec};
 pub use entity::{AlgorithmSpec, SceneEntity};
 pub use error::{Location, SceneError};

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Unit, Vector3};
 
+use crate::csg::{CSG_KEYS, CsgSpec};
 use crate::error::{Location, SceneError};
 use crate::pose::read_direction;
 use crate::reader::{Bound, Table, Value};
@@ -67,6 +68,8 @@ pub enum ShapeSpec {
     },
     /// Triangles in a file of their own.
     Mesh(MeshSpec),
+    /// Several shapes joined to one.
+    Csg(CsgSpec),
     /// Another shape but a mesh, drawn out along B's axes.
     Scaled {
         /// The shape before.
@@ -100,6 +103,7 @@ impl ShapeSpec {
             Self::Capsule { .. } => "capsule",
             Self::Ellipsoid { .. } => "ellipsoid",
             Self::Mesh(_) => "mesh",
+            Self::Csg(_) => "csg",
             Self::Scaled { shape, .. } => shape.kind(),
         }
     }
@@ -120,7 +124,16 @@ impl ShapeSpec {
         }
     }
 
-    /// Reads the `shape` of an entity.
+    /// Whether it can be a part of a csg: what is inside of it is known exactly.
+    pub(crate) fn can_be_joined(&self) -> bool {
+        match self {
+            Self::Scaled { shape, .. } => shape.can_be_joined(),
+            Self::Mesh(_) => false,
+            _ => true,
+        }
+    }
+
+    /// Reads the `shape` of an entity, or of a part of a csg.
     pub(crate) fn read(entity: &Table<'_>) -> Result<Self, SceneError> {
         let table = entity.require("shape", EXAMPLE)?.table(EXAMPLE)?;
         let kind = table.require("kind", KINDS.list())?.choose("shape kind", &KINDS)?;
@@ -149,6 +162,7 @@ fn reader_of(kind: &str) -> (&'static Vocabulary, Read) {
         "torus" => (&TORUS_KEYS, read_torus),
         "capsule" => (&CYLINDER_KEYS, read_capsule),
         "ellipsoid" => (&ELLIPSOID_KEYS, read_ellipsoid),
+        "csg" => (&CSG_KEYS, read_csg),
         _ => (&MESH_KEYS, read_mesh),
     }
 }
@@ -216,6 +230,10 @@ fn read_mesh(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
     Ok(ShapeSpec::Mesh(MeshSpec { file, scale: [1.0; 3], at: *value.at() }))
 }
 
+fn read_csg(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
+    CsgSpec::read(table).map(ShapeSpec::Csg)
+}
+
 fn size(table: &Table<'_>, key: &str) -> Result<f64, SceneError> {
     table.number(key, Bound::Positive)
 }
@@ -238,7 +256,18 @@ const ELLIPSOID_KEYS: Vocabulary = keys(&["kind", "radii_m", "scale"]);
 const MESH_KEYS: Vocabulary = keys(&["kind", "file", "scale"]);
 
 const KINDS: Vocabulary = Vocabulary {
-    available: &["plane", "sphere", "box", "cylinder", "cone", "torus", "capsule", "ellipsoid", "mesh"],
-    later: &["nurbs", "csg"],
+    available: &[
+        "plane",
+        "sphere",
+        "box",
+        "cylinder",
+        "cone",
+        "torus",
+        "capsule",
+        "ellipsoid",
+        "mesh",
+        "csg",
+    ],
+    later: &["nurbs"],
 };
 const EXAMPLE: &str = "a table such as { kind = \"sphere\", radius_m = 0.05 }";
