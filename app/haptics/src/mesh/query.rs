@@ -32,6 +32,11 @@ impl Mesh {
         self.bvh.nearest(self.triangles(), p_B)
     }
 
+    /// As [`Self::nearest`], if it is as near as this \[m\].
+    pub(crate) fn nearest_within(&self, p_B: &Vector3<f64>, at_most_m: f64) -> Option<Nearest> {
+        self.bvh.nearest_within(self.triangles(), p_B, at_most_m)
+    }
+
     /// Whether a point is inside or on the surface. A sheet has no inside.
     pub fn is_inside(&self, p_B: &Vector3<f64>) -> bool {
         self.sides == Sides::Solid && self.bvh.is_inside(self.triangles(), p_B)

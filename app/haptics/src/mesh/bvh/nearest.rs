@@ -35,6 +35,38 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
         self.nearest_of_visited(triangles, p_B, usize::MAX).0
     }
 
+    /// The nearest point of the faces, if any is as near as this \[m\]: the smaller, the cheaper.
+    pub(in crate::mesh) fn nearest_within(
+        &self,
+        triangles: Triangles<'_>,
+        p_B: &Vector3<f64>,
+        at_most_m: f64,
+    ) -> Option<Nearest> {
+        let mut search = Search::new(triangles, p_B, self.extent_m());
+        if search.limit < 0.0 || search.p_B != *p_B {
+            // Not finite, or farther away than any ball is large.
+            return None;
+        }
+        search.reach_m = at_most_m;
+        search.limit = above(at_most_m * at_most_m).min(f32::MAX);
+        let mut stack = Stack::<f32>::new();
+        let p = Rounded::new(&search.p_B);
+        while let Some((squared_distance, child)) = stack.pop() {
+            if squared_distance > search.limit {
+                continue;
+            }
+            if child.count() == 0 {
+                let node = &self.nodes[child.index()];
+                stack.push(&node.squared_distances(&p), &node.children, search.limit);
+            } else {
+                for face in child.index()..child.index() + child.count() {
+                    search.consider(triangles, face as u32);
+                }
+            }
+        }
+        (search.best.squared_distance <= at_most_m * at_most_m).then(|| search.result(p_B))
+    }
+
     /// As [`Self::nearest`], and `true`; or the nearest of what was seen when so many nodes and runs of faces had been
     /// visited, and `false`.
     pub(super) fn nearest_of_visited(
