@@ -52,3 +52,44 @@ fn a_ball_is_never_nearer_to_a_mesh_than_its_radius() {
         }
     }
 }
+
+/// The oracle tries many places near the ball, all triangles looked at: none that has room may be nearer to the HIP.
+#[test]
+fn a_ball_without_friction_comes_to_rest_where_no_place_nearby_is_nearer_to_the_hip() {
+    for (name, mesh) in meshes() {
+        for radius_m in [1e-3, 4e-3, 0.015] {
+            let entity = touchable(&mesh, Friction::None);
+            let mut finger = finger(radius_m);
+            let mut roaming = Roaming::new(11, 0.11, 1e-3);
+            let mut noise = Noise(3);
+            let (mut tried, mut late) = (0, 0);
+            for tick in 0..4000 {
+                let hip = roaming.next();
+                let mut out = step(&mut finger, &entity, &hip);
+                if tick % 20 != 0 || out.entity.is_none() {
+                    continue;
+                }
+                for _ in 0..10 {
+                    let again = step(&mut finger, &entity, &hip);
+                    late += u32::from((again.god_object_W - out.god_object_W).norm() > 1e-7);
+                    out = again;
+                }
+                let centre = out.god_object_W;
+                let reach = (centre - hip).norm();
+                tried += 1;
+                for _ in 0..200 {
+                    let there = centre + common::meshes::unit_vector(&mut noise) * (1e-3 * radius_m);
+                    let has_room = mesh.nearest(&there).distance_m >= radius_m;
+                    // A step of 1e-3 r along a surface curved by 1/r gains up to half of its square over r.
+                    let nearer = reach - (there - hip).norm();
+                    assert!(
+                        !(has_room && nearer > 2e-5 * radius_m),
+                        "{name} {radius_m} {tick}: {nearer:e} at {centre:?} for {hip:?} {out:?}"
+                    );
+                }
+            }
+            println!("{name} {radius_m}: {tried} {late}");
+            assert!(tried > 10, "{name} {radius_m}: {tried}");
+        }
+    }
+}

@@ -313,6 +313,7 @@ fn seek_with(
         }
         let Drawn { target_B, is_at_rest, tangential_B } =
             draw.drawn(&look.view, &(start.centre_B - ball.centre_B));
+        if std::env::var("DBG").is_ok() { println!("  careful {is_careful} rests {} rest {is_at_rest} c {:?} t {:?} n {:?}", ball.rests().len(), ball.centre_B.as_slice(), (target_B-ball.centre_B).norm(), look.view.normal_B.as_slice()); for r in ball.rests() { println!("     {:?} {} {:?}", r.foot.feature, r.load_m, r.normal_B.as_slice()); } }
         sees = Some((look, tangential_B));
         if is_at_rest {
             break;
@@ -338,7 +339,7 @@ fn seek_with(
             sees = None;
         }
         let strayed_m2 = (ball.centre_B - start.centre_B).norm_squared();
-        if strayed_m2 > 0.25 * ball.radius_m * ball.radius_m || strayed_m2.is_nan() {
+        if ball.is_blocked || strayed_m2 > 0.25 * ball.radius_m * ball.radius_m || strayed_m2.is_nan() {
             return Sought::Unsure;
         }
     }

@@ -26,6 +26,8 @@ pub(super) struct Ball {
     pub(super) radius_m: f64,
     rests: [Rest; MOST],
     count: usize,
+    /// The move came to a feature that stands in its way: the centre is where it was to go, nearer than it may be.
+    pub(super) is_blocked: bool,
 }
 
 /// A feature that it touches.
@@ -54,7 +56,7 @@ impl Ball {
         let foot =
             Foot { face: 0, feature: Feature::None, corner: 0, point_B: centre_B, squared_m2: f64::INFINITY };
         let rest = Rest { foot, normal_B: Vector3::y(), offset_m: 0.0, load_m: 0.0 };
-        Self { centre_B, radius_m, rests: [rest; MOST], count: 0 }
+        Self { centre_B, radius_m, rests: [rest; MOST], count: 0, is_blocked: false }
     }
 
     pub(super) fn rests(&self) -> &[Rest] {
@@ -164,13 +166,35 @@ impl Ball {
     pub(super) fn rolled_to(&self, mesh: &Mesh, target_B: &Vector3<f64>) -> Self {
         let mut ball = *self;
         ball.centre_B = *target_B;
+        let near_m = tolerance_m(mesh, self.radius_m);
         if let [rest] = ball.rests_mut() {
+            let face = rest.foot.face;
             rest.walk(mesh, target_B, self.radius_m);
-            ball.centre_B = target_B + rest.normal_B * (rest.offset_m - rest.normal_B.dot(target_B));
+            let missing_m = rest.offset_m - rest.normal_B.dot(target_B);
+            // Pushed out it would come farther from the HIP, and over the fold in which it belongs.
+            let is_blocked = missing_m > near_m && rest.foot.face != face;
+            if !is_blocked {
+                ball.centre_B = target_B + rest.normal_B * missing_m;
+            }
+            ball.is_blocked = is_blocked;
             return ball;
         }
-        ball.settle(mesh);
+        ball.is_blocked = ball.is_led_into_a_fold(mesh);
+        if !ball.is_blocked {
+            ball.settle(mesh);
+        }
         ball
+    }
+
+    #[inline(never)]
+    fn is_led_into_a_fold(&self, mesh: &Mesh) -> bool {
+        let near_m = tolerance_m(mesh, self.radius_m);
+        self.rests().iter().filter(|rest| rest.load_m > 0.0).any(|rest| {
+            let mut there = *rest;
+            there.walk(mesh, &self.centre_B, self.radius_m);
+            let height_m = distance(&(there.normal_B, there.offset_m), &self.centre_B);
+            height_m < -near_m && there.foot.face != rest.foot.face
+        })
     }
 
     #[inline(never)]
@@ -341,11 +365,12 @@ impl Rest {
     }
 }
 
-/// Where on a path, before the share `end` of it, the feature that is met from a face is first as near as the radius.
+/// Where on a path, before the share `end` of it, a face is first as near as the radius.
 ///
 /// Regula falsi after Illinois; what is left of the radius at the end is far below what an obstacle has to be.
 fn touching(mesh: &Mesh, path: impl Fn(f64) -> Ball, face: u32, end: f64) -> (f64, Ball) {
-    let gap = |ball: &Ball| Foot::from_face(mesh, face, &ball.centre_B).squared_m2.sqrt() - ball.radius_m;
+    // Of this face alone: a walk from it might end at what the ball rests on.
+    let gap = |ball: &Ball| Foot::on(mesh, face, &ball.centre_B).squared_m2.sqrt() - ball.radius_m;
     let start = path(0.0);
     let (mut low, mut high) = ((0.0, gap(&start)), (end, gap(&path(end))));
     if low.1.is_nan() || low.1 <= 0.0 || high.1.is_nan() || high.1 >= 0.0 {

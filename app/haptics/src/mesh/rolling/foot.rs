@@ -43,8 +43,9 @@ impl Foot {
         here
     }
 
+    /// The closest point of one face.
     #[inline(always)]
-    fn on(mesh: &Mesh, index: u32, p_B: &Vector3<f64>) -> Self {
+    pub(super) fn on(mesh: &Mesh, index: u32, p_B: &Vector3<f64>) -> Self {
         let face = &mesh.faces[index as usize];
         let corners = face.vertices.map(|vertex| mesh.vertices[vertex as usize]);
         match closest_on(face, &corners, p_B, f64::INFINITY) {
