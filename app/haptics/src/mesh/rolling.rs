@@ -313,16 +313,11 @@ fn seek_with(
         }
         let Drawn { target_B, is_at_rest, tangential_B } =
             draw.drawn(&look.view, &(start.centre_B - ball.centre_B));
-        if std::env::var("DBG").is_ok() { println!("  careful {is_careful} rests {} rest {is_at_rest} c {:?} t {:?} n {:?}", ball.rests().len(), ball.centre_B.as_slice(), (target_B-ball.centre_B).norm(), look.view.normal_B.as_slice()); for r in ball.rests() { println!("     {:?} {} {:?}", r.foot.feature, r.load_m, r.normal_B.as_slice()); } }
         sees = Some((look, tangential_B));
         if is_at_rest {
             break;
         }
         if is_careful {
-            let target_B = is_frictionless
-                .then(|| ball.seat(mesh, &input.hip_B))
-                .flatten()
-                .map_or(target_B, |seat| seat.centre_B);
             let before = (ball.centre_B, ball.rests().len());
             ball = ball.rolled_until(mesh, &target_B);
             if before == (ball.centre_B, ball.rests().len()) {
