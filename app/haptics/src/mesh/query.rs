@@ -37,6 +37,16 @@ impl Mesh {
         self.bvh.nearest_within(self.triangles(), p_B, at_most_m)
     }
 
+    /// As [`Self::nearest_within`], of faces that reach above a plane that is no nearer than this either.
+    pub(crate) fn nearest_above(
+        &self,
+        p_B: &Vector3<f64>,
+        at_most_m: f64,
+        plane: (&Vector3<f64>, f64),
+    ) -> Option<Nearest> {
+        self.bvh.nearest_above(self.triangles(), p_B, at_most_m, plane)
+    }
+
     /// Whether a point is inside or on the surface. A sheet has no inside.
     pub fn is_inside(&self, p_B: &Vector3<f64>) -> bool {
         self.sides == Sides::Solid && self.bvh.is_inside(self.triangles(), p_B)

@@ -56,6 +56,8 @@ struct Touching {
     scout: Option<Ball>,
     /// Here the HIP is where no ball can be.
     tight: Room,
+    /// There, it is deeper inside than the radius.
+    is_inside: bool,
 }
 
 /// A ball of which something is known.
@@ -180,7 +182,7 @@ fn found_inside(mesh: &Mesh, hip_B: &Vector3<f64>, radius_m: f64) -> Option<Ball
 
 impl Touching {
     fn new(ball: Ball) -> Self {
-        Self { ball, grip: Grip::default(), scout: None, tight: Room::default() }
+        Self { ball, grip: Grip::default(), scout: None, tight: Room::default(), is_inside: false }
     }
 
     fn update(&mut self, mesh: &Mesh, friction: &Friction, input: &ConeInput) -> Option<Touch> {
@@ -215,15 +217,13 @@ impl Touching {
         if self.tight.has(&hip_B, 0.0) {
             return false;
         }
-        let tight_m = if let Some(near) = mesh.nearest_within(&hip_B, radius_m) {
-            Some(radius_m - near.distance_m)
-        } else if mesh.is_inside(&hip_B) {
-            Some(mesh.clearance(&hip_B, mesh.extent_m()).max(radius_m))
-        } else {
-            None
+        let tight_m = match mesh.nearest_within(&hip_B, radius_m) {
+            Some(near) => radius_m - near.distance_m,
+            None => self.depth_inside(mesh, &hip_B),
         };
-        if let Some(radius_m) = tight_m {
-            self.tight = Room { centre_B: hip_B, radius_m };
+        self.is_inside = tight_m > radius_m;
+        if tight_m > 0.0 {
+            self.tight = Room { centre_B: hip_B, radius_m: tight_m };
             self.scout = None;
             return false;
         }
@@ -235,6 +235,16 @@ impl Touching {
             }
             None => true,
         }
+    }
+
+    /// A lower bound of how far a HIP, which has room around it, would have to go to be outside; 0 if it is.
+    fn depth_inside(&self, mesh: &Mesh, hip_B: &Vector3<f64>) -> f64 {
+        let radius_m = self.ball.radius_m;
+        // All that the hierarchy can say cheaply, and what is known.
+        let clear_m = mesh.clearance(hip_B, mesh.extent_m()).max(radius_m * (1.0 + f64::EPSILON));
+        // No face is between here and where it was inside.
+        let was_inside = self.is_inside && (hip_B - self.tight.centre_B).norm() < clear_m;
+        if was_inside || mesh.is_inside(hip_B) { clear_m } else { 0.0 }
     }
 
     fn answer(&mut self, rested: Rested, input: &ConeInput) -> Touch {

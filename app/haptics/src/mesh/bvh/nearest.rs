@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 
 use super::closest::{Closest, closest_on};
 use super::stack::Stack;
-use super::{Bvh, Rounded, Triangles, above};
+use super::{Bvh, Face, Rounded, Triangles, above, larger};
 use crate::surface::Feature;
 
 /// The point of a mesh nearest to a given one.
@@ -42,6 +42,32 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
         p_B: &Vector3<f64>,
         at_most_m: f64,
     ) -> Option<Nearest> {
+        self.nearest_of(triangles, p_B, at_most_m, |_| true)
+    }
+
+    /// As [`Self::nearest_within`], of what reaches above a plane that is as far below the point, `normal . x = offset`:
+    /// a face with all corners below need not be looked at. On a convex mesh that is every one.
+    pub(in crate::mesh) fn nearest_above(
+        &self,
+        triangles: Triangles<'_>,
+        p_B: &Vector3<f64>,
+        at_most_m: f64,
+        (normal_B, offset_m): (&Vector3<f64>, f64),
+    ) -> Option<Nearest> {
+        self.nearest_of(triangles, p_B, at_most_m, |face| {
+            let [a, b, c] = triangles.corners(face).map(|corner| normal_B.dot(&corner));
+            larger(larger(a, b), c) > offset_m
+        })
+    }
+
+    #[inline(always)]
+    fn nearest_of(
+        &self,
+        triangles: Triangles<'_>,
+        p_B: &Vector3<f64>,
+        at_most_m: f64,
+        counts: impl Fn(&Face) -> bool,
+    ) -> Option<Nearest> {
         let mut search = Search::new(triangles, p_B, self.extent_m());
         if search.limit < 0.0 || search.p_B != *p_B {
             // Not finite, or farther away than any ball is large.
@@ -60,7 +86,9 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
                 stack.push(&node.squared_distances(&p), &node.children, search.limit);
             } else {
                 for face in child.index()..child.index() + child.count() {
-                    search.consider(triangles, face as u32);
+                    if counts(&triangles.faces[face]) && search.may_reach(triangles, face as u32) {
+                        search.consider(triangles, face as u32);
+                    }
                 }
             }
         }
@@ -126,6 +154,26 @@ impl Search {
             // Finite, since boxes of nothing are infinitely far away.
             limit: if is_finite { f32::MAX } else { -1.0 },
         }
+    }
+
+    /// Whether a face is not obviously too far away: of most faces beside a tangent ball, one edge shows it, and
+    /// without a division.
+    #[inline(always)]
+    fn may_reach(&self, triangles: Triangles<'_>, index: u32) -> bool {
+        let face = &triangles.faces[index as usize];
+        let height = face.normal_B.dot(&self.p_B) - face.offset_m;
+        let left = self.reach_m * self.reach_m - height * height;
+        if left < 0.0 {
+            return false;
+        }
+        let left = left * (1.0 + ROUNDING) + self.slack_m * self.slack_m;
+        let [a, b, c] = triangles.corners(face);
+        let is_beyond = |from: &Vector3<f64>, to: &Vector3<f64>| {
+            let edge = to - from;
+            let beyond = edge.cross(&face.normal_B).dot(&(self.p_B - from));
+            beyond > 0.0 && beyond * beyond > left * edge.norm_squared()
+        };
+        !(is_beyond(&a, &b) | is_beyond(&b, &c) | is_beyond(&c, &a))
     }
 
     #[inline(always)]

@@ -257,7 +257,15 @@ impl Ball {
     /// What is nearer than it should be.
     #[inline(always)]
     pub(super) fn obstacle(&self, mesh: &Mesh) -> Option<Nearest> {
-        mesh.nearest_within(&self.centre_B, self.radius_m - tolerance_m(mesh, self.radius_m))
+        let near_m = self.radius_m - tolerance_m(mesh, self.radius_m);
+        match self.rests() {
+            [] => mesh.nearest_within(&self.centre_B, near_m),
+            [rest, ..] => {
+                // Below the plane through the lowest point of that smaller ball nothing reaches into it.
+                let offset_m = rest.normal_B.dot(&self.centre_B) - near_m;
+                mesh.nearest_above(&self.centre_B, near_m, (&rest.normal_B, offset_m))
+            }
+        }
     }
 
     /// As [`Self::rolled_to`], as far as nothing else is in the way; by half of its radius at the most.
