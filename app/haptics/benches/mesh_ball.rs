@@ -93,8 +93,7 @@ fn rows(name: &str, shape: &Shape, path: &[(Phase, Vector3<f64>)], clock_ns: u64
         let runs: Vec<_> = (0..RUNS).map(|_| tick_times(&entity, path, clock_ns)).collect();
         let best = |tick: usize| runs.iter().map(|run| run[tick]).min().unwrap_or(0);
         for (phase, _) in PHASES {
-            let mut times: Vec<_> =
-                (0..path.len()).filter(|&tick| path[tick].0 == phase).map(best).collect();
+            let mut times: Vec<_> = (0..path.len()).filter(|&tick| path[tick].0 == phase).map(best).collect();
             times.sort_unstable();
             let [median, p99, p999, max] = [0.5, 0.99, 0.999, 1.0].map(|q| quantile(&times, q));
             println!(

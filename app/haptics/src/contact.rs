@@ -22,6 +22,7 @@ use crate::hip::Hip;
 use crate::mesh::{Beginning, Mesh, MeshCone, RollingCone};
 use crate::shape::Shape;
 use crate::surface::{Feature, Surface};
+use crate::touch_points::TouchPoints;
 use crate::vector_field::VectorField;
 
 /// What a finger feels of one entity in one tick, in the world frame.
@@ -73,6 +74,8 @@ pub(crate) struct Slot {
     rolling: RollingCone,
     csg: CsgCone,
     own: ContactMemory,
+    /// Whether anything was noted here since it was new.
+    is_used: bool,
     /// How much of the force is rendered, 0 to 1.
     strength: f64,
     pub(crate) contact: Option<Contact>,
@@ -84,6 +87,7 @@ pub const RAMP_IN_S: f64 = 0.1;
 
 impl Slot {
     pub(crate) fn step(&mut self, index: usize, entity: &Entity, sweep: &Sweep<'_>) -> Option<&Contact> {
+        self.is_used = true;
         self.contact = self.touch(index, entity, sweep);
         if self.contact.is_none() {
             self.cone = None;
@@ -92,6 +96,21 @@ impl Slot {
             self.csg.let_go();
         }
         self.contact.as_ref()
+    }
+
+    /// Forgets everything, if there is anything to forget.
+    pub(crate) fn vacate(&mut self) {
+        if self.is_used {
+            *self = Self::default();
+        }
+    }
+
+    /// Where the finger touches the entity, in this tick.
+    pub(crate) fn touch_points(&self, entity: &Entity, finger_radius_m: f64) -> TouchPoints {
+        let Some(contact) = &self.contact else { return TouchPoints::NONE };
+        let shares = self.rolling.shares();
+        let points = TouchPoints::of_shares(shares, entity, contact, self.strength);
+        if points.as_slice().is_empty() { TouchPoints::single(contact, finger_radius_m) } else { points }
     }
 
     fn touch(&mut self, index: usize, entity: &Entity, sweep: &Sweep<'_>) -> Option<Contact> {
@@ -145,6 +164,7 @@ impl Slot {
 
     fn touch_by(&mut self, algorithm: &dyn ContactAlgorithm, input: &TouchInput<'_>) -> Option<Touch> {
         (self.cone, self.mesh) = (None, MeshCone::default());
+        self.rolling.let_go();
         let begins = self.contact.is_none();
         if begins {
             self.own = ContactMemory::default();
@@ -163,6 +183,7 @@ impl Slot {
             Shape::Own(surface) if input.finger_radius_m == 0.0 => self.touch_surface(&**surface, input),
             Shape::Own(_) => input.of_surface(|grown| self.touch_surface(grown, input))?,
             Shape::Mesh(mesh) => {
+                self.cone = None;
                 let touched = self.rolling.update(mesh, input);
                 self.begun(touched)
             }
@@ -194,6 +215,7 @@ impl Slot {
 
     fn touch_surface<S: Surface + ?Sized>(&mut self, surface: &S, input: &TouchInput<'_>) -> Option<Touch> {
         self.mesh.let_go();
+        self.rolling.let_go();
         let distance_m = surface.signed_distance(&input.cone.hip_B);
         let cone = match &mut self.cone {
             Some(cone) => cone,

@@ -51,7 +51,7 @@ pub use error::MeshError;
 pub use face::{Face, Link};
 pub use mesh_cone::{Beginning, MeshCone};
 pub use report::{Finding, MeshReport};
-pub(crate) use rolling::RollingCone;
+pub(crate) use rolling::{RollingCone, Share};
 pub use soup::TriangleSoup;
 pub use walk::MAX_FEATURE_CHANGES;
 

@@ -47,6 +47,16 @@ pub(crate) struct RollingCone {
     clear: Room,
 }
 
+/// One of the features that a ball touches, and what it does to the user.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Share {
+    pub(crate) point_B: Vector3<f64>,
+    pub(crate) normal_B: Vector3<f64>,
+    pub(crate) force_on_user_B: Vector3<f64>,
+    /// Of all loads, 0 to 1.
+    pub(crate) part: f64,
+}
+
 /// A contact.
 #[derive(Debug, Clone, Copy)]
 struct Touching {
@@ -58,6 +68,8 @@ struct Touching {
     tight: Room,
     /// There, it is deeper inside than the radius.
     is_inside: bool,
+    /// What was answered last: tangential spring \[m\], sum of the loads \[m\] and stiffness \[N/m\].
+    answered: (Vector3<f64>, f64, f64),
 }
 
 /// A ball of which something is known.
@@ -113,6 +125,19 @@ impl RollingCone {
             self.touching = None;
         }
         felt.map(|touch| (touch, beginning))
+    }
+
+    /// The features that it presses on, in this tick; friction is shared out as the loads are.
+    pub(crate) fn shares(&self) -> impl Iterator<Item = Share> {
+        let touching = self.touching.as_ref();
+        let (tangential_B, load_m, k) = touching.map_or_else(Default::default, |touching| touching.answered);
+        let rests = touching.map_or(&[][..], |touching| touching.ball.rests());
+        rests.iter().filter(|rest| rest.load_m > 0.0).map(move |rest| {
+            let part = rest.load_m / load_m;
+            let spring_B = rest.normal_B * rest.load_m + tangential_B * part;
+            let (point_B, normal_B) = (rest.foot.point_B, rest.normal_B);
+            Share { point_B, normal_B, force_on_user_B: spring_B * k, part }
+        })
     }
 
     /// Ends the contact.
@@ -182,7 +207,14 @@ fn found_inside(mesh: &Mesh, hip_B: &Vector3<f64>, radius_m: f64) -> Option<Ball
 
 impl Touching {
     fn new(ball: Ball) -> Self {
-        Self { ball, grip: Grip::default(), scout: None, tight: Room::default(), is_inside: false }
+        Self {
+            ball,
+            grip: Grip::default(),
+            scout: None,
+            tight: Room::default(),
+            is_inside: false,
+            answered: Default::default(),
+        }
     }
 
     fn update(&mut self, mesh: &Mesh, friction: &Friction, input: &ConeInput) -> Option<Touch> {
@@ -254,7 +286,9 @@ impl Touching {
             ball.primary().map_or((Feature::Face, 0), |rest| (rest.foot.feature, rest.foot.face));
         let k = input.stiffness_n_per_m;
         let is_pressed = look.view.load_m > 0.0;
-        let spring_B = look.normal_spring_B + ball.free_part(&tangential_B);
+        let tangential_B = ball.free_part(&tangential_B);
+        let spring_B = look.normal_spring_B + tangential_B;
+        self.answered = (tangential_B, look.view.load_m, k);
         Touch {
             god_object: SurfacePoint { point_B: ball.centre_B, normal_B: look.view.normal_B, feature, piece },
             force_on_user_B: if is_pressed { spring_B * k } else { Vector3::zeros() },
