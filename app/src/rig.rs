@@ -182,6 +182,7 @@ impl Rig {
         let of = |device: usize| devices.get(device).copied().unwrap_or_default();
         Names {
             extras: self.scene.fingers.iter().map(|finger| of(finger.device)).collect(),
+            torques: self.scene.fingers.iter().map(|finger| finger.radius_m > 0.0).collect(),
             fingers: self.scene.fingers.iter().map(|finger| finger.name.clone()).collect(),
             entities: self.scene.entities.iter().map(|entity| entity.name.clone()).collect(),
         }
@@ -256,11 +257,11 @@ impl Rig {
 
     /// A finger would pass through what it cannot feel, without a word.
     fn check_felt(&self, entities: &[Entity], finger: &SceneFinger) -> Result<(), RigError> {
-        let not_felt = entities.iter().position(|entity| !entity.shape.is_felt_by(finger.radius_m));
+        let not_felt = entities.iter().position(|entity| !entity.is_felt_by(finger.radius_m));
         let Some(index) = not_felt else { return Ok(()) };
         let spec = &self.scene.entities[index];
-        // A ring is felt by balls that fit through its hole, a mesh by none.
-        let by_smaller = entities[index].shape.is_felt_by(1e-3 * finger.radius_m);
+        // Somebody's own shape may be felt by small balls only.
+        let by_smaller = entities[index].is_felt_by(1e-3 * finger.radius_m);
         Err(RigError::NotFelt {
             file: self.scene_file.clone(),
             line: spec.line,
@@ -268,7 +269,11 @@ impl Rig {
             radius_m: finger.radius_m,
             entity: spec.name.clone(),
             kind: spec.shape.kind(),
-            smaller: if by_smaller { ", a smaller radius" } else { "" },
+            otherwise: match () {
+                () if entities[index].shape.is_felt_by(finger.radius_m) => ", algorithm = \"friction-cone\"",
+                () if by_smaller => ", a smaller radius",
+                () => "",
+            },
         })
     }
 

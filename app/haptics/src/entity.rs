@@ -84,6 +84,14 @@ impl Entity {
         Self { height_map: Some(height_map.into()), ..self }
     }
 
+    /// Whether a finger of this radius can feel it, rendered as it is.
+    pub fn is_felt_by(&self, finger_radius_m: f64) -> bool {
+        let is_ball_on_mesh = finger_radius_m != 0.0 && matches!(self.shape, Shape::Mesh(_));
+        // That baseline walks with points alone.
+        let is_lost = is_ball_on_mesh && self.algorithm == Algorithm::ClassicGodObject;
+        !is_lost && self.shape.is_felt_by(finger_radius_m)
+    }
+
     /// One tick on: the current pose becomes the previous one.
     pub fn move_to(&mut self, X_WB: Isometry3<f64>) {
         self.previous_X_WB = self.X_WB;

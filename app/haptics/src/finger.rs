@@ -73,12 +73,13 @@ impl Finger {
     ///
     /// Entities beyond the capacity are not felt. Errors: a radius not finite or negative.
     pub fn new(radius_m: f64, capacity: usize) -> Result<Self, ParameterError> {
+        let radius_m = at_least_zero("radius_m", radius_m)?;
         Ok(Self {
-            radius_m: at_least_zero("radius_m", radius_m)?,
+            radius_m,
             ramp_in_s: RAMP_IN_S,
             previous_hip_W: None,
             last_finite_hip_W: Vector3::zeros(),
-            slots: vec![Slot::default(); capacity].into(),
+            slots: (0..capacity).map(|_| Slot::new(radius_m)).collect(),
         })
     }
 
@@ -171,14 +172,14 @@ impl Finger {
     /// Ends the contact with one entity, because it is gone or another one has its index.
     pub fn forget(&mut self, entity: usize) {
         if let Some(slot) = self.slots.get_mut(entity) {
-            *slot = Slot::default();
+            slot.vacate();
         }
     }
 
     /// Ends all contacts and forgets where the finger was: the next step is a first one.
     pub fn reset(&mut self) {
         self.previous_hip_W = None;
-        self.slots.fill(Slot::default());
+        self.slots.iter_mut().for_each(Slot::vacate);
     }
 }
 

@@ -127,6 +127,11 @@ impl RollingCone {
         felt.map(|touch| (touch, beginning))
     }
 
+    /// Whether a contact lives.
+    pub(crate) fn is_touching(&self) -> bool {
+        self.touching.is_some()
+    }
+
     /// The features that it presses on, in this tick; friction is shared out as the loads are.
     pub(crate) fn shares(&self) -> impl Iterator<Item = Share> {
         let touching = self.touching.as_ref();
