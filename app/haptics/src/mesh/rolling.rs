@@ -22,11 +22,13 @@
 mod ball;
 mod foot;
 mod press;
+mod vicinity;
 
 use nalgebra::Vector3;
 use std::cell::Cell;
 
 use self::ball::{Ball, Look};
+use self::vicinity::Vicinity;
 use super::draw::{Against, Draw, Drawn, Frictionless};
 use super::{Beginning, Mesh};
 use crate::algorithm::{Touch, TouchInput};
@@ -45,6 +47,7 @@ pub(crate) struct RollingCone {
     last_hip_B: Option<Vector3<f64>>,
     /// No face comes as near as this.
     clear: Room,
+    vicinity: Vicinity,
 }
 
 /// One of the features that a ball touches, and what it does to the user.
@@ -120,7 +123,7 @@ impl RollingCone {
             self.touching = Some(Touching::new(ball));
         }
         let touching = self.touching.as_mut()?;
-        let felt = touching.update(mesh, input.friction, &input.cone);
+        let felt = touching.update(mesh, input.friction, &mut self.vicinity, &input.cone);
         if felt.is_none() {
             self.touching = None;
         }
@@ -222,18 +225,24 @@ impl Touching {
         }
     }
 
-    fn update(&mut self, mesh: &Mesh, friction: &Friction, input: &ConeInput) -> Option<Touch> {
+    fn update(
+        &mut self,
+        mesh: &Mesh,
+        friction: &Friction,
+        vicinity: &mut Vicinity,
+        input: &ConeInput,
+    ) -> Option<Touch> {
         if matches!(friction, Friction::None) {
             self.grip.state = FrictionState::Slip;
-            let rested = seek(mesh, &self.ball, || Frictionless, true, input)?;
+            let rested = seek(mesh, &self.ball, || Frictionless, true, vicinity, input)?;
             return Some(self.answer(rested, input));
         }
-        if self.is_out(mesh, input) {
+        if self.is_out(mesh, vicinity, input) {
             return None;
         }
         let look = self.ball.look(mesh, input);
         if look.is_free {
-            let rested = seek(mesh, &self.ball, || Frictionless, true, input)?;
+            let rested = seek(mesh, &self.ball, || Frictionless, true, vicinity, input)?;
             return Some(self.answer(rested, input));
         }
         let pull = self.grip.begin_tick(&look.view, input);
@@ -242,14 +251,14 @@ impl Touching {
         }
         let memory = &self.grip.memory;
         let against = || Against { friction, memory, pull: &pull, input, slides_with: Cell::new(None) };
-        let mut rested = seek(mesh, &self.ball, against, false, input)?;
+        let mut rested = seek(mesh, &self.ball, against, false, vicinity, input)?;
         rested.tangential_B +=
             self.grip.drag(friction, &rested.tangential_B, &rested.look.view, &pull, input);
         Some(self.answer(rested, input))
     }
 
     /// Whether the finger is round the corner, whatever friction says.
-    fn is_out(&mut self, mesh: &Mesh, input: &ConeInput) -> bool {
+    fn is_out(&mut self, mesh: &Mesh, vicinity: &mut Vicinity, input: &ConeInput) -> bool {
         let (hip_B, radius_m) = (input.hip_B, self.ball.radius_m);
         if self.tight.has(&hip_B, 0.0) {
             return false;
@@ -265,7 +274,7 @@ impl Touching {
             return false;
         }
         let scout = self.scout.unwrap_or(self.ball);
-        match seek(mesh, &scout, || Frictionless, true, input) {
+        match seek(mesh, &scout, || Frictionless, true, vicinity, input) {
             Some(rested) => {
                 self.scout = Some(rested.ball);
                 false
@@ -279,8 +288,8 @@ impl Touching {
         let radius_m = self.ball.radius_m;
         // All that the hierarchy can say cheaply, and what is known.
         let clear_m = mesh.clearance(hip_B, mesh.extent_m()).max(radius_m * (1.0 + f64::EPSILON));
-        // No face is between here and where it was inside.
-        let was_inside = self.is_inside && (hip_B - self.tight.centre_B).norm() < clear_m;
+        // Two balls without a face in them that overlap are on the same side.
+        let was_inside = self.is_inside && (hip_B - self.tight.centre_B).norm() < clear_m + self.tight.radius_m;
         if was_inside || mesh.is_inside(hip_B) { clear_m } else { 0.0 }
     }
 
@@ -312,9 +321,10 @@ fn seek<D: Draw>(
     start: &Ball,
     draw: impl Fn() -> D,
     is_frictionless: bool,
+    vicinity: &mut Vicinity,
     input: &ConeInput,
 ) -> Option<Rested> {
-    match seek_with(mesh, start, &draw(), is_frictionless, false, input) {
+    match seek_with(mesh, start, &draw(), is_frictionless, false, Some(vicinity), input) {
         Sought::Rested(rested) => Some(rested),
         Sought::Free => None,
         Sought::Unsure => match seek_carefully(mesh, start, &draw(), is_frictionless, input) {
@@ -332,7 +342,7 @@ fn seek_carefully(
     is_frictionless: bool,
     input: &ConeInput,
 ) -> Sought {
-    seek_with(mesh, start, draw, is_frictionless, true, input)
+    seek_with(mesh, start, draw, is_frictionless, true, None, input)
 }
 
 #[inline(always)]
@@ -342,6 +352,7 @@ fn seek_with(
     draw: &impl Draw,
     is_frictionless: bool,
     is_careful: bool,
+    vicinity: Option<&mut Vicinity>,
     input: &ConeInput,
 ) -> Sought {
     let mut ball = *start;
@@ -387,7 +398,9 @@ fn seek_with(
             return Sought::Unsure;
         }
     }
-    if !is_careful && ball.centre_B != start.centre_B && ball.obstacle(mesh).is_some() {
+    if let Some(vicinity) = vicinity.filter(|_| ball.centre_B != start.centre_B)
+        && !ball.is_clear(mesh, vicinity, &start.centre_B)
+    {
         return Sought::Unsure;
     }
     let (look, tangential_B) = match sees {

@@ -60,6 +60,28 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
         })
     }
 
+    /// Visits all faces that may be as near to a point as this \[m\], until `visit` says `false`; says whether it never did.
+    pub(in crate::mesh) fn for_each_within(
+        &self,
+        triangles: Triangles<'_>,
+        p_B: &Vector3<f64>,
+        at_most_m: f64,
+        mut visit: impl FnMut(&Face) -> bool,
+    ) -> bool {
+        let limit = above(at_most_m * at_most_m).min(f32::MAX);
+        let mut stack = Stack::<f32>::new();
+        let p = Rounded::new(p_B);
+        while let Some((_, child)) = stack.pop() {
+            if child.count() == 0 {
+                let node = &self.nodes[child.index()];
+                stack.push(&node.squared_distances(&p), &node.children, limit);
+            } else if !triangles.faces[child.index()..child.index() + child.count()].iter().all(&mut visit) {
+                return false;
+            }
+        }
+        true
+    }
+
     #[inline(always)]
     fn nearest_of(
         &self,

@@ -14,6 +14,7 @@ use nalgebra::Vector3;
 
 use super::foot::Foot;
 use super::press::{MOST, Plane, onto, press};
+use super::vicinity::Vicinity;
 use crate::friction_cone::ConeInput;
 use crate::mesh::{Mesh, Nearest};
 use crate::surface::{Feature, direction_or_up};
@@ -266,6 +267,16 @@ impl Ball {
                 mesh.nearest_above(&self.centre_B, near_m, (&rest.normal_B, offset_m))
             }
         }
+    }
+
+    /// Whether nothing is nearer than it should be; `start_B` is where it was when the tick began.
+    #[inline(always)]
+    pub(super) fn is_clear(&self, mesh: &Mesh, vicinity: &mut Vicinity, start_B: &Vector3<f64>) -> bool {
+        let near_m = self.radius_m - tolerance_m(mesh, self.radius_m);
+        let moved_m = (self.centre_B - start_B).norm();
+        self.rests().first().is_some_and(|rest| {
+            vicinity.is_clear(mesh, &self.centre_B, &rest.normal_B, near_m, moved_m)
+        }) || self.obstacle(mesh).is_none()
     }
 
     /// As [`Self::rolled_to`], as far as nothing else is in the way; by half of its radius at the most.
