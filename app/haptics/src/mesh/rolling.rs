@@ -289,7 +289,8 @@ impl Touching {
         // All that the hierarchy can say cheaply, and what is known.
         let clear_m = mesh.clearance(hip_B, mesh.extent_m()).max(radius_m * (1.0 + f64::EPSILON));
         // Two balls without a face in them that overlap are on the same side.
-        let was_inside = self.is_inside && (hip_B - self.tight.centre_B).norm() < clear_m + self.tight.radius_m;
+        let was_inside =
+            self.is_inside && (hip_B - self.tight.centre_B).norm() < clear_m + self.tight.radius_m;
         if was_inside || mesh.is_inside(hip_B) { clear_m } else { 0.0 }
     }
 
@@ -422,4 +423,4 @@ const ON_THE_MESH: f64 = 1e-9;
 const FARTHER_OUT: [f64; 5] = [1.0, 1.5, 2.5, 5.0, 10.0];
 const MOST_CORRECTIONS: usize = 16;
 const MOST_ROUNDS: u32 = 32;
-const MOST_CAREFUL_ROUNDS: u32 = 48;
+const MOST_CAREFUL_ROUNDS: u32 = 24;

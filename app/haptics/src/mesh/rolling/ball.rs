@@ -274,9 +274,10 @@ impl Ball {
     pub(super) fn is_clear(&self, mesh: &Mesh, vicinity: &mut Vicinity, start_B: &Vector3<f64>) -> bool {
         let near_m = self.radius_m - tolerance_m(mesh, self.radius_m);
         let moved_m = (self.centre_B - start_B).norm();
-        self.rests().first().is_some_and(|rest| {
-            vicinity.is_clear(mesh, &self.centre_B, &rest.normal_B, near_m, moved_m)
-        }) || self.obstacle(mesh).is_none()
+        self.rests()
+            .first()
+            .is_some_and(|rest| vicinity.is_clear(mesh, &self.centre_B, &rest.normal_B, near_m, moved_m))
+            || self.obstacle(mesh).is_none()
     }
 
     /// As [`Self::rolled_to`], as far as nothing else is in the way; by half of its radius at the most.
@@ -444,5 +445,5 @@ const LEAST_HEIGHT: f64 = 1e-3;
 const SHORTEST_LEAP: f64 = 0.125;
 const MOST_LEAPS: usize = 64;
 const MOST_CORRECTIONS: usize = 6;
-const MOST_OBSTACLES: usize = 6;
-const MOST_LOOKS: usize = 40;
+const MOST_OBSTACLES: usize = 4;
+const MOST_LOOKS: usize = 24;

@@ -49,8 +49,13 @@ impl Vicinity {
         near_m: f64,
         moved_m: f64,
     ) -> bool {
-        if !self.has(centre_B) && !(moved_m * 3.0 < self.next * near_m && self.gather(mesh, centre_B, near_m)) {
-            return false;
+        if !self.has(centre_B) {
+            // One that moves fast would gather anew each tick.
+            let is_worth_it = 3.0 * moved_m < self.next * near_m;
+            if !(is_worth_it && self.gather(mesh, centre_B, near_m)) {
+                self.next = (RECOVERY * self.next).min(LARGEST_MARGIN);
+                return false;
+            }
         }
         let offset_m = normal_B.dot(centre_B) - near_m;
         let [x, y, z] = &self.corners;
@@ -68,22 +73,19 @@ impl Vicinity {
     /// Whether there was room for all.
     #[inline(never)]
     fn gather(&mut self, mesh: &Mesh, centre_B: &Vector3<f64>, near_m: f64) -> bool {
-        if self.next < SMALLEST_MARGIN {
-            return false;
-        }
         let margin_m = self.next * near_m;
         let (corners, mut count) = (&mut self.corners, 0);
-        let mut recent = [u32::MAX; RECENT];
+        let mut seen = [u32::MAX; SEEN];
         let has_room = mesh.for_each_within(centre_B, near_m + margin_m, |face| {
             for vertex in face.vertices {
-                // Neighbours in space are neighbours in memory: most repetitions are caught.
-                if recent.contains(&vertex) {
+                // Most repetitions are caught, and the others do no harm.
+                let place = &mut seen[vertex as usize % SEEN];
+                if std::mem::replace(place, vertex) == vertex {
                     continue;
                 }
                 if count == MOST_CORNERS {
                     return false;
                 }
-                recent[count % RECENT] = vertex;
                 let corner = &mesh.vertices[vertex as usize];
                 for axis in 0..3 {
                     corners[axis][count] = corner[axis];
@@ -94,7 +96,7 @@ impl Vicinity {
         });
         if !has_room || count == 0 {
             self.margin_m = -1.0;
-            self.next *= 0.5;
+            self.next *= 0.7;
             return false;
         }
         // Whole lanes, filled with a corner that counts anyway.
@@ -104,14 +106,14 @@ impl Vicinity {
             }
         }
         (self.centre_B, self.margin_m, self.count) = (*centre_B, margin_m, count);
-        self.next = (2.0 * self.next).min(LARGEST_MARGIN);
         true
     }
 }
 
-const MOST_CORNERS: usize = 128;
+const MOST_CORNERS: usize = 192;
 const LANES: usize = 8;
-const RECENT: usize = 16;
+const SEEN: usize = 256;
 /// As shares of the radius.
 const LARGEST_MARGIN: f64 = 1.0;
-const SMALLEST_MARGIN: f64 = 0.1;
+/// After so many corners that there was no room, the margin grows again by this much a tick.
+const RECOVERY: f64 = 1.02;
