@@ -166,6 +166,7 @@ impl Rig {
     pub fn fast_step(&self) -> Result<FastStep, RigError> {
         let entities: Vec<Entity> =
             self.scene.entities.iter().map(|entity| self.entity(entity)).collect::<Result<_, _>>()?;
+        let entities = self.prepared(entities);
         let fingers = self.scene.fingers.iter().map(|finger| {
             let made = Finger::new(finger.radius_m, entities.len())
                 .map_err(|source| self.refused(None, format!("finger {}", finger.name), source))?;
@@ -253,6 +254,15 @@ impl Rig {
             .and_then(|entity| entity.with_friction(friction))
             .map(|entity| entity.with_algorithm(algorithm))
             .map_err(refused)
+    }
+
+    /// What balls cannot feel by its equation they feel in triangles.
+    fn prepared(&self, entities: Vec<Entity>) -> Vec<Entity> {
+        let prepare = |entity: Entity, radius_m: f64| {
+            if entity.is_felt_by(radius_m) { entity } else { entity.prepared_for(radius_m) }
+        };
+        let radii = || self.scene.fingers.iter().map(|finger| finger.radius_m);
+        entities.into_iter().map(|entity| radii().fold(entity, prepare)).collect()
     }
 
     /// A finger would pass through what it cannot feel, without a word.

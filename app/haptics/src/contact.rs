@@ -153,7 +153,7 @@ impl Slot {
             dt_s: sweep.dt_s,
         };
         let input = TouchInput {
-            shape: &entity.shape,
+            shape: entity.shape_for(sweep.finger_radius_m),
             friction: &entity.friction,
             finger_radius_m: sweep.finger_radius_m,
             previous_hip_B: previous_B,

@@ -62,6 +62,7 @@ mod slide;
 mod sphere;
 mod surface;
 mod tangent_view;
+mod tessellated;
 mod torus;
 mod touch_points;
 mod vector_field;
