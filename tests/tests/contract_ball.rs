@@ -54,9 +54,13 @@ fn a_ball_feels_a_cube_of_triangles_as_it_feels_a_box_tick_by_tick() {
         let edges = boxes.iter().filter(|s| s.feature == "edge").count();
         assert!(edges > 100, "{edges} ticks on an edge");
         for (mesh, box_) in meshes.iter().zip(&boxes) {
-            // On faces both are exact. Round the edge each slides in steps of its own, with which the direction turns.
+            // On faces both are exact. Round the edge each slides in steps of its own, and the direction turns with them:
+            // ways of 1e-4 m on arcs of 8e-3 m differ by their square, 1.5e-4 of a force of 3 N at the most, and mend.
             let difference_n = (mesh.force - box_.force).norm();
-            assert!(difference_n <= 5e-5, "{friction}: {difference_n} N apart\nmesh {mesh:?}\nbox  {box_:?}");
+            assert!(
+                difference_n <= 4.5e-4,
+                "{friction}: {difference_n} N apart\nmesh {mesh:?}\nbox  {box_:?}"
+            );
         }
     }
 }

@@ -37,7 +37,7 @@ pub struct Entity {
     /// What stands out of its surface.
     pub height_map: Option<Shared<HeightMap>>,
     /// In triangles, for balls to which the shape itself has nothing to offer; see [`Self::prepared_for`].
-    for_balls: Option<Shape>,
+    pub for_balls: Option<Shape>,
 }
 
 impl Entity {

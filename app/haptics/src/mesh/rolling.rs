@@ -98,6 +98,7 @@ struct Rested {
 }
 
 /// How a search for rest ended.
+#[expect(clippy::large_enum_variant, reason = "it is looked at at once, and a tick must not allocate")]
 enum Sought {
     Rested(Rested),
     /// At the HIP.
@@ -235,7 +236,7 @@ impl Touching {
         if matches!(friction, Friction::None) {
             self.grip.state = FrictionState::Slip;
             let rested = seek(mesh, &self.ball, || Frictionless, true, vicinity, input)?;
-            return Some(self.answer(rested, input));
+            return Some(self.answer(&rested, input));
         }
         if self.is_out(mesh, vicinity, input) {
             return None;
@@ -243,18 +244,18 @@ impl Touching {
         let look = self.ball.look(mesh, input);
         if look.is_free {
             let rested = seek(mesh, &self.ball, || Frictionless, true, vicinity, input)?;
-            return Some(self.answer(rested, input));
+            return Some(self.answer(&rested, input));
         }
         let pull = self.grip.begin_tick(&look.view, input);
         if let Some(tangential_B) = self.grip.hold(friction, &look.view, &pull, input) {
-            return Some(self.answer(Rested { ball: self.ball, look, tangential_B }, input));
+            return Some(self.answer(&Rested { ball: self.ball, look, tangential_B }, input));
         }
         let memory = &self.grip.memory;
         let against = || Against { friction, memory, pull: &pull, input, slides_with: Cell::new(None) };
         let mut rested = seek(mesh, &self.ball, against, false, vicinity, input)?;
         rested.tangential_B +=
             self.grip.drag(friction, &rested.tangential_B, &rested.look.view, &pull, input);
-        Some(self.answer(rested, input))
+        Some(self.answer(&rested, input))
     }
 
     /// Whether the finger is round the corner, whatever friction says.
@@ -294,14 +295,14 @@ impl Touching {
         if was_inside || mesh.is_inside(hip_B) { clear_m } else { 0.0 }
     }
 
-    fn answer(&mut self, rested: Rested, input: &ConeInput) -> Touch {
+    fn answer(&mut self, rested: &Rested, input: &ConeInput) -> Touch {
         let Rested { ball, look, tangential_B } = rested;
-        self.ball = ball;
+        self.ball = *ball;
         let (feature, piece) =
             ball.primary().map_or((Feature::Face, 0), |rest| (rest.foot.feature, rest.foot.face));
         let k = input.stiffness_n_per_m;
         let is_pressed = look.view.load_m > 0.0;
-        let tangential_B = ball.free_part(&tangential_B);
+        let tangential_B = ball.free_part(tangential_B);
         let spring_B = look.normal_spring_B + tangential_B;
         self.answered = (tangential_B, look.view.load_m, k);
         Touch {

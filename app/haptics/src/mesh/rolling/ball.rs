@@ -113,7 +113,8 @@ impl Ball {
             if let Some(rest) = self.rests_mut().get_mut(index) {
                 rest.load_m = view.load_m;
             }
-            let is_free = set == 0 && !(height_m <= tolerance_m(mesh, self.radius_m));
+            let is_near = height_m <= tolerance_m(mesh, self.radius_m);
+            let is_free = set == 0 && !is_near;
             return Look { normal_spring_B: normal_B * view.load_m, view, is_free };
         }
         let out_B = pressed.point_B - input.hip_B;
