@@ -40,9 +40,11 @@ fn every_form_is_felt_by_every_ball() {
             assert!(entity.is_felt_by(radius_m), "{form:?} {radius_m}");
             assert!(entity.is_felt_by(0.0));
             let mut finger = finger(radius_m);
-            let touched = (0..200).any(|i| {
-                let y = (1.0 + radius_m) * (1.0 - f64::from(i) / 199.0) - 0.02;
-                step(&mut finger, &entity, &Vector3::new(0.045, y, 0.0)).entity.is_some()
+            // Down over the tube of a ring, then down the axis.
+            let touched = (0..400).any(|i| {
+                let y = (1.0 + radius_m) * (1.0 - f64::from(i % 200) / 199.0) - 0.02;
+                let x = if i < 200 { 0.045 } else { 0.0 };
+                step(&mut finger, &entity, &Vector3::new(x, y, 0.0)).entity.is_some()
             });
             assert!(touched, "{form:?} {radius_m}");
         }
