@@ -424,4 +424,4 @@ const ON_THE_MESH: f64 = 1e-9;
 const FARTHER_OUT: [f64; 5] = [1.0, 1.5, 2.5, 5.0, 10.0];
 const MOST_CORRECTIONS: usize = 16;
 const MOST_ROUNDS: u32 = 32;
-const MOST_CAREFUL_ROUNDS: u32 = 24;
+const MOST_CAREFUL_ROUNDS: u32 = 48;

@@ -446,5 +446,5 @@ const LEAST_HEIGHT: f64 = 1e-3;
 const SHORTEST_LEAP: f64 = 0.125;
 const MOST_LEAPS: usize = 64;
 const MOST_CORRECTIONS: usize = 6;
-const MOST_OBSTACLES: usize = 4;
-const MOST_LOOKS: usize = 24;
+const MOST_OBSTACLES: usize = 6;
+const MOST_LOOKS: usize = 40;
