@@ -236,6 +236,7 @@ impl DeviceFinger {
         FingerRow {
             god_object: output.god_object_W,
             force_on_user: finite_or_zero(output.force_on_user_W),
+            torque_on_user: finite_or_zero(output.torque_on_user_W),
             entity: output.entity.map(|index| index as u32),
             feature: output.feature,
             friction: output.friction,

@@ -57,11 +57,17 @@ pub struct Names {
     pub extras: Vec<Extras>,
     /// Which are kept passive; those beyond the list are not.
     pub passive: Vec<bool>,
+    /// Whether their torques are told; fingers beyond the list: no.
+    pub torques: Vec<bool>,
     /// The entities.
     pub entities: Vec<String>,
 }
 
 impl Names {
+    fn has_torque(&self, finger: usize) -> bool {
+        self.torques.get(finger).copied().unwrap_or_default()
+    }
+
     fn extras_of(&self, finger: usize) -> Extras {
         self.extras.get(finger).copied().unwrap_or_default()
     }
@@ -202,6 +208,9 @@ fn header(names: &Names) -> String {
         if names.is_passive(index) {
             let _ = write!(line, ",{finger}_energy,{finger}_controlled");
         }
+        if names.has_torque(index) {
+            push_axes(&mut line, finger, "torque");
+        }
     }
     line.push('\n');
     line
@@ -230,6 +239,9 @@ fn write_row(line: &mut String, row: &Row, names: &Names, period_ns: u64) {
         write_extras(line, finger, names.extras_of(index));
         if names.is_passive(index) {
             let _ = write!(line, ",{:?},{:?}", finger.energy_j, finger.controlled_n);
+        }
+        if names.has_torque(index) {
+            write_vector(line, &finger.torque_on_user);
         }
     }
     line.push('\n');
@@ -290,6 +302,7 @@ mod tests {
             fingers: vec!["a".into(), "b".into()],
             extras: Vec::new(),
             passive: Vec::new(),
+            torques: Vec::new(),
             entities: vec!["table".into()],
         }
     }
@@ -352,6 +365,19 @@ mod tests {
         write_row(&mut line, &told, &names, 1_000_000);
         assert!(line.ends_with(",-0.0015,0.25\n"), "{line}");
         assert_eq!(line.matches(',').count(), header(&names).matches(',').count());
+    }
+
+    #[test]
+    fn only_a_finger_with_a_radius_has_columns_for_its_torque() {
+        let plain = header(&names());
+        let names = Names { torques: vec![false, true], ..names() };
+        let added = ",b_torque_x,b_torque_y,b_torque_z\n";
+        assert_eq!(header(&names), plain.trim_end().to_owned() + added, "behind the last finger's others");
+        let mut told = row(0, 1.0);
+        told.fingers[1].torque_on_user = Vector3::new(0.5, -0.25, 0.0);
+        let mut line = String::new();
+        write_row(&mut line, &told, &names, 1_000_000);
+        assert!(line.ends_with(",0.5,-0.25,0.0\n"), "{line}");
     }
 
     #[test]

@@ -168,6 +168,7 @@ impl Rig {
     pub fn fast_step(&self) -> Result<FastStep, RigError> {
         let entities: Vec<Entity> =
             self.scene.entities.iter().map(|entity| self.entity(entity)).collect::<Result<_, _>>()?;
+        let entities = self.prepared(entities);
         let fingers = self.scene.fingers.iter().map(|finger| {
             let made = Finger::new(finger.radius_m, entities.len())
                 .map_err(|source| self.refused(None, format!("finger {}", finger.name), source))?;
@@ -194,6 +195,7 @@ impl Rig {
         Names {
             extras: self.scene.fingers.iter().map(|finger| of(finger.device)).collect(),
             passive: self.scene.fingers.iter().map(|finger| finger.passivity.is_some()).collect(),
+            torques: self.scene.fingers.iter().map(|finger| finger.radius_m > 0.0).collect(),
             fingers: self.scene.fingers.iter().map(|finger| finger.name.clone()).collect(),
             entities: self.scene.entities.iter().map(|entity| entity.name.clone()).collect(),
         }
@@ -279,13 +281,22 @@ impl Rig {
         Err(RigError::NotRendered { file: self.scene_file.clone(), line: spec.line, what, found })
     }
 
+    /// What balls cannot feel by its equation they feel in triangles.
+    fn prepared(&self, entities: Vec<Entity>) -> Vec<Entity> {
+        let prepare = |entity: Entity, radius_m: f64| {
+            if entity.is_felt_by(radius_m) { entity } else { entity.prepared_for(radius_m) }
+        };
+        let radii = || self.scene.fingers.iter().map(|finger| finger.radius_m);
+        entities.into_iter().map(|entity| radii().fold(entity, prepare)).collect()
+    }
+
     /// A finger would pass through what it cannot feel, without a word.
     fn check_felt(&self, entities: &[Entity], finger: &SceneFinger) -> Result<(), RigError> {
-        let not_felt = entities.iter().position(|entity| !entity.shape.is_felt_by(finger.radius_m));
+        let not_felt = entities.iter().position(|entity| !entity.is_felt_by(finger.radius_m));
         let Some(index) = not_felt else { return Ok(()) };
         let spec = &self.scene.entities[index];
-        // A ring is felt by balls that fit through its hole, a mesh by none.
-        let by_smaller = entities[index].shape.is_felt_by(1e-3 * finger.radius_m);
+        // Somebody's own shape may be felt by small balls only.
+        let by_smaller = entities[index].is_felt_by(1e-3 * finger.radius_m);
         Err(RigError::NotFelt {
             file: self.scene_file.clone(),
             line: spec.line,
@@ -293,7 +304,11 @@ impl Rig {
             radius_m: finger.radius_m,
             entity: spec.name.clone(),
             kind: spec.shape.kind(),
-            smaller: if by_smaller { ", a smaller radius" } else { "" },
+            otherwise: match () {
+                () if entities[index].shape.is_felt_by(finger.radius_m) => ", algorithm = \"friction-cone\"",
+                () if by_smaller => ", a smaller radius",
+                () => "",
+            },
         })
     }
 

@@ -22,6 +22,8 @@ pub struct FingerRow {
     pub god_object: Vector3<f64>,
     /// What rendering computed (N).
     pub force_on_user: Vector3<f64>,
+    /// Torque of the same about the finger's centre (N m); recorded where the finger has a radius.
+    pub torque_on_user: Vector3<f64>,
     /// What the device was made to render after ramps, limits and converters (N).
     pub applied_on_user: Vector3<f64>,
     /// How its device's last link is turned, w x y z; recorded where a gimbal measures it.

@@ -69,7 +69,10 @@ impl TouchInput<'_> {
     /// Of a mesh as [`Mesh::is_inside`] says, at a cost that a tick can bear.
     pub fn is_inside(&self) -> bool {
         match self.shape {
-            Shape::Mesh(mesh) => self.finger_radius_m == 0.0 && mesh.is_inside(&self.cone.hip_B),
+            Shape::Mesh(mesh) => {
+                let (hip_B, radius_m) = (&self.cone.hip_B, self.finger_radius_m);
+                mesh.is_inside(hip_B) || radius_m > 0.0 && mesh.nearest_within(hip_B, radius_m).is_some()
+            }
             Shape::Csg(csg) => self.finger_radius_m == 0.0 && csg.is_inside(&self.cone.hip_B),
             _ => self.of_surface(|surface| surface.signed_distance(&self.cone.hip_B) <= 0.0).unwrap_or(false),
         }
@@ -82,12 +85,15 @@ impl TouchInput<'_> {
     pub fn nearest(&self) -> Option<SurfacePoint> {
         let hip_B = &self.cone.hip_B;
         match self.shape {
-            Shape::Mesh(mesh) => (self.finger_radius_m == 0.0).then(|| nearest_of_mesh(mesh, hip_B)),
+            Shape::Mesh(mesh) => {
+                let at = nearest_of_mesh(mesh, hip_B);
+                Some(SurfacePoint { point_B: at.point_B + at.normal_B * self.finger_radius_m, ..at })
+            }
             _ => self.of_surface(|surface| surface.nearest(hip_B)),
         }
     }
 
-    /// Where the HIP's last step entered the material first.
+    /// Where the HIP's last step entered the material first; `None` for a finger with a radius and a mesh.
     pub fn entry(&self) -> Option<SurfacePoint> {
         let (from_B, to_B) = (self.previous_hip_B?, self.cone.hip_B);
         match self.shape {

@@ -22,6 +22,7 @@ use crate::hip::Hip;
 use crate::mesh::{Beginning, Mesh, MeshCone, RollingCone};
 use crate::shape::Shape;
 use crate::surface::{Feature, Surface};
+use crate::touch_points::TouchPoints;
 use crate::vector_field::VectorField;
 
 /// What a finger feels of one entity in one tick, in the world frame.
@@ -66,13 +67,16 @@ pub(crate) struct Sweep<'h> {
 }
 
 /// A finger's place for one entity.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Slot {
     cone: Option<FrictionCone>,
     mesh: MeshCone,
-    rolling: RollingCone,
+    /// Of a ball; large, and points have none.
+    rolling: Option<Box<RollingCone>>,
     csg: CsgCone,
     own: ContactMemory,
+    /// Whether anything was noted here since it was new.
+    is_used: bool,
     /// How much of the force is rendered, 0 to 1.
     strength: f64,
     pub(crate) contact: Option<Contact>,
@@ -84,14 +88,48 @@ pub const RAMP_IN_S: f64 = 0.1;
 
 impl Slot {
     pub(crate) fn step(&mut self, index: usize, entity: &Entity, sweep: &Sweep<'_>) -> Option<&Contact> {
+        self.is_used = true;
         self.contact = self.touch(index, entity, sweep);
         if self.contact.is_none() {
             self.cone = None;
             self.mesh.let_go();
-            self.rolling.let_go();
+            self.let_roll_go();
             self.csg.let_go();
         }
         self.contact.as_ref()
+    }
+
+    /// For a finger of this radius.
+    pub(crate) fn new(finger_radius_m: f64) -> Self {
+        let rolling = (finger_radius_m > 0.0).then(Box::default);
+        Self { rolling, ..Self::default() }
+    }
+
+    /// Forgets everything, if there is anything to forget.
+    pub(crate) fn vacate(&mut self) {
+        if self.is_used {
+            let mut rolling = self.rolling.take();
+            if let Some(rolling) = &mut rolling {
+                **rolling = RollingCone::default();
+            }
+            *self = Self { rolling, ..Self::default() };
+        }
+    }
+
+    fn let_roll_go(&mut self) {
+        if let Some(rolling) = &mut self.rolling {
+            rolling.let_go();
+        }
+    }
+
+    /// Where the finger touches the entity, in this tick.
+    pub(crate) fn touch_points(&self, entity: &Entity, finger_radius_m: f64) -> TouchPoints {
+        let Some(contact) = &self.contact else { return TouchPoints::NONE };
+        let rolls = self.rolling.as_ref().filter(|rolling| rolling.is_touching());
+        match rolls {
+            Some(rolling) => TouchPoints::of_shares(rolling.shares(), entity, contact, self.strength),
+            None => TouchPoints::single(contact, finger_radius_m),
+        }
     }
 
     fn touch(&mut self, index: usize, entity: &Entity, sweep: &Sweep<'_>) -> Option<Contact> {
@@ -115,7 +153,7 @@ impl Slot {
             dt_s: sweep.dt_s,
         };
         let input = TouchInput {
-            shape: &entity.shape,
+            shape: entity.shape_for(sweep.finger_radius_m),
             friction: &entity.friction,
             finger_radius_m: sweep.finger_radius_m,
             previous_hip_B: previous_B,
@@ -145,6 +183,7 @@ impl Slot {
 
     fn touch_by(&mut self, algorithm: &dyn ContactAlgorithm, input: &TouchInput<'_>) -> Option<Touch> {
         (self.cone, self.mesh) = (None, MeshCone::default());
+        self.let_roll_go();
         let begins = self.contact.is_none();
         if begins {
             self.own = ContactMemory::default();
@@ -163,7 +202,8 @@ impl Slot {
             Shape::Own(surface) if input.finger_radius_m == 0.0 => self.touch_surface(&**surface, input),
             Shape::Own(_) => input.of_surface(|grown| self.touch_surface(grown, input))?,
             Shape::Mesh(mesh) => {
-                let touched = self.rolling.update(mesh, input);
+                self.cone = None;
+                let touched = self.rolling.as_mut()?.update(mesh, input);
                 self.begun(touched)
             }
             Shape::Csg(csg) => {
@@ -195,6 +235,7 @@ impl Slot {
     fn touch_surface<S: Surface + ?Sized>(&mut self, surface: &S, input: &TouchInput<'_>) -> Option<Touch> {
         self.mesh.let_go();
         self.csg.let_go();
+        self.let_roll_go();
         let distance_m = surface.signed_distance(&input.cone.hip_B);
         let cone = match &mut self.cone {
             Some(cone) => cone,

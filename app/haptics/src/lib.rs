@@ -65,7 +65,9 @@ mod slide;
 mod sphere;
 mod surface;
 mod tangent_view;
+mod tessellated;
 mod torus;
+mod touch_points;
 mod vector_field;
 
 pub use algorithm::{Algorithm, CONTACT_WORDS, ContactAlgorithm, ContactMemory, Touch, TouchInput};
@@ -102,4 +104,5 @@ pub use slide::MAX_SLIDE_ROUNDS;
 pub use sphere::Sphere;
 pub use surface::{Feature, Surface, SurfacePoint};
 pub use torus::Torus;
+pub use touch_points::{MAX_TOUCH_POINTS, TouchPoint, TouchPoints};
 pub use vector_field::VectorField;

@@ -55,7 +55,7 @@ pub use face::{Face, Link};
 pub use mesh_cone::{Beginning, MeshCone};
 pub use normals::{SHARPEST_CREASE_RAD, VertexNormals};
 pub use report::{Finding, MeshReport};
-pub(crate) use rolling::RollingCone;
+pub(crate) use rolling::{RollingCone, Share};
 pub use soup::TriangleSoup;
 pub use walk::MAX_FEATURE_CHANGES;
 

@@ -82,7 +82,8 @@ impl Shape {
         let is_point = finger_radius_m == 0.0;
         match self {
             Self::Form(form) => is_point || form.grown(finger_radius_m).is_some(),
-            Self::Mesh(_) | Self::Csg(_) => is_point,
+            Self::Mesh(_) => true,
+            Self::Csg(_) => is_point,
             Self::Own(surface) => is_point || surface.show_grown(finger_radius_m, &mut |_| {}),
         }
     }

@@ -8,7 +8,7 @@
 //! middle line the normal is +y. Signed distances are exact everywhere.
 //! Invariants: the ring is wider than the tube is thick, so that there is a hole: otherwise the surface would meet
 //! itself in a dimple where no single normal exists. That holds for grown tori, too: a ball that does not fit through
-//! the hole cannot feel this shape.
+//! the hole feels this shape in triangles ([`crate::Entity::prepared_for`]).
 //! Cost: two square roots per question; an entry near enough to be possible solves a quartic.
 
 use nalgebra::Vector3;

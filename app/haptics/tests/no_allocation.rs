@@ -205,3 +205,28 @@ fn queries_of_a_mesh_never_allocate() {
     assert_eq!(CALLS.get() - before, 0);
     assert!(hits > 1000 && inside > 1000, "{hits} {inside}");
 }
+
+#[test]
+fn a_ball_on_a_mesh_never_allocates() {
+    let bumpy = std::sync::Arc::new(Mesh::build(make::bumpy_sphere(100, 51, 0.02)).unwrap().0);
+    let knot = std::sync::Arc::new(Mesh::build(make::klein_bottle(40, 20, 0.04)).unwrap().0);
+    let entities = [entity(bumpy, stiction()), entity(knot, Friction::None)];
+    let mut finger = Finger::new(2e-3, entities.len()).unwrap();
+    let mut noise = Noise(10);
+    let (mut free, mut touched) = (0, 0);
+    let before = CALLS.get();
+    for i in 0..20_000 {
+        let t = f64::from(i) * DT;
+        let hip = Vector3::new(0.025 * (2.0 * t).sin(), 0.025 * (3.0 * t).cos(), 0.01 * t.sin())
+            + noise.vector(1e-5);
+        if i % 500 == 0 {
+            finger.forget(0);
+        }
+        match finger.step(&entities, &hip, DT).friction {
+            haptics::ContactState::Free => free += 1,
+            _ => touched += finger.touch_points(&entities, 0).as_slice().len().min(1),
+        }
+    }
+    assert_eq!(CALLS.get() - before, 0);
+    assert!(free > 1000 && touched > 1000, "{free} {touched}");
+}

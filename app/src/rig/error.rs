@@ -113,7 +113,7 @@ pub enum RigError {
     /// A finger with a radius meets a shape that has no surface for its centre to roll on.
     #[error(
         "{}:{line}: finger {finger} has radius_m = {radius_m}, and entity {entity}, a {kind}, cannot be felt by such a finger; \
-         allowed: radius_m = 0, which feels every shape{smaller}, or another shape", .file.display()
+         allowed: radius_m = 0, which feels every shape{otherwise}, or another shape", .file.display()
     )]
     NotFelt {
         /// The scene's file.
@@ -128,8 +128,8 @@ pub enum RigError {
         entity: String,
         /// The kind of its shape.
         kind: &'static str,
-        /// Whether a smaller radius would do.
-        smaller: &'static str,
+        /// What else would do.
+        otherwise: &'static str,
     },
     /// Something of the grammar that this version has not got.
     #[error("{file}: {what} is not available in this version")]

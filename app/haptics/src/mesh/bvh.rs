@@ -28,6 +28,7 @@ mod stack;
 use nalgebra::Vector3;
 
 use super::Face;
+pub(in crate::mesh) use closest::closest_on;
 pub use nearest::Nearest;
 pub use segment::Hit;
 #[cfg(test)]

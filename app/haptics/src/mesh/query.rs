@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Hit, Mesh, Nearest, Sides, Triangles};
+use super::{Face, Hit, Mesh, Nearest, Sides, Triangles};
 
 impl Mesh {
     /// The first face that the segment `from_B -> to_B` enters: from outside, or from either side of a sheet.
@@ -39,6 +39,31 @@ impl Mesh {
     /// answer is that for a point 1000 extents away in the same direction, with the point's own distance.
     pub fn nearest_unbounded(&self, p_B: &Vector3<f64>) -> Nearest {
         self.bvh.nearest_unbounded(self.triangles(), p_B)
+    }
+
+    /// As [`Self::nearest`], if it is as near as this \[m\].
+    pub(crate) fn nearest_within(&self, p_B: &Vector3<f64>, at_most_m: f64) -> Option<Nearest> {
+        self.bvh.nearest_within(self.triangles(), p_B, at_most_m)
+    }
+
+    /// Visits all faces that may be as near as this \[m\], until `visit` says `false`; says whether it never did.
+    pub(crate) fn for_each_within(
+        &self,
+        p_B: &Vector3<f64>,
+        at_most_m: f64,
+        visit: impl FnMut(&Face) -> bool,
+    ) -> bool {
+        self.bvh.for_each_within(self.triangles(), p_B, at_most_m, visit)
+    }
+
+    /// As [`Self::nearest_within`], of faces that reach above a plane that is no nearer than this either.
+    pub(crate) fn nearest_above(
+        &self,
+        p_B: &Vector3<f64>,
+        at_most_m: f64,
+        plane: (&Vector3<f64>, f64),
+    ) -> Option<Nearest> {
+        self.bvh.nearest_above(self.triangles(), p_B, at_most_m, plane)
     }
 
     /// Whether a point is inside or on the surface, at a cost that a tick can bear. A sheet has no inside.

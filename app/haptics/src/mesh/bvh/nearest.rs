@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 
 use super::closest::{Closest, closest_on};
 use super::stack::Stack;
-use super::{Bvh, Rounded, Triangles, above};
+use super::{Bvh, Face, Rounded, Triangles, above, larger};
 use crate::surface::Feature;
 
 /// The point of a mesh nearest to a given one.
@@ -40,6 +40,88 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
     /// be a little farther away than the nearest.
     pub fn nearest(&self, triangles: Triangles<'_>, p_B: &Vector3<f64>) -> Nearest {
         self.nearest_of_visited(triangles, p_B, MOST_VISITS).0
+    }
+
+    /// The nearest point of the faces, if any is as near as this \[m\]: the smaller, the cheaper.
+    pub(in crate::mesh) fn nearest_within(
+        &self,
+        triangles: Triangles<'_>,
+        p_B: &Vector3<f64>,
+        at_most_m: f64,
+    ) -> Option<Nearest> {
+        self.nearest_of(triangles, p_B, at_most_m, |_| true)
+    }
+
+    /// As [`Self::nearest_within`], of what reaches above a plane that is as far below the point, `normal . x = offset`:
+    /// a face with all corners below need not be looked at. On a convex mesh that is every one.
+    pub(in crate::mesh) fn nearest_above(
+        &self,
+        triangles: Triangles<'_>,
+        p_B: &Vector3<f64>,
+        at_most_m: f64,
+        (normal_B, offset_m): (&Vector3<f64>, f64),
+    ) -> Option<Nearest> {
+        self.nearest_of(triangles, p_B, at_most_m, |face| {
+            let [a, b, c] = triangles.corners(face).map(|corner| normal_B.dot(&corner));
+            larger(larger(a, b), c) > offset_m
+        })
+    }
+
+    /// Visits all faces that may be as near to a point as this \[m\], until `visit` says `false`; says whether it never did.
+    pub(in crate::mesh) fn for_each_within(
+        &self,
+        triangles: Triangles<'_>,
+        p_B: &Vector3<f64>,
+        at_most_m: f64,
+        mut visit: impl FnMut(&Face) -> bool,
+    ) -> bool {
+        let limit = above(at_most_m * at_most_m).min(f32::MAX);
+        let mut stack = Stack::<f32>::new();
+        let p = Rounded::new(p_B);
+        while let Some((_, child)) = stack.pop() {
+            if child.count() == 0 {
+                let node = &self.nodes[child.index()];
+                stack.push(&node.squared_distances(&p), &node.children, limit);
+            } else if !triangles.faces[child.index()..child.index() + child.count()].iter().all(&mut visit) {
+                return false;
+            }
+        }
+        true
+    }
+
+    #[inline(always)]
+    fn nearest_of(
+        &self,
+        triangles: Triangles<'_>,
+        p_B: &Vector3<f64>,
+        at_most_m: f64,
+        counts: impl Fn(&Face) -> bool,
+    ) -> Option<Nearest> {
+        let mut search = Search::new(triangles, p_B, self.extent_m());
+        if search.limit < 0.0 || search.p_B != *p_B {
+            // Not finite, or farther away than any ball is large.
+            return None;
+        }
+        search.reach_m = at_most_m;
+        search.limit = above(at_most_m * at_most_m).min(f32::MAX);
+        let mut stack = Stack::<f32>::new();
+        let p = Rounded::new(&search.p_B);
+        while let Some((squared_distance, child)) = stack.pop() {
+            if squared_distance > search.limit {
+                continue;
+            }
+            if child.count() == 0 {
+                let node = &self.nodes[child.index()];
+                stack.push(&node.squared_distances(&p), &node.children, search.limit);
+            } else {
+                for face in child.index()..child.index() + child.count() {
+                    if counts(&triangles.faces[face]) && search.may_reach(triangles, face as u32) {
+                        search.consider(triangles, face as u32);
+                    }
+                }
+            }
+        }
+        (search.best.squared_distance <= at_most_m * at_most_m).then(|| search.result(p_B))
     }
 
     /// As [`Self::nearest_unbounded`], and `true`; or the nearest of what was seen when so many nodes and runs of faces had been
@@ -101,6 +183,26 @@ impl Search {
             // Finite, since boxes of nothing are infinitely far away.
             limit: if is_finite { f32::MAX } else { -1.0 },
         }
+    }
+
+    /// Whether a face is not obviously too far away: of most faces beside a tangent ball, one edge shows it, and
+    /// without a division.
+    #[inline(always)]
+    fn may_reach(&self, triangles: Triangles<'_>, index: u32) -> bool {
+        let face = &triangles.faces[index as usize];
+        let height = face.normal_B.dot(&self.p_B) - face.offset_m;
+        let left = self.reach_m * self.reach_m - height * height;
+        if left < 0.0 {
+            return false;
+        }
+        let left = left * (1.0 + ROUNDING) + self.slack_m * self.slack_m;
+        let [a, b, c] = triangles.corners(face);
+        let is_beyond = |from: &Vector3<f64>, to: &Vector3<f64>| {
+            let edge = to - from;
+            let beyond = edge.cross(&face.normal_B).dot(&(self.p_B - from));
+            beyond > 0.0 && beyond * beyond > left * edge.norm_squared()
+        };
+        !(is_beyond(&a, &b) | is_beyond(&b, &c) | is_beyond(&c, &a))
     }
 
     #[inline(always)]
