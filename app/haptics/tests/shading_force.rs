@@ -70,7 +70,7 @@ fn a_shaded_ball_of_triangles_feels_like_a_ball_and_the_more_so_the_finer_it_is(
         let [faceted, shaded] = [Shading::None, interpolated(&mesh)].map(|shading| {
             let felt = directions(&shaded(&mesh, Friction::None, shading), around_ball(rho));
             assert!(felt.len() > 59_000, "{}", felt.len());
-            let errors = felt.iter().map(|(hip, force, _)| degrees(force, &hip));
+            let errors = felt.iter().map(|(hip, force, _)| degrees(force, hip));
             let (mean, worst) = errors.fold((0.0, 0.0_f64), |(sum, worst), e| (sum + e, worst.max(e)));
             [mean / felt.len() as f64, worst]
         });

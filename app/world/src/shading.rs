@@ -78,11 +78,8 @@ impl ShadingSpec {
 
 /// What is round has no facets, and would silently feel as before.
 fn check_shape(kind: &str, kind_value: &Value<'_>, shape: &ShapeSpec) -> Result<(), SceneError> {
-    let is_fit = match (kind, shape) {
-        ("none", _) | (_, ShapeSpec::Mesh(_)) => true,
-        ("regions", ShapeSpec::Box { .. }) => true,
-        _ => false,
-    };
+    let is_fit =
+        matches!((kind, shape), ("none", _) | (_, ShapeSpec::Mesh(_)) | ("regions", ShapeSpec::Box { .. }));
     if is_fit {
         return Ok(());
     }
