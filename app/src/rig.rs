@@ -4,10 +4,12 @@
 mod error;
 mod material;
 mod models;
+mod pictures;
 
 pub use self::error::RigError;
 use self::material::Unfit;
 use self::models::Models;
+use self::pictures::Pictures;
 use crate::fast_step::{DeviceFinger, FastStep};
 use crate::mount::Mount;
 use crate::recording::Names;
@@ -45,6 +47,7 @@ pub struct Rig {
     /// X_WD of each device; beyond the list the world's origin.
     bases: Vec<Isometry3<f64>>,
     models: Models,
+    pictures: Pictures,
 }
 
 /// How the hand moves the devices that are not real.
@@ -90,6 +93,7 @@ impl Rig {
         let mut rig = Self {
             scene_file: scene_file.into(),
             models: Models::load(&scene)?,
+            pictures: Pictures::load(&scene)?,
             scene,
             layout,
             hand_mode,
@@ -244,14 +248,20 @@ impl Rig {
             Unfit::Refused(source) => refused(source),
             Unfit::NotAvailable(it) => self.not_available(format!("{}: {it}", what())),
         };
-        let shape = material::shape(&spec.shape, &self.models).map_err(unfit)?;
+        let shape = material::shape(&spec.shape, &self.models, spec.height_map.is_some()).map_err(unfit)?;
         let friction = material::friction(&spec.friction).map_err(unfit)?;
         let algorithm = material::algorithm(spec.algorithm).map_err(unfit)?;
-        Entity::new(shape, spec.pose, spec.stiffness_n_per_m)
+        let height_map =
+            spec.height_map.as_ref().map(|map| self.pictures.height_map(map, &shape)).transpose()?;
+        let entity = Entity::new(shape, spec.pose, spec.stiffness_n_per_m)
             .and_then(|entity| entity.with_damping(spec.damping_n_s_per_m))
             .and_then(|entity| entity.with_friction(friction))
             .map(|entity| entity.with_algorithm(algorithm))
-            .map_err(refused)
+            .map_err(refused)?;
+        Ok(match height_map {
+            Some(height_map) => entity.with_height_map(height_map),
+            None => entity,
+        })
     }
 
     /// A finger would pass through what it cannot feel, without a word.
@@ -272,12 +282,13 @@ impl Rig {
         })
     }
 
-    /// The model files that it is made of.
+    /// The model and picture files that it is made of.
     pub fn model_files(&self) -> impl Iterator<Item = &PathBuf> {
-        self.scene.entities.iter().filter_map(|entity| match &entity.shape {
+        let models = self.scene.entities.iter().filter_map(|entity| match &entity.shape {
             ShapeSpec::Mesh(mesh) => Some(&mesh.file),
             _ => None,
-        })
+        });
+        models.chain(self.scene.entities.iter().filter_map(|entity| Some(&entity.height_map.as_ref()?.file)))
     }
 
     fn refused(&self, line: Option<usize>, what: String, source: ParameterError) -> RigError {

@@ -23,9 +23,9 @@ impl From<ParameterError> for Unfit {
 }
 
 /// A shape; meshes are those that were loaded.
-pub(super) fn shape(spec: &ShapeSpec, models: &Models) -> Result<Shape, Unfit> {
+pub(super) fn shape(spec: &ShapeSpec, models: &Models, has_picture: bool) -> Result<Shape, Unfit> {
     match spec {
-        ShapeSpec::Mesh(mesh) => match models.mesh(mesh) {
+        ShapeSpec::Mesh(mesh) => match models.mesh(mesh, has_picture) {
             Some(mesh) => Ok(Arc::clone(mesh).into()),
             None => Err(Unfit::NotAvailable(format!("shape {spec:?}"))),
         },

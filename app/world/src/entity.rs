@@ -4,6 +4,7 @@ use nalgebra::Isometry3;
 
 use crate::error::SceneError;
 use crate::friction::FrictionSpec;
+use crate::height_map::HeightMapSpec;
 use crate::names::Names;
 use crate::pose::read_pose;
 use crate::reader::{Bound, Table};
@@ -29,6 +30,8 @@ pub struct SceneEntity {
     pub friction: FrictionSpec,
     /// Default the Friction Cone Algorithm.
     pub algorithm: AlgorithmSpec,
+    /// Default none.
+    pub height_map: Option<HeightMapSpec>,
 }
 
 /// What works out the force of contacts with an entity.
@@ -53,10 +56,13 @@ impl SceneEntity {
     pub(crate) fn read(table: &Table<'_>, i: usize, names: &mut Names) -> Result<Self, SceneError> {
         table.check_keys(&KEYS)?;
         let stiffness_default = Self::DEFAULT_STIFFNESS_N_PER_M;
+        let name = names.claim(table, format!("e{i}"))?;
+        let shape = ShapeSpec::read(table)?;
         Ok(Self {
-            name: names.claim(table, format!("e{i}"))?,
+            name,
             line: table.document().line(table.offset()),
-            shape: ShapeSpec::read(table)?,
+            height_map: HeightMapSpec::read(table, &shape)?,
+            shape,
             pose: read_pose(table)?,
             stiffness_n_per_m: table.number_or("stiffness_n_per_m", Bound::Positive, stiffness_default)?,
             damping_n_s_per_m: table.number_or("damping_n_s_per_m", Bound::NotNegative, 0.0)?,
@@ -90,6 +96,7 @@ const KEYS: Vocabulary = Vocabulary {
         "damping_n_s_per_m",
         "friction",
         "algorithm",
+        "height_map",
     ],
     later: &[
         "velocity_m_s",

@@ -239,6 +239,14 @@ impl<'d> Value<'d> {
         Ok(path)
     }
 
+    /// Yes or no.
+    pub(crate) fn truth(&self) -> Result<bool, SceneError> {
+        match self.value.get_ref() {
+            DeValue::Boolean(truth) => Ok(*truth),
+            _ => Err(self.wrong_type("true or false")),
+        }
+    }
+
     /// One of the words that this version implements.
     pub(crate) fn choose(&self, what: &'static str, words: &Vocabulary) -> Result<&'static str, SceneError> {
         let available = words.list();
