@@ -14,7 +14,7 @@
 //!   `n' = normalise(n - grad h)`. The part of the force along n is `k (d + h)`, that along the surface
 //!   `-k (d + h) grad h`: without friction this is the gradient of `k/2 (d + h)^2`, and no path gains energy. Friction
 //!   keeps its share of the normal force and turns with the normal. On curved surfaces this holds to first order in
-//!   h over the radius of curvature.
+//!   (d + h) over the radius of curvature, since the slope is taken at the surface and not where the finger is.
 //!
 //! Where touch begins: with the gradient form a raised surface is met at its own height, because the contact is that with
 //! the shape grown by the map's largest height, less what is missing below that ([`HeightMap::lift_m`]): the force begins at
