@@ -50,7 +50,7 @@ fn made(spec: &HeightMapSpec, grid: Arc<HeightGrid>) -> Result<HeightMap, Height
 
 fn load(spec: &HeightMapSpec) -> Result<HeightGrid, RigError> {
     load_png(&spec.file).map_err(|source| RigError::Picture {
-        at: Box::new(spec.at.clone()),
+        at: Box::new(spec.file_at.clone()),
         file: spec.file.clone(),
         source,
     })

@@ -28,6 +28,8 @@ pub struct HeightMapSpec {
     pub zero_level: f64,
     /// Where the scene says so, for messages.
     pub at: Location,
+    /// Where it names the file.
+    pub file_at: Location,
 }
 
 impl HeightMapSpec {
@@ -50,6 +52,7 @@ impl HeightMapSpec {
             invert: table.get("invert").map_or(Ok(false), |invert| invert.truth())?,
             zero_level: read_zero_level(&table)?,
             at: *value.at(),
+            file_at: *file.at(),
         }))
     }
 }
