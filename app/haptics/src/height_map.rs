@@ -179,7 +179,8 @@ impl HeightMap {
         let can_grow = match shape {
             Shape::Form(form) => form.grown(radius_m).is_some(),
             Shape::Own(surface) => surface.show_grown(radius_m, &mut |_| {}),
-            Shape::Mesh(_) | Shape::Csg(_) => false,
+            // A mesh is met by rolling a ball over it, which would round off its concave edges; and costs ten times as much.
+            _ => false,
         };
         if can_grow { highest_m } else { 0.0 }
     }
@@ -287,7 +288,7 @@ fn some_point(shape: &Shape) -> SurfacePoint {
     match shape {
         Shape::Form(form) => form.nearest(&far_B),
         Shape::Own(surface) => surface.nearest(&far_B),
-        Shape::Mesh(_) | Shape::Csg(_) => SurfacePoint {
+        _ => SurfacePoint {
             point_B: Vector3::zeros(),
             normal_B: Vector3::y(),
             feature: crate::surface::Feature::Face,

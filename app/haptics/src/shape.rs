@@ -97,8 +97,8 @@ impl Shape {
         match self {
             Self::Form(form) => form.chart(at),
             Self::Mesh(mesh) => mesh.chart(at.piece, &at.point_B),
-            Self::Csg(_) => None,
             Self::Own(surface) => surface.chart(at),
+            _ => None,
         }
     }
 }
