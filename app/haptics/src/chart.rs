@@ -111,7 +111,7 @@ impl Chart {
     /// that make metres again, `normal_B` is the stretched surface's.
     pub(crate) fn stretched(self, factors: &Vector3<f64>, along: [f64; 2], normal_B: &Vector3<f64>) -> Self {
         // A gradient goes with the inverse of what places go with; only its part along the surface is one.
-        let stretch = |gradient_B: Vector3<f64>| along_surface(&gradient_B.component_mul(factors), normal_B);
+        let stretch = |gradient_B: Vector3<f64>| along_surface(&gradient_B.component_div(factors), normal_B);
         Self {
             u: self.u.stretched(along[0], stretch(self.u.gradient_B)),
             v: self.v.stretched(along[1], stretch(self.v.gradient_B)),
