@@ -5,10 +5,12 @@ mod effects;
 mod error;
 mod material;
 mod models;
+mod pictures;
 
 pub use self::error::RigError;
 use self::material::Unfit;
 use self::models::Models;
+use self::pictures::Pictures;
 use crate::fast_step::{DeviceFinger, FastStep};
 use crate::mount::Mount;
 use crate::recording::Names;
@@ -47,6 +49,7 @@ pub struct Rig {
     /// X_WD of each device; beyond the list the world's origin.
     bases: Vec<Isometry3<f64>>,
     models: Models,
+    pictures: Pictures,
 }
 
 /// How the hand moves the devices that are not real.
@@ -92,6 +95,7 @@ impl Rig {
         let mut rig = Self {
             scene_file: scene_file.into(),
             models: Models::load(&scene)?,
+            pictures: Pictures::load(&scene)?,
             scene,
             layout,
             hand_mode,
@@ -256,15 +260,21 @@ impl Rig {
         let refused = |source| self.refused(Some(spec.line), what(), source);
         let unfit = |unfit| self.unfit(spec.line, what(), unfit);
         self.check_rendered(spec, what())?;
-        let shape = material::shape(&spec.shape, &self.models).map_err(unfit)?;
+        let shape = material::shape(&spec.shape, &self.models, spec.height_map.is_some()).map_err(unfit)?;
         let friction = material::friction(&spec.friction).map_err(unfit)?;
         let algorithm = material::algorithm(spec.algorithm).map_err(unfit)?;
-        let shading = material::shading(spec.shading, &spec.shape, &self.models).map_err(unfit)?;
+        let shading = material::shading(spec, &self.models).map_err(unfit)?;
+        let height_map =
+            spec.height_map.as_ref().map(|map| self.pictures.height_map(map, &shape)).transpose()?;
         let entity = Entity::new(shape, spec.pose, spec.stiffness_n_per_m)
             .and_then(|entity| entity.with_damping(spec.damping_n_s_per_m))
             .and_then(|entity| entity.with_friction(friction))
             .map(|entity| entity.with_algorithm(algorithm).with_shading(shading))
             .map_err(refused)?;
+        let entity = match height_map {
+            Some(height_map) => entity.with_height_map(height_map),
+            None => entity,
+        };
         self.with_surface_effects(entity, spec)
     }
 
@@ -312,12 +322,13 @@ impl Rig {
         })
     }
 
-    /// The model files that it is made of.
+    /// The model and picture files that it is made of.
     pub fn model_files(&self) -> impl Iterator<Item = &PathBuf> {
-        self.scene.entities.iter().filter_map(|entity| match &entity.shape {
+        let models = self.scene.entities.iter().filter_map(|entity| match &entity.shape {
             ShapeSpec::Mesh(mesh) => Some(&mesh.file),
             _ => None,
-        })
+        });
+        models.chain(self.scene.entities.iter().filter_map(|entity| Some(&entity.height_map.as_ref()?.file)))
     }
 
     fn refused(&self, line: Option<usize>, what: String, source: ParameterError) -> RigError {

@@ -31,6 +31,7 @@
 
 mod algorithm;
 mod capsule;
+mod chart;
 mod classic_god_object;
 mod cone;
 mod constraints;
@@ -72,6 +73,7 @@ mod vector_field;
 
 pub use algorithm::{Algorithm, CONTACT_WORDS, ContactAlgorithm, ContactMemory, Touch, TouchInput};
 pub use capsule::Capsule;
+pub use chart::{Chart, Coordinate, POLE_SHARE};
 pub use classic_god_object::ClassicGodObject;
 pub use cone::Cone;
 pub use contact::{Contact, RAMP_IN_S};
@@ -92,7 +94,9 @@ pub use friction::{
 };
 pub use friction_cone::{ConeForce, ConeInput, FrictionCone};
 pub use friction_law::{FrictionLaw, FrictionMemory, FrictionQuery, FrictionState, MEMORY_WORDS};
-pub use height_map::HeightMap;
+pub use height_map::{
+    Border, HeightForm, HeightGrid, HeightMap, HeightMapError, MAX_GRID_SIDE, PictureScale,
+};
 pub use hip::Hip;
 pub use material::Material;
 pub use plane::Plane;

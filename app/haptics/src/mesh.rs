@@ -44,6 +44,7 @@ mod sliver;
 mod soup;
 mod topology;
 mod touching;
+mod uv;
 mod walk;
 mod winding;
 
@@ -57,10 +58,12 @@ pub use normals::{SHARPEST_CREASE_RAD, VertexNormals};
 pub use report::{Finding, MeshReport};
 pub(crate) use rolling::{RollingCone, Share};
 pub use soup::TriangleSoup;
+pub use uv::CornerUv;
 pub use walk::MAX_FEATURE_CHANGES;
 
 use nalgebra::Vector3;
 use std::fmt;
+use uv::FaceUv;
 
 /// The most faces around a vertex: a walk goes round it within a tick.
 pub const MAX_VALENCE: u32 = 16_384;
@@ -74,6 +77,8 @@ pub struct Mesh {
     extent_m: f64,
     /// Of all meshes that this process has built, which. An address would be another mesh's as soon as this one is gone.
     identity: u64,
+    /// Texture coordinates of each face's corners, where somebody gave any: 24 bytes a face beside its 64.
+    uv: Option<Box<[FaceUv]>>,
 }
 
 /// From where a mesh can be felt.

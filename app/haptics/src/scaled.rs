@@ -17,6 +17,7 @@
 use nalgebra::Vector3;
 
 use crate::capsule::Capsule;
+use crate::chart::Chart;
 use crate::cone::Cone;
 use crate::convex::direction_or;
 use crate::cuboid::Cuboid;
@@ -225,6 +226,16 @@ impl Surface for Scaled {
         let (a, b, diagonal) = (bend(one), bend(other), bend(one + other));
         let mixed = diagonal - 0.5 * (a + b);
         a > 0.0 && b > 0.0 && a * b > mixed * mixed
+    }
+
+    fn chart(&self, at: &SurfacePoint) -> Option<Chart> {
+        let chart = self.surface().chart(&self.unscaled_point(at))?;
+        let level = 0.5 * (self.factors.x + self.factors.z);
+        let upward = match self.unscaled {
+            Unscaled::Cylinder(_) | Unscaled::Cone(_) => self.factors.y,
+            Unscaled::Torus(_) | Unscaled::Capsule(_) => 0.5 * (level + self.factors.y),
+        };
+        Some(chart.stretched(&self.factors, [level, upward], &at.normal_B))
     }
 
     fn grown(&self, _radius_m: f64) -> Option<Self> {

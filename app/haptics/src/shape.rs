@@ -7,6 +7,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use crate::capsule::Capsule;
+use crate::chart::Chart;
 use crate::cone::Cone;
 use crate::csg::Csg;
 use crate::cuboid::Cuboid;
@@ -89,6 +90,20 @@ impl Shape {
     }
 }
 
+/// Where a picture lies on it.
+impl Shape {
+    /// Coordinates along the surface at one of its points; `None` where there are none: on trees of shapes, on meshes
+    /// without texture coordinates and on own surfaces that tell none.
+    pub fn chart(&self, at: &SurfacePoint) -> Option<Chart> {
+        match self {
+            Self::Form(form) => form.chart(at),
+            Self::Mesh(mesh) => mesh.chart(at.piece, &at.point_B),
+            Self::Own(surface) => surface.chart(at),
+            _ => None,
+        }
+    }
+}
+
 impl From<Arc<Mesh>> for Shape {
     fn from(mesh: Arc<Mesh>) -> Self {
         Self::Mesh(mesh.into())
@@ -139,6 +154,10 @@ macro_rules! forms {
 
             fn holds_outside(&self, at: &SurfacePoint, depth_m: f64) -> bool {
                 match self { $(Self::$form(form) => form.holds_outside(at, depth_m)),* }
+            }
+
+            fn chart(&self, at: &SurfacePoint) -> Option<Chart> {
+                match self { $(Self::$form(form) => form.chart(at)),* }
             }
 
             fn grown(&self, radius_m: f64) -> Option<Self> {

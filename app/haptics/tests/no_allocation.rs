@@ -136,6 +136,34 @@ fn no_shape_makes_a_step_allocate() {
 }
 
 #[test]
+fn heights_on_a_surface_never_allocate() {
+    let soup = make::bumpy_sphere(40, 21, 0.02);
+    let uv: Vec<_> = (0..soup.faces.len()).map(|i| [[0.1, 0.2], [i as f64, 0.3], [0.4, 0.9]]).collect();
+    let mesh = std::sync::Arc::new(Mesh::build_with_uv(soup, &uv).unwrap().0);
+    let shapes = solids::all().into_iter().map(|solid| haptics::Shape::from(solid.form)).chain([mesh.into()]);
+    for shape in shapes {
+        for form in [haptics::HeightForm::AlongForce, haptics::HeightForm::Gradient] {
+            let map =
+                pictures::repeated(&pictures::rough(16, 1), 2e-3, [2.0; 2]).with_zero_level(0.5).unwrap();
+            let entities = [pictures::with(entity(shape.clone(), stiction()), map.with_form(form))];
+            let mut finger = point_finger();
+            let mut noise = Noise(8);
+            let (mut hip, mut touched) = (Vector3::y() * 0.05, 0);
+            let before = CALLS.get();
+            for i in 0..5_000u32 {
+                if i.is_multiple_of(100) {
+                    finger.forget(0);
+                }
+                hip = hip * 0.99 + noise.vector(5e-3);
+                touched += u32::from(finger.step(&entities, &hip, DT).entity.is_some());
+            }
+            assert_eq!(CALLS.get() - before, 0, "{shape:?}");
+            assert!(touched > 100, "{shape:?}: {touched}");
+        }
+    }
+}
+
+#[test]
 fn no_friction_model_ever_allocates() {
     for (name, friction) in laws::drift_free().into_iter().chain(laws::drifting()) {
         let entities = [table(friction.clone()), ball(0.02, friction)];

@@ -9,9 +9,9 @@ use common::laws::{any_friction, largest_ratio};
 use common::meshes::{bumpy_sphere, touchable};
 use common::*;
 use haptics::{
-    Capsule, Cone, ConeInput, ContactState, Cuboid, Cylinder, Ellipsoid, Entity, Finger, Form, Friction,
-    FrictionCone, FrictionState, MAX_SLIDE_ROUNDS, Plane, Scaled, Shading, ShadingForm, Sphere, Surface,
-    Torus,
+    Border, Capsule, Cone, ConeInput, ContactState, Cuboid, Cylinder, Ellipsoid, Entity, Finger, Form,
+    Friction, FrictionCone, FrictionState, HeightForm, HeightMap, MAX_SLIDE_ROUNDS, PictureScale, Plane,
+    Scaled, Shading, ShadingForm, Sphere, Surface, Torus,
 };
 use nalgebra::{Isometry3, Vector3};
 use proptest::prelude::*;
@@ -195,6 +195,66 @@ proptest! {
                 prop_assert!(tangential_n <= mu * contact.normal_force_n + slack * (1.0 + normal_n), "{mu} {contact:?}");
             }
             prop_assert!(csg.signed_distance(&contact.god_object_W).abs() < 1e-12, "{contact:?}");
+        }
+    }
+}
+
+fn any_height_map() -> impl Strategy<Value = HeightMap> {
+    let numbers = prop::array::uniform2(prop_oneof![0.01..10.0f64, Just(1e-300), Just(1e300), Just(5e-324)]);
+    let scale = (prop::bool::ANY, numbers)
+        .prop_map(|(is_size, n)| if is_size { PictureScale::Size(n) } else { PictureScale::Repeat(n) });
+    let words = (prop::bool::ANY, prop::bool::ANY, prop::bool::ANY);
+    let amplitude = prop_oneof![-2e-3..2e-3f64, -1.0..=1.0f64, Just(5e-324)];
+    (scale, words, amplitude, 0.0..=1.0f64, 1..5usize, any::<u64>()).prop_map(
+        |(scale, (is_along, is_clamped, is_inverted), amplitude_m, zero_level, side, seed)| {
+            let map = HeightMap::new(pictures::rough(side, seed), amplitude_m, scale).unwrap();
+            let map = map.with_zero_level(zero_level).unwrap();
+            let map = if is_along { map.with_form(HeightForm::AlongForce) } else { map };
+            let map = if is_clamped { map.with_border(Border::Clamp) } else { map };
+            if is_inverted { map.inverted() } else { map }
+        },
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(500))]
+
+    #[test]
+    fn on_heights_contacts_never_pull_and_stay_within_their_cone(
+        shape in any_shape(), friction in any_friction(), map in any_height_map(), damping in prop_oneof![Just(0.0), 0.0..20.0f64],
+        turn in prop::array::uniform3(-3.0..3.0f64), seed: u64, step in -5.0..-1.0f64,
+    ) {
+        let X_WB = Isometry3::new(Vector3::new(0.01, -0.02, 0.03), Vector3::from(turn));
+        let entity = pictures::with(Entity { X_WB, previous_X_WB: X_WB, damping_n_s_per_m: damping, ..entity(shape, friction.clone()) }, map);
+        let mut finger = point_finger();
+        let mut noise = Noise(seed);
+        let mut hip = X_WB.translation.vector;
+        for _ in 0..200 {
+            hip += noise.vector(10f64.powf(step));
+            let out = finger.step(std::slice::from_ref(&entity), &hip, DT);
+            prop_assert!(out.force_on_user_W.iter().all(|x| x.is_finite()));
+            let Some(contact) = finger.contact(0) else { continue };
+            let normal_n = contact.force_on_user_W.dot(&contact.normal_W);
+            let rounding = 1e-12 * contact.force_on_user_W.norm();
+            prop_assert!(contact.normal_force_n >= 0.0 && normal_n >= -rounding, "{contact:?}");
+            prop_assert!((contact.normal_W.norm() - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn on_heights_every_finite_input_gives_a_finite_output(
+        shape in any_shape(), friction in any_friction(), map in any_height_map(),
+        hips in prop::collection::vec(prop::array::uniform3(any_size()), 1..20),
+        shift in prop::array::uniform3(any_size()), k in any_size(), b in any_size(), dt in any_size(), r in 0.0..0.1f64,
+    ) {
+        let entity = Entity { stiffness_n_per_m: k, damping_n_s_per_m: b, ..entity(shape, friction) };
+        let mut entity = pictures::with(entity, map);
+        let mut finger = Finger::new(r, 2).unwrap();
+        for hip in hips {
+            let out = finger.step(&[entity.clone(), entity.clone()], &Vector3::from(hip), dt);
+            prop_assert!(out.force_on_user_W.iter().all(|x| x.is_finite()), "{out:?}");
+            prop_assert!(out.god_object_W.iter().all(|x| x.is_finite()), "{out:?}");
+            entity.move_to(Isometry3::translation(shift[0], shift[1], shift[2]));
         }
     }
 }

@@ -2,13 +2,14 @@
 
 use crate::simulated::SimulationError;
 use haptics::mesh::MeshError;
-use haptics::{CsgError, ParameterError};
+use haptics::{CsgError, HeightMapError, ParameterError};
 use io_driver::open::OpenError;
 use io_driver::sim::script::HandError;
 use std::io;
 use std::path::PathBuf;
 use thiserror::Error;
 use world::model::ModelError;
+use world::picture::PictureError;
 use world::{Location, SceneError};
 
 /// What is wrong with the input.
@@ -109,6 +110,24 @@ pub enum RigError {
         place: String,
         /// Why.
         source: Box<MeshError>,
+    },
+    /// A picture file cannot be read.
+    #[error("{at}: {}: {source}", .file.display())]
+    Picture {
+        /// Where the scene names it.
+        at: Box<Location>,
+        /// The picture's file.
+        file: PathBuf,
+        /// Why.
+        source: PictureError,
+    },
+    /// A picture cannot lie on its shape.
+    #[error("{at}: {source}")]
+    HeightMap {
+        /// Where the scene says so.
+        at: Box<Location>,
+        /// Why.
+        source: HeightMapError,
     },
     /// A finger with a radius meets a shape that has no surface for its centre to roll on.
     #[error(

@@ -10,7 +10,9 @@ use haptics::{
 use nalgebra::Isometry3;
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
-use world::{AlgorithmSpec, CsgOp, CsgSpec, FrictionSpec, ShadingFormSpec, ShadingSpec, ShapeSpec};
+use world::{
+    AlgorithmSpec, CsgOp, CsgSpec, FrictionSpec, SceneEntity, ShadingFormSpec, ShadingSpec, ShapeSpec,
+};
 
 /// Why something has no counterpart in rendering.
 pub(super) enum Unfit {
@@ -52,9 +54,9 @@ impl From<CsgError> for Unfit {
 }
 
 /// A shape; meshes are those that were loaded.
-pub(super) fn shape(spec: &ShapeSpec, models: &Models) -> Result<Shape, Unfit> {
+pub(super) fn shape(spec: &ShapeSpec, models: &Models, has_picture: bool) -> Result<Shape, Unfit> {
     match spec {
-        ShapeSpec::Mesh(mesh) => match models.mesh(mesh) {
+        ShapeSpec::Mesh(mesh) => match models.mesh(mesh, has_picture) {
             Some(mesh) => Ok(Arc::clone(mesh).into()),
             None => Err(Unfit::NotAvailable(format!("shape {spec:?}"))),
         },
@@ -158,11 +160,14 @@ pub(super) fn algorithm(spec: AlgorithmSpec) -> Result<Algorithm, Unfit> {
 }
 
 /// How its facets feel; meshes are shaded when they are loaded.
-pub(super) fn shading(spec: ShadingSpec, shape: &ShapeSpec, models: &Models) -> Result<Shading, Unfit> {
+pub(super) fn shading(entity: &SceneEntity, models: &Models) -> Result<Shading, Unfit> {
+    let (spec, shape) = (entity.shading, &entity.shape);
     let not_available = || Unfit::NotAvailable(format!("shading {spec:?} of a {}", shape.kind()));
     match (spec, shape) {
         (ShadingSpec::None, _) => Ok(Shading::None),
-        (_, ShapeSpec::Mesh(mesh)) => models.shading(mesh, spec).cloned().ok_or_else(not_available),
+        (_, ShapeSpec::Mesh(mesh)) => {
+            models.shading(mesh, entity.height_map.is_some(), spec).cloned().ok_or_else(not_available)
+        }
         (ShadingSpec::Regions { length_m, crease_angle_deg, form }, ShapeSpec::Box { size_m }) => {
             // All its edges are as sharp.
             if crease_angle_deg.to_radians() < FRAC_PI_2 {

@@ -4,7 +4,7 @@
 
 use super::{RigError, material};
 use haptics::Shading;
-use haptics::mesh::{Finding, Mesh, MeshError, MeshReport, TriangleSoup};
+use haptics::mesh::{CornerUv, Finding, Mesh, MeshError, MeshReport, TriangleSoup};
 use io_driver::say::say;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
@@ -24,8 +24,8 @@ pub(super) struct Models {
     shadings: Vec<(Key, ShadingSpec, Shading)>,
 }
 
-/// A file, and the bits of the factors along its axes.
-type Key = (PathBuf, [u64; 3]);
+/// A file, the bits of the factors along its axes, and whether a picture lies on it.
+type Key = (PathBuf, [u64; 3], bool);
 
 impl Models {
     /// Loads every mesh that the scene's entities use.
@@ -33,50 +33,64 @@ impl Models {
         let mut models = Self::default();
         for entity in &scene.entities {
             let ShapeSpec::Mesh(spec) = &entity.shape else { continue };
-            if let Entry::Vacant(place) = models.meshes.entry(key_of(spec)) {
-                place.insert(Arc::new(build(spec)?));
+            let has_picture = entity.height_map.is_some();
+            if let Entry::Vacant(place) = models.meshes.entry(key_of(spec, has_picture)) {
+                place.insert(Arc::new(build(spec, has_picture)?));
             }
-            models.shade(spec, entity.shading);
+            models.shade(key_of(spec, has_picture), entity.shading);
         }
         Ok(models)
     }
 
     /// Shades a mesh, once for all entities that are shaded alike.
-    fn shade(&mut self, spec: &MeshSpec, shading: ShadingSpec) {
-        if shading == ShadingSpec::None || self.shading(spec, shading).is_some() {
+    fn shade(&mut self, key: Key, shading: ShadingSpec) {
+        if shading == ShadingSpec::None || self.shading_of(&key, shading).is_some() {
             return;
         }
-        let mesh = &self.meshes[&key_of(spec)];
+        let mesh = &self.meshes[&key];
         // What the reader of scenes let through is not refused; if it were, the entity would not be available.
         if let Ok(made) = material::mesh_shading(shading, mesh) {
-            self.shadings.push((key_of(spec), shading, made));
+            self.shadings.push((key, shading, made));
         }
     }
 
     /// The shading of a mesh that was loaded.
-    pub(super) fn shading(&self, spec: &MeshSpec, shading: ShadingSpec) -> Option<&Shading> {
-        let key = key_of(spec);
-        self.shadings.iter().find(|(of, by, _)| *of == key && *by == shading).map(|(.., made)| made)
+    pub(super) fn shading(
+        &self,
+        spec: &MeshSpec,
+        has_picture: bool,
+        shading: ShadingSpec,
+    ) -> Option<&Shading> {
+        self.shading_of(&key_of(spec, has_picture), shading)
     }
 
-    /// A mesh that was loaded.
-    pub(super) fn mesh(&self, spec: &MeshSpec) -> Option<&Arc<Mesh>> {
-        self.meshes.get(&key_of(spec))
+    fn shading_of(&self, key: &Key, shading: ShadingSpec) -> Option<&Shading> {
+        self.shadings.iter().find(|(of, by, _)| of == key && *by == shading).map(|(.., made)| made)
+    }
+
+    /// A mesh that was loaded, for a picture to lie on or not.
+    pub(super) fn mesh(&self, spec: &MeshSpec, has_picture: bool) -> Option<&Arc<Mesh>> {
+        self.meshes.get(&key_of(spec, has_picture))
     }
 }
 
-fn key_of(spec: &MeshSpec) -> Key {
-    (spec.file.clone(), spec.scale.map(f64::to_bits))
+fn key_of(spec: &MeshSpec, has_picture: bool) -> Key {
+    (spec.file.clone(), spec.scale.map(f64::to_bits), has_picture)
 }
 
-fn build(spec: &MeshSpec) -> Result<Mesh, RigError> {
+fn build(spec: &MeshSpec, has_picture: bool) -> Result<Mesh, RigError> {
     let file = &spec.file;
-    let soup = read(file).map_err(|source| RigError::Model {
+    let (soup, uv) = read(file, has_picture).map_err(|source| RigError::Model {
         at: Box::new(spec.at.clone()),
         file: file.clone(),
         source,
     })?;
-    let (mesh, report) = Mesh::build(scaled(soup, &spec.scale)).map_err(|source| RigError::Mesh {
+    let soup = scaled(soup, &spec.scale);
+    let built = match uv {
+        Some(uv) => Mesh::build_with_uv(soup, &uv),
+        None => Mesh::build(soup),
+    };
+    let (mesh, report) = built.map_err(|source| RigError::Mesh {
         at: Box::new(spec.at.clone()),
         file: file.clone(),
         place: place_of(&source, file),
@@ -86,12 +100,16 @@ fn build(spec: &MeshSpec) -> Result<Mesh, RigError> {
     Ok(mesh)
 }
 
-fn read(file: &Path) -> Result<TriangleSoup, ModelError> {
+/// Texture coordinates only where a picture needs them.
+fn read(file: &Path, has_picture: bool) -> Result<(TriangleSoup, Option<Vec<CornerUv>>), ModelError> {
     let bytes = model::read_file(file)?;
     if bytes.len() >= WORTH_A_LINE_BYTES {
         say(format_args!("phantom3: loading {} ({} MB)", file.display(), bytes.len() / 1_000_000));
     }
-    model::read(file, &bytes)
+    if has_picture {
+        return model::read_with_uv(file, &bytes).map(|(soup, uv)| (soup, Some(uv)));
+    }
+    Ok((model::read(file, &bytes)?, None))
 }
 
 fn scaled(mut soup: TriangleSoup, scale: &[f64; 3]) -> TriangleSoup {

@@ -5,6 +5,7 @@ use nalgebra::Isometry3;
 use crate::effects::{MagnetismSpec, VibrationSpec};
 use crate::error::SceneError;
 use crate::friction::FrictionSpec;
+use crate::height_map::HeightMapSpec;
 use crate::material::read_material;
 use crate::names::Names;
 use crate::pose::read_pose;
@@ -40,6 +41,8 @@ pub struct SceneEntity {
     pub vibration: Option<VibrationSpec>,
     /// Default none.
     pub shading: ShadingSpec,
+    /// Default none.
+    pub height_map: Option<HeightMapSpec>,
 }
 
 /// What works out the force of contacts with an entity.
@@ -81,6 +84,7 @@ impl SceneEntity {
             magnetism: MagnetismSpec::read(table)?,
             vibration: VibrationSpec::read(table)?,
             shading: ShadingSpec::read(table, &shape)?,
+            height_map: HeightMapSpec::read(table, &shape)?,
             shape,
         })
     }
@@ -112,6 +116,7 @@ const KEYS: Vocabulary = Vocabulary {
         "algorithm",
         "material",
         "shading",
+        "height_map",
         "magnetism",
         "vibration",
     ],

@@ -23,7 +23,7 @@ impl PassivitySpec {
     /// Of a finger; `None`: it is not kept passive.
     pub(crate) fn read(finger: &Table<'_>) -> Result<Option<Self>, SceneError> {
         let Some(value) = finger.get("passivity") else { return Ok(None) };
-        if let Some(truth) = value.truth() {
+        if let Some(truth) = value.truth_if_any() {
             return Ok(truth.then(Self::default));
         }
         let table = value.table(ALLOWED)?;

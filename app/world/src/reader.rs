@@ -250,6 +250,11 @@ impl<'d> Value<'d> {
         Ok(path)
     }
 
+    /// Yes or no.
+    pub(crate) fn truth(&self) -> Result<bool, SceneError> {
+        self.truth_if_any().ok_or_else(|| self.wrong_type("true or false"))
+    }
+
     /// One of the words that this version implements.
     pub(crate) fn choose(&self, what: &'static str, words: &Vocabulary) -> Result<&'static str, SceneError> {
         let available = words.list();
@@ -268,7 +273,7 @@ impl<'d> Value<'d> {
     }
 
     /// `true` or `false`; `None`: it is something else.
-    pub(crate) fn truth(&self) -> Option<bool> {
+    pub(crate) fn truth_if_any(&self) -> Option<bool> {
         if let DeValue::Boolean(truth) = self.value.get_ref() { Some(*truth) } else { None }
     }
 

@@ -6,7 +6,7 @@ use world::Scene;
 
 use crate::{refused, with_entity, with_finger, with_shape, with_top};
 
-const ENTITY_KEYS: &str = "name, shape, position_m, orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction, algorithm, material, shading, magnetism, vibration";
+const ENTITY_KEYS: &str = "name, shape, position_m, orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction, algorithm, material, shading, height_map, magnetism, vibration";
 
 #[test]
 fn text_that_is_not_toml_is_refused_with_line_and_column() {
@@ -38,18 +38,18 @@ fn an_unknown_key_is_refused_with_what_was_probably_meant() {
     refused(
         &with_entity("colour = \"red\""),
         "s.toml:8: entity[0].colour: unknown key; allowed: name, shape, position_m, \
-         orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction, algorithm, material, shading, magnetism, vibration",
+         orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction, algorithm, material, shading, height_map, magnetism, vibration",
     );
     refused(
         &with_entity("stifness_n_per_m = 1"),
         "s.toml:8: entity[0].stifness_n_per_m: unknown key (did you mean `stiffness_n_per_m`?); \
          allowed: name, shape, position_m, orientation_wxyz, stiffness_n_per_m, \
-         damping_n_s_per_m, friction, algorithm, material, shading, magnetism, vibration",
+         damping_n_s_per_m, friction, algorithm, material, shading, height_map, magnetism, vibration",
     );
     refused(
         &with_entity("\"two words\" = 1"),
         "s.toml:8: entity[0].\"two words\": unknown key; allowed: name, shape, position_m, \
-         orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction, algorithm, material, shading, magnetism, vibration",
+         orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction, algorithm, material, shading, height_map, magnetism, vibration",
     );
     refused(
         &with_shape("{ kind = \"sphere\", radius_m = 1, normal = [0, 1, 0] }"),
@@ -91,7 +91,7 @@ fn a_key_of_the_format_that_this_version_lacks_is_told_apart_from_an_unknown_one
         &with_entity("mass = 0.1"),
         "s.toml:8: entity[0].mass: unknown key (did you mean `mass_kg`, which is not available \
          in this version?); allowed: name, shape, position_m, orientation_wxyz, \
-         stiffness_n_per_m, damping_n_s_per_m, friction, algorithm, material, shading, magnetism, vibration",
+         stiffness_n_per_m, damping_n_s_per_m, friction, algorithm, material, shading, height_map, magnetism, vibration",
     );
 }
 
