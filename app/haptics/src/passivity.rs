@@ -40,12 +40,16 @@
 //! of F, `u_j = u_(j-1) + F . d <= bound_j`. Where forces come a tick late the larger of stored_j(i) and stored_j(i-1)
 //! counts, and each force is chosen within what the one before it leaves. Should the finger be faster than that, the surprise `s`, by which a way is
 //! longer than p + r, adds at most |F| s, and is forgiven: a finger is not left without its wall for a jolt. After
-//! `reset`, and at the very first tick, the finger is taken to have been at rest.
+//! `reset`, and at the very first tick, the finger is taken to have been at rest. A tick that is missed is one of which
+//! nothing was foreseen; what it fed is seen, in the next.
 //!
 //! What is not seen: the energy is that of the positions as read. Of a force that goes from zero to F and back,
 //! rounding to counts of q hides at most F q along its direction. A force that the motors hold for another time than
 //! from reading to reading (a fixed phase within the tick, a slow amplifier) feeds up to its own change times the way
-//! meanwhile more. Entities that move by themselves do work on the hand, and count as active.
+//! meanwhile more: it is exact for replies in the same tick and, told that it is late, in the next. Limits on the way to
+//! the motors that hold a force longer than it was asked for (a slew rate) can do that too. Entities that move by
+//! themselves do work on the hand, and count as active. So does what gives back later than a spring would: credit is
+//! forgotten as soon as no spring can hold it.
 //!
 //! Frames and signs: world, SI; forces are forces on the user; energy is positive when it was fed into the hand.
 //! Invariants: the force is never larger than the one wanted, and never has a component against it (so a wall
