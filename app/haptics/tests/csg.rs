@@ -47,8 +47,7 @@ fn a_path_into_a_tree_meets_its_boundary() {
             let mut finger = point_finger();
             step(&mut finger, &entity, &from);
             let out = step(&mut finger, &entity, &to);
-            let first =
-                (0..=4000).map(|i| from + (to - from) * (f64::from(i) / 4000.0)).find(|p| contains(p));
+            let first = (0..=4000).map(|i| from + (to - from) * (f64::from(i) / 4000.0)).find(contains);
             if contains(&to) {
                 assert!(out.entity.is_some(), "{name}: {from:?} {to:?}");
             }

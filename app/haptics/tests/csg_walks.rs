@@ -101,7 +101,7 @@ fn nothing_leaks_at_edges_and_corners() {
             // Of convex edges the god-object only passes by: where it changes the patch.
             if let Some(contact) = finger.contact(0) {
                 let god = contact.god_object_W;
-                let around = (0..4).map(|_| god + noise.vector(1e-4)).filter(|p| contains(p)).count();
+                let around = (0..4).map(|_| god + noise.vector(1e-4)).filter(contains).count();
                 if around <= 1 {
                     places.push(god);
                 }
