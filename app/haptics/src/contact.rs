@@ -20,6 +20,7 @@ use crate::friction_cone::{ConeInput, FrictionCone};
 use crate::friction_law::FrictionState;
 use crate::hip::Hip;
 use crate::mesh::{Beginning, Mesh, MeshCone, RollingCone};
+use crate::nurbs::NurbsCone;
 use crate::shape::Shape;
 use crate::surface::{Feature, Surface};
 use crate::vector_field::VectorField;
@@ -72,6 +73,7 @@ pub(crate) struct Slot {
     mesh: MeshCone,
     rolling: RollingCone,
     csg: CsgCone,
+    nurbs: NurbsCone,
     own: ContactMemory,
     /// How much of the force is rendered, 0 to 1.
     strength: f64,
@@ -90,6 +92,7 @@ impl Slot {
             self.mesh.let_go();
             self.rolling.let_go();
             self.csg.let_go();
+            self.nurbs.let_go();
         }
         self.contact.as_ref()
     }
@@ -164,6 +167,10 @@ impl Slot {
             Shape::Own(_) => input.of_surface(|grown| self.touch_surface(grown, input))?,
             Shape::Mesh(mesh) => {
                 let touched = self.rolling.update(mesh, input);
+                self.begun(touched)
+            }
+            Shape::Nurbs(nurbs) => {
+                let touched = self.nurbs.update(nurbs, input);
                 self.begun(touched)
             }
             Shape::Csg(csg) => {
