@@ -154,14 +154,15 @@ impl Nurbs {
         steps: &mut u32,
     ) -> Moved {
         let here = &foot.local;
-        let (full, is_newton) = newton(here, offset_B, slope, is_free);
+        let room: Room = [0, 1].map(|d| if is_free[d] { [-foot.at[d], 1.0 - foot.at[d]] } else { [0.0; 2] });
+        let (full, is_newton) = newton(here, offset_B, slope, is_free, &room);
         let full_m = (here.du * full[0] + here.dv * full[1]).norm();
         let square = offset_B.norm_squared();
         if full_m.is_nan() || full_m <= ARRIVED * self.extent_m {
             let off = if is_newton { None } else { self.off_the_ridge(foot, offset_B, target_B, steps) };
             return off.map_or(Moved::Arrived(*foot), Moved::To);
         }
-        let mut share = within(foot.at, full, &self.patches[foot.patch as usize].longest_step);
+        let mut share = within(full, &self.patches[foot.patch as usize].longest_step);
         for _ in 0..MAX_HALVINGS {
             *steps += 1;
             let next = self.foot(foot.patch, moved(foot.at, full, share), foot.side);
@@ -214,25 +215,40 @@ enum Moved {
     Arrived(Foot),
 }
 
+/// How far each parameter may go back and forth.
+type Room = [[f64; 2]; 2];
+
 /// The step along the free parameters, and whether it is Newton's own.
+///
+/// Where it would leave the patch it ends at the border, and the other parameter does what is best there: cut short as a
+/// whole it would end at once when it runs along a border that is bent.
 #[inline]
 fn newton(
     here: &super::local::Local,
     offset_B: &Vector3<f64>,
     slope: [f64; 2],
     is_free: [bool; 2],
+    room: &Room,
 ) -> ([f64; 2], bool) {
     let (uu, uv, vv) = (here.du.norm_squared(), here.du.dot(&here.dv), here.dv.norm_squared());
     let (a, b, c) = (uu - offset_B.dot(&here.duu), uv - offset_B.dot(&here.duv), vv - offset_B.dot(&here.dvv));
-    let along = |slope: f64, newton: f64, plain: f64| {
-        if newton > LEAST_PIVOT * plain { (slope / newton, true) } else { (divided(slope, plain), false) }
+    // One parameter, while the other one goes `other`.
+    let alone = |slope: f64, newton: f64, mixed: f64, plain: f64, plain_mixed: f64, other: f64| {
+        if newton > LEAST_PIVOT * plain {
+            (divided(slope - mixed * other, newton), true)
+        } else {
+            (divided(slope - plain_mixed * other, plain), false)
+        }
     };
-    match is_free {
+    let u_beside = |other: f64| alone(slope[0], a, b, uu, uv, other);
+    let v_beside = |other: f64| alone(slope[1], c, b, vv, uv, other);
+    let (step, is_newton) = match is_free {
         [true, true] => {
             let (det, plain) = (a * c - b * b, uu * vv - uv * uv);
-            if a > LEAST_PIVOT * uu && det > LEAST_PIVOT * plain && det > LEAST_PIVOT * LEAST_PIVOT * uu * vv {
+            let least = LEAST_PIVOT * LEAST_PIVOT * uu * vv;
+            if a > LEAST_PIVOT * uu && det > LEAST_PIVOT * plain && det > least {
                 ([(slope[0] * c - slope[1] * b) / det, (slope[1] * a - slope[0] * b) / det], true)
-            } else if plain > LEAST_PIVOT * LEAST_PIVOT * uu * vv {
+            } else if plain > least {
                 ([(slope[0] * vv - slope[1] * uv) / plain, (slope[1] * uu - slope[0] * uv) / plain], false)
             } else {
                 // Both derivatives point the same way.
@@ -240,14 +256,28 @@ fn newton(
             }
         }
         [true, false] => {
-            let (step, is_newton) = along(slope[0], a, uu);
+            let (step, is_newton) = u_beside(0.0);
             ([step, 0.0], is_newton)
         }
         [false, true] => {
-            let (step, is_newton) = along(slope[1], c, vv);
+            let (step, is_newton) = v_beside(0.0);
             ([0.0, step], is_newton)
         }
         [false, false] => ([0.0; 2], true),
+    };
+    let fits = |d: usize, step: f64| room[d][0] <= step && step <= room[d][1];
+    if fits(0, step[0]) && fits(1, step[1]) {
+        return (step, is_newton);
+    }
+    let cut = |d: usize, step: f64| step.clamp(room[d][0], room[d][1]);
+    if !fits(0, step[0]) {
+        let u = cut(0, step[0]);
+        let (v, is_newton) = if is_free[1] { v_beside(u) } else { (0.0, true) };
+        ([u, cut(1, v)], is_newton && fits(1, v))
+    } else {
+        let v = cut(1, step[1]);
+        let (u, is_newton) = if is_free[0] { u_beside(v) } else { (0.0, true) };
+        ([cut(0, u), v], is_newton && fits(0, u))
     }
 }
 
@@ -255,20 +285,11 @@ fn divided(slope: f64, square: f64) -> f64 {
     if square > 0.0 { slope / square } else { 0.0 }
 }
 
-/// The share of a step that ends at the border, if it would lead beyond, or that is long enough.
+/// The share of a step that is long enough.
 #[inline]
-fn within(at: [f64; 2], step: [f64; 2], longest: &[f64; 2]) -> f64 {
-    let mut share = 1.0f64;
-    for d in 0..2 {
-        let room = if step[d] > 0.0 { 1.0 - at[d] } else { -at[d] };
-        if step[d].abs() > room.abs() {
-            share = share.min(room / step[d]);
-        }
-        if step[d].abs() * share > longest[d] {
-            share = longest[d] / step[d].abs();
-        }
-    }
-    share
+fn within(step: [f64; 2], longest: &[f64; 2]) -> f64 {
+    let share = |d: usize| if step[d].abs() > longest[d] { longest[d] / step[d].abs() } else { 1.0 };
+    share(0).min(share(1))
 }
 
 #[inline]

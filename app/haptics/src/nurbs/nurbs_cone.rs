@@ -219,22 +219,29 @@ impl Nurbs {
         Some(walker.at_foot(crossed.foot))
     }
 
-    /// In steps as long as the way is clear, so that nothing is passed by.
+    /// In steps as long as the way is clear, so that nothing is passed by; the last ones are Newton's.
     fn meet_ball(&self, walker: &Walker<'_>, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<Stand> {
         let path_B = to_B - from_B;
         let length_m = path_B.norm();
+        let at = |along_m: f64| if along_m < length_m { from_B + path_B * (along_m / length_m) } else { *to_B };
         let mut along_m = 0.0;
         for _ in 0..MAX_STRIDES {
-            let p_B = if along_m < length_m { from_B + path_B * (along_m / length_m) } else { *to_B };
-            let clear_m = self.clearance(&p_B) - walker.layer_m();
-            let clear_m = if clear_m > 0.0 { clear_m } else { walker.find(&p_B)?.height_m };
-            if clear_m <= 1e-9 * self.extent_m && (clear_m <= 0.0 || along_m < length_m) {
-                return walker.find(&p_B);
-            }
+            let clear_m = self.clearance(&at(along_m)) - walker.layer_m();
+            let stride_m = if clear_m > 0.0 {
+                clear_m
+            } else {
+                let stand = walker.find(&at(along_m))?;
+                let sinks = -stand.at.normal_B.dot(&path_B) / length_m;
+                if stand.height_m <= 1e-15 * self.extent_m {
+                    return (sinks > 0.0 || !stand.is_free).then_some(stand);
+                }
+                let is_close = stand.height_m <= CLOSE * self.extent_m && sinks > 1e-3;
+                stand.height_m / if is_close { sinks } else { 1.0 }
+            };
             if along_m >= length_m {
                 return None;
             }
-            along_m += clear_m;
+            along_m += stride_m;
         }
         // Along a surface that is all but touched: the end decides.
         walker.find(to_B).filter(|stand| !stand.is_free)
@@ -256,5 +263,7 @@ impl Nurbs {
 
 /// Positions that differ by less than this share of the extent are the same, seen through two equal poses.
 const SAME_PLACE: f64 = 1e-9;
+/// Share of the extent within which a surface is flat enough that a ball sinks to it evenly.
+const CLOSE: f64 = 1e-4;
 /// Bound on the looks of a ball along its way.
 const MAX_STRIDES: u32 = 32;
