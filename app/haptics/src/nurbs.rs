@@ -362,19 +362,3 @@ const GAUSS: [(f64, f64); 5] = [
     (0.769_234_655_052_841_5, 0.239_314_335_249_683_23),
     (0.953_089_922_969_332, 0.118_463_442_528_095),
 ];
-#[cfg(test)]
-mod probe {
-    use super::*;
-    #[test]
-    fn probe() {
-        let n = Nurbs::build(&make::cylinder(0.03, 0.08)).unwrap().0;
-        let p = Vector3::new(-0.00384495610163794, -0.09461194251757082, -0.029768880617063793);
-        println!("{}", n.cells.len());
-        for c in &n.cells {
-            let middle = c.window.map(|[a, b]| (a + b) / 2.0);
-            let s = n.foot(c.patch, middle, 1.0);
-            let a = n.descend(&p, &s, descend::Crossing::All);
-            println!("{:?} {:?} -> {} {:?} {:.6} {}", c.patch, middle, a.foot.patch, a.foot.at, (a.foot.point_B() - p).norm(), match a.rest { descend::Rest::Smooth => "s", descend::Rest::Rim => "r", descend::Rest::Crease(_) => "c", _ => "t" });
-        }
-    }
-}

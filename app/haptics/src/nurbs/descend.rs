@@ -66,7 +66,7 @@ impl Nurbs {
             let slope = [offset_B.dot(&foot.local.du), offset_B.dot(&foot.local.dv)];
             let mut rest = Rest::Smooth;
             let mut is_free = [true; 2];
-            if let Some(step) = self.at_borders(&foot, &offset_B, slope, crossing, &mut is_free, &mut rest) {
+            if let Some(step) = self.at_borders(&foot, &offset_B, crossing, &mut is_free, &mut rest) {
                 match step {
                     Step::Over(beyond) => {
                         steps += 1;
@@ -96,20 +96,21 @@ impl Nurbs {
         &self,
         foot: &Foot,
         offset_B: &Vector3<f64>,
-        slope: [f64; 2],
         crossing: Crossing,
         is_free: &mut [bool; 2],
         rest: &mut Rest,
     ) -> Option<Step> {
         for d in 0..2 {
             let edge = match foot.at[d] {
-                0.0 if slope[d] < 0.0 => 2 * d,
-                1.0 if slope[d] > 0.0 => 2 * d + 1,
-                _ => {
-                    // A vanishing edge has no slope across it either, where the target is straight beyond.
-                    continue;
-                }
+                0.0 => 2 * d,
+                1.0 => 2 * d + 1,
+                _ => continue,
             };
+            // Square to the edge, as the patch beyond will see it: where parameters run askew, rounding would send a
+            // descent to and fro.
+            if self.inward(foot, edge as u8).dot(offset_B) >= 0.0 {
+                continue;
+            }
             is_free[d] = false;
             match self.beyond(foot, edge, offset_B) {
                 Border::Rim => *rest = Rest::Rim,

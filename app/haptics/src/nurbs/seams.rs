@@ -56,6 +56,8 @@ pub(super) enum Border {
 
 /// As a share of the extent: points closer than this are the same.
 pub(super) const EQUAL: f64 = 1e-6;
+/// What was written down twice and read back agrees so well.
+const EXACT: f64 = 1e-11;
 /// Normals that differ by less are not told apart by a finger.
 pub const SMOOTH_RAD: f64 = 0.01;
 
@@ -159,34 +161,44 @@ impl Nurbs {
 /// Finds poles and links, and turns patches so that neighbours agree about the outside.
 pub(super) fn join(nurbs: &mut Nurbs) -> Result<Joined, NurbsError> {
     find_poles(nurbs);
-    let mut links = Vec::new();
     let edges: Vec<(u32, u8)> = (0..nurbs.patches.len() as u32)
         .flat_map(|patch| (0..4).map(move |edge| (patch, edge)))
-        .filter(|&(patch, edge)| nurbs.patches[patch as usize].edges[usize::from(edge)].pole.is_none())
+        .filter(|&edge| edge_of(nurbs, edge).pole.is_none())
         .collect();
     let boxes: Vec<_> = edges.iter().map(|&edge| box_of(nurbs, edge)).collect();
-    let slack = EQUAL * nurbs.extent_m;
-    for i in 0..edges.len() {
-        for j in i + 1..edges.len() {
-            let (a, b) = (&boxes[i], &boxes[j]);
-            let is_apart = (0..3).any(|c| a[0][c] > b[1][c] + slack || b[0][c] > a[1][c] + slack);
-            if is_apart {
-                continue;
-            }
-            let met = runs_along(nurbs, edges[i], edges[j])
-                .map(|to| (edges[i], edges[j], to))
-                .or_else(|| runs_along(nurbs, edges[j], edges[i]).map(|to| (edges[j], edges[i], to)));
-            if let Some((part, whole, to)) = met {
-                links.push((part, whole, to));
+    // Edges that agree to rounding first: in a thin plate others may be nearly as near.
+    for slack in [EXACT, EQUAL].map(|share| share * nurbs.extent_m) {
+        for i in 0..edges.len() {
+            for j in i + 1..edges.len() {
+                let (a, b) = (&boxes[i], &boxes[j]);
+                let is_apart = (0..3).any(|c| a[0][c] > b[1][c] + slack || b[0][c] > a[1][c] + slack);
+                let is_new = |k: usize| slack < EQUAL * nurbs.extent_m || !is_covered(nurbs, edges[k]);
+                if !is_apart && is_new(i) && is_new(j) {
+                    link(nurbs, edges[i], edges[j], slack)?;
+                }
             }
         }
     }
-    for &(part, whole, to) in &links {
-        let back = if to[0] <= to[1] { [0.0, 1.0] } else { [1.0, 0.0] };
-        add(nurbs, part, [0.0, 1.0], whole, to)?;
-        add(nurbs, whole, [to[0].min(to[1]), to[0].max(to[1])], part, back)?;
-    }
     Ok(orient(nurbs))
+}
+
+fn edge_of(nurbs: &Nurbs, (patch, edge): (u32, u8)) -> &Edge {
+    &nurbs.patches[patch as usize].edges[usize::from(edge)]
+}
+
+fn is_covered(nurbs: &Nurbs, edge: (u32, u8)) -> bool {
+    edge_of(nurbs, edge).links.iter().map(|link| link.along[1] - link.along[0]).sum::<f64>() > 1.0 - 1e-4
+}
+
+/// Links two edges if one runs along the other.
+fn link(nurbs: &mut Nurbs, a: (u32, u8), b: (u32, u8), slack: f64) -> Result<(), NurbsError> {
+    let met = runs_along(nurbs, a, b, slack)
+        .map(|to| (a, b, to))
+        .or_else(|| runs_along(nurbs, b, a, slack).map(|to| (b, a, to)));
+    let Some((part, whole, to)) = met else { return Ok(()) };
+    let back = if to[0] <= to[1] { [0.0, 1.0] } else { [1.0, 0.0] };
+    add(nurbs, part, [0.0, 1.0], whole, to)?;
+    add(nurbs, whole, [to[0].min(to[1]), to[0].max(to[1])], part, back)
 }
 
 /// What joining found.
@@ -249,8 +261,7 @@ fn find_poles(nurbs: &mut Nurbs) {
 }
 
 /// If `part` runs along `whole` from end to end: the parameters of its ends there.
-fn runs_along(nurbs: &Nurbs, part: (u32, u8), whole: (u32, u8)) -> Option<[f64; 2]> {
-    let slack = EQUAL * nurbs.extent_m;
+fn runs_along(nurbs: &Nurbs, part: (u32, u8), whole: (u32, u8), slack: f64) -> Option<[f64; 2]> {
     let end = |edge: (u32, u8), x: f64| nurbs.local(edge.0, on_edge(edge.1, x)).point_B;
     let is_same = |a: Vector3<f64>, b: Vector3<f64>| (a - b).norm() <= slack;
     let ends = [end(part, 0.0), end(part, 1.0)];
@@ -333,8 +344,7 @@ fn orient(nurbs: &mut Nurbs) -> Joined {
     for patch in 0..count {
         for edge in 0..4u8 {
             let here = &nurbs.patches[patch].edges[usize::from(edge)];
-            let covered: f64 = here.links.iter().map(|link| link.along[1] - link.along[0]).sum();
-            is_closed &= here.pole.is_some() || covered > 1.0 - 1e-4;
+            is_closed &= here.pole.is_some() || is_covered(nurbs, (patch as u32, edge));
             for l in 0..here.links.len() {
                 let link = nurbs.patches[patch].edges[usize::from(edge)].links[l];
                 let agrees = sense(edge) * sense(link.edge) * (link.to[1] - link.to[0]) < 0.0;
