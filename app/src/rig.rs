@@ -275,7 +275,7 @@ impl Rig {
     /// The model files that it is made of.
     pub fn model_files(&self) -> impl Iterator<Item = &PathBuf> {
         self.scene.entities.iter().filter_map(|entity| match &entity.shape {
-            ShapeSpec::Mesh(mesh) => Some(&mesh.file),
+            ShapeSpec::Mesh(model) | ShapeSpec::Nurbs(model) => Some(&model.file),
             _ => None,
         })
     }

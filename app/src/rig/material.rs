@@ -29,6 +29,10 @@ pub(super) fn shape(spec: &ShapeSpec, models: &Models) -> Result<Shape, Unfit> {
             Some(mesh) => Ok(Arc::clone(mesh).into()),
             None => Err(Unfit::NotAvailable(format!("shape {spec:?}"))),
         },
+        ShapeSpec::Nurbs(nurbs) => match models.nurbs(nurbs) {
+            Some(nurbs) => Ok(Arc::clone(nurbs).into()),
+            None => Err(Unfit::NotAvailable(format!("shape {spec:?}"))),
+        },
         spec => Ok(Shape::Form(form(spec)?)),
     }
 }

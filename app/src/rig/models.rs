@@ -1,8 +1,9 @@
-//! The meshes of a scene: each file is read and built once for all entities that use it alike.
+//! The meshes and patches of a scene: each file is read and built once for all entities that use it alike.
 //!
 //! What was repaired is told once, what cannot be used is refused with the place in the scene and in the model.
 
 use super::RigError;
+use haptics::Nurbs;
 use haptics::mesh::{Finding, Mesh, MeshError, MeshReport, TriangleSoup};
 use io_driver::say::say;
 use nalgebra::Vector3;
@@ -20,6 +21,7 @@ const WORTH_A_LINE_BYTES: usize = 16 << 20;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Models {
     meshes: BTreeMap<Key, Arc<Mesh>>,
+    nurbs: BTreeMap<Key, Arc<Nurbs>>,
 }
 
 /// A file, and the bits of the factors along its axes.
@@ -30,9 +32,18 @@ impl Models {
     pub(super) fn load(scene: &Scene) -> Result<Self, RigError> {
         let mut models = Self::default();
         for entity in &scene.entities {
-            let ShapeSpec::Mesh(spec) = &entity.shape else { continue };
-            if let Entry::Vacant(place) = models.meshes.entry(key_of(spec)) {
-                place.insert(Arc::new(build(spec)?));
+            match &entity.shape {
+                ShapeSpec::Mesh(spec) => {
+                    if let Entry::Vacant(place) = models.meshes.entry(key_of(spec)) {
+                        place.insert(Arc::new(build(spec)?));
+                    }
+                }
+                ShapeSpec::Nurbs(spec) => {
+                    if let Entry::Vacant(place) = models.nurbs.entry(key_of(spec)) {
+                        place.insert(Arc::new(join(spec)?));
+                    }
+                }
+                _ => {}
             }
         }
         Ok(models)
@@ -41,6 +52,11 @@ impl Models {
     /// A mesh that was loaded.
     pub(super) fn mesh(&self, spec: &MeshSpec) -> Option<&Arc<Mesh>> {
         self.meshes.get(&key_of(spec))
+    }
+
+    /// Patches that were loaded.
+    pub(super) fn nurbs(&self, spec: &MeshSpec) -> Option<&Arc<Nurbs>> {
+        self.nurbs.get(&key_of(spec))
     }
 }
 
@@ -63,6 +79,30 @@ fn build(spec: &MeshSpec) -> Result<Mesh, RigError> {
     })?;
     tell(file, &report);
     Ok(mesh)
+}
+
+/// Reads and joins the patches of a file.
+fn join(spec: &MeshSpec) -> Result<Nurbs, RigError> {
+    let file = &spec.file;
+    let at = || Box::new(spec.at.clone());
+    let bytes = model::read_file(file);
+    let read = bytes.and_then(|bytes| model::read_nurbs(file, &bytes));
+    let mut patches = read.map_err(|source| match source {
+        // It names the file itself.
+        ModelError::Toml(source) => RigError::Patches { at: at(), said: source.to_string() },
+        source => RigError::Model { at: at(), file: file.clone(), source },
+    })?;
+    for point in patches.iter_mut().flat_map(|patch| &mut patch.points) {
+        point.iter_mut().zip(spec.scale).for_each(|(x, factor)| *x *= factor);
+    }
+    let (nurbs, report) = Nurbs::build(&patches).map_err(|source| {
+        let said = format!("{}: {source}", file.display());
+        RigError::Patches { at: at(), said }
+    })?;
+    if report.turned > 0 || report.rims > 0 || report.is_one_sided {
+        say(format_args!("phantom3: {}: {report}", file.display()));
+    }
+    Ok(nurbs)
 }
 
 fn read(file: &Path) -> Result<TriangleSoup, ModelError> {

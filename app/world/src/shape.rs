@@ -67,6 +67,8 @@ pub enum ShapeSpec {
     },
     /// Triangles in a file of their own.
     Mesh(MeshSpec),
+    /// Rational patches in a file of their own.
+    Nurbs(MeshSpec),
     /// Another shape but a mesh, drawn out along B's axes.
     Scaled {
         /// The shape before.
@@ -76,10 +78,10 @@ pub enum ShapeSpec {
     },
 }
 
-/// A mesh file and what becomes of it.
+/// A file of triangles or patches and what becomes of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeshSpec {
-    /// OBJ or STL; made relative to where the scene file is. It is not opened by the reader of scenes.
+    /// OBJ or STL; of patches OBJ or TOML; made relative to where the scene file is. It is not opened by the reader of scenes.
     pub file: PathBuf,
     /// Factors along x, y and z that make metres of the file's numbers; above 0, default 1.
     pub scale: [f64; 3],
@@ -100,6 +102,7 @@ impl ShapeSpec {
             Self::Capsule { .. } => "capsule",
             Self::Ellipsoid { .. } => "ellipsoid",
             Self::Mesh(_) => "mesh",
+            Self::Nurbs(_) => "nurbs",
             Self::Scaled { shape, .. } => shape.kind(),
         }
     }
@@ -115,6 +118,7 @@ impl ShapeSpec {
         let scale = value.factors()?;
         Ok(match shape {
             ShapeSpec::Mesh(mesh) => ShapeSpec::Mesh(MeshSpec { scale, ..mesh }),
+            ShapeSpec::Nurbs(nurbs) => ShapeSpec::Nurbs(MeshSpec { scale, ..nurbs }),
             shape => ShapeSpec::Scaled { shape: Box::new(shape), scale },
         })
     }
@@ -133,6 +137,7 @@ fn reader_of(kind: &str) -> (&'static Vocabulary, Read) {
         "torus" => (&TORUS_KEYS, read_torus),
         "capsule" => (&CYLINDER_KEYS, read_capsule),
         "ellipsoid" => (&ELLIPSOID_KEYS, read_ellipsoid),
+        "nurbs" => (&MESH_KEYS, read_nurbs),
         _ => (&MESH_KEYS, read_mesh),
     }
 }
@@ -193,11 +198,19 @@ fn read_ellipsoid(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
 }
 
 fn read_mesh(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
-    let allowed = "the path of an OBJ or STL file, relative to this file";
+    Ok(ShapeSpec::Mesh(read_file(table, "the path of an OBJ or STL file, relative to this file")?))
+}
+
+fn read_nurbs(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
+    let allowed = "the path of a file of patches, TOML or OBJ, relative to this file";
+    Ok(ShapeSpec::Nurbs(read_file(table, allowed)?))
+}
+
+fn read_file(table: &Table<'_>, allowed: &str) -> Result<MeshSpec, SceneError> {
     let value = table.require("file", allowed)?;
     let beside = table.document().file().parent().unwrap_or(Path::new(""));
     let file = beside.join(value.path(allowed)?);
-    Ok(ShapeSpec::Mesh(MeshSpec { file, scale: [1.0; 3], at: *value.at() }))
+    Ok(MeshSpec { file, scale: [1.0; 3], at: *value.at() })
 }
 
 fn size(table: &Table<'_>, key: &str) -> Result<f64, SceneError> {
@@ -222,7 +235,7 @@ const ELLIPSOID_KEYS: Vocabulary = keys(&["kind", "radii_m", "scale"]);
 const MESH_KEYS: Vocabulary = keys(&["kind", "file", "scale"]);
 
 const KINDS: Vocabulary = Vocabulary {
-    available: &["plane", "sphere", "box", "cylinder", "cone", "torus", "capsule", "ellipsoid", "mesh"],
-    later: &["nurbs", "csg"],
+    available: &["plane", "sphere", "box", "cylinder", "cone", "torus", "capsule", "ellipsoid", "mesh", "nurbs"],
+    later: &["csg"],
 };
 const EXAMPLE: &str = "a table such as { kind = \"sphere\", radius_m = 0.05 }";
