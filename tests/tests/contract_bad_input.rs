@@ -175,7 +175,7 @@ fn a_scene_that_is_wrong_is_refused_with_file_line_key_finding_and_remedy() {
             &["entity[0].shape.normal", "zero vector", "a direction"],
         ),
     ];
-    let later = ["nurbs", "csg"];
+    let later = ["csg"];
     let place = workplace();
     for (index, (scene, parts)) in cases.iter().enumerate() {
         place.write("scene.toml", scene);

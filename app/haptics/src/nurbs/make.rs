@@ -27,10 +27,10 @@ fn circle_weight(k: usize) -> f64 {
     if k % 2 == 1 { HALF } else { 1.0 }
 }
 
-/// A profile turned about the y axis: u around, v along the profile.
+/// A profile turned about the y axis: u around, v along the profile. One that rises outside faces outward.
 pub fn revolved(degree: usize, knots: &[f64], profile: &[[f64; 3]]) -> NurbsPatch {
     let ring = |&[rho, y, w]: &ProfilePoint| {
-        CIRCLE.iter().enumerate().map(move |(k, [c, s])| [rho * c, y, rho * s, w * circle_weight(k)])
+        CIRCLE.iter().enumerate().map(move |(k, [c, s])| [rho * c, y, -rho * s, w * circle_weight(k)])
     };
     NurbsPatch {
         degree: [2, degree],
@@ -122,7 +122,9 @@ pub fn mouse(length_m: f64) -> Vec<NurbsPatch> {
             let [x, z] = CIRCLE[2 * quarter + k];
             [a * rho * x, b * y, c * rho * z, w * circle_weight(k)]
         };
-        let points = profile.iter().flat_map(|&p| (0..3).map(move |k| point(p, k))).collect();
+        // Against the clock seen from outside.
+        let turned = |k: usize| if up > 0.0 { 2 - k } else { k };
+        let points = profile.iter().flat_map(|&p| (0..3).map(move |k| point(p, turned(k)))).collect();
         NurbsPatch { degree: [2, 2], knots: [knots.clone(), knots.clone()], points }
     };
     [1.0, -1.0].into_iter().flat_map(|up| (0..4).map(move |q| (q, up))).map(|(q, up)| octant(q, up)).collect()

@@ -96,13 +96,13 @@ fn a_key_of_the_format_that_this_version_lacks_is_told_apart_from_an_unknown_one
     );
 }
 
-const KINDS: &str = "plane, sphere, box, cylinder, cone, torus, capsule, ellipsoid, mesh";
+const KINDS: &str = "plane, sphere, box, cylinder, cone, torus, capsule, ellipsoid, mesh, nurbs";
 const MODELS: &str = "none, coulomb, stiction, viscous, coulomb-viscous, stribeck, karnopp, dahl, lugre, curve, bristle, \
                       reset-integrator, hayward, fixed-cone";
 
 #[test]
 fn a_shape_kind_that_this_version_lacks_is_told_apart_from_an_unknown_one() {
-    for kind in ["nurbs", "csg"] {
+    for kind in ["csg"] {
         let message = format!(
             "s.toml:4: entity[0].shape.kind: shape kind `{kind}` is not available in this version; \
              available: {KINDS}"
@@ -117,7 +117,7 @@ fn a_shape_kind_that_this_version_lacks_is_told_apart_from_an_unknown_one() {
     );
     refused(
         &with_shape("{ kind = \"nurb\" }"),
-        &unknown("`nurb` (did you mean `nurbs`, which is not available in this version?)"),
+        &unknown("`nurb` (did you mean `nurbs`?)"),
     );
     refused(&with_shape("{ kind = \"Mesh\" }"), &unknown("`Mesh` (did you mean `mesh`?)"));
     refused(&with_shape("{ kind = \"a\\nb\" }"), &unknown("`a\\nb`"));
@@ -191,7 +191,7 @@ fn a_missing_key_is_named_with_what_may_stand_there() {
     refused(
         &with_shape("{ radius_m = 1 }"),
         "s.toml:4: entity[0].shape.kind: missing; allowed: plane, sphere, box, cylinder, cone, torus, capsule, \
-         ellipsoid, mesh",
+         ellipsoid, mesh, nurbs",
     );
     refused(
         &with_shape("{ kind = \"sphere\" }"),
