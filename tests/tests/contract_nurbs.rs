@@ -85,8 +85,16 @@ fn scaled_by_three_factors_a_ball_is_an_ellipsoid() {
 fn files_that_are_no_patches_are_refused_with_both_places() {
     let good = write_patches(&make::mouse(0.08));
     let cases = [
-        ("p.toml", good.replacen("degree = [2, 2]", "degree = [9, 2]", 1), vec!["p.toml:2: patch[0].degree", "degree u: 9"]),
-        ("p.obj", "v 0 0 0\ncstype bezier\n".into(), vec!["p.obj", "line 2: found `bezier`", "cstype rat bspline"]),
+        (
+            "p.toml",
+            good.replacen("degree = [2, 2]", "degree = [9, 2]", 1),
+            vec!["p.toml:2: patch[0].degree", "degree u: 9"],
+        ),
+        (
+            "p.obj",
+            "v 0 0 0\ncstype bezier\n".into(),
+            vec!["p.obj", "line 2: found `bezier`", "cstype rat bspline"],
+        ),
         ("p.step", String::new(), vec!["p.step", "neither TOML nor OBJ"]),
         // One patch three times: nobody could say what lies beyond its edges.
         ("p.toml", good.repeat(2), vec!["p.toml", "an edge through", "two patches at an edge"]),
@@ -95,7 +103,8 @@ fn files_that_are_no_patches_are_refused_with_both_places() {
         let place = Workplace::new();
         place.write(file, &text);
         place.write("scene.toml", scene(&format!("kind = \"nurbs\", file = \"{file}\""), ""));
-        let said: Said = place.run(["run", "scene.toml", "--clock", "virtual", "--headless", "--record", "out.csv"]);
+        let said: Said =
+            place.run(["run", "scene.toml", "--clock", "virtual", "--headless", "--record", "out.csv"]);
         assert!(said.status.is_some_and(|status| status != 0), "{file}: {said:?}");
         for part in ["scene.toml:5: entity[0].shape.file"].iter().chain(&parts) {
             assert!(said.err.contains(part), "{part}: {}", said.err);

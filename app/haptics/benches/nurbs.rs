@@ -36,7 +36,9 @@ fn walk(nurbs: &Nurbs, height_m: f64) -> Vec<Vector3<f64>> {
             let angle = std::f64::consts::TAU * i as f64 / ROUND as f64;
             let aside = Vector3::new(angle.cos(), 0.0, angle.sin()) * 0.033;
             let at = match nurbs.sides() {
-                haptics::mesh::Sides::Sheet => surface.entry(&(aside + Vector3::y()), &(aside - Vector3::y())).unwrap(),
+                haptics::mesh::Sides::Sheet => {
+                    surface.entry(&(aside + Vector3::y()), &(aside - Vector3::y())).unwrap()
+                }
                 _ => surface.nearest(&(aside * 3.0 + Vector3::y() * 0.05)),
             };
             at.point_B + at.normal_B * height_m

@@ -112,7 +112,10 @@ pub struct NurbsReport {
 impl fmt::Display for NurbsReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { patches, elements, cells, seams, creases, rims, poles, turned, is_one_sided } = self;
-        write!(f, "{patches} patches of {elements} polynomials in {cells} cells, {seams} seams ({creases} of them")?;
+        write!(
+            f,
+            "{patches} patches of {elements} polynomials in {cells} cells, {seams} seams ({creases} of them"
+        )?;
         write!(f, " creases), {poles} poles")?;
         if *rims > 0 {
             write!(f, "; it ends at {rims} edges: a sheet, felt from both sides")?;
@@ -166,7 +169,8 @@ impl Nurbs {
         nurbs.widen_slack();
         nurbs.group();
         tree::grow(&mut nurbs)?;
-        let report = NurbsReport { turned, is_one_sided: !joined.is_orientable, ..nurbs.report(patches.len()) };
+        let report =
+            NurbsReport { turned, is_one_sided: !joined.is_orientable, ..nurbs.report(patches.len()) };
         Ok((nurbs, report))
     }
 
@@ -246,7 +250,8 @@ impl Nurbs {
             (0..=p).map(|i| i + q * (p + 1)).collect(),
         ];
         let tiny = 1e-3 * seams::EQUAL * self.extent_m;
-        let shrunk = edges.iter().find(|edge| edge.iter().all(|&k| (point(k) - point(edge[0])).amax() <= tiny));
+        let shrunk =
+            edges.iter().find(|edge| edge.iter().all(|&k| (point(k) - point(edge[0])).amax() <= tiny));
         // Taken from there, what vanishes there does so to the last digit.
         let origin_B = shrunk.map_or_else(|| point(net.len() / 2), |edge| point(edge[0]));
         let first = self.controls.len();
@@ -280,7 +285,9 @@ impl Nurbs {
     fn volume_under(&self, patch: u32) -> f64 {
         let breaks = &self.patches[patch as usize].breaks;
         let places = |d: usize| {
-            breaks[d].windows(2).flat_map(|ends| GAUSS.map(|(x, w)| (ends[0] + (ends[1] - ends[0]) * x, w * (ends[1] - ends[0]))))
+            breaks[d].windows(2).flat_map(|ends| {
+                GAUSS.map(|(x, w)| (ends[0] + (ends[1] - ends[0]) * x, w * (ends[1] - ends[0])))
+            })
         };
         places(1)
             .flat_map(|v| places(0).map(move |u| (u, v)))
@@ -337,7 +344,8 @@ impl Nurbs {
         let edges = || self.patches.iter().flat_map(|patch| &patch.edges);
         let links = || edges().flat_map(|edge| &edge.links);
         let is_open = |edge: &&Edge| {
-            edge.pole.is_none() && edge.links.iter().map(|l| l.along[1] - l.along[0]).sum::<f64>() < 1.0 - 1e-4
+            edge.pole.is_none()
+                && edge.links.iter().map(|l| l.along[1] - l.along[0]).sum::<f64>() < 1.0 - 1e-4
         };
         NurbsReport {
             patches,

@@ -66,7 +66,8 @@ fn a_step_on_rational_patches_never_allocates() {
     let solid = std::sync::Arc::new(Nurbs::build(&nurbs::make::vase(0.05)).unwrap().0);
     let sheet = std::sync::Arc::new(Nurbs::build(&nurbs::make::sheet(6, 0.05, 0.002)).unwrap().0);
     for radius in [0.0, 0.002] {
-        let entities = [entity(solid.clone(), stiction()), entity(sheet.clone(), Friction::coulomb(0.3).unwrap())];
+        let entities =
+            [entity(solid.clone(), stiction()), entity(sheet.clone(), Friction::coulomb(0.3).unwrap())];
         let mut finger = Finger::new(radius, entities.len()).unwrap();
         let mut noise = Noise(10);
         let mut touched = 0;
@@ -76,7 +77,8 @@ fn a_step_on_rational_patches_never_allocates() {
                 finger.forget(0);
             }
             let t = f64::from(i) * DT;
-            let hip = Vector3::new(0.02 * (2.0 * t).sin(), 0.03 * (3.0 * t).cos(), 0.01 * t.sin()) + noise.vector(1e-5);
+            let hip = Vector3::new(0.02 * (2.0 * t).sin(), 0.03 * (3.0 * t).cos(), 0.01 * t.sin())
+                + noise.vector(1e-5);
             touched += u32::from(finger.step(&entities, &hip, DT).entity.is_some());
         }
         assert_eq!(CALLS.get() - before, 0);

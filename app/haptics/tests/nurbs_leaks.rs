@@ -146,7 +146,10 @@ fn random_walks_never_pop_through_and_never_stick() {
                 let is_held = out.entity.is_some();
                 // Inside it is always held; outside only where it was pressed through, which takes having been in.
                 assert!(distance >= -1e-12 || is_held, "{name} {seed} {i}: {distance:e} inside and free");
-                assert!(distance <= 1e-12 || !is_held || !was_outside, "{name} {seed} {i}: grabbed at {distance:e}");
+                assert!(
+                    distance <= 1e-12 || !is_held || !was_outside,
+                    "{name} {seed} {i}: grabbed at {distance:e}"
+                );
                 if let Some(contact) = finger.contact(0) {
                     let off = surface.nearest(&contact.god_object_W).point_B - contact.god_object_W;
                     assert!(off.norm() < 1e-14, "{name} {seed} {i}: off the surface by {:e}", off.norm());

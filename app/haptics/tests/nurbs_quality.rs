@@ -79,7 +79,11 @@ fn over_seams_the_force_changes_no_faster_than_the_finger_moves() {
                     let moved = (hip - path[i - 1]).norm();
                     // A millimetre deep on a curvature of less than 1 / 4 mm, force turns by less than
                     // depth / radius per move, and friction by as much again.
-                    assert!((force - last).norm() <= 3.0 * K * moved, "{name} {i}: {} {moved}", (force - last).norm());
+                    assert!(
+                        (force - last).norm() <= 3.0 * K * moved,
+                        "{name} {i}: {} {moved}",
+                        (force - last).norm()
+                    );
                 }
                 last = Some(force);
             }
@@ -243,9 +247,20 @@ fn any_knot_vector_and_degree_is_the_spline_that_de_boor_gives() {
                 knots[count + 1..].fill(last);
             }
             let points: Vec<[f64; 4]> = (0..count * 2)
-                .map(|k| [k as f64 % count as f64 + noise.uniform(), noise.uniform(), (k / count) as f64, noise.between(0.5, 2.0)])
+                .map(|k| {
+                    [
+                        k as f64 % count as f64 + noise.uniform(),
+                        noise.uniform(),
+                        (k / count) as f64,
+                        noise.between(0.5, 2.0),
+                    ]
+                })
                 .collect();
-            let patch = NurbsPatch { degree: [degree, 1], knots: [knots.clone(), vec![0.0, 0.0, 1.0, 1.0]], points: points.clone() };
+            let patch = NurbsPatch {
+                degree: [degree, 1],
+                knots: [knots.clone(), vec![0.0, 0.0, 1.0, 1.0]],
+                points: points.clone(),
+            };
             if patch.check(0).is_err() {
                 continue;
             }
@@ -287,7 +302,9 @@ fn de_boor(points: &[[f64; 4]], knots: &[f64], degree: usize, x: f64) -> Vector3
         if p == 0 {
             return f64::from(u8::from(knots[i] <= x && x < knots[i + 1]));
         }
-        let part = |numerator: f64, denominator: f64, b: f64| if denominator > 0.0 { numerator / denominator * b } else { 0.0 };
+        let part = |numerator: f64, denominator: f64, b: f64| {
+            if denominator > 0.0 { numerator / denominator * b } else { 0.0 }
+        };
         part(x - knots[i], knots[i + p] - knots[i], basis(knots, i, p - 1, x))
             + part(knots[i + p + 1] - x, knots[i + p + 1] - knots[i + 1], basis(knots, i + 1, p - 1, x))
     }

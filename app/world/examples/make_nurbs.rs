@@ -35,7 +35,9 @@ fn text(arguments: &[String]) -> Option<String> {
         [kind, size_m] => (kind, size_m.parse().ok().filter(|size: &f64| size.is_finite() && *size > 0.0)?),
         _ => return None,
     };
-    let about = format!("# Written by `make_nurbs {kind} {size_m}`. Metres, y up; points: x, y, z, weight; u runs first.\n\n");
+    let about = format!(
+        "# Written by `make_nurbs {kind} {size_m}`. Metres, y up; points: x, y, z, weight; u runs first.\n\n"
+    );
     Some(about + &world::model::write_patches(&patches(kind, size_m)?))
 }
 

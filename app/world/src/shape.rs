@@ -235,7 +235,18 @@ const ELLIPSOID_KEYS: Vocabulary = keys(&["kind", "radii_m", "scale"]);
 const MESH_KEYS: Vocabulary = keys(&["kind", "file", "scale"]);
 
 const KINDS: Vocabulary = Vocabulary {
-    available: &["plane", "sphere", "box", "cylinder", "cone", "torus", "capsule", "ellipsoid", "mesh", "nurbs"],
+    available: &[
+        "plane",
+        "sphere",
+        "box",
+        "cylinder",
+        "cone",
+        "torus",
+        "capsule",
+        "ellipsoid",
+        "mesh",
+        "nurbs",
+    ],
     later: &["csg"],
 };
 const EXAMPLE: &str = "a table such as { kind = \"sphere\", radius_m = 0.05 }";

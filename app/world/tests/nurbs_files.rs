@@ -31,7 +31,12 @@ fn free_form(patches: &[NurbsPatch]) -> String {
         let count = patch.points.len() as i64;
         let corners: Vec<String> = (-count..0).map(|k| format!("{k}/1/1")).collect();
         let range = list(&[ends(0), ends(1)].concat());
-        writeln!(text, "vt 0 0\nvn 0 0 1\ncstype rat bspline\ndeg {p} {q}\nsurf {range} \\\n {}", corners.join(" ")).unwrap();
+        writeln!(
+            text,
+            "vt 0 0\nvn 0 0 1\ncstype rat bspline\ndeg {p} {q}\nsurf {range} \\\n {}",
+            corners.join(" ")
+        )
+        .unwrap();
         writeln!(text, "parm u {}\nparm v {}\nend", list(&patch.knots[0]), list(&patch.knots[1])).unwrap();
     }
     text
@@ -86,7 +91,10 @@ const PATCH: &str = "[[patch]]\ndegree = [1, 1]\nknots_u = [0, 0, 1, 1]\nknots_v
 
 #[test]
 fn what_is_wrong_with_a_toml_file_is_told_with_line_and_key() {
-    assert_eq!(read_patches(Path::new("p.toml"), PATCH.as_bytes()).unwrap()[0].points[3], [1.0, 0.0, 1.0, 2.0]);
+    assert_eq!(
+        read_patches(Path::new("p.toml"), PATCH.as_bytes()).unwrap()[0].points[3],
+        [1.0, 0.0, 1.0, 2.0]
+    );
     let with = |from: &str, to: &str| {
         assert!(PATCH.contains(from));
         PATCH.replace(from, to)
@@ -130,7 +138,10 @@ fn what_is_wrong_with_a_toml_file_is_told_with_line_and_key() {
         "p.toml:3: patch[0].knot_u: unknown key (did you mean `knots_u`?); allowed: degree, knots_u, knots_v, points",
     );
     let error = read_nurbs(Path::new("p.step"), b"").unwrap_err().to_string();
-    assert_eq!(error, "neither TOML nor OBJ by its name; allowed: a file of patches that ends in .toml or .obj");
+    assert_eq!(
+        error,
+        "neither TOML nor OBJ by its name; allowed: a file of patches that ends in .toml or .obj"
+    );
 }
 
 #[track_caller]
@@ -154,7 +165,10 @@ fn what_is_wrong_with_an_obj_file_is_told_with_its_line() {
         &with("end\n", "trim 0 1 1\nend\n"),
         "line 10: found `trim`; allowed: whole surfaces: export the model without trimming",
     );
-    obj_refused(&with("end\n", ""), "line 7: found a surface without an end; allowed: `end` behind its `parm` statements");
+    obj_refused(
+        &with("end\n", ""),
+        "line 7: found a surface without an end; allowed: `end` behind its `parm` statements",
+    );
     obj_refused(
         &with("cstype bspline", "cstype rat bezier"),
         "line 5: found `rat bezier`; allowed: `cstype bspline` or `cstype rat bspline`",
@@ -168,14 +182,23 @@ fn what_is_wrong_with_an_obj_file_is_told_with_its_line() {
         &with("parm v 0 0 1 1", "parm v 0 0 1"),
         "line 9: found knots v: 3 knots; allowed: 4 or more at degree 1",
     );
-    obj_refused(&with("parm v 0 0 1 1\n", ""), "line 9: found a surface without knots; allowed: `parm u` and `parm v` before `end`");
-    obj_refused(&with("deg 1 1\n", ""), "line 6: found a surface of no kind; allowed: `cstype` and `deg` before the first surface");
+    obj_refused(
+        &with("parm v 0 0 1 1\n", ""),
+        "line 9: found a surface without knots; allowed: `parm u` and `parm v` before `end`",
+    );
+    obj_refused(
+        &with("deg 1 1\n", ""),
+        "line 6: found a surface of no kind; allowed: `cstype` and `deg` before the first surface",
+    );
     obj_refused(&with("v 1 0 1", "v 1 0 nan"), "line 4: found `nan`; allowed: a finite number");
     obj_refused(
         &with("end\n", "end\nf 1 2 3\n"),
         "line 11: found a polygon; allowed: free-form surfaces only; polygons are a shape of kind \"mesh\"",
     );
-    obj_refused(&with("end\n", "end\nwhatever\n"), "line 11: found `whatever`; allowed: statements of OBJ, or a comment after `#`");
+    obj_refused(
+        &with("end\n", "end\nwhatever\n"),
+        "line 11: found `whatever`; allowed: statements of OBJ, or a comment after `#`",
+    );
 }
 
 #[test]
@@ -191,7 +214,8 @@ fn no_cut_or_bitten_file_makes_a_reader_panic() {
         if let Some(byte) = bytes.get_mut(at) {
             *byte = (state >> 20) as u8;
         }
-        let patches = if round % 2 == 0 { read_patches(Path::new("p.toml"), &bytes) } else { read_free_form(&bytes) };
+        let patches =
+            if round % 2 == 0 { read_patches(Path::new("p.toml"), &bytes) } else { read_free_form(&bytes) };
         // What is let through can be built, or is refused there.
         if let Ok(patches) = patches {
             let _ = Nurbs::build(&patches);

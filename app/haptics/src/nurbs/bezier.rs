@@ -57,12 +57,18 @@ pub(super) fn elements_of(patch: &NurbsPatch) -> Elements {
         })
         .collect();
     let net = |eu: usize, ev: usize| {
-        (0..=q).flat_map(|j| (0..=p).map(move |i| (i, j))).map(|(i, j)| columns[eu * p + i][ev * q + j]).collect()
+        (0..=q)
+            .flat_map(|j| (0..=p).map(move |i| (i, j)))
+            .map(|(i, j)| columns[eu * p + i][ev * q + j])
+            .collect()
     };
     Elements {
         counts,
         breaks: [breaks_of(&patch.knots[0], p, &spans[0]), breaks_of(&patch.knots[1], q, &spans[1])],
-        nets: (0..counts[1]).flat_map(|ev| (0..counts[0]).map(move |eu| (eu, ev))).map(|(eu, ev)| net(eu, ev)).collect(),
+        nets: (0..counts[1])
+            .flat_map(|ev| (0..counts[0]).map(move |eu| (eu, ev)))
+            .map(|(eu, ev)| net(eu, ev))
+            .collect(),
     }
 }
 
@@ -74,7 +80,8 @@ fn spans_of(knots: &[f64], degree: usize) -> Vec<usize> {
 fn breaks_of(knots: &[f64], degree: usize, spans: &[usize]) -> Vec<Break> {
     let end = knots[spans[spans.len() - 1] + 1];
     let ats = spans.iter().map(|&i| knots[i]).chain([end]);
-    ats.map(|at| Break { at, may_be_sharp: knots.iter().filter(|&&knot| knot == at).count() >= degree }).collect()
+    ats.map(|at| Break { at, may_be_sharp: knots.iter().filter(|&&knot| knot == at).count() >= degree })
+        .collect()
 }
 
 /// Bezier points of a curve: `degree` per span and one at the end, neighbours sharing theirs.

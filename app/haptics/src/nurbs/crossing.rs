@@ -79,11 +79,8 @@ impl Nurbs {
                 }
                 Of::Nodes(second) => {
                     let key = |k: u32| self.nodes[k as usize].bounds.distance_squared(from_B);
-                    let (first, second) = if key(index + 1) <= key(second) {
-                        (index + 1, second)
-                    } else {
-                        (second, index + 1)
-                    };
+                    let (first, second) =
+                        if key(index + 1) <= key(second) { (index + 1, second) } else { (second, index + 1) };
                     waiting.push(0.0, second);
                     waiting.push(0.0, first);
                 }
@@ -150,20 +147,15 @@ impl Nurbs {
         }
     }
 
-    fn take(
-        &self,
-        foot: Foot,
-        path: &Path,
-        best: &mut Option<Crossed>,
-        counts: &impl Fn(&Crossed) -> bool,
-    ) {
+    fn take(&self, foot: Foot, path: &Path, best: &mut Option<Crossed>, counts: &impl Fn(&Crossed) -> bool) {
         let along_m = path.ahead.dot(&(foot.point_B() - path.from_B));
         let is_on_it = along_m >= -path.slack_m && along_m <= path.length_m + path.slack_m;
         if !is_on_it || best.as_ref().is_some_and(|best| best.along_m <= along_m) {
             return;
         }
         // Grazing a solid counts as entering it: the contact that begins will find itself free.
-        let is_front = path.ahead.dot(&foot.normal_B) <= if self.sides == Sides::Solid { GRAZING } else { 0.0 };
+        let is_front =
+            path.ahead.dot(&foot.normal_B) <= if self.sides == Sides::Solid { GRAZING } else { 0.0 };
         let foot = if is_front { foot } else { Foot { side: -1.0, normal_B: -foot.normal_B, ..foot } };
         let crossed = Crossed { foot, along_m };
         if counts(&crossed) {
@@ -174,7 +166,8 @@ impl Nurbs {
     /// The crossing in an even window, begun where an even net would have it.
     fn newton(&self, cell: &Cell, path: &Path, window: &Window, start: [f64; 2]) -> Found {
         let of = |d: usize, x: f64| window[d][0] * (1.0 - x) + window[d][1] * x;
-        let wide: [f64; 2] = [0, 1].map(|d| (cell.window[d][1] - cell.window[d][0]) * (window[d][1] - window[d][0]));
+        let wide: [f64; 2] =
+            [0, 1].map(|d| (cell.window[d][1] - cell.window[d][0]) * (window[d][1] - window[d][0]));
         let low = cell.at([window[0][0], window[1][0]]);
         let mut at = cell.at([of(0, start[0].clamp(0.0, 1.0)), of(1, start[1].clamp(0.0, 1.0))]);
         let mut last_m = f64::INFINITY;
@@ -200,9 +193,8 @@ impl Nurbs {
                 return Found::Nothing;
             }
             // Off the window by more than its size there is nothing to be found.
-            at = [0, 1].map(|d| {
-                (at[d] + step[d]).clamp(low[d] - wide[d], low[d] + 2.0 * wide[d]).clamp(-0.1, 1.1)
-            });
+            at = [0, 1]
+                .map(|d| (at[d] + step[d]).clamp(low[d] - wide[d], low[d] + 2.0 * wide[d]).clamp(-0.1, 1.1));
         }
         Found::Nothing
     }

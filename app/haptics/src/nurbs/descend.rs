@@ -232,7 +232,8 @@ fn newton(
     room: &Room,
 ) -> ([f64; 2], bool) {
     let (uu, uv, vv) = (here.du.norm_squared(), here.du.dot(&here.dv), here.dv.norm_squared());
-    let (a, b, c) = (uu - offset_B.dot(&here.duu), uv - offset_B.dot(&here.duv), vv - offset_B.dot(&here.dvv));
+    let (a, b, c) =
+        (uu - offset_B.dot(&here.duu), uv - offset_B.dot(&here.duv), vv - offset_B.dot(&here.dvv));
     // One parameter, while the other one goes `other`.
     let alone = |slope: f64, newton: f64, mixed: f64, plain: f64, plain_mixed: f64, other: f64| {
         if newton > LEAST_PIVOT * plain {

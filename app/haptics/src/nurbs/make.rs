@@ -49,7 +49,9 @@ pub fn sphere(radius_m: f64) -> Vec<NurbsPatch> {
 /// An exact ring about the y axis, one patch closed both ways.
 pub fn torus(ring_radius_m: f64, tube_radius_m: f64) -> Vec<NurbsPatch> {
     let profile: Vec<_> = (0..9)
-        .map(|k| [ring_radius_m + tube_radius_m * CIRCLE[k][0], tube_radius_m * CIRCLE[k][1], circle_weight(k)])
+        .map(|k| {
+            [ring_radius_m + tube_radius_m * CIRCLE[k][0], tube_radius_m * CIRCLE[k][1], circle_weight(k)]
+        })
         .collect();
     vec![revolved(2, &CIRCLE_KNOTS, &profile)]
 }
@@ -96,11 +98,8 @@ pub fn vase(height_m: f64) -> Vec<NurbsPatch> {
         [0.0, 0.04],
     ]);
     let arc = [[0.20, 0.98, 1.0], [0.20, 1.0, HALF], [0.18, 1.0, 1.0], [0.16, 1.0, HALF], [0.16, 0.98, 1.0]];
-    let lip = revolved(
-        2,
-        &[0.0, 0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 2.0],
-        &arc.map(|[rho, y, w]| [rho * h, y * h, w]),
-    );
+    let lip =
+        revolved(2, &[0.0, 0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 2.0], &arc.map(|[rho, y, w]| [rho * h, y * h, w]));
     vec![outside, lip, inside]
 }
 

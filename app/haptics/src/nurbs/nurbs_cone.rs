@@ -223,7 +223,8 @@ impl Nurbs {
     fn meet_ball(&self, walker: &Walker<'_>, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<Stand> {
         let path_B = to_B - from_B;
         let length_m = path_B.norm();
-        let at = |along_m: f64| if along_m < length_m { from_B + path_B * (along_m / length_m) } else { *to_B };
+        let at =
+            |along_m: f64| if along_m < length_m { from_B + path_B * (along_m / length_m) } else { *to_B };
         let mut along_m = 0.0;
         for _ in 0..MAX_STRIDES {
             let clear_m = self.clearance(&at(along_m)) - walker.layer_m();

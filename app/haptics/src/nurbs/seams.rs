@@ -248,7 +248,8 @@ fn find_poles(nurbs: &mut Nurbs) {
             if (high - low).amax() > slack {
                 continue;
             }
-            let known = nurbs.poles.iter().position(|pole| (pole.point_B - low).amax() <= EQUAL * nurbs.extent_m);
+            let known =
+                nurbs.poles.iter().position(|pole| (pole.point_B - low).amax() <= EQUAL * nurbs.extent_m);
             let pole = known.unwrap_or(nurbs.poles.len());
             if known.is_none() {
                 let (edges, normal_B) = (Vec::new(), Vector3::y());

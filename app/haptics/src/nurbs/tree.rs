@@ -146,7 +146,14 @@ fn cut(nurbs: &mut Nurbs, index: usize, [i, j]: [usize; 2], cells: &mut Vec<Cell
         let axis_B = nurbs.foot(index as u32, middle, 1.0).normal_B;
         let first = nurbs.controls.len();
         nurbs.controls.extend(net);
-        cells.push(Cell { patch: index as u32, window, net: first, origin_B: element.origin_B, bounds, axis_B });
+        cells.push(Cell {
+            patch: index as u32,
+            window,
+            net: first,
+            origin_B: element.origin_B,
+            bounds,
+            axis_B,
+        });
     }
     Ok(())
 }

@@ -170,7 +170,9 @@ impl<'n> Walker<'n> {
     /// The nearest of all; far away a descent from the nearest cell.
     pub(super) fn find(&self, p_B: &Vector3<f64>) -> Option<Stand> {
         let mut arrival = self.nurbs.nearest_within(p_B, f64::INFINITY)?;
-        if self.nurbs.sides == Sides::Sheet && (p_B - arrival.foot.point_B()).dot(&arrival.foot.normal_B) < 0.0 {
+        if self.nurbs.sides == Sides::Sheet
+            && (p_B - arrival.foot.point_B()).dot(&arrival.foot.normal_B) < 0.0
+        {
             let foot = arrival.foot;
             arrival.foot = Foot { side: -foot.side, normal_B: -foot.normal_B, ..foot };
             if let Rest::Crease(crease) = &mut arrival.rest {
@@ -188,8 +190,12 @@ impl Surface for Walker<'_> {
     }
 
     fn nearest(&self, point_B: &Vector3<f64>) -> SurfacePoint {
-        let nowhere =
-            SurfacePoint { point_B: Vector3::zeros(), normal_B: Vector3::y(), feature: Feature::Surface, piece: 0 };
+        let nowhere = SurfacePoint {
+            point_B: Vector3::zeros(),
+            normal_B: Vector3::y(),
+            feature: Feature::Surface,
+            piece: 0,
+        };
         self.find(point_B).map_or(nowhere, |stand| {
             self.know(&stand.at, &stand.foot);
             stand.at

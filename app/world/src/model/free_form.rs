@@ -64,7 +64,11 @@ impl Reader {
             }
             b"bmat" | b"step" => return refused(line, shown(keyword), CSTYPE),
             b"f" | b"fo" => {
-                return refused(line, "a polygon", "free-form surfaces only; polygons are a shape of kind \"mesh\"");
+                return refused(
+                    line,
+                    "a polygon",
+                    "free-form surfaces only; polygons are a shape of kind \"mesh\"",
+                );
             }
             other if IGNORED.contains(&other) || FREE_FORM.contains(&other) => {}
             other => return refused(line, shown(other), "statements of OBJ, or a comment after `#`"),
@@ -163,7 +167,11 @@ fn vertex(line: usize, rest: &[&[u8]]) -> Result<[f64; 4], ModelError> {
     match numbers[..] {
         [x, y, z] | [x, y, z, _, _, _] => Ok([x, y, z, 1.0]),
         [x, y, z, w] | [x, y, z, w, _, _, _] => Ok([x, y, z, w]),
-        _ => refused(line, format!("a vertex of {} numbers", numbers.len()), "three coordinates, and perhaps a weight"),
+        _ => refused(
+            line,
+            format!("a vertex of {} numbers", numbers.len()),
+            "three coordinates, and perhaps a weight",
+        ),
     }
 }
 

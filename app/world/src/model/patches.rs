@@ -51,7 +51,8 @@ fn read(file: &Path, text: &str) -> Result<Vec<NurbsPatch>, SceneError> {
 fn patch(index: usize, table: &Table<'_>) -> Result<NurbsPatch, SceneError> {
     table.check_keys(&PATCH_KEYS)?;
     let degree: Value<'_> = table.require("degree", DEGREE)?;
-    let degree = degree.numbers::<2>()?.map(|number| if number.fract() == 0.0 { number } else { 0.0 } as usize);
+    let degree =
+        degree.numbers::<2>()?.map(|number| if number.fract() == 0.0 { number } else { 0.0 } as usize);
     let knots_u = table.require("knots_u", KNOTS)?.list(Bound::Any)?;
     let knots_v = table.require("knots_v", KNOTS)?.list(Bound::Any)?;
     let points: Vec<[f64; 4]> =

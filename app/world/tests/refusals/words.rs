@@ -115,10 +115,7 @@ fn a_shape_kind_that_this_version_lacks_is_told_apart_from_an_unknown_one() {
         &with_shape("{ kind = \"shpere\", radius_m = 1 }"),
         &unknown("`shpere` (did you mean `sphere`?)"),
     );
-    refused(
-        &with_shape("{ kind = \"nurb\" }"),
-        &unknown("`nurb` (did you mean `nurbs`?)"),
-    );
+    refused(&with_shape("{ kind = \"nurb\" }"), &unknown("`nurb` (did you mean `nurbs`?)"));
     refused(&with_shape("{ kind = \"Mesh\" }"), &unknown("`Mesh` (did you mean `mesh`?)"));
     refused(&with_shape("{ kind = \"a\\nb\" }"), &unknown("`a\\nb`"));
 }
