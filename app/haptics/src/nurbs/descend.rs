@@ -24,6 +24,10 @@ pub(super) struct Arrival {
 
 /// What kept it.
 #[derive(Debug, Clone, Copy)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "lives on the stack for a moment; a box would allocate in a tick"
+)]
 pub(super) enum Rest {
     /// Nothing: no direction leads down.
     Smooth,
@@ -100,7 +104,7 @@ impl Nurbs {
         is_free: &mut [bool; 2],
         rest: &mut Rest,
     ) -> Option<Step> {
-        for d in 0..2 {
+        for (d, is_free) in is_free.iter_mut().enumerate() {
             let edge = match foot.at[d] {
                 0.0 => 2 * d,
                 1.0 => 2 * d + 1,
@@ -111,7 +115,7 @@ impl Nurbs {
             if self.inward(foot, edge as u8).dot(offset_B) >= 0.0 {
                 continue;
             }
-            is_free[d] = false;
+            *is_free = false;
             match self.beyond(foot, edge, offset_B) {
                 Border::Rim => *rest = Rest::Rim,
                 Border::Patch { foot: beyond, edge: edge_beyond, is_smooth, leads_down } => {

@@ -109,17 +109,17 @@ impl<const N: usize> Basis<N> {
         for level in 1..=p {
             // Here `b` holds degree `level - 1`.
             if level + 1 == p {
-                for k in 0..=p {
+                for (k, of) in of.iter_mut().enumerate().take(p + 1) {
                     let at = |k: usize| if k < p - 1 { b[k] } else { 0.0 };
                     let before = |back: usize| k.checked_sub(back).map_or(0.0, at);
-                    of[k][2] = second * (before(2) - 2.0 * before(1) + before(0));
+                    of[2] = second * (before(2) - 2.0 * before(1) + before(0));
                 }
             }
             if level == p {
-                for k in 0..=p {
+                for (k, of) in of.iter_mut().enumerate().take(p + 1) {
                     let before = if k > 0 { b[k - 1] } else { 0.0 };
                     let here = if k < p { b[k] } else { 0.0 };
-                    of[k][1] = first * (before - here);
+                    of[1] = first * (before - here);
                 }
             }
             for k in (1..=level).rev() {
@@ -127,8 +127,8 @@ impl<const N: usize> Basis<N> {
             }
             b[0] *= r;
         }
-        for k in 0..=p {
-            of[k][0] = b[k];
+        for (of, b) in of.iter_mut().zip(&b[..=p]) {
+            of[0] = *b;
         }
         Self(of)
     }

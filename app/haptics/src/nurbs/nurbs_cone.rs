@@ -170,11 +170,12 @@ impl Touching {
             return Some(self.touch(&force));
         }
         let mut god_object = *self.cone.god_object();
-        if god_object.feature == Feature::Edge && walker.is_of_a_point() {
-            if let Some((turned, foot)) = walker.turned(&self.god_foot) {
-                self.cone.stand_at(turned);
-                (god_object, self.god_foot) = (turned, foot);
-            }
+        if god_object.feature == Feature::Edge
+            && walker.is_of_a_point()
+            && let Some((turned, foot)) = walker.turned(&self.god_foot)
+        {
+            self.cone.stand_at(turned);
+            (god_object, self.god_foot) = (turned, foot);
         }
         walker.know(&god_object, &self.god_foot);
         let force = self.cone.update(walker, friction, input);
