@@ -3,11 +3,11 @@
 //! Problem: there is no formula for where a path meets such a surface, nor for its nearest point; a finger needs both
 //! every tick, exactly, and must get through neither seams between patches nor points that edges have shrunk to.
 //!
-//! Model: patches are cut into Bezier elements once ([`bezier`]), with all derivatives at hand ([`local`]); a tree of
-//! cells tells what is near ([`tree`]); where a path first crosses is found by halving hulls ([`crossing`]); from then on
+//! Model: patches are cut into Bezier elements once (`bezier`), with all derivatives at hand (`local`); a tree of
+//! cells tells what is near (`tree`); where a path first crosses is found by halving hulls (`crossing`); from then on
 //! a god-object's place is known by patch and parameters, and a step of Newton's or two a tick keep it up to date
-//! ([`descend`]), across borders ([`seams`]). The Friction Cone Algorithm runs on that as on every surface
-//! ([`walker`], [`nurbs_cone`]).
+//! (`descend`), across borders (`seams`). The Friction Cone Algorithm runs on that as on every surface
+//! (`walker`, `nurbs_cone`).
 //!
 //! Frames and signs: everything in the object's frame B. A closed set has an inside and is turned outward here; a set
 //! with open edges, or one that cannot be turned (a Klein bottle), is a sheet and is felt from both sides.
