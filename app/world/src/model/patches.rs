@@ -78,7 +78,7 @@ fn refused(table: &Table<'_>, error: NurbsError) -> SceneError {
     };
     let key = match part.split_once(' ') {
         Some(("degree", _)) => "degree",
-        Some(("knots", direction)) if direction == "u" => "knots_u",
+        Some(("knots", "u")) => "knots_u",
         Some(("knots", _)) => "knots_v",
         _ => "points",
     };
