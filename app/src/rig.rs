@@ -325,7 +325,7 @@ impl Rig {
     /// The model and picture files that it is made of.
     pub fn model_files(&self) -> impl Iterator<Item = &PathBuf> {
         let models = self.scene.entities.iter().filter_map(|entity| match &entity.shape {
-            ShapeSpec::Mesh(mesh) => Some(&mesh.file),
+            ShapeSpec::Mesh(model) | ShapeSpec::Nurbs(model) => Some(&model.file),
             _ => None,
         });
         models.chain(self.scene.entities.iter().filter_map(|entity| Some(&entity.height_map.as_ref()?.file)))

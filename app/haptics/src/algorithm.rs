@@ -125,6 +125,7 @@ impl TouchInput<'_> {
                 });
                 answer
             }
+            Shape::Nurbs(nurbs) => Some(ask(&nurbs.surface(self.finger_radius_m))),
             Shape::Mesh(_) | Shape::Csg(_) => None,
         }
     }

@@ -22,6 +22,7 @@ use crate::friction_law::FrictionState;
 use crate::height_map::Over;
 use crate::hip::Hip;
 use crate::mesh::{Beginning, Mesh, MeshCone, RollingCone};
+use crate::nurbs::NurbsCone;
 use crate::shape::Shape;
 use crate::surface::{Feature, Surface};
 use crate::touch_points::TouchPoints;
@@ -76,6 +77,7 @@ pub(crate) struct Slot {
     /// Of a ball; large, and points have none.
     rolling: Option<Box<RollingCone>>,
     csg: CsgCone,
+    nurbs: NurbsCone,
     own: ContactMemory,
     /// Whether anything was noted here since it was new.
     is_used: bool,
@@ -99,6 +101,7 @@ impl Slot {
             self.mesh.let_go();
             self.let_roll_go();
             self.csg.let_go();
+            self.nurbs.let_go();
         }
         self.contact.as_ref()
     }
@@ -227,6 +230,10 @@ impl Slot {
             Shape::Mesh(mesh) => {
                 self.cone = None;
                 let touched = self.rolling.as_mut()?.update(mesh, input);
+                self.begun(touched)
+            }
+            Shape::Nurbs(nurbs) => {
+                let touched = self.nurbs.update(nurbs, input);
                 self.begun(touched)
             }
             Shape::Csg(csg) => {

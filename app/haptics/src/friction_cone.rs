@@ -88,6 +88,11 @@ impl FrictionCone {
         &self.god_object
     }
 
+    /// Turns a god-object that rests where the surface has no normal of its own: it presses against where the HIP is now.
+    pub(crate) fn stand_at(&mut self, at: SurfacePoint) {
+        self.god_object = at;
+    }
+
     /// Whether it holds or slides.
     pub fn state(&self) -> FrictionState {
         self.grip.state

@@ -55,6 +55,7 @@ mod height_map;
 mod hip;
 mod material;
 pub mod mesh;
+pub mod nurbs;
 pub mod passivity;
 mod plane;
 mod quartic;
@@ -99,6 +100,7 @@ pub use height_map::{
 };
 pub use hip::Hip;
 pub use material::Material;
+pub use nurbs::{Nurbs, NurbsError, NurbsPatch, NurbsReport};
 pub use plane::Plane;
 pub use scaled::Scaled;
 pub use shading::{BoxRegions, Regions, Shading, ShadingForm};

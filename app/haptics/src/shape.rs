@@ -14,6 +14,7 @@ use crate::cuboid::Cuboid;
 use crate::cylinder::Cylinder;
 use crate::ellipsoid::Ellipsoid;
 use crate::mesh::Mesh;
+use crate::nurbs::Nurbs;
 use crate::plane::Plane;
 use crate::scaled::Scaled;
 use crate::shared::Shared;
@@ -30,6 +31,8 @@ pub enum Shape {
     Mesh(Shared<Mesh>),
     /// A tree of closed forms.
     Csg(Shared<Csg>),
+    /// Rational patches.
+    Nurbs(Shared<Nurbs>),
     /// Somebody's own surface.
     Own(Shared<dyn OwnSurface>),
 }
@@ -85,6 +88,7 @@ impl Shape {
             Self::Form(form) => is_point || form.grown(finger_radius_m).is_some(),
             Self::Mesh(_) => true,
             Self::Csg(_) => is_point,
+            Self::Nurbs(_) => finger_radius_m >= 0.0,
             Self::Own(surface) => is_point || surface.show_grown(finger_radius_m, &mut |_| {}),
         }
     }
@@ -113,6 +117,12 @@ impl From<Arc<Mesh>> for Shape {
 impl From<Arc<Csg>> for Shape {
     fn from(csg: Arc<Csg>) -> Self {
         Self::Csg(csg.into())
+    }
+}
+
+impl From<Arc<Nurbs>> for Shape {
+    fn from(nurbs: Arc<Nurbs>) -> Self {
+        Self::Nurbs(nurbs.into())
     }
 }
 

@@ -10,7 +10,7 @@ mod trees;
 use common::*;
 use haptics::mesh::{Mesh, make};
 use haptics::passivity::{Passivity, PassivitySpec, Port};
-use haptics::{Finger, Friction, Shading};
+use haptics::{Finger, Friction, Nurbs, Shading, nurbs};
 use nalgebra::Vector3;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -111,6 +111,31 @@ fn no_tree_of_shapes_makes_a_step_allocate() {
             assert_eq!(CALLS.get() - before, 0, "{}", tree.name);
             assert!(touched > 500, "{}: {touched}", tree.name);
         }
+    }
+}
+
+#[test]
+fn a_step_on_rational_patches_never_allocates() {
+    let solid = std::sync::Arc::new(Nurbs::build(&nurbs::make::vase(0.05)).unwrap().0);
+    let sheet = std::sync::Arc::new(Nurbs::build(&nurbs::make::sheet(6, 0.05, 0.002)).unwrap().0);
+    for radius in [0.0, 0.002] {
+        let entities =
+            [entity(solid.clone(), stiction()), entity(sheet.clone(), Friction::coulomb(0.3).unwrap())];
+        let mut finger = Finger::new(radius, entities.len()).unwrap();
+        let mut noise = Noise(10);
+        let mut touched = 0;
+        let before = CALLS.get();
+        for i in 0..20_000u32 {
+            if i.is_multiple_of(500) {
+                finger.forget(0);
+            }
+            let t = f64::from(i) * DT;
+            let hip = Vector3::new(0.02 * (2.0 * t).sin(), 0.03 * (3.0 * t).cos(), 0.01 * t.sin())
+                + noise.vector(1e-5);
+            touched += u32::from(finger.step(&entities, &hip, DT).entity.is_some());
+        }
+        assert_eq!(CALLS.get() - before, 0);
+        assert!(touched > 1000, "{touched}");
     }
 }
 

@@ -129,6 +129,14 @@ pub enum RigError {
         /// Why.
         source: HeightMapError,
     },
+    /// A file of patches makes no surface.
+    #[error("{at}: {said}")]
+    Patches {
+        /// Where the scene names it.
+        at: Box<Location>,
+        /// The file, the place in it, and why.
+        said: String,
+    },
     /// A finger with a radius meets a shape that has no surface for its centre to roll on.
     #[error(
         "{}:{line}: finger {finger} has radius_m = {radius_m}, and entity {entity}, a {kind}, cannot be felt by such a finger; \

@@ -60,6 +60,10 @@ pub(super) fn shape(spec: &ShapeSpec, models: &Models, has_picture: bool) -> Res
             Some(mesh) => Ok(Arc::clone(mesh).into()),
             None => Err(Unfit::NotAvailable(format!("shape {spec:?}"))),
         },
+        ShapeSpec::Nurbs(nurbs) => match models.nurbs(nurbs) {
+            Some(nurbs) => Ok(Arc::clone(nurbs).into()),
+            None => Err(Unfit::NotAvailable(format!("shape {spec:?}"))),
+        },
         spec if is_csg(spec) => {
             // As the only part of a tree it may be scaled like any other.
             let tree = CsgTree::union([part(spec, Isometry3::identity())?]);

@@ -1,10 +1,10 @@
-//! The meshes of a scene: each file is read and built once for all entities that use it alike.
+//! The meshes and patches of a scene: each file is read and built once for all entities that use it alike.
 //!
 //! What was repaired is told once, what cannot be used is refused with the place in the scene and in the model.
 
 use super::{RigError, material};
-use haptics::Shading;
 use haptics::mesh::{CornerUv, Finding, Mesh, MeshError, MeshReport, TriangleSoup};
+use haptics::{Nurbs, Shading};
 use io_driver::say::say;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
@@ -22,6 +22,7 @@ const WORTH_A_LINE_BYTES: usize = 16 << 20;
 pub(super) struct Models {
     meshes: BTreeMap<Key, Arc<Mesh>>,
     shadings: Vec<(Key, ShadingSpec, Shading)>,
+    nurbs: BTreeMap<Key, Arc<Nurbs>>,
 }
 
 /// A file, the bits of the factors along its axes, and whether a picture lies on it.
@@ -32,6 +33,11 @@ impl Models {
     pub(super) fn load(scene: &Scene) -> Result<Self, RigError> {
         let mut models = Self::default();
         for entity in &scene.entities {
+            if let ShapeSpec::Nurbs(spec) = &entity.shape
+                && let Entry::Vacant(place) = models.nurbs.entry(key_of(spec, false))
+            {
+                place.insert(Arc::new(join(spec)?));
+            }
             let ShapeSpec::Mesh(spec) = &entity.shape else { continue };
             let has_picture = entity.height_map.is_some();
             if let Entry::Vacant(place) = models.meshes.entry(key_of(spec, has_picture)) {
@@ -72,6 +78,11 @@ impl Models {
     pub(super) fn mesh(&self, spec: &MeshSpec, has_picture: bool) -> Option<&Arc<Mesh>> {
         self.meshes.get(&key_of(spec, has_picture))
     }
+
+    /// Patches that were loaded.
+    pub(super) fn nurbs(&self, spec: &MeshSpec) -> Option<&Arc<Nurbs>> {
+        self.nurbs.get(&key_of(spec, false))
+    }
 }
 
 fn key_of(spec: &MeshSpec, has_picture: bool) -> Key {
@@ -98,6 +109,30 @@ fn build(spec: &MeshSpec, has_picture: bool) -> Result<Mesh, RigError> {
     })?;
     tell(file, &report);
     Ok(mesh)
+}
+
+/// Reads and joins the patches of a file.
+fn join(spec: &MeshSpec) -> Result<Nurbs, RigError> {
+    let file = &spec.file;
+    let at = || Box::new(spec.at.clone());
+    let bytes = model::read_file(file);
+    let read = bytes.and_then(|bytes| model::read_nurbs(file, &bytes));
+    let mut patches = read.map_err(|source| match source {
+        // It names the file itself.
+        ModelError::Toml(source) => RigError::Patches { at: at(), said: source.to_string() },
+        source => RigError::Model { at: at(), file: file.clone(), source },
+    })?;
+    for point in patches.iter_mut().flat_map(|patch| &mut patch.points) {
+        point.iter_mut().zip(spec.scale).for_each(|(x, factor)| *x *= factor);
+    }
+    let (nurbs, report) = Nurbs::build(&patches).map_err(|source| {
+        let said = format!("{}: {source}", file.display());
+        RigError::Patches { at: at(), said }
+    })?;
+    if report.turned > 0 || report.rims > 0 || report.is_one_sided {
+        say(format_args!("phantom3: {}: {report}", file.display()));
+    }
+    Ok(nurbs)
 }
 
 /// Texture coordinates only where a picture needs them.

@@ -15,13 +15,19 @@
 //! Units: the file's own; a scene's `scale` makes metres of them.
 //! Cost: one pass; a million triangles take a fraction of a second.
 
+mod free_form;
 mod obj;
+mod patches;
 mod polygon;
 mod stl;
 
+pub use free_form::read_free_form;
 pub use obj::{line_of_face, read_obj, read_obj_with_uv};
+pub use patches::{read_patches, write_patches};
 pub use stl::read_stl;
 
+use crate::error::SceneError;
+use haptics::NurbsPatch;
 use haptics::mesh::{CornerUv, TriangleSoup};
 use std::fs::File;
 use std::io::{self, Read};
@@ -82,6 +88,15 @@ pub enum ModelError {
         "found an STL file, which has no texture coordinates; allowed under a height map: an OBJ file with `vt`"
     )]
     NoTexture,
+    /// Something wrong in a TOML file of patches; the message names the file.
+    #[error(transparent)]
+    Toml(#[from] Box<SceneError>),
+    /// A file of patches is TOML or OBJ.
+    #[error("neither TOML nor OBJ by its name; allowed: a file of patches that ends in .toml or .obj")]
+    UnknownPatches,
+    /// There is no surface in it.
+    #[error("found no free-form surface in it; allowed: at least one")]
+    NoPatch,
     /// There is nothing to touch in it.
     #[error("found no triangle in it; allowed: at least one")]
     NoTriangle,
@@ -155,6 +170,21 @@ pub fn read_with_uv(file: &Path, bytes: &[u8]) -> Result<(TriangleSoup, Vec<Corn
     match Format::of(file, bytes).ok_or(ModelError::UnknownFormat)? {
         Format::Obj => read_obj_with_uv(bytes),
         Format::Stl => Err(ModelError::NoTexture),
+    }
+}
+
+/// The rational patches in `bytes`, as `file`'s ending says: TOML of ours, or OBJ's free-form surfaces.
+///
+/// # Errors
+/// The first thing found to be wrong, with its place.
+pub fn read_nurbs(file: &Path, bytes: &[u8]) -> Result<Vec<NurbsPatch>, ModelError> {
+    let ending = file.extension().unwrap_or_default();
+    if ending.eq_ignore_ascii_case("toml") {
+        read_patches(file, bytes)
+    } else if ending.eq_ignore_ascii_case("obj") {
+        read_free_form(bytes)
+    } else {
+        Err(ModelError::UnknownPatches)
     }
 }
 

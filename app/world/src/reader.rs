@@ -185,6 +185,21 @@ impl<'d> Value<'d> {
         }
     }
 
+    /// A list of values, at least one of them.
+    pub(crate) fn items(&self, allowed: &str) -> Result<Vec<Value<'d>>, SceneError> {
+        match self.value.get_ref() {
+            DeValue::Array(items) if !items.is_empty() => {
+                Ok(items.iter().enumerate().map(|(i, value)| self.item(i, value)).collect())
+            }
+            _ => Err(self.wrong_type(allowed)),
+        }
+    }
+
+    /// How many items a list has; 0 if it is none.
+    pub(crate) fn length(&self) -> usize {
+        if let DeValue::Array(items) = self.value.get_ref() { items.len() } else { 0 }
+    }
+
     /// Factors along three axes: one number for all, or an array of three; above 0.
     pub(crate) fn factors(&self) -> Result<[f64; 3], SceneError> {
         self.along_axes(Bound::Positive)

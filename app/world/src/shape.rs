@@ -70,6 +70,8 @@ pub enum ShapeSpec {
     Mesh(MeshSpec),
     /// Several shapes joined to one.
     Csg(CsgSpec),
+    /// Rational patches in a file of their own.
+    Nurbs(MeshSpec),
     /// Another shape but a mesh, drawn out along B's axes.
     Scaled {
         /// The shape before.
@@ -79,10 +81,10 @@ pub enum ShapeSpec {
     },
 }
 
-/// A mesh file and what becomes of it.
+/// A file of triangles or patches and what becomes of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeshSpec {
-    /// OBJ or STL; made relative to where the scene file is. It is not opened by the reader of scenes.
+    /// OBJ or STL; of patches OBJ or TOML; made relative to where the scene file is. It is not opened by the reader of scenes.
     pub file: PathBuf,
     /// Factors along x, y and z that make metres of the file's numbers; above 0, default 1.
     pub scale: [f64; 3],
@@ -104,6 +106,7 @@ impl ShapeSpec {
             Self::Ellipsoid { .. } => "ellipsoid",
             Self::Mesh(_) => "mesh",
             Self::Csg(_) => "csg",
+            Self::Nurbs(_) => "nurbs",
             Self::Scaled { shape, .. } => shape.kind(),
         }
     }
@@ -144,6 +147,7 @@ impl ShapeSpec {
         let scale = value.factors()?;
         Ok(match shape {
             ShapeSpec::Mesh(mesh) => ShapeSpec::Mesh(MeshSpec { scale, ..mesh }),
+            ShapeSpec::Nurbs(nurbs) => ShapeSpec::Nurbs(MeshSpec { scale, ..nurbs }),
             shape => ShapeSpec::Scaled { shape: Box::new(shape), scale },
         })
     }
@@ -163,6 +167,7 @@ fn reader_of(kind: &str) -> (&'static Vocabulary, Read) {
         "capsule" => (&CYLINDER_KEYS, read_capsule),
         "ellipsoid" => (&ELLIPSOID_KEYS, read_ellipsoid),
         "csg" => (&CSG_KEYS, read_csg),
+        "nurbs" => (&MESH_KEYS, read_nurbs),
         _ => (&MESH_KEYS, read_mesh),
     }
 }
@@ -223,11 +228,19 @@ fn read_ellipsoid(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
 }
 
 fn read_mesh(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
-    let allowed = "the path of an OBJ or STL file, relative to this file";
+    Ok(ShapeSpec::Mesh(read_file(table, "the path of an OBJ or STL file, relative to this file")?))
+}
+
+fn read_nurbs(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
+    let allowed = "the path of a file of patches, TOML or OBJ, relative to this file";
+    Ok(ShapeSpec::Nurbs(read_file(table, allowed)?))
+}
+
+fn read_file(table: &Table<'_>, allowed: &str) -> Result<MeshSpec, SceneError> {
     let value = table.require("file", allowed)?;
     let beside = table.document().file().parent().unwrap_or(Path::new(""));
     let file = beside.join(value.path(allowed)?);
-    Ok(ShapeSpec::Mesh(MeshSpec { file, scale: [1.0; 3], at: *value.at() }))
+    Ok(MeshSpec { file, scale: [1.0; 3], at: *value.at() })
 }
 
 fn read_csg(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
@@ -267,7 +280,8 @@ const KINDS: Vocabulary = Vocabulary {
         "ellipsoid",
         "mesh",
         "csg",
+        "nurbs",
     ],
-    later: &["nurbs"],
+    later: &[],
 };
 const EXAMPLE: &str = "a table such as { kind = \"sphere\", radius_m = 0.05 }";

@@ -122,12 +122,12 @@ fn what_is_wrong_with_an_obj_is_told_with_its_line() {
         (
             "curv 0 1 1 2",
             "found `curv`, which belongs to free-form curves and surfaces; allowed: polygons (`v` and `f`): export \
-             the model as a mesh",
+             the model as a mesh, or take `kind = \"nurbs\"`",
         ),
         (
             "cstype bspline",
             "found `cstype`, which belongs to free-form curves and surfaces; allowed: polygons (`v` and `f`): export \
-             the model as a mesh",
+             the model as a mesh, or take `kind = \"nurbs\"`",
         ),
         (
             "wobble\x07 1",

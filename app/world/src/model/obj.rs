@@ -84,7 +84,7 @@ pub(super) fn looks_like_obj(bytes: &[u8]) -> bool {
 
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-const IGNORED: [&[u8]; 18] = [
+pub(super) const IGNORED: [&[u8]; 18] = [
     b"vt",
     b"vn",
     b"o",
@@ -104,7 +104,7 @@ const IGNORED: [&[u8]; 18] = [
     b"d_interp",
     b"lod",
 ];
-const FREE_FORM: [&[u8]; 19] = [
+pub(super) const FREE_FORM: [&[u8]; 19] = [
     b"cstype", b"deg", b"bmat", b"step", b"curv", b"curv2", b"surf", b"parm", b"trim", b"hole", b"scrv",
     b"sp", b"end", b"con", b"vp", b"ctech", b"stech", b"bzp", b"bsp",
 ];
@@ -274,7 +274,7 @@ fn no_texture(line: usize, index: &str, count: usize) -> ModelError {
 }
 
 /// A whole number of a few digits; none is longer in a file that we read.
-fn integer(word: &[u8]) -> Option<i64> {
+pub(super) fn integer(word: &[u8]) -> Option<i64> {
     let (sign, digits) = match word {
         [b'-', digits @ ..] => (-1, digits),
         [b'+', digits @ ..] => (1, digits),
@@ -314,7 +314,7 @@ fn out_of_range(line: usize, index: &str, vertices: usize) -> ModelError {
 
 fn free_form(line: usize, word: &[u8]) -> ModelError {
     let found = format!("{}, which belongs to free-form curves and surfaces", shown(word));
-    let allowed = "polygons (`v` and `f`): export the model as a mesh".into();
+    let allowed = "polygons (`v` and `f`): export the model as a mesh, or take `kind = \"nurbs\"`".into();
     ModelError::Line { line, found, allowed }
 }
 
@@ -332,20 +332,20 @@ fn indivisible(line: usize, corners: usize) -> ModelError {
 }
 
 /// The words of a statement, up to a comment.
-fn words(statement: &[u8]) -> impl Iterator<Item = &[u8]> {
+pub(super) fn words(statement: &[u8]) -> impl Iterator<Item = &[u8]> {
     let code = statement.split(|&byte| byte == b'#').next().unwrap_or_default();
     code.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
 }
 
 /// Lines with their numbers, counted from 1; one that ends in a backslash goes on in the next.
-struct Statements<'t> {
+pub(super) struct Statements<'t> {
     /// What has not been read.
     rest: Option<&'t [u8]>,
     line: usize,
 }
 
 impl<'t> Statements<'t> {
-    fn new(bytes: &'t [u8]) -> Self {
+    pub(super) fn new(bytes: &'t [u8]) -> Self {
         Self { rest: Some(bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes)), line: 0 }
     }
 

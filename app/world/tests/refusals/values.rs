@@ -15,7 +15,7 @@ fn a_value_of_the_wrong_type_is_named_with_what_was_found() {
     refused(
         &with_shape("{ kind = 3 }"),
         "s.toml:4: entity[0].shape.kind: found 3; allowed: plane, sphere, box, cylinder, cone, torus, capsule, \
-         ellipsoid, mesh, csg",
+         ellipsoid, mesh, csg, nurbs",
     );
     refused(
         &with_shape("\"sphere\""),

@@ -95,27 +95,19 @@ fn a_key_of_the_format_that_this_version_lacks_is_told_apart_from_an_unknown_one
     );
 }
 
-const KINDS: &str = "plane, sphere, box, cylinder, cone, torus, capsule, ellipsoid, mesh, csg";
+const KINDS: &str = "plane, sphere, box, cylinder, cone, torus, capsule, ellipsoid, mesh, csg, nurbs";
 const MODELS: &str = "none, coulomb, stiction, viscous, coulomb-viscous, stribeck, karnopp, dahl, lugre, curve, bristle, \
                       reset-integrator, hayward, fixed-cone";
 
 #[test]
 fn a_shape_kind_that_this_version_lacks_is_told_apart_from_an_unknown_one() {
-    let message = format!(
-        "s.toml:4: entity[0].shape.kind: shape kind `nurbs` is not available in this version; \
-         available: {KINDS}"
-    );
-    refused(&with_shape("{ kind = \"nurbs\", size_m = [1, 1, 1] }"), &message);
     let unknown =
         |found: &str| format!("s.toml:4: entity[0].shape.kind: unknown shape kind {found}; allowed: {KINDS}");
     refused(
         &with_shape("{ kind = \"shpere\", radius_m = 1 }"),
         &unknown("`shpere` (did you mean `sphere`?)"),
     );
-    refused(
-        &with_shape("{ kind = \"nurb\" }"),
-        &unknown("`nurb` (did you mean `nurbs`, which is not available in this version?)"),
-    );
+    refused(&with_shape("{ kind = \"nurb\" }"), &unknown("`nurb` (did you mean `nurbs`?)"));
     refused(&with_shape("{ kind = \"Mesh\" }"), &unknown("`Mesh` (did you mean `mesh`?)"));
     refused(&with_shape("{ kind = \"a\\nb\" }"), &unknown("`a\\nb`"));
 }
@@ -188,7 +180,7 @@ fn a_missing_key_is_named_with_what_may_stand_there() {
     refused(
         &with_shape("{ radius_m = 1 }"),
         "s.toml:4: entity[0].shape.kind: missing; allowed: plane, sphere, box, cylinder, cone, torus, capsule, \
-         ellipsoid, mesh, csg",
+         ellipsoid, mesh, csg, nurbs",
     );
     refused(
         &with_shape("{ kind = \"sphere\" }"),

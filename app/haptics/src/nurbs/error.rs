@@ -1,0 +1,54 @@
+//! Refuses patches that are no surface, and sets of them that nobody could touch.
+
+use std::fmt;
+
+/// Why patches were refused. Patches, directions (`u`, `v`) and indices count as the caller gave them, from 0.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum NurbsError {
+    /// There is none.
+    NoPatch,
+    /// Something about one patch.
+    Patch {
+        /// Which one.
+        patch: usize,
+        /// Which part of it, such as `degree u`.
+        part: String,
+        /// What was found.
+        found: String,
+        /// What is allowed.
+        allowed: String,
+    },
+    /// More than two patches along one line: nobody could say what lies beyond.
+    TooManyAtEdge {
+        /// Three that meet there.
+        patches: [usize; 3],
+        /// A point of the edge (m).
+        point_B: [f64; 3],
+    },
+    /// More cells than memory is meant for.
+    TooManyCells {
+        /// The most that is built.
+        limit: usize,
+    },
+}
+
+impl fmt::Display for NurbsError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoPatch => write!(f, "found no patch; allowed: at least one"),
+            Self::Patch { patch, part, found, allowed } => {
+                write!(f, "patch {patch}: {part}: found {found}; allowed: {allowed}")
+            }
+            Self::TooManyAtEdge { patches: [a, b, c], point_B: [x, y, z] } => write!(
+                f,
+                "patches {a}, {b} and {c} have an edge through ({x}, {y}, {z}) in common; allowed: two patches at an edge"
+            ),
+            Self::TooManyCells { limit } => {
+                write!(f, "the patches fall into more than {limit} cells; allowed: fewer knots or patches")
+            }
+        }
+    }
+}
+
+impl std::error::Error for NurbsError {}
