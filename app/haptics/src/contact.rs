@@ -275,6 +275,8 @@ impl Slot {
             };
             self.hovers = !height_map.raise(&over, &mut touch);
             if self.hovers {
+                // Whoever comes down from here comes from outside.
+                self.strength = 1.0;
                 return None;
             }
         }

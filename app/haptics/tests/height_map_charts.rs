@@ -253,3 +253,64 @@ fn at_poles_and_tips_everything_is_finite_and_nothing_stands() {
         }
     }
 }
+
+#[test]
+fn slopes_are_how_heights_change_along_the_surface() {
+    for (name, form, size_m) in forms() {
+        let shape = Shape::Form(form);
+        let mut noise = Noise(15);
+        let sized_map = sized(&rough(8, 4), 2e-4, 0.03).with_zero_level(0.3).unwrap();
+        let repeated_map = repeated(&rough(8, 5), 2e-4, [2.0; 2]).with_zero_level(0.9).unwrap();
+        for map in [sized_map.clone(), sized_map.inverted(), repeated_map.clone(), repeated_map.inverted()] {
+            let mut steepest = 0.0_f64;
+            for _ in 0..1000 {
+                let at = form.nearest(&noise.vector(size_m));
+                let step_m = 1e-7;
+                let direction = along(&noise.vector(1.0), &at.normal_B).normalize() * step_m;
+                let [ahead, behind] =
+                    [1.0, -1.0].map(|side| form.settle(&at, &(at.point_B + direction * side)));
+                if ahead.piece != at.piece || behind.piece != at.piece {
+                    continue;
+                }
+                let slope = map.height(&shape, &at).1;
+                let risen_m = map.height(&shape, &ahead).0 - map.height(&shape, &behind).0;
+                let error = (risen_m - slope.dot(&(ahead.point_B - behind.point_B))) / step_m;
+                // Slopes change by at most 5 A / p^2 = 1000 per metre between texels p of a millimetre, squeezed ones
+                // near poles included: 1e-4 over the step.
+                assert!(error.abs() < 2e-4, "{name}: {error} beside {slope} at {at:?}");
+                steepest = steepest.max(slope.norm());
+            }
+            let is_endless = chart(&form, &form.nearest(&Vector3::x())).u.length_m.is_infinite();
+            assert!(steepest > 0.005 || is_endless, "{name}: {steepest}");
+        }
+    }
+}
+
+#[test]
+fn a_picture_of_a_given_size_closes_around_all_the_same() {
+    for (name, form, _) in forms() {
+        let u = chart(&form, &form.nearest(&(Vector3::x() * 0.2))).u;
+        if !u.closes {
+            continue;
+        }
+        // 0.37 of the way around: three pictures of a third are nearest.
+        let map = sized(&rough(8, 6), 1e-3, 0.37 * u.length_m);
+        let near_seam = |x: f64| map.height(&Shape::Form(form), &form.nearest(&Vector3::new(x, 0.004, -0.2)));
+        let (left, right) = (near_seam(-1e-9), near_seam(1e-9));
+        // Slopes of at most 1e-3 over texels of some millimetres, over 2e-9 m.
+        assert!(
+            (left.0 - right.0).abs() < 1e-9 && (left.1 - right.1).norm() < 1e-5,
+            "{name}: {left:?} {right:?}"
+        );
+        // And it is three of them: a third of the way around it is the same again.
+        let at = |turn: f64| {
+            let (x, z) = (turn * TAU).sin_cos();
+            map.height(&Shape::Form(form), &form.nearest(&(Vector3::new(x, 0.01, z) * 0.2))).0
+        };
+        if !name.contains("scaled") && !name.contains("elliptic") && name != "ellipsoid" {
+            for turn in [0.03, 0.11, 0.29] {
+                assert!((at(turn) - at(turn + 1.0 / 3.0)).abs() < 1e-12, "{name} {turn}");
+            }
+        }
+    }
+}

@@ -91,7 +91,7 @@ pub fn read_png(bytes: &[u8]) -> Result<HeightGrid, PictureError> {
     }
     let mut decoder = Decoder::new_with_limits(Cursor::new(bytes), Limits { bytes: DECODER_BYTES });
     decoder.set_transformations(Transformations::EXPAND);
-    let mut reader = decoder.read_info().map_err(damaged)?;
+    let mut reader = decoder.read_info().map_err(|cause| damaged(&cause))?;
     let (width, height) = (reader.info().width as usize, reader.info().height as usize);
     let (colour, depth) = reader.output_color_type();
     if let Some(found) = more_than_grey(reader.info().color_type, colour) {
@@ -104,8 +104,8 @@ pub fn read_png(bytes: &[u8]) -> Result<HeightGrid, PictureError> {
     }
     let bytes_each = if depth == BitDepth::Sixteen { 2 } else { 1 };
     let mut pixels = vec![0; width * height * bytes_each];
-    reader.next_frame(&mut pixels).map_err(damaged)?;
-    reader.finish().map_err(damaged)?;
+    reader.next_frame(&mut pixels).map_err(|cause| damaged(&cause))?;
+    reader.finish().map_err(|cause| damaged(&cause))?;
     let values = if depth == BitDepth::Sixteen {
         let share = |pair: &[u8]| f32::from(u16::from_be_bytes([pair[0], pair[1]])) / f32::from(u16::MAX);
         pixels.chunks_exact(2).map(share).collect()
@@ -140,7 +140,7 @@ fn begins_with(bytes: &[u8]) -> String {
     }
 }
 
-fn damaged(cause: DecodingError) -> PictureError {
+fn damaged(cause: &DecodingError) -> PictureError {
     // On one line, whatever the decoder says.
     let cause = cause.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
     PictureError::Damaged { cause }
