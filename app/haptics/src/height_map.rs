@@ -218,7 +218,7 @@ impl HeightMap {
     fn on_chart(&self, chart: &Chart, at: &SurfacePoint) -> Height {
         let [u, v] = [(0, &chart.u), (1, &chart.v)].map(|(axis, along)| self.in_pictures(axis, along));
         let sample = self.picture.at([u.0, v.0], self.border);
-        let gain_m = self.amplitude_m;
+        let gain_m = if self.is_inverted { -self.amplitude_m } else { self.amplitude_m };
         let full_m = self.height_of(sample.value);
         let slope_B =
             chart.u.gradient_B * (sample.slopes[0] * u.1) + chart.v.gradient_B * (sample.slopes[1] * v.1);

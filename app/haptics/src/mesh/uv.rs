@@ -83,7 +83,7 @@ fn shares([a, b, c]: &[Vector3<f64>; 3]) -> [Vector3<f64>; 2] {
 /// The coordinates of the input's face at a corner of what became of it: mostly one of its own corners.
 fn at(corners: &[Vector3<f64>; 3], uv: &CornerUv, corner: &Vector3<f64>) -> [f64; 2] {
     if let Some(same) = corners.iter().position(|own| own == corner) {
-        return uv[(same + 1) % 3];
+        return uv[same];
     }
     let away = corner - corners[0];
     let [b, c] = shares(corners).map(|share| share.dot(&away));
