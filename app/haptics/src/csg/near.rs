@@ -130,7 +130,7 @@ fn gather(csg: &Csg, anchor_B: &Vector3<f64>, radius_m: f64, keep_eight: bool) -
         }
     }
     if crowd.is_too_large && !keep_eight {
-        return Err(crowd.nearest[MAX_NEAR]);
+        return Err(crowd.ninth_m());
     }
     here.table = stack[0];
     Ok(here)
@@ -160,6 +160,10 @@ fn leaf(csg: &Csg, here: &mut Neighbourhood, crowd: &mut Crowd, items: &[Item], 
         let Some(index) = listed else {
             // Nowhere to list it. If it cannot be helped, the leaf is as if it went on there.
             debug_assert!(keep_eight || crowd.is_too_large);
+            if !keep_eight {
+                // It will have to be smaller: whatever is farther need not be looked at any more.
+                here.radius_m = here.radius_m.min(crowd.ninth_m());
+            }
             continue;
         };
         let sides = SIDES[index];
@@ -181,32 +185,34 @@ impl Neighbourhood {
     }
 }
 
-/// How near the nearest nine are: the ninth decides how large a neighbourhood can be.
+/// The nearest nine: the ninth decides how large a neighbourhood can be.
 struct Crowd {
-    nearest: [f64; MAX_NEAR + 1],
-    last: u16,
+    nearest: [(f64, u16); MAX_NEAR + 1],
     is_too_large: bool,
 }
 
 impl Default for Crowd {
     fn default() -> Self {
-        Self { nearest: [f64::INFINITY; MAX_NEAR + 1], last: u16::MAX, is_too_large: false }
+        Self { nearest: [(f64::INFINITY, u16::MAX); MAX_NEAR + 1], is_too_large: false }
     }
 }
 
 impl Crowd {
-    /// Patches beyond the eighth may come twice, which makes the neighbourhood smaller than it must be, but not wrong.
+    /// Patches beyond the eighth are not listed, and may come twice.
     fn add(&mut self, number: u16, height_m: f64) {
-        if number == self.last {
+        if self.nearest.iter().any(|&(_, known)| known == number) {
             return;
         }
-        self.last = number;
-        let mut height_m = height_m;
+        let mut newcomer = (height_m, number);
         for place in &mut self.nearest {
-            if height_m < *place {
-                std::mem::swap(place, &mut height_m);
+            if newcomer.0 < place.0 {
+                std::mem::swap(place, &mut newcomer);
             }
         }
+    }
+
+    fn ninth_m(&self) -> f64 {
+        self.nearest[MAX_NEAR].0
     }
 }
 
