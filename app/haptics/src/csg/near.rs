@@ -108,11 +108,18 @@ fn gather(csg: &Csg, anchor_B: &Vector3<f64>, radius_m: f64, keep_eight: bool) -
     let mut crowd = Crowd::default();
     let mut stack = [[0; 4]; STACK];
     let mut top = 0;
-    for step in &csg.steps {
+    let mut steps = &csg.steps[..];
+    while let [step, rest @ ..] = steps {
+        steps = rest;
         match *step {
             Step::Leaf { centre_B, radius_m: leaf_m, first, count } => {
-                let reach_m = leaf_m + radius_m;
+                let reach_m = leaf_m + here.radius_m;
                 let is_near = (anchor_B - centre_B).norm_squared() <= reach_m * reach_m;
+                if let (false, [Step::Join(CsgOp::Union | CsgOp::Difference), after @ ..]) = (is_near, rest) {
+                    // Nothing added, or nothing taken away: of many leaves most.
+                    steps = after;
+                    continue;
+                }
                 let items = &csg.items[first as usize..(first + count) as usize];
                 stack[top] =
                     if is_near { leaf(csg, &mut here, &mut crowd, items, keep_eight) } else { NOTHING };
