@@ -21,7 +21,7 @@ use crate::slide::Round;
 /// bends too much to tell.
 pub(super) fn foresee(csg: &Csg, god: &God, round: &Round, hip_B: &Vector3<f64>) -> Option<Vector3<f64>> {
     let left = (round.gap_m - round.asked_m) / round.view.depth_m;
-    let tells = round.asked_m > round.view.rest_m && left >= 0.0 && left < f64::INFINITY;
+    let tells = round.asked_m > round.view.rest_m && (0.0..f64::INFINITY).contains(&left);
     // A patch has a whole rim of places where friction is content: which of them is a matter of the way.
     let is_one_place = match god.active.count_ones() {
         1 => left == 0.0,
