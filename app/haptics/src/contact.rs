@@ -79,6 +79,8 @@ pub(crate) struct Slot {
     csg: CsgCone,
     nurbs: NurbsCone,
     own: ContactMemory,
+    /// Whose state is kept.
+    kept: Kept,
     /// Whether anything was noted here since it was new.
     is_used: bool,
     /// How much of the force is rendered, 0 to 1.
@@ -86,6 +88,19 @@ pub(crate) struct Slot {
     /// Inside, but above a dent of the entity's height map: nothing is felt, and nothing begins anew.
     hovers: bool,
     pub(crate) contact: Option<Contact>,
+}
+
+/// Whoever looked after the contact in the last tick: the others know nothing of what happened since they did.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+enum Kept {
+    #[default]
+    Nobodys,
+    Surface,
+    Mesh,
+    Rolling,
+    Csg,
+    Nurbs,
+    Own,
 }
 
 /// A contact that begins inside reaches its whole force after this time \[s\]: slow enough that no hand is thrown, and
@@ -97,13 +112,32 @@ impl Slot {
         self.is_used = true;
         self.contact = self.touch(index, entity, sweep);
         if !self.has_met() {
-            self.cone = None;
-            self.mesh.let_go();
-            self.let_roll_go();
-            self.csg.let_go();
-            self.nurbs.let_go();
+            self.let_go();
         }
         self.contact.as_ref()
+    }
+
+    fn let_go(&mut self) {
+        self.cone = None;
+        self.mesh.let_go();
+        self.let_roll_go();
+        self.csg.let_go();
+        self.nurbs.let_go();
+    }
+
+    /// Forgets the contact with another kind of shape that the entity had: it may be met again where that one was left.
+    #[inline(always)]
+    fn keep(&mut self, kept: Kept) {
+        if self.kept != kept {
+            self.keep_other(kept);
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn keep_other(&mut self, kept: Kept) {
+        self.let_go();
+        self.kept = kept;
     }
 
     /// For a finger of this radius.
@@ -208,8 +242,7 @@ impl Slot {
     }
 
     fn touch_by(&mut self, algorithm: &dyn ContactAlgorithm, input: &TouchInput<'_>) -> Option<Touch> {
-        (self.cone, self.mesh) = (None, MeshCone::default());
-        self.let_roll_go();
+        self.keep(Kept::Own);
         let begins = !self.has_met();
         if begins {
             self.own = ContactMemory::default();
@@ -228,15 +261,17 @@ impl Slot {
             Shape::Own(surface) if input.finger_radius_m == 0.0 => self.touch_surface(&**surface, input),
             Shape::Own(_) => input.of_surface(|grown| self.touch_surface(grown, input))?,
             Shape::Mesh(mesh) => {
-                self.cone = None;
+                self.keep(Kept::Rolling);
                 let touched = self.rolling.as_mut()?.update(mesh, input);
                 self.begun(touched)
             }
             Shape::Nurbs(nurbs) => {
+                self.keep(Kept::Nurbs);
                 let touched = self.nurbs.update(nurbs, input);
                 self.begun(touched)
             }
             Shape::Csg(csg) => {
+                self.keep(Kept::Csg);
                 let touched = self.csg.update(csg, input);
                 self.begun(touched)
             }
@@ -245,8 +280,7 @@ impl Slot {
 
     #[inline(always)]
     fn touch_mesh(&mut self, mesh: &Mesh, input: &TouchInput<'_>) -> Option<Touch> {
-        // Of another shape that the entity had.
-        self.cone = None;
+        self.keep(Kept::Mesh);
         let was_touching = self.mesh.is_touching();
         let (force, beginning) = self.mesh.update(mesh, input.friction, input.previous_hip_B, &input.cone)?;
         match beginning {
@@ -263,9 +297,7 @@ impl Slot {
     }
 
     fn touch_surface<S: Surface + ?Sized>(&mut self, surface: &S, input: &TouchInput<'_>) -> Option<Touch> {
-        self.mesh.let_go();
-        self.csg.let_go();
-        self.let_roll_go();
+        self.keep(Kept::Surface);
         let distance_m = surface.signed_distance(&input.cone.hip_B);
         let cone = match &mut self.cone {
             Some(cone) => cone,

@@ -20,6 +20,7 @@
 mod corner;
 mod csg_cone;
 mod flatten;
+mod foresight;
 mod hit;
 mod near;
 mod patch;

@@ -5,8 +5,11 @@ mod common;
 #[path = "common/trees.rs"]
 mod trees;
 
+use std::sync::Arc;
+
 use common::*;
-use haptics::{Csg, CsgPart, CsgTree, Finger, Friction, Plane, Surface};
+use haptics::mesh::{Mesh, make};
+use haptics::{Csg, CsgPart, CsgTree, Finger, Friction, Plane, Shape, Surface};
 use nalgebra::Vector3;
 use trees::{Tree, built, cuboid, touchable, v};
 
@@ -155,4 +158,31 @@ fn fingers_with_a_radius_do_not_feel_trees() {
     assert!(entity.shape.is_felt_by(0.0) && !entity.shape.is_felt_by(1e-3));
     let mut finger = finger(1e-3);
     assert_eq!(step(&mut finger, &entity, &v(0.04, 0.0, 0.0)).entity, None);
+}
+
+/// As a mesh, as patches, as a plane: whatever it is for a while, the contact of before would pull back across the solid.
+#[test]
+fn an_entity_that_is_something_else_for_a_while_is_met_anew_as_a_tree() {
+    let friction = || Friction::stiction(0.7, 0.3).unwrap();
+    let tree = touchable(&CsgTree::union([cuboid([0.1; 3])]), friction());
+    let mesh = Arc::new(Mesh::build(make::cuboid([0.1; 3])).unwrap().0);
+    let nurbs = Arc::new(haptics::Nurbs::build(&haptics::nurbs::make::sphere(0.05)).unwrap().0);
+    let shapes = [Shape::from(mesh), Shape::from(nurbs), Shape::from(Plane::new(Vector3::y(), 0.0).unwrap())];
+    let whiles = shapes.map(|shape| entity(shape, friction()));
+    for first in whiles.iter().chain([&tree]) {
+        for other in whiles.iter().chain([&tree]).filter(|other| !std::ptr::eq(*other, first)) {
+            let mut finger = point_finger();
+            step(&mut finger, first, &v(0.0, 0.06, 0.0));
+            step(&mut finger, first, &v(0.0, -0.001, 0.0));
+            step(&mut finger, other, &v(0.0, -0.002, 0.0));
+            step(&mut finger, other, &v(0.049, -0.003, 0.0));
+            let met_anew = step(&mut finger, first, &v(0.049, -0.001, 0.0));
+            let mut new = point_finger();
+            step(&mut new, other, &v(0.049, -0.003, 0.0));
+            let fresh = step(&mut new, first, &v(0.049, -0.001, 0.0));
+            // The same steps by the same code, but for the ramp, which starts with a contact and not with a shape.
+            let off_m = (met_anew.god_object_W - fresh.god_object_W).norm();
+            assert!(off_m < 1e-12, "{first:?} {other:?} {met_anew:?} {fresh:?}");
+        }
+    }
 }

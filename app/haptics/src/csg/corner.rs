@@ -131,6 +131,10 @@ impl Corner {
         if self.count == 1 {
             return true;
         }
+        if self.count == 2 && self.normals_B[0].cross(&self.normals_B[1]).norm_squared() > CLEAR * CLEAR {
+            // The common case: two planes that meet in an edge leave four wedges.
+            return true;
+        }
         let normal = |i: usize| self.outward(i, cell >> i);
         // A cone has room if one of the directions along its edges and across its faces, all added, is in front of all.
         let mut middle_B = Vector3::zeros();
@@ -208,6 +212,8 @@ const OUTSIDE: [u64; MAX_CORNER] = [
 ];
 /// Planes closer to parallel than this (rad) are one, or leave a slit between them through which nothing goes.
 const SLIT: f64 = 1e-6;
+/// Planes that meet under more than this (rad) are not parallel by far.
+const CLEAR: f64 = 1e-3;
 /// Points may miss a plane by this share of their distance.
 const SLACK: f64 = 1e-12;
 /// Squares of distances that differ by less, as a share, are equal.

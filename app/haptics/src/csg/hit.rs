@@ -49,7 +49,9 @@ pub(super) fn first_hit(
         let length_m = path_B.norm();
         if !near.holds(&from_B, length_m.min(0.25 * near.radius_m)) {
             let before = near;
-            near = Neighbourhood::around(csg, &from_B, LARGER * length_m);
+            // Through a crowd it is followed in pieces as small as the last one.
+            let wish_m = (LARGER * length_m).min(GROWTH * near.radius_m.max(COMMON * csg.extent_m));
+            near = Neighbourhood::around(csg, &from_B, wish_m);
             sides = near.sides_after(csg, &from_B, &before, sides);
         }
         let room_m = (near.radius_m - (from_B - near.anchor_B).norm()) * (1.0 - 1e-9);
@@ -159,3 +161,8 @@ impl Neighbourhood {
 
 /// A neighbourhood is asked for this much larger than the path.
 const LARGER: f64 = 1.5;
+/// The next neighbourhood of a path is asked for this much larger than the last one: a long way through the open takes
+/// few of them.
+const GROWTH: f64 = 4.0;
+/// Radius of a common neighbourhood, in terms of the extent.
+const COMMON: f64 = 0.02;

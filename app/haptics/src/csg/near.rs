@@ -108,11 +108,18 @@ fn gather(csg: &Csg, anchor_B: &Vector3<f64>, radius_m: f64, keep_eight: bool) -
     let mut crowd = Crowd::default();
     let mut stack = [[0; 4]; STACK];
     let mut top = 0;
-    for step in &csg.steps {
+    let mut steps = &csg.steps[..];
+    while let [step, rest @ ..] = steps {
+        steps = rest;
         match *step {
             Step::Leaf { centre_B, radius_m: leaf_m, first, count } => {
-                let reach_m = leaf_m + radius_m;
+                let reach_m = leaf_m + here.radius_m;
                 let is_near = (anchor_B - centre_B).norm_squared() <= reach_m * reach_m;
+                if let (false, [Step::Join(CsgOp::Union | CsgOp::Difference), after @ ..]) = (is_near, rest) {
+                    // Nothing added, or nothing taken away: of many leaves most.
+                    steps = after;
+                    continue;
+                }
                 let items = &csg.items[first as usize..(first + count) as usize];
                 stack[top] =
                     if is_near { leaf(csg, &mut here, &mut crowd, items, keep_eight) } else { NOTHING };
@@ -130,7 +137,7 @@ fn gather(csg: &Csg, anchor_B: &Vector3<f64>, radius_m: f64, keep_eight: bool) -
         }
     }
     if crowd.is_too_large && !keep_eight {
-        return Err(crowd.nearest[MAX_NEAR]);
+        return Err(crowd.ninth_m());
     }
     here.table = stack[0];
     Ok(here)
@@ -160,6 +167,10 @@ fn leaf(csg: &Csg, here: &mut Neighbourhood, crowd: &mut Crowd, items: &[Item], 
         let Some(index) = listed else {
             // Nowhere to list it. If it cannot be helped, the leaf is as if it went on there.
             debug_assert!(keep_eight || crowd.is_too_large);
+            if !keep_eight {
+                // It will have to be smaller: whatever is farther need not be looked at any more.
+                here.radius_m = here.radius_m.min(crowd.ninth_m());
+            }
             continue;
         };
         let sides = SIDES[index];
@@ -181,32 +192,34 @@ impl Neighbourhood {
     }
 }
 
-/// How near the nearest nine are: the ninth decides how large a neighbourhood can be.
+/// The nearest nine: the ninth decides how large a neighbourhood can be.
 struct Crowd {
-    nearest: [f64; MAX_NEAR + 1],
-    last: u16,
+    nearest: [(f64, u16); MAX_NEAR + 1],
     is_too_large: bool,
 }
 
 impl Default for Crowd {
     fn default() -> Self {
-        Self { nearest: [f64::INFINITY; MAX_NEAR + 1], last: u16::MAX, is_too_large: false }
+        Self { nearest: [(f64::INFINITY, u16::MAX); MAX_NEAR + 1], is_too_large: false }
     }
 }
 
 impl Crowd {
-    /// Patches beyond the eighth may come twice, which makes the neighbourhood smaller than it must be, but not wrong.
+    /// Patches beyond the eighth are not listed, and may come twice.
     fn add(&mut self, number: u16, height_m: f64) {
-        if number == self.last {
+        if self.nearest.iter().any(|&(_, known)| known == number) {
             return;
         }
-        self.last = number;
-        let mut height_m = height_m;
+        let mut newcomer = (height_m, number);
         for place in &mut self.nearest {
-            if height_m < *place {
-                std::mem::swap(place, &mut height_m);
+            if newcomer.0 < place.0 {
+                std::mem::swap(place, &mut newcomer);
             }
         }
+    }
+
+    fn ninth_m(&self) -> f64 {
+        self.nearest[MAX_NEAR].0
     }
 }
 

@@ -18,6 +18,7 @@ use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
 use super::Csg;
 use super::corner::Corner;
+use super::foresight::foresee;
 use super::hit::{Events, Hit, first_hit};
 use super::near::{Neighbourhood, Sides};
 use super::patch::Look;
@@ -76,7 +77,7 @@ impl God {
         u32::from(self.near.number(self.active.trailing_zeros() as usize % super::near::MAX_NEAR))
     }
 
-    fn is_on_planes(&self, csg: &Csg) -> bool {
+    pub(super) fn is_on_planes(&self, csg: &Csg) -> bool {
         self.held_by().all(|index| self.near.patch(csg, index).is_plane())
     }
 
@@ -101,6 +102,16 @@ impl God {
             numbers.sort_unstable();
         }
         numbers
+    }
+
+    /// What the patches that hold it show of a place.
+    #[inline]
+    pub(super) fn looks(&self, csg: &Csg, at_B: &Vector3<f64>, hip_B: &Vector3<f64>) -> [Option<Look>; 3] {
+        let mut looks = [None; 3];
+        for (place, index) in looks.iter_mut().zip(self.held_by()) {
+            *place = Some(self.near.patch(csg, index).look(at_B, hip_B));
+        }
+        looks
     }
 
     fn look_around(&mut self, csg: &Csg, wish_m: f64) {
@@ -271,8 +282,13 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
         let (before_B, held_before) = (god.point_B, god.held_patches());
         // From within a bore, the HIP far behind its wall, tangents overshoot; the wall's nearest place is known.
         let foot_B = || settle(csg, god, god.active, &input.hip_B, &input.hip_B);
-        let is_foot = is_first && round.asked_m == round.gap_m && god.is_in_hollow(csg);
-        let target_B = if is_foot { foot_B() } else { round.target_B(step_m) };
+        let is_in_hollow = is_first && round.asked_m == round.gap_m && god.is_in_hollow(csg);
+        let seen_B = match is_first {
+            true if is_in_hollow => Some(foot_B()),
+            true => foresee(csg, god, &round, &input.hip_B),
+            false => None,
+        };
+        let target_B = seen_B.unwrap_or_else(|| round.target_B(step_m));
         let moved = advance(csg, god, &target_B, longest, &input.hip_B);
         if moved == Moved::TooFar {
             if round.asked_m < 0.0 && round.gap_m > 0.0 {
@@ -282,7 +298,7 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
             continue;
         }
         shortened = 1.0;
-        if !is_foot {
+        if seen_B.is_none() {
             secant.made(round.asked_m, step_m);
         }
         view = stand(csg, god, input)?;
@@ -393,7 +409,7 @@ fn settle(csg: &Csg, god: &God, patches: Sides, from_B: &Vector3<f64>, hip_B: &V
 }
 
 /// The shortest step onto the tangent planes.
-fn correction(looks: &[Option<Look>; 3]) -> Vector3<f64> {
+pub(super) fn correction(looks: &[Option<Look>; 3]) -> Vector3<f64> {
     match *looks {
         [Some(a), Some(b), Some(c)] => {
             let rows = Matrix3::from_rows(&[a, b, c].map(|look| look.normal_B.transpose()));
