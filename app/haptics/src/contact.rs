@@ -209,6 +209,8 @@ impl Slot {
 
     fn touch_by(&mut self, algorithm: &dyn ContactAlgorithm, input: &TouchInput<'_>) -> Option<Touch> {
         (self.cone, self.mesh) = (None, MeshCone::default());
+        self.csg.let_go();
+        self.nurbs.let_go();
         self.let_roll_go();
         let begins = !self.has_met();
         if begins {
@@ -265,6 +267,7 @@ impl Slot {
     fn touch_surface<S: Surface + ?Sized>(&mut self, surface: &S, input: &TouchInput<'_>) -> Option<Touch> {
         self.mesh.let_go();
         self.csg.let_go();
+        self.nurbs.let_go();
         self.let_roll_go();
         let distance_m = surface.signed_distance(&input.cone.hip_B);
         let cone = match &mut self.cone {
