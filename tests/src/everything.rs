@@ -58,7 +58,7 @@ vibration = { frequency_hz = 110.0, amplitude_n = 0.1 }
 [[entity]]
 name = "ring"
 shape = { kind = "torus", ring_radius_m = 0.011, tube_radius_m = 0.01 }
-position_m = [0.03, -0.01, 0.0]
+position_m = [0.03, -0.01, 0.011]
 friction = { model = "lugre", mu_s = 0.6, mu_d = 0.4 }
 height_map = { file = "bumps.png", amplitude_m = 0.0002, repeat = [8, 8], form = "along-force" }
 magnetism = { force_n = 0.3, distance_m = 0.006 }
@@ -74,7 +74,7 @@ const SOLID: &str = r#"
 [[entity]]
 name = "solid"
 shape = { kind = "csg", op = "difference", children = [{ shape = { kind = "box", size_m = [0.03, 0.04, 0.06] } }, { shape = { kind = "cylinder", radius_m = 0.006, length_m = 0.2 } }] }
-position_m = [0.06, -0.02, 0.0]
+position_m = [0.07, -0.02, 0.0]
 material = "skin"
 vibration = { frequency_hz = 70.0, amplitude_n = 0.1 }
 "#;
@@ -103,7 +103,7 @@ pub fn write(directory: &Path, is_round: bool) {
     }
 }
 
-/// Three fingers, one behind the other, over all of it and back, in and out of it all the while.
+/// Three fingers, one behind the other, over all of it and back.
 fn hand() -> String {
     let mut text = String::from("t");
     for finger in 0..3 {
@@ -115,12 +115,20 @@ fn hand() -> String {
         let _ = write!(text, "{t:?}");
         for finger in [0.0, 1.0, 2.0] {
             let along = -0.19 * (std::f64::consts::TAU * t / SECONDS + 0.3 * finger).cos();
-            let height = 0.001 + 0.004 * (7.0 * t + finger).sin();
+            let height = above(along) + 0.0005 * (40.0 * t + finger).sin();
             let _ = write!(text, ",{along:?},{height:?},{:?}", 0.006 * finger - 0.006);
         }
         text.push('\n');
     }
     text
+}
+
+/// 3 mm deep in the middle of each entity, and 6 mm above what is between them: whoever comes in by a side is held there.
+fn above(x: f64) -> f64 {
+    let places = [(-0.14, 0.02), (-0.05, 0.02), (0.03, 0.02), (0.07, 0.013), (0.12, 0.02)];
+    let dips = places.map(|(middle, width): (f64, f64)| ((x - middle).abs() / width).min(1.0));
+    let nearest = dips.into_iter().fold(1.0, f64::min);
+    0.006 - 0.009 * (std::f64::consts::FRAC_PI_2 * nearest).cos().powi(2)
 }
 
 /// A block whose upper side, at y = 0, has pictures of 20 mm on it.

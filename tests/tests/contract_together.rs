@@ -35,7 +35,7 @@ fn with_everything_in_it_lockstep_writes_what_one_process_writes_and_all_of_it_i
                 let ticks = touched.iter().filter(|touched| **touched == name).count();
                 assert!(ticks > 20, "{finger} on {name}, round {is_round}: {ticks} ticks");
             }
-            // Ball and point are at most 3 + 3 mm deep at 1000 N/m, with friction of 1.12 of it, and effects of 4 N beside it.
+            // At most 3.5 mm deep, a ball 3 mm more, at 1000 N/m, with friction of 1.12 of it, and effects of 4 N beside it.
             let forces = table.vectors(&format!("{finger}_force"));
             let largest = forces.iter().map(Vector3::norm).fold(0.0, f64::max);
             assert!(forces.iter().all(|force| force.iter().all(|f| f.is_finite())));
@@ -58,10 +58,9 @@ fn with_everything_in_it_a_simulated_hand_is_pushed_out_and_not_shaken() {
             let fastest = hips.windows(2).map(|two| (two[1] - two[0]).norm()).fold(0.0, f64::max);
             assert!(fastest < 1e-3, "{finger}, round {is_round}: {fastest}");
             let touched = table.texts(&format!("{finger}_entity"));
-            assert!(
-                touched.iter().filter(|name| !name.is_empty()).count() > 500,
-                "{finger}, round {is_round}"
-            );
+            // Held lightly, it is carried over most of it by the guide.
+            let ticks = touched.iter().filter(|name| !name.is_empty()).count();
+            assert!(ticks > 30, "{finger}, round {is_round}: {ticks} ticks");
         }
     }
 }
