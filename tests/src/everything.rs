@@ -73,7 +73,7 @@ vibration = { frequency_hz = 130.0, amplitude_n = 0.1 }
 const SOLID: &str = r#"
 [[entity]]
 name = "solid"
-shape = { kind = "csg", op = "difference", children = [{ shape = { kind = "box", size_m = [0.03, 0.04, 0.06] } }, { shape = { kind = "cylinder", radius_m = 0.006, length_m = 0.2 } }] }
+shape = { kind = "csg", op = "difference", children = [{ shape = { kind = "box", size_m = [0.03, 0.04, 0.06] } }, { shape = { kind = "cylinder", radius_m = 0.006, length_m = 0.2 }, position_m = [0.0, 0.0, 0.013] }] }
 position_m = [0.07, -0.02, 0.0]
 material = "skin"
 vibration = { frequency_hz = 70.0, amplitude_n = 0.1 }

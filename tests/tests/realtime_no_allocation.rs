@@ -287,7 +287,7 @@ impl Device for Breaking {
 /// The default scene's hand touches, holds and slides for ten seconds: at 10 kHz a hundred thousand ticks.
 #[test]
 fn the_applications_turn_never_calls_the_heap_while_fingers_touch_hold_and_slide() {
-    play_scene(&config_file("scenes/default.toml"), 2);
+    play_scene(&config_file("scenes/default.toml"), 2, TICKS / 100);
 }
 
 /// Three fingers over meshes, patches, solids and raised boxes, with fields, guides, magnets, vibration and passivity.
@@ -296,12 +296,13 @@ fn the_applications_turn_never_calls_the_heap_with_everything_that_a_scene_may_h
     for is_round in [false, true] {
         let directory = tempfile::tempdir().unwrap();
         everything::write(directory.path(), is_round);
-        play_scene(&directory.path().join("scene.toml"), 3);
+        // The hand is done after half of the ticks, and most of the time the fingers are in the air.
+        play_scene(&directory.path().join("scene.toml"), 3, TICKS / 400);
     }
 }
 
-/// A hundred thousand turns at 10 kHz.
-fn play_scene(file: &Path, fingers: usize) {
+/// A hundred thousand turns at 10 kHz; every state of friction is seen at least so often.
+fn play_scene(file: &Path, fingers: usize, least: u64) {
     let _turn = in_turn();
     alloc_guard::assert_installed();
     let period_ns = period_of(10_000.0);
@@ -344,7 +345,7 @@ fn play_scene(file: &Path, fingers: usize) {
     assert_eq!(fast.tally.answered, answered);
     assert!(fast.tally.rows_lost > 0 && fast.tally.frames_missed > 0, "{:?}", fast.tally);
     for state in [ContactState::Free, ContactState::Stick, ContactState::Slip] {
-        assert!(seen[state as usize] > TICKS / 100, "hardly ever {state:?}: {seen:?}");
+        assert!(seen[state as usize] > least, "hardly ever {state:?}: {seen:?}");
     }
 }
 
