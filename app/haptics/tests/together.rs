@@ -143,7 +143,7 @@ fn what_hums_on_a_raised_surface_never_pulls_and_comes_on_with_the_load() {
             // Above a dent the magnet rests too, and below the highest place there is none; its texel is half a one off the
             // crest, 1.2e-3 of the wave.
             None => {
-                assert!(hip.y > 0.03 + 0.998 * AMPLITUDE_M || beside == Vector3::zeros(), "{i}: {beside}")
+                assert!(hip.y > 0.03 + 0.998 * AMPLITUDE_M || beside == Vector3::zeros(), "{i}: {beside}");
             }
         }
     }
