@@ -137,7 +137,7 @@ impl FastStep {
                 row.force_on_user = finite_or_zero(row.force_on_user + beside_W);
             }
             if let Some(passivity) = passivity {
-                keep_passive(passivity, finger, device, carried_W, &tick, row);
+                keep_passive(passivity, finger, felt, device, carried_W, &tick, row);
             }
             command.devices[finger.device].force_on_user_n = finger.mount.force_to_device(row.force_on_user);
         }

@@ -2,7 +2,8 @@
 //!
 //! Model: what is observed is the force that the driver says the motors were made to render in the last tick, after
 //! ramps, limits and converters; where the driver writes forces a tick late, that is the older one, and the controller
-//! is told so. What the materials that a finger touches can have stored is that of springs under the present forces.
+//! is told so. What the materials that a finger touches can have stored is that of springs under the present forces; guides
+//! and magnets say what they hold.
 //!
 //! Frames: world. Affine placements keep power, so the energy is the device's own.
 
@@ -10,8 +11,8 @@
 
 use crate::fast_step::DeviceFinger;
 use crate::row::FingerRow;
-use haptics::Entity;
 use haptics::passivity::{Passivity, Port};
+use haptics::{Entity, FingerEffects};
 use nalgebra::Vector3;
 use shm_abi::frame::DEVICE_POSITION_VALID;
 use shm_abi::{DeviceFrame, Frame};
@@ -40,6 +41,7 @@ impl<'a> Tick<'a> {
 pub fn keep_passive(
     passivity: &mut Passivity,
     finger: &DeviceFinger,
+    felt: &FingerEffects,
     device: &DeviceFrame,
     carried_W: Vector3<f64>,
     tick: &Tick<'_>,
@@ -55,7 +57,7 @@ pub fn keep_passive(
         position_W: row.hip,
         force_on_user_W: row.force_on_user,
         applied_on_user_W: Some(finger.mount.force_to_world(device.force_on_user_n_applied)),
-        stored_j: stored_j(finger, tick.entities),
+        stored_j: stored_j(finger, tick.entities) + felt.stored_j(),
         is_late: tick.is_late,
         dt_s: tick.dt_s,
     });

@@ -16,7 +16,7 @@ use crate::mount::Mount;
 use crate::recording::Names;
 use crate::simulated::{SimulatedDevices, base_for_path};
 use haptics::passivity::Passivity;
-use haptics::{Entity, Finger, ParameterError};
+use haptics::{Algorithm, Entity, Finger, ParameterError};
 use io_driver::config::{
     Backend, DeviceConfig, DriverConfig, ProcessConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig, Wish,
     Zeroing,
@@ -305,6 +305,7 @@ impl Rig {
         let not_felt = entities.iter().position(|entity| !entity.is_felt_by(finger.radius_m));
         let Some(index) = not_felt else { return Ok(()) };
         let spec = &self.scene.entities[index];
+        let with_cone = entities[index].clone().with_algorithm(Algorithm::FrictionCone);
         // Somebody's own shape may be felt by small balls only.
         let by_smaller = entities[index].is_felt_by(1e-3 * finger.radius_m);
         Err(RigError::NotFelt {
@@ -315,7 +316,7 @@ impl Rig {
             entity: spec.name.clone(),
             kind: spec.shape.kind(),
             otherwise: match () {
-                () if entities[index].shape.is_felt_by(finger.radius_m) => ", algorithm = \"friction-cone\"",
+                () if with_cone.is_felt_by(finger.radius_m) => ", algorithm = \"friction-cone\"",
                 () if by_smaller => ", a smaller radius",
                 () => "",
             },

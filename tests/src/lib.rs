@@ -7,6 +7,7 @@
 
 pub mod bare_loop;
 pub mod driver;
+pub mod everything;
 pub mod faults;
 pub mod intruder;
 pub mod jitter;

@@ -95,6 +95,22 @@ struct Motion {
     dt_s: f64,
 }
 
+/// What something that draws a finger does in a tick.
+#[derive(Debug, Clone, Copy, Default)]
+struct Pull {
+    /// World frame (N).
+    force_on_user_W: Vector3<f64>,
+    /// What it gives back if the finger follows (J).
+    stored_j: f64,
+}
+
+impl Pull {
+    fn add(&mut self, other: &Self) {
+        self.force_on_user_W += other.force_on_user_W;
+        self.stored_j += other.stored_j;
+    }
+}
+
 /// From 0 at `x <= 0` to 1 at `x >= 1` without a step in value or slope; 0 for what is no number.
 fn smooth_step(x: f64) -> f64 {
     if x > 0.0 {

@@ -27,7 +27,9 @@
 //! Edges: each face of a box, each cap has a picture of its own; heights jump from one to the next. Over a round edge the
 //! picture of the face that it looks most like goes on.
 //!
-//! Frames: B. Invariants: a contact never pulls; nothing that is finite becomes infinite but by its own size.
+//! Frames: B. Invariants: a contact never pulls; nothing that is finite becomes infinite but by its own size, and no slope
+//! makes more of a force than its `sqrt(5)`-fold: beyond a slope of 2 (63 degrees) they are felt as that one, and a path may
+//! gain energy.
 //! Cost: nine texels and the chart, in contact only.
 
 mod error;
@@ -198,6 +200,7 @@ impl HeightMap {
         let held = touch.god_object;
         let on_base_B = held.point_B - held.normal_B * (over.finger_radius_m + lift_m);
         let (h_m, slope_B) = self.height(over.shape, &SurfacePoint { point_B: on_base_B, ..held });
+        let slope_B = slope_B.cap_magnitude(STEEPEST);
         match self.form {
             HeightForm::AlongForce => lengthen(over.stiffness_n_per_m * h_m, touch),
             HeightForm::Gradient => {
@@ -271,6 +274,10 @@ fn lean(by_n: f64, slope_B: &Vector3<f64>, touch: &mut Touch) {
     touch.normal_force_n = after_n;
     touch.god_object.normal_B = leaning_B;
 }
+
+/// Slopes that are steeper are felt as this one: on a mesh whose texture coordinates shrink to a point they have no end, and
+/// the force grows with them.
+const STEEPEST: f64 = 2.0;
 
 /// A load so small that it tells no direction.
 const LEAST_N: f64 = 1e-200;

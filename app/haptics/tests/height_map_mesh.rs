@@ -203,3 +203,23 @@ fn both_sides_of_a_sheet_are_raised_towards_the_finger() {
         assert!(above.y > 0.5 && (above.y + below.y).abs() < 1e-12 && (above.x - below.x).abs() < 1e-12);
     }
 }
+
+#[test]
+fn texture_coordinates_that_shrink_to_a_point_make_no_more_of_a_force_than_the_steepest_slope() {
+    // A thousand pictures on a triangle of 10 mm, a wave of 10 um: slopes of 150.
+    let soup = TriangleSoup {
+        vertices: vec![Vector3::zeros(), Vector3::new(0.0, 0.0, 0.01), Vector3::new(0.01, 0.0, 0.0)],
+        faces: vec![[0, 1, 2]],
+    };
+    let mesh = Arc::new(Mesh::build_with_uv(soup, &[[[0.0; 2], [0.0, 1000.0], [1000.0, 0.0]]]).unwrap().0);
+    let map = repeated(&wave(), AMPLITUDE_M, [1.0; 2]).with_zero_level(1.0).unwrap();
+    let sheet = with(entity(Shape::from(mesh), Friction::None), map);
+    let (depth_m, mut largest_n, mut finger) = (1e-3, 0.0_f64, point_finger());
+    finger.step(std::slice::from_ref(&sheet), &Vector3::new(0.002, 0.001, 0.002), DT);
+    for i in 0..2000 {
+        let hip = Vector3::new(0.002 + 1.7e-6 * f64::from(i), -depth_m, 0.002);
+        largest_n = largest_n.max(finger.step(std::slice::from_ref(&sheet), &hip, DT).force_on_user_W.norm());
+    }
+    // A slope of 2 makes sqrt(5) of a load.
+    assert!((0.5 * K * depth_m..K * depth_m * 5.0_f64.sqrt() + 1e-12).contains(&largest_n), "{largest_n}");
+}

@@ -31,8 +31,12 @@ impl Rig {
         let limits = self.limits(Limits::DEFAULT_DEVICE_MASS_KG).map_err(refused)?;
         if let Some(magnetism) = &spec.magnetism {
             if !Magnetism::suits(&entity.shape) {
-                let kind = spec.shape.kind();
-                return Err(self.not_available(format!("magnetism of entity {}, a {kind},", spec.name)));
+                return Err(RigError::NoMagnet {
+                    file: self.scene_file.clone(),
+                    line: spec.line,
+                    entity: spec.name.clone(),
+                    kind: spec.shape.kind(),
+                });
             }
             let made = Magnetism::new(magnetism.force_n, magnetism.distance_m, &limits);
             entity = entity.with_magnetism(made.map_err(refused)?);

@@ -89,6 +89,21 @@ pub enum RigError {
         /// The algorithm.
         found: &'static str,
     },
+    /// A shape whose distance from a finger outside is not known.
+    #[error(
+        "{}:{line}: entity {entity} is a {kind}, which cannot have magnetism; allowed: no magnetism, or another shape",
+        .file.display()
+    )]
+    NoMagnet {
+        /// The scene's file.
+        file: PathBuf,
+        /// Where the entity begins.
+        line: usize,
+        /// The entity's name.
+        entity: String,
+        /// The kind of its shape.
+        kind: &'static str,
+    },
     /// A model file cannot be read.
     #[error("{at}: {}: {source}", .file.display())]
     Model {

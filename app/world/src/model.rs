@@ -42,7 +42,7 @@ pub const MAX_MODEL_BYTES: u64 = 1 << 30;
 #[non_exhaustive]
 pub enum ModelError {
     /// There is no such file.
-    #[error("no such file; name an existing OBJ or STL file")]
+    #[error("no such file; name an existing one")]
     NotFound,
     /// The file is there, but the system does not let us read it.
     #[error("cannot be read: {0}")]

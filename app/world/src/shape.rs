@@ -131,7 +131,7 @@ impl ShapeSpec {
     pub(crate) fn can_be_joined(&self) -> bool {
         match self {
             Self::Scaled { shape, .. } => shape.can_be_joined(),
-            Self::Mesh(_) => false,
+            Self::Mesh(_) | Self::Nurbs(_) => false,
             _ => true,
         }
     }

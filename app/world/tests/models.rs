@@ -315,7 +315,7 @@ fn the_ending_says_the_format_and_where_it_does_not_the_content_does() {
 fn files_that_cannot_be_read_are_refused() {
     let directory = tempfile::tempdir().expect("a directory");
     let refused = |file: &Path| model::load(file).expect_err("it cannot be read").to_string();
-    assert_eq!(refused(&directory.path().join("none.stl")), "no such file; name an existing OBJ or STL file");
+    assert_eq!(refused(&directory.path().join("none.stl")), "no such file; name an existing one");
     assert_eq!(refused(directory.path()), "not a regular file; name an OBJ or STL file");
     assert_eq!(refused(Path::new("/dev/zero")), "not a regular file; name an OBJ or STL file");
     // A file of holes: it takes no room on the disk, and is not read.

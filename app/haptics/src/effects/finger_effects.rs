@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 
 use super::acceleration::AccelerationFilter;
 use super::guide::Hold;
-use super::{Effects, Motion};
+use super::{Effects, Motion, Pull};
 use crate::contact::RAMP_IN_S;
 use crate::entity::Entity;
 use crate::error::{ParameterError, at_least_zero};
@@ -24,6 +24,8 @@ pub struct FingerEffects {
     previous_hip_W: Option<Vector3<f64>>,
     filters: Box<[AccelerationFilter]>,
     holds: Box<[Hold]>,
+    /// What springs and magnets hold (J).
+    stored_j: f64,
 }
 
 /// When a tick is.
@@ -44,6 +46,7 @@ impl FingerEffects {
             previous_hip_W: None,
             filters: vec![AccelerationFilter::default(); effects.fields().len()].into(),
             holds: vec![Hold::default(); effects.guides().len()].into(),
+            stored_j: 0.0,
         }
     }
 
@@ -81,10 +84,22 @@ impl FingerEffects {
             return Vector3::zeros();
         }
         let motion = self.motion(&hip, moment.dt_s);
-        let mut force_W = self.of_fields(effects, &motion) + self.of_guides(effects, &motion);
-        force_W += of_surfaces(effects, entities, finger, &hip.position_W, moment.t_s);
+        let mut pull = self.of_guides(effects, &motion);
+        pull.force_on_user_W += self.of_fields(effects, &motion);
+        pull.add(&of_magnets(effects, entities, finger, &hip.position_W));
+        pull.force_on_user_W += of_vibrations(effects, entities, finger, moment.t_s);
         self.come_on(moment.dt_s);
-        if is_finite(&force_W) { force_W * self.strength } else { Vector3::zeros() }
+        if !(is_finite(&pull.force_on_user_W) && pull.stored_j.is_finite()) {
+            pull = Pull::default();
+        }
+        self.stored_j = pull.stored_j * self.strength;
+        pull.force_on_user_W * self.strength
+    }
+
+    /// What the springs of guides and the magnets held in the last tick \[J\]: what they give back when the finger goes
+    /// to the track or the surface. Of a magnet that is out of reach, and of fields, nothing.
+    pub fn stored_j(&self) -> f64 {
+        self.stored_j
     }
 
     /// Whether it is held by this guide.
@@ -94,7 +109,7 @@ impl FingerEffects {
 
     /// Forgets all: the next step is a first one.
     pub fn reset(&mut self) {
-        self.strength = 0.0;
+        (self.strength, self.stored_j) = (0.0, 0.0);
         self.previous_hip_W = None;
         self.filters.fill(AccelerationFilter::default());
         self.holds.fill(Hold::default());
@@ -116,9 +131,12 @@ impl FingerEffects {
         felt.map(|(field, filter)| field.force_on_user_W(motion, filter)).sum()
     }
 
-    fn of_guides(&mut self, effects: &Effects, motion: &Motion) -> Vector3<f64> {
-        let felt = effects.guides().iter().zip(&mut self.holds);
-        felt.map(|(guide, hold)| guide.force_on_user_W(motion, hold)).sum()
+    fn of_guides(&mut self, effects: &Effects, motion: &Motion) -> Pull {
+        let mut pull = Pull::default();
+        for (guide, hold) in effects.guides().iter().zip(&mut self.holds) {
+            pull.add(&guide.pull(motion, hold));
+        }
+        pull
     }
 
     fn come_on(&mut self, dt_s: f64) {
@@ -130,20 +148,19 @@ impl FingerEffects {
     }
 }
 
-fn of_surfaces(
-    effects: &Effects,
-    entities: &[Entity],
-    finger: &Finger,
-    hip_W: &Vector3<f64>,
-    t_s: f64,
-) -> Vector3<f64> {
-    let mut force_W = Vector3::zeros();
+fn of_magnets(effects: &Effects, entities: &[Entity], finger: &Finger, hip_W: &Vector3<f64>) -> Pull {
+    let mut pull = Pull::default();
     for &index in &effects.magnetic {
         let Some(entity) = entities.get(index) else { continue };
         if let (Some(magnetism), None) = (&entity.magnetism, finger.contact(index)) {
-            force_W += magnetism.force_on_user_W(entity, hip_W, finger.radius_m());
+            pull.add(&magnetism.pull(entity, hip_W, finger.radius_m()));
         }
     }
+    pull
+}
+
+fn of_vibrations(effects: &Effects, entities: &[Entity], finger: &Finger, t_s: f64) -> Vector3<f64> {
+    let mut force_W = Vector3::zeros();
     for &index in &effects.vibrating {
         let Some(entity) = entities.get(index) else { continue };
         if let (Some(vibration), Some(contact)) = (&entity.vibration, finger.contact(index)) {

@@ -12,7 +12,7 @@
 use nalgebra::Vector3;
 
 use super::limits::not_above;
-use super::{Limits, MOST_FORCE_N, Motion, Track, bounded, smooth_step};
+use super::{Limits, MOST_FORCE_N, Motion, Pull, Track, bounded, smooth_step};
 use crate::error::{ParameterError, above_zero, at_least_zero};
 
 /// A guide.
@@ -102,14 +102,14 @@ impl Guide {
         &self.track
     }
 
-    pub(super) fn force_on_user_W(&self, motion: &Motion, hold: &mut Hold) -> Vector3<f64> {
+    pub(super) fn pull(&self, motion: &Motion, hold: &mut Hold) -> Pull {
         let foot = self.track.foot(&motion.position_W);
         let off_W = motion.position_W - foot.point_W;
         let distance_m = off_W.norm();
         let stretch_m = (distance_m - self.deadband_m).max(0.0);
         hold.step(self, distance_m, self.stiffness_n_per_m * stretch_m, motion.dt_s);
         if hold.strength == 0.0 {
-            return Vector3::zeros();
+            return Pull::default();
         }
         let spring_W = if stretch_m > 0.0 {
             off_W * (-self.stiffness_n_per_m * stretch_m / distance_m)
@@ -118,7 +118,17 @@ impl Guide {
         };
         let damping = self.damping_n_s_per_m * self.damped(stretch_m);
         let damper_W = foot.across(&motion.velocity_W, &off_W) * -damping;
-        bounded(spring_W + damper_W, self.force_limit_n) * hold.strength
+        Pull {
+            force_on_user_W: bounded(spring_W + damper_W, self.force_limit_n) * hold.strength,
+            stored_j: self.stored_j(stretch_m) * hold.strength,
+        }
+    }
+
+    /// What its spring gives back on the way to the track (J).
+    fn stored_j(&self, stretch_m: f64) -> f64 {
+        // From here on the force is its limit.
+        let spring_m = stretch_m.min(self.force_limit_n / self.stiffness_n_per_m);
+        (0.5 * self.stiffness_n_per_m * spring_m) * spring_m + self.force_limit_n * (stretch_m - spring_m)
     }
 
     /// How much of the damper is felt, 0 to 1.

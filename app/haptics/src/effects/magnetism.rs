@@ -5,15 +5,16 @@
 //! as well; largest, F0, at a third of the reach; and 0 with slope 0 at its end. So it has no step anywhere, a finger
 //! comes to rest at the surface neither sunk in nor off it, and it takes `27/48 F0 D` to pull it free: exactly what the
 //! surface gave when it came. Where two points of the surface are equally near the force changes sides, but the
-//! potential has no step there either. Inside there is none: contact is on its own.
+//! potential has no step there either. Inside there is none: contact is on its own. A surface that a height map raises
+//! attracts from where it is highest, since there a finger may be in contact: below, it hovers without a pull.
 //!
 //! Signs: forces on the user. Cost: one nearest point of the shape while no contact; a mesh is first asked whether
 //! it is near at all.
 
 use nalgebra::Vector3;
 
-use super::Limits;
 use super::limits::not_above;
+use super::{Limits, Pull};
 use crate::entity::Entity;
 use crate::error::{ParameterError, above_zero, at_least_zero};
 use crate::frame::{is_finite, point_into_body, vector_into_world};
@@ -68,23 +69,23 @@ impl Magnetism {
     }
 
     /// On a finger of this radius that does not touch the entity.
-    pub(super) fn force_on_user_W(
-        &self,
-        entity: &Entity,
-        hip_W: &Vector3<f64>,
-        finger_radius_m: f64,
-    ) -> Vector3<f64> {
+    pub(super) fn pull(&self, entity: &Entity, hip_W: &Vector3<f64>, finger_radius_m: f64) -> Pull {
         let hip_B = point_into_body(&entity.X_WB, hip_W);
-        let reach_m = self.distance_m + finger_radius_m;
-        let Some(nearest_B) = nearest(&entity.shape, &hip_B, reach_m) else { return Vector3::zeros() };
+        let lift_m = entity.height_map.as_ref().map_or(0.0, |map| map.lift_m(&entity.shape, finger_radius_m));
+        let touched_m = finger_radius_m + lift_m;
+        let reach_m = self.distance_m + touched_m;
+        let Some(nearest_B) = nearest(&entity.shape, &hip_B, reach_m) else { return Pull::default() };
         let way_B = nearest_B - hip_B;
         let distance_m = way_B.norm();
-        let pull_n = self.pull_n(distance_m - finger_radius_m);
-        if pull_n <= 0.0 {
-            return Vector3::zeros();
-        }
+        let pull_n = self.pull_n(distance_m - touched_m);
         let force_B = way_B * (pull_n / distance_m);
-        if is_finite(&force_B) { vector_into_world(&entity.X_WB, &force_B) } else { Vector3::zeros() }
+        if pull_n <= 0.0 || !is_finite(&force_B) {
+            return Pull::default();
+        }
+        Pull {
+            force_on_user_W: vector_into_world(&entity.X_WB, &force_B),
+            stored_j: self.potential_j(distance_m - touched_m) - self.potential_j(0.0),
+        }
     }
 }
 

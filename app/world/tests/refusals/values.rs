@@ -361,6 +361,11 @@ fn a_size_that_no_shape_has_is_refused() {
              allowed: in a csg: plane, sphere, box, cylinder, cone, torus, capsule, ellipsoid, csg",
         ),
         (
+            "{ kind = \"csg\", op = \"union\", children = [{ shape = { kind = \"nurbs\", file = \"a.toml\" } }] }",
+            "children[0].shape.kind: found the string \"nurbs\"; \
+             allowed: in a csg: plane, sphere, box, cylinder, cone, torus, capsule, ellipsoid, csg",
+        ),
+        (
             "{ kind = \"csg\", op = \"union\", children = [{ shape = { kind = \"sphere\", radius_m = 1 }, pose = 1 }] }",
             "children[0].pose: unknown key; allowed: shape, position_m, orientation_wxyz",
         ),
