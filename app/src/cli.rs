@@ -6,6 +6,7 @@
 use crate::calibrate::{self, CalibrateArgs, default_layout};
 use crate::demo;
 use crate::outcome::{RunFailure, Stop};
+use crate::picture::{self, PlotArgs};
 use crate::report::Report;
 use crate::rig::{HandMode, Rig};
 use crate::run::{self, Attach, RunPlan};
@@ -13,6 +14,7 @@ use crate::simulated::SimulatedDevices;
 use crate::study::{self, StudyCommand};
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use haptics::Material;
 use io_driver::config::period_of;
 use io_driver::say::say;
 use io_driver::sim::hand::model_file::Firmness;
@@ -51,6 +53,10 @@ enum AppCommand {
     Run(RunArgs),
     /// Find where a device stands, from points that it and another one measured together
     Calibrate(CalibrateArgs),
+    /// Draw a recording: what the fingers felt
+    Plot(PlotArgs),
+    /// List the materials that an entity of a scene can be made of
+    Materials,
     /// Answer a question about the whole system with a table and a picture
     #[command(subcommand)]
     Study(StudyCommand),
@@ -139,7 +145,14 @@ pub fn main() -> ExitCode {
     match Cli::parse().command {
         Some(AppCommand::Driver(command)) => io_driver::cli::execute(command),
         Some(AppCommand::Calibrate(args)) => calibrate::run(&args),
+        Some(AppCommand::Materials) => {
+            print_materials();
+            ExitCode::SUCCESS
+        }
         Some(AppCommand::Run(args)) => conclude(run_scene(&args)),
+        Some(AppCommand::Plot(args)) => {
+            picture::execute(&args).map_or_else(|failure| failed(&failure), stopped)
+        }
         Some(AppCommand::Study(command)) => {
             let result = install_signals().and_then(|signals| study::execute(&command, &signals));
             result.map_or_else(|failure| failed(&failure), stopped)
@@ -331,6 +344,25 @@ fn failed(failure: &RunFailure) -> ExitCode {
 fn print_report(report: &Report) {
     use std::io::Write;
     let _ = writeln!(std::io::stdout(), "{report}");
+}
+
+/// What `material = "..."` of an entity stands for, a line each.
+fn print_materials() {
+    use std::io::Write;
+    let mut out = std::io::stdout();
+    let _ = writeln!(
+        out,
+        "{:<10} {:>5} {:>5} {:>14} {:>15}  source of the friction",
+        "material", "mu_s", "mu_d", "stiffness N/m", "damping N s/m"
+    );
+    for made_of in Material::ALL {
+        let Material { name, mu_s, mu_d, stiffness_n_per_m, damping_n_s_per_m, source } = made_of;
+        let _ = writeln!(
+            out,
+            "{name:<10} {mu_s:>5.2} {mu_d:>5.2} {stiffness_n_per_m:>14.0} {damping_n_s_per_m:>15.1}  {source}"
+        );
+    }
+    let _ = writeln!(out, "Friction is that of a dry fingertip; all of stiffness and damping is a choice.");
 }
 
 fn parse_seconds(text: &str) -> Result<f64, String> {

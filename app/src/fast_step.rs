@@ -2,7 +2,8 @@
 //!
 //! Model: each finger's HIP is taken into the world, steps against the entities, and its force goes back
 //! into its device's base frame. Damping goes by the driver's estimate of the HIP's velocity; a driver of before
-//! 1.1 gives none, and then by the difference of its positions. The same step serves all three clocks.
+//! 1.1 gives none, and then by the difference of its positions. What is felt beside contacts (fields, guides, magnets,
+//! vibration) is added to their force. The same step serves all three clocks.
 //!
 //! Frames and signs: forces are forces on the user.
 //! Invariants: no allocation, clock, lock or panic; the command answers the frame's tick; a device whose
@@ -12,8 +13,10 @@
 #![allow(non_snake_case)] // Frames are capital letters: tip_D is the tip in D.
 
 use crate::mount::Mount;
+use crate::passive_port::{Tick, keep_passive};
 use crate::row::{FingerRow, Row};
-use haptics::{Entity, Finger, Hip, RAMP_IN_S};
+use haptics::passivity::Passivity;
+use haptics::{Effects, Entity, Field, Finger, FingerEffects, Guide, Hip, Moment, RAMP_IN_S};
 use nalgebra::Vector3;
 use shm_abi::frame::DEVICE_POSITION_VALID;
 use shm_abi::{Command, DeviceFrame, Frame};
@@ -35,6 +38,9 @@ pub struct DeviceFinger {
 pub struct FastStep {
     fingers: Vec<DeviceFinger>,
     entities: Vec<Entity>,
+    effects: Effects,
+    /// Of each finger.
+    finger_effects: Vec<FingerEffects>,
     period_s: f64,
     last_tick: Option<u64>,
     driver_estimates: bool,
@@ -42,6 +48,8 @@ pub struct FastStep {
     tips_D: Vec<Option<[f64; 3]>>,
     /// How far each finger was carried through the world since the last tick (m): no device's velocity tells of it.
     carried_W: Vec<Vector3<f64>>,
+    /// What keeps each finger passive, if anything does.
+    passivities: Vec<Option<Passivity>>,
 }
 
 /// The first minor version of the shared-memory contract whose frames tell velocities.
@@ -52,7 +60,37 @@ impl FastStep {
     pub fn new(fingers: Vec<DeviceFinger>, entities: Vec<Entity>, period_ns: u64) -> Self {
         let (tips_D, carried_W) = (vec![None; fingers.len()], vec![Vector3::zeros(); fingers.len()]);
         let period_s = period_ns as f64 / 1e9;
-        Self { fingers, entities, period_s, last_tick: None, driver_estimates: false, tips_D, carried_W }
+        let passivities = vec![None; fingers.len()];
+        Self {
+            fingers,
+            entities,
+            effects: Effects::default(),
+            finger_effects: Vec::new(),
+            period_s,
+            last_tick: None,
+            driver_estimates: false,
+            tips_D,
+            carried_W,
+            passivities,
+        }
+        .with_effects(Vec::new(), Vec::new())
+    }
+
+    /// With these fields and guides beside the entities, and what the entities' surfaces do.
+    #[must_use]
+    pub fn with_effects(mut self, fields: Vec<Field>, guides: Vec<Guide>) -> Self {
+        self.effects = Effects::new(fields, guides, &self.entities);
+        self.finger_effects = vec![FingerEffects::new(&self.effects); self.fingers.len()];
+        self
+    }
+
+    /// With fingers whose forces do not feed energy into the hand, one for each finger; `None`: as rendered.
+    #[must_use]
+    pub fn with_passivities(mut self, passivities: impl IntoIterator<Item = Option<Passivity>>) -> Self {
+        for (own, given) in self.passivities.iter_mut().zip(passivities) {
+            *own = given;
+        }
+        self
     }
 
     /// Which minor version of the contract the driver speaks, and over how many ticks it lets forces come on.
@@ -67,6 +105,9 @@ impl FastStep {
             // No product of an integer and a period is out of range.
             let _ = finger.finger.set_ramp_in(ramp_in_s);
         }
+        for felt in &mut self.finger_effects {
+            let _ = felt.set_ramp_in(ramp_in_s);
+        }
     }
 
     /// Renders a frame into the command that answers it, and into a row.
@@ -77,14 +118,27 @@ impl FastStep {
         let dt_s = ticks as f64 * self.period_s;
         row.run_tick = frame.run_tick.max(0).unsigned_abs();
         let devices = frame.present_devices();
-        let known = self.tips_D.iter_mut().zip(&mut self.carried_W);
-        for ((finger, row), (tip_D, carried_W)) in self.fingers.iter_mut().zip(&mut row.fingers).zip(known) {
+        let tick = Tick::new(frame, &self.entities, dt_s);
+        let moment = Moment { t_s: row.run_tick as f64 * self.period_s, dt_s };
+        let states = self.finger_effects.iter_mut().zip(&mut self.passivities);
+        let known = self.tips_D.iter_mut().zip(&mut self.carried_W).zip(states);
+        for ((finger, row), ((tip_D, carried_W), (felt, passivity))) in
+            self.fingers.iter_mut().zip(&mut row.fingers).zip(known)
+        {
             let Some(device) = devices.get(finger.device) else { continue };
             let is_valid = device.flags & DEVICE_POSITION_VALID != 0;
             *tip_D = is_valid.then_some(device.position_m_measured);
-            let carried_W = std::mem::take(carried_W) / dt_s;
-            let velocity_W = self.driver_estimates.then(|| finger.velocity_W(device, carried_W));
+            let carried_W = std::mem::take(carried_W);
+            let velocity_W = self.driver_estimates.then(|| finger.velocity_W(device, carried_W / dt_s));
             *row = finger.step(device, &self.entities, dt_s, velocity_W);
+            if !self.effects.is_empty() {
+                let hip = is_valid.then_some(Hip { position_W: row.hip, velocity_W });
+                let beside_W = finger.feel(felt, &self.effects, &self.entities, hip, moment);
+                row.force_on_user = finite_or_zero(row.force_on_user + beside_W);
+            }
+            if let Some(passivity) = passivity {
+                keep_passive(passivity, finger, device, carried_W, &tick, row);
+            }
             command.devices[finger.device].force_on_user_n = finger.mount.force_to_device(row.force_on_user);
         }
     }
@@ -122,12 +176,13 @@ impl FastStep {
         if touches && !is_near {
             return false;
         }
-        for ((finger, tip_D), carried_W) in self.fingers.iter_mut().zip(&self.tips_D).zip(&mut self.carried_W)
-        {
+        let known = self.tips_D.iter().zip(&mut self.carried_W).zip(&mut self.finger_effects);
+        for (finger, ((tip_D, carried_W), felt)) in self.fingers.iter_mut().zip(known) {
             *carried_W += carried(finger, tip_D);
             finger.mount = mount_of(finger);
             if !is_near {
                 finger.finger.reset();
+                felt.reset();
             }
         }
         true
@@ -141,6 +196,8 @@ impl FastStep {
         for finger in &mut self.fingers {
             finger.finger.reset();
         }
+        self.passivities.iter_mut().flatten().for_each(Passivity::reset);
+        self.finger_effects.iter_mut().for_each(FingerEffects::reset);
     }
 }
 
@@ -179,6 +236,7 @@ impl DeviceFinger {
         FingerRow {
             god_object: output.god_object_W,
             force_on_user: finite_or_zero(output.force_on_user_W),
+            torque_on_user: finite_or_zero(output.torque_on_user_W),
             entity: output.entity.map(|index| index as u32),
             feature: output.feature,
             friction: output.friction,
@@ -187,10 +245,33 @@ impl DeviceFinger {
     }
 }
 
+impl DeviceFinger {
+    /// The force of what is felt beside contacts (N); nothing without a `hip`.
+    fn feel(
+        &self,
+        felt: &mut FingerEffects,
+        effects: &Effects,
+        entities: &[Entity],
+        hip: Option<Hip>,
+        moment: Moment,
+    ) -> Vector3<f64> {
+        match hip {
+            Some(hip) => felt.step(effects, entities, &self.finger, hip, moment),
+            None => {
+                felt.reset();
+                Vector3::zeros()
+            }
+        }
+    }
+}
+
 /// The driver refuses a command that is not finite as a whole; zero for one finger is milder.
 fn finite_or_zero(force: Vector3<f64>) -> Vector3<f64> {
     if force.iter().all(|component| component.is_finite()) { force } else { Vector3::zeros() }
 }
+
+#[cfg(test)]
+mod beside;
 
 #[cfg(test)]
 mod damped {
@@ -249,6 +330,97 @@ mod damped {
         assert!((after_a_gap - (K * 2.1e-3 + B * 0.1)).abs() < 1e-12, "1 mm in ten ticks");
         step.meet_driver(1, 0);
         assert!((force(&mut step, 13, -2.2e-3, 0.0) - K * 2.2e-3).abs() < 1e-12, "1.1 tells");
+    }
+}
+
+#[cfg(test)]
+mod passive {
+    use super::*;
+    use bytemuck::Zeroable;
+    use haptics::Plane;
+    use haptics::passivity::PassivitySpec;
+    use nalgebra::{Isometry3, UnitQuaternion};
+
+    const PERIOD_NS: u64 = 1_000_000;
+    const K: f64 = 1000.0;
+
+    /// A finger over a floor, its device upside down, kept passive by a bound of 1 uJ.
+    fn step() -> FastStep {
+        let floor = Entity::new(Plane::new(Vector3::y(), 0.0).unwrap(), Isometry3::identity(), K).unwrap();
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI);
+        let finger = DeviceFinger {
+            finger: Finger::new(0.0, 1).unwrap().with_ramp_in(0.0).unwrap(),
+            device: 0,
+            mount: Mount::new(Isometry3::from_parts(Vector3::zeros().into(), turn)),
+        };
+        let spec = PassivitySpec::for_motion(1e-3, 0.0, 0.0).with_bound(1e-6);
+        let spec = PassivitySpec { device_friction_n: 0.0, ..spec };
+        FastStep::new(vec![finger], vec![floor], PERIOD_NS)
+            .with_passivities([Passivity::new(spec, 1e-3).ok()])
+    }
+
+    /// The finger at this height (m), where motors held this force upwards (N), of the command of that tick.
+    fn feel(
+        step: &mut FastStep,
+        tick: u64,
+        height: f64,
+        applied: f64,
+        command_tick: u64,
+    ) -> (FingerRow, f64) {
+        let mut frame = Frame::zeroed();
+        (frame.tick, frame.device_count) = (tick, 1);
+        (frame.previous.authority, frame.previous.command_tick) = (1.0, command_tick);
+        frame.devices[0].flags = DEVICE_POSITION_VALID;
+        frame.devices[0].position_m_measured[1] = -height;
+        frame.devices[0].force_on_user_n_applied[1] = -applied;
+        let (mut command, mut row) = (Command::zero(tick, 1, 1), Row::empty());
+        step.step(&frame, &mut command, &mut row);
+        (row.fingers[0], -command.devices[0].force_on_user_n[1])
+    }
+
+    #[test]
+    fn what_counts_is_the_force_that_the_motors_held_and_the_command_is_what_is_left() {
+        let mut step = step();
+        feel(&mut step, 1, 1e-3, 0.0, 0);
+        let (pressed, commanded) = feel(&mut step, 2, -1e-3, 0.0, 1);
+        assert_eq!((pressed.energy_j, pressed.controlled_n), (0.0, 0.0));
+        assert!((commanded - 1.0).abs() < 1e-12, "pressed in by 2 mm a tick, it takes energy: {commanded}");
+        // It wanted a newton, of which the driver let 0.4 N through; out by half a millimetre.
+        let (released, commanded) = feel(&mut step, 3, -0.5e-3, 0.4, 2);
+        assert!((released.energy_j - 0.2e-3).abs() < 1e-15, "{released:?}");
+        // More than the bound: nothing is left of 0.5 N.
+        assert_eq!((commanded, released.force_on_user), (0.0, Vector3::zeros()));
+        assert!((released.controlled_n - 0.5).abs() < 1e-12, "{released:?}");
+    }
+
+    #[test]
+    fn a_device_that_is_carried_does_no_work_and_one_that_is_lost_moved_nowhere() {
+        let mut step = step();
+        feel(&mut step, 1, -1e-3, 0.0, 0);
+        feel(&mut step, 2, -1e-3, 1.0, 1);
+        let camera = Isometry3::translation(0.0, 0.5e-3, 0.0);
+        let text = "master = 0\nattached_to = \"camera\"\n[[device]]\norientation_wxyz = [0, 0, 0, 1]\n";
+        let layout = Layout::parse(text, std::path::Path::new("l.toml")).unwrap();
+        assert!(step.set_layout(&layout.with_camera(camera)));
+        assert!(feel(&mut step, 3, -1e-3, 1.0, 2).0.energy_j.abs() < 1e-15);
+        let mut lost = Frame::zeroed();
+        (lost.tick, lost.device_count) = (4, 1);
+        step.step(&lost, &mut Command::zero(4, 1, 1), &mut Row::empty());
+        assert!(feel(&mut step, 5, -0.2e-3, 1.0, 4).0.energy_j.abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_driver_that_writes_a_tick_late_is_told_from_one_that_does_not() {
+        // It comes out by 0.5 mm a tick and wants 0.5 N. Of a microjoule that makes 2 mN; but where the newton of the tick
+        // before is still to come, that alone may feed half a millijoule.
+        for (late, left) in [(0, 2e-3), (1, 0.0)] {
+            let mut step = step();
+            feel(&mut step, 2, 1e-3, 0.0, 1 - late);
+            feel(&mut step, 3, -1e-3, 0.0, 2 - late);
+            let (_, commanded) = feel(&mut step, 4, -0.5e-3, 0.0, 3 - late);
+            // The margin of the multiplier.
+            assert!((commanded - left).abs() < 1e-8, "{late}: {commanded}");
+        }
     }
 }
 

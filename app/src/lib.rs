@@ -20,6 +20,8 @@ pub mod fast_thread;
 pub mod mount;
 mod not_zeroed;
 pub mod outcome;
+pub mod passive_port;
+pub mod picture;
 pub mod progress;
 pub mod recording;
 pub mod report;

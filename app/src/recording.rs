@@ -55,13 +55,25 @@ pub struct Names {
     pub fingers: Vec<String>,
     /// What their devices tell besides positions; fingers beyond the list: nothing.
     pub extras: Vec<Extras>,
+    /// Which are kept passive; those beyond the list are not.
+    pub passive: Vec<bool>,
+    /// Whether their torques are told; fingers beyond the list: no.
+    pub torques: Vec<bool>,
     /// The entities.
     pub entities: Vec<String>,
 }
 
 impl Names {
+    fn has_torque(&self, finger: usize) -> bool {
+        self.torques.get(finger).copied().unwrap_or_default()
+    }
+
     fn extras_of(&self, finger: usize) -> Extras {
         self.extras.get(finger).copied().unwrap_or_default()
+    }
+
+    fn is_passive(&self, finger: usize) -> bool {
+        self.passive.get(finger).copied().unwrap_or_default()
     }
 }
 
@@ -193,6 +205,12 @@ fn header(names: &Names) -> String {
         }
         push_axes(&mut line, finger, "applied");
         push_extras(&mut line, finger, names.extras_of(index));
+        if names.is_passive(index) {
+            let _ = write!(line, ",{finger}_energy,{finger}_controlled");
+        }
+        if names.has_torque(index) {
+            push_axes(&mut line, finger, "torque");
+        }
     }
     line.push('\n');
     line
@@ -219,6 +237,12 @@ fn write_row(line: &mut String, row: &Row, names: &Names, period_ns: u64) {
     for (index, (_, finger)) in names.fingers.iter().zip(&row.fingers).enumerate() {
         write_finger(line, finger, names);
         write_extras(line, finger, names.extras_of(index));
+        if names.is_passive(index) {
+            let _ = write!(line, ",{:?},{:?}", finger.energy_j, finger.controlled_n);
+        }
+        if names.has_torque(index) {
+            write_vector(line, &finger.torque_on_user);
+        }
     }
     line.push('\n');
 }
@@ -274,7 +298,13 @@ mod tests {
     use super::*;
 
     fn names() -> Names {
-        Names { fingers: vec!["a".into(), "b".into()], extras: Vec::new(), entities: vec!["table".into()] }
+        Names {
+            fingers: vec!["a".into(), "b".into()],
+            extras: Vec::new(),
+            passive: Vec::new(),
+            torques: Vec::new(),
+            entities: vec!["table".into()],
+        }
     }
 
     fn row(run_tick: u64, number: f64) -> Row {
@@ -322,6 +352,32 @@ mod tests {
         write_row(&mut line, &told, &names, 1_000_000);
         assert!(line.ends_with(",0.5,-0.5,0.5,-0.5,5\n"), "{line}");
         assert_eq!(line.matches(',').count(), header(&names).matches(',').count());
+    }
+
+    #[test]
+    fn only_a_finger_that_is_kept_passive_tells_its_energy() {
+        let plain = header(&names());
+        let names = Names { passive: vec![false, true], ..names() };
+        assert_eq!(header(&names), plain.trim_end().to_owned() + ",b_energy,b_controlled\n");
+        let mut told = row(0, 1.0);
+        (told.fingers[1].energy_j, told.fingers[1].controlled_n) = (-1.5e-3, 0.25);
+        let mut line = String::new();
+        write_row(&mut line, &told, &names, 1_000_000);
+        assert!(line.ends_with(",-0.0015,0.25\n"), "{line}");
+        assert_eq!(line.matches(',').count(), header(&names).matches(',').count());
+    }
+
+    #[test]
+    fn only_a_finger_with_a_radius_has_columns_for_its_torque() {
+        let plain = header(&names());
+        let names = Names { torques: vec![false, true], ..names() };
+        let added = ",b_torque_x,b_torque_y,b_torque_z\n";
+        assert_eq!(header(&names), plain.trim_end().to_owned() + added, "behind the last finger's others");
+        let mut told = row(0, 1.0);
+        told.fingers[1].torque_on_user = Vector3::new(0.5, -0.25, 0.0);
+        let mut line = String::new();
+        write_row(&mut line, &told, &names, 1_000_000);
+        assert!(line.ends_with(",0.5,-0.25,0.0\n"), "{line}");
     }
 
     #[test]

@@ -1,17 +1,21 @@
 //! From files and arguments to everything a run needs: whatever can be wrong with the input is found here,
 //! before anything is started.
 
+mod effects;
 mod error;
 mod material;
 mod models;
+mod pictures;
 
 pub use self::error::RigError;
 use self::material::Unfit;
 use self::models::Models;
+use self::pictures::Pictures;
 use crate::fast_step::{DeviceFinger, FastStep};
 use crate::mount::Mount;
 use crate::recording::Names;
 use crate::simulated::{SimulatedDevices, base_for_path};
+use haptics::passivity::Passivity;
 use haptics::{Entity, Finger, ParameterError};
 use io_driver::config::{
     Backend, DeviceConfig, DriverConfig, ProcessConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig, Wish,
@@ -25,7 +29,7 @@ use io_driver::sim::script::HandScript;
 use nalgebra::{Isometry3, Vector3};
 use shm_abi::segment::ClockMode;
 use std::path::{Path, PathBuf};
-use world::{Layout, Scene, SceneEntity, SceneFinger, ShapeSpec};
+use world::{AlgorithmSpec, Layout, Scene, SceneEntity, SceneFinger, ShapeSpec};
 
 /// What a run needs, checked.
 #[derive(Debug, Clone)]
@@ -45,6 +49,7 @@ pub struct Rig {
     /// X_WD of each device; beyond the list the world's origin.
     bases: Vec<Isometry3<f64>>,
     models: Models,
+    pictures: Pictures,
 }
 
 /// How the hand moves the devices that are not real.
@@ -90,6 +95,7 @@ impl Rig {
         let mut rig = Self {
             scene_file: scene_file.into(),
             models: Models::load(&scene)?,
+            pictures: Pictures::load(&scene)?,
             scene,
             layout,
             hand_mode,
@@ -166,6 +172,7 @@ impl Rig {
     pub fn fast_step(&self) -> Result<FastStep, RigError> {
         let entities: Vec<Entity> =
             self.scene.entities.iter().map(|entity| self.entity(entity)).collect::<Result<_, _>>()?;
+        let entities = self.prepared(entities);
         let fingers = self.scene.fingers.iter().map(|finger| {
             let made = Finger::new(finger.radius_m, entities.len())
                 .map_err(|source| self.refused(None, format!("finger {}", finger.name), source))?;
@@ -174,7 +181,16 @@ impl Rig {
             Ok(DeviceFinger { finger: made, device: finger.device, mount })
         });
         let fingers: Vec<DeviceFinger> = fingers.collect::<Result<_, RigError>>()?;
-        Ok(FastStep::new(fingers, entities, self.period_ns))
+        let passivities = self.scene.fingers.iter().map(|finger| {
+            let Some(spec) = &finger.passivity else { return Ok(None) };
+            let what = || format!("passivity of finger {}", finger.name);
+            let refused = |source| self.refused(None, what(), source);
+            material::passivity(spec, self.period_ns as f64 / 1e9).map(Some).map_err(refused)
+        });
+        let passivities: Vec<Option<Passivity>> = passivities.collect::<Result<_, RigError>>()?;
+        let (fields, guides) = self.effects()?;
+        let step = FastStep::new(fingers, entities, self.period_ns);
+        Ok(step.with_effects(fields, guides).with_passivities(passivities))
     }
 
     /// What the recording's columns are called, for devices that tell so much.
@@ -182,6 +198,8 @@ impl Rig {
         let of = |device: usize| devices.get(device).copied().unwrap_or_default();
         Names {
             extras: self.scene.fingers.iter().map(|finger| of(finger.device)).collect(),
+            passive: self.scene.fingers.iter().map(|finger| finger.passivity.is_some()).collect(),
+            torques: self.scene.fingers.iter().map(|finger| finger.radius_m > 0.0).collect(),
             fingers: self.scene.fingers.iter().map(|finger| finger.name.clone()).collect(),
             entities: self.scene.entities.iter().map(|entity| entity.name.clone()).collect(),
         }
@@ -240,27 +258,55 @@ impl Rig {
     fn entity(&self, spec: &SceneEntity) -> Result<Entity, RigError> {
         let what = || format!("entity {}", spec.name);
         let refused = |source| self.refused(Some(spec.line), what(), source);
-        let unfit = |unfit| match unfit {
-            Unfit::Refused(source) => refused(source),
-            Unfit::NotAvailable(it) => self.not_available(format!("{}: {it}", what())),
-        };
-        let shape = material::shape(&spec.shape, &self.models).map_err(unfit)?;
+        let unfit = |unfit| self.unfit(spec.line, what(), unfit);
+        self.check_rendered(spec, what())?;
+        let shape = material::shape(&spec.shape, &self.models, spec.height_map.is_some()).map_err(unfit)?;
         let friction = material::friction(&spec.friction).map_err(unfit)?;
         let algorithm = material::algorithm(spec.algorithm).map_err(unfit)?;
-        Entity::new(shape, spec.pose, spec.stiffness_n_per_m)
+        let shading = material::shading(spec, &self.models).map_err(unfit)?;
+        let height_map =
+            spec.height_map.as_ref().map(|map| self.pictures.height_map(map, &shape)).transpose()?;
+        let entity = Entity::new(shape, spec.pose, spec.stiffness_n_per_m)
             .and_then(|entity| entity.with_damping(spec.damping_n_s_per_m))
             .and_then(|entity| entity.with_friction(friction))
-            .map(|entity| entity.with_algorithm(algorithm))
-            .map_err(refused)
+            .map(|entity| entity.with_algorithm(algorithm).with_shading(shading))
+            .map_err(refused)?;
+        let entity = match height_map {
+            Some(height_map) => entity.with_height_map(height_map),
+            None => entity,
+        };
+        self.with_surface_effects(entity, spec)
+    }
+
+    /// The algorithms to compare with know surfaces, and trees have none of their own.
+    fn check_rendered(&self, spec: &SceneEntity, what: String) -> Result<(), RigError> {
+        let found = match spec.algorithm {
+            AlgorithmSpec::VectorField => "vector-field",
+            AlgorithmSpec::ClassicGodObject => "classic",
+            _ => return Ok(()),
+        };
+        if !material::is_csg(&spec.shape) {
+            return Ok(());
+        }
+        Err(RigError::NotRendered { file: self.scene_file.clone(), line: spec.line, what, found })
+    }
+
+    /// What balls cannot feel by its equation they feel in triangles.
+    fn prepared(&self, entities: Vec<Entity>) -> Vec<Entity> {
+        let prepare = |entity: Entity, radius_m: f64| {
+            if entity.is_felt_by(radius_m) { entity } else { entity.prepared_for(radius_m) }
+        };
+        let radii = || self.scene.fingers.iter().map(|finger| finger.radius_m);
+        entities.into_iter().map(|entity| radii().fold(entity, prepare)).collect()
     }
 
     /// A finger would pass through what it cannot feel, without a word.
     fn check_felt(&self, entities: &[Entity], finger: &SceneFinger) -> Result<(), RigError> {
-        let not_felt = entities.iter().position(|entity| !entity.shape.is_felt_by(finger.radius_m));
+        let not_felt = entities.iter().position(|entity| !entity.is_felt_by(finger.radius_m));
         let Some(index) = not_felt else { return Ok(()) };
         let spec = &self.scene.entities[index];
-        // A ring is felt by balls that fit through its hole, a mesh by none.
-        let by_smaller = entities[index].shape.is_felt_by(1e-3 * finger.radius_m);
+        // Somebody's own shape may be felt by small balls only.
+        let by_smaller = entities[index].is_felt_by(1e-3 * finger.radius_m);
         Err(RigError::NotFelt {
             file: self.scene_file.clone(),
             line: spec.line,
@@ -268,20 +314,34 @@ impl Rig {
             radius_m: finger.radius_m,
             entity: spec.name.clone(),
             kind: spec.shape.kind(),
-            smaller: if by_smaller { ", a smaller radius" } else { "" },
+            otherwise: match () {
+                () if entities[index].shape.is_felt_by(finger.radius_m) => ", algorithm = \"friction-cone\"",
+                () if by_smaller => ", a smaller radius",
+                () => "",
+            },
         })
     }
 
-    /// The model files that it is made of.
+    /// The model and picture files that it is made of.
     pub fn model_files(&self) -> impl Iterator<Item = &PathBuf> {
-        self.scene.entities.iter().filter_map(|entity| match &entity.shape {
+        let models = self.scene.entities.iter().filter_map(|entity| match &entity.shape {
             ShapeSpec::Mesh(model) | ShapeSpec::Nurbs(model) => Some(&model.file),
             _ => None,
-        })
+        });
+        models.chain(self.scene.entities.iter().filter_map(|entity| Some(&entity.height_map.as_ref()?.file)))
     }
 
     fn refused(&self, line: Option<usize>, what: String, source: ParameterError) -> RigError {
         RigError::Refused { file: self.scene_file.clone(), line, what, source }
+    }
+
+    /// Why something that begins in this line of the scene has no counterpart in rendering.
+    fn unfit(&self, line: usize, what: String, unfit: Unfit) -> RigError {
+        match unfit {
+            Unfit::Refused(source) => self.refused(Some(line), what, source),
+            Unfit::NoSolid(source) => RigError::NoSolid { file: self.scene_file.clone(), line, what, source },
+            Unfit::NotAvailable(it) => self.not_available(format!("{what}: {it}")),
+        }
     }
 
     fn not_available(&self, what: String) -> RigError {

@@ -22,6 +22,8 @@ pub struct FingerRow {
     pub god_object: Vector3<f64>,
     /// What rendering computed (N).
     pub force_on_user: Vector3<f64>,
+    /// Torque of the same about the finger's centre (N m); recorded where the finger has a radius.
+    pub torque_on_user: Vector3<f64>,
     /// What the device was made to render after ramps, limits and converters (N).
     pub applied_on_user: Vector3<f64>,
     /// How its device's last link is turned, w x y z; recorded where a gimbal measures it.
@@ -34,6 +36,10 @@ pub struct FingerRow {
     pub feature: Feature,
     /// What the friction does.
     pub friction: ContactState,
+    /// Energy fed into the hand up to this tick (J); zero where nobody keeps the finger passive.
+    pub energy_j: f64,
+    /// By how much that changed the force (N).
+    pub controlled_n: f64,
 }
 
 impl Row {

@@ -160,7 +160,7 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
 /// Makes this process end with its parent, if it is to.
 fn die_with_parent(options: &RunOptions) -> Result<(), RunError> {
     if let Some(parent) = options.parent {
-        // Not SIGTERM, which ends the process at once when it comes twice: a parent of several threads can die
+        // Not SIGTERM, which ends the process at once when it comes again later: a parent of several threads can die
         // twice to the kernel, first the thread that started this process, then the one that inherited it.
         rt_core::process::die_with_parent(parent, rustix::process::Signal::HUP.as_raw()).map_err(
             |error| {

@@ -2,21 +2,27 @@
 //!
 //! Problem: a signal's default action ends the process in the middle of a tick, motors on.
 //! Model: SIGTERM, SIGINT and SIGHUP set one word; the loop reads it each tick and ends in order.
-//! If ending hangs, the *same* SIGTERM or SIGINT once more performs the last act ([`crate::last_act`]) and ends
-//! the process at once, by the default action and with its exit status. A different one does not: a
-//! terminal sends SIGINT to parent and child alike, a parent then sends its child SIGTERM, and systemd may
-//! send SIGHUP right after SIGTERM; none of these means "now".
+//! If ending hangs, the *same* SIGTERM or SIGINT once more, [`SAME_REQUEST`] or more after the first, performs the last
+//! act ([`crate::last_act`]) and ends the process at once, by the default action and with its exit status. Others do
+//! not mean "now": timeout(1) sends its signal to its child and right after that to the child's group, a terminal sends
+//! SIGINT to parent and child alike, a parent then sends its child SIGTERM, and systemd may send SIGHUP right after
+//! SIGTERM.
 //! Invariants: installed for the rest of the process. A signal ends the sleep of the thread that
 //! happens to receive it, not of all: a loop that sleeps long has to wake by itself. SIGPIPE stays
 //! ignored, as Rust's start-up code leaves it: a write to a closed socket is an error, not a death.
 //! Cost: one relaxed load a tick.
 
-use crate::sys::at_once::perform_last_act_if;
+use crate::sys::at_once::end_when_repeated;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::Duration;
+
+/// Signals closer together than this are one request: longer than one sender takes to send it twice, shorter than
+/// anybody's patience.
+pub const SAME_REQUEST: Duration = Duration::from_millis(200);
 
 /// Whether this process was asked to stop.
 #[derive(Clone, Debug)]
@@ -33,11 +39,7 @@ impl StopSignals {
     pub fn install() -> io::Result<Self> {
         let signal = Arc::new(AtomicUsize::new(0));
         for number in [SIGTERM, SIGINT] {
-            let came_before = Arc::new(AtomicBool::new(false));
-            // Actions run in this order: the first signal finds the flag down, the second up.
-            perform_last_act_if(number, Arc::clone(&came_before))?;
-            flag::register_conditional_default(number, Arc::clone(&came_before))?;
-            flag::register(number, came_before)?;
+            end_when_repeated(number, SAME_REQUEST)?;
         }
         for number in [SIGTERM, SIGINT, SIGHUP] {
             flag::register_usize(number, Arc::clone(&signal), number as usize)?;
@@ -79,8 +81,10 @@ mod tests {
             assert_eq!(outcome(once).code(), Some(number), "{once} is a request");
         }
         assert_eq!(outcome("").code(), Some(0), "no signal, no request");
-        assert_eq!(outcome("SIGTERM SIGTERM").signal(), Some(SIGTERM));
-        assert_eq!(outcome("SIGINT SIGINT").signal(), Some(SIGINT));
+        assert_eq!(outcome("SIGTERM later SIGTERM").signal(), Some(SIGTERM));
+        assert_eq!(outcome("SIGINT later SIGINT").signal(), Some(SIGINT));
+        assert_eq!(outcome("SIGTERM SIGTERM").code(), Some(SIGTERM), "one request, delivered twice");
+        assert_eq!(outcome("SIGTERM SIGTERM later SIGTERM").signal(), Some(SIGTERM));
         assert_eq!(outcome("SIGINT SIGTERM").code(), Some(SIGTERM), "still a request");
         assert_eq!(outcome("SIGTERM SIGHUP SIGHUP").code(), Some(SIGHUP), "still a request");
     }
@@ -90,7 +94,10 @@ mod tests {
         let stop = StopSignals::install().unwrap();
         assert_eq!(stop.requested(), None);
         for name in signals.split_whitespace() {
-            raise(name.parse().unwrap()).unwrap();
+            match name {
+                "later" => std::thread::sleep(SAME_REQUEST),
+                name => raise(name.parse().unwrap()).unwrap(),
+            }
         }
         std::process::exit(stop.requested().unwrap_or(0))
     }

@@ -175,20 +175,11 @@ fn a_scene_that_is_wrong_is_refused_with_file_line_key_finding_and_remedy() {
             &["entity[0].shape.normal", "zero vector", "a direction"],
         ),
     ];
-    let later = ["csg"];
     let place = workplace();
     for (index, (scene, parts)) in cases.iter().enumerate() {
         place.write("scene.toml", scene);
         let clock = CLOCKS[index % 2];
         assert_says(&refused(&place, &["run", "scene.toml", "--clock", clock, "--record", "out.csv"]), parts);
-    }
-    for kind in later {
-        place.write("scene.toml", shape(&format!("{{ kind = \"{kind}\" }}")));
-        let message = refused(&place, &["run", "scene.toml", "--record", "out.csv"]);
-        assert_says(
-            &message,
-            &[&format!("`{kind}` is not available in this version; available: plane, sphere, box, cylinder")],
-        );
     }
     for key in ["mass_kg", "inertia_kg_m2", "rotation_locked", "centre_of_mass_m", "angular_velocity_rad_s"] {
         place.write("scene.toml", entity(&format!("{key} = 1")));

@@ -372,15 +372,19 @@ fn a_recording_does_not_overwrite_a_model() {
 }
 
 #[test]
-fn a_finger_with_a_radius_is_refused_on_a_mesh() {
+fn a_finger_with_a_radius_is_refused_on_a_mesh_by_the_algorithm_that_knows_points_only() {
     let place = Workplace::new();
     place.write("cube.obj", Format::Obj.write(&cube()));
-    place.write("scene.toml", mesh("cube.obj").replace("start_m", "radius_m = 0.005\nstart_m"));
+    let scene = mesh("cube.obj").replace("start_m", "radius_m = 0.005\nstart_m");
+    place.write("scene.toml", scene + "algorithm = \"classic\"\n");
     let said = place.run(["run", "scene.toml", "--clock", "virtual", "--headless"]);
     assert_eq!(said.status, Some(2), "{}", said.err);
-    for part in
-        ["scene.toml:4: finger f0 has radius_m = 0.005", "entity thing, a mesh", "allowed: radius_m = 0"]
-    {
+    for part in [
+        "scene.toml:4: finger f0 has radius_m = 0.005",
+        "entity thing, a mesh",
+        "allowed: radius_m = 0",
+        "algorithm = \"friction-cone\"",
+    ] {
         assert!(said.err.contains(part), "`{part}` is missing in: {}", said.err);
     }
 }

@@ -44,6 +44,28 @@ fn a_study_writes_table_csv_and_pictures_that_are_the_same_every_time() {
 }
 
 #[test]
+fn a_finger_that_is_kept_passive_settles_in_front_of_stiffer_walls_and_feels_ordinary_ones_as_they_are() {
+    let place = Workplace::new();
+    let said = place.run([&SMALL[..], &["--out", "a", "--passivity"]].concat());
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    assert!(said.out.contains("kept fed") && said.out.contains("Why they differ"), "{}", said.out);
+    let csv = std::fs::read_to_string(place.path("a/stiffness.csv")).expect("a table");
+    let mut lines = csv.lines();
+    let head: Vec<&str> = lines.next().expect("a header").split(',').collect();
+    for line in lines {
+        let cells: Vec<&str> = line.split(',').collect();
+        assert_eq!(cells.len(), head.len(), "{line}");
+        let number = |name: &str| -> f64 {
+            cells[head.iter().position(|column| *column == name).expect(name)].parse().expect("a number")
+        };
+        assert!(number("kept_n_per_m") > 3.0 * number("settled_n_per_m"), "{line}");
+        assert_eq!((number("half_changed_rms_n"), number("half_changed_most_n")), (0.0, 0.0), "{line}");
+        assert!(number("twice_changed_most_n") > 0.1, "{line}");
+        assert!(number("twice_kept_fed_j") < number("twice_fed_j"), "{line}");
+    }
+}
+
+#[test]
 fn whatever_is_wrong_is_told_before_the_first_trial() {
     let place = Workplace::new();
     place.write("a-file", "");

@@ -81,7 +81,7 @@ fn queries<const WIDTH: usize>(criterion: &mut Criterion, mesh: &Mesh) {
                 black_box(tree.first_hit(triangles, Sides::Solid, from, to));
             });
             run(format!("nearest {where_to}, {manner}"), &above, &|point, _| {
-                black_box(tree.nearest(triangles, point));
+                black_box(tree.nearest_unbounded(triangles, point));
             });
             run(format!("clearance {where_to}, {manner}"), &above, &|point, _| {
                 black_box(tree.clearance(point, 0.05));

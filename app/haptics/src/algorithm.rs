@@ -65,23 +65,35 @@ pub struct TouchInput<'e> {
 /// What is asked of every shape alike, for this finger.
 impl TouchInput<'_> {
     /// Whether the HIP is inside the material, or on its surface. Open meshes have no inside.
+    ///
+    /// Of a mesh as [`Mesh::is_inside`] says, at a cost that a tick can bear.
     pub fn is_inside(&self) -> bool {
         match self.shape {
-            Shape::Mesh(mesh) => self.finger_radius_m == 0.0 && mesh.is_inside(&self.cone.hip_B),
+            Shape::Mesh(mesh) => {
+                let (hip_B, radius_m) = (&self.cone.hip_B, self.finger_radius_m);
+                mesh.is_inside(hip_B) || radius_m > 0.0 && mesh.nearest_within(hip_B, radius_m).is_some()
+            }
+            Shape::Csg(csg) => self.finger_radius_m == 0.0 && csg.is_inside(&self.cone.hip_B),
             _ => self.of_surface(|surface| surface.signed_distance(&self.cone.hip_B) <= 0.0).unwrap_or(false),
         }
     }
 
     /// The surface point nearest to the HIP; `None` if a finger of this size cannot feel the shape.
+    ///
+    /// Where very many faces of a mesh are about as near, as at the centre of a ball, it is on one of these: not
+    /// necessarily on the very nearest, which no tick has the time to find.
     pub fn nearest(&self) -> Option<SurfacePoint> {
         let hip_B = &self.cone.hip_B;
         match self.shape {
-            Shape::Mesh(mesh) => (self.finger_radius_m == 0.0).then(|| nearest_of_mesh(mesh, hip_B)),
+            Shape::Mesh(mesh) => {
+                let at = nearest_of_mesh(mesh, hip_B);
+                Some(SurfacePoint { point_B: at.point_B + at.normal_B * self.finger_radius_m, ..at })
+            }
             _ => self.of_surface(|surface| surface.nearest(hip_B)),
         }
     }
 
-    /// Where the HIP's last step entered the material first.
+    /// Where the HIP's last step entered the material first; `None` for a finger with a radius and a mesh.
     pub fn entry(&self) -> Option<SurfacePoint> {
         let (from_B, to_B) = (self.previous_hip_B?, self.cone.hip_B);
         match self.shape {
@@ -100,7 +112,7 @@ impl TouchInput<'_> {
         }
     }
 
-    /// Asks the surface on which the finger's centre rolls; `None` for a mesh, and if it cannot feel the shape.
+    /// Asks the surface on which the finger's centre rolls; `None` for a mesh or a tree of shapes, and if it cannot feel the shape.
     pub fn of_surface<R>(&self, ask: impl FnOnce(&dyn Surface) -> R) -> Option<R> {
         match self.shape {
             Shape::Form(form) if self.finger_radius_m == 0.0 => Some(ask(form)),
@@ -121,14 +133,14 @@ impl TouchInput<'_> {
 
 /// Its normal is the face's; on edges and vertices that of the shortest way through the surface.
 fn nearest_of_mesh(mesh: &Mesh, hip_B: &Vector3<f64>) -> SurfacePoint {
-    let nearest = mesh.nearest(hip_B);
+    let (nearest, is_inside) = mesh.nearest_and_side(hip_B);
     let face_normal_B = mesh.faces()[nearest.face as usize].normal_B;
     let way_B = nearest.point_B - hip_B;
     // So close to the surface that the way is mostly rounding.
     let is_on_it = nearest.distance_m.is_nan() || nearest.distance_m <= 1e-9 * mesh.extent_m();
     let normal_B = if is_on_it || nearest.feature == Feature::Face || nearest.distance_m.is_infinite() {
         face_normal_B
-    } else if mesh.is_inside(hip_B) {
+    } else if is_inside {
         way_B / nearest.distance_m
     } else {
         -way_B / nearest.distance_m

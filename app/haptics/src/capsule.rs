@@ -5,7 +5,9 @@
 //! Invariant: points it returns lie at the radius from the axis to rounding. Cost: a square root per question.
 
 use nalgebra::Vector3;
+use std::f64::consts::PI;
 
+use crate::chart::Chart;
 use crate::convex::{Level, direction_or, first_entry};
 use crate::error::{ParameterError, above_zero, at_least_zero};
 use crate::surface::{Feature, Surface, SurfacePoint};
@@ -69,6 +71,13 @@ impl Surface for Capsule {
 
     fn tangent_offset(&self, at: &SurfacePoint) -> f64 {
         self.half_length_m * at.normal_B.y.abs() + self.radius_m
+    }
+
+    fn chart(&self, at: &SurfacePoint) -> Option<Chart> {
+        let latitude = at.normal_B.y.atan2(at.normal_B.x.hypot(at.normal_B.z));
+        let along_m = at.point_B.y.clamp(-self.half_length_m, self.half_length_m) + self.radius_m * latitude;
+        let length_m = self.length_m() + PI * self.radius_m;
+        Some(Chart::revolved(at, self.radius_m, along_m, length_m, false))
     }
 
     fn grown(&self, radius_m: f64) -> Option<Self> {

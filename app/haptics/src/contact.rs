@@ -16,13 +16,16 @@ use crate::classic_god_object::ClassicGodObject;
 use crate::csg::CsgCone;
 use crate::entity::Entity;
 use crate::frame::{is_finite, point_into_body, point_into_world, vector_into_body, vector_into_world};
+use crate::friction::Friction;
 use crate::friction_cone::{ConeInput, FrictionCone};
 use crate::friction_law::FrictionState;
+use crate::height_map::Over;
 use crate::hip::Hip;
 use crate::mesh::{Beginning, Mesh, MeshCone, RollingCone};
 use crate::nurbs::NurbsCone;
 use crate::shape::Shape;
 use crate::surface::{Feature, Surface};
+use crate::touch_points::TouchPoints;
 use crate::vector_field::VectorField;
 
 /// What a finger feels of one entity in one tick, in the world frame.
@@ -67,16 +70,21 @@ pub(crate) struct Sweep<'h> {
 }
 
 /// A finger's place for one entity.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Slot {
     cone: Option<FrictionCone>,
     mesh: MeshCone,
-    rolling: RollingCone,
+    /// Of a ball; large, and points have none.
+    rolling: Option<Box<RollingCone>>,
     csg: CsgCone,
     nurbs: NurbsCone,
     own: ContactMemory,
+    /// Whether anything was noted here since it was new.
+    is_used: bool,
     /// How much of the force is rendered, 0 to 1.
     strength: f64,
+    /// Inside, but above a dent of the entity's height map: nothing is felt, and nothing begins anew.
+    hovers: bool,
     pub(crate) contact: Option<Contact>,
 }
 
@@ -86,21 +94,66 @@ pub const RAMP_IN_S: f64 = 0.1;
 
 impl Slot {
     pub(crate) fn step(&mut self, index: usize, entity: &Entity, sweep: &Sweep<'_>) -> Option<&Contact> {
+        self.is_used = true;
         self.contact = self.touch(index, entity, sweep);
-        if self.contact.is_none() {
+        if !self.has_met() {
             self.cone = None;
             self.mesh.let_go();
-            self.rolling.let_go();
+            self.let_roll_go();
             self.csg.let_go();
             self.nurbs.let_go();
         }
         self.contact.as_ref()
     }
 
+    /// For a finger of this radius.
+    pub(crate) fn new(finger_radius_m: f64) -> Self {
+        let rolling = (finger_radius_m > 0.0).then(Box::default);
+        Self { rolling, ..Self::default() }
+    }
+
+    /// Forgets everything, if there is anything to forget.
+    pub(crate) fn vacate(&mut self) {
+        if self.is_used {
+            let mut rolling = self.rolling.take();
+            if let Some(rolling) = &mut rolling {
+                **rolling = RollingCone::default();
+            }
+            *self = Self { rolling, ..Self::default() };
+        }
+    }
+
+    fn let_roll_go(&mut self) {
+        if let Some(rolling) = &mut self.rolling {
+            rolling.let_go();
+        }
+    }
+
+    /// Where the finger touches the entity, in this tick.
+    pub(crate) fn touch_points(&self, entity: &Entity, finger_radius_m: f64) -> TouchPoints {
+        let Some(contact) = &self.contact else { return TouchPoints::NONE };
+        let rolls = self.rolling.as_ref().filter(|rolling| rolling.is_touching());
+        match rolls {
+            Some(rolling) => TouchPoints::of_shares(rolling.shares(), entity, contact, self.strength),
+            None => TouchPoints::single(contact, finger_radius_m),
+        }
+    }
+
+    /// Whether it goes on from the last tick.
+    fn has_met(&self) -> bool {
+        self.contact.is_some() || self.hovers
+    }
+
+    /// Nothing touches.
+    fn part(&mut self) -> Option<Contact> {
+        self.hovers = false;
+        None
+    }
+
     fn touch(&mut self, index: usize, entity: &Entity, sweep: &Sweep<'_>) -> Option<Contact> {
         let hip_B = point_into_body(&entity.X_WB, &sweep.hip.position_W);
         if !is_finite(&hip_B) {
-            return None;
+            return self.part();
         }
         let previous_B = sweep.previous_hip_W.map(|p_W| point_into_body(&entity.previous_X_WB, &p_W));
         let previous_B = previous_B.filter(is_finite);
@@ -117,22 +170,30 @@ impl Slot {
             damping_n_s_per_m: entity.damping_n_s_per_m,
             dt_s: sweep.dt_s,
         };
+        let lift_m = match &entity.height_map {
+            Some(height_map) => height_map.lift_m(&entity.shape, sweep.finger_radius_m),
+            None => {
+                self.hovers = false;
+                0.0
+            }
+        };
         let input = TouchInput {
-            shape: &entity.shape,
-            friction: &entity.friction,
-            finger_radius_m: sweep.finger_radius_m,
+            shape: entity.shape_for(sweep.finger_radius_m),
+            // Above a dent nothing holds the god-object back.
+            friction: if self.hovers { &Friction::None } else { &entity.friction },
+            finger_radius_m: sweep.finger_radius_m + lift_m,
             previous_hip_B: previous_B,
             cone,
         };
         // Apart from the others, whose answers take as long to copy as this one to find.
-        let is_point = sweep.finger_radius_m == 0.0;
+        let is_point = input.finger_radius_m == 0.0;
         if let (Algorithm::FrictionCone, Shape::Mesh(mesh), true) =
             (&entity.algorithm, &entity.shape, is_point)
         {
-            let touch = self.touch_mesh(mesh, &input)?;
+            let Some(touch) = self.touch_mesh(mesh, &input) else { return self.part() };
             return self.feel(index, entity, touch, sweep);
         }
-        let touch = self.touch_by_any(entity, &input)?;
+        let Some(touch) = self.touch_by_any(entity, &input) else { return self.part() };
         self.feel(index, entity, touch, sweep)
     }
 
@@ -148,7 +209,8 @@ impl Slot {
 
     fn touch_by(&mut self, algorithm: &dyn ContactAlgorithm, input: &TouchInput<'_>) -> Option<Touch> {
         (self.cone, self.mesh) = (None, MeshCone::default());
-        let begins = self.contact.is_none();
+        self.let_roll_go();
+        let begins = !self.has_met();
         if begins {
             self.own = ContactMemory::default();
         }
@@ -166,7 +228,8 @@ impl Slot {
             Shape::Own(surface) if input.finger_radius_m == 0.0 => self.touch_surface(&**surface, input),
             Shape::Own(_) => input.of_surface(|grown| self.touch_surface(grown, input))?,
             Shape::Mesh(mesh) => {
-                let touched = self.rolling.update(mesh, input);
+                self.cone = None;
+                let touched = self.rolling.as_mut()?.update(mesh, input);
                 self.begun(touched)
             }
             Shape::Nurbs(nurbs) => {
@@ -201,6 +264,8 @@ impl Slot {
 
     fn touch_surface<S: Surface + ?Sized>(&mut self, surface: &S, input: &TouchInput<'_>) -> Option<Touch> {
         self.mesh.let_go();
+        self.csg.let_go();
+        self.let_roll_go();
         let distance_m = surface.signed_distance(&input.cone.hip_B);
         let cone = match &mut self.cone {
             Some(cone) => cone,
@@ -234,7 +299,7 @@ impl Slot {
         let (touch, beginning) = touched?;
         match beginning {
             Beginning::WasInside => self.strength = 0.0,
-            Beginning::Came if self.contact.is_none() => self.strength = 1.0,
+            Beginning::Came if !self.has_met() => self.strength = 1.0,
             Beginning::Came => {}
         }
         Some(touch)
@@ -251,7 +316,18 @@ impl Slot {
     ) -> Option<Contact> {
         entity.shading.turn(&entity.shape, &mut touch);
         if let Some(height_map) = &entity.height_map {
-            height_map.raise(&entity.shape, entity.stiffness_n_per_m, &mut touch);
+            let over = Over {
+                shape: &entity.shape,
+                stiffness_n_per_m: entity.stiffness_n_per_m,
+                finger_radius_m: sweep.finger_radius_m,
+                hip_B: point_into_body(&entity.X_WB, &sweep.hip.position_W),
+            };
+            self.hovers = !height_map.raise(&over, &mut touch);
+            if self.hovers {
+                // Whoever comes down from here comes from outside.
+                self.strength = 1.0;
+                return None;
+            }
         }
         if self.strength < 1.0 {
             let step = sweep.dt_s / sweep.ramp_in_s;

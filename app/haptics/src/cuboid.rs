@@ -9,6 +9,7 @@
 
 use nalgebra::Vector3;
 
+use crate::chart::Chart;
 use crate::convex::{Edged, Level, direction_or};
 use crate::error::{ParameterError, above_zero};
 use crate::surface::{Feature, Surface, SurfacePoint};
@@ -154,6 +155,16 @@ impl Surface for Cuboid {
     /// radius has gone past its middle.
     fn holds_outside(&self, at: &SurfacePoint, _depth_m: f64) -> bool {
         at.piece != ROUND
+    }
+
+    /// Each face has its own; round edges share that of the face they look most like.
+    fn chart(&self, at: &SurfacePoint) -> Option<Chart> {
+        let axis = if at.piece == ROUND { at.normal_B.iamax() } else { axis(at.piece) };
+        let mut normal_B = Vector3::zeros();
+        normal_B[axis] = at.normal_B[axis].signum();
+        let [x_m, y_m, z_m] = self.size_m();
+        let lengths_m = [[z_m, y_m], [x_m, z_m], [x_m, y_m]][axis];
+        Some(Chart::flat(&at.point_B, &normal_B, lengths_m))
     }
 
     fn grown(&self, radius_m: f64) -> Option<Self> {

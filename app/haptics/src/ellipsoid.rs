@@ -15,6 +15,7 @@
 
 use nalgebra::Vector3;
 
+use crate::chart::Chart;
 use crate::convex::{Level, direction_or, first_entry};
 use crate::error::{ParameterError, above_zero};
 use crate::surface::{Feature, Surface, SurfacePoint};
@@ -183,6 +184,15 @@ impl Surface for Ellipsoid {
         let mean = h.powi(3) * (squares.sum() - within_B.norm_squared()) / (2.0 * volume * volume);
         let sharpest = mean + (mean * mean - gauss).max(0.0).sqrt();
         (depth_m - self.layer_m) * sharpest < 1.0
+    }
+
+    /// Those of the ball that it is stretched from, along radii of mean length.
+    fn chart(&self, at: &SurfacePoint) -> Option<Chart> {
+        let direction = direction_or(&at.point_B.component_div(&self.radii_m), Vector3::y());
+        let on_ball = SurfacePoint { point_B: direction, normal_B: direction, ..*at };
+        let level_m = 0.5 * (self.radii_m.x + self.radii_m.z);
+        let along_m = [level_m, 0.5 * (level_m + self.radii_m.y)];
+        Some(Chart::of_ball(&on_ball, 1.0).stretched(&self.radii_m, along_m, &at.normal_B))
     }
 
     fn grown(&self, radius_m: f64) -> Option<Self> {

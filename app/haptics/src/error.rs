@@ -36,6 +36,17 @@ pub enum ParameterError {
         /// What is allowed, in words.
         allowed: &'static str,
     },
+    /// A value above what is stable or can be rendered.
+    AboveLimit {
+        /// Name of the parameter, with its unit.
+        parameter: &'static str,
+        /// What was found.
+        value: f64,
+        /// The largest that is allowed.
+        limit: f64,
+        /// Where that comes from, in words.
+        limit_is: &'static str,
+    },
     /// A vector that should give a direction has no usable length.
     NoDirection {
         /// Name of the parameter.
@@ -56,6 +67,9 @@ impl fmt::Display for ParameterError {
             }
             Self::CurvePoint { index, speed_m_s, mu, allowed } => {
                 write!(f, "point {index} of the curve is ({speed_m_s} m/s, {mu}); allowed are {allowed}")
+            }
+            Self::AboveLimit { parameter, value, limit, limit_is } => {
+                write!(f, "{parameter} is {value}; allowed is at most {limit:.4}, {limit_is}")
             }
             Self::NoDirection { parameter, value: [x, y, z] } => {
                 write!(f, "{parameter} is [{x}, {y}, {z}]; allowed is a finite vector that is not zero")

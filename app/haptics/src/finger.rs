@@ -18,6 +18,7 @@ use crate::frame::is_finite;
 use crate::friction_law::FrictionState;
 use crate::hip::Hip;
 use crate::surface::Feature;
+use crate::touch_points::TouchPoints;
 
 /// A finger and its contacts.
 #[derive(Debug, Clone)]
@@ -55,6 +56,8 @@ impl From<FrictionState> for ContactState {
 pub struct FingerOutput {
     /// Force the device renders \[N\], over all contacts.
     pub force_on_user_W: Vector3<f64>,
+    /// Torque of the same forces about the centre of the finger \[N m\], over all contacts; zero for a point.
+    pub torque_on_user_W: Vector3<f64>,
     /// God-object of the primary contact; the HIP in free space \[m\].
     pub god_object_W: Vector3<f64>,
     /// Index of the primary contact's entity.
@@ -70,12 +73,13 @@ impl Finger {
     ///
     /// Entities beyond the capacity are not felt. Errors: a radius not finite or negative.
     pub fn new(radius_m: f64, capacity: usize) -> Result<Self, ParameterError> {
+        let radius_m = at_least_zero("radius_m", radius_m)?;
         Ok(Self {
-            radius_m: at_least_zero("radius_m", radius_m)?,
+            radius_m,
             ramp_in_s: RAMP_IN_S,
             previous_hip_W: None,
             last_finite_hip_W: Vector3::zeros(),
-            slots: vec![Slot::default(); capacity].into(),
+            slots: (0..capacity).map(|_| Slot::new(radius_m)).collect(),
         })
     }
 
@@ -133,11 +137,14 @@ impl Finger {
         for (index, (slot, entity)) in self.slots.iter_mut().zip(entities).enumerate() {
             if let Some(contact) = slot.step(index, entity, &sweep) {
                 total.add(contact);
+                if self.radius_m > 0.0 {
+                    total.turn(slot, entity, self.radius_m);
+                }
             }
         }
         // Entities that are gone take their contacts along.
         for slot in self.slots.iter_mut().skip(entities.len()) {
-            *slot = Slot::default();
+            slot.vacate();
         }
         total.output(&self.slots, hip_W)
     }
@@ -152,17 +159,27 @@ impl Finger {
         self.slots.get(entity)?.contact.as_ref()
     }
 
+    /// Where the finger touched this entity in the last tick, which must be as it was then.
+    ///
+    /// A ball in a groove or a corner touches it at two or three points; together they make the contact's force.
+    pub fn touch_points(&self, entities: &[Entity], entity: usize) -> TouchPoints {
+        match (self.slots.get(entity), entities.get(entity)) {
+            (Some(slot), Some(entity)) => slot.touch_points(entity, self.radius_m),
+            _ => TouchPoints::NONE,
+        }
+    }
+
     /// Ends the contact with one entity, because it is gone or another one has its index.
     pub fn forget(&mut self, entity: usize) {
         if let Some(slot) = self.slots.get_mut(entity) {
-            *slot = Slot::default();
+            slot.vacate();
         }
     }
 
     /// Ends all contacts and forgets where the finger was: the next step is a first one.
     pub fn reset(&mut self) {
         self.previous_hip_W = None;
-        self.slots.fill(Slot::default());
+        self.slots.iter_mut().for_each(Slot::vacate);
     }
 }
 
@@ -170,6 +187,7 @@ impl Finger {
 #[derive(Default)]
 struct Total {
     force_on_user_W: Vector3<f64>,
+    torque_on_user_W: Vector3<f64>,
     /// Square of the largest force, and whose it is.
     primary: Option<(f64, usize)>,
 }
@@ -183,14 +201,25 @@ impl Total {
         }
     }
 
+    #[inline(never)]
+    fn turn(&mut self, slot: &Slot, entity: &Entity, radius_m: f64) {
+        if let Some(contact) = &slot.contact {
+            let points = slot.touch_points(entity, radius_m);
+            self.torque_on_user_W += points.torque_on_user_about_W(&contact.god_object_W);
+        }
+    }
+
     fn output(&self, slots: &[Slot], hip_W: &Vector3<f64>) -> FingerOutput {
         let primary = self.primary.and_then(|(_, entity)| slots[entity].contact.as_ref());
         let Some(primary) = primary else { return free(*hip_W) };
         // Finite forces can overflow in the sum; zero is the safe one.
         let force_on_user_W =
             if is_finite(&self.force_on_user_W) { self.force_on_user_W } else { Vector3::zeros() };
+        let torque_on_user_W =
+            if is_finite(&self.torque_on_user_W) { self.torque_on_user_W } else { Vector3::zeros() };
         FingerOutput {
             force_on_user_W,
+            torque_on_user_W,
             god_object_W: primary.god_object_W,
             entity: Some(primary.entity),
             feature: primary.feature,
@@ -202,6 +231,7 @@ impl Total {
 fn free(hip_W: Vector3<f64>) -> FingerOutput {
     FingerOutput {
         force_on_user_W: Vector3::zeros(),
+        torque_on_user_W: Vector3::zeros(),
         god_object_W: hip_W,
         entity: None,
         feature: Feature::None,

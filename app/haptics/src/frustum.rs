@@ -12,6 +12,7 @@
 
 use nalgebra::Vector3;
 
+use crate::chart::Chart;
 use crate::convex::{Edged, Level, around_y, direction_or};
 use crate::error::{ParameterError, above_zero, at_least_zero};
 use crate::surface::{Feature, Surface, SurfacePoint};
@@ -270,6 +271,17 @@ impl Surface for Frustum {
         }
     }
 
+    /// Caps have their own, rims that of the side.
+    fn chart(&self, at: &SurfacePoint) -> Option<Chart> {
+        if matches!(at.piece, TOP | BOTTOM) {
+            let lengths_m = [2.0 * self.radius_of_cap(at.piece); 2];
+            return Some(Chart::flat(&at.point_B, &cap_normal(at.piece), lengths_m));
+        }
+        let radius_m = self.radius_bottom_m.max(self.radius_top_m);
+        let [along_m, length_m] = [at.point_B.y, 2.0 * self.half_length_m].map(|y_m| y_m / self.normal_rho);
+        Some(Chart::revolved(at, radius_m, along_m, length_m, false))
+    }
+
     fn grown(&self, radius_m: f64) -> Option<Self> {
         Some(Self { rounding_m: self.rounding_m + radius_m, ..*self })
     }
@@ -301,6 +313,10 @@ macro_rules! is_a_frustum {
 
             fn holds_outside(&self, at: &SurfacePoint, depth_m: f64) -> bool {
                 self.0.holds_outside(at, depth_m)
+            }
+
+            fn chart(&self, at: &SurfacePoint) -> Option<crate::chart::Chart> {
+                self.0.chart(at)
             }
 
             fn grown(&self, radius_m: f64) -> Option<Self> {

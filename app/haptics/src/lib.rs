@@ -31,6 +31,7 @@
 
 mod algorithm;
 mod capsule;
+mod chart;
 mod classic_god_object;
 mod cone;
 mod constraints;
@@ -39,6 +40,7 @@ mod convex;
 mod csg;
 mod cuboid;
 mod cylinder;
+mod effects;
 mod ellipsoid;
 mod entity;
 mod error;
@@ -51,8 +53,10 @@ mod frustum;
 mod grip;
 mod height_map;
 mod hip;
+mod material;
 pub mod mesh;
 pub mod nurbs;
+pub mod passivity;
 mod plane;
 mod quartic;
 mod scaled;
@@ -63,17 +67,24 @@ mod slide;
 mod sphere;
 mod surface;
 mod tangent_view;
+mod tessellated;
 mod torus;
+mod touch_points;
 mod vector_field;
 
 pub use algorithm::{Algorithm, CONTACT_WORDS, ContactAlgorithm, ContactMemory, Touch, TouchInput};
 pub use capsule::Capsule;
+pub use chart::{Chart, Coordinate, POLE_SHARE};
 pub use classic_god_object::ClassicGodObject;
 pub use cone::Cone;
 pub use contact::{Contact, RAMP_IN_S};
-pub use csg::Csg;
+pub use csg::{Csg, CsgError, CsgOp, CsgPart, CsgTree, MAX_DEPTH, MAX_LEAVES, PartShape};
 pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
+pub use effects::{
+    Effects, Field, FieldKind, FingerEffects, Guide, HYSTERESIS_M, Limits, MAX_PATH_POINTS, MOST_FORCE_N,
+    Magnetism, Moment, Region, Track, Vibration,
+};
 pub use ellipsoid::{Ellipsoid, LARGEST_RATIO};
 pub use entity::Entity;
 pub use error::ParameterError;
@@ -84,16 +95,20 @@ pub use friction::{
 };
 pub use friction_cone::{ConeForce, ConeInput, FrictionCone};
 pub use friction_law::{FrictionLaw, FrictionMemory, FrictionQuery, FrictionState, MEMORY_WORDS};
-pub use height_map::HeightMap;
+pub use height_map::{
+    Border, HeightForm, HeightGrid, HeightMap, HeightMapError, MAX_GRID_SIDE, PictureScale,
+};
 pub use hip::Hip;
+pub use material::Material;
 pub use nurbs::{Nurbs, NurbsError, NurbsPatch, NurbsReport};
 pub use plane::Plane;
 pub use scaled::Scaled;
-pub use shading::Shading;
+pub use shading::{BoxRegions, Regions, Shading, ShadingForm};
 pub use shape::{Form, OwnSurface, Shape};
 pub use shared::Shared;
 pub use slide::MAX_SLIDE_ROUNDS;
 pub use sphere::Sphere;
 pub use surface::{Feature, Surface, SurfacePoint};
 pub use torus::Torus;
+pub use touch_points::{MAX_TOUCH_POINTS, TouchPoint, TouchPoints};
 pub use vector_field::VectorField;

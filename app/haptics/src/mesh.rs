@@ -32,6 +32,7 @@ mod facing;
 mod fan;
 pub mod make;
 mod mesh_cone;
+mod normals;
 mod order;
 mod pinch;
 mod place;
@@ -43,20 +44,26 @@ mod sliver;
 mod soup;
 mod topology;
 mod touching;
+mod uv;
 mod walk;
 mod winding;
 
+#[cfg(test)]
+pub(crate) use bvh::POPPED;
 pub use bvh::{Bvh, Hit, Nearest, Triangles};
 pub use error::MeshError;
 pub use face::{Face, Link};
 pub use mesh_cone::{Beginning, MeshCone};
+pub use normals::{SHARPEST_CREASE_RAD, VertexNormals};
 pub use report::{Finding, MeshReport};
-pub(crate) use rolling::RollingCone;
+pub(crate) use rolling::{RollingCone, Share};
 pub use soup::TriangleSoup;
+pub use uv::CornerUv;
 pub use walk::MAX_FEATURE_CHANGES;
 
 use nalgebra::Vector3;
 use std::fmt;
+use uv::FaceUv;
 
 /// The most faces around a vertex: a walk goes round it within a tick.
 pub const MAX_VALENCE: u32 = 16_384;
@@ -70,6 +77,8 @@ pub struct Mesh {
     extent_m: f64,
     /// Of all meshes that this process has built, which. An address would be another mesh's as soon as this one is gone.
     identity: u64,
+    /// Texture coordinates of each face's corners, where somebody gave any: 24 bytes a face beside its 64.
+    uv: Option<Box<[FaceUv]>>,
 }
 
 /// From where a mesh can be felt.

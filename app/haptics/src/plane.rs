@@ -6,6 +6,7 @@
 
 use nalgebra::Vector3;
 
+use crate::chart::Chart;
 use crate::error::{ParameterError, finite};
 use crate::surface::{Feature, Surface, SurfacePoint};
 
@@ -78,6 +79,11 @@ impl Surface for Plane {
 
     fn tangent_offset(&self, _at: &SurfacePoint) -> f64 {
         self.offset_m
+    }
+
+    /// From the foot of B's origin.
+    fn chart(&self, at: &SurfacePoint) -> Option<Chart> {
+        Some(Chart::flat(&at.point_B, &self.normal_B, [f64::INFINITY; 2]))
     }
 
     fn grown(&self, radius_m: f64) -> Option<Self> {

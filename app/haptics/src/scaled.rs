@@ -17,6 +17,7 @@
 use nalgebra::Vector3;
 
 use crate::capsule::Capsule;
+use crate::chart::Chart;
 use crate::cone::Cone;
 use crate::convex::direction_or;
 use crate::cuboid::Cuboid;
@@ -44,6 +45,18 @@ enum Unscaled {
     Cone(Cone),
     Torus(Torus),
     Capsule(Capsule),
+}
+
+impl Unscaled {
+    /// No point of the shape is farther from the origin \[m\].
+    fn reach_m(&self) -> f64 {
+        match self {
+            Self::Cylinder(c) => c.radius_m() + c.length_m(),
+            Self::Cone(c) => c.radius_bottom_m().max(c.radius_top_m()) + c.length_m(),
+            Self::Torus(t) => t.ring_radius_m() + t.tube_radius_m(),
+            Self::Capsule(c) => c.radius_m() + c.length_m(),
+        }
+    }
 }
 
 /// Slides that the search for the nearest point begins.
@@ -145,9 +158,10 @@ impl Scaled {
     /// Along each axis from outside towards the point, where that path enters.
     fn seen_from(&self, side: usize, point_B: &Vector3<f64>) -> Option<SurfacePoint> {
         let mut away_B = Vector3::zeros();
-        let reach_m = self.nearest_unscaled(point_B).point_B.norm() + point_B.norm() + self.factors.max();
+        // Outside, even if the point lies at the far end.
+        let reach_m = 2.0 * (self.unscaled.reach_m() * self.factors.max() + point_B.norm());
         away_B[side / 2] = if side.is_multiple_of(2) { reach_m } else { -reach_m };
-        self.entry(&(point_B + away_B * 4.0), point_B)
+        self.entry(&(point_B + away_B), point_B)
     }
 
     fn nearest_unscaled(&self, point_B: &Vector3<f64>) -> SurfacePoint {
@@ -214,6 +228,16 @@ impl Surface for Scaled {
         a > 0.0 && b > 0.0 && a * b > mixed * mixed
     }
 
+    fn chart(&self, at: &SurfacePoint) -> Option<Chart> {
+        let chart = self.surface().chart(&self.unscaled_point(at))?;
+        let level = 0.5 * (self.factors.x + self.factors.z);
+        let upward = match self.unscaled {
+            Unscaled::Cylinder(_) | Unscaled::Cone(_) => self.factors.y,
+            Unscaled::Torus(_) | Unscaled::Capsule(_) => 0.5 * (level + self.factors.y),
+        };
+        Some(chart.stretched(&self.factors, [level, upward], &at.normal_B))
+    }
+
     fn grown(&self, _radius_m: f64) -> Option<Self> {
         None
     }
@@ -277,6 +301,31 @@ mod tests {
         assert!((at.point_B - hip).cross(&at.normal_B).norm() < 1e-14);
         assert!(((at.point_B.x / 0.045).powi(2) + (at.point_B.z / 0.015).powi(2) - 1.0).abs() < 1e-15);
         assert!((printed - hip).norm() > 1.2 * (at.point_B - hip).norm(), "{printed} {at:?}");
+    }
+
+    #[test]
+    fn a_point_inside_is_seen_from_all_six_sides_and_from_metres_or_millimetres_alike() {
+        // Slender, small and large ones; a length that is 1 only if lengths are metres would show.
+        type FormOfSize = fn(f64) -> Form;
+        let forms: [(FormOfSize, [f64; 3]); 4] = [
+            (|s| Cylinder::new(0.002 * s, 0.5 * s).unwrap().into(), [0.0, 0.2, 0.0]),
+            (|s| Cone::new(0.01 * s, 0.002 * s, 0.4 * s).unwrap().into(), [0.0, 0.1, 0.0]),
+            (|s| Capsule::new(0.002 * s, 0.5 * s).unwrap().into(), [0.001, -0.2, 0.0]),
+            (|s| Torus::new(0.3 * s, 0.01 * s).unwrap().into(), [-0.3, 0.002, 0.0]),
+        ];
+        for (form, inside) in forms {
+            let at = |s: f64| match Scaled::new(form(s), [1.5 / s, 1.0 / s, 0.5 / s]).unwrap() {
+                Form::Scaled(scaled) => {
+                    let inside = Vector3::from(inside).component_mul(&Vector3::new(1.5, 1.0, 0.5));
+                    (0..6).map(|side| scaled.seen_from(side, &inside).expect("inside").point_B).collect()
+                }
+                other => panic!("{other:?}"),
+            };
+            let metres: Vec<Vector3<f64>> = at(1.0);
+            // In units a thousandth as long, with factors of 1e-3; powers of two, so that no bit changes.
+            assert_eq!(metres, at(1024.0), "{metres:?}");
+            assert_eq!(metres, at(1.0 / 1024.0), "{metres:?}");
+        }
     }
 
     #[test]

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use crate::capsule::Capsule;
+use crate::chart::Chart;
 use crate::cone::Cone;
 use crate::csg::Csg;
 use crate::cuboid::Cuboid;
@@ -85,9 +86,24 @@ impl Shape {
         let is_point = finger_radius_m == 0.0;
         match self {
             Self::Form(form) => is_point || form.grown(finger_radius_m).is_some(),
-            Self::Mesh(_) | Self::Csg(_) => is_point,
+            Self::Mesh(_) => true,
+            Self::Csg(_) => is_point,
             Self::Nurbs(_) => finger_radius_m >= 0.0,
             Self::Own(surface) => is_point || surface.show_grown(finger_radius_m, &mut |_| {}),
+        }
+    }
+}
+
+/// Where a picture lies on it.
+impl Shape {
+    /// Coordinates along the surface at one of its points; `None` where there are none: on trees of shapes, on meshes
+    /// without texture coordinates and on own surfaces that tell none.
+    pub fn chart(&self, at: &SurfacePoint) -> Option<Chart> {
+        match self {
+            Self::Form(form) => form.chart(at),
+            Self::Mesh(mesh) => mesh.chart(at.piece, &at.point_B),
+            Self::Own(surface) => surface.chart(at),
+            _ => None,
         }
     }
 }
@@ -148,6 +164,10 @@ macro_rules! forms {
 
             fn holds_outside(&self, at: &SurfacePoint, depth_m: f64) -> bool {
                 match self { $(Self::$form(form) => form.holds_outside(at, depth_m)),* }
+            }
+
+            fn chart(&self, at: &SurfacePoint) -> Option<Chart> {
+                match self { $(Self::$form(form) => form.chart(at)),* }
             }
 
             fn grown(&self, radius_m: f64) -> Option<Self> {

@@ -117,18 +117,18 @@ pub(crate) fn slide<S: Surface + ?Sized, L: FrictionLaw + ?Sized>(
 }
 
 /// One look at the contact during a slide.
-struct Round {
-    view: TangentView,
+pub(crate) struct Round {
+    pub(crate) view: TangentView,
     /// Against the motion, in the tangent plane.
-    direction_B: Vector3<f64>,
-    gap_m: f64,
+    pub(crate) direction_B: Vector3<f64>,
+    pub(crate) gap_m: f64,
     /// What the law still asks for, signed.
-    asked_m: f64,
+    pub(crate) asked_m: f64,
 }
 
 impl Round {
     /// `back_B` leads from the god-object to where it was when the tick began.
-    fn new(
+    pub(crate) fn new(
         view: TangentView,
         direction_before_B: &Vector3<f64>,
         asked: impl Fn(&FrictionQuery) -> f64,
@@ -147,12 +147,12 @@ impl Round {
     ///
     /// A gap of zero does move: onto S, which is where the frictionless god-object belongs even
     /// if the HIP only went deeper.
-    fn is_inside_the_circle(&self) -> bool {
+    pub(crate) fn is_inside_the_circle(&self) -> bool {
         self.asked_m < 0.0 || (self.asked_m == 0.0 && self.gap_m > 0.0) || self.asked_m.is_nan()
     }
 
     /// The point of the tangent plane `step_m` closer to S.
-    fn target_B(&self, step_m: f64) -> Vector3<f64> {
+    pub(crate) fn target_B(&self, step_m: f64) -> Vector3<f64> {
         let radius_m = self.gap_m - step_m;
         if radius_m == 0.0 {
             return self.view.surface_point_B;
@@ -163,9 +163,12 @@ impl Round {
 
     /// The force belongs to the rim that the law asks for; what is left to slide is rounding, or the debt of a search
     /// that met its bound, and must not leave the friction cone, nor pull along with the motion.
+    pub(crate) fn rim_B(&self) -> Vector3<f64> {
+        self.direction_B * (self.gap_m - self.asked_m).max(0.0)
+    }
+
     fn arrived(&self, rounds: u32) -> Slid {
-        let radius_m = (self.gap_m - self.asked_m).max(0.0);
-        Slid { view: self.view, tangential_B: self.direction_B * radius_m, rounds }
+        Slid { view: self.view, tangential_B: self.rim_B(), rounds }
     }
 }
 
@@ -174,7 +177,7 @@ impl Round {
 /// After a change of sign this interpolates, so the step stays within the last one. Where the
 /// residual grew although the step was right (past the steepest point of a sphere, seen from deep
 /// inside) the steps double instead.
-struct Secant {
+pub(crate) struct Secant {
     /// Slide asked for and step made, one round ago.
     last: Option<(f64, f64)>,
     gain: f64,
@@ -189,7 +192,7 @@ impl Default for Secant {
 impl Secant {
     /// Next step. It exceeds both the slide asked for and the depth, which stands for the size of
     /// the surroundings, never: a slope taken from noise must not fling the god-object away.
-    fn step(&mut self, asked_m: f64, depth_m: f64) -> f64 {
+    pub(crate) fn step(&mut self, asked_m: f64, depth_m: f64) -> f64 {
         if let Some((asked_before_m, step_m)) = self.last.take() {
             let slope = (asked_before_m - asked_m) / step_m;
             self.gain = if slope > f64::MIN_POSITIVE { 1.0 / slope } else { 2.0 * self.gain };
@@ -199,7 +202,7 @@ impl Secant {
     }
 
     /// The step that was really made; before it, `step` answers the same again.
-    fn made(&mut self, asked_m: f64, step_m: f64) {
+    pub(crate) fn made(&mut self, asked_m: f64, step_m: f64) {
         self.last = Some((asked_m, step_m));
     }
 }

@@ -9,6 +9,7 @@
 
 use nalgebra::Vector3;
 
+use crate::chart::Chart;
 use crate::error::{ParameterError, above_zero};
 use crate::surface::{Feature, Surface, SurfacePoint, direction_or_up};
 
@@ -74,6 +75,10 @@ impl Surface for Sphere {
     fn tangent_offset(&self, _at: &SurfacePoint) -> f64 {
         //= melder#4.11
         self.radius_m
+    }
+
+    fn chart(&self, at: &SurfacePoint) -> Option<Chart> {
+        Some(Chart::of_ball(at, self.radius_m))
     }
 
     fn grown(&self, radius_m: f64) -> Option<Self> {

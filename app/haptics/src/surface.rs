@@ -11,6 +11,8 @@
 
 use nalgebra::Vector3;
 
+use crate::chart::Chart;
+
 /// What kind of surface piece a god-object rests on; of a finger with a radius, what the finger touches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Feature {
@@ -79,6 +81,12 @@ pub trait Surface {
     fn holds_outside(&self, at: &SurfacePoint, depth_m: f64) -> bool {
         let _ = (at, depth_m);
         false
+    }
+
+    /// Coordinates along the surface at one of its points; `None` if it has none, and no picture can lie on it.
+    fn chart(&self, at: &SurfacePoint) -> Option<Chart> {
+        let _ = at;
+        None
     }
 
     /// The surface on which the centre of a ball of radius `radius_m` rolls: a spherical finger

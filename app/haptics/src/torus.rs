@@ -8,11 +8,13 @@
 //! middle line the normal is +y. Signed distances are exact everywhere.
 //! Invariants: the ring is wider than the tube is thick, so that there is a hole: otherwise the surface would meet
 //! itself in a dimple where no single normal exists. That holds for grown tori, too: a ball that does not fit through
-//! the hole cannot feel this shape.
+//! the hole feels this shape in triangles ([`crate::Entity::prepared_for`]).
 //! Cost: two square roots per question; an entry near enough to be possible solves a quartic.
 
 use nalgebra::Vector3;
+use std::f64::consts::TAU;
 
+use crate::chart::Chart;
 use crate::convex::around_y;
 use crate::error::{ParameterError, above_zero};
 use crate::quartic::first_fall_below_zero;
@@ -127,6 +129,12 @@ impl Surface for Torus {
 
     fn tangent_offset(&self, at: &SurfacePoint) -> f64 {
         at.normal_B.dot(&self.middle(&at.point_B)) + self.tube_radius_m
+    }
+
+    fn chart(&self, at: &SurfacePoint) -> Option<Chart> {
+        let out = at.normal_B.dot(&around_y(&at.point_B).1);
+        let along_m = self.tube_radius_m * at.normal_B.y.atan2(out);
+        Some(Chart::revolved(at, self.ring_radius_m, along_m, TAU * self.tube_radius_m, true))
     }
 
     fn grown(&self, radius_m: f64) -> Option<Self> {

@@ -79,6 +79,31 @@ fn bristles_are_random_but_the_same_in_every_run() {
 }
 
 #[test]
+fn bristles_of_two_fingers_do_not_rasp_in_step() {
+    let law = Friction::bristle(MU_D, 8, 1).unwrap();
+    let ratios = |from: f64, step: f64, depth: f64| -> Vec<f64> {
+        let ticks = along(&law, (0..4000).map(|i| (from + f64::from(i) * step, depth)));
+        ticks.iter().skip(1000).map(|tick| tick.0).collect()
+    };
+    let correlation = |one: &[f64], other: &[f64]| {
+        let of = |a: &[f64], b: &[f64]| -> f64 {
+            let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
+            a.iter().zip(b).map(|(x, y)| (x - mean(a)) * (y - mean(b))).sum()
+        };
+        of(one, other) / (of(one, one) * of(other, other)).sqrt()
+    };
+    let one = ratios(0.0, 1e-5, DEPTH);
+    // As fast and a thousandth deeper, or as deep and a thousandth faster.
+    for other in [ratios(0.0, 1e-5, DEPTH * 1.001), ratios(0.0, 1.001e-5, DEPTH)] {
+        // 3000 ticks are some 27 lives of each of 8 bonds: uncorrelated within 1 / sqrt(27), three times that.
+        let together = correlation(&one, &other);
+        assert!(together.abs() < 0.6, "{together}");
+    }
+    // Elsewhere, under the same circumstances, it is the same contact.
+    assert!(correlation(&one, &ratios(0.3, 1e-5, DEPTH)) > 0.999);
+}
+
+#[test]
 fn bristles_that_never_slid_snap_together_at_one_and_a_half_times_the_mean() {
     let ticks =
         along(&Friction::bristle(MU_D, 20, 3).unwrap(), at_depth((0..2300).map(|i| f64::from(i) * 1e-6)));

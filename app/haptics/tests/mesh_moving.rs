@@ -62,7 +62,7 @@ fn is_inside(mesh: &Mesh, p: &Vector3<f64>) -> bool {
     if p.amax() > mesh.extent_m() {
         return false;
     }
-    if mesh.faces().len() < 1000 { winding_number(mesh, p) > 0.75 } else { mesh.is_inside(p) }
+    if mesh.faces().len() < 1000 { winding_number(mesh, p) > 0.75 } else { mesh.is_inside_unbounded(p) }
 }
 
 #[test]

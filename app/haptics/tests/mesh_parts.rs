@@ -2,11 +2,13 @@
 #![allow(non_snake_case)]
 
 mod common;
+mod mesh_oracle;
 
 use common::meshes::*;
 use common::*;
 use haptics::Friction;
 use haptics::mesh::{TriangleSoup, make};
+use mesh_oracle::winding_number;
 use nalgebra::Vector3;
 
 /// Cubes of 0.1 m around the origin and around (0.1, 0.1, 0.1): they touch at one corner alone.
@@ -49,6 +51,52 @@ fn let_go_by_one_of_two_overlapping_parts_a_finger_is_felt_to_be_inside_the_othe
     let out = step(&mut finger, &cubes, &Vector3::new(0.095, 0.045, 0.04));
     assert_eq!(out.entity, Some(0));
     assert!((out.force_on_user_W - Vector3::x() * (K * 0.005)).norm() < 1e-12, "{out:?}");
+}
+
+/// One solid and another one, moved.
+fn both(one: TriangleSoup, other: &TriangleSoup, by: [f64; 3]) -> TriangleSoup {
+    let mut soup = one;
+    let first = soup.vertices.len() as u32;
+    soup.vertices.extend(other.vertices.iter().map(|v| v + Vector3::from(by)));
+    soup.faces.extend(other.faces.iter().map(|face| face.map(|v| v + first)));
+    soup
+}
+
+#[test]
+fn inside_solids_that_overlap_or_cut_through_themselves_no_finger_is_lost() {
+    let (cube, ball) = (make::cuboid([0.1; 3]), make::uv_sphere(24, 12, 0.05));
+    let beam = make::cuboid([0.02, 0.1, 0.03]);
+    for (name, soup) in [
+        ("cubes", both(cube.clone(), &cube, [0.05, 0.03, 0.04])),
+        ("balls", both(ball.clone(), &ball, [0.04, 0.01, 0.02])),
+        ("cube and ball", both(cube, &ball, [0.05, 0.02, 0.01])),
+        ("cross", both(make::cuboid([0.1, 0.02, 0.02]), &beam, [0.003, 0.001, 0.002])),
+        // Its tube is thicker than its ring is wide: one surface, which goes through itself around the axis.
+        ("spindle torus", make::torus(24, 16, 0.03, 0.05)),
+    ] {
+        let mesh = built(soup);
+        for friction in [Friction::None, Friction::Coulomb { mu: 0.5 }] {
+            let entity = touchable(&mesh, friction);
+            let (mut finger, mut roaming) = (point_finger(), Roaming::new(9, 0.09, 5e-4));
+            let (mut inside, mut last) = (0, None);
+            for tick in 0..50_000 {
+                let hip = roaming.next();
+                let out = step(&mut finger, &entity, &hip);
+                let is_inside = winding_number(&mesh, &hip) > 0.5;
+                inside += u32::from(is_inside);
+                let told = || format!("{name}, tick {tick}, {hip:?}: {out:?}");
+                assert!(out.entity.is_some() || !is_inside, "lost: {}", told());
+                // Who is outside and was free comes to touch only by a step through the surface.
+                if let Some((last_hip, false)) = last.replace((hip, out.entity.is_some()))
+                    && !is_inside
+                    && out.entity.is_some()
+                {
+                    assert!(mesh.first_hit(&last_hip, &hip).is_some(), "drawn: {}", told());
+                }
+            }
+            assert!(inside > 1500, "{name}: {inside}");
+        }
+    }
 }
 
 #[test]

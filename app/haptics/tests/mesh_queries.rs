@@ -75,7 +75,7 @@ fn the_nearest_point_is_the_one_that_looking_at_every_face_finds() {
         let mut noise = Noise(1);
         for _ in 0..1000 {
             let p = target(&mesh, &mut noise) + noise.vector(1.0) * reach(&mesh, &mut noise);
-            let (found, expected) = (mesh.nearest(&p), oracle::distance(&mesh, &p));
+            let (found, expected) = (mesh.nearest_unbounded(&p), oracle::distance(&mesh, &p));
             // Points are some 10 roundings of coordinates this large off; the oracle's regions lose two digits on
             // slivers.
             let tolerance = 1e-13 * (mesh.extent_m() + p.amax());
@@ -153,14 +153,14 @@ fn a_hit_lies_on_its_face_and_on_the_segment() {
 fn inside_is_where_the_mesh_goes_around_once() {
     for (name, mesh) in small_meshes() {
         if mesh.sides() == Sides::Sheet {
-            assert!(!mesh.is_inside(&Vector3::zeros()));
+            assert!(!mesh.is_inside_unbounded(&Vector3::zeros()));
             continue;
         }
         let mut noise = Noise(3);
         for _ in 0..1000 {
             let p = target(&mesh, &mut noise) + noise.vector(1.0) * reach(&mesh, &mut noise);
             let times = oracle::winding_number(&mesh, &p);
-            assert_eq!(mesh.is_inside(&p), times > 0.5, "{name}: {p:?} {times}");
+            assert_eq!(mesh.is_inside_unbounded(&p), times > 0.5, "{name}: {p:?} {times}");
         }
     }
 }
@@ -176,7 +176,7 @@ fn beyond_a_sharp_edge_is_outside() {
     for _ in 0..5000 {
         let p = tilt * (Vector3::z() * noise.between(-0.051, 0.051) + noise.vector(0.002));
         let times = oracle::winding_number(&mesh, &p);
-        assert_eq!(mesh.is_inside(&p), times > 0.5, "{p:?} {times}");
+        assert_eq!(mesh.is_inside_unbounded(&p), times > 0.5, "{p:?} {times}");
     }
 }
 
@@ -293,6 +293,25 @@ fn nothing_slips_through_in_steps() {
 }
 
 #[test]
+fn a_segment_that_ends_on_a_face_up_to_rounding_has_met_it() {
+    for (name, mesh) in small_meshes() {
+        let mut noise = Noise(21);
+        for _ in 0..1000 {
+            let face = (noise.uniform() * mesh.faces().len() as f64) as usize;
+            let [a, b, c] = oracle::corners(&mesh, face);
+            let out = mesh.faces()[face].normal_B * mesh.extent_m();
+            // The middle of a face lies in its plane up to a rounding, a thousandth of the tolerance.
+            let on_it = (a + b + c) / 3.0;
+            let met = |height: f64| mesh.first_hit(&(on_it + out * 0.01), &(on_it + out * height));
+            assert!(met(0.5e-13).is_some() && met(-0.5e-13).is_some(), "{name}: {face}");
+            if matches!(name, "cube" | "plate" | "sphere") {
+                assert!(met(3e-13).is_none(), "{name}: {face}");
+            }
+        }
+    }
+}
+
+#[test]
 fn a_chain_of_steps_hits_where_the_long_segment_does() {
     let meshes = [
         ("cube", mesh(make::cuboid([0.05, 0.05, 0.05]))),
@@ -340,7 +359,7 @@ fn a_random_walk_into_a_mesh_is_noticed() {
             p = next;
         }
         // The hills are flat enough for the nearest face to tell the side of a point this near.
-        assert!(!is_free || !mesh.is_inside(&p), "{p:?}");
+        assert!(!is_free || !mesh.is_inside_unbounded(&p), "{p:?}");
     }
     assert!(entries > 250, "{entries}");
 }
@@ -356,7 +375,7 @@ fn the_nearest_feature_is_told() {
         (Vector3::new(-0.1, 0.1, 0.1), Feature::Vertex, Vector3::new(-0.1, 0.1, 0.1), 0.0),
     ];
     for (p, feature, point, distance) in cases {
-        let nearest = mesh.nearest(&p);
+        let nearest = mesh.nearest_unbounded(&p);
         assert_eq!(nearest.feature, feature);
         // A handful of roundings of numbers of size 0.1.
         assert!((nearest.point_B - point).norm() < 1e-16 && (nearest.distance_m - distance).abs() < 1e-16);
@@ -379,7 +398,7 @@ fn of_equally_near_faces_the_first_is_told() {
             let vertex = mesh.faces()[face].vertices[0];
             let p = mesh.vertices()[vertex as usize];
             let first = mesh.faces().iter().position(|face| face.vertices.contains(&vertex)).unwrap();
-            let nearest = mesh.nearest(&p);
+            let nearest = mesh.nearest_unbounded(&p);
             assert_eq!((nearest.feature, nearest.distance_m), (Feature::Vertex, 0.0), "{name}");
             // Where the mesh passes through itself, or slivers lie within rounding, another face may be as near.
             assert!(nearest.face as usize <= first, "{name}: {nearest:?} {first}");
@@ -402,7 +421,7 @@ fn of_the_two_faces_of_an_edge_the_first_is_told() {
             let along = corners[(edge + 1) % 3] - corners[edge];
             let on_edge = corners[edge] + along * noise.between(0.01, 0.99);
             let p = on_edge + (face.normal_B + across.normal_B) * noise.between(1e-4, 0.1);
-            let nearest = mesh.nearest(&p);
+            let nearest = mesh.nearest_unbounded(&p);
             assert_eq!(
                 (nearest.feature, nearest.face),
                 (Feature::Edge, link.face().min(index as u32)),
@@ -452,13 +471,16 @@ fn any_numbers_are_survived() {
             let hit = mesh.first_hit(&from, &to);
             assert!(hit.is_none_or(|hit| is_finite && (0.0..=1.0).contains(&hit.fraction)), "{name}");
             assert!(mesh.first_hit(&from, &from).is_none(), "{name}: no length");
-            let nearest = mesh.nearest(&from);
+            let nearest = mesh.nearest_unbounded(&from);
             assert!(
                 nearest.point_B.amax() <= mesh.extent_m() && nearest.distance_m >= 0.0,
                 "{name}: {nearest:?}"
             );
+            let bounded = mesh.nearest(&from);
+            assert!(bounded.point_B.amax() <= mesh.extent_m() && bounded.distance_m >= nearest.distance_m);
             assert!((0.0..=1e30).contains(&mesh.clearance(&from, 1e30)), "{name}");
             assert!(!(mesh.is_inside(&from) && from.amax() > mesh.extent_m()), "{name}");
+            assert!(!(mesh.is_inside_unbounded(&from) && from.amax() > mesh.extent_m()), "{name}");
         }
     }
 }
@@ -490,7 +512,7 @@ fn the_clearance_is_worth_asking_for() {
     let mut fractions: Vec<_> = (0..2000)
         .map(|_| {
             let p = noise.vector(1.0).normalize() * 0.125;
-            mesh.clearance(&p, 1.0) / mesh.nearest(&p).distance_m
+            mesh.clearance(&p, 1.0) / mesh.nearest_unbounded(&p).distance_m
         })
         .collect();
     fractions.sort_by(f64::total_cmp);
@@ -508,8 +530,8 @@ fn trees_of_any_width_answer_alike() {
     for _ in 0..5000 {
         let p = target(&mesh, &mut noise) + noise.vector(1.0) * reach(&mesh, &mut noise);
         let q = target(&mesh, &mut noise);
-        assert_eq!(two.nearest(triangles, &p), mesh.nearest(&p));
-        assert_eq!(eight.nearest(triangles, &p), mesh.nearest(&p));
+        assert_eq!(two.nearest_unbounded(triangles, &p), mesh.nearest_unbounded(&p));
+        assert_eq!(eight.nearest_unbounded(triangles, &p), mesh.nearest_unbounded(&p));
         assert_eq!(two.first_hit(triangles, Sides::Solid, &p, &q), mesh.first_hit(&p, &q));
         assert_eq!(eight.first_hit(triangles, Sides::Solid, &p, &q), mesh.first_hit(&p, &q));
     }

@@ -119,6 +119,108 @@ fn edge_to_vertex_and_from_there_to_edge_face_and_free_space() {
 }
 
 #[test]
+fn a_concave_edge_ends_at_its_vertex_whichever_of_its_faces_one_came_by() {
+    // The two faces of an edge run along it in opposite directions: to one its end is at 0, to the other at 1.
+    let room = mesh(corner_of_a_room(), Friction::None);
+    for [along, up, across] in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+        let place = |a: f64, b: f64, c: f64| {
+            let mut place = [0.0; 3];
+            (place[along], place[up], place[across]) = (a, b, c);
+            place
+        };
+        let way = [place(0.07, 0.01, 0.05), place(0.07, -0.004, 0.05), place(0.07, -0.004, -0.003)];
+        assert_eq!(go(&room, &way).feature, Feature::Edge);
+        let end = place(-0.002, -0.004, -0.003);
+        let out = go(&room, &[&way[..], &[end]].concat());
+        assert_eq!(out.feature, Feature::Vertex, "{along} {up} {across}");
+        assert_near(out.god_object_W, [0.0; 3]);
+        assert_near(out.force_on_user_W, end.map(|x| -K * x));
+    }
+}
+
+#[test]
+fn from_the_very_edge_a_finger_goes_in_by_the_face_whose_plane_is_nearer() {
+    let cube = mesh(make::cuboid([0.1; 3]), Friction::None);
+    // By less than what counts as in front, the HIP is beyond the edge: there the god-object waits on the edge itself.
+    let beyond = 0.05 + 1e-14;
+    let from_the_top = [[0.04, 0.06, 0.01], [0.04, 0.045, 0.01], [beyond, 0.05, 0.01]];
+    let from_the_side = [[0.06, 0.04, 0.01], [0.045, 0.04, 0.01], [0.05, beyond, 0.01]];
+    for start in [from_the_top, from_the_side] {
+        let waiting = go(&cube, &start);
+        assert_eq!((waiting.feature, waiting.entity), (Feature::Edge, Some(0)));
+        let then = |place| go(&cube, &[&start[..], &[place]].concat());
+        assert_near(then([0.049, 0.047, 0.01]).force_on_user_W, [K * (0.05 - 0.049), 0.0, 0.0]);
+        assert_near(then([0.047, 0.049, 0.01]).force_on_user_W, [0.0, K * (0.05 - 0.049), 0.0]);
+    }
+}
+
+/// Four steep faces that meet at the origin; their other corners are at this height. Counter-clockwise seen from the
+/// axis, or from the other side.
+fn steep_pyramid(height_m: f64, is_seen_from_axis: bool) -> TriangleSoup {
+    let corner = |i: u32| [(0.01, 0.01), (0.01, -0.01), (-0.01, -0.01), (-0.01, 0.01)][i as usize % 4];
+    let vertices = std::iter::once(Vector3::zeros())
+        .chain((0..4).map(|i| Vector3::new(corner(i).0, height_m, corner(i).1)))
+        .collect();
+    let is_flipped = is_seen_from_axis == (height_m > 0.0);
+    let face = |i: u32| {
+        let (one, other) = (1 + i, 1 + (i + 1) % 4);
+        if is_flipped { [0, other, one] } else { [0, one, other] }
+    };
+    TriangleSoup { vertices, faces: (0..4).map(face).collect() }
+}
+
+#[test]
+fn beside_and_below_the_bottom_of_a_steep_pit_a_finger_is_held_by_that_bottom() {
+    // The HIP is behind one wall and in front of the one opposite, prolonged downwards: the mean normal decides.
+    for is_seen_from_axis in [true, false] {
+        let pit = mesh(steep_pyramid(0.05, is_seen_from_axis), Friction::None);
+        for hip in [[2e-3, -1e-3, 0.0], [0.0, -1e-3, -2e-3], [1e-3, -1e-3, 2e-3], [0.0, -1e-3, 0.0]] {
+            let out = go(&pit, &[[0.0, 0.04, 0.0], hip]);
+            assert_eq!((out.entity, out.feature), (Some(0), Feature::Vertex), "{hip:?}");
+            assert_near(out.god_object_W, [0.0; 3]);
+            assert_near(out.force_on_user_W, hip.map(|x| -K * x));
+        }
+    }
+}
+
+#[test]
+fn beside_and_above_the_tip_of_a_spike_a_finger_is_free() {
+    let spike = steep_pyramid(-0.05, false);
+    let base = [[1, 2, 3], [1, 3, 4]];
+    for base in [base, base.map(|[a, b, c]| [a, c, b])] {
+        let mut spike = spike.clone();
+        spike.faces.extend(base);
+        let spike = mesh(spike, Friction::None);
+        let pressed = [[0.02, -0.01, 0.0], [1e-3, -0.01, 0.0]];
+        assert_eq!(go(&spike, &pressed).entity, Some(0));
+        // Behind the flank that it came by, prolonged, and in front of the one opposite.
+        let out = go(&spike, &[pressed[0], pressed[1], [-2e-3, 1e-3, 0.0]]);
+        assert_eq!(out.entity, None, "{out:?}");
+    }
+}
+
+#[test]
+fn a_finger_that_stops_on_a_sheet_by_rounding_stays_on_the_side_it_came_from() {
+    let [one, other] = [[0.6, 0.48, 0.64], [0.8, -0.36, -0.48]];
+    let roof = sheet(&square([0.011, 0.013, 0.017], one, other));
+    let normal = Vector3::from(one).cross(&Vector3::from(other));
+    let roof = mesh(roof, Friction::None);
+    let mut noise = Noise(5);
+    for _ in 0..1000 {
+        let [u, v] = [0; 2].map(|_| noise.between(0.01, 0.19));
+        // On the plane but for a rounding to either side.
+        let on_it = Vector3::new(0.011, 0.013, 0.017) + Vector3::from(one) * u + Vector3::from(other) * v;
+        for side in [1.0, -1.0] {
+            let at = |height: f64| (on_it + normal * (side * height)).into();
+            assert_eq!(go(&roof, &[at(0.01), at(0.0), at(1e-3)]).entity, None, "{u} {v}");
+            let pressed = go(&roof, &[at(0.01), at(0.0), at(-1e-3)]);
+            // Positions of 0.2 m, a few roundings of 3e-17 m each, times 500 N/m.
+            assert!((pressed.force_on_user_W - normal * (side * K * 1e-3)).norm() < 1e-13, "{pressed:?}");
+        }
+    }
+}
+
+#[test]
 fn over_a_convex_edge_the_nearest_face_plane_wins_and_beside_it_the_finger_is_free() {
     let cube = mesh(make::cuboid([0.1; 3]), Friction::None);
     let start = [[0.01, 0.06, 0.02], [0.01, 0.046, 0.02]];

@@ -32,7 +32,7 @@ impl Ground {
 
     /// All faces that share a vertex with the one nearest to a point.
     fn around(&self, p: &Vector3<f64>) -> impl Iterator<Item = usize> {
-        let face = self.mesh.nearest(p).face as usize;
+        let face = self.mesh.nearest_unbounded(p).face as usize;
         self.mesh.faces()[face]
             .vertices
             .into_iter()
@@ -77,7 +77,7 @@ fn walk(ground: &Ground, mut roaming: Roaming, ticks: usize) -> Seen {
         );
         if out.entity.is_none() {
             assert!(
-                mesh.sides() == Sides::Sheet || !mesh.is_inside(&hip) || is_on_it(mesh, &hip),
+                mesh.sides() == Sides::Sheet || !mesh.is_inside_unbounded(&hip) || is_on_it(mesh, &hip),
                 "{}",
                 told()
             );
@@ -95,7 +95,7 @@ fn walk(ground: &Ground, mut roaming: Roaming, ticks: usize) -> Seen {
 }
 
 fn is_on_it(mesh: &Mesh, p: &Vector3<f64>) -> bool {
-    mesh.nearest(p).distance_m < 1e-13
+    mesh.nearest_unbounded(p).distance_m < 1e-13
 }
 
 /// Where, beside a god-object that ought to be at rest, the mesh is nearer to the HIP; or that it is not on the mesh.

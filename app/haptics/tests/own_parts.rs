@@ -9,9 +9,10 @@ mod example;
 use common::meshes::*;
 use common::*;
 use example::{Ageing, EggCarton, Honey, drag};
+use haptics::mesh::make;
 use haptics::{
     Algorithm, ConeInput, ContactAlgorithm, ContactMemory, ContactState, Friction, FrictionLaw,
-    FrictionQuery, Shape, Sphere, Surface, SurfacePoint, Touch, TouchInput,
+    FrictionMemory, FrictionQuery, Shape, Sphere, Surface, SurfacePoint, Touch, TouchInput,
 };
 use nalgebra::Vector3;
 
@@ -174,16 +175,16 @@ fn an_own_algorithm_keeps_the_memory_of_the_entitys_friction_for_one_contact() {
     #[derive(Debug)]
     struct Dries;
     impl FrictionLaw for Dries {
-        fn holds(&self, query: &FrictionQuery, memory: &mut haptics::FrictionMemory) -> bool {
+        fn holds(&self, query: &FrictionQuery, memory: &mut FrictionMemory) -> bool {
             memory.words[23] += query.dt_s;
             memory.words[23] > 10.5 * DT
         }
 
-        fn slide(&self, query: &FrictionQuery, _memory: &haptics::FrictionMemory) -> f64 {
+        fn slide(&self, query: &FrictionQuery, _memory: &FrictionMemory) -> f64 {
             query.gap_m
         }
 
-        fn held_limit_m(&self, query: &FrictionQuery, _memory: &haptics::FrictionMemory) -> f64 {
+        fn held_limit_m(&self, query: &FrictionQuery, _memory: &FrictionMemory) -> f64 {
             query.load_m
         }
     }
@@ -193,5 +194,70 @@ fn an_own_algorithm_keeps_the_memory_of_the_entitys_friction_for_one_contact() {
         let held = (0..20).map(|_| step(&mut finger, &entity, &Vector3::new(0.0, -DEPTH, 0.0)).friction);
         assert_eq!(held.filter(|state| *state == ContactState::Stick).count(), 10);
         step(&mut finger, &entity, &Vector3::y());
+    }
+}
+
+/// Holds whatever it touches, with any force, and resists every motion with the same force.
+#[derive(Debug)]
+struct Glue {
+    /// Of spring \[m\].
+    drag_m: f64,
+}
+
+impl FrictionLaw for Glue {
+    fn holds(&self, _query: &FrictionQuery, _memory: &mut FrictionMemory) -> bool {
+        true
+    }
+
+    fn slide(&self, _query: &FrictionQuery, _memory: &FrictionMemory) -> f64 {
+        -1.0
+    }
+
+    fn held_limit_m(&self, _query: &FrictionQuery, _memory: &FrictionMemory) -> f64 {
+        1.0
+    }
+
+    fn drag_m(&self, _query: &FrictionQuery, _memory: &FrictionMemory) -> f64 {
+        self.drag_m
+    }
+}
+
+/// Flat at y = 0 around the origin, with this law: a shape of a closed form and a mesh.
+fn flat_grounds(law: impl Fn() -> Glue) -> [haptics::Entity; 2] {
+    let mut cube = make::cuboid([0.1; 3]);
+    cube.vertices.iter_mut().for_each(|v| v.y -= 0.05);
+    [table(Friction::own(law())), touchable(&built(cube), Friction::own(law()))]
+}
+
+#[test]
+fn touching_without_pressing_is_without_force_whatever_a_law_makes_of_it() {
+    for mut ground in flat_grounds(|| Glue { drag_m: 0.0 }) {
+        let felt = |ground: &haptics::Entity, hips: [[f64; 2]; 3]| {
+            let mut finger = point_finger();
+            let hips = hips.map(|[x, y]| step(&mut finger, ground, &Vector3::new(x, y, 0.0)));
+            hips[2]
+        };
+        let held = felt(&ground, [[0.0, 0.01], [0.0, -0.005], [0.003, -0.004]]);
+        assert!((held.force_on_user_W - Vector3::new(-K * 0.003, K * 0.004, 0.0)).norm() < 1e-14, "{held:?}");
+        // Right on the surface, and 3 mm from where it is held.
+        let resting = felt(&ground, [[0.0, 0.01], [0.0, -0.005], [0.003, 0.0]]);
+        assert_eq!((resting.entity, resting.force_on_user_W), (Some(0), Vector3::zeros()));
+        // Below it, and drawn back so fast that the damper takes all of the spring: at 2 m/s, where 0.8 were enough.
+        ground.damping_n_s_per_m = 2.5;
+        let lifted = felt(&ground, [[0.0, 0.01], [0.0, -0.006], [0.003, -0.004]]);
+        assert_eq!((lifted.entity, lifted.force_on_user_W), (Some(0), Vector3::zeros()));
+    }
+}
+
+#[test]
+fn what_an_own_law_renders_beside_the_spring_is_felt_against_the_motion() {
+    for ground in flat_grounds(|| Glue { drag_m: 1e-3 }) {
+        let mut finger = point_finger();
+        let places = [[0.0, 0.01], [0.0, -0.005], [0.002, -0.005], [0.001, -0.005], [0.001, -0.005]];
+        let felt = places.map(|[x, y]| step(&mut finger, &ground, &Vector3::new(x, y, 0.0)).force_on_user_W);
+        // 1 mm of spring beside those of the lag, forwards and backwards; none at rest.
+        for (force, x_m) in felt[2..].iter().zip([-0.003, -0.001 + 0.001, -0.001]) {
+            assert!((force - Vector3::new(K * x_m, K * 0.005, 0.0)).norm() < 1e-14, "{felt:?}");
+        }
     }
 }

@@ -2,12 +2,16 @@
 #![allow(non_snake_case)]
 
 mod common;
+#[path = "common/trees.rs"]
+mod trees;
 
 use common::laws::{any_friction, largest_ratio};
+use common::meshes::{bumpy_sphere, touchable};
 use common::*;
 use haptics::{
-    Capsule, Cone, ConeInput, ContactState, Cuboid, Cylinder, Ellipsoid, Entity, Finger, Form, Friction,
-    FrictionCone, FrictionState, MAX_SLIDE_ROUNDS, Plane, Scaled, Sphere, Surface, Torus,
+    Border, Capsule, Cone, ConeInput, ContactState, Cuboid, Cylinder, Ellipsoid, Entity, Finger, Form,
+    Friction, FrictionCone, FrictionState, HeightForm, HeightMap, MAX_SLIDE_ROUNDS, PictureScale, Plane,
+    Scaled, Shading, ShadingForm, Sphere, Surface, Torus,
 };
 use nalgebra::{Isometry3, Vector3};
 use proptest::prelude::*;
@@ -98,6 +102,153 @@ proptest! {
         shift in prop::array::uniform3(any_size()), k in any_size(), b in any_size(), dt in any_size(), r in 0.0..0.1f64,
     ) {
         let mut entity = Entity { stiffness_n_per_m: k, damping_n_s_per_m: b, ..entity(shape, friction) };
+        let mut finger = Finger::new(r, 2).unwrap();
+        for hip in hips {
+            let out = finger.step(&[entity.clone(), entity.clone()], &Vector3::from(hip), dt);
+            prop_assert!(out.force_on_user_W.iter().all(|x| x.is_finite()), "{out:?}");
+            prop_assert!(out.god_object_W.iter().all(|x| x.is_finite()), "{out:?}");
+            entity.move_to(Isometry3::translation(shift[0], shift[1], shift[2]));
+        }
+    }
+}
+
+#[test]
+fn shaded_forces_stay_finite_and_as_large_as_they_were_for_every_input() {
+    let mesh = bumpy_sphere(16);
+    let cuboid = Cuboid::new([0.1; 3]).unwrap();
+    let odd = [0.0, -0.0, 5e-324, 1e-160, 1e-9, 0.05, 0.0999, 0.1, f64::INFINITY, f64::NAN];
+    let (rotate, bisect) = (ShadingForm::Rotate, ShadingForm::Bisect);
+    for (form, largest) in
+        [(rotate, 1e9), (bisect, 1e9), (rotate, 1e154), (bisect, 1e154), (rotate, f64::MAX)]
+    {
+        let plain = [touchable(&mesh, stiction()), entity(cuboid, stiction())];
+        let shaded = [
+            plain[0].clone().with_shading(Shading::interpolated(&mesh, 1.0, form).unwrap()),
+            plain[0].clone().with_shading(Shading::regions(&mesh, 1e-3, 3.0, form).unwrap()),
+            plain[1].clone().with_shading(Shading::box_regions(&cuboid, 1e-2, form).unwrap()),
+        ];
+        for (shaded, plain) in shaded.into_iter().zip([&plain[0], &plain[0], &plain[1]]) {
+            let (mut noise, mut fingers) = (Noise(12), [point_finger(), point_finger()]);
+            let mut touched = 0;
+            for i in 0..20_000 {
+                let pick = |noise: &mut Noise| {
+                    let pick = (noise.uniform() * (odd.len() + 1) as f64) as usize;
+                    odd.get(pick).copied().unwrap_or(largest)
+                };
+                let hip =
+                    if i % 4 == 0 { Vector3::from_fn(|_, _| pick(&mut noise)) } else { noise.vector(0.05) };
+                let felt = fingers[0].step(std::slice::from_ref(&shaded), &hip, DT).force_on_user_W;
+                let before = fingers[1].step(std::slice::from_ref(plain), &hip, DT).force_on_user_W;
+                assert!(felt.iter().all(|x| x.is_finite()), "{felt:?} at {hip:?}");
+                // Beyond that squares overflow, and contacts that have no finite force end.
+                if largest < 1e100 {
+                    assert!(
+                        (felt.norm() - before.norm()).abs() <= 1e-14 * before.norm(),
+                        "{felt:?} {before:?}"
+                    );
+                }
+                touched += u32::from(felt != Vector3::zeros());
+            }
+            assert!(touched > 2000, "{touched}");
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn every_finite_input_to_a_tree_gives_a_finite_output(
+        which in 0..7usize, friction in any_friction(),
+        hips in prop::collection::vec(prop::array::uniform3(any_size()), 1..20),
+        shift in prop::array::uniform3(any_size()), k in any_size(), b in any_size(), dt in any_size(),
+    ) {
+        let tree = &trees::all()[which];
+        let mut entity =
+            Entity { stiffness_n_per_m: k, damping_n_s_per_m: b, ..trees::touchable(&tree.tree, friction) };
+        let mut finger = Finger::new(0.0, 2).unwrap();
+        for hip in hips {
+            let out = finger.step(&[entity.clone(), entity.clone()], &Vector3::from(hip), dt);
+            prop_assert!(out.force_on_user_W.iter().all(|x| x.is_finite()), "{out:?}");
+            prop_assert!(out.god_object_W.iter().all(|x| x.is_finite()), "{out:?}");
+            entity.move_to(Isometry3::translation(shift[0], shift[1], shift[2]));
+        }
+    }
+
+    /// With every friction law: within its cone, out of the material, on the boundary.
+    #[test]
+    fn a_contact_with_a_tree_stays_within_the_friction_cone(
+        which in 0..7usize, friction in any_friction(),
+        hips in prop::collection::vec(prop::array::uniform3(-1.1..1.1f64), 2..40),
+    ) {
+        let tree = &trees::all()[which];
+        let entity = trees::touchable(&tree.tree, friction.clone());
+        let csg = trees::built(&tree.tree);
+        let mut finger = Finger::new(0.0, 1).unwrap().with_ramp_in(0.0).unwrap();
+        for hip in hips {
+            finger.step(std::slice::from_ref(&entity), &(Vector3::from(hip) * tree.size_m), DT);
+            let Some(contact) = finger.contact(0) else { continue };
+            let normal_n = contact.force_on_user_W.dot(&contact.normal_W);
+            let tangential_n = (contact.force_on_user_W - contact.normal_W * normal_n).norm();
+            prop_assert!(normal_n >= -1e-12, "{contact:?}");
+            if let Some(mu) = largest_ratio(&friction, contact.normal_force_n) {
+                // LuGre's damping stands beside the spring within a circle that a slide may miss by its rest.
+                let slack = if matches!(friction, Friction::LuGre(_)) { 1e-9 } else { 1e-11 };
+                prop_assert!(tangential_n <= mu * contact.normal_force_n + slack * (1.0 + normal_n), "{mu} {contact:?}");
+            }
+            prop_assert!(csg.signed_distance(&contact.god_object_W).abs() < 1e-12, "{contact:?}");
+        }
+    }
+}
+
+fn any_height_map() -> impl Strategy<Value = HeightMap> {
+    let numbers = prop::array::uniform2(prop_oneof![0.01..10.0f64, Just(1e-300), Just(1e300), Just(5e-324)]);
+    let scale = (prop::bool::ANY, numbers)
+        .prop_map(|(is_size, n)| if is_size { PictureScale::Size(n) } else { PictureScale::Repeat(n) });
+    let words = (prop::bool::ANY, prop::bool::ANY, prop::bool::ANY);
+    let amplitude = prop_oneof![-2e-3..2e-3f64, -1.0..=1.0f64, Just(5e-324)];
+    (scale, words, amplitude, 0.0..=1.0f64, 1..5usize, any::<u64>()).prop_map(
+        |(scale, (is_along, is_clamped, is_inverted), amplitude_m, zero_level, side, seed)| {
+            let map = HeightMap::new(pictures::rough(side, seed), amplitude_m, scale).unwrap();
+            let map = map.with_zero_level(zero_level).unwrap();
+            let map = if is_along { map.with_form(HeightForm::AlongForce) } else { map };
+            let map = if is_clamped { map.with_border(Border::Clamp) } else { map };
+            if is_inverted { map.inverted() } else { map }
+        },
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(500))]
+
+    #[test]
+    fn on_heights_contacts_never_pull_and_stay_within_their_cone(
+        shape in any_shape(), friction in any_friction(), map in any_height_map(), damping in prop_oneof![Just(0.0), 0.0..20.0f64],
+        turn in prop::array::uniform3(-3.0..3.0f64), seed: u64, step in -5.0..-1.0f64,
+    ) {
+        let X_WB = Isometry3::new(Vector3::new(0.01, -0.02, 0.03), Vector3::from(turn));
+        let entity = pictures::with(Entity { X_WB, previous_X_WB: X_WB, damping_n_s_per_m: damping, ..entity(shape, friction.clone()) }, map);
+        let mut finger = point_finger();
+        let mut noise = Noise(seed);
+        let mut hip = X_WB.translation.vector;
+        for _ in 0..200 {
+            hip += noise.vector(10f64.powf(step));
+            let out = finger.step(std::slice::from_ref(&entity), &hip, DT);
+            prop_assert!(out.force_on_user_W.iter().all(|x| x.is_finite()));
+            let Some(contact) = finger.contact(0) else { continue };
+            let normal_n = contact.force_on_user_W.dot(&contact.normal_W);
+            let rounding = 1e-12 * contact.force_on_user_W.norm();
+            prop_assert!(contact.normal_force_n >= 0.0 && normal_n >= -rounding, "{contact:?}");
+            prop_assert!((contact.normal_W.norm() - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn on_heights_every_finite_input_gives_a_finite_output(
+        shape in any_shape(), friction in any_friction(), map in any_height_map(),
+        hips in prop::collection::vec(prop::array::uniform3(any_size()), 1..20),
+        shift in prop::array::uniform3(any_size()), k in any_size(), b in any_size(), dt in any_size(), r in 0.0..0.1f64,
+    ) {
+        let entity = Entity { stiffness_n_per_m: k, damping_n_s_per_m: b, ..entity(shape, friction) };
+        let mut entity = pictures::with(entity, map);
         let mut finger = Finger::new(r, 2).unwrap();
         for hip in hips {
             let out = finger.step(&[entity.clone(), entity.clone()], &Vector3::from(hip), dt);

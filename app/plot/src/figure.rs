@@ -69,6 +69,14 @@ impl Figure {
         output::write(self, stem)
     }
 
+    /// Writes `stem.svg` alone.
+    ///
+    /// # Errors
+    /// If it cannot be made or written; the message names the file.
+    pub fn write_svg(&self, stem: &Path) -> Result<(), PlotError> {
+        output::write_svg(self, stem)
+    }
+
     /// Width and height (px), unscaled.
     pub(crate) fn size(&self) -> (u32, u32) {
         (self.width, self.head() as u32 + self.panel_height * self.panels.len() as u32)

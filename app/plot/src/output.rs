@@ -68,15 +68,20 @@ pub(crate) fn png(figure: &Figure) -> Result<Vec<u8>, PlotError> {
 }
 
 pub(crate) fn write(figure: &Figure, stem: &Path) -> Result<(), PlotError> {
-    let write = |suffix: &str, bytes: &[u8]| {
-        // `with_extension` would cut a stem that holds a point.
-        let mut name = stem.as_os_str().to_owned();
-        name.push(suffix);
-        let file = PathBuf::from(name);
-        std::fs::write(&file, bytes).map_err(|source| PlotError::Write { file, source })
-    };
-    write(".svg", figure.svg()?.as_bytes())?;
-    write(".png", &figure.png()?)
+    write_svg(figure, stem)?;
+    write_file(stem, ".png", &figure.png()?)
+}
+
+pub(crate) fn write_svg(figure: &Figure, stem: &Path) -> Result<(), PlotError> {
+    write_file(stem, ".svg", figure.svg()?.as_bytes())
+}
+
+fn write_file(stem: &Path, suffix: &str, bytes: &[u8]) -> Result<(), PlotError> {
+    // `with_extension` would cut a stem that holds a point.
+    let mut name = stem.as_os_str().to_owned();
+    name.push(suffix);
+    let file = PathBuf::from(name);
+    std::fs::write(&file, bytes).map_err(|source| PlotError::Write { file, source })
 }
 
 fn render<DB: DrawingBackend>(figure: &Figure, backend: DB, scale: f64) -> Result<(), PlotError> {

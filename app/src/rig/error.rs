@@ -1,14 +1,15 @@
 //! What can be wrong with the input of a run.
 
 use crate::simulated::SimulationError;
-use haptics::ParameterError;
 use haptics::mesh::MeshError;
+use haptics::{CsgError, HeightMapError, ParameterError};
 use io_driver::open::OpenError;
 use io_driver::sim::script::HandError;
 use std::io;
 use std::path::PathBuf;
 use thiserror::Error;
 use world::model::ModelError;
+use world::picture::PictureError;
 use world::{Location, SceneError};
 
 /// What is wrong with the input.
@@ -61,6 +62,33 @@ pub enum RigError {
         /// Why.
         source: ParameterError,
     },
+    /// The parts of a shape make no solid.
+    #[error("{}:{line}: {what}: {source}", .file.display())]
+    NoSolid {
+        /// The scene's file.
+        file: PathBuf,
+        /// Where the entity begins.
+        line: usize,
+        /// The entity.
+        what: String,
+        /// Why.
+        source: CsgError,
+    },
+    /// An algorithm that cannot render a shape of this kind.
+    #[error(
+        "{}:{line}: {what} is a csg, which algorithm {found} cannot render; allowed: friction-cone, which without friction \
+         is the classic god-object", .file.display()
+    )]
+    NotRendered {
+        /// The scene's file.
+        file: PathBuf,
+        /// Where the entity begins.
+        line: usize,
+        /// The entity.
+        what: String,
+        /// The algorithm.
+        found: &'static str,
+    },
     /// A model file cannot be read.
     #[error("{at}: {}: {source}", .file.display())]
     Model {
@@ -83,6 +111,24 @@ pub enum RigError {
         /// Why.
         source: Box<MeshError>,
     },
+    /// A picture file cannot be read.
+    #[error("{at}: {}: {source}", .file.display())]
+    Picture {
+        /// Where the scene names it.
+        at: Box<Location>,
+        /// The picture's file.
+        file: PathBuf,
+        /// Why.
+        source: PictureError,
+    },
+    /// A picture cannot lie on its shape.
+    #[error("{at}: {source}")]
+    HeightMap {
+        /// Where the scene says so.
+        at: Box<Location>,
+        /// Why.
+        source: HeightMapError,
+    },
     /// A file of patches makes no surface.
     #[error("{at}: {said}")]
     Patches {
@@ -94,7 +140,7 @@ pub enum RigError {
     /// A finger with a radius meets a shape that has no surface for its centre to roll on.
     #[error(
         "{}:{line}: finger {finger} has radius_m = {radius_m}, and entity {entity}, a {kind}, cannot be felt by such a finger; \
-         allowed: radius_m = 0, which feels every shape{smaller}, or another shape", .file.display()
+         allowed: radius_m = 0, which feels every shape{otherwise}, or another shape", .file.display()
     )]
     NotFelt {
         /// The scene's file.
@@ -109,8 +155,8 @@ pub enum RigError {
         entity: String,
         /// The kind of its shape.
         kind: &'static str,
-        /// Whether a smaller radius would do.
-        smaller: &'static str,
+        /// What else would do.
+        otherwise: &'static str,
     },
     /// Something of the grammar that this version has not got.
     #[error("{file}: {what} is not available in this version")]

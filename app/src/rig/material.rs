@@ -1,17 +1,25 @@
-//! From what a scene says of an entity to what rendering takes: shape, friction, algorithm.
+//! From what a scene says of an entity to what rendering takes: shape, friction, algorithm, shading.
 
 use super::models::Models;
+use haptics::mesh::Mesh;
+use haptics::passivity::{Passivity, PassivitySpec};
 use haptics::{
-    Algorithm, Capsule, Cone, Cuboid, Cylinder, Ellipsoid, Form, Friction, ParameterError, Plane, Scaled,
-    Shape, Sphere, Torus,
+    Algorithm, Capsule, Cone, Csg, CsgError, CsgPart, CsgTree, Cuboid, Cylinder, Ellipsoid, Form, Friction,
+    ParameterError, Plane, Scaled, Shading, ShadingForm, Shape, Sphere, Torus,
 };
+use nalgebra::Isometry3;
+use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
-use world::{AlgorithmSpec, FrictionSpec, ShapeSpec};
+use world::{
+    AlgorithmSpec, CsgOp, CsgSpec, FrictionSpec, SceneEntity, ShadingFormSpec, ShadingSpec, ShapeSpec,
+};
 
 /// Why something has no counterpart in rendering.
 pub(super) enum Unfit {
     /// Its numbers are refused.
     Refused(ParameterError),
+    /// Its parts make no solid.
+    NoSolid(CsgError),
     /// This version has not got it.
     NotAvailable(String),
 }
@@ -22,10 +30,33 @@ impl From<ParameterError> for Unfit {
     }
 }
 
+/// What keeps a finger passive at this length of a tick (s).
+pub(super) fn passivity(spec: &world::PassivitySpec, period_s: f64) -> Result<Passivity, ParameterError> {
+    let motion = PassivitySpec::usual(period_s);
+    let usual = PassivitySpec::for_motion(
+        period_s,
+        spec.acceleration_m_per_s2.unwrap_or(motion.acceleration_m_per_s2),
+        spec.resolution_m.unwrap_or(motion.resolution_m),
+    );
+    let wanted = usual.with_bound(spec.bound_j.unwrap_or(usual.bound_j));
+    let passivity = PassivitySpec {
+        recovery_w: spec.recovery_w.unwrap_or(wanted.recovery_w),
+        device_friction_n: spec.device_friction_n.unwrap_or(wanted.device_friction_n),
+        ..wanted
+    };
+    Passivity::new(passivity, period_s)
+}
+
+impl From<CsgError> for Unfit {
+    fn from(error: CsgError) -> Self {
+        Self::NoSolid(error)
+    }
+}
+
 /// A shape; meshes are those that were loaded.
-pub(super) fn shape(spec: &ShapeSpec, models: &Models) -> Result<Shape, Unfit> {
+pub(super) fn shape(spec: &ShapeSpec, models: &Models, has_picture: bool) -> Result<Shape, Unfit> {
     match spec {
-        ShapeSpec::Mesh(mesh) => match models.mesh(mesh) {
+        ShapeSpec::Mesh(mesh) => match models.mesh(mesh, has_picture) {
             Some(mesh) => Ok(Arc::clone(mesh).into()),
             None => Err(Unfit::NotAvailable(format!("shape {spec:?}"))),
         },
@@ -33,11 +64,42 @@ pub(super) fn shape(spec: &ShapeSpec, models: &Models) -> Result<Shape, Unfit> {
             Some(nurbs) => Ok(Arc::clone(nurbs).into()),
             None => Err(Unfit::NotAvailable(format!("shape {spec:?}"))),
         },
+        spec if is_csg(spec) => {
+            // As the only part of a tree it may be scaled like any other.
+            let tree = CsgTree::union([part(spec, Isometry3::identity())?]);
+            Ok(Arc::new(Csg::build(&tree)?).into())
+        }
         spec => Ok(Shape::Form(form(spec)?)),
     }
 }
 
-fn form(spec: &ShapeSpec) -> Result<Form, Unfit> {
+/// Whether a shape is joined of others, scaled or not.
+pub(super) fn is_csg(spec: &ShapeSpec) -> bool {
+    match spec {
+        ShapeSpec::Scaled { shape, .. } => is_csg(shape),
+        spec => matches!(spec, ShapeSpec::Csg(_)),
+    }
+}
+
+fn part(spec: &ShapeSpec, pose: Isometry3<f64>) -> Result<CsgPart, Unfit> {
+    match spec {
+        ShapeSpec::Csg(spec) => Ok(CsgPart::tree(tree(spec)?, pose)),
+        ShapeSpec::Scaled { shape, scale } if is_csg(shape) => Ok(part(shape, pose)?.scaled(*scale)),
+        spec => Ok(CsgPart::new(form(spec)?, pose)),
+    }
+}
+
+fn tree(spec: &CsgSpec) -> Result<CsgTree, Unfit> {
+    let parts =
+        spec.children.iter().map(|child| part(&child.shape, child.pose)).collect::<Result<Vec<_>, _>>()?;
+    Ok(match spec.op {
+        CsgOp::Union => CsgTree::union(parts),
+        CsgOp::Intersection => CsgTree::intersection(parts),
+        CsgOp::Difference => CsgTree::difference(parts),
+    })
+}
+
+pub(super) fn form(spec: &ShapeSpec) -> Result<Form, Unfit> {
     Ok(match *spec {
         ShapeSpec::Plane { normal, offset_m } => Plane::new(normal.into_inner(), offset_m)?.into(),
         ShapeSpec::Sphere { radius_m } => Sphere::new(radius_m)?.into(),
@@ -98,5 +160,46 @@ pub(super) fn algorithm(spec: AlgorithmSpec) -> Result<Algorithm, Unfit> {
         AlgorithmSpec::VectorField => Ok(Algorithm::VectorField),
         AlgorithmSpec::ClassicGodObject => Ok(Algorithm::ClassicGodObject),
         other => Err(Unfit::NotAvailable(format!("algorithm {other:?}"))),
+    }
+}
+
+/// How its facets feel; meshes are shaded when they are loaded.
+pub(super) fn shading(entity: &SceneEntity, models: &Models) -> Result<Shading, Unfit> {
+    let (spec, shape) = (entity.shading, &entity.shape);
+    let not_available = || Unfit::NotAvailable(format!("shading {spec:?} of a {}", shape.kind()));
+    match (spec, shape) {
+        (ShadingSpec::None, _) => Ok(Shading::None),
+        (_, ShapeSpec::Mesh(mesh)) => {
+            models.shading(mesh, entity.height_map.is_some(), spec).cloned().ok_or_else(not_available)
+        }
+        (ShadingSpec::Regions { length_m, crease_angle_deg, form }, ShapeSpec::Box { size_m }) => {
+            // All its edges are as sharp.
+            if crease_angle_deg.to_radians() < FRAC_PI_2 {
+                return Ok(Shading::None);
+            }
+            Ok(Shading::box_regions(&Cuboid::new(*size_m)?, length_m, shading_form(form))?)
+        }
+        _ => Err(not_available()),
+    }
+}
+
+/// That of a mesh.
+pub(super) fn mesh_shading(spec: ShadingSpec, mesh: &Mesh) -> Result<Shading, Unfit> {
+    Ok(match spec {
+        ShadingSpec::None => Shading::None,
+        ShadingSpec::Interpolated { crease_angle_deg, form } => {
+            Shading::interpolated(mesh, crease_angle_deg.to_radians(), shading_form(form))?
+        }
+        ShadingSpec::Regions { length_m, crease_angle_deg, form } => {
+            Shading::regions(mesh, length_m, crease_angle_deg.to_radians(), shading_form(form))?
+        }
+        other => return Err(Unfit::NotAvailable(format!("shading {other:?}"))),
+    })
+}
+
+fn shading_form(spec: ShadingFormSpec) -> ShadingForm {
+    match spec {
+        ShadingFormSpec::Bisect => ShadingForm::Bisect,
+        _ => ShadingForm::Rotate,
     }
 }

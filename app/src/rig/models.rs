@@ -2,9 +2,9 @@
 //!
 //! What was repaired is told once, what cannot be used is refused with the place in the scene and in the model.
 
-use super::RigError;
-use haptics::Nurbs;
-use haptics::mesh::{Finding, Mesh, MeshError, MeshReport, TriangleSoup};
+use super::{RigError, material};
+use haptics::mesh::{CornerUv, Finding, Mesh, MeshError, MeshReport, TriangleSoup};
+use haptics::{Nurbs, Shading};
 use io_driver::say::say;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
@@ -12,7 +12,7 @@ use std::collections::btree_map::Entry;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use world::model::{self, Format, ModelError};
-use world::{MeshSpec, Scene, ShapeSpec};
+use world::{MeshSpec, Scene, ShadingSpec, ShapeSpec};
 
 /// From this size on it takes so long that somebody wonders: a third of a million triangles.
 const WORTH_A_LINE_BYTES: usize = 16 << 20;
@@ -21,57 +21,87 @@ const WORTH_A_LINE_BYTES: usize = 16 << 20;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Models {
     meshes: BTreeMap<Key, Arc<Mesh>>,
+    shadings: Vec<(Key, ShadingSpec, Shading)>,
     nurbs: BTreeMap<Key, Arc<Nurbs>>,
 }
 
-/// A file, and the bits of the factors along its axes.
-type Key = (PathBuf, [u64; 3]);
+/// A file, the bits of the factors along its axes, and whether a picture lies on it.
+type Key = (PathBuf, [u64; 3], bool);
 
 impl Models {
     /// Loads every mesh that the scene's entities use.
     pub(super) fn load(scene: &Scene) -> Result<Self, RigError> {
         let mut models = Self::default();
         for entity in &scene.entities {
-            match &entity.shape {
-                ShapeSpec::Mesh(spec) => {
-                    if let Entry::Vacant(place) = models.meshes.entry(key_of(spec)) {
-                        place.insert(Arc::new(build(spec)?));
-                    }
-                }
-                ShapeSpec::Nurbs(spec) => {
-                    if let Entry::Vacant(place) = models.nurbs.entry(key_of(spec)) {
-                        place.insert(Arc::new(join(spec)?));
-                    }
-                }
-                _ => {}
+            if let ShapeSpec::Nurbs(spec) = &entity.shape
+                && let Entry::Vacant(place) = models.nurbs.entry(key_of(spec, false))
+            {
+                place.insert(Arc::new(join(spec)?));
             }
+            let ShapeSpec::Mesh(spec) = &entity.shape else { continue };
+            let has_picture = entity.height_map.is_some();
+            if let Entry::Vacant(place) = models.meshes.entry(key_of(spec, has_picture)) {
+                place.insert(Arc::new(build(spec, has_picture)?));
+            }
+            models.shade(key_of(spec, has_picture), entity.shading);
         }
         Ok(models)
     }
 
-    /// A mesh that was loaded.
-    pub(super) fn mesh(&self, spec: &MeshSpec) -> Option<&Arc<Mesh>> {
-        self.meshes.get(&key_of(spec))
+    /// Shades a mesh, once for all entities that are shaded alike.
+    fn shade(&mut self, key: Key, shading: ShadingSpec) {
+        if shading == ShadingSpec::None || self.shading_of(&key, shading).is_some() {
+            return;
+        }
+        let mesh = &self.meshes[&key];
+        // What the reader of scenes let through is not refused; if it were, the entity would not be available.
+        if let Ok(made) = material::mesh_shading(shading, mesh) {
+            self.shadings.push((key, shading, made));
+        }
+    }
+
+    /// The shading of a mesh that was loaded.
+    pub(super) fn shading(
+        &self,
+        spec: &MeshSpec,
+        has_picture: bool,
+        shading: ShadingSpec,
+    ) -> Option<&Shading> {
+        self.shading_of(&key_of(spec, has_picture), shading)
+    }
+
+    fn shading_of(&self, key: &Key, shading: ShadingSpec) -> Option<&Shading> {
+        self.shadings.iter().find(|(of, by, _)| of == key && *by == shading).map(|(.., made)| made)
+    }
+
+    /// A mesh that was loaded, for a picture to lie on or not.
+    pub(super) fn mesh(&self, spec: &MeshSpec, has_picture: bool) -> Option<&Arc<Mesh>> {
+        self.meshes.get(&key_of(spec, has_picture))
     }
 
     /// Patches that were loaded.
     pub(super) fn nurbs(&self, spec: &MeshSpec) -> Option<&Arc<Nurbs>> {
-        self.nurbs.get(&key_of(spec))
+        self.nurbs.get(&key_of(spec, false))
     }
 }
 
-fn key_of(spec: &MeshSpec) -> Key {
-    (spec.file.clone(), spec.scale.map(f64::to_bits))
+fn key_of(spec: &MeshSpec, has_picture: bool) -> Key {
+    (spec.file.clone(), spec.scale.map(f64::to_bits), has_picture)
 }
 
-fn build(spec: &MeshSpec) -> Result<Mesh, RigError> {
+fn build(spec: &MeshSpec, has_picture: bool) -> Result<Mesh, RigError> {
     let file = &spec.file;
-    let soup = read(file).map_err(|source| RigError::Model {
+    let (soup, uv) = read(file, has_picture).map_err(|source| RigError::Model {
         at: Box::new(spec.at.clone()),
         file: file.clone(),
         source,
     })?;
-    let (mesh, report) = Mesh::build(scaled(soup, &spec.scale)).map_err(|source| RigError::Mesh {
+    let soup = scaled(soup, &spec.scale);
+    let built = match uv {
+        Some(uv) => Mesh::build_with_uv(soup, &uv),
+        None => Mesh::build(soup),
+    };
+    let (mesh, report) = built.map_err(|source| RigError::Mesh {
         at: Box::new(spec.at.clone()),
         file: file.clone(),
         place: place_of(&source, file),
@@ -105,12 +135,16 @@ fn join(spec: &MeshSpec) -> Result<Nurbs, RigError> {
     Ok(nurbs)
 }
 
-fn read(file: &Path) -> Result<TriangleSoup, ModelError> {
+/// Texture coordinates only where a picture needs them.
+fn read(file: &Path, has_picture: bool) -> Result<(TriangleSoup, Option<Vec<CornerUv>>), ModelError> {
     let bytes = model::read_file(file)?;
     if bytes.len() >= WORTH_A_LINE_BYTES {
         say(format_args!("phantom3: loading {} ({} MB)", file.display(), bytes.len() / 1_000_000));
     }
-    model::read(file, &bytes)
+    if has_picture {
+        return model::read_with_uv(file, &bytes).map(|(soup, uv)| (soup, Some(uv)));
+    }
+    Ok((model::read(file, &bytes)?, None))
 }
 
 fn scaled(mut soup: TriangleSoup, scale: &[f64; 3]) -> TriangleSoup {

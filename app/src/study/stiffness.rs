@@ -7,12 +7,14 @@
 //! Model: for each case the whole system on the virtual clock ([`trial`]), a simulated arm and hand in front of a
 //! wall; the stiffness is raised until the oscillation after a push does not settle ([`search`]). Beside it stand what theory
 //! says: the sampled linear loop without friction and encoder ([`linear`]), passivity, and friction against
-//! encoder steps ([`bounds`]).
+//! encoder steps ([`bounds`]). With `--passivity` each search is done once more with a finger that is kept passive, and
+//! it is told what that costs ([`kept`]).
 //!
 //! Cost: some minutes of one CPU for all cases; as many at once as there are CPUs.
 
 pub mod bounds;
 pub mod case;
+pub mod kept;
 pub mod linear;
 pub mod picture;
 pub mod plant;
@@ -60,6 +62,9 @@ pub struct StiffnessArgs {
     /// How much deeper the hand wants to be after its push (mm)
     #[arg(long, value_name = "MM", default_value_t = 1.0, value_parser = parse_push)]
     push_mm: f64,
+    /// Searches again with a finger that is kept passive: takes twice as long
+    #[arg(long)]
+    passivity: bool,
     /// Where the results go: stiffness.csv, stiffness.svg, stiffness.png
     #[arg(long, value_name = "DIR", default_value = "study-stiffness")]
     out: PathBuf,
@@ -79,6 +84,8 @@ pub struct Answer {
     pub quiet: Found,
     /// What theory says.
     pub theory: bounds::Theory,
+    /// What became of it with a finger that is kept passive, if that was asked.
+    pub kept: Option<kept::Kept>,
 }
 
 /// Does the study.
@@ -107,7 +114,7 @@ pub fn execute(args: &StiffnessArgs, signals: &StopSignals) -> Result<Stop, RunF
         ))
     })?;
     say(format_args!("phantom3: {} cases, {jobs} at a time; some seconds each", cases.len()));
-    let Some(answers) = answer_all(&bench, &cases, jobs, signals)? else {
+    let Some(answers) = answer_all(&bench, &cases, args.passivity, jobs, signals)? else {
         return Ok(Stop::Signal(signals.requested().unwrap_or(rustix::process::Signal::INT.as_raw())));
     };
     print(&table::text(&bench, &answers));
@@ -129,6 +136,7 @@ fn print(text: &str) {
 fn answer_all(
     bench: &Bench,
     cases: &[Case],
+    with_passivity: bool,
     jobs: usize,
     signals: &StopSignals,
 ) -> Result<Option<Vec<Answer>>, RunFailure> {
@@ -139,7 +147,7 @@ fn answer_all(
         while signals.requested().is_none() {
             let index = next.fetch_add(1, Ordering::Relaxed);
             let Some(case) = cases.get(index) else { break };
-            let answer = answer(bench, case, signals);
+            let answer = answer(bench, case, with_passivity, signals);
             if let Ok(mut answers) = answers.lock() {
                 answers[index] = Some(answer);
             }
@@ -167,7 +175,12 @@ fn vec_of_none<T>(count: usize) -> Vec<Option<T>> {
     std::iter::repeat_with(|| None).take(count).collect()
 }
 
-fn answer(bench: &Bench, case: &Case, signals: &StopSignals) -> Result<Answer, RunFailure> {
+fn answer(
+    bench: &Bench,
+    case: &Case,
+    with_passivity: bool,
+    signals: &StopSignals,
+) -> Result<Answer, RunFailure> {
     // What is quiet has settled, so what is known of one helps the other.
     let (mut settled, mut quiet) = (Search::default(), Search::default());
     while signals.requested().is_none() {
@@ -177,7 +190,9 @@ fn answer(bench: &Bench, case: &Case, signals: &StopSignals) -> Result<Answer, R
         settled.learn(stiffness, outcome.settles());
     }
     let theory = bounds::Theory::of(bench, case)?;
-    Ok(Answer { case: case.clone(), settled: settled.found(), quiet: quiet.found(), theory })
+    let (settled, quiet) = (settled.found(), quiet.found());
+    let kept = with_passivity.then(|| kept::Kept::of(bench, case, [quiet, settled], signals)).transpose()?;
+    Ok(Answer { case: case.clone(), settled, quiet, theory, kept })
 }
 
 fn parse_rate(text: &str) -> Result<f64, String> {

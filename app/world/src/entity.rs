@@ -2,11 +2,15 @@
 
 use nalgebra::Isometry3;
 
+use crate::effects::{MagnetismSpec, VibrationSpec};
 use crate::error::SceneError;
 use crate::friction::FrictionSpec;
+use crate::height_map::HeightMapSpec;
+use crate::material::read_material;
 use crate::names::Names;
 use crate::pose::read_pose;
 use crate::reader::{Bound, Table};
+use crate::shading::ShadingSpec;
 use crate::shape::ShapeSpec;
 use crate::vocabulary::Vocabulary;
 
@@ -29,6 +33,16 @@ pub struct SceneEntity {
     pub friction: FrictionSpec,
     /// Default the Friction Cone Algorithm.
     pub algorithm: AlgorithmSpec,
+    /// What it is made of, if the scene says; it gave the values that the scene did not.
+    pub material: Option<&'static str>,
+    /// How it attracts fingers that are near.
+    pub magnetism: Option<MagnetismSpec>,
+    /// How it hums while it is touched.
+    pub vibration: Option<VibrationSpec>,
+    /// Default none.
+    pub shading: ShadingSpec,
+    /// Default none.
+    pub height_map: Option<HeightMapSpec>,
 }
 
 /// What works out the force of contacts with an entity.
@@ -52,16 +66,26 @@ impl SceneEntity {
     /// Reads the `[[entity]]` at position `i` of the list.
     pub(crate) fn read(table: &Table<'_>, i: usize, names: &mut Names) -> Result<Self, SceneError> {
         table.check_keys(&KEYS)?;
-        let stiffness_default = Self::DEFAULT_STIFFNESS_N_PER_M;
+        let material = read_material(table)?;
+        let stiffness_default =
+            material.map_or(Self::DEFAULT_STIFFNESS_N_PER_M, |made_of| made_of.stiffness_n_per_m);
+        let damping_default = material.map_or(0.0, |made_of| made_of.damping_n_s_per_m);
+        let name = names.claim(table, format!("e{i}"))?;
+        let shape = ShapeSpec::read(table)?;
         Ok(Self {
-            name: names.claim(table, format!("e{i}"))?,
+            name,
             line: table.document().line(table.offset()),
-            shape: ShapeSpec::read(table)?,
             pose: read_pose(table)?,
             stiffness_n_per_m: table.number_or("stiffness_n_per_m", Bound::Positive, stiffness_default)?,
-            damping_n_s_per_m: table.number_or("damping_n_s_per_m", Bound::NotNegative, 0.0)?,
-            friction: FrictionSpec::read(table)?,
+            damping_n_s_per_m: table.number_or("damping_n_s_per_m", Bound::NotNegative, damping_default)?,
+            friction: FrictionSpec::read(table, material)?,
             algorithm: AlgorithmSpec::read(table)?,
+            material: material.map(|made_of| made_of.name),
+            magnetism: MagnetismSpec::read(table)?,
+            vibration: VibrationSpec::read(table)?,
+            shading: ShadingSpec::read(table, &shape)?,
+            height_map: HeightMapSpec::read(table, &shape)?,
+            shape,
         })
     }
 }
@@ -90,6 +114,11 @@ const KEYS: Vocabulary = Vocabulary {
         "damping_n_s_per_m",
         "friction",
         "algorithm",
+        "material",
+        "shading",
+        "height_map",
+        "magnetism",
+        "vibration",
     ],
     later: &[
         "velocity_m_s",

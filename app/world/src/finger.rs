@@ -7,6 +7,7 @@ use nalgebra::Point3;
 use crate::MAX_DEVICES;
 use crate::error::SceneError;
 use crate::names::Names;
+use crate::passivity::PassivitySpec;
 use crate::reader::{Bound, Table};
 use crate::vocabulary::Vocabulary;
 
@@ -21,6 +22,8 @@ pub struct SceneFinger {
     pub start_m: Point3<f64>,
     /// Index of the haptic device that moves it; unique, default its position in the list.
     pub device: usize,
+    /// How its forces are kept from feeding energy into the hand; default they are not.
+    pub passivity: Option<PassivitySpec>,
 }
 
 impl SceneFinger {
@@ -47,6 +50,7 @@ impl SceneFinger {
             radius_m: table.number_or("radius_m", Bound::NotNegative, 0.0)?,
             start_m: table.numbers_or("start_m", [0.0; 3])?.into(),
             device: claim_device(table, i, devices)?,
+            passivity: PassivitySpec::read(table)?,
         })
     }
 }
@@ -70,4 +74,5 @@ fn claim_device(
     }
 }
 
-const KEYS: Vocabulary = Vocabulary { available: &["name", "radius_m", "start_m", "device"], later: &[] };
+const KEYS: Vocabulary =
+    Vocabulary { available: &["name", "radius_m", "start_m", "device", "passivity"], later: &[] };

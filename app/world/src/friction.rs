@@ -1,5 +1,7 @@
 //! The friction of an entity's surface.
 
+use haptics::Material;
+
 use crate::error::SceneError;
 use crate::reader::{Bound, Table};
 use crate::vocabulary::Vocabulary;
@@ -131,9 +133,12 @@ impl FrictionSpec {
     /// The most points of a curve; one more is kept for the speed 0.
     pub const MAX_CURVE_POINTS: usize = haptics::MAX_CURVE_POINTS - 1;
 
-    /// Reads the `friction` of an entity; none if there is no such key.
-    pub(crate) fn read(entity: &Table<'_>) -> Result<Self, SceneError> {
-        let Some(value) = entity.get("friction") else { return Ok(Self::None) };
+    /// Reads the `friction` of an entity; without such a key its material's, without a material none.
+    pub(crate) fn read(entity: &Table<'_>, material: Option<&Material>) -> Result<Self, SceneError> {
+        let Some(value) = entity.get("friction") else {
+            let of = |material: &Material| Self::Stiction { mu_s: material.mu_s, mu_d: material.mu_d };
+            return Ok(material.map_or(Self::None, of));
+        };
         let table = value.table(EXAMPLE)?;
         let model = table.require("model", MODELS.list())?.choose("friction model", &MODELS)?;
         let (keys, read) = reader_of(model);

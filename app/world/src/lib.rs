@@ -32,30 +32,46 @@
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
 
+mod csg;
 mod document;
+mod effects;
 mod entity;
 mod error;
+mod field;
 mod finger;
 mod friction;
+mod guide;
+mod height_map;
 mod layout;
+mod material;
 pub mod model;
 mod names;
+mod passivity;
+pub mod picture;
 mod placement;
 mod pose;
 mod reader;
 mod scene;
+mod shading;
 mod shape;
 mod source;
 mod vocabulary;
 
+pub use csg::{CsgChild, CsgOp, CsgSpec};
+pub use effects::{MagnetismSpec, VibrationSpec};
 pub use entity::{AlgorithmSpec, SceneEntity};
 pub use error::{Location, SceneError};
+pub use field::{FieldKindSpec, FieldSpec, MAX_FIELDS};
 pub use finger::SceneFinger;
 pub use friction::FrictionSpec;
+pub use guide::{GuideSpec, MAX_GUIDES, TrackSpec};
+pub use height_map::HeightMapSpec;
 pub use layout::Layout;
 pub use names::MAX_NAME_BYTES;
+pub use passivity::PassivitySpec;
 pub use placement::{Affine, LEAST_STRETCH, MOST_STRETCH, Placement};
 pub use scene::Scene;
+pub use shading::{ShadingFormSpec, ShadingSpec};
 pub use shape::{MeshSpec, ShapeSpec};
 pub use source::MAX_FILE_BYTES;
 

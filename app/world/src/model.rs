@@ -22,13 +22,13 @@ mod polygon;
 mod stl;
 
 pub use free_form::read_free_form;
-pub use obj::{line_of_face, read_obj};
+pub use obj::{line_of_face, read_obj, read_obj_with_uv};
 pub use patches::{read_patches, write_patches};
 pub use stl::read_stl;
 
 use crate::error::SceneError;
 use haptics::NurbsPatch;
-use haptics::mesh::TriangleSoup;
+use haptics::mesh::{CornerUv, TriangleSoup};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
@@ -83,6 +83,11 @@ pub enum ModelError {
         /// What may stand there.
         allowed: String,
     },
+    /// A picture is to lie on a model that cannot say where.
+    #[error(
+        "found an STL file, which has no texture coordinates; allowed under a height map: an OBJ file with `vt`"
+    )]
+    NoTexture,
     /// Something wrong in a TOML file of patches; the message names the file.
     #[error(transparent)]
     Toml(#[from] Box<SceneError>),
@@ -154,6 +159,17 @@ pub fn read(file: &Path, bytes: &[u8]) -> Result<TriangleSoup, ModelError> {
     match Format::of(file, bytes).ok_or(ModelError::UnknownFormat)? {
         Format::Obj => read_obj(bytes),
         Format::Stl => read_stl(bytes),
+    }
+}
+
+/// The triangles in `bytes` and the texture coordinates of their corners.
+///
+/// # Errors
+/// As [`read`]; a format or a face without texture coordinates.
+pub fn read_with_uv(file: &Path, bytes: &[u8]) -> Result<(TriangleSoup, Vec<CornerUv>), ModelError> {
+    match Format::of(file, bytes).ok_or(ModelError::UnknownFormat)? {
+        Format::Obj => read_obj_with_uv(bytes),
+        Format::Stl => Err(ModelError::NoTexture),
     }
 }
 

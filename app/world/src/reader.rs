@@ -202,10 +202,15 @@ impl<'d> Value<'d> {
 
     /// Factors along three axes: one number for all, or an array of three; above 0.
     pub(crate) fn factors(&self) -> Result<[f64; 3], SceneError> {
+        self.along_axes(Bound::Positive)
+    }
+
+    /// A number within `bound` for each of three axes: one for all, or an array of three.
+    pub(crate) fn along_axes(&self, bound: Bound) -> Result<[f64; 3], SceneError> {
         match self.value.get_ref() {
-            DeValue::Array(items) if items.len() == 3 => self.numbers_in(Bound::Positive),
-            DeValue::Integer(_) | DeValue::Float(_) => Ok([self.number(Bound::Positive)?; 3]),
-            _ => Err(self.wrong_type("a number above 0, or an array of 3 numbers above 0")),
+            DeValue::Array(items) if items.len() == 3 => self.numbers_in(bound),
+            DeValue::Integer(_) | DeValue::Float(_) => Ok([self.number(bound)?; 3]),
+            _ => Err(self.wrong_type(format!("{bound}, or an array of 3 {}", bound.of_several()))),
         }
     }
 
@@ -221,6 +226,12 @@ impl<'d> Value<'d> {
             *row = self.item(i, value).numbers()?;
         }
         Ok(rows)
+    }
+
+    /// Any number of points of three finite numbers.
+    pub(crate) fn points(&self, allowed: &str) -> Result<Vec<[f64; 3]>, SceneError> {
+        let DeValue::Array(items) = self.value.get_ref() else { return Err(self.wrong_type(allowed)) };
+        items.iter().enumerate().map(|(i, value)| self.item(i, value).numbers()).collect()
     }
 
     /// A whole number below `limit`.
@@ -254,6 +265,11 @@ impl<'d> Value<'d> {
         Ok(path)
     }
 
+    /// Yes or no.
+    pub(crate) fn truth(&self) -> Result<bool, SceneError> {
+        self.truth_if_any().ok_or_else(|| self.wrong_type("true or false"))
+    }
+
     /// One of the words that this version implements.
     pub(crate) fn choose(&self, what: &'static str, words: &Vocabulary) -> Result<&'static str, SceneError> {
         let available = words.list();
@@ -269,6 +285,11 @@ impl<'d> Value<'d> {
                 Err(SceneError::UnknownKind { at, what, found, allowed, suggestion })
             }
         }
+    }
+
+    /// `true` or `false`; `None`: it is something else.
+    pub(crate) fn truth_if_any(&self) -> Option<bool> {
+        if let DeValue::Boolean(truth) = self.value.get_ref() { Some(*truth) } else { None }
     }
 
     pub(crate) fn table(&self, allowed: &str) -> Result<Table<'d>, SceneError> {

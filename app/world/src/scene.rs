@@ -7,7 +7,9 @@ use nalgebra::Vector3;
 use crate::document::{Document, LineEnds};
 use crate::entity::SceneEntity;
 use crate::error::SceneError;
+use crate::field::FieldSpec;
 use crate::finger::SceneFinger;
+use crate::guide::GuideSpec;
 use crate::names::Names;
 use crate::reader::Table;
 use crate::source::read_text;
@@ -26,6 +28,10 @@ pub struct Scene {
     pub fingers: Vec<SceneFinger>,
     /// May be empty.
     pub entities: Vec<SceneEntity>,
+    /// Force fields; may be empty.
+    pub fields: Vec<FieldSpec>,
+    /// Guides; may be empty.
+    pub guides: Vec<GuideSpec>,
 }
 
 impl Scene {
@@ -58,6 +64,8 @@ impl Scene {
             hand: read_hand(&table, file)?,
             fingers: SceneFinger::read_all(&table)?,
             entities: read_entities(&table)?,
+            fields: FieldSpec::read_all(&table)?,
+            guides: GuideSpec::read_all(&table)?,
         })
     }
 }
@@ -81,5 +89,7 @@ fn read_entities(table: &Table<'_>) -> Result<Vec<SceneEntity>, SceneError> {
     tables.iter().enumerate().map(|(i, table)| SceneEntity::read(table, i, &mut names)).collect()
 }
 
-const KEYS: Vocabulary =
-    Vocabulary { available: &["name", "gravity_m_s2", "hand", "finger", "entity"], later: &[] };
+const KEYS: Vocabulary = Vocabulary {
+    available: &["name", "gravity_m_s2", "hand", "finger", "entity", "field", "guide"],
+    later: &[],
+};

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Unit, Vector3};
 
+use crate::csg::{CSG_KEYS, CsgSpec};
 use crate::error::{Location, SceneError};
 use crate::pose::read_direction;
 use crate::reader::{Bound, Table, Value};
@@ -67,6 +68,8 @@ pub enum ShapeSpec {
     },
     /// Triangles in a file of their own.
     Mesh(MeshSpec),
+    /// Several shapes joined to one.
+    Csg(CsgSpec),
     /// Rational patches in a file of their own.
     Nurbs(MeshSpec),
     /// Another shape but a mesh, drawn out along B's axes.
@@ -102,12 +105,38 @@ impl ShapeSpec {
             Self::Capsule { .. } => "capsule",
             Self::Ellipsoid { .. } => "ellipsoid",
             Self::Mesh(_) => "mesh",
+            Self::Csg(_) => "csg",
             Self::Nurbs(_) => "nurbs",
             Self::Scaled { shape, .. } => shape.kind(),
         }
     }
 
-    /// Reads the `shape` of an entity.
+    /// Whether it has a closed form, so that the depth of a point in it is known without a search.
+    pub fn is_closed_form(&self) -> bool {
+        match self {
+            Self::Plane { .. }
+            | Self::Sphere { .. }
+            | Self::Box { .. }
+            | Self::Cylinder { .. }
+            | Self::Cone { .. }
+            | Self::Torus { .. }
+            | Self::Capsule { .. }
+            | Self::Ellipsoid { .. } => true,
+            Self::Scaled { shape, .. } => shape.is_closed_form(),
+            _ => false,
+        }
+    }
+
+    /// Whether it can be a part of a csg: what is inside of it is known exactly.
+    pub(crate) fn can_be_joined(&self) -> bool {
+        match self {
+            Self::Scaled { shape, .. } => shape.can_be_joined(),
+            Self::Mesh(_) => false,
+            _ => true,
+        }
+    }
+
+    /// Reads the `shape` of an entity, or of a part of a csg.
     pub(crate) fn read(entity: &Table<'_>) -> Result<Self, SceneError> {
         let table = entity.require("shape", EXAMPLE)?.table(EXAMPLE)?;
         let kind = table.require("kind", KINDS.list())?.choose("shape kind", &KINDS)?;
@@ -137,6 +166,7 @@ fn reader_of(kind: &str) -> (&'static Vocabulary, Read) {
         "torus" => (&TORUS_KEYS, read_torus),
         "capsule" => (&CYLINDER_KEYS, read_capsule),
         "ellipsoid" => (&ELLIPSOID_KEYS, read_ellipsoid),
+        "csg" => (&CSG_KEYS, read_csg),
         "nurbs" => (&MESH_KEYS, read_nurbs),
         _ => (&MESH_KEYS, read_mesh),
     }
@@ -213,6 +243,10 @@ fn read_file(table: &Table<'_>, allowed: &str) -> Result<MeshSpec, SceneError> {
     Ok(MeshSpec { file, scale: [1.0; 3], at: *value.at() })
 }
 
+fn read_csg(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
+    CsgSpec::read(table).map(ShapeSpec::Csg)
+}
+
 fn size(table: &Table<'_>, key: &str) -> Result<f64, SceneError> {
     table.number(key, Bound::Positive)
 }
@@ -245,8 +279,9 @@ const KINDS: Vocabulary = Vocabulary {
         "capsule",
         "ellipsoid",
         "mesh",
+        "csg",
         "nurbs",
     ],
-    later: &["csg"],
+    later: &[],
 };
 const EXAMPLE: &str = "a table such as { kind = \"sphere\", radius_m = 0.05 }";

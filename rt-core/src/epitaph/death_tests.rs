@@ -141,7 +141,10 @@ fn die_by_stop_signals(cell: &'static EpitaphWords, times: usize) -> ! {
     register.store(3000, Ordering::Relaxed);
     crate::last_act::guard(register, 2048).unwrap();
     let _stop = crate::signals::StopSignals::install().unwrap();
-    (0..times).for_each(|_| nix::sys::signal::raise(nix::sys::signal::Signal::SIGTERM).unwrap());
+    for _ in 0..times {
+        nix::sys::signal::raise(nix::sys::signal::Signal::SIGTERM).unwrap();
+        std::thread::sleep(crate::signals::SAME_REQUEST);
+    }
     std::process::exit(99)
 }
 

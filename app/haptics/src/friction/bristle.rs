@@ -13,8 +13,11 @@
 //! formed together snap together: the first breakaway takes up to `3/2 mu N`.
 //!
 //! Bonds are numbers along the line from god-object to surface point. When that line turns, the bonds'
-//! deviations from their mean turn with it: mirrored at a reversal, projected in between. The random
-//! numbers depend on the seed and on how many were drawn: every run is the same.
+//! deviations from their mean turn with it: mirrored at a reversal, projected in between.
+//!
+//! The random numbers depend on the seed, on how many were drawn, and on how far the bonds were stretched when
+//! the first of this contact snapped: two fingers do not rasp in step, and every run is the same. That stretch is
+//! taken against the load and to 24 bits, so that size, place and direction make no difference.
 //!
 //! Invariants: `|F_t| <= 3/2 mu N`; while no bond snaps it holds. Cost: linear in the bonds.
 
@@ -36,7 +39,9 @@ pub const MAX_BRISTLES: usize = 20;
 /// Words of the memory: first the bonds' stretches (m), then these.
 const MEAN: usize = MAX_BRISTLES;
 const DRAWN: usize = MAX_BRISTLES + 1;
-const _: () = assert!(DRAWN < MEMORY_WORDS);
+/// A number of the contact's own, from the first draw on.
+const OWN: usize = MAX_BRISTLES + 2;
+const _: () = assert!(OWN < MEMORY_WORDS);
 
 /// `delta_s` over the mean stretch of steady sliding.
 const SNAP_OVER_MEAN: f64 = 1.5;
@@ -55,9 +60,10 @@ impl Bristles {
     }
 
     /// Uniform in 0 to 1, 1 excluded.
-    fn draw(&self, drawn: &mut f64) -> f64 {
+    fn draw(&self, own: f64, drawn: &mut f64) -> f64 {
         *drawn += 1.0;
-        (mix(self.seed ^ mix(*drawn as u64)) >> 11) as f64 / (1u64 << 53) as f64
+        let mixed = mix(self.seed ^ mix(own as u64 ^ mix(*drawn as u64)));
+        (mixed >> 11) as f64 / (1u64 << 53) as f64
     }
 }
 
@@ -70,11 +76,15 @@ impl FrictionLaw for Bristles {
         }
         let turn = cosine_of_turn(memory.words[MEAN], query);
         let mean_before_m = memory.words[MEAN];
-        let (mut drawn, mut sum_m, mut holds) = (memory.words[DRAWN], 0.0, true);
+        let (mut own, mut drawn) = (memory.words[OWN], memory.words[DRAWN]);
+        let (mut sum_m, mut holds) = (0.0, true);
         for stretch_m in &mut memory.words[..self.bonds] {
             *stretch_m = query.gap_m + (*stretch_m - mean_before_m) * turn;
             if stretch_m.abs() > snap_m || stretch_m.is_nan() {
-                *stretch_m = (self.draw(&mut drawn) * snap_m).copysign(*stretch_m);
+                if own == 0.0 {
+                    own = own_number(query);
+                }
+                *stretch_m = (self.draw(own, &mut drawn) * snap_m).copysign(*stretch_m);
                 holds = false;
             }
             sum_m += *stretch_m;
@@ -84,7 +94,7 @@ impl FrictionLaw for Bristles {
         let excess_m = sum_m / self.bonds as f64 - mean_m;
         memory.words[..self.bonds].iter_mut().for_each(|stretch_m| *stretch_m -= excess_m);
         memory.words[MEAN] = mean_m;
-        memory.words[DRAWN] = drawn;
+        (memory.words[OWN], memory.words[DRAWN]) = (own, drawn);
         holds
     }
 
@@ -104,6 +114,15 @@ fn cosine_of_turn(before_m: f64, query: &FrictionQuery) -> f64 {
     let cosine = (before_m * before_m + now_m * now_m - path_m * path_m) / twice;
     // Without a direction before or now there is no turn.
     if cosine.is_nan() || twice <= 0.0 { 1.0 } else { cosine.clamp(-1.0, 1.0) }
+}
+
+/// What tells a contact from others: a whole number from 1 on that a word of the memory holds exactly.
+///
+/// Of what the contact sees, as ratios, in single precision: the same from wherever one looks at it.
+fn own_number(query: &FrictionQuery) -> f64 {
+    let bits = |length_m: f64| u64::from(((length_m / query.load_m) as f32).to_bits());
+    let mixed = mix(bits(query.gap_m) << 32 | bits(query.hip_travel_m));
+    (mixed >> 12 | 1) as f64
 }
 
 /// SplitMix64 (G. Steele, D. Lea, C. Flood 2014) of a counter.

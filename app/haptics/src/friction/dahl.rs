@@ -6,7 +6,9 @@
 //! z' = v - |v| z / z_max,    z_max = mu * load
 //! ```
 //!
-//! and the friction force is stiffness times strain. Here the contact's own spring is that stiffness:
+//! and the friction force is stiffness times strain. Dahl's own formula has the exponent i of
+//! `(1 - z / z_max sgn v)^i` for a parameter, which tells brittle materials from ductile ones; here it is 1, which
+//! most who use the model choose, and for which a tick has a closed form. Here the contact's own spring is that stiffness:
 //! `z = S - G`, and v is the velocity of S, which the HIP prescribes. From rest the force rises as
 //! `mu N (1 - exp(-s / z_max))` over the path s; reversing, it falls along another branch: a loop.
 //!

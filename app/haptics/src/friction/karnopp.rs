@@ -10,7 +10,9 @@
 //!
 //! The speed is that of the HIP along the surface, the measured one, for which the band was made: the
 //! god-object's own speed is never in doubt and would need none. Dragged more slowly than `v_min` the
-//! contact sticks and slips by turns. Where the length of a tick is unknown, every speed is zero.
+//! contact sticks and slips by turns. Measured with an encoder, a speed is zero or one step over a tick at least (0.03 mm
+//! in a millisecond are 30 mm/s): a `v_min` below that is never seen, and the contact sticks in each tick in which the
+//! encoder does not count, whatever `v_min` is. Where the length of a tick is unknown, every speed is zero.
 //!
 //! Invariant: `|F_t| <= (mu_s + mu_v v) N`. Cost: a few flops; no memory.
 

@@ -13,8 +13,11 @@
 //! small motions are elastic with hysteresis.
 //!
 //! The damping of the strain and the viscous part are felt along the motion of the HIP, beside the
-//! spring. `z'` is taken along that motion too, which it is unless the direction turns. The damping
-//! is cut so that it never lifts the dry part above `mu_s N`: a fast breakaway must not leave the cone.
+//! spring. `z'` is taken along that motion too, which it is unless the direction turns.
+//!
+//! Deviation: the damping is cut, which that of the model is not. It never lifts the dry part above `mu_s N`, since
+//! a fast breakaway must not leave the cone, and it never drives: where `z'` is against the motion, as after a rise of
+//! speed on the falling curve, it is left out.
 //!
 //! Like Dahl's it yields at every strain: it drifts under noise, and never reports sticking.
 //!

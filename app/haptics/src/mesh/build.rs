@@ -27,6 +27,14 @@ impl Mesh {
     /// # Errors
     /// When the input contradicts itself, or has a defect that cannot be repaired without guessing.
     pub fn build(soup: TriangleSoup) -> Result<(Self, MeshReport), MeshError> {
+        Self::build_and_tell(soup, |_| {})
+    }
+
+    /// As [`Self::build`]; `tell_origin` hears of each face, in order, of which face of the input it is a part.
+    pub(super) fn build_and_tell(
+        soup: TriangleSoup,
+        mut tell_origin: impl FnMut(u32),
+    ) -> Result<(Self, MeshReport), MeshError> {
         soup.validate()?;
         let mut report = MeshReport::default();
         let mut triangles = repair::proper_triangles(&soup, &mut report)?;
@@ -39,6 +47,7 @@ impl Mesh {
         report_edges(&triangles, &links, &mut report);
         let faces: Box<[Face]> =
             triangles.iter().zip(&links).map(|(triangle, links)| face(triangle, links, &vertices)).collect();
+        triangles.iter().for_each(|triangle| tell_origin(triangle.origin));
         drop((triangles, links));
         report.faces = faces.len();
         report.vertices = vertices.len();
@@ -46,7 +55,7 @@ impl Mesh {
         let vertices = vertices.into_boxed_slice();
         let bvh = Bvh::build(&faces, &vertices);
         let identity = BUILT.fetch_add(1, Ordering::Relaxed);
-        Ok((Self { faces, vertices, bvh, sides, extent_m, identity }, report))
+        Ok((Self { faces, vertices, bvh, sides, extent_m, identity, uv: None }, report))
     }
 }
 

@@ -21,14 +21,18 @@ mod clearance;
 mod closest;
 mod inside;
 mod nearest;
+mod parts;
 mod segment;
 mod stack;
 
 use nalgebra::Vector3;
 
 use super::Face;
+pub(in crate::mesh) use closest::closest_on;
 pub use nearest::Nearest;
 pub use segment::Hit;
+#[cfg(test)]
+pub(crate) use stack::POPPED;
 
 /// A hierarchy of boxes around the faces of a mesh.
 ///

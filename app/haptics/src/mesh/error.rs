@@ -1,6 +1,7 @@
 //! Why no mesh can be made of a triangle soup.
 
 use super::soup::LARGEST_COORDINATE_M;
+use super::uv::LARGEST_UV;
 use std::fmt;
 
 /// A defect that cannot be repaired. Faces and vertices are named by their index in the input, from 0.
@@ -48,6 +49,20 @@ pub enum MeshError {
         /// Where that edge begins and ends (m).
         ends_B: [[f64; 3]; 2],
     },
+    /// Not as many triples of texture coordinates as faces.
+    UvNumber {
+        /// How many triples there are.
+        found: usize,
+        /// How many faces there are.
+        faces: usize,
+    },
+    /// A texture coordinate that is not finite, or larger than any picture is repeated.
+    Uv {
+        /// The first face with such a coordinate.
+        face: usize,
+        /// The coordinates of its corners.
+        found: [[f64; 2]; 3],
+    },
     /// More faces around a vertex than may be walked round within a tick.
     Valence {
         /// Where the vertex is (m).
@@ -85,6 +100,15 @@ impl fmt::Display for MeshError {
                 "{edges} edges are shared by more than two faces (first: face {first_face}, {faces} faces at the \
                  edge from {a:?} to {b:?} m); allowed are one or two, or solid parts that touch along the edge: \
                  remove inner walls, separate sheets that meet, wind faces outward"
+            ),
+            Self::UvNumber { found, faces } => write!(
+                f,
+                "{found} faces have texture coordinates, but there are {faces} faces; allowed are three for each"
+            ),
+            Self::Uv { face, found } => write!(
+                f,
+                "face {face} has the texture coordinates {found:?}; allowed are finite numbers, at most \
+                 {LARGEST_UV:e} in size"
             ),
             Self::Valence { at_B, faces, allowed } => write!(
                 f,

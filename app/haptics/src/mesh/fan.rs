@@ -43,7 +43,7 @@ pub(crate) fn for_each_around<'m>(
 
 impl<'m> Sector<'m> {
     /// The sector across one of the corner's two edges, and the edge of that face by which it was reached.
-    fn over(&self, mesh: &'m Mesh, edge: usize) -> Option<(Self, usize)> {
+    pub(super) fn over(&self, mesh: &'m Mesh, edge: usize) -> Option<(Self, usize)> {
         let link = self.facet.face.links[edge];
         let facet = Facet::of(mesh, self.facet.side.across(link)?);
         let shared = link.edge();

@@ -8,9 +8,9 @@
 //! Invariant: between two ticks the finger's path never crosses the mesh unnoticed, also where rounding put its end on
 //! the wrong side.
 //! Limit: a god-object does not see other parts that overlap its own. Let go inside of one, a finger is found there, by
-//! the face nearest to it, unless that face is of another part.
+//! the face nearest to it, or if that face is of another part, by one of its own part.
 //! Cost: free and far, one comparison; free and near, one query of the hierarchy; in contact, independent of the mesh; let go or
-//! found inside, one bounded query more.
+//! found inside, some bounded queries more.
 
 use nalgebra::Vector3;
 use std::cell::Cell;
@@ -98,12 +98,16 @@ impl MeshCone {
         friction: &Friction,
         input: &ConeInput,
     ) -> Option<(ConeForce, Beginning)> {
-        self.touching = found_inside(mesh, &input.hip_B).map(Touching::new);
-        let force = self.touching.as_mut()?.update(mesh, friction, input);
-        if force.is_none() {
-            self.touching = None;
+        self.touching = None;
+        // The one that is nearest may be of a surface that cuts through itself, and lead out of it again.
+        for way_out in mesh.ways_out(&input.hip_B) {
+            let mut touching = Touching::new(Place::nearest(&way_out));
+            if let Some(force) = touching.update(mesh, friction, input) {
+                self.touching = Some(touching);
+                return Some((force, Beginning::WasInside));
+            }
         }
-        Some((force?, Beginning::WasInside))
+        None
     }
 
     /// Whether a contact lives.
@@ -147,7 +151,8 @@ impl MeshCone {
         };
         let Some(from_B) = previous_hip_B.filter(|from_B| !is_elsewhere(from_B)) else {
             self.clear = Clear::default();
-            return found_inside(mesh, hip_B).map(|place| (place, Beginning::WasInside));
+            let way_out = mesh.ways_out(hip_B).next()?;
+            return Some((Place::nearest(&way_out), Beginning::WasInside));
         };
         if self.clear.has(&from_B) && self.clear.has(hip_B) {
             return None;
@@ -158,11 +163,6 @@ impl MeshCone {
         self.clear = Clear { centre_B: *hip_B, radius_m: mesh.clearance(hip_B, mesh.extent_m()) };
         None
     }
-}
-
-/// Where a finger that is inside is pushed out: along the nearest face.
-fn found_inside(mesh: &Mesh, hip_B: &Vector3<f64>) -> Option<Place> {
-    mesh.way_out(hip_B).map(|nearest| Place::nearest(&nearest))
 }
 
 impl Touching {

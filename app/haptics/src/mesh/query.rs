@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Hit, Mesh, Nearest, Sides, Triangles};
+use super::{Face, Hit, Mesh, Nearest, Sides, Triangles};
 
 impl Mesh {
     /// The first face that the segment `from_B -> to_B` enters: from outside, or from either side of a sheet.
@@ -24,17 +24,67 @@ impl Mesh {
         self.bvh.first_hit_of_others(self.triangles(), self.sides, from_B, to_B, is_skipped)
     }
 
-    /// The point of the mesh nearest to a point on either side.
+    /// A point of the mesh nearest to a point on either side, at a cost that a tick can bear.
     ///
-    /// A point that is not finite is answered by a corner of face 0, infinitely far away. Beyond 1000 extents the
-    /// answer is that for a point 1000 extents away in the same direction, with the point's own distance.
+    /// Where very many faces are as near, as at the centre of a ball, it is one of those seen first, and may be a little
+    /// farther away than the very nearest: [`Self::nearest_unbounded`] is that one.
     pub fn nearest(&self, p_B: &Vector3<f64>) -> Nearest {
         self.bvh.nearest(self.triangles(), p_B)
     }
 
-    /// Whether a point is inside or on the surface. A sheet has no inside.
+    /// The point of the mesh nearest to a point on either side. For tools and tests: at the centre of a ball it looks at
+    /// all faces, and no tick has the time for that.
+    ///
+    /// A point that is not finite is answered by a corner of face 0, infinitely far away. Beyond 1000 extents the
+    /// answer is that for a point 1000 extents away in the same direction, with the point's own distance.
+    pub fn nearest_unbounded(&self, p_B: &Vector3<f64>) -> Nearest {
+        self.bvh.nearest_unbounded(self.triangles(), p_B)
+    }
+
+    /// As [`Self::nearest`], if it is as near as this \[m\].
+    pub(crate) fn nearest_within(&self, p_B: &Vector3<f64>, at_most_m: f64) -> Option<Nearest> {
+        self.bvh.nearest_within(self.triangles(), p_B, at_most_m)
+    }
+
+    /// Visits all faces that may be as near as this \[m\], until `visit` says `false`; says whether it never did.
+    pub(crate) fn for_each_within(
+        &self,
+        p_B: &Vector3<f64>,
+        at_most_m: f64,
+        visit: impl FnMut(&Face) -> bool,
+    ) -> bool {
+        self.bvh.for_each_within(self.triangles(), p_B, at_most_m, visit)
+    }
+
+    /// As [`Self::nearest_within`], of faces that reach above a plane that is no nearer than this either.
+    pub(crate) fn nearest_above(
+        &self,
+        p_B: &Vector3<f64>,
+        at_most_m: f64,
+        plane: (&Vector3<f64>, f64),
+    ) -> Option<Nearest> {
+        self.bvh.nearest_above(self.triangles(), p_B, at_most_m, plane)
+    }
+
+    /// Whether a point is inside or on the surface, at a cost that a tick can bear. A sheet has no inside.
+    ///
+    /// Exact unless very many faces are about as near. Of these one is chosen, and the way to it tells; in doubt, a
+    /// point is outside.
     pub fn is_inside(&self, p_B: &Vector3<f64>) -> bool {
-        self.sides == Sides::Solid && self.bvh.is_inside(self.triangles(), p_B)
+        self.way_out(p_B).is_some()
+    }
+
+    /// As [`Self::is_inside`], whatever it costs: for tools and tests.
+    pub fn is_inside_unbounded(&self, p_B: &Vector3<f64>) -> bool {
+        self.sides == Sides::Solid && self.bvh.is_inside_unbounded(self.triangles(), p_B)
+    }
+
+    /// As [`Self::nearest`], and whether the point is inside, as [`Self::is_inside`] says.
+    pub(crate) fn nearest_and_side(&self, p_B: &Vector3<f64>) -> (Nearest, bool) {
+        match self.sides {
+            Sides::Solid => self.bvh.nearest_and_side(self.triangles(), p_B),
+            Sides::Sheet => (self.nearest(p_B), false),
+        }
     }
 
     /// A point of the surface through which to push out what is inside, at a cost that a tick can bear.
@@ -45,6 +95,18 @@ impl Mesh {
             return None;
         }
         self.bvh.way_out(self.triangles(), p_B)
+    }
+
+    /// Ways out of what is inside, to be tried one after the other: that of [`Self::way_out`], and, where the nearest
+    /// face is of another part than the one that the point is inside of, or belongs to it in a roundabout way, faces
+    /// of that part. Each has a cost that a tick can bear, and none if it is not asked for.
+    pub(crate) fn ways_out(&self, p_B: &Vector3<f64>) -> impl Iterator<Item = Nearest> {
+        let may_be_inside = self.sides == Sides::Solid && self.bvh.is_within_box(p_B);
+        let found = may_be_inside.then(|| self.nearest_and_side(p_B));
+        let nearest = found.and_then(|(nearest, is_inside)| is_inside.then_some(nearest));
+        let of_parts = move || self.bvh.ways_out_of_parts(self.triangles(), p_B, &found?.0);
+        let of_parts = std::iter::once_with(of_parts).flatten().flatten();
+        nearest.into_iter().chain(of_parts.filter(|way| way.distance_m.is_finite()))
     }
 
     /// A lower bound of the distance from a point to the mesh, at most `at_most_m`; 0 if nothing better is known

@@ -12,7 +12,9 @@
 //! Invariants: the god-object is on the mesh. A frictionless walk never lengthens the spring, hence ends at a local
 //! minimum of the distance to the HIP.
 //! Cost: two to four face records a tick on small triangles; bounded by [`MAX_FEATURE_CHANGES`], at which the
-//! god-object waits where it is and goes on in the next tick.
+//! god-object waits where it is and goes on in the next tick. Dear are single ticks in which a god-object that was held in
+//! a dale comes over the saddle, and is drawn over centimetres to where the HIP has got to meanwhile: 3 to 10 us for 50 to
+//! 90 faces of a million and a flight; 20 us more for a vertex of 1000 faces, and 60 for a flight that starts at one.
 
 use nalgebra::Vector3;
 

@@ -38,6 +38,47 @@ pub(crate) fn bumpy_sphere(meridians: usize) -> Arc<Mesh> {
     built(make::bumpy_sphere(meridians, path::rings(meridians), 0.1))
 }
 
+/// A ball of 20 * 4^n triangles, all nearly alike.
+pub(crate) fn icosphere(subdivisions: u32, radius_m: f64) -> TriangleSoup {
+    let phi = 0.5 * (1.0 + 5.0_f64.sqrt());
+    let mut vertices = Vec::new();
+    for (a, b) in [(1.0, phi), (-1.0, phi), (1.0, -phi), (-1.0, -phi)] {
+        vertices.extend([Vector3::new(0.0, a, b), Vector3::new(a, b, 0.0), Vector3::new(b, 0.0, a)]);
+    }
+    // Corners of a face are 2 apart.
+    let is_edge = |a: &Vector3<f64>, b: &Vector3<f64>| ((a - b).norm() - 2.0).abs() < 1e-9;
+    let mut faces = Vec::new();
+    for a in 0..12 {
+        for b in a + 1..12 {
+            for c in b + 1..12 {
+                let [p, q, r] = [a, b, c].map(|i| vertices[i]);
+                if is_edge(&p, &q) && is_edge(&q, &r) && is_edge(&r, &p) {
+                    let is_outward = (q - p).cross(&(r - p)).dot(&p) > 0.0;
+                    faces.push(if is_outward { [a, b, c] } else { [a, c, b] }.map(|i| i as u32));
+                }
+            }
+        }
+    }
+    for _ in 0..subdivisions {
+        let mut middles = std::collections::BTreeMap::new();
+        let mut middle = |a: u32, b: u32| {
+            *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                vertices.push(vertices[a as usize].normalize() + vertices[b as usize].normalize());
+                vertices.len() as u32 - 1
+            })
+        };
+        faces = faces
+            .iter()
+            .flat_map(|&[a, b, c]| {
+                let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
+                [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+            })
+            .collect();
+    }
+    let vertices = vertices.iter().map(|v| v.normalize() * radius_m).collect();
+    TriangleSoup { vertices, faces }
+}
+
 /// A prism whose first edge, along z through the origin, has this angle inside the material; up to 350 degrees.
 ///
 /// The material lies around -y. Its two flanks are 0.1 m long, as it is wide; above 180 degrees the edge is concave.
@@ -55,7 +96,7 @@ pub(crate) fn wedge(degrees: f64) -> TriangleSoup {
 }
 
 /// Over an outline that is counter-clockwise seen from +z and seen whole from its first point.
-fn prism(outline: &[[f64; 2]], z: f64) -> TriangleSoup {
+pub(crate) fn prism(outline: &[[f64; 2]], z: f64) -> TriangleSoup {
     let n = outline.len() as u32;
     let end = |z: f64| outline.iter().map(move |p| Vector3::new(p[0], p[1], z));
     let mut soup = TriangleSoup { vertices: end(z).chain(end(-z)).collect(), faces: Vec::new() };

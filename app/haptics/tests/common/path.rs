@@ -52,6 +52,19 @@ pub(crate) fn smooth(_u: f64, _theta: f64) -> f64 {
     R
 }
 
+/// Radius of the fingers with volume that feel these balls \[m\].
+pub(crate) const FINGER_M: f64 = 1e-3;
+
+/// On which such a finger's centre rolls.
+pub(crate) fn smooth_for_a_ball(_u: f64, _theta: f64) -> f64 {
+    R + FINGER_M
+}
+
+/// Nearly that on which such a finger's centre rolls: by less than 0.1 mm, since the bumps are no steeper than 0.4.
+pub(crate) fn bumpy_for_a_ball(u: f64, theta: f64) -> f64 {
+    bumpy(u, theta) + FINGER_M
+}
+
 pub(crate) fn bumpy(u: f64, theta: f64) -> f64 {
     R * (1.0 + 0.05 * (8.0 * u).sin() * (8.0 * theta).sin())
 }

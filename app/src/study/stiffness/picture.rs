@@ -34,6 +34,9 @@ fn chart(title: &str, answers: &[&Answer]) -> Chart {
         let of_mode = || answers.iter().filter(|answer| answer.case.mode == mode);
         let measured: Vec<_> =
             of_mode().filter_map(|answer| Some((answer.case.rate_hz, answer.settled.n_per_m()?))).collect();
+        let kept: Vec<_> = of_mode()
+            .filter_map(|answer| Some((answer.case.rate_hz, answer.kept?.settled.n_per_m()?)))
+            .collect();
         let linear: Vec<_> = of_mode()
             .filter_map(|answer| Some((answer.case.rate_hz, answer.theory.linear.n_per_m()?)))
             .collect();
@@ -43,6 +46,13 @@ fn chart(title: &str, answers: &[&Answer]) -> Chart {
         // A line through one rate is no line.
         let (whole, theory) =
             if measured.len() > 1 { (Look::Line, Look::Dashed) } else { (Look::Dots, Look::Dots) };
+        let chart = if kept.is_empty() {
+            chart
+        } else {
+            chart.with(
+                Series::new(&format!("{}, kept passive", mode.name()), Look::Dots, kept).coloured(index),
+            )
+        };
         chart
             .with(Series::new(mode.name(), whole, measured).coloured(index))
             .with(Series::new(&format!("{}, linear", mode.name()), theory, linear).coloured(index))

@@ -1,6 +1,7 @@
 //! The study's answers as a table for people and as CSV.
 
 use super::Answer;
+use super::kept::Kept;
 use super::search::{Found, LEAST_N_PER_M, MOST_N_PER_M};
 use super::trial::Bench;
 use std::fmt::Write as _;
@@ -37,6 +38,15 @@ damping helps the linear loop, with the plain difference for a velocity, more th
 calmer and some milliseconds late.
 ";
 
+/// The same for the columns of a controller.
+const EXPLANATION_KEPT: &str = "\
+With a finger that is kept passive, by a bound of 8.5 N times what a tick can surprise it with:
+kept      as settled
+half      by how much the controller changes the force of a wall half as stiff as is quiet without: N rms
+twice     the same for one twice as stiff as settles without
+fed       the most that this one ever feeds into the hand, without and with the controller: mJ
+";
+
 /// For people.
 pub fn text(bench: &Bench, answers: &[Answer]) -> String {
     let plant = &bench.plant;
@@ -57,7 +67,7 @@ pub fn text(bench: &Bench, answers: &[Answer]) -> String {
         "{:<16} {:>7} {:<12} {:>6} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}",
         "hand", "damping", "reply", "Hz", "settled", "quiet", "linear", "damped", "passive", "friction"
     );
-    for Answer { case, settled, quiet, theory } in answers {
+    for Answer { case, settled, quiet, theory, .. } in answers {
         let _ = writeln!(
             text,
             "{:<16} {:>7.1} {:<12} {:>6.0} {:>8} {:>8} {:>8} {:>8.0} {:>8.0} {:>8.0}",
@@ -73,7 +83,39 @@ pub fn text(bench: &Bench, answers: &[Answer]) -> String {
             theory.friction
         );
     }
-    text + "\n" + EXPLANATION
+    text += "\n";
+    if answers.iter().any(|answer| answer.kept.is_some()) {
+        text += &kept_text(answers);
+        text += "\n";
+        text += EXPLANATION_KEPT;
+        text += "\n";
+    }
+    text + EXPLANATION
+}
+
+fn kept_text(answers: &[Answer]) -> String {
+    let mut text = format!(
+        "{:<16} {:>7} {:<12} {:>6} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}\n",
+        "hand", "damping", "reply", "Hz", "settled", "kept", "half", "twice", "fed", "kept fed"
+    );
+    for Answer { case, settled, kept, .. } in answers {
+        let Some(kept) = kept else { continue };
+        let _ = writeln!(
+            text,
+            "{:<16} {:>7.1} {:<12} {:>6.0} {:>8} {:>8} {:>8.4} {:>8.4} {:>8.2} {:>8.2}",
+            case.hand.name(),
+            case.damping_n_s_per_m,
+            case.mode.name(),
+            case.rate_hz,
+            shown(*settled),
+            shown(kept.settled),
+            kept.half.kept.changed_rms_n,
+            kept.twice.kept.changed_rms_n,
+            kept.twice.bare.fed_most_j * 1e3,
+            kept.twice.kept.fed_most_j * 1e3
+        );
+    }
+    text
 }
 
 fn shown(found: Found) -> String {
@@ -94,11 +136,14 @@ pub fn write_csv(file: &Path, bench: &Bench, answers: &[Answer]) -> Result<(), T
 
 fn csv(bench: &Bench, answers: &[Answer]) -> String {
     let mut text = String::from(
-        "hand,axis,damping_n_s_per_m,reply,rate_hz,settled_n_per_m,quiet_n_per_m,linear_n_per_m,damped_n_per_m,passive_n_per_m,friction_n_per_m\n",
+        "hand,axis,damping_n_s_per_m,reply,rate_hz,settled_n_per_m,quiet_n_per_m,linear_n_per_m,damped_n_per_m,passive_n_per_m,friction_n_per_m",
     );
+    let has_kept = answers.iter().any(|answer| answer.kept.is_some());
+    text += if has_kept { KEPT_COLUMNS } else { "" };
+    text.push('\n');
     let number = |found: Found| found.n_per_m().map_or_else(String::new, |n| n.to_string());
-    for Answer { case, settled, quiet, theory } in answers {
-        let _ = writeln!(
+    for Answer { case, settled, quiet, theory, kept } in answers {
+        let _ = write!(
             text,
             "{},{:?},{},{},{},{},{},{},{},{},{}",
             case.hand.name(),
@@ -113,6 +158,24 @@ fn csv(bench: &Bench, answers: &[Answer]) -> String {
             theory.passive,
             theory.friction
         );
+        if let Some(Kept { settled, half, twice }) = kept {
+            let _ = write!(
+                text,
+                ",{},{},{},{},{},{},{}",
+                number(*settled),
+                half.kept.changed_rms_n,
+                half.kept.changed_most_n,
+                twice.kept.changed_rms_n,
+                twice.kept.changed_most_n,
+                twice.bare.fed_most_j,
+                twice.kept.fed_most_j
+            );
+        }
+        text.push('\n');
     }
     text
 }
+
+/// Only where they were asked for.
+const KEPT_COLUMNS: &str = ",kept_n_per_m,half_changed_rms_n,half_changed_most_n,twice_changed_rms_n,\
+    twice_changed_most_n,twice_fed_j,twice_kept_fed_j";

@@ -4,6 +4,8 @@
 //! wants to be some millimetres behind the surface, or above it; half a second after full authority it wants to be
 //! deeper by its push. What counts is what the counters say from two seconds after the push on, for a quarter of a second: it has
 //! settled if no joint's counter moves by two counts or more.
+//! On the way it is summed up what energy the force that the motors rendered fed into the hand, apart from any
+//! controller's own account, and by how much a passivity controller changed the force, if there is one.
 //! The whole system runs: driver cycle with all its limits, shared memory, fast step; only the waiting is left out.
 
 use super::case::{Axis, Case};
@@ -12,10 +14,12 @@ use crate::fast_loop::{FastLoop, Turn, WhenFull};
 use crate::fast_step::{DeviceFinger, FastStep};
 use crate::mount::Mount;
 use crate::outcome::RunFailure;
+use crate::row::Row;
 use crate::simulated::SimulatedDevices;
 use crate::slow::row_queue;
 use crate::virtual_clock::VirtualDriver;
 use bytemuck::Zeroable;
+use haptics::passivity::{Passivity, PassivitySpec};
 use haptics::{Entity, Finger, Plane};
 use io_driver::config::{
     DeviceConfig, DriverConfig, ProcessConfig, RealTime, ReplyConfig, SafetyConfig, Wish, Zeroing, period_of,
@@ -23,6 +27,7 @@ use io_driver::config::{
 use io_driver::open::ROUND_TRIP_NS;
 use io_driver::sim::hand::HandModel;
 use nalgebra::{Isometry3, Vector3};
+use rtrb::Consumer;
 use shm_abi::segment::ClockMode;
 use shm_abi::{DriverState, Frame};
 use std::path::{Path, PathBuf};
@@ -57,12 +62,13 @@ pub struct Bench {
 pub struct Trial {
     driver: VirtualDriver,
     fast: FastLoop,
+    rows: Consumer<Row>,
     ticks: u64,
     look_from: i64,
 }
 
 /// What came of a trial.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outcome {
     /// By how much the counter of the worst joint moved while it was looked at.
     pub ripple_counts: i64,
@@ -70,9 +76,20 @@ pub struct Outcome {
     pub changes: u32,
     /// The driver ended in its fault state: the arm was too fast.
     pub is_fault: bool,
+    /// The most that the rendered force had fed into the hand at any time since full authority (J).
+    pub fed_most_j: f64,
+    /// By how much a controller changed the force, in the mean square and at most (N).
+    pub changed_rms_n: f64,
+    /// At most (N).
+    pub changed_most_n: f64,
 }
 
 impl Outcome {
+    /// The driver stopped it.
+    fn fault(felt: &Felt) -> Self {
+        felt.outcome(i64::MAX, u32::MAX, true)
+    }
+
     /// Whether nothing buzzes either: a counter may creep over a count, but not flicker.
     pub fn is_quiet(&self) -> bool {
         self.settles() && self.changes <= CHANGES
@@ -115,18 +132,41 @@ impl Bench {
     /// # Errors
     /// If the devices or the memory cannot be had.
     pub fn open(&self, case: &Case, stiffness_n_per_m: f64) -> Result<Trial, RunFailure> {
+        self.open_with(case, stiffness_n_per_m, None)
+    }
+
+    /// The same with a finger that is kept passive, by the numbers of this arm.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn open_kept(&self, case: &Case, stiffness_n_per_m: f64) -> Result<Trial, RunFailure> {
+        let period_s = self.config(case).period_ns as f64 / 1e9;
+        let usual = PassivitySpec::usual(period_s);
+        let of_arm = PassivitySpec::for_motion(period_s, usual.acceleration_m_per_s2, self.plant.count_m);
+        let spec = PassivitySpec { device_friction_n: self.plant.coulomb_n, ..of_arm };
+        let passivity =
+            Passivity::new(spec, period_s).map_err(|error| RunFailure::Start(error.to_string()))?;
+        self.open_with(case, stiffness_n_per_m, Some(passivity))
+    }
+
+    fn open_with(
+        &self,
+        case: &Case,
+        stiffness_n_per_m: f64,
+        passivity: Option<Passivity>,
+    ) -> Result<Trial, RunFailure> {
         let config = self.config(case);
         let period_ns = config.period_ns;
         let wall = self.wall(stiffness_n_per_m, case.damping_n_s_per_m)?;
         let finger = Finger::new(0.0, 1).map_err(|error| RunFailure::Start(error.to_string()))?;
         let finger = DeviceFinger { finger, device: 0, mount: Mount::new(Isometry3::identity()) };
-        let step = FastStep::new(vec![finger], vec![wall], period_ns);
-        // Nobody reads the rows.
-        let (rows, _) = row_queue();
+        let step = FastStep::new(vec![finger], vec![wall], period_ns).with_passivities([passivity]);
+        let (producer, rows) = row_queue();
         let ticks = |s: f64| (s * 1e9 / period_ns as f64).round();
         Ok(Trial {
             driver: VirtualDriver::open(&config)?,
-            fast: FastLoop::new(step, rows, WhenFull::Drop, u64::MAX, period_ns),
+            fast: FastLoop::new(step, producer, WhenFull::Drop, u64::MAX, period_ns),
+            rows,
             ticks: config.safety.ramp_in_ticks + ticks(PUSH_S + SETTLE_S + LOOK_S) as u64,
             look_from: ticks(PUSH_S + SETTLE_S) as i64,
         })
@@ -194,10 +234,14 @@ impl Trial {
     pub fn run(mut self) -> Result<Outcome, RunFailure> {
         let mut frame = Frame::zeroed();
         let mut seen: Option<[Counter; 3]> = None;
+        let mut felt = Felt::default();
         for tick in 1..=self.ticks {
             let turn = self.driver.tick(tick, &mut self.fast);
+            while let Ok(row) = self.rows.pop() {
+                felt.take(&row);
+            }
             if matches!(turn, Turn::Fault(_)) {
-                return Ok(Outcome { ripple_counts: i64::MAX, changes: u32::MAX, is_fault: true });
+                return Ok(Outcome::fault(&felt));
             }
             let is_read = self.driver.view().read_frame(tick, &mut frame).is_ok();
             if is_read && frame.state == DriverState::Active as u64 && frame.run_tick >= self.look_from {
@@ -208,13 +252,47 @@ impl Trial {
         }
         // Full authority that never came is no quiet wall.
         let Some(counters) = seen else {
-            return Ok(Outcome { ripple_counts: i64::MAX, changes: u32::MAX, is_fault: true });
+            return Ok(Outcome::fault(&felt));
         };
-        Ok(Outcome {
-            ripple_counts: counters.iter().map(|counter| counter.most - counter.least).max().unwrap_or(0),
-            changes: counters.iter().map(|counter| counter.changes).max().unwrap_or(0),
-            is_fault: false,
-        })
+        let ripple_counts = counters.iter().map(|counter| counter.most - counter.least).max().unwrap_or(0);
+        let changes = counters.iter().map(|counter| counter.changes).max().unwrap_or(0);
+        Ok(felt.outcome(ripple_counts, changes, false))
+    }
+}
+
+/// What the finger felt since full authority.
+#[derive(Debug, Clone, Copy, Default)]
+struct Felt {
+    /// Where it was and what the motors held then.
+    last: Option<(Vector3<f64>, Vector3<f64>)>,
+    fed_j: f64,
+    fed_most_j: f64,
+    changed_squared: f64,
+    changed_most_n: f64,
+    rows: f64,
+}
+
+impl Felt {
+    fn take(&mut self, row: &Row) {
+        let finger = &row.fingers[0];
+        if let Some((hip, held)) = self.last.replace((finger.hip, finger.applied_on_user)) {
+            self.fed_j += held.dot(&(finger.hip - hip));
+        }
+        self.fed_most_j = self.fed_most_j.max(self.fed_j);
+        self.changed_squared += finger.controlled_n * finger.controlled_n;
+        self.changed_most_n = self.changed_most_n.max(finger.controlled_n);
+        self.rows += 1.0;
+    }
+
+    fn outcome(&self, ripple_counts: i64, changes: u32, is_fault: bool) -> Outcome {
+        Outcome {
+            ripple_counts,
+            changes,
+            is_fault,
+            fed_most_j: self.fed_most_j,
+            changed_rms_n: (self.changed_squared / self.rows.max(1.0)).sqrt(),
+            changed_most_n: self.changed_most_n,
+        }
     }
 }
 

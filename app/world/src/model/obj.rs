@@ -1,15 +1,15 @@
 //! Wavefront OBJ: vertices and polygons.
 //!
 //! Read: `v x y z` (with a weight or a colour behind it, ignored) and `f` with three or more corners `a`, `a/b`, `a//c`
-//! or `a/b/c`; negative indices count back from the last vertex. Polygons are divided into triangles. Ignored: texture
-//! coordinates, normals, groups, materials (their file need not be there), lines and points. Refused: free-form curves
+//! or `a/b/c`; negative indices count back from the last vertex; texture coordinates `vt`, if a picture is to lie on the
+//! model. Polygons are divided into triangles. Ignored: normals, groups, materials (their file need not be there), lines and points. Refused: free-form curves
 //! and surfaces, which have no polygons.
 //!
 //! A face may name a vertex that comes later in the file, so polygons are divided when all vertices are known.
 
 use super::polygon::{MAX_CONCAVE_CORNERS, triangulate};
 use super::{ModelError, number, shown};
-use haptics::mesh::TriangleSoup;
+use haptics::mesh::{CornerUv, TriangleSoup};
 use nalgebra::Vector3;
 use std::borrow::Cow;
 
@@ -28,6 +28,34 @@ pub fn read_obj(bytes: &[u8]) -> Result<TriangleSoup, ModelError> {
         begin = end as usize;
     }
     if faces.is_empty() { Err(ModelError::NoTriangle) } else { Ok(TriangleSoup { vertices, faces }) }
+}
+
+/// Reads an OBJ file whose faces have texture coordinates; one triple for each triangle of the soup.
+///
+/// # Errors
+/// As [`read_obj`]; a corner of a face without a texture coordinate.
+pub fn read_obj_with_uv(bytes: &[u8]) -> Result<(TriangleSoup, Vec<CornerUv>), ModelError> {
+    let Polygons { vertices, corners, polygons } = Polygons::read(bytes)?;
+    let textures = Textures::read(bytes)?;
+    let (mut faces, mut uv, mut divided) = (Vec::with_capacity(polygons.len()), Vec::new(), Vec::new());
+    let mut begin = 0;
+    for Polygon { line, end } in polygons {
+        let of_polygon = begin..end as usize;
+        // By the number of the corner within its polygon, which tells its vertex and its texture coordinate.
+        let numbers: Vec<u32> = (0..of_polygon.len() as u32).collect();
+        let places: Vec<Vector3<f64>> =
+            corners[of_polygon.clone()].iter().map(|&corner| vertices[corner as usize]).collect();
+        divided.clear();
+        triangulate(&numbers, &places, &mut divided)
+            .ok_or_else(|| indivisible(line as usize, numbers.len()))?;
+        for face in &divided {
+            let at = face.map(|number| begin + number as usize);
+            faces.push(at.map(|corner| corners[corner]));
+            uv.push(at.map(|corner| textures.uv[textures.corners[corner] as usize]));
+        }
+        begin = end as usize;
+    }
+    if faces.is_empty() { Err(ModelError::NoTriangle) } else { Ok((TriangleSoup { vertices, faces }, uv)) }
 }
 
 /// The line on which the polygon begins that became triangle `face` (counted from 0) of what [`read_obj`] returns.
@@ -161,6 +189,88 @@ impl Polygons {
         };
         index.ok_or_else(|| out_of_range(line, &number.to_string(), count))
     }
+}
+
+/// What the file says of texture coordinates. It is read apart from the polygons, so that files without cost nothing.
+#[derive(Default)]
+struct Textures {
+    uv: Vec<[f64; 2]>,
+    /// Of all corners of all polygons, one after another.
+    corners: Vec<u32>,
+}
+
+impl Textures {
+    /// Of a file whose polygons have been read, and whose corners are sound.
+    fn read(bytes: &[u8]) -> Result<Self, ModelError> {
+        let mut read = Self::default();
+        let mut awaited = Vec::new();
+        for (line, statement) in Statements::new(bytes) {
+            let mut words = words(&statement);
+            match words.next() {
+                Some(b"vt") => read.uv.push(texture(line, words)?),
+                Some(b"f" | b"fo") => {
+                    for word in words {
+                        let index = read.index(line, word)?;
+                        if index as usize >= read.uv.len() {
+                            awaited.push((line, index));
+                        }
+                        read.corners.push(index);
+                    }
+                }
+                _ => {}
+            }
+        }
+        let count = read.uv.len();
+        match awaited.into_iter().find(|(_, index)| *index as usize >= count) {
+            Some((line, index)) => Err(no_texture(line, &(u64::from(index) + 1).to_string(), count)),
+            None => Ok(read),
+        }
+    }
+
+    /// The texture coordinate that a corner such as `7/2` or `7/-1/3` names, counted from 0.
+    fn index(&self, line: usize, word: &[u8]) -> Result<u32, ModelError> {
+        let Some(number) = word.split(|&byte| byte == b'/').nth(1).and_then(integer) else {
+            let found = format!("corner {} without a texture coordinate", shown(word));
+            let allowed =
+                "corners such as 7/2 or 7/2/3, and lines `vt`, since a picture is to lie on this model"
+                    .into();
+            return Err(ModelError::Line { line, found, allowed });
+        };
+        let count = self.uv.len();
+        let index = match number {
+            1.. => u32::try_from(number - 1).ok(),
+            0 => None,
+            _ => usize::try_from(count as i64 + number).ok().map(|index| index as u32),
+        };
+        index.ok_or_else(|| no_texture(line, &number.to_string(), count))
+    }
+}
+
+/// One or two coordinates; a third may follow, for textures with a depth.
+fn texture<'l>(line: usize, words: impl Iterator<Item = &'l [u8]>) -> Result<[f64; 2], ModelError> {
+    let (mut uv, mut count) = ([0.0; 2], 0);
+    for word in words {
+        let Some(number) = number(word) else {
+            return Err(ModelError::Line { line, found: shown(word), allowed: "a finite number".into() });
+        };
+        if let Some(coordinate) = uv.get_mut(count) {
+            *coordinate = number;
+        }
+        count += 1;
+    }
+    if (1..=3).contains(&count) {
+        return Ok(uv);
+    }
+    let allowed = "one to three of them".into();
+    Err(ModelError::Line { line, found: format!("a texture coordinate of {count} numbers"), allowed })
+}
+
+fn no_texture(line: usize, index: &str, count: usize) -> ModelError {
+    let allowed = match count {
+        0 => "a texture coordinate, but there is none".into(),
+        count => format!("1 to {count}, or -{count} to -1, since there are {count} texture coordinates"),
+    };
+    ModelError::Line { line, found: format!("texture coordinate {index}"), allowed }
 }
 
 /// A whole number of a few digits; none is longer in a file that we read.

@@ -1,5 +1,6 @@
 //! What a scene or layout file can have wrong, and exactly what its author is told.
 
+mod effects;
 mod values;
 mod words;
 

@@ -15,7 +15,7 @@ fn a_value_of_the_wrong_type_is_named_with_what_was_found() {
     refused(
         &with_shape("{ kind = 3 }"),
         "s.toml:4: entity[0].shape.kind: found 3; allowed: plane, sphere, box, cylinder, cone, torus, capsule, \
-         ellipsoid, mesh, nurbs",
+         ellipsoid, mesh, csg, nurbs",
     );
     refused(
         &with_shape("\"sphere\""),
@@ -346,10 +346,31 @@ fn a_size_that_no_shape_has_is_refused() {
             "{ kind = \"sphere\", radius_m = 1, scale = \"2\" }",
             "scale: found the string \"2\"; allowed: a number above 0, or an array of 3 numbers above 0",
         ),
+        ("{ kind = \"csg\", op = \"union\" }", CHILDREN),
+        (
+            "{ kind = \"csg\", op = \"union\", children = [] }",
+            &CHILDREN.replace("missing", "found an array of length 0"),
+        ),
+        (
+            "{ kind = \"csg\", op = \"minus\", children = [] }",
+            "op: unknown operation `minus`; allowed: union, intersection, difference",
+        ),
+        (
+            "{ kind = \"csg\", op = \"union\", children = [{ shape = { kind = \"mesh\", file = \"a.obj\" } }] }",
+            "children[0].shape.kind: found the string \"mesh\"; \
+             allowed: in a csg: plane, sphere, box, cylinder, cone, torus, capsule, ellipsoid, csg",
+        ),
+        (
+            "{ kind = \"csg\", op = \"union\", children = [{ shape = { kind = \"sphere\", radius_m = 1 }, pose = 1 }] }",
+            "children[0].pose: unknown key; allowed: shape, position_m, orientation_wxyz",
+        ),
     ] {
         refused(&with_shape(shape), &format!("s.toml:4: entity[0].shape.{message}"));
     }
 }
+
+const CHILDREN: &str = "children: missing; allowed: an array of tables such as { shape = { kind = \"sphere\", \
+                        radius_m = 0.05 }, position_m = [0, 0, 0] }, at least one";
 
 #[test]
 fn a_friction_that_no_surface_has_is_refused() {

@@ -6,8 +6,7 @@ use world::Scene;
 
 use crate::{refused, with_entity, with_finger, with_shape, with_top};
 
-const ENTITY_KEYS: &str =
-    "name, shape, position_m, orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction, algorithm";
+const ENTITY_KEYS: &str = "name, shape, position_m, orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction, algorithm, material, shading, height_map, magnetism, vibration";
 
 #[test]
 fn text_that_is_not_toml_is_refused_with_line_and_column() {
@@ -29,28 +28,28 @@ fn an_unknown_key_is_refused_with_what_was_probably_meant() {
     refused(
         &with_top("gravity = [0.0, 0.0, 0.0]"),
         "s.toml:2: gravity: unknown key (did you mean `gravity_m_s2`?); allowed: name, \
-         gravity_m_s2, hand, finger, entity",
+         gravity_m_s2, hand, finger, entity, field, guide",
     );
     refused(
         &with_finger("raduis_m = 0.01"),
         "s.toml:4: finger[0].raduis_m: unknown key (did you mean `radius_m`?); allowed: name, \
-         radius_m, start_m, device",
+         radius_m, start_m, device, passivity",
     );
     refused(
         &with_entity("colour = \"red\""),
         "s.toml:8: entity[0].colour: unknown key; allowed: name, shape, position_m, \
-         orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction, algorithm",
+         orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction, algorithm, material, shading, height_map, magnetism, vibration",
     );
     refused(
         &with_entity("stifness_n_per_m = 1"),
         "s.toml:8: entity[0].stifness_n_per_m: unknown key (did you mean `stiffness_n_per_m`?); \
          allowed: name, shape, position_m, orientation_wxyz, stiffness_n_per_m, \
-         damping_n_s_per_m, friction, algorithm",
+         damping_n_s_per_m, friction, algorithm, material, shading, height_map, magnetism, vibration",
     );
     refused(
         &with_entity("\"two words\" = 1"),
         "s.toml:8: entity[0].\"two words\": unknown key; allowed: name, shape, position_m, \
-         orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction, algorithm",
+         orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction, algorithm, material, shading, height_map, magnetism, vibration",
     );
     refused(
         &with_shape("{ kind = \"sphere\", radius_m = 1, normal = [0, 1, 0] }"),
@@ -59,7 +58,7 @@ fn an_unknown_key_is_refused_with_what_was_probably_meant() {
     refused(
         "[[finger]]\n[[entitys]]\n",
         "s.toml:2: entitys: unknown key (did you mean `entity`?); allowed: name, gravity_m_s2, \
-         hand, finger, entity",
+         hand, finger, entity, field, guide",
     );
 }
 
@@ -67,7 +66,7 @@ fn an_unknown_key_is_refused_with_what_was_probably_meant() {
 fn of_several_unknown_keys_the_first_in_the_file_is_named() {
     refused(
         "zebra = 1\napple = 2\n[[finger]]\n",
-        "s.toml:1: zebra: unknown key; allowed: name, gravity_m_s2, hand, finger, entity",
+        "s.toml:1: zebra: unknown key; allowed: name, gravity_m_s2, hand, finger, entity, field, guide",
     );
 }
 
@@ -92,24 +91,16 @@ fn a_key_of_the_format_that_this_version_lacks_is_told_apart_from_an_unknown_one
         &with_entity("mass = 0.1"),
         "s.toml:8: entity[0].mass: unknown key (did you mean `mass_kg`, which is not available \
          in this version?); allowed: name, shape, position_m, orientation_wxyz, \
-         stiffness_n_per_m, damping_n_s_per_m, friction, algorithm",
+         stiffness_n_per_m, damping_n_s_per_m, friction, algorithm, material, shading, height_map, magnetism, vibration",
     );
 }
 
-const KINDS: &str = "plane, sphere, box, cylinder, cone, torus, capsule, ellipsoid, mesh, nurbs";
+const KINDS: &str = "plane, sphere, box, cylinder, cone, torus, capsule, ellipsoid, mesh, csg, nurbs";
 const MODELS: &str = "none, coulomb, stiction, viscous, coulomb-viscous, stribeck, karnopp, dahl, lugre, curve, bristle, \
                       reset-integrator, hayward, fixed-cone";
 
 #[test]
 fn a_shape_kind_that_this_version_lacks_is_told_apart_from_an_unknown_one() {
-    let later = ["csg"];
-    for kind in later {
-        let message = format!(
-            "s.toml:4: entity[0].shape.kind: shape kind `{kind}` is not available in this version; \
-             available: {KINDS}"
-        );
-        refused(&with_shape(&format!("{{ kind = \"{kind}\", size_m = [1, 1, 1] }}")), &message);
-    }
     let unknown =
         |found: &str| format!("s.toml:4: entity[0].shape.kind: unknown shape kind {found}; allowed: {KINDS}");
     refused(
@@ -189,7 +180,7 @@ fn a_missing_key_is_named_with_what_may_stand_there() {
     refused(
         &with_shape("{ radius_m = 1 }"),
         "s.toml:4: entity[0].shape.kind: missing; allowed: plane, sphere, box, cylinder, cone, torus, capsule, \
-         ellipsoid, mesh, nurbs",
+         ellipsoid, mesh, csg, nurbs",
     );
     refused(
         &with_shape("{ kind = \"sphere\" }"),

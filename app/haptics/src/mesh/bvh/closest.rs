@@ -15,17 +15,17 @@ use crate::surface::Feature;
 
 /// A point of a triangle.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Closest {
-    pub(super) feature: Feature,
+pub(in crate::mesh) struct Closest {
+    pub(in crate::mesh) feature: Feature,
     /// Which edge or corner.
-    pub(super) corner: usize,
-    pub(super) point_B: Vector3<f64>,
-    pub(super) squared_distance: f64,
+    pub(in crate::mesh) corner: usize,
+    pub(in crate::mesh) point_B: Vector3<f64>,
+    pub(in crate::mesh) squared_distance: f64,
 }
 
 /// None may be answered if it is farther than the root of `at_most`, which saves half of the work.
 #[inline]
-pub(super) fn closest_on(
+pub(in crate::mesh) fn closest_on(
     face: &Face,
     corners: &[Vector3<f64>; 3],
     p: &Vector3<f64>,

@@ -60,35 +60,72 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
         is_skipped: impl Fn(u32) -> bool,
     ) -> Option<Hit> {
         let segment = Segment::new(from_B, to_B, sides, self.extent_m());
-        let clipped = Clipped::new(&segment, &self.lower_B, &self.upper_B)?;
+        self.first_of(triangles, &segment, is_skipped, usize::MAX).unwrap_or(None)
+    }
+
+    /// As [`Self::first_hit_of_others`]; an error if it is not known when so many nodes and runs of faces have been
+    /// visited.
+    pub(super) fn first_hit_of_visited(
+        &self,
+        triangles: Triangles<'_>,
+        sides: Sides,
+        from_B: &Vector3<f64>,
+        to_B: &Vector3<f64>,
+        is_skipped: impl Fn(u32) -> bool,
+        most_visits: usize,
+    ) -> Result<Option<Hit>, TooManyVisits> {
+        let segment = Segment::new(from_B, to_B, sides, self.extent_m());
+        self.first_of(triangles, &segment, is_skipped, most_visits)
+    }
+
+    #[inline(always)]
+    fn first_of(
+        &self,
+        triangles: Triangles<'_>,
+        segment: &Segment,
+        is_skipped: impl Fn(u32) -> bool,
+        most_visits: usize,
+    ) -> Result<Option<Hit>, TooManyVisits> {
+        let Some(clipped) = Clipped::new(segment, &self.lower_B, &self.upper_B) else { return Ok(None) };
         let line = Line::new(segment.path, clipped.end);
         let slabs = Slabs::new(&clipped);
         let mut best: Option<Met> = None;
         let mut limit = 1.0;
+        let mut visits = 0;
         let mut stack = Stack::<f32>::new();
         while let Some((entered, child)) = stack.pop() {
             if entered > limit {
                 continue;
             }
+            if visits == most_visits {
+                return Err(TooManyVisits);
+            }
+            visits += 1;
             if child.count() == 0 {
                 let node = &self.nodes[child.index()];
                 stack.push(&slabs.entries(node, limit), &node.children, limit);
                 continue;
             }
             for index in child.index()..child.index() + child.count() {
-                let Some(met) = segment.meets(triangles, index as u32, &line) else { continue };
-                if is_skipped(met.face) {
+                // First, since of a thousand faces that share the place where the segment starts each would be near
+                // enough to be looked at closely.
+                if is_skipped(index as u32) {
                     continue;
                 }
+                let Some(met) = segment.meets(triangles, index as u32, &line) else { continue };
                 if best.is_none_or(|best| (met.fraction, met.face) < (best.fraction, best.face)) {
                     best = Some(met);
                     limit = clipped.fraction(met.fraction);
                 }
             }
         }
-        best.map(|met| segment.hit(triangles, met))
+        Ok(best.map(|met| segment.hit(triangles, met)))
     }
 }
+
+/// A query met its bound.
+#[derive(Debug)]
+pub(super) struct TooManyVisits;
 
 /// The segment and what its distances from planes are compared with.
 struct Segment {

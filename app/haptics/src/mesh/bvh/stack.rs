@@ -16,6 +16,8 @@ impl<Key: Copy + Default + PartialOrd> Stack<Key> {
 
     #[inline(always)]
     pub(super) fn pop(&mut self) -> Option<(Key, Child)> {
+        #[cfg(test)]
+        POPPED.set(POPPED.get() + 1);
         self.len = self.len.checked_sub(1)?;
         self.entries.get(self.len).copied()
     }
@@ -47,4 +49,10 @@ impl<Key: Copy + Default + PartialOrd> Stack<Key> {
         self.entries[at] = (key, child);
         self.len += 1;
     }
+}
+
+#[cfg(test)]
+thread_local! {
+    /// What queries of this thread have taken off their stacks: nodes and runs of faces, visited or ruled out.
+    pub(crate) static POPPED: std::cell::Cell<usize> = const { std::cell::Cell::new(0) };
 }

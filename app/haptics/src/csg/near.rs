@@ -1,0 +1,295 @@
+//! What of a solid matters near a point: a few patches, and the tree as a table over their sides.
+//!
+//! Model: within a ball around an anchor, all patches whose level there exceeds the ball's radius keep their side. The
+//! others, at most eight, make up to 256 combinations of sides; for each the tree is evaluated once, all of them at once:
+//! a leaf is a bit pattern of 256 bits, and union, intersection and difference are single operations on them. With
+//! the table in hand the solid is `table[sides]`, whatever the tree was.
+//!
+//! Invariants: a patch that is not listed keeps its side within the ball. If more than eight are near, the ball is as
+//! small as it must be for eight, but not smaller than [`SMALLEST`].
+//! Cost: a ball test per leaf, a level per patch of the leaves nearby; seldom twice.
+
+use nalgebra::Vector3;
+
+use super::patch::Patch;
+use super::{Csg, CsgOp, Item, STACK, Step};
+
+/// The patches near an anchor, and the solid in terms of their sides.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Neighbourhood {
+    pub(super) anchor_B: Vector3<f64>,
+    /// Within which it is true (m).
+    pub(super) radius_m: f64,
+    /// The patches, by their numbers in the solid.
+    patches: [u16; MAX_NEAR],
+    count: usize,
+    table: Table,
+}
+
+/// A bit for each combination of sides: whether that is inside the solid.
+type Table = [u64; 4];
+
+/// Sides of the listed patches: a bit for each, set inside. Their place in the list is their bit's.
+pub(super) type Sides = usize;
+
+/// The most patches of a neighbourhood.
+pub(super) const MAX_NEAR: usize = 8;
+
+impl Neighbourhood {
+    /// All that matters within `wish_m` of a point, or within less if that would be too much.
+    pub(super) fn around(csg: &Csg, anchor_B: &Vector3<f64>, wish_m: f64) -> Self {
+        let smallest_m = SMALLEST * csg.extent_m;
+        let mut radius_m = wish_m.max(smallest_m);
+        for _ in 0..MAX_TRIES {
+            match gather(csg, anchor_B, radius_m, false) {
+                Ok(neighbourhood) => return neighbourhood,
+                // Just below the ninth, or a part of it if that cannot be told.
+                Err(ninth_m) if ninth_m < radius_m => radius_m = ninth_m * JUST_BELOW,
+                Err(_) => radius_m *= 0.25,
+            }
+            if radius_m <= smallest_m {
+                break;
+            }
+        }
+        gather(csg, anchor_B, smallest_m, true).unwrap_or(Self::nowhere(anchor_B))
+    }
+
+    fn nowhere(anchor_B: &Vector3<f64>) -> Self {
+        Self { anchor_B: *anchor_B, radius_m: 0.0, patches: [0; MAX_NEAR], count: 0, table: NOTHING }
+    }
+
+    pub(super) fn holds(&self, point_B: &Vector3<f64>, reach_m: f64) -> bool {
+        (point_B - self.anchor_B).norm() + reach_m <= self.radius_m
+    }
+
+    /// How many patches it lists.
+    pub(super) fn count(&self) -> usize {
+        self.count
+    }
+
+    #[inline(always)]
+    pub(super) fn patch<'c>(&self, csg: &'c Csg, index: usize) -> &'c Patch {
+        &csg.patches[usize::from(self.patches[index])]
+    }
+
+    /// A patch's number in the solid.
+    pub(super) fn number(&self, index: usize) -> u16 {
+        self.patches[index]
+    }
+
+    /// Where a patch is listed.
+    pub(super) fn position(&self, number: u16) -> Option<usize> {
+        self.patches[..self.count].iter().position(|&patch| patch == number)
+    }
+
+    /// Whether these sides are inside the solid.
+    #[inline(always)]
+    pub(super) fn is_solid(&self, sides: Sides) -> bool {
+        self.table[(sides >> 6) & 3] >> (sides & 63) & 1 == 1
+    }
+
+    /// Nothing in it but free space.
+    pub(super) fn is_empty(&self) -> bool {
+        self.table == [0; 4]
+    }
+
+    /// The sides of a point.
+    #[inline(always)]
+    pub(super) fn sides(&self, csg: &Csg, point_B: &Vector3<f64>) -> Sides {
+        (0..self.count).fold(0, |sides, index| {
+            sides | usize::from(self.patch(csg, index).level(point_B) <= 0.0) << index
+        })
+    }
+}
+
+/// The patches within a radius, or from which distance on there would be too many.
+fn gather(csg: &Csg, anchor_B: &Vector3<f64>, radius_m: f64, keep_eight: bool) -> Result<Neighbourhood, f64> {
+    let mut here = Neighbourhood { radius_m, ..Neighbourhood::nowhere(anchor_B) };
+    let mut crowd = Crowd::default();
+    let mut stack = [[0; 4]; STACK];
+    let mut top = 0;
+    for step in &csg.steps {
+        match *step {
+            Step::Leaf { centre_B, radius_m: leaf_m, first, count } => {
+                let reach_m = leaf_m + radius_m;
+                let is_near = (anchor_B - centre_B).norm_squared() <= reach_m * reach_m;
+                let items = &csg.items[first as usize..(first + count) as usize];
+                stack[top] =
+                    if is_near { leaf(csg, &mut here, &mut crowd, items, keep_eight) } else { NOTHING };
+                top += 1;
+            }
+            Step::Join(op) => {
+                let (a, b) = (stack[top - 2], stack[top - 1]);
+                stack[top - 2] = match op {
+                    CsgOp::Union => std::array::from_fn(|i| a[i] | b[i]),
+                    CsgOp::Intersection => std::array::from_fn(|i| a[i] & b[i]),
+                    CsgOp::Difference => std::array::from_fn(|i| a[i] & !b[i]),
+                };
+                top -= 1;
+            }
+        }
+    }
+    if crowd.is_too_large && !keep_eight {
+        return Err(crowd.nearest[MAX_NEAR]);
+    }
+    here.table = stack[0];
+    Ok(here)
+}
+
+/// Whether a leaf is inside, for every combination of sides.
+fn leaf(csg: &Csg, here: &mut Neighbourhood, crowd: &mut Crowd, items: &[Item], keep_eight: bool) -> Table {
+    let mut heights_m = [f64::INFINITY; MAX_ITEMS];
+    for (item, height_m) in items.iter().zip(&mut heights_m) {
+        let level = csg.patches[usize::from(item.patch)].level(&here.anchor_B);
+        let is_inside = (level <= 0.0) != item.is_flipped;
+        *height_m = level.abs();
+        if *height_m > here.radius_m && !is_inside {
+            // Whatever the other patches say: they need no place in the list.
+            return NOTHING;
+        }
+    }
+    let mut inside = EVERYTHING;
+    for (item, &height_m) in items.iter().zip(&heights_m) {
+        if height_m > here.radius_m {
+            continue;
+        }
+        let listed = match here.position(item.patch) {
+            Some(index) => Some(index),
+            None => here.list(item.patch, height_m, crowd),
+        };
+        let Some(index) = listed else {
+            // Nowhere to list it. If it cannot be helped, the leaf is as if it went on there.
+            debug_assert!(keep_eight || crowd.is_too_large);
+            continue;
+        };
+        let sides = SIDES[index];
+        inside = std::array::from_fn(|i| inside[i] & if item.is_flipped { !sides[i] } else { sides[i] });
+    }
+    inside
+}
+
+impl Neighbourhood {
+    fn list(&mut self, number: u16, height_m: f64, crowd: &mut Crowd) -> Option<usize> {
+        crowd.add(number, height_m);
+        if self.count == MAX_NEAR {
+            crowd.is_too_large = true;
+            return None;
+        }
+        self.patches[self.count] = number;
+        self.count += 1;
+        Some(self.count - 1)
+    }
+}
+
+/// How near the nearest nine are: the ninth decides how large a neighbourhood can be.
+struct Crowd {
+    nearest: [f64; MAX_NEAR + 1],
+    last: u16,
+    is_too_large: bool,
+}
+
+impl Default for Crowd {
+    fn default() -> Self {
+        Self { nearest: [f64::INFINITY; MAX_NEAR + 1], last: u16::MAX, is_too_large: false }
+    }
+}
+
+impl Crowd {
+    /// Patches beyond the eighth may come twice, which makes the neighbourhood smaller than it must be, but not wrong.
+    fn add(&mut self, number: u16, height_m: f64) {
+        if number == self.last {
+            return;
+        }
+        self.last = number;
+        let mut height_m = height_m;
+        for place in &mut self.nearest {
+            if height_m < *place {
+                std::mem::swap(place, &mut height_m);
+            }
+        }
+    }
+}
+
+/// The most patches of a leaf: a box has as many.
+const MAX_ITEMS: usize = 6;
+const NOTHING: Table = [0; 4];
+const EVERYTHING: Table = [u64::MAX; 4];
+/// For each patch, the combinations in which one is inside of it.
+const SIDES: [Table; MAX_NEAR] = [
+    [0xAAAA_AAAA_AAAA_AAAA; 4],
+    [0xCCCC_CCCC_CCCC_CCCC; 4],
+    [0xF0F0_F0F0_F0F0_F0F0; 4],
+    [0xFF00_FF00_FF00_FF00; 4],
+    [0xFFFF_0000_FFFF_0000; 4],
+    [0xFFFF_FFFF_0000_0000; 4],
+    [0, u64::MAX, 0, u64::MAX],
+    [0, 0, u64::MAX, u64::MAX],
+];
+/// Bound on the sizes that are tried: from a metre to the smallest in quarters takes fewer.
+const MAX_TRIES: u32 = 16;
+/// No neighbourhood is smaller, in terms of the solid's extent.
+const SMALLEST: f64 = 1e-8;
+/// So that the ninth nearest is outside.
+const JUST_BELOW: f64 = 1.0 - 1e-9;
+
+#[cfg(test)]
+mod tests {
+    use super::super::{CsgPart, CsgTree};
+    use super::*;
+    use crate::cuboid::Cuboid;
+    use crate::plane::Plane;
+    use crate::sphere::Sphere;
+
+    /// A block of bricks with a ball taken out of its middle.
+    fn bricks() -> Csg {
+        let brick = Cuboid::new([0.02; 3]).unwrap();
+        let grid = (0..27).map(|i| {
+            let place = Vector3::new(f64::from(i % 3), f64::from(i / 3 % 3), f64::from(i / 9)) * 0.02;
+            CsgPart::at(brick, place - Vector3::repeat(0.02))
+        });
+        let block = CsgTree::union(grid);
+        Csg::build(&CsgTree::difference([CsgPart::from(block), Sphere::new(0.025).unwrap().into()])).unwrap()
+    }
+
+    #[test]
+    fn bricks_side_by_side_share_their_planes() {
+        // Four planes for each axis, and the ball.
+        assert_eq!(bricks().patch_count(), 13);
+    }
+
+    #[test]
+    fn within_a_neighbourhood_the_table_says_what_the_tree_says() {
+        let csg = bricks();
+        let spread = |i: u32, step: f64| 2.0 * (f64::from(i) * step).fract() - 1.0;
+        let point = |i: u32| Vector3::new(spread(i, 0.618_034), spread(i, 0.414_214), spread(i, 0.732_051));
+        for i in 0..2000 {
+            let near = Neighbourhood::around(&csg, &(point(i) * 0.035), 0.004);
+            assert!(near.count() <= MAX_NEAR);
+            for j in 0..20 {
+                let p = near.anchor_B + point(7 * i + j) * (near.radius_m / 3f64.sqrt());
+                assert_eq!(near.is_solid(near.sides(&csg, &p)), csg.is_inside(&p), "{p:?} {near:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn where_more_than_eight_patches_meet_the_ball_is_as_small_as_it_can_be() {
+        let flank = |i: u32| {
+            let angle = f64::from(i) * 0.5;
+            CsgPart::from(Plane::new(Vector3::new(angle.cos(), 1.0, angle.sin()), 0.0).unwrap())
+        };
+        let pyramid = Csg::build(&CsgTree::intersection((0..12).map(flank))).unwrap();
+        let beside = Neighbourhood::around(&pyramid, &Vector3::new(0.01, -0.02, 0.0), 0.1);
+        assert!(beside.count() == MAX_NEAR && beside.radius_m > 1e-3, "{beside:?}");
+        let at_tip = Neighbourhood::around(&pyramid, &Vector3::zeros(), 0.1);
+        assert_eq!((at_tip.count(), at_tip.radius_m), (MAX_NEAR, SMALLEST * pyramid.extent_m));
+    }
+
+    #[test]
+    fn what_is_not_a_number_has_a_neighbourhood_too() {
+        for bad in [f64::NAN, f64::INFINITY, f64::MAX] {
+            let near = Neighbourhood::around(&bricks(), &Vector3::repeat(bad), bad);
+            assert!(near.count() <= MAX_NEAR);
+        }
+    }
+}

@@ -1,0 +1,285 @@
+//! Keeps what is rendered to one finger from feeding energy into the hand: a passivity observer and controller.
+//!
+//! Problem: a spring that is looked at in steps of time and place gives back more than it took: pressed and released
+//! evenly at a speed v to a depth d it has fed `k v T d` into the hand, half of `k v^2 T^2` a tick. A stiff wall
+//! feeds more than hand and arm can take, and buzzes; a force that comes late, one that turns in a circle or an
+//! effect of somebody's own feeds without end. What the source is made of is not known here.
+//!
+//! Model: time-domain passivity (Hannaford and Ryu, IEEE Trans. Robotics and Automation 18(1), 2002), for a force of
+//! three components that is held between ticks. In the interval that ends at tick k the port feeds exactly
+//!
+//! ```text
+//! dE_k = F_(k-1) . (x_k - x_(k-1))        F: the force on the user that was held; x: the HIP
+//! ```
+//!
+//! whatever the path between. The *balance* u sums that up. Two things keep it a fair one:
+//!
+//! - Reference energy: what the hand put in may come back, but not more than a spring under the present force can have
+//!   stored, `u >= -stored_j`. Pressing in and coming out is free; what friction took is gone at once, and with the
+//!   last contact all credit is: there is nothing to reset in free space.
+//! - Debts are paid, not forgotten: while `u > 0` it falls by `recovery_w` and, over whatever way the finger goes, by
+//!   the device's own friction `device_friction_n`, which takes that much before the hand gets anything.
+//!
+//! The controller lets the force pass, to the bit, if `F . d <= bound_j - u` for every way d that the finger can go
+//! while the force is held; else the nearest force that fulfils this is rendered ([`limit`](self)). The way is not
+//! known when the force is chosen. It is known to be near the last one: a tip whose acceleration is at most a, read
+//! with a count of q, moves between two ticks by p + e, with p the way of the interval before and
+//!
+//! ```text
+//! |e| <= r = a T^2 + 2 sqrt(3) q          (2 a T^2 + ... where the force acts a tick later)
+//! ```
+//!
+//! Guarantee, for every source of force and between any two ticks i < j: as long as the acceleration keeps to its
+//! bound,
+//!
+//! ```text
+//! energy fed from i to j  <=  bound_j + stored_j(i) + recovery_w (t_j - t_i) + device_friction_n * way
+//! ```
+//!
+//! since u grows by what is fed less what is paid, is at least -stored_j(i) in i, and at most bound_j in j: by choice
+//! of F, `u_j = u_(j-1) + F . d <= bound_j`. Where forces come a tick late the larger of stored_j(i) and stored_j(i-1)
+//! counts, and each force is chosen within what the one before it leaves. Should the finger be faster than that, the surprise `s`, by which a way is
+//! longer than p + r, adds at most |F| s, and is forgiven: a finger is not left without its wall for a jolt. After
+//! `reset`, and at the very first tick, the finger is taken to have been at rest. A tick that is missed is one of which
+//! nothing was foreseen; what it fed is seen, in the next.
+//!
+//! What is not seen: the energy is that of the positions as read. Of a force that goes from zero to F and back,
+//! rounding to counts of q hides at most F q along its direction. A force that the motors hold for another time than
+//! from reading to reading (a fixed phase within the tick, a slow amplifier) feeds up to its own change times the way
+//! meanwhile more: it is exact for replies in the same tick and, told that it is late, in the next. Limits on the way to
+//! the motors that hold a force longer than it was asked for (a slew rate) can do that too. Entities that move by
+//! themselves do work on the hand, and count as active. So does what gives back later than a spring would: credit is
+//! forgotten as soon as no spring can hold it.
+//!
+//! Frames and signs: world, SI; forces are forces on the user; energy is positive when it was fed into the hand.
+//! Invariants: the force is never larger than the one wanted, and never has a component against it (so a wall
+//! without friction never pulls); it is a continuous function of the wanted force, the last way and the balance, so
+//! at rest nothing chatters; no input makes it not finite. No allocation.
+//! Cost: some ten nanoseconds while nothing is changed, about a microsecond while something is.
+
+mod limit;
+mod port;
+
+pub use port::{Port, Rendered};
+
+use nalgebra::Vector3;
+
+use crate::error::{ParameterError, above_zero, at_least_zero};
+use crate::frame::is_finite;
+
+/// The numbers of a controller.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PassivitySpec {
+    /// What may be fed beyond what the hand put in \[J\], > 0.
+    pub bound_j: f64,
+    /// A debt is paid at this rate \[W\], >= 0.
+    pub recovery_w: f64,
+    /// What the device's own friction takes from every motion before the hand gets anything \[N\], >= 0.
+    pub device_friction_n: f64,
+    /// The largest acceleration of the tip \[m/s^2\], >= 0.
+    pub acceleration_m_per_s2: f64,
+    /// Steps of a position along each axis \[m\], >= 0.
+    pub resolution_m: f64,
+}
+
+/// The observer and controller of one finger.
+#[derive(Debug, Clone)]
+pub struct Passivity {
+    spec: PassivitySpec,
+    period_s: f64,
+    /// All that was fed since the beginning (J).
+    energy_j: f64,
+    /// What of it nobody has paid for; negative: credit (J).
+    balance_j: f64,
+    /// What springs held in the last tick (J).
+    stored_j: f64,
+    position_W: Option<Vector3<f64>>,
+    /// Follows the position when it is a count away: what friction acts on.
+    dragged_W: Vector3<f64>,
+    /// The force that acts until the next tick, and the one after it where forces come late.
+    acting_W: Vector3<f64>,
+    pending_W: Vector3<f64>,
+}
+
+impl PassivitySpec {
+    /// The usual numbers at this length of a tick \[s\]: those of a Premium (8.5 N, counts of 0.03 mm, 0.04 N of
+    /// friction).
+    ///
+    /// The bound is what the strongest force can feed in one tick that nobody foresaw, `F r`: with less, a finger that
+    /// rests without credit would not get its whole force. It does not go by the stiffness: a spring's own rounding,
+    /// `k q^2 / 2`, is a microjoule, and would be used up by any touch.
+    pub fn usual(period_s: f64) -> Self {
+        Self::for_motion(period_s, ACCELERATION_M_PER_S2, RESOLUTION_M)
+    }
+
+    /// The same for a tip of this largest acceleration \[m/s^2\], whose positions come in steps of this size \[m\].
+    pub fn for_motion(period_s: f64, acceleration_m_per_s2: f64, resolution_m: f64) -> Self {
+        let unbound = Self {
+            bound_j: 0.0,
+            recovery_w: 0.0,
+            device_friction_n: DEVICE_FRICTION_N,
+            acceleration_m_per_s2,
+            resolution_m,
+        };
+        unbound.with_bound(FULL_FORCE_N * unbound.surprise_m(period_s, 1.0))
+    }
+
+    /// With this bound \[J\], all of which is paid in ten seconds.
+    pub fn with_bound(self, bound_j: f64) -> Self {
+        Self { bound_j, recovery_w: bound_j / RECOVERY_S, ..self }
+    }
+
+    /// The same, if each number is in range.
+    ///
+    /// Errors: the first that is not.
+    pub fn validated(self) -> Result<Self, ParameterError> {
+        above_zero("bound_j", self.bound_j)?;
+        at_least_zero("recovery_w", self.recovery_w)?;
+        at_least_zero("device_friction_n", self.device_friction_n)?;
+        at_least_zero("acceleration_m_per_s2", self.acceleration_m_per_s2)?;
+        at_least_zero("resolution_m", self.resolution_m)?;
+        Ok(self)
+    }
+
+    /// How far the way of an interval can be from that of the last one, `ticks` before it \[m\].
+    fn surprise_m(&self, period_s: f64, ticks: f64) -> f64 {
+        ticks * self.acceleration_m_per_s2 * period_s * period_s + 2.0 * f64::sqrt(3.0) * self.resolution_m
+    }
+}
+
+impl Passivity {
+    /// At rest, owing nothing, for ticks of this length \[s\].
+    ///
+    /// Errors: a number that is out of range.
+    pub fn new(spec: PassivitySpec, period_s: f64) -> Result<Self, ParameterError> {
+        Ok(Self {
+            spec: spec.validated()?,
+            period_s: above_zero("period_s", period_s)?,
+            energy_j: 0.0,
+            balance_j: 0.0,
+            stored_j: 0.0,
+            position_W: None,
+            dragged_W: Vector3::zeros(),
+            acting_W: Vector3::zeros(),
+            pending_W: Vector3::zeros(),
+        })
+    }
+
+    /// The numbers it goes by.
+    pub fn spec(&self) -> &PassivitySpec {
+        &self.spec
+    }
+
+    /// All that was fed into the hand since the beginning, as seen \[J\].
+    pub fn energy_j(&self) -> f64 {
+        self.energy_j
+    }
+
+    /// What was fed and not paid for \[J\]; negative while the hand may have something back.
+    pub fn balance_j(&self) -> f64 {
+        self.balance_j
+    }
+
+    /// One tick: sees what the last force did, and chooses the next.
+    pub fn step(&mut self, port: &Port) -> Rendered {
+        if !is_finite(&port.position_W) {
+            self.reset();
+            return self.rendered(Vector3::zeros(), port);
+        }
+        let (moved_W, ticks) = self.observe(port);
+        let spread = 0.5 * (ticks + 1.0);
+        let surprise_m = self.spec.surprise_m(self.period_s, spread);
+        let mut budget_j = self.spec.bound_j - self.balance_j;
+        let force_W = if port.is_late {
+            // What is on its way has been paid for in the tick before.
+            let due_j = limit::most_j(&self.pending_W, &moved_W, surprise_m);
+            let of_springs_j = self.spec.bound_j + self.stored_j;
+            budget_j = (budget_j - due_j.max(0.0)).clamp(0.0, of_springs_j);
+            let surprise_m = self.spec.surprise_m(self.period_s, spread + 1.0);
+            limit::nearest(port.force_on_user_W, moved_W, surprise_m, budget_j)
+        } else {
+            limit::nearest(port.force_on_user_W, moved_W, surprise_m, budget_j)
+        };
+        self.acting_W = if port.is_late { self.pending_W } else { force_W };
+        self.pending_W = force_W;
+        self.rendered(force_W, port)
+    }
+
+    /// The finger was moved by this (m) without its hand: what it was attached to has moved.
+    pub fn carry(&mut self, by_W: Vector3<f64>) {
+        if let Some(position_W) = &mut self.position_W {
+            *position_W += by_W;
+            self.dragged_W += by_W;
+        }
+    }
+
+    /// Forgets where the finger was, and what it had stored; debts stay.
+    pub fn reset(&mut self) {
+        self.position_W = None;
+        (self.acting_W, self.pending_W) = (Vector3::zeros(), Vector3::zeros());
+        (self.balance_j, self.stored_j) = (self.balance_j.max(0.0), 0.0);
+    }
+
+    /// Sums up the interval that ends now. Returns how far a usual tick of it went (m), and how many there were.
+    fn observe(&mut self, port: &Port) -> (Vector3<f64>, f64) {
+        let ticks = port.ticks(self.period_s);
+        let from_W = self.position_W.replace(port.position_W);
+        let moved_W = from_W.map(|from_W| port.position_W - from_W);
+        // No hand moves like that: a sensor that was put right, say.
+        let most_m = MOST_M_PER_S * ticks * self.period_s;
+        let moved_W = moved_W.filter(|moved_W| moved_W.norm() <= most_m).unwrap_or_else(|| {
+            self.dragged_W = port.position_W;
+            Vector3::zeros()
+        });
+        let held_W = port.applied_on_user_W.filter(is_finite).unwrap_or(self.acting_W);
+        let fed_j = held_W.dot(&moved_W).clamp(-MOST_J, MOST_J);
+        if !fed_j.is_nan() {
+            self.energy_j += fed_j;
+            self.balance_j += fed_j;
+        }
+        self.pay(port.position_W, ticks * self.period_s);
+        let before_j = std::mem::replace(&mut self.stored_j, port.stored_j());
+        // A force that is on its way was the springs' when it was chosen.
+        let credit_j = if port.is_late { self.stored_j.max(before_j) } else { self.stored_j };
+        self.balance_j = self.balance_j.max(-credit_j).min(self.spec.bound_j);
+        (moved_W / ticks, ticks)
+    }
+
+    /// A debt becomes smaller, and no credit.
+    fn pay(&mut self, position_W: Vector3<f64>, dt_s: f64) {
+        let behind_W = position_W - self.dragged_W;
+        // A counter that flickers moves nothing.
+        let way_m = behind_W.norm() - 2.0 * self.spec.resolution_m;
+        if way_m > 0.0 {
+            self.dragged_W += behind_W * (way_m / behind_W.norm());
+        }
+        if self.balance_j > 0.0 {
+            let paid_j = self.spec.recovery_w * dt_s + self.spec.device_friction_n * way_m.max(0.0);
+            self.balance_j = (self.balance_j - paid_j).max(0.0);
+        }
+    }
+
+    fn rendered(&self, force_on_user_W: Vector3<f64>, port: &Port) -> Rendered {
+        let changed_n = (force_on_user_W - port.force_on_user_W).norm();
+        Rendered {
+            force_on_user_W,
+            changed_n: if changed_n.is_finite() { changed_n } else { 0.0 },
+            energy_j: self.energy_j,
+        }
+    }
+}
+
+/// The strongest force that passes at rest without credit: a Premium's peak (N).
+const FULL_FORCE_N: f64 = 8.5;
+/// Its whole peak on its tip's 60 g, nobody holding it: 140 (m/s^2).
+const ACCELERATION_M_PER_S2: f64 = 150.0;
+/// What moves a Premium's tip: pays for counts below 2 f / q = 2.7 N/mm, where rounding leaks k q / 2 for each metre (N).
+const DEVICE_FRICTION_N: f64 = 0.04;
+/// Counts of a Premium at its tip (m).
+const RESOLUTION_M: f64 = 3e-5;
+/// In this time a debt of the whole bound is paid (s): 0.2 mW, far below what keeps up a buzz that can be felt.
+const RECOVERY_S: f64 = 10.0;
+/// Faster than any hand (m/s).
+const MOST_M_PER_S: f64 = 20.0;
+/// More than anything feeds in a tick; sums of it stay finite (J).
+const MOST_J: f64 = 1e9;

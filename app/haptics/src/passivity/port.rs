@@ -1,0 +1,60 @@
+//! What a controller is told in a tick, and what it says.
+
+use nalgebra::Vector3;
+
+use crate::frame::is_finite;
+
+/// One tick at the port between rendering and hand; world frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Port {
+    /// Where the finger is \[m\].
+    pub position_W: Vector3<f64>,
+    /// The force that rendering wants from now on \[N\].
+    pub force_on_user_W: Vector3<f64>,
+    /// The force that was held in the interval that ends now \[N\]; `None`: the one chosen for it.
+    pub applied_on_user_W: Option<Vector3<f64>>,
+    /// The most that what renders the wanted force can have stored \[J\]: |F|^2 / 2 k of a spring.
+    pub stored_j: f64,
+    /// Whether the force chosen now acts from the next tick on, and the one of the last tick until then.
+    pub is_late: bool,
+    /// Time since the last tick \[s\].
+    pub dt_s: f64,
+}
+
+/// What comes out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rendered {
+    /// The force to render \[N\].
+    pub force_on_user_W: Vector3<f64>,
+    /// By how much it was changed \[N\].
+    pub changed_n: f64,
+    /// All that was fed into the hand up to now \[J\].
+    pub energy_j: f64,
+}
+
+impl Port {
+    /// A finger here \[m\] that is to feel this force \[N\] at once, of a source that stores nothing.
+    pub fn new(position_W: Vector3<f64>, force_on_user_W: Vector3<f64>, dt_s: f64) -> Self {
+        Self { position_W, force_on_user_W, applied_on_user_W: None, stored_j: 0.0, is_late: false, dt_s }
+    }
+
+    /// From a source that can have stored so much \[J\].
+    pub fn storing(self, stored_j: f64) -> Self {
+        Self { stored_j, ..self }
+    }
+
+    /// What may come back; zero where nobody knows.
+    pub(super) fn stored_j(&self) -> f64 {
+        let is_known = self.stored_j.is_finite() && self.stored_j > 0.0 && is_finite(&self.force_on_user_W);
+        if is_known { self.stored_j } else { 0.0 }
+    }
+
+    /// Length of the interval in ticks; one where time makes no sense.
+    pub(super) fn ticks(&self, period_s: f64) -> f64 {
+        let ticks = self.dt_s / period_s;
+        if ticks.is_finite() { ticks.clamp(1.0, MOST_TICKS) } else { 1.0 }
+    }
+}
+
+/// After a longer gap everything is new anyway.
+const MOST_TICKS: f64 = 1e6;

@@ -1,0 +1,99 @@
+//! Forces as figures.
+
+use super::recorded::{Recorded, RecordedFinger};
+use super::visit::Visit;
+use nalgebra::Vector3;
+use plot::{Axis, Chart, Figure, Look, Series};
+
+/// So many steps across a picture are as fine as it shows: of each, the least and the most are drawn.
+const STEPS: usize = 400;
+
+/// What each finger felt, along the time.
+pub(super) fn of_run(
+    recorded: &Recorded,
+    fingers: &[RecordedFinger],
+    against: Option<(&Recorded, &[RecordedFinger])>,
+) -> Figure {
+    let panel = |finger: &RecordedFinger| {
+        let chart =
+            Chart::new(&finger.name, Axis::linear("time", "s"), Axis::linear("force on the user", "N"));
+        let chart = with_forces(chart, &recorded.times_s, &finger.forces, Look::Line, "");
+        let Some((other, others)) = against else { return chart };
+        match others.iter().find(|other| other.name == finger.name) {
+            Some(finger) => {
+                let label = format!(", {}", other.label());
+                with_forces(chart, &other.times_s, &finger.forces, Look::Dashed, &label)
+            }
+            None => chart,
+        }
+    };
+    Figure::new("What the fingers felt", fingers.iter().map(panel).collect())
+}
+
+/// What a finger felt on its way over an entity, and on the same way in another recording.
+pub(super) fn of_entity(visit: &Visit, against: Option<(&str, &Visit)>) -> Figure {
+    let chart =
+        Chart::new("", Axis::linear("way of the finger", "mm"), Axis::linear("force on the user", "N"));
+    let millimetres = |visit: &Visit| visit.way_m.iter().map(|way_m| way_m * 1e3).collect::<Vec<_>>();
+    let chart = match against {
+        Some((label, other)) => {
+            with_forces(chart, &millimetres(other), &other.forces, Look::Dashed, &format!(", {label}"))
+        }
+        None => chart,
+    };
+    let figure = |chart| Figure::new(&visit.entity, vec![chart]);
+    figure(with_forces(chart, &millimetres(visit), &visit.forces, Look::Line, ""))
+}
+
+/// Components that never differ from zero are left out.
+fn with_forces(chart: Chart, xs: &[f64], forces: &[Vector3<f64>], look: Look, suffix: &str) -> Chart {
+    ["x", "y", "z"].into_iter().enumerate().fold(chart, |chart, (axis, name)| {
+        let felt: Vec<_> = xs.iter().zip(forces).map(|(x, force)| (*x, force[axis])).collect();
+        if felt.iter().all(|(_, force)| *force == 0.0) {
+            return chart;
+        }
+        chart.with(Series::new(&format!("{name}{suffix}"), look, thinned(&felt)).coloured(axis))
+    })
+}
+
+/// As few points as look the same.
+fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let (Some(first), Some(last)) = (points.first(), points.last()) else { return Vec::new() };
+    if points.len() <= 2 * STEPS {
+        return points.to_vec();
+    }
+    let width = (last.0 - first.0) / STEPS as f64;
+    let step_of = |x: f64| ((x - first.0) / width) as usize;
+    let mut thin = Vec::new();
+    for step in points.chunk_by(|a, b| step_of(a.0) == step_of(b.0)) {
+        let by_height = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
+        let (least, most) = (step.iter().min_by(by_height), step.iter().max_by(by_height));
+        let mut ends: Vec<_> = [least, most].into_iter().flatten().copied().collect();
+        ends.sort_by(|a, b| a.0.total_cmp(&b.0));
+        ends.dedup();
+        thin.extend(ends);
+    }
+    thin
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thinned_points_keep_every_peak() {
+        let peak = |i: usize| if i == 77_777 { 5.0 } else { (i as f64 * 1e-3).sin() };
+        let points: Vec<_> = (0..100_000).map(|i| (i as f64, peak(i))).collect();
+        let thin = thinned(&points);
+        assert!(thin.len() <= 2 * (STEPS + 1), "{}", thin.len());
+        assert!(thin.contains(&(77_777.0, 5.0)));
+        assert!(thin.is_sorted_by(|a, b| a.0 <= b.0));
+        assert_eq!(thinned(&points[..10]), points[..10]);
+    }
+
+    #[test]
+    fn a_finger_that_does_not_move_is_drawn_too() {
+        let points: Vec<_> = (0..10_000).map(|i| (0.0, f64::from(i))).collect();
+        assert_eq!(thinned(&points), [(0.0, 0.0), (0.0, 9999.0)]);
+    }
+}

@@ -1,0 +1,103 @@
+//! `phantom3 plot`: a recording as a picture of what the fingers felt.
+//!
+//! Model: the force on the user along the time, or, with `--by-entity`, along the way that the finger went on each
+//! entity, one picture per entity: this is where two ways to render the same thing are compared (`--against`).
+
+mod figure;
+mod recorded;
+mod visit;
+
+use crate::outcome::{RunFailure, Stop};
+use clap::Args;
+use figure::{of_entity, of_run};
+use plot::{Figure, PlotError};
+use recorded::{Recorded, RecordedFinger};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use visit::visits;
+
+/// What is to be drawn.
+#[derive(Debug, Args)]
+pub struct PlotArgs {
+    /// The recording (CSV), as `run --record` wrote it
+    recording: PathBuf,
+    /// Another one, dashed: the same hand on something that differs
+    #[arg(long, value_name = "CSV")]
+    against: Option<PathBuf>,
+    /// Which finger [default: each has a panel; with --by-entity: the first]
+    #[arg(long, value_name = "NAME")]
+    finger: Option<String>,
+    /// Only from here on (s)
+    #[arg(long, value_name = "S", default_value_t = 0.0)]
+    from: f64,
+    /// Only up to here (s) [default: the end]
+    #[arg(long, value_name = "S")]
+    to: Option<f64>,
+    /// A picture for each entity, along the way that the finger went on it
+    #[arg(long)]
+    by_entity: bool,
+    /// Pictures for the web alone, without PNG
+    #[arg(long)]
+    svg_only: bool,
+    /// Where: OUT.svg and OUT.png; with --by-entity a directory for ENTITY.svg and ENTITY.png
+    /// [default: the recording's name without its ending]
+    #[arg(long, value_name = "OUT")]
+    out: Option<PathBuf>,
+}
+
+/// Draws.
+///
+/// # Errors
+/// A recording that cannot be read or is none, nothing to draw, and pictures that cannot be written.
+pub fn execute(args: &PlotArgs) -> Result<Stop, RunFailure> {
+    let wrong = |error: &dyn std::fmt::Display| RunFailure::Start(error.to_string());
+    let read = |file: &Path| {
+        let recorded = Recorded::read(file).map_err(|error| wrong(&error))?;
+        recorded.between(args.from, args.to.unwrap_or(f64::INFINITY)).map_err(|error| wrong(&error))
+    };
+    let recorded = read(&args.recording)?;
+    let against = args.against.as_deref().map(read).transpose()?;
+    let out = args.out.clone().unwrap_or_else(|| args.recording.with_extension(""));
+    let finger = |recorded: &Recorded| recorded.choose(args.finger.as_deref()).map_err(|error| wrong(&error));
+    if !args.by_entity {
+        let fingers = finger(&recorded)?;
+        let others = against.as_ref().map(finger).transpose()?.unwrap_or_default();
+        let figure = of_run(&recorded, &fingers, against.as_ref().map(|against| (against, &*others)));
+        return write(&figure, &out, args.svg_only);
+    }
+    std::fs::create_dir_all(&out)
+        .map_err(|error| wrong(&format_args!("cannot make the directory {}: {error}", out.display())))?;
+    let first = |fingers: Vec<RecordedFinger>| fingers.into_iter().next();
+    let felt = visits(first(finger(&recorded)?).as_ref());
+    let felt_against = match &against {
+        Some(against) => visits(first(finger(against)?).as_ref()),
+        None => Vec::new(),
+    };
+    if felt.is_empty() {
+        return Err(wrong(&format_args!(
+            "{}: this finger touches nothing; choose another with --finger, or leave --by-entity out",
+            args.recording.display()
+        )));
+    }
+    for visit in &felt {
+        let other = felt_against.iter().find(|other| other.entity == visit.entity);
+        let other = against.as_ref().map(Recorded::label).zip(other);
+        let other = other.as_ref().map(|(label, other)| (label.as_str(), *other));
+        write(&of_entity(visit, other), &out.join(&visit.entity), args.svg_only)?;
+    }
+    Ok(Stop::Finished)
+}
+
+fn write(figure: &Figure, stem: &Path, svg_only: bool) -> Result<Stop, RunFailure> {
+    let late = |error: PlotError| RunFailure::Results(error.to_string());
+    let written = if svg_only {
+        figure.write_svg(stem).map_err(late)?;
+        ".svg"
+    } else {
+        figure.write(stem).map_err(late)?;
+        ".svg, .png"
+    };
+    // Nobody to tell is no reason to fail.
+    let _ = writeln!(std::io::stdout(), "written      {}{written}", stem.display());
+    Ok(Stop::Finished)
+}

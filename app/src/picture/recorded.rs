@@ -1,0 +1,208 @@
+//! A recording, read back.
+//!
+//! Columns are found by their names, so that a recording may have more of them than this version knows.
+
+use csv::StringRecord;
+use nalgebra::Vector3;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// A recording.
+#[derive(Debug, Clone)]
+pub(super) struct Recorded {
+    file: PathBuf,
+    /// Of each row (s).
+    pub(super) times_s: Vec<f64>,
+    pub(super) fingers: Vec<RecordedFinger>,
+}
+
+/// What it says of a finger, row by row; world frame, SI.
+#[derive(Debug, Clone, Default)]
+pub(super) struct RecordedFinger {
+    pub(super) name: String,
+    pub(super) hips: Vec<Vector3<f64>>,
+    /// On the user (N).
+    pub(super) forces: Vec<Vector3<f64>>,
+    /// What it touches; empty in free space.
+    pub(super) entities: Vec<String>,
+}
+
+/// Why a file is no recording, or not the one that is asked for.
+#[derive(Debug, Error)]
+pub(super) enum RecordedError {
+    #[error("cannot read the recording {file}: {source}")]
+    Read { file: PathBuf, source: csv::Error },
+    #[error("{file}: no column {column}; is this a recording that `phantom3 run --record` wrote?")]
+    NoColumn { file: PathBuf, column: String },
+    #[error("{file}:{line}: {column} is {found:?}; allowed: a number")]
+    NoNumber { file: PathBuf, line: u64, column: String, found: String },
+    #[error("{file}: no row between {from_s} s and {to_s} s; it lasts from {first_s} s to {last_s} s")]
+    NothingThere { file: PathBuf, from_s: f64, to_s: f64, first_s: f64, last_s: f64 },
+    #[error("{file}: no finger {name:?}; there are: {known}")]
+    NoFinger { file: PathBuf, name: String, known: String },
+}
+
+/// Where a finger's numbers stand in a row.
+struct Columns {
+    hip: [usize; 3],
+    force: [usize; 3],
+    entity: usize,
+}
+
+impl Recorded {
+    pub(super) fn read(file: &Path) -> Result<Self, RecordedError> {
+        let unreadable = |source| RecordedError::Read { file: file.into(), source };
+        let mut reader = csv::Reader::from_path(file).map_err(unreadable)?;
+        let header = reader.headers().map_err(unreadable)?.clone();
+        let at = |column: &str| {
+            let no_column = || RecordedError::NoColumn { file: file.into(), column: column.into() };
+            header.iter().position(|name| name == column).ok_or_else(no_column)
+        };
+        let time = at("t")?;
+        let names: Vec<_> = header.iter().filter_map(|column| column.strip_suffix("_hip_x")).collect();
+        if names.is_empty() {
+            at("f0_hip_x")?;
+        }
+        let mut fingers: Vec<_> =
+            names.iter().map(|name| RecordedFinger { name: (*name).into(), ..Default::default() }).collect();
+        let columns: Vec<_> = names.iter().map(|name| Columns::of(name, &at)).collect::<Result<_, _>>()?;
+        let mut times_s = Vec::new();
+        for row in reader.records() {
+            let row = Row { file, header: &header, row: row.map_err(unreadable)? };
+            times_s.push(row.number(time)?);
+            for (finger, columns) in fingers.iter_mut().zip(&columns) {
+                finger.hips.push(row.vector(columns.hip)?);
+                finger.forces.push(row.vector(columns.force)?);
+                finger.entities.push(row.row[columns.entity].into());
+            }
+        }
+        Ok(Self { file: file.into(), times_s, fingers })
+    }
+
+    /// What a legend calls it: the file's name without folders and ending.
+    pub(super) fn label(&self) -> String {
+        self.file.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
+    /// The rows from one time to another (s).
+    pub(super) fn between(self, from_s: f64, to_s: f64) -> Result<Self, RecordedError> {
+        let is_kept: Vec<_> = self.times_s.iter().map(|t| (from_s..=to_s).contains(t)).collect();
+        if !is_kept.contains(&true) {
+            let [first_s, last_s] =
+                [self.times_s.first(), self.times_s.last()].map(|t| t.copied().unwrap_or(f64::NAN));
+            return Err(RecordedError::NothingThere { file: self.file, from_s, to_s, first_s, last_s });
+        }
+        let finger = |finger: &RecordedFinger| RecordedFinger {
+            name: finger.name.clone(),
+            hips: kept(&finger.hips, &is_kept),
+            forces: kept(&finger.forces, &is_kept),
+            entities: kept(&finger.entities, &is_kept),
+        };
+        let fingers = self.fingers.iter().map(finger).collect();
+        Ok(Self { times_s: kept(&self.times_s, &is_kept), fingers, file: self.file })
+    }
+
+    /// The finger of this name; without one, all.
+    pub(super) fn choose(&self, name: Option<&str>) -> Result<Vec<RecordedFinger>, RecordedError> {
+        let chosen: Vec<_> = self
+            .fingers
+            .iter()
+            .filter(|finger| name.is_none_or(|name| name == finger.name))
+            .cloned()
+            .collect();
+        if !chosen.is_empty() {
+            return Ok(chosen);
+        }
+        let known: Vec<_> = self.fingers.iter().map(|finger| finger.name.as_str()).collect();
+        Err(RecordedError::NoFinger {
+            file: self.file.clone(),
+            name: name.unwrap_or_default().into(),
+            known: known.join(", "),
+        })
+    }
+}
+
+fn kept<T: Clone>(all: &[T], is_kept: &[bool]) -> Vec<T> {
+    all.iter().zip(is_kept).filter(|(_, is_kept)| **is_kept).map(|(one, _)| one.clone()).collect()
+}
+
+impl Columns {
+    fn of(finger: &str, at: &impl Fn(&str) -> Result<usize, RecordedError>) -> Result<Self, RecordedError> {
+        let axes = |quantity: &str| -> Result<[usize; 3], RecordedError> {
+            let of = |axis| at(&format!("{finger}_{quantity}_{axis}"));
+            Ok([of("x")?, of("y")?, of("z")?])
+        };
+        Ok(Self { hip: axes("hip")?, force: axes("force")?, entity: at(&format!("{finger}_entity"))? })
+    }
+}
+
+/// A row, and what it takes to say what is wrong with it.
+struct Row<'f> {
+    file: &'f Path,
+    header: &'f StringRecord,
+    row: StringRecord,
+}
+
+impl Row<'_> {
+    fn number(&self, column: usize) -> Result<f64, RecordedError> {
+        self.row[column].parse().map_err(|_| RecordedError::NoNumber {
+            file: self.file.into(),
+            line: self.row.position().map_or(0, csv::Position::line),
+            column: self.header[column].into(),
+            found: self.row[column].into(),
+        })
+    }
+
+    fn vector(&self, columns: [usize; 3]) -> Result<Vector3<f64>, RecordedError> {
+        let [x, y, z] = columns;
+        Ok(Vector3::new(self.number(x)?, self.number(y)?, self.number(z)?))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEADER: &str = "t,a_hip_x,a_hip_y,a_hip_z,a_force_x,a_force_y,a_force_z,a_entity,later\n";
+
+    fn read(text: &str) -> Result<Recorded, RecordedError> {
+        let directory = tempfile::tempdir().expect("a directory");
+        let file = directory.path().join("r.csv");
+        std::fs::write(&file, text).expect("written");
+        Recorded::read(&file)
+    }
+
+    #[test]
+    fn columns_are_found_by_name_and_more_of_them_do_not_matter() {
+        let recorded = read(&format!("{HEADER}0.5,1,2,3,4,5,6,ball,x\n")).expect("a recording");
+        assert_eq!(recorded.times_s, [0.5]);
+        let finger = &recorded.fingers[0];
+        assert_eq!((finger.name.as_str(), finger.entities[0].as_str()), ("a", "ball"));
+        assert_eq!(finger.hips, [Vector3::new(1.0, 2.0, 3.0)]);
+        assert_eq!(finger.forces, [Vector3::new(4.0, 5.0, 6.0)]);
+    }
+
+    #[test]
+    fn what_is_no_recording_is_refused_with_file_line_and_column() {
+        for (text, says) in [
+            ("x,y\n1,2\n", "no column t"),
+            ("t,y\n1,2\n", "no column f0_hip_x"),
+            (&*HEADER.replace(",a_force_y", ""), "no column a_force_y"),
+            (&*format!("{HEADER}0,1,2,3,4,5,6,,\n0.1,1,2,3,four,5,6,,\n"), "r.csv:3: a_force_x is \"four\""),
+            (&*format!("{HEADER}0,1,2\n"), "cannot read the recording"),
+        ] {
+            let error = read(text).expect_err("refused").to_string();
+            assert!(error.contains(says), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_part_that_is_not_there_and_a_finger_that_is_not_there_are_told() {
+        let recorded = read(&format!("{HEADER}0,1,2,3,4,5,6,,\n1,1,2,3,4,5,6,,\n")).expect("a recording");
+        assert_eq!(recorded.clone().between(0.5, 2.0).expect("a row").times_s, [1.0]);
+        let error = recorded.clone().between(3.0, 4.0).expect_err("nothing").to_string();
+        assert!(error.contains("from 0 s to 1 s"), "{error}");
+        let error = recorded.choose(Some("b")).expect_err("no such finger").to_string();
+        assert!(error.contains("there are: a"), "{error}");
+    }
+}

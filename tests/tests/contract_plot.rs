@@ -1,0 +1,69 @@
+//! `phantom3 plot`: recordings become pictures, and what is wrong is told.
+
+use system_tests::workplace::Workplace;
+
+const SCENE: &str = "\
+[[entity]]
+name = \"table\"
+shape = { kind = \"plane\", normal = [0.0, 1.0, 0.0], offset_m = 0.0 }
+friction = { model = \"coulomb\", mu = MU }
+[[finger]]
+start_m = [0.0, 0.01, 0.0]
+";
+
+/// Down to 2 mm under the table and 40 mm along it.
+const HAND: &str = "t,f0_x,f0_y,f0_z\n0,0,0.01,0\n0.2,0,-0.002,0\n0.6,0.04,-0.002,0\n0.8,0.04,0.01,0\n";
+
+fn recorded(place: &Workplace, name: &str, mu: f64) {
+    place.write(format!("{name}.toml"), SCENE.replace("MU", &mu.to_string()));
+    place.write("hand.csv", HAND);
+    let (scene, csv) = (format!("{name}.toml"), format!("{name}.csv"));
+    let said = place.run(["run", &scene, "--hand", "hand.csv", "--clock", "virtual", "--record", &csv]);
+    assert_eq!(said.status, Some(0), "{}", said.err);
+}
+
+#[test]
+fn a_recording_and_another_one_become_a_picture_per_entity() {
+    let place = Workplace::new();
+    recorded(&place, "rough", 0.5);
+    recorded(&place, "smooth", 0.1);
+    let said =
+        place.run(["plot", "rough.csv", "--against", "smooth.csv", "--by-entity", "--out", "pictures"]);
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    let svg = std::fs::read_to_string(place.path("pictures/table.svg")).expect("a picture");
+    // Force along the motion and along the normal, in both; nothing acts across. The legend is text.
+    for word in ["table", ">x<", ">y<", ">x, smooth<", ">y, smooth<", "way of the finger (mm)"] {
+        assert!(svg.replace("\n", "").contains(word), "no {word} in {svg}");
+    }
+    assert!(!svg.replace("\n", "").contains(">z<"), "what is always zero is not drawn");
+    let png = std::fs::read(place.path("pictures/table.png")).expect("a picture");
+    assert_eq!(png[1..4], *b"PNG");
+    let again = place.run(["plot", "rough.csv", "--from", "0.3", "--to", "0.5", "--svg-only"]);
+    assert_eq!(again.status, Some(0), "{}", again.err);
+    let svg = std::fs::read_to_string(place.path("rough.svg")).expect("beside the recording");
+    assert!(svg.contains("time (s)"));
+    assert!(!place.path("rough.png").exists());
+}
+
+#[test]
+fn what_cannot_be_drawn_is_told_with_the_file_and_what_there_is() {
+    let place = Workplace::new();
+    recorded(&place, "rough", 0.5);
+    place.write(
+        "free.csv",
+        "t,f0_hip_x,f0_hip_y,f0_hip_z,f0_force_x,f0_force_y,f0_force_z,f0_entity\n0,0,0,0,0,0,0,\n",
+    );
+    for (arguments, says) in [
+        (&["plot", "nowhere.csv"][..], "nowhere.csv"),
+        (&["plot", "rough.toml"], "is this a recording"),
+        (&["plot", "rough.csv", "--finger", "thumb"], "there are: f0"),
+        (&["plot", "rough.csv", "--from", "7"], "it lasts from 0 s to"),
+        (&["plot", "rough.csv", "--against", "hand.csv"], "hand.csv: no column f0_hip_x"),
+        (&["plot", "free.csv", "--by-entity"], "touches nothing"),
+        (&["plot", "rough.csv", "--by-entity", "--out", "rough.csv"], "cannot make the directory rough.csv"),
+    ] {
+        let said = place.run(arguments);
+        assert_eq!(said.status, Some(2), "{arguments:?}: {}", said.err);
+        assert!(said.err.contains(says), "{arguments:?}: {}", said.err);
+    }
+}
