@@ -139,11 +139,15 @@ impl Nurbs {
         if full_m.is_nan() || full_m <= ARRIVED * self.extent_m {
             return if is_newton { Moved::Arrived } else { self.off_the_ridge(foot, offset_B, steps) };
         }
-        let mut share = within(full, &self.patches[foot.patch as usize].longest_step);
+        let longest = &self.patches[foot.patch as usize].longest_step;
+        let span = (full[0].abs() / longest[0]).max(full[1].abs() / longest[1]);
+        let mut share = if span > 1.0 { 1.0 / span } else { 1.0 };
         let is_mendable = is_newton && share == 1.0 && is_free == [true; 2];
         let full = if is_mendable { mended(&here, offset_B, full, &room) } else { full };
-        let last = if is_mendable { LAST } else { LAST_UNMENDED };
-        let is_last = is_newton && full_m <= last * self.extent_m;
+        // What Newton's steps leave falls with the share of an element they cover, not with their length: by a pole the
+        // shortest may lead far round.
+        let left_m = full_m * if is_mendable { span * span } else { span };
+        let is_last = is_newton && left_m <= ARRIVED * self.extent_m;
         if is_last && self.nudge(foot, full) {
             return Moved::Arrived;
         }
@@ -152,10 +156,13 @@ impl Nurbs {
             *steps += 1;
             let next = self.foot(foot.patch, moved(foot.at, full, share), foot.side);
             // So short a step of Newton's is right although its gain drowns in rounding.
-            let is_short = full_m * share <= SHORT * self.extent_m;
+            let is_short = full_m * share <= SHORT * self.extent_m && span <= SMALL;
             if (target_B - next.local.point_B).norm_squared() < square || (is_newton && is_short) {
+                // A border that it has just come to has yet to say what lies beyond.
+                let is_come =
+                    (0..2).any(|d| next.at[d] != foot.at[d] && (next.at[d] == 0.0 || next.at[d] == 1.0));
                 *foot = next;
-                return if is_last && share == 1.0 { Moved::Arrived } else { Moved::On };
+                return if is_last && share == 1.0 && !is_come { Moved::Arrived } else { Moved::On };
             }
             if is_short {
                 break;
@@ -311,13 +318,6 @@ fn divided(slope: f64, square: f64) -> f64 {
     if square > 0.0 { slope / square } else { 0.0 }
 }
 
-/// The share of a step that is long enough.
-#[inline]
-fn within(step: [f64; 2], longest: &[f64; 2]) -> f64 {
-    let share = |d: usize| if step[d].abs() > longest[d] { longest[d] / step[d].abs() } else { 1.0 };
-    share(0).min(share(1))
-}
-
 #[inline]
 fn moved(at: [f64; 2], step: [f64; 2], share: f64) -> [f64; 2] {
     std::array::from_fn(|d| {
@@ -333,12 +333,11 @@ fn moved(at: [f64; 2], step: [f64; 2], share: f64) -> [f64; 2] {
     })
 }
 
-/// Shares of the extent: a step that is rounding, one behind which the next is rounding (mended on the picture, or not),
-/// and one too short to judge by the distance.
+/// Shares of the extent: a step that is rounding, and one too short to judge by the distance.
 const ARRIVED: f64 = 1e-16;
-const LAST: f64 = 1e-6;
-const LAST_UNMENDED: f64 = 3e-8;
 const SHORT: f64 = 1e-7;
+/// Share of an element over which derivatives hardly change.
+const SMALL: f64 = 1e-3;
 const AT_BORDER: f64 = 1e-15;
 /// Share of an element so short that what third derivatives add to the first ones is 1e-10 of them, and to the point
 /// nothing.
