@@ -146,9 +146,10 @@ fn a_tessellation_comes_closer_with_the_square_of_its_width() {
     for pair in errors.windows(2) {
         assert!((0.22..0.28).contains(&(pair[1] / pair[0])), "{errors:?}");
     }
-    // No deeper than facets lie below the surface where they do most, K times that; on average about half.
+    // No deeper than facets lie below the surface where they do most, K times that; on average a good part of that.
     let below_m = farthest_below(&nurbs, 64);
-    assert!((1e-6..1e-5).contains(&below_m), "{below_m}");
+    // Cells up to 2 mm long, on radii of some centimetres.
+    assert!((1e-6..2e-5).contains(&below_m), "{below_m}");
     assert!((0.1..1.0).contains(&(errors[2] / (K * below_m))), "{errors:?} {below_m}");
 }
 
