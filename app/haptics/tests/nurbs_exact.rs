@@ -125,3 +125,21 @@ fn a_finger_that_begins_inside_is_pushed_out_slowly() {
         assert!(off.norm() < 1e-11, "{tick} {out:?}");
     }
 }
+
+#[test]
+fn crept_along_the_surface_does_not_fade() {
+    let radius = 0.05;
+    let entities = [entity(built(&make::sphere(radius)), Friction::None)];
+    let mut finger = point_finger();
+    let at = |i: u32| {
+        // Steps of half a micron: short enough to be made without a look at the surface.
+        let angle = 0.3 + f64::from(i) * 5e-7 / radius;
+        Vector3::new(angle.cos() * 0.8, angle.sin(), angle.cos() * 0.6)
+    };
+    finger.step(&entities, &(at(0) * 0.06), DT);
+    for i in 0..40_000 {
+        let out = finger.step(&entities, &(at(i) * 0.048), DT);
+        // 1e-9 of the force.
+        assert!((out.force_on_user_W - at(i) * (K * 0.002)).norm() < 1e-9, "{i} {out:?}");
+    }
+}

@@ -200,6 +200,10 @@ impl Nurbs {
     }
 }
 
+#[expect(
+    clippy::large_enum_variant,
+    reason = "lives on the stack for a moment; a box would allocate in a tick"
+)]
 enum Found {
     At(Foot),
     /// There is one, but in another window.

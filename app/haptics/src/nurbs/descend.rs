@@ -3,6 +3,9 @@
 //! Model: Newton's method on `|S(u, v) - target|^2`. Where its matrix is not positive the curvature is left out
 //! (Gauss and Newton), so that every step leads down; steps that do not are halved. At a border the descent goes on in
 //! the patch beyond if that leads farther down; at a point that an edge has shrunk to, in the direction that does most.
+//! The derivatives at hand are a picture of the surroundings, right to the second order: a step is mended on it before
+//! the surface is looked at again, and the last one, which is too short to tell the picture from the surface, is made
+//! on it alone.
 //! That is where a frictionless god-object goes, and where Melder eq. 4.12-4.14 bring one back to.
 //!
 //! Invariants: the distance never grows but by rounding; the answer is on the surface. What the bound ends goes on in
@@ -13,40 +16,20 @@ use nalgebra::Vector3;
 
 use super::Nurbs;
 use super::foot::Foot;
+use super::local::Local;
 use super::seams::Border;
 
-/// Where a descent ended.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Arrival {
-    pub(super) foot: Foot,
-    pub(super) rest: Rest,
-}
-
-/// What kept it.
-#[derive(Debug, Clone, Copy)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "lives on the stack for a moment; a box would allocate in a tick"
-)]
+/// What kept a foot where its descent ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Rest {
     /// Nothing: no direction leads down.
     Smooth,
     /// The surface ends.
     Rim,
-    /// An edge.
-    Crease(Crease),
+    /// A sharp edge: this one of the foot's patch.
+    Crease(u8),
     /// A sharp point.
     Tip(u32),
-}
-
-/// A sharp edge that a foot stands on.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Crease {
-    /// Which edge of the foot's patch it is.
-    pub(super) edge: u8,
-    /// The same place seen from the patch beyond, and which edge of that it is.
-    pub(super) beyond: Foot,
-    pub(super) edge_beyond: u8,
 }
 
 /// Which edges a descent crosses.
@@ -62,40 +45,38 @@ pub(super) enum Crossing {
 pub(super) const MAX_STEPS: u32 = 64;
 
 impl Nurbs {
-    pub(super) fn descend(&self, target_B: &Vector3<f64>, from: &Foot, crossing: Crossing) -> Arrival {
-        let mut foot = *from;
+    /// Takes `foot` down; what keeps it there.
+    pub(super) fn descend(&self, target_B: &Vector3<f64>, foot: &mut Foot, crossing: Crossing) -> Rest {
         let mut steps = 0;
         while steps < MAX_STEPS {
             let offset_B = target_B - foot.local.point_B;
-            let slope = [offset_B.dot(&foot.local.du), offset_B.dot(&foot.local.dv)];
             let mut rest = Rest::Smooth;
             let mut is_free = [true; 2];
-            if let Some(step) = self.at_borders(&foot, &offset_B, crossing, &mut is_free, &mut rest) {
-                match step {
-                    Step::Over(beyond) => {
+            if is_at_border(&foot.at) {
+                match self.at_borders(foot, &offset_B, crossing, &mut is_free, &mut rest) {
+                    Some(Step::Over(beyond)) => {
                         steps += 1;
-                        foot = beyond;
+                        *foot = beyond;
                         continue;
                     }
-                    Step::End => return Arrival { foot, rest },
+                    Some(Step::End) => return rest,
+                    None => {}
                 }
             }
-            match self.step(&foot, &offset_B, target_B, slope, is_free, &mut steps) {
-                Moved::To(next) => foot = next,
-                Moved::Arrived(foot) => return Arrival { foot, rest: self.settled(&foot, rest) },
+            if self.step(foot, &offset_B, is_free, &mut steps) == Moved::Arrived {
+                return self.settled(foot, rest);
             }
         }
-        Arrival { foot, rest: Rest::Smooth }
+        Rest::Smooth
     }
 
     /// A last step may have left the border that held it.
     fn settled(&self, foot: &Foot, rest: Rest) -> Rest {
-        let is_at_border = foot.at.iter().any(|&x| x == 0.0 || x == 1.0);
-        if is_at_border { rest } else { Rest::Smooth }
+        if is_at_border(&foot.at) { rest } else { Rest::Smooth }
     }
 
     /// What borders do to a descent that stands at one and wants to leave the patch.
-    #[inline]
+    #[inline(never)]
     fn at_borders(
         &self,
         foot: &Foot,
@@ -118,19 +99,18 @@ impl Nurbs {
             *is_free = false;
             match self.beyond(foot, edge, offset_B) {
                 Border::Rim => *rest = Rest::Rim,
-                Border::Patch { foot: beyond, edge: edge_beyond, is_smooth, leads_down } => {
-                    let crease = Crease { edge: edge as u8, beyond, edge_beyond };
+                Border::Patch { foot: beyond, is_smooth, leads_down, .. } => {
                     if is_smooth {
                         if leads_down {
                             return Some(Step::Over(beyond));
                         }
                     } else if crossing == Crossing::Smooth {
-                        *rest = Rest::Crease(crease);
+                        *rest = Rest::Crease(edge as u8);
                         return Some(Step::End);
                     } else if leads_down {
                         return Some(Step::Over(beyond));
                     } else {
-                        *rest = Rest::Crease(crease);
+                        *rest = Rest::Crease(edge as u8);
                     }
                 }
                 Border::Pole(pole) => match self.over_pole(foot, pole, offset_B) {
@@ -148,76 +128,105 @@ impl Nurbs {
     }
 
     /// One safeguarded step within the patch.
-    #[inline]
-    fn step(
-        &self,
-        foot: &Foot,
-        offset_B: &Vector3<f64>,
-        target_B: &Vector3<f64>,
-        slope: [f64; 2],
-        is_free: [bool; 2],
-        steps: &mut u32,
-    ) -> Moved {
-        let here = &foot.local;
+    #[inline(always)]
+    fn step(&self, foot: &mut Foot, offset_B: &Vector3<f64>, is_free: [bool; 2], steps: &mut u32) -> Moved {
+        let here = foot.local;
+        let slope = [offset_B.dot(&here.du), offset_B.dot(&here.dv)];
         let room: Room = [0, 1].map(|d| if is_free[d] { [-foot.at[d], 1.0 - foot.at[d]] } else { [0.0; 2] });
-        let (full, is_newton) = newton(here, offset_B, slope, is_free, &room);
+        let (full, is_newton) = newton(&here, offset_B, slope, is_free, &room);
         let full_m = (here.du * full[0] + here.dv * full[1]).norm();
         let square = offset_B.norm_squared();
         if full_m.is_nan() || full_m <= ARRIVED * self.extent_m {
-            let off = if is_newton { None } else { self.off_the_ridge(foot, offset_B, target_B, steps) };
-            return off.map_or(Moved::Arrived(*foot), Moved::To);
+            return if is_newton { Moved::Arrived } else { self.off_the_ridge(foot, offset_B, steps) };
         }
-        let mut share = within(full, &self.patches[foot.patch as usize].longest_step);
+        let longest = &self.patches[foot.patch as usize].longest_step;
+        let span = (full[0].abs() / longest[0]).max(full[1].abs() / longest[1]);
+        let mut share = if span > 1.0 { 1.0 / span } else { 1.0 };
+        let is_mendable = is_newton && share == 1.0 && is_free == [true; 2];
+        let full = if is_mendable { mended(&here, offset_B, full, &room) } else { full };
+        // What Newton's steps leave falls with the share of an element they cover, not with their length: by a pole the
+        // shortest may lead far round.
+        let left_m = full_m * if is_mendable { span * span } else { span };
+        let is_last = is_newton && left_m <= ARRIVED * self.extent_m;
+        if is_last && self.nudge(foot, full) {
+            return Moved::Arrived;
+        }
+        let target_B = here.point_B + offset_B;
         for _ in 0..MAX_HALVINGS {
             *steps += 1;
             let next = self.foot(foot.patch, moved(foot.at, full, share), foot.side);
             // So short a step of Newton's is right although its gain drowns in rounding.
-            let is_short = full_m * share <= SHORT * self.extent_m;
+            let is_short = full_m * share <= SHORT * self.extent_m && span <= SMALL;
             if (target_B - next.local.point_B).norm_squared() < square || (is_newton && is_short) {
-                let is_last = is_newton && full_m <= LAST * self.extent_m && share == 1.0;
-                return if is_last { Moved::Arrived(next) } else { Moved::To(next) };
+                // A border that it has just come to has yet to say what lies beyond.
+                let is_come =
+                    (0..2).any(|d| next.at[d] != foot.at[d] && (next.at[d] == 0.0 || next.at[d] == 1.0));
+                *foot = next;
+                return if is_last && share == 1.0 && !is_come { Moved::Arrived } else { Moved::On };
             }
             if is_short {
                 break;
             }
             share *= 0.5;
         }
-        Moved::Arrived(*foot)
+        Moved::Arrived
+    }
+
+    /// Makes a step so short that the derivatives at hand tell all there is to know about where it ends; whether it was.
+    #[inline]
+    fn nudge(&self, foot: &mut Foot, step: [f64; 2]) -> bool {
+        let longest = &self.patches[foot.patch as usize].longest_step;
+        let share = (step[0].abs() / longest[0]).max(step[1].abs() / longest[1]);
+        let at = moved(foot.at, step, 1.0);
+        // Beyond a knot other polynomials hold, and what lies at a border must be there to the last digit.
+        let is_told = foot.blur + share <= NUDGE
+            && !is_at_border(&at)
+            && self.is_in_one_element(foot.patch, &foot.at, &at);
+        if is_told {
+            let local = foot.local.moved([at[0] - foot.at[0], at[1] - foot.at[1]]);
+            let blur = foot.blur + share;
+            *foot = Foot { blur, ..self.foot_of_local(foot.patch, at, foot.side, local) };
+        }
+        is_told
     }
 
     /// Straight above the target nothing leads down at first, yet every way does: a god-object that was pushed through
     /// the middle of a ball must not stay on its far side.
     #[cold]
-    fn off_the_ridge(
-        &self,
-        foot: &Foot,
-        offset_B: &Vector3<f64>,
-        target_B: &Vector3<f64>,
-        steps: &mut u32,
-    ) -> Option<Foot> {
+    fn off_the_ridge(&self, foot: &mut Foot, offset_B: &Vector3<f64>, steps: &mut u32) -> Moved {
         let here = &foot.local;
+        let target_B = here.point_B + offset_B;
         let falls = |dd: &Vector3<f64>, d: &Vector3<f64>| divided(offset_B.dot(dd), d.norm_squared());
         let d = usize::from(falls(&here.dvv, &here.dv) > falls(&here.duu, &here.du));
         let longest = self.patches[foot.patch as usize].longest_step[d];
-        [longest, -longest].into_iter().find_map(|step| {
+        for step in [longest, -longest] {
             *steps += 1;
             let mut at = foot.at;
             at[d] = (at[d] + 0.25 * step).clamp(0.0, 1.0);
             let next = self.foot(foot.patch, at, foot.side);
             let square = (target_B - next.local.point_B).norm_squared();
-            (square < offset_B.norm_squared() * (1.0 - 1e-12)).then_some(next)
-        })
+            if square < offset_B.norm_squared() * (1.0 - 1e-12) {
+                *foot = next;
+                return Moved::On;
+            }
+        }
+        Moved::Arrived
     }
 }
 
+#[expect(
+    clippy::large_enum_variant,
+    reason = "lives on the stack for a moment; a box would allocate in a tick"
+)]
 enum Step {
     Over(Foot),
     End,
 }
 
+#[derive(PartialEq)]
 enum Moved {
-    To(Foot),
-    Arrived(Foot),
+    On,
+    Arrived,
 }
 
 /// How far each parameter may go back and forth.
@@ -229,7 +238,7 @@ type Room = [[f64; 2]; 2];
 /// whole it would end at once when it runs along a border that is bent.
 #[inline]
 fn newton(
-    here: &super::local::Local,
+    here: &Local,
     offset_B: &Vector3<f64>,
     slope: [f64; 2],
     is_free: [bool; 2],
@@ -287,15 +296,26 @@ fn newton(
     }
 }
 
-fn divided(slope: f64, square: f64) -> f64 {
-    if square > 0.0 { slope / square } else { 0.0 }
+/// Newton's step once more on the picture that the derivatives give of where `step` leads.
+#[inline]
+fn mended(here: &Local, offset_B: &Vector3<f64>, step: [f64; 2], room: &Room) -> [f64; 2] {
+    let there = here.moved(step);
+    let off_B = offset_B - (there.point_B - here.point_B);
+    let slope = [off_B.dot(&there.du), off_B.dot(&there.dv)];
+    let (more, is_newton) =
+        newton(&there, &off_B, slope, [true; 2], &[[f64::NEG_INFINITY, f64::INFINITY]; 2]);
+    let sum = [step[0] + more[0], step[1] + more[1]];
+    let is_small = (0..2).all(|d| more[d].abs() <= 0.25 * step[d].abs().max(step[1 - d].abs()));
+    let fits = (0..2).all(|d| room[d][0] < sum[d] && sum[d] < room[d][1]);
+    if is_newton && is_small && fits { sum } else { step }
 }
 
-/// The share of a step that is long enough.
-#[inline]
-fn within(step: [f64; 2], longest: &[f64; 2]) -> f64 {
-    let share = |d: usize| if step[d].abs() > longest[d] { longest[d] / step[d].abs() } else { 1.0 };
-    share(0).min(share(1))
+fn is_at_border(at: &[f64; 2]) -> bool {
+    at.iter().any(|&x| x == 0.0 || x == 1.0)
+}
+
+fn divided(slope: f64, square: f64) -> f64 {
+    if square > 0.0 { slope / square } else { 0.0 }
 }
 
 #[inline]
@@ -313,12 +333,15 @@ fn moved(at: [f64; 2], step: [f64; 2], share: f64) -> [f64; 2] {
     })
 }
 
-/// Shares of the extent: a step that is rounding, one behind which the next is rounding, and one too short to judge by
-/// the distance.
+/// Shares of the extent: a step that is rounding, and one too short to judge by the distance.
 const ARRIVED: f64 = 1e-16;
-const LAST: f64 = 3e-8;
 const SHORT: f64 = 1e-7;
+/// Share of an element over which derivatives hardly change.
+const SMALL: f64 = 1e-3;
 const AT_BORDER: f64 = 1e-15;
+/// Share of an element so short that what third derivatives add to the first ones is 1e-10 of them, and to the point
+/// nothing.
+const NUDGE: f64 = 1e-5;
 const MAX_HALVINGS: u32 = 12;
 /// Below this share of the surface's own metric the curvature is not to be trusted.
 const LEAST_PIVOT: f64 = 1e-3;

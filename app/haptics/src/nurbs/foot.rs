@@ -16,6 +16,8 @@ pub(crate) struct Foot {
     pub(super) side: f64,
     pub(super) local: Local,
     pub(super) normal_B: Vector3<f64>,
+    /// How far it has been moved since the surface was last looked at, as a share of an element.
+    pub(super) blur: f64,
 }
 
 impl Foot {
@@ -28,14 +30,18 @@ impl Nurbs {
     /// The foot at `at` of a patch.
     #[inline]
     pub(super) fn foot(&self, patch: u32, at: [f64; 2], side: f64) -> Foot {
-        let local = self.local(patch, at);
+        self.foot_of_local(patch, at, side, self.local(patch, at))
+    }
+
+    #[inline(always)]
+    pub(super) fn foot_of_local(&self, patch: u32, at: [f64; 2], side: f64, local: Local) -> Foot {
         let is_turned = self.patches[patch as usize].is_turned;
         let outward = if is_turned { -side } else { side };
         let normal_B = self.natural_normal(patch, at, &local) * outward;
-        Foot { patch, at, side, local, normal_B }
+        Foot { patch, at, side, local, normal_B, blur: 0.0 }
     }
 
-    #[inline]
+    #[inline(always)]
     pub(super) fn local(&self, patch: u32, at: [f64; 2]) -> Local {
         let patch = &self.patches[patch as usize];
         let (i, s, width_u) = locate(&patch.breaks[0], at[0]);
@@ -46,8 +52,15 @@ impl Nurbs {
         local(net, patch.degree, &element.origin_B, [s, t], [width_u, width_v])
     }
 
-    /// Along `S_u x S_v`; where an edge has shrunk to a point, what that tends to.
+    /// Whether the same polynomial holds at both places.
     #[inline]
+    pub(super) fn is_in_one_element(&self, patch: u32, a: &[f64; 2], b: &[f64; 2]) -> bool {
+        let breaks = &self.patches[patch as usize].breaks;
+        (0..2).all(|d| locate(&breaks[d], a[d]).0 == locate(&breaks[d], b[d]).0)
+    }
+
+    /// Along `S_u x S_v`; where an edge has shrunk to a point, what that tends to.
+    #[inline(always)]
     fn natural_normal(&self, patch: u32, at: [f64; 2], here: &Local) -> Vector3<f64> {
         let (uu, vv) = (here.du.norm_squared(), here.dv.norm_squared());
         let across = here.du.cross(&here.dv);

@@ -18,6 +18,16 @@ pub(super) struct Local {
     pub(super) dvv: Vector3<f64>,
 }
 
+impl Local {
+    /// What second derivatives tell of the surface `by` this much farther on.
+    #[inline(always)]
+    pub(super) fn moved(&self, [u, v]: [f64; 2]) -> Self {
+        let (by_u, by_v) = (self.duu * u + self.duv * v, self.duv * u + self.dvv * v);
+        let point_B = self.point_B + (self.du + by_u * 0.5) * u + (self.dv + by_v * 0.5) * v;
+        Self { point_B, du: self.du + by_u, dv: self.dv + by_v, ..*self }
+    }
+}
+
 /// A basis, its first and its second derivative.
 struct Basis<const N: usize>([[f64; 3]; N]);
 

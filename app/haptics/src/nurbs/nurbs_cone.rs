@@ -69,9 +69,10 @@ impl NurbsCone {
             return Some((touch, beginning));
         }
         self.left = Some(touching.shadow.side);
+        let let_go_m = (touching.shadow.point_B() - hip_B).norm();
         self.touching = None;
         self.clear = None;
-        self.pass_on(nurbs, &walker, input)
+        self.pass_on(nurbs, &walker, input, let_go_m)
     }
 
     /// Let go by one of two parts that overlap, it may be inside the other, whose surface it never came through.
@@ -81,11 +82,13 @@ impl NurbsCone {
         nurbs: &Nurbs,
         walker: &Walker<'_>,
         input: &TouchInput<'_>,
+        let_go_m: f64,
     ) -> Option<(Touch, Beginning)> {
         if nurbs.sides == Sides::Sheet || !nurbs.has_near(&input.cone.hip_B, 0.0) {
             return None;
         }
-        let stand = walker.find(&input.cone.hip_B).filter(|stand| {
+        // What lies farther off than where it was let go is not what it is in.
+        let stand = walker.find_within(&input.cone.hip_B, let_go_m).filter(|stand| {
             // Where it was let go, rounding does not find it again.
             stand.height_m < -1e-12 * nurbs.extent_m
         })?;
@@ -155,8 +158,8 @@ impl Touching {
         friction: &Friction,
         input: &ConeInput,
     ) -> Option<Touch> {
-        let down = nurbs.descend(&input.hip_B, &self.shadow, Crossing::All);
-        let stand = walker.stand(&down, &input.hip_B);
+        let rest = nurbs.descend(&input.hip_B, &mut self.shadow, Crossing::All);
+        let stand = walker.stand(self.shadow, rest, &input.hip_B);
         self.shadow = stand.foot;
         if stand.is_free || stand.height_m.is_nan() {
             return None;

@@ -48,6 +48,10 @@ pub(super) struct Pole {
 }
 
 /// What a descent finds at an edge.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "lives on the stack for a moment; a box would allocate in a tick"
+)]
 pub(super) enum Border {
     Rim,
     Patch { foot: Foot, edge: u8, is_smooth: bool, leads_down: bool },

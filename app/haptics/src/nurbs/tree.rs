@@ -8,8 +8,9 @@
 use nalgebra::Vector3;
 
 use super::bezier::{Control, Window, restrict};
-use super::descend::{Arrival, Crossing};
+use super::descend::{Crossing, Rest};
 use super::error::NurbsError;
+use super::foot::Foot;
 use super::{Nurbs, Patch};
 
 /// A part of an element.
@@ -269,8 +270,8 @@ impl Nurbs {
     }
 
     /// The nearest point of all, found by a descent in every cell that may hold it; `None` beyond `at_most_m`.
-    pub(super) fn nearest_within(&self, p_B: &Vector3<f64>, at_most_m: f64) -> Option<Arrival> {
-        let mut best: Option<Arrival> = None;
+    pub(super) fn nearest_within(&self, p_B: &Vector3<f64>, at_most_m: f64) -> Option<(Foot, Rest)> {
+        let mut best = None;
         let mut left = MAX_DESCENTS;
         self.visit_near(p_B, at_most_m * at_most_m, |cell, _, limit| {
             left -= 1;
@@ -278,11 +279,11 @@ impl Nurbs {
                 return 0.0;
             }
             let middle = cell.window.map(|[a, b]| (a + b) / 2.0);
-            let start = self.foot(cell.patch, middle, 1.0);
-            let arrival = self.descend(p_B, &start, Crossing::All);
-            let square = (arrival.foot.point_B() - p_B).norm_squared();
+            let mut foot = self.foot(cell.patch, middle, 1.0);
+            let rest = self.descend(p_B, &mut foot, Crossing::All);
+            let square = (foot.point_B() - p_B).norm_squared();
             if square < limit {
-                best = Some(arrival);
+                best = Some((foot, rest));
                 return square;
             }
             limit

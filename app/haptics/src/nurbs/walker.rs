@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use std::cell::Cell;
 
 use super::Nurbs;
-use super::descend::{Arrival, Crease, Crossing, Rest};
+use super::descend::{Crossing, Rest};
 use super::foot::Foot;
 use super::seams::{Border, running};
 use crate::mesh::Sides;
@@ -25,7 +25,9 @@ pub(crate) struct Walker<'n> {
     /// Against which a concave crease presses back.
     hip_B: Vector3<f64>,
     layer_m: f64,
-    feet: [Cell<Option<(SurfacePoint, Foot)>>; 2],
+    feet: [Cell<Option<Foot>>; 2],
+    /// The points that were answered for them.
+    answers_B: [Cell<Vector3<f64>>; 2],
     newest: Cell<usize>,
 }
 
@@ -41,7 +43,8 @@ pub(super) struct Stand {
 
 impl<'n> Walker<'n> {
     pub(crate) fn new(nurbs: &'n Nurbs, hip_B: Vector3<f64>, layer_m: f64) -> Self {
-        Self { nurbs, hip_B, layer_m, feet: [const { Cell::new(None) }; 2], newest: Cell::new(0) }
+        let answers_B = [Cell::new(Vector3::zeros()), Cell::new(Vector3::zeros())];
+        Self { nurbs, hip_B, layer_m, feet: [const { Cell::new(None) }; 2], answers_B, newest: Cell::new(0) }
     }
 
     pub(super) fn is_of_a_point(&self) -> bool {
@@ -54,32 +57,28 @@ impl<'n> Walker<'n> {
 
     /// Where a point finger that has just come to the surface stands.
     pub(super) fn at_foot(&self, foot: Foot) -> Stand {
-        let at = SurfacePoint {
-            point_B: foot.point_B(),
-            normal_B: foot.normal_B,
-            feature: Feature::Surface,
-            piece: self.nurbs.patches[foot.patch as usize].group,
-        };
+        let at = self.on(&foot);
         Stand { at, foot, is_free: false, height_m: 0.0 }
     }
 
     /// Makes known where a point of the surface is.
     pub(super) fn know(&self, at: &SurfacePoint, foot: &Foot) {
         let slot = 1 - self.newest.get();
-        self.feet[slot].set(Some((*at, *foot)));
+        self.feet[slot].set(Some(*foot));
+        self.answers_B[slot].set(at.point_B);
         self.newest.set(slot);
     }
 
     /// The foot of a point that was answered lately.
     pub(super) fn foot_of(&self, at: &SurfacePoint) -> Option<Foot> {
-        let known = |slot: usize| self.feet[slot].get().filter(|(known, _)| known.point_B == at.point_B);
         let newest = self.newest.get();
-        known(newest).or_else(|| known(1 - newest)).map(|(_, foot)| foot)
+        let known =
+            [newest, 1 - newest].into_iter().find(|&slot| self.answers_B[slot].get() == at.point_B)?;
+        self.feet[known].get()
     }
 
-    /// Where somebody at `p_B` is held whose way down ended at `arrival`.
-    pub(super) fn stand(&self, arrival: &Arrival, p_B: &Vector3<f64>) -> Stand {
-        let Arrival { foot, rest } = *arrival;
+    /// Where somebody at `p_B` is held whose way down ended at `foot`.
+    pub(super) fn stand(&self, foot: Foot, rest: Rest, p_B: &Vector3<f64>) -> Stand {
         let away_B = p_B - foot.point_B();
         let at = |normal_B: Vector3<f64>, feature| SurfacePoint {
             point_B: foot.point_B() + normal_B * self.layer_m,
@@ -94,7 +93,9 @@ impl<'n> Walker<'n> {
                 return Stand { at: at(foot.normal_B, Feature::Surface), foot, is_free, height_m };
             }
             Rest::Rim => return self.stand_on_rim(foot, &away_B, at),
-            Rest::Crease(crease) => foot.normal_B + crease.beyond.normal_B,
+            Rest::Crease(edge) => {
+                foot.normal_B + self.beyond(&foot, edge).map_or(foot.normal_B, |(beyond, _)| beyond.normal_B)
+            }
             Rest::Tip(pole) => self.nurbs.poles[pole as usize].normal_B * foot.side,
         };
         let feature = if matches!(rest, Rest::Tip(_)) { Feature::Vertex } else { Feature::Edge };
@@ -127,60 +128,64 @@ impl<'n> Walker<'n> {
         Stand { at: at(normal_B, Feature::Edge), foot, is_free: height_m > 0.0, height_m }
     }
 
-    /// Where a point finger that came to a crease stands.
-    fn on_crease(&self, foot: &Foot, crease: &Crease) -> (SurfacePoint, Foot) {
-        let (nurbs, beyond) = (self.nurbs, &crease.beyond);
-        let on = |foot: &Foot| SurfacePoint {
+    /// The same place on the other side of a crease, and which edge of the patch there it is on.
+    fn beyond(&self, foot: &Foot, edge: u8) -> Option<(Foot, u8)> {
+        match self.nurbs.beyond(foot, usize::from(edge), &Vector3::zeros()) {
+            Border::Patch { foot, edge, is_smooth: false, .. } => Some((foot, edge)),
+            _ => None,
+        }
+    }
+
+    fn on(&self, foot: &Foot) -> SurfacePoint {
+        SurfacePoint {
             point_B: foot.point_B(),
             normal_B: foot.normal_B,
             feature: Feature::Surface,
-            piece: nurbs.patches[foot.patch as usize].group,
-        };
-        let into_beyond = nurbs.inward(beyond, crease.edge_beyond);
-        let into_here = nurbs.inward(foot, crease.edge);
+            piece: self.nurbs.patches[foot.patch as usize].group,
+        }
+    }
+
+    /// Where a point finger that came to a crease stands.
+    fn on_crease(&self, foot: &Foot, edge: u8) -> Option<(SurfacePoint, Foot)> {
+        let nurbs = self.nurbs;
+        let (beyond, edge_beyond) = &self.beyond(foot, edge)?;
+        let into_beyond = nurbs.inward(beyond, *edge_beyond);
+        let into_here = nurbs.inward(foot, edge);
         let is_convex = into_beyond.dot(&foot.normal_B) < 0.0;
         let off_B = self.hip_B - foot.point_B();
         if is_convex || off_B.dot(&into_beyond) > 0.0 {
-            return (on(beyond), *beyond);
+            return Some((self.on(beyond), *beyond));
         }
         if off_B.dot(&into_here) > 0.0 {
-            return (on(foot), *foot);
+            return Some((self.on(foot), *foot));
         }
-        let along = if running(crease.edge) == 0 { foot.local.du } else { foot.local.dv };
+        let along = if running(edge) == 0 { foot.local.du } else { foot.local.dv };
         let along = direction_or_up(&along);
         let press_B = along * off_B.dot(&along) - off_B;
         let mean_B = foot.normal_B + beyond.normal_B;
         let is_far = press_B.norm() > 1e-12 * nurbs.extent_m;
         let normal_B = direction_or_up(if is_far { &press_B } else { &mean_B });
-        (SurfacePoint { normal_B, feature: Feature::Edge, piece: ON_CREASE, ..on(foot) }, *foot)
+        Some((SurfacePoint { normal_B, feature: Feature::Edge, piece: ON_CREASE, ..self.on(foot) }, *foot))
     }
 
     /// How a god-object that rests on a crease stands to where the HIP is now.
     pub(super) fn turned(&self, foot: &Foot) -> Option<(SurfacePoint, Foot)> {
-        (0..4).filter(|&edge| foot.at[usize::from(edge > 1)] == f64::from(edge % 2)).find_map(|edge| {
-            match self.nurbs.beyond(foot, edge as usize, &Vector3::zeros()) {
-                Border::Patch { foot: beyond, edge: edge_beyond, is_smooth: false, .. } => {
-                    Some(self.on_crease(foot, &Crease { edge, beyond, edge_beyond }))
-                }
-                _ => None,
-            }
-        })
+        (0..4)
+            .filter(|&edge| foot.at[usize::from(edge > 1)] == f64::from(edge % 2))
+            .find_map(|edge| self.on_crease(foot, edge))
     }
 
     /// The nearest of all; far away a descent from the nearest cell.
     pub(super) fn find(&self, p_B: &Vector3<f64>) -> Option<Stand> {
-        let mut arrival = self.nurbs.nearest_within(p_B, f64::INFINITY)?;
-        if self.nurbs.sides == Sides::Sheet
-            && (p_B - arrival.foot.point_B()).dot(&arrival.foot.normal_B) < 0.0
-        {
-            let foot = arrival.foot;
-            arrival.foot = Foot { side: -foot.side, normal_B: -foot.normal_B, ..foot };
-            if let Rest::Crease(crease) = &mut arrival.rest {
-                crease.beyond.side *= -1.0;
-                crease.beyond.normal_B *= -1.0;
-            }
+        self.find_within(p_B, f64::INFINITY)
+    }
+
+    pub(super) fn find_within(&self, p_B: &Vector3<f64>, at_most_m: f64) -> Option<Stand> {
+        let (mut foot, rest) = self.nurbs.nearest_within(p_B, at_most_m)?;
+        if self.nurbs.sides == Sides::Sheet && (p_B - foot.point_B()).dot(&foot.normal_B) < 0.0 {
+            foot = Foot { side: -foot.side, normal_B: -foot.normal_B, ..foot };
         }
-        Some(self.stand(&arrival, p_B))
+        Some(self.stand(foot, rest, p_B))
     }
 }
 
@@ -211,21 +216,20 @@ impl Surface for Walker<'_> {
 
     fn settle(&self, from: &SurfacePoint, on_tangent_plane_B: &Vector3<f64>) -> SurfacePoint {
         let foot = self.foot_of(from).or_else(|| self.find(&from.point_B).map(|stand| stand.foot));
-        let Some(foot) = foot else { return *from };
-        let (at, foot) = if self.layer_m > 0.0 {
-            let arrival = self.nurbs.descend(on_tangent_plane_B, &foot, Crossing::All);
-            let stand = self.stand(&arrival, on_tangent_plane_B);
-            (stand.at, stand.foot)
+        let Some(mut foot) = foot else { return *from };
+        let at = if self.layer_m > 0.0 {
+            let rest = self.nurbs.descend(on_tangent_plane_B, &mut foot, Crossing::All);
+            let stand = self.stand(foot, rest, on_tangent_plane_B);
+            foot = stand.foot;
+            stand.at
         } else {
-            let arrival = self.nurbs.descend(on_tangent_plane_B, &foot, Crossing::Smooth);
-            match &arrival.rest {
-                Rest::Crease(crease) => self.on_crease(&arrival.foot, crease),
-                _ => {
-                    let foot = arrival.foot;
-                    let piece = self.nurbs.patches[foot.patch as usize].group;
-                    let (point_B, normal_B) = (foot.point_B(), foot.normal_B);
-                    (SurfacePoint { point_B, normal_B, feature: Feature::Surface, piece }, foot)
-                }
+            let rest = self.nurbs.descend(on_tangent_plane_B, &mut foot, Crossing::Smooth);
+            let crease = if let Rest::Crease(edge) = rest { self.on_crease(&foot, edge) } else { None };
+            if let Some((at, beyond)) = crease {
+                foot = beyond;
+                at
+            } else {
+                self.on(&foot)
             }
         };
         self.know(&at, &foot);
@@ -234,12 +238,13 @@ impl Surface for Walker<'_> {
 
     /// Whether the way down from `at` ends there.
     fn holds_outside(&self, at: &SurfacePoint, depth_m: f64) -> bool {
-        let Some(foot) = self.foot_of(at).or_else(|| self.find(&at.point_B).map(|stand| stand.foot)) else {
+        let Some(mut foot) = self.foot_of(at).or_else(|| self.find(&at.point_B).map(|stand| stand.foot))
+        else {
             return false;
         };
         let hip_B = at.point_B - at.normal_B * depth_m;
-        let arrival = self.nurbs.descend(&hip_B, &foot, Crossing::All);
-        !self.stand(&arrival, &hip_B).is_free
+        let rest = self.nurbs.descend(&hip_B, &mut foot, Crossing::All);
+        !self.stand(foot, rest, &hip_B).is_free
     }
 
     fn grown(&self, radius_m: f64) -> Option<Self> {
