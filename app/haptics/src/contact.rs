@@ -233,10 +233,12 @@ impl Slot {
                 self.begun(touched)
             }
             Shape::Nurbs(nurbs) => {
+                self.let_roll_go();
                 let touched = self.nurbs.update(nurbs, input);
                 self.begun(touched)
             }
             Shape::Csg(csg) => {
+                self.let_roll_go();
                 let touched = self.csg.update(csg, input);
                 self.begun(touched)
             }
@@ -314,7 +316,10 @@ impl Slot {
         mut touch: Touch,
         sweep: &Sweep<'_>,
     ) -> Option<Contact> {
-        entity.shading.turn(&entity.shape, &mut touch);
+        match self.rolling.as_ref().filter(|rolling| rolling.is_touching()) {
+            Some(rolling) => entity.shading.turn_shares(&entity.shape, rolling.shares(), &mut touch),
+            None => entity.shading.turn(&entity.shape, &mut touch),
+        }
         if let Some(height_map) = &entity.height_map {
             let over = Over {
                 shape: &entity.shape,

@@ -28,6 +28,7 @@ use nalgebra::Vector3;
 use std::cell::Cell;
 
 use self::ball::{Ball, Look};
+use self::foot::Foot;
 use self::vicinity::Vicinity;
 use super::draw::{Against, Draw, Drawn, Frictionless};
 use super::{Beginning, Mesh};
@@ -53,8 +54,8 @@ pub(crate) struct RollingCone {
 /// One of the features that a ball touches, and what it does to the user.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Share {
-    pub(crate) point_B: Vector3<f64>,
-    pub(crate) normal_B: Vector3<f64>,
+    /// On the mesh, not where the ball's centre is.
+    pub(crate) at: SurfacePoint,
     pub(crate) force_on_user_B: Vector3<f64>,
     /// Of all loads, 0 to 1.
     pub(crate) part: f64,
@@ -144,8 +145,9 @@ impl RollingCone {
         rests.iter().filter(|rest| rest.load_m > 0.0).map(move |rest| {
             let part = rest.load_m / load_m;
             let spring_B = rest.normal_B * rest.load_m + tangential_B * part;
-            let (point_B, normal_B) = (rest.foot.point_B, rest.normal_B);
-            Share { point_B, normal_B, force_on_user_B: spring_B * k, part }
+            let Foot { point_B, feature, face, .. } = rest.foot;
+            let at = SurfacePoint { point_B, normal_B: rest.normal_B, feature, piece: face };
+            Share { at, force_on_user_B: spring_B * k, part }
         })
     }
 
