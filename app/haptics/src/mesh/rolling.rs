@@ -27,7 +27,7 @@ mod vicinity;
 use nalgebra::Vector3;
 use std::cell::Cell;
 
-use self::ball::{Ball, Flight, Look};
+use self::ball::{Ball, Flight, Look, Work};
 use self::foot::Foot;
 use self::vicinity::Vicinity;
 use super::draw::{Against, Draw, Drawn, Frictionless};
@@ -372,6 +372,7 @@ fn seek_with(
     let mut ball = *start;
     let mut pushes_left = MOST_PUSHES;
     let mut met_something = false;
+    let work = Work::default();
     let rounds = if is_careful { MOST_CAREFUL_ROUNDS } else { MOST_ROUNDS };
     let mut sees = None;
     for _ in 0..rounds {
@@ -386,7 +387,11 @@ fn seek_with(
             if flown.rests().is_empty() && flown.centre_B == input.hip_B {
                 return Sought::Free;
             }
-            ball = flown;
+            (ball, sees) = (flown, None);
+            if ball.rests().is_empty() {
+                // Still in flight; it goes on in the next tick.
+                break;
+            }
             continue;
         }
         let Drawn { target_B, is_at_rest, tangential_B } =
@@ -416,11 +421,14 @@ fn seek_with(
         }
         if is_careful {
             let before = (ball.centre_B, ball.rests().len());
-            ball = ball.rolled_until(mesh, &target_B);
+            ball = ball.rolled_until(mesh, &target_B, &work);
             if before == (ball.centre_B, ball.rests().len()) {
                 break;
             }
             sees = None;
+            if work.is_enough() {
+                break;
+            }
             continue;
         }
         if let Some(seat) = is_frictionless.then(|| ball.seat(mesh, &input.hip_B)).flatten() {

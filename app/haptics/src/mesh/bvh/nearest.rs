@@ -250,3 +250,23 @@ const MOST_VISITS_OF_BALLS: usize = 4096;
 const ROUNDING: f64 = 1e-14;
 /// How many times the extent of the mesh a point may be away before it is brought nearer.
 const FARTHEST: f64 = 1000.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{Mesh, make};
+
+    #[test]
+    fn what_is_asked_for_balls_gives_up_where_very_many_faces_are_as_near() {
+        let (mesh, _) = Mesh::build(make::uv_sphere(200, 101, 0.1)).unwrap();
+        let centre = Vector3::new(1e-9, 2e-9, 3e-9);
+        assert_eq!(mesh.nearest_within(&centre, 0.11), Err(TooMany), "40,000 are as near");
+        let below = (&Vector3::y(), -0.2);
+        assert_eq!(mesh.nearest_above(&centre, 0.11, below), Err(TooMany));
+        // But not where they are farther than is asked, or where some are nearer than others.
+        assert_eq!(mesh.nearest_within(&centre, 0.09), Ok(None));
+        let beside = Vector3::new(0.02, 0.201, 0.01);
+        let near = mesh.nearest_within(&beside, 0.2).unwrap().unwrap();
+        assert_eq!(near, mesh.nearest(&beside));
+    }
+}

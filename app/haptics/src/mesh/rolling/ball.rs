@@ -10,6 +10,8 @@
 //! room of r around it, cannot come to the other side of anything.
 //! Cost: a walk of each foot and one bounded query; at something new some ten walks more.
 
+use std::cell::Cell;
+
 use nalgebra::Vector3;
 
 use super::foot::Foot;
@@ -53,6 +55,21 @@ pub(super) struct Look {
     pub(super) is_free: bool,
 }
 
+/// What was done in a tick already, in places that were looked at.
+#[derive(Debug, Default)]
+pub(super) struct Work(Cell<u32>);
+
+impl Work {
+    fn look(&self) {
+        self.0.set(self.0.get().saturating_add(1));
+    }
+
+    /// Whether the rest has to wait for the next tick.
+    pub(super) fn is_enough(&self) -> bool {
+        self.0.get() >= MOST_WORK
+    }
+}
+
 /// How much of a flight is done in a tick; the rest in the next ones.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Flight {
@@ -64,7 +81,7 @@ pub(super) struct Flight {
 impl Flight {
     /// One that was met in free space went all the way already.
     pub(super) const TO_THE_END: Self = Self { most_leaps: 64, farthest: f64::INFINITY };
-    pub(super) const OF_A_BALL_THAT_TOUCHES: Self = Self { most_leaps: 6, farthest: 2.0 };
+    pub(super) const OF_A_BALL_THAT_TOUCHES: Self = Self { most_leaps: 20, farthest: 2.0 };
 }
 
 impl Ball {
@@ -339,12 +356,12 @@ impl Ball {
     }
 
     /// As [`Self::rolled_to`], as far as nothing else is in the way; by half of its radius at the most.
-    pub(super) fn rolled_until(&self, mesh: &Mesh, target_B: &Vector3<f64>) -> Self {
+    pub(super) fn rolled_until(&self, mesh: &Mesh, target_B: &Vector3<f64>, work: &Work) -> Self {
         let way_B = target_B - self.centre_B;
         let way_m = way_B.norm();
         let longest_m = 0.5 * self.radius_m;
         let way_B = if way_m > longest_m { way_B * (longest_m / way_m) } else { way_B };
-        self.first_touch(mesh, |share| self.rolled_to(mesh, &(self.centre_B + way_B * share)))
+        self.first_touch(mesh, work, |share| self.rolled_to(mesh, &(self.centre_B + way_B * share)))
             .unwrap_or(*self)
     }
 
@@ -371,7 +388,9 @@ impl Ball {
             let leap_m = safe_m.max(SHORTEST_LEAP * radius_m).min(left_m);
             let leap_B = way_B * (leap_m / left_m);
             let from_B = ball.centre_B;
-            ball = ball.first_touch(mesh, |share| Self::in_free_space(from_B + leap_B * share, radius_m))?;
+            ball = ball.first_touch(mesh, &Work::default(), |share| {
+                Self::in_free_space(from_B + leap_B * share, radius_m)
+            })?;
             if ball.count > 0 || leap_m >= left_m {
                 return Some(ball);
             }
@@ -380,12 +399,13 @@ impl Ball {
     }
 
     /// The end of a path, or where on it something new is first touched; `None` if that cannot be told.
-    fn first_touch(&self, mesh: &Mesh, path: impl Fn(f64) -> Self) -> Option<Self> {
+    fn first_touch(&self, mesh: &Mesh, work: &Work, path: impl Fn(f64) -> Self) -> Option<Self> {
         let mut ball = path(1.0);
         let mut end = 1.0;
         for _ in 0..MOST_OBSTACLES {
+            work.look();
             let Some(obstacle) = ball.obstacle(mesh).ok()? else { return Some(ball) };
-            (end, ball) = touching(mesh, &path, obstacle.face, end);
+            (end, ball) = touching(mesh, work, &path, obstacle.face, end);
             ball.add(mesh, obstacle.face);
         }
         (ball.obstacle(mesh) == Ok(None)).then_some(ball)
@@ -462,7 +482,7 @@ impl Rest {
 /// Where on a path, before the share `end` of it, a face is first as near as the radius.
 ///
 /// Regula falsi after Illinois; what is left of the radius at the end is far below what an obstacle has to be.
-fn touching(mesh: &Mesh, path: impl Fn(f64) -> Ball, face: u32, end: f64) -> (f64, Ball) {
+fn touching(mesh: &Mesh, work: &Work, path: impl Fn(f64) -> Ball, face: u32, end: f64) -> (f64, Ball) {
     // Of this face alone: a walk from it might end at what the ball rests on.
     let gap = |ball: &Ball| Foot::on(mesh, face, &ball.centre_B).squared_m2.sqrt() - ball.radius_m;
     let start = path(0.0);
@@ -477,6 +497,7 @@ fn touching(mesh: &Mesh, path: impl Fn(f64) -> Ball, face: u32, end: f64) -> (f6
         if low.1 <= enough_m {
             break;
         }
+        work.look();
         let share = (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1);
         let ball = path(share);
         let here_m = gap(&ball);
@@ -516,7 +537,9 @@ const BAND: f64 = 1e-7;
 const SAME_FOOT: f64 = 1e-9;
 /// Heights above the mesh below this share of the radius have no direction worth going by.
 const LEAST_HEIGHT: f64 = 1e-3;
-const SHORTEST_LEAP: f64 = 0.125;
+const SHORTEST_LEAP: f64 = 0.375;
 const MOST_CORRECTIONS: usize = 6;
 const MOST_OBSTACLES: usize = 6;
+/// Enough for a finger to roll on over plain faces for as many halves of its radius as there are rounds.
+const MOST_WORK: u32 = 64;
 const MOST_LOOKS: usize = 40;
