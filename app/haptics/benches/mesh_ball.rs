@@ -3,7 +3,7 @@
 //! Along the standard path (`tests/common/path.rs`), 5 mm under the surface on which the finger's centre rolls; and
 //! lightly, 0.3 mm under it. `cargo bench -p haptics --bench mesh_ball -- table` prints median, p99, p99.9 and maximum of
 //! single ticks per phase; the clock's own time is taken off, and each tick's best of several runs counts, as in
-//! `mesh_slide`. Without `table`, Criterion measures whole slides.
+//! `mesh_slide`. With `bumpy` behind it, on the bumpy ball alone. Without `table`, Criterion measures whole slides.
 #![allow(non_snake_case)]
 
 #[path = "../tests/common/path.rs"]
@@ -66,6 +66,9 @@ fn table() {
         "{:<16} {:<12} {:<9} {:>7} {:>7} {:>7} {:>8}",
         "mesh", "friction", "phase", "median", "p99", "p99.9", "max"
     );
+    if std::env::args().any(|argument| argument == "bumpy") {
+        return bumpy(clock_ns);
+    }
     for (meridians, name) in SIZES {
         let shape = shape_of(make::uv_sphere(meridians, path::rings(meridians), R));
         rows(name, &shape, &path::standard_path(path::smooth_for_a_ball), clock_ns);
@@ -74,6 +77,10 @@ fn table() {
     rows("lightly 1M", &million, &lightly(), clock_ns);
     let shuffled = shape_of(make::shuffled(&make::uv_sphere(1000, 501, R), 7));
     rows("shuffled 1M", &shuffled, &path::standard_path(path::smooth_for_a_ball), clock_ns);
+    bumpy(clock_ns);
+}
+
+fn bumpy(clock_ns: u64) {
     let bumpy = shape_of(make::bumpy_sphere(1000, 501, R));
     rows("bumpy 1M", &bumpy, &path::standard_path(path::bumpy_for_a_ball), clock_ns);
 }

@@ -71,7 +71,7 @@ impl TouchInput<'_> {
         match self.shape {
             Shape::Mesh(mesh) => {
                 let (hip_B, radius_m) = (&self.cone.hip_B, self.finger_radius_m);
-                mesh.is_inside(hip_B) || radius_m > 0.0 && mesh.nearest_within(hip_B, radius_m).is_some()
+                mesh.is_inside(hip_B) || radius_m > 0.0 && mesh.nearest_within(hip_B, radius_m) != Ok(None)
             }
             Shape::Csg(csg) => self.finger_radius_m == 0.0 && csg.is_inside(&self.cone.hip_B),
             _ => self.of_surface(|surface| surface.signed_distance(&self.cone.hip_B) <= 0.0).unwrap_or(false),

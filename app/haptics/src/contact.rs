@@ -346,7 +346,10 @@ impl Slot {
         mut touch: Touch,
         sweep: &Sweep<'_>,
     ) -> Option<Contact> {
-        entity.shading.turn(&entity.shape, &mut touch);
+        match self.rolling.as_ref().filter(|rolling| rolling.is_touching()) {
+            Some(rolling) => entity.shading.turn_shares(&entity.shape, rolling.shares(), &mut touch),
+            None => entity.shading.turn(&entity.shape, &mut touch),
+        }
         if let Some(height_map) = &entity.height_map {
             let over = Over {
                 shape: &entity.shape,

@@ -11,7 +11,11 @@
 //! What is turned from: on a face its normal; on an edge or a vertex, where the god-object's normal is no face's, that
 //! normal. So a force without friction always points along the shaded normal, and changes no faster than that does over
 //! the god-object's way, whichever feature it is on ([`at`](self) tells the cases). The back of a sheet is shaded as its
-//! front, mirrored. Balls are shaded where they touch.
+//! front, mirrored.
+//!
+//! A ball is shaded where it touches: at its foot on the mesh, not at its centre. Where it touches at several places, what
+//! each of them does to the user is turned on its own, so that one that comes or goes changes nothing at that moment:
+//! its load is zero then.
 //!
 //! Limits:
 //! - The god-object itself leaps over convex edges: at depth d over an edge of angle a by d sin(a), since there the HIP
@@ -46,7 +50,7 @@ use nalgebra::Vector3;
 use crate::algorithm::Touch;
 use crate::cuboid::Cuboid;
 use crate::error::ParameterError;
-use crate::mesh::{Mesh, VertexNormals};
+use crate::mesh::{Mesh, Share, VertexNormals};
 use crate::shape::{self, Shape};
 use crate::shared::Shared;
 use crate::surface::SurfacePoint;
@@ -120,6 +124,19 @@ impl Shading {
             // Copies: what is lent to a function that is not inlined has to live in memory, shaded or not.
             touch.force_on_user_B = self.turned_force(shape, touch.god_object, touch.force_on_user_B);
         }
+    }
+
+    /// As [`Self::turn`], of a ball that touches a mesh at these places.
+    pub(crate) fn turn_shares(&self, shape: &Shape, shares: impl Iterator<Item = Share>, touch: &mut Touch) {
+        if !matches!(self, Self::None) {
+            touch.force_on_user_B = shares.map(|share| self.turned_share(shape, &share)).sum();
+        }
+    }
+
+    /// What one of the places that a ball touches does to the user, turned.
+    #[inline(never)]
+    pub(crate) fn turned_share(&self, shape: &Shape, share: &Share) -> Vector3<f64> {
+        self.turned(shape, &share.at, &share.force_on_user_B, self.form())
     }
 
     #[inline(never)]

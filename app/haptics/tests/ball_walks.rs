@@ -9,6 +9,7 @@ use common::meshes::{Roaming, built, bumpy_sphere, cube, plate, star, step, touc
 use common::*;
 use haptics::Friction;
 use haptics::mesh::{Mesh, make};
+use nalgebra::Vector3;
 
 fn meshes() -> Vec<(&'static str, Arc<Mesh>)> {
     vec![
@@ -87,5 +88,27 @@ fn a_ball_without_friction_comes_to_rest_where_no_place_nearby_is_nearer_to_the_
             }
             assert!(tried > 10, "{name} {radius_m}: {tried}");
         }
+    }
+}
+
+#[test]
+fn a_ball_as_large_as_a_fine_mesh_stays_outside_of_it() {
+    let mesh = bumpy_sphere(500);
+    for radius_m in [0.03, 0.1, 1.0] {
+        let entity = touchable(&mesh, Friction::None);
+        let mut finger = finger(radius_m);
+        let mut touched = 0;
+        for tick in 0..300 {
+            let t = f64::from(tick) * 0.02;
+            let way = Vector3::new(t.cos(), 0.3 * t.sin(), t.sin()).normalize();
+            let out = step(&mut finger, &entity, &(way * (radius_m + 0.11 - 2e-4 * f64::from(tick.min(75)))));
+            if out.entity.is_some() {
+                let gap_m = mesh.nearest_unbounded(&out.god_object_W).distance_m - radius_m;
+                // As above.
+                assert!(gap_m > -1e-8 * radius_m - 1e-11, "{radius_m} {tick}: {gap_m:e}");
+                touched += 1;
+            }
+        }
+        assert!(touched > 50, "{radius_m}: {touched}");
     }
 }

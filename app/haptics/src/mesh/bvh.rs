@@ -30,6 +30,7 @@ use nalgebra::Vector3;
 use super::Face;
 pub(in crate::mesh) use closest::closest_on;
 pub use nearest::Nearest;
+pub(crate) use nearest::TooMany;
 pub use segment::Hit;
 #[cfg(test)]
 pub(crate) use stack::POPPED;

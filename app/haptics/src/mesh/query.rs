@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::bvh::TooMany;
 use super::{Face, Hit, Mesh, Nearest, Sides, Triangles};
 
 impl Mesh {
@@ -42,7 +43,11 @@ impl Mesh {
     }
 
     /// As [`Self::nearest`], if it is as near as this \[m\].
-    pub(crate) fn nearest_within(&self, p_B: &Vector3<f64>, at_most_m: f64) -> Option<Nearest> {
+    pub(crate) fn nearest_within(
+        &self,
+        p_B: &Vector3<f64>,
+        at_most_m: f64,
+    ) -> Result<Option<Nearest>, TooMany> {
         self.bvh.nearest_within(self.triangles(), p_B, at_most_m)
     }
 
@@ -62,7 +67,7 @@ impl Mesh {
         p_B: &Vector3<f64>,
         at_most_m: f64,
         plane: (&Vector3<f64>, f64),
-    ) -> Option<Nearest> {
+    ) -> Result<Option<Nearest>, TooMany> {
         self.bvh.nearest_above(self.triangles(), p_B, at_most_m, plane)
     }
 

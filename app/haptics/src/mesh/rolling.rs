@@ -27,7 +27,8 @@ mod vicinity;
 use nalgebra::Vector3;
 use std::cell::Cell;
 
-use self::ball::{Ball, Look};
+use self::ball::{Ball, Flight, Look, Work};
+use self::foot::Foot;
 use self::vicinity::Vicinity;
 use super::draw::{Against, Draw, Drawn, Frictionless};
 use super::{Beginning, Mesh};
@@ -36,7 +37,7 @@ use crate::friction::Friction;
 use crate::friction_cone::ConeInput;
 use crate::friction_law::FrictionState;
 use crate::grip::Grip;
-use crate::surface::{Feature, SurfacePoint};
+use crate::surface::{Feature, SurfacePoint, direction_or_up};
 
 /// State of one spherical finger towards one mesh.
 #[derive(Debug, Clone, Copy, Default)]
@@ -53,8 +54,8 @@ pub(crate) struct RollingCone {
 /// One of the features that a ball touches, and what it does to the user.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Share {
-    pub(crate) point_B: Vector3<f64>,
-    pub(crate) normal_B: Vector3<f64>,
+    /// On the mesh, not where the ball's centre is.
+    pub(crate) at: SurfacePoint,
     pub(crate) force_on_user_B: Vector3<f64>,
     /// Of all loads, 0 to 1.
     pub(crate) part: f64,
@@ -144,8 +145,9 @@ impl RollingCone {
         rests.iter().filter(|rest| rest.load_m > 0.0).map(move |rest| {
             let part = rest.load_m / load_m;
             let spring_B = rest.normal_B * rest.load_m + tangential_B * part;
-            let (point_B, normal_B) = (rest.foot.point_B, rest.normal_B);
-            Share { point_B, normal_B, force_on_user_B: spring_B * k, part }
+            let Foot { point_B, feature, face, .. } = rest.foot;
+            let at = SurfacePoint { point_B, normal_B: rest.normal_B, feature, piece: face };
+            Share { at, force_on_user_B: spring_B * k, part }
         })
     }
 
@@ -172,7 +174,9 @@ impl RollingCone {
             if self.clear.has(&from_B, radius_m) && self.clear.has(&hip_B, radius_m) {
                 return None;
             }
-            if let Some(ball) = Ball::in_free_space(from_B, radius_m).flown_to(mesh, &hip_B) {
+            if let Some(ball) =
+                Ball::in_free_space(from_B, radius_m).flown_to(mesh, &hip_B, Flight::TO_THE_END)
+            {
                 if ball.rests().is_empty() && ball.centre_B == hip_B {
                     self.clear = Room {
                         centre_B: hip_B,
@@ -194,7 +198,7 @@ fn found_inside(mesh: &Mesh, hip_B: &Vector3<f64>, radius_m: f64) -> Option<Ball
     let (face, point_B, out_B) = match mesh.way_out(hip_B) {
         Some(way) => (way.face, way.point_B, way.point_B - hip_B),
         None => {
-            let near = mesh.nearest_within(hip_B, radius_m)?;
+            let near = mesh.nearest_within(hip_B, radius_m).ok()??;
             (near.face, near.point_B, hip_B - near.point_B)
         }
     };
@@ -204,7 +208,7 @@ fn found_inside(mesh: &Mesh, hip_B: &Vector3<f64>, radius_m: f64) -> Option<Ball
     FARTHER_OUT.iter().find_map(|share| {
         let mut ball = Ball::in_free_space(point_B + normal_B * (radius_m * share), radius_m);
         for _ in 0..MOST_CORRECTIONS {
-            let Some(obstacle) = ball.obstacle(mesh) else {
+            let Some(obstacle) = ball.obstacle(mesh).ok()? else {
                 return (!mesh.is_inside(&ball.centre_B)).then_some(ball);
             };
             ball.add(mesh, obstacle.face);
@@ -264,7 +268,11 @@ impl Touching {
         if self.tight.has(&hip_B, 0.0) {
             return false;
         }
-        let tight_m = match mesh.nearest_within(&hip_B, radius_m) {
+        let Ok(near) = mesh.nearest_within(&hip_B, radius_m) else {
+            // As far as can be told.
+            return false;
+        };
+        let tight_m = match near {
             Some(near) => radius_m - near.distance_m,
             None => self.depth_inside(mesh, &hip_B),
         };
@@ -305,8 +313,12 @@ impl Touching {
         let tangential_B = ball.free_part(tangential_B);
         let spring_B = look.normal_spring_B + tangential_B;
         self.answered = (tangential_B, look.view.load_m, k);
+        // In flight it has no surface.
+        let is_in_flight = ball.rests().is_empty();
+        let normal_B =
+            if is_in_flight { direction_or_up(&(ball.centre_B - input.hip_B)) } else { look.view.normal_B };
         Touch {
-            god_object: SurfacePoint { point_B: ball.centre_B, normal_B: look.view.normal_B, feature, piece },
+            god_object: SurfacePoint { point_B: ball.centre_B, normal_B, feature, piece },
             force_on_user_B: if is_pressed { spring_B * k } else { Vector3::zeros() },
             normal_force_n: if is_pressed { k * look.normal_spring_B.norm() } else { 0.0 },
             friction: self.grip.state,
@@ -354,10 +366,13 @@ fn seek_with(
     draw: &impl Draw,
     is_frictionless: bool,
     is_careful: bool,
-    vicinity: Option<&mut Vicinity>,
+    mut vicinity: Option<&mut Vicinity>,
     input: &ConeInput,
 ) -> Sought {
     let mut ball = *start;
+    let mut pushes_left = MOST_PUSHES;
+    let mut met_something = false;
+    let work = Work::default();
     let rounds = if is_careful { MOST_CAREFUL_ROUNDS } else { MOST_ROUNDS };
     let mut sees = None;
     for _ in 0..rounds {
@@ -366,42 +381,71 @@ fn seek_with(
             if !is_careful {
                 return Sought::Unsure;
             }
-            let Some(flown) = ball.flown_to(mesh, &input.hip_B) else { break };
+            let Some(flown) = ball.flown_to(mesh, &input.hip_B, Flight::OF_A_BALL_THAT_TOUCHES) else {
+                break;
+            };
             if flown.rests().is_empty() && flown.centre_B == input.hip_B {
                 return Sought::Free;
             }
-            ball = flown;
+            (ball, sees) = (flown, None);
+            if ball.rests().is_empty() {
+                // Still in flight; it goes on in the next tick.
+                break;
+            }
             continue;
         }
         let Drawn { target_B, is_at_rest, tangential_B } =
             draw.drawn(&look.view, &(start.centre_B - ball.centre_B));
         sees = Some((look, tangential_B));
         if is_at_rest {
-            break;
+            let Some(vicinity) = vicinity.as_deref_mut().filter(|_| ball.centre_B != start.centre_B) else {
+                break;
+            };
+            if met_something && !ball.is_on_all_that_holds_it(mesh) {
+                return Sought::Unsure;
+            }
+            match ball.obstacle_near(mesh, vicinity, &start.centre_B) {
+                Ok(None) => return Sought::Rested(Rested { ball, look, tangential_B }),
+                Ok(Some(obstacle)) if pushes_left > 0 => {
+                    pushes_left -= 1;
+                    met_something = true;
+                    ball = ball.pushed_out_of(mesh, obstacle.face);
+                    sees = None;
+                    if ball.strayed(start) {
+                        return Sought::Unsure;
+                    }
+                    continue;
+                }
+                _ => return Sought::Unsure,
+            }
         }
         if is_careful {
             let before = (ball.centre_B, ball.rests().len());
-            ball = ball.rolled_until(mesh, &target_B);
+            ball = ball.rolled_until(mesh, &target_B, &work);
             if before == (ball.centre_B, ball.rests().len()) {
                 break;
             }
             sees = None;
+            if work.is_enough() {
+                break;
+            }
             continue;
         }
         if let Some(seat) = is_frictionless.then(|| ball.seat(mesh, &input.hip_B)).flatten() {
             ball = seat;
             sees = None;
         } else {
-            ball = ball.rolled_to(mesh, &target_B);
+            let rolled = ball.rolled_to(mesh, &target_B);
+            met_something |= rolled.is_blocked;
+            ball = if rolled.is_blocked { ball.in_the_fold(mesh, &target_B) } else { rolled };
             sees = None;
         }
-        let strayed_m2 = (ball.centre_B - start.centre_B).norm_squared();
-        if ball.is_blocked || strayed_m2 > 0.25 * ball.radius_m * ball.radius_m || strayed_m2.is_nan() {
+        if ball.strayed(start) {
             return Sought::Unsure;
         }
     }
     if let Some(vicinity) = vicinity.filter(|_| ball.centre_B != start.centre_B)
-        && !ball.is_clear(mesh, vicinity, &start.centre_B)
+        && (met_something || ball.obstacle_near(mesh, vicinity, &start.centre_B) != Ok(None))
     {
         return Sought::Unsure;
     }
@@ -423,5 +467,7 @@ const ON_THE_MESH: f64 = 1e-9;
 /// Where to look for room, in radii from the mesh.
 const FARTHER_OUT: [f64; 5] = [1.0, 1.5, 2.5, 5.0, 10.0];
 const MOST_CORRECTIONS: usize = 16;
-const MOST_ROUNDS: u32 = 32;
+const MOST_ROUNDS: u32 = 8;
+/// How often a ball that came to rest too near to something new is pushed out of that before it is done with care.
+const MOST_PUSHES: u32 = 3;
 const MOST_CAREFUL_ROUNDS: u32 = 48;

@@ -43,12 +43,14 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
     }
 
     /// The nearest point of the faces, if any is as near as this \[m\]: the smaller, the cheaper.
+    ///
+    /// Errors: so many are about as near that a tick cannot look at all.
     pub(in crate::mesh) fn nearest_within(
         &self,
         triangles: Triangles<'_>,
         p_B: &Vector3<f64>,
         at_most_m: f64,
-    ) -> Option<Nearest> {
+    ) -> Result<Option<Nearest>, TooMany> {
         self.nearest_of(triangles, p_B, at_most_m, |_| true)
     }
 
@@ -60,7 +62,7 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
         p_B: &Vector3<f64>,
         at_most_m: f64,
         (normal_B, offset_m): (&Vector3<f64>, f64),
-    ) -> Option<Nearest> {
+    ) -> Result<Option<Nearest>, TooMany> {
         self.nearest_of(triangles, p_B, at_most_m, |face| {
             let [a, b, c] = triangles.corners(face).map(|corner| normal_B.dot(&corner));
             larger(larger(a, b), c) > offset_m
@@ -96,12 +98,13 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
         p_B: &Vector3<f64>,
         at_most_m: f64,
         counts: impl Fn(&Face) -> bool,
-    ) -> Option<Nearest> {
+    ) -> Result<Option<Nearest>, TooMany> {
         let mut search = Search::new(triangles, p_B, self.extent_m());
         if search.limit < 0.0 || search.p_B != *p_B {
             // Not finite, or farther away than any ball is large.
-            return None;
+            return Ok(None);
         }
+        let mut visits = 0;
         search.reach_m = at_most_m;
         search.limit = above(at_most_m * at_most_m).min(f32::MAX);
         let mut stack = Stack::<f32>::new();
@@ -110,6 +113,10 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
             if squared_distance > search.limit {
                 continue;
             }
+            if visits == MOST_VISITS_OF_BALLS {
+                return Err(TooMany);
+            }
+            visits += 1;
             if child.count() == 0 {
                 let node = &self.nodes[child.index()];
                 stack.push(&node.squared_distances(&p), &node.children, search.limit);
@@ -121,7 +128,7 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
                 }
             }
         }
-        (search.best.squared_distance <= at_most_m * at_most_m).then(|| search.result(p_B))
+        Ok((search.best.squared_distance <= at_most_m * at_most_m).then(|| search.result(p_B)))
     }
 
     /// As [`Self::nearest_unbounded`], and `true`; or the nearest of what was seen when so many nodes and runs of faces had been
@@ -156,6 +163,10 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
         (search.result(p_B), true)
     }
 }
+
+/// More faces are about as near to a point as was asked than a tick can look at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct TooMany;
 
 /// The nearest point so far.
 struct Search {
@@ -233,7 +244,29 @@ impl Search {
 /// Bound on the nodes and runs of faces that a tick's query visits. Near the surface some tens are needed, at the centre
 /// of a ball of a million faces 700,000.
 pub(super) const MOST_VISITS: usize = 1024;
+/// The same of queries for balls, of which most ask some tens: a ball that touches all over is left where it is.
+const MOST_VISITS_OF_BALLS: usize = 4096;
 /// Ten times what is lost when a distance from a plane is computed, relative to the coordinates.
 const ROUNDING: f64 = 1e-14;
 /// How many times the extent of the mesh a point may be away before it is brought nearer.
 const FARTHEST: f64 = 1000.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{Mesh, make};
+
+    #[test]
+    fn what_is_asked_for_balls_gives_up_where_very_many_faces_are_as_near() {
+        let (mesh, _) = Mesh::build(make::uv_sphere(200, 101, 0.1)).unwrap();
+        let centre = Vector3::new(1e-9, 2e-9, 3e-9);
+        assert_eq!(mesh.nearest_within(&centre, 0.11), Err(TooMany), "40,000 are as near");
+        let below = (&Vector3::y(), -0.2);
+        assert_eq!(mesh.nearest_above(&centre, 0.11, below), Err(TooMany));
+        // But not where they are farther than is asked, or where some are nearer than others.
+        assert_eq!(mesh.nearest_within(&centre, 0.09), Ok(None));
+        let beside = Vector3::new(0.02, 0.201, 0.01);
+        let near = mesh.nearest_within(&beside, 0.2).unwrap().unwrap();
+        assert_eq!(near, mesh.nearest(&beside));
+    }
+}

@@ -10,12 +10,15 @@
 //! room of r around it, cannot come to the other side of anything.
 //! Cost: a walk of each foot and one bounded query; at something new some ten walks more.
 
+use std::cell::Cell;
+
 use nalgebra::Vector3;
 
 use super::foot::Foot;
 use super::press::{MOST, Plane, onto, press};
 use super::vicinity::Vicinity;
 use crate::friction_cone::ConeInput;
+use crate::mesh::bvh::TooMany;
 use crate::mesh::{Mesh, Nearest};
 use crate::surface::{Feature, direction_or_up};
 use crate::tangent_view::{TangentView, tangential};
@@ -50,6 +53,35 @@ pub(super) struct Look {
     pub(super) normal_spring_B: Vector3<f64>,
     /// The HIP is clear of all that it touches.
     pub(super) is_free: bool,
+}
+
+/// What was done in a tick already, in places that were looked at.
+#[derive(Debug, Default)]
+pub(super) struct Work(Cell<u32>);
+
+impl Work {
+    fn look(&self) {
+        self.0.set(self.0.get().saturating_add(1));
+    }
+
+    /// Whether the rest has to wait for the next tick.
+    pub(super) fn is_enough(&self) -> bool {
+        self.0.get() >= MOST_WORK
+    }
+}
+
+/// How much of a flight is done in a tick; the rest in the next ones.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Flight {
+    most_leaps: usize,
+    /// How long a leap is looked ahead for, in radii: farther costs more.
+    farthest: f64,
+}
+
+impl Flight {
+    /// One that was met in free space went all the way already.
+    pub(super) const TO_THE_END: Self = Self { most_leaps: 64, farthest: f64::INFINITY };
+    pub(super) const OF_A_BALL_THAT_TOUCHES: Self = Self { most_leaps: 20, farthest: 2.0 };
 }
 
 impl Ball {
@@ -258,7 +290,7 @@ impl Ball {
 
     /// What is nearer than it should be.
     #[inline(always)]
-    pub(super) fn obstacle(&self, mesh: &Mesh) -> Option<Nearest> {
+    pub(super) fn obstacle(&self, mesh: &Mesh) -> Result<Option<Nearest>, TooMany> {
         let near_m = self.radius_m - tolerance_m(mesh, self.radius_m);
         match self.rests() {
             [] => mesh.nearest_within(&self.centre_B, near_m),
@@ -270,24 +302,66 @@ impl Ball {
         }
     }
 
-    /// Whether nothing is nearer than it should be; `start_B` is where it was when the tick began.
+    /// As [`Self::obstacle`]; `start_B` is where it was when the tick began.
     #[inline(always)]
-    pub(super) fn is_clear(&self, mesh: &Mesh, vicinity: &mut Vicinity, start_B: &Vector3<f64>) -> bool {
+    pub(super) fn obstacle_near(
+        &self,
+        mesh: &Mesh,
+        vicinity: &mut Vicinity,
+        start_B: &Vector3<f64>,
+    ) -> Result<Option<Nearest>, TooMany> {
         let near_m = self.radius_m - tolerance_m(mesh, self.radius_m);
         let moved_m = (self.centre_B - start_B).norm();
-        self.rests()
+        let is_clear = self
+            .rests()
             .first()
-            .is_some_and(|rest| vicinity.is_clear(mesh, &self.centre_B, &rest.normal_B, near_m, moved_m))
-            || self.obstacle(mesh).is_none()
+            .is_some_and(|rest| vicinity.is_clear(mesh, &self.centre_B, &rest.normal_B, near_m, moved_m));
+        if is_clear { Ok(None) } else { self.obstacle(mesh) }
+    }
+
+    /// Where it is pushed out of a feature that it came too near to.
+    #[inline(never)]
+    pub(super) fn pushed_out_of(&self, mesh: &Mesh, face: u32) -> Self {
+        let mut ball = *self;
+        ball.add(mesh, face);
+        ball.settle(mesh);
+        ball
+    }
+
+    /// Where it is in a fold that it is led into on its way to `target_B`: on what it rests on now and on what its feet
+    /// come to there.
+    #[inline(never)]
+    pub(super) fn in_the_fold(&self, mesh: &Mesh, target_B: &Vector3<f64>) -> Self {
+        let near_m = tolerance_m(mesh, self.radius_m);
+        let mut ball = *self;
+        ball.centre_B = *target_B;
+        for rest in self.rests().iter().filter(|rest| rest.load_m > 0.0) {
+            let mut there = *rest;
+            there.walk(mesh, target_B, self.radius_m);
+            let height_m = distance(&(there.normal_B, there.offset_m), target_B);
+            if height_m < -near_m && there.foot.face != rest.foot.face && ball.count < MOST {
+                ball.rests[ball.count] = there;
+                ball.count += 1;
+            }
+        }
+        // Onto planes as they are: walked there, both feet would be the same.
+        let (planes, count) = ball.planes();
+        let pressed = press(&planes[..count], target_B);
+        for (rest, load_m) in ball.rests_mut().iter_mut().zip(pressed.loads_m) {
+            rest.load_m = rest.load_m.max(load_m);
+        }
+        ball.centre_B = pressed.point_B;
+        ball.settle(mesh);
+        ball
     }
 
     /// As [`Self::rolled_to`], as far as nothing else is in the way; by half of its radius at the most.
-    pub(super) fn rolled_until(&self, mesh: &Mesh, target_B: &Vector3<f64>) -> Self {
+    pub(super) fn rolled_until(&self, mesh: &Mesh, target_B: &Vector3<f64>, work: &Work) -> Self {
         let way_B = target_B - self.centre_B;
         let way_m = way_B.norm();
         let longest_m = 0.5 * self.radius_m;
         let way_B = if way_m > longest_m { way_B * (longest_m / way_m) } else { way_B };
-        self.first_touch(mesh, |share| self.rolled_to(mesh, &(self.centre_B + way_B * share)))
+        self.first_touch(mesh, work, |share| self.rolled_to(mesh, &(self.centre_B + way_B * share)))
             .unwrap_or(*self)
     }
 
@@ -295,14 +369,15 @@ impl Ball {
     ///
     /// `None` where it began with something nearer than it may be.
     #[inline(never)]
-    pub(super) fn flown_to(&self, mesh: &Mesh, target_B: &Vector3<f64>) -> Option<Self> {
+    pub(super) fn flown_to(&self, mesh: &Mesh, target_B: &Vector3<f64>, flight: Flight) -> Option<Self> {
         let radius_m = self.radius_m;
         let mut ball = Self::in_free_space(self.centre_B, radius_m);
-        for _ in 0..MOST_LEAPS {
+        for _ in 0..flight.most_leaps {
             let way_B = target_B - ball.centre_B;
             let left_m = way_B.norm();
-            let near = mesh.nearest_within(&ball.centre_B, radius_m + left_m);
-            let safe_m = near.map_or(f64::INFINITY, |near| near.distance_m - radius_m);
+            let ahead_m = left_m.min(flight.farthest * radius_m);
+            let near = mesh.nearest_within(&ball.centre_B, radius_m + ahead_m).ok()?;
+            let safe_m = near.map_or(ahead_m, |near| near.distance_m - radius_m);
             if safe_m >= left_m {
                 return Some(Self::in_free_space(*target_B, radius_m));
             }
@@ -313,7 +388,9 @@ impl Ball {
             let leap_m = safe_m.max(SHORTEST_LEAP * radius_m).min(left_m);
             let leap_B = way_B * (leap_m / left_m);
             let from_B = ball.centre_B;
-            ball = ball.first_touch(mesh, |share| Self::in_free_space(from_B + leap_B * share, radius_m))?;
+            ball = ball.first_touch(mesh, &Work::default(), |share| {
+                Self::in_free_space(from_B + leap_B * share, radius_m)
+            })?;
             if ball.count > 0 || leap_m >= left_m {
                 return Some(ball);
             }
@@ -322,15 +399,31 @@ impl Ball {
     }
 
     /// The end of a path, or where on it something new is first touched; `None` if that cannot be told.
-    fn first_touch(&self, mesh: &Mesh, path: impl Fn(f64) -> Self) -> Option<Self> {
+    fn first_touch(&self, mesh: &Mesh, work: &Work, path: impl Fn(f64) -> Self) -> Option<Self> {
         let mut ball = path(1.0);
         let mut end = 1.0;
         for _ in 0..MOST_OBSTACLES {
-            let Some(obstacle) = ball.obstacle(mesh) else { return Some(ball) };
-            (end, ball) = touching(mesh, &path, obstacle.face, end);
+            work.look();
+            let Some(obstacle) = ball.obstacle(mesh).ok()? else { return Some(ball) };
+            (end, ball) = touching(mesh, work, &path, obstacle.face, end);
             ball.add(mesh, obstacle.face);
         }
-        ball.obstacle(mesh).is_none().then_some(ball)
+        (ball.obstacle(mesh) == Ok(None)).then_some(ball)
+    }
+
+    /// Of a place that was guessed: whether it is as far from everything that presses on it as it may be.
+    #[inline(never)]
+    pub(super) fn is_on_all_that_holds_it(&self, mesh: &Mesh) -> bool {
+        let near_m = tolerance_m(mesh, self.radius_m);
+        let mut held = self.rests().iter().filter(|rest| rest.load_m > 0.0);
+        held.all(|rest| distance(&(rest.normal_B, rest.offset_m), &self.centre_B).abs() <= near_m)
+    }
+
+    /// Whether it went so far that it might have passed something.
+    #[inline(always)]
+    pub(super) fn strayed(&self, start: &Self) -> bool {
+        let strayed_m2 = (self.centre_B - start.centre_B).norm_squared();
+        strayed_m2 > 0.25 * self.radius_m * self.radius_m || strayed_m2.is_nan()
     }
 
     /// Takes note of a feature that it touches.
@@ -389,7 +482,7 @@ impl Rest {
 /// Where on a path, before the share `end` of it, a face is first as near as the radius.
 ///
 /// Regula falsi after Illinois; what is left of the radius at the end is far below what an obstacle has to be.
-fn touching(mesh: &Mesh, path: impl Fn(f64) -> Ball, face: u32, end: f64) -> (f64, Ball) {
+fn touching(mesh: &Mesh, work: &Work, path: impl Fn(f64) -> Ball, face: u32, end: f64) -> (f64, Ball) {
     // Of this face alone: a walk from it might end at what the ball rests on.
     let gap = |ball: &Ball| Foot::on(mesh, face, &ball.centre_B).squared_m2.sqrt() - ball.radius_m;
     let start = path(0.0);
@@ -404,6 +497,7 @@ fn touching(mesh: &Mesh, path: impl Fn(f64) -> Ball, face: u32, end: f64) -> (f6
         if low.1 <= enough_m {
             break;
         }
+        work.look();
         let share = (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1);
         let ball = path(share);
         let here_m = gap(&ball);
@@ -443,8 +537,9 @@ const BAND: f64 = 1e-7;
 const SAME_FOOT: f64 = 1e-9;
 /// Heights above the mesh below this share of the radius have no direction worth going by.
 const LEAST_HEIGHT: f64 = 1e-3;
-const SHORTEST_LEAP: f64 = 0.125;
-const MOST_LEAPS: usize = 64;
+const SHORTEST_LEAP: f64 = 0.375;
 const MOST_CORRECTIONS: usize = 6;
 const MOST_OBSTACLES: usize = 6;
+/// Enough for a finger to roll on over plain faces for as many halves of its radius as there are rounds.
+const MOST_WORK: u32 = 64;
 const MOST_LOOKS: usize = 40;
