@@ -23,6 +23,7 @@ use crate::height_map::Over;
 use crate::hip::Hip;
 use crate::mesh::{Beginning, Mesh, MeshCone, RollingCone};
 use crate::nurbs::NurbsCone;
+use crate::shading::Shading;
 use crate::shape::Shape;
 use crate::surface::{Feature, Surface};
 use crate::touch_points::TouchPoints;
@@ -90,7 +91,8 @@ pub(crate) struct Slot {
     pub(crate) contact: Option<Contact>,
 }
 
-/// Whoever looked after the contact in the last tick: the others know nothing of what happened since they did.
+/// Whoever looked after the contact in the last tick. The others know nothing of what happened since they did, and so
+/// keep nothing.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 enum Kept {
     #[default]
@@ -118,11 +120,18 @@ impl Slot {
     }
 
     fn let_go(&mut self) {
-        self.cone = None;
-        self.mesh.let_go();
-        self.let_roll_go();
-        self.csg.let_go();
-        self.nurbs.let_go();
+        match self.kept {
+            Kept::Nobodys | Kept::Own => {}
+            Kept::Surface => self.cone = None,
+            Kept::Mesh => self.mesh.let_go(),
+            Kept::Rolling => {
+                if let Some(rolling) = &mut self.rolling {
+                    rolling.let_go();
+                }
+            }
+            Kept::Csg => self.csg.let_go(),
+            Kept::Nurbs => self.nurbs.let_go(),
+        }
     }
 
     /// Forgets the contact with another kind of shape that the entity had: it may be met again where that one was left.
@@ -154,12 +163,6 @@ impl Slot {
                 **rolling = RollingCone::default();
             }
             *self = Self { rolling, ..Self::default() };
-        }
-    }
-
-    fn let_roll_go(&mut self) {
-        if let Some(rolling) = &mut self.rolling {
-            rolling.let_go();
         }
     }
 
@@ -346,6 +349,23 @@ impl Slot {
         mut touch: Touch,
         sweep: &Sweep<'_>,
     ) -> Option<Contact> {
+        // Apart, so that a touch that stays as it is stays in registers.
+        if !matches!(entity.shading, Shading::None) || entity.height_map.is_some() {
+            touch = self.shade_and_raise(entity, touch, sweep)?;
+        }
+        if self.strength < 1.0 {
+            let step = sweep.dt_s / sweep.ramp_in_s;
+            // Where time is unknown or no ramp wanted, there is none.
+            self.strength = if step > 0.0 { (self.strength + step).min(1.0) } else { 1.0 };
+            touch.force_on_user_B *= self.strength;
+            touch.normal_force_n *= self.strength;
+        }
+        in_world(index, entity, &touch)
+    }
+
+    /// The touch as the entity's facets and heights have it; `None` above a dent.
+    #[inline(never)]
+    fn shade_and_raise(&mut self, entity: &Entity, mut touch: Touch, sweep: &Sweep<'_>) -> Option<Touch> {
         match self.rolling.as_ref().filter(|rolling| rolling.is_touching()) {
             Some(rolling) => entity.shading.turn_shares(&entity.shape, rolling.shares(), &mut touch),
             None => entity.shading.turn(&entity.shape, &mut touch),
@@ -364,14 +384,7 @@ impl Slot {
                 return None;
             }
         }
-        if self.strength < 1.0 {
-            let step = sweep.dt_s / sweep.ramp_in_s;
-            // Where time is unknown or no ramp wanted, there is none.
-            self.strength = if step > 0.0 { (self.strength + step).min(1.0) } else { 1.0 };
-            touch.force_on_user_B *= self.strength;
-            touch.normal_force_n *= self.strength;
-        }
-        in_world(index, entity, &touch)
+        Some(touch)
     }
 }
 
