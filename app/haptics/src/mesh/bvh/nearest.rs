@@ -244,8 +244,8 @@ impl Search {
 /// Bound on the nodes and runs of faces that a tick's query visits. Near the surface some tens are needed, at the centre
 /// of a ball of a million faces 700,000.
 pub(super) const MOST_VISITS: usize = 1024;
-/// The same of queries for balls, of which most ask some tens; one that rests in a ring of a tenth of a million faces asks
-/// 5000. A ball that touches all over is left where it is.
+/// The same of queries for balls, of which most ask some tens; one that rests in a ring of a tenth of a million faces asks more
+/// than 4096. A ball that touches all over is left where it is.
 const MOST_VISITS_OF_BALLS: usize = 8192;
 /// Ten times what is lost when a distance from a plane is computed, relative to the coordinates.
 const ROUNDING: f64 = 1e-14;
