@@ -170,8 +170,8 @@ fn a_driver_that_is_told_twice_to_stop_while_its_loop_hangs_switches_off_by_its_
                     ticks() == before
                 });
                 stand.driver.signal(signal);
-                // It is heard within a poll of 20 ms; heard too late, the second is the first.
-                std::thread::sleep(std::time::Duration::from_millis(100));
+                // Heard sooner, it would be the same request delivered twice.
+                std::thread::sleep(2 * rt_core::signals::SAME_REQUEST);
                 stand.driver.signal(signal);
             });
             assert_eq!(
