@@ -353,15 +353,17 @@ fn every_kind_of_mesh_says_the_same_in_every_format() {
 #[test]
 fn the_committed_meshes_are_what_their_program_makes() {
     let committed = [
-        ("cube.obj", "cuboid", written::Format::Obj),
-        ("star.stl", "star", written::Format::StlText),
-        ("bumpy.obj", "bumpy", written::Format::Obj),
-        ("klein.stl", "klein", written::Format::Stl),
+        ("cube.obj", "cuboid", None, written::Format::Obj),
+        ("star.stl", "star", None, written::Format::StlText),
+        ("bumpy.obj", "bumpy", None, written::Format::Obj),
+        ("klein.stl", "klein", None, written::Format::Stl),
+        ("coarse.obj", "sphere", Some(12), written::Format::Obj),
     ];
     let meshes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/meshes");
-    for (file, kind, format) in committed {
-        let (_, number, make) = written::KINDS.into_iter().find(|(name, ..)| *name == kind).expect("a kind");
-        let made = model::read(Path::new(file), &format.write(&make(number, 0.04))).expect("what we wrote");
+    for (file, kind, number, format) in committed {
+        let (_, usual, make) = written::KINDS.into_iter().find(|(name, ..)| *name == kind).expect("a kind");
+        let made = model::read(Path::new(file), &format.write(&make(number.unwrap_or(usual), 0.04)))
+            .expect("what we wrote");
         let found = model::load(&meshes.join(file)).unwrap_or_else(|error| panic!("{file}: {error}"));
         assert_eq!(found.faces, made.faces, "{file}");
         for (found, made) in found.vertices.iter().zip(&made.vertices) {
