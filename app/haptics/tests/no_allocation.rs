@@ -2,44 +2,19 @@
 #![allow(non_snake_case)]
 
 mod common;
+#[path = "common/counting.rs"]
+mod counting;
 #[path = "common/solids.rs"]
 mod solids;
 #[path = "common/trees.rs"]
 mod trees;
 
 use common::*;
+use counting::CALLS;
 use haptics::mesh::{Mesh, make};
 use haptics::passivity::{Passivity, PassivitySpec, Port};
 use haptics::{Finger, Friction, Nurbs, Shading, nurbs};
 use nalgebra::Vector3;
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
-
-/// The system's allocator, counting the calls of each thread.
-struct Counting;
-
-thread_local! {
-    static CALLS: Cell<u64> = const { Cell::new(0) };
-}
-
-// SAFETY: every call is handed on unchanged to `System`, which keeps the contract; counting
-// touches a thread-local without destructor and without allocation.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        CALLS.set(CALLS.get() + 1);
-        // SAFETY: the caller keeps `alloc`'s contract for this very layout.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, block: *mut u8, layout: Layout) {
-        CALLS.set(CALLS.get() + 1);
-        // SAFETY: `block` came from `System.alloc` with this layout, through `alloc` above.
-        unsafe { System.dealloc(block, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 #[test]
 fn a_step_on_a_mesh_never_allocates() {
