@@ -50,7 +50,9 @@ struct Seen {
     long_walks: usize,
 }
 
-const MOST_TICKS_OF_A_WALK: usize = 4;
+/// A tick's walk is bounded by 256 pieces, some 40 mm of triangles of half a millimetre. A god-object that comes out of
+/// a dale opposite its HIP has half the way round a ball of 0.1 m before it, and the hills on that way.
+const MOST_TICKS_OF_A_WALK: usize = 10;
 
 fn walk(ground: &Ground, mut roaming: Roaming, ticks: usize) -> Seen {
     let mesh = &ground.mesh;
@@ -60,14 +62,18 @@ fn walk(ground: &Ground, mut roaming: Roaming, ticks: usize) -> Seen {
     for tick in 0..ticks {
         let hip = roaming.next();
         let mut out = step(&mut finger, &entity, &hip);
-        // A tick's walk is bounded: a god-object 0.1 m from its next place needs a few on triangles of half a
-        // millimetre.
         for _ in 0..MOST_TICKS_OF_A_WALK {
             if out.entity.is_none() || stuck(ground, &hip, &out).is_none() {
                 break;
             }
             seen.long_walks += 1;
+            let before = out;
             out = step(&mut finger, &entity, &hip);
+            let spring_m = |out: &FingerOutput| (out.god_object_W - hip).norm();
+            assert!(
+                out.entity.is_none() || spring_m(&out) < spring_m(&before),
+                "tick {tick}, HIP {hip:?}: goes nowhere, {before:?}, then {out:?}"
+            );
         }
         let told = || format!("tick {tick}, HIP {hip:?}: {out:?}");
         assert!(
@@ -122,7 +128,8 @@ fn check(name: &str, mesh: Arc<Mesh>, half_width_m: f64, step_m: f64, ticks: usi
     let seen = walk(&ground, Roaming::new(9, half_width_m, step_m), ticks);
     println!("{name}: {seen:?}");
     assert!(seen.touching > ticks / 50, "{name}: {seen:?}");
-    assert!(seen.long_walks <= seen.touching / 1000, "{name}: {seen:?}");
+    // Only round a ball, when the HIP passes near its middle: 0.17 % of the ticks on a million triangles.
+    assert!(seen.long_walks <= seen.touching / 300, "{name}: {seen:?}");
 }
 
 fn check_all(ticks: usize, meridians: usize) {
