@@ -1,0 +1,107 @@
+//! What a contact point between two entities remembers.
+//!
+//! Model: every contact point has a friction cone of its own (Melder ch. 6.3.1). Its god-object is kept as the *stretch*,
+//! how far the body's point has been dragged from where friction holds it, along the other's tangent plane: 0 where the
+//! contact begins, and the spring of it is the friction. From tick to tick the stretch grows by what the body's material at
+//! the contact moved relative to the other's. So a vertex that stands still is held at the very same place for ever, and a
+//! ball that rolls drags nothing. A contact that slides leaves its stretch on the rim of the friction circle.
+//! Frames: the stretch is kept in the other's frame, which carries it along.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use crate::collide::ContactPoint;
+use crate::row::{Held, Row};
+
+/// A contact point's memory.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Anchor {
+    /// Which features touch.
+    pub id: u32,
+    /// The material that was at the contact, of the body and of the other, each in its own frame \[m\].
+    materials: [Vector3<f64>; 2],
+    /// In the other's frame, before the motion of the tick \[m\].
+    stretch: Vector3<f64>,
+    /// Force on the body in the last tick \[N\], in the other's frame.
+    force: Vector3<f64>,
+    /// Whether it stuck or slid.
+    held: Held,
+    /// How much of a depth that was there from the start is still granted \[m\].
+    pub(crate) granted_m: f64,
+}
+
+impl Anchor {
+    /// A contact that begins here, pressed by nothing yet.
+    pub(crate) fn begin(point: &ContactPoint, X_WA: &Isometry3<f64>, X_WB: &Isometry3<f64>) -> Self {
+        let mut anchor = Self { id: point.id, ..Self::default() };
+        anchor.touch(point, X_WA, X_WB);
+        anchor
+    }
+
+    /// Goes on at this point: takes note of what moved since the last tick.
+    pub(crate) fn carry(&mut self, point: &ContactPoint, X_WA: &Isometry3<f64>, X_WB: &Isometry3<f64>) {
+        let [a_A, b_B] = self.materials.map(Point3::from);
+        let moved_W = X_WA * a_A - X_WB * b_B;
+        self.stretch += X_WB.inverse_transform_vector(&moved_W);
+        self.id = point.id;
+        self.touch(point, X_WA, X_WB);
+    }
+
+    fn touch(&mut self, point: &ContactPoint, X_WA: &Isometry3<f64>, X_WB: &Isometry3<f64>) {
+        let at = Point3::from(point.point_W);
+        self.materials = [X_WA, X_WB].map(|pose| pose.inverse_transform_point(&at).coords);
+        let normal_B = X_WB.inverse_transform_vector(&point.normal_W);
+        // Seen in the tangent plane, and no shorter for its having turned.
+        let length_m = self.stretch.norm();
+        let along_B = self.stretch - normal_B * normal_B.dot(&self.stretch);
+        let along_m = along_B.norm();
+        self.stretch =
+            if along_m > 0.0 { along_B * (length_m.min(2.0 * along_m) / along_m) } else { along_B };
+    }
+
+    pub(crate) fn stretch_W(&self, X_WB: &Isometry3<f64>) -> Vector3<f64> {
+        X_WB.rotation * self.stretch
+    }
+
+    pub(crate) fn force_W(&self, X_WB: &Isometry3<f64>) -> Vector3<f64> {
+        X_WB.rotation * self.force
+    }
+
+    pub(crate) fn held(&self) -> Held {
+        self.held
+    }
+
+    /// Where it was, when nobody knows what it is now \[m\], in W.
+    pub(crate) fn point_W(&self, X_WB: &Isometry3<f64>) -> Vector3<f64> {
+        (X_WB * Point3::from(self.materials[1])).coords
+    }
+
+    /// Remembers how the tick ended: `moved_W` is how far the body's point moves in it relative to the other's (m).
+    pub(crate) fn settle(&mut self, row: &Row, moved_W: &Vector3<f64>, X_WB: &Isometry3<f64>) {
+        self.force = X_WB.inverse_transform_vector(&row.force_W);
+        let k = row.stiffness[1];
+        let n = row.normal_W;
+        let normal_n = n.dot(&row.force_W);
+        if row.held == Held::Slip && k > 0.0 {
+            // What the spring is stretched by at the end, less what it will be found to have moved until then.
+            let across_W = row.force_W - n * normal_n;
+            let moved_across_W = moved_W - n * n.dot(moved_W);
+            self.stretch = X_WB.inverse_transform_vector(&(-across_W / k - moved_across_W));
+        }
+        if normal_n == 0.0 {
+            self.stretch = Vector3::zeros();
+        }
+        self.held = match row.held {
+            Held::Slip if normal_n > 0.0 && is_caught(row, normal_n) => Held::Stick,
+            Held::Slip if normal_n == 0.0 => Held::Stick,
+            held => held,
+        };
+    }
+}
+
+/// Whether a contact that slid is so far inside its circle that it sticks again (Melder eq. 7.35, in squares).
+fn is_caught(row: &Row, normal_n: f64) -> bool {
+    let across = (row.force_W - row.normal_W * normal_n).norm_squared();
+    // One coefficient for both catches at once.
+    let share = if row.mu_slide == row.mu_hold { 1.0 - 1e-9 } else { 1.0 - haptics::RESTICK_MARGIN };
+    across < (share * row.mu_slide * normal_n).powi(2)
+}

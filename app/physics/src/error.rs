@@ -1,0 +1,37 @@
+//! Refuses bodies that cannot exist.
+
+use haptics::ParameterError;
+use thiserror::Error;
+
+/// Why an entity cannot be a body.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum BodyError {
+    /// A single value outside its range.
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
+    /// No mass distribution has such moments.
+    #[error(
+        "inertia_kg_m2 is [{}, {}, {}]; allowed are three finite numbers > 0 of which none is more than the sum of the \
+         other two",
+        .moments[0], .moments[1], .moments[2]
+    )]
+    Inertia {
+        /// Principal moments found (kg m^2).
+        moments: [f64; 3],
+    },
+    /// Infinite, or without a volume.
+    #[error(
+        "a {shape} has no inertia of its own; give `inertia_kg_m2`, or leave out `mass_kg` and it is fixed"
+    )]
+    NoInertia {
+        /// What it is.
+        shape: &'static str,
+    },
+    /// It could not be told where it touches.
+    #[error("a {shape} cannot move: nobody finds its contact points; leave out `mass_kg` and it is fixed")]
+    NoContactPoints {
+        /// What it is.
+        shape: &'static str,
+    },
+}

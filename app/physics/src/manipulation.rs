@@ -1,0 +1,231 @@
+//! One tick of all bodies: contact points, forces, residual force and torque, motion.
+
+use haptics::Entity;
+use nalgebra::Vector3;
+
+use crate::body::Body;
+use crate::collide::{MAX_POINTS, can_move};
+use crate::error::BodyError;
+use crate::integrator::Integrator;
+use crate::pair::{Pair, Response, Start, Surfacing};
+use crate::row::Row;
+use crate::solver::{Motion, Solver};
+use crate::touch::Touch;
+
+/// What holds for all bodies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// \[m/s^2\], in W.
+    pub gravity_W: Vector3<f64>,
+    /// How forces become motion.
+    pub integrator: Integrator,
+    /// How contacts between entities answer.
+    pub response: Response,
+    /// Nothing moves faster \[m/s\].
+    pub most_speed_m_s: f64,
+    /// Nothing turns faster \[rad/s\].
+    pub most_spin_rad_s: f64,
+    /// A body farther than this from the origin has left the world and is parked \[m\].
+    pub world_radius_m: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            gravity_W: Vector3::new(0.0, -9.81, 0.0),
+            integrator: Integrator::default(),
+            response: Response::default(),
+            most_speed_m_s: 50.0,
+            most_spin_rad_s: 2000.0,
+            world_radius_m: 100.0,
+        }
+    }
+}
+
+/// All bodies, and what they remember of where they touch.
+#[derive(Debug, Clone)]
+pub struct Manipulation {
+    settings: Settings,
+    bodies: Box<[Body]>,
+    /// Of each body, which entity it is.
+    entities: Box<[usize]>,
+    /// Of each body, whether it has left the world, or was lost to a number that is none.
+    is_parked: Box<[bool]>,
+    pairs: Box<[Pair]>,
+    rows: Vec<Row>,
+    motions: Vec<Motion>,
+    solver: Solver,
+}
+
+/// What a tick took and did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Made {
+    /// Contact points, those of fingers among them.
+    pub rows: usize,
+    /// Turns of the solver.
+    pub sweeps: usize,
+    /// Bodies that were parked in this tick.
+    pub parked: usize,
+}
+
+/// The most touches of fingers in a tick.
+const MAX_TOUCHES: usize = 64;
+/// The most contact points between entities in a tick; more are left out.
+const MAX_ROWS: usize = 2048;
+
+impl Manipulation {
+    /// The entities of these numbers are bodies; all others are fixed.
+    ///
+    /// # Errors
+    /// A body whose contact points nobody can find.
+    pub fn new(entities: &[Entity], bodies: &[(usize, Body)], settings: Settings) -> Result<Self, BodyError> {
+        let body_of = |entity: usize| bodies.iter().position(|(of, _)| *of == entity);
+        let mut pairs = Vec::new();
+        for (number, &(a, _)) in bodies.iter().enumerate() {
+            if !can_move(&entities[a].shape) {
+                return Err(BodyError::NoContactPoints { shape: "shape of this kind" });
+            }
+            for b in 0..entities.len() {
+                let other = body_of(b);
+                // Of two bodies once.
+                if b != a && other.is_none_or(|other| other > number) {
+                    let surfacing = Surfacing::between(&entities[a], &entities[b], settings.response);
+                    pairs.push(Pair::new([a, b], (number, other), surfacing));
+                }
+            }
+        }
+        let room = (pairs.len() * MAX_POINTS).min(MAX_ROWS) + MAX_TOUCHES;
+        Ok(Self {
+            settings,
+            bodies: bodies.iter().map(|(_, body)| *body).collect(),
+            entities: bodies.iter().map(|(entity, _)| *entity).collect(),
+            is_parked: vec![false; bodies.len()].into(),
+            pairs: pairs.into(),
+            rows: Vec::with_capacity(room),
+            motions: Vec::with_capacity(bodies.len()),
+            solver: Solver::with_capacity(room),
+        })
+    }
+
+    /// The bodies, in the order in which they were given.
+    pub fn bodies(&self) -> &[Body] {
+        &self.bodies
+    }
+
+    /// The contact points of the last tick, with their forces.
+    pub fn rows(&self) -> &[Row] {
+        &self.rows
+    }
+
+    /// One tick: moves the bodies and their entities; of each touch, `force_on_user_W` becomes what the body got, times -1.
+    pub fn step(&mut self, entities: &mut [Entity], touches: &mut [Touch], dt_s: f64) -> Made {
+        if !(dt_s > 0.0 && dt_s.is_finite()) {
+            return Made::default();
+        }
+        self.fall_freely(dt_s);
+        self.rows.clear();
+        let start = Start { entities, bodies: &self.bodies, motions: &self.motions, dt_s };
+        // Fingers first: they are never left out.
+        let mut fingers = [None; MAX_TOUCHES];
+        for (touch, place) in touches.iter().zip(&mut fingers) {
+            let Some(body) = self.entities.iter().position(|&entity| entity == touch.entity) else {
+                continue;
+            };
+            let (state, motion) = (&self.bodies[body], moving(&self.bodies[body]));
+            *place = Some(self.rows.len());
+            self.rows.push(touch.row(body, &state.centre_W, &motion, &entities[touch.entity]));
+        }
+        for pair in &mut self.pairs {
+            pair.gather(&start, &mut self.rows);
+        }
+        let sweeps = self.solver.solve(&mut self.rows, &mut self.motions, dt_s);
+        for (touch, row) in touches.iter_mut().zip(fingers) {
+            if let Some(row) = row {
+                touch.force_on_user_W = -self.rows[row].force_W;
+            }
+        }
+        for pair in &mut self.pairs {
+            pair.settle(&self.rows, &self.motions, entities, dt_s);
+        }
+        let parked = self.advance(entities, dt_s);
+        Made { rows: self.rows.len(), sweeps, parked }
+    }
+
+    /// How the bodies would move without anything that touches them.
+    fn fall_freely(&mut self, dt_s: f64) {
+        self.motions.clear();
+        let fall_W = self.settings.gravity_W * dt_s;
+        for (body, &is_parked) in self.bodies.iter().zip(&self.is_parked) {
+            let mut motion = moving(body);
+            if is_parked {
+                (motion.inverse_mass, motion.inverse_inertia_W) = (0.0, nalgebra::Matrix3::zeros());
+            } else {
+                motion.velocity_W += fall_W;
+            }
+            self.motions.push(motion);
+        }
+    }
+
+    /// Takes the bodies to the end of the tick; says how many had to be parked.
+    fn advance(&mut self, entities: &mut [Entity], dt_s: f64) -> usize {
+        let settings = self.settings;
+        let mut parked = 0;
+        for (number, body) in self.bodies.iter_mut().enumerate() {
+            let entity = &mut entities[self.entities[number]];
+            if self.is_parked[number] {
+                entity.move_to(entity.X_WB);
+                continue;
+            }
+            let before = *body;
+            let mut wrench = crate::wrench::Wrench::default();
+            let mut is_free = true;
+            for row in &self.rows {
+                let sides = [(Some(row.body), row.force_W), (row.other, -row.force_W)];
+                for ((side, force_W), arm_W) in sides.iter().zip(&row.arms_W) {
+                    if *side == Some(number) && *force_W != Vector3::zeros() {
+                        wrench.add(force_W, arm_W);
+                        is_free = false;
+                    }
+                }
+                let torque_W = row.normal_W * row.torsion.torque_nm;
+                for (side, torque_W) in [(Some(row.body), torque_W), (row.other, -torque_W)] {
+                    if side == Some(number) {
+                        wrench.torque_W += torque_W;
+                    }
+                }
+            }
+            //= melder#5.7
+            let acceleration_W = settings.gravity_W + wrench.force_W / body.mass.mass_kg;
+            body.velocity_W = limited(body.velocity_W + acceleration_W * dt_s, settings.most_speed_m_s);
+            if !body.rotation_locked {
+                body.angular_momentum_W += wrench.torque_W * dt_s;
+                let spin = body.angular_velocity_W().norm();
+                if spin > settings.most_spin_rad_s {
+                    body.angular_momentum_W *= settings.most_spin_rad_s / spin;
+                }
+            }
+            settings.integrator.advance(body, is_free.then_some(settings.gravity_W), dt_s);
+            if !body.is_finite() || body.centre_W.norm() > settings.world_radius_m {
+                *body = Body { velocity_W: Vector3::zeros(), angular_momentum_W: Vector3::zeros(), ..before };
+                self.is_parked[number] = true;
+                parked += 1;
+            }
+            entity.move_to(body.pose());
+        }
+        parked
+    }
+}
+
+fn moving(body: &Body) -> Motion {
+    Motion {
+        velocity_W: body.velocity_W,
+        angular_velocity_W: body.angular_velocity_W(),
+        inverse_mass: body.mass.mass_kg.recip(),
+        inverse_inertia_W: body.inverse_inertia_W(),
+    }
+}
+
+fn limited(v: Vector3<f64>, most: f64) -> Vector3<f64> {
+    let length = v.norm();
+    if length > most { v * (most / length) } else { v }
+}

@@ -1,0 +1,138 @@
+//! One point at which a body is pressed: a spring with damper and friction cone, as a function of how the point moves.
+//!
+//! Model: with `d` how far the body's point has moved in the tick relative to what presses it, and `u` how fast it does,
+//! the trial force is `rest - k d - b u`, with stiffness and damping of their own along the normal and across it. Its
+//! normal part is never negative (contacts never pull). Its tangential part is kept inside the friction cone; on the rim
+//! there is no damping, so that sliding ratios are exact.
+//! Frames and signs: W; `normal_W` points to the body that is pressed; forces are forces on that body.
+
+use nalgebra::{Matrix3, Vector3};
+
+/// A contact point in a tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Row {
+    /// Number of the body that is pressed.
+    pub body: usize,
+    /// Number of the body that presses; `None`: a finger, or what is fixed.
+    pub other: Option<usize>,
+    /// From the centre of mass of either to the contact point \[m\].
+    pub arms_W: [Vector3<f64>; 2],
+    /// Unit normal, to the body.
+    pub normal_W: Vector3<f64>,
+    /// Force on the body if the point does not move \[N\].
+    pub rest_W: Vector3<f64>,
+    /// \[N/m\], along the normal and across it.
+    pub stiffness: [f64; 2],
+    /// \[N s/m\], along the normal and, while it sticks, across it.
+    pub damping: [f64; 2],
+    /// Ratio of tangential to normal force up to which it sticks.
+    pub mu_hold: f64,
+    /// That with which it slides, <= `mu_hold`.
+    pub mu_slide: f64,
+    /// Whether it sticks or slides: at first as in the last tick, then as this one has it.
+    pub held: Held,
+    /// Force on the body \[N\]: at first a guess, then the answer.
+    pub force_W: Vector3<f64>,
+    /// What of its turning about the normal the contact resists.
+    pub torsion: Torsion,
+}
+
+/// Resistance of a contact point to turning about its normal: a spring with damper and limit, as the row itself.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Torsion {
+    /// Torque on the body about the normal if it does not turn \[N m\].
+    pub rest_nm: f64,
+    /// \[N m/rad\]
+    pub stiffness_nm_per_rad: f64,
+    /// \[N m s/rad\]
+    pub damping_nm_s_per_rad: f64,
+    /// The torque stays within this \[N m\]; 0: none.
+    pub most_nm: f64,
+    /// The answer \[N m\].
+    pub torque_nm: f64,
+}
+
+impl Torsion {
+    /// By how much the trial torque falls per angular velocity that lasts for the tick \[N m s\].
+    #[inline]
+    pub(crate) fn falls(&self, dt_s: f64) -> f64 {
+        self.stiffness_nm_per_rad * dt_s + self.damping_nm_s_per_rad
+    }
+}
+
+/// What friction does at a contact point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Held {
+    /// It holds.
+    #[default]
+    Stick,
+    /// It slides, or has slid and was not caught again.
+    Slip,
+}
+
+impl Row {
+    /// The trial force after a displacement (m) at a velocity (m/s), both of the body's point relative to the other's.
+    #[inline]
+    pub fn trial_W(&self, displacement_W: &Vector3<f64>, velocity_W: &Vector3<f64>) -> Vector3<f64> {
+        let [k_n, k_t] = self.stiffness;
+        let [b_n, b_t] = self.dampings();
+        let change = |along: f64, across: f64, v: &Vector3<f64>| {
+            let v_n = self.normal_W.dot(v);
+            v * across + self.normal_W * (v_n * (along - across))
+        };
+        self.rest_W - change(k_n, k_t, displacement_W) - change(b_n, b_t, velocity_W)
+    }
+
+    /// The force: what of a trial force does not pull and lies in the cone.
+    #[inline]
+    pub fn project(&self, trial_W: &Vector3<f64>) -> Vector3<f64> {
+        let normal_n = self.normal_W.dot(trial_W);
+        if normal_n.is_nan() || normal_n <= 0.0 {
+            return Vector3::zeros();
+        }
+        let across_W = trial_W - self.normal_W * normal_n;
+        self.normal_W * normal_n + self.within(&across_W, normal_n)
+    }
+
+    /// A tangential force, cut to what the cone allows at this normal force.
+    #[inline]
+    pub(crate) fn within(&self, across_W: &Vector3<f64>, normal_n: f64) -> Vector3<f64> {
+        let across_n = across_W.norm();
+        let most_n = self.mu() * normal_n;
+        if across_n <= most_n { *across_W } else { across_W * (most_n / across_n) }
+    }
+
+    /// The ratio that counts now.
+    #[inline]
+    pub(crate) fn mu(&self) -> f64 {
+        match self.held {
+            Held::Stick => self.mu_hold,
+            Held::Slip => self.mu_slide,
+        }
+    }
+
+    #[inline]
+    fn dampings(&self) -> [f64; 2] {
+        let [b_n, b_t] = self.damping;
+        match self.held {
+            Held::Stick => [b_n, b_t],
+            Held::Slip => [b_n, 0.0],
+        }
+    }
+
+    /// By how much the trial force falls per velocity that lasts for the tick \[N s/m\]: along the normal, and across.
+    #[inline]
+    pub(crate) fn falls(&self, dt_s: f64) -> [f64; 2] {
+        let [k_n, k_t] = self.stiffness;
+        let [b_n, b_t] = self.dampings();
+        [k_n * dt_s + b_n, k_t * dt_s + b_t]
+    }
+
+    /// The same as a matrix in W.
+    #[inline]
+    pub(crate) fn falls_W(&self, dt_s: f64) -> Matrix3<f64> {
+        let [along, across] = self.falls(dt_s);
+        let n = self.normal_W;
+        Matrix3::from_diagonal_element(across) + n * n.transpose() * (along - across)
+    }
+}

@@ -1,0 +1,82 @@
+//! A finger's touch on a body: what rendering found, and what the tick makes of it.
+//!
+//! Model: rendering gives the force for where HIP and body are when the tick begins. In the tick the body gives way (the
+//! HIP's next position is not known), and the force with it: the spring's end on the body moves along. The user is made to
+//! feel that force, the one which the body got.
+
+use haptics::{Entity, FrictionLaw, FrictionMemory, FrictionQuery};
+use nalgebra::Vector3;
+
+use crate::row::{Held, Row, Torsion};
+use crate::solver::Motion;
+
+/// One point at which a finger touches a body, in the world frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Touch {
+    /// Index of the entity.
+    pub entity: usize,
+    /// Which finger's.
+    pub finger: usize,
+    /// Where \[m\].
+    pub point_W: Vector3<f64>,
+    /// Outward unit normal of the entity there.
+    pub normal_W: Vector3<f64>,
+    /// What the user feels \[N\]: as rendered, then as [`Manipulation::step`](crate::Manipulation::step) has it.
+    pub force_on_user_W: Vector3<f64>,
+    /// Whether its friction holds.
+    pub is_sticking: bool,
+}
+
+impl Touch {
+    /// As a contact point of this body, whose centre is there and which moves like that when the tick begins.
+    pub(crate) fn row(&self, body: usize, centre_W: &Vector3<f64>, motion: &Motion, entity: &Entity) -> Row {
+        let arm_W = self.point_W - centre_W;
+        let k = entity.stiffness_n_per_m;
+        let b = entity.damping_n_s_per_m;
+        let held = if self.is_sticking { Held::Stick } else { Held::Slip };
+        let n = -self.normal_W;
+        let force_W = -self.force_on_user_W;
+        let mu = self.ratio(&force_W, entity);
+        let mut row = Row {
+            body,
+            other: None,
+            arms_W: [arm_W, Vector3::zeros()],
+            normal_W: n,
+            rest_W: force_W,
+            stiffness: [k; 2],
+            damping: [b; 2],
+            mu_hold: mu,
+            mu_slide: mu,
+            held,
+            force_W,
+            torsion: Torsion::default(),
+        };
+        // Rendering has damped the motion with which the tick begins.
+        row.rest_W += force_W - row.trial_W(&Vector3::zeros(), &motion.at(&arm_W));
+        row
+    }
+
+    /// Ratio of tangential to normal force that friction allows: the law's while it holds, that which is while it slides.
+    fn ratio(&self, force_W: &Vector3<f64>, entity: &Entity) -> f64 {
+        let n = -self.normal_W;
+        let normal_n = n.dot(force_W);
+        let across_n = (force_W - n * normal_n).norm();
+        let is = if normal_n > 0.0 { across_n / normal_n } else { 0.0 };
+        if !self.is_sticking {
+            return is;
+        }
+        let load_m = (normal_n / entity.stiffness_n_per_m).max(LEAST_LOAD_M);
+        is.max(friction_circle_m(entity, load_m) / load_m)
+    }
+}
+
+/// Radius of the circle within which an entity's friction holds a god-object that is pressed so deep (m).
+pub(crate) fn friction_circle_m(entity: &Entity, load_m: f64) -> f64 {
+    let stiffness_n_per_m = entity.stiffness_n_per_m;
+    let query = FrictionQuery { load_m, stiffness_n_per_m, ..FrictionQuery::default() };
+    let radius_m = entity.friction.held_limit_m(&query, &FrictionMemory::default());
+    if radius_m.is_finite() { radius_m.max(0.0) } else { 0.0 }
+}
+
+/// Of a touch without a force, the ratio at this depth counts.
+const LEAST_LOAD_M: f64 = 1e-9;

@@ -1,0 +1,78 @@
+//! A world in a box: entities, bodies and fingers that are stepped together, as the application does it.
+#![allow(dead_code, non_snake_case, unreachable_pub)]
+
+use haptics::{ContactState, Entity, Finger, Friction, Plane, Shape};
+use nalgebra::{Isometry3, Vector3};
+use physics::{Body, Made, Manipulation, MassProperties, Settings, Touch};
+
+pub const DT: f64 = 1e-3;
+pub const G: f64 = 9.81;
+
+/// Fingers, entities and bodies.
+pub struct World {
+    pub entities: Vec<Entity>,
+    pub manipulation: Manipulation,
+    pub fingers: Vec<Finger>,
+    pub touches: Vec<Touch>,
+    pub made: Made,
+}
+
+impl World {
+    pub fn new(entities: Vec<Entity>, bodies: &[(usize, Body)], settings: Settings, fingers: usize) -> Self {
+        let manipulation = Manipulation::new(&entities, bodies, settings).unwrap();
+        let finger = || Finger::new(0.0, entities.len()).unwrap().with_ramp_in(0.0).unwrap();
+        let fingers = (0..fingers).map(|_| finger()).collect();
+        Self { entities, manipulation, fingers, touches: Vec::new(), made: Made::default() }
+    }
+
+    /// One tick: the force on each finger, by its HIP.
+    pub fn step(&mut self, hips: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        self.touches.clear();
+        let mut forces = Vec::new();
+        for (index, (finger, hip)) in self.fingers.iter_mut().zip(hips).enumerate() {
+            forces.push(finger.step(&self.entities, hip, DT).force_on_user_W);
+            for contact in finger.contacts() {
+                self.touches.push(Touch {
+                    entity: contact.entity,
+                    finger: index,
+                    point_W: contact.god_object_W,
+                    normal_W: contact.normal_W,
+                    force_on_user_W: contact.force_on_user_W,
+                    is_sticking: ContactState::from(contact.friction) == ContactState::Stick,
+                });
+            }
+        }
+        let rendered = self.touches.clone();
+        self.made = self.manipulation.step(&mut self.entities, &mut self.touches, DT);
+        for (touch, was) in self.touches.iter().zip(rendered) {
+            forces[touch.finger] += touch.force_on_user_W - was.force_on_user_W;
+        }
+        forces
+    }
+
+    pub fn body(&self) -> &Body {
+        &self.manipulation.bodies()[0]
+    }
+}
+
+/// A half-space below `y = 0`, leaned about z by an angle (rad).
+pub fn floor(lean: f64, stiffness: f64, mu: f64) -> Entity {
+    let normal = Vector3::new(-lean.sin(), lean.cos(), 0.0);
+    let plane = Plane::new(normal, 0.0).unwrap();
+    Entity::new(plane, Isometry3::identity(), stiffness)
+        .unwrap()
+        .with_friction(Friction::coulomb(mu).unwrap())
+        .unwrap()
+}
+
+/// An entity with Coulomb friction and the damping of what moves.
+pub fn object(shape: impl Into<Shape>, X_WB: Isometry3<f64>, stiffness: f64, mu: f64) -> Entity {
+    let entity =
+        Entity::new(shape, X_WB, stiffness).unwrap().with_friction(Friction::coulomb(mu).unwrap()).unwrap();
+    entity.with_damping(1.0).unwrap()
+}
+
+/// At rest where its entity is.
+pub fn body(entity: &Entity, mass_kg: f64) -> Body {
+    Body::at_rest(MassProperties::of_shape(&entity.shape, mass_kg).unwrap(), &entity.X_WB)
+}

@@ -1,0 +1,65 @@
+//! Objects on planes: falling, resting, sliding, against closed forms.
+#![allow(non_snake_case)]
+
+mod common;
+
+use common::*;
+use haptics::{Cuboid, Sphere};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use physics::Settings;
+
+const EDGE: f64 = 0.05;
+const MASS: f64 = 0.1;
+
+/// A cube on a slope, its lower face in it by as much as carries it; x points up the slope.
+fn cube_on(lean: f64, mu: f64) -> World {
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), lean);
+    let floor = floor(lean, 2000.0, mu);
+    let depth = MASS * G * lean.cos() / (4.0 * 2000.0 * 1000.0 / 3000.0);
+    let at = turn * Vector3::new(0.0, EDGE / 2.0 - depth, 0.0);
+    let cube = object(Cuboid::new([EDGE; 3]).unwrap(), Isometry3::from_parts(at.into(), turn), 1000.0, mu);
+    let body = body(&cube, MASS);
+    World::new(vec![floor, cube], &[(1, body)], Settings::default(), 0)
+}
+
+#[test]
+fn what_falls_falls_as_galilei_says() {
+    let ball = object(Sphere::new(0.02).unwrap(), Isometry3::translation(0.0, 3.0, 0.0), 1000.0, 0.5);
+    let body = body(&ball, MASS);
+    let mut world = World::new(vec![ball], &[(0, body)], Settings::default(), 0);
+    for _ in 0..500 {
+        world.step(&[]);
+    }
+    // The mean velocity of each tick is exact: 500 roundings of numbers near 3.
+    assert!((world.body().centre_W.y - (3.0 - 0.5 * G * 0.25)).abs() < 1e-12);
+    assert!((world.body().velocity_W.y + G * 0.5).abs() < 1e-12);
+}
+
+#[test]
+fn a_cube_holds_just_below_the_friction_angle_and_slides_just_above_as_coulomb_says() {
+    let mu: f64 = 0.5;
+    let mut world = cube_on((0.95 * mu).atan(), mu);
+    for _ in 0..1000 {
+        world.step(&[]);
+    }
+    let start = world.body().centre_W;
+    for _ in 0..60_000 {
+        world.step(&[]);
+    }
+    let crept = (world.body().centre_W - start).norm();
+    // What the solver leaves open, 1e-10 of the forces, each tick anew.
+    assert!(crept < 1e-9, "{crept}");
+
+    let lean = 0.6_f64;
+    let mut world = cube_on(lean, mu);
+    for _ in 0..300 {
+        world.step(&[]);
+    }
+    let v = world.body().velocity_W;
+    for _ in 0..300 {
+        world.step(&[]);
+    }
+    let a = (world.body().velocity_W - v).norm() / 0.3;
+    let expected = G * (lean.sin() - mu * lean.cos());
+    assert!((a - expected).abs() < 1e-6 * expected, "{a} {expected}");
+}
