@@ -133,7 +133,7 @@ impl Manipulation {
             };
             let (state, motion) = (&self.bodies[body], moving(&self.bodies[body]));
             *place = Some(self.rows.len());
-            self.rows.push(touch.row(body, &state.centre_W, &motion, &entities[touch.entity]));
+            self.rows.push(touch.row(body, &state.centre_W, &motion, &entities[touch.entity], dt_s));
         }
         for pair in &mut self.pairs {
             pair.gather(&start, &mut self.rows);
