@@ -6,9 +6,9 @@
 //! Cost: bounded; no allocation, no system call but the wake-up of a sleeping driver.
 
 use crate::fast_step::FastStep;
-use crate::row::Row;
+use crate::row::{BodyRow, Row};
+use crate::row_queue::RowSender;
 use bytemuck::Zeroable;
-use rtrb::Producer;
 use shm_abi::{Command, CommanderMemory, DriverState, DriverView, Frame};
 
 /// How far a missed frame is searched for in the ring: the next one is nearly always among these.
@@ -39,7 +39,7 @@ pub enum Turn {
 /// The fast thread's state.
 pub struct FastLoop {
     step: FastStep,
-    rows: Producer<Row>,
+    rows: RowSender,
     when_full: WhenFull,
     /// Rows that the run shall have.
     total_ticks: u64,
@@ -52,6 +52,8 @@ pub struct FastLoop {
     next_tick: u64,
     /// The row that waits for what the motors did, and the driver's tick it belongs to.
     pending: Option<(u64, Row)>,
+    /// Its bodies.
+    pending_bodies: Vec<BodyRow>,
     frame: Frame,
     following: Frame,
     command: Command,
@@ -81,12 +83,13 @@ impl FastLoop {
     /// A run of `total_ticks` rows.
     pub fn new(
         step: FastStep,
-        rows: Producer<Row>,
+        rows: RowSender,
         when_full: WhenFull,
         total_ticks: u64,
         period_ns: u64,
     ) -> Self {
         Self {
+            pending_bodies: step.bodies().to_vec(),
             step,
             rows,
             when_full,
@@ -156,6 +159,7 @@ impl FastLoop {
         self.next_tick = self.row.run_tick + 1;
         if self.row.run_tick < self.total_ticks {
             self.pending = Some((self.frame.tick, self.row));
+            self.pending_bodies.copy_from_slice(self.step.bodies());
             for finger in &self.row.fingers {
                 self.tally.peak_force_n = self.tally.peak_force_n.max(finger.force_on_user.norm());
             }
@@ -212,9 +216,9 @@ impl FastLoop {
                 std::thread::yield_now();
             }
         }
-        match self.rows.push(row) {
-            Ok(()) => self.tally.rows += 1,
-            Err(_) => self.tally.rows_lost += 1,
+        match self.rows.send(row, &self.pending_bodies) {
+            true => self.tally.rows += 1,
+            false => self.tally.rows_lost += 1,
         }
     }
 }

@@ -2,8 +2,9 @@
 //!
 //! Model: each finger's HIP is taken into the world, steps against the entities, and its force goes back
 //! into its device's base frame. Damping goes by the driver's estimate of the HIP's velocity; a driver of before
-//! 1.1 gives none, and then by the difference of its positions. What is felt beside contacts (fields, guides, magnets,
-//! vibration) is added to their force. The same step serves all three clocks.
+//! 1.1 gives none, and then by the difference of its positions. Entities that move are moved by these forces ([`Objects`]),
+//! and give way to them. What is felt beside contacts (fields, guides, magnets, vibration) is added to their force. The
+//! same step serves all three clocks.
 //!
 //! Frames and signs: forces are forces on the user.
 //! Invariants: no allocation, clock, lock or panic; the command answers the frame's tick; a device whose
@@ -12,12 +13,18 @@
 
 #![allow(non_snake_case)] // Frames are capital letters: tip_D is the tip in D.
 
+mod objects;
+
+pub use objects::Objects;
+
 use crate::mount::Mount;
 use crate::passive_port::{Tick, keep_passive};
-use crate::row::{FingerRow, Row};
+use crate::row::{BodyRow, FingerRow, Row};
 use haptics::passivity::Passivity;
 use haptics::{Effects, Entity, Field, Finger, FingerEffects, Guide, Hip, Moment, RAMP_IN_S};
 use nalgebra::Vector3;
+use physics::{Body, BodyError, Manipulation};
+use shm_abi::MAX_DEVICES;
 use shm_abi::frame::DEVICE_POSITION_VALID;
 use shm_abi::{Command, DeviceFrame, Frame};
 use world::Layout;
@@ -38,6 +45,8 @@ pub struct DeviceFinger {
 pub struct FastStep {
     fingers: Vec<DeviceFinger>,
     entities: Vec<Entity>,
+    /// Those that move.
+    objects: Option<Objects>,
     effects: Effects,
     /// Of each finger.
     finger_effects: Vec<FingerEffects>,
@@ -64,6 +73,7 @@ impl FastStep {
         Self {
             fingers,
             entities,
+            objects: None,
             effects: Effects::default(),
             finger_effects: Vec::new(),
             period_s,
@@ -82,6 +92,25 @@ impl FastStep {
         self.effects = Effects::new(fields, guides, &self.entities);
         self.finger_effects = vec![FingerEffects::new(&self.effects); self.fingers.len()];
         self
+    }
+
+    /// With entities that move.
+    ///
+    /// # Errors
+    /// What [`Manipulation::new`] refuses.
+    pub fn with_objects(
+        mut self,
+        bodies: &[(usize, Body)],
+        settings: physics::Settings,
+    ) -> Result<Self, BodyError> {
+        let manipulation = Manipulation::new(&self.entities, bodies, settings)?;
+        self.objects = Some(Objects::new(manipulation, self.fingers.len(), self.period_s));
+        Ok(self)
+    }
+
+    /// The entities that move, as the last tick began.
+    pub fn bodies(&self) -> &[BodyRow] {
+        self.objects.as_ref().map_or(&[], Objects::rows)
     }
 
     /// With fingers whose forces do not feed energy into the hand, one for each finger; `None`: as rendered.
@@ -118,12 +147,11 @@ impl FastStep {
         let dt_s = ticks as f64 * self.period_s;
         row.run_tick = frame.run_tick.max(0).unsigned_abs();
         let devices = frame.present_devices();
-        let tick = Tick::new(frame, &self.entities, dt_s);
         let moment = Moment { t_s: row.run_tick as f64 * self.period_s, dt_s };
-        let states = self.finger_effects.iter_mut().zip(&mut self.passivities);
-        let known = self.tips_D.iter_mut().zip(&mut self.carried_W).zip(states);
-        for ((finger, row), ((tip_D, carried_W), (felt, passivity))) in
-            self.fingers.iter_mut().zip(&mut row.fingers).zip(known)
+        let mut hips = [None; MAX_DEVICES];
+        let moved = self.tips_D.iter_mut().zip(&mut self.carried_W).zip(&mut hips);
+        for ((finger, row), ((tip_D, carried_W), hip)) in
+            self.fingers.iter_mut().zip(&mut row.fingers).zip(moved)
         {
             let Some(device) = devices.get(finger.device) else { continue };
             let is_valid = device.flags & DEVICE_POSITION_VALID != 0;
@@ -131,13 +159,31 @@ impl FastStep {
             let carried_W = std::mem::take(carried_W);
             let velocity_W = self.driver_estimates.then(|| finger.velocity_W(device, carried_W / dt_s));
             *row = finger.step(device, &self.entities, dt_s, velocity_W);
-            if !self.effects.is_empty() {
-                let hip = is_valid.then_some(Hip { position_W: row.hip, velocity_W });
-                let beside_W = finger.feel(felt, &self.effects, &self.entities, hip, moment);
-                row.force_on_user = finite_or_zero(row.force_on_user + beside_W);
+            *hip =
+                Some(Carried { carried_W, hip: is_valid.then_some(Hip { position_W: row.hip, velocity_W }) });
+        }
+        if let Some(objects) = &mut self.objects {
+            objects.note();
+            if frame.run_tick >= 0 {
+                objects.step(&mut self.entities, &self.fingers, &mut row.fingers, dt_s);
             }
+        }
+        let tick = Tick::new(frame, &self.entities, dt_s);
+        let states = self.finger_effects.iter_mut().zip(&mut self.passivities);
+        for ((finger, row), (carried, (felt, passivity))) in
+            self.fingers.iter().zip(&mut row.fingers).zip(hips.iter().zip(states))
+        {
+            let (Some(device), Some(Carried { carried_W, hip })) = (devices.get(finger.device), carried)
+            else {
+                continue;
+            };
+            if !self.effects.is_empty() {
+                row.force_on_user += finger.feel(felt, &self.effects, &self.entities, *hip, moment);
+            }
+            row.force_on_user = finite_or_zero(row.force_on_user);
+            row.torque_on_user = finite_or_zero(row.torque_on_user);
             if let Some(passivity) = passivity {
-                keep_passive(passivity, finger, felt, device, carried_W, &tick, row);
+                keep_passive(passivity, finger, felt, device, *carried_W, &tick, row);
             }
             command.devices[finger.device].force_on_user_n = finger.mount.force_to_device(row.force_on_user);
         }
@@ -199,6 +245,15 @@ impl FastStep {
         self.passivities.iter_mut().flatten().for_each(Passivity::reset);
         self.finger_effects.iter_mut().for_each(FingerEffects::reset);
     }
+}
+
+/// How a finger came to where it is.
+#[derive(Debug, Clone, Copy)]
+struct Carried {
+    /// How far it was carried through the world (m).
+    carried_W: Vector3<f64>,
+    /// Where its device has it, if that is known.
+    hip: Option<Hip>,
 }
 
 /// How fast the devices may be carried through the world while a finger touches: a hand's own fastest.

@@ -27,6 +27,7 @@ pub mod recording;
 pub mod report;
 pub mod rig;
 pub mod row;
+pub mod row_queue;
 pub mod run;
 pub mod simulated;
 pub mod slow;

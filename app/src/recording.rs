@@ -6,7 +6,7 @@
 //! (a full disk) is cut back to the last row that fits.
 //! Units: SI; world frame; forces are forces on the user.
 
-use crate::row::{FingerRow, Row};
+use crate::row::{BodyRow, FingerRow, Row};
 use haptics::{ContactState, Feature};
 use io_driver::device::{Extras, run_time_s};
 use nalgebra::Vector3;
@@ -61,6 +61,8 @@ pub struct Names {
     pub torques: Vec<bool>,
     /// The entities.
     pub entities: Vec<String>,
+    /// Those of them that move, in the order of a row's bodies.
+    pub bodies: Vec<String>,
 }
 
 impl Names {
@@ -125,12 +127,12 @@ impl Recording {
         &self.path
     }
 
-    /// Appends a row.
+    /// Appends a row and its bodies.
     ///
     /// # Errors
     /// If the rows before it, or it, cannot be written.
-    pub fn append(&mut self, row: &Row) -> Result<(), RecordingError> {
-        write_row(&mut self.buffer, row, &self.names, self.period_ns);
+    pub fn append(&mut self, row: &Row, bodies: &[BodyRow]) -> Result<(), RecordingError> {
+        write_row(&mut self.buffer, row, bodies, &self.names, self.period_ns);
         self.ends.push((self.buffer.len(), row.run_tick));
         if self.buffer.len() >= CHUNK_BYTES { self.flush() } else { Ok(()) }
     }
@@ -212,6 +214,11 @@ fn header(names: &Names) -> String {
             push_axes(&mut line, finger, "torque");
         }
     }
+    for body in &names.bodies {
+        for quantity in ["x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz"] {
+            let _ = write!(line, ",{body}_{quantity}");
+        }
+    }
     line.push('\n');
     line
 }
@@ -232,7 +239,7 @@ fn push_axes(line: &mut String, finger: &str, quantity: &str) {
     }
 }
 
-fn write_row(line: &mut String, row: &Row, names: &Names, period_ns: u64) {
+fn write_row(line: &mut String, row: &Row, bodies: &[BodyRow], names: &Names, period_ns: u64) {
     let _ = write!(line, "{:?}", run_time_s(row.run_tick as i64, period_ns));
     for (index, (_, finger)) in names.fingers.iter().zip(&row.fingers).enumerate() {
         write_finger(line, finger, names);
@@ -243,6 +250,13 @@ fn write_row(line: &mut String, row: &Row, names: &Names, period_ns: u64) {
         if names.has_torque(index) {
             write_vector(line, &finger.torque_on_user);
         }
+    }
+    for body in bodies {
+        write_vector(line, &body.position);
+        let q = body.orientation;
+        let _ = write!(line, ",{:?},{:?},{:?},{:?}", q.w, q.i, q.j, q.k);
+        write_vector(line, &body.velocity);
+        write_vector(line, &body.angular_velocity);
     }
     line.push('\n');
 }
@@ -304,6 +318,7 @@ mod tests {
             passive: Vec::new(),
             torques: Vec::new(),
             entities: vec!["table".into()],
+            bodies: Vec::new(),
         }
     }
 
@@ -319,7 +334,7 @@ mod tests {
         let directory = tempfile::tempdir().expect("a directory");
         let path = directory.path().join("r.csv");
         let mut recording = Recording::create(&path, names(), 1_000_000).expect("created");
-        recording.append(&row(3, 0.1 + 0.2)).expect("appended");
+        recording.append(&row(3, 0.1 + 0.2), &[]).expect("appended");
         assert_eq!(recording.finish().expect("finished"), 1);
         let text = std::fs::read_to_string(&path).expect("readable");
         let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
@@ -349,7 +364,7 @@ mod tests {
         told.fingers[1].orientation_wxyz = [0.5, -0.5, 0.5, -0.5];
         told.fingers[1].buttons = 5;
         let mut line = String::new();
-        write_row(&mut line, &told, &names, 1_000_000);
+        write_row(&mut line, &told, &[], &names, 1_000_000);
         assert!(line.ends_with(",0.5,-0.5,0.5,-0.5,5\n"), "{line}");
         assert_eq!(line.matches(',').count(), header(&names).matches(',').count());
     }
@@ -362,7 +377,7 @@ mod tests {
         let mut told = row(0, 1.0);
         (told.fingers[1].energy_j, told.fingers[1].controlled_n) = (-1.5e-3, 0.25);
         let mut line = String::new();
-        write_row(&mut line, &told, &names, 1_000_000);
+        write_row(&mut line, &told, &[], &names, 1_000_000);
         assert!(line.ends_with(",-0.0015,0.25\n"), "{line}");
         assert_eq!(line.matches(',').count(), header(&names).matches(',').count());
     }
@@ -376,8 +391,26 @@ mod tests {
         let mut told = row(0, 1.0);
         told.fingers[1].torque_on_user = Vector3::new(0.5, -0.25, 0.0);
         let mut line = String::new();
-        write_row(&mut line, &told, &names, 1_000_000);
+        write_row(&mut line, &told, &[], &names, 1_000_000);
         assert!(line.ends_with(",0.5,-0.25,0.0\n"), "{line}");
+    }
+
+    #[test]
+    fn what_moves_tells_its_pose_and_how_it_moves_behind_all_fingers() {
+        let plain = header(&names());
+        let names = Names { bodies: vec!["cube".into()], ..names() };
+        let added = "cube_x,cube_y,cube_z,cube_qw,cube_qx,cube_qy,cube_qz,cube_vx,cube_vy,cube_vz,cube_wx,cube_wy,cube_wz";
+        assert_eq!(header(&names), format!("{},{added}\n", plain.trim_end()));
+        let body = BodyRow {
+            position: Vector3::new(1.0, 2.0, 3.0),
+            orientation: nalgebra::Quaternion::new(0.5, -0.5, 0.5, -0.25),
+            velocity: Vector3::new(4.0, 5.0, 6.0),
+            angular_velocity: Vector3::new(7.0, 8.0, 9.0),
+        };
+        let mut line = String::new();
+        write_row(&mut line, &row(0, 1.0), &[body], &names, 1_000_000);
+        assert!(line.ends_with(",1.0,2.0,3.0,0.5,-0.5,0.5,-0.25,4.0,5.0,6.0,7.0,8.0,9.0\n"), "{line}");
+        assert_eq!(line.matches(',').count(), header(&names).matches(',').count());
     }
 
     #[test]
@@ -395,8 +428,8 @@ mod tests {
         let directory = tempfile::tempdir().expect("a directory");
         let path = directory.path().join("r.csv");
         let mut recording = Recording::create(&path, names(), 1_000_000).expect("created");
-        recording.append(&row(0, 1.0)).expect("appended");
-        recording.append(&row(1, 2.0)).expect("appended");
+        recording.append(&row(0, 1.0), &[]).expect("appended");
+        recording.append(&row(1, 2.0), &[]).expect("appended");
         let bytes = recording.buffer.clone().into_bytes();
         let half = recording.ends[0].0 + 5;
         recording.file.write_all(&bytes[..half]).expect("written");

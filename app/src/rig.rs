@@ -5,6 +5,7 @@ mod effects;
 mod error;
 mod material;
 mod models;
+mod moving;
 mod pictures;
 
 pub use self::error::RigError;
@@ -189,7 +190,9 @@ impl Rig {
         });
         let passivities: Vec<Option<Passivity>> = passivities.collect::<Result<_, RigError>>()?;
         let (fields, guides) = self.effects()?;
+        let bodies = self.bodies(&entities)?;
         let step = FastStep::new(fingers, entities, self.period_ns);
+        let step = if bodies.is_empty() { step } else { self.with_objects(step, &bodies)? };
         Ok(step.with_effects(fields, guides).with_passivities(passivities))
     }
 
@@ -202,6 +205,7 @@ impl Rig {
             torques: self.scene.fingers.iter().map(|finger| finger.radius_m > 0.0).collect(),
             fingers: self.scene.fingers.iter().map(|finger| finger.name.clone()).collect(),
             entities: self.scene.entities.iter().map(|entity| entity.name.clone()).collect(),
+            bodies: self.moving().map(|(_, entity, _)| entity.name.clone()).collect(),
         }
     }
 

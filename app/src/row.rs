@@ -1,7 +1,7 @@
 //! What one fast tick leaves behind for slower eyes: the recording's row.
 
 use haptics::{ContactState, Feature};
-use nalgebra::Vector3;
+use nalgebra::{Quaternion, Vector3};
 use shm_abi::MAX_DEVICES;
 
 /// One fast tick of a run.
@@ -47,4 +47,17 @@ impl Row {
     pub fn empty() -> Self {
         Self { run_tick: 0, fingers: [FingerRow::default(); MAX_DEVICES] }
     }
+}
+
+/// One entity that moves, as it is when a tick begins; world frame, SI.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct BodyRow {
+    /// Of the entity's frame (m).
+    pub position: Vector3<f64>,
+    /// Of the entity's frame.
+    pub orientation: Quaternion<f64>,
+    /// Of the entity's frame's origin (m/s).
+    pub velocity: Vector3<f64>,
+    /// rad/s.
+    pub angular_velocity: Vector3<f64>,
 }

@@ -8,7 +8,8 @@ use crate::progress::Progress;
 use crate::recording::Recording;
 use crate::report::{Baseline, Report};
 use crate::rig::{HandMode, Rig};
-use crate::slow::{SlowSide, row_queue};
+use crate::row_queue::row_queue;
+use crate::slow::SlowSide;
 use crate::two_processes::{self, Source};
 use crate::virtual_clock::VirtualDriver;
 use io_driver::device::Extras;
@@ -77,7 +78,7 @@ impl Parts {
         }
         let when_full = if clock == ClockMode::Real { WhenFull::Drop } else { WhenFull::Wait };
         let step = rig.fast_step().map_err(|error| RunFailure::Start(error.to_string()))?;
-        let (producer, consumer) = row_queue();
+        let (producer, consumer) = row_queue(step.bodies().len());
         let record = |path: &PathBuf| Recording::create(path, rig.names(devices), period_ns);
         let recording = plan.record.as_ref().map(record).transpose()?;
         Ok(Self {

@@ -4,8 +4,8 @@ use bytemuck::Zeroable;
 use io_driver::config::ReplyMode;
 use phantom3::fast_loop::{FastLoop, Turn, WhenFull};
 use phantom3::rig::{HandMode, Rig};
+use phantom3::row_queue::row_queue;
 use phantom3::simulated::SimulatedDevices;
-use phantom3::slow::row_queue;
 use phantom3::virtual_clock::VirtualDriver;
 use shm_abi::segment::ClockMode;
 use shm_abi::{Frame, ReplyKind};
@@ -24,7 +24,7 @@ fn ages(mode: ReplyMode) -> Vec<u64> {
     let mut config = rig.driver_config(ClockMode::Virtual);
     config.reply.mode = mode;
     let mut driver = VirtualDriver::open(&config).expect("devices");
-    let (rows, _queue) = row_queue();
+    let (rows, _queue) = row_queue(0);
     let step = rig.fast_step().expect("a step");
     let mut fast = FastLoop::new(step, rows, WhenFull::Drop, u64::MAX, config.period_ns);
     let mut frame = Frame::zeroed();

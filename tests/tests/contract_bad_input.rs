@@ -106,12 +106,24 @@ fn a_scene_that_is_wrong_is_refused_with_file_line_key_finding_and_remedy() {
             &["entity[1].name", "\"table\"", "line 3"],
         ),
         (
-            entity("mass_kg = 0.1"),
-            &["scene.toml:5: entity[0].mass_kg", "not available in this version", "available: name, shape"],
+            entity("velocity_m_s = [0, 1, 0]"),
+            &["entity[0].mass_kg", "missing", "an entity with `velocity_m_s` moves"],
+        ),
+        (entity("mass_kg = -1.0"), &["scene.toml:5: entity[0].mass_kg", "found -1.0", "above 0"]),
+        (
+            entity("mass_kg = 0.1\ndensity_kg_m3 = 500.0"),
+            &["scene.toml:6: entity[0].density_kg_m3", "found 500.0", "not both"],
         ),
         (
-            entity("velocity_m_s = [0.0, 0.0, 0.0]"),
-            &["entity[0].velocity_m_s", "not available in this version"],
+            entity("mass_kg = 0.1"),
+            &["scene.toml:2: entity table: a plane cannot move", "leave out `mass_kg`"],
+        ),
+        (
+            entity("").replace(
+                "kind = \"plane\", normal = [0.0, 1.0, 0.0], offset_m = 0.0",
+                "kind = \"sphere\", radius_m = 0.1",
+            ) + "mass_kg = 0.1\ninertia_kg_m2 = [1e-5, 1e-5, 3e-5]",
+            &["scene.toml:2: entity table", "inertia_kg_m2 is [0.00001, 0.00001, 0.00003]", "sum"],
         ),
         (entity("stiffness_n_per_m = 0"), &["entity[0].stiffness_n_per_m", "found 0", "above 0"]),
         (entity("damping_n_s_per_m = -1"), &["entity[0].damping_n_s_per_m", "found -1", "0 or more"]),
@@ -180,14 +192,6 @@ fn a_scene_that_is_wrong_is_refused_with_file_line_key_finding_and_remedy() {
         place.write("scene.toml", scene);
         let clock = CLOCKS[index % 2];
         assert_says(&refused(&place, &["run", "scene.toml", "--clock", clock, "--record", "out.csv"]), parts);
-    }
-    for key in ["mass_kg", "inertia_kg_m2", "rotation_locked", "centre_of_mass_m", "angular_velocity_rad_s"] {
-        place.write("scene.toml", entity(&format!("{key} = 1")));
-        let message = refused(&place, &["run", "scene.toml", "--record", "out.csv"]);
-        assert_says(
-            &message,
-            &[&format!("scene.toml:5: entity[0].{key}: this key is not available in this version")],
-        );
     }
 }
 

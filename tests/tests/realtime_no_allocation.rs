@@ -18,8 +18,8 @@ use io_driver::zeroing::{DeviceSet, ZeroState};
 use nalgebra::Vector3;
 use phantom3::fast_loop::{FastLoop, Turn, WhenFull};
 use phantom3::rig::{HandMode, Rig};
+use phantom3::row_queue::row_queue_of;
 use rt_core::alloc_guard::{self, CountingAllocator};
-use rtrb::RingBuffer;
 use shm_abi::doorbell::WaitMode;
 use shm_abi::segment::{ClockMode, DeviceInfo};
 use shm_abi::{Command, CommanderMemory, CommanderView, DriverMemory, DriverState, DriverView, FaultReason};
@@ -316,8 +316,9 @@ fn play_scene(file: &Path, fingers: usize, least: u64) {
     let commander = CommanderMemory::map(fd.as_fd()).unwrap();
     cycle.grant(view);
     cycle.change_lease();
-    let (rows, mut taken) = RingBuffer::new(1024);
-    let mut fast = FastLoop::new(rig.fast_step().unwrap(), rows, WhenFull::Drop, TICKS, period_ns);
+    let step = rig.fast_step().unwrap();
+    let (rows, mut taken) = row_queue_of(1024, step.bodies().len());
+    let mut fast = FastLoop::new(step, rows, WhenFull::Drop, TICKS, period_ns);
     let (mut seen, mut answered) = ([0_u64; 3], 0);
     for tick in 1..=TICKS {
         cycle.sense(tick, tick * period_ns);
@@ -335,7 +336,7 @@ fn play_scene(file: &Path, fingers: usize, least: u64) {
         }
         // For a while nobody takes the rows, so that the queue runs full.
         while tick % 10_000 < 5_000
-            && let Ok(row) = taken.pop()
+            && let Some((row, _)) = taken.receive()
         {
             for finger in &row.fingers[..fingers] {
                 seen[finger.friction as usize] += 1;

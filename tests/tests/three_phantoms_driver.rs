@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Vector3};
 use phantom3::fast_loop::{FastLoop, Turn, WhenFull};
 use phantom3::fast_step::{DeviceFinger, FastStep};
 use phantom3::mount::Mount;
-use phantom3::slow::row_queue;
+use phantom3::row_queue::row_queue;
 use phantom3::virtual_clock::VirtualDriver;
 use shm_abi::segment::ClockMode;
 use shm_abi::{DriverState, Frame};
@@ -51,7 +51,7 @@ fn run(config: &DriverConfig, ticks: u64, mut look: impl FnMut(&Frame)) {
     };
     let step = FastStep::new(vec![finger(0), finger(1), finger(2)], Vec::new(), config.period_ns);
     // Nobody reads the rows.
-    let (rows, _) = row_queue();
+    let (rows, _) = row_queue(0);
     let mut fast = FastLoop::new(step, rows, WhenFull::Drop, u64::MAX, config.period_ns);
     let mut driver = VirtualDriver::open(config).expect("the driver file opens");
     let mut frame = Frame::zeroed();

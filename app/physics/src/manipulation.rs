@@ -112,6 +112,11 @@ impl Manipulation {
         &self.bodies
     }
 
+    /// Whether the entity of this number is a body.
+    pub fn is_body(&self, entity: usize) -> bool {
+        self.entities.contains(&entity)
+    }
+
     /// The contact points of the last tick, with their forces.
     pub fn rows(&self) -> &[Row] {
         &self.rows

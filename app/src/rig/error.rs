@@ -89,6 +89,18 @@ pub enum RigError {
         /// The algorithm.
         found: &'static str,
     },
+    /// An entity that cannot move as it is described.
+    #[error("{}:{line}: {what}: {source}", .file.display())]
+    NoBody {
+        /// The scene's file.
+        file: PathBuf,
+        /// Where the entity begins.
+        line: usize,
+        /// The entity.
+        what: String,
+        /// Why.
+        source: physics::BodyError,
+    },
     /// A shape whose distance from a finger outside is not known.
     #[error(
         "{}:{line}: entity {entity} is a {kind}, which cannot have magnetism; allowed: no magnetism, or another shape",

@@ -7,6 +7,7 @@ use crate::error::SceneError;
 use crate::friction::FrictionSpec;
 use crate::height_map::HeightMapSpec;
 use crate::material::read_material;
+use crate::motion::MotionSpec;
 use crate::names::Names;
 use crate::pose::read_pose;
 use crate::reader::{Bound, Table};
@@ -14,7 +15,7 @@ use crate::shading::ShadingSpec;
 use crate::shape::ShapeSpec;
 use crate::vocabulary::Vocabulary;
 
-/// One `[[entity]]`: fixed in the world in this version.
+/// One `[[entity]]`: fixed in the world, or with a mass.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneEntity {
     /// Unique among the entities; default e0, e1, ... by position in the list.
@@ -27,7 +28,7 @@ pub struct SceneEntity {
     pub pose: Isometry3<f64>,
     /// Normal force per depth; above 0, default [`SceneEntity::DEFAULT_STIFFNESS_N_PER_M`].
     pub stiffness_n_per_m: f64,
-    /// Normal force per speed of approach; 0 or more, default 0 (the entity is fixed).
+    /// Normal force per speed of approach; 0 or more, default 0, or [`MotionSpec::DEFAULT_DAMPING_N_S_PER_M`] if it moves.
     pub damping_n_s_per_m: f64,
     /// Default none.
     pub friction: FrictionSpec,
@@ -43,6 +44,8 @@ pub struct SceneEntity {
     pub shading: ShadingSpec,
     /// Default none.
     pub height_map: Option<HeightMapSpec>,
+    /// How it moves; default it is fixed.
+    pub motion: Option<MotionSpec>,
 }
 
 /// What works out the force of contacts with an entity.
@@ -69,7 +72,9 @@ impl SceneEntity {
         let material = read_material(table)?;
         let stiffness_default =
             material.map_or(Self::DEFAULT_STIFFNESS_N_PER_M, |made_of| made_of.stiffness_n_per_m);
-        let damping_default = material.map_or(0.0, |made_of| made_of.damping_n_s_per_m);
+        let motion = MotionSpec::read(table)?;
+        let usual_damping = if motion.is_some() { MotionSpec::DEFAULT_DAMPING_N_S_PER_M } else { 0.0 };
+        let damping_default = material.map_or(usual_damping, |made_of| made_of.damping_n_s_per_m);
         let name = names.claim(table, format!("e{i}"))?;
         let shape = ShapeSpec::read(table)?;
         Ok(Self {
@@ -85,6 +90,7 @@ impl SceneEntity {
             vibration: VibrationSpec::read(table)?,
             shading: ShadingSpec::read(table, &shape)?,
             height_map: HeightMapSpec::read(table, &shape)?,
+            motion,
             shape,
         })
     }
@@ -119,13 +125,13 @@ const KEYS: Vocabulary = Vocabulary {
         "height_map",
         "magnetism",
         "vibration",
-    ],
-    later: &[
+        "mass_kg",
+        "density_kg_m3",
+        "inertia_kg_m2",
+        "centre_of_mass_m",
         "velocity_m_s",
         "angular_velocity_rad_s",
-        "mass_kg",
-        "inertia_kg_m2",
         "rotation_locked",
-        "centre_of_mass_m",
     ],
+    later: &[],
 };

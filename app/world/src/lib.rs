@@ -34,6 +34,7 @@
 
 mod csg;
 mod document;
+mod dynamics;
 mod effects;
 mod entity;
 mod error;
@@ -45,6 +46,7 @@ mod height_map;
 mod layout;
 mod material;
 pub mod model;
+mod motion;
 mod names;
 mod passivity;
 pub mod picture;
@@ -58,6 +60,7 @@ mod source;
 mod vocabulary;
 
 pub use csg::{CsgChild, CsgOp, CsgSpec};
+pub use dynamics::{DynamicsSpec, IntegratorSpec, ResponseSpec};
 pub use effects::{MagnetismSpec, VibrationSpec};
 pub use entity::{AlgorithmSpec, SceneEntity};
 pub use error::{Location, SceneError};
@@ -67,6 +70,7 @@ pub use friction::FrictionSpec;
 pub use guide::{GuideSpec, MAX_GUIDES, TrackSpec};
 pub use height_map::HeightMapSpec;
 pub use layout::Layout;
+pub use motion::{MassSpec, MotionSpec};
 pub use names::MAX_NAME_BYTES;
 pub use passivity::PassivitySpec;
 pub use placement::{Affine, LEAST_STRETCH, MOST_STRETCH, Placement};

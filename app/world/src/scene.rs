@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::Vector3;
 
 use crate::document::{Document, LineEnds};
+use crate::dynamics::DynamicsSpec;
 use crate::entity::SceneEntity;
 use crate::error::SceneError;
 use crate::field::FieldSpec;
@@ -22,6 +23,8 @@ pub struct Scene {
     pub name: String,
     /// World frame; default [`Scene::DEFAULT_GRAVITY_M_S2`].
     pub gravity_m_s2: Vector3<f64>,
+    /// How what moves is computed.
+    pub dynamics: DynamicsSpec,
     /// The hand file that drives the fingers, made relative to where the scene file is.
     pub hand: Option<PathBuf>,
     /// 1 to [`MAX_DEVICES`](crate::MAX_DEVICES) of them.
@@ -61,6 +64,7 @@ impl Scene {
         Ok(Self {
             name: read_name(&table, file)?,
             gravity_m_s2: table.numbers_or("gravity_m_s2", Self::DEFAULT_GRAVITY_M_S2)?.into(),
+            dynamics: DynamicsSpec::read(&table)?,
             hand: read_hand(&table, file)?,
             fingers: SceneFinger::read_all(&table)?,
             entities: read_entities(&table)?,
@@ -90,6 +94,16 @@ fn read_entities(table: &Table<'_>) -> Result<Vec<SceneEntity>, SceneError> {
 }
 
 const KEYS: Vocabulary = Vocabulary {
-    available: &["name", "gravity_m_s2", "hand", "finger", "entity", "field", "guide"],
+    available: &[
+        "name",
+        "gravity_m_s2",
+        "integrator",
+        "contact_response",
+        "hand",
+        "finger",
+        "entity",
+        "field",
+        "guide",
+    ],
     later: &[],
 };

@@ -15,8 +15,8 @@ use crate::fast_step::{DeviceFinger, FastStep};
 use crate::mount::Mount;
 use crate::outcome::RunFailure;
 use crate::row::Row;
+use crate::row_queue::{RowReceiver, row_queue};
 use crate::simulated::SimulatedDevices;
-use crate::slow::row_queue;
 use crate::virtual_clock::VirtualDriver;
 use bytemuck::Zeroable;
 use haptics::passivity::{Passivity, PassivitySpec};
@@ -27,7 +27,6 @@ use io_driver::config::{
 use io_driver::open::ROUND_TRIP_NS;
 use io_driver::sim::hand::HandModel;
 use nalgebra::{Isometry3, Vector3};
-use rtrb::Consumer;
 use shm_abi::segment::ClockMode;
 use shm_abi::{DriverState, Frame};
 use std::path::{Path, PathBuf};
@@ -62,7 +61,7 @@ pub struct Bench {
 pub struct Trial {
     driver: VirtualDriver,
     fast: FastLoop,
-    rows: Consumer<Row>,
+    rows: RowReceiver,
     ticks: u64,
     look_from: i64,
 }
@@ -161,7 +160,7 @@ impl Bench {
         let finger = Finger::new(0.0, 1).map_err(|error| RunFailure::Start(error.to_string()))?;
         let finger = DeviceFinger { finger, device: 0, mount: Mount::new(Isometry3::identity()) };
         let step = FastStep::new(vec![finger], vec![wall], period_ns).with_passivities([passivity]);
-        let (producer, rows) = row_queue();
+        let (producer, rows) = row_queue(0);
         let ticks = |s: f64| (s * 1e9 / period_ns as f64).round();
         Ok(Trial {
             driver: VirtualDriver::open(&config)?,
@@ -237,7 +236,7 @@ impl Trial {
         let mut felt = Felt::default();
         for tick in 1..=self.ticks {
             let turn = self.driver.tick(tick, &mut self.fast);
-            while let Ok(row) = self.rows.pop() {
+            while let Some((row, _)) = self.rows.receive() {
                 felt.take(&row);
             }
             if matches!(turn, Turn::Fault(_)) {

@@ -1,0 +1,75 @@
+//! How a scene's moving entities are computed: `integrator` and `contact_response`.
+
+use crate::error::SceneError;
+use crate::reader::{Bound, Table, Value};
+use crate::vocabulary::Vocabulary;
+
+/// What holds for all entities that move.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct DynamicsSpec {
+    /// How forces become motion.
+    pub integrator: IntegratorSpec,
+    /// How contacts between entities answer.
+    pub response: ResponseSpec,
+}
+
+/// How forces become motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum IntegratorSpec {
+    /// Contact forces of the tick's end, angular momentum carried: stable for every mass.
+    #[default]
+    Implicit,
+    /// Runge and Kutta's of the fourth order; to compare with.
+    Rk4,
+    /// As the thesis has it; to compare with.
+    ThesisEuler,
+}
+
+/// How contacts between entities answer.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum ResponseSpec {
+    /// By a spring and a damper.
+    #[default]
+    Force,
+    /// By reflected velocities.
+    Impulse {
+        /// Share of the approaching velocity that comes back, 0 to 1.
+        restitution: f64,
+    },
+}
+
+impl DynamicsSpec {
+    pub(crate) fn read(scene: &Table<'_>) -> Result<Self, SceneError> {
+        let integrator = match scene.get("integrator") {
+            None => IntegratorSpec::default(),
+            Some(value) => match value.choose("integrator", &INTEGRATORS)? {
+                "rk4" => IntegratorSpec::Rk4,
+                "thesis-euler" => IntegratorSpec::ThesisEuler,
+                _ => IntegratorSpec::Implicit,
+            },
+        };
+        let response = scene.get("contact_response").map(|value| ResponseSpec::read(&value)).transpose()?;
+        Ok(Self { integrator, response: response.unwrap_or_default() })
+    }
+}
+
+impl ResponseSpec {
+    fn read(value: &Value<'_>) -> Result<Self, SceneError> {
+        let table = value.table(ALLOWED)?;
+        table.check_keys(&KEYS)?;
+        let kind = table.require("kind", "force, impulse")?.choose("contact response", &RESPONSES)?;
+        let Some(restitution) = table.get("restitution") else {
+            return Ok(if kind == "force" { Self::Force } else { Self::Impulse { restitution: 0.0 } });
+        };
+        let allowed = "a number from 0 to 1, with kind = \"impulse\"";
+        match restitution.number(Bound::NotNegative)? {
+            share if kind == "impulse" && share <= 1.0 => Ok(Self::Impulse { restitution: share }),
+            _ => Err(restitution.out_of_range(allowed)),
+        }
+    }
+}
+
+const ALLOWED: &str = "a table such as { kind = \"impulse\", restitution = 0.5 } or { kind = \"force\" }";
+const KEYS: Vocabulary = Vocabulary { available: &["kind", "restitution"], later: &[] };
+const RESPONSES: Vocabulary = Vocabulary { available: &["force", "impulse"], later: &[] };
+const INTEGRATORS: Vocabulary = Vocabulary { available: &["implicit", "rk4", "thesis-euler"], later: &[] };
