@@ -1,6 +1,6 @@
 //! A recording read back.
 
-use nalgebra::Vector3;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use std::path::Path;
 
 /// Columns by name.
@@ -74,6 +74,40 @@ impl Table {
         };
         (0..self.len()).map(sample).collect()
     }
+}
+
+impl Table {
+    /// All columns of an entity that moves.
+    pub fn body(&self, name: &str) -> Vec<BodySample> {
+        let column = |what: &str| self.numbers(&format!("{name}_{what}"));
+        let three = |names: [&str; 3]| {
+            let [x, y, z] = names.map(column);
+            (0..self.len()).map(|row| Vector3::new(x[row], y[row], z[row])).collect::<Vec<_>>()
+        };
+        let [w, i, j, k] = ["qw", "qx", "qy", "qz"].map(column);
+        let (position, velocity) = (three(["x", "y", "z"]), three(["vx", "vy", "vz"]));
+        let spin = three(["wx", "wy", "wz"]);
+        let sample = |row: usize| BodySample {
+            position: position[row],
+            orientation: UnitQuaternion::new_normalize(Quaternion::new(w[row], i[row], j[row], k[row])),
+            velocity: velocity[row],
+            angular_velocity: spin[row],
+        };
+        (0..self.len()).map(sample).collect()
+    }
+}
+
+/// One entity that moves in one row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BodySample {
+    /// m
+    pub position: Vector3<f64>,
+    /// In the world.
+    pub orientation: UnitQuaternion<f64>,
+    /// m/s
+    pub velocity: Vector3<f64>,
+    /// rad/s, in the world.
+    pub angular_velocity: Vector3<f64>,
 }
 
 /// One finger in one row.

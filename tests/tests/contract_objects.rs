@@ -1,0 +1,207 @@
+//! Entities that move, through scene file, hand file and recording alone, against closed forms.
+
+use nalgebra::{UnitQuaternion, Vector3};
+use std::f64::consts::PI;
+use std::fmt::Write as _;
+use system_tests::recording::Table;
+use system_tests::workplace::Workplace;
+
+type V = Vector3<f64>;
+
+const G: f64 = 9.81;
+const DT: f64 = 1e-3;
+const MASS: f64 = 0.1;
+const EDGE: f64 = 0.05;
+
+/// A finger that touches nothing, and a hand that keeps it there for so long (s).
+fn alone(seconds: f64) -> String {
+    format!("t,f0_x,f0_y,f0_z\n0,1,1,1\n{seconds:?},1,1,1\n")
+}
+
+/// A table, leaned about z by an angle (rad), and a cube of 0.1 kg on it; `rest` belongs to the cube.
+fn cube_on_table(lean: f64, mu: f64, rest: &str) -> String {
+    let (k_table, k_cube) = (2000.0, 500.0);
+    let weight = MASS * G * lean.cos();
+    let sunk = weight / (4.0 * k_table * k_cube / (k_table + k_cube));
+    let turn = UnitQuaternion::from_axis_angle(&V::z_axis(), lean);
+    let (at, n) = (turn * V::new(0.0, EDGE / 2.0 - sunk, 0.0), turn * V::y());
+    let q = turn.quaternion();
+    format!(
+        r#"
+        [[finger]]
+        [[entity]]
+        name = "table"
+        shape = {{ kind = "plane", normal = [{:?}, {:?}, 0.0], offset_m = 0.0 }}
+        stiffness_n_per_m = {k_table:?}
+        damping_n_s_per_m = 2.0
+        friction = {{ model = "coulomb", mu = {mu:?} }}
+        [[entity]]
+        name = "cube"
+        shape = {{ kind = "box", size_m = [{EDGE}, {EDGE}, {EDGE}] }}
+        position_m = [{:?}, {:?}, 0.0]
+        orientation_wxyz = [{:?}, {:?}, {:?}, {:?}]
+        mass_kg = {MASS}
+        stiffness_n_per_m = {k_cube:?}
+        friction = {{ model = "coulomb", mu = {mu:?} }}
+        {rest}"#,
+        n.x, n.y, at.x, at.y, q.w, q.i, q.j, q.k
+    )
+}
+
+fn played(scene: &str, hand: &str) -> Table {
+    Workplace::new().play(scene, hand, &[])
+}
+
+#[test]
+fn what_is_let_go_falls_and_turns_as_newton_says_from_the_first_row_on() {
+    let scene = r#"
+        [[finger]]
+        [[entity]]
+        name = "ball"
+        shape = { kind = "sphere", radius_m = 0.02 }
+        position_m = [0.0, 0.5, 0.0]
+        velocity_m_s = [0.3, 0.0, 0.0]
+        angular_velocity_rad_s = [0.0, 2.0, 0.0]
+        mass_kg = 0.2"#;
+    let table = played(scene, &alone(0.3));
+    let ball = table.body("ball");
+    for (row, (t, ball)) in table.numbers("t").into_iter().zip(&ball).enumerate() {
+        let expected = V::new(0.3 * t, 0.5 - 0.5 * G * t * t, 0.0);
+        // Velocities are summed up over 300 ticks, positions of 0.5 m from them.
+        assert!((ball.position - expected).norm() < 1e-13, "row {row}: {ball:?}");
+        assert!((ball.velocity - V::new(0.3, -G * t, 0.0)).norm() < 1e-13, "row {row}: {ball:?}");
+        let turned = UnitQuaternion::from_axis_angle(&V::y_axis(), 2.0 * t);
+        assert!(ball.orientation.angle_to(&turned) < 1e-7, "row {row}: {ball:?}");
+        assert!((ball.angular_velocity - V::new(0.0, 2.0, 0.0)).norm() < 1e-13, "row {row}");
+    }
+}
+
+#[test]
+fn a_cube_that_is_pushed_off_slides_as_far_as_its_friction_lets_it() {
+    let (mu, v) = (0.4, 0.5);
+    let scene = cube_on_table(0.0, mu, "velocity_m_s = [0.5, 0.0, 0.0]");
+    let table = played(&scene, &alone(1.0));
+    let cube = table.body("cube");
+    let slid = cube.last().unwrap().position.x;
+    let stops_at_s = v / (mu * G);
+    // The last tick's friction stops it within that tick, and then the springs of its corners, stretched by
+    // mu m g / (4 k) = 0.25 mm, draw it back in their own time.
+    assert!((slid - v * v / (2.0 * mu * G)).abs() < 0.3e-3 + v * DT, "{slid}");
+    let rows = table.numbers("t").into_iter().zip(&cube);
+    for (t, cube) in rows.filter(|(t, _)| *t > 0.05 && *t < stops_at_s - 0.01) {
+        // It rocks on its springs at first, so that its corners carry different loads; their sum is the weight.
+        assert!((cube.velocity.x - (v - mu * G * t)).abs() < 2e-3, "at {t} s: {cube:?}");
+    }
+    // It stands.
+    assert!(cube.last().unwrap().velocity.norm() < 1e-6, "{:?}", cube.last());
+}
+
+#[test]
+fn below_the_friction_angle_a_cube_stays_and_above_it_slides_with_what_is_left() {
+    let mu: f64 = 0.5;
+    let held = played(&cube_on_table((0.95 * mu).atan(), mu, ""), &alone(10.0)).body("cube");
+    let crept = (held.last().unwrap().position - held[1000].position).norm();
+    // What the solver leaves open: 1e-10 of the forces.
+    assert!(crept < 1e-9, "{crept}");
+    let lean: f64 = 0.6;
+    let slides = played(&cube_on_table(lean, mu, ""), &alone(0.6)).body("cube");
+    let acceleration = (slides[600 - 1].velocity - slides[300].velocity).norm() / (299.0 * DT);
+    let expected = G * (lean.sin() - mu * lean.cos());
+    assert!((acceleration - expected).abs() < 1e-6 * expected, "{acceleration} {expected}");
+}
+
+/// Two fingers close on the cube, lift it by 50 mm, hold it, put it down 30 mm aside and let it go.
+fn pick_and_place(squeeze: f64) -> String {
+    let mut hand = String::from("t,f0_x,f0_y,f0_z,f1_x,f1_y,f1_z\n");
+    let smooth =
+        |t: f64, from: f64, to: f64| 0.5 - 0.5 * (PI * ((t - from) / (to - from)).clamp(0.0, 1.0)).cos();
+    for step in 0..=700 {
+        let t = f64::from(step) * 0.01;
+        let closed = smooth(t, 0.0, 1.0) - smooth(t, 6.0, 7.0);
+        let x = EDGE / 2.0 + 0.01 - (0.01 + squeeze) * closed;
+        let y = 0.025 + 0.05 * (smooth(t, 1.0, 2.5) - smooth(t, 4.0, 5.5));
+        let z = 0.03 * smooth(t, 2.5, 4.0);
+        let _ = writeln!(hand, "{t:?},{x:?},{y:?},{z:?},{:?},{y:?},{z:?}", -x);
+    }
+    hand
+}
+
+fn grasped() -> Table {
+    let scene = cube_on_table(0.0, 0.5, "").replacen("[[finger]]", "[[finger]]\n[[finger]]", 1);
+    played(&scene, &pick_and_place(0.004))
+}
+
+#[test]
+fn a_grasped_cube_is_lifted_carried_and_put_down() {
+    let table = grasped();
+    let cube = table.body("cube");
+    let at = |t: f64| cube[(t / DT) as usize];
+    // Sunk in, 0.61 mm; carried by two springs across, mg / 2k = 0.98 mm.
+    let hangs = MASS * G * (0.5 / 500.0 + 0.25 / 400.0);
+    assert!((at(3.9).position.y - (0.075 - hangs)).abs() < 1e-4, "{:?}", at(3.9));
+    assert!(
+        (at(6.9).position - V::new(0.0, 0.025 - 0.25 * MASS * G / 400.0, 0.03)).norm() < 1e-3,
+        "{:?}",
+        at(6.9)
+    );
+    assert!(at(6.9).velocity.norm() < 1e-3 && table.finger("f0")[6990].entity.is_empty());
+    for finger in ["f0", "f1"] {
+        let rows = table.finger(finger);
+        assert!(rows[1500..5000].iter().all(|s| s.entity == "cube" && s.friction == "stick"), "{finger}");
+    }
+}
+
+#[test]
+fn what_the_fingers_feel_is_what_moved_the_cube_in_every_tick() {
+    let table = grasped();
+    let (cube, f0, f1) = (table.body("cube"), table.finger("f0"), table.finger("f1"));
+    let mut in_the_air = 0;
+    for row in 2000..4000 {
+        let on_users = f0[row].force + f1[row].force;
+        let acceleration = (cube[row + 1].velocity - cube[row].velocity) / DT;
+        // The velocity of the frame's origin is that of the centre of mass. Differences of numbers near 0.05 m/s over a
+        // tick, times 0.1 kg.
+        let wanted = (V::new(0.0, -G, 0.0) - acceleration) * MASS;
+        assert!((on_users - wanted).norm() < 1e-12, "row {row}: {on_users:?}, {wanted:?}");
+        in_the_air += 1;
+    }
+    assert_eq!(in_the_air, 2000);
+    // At rest in the air: the weight, on both alike.
+    assert!((f0[3990].force.y + 0.5 * MASS * G).abs() < 0.01, "{:?}", f0[3990]);
+}
+
+#[test]
+fn a_run_with_objects_repeats_to_the_byte() {
+    let scene = cube_on_table(0.0, 0.5, "").replacen("[[finger]]", "[[finger]]\n[[finger]]", 1);
+    let bytes = || {
+        let place = Workplace::new();
+        let table = place.play(&scene, &pick_and_place(0.004), &[]);
+        table.rows().to_vec()
+    };
+    assert!(bytes() == bytes());
+}
+
+#[test]
+fn a_locked_body_never_turns_and_a_given_centre_of_mass_falls_straight() {
+    let scene = cube_on_table(0.0, 0.5, "rotation_locked = true");
+    let cube = played(&scene, &alone(0.5)).body("cube");
+    assert!(cube.iter().all(|cube| cube.orientation == UnitQuaternion::identity()));
+    // Thrown turning about z: its centre of mass, 10 mm from its middle, goes straight down.
+    let scene = r#"
+        [[finger]]
+        [[entity]]
+        name = "box"
+        shape = { kind = "box", size_m = [0.05, 0.05, 0.05] }
+        position_m = [0.0, 1.0, 0.0]
+        centre_of_mass_m = [0.01, 0.0, 0.0]
+        velocity_m_s = [0.0, -0.1, 0.0]
+        angular_velocity_rad_s = [0.0, 0.0, 10.0]
+        mass_kg = 0.1"#;
+    let table = played(scene, &alone(0.3));
+    for (t, cube) in table.numbers("t").into_iter().zip(table.body("box")) {
+        let centre = cube.position + cube.orientation * V::new(0.01, 0.0, 0.0);
+        // The frame's origin moves down at 0.1 m/s, and the centre, 10 mm aside, stands still: 10 rad/s times 10 mm.
+        let expected = V::new(0.01, 1.0 - 0.5 * G * t * t, 0.0);
+        assert!((centre - expected).norm() < 1e-12, "at {t} s: {centre:?}");
+    }
+}
