@@ -113,6 +113,11 @@ impl FastStep {
         self.objects.as_ref().map_or(&[], Objects::rows)
     }
 
+    /// What moving the entities took in the last tick.
+    pub fn made(&self) -> physics::Made {
+        self.objects.as_ref().map_or_else(Default::default, |objects| objects.made)
+    }
+
     /// With fingers whose forces do not feed energy into the hand, one for each finger; `None`: as rendered.
     #[must_use]
     pub fn with_passivities(mut self, passivities: impl IntoIterator<Item = Option<Passivity>>) -> Self {

@@ -358,6 +358,7 @@ fn the_committed_meshes_are_what_their_program_makes() {
         ("bumpy.obj", "bumpy", None, written::Format::Obj),
         ("klein.stl", "klein", None, written::Format::Stl),
         ("coarse.obj", "sphere", Some(12), written::Format::Obj),
+        ("bumpy-100k.stl", "bumpy", Some(316), written::Format::Stl),
     ];
     let meshes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/meshes");
     for (file, kind, number, format) in committed {
