@@ -8,10 +8,21 @@
 use haptics::{Form, Shape};
 use nalgebra::{Isometry3, Vector3};
 
+mod axis;
+mod ball;
 mod bounds;
+mod convex;
+mod convex_pair;
+mod facet;
+mod gjk;
+mod lines;
 pub(crate) mod mesh;
+mod overlay;
+mod ring;
+mod spots;
 
 pub use bounds::bounding_ball;
+use spots::{Spot, Spots};
 
 /// The most contact points of two entities.
 pub const MAX_POINTS: usize = 8;
@@ -125,8 +136,60 @@ pub fn contact_points(
 ) {
     match (a.shape, b.shape) {
         (Shape::Mesh(_), _) | (_, Shape::Mesh(_)) => mesh::contact_points(a, b, reach_m, memory, found),
+        (Shape::Form(form_a), Shape::Form(form_b)) => {
+            if !forms_are_collidable(form_a, form_b) {
+                return;
+            }
+            let is_swapped = rank(form_b) < rank(form_a);
+            let (first, second) = if is_swapped { (b, a) } else { (a, b) };
+            let (form_a, form_b) = if is_swapped { (form_b, form_a) } else { (form_a, form_b) };
+            let X_BA = second.X_W.inv_mul(first.X_W);
+            let spots = match (form_a, form_b) {
+                (Form::Sphere(sphere), _) => {
+                    let radius_m = sphere.radius_m();
+                    if let Form::Torus(torus) = form_b {
+                        // As a ring on the ball: it may lie in the hole.
+                        let spots = ring::contact(torus, &X_BA.inverse(), form_a, reach_m, memory);
+                        spots.report(first.X_W, !is_swapped, found);
+                        return;
+                    }
+                    let centre = X_BA.translation.vector;
+                    Some(single(&ball::on_form(form_b, &centre, radius_m), &centre, radius_m, reach_m))
+                }
+                (Form::Torus(torus), _) => Some(ring::contact(torus, &X_BA, form_b, reach_m, memory)),
+                (_, Form::Plane(plane)) => convex_pair::on_plane(form_a, &X_BA, plane, reach_m, memory),
+                _ => convex_pair::contact(form_a, &X_BA, form_b, reach_m, memory),
+            };
+            if let Some(spots) = spots {
+                spots.report(second.X_W, is_swapped, found);
+            }
+        }
+        (Shape::Form(Form::Sphere(sphere)), surface) => {
+            let centre = b.X_W.inv_mul(a.X_W).translation.vector;
+            if let Some(touch) = ball::on_surface(surface, &centre, sphere.radius_m()) {
+                single(&touch, &centre, sphere.radius_m(), reach_m).report(b.X_W, false, found);
+            }
+        }
         _ => {}
     }
+}
+
+/// Which of two forms is looked at as A: balls on anything, rings on anything else.
+fn rank(form: &Form) -> u32 {
+    match form {
+        Form::Sphere(_) => 0,
+        Form::Torus(_) => 1,
+        Form::Plane(_) => 3,
+        _ => 2,
+    }
+}
+
+/// The one contact point of a ball.
+fn single(touch: &ball::Touch, centre: &Vector3<f64>, radius_m: f64, reach_m: f64) -> Spots {
+    let mut spots = Spots::within(reach_m);
+    let on_a = centre - touch.normal * radius_m;
+    spots.push(Spot { id: 0, on_a, normal: touch.normal, gap_m: touch.gap_m });
+    spots
 }
 
 fn forms_are_collidable(a: &Form, b: &Form) -> bool {
