@@ -39,7 +39,7 @@ pub use anchor::Anchor;
 pub use body::Body;
 pub use error::BodyError;
 pub use integrator::Integrator;
-pub use manipulation::{Made, Manipulation, Settings};
+pub use manipulation::{Made, Manipulation, Parked, Reason, Settings};
 pub use mass::MassProperties;
 pub use pair::{Response, Surfacing};
 pub use pair_friction::PairFriction;
