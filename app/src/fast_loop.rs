@@ -77,6 +77,24 @@ pub struct Tally {
     pub peak_force_n: f64,
     /// The largest force any device was made to render (N).
     pub peak_applied_n: f64,
+    /// Entities that left the world, or were lost, and stand still since.
+    pub parked: u64,
+    /// The first of them, and in which tick of the run.
+    pub parked_first: [Option<(physics::Parked, u64)>; TOLD],
+}
+
+/// How many parked entities are told by name.
+pub const TOLD: usize = 4;
+
+impl Tally {
+    fn park(&mut self, parked: &[physics::Parked], run_tick: u64) {
+        for parked in parked {
+            if let Some(place) = self.parked_first.get_mut(self.parked as usize) {
+                *place = Some((*parked, run_tick));
+            }
+            self.parked += 1;
+        }
+    }
 }
 
 impl FastLoop {
@@ -156,6 +174,7 @@ impl FastLoop {
         }
         self.place_in_time();
         self.row.run_tick = self.run_ticks();
+        self.tally.park(self.step.parked_now(), self.row.run_tick);
         self.next_tick = self.row.run_tick + 1;
         if self.row.run_tick < self.total_ticks {
             self.pending = Some((self.frame.tick, self.row));

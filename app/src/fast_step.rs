@@ -113,6 +113,11 @@ impl FastStep {
         self.objects.as_ref().map_or(&[], Objects::rows)
     }
 
+    /// The entities that were parked in the last tick, because they left the world or were lost.
+    pub fn parked_now(&self) -> &[physics::Parked] {
+        self.objects.as_ref().map_or(&[], Objects::parked_now)
+    }
+
     /// What moving the entities took in the last tick.
     pub fn made(&self) -> physics::Made {
         self.objects.as_ref().map_or_else(Default::default, |objects| objects.made)

@@ -25,6 +25,8 @@ pub struct Report {
     pub timing: Option<Timing>,
     /// What was obtained: the driver's words, and the fast thread's.
     pub guarantees: Option<(String, SetupReport)>,
+    /// What became of entities that stand still since, a line each.
+    pub parked: Vec<String>,
     /// Where the recording lies, and its rows.
     pub recording: Option<(PathBuf, u64)>,
 }
@@ -111,6 +113,9 @@ impl fmt::Display for Report {
             "peak force   {:.3} N computed, {:.3} N rendered",
             tally.peak_force_n, tally.peak_applied_n
         )?;
+        for line in &self.parked {
+            writeln!(f, "parked       {line}")?;
+        }
         if let Some((driver, fast)) = &self.guarantees {
             if !driver.trim().is_empty() {
                 writeln!(f, "guarantees of the driver's loop")?;

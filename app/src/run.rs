@@ -1,7 +1,7 @@
 //! A scripted run from start to report.
 
 use crate::child::DriverChild;
-use crate::fast_loop::{FastLoop, WhenFull};
+use crate::fast_loop::{FastLoop, Tally, WhenFull};
 use crate::not_zeroed;
 use crate::outcome::{RunFailure, Stop};
 use crate::progress::Progress;
@@ -13,6 +13,7 @@ use crate::slow::SlowSide;
 use crate::two_processes::{self, Source};
 use crate::virtual_clock::VirtualDriver;
 use io_driver::device::Extras;
+use physics::Reason;
 use rt_core::signals::StopSignals;
 use shm_abi::client;
 use shm_abi::segment::{ClockMode, DriverInfo};
@@ -104,6 +105,7 @@ fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Repo
         counters: io_driver::status::CounterStatus::of(driver.view()),
         timing: None,
         guarantees: None,
+        parked: parked(&fast.tally, rig),
         recording: plan.record.clone().zip(rows),
     };
     Ok((report, stop))
@@ -133,9 +135,33 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
         counters: baseline.counters(&end.driver),
         timing: is_real.then(|| baseline.timing(&end.driver, &end.step_ns)),
         guarantees: is_real.then_some((info.setup_report, end.fast_report)),
+        parked: parked(&end.tally, rig),
         recording: plan.record.clone().zip(rows),
     };
     Ok((report, end.stop))
+}
+
+/// What is told of entities that were parked.
+fn parked(tally: &Tally, rig: &Rig) -> Vec<String> {
+    let mut lines: Vec<String> = tally
+        .parked_first
+        .iter()
+        .flatten()
+        .map(|(parked, tick)| {
+            let name = rig.scene.entities.get(parked.entity).map_or("?", |entity| entity.name.as_str());
+            let why = match parked.why {
+                Reason::LeftTheWorld => "left the world",
+                Reason::NotANumber => "was lost to a number that is none",
+            };
+            let t_s = *tick as f64 * rig.period_ns as f64 / 1e9;
+            format!("{name} {why} at t = {t_s} s and stands still since")
+        })
+        .collect();
+    let untold = tally.parked.saturating_sub(lines.len() as u64);
+    if untold > 0 {
+        lines.push(format!("and {untold} more"));
+    }
+    lines
 }
 
 /// Closes the recording whatever happened; a failure of the run comes before one of the recording.

@@ -205,3 +205,20 @@ fn a_locked_body_never_turns_and_a_given_centre_of_mass_falls_straight() {
         assert!((centre - expected).norm() < 1e-12, "at {t} s: {centre:?}");
     }
 }
+
+#[test]
+fn what_leaves_the_world_is_told_by_name_and_stands_still() {
+    let place = Workplace::new();
+    place.write(
+        "scene.toml",
+        "[[finger]]\n[[entity]]\nname = \"rocket\"\nshape = { kind = \"sphere\", radius_m = 0.02 }\n\
+         position_m = [0, 95, 0]\nvelocity_m_s = [0, 20, 0]\nmass_kg = 1\n",
+    );
+    let said = place.run(["run", "scene.toml", "--clock", "virtual", "--headless", "--record", "out.csv"]);
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    // 95 + 20 t - g t^2 / 2 = 100 m.
+    assert!(said.out.contains("parked       rocket left the world at t = 0.26"), "{}", said.out);
+    let rocket = Table::read(&place.path("out.csv")).body("rocket");
+    let last = rocket.last().unwrap();
+    assert!((last.position.y - 100.0).abs() < 0.05 && last.velocity == V::zeros(), "{last:?}");
+}

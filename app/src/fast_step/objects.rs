@@ -49,6 +49,12 @@ impl Objects {
         &self.rows
     }
 
+    /// Those that were parked in the last tick.
+    pub fn parked_now(&self) -> &[physics::Parked] {
+        let parked = self.manipulation.parked();
+        &parked[parked.len().saturating_sub(self.made.parked)..]
+    }
+
     /// Takes note of how the bodies are.
     pub fn note(&mut self) {
         for (row, body) in self.rows.iter_mut().zip(self.manipulation.bodies()) {

@@ -38,7 +38,9 @@ impl Rig {
             gravity_W: self.scene.gravity_m_s2,
             integrator: match dynamics.integrator {
                 IntegratorSpec::Implicit => Integrator::Implicit,
-                IntegratorSpec::Rk4 | IntegratorSpec::ThesisEuler => Integrator::Implicit,
+                IntegratorSpec::Rk4 => Integrator::Rk4,
+                IntegratorSpec::ThesisEuler => Integrator::ThesisEuler,
+                IntegratorSpec::ThesisEulerGyroscopic => Integrator::ThesisEulerGyroscopic,
             },
             response: match dynamics.response {
                 ResponseSpec::Force => Response::Force,

@@ -21,8 +21,10 @@ pub enum IntegratorSpec {
     Implicit,
     /// Runge and Kutta's of the fourth order; to compare with.
     Rk4,
-    /// As the thesis has it; to compare with.
+    /// As the thesis has it, without the gyroscopic term; to compare with.
     ThesisEuler,
+    /// The same with the gyroscopic term.
+    ThesisEulerGyroscopic,
 }
 
 /// How contacts between entities answer.
@@ -45,6 +47,7 @@ impl DynamicsSpec {
             Some(value) => match value.choose("integrator", &INTEGRATORS)? {
                 "rk4" => IntegratorSpec::Rk4,
                 "thesis-euler" => IntegratorSpec::ThesisEuler,
+                "thesis-euler-gyroscopic" => IntegratorSpec::ThesisEulerGyroscopic,
                 _ => IntegratorSpec::Implicit,
             },
         };
@@ -72,4 +75,5 @@ impl ResponseSpec {
 const ALLOWED: &str = "a table such as { kind = \"impulse\", restitution = 0.5 } or { kind = \"force\" }";
 const KEYS: Vocabulary = Vocabulary { available: &["kind", "restitution"], later: &[] };
 const RESPONSES: Vocabulary = Vocabulary { available: &["force", "impulse"], later: &[] };
-const INTEGRATORS: Vocabulary = Vocabulary { available: &["implicit", "rk4", "thesis-euler"], later: &[] };
+const INTEGRATORS: Vocabulary =
+    Vocabulary { available: &["implicit", "rk4", "thesis-euler", "thesis-euler-gyroscopic"], later: &[] };

@@ -21,10 +21,9 @@ pub(super) struct Touch {
 pub(super) fn on_form(form: &Form, centre: &Vector3<f64>, radius_m: f64) -> Touch {
     match form {
         Form::Plane(plane) => on_plane(plane, centre, radius_m),
-        Form::Sphere(_) | Form::Capsule(_) | Form::Torus(_) => Touch {
-            normal: form.nearest(centre).normal_B,
-            gap_m: form.signed_distance(centre) - radius_m,
-        },
+        Form::Sphere(_) | Form::Capsule(_) | Form::Torus(_) => {
+            Touch { normal: form.nearest(centre).normal_B, gap_m: form.signed_distance(centre) - radius_m }
+        }
         // Sharp forms know their distance where they are round.
         Form::Cuboid(_) | Form::Cylinder(_) | Form::Cone(_) => {
             let round = form.grown(radius_m).unwrap_or(*form);
@@ -42,12 +41,9 @@ pub(super) fn on_surface(shape: &Shape, centre: &Vector3<f64>, radius_m: f64) ->
         from_nearest(&surface.nearest(centre), surface.signed_distance(centre), centre, radius_m)
     };
     match shape {
-        Shape::Own(own) => Some(from_nearest(
-            &own.nearest(centre),
-            own.signed_distance(centre),
-            centre,
-            radius_m,
-        )),
+        Shape::Own(own) => {
+            Some(from_nearest(&own.nearest(centre), own.signed_distance(centre), centre, radius_m))
+        }
         Shape::Nurbs(nurbs) => Some(touch(&nurbs.surface(0.0))),
         _ => None,
     }
