@@ -23,6 +23,7 @@ use rt_core::alloc_guard::{self, CountingAllocator};
 use shm_abi::doorbell::WaitMode;
 use shm_abi::segment::{ClockMode, DeviceInfo};
 use shm_abi::{Command, CommanderMemory, CommanderView, DriverMemory, DriverState, DriverView, FaultReason};
+use std::fmt::Write as _;
 use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -289,6 +290,52 @@ impl Device for Breaking {
 fn the_applications_turn_never_calls_the_heap_while_fingers_touch_hold_and_slide() {
     play_scene(&config_file("scenes/default.toml"), 2, TICKS / 100);
 }
+
+/// Two fingers squeeze a cube on the floor, drag it, pull off it sideways, and let go; a ball bounces and leaves the world.
+#[test]
+fn the_applications_turn_never_calls_the_heap_while_objects_move() {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(directory.path().join("scene.toml"), OBJECTS).unwrap();
+    let mut hand = String::from("t,f0_x,f0_y,f0_z,f1_x,f1_y,f1_z\n");
+    for step in 0..=100 {
+        let phase = f64::from(step % 20) / 20.0;
+        let closed = if phase < 0.8 { 0.021 } else { 0.04 };
+        // Up slowly, then off over the cube's sides, faster than it can follow.
+        let y = 0.025 + 0.05 * phase * phase;
+        let _ = writeln!(
+            hand,
+            "{:?},{closed},{y:?},0,-{closed},{:?},{:?}",
+            f64::from(step) * 0.1,
+            y,
+            0.02 * phase
+        );
+    }
+    std::fs::write(directory.path().join("hand.csv"), hand).unwrap();
+    play_scene(&directory.path().join("scene.toml"), 2, TICKS / 400);
+}
+
+const OBJECTS: &str = r#"
+hand = "hand.csv"
+[[finger]]
+[[finger]]
+[[entity]]
+name = "floor"
+shape = { kind = "plane", normal = [0, 1, 0], offset_m = 0 }
+friction = { model = "coulomb", mu = 0.5 }
+[[entity]]
+name = "cube"
+shape = { kind = "box", size_m = [0.05, 0.05, 0.05] }
+position_m = [0, 0.025, 0]
+mass_kg = 0.1
+stiffness_n_per_m = 500
+friction = { model = "stiction", mu_s = 0.4, mu_d = 0.2 }
+[[entity]]
+name = "ball"
+shape = { kind = "sphere", radius_m = 0.02 }
+position_m = [0.3, 0.3, 0]
+velocity_m_s = [0, 0, 20]
+mass_kg = 0.1
+"#;
 
 /// Three fingers over meshes, patches, solids and raised boxes, with fields, guides, magnets, vibration and passivity.
 #[test]
