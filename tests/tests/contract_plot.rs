@@ -46,6 +46,25 @@ fn a_recording_and_another_one_become_a_picture_per_entity() {
 }
 
 #[test]
+fn what_moves_is_drawn_with_its_way_and_its_turn() {
+    let place = Workplace::new();
+    place.write("drop.toml", "[[finger]]\n[[entity]]\nname = \"ball\"\nshape = { kind = \"sphere\", radius_m = 0.02 }\nmass_kg = 1\n");
+    let said =
+        place.run(["run", "drop.toml", "--clock", "virtual", "--seconds", "0.1", "--record", "drop.csv"]);
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    let said = place.run(["plot", "drop.csv", "--objects", "--svg-only"]);
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    let svg = std::fs::read_to_string(place.path("drop.svg")).expect("a picture").replace('\n', "");
+    for word in ["ball", ">y<", "moved (mm)", "turned (deg)", "time (s)"] {
+        assert!(svg.contains(word), "no {word} in {svg}");
+    }
+    recorded(&place, "rough", 0.5);
+    let said = place.run(["plot", "rough.csv", "--objects"]);
+    assert_eq!(said.status, Some(2));
+    assert!(said.err.contains("nothing moves in this recording"), "{}", said.err);
+}
+
+#[test]
 fn what_cannot_be_drawn_is_told_with_the_file_and_what_there_is() {
     let place = Workplace::new();
     recorded(&place, "rough", 0.5);

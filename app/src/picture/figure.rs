@@ -1,6 +1,6 @@
 //! Forces as figures.
 
-use super::recorded::{Recorded, RecordedFinger};
+use super::recorded::{Recorded, RecordedBody, RecordedFinger};
 use super::visit::Visit;
 use nalgebra::Vector3;
 use plot::{Axis, Chart, Figure, Look, Series};
@@ -17,17 +17,59 @@ pub(super) fn of_run(
     let panel = |finger: &RecordedFinger| {
         let chart =
             Chart::new(&finger.name, Axis::linear("time", "s"), Axis::linear("force on the user", "N"));
-        let chart = with_forces(chart, &recorded.times_s, &finger.forces, Look::Line, "");
+        let chart = with_components(chart, &recorded.times_s, &finger.forces, Look::Line, "");
         let Some((other, others)) = against else { return chart };
         match others.iter().find(|other| other.name == finger.name) {
             Some(finger) => {
                 let label = format!(", {}", other.label());
-                with_forces(chart, &other.times_s, &finger.forces, Look::Dashed, &label)
+                with_components(chart, &other.times_s, &finger.forces, Look::Dashed, &label)
             }
             None => chart,
         }
     };
     Figure::new("What the fingers felt", fingers.iter().map(panel).collect())
+}
+
+/// How far each entity that moves went and turned since the first row, along the time.
+pub(super) fn of_objects(
+    recorded: &Recorded,
+    bodies: &[RecordedBody],
+    against: Option<(&Recorded, &[RecordedBody])>,
+) -> Figure {
+    let panels = |body: &RecordedBody| {
+        let chart =
+            |quantity, unit| Chart::new(&body.name, Axis::linear("time", "s"), Axis::linear(quantity, unit));
+        let mut panels = [chart("moved", "mm"), chart("turned", "deg")];
+        panels = with_motion(panels, &recorded.times_s, body, Look::Line, "");
+        let Some((other, others)) = against else { return panels };
+        match others.iter().find(|other| other.name == body.name) {
+            Some(body) => {
+                let label = format!(", {}", other.label());
+                with_motion(panels, &other.times_s, body, Look::Dashed, &label)
+            }
+            None => panels,
+        }
+    };
+    Figure::new("How objects moved", bodies.iter().flat_map(panels).collect())
+}
+
+fn with_motion(
+    [moved, turned]: [Chart; 2],
+    times_s: &[f64],
+    body: &RecordedBody,
+    look: Look,
+    suffix: &str,
+) -> [Chart; 2] {
+    let first = body.positions.first().copied().unwrap_or_default();
+    let way_mm: Vec<_> = body.positions.iter().map(|at| (at - first) * 1e3).collect();
+    let from = body.orientations.first().copied().unwrap_or_default();
+    let angles_deg = body.orientations.iter().map(|at| from.angle_to(at).to_degrees());
+    let angles_deg: Vec<_> = times_s.iter().copied().zip(angles_deg).collect();
+    let label = if suffix.is_empty() { "" } else { &suffix[2..] };
+    [
+        with_components(moved, times_s, &way_mm, look, suffix),
+        turned.with(Series::new(label, look, thinned(&angles_deg))),
+    ]
 }
 
 /// What a finger felt on its way over an entity, and on the same way in another recording.
@@ -37,18 +79,18 @@ pub(super) fn of_entity(visit: &Visit, against: Option<(&str, &Visit)>) -> Figur
     let millimetres = |visit: &Visit| visit.way_m.iter().map(|way_m| way_m * 1e3).collect::<Vec<_>>();
     let chart = match against {
         Some((label, other)) => {
-            with_forces(chart, &millimetres(other), &other.forces, Look::Dashed, &format!(", {label}"))
+            with_components(chart, &millimetres(other), &other.forces, Look::Dashed, &format!(", {label}"))
         }
         None => chart,
     };
     let figure = |chart| Figure::new(&visit.entity, vec![chart]);
-    figure(with_forces(chart, &millimetres(visit), &visit.forces, Look::Line, ""))
+    figure(with_components(chart, &millimetres(visit), &visit.forces, Look::Line, ""))
 }
 
 /// Components that never differ from zero are left out.
-fn with_forces(chart: Chart, xs: &[f64], forces: &[Vector3<f64>], look: Look, suffix: &str) -> Chart {
+fn with_components(chart: Chart, xs: &[f64], vectors: &[Vector3<f64>], look: Look, suffix: &str) -> Chart {
     ["x", "y", "z"].into_iter().enumerate().fold(chart, |chart, (axis, name)| {
-        let felt: Vec<_> = xs.iter().zip(forces).map(|(x, force)| (*x, force[axis])).collect();
+        let felt: Vec<_> = xs.iter().zip(vectors).map(|(x, force)| (*x, force[axis])).collect();
         if felt.iter().all(|(_, force)| *force == 0.0) {
             return chart;
         }

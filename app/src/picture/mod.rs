@@ -1,7 +1,8 @@
 //! `phantom3 plot`: a recording as a picture of what the fingers felt.
 //!
 //! Model: the force on the user along the time, or, with `--by-entity`, along the way that the finger went on each
-//! entity, one picture per entity: this is where two ways to render the same thing are compared (`--against`).
+//! entity, one picture per entity: this is where two ways to render the same thing are compared (`--against`). With
+//! `--objects`, how far what moves went and turned.
 
 mod figure;
 mod recorded;
@@ -9,7 +10,7 @@ mod visit;
 
 use crate::outcome::{RunFailure, Stop};
 use clap::Args;
-use figure::{of_entity, of_run};
+use figure::{of_entity, of_objects, of_run};
 use plot::{Figure, PlotError};
 use recorded::{Recorded, RecordedFinger};
 use std::io::Write;
@@ -36,6 +37,9 @@ pub struct PlotArgs {
     /// A picture for each entity, along the way that the finger went on it
     #[arg(long)]
     by_entity: bool,
+    /// How far the objects moved and turned, instead of what the fingers felt
+    #[arg(long, conflicts_with_all = ["by_entity", "finger"])]
+    objects: bool,
     /// Pictures for the web alone, without PNG
     #[arg(long)]
     svg_only: bool,
@@ -59,6 +63,11 @@ pub fn execute(args: &PlotArgs) -> Result<Stop, RunFailure> {
     let against = args.against.as_deref().map(read).transpose()?;
     let out = args.out.clone().unwrap_or_else(|| args.recording.with_extension(""));
     let finger = |recorded: &Recorded| recorded.choose(args.finger.as_deref()).map_err(|error| wrong(&error));
+    if args.objects {
+        let others = against.as_ref().map(|against| (against, &*against.bodies));
+        let bodies = recorded.moving().map_err(|error| wrong(&error))?;
+        return write(&of_objects(&recorded, bodies, others), &out, args.svg_only);
+    }
     if !args.by_entity {
         let fingers = finger(&recorded)?;
         let others = against.as_ref().map(finger).transpose()?.unwrap_or_default();

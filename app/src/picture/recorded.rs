@@ -3,7 +3,7 @@
 //! Columns are found by their names, so that a recording may have more of them than this version knows.
 
 use csv::StringRecord;
-use nalgebra::Vector3;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -14,6 +14,7 @@ pub(super) struct Recorded {
     /// Of each row (s).
     pub(super) times_s: Vec<f64>,
     pub(super) fingers: Vec<RecordedFinger>,
+    pub(super) bodies: Vec<RecordedBody>,
 }
 
 /// What it says of a finger, row by row; world frame, SI.
@@ -25,6 +26,14 @@ pub(super) struct RecordedFinger {
     pub(super) forces: Vec<Vector3<f64>>,
     /// What it touches; empty in free space.
     pub(super) entities: Vec<String>,
+}
+
+/// What it says of an entity that moves, row by row; world frame, SI.
+#[derive(Debug, Clone, Default)]
+pub(super) struct RecordedBody {
+    pub(super) name: String,
+    pub(super) positions: Vec<Vector3<f64>>,
+    pub(super) orientations: Vec<UnitQuaternion<f64>>,
 }
 
 /// Why a file is no recording, or not the one that is asked for.
@@ -40,6 +49,8 @@ pub(super) enum RecordedError {
     NothingThere { file: PathBuf, from_s: f64, to_s: f64, first_s: f64, last_s: f64 },
     #[error("{file}: no finger {name:?}; there are: {known}")]
     NoFinger { file: PathBuf, name: String, known: String },
+    #[error("{file}: nothing moves in this recording; leave --objects out")]
+    NoBody { file: PathBuf },
 }
 
 /// Where a finger's numbers stand in a row.
@@ -66,6 +77,12 @@ impl Recorded {
         let mut fingers: Vec<_> =
             names.iter().map(|name| RecordedFinger { name: (*name).into(), ..Default::default() }).collect();
         let columns: Vec<_> = names.iter().map(|name| Columns::of(name, &at)).collect::<Result<_, _>>()?;
+        let moving: Vec<_> = header.iter().filter_map(|column| column.strip_suffix("_qw")).collect();
+        // Fingers' devices may tell how they are turned, too.
+        let moving: Vec<_> = moving.into_iter().filter(|name| !names.contains(name)).collect();
+        let mut bodies: Vec<_> =
+            moving.iter().map(|name| RecordedBody { name: (*name).into(), ..Default::default() }).collect();
+        let places: Vec<_> = moving.iter().map(|name| places(name, &at)).collect::<Result<_, _>>()?;
         let mut times_s = Vec::new();
         for row in reader.records() {
             let row = Row { file, header: &header, row: row.map_err(unreadable)? };
@@ -75,8 +92,14 @@ impl Recorded {
                 finger.forces.push(row.vector(columns.force)?);
                 finger.entities.push(row.row[columns.entity].into());
             }
+            for (body, [x, y, z, qw, qx, qy, qz]) in bodies.iter_mut().zip(&places) {
+                body.positions.push(row.vector([*x, *y, *z])?);
+                let imaginary = row.vector([*qx, *qy, *qz])?;
+                let turned = Quaternion::from_parts(row.number(*qw)?, imaginary);
+                body.orientations.push(UnitQuaternion::new_normalize(turned));
+            }
         }
-        Ok(Self { file: file.into(), times_s, fingers })
+        Ok(Self { file: file.into(), times_s, fingers, bodies })
     }
 
     /// What a legend calls it: the file's name without folders and ending.
@@ -99,7 +122,21 @@ impl Recorded {
             entities: kept(&finger.entities, &is_kept),
         };
         let fingers = self.fingers.iter().map(finger).collect();
-        Ok(Self { times_s: kept(&self.times_s, &is_kept), fingers, file: self.file })
+        let body = |body: &RecordedBody| RecordedBody {
+            name: body.name.clone(),
+            positions: kept(&body.positions, &is_kept),
+            orientations: kept(&body.orientations, &is_kept),
+        };
+        let bodies = self.bodies.iter().map(body).collect();
+        Ok(Self { times_s: kept(&self.times_s, &is_kept), fingers, bodies, file: self.file })
+    }
+
+    /// The entities that move.
+    pub(super) fn moving(&self) -> Result<&[RecordedBody], RecordedError> {
+        if self.bodies.is_empty() {
+            return Err(RecordedError::NoBody { file: self.file.clone() });
+        }
+        Ok(&self.bodies)
     }
 
     /// The finger of this name; without one, all.
@@ -120,6 +157,18 @@ impl Recorded {
             known: known.join(", "),
         })
     }
+}
+
+/// Where an entity's numbers stand in a row: where it is, and how it is turned.
+fn places(
+    body: &str,
+    at: &impl Fn(&str) -> Result<usize, RecordedError>,
+) -> Result<[usize; 7], RecordedError> {
+    let mut places = [0; 7];
+    for (place, quantity) in places.iter_mut().zip(["x", "y", "z", "qw", "qx", "qy", "qz"]) {
+        *place = at(&format!("{body}_{quantity}"))?;
+    }
+    Ok(places)
 }
 
 fn kept<T: Clone>(all: &[T], is_kept: &[bool]) -> Vec<T> {
