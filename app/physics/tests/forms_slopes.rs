@@ -200,6 +200,6 @@ fn a_bar_lies_across_the_edges_of_two_others() {
         assert!((world.body().centre_W.y - top - 0.005).abs() < 1e-4, "{bar:?} {:?}", world.body());
         let loads: Vec<f64> = world.manipulation.rows().iter().map(|row| row.force_W.y).collect();
         assert!((loads.iter().sum::<f64>() - MASS * G).abs() < 1e-6, "{bar:?} {loads:?}");
-        assert!(world.body().velocity_W.norm() < 1e-9, "{bar:?}");
+        assert!(world.body().velocity_W.norm() < 1e-9, "{bar:?} {:?}", world.body());
     }
 }
