@@ -136,33 +136,12 @@ pub fn contact_points(
 ) {
     match (a.shape, b.shape) {
         (Shape::Mesh(_), _) | (_, Shape::Mesh(_)) => mesh::contact_points(a, b, reach_m, memory, found),
-        (Shape::Form(form_a), Shape::Form(form_b)) => {
-            if !forms_are_collidable(form_a, form_b) {
-                return;
-            }
+        (Shape::Form(form_a), Shape::Form(form_b)) if forms_are_collidable(form_a, form_b) => {
             let is_swapped = rank(form_b) < rank(form_a);
-            let (first, second) = if is_swapped { (b, a) } else { (a, b) };
+            let (X_WA, X_WB) = if is_swapped { (b.X_W, a.X_W) } else { (a.X_W, b.X_W) };
             let (form_a, form_b) = if is_swapped { (form_b, form_a) } else { (form_a, form_b) };
-            let X_BA = second.X_W.inv_mul(first.X_W);
-            let spots = match (form_a, form_b) {
-                (Form::Sphere(sphere), _) => {
-                    let radius_m = sphere.radius_m();
-                    if let Form::Torus(torus) = form_b {
-                        // As a ring on the ball: it may lie in the hole.
-                        let spots = ring::contact(torus, &X_BA.inverse(), form_a, reach_m, memory);
-                        spots.report(first.X_W, !is_swapped, found);
-                        return;
-                    }
-                    let centre = X_BA.translation.vector;
-                    Some(single(&ball::on_form(form_b, &centre, radius_m), &centre, radius_m, reach_m))
-                }
-                (Form::Torus(torus), _) => Some(ring::contact(torus, &X_BA, form_b, reach_m, memory)),
-                (_, Form::Plane(plane)) => convex_pair::on_plane(form_a, &X_BA, plane, reach_m, memory),
-                _ => convex_pair::contact(form_a, &X_BA, form_b, reach_m, memory),
-            };
-            if let Some(spots) = spots {
-                spots.report(second.X_W, is_swapped, found);
-            }
+            let spots = of_forms(form_a, &X_WB.inv_mul(X_WA), form_b, reach_m, memory);
+            spots.report(X_WB, is_swapped, found);
         }
         (Shape::Form(Form::Sphere(sphere)), surface) => {
             let centre = b.X_W.inv_mul(a.X_W).translation.vector;
@@ -174,11 +153,31 @@ pub fn contact_points(
     }
 }
 
-/// Which of two forms is looked at as A: balls on anything, rings on anything else.
+/// In the frame of B, which does not rank before A.
+fn of_forms(
+    a: &Form,
+    X_BA: &Isometry3<f64>,
+    b: &Form,
+    reach_m: f64,
+    memory: &mut PairMemory,
+) -> Spots {
+    match (a, b) {
+        (Form::Torus(torus), _) => ring::contact(torus, X_BA, b, reach_m, memory),
+        // Of a convex one the nearest point is better found by what suits all convex ones.
+        (Form::Sphere(sphere), _) if !matches!(b, Form::Scaled(_)) || is_scaled_torus(b) => {
+            let (centre, radius_m) = (X_BA.translation.vector, sphere.radius_m());
+            single(&ball::on_form(b, &centre, radius_m), &centre, radius_m, reach_m)
+        }
+        (_, Form::Plane(plane)) => convex_pair::on_plane(a, X_BA, plane, reach_m, memory),
+        _ => convex_pair::contact(a, X_BA, b, reach_m, memory),
+    }
+}
+
+/// Which of two forms is looked at as A: rings on anything (a ball may lie in the hole), balls on anything else.
 fn rank(form: &Form) -> u32 {
     match form {
-        Form::Sphere(_) => 0,
-        Form::Torus(_) => 1,
+        Form::Torus(_) => 0,
+        Form::Sphere(_) => 1,
         Form::Plane(_) => 3,
         _ => 2,
     }

@@ -20,24 +20,25 @@ use super::spots::{Spot, Spots};
 const LOOKS_ALONG: f64 = 5e-9;
 const SINGLE_ID: u32 = 1;
 
-/// `None` if either is no convex form.
+/// nothing if either is no convex form.
 pub(super) fn contact(
     a: &Form,
     X_BA: &Isometry3<f64>,
     b: &Form,
     reach_m: f64,
     memory: &mut PairMemory,
-) -> Option<Spots> {
-    let (a, b) = (Convex::of(a, X_BA)?, Convex::of(b, &Isometry3::identity())?);
+) -> Spots {
+    let mut spots = Spots::within(reach_m);
+    let placed = (Convex::of(a, X_BA), Convex::of(b, &Isometry3::identity()));
+    let (Some(a), Some(b)) = placed else { return spots };
     let [x, y, z, is_known, ..] = memory.words;
     let last = (is_known == 1.0).then(|| Vector3::new(x, y, z));
     let found = axis::find(&a, &b, last);
     let n = found.normal;
     memory.words[..4].copy_from_slice(&[n.x, n.y, n.z, 1.0]);
-    let mut spots = Spots::within(reach_m);
     let gap_m = found.gap_m - a.radius_m - b.radius_m;
     if gap_m > reach_m {
-        return Some(spots);
+        return spots;
     }
     let facets = [Facet::of(&a, &-n), Facet::of(&b, &n)];
     let looks_along = |facet: &Facet| match facet {
@@ -51,30 +52,32 @@ pub(super) fn contact(
         Overlay { sides, normal, angles: &mut memory.words[4..6], spots: &mut spots }.find();
     }
     if !spots.is_empty() {
-        return Some(spots);
+        return spots;
     }
     let on_a = found.on_a - n * a.radius_m;
     match [Facet::edge_of(&a, &-n), Facet::edge_of(&b, &n)] {
         [Facet::Line(line_a), Facet::Line(line_b)] if exact.is_none() => {
             let radii_m = [a.radius_m, b.radius_m];
-            Alongside { lines: [line_a, line_b], radii_m, normal: n, gap_m, on_a }.find(&mut spots);
+            Alongside { lines: [line_a, line_b], radii_m, normal: n, gap_m, on_a }
+                .sharpened()
+                .find(&mut spots);
         }
         _ => spots.push(Spot { id: SINGLE_ID, on_a, normal: n, gap_m }),
     }
-    Some(spots)
+    spots
 }
 
-/// On a half-space, whose frame is B; `None` if A is no convex form.
+/// On a half-space, whose frame is B; nothing if A is no convex form.
 pub(super) fn on_plane(
     a: &Form,
     X_BA: &Isometry3<f64>,
     plane: &haptics::Plane,
     reach_m: f64,
     memory: &mut PairMemory,
-) -> Option<Spots> {
-    let a = Convex::of(a, X_BA)?;
-    let normal = plane.normal_B();
+) -> Spots {
     let mut spots = Spots::within(reach_m);
+    let Some(a) = Convex::of(a, X_BA) else { return spots };
+    let normal = plane.normal_B();
     let ground = Plate::endless(normal * plane.offset_m(), normal);
     if let super::convex::Core::Box { half_m } = a.core {
         for number in 0..8_u32 {
@@ -83,12 +86,12 @@ pub(super) fn on_plane(
             let on_a = a.placed_point(&corner);
             spots.push(Spot { id: number, on_a, normal, gap_m: normal.dot(&on_a) - plane.offset_m() });
         }
-        return Some(spots);
+        return spots;
     }
     let sides = [
         Side { facet: Facet::of(&a, &-normal), radius_m: a.radius_m },
         Side { facet: Facet::Plate(ground), radius_m: 0.0 },
     ];
     Overlay { sides, normal, angles: &mut memory.words[4..6], spots: &mut spots }.find();
-    Some(spots)
+    spots
 }

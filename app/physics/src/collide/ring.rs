@@ -23,7 +23,7 @@ const SLOTS: usize = 4;
 /// Into how many pieces the ring is cut.
 const PIECES: usize = 24;
 /// Bound on the search for a place.
-const ROUNDS: usize = 12;
+const ROUNDS: usize = 24;
 /// Rising by less per turn (shares of the ring's radius), the ring lies flat.
 const FLAT: f64 = 1e-4;
 const QUARTER_IDS: u32 = 8;
@@ -240,24 +240,31 @@ impl Ring<'_> {
         }
     }
 
-    /// Where the slope changes its sign between two angles.
+    /// Where the slope changes its sign between two angles: false position, halving the value of an end that stays
+    /// (Illinois).
     fn bottom(&self, mut low: f64, mut high: f64) -> f64 {
         let (mut falls, mut rises) = (self.slope(low), self.slope(high));
-        let mut angle = 0.5 * (low + high);
-        for round in 0..ROUNDS {
+        let mut stays = 0;
+        for _ in 0..ROUNDS {
+            let secant = low - falls * (high - low) / (rises - falls);
+            let angle = if secant > low && secant < high { secant } else { 0.5 * (low + high) };
             let slope = self.slope(angle);
-            if slope == 0.0 || high - low < 1e-12 {
-                break;
+            if slope.abs() < STEEP || high - low < 1e-12 {
+                return angle;
             }
             if slope < 0.0 {
                 (low, falls) = (angle, slope);
+                rises *= if stays == 1 { 0.5 } else { 1.0 };
+                stays = 1;
             } else {
                 (high, rises) = (angle, slope);
+                falls *= if stays == -1 { 0.5 } else { 1.0 };
+                stays = -1;
             }
-            let secant = low - falls * (high - low) / (rises - falls);
-            let is_good = round % 3 != 2 && falls < 0.0 && rises > 0.0;
-            angle = if is_good && secant.is_finite() { secant.clamp(low, high) } else { 0.5 * (low + high) };
         }
-        angle
+        0.5 * (low + high)
     }
 }
+
+/// A slope of less is none.
+const STEEP: f64 = 1e-11;
