@@ -5,6 +5,11 @@
 //! Frames and signs: W; normals leave B and point to A; gaps are negative where they overlap.
 //! Invariants: no allocation; at most [`MAX_POINTS`] points; an id stands for the same features from tick to tick.
 
+mod mesh;
+mod mesh_ball;
+mod mesh_plane;
+mod mesh_span;
+
 use haptics::{Form, Shape};
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -69,7 +74,7 @@ pub struct PairMemory {
 
 /// Whether contact points of such an entity as `A` can be found.
 pub fn can_move(shape: &Shape) -> bool {
-    matches!(shape, Shape::Form(Form::Sphere(_) | Form::Cuboid(_)))
+    matches!(shape, Shape::Form(Form::Sphere(_) | Form::Cuboid(_)) | Shape::Mesh(_))
 }
 
 /// A ball around an entity: its centre in the entity's frame and its radius (m); `None` where it has no end.
@@ -79,6 +84,7 @@ pub fn bounding_ball(shape: &Shape) -> Option<(Vector3<f64>, f64)> {
         Shape::Form(Form::Cuboid(cuboid)) => {
             Some((Vector3::zeros(), 0.5 * Vector3::from(cuboid.size_m()).norm()))
         }
+        Shape::Mesh(mesh) => Some(mesh::bounding_ball(mesh)),
         _ => None,
     }
 }
@@ -91,7 +97,10 @@ pub fn contact_points(
     memory: &mut PairMemory,
     found: &mut ContactPoints,
 ) {
-    let _ = memory;
+    if let (Shape::Mesh(_), _) | (_, Shape::Mesh(_)) = (a.shape, b.shape) {
+        mesh::contact_points(a, b, reach_m, memory, found);
+        return;
+    }
     let Shape::Form(Form::Plane(plane)) = b.shape else { return };
     let normal_W = b.X_W.rotation * plane.normal_B();
     let offset_m = plane.offset_m() + normal_W.dot(&b.X_W.translation.vector);

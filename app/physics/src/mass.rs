@@ -4,6 +4,8 @@
 //! axes that they belong to.
 //! Frames: B the entity's frame, P the principal axes.
 
+mod polyhedron;
+
 use haptics::{Form, ParameterError, Shape};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -26,9 +28,13 @@ impl MassProperties {
     /// Of a solid of this shape and mass, of one density.
     ///
     /// # Errors
-    /// A mass that is not finite or not positive; a shape without inertia (a plane, an own surface).
+    /// A mass that is not finite or not positive; a shape without inertia (a plane, an own surface); a mesh that is not
+    /// closed or encloses nothing.
     pub fn of_shape(shape: &Shape, mass_kg: f64) -> Result<Self, BodyError> {
         let mass_kg = positive("mass_kg", mass_kg)?;
+        if let Shape::Mesh(mesh) = shape {
+            return Ok(polyhedron::volume(mesh)?.with_mass(mass_kg));
+        }
         let Shape::Form(form) = shape else {
             return Err(BodyError::NoInertia { shape: "shape of this kind" });
         };

@@ -270,7 +270,7 @@ fn hard(row: &Row, start: &Start<'_>) -> f64 {
 }
 
 /// Contact points are looked for from this distance on \[m\].
-const REACH_M: f64 = 1e-3;
+pub(crate) const REACH_M: f64 = 1e-3;
 /// A contact point of another name within this distance is the same one \[m\].
 const NEAR_M: f64 = 2e-4;
 /// How fast a depth that was there from the start is let out \[m/s\].
