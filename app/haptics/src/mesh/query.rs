@@ -129,14 +129,14 @@ impl Mesh {
         self.bvh.bounds_B()
     }
 
-    /// The vertex with the largest product of two counts, and that product, if it is larger than `more_than`; see
-    /// [`Bvh::outlying`](super::Bvh::outlying).
+    /// The vertex with the largest product of two counts, as a corner of a face (three times its number plus that of the
+    /// corner), and that product, if it is larger than `more_than`; see [`Bvh::outlying`](super::Bvh::outlying).
     pub fn outlying(&self, counts: [&Linear; 2], limits: &[Linear], more_than: f64) -> Option<(u32, f64)> {
         self.bvh.outlying(self.triangles(), counts, limits, more_than)
     }
 
-    /// Visits the vertices at which none of at most six limits is negative, each as often as faces meet there, until
-    /// `visit` says `false`; says whether it never did.
+    /// Visits the vertices at which none of at most six limits is negative, as corners of faces, each as often as faces meet
+    /// there, until `visit` says `false`; says whether all were visited, of which there may be too many for a tick.
     pub fn for_each_vertex_within(&self, limits: &[Linear], visit: impl FnMut(u32) -> bool) -> bool {
         self.bvh.for_each_vertex_within(self.triangles(), limits, visit)
     }

@@ -48,10 +48,10 @@ pub(super) fn contact_points(
         return;
     }
     let mut found = Found::default();
-    // All in reach, or else all that touch, or else the nearest.
-    let all = [ball.radius_m + reach_m, ball.radius_m]
-        .into_iter()
-        .any(|within_m| found.gather(mesh, ball, within_m));
+    // Of all but the nearest only those that may touch in this tick.
+    let travel_m = (reach_m - crate::pair::REACH_M).max(0.0);
+    let within_m = ball.radius_m + travel_m;
+    let all = nearest.distance_m <= within_m && found.gather(mesh, ball, within_m);
     if !all || found.count == 0 {
         found = Found::default();
         found.add(of_nearest(mesh, ball, &nearest));
@@ -129,11 +129,7 @@ impl Found {
         let mut left = MOST_FACES;
         self.count = 0;
         mesh.for_each_face_near(&ball.centre_M, within_m, |face| {
-            if let Some(contact) = on_face(mesh, ball, face)
-                && contact.gap_m + ball.radius_m <= within_m
-            {
-                self.add(contact);
-            }
+            on_face(mesh, ball, face, within_m).into_iter().for_each(|contact| self.add(contact));
             left -= 1;
             left > 0
         })
@@ -160,34 +156,36 @@ impl Found {
     }
 }
 
-/// The point of a face that is nearest to the centre, if it is locally nearest on the mesh.
-fn on_face(mesh: &Mesh, ball: &Ball, number: u32) -> Option<Contact> {
+/// The point of a face that is nearest to the centre, if it is as near as this and locally nearest on the mesh.
+fn on_face(mesh: &Mesh, ball: &Ball, number: u32, within_m: f64) -> Option<Contact> {
     let face = &mesh.faces()[number as usize];
+    let height_m = face.normal_B.dot(&ball.centre_M) - face.offset_m;
+    if height_m.abs() > within_m {
+        return None;
+    }
     let corners = face.vertices.map(|vertex| mesh.vertices()[vertex as usize]);
+    let edges = [0, 1, 2].map(|i| corners[(i + 1) % 3] - corners[i]);
     let to_centre = corners.map(|corner| ball.centre_M - corner);
-    let inward = [0, 1, 2].map(|i| face.normal_B.cross(&(corners[(i + 1) % 3] - corners[i])));
-    let beyond = [0, 1, 2].map(|i| inward[i].dot(&to_centre[i]));
-    if beyond.iter().all(|&beyond| beyond > 0.0) {
-        let height_m = face.normal_B.dot(&ball.centre_M) - face.offset_m;
+    let is_beyond = [0, 1, 2].map(|i| face.normal_B.dot(&edges[i].cross(&to_centre[i])) <= 0.0);
+    if is_beyond == [false; 3] {
         let point_M = ball.centre_M - face.normal_B * height_m;
         return Some(at(mesh, ball, About::Face(number), number, point_M));
     }
-    for i in 0..3 {
-        if beyond[i] > 0.0 {
-            continue;
-        }
-        let along = corners[(i + 1) % 3] - corners[i];
-        let share = along.dot(&to_centre[i]) / along.norm_squared();
+    let is_near = |point_M: &Vector3<f64>| (ball.centre_M - point_M).norm_squared() <= within_m * within_m;
+    for i in (0..3).filter(|&i| is_beyond[i]) {
+        let share = edges[i].dot(&to_centre[i]) / edges[i].norm_squared();
         if share > 0.0 && share < 1.0 {
-            let point_M = corners[i] + along * share;
-            return leads_away(mesh, face, i, &point_M, ball)
+            let point_M = corners[i] + edges[i] * share;
+            return (is_near(&point_M) && leads_away(mesh, face, i, &point_M, ball))
                 .then(|| at(mesh, ball, edge(face, number, i), number, point_M));
         }
     }
-    let nearer = |i: usize, j: usize| if to_centre[i].norm_squared() <= to_centre[j].norm_squared() { i } else { j };
+    let nearer =
+        |i: usize, j: usize| if to_centre[i].norm_squared() <= to_centre[j].norm_squared() { i } else { j };
     let i = nearer(nearer(0, 1), 2);
     let about = About::Vertex(face.vertices[i]);
-    is_nearest_vertex(mesh, number, i, ball).then(|| at(mesh, ball, about, number, corners[i]))
+    (is_near(&corners[i]) && is_nearest_vertex(mesh, number, i, ball))
+        .then(|| at(mesh, ball, about, number, corners[i]))
 }
 
 /// Whether the face across an edge leads away from the centre, too.

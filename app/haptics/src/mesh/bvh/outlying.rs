@@ -13,30 +13,43 @@
 use nalgebra::Vector3;
 
 use super::stack::Stack;
-use super::{Bvh, Node, Triangles, above, larger};
+use super::{Bvh, Node, Triangles, above, larger, smaller};
 
-/// A linear function of a point, `along . x + base`.
+/// A linear function of a point, `along . x + base`, or `at_most` where that is less.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Linear {
     /// Its gradient.
     pub along_B: Vector3<f64>,
     /// Its value at the origin.
     pub base: f64,
+    /// It grows no larger: the tighter, the fewer boxes need be looked at.
+    pub at_most: f64,
 }
 
 impl Linear {
     /// The same everywhere.
-    pub const ONE: Self = Self { along_B: Vector3::new(0.0, 0.0, 0.0), base: 1.0 };
+    pub const ONE: Self = Self::new(Vector3::new(0.0, 0.0, 0.0), 1.0);
+
+    /// Without a limit.
+    pub const fn new(along_B: Vector3<f64>, base: f64) -> Self {
+        Self { along_B, base, at_most: f64::INFINITY }
+    }
 
     /// How far a point is from a plane through `from_B`, along this.
     pub fn from(from_B: &Vector3<f64>, along_B: Vector3<f64>) -> Self {
-        Self { along_B, base: -along_B.dot(from_B) }
+        Self::new(along_B, -along_B.dot(from_B))
+    }
+
+    /// The same, growing no larger than this.
+    #[must_use]
+    pub fn at_most(self, at_most: f64) -> Self {
+        Self { at_most, ..self }
     }
 
     /// Its value there.
     #[inline]
     pub fn at(&self, point_B: &Vector3<f64>) -> f64 {
-        self.along_B.dot(point_B) + self.base
+        smaller(self.along_B.dot(point_B) + self.base, self.at_most)
     }
 
     /// As the nodes see it.
@@ -44,7 +57,8 @@ impl Linear {
         // Three products, their sum and a number rounded to `f32`: less than eight roundings of the largest.
         let size = self.along_B.amax() * extent_m * 3.0 + self.base.abs();
         let base = above(self.base + size * 8.0 * f64::from(f32::EPSILON));
-        Rounded { along: [0, 1, 2].map(|axis| self.along_B[axis] as f32), base }
+        let along = [0, 1, 2].map(|axis| self.along_B[axis] as f32);
+        Rounded { along, base, at_most: above(self.at_most) }
     }
 }
 
@@ -52,6 +66,7 @@ impl Linear {
 struct Rounded {
     along: [f32; 3],
     base: f32,
+    at_most: f32,
 }
 
 impl<const WIDTH: usize> Node<WIDTH> {
@@ -67,6 +82,9 @@ impl<const WIDTH: usize> Node<WIDTH> {
                 sum[i] += along * side[i];
             }
         }
+        for bound in &mut sum {
+            *bound = smaller(*bound, function.at_most);
+        }
         sum
     }
 
@@ -78,7 +96,8 @@ impl<const WIDTH: usize> Node<WIDTH> {
 }
 
 impl<const WIDTH: usize> Bvh<WIDTH> {
-    /// The vertex with the largest product of two counts, and that product, if it is larger than `more_than` >= 0.
+    /// The vertex with the largest product of two counts, as a corner of a face (three times its number plus that of the
+    /// corner), and that product, if it is larger than `more_than` >= 0.
     ///
     /// Of vertices that are equal, that which was seen first. At most `MOST_LIMITS` limits are heeded.
     pub fn outlying(
@@ -115,8 +134,8 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
                 stack.push(&keys, &node.children, limit);
                 continue;
             }
-            for face in &triangles.faces[child.index()..child.index() + child.count()] {
-                for vertex in face.vertices {
+            for face in child.index()..child.index() + child.count() {
+                for (corner, vertex) in triangles.faces[face].vertices.into_iter().enumerate() {
                     let point_B = &triangles.vertices[vertex as usize];
                     let [f, g] = counts.map(|count| count.at(point_B));
                     if f > 0.0
@@ -125,7 +144,7 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
                         && limits.iter().all(|limit| limit.at(point_B) >= 0.0)
                     {
                         most = f * g;
-                        best = Some((vertex, most));
+                        best = Some(((3 * face + corner) as u32, most));
                         limit = key(most);
                     }
                 }
@@ -134,8 +153,8 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
         best
     }
 
-    /// Visits the vertices at which no limit is negative, each as often as faces meet there, until `visit` says `false`;
-    /// says whether it never did.
+    /// Visits the vertices at which no limit is negative, as corners of faces, each as often as faces meet there, until
+    /// `visit` says `false`; says whether all were visited.
     pub fn for_each_vertex_within(
         &self,
         triangles: Triangles<'_>,
@@ -150,16 +169,22 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
         }
         let one = Linear::ONE.rounded(extent_m);
         let mut stack = Stack::<f32>::new();
+        let mut visits = 0;
         while let Some((_, child)) = stack.pop() {
+            visits += 1;
+            if visits > MOST_VISITS {
+                return false;
+            }
             if child.count() == 0 {
                 let node = &self.nodes[child.index()];
                 stack.push(&node.keys(&one, &one, &rounded[..limits.len()]), &node.children, 0.0);
                 continue;
             }
-            for face in &triangles.faces[child.index()..child.index() + child.count()] {
-                for vertex in face.vertices {
+            for face in child.index()..child.index() + child.count() {
+                for (corner, vertex) in triangles.faces[face].vertices.into_iter().enumerate() {
                     let point_B = &triangles.vertices[vertex as usize];
-                    if limits.iter().all(|limit| limit.at(point_B) >= 0.0) && !visit(vertex) {
+                    let counts = limits.iter().all(|limit| limit.at(point_B) >= 0.0);
+                    if counts && !visit((3 * face + corner) as u32) {
                         return false;
                     }
                 }
@@ -199,6 +224,6 @@ fn key(more_than: f64) -> f32 {
 }
 
 /// Bound on the nodes and runs of faces that are visited.
-const MOST_VISITS: usize = 1024;
+const MOST_VISITS: usize = 128;
 /// As many as a box has sides.
 const MOST_LIMITS: usize = 6;
