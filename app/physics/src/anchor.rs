@@ -41,9 +41,11 @@ impl Anchor {
     pub(crate) fn carry(&mut self, point: &ContactPoint, X_WA: &Isometry3<f64>, X_WB: &Isometry3<f64>) {
         let [a_A, b_B] = self.materials.map(Point3::from);
         let moved_W = X_WA * a_A - X_WB * b_B;
-        self.stretch += X_WB.inverse_transform_vector(&moved_W);
         self.id = point.id;
         self.touch(point, X_WA, X_WB);
+        // What rolls lifts its last contact, which stretches nothing.
+        let n = point.normal_W;
+        self.stretch += X_WB.inverse_transform_vector(&(moved_W - n * n.dot(&moved_W)));
     }
 
     fn touch(&mut self, point: &ContactPoint, X_WA: &Isometry3<f64>, X_WB: &Isometry3<f64>) {

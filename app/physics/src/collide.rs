@@ -5,14 +5,28 @@
 //! Frames and signs: W; normals leave B and point to A; gaps are negative where they overlap.
 //! Invariants: no allocation; at most [`MAX_POINTS`] points; an id stands for the same features from tick to tick.
 
-mod mesh;
+use haptics::{Form, Shape};
+use nalgebra::{Isometry3, Vector3};
+
+mod axis;
+mod ball;
+mod bounds;
+mod convex;
+mod convex_pair;
+mod facet;
+mod gjk;
+mod lines;
+pub(crate) mod mesh;
 mod mesh_ball;
 mod mesh_corner;
 mod mesh_plane;
 mod mesh_span;
+mod overlay;
+mod ring;
+mod spots;
 
-use haptics::{Form, Shape};
-use nalgebra::{Isometry3, Point3, Vector3};
+pub use bounds::bounding_ball;
+use spots::{Spot, Spots};
 
 /// The most contact points of two entities.
 pub const MAX_POINTS: usize = 8;
@@ -75,24 +89,50 @@ pub struct PairMemory {
     pub features: [u32; MAX_POINTS],
 }
 
-/// Whether contact points of such an entity as `A` can be found.
+/// Whether contact points of such an entity as `A` can be found: a solid that ends somewhere.
 pub fn can_move(shape: &Shape) -> bool {
-    matches!(shape, Shape::Form(Form::Sphere(_) | Form::Cuboid(_)) | Shape::Mesh(_))
-}
-
-/// A ball around an entity: its centre in the entity's frame and its radius (m); `None` where it has no end.
-pub fn bounding_ball(shape: &Shape) -> Option<(Vector3<f64>, f64)> {
     match shape {
-        Shape::Form(Form::Sphere(sphere)) => Some((Vector3::zeros(), sphere.radius_m())),
-        Shape::Form(Form::Cuboid(cuboid)) => {
-            Some((Vector3::zeros(), 0.5 * Vector3::from(cuboid.size_m()).norm()))
-        }
-        Shape::Mesh(mesh) => Some(mesh::bounding_ball(mesh)),
-        _ => None,
+        Shape::Form(Form::Plane(_)) => false,
+        Shape::Form(form) => !is_scaled_torus(form),
+        Shape::Mesh(mesh) => mesh::can_move(mesh),
+        _ => false,
     }
 }
 
-/// Where A and B touch, or come nearer than `reach_m`.
+/// Whether contact points of these two can be found if A moves. What cannot passes through the other.
+pub fn is_collidable(a: &Shape, b: &Shape) -> bool {
+    if !can_move(a) {
+        return false;
+    }
+    match (a, b) {
+        (Shape::Mesh(_), _) | (_, Shape::Mesh(_)) => mesh::is_collidable(a, b),
+        (Shape::Form(a), Shape::Form(b)) => forms_are_collidable(a, b),
+        (Shape::Form(Form::Sphere(_)), Shape::Own(_) | Shape::Nurbs(_)) => true,
+        _ => false,
+    }
+}
+
+/// What a shape is called.
+pub fn name(shape: &Shape) -> &'static str {
+    match shape {
+        Shape::Form(Form::Plane(_)) => "plane",
+        Shape::Form(Form::Sphere(_)) => "sphere",
+        Shape::Form(Form::Cuboid(_)) => "box",
+        Shape::Form(Form::Cylinder(_)) => "cylinder",
+        Shape::Form(Form::Cone(_)) => "cone",
+        Shape::Form(Form::Capsule(_)) => "capsule",
+        Shape::Form(Form::Torus(_)) => "torus",
+        Shape::Form(Form::Ellipsoid(_)) => "ellipsoid",
+        Shape::Form(form @ Form::Scaled(_)) if is_scaled_torus(form) => "torus scaled by different factors",
+        Shape::Form(Form::Scaled(_)) => "form scaled by different factors",
+        Shape::Mesh(_) => "mesh",
+        Shape::Csg(_) => "tree of shapes (CSG)",
+        Shape::Nurbs(_) => "NURBS surface",
+        Shape::Own(_) => "surface of one's own",
+    }
+}
+
+/// Where A and B touch, or come nearer than `reach_m`; nothing where they are not [collidable](is_collidable).
 pub fn contact_points(
     a: Solid<'_>,
     b: Solid<'_>,
@@ -100,31 +140,73 @@ pub fn contact_points(
     memory: &mut PairMemory,
     found: &mut ContactPoints,
 ) {
-    if let (Shape::Mesh(_), _) | (_, Shape::Mesh(_)) = (a.shape, b.shape) {
-        mesh::contact_points(a, b, reach_m, memory, found);
-        return;
-    }
-    let Shape::Form(Form::Plane(plane)) = b.shape else { return };
-    let normal_W = b.X_W.rotation * plane.normal_B();
-    let offset_m = plane.offset_m() + normal_W.dot(&b.X_W.translation.vector);
-    let mut report = |id: u32, point_W: Vector3<f64>| {
-        let gap_m = normal_W.dot(&point_W) - offset_m;
-        if gap_m <= reach_m {
-            found.push(ContactPoint { id, point_W, normal_W, gap_m });
+    match (a.shape, b.shape) {
+        (Shape::Mesh(_), _) | (_, Shape::Mesh(_)) => mesh::contact_points(a, b, reach_m, memory, found),
+        (Shape::Form(form_a), Shape::Form(form_b)) if forms_are_collidable(form_a, form_b) => {
+            let is_swapped = rank(form_b) < rank(form_a);
+            let (X_WA, X_WB) = if is_swapped { (b.X_W, a.X_W) } else { (a.X_W, b.X_W) };
+            let (form_a, form_b) = if is_swapped { (form_b, form_a) } else { (form_a, form_b) };
+            let spots = of_forms(form_a, &X_WB.inv_mul(X_WA), form_b, reach_m, memory);
+            spots.report(X_WB, is_swapped, found);
         }
-    };
-    match a.shape {
-        Shape::Form(Form::Sphere(sphere)) => {
-            report(0, a.X_W.translation.vector - normal_W * sphere.radius_m());
-        }
-        Shape::Form(Form::Cuboid(cuboid)) => {
-            let half = Vector3::from(cuboid.size_m()) * 0.5;
-            for corner in 0..8_u32 {
-                let sign = |bit: u32| if corner >> bit & 1 == 1 { 1.0 } else { -1.0 };
-                let corner_A = half.component_mul(&Vector3::new(sign(0), sign(1), sign(2)));
-                report(corner, (a.X_W * Point3::from(corner_A)).coords);
+        (Shape::Form(Form::Sphere(sphere)), surface) => {
+            let centre = b.X_W.inv_mul(a.X_W).translation.vector;
+            if let Some(touch) = ball::on_surface(surface, &centre, sphere.radius_m()) {
+                single(&touch, &centre, sphere.radius_m(), reach_m).report(b.X_W, false, found);
             }
         }
         _ => {}
     }
+}
+
+/// In the frame of B, which does not rank before A.
+fn of_forms(
+    a: &Form,
+    X_BA: &Isometry3<f64>,
+    b: &Form,
+    reach_m: f64,
+    memory: &mut PairMemory,
+) -> Spots {
+    match (a, b) {
+        (Form::Torus(torus), _) => ring::contact(torus, X_BA, b, reach_m, memory),
+        // Of a convex one the nearest point is better found by what suits all convex ones.
+        (Form::Sphere(sphere), _) if !matches!(b, Form::Scaled(_)) || is_scaled_torus(b) => {
+            let (centre, radius_m) = (X_BA.translation.vector, sphere.radius_m());
+            single(&ball::on_form(b, &centre, radius_m), &centre, radius_m, reach_m)
+        }
+        (_, Form::Plane(plane)) => convex_pair::on_plane(a, X_BA, plane, reach_m, memory),
+        _ => convex_pair::contact(a, X_BA, b, reach_m, memory),
+    }
+}
+
+/// Which of two forms is looked at as A: rings on anything (a ball may lie in the hole), balls on anything else.
+fn rank(form: &Form) -> u32 {
+    match form {
+        Form::Torus(_) => 0,
+        Form::Sphere(_) => 1,
+        Form::Plane(_) => 3,
+        _ => 2,
+    }
+}
+
+/// The one contact point of a ball.
+fn single(touch: &ball::Touch, centre: &Vector3<f64>, radius_m: f64, reach_m: f64) -> Spots {
+    let mut spots = Spots::within(reach_m);
+    let on_a = centre - touch.normal * radius_m;
+    spots.push(Spot { id: 0, on_a, normal: touch.normal, gap_m: touch.gap_m });
+    spots
+}
+
+fn forms_are_collidable(a: &Form, b: &Form) -> bool {
+    let (is_ball, is_ring) = (matches!(a, Form::Sphere(_)), matches!(a, Form::Torus(_)));
+    match b {
+        Form::Scaled(_) if is_scaled_torus(b) => is_ball,
+        Form::Scaled(_) => !is_ring,
+        Form::Torus(_) => !matches!(a, Form::Scaled(_)),
+        _ => true,
+    }
+}
+
+fn is_scaled_torus(form: &Form) -> bool {
+    matches!(form, Form::Scaled(scaled) if matches!(scaled.unscaled(), Form::Torus(_)))
 }

@@ -4,7 +4,7 @@ use haptics::Entity;
 use nalgebra::Vector3;
 
 use crate::body::Body;
-use crate::collide::{MAX_POINTS, can_move};
+use crate::collide::{self, MAX_POINTS, can_move};
 use crate::error::BodyError;
 use crate::integrator::Integrator;
 use crate::pair::{Pair, Response, Start, Surfacing};
@@ -83,7 +83,7 @@ impl Manipulation {
         let mut pairs = Vec::new();
         for (number, &(a, _)) in bodies.iter().enumerate() {
             if !can_move(&entities[a].shape) {
-                return Err(BodyError::NoContactPoints { shape: "shape of this kind" });
+                return Err(BodyError::NoContactPoints { shape: collide::name(&entities[a].shape) });
             }
             for b in 0..entities.len() {
                 let other = body_of(b);

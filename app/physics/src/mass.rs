@@ -4,12 +4,16 @@
 //! axes that they belong to.
 //! Frames: B the entity's frame, P the principal axes.
 
-mod polyhedron;
-
-use haptics::{Form, ParameterError, Shape};
+use haptics::{ParameterError, Shape};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
+use crate::collide;
 use crate::error::BodyError;
+
+mod forms;
+mod polyhedron;
+
+use forms::Spread;
 
 /// Mass, centre of mass and inertia of a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,16 +39,31 @@ impl MassProperties {
         if let Shape::Mesh(mesh) = shape {
             return Ok(polyhedron::volume(mesh)?.with_mass(mass_kg));
         }
-        let Shape::Form(form) = shape else {
-            return Err(BodyError::NoInertia { shape: "shape of this kind" });
-        };
-        let per_mass = moments_per_mass(form).ok_or(BodyError::NoInertia { shape: "plane" })?;
-        Ok(Self {
+        Ok(Self::of_spread(&spread(shape)?, mass_kg))
+    }
+
+    /// Of a solid of this shape and density \[kg/m^3\].
+    ///
+    /// # Errors
+    /// A density that is not finite or not positive, or makes no such mass; a shape without inertia.
+    pub fn of_density(shape: &Shape, density_kg_m3: f64) -> Result<Self, BodyError> {
+        let density_kg_m3 = positive("density_kg_m3", density_kg_m3)?;
+        if let Shape::Mesh(mesh) = shape {
+            let volume = polyhedron::volume(mesh)?;
+            return Ok(volume.with_mass(positive("mass_kg", density_kg_m3 * volume.volume_m3)?));
+        }
+        let spread = spread(shape)?;
+        let mass_kg = positive("mass_kg", density_kg_m3 * spread.volume_m3)?;
+        Ok(Self::of_spread(&spread, mass_kg))
+    }
+
+    fn of_spread(spread: &Spread, mass_kg: f64) -> Self {
+        Self {
             mass_kg,
-            centre_B: Vector3::zeros(),
-            principal_kg_m2: per_mass * mass_kg,
+            centre_B: spread.centre_B,
+            principal_kg_m2: spread.moments_per_mass() * mass_kg,
             axes_BP: UnitQuaternion::identity(),
-        })
+        }
     }
 
     /// The same with these principal moments \[kg m^2\], about the entity's own axes.
@@ -62,7 +81,10 @@ impl MassProperties {
         Ok(Self { principal_kg_m2: moments.into(), axes_BP: UnitQuaternion::identity(), ..self })
     }
 
-    /// The same mass with its centre elsewhere (m, in B); the moments are those about the new centre.
+    /// The same mass with its centre elsewhere (m, in B).
+    ///
+    /// The moments stay as they are and are those about the new centre: a body that is not of one density. What is known
+    /// about another point than the centre of mass, at a distance d from it, is larger by `m d^2` across d (parallel axes).
     pub fn with_centre(self, centre_B: Vector3<f64>) -> Self {
         Self { centre_B, ..self }
     }
@@ -83,14 +105,11 @@ pub(crate) fn positive(parameter: &'static str, value: f64) -> Result<f64, Param
     }
 }
 
-/// Principal moments of a solid of 1 kg about its centre \[m^2\].
-fn moments_per_mass(form: &Form) -> Option<Vector3<f64>> {
-    Some(match form {
-        Form::Sphere(sphere) => Vector3::repeat(0.4 * sphere.radius_m().powi(2)),
-        Form::Cuboid(cuboid) => {
-            let [x, y, z] = cuboid.size_m().map(|edge| edge * edge / 12.0);
-            Vector3::new(y + z, x + z, x + y)
-        }
-        _ => return None,
-    })
+/// Of a solid that is full.
+fn spread(shape: &Shape) -> Result<Spread, BodyError> {
+    match shape {
+        Shape::Form(form) => Spread::of(form),
+        _ => None,
+    }
+    .ok_or_else(|| BodyError::NoInertia { shape: collide::name(shape) })
 }

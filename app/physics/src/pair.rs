@@ -104,6 +104,8 @@ impl Pair {
         let reach_m = REACH_M + speed_m_s * start.dt_s;
         if !is_near(a, b, reach_m) {
             self.count = 0;
+            // They may meet again from another side.
+            self.memory = PairMemory::default();
             return;
         }
         let (in_A, in_B) = (Solid { shape: &a.shape, X_W: &a.X_WB }, Solid { shape: &b.shape, X_W: &b.X_WB });

@@ -37,16 +37,22 @@ pub(super) fn contact_points(
     }
 }
 
-/// Whether something can be touched by a mesh.
-pub(super) fn is_collidable(other: &Shape) -> bool {
+/// Whether contact points of such a mesh as A can be found.
+pub(super) fn can_move(_mesh: &Mesh) -> bool {
+    true
+}
+
+/// Whether those of these two can, of which one is a mesh.
+pub(super) fn is_collidable(a: &Shape, b: &Shape) -> bool {
+    let other = if matches!(a, Shape::Mesh(_)) { b } else { a };
     matches!(other, Shape::Form(Form::Plane(_) | Form::Sphere(_)))
 }
 
 /// A ball around a mesh: that around its box.
-pub(super) fn bounding_ball(mesh: &Mesh) -> (Vector3<f64>, f64) {
+pub(super) fn bounding_ball(mesh: &Mesh) -> Option<(Vector3<f64>, f64)> {
     let [low_B, high_B] = mesh.bounds_B();
     // The mesh is in the box to rounding.
-    ((low_B + high_B) * 0.5, 0.5 * (high_B - low_B).norm() * (1.0 + 1e-12))
+    Some(((low_B + high_B) * 0.5, 0.5 * (high_B - low_B).norm() * (1.0 + 1e-12)))
 }
 
 fn against(

@@ -1,0 +1,112 @@
+//! Contact points of two lines: edges, sides of cylinders and cones, axes of capsules.
+//!
+//! Model: lines that cross touch where they are nearest. The more they run alongside each other, the more the ends of the
+//! piece that they share carry instead: the point between them counts with what the ends, as deep as they are, leave to it.
+//! Away from the crossing the gap grows as the forms' roundness has it.
+
+use nalgebra::Vector3;
+
+use super::axis::unit;
+use super::facet::Line;
+use super::spots::{Spot, Spots};
+
+/// Of a pair of lines, and where they are nearest.
+pub(super) struct Alongside {
+    pub(super) lines: [Line; 2],
+    /// Which the lines' forms have around what was found \[m\].
+    pub(super) radii_m: [f64; 2],
+    pub(super) normal: Vector3<f64>,
+    /// Between the surfaces at the nearest place.
+    pub(super) gap_m: f64,
+    /// On A's surface there.
+    pub(super) on_a: Vector3<f64>,
+}
+
+const CROSSING_ID: u32 = 1;
+const END_IDS: [u32; 2] = [2, 3];
+/// An end nearer to the crossing than this counts less \[m\].
+const FADE_M: f64 = 1e-3;
+/// Lines that are not parallel to this sine cross.
+const PARALLEL: f64 = 0.3;
+
+/// A direction that is across both lines to this is exactly so.
+const ACROSS: f64 = 1e-5;
+
+impl Alongside {
+    /// The same with what the search for nearest points leaves open taken from the lines, if they cross.
+    pub(super) fn sharpened(self) -> Self {
+        let [a, b] = self.lines.map(|line| line.ends);
+        let (along_a, along_b) = (a[1] - a[0], b[1] - b[0]);
+        let across = along_a.cross(&along_b);
+        let squared = across.norm_squared();
+        if squared <= PARALLEL * PARALLEL * along_a.norm_squared() * along_b.norm_squared() {
+            return self;
+        }
+        let Some(normal) = unit(&(across * across.dot(&self.normal))) else { return self };
+        let from = b[0] - a[0];
+        let place = from.cross(&along_b).dot(&across) / squared;
+        let place_on_b = from.cross(&along_a).dot(&across) / squared;
+        let is_within = [place, place_on_b].iter().all(|place| (0.0..=1.0).contains(place));
+        if !is_within || (normal - self.normal).norm_squared() > ACROSS * ACROSS {
+            return self;
+        }
+        let on_a = a[0] + along_a * place;
+        let on_b = b[0] + along_b * place_on_b;
+        let [radius_a, radius_b] = self.radii_m;
+        let gap_m = normal.dot(&(on_a - on_b)) - radius_a - radius_b;
+        Self { normal, gap_m, on_a: on_a - normal * radius_a, ..self }
+    }
+
+    /// Appends up to three points.
+    pub(super) fn find(&self, spots: &mut Spots) {
+        let mut crossing = 1.0;
+        if let Some(ends) = self.shared() {
+            let spots_at = ends.map(|at| self.at(at));
+            let share = |spot: &Spot| {
+                let apart = ((spot.on_a - self.on_a).norm() / FADE_M).min(1.0);
+                apart * if self.gap_m < 0.0 { (spot.gap_m / self.gap_m).clamp(0.0, 1.0) } else { 0.0 }
+            };
+            crossing -= share(&spots_at[0]).min(share(&spots_at[1]));
+            for (mut spot, id) in spots_at.into_iter().zip(END_IDS) {
+                spot.id = id;
+                if spot.gap_m < 0.0 {
+                    spot.gap_m *= ((spot.on_a - self.on_a).norm() / FADE_M).min(1.0);
+                }
+                spots.push(spot);
+            }
+        }
+        let gap_m = if self.gap_m < 0.0 { self.gap_m * crossing } else { self.gap_m };
+        if crossing > 0.0 {
+            spots.push(Spot { id: CROSSING_ID, on_a: self.on_a, normal: self.normal, gap_m });
+        }
+    }
+
+    /// From where to where on A's line B's runs alongside.
+    fn shared(&self) -> Option<[f64; 2]> {
+        let [a, b] = self.lines.map(|line| line.ends);
+        let (along_a, along_b) = (a[1] - a[0], b[1] - b[0]);
+        let across = along_a.cross(&along_b).norm_squared();
+        let squared = along_a.norm_squared();
+        if across > PARALLEL * PARALLEL * squared * along_b.norm_squared() || squared == 0.0 {
+            return None;
+        }
+        let [first, last] = b.map(|end| (end - a[0]).dot(&along_a) / squared);
+        let (first, last) = (first.min(last).max(0.0), first.max(last).min(1.0));
+        (first < last).then_some([first, last])
+    }
+
+    /// The contact at a place of A's line.
+    fn at(&self, place: f64) -> Spot {
+        let [a, b] = self.lines;
+        let on_a = a.ends[0] + (a.ends[1] - a.ends[0]) * place;
+        let along_b = b.ends[1] - b.ends[0];
+        let on_b = b.ends[0]
+            + along_b * ((on_a - b.ends[0]).dot(&along_b) / along_b.norm_squared()).clamp(0.0, 1.0);
+        let away = on_a - on_b;
+        let height_m = self.normal.dot(&away);
+        let aside_m = (away - self.normal * height_m).norm();
+        let bend_m = a.bend_m + b.bend_m;
+        let gap_m = height_m + bend_m.hypot(aside_m) - bend_m - self.radii_m[0] - self.radii_m[1];
+        Spot { id: 0, on_a: on_a - self.normal * self.radii_m[0], normal: self.normal, gap_m }
+    }
+}

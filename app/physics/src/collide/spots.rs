@@ -1,0 +1,97 @@
+//! Contact points while they are being found.
+//!
+//! Model: where a contact's outline is cut off, its corners change in number; two that come out of one must not press twice
+//! as hard at once. A point that lies nearer than [`FADE_M`] to one that was found before it counts with the share of that
+//! distance: its depth is that much less.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use super::{ContactPoint, ContactPoints, MAX_POINTS};
+
+/// A contact point in the frame of the second form.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Spot {
+    pub(super) id: u32,
+    /// On the surface of the first form \[m\].
+    pub(super) on_a: Vector3<f64>,
+    /// Unit, from the second to the first.
+    pub(super) normal: Vector3<f64>,
+    pub(super) gap_m: f64,
+}
+
+/// All contact points of two forms.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Spots {
+    all: [Spot; MAX_SPOTS],
+    count: usize,
+    /// No farther than this.
+    reach_m: f64,
+}
+
+/// Room while they are found.
+const MAX_SPOTS: usize = 24;
+/// Points nearer to each other than this share their depth \[m\].
+const FADE_M: f64 = 1e-3;
+/// A share of less is nothing.
+const NOTHING: f64 = 1e-6;
+
+impl Spots {
+    pub(super) fn within(reach_m: f64) -> Self {
+        Self { reach_m, ..Self::default() }
+    }
+
+    /// Adds one that is near enough, after all to which it must give way.
+    pub(super) fn push(&mut self, mut spot: Spot) {
+        if !spot.gap_m.is_finite() || spot.gap_m > self.reach_m || self.count == MAX_SPOTS {
+            return;
+        }
+        let squared = |other: &Spot| (other.on_a - spot.on_a).norm_squared();
+        let nearest = self.as_slice().iter().map(squared).fold(f64::INFINITY, f64::min);
+        let share = nearest.sqrt() / FADE_M;
+        if share < NOTHING {
+            return;
+        }
+        if spot.gap_m < 0.0 {
+            spot.gap_m *= share.min(1.0);
+        }
+        self.all[self.count] = spot;
+        self.count += 1;
+    }
+
+    pub(super) fn as_slice(&self) -> &[Spot] {
+        &self.all[..self.count]
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// If there are too many, those of these ids are the first to go.
+    pub(super) fn thin_out(&mut self, ids: std::ops::Range<u32>) {
+        let mut at = 0;
+        while self.count > MAX_POINTS && at < self.count {
+            if ids.contains(&self.all[at].id) {
+                self.all.copy_within(at + 1..self.count, at);
+                self.count -= 1;
+            } else {
+                at += 1;
+            }
+        }
+    }
+
+    /// Reports them in W; `is_swapped`: the second form is A.
+    pub(super) fn report(&self, X_W: &Isometry3<f64>, is_swapped: bool, found: &mut ContactPoints) {
+        for spot in self.as_slice() {
+            let (mut on_a, mut normal) = (spot.on_a, spot.normal);
+            if is_swapped {
+                (on_a, normal) = (on_a - normal * spot.gap_m, -normal);
+            }
+            found.push(ContactPoint {
+                id: spot.id,
+                point_W: (X_W * Point3::from(on_a)).coords,
+                normal_W: X_W.rotation * normal,
+                gap_m: spot.gap_m,
+            });
+        }
+    }
+}
