@@ -50,7 +50,7 @@ mod winding;
 
 #[cfg(test)]
 pub(crate) use bvh::POPPED;
-pub use bvh::{Bvh, Hit, Nearest, Triangles};
+pub use bvh::{Bvh, Hit, Linear, Nearest, Triangles};
 pub use error::MeshError;
 pub use face::{Face, Link};
 pub use mesh_cone::{Beginning, MeshCone};

@@ -17,6 +17,10 @@ mod facet;
 mod gjk;
 mod lines;
 pub(crate) mod mesh;
+mod mesh_ball;
+mod mesh_corner;
+mod mesh_plane;
+mod mesh_span;
 mod overlay;
 mod ring;
 mod spots;
@@ -81,6 +85,8 @@ pub struct Solid<'s> {
 pub struct PairMemory {
     /// Whatever the pair's algorithm makes of them.
     pub words: [f64; 8],
+    /// Numbers of features plus one; 0: none.
+    pub features: [u32; MAX_POINTS],
 }
 
 /// Whether contact points of such an entity as `A` can be found: a solid that ends somewhere.

@@ -28,6 +28,24 @@ pub enum BodyError {
         /// What it is.
         shape: &'static str,
     },
+    /// It has no inside.
+    #[error(
+        "a mesh of {faces} faces that is open or cannot be oriented encloses no volume and has no inertia of its own; \
+         close it, or give `inertia_kg_m2` and `centre_of_mass_m`, or leave out `mass_kg` and it is fixed"
+    )]
+    OpenMesh {
+        /// How many triangles.
+        faces: usize,
+    },
+    /// Its inside is nothing.
+    #[error(
+        "a closed mesh encloses a volume of {volume_m3} m^3; allowed is more than a rounding of its size to the third; \
+         thicken it, or give `inertia_kg_m2` and `centre_of_mass_m`, or leave out `mass_kg` and it is fixed"
+    )]
+    NoVolume {
+        /// Volume found (m^3).
+        volume_m3: f64,
+    },
     /// It could not be told where it touches.
     #[error("a {shape} cannot move: nobody finds its contact points; leave out `mass_kg` and it is fixed")]
     NoContactPoints {

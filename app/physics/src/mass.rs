@@ -11,6 +11,7 @@ use crate::collide;
 use crate::error::BodyError;
 
 mod forms;
+mod polyhedron;
 
 use forms::Spread;
 
@@ -31,9 +32,13 @@ impl MassProperties {
     /// Of a solid of this shape and mass, of one density.
     ///
     /// # Errors
-    /// A mass that is not finite or not positive; a shape without inertia (a plane, an own surface).
+    /// A mass that is not finite or not positive; a shape without inertia (a plane, an own surface); a mesh that is not
+    /// closed or encloses nothing.
     pub fn of_shape(shape: &Shape, mass_kg: f64) -> Result<Self, BodyError> {
         let mass_kg = positive("mass_kg", mass_kg)?;
+        if let Shape::Mesh(mesh) = shape {
+            return Ok(polyhedron::volume(mesh)?.with_mass(mass_kg));
+        }
         Ok(Self::of_spread(&spread(shape)?, mass_kg))
     }
 
@@ -43,6 +48,10 @@ impl MassProperties {
     /// A density that is not finite or not positive, or makes no such mass; a shape without inertia.
     pub fn of_density(shape: &Shape, density_kg_m3: f64) -> Result<Self, BodyError> {
         let density_kg_m3 = positive("density_kg_m3", density_kg_m3)?;
+        if let Shape::Mesh(mesh) = shape {
+            let volume = polyhedron::volume(mesh)?;
+            return Ok(volume.with_mass(positive("mass_kg", density_kg_m3 * volume.volume_m3)?));
+        }
         let spread = spread(shape)?;
         let mass_kg = positive("mass_kg", density_kg_m3 * spread.volume_m3)?;
         Ok(Self::of_spread(&spread, mass_kg))

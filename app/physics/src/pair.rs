@@ -317,7 +317,7 @@ fn let_out_m_s(depth_m: f64, dt_s: f64) -> f64 {
 }
 
 /// Contact points are looked for from this distance on \[m\].
-const REACH_M: f64 = 1e-3;
+pub(crate) const REACH_M: f64 = 1e-3;
 /// A contact point of another name within this distance is the same one \[m\].
 const NEAR_M: f64 = 2e-4;
 /// A depth that should not be there falls by `e` in this time \[s\]. The body then slows down by less than gravity slows it,

@@ -21,6 +21,7 @@ mod clearance;
 mod closest;
 mod inside;
 mod nearest;
+mod outlying;
 mod parts;
 mod segment;
 mod stack;
@@ -31,6 +32,7 @@ use super::Face;
 pub(in crate::mesh) use closest::closest_on;
 pub use nearest::Nearest;
 pub(crate) use nearest::TooMany;
+pub use outlying::Linear;
 pub use segment::Hit;
 #[cfg(test)]
 pub(crate) use stack::POPPED;
@@ -69,6 +71,11 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
     /// What it occupies \[bytes\].
     pub fn size_bytes(&self) -> usize {
         size_of_val(&*self.nodes)
+    }
+
+    /// The box around all faces: lowest and highest coordinates \[m\].
+    pub fn bounds_B(&self) -> [Vector3<f64>; 2] {
+        [self.lower_B, self.upper_B]
     }
 
     /// Largest absolute coordinate of the geometry \[m\]: what tolerances are relative to.

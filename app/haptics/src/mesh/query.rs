@@ -3,7 +3,9 @@
 use nalgebra::Vector3;
 
 use super::bvh::TooMany;
-use super::{Face, Hit, Mesh, Nearest, Sides, Triangles};
+use super::fan::for_each_around;
+use super::place::Side;
+use super::{Face, Hit, Linear, Mesh, Nearest, Sides, Triangles};
 
 impl Mesh {
     /// The first face that the segment `from_B -> to_B` enters: from outside, or from either side of a sheet.
@@ -120,6 +122,42 @@ impl Mesh {
     /// As long as a finger has moved less than this, it cannot have touched. Constant cost, whatever the mesh.
     pub fn clearance(&self, p_B: &Vector3<f64>, at_most_m: f64) -> f64 {
         self.bvh.clearance(p_B, at_most_m)
+    }
+
+    /// The box around it, in its own frame: lowest and highest coordinates \[m\].
+    pub fn bounds_B(&self) -> [Vector3<f64>; 2] {
+        self.bvh.bounds_B()
+    }
+
+    /// The vertex with the largest product of two counts, as a corner of a face (three times its number plus that of the
+    /// corner), and that product, if it is larger than `more_than`; see [`Bvh::outlying`](super::Bvh::outlying).
+    pub fn outlying(&self, counts: [&Linear; 2], limits: &[Linear], more_than: f64) -> Option<(u32, f64)> {
+        self.bvh.outlying(self.triangles(), counts, limits, more_than)
+    }
+
+    /// Visits the vertices at which none of at most six limits is negative, as corners of faces, each as often as faces meet
+    /// there, until `visit` says `false`; says whether all were visited, of which there may be too many for a tick.
+    pub fn for_each_vertex_within(&self, limits: &[Linear], visit: impl FnMut(u32) -> bool) -> bool {
+        self.bvh.for_each_vertex_within(self.triangles(), limits, visit)
+    }
+
+    /// Visits the numbers of all faces that may be as near as this \[m\], in no order that means anything, until `visit`
+    /// says `false`; says whether it never did.
+    pub fn for_each_face_near(
+        &self,
+        p_B: &Vector3<f64>,
+        at_most_m: f64,
+        visit: impl FnMut(u32) -> bool,
+    ) -> bool {
+        self.bvh.for_each_face_near(self.triangles(), p_B, at_most_m, visit)
+    }
+
+    /// Visits the faces around a corner of a face, itself among them: each with the number of that corner in it. At most
+    /// [`MAX_VALENCE`](super::MAX_VALENCE).
+    pub fn for_each_face_around(&self, face: u32, corner: usize, mut visit: impl FnMut(&Face, usize)) {
+        for_each_around(self, Side { face, is_back: false }, corner, |sector| {
+            visit(sector.facet.face, sector.corner);
+        });
     }
 
     fn triangles(&self) -> Triangles<'_> {

@@ -1,31 +1,134 @@
-//! Contact points where a mesh is on either side.
+//! Where a mesh touches something else.
+//!
+//! Model: against a plane, the vertices that it stands on ([`mesh_plane`](super::mesh_plane)); against a ball, the locally
+//! nearest features ([`mesh_ball`](super::mesh_ball)). What is found is told in the mesh's frame, with normals that leave
+//! the mesh or point to it as is handy; [`Told`] turns it into contact points of A and B.
+//!
+//! Identity: what a contact point is about is told by a number below 2^30 and a kind of two bits: a face, an edge (three
+//! times its face plus its number there), a vertex, or a point of the other one. No two of a pair clash as long as a mesh
+//! has less than 357,000,000 faces.
 
-use haptics::Shape;
 use haptics::mesh::Mesh;
-use nalgebra::Vector3;
+use haptics::{Form, Shape};
+use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::{ContactPoints, PairMemory, Solid};
+use super::mesh_ball::{self, Ball};
+use super::mesh_plane;
+use super::{ContactPoint, ContactPoints, PairMemory, Solid};
+
+/// Where A and B touch, at least one of them being a mesh.
+pub(super) fn contact_points(
+    a: Solid<'_>,
+    b: Solid<'_>,
+    reach_m: f64,
+    memory: &mut PairMemory,
+    found: &mut ContactPoints,
+) {
+    match (a.shape, b.shape) {
+        (Shape::Mesh(mesh), other) => {
+            let told = Told { X_WM: a.X_W, mesh_is_a: true, found };
+            against(mesh, other, b.X_W, reach_m, memory, told);
+        }
+        (other, Shape::Mesh(mesh)) => {
+            let told = Told { X_WM: b.X_W, mesh_is_a: false, found };
+            against(mesh, other, a.X_W, reach_m, memory, told);
+        }
+        _ => {}
+    }
+}
 
 /// Whether contact points of such a mesh as A can be found.
 pub(super) fn can_move(_mesh: &Mesh) -> bool {
-    false
+    true
 }
 
 /// Whether those of these two can, of which one is a mesh.
-pub(super) fn is_collidable(_a: &Shape, _b: &Shape) -> bool {
-    false
+pub(super) fn is_collidable(a: &Shape, b: &Shape) -> bool {
+    let other = if matches!(a, Shape::Mesh(_)) { b } else { a };
+    matches!(other, Shape::Form(Form::Plane(_) | Form::Sphere(_)))
 }
 
-pub(super) fn bounding_ball(_mesh: &Mesh) -> Option<(Vector3<f64>, f64)> {
-    None
+/// A ball around a mesh: that around its box.
+pub(super) fn bounding_ball(mesh: &Mesh) -> Option<(Vector3<f64>, f64)> {
+    let [low_B, high_B] = mesh.bounds_B();
+    // The mesh is in the box to rounding.
+    Some(((low_B + high_B) * 0.5, 0.5 * (high_B - low_B).norm() * (1.0 + 1e-12)))
 }
 
-/// Where A and B touch, of which one is a mesh.
-pub(super) fn contact_points(
-    _a: Solid<'_>,
-    _b: Solid<'_>,
-    _reach_m: f64,
-    _memory: &mut PairMemory,
-    _found: &mut ContactPoints,
+fn against(
+    mesh: &Mesh,
+    other: &Shape,
+    X_WO: &Isometry3<f64>,
+    reach_m: f64,
+    memory: &mut PairMemory,
+    mut told: Told<'_>,
 ) {
+    let X_MO = told.X_WM.inv_mul(X_WO);
+    match other {
+        Shape::Form(Form::Plane(plane)) => {
+            let normal_M = X_MO * plane.normal_B();
+            let offset_m = plane.offset_m() + normal_M.dot(&X_MO.translation.vector);
+            mesh_plane::contact_points(mesh, &normal_M, offset_m, reach_m, memory, &mut told);
+        }
+        Shape::Form(Form::Sphere(sphere)) => {
+            let ball = Ball { centre_M: X_MO.translation.vector, radius_m: sphere.radius_m() };
+            mesh_ball::contact_points(mesh, &ball, reach_m, memory, &mut told);
+        }
+        _ => {}
+    }
+}
+
+/// Contact points as the mesh sees them, told to the pair.
+pub(super) struct Told<'t> {
+    /// Pose of the mesh.
+    pub(super) X_WM: &'t Isometry3<f64>,
+    /// Or B.
+    pub(super) mesh_is_a: bool,
+    pub(super) found: &'t mut ContactPoints,
+}
+
+/// A contact point in the mesh's frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Contact {
+    pub(super) id: u32,
+    /// On the mesh \[m\].
+    pub(super) on_mesh_M: Vector3<f64>,
+    /// Unit, from the mesh to the other one.
+    pub(super) normal_M: Vector3<f64>,
+    /// Negative where they overlap \[m\].
+    pub(super) gap_m: f64,
+}
+
+impl Told<'_> {
+    pub(super) fn tell(&mut self, contact: &Contact) {
+        let Contact { id, on_mesh_M, normal_M, gap_m } = *contact;
+        let (point_M, sign) =
+            if self.mesh_is_a { (on_mesh_M, -1.0) } else { (on_mesh_M + normal_M * gap_m, 1.0) };
+        let point_W = (self.X_WM * Point3::from(point_M)).coords;
+        self.found.push(ContactPoint { id, point_W, normal_W: self.X_WM * normal_M * sign, gap_m });
+    }
+}
+
+/// What a contact point is about.
+pub(super) enum About {
+    /// A face of the mesh.
+    Face(u32),
+    /// An edge, by a face of the mesh and its number there.
+    Edge(u32, usize),
+    /// A vertex of the mesh.
+    Vertex(u32),
+    /// A point of the other one.
+    #[allow(dead_code, reason = "balls and planes have no features")]
+    Other(u32),
+}
+
+impl About {
+    pub(super) fn id(&self) -> u32 {
+        match *self {
+            Self::Face(face) => face << 2,
+            Self::Edge(face, edge) => (face * 3 + edge as u32) << 2 | 1,
+            Self::Vertex(vertex) => vertex << 2 | 2,
+            Self::Other(point) => point << 2 | 3,
+        }
+    }
 }

@@ -77,6 +77,18 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
         at_most_m: f64,
         mut visit: impl FnMut(&Face) -> bool,
     ) -> bool {
+        self.for_each_face_near(triangles, p_B, at_most_m, |face| visit(&triangles.faces[face as usize]))
+    }
+
+    /// As [`Self::for_each_within`], with the faces' numbers.
+    pub(in crate::mesh) fn for_each_face_near(
+        &self,
+        triangles: Triangles<'_>,
+        p_B: &Vector3<f64>,
+        at_most_m: f64,
+        mut visit: impl FnMut(u32) -> bool,
+    ) -> bool {
+        debug_assert!(triangles.faces.len() < u32::MAX as usize);
         let limit = above(at_most_m * at_most_m).min(f32::MAX);
         let mut stack = Stack::<f32>::new();
         let p = Rounded::new(p_B);
@@ -84,7 +96,7 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
             if child.count() == 0 {
                 let node = &self.nodes[child.index()];
                 stack.push(&node.squared_distances(&p), &node.children, limit);
-            } else if !triangles.faces[child.index()..child.index() + child.count()].iter().all(&mut visit) {
+            } else if !(child.index()..child.index() + child.count()).all(|face| visit(face as u32)) {
                 return false;
             }
         }

@@ -1,0 +1,84 @@
+//! A vertex of a mesh, known as a corner of one of its faces: from there its neighbours are found.
+
+use haptics::mesh::Mesh;
+use nalgebra::Vector3;
+
+/// Three times the face's number plus that of the corner.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Corner(u32);
+
+impl Corner {
+    pub(super) fn new(corner: u32) -> Self {
+        Self(corner)
+    }
+
+    /// One that was remembered as [`Self::number`]: 0 is none, nor is one that this mesh does not have.
+    pub(super) fn remembered(number: u32, mesh: &Mesh) -> Option<Self> {
+        number.checked_sub(1).filter(|&corner| (corner as usize) < 3 * mesh.faces().len()).map(Self)
+    }
+
+    pub(super) fn number(self) -> u32 {
+        self.0 + 1
+    }
+
+    pub(super) fn vertex(self, mesh: &Mesh) -> u32 {
+        mesh.faces()[(self.0 / 3) as usize].vertices[(self.0 % 3) as usize]
+    }
+
+    pub(super) fn point_M(self, mesh: &Mesh) -> &Vector3<f64> {
+        &mesh.vertices()[self.vertex(mesh) as usize]
+    }
+
+    /// From neighbour to neighbour as long as the score grows; where that ends, and the score there.
+    pub(super) fn climb(self, mesh: &Mesh, score: impl Fn(Self) -> f64) -> (Self, f64) {
+        let (mut at, mut most) = (self, score(self));
+        for _ in 0..MOST_STEPS {
+            let from = at;
+            let (face, corner) = (from.0 / 3, (from.0 % 3) as usize);
+            // Which number a face has, the link of the one before it tells; so neighbours are taken face by face.
+            let mut fan = Fan::new(mesh, face, corner);
+            while let Some((face, corner)) = fan.next() {
+                for next in [(corner + 1) % 3, (corner + 2) % 3] {
+                    let neighbour = Self(3 * face + next as u32);
+                    let score = score(neighbour);
+                    if score > most {
+                        (at, most) = (neighbour, score);
+                    }
+                }
+            }
+            if at == from {
+                break;
+            }
+        }
+        (at, most)
+    }
+}
+
+/// The faces around a corner, one way round, up to an end of the mesh.
+struct Fan<'m> {
+    mesh: &'m Mesh,
+    first: u32,
+    next: Option<(u32, usize)>,
+    left: usize,
+}
+
+impl<'m> Fan<'m> {
+    fn new(mesh: &'m Mesh, face: u32, corner: usize) -> Self {
+        Self { mesh, first: face, next: Some((face, corner)), left: MOST_AROUND }
+    }
+
+    fn next(&mut self) -> Option<(u32, usize)> {
+        let (face, corner) = self.next.take()?;
+        let link = self.mesh.faces()[face as usize].links[corner];
+        self.left -= 1;
+        if !link.is_boundary() && !link.is_turned() && link.face() != self.first && self.left > 0 {
+            self.next = Some((link.face(), (link.edge() + 1) % 3));
+        }
+        Some((face, corner))
+    }
+}
+
+/// Steps of a climb; the next tick goes on.
+const MOST_STEPS: usize = 64;
+/// Faces that are looked at around a vertex.
+const MOST_AROUND: usize = 64;
