@@ -7,8 +7,9 @@
 //! of where it stands) ends after few rounds. A solution exists always: springs and dampers take energy from a body
 //! that moves fast, whatever it does.
 //! A step that does not bring it nearer is halved. Where none does (a light body between points with much friction, one
-//! scene in thousands), the points take some cautious turns one by one, which leads out of such a place. Should it find nothing
-//! nevertheless (contact points many times farther from the centre than the mass itself is), what such turns leave stands.
+//! scene in thousands), the forces are let grow from next to nothing; then the points take some cautious turns one by one. Should
+//! all that find nothing (contact points many times farther from the centre than the mass itself is), what such turns leave
+//! stands.
 //!
 //! Measure of what is left: the kinetic energy of the impulse that is too much or too little, over that of all forces.
 
@@ -26,6 +27,8 @@ const SOLVED: f64 = 1e-13;
 const NEARLY_SOLVED: f64 = 1e-9;
 /// How often a step is halved.
 const HALVINGS: usize = 6;
+/// Shares of the tick for which forces last, on the way to all of it.
+const LOADS: [f64; 8] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 0.3, 0.6];
 /// Turns of the points one by one: at first, and the most at once; each time twice as many.
 const FIRST_TURNS: usize = 8;
 const MOST_TURNS: usize = 256;
@@ -50,36 +53,26 @@ pub(super) fn solve(rows: &mut [Row], which: &[usize], motion: &mut Motion, dt_s
         row.torsion.torque_nm = 0.0;
     }
     let mut p = problem.impulse(rows, which);
-    let mut now = problem.sum(rows, which, &p);
+    let mut stuck_at = None;
     let (mut rounds, mut turns) = (0, FIRST_TURNS);
     let is_found = loop {
-        if rounds == MAX_SWEEPS {
+        let is_solved = problem.approach(rows, which, &mut p, 1.0, &mut rounds);
+        if is_solved && !problem.let_slip(rows, which, &p) {
+            break true;
+        }
+        if is_solved {
+            continue;
+        }
+        if rounds >= MAX_SWEEPS || turns > MOST_TURNS {
             break false;
         }
-        rounds += 1;
-        let nearer = problem.step(rows, which, &p, &now);
-        let is_solved = match nearer {
-            Some((next_p, next)) => {
-                // Where roundings are all that is left, a step wins little.
-                let stalls = next.left_j > 0.25 * now.left_j;
-                (p, now) = (next_p, next);
-                now.is_within(SOLVED) || (stalls && now.is_within(NEARLY_SOLVED))
-            }
-            None => now.is_within(NEARLY_SOLVED),
-        };
-        if is_solved {
-            if !problem.let_slip(rows, which, &p) {
-                break true;
-            }
-            now = problem.sum(rows, which, &p);
-        } else if nearer.is_none() {
-            if turns > MOST_TURNS {
-                break false;
-            }
-            problem.settle(rows, which, &p);
+        if stuck_at.is_none() {
+            stuck_at = Some(p);
+            p = problem.load(rows, which, &mut rounds);
+        } else {
+            problem.settle(rows, which, &if turns == FIRST_TURNS { stuck_at.unwrap_or(p) } else { p });
             p = problem.relax(rows, which, turns);
             turns *= 2;
-            now = problem.sum(rows, which, &p);
         }
     };
     problem.settle(rows, which, &p);
@@ -124,8 +117,42 @@ impl Problem {
         joined(&(force_W * self.dt_s), &(torque_W * self.dt_s))
     }
 
+    /// Newton's steps until it is solved, when that is said, or nothing brings it nearer.
+    fn approach(
+        &self,
+        rows: &[Row],
+        which: &[usize],
+        p: &mut Vector6,
+        load: f64,
+        rounds: &mut usize,
+    ) -> bool {
+        let mut now = self.sum(rows, which, p, load);
+        while *rounds < MAX_SWEEPS {
+            *rounds += 1;
+            let Some((next_p, next)) = self.step(rows, which, p, &now, load) else {
+                return now.is_within(NEARLY_SOLVED);
+            };
+            // Where roundings are all that is left, a step wins little.
+            let stalls = next.left_j > 0.25 * now.left_j;
+            (*p, now) = (next_p, next);
+            if now.is_within(SOLVED) || (stalls && now.is_within(NEARLY_SOLVED)) {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// The way from forces that do next to nothing to all of them.
+    fn load(&self, rows: &[Row], which: &[usize], rounds: &mut usize) -> Vector6 {
+        let mut p = Vector6::zeros();
+        for load in LOADS {
+            self.approach(rows, which, &mut p, load, rounds);
+        }
+        p
+    }
+
     /// What the points do at `p`.
-    fn sum(&self, rows: &[Row], which: &[usize], p: &Vector6) -> Sum {
+    fn sum(&self, rows: &[Row], which: &[usize], p: &Vector6, load: f64) -> Sum {
         let motion = self.moving(p);
         let (mut force_W, mut torque_W, mut all) = (Vector3::zeros(), Vector3::zeros(), 0.0);
         let turns = self.start.inverse_inertia_W.trace();
@@ -139,9 +166,9 @@ impl Problem {
             all += on_body_W.norm_squared() * (self.start.inverse_mass + arm_W.norm_squared() * turns)
                 + twist_nm * twist_nm * turns;
         }
-        let impulse = joined(&(force_W * self.dt_s), &(torque_W * self.dt_s));
-        let left = p - impulse;
-        Sum { left, left_j: self.energy(&left), all_j: all * self.dt_s * self.dt_s }
+        let acts_s = self.dt_s * load;
+        let left = p - joined(&(force_W * acts_s), &(torque_W * acts_s));
+        Sum { left, left_j: self.energy(&left), all_j: all * acts_s * acts_s }
     }
 
     /// `p W p`.
@@ -151,12 +178,19 @@ impl Problem {
     }
 
     /// A step of Newton's that brings it nearer, and what the points do there.
-    fn step(&self, rows: &[Row], which: &[usize], p: &Vector6, now: &Sum) -> Option<(Vector6, Sum)> {
-        let change = self.derivative(rows, which, p).lu().solve(&now.left)?;
+    fn step(
+        &self,
+        rows: &[Row],
+        which: &[usize],
+        p: &Vector6,
+        now: &Sum,
+        load: f64,
+    ) -> Option<(Vector6, Sum)> {
+        let change = self.derivative(rows, which, p, load).lu().solve(&now.left)?;
         let mut share = 1.0;
         for _ in 0..=HALVINGS {
             let next_p = p - change * share;
-            let next = self.sum(rows, which, &next_p);
+            let next = self.sum(rows, which, &next_p, load);
             if next.left_j < (1.0 - 1e-3 * share) * now.left_j || next.left_j == 0.0 {
                 return Some((next_p, next));
             }
@@ -166,7 +200,7 @@ impl Problem {
     }
 
     /// Of `p - dt sum J^T f(u_0 + W p)`, by `p`.
-    fn derivative(&self, rows: &[Row], which: &[usize], p: &Vector6) -> Matrix6 {
+    fn derivative(&self, rows: &[Row], which: &[usize], p: &Vector6, load: f64) -> Matrix6 {
         let motion = self.moving(p);
         let mut falls = [Matrix3::zeros(); 4];
         for &at in which {
@@ -189,7 +223,7 @@ impl Problem {
             let (row, column) = (block / 2 * 3, block % 2 * 3);
             let by_p = if column == 0 { falls * inverse_mass } else { falls * inverse_inertia_W };
             let mut place = derivative.fixed_view_mut::<3, 3>(row, column);
-            place += by_p * self.dt_s;
+            place += by_p * (self.dt_s * load);
         }
         derivative
     }
