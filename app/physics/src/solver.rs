@@ -90,13 +90,20 @@ impl Solver {
     pub fn solve(&mut self, rows: &mut [Row], motions: &mut [Motion], dt_s: f64) -> usize {
         let room = self.blocks.capacity().min(rows.len());
         let (rows, beyond) = rows.split_at_mut(room);
-        beyond.iter_mut().for_each(|row| row.force_W = Vector3::zeros());
+        for row in beyond {
+            (row.force_W, row.torsion.torque_nm) = (Vector3::zeros(), 0.0);
+        }
         self.blocks.clear();
         for row in rows.iter_mut() {
             row.force_W = row.project(&row.force_W);
             self.blocks.push(Block::new(row, motions, dt_s));
             push(row, motions, &(row.force_W * dt_s));
-            row.torsion.torque_nm = 0.0;
+            let most_nm = row.torsion.most_nm.max(0.0);
+            // A guess that is no number is none.
+            let guess_nm = row.torsion.torque_nm;
+            row.torsion.torque_nm =
+                if guess_nm.is_finite() && guess_nm.abs() <= most_nm { guess_nm } else { 0.0 };
+            twirl(row, motions, row.torsion.torque_nm * dt_s);
         }
         let mut sweeps = 0;
         while sweeps < MAX_SWEEPS {
@@ -124,7 +131,9 @@ impl Solver {
             most = most.max(force_W.norm_squared());
             if row.torsion.most_nm > 0.0 {
                 let change = twist(row, motions, dt_s);
-                most_change = most_change.max(change * change / (ARM_M * ARM_M));
+                let per_arm = (ARM_M * ARM_M).recip();
+                most_change = most_change.max(change * change * per_arm);
+                most = most.max(row.torsion.torque_nm.powi(2) * per_arm);
             }
         }
         most_change <= SETTLED * SETTLED * most
@@ -177,6 +186,9 @@ impl Block {
         if inside_W == sticks_W {
             return sticks_W;
         }
+        if row.tie_n.is_some() {
+            return self.stretched(row, velocity_W, dt_s);
+        }
         // On the rim: normal and tangential part in turns.
         let give_n = n.dot(&(self.give_W * n));
         let give_t = self.give_W.diagonal().max();
@@ -191,6 +203,18 @@ impl Block {
             let trial_across_W = trial_W - n * n.dot(&trial_W);
             let across_W = across_W + (trial_across_W - across_W) / (1.0 + across * give_t);
             force_W = n * normal_n + row.within(&across_W, normal_n);
+        }
+        force_W
+    }
+
+    /// A tie's force when it is at its limit: a step towards the trial force, cut, in turns.
+    fn stretched(&self, row: &Row, velocity_W: &Vector3<f64>, dt_s: f64) -> Vector3<f64> {
+        let falls_W = row.falls_W(dt_s);
+        let most = 1.0 + (falls_W * self.give_W).norm();
+        let mut force_W = row.project(&row.force_W);
+        for _ in 0..RIM_ROUNDS {
+            let trial_W = row.rest_W - falls_W * (velocity_W + self.give_W * force_W);
+            force_W = row.project(&(force_W + (trial_W - force_W) / most));
         }
         force_W
     }
@@ -219,12 +243,18 @@ fn twist(row: &mut Row, motions: &mut [Motion], dt_s: f64) -> f64 {
         ((torsion.rest_nm - falls * without) / (1.0 + falls * give)).clamp(-torsion.most_nm, torsion.most_nm);
     let change = torque_nm - torsion.torque_nm;
     torsion.torque_nm = torque_nm;
-    let impulse_W = n * (change * dt_s);
+    twirl(row, motions, change * dt_s);
+    change
+}
+
+/// An angular impulse about the normal (N m s).
+#[inline]
+fn twirl(row: &Row, motions: &mut [Motion], impulse_nms: f64) {
+    let impulse_W = row.normal_W * impulse_nms;
     motions[row.body].turn(&impulse_W);
     if let Some(other) = row.other {
         motions[other].turn(&-impulse_W);
     }
-    change
 }
 
 /// A torque counts as the force that makes it at this arm \[m\].
