@@ -6,6 +6,8 @@ use nalgebra::Vector3;
 use crate::body::Body;
 use crate::collide::{MAX_POINTS, can_move};
 use crate::error::BodyError;
+use crate::grasp_axis::GraspAxis;
+use crate::hand::{FingerSettings, FingerTick, Hand, HandStart};
 use crate::integrator::Integrator;
 use crate::pair::{Pair, Response, Start, Surfacing};
 use crate::row::Row;
@@ -55,6 +57,7 @@ pub struct Manipulation {
     rows: Vec<Row>,
     motions: Vec<Motion>,
     solver: Solver,
+    hand: Hand,
 }
 
 /// What a tick took and did.
@@ -104,7 +107,23 @@ impl Manipulation {
             rows: Vec::with_capacity(room),
             motions: Vec::with_capacity(bodies.len()),
             solver: Solver::with_capacity(room),
+            hand: Hand::new(&[], bodies.len()),
         })
+    }
+
+    /// With fingers that are more than points: soft, or with a button. What they are must have been
+    /// [checked](crate::SoftFinger::validated); a finger beyond them is a point.
+    #[must_use]
+    pub fn with_fingers(mut self, fingers: &[FingerSettings]) -> Self {
+        self.hand = Hand::new(fingers, self.bodies.len());
+        let room = self.rows.capacity() + self.hand.most_rows();
+        (self.rows, self.solver) = (Vec::with_capacity(room), Solver::with_capacity(room));
+        self
+    }
+
+    /// The line between the two fingers that held a body in the last tick.
+    pub fn grasp_axis(&self, body: usize) -> Option<GraspAxis> {
+        self.hand.axis(body)
     }
 
     /// The bodies, in the order in which they were given.
@@ -119,6 +138,17 @@ impl Manipulation {
 
     /// One tick: moves the bodies and their entities; of each touch, `force_on_user_W` becomes what the body got, times -1.
     pub fn step(&mut self, entities: &mut [Entity], touches: &mut [Touch], dt_s: f64) -> Made {
+        self.step_with(entities, touches, &mut [], dt_s)
+    }
+
+    /// As [`Self::step`], with what the fingers do besides touching, by their numbers; their answers are filled in.
+    pub fn step_with(
+        &mut self,
+        entities: &mut [Entity],
+        touches: &mut [Touch],
+        fingers: &mut [FingerTick],
+        dt_s: f64,
+    ) -> Made {
         if !(dt_s > 0.0 && dt_s.is_finite()) {
             return Made::default();
         }
@@ -126,8 +156,8 @@ impl Manipulation {
         self.rows.clear();
         let start = Start { entities, bodies: &self.bodies, motions: &self.motions, dt_s };
         // Fingers first: they are never left out.
-        let mut fingers = [None; MAX_TOUCHES];
-        for (touch, place) in touches.iter().zip(&mut fingers) {
+        let mut touch_rows = [None; MAX_TOUCHES];
+        for (touch, place) in touches.iter().zip(&mut touch_rows) {
             let Some(body) = self.entities.iter().position(|&entity| entity == touch.entity) else {
                 continue;
             };
@@ -135,15 +165,26 @@ impl Manipulation {
             *place = Some(self.rows.len());
             self.rows.push(touch.row(body, &state.centre_W, &motion, &entities[touch.entity], dt_s));
         }
+        let hand = HandStart {
+            touches,
+            touch_rows: &touch_rows,
+            entities,
+            bodies_are: &self.entities,
+            bodies: &self.bodies,
+            gravity_W: self.settings.gravity_W,
+            dt_s,
+        };
+        self.hand.gather(&hand, fingers, &mut self.rows);
         for pair in &mut self.pairs {
             pair.gather(&start, &mut self.rows);
         }
         let sweeps = self.solver.solve(&mut self.rows, &mut self.motions, dt_s);
-        for (touch, row) in touches.iter_mut().zip(fingers) {
+        for (touch, row) in touches.iter_mut().zip(touch_rows) {
             if let Some(row) = row {
                 touch.force_on_user_W = -self.rows[row].force_W;
             }
         }
+        self.hand.settle(&self.rows, &self.motions, &self.entities, fingers, dt_s);
         for pair in &mut self.pairs {
             pair.settle(&self.rows, &self.motions, entities, dt_s);
         }
