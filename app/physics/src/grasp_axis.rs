@@ -150,9 +150,7 @@ impl AxisMemory {
 
     /// Remembers how the tick ended.
     pub(crate) fn settle(&mut self, torsion: &Torsion, spin_rad_s: f64, dt_s: f64) {
-        if torsion.stiffness_nm_per_rad > 0.0 {
-            self.twist.settle(torsion, spin_rad_s, dt_s);
-        }
+        self.twist.settle(torsion, spin_rad_s, dt_s);
     }
 }
 

@@ -65,9 +65,12 @@ impl Twist {
     /// Remembers how the tick ended; `spin_rad_s` is how fast the body turns about the axis in it.
     pub(crate) fn settle(&mut self, torsion: &Torsion, spin_rad_s: f64, dt_s: f64) {
         self.torque_nm = torsion.torque_nm;
-        if torsion.torque_nm.abs() >= torsion.most_nm * (1.0 - RIM) {
-            // On the limit: turned by what the limit turns it, less what it will be found to have turned until then.
-            self.angle_rad = -torsion.torque_nm / torsion.stiffness_nm_per_rad - spin_rad_s * dt_s;
+        if torsion.stiffness_nm_per_rad > 0.0 {
+            // No spring is turned by more than the limit turns it: the rest of the angle slides along. What the damper adds
+            // to the torque is not the spring's. The angle is kept as it was before the turn that will be found.
+            let turn_rad = spin_rad_s * dt_s;
+            let most_rad = torsion.most_nm.max(0.0) / torsion.stiffness_nm_per_rad;
+            self.angle_rad = (self.angle_rad + turn_rad).clamp(-most_rad, most_rad) - turn_rad;
         }
     }
 
@@ -76,9 +79,6 @@ impl Twist {
         (self.angle_rad, self.torque_nm) = (0.0, 0.0);
     }
 }
-
-/// Roundings of a torque.
-const RIM: f64 = 1e-9;
 
 #[cfg(test)]
 mod tests {
