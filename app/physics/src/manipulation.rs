@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 use crate::body::Body;
 use crate::collide::{MAX_POINTS, can_move};
 use crate::error::BodyError;
+use crate::grasp::{self, GraspQuality};
 use crate::grasp_axis::GraspAxis;
 use crate::hand::{FingerSettings, FingerTick, Hand, HandStart};
 use crate::integrator::Integrator;
@@ -58,6 +59,8 @@ pub struct Manipulation {
     motions: Vec<Motion>,
     solver: Solver,
     hand: Hand,
+    /// So many of the rows, from the first on, are fingers' touches.
+    touch_rows: usize,
 }
 
 /// What a tick took and did.
@@ -108,6 +111,7 @@ impl Manipulation {
             motions: Vec::with_capacity(bodies.len()),
             solver: Solver::with_capacity(room),
             hand: Hand::new(&[], bodies.len()),
+            touch_rows: 0,
         })
     }
 
@@ -119,6 +123,14 @@ impl Manipulation {
         let room = self.rows.capacity() + self.hand.most_rows();
         (self.rows, self.solver) = (Vec::with_capacity(room), Solver::with_capacity(room));
         self
+    }
+
+    /// How well the fingers held a body in the last tick. Not part of a tick: it takes some microseconds.
+    pub fn grasp_quality(&self, body: usize) -> Option<GraspQuality> {
+        let state = self.bodies.get(body)?;
+        let weight_W = self.settings.gravity_W * state.mass.mass_kg;
+        // Arms are those of the tick's beginning: any centre will do.
+        Some(grasp::quality(&self.rows, self.touch_rows, body, (&state.centre_W, &weight_W)))
     }
 
     /// The line between the two fingers that held a body in the last tick.
@@ -165,6 +177,7 @@ impl Manipulation {
             *place = Some(self.rows.len());
             self.rows.push(touch.row(body, &state.centre_W, &motion, &entities[touch.entity], dt_s));
         }
+        self.touch_rows = self.rows.len();
         let hand = HandStart {
             touches,
             touch_rows: &touch_rows,
