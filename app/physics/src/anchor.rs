@@ -25,6 +25,8 @@ pub struct Anchor {
     force: Vector3<f64>,
     /// Whether it stuck or slid.
     held: Held,
+    /// It came nearer when the last tick began, fast enough to bounce.
+    pub(crate) approached: bool,
     /// How much of a depth that was there from the start is still granted \[m\].
     pub(crate) granted_m: f64,
 }
@@ -68,6 +70,11 @@ impl Anchor {
 
     pub(crate) fn held(&self) -> Held {
         self.held
+    }
+
+    /// Whether it was pressed in the last tick.
+    pub(crate) fn is_pressed(&self) -> bool {
+        self.force != Vector3::zeros()
     }
 
     /// Where it was, when nobody knows what it is now \[m\], in W.

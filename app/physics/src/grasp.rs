@@ -142,7 +142,7 @@ fn tangents(normal_W: &Vector3<f64>) -> [Vector3<f64>; 2] {
     [one, normal_W.cross(&one)]
 }
 
-/// Of a body whose finger contacts are the first so many rows, and its other contacts the rest.
+/// Of a body whose finger contacts are among the first so many rows, and its other contacts the rest.
 pub(crate) fn quality(
     rows: &[Row],
     touches: usize,
@@ -150,7 +150,7 @@ pub(crate) fn quality(
     (centre_W, weight_W): (&Vector3<f64>, &Vector3<f64>),
 ) -> GraspQuality {
     let mut grasp = Grasp::about(*centre_W);
-    for row in rows.iter().take(touches).filter(|row| row.body == body) {
+    for row in rows.iter().take(touches).filter(|row| row.body == body && row.tie_n.is_none()) {
         let normal_n = row.normal_W.dot(&row.force_W);
         if normal_n > 0.0 {
             grasp.add(GraspContact {

@@ -50,7 +50,7 @@ pub use grasp::{Grasp, GraspContact, GraspQuality};
 pub use grasp_axis::GraspAxis;
 pub use hand::{FingerSettings, FingerTick};
 pub use integrator::Integrator;
-pub use manipulation::{Made, Manipulation, Settings};
+pub use manipulation::{Made, Manipulation, Parked, Reason, Settings};
 pub use mass::MassProperties;
 pub use pair::{Response, Surfacing};
 pub use pair_friction::PairFriction;

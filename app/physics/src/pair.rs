@@ -79,6 +79,8 @@ pub(crate) struct Start<'t> {
     /// As they are without contacts, at the end of the tick.
     pub(crate) motions: &'t [Motion],
     pub(crate) dt_s: f64,
+    /// Whether forces are those of the end of the tick.
+    pub(crate) is_implicit: bool,
 }
 
 impl Pair {
@@ -114,8 +116,8 @@ impl Pair {
             if rows.len() == rows.capacity() {
                 return;
             }
-            anchor.granted_m =
-                (anchor.granted_m - LET_OUT_M_S * start.dt_s).clamp(0.0, (-point.gap_m).max(0.0));
+            let let_out_m = let_out_m_s(anchor.granted_m, start.dt_s) * start.dt_s;
+            anchor.granted_m = (anchor.granted_m - let_out_m).clamp(0.0, (-point.gap_m).max(0.0));
             rows.push(row(self.bodies, &self.surfacing, anchor, point, &b.X_WB, start));
             self.rows += 1;
         }
@@ -203,7 +205,7 @@ fn is_near(a: &Entity, b: &Entity, reach_m: f64) -> bool {
 fn row(
     (body, other): (usize, Option<usize>),
     surfacing: &Surfacing,
-    anchor: &Anchor,
+    anchor: &mut Anchor,
     point: &ContactPoint,
     X_WB: &Isometry3<f64>,
     start: &Start<'_>,
@@ -231,32 +233,58 @@ fn row(
     let rest_n = match surfacing.response {
         //= melder#6.2
         Response::Force if gap_m < 0.0 => -k * gap_m,
+        // Of a force that is known when the tick begins nothing is damped before they meet.
+        Response::Force if !start.is_implicit => {
+            row.damping[0] = 0.0;
+            -k * gap_m
+        }
         // Only what is left of the tick when they meet is damped.
         Response::Force => {
             (row.stiffness[0], row.damping[0]) = (k + b / dt_s, 0.0);
             -row.stiffness[0] * gap_m
         }
         Response::Impulse { restitution } => {
-            let stop = hard(&row, start);
-            let approach_m_s = -n.dot(&relative(&row, start));
-            // Slower than what gravity brings up in a few ticks, it rests.
-            //= melder#6.1
-            let bounce_m_s = if approach_m_s > SLOW_M_S && gap_m < approach_m_s * dt_s {
-                restitution * approach_m_s
-            } else {
-                0.0
-            };
-            let wanted_m_s = if gap_m < 0.0 { -gap_m * CORRECTED / dt_s } else { -gap_m / dt_s };
+            let stop = stop_n_s_per_m(&row, start);
             (row.stiffness, row.damping) = ([0.0, k], [stop, b]);
-            stop * if bounce_m_s > 0.0 { bounce_m_s } else { wanted_m_s.min(LET_OUT_M_S) }
+            if let Some(bounce_m_s) = bounce_m_s(&row, gap_m, restitution, anchor, start) {
+                // What an impulse gives across the normal lasts no longer than the impulse.
+                row.stiffness[1] = stop / dt_s;
+                row.rest_W = n * (stop * bounce_m_s);
+                return row;
+            }
+            let wanted_m_s = if gap_m < 0.0 { let_out_m_s(-gap_m, dt_s) } else { -gap_m / dt_s };
+            stop * wanted_m_s
         }
     };
     row.rest_W = n * rest_n - anchor.stretch_W(X_WB) * row.stiffness[1];
     row
 }
 
+/// With which normal velocity the row's point leaves the tick, if it bounces.
+///
+/// That is the reflected velocity of the beginning of the tick, less what gravity takes from it in the whole tick: so a ball
+/// that does not lose anything else loses `(g dt)^2 / 2` of energy per mass in each bounce, and never gains. A bounce that
+/// gravity would end within the tick is none. Nor is one that anything else ended so: a contact that closes in a tick in
+/// which it did not approach was pushed back before it got off, and rests.
+fn bounce_m_s(
+    row: &Row,
+    gap_m: f64,
+    restitution: f64,
+    anchor: &mut Anchor,
+    start: &Start<'_>,
+) -> Option<f64> {
+    let along = |velocity_W: &Vector3<f64>| row.normal_W.dot(velocity_W);
+    let (now_m_s, freely_m_s) = (along(&at_start(row, start)), along(&freely(row, start)));
+    //= melder#6.1
+    let bounce_m_s = restitution * -now_m_s + (freely_m_s - now_m_s).min(0.0);
+    let approaches = now_m_s < 0.0 && bounce_m_s > 0.0;
+    let was_pushed_back = anchor.is_pressed() && !anchor.approached;
+    anchor.approached = approaches;
+    (approaches && !was_pushed_back && gap_m < -freely_m_s * start.dt_s).then_some(bounce_m_s)
+}
+
 /// Velocity of A's point relative to B's when the tick begins.
-fn relative(row: &Row, start: &Start<'_>) -> Vector3<f64> {
+fn at_start(row: &Row, start: &Start<'_>) -> Vector3<f64> {
     let at = |body: usize, arm_W: &Vector3<f64>| {
         let body = &start.bodies[body];
         body.velocity_W + body.angular_velocity_W().cross(arm_W)
@@ -264,21 +292,38 @@ fn relative(row: &Row, start: &Start<'_>) -> Vector3<f64> {
     at(row.body, &row.arms_W[0]) - row.other.map_or(Vector3::zeros(), |other| at(other, &row.arms_W[1]))
 }
 
+/// The same at its end, if nothing touched anything.
+fn freely(row: &Row, start: &Start<'_>) -> Vector3<f64> {
+    let at = |body: usize, arm_W: &Vector3<f64>| start.motions[body].at(arm_W);
+    at(row.body, &row.arms_W[0]) - row.other.map_or(Vector3::zeros(), |other| at(other, &row.arms_W[1]))
+}
+
 /// A damping so large that velocities are what is wanted.
-fn hard(row: &Row, start: &Start<'_>) -> f64 {
-    let inverse = |body: usize| start.motions[body].inverse_mass;
-    HARD / ((inverse(row.body) + row.other.map_or(0.0, inverse)) * start.dt_s)
+fn stop_n_s_per_m(row: &Row, start: &Start<'_>) -> f64 {
+    let give = |body: usize, arm_W: &Vector3<f64>| {
+        let motion = &start.motions[body];
+        let turns_W = arm_W.cross(&row.normal_W);
+        motion.inverse_mass + turns_W.dot(&(motion.inverse_inertia_W * turns_W))
+    };
+    let gives = give(row.body, &row.arms_W[0]) + row.other.map_or(0.0, |other| give(other, &row.arms_W[1]));
+    // Nothing can be stopped that nothing moves.
+    if gives > 0.0 { HARD / (gives * start.dt_s) } else { 0.0 }
+}
+
+/// How fast a depth that should not be there is let out.
+fn let_out_m_s(depth_m: f64, dt_s: f64) -> f64 {
+    (depth_m / LET_OUT_S.max(dt_s)).min(LET_OUT_M_S)
 }
 
 /// Contact points are looked for from this distance on \[m\].
 const REACH_M: f64 = 1e-3;
 /// A contact point of another name within this distance is the same one \[m\].
 const NEAR_M: f64 = 2e-4;
-/// How fast a depth that was there from the start is let out \[m/s\].
+/// A depth that should not be there falls by `e` in this time \[s\]. The body then slows down by less than gravity slows it,
+/// for depths up to `g t^2`, 0.1 m: it follows, and does not hop.
+const LET_OUT_S: f64 = 0.1;
+/// And never faster than this \[m/s\].
 const LET_OUT_M_S: f64 = 0.2;
-/// Approaching slower than this, nothing bounces \[m/s\].
-const SLOW_M_S: f64 = 0.02;
-/// How much of a depth an impulse response takes back in a tick.
-const CORRECTED: f64 = 0.2;
-/// How many times harder than the bodies' masses impulses stop.
-const HARD: f64 = 1e4;
+/// How many times harder than what moves impulses stop: velocities are right to one part in so many, and solved for with as
+/// many times the rounding.
+const HARD: f64 = 1e6;
