@@ -22,28 +22,40 @@
 #![allow(non_snake_case)]
 
 mod anchor;
+mod attach;
 mod body;
 pub mod collide;
 mod error;
+mod gimbal;
+pub mod grasp;
+mod grasp_axis;
+mod hand;
 mod integrator;
 mod manipulation;
 mod mass;
 mod pair;
 mod pair_friction;
 mod row;
+mod soft_finger;
 mod solver;
 mod touch;
+mod twist;
 mod wrench;
 
 pub use anchor::Anchor;
+pub use attach::{Attachment, HeldOrientation};
 pub use body::Body;
 pub use error::BodyError;
+pub use grasp::{Grasp, GraspContact, GraspQuality};
+pub use grasp_axis::GraspAxis;
+pub use hand::{FingerSettings, FingerTick};
 pub use integrator::Integrator;
 pub use manipulation::{Made, Manipulation, Parked, Reason, Settings};
 pub use mass::MassProperties;
 pub use pair::{Response, Surfacing};
 pub use pair_friction::PairFriction;
 pub use row::{Held, Row, Torsion};
+pub use soft_finger::{SoftFinger, TorsionModel};
 pub use solver::{MAX_SWEEPS, Motion, Solver};
 pub use touch::Touch;
 pub use wrench::Wrench;

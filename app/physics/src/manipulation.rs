@@ -6,6 +6,9 @@ use nalgebra::Vector3;
 use crate::body::Body;
 use crate::collide::{self, MAX_POINTS, can_move};
 use crate::error::BodyError;
+use crate::grasp::{self, GraspQuality};
+use crate::grasp_axis::GraspAxis;
+use crate::hand::{FingerSettings, FingerTick, Hand, HandStart};
 use crate::integrator::explicit::{self, Kept};
 use crate::integrator::rk4::Stages;
 use crate::integrator::{Gets, Integrator, Limits, mean_angular_velocity_W};
@@ -57,6 +60,7 @@ pub struct Manipulation {
     rows: Vec<Row>,
     motions: Vec<Motion>,
     solver: Solver,
+    hand: Hand,
     /// The first so many rows are fingers'.
     touching: usize,
     gets: Box<[Gets]>,
@@ -129,6 +133,7 @@ impl Manipulation {
             pairs: pairs.into(),
             rows: Vec::with_capacity(room),
             motions: Vec::with_capacity(bodies.len()),
+            hand: Hand::new(&[], bodies.len()),
             solver: Solver::with_capacity(room, bodies.len()),
             touching: 0,
             gets: vec![Gets::default(); bodies.len()].into(),
@@ -136,6 +141,33 @@ impl Manipulation {
             fixed: Vec::with_capacity(room),
             parked: Vec::with_capacity(bodies.len()),
         })
+    }
+
+    /// With fingers that are more than points: soft, or with a button. What they are must have been
+    /// [checked](crate::SoftFinger::validated); a finger beyond them is a point.
+    #[must_use]
+    pub fn with_fingers(mut self, fingers: &[FingerSettings]) -> Self {
+        self.hand = Hand::new(fingers, self.bodies.len());
+        let room = self.rows.capacity() + self.hand.most_rows();
+        let bodies = self.bodies.len();
+        self.rows = Vec::with_capacity(room);
+        self.solver = Solver::with_capacity(room, bodies);
+        self.stages = Stages::with_capacity(room, bodies);
+        self.fixed = Vec::with_capacity(room);
+        self
+    }
+
+    /// How well the fingers held a body in the last tick. Not part of a tick: it takes some microseconds.
+    pub fn grasp_quality(&self, body: usize) -> Option<GraspQuality> {
+        let state = self.bodies.get(body)?;
+        let weight_W = self.settings.gravity_W * state.mass.mass_kg;
+        // Arms are those of the tick's beginning: any centre will do.
+        Some(grasp::quality(&self.rows, self.touching, body, (&state.centre_W, &weight_W)))
+    }
+
+    /// The line between the two fingers that held a body in the last tick.
+    pub fn grasp_axis(&self, body: usize) -> Option<GraspAxis> {
+        self.hand.axis(body)
     }
 
     /// The bodies, in the order in which they were given.
@@ -161,17 +193,29 @@ impl Manipulation {
 
     /// One tick: moves the bodies and their entities; of each touch, `force_on_user_W` becomes what the body got, times -1.
     pub fn step(&mut self, entities: &mut [Entity], touches: &mut [Touch], dt_s: f64) -> Made {
+        self.step_with(entities, touches, &mut [], dt_s)
+    }
+
+    /// As [`Self::step`], with what the fingers do besides touching, by their numbers; their answers are filled in.
+    pub fn step_with(
+        &mut self,
+        entities: &mut [Entity],
+        touches: &mut [Touch],
+        fingers: &mut [FingerTick],
+        dt_s: f64,
+    ) -> Made {
         if !(dt_s > 0.0 && dt_s.is_finite()) {
             return Made::default();
         }
         self.fall_freely(dt_s);
-        let fingers = self.gather(entities, touches, dt_s);
+        let touch_rows = self.gather(entities, touches, fingers, dt_s);
         let sweeps = self.find_forces(dt_s);
-        for (touch, row) in touches.iter_mut().zip(fingers) {
+        for (touch, row) in touches.iter_mut().zip(touch_rows) {
             if let Some(row) = row {
                 touch.force_on_user_W = -self.rows[row].force_W;
             }
         }
+        self.hand.settle(&self.rows, &self.motions, &self.entities, fingers, dt_s);
         for pair in &mut self.pairs {
             pair.settle(&self.rows, &self.motions, entities, dt_s);
         }
@@ -199,11 +243,17 @@ impl Manipulation {
     }
 
     /// All contact points of the tick; says which are whose touch.
-    fn gather(&mut self, entities: &[Entity], touches: &[Touch], dt_s: f64) -> [Option<usize>; MAX_TOUCHES] {
+    fn gather(
+        &mut self,
+        entities: &[Entity],
+        touches: &[Touch],
+        fingers: &[FingerTick],
+        dt_s: f64,
+    ) -> [Option<usize>; MAX_TOUCHES] {
         self.rows.clear();
-        let mut fingers = [None; MAX_TOUCHES];
+        let mut touch_rows = [None; MAX_TOUCHES];
         // Fingers first: they are never left out.
-        for (touch, place) in touches.iter().zip(&mut fingers) {
+        for (touch, place) in touches.iter().zip(&mut touch_rows) {
             let Some(body) = self.entities.iter().position(|&entity| entity == touch.entity) else {
                 continue;
             };
@@ -211,6 +261,19 @@ impl Manipulation {
             *place = Some(self.rows.len());
             self.rows.push(touch.row(body, &state.centre_W, &motion, &entities[touch.entity], dt_s));
         }
+        self.hand.gather(
+            &HandStart {
+                touches,
+                touch_rows: &touch_rows,
+                entities,
+                bodies_are: &self.entities,
+                bodies: &self.bodies,
+                gravity_W: self.settings.gravity_W,
+                dt_s,
+            },
+            fingers,
+            &mut self.rows,
+        );
         self.touching = self.rows.len();
         let start = Start {
             entities,
@@ -222,7 +285,7 @@ impl Manipulation {
         for pair in &mut self.pairs {
             pair.gather(&start, &mut self.rows);
         }
-        fingers
+        touch_rows
     }
 
     /// What all contact points do in the tick; returns the turns of the solver.

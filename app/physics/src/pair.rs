@@ -230,6 +230,7 @@ fn row(
         held: anchor.held(),
         force_W: anchor.force_W(X_WB),
         torsion: Torsion::default(),
+        tie_n: None,
     };
     let rest_n = match surfacing.response {
         //= melder#6.2

@@ -35,6 +35,8 @@ pub struct Row {
     pub force_W: Vector3<f64>,
     /// What of its turning about the normal the contact resists.
     pub torsion: Torsion,
+    /// A tie, not a contact: it pulls as well as it presses, in every direction up to this force \[N\]; there is no cone.
+    pub tie_n: Option<f64>,
 }
 
 /// Resistance of a contact point to turning about its normal: a spring with damper and limit, as the row itself.
@@ -103,9 +105,31 @@ impl Row {
         self.rest_W - change(k_n, k_t, displacement_W) - change(b_n, b_t, velocity_W)
     }
 
-    /// The force: what of a trial force does not pull and lies in the cone.
+    /// A row that only turns, about this axis (unit): the body, against what is fixed.
+    pub fn turning(body: usize, axis_W: Vector3<f64>, torsion: Torsion) -> Self {
+        Self {
+            body,
+            other: None,
+            arms_W: [Vector3::zeros(); 2],
+            normal_W: axis_W,
+            rest_W: Vector3::zeros(),
+            stiffness: [0.0; 2],
+            damping: [0.0; 2],
+            mu_hold: 0.0,
+            mu_slide: 0.0,
+            held: Held::Stick,
+            force_W: Vector3::zeros(),
+            torsion,
+            tie_n: None,
+        }
+    }
+
+    /// The force: what of a trial force does not pull and lies in the cone; of a tie, what is not too much.
     #[inline]
     pub fn project(&self, trial_W: &Vector3<f64>) -> Vector3<f64> {
+        if let Some(most_n) = self.tie_n {
+            return within_ball(trial_W, most_n);
+        }
         let normal_n = self.normal_W.dot(trial_W);
         if normal_n.is_nan() || normal_n <= 0.0 {
             return Vector3::zeros();
@@ -143,6 +167,7 @@ impl Row {
         vectors.iter().all(|v| v.iter().all(|x| x.is_finite()))
             && not_negative.iter().all(|x| x.is_finite() && *x >= 0.0)
             && torsion.rest_nm.is_finite()
+            && self.tie_n.is_none_or(|most_n| most_n.is_finite() && most_n >= 0.0)
     }
 
     #[inline]
@@ -181,6 +206,16 @@ impl Row {
         let [along, across] = self.falls(dt_s);
         let n = self.normal_W;
         let trial_W = self.trial_at_end_W(velocity_W, dt_s);
+        if let Some(most_n) = self.tie_n {
+            let length_n = trial_W.norm();
+            let falls_W = Matrix3::from_diagonal_element(across) + n * n.transpose() * (along - across);
+            let unit_W = trial_W / length_n;
+            return if length_n <= most_n {
+                falls_W
+            } else {
+                (Matrix3::identity() - unit_W * unit_W.transpose()) * falls_W * (most_n / length_n)
+            };
+        }
         let normal_n = n.dot(&trial_W);
         if normal_n <= 0.0 {
             return Matrix3::zeros();
@@ -195,5 +230,17 @@ impl Row {
         let share = if across_n > 0.0 { mu * normal_n / across_n } else { 0.0 };
         (n + t * mu) * n.transpose() * along
             + (Matrix3::identity() - n * n.transpose() - t * t.transpose()) * (across * share)
+    }
+}
+
+/// A force, cut to this length; one that is no number is none.
+fn within_ball(force_W: &Vector3<f64>, most_n: f64) -> Vector3<f64> {
+    let length_n = force_W.norm();
+    if length_n <= most_n {
+        *force_W
+    } else if length_n.is_finite() {
+        force_W * (most_n / length_n)
+    } else {
+        Vector3::zeros()
     }
 }

@@ -125,7 +125,7 @@ fn silence(row: &mut Row) {
 
 /// Where stiction is at its limit it breaks; says whether sliding takes another force than holding did.
 fn lets_slip(row: &mut Row) -> bool {
-    let breaks = row.held == Held::Stick && is_at_the_rim(row, row.mu_hold);
+    let breaks = row.held == Held::Stick && row.tie_n.is_none() && is_at_the_rim(row, row.mu_hold);
     if breaks {
         row.held = Held::Slip;
     }

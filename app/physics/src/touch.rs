@@ -59,6 +59,7 @@ impl Touch {
             held,
             force_W,
             torsion: Torsion::default(),
+            tie_n: None,
         };
         let velocity_W = motion.at(&arm_W);
         row.rest_W += force_W - row.trial_W(&(velocity_W * dt_s), &velocity_W);

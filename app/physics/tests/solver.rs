@@ -44,6 +44,7 @@ fn row(noise: &mut Noise, size: f64, stiffness: f64, mu: f64) -> Row {
         held: if noise.chance(0.5) { Held::Stick } else { Held::Slip },
         force_W: normal_W * stiffness * noise.within(0.0, 1e-3),
         torsion: Torsion::default(),
+        tie_n: None,
     }
 }
 

@@ -67,7 +67,9 @@ fn sweep(
         most = most.max(force_W.norm_squared());
         if row.torsion.most_nm > 0.0 {
             let change = twist(row, motions, dt_s);
-            most_change = most_change.max(change * change / (ARM_M * ARM_M));
+            let per_arm = (ARM_M * ARM_M).recip();
+            most_change = most_change.max(change * change * per_arm);
+            most = most.max(row.torsion.torque_nm.powi(2) * per_arm);
         }
     }
     most_change <= SETTLED * SETTLED * most

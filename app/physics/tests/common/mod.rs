@@ -3,7 +3,7 @@
 
 use haptics::{ContactState, Entity, Finger, Friction, Plane, Shape};
 use nalgebra::{Isometry3, Vector3};
-use physics::{Body, Made, Manipulation, MassProperties, Settings, Touch};
+use physics::{Body, FingerSettings, FingerTick, Made, Manipulation, MassProperties, Settings, Touch};
 
 pub const DT: f64 = 1e-3;
 pub const G: f64 = 9.81;
@@ -14,6 +14,8 @@ pub struct World {
     pub manipulation: Manipulation,
     pub fingers: Vec<Finger>,
     pub touches: Vec<Touch>,
+    /// What the fingers do besides touching; their HIPs are set by `step`.
+    pub ticks: Vec<FingerTick>,
     pub made: Made,
 }
 
@@ -21,8 +23,15 @@ impl World {
     pub fn new(entities: Vec<Entity>, bodies: &[(usize, Body)], settings: Settings, fingers: usize) -> Self {
         let manipulation = Manipulation::new(&entities, bodies, settings).unwrap();
         let finger = || Finger::new(0.0, entities.len()).unwrap().with_ramp_in(0.0).unwrap();
-        let fingers = (0..fingers).map(|_| finger()).collect();
-        Self { entities, manipulation, fingers, touches: Vec::new(), made: Made::default() }
+        let fingers: Vec<_> = (0..fingers).map(|_| finger()).collect();
+        let ticks = vec![FingerTick::at(Vector3::zeros()); fingers.len()];
+        Self { entities, manipulation, fingers, touches: Vec::new(), ticks, made: Made::default() }
+    }
+
+    /// With fingers that are more than points, all alike.
+    pub fn with_fingers(mut self, settings: FingerSettings) -> Self {
+        self.manipulation = self.manipulation.with_fingers(&vec![settings; self.fingers.len()]);
+        self
     }
 
     /// One tick: the force on each finger, by its HIP.
@@ -30,6 +39,7 @@ impl World {
         self.touches.clear();
         let mut forces = Vec::new();
         for (index, (finger, hip)) in self.fingers.iter_mut().zip(hips).enumerate() {
+            self.ticks[index].hip_W = *hip;
             forces.push(finger.step(&self.entities, hip, DT).force_on_user_W);
             for contact in finger.contacts() {
                 self.touches.push(Touch {
@@ -43,9 +53,12 @@ impl World {
             }
         }
         let rendered = self.touches.clone();
-        self.made = self.manipulation.step(&mut self.entities, &mut self.touches, DT);
+        self.made = self.manipulation.step_with(&mut self.entities, &mut self.touches, &mut self.ticks, DT);
         for (touch, was) in self.touches.iter().zip(rendered) {
             forces[touch.finger] += touch.force_on_user_W - was.force_on_user_W;
+        }
+        for (force, tick) in forces.iter_mut().zip(&self.ticks) {
+            *force += tick.force_on_user_W;
         }
         forces
     }
