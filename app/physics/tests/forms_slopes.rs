@@ -170,7 +170,8 @@ fn a_stack_of_three_stands_and_carries_what_lies_on_it() {
         let stands = 0.015 + 0.03 * number as f64;
         assert!(end.centre_W.y < stands && end.centre_W.y > stands - 1e-4, "{number}: {}", end.centre_W.y);
     }
-    let on_floor: f64 = world.manipulation.rows().iter().filter(|row| row.other.is_none()).map(|row| row.force_W.y).sum();
+    let on_floor: f64 =
+        world.manipulation.rows().iter().filter(|row| row.other.is_none()).map(|row| row.force_W.y).sum();
     assert!((on_floor - 3.0 * MASS * G).abs() < 1e-6, "{on_floor}");
 }
 
@@ -195,7 +196,8 @@ fn a_bar_lies_across_the_edges_of_two_others() {
         let at = pose(lies, Vector3::new(0.0, top + 0.005, 0.0));
         let thing = object(bar, at, STIFFNESS, 0.5).with_damping(100.0).unwrap();
         let body = body(&thing, MASS);
-        let mut world = World::new(vec![roof(0.03), roof(-0.03), thing], &[(2, body)], Settings::default(), 0);
+        let mut world =
+            World::new(vec![roof(0.03), roof(-0.03), thing], &[(2, body)], Settings::default(), 0);
         seconds(&mut world, 2.0);
         assert!((world.body().centre_W.y - top - 0.005).abs() < 1e-4, "{bar:?} {:?}", world.body());
         let loads: Vec<f64> = world.manipulation.rows().iter().map(|row| row.force_W.y).collect();

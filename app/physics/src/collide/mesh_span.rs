@@ -264,19 +264,18 @@ impl Seek<'_> {
             if self.standing.is_over(corner) { score(corner.point_M(mesh)) } else { 0.0 }
         };
         let least = at_least_m * self.depth.at_most;
-        let kept = self.kept.iter().flatten().fold(
-            (self.deepest, 0.0),
-            |best, &one| if of(one) > best.1 { (one, of(one)) } else { best },
-        );
+        let kept = self
+            .kept
+            .iter()
+            .flatten()
+            .fold((self.deepest, 0.0), |best, &one| if of(one) > best.1 { (one, of(one)) } else { best });
         let (mut best, mut most) = (kept.0, kept.1);
         let (near, near_score) = kept.0.climb(mesh, of);
         if near_score > least.max(self.how.better * kept.1) {
             (best, most) = (near, near_score);
         }
         let needed = least.max(self.how.better * most);
-        if let Some((corner, score)) =
-            mesh.outlying([distance, &self.depth], self.standing.limits, needed)
-        {
+        if let Some((corner, score)) = mesh.outlying([distance, &self.depth], self.standing.limits, needed) {
             (best, most) = (Corner::new(corner), score);
         }
         (most > 0.0).then_some(best)
