@@ -35,10 +35,11 @@ fn ten() -> FastStep {
 /// Where the fingers are in a tick.
 fn frame(tick: usize) -> Frame {
     let mut frame = Frame::zeroed();
-    (frame.tick, frame.device_count, frame.run_tick) = (tick as u64 + 1, 3, tick as i64);
+    // Nothing falls until the fingers have closed on it.
+    (frame.tick, frame.device_count, frame.run_tick) = (tick as u64 + 1, 3, tick as i64 - 250);
     let closed = (tick as f64 / 200.0).min(1.0);
     let x = 0.035 - 0.014 * closed;
-    let sway = 0.01 * (TAU * tick as f64 / 1000.0).sin() * closed;
+    let sway = 0.01 * (TAU * (tick as f64 - 250.0).max(0.0) / 1000.0).sin();
     for (device, at) in frame.devices.iter_mut().zip([[-x, 0.0], [x, 0.01], [x, -0.01]]) {
         device.flags = DEVICE_POSITION_VALID;
         device.position_m_measured = [at[0] + sway, 0.125, at[1] + 0.5 * sway];
