@@ -15,7 +15,7 @@
 
 mod objects;
 
-pub use objects::Objects;
+pub use objects::{HandFinger, Objects};
 
 use crate::mount::Mount;
 use crate::passive_port::{Tick, keep_passive};
@@ -25,7 +25,7 @@ use haptics::{Effects, Entity, Field, Finger, FingerEffects, Guide, Hip, Moment,
 use nalgebra::Vector3;
 use physics::{Body, BodyError, Manipulation};
 use shm_abi::MAX_DEVICES;
-use shm_abi::frame::DEVICE_POSITION_VALID;
+use shm_abi::frame::{DEVICE_ORIENTATION_MEASURED, DEVICE_POSITION_VALID};
 use shm_abi::{Command, DeviceFrame, Frame};
 use world::Layout;
 
@@ -94,7 +94,8 @@ impl FastStep {
         self
     }
 
-    /// With entities that move.
+    /// With entities that move, held by fingers that are this (one for each). `wants_quality`: each tick is to tell how
+    /// they are grasped.
     ///
     /// # Errors
     /// What [`Manipulation::new`] refuses.
@@ -102,9 +103,11 @@ impl FastStep {
         mut self,
         bodies: &[(usize, Body)],
         settings: physics::Settings,
+        hand: &[HandFinger],
+        wants_quality: bool,
     ) -> Result<Self, BodyError> {
         let manipulation = Manipulation::new(&self.entities, bodies, settings)?;
-        self.objects = Some(Objects::new(manipulation, self.fingers.len(), self.period_s));
+        self.objects = Some(Objects::new(manipulation, hand, wants_quality, self.period_s));
         Ok(self)
     }
 
@@ -290,6 +293,7 @@ impl DeviceFinger {
             hip,
             god_object: hip,
             orientation_wxyz,
+            has_orientation: device.flags & DEVICE_ORIENTATION_MEASURED != 0,
             buttons: device.buttons,
             ..FingerRow::default()
         };

@@ -10,6 +10,7 @@ use crate::row::{BodyRow, FingerRow, Row};
 use haptics::{ContactState, Feature};
 use io_driver::device::{Extras, run_time_s};
 use nalgebra::Vector3;
+use physics::GraspQuality;
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
@@ -63,11 +64,19 @@ pub struct Names {
     pub entities: Vec<String>,
     /// Those of them that move, in the order of a row's bodies.
     pub bodies: Vec<String>,
+    /// Which fingers tie objects to themselves; those beyond the list do not.
+    pub ties: Vec<bool>,
+    /// Whether it is told how the bodies are grasped.
+    pub grasp_quality: bool,
 }
 
 impl Names {
     fn has_torque(&self, finger: usize) -> bool {
         self.torques.get(finger).copied().unwrap_or_default()
+    }
+
+    fn ties(&self, finger: usize) -> bool {
+        self.ties.get(finger).copied().unwrap_or_default()
     }
 
     fn extras_of(&self, finger: usize) -> Extras {
@@ -213,9 +222,17 @@ fn header(names: &Names) -> String {
         if names.has_torque(index) {
             push_axes(&mut line, finger, "torque");
         }
+        if names.ties(index) {
+            let _ = write!(line, ",{finger}_attached");
+        }
     }
     for body in &names.bodies {
         for quantity in ["x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz"] {
+            let _ = write!(line, ",{body}_{quantity}");
+        }
+        for quantity in
+            ["contacts", "rank", "residual", "closure"].into_iter().filter(|_| names.grasp_quality)
+        {
             let _ = write!(line, ",{body}_{quantity}");
         }
     }
@@ -250,6 +267,9 @@ fn write_row(line: &mut String, row: &Row, bodies: &[BodyRow], names: &Names, pe
         if names.has_torque(index) {
             write_vector(line, &finger.torque_on_user);
         }
+        if names.ties(index) {
+            let _ = write!(line, ",{}", entity_name(finger.attached, names));
+        }
     }
     for body in bodies {
         write_vector(line, &body.position);
@@ -257,6 +277,10 @@ fn write_row(line: &mut String, row: &Row, bodies: &[BodyRow], names: &Names, pe
         let _ = write!(line, ",{:?},{:?},{:?},{:?}", q.w, q.i, q.j, q.k);
         write_vector(line, &body.velocity);
         write_vector(line, &body.angular_velocity);
+        if names.grasp_quality {
+            let GraspQuality { contacts, rank, residual, has_force_closure } = body.grasp;
+            let _ = write!(line, ",{contacts},{rank},{residual:?},{}", u8::from(has_force_closure));
+        }
     }
     line.push('\n');
 }
@@ -265,10 +289,14 @@ fn write_finger(line: &mut String, finger: &FingerRow, names: &Names) {
     for vector in [&finger.hip, &finger.god_object, &finger.force_on_user] {
         write_vector(line, vector);
     }
-    let entity = finger.entity.and_then(|index| names.entities.get(index as usize));
+    let entity = entity_name(finger.entity, names);
     let (feature, friction) = (feature_name(finger.feature), friction_name(finger.friction));
-    let _ = write!(line, ",{},{feature},{friction}", entity.map_or("", String::as_str));
+    let _ = write!(line, ",{entity},{feature},{friction}");
     write_vector(line, &finger.applied_on_user);
+}
+
+fn entity_name(index: Option<u32>, names: &Names) -> &str {
+    index.and_then(|index| names.entities.get(index as usize)).map_or("", String::as_str)
 }
 
 fn write_extras(line: &mut String, finger: &FingerRow, extras: Extras) {
@@ -319,6 +347,8 @@ mod tests {
             torques: Vec::new(),
             entities: vec!["table".into()],
             bodies: Vec::new(),
+            ties: Vec::new(),
+            grasp_quality: false,
         }
     }
 
@@ -406,6 +436,7 @@ mod tests {
             orientation: nalgebra::Quaternion::new(0.5, -0.5, 0.5, -0.25),
             velocity: Vector3::new(4.0, 5.0, 6.0),
             angular_velocity: Vector3::new(7.0, 8.0, 9.0),
+            ..BodyRow::default()
         };
         let mut line = String::new();
         write_row(&mut line, &row(0, 1.0), &[body], &names, 1_000_000);

@@ -202,7 +202,9 @@ impl Rig {
         Names {
             extras: self.scene.fingers.iter().map(|finger| of(finger.device)).collect(),
             passive: self.scene.fingers.iter().map(|finger| finger.passivity.is_some()).collect(),
-            torques: self.scene.fingers.iter().map(|finger| finger.radius_m > 0.0).collect(),
+            torques: self.scene.fingers.iter().map(has_torque).collect(),
+            ties: self.scene.fingers.iter().map(|finger| finger.attach.is_some()).collect(),
+            grasp_quality: self.scene.dynamics.grasp_quality,
             fingers: self.scene.fingers.iter().map(|finger| finger.name.clone()).collect(),
             entities: self.scene.entities.iter().map(|entity| entity.name.clone()).collect(),
             bodies: self.moving().map(|(_, entity, _)| entity.name.clone()).collect(),
@@ -352,6 +354,11 @@ impl Rig {
     fn not_available(&self, what: String) -> RigError {
         RigError::NotAvailable { file: self.scene_file.clone(), what }
     }
+}
+
+/// Whether contacts turn it: it has a radius, a pad, or something tied to it.
+fn has_torque(finger: &SceneFinger) -> bool {
+    finger.radius_m > 0.0 || finger.soft.is_some() || finger.attach.is_some()
 }
 
 /// Reads the hand file as the driver will, so that its mistakes are told here, by this process.

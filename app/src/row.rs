@@ -2,6 +2,7 @@
 
 use haptics::{ContactState, Feature};
 use nalgebra::{Quaternion, Vector3};
+use physics::GraspQuality;
 use shm_abi::MAX_DEVICES;
 
 /// One fast tick of a run.
@@ -28,6 +29,8 @@ pub struct FingerRow {
     pub applied_on_user: Vector3<f64>,
     /// How its device's last link is turned, w x y z; recorded where a gimbal measures it.
     pub orientation_wxyz: [f64; 4],
+    /// Whether that is known.
+    pub has_orientation: bool,
     /// Bit `i`: button `i` of its device is pressed; recorded where it has buttons.
     pub buttons: u64,
     /// Index of the touched entity.
@@ -40,6 +43,8 @@ pub struct FingerRow {
     pub energy_j: f64,
     /// By how much that changed the force (N).
     pub controlled_n: f64,
+    /// Index of the entity that is tied to it; recorded where a button ties.
+    pub attached: Option<u32>,
 }
 
 impl Row {
@@ -60,4 +65,6 @@ pub struct BodyRow {
     pub velocity: Vector3<f64>,
     /// rad/s.
     pub angular_velocity: Vector3<f64>,
+    /// How the fingers hold it in this tick; recorded where the scene asks for it.
+    pub grasp: GraspQuality,
 }

@@ -104,6 +104,11 @@ impl Finger {
         self.radius_m
     }
 
+    /// Where its HIP was in the last step (m); `None` where that was not known.
+    pub fn last_hip_W(&self) -> Option<Vector3<f64>> {
+        self.previous_hip_W
+    }
+
     /// How many entities it has slots for.
     pub fn capacity(&self) -> usize {
         self.slots.len()

@@ -8,8 +8,8 @@
 //! made up for at once: objects are late by what was missed.
 
 use haptics::{ContactState, Entity};
-use nalgebra::Vector3;
-use physics::{Made, Manipulation, Touch};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use physics::{FingerSettings, FingerTick, Made, Manipulation, Touch};
 
 use super::DeviceFinger;
 use crate::row::{BodyRow, FingerRow};
@@ -17,11 +17,24 @@ use crate::row::{BodyRow, FingerRow};
 /// Ticks that a single step of the objects makes up for at most.
 const MOST_TICKS: f64 = 4.0;
 
+/// What a finger is to objects beside a point.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct HandFinger {
+    /// Its pad, and how it ties.
+    pub settings: FingerSettings,
+    /// The button of its device that ties.
+    pub button: Option<u32>,
+}
+
 /// Moving entities and what is known of them.
 #[derive(Debug, Clone)]
 pub struct Objects {
     manipulation: Manipulation,
     touches: Vec<Touch>,
+    ticks: Vec<FingerTick>,
+    /// The button with which each finger ties.
+    buttons: Vec<Option<u32>>,
+    wants_quality: bool,
     /// As the tick began.
     rows: Vec<BodyRow>,
     period_s: f64,
@@ -30,12 +43,22 @@ pub struct Objects {
 }
 
 impl Objects {
-    /// With room for this many fingers.
-    pub fn new(manipulation: Manipulation, fingers: usize, period_s: f64) -> Self {
-        let room = fingers * manipulation.bodies().len() * haptics::MAX_TOUCH_POINTS;
+    /// Held by these fingers. `wants_quality`: each tick is to tell how they are grasped.
+    pub fn new(
+        manipulation: Manipulation,
+        fingers: &[HandFinger],
+        wants_quality: bool,
+        period_s: f64,
+    ) -> Self {
+        let settings: Vec<_> = fingers.iter().map(|finger| finger.settings).collect();
+        let manipulation = manipulation.with_fingers(&settings);
+        let room = fingers.len() * manipulation.bodies().len() * haptics::MAX_TOUCH_POINTS;
         let mut objects = Self {
             rows: vec![BodyRow::default(); manipulation.bodies().len()],
             touches: Vec::with_capacity(room),
+            ticks: vec![FingerTick::at(Vector3::zeros()); fingers.len()],
+            buttons: fingers.iter().map(|finger| finger.button).collect(),
+            wants_quality,
             manipulation,
             period_s,
             made: Made::default(),
@@ -65,6 +88,7 @@ impl Objects {
                 orientation: pose.rotation.into_inner(),
                 velocity: body.velocity_W + spin_W.cross(&from_centre_W),
                 angular_velocity: spin_W,
+                ..*row
             };
         }
     }
@@ -99,11 +123,35 @@ impl Objects {
         }
         let rendered = self.touches.iter().map(|touch| -touch.force_on_user_W);
         add_to_rows(rendered, &self.touches, fingers, rows);
+        for ((tick, button), (row, finger)) in
+            self.ticks.iter_mut().zip(&self.buttons).zip(rows.iter().zip(fingers))
+        {
+            *tick = FingerTick {
+                gimbal: row.has_orientation.then(|| orientation(row.orientation_wxyz)),
+                is_button_held: button.is_some_and(|button| row.buttons >> button & 1 == 1),
+                // One that is lost holds nothing.
+                ..FingerTick::at(finger.finger.last_hip_W().unwrap_or_else(|| Vector3::repeat(f64::NAN)))
+            };
+        }
         let dt_s = dt_s.min(MOST_TICKS * self.period_s);
-        self.made = self.manipulation.step(entities, &mut self.touches, dt_s);
+        self.made = self.manipulation.step_with(entities, &mut self.touches, &mut self.ticks, dt_s);
+        for (row, tick) in rows.iter_mut().zip(&self.ticks) {
+            row.force_on_user += tick.force_on_user_W;
+            row.torque_on_user += tick.torque_on_user_W;
+            row.attached = tick.attached.map(|entity| entity as u32);
+        }
+        if self.wants_quality {
+            for (body, row) in self.rows.iter_mut().enumerate() {
+                row.grasp = self.manipulation.grasp_quality(body).unwrap_or_default();
+            }
+        }
         let got = self.touches.iter().map(|touch| touch.force_on_user_W);
         add_to_rows(got, &self.touches, fingers, rows);
     }
+}
+
+fn orientation([w, x, y, z]: [f64; 4]) -> UnitQuaternion<f64> {
+    UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z))
 }
 
 /// Adds forces on users, one of each touch, to their fingers' rows; and their torques, where the finger has a radius.

@@ -1,12 +1,18 @@
 //! From what a scene says of entities that move to bodies.
 
-use haptics::Entity;
+use haptics::{Entity, ParameterError};
 use physics::collide::can_move;
-use physics::{Body, BodyError, Integrator, MassProperties, Response, Settings};
-use world::{IntegratorSpec, MassSpec, MotionSpec, ResponseSpec, SceneEntity};
+use physics::{
+    Attachment, Body, BodyError, FingerSettings, HeldOrientation, Integrator, MassProperties, Response,
+    Settings, SoftFinger, TorsionModel,
+};
+use world::{
+    AttachSpec, AttachedOrientation, IntegratorSpec, MassSpec, MotionSpec, ResponseSpec, SceneEntity,
+    SceneFinger, SoftModelSpec, SoftSpec,
+};
 
 use super::{Rig, RigError};
-use crate::fast_step::FastStep;
+use crate::fast_step::{FastStep, HandFinger};
 
 impl Rig {
     /// The entities that move: their numbers, and what the scene says of them.
@@ -50,7 +56,17 @@ impl Rig {
         };
         // Which entity it is, is not told; the first that moves is named.
         let first = |source| self.no_body(&self.scene.entities[bodies[0].0], source);
-        step.with_objects(bodies, settings).map_err(first)
+        let hand: Vec<HandFinger> =
+            self.scene.fingers.iter().map(|f| self.hand_finger(f)).collect::<Result<_, _>>()?;
+        step.with_objects(bodies, settings, &hand, dynamics.grasp_quality).map_err(first)
+    }
+
+    fn hand_finger(&self, spec: &SceneFinger) -> Result<HandFinger, RigError> {
+        let refused = |source| self.refused(None, format!("finger {}", spec.name), source);
+        let soft = spec.soft.as_ref().map_or(Ok(SoftFinger::POINT), soft_finger).map_err(refused)?;
+        let attachment = spec.attach.as_ref().map(attachment).transpose().map_err(refused)?;
+        let settings = FingerSettings { soft, attachment };
+        Ok(HandFinger { settings, button: spec.attach.map(|attach| attach.button) })
     }
 
     fn no_body(&self, spec: &SceneEntity, source: BodyError) -> RigError {
@@ -59,10 +75,80 @@ impl Rig {
     }
 }
 
+fn soft_finger(spec: &SoftSpec) -> Result<SoftFinger, ParameterError> {
+    let usual = SoftFinger::default();
+    let of = |name| TorsionModel::of_name(name).unwrap_or(TorsionModel::None);
+    let mut model = match spec.model {
+        SoftModelSpec::None => TorsionModel::None,
+        SoftModelSpec::Coulomb { .. } => of("coulomb"),
+        SoftModelSpec::Viscous { .. } => of("viscous"),
+        SoftModelSpec::StickSlip { .. } => of("stick-slip"),
+    };
+    let set = |place: &mut f64, value: Option<f64>| *place = value.unwrap_or(*place);
+    match (&mut model, spec.model) {
+        (TorsionModel::Coulomb { pad_radius_m }, SoftModelSpec::Coulomb { pad_radius_m: given }) => {
+            set(pad_radius_m, given);
+        }
+        (
+            TorsionModel::Viscous { critical_area_m2, damping_nm_s_per_rad },
+            SoftModelSpec::Viscous { critical_area_m2: area, viscous_damping_n_m_s_per_rad: damping },
+        ) => {
+            set(critical_area_m2, area);
+            set(damping_nm_s_per_rad, damping);
+        }
+        (
+            TorsionModel::StickSlip {
+                critical_area_at_rest_m2,
+                critical_area_turning_m2,
+                damping_nm_s_per_rad,
+            },
+            SoftModelSpec::StickSlip {
+                critical_area_at_rest_m2: at_rest,
+                critical_area_turning_m2: turning,
+                viscous_damping_n_m_s_per_rad: damping,
+            },
+        ) => {
+            set(critical_area_at_rest_m2, at_rest);
+            // The usual share of the other, where only that is given.
+            let share = *critical_area_turning_m2 / *critical_area_at_rest_m2;
+            set(critical_area_turning_m2, turning.or(at_rest.map(|area| area * share)));
+            set(damping_nm_s_per_rad, damping);
+        }
+        _ => {}
+    }
+    SoftFinger {
+        model,
+        stiffness_nm_per_rad: spec.stiffness_n_m_per_rad.unwrap_or(usual.stiffness_nm_per_rad),
+        damping_nm_s_per_rad: spec.damping_n_m_s_per_rad.unwrap_or(usual.damping_nm_s_per_rad),
+        normal_share: spec.normal_share.unwrap_or(usual.normal_share),
+        gimbal_area_m2: spec.gimbal_area_m2.unwrap_or(usual.gimbal_area_m2),
+    }
+    .validated()
+}
+
+fn attachment(spec: &AttachSpec) -> Result<Attachment, ParameterError> {
+    let usual = Attachment::default();
+    Attachment {
+        stiffness_n_per_m: spec.stiffness_n_per_m.unwrap_or(usual.stiffness_n_per_m),
+        damping_n_s_per_m: spec.damping_n_s_per_m.unwrap_or(usual.damping_n_s_per_m),
+        most_force_n: spec.most_force_n.unwrap_or(usual.most_force_n),
+        orientation: match spec.orientation {
+            AttachedOrientation::Free => HeldOrientation::Free,
+            AttachedOrientation::Locked => HeldOrientation::Locked,
+            AttachedOrientation::Gimbal => HeldOrientation::Gimbal,
+        },
+        stiffness_nm_per_rad: spec.stiffness_n_m_per_rad.unwrap_or(usual.stiffness_nm_per_rad),
+        damping_nm_s_per_rad: spec.damping_n_m_s_per_rad.unwrap_or(usual.damping_nm_s_per_rad),
+        most_torque_nm: spec.most_torque_n_m.unwrap_or(usual.most_torque_nm),
+        fade_s: spec.fade_s.unwrap_or(usual.fade_s),
+    }
+    .validated()
+}
+
 fn body(entity: &Entity, motion: &MotionSpec) -> Result<Body, BodyError> {
     let mass = match motion.mass {
         MassSpec::Mass(mass_kg) => MassProperties::of_shape(&entity.shape, mass_kg),
-        MassSpec::Density(_) => MassProperties::of_shape(&entity.shape, 1.0),
+        MassSpec::Density(density) => MassProperties::of_density(&entity.shape, density),
     }?;
     let mass = match motion.inertia_kg_m2 {
         Some(moments) => mass.with_inertia(moments)?,

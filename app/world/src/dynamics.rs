@@ -1,4 +1,4 @@
-//! How a scene's moving entities are computed: `integrator` and `contact_response`.
+//! How a scene's moving entities are computed: `integrator`, `contact_response` and `grasp_quality`.
 
 use crate::error::SceneError;
 use crate::reader::{Bound, Table, Value};
@@ -11,6 +11,8 @@ pub struct DynamicsSpec {
     pub integrator: IntegratorSpec,
     /// How contacts between entities answer.
     pub response: ResponseSpec,
+    /// Whether it is told how good the grasp of each is.
+    pub grasp_quality: bool,
 }
 
 /// How forces become motion.
@@ -52,7 +54,8 @@ impl DynamicsSpec {
             },
         };
         let response = scene.get("contact_response").map(|value| ResponseSpec::read(&value)).transpose()?;
-        Ok(Self { integrator, response: response.unwrap_or_default() })
+        let grasp_quality = scene.get("grasp_quality").map_or(Ok(false), |value| value.truth())?;
+        Ok(Self { integrator, response: response.unwrap_or_default(), grasp_quality })
     }
 }
 

@@ -5,10 +5,12 @@ use std::collections::BTreeMap;
 use nalgebra::Point3;
 
 use crate::MAX_DEVICES;
+use crate::attach::AttachSpec;
 use crate::error::SceneError;
 use crate::names::Names;
 use crate::passivity::PassivitySpec;
 use crate::reader::{Bound, Table};
+use crate::soft::SoftSpec;
 use crate::vocabulary::Vocabulary;
 
 /// One `[[finger]]`.
@@ -24,6 +26,10 @@ pub struct SceneFinger {
     pub device: usize,
     /// How its forces are kept from feeding energy into the hand; default they are not.
     pub passivity: Option<PassivitySpec>,
+    /// What its pad does against turning; default it is a point.
+    pub soft: Option<SoftSpec>,
+    /// How it ties objects to itself; default it does not.
+    pub attach: Option<AttachSpec>,
 }
 
 impl SceneFinger {
@@ -51,6 +57,8 @@ impl SceneFinger {
             start_m: table.numbers_or("start_m", [0.0; 3])?.into(),
             device: claim_device(table, i, devices)?,
             passivity: PassivitySpec::read(table)?,
+            soft: SoftSpec::read(table)?,
+            attach: AttachSpec::read(table)?,
         })
     }
 }
@@ -74,5 +82,7 @@ fn claim_device(
     }
 }
 
-const KEYS: Vocabulary =
-    Vocabulary { available: &["name", "radius_m", "start_m", "device", "passivity"], later: &[] };
+const KEYS: Vocabulary = Vocabulary {
+    available: &["name", "radius_m", "start_m", "device", "passivity", "soft", "attach"],
+    later: &[],
+};

@@ -32,6 +32,7 @@
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
 
+mod attach;
 mod csg;
 mod document;
 mod dynamics;
@@ -56,9 +57,11 @@ mod reader;
 mod scene;
 mod shading;
 mod shape;
+mod soft;
 mod source;
 mod vocabulary;
 
+pub use attach::{AttachSpec, AttachedOrientation};
 pub use csg::{CsgChild, CsgOp, CsgSpec};
 pub use dynamics::{DynamicsSpec, IntegratorSpec, ResponseSpec};
 pub use effects::{MagnetismSpec, VibrationSpec};
@@ -77,6 +80,7 @@ pub use placement::{Affine, LEAST_STRETCH, MOST_STRETCH, Placement};
 pub use scene::Scene;
 pub use shading::{ShadingFormSpec, ShadingSpec};
 pub use shape::{MeshSpec, ShapeSpec};
+pub use soft::{SoftModelSpec, SoftSpec};
 pub use source::MAX_FILE_BYTES;
 
 /// Fingers in a scene, devices in a layout, and haptic devices of one driver: at most this many.
