@@ -99,6 +99,7 @@ const KEYS: Vocabulary = Vocabulary {
         "gravity_m_s2",
         "integrator",
         "contact_response",
+        "grasp_quality",
         "hand",
         "finger",
         "entity",
