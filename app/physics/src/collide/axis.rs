@@ -28,7 +28,7 @@ pub(super) struct Axis {
 
 const MAX_TURNS: usize = 6;
 /// Turns that change the direction by less end the search.
-const FOUND: f64 = 1e-9;
+const FOUND: f64 = 1e-7;
 /// The room between the cores, of the smaller one's inner radius.
 const ROOM: f64 = 0.05;
 /// As deep as this share of the smaller inner radius, other ways out are looked at.
