@@ -61,7 +61,7 @@ fn continuity_look() {
         let mut noise = Noise(5);
         let mut worst = (0.0_f64, 0.0);
         let begin = std::time::Instant::now();
-        for _ in 0..6 {
+        for trial in 0..6 {
             let (X_WA, X_WB, memory) = overlapping(&a, &b, 3e-4, &mut noise);
             let (along, axis) = (noise.direction(), noise.direction());
             let most_jump = |steps: usize| {
@@ -83,6 +83,7 @@ fn continuity_look() {
                 most
             };
             let (coarse, fine) = (most_jump(1000), most_jump(10_000));
+            if fine > 0.3 * coarse { println!("   {trial}: {coarse:.1e} {fine:.1e}"); }
             if fine > worst.0 { worst = (fine, coarse); }
         }
         let bad = if worst.0 > 0.3 * worst.1 { "BAD" } else { "" };

@@ -58,9 +58,7 @@ pub(super) fn contact(
     match [Facet::edge_of(&a, &-n), Facet::edge_of(&b, &n)] {
         [Facet::Line(line_a), Facet::Line(line_b)] if exact.is_none() => {
             let radii_m = [a.radius_m, b.radius_m];
-            Alongside { lines: [line_a, line_b], radii_m, normal: n, gap_m, on_a }
-                .sharpened()
-                .find(&mut spots);
+            Alongside { lines: [line_a, line_b], radii_m, normal: n, gap_m, on_a }.find(&mut spots);
         }
         _ => spots.push(Spot { id: SINGLE_ID, on_a, normal: n, gap_m }),
     }

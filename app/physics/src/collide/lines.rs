@@ -6,7 +6,6 @@
 
 use nalgebra::Vector3;
 
-use super::axis::unit;
 use super::facet::Line;
 use super::spots::{Spot, Spots};
 
@@ -29,34 +28,7 @@ const FADE_M: f64 = 1e-3;
 /// Lines that are not parallel to this sine cross.
 const PARALLEL: f64 = 0.3;
 
-/// A direction that is across both lines to this is exactly so.
-const ACROSS: f64 = 1e-5;
-
 impl Alongside {
-    /// The same with what the search for nearest points leaves open taken from the lines, if they cross.
-    pub(super) fn sharpened(self) -> Self {
-        let [a, b] = self.lines.map(|line| line.ends);
-        let (along_a, along_b) = (a[1] - a[0], b[1] - b[0]);
-        let across = along_a.cross(&along_b);
-        let squared = across.norm_squared();
-        if squared <= PARALLEL * PARALLEL * along_a.norm_squared() * along_b.norm_squared() {
-            return self;
-        }
-        let Some(normal) = unit(&(across * across.dot(&self.normal))) else { return self };
-        let from = b[0] - a[0];
-        let place = from.cross(&along_b).dot(&across) / squared;
-        let place_on_b = from.cross(&along_a).dot(&across) / squared;
-        let is_within = [place, place_on_b].iter().all(|place| (0.0..=1.0).contains(place));
-        if !is_within || (normal - self.normal).norm_squared() > ACROSS * ACROSS {
-            return self;
-        }
-        let on_a = a[0] + along_a * place;
-        let on_b = b[0] + along_b * place_on_b;
-        let [radius_a, radius_b] = self.radii_m;
-        let gap_m = normal.dot(&(on_a - on_b)) - radius_a - radius_b;
-        Self { normal, gap_m, on_a: on_a - normal * radius_a, ..self }
-    }
-
     /// Appends up to three points.
     pub(super) fn find(&self, spots: &mut Spots) {
         let mut crossing = 1.0;
