@@ -68,6 +68,7 @@ fn continuity_look() {
                 let mut memory = memory;
                 let mut last: Option<[Vector3<f64>; 2]> = None;
                 let mut most = 0.0_f64;
+                let mut before: Vec<ContactPoint> = Vec::new();
                 for step in 0..steps {
                     let s = step as f64 / steps as f64;
                     let turn = UnitQuaternion::from_scaled_axis(axis * (0.05 * s));
@@ -76,9 +77,16 @@ fn continuity_look() {
                     if -deepest(&found) > 1.5e-3 { break; }
                     let now = wrench(&found, &X.translation.vector);
                     if let Some(last) = last {
+                        let jump = (now[0] - last[0]).norm().max((now[1] - last[1]).norm() / 0.02);
+                        if jump > 5e-3 {
+                            println!("{name} {trial} at {step} of {steps}: {jump}");
+                            for p in before.iter() { println!("   - {} {:?} n {:?} {:.3e}", p.id, (X_WB.inverse() * nalgebra::Point3::from(p.point_W)).coords.data.0, (X_WB.rotation.inverse() * p.normal_W).data.0, p.gap_m); }
+                            for p in found.iter() { println!("   + {} {:?} n {:?} {:.3e}", p.id, (X_WB.inverse() * nalgebra::Point3::from(p.point_W)).coords.data.0, (X_WB.rotation.inverse() * p.normal_W).data.0, p.gap_m); }
+                        }
                         most = most.max((now[0] - last[0]).norm()).max((now[1] - last[1]).norm() / 0.02);
                     }
                     last = Some(now);
+                    before = found;
                 }
                 most
             };

@@ -35,6 +35,8 @@ const FOUND: f64 = 1e-5;
 const ROOM: f64 = 0.05;
 /// Less deep than this share of the smaller inner radius, a direction that could be followed is right.
 const SHALLOW: f64 = 0.25;
+/// Gaps that differ by this share of it are the same: rounding.
+const SAME: f64 = 1e-12;
 /// What a search leaves open is less.
 const NEAR: f64 = 1e-3;
 /// As deep as this share of the smaller inner radius, other ways out are looked at.
@@ -49,8 +51,9 @@ pub(super) fn find(a: &Convex, b: &Convex, last: Option<Vector3<f64>>) -> Axis {
     let room_m = ROOM * inner_m;
     if let Some((normal, on_a)) = last.and_then(|last| follow(a, b, &last)) {
         let axis = Axis { on_a, ..Axis::along(a, b, normal) };
-        // Not so deep that it might have come out on another side.
-        if radii_m - axis.gap_m < SHALLOW * inner_m {
+        // Not so deep that it might have come out on another side, and no way down.
+        let is_better = last.is_some_and(|last| axis.gap_m >= separation(a, b, &last) - SAME * inner_m);
+        if is_better && radii_m - axis.gap_m < SHALLOW * inner_m {
             return axis;
         }
     }
@@ -108,7 +111,8 @@ fn ascend(a: &Convex, b: &Convex, mut normal: Vector3<f64>, room_m: f64) -> Axis
     // To the last digit, if it can be had.
     match follow(a, b, &normal) {
         Some((exact, on_a)) if (exact - normal).norm_squared() < NEAR * NEAR => {
-            Axis { on_a, ..Axis::along(a, b, exact) }
+            let exact = Axis { on_a, ..Axis::along(a, b, exact) };
+            if exact.gap_m >= axis.gap_m - SAME * room_m { exact } else { axis }
         }
         _ => axis,
     }
