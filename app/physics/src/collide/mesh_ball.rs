@@ -219,14 +219,12 @@ fn is_nearest_vertex(mesh: &Mesh, number: u32, corner: usize, ball: &Ball) -> bo
 
 /// Takes from each depth what the others' normals share of it: afterwards the depths `l` are such that what presses along
 /// each normal is what its own depth `d` was, `l_i + sum c_ij l_j = d_i`, or they are zero and there is more.
-pub(super) fn share(contacts: &mut [Contact]) {
+fn share(contacts: &mut [Contact]) {
     let count = contacts.len().min(MAX_POINTS);
-    let deep = contacts.iter().filter(|contact| contact.gap_m < 0.0).count();
-    if deep < 2 {
+    if contacts.iter().filter(|contact| contact.gap_m < 0.0).count() < 2 {
         return;
     }
-    let mut depths = [0.0; MAX_POINTS];
-    let (mut cosines, mut loads) = ([[0.0; MAX_POINTS]; MAX_POINTS], [0.0; MAX_POINTS]);
+    let (mut depths, mut cosines) = ([0.0; MAX_POINTS], [[0.0; MAX_POINTS]; MAX_POINTS]);
     for i in 0..count {
         depths[i] = -contacts[i].gap_m;
         for j in 0..count {
@@ -234,25 +232,52 @@ pub(super) fn share(contacts: &mut [Contact]) {
         }
         cosines[i][i] = 1.0 + STIFF;
     }
-    let mut missing = depths;
+    let mut carries = [false; MAX_POINTS];
+    (0..count).for_each(|i| carries[i] = depths[i] > 0.0);
+    let mut loads = [0.0; MAX_POINTS];
     for _ in 0..SHARE_ROUNDS {
-        let mut most: f64 = 0.0;
-        for i in 0..count {
-            let load = (loads[i] + missing[i] / cosines[i][i]).max(0.0);
-            let change = load - loads[i];
-            loads[i] = load;
-            most = most.max(change.abs());
-            for j in 0..count {
-                missing[j] -= change * cosines[j][i];
-            }
+        loads = solve(&cosines, &depths, &carries);
+        // Who would pull carries nothing; who is pressed more than the others' loads explain carries again.
+        let least = (0..count).filter(|&i| carries[i]).min_by(|&i, &j| loads[i].total_cmp(&loads[j]));
+        if let Some(least) = least.filter(|&least| loads[least] < 0.0) {
+            carries[least] = false;
+            continue;
         }
-        if most <= 1e-12 * depths[0].abs() {
-            break;
+        let missing = |i: usize| depths[i] - (0..count).map(|j| cosines[i][j] * loads[j]).sum::<f64>();
+        let most = (0..count).filter(|&i| !carries[i]).max_by(|&i, &j| missing(i).total_cmp(&missing(j)));
+        match most.filter(|&most| missing(most) > 1e-12 * depths[most].abs()) {
+            Some(most) => carries[most] = true,
+            None => break,
         }
     }
-    for (contact, (load, missing)) in contacts.iter_mut().zip(loads.iter().zip(missing)) {
-        contact.gap_m = if *load > 0.0 { -load } else { (-missing).max(0.0) };
+    for (i, contact) in contacts.iter_mut().enumerate().take(count) {
+        contact.gap_m = if carries[i] { -loads[i].max(0.0) } else { contact.gap_m.max(0.0) };
     }
+}
+
+/// Loads of those that carry, which take their depths together; by elimination: the matrix is positive definite.
+fn solve(
+    cosines: &[[f64; MAX_POINTS]; MAX_POINTS],
+    depths: &[f64; MAX_POINTS],
+    carries: &[bool; MAX_POINTS],
+) -> [f64; MAX_POINTS] {
+    let (mut m, mut loads) = (*cosines, *depths);
+    for i in (0..MAX_POINTS).filter(|&i| carries[i]) {
+        for j in (i + 1..MAX_POINTS).filter(|&j| carries[j]) {
+            let factor = m[j][i] / m[i][i];
+            (i..MAX_POINTS).for_each(|k| m[j][k] -= factor * m[i][k]);
+            loads[j] -= factor * loads[i];
+        }
+    }
+    for i in (0..MAX_POINTS).rev() {
+        if !carries[i] {
+            loads[i] = 0.0;
+            continue;
+        }
+        let others: f64 = (i + 1..MAX_POINTS).filter(|&j| carries[j]).map(|j| m[i][j] * loads[j]).sum();
+        loads[i] = (loads[i] - others) / m[i][i];
+    }
+    loads
 }
 
 /// Faces that are looked at around a ball.
@@ -263,4 +288,5 @@ const SAME: f64 = 1e-9;
 const ROUNDING: f64 = 1e-13;
 /// Normals that are the same share a depth evenly.
 const STIFF: f64 = 1e-3;
-const SHARE_ROUNDS: usize = 64;
+/// Each changes who carries by one.
+const SHARE_ROUNDS: usize = 16;
