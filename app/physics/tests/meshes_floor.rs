@@ -7,7 +7,9 @@ mod meshes;
 
 use common::*;
 use haptics::mesh::make;
-use haptics::{Capsule, Cone, Cuboid, Cylinder, Ellipsoid, Entity, Friction, Shape, Sphere, Torus};
+use haptics::{
+    Capsule, Cone, Cuboid, Cylinder, Ellipsoid, Entity, Friction, Plane, Shape, Sphere, Torus,
+};
 use meshes::{angle, block, build, cut_in_four, terrain};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use physics::Settings;
@@ -55,25 +57,26 @@ fn a_ball_rolls_down_triangles_as_down_the_plane_and_feels_no_edge() {
     let sphere = || Shape::from(Sphere::new(radius).unwrap());
     for cells in [2, 50, 400] {
         let depth = MASS * G * angle.cos() / K;
+        let plane = Shape::from(Plane::new(Vector3::y(), 0.0).unwrap());
         let mut world = over(flat(cells), angle, 0.8, sphere(), up(radius - depth));
+        let mut on_plane = over(plane, angle, 0.8, sphere(), up(radius - depth));
         run(&mut world, 200);
+        run(&mut on_plane, 200);
         let v = world.body().velocity_W;
-        let down_W = lean(angle) * Vector3::x();
-        let mut last_n: Option<f64> = None;
         for _ in 0..300 {
-            world.step(&[]);
-            let rows = world.manipulation.rows();
-            let touching: Vec<_> = rows.iter().filter(|row| row.force_W.norm() > 0.0).collect();
-            assert_eq!(touching.len(), 1, "{cells}");
-            let force_n = touching[0].normal_W.dot(&touching[0].force_W);
-            // In one plane nothing changes from face to face.
-            assert!(last_n.is_none_or(|last_n| (force_n - last_n).abs() < 1e-6 * force_n), "{cells}");
-            last_n = Some(force_n);
+            run(&mut world, 1);
+            run(&mut on_plane, 1);
+            let [force_W, plane_W] = [&world, &on_plane].map(|world| {
+                world.manipulation.rows().iter().map(|row| row.force_W).sum::<Vector3<f64>>()
+            });
+            // Heights of one plane, measured by this face or that one: 1e-16 over millimetres, and what the solver leaves.
+            assert!((force_W - plane_W).norm() < 1e-8, "{cells}: {force_W} {plane_W}");
         }
-        let a = -down_W.dot(&(world.body().velocity_W - v)) / 0.3;
+        let a = (world.body().velocity_W - v).norm() / 0.3;
         let expected = 5.0 / 7.0 * G * angle.sin();
-        // The spring gives along the slope, too: rolling is that of a wheel whose contact lags by a tick.
-        assert!((a - expected).abs() < 1e-3 * expected, "{cells}: {a} {expected}");
+        // The ball is flattened by 1.4 mm of 20: it rolls on a smaller wheel, with part of the difference.
+        let flattened = depth / radius;
+        assert!((a / expected - 1.0).abs() < 0.1 * flattened, "{cells}: {a} {expected}");
     }
 }
 
@@ -86,13 +89,13 @@ fn a_ball_rolls_over_hills_without_jumps_of_its_force() {
     let mut world = over(ground, 0.1, 0.8, sphere, up(radius + 0.002));
     run(&mut world, 300);
     let (mut last_W, mut most, mut sum) = (Vector3::zeros(), 0.0_f64, 0.0);
-    for tick in 0..700 {
+    for tick in 0..400 {
         world.step(&[]);
         let force_W: Vector3<f64> = world.manipulation.rows().iter().map(|row| row.force_W).sum();
         if tick > 0 {
             most = most.max((force_W - last_W).norm());
         }
-        sum += force_W.norm() / 700.0;
+        sum += force_W.norm() / 400.0;
         last_W = force_W;
     }
     // Facets of 1.2 mm turn by up to slope / curvature: 0.002 * 40^2 * 0.0012 = 4 mrad of a newton; the rest is motion.
@@ -101,7 +104,7 @@ fn a_ball_rolls_over_hills_without_jumps_of_its_force() {
 
 #[test]
 fn a_ball_in_a_shallow_valley_is_pressed_once_and_in_a_groove_from_both_sides() {
-    for (slope, share) in [(0.01_f64, 1.0), (1.0, 1.0)] {
+    for (slope, share) in [(0.02_f64, 1.0), (1.0, 1.0)] {
         let valley: Shape = build(terrain(2, 0.4, |x, _| slope * x.abs())).into();
         let radius = 0.02;
         let sphere = Shape::from(Sphere::new(radius).unwrap());

@@ -56,6 +56,7 @@ pub(super) fn contact_points(
         found = Found::default();
         found.add(of_nearest(mesh, ball, &nearest));
     }
+    found.unite();
     share(&mut found.contacts[..found.count]);
     found.contacts[..found.count].iter().for_each(|contact| told.tell(contact));
 }
@@ -133,6 +134,21 @@ impl Found {
             left -= 1;
             left > 0
         })
+    }
+
+    /// On both sides of a fold that is nearly flat, the deeper one counts for both.
+    fn unite(&mut self) {
+        self.contacts[..self.count].sort_unstable_by(|a, b| a.gap_m.total_cmp(&b.gap_m));
+        let mut kept = 0;
+        for at in 0..self.count {
+            let one = self.contacts[at];
+            let is_flat = |other: &Contact| (other.normal_M - one.normal_M).norm_squared() < FOLD * FOLD;
+            if !self.contacts[..kept].iter().any(is_flat) {
+                self.contacts[kept] = one;
+                kept += 1;
+            }
+        }
+        self.count = kept;
     }
 
     /// Each feature once, at most as many as there is room for: the nearest.
@@ -286,7 +302,9 @@ const MOST_FACES: usize = 512;
 const SAME: f64 = 1e-9;
 /// Roundings of products of coordinates.
 const ROUNDING: f64 = 1e-13;
-/// Normals that are the same share a depth evenly.
-const STIFF: f64 = 1e-3;
+/// A fold that turns the normal by less is flat \[rad\]: what it would do sideways is a hundredth of the load at most.
+const FOLD: f64 = 0.01;
+/// Of what shares of a depth cannot be told apart to rounding, each gets the same.
+const STIFF: f64 = 1e-9;
 /// Each changes who carries by one.
 const SHARE_ROUNDS: usize = 16;

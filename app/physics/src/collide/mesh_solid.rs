@@ -61,11 +61,17 @@ fn meet(
     if (at_M - centre_M).norm() > radius_m + reach_m && !mesh.is_inside(&centre_M) {
         return None;
     }
-    let toward = |at_M: &Vector3<f64>| (centre_M - at_M).try_normalize(0.0).unwrap_or_else(Vector3::y);
-    let mut seen = other.see(&at_M, &-toward(&at_M), 0.0);
+    let [low_M, high_M] = mesh.bounds_B();
+    // Out of the larger one is where the smaller one's middle is.
+    let is_smaller = 0.5 * (high_M - low_M).norm() < radius_m;
+    let out_M = |at_M: &Vector3<f64>| {
+        let out_M = if is_smaller { (low_M + high_M) * 0.5 - at_M } else { at_M - centre_M };
+        out_M.try_normalize(0.0).unwrap_or_else(Vector3::y)
+    };
+    let mut seen = other.see(&at_M, &out_M(&at_M), 0.0);
     for _ in 0..TO_AND_FRO {
         at_M = mesh.nearest(&(at_M - seen.out * seen.gap_m)).point_B;
-        seen = other.see(&at_M, &-toward(&at_M), 0.0);
+        seen = other.see(&at_M, &out_M(&at_M), 0.0);
     }
     let normal_M = -seen.out;
     Some(Meeting { normal_M, at_M, depth_m: (-seen.gap_m).max(0.0), reach_m, travel_m })
