@@ -20,7 +20,9 @@ mod lines;
 pub(crate) mod mesh;
 mod mesh_ball;
 mod mesh_corner;
+mod mesh_other;
 mod mesh_plane;
+mod mesh_solid;
 mod mesh_span;
 mod overlay;
 mod ring;
@@ -86,8 +88,19 @@ pub struct Solid<'s> {
 pub struct PairMemory {
     /// Whatever the pair's algorithm makes of them.
     pub words: [f64; 8],
-    /// Numbers of features plus one; 0: none.
-    pub features: [u32; MAX_POINTS],
+    /// Of either, where it is a mesh, which vertices it stands on.
+    pub stands: [Stands; 2],
+}
+
+/// The vertices that a mesh stands on, and how it stood when they were chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Stands {
+    /// As corners of faces, plus one; 0: none.
+    corners: [u32; MAX_POINTS],
+    /// Heights were `along . x + base`, and the lowest this one.
+    along: Vector3<f64>,
+    base: f64,
+    lowest_m: f64,
 }
 
 /// Whether contact points of such an entity as `A` can be found: a solid that ends somewhere.

@@ -87,7 +87,7 @@ impl Mesh {
     }
 
     /// As [`Self::nearest`], and whether the point is inside, as [`Self::is_inside`] says.
-    pub(crate) fn nearest_and_side(&self, p_B: &Vector3<f64>) -> (Nearest, bool) {
+    pub fn nearest_and_side(&self, p_B: &Vector3<f64>) -> (Nearest, bool) {
         match self.sides {
             Sides::Solid => self.bvh.nearest_and_side(self.triangles(), p_B),
             Sides::Sheet => (self.nearest(p_B), false),

@@ -13,7 +13,8 @@ use haptics::{Form, Shape};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::mesh_ball::{self, Ball};
-use super::mesh_plane;
+use super::mesh_other::{Other, Solidity};
+use super::{mesh_plane, mesh_solid};
 use super::{ContactPoint, ContactPoints, PairMemory, Solid};
 
 /// Where A and B touch, at least one of them being a mesh.
@@ -45,7 +46,7 @@ pub(super) fn can_move(_mesh: &Mesh) -> bool {
 /// Whether those of these two can, of which one is a mesh.
 pub(super) fn is_collidable(a: &Shape, b: &Shape) -> bool {
     let other = if matches!(a, Shape::Mesh(_)) { b } else { a };
-    matches!(other, Shape::Form(Form::Plane(_) | Form::Sphere(_)))
+    matches!(other, Shape::Form(_) | Shape::Mesh(_))
 }
 
 /// A ball around a mesh: that around its box.
@@ -74,7 +75,15 @@ fn against(
             let ball = Ball { centre_M: X_MO.translation.vector, radius_m: sphere.radius_m() };
             mesh_ball::contact_points(mesh, &ball, reach_m, memory, &mut told);
         }
-        _ => {}
+        Shape::Form(form) => {
+            let other = Other { solid: Solidity::Form(form), X_MO };
+            mesh_solid::contact_points(mesh, &other, reach_m, memory, &mut told);
+        }
+        Shape::Mesh(second) => {
+            let other = Other { solid: Solidity::Mesh(second), X_MO };
+            mesh_solid::contact_points(mesh, &other, reach_m, memory, &mut told);
+        }
+        Shape::Csg(_) | Shape::Nurbs(_) | Shape::Own(_) => {}
     }
 }
 

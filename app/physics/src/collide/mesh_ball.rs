@@ -56,6 +56,7 @@ pub(super) fn contact_points(
         found = Found::default();
         found.add(of_nearest(mesh, ball, &nearest));
     }
+    found.unite();
     share(&mut found.contacts[..found.count]);
     found.contacts[..found.count].iter().for_each(|contact| told.tell(contact));
 }
@@ -133,6 +134,21 @@ impl Found {
             left -= 1;
             left > 0
         })
+    }
+
+    /// On both sides of a fold that is nearly flat, the deeper one counts for both.
+    fn unite(&mut self) {
+        self.contacts[..self.count].sort_unstable_by(|a, b| a.gap_m.total_cmp(&b.gap_m));
+        let mut kept = 0;
+        for at in 0..self.count {
+            let one = self.contacts[at];
+            let is_flat = |other: &Contact| (other.normal_M - one.normal_M).norm_squared() < FOLD * FOLD;
+            if !self.contacts[..kept].iter().any(is_flat) {
+                self.contacts[kept] = one;
+                kept += 1;
+            }
+        }
+        self.count = kept;
     }
 
     /// Each feature once, at most as many as there is room for: the nearest.
@@ -219,14 +235,12 @@ fn is_nearest_vertex(mesh: &Mesh, number: u32, corner: usize, ball: &Ball) -> bo
 
 /// Takes from each depth what the others' normals share of it: afterwards the depths `l` are such that what presses along
 /// each normal is what its own depth `d` was, `l_i + sum c_ij l_j = d_i`, or they are zero and there is more.
-pub(super) fn share(contacts: &mut [Contact]) {
+fn share(contacts: &mut [Contact]) {
     let count = contacts.len().min(MAX_POINTS);
-    let deep = contacts.iter().filter(|contact| contact.gap_m < 0.0).count();
-    if deep < 2 {
+    if contacts.iter().filter(|contact| contact.gap_m < 0.0).count() < 2 {
         return;
     }
-    let mut depths = [0.0; MAX_POINTS];
-    let (mut cosines, mut loads) = ([[0.0; MAX_POINTS]; MAX_POINTS], [0.0; MAX_POINTS]);
+    let (mut depths, mut cosines) = ([0.0; MAX_POINTS], [[0.0; MAX_POINTS]; MAX_POINTS]);
     for i in 0..count {
         depths[i] = -contacts[i].gap_m;
         for j in 0..count {
@@ -234,25 +248,52 @@ pub(super) fn share(contacts: &mut [Contact]) {
         }
         cosines[i][i] = 1.0 + STIFF;
     }
-    let mut missing = depths;
+    let mut carries = [false; MAX_POINTS];
+    (0..count).for_each(|i| carries[i] = depths[i] > 0.0);
+    let mut loads = [0.0; MAX_POINTS];
     for _ in 0..SHARE_ROUNDS {
-        let mut most: f64 = 0.0;
-        for i in 0..count {
-            let load = (loads[i] + missing[i] / cosines[i][i]).max(0.0);
-            let change = load - loads[i];
-            loads[i] = load;
-            most = most.max(change.abs());
-            for j in 0..count {
-                missing[j] -= change * cosines[j][i];
-            }
+        loads = solve(&cosines, &depths, &carries);
+        // Who would pull carries nothing; who is pressed more than the others' loads explain carries again.
+        let least = (0..count).filter(|&i| carries[i]).min_by(|&i, &j| loads[i].total_cmp(&loads[j]));
+        if let Some(least) = least.filter(|&least| loads[least] < 0.0) {
+            carries[least] = false;
+            continue;
         }
-        if most <= 1e-12 * depths[0].abs() {
-            break;
+        let missing = |i: usize| depths[i] - (0..count).map(|j| cosines[i][j] * loads[j]).sum::<f64>();
+        let most = (0..count).filter(|&i| !carries[i]).max_by(|&i, &j| missing(i).total_cmp(&missing(j)));
+        match most.filter(|&most| missing(most) > 1e-12 * depths[most].abs()) {
+            Some(most) => carries[most] = true,
+            None => break,
         }
     }
-    for (contact, (load, missing)) in contacts.iter_mut().zip(loads.iter().zip(missing)) {
-        contact.gap_m = if *load > 0.0 { -load } else { (-missing).max(0.0) };
+    for (i, contact) in contacts.iter_mut().enumerate().take(count) {
+        contact.gap_m = if carries[i] { -loads[i].max(0.0) } else { contact.gap_m.max(0.0) };
     }
+}
+
+/// Loads of those that carry, which take their depths together; by elimination: the matrix is positive definite.
+fn solve(
+    cosines: &[[f64; MAX_POINTS]; MAX_POINTS],
+    depths: &[f64; MAX_POINTS],
+    carries: &[bool; MAX_POINTS],
+) -> [f64; MAX_POINTS] {
+    let (mut m, mut loads) = (*cosines, *depths);
+    for i in (0..MAX_POINTS).filter(|&i| carries[i]) {
+        for j in (i + 1..MAX_POINTS).filter(|&j| carries[j]) {
+            let factor = m[j][i] / m[i][i];
+            (i..MAX_POINTS).for_each(|k| m[j][k] -= factor * m[i][k]);
+            loads[j] -= factor * loads[i];
+        }
+    }
+    for i in (0..MAX_POINTS).rev() {
+        if !carries[i] {
+            loads[i] = 0.0;
+            continue;
+        }
+        let others: f64 = (i + 1..MAX_POINTS).filter(|&j| carries[j]).map(|j| m[i][j] * loads[j]).sum();
+        loads[i] = (loads[i] - others) / m[i][i];
+    }
+    loads
 }
 
 /// Faces that are looked at around a ball.
@@ -261,6 +302,9 @@ const MOST_FACES: usize = 512;
 const SAME: f64 = 1e-9;
 /// Roundings of products of coordinates.
 const ROUNDING: f64 = 1e-13;
-/// Normals that are the same share a depth evenly.
-const STIFF: f64 = 1e-3;
-const SHARE_ROUNDS: usize = 64;
+/// A fold that turns the normal by less is flat \[rad\]: what it would do sideways is a hundredth of the load at most.
+const FOLD: f64 = 0.01;
+/// Of what shares of a depth cannot be told apart to rounding, each gets the same.
+const STIFF: f64 = 1e-9;
+/// Each changes who carries by one.
+const SHARE_ROUNDS: usize = 16;

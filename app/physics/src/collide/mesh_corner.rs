@@ -29,6 +29,21 @@ impl Corner {
         &mesh.vertices()[self.vertex(mesh) as usize]
     }
 
+    /// Whether all faces around it lie in one plane.
+    pub(super) fn is_in_a_plane(self, mesh: &Mesh) -> bool {
+        let first = &mesh.faces()[(self.0 / 3) as usize].normal_B;
+        let mut fan = Fan::new(mesh, self.0 / 3, (self.0 % 3) as usize);
+        let mut is_closed = false;
+        while let Some((face, corner)) = fan.next() {
+            let face = &mesh.faces()[face as usize];
+            if (face.normal_B - first).norm_squared() > FLAT * FLAT {
+                return false;
+            }
+            is_closed = face.links[corner].face() == fan.first && !face.links[corner].is_boundary();
+        }
+        is_closed
+    }
+
     /// From neighbour to neighbour as long as the score grows; where that ends, and the score there.
     pub(super) fn climb(self, mesh: &Mesh, score: impl Fn(Self) -> f64) -> (Self, f64) {
         let (mut at, mut most) = (self, score(self));
@@ -78,6 +93,8 @@ impl<'m> Fan<'m> {
     }
 }
 
+/// Normals that differ by less are the same: rounding of what lies in a plane.
+const FLAT: f64 = 1e-6;
 /// Steps of a climb; the next tick goes on.
 const MOST_STEPS: usize = 64;
 /// Faces that are looked at around a vertex.

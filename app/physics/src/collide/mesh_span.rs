@@ -23,7 +23,7 @@ use haptics::mesh::Linear;
 use nalgebra::Vector3;
 
 use super::mesh_corner::Corner;
-use super::{MAX_POINTS, PairMemory};
+use super::{MAX_POINTS, Stands};
 
 /// A mesh over a flat face.
 pub(super) struct Standing<'m> {
@@ -43,8 +43,8 @@ pub(super) type Chosen = [Option<Corner>; MAX_POINTS];
 
 impl Standing<'_> {
     /// The vertices that count in this tick; none is named twice.
-    pub(super) fn choose(&self, memory: &mut PairMemory) -> Chosen {
-        let kept = memory.features.map(|number| Corner::remembered(number, self.mesh));
+    pub(super) fn choose(&self, memory: &mut Stands) -> Chosen {
+        let kept = memory.corners.map(|number| Corner::remembered(number, self.mesh));
         if self.is_still(memory, &kept) {
             return kept;
         }
@@ -54,22 +54,20 @@ impl Standing<'_> {
     }
 
     /// Whether all heights are what they were when these were chosen.
-    fn is_still(&self, memory: &PairMemory, kept: &Chosen) -> bool {
-        let [x, y, z, base, lowest_m, ..] = memory.words;
-        if lowest_m >= 0.0 || kept[0].is_none() {
+    fn is_still(&self, memory: &Stands, kept: &Chosen) -> bool {
+        if memory.lowest_m >= 0.0 || kept[0].is_none() {
             return false;
         }
-        let turned = (self.height.along_B - Vector3::new(x, y, z)).norm();
-        let sunk_m = (self.height.base - base).abs();
-        turned * 1.8 * self.mesh.extent_m() + sunk_m <= STILL * -lowest_m
+        let turned = (self.height.along_B - memory.along).norm();
+        let sunk_m = (self.height.base - memory.base).abs();
+        turned * 1.8 * self.mesh.extent_m() + sunk_m <= STILL * -memory.lowest_m
     }
 
-    fn remember(&self, chosen: &Chosen, memory: &mut PairMemory) {
+    fn remember(&self, chosen: &Chosen, memory: &mut Stands) {
         let heights = chosen.iter().flatten().map(|vertex| self.height_m(*vertex));
         let lowest_m = heights.fold(f64::INFINITY, f64::min);
-        let [x, y, z] = self.height.along_B.into();
-        memory.words = [x, y, z, self.height.base, lowest_m, 0.0, 0.0, 0.0];
-        memory.features = chosen.map(|corner| corner.map_or(0, Corner::number));
+        let corners = chosen.map(|corner| corner.map_or(0, Corner::number));
+        *memory = Stands { corners, along: self.height.along_B, base: self.height.base, lowest_m };
     }
 
     /// All within reach, if they are few.
@@ -288,7 +286,7 @@ fn flat(v_B: &Vector3<f64>, up_B: &Vector3<f64>) -> Vector3<f64> {
 }
 
 /// Any direction along the face.
-fn across(up_B: &Vector3<f64>) -> Vector3<f64> {
+pub(super) fn across(up_B: &Vector3<f64>) -> Vector3<f64> {
     let axis_B = match up_B.iamin() {
         0 => Vector3::x(),
         1 => Vector3::y(),
