@@ -240,6 +240,15 @@ impl Problem {
             let change_W = (row.at_end_W(&motion.at(&arm_W), self.dt_s) - row.force_W) * share;
             row.force_W += change_W;
             motion.push(&(change_W * self.dt_s), &arm_W);
+            if row.torsion.most_nm > 0.0 {
+                let n = row.normal_W;
+                let give = n.dot(&(motion.inverse_inertia_W * n)) * self.dt_s;
+                let asked_nm = row.torsion.at_end_nm(n.dot(&motion.angular_velocity_W), self.dt_s);
+                let share = 1.0 / (1.0 + row.torsion.falls(self.dt_s) * give);
+                let change_nm = (asked_nm - row.torsion.torque_nm) * share;
+                row.torsion.torque_nm += change_nm;
+                motion.turn(&(n * (change_nm * self.dt_s)));
+            }
         }
         self.impulse(rows, which)
     }
