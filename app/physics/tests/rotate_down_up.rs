@@ -83,8 +83,8 @@ fn held_at_a_corner_and_lowered_on_a_smooth_floor_a_cube_turns_until_it_lies_fla
                 lowest_before_contact = lowest_before_contact.min(corner.off_flat());
             }
         }
-        // While it hung it swung, by what it leant at first.
-        assert!(lowest_before_contact > FRAC_PI_4 - lean.abs() - 0.05, "{lean}: {lowest_before_contact}");
+        // Until it touched, it swung about hanging by its corner: never near to lying flat.
+        assert!(lowest_before_contact > 0.15, "{lean}: {lowest_before_contact}");
         for _ in 0..3000 {
             corner.hold_at(low);
         }
