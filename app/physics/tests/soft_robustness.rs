@@ -208,3 +208,37 @@ fn a_tick_of_soft_fingers_never_allocates() {
         assert_eq!(calls, 0, "{integrator:?}");
     }
 }
+
+#[test]
+fn pads_are_calm_whatever_the_weight_and_however_stiff_they_are() {
+    for mass in [0.001, 0.01, 0.1, 1.0, 10.0] {
+        for k in [50.0, 500.0, 5000.0] {
+            for (stiffness_nm_per_rad, damping_nm_s_per_rad) in
+                [(0.05, 0.0), (0.5, 2e-3), (50.0, 0.0), (50.0, 0.2)]
+            {
+                let soft = SoftFinger { stiffness_nm_per_rad, damping_nm_s_per_rad, ..SoftFinger::default() };
+                let settings = Settings { gravity_W: Vector3::zeros(), ..Settings::default() };
+                let cube = object(Cuboid::new([0.05; 3]).unwrap(), Isometry3::identity(), k, 0.8);
+                let state = body(&cube, mass);
+                let mut world = World::new(vec![cube], &[(0, state)], settings, 2)
+                    .with_fingers(FingerSettings { soft, attachment: None });
+                let noise = &mut Noise::new(3);
+                let (mut fastest, mut rounds) = (0.0_f64, 0);
+                for tick in 0..3000 {
+                    let t = f64::from(tick) * DT;
+                    // A hand that trembles at 10 Hz and sways; encoders' steps.
+                    let sway = Vector3::new(0.0, 0.02 * (3.0 * t).sin(), 1e-3 * (60.0 * t).sin());
+                    let hips =
+                        [-0.023, 0.023].map(|x| Vector3::new(x, 0.001, 0.0) + sway + noise.vector(1.5e-5));
+                    world.step(&hips);
+                    fastest = fastest.max(world.body().angular_velocity_W().x.abs());
+                    rounds = rounds.max(world.made.sweeps);
+                }
+                // What 0.06 m/s do at an arm of some millimetres, and no more.
+                assert!(fastest < 3.0, "{mass} kg, {k} N/m, {stiffness_nm_per_rad}: {fastest}");
+                // Torques of stiff pads stand at either limit until they are all but found.
+                assert!(rounds < 60, "{mass} kg, {k} N/m, {stiffness_nm_per_rad}: {rounds}");
+            }
+        }
+    }
+}

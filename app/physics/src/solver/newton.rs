@@ -50,7 +50,7 @@ pub(super) fn solve(rows: &mut [Row], which: &[usize], motion: &mut Motion, dt_s
     for &at in which {
         let row = &mut rows[at];
         row.force_W = row.project(&row.force_W);
-        row.torsion.torque_nm = 0.0;
+        row.torsion.begin();
     }
     let mut p = problem.impulse(rows, which);
     let mut stuck_at = None;
@@ -186,9 +186,14 @@ impl Problem {
         now: &Sum,
         load: f64,
     ) -> Option<(Vector6, Sum)> {
-        let change = self.derivative(rows, which, p, load).lu().solve(&now.left)?;
+        let change = self.derivative(rows, which, p, load, false).lu().solve(&now.left)?;
         let mut share = 1.0;
-        for _ in 0..=HALVINGS {
+        for halvings in 0..=HALVINGS {
+            if halvings == 1
+                && let Some(step) = self.step_back(rows, which, p, now, load)
+            {
+                return Some(step);
+            }
             let next_p = p - change * share;
             let next = self.sum(rows, which, &next_p, load);
             if next.left_j < (1.0 - 1e-3 * share) * now.left_j || next.left_j == 0.0 {
@@ -199,8 +204,30 @@ impl Problem {
         None
     }
 
-    /// Of `p - dt sum J^T f(u_0 + W p)`, by `p`.
-    fn derivative(&self, rows: &[Row], which: &[usize], p: &Vector6, load: f64) -> Matrix6 {
+    /// A step where the whole one leads too far because torques at their limit do not change on the way, until they turn over:
+    /// with the slopes of their chords, which lead back to where they do.
+    fn step_back(
+        &self,
+        rows: &[Row],
+        which: &[usize],
+        p: &Vector6,
+        now: &Sum,
+        load: f64,
+    ) -> Option<(Vector6, Sum)> {
+        let spin_W = self.moving(p).angular_velocity_W;
+        let is_at_limit = |row: &Row| {
+            row.torsion.most_nm > 0.0 && row.torsion.falls_at_end(row.normal_W.dot(&spin_W), self.dt_s) == 0.0
+        };
+        if !which.iter().any(|&at| is_at_limit(&rows[at])) {
+            return None;
+        }
+        let next_p = p - self.derivative(rows, which, p, load, true).lu().solve(&now.left)?;
+        let next = self.sum(rows, which, &next_p, load);
+        (next.left_j < (1.0 - 1e-3) * now.left_j).then_some((next_p, next))
+    }
+
+    /// Of `p - dt sum J^T f(u_0 + W p)`, by `p`; of torsion the chords, if wanted.
+    fn derivative(&self, rows: &[Row], which: &[usize], p: &Vector6, load: f64, chords: bool) -> Matrix6 {
         let motion = self.moving(p);
         let mut falls = [Matrix3::zeros(); 4];
         for &at in which {
@@ -214,8 +241,10 @@ impl Problem {
             falls[2] += rD;
             falls[3] -= rD * r;
             let n = &row.normal_W;
-            falls[3] +=
-                n * n.transpose() * row.torsion.falls_at_end(n.dot(&motion.angular_velocity_W), self.dt_s);
+            let (torsion, spin) = (&row.torsion, n.dot(&motion.angular_velocity_W));
+            let twists =
+                if chords { torsion.chord(spin, self.dt_s) } else { torsion.falls_at_end(spin, self.dt_s) };
+            falls[3] += n * n.transpose() * twists;
         }
         let (inverse_mass, inverse_inertia_W) = (self.start.inverse_mass, &self.start.inverse_inertia_W);
         let mut derivative = Matrix6::identity();
