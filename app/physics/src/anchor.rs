@@ -41,13 +41,16 @@ impl Anchor {
 
     /// Goes on at this point: takes note of what moved since the last tick.
     pub(crate) fn carry(&mut self, point: &ContactPoint, X_WA: &Isometry3<f64>, X_WB: &Isometry3<f64>) {
-        let [a_A, b_B] = self.materials.map(Point3::from);
-        let moved_W = X_WA * a_A - X_WB * b_B;
-        // What rolls lifts its material off: only what it moved along the surface drags.
-        let along_W = moved_W - point.normal_W * point.normal_W.dot(&moved_W);
+        // What moved before anything pressed stretched nothing.
+        if self.is_pressed() {
+            let [a_A, b_B] = self.materials.map(Point3::from);
+            let moved_W = X_WA * a_A - X_WB * b_B;
+            // Along the normal it is another spring's: here it would be taken for a turn of the stretch.
+            let across_W = moved_W - point.normal_W * point.normal_W.dot(&moved_W);
+            self.stretch += X_WB.inverse_transform_vector(&across_W);
+        }
         self.id = point.id;
         self.touch(point, X_WA, X_WB);
-        self.stretch += X_WB.inverse_transform_vector(&along_W);
     }
 
     fn touch(&mut self, point: &ContactPoint, X_WA: &Isometry3<f64>, X_WB: &Isometry3<f64>) {

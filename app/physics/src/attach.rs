@@ -124,6 +124,7 @@ pub(crate) struct Bond {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TiedFinger<'b> {
     pub(crate) hip_W: Vector3<f64>,
+    pub(crate) velocity_W: Option<Vector3<f64>>,
     pub(crate) is_held: bool,
     /// By how much the gimbal turned in the tick.
     pub(crate) turn_W: Option<Vector3<f64>>,
@@ -184,7 +185,8 @@ impl Bond {
         let point_W = (body.pose() * Point3::from(self.point_B)).coords;
         let arm_W = point_W - body.centre_W;
         let (k, b) = (of.stiffness_n_per_m, of.damping_n_s_per_m);
-        let hand_W = (finger.hip_W - self.hip_W) / dt_s;
+        let known_W = finger.velocity_W.filter(|v| v.iter().all(|x| x.is_finite()));
+        let hand_W = known_W.unwrap_or_else(|| (finger.hip_W - self.hip_W) / dt_s);
         let velocity_W = body.velocity_W + body.angular_velocity_W().cross(&arm_W);
         Row {
             body: self.body,

@@ -41,6 +41,8 @@ impl Default for FingerSettings {
 pub struct FingerTick {
     /// Its HIP \[m\].
     pub hip_W: Vector3<f64>,
+    /// How fast that moves \[m/s\], where somebody knows better than the difference of two positions, which comes in steps.
+    pub hip_velocity_W: Option<Vector3<f64>>,
     /// Its orientation, where it has an instrumented gimbal.
     pub gimbal: Option<UnitQuaternion<f64>>,
     /// Whether its button is held.
@@ -58,6 +60,7 @@ impl FingerTick {
     pub fn at(hip_W: Vector3<f64>) -> Self {
         Self {
             hip_W,
+            hip_velocity_W: None,
             gimbal: None,
             is_button_held: false,
             force_on_user_W: Vector3::zeros(),
@@ -104,6 +107,7 @@ pub(crate) struct HandStart<'t> {
     /// Of each body, its entity.
     pub(crate) bodies_are: &'t [usize],
     pub(crate) bodies: &'t [Body],
+    pub(crate) is_parked: &'t [bool],
     pub(crate) gravity_W: Vector3<f64>,
     pub(crate) dt_s: f64,
 }
@@ -258,9 +262,14 @@ impl Hand {
                 let touched = touched_by(index, start);
                 finger.bond = touched.map(|body| Bond::begin(body, tick.hip_W, &start.bodies[body]));
             }
-            let Some(bond) = &mut finger.bond else { continue };
+            // What does not move any more would hold the finger for ever.
+            let Some(bond) = finger.bond.as_mut().filter(|bond| !start.is_parked[bond.body]) else {
+                finger.bond = None;
+                continue;
+            };
             let tied = TiedFinger {
                 hip_W: tick.hip_W,
+                velocity_W: tick.hip_velocity_W,
                 is_held: tick.is_button_held,
                 turn_W: finger.turn_W,
                 body: &start.bodies[bond.body],

@@ -10,6 +10,9 @@
 //! - asks what the springs do at the *end* of the tick ([`Solver`]): so no spring is too stiff for a light body;
 //! - sums the forces up ([`Wrench`]) and moves the bodies ([`Integrator`]).
 //!
+//! Fingers are points, unless told otherwise: [soft](SoftFinger), with a gimbal or a button that
+//! [ties](Attachment) an object to them ([`Manipulation::step_with`]). How well they hold an object: [`grasp`].
+//!
 //! What a finger's spring did to a body in a tick, times -1, is what the user is made to feel in that tick.
 //!
 //! Frames and signs: W world, B a body's own frame, P its principal axes with the centre of mass as origin. SI, y up.

@@ -268,6 +268,7 @@ impl Manipulation {
                 entities,
                 bodies_are: &self.entities,
                 bodies: &self.bodies,
+                is_parked: &self.is_parked,
                 gravity_W: self.settings.gravity_W,
                 dt_s,
             },

@@ -248,13 +248,20 @@ fn row(
         Response::Impulse { restitution } => {
             let stop = stop_n_s_per_m(&row, start);
             (row.stiffness, row.damping) = ([0.0, k], [stop, b]);
-            if let Some(bounce_m_s) = bounce_m_s(&row, gap_m, restitution, anchor, start) {
+            let impact = Impact::of(&row, gap_m, restitution, anchor, start);
+            if impact.is_one {
                 // What an impulse gives across the normal lasts no longer than the impulse.
                 row.stiffness[1] = stop / dt_s;
-                row.rest_W = n * (stop * bounce_m_s);
+            }
+            let wanted_m_s = match gap_m {
+                _ if impact.bounce_m_s > 0.0 => impact.bounce_m_s,
+                gap_m if gap_m < 0.0 => let_out_m_s(-gap_m, dt_s),
+                _ => -gap_m / dt_s,
+            };
+            if impact.is_one {
+                row.rest_W = n * (stop * wanted_m_s);
                 return row;
             }
-            let wanted_m_s = if gap_m < 0.0 { let_out_m_s(-gap_m, dt_s) } else { -gap_m / dt_s };
             stop * wanted_m_s
         }
     };
@@ -262,27 +269,30 @@ fn row(
     row
 }
 
-/// With which normal velocity the row's point leaves the tick, if it bounces.
-///
-/// That is the reflected velocity of the beginning of the tick, less what gravity takes from it in the whole tick: so a ball
-/// that does not lose anything else loses `(g dt)^2 / 2` of energy per mass in each bounce, and never gains. A bounce that
-/// gravity would end within the tick is none. Nor is one that anything else ended so: a contact that closes in a tick in
-/// which it did not approach was pushed back before it got off, and rests.
-fn bounce_m_s(
-    row: &Row,
-    gap_m: f64,
-    restitution: f64,
-    anchor: &mut Anchor,
-    start: &Start<'_>,
-) -> Option<f64> {
-    let along = |velocity_W: &Vector3<f64>| row.normal_W.dot(velocity_W);
-    let (now_m_s, freely_m_s) = (along(&at_start(row, start)), along(&freely(row, start)));
-    //= melder#6.1
-    let bounce_m_s = restitution * -now_m_s + (freely_m_s - now_m_s).min(0.0);
-    let approaches = now_m_s < 0.0 && bounce_m_s > 0.0;
-    let was_pushed_back = anchor.is_pressed() && !anchor.approached;
-    anchor.approached = approaches;
-    (approaches && !was_pushed_back && gap_m < -freely_m_s * start.dt_s).then_some(bounce_m_s)
+/// What a row's point does that meets the other in a tick.
+struct Impact {
+    is_one: bool,
+    /// With which normal velocity it leaves the tick; 0 and below: it stays.
+    bounce_m_s: f64,
+}
+
+impl Impact {
+    /// The velocity that it leaves with is the reflected one of the beginning of the tick, less what gravity takes from it in
+    /// the whole tick: so a ball that does not lose anything else loses `(g dt)^2 / 2` of energy per mass in each bounce, and never
+    /// gains. What approaches no faster than gravity makes it in a tick rests, and a bounce that gravity would end
+    /// within the tick is none. Nor is one that anything else ended so: a contact that closes in a tick in which it did not
+    /// approach was pushed back before it got off, and rests.
+    fn of(row: &Row, gap_m: f64, restitution: f64, anchor: &mut Anchor, start: &Start<'_>) -> Self {
+        let along = |velocity_W: &Vector3<f64>| row.normal_W.dot(velocity_W);
+        let (now_m_s, freely_m_s) = (along(&at_start(row, start)), along(&freely(row, start)));
+        let falls_m_s = (freely_m_s - now_m_s).min(0.0);
+        let approaches = now_m_s < falls_m_s;
+        let was_pushed_back = anchor.is_pressed() && !anchor.approached;
+        anchor.approached = approaches;
+        let is_one = approaches && !was_pushed_back && gap_m < -freely_m_s * start.dt_s;
+        //= melder#6.1
+        Self { is_one, bounce_m_s: if is_one { restitution * -now_m_s + falls_m_s } else { 0.0 } }
+    }
 }
 
 /// Velocity of A's point relative to B's when the tick begins.

@@ -50,7 +50,7 @@ pub struct Torsion {
     pub damping_nm_s_per_rad: f64,
     /// The torque stays within this \[N m\]; 0: none.
     pub most_nm: f64,
-    /// The answer \[N m\].
+    /// At first a guess, then the answer \[N m\].
     pub torque_nm: f64,
 }
 
@@ -59,6 +59,13 @@ impl Torsion {
     #[inline]
     pub(crate) fn falls(&self, dt_s: f64) -> f64 {
         self.stiffness_nm_per_rad * dt_s + self.damping_nm_s_per_rad
+    }
+
+    /// Makes the guess one that it can have.
+    #[inline]
+    pub(crate) fn begin(&mut self) {
+        let guess_nm = if self.torque_nm.is_finite() { self.torque_nm } else { 0.0 };
+        self.torque_nm = guess_nm.clamp(-self.most_nm, self.most_nm);
     }
 
     /// The torque if the body turns about the normal at `spin_rad_s` all the tick \[N m\].
@@ -79,6 +86,16 @@ impl Torsion {
     pub(crate) fn falls_at_end(&self, spin_rad_s: f64, dt_s: f64) -> f64 {
         let falls = self.falls(dt_s);
         if (self.rest_nm - falls * spin_rad_s).abs() < self.most_nm { falls } else { 0.0 }
+    }
+}
+
+impl Torsion {
+    /// The slope of the line to where the torque stands from where there is none \[N m s\]: what a torque at its limit, which
+    /// does not change at all, is worth on the way back.
+    #[inline]
+    pub(crate) fn chord(&self, spin_rad_s: f64, dt_s: f64) -> f64 {
+        let (falls, trial_nm) = (self.falls(dt_s), self.rest_nm - self.falls(dt_s) * spin_rad_s);
+        if trial_nm.abs() <= self.most_nm { falls } else { falls * (self.most_nm / trial_nm.abs()) }
     }
 }
 

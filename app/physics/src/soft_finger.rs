@@ -5,6 +5,7 @@
 //! Model: the area `A = pi r^2` of a touch's friction circle stands for the pressed area of the pad. Three ways to make use
 //! of it, see [`TorsionModel`]. Where a touch has no friction circle (another algorithm than the friction cone), a share of
 //! the normal force stands in: `r = share N / k`.
+//! Turning and sliding share nothing: a touch that slides resists turning as one that holds.
 //! Frames and signs: about the touch's normal (`coulomb`), or about the grasp axis (see [`crate::GraspAxis`]).
 //! Invariant: parameters are checked when they are set; torques never exceed what is said here.
 

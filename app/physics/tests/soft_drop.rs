@@ -9,7 +9,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use common::*;
 use held::*;
-use physics::{SoftFinger, TorsionModel};
+use physics::{Integrator, Settings, SoftFinger, TorsionModel};
 
 /// `K(sin(angle / 2)) 2 / pi`: by how much a pendulum of this amplitude is slower than a small one (Gauss).
 fn slower(amplitude: f64) -> f64 {
@@ -104,6 +104,26 @@ fn torsional_friction_holds_up_to_what_a_disc_holds_and_slips_above() {
         // beyond as it was fast.
         let slips = after(0.99);
         assert!(slips > 0.13, "{arm}: {slips}");
+    }
+}
+
+#[test]
+fn pads_hold_with_every_integrator() {
+    for (name, integrator) in Integrator::NAMES {
+        for model in ["coulomb", "viscous"] {
+            let soft = SoftFinger::default().with_model(TorsionModel::of_name(model).unwrap());
+            let settings = Settings { integrator, ..Settings::default() };
+            let mut held = Held::in_a_world_of(settings, soft, [500.0, 0.5], 0.005, FRAC_PI_2);
+            let force = 1.5 * held.needed();
+            held.squeeze_for(0.5, 2.0 * force);
+            held.relax(0.5, 2.0 * force, force);
+            held.squeeze_for(3.0, force);
+            // Coulomb's pads give by m g L / 2 over 0.5 N m/rad each; the others' hold gravity as a whole.
+            let given = if model == "coulomb" { held.weight_moment() / 2.0 / 0.5 } else { 0.0 };
+            let turned = FRAC_PI_2 - held.angle();
+            assert!((turned - given).abs() < 1e-3, "{name} {model}: {turned}");
+            assert!(held.world.body().angular_velocity_W().norm() < 1e-6, "{name} {model}");
+        }
     }
 }
 

@@ -30,9 +30,10 @@ pub(super) fn solve(
     for &at in which {
         let row = &mut rows[at];
         row.force_W = row.project(&row.force_W);
-        row.torsion.torque_nm = 0.0;
+        row.torsion.begin();
         blocks.push(Block::new(row, motions, dt_s));
         push(row, motions, &(row.force_W * dt_s));
+        twirl(row, motions, row.torsion.torque_nm * dt_s);
     }
     let mut sweeps = 0;
     while sweeps < MAX_SWEEPS && !which.is_empty() {
@@ -145,12 +146,18 @@ fn twist(row: &mut Row, motions: &mut [Motion], dt_s: f64) -> f64 {
         ((torsion.rest_nm - falls * without) / (1.0 + falls * give)).clamp(-torsion.most_nm, torsion.most_nm);
     let change = torque_nm - torsion.torque_nm;
     torsion.torque_nm = torque_nm;
-    let impulse_W = n * (change * dt_s);
+    twirl(row, motions, change * dt_s);
+    change
+}
+
+/// An angular impulse about the normal (N m s).
+#[inline]
+fn twirl(row: &Row, motions: &mut [Motion], impulse_nms: f64) {
+    let impulse_W = row.normal_W * impulse_nms;
     motions[row.body].turn(&impulse_W);
     if let Some(other) = row.other {
         motions[other].turn(&-impulse_W);
     }
-    change
 }
 
 /// A torque counts as the force that makes it at this arm \[m\].

@@ -23,8 +23,10 @@ type Vector6 = SVector<f64, 6>;
 
 /// What is left of the equations, in shares of all forces, when they count as solved.
 const SOLVED: f64 = 1e-13;
-/// When nothing brings it nearer any more, this is solved too: roundings of points that are very hard.
+/// When nothing brings it nearer any more, this is solved too.
 const NEARLY_SOLVED: f64 = 1e-9;
+/// Of velocities; points that are very hard make much of it.
+const ROUNDING: f64 = 1e-15;
 /// How often a step is halved.
 const HALVINGS: usize = 6;
 /// Shares of the tick for which forces last, on the way to all of it.
@@ -42,6 +44,8 @@ struct Sum {
     left_j: f64,
     /// The like of all forces, each by itself \[J\].
     all_j: f64,
+    /// The like of the roundings of these forces \[J\].
+    noise_j: f64,
 }
 
 /// The forces of these rows, all of this body, and the motion that they leave; returns the rounds made.
@@ -50,7 +54,7 @@ pub(super) fn solve(rows: &mut [Row], which: &[usize], motion: &mut Motion, dt_s
     for &at in which {
         let row = &mut rows[at];
         row.force_W = row.project(&row.force_W);
-        row.torsion.torque_nm = 0.0;
+        row.torsion.begin();
     }
     let mut p = problem.impulse(rows, which);
     let mut stuck_at = None;
@@ -79,6 +83,7 @@ pub(super) fn solve(rows: &mut [Row], which: &[usize], motion: &mut Motion, dt_s
     if !is_found {
         // Not what was sought, but forces that contacts can have.
         problem.relax(rows, which, FIRST_TURNS);
+        which.iter().for_each(|&at| _ = lets_slip(&mut rows[at]));
     }
     *motion = problem.moving(&problem.impulse(rows, which));
     rounds
@@ -86,7 +91,7 @@ pub(super) fn solve(rows: &mut [Row], which: &[usize], motion: &mut Motion, dt_s
 
 impl Sum {
     fn is_within(&self, share: f64) -> bool {
-        self.left_j <= share * share * self.all_j
+        self.left_j <= share * share * self.all_j + self.noise_j
     }
 }
 
@@ -154,8 +159,10 @@ impl Problem {
     /// What the points do at `p`.
     fn sum(&self, rows: &[Row], which: &[usize], p: &Vector6, load: f64) -> Sum {
         let motion = self.moving(p);
-        let (mut force_W, mut torque_W, mut all) = (Vector3::zeros(), Vector3::zeros(), 0.0);
+        let (mut force_W, mut torque_W) = (Vector3::zeros(), Vector3::zeros());
+        let (mut all, mut noise) = (0.0, 0.0);
         let turns = self.start.inverse_inertia_W.trace();
+        let (speed, spin) = (motion.velocity_W.norm(), motion.angular_velocity_W.norm());
         for &at in which {
             let row = &rows[at];
             let arm_W = &row.arms_W[0];
@@ -163,12 +170,21 @@ impl Problem {
             let twist_nm = row.torsion.at_end_nm(row.normal_W.dot(&motion.angular_velocity_W), self.dt_s);
             force_W += on_body_W;
             torque_W += arm_W.cross(&on_body_W) + row.normal_W * twist_nm;
-            all += on_body_W.norm_squared() * (self.start.inverse_mass + arm_W.norm_squared() * turns)
-                + twist_nm * twist_nm * turns;
+            let arm_m = arm_W.norm();
+            let gives = self.start.inverse_mass + arm_m * arm_m * turns;
+            let [along, across] = row.falls(self.dt_s);
+            let rounding_n = ROUNDING * along.max(across) * (speed + spin * arm_m);
+            all += on_body_W.norm_squared() * gives + twist_nm * twist_nm * turns;
+            noise += rounding_n * rounding_n * gives;
         }
         let acts_s = self.dt_s * load;
         let left = p - joined(&(force_W * acts_s), &(torque_W * acts_s));
-        Sum { left, left_j: self.energy(&left), all_j: all * acts_s * acts_s }
+        Sum {
+            left,
+            left_j: self.energy(&left),
+            all_j: all * acts_s * acts_s,
+            noise_j: noise * acts_s * acts_s,
+        }
     }
 
     /// `p W p`.
@@ -186,9 +202,14 @@ impl Problem {
         now: &Sum,
         load: f64,
     ) -> Option<(Vector6, Sum)> {
-        let change = self.derivative(rows, which, p, load).lu().solve(&now.left)?;
+        let change = self.derivative(rows, which, p, load, false).lu().solve(&now.left)?;
         let mut share = 1.0;
-        for _ in 0..=HALVINGS {
+        for halvings in 0..=HALVINGS {
+            if halvings == 1
+                && let Some(step) = self.step_back(rows, which, p, now, load)
+            {
+                return Some(step);
+            }
             let next_p = p - change * share;
             let next = self.sum(rows, which, &next_p, load);
             if next.left_j < (1.0 - 1e-3 * share) * now.left_j || next.left_j == 0.0 {
@@ -199,8 +220,30 @@ impl Problem {
         None
     }
 
-    /// Of `p - dt sum J^T f(u_0 + W p)`, by `p`.
-    fn derivative(&self, rows: &[Row], which: &[usize], p: &Vector6, load: f64) -> Matrix6 {
+    /// A step where the whole one leads too far because torques at their limit do not change on the way, until they turn over:
+    /// with the slopes of their chords, which lead back to where they do.
+    fn step_back(
+        &self,
+        rows: &[Row],
+        which: &[usize],
+        p: &Vector6,
+        now: &Sum,
+        load: f64,
+    ) -> Option<(Vector6, Sum)> {
+        let spin_W = self.moving(p).angular_velocity_W;
+        let is_at_limit = |row: &Row| {
+            row.torsion.most_nm > 0.0 && row.torsion.falls_at_end(row.normal_W.dot(&spin_W), self.dt_s) == 0.0
+        };
+        if !which.iter().any(|&at| is_at_limit(&rows[at])) {
+            return None;
+        }
+        let next_p = p - self.derivative(rows, which, p, load, true).lu().solve(&now.left)?;
+        let next = self.sum(rows, which, &next_p, load);
+        (next.left_j < (1.0 - 1e-3) * now.left_j).then_some((next_p, next))
+    }
+
+    /// Of `p - dt sum J^T f(u_0 + W p)`, by `p`; of torsion the chords, if wanted.
+    fn derivative(&self, rows: &[Row], which: &[usize], p: &Vector6, load: f64, chords: bool) -> Matrix6 {
         let motion = self.moving(p);
         let mut falls = [Matrix3::zeros(); 4];
         for &at in which {
@@ -214,8 +257,10 @@ impl Problem {
             falls[2] += rD;
             falls[3] -= rD * r;
             let n = &row.normal_W;
-            falls[3] +=
-                n * n.transpose() * row.torsion.falls_at_end(n.dot(&motion.angular_velocity_W), self.dt_s);
+            let (torsion, spin) = (&row.torsion, n.dot(&motion.angular_velocity_W));
+            let twists =
+                if chords { torsion.chord(spin, self.dt_s) } else { torsion.falls_at_end(spin, self.dt_s) };
+            falls[3] += n * n.transpose() * twists;
         }
         let (inverse_mass, inverse_inertia_W) = (self.start.inverse_mass, &self.start.inverse_inertia_W);
         let mut derivative = Matrix6::identity();
@@ -240,6 +285,15 @@ impl Problem {
             let change_W = (row.at_end_W(&motion.at(&arm_W), self.dt_s) - row.force_W) * share;
             row.force_W += change_W;
             motion.push(&(change_W * self.dt_s), &arm_W);
+            if row.torsion.most_nm > 0.0 {
+                let n = row.normal_W;
+                let give = n.dot(&(motion.inverse_inertia_W * n)) * self.dt_s;
+                let asked_nm = row.torsion.at_end_nm(n.dot(&motion.angular_velocity_W), self.dt_s);
+                let share = 1.0 / (1.0 + row.torsion.falls(self.dt_s) * give);
+                let change_nm = (asked_nm - row.torsion.torque_nm) * share;
+                row.torsion.torque_nm += change_nm;
+                motion.turn(&(n * (change_nm * self.dt_s)));
+            }
         }
         self.impulse(rows, which)
     }

@@ -26,13 +26,24 @@ pub struct Held {
 impl Held {
     /// The centre of mass hangs at this angle (rad) from straight below the axis, this far from it (m).
     pub fn new(soft: SoftFinger, stiffness: f64, mu: f64, arm: f64, angle: f64) -> Self {
+        Self::in_a_world_of(Settings::default(), soft, [stiffness, mu], arm, angle)
+    }
+
+    /// As `new`, with other settings, the cube of this stiffness and friction.
+    pub fn in_a_world_of(
+        world: Settings,
+        soft: SoftFinger,
+        [stiffness, mu]: [f64; 2],
+        arm: f64,
+        angle: f64,
+    ) -> Self {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), angle);
         let centre = turn * Vector3::new(0.0, -arm, 0.0);
         let pose = Isometry3::from_parts(Translation3::from(centre), turn);
         let cube = object(Cuboid::new([EDGE; 3]).unwrap(), pose, stiffness, mu);
         let state = body(&cube, MASS);
         let settings = FingerSettings { soft: soft.validated().unwrap(), attachment: None };
-        let world = World::new(vec![cube], &[(0, state)], Settings::default(), 2).with_fingers(settings);
+        let world = World::new(vec![cube], &[(0, state)], world, 2).with_fingers(settings);
         Self { world, stiffness, mu, arm }
     }
 
