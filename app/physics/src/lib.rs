@@ -30,6 +30,7 @@ mod manipulation;
 mod mass;
 mod pair;
 mod pair_friction;
+mod restitution;
 mod row;
 mod solver;
 mod touch;

@@ -10,6 +10,7 @@ use crate::integrator::explicit::{self, Kept};
 use crate::integrator::rk4::Stages;
 use crate::integrator::{Gets, Integrator, Limits, mean_angular_velocity_W};
 use crate::pair::{Pair, Response, Start, Surfacing};
+use crate::restitution::Restitution;
 use crate::row::Row;
 use crate::solver::{Motion, Solver};
 use crate::touch::Touch;
@@ -57,6 +58,7 @@ pub struct Manipulation {
     rows: Vec<Row>,
     motions: Vec<Motion>,
     solver: Solver,
+    restitution: Restitution,
     /// The first so many rows are fingers'.
     touching: usize,
     gets: Box<[Gets]>,
@@ -130,6 +132,7 @@ impl Manipulation {
             rows: Vec::with_capacity(room),
             motions: Vec::with_capacity(bodies.len()),
             solver: Solver::with_capacity(room, bodies.len()),
+            restitution: Restitution::with_capacity(room, bodies.len()),
             touching: 0,
             gets: vec![Gets::default(); bodies.len()].into(),
             stages: Stages::with_capacity(room, bodies.len()),
@@ -207,6 +210,7 @@ impl Manipulation {
             self.rows.push(touch.row(body, &state.centre_W, &motion, &entities[touch.entity], dt_s));
         }
         self.touching = self.rows.len();
+        self.restitution.impacts.clear();
         let start = Start {
             entities,
             bodies: &self.bodies,
@@ -215,7 +219,7 @@ impl Manipulation {
             is_implicit: self.settings.integrator.is_implicit(),
         };
         for pair in &mut self.pairs {
-            pair.gather(&start, &mut self.rows);
+            pair.gather(&start, &mut self.rows, &mut self.restitution.impacts);
         }
         fingers
     }
@@ -247,7 +251,7 @@ impl Manipulation {
                 }
             }
         }
-        let sweeps = self.solver.solve(&mut self.rows, &mut self.motions, dt_s);
+        let sweeps = self.restitution.solve(&mut self.solver, &mut self.rows, &mut self.motions, dt_s);
         explicit::release(&mut self.rows, &mut self.fixed);
         sweeps
     }
