@@ -98,8 +98,8 @@ impl Pair {
         }
     }
 
-    /// Finds where it touches, and appends a row for each point.
-    pub(crate) fn gather(&mut self, start: &Start<'_>, rows: &mut Vec<Row>) {
+    /// Finds where it touches, and appends a row for each point; notes which rows are impacts.
+    pub(crate) fn gather(&mut self, start: &Start<'_>, rows: &mut Vec<Row>, impacts: &mut Vec<usize>) {
         (self.first_row, self.rows) = (rows.len(), 0);
         let [a, b] = self.entities.map(|index| &start.entities[index]);
         let speed_m_s = self.closing_speed(start);
@@ -120,7 +120,11 @@ impl Pair {
             }
             let let_out_m = let_out_m_s(anchor.granted_m, start.dt_s) * start.dt_s;
             anchor.granted_m = (anchor.granted_m - let_out_m).clamp(0.0, (-point.gap_m).max(0.0));
-            rows.push(row(self.bodies, &self.surfacing, anchor, point, &b.X_WB, start));
+            let (row, is_impact) = row(self.bodies, &self.surfacing, anchor, point, &b.X_WB, start);
+            if is_impact {
+                impacts.push(rows.len());
+            }
+            rows.push(row);
             self.rows += 1;
         }
     }
@@ -211,7 +215,7 @@ fn row(
     point: &ContactPoint,
     X_WB: &Isometry3<f64>,
     start: &Start<'_>,
-) -> Row {
+) -> (Row, bool) {
     let arm = |body: usize| point.point_W - start.bodies[body].centre_W;
     let dt_s = start.dt_s;
     let (k, b) = (surfacing.stiffness_n_per_m, surfacing.damping_n_s_per_m);
@@ -260,13 +264,13 @@ fn row(
             };
             if impact.is_one {
                 row.rest_W = n * (stop * wanted_m_s);
-                return row;
+                return (row, true);
             }
             stop * wanted_m_s
         }
     };
     row.rest_W = n * rest_n - anchor.stretch_W(X_WB) * row.stiffness[1];
-    row
+    (row, false)
 }
 
 /// What a row's point does that meets the other in a tick.

@@ -20,7 +20,12 @@ fn wrench(points: &[ContactPoint], about: &Vector3<f64>) -> [Vector3<f64>; 2] {
 }
 
 /// Two forms, as deep in each other as wanted, and what the pair remembers of how they came there.
-fn overlapping(a: &Form, b: &Form, depth: f64, noise: &mut Noise) -> (Isometry3<f64>, Isometry3<f64>, PairMemory) {
+fn overlapping(
+    a: &Form,
+    b: &Form,
+    depth: f64,
+    noise: &mut Noise,
+) -> (Isometry3<f64>, Isometry3<f64>, PairMemory) {
     let X_WB = pose(noise.turn(), Vector3::new(0.03, -0.02, 0.01));
     let (turn, away) = (noise.turn(), noise.direction());
     let aside = noise.direction() * 0.01;
@@ -74,14 +79,32 @@ fn continuity_look() {
                     let turn = UnitQuaternion::from_scaled_axis(axis * (0.05 * s));
                     let X = pose(turn * X_WA.rotation, X_WA.translation.vector + along * (1e-3 * s));
                     let found = points(&a, &X, &b, &X_WB, REACH, &mut memory);
-                    if -deepest(&found) > 1.5e-3 { break; }
+                    if -deepest(&found) > 1.5e-3 {
+                        break;
+                    }
                     let now = wrench(&found, &X.translation.vector);
                     if let Some(last) = last {
                         let jump = (now[0] - last[0]).norm().max((now[1] - last[1]).norm() / 0.02);
                         if jump > 5e-3 {
                             println!("{name} {trial} at {step} of {steps}: {jump}");
-                            for p in before.iter() { println!("   - {} {:?} n {:?} {:.3e}", p.id, (X_WB.inverse() * nalgebra::Point3::from(p.point_W)).coords.data.0, (X_WB.rotation.inverse() * p.normal_W).data.0, p.gap_m); }
-                            for p in found.iter() { println!("   + {} {:?} n {:?} {:.3e}", p.id, (X_WB.inverse() * nalgebra::Point3::from(p.point_W)).coords.data.0, (X_WB.rotation.inverse() * p.normal_W).data.0, p.gap_m); }
+                            for p in before.iter() {
+                                println!(
+                                    "   - {} {:?} n {:?} {:.3e}",
+                                    p.id,
+                                    (X_WB.inverse() * nalgebra::Point3::from(p.point_W)).coords.data.0,
+                                    (X_WB.rotation.inverse() * p.normal_W).data.0,
+                                    p.gap_m
+                                );
+                            }
+                            for p in found.iter() {
+                                println!(
+                                    "   + {} {:?} n {:?} {:.3e}",
+                                    p.id,
+                                    (X_WB.inverse() * nalgebra::Point3::from(p.point_W)).coords.data.0,
+                                    (X_WB.rotation.inverse() * p.normal_W).data.0,
+                                    p.gap_m
+                                );
+                            }
                         }
                         most = most.max((now[0] - last[0]).norm()).max((now[1] - last[1]).norm() / 0.02);
                     }
@@ -91,10 +114,19 @@ fn continuity_look() {
                 most
             };
             let (coarse, fine) = (most_jump(1000), most_jump(10_000));
-            if fine > 0.3 * coarse { println!("   {trial}: {coarse:.1e} {fine:.1e}"); }
-            if fine > worst.0 { worst = (fine, coarse); }
+            if fine > 0.3 * coarse {
+                println!("   {trial}: {coarse:.1e} {fine:.1e}");
+            }
+            if fine > worst.0 {
+                worst = (fine, coarse);
+            }
         }
         let bad = if worst.0 > 0.3 * worst.1 { "BAD" } else { "" };
-        println!("{name}: {:.1e} {:.1e} {:.1} us {bad}", worst.1, worst.0, begin.elapsed().as_secs_f64() * 1e6 / 66000.0);
+        println!(
+            "{name}: {:.1e} {:.1e} {:.1} us {bad}",
+            worst.1,
+            worst.0,
+            begin.elapsed().as_secs_f64() * 1e6 / 66000.0
+        );
     }
 }

@@ -7,9 +7,7 @@ mod meshes;
 
 use common::*;
 use haptics::mesh::make;
-use haptics::{
-    Capsule, Cone, Cuboid, Cylinder, Ellipsoid, Entity, Friction, Plane, Shape, Sphere, Torus,
-};
+use haptics::{Capsule, Cone, Cuboid, Cylinder, Ellipsoid, Entity, Friction, Plane, Shape, Sphere, Torus};
 use meshes::{angle, block, build, cut_in_four, terrain};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use physics::Settings;
@@ -66,9 +64,8 @@ fn a_ball_rolls_down_triangles_as_down_the_plane_and_feels_no_edge() {
         for _ in 0..300 {
             run(&mut world, 1);
             run(&mut on_plane, 1);
-            let [force_W, plane_W] = [&world, &on_plane].map(|world| {
-                world.manipulation.rows().iter().map(|row| row.force_W).sum::<Vector3<f64>>()
-            });
+            let [force_W, plane_W] = [&world, &on_plane]
+                .map(|world| world.manipulation.rows().iter().map(|row| row.force_W).sum::<Vector3<f64>>());
             // Heights of one plane, measured by this face or that one: 1e-16 over millimetres, and what the solver leaves.
             assert!((force_W - plane_W).norm() < 1e-8, "{cells}: {force_W} {plane_W}");
         }
