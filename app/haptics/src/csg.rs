@@ -17,13 +17,18 @@
 //! Limits: of more than eight patches that meet in one point the eight nearest count. Parts thinner than
 //! [`TOLERANCE`] times the solid's extent are not felt. Only fingers that are points feel trees.
 
+mod advance;
 mod corner;
 mod csg_cone;
 mod flatten;
 mod foresight;
+mod god;
 mod hit;
 mod near;
 mod patch;
+mod pressed_through;
+mod settle;
+mod stand;
 mod tree;
 mod walk;
 mod way_out;

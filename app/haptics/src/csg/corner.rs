@@ -56,6 +56,12 @@ impl Corner {
         }
     }
 
+    /// Where a patch of the neighbourhood is listed here.
+    #[inline(always)]
+    pub(super) fn place(&self, index: usize) -> usize {
+        self.indices[..self.count].iter().position(|&i| i == index).unwrap_or(0)
+    }
+
     /// `sides` of the god-object's own cell; `to_hip_B` leads from the god-object to the HIP. `None` if all is solid.
     pub(super) fn facing(
         &self,

@@ -13,35 +13,48 @@
 use nalgebra::Vector3;
 
 use super::Csg;
-use super::patch::Look;
-use super::walk::{God, correction};
+use super::god::God;
+use super::patch::{Look, Patch};
+use super::settle::correction;
 use crate::slide::Round;
 
 /// A place on the bent patches that hold a god-object, from which little is left to slide; `None` where the way there
 /// bends too much to tell.
+#[inline(always)]
 pub(super) fn foresee(csg: &Csg, god: &God, round: &Round, hip_B: &Vector3<f64>) -> Option<Vector3<f64>> {
     let left = (round.gap_m - round.asked_m) / round.view.depth_m;
     let tells = round.asked_m > round.view.rest_m && (0.0..f64::INFINITY).contains(&left);
-    // A patch has a whole rim of places where friction is content: which of them is a matter of the way.
-    let is_one_place = match god.active.count_ones() {
-        1 => left == 0.0,
-        2 => true,
-        _ => false,
-    };
-    if !tells || !is_one_place || god.is_on_planes(csg) {
+    if !tells {
         return None;
     }
-    let mut point_B = god.point_B;
-    let mut normals_B = [None; 2];
+    let rest_m = round.view.rest_m;
+    // A patch has a whole rim of places where friction is content: which of them is a matter of the way.
+    match (god.only_patch(csg), god.both_patches(csg)) {
+        (Some(patch), _) if left == 0.0 && !patch.is_plane() => {
+            along([patch], &god.point_B, left, rest_m, hip_B)
+        }
+        (_, Some(patches)) if !god.is_on_planes(csg) => along(patches, &god.point_B, left, rest_m, hip_B),
+        _ => None,
+    }
+}
+
+#[inline(never)]
+fn along<const N: usize>(
+    patches: [&Patch; N],
+    from_B: &Vector3<f64>,
+    left: f64,
+    rest_m: f64,
+    hip_B: &Vector3<f64>,
+) -> Option<Vector3<f64>> {
+    let mut point_B = *from_B;
+    let mut looks = patches.map(|patch| patch.look(&point_B, hip_B));
+    let first = looks;
     // Direction, what was asked for and the step taken there.
     let mut last: Option<(Vector3<f64>, f64, f64)> = None;
     for _ in 0..MAX_STEPS {
-        let looks = god.looks(csg, &point_B, hip_B);
-        for (look, first_B) in looks.iter().flatten().zip(&mut normals_B) {
-            let first_B: &Vector3<f64> = first_B.get_or_insert(look.normal_B);
-            if first_B.dot(&look.normal_B) < BENT {
-                return None;
-            }
+        let bends = |(first, look): (&Look, &Look)| first.normal_B.dot(&look.normal_B) < BENT;
+        if first.iter().zip(&looks).any(bends) {
+            return None;
         }
         let to_hip_B = hip_B - point_B;
         let (direction_B, lag_m) = lag(&looks, &to_hip_B)?;
@@ -49,7 +62,7 @@ pub(super) fn foresee(csg: &Csg, god: &God, round: &Round, hip_B: &Vector3<f64>)
         let turned =
             if last.is_some_and(|(before_B, ..)| before_B.dot(&direction_B) < 0.0) { -1.0 } else { 1.0 };
         let (direction_B, asked_m) = (direction_B * turned, lag_m * turned - left_m);
-        if asked_m.abs() <= round.view.rest_m {
+        if asked_m.abs() <= rest_m {
             break;
         }
         let gain = match last {
@@ -63,19 +76,21 @@ pub(super) fn foresee(csg: &Csg, god: &God, round: &Round, hip_B: &Vector3<f64>)
         let step_m = gain * asked_m;
         point_B += direction_B * step_m + correction(&looks);
         last = Some((direction_B, asked_m, step_m));
+        looks = patches.map(|patch| patch.look(&point_B, hip_B));
     }
     Some(point_B)
 }
 
 /// Towards the HIP along the patches, and how far it is (m).
-fn lag(looks: &[Option<Look>; 3], to_hip_B: &Vector3<f64>) -> Option<(Vector3<f64>, f64)> {
+#[inline(always)]
+fn lag(looks: &[Look], to_hip_B: &Vector3<f64>) -> Option<(Vector3<f64>, f64)> {
     let lag_B = match looks {
-        [Some(a), Some(b), _] => {
+        [a, b, ..] => {
             let along_B = a.normal_B.cross(&b.normal_B);
             along_B * (along_B.dot(to_hip_B) / along_B.norm_squared())
         }
-        [Some(a), ..] => to_hip_B - a.normal_B * a.normal_B.dot(to_hip_B),
-        _ => return None,
+        [a] => to_hip_B - a.normal_B * a.normal_B.dot(to_hip_B),
+        [] => return None,
     };
     let lag_m = lag_B.norm();
     if lag_m > 0.0 { Some((lag_B / lag_m, lag_m)) } else { None }

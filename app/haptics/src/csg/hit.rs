@@ -54,7 +54,7 @@ pub(super) fn first_hit(
             near = Neighbourhood::around(csg, &from_B, wish_m);
             sides = near.sides_after(csg, &from_B, &before, sides);
         }
-        let room_m = (near.radius_m - (from_B - near.anchor_B).norm()) * (1.0 - 1e-9);
+        let room_m = near.room_m(&from_B);
         let is_last = length_m <= room_m;
         let end_B = if is_last { *to_B } else { from_B + path_B * (room_m / length_m) };
         if let Some(hit) = hit_within(csg, &near, &mut sides, &from_B, &end_B) {
@@ -106,7 +106,12 @@ impl Events {
         let length_m = (to_B - from_B).norm();
         for index in (0..near.count()).filter(|index| skip >> index & 1 == 0) {
             let patch = near.patch(csg, index);
-            let [before, after] = [patch.level(from_B), patch.level(to_B)];
+            let before = patch.level(from_B);
+            if before.abs() > length_m + csg.tolerance_m() {
+                // Levels are no steeper than one.
+                continue;
+            }
+            let after = patch.level(to_B);
             let starts_inside = sides >> index & 1 == 1;
             let beyond_m = if starts_inside { after } else { -after };
             // Who starts on a patch has left it when rounding can no longer have done it.

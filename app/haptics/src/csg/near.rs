@@ -58,8 +58,14 @@ impl Neighbourhood {
         Self { anchor_B: *anchor_B, radius_m: 0.0, patches: [0; MAX_NEAR], count: 0, table: NOTHING }
     }
 
+    #[inline]
     pub(super) fn holds(&self, point_B: &Vector3<f64>, reach_m: f64) -> bool {
         (point_B - self.anchor_B).norm() + reach_m <= self.radius_m
+    }
+
+    /// How far a point may go without leaving it (m).
+    pub(super) fn room_m(&self, point_B: &Vector3<f64>) -> f64 {
+        (self.radius_m - (point_B - self.anchor_B).norm()) * (1.0 - 1e-9)
     }
 
     /// How many patches it lists.

@@ -1,0 +1,202 @@
+//! What holds the HIP back where a god-object stands.
+//!
+//! Model: of the patches that it is on, those that hold the HIP back hold it from here on (regenerate transitions, see
+//! [`super::corner`]). A HIP in front of all lifts the god-object off; it flies straight to the HIP, and touches again
+//! where that way meets the solid. In its clearing only the patches that held it before are looked at.
+//!
+//! Frames: object frame B; normals point to the free side.
+//! Cost: in a clearing a look at one patch, or two on an edge; else a level for each patch nearby. Flights are bounded.
+
+use nalgebra::Vector3;
+
+use super::Csg;
+use super::corner::Corner;
+use super::god::{Clearing, God, worst_m};
+use super::hit::first_hit;
+use super::patch::{Look, Patch};
+use super::way_out::way_out;
+use crate::friction_cone::ConeInput;
+use crate::surface::direction_or_up;
+use crate::tangent_view::TangentView;
+
+/// What holds the HIP back where the god-object stands; `None` if it is free and gone.
+#[inline(always)]
+pub(super) fn stand(csg: &Csg, god: &mut God, input: &ConeInput) -> Option<TangentView> {
+    if god.clearing.holds(&god.point_B) {
+        let view = match (god.only_patch(csg), god.both_patches(csg)) {
+            (Some(patch), _) => {
+                let look = patch.look(&god.point_B, &input.hip_B);
+                on_patch(csg, god, patch, &god.point_B, &look, input)
+            }
+            (_, Some(patches)) => {
+                let looks = patches.map(|patch| patch.look(&god.point_B, &input.hip_B));
+                on_edge(csg, god, &god.point_B, &looks, input)
+            }
+            _ => None,
+        };
+        if view.is_some() {
+            return view;
+        }
+    }
+    stand_anywhere(csg, god, input)
+}
+
+/// What a god-object on one patch sees from a place in its clearing; `None` if it is held there by something else.
+#[inline(always)]
+pub(super) fn on_patch(
+    csg: &Csg,
+    god: &God,
+    patch: &Patch,
+    point_B: &Vector3<f64>,
+    look: &Look,
+    input: &ConeInput,
+) -> Option<TangentView> {
+    let is_turned = god.sides & god.active != 0;
+    let view = view_of_patch(patch, is_turned, point_B, &look.normal_B, input);
+    let is_held = look.height_m.abs() <= csg.tolerance_m() && view.depth_m >= -RELEASE * csg.extent_m;
+    is_held.then_some(view)
+}
+
+/// What a god-object on an edge sees from a place in its clearing; `None` if not both of its patches hold it there.
+#[inline(always)]
+pub(super) fn on_edge(
+    csg: &Csg,
+    god: &God,
+    point_B: &Vector3<f64>,
+    looks: &[Look; 2],
+    input: &ConeInput,
+) -> Option<TangentView> {
+    let mut corner = Corner::new();
+    god.held_by().zip(looks).for_each(|(index, look)| corner.add(index, look));
+    let to_hip_B = input.hip_B - point_B;
+    let facing = corner.facing(&god.near, god.sides, &to_hip_B, RELEASE * csg.extent_m)?;
+    let is_held =
+        (facing.sides, facing.active) == (god.sides, god.active) && worst_m(looks) <= csg.tolerance_m();
+    is_held.then(|| view_of_edge(&corner, god, point_B, &(facing.way_B - to_hip_B), input))
+}
+
+#[inline(never)]
+fn stand_anywhere(csg: &Csg, god: &mut God, input: &ConeInput) -> Option<TangentView> {
+    for _ in 0..MAX_FLIGHTS {
+        if !god.near.holds(&god.point_B, 0.0) {
+            god.look_around(csg, 0.0);
+        }
+        let (corner, nearest_m) = corner(csg, god, &input.hip_B);
+        match held(csg, god, &corner, input) {
+            Held::By(view) => {
+                god.clearing = Clearing::around(god, corner.count, nearest_m);
+                return Some(view);
+            }
+            Held::Nothing => {
+                let hit = first_hit(csg, &god.near, god.sides, &god.point_B, &input.hip_B)?;
+                *god = God::hit(&hit);
+            }
+            Held::Lost => *god = way_out(csg, &god.point_B)?,
+        }
+    }
+    None
+}
+
+/// What of the boundary is where the god-object is: the patches it is on, and how far away the nearest other is (m).
+fn corner(csg: &Csg, god: &mut God, hip_B: &Vector3<f64>) -> (Corner, f64) {
+    let mut corner = Corner::new();
+    let mut nearest_m = f64::INFINITY;
+    for index in 0..god.near.count() {
+        let patch = god.near.patch(csg, index);
+        let level = patch.level(&god.point_B);
+        if level.abs() <= csg.tolerance_m() {
+            corner.add(index, &patch.look(&god.point_B, hip_B));
+        } else {
+            let is_inside = usize::from(level <= 0.0);
+            god.sides = god.sides & !(1 << index) | is_inside << index;
+            nearest_m = nearest_m.min(level.abs());
+        }
+    }
+    // So that it is not on them anywhere in between.
+    (corner, nearest_m - 2.0 * csg.tolerance_m())
+}
+
+enum Held {
+    By(TangentView),
+    /// The HIP is in front of all that is here.
+    Nothing,
+    /// The god-object is in the material.
+    Lost,
+}
+
+#[inline]
+fn held(csg: &Csg, god: &mut God, corner: &Corner, input: &ConeInput) -> Held {
+    let to_hip_B = input.hip_B - god.point_B;
+    let release_m = RELEASE * csg.extent_m;
+    let by_patch = |god: &God, index: usize, place: usize| {
+        let is_turned = god.sides >> index & 1 == 1;
+        let patch = god.near.patch(csg, index);
+        view_of_patch(patch, is_turned, &god.point_B, &corner.normals_B[place], input)
+    };
+    if corner.count <= 1 {
+        let index = corner.indices[0];
+        let flipped = god.sides ^ 1 << index;
+        let is_solid = [god.sides, flipped].map(|sides| god.near.is_solid(sides));
+        if corner.count == 0 || is_solid[0] == is_solid[1] {
+            return if is_solid[0] { Held::Lost } else { Held::Nothing };
+        }
+        if is_solid[0] {
+            god.sides = flipped;
+        }
+        god.active = 1 << index;
+        let view = by_patch(god, index, 0);
+        return if view.depth_m < -release_m { Held::Nothing } else { Held::By(view) };
+    }
+    let Some(facing) = corner.facing(&god.near, god.sides, &to_hip_B, release_m) else { return Held::Lost };
+    (god.sides, god.active) = (facing.sides, facing.active);
+    match facing.active.count_ones() {
+        0 => Held::Nothing,
+        1 => {
+            let index = facing.active.trailing_zeros() as usize;
+            Held::By(by_patch(god, index, corner.place(index)))
+        }
+        _ => Held::By(view_of_edge(corner, god, &god.point_B, &(facing.way_B - to_hip_B), input)),
+    }
+}
+
+#[inline(always)]
+fn view_of_patch(
+    patch: &Patch,
+    is_turned: bool,
+    point_B: &Vector3<f64>,
+    normal_B: &Vector3<f64>,
+    input: &ConeInput,
+) -> TangentView {
+    let normal_B = if is_turned { -normal_B } else { *normal_B };
+    let offset_m = match patch {
+        Patch::Plane { offset_m, .. } if is_turned => -offset_m,
+        Patch::Plane { offset_m, .. } => *offset_m,
+        Patch::Curved(_) => normal_B.dot(point_B),
+    };
+    TangentView::new(point_B, normal_B, offset_m, input)
+}
+
+/// From an edge or a corner; `out_B` leads from the HIP to the nearest place where it would be free.
+#[inline(always)]
+fn view_of_edge(
+    corner: &Corner,
+    god: &God,
+    point_B: &Vector3<f64>,
+    out_B: &Vector3<f64>,
+    input: &ConeInput,
+) -> TangentView {
+    let depth_m = out_B.norm();
+    let outward = |sum, index: usize| {
+        let normal_B = corner.normals_B[corner.place(index)];
+        sum + if god.sides >> index & 1 == 1 { -normal_B } else { normal_B }
+    };
+    let between_B = || direction_or_up(&god.held_by().fold(Vector3::zeros(), outward));
+    let normal_B = if depth_m > 0.0 { direction_or_up(out_B) } else { between_B() };
+    let offset_m = normal_B.dot(&input.hip_B) + depth_m;
+    TangentView::new(point_B, normal_B, offset_m, input)
+}
+
+/// Bound on the flights of a god-object within one tick.
+const MAX_FLIGHTS: u32 = 8;
+/// A HIP this far in front of a patch is free, in terms of the extent: more than a path that ends there is met before it.
+pub(super) const RELEASE: f64 = 4e-12;
