@@ -73,6 +73,26 @@ impl Corner {
         let others = sides & !self.spread((1 << self.count) - 1);
         let start = (0..self.count).fold(0, |cell, i| cell | (sides >> self.indices[i] & 1) << i);
         let is_free = |cell: usize| !near.is_solid(others | self.spread(cell)) && self.has_room(cell);
+        let is_walled_in = (0..self.count).all(|i| near.is_solid(sides ^ 1 << self.indices[i]));
+        if is_walled_in && is_free(start) {
+            // The common case, a concave edge or corner: there is no other cell to go to.
+            let (way_B, mask) = self.nearest(start, to_hip_B);
+            let facing = Facing { sides, active: self.spread(mask), way_B };
+            return Some(if mask == 0 { self.held(near, facing, to_hip_B, release_m) } else { facing });
+        }
+        self.facing_of_many(near, others, start, to_hip_B, release_m)
+    }
+
+    #[inline(never)]
+    fn facing_of_many(
+        &self,
+        near: &Neighbourhood,
+        others: Sides,
+        start: usize,
+        to_hip_B: &Vector3<f64>,
+        release_m: f64,
+    ) -> Option<Facing> {
+        let is_free = |cell: usize| !near.is_solid(others | self.spread(cell)) && self.has_room(cell);
         let free =
             (0..1usize << self.count).filter(|&cell| is_free(cell)).fold(0u64, |free, cell| free | 1 << cell);
         let reached = self.reached(free, start);

@@ -15,7 +15,7 @@ use nalgebra::Vector3;
 use super::Csg;
 use super::god::God;
 use super::patch::{Look, Patch};
-use super::settle::correction;
+use super::settle::{correction, settle_on};
 use crate::slide::Round;
 
 /// A place on the bent patches that hold a god-object, from which little is left to slide; `None` where the way there
@@ -30,75 +30,149 @@ pub(super) fn foresee(csg: &Csg, god: &God, round: &Round, hip_B: &Vector3<f64>)
     let rest_m = round.view.rest_m;
     // A patch has a whole rim of places where friction is content: which of them is a matter of the way.
     match (god.only_patch(csg), god.both_patches(csg)) {
-        (Some(patch), _) if left == 0.0 && !patch.is_plane() => {
-            along([patch], &god.point_B, left, rest_m, hip_B)
-        }
-        (_, Some(patches)) if !god.is_on_planes(csg) => along(patches, &god.point_B, left, rest_m, hip_B),
+        (Some(patch), _) if left == 0.0 && !patch.is_plane() => foot(patch, god, hip_B, rest_m),
+        (_, Some(patches)) if !god.is_on_planes(csg) => on_rim(patches, god, hip_B, left, rest_m),
         _ => None,
     }
 }
 
-#[inline(never)]
-fn along<const N: usize>(
-    patches: [&Patch; N],
-    from_B: &Vector3<f64>,
+/// The nearest place of one bent patch.
+fn foot(patch: &Patch, god: &God, hip_B: &Vector3<f64>, rest_m: f64) -> Option<Vector3<f64>> {
+    let first = patch.look(&god.point_B, hip_B);
+    // Of all but scaled patches this is the place.
+    let (mut point_B, [mut look]) = settle_on([patch], hip_B, hip_B);
+    for _ in 0..MAX_STEPS {
+        if first.normal_B.dot(&look.normal_B) < BENT {
+            return None;
+        }
+        let to_hip_B = hip_B - point_B;
+        let lag_B = to_hip_B - look.normal_B * look.normal_B.dot(&to_hip_B);
+        let lag_m = lag_B.norm();
+        if lag_m <= rest_m {
+            break;
+        }
+        let bend_per_m = patch.bend_per_m(&point_B, &(lag_B / lag_m));
+        // How much faster the foot moves than the HIP.
+        let gain = 1.0 / (1.0 + bend_per_m * look.normal_B.dot(&to_hip_B));
+        if gain.is_nan() || gain <= 0.0 || gain > MAX_GAIN {
+            return None;
+        }
+        (point_B, [look]) = settle_on([patch], &(point_B + lag_B * gain), hip_B);
+    }
+    Some(point_B)
+}
+
+/// Where on the curve of two patches friction is content, or the nearest place of it if nothing is left to friction.
+fn on_rim(
+    patches: [&Patch; 2],
+    god: &God,
+    hip_B: &Vector3<f64>,
     left: f64,
     rest_m: f64,
-    hip_B: &Vector3<f64>,
 ) -> Option<Vector3<f64>> {
-    let mut point_B = *from_B;
+    let mut point_B = god.point_B;
     let mut looks = patches.map(|patch| patch.look(&point_B, hip_B));
     let first = looks;
-    // Direction, what was asked for and the step taken there.
-    let mut last: Option<(Vector3<f64>, f64, f64)> = None;
+    let mut direction_before_B = Vector3::zeros();
     for _ in 0..MAX_STEPS {
         let bends = |(first, look): (&Look, &Look)| first.normal_B.dot(&look.normal_B) < BENT;
         if first.iter().zip(&looks).any(bends) {
             return None;
         }
+        let along_B = looks[0].normal_B.cross(&looks[1].normal_B);
+        let along_B = along_B / along_B.norm();
         let to_hip_B = hip_B - point_B;
-        let (direction_B, lag_m) = lag(&looks, &to_hip_B)?;
-        let left_m = if left > 0.0 { left * (to_hip_B - direction_B * lag_m).norm() } else { 0.0 };
-        let turned =
-            if last.is_some_and(|(before_B, ..)| before_B.dot(&direction_B) < 0.0) { -1.0 } else { 1.0 };
-        let (direction_B, asked_m) = (direction_B * turned, lag_m * turned - left_m);
+        let is_ahead =
+            along_B.dot(if direction_before_B == Vector3::zeros() { &to_hip_B } else { &direction_before_B })
+                >= 0.0;
+        let along_B = if is_ahead { along_B } else { -along_B };
+        let arc = Arc::new(patches, &looks, &point_B, &along_B, &to_hip_B);
+        let asked_m = arc.lag_m - left * arc.depth_m;
         if asked_m.abs() <= rest_m {
             break;
         }
-        let gain = match last {
-            Some((_, asked_before_m, step_m)) => step_m / (asked_before_m - asked_m),
-            None => 1.0,
-        };
-        // A slope of the wrong sign, or none.
-        if gain.is_nan() || gain <= 0.0 || gain > MAX_GAIN {
-            return None;
-        }
-        let step_m = gain * asked_m;
-        point_B += direction_B * step_m + correction(&looks);
-        last = Some((direction_B, asked_m, step_m));
+        point_B += arc.way_B(asked_m, left)? + correction(&looks);
         looks = patches.map(|patch| patch.look(&point_B, hip_B));
+        direction_before_B = along_B;
     }
     Some(point_B)
 }
 
-/// Towards the HIP along the patches, and how far it is (m).
-#[inline(always)]
-fn lag(looks: &[Look], to_hip_B: &Vector3<f64>) -> Option<(Vector3<f64>, f64)> {
-    let lag_B = match looks {
-        [a, b, ..] => {
-            let along_B = a.normal_B.cross(&b.normal_B);
-            along_B * (along_B.dot(to_hip_B) / along_B.norm_squared())
-        }
-        [a] => to_hip_B - a.normal_B * a.normal_B.dot(to_hip_B),
-        [] => return None,
-    };
-    let lag_m = lag_B.norm();
-    if lag_m > 0.0 { Some((lag_B / lag_m, lag_m)) } else { None }
+/// A curve as it is near one of its points: a piece of a circle.
+struct Arc {
+    along_B: Vector3<f64>,
+    /// To the circle's centre, over the square of the radius.
+    bend_B: Vector3<f64>,
+    /// To the HIP, along the curve.
+    lag_m: f64,
+    depth_m: f64,
+    to_hip_B: Vector3<f64>,
 }
 
-/// Common slides need three to five.
+impl Arc {
+    fn new(
+        patches: [&Patch; 2],
+        looks: &[Look; 2],
+        point_B: &Vector3<f64>,
+        along_B: &Vector3<f64>,
+        to_hip_B: &Vector3<f64>,
+    ) -> Self {
+        let bent = [0, 1]
+            .map(|i| Look { height_m: patches[i].bend_per_m(point_B, along_B), normal_B: looks[i].normal_B });
+        let lag_m = along_B.dot(to_hip_B);
+        Self {
+            along_B: *along_B,
+            // What leads away from both tangent planes as fast as the patches do.
+            bend_B: correction(&bent),
+            lag_m,
+            depth_m: (to_hip_B - along_B * lag_m).norm(),
+            to_hip_B: *to_hip_B,
+        }
+    }
+
+    /// From here to where what friction leaves is `left` of the depth; `None` if that cannot be told.
+    fn way_B(&self, asked_m: f64, left: f64) -> Option<Vector3<f64>> {
+        let bend_per_m = self.bend_B.norm();
+        if bend_per_m * asked_m.abs() < STRAIGHT {
+            return self.straight_B(asked_m, left);
+        }
+        let (radius_m, inward_B) = (1.0 / bend_per_m, self.bend_B / bend_per_m);
+        // The HIP as seen from the centre: outwards, along, and beside the circle's plane.
+        let out_m = radius_m - inward_B.dot(&self.to_hip_B);
+        let reach_m = out_m.hypot(self.lag_m);
+        let beside_m2 =
+            (self.to_hip_B.norm_squared() - (radius_m - out_m).powi(2) - self.lag_m.powi(2)).max(0.0);
+        // `reach sin a = left sqrt((radius - reach cos a)^2 + beside^2)`, solved for the cosine.
+        let l2 = left * left;
+        let (a, b) = (reach_m * reach_m * (1.0 + l2), l2 * radius_m * reach_m);
+        let c = l2 * (radius_m * radius_m + beside_m2) - reach_m * reach_m;
+        let cos_left = (b + (b * b - a * c).sqrt()) / a;
+        let sin_left = (1.0 - cos_left * cos_left).max(0.0).sqrt();
+        let (cos_hip, sin_hip) = (out_m / reach_m, self.lag_m / reach_m);
+        let cos = cos_hip * cos_left + sin_hip * sin_left;
+        let sin = sin_hip * cos_left - cos_hip * sin_left;
+        // Also what is not a number.
+        if !(cos > BENT) {
+            return None;
+        }
+        Some((self.along_B + inward_B * (sin / (1.0 + cos))) * (radius_m * sin))
+    }
+
+    /// Newton's method.
+    fn straight_B(&self, asked_m: f64, left: f64) -> Option<Vector3<f64>> {
+        let lag_slope = self.bend_B.dot(&self.to_hip_B) - 1.0;
+        let depth_slope = -self.lag_m * (1.0 + lag_slope) / self.depth_m;
+        let gain = -1.0 / (lag_slope - if left > 0.0 { left * depth_slope } else { 0.0 });
+        (gain > 0.0 && gain < MAX_GAIN).then(|| self.along_B * (asked_m * gain))
+    }
+}
+
+/// Bound on the steps; circles take one, other curves two or three.
 const MAX_STEPS: u32 = 6;
 /// Cosine between the first normal and the last: about 35 degrees, less than leads to another side of anything.
 const BENT: f64 = 0.8;
 /// Steps larger than what is asked for by more than this come from slopes that say nothing.
 const MAX_GAIN: f64 = 8.0;
+/// A step of less than this share of the radius is straight enough for Newton's method, and too short for the circle's centre
+/// to be known well.
+const STRAIGHT: f64 = 1e-2;

@@ -110,6 +110,15 @@ impl Patch {
         }
     }
 
+    /// Curvature along a unit tangent (1/m), positive where the surface bends to its inside; not finite where it has none.
+    #[inline(always)]
+    pub(crate) fn bend_per_m(&self, at_B: &Vector3<f64>, along_B: &Vector3<f64>) -> f64 {
+        match self {
+            Self::Plane { .. } => 0.0,
+            Self::Curved(curved) => curved.bend_per_m(at_B, along_B),
+        }
+    }
+
     /// The smallest radius that the surface is bent with, seen from outside, at a point (m); infinite where it is flat.
     pub(crate) fn smallest_radius_m(&self, at_B: &Vector3<f64>) -> f64 {
         match self {
@@ -165,12 +174,17 @@ impl Curved {
 
     #[inline(always)]
     fn look(&self, point_B: &Vector3<f64>, seen_from_B: &Vector3<f64>) -> Look {
-        let point_L = self.local(point_B);
-        let height = self.kind.level(&point_L);
-        let gradient_L = self.kind.gradient(&point_L, &self.local(seen_from_B));
+        let (height, gradient_L) = self.kind.look(&self.local(point_B), || self.local(seen_from_B));
         let gradient_B = self.turn_LB.tr_mul(&gradient_L);
         let slope = gradient_B.norm();
         Look { height_m: height / slope, normal_B: gradient_B / slope }
+    }
+
+    #[inline(always)]
+    fn bend_per_m(&self, at_B: &Vector3<f64>, along_B: &Vector3<f64>) -> f64 {
+        let (point_L, along_L) = (self.local(at_B), self.turn_LB * along_B);
+        let (_, gradient_L) = self.kind.look(&point_L, Vector3::y);
+        self.kind.second(&point_L, &gradient_L, &along_L) / self.turn_LB.tr_mul(&gradient_L).norm()
     }
 
     fn smallest_radius_m(&self, at_B: &Vector3<f64>) -> f64 {
@@ -231,20 +245,56 @@ impl Kind {
         }
     }
 
-    /// Of unit length.
+    /// Level and its gradient, which is of unit length.
     #[inline(always)]
-    fn gradient(&self, p: &Vector3<f64>, seen_from: &Vector3<f64>) -> Vector3<f64> {
+    fn look(&self, p: &Vector3<f64>, seen_from: impl Fn() -> Vector3<f64>) -> (f64, Vector3<f64>) {
+        // Where a point is so near to the axis or the centre that it has no direction.
+        let aside = || around_y(&seen_from()).1;
         match *self {
-            Self::Ball { .. } => direction_or(p, direction_or(seen_from, Vector3::y())),
-            Self::Tube { .. } => outward(p, seen_from),
-            Self::Nappe { normal_rho, normal_y, .. } => {
-                outward(p, seen_from) * normal_rho + Vector3::y() * normal_y
+            Self::Ball { radius_m } => {
+                let (out, distance_m) = direction(p, || direction_or(&seen_from(), Vector3::y()));
+                (distance_m - radius_m, out)
             }
+            Self::Tube { radius_m } => {
+                let (out, rho) = direction(&across(p), aside);
+                (rho - radius_m, out)
+            }
+            Self::Nappe { normal_rho, normal_y, offset_m } => {
+                let (out, rho) = direction(&across(p), aside);
+                (normal_rho * rho + normal_y * p.y - offset_m, out * normal_rho + Vector3::y() * normal_y)
+            }
+            Self::Ring { ring_radius_m, tube_radius_m } => {
+                let (out, _) = direction(&across(p), aside);
+                let (out, distance_m) = direction(&(p - out * ring_radius_m), Vector3::y);
+                (distance_m - tube_radius_m, out)
+            }
+            Self::Pill { radius_m, half_length_m } => {
+                let sideways = || direction(&across(p), aside).0;
+                let (out, distance_m) = direction(&(p - core(p, half_length_m)), sideways);
+                (distance_m - radius_m, out)
+            }
+        }
+    }
+
+    /// The level's second derivative along `v`, where its gradient is `n`.
+    #[inline(always)]
+    fn second(&self, p: &Vector3<f64>, n: &Vector3<f64>, v: &Vector3<f64>) -> f64 {
+        let rho = rho(p);
+        let around = (v.x * p.z - v.z * p.x) / rho;
+        let across_n = |v2: f64| v2 - v.dot(n) * v.dot(n);
+        match *self {
+            Self::Ball { .. } => across_n(v.norm_squared()) / p.norm(),
+            Self::Tube { .. } => around * around / rho,
+            Self::Nappe { normal_rho, .. } => normal_rho * around * around / rho,
             Self::Ring { ring_radius_m, .. } => {
-                direction_or(&(p - outward(p, seen_from) * ring_radius_m), Vector3::y())
+                let beside = rho - ring_radius_m;
+                let distance = (beside * beside + p.y * p.y).sqrt();
+                let within = across_n(v.norm_squared() - around * around) / distance;
+                within + beside / (distance * rho) * around * around
             }
+            Self::Pill { half_length_m, .. } if p.y.abs() <= half_length_m => around * around / rho,
             Self::Pill { half_length_m, .. } => {
-                direction_or(&(p - core(p, half_length_m)), outward(p, seen_from))
+                across_n(v.norm_squared()) / (p - core(p, half_length_m)).norm()
             }
         }
     }
@@ -264,8 +314,8 @@ impl Kind {
         let mut share = 0.0;
         for _ in 0..MAX_ENTRY_ROUNDS {
             let point = from + path * share;
-            let height_m = self.level(&point);
-            let descent = -self.gradient(&point, &point).dot(&path);
+            let (height_m, gradient) = self.look(&point, || point);
+            let descent = -gradient.dot(&path);
             if descent.is_nan() || descent <= 0.0 {
                 return None;
             }
@@ -333,9 +383,17 @@ fn rho(p: &Vector3<f64>) -> f64 {
     (p.x * p.x + p.z * p.z).sqrt()
 }
 
-fn outward(p: &Vector3<f64>, seen_from: &Vector3<f64>) -> Vector3<f64> {
-    let across = Vector3::new(p.x, 0.0, p.z);
-    direction_or(&across, around_y(seen_from).1)
+#[inline(always)]
+fn across(p: &Vector3<f64>) -> Vector3<f64> {
+    Vector3::new(p.x, 0.0, p.z)
+}
+
+/// `v` at unit length, or another direction where it has none, and how long it is.
+#[inline(always)]
+fn direction(v: &Vector3<f64>, otherwise: impl FnOnce() -> Vector3<f64>) -> (Vector3<f64>, f64) {
+    let length = v.norm();
+    let has_one = length > SMALLEST_LENGTH_M && length.is_finite();
+    (if has_one { v / length } else { otherwise() }, length)
 }
 
 fn core(p: &Vector3<f64>, half_length_m: f64) -> Vector3<f64> {
