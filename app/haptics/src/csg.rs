@@ -24,6 +24,7 @@ mod flatten;
 mod foresight;
 mod god;
 mod hit;
+mod kind;
 mod near;
 mod patch;
 mod pressed_through;
