@@ -18,6 +18,7 @@
 //! [`TOLERANCE`] times the solid's extent are not felt. Only fingers that are points feel trees.
 
 mod advance;
+mod cells;
 mod corner;
 mod csg_cone;
 mod flatten;
@@ -41,6 +42,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use nalgebra::Vector3;
 
+use cells::Cells;
 use flatten::Flat;
 use patch::Patch;
 
@@ -53,6 +55,8 @@ pub struct Csg {
     items: Box<[Item]>,
     /// The tree in postfix order: no recursion is needed to evaluate it.
     steps: Box<[Step]>,
+    /// The same, by place.
+    cells: Cells,
     extent_m: f64,
     /// Of all solids that this process has built, which.
     identity: u64,
@@ -82,7 +86,8 @@ impl Csg {
     pub fn build(tree: &CsgTree) -> Result<Self, CsgError> {
         let Flat { patches, items, steps, extent_m } = flatten::flatten(tree)?;
         let identity = BUILT.fetch_add(1, Ordering::Relaxed);
-        Ok(Self { patches, items, steps, extent_m, identity })
+        let cells = Cells::build(&patches, &items, &steps, extent_m);
+        Ok(Self { patches, items, steps, cells, extent_m, identity })
     }
 
     /// A bound of the distance to the boundary, negative inside; exact in sign and zero, and never larger than the

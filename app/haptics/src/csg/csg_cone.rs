@@ -107,7 +107,7 @@ impl CsgCone {
             None => {
                 let clear_m = csg.signed_distance(from_B);
                 let wish_m = clear_m.max(LARGER * length_m).max(COMMON * csg.extent_m);
-                *self.near.insert(Neighbourhood::around(csg, from_B, wish_m))
+                *self.near.insert(Neighbourhood::amid(csg, from_B, wish_m))
             }
         };
         if near.is_empty() && near.holds(from_B, length_m) {

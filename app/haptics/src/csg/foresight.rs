@@ -51,7 +51,7 @@ fn foot(patch: &Patch, god: &God, hip_B: &Vector3<f64>, rest_m: f64) -> Option<V
         if lag_m <= rest_m {
             break;
         }
-        let bend_per_m = patch.bend_per_m(&point_B, &(lag_B / lag_m));
+        let bend_per_m = patch.bending(&point_B, &(lag_B / lag_m));
         // How much faster the foot moves than the HIP.
         let gain = 1.0 / (1.0 + bend_per_m * look.normal_B.dot(&to_hip_B));
         if gain.is_nan() || gain <= 0.0 || gain > MAX_GAIN {
@@ -118,7 +118,7 @@ impl Arc {
         to_hip_B: &Vector3<f64>,
     ) -> Self {
         let bent = [0, 1]
-            .map(|i| Look { height_m: patches[i].bend_per_m(point_B, along_B), normal_B: looks[i].normal_B });
+            .map(|i| Look { height_m: patches[i].bending(point_B, along_B), normal_B: looks[i].normal_B });
         let lag_m = along_B.dot(to_hip_B);
         Self {
             along_B: *along_B,

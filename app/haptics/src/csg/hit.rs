@@ -33,7 +33,7 @@ pub(super) struct Events {
 /// Eight patches, each crossed twice; a path through more rings than two is followed in parts.
 const MAX_EVENTS: usize = 24;
 /// Neighbourhoods that a path is followed through within one tick.
-const MAX_PIECES: u32 = 64;
+const MAX_PIECES: u32 = 256;
 
 /// Where a path first enters the solid, beginning `sides` in `near`.
 pub(super) fn first_hit(
@@ -51,7 +51,7 @@ pub(super) fn first_hit(
             let before = near;
             // Through a crowd it is followed in pieces as small as the last one.
             let wish_m = (LARGER * length_m).min(GROWTH * near.radius_m.max(COMMON * csg.extent_m));
-            near = Neighbourhood::around(csg, &from_B, wish_m);
+            near = Neighbourhood::amid(csg, &from_B, wish_m);
             sides = near.sides_after(csg, &from_B, &before, sides);
         }
         let room_m = near.room_m(&from_B);

@@ -116,26 +116,31 @@ impl Kind {
         }
     }
 
-    /// The level's second derivative along `v`, where its gradient is `n`.
+    /// `u' H v` with the level's second derivatives H at a point.
     #[inline(always)]
-    pub(super) fn second(&self, p: &Vector3<f64>, axes: &Axes, n: &Vector3<f64>, v: &Vector3<f64>) -> f64 {
+    pub(super) fn bending(&self, p: &Vector3<f64>, axes: &Axes, u: &Vector3<f64>, v: &Vector3<f64>) -> f64 {
+        let round = |p: &Vector3<f64>| {
+            let distance2 = p.norm_squared();
+            (u.dot(v) - p.dot(u) * p.dot(v) / distance2) / distance2.sqrt()
+        };
         let rho = axes.across(p).norm();
-        let around = axes.y.cross(p).dot(v) / rho;
-        let across_n = |v2: f64| v2 - v.dot(n) * v.dot(n);
+        let around = || {
+            let across = axes.y.cross(p);
+            across.dot(u) * across.dot(v) / (rho * rho)
+        };
         match *self {
-            Self::Ball { .. } => across_n(v.norm_squared()) / p.norm(),
-            Self::Tube { .. } => around * around / rho,
-            Self::Nappe { normal_rho, .. } => normal_rho * around * around / rho,
+            Self::Ball { .. } => round(p),
+            Self::Tube { .. } => around() / rho,
+            Self::Nappe { normal_rho, .. } => around() * normal_rho / rho,
             Self::Ring { ring_radius_m, .. } => {
-                let beside = rho - ring_radius_m;
-                let distance = beside.hypot(axes.y.dot(p));
-                let within = across_n(v.norm_squared() - around * around) / distance;
-                within + beside / (distance * rho) * around * around
+                let from_core = p - axes.across(p) * (ring_radius_m / rho);
+                let distance2 = from_core.norm_squared();
+                let around = around();
+                let rest = u.dot(v) - around - from_core.dot(u) * from_core.dot(v) / distance2;
+                (rest + around * (rho - ring_radius_m) / rho) / distance2.sqrt()
             }
-            Self::Pill { half_length_m, .. } if axes.y.dot(p).abs() <= half_length_m => around * around / rho,
-            Self::Pill { half_length_m, .. } => {
-                across_n(v.norm_squared()) / axes.beyond(p, half_length_m).norm()
-            }
+            Self::Pill { half_length_m, .. } if axes.y.dot(p).abs() <= half_length_m => around() / rho,
+            Self::Pill { half_length_m, .. } => round(&axes.beyond(p, half_length_m)),
         }
     }
 

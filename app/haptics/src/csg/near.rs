@@ -7,12 +7,13 @@
 //!
 //! Invariants: a patch that is not listed keeps its side within the ball. If more than eight are near, the ball is as
 //! small as it must be for eight, but not smaller than [`SMALLEST`].
-//! Cost: a ball test per leaf, a level per patch of the leaves nearby; seldom twice.
+//! Cost: a level per patch of the [cell](super::cells) there; seldom twice.
 
 use nalgebra::Vector3;
 
+use super::cells::{CellStep, Part};
 use super::patch::Patch;
-use super::{Csg, CsgOp, Item, STACK, Step};
+use super::{Csg, CsgOp, Item, STACK};
 
 /// The patches near an anchor, and the solid in terms of their sides.
 #[derive(Debug, Clone, Copy)]
@@ -38,10 +39,21 @@ pub(super) const MAX_NEAR: usize = 8;
 impl Neighbourhood {
     /// All that matters within `wish_m` of a point, or within less if that would be too much.
     pub(super) fn around(csg: &Csg, anchor_B: &Vector3<f64>, wish_m: f64) -> Self {
+        Self::within(csg, anchor_B, wish_m, u32::MAX)
+    }
+
+    /// As [`Self::around`], but where there is a crowd what is found soon will do.
+    pub(super) fn amid(csg: &Csg, anchor_B: &Vector3<f64>, wish_m: f64) -> Self {
+        Self::within(csg, anchor_B, wish_m, CROWD)
+    }
+
+    fn within(csg: &Csg, anchor_B: &Vector3<f64>, wish_m: f64, crowd: u32) -> Self {
         let smallest_m = SMALLEST * csg.extent_m;
         let mut radius_m = wish_m.max(smallest_m);
         for _ in 0..MAX_TRIES {
-            match gather(csg, anchor_B, radius_m, false) {
+            let part = csg.cells.part(anchor_B, radius_m, crowd);
+            radius_m = radius_m.min(part.reach_m);
+            match gather_from(csg, &part, anchor_B, radius_m, false) {
                 Ok(neighbourhood) => return neighbourhood,
                 // Just below the ninth, or a part of it if that cannot be told.
                 Err(ninth_m) if ninth_m < radius_m => radius_m = ninth_m * JUST_BELOW,
@@ -110,28 +122,27 @@ impl Neighbourhood {
 
 /// The patches within a radius, or from which distance on there would be too many.
 fn gather(csg: &Csg, anchor_B: &Vector3<f64>, radius_m: f64, keep_eight: bool) -> Result<Neighbourhood, f64> {
+    gather_from(csg, &csg.cells.part(anchor_B, radius_m, u32::MAX), anchor_B, radius_m, keep_eight)
+}
+
+fn gather_from(
+    csg: &Csg,
+    part: &Part<'_>,
+    anchor_B: &Vector3<f64>,
+    radius_m: f64,
+    keep_eight: bool,
+) -> Result<Neighbourhood, f64> {
     let mut here = Neighbourhood { radius_m, ..Neighbourhood::nowhere(anchor_B) };
     let mut crowd = Crowd::default();
-    let mut stack = [[0; 4]; STACK];
+    let mut stack = [NOTHING; STACK];
     let mut top = 0;
-    let mut steps = &csg.steps[..];
-    while let [step, rest @ ..] = steps {
-        steps = rest;
+    for step in part.steps {
         match *step {
-            Step::Leaf { centre_B, radius_m: leaf_m, first, count } => {
-                let reach_m = leaf_m + here.radius_m;
-                let is_near = (anchor_B - centre_B).norm_squared() <= reach_m * reach_m;
-                if let (false, [Step::Join(CsgOp::Union | CsgOp::Difference), after @ ..]) = (is_near, rest) {
-                    // Nothing added, or nothing taken away: of many leaves most.
-                    steps = after;
-                    continue;
-                }
-                let items = &csg.items[first as usize..(first + count) as usize];
-                stack[top] =
-                    if is_near { leaf(csg, &mut here, &mut crowd, items, keep_eight) } else { NOTHING };
+            CellStep::Leaf { first, count } => {
+                stack[top] = leaf(csg, &mut here, &mut crowd, part.items(first, count), keep_eight);
                 top += 1;
             }
-            Step::Join(op) => {
+            CellStep::Join(op) => {
                 let (a, b) = (stack[top - 2], stack[top - 1]);
                 stack[top - 2] = match op {
                     CsgOp::Union => std::array::from_fn(|i| a[i] | b[i]),
@@ -248,6 +259,8 @@ const SIDES: [Table; MAX_NEAR] = [
 const MAX_TRIES: u32 = 16;
 /// No neighbourhood is smaller, in terms of the solid's extent.
 const SMALLEST: f64 = 1e-8;
+/// With more patches than this in a cell a neighbourhood would probably be too crowded.
+const CROWD: u32 = 10;
 /// So that the ninth nearest is outside.
 const JUST_BELOW: f64 = 1.0 - 1e-9;
 

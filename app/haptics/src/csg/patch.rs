@@ -91,12 +91,24 @@ impl Patch {
         }
     }
 
-    /// Curvature along a unit tangent (1/m), positive where the surface bends to its inside; not finite where it has none.
+    /// How much the surface is bent in a direction along it, at a point of it: the normal turns by as much per length
+    /// (1/m). Positive where it is convex; not finite where it has no normal.
     #[inline(always)]
-    pub(crate) fn bend_per_m(&self, at_B: &Vector3<f64>, along_B: &Vector3<f64>) -> f64 {
+    pub(crate) fn bending(&self, at_B: &Vector3<f64>, along_B: &Vector3<f64>) -> f64 {
+        self.mixed_bending(at_B, along_B, along_B)
+    }
+
+    /// As [`Self::bending`], of two directions: how much the normal turns towards one on the way along the other (1/m).
+    #[inline(always)]
+    pub(crate) fn mixed_bending(
+        &self,
+        at_B: &Vector3<f64>,
+        along_B: &Vector3<f64>,
+        towards_B: &Vector3<f64>,
+    ) -> f64 {
         match self {
             Self::Plane { .. } => 0.0,
-            Self::Curved(curved) => curved.bend_per_m(at_B, along_B),
+            Self::Curved(curved) => curved.bending(at_B, along_B, towards_B),
         }
     }
 
@@ -158,8 +170,12 @@ impl Curved {
     fn seen(&self, point_B: &Vector3<f64>) -> Vector3<f64> {
         match &self.place {
             Some(place) => point_B - place.centre_B,
-            None => self.turn_LB * point_B + self.shift_L,
+            None => self.local(point_B),
         }
+    }
+
+    fn local(&self, point_B: &Vector3<f64>) -> Vector3<f64> {
+        self.turn_LB * point_B + self.shift_L
     }
 
     #[inline(always)]
@@ -195,15 +211,14 @@ impl Curved {
     }
 
     #[inline(always)]
-    fn bend_per_m(&self, at_B: &Vector3<f64>, along_B: &Vector3<f64>) -> f64 {
+    fn bending(&self, at_B: &Vector3<f64>, along_B: &Vector3<f64>, towards_B: &Vector3<f64>) -> f64 {
         if let Some(Place { centre_B, axes }) = &self.place {
-            let p_B = at_B - centre_B;
-            return self.kind.second(&p_B, axes, &self.kind.look(&p_B, axes, || p_B).1, along_B);
+            return self.kind.bending(&(at_B - centre_B), axes, along_B, towards_B);
         }
-        let (point_L, along_L) = (self.seen(at_B), self.turn_LB * along_B);
-        let (_, gradient_L) = self.kind.look(&point_L, &Axes::UPRIGHT, || point_L);
-        let slope = self.turn_LB.tr_mul(&gradient_L).norm();
-        self.kind.second(&point_L, &Axes::UPRIGHT, &gradient_L, &along_L) / slope
+        let at_L = self.local(at_B);
+        let (along_L, towards_L) = (self.turn_LB * along_B, self.turn_LB * towards_B);
+        let (_, gradient_B) = self.mapped(at_B, at_B);
+        self.kind.bending(&at_L, &Axes::UPRIGHT, &along_L, &towards_L) / gradient_B.norm()
     }
 
     fn smallest_radius_m(&self, at_B: &Vector3<f64>) -> f64 {
