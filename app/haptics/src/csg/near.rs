@@ -39,22 +39,40 @@ pub(super) const MAX_NEAR: usize = 8;
 impl Neighbourhood {
     /// All that matters within `wish_m` of a point, or within less if that would be too much.
     pub(super) fn around(csg: &Csg, anchor_B: &Vector3<f64>, wish_m: f64) -> Self {
-        Self::within(csg, anchor_B, wish_m, u32::MAX)
+        let wish_m = wish_m.max(SMALLEST * csg.extent_m);
+        let (mut here, is_crowded) = Self::soon(csg, anchor_B, wish_m);
+        // It grows until it is crowded: to look at all of a large ball first would take longer.
+        let mut radius_m = here.radius_m;
+        for _ in 0..MAX_TRIES {
+            if is_crowded || radius_m >= wish_m {
+                break;
+            }
+            radius_m = (GROWTH * radius_m).min(wish_m);
+            match gather(csg, anchor_B, radius_m, false) {
+                Ok(larger) => here = larger,
+                Err(ninth_m) => {
+                    let largest = gather(csg, anchor_B, ninth_m * JUST_BELOW, false);
+                    return largest.unwrap_or(here);
+                }
+            }
+        }
+        here
     }
 
     /// As [`Self::around`], but where there is a crowd what is found soon will do.
     pub(super) fn amid(csg: &Csg, anchor_B: &Vector3<f64>, wish_m: f64) -> Self {
-        Self::within(csg, anchor_B, wish_m, CROWD)
+        Self::soon(csg, anchor_B, wish_m).0
     }
 
-    fn within(csg: &Csg, anchor_B: &Vector3<f64>, wish_m: f64, crowd: u32) -> Self {
+    /// What is found soon, and whether it is as large as it can be.
+    fn soon(csg: &Csg, anchor_B: &Vector3<f64>, wish_m: f64) -> (Self, bool) {
         let smallest_m = SMALLEST * csg.extent_m;
         let mut radius_m = wish_m.max(smallest_m);
-        for _ in 0..MAX_TRIES {
-            let part = csg.cells.part(anchor_B, radius_m, crowd);
+        for tries in 0..MAX_TRIES {
+            let part = csg.cells.part(anchor_B, radius_m, CROWD);
             radius_m = radius_m.min(part.reach_m);
             match gather_from(csg, &part, anchor_B, radius_m, false) {
-                Ok(neighbourhood) => return neighbourhood,
+                Ok(neighbourhood) => return (neighbourhood, tries > 0),
                 // Just below the ninth, or a part of it if that cannot be told.
                 Err(ninth_m) if ninth_m < radius_m => radius_m = ninth_m * JUST_BELOW,
                 Err(_) => radius_m *= 0.25,
@@ -63,7 +81,7 @@ impl Neighbourhood {
                 break;
             }
         }
-        gather(csg, anchor_B, smallest_m, true).unwrap_or(Self::nowhere(anchor_B))
+        (gather(csg, anchor_B, smallest_m, true).unwrap_or(Self::nowhere(anchor_B)), true)
     }
 
     fn nowhere(anchor_B: &Vector3<f64>) -> Self {
@@ -259,6 +277,8 @@ const SIDES: [Table; MAX_NEAR] = [
 const MAX_TRIES: u32 = 16;
 /// No neighbourhood is smaller, in terms of the solid's extent.
 const SMALLEST: f64 = 1e-8;
+/// How much larger the next ball is that is tried.
+const GROWTH: f64 = 2.0;
 /// With more patches than this in a cell a neighbourhood would probably be too crowded.
 const CROWD: u32 = 10;
 /// So that the ninth nearest is outside.

@@ -37,7 +37,7 @@ pub(super) fn settle_on<const N: usize>(
     hip_B: &Vector3<f64>,
 ) -> (Vector3<f64>, [Look; N]) {
     let mut point_B = *from_B;
-    let mut looks = patches.map(|patch| patch.look(&point_B, hip_B));
+    let mut looks = looks_at(&patches, &point_B, hip_B);
     let mut last = f64::INFINITY;
     for _ in 0..MAX_ROUNDS {
         let worst = worst_m(&looks);
@@ -48,9 +48,23 @@ pub(super) fn settle_on<const N: usize>(
         }
         last = worst;
         point_B += correction(&looks);
-        looks = patches.map(|patch| patch.look(&point_B, hip_B));
+        looks = looks_at(&patches, &point_B, hip_B);
     }
     (point_B, looks)
+}
+
+/// What patches show of a point.
+#[inline(always)]
+pub(super) fn looks_at<const N: usize>(
+    patches: &[&Patch; N],
+    point_B: &Vector3<f64>,
+    hip_B: &Vector3<f64>,
+) -> [Look; N] {
+    let mut looks = [Look { height_m: 0.0, normal_B: Vector3::zeros() }; N];
+    for (look, patch) in looks.iter_mut().zip(patches) {
+        *look = patch.look(point_B, hip_B);
+    }
+    looks
 }
 
 /// The shortest step onto the tangent planes.
