@@ -15,7 +15,7 @@ use nalgebra::Vector3;
 use super::Csg;
 use super::god::God;
 use super::patch::{Look, Patch};
-use super::settle::{correction, settle_on};
+use super::settle::{correction, looks_at, settle_on};
 use crate::slide::Round;
 
 /// A place on the bent patches that hold a god-object, from which little is left to slide; `None` where the way there
@@ -71,7 +71,7 @@ fn on_rim(
     rest_m: f64,
 ) -> Option<Vector3<f64>> {
     let mut point_B = god.point_B;
-    let mut looks = patches.map(|patch| patch.look(&point_B, hip_B));
+    let mut looks = looks_at(&patches, &point_B, hip_B);
     let first = looks;
     let mut direction_before_B = Vector3::zeros();
     for _ in 0..MAX_STEPS {
@@ -92,7 +92,7 @@ fn on_rim(
             break;
         }
         point_B += arc.way_B(asked_m, left)? + correction(&looks);
-        looks = patches.map(|patch| patch.look(&point_B, hip_B));
+        looks = looks_at(&patches, &point_B, hip_B);
         direction_before_B = along_B;
     }
     Some(point_B)
@@ -110,6 +110,7 @@ struct Arc {
 }
 
 impl Arc {
+    #[inline(always)]
     fn new(
         patches: [&Patch; 2],
         looks: &[Look; 2],
@@ -117,13 +118,13 @@ impl Arc {
         along_B: &Vector3<f64>,
         to_hip_B: &Vector3<f64>,
     ) -> Self {
-        let bent = [0, 1]
-            .map(|i| Look { height_m: patches[i].bending(point_B, along_B), normal_B: looks[i].normal_B });
+        let bent =
+            |i: usize| Look { height_m: patches[i].bending(point_B, along_B), normal_B: looks[i].normal_B };
         let lag_m = along_B.dot(to_hip_B);
         Self {
             along_B: *along_B,
             // What leads away from both tangent planes as fast as the patches do.
-            bend_B: correction(&bent),
+            bend_B: correction(&[bent(0), bent(1)]),
             lag_m,
             depth_m: (to_hip_B - along_B * lag_m).norm(),
             to_hip_B: *to_hip_B,
@@ -131,6 +132,7 @@ impl Arc {
     }
 
     /// From here to where what friction leaves is `left` of the depth; `None` if that cannot be told.
+    #[inline(always)]
     fn way_B(&self, asked_m: f64, left: f64) -> Option<Vector3<f64>> {
         let bend_per_m = self.bend_B.norm();
         if bend_per_m * asked_m.abs() < STRAIGHT {
@@ -139,7 +141,7 @@ impl Arc {
         let (radius_m, inward_B) = (1.0 / bend_per_m, self.bend_B / bend_per_m);
         // The HIP as seen from the centre: outwards, along, and beside the circle's plane.
         let out_m = radius_m - inward_B.dot(&self.to_hip_B);
-        let reach_m = out_m.hypot(self.lag_m);
+        let reach_m = (out_m * out_m + self.lag_m * self.lag_m).sqrt();
         let beside_m2 =
             (self.to_hip_B.norm_squared() - (radius_m - out_m).powi(2) - self.lag_m.powi(2)).max(0.0);
         // `reach sin a = left sqrt((radius - reach cos a)^2 + beside^2)`, solved for the cosine.
@@ -175,4 +177,4 @@ const BENT: f64 = 0.8;
 const MAX_GAIN: f64 = 8.0;
 /// A step of less than this share of the radius is straight enough for Newton's method, and too short for the circle's centre
 /// to be known well.
-const STRAIGHT: f64 = 1e-2;
+const STRAIGHT: f64 = 1e-5;

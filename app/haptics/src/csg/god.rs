@@ -118,7 +118,7 @@ impl God {
     pub(super) fn both_patches<'c>(&self, csg: &'c Csg) -> Option<[&'c Patch; 2]> {
         let first = self.active.trailing_zeros() as usize;
         let second = (self.active & self.active.wrapping_sub(1)).trailing_zeros() as usize;
-        (self.active.count_ones() == 2).then(|| [first, second].map(|index| self.near.patch(csg, index)))
+        (self.active.count_ones() == 2).then(|| [self.near.patch(csg, first), self.near.patch(csg, second)])
     }
 
     /// Makes its surroundings known anew.

@@ -14,6 +14,7 @@ use super::corner::Corner;
 use super::god::{Clearing, God, worst_m};
 use super::hit::first_hit;
 use super::patch::{Look, Patch};
+use super::settle::looks_at;
 use super::way_out::way_out;
 use crate::friction_cone::ConeInput;
 use crate::surface::direction_or_up;
@@ -29,7 +30,7 @@ pub(super) fn stand(csg: &Csg, god: &mut God, input: &ConeInput) -> Option<Tange
                 on_patch(csg, god, patch, &god.point_B, &look, input)
             }
             (_, Some(patches)) => {
-                let looks = patches.map(|patch| patch.look(&god.point_B, &input.hip_B));
+                let looks = looks_at(&patches, &god.point_B, &input.hip_B);
                 on_edge(csg, god, &god.point_B, &looks, input)
             }
             _ => None,
