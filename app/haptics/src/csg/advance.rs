@@ -10,9 +10,9 @@
 use nalgebra::Vector3;
 
 use super::Csg;
-use super::god::God;
+use super::god::{God, worst_m};
 use super::hit::Events;
-use super::patch::Patch;
+use super::patch::{Look, Patch};
 use super::settle::{settle, settle_on};
 use super::stand::{on_edge, on_patch};
 use crate::friction_cone::ConeInput;
@@ -29,6 +29,13 @@ pub(super) enum Moved {
     TooFar,
 }
 
+/// Where to go, and what is known of the place.
+pub(super) struct Target {
+    pub(super) point_B: Vector3<f64>,
+    /// What the two patches of an edge show there.
+    pub(super) looks: Option<[Look; 2]>,
+}
+
 /// How a glide went.
 pub(super) enum Glided {
     /// To the target, held by the same patches.
@@ -41,13 +48,8 @@ pub(super) enum Glided {
 
 /// Goes there within the clearing.
 #[inline(always)]
-pub(super) fn glide(
-    csg: &Csg,
-    god: &mut God,
-    target_B: &Vector3<f64>,
-    longest: f64,
-    input: &ConeInput,
-) -> Glided {
+pub(super) fn glide(csg: &Csg, god: &mut God, target: &Target, longest: f64, input: &ConeInput) -> Glided {
+    let target_B = &target.point_B;
     if !god.clearing.holds(target_B) {
         return Glided::Not;
     }
@@ -62,7 +64,10 @@ pub(super) fn glide(
         }
         (moved_B, on_patch(csg, god, patch, &moved_B, &look, input))
     } else if let Some(patches) = god.both_patches(csg) {
-        let (moved_B, looks) = settle_on(patches, target_B, hip_B);
+        let (moved_B, looks) = match target.looks {
+            Some(looks) if worst_m(&looks) <= ON_IT * f64::EPSILON * target_B.amax() => (*target_B, looks),
+            _ => settle_on(patches, target_B, hip_B),
+        };
         if (moved_B - hip_B).norm_squared() > longest {
             return Glided::TooFar;
         }
@@ -91,7 +96,7 @@ pub(super) fn advance(
     let way_B = target_B - god.point_B;
     let length_m = way_B.norm();
     if !god.near.holds(&god.point_B, length_m) {
-        god.look_around(csg, LARGER * length_m);
+        god.look_around(csg, length_m);
     }
     let room_m = god.near.room_m(&god.point_B);
     let mut share = if length_m > room_m { room_m / length_m } else { 1.0 };
@@ -135,7 +140,7 @@ fn stop_where_it_ends(csg: &Csg, god: &mut God, to_B: &Vector3<f64>, hip_B: &Vec
     false
 }
 
-/// A neighbourhood is asked for this much larger than the way.
-const LARGER: f64 = 4.0;
 /// Bound on the attempts to come back onto bent patches within the neighbourhood.
 const MAX_SHORTENED: u32 = 8;
+/// Roundings of its coordinates that a place on the patches may be off.
+const ON_IT: f64 = 8.0;

@@ -208,6 +208,26 @@ impl Corner {
     }
 }
 
+/// The way to the nearest place on an edge, if nothing but the edge holds the HIP back: all around it is solid.
+#[inline(always)]
+pub(super) fn edge_holds(
+    near: &Neighbourhood,
+    sides: Sides,
+    [first, second]: [usize; 2],
+    outward_B: &[Vector3<f64>; 2],
+    to_hip_B: &Vector3<f64>,
+) -> Option<Vector3<f64>> {
+    let is_walled_in = !near.is_solid(sides)
+        && near.is_solid(sides ^ 1 << first)
+        && near.is_solid(sides ^ 1 << second)
+        && outward_B[0].cross(&outward_B[1]).norm_squared() > CLEAR * CLEAR;
+    if !is_walled_in {
+        return None;
+    }
+    let (way_B, mask) = nearest_before(outward_B, to_hip_B);
+    (mask == 0b11).then_some(way_B)
+}
+
 /// The point in front of all planes through the origin nearest to the HIP, and those that it lies on.
 #[inline(always)]
 fn nearest_before(normals_B: &[Vector3<f64>], to_hip_B: &Vector3<f64>) -> (Vector3<f64>, usize) {

@@ -13,6 +13,7 @@
 use nalgebra::Vector3;
 
 use super::Csg;
+use super::advance::Target;
 use super::god::God;
 use super::patch::{Look, Patch};
 use super::settle::{correction, looks_at, settle_on};
@@ -21,7 +22,7 @@ use crate::slide::Round;
 /// A place on the bent patches that hold a god-object, from which little is left to slide; `None` where the way there
 /// bends too much to tell.
 #[inline(always)]
-pub(super) fn foresee(csg: &Csg, god: &God, round: &Round, hip_B: &Vector3<f64>) -> Option<Vector3<f64>> {
+pub(super) fn foresee(csg: &Csg, god: &God, round: &Round, hip_B: &Vector3<f64>) -> Option<Target> {
     let left = (round.gap_m - round.asked_m) / round.view.depth_m;
     let tells = round.asked_m > round.view.rest_m && (0.0..f64::INFINITY).contains(&left);
     if !tells {
@@ -30,7 +31,9 @@ pub(super) fn foresee(csg: &Csg, god: &God, round: &Round, hip_B: &Vector3<f64>)
     let rest_m = round.view.rest_m;
     // A patch has a whole rim of places where friction is content: which of them is a matter of the way.
     match (god.only_patch(csg), god.both_patches(csg)) {
-        (Some(patch), _) if left == 0.0 && !patch.is_plane() => foot(patch, god, hip_B, rest_m),
+        (Some(patch), _) if left == 0.0 && !patch.is_plane() => {
+            foot(patch, god, hip_B, rest_m).map(|point_B| Target { point_B, looks: None })
+        }
         (_, Some(patches)) if !god.is_on_planes(csg) => on_rim(patches, god, hip_B, left, rest_m),
         _ => None,
     }
@@ -63,13 +66,7 @@ fn foot(patch: &Patch, god: &God, hip_B: &Vector3<f64>, rest_m: f64) -> Option<V
 }
 
 /// Where on the curve of two patches friction is content, or the nearest place of it if nothing is left to friction.
-fn on_rim(
-    patches: [&Patch; 2],
-    god: &God,
-    hip_B: &Vector3<f64>,
-    left: f64,
-    rest_m: f64,
-) -> Option<Vector3<f64>> {
+fn on_rim(patches: [&Patch; 2], god: &God, hip_B: &Vector3<f64>, left: f64, rest_m: f64) -> Option<Target> {
     let mut point_B = god.point_B;
     let mut looks = looks_at(&patches, &point_B, hip_B);
     let first = looks;
@@ -95,7 +92,7 @@ fn on_rim(
         looks = looks_at(&patches, &point_B, hip_B);
         direction_before_B = along_B;
     }
-    Some(point_B)
+    Some(Target { point_B, looks: Some(looks) })
 }
 
 /// A curve as it is near one of its points: a piece of a circle.

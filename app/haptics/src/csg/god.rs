@@ -121,9 +121,10 @@ impl God {
         (self.active.count_ones() == 2).then(|| [self.near.patch(csg, first), self.near.patch(csg, second)])
     }
 
-    /// Makes its surroundings known anew.
-    pub(super) fn look_around(&mut self, csg: &Csg, wish_m: f64) {
-        let near = Neighbourhood::around(csg, &self.point_B, wish_m.max(COMMON * csg.extent_m));
+    /// Makes its surroundings known anew, if it can be for a way of this length.
+    pub(super) fn look_around(&mut self, csg: &Csg, length_m: f64) {
+        let wish_m = (LARGER * length_m).max(COMMON * csg.extent_m);
+        let near = Neighbourhood::at_least(csg, &self.point_B, length_m, wish_m);
         let active = self.held_by().filter_map(|index| near.position(self.near.number(index)));
         self.active = active.fold(0, |active, place| active | 1 << place);
         self.sides = near.sides_after(csg, &self.point_B, &self.near, self.sides);
@@ -150,5 +151,7 @@ pub(super) fn worst_m(looks: &[Look]) -> f64 {
 
 /// The most patches that a god-object in a clearing is held by.
 const MAX_CLEAR: usize = 2;
+/// A neighbourhood is asked for this much larger than the way.
+const LARGER: f64 = 4.0;
 /// Radius of a common neighbourhood, in terms of the extent.
 const COMMON: f64 = 0.02;

@@ -156,7 +156,7 @@ impl Kind {
     pub(super) fn entry(&self, axes: &Axes, from: &Vector3<f64>, to: &Vector3<f64>) -> Option<f64> {
         let path = to - from;
         let resolution_m = 2.0 * f64::EPSILON * from.amax().max(to.amax());
-        let mut share = 0.0;
+        let mut share = self.entry_guess(axes, from, &path);
         for _ in 0..MAX_ENTRY_ROUNDS {
             let point = from + path * share;
             let (height_m, gradient) = self.look(&point, axes, || point);
@@ -173,6 +173,19 @@ impl Kind {
             }
         }
         Some(share)
+    }
+
+    /// Where round patches are entered: what rounding leaves of it is up to the search. Zero if that cannot be told.
+    fn entry_guess(&self, axes: &Axes, from: &Vector3<f64>, path: &Vector3<f64>) -> f64 {
+        let (from, path, radius_m) = match *self {
+            Self::Ball { radius_m } => (*from, *path, radius_m),
+            Self::Tube { radius_m } => (axes.across(from), axes.across(path), radius_m),
+            _ => return 0.0,
+        };
+        let (approach, outside) = (-from.dot(&path), from.norm_squared() - radius_m * radius_m);
+        let share = outside / (approach + (approach * approach - path.norm_squared() * outside).sqrt());
+        // Also what is not a number.
+        if approach > 0.0 && outside > 0.0 && share <= 1.0 { share } else { 0.0 }
     }
 
     /// Goes along the path by no more than the level allows, and by no less than a small part of it: what is missed is

@@ -39,15 +39,19 @@ pub(super) const MAX_NEAR: usize = 8;
 impl Neighbourhood {
     /// All that matters within `wish_m` of a point, or within less if that would be too much.
     pub(super) fn around(csg: &Csg, anchor_B: &Vector3<f64>, wish_m: f64) -> Self {
-        let wish_m = wish_m.max(SMALLEST * csg.extent_m);
+        Self::at_least(csg, anchor_B, wish_m, wish_m)
+    }
+
+    /// As [`Self::around`] within `need_m`; up to `wish_m` where that takes no longer.
+    pub(super) fn at_least(csg: &Csg, anchor_B: &Vector3<f64>, need_m: f64, wish_m: f64) -> Self {
         let (mut here, is_crowded) = Self::soon(csg, anchor_B, wish_m);
         // It grows until it is crowded: to look at all of a large ball first would take longer.
         let mut radius_m = here.radius_m;
         for _ in 0..MAX_TRIES {
-            if is_crowded || radius_m >= wish_m {
+            if is_crowded || radius_m >= need_m {
                 break;
             }
-            radius_m = (GROWTH * radius_m).min(wish_m);
+            radius_m *= GROWTH;
             match gather(csg, anchor_B, radius_m, false) {
                 Ok(larger) => here = larger,
                 Err(ninth_m) => {
@@ -59,7 +63,7 @@ impl Neighbourhood {
         here
     }
 
-    /// As [`Self::around`], but where there is a crowd what is found soon will do.
+    /// All that matters within `wish_m` of a point, or within less where that would be too much or would take longer.
     pub(super) fn amid(csg: &Csg, anchor_B: &Vector3<f64>, wish_m: f64) -> Self {
         Self::soon(csg, anchor_B, wish_m).0
     }
@@ -280,7 +284,7 @@ const SMALLEST: f64 = 1e-8;
 /// How much larger the next ball is that is tried.
 const GROWTH: f64 = 2.0;
 /// With more patches than this in a cell a neighbourhood would probably be too crowded.
-const CROWD: u32 = 10;
+const CROWD: u32 = 16;
 /// So that the ninth nearest is outside.
 const JUST_BELOW: f64 = 1.0 - 1e-9;
 

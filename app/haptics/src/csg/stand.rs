@@ -10,7 +10,7 @@
 use nalgebra::Vector3;
 
 use super::Csg;
-use super::corner::Corner;
+use super::corner::{Corner, edge_holds};
 use super::god::{Clearing, God, worst_m};
 use super::hit::first_hit;
 use super::patch::{Look, Patch};
@@ -67,13 +67,22 @@ pub(super) fn on_edge(
     looks: &[Look; 2],
     input: &ConeInput,
 ) -> Option<TangentView> {
-    let mut corner = Corner::new();
-    god.held_by().zip(looks).for_each(|(index, look)| corner.add(index, look));
+    let mut held_by = god.held_by();
+    let indices = [held_by.next()?, held_by.next()?];
+    let is_turned = |index: usize| god.sides >> index & 1 == 1;
+    let outward = |i: usize| if is_turned(indices[i]) { -looks[i].normal_B } else { looks[i].normal_B };
     let to_hip_B = input.hip_B - point_B;
-    let facing = corner.facing(&god.near, god.sides, &to_hip_B, RELEASE * csg.extent_m)?;
-    let is_held =
-        (facing.sides, facing.active) == (god.sides, god.active) && worst_m(looks) <= csg.tolerance_m();
-    is_held.then(|| view_of_edge(&corner, god, point_B, &(facing.way_B - to_hip_B), input))
+    let way_B = edge_holds(&god.near, god.sides, indices, &[outward(0), outward(1)], &to_hip_B)?;
+    if worst_m(looks) > csg.tolerance_m() {
+        return None;
+    }
+    let out_B = way_B - to_hip_B;
+    let depth_m = out_B.norm();
+    if depth_m == 0.0 {
+        return None;
+    }
+    let normal_B = direction_or_up(&out_B);
+    Some(TangentView::new(point_B, normal_B, normal_B.dot(&input.hip_B) + depth_m, input))
 }
 
 #[inline(never)]

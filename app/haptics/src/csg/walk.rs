@@ -14,7 +14,7 @@
 use nalgebra::Vector3;
 
 use super::Csg;
-use super::advance::{Glided, Moved, advance, glide};
+use super::advance::{Glided, Moved, Target, advance, glide};
 use super::foresight::foresee;
 use super::god::God;
 use super::settle::settle;
@@ -54,19 +54,21 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
         }
         let step_m = shortened * secant.step(round.asked_m, round.view.depth_m);
         // From within a bore, the HIP far behind its wall, tangents overshoot; the wall's nearest place is known.
-        let foot_B = || settle(csg, god, god.active, &input.hip_B, &input.hip_B);
+        let foot =
+            || Target { point_B: settle(csg, god, god.active, &input.hip_B, &input.hip_B), looks: None };
         let is_in_hollow = is_first && round.asked_m == round.gap_m && god.is_in_hollow(csg);
-        let seen_B = match is_first {
-            true if is_in_hollow => Some(foot_B()),
+        let seen = match is_first {
+            true if is_in_hollow => Some(foot()),
             true => foresee(csg, god, &round, &input.hip_B),
             false => None,
         };
-        let target_B = seen_B.unwrap_or_else(|| round.target_B(step_m));
+        let is_seen = seen.is_some();
+        let target = seen.unwrap_or_else(|| Target { point_B: round.target_B(step_m), looks: None });
         let (before_B, held_before) = (god.point_B, god.held_patches());
-        let (moved, view) = match glide(csg, god, &target_B, longest, input) {
+        let (moved, view) = match glide(csg, god, &target, longest, input) {
             Glided::There(view) => (Moved::There, Some(view)),
             Glided::TooFar => (Moved::TooFar, None),
-            Glided::Not => (advance(csg, god, &target_B, longest, &input.hip_B), None),
+            Glided::Not => (advance(csg, god, &target.point_B, longest, &input.hip_B), None),
         };
         if moved == Moved::TooFar {
             if round.asked_m < 0.0 && round.gap_m > 0.0 {
@@ -76,7 +78,7 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
             continue;
         }
         shortened = 1.0;
-        if seen_B.is_none() {
+        if !is_seen {
             secant.made(round.asked_m, step_m);
         }
         let has_glided = view.is_some();
