@@ -83,16 +83,33 @@ fn on_rim(patches: [&Patch; 2], god: &God, hip_B: &Vector3<f64>, left: f64, rest
             along_B.dot(if direction_before_B == Vector3::zeros() { &to_hip_B } else { &direction_before_B })
                 >= 0.0;
         let along_B = if is_ahead { along_B } else { -along_B };
-        let arc = Arc::new(patches, &looks, &point_B, &along_B, &to_hip_B);
-        let asked_m = arc.lag_m - left * arc.depth_m;
+        let lag_m = along_B.dot(&to_hip_B);
+        let depth_m = (to_hip_B - along_B * lag_m).norm();
+        let asked_m = lag_m - left * depth_m;
         if asked_m.abs() <= rest_m {
             break;
         }
+        let bend_B = bend(patches, &looks, &point_B, &along_B);
+        let arc = Arc { along_B, bend_B, lag_m, depth_m, to_hip_B };
         point_B += arc.way_B(asked_m, left)? + correction(&looks);
         looks = looks_at(&patches, &point_B, hip_B);
         direction_before_B = along_B;
     }
     Some(Target { point_B, looks: Some(looks) })
+}
+
+/// To the centre of the circle that the curve of two patches bends along, over the square of its radius (1/m).
+#[inline(always)]
+fn bend(
+    patches: [&Patch; 2],
+    looks: &[Look; 2],
+    point_B: &Vector3<f64>,
+    along_B: &Vector3<f64>,
+) -> Vector3<f64> {
+    let bent =
+        |i: usize| Look { height_m: patches[i].bending(point_B, along_B), normal_B: looks[i].normal_B };
+    // What leads away from both tangent planes as fast as the patches do.
+    correction(&[bent(0), bent(1)])
 }
 
 /// A curve as it is near one of its points: a piece of a circle.
@@ -107,27 +124,6 @@ struct Arc {
 }
 
 impl Arc {
-    #[inline(always)]
-    fn new(
-        patches: [&Patch; 2],
-        looks: &[Look; 2],
-        point_B: &Vector3<f64>,
-        along_B: &Vector3<f64>,
-        to_hip_B: &Vector3<f64>,
-    ) -> Self {
-        let bent =
-            |i: usize| Look { height_m: patches[i].bending(point_B, along_B), normal_B: looks[i].normal_B };
-        let lag_m = along_B.dot(to_hip_B);
-        Self {
-            along_B: *along_B,
-            // What leads away from both tangent planes as fast as the patches do.
-            bend_B: correction(&[bent(0), bent(1)]),
-            lag_m,
-            depth_m: (to_hip_B - along_B * lag_m).norm(),
-            to_hip_B: *to_hip_B,
-        }
-    }
-
     /// From here to where what friction leaves is `left` of the depth; `None` if that cannot be told.
     #[inline(always)]
     fn way_B(&self, asked_m: f64, left: f64) -> Option<Vector3<f64>> {

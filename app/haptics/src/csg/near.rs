@@ -133,6 +133,16 @@ impl Neighbourhood {
         self.table == [0; 4]
     }
 
+    /// Of the listed patches, at a point.
+    #[inline(always)]
+    pub(super) fn levels_m(&self, csg: &Csg, point_B: &Vector3<f64>) -> [f64; MAX_NEAR] {
+        let mut levels_m = [f64::INFINITY; MAX_NEAR];
+        for (index, level_m) in levels_m.iter_mut().enumerate().take(self.count) {
+            *level_m = self.patch(csg, index).level(point_B);
+        }
+        levels_m
+    }
+
     /// The sides of a point.
     #[inline(always)]
     pub(super) fn sides(&self, csg: &Csg, point_B: &Vector3<f64>) -> Sides {

@@ -71,6 +71,15 @@ impl Patch {
         matches!(self, Self::Plane { .. })
     }
 
+    /// Whether heights are distances, everywhere: it is not scaled.
+    #[inline(always)]
+    pub(crate) fn is_distance(&self) -> bool {
+        match self {
+            Self::Plane { .. } => true,
+            Self::Curved(curved) => curved.place.is_some(),
+        }
+    }
+
     /// Negative inside, zero on the surface; no steeper than one.
     #[inline(always)]
     pub(crate) fn level(&self, point_B: &Vector3<f64>) -> f64 {

@@ -38,6 +38,12 @@ pub(super) fn settle_on<const N: usize>(
 ) -> (Vector3<f64>, [Look; N]) {
     let mut point_B = *from_B;
     let mut looks = looks_at(&patches, &point_B, hip_B);
+    if N == 1 && patches[0].is_distance() {
+        // The first step leads there, and along it the normal is the same.
+        point_B += correction(&looks);
+        looks[0].height_m = 0.0;
+        return (point_B, looks);
+    }
     let mut last = f64::INFINITY;
     for _ in 0..MAX_ROUNDS {
         let worst = worst_m(&looks);
