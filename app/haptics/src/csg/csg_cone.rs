@@ -141,10 +141,11 @@ impl Touching {
             return Some(self.answer(&walked, input));
         }
         walk_freely(csg, &mut self.shadow, input)?;
-        let view = stand(csg, &mut self.god_object, input)?;
-        let pull = self.grip.begin_tick(&view, input);
-        if let Some(tangential_B) = self.grip.hold(friction, &view, &pull, input) {
-            return Some(self.answer(&Slid { view, tangential_B, rounds: 0 }, input));
+        let stood = stand(csg, &mut self.god_object, input)?;
+        let view = &stood.view;
+        let pull = self.grip.begin_tick(view, input);
+        if let Some(tangential_B) = self.grip.hold(friction, view, &pull, input) {
+            return Some(self.answer(&Slid { view: stood.view, tangential_B, rounds: 0 }, input));
         }
         let slider = Slider {
             friction,
@@ -153,7 +154,7 @@ impl Touching {
             input,
             start_B: self.god_object.point_B,
         };
-        let mut slid = walk(csg, &mut self.god_object, view, &slider)?;
+        let mut slid = walk(csg, &mut self.god_object, stood, &slider)?;
         slid.tangential_B += self.grip.drag(friction, &slid.tangential_B, &slid.view, &pull, input);
         Some(self.answer(&slid, input))
     }
@@ -167,7 +168,7 @@ impl Touching {
 /// The frictionless god-object; `None` if the finger is free.
 #[inline(always)]
 fn walk_freely(csg: &Csg, god: &mut God, input: &ConeInput) -> Option<Slid> {
-    let view = stand(csg, god, input)?;
+    let stood = stand(csg, god, input)?;
     let slider = Slider {
         friction: &Frictionless,
         memory: &NOTHING,
@@ -175,7 +176,7 @@ fn walk_freely(csg: &Csg, god: &mut God, input: &ConeInput) -> Option<Slid> {
         input,
         start_B: god.point_B,
     };
-    let slid = walk(csg, god, view, &slider)?;
+    let slid = walk(csg, god, stood, &slider)?;
     holds_outside(csg, god, &slid.view, input).then_some(slid)
 }
 

@@ -22,7 +22,13 @@ use crate::slide::Round;
 /// A place on the bent patches that hold a god-object, from which little is left to slide; `None` where the way there
 /// bends too much to tell.
 #[inline(always)]
-pub(super) fn foresee(csg: &Csg, god: &God, round: &Round, hip_B: &Vector3<f64>) -> Option<Target> {
+pub(super) fn foresee(
+    csg: &Csg,
+    god: &God,
+    round: &Round,
+    looks: Option<[Look; 2]>,
+    hip_B: &Vector3<f64>,
+) -> Option<Target> {
     let left = (round.gap_m - round.asked_m) / round.view.depth_m;
     let tells = round.asked_m > round.view.rest_m && (0.0..f64::INFINITY).contains(&left);
     if !tells {
@@ -34,7 +40,10 @@ pub(super) fn foresee(csg: &Csg, god: &God, round: &Round, hip_B: &Vector3<f64>)
         (Some(patch), _) if left == 0.0 && !patch.is_plane() => {
             foot(patch, god, hip_B, rest_m).map(|point_B| Target { point_B, looks: None })
         }
-        (_, Some(patches)) if !god.is_on_planes(csg) => on_rim(patches, god, hip_B, left, rest_m),
+        (_, Some(patches)) if !god.is_on_planes(csg) => {
+            let looks = looks.unwrap_or_else(|| looks_at(&patches, &god.point_B, hip_B));
+            on_rim(patches, looks, &god.point_B, hip_B, left, rest_m)
+        }
         _ => None,
     }
 }
@@ -66,9 +75,15 @@ fn foot(patch: &Patch, god: &God, hip_B: &Vector3<f64>, rest_m: f64) -> Option<V
 }
 
 /// Where on the curve of two patches friction is content, or the nearest place of it if nothing is left to friction.
-fn on_rim(patches: [&Patch; 2], god: &God, hip_B: &Vector3<f64>, left: f64, rest_m: f64) -> Option<Target> {
-    let mut point_B = god.point_B;
-    let mut looks = looks_at(&patches, &point_B, hip_B);
+fn on_rim(
+    patches: [&Patch; 2],
+    mut looks: [Look; 2],
+    from_B: &Vector3<f64>,
+    hip_B: &Vector3<f64>,
+    left: f64,
+    rest_m: f64,
+) -> Option<Target> {
+    let mut point_B = *from_B;
     let first = looks;
     let mut direction_before_B = Vector3::zeros();
     for _ in 0..MAX_STEPS {

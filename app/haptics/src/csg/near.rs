@@ -166,12 +166,29 @@ fn gather_from(
 ) -> Result<Neighbourhood, f64> {
     let mut here = Neighbourhood { radius_m, ..Neighbourhood::nowhere(anchor_B) };
     let mut crowd = Crowd::default();
-    let mut stack = [NOTHING; STACK];
+    let leaf = |first, count| leaf(csg, &mut here, &mut crowd, part.items(first, count), keep_eight);
+    // A stack is as deep as there are leaves, at the most; most parts have few.
+    let table = if part.steps.len() < 2 * FEW {
+        evaluated::<FEW>(part.steps, leaf)
+    } else {
+        evaluated::<STACK>(part.steps, leaf)
+    };
+    if crowd.is_too_large && !keep_eight {
+        return Err(crowd.ninth_m());
+    }
+    here.table = table;
+    Ok(here)
+}
+
+/// For every combination of sides whether that is inside, from what is inside the leaves.
+#[inline(always)]
+fn evaluated<const DEPTH: usize>(steps: &[CellStep], mut leaf: impl FnMut(u32, u32) -> Table) -> Table {
+    let mut stack = [NOTHING; DEPTH];
     let mut top = 0;
-    for step in part.steps {
+    for step in steps {
         match *step {
             CellStep::Leaf { first, count } => {
-                stack[top] = leaf(csg, &mut here, &mut crowd, part.items(first, count), keep_eight);
+                stack[top] = leaf(first, count);
                 top += 1;
             }
             CellStep::Join(op) => {
@@ -185,11 +202,7 @@ fn gather_from(
             }
         }
     }
-    if crowd.is_too_large && !keep_eight {
-        return Err(crowd.ninth_m());
-    }
-    here.table = stack[0];
-    Ok(here)
+    stack[0]
 }
 
 /// Whether a leaf is inside, for every combination of sides.
@@ -230,30 +243,44 @@ fn leaf(csg: &Csg, here: &mut Neighbourhood, crowd: &mut Crowd, items: &[Item], 
 
 impl Neighbourhood {
     fn list(&mut self, number: u16, height_m: f64, crowd: &mut Crowd) -> Option<usize> {
-        crowd.add(number, height_m);
         if self.count == MAX_NEAR {
-            crowd.is_too_large = true;
+            crowd.overflow(&self.patches, number, height_m);
             return None;
         }
         self.patches[self.count] = number;
+        crowd.heights_m[self.count] = height_m;
         self.count += 1;
         Some(self.count - 1)
     }
 }
 
-/// The nearest nine: the ninth decides how large a neighbourhood can be.
+/// The nearest nine, if there are as many: the ninth decides how large a neighbourhood can be.
 struct Crowd {
+    /// Of those that are listed.
+    heights_m: [f64; MAX_NEAR],
     nearest: [(f64, u16); MAX_NEAR + 1],
     is_too_large: bool,
 }
 
 impl Default for Crowd {
     fn default() -> Self {
-        Self { nearest: [(f64::INFINITY, u16::MAX); MAX_NEAR + 1], is_too_large: false }
+        let nearest = [(f64::INFINITY, u16::MAX); MAX_NEAR + 1];
+        Self { heights_m: [f64::INFINITY; MAX_NEAR], nearest, is_too_large: false }
     }
 }
 
 impl Crowd {
+    /// Takes note of one more than can be listed.
+    fn overflow(&mut self, listed: &[u16; MAX_NEAR], number: u16, height_m: f64) {
+        if !self.is_too_large {
+            self.is_too_large = true;
+            for (index, &number) in listed.iter().enumerate() {
+                self.add(number, self.heights_m[index]);
+            }
+        }
+        self.add(number, height_m);
+    }
+
     /// Patches beyond the eighth are not listed, and may come twice.
     fn add(&mut self, number: u16, height_m: f64) {
         if self.nearest.iter().any(|&(_, known)| known == number) {
@@ -274,6 +301,8 @@ impl Crowd {
 
 /// The most patches of a leaf: a box has as many.
 const MAX_ITEMS: usize = 6;
+/// Leaves of a common part.
+const FEW: usize = 6;
 const NOTHING: Table = [0; 4];
 const EVERYTHING: Table = [u64::MAX; 4];
 /// For each patch, the combinations in which one is inside of it.

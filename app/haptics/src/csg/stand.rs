@@ -20,26 +20,40 @@ use crate::friction_cone::ConeInput;
 use crate::surface::direction_or_up;
 use crate::tangent_view::TangentView;
 
+/// What a god-object sees from where it stands.
+pub(super) struct Stood {
+    pub(super) view: TangentView,
+    /// What the two patches of an edge show there, if that is known.
+    pub(super) looks: Option<[Look; 2]>,
+}
+
+impl From<TangentView> for Stood {
+    fn from(view: TangentView) -> Self {
+        Self { view, looks: None }
+    }
+}
+
 /// What holds the HIP back where the god-object stands; `None` if it is free and gone.
 #[inline(always)]
-pub(super) fn stand(csg: &Csg, god: &mut God, input: &ConeInput) -> Option<TangentView> {
+pub(super) fn stand(csg: &Csg, god: &mut God, input: &ConeInput) -> Option<Stood> {
     if god.clearing.holds(&god.point_B) {
-        let view = match (god.only_patch(csg), god.both_patches(csg)) {
+        let stood = match (god.only_patch(csg), god.both_patches(csg)) {
             (Some(patch), _) => {
                 let look = patch.look(&god.point_B, &input.hip_B);
-                on_patch(csg, god, patch, &god.point_B, &look, input)
+                on_patch(csg, god, patch, &god.point_B, &look, input).map(Stood::from)
             }
             (_, Some(patches)) => {
                 let looks = looks_at(&patches, &god.point_B, &input.hip_B);
-                on_edge(csg, god, &god.point_B, &looks, input)
+                let view = on_edge(csg, god, &god.point_B, &looks, input);
+                view.map(|view| Stood { view, looks: Some(looks) })
             }
             _ => None,
         };
-        if view.is_some() {
-            return view;
+        if stood.is_some() {
+            return stood;
         }
     }
-    stand_anywhere(csg, god, input)
+    stand_anywhere(csg, god, input).map(Stood::from)
 }
 
 /// What a god-object on one patch sees from a place in its clearing; `None` if it is held there by something else.

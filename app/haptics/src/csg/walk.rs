@@ -18,21 +18,21 @@ use super::advance::{Glided, Moved, Target, advance, glide};
 use super::foresight::foresee;
 use super::god::God;
 use super::settle::settle;
-use super::stand::stand;
+use super::stand::{Stood, stand};
 use crate::friction_law::FrictionLaw;
 use crate::slide::{Secant, Slid, Slider};
-use crate::tangent_view::TangentView;
 
 /// Goes on from where the god-object stands until nothing draws it any further; `None` if it is free and gone.
 #[inline(always)]
 pub(super) fn walk<L: FrictionLaw + ?Sized>(
     csg: &Csg,
     god: &mut God,
-    view: TangentView,
+    stood: Stood,
     slider: &Slider<'_, L>,
 ) -> Option<Slid> {
     let input = slider.input;
-    let mut round = slider.look(view, &Vector3::zeros(), &god.point_B);
+    let mut round = slider.look(stood.view, &Vector3::zeros(), &god.point_B);
+    let mut looks = stood.looks;
     let (mut secant, mut shortened, mut stalls) = (Secant::default(), 1.0, 0);
     let mut longest = f64::NAN;
     // Force ratio with which it already slides: a curve that falls with speed may hold what rests, but not what slides.
@@ -59,7 +59,7 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
         let is_in_hollow = is_first && round.asked_m == round.gap_m && god.is_in_hollow(csg);
         let seen = match is_first {
             true if is_in_hollow => Some(foot()),
-            true => foresee(csg, god, &round, &input.hip_B),
+            true => foresee(csg, god, &round, looks.take(), &input.hip_B),
             false => None,
         };
         let is_seen = seen.is_some();
@@ -84,7 +84,11 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
         let has_glided = view.is_some();
         let view = match view {
             Some(view) => view,
-            None => stand(csg, god, input)?,
+            None => {
+                let stood = stand(csg, god, input)?;
+                looks = stood.looks;
+                stood.view
+            }
         };
         let is_same = has_glided || moved == Moved::There && god.held_patches() == held_before;
         if is_same {
