@@ -45,9 +45,10 @@ fn main() {
     criterion.final_summary();
 }
 
-fn works() -> [(&'static str, Friction, f64); 4] {
+fn works() -> [(&'static str, Friction, f64); 5] {
     [
         ("slide", Friction::None, -1e-3),
+        ("coulomb", Friction::coulomb(0.3).expect("friction"), -1e-3),
         ("stiction", Friction::stiction(0.7, 0.3).expect("friction"), -1e-3),
         ("free, near", Friction::None, 4e-3),
         ("free, far", Friction::None, 5e-2),

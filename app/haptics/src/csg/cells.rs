@@ -215,3 +215,90 @@ const MAX_DEPTH: u32 = 5;
 const FEW: u32 = 4;
 /// So that rounding prunes nothing that matters.
 const JUST_ABOVE: f64 = 1.0 + 1e-9;
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Isometry3;
+
+    use super::super::near::Neighbourhood;
+    use super::super::{Csg, CsgPart, CsgTree};
+    use super::*;
+    use crate::cuboid::Cuboid;
+    use crate::cylinder::Cylinder;
+    use crate::plane::Plane;
+    use crate::sphere::Sphere;
+
+    fn ball(radius_m: f64) -> CsgPart {
+        Sphere::new(radius_m).unwrap().into()
+    }
+
+    fn bricks() -> CsgPart {
+        let brick = Cuboid::new([0.012, 0.015, 0.018]).unwrap();
+        let grid = (0..27).map(|i| {
+            let place = Vector3::new(f64::from(i % 3), f64::from(i / 3 % 3), f64::from(i / 9)) * 0.02;
+            CsgPart::at(brick, place - Vector3::repeat(0.02))
+        });
+        CsgTree::union(grid).into()
+    }
+
+    /// In all of them some places are far from one operand of an operation, or deep within it.
+    fn solids() -> [CsgTree; 5] {
+        let tilted = Isometry3::rotation(Vector3::new(0.3, 0.4, 0.5));
+        let rod = CsgPart::new(Cylinder::new(0.008, 0.09).unwrap(), tilted);
+        let below = CsgPart::from(Plane::new(Vector3::new(0.6, 0.8, 0.0), 0.005).unwrap());
+        [
+            CsgTree::difference([bricks(), ball(0.02)]),
+            CsgTree::intersection([bricks(), ball(0.025), below.clone()]),
+            CsgTree::difference([ball(0.035), bricks()]),
+            CsgTree::difference([below, CsgTree::intersection([ball(0.03), bricks()]).into(), rod.clone()]),
+            CsgTree::union([CsgTree::difference([rod, bricks()]).into(), ball(0.004)]),
+        ]
+    }
+
+    fn spread(i: u32) -> Vector3<f64> {
+        let along = |step: f64| 2.0 * (f64::from(i) * step).fract() - 1.0;
+        Vector3::new(along(0.618_034), along(0.414_214), along(0.732_051))
+    }
+
+    #[test]
+    fn what_is_left_in_a_cell_says_what_the_whole_tree_says() {
+        for tree in solids() {
+            let csg = Csg::build(&tree).unwrap();
+            let mut answers = [0; 2];
+            for i in 0..4000 {
+                // Some of them beyond the cells.
+                let anchor = spread(i) * 0.06;
+                let wish_m = [1e-4, 1e-3, 4e-3, 0.05][i as usize % 4];
+                for near in
+                    [Neighbourhood::around(&csg, &anchor, wish_m), Neighbourhood::amid(&csg, &anchor, wish_m)]
+                {
+                    for j in 0..20 {
+                        let p = anchor + spread(7 * i + j) * (near.radius_m / 3f64.sqrt());
+                        let is_inside = csg.is_inside(&p);
+                        assert_eq!(near.is_solid(near.sides(&csg, &p)), is_inside, "{p:?} {near:?}");
+                        answers[usize::from(is_inside)] += 1;
+                    }
+                }
+            }
+            assert!(answers.iter().all(|&count| count > 500), "{answers:?}");
+        }
+    }
+
+    #[test]
+    fn leaves_that_are_far_are_not_looked_at() {
+        let [tree, ..] = solids();
+        let csg = Csg::build(&tree).unwrap();
+        let patches = |x: f64, y: f64, z: f64| {
+            let part = csg.cells.part(&Vector3::new(x, y, z), 1e-3, u32::MAX);
+            let count = |step: &CellStep| if let CellStep::Leaf { count, .. } = step { *count } else { 0 };
+            part.steps.iter().map(count).sum::<u32>()
+        };
+        assert_eq!(csg.items.len(), 27 * 6 + 1);
+        // In the air; on the face of a brick; deep in what the ball took away; between ball and bricks. Cells with few
+        // patches are not split, whatever they are.
+        assert!(patches(0.0, 0.032, 0.0) <= FEW);
+        assert!((1..=6).contains(&patches(0.02, 0.0275, 0.02)));
+        assert!(patches(0.0, 0.001, 0.0) <= FEW);
+        assert!((1..=13).contains(&patches(0.02, 0.001, 0.001)));
+    }
+}

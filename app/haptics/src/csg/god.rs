@@ -46,6 +46,11 @@ impl Clearing {
         Self { centre_B: god.point_B, radius_m: radius_m.max(0.0) }
     }
 
+    #[cfg(test)]
+    pub(super) fn radius_m(&self) -> f64 {
+        self.radius_m
+    }
+
     #[inline(always)]
     pub(super) fn holds(&self, point_B: &Vector3<f64>) -> bool {
         (point_B - self.centre_B).norm_squared() < self.radius_m * self.radius_m

@@ -254,4 +254,4 @@ fn direction(v: &Vector3<f64>, otherwise: impl FnOnce() -> Vector3<f64>) -> (Vec
 /// Bound on the search for a crossing; paths that touch in one point halve their distance each round.
 const MAX_ENTRY_ROUNDS: u32 = 64;
 /// The smallest step over a path past a ring.
-const MARCH: f64 = 1.0 / 64.0;
+pub(super) const MARCH: f64 = 1.0 / 64.0;

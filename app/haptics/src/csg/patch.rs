@@ -276,3 +276,98 @@ impl Curved {
 
 /// A map that changes lengths by less is a turn.
 pub(super) const RIGID: f64 = 1e-14;
+
+#[cfg(test)]
+mod tests {
+    use super::super::kind::MARCH;
+    use super::super::{Csg, CsgPart, CsgTree};
+    use super::*;
+    use crate::capsule::Capsule;
+    use crate::cone::Cone;
+    use crate::cylinder::Cylinder;
+    use crate::sphere::Sphere;
+    use crate::torus::Torus;
+
+    /// A curved patch of each kind, as it is, turned, and scaled.
+    fn patches() -> Vec<Patch> {
+        let pose = nalgebra::Isometry3::new(Vector3::new(0.01, -0.02, 0.005), Vector3::new(0.4, 0.8, -0.3));
+        let parts = [
+            CsgPart::new(Sphere::new(0.03).unwrap(), pose),
+            CsgPart::new(Cylinder::new(0.03, 0.1).unwrap(), pose),
+            CsgPart::new(Cone::new(0.04, 0.01, 0.05).unwrap(), pose),
+            CsgPart::new(Capsule::new(0.02, 0.04).unwrap(), pose),
+            CsgPart::new(Torus::new(0.04, 0.015).unwrap(), pose),
+        ];
+        let scaled = parts.clone().map(|part| part.scaled([1.2, 0.7, 0.9]));
+        let curved = |part| {
+            let csg = Csg::build(&CsgTree::union([part])).unwrap();
+            *csg.patches.iter().find(|patch| !patch.is_plane()).unwrap()
+        };
+        parts.into_iter().chain(scaled).map(curved).collect()
+    }
+
+    fn spread(i: u32) -> Vector3<f64> {
+        let along = |step: f64| 2.0 * (f64::from(i) * step).fract() - 1.0;
+        Vector3::new(along(0.618_034), along(0.414_214), along(0.732_051))
+    }
+
+    #[test]
+    fn a_patch_bends_as_much_as_its_normal_turns() {
+        for (kind, patch) in patches().iter().enumerate() {
+            let mut looked = 0;
+            for i in 0..200 {
+                let (point, from) = (spread(i) * 0.06, Vector3::zeros());
+                let mut foot = point;
+                for _ in 0..50 {
+                    let look = patch.look(&foot, &from);
+                    foot -= look.normal_B * look.height_m;
+                }
+                let normal = patch.look(&foot, &from).normal_B;
+                let [along, towards] =
+                    [spread(2 * i + 1), spread(2 * i + 2)].map(|v| (v - normal * normal.dot(&v)).normalize());
+                let step = 1e-6;
+                let turned = patch.look(&(foot + along * step), &from).normal_B
+                    - patch.look(&(foot - along * step), &from).normal_B;
+                let expected = turned.dot(&towards) / (2.0 * step);
+                let bending = patch.mixed_bending(&foot, &along, &towards);
+                if expected.abs() < 200.0 {
+                    looked += 1;
+                    // Of central differences the error is the step's square over the cube of a radius of 5 mm, and
+                    // rounding over the step.
+                    assert!(
+                        (bending - expected).abs() < 1e-4 + 1e-5 * expected.abs(),
+                        "{kind} {i} {bending} {expected}"
+                    );
+                }
+            }
+            assert!(looked > 100, "{kind}: {looked}");
+        }
+    }
+
+    /// The level's zeros beside what a path's crossings say.
+    #[test]
+    fn crossings_are_where_the_level_changes_its_sign() {
+        for (kind, patch) in patches().iter().enumerate() {
+            let mut found = [0; 5];
+            for i in 0..2000 {
+                let (from, to) = (spread(i) * 0.08, spread(5 * i + 3) * 0.08);
+                let inside = [&from, &to].map(|p| patch.level(p) <= 0.0);
+                let crossings = patch.crossings(&from, &to, inside);
+                let shares = crossings.shares();
+                found[shares.len()] += 1;
+                assert_eq!(shares.len() % 2 == 1, inside[0] != inside[1], "{kind} {i} {shares:?}");
+                for &share in shares {
+                    let level = patch.level(&(from + (to - from) * share));
+                    assert!(level.abs() < 1e-14, "{kind} {i} {level}");
+                }
+                let along = (0..=400).map(|k| patch.level(&(from + (to - from) * (f64::from(k) / 400.0))));
+                let changes =
+                    along.clone().zip(along.clone().skip(1)).filter(|(a, b)| (*a <= 0.0) != (*b <= 0.0));
+                // A path past a ring may miss what is thinner than its smallest step.
+                let is_thin = along.fold(f64::INFINITY, f64::min) > -MARCH * (to - from).norm();
+                assert!(is_thin || shares.len() >= changes.count(), "{kind} {i} {shares:?}");
+            }
+            assert!(found[1] > 30 && found[2] > 50, "{kind}: {found:?}");
+        }
+    }
+}

@@ -224,3 +224,69 @@ fn view_of_edge(
 const MAX_FLIGHTS: u32 = 8;
 /// A HIP this far in front of a patch is free, in terms of the extent: more than a path that ends there is met before it.
 pub(super) const RELEASE: f64 = 4e-12;
+
+#[cfg(test)]
+mod tests {
+    use super::super::{CsgPart, CsgTree};
+    use super::*;
+    use crate::cuboid::Cuboid;
+    use crate::cylinder::Cylinder;
+    use crate::sphere::Sphere;
+
+    /// A plate with a bore, a knob and a dimple.
+    fn plate() -> Csg {
+        let at = |x: f64, z: f64| Vector3::new(x, 0.005, z);
+        let solid = CsgTree::union([
+            CsgPart::from(Cuboid::new([0.06, 0.01, 0.06]).unwrap()),
+            CsgPart::at(Sphere::new(0.004).unwrap(), at(0.01, 0.01)),
+        ]);
+        Csg::build(&CsgTree::difference([
+            CsgPart::from(solid),
+            CsgPart::at(Cylinder::new(0.005, 0.1).unwrap(), at(-0.01, 0.0)),
+            CsgPart::at(Sphere::new(0.004).unwrap(), at(0.012, -0.01)),
+        ]))
+        .unwrap()
+    }
+
+    fn input(hip_B: Vector3<f64>) -> ConeInput {
+        ConeInput {
+            hip_B,
+            hip_velocity_B: Vector3::zeros(),
+            stiffness_n_per_m: 500.0,
+            damping_n_s_per_m: 0.0,
+            dt_s: 1e-3,
+        }
+    }
+
+    #[test]
+    fn in_a_clearing_all_patches_keep_their_side_but_those_that_hold() {
+        let csg = plate();
+        let spread = |i: u32, step: f64| 2.0 * (f64::from(i) * step).fract() - 1.0;
+        let point = |i: u32| Vector3::new(spread(i, 0.618_034), spread(i, 0.414_214), spread(i, 0.732_051));
+        let mut clear = [0; 3];
+        for i in 0..4000 {
+            let hip_B = point(i).component_mul(&Vector3::new(0.03, 0.005, 0.03));
+            let Some(mut god) = csg.is_inside(&hip_B).then(|| way_out(&csg, &hip_B)).flatten() else {
+                continue;
+            };
+            if stand(&csg, &mut god, &input(hip_B)).is_none() || god.clearing.radius_m() == 0.0 {
+                continue;
+            }
+            clear[god.active.count_ones() as usize] += 1;
+            let before = csg.patches.iter().map(|patch| patch.level(&god.point_B) <= 0.0);
+            let held: Vec<_> = god.held_by().map(|index| usize::from(god.near.number(index))).collect();
+            let radius_m = god.clearing.radius_m();
+            for j in 0..20 {
+                let p = god.point_B + point(9 * i + j).normalize() * radius_m * 0.999_999;
+                assert!(god.clearing.holds(&p) && god.near.holds(&p, 0.0));
+                for (number, was_inside) in before.clone().enumerate().filter(|(n, _)| !held.contains(n)) {
+                    let level_m = csg.patches[number].level(&p);
+                    let is_relevant = god.near.position(number as u16).is_some();
+                    assert!(!is_relevant || (level_m <= 0.0) == was_inside, "{number} {level_m} {god:?}");
+                    assert!(!is_relevant || level_m.abs() > csg.tolerance_m());
+                }
+            }
+        }
+        assert!(clear[1] > 1000, "{clear:?}");
+    }
+}
