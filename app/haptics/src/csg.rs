@@ -12,8 +12,9 @@
 //! by [`walk`], its state being the patches that it rests on: one (a primitive of fig. 9.4), two (an edge) or more (a corner).
 //!
 //! Frames and signs: object frame B; normals leave the material; the boundary belongs to the solid.
-//! Cost: independent of the tree while the finger stays in its neighbourhood; a new one looks at each leaf's bounding ball
-//! and at the patches of the leaves nearby. No recursion, no allocation.
+//! Cost: independent of the tree while the finger stays in its neighbourhood; a new one looks at the patches that the
+//! [`cells`] have left of the tree there. In its clearing (see [`god`]) a god-object looks at what holds it only. No
+//! recursion, no allocation.
 //! Limits: of more than eight patches that meet in one point the eight nearest count. Parts thinner than
 //! [`TOLERANCE`] times the solid's extent are not felt. Only fingers that are points feel trees.
 

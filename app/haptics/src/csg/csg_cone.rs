@@ -5,7 +5,7 @@
 //!
 //! Frames: the solid's own, B.
 //! Invariant: between two ticks the finger's path never enters the solid unnoticed.
-//! Cost: free and far, two distances; else see [`super::walk`].
+//! Cost: free and far, two distances; else see [`super::walk`], twice with friction.
 
 use nalgebra::Vector3;
 

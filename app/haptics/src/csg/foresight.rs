@@ -1,14 +1,16 @@
 //! Where a slide over bent patches will end, guessed before it is walked.
 //!
-//! Problem: around the rim of a bore each round of a walk overshoots the bend, and a round looks at everything nearby:
-//! corners, crossings, the solid's cells. Of five to nine of them the patches that hold the god-object would have been enough.
+//! Problem: around the rim of a bore each round of a walk overshoots the bend, and a round looks at what holds the HIP back. Of
+//! five to nine of them the patches that hold the god-object would have been enough.
 //!
-//! Model: along the tangent by what is asked for, divided by the slope that the last step showed, and in the same step back
-//! onto the patches (Newton's method). What friction leaves of the way is taken to grow with the depth, as Coulomb's does.
+//! Model: on one patch, without friction, the slide ends at the HIP's foot. Along the curve of two patches it follows the
+//! circle that the curve bends along (from the patches' own curvatures), on which the place where friction is content
+//! solves a quadratic equation, and in the same step comes back onto the patches; where it is all but straight, Newton's
+//! method. What friction leaves of the way is taken to grow with the depth, as Coulomb's does.
 //!
 //! Frames: object frame B. Invariant: a guess decides nothing: whoever walks there meets what is on the way, and goes on
 //! from there until friction is content.
-//! Cost: at most [`MAX_STEPS`] looks at one or two patches.
+//! Cost: at most [`MAX_STEPS`] looks at one or two patches; on a circular rim two.
 
 use nalgebra::Vector3;
 
@@ -161,8 +163,7 @@ impl Arc {
         let (cos_hip, sin_hip) = (out_m / reach_m, self.lag_m / reach_m);
         let cos = cos_hip * cos_left + sin_hip * sin_left;
         let sin = sin_hip * cos_left - cos_hip * sin_left;
-        // Also what is not a number.
-        if !(cos > BENT) {
+        if cos.is_nan() || cos <= BENT {
             return None;
         }
         Some((self.along_B + inward_B * (sin / (1.0 + cos))) * (radius_m * sin))

@@ -159,4 +159,4 @@ const MAX_CLEAR: usize = 2;
 /// A neighbourhood is asked for this much larger than the way.
 const LARGER: f64 = 4.0;
 /// Radius of a common neighbourhood, in terms of the extent.
-const COMMON: f64 = 0.02;
+const COMMON: f64 = 0.03;

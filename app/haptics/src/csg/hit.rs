@@ -5,7 +5,8 @@
 //! longer than a neighbourhood is followed from one to the next.
 //!
 //! Invariant: a path whose ends lie on different sides of a patch crosses it, whatever rounding says in between.
-//! Cost: two levels for each patch nearby, and one search for each crossing; bounded by [`MAX_PIECES`].
+//! Cost: for each piece a neighbourhood that is found soon, one level for each patch nearby, another of those within
+//! reach, and one search for each crossing; bounded by [`MAX_PIECES`].
 
 use nalgebra::Vector3;
 

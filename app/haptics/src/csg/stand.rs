@@ -21,6 +21,7 @@ use crate::surface::direction_or_up;
 use crate::tangent_view::TangentView;
 
 /// What a god-object sees from where it stands.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Stood {
     pub(super) view: TangentView,
     /// What the two patches of an edge show there, if that is known.

@@ -31,8 +31,8 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
     slider: &Slider<'_, L>,
 ) -> Option<Slid> {
     let input = slider.input;
-    let mut round = slider.look(stood.view, &Vector3::zeros(), &god.point_B);
-    let mut looks = stood.looks;
+    let Stood { view, mut looks } = stood;
+    let mut round = slider.look(view, &Vector3::zeros(), &god.point_B);
     let (mut secant, mut shortened, mut stalls) = (Secant::default(), 1.0, 0);
     let mut longest = f64::NAN;
     // Force ratio with which it already slides: a curve that falls with speed may hold what rests, but not what slides.
