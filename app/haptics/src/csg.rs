@@ -12,18 +12,26 @@
 //! by [`walk`], its state being the patches that it rests on: one (a primitive of fig. 9.4), two (an edge) or more (a corner).
 //!
 //! Frames and signs: object frame B; normals leave the material; the boundary belongs to the solid.
-//! Cost: independent of the tree while the finger stays in its neighbourhood; a new one looks at each leaf's bounding ball
-//! and at the patches of the leaves nearby. No recursion, no allocation.
+//! Cost: independent of the tree while the finger stays in its neighbourhood; a new one looks at the patches that the
+//! [`cells`] have left of the tree there. In its clearing (see [`god`]) a god-object looks at what holds it only. No
+//! recursion, no allocation.
 //! Limits: of more than eight patches that meet in one point the eight nearest count. Parts thinner than
 //! [`TOLERANCE`] times the solid's extent are not felt. Only fingers that are points feel trees.
 
+mod advance;
+mod cells;
 mod corner;
 mod csg_cone;
 mod flatten;
 mod foresight;
+mod god;
 mod hit;
+mod kind;
 mod near;
 mod patch;
+mod pressed_through;
+mod settle;
+mod stand;
 mod tree;
 mod walk;
 mod way_out;
@@ -35,6 +43,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use nalgebra::Vector3;
 
+use cells::Cells;
 use flatten::Flat;
 use patch::Patch;
 
@@ -47,6 +56,8 @@ pub struct Csg {
     items: Box<[Item]>,
     /// The tree in postfix order: no recursion is needed to evaluate it.
     steps: Box<[Step]>,
+    /// The same, by place.
+    cells: Cells,
     extent_m: f64,
     /// Of all solids that this process has built, which.
     identity: u64,
@@ -76,7 +87,8 @@ impl Csg {
     pub fn build(tree: &CsgTree) -> Result<Self, CsgError> {
         let Flat { patches, items, steps, extent_m } = flatten::flatten(tree)?;
         let identity = BUILT.fetch_add(1, Ordering::Relaxed);
-        Ok(Self { patches, items, steps, extent_m, identity })
+        let cells = Cells::build(&patches, &items, &steps, extent_m);
+        Ok(Self { patches, items, steps, cells, extent_m, identity })
     }
 
     /// A bound of the distance to the boundary, negative inside; exact in sign and zero, and never larger than the

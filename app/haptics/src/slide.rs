@@ -40,6 +40,61 @@ pub(crate) struct Slid {
     pub(crate) rounds: u32,
 }
 
+/// What all rounds of one slide have in common.
+pub(crate) struct Slider<'s, L: ?Sized> {
+    pub(crate) friction: &'s L,
+    pub(crate) memory: &'s FrictionMemory,
+    pub(crate) pull: &'s Pull,
+    pub(crate) input: &'s ConeInput,
+    /// Where the god-object was when the tick began.
+    pub(crate) start_B: Vector3<f64>,
+}
+
+impl<L: FrictionLaw + ?Sized> Slider<'_, L> {
+    /// What the law asks of a god-object at `point_B`.
+    #[inline(always)]
+    pub(crate) fn look(
+        &self,
+        view: TangentView,
+        direction_before_B: &Vector3<f64>,
+        point_B: &Vector3<f64>,
+    ) -> Round {
+        let asked = |query: &_| self.friction.slide(query, self.memory);
+        Round::new(view, direction_before_B, asked, &(self.start_B - point_B), self.pull, self.input)
+    }
+
+    /// Inside its circle.
+    #[inline]
+    pub(crate) fn rested(&self, round: &Round, rounds: u32) -> Slid {
+        let query = query(FrictionState::Slip, round.view.gap_m, 0.0, &round.view, self.pull, self.input);
+        let held_m = self.friction.held_limit_m(&query, self.memory);
+        // Where friction grows with speed, the circle that it rests in is larger than the one that holds.
+        let limit_m = held_m.max(round.gap_m - round.asked_m);
+        Slid { view: round.view, tangential_B: cut_to(round.view.lag_B, limit_m), rounds }
+    }
+
+    /// Beyond the rim: inside its circle its own spring is felt, or none if it is past S.
+    #[inline]
+    pub(crate) fn went_too_far(&self, round: &Round, rounds: u32) -> Slid {
+        let slid = self.rested(round, rounds);
+        if round.gap_m > 0.0 { slid } else { Slid { tangential_B: Vector3::zeros(), ..slid } }
+    }
+
+    /// Square of how long the spring is from a point.
+    #[inline]
+    pub(crate) fn stretch(&self, point_B: &Vector3<f64>) -> f64 {
+        (point_B - self.input.hip_B).norm_squared()
+    }
+
+    /// How long the spring may become during a slide that begins at `from_B`, squared.
+    #[inline]
+    pub(crate) fn longest(&self, round: &Round, from_B: &Vector3<f64>) -> f64 {
+        // Bonds bent the other way may ask for a place beyond S.
+        let asked_for = self.stretch(&round.target_B(round.asked_m));
+        asked_for.max(self.stretch(from_B)) * (1.0 + STRETCH_TOLERANCE)
+    }
+}
+
 /// Moves `god_object` until `friction` asks for no more, starting from what `view` shows.
 pub(crate) fn slide<S: Surface + ?Sized, L: FrictionLaw + ?Sized>(
     surface: &S,
@@ -50,41 +105,21 @@ pub(crate) fn slide<S: Surface + ?Sized, L: FrictionLaw + ?Sized>(
     pull: &Pull,
     input: &ConeInput,
 ) -> Slid {
-    let start_B = god_object.point_B;
-    let look = |view, direction_before_B: &Vector3<f64>, god_object: &SurfacePoint| {
-        let asked = |query: &_| friction.slide(query, memory);
-        Round::new(view, direction_before_B, asked, &(start_B - god_object.point_B), pull, input)
-    };
-    let limit_m = |view: &TangentView| {
-        friction.held_limit_m(&query(FrictionState::Slip, view.gap_m, 0.0, view, pull, input), memory)
-    };
-    let rested = |round: &Round, rounds| {
-        // Where friction grows with speed, the circle that it rests in is larger than the one that holds.
-        let limit_m = limit_m(&round.view).max(round.gap_m - round.asked_m);
-        Slid { view: round.view, tangential_B: cut_to(round.view.lag_B, limit_m), rounds }
-    };
-    // A god-object that went too far is inside its circle, and its own spring is felt, or none if it is past S.
-    let went_too_far = |round: &Round, rounds| {
-        let slid = rested(round, rounds);
-        if round.gap_m > 0.0 { slid } else { Slid { tangential_B: Vector3::zeros(), ..slid } }
-    };
-    let mut round = look(view, &Vector3::zeros(), god_object);
+    let slider = Slider { friction, memory, pull, input, start_B: god_object.point_B };
+    let mut round = slider.look(view, &Vector3::zeros(), &god_object.point_B);
     if round.is_inside_the_circle() {
-        return rested(&round, 0);
+        return slider.rested(&round, 0);
     }
     let mut secant = Secant::default();
-    let stretch_at = |point_B: &Vector3<f64>| (point_B - input.hip_B).norm_squared();
-    // Bonds bent the other way may ask for a place beyond S.
-    let longest =
-        stretch_at(&round.target_B(round.asked_m)).max(stretch_at(&start_B)) * (1.0 + STRETCH_TOLERANCE);
+    let longest = slider.longest(&round, &god_object.point_B);
     let mut shortened = 1.0;
     for rounds in 1..=MAX_SLIDE_ROUNDS {
         let step_m = shortened * secant.step(round.asked_m, round.view.depth_m);
         let moved = surface.settle(god_object, &round.target_B(step_m));
-        if stretch_at(&moved.point_B) > longest {
+        if slider.stretch(&moved.point_B) > longest {
             // Flung round the solid, to a farther side of it: a slide must not load the spring.
             if round.asked_m < 0.0 && round.gap_m > 0.0 {
-                return went_too_far(&round, rounds);
+                return slider.went_too_far(&round, rounds);
             }
             shortened *= 0.5;
             continue;
@@ -102,18 +137,22 @@ pub(crate) fn slide<S: Surface + ?Sized, L: FrictionLaw + ?Sized>(
                 return Slid { view, tangential_B: Vector3::zeros(), rounds };
             }
             secant = Secant::default();
-            round = look(view, &Vector3::zeros(), god_object);
+            round = slider.look(view, &Vector3::zeros(), &god_object.point_B);
             if round.is_inside_the_circle() {
-                return rested(&round, rounds);
+                return slider.rested(&round, rounds);
             }
             continue;
         }
-        round = look(view, &round.direction_B, god_object);
+        round = slider.look(view, &round.direction_B, &god_object.point_B);
         if round.asked_m.is_nan() || round.asked_m.abs() <= view.rest_m {
             return round.arrived(rounds);
         }
     }
-    if round.asked_m < 0.0 { went_too_far(&round, MAX_SLIDE_ROUNDS) } else { round.arrived(MAX_SLIDE_ROUNDS) }
+    if round.asked_m < 0.0 {
+        slider.went_too_far(&round, MAX_SLIDE_ROUNDS)
+    } else {
+        round.arrived(MAX_SLIDE_ROUNDS)
+    }
 }
 
 /// One look at the contact during a slide.
@@ -128,7 +167,8 @@ pub(crate) struct Round {
 
 impl Round {
     /// `back_B` leads from the god-object to where it was when the tick began.
-    pub(crate) fn new(
+    #[inline(always)]
+    fn new(
         view: TangentView,
         direction_before_B: &Vector3<f64>,
         asked: impl Fn(&FrictionQuery) -> f64,
@@ -163,11 +203,12 @@ impl Round {
 
     /// The force belongs to the rim that the law asks for; what is left to slide is rounding, or the debt of a search
     /// that met its bound, and must not leave the friction cone, nor pull along with the motion.
-    pub(crate) fn rim_B(&self) -> Vector3<f64> {
+    fn rim_B(&self) -> Vector3<f64> {
         self.direction_B * (self.gap_m - self.asked_m).max(0.0)
     }
 
-    fn arrived(&self, rounds: u32) -> Slid {
+    #[inline]
+    pub(crate) fn arrived(&self, rounds: u32) -> Slid {
         Slid { view: self.view, tangential_B: self.rim_B(), rounds }
     }
 }

@@ -56,6 +56,12 @@ impl Corner {
         }
     }
 
+    /// Where a patch of the neighbourhood is listed here.
+    #[inline(always)]
+    pub(super) fn place(&self, index: usize) -> usize {
+        self.indices[..self.count].iter().position(|&i| i == index).unwrap_or(0)
+    }
+
     /// `sides` of the god-object's own cell; `to_hip_B` leads from the god-object to the HIP. `None` if all is solid.
     pub(super) fn facing(
         &self,
@@ -66,6 +72,26 @@ impl Corner {
     ) -> Option<Facing> {
         let others = sides & !self.spread((1 << self.count) - 1);
         let start = (0..self.count).fold(0, |cell, i| cell | (sides >> self.indices[i] & 1) << i);
+        let is_free = |cell: usize| !near.is_solid(others | self.spread(cell)) && self.has_room(cell);
+        let is_walled_in = (0..self.count).all(|i| near.is_solid(sides ^ 1 << self.indices[i]));
+        if is_walled_in && is_free(start) {
+            // The common case, a concave edge or corner: there is no other cell to go to.
+            let (way_B, mask) = self.nearest(start, to_hip_B);
+            let facing = Facing { sides, active: self.spread(mask), way_B };
+            return Some(if mask == 0 { self.held(near, facing, to_hip_B, release_m) } else { facing });
+        }
+        self.facing_of_many(near, others, start, to_hip_B, release_m)
+    }
+
+    #[inline(never)]
+    fn facing_of_many(
+        &self,
+        near: &Neighbourhood,
+        others: Sides,
+        start: usize,
+        to_hip_B: &Vector3<f64>,
+        release_m: f64,
+    ) -> Option<Facing> {
         let is_free = |cell: usize| !near.is_solid(others | self.spread(cell)) && self.has_room(cell);
         let free =
             (0..1usize << self.count).filter(|&cell| is_free(cell)).fold(0u64, |free, cell| free | 1 << cell);
@@ -131,10 +157,18 @@ impl Corner {
         if self.count == 1 {
             return true;
         }
-        if self.count == 2 && self.normals_B[0].cross(&self.normals_B[1]).norm_squared() > CLEAR * CLEAR {
-            // The common case: two planes that meet in an edge leave four wedges.
-            return true;
-        }
+        // The common cases: two planes that meet in an edge leave four wedges, three that meet in a point eight corners.
+        let [a, b, c, ..] = &self.normals_B;
+        let is_clear = match self.count {
+            2 => a.cross(b).norm_squared() > CLEAR * CLEAR,
+            3 => a.cross(b).dot(c).abs() > CLEAR,
+            _ => false,
+        };
+        is_clear || self.has_room_in_between(cell)
+    }
+
+    #[inline(never)]
+    fn has_room_in_between(&self, cell: usize) -> bool {
         let normal = |i: usize| self.outward(i, cell >> i);
         // A cone has room if one of the directions along its edges and across its faces, all added, is in front of all.
         let mut middle_B = Vector3::zeros();
@@ -161,38 +195,71 @@ impl Corner {
     }
 
     /// The point of a cell nearest to the HIP, and the planes that it lies on.
+    #[inline]
     fn nearest(&self, cell: usize, to_hip_B: &Vector3<f64>) -> (Vector3<f64>, usize) {
-        let normal = |i: usize| self.outward(i, cell >> i);
-        let slack_m = SLACK * to_hip_B.norm();
-        let is_in = |p: &Vector3<f64>, mask: usize| {
-            (0..self.count).all(|k| mask >> k & 1 == 1 || normal(k).dot(p) >= -slack_m)
-        };
-        if (0..self.count).all(|k| normal(k).dot(to_hip_B) >= 0.0) {
-            return (*to_hip_B, 0);
+        let mut normals_B = self.normals_B;
+        for (i, normal_B) in normals_B.iter_mut().enumerate().take(self.count) {
+            *normal_B = self.outward(i, cell >> i);
         }
-        // At the tip, if nowhere else.
-        let mut best = (to_hip_B.norm_squared(), (Vector3::zeros(), (1 << self.count) - 1));
-        let mut offer = |p: Vector3<f64>, mask: usize| {
-            let distance_m2 = (p - to_hip_B).norm_squared();
-            if distance_m2 < best.0 && is_in(&p, mask) {
-                best = (distance_m2, (p, mask));
-            }
-        };
-        for i in 0..self.count {
-            let height_m = normal(i).dot(to_hip_B);
-            if height_m < 0.0 {
-                offer(to_hip_B - normal(i) * height_m, 1 << i);
-            }
-            for j in 0..i {
-                let along_B = normal(i).cross(&normal(j));
-                let length_squared = along_B.norm_squared();
-                if length_squared > SLIT * SLIT {
-                    offer(along_B * (along_B.dot(to_hip_B) / length_squared), 1 << i | 1 << j);
-                }
-            }
+        match self.count {
+            2 => nearest_before(&[normals_B[0], normals_B[1]], to_hip_B),
+            count => nearest_before(&normals_B[..count], to_hip_B),
         }
-        best.1
     }
+}
+
+/// The way to the nearest place on an edge, if nothing but the edge holds the HIP back: all around it is solid.
+#[inline(always)]
+pub(super) fn edge_holds(
+    near: &Neighbourhood,
+    sides: Sides,
+    [first, second]: [usize; 2],
+    outward_B: &[Vector3<f64>; 2],
+    to_hip_B: &Vector3<f64>,
+) -> Option<Vector3<f64>> {
+    let is_walled_in = !near.is_solid(sides)
+        && near.is_solid(sides ^ 1 << first)
+        && near.is_solid(sides ^ 1 << second)
+        && outward_B[0].cross(&outward_B[1]).norm_squared() > CLEAR * CLEAR;
+    if !is_walled_in {
+        return None;
+    }
+    let (way_B, mask) = nearest_before(outward_B, to_hip_B);
+    (mask == 0b11).then_some(way_B)
+}
+
+/// The point in front of all planes through the origin nearest to the HIP, and those that it lies on.
+#[inline(always)]
+fn nearest_before(normals_B: &[Vector3<f64>], to_hip_B: &Vector3<f64>) -> (Vector3<f64>, usize) {
+    let slack_m = SLACK * to_hip_B.norm();
+    let is_in = |p: &Vector3<f64>, mask: usize| {
+        (0..normals_B.len()).all(|k| mask >> k & 1 == 1 || normals_B[k].dot(p) >= -slack_m)
+    };
+    if normals_B.iter().all(|normal_B| normal_B.dot(to_hip_B) >= 0.0) {
+        return (*to_hip_B, 0);
+    }
+    // At the tip, if nowhere else.
+    let mut best = (to_hip_B.norm_squared(), (Vector3::zeros(), (1 << normals_B.len()) - 1));
+    let mut offer = |p: Vector3<f64>, mask: usize| {
+        let distance_m2 = (p - to_hip_B).norm_squared();
+        if distance_m2 < best.0 && is_in(&p, mask) {
+            best = (distance_m2, (p, mask));
+        }
+    };
+    for i in 0..normals_B.len() {
+        let height_m = normals_B[i].dot(to_hip_B);
+        if height_m < 0.0 {
+            offer(to_hip_B - normals_B[i] * height_m, 1 << i);
+        }
+        for j in 0..i {
+            let along_B = normals_B[i].cross(&normals_B[j]);
+            let length_squared = along_B.norm_squared();
+            if length_squared > SLIT * SLIT {
+                offer(along_B * (along_B.dot(to_hip_B) / length_squared), 1 << i | 1 << j);
+            }
+        }
+    }
+    best.1
 }
 
 /// An order of places.

@@ -5,24 +5,26 @@
 //!
 //! Frames: the solid's own, B.
 //! Invariant: between two ticks the finger's path never enters the solid unnoticed.
-//! Cost: free and far, two distances; else see [`super::walk`].
+//! Cost: free and far, two distances; else see [`super::walk`], twice with friction.
 
 use nalgebra::Vector3;
 
 use super::Csg;
+use super::god::God;
 use super::hit::first_hit;
 use super::near::Neighbourhood;
-use super::walk::{God, RELEASE, Walked, holds_outside, stand, walk};
+use super::pressed_through::holds_outside;
+use super::stand::{RELEASE, stand};
+use super::walk::walk;
 use super::way_out::way_out;
 use crate::algorithm::{Touch, TouchInput};
 use crate::friction::Friction;
 use crate::friction_cone::{ConeForce, ConeInput, answer};
-use crate::friction_law::FrictionMemory;
-use crate::friction_law::FrictionState;
+use crate::friction_law::{FrictionLaw, FrictionMemory, FrictionQuery, FrictionState, MEMORY_WORDS};
 use crate::grip::{Grip, Pull};
 use crate::mesh::Beginning;
+use crate::slide::{Slid, Slider};
 use crate::surface::SurfacePoint;
-use crate::tangent_view::TangentView;
 
 /// State of one finger towards one tree.
 #[derive(Debug, Clone, Copy, Default)]
@@ -105,7 +107,7 @@ impl CsgCone {
             None => {
                 let clear_m = csg.signed_distance(from_B);
                 let wish_m = clear_m.max(LARGER * length_m).max(COMMON * csg.extent_m);
-                *self.near.insert(Neighbourhood::around(csg, from_B, wish_m))
+                *self.near.insert(Neighbourhood::amid(csg, from_B, wish_m))
             }
         };
         if near.is_empty() && near.holds(from_B, length_m) {
@@ -139,31 +141,63 @@ impl Touching {
             return Some(self.answer(&walked, input));
         }
         walk_freely(csg, &mut self.shadow, input)?;
-        let view = stand(csg, &mut self.god_object, input)?;
-        let pull = self.grip.begin_tick(&view, input);
-        if let Some(tangential_B) = self.grip.hold(friction, &view, &pull, input) {
-            return Some(self.answer(&Walked { view, tangential_B, rounds: 0 }, input));
+        let stood = stand(csg, &mut self.god_object, input)?;
+        let view = &stood.view;
+        let pull = self.grip.begin_tick(view, input);
+        if let Some(tangential_B) = self.grip.hold(friction, view, &pull, input) {
+            return Some(self.answer(&Slid { view: stood.view, tangential_B, rounds: 0 }, input));
         }
-        let memory = self.grip.memory;
-        let mut walked = walk(csg, &mut self.god_object, view, friction, (&memory, &pull), input)?;
-        walked.tangential_B += self.grip.drag(friction, &walked.tangential_B, &walked.view, &pull, input);
-        Some(self.answer(&walked, input))
+        let slider = Slider {
+            friction,
+            memory: &self.grip.memory,
+            pull: &pull,
+            input,
+            start_B: self.god_object.point_B,
+        };
+        let mut slid = walk(csg, &mut self.god_object, stood, &slider)?;
+        slid.tangential_B += self.grip.drag(friction, &slid.tangential_B, &slid.view, &pull, input);
+        Some(self.answer(&slid, input))
     }
 
-    fn answer(&mut self, walked: &Walked, input: &ConeInput) -> ConeForce {
-        self.normal_B = walked.view.normal_B;
-        answer(&walked.view, &walked.tangential_B, walked.rounds, input)
+    fn answer(&mut self, slid: &Slid, input: &ConeInput) -> ConeForce {
+        self.normal_B = slid.view.normal_B;
+        answer(&slid.view, &slid.tangential_B, slid.rounds, input)
     }
 }
 
 /// The frictionless god-object; `None` if the finger is free.
-fn walk_freely(csg: &Csg, god: &mut God, input: &ConeInput) -> Option<Walked> {
-    let view: TangentView = stand(csg, god, input)?;
-    let walked =
-        walk(csg, god, view, &Friction::None, (&FrictionMemory::default(), &Pull::default()), input)?;
-    holds_outside(csg, god, &walked.view, input).then_some(walked)
+#[inline(always)]
+fn walk_freely(csg: &Csg, god: &mut God, input: &ConeInput) -> Option<Slid> {
+    let stood = stand(csg, god, input)?;
+    let slider = Slider {
+        friction: &Frictionless,
+        memory: &NOTHING,
+        pull: &Pull::default(),
+        input,
+        start_B: god.point_B,
+    };
+    let slid = walk(csg, god, stood, &slider)?;
+    holds_outside(csg, god, &slid.view, input).then_some(slid)
 }
 
+/// [`Friction::None`] without its name being looked up.
+struct Frictionless;
+
+impl FrictionLaw for Frictionless {
+    fn holds(&self, _query: &FrictionQuery, _memory: &mut FrictionMemory) -> bool {
+        false
+    }
+
+    fn slide(&self, query: &FrictionQuery, _memory: &FrictionMemory) -> f64 {
+        query.gap_m
+    }
+
+    fn held_limit_m(&self, _query: &FrictionQuery, _memory: &FrictionMemory) -> f64 {
+        0.0
+    }
+}
+
+const NOTHING: FrictionMemory = FrictionMemory { words: [0.0; MEMORY_WORDS] };
 /// A neighbourhood is asked for this much larger than a tick's path, at least.
 const LARGER: f64 = 1.5;
 /// Radius of a common neighbourhood, in terms of the extent.

@@ -7,7 +7,8 @@
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
-use super::patch::{Curved, Kind, Patch};
+use super::kind::Kind;
+use super::patch::{Curved, Patch, RIGID};
 use super::tree::{CsgError, CsgPart, CsgTree, MAX_DEPTH, MAX_LEAVES, PartShape};
 use super::{Item, Step};
 use crate::capsule::Capsule;
@@ -193,7 +194,7 @@ impl Flattening {
             turn_LB = Matrix3::identity();
         }
         let shift_L = -turn_LB * map.shift_B;
-        self.patches.push(Patch::Curved(Curved { kind, turn_LB, shift_L, stretch }));
+        self.patches.push(Patch::Curved(Curved::new(kind, turn_LB, shift_L, stretch)));
     }
 }
 
@@ -271,7 +272,5 @@ const SAMPLES: usize = 16;
 /// Surfaces nearer to each other than this share of the extent are one: more than what a scene's decimals leave, and the
 /// size of an atom on a solid of 0.1 m.
 const SAME: f64 = 1e-9;
-/// A map that changes lengths by less is a turn.
-const RIGID: f64 = 1e-14;
 
 const _: () = assert!(6 * MAX_LEAVES <= u16::MAX as usize);

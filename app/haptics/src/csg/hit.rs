@@ -5,12 +5,13 @@
 //! longer than a neighbourhood is followed from one to the next.
 //!
 //! Invariant: a path whose ends lie on different sides of a patch crosses it, whatever rounding says in between.
-//! Cost: two levels for each patch nearby, and one search for each crossing; bounded by [`MAX_PIECES`].
+//! Cost: for each piece a neighbourhood that is found soon, one level for each patch nearby, another of those within
+//! reach, and one search for each crossing; bounded by [`MAX_PIECES`].
 
 use nalgebra::Vector3;
 
 use super::Csg;
-use super::near::{Neighbourhood, Sides};
+use super::near::{MAX_NEAR, Neighbourhood, Sides};
 
 /// Where a path entered the solid.
 #[derive(Debug, Clone, Copy)]
@@ -33,7 +34,7 @@ pub(super) struct Events {
 /// Eight patches, each crossed twice; a path through more rings than two is followed in parts.
 const MAX_EVENTS: usize = 24;
 /// Neighbourhoods that a path is followed through within one tick.
-const MAX_PIECES: u32 = 64;
+const MAX_PIECES: u32 = 256;
 
 /// Where a path first enters the solid, beginning `sides` in `near`.
 pub(super) fn first_hit(
@@ -47,46 +48,28 @@ pub(super) fn first_hit(
     for _ in 0..MAX_PIECES {
         let path_B = to_B - from_B;
         let length_m = path_B.norm();
-        if !near.holds(&from_B, length_m.min(0.25 * near.radius_m)) {
-            let before = near;
+        let before = near;
+        let is_left = !near.holds(&from_B, length_m.min(0.25 * near.radius_m));
+        if is_left {
             // Through a crowd it is followed in pieces as small as the last one.
             let wish_m = (LARGER * length_m).min(GROWTH * near.radius_m.max(COMMON * csg.extent_m));
-            near = Neighbourhood::around(csg, &from_B, wish_m);
-            sides = near.sides_after(csg, &from_B, &before, sides);
+            near = Neighbourhood::amid(csg, &from_B, wish_m);
         }
-        let room_m = (near.radius_m - (from_B - near.anchor_B).norm()) * (1.0 - 1e-9);
+        let levels_m = near.levels_m(csg, &from_B);
+        if is_left {
+            sides = near.sides_known(csg, &levels_m, &before, sides);
+        }
+        let room_m = near.room_m(&from_B);
         let is_last = length_m <= room_m;
         let end_B = if is_last { *to_B } else { from_B + path_B * (room_m / length_m) };
-        if let Some(hit) = hit_within(csg, &near, &mut sides, &from_B, &end_B) {
+        let events = Events::between(csg, &near, &levels_m, sides, 0, &from_B, &end_B);
+        if let Some(hit) = events.first_hit(&near, &mut sides, &from_B, &end_B) {
             return Some(hit);
         }
         if is_last || length_m.is_nan() {
             return None;
         }
         from_B = end_B;
-    }
-    None
-}
-
-fn hit_within(
-    csg: &Csg,
-    near: &Neighbourhood,
-    sides: &mut Sides,
-    from_B: &Vector3<f64>,
-    to_B: &Vector3<f64>,
-) -> Option<Hit> {
-    if near.is_empty() {
-        return None;
-    }
-    let events = Events::along(csg, near, *sides, 0, from_B, to_B);
-    for (share, index) in events.iter() {
-        let was_free = !near.is_solid(*sides);
-        let before = *sides;
-        *sides ^= 1 << index;
-        if was_free && near.is_solid(*sides) {
-            let point_B = from_B + (to_B - from_B) * share;
-            return Some(Hit { point_B, near: *near, sides: before, patch: 1 << index });
-        }
     }
     None
 }
@@ -102,11 +85,30 @@ impl Events {
         from_B: &Vector3<f64>,
         to_B: &Vector3<f64>,
     ) -> Self {
+        Self::between(csg, near, &near.levels_m(csg, from_B), sides, skip, from_B, to_B)
+    }
+
+    /// The same, of a path that begins at these levels.
+    #[inline]
+    fn between(
+        csg: &Csg,
+        near: &Neighbourhood,
+        levels_m: &[f64; MAX_NEAR],
+        sides: Sides,
+        skip: Sides,
+        from_B: &Vector3<f64>,
+        to_B: &Vector3<f64>,
+    ) -> Self {
         let mut events = Self { events: [(0.0, 0); MAX_EVENTS], count: 0 };
         let length_m = (to_B - from_B).norm();
         for index in (0..near.count()).filter(|index| skip >> index & 1 == 0) {
+            let before = levels_m[index];
+            if before.abs() > length_m + csg.tolerance_m() {
+                // Levels are no steeper than one.
+                continue;
+            }
             let patch = near.patch(csg, index);
-            let [before, after] = [patch.level(from_B), patch.level(to_B)];
+            let after = patch.level(to_B);
             let starts_inside = sides >> index & 1 == 1;
             let beyond_m = if starts_inside { after } else { -after };
             // Who starts on a patch has left it when rounding can no longer have done it.
@@ -120,6 +122,26 @@ impl Events {
             }
         }
         events
+    }
+
+    /// The first of them that leads into the solid; `sides` follows.
+    fn first_hit(
+        &self,
+        near: &Neighbourhood,
+        sides: &mut Sides,
+        from_B: &Vector3<f64>,
+        to_B: &Vector3<f64>,
+    ) -> Option<Hit> {
+        for (share, index) in self.iter() {
+            let was_free = !near.is_solid(*sides);
+            let before = *sides;
+            *sides ^= 1 << index;
+            if was_free && near.is_solid(*sides) {
+                let point_B = from_B + (to_B - from_B) * share;
+                return Some(Hit { point_B, near: *near, sides: before, patch: 1 << index });
+            }
+        }
+        None
     }
 
     fn push(&mut self, share: f64, index: usize) {
@@ -149,8 +171,13 @@ impl Neighbourhood {
         before: &Self,
         sides: Sides,
     ) -> Sides {
+        self.sides_known(csg, &self.levels_m(csg, point_B), before, sides)
+    }
+
+    /// The same, of a point with these levels.
+    fn sides_known(&self, csg: &Csg, levels_m: &[f64; MAX_NEAR], before: &Self, sides: Sides) -> Sides {
         (0..self.count()).fold(0, |here, index| {
-            let level = self.patch(csg, index).level(point_B);
+            let level = levels_m[index];
             let is_on = level.abs() <= csg.tolerance_m();
             let known = before.position(self.number(index)).filter(|_| is_on);
             let is_inside = known.map_or(level <= 0.0, |place| sides >> place & 1 == 1);

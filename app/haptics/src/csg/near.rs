@@ -7,12 +7,13 @@
 //!
 //! Invariants: a patch that is not listed keeps its side within the ball. If more than eight are near, the ball is as
 //! small as it must be for eight, but not smaller than [`SMALLEST`].
-//! Cost: a ball test per leaf, a level per patch of the leaves nearby; seldom twice.
+//! Cost: a level per patch of the [cell](super::cells) there; seldom twice.
 
 use nalgebra::Vector3;
 
+use super::cells::{CellStep, Part};
 use super::patch::Patch;
-use super::{Csg, CsgOp, Item, STACK, Step};
+use super::{Csg, CsgOp, Item, STACK};
 
 /// The patches near an anchor, and the solid in terms of their sides.
 #[derive(Debug, Clone, Copy)]
@@ -38,11 +39,44 @@ pub(super) const MAX_NEAR: usize = 8;
 impl Neighbourhood {
     /// All that matters within `wish_m` of a point, or within less if that would be too much.
     pub(super) fn around(csg: &Csg, anchor_B: &Vector3<f64>, wish_m: f64) -> Self {
+        Self::at_least(csg, anchor_B, wish_m, wish_m)
+    }
+
+    /// As [`Self::around`] within `need_m`; up to `wish_m` where that takes no longer.
+    pub(super) fn at_least(csg: &Csg, anchor_B: &Vector3<f64>, need_m: f64, wish_m: f64) -> Self {
+        let (mut here, is_crowded) = Self::soon(csg, anchor_B, wish_m);
+        // It grows until it is crowded: to look at all of a large ball first would take longer.
+        let mut radius_m = here.radius_m;
+        for _ in 0..MAX_TRIES {
+            if is_crowded || radius_m >= need_m {
+                break;
+            }
+            radius_m *= GROWTH;
+            match gather(csg, anchor_B, radius_m, false) {
+                Ok(larger) => here = larger,
+                Err(ninth_m) => {
+                    let largest = gather(csg, anchor_B, ninth_m * JUST_BELOW, false);
+                    return largest.unwrap_or(here);
+                }
+            }
+        }
+        here
+    }
+
+    /// All that matters within `wish_m` of a point, or within less where that would be too much or would take longer.
+    pub(super) fn amid(csg: &Csg, anchor_B: &Vector3<f64>, wish_m: f64) -> Self {
+        Self::soon(csg, anchor_B, wish_m).0
+    }
+
+    /// What is found soon, and whether it is as large as it can be.
+    fn soon(csg: &Csg, anchor_B: &Vector3<f64>, wish_m: f64) -> (Self, bool) {
         let smallest_m = SMALLEST * csg.extent_m;
         let mut radius_m = wish_m.max(smallest_m);
-        for _ in 0..MAX_TRIES {
-            match gather(csg, anchor_B, radius_m, false) {
-                Ok(neighbourhood) => return neighbourhood,
+        for tries in 0..MAX_TRIES {
+            let part = csg.cells.part(anchor_B, radius_m, CROWD);
+            radius_m = radius_m.min(part.reach_m);
+            match gather_from(csg, &part, anchor_B, radius_m, false) {
+                Ok(neighbourhood) => return (neighbourhood, tries > 0),
                 // Just below the ninth, or a part of it if that cannot be told.
                 Err(ninth_m) if ninth_m < radius_m => radius_m = ninth_m * JUST_BELOW,
                 Err(_) => radius_m *= 0.25,
@@ -51,15 +85,21 @@ impl Neighbourhood {
                 break;
             }
         }
-        gather(csg, anchor_B, smallest_m, true).unwrap_or(Self::nowhere(anchor_B))
+        (gather(csg, anchor_B, smallest_m, true).unwrap_or(Self::nowhere(anchor_B)), true)
     }
 
     fn nowhere(anchor_B: &Vector3<f64>) -> Self {
         Self { anchor_B: *anchor_B, radius_m: 0.0, patches: [0; MAX_NEAR], count: 0, table: NOTHING }
     }
 
+    #[inline]
     pub(super) fn holds(&self, point_B: &Vector3<f64>, reach_m: f64) -> bool {
         (point_B - self.anchor_B).norm() + reach_m <= self.radius_m
+    }
+
+    /// How far a point may go without leaving it (m).
+    pub(super) fn room_m(&self, point_B: &Vector3<f64>) -> f64 {
+        (self.radius_m - (point_B - self.anchor_B).norm()) * (1.0 - 1e-9)
     }
 
     /// How many patches it lists.
@@ -93,6 +133,16 @@ impl Neighbourhood {
         self.table == [0; 4]
     }
 
+    /// Of the listed patches, at a point.
+    #[inline(always)]
+    pub(super) fn levels_m(&self, csg: &Csg, point_B: &Vector3<f64>) -> [f64; MAX_NEAR] {
+        let mut levels_m = [f64::INFINITY; MAX_NEAR];
+        for (index, level_m) in levels_m.iter_mut().enumerate().take(self.count) {
+            *level_m = self.patch(csg, index).level(point_B);
+        }
+        levels_m
+    }
+
     /// The sides of a point.
     #[inline(always)]
     pub(super) fn sides(&self, csg: &Csg, point_B: &Vector3<f64>) -> Sides {
@@ -104,28 +154,44 @@ impl Neighbourhood {
 
 /// The patches within a radius, or from which distance on there would be too many.
 fn gather(csg: &Csg, anchor_B: &Vector3<f64>, radius_m: f64, keep_eight: bool) -> Result<Neighbourhood, f64> {
+    gather_from(csg, &csg.cells.part(anchor_B, radius_m, u32::MAX), anchor_B, radius_m, keep_eight)
+}
+
+fn gather_from(
+    csg: &Csg,
+    part: &Part<'_>,
+    anchor_B: &Vector3<f64>,
+    radius_m: f64,
+    keep_eight: bool,
+) -> Result<Neighbourhood, f64> {
     let mut here = Neighbourhood { radius_m, ..Neighbourhood::nowhere(anchor_B) };
     let mut crowd = Crowd::default();
-    let mut stack = [[0; 4]; STACK];
+    let leaf = |first, count| leaf(csg, &mut here, &mut crowd, part.items(first, count), keep_eight);
+    // A stack is as deep as there are leaves, at the most; most parts have few.
+    let table = if part.steps.len() < 2 * FEW {
+        evaluated::<FEW>(part.steps, leaf)
+    } else {
+        evaluated::<STACK>(part.steps, leaf)
+    };
+    if crowd.is_too_large && !keep_eight {
+        return Err(crowd.ninth_m());
+    }
+    here.table = table;
+    Ok(here)
+}
+
+/// For every combination of sides whether that is inside, from what is inside the leaves.
+#[inline(always)]
+fn evaluated<const DEPTH: usize>(steps: &[CellStep], mut leaf: impl FnMut(u32, u32) -> Table) -> Table {
+    let mut stack = [NOTHING; DEPTH];
     let mut top = 0;
-    let mut steps = &csg.steps[..];
-    while let [step, rest @ ..] = steps {
-        steps = rest;
+    for step in steps {
         match *step {
-            Step::Leaf { centre_B, radius_m: leaf_m, first, count } => {
-                let reach_m = leaf_m + here.radius_m;
-                let is_near = (anchor_B - centre_B).norm_squared() <= reach_m * reach_m;
-                if let (false, [Step::Join(CsgOp::Union | CsgOp::Difference), after @ ..]) = (is_near, rest) {
-                    // Nothing added, or nothing taken away: of many leaves most.
-                    steps = after;
-                    continue;
-                }
-                let items = &csg.items[first as usize..(first + count) as usize];
-                stack[top] =
-                    if is_near { leaf(csg, &mut here, &mut crowd, items, keep_eight) } else { NOTHING };
+            CellStep::Leaf { first, count } => {
+                stack[top] = leaf(first, count);
                 top += 1;
             }
-            Step::Join(op) => {
+            CellStep::Join(op) => {
                 let (a, b) = (stack[top - 2], stack[top - 1]);
                 stack[top - 2] = match op {
                     CsgOp::Union => std::array::from_fn(|i| a[i] | b[i]),
@@ -136,11 +202,7 @@ fn gather(csg: &Csg, anchor_B: &Vector3<f64>, radius_m: f64, keep_eight: bool) -
             }
         }
     }
-    if crowd.is_too_large && !keep_eight {
-        return Err(crowd.ninth_m());
-    }
-    here.table = stack[0];
-    Ok(here)
+    stack[0]
 }
 
 /// Whether a leaf is inside, for every combination of sides.
@@ -181,30 +243,44 @@ fn leaf(csg: &Csg, here: &mut Neighbourhood, crowd: &mut Crowd, items: &[Item], 
 
 impl Neighbourhood {
     fn list(&mut self, number: u16, height_m: f64, crowd: &mut Crowd) -> Option<usize> {
-        crowd.add(number, height_m);
         if self.count == MAX_NEAR {
-            crowd.is_too_large = true;
+            crowd.overflow(&self.patches, number, height_m);
             return None;
         }
         self.patches[self.count] = number;
+        crowd.heights_m[self.count] = height_m;
         self.count += 1;
         Some(self.count - 1)
     }
 }
 
-/// The nearest nine: the ninth decides how large a neighbourhood can be.
+/// The nearest nine, if there are as many: the ninth decides how large a neighbourhood can be.
 struct Crowd {
+    /// Of those that are listed.
+    heights_m: [f64; MAX_NEAR],
     nearest: [(f64, u16); MAX_NEAR + 1],
     is_too_large: bool,
 }
 
 impl Default for Crowd {
     fn default() -> Self {
-        Self { nearest: [(f64::INFINITY, u16::MAX); MAX_NEAR + 1], is_too_large: false }
+        let nearest = [(f64::INFINITY, u16::MAX); MAX_NEAR + 1];
+        Self { heights_m: [f64::INFINITY; MAX_NEAR], nearest, is_too_large: false }
     }
 }
 
 impl Crowd {
+    /// Takes note of one more than can be listed.
+    fn overflow(&mut self, listed: &[u16; MAX_NEAR], number: u16, height_m: f64) {
+        if !self.is_too_large {
+            self.is_too_large = true;
+            for (index, &number) in listed.iter().enumerate() {
+                self.add(number, self.heights_m[index]);
+            }
+        }
+        self.add(number, height_m);
+    }
+
     /// Patches beyond the eighth are not listed, and may come twice.
     fn add(&mut self, number: u16, height_m: f64) {
         if self.nearest.iter().any(|&(_, known)| known == number) {
@@ -225,6 +301,8 @@ impl Crowd {
 
 /// The most patches of a leaf: a box has as many.
 const MAX_ITEMS: usize = 6;
+/// Leaves of a common part.
+const FEW: usize = 6;
 const NOTHING: Table = [0; 4];
 const EVERYTHING: Table = [u64::MAX; 4];
 /// For each patch, the combinations in which one is inside of it.
@@ -242,6 +320,10 @@ const SIDES: [Table; MAX_NEAR] = [
 const MAX_TRIES: u32 = 16;
 /// No neighbourhood is smaller, in terms of the solid's extent.
 const SMALLEST: f64 = 1e-8;
+/// How much larger the next ball is that is tried.
+const GROWTH: f64 = 2.0;
+/// With more patches than this in a cell a neighbourhood would probably be too crowded.
+const CROWD: u32 = 16;
 /// So that the ninth nearest is outside.
 const JUST_BELOW: f64 = 1.0 - 1e-9;
 

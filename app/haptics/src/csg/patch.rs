@@ -14,8 +14,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::convex::{around_y, direction_or};
-use crate::surface::SMALLEST_LENGTH_M;
+use super::kind::{Axes, Kind};
 
 /// A smooth surface with an inside.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,42 +27,24 @@ pub(crate) enum Patch {
     Curved(Curved),
 }
 
-/// A curved surface: its equation in L, and the way from B to there.
+/// A curved surface: its equation, and the way from B to its frame L.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Curved {
-    pub(crate) kind: Kind,
+    kind: Kind,
     /// `p_L = turn * p_B + shift`; it may scale, too.
-    pub(crate) turn_LB: Matrix3<f64>,
-    pub(crate) shift_L: Vector3<f64>,
+    turn_LB: Matrix3<f64>,
+    shift_L: Vector3<f64>,
     /// How much the map stretches at the most: levels of B are those of L divided by it.
-    pub(crate) stretch: f64,
+    stretch: f64,
+    /// If the map only turns and shifts, the equation serves in B.
+    place: Option<Place>,
 }
 
-/// A curved surface in its own frame.
+/// A surface's origin and axes in B.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Kind {
-    Ball {
-        radius_m: f64,
-    },
-    /// The side of a cylinder without end around y.
-    Tube {
-        radius_m: f64,
-    },
-    /// The side of a cone without end around y: `normal_rho * rho + normal_y * y <= offset`.
-    Nappe {
-        normal_rho: f64,
-        normal_y: f64,
-        offset_m: f64,
-    },
-    Ring {
-        ring_radius_m: f64,
-        tube_radius_m: f64,
-    },
-    /// All within a radius of a piece of the y axis.
-    Pill {
-        radius_m: f64,
-        half_length_m: f64,
-    },
+struct Place {
+    centre_B: Vector3<f64>,
+    axes: Axes,
 }
 
 /// What a patch shows of a point.
@@ -90,6 +71,15 @@ impl Patch {
         matches!(self, Self::Plane { .. })
     }
 
+    /// Whether heights are distances, everywhere: it is not scaled.
+    #[inline(always)]
+    pub(crate) fn is_distance(&self) -> bool {
+        match self {
+            Self::Plane { .. } => true,
+            Self::Curved(curved) => curved.place.is_some(),
+        }
+    }
+
     /// Negative inside, zero on the surface; no steeper than one.
     #[inline(always)]
     pub(crate) fn level(&self, point_B: &Vector3<f64>) -> f64 {
@@ -107,6 +97,27 @@ impl Patch {
                 Look { height_m: normal_B.dot(point_B) - offset_m, normal_B: *normal_B }
             }
             Self::Curved(curved) => curved.look(point_B, seen_from_B),
+        }
+    }
+
+    /// How much the surface is bent in a direction along it, at a point of it: the normal turns by as much per length
+    /// (1/m). Positive where it is convex; not finite where it has no normal.
+    #[inline(always)]
+    pub(crate) fn bending(&self, at_B: &Vector3<f64>, along_B: &Vector3<f64>) -> f64 {
+        self.mixed_bending(at_B, along_B, along_B)
+    }
+
+    /// As [`Self::bending`], of two directions: how much the normal turns towards one on the way along the other (1/m).
+    #[inline(always)]
+    pub(crate) fn mixed_bending(
+        &self,
+        at_B: &Vector3<f64>,
+        along_B: &Vector3<f64>,
+        towards_B: &Vector3<f64>,
+    ) -> f64 {
+        match self {
+            Self::Plane { .. } => 0.0,
+            Self::Curved(curved) => curved.bending(at_B, along_B, towards_B),
         }
     }
 
@@ -141,7 +152,7 @@ impl Patch {
 }
 
 impl Crossings {
-    fn push(&mut self, share: f64) {
+    pub(super) fn push(&mut self, share: f64) {
         if let Some(place) = self.shares.get_mut(self.count) {
             *place = share.clamp(0.0, 1.0);
             self.count += 1;
@@ -154,29 +165,76 @@ impl Crossings {
 }
 
 impl Curved {
+    /// `stretch` is the largest length that the turn gives a vector of length one.
+    pub(super) fn new(kind: Kind, turn_LB: Matrix3<f64>, shift_L: Vector3<f64>, stretch: f64) -> Self {
+        let is_rigid = (turn_LB.tr_mul(&turn_LB) - Matrix3::identity()).amax() < RIGID;
+        let axis = |row: usize| turn_LB.row(row).transpose();
+        let place = is_rigid
+            .then(|| Place { centre_B: -turn_LB.tr_mul(&shift_L), axes: Axes { y: axis(1), x: axis(0) } });
+        Self { kind, turn_LB, shift_L, stretch, place }
+    }
+
+    /// A point as seen from the surface's origin, along B if that will do.
+    #[inline(always)]
+    fn seen(&self, point_B: &Vector3<f64>) -> Vector3<f64> {
+        match &self.place {
+            Some(place) => point_B - place.centre_B,
+            None => self.local(point_B),
+        }
+    }
+
     fn local(&self, point_B: &Vector3<f64>) -> Vector3<f64> {
         self.turn_LB * point_B + self.shift_L
     }
 
     #[inline(always)]
+    fn axes(&self) -> &Axes {
+        self.place.as_ref().map_or(&Axes::UPRIGHT, |place| &place.axes)
+    }
+
+    #[inline(always)]
     fn level(&self, point_B: &Vector3<f64>) -> f64 {
-        self.kind.level(&self.local(point_B)) / self.stretch
+        match &self.place {
+            Some(place) => self.kind.level(&(point_B - place.centre_B), &place.axes),
+            None => self.kind.level(&self.seen(point_B), &Axes::UPRIGHT) / self.stretch,
+        }
     }
 
     #[inline(always)]
     fn look(&self, point_B: &Vector3<f64>, seen_from_B: &Vector3<f64>) -> Look {
-        let point_L = self.local(point_B);
-        let height = self.kind.level(&point_L);
-        let gradient_L = self.kind.gradient(&point_L, &self.local(seen_from_B));
-        let gradient_B = self.turn_LB.tr_mul(&gradient_L);
+        if let Some(Place { centre_B, axes }) = &self.place {
+            let (height_m, normal_B) = self.kind.look(&(point_B - centre_B), axes, || seen_from_B - centre_B);
+            return Look { height_m, normal_B };
+        }
+        let (height, gradient_B) = self.mapped(point_B, seen_from_B);
         let slope = gradient_B.norm();
         Look { height_m: height / slope, normal_B: gradient_B / slope }
+    }
+
+    /// Level in L, and its gradient along B.
+    #[inline(never)]
+    fn mapped(&self, point_B: &Vector3<f64>, seen_from_B: &Vector3<f64>) -> (f64, Vector3<f64>) {
+        let seen_from = || self.seen(seen_from_B);
+        let (height, gradient_L) = self.kind.look(&self.seen(point_B), &Axes::UPRIGHT, seen_from);
+        (height, self.turn_LB.tr_mul(&gradient_L))
+    }
+
+    #[inline(always)]
+    fn bending(&self, at_B: &Vector3<f64>, along_B: &Vector3<f64>, towards_B: &Vector3<f64>) -> f64 {
+        if let Some(Place { centre_B, axes }) = &self.place {
+            return self.kind.bending(&(at_B - centre_B), axes, along_B, towards_B);
+        }
+        let at_L = self.local(at_B);
+        let (along_L, towards_L) = (self.turn_LB * along_B, self.turn_LB * towards_B);
+        let (_, gradient_B) = self.mapped(at_B, at_B);
+        self.kind.bending(&at_L, &Axes::UPRIGHT, &along_L, &towards_L) / gradient_B.norm()
     }
 
     fn smallest_radius_m(&self, at_B: &Vector3<f64>) -> f64 {
         // A map that stretches makes sharper at most by its square, over its least stretch; here that of the rigid or
         // evenly scaled patch, and of others a lower bound.
-        self.kind.smallest_radius(&self.local(at_B)) * self.least_stretch() / (self.stretch * self.stretch)
+        self.kind.smallest_radius(&self.seen(at_B), self.axes()) * self.least_stretch()
+            / (self.stretch * self.stretch)
     }
 
     fn least_stretch(&self) -> f64 {
@@ -193,20 +251,20 @@ impl Curved {
         is_inside: [bool; 2],
         crossings: &mut Crossings,
     ) {
-        let (from_L, to_L) = (self.local(from_B), self.local(to_B));
+        let (from_L, to_L, axes) = (self.seen(from_B), self.seen(to_B), self.axes());
         if matches!(self.kind, Kind::Ring { .. }) {
-            self.kind.march(&from_L, &to_L, is_inside, crossings);
+            self.kind.march(axes, &from_L, &to_L, is_inside, crossings);
             return;
         }
         let [starts_inside, ends_inside] = is_inside;
         let entry = match is_inside {
-            [false, true] => Some(self.kind.entry(&from_L, &to_L).unwrap_or(1.0)),
-            [false, false] => self.kind.entry(&from_L, &to_L),
+            [false, true] => Some(self.kind.entry(axes, &from_L, &to_L).unwrap_or(1.0)),
+            [false, false] => self.kind.entry(axes, &from_L, &to_L),
             _ => None,
         };
         // Leaving is entering on the way back.
         let exit = (!ends_inside && (starts_inside || entry.is_some()))
-            .then(|| 1.0 - self.kind.entry(&to_L, &from_L).unwrap_or(1.0));
+            .then(|| 1.0 - self.kind.entry(axes, &to_L, &from_L).unwrap_or(1.0));
         if let (false, Some(entry), Some(exit)) = (starts_inside, entry, exit)
             && exit <= entry
         {
@@ -216,133 +274,100 @@ impl Curved {
     }
 }
 
-impl Kind {
-    #[inline(always)]
-    fn level(&self, p: &Vector3<f64>) -> f64 {
-        match *self {
-            Self::Ball { radius_m } => p.norm() - radius_m,
-            Self::Tube { radius_m } => rho(p) - radius_m,
-            Self::Nappe { normal_rho, normal_y, offset_m } => normal_rho * rho(p) + normal_y * p.y - offset_m,
-            Self::Ring { ring_radius_m, tube_radius_m } => {
-                let across = rho(p) - ring_radius_m;
-                (across * across + p.y * p.y).sqrt() - tube_radius_m
+/// A map that changes lengths by less is a turn.
+pub(super) const RIGID: f64 = 1e-14;
+
+#[cfg(test)]
+mod tests {
+    use super::super::kind::MARCH;
+    use super::super::{Csg, CsgPart, CsgTree};
+    use super::*;
+    use crate::capsule::Capsule;
+    use crate::cone::Cone;
+    use crate::cylinder::Cylinder;
+    use crate::sphere::Sphere;
+    use crate::torus::Torus;
+
+    /// A curved patch of each kind, as it is, turned, and scaled.
+    fn patches() -> Vec<Patch> {
+        let pose = nalgebra::Isometry3::new(Vector3::new(0.01, -0.02, 0.005), Vector3::new(0.4, 0.8, -0.3));
+        let parts = [
+            CsgPart::new(Sphere::new(0.03).unwrap(), pose),
+            CsgPart::new(Cylinder::new(0.03, 0.1).unwrap(), pose),
+            CsgPart::new(Cone::new(0.04, 0.01, 0.05).unwrap(), pose),
+            CsgPart::new(Capsule::new(0.02, 0.04).unwrap(), pose),
+            CsgPart::new(Torus::new(0.04, 0.015).unwrap(), pose),
+        ];
+        let scaled = parts.clone().map(|part| part.scaled([1.2, 0.7, 0.9]));
+        let curved = |part| {
+            let csg = Csg::build(&CsgTree::union([part])).unwrap();
+            *csg.patches.iter().find(|patch| !patch.is_plane()).unwrap()
+        };
+        parts.into_iter().chain(scaled).map(curved).collect()
+    }
+
+    fn spread(i: u32) -> Vector3<f64> {
+        let along = |step: f64| 2.0 * (f64::from(i) * step).fract() - 1.0;
+        Vector3::new(along(0.618_034), along(0.414_214), along(0.732_051))
+    }
+
+    #[test]
+    fn a_patch_bends_as_much_as_its_normal_turns() {
+        for (kind, patch) in patches().iter().enumerate() {
+            let mut looked = 0;
+            for i in 0..200 {
+                let (point, from) = (spread(i) * 0.06, Vector3::zeros());
+                let mut foot = point;
+                for _ in 0..50 {
+                    let look = patch.look(&foot, &from);
+                    foot -= look.normal_B * look.height_m;
+                }
+                let normal = patch.look(&foot, &from).normal_B;
+                let [along, towards] =
+                    [spread(2 * i + 1), spread(2 * i + 2)].map(|v| (v - normal * normal.dot(&v)).normalize());
+                let step = 1e-6;
+                let turned = patch.look(&(foot + along * step), &from).normal_B
+                    - patch.look(&(foot - along * step), &from).normal_B;
+                let expected = turned.dot(&towards) / (2.0 * step);
+                let bending = patch.mixed_bending(&foot, &along, &towards);
+                if expected.abs() < 200.0 {
+                    looked += 1;
+                    // Of central differences the error is the step's square over the cube of a radius of 5 mm, and
+                    // rounding over the step.
+                    assert!(
+                        (bending - expected).abs() < 1e-4 + 1e-5 * expected.abs(),
+                        "{kind} {i} {bending} {expected}"
+                    );
+                }
             }
-            Self::Pill { radius_m, half_length_m } => (p - core(p, half_length_m)).norm() - radius_m,
+            assert!(looked > 100, "{kind}: {looked}");
         }
     }
 
-    /// Of unit length.
-    #[inline(always)]
-    fn gradient(&self, p: &Vector3<f64>, seen_from: &Vector3<f64>) -> Vector3<f64> {
-        match *self {
-            Self::Ball { .. } => direction_or(p, direction_or(seen_from, Vector3::y())),
-            Self::Tube { .. } => outward(p, seen_from),
-            Self::Nappe { normal_rho, normal_y, .. } => {
-                outward(p, seen_from) * normal_rho + Vector3::y() * normal_y
+    /// The level's zeros beside what a path's crossings say.
+    #[test]
+    fn crossings_are_where_the_level_changes_its_sign() {
+        for (kind, patch) in patches().iter().enumerate() {
+            let mut found = [0; 5];
+            for i in 0..2000 {
+                let (from, to) = (spread(i) * 0.08, spread(5 * i + 3) * 0.08);
+                let inside = [&from, &to].map(|p| patch.level(p) <= 0.0);
+                let crossings = patch.crossings(&from, &to, inside);
+                let shares = crossings.shares();
+                found[shares.len()] += 1;
+                assert_eq!(shares.len() % 2 == 1, inside[0] != inside[1], "{kind} {i} {shares:?}");
+                for &share in shares {
+                    let level = patch.level(&(from + (to - from) * share));
+                    assert!(level.abs() < 1e-14, "{kind} {i} {level}");
+                }
+                let along = (0..=400).map(|k| patch.level(&(from + (to - from) * (f64::from(k) / 400.0))));
+                let changes =
+                    along.clone().zip(along.clone().skip(1)).filter(|(a, b)| (*a <= 0.0) != (*b <= 0.0));
+                // A path past a ring may miss what is thinner than its smallest step.
+                let is_thin = along.fold(f64::INFINITY, f64::min) > -MARCH * (to - from).norm();
+                assert!(is_thin || shares.len() >= changes.count(), "{kind} {i} {shares:?}");
             }
-            Self::Ring { ring_radius_m, .. } => {
-                direction_or(&(p - outward(p, seen_from) * ring_radius_m), Vector3::y())
-            }
-            Self::Pill { half_length_m, .. } => {
-                direction_or(&(p - core(p, half_length_m)), outward(p, seen_from))
-            }
-        }
-    }
-
-    fn smallest_radius(&self, p: &Vector3<f64>) -> f64 {
-        match *self {
-            Self::Ball { radius_m } | Self::Tube { radius_m } | Self::Pill { radius_m, .. } => radius_m,
-            Self::Nappe { normal_rho, .. } => rho(p) / normal_rho,
-            Self::Ring { ring_radius_m, tube_radius_m } => tube_radius_m.min(ring_radius_m + tube_radius_m),
-        }
-    }
-
-    /// The share of the path at which it enters the convex patch, which it begins outside of or on.
-    fn entry(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> Option<f64> {
-        let path = to - from;
-        let resolution_m = 2.0 * f64::EPSILON * from.amax().max(to.amax());
-        let mut share = 0.0;
-        for _ in 0..MAX_ENTRY_ROUNDS {
-            let point = from + path * share;
-            let height_m = self.level(&point);
-            let descent = -self.gradient(&point, &point).dot(&path);
-            if descent.is_nan() || descent <= 0.0 {
-                return None;
-            }
-            if height_m <= resolution_m {
-                return Some(share);
-            }
-            share += height_m / descent;
-            if share > 1.0 {
-                return None;
-            }
-        }
-        Some(share)
-    }
-
-    /// Goes along the path by no more than the level allows, and by no less than a small part of it: what is missed is
-    /// thinner than nobody can feel, and left on the side where it was met.
-    fn march(&self, from: &Vector3<f64>, to: &Vector3<f64>, is_inside: [bool; 2], crossings: &mut Crossings) {
-        let path = to - from;
-        let length_m = path.norm();
-        if length_m < SMALLEST_LENGTH_M {
-            if is_inside[0] != is_inside[1] {
-                crossings.push(0.0);
-            }
-            return;
-        }
-        let at = |share: f64| self.level(&(from + path * share));
-        let (mut share, mut height_m, mut was_inside) = (0.0, at(0.0), is_inside[0]);
-        while share < 1.0 {
-            let next = (share + (height_m.abs() / length_m).max(MARCH)).min(1.0);
-            let next_m = at(next);
-            let inside = if next == 1.0 { is_inside[1] } else { next_m <= 0.0 };
-            if inside != was_inside {
-                crossings.push(root(&at, [share, next], [height_m, next_m]));
-            }
-            (share, height_m, was_inside) = (next, next_m, inside);
+            assert!(found[1] > 30 && found[2] > 50, "{kind}: {found:?}");
         }
     }
 }
-
-/// Where a function changes its sign between two shares: the false position, kept from creeping (Illinois).
-fn root(at: &impl Fn(f64) -> f64, mut shares: [f64; 2], mut heights: [f64; 2]) -> f64 {
-    if heights[0] * heights[1] >= 0.0 {
-        // Rounding at an end of the path.
-        return if heights[0].abs() < heights[1].abs() { shares[0] } else { shares[1] };
-    }
-    let mut share = shares[1];
-    for _ in 0..MAX_ENTRY_ROUNDS {
-        share = (shares[0] * heights[1] - shares[1] * heights[0]) / (heights[1] - heights[0]);
-        let height = at(share);
-        if height == 0.0 || (shares[1] - shares[0]).abs() <= f64::EPSILON {
-            break;
-        }
-        if height * heights[1] < 0.0 {
-            (shares[0], heights[0]) = (shares[1], heights[1]);
-        } else {
-            heights[0] *= 0.5;
-        }
-        (shares[1], heights[1]) = (share, height);
-    }
-    share
-}
-
-#[inline(always)]
-fn rho(p: &Vector3<f64>) -> f64 {
-    (p.x * p.x + p.z * p.z).sqrt()
-}
-
-fn outward(p: &Vector3<f64>, seen_from: &Vector3<f64>) -> Vector3<f64> {
-    let across = Vector3::new(p.x, 0.0, p.z);
-    direction_or(&across, around_y(seen_from).1)
-}
-
-fn core(p: &Vector3<f64>, half_length_m: f64) -> Vector3<f64> {
-    Vector3::y() * p.y.clamp(-half_length_m, half_length_m)
-}
-
-/// Bound on the search for a crossing; paths that touch in one point halve their distance each round.
-const MAX_ENTRY_ROUNDS: u32 = 64;
-/// The smallest step over a path past a ring.
-const MARCH: f64 = 1.0 / 64.0;

@@ -7,9 +7,9 @@
 use nalgebra::Vector3;
 
 use super::Csg;
+use super::god::God;
 use super::hit::Events;
 use super::near::Neighbourhood;
-use super::walk::God;
 
 /// The god-object of a HIP inside; `None` if there is no boundary to be found.
 pub(super) fn way_out(csg: &Csg, hip_B: &Vector3<f64>) -> Option<God> {
@@ -53,7 +53,7 @@ fn on_boundary(csg: &Csg, point_B: &Vector3<f64>) -> Option<God> {
         .filter(|&index| is_here(index))
         .find(|&index| near.is_solid(sides) != near.is_solid(sides ^ 1 << index))?;
     let free = if near.is_solid(sides) { sides ^ 1 << index } else { sides };
-    Some(God { point_B: *point_B, near, sides: free, active: 1 << index })
+    Some(God::new(*point_B, near, free, 1 << index))
 }
 
 /// Where a straight way out meets the open.
@@ -72,7 +72,7 @@ fn straight_out(csg: &Csg, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option
             sides ^= 1 << index;
             if !near.is_solid(sides) {
                 let way_B = (end_B - from_B) * share;
-                let god = God { point_B: from_B + way_B, near, sides, active: 1 << index };
+                let god = God::new(from_B + way_B, near, sides, 1 << index);
                 return Some((gone_m + way_B.norm(), god));
             }
         }

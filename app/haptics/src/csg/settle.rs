@@ -1,0 +1,109 @@
+//! Back onto the patches that hold a god-object.
+//!
+//! Model: Newton's method by the shortest way: each step leads to the nearest point that is on all tangent planes. One
+//! rigid patch takes one step, edges of curved patches two or three. At the end the tangent planes are those of where it ends.
+//!
+//! Cost: bounded by [`MAX_ROUNDS`] looks at each of up to three patches.
+
+use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+
+use super::Csg;
+use super::god::{God, places, worst_m};
+use super::near::Sides;
+use super::patch::{Look, Patch};
+
+/// The point of all these patches nearest to one that is near them, to first order.
+pub(super) fn settle(
+    csg: &Csg,
+    god: &God,
+    patches: Sides,
+    from_B: &Vector3<f64>,
+    hip_B: &Vector3<f64>,
+) -> Vector3<f64> {
+    let mut held = places(patches).map(|index| god.near.patch(csg, index));
+    match (held.next(), held.next(), held.next()) {
+        (Some(a), None, _) => settle_on([a], from_B, hip_B).0,
+        (Some(a), Some(b), None) => settle_on([a, b], from_B, hip_B).0,
+        (Some(a), Some(b), Some(c)) => settle_on([a, b, c], from_B, hip_B).0,
+        _ => *from_B,
+    }
+}
+
+/// The same, and what the patches show there.
+#[inline(always)]
+pub(super) fn settle_on<const N: usize>(
+    patches: [&Patch; N],
+    from_B: &Vector3<f64>,
+    hip_B: &Vector3<f64>,
+) -> (Vector3<f64>, [Look; N]) {
+    let mut point_B = *from_B;
+    let mut looks = looks_at(&patches, &point_B, hip_B);
+    if N == 1 && patches[0].is_distance() {
+        // The first step leads there, and along it the normal is the same.
+        point_B += correction(&looks);
+        looks[0].height_m = 0.0;
+        return (point_B, looks);
+    }
+    let mut last = f64::INFINITY;
+    for _ in 0..MAX_ROUNDS {
+        let worst = worst_m(&looks);
+        let resolution_m = 2.0 * f64::EPSILON * point_B.amax();
+        // Rounding has the last word.
+        if worst.is_nan() || worst <= resolution_m || (worst >= last && worst <= 8.0 * resolution_m) {
+            break;
+        }
+        last = worst;
+        point_B += correction(&looks);
+        looks = looks_at(&patches, &point_B, hip_B);
+    }
+    (point_B, looks)
+}
+
+/// What patches show of a point.
+#[inline(always)]
+pub(super) fn looks_at<const N: usize>(
+    patches: &[&Patch; N],
+    point_B: &Vector3<f64>,
+    hip_B: &Vector3<f64>,
+) -> [Look; N] {
+    let mut looks = [Look { height_m: 0.0, normal_B: Vector3::zeros() }; N];
+    for (look, patch) in looks.iter_mut().zip(patches) {
+        *look = patch.look(point_B, hip_B);
+    }
+    looks
+}
+
+/// The shortest step onto the tangent planes.
+#[inline(always)]
+pub(super) fn correction(looks: &[Look]) -> Vector3<f64> {
+    match looks {
+        [a] => -a.normal_B * a.height_m,
+        [a, b] => onto_both(a, b),
+        [a, b, c, ..] => {
+            let rows = Matrix3::from_rows(&[a, b, c].map(|look| look.normal_B.transpose()));
+            let heights = Vector3::new(a.height_m, b.height_m, c.height_m);
+            match rows.try_inverse().filter(|_| rows.determinant().abs() > PARALLEL) {
+                Some(inverse) => -(inverse * heights),
+                None => onto_both(a, b),
+            }
+        }
+        [] => Vector3::zeros(),
+    }
+}
+
+#[inline(always)]
+fn onto_both(a: &Look, b: &Look) -> Vector3<f64> {
+    let cosine = a.normal_B.dot(&b.normal_B);
+    let determinant = a.normal_B.cross(&b.normal_B).norm_squared();
+    if determinant < PARALLEL * PARALLEL {
+        return -a.normal_B * a.height_m;
+    }
+    let inverse = Matrix2::new(1.0, -cosine, -cosine, 1.0) / determinant;
+    let shares = inverse * Vector2::new(a.height_m, b.height_m);
+    -(a.normal_B * shares.x + b.normal_B * shares.y)
+}
+
+/// Bound on Newton's method; patches that touch halve their distance each round.
+const MAX_ROUNDS: u32 = 24;
+/// Patches closer to parallel than this (rad) have no edge.
+const PARALLEL: f64 = 1e-9;
