@@ -22,7 +22,7 @@ fn contact_points_never_allocate() {
     for a in &shapes {
         for b in &shapes {
             let mut memory = PairMemory::default();
-            for _ in 0..1000 {
+            for _ in 0..300 {
                 let X_WA = pose(noise.turn(), noise.direction() * 0.03);
                 let X_WB = pose(noise.turn(), Vector3::zeros());
                 let mut found = ContactPoints::default();
@@ -33,5 +33,5 @@ fn contact_points_never_allocate() {
         }
     }
     assert_eq!(CALLS.get() - before, 0);
-    assert!(touched > 100_000, "{touched}");
+    assert!(touched > 30_000, "{touched}");
 }
