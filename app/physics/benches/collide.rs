@@ -37,7 +37,8 @@ fn main() {
         let mut group = criterion.benchmark_group(format!("at rest on a {below}"));
         for (name, a) in all() {
             let X_WA = Isometry3::identity();
-            let low = deepest(&points(&a, &X_WA, &b, &Isometry3::identity(), 1.0, &mut PairMemory::default()));
+            let low =
+                deepest(&points(&a, &X_WA, &b, &Isometry3::identity(), 1.0, &mut PairMemory::default()));
             let X_WA = Isometry3::translation(0.0, -low - 1e-4, 0.0);
             let lying = lying_on(&a, &X_WA, &b);
             group.bench_function(name, |bencher| {
@@ -67,7 +68,13 @@ fn lying_on(a: &Form, X_WA: &Isometry3<f64>, b: &Form) -> Isometry3<f64> {
     X
 }
 
-fn call(a: &Shape, X_WA: &Isometry3<f64>, b: &Shape, X_WB: &Isometry3<f64>, memory: &mut PairMemory) -> ContactPoints {
+fn call(
+    a: &Shape,
+    X_WA: &Isometry3<f64>,
+    b: &Shape,
+    X_WB: &Isometry3<f64>,
+    memory: &mut PairMemory,
+) -> ContactPoints {
     let mut found = ContactPoints::default();
     contact_points(Solid { shape: a, X_W: X_WA }, Solid { shape: b, X_W: X_WB }, REACH_M, memory, &mut found);
     found

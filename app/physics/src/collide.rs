@@ -155,13 +155,7 @@ pub fn contact_points(
 }
 
 /// In the frame of B, which does not rank before A.
-fn of_forms(
-    a: &Form,
-    X_BA: &Isometry3<f64>,
-    b: &Form,
-    reach_m: f64,
-    memory: &mut PairMemory,
-) -> Spots {
+fn of_forms(a: &Form, X_BA: &Isometry3<f64>, b: &Form, reach_m: f64, memory: &mut PairMemory) -> Spots {
     match (a, b) {
         (Form::Torus(torus), _) => ring::contact(torus, X_BA, b, reach_m, memory),
         // Of a convex one the nearest point is better found by what suits all convex ones.

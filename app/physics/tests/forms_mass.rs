@@ -6,7 +6,9 @@ mod solids;
 
 use std::f64::consts::PI;
 
-use haptics::{Capsule, Cone, Csg, CsgTree, Cuboid, Cylinder, Ellipsoid, Form, Plane, Shape, Sphere, Surface, Torus};
+use haptics::{
+    Capsule, Cone, Csg, CsgTree, Cuboid, Cylinder, Ellipsoid, Form, Plane, Shape, Sphere, Surface, Torus,
+};
 use nalgebra::{Matrix3, Vector3};
 use physics::collide::{bounding_ball, can_move, is_collidable, name};
 use physics::{BodyError, MassProperties};
@@ -113,7 +115,9 @@ fn a_ball_around_a_form_holds_all_of_it_and_little_else() {
         let (centre, radius) = bounding_ball(&form.into()).unwrap();
         let n = 100;
         let farthest = (0..n * n)
-            .map(|i| surface_point(&form, f64::from(i % n) / f64::from(n), f64::from(i / n) / f64::from(n - 1)))
+            .map(|i| {
+                surface_point(&form, f64::from(i % n) / f64::from(n), f64::from(i / n) / f64::from(n - 1))
+            })
             .map(|point| (point - centre).norm())
             .fold(0.0, f64::max);
         assert!(farthest <= radius * (1.0 + 1e-12), "{name}: {farthest} {radius}");
@@ -141,7 +145,8 @@ fn it_can_be_asked_what_can_move_and_what_can_be_met() {
             assert!(is_collidable(&b.into(), &b.into()), "{}", name(&b.into()));
         }
     }
-    let ring: Shape = haptics::Scaled::new(Torus::new(0.03, 0.01).unwrap().into(), [1.0, 2.0, 1.0]).unwrap().into();
+    let ring: Shape =
+        haptics::Scaled::new(Torus::new(0.03, 0.01).unwrap().into(), [1.0, 2.0, 1.0]).unwrap().into();
     assert!(!can_move(&ring));
     assert!(is_collidable(&Sphere::new(0.01).unwrap().into(), &ring));
     assert!(!is_collidable(&Cuboid::new([0.01; 3]).unwrap().into(), &ring));

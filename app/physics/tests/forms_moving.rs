@@ -20,7 +20,12 @@ fn wrench(points: &[ContactPoint], about: &Vector3<f64>) -> [Vector3<f64>; 2] {
 }
 
 /// Two forms, as deep in each other as wanted, and what the pair remembers of how they came there.
-fn overlapping(a: &Form, b: &Form, depth: f64, noise: &mut Noise) -> (Isometry3<f64>, Isometry3<f64>, PairMemory) {
+fn overlapping(
+    a: &Form,
+    b: &Form,
+    depth: f64,
+    noise: &mut Noise,
+) -> (Isometry3<f64>, Isometry3<f64>, PairMemory) {
     let X_WB = pose(noise.turn(), Vector3::new(0.03, -0.02, 0.01));
     let (turn, away) = (noise.turn(), noise.direction());
     let aside = noise.direction() * 0.01;

@@ -7,7 +7,9 @@ mod solids;
 use std::collections::BTreeSet;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
-use haptics::{Capsule, Cone, Cuboid, Cylinder, Ellipsoid, Form, Plane, Shape, Sphere, Surface, SurfacePoint, Torus};
+use haptics::{
+    Capsule, Cone, Cuboid, Cylinder, Ellipsoid, Form, Plane, Shape, Sphere, Surface, SurfacePoint, Torus,
+};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use physics::collide::{ContactPoint, ContactPoints, PairMemory, Solid, contact_points, is_collidable};
 use solids::*;
@@ -24,7 +26,14 @@ fn slab() -> Form {
 
 /// Points of a form whose lowest point is 0.1 mm deep, on a plane and on a slab.
 fn on_both(form: Form, turn: UnitQuaternion<f64>) -> [Vec<ContactPoint>; 2] {
-    let lowest = deepest(&points(&form, &pose(turn, Vector3::zeros()), &ground(), &Isometry3::identity(), 1.0, &mut PairMemory::default()));
+    let lowest = deepest(&points(
+        &form,
+        &pose(turn, Vector3::zeros()),
+        &ground(),
+        &Isometry3::identity(),
+        1.0,
+        &mut PairMemory::default(),
+    ));
     let X = pose(turn, Vector3::new(0.01, -lowest - 1e-4, 0.02));
     let down = Isometry3::translation(0.0, -0.05, 0.0);
     [
@@ -44,7 +53,8 @@ fn an_edge_gives_its_ends_a_face_its_corners_and_a_rim_four_points() {
     let corner = UnitQuaternion::rotation_between(&Vector3::new(1.0, 1.0, 1.0), &-Vector3::y()).unwrap();
     let cube: Form = Cuboid::new([0.04; 3]).unwrap().into();
     let cylinder: Form = Cylinder::new(0.02, 0.05).unwrap().into();
-    let (cone, capsule): (Form, Form) = (Cone::new(0.02, 0.0, 0.05).unwrap().into(), Capsule::new(0.01, 0.05).unwrap().into());
+    let (cone, capsule): (Form, Form) =
+        (Cone::new(0.02, 0.0, 0.05).unwrap().into(), Capsule::new(0.01, 0.05).unwrap().into());
     let torus: Form = Torus::new(0.03, 0.01).unwrap().into();
     let ellipsoid: Form = Ellipsoid::new([0.03, 0.015, 0.02]).unwrap().into();
     let side = (0.02_f64).atan2(0.05);
@@ -92,7 +102,8 @@ fn four_points_of_a_rim_press_and_turn_like_all_of_it_however_it_leans() {
             let axis = Vector3::new(noise.normal(), 0.0, noise.normal()).normalize();
             let turn = about(axis, noise.between(0.0, 2e-3)) * about(Vector3::y(), noise.between(0.0, TAU));
             let X = pose(turn, Vector3::new(0.0, down - 4e-4, 0.0));
-            let found = points(&form, &X, &ground(), &Isometry3::identity(), REACH, &mut PairMemory::default());
+            let found =
+                points(&form, &X, &ground(), &Isometry3::identity(), REACH, &mut PairMemory::default());
             assert_eq!(found.len(), 4);
             let (mut force, mut torque) = (0.0, Vector3::zeros());
             for point in &found {
@@ -116,7 +127,14 @@ fn four_points_of_a_rim_press_and_turn_like_all_of_it_however_it_leans() {
             assert!((torque - rim_torque).norm() < 1e-16, "{torque} {rim_torque}");
             // One of them is the deepest point, unless it stands flat.
             if turn.inverse_transform_vector(&Vector3::y()).xz().norm() > 1e-4 {
-                let lowest = deepest(&points(&form, &X, &ground(), &Isometry3::identity(), 1.0, &mut PairMemory::default()));
+                let lowest = deepest(&points(
+                    &form,
+                    &X,
+                    &ground(),
+                    &Isometry3::identity(),
+                    1.0,
+                    &mut PairMemory::default(),
+                ));
                 assert!((deepest(&found) - lowest).abs() < 1e-16);
                 let tilt = turn.inverse_transform_vector(&Vector3::y()).xz().norm();
                 let level = if let Form::Torus(_) = form { 1.0 } else { (1.0 - tilt * tilt).sqrt() };
@@ -130,7 +148,9 @@ fn four_points_of_a_rim_press_and_turn_like_all_of_it_however_it_leans() {
 #[test]
 fn a_rim_that_stands_flat_keeps_its_points_on_the_material() {
     for form in [Form::from(Cylinder::new(0.02, 0.05).unwrap()), Torus::new(0.03, 0.01).unwrap().into()] {
-        for (b, X_WB) in [(ground(), Isometry3::identity()), (slab(), Isometry3::translation(0.0, -0.05, 0.0))] {
+        for (b, X_WB) in
+            [(ground(), Isometry3::identity()), (slab(), Isometry3::translation(0.0, -0.05, 0.0))]
+        {
             let height = if let Form::Torus(_) = form { 0.01 } else { 0.025 };
             let mut memory = PairMemory::default();
             let mut noise = Noise(4);
@@ -229,7 +249,14 @@ fn edges_that_cross_touch_in_one_point_and_parallel_ones_in_two() {
         let X = pose(about(Vector3::y(), turn) * roof, Vector3::new(0.0, 2.0 * top - depth, 0.02));
         // It came from above.
         let mut memory = PairMemory::default();
-        points(&bar, &pose(X.rotation, X.translation.vector + Vector3::y() * 0.01), &bar, &pose(roof, Vector3::zeros()), 1.0, &mut memory);
+        points(
+            &bar,
+            &pose(X.rotation, X.translation.vector + Vector3::y() * 0.01),
+            &bar,
+            &pose(roof, Vector3::zeros()),
+            1.0,
+            &mut memory,
+        );
         let found = points(&bar, &X, &bar, &pose(roof, Vector3::zeros()), REACH, &mut memory);
         let deep: Vec<_> = found.iter().filter(|point| point.gap_m < -1e-9).collect();
         assert_eq!(deep.len(), expected, "{turn}: {found:?}");
@@ -242,7 +269,8 @@ fn edges_that_cross_touch_in_one_point_and_parallel_ones_in_two() {
 
 #[test]
 fn a_ball_in_the_hole_of_a_ring_touches_it_all_around() {
-    let (ball, ring): (Form, Form) = (Sphere::new(0.03).unwrap().into(), Torus::new(0.03, 0.01).unwrap().into());
+    let (ball, ring): (Form, Form) =
+        (Sphere::new(0.03).unwrap().into(), Torus::new(0.03, 0.01).unwrap().into());
     // 4 cm between the ball's centre and the tube's middle line.
     let height = (0.04_f64 * 0.04 - 0.03 * 0.03).sqrt();
     let X = Isometry3::translation(0.0, height - 1e-4, 0.0);

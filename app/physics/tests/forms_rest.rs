@@ -22,8 +22,7 @@ const SERIES: f64 = 1000.0 * 2000.0 / 3000.0;
 fn above_floor(form: Form, turn: nalgebra::UnitQuaternion<f64>, height: f64) -> World {
     let ground: Form = Plane::new(Vector3::y(), 0.0).unwrap().into();
     let X = pose(turn, Vector3::zeros());
-    let low =
-        deepest(&points(&form, &X, &ground, &Isometry3::identity(), 1.0, &mut PairMemory::default()));
+    let low = deepest(&points(&form, &X, &ground, &Isometry3::identity(), 1.0, &mut PairMemory::default()));
     let thing = object(form, pose(turn, Vector3::y() * (height - low)), STIFFNESS, MU);
     let body = body(&thing, MASS);
     World::new(vec![floor(0.0, 2000.0, MU), thing], &[(1, body)], Settings::default(), 0)
@@ -80,7 +79,11 @@ fn every_form_that_is_dropped_comes_to_rest_where_statics_says_and_stays_there()
             // One end of a cone sinks deeper by less than 1 mm, a slope of 2e-2 that moves the centre of mass by as
             // much of its height of 1 cm towards that end: 1 % of the load and of what it sinks.
             let off = (at.translation.y - expected).abs();
-            assert!(off < if name.contains("cone") { 1e-5 } else { 1e-8 }, "{name}: {} {expected}", at.translation.y);
+            assert!(
+                off < if name.contains("cone") { 1e-5 } else { 1e-8 },
+                "{name}: {} {expected}",
+                at.translation.y
+            );
             let rolls = world.body().velocity_W.norm() + 0.05 * world.body().angular_velocity_W().norm();
             (0..60_000).for_each(|_| drop(world.step(&[])));
             let after = world.entities[1].X_WB;

@@ -170,7 +170,8 @@ fn a_stack_of_three_stands_and_carries_what_lies_on_it() {
         let stands = 0.015 + 0.03 * number as f64;
         assert!(end.centre_W.y < stands && end.centre_W.y > stands - 1e-4, "{number}: {}", end.centre_W.y);
     }
-    let on_floor: f64 = world.manipulation.rows().iter().filter(|row| row.other.is_none()).map(|row| row.force_W.y).sum();
+    let on_floor: f64 =
+        world.manipulation.rows().iter().filter(|row| row.other.is_none()).map(|row| row.force_W.y).sum();
     assert!((on_floor - 3.0 * MASS * G).abs() < 1e-6, "{on_floor}");
 }
 
@@ -195,7 +196,8 @@ fn a_bar_lies_across_the_edges_of_two_others() {
         let at = pose(lies, Vector3::new(0.0, top + 0.005, 0.0));
         let thing = object(bar, at, STIFFNESS, 0.5).with_damping(100.0).unwrap();
         let body = body(&thing, MASS);
-        let mut world = World::new(vec![roof(0.03), roof(-0.03), thing], &[(2, body)], Settings::default(), 0);
+        let mut world =
+            World::new(vec![roof(0.03), roof(-0.03), thing], &[(2, body)], Settings::default(), 0);
         seconds(&mut world, 2.0);
         assert!((world.body().centre_W.y - top - 0.005).abs() < 1e-4, "{bar:?} {:?}", world.body());
         let loads: Vec<f64> = world.manipulation.rows().iter().map(|row| row.force_W.y).collect();
@@ -206,21 +208,30 @@ fn a_bar_lies_across_the_edges_of_two_others() {
 
 #[test]
 fn a_ring_hangs_on_a_peg_and_a_ball_lies_in_a_ring() {
-    let still = |thing: Form, X: nalgebra::Isometry3<f64>, fixed: Form, X_fixed: nalgebra::Isometry3<f64>, height: f64| {
+    let still = |thing: Form,
+                 X: nalgebra::Isometry3<f64>,
+                 fixed: Form,
+                 X_fixed: nalgebra::Isometry3<f64>,
+                 height: f64| {
         let below = object(fixed, X_fixed, STIFFNESS, 0.5);
         let thing = object(thing, X, STIFFNESS, 0.5).with_damping(100.0).unwrap();
         let body = body(&thing, MASS);
         let mut world = World::new(vec![below, thing], &[(1, body)], Settings::default(), 0);
         seconds(&mut world, 3.0);
         let body = world.body();
-        assert!((body.centre_W.y - height).abs() < 1e-4, "{thing:?} {body:?}", thing = world.entities[1].shape);
+        assert!(
+            (body.centre_W.y - height).abs() < 1e-4,
+            "{thing:?} {body:?}",
+            thing = world.entities[1].shape
+        );
         assert!(body.velocity_W.norm() < 1e-6, "{body:?}");
         let load: f64 = world.manipulation.rows().iter().map(|row| row.force_W.y).sum();
         assert!((load - MASS * G).abs() < 1e-5, "{load}");
     };
     let across = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
     let none = UnitQuaternion::identity();
-    let (ring, peg): (Form, Form) = (Torus::new(0.03, 0.01).unwrap().into(), Capsule::new(0.008, 0.1).unwrap().into());
+    let (ring, peg): (Form, Form) =
+        (Torus::new(0.03, 0.01).unwrap().into(), Capsule::new(0.008, 0.1).unwrap().into());
     let rod: Form = Cylinder::new(0.008, 0.1).unwrap().into();
     for peg in [peg, rod] {
         // The hole's top on the peg's top.

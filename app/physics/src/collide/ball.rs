@@ -20,9 +20,7 @@ pub(super) struct Touch {
 /// How a ball of this radius touches a form, in whose frame it is.
 pub(super) fn on_form(form: &Form, centre: &Vector3<f64>, radius_m: f64) -> Touch {
     match form {
-        Form::Plane(plane) => {
-            Touch { normal: plane.normal_B(), gap_m: gap_m(form, centre, radius_m) }
-        }
+        Form::Plane(plane) => Touch { normal: plane.normal_B(), gap_m: gap_m(form, centre, radius_m) },
         Form::Sphere(_) | Form::Capsule(_) | Form::Torus(_) => {
             Touch { normal: form.nearest(centre).normal_B, gap_m: gap_m(form, centre, radius_m) }
         }
@@ -54,12 +52,9 @@ pub(super) fn on_surface(shape: &Shape, centre: &Vector3<f64>, radius_m: f64) ->
         from_nearest(&surface.nearest(centre), surface.signed_distance(centre), centre, radius_m)
     };
     match shape {
-        Shape::Own(own) => Some(from_nearest(
-            &own.nearest(centre),
-            own.signed_distance(centre),
-            centre,
-            radius_m,
-        )),
+        Shape::Own(own) => {
+            Some(from_nearest(&own.nearest(centre), own.signed_distance(centre), centre, radius_m))
+        }
         Shape::Nurbs(nurbs) => Some(touch(&nurbs.surface(0.0))),
         _ => None,
     }

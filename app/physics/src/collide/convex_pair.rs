@@ -82,9 +82,8 @@ pub(super) fn on_plane(
     let ground = Plate::endless(normal * plane.offset_m(), normal);
     if let super::convex::Core::Box { half_m } = a.core {
         for number in 0..8_u32 {
-            let corner = half_m.map_with_location(|axis, _, half| {
-                if number >> axis & 1 == 1 { half } else { -half }
-            });
+            let corner =
+                half_m.map_with_location(|axis, _, half| if number >> axis & 1 == 1 { half } else { -half });
             let on_a = a.placed_point(&corner);
             spots.push(Spot { id: number, on_a, normal, gap_m: normal.dot(&on_a) - plane.offset_m() });
         }

@@ -73,8 +73,8 @@ impl Alongside {
         let [a, b] = self.lines;
         let on_a = a.ends[0] + (a.ends[1] - a.ends[0]) * place;
         let along_b = b.ends[1] - b.ends[0];
-        let on_b = b.ends[0]
-            + along_b * ((on_a - b.ends[0]).dot(&along_b) / along_b.norm_squared()).clamp(0.0, 1.0);
+        let on_b =
+            b.ends[0] + along_b * ((on_a - b.ends[0]).dot(&along_b) / along_b.norm_squared()).clamp(0.0, 1.0);
         let away = on_a - on_b;
         let height_m = self.normal.dot(&away);
         let aside_m = (away - self.normal * height_m).norm();

@@ -173,7 +173,9 @@ impl Overlay<'_> {
             let Some(part) = other.covered_part(&ends) else { continue };
             for (which, (at, cut)) in part.into_iter().enumerate().filter(|(_, (_, cut))| *cut < 4) {
                 let id = match other.plate().outline {
-                    Outline::Square { edges: others, .. } if of == A => EDGE_EDGE_IDS + edge * 16 + others[cut],
+                    Outline::Square { edges: others, .. } if of == A => {
+                        EDGE_EDGE_IDS + edge * 16 + others[cut]
+                    }
                     Outline::Square { edges: others, .. } => EDGE_EDGE_IDS + others[cut] * 16 + edge,
                     Outline::Disc { cap, .. } => EDGE_RIM_IDS + edge * 4 + cap * 2 + which as u32,
                     Outline::Endless => continue,

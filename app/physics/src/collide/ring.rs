@@ -128,14 +128,7 @@ impl Ring<'_> {
     }
 
     /// Laid on a plate: four points of it, and where it crosses the plate's outline.
-    fn lie_on(
-        &self,
-        plate: &Option<Plate>,
-        number: u32,
-        first: &mut f64,
-        reach_m: f64,
-        spots: &mut Spots,
-    ) {
+    fn lie_on(&self, plate: &Option<Plate>, number: u32, first: &mut f64, reach_m: f64, spots: &mut Spots) {
         let Some(plate) = plate else { return };
         let n = plate.normal;
         let (ring_m, tube_m) = (self.torus.ring_radius_m(), self.torus.tube_radius_m());

@@ -69,7 +69,9 @@ pub fn surface_point(form: &Form, u: f64, v: f64) -> Vector3<f64> {
     let latitude = PI * (v.clamp(0.0, 1.0) - 0.5);
     match form {
         Form::Sphere(s) => around(s.radius_m() * latitude.cos(), s.radius_m() * latitude.sin()),
-        Form::Ellipsoid(e) => around(latitude.cos(), latitude.sin()).component_mul(&Vector3::from(e.radii_m())),
+        Form::Ellipsoid(e) => {
+            around(latitude.cos(), latitude.sin()).component_mul(&Vector3::from(e.radii_m()))
+        }
         Form::Capsule(c) => {
             let (r, l) = (c.radius_m(), c.length_m());
             let along = (l + PI * r) * (v.clamp(0.0, 1.0) - 0.5);
@@ -125,9 +127,7 @@ pub fn distance(a: &Form, X_WA: &Isometry3<f64>, b: &Form, X_WB: &Isometry3<f64>
         return distance(b, X_WB, a, X_WA);
     }
     let X_BA = X_WB.inv_mul(X_WA);
-    let at = |u: f64, v: f64| {
-        distance_outside(b, &(X_BA * Point3::from(surface_point(a, u, v))).coords)
-    };
+    let at = |u: f64, v: f64| distance_outside(b, &(X_BA * Point3::from(surface_point(a, u, v))).coords);
     let n = 48;
     let mut grid: Vec<(f64, f64, f64)> = (0..n * n)
         .map(|i| (f64::from(i % n) / f64::from(n), (f64::from(i / n) + 0.5) / f64::from(n)))
