@@ -28,7 +28,7 @@ pub(super) struct Axis {
     pub(super) on_a: Vector3<f64>,
 }
 
-const MAX_TURNS: usize = 6;
+const MAX_TURNS: usize = 4;
 /// Turns that change the direction by less end the search.
 const FOUND: f64 = 1e-5;
 /// The room between the cores, of the smaller one's inner radius.

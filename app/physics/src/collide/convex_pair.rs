@@ -19,7 +19,7 @@ use super::spots::{Spot, Spots};
 
 /// A face looks along the contact if it is turned from it by less \[1 - cosine\].
 const LOOKS_ALONG: f64 = 5e-9;
-const SINGLE_ID: u32 = 1;
+const SINGLE_ID: u32 = 1100;
 
 /// nothing if either is no convex form.
 pub(super) fn contact(

@@ -21,8 +21,8 @@ pub(super) struct Alongside {
     pub(super) on_a: Vector3<f64>,
 }
 
-const CROSSING_ID: u32 = 1;
-const END_IDS: [u32; 2] = [2, 3];
+const CROSSING_ID: u32 = 1100;
+const END_IDS: [u32; 2] = [1101, 1102];
 /// An end nearer to the crossing than this counts less \[m\].
 const FADE_M: f64 = 1e-3;
 /// Lines at this sine or more only cross.
