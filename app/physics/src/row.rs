@@ -87,9 +87,7 @@ impl Torsion {
         let falls = self.falls(dt_s);
         if (self.rest_nm - falls * spin_rad_s).abs() < self.most_nm { falls } else { 0.0 }
     }
-}
 
-impl Torsion {
     /// The slope of the line to where the torque stands from where there is none \[N m s\]: what a torque at its limit, which
     /// does not change at all, is worth on the way back.
     #[inline]

@@ -65,7 +65,7 @@ fn walk(points: &[Vector6<f64>], mut direction: Vector6<f64>) -> f64 {
     for _ in 0..MAX_FACES {
         let Some(face) = ray(points, &direction) else { break };
         let distance = face.reach / face.normal.norm();
-        if !(distance < nearest * (1.0 - 1e-9)) {
+        if distance.is_nan() || distance >= nearest * (1.0 - 1e-9) {
             break;
         }
         (nearest, direction) = (distance, face.normal.normalize());
