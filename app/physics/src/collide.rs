@@ -19,6 +19,7 @@ mod lines;
 pub(crate) mod mesh;
 mod mesh_ball;
 mod mesh_corner;
+mod mesh_cut;
 mod mesh_other;
 mod mesh_plane;
 mod mesh_solid;
