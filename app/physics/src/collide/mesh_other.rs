@@ -93,9 +93,7 @@ impl Other<'_> {
         let along = self.X_MO.inverse_transform_vector(along_M);
         let seen = match self.solid {
             Solidity::Form(Form::Cuboid(cuboid)) => in_box(cuboid, &point, &along),
-            Solidity::Form(form) => {
-                Seen { out: form.nearest(&point).normal_B, gap_m: form.signed_distance(&point) }
-            }
+            Solidity::Form(form) => at_form(*form, &point),
             Solidity::Mesh(mesh) => see(mesh, &point, &along, deep_m),
         };
         Seen { out: self.X_MO * seen.out, gap_m: seen.gap_m }
@@ -245,8 +243,21 @@ fn in_box(cuboid: &Cuboid, point: &Vector3<f64>, along: &Vector3<f64>) -> Seen {
         out[axis] = 1.0_f64.copysign(along[axis]);
         return Seen { out, gap_m: -depth_m };
     }
-    Seen { out: cuboid.nearest(point).normal_B, gap_m }
+    at_form((*cuboid).into(), point)
 }
+
+fn at_form(form: Form, point: &Vector3<f64>) -> Seen {
+    let (nearest, gap_m) = (form.nearest(point), form.signed_distance(point));
+    let away = point - nearest.point_B;
+    // At an edge the way from the nearest point is none of the faces' normals.
+    match away.try_normalize(NOTHING_M).filter(|_| gap_m > 0.0) {
+        Some(out) => Seen { out, gap_m: away.norm() },
+        None => Seen { out: nearest.normal_B, gap_m },
+    }
+}
+
+/// Nearer to a surface, the way from there is rounding \[m\].
+const NOTHING_M: f64 = 1e-9;
 
 /// Where a point is with regard to a mesh; inside, `along` is the way out that it came in by. A sheet is seen from there, and
 /// so is a wall that it cannot have come through otherwise than by going so deep (m).

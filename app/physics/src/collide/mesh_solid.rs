@@ -119,8 +119,8 @@ impl Found<'_> {
         for corner in chosen.into_iter().flatten().filter(|corner| !corner.is_in_a_plane(mesh)) {
             let on_mesh_M = *corner.point_M(mesh);
             let seen = other.see(&on_mesh_M, &-n, meeting.deep_m());
-            let id = About::Vertex(corner.vertex(mesh)).id();
-            self.push(Contact { id, on_mesh_M, normal_M: -seen.out, gap_m: seen.gap_m });
+            let about = About::Vertex(corner.vertex(mesh));
+            self.push(Contact::new(about, on_mesh_M, -seen.out, seen.gap_m));
         }
         if self.meeting.depth_m > 0.0 {
             chosen.into_iter().flatten().for_each(|corner| self.edges_of_mesh(mesh, other, corner));
@@ -142,8 +142,7 @@ impl Found<'_> {
             let seen = see(mesh, &own.at_M, &meeting.normal_M, meeting.deep_m());
             let gap_m = seen.gap_m - own.radius_m;
             let on_mesh_M = own.at_M - seen.out * seen.gap_m;
-            let id = About::Other(own.number).id();
-            self.push(Contact { id, on_mesh_M, normal_M: seen.out, gap_m });
+            self.push(Contact::new(About::Other(own.number), on_mesh_M, seen.out, gap_m));
         }
         if meeting.depth_m > 0.0 {
             self.edges(mesh, other);
@@ -176,8 +175,8 @@ impl Found<'_> {
         let cuts = edge.cuts(mesh, &meeting.normal_M, meeting.deep_m());
         for (end, cut) in cuts.into_iter().enumerate() {
             if let Some(cut) = cut {
-                let id = about.at_end(end as u32).id();
-                self.push(Contact { id, on_mesh_M: cut.on_mesh, normal_M: cut.out, gap_m: cut.gap_m });
+                let about = about.at_end(end as u32);
+                self.push(Contact::new(about, cut.on_mesh, cut.out, cut.gap_m));
             }
         }
     }
@@ -196,7 +195,7 @@ impl Found<'_> {
                 if let Some(cut) = cut {
                     let on_mesh_M = (other.X_MO * Point3::from(cut.on_edge)).coords;
                     let normal_M = -(other.X_MO * cut.out);
-                    self.push(Contact { id: about.id(), on_mesh_M, normal_M, gap_m: cut.gap_m });
+                    self.push(Contact::new(about, on_mesh_M, normal_M, cut.gap_m));
                 }
             }
         });

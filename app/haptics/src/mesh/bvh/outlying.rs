@@ -224,6 +224,6 @@ fn key(more_than: f64) -> f32 {
 }
 
 /// Bound on the nodes and runs of faces that are visited.
-const MOST_VISITS: usize = 128;
+const MOST_VISITS: usize = 256;
 /// As many as a box has sides.
 const MOST_LIMITS: usize = 6;
