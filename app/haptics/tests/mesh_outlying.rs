@@ -37,7 +37,7 @@ fn the_largest_product_of_two_counts_is_found_within_limits_and_above_what_is_kn
                 if counts { f * g } else { 0.0 }
             };
             let most = mesh.vertices().iter().map(score).fold(0.0, f64::max);
-            match mesh.outlying([&first, &second], &limits, 0.0) {
+            match mesh.outlying([&first, &second], &limits, 0.0, 1000) {
                 Some((corner, product)) => {
                     assert_eq!(product, most);
                     assert_eq!(score(&point(&mesh, corner)), product);
@@ -48,7 +48,7 @@ fn the_largest_product_of_two_counts_is_found_within_limits_and_above_what_is_kn
                     none += 1;
                 }
             }
-            assert_eq!(mesh.outlying([&first, &second], &limits, most), None);
+            assert_eq!(mesh.outlying([&first, &second], &limits, most, 1000), None);
         }
     }
     assert!(found > 1000 && none > 1000, "{found} {none}");

@@ -101,6 +101,8 @@ pub struct Stands {
     along: Vector3<f64>,
     base: f64,
     lowest_m: f64,
+    /// How often they were sought.
+    ticks: u32,
 }
 
 /// Whether contact points of such an entity as `A` can be found: a solid that ends somewhere.
