@@ -5,7 +5,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use haptics::mesh::make;
-use haptics::{Plane, Shape, Sphere};
+use haptics::{Cuboid, Cylinder, Plane, Shape, Sphere};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use physics::collide::{ContactPoints, PairMemory, Solid, contact_points};
 
@@ -72,6 +72,44 @@ fn benches(c: &mut Criterion) {
     rest(c, "ball on mesh/flat of 80k", (&sphere, at(0.0123, 0.0199, straight)), &flat);
     let ground = wavy(0.0123, 0.0077);
     rest(c, "ball on mesh/wavy of 80k", (&sphere, at(0.0123, ground + 0.0199, straight)), &bumpy);
+
+    let table: Shape = Cuboid::new([0.4, 0.2, 0.4]).unwrap().into();
+    let on_table = at(0.0, 0.1 + low, straight);
+    rest(c, "mesh on box/cube of 12", (&cuboid(0, straight), on_table), &table);
+    rest(c, "mesh on box/cube of 49k", (&cuboid(6, straight), on_table), &table);
+    rest(c, "mesh on box/ball of 100k", (&balls[0], on_table), &table);
+    let cube: Shape = Cuboid::new([0.05; 3]).unwrap().into();
+    rest(c, "box on mesh/flat of 80k", (&cube, at(0.0123, 0.0249, straight)), &flat);
+    rest(c, "box on mesh/wavy of 80k", (&cube, at(0.0123, ground + 0.0249, straight)), &bumpy);
+    let cylinder: Shape = Cylinder::new(0.02, 0.05).unwrap().into();
+    rest(c, "cylinder on mesh/flat of 80k", (&cylinder, at(0.0123, 0.0249, straight)), &flat);
+    rest(c, "mesh on mesh/cube of 49k on flat of 80k", (&cuboid(6, straight), at(0.0, low, straight)), &flat);
+
+    moving(c, "moving/cube of 49k on plane", (&cuboid(6, straight), at(0.0, low, straight)), &floor);
+    moving(c, "moving/ball of 100k on plane", (&balls[0], at(0.0, low, lying)), &floor);
+    moving(c, "moving/ball of 100k on box", (&balls[0], on_table), &table);
+    moving(c, "moving/box on flat of 80k", (&cube, at(0.0123, 0.0249, straight)), &flat);
+}
+
+/// Of a pair that moves: nothing is as it was a tick ago.
+fn moving(c: &mut Criterion, name: &str, (a, X_WA): (&Shape, Isometry3<f64>), b: &Shape) {
+    let mut memory = PairMemory::default();
+    let mut tick = 0_u32;
+    let X_WB = Isometry3::identity();
+    c.bench_function(name, |bench| {
+        bench.iter(|| {
+            tick = tick.wrapping_add(1);
+            let phase = f64::from(tick) * 0.01;
+            let rolls = Vector3::new(0.02 * phase.sin(), 0.01 * (0.7 * phase).cos(), 0.02 * (1.3 * phase).sin());
+            let mut pose = X_WA;
+            pose.rotation = UnitQuaternion::from_scaled_axis(rolls) * pose.rotation;
+            pose.translation.vector.y += 1e-4 * (3.0 * phase).sin();
+            let mut found = ContactPoints::default();
+            let (a, b) = (Solid { shape: a, X_W: &pose }, Solid { shape: b, X_W: &X_WB });
+            contact_points(a, b, 1e-3, &mut memory, &mut found);
+            black_box(found)
+        });
+    });
 }
 
 criterion_group!(mesh_contact, benches);

@@ -20,6 +20,7 @@ mod lines;
 pub(crate) mod mesh;
 mod mesh_ball;
 mod mesh_corner;
+mod mesh_cut;
 mod mesh_other;
 mod mesh_plane;
 mod mesh_solid;
@@ -101,6 +102,8 @@ pub struct Stands {
     along: Vector3<f64>,
     base: f64,
     lowest_m: f64,
+    /// How often they were sought.
+    ticks: u32,
 }
 
 /// Whether contact points of such an entity as `A` can be found: a solid that ends somewhere.

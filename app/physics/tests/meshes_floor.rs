@@ -27,10 +27,22 @@ fn ground(shape: Shape, turn: UnitQuaternion<f64>, mu: f64) -> Entity {
 
 /// Something `at` over a ground that leans, both in the ground's frame.
 fn over(ground_shape: Shape, angle: f64, mu: f64, shape: Shape, at: Isometry3<f64>) -> World {
+    over_of(MASS, ground_shape, angle, mu, shape, at)
+}
+
+/// The same of another mass: a light one hardly sinks into the ground.
+fn over_of(
+    mass: f64,
+    ground_shape: Shape,
+    angle: f64,
+    mu: f64,
+    shape: Shape,
+    at: Isometry3<f64>,
+) -> World {
     let turn = lean(angle);
     // So damped, what swings on its springs has come to rest in some tenths of a second.
     let entity = object(shape, turn * at, 1000.0, mu).with_damping(5.0).unwrap();
-    let body = body(&entity, MASS);
+    let body = body(&entity, mass);
     World::new(vec![ground(ground_shape, turn, mu), entity], &[(1, body)], Settings::default(), 0)
 }
 
@@ -54,10 +66,11 @@ fn a_ball_rolls_down_triangles_as_down_the_plane_and_feels_no_edge() {
     let (radius, angle) = (0.02, 0.2_f64);
     let sphere = || Shape::from(Sphere::new(radius).unwrap());
     for cells in [2, 50, 400] {
-        let depth = MASS * G * angle.cos() / K;
+        let mass = MASS / 20.0;
+        let depth = mass * G * angle.cos() / K;
         let plane = Shape::from(Plane::new(Vector3::y(), 0.0).unwrap());
-        let mut world = over(flat(cells), angle, 0.8, sphere(), up(radius - depth));
-        let mut on_plane = over(plane, angle, 0.8, sphere(), up(radius - depth));
+        let mut world = over_of(mass, flat(cells), angle, 0.8, sphere(), up(radius - depth));
+        let mut on_plane = over_of(mass, plane, angle, 0.8, sphere(), up(radius - depth));
         run(&mut world, 200);
         run(&mut on_plane, 200);
         let v = world.body().velocity_W;
@@ -71,9 +84,8 @@ fn a_ball_rolls_down_triangles_as_down_the_plane_and_feels_no_edge() {
         }
         let a = (world.body().velocity_W - v).norm() / 0.3;
         let expected = 5.0 / 7.0 * G * angle.sin();
-        // The ball is flattened by 1.4 mm of 20: it rolls on a smaller wheel, with part of the difference.
-        let flattened = depth / radius;
-        assert!((a / expected - 1.0).abs() < 0.1 * flattened, "{cells}: {a} {expected}");
+        // The ball is flattened by 0.07 mm of 20, 0.4 %: it rolls on a smaller wheel, with part of the difference.
+        assert!((a / expected - 1.0).abs() < 1e-3, "{cells}: {a} {expected}");
     }
 }
 
@@ -201,6 +213,35 @@ fn meshes_rest_on_boxes_and_on_meshes_as_on_a_plane() {
             let start = world.body().centre_W;
             run(&mut world, 5000);
             assert!((world.body().centre_W - start).norm() < 1e-8, "{name} {times}");
+        }
+    }
+}
+
+#[test]
+fn a_cube_lies_half_over_the_end_of_a_table_until_its_middle_passes_it() {
+    let edge = 0.05;
+    let cuboid = |size: [f64; 3], times: usize| {
+        let mut soup = make::cuboid(size);
+        (0..times).for_each(|_| soup = cut_in_four(&soup));
+        Shape::from(build(soup))
+    };
+    let table = [0.4, 0.2, 0.4];
+    let of_box = |size: [f64; 3]| Shape::from(Cuboid::new(size).unwrap());
+    let pairs = [
+        ("mesh on box", of_box(table), cuboid([edge; 3], 0)),
+        ("fine mesh on box", of_box(table), cuboid([edge; 3], 4)),
+        ("box on mesh", cuboid(table, 0), of_box([edge; 3])),
+        ("box on fine mesh", cuboid(table, 4), of_box([edge; 3])),
+        ("mesh on mesh", cuboid(table, 0), cuboid([edge; 3], 0)),
+    ];
+    for (name, table, cube) in &pairs {
+        // Springs that give by 0.04 mm lean it outward by some hundredths of a millimetre where it is nearly off.
+        for (beyond, falls) in [(-0.002, false), (0.002, true)] {
+            let at = Isometry3::translation(0.2 + beyond, 0.1 + edge / 2.0 - 2e-5, 0.01);
+            let mut world = over_of(MASS / 20.0, table.clone(), 0.0, 0.5, cube.clone(), at);
+            run(&mut world, 1500);
+            let is_down = world.body().centre_W.y < 0.1;
+            assert_eq!(is_down, falls, "{name} {beyond}: {}", world.body().centre_W);
         }
     }
 }

@@ -131,8 +131,14 @@ impl Mesh {
 
     /// The vertex with the largest product of two counts, as a corner of a face (three times its number plus that of the
     /// corner), and that product, if it is larger than `more_than`; see [`Bvh::outlying`](super::Bvh::outlying).
-    pub fn outlying(&self, counts: [&Linear; 2], limits: &[Linear], more_than: f64) -> Option<(u32, f64)> {
-        self.bvh.outlying(self.triangles(), counts, limits, more_than)
+    pub fn outlying(
+        &self,
+        counts: [&Linear; 2],
+        limits: &[Linear],
+        more_than: f64,
+        most_visits: usize,
+    ) -> Option<(u32, f64)> {
+        self.bvh.outlying(self.triangles(), counts, limits, more_than, most_visits)
     }
 
     /// Visits the vertices at which none of at most six limits is negative, as corners of faces, each as often as faces meet

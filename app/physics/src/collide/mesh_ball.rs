@@ -87,7 +87,7 @@ fn pressed_by(mesh: &Mesh, number: u32, is_front: bool, ball: &Ball) -> Contact 
     let height_m = face.normal_B.dot(&ball.centre_M) - face.offset_m;
     let on_mesh_M = ball.centre_M - face.normal_B * height_m;
     let gap_m = if is_front { height_m } else { -height_m } - ball.radius_m;
-    Contact { id: About::Face(number).id(), on_mesh_M, normal_M, gap_m }
+    Contact::new(About::Face(number), on_mesh_M, normal_M, gap_m)
 }
 
 fn of_nearest(mesh: &Mesh, ball: &Ball, nearest: &Nearest) -> Contact {
@@ -105,7 +105,7 @@ fn at(mesh: &Mesh, ball: &Ball, about: About, face: u32, on_mesh_M: Vector3<f64>
     let distance_m = to_centre_M.norm();
     let normal_M =
         if distance_m > 0.0 { to_centre_M / distance_m } else { mesh.faces()[face as usize].normal_B };
-    Contact { id: about.id(), on_mesh_M, normal_M, gap_m: distance_m - ball.radius_m }
+    Contact::new(about, on_mesh_M, normal_M, distance_m - ball.radius_m)
 }
 
 /// An edge by the lower of its two faces.

@@ -44,6 +44,20 @@ impl Corner {
         is_closed
     }
 
+    /// Visits the ends of all sharp edges that leave it, each with its face and number there.
+    pub(super) fn for_each_sharp_edge(self, mesh: &Mesh, mut visit: impl FnMut(&Vector3<f64>, u32, usize)) {
+        let mut fan = Fan::new(mesh, self.0 / 3, (self.0 % 3) as usize);
+        while let Some((number, corner)) = fan.next() {
+            let face = &mesh.faces()[number as usize];
+            let link = face.links[corner];
+            let is_sharp = link.is_boundary()
+                || mesh.faces()[link.face() as usize].normal_B.dot(&face.normal_B) < SHARP;
+            if is_sharp {
+                visit(&mesh.vertices()[face.vertices[(corner + 1) % 3] as usize], number, corner);
+            }
+        }
+    }
+
     /// From neighbour to neighbour as long as the score grows; where that ends, and the score there.
     pub(super) fn climb(self, mesh: &Mesh, score: impl Fn(Self) -> f64) -> (Self, f64) {
         let (mut at, mut most) = (self, score(self));
@@ -95,6 +109,8 @@ impl<'m> Fan<'m> {
 
 /// Normals that differ by less are the same: rounding of what lies in a plane.
 const FLAT: f64 = 1e-6;
+/// Cosine between the faces of a sharp edge.
+const SHARP: f64 = 0.9;
 /// Steps of a climb; the next tick goes on.
 const MOST_STEPS: usize = 64;
 /// Faces that are looked at around a vertex.

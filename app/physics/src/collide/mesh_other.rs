@@ -9,6 +9,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::convex::{Convex, Core};
 use super::mesh_corner::Corner;
+use super::mesh_cut::Edge;
 use super::mesh_span::Standing;
 use super::{MAX_POINTS, Stands};
 
@@ -40,6 +41,8 @@ pub(super) struct Own {
     pub(super) number: u32,
     pub(super) at_M: Vector3<f64>,
     pub(super) radius_m: f64,
+    /// Of a mesh, which one.
+    pub(super) corner: Option<Corner>,
 }
 
 /// Points of its own that look at the mesh.
@@ -90,9 +93,7 @@ impl Other<'_> {
         let along = self.X_MO.inverse_transform_vector(along_M);
         let seen = match self.solid {
             Solidity::Form(Form::Cuboid(cuboid)) => in_box(cuboid, &point, &along),
-            Solidity::Form(form) => {
-                Seen { out: form.nearest(&point).normal_B, gap_m: form.signed_distance(&point) }
-            }
+            Solidity::Form(form) => at_form(*form, &point),
             Solidity::Mesh(mesh) => see(mesh, &point, &along, deep_m),
         };
         Seen { out: self.X_MO * seen.out, gap_m: seen.gap_m }
@@ -133,9 +134,26 @@ impl Other<'_> {
         }
     }
 
+    /// Edges of its own around the face that looks this way; none where it has no straight ones.
+    pub(super) fn edges(&self, way_M: &Vector3<f64>) -> [Option<Edge>; 4] {
+        let Solidity::Form(Form::Cuboid(cuboid)) = self.solid else { return [None; 4] };
+        let half = Vector3::from(cuboid.size_m()) * 0.5;
+        let way = self.X_MO.inverse_transform_vector(way_M);
+        let axis = way.iamax();
+        let corner = |(s, t): (f64, f64)| {
+            let mut corner = half;
+            corner[axis] = half[axis].copysign(way[axis]);
+            corner[(axis + 1) % 3] *= s;
+            corner[(axis + 2) % 3] *= t;
+            (self.X_MO * Point3::from(corner)).coords
+        };
+        let corners = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)].map(corner);
+        [0, 1, 2, 3].map(|i| Some(Edge { ends: [corners[i], corners[(i + 1) % 4]] }))
+    }
+
     fn own_vertex(&self, mesh: &Mesh, corner: Corner) -> Own {
         let at_M = (self.X_MO * Point3::from(*corner.point_M(mesh))).coords;
-        Own { number: corner.vertex(mesh), at_M, radius_m: 0.0 }
+        Own { number: corner.vertex(mesh), at_M, radius_m: 0.0, corner: Some(corner) }
     }
 
     fn owns_of_form(&self, form: &Form, way_M: &Vector3<f64>) -> Owns {
@@ -192,7 +210,7 @@ struct Points<'p> {
 impl Points<'_> {
     fn push(&mut self, number: u32, at: Vector3<f64>, radius_m: f64) {
         if let Some(place) = self.owns.get_mut(self.count) {
-            *place = Some(Own { number, at_M: (self.X_MO * Point3::from(at)).coords, radius_m });
+            *place = Some(Own { number, at_M: (self.X_MO * Point3::from(at)).coords, radius_m, corner: None });
             self.count += 1;
         }
     }
@@ -226,8 +244,21 @@ fn in_box(cuboid: &Cuboid, point: &Vector3<f64>, along: &Vector3<f64>) -> Seen {
         out[axis] = 1.0_f64.copysign(along[axis]);
         return Seen { out, gap_m: -depth_m };
     }
-    Seen { out: cuboid.nearest(point).normal_B, gap_m }
+    at_form((*cuboid).into(), point)
 }
+
+fn at_form(form: Form, point: &Vector3<f64>) -> Seen {
+    let (nearest, gap_m) = (form.nearest(point), form.signed_distance(point));
+    let away = point - nearest.point_B;
+    // At an edge the way from the nearest point is none of the faces' normals.
+    match away.try_normalize(NOTHING_M).filter(|_| gap_m > 0.0) {
+        Some(out) => Seen { out, gap_m: away.norm() },
+        None => Seen { out: nearest.normal_B, gap_m },
+    }
+}
+
+/// Nearer to a surface, the way from there is rounding \[m\].
+const NOTHING_M: f64 = 1e-9;
 
 /// Where a point is with regard to a mesh; inside, `along` is the way out that it came in by. A sheet is seen from there, and
 /// so is a wall that it cannot have come through otherwise than by going so deep (m).

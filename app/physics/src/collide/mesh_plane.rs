@@ -28,8 +28,8 @@ pub(super) fn contact_points(
     for corner in standing.choose(&mut memory.stands[0]).into_iter().flatten() {
         let gap_m = standing.height_m(corner);
         if gap_m <= reach_m {
-            let (on_mesh_M, id) = (*corner.point_M(mesh), About::Vertex(corner.vertex(mesh)).id());
-            told.tell(&Contact { id, on_mesh_M, normal_M: -normal_M, gap_m });
+            let about = About::Vertex(corner.vertex(mesh));
+            told.tell(&Contact::new(about, *corner.point_M(mesh), -normal_M, gap_m));
         }
     }
 }

@@ -9,17 +9,19 @@
 //! A vertex in the middle of a flat face presses nothing that the other one's corners do not: it is left out.
 //! Frames: the mesh's frame M; normals from the mesh to the other one.
 //! Limits: of two that touch in several places at once around a corner or in a hole, points of the other one are found
-//! everywhere, vertices of the mesh only where most of the load is. A form's edges and a mesh's are cut off where they end
-//! at a silhouette; two fine meshes meet with vertices only, which lie as near as their triangles are large.
+//! everywhere, vertices of the mesh only where most of the load is. Crossings are found of a box's edges and of sharp edges
+//! that leave the vertices of a mesh that were chosen: of fine meshes these are short, but vertices lie as near. Rims of round
+//! forms are not cut off.
 //! Memory: words 0 to 2 the normal, 3 whether there is one, 4 to 6 where, 7 how deep.
 //! Cost: two choices of vertices and at most eight queries for the nearest point for each side; bounded.
 
 use haptics::mesh::{Linear, Mesh};
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 
 use super::mesh::{About, Contact, Told};
 use super::mesh_corner::Corner;
-use super::mesh_other::{Meeting, Other, see};
+use super::mesh_cut::Edge;
+use super::mesh_other::{Meeting, Other, Solidity, see};
 use super::mesh_span::Standing;
 use super::{MAX_POINTS, PairMemory};
 
@@ -44,7 +46,13 @@ pub(super) fn contact_points(
 }
 
 /// About where they meet: as in the last tick, or else found by going to and fro; `None` where they are far apart.
-fn meet(mesh: &Mesh, other: &Other<'_>, reach_m: f64, travel_m: f64, memory: &PairMemory) -> Option<Meeting> {
+fn meet(
+    mesh: &Mesh,
+    other: &Other<'_>,
+    reach_m: f64,
+    travel_m: f64,
+    memory: &PairMemory,
+) -> Option<Meeting> {
     let [x, y, z, is_known, at_x, at_y, at_z, depth_m] = memory.words;
     if is_known == 1.0 {
         let normal_M = Vector3::new(x, y, z);
@@ -107,15 +115,15 @@ impl Found<'_> {
             reach_m: meeting.reach_m,
             travel_m: meeting.travel_m,
         };
-        for corner in standing.choose(&mut memory.stands[0]).into_iter().flatten() {
-            if corner.is_in_a_plane(mesh) {
-                continue;
-            }
+        let chosen = standing.choose(&mut memory.stands[0]);
+        for corner in chosen.into_iter().flatten().filter(|corner| !corner.is_in_a_plane(mesh)) {
             let on_mesh_M = *corner.point_M(mesh);
             let seen = other.see(&on_mesh_M, &-n, meeting.deep_m());
-            let id = About::Vertex(corner.vertex(mesh)).id();
-            self.push(Contact { id, on_mesh_M, normal_M: -seen.out, gap_m: seen.gap_m });
-            self.outline(mesh, other, corner);
+            let about = About::Vertex(corner.vertex(mesh));
+            self.push(Contact::new(about, on_mesh_M, -seen.out, seen.gap_m));
+        }
+        if self.meeting.depth_m > 0.0 {
+            chosen.into_iter().flatten().for_each(|corner| self.edges_of_mesh(mesh, other, corner));
         }
     }
 
@@ -134,20 +142,73 @@ impl Found<'_> {
             let seen = see(mesh, &own.at_M, &meeting.normal_M, meeting.deep_m());
             let gap_m = seen.gap_m - own.radius_m;
             let on_mesh_M = own.at_M - seen.out * seen.gap_m;
-            let id = About::Other(own.number).id();
-            self.push(Contact { id, on_mesh_M, normal_M: seen.out, gap_m });
+            self.push(Contact::new(About::Other(own.number), on_mesh_M, seen.out, gap_m));
+        }
+        if meeting.depth_m > 0.0 {
+            self.edges(mesh, other);
+            let corners = owns.into_iter().flatten().filter_map(|own| own.corner);
+            corners.for_each(|corner| self.edges_of_other(mesh, other, corner));
         }
     }
 
-    /// Where edges that leave a vertex are cut off by the other one.
-    fn outline(&mut self, _mesh: &Mesh, _other: &Other<'_>, _corner: Corner) {}
+    /// Where edges of a form are cut off by the mesh.
+    fn edges(&mut self, mesh: &Mesh, other: &Other<'_>) {
+        let n = self.meeting.normal_M;
+        for (number, edge) in other.edges(&-n).into_iter().flatten().enumerate() {
+            self.cuts_by_mesh(mesh, &edge, About::Cut { edge: number as u32, of_mesh: false, end: 0 });
+        }
+    }
+
+    /// Where edges that leave a vertex of the other mesh are cut off by this one.
+    fn edges_of_other(&mut self, mesh: &Mesh, other: &Other<'_>, corner: Corner) {
+        let Solidity::Mesh(second) = other.solid else { return };
+        let place = |point: &Vector3<f64>| (other.X_MO * Point3::from(*point)).coords;
+        let from = place(corner.point_M(second));
+        corner.for_each_sharp_edge(second, |to, face, edge| {
+            let about = About::Cut { edge: 3 * face + edge as u32, of_mesh: false, end: 0 };
+            self.cuts_by_mesh(mesh, &Edge { ends: [from, place(to)] }, about);
+        });
+    }
+
+    fn cuts_by_mesh(&mut self, mesh: &Mesh, edge: &Edge, about: About) {
+        let meeting = self.meeting;
+        let cuts = edge.cuts(mesh, &meeting.normal_M, meeting.deep_m());
+        for (end, cut) in cuts.into_iter().enumerate() {
+            if let Some(cut) = cut {
+                let about = about.at_end(end as u32);
+                self.push(Contact::new(about, cut.on_mesh, cut.out, cut.gap_m));
+            }
+        }
+    }
+
+    /// Where edges that leave a vertex of this mesh are cut off by the other one.
+    fn edges_of_mesh(&mut self, mesh: &Mesh, other: &Other<'_>, corner: Corner) {
+        let Solidity::Mesh(second) = other.solid else { return };
+        let meeting = self.meeting;
+        let place = |point: &Vector3<f64>| other.X_MO.inverse_transform_point(&Point3::from(*point)).coords;
+        let along = other.X_MO.inverse_transform_vector(&-meeting.normal_M);
+        let from = place(corner.point_M(mesh));
+        corner.for_each_sharp_edge(mesh, |to, face, edge| {
+            let cuts = Edge { ends: [from, place(to)] }.cuts(second, &along, meeting.deep_m());
+            for (end, cut) in cuts.into_iter().enumerate() {
+                let about = About::Cut { edge: 3 * face + edge as u32, of_mesh: true, end: end as u32 };
+                if let Some(cut) = cut {
+                    let on_mesh_M = (other.X_MO * Point3::from(cut.on_edge)).coords;
+                    let normal_M = -(other.X_MO * cut.out);
+                    self.push(Contact::new(about, on_mesh_M, normal_M, cut.gap_m));
+                }
+            }
+        });
+    }
 
     fn push(&mut self, contact: Contact) {
         if contact.gap_m > self.meeting.reach_m || !contact.gap_m.is_finite() {
             return;
         }
+        // Of a crossing both edges tell, each on its side of the depth.
+        let together_m = TOGETHER_M + 2.0 * contact.gap_m.min(0.0).abs();
         let is_there =
-            |one: &Contact| (one.on_mesh_M - contact.on_mesh_M).norm_squared() < TOGETHER_M * TOGETHER_M;
+            |one: &Contact| (one.on_mesh_M - contact.on_mesh_M).norm_squared() < together_m * together_m;
         if self.contacts[..self.count].iter().any(is_there) {
             return;
         }
@@ -158,8 +219,8 @@ impl Found<'_> {
     }
 }
 
-/// Room for vertices and points of the other one.
-const ROOM: usize = 2 * MAX_POINTS;
+/// Room for vertices, points of the other one and crossings.
+const ROOM: usize = 3 * MAX_POINTS;
 /// Turns between the two until the nearest points are about found.
 const TO_AND_FRO: usize = 4;
 /// Points at most so many times as deep as the deepest of the last tick are found.

@@ -17,7 +17,8 @@
 //! Error: what sticks out of the polygon by less than [`BULGE`] of the side that it sticks out of may be missing, so a
 //! tipping threshold is that of the convex hull of the contact patch to about a twentieth of the patch.
 //! Frames: the mesh's own. Cost: next to nothing while it rests; when it tilts or sinks, a walk and a query of the
-//! hierarchy for each role, both bounded: of very many triangles in an oblique face, the hierarchy may miss the best.
+//! hierarchy for each role, both bounded. Of very many triangles in an oblique face a query may miss the best; so in each
+//! tick that of another role looks at more.
 
 use haptics::mesh::Linear;
 use nalgebra::Vector3;
@@ -48,7 +49,7 @@ impl Standing<'_> {
         if self.is_still(memory, &kept) {
             return kept;
         }
-        let chosen = self.all_of_few().unwrap_or_else(|| self.of_many(&kept));
+        let chosen = self.all_of_few().unwrap_or_else(|| self.of_many(&kept, memory.ticks));
         self.remember(&chosen, memory);
         chosen
     }
@@ -67,7 +68,8 @@ impl Standing<'_> {
         let heights = chosen.iter().flatten().map(|vertex| self.height_m(*vertex));
         let lowest_m = heights.fold(f64::INFINITY, f64::min);
         let corners = chosen.map(|corner| corner.map_or(0, Corner::number));
-        *memory = Stands { corners, along: self.height.along_B, base: self.height.base, lowest_m };
+        let (along, base, ticks) = (self.height.along_B, self.height.base, memory.ticks.wrapping_add(1));
+        *memory = Stands { corners, along, base, lowest_m, ticks };
     }
 
     /// All within reach, if they are few.
@@ -92,25 +94,26 @@ impl Standing<'_> {
     }
 
     /// Those that have a role, and as many of the last tick as there is room for.
-    fn of_many(&self, kept: &Chosen) -> Chosen {
+    fn of_many(&self, kept: &Chosen, ticks: u32) -> Chosen {
         let is_low = |corner: &Corner| self.is_over(*corner) && self.height_m(*corner) <= self.reach_m;
         let begins = !kept.iter().flatten().any(is_low);
-        let mut chosen = self.turn(kept, if begins { &FIRST } else { &LATER });
+        let searched = (!begins).then_some(1 + ticks as usize % (MAX_POINTS - 1));
+        let mut chosen = self.turn(kept, if begins { &FIRST } else { &LATER }, searched);
         // What is found at first is found from anywhere.
         for _ in 0..if begins { FIRST_TURNS } else { 0 } {
-            chosen = self.turn(&chosen, &FIRST);
+            chosen = self.turn(&chosen, &FIRST, None);
         }
         chosen
     }
 
-    fn turn(&self, kept: &Chosen, how: &How) -> Chosen {
+    fn turn(&self, kept: &Chosen, how: &How, searched: Option<usize>) -> Chosen {
         let mut chosen = [None; MAX_POINTS];
         let Some(deepest) = self.deepest(kept) else { return chosen };
         let height_m = self.height_m(deepest);
         let level_m = self.level_m(height_m);
         let kept = kept.map(|one| one.filter(|one| self.is_over(*one) && self.height_m(*one) <= level_m));
         let depth = self.below(level_m).at_most(level_m - height_m);
-        Seek { standing: self, depth, deepest, kept: &kept, how }.choose(&mut chosen);
+        Seek { standing: self, depth, deepest, kept: &kept, how, searched }.choose(&mut chosen);
         self.keep(kept, &mut chosen);
         chosen
     }
@@ -144,7 +147,7 @@ impl Standing<'_> {
         let mut kept = kept.iter().flatten().copied().filter(counts);
         let Some(first) = kept.next() else {
             let counts = [&self.below(self.reach_m), &Linear::ONE];
-            return self.mesh.outlying(counts, self.limits, 0.0).map(|(corner, _)| Corner::new(corner));
+            return self.mesh.outlying(counts, self.limits, 0.0, MANY_VISITS).map(|(corner, _)| Corner::new(corner));
         };
         let known = kept.fold(first, lower);
         // What comes in loaded pushes: a ball that rolls would be driven by what enters below it and leaves behind.
@@ -179,6 +182,8 @@ struct Seek<'s> {
     deepest: Corner,
     kept: &'s Chosen,
     how: &'s How,
+    /// The role for which much is looked at; `None`: each.
+    searched: Option<usize>,
 }
 
 /// What makes one chosen that was not.
@@ -206,7 +211,7 @@ impl Seek<'_> {
         let length_m = along_B.norm();
         let beside_B = up_B.cross(&along_B) / length_m;
         for (role, side_B) in [(2, beside_B), (3, -beside_B)] {
-            let found = self.best(&Linear::from(d_B, side_B), self.how.bulge * length_m);
+            let found = self.best(role, &Linear::from(d_B, side_B), self.how.bulge * length_m);
             chosen[role] = found.filter(|found| self.is_new(found, chosen));
         }
         self.sides(chosen);
@@ -225,7 +230,7 @@ impl Seek<'_> {
         let beside_B = up_B.cross(&along_B);
         [along_B, -along_B, beside_B, -beside_B]
             .iter()
-            .find_map(|way_B| self.best(&Linear::from(d_B, *way_B), least_m))
+            .find_map(|way_B| self.best(1, &Linear::from(d_B, *way_B), least_m))
     }
 
     /// What sticks out of the sides of the quadrilateral.
@@ -240,7 +245,7 @@ impl Seek<'_> {
             if length_m > 0.0 {
                 // F is to the left of D E seen from above, so the outside is to the left of D F.
                 let outward_B = up_B.cross(&along_B) / length_m;
-                let found = self.best(&Linear::from(from_B, outward_B), self.how.bulge * length_m);
+                let found = self.best(4 + role, &Linear::from(from_B, outward_B), self.how.bulge * length_m);
                 chosen[4 + role] = found.filter(|found| self.is_new(found, chosen));
             }
         }
@@ -252,7 +257,7 @@ impl Seek<'_> {
     }
 
     /// The best by distance and depth; if it was not chosen before, it is at least this far away (m).
-    fn best(&self, distance: &Linear, at_least_m: f64) -> Option<Corner> {
+    fn best(&self, role: usize, distance: &Linear, at_least_m: f64) -> Option<Corner> {
         let mesh = self.standing.mesh;
         let score = |point_B: &Vector3<f64>| {
             let (far, deep) = (distance.at(point_B), self.depth.at(point_B));
@@ -262,18 +267,20 @@ impl Seek<'_> {
             if self.standing.is_over(corner) { score(corner.point_M(mesh)) } else { 0.0 }
         };
         let least = at_least_m * self.depth.at_most;
-        let kept = self
-            .kept
-            .iter()
-            .flatten()
-            .fold((self.deepest, 0.0), |best, &one| if of(one) > best.1 { (one, of(one)) } else { best });
+        let kept = self.kept.iter().flatten().fold(
+            (self.deepest, 0.0),
+            |best, &one| if of(one) > best.1 { (one, of(one)) } else { best },
+        );
         let (mut best, mut most) = (kept.0, kept.1);
         let (near, near_score) = kept.0.climb(mesh, of);
         if near_score > least.max(self.how.better * kept.1) {
             (best, most) = (near, near_score);
         }
         let needed = least.max(self.how.better * most);
-        if let Some((corner, score)) = mesh.outlying([distance, &self.depth], self.standing.limits, needed) {
+        let visits = if self.searched.is_none_or(|searched| searched == role) { MANY_VISITS } else { FEW_VISITS };
+        if let Some((corner, score)) =
+            mesh.outlying([distance, &self.depth], self.standing.limits, needed, visits)
+        {
             (best, most) = (Corner::new(corner), score);
         }
         (most > 0.0).then_some(best)
@@ -307,5 +314,8 @@ const BULGE: f64 = 0.05;
 const FAR: f64 = 1e-5;
 /// Depths below this are as this one \[m\].
 const LEAST_M: f64 = 1e-5;
+/// Nodes of the hierarchy that are looked at for a role: in each tick many for one of them.
+const MANY_VISITS: usize = 256;
+const FEW_VISITS: usize = 32;
 /// Limits of a face, and the level.
 const MAX_LIMITS: usize = 6;

@@ -7,7 +7,7 @@
 //! both being positive; a count that is 1 everywhere leaves the other alone. Boxes bound either count from above, hence the
 //! product; those that cannot beat what was found, or lie beyond a limit, are left out. Limits are counts, too: what makes
 //! one of them negative does not count.
-//! Cost: some tens of nodes where a vertex sticks out; at most [`MOST_VISITS`] where very many lie about as far out, and
+//! Cost: some tens of nodes where a vertex sticks out; as many as are allowed where very many lie about as far out, and
 //! then the best of those seen is the answer.
 
 use nalgebra::Vector3;
@@ -99,13 +99,15 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
     /// The vertex with the largest product of two counts, as a corner of a face (three times its number plus that of the
     /// corner), and that product, if it is larger than `more_than` >= 0.
     ///
-    /// Of vertices that are equal, that which was seen first. At most `MOST_LIMITS` limits are heeded.
+    /// Of vertices that are equal, that which was seen first. At most `MOST_LIMITS` limits are heeded. After so many nodes
+    /// and runs of faces the best of those seen is the answer.
     pub fn outlying(
         &self,
         triangles: Triangles<'_>,
         counts: [&Linear; 2],
         limits: &[Linear],
         more_than: f64,
+        most_visits: usize,
     ) -> Option<(u32, f64)> {
         let extent_m = self.extent_m();
         let [first, second] = counts.map(|count| count.rounded(extent_m));
@@ -121,7 +123,7 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
         let mut stack = Stack::<f32>::new();
         for visits in 0_usize.. {
             let Some((bound, child)) = stack.pop() else { break };
-            if visits >= MOST_VISITS {
+            if visits >= most_visits {
                 break;
             }
             // The root has none.
@@ -223,7 +225,7 @@ fn key(more_than: f64) -> f32 {
     above(-more_than * (1.0 - 4.0 * f64::from(f32::EPSILON)))
 }
 
-/// Bound on the nodes and runs of faces that are visited.
-const MOST_VISITS: usize = 128;
+/// Bound on the nodes and runs of faces that are visited for vertices within limits.
+const MOST_VISITS: usize = 256;
 /// As many as a box has sides.
 const MOST_LIMITS: usize = 6;
