@@ -12,7 +12,7 @@ use crate::hand::{FingerSettings, FingerTick, Hand, HandStart};
 use crate::integrator::explicit::{self, Kept};
 use crate::integrator::rk4::Stages;
 use crate::integrator::{Gets, Integrator, Limits, mean_angular_velocity_W};
-use crate::pair::{Pair, Response, Start, Surfacing};
+use crate::pair::{Pair, Response, Start, Surfacing, fastest_point_m_s};
 use crate::restitution::Restitution;
 use crate::row::Row;
 use crate::solver::{Motion, Solver};
@@ -60,6 +60,7 @@ pub struct Manipulation {
     pairs: Box<[Pair]>,
     rows: Vec<Row>,
     motions: Vec<Motion>,
+    speeds_m_s: Vec<f64>,
     solver: Solver,
     hand: Hand,
     restitution: Restitution,
@@ -121,7 +122,10 @@ impl Manipulation {
                 let other = body_of(b);
                 // Of two bodies once.
                 if b != a && other.is_none_or(|other| other > number) {
-                    let surfacing = Surfacing::between(&entities[a], &entities[b], settings.response);
+                    // Between two that move, springs answer: reflected velocities of many bodies at once are not found in
+                    // a tick's turns.
+                    let response = if other.is_some() { Response::Force } else { settings.response };
+                    let surfacing = Surfacing::between(&entities[a], &entities[b], response);
                     pairs.push(Pair::new([a, b], (number, other), surfacing));
                 }
             }
@@ -136,6 +140,7 @@ impl Manipulation {
             rows: Vec::with_capacity(room),
             motions: Vec::with_capacity(bodies.len()),
             hand: Hand::new(&[], bodies.len()),
+            speeds_m_s: Vec::with_capacity(bodies.len()),
             solver: Solver::with_capacity(room, bodies.len()),
             restitution: Restitution::with_capacity(room, bodies.len()),
             touching: 0,
@@ -280,10 +285,16 @@ impl Manipulation {
         );
         self.touching = self.rows.len();
         self.restitution.impacts.clear();
+        self.speeds_m_s.clear();
+        let moving = self.entities.iter().zip(&self.bodies).zip(&self.motions);
+        self.speeds_m_s.extend(
+            moving.map(|((&entity, body), motion)| fastest_point_m_s(&entities[entity], body, motion)),
+        );
         let start = Start {
             entities,
             bodies: &self.bodies,
             motions: &self.motions,
+            speeds_m_s: &self.speeds_m_s,
             dt_s,
             is_implicit: self.settings.integrator.is_implicit(),
         };

@@ -31,14 +31,7 @@ fn over(ground_shape: Shape, angle: f64, mu: f64, shape: Shape, at: Isometry3<f6
 }
 
 /// The same of another mass: a light one hardly sinks into the ground.
-fn over_of(
-    mass: f64,
-    ground_shape: Shape,
-    angle: f64,
-    mu: f64,
-    shape: Shape,
-    at: Isometry3<f64>,
-) -> World {
+fn over_of(mass: f64, ground_shape: Shape, angle: f64, mu: f64, shape: Shape, at: Isometry3<f64>) -> World {
     let turn = lean(angle);
     // So damped, what swings on its springs has come to rest in some tenths of a second.
     let entity = object(shape, turn * at, 1000.0, mu).with_damping(5.0).unwrap();

@@ -210,7 +210,8 @@ struct Points<'p> {
 impl Points<'_> {
     fn push(&mut self, number: u32, at: Vector3<f64>, radius_m: f64) {
         if let Some(place) = self.owns.get_mut(self.count) {
-            *place = Some(Own { number, at_M: (self.X_MO * Point3::from(at)).coords, radius_m, corner: None });
+            *place =
+                Some(Own { number, at_M: (self.X_MO * Point3::from(at)).coords, radius_m, corner: None });
             self.count += 1;
         }
     }
