@@ -7,22 +7,23 @@
 //! Model: each [`Row`]'s force is that of the end of the tick, `project(rest - (k dt + b) u)`, where `u` is the velocity
 //! that all forces of the tick leave its point with. A body that only fingers and fixed things press has six unknowns,
 //! whatever the number of its contact points, and they are found by Newton's method ([`newton`]). Bodies that press each
-//! other are found row by row in turns ([`gauss_seidel`]). Warm: both begin with the forces of the last tick.
+//! other are found body by body in turns ([`together`]). Warm: both begin with the forces of the last tick.
 //!
 //! Invariant: velocities and forces belong together to rounding, however many turns were made: what the bodies got is the
 //! sum of the rows' forces. Where stiction breaks, that row slides for the rest of the tick. Rows that are not made of
 //! numbers press nothing.
-//! Cost: rows times turns, at most [`MAX_SWEEPS`]; 2 to 5 in the common case.
+//! Cost: rows times rounds, at most [`MAX_SWEEPS`] a body, 1 to 5 in the common case; for bodies that press each other that
+//! times the turns over all of them.
 
-mod gauss_seidel;
 mod motion;
 mod newton;
+mod together;
 
 use nalgebra::Vector3;
 
 use crate::row::{Held, Row};
-use gauss_seidel::Block;
 pub use motion::Motion;
+use together::Room;
 
 /// The most turns over all rows in a tick.
 pub const MAX_SWEEPS: usize = 120;
@@ -39,7 +40,7 @@ pub struct Solver {
     starts: Vec<usize>,
     /// Of each body, whether another one that moves presses it.
     is_coupled: Vec<bool>,
-    blocks: Vec<Block>,
+    together: Room,
 }
 
 impl Solver {
@@ -51,7 +52,7 @@ impl Solver {
             places: Vec::with_capacity(rows),
             starts: Vec::with_capacity(bodies + 3),
             is_coupled: Vec::with_capacity(bodies),
-            blocks: Vec::with_capacity(rows),
+            together: Room::with_capacity(rows),
         }
     }
 
@@ -76,7 +77,7 @@ impl Solver {
         let (coupled, unsound) =
             self.order[self.starts[bodies]..].split_at(self.starts[bodies + 1] - self.starts[bodies]);
         unsound.iter().for_each(|&at| silence(&mut rows[at]));
-        most.max(gauss_seidel::solve(&mut self.blocks, coupled, rows, motions, dt_s))
+        most.max(together::solve(&mut self.together, coupled, rows, motions, dt_s))
     }
 
     /// Which rows are to be solved together.

@@ -1,0 +1,127 @@
+//! Bodies that press each other: body by body in turns, each by Newton's method.
+//!
+//! Model: while a body is solved for, the others go on as they do; a point that it shares with another one is as soft as
+//! that one gives way: with `g` what velocity a force of the tick gives to the other's point and `b` what the row's trial
+//! force falls by, the row's force is sought as `project((trial + b g f) / (1 + b g))`, `f` being the force that it has. Where
+//! nothing changes any more that is the row's own law. The other body gets at once what the force has changed by.
+//! Points with what is fixed, of which a box has up to eight that are as hard as can be, are solved exactly in every turn;
+//! point by point they would throw a light box about.
+//!
+//! Invariant: velocities and forces belong together to rounding, however many turns were made.
+//! Cost: bodies times turns, at most [`MAX_TURNS`], times Newton's.
+
+use nalgebra::Vector3;
+
+use super::{Motion, newton};
+use crate::row::Row;
+
+/// The most turns over all bodies in a tick.
+const MAX_TURNS: usize = 40;
+
+/// Forces that change by less than this share of the largest are found.
+const SETTLED: f64 = 1e-9;
+
+/// Room for the rows of a body as they were, and their numbers.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Room {
+    which: Vec<usize>,
+    were: Vec<Row>,
+}
+
+impl Room {
+    pub(super) fn with_capacity(rows: usize) -> Self {
+        Self { which: Vec::with_capacity(rows), were: Vec::with_capacity(rows) }
+    }
+}
+
+/// The forces of these rows of all bodies, and the motions that they leave; returns the turns made.
+pub(super) fn solve(
+    room: &mut Room,
+    which: &[usize],
+    rows: &mut [Row],
+    motions: &mut [Motion],
+    dt_s: f64,
+) -> usize {
+    for &at in which {
+        let row = &mut rows[at];
+        row.force_W = row.project(&row.force_W);
+        row.torsion.torque_nm = 0.0;
+        push(row, motions, &(row.force_W * dt_s));
+    }
+    let mut turns = 0;
+    while turns < MAX_TURNS && !which.is_empty() {
+        turns += 1;
+        let (mut changed, mut most) = (0.0_f64, 0.0_f64);
+        for body in 0..motions.len() {
+            room.which.clear();
+            room.which.extend(which.iter().copied().filter(|&at| rows[at].body == body));
+            let [change, largest] = solve_body(room, rows, motions, body, dt_s);
+            (changed, most) = (changed.max(change), most.max(largest));
+        }
+        if changed <= SETTLED * SETTLED * most {
+            break;
+        }
+    }
+    turns
+}
+
+/// The forces of one body's rows; returns the squares of their largest change and of the largest of them.
+fn solve_body(room: &mut Room, rows: &mut [Row], motions: &mut [Motion], body: usize, dt_s: f64) -> [f64; 2] {
+    let Room { which, were } = room;
+    if which.is_empty() {
+        return [0.0; 2];
+    }
+    were.clear();
+    for &at in which.iter() {
+        let row = &mut rows[at];
+        were.push(*row);
+        motions[body].push(&(row.force_W * -dt_s), &row.arms_W[0]);
+        motions[body].turn(&(row.normal_W * (-row.torsion.torque_nm * dt_s)));
+        if let Some(other) = row.other {
+            soften(row, &motions[other], dt_s);
+        }
+    }
+    newton::solve(rows, which, &mut motions[body], dt_s);
+    let (mut change, mut most) = (0.0_f64, 0.0_f64);
+    for (&at, was) in which.iter().zip(were.iter()) {
+        let row = &mut rows[at];
+        (row.rest_W, row.stiffness, row.damping) = (was.rest_W, was.stiffness, was.damping);
+        let (changed_W, turned_nm) =
+            (row.force_W - was.force_W, row.torsion.torque_nm - was.torsion.torque_nm);
+        if let Some(other) = row.other {
+            motions[other].push(&(changed_W * -dt_s), &row.arms_W[1]);
+            motions[other].turn(&(row.normal_W * (-turned_nm * dt_s)));
+        }
+        change = change.max(changed_W.norm_squared());
+        most = most.max(row.force_W.norm_squared());
+    }
+    [change, most]
+}
+
+/// The row as its own body sees it, if the other moves like that with the force that the row has.
+fn soften(row: &mut Row, other: &Motion, dt_s: f64) {
+    let arm_W = row.arms_W[1];
+    let give_W = other.mobility_W(&arm_W) * dt_s;
+    let (n, velocity_W) = (row.normal_W, other.at(&arm_W));
+    let gives = [n.dot(&(give_W * n)), give_W.diagonal().max()];
+    let falls = row.falls(dt_s);
+    let split = |v: &Vector3<f64>| {
+        let along = n * n.dot(v);
+        [along, v - along]
+    };
+    let (rests, moves, has) = (split(&row.rest_W), split(&velocity_W), split(&row.force_W));
+    row.rest_W = Vector3::zeros();
+    for part in 0..2 {
+        let soft = 1.0 + falls[part] * gives[part];
+        row.rest_W += (rests[part] + (moves[part] + has[part] * gives[part]) * falls[part]) / soft;
+        row.stiffness[part] = falls[part] / soft / dt_s;
+        row.damping[part] = 0.0;
+    }
+}
+
+fn push(row: &Row, motions: &mut [Motion], impulse_W: &Vector3<f64>) {
+    motions[row.body].push(impulse_W, &row.arms_W[0]);
+    if let Some(other) = row.other {
+        motions[other].push(&-impulse_W, &row.arms_W[1]);
+    }
+}
