@@ -1,7 +1,7 @@
 //! Bodies that press each other: body by body in turns, each by Newton's method.
 //!
 //! Model: while a body is solved for, the others go on as they do; a point that it shares with another one is as soft as
-//! that one gives way: with `g` what velocity a force of the tick gives to the other's point and `b` what the row's trial
+//! that one gives way: with `g` what velocity forces of the tick give to the other's point (as many as they share) and `b` what the row's trial
 //! force falls by, the row's force is sought as `project((trial + b g f) / (1 + b g))`, `f` being the force that it has. Where
 //! nothing changes any more that is the row's own law. The other body gets at once what the force has changed by.
 //! Points with what is fixed, of which a box has up to eight that are as hard as can be, are solved exactly in every turn;
@@ -72,13 +72,15 @@ fn solve_body(room: &mut Room, rows: &mut [Row], motions: &mut [Motion], body: u
         return [0.0; 2];
     }
     were.clear();
+    were.extend(which.iter().map(|&at| rows[at]));
     for &at in which.iter() {
         let row = &mut rows[at];
-        were.push(*row);
         motions[body].push(&(row.force_W * -dt_s), &row.arms_W[0]);
         motions[body].turn(&(row.normal_W * (-row.torsion.torque_nm * dt_s)));
         if let Some(other) = row.other {
-            soften(row, &motions[other], dt_s);
+            // What all points give to the other together is at most so many times what one does.
+            let sharing = were.iter().filter(|row| row.other == Some(other)).count();
+            soften(row, &motions[other], sharing as f64, dt_s);
         }
     }
     newton::solve(rows, which, &mut motions[body], dt_s);
@@ -99,9 +101,9 @@ fn solve_body(room: &mut Room, rows: &mut [Row], motions: &mut [Motion], body: u
 }
 
 /// The row as its own body sees it, if the other moves like that with the force that the row has.
-fn soften(row: &mut Row, other: &Motion, dt_s: f64) {
+fn soften(row: &mut Row, other: &Motion, sharing: f64, dt_s: f64) {
     let arm_W = row.arms_W[1];
-    let give_W = other.mobility_W(&arm_W) * dt_s;
+    let give_W = other.mobility_W(&arm_W) * (sharing * dt_s);
     let (n, velocity_W) = (row.normal_W, other.at(&arm_W));
     let gives = [n.dot(&(give_W * n)), give_W.diagonal().max()];
     let falls = row.falls(dt_s);
