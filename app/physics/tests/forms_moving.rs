@@ -109,8 +109,7 @@ fn forces_change_as_little_as_the_poses_do() {
     }
     // Where a rim lies deeper than a tip is round, the way out that it came by ends somewhere: it takes another. That turns
     // the force, which does not grow.
-    println!("{} of {tried}: {jumped:?}", jumped.len());
-    assert!(jumped.len() * 100 <= tried, "{} of {tried}: {jumped:?}", jumped.len());
+    assert!(jumped.len() * 150 <= tried, "{} of {tried}: {jumped:?}", jumped.len());
     assert!(jumped.iter().all(|(_, coarse, fine)| coarse.max(*fine) < 1.0), "{jumped:?}");
 }
 
