@@ -2,8 +2,22 @@
 //!
 //! Model (Melder ch. 6.2.1, 7.4): a contact that fills an edge gives its two ends, one that fills a face its corners. A
 //! point is reported from a given reach on before it touches, so that its spring is there when it does.
-//! Frames and signs: W; normals leave B and point to A; gaps are negative where they overlap.
-//! Invariants: no allocation; at most [`MAX_POINTS`] points; an id stands for the same features from tick to tick.
+//! Who finds them, by the kinds of the two:
+//! - convex forms with each other: `convex_pair`, along the direction in which they touch (`axis`, `follow`, `gjk`), what
+//!   flat pieces (`overlay`) and lines (`lines`) share; on planes the same with the plane's normal;
+//! - balls on anything that tells its nearest point: `ball`; rings, as a ball that is swept along a circle: `ring`;
+//! - meshes with anything: `mesh`.
+//!
+//! Who cannot meet says [`is_collidable`]: trees of shapes with nothing, NURBS and surfaces of one's own with balls only, a
+//! torus that is scaled by different factors with balls only, a torus not with other scaled forms.
+//!
+//! Frames and signs: W; normals leave B and point to A; gaps are negative where they overlap. Of points nearer to each other
+//! than a millimetre the later ones count with a part of their depth.
+//! Invariants: no allocation; at most [`MAX_POINTS`] points; an id stands for the same features from tick to tick; finite for
+//! every pose; along a continuous way the forces of springs on the points are continuous, save where the way out that a
+//! body came by ends (a rim that is deeper in a tip than that is round).
+//! Cost: mostly below 1 us a pair while the direction of the last tick can be followed, a few where a ring has edges beside
+//! it; bounded searches of up to some tens where it cannot. `cargo bench -p physics --bench collide -- table`.
 
 use haptics::{Form, Shape};
 use nalgebra::{Isometry3, Vector3};

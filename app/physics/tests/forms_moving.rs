@@ -109,8 +109,61 @@ fn forces_change_as_little_as_the_poses_do() {
     }
     // Where a rim lies deeper than a tip is round, the way out that it came by ends somewhere: it takes another. That turns
     // the force, which does not grow.
-    assert!(jumped.len() * 100 <= tried, "{} of {tried}: {jumped:?}", jumped.len());
+    assert!(jumped.len() * 150 <= tried, "{} of {tried}: {jumped:?}", jumped.len());
     assert!(jumped.iter().all(|(_, coarse, fine)| coarse.max(*fine) < 1.0), "{jumped:?}");
+}
+
+#[test]
+fn moved_out_along_the_normal_by_the_depth_they_are_as_far_apart_as_that_is_more() {
+    for (name, a, b) in pairs() {
+        if let (Form::Scaled(_), Form::Scaled(_)) = (a, b) {
+            continue;
+        }
+        let mut noise = Noise(7);
+        for _ in 0..4 {
+            let (X_WA, X_WB, mut memory) = overlapping(&a, &b, 3e-4, &mut noise);
+            let found = points(&a, &X_WA, &b, &X_WB, REACH, &mut memory);
+            let deepest = found.iter().min_by(|p, q| p.gap_m.total_cmp(&q.gap_m)).unwrap();
+            // A ring may come nearer to something else on its way out.
+            if found.len() > 1 && name.contains("torus") {
+                continue;
+            }
+            let out = deepest.normal_W * (1e-3 - deepest.gap_m);
+            let gap = distance(&a, &pose(X_WA.rotation, X_WA.translation.vector + out), &b, &X_WB);
+            // The oracle's 1e-7 m; and a normal that is wrong by 1e-4 leaves (1e-4)^2 of the way.
+            assert!((gap - 1e-3).abs() < 2e-7, "{name}: {gap} {found:?}");
+            // The point is one of A's surface.
+            let on_a = X_WA.inverse_transform_point(&nalgebra::Point3::from(deepest.point_W)).coords;
+            if !matches!(a, Form::Scaled(_)) {
+                assert!(distance_outside(&a, &on_a).abs() < 1e-6, "{name}: {deepest:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_has_gone_over_an_edge_is_free() {
+    let slab: Form = haptics::Cuboid::new([0.2, 0.1, 0.2]).unwrap().into();
+    for (name, a) in all().into_iter().chain(scaled()) {
+        let radius = physics::collide::bounding_ball(&a.into()).unwrap().1;
+        let X_WB = Isometry3::translation(0.0, -0.05, 0.0);
+        let turn = Noise(3).turn();
+        let at = |x: f64, y: f64| pose(turn, Vector3::new(x, y, 0.0));
+        let high = at(0.05, 0.2);
+        let gap = deepest(&points(&a, &high, &slab, &X_WB, 1.0, &mut PairMemory::default()));
+        let y = 0.2 - gap - 5e-4;
+        let mut memory = PairMemory::default();
+        let mut was_in_contact = 0;
+        for step in 0..200 {
+            let x = 0.05 + f64::from(step) * 1e-3;
+            let found = points(&a, &at(x, y), &slab, &X_WB, REACH, &mut memory);
+            let touches = deepest(&found) < 0.0;
+            was_in_contact += i32::from(touches);
+            assert!(!touches || x < 0.1 + radius, "{name} at {x}: {found:?}");
+            assert!(touches || x > 0.1 - radius, "{name} at {x}");
+        }
+        assert!(was_in_contact > 20, "{name}");
+    }
 }
 
 #[test]

@@ -23,33 +23,25 @@ pub(super) struct Alongside {
 
 const CROSSING_ID: u32 = 1100;
 const END_IDS: [u32; 2] = [1101, 1102];
-/// An end nearer to the crossing than this counts less \[m\].
+/// An end nearer to the crossing than this leaves it more \[m\].
 const FADE_M: f64 = 1e-3;
 /// Lines at this sine or more only cross.
 const PARALLEL: f64 = 0.3;
 
 impl Alongside {
-    /// Appends up to three points.
+    /// Appends up to three points: the crossing, to which the ends give way where they are near it.
     pub(super) fn find(&self, spots: &mut Spots) {
-        let mut crossing = 1.0;
-        if let Some((ends, alongside)) = self.shared() {
-            let spots_at = ends.map(|at| self.at(at));
-            let apart = |spot: &Spot| alongside * ((spot.on_a - self.on_a).norm() / FADE_M).min(1.0);
-            let share = |spot: &Spot| {
-                apart(spot) * if self.gap_m < 0.0 { (spot.gap_m / self.gap_m).clamp(0.0, 1.0) } else { 0.0 }
-            };
-            crossing -= share(&spots_at[0]).min(share(&spots_at[1]));
-            for (mut spot, id) in spots_at.into_iter().zip(END_IDS) {
-                spot.id = id;
-                if spot.gap_m < 0.0 {
-                    spot.gap_m *= apart(&spot);
-                }
-                spots.push(spot);
-            }
-        }
-        let gap_m = if self.gap_m < 0.0 { self.gap_m * crossing } else { self.gap_m };
-        if crossing > 0.0 {
-            spots.push(Spot { id: CROSSING_ID, on_a: self.on_a, normal: self.normal, gap_m });
+        let crossing = Spot { id: CROSSING_ID, on_a: self.on_a, normal: self.normal, gap_m: self.gap_m };
+        let Some((ends, alongside)) = self.shared() else { return spots.push(crossing) };
+        let ends = ends.map(|at| self.at(at));
+        let carries = |end: &Spot| {
+            let apart = ((end.on_a - self.on_a).norm() / FADE_M).min(1.0);
+            let deep = if self.gap_m < 0.0 { (end.gap_m / self.gap_m).clamp(0.0, 1.0) } else { 0.0 };
+            alongside * apart * deep
+        };
+        spots.push_share(crossing, 1.0 - carries(&ends[0]).min(carries(&ends[1])));
+        for (end, id) in ends.into_iter().zip(END_IDS) {
+            spots.push_share(Spot { id, ..end }, alongside);
         }
     }
 

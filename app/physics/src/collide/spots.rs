@@ -1,8 +1,8 @@
 //! Contact points while they are being found.
 //!
 //! Model: where a contact's outline is cut off, its corners change in number; two that come out of one must not press twice
-//! as hard at once. A point that lies nearer than [`FADE_M`] to one that was found before it counts with the share of that
-//! distance: its depth is that much less.
+//! as hard at once. A point that lies nearer than [`FADE_M`] to one that was found before it leaves to that one what both
+//! are deep, the more the nearer it is.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -23,6 +23,8 @@ pub(super) struct Spot {
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Spots {
     all: [Spot; MAX_SPOTS],
+    /// With what depth each counts \[m\].
+    depths_m: [f64; MAX_SPOTS],
     count: usize,
     /// No farther than this.
     reach_m: f64,
@@ -32,7 +34,7 @@ pub(super) struct Spots {
 const MAX_SPOTS: usize = 24;
 /// Points nearer to each other than this share their depth \[m\].
 const FADE_M: f64 = 1e-3;
-/// A share of less is nothing.
+/// A share or a distance of less is nothing.
 const NOTHING: f64 = 1e-4;
 
 impl Spots {
@@ -41,23 +43,32 @@ impl Spots {
     }
 
     /// Adds one that is near enough, after all to which it must give way.
-    pub(super) fn push(&mut self, mut spot: Spot) {
+    pub(super) fn push(&mut self, spot: Spot) {
+        self.push_share(spot, 1.0);
+    }
+
+    /// Adds one that counts with a share of its depth.
+    pub(super) fn push_share(&mut self, spot: Spot, share: f64) {
         let is_finite = |v: &Vector3<f64>| v.iter().all(|x| x.is_finite());
         if !(is_finite(&spot.on_a) && is_finite(&spot.normal) && spot.gap_m <= self.reach_m)
             || self.count == MAX_SPOTS
         {
             return;
         }
-        let squared = |other: &Spot| (other.on_a - spot.on_a).norm_squared();
-        let nearest = self.as_slice().iter().map(squared).fold(f64::INFINITY, f64::min);
-        let share = nearest.sqrt() / FADE_M;
-        if share < NOTHING {
+        let depth_m = (-spot.gap_m).max(0.0);
+        let (mut taken_m, mut nearest) = (0.0_f64, f64::INFINITY);
+        for other in self.as_slice() {
+            let apart = (other.on_a - spot.on_a).norm() / FADE_M;
+            let both_m = depth_m.min(-other.gap_m).max(0.0);
+            taken_m = taken_m.max((1.0 - apart).max(0.0) * both_m);
+            nearest = nearest.min(apart);
+        }
+        let counts_m = (depth_m * share - taken_m).max(0.0);
+        if nearest < NOTHING || depth_m > 0.0 && counts_m <= NOTHING * depth_m {
             return;
         }
-        if spot.gap_m < 0.0 {
-            spot.gap_m *= share.min(1.0);
-        }
         self.all[self.count] = spot;
+        self.depths_m[self.count] = counts_m;
         self.count += 1;
     }
 
@@ -75,6 +86,7 @@ impl Spots {
         while self.count > MAX_POINTS && at < self.count {
             if ids.contains(&self.all[at].id) {
                 self.all.copy_within(at + 1..self.count, at);
+                self.depths_m.copy_within(at + 1..self.count, at);
                 self.count -= 1;
             } else {
                 at += 1;
@@ -84,7 +96,7 @@ impl Spots {
 
     /// Reports them in W; `is_swapped`: the second form is A.
     pub(super) fn report(&self, X_W: &Isometry3<f64>, is_swapped: bool, found: &mut ContactPoints) {
-        for spot in self.as_slice() {
+        for (spot, depth_m) in self.as_slice().iter().zip(self.depths_m) {
             let (mut on_a, mut normal) = (spot.on_a, spot.normal);
             if is_swapped {
                 (on_a, normal) = (on_a - normal * spot.gap_m, -normal);
@@ -93,7 +105,7 @@ impl Spots {
                 id: spot.id,
                 point_W: (X_W * Point3::from(on_a)).coords,
                 normal_W: X_W.rotation * normal,
-                gap_m: spot.gap_m,
+                gap_m: if spot.gap_m < 0.0 { -depth_m } else { spot.gap_m },
             });
         }
     }
