@@ -19,6 +19,8 @@ pub struct Anchor {
     pub id: u32,
     /// The material that was at the contact, of the body and of the other, each in its own frame \[m\].
     materials: [Vector3<f64>; 2],
+    /// Of either, whether it is the same material as in the last tick: a vertex, not a ball that rolls.
+    pub(crate) is_same_material: [bool; 2],
     /// In the other's frame, before the motion of the tick \[m\].
     stretch: Vector3<f64>,
     /// Force on the body in the last tick \[N\], in the other's frame.
@@ -36,15 +38,28 @@ impl Anchor {
     pub(crate) fn begin(point: &ContactPoint, X_WA: &Isometry3<f64>, X_WB: &Isometry3<f64>) -> Self {
         let mut anchor = Self { id: point.id, ..Self::default() };
         anchor.touch(point, X_WA, X_WB);
+        anchor.is_same_material = [false; 2];
         anchor
     }
 
     /// Goes on at this point: takes note of what moved since the last tick.
-    pub(crate) fn carry(&mut self, point: &ContactPoint, X_WA: &Isometry3<f64>, X_WB: &Isometry3<f64>) {
+    ///
+    /// Poses of the body and of the other: now, and in the last tick.
+    pub(crate) fn carry(
+        &mut self,
+        point: &ContactPoint,
+        now: [&Isometry3<f64>; 2],
+        last: [&Isometry3<f64>; 2],
+    ) {
+        let [X_WA, X_WB] = now;
         // What moved before anything pressed stretched nothing.
         if self.is_pressed() {
             let [a_A, b_B] = self.materials.map(Point3::from);
-            let moved_W = X_WA * a_A - X_WB * b_B;
+            let at = Point3::from(point.point_W);
+            let [a_now_A, b_now_B] = now.map(|pose| pose.inverse_transform_point(&at));
+            // The mean of where the material that was at the contact has come to, and of where that which is now has come
+            // from: either alone makes a ball that rolls and spins drag by `omega^2 r dt^2 / 2` in each tick.
+            let moved_W = (X_WA * a_A - X_WB * b_B + (last[1] * b_now_B - last[0] * a_now_A)) * 0.5;
             // Along the normal it is another spring's: here it would be taken for a turn of the stretch.
             let across_W = moved_W - point.normal_W * point.normal_W.dot(&moved_W);
             self.stretch += X_WB.inverse_transform_vector(&across_W);
@@ -55,7 +70,10 @@ impl Anchor {
 
     fn touch(&mut self, point: &ContactPoint, X_WA: &Isometry3<f64>, X_WB: &Isometry3<f64>) {
         let at = Point3::from(point.point_W);
-        self.materials = [X_WA, X_WB].map(|pose| pose.inverse_transform_point(&at).coords);
+        let materials = [X_WA, X_WB].map(|pose| pose.inverse_transform_point(&at).coords);
+        let is_same = |side: usize| (materials[side] - self.materials[side]).norm_squared() < SAME_M * SAME_M;
+        self.is_same_material = [is_same(0), is_same(1)];
+        self.materials = materials;
         let normal_B = X_WB.inverse_transform_vector(&point.normal_W);
         // Seen in the tangent plane, and no shorter for its having turned.
         let length_m = self.stretch.norm();
@@ -117,3 +135,6 @@ fn is_caught(row: &Row, normal_n: f64) -> bool {
     let share = if row.mu_slide == row.mu_hold { 1.0 - 1e-9 } else { 1.0 - haptics::RESTICK_MARGIN };
     across < (share * row.mu_slide * normal_n).powi(2)
 }
+
+/// Nearer is the same material \[m\]: what moves less in a tick does not matter.
+const SAME_M: f64 = 1e-9;

@@ -92,6 +92,8 @@ impl Integrator {
                 thesis_euler::turn(body, &gets.wrench.torque_W, is_gyroscopic, limits, dt_s);
             }
         }
+        // The axes have turned under the angular momentum: about a thinner one it is a faster turn.
+        limits.spin(body);
     }
 }
 

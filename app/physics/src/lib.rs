@@ -38,6 +38,7 @@ mod manipulation;
 mod mass;
 mod pair;
 mod pair_friction;
+mod restitution;
 mod row;
 mod soft_finger;
 mod solver;

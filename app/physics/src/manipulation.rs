@@ -13,6 +13,7 @@ use crate::integrator::explicit::{self, Kept};
 use crate::integrator::rk4::Stages;
 use crate::integrator::{Gets, Integrator, Limits, mean_angular_velocity_W};
 use crate::pair::{Pair, Response, Start, Surfacing};
+use crate::restitution::Restitution;
 use crate::row::Row;
 use crate::solver::{Motion, Solver};
 use crate::touch::Touch;
@@ -61,6 +62,7 @@ pub struct Manipulation {
     motions: Vec<Motion>,
     solver: Solver,
     hand: Hand,
+    restitution: Restitution,
     /// The first so many rows are fingers'.
     touching: usize,
     gets: Box<[Gets]>,
@@ -135,6 +137,7 @@ impl Manipulation {
             motions: Vec::with_capacity(bodies.len()),
             hand: Hand::new(&[], bodies.len()),
             solver: Solver::with_capacity(room, bodies.len()),
+            restitution: Restitution::with_capacity(room, bodies.len()),
             touching: 0,
             gets: vec![Gets::default(); bodies.len()].into(),
             stages: Stages::with_capacity(room, bodies.len()),
@@ -153,6 +156,7 @@ impl Manipulation {
         self.rows = Vec::with_capacity(room);
         self.solver = Solver::with_capacity(room, bodies);
         self.stages = Stages::with_capacity(room, bodies);
+        self.restitution = Restitution::with_capacity(room, bodies);
         self.fixed = Vec::with_capacity(room);
         self
     }
@@ -271,6 +275,7 @@ impl Manipulation {
             &mut self.rows,
         );
         self.touching = self.rows.len();
+        self.restitution.impacts.clear();
         let start = Start {
             entities,
             bodies: &self.bodies,
@@ -279,7 +284,7 @@ impl Manipulation {
             is_implicit: self.settings.integrator.is_implicit(),
         };
         for pair in &mut self.pairs {
-            pair.gather(&start, &mut self.rows);
+            pair.gather(&start, &mut self.rows, &mut self.restitution.impacts);
         }
         touch_rows
     }
@@ -311,7 +316,7 @@ impl Manipulation {
                 }
             }
         }
-        let sweeps = self.solver.solve(&mut self.rows, &mut self.motions, dt_s);
+        let sweeps = self.restitution.solve(&mut self.solver, &mut self.rows, &mut self.motions, dt_s);
         explicit::release(&mut self.rows, &mut self.fixed);
         sweeps
     }

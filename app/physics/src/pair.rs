@@ -6,7 +6,7 @@
 //! A contact that is found deep at once (objects placed into each other) is let out slowly.
 
 use haptics::Entity;
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use crate::anchor::Anchor;
 use crate::body::Body;
@@ -98,8 +98,8 @@ impl Pair {
         }
     }
 
-    /// Finds where it touches, and appends a row for each point.
-    pub(crate) fn gather(&mut self, start: &Start<'_>, rows: &mut Vec<Row>) {
+    /// Finds where it touches, and appends a row for each point; notes which rows are impacts.
+    pub(crate) fn gather(&mut self, start: &Start<'_>, rows: &mut Vec<Row>, impacts: &mut Vec<usize>) {
         (self.first_row, self.rows) = (rows.len(), 0);
         let [a, b] = self.entities.map(|index| &start.entities[index]);
         let speed_m_s = self.closing_speed(start);
@@ -111,14 +111,19 @@ impl Pair {
         let (in_A, in_B) = (Solid { shape: &a.shape, X_W: &a.X_WB }, Solid { shape: &b.shape, X_W: &b.X_WB });
         let mut found = ContactPoints::default();
         contact_points(in_A, in_B, reach_m, &mut self.memory, &mut found);
-        self.carry(&found, &a.X_WB, &b.X_WB, reach_m, speed_m_s * start.dt_s);
+        let poses = [[&a.X_WB, &b.X_WB], [&a.previous_X_WB, &b.previous_X_WB]];
+        self.carry(&found, poses, reach_m, speed_m_s * start.dt_s);
         for (anchor, point) in self.anchors.iter_mut().zip(found.as_slice()) {
             if rows.len() == rows.capacity() {
                 return;
             }
             let let_out_m = let_out_m_s(anchor.granted_m, start.dt_s) * start.dt_s;
             anchor.granted_m = (anchor.granted_m - let_out_m).clamp(0.0, (-point.gap_m).max(0.0));
-            rows.push(row(self.bodies, &self.surfacing, anchor, point, &b.X_WB, start));
+            let (row, is_impact) = row(self.bodies, &self.surfacing, anchor, point, &b.X_WB, start);
+            if is_impact {
+                impacts.push(rows.len());
+            }
+            rows.push(row);
             self.rows += 1;
         }
     }
@@ -140,8 +145,7 @@ impl Pair {
     fn carry(
         &mut self,
         found: &ContactPoints,
-        X_WA: &Isometry3<f64>,
-        X_WB: &Isometry3<f64>,
+        [now, last]: [[&Isometry3<f64>; 2]; 2],
         reach_m: f64,
         moved_m: f64,
     ) {
@@ -157,21 +161,21 @@ impl Pair {
             if let Some(old) = same {
                 is_free[old] = false;
                 self.anchors[at] = was[old];
-                self.anchors[at].carry(point, X_WA, X_WB);
+                self.anchors[at].carry(point, now, last);
             }
         }
         for (at, point) in found.as_slice().iter().enumerate().filter(|(at, _)| is_new[*at]) {
             // The same contact under another name: it came from one face of a mesh to the next.
             let near_m = NEAR_M + 2.0 * moved_m;
             let is_near =
-                |old: &usize| is_free[*old] && (was[*old].point_W(X_WB) - point.point_W).norm() < near_m;
+                |old: &usize| is_free[*old] && (was[*old].point_W(now[1]) - point.point_W).norm() < near_m;
             if let Some(old) = (0..MAX_POINTS).find(is_near) {
                 is_free[old] = false;
                 self.anchors[at] = was[old];
-                self.anchors[at].carry(point, X_WA, X_WB);
+                self.anchors[at].carry(point, now, last);
                 continue;
             }
-            self.anchors[at] = Anchor::begin(point, X_WA, X_WB);
+            self.anchors[at] = Anchor::begin(point, now[0], now[1]);
             if begins && -point.gap_m > reach_m {
                 self.anchors[at].granted_m = -point.gap_m;
             }
@@ -209,16 +213,22 @@ fn row(
     point: &ContactPoint,
     X_WB: &Isometry3<f64>,
     start: &Start<'_>,
-) -> Row {
-    let arm = |body: usize| point.point_W - start.bodies[body].centre_W;
+) -> (Row, bool) {
     let dt_s = start.dt_s;
+    let arm = |body: usize, side: usize| {
+        let arm_W = point.point_W - start.bodies[body].centre_W;
+        // Material on an arm that turns moves along the chord: at right angles to the arm of the tick's middle. What rolls
+        // touches with other material by then.
+        let goes_along = anchor.is_same_material[side] && start.is_implicit;
+        if goes_along { middle_W(&start.motions[body], dt_s) * arm_W } else { arm_W }
+    };
     let (k, b) = (surfacing.stiffness_n_per_m, surfacing.damping_n_s_per_m);
     let gap_m = point.gap_m + anchor.granted_m;
     let n = point.normal_W;
     let mut row = Row {
         body,
         other,
-        arms_W: [arm(body), other.map_or(Vector3::zeros(), arm)],
+        arms_W: [arm(body, 0), other.map_or(Vector3::zeros(), |other| arm(other, 1))],
         normal_W: n,
         rest_W: Vector3::zeros(),
         stiffness: [k; 2],
@@ -258,13 +268,20 @@ fn row(
             };
             if impact.is_one {
                 row.rest_W = n * (stop * wanted_m_s);
-                return row;
+                return (row, true);
             }
             stop * wanted_m_s
         }
     };
     row.rest_W = n * rest_n - anchor.stretch_W(X_WB) * row.stiffness[1];
-    row
+    (row, false)
+}
+
+/// How far a body turns in half a tick, if nothing touches it.
+fn middle_W(motion: &Motion, dt_s: f64) -> UnitQuaternion<f64> {
+    // Beyond a radian a chord is none.
+    let turn_W = motion.angular_velocity_W * (0.5 * dt_s);
+    UnitQuaternion::from_scaled_axis(if turn_W.norm_squared() < 0.25 { turn_W } else { Vector3::zeros() })
 }
 
 /// What a row's point does that meets the other in a tick.

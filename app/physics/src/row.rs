@@ -209,7 +209,7 @@ impl Row {
     }
 
     #[inline]
-    fn trial_at_end_W(&self, velocity_W: &Vector3<f64>, dt_s: f64) -> Vector3<f64> {
+    pub(crate) fn trial_at_end_W(&self, velocity_W: &Vector3<f64>, dt_s: f64) -> Vector3<f64> {
         let [along, across] = self.falls(dt_s);
         let v_n = self.normal_W.dot(velocity_W);
         self.rest_W - velocity_W * across - self.normal_W * (v_n * (along - across))

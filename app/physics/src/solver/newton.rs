@@ -26,14 +26,14 @@ const SOLVED: f64 = 1e-13;
 /// When nothing brings it nearer any more, this is solved too.
 const NEARLY_SOLVED: f64 = 1e-9;
 /// Of velocities; points that are very hard make much of it.
-const ROUNDING: f64 = 1e-15;
+const ROUNDING: f64 = 1e-14;
 /// How often a step is halved.
 const HALVINGS: usize = 6;
 /// Shares of the tick for which forces last, on the way to all of it.
 const LOADS: [f64; 8] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 0.3, 0.6];
 /// Turns of the points one by one: at first, and the most at once; each time twice as many.
 const FIRST_TURNS: usize = 8;
-const MOST_TURNS: usize = 256;
+const MOST_TURNS: usize = 512;
 
 /// What all points do at some `p`.
 #[derive(Clone, Copy)]
@@ -82,8 +82,9 @@ pub(super) fn solve(rows: &mut [Row], which: &[usize], motion: &mut Motion, dt_s
     problem.settle(rows, which, &p);
     if !is_found {
         // Not what was sought, but forces that contacts can have.
-        problem.relax(rows, which, FIRST_TURNS);
-        which.iter().for_each(|&at| _ = lets_slip(&mut rows[at]));
+        problem.let_slip(rows, which, &p);
+        which.iter().for_each(|&at| (rows[at].force_W, rows[at].torsion.torque_nm) = (Vector3::zeros(), 0.0));
+        problem.relax(rows, which, MOST_TURNS);
     }
     *motion = problem.moving(&problem.impulse(rows, which));
     rounds
@@ -273,16 +274,20 @@ impl Problem {
         derivative
     }
 
-    /// Each point in turn goes as far to what its velocity asks for as it may, if that is to lessen what is left.
+    /// Projected Gauss-Seidel: each point in turn goes as far to what its velocity asks for, along the normal and across it, as it
+    /// may if that is to lessen what is left, and stays in its cone.
     fn relax(&self, rows: &mut [Row], which: &[usize], turns: usize) -> Vector6 {
         let mut motion = self.moving(&self.impulse(rows, which));
         for at in (0..turns).flat_map(|_| which.iter()) {
             let row = &mut rows[*at];
             let arm_W = row.arms_W[0];
-            let [along, across] = row.falls(self.dt_s);
             let most_give = motion.inverse_mass + arm_W.norm_squared() * motion.inverse_inertia_W.trace();
-            let share = 1.0 / (1.0 + along.max(across) * most_give * self.dt_s);
-            let change_W = (row.at_end_W(&motion.at(&arm_W), self.dt_s) - row.force_W) * share;
+            let [along, across] =
+                row.falls(self.dt_s).map(|falls| 1.0 / (1.0 + falls * most_give * self.dt_s));
+            let missing_W = row.trial_at_end_W(&motion.at(&arm_W), self.dt_s) - row.force_W;
+            let missing_n = row.normal_W.dot(&missing_W);
+            let wanted_W = row.force_W + missing_W * across + row.normal_W * (missing_n * (along - across));
+            let change_W = row.project(&wanted_W) - row.force_W;
             row.force_W += change_W;
             motion.push(&(change_W * self.dt_s), &arm_W);
             if row.torsion.most_nm > 0.0 {
