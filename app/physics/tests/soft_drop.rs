@@ -36,8 +36,8 @@ fn between_point_fingers_a_cube_swings_as_a_physical_pendulum() {
         let period = crossings[2] - crossings[0];
         let small = 2.0 * PI * (held.inertia() / held.weight_moment()).sqrt();
         let expected = small * slower(amplitude);
-        // The springs of the pads give: by m g / 2k, a hundredth of a millimetre... of 5 mm at least; their damping takes a
-        // little of the amplitude.
+        // The axis gives, by m g / 2k = 0.1 mm and what swinging adds to it, of an arm of 5 mm at least; the pads' damping
+        // takes a little of the amplitude.
         assert!((period / expected - 1.0).abs() < 3e-3, "{arm} {amplitude}: {period} {expected}");
     }
 }
@@ -189,7 +189,7 @@ fn viscous_torsion_holds_above_the_critical_area_at_once_and_without_sagging() {
 
 #[test]
 fn stick_slip_torsion_holds_above_one_area_drops_below_another_and_goes_in_jerks_between() {
-    // Of which the smaller carries the cube by the skin of its teeth.
+    // The smallest of those below carries the cube with 6 % to spare.
     let (at_rest, turning) = (7e-6, 4.5e-6);
     let model = TorsionModel::StickSlip {
         critical_area_at_rest_m2: at_rest,
