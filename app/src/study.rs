@@ -1,7 +1,8 @@
 //! `phantom3 study ...`: questions about the whole system that a table and a picture answer.
 //!
-//! Every study runs on the virtual clock, so that its answers are the same on every machine.
+//! Every study runs on the virtual clock or on none, so that its answers are the same on every machine.
 
+pub mod integrators;
 pub mod stiffness;
 
 use crate::outcome::RunFailure;
@@ -13,6 +14,8 @@ use rt_core::signals::StopSignals;
 pub enum StudyCommand {
     /// How stiff a virtual wall may be before it buzzes, by way of replying, rate, damping and hand
     Stiffness(stiffness::StiffnessArgs),
+    /// How well moving objects are integrated: a spinning body for a minute, and how stiff a light one may be held
+    Integrators(integrators::IntegratorsArgs),
 }
 
 /// Does the study.
@@ -22,5 +25,6 @@ pub enum StudyCommand {
 pub fn execute(command: &StudyCommand, signals: &StopSignals) -> Result<crate::outcome::Stop, RunFailure> {
     match command {
         StudyCommand::Stiffness(args) => stiffness::execute(args, signals),
+        StudyCommand::Integrators(args) => integrators::execute(args, signals),
     }
 }

@@ -12,7 +12,7 @@ use crate::hand::{FingerSettings, FingerTick, Hand, HandStart};
 use crate::integrator::explicit::{self, Kept};
 use crate::integrator::rk4::Stages;
 use crate::integrator::{Gets, Integrator, Limits, mean_angular_velocity_W};
-use crate::pair::{Pair, Response, Start, Surfacing};
+use crate::pair::{Pair, Response, Start, Surfacing, fastest_point_m_s};
 use crate::restitution::Restitution;
 use crate::row::Row;
 use crate::solver::{Motion, Solver};
@@ -60,6 +60,7 @@ pub struct Manipulation {
     pairs: Box<[Pair]>,
     rows: Vec<Row>,
     motions: Vec<Motion>,
+    speeds_m_s: Vec<f64>,
     solver: Solver,
     hand: Hand,
     restitution: Restitution,
@@ -136,6 +137,7 @@ impl Manipulation {
             rows: Vec::with_capacity(room),
             motions: Vec::with_capacity(bodies.len()),
             hand: Hand::new(&[], bodies.len()),
+            speeds_m_s: Vec::with_capacity(bodies.len()),
             solver: Solver::with_capacity(room, bodies.len()),
             restitution: Restitution::with_capacity(room, bodies.len()),
             touching: 0,
@@ -276,10 +278,16 @@ impl Manipulation {
         );
         self.touching = self.rows.len();
         self.restitution.impacts.clear();
+        self.speeds_m_s.clear();
+        let moving = self.entities.iter().zip(&self.bodies).zip(&self.motions);
+        self.speeds_m_s.extend(
+            moving.map(|((&entity, body), motion)| fastest_point_m_s(&entities[entity], body, motion)),
+        );
         let start = Start {
             entities,
             bodies: &self.bodies,
             motions: &self.motions,
+            speeds_m_s: &self.speeds_m_s,
             dt_s,
             is_implicit: self.settings.integrator.is_implicit(),
         };

@@ -78,6 +78,8 @@ pub(crate) struct Start<'t> {
     pub(crate) bodies: &'t [Body],
     /// As they are without contacts, at the end of the tick.
     pub(crate) motions: &'t [Motion],
+    /// The most that any point of each moves per time \[m/s\].
+    pub(crate) speeds_m_s: &'t [f64],
     pub(crate) dt_s: f64,
     /// Whether forces are those of the end of the tick.
     pub(crate) is_implicit: bool,
@@ -184,16 +186,16 @@ impl Pair {
 
     /// The most that A and B can come nearer to each other per time \[m/s\].
     fn closing_speed(&self, start: &Start<'_>) -> f64 {
-        let speed = |body: usize, entity: usize| {
-            let motion = &start.motions[body];
-            let ball = bounding_ball(&start.entities[entity].shape).map_or(0.0, |(centre_B, radius_m)| {
-                radius_m + (centre_B - start.bodies[body].mass.centre_B).norm()
-            });
-            motion.velocity_W.norm() + motion.angular_velocity_W.norm() * ball
-        };
         let (a, b) = self.bodies;
-        speed(a, self.entities[0]) + b.map_or(0.0, |b| speed(b, self.entities[1]))
+        start.speeds_m_s[a] + b.map_or(0.0, |b| start.speeds_m_s[b])
     }
+}
+
+/// The most that any point of a body moves per time \[m/s\].
+pub(crate) fn fastest_point_m_s(entity: &Entity, body: &Body, motion: &Motion) -> f64 {
+    let farthest_m = bounding_ball(&entity.shape)
+        .map_or(0.0, |(centre_B, radius_m)| radius_m + (centre_B - body.mass.centre_B).norm());
+    motion.velocity_W.norm() + motion.angular_velocity_W.norm() * farthest_m
 }
 
 fn is_near(a: &Entity, b: &Entity, reach_m: f64) -> bool {

@@ -33,6 +33,8 @@ pub struct Solver {
     room: [usize; 2],
     /// Numbers of rows: those of each body that presses no other body, then those of all others, then the unsound ones.
     order: Vec<usize>,
+    /// Of each row, among which it is.
+    places: Vec<usize>,
     /// Where the rows of each body begin in `order`.
     starts: Vec<usize>,
     /// Of each body, whether another one that moves presses it.
@@ -46,6 +48,7 @@ impl Solver {
         Self {
             room: [rows, bodies],
             order: Vec::with_capacity(rows),
+            places: Vec::with_capacity(rows),
             starts: Vec::with_capacity(bodies + 3),
             is_coupled: Vec::with_capacity(bodies),
             blocks: Vec::with_capacity(rows),
@@ -79,30 +82,32 @@ impl Solver {
     /// Which rows are to be solved together.
     fn sort(&mut self, rows: &[Row], motions: &[Motion]) {
         let bodies = motions.len();
+        let (coupled, unsound) = (bodies, bodies + 1);
         self.is_coupled.clear();
         self.is_coupled.resize(bodies, false);
+        self.places.clear();
         for row in rows {
-            if let Some(other) =
-                row.other.filter(|&other| is_sound(row, motions) && !motions[other].is_fixed())
-            {
+            let is_sound = is_sound(row, motions);
+            self.places.push(if is_sound { row.body } else { unsound });
+            if let Some(other) = row.other.filter(|&other| is_sound && !motions[other].is_fixed()) {
                 self.is_coupled[row.body] = true;
                 self.is_coupled[other] = true;
             }
         }
-        let place = |row: &Row| match row {
-            row if !is_sound(row, motions) => bodies + 1,
-            row if self.is_coupled[row.body] => bodies,
-            row => row.body,
-        };
         // Sorted by counting: stable, and without a heap.
         self.starts.clear();
         self.starts.resize(bodies + 3, 0);
-        rows.iter().for_each(|row| self.starts[place(row) + 1] += 1);
+        for place in &mut self.places {
+            if self.is_coupled.get(*place) == Some(&true) {
+                *place = coupled;
+            }
+            self.starts[*place + 1] += 1;
+        }
         (1..bodies + 3).for_each(|at| self.starts[at] += self.starts[at - 1]);
         self.order.clear();
         self.order.resize(rows.len(), 0);
-        for (at, row) in rows.iter().enumerate() {
-            let next = &mut self.starts[place(row)];
+        for (at, &place) in self.places.iter().enumerate() {
+            let next = &mut self.starts[place];
             self.order[*next] = at;
             *next += 1;
         }

@@ -16,6 +16,8 @@ use crate::body::Body;
 
 /// The most that a body turns in a step \[rad\].
 const STEP_RAD: f64 = 0.25;
+/// A body that turns less in a tick keeps its angular velocity, to this share \[rad\].
+const SLOW_RAD: f64 = 1e-4;
 /// The most steps in a tick.
 const MOST_STEPS: usize = 64;
 /// Rounds to find the middle of a step; each wins a factor of 8 or more.
@@ -34,7 +36,7 @@ pub(super) fn turn(body: &mut Body, dt_s: f64) {
 /// Its angular velocity over a tick in which nothing presses it \[rad/s\].
 pub(crate) fn mean_angular_velocity_W(body: &Body, dt_s: f64) -> Vector3<f64> {
     let moments = &body.mass.principal_kg_m2;
-    if moments.min() == moments.max() {
+    if moments.min() == moments.max() || fastest(body) * dt_s < SLOW_RAD {
         return body.angular_velocity_W();
     }
     match turned(body, dt_s) {

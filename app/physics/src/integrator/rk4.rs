@@ -2,8 +2,8 @@
 //!
 //! Model: position, velocity, orientation and angular momentum of each body; contact points, their normals and whether they
 //! hold stay what they were when the tick began, and their forces follow how far and how fast the bodies' points have moved
-//! in each stage. A finger goes on with the velocity that the body's point had when the tick began, as in
-//! [`crate::Touch`]. What the user feels is the mean of the stages, which is what the body got.
+//! in each stage. A finger stands still for the tick: so a hand that holds still is integrated to fourth order, and one that
+//! carries feels a drag of `k dt / 2`. What the user feels is the mean of the stages, which is what the body got.
 //! The integrator is explicit: beyond `k dt^2 / m` of some units it throws light bodies away.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -51,7 +51,8 @@ pub(crate) struct Stages {
     now: Vec<State>,
     sums: Vec<State>,
     wrenches: Vec<Wrench>,
-    /// Of each row, the mean force and torque, and the velocity with which what presses goes on.
+    /// Of each row, the mean force and torque; and of a finger's the velocity of the body's point when the tick begins, with
+    /// which its row has the finger going on.
     means: Vec<(Vector3<f64>, f64, Vector3<f64>)>,
 }
 
@@ -86,9 +87,9 @@ impl Stages {
         dt_s: f64,
     ) {
         self.begin(bodies, rows, touches);
-        for (stage, (share, weight)) in STAGES.into_iter().enumerate() {
+        for (stage, (_, weight)) in STAGES.into_iter().enumerate() {
             self.wrenches.iter_mut().for_each(|wrench| *wrench = Wrench::default());
-            self.press(bodies, rows, springs, share * dt_s, dt_s, weight);
+            self.press(bodies, rows, springs, dt_s, weight);
             let next_s = STAGES.get(stage + 1).map_or(0.0, |(share, _)| share * dt_s);
             for (number, body) in bodies.iter().enumerate() {
                 if gets[number].is_parked {
@@ -141,7 +142,7 @@ impl Stages {
     }
 
     /// What the rows give in this stage.
-    fn press(&mut self, bodies: &[Body], rows: &[Row], springs: usize, at_s: f64, dt_s: f64, weight: f64) {
+    fn press(&mut self, bodies: &[Body], rows: &[Row], springs: usize, dt_s: f64, weight: f64) {
         for (row, mean) in rows.iter().zip(&mut self.means).take(springs) {
             if !row.is_finite() {
                 continue;
@@ -152,7 +153,7 @@ impl Stages {
                 None => Default::default(),
             };
             let (moved_W, velocity_W) = (point.moved_W - other.moved_W, point.velocity_W - other.velocity_W);
-            let rows_own_W = moved_W + mean.2 * (dt_s - at_s);
+            let rows_own_W = moved_W + mean.2 * dt_s;
             let force_W = row.project(&row.trial_W(&rows_own_W, &velocity_W));
             let turned_rad = row.normal_W.dot(&(point.turned_W - other.turned_W));
             let spin_rad_s = row.normal_W.dot(&(point.spin_W - other.spin_W));
