@@ -221,6 +221,30 @@ fn stick_slip_torsion_holds_above_one_area_drops_below_another_and_goes_in_jerks
 }
 
 #[test]
+fn a_grip_that_trembles_about_the_critical_area_lets_the_object_down_and_never_lifts_it() {
+    for model in ["viscous", "stick-slip", "coulomb"] {
+        let soft = SoftFinger::default().with_model(TorsionModel::of_name(model).unwrap());
+        let mut held = Held::new(soft, 500.0, 0.5, 0.005, FRAC_PI_2);
+        // The default's 4.5 mm^2; what Coulomb's pads hold is about that.
+        let force = held.stiffness * (4.5e-6 / PI).sqrt() / held.mu;
+        held.squeeze_for(0.5, 2.0 * force);
+        held.relax(0.5, 2.0 * force, force);
+        // What the pads' springs gave at most, they may give back.
+        let springs =
+            held.weight_moment().powi(2) / (2.0 * 1.0) + (MASS * G).powi(2) / (4.0 * held.stiffness);
+        let (start, mut seed) = (held.energy(), 1_u64);
+        for _ in 0..5000 {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            let noise = (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
+            held.squeeze(force * (1.0 + 0.1 * noise));
+            assert!(held.energy() < start + springs, "{model}: {} {start}", held.energy());
+        }
+        let turned = FRAC_PI_2 - held.angle();
+        assert!((0.0..1.5).contains(&turned), "{model}: {turned}");
+    }
+}
+
+#[test]
 fn torsion_takes_energy_and_never_gives_any() {
     let coulomb = |pad_radius_m| TorsionModel::Coulomb { pad_radius_m };
     let viscous = TorsionModel::Viscous { critical_area_m2: 1e3, damping_nm_s_per_rad: 3e-4 };
