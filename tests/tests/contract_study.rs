@@ -92,6 +92,33 @@ fn whatever_is_wrong_is_told_before_the_first_trial() {
 }
 
 #[test]
+fn the_study_of_integrators_writes_tables_and_pictures_and_says_what_is_wrong_with_its_arguments() {
+    let place = Workplace::new();
+    let small = ["study", "integrators", "--spins", "100", "--seconds", "2", "--masses", "0.001,0.1"];
+    let said = place.run([&small[..], &["--out", "a"]].concat());
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    for word in ["implicit", "rk4", "thesis-euler-gyroscopic", "beyond", "a/integrators-spin.csv"] {
+        assert!(said.out.contains(word), "no `{word}` in:\n{}", said.out);
+    }
+    for name in ["integrators.svg", "integrators.png"] {
+        assert!(place.path(&format!("a/{name}")).exists(), "{name}");
+    }
+    let read = |name: &str| std::fs::read_to_string(place.path(&format!("a/{name}"))).expect(name);
+    assert_eq!(read("integrators-spin.csv").lines().count(), 1 + 4);
+    let stays = read("integrators-stiffness.csv");
+    // The default has no limit where Euler's method ends near 2 m / dt^2.
+    assert!(stays.contains("implicit,0.001,100000,1"), "{stays}");
+    let of_gram = stays.lines().find_map(|line| line.strip_prefix("thesis-euler,0.001,")).expect("a row");
+    let limit: f64 = of_gram.split(',').next().and_then(|cell| cell.parse().ok()).expect("a number");
+    assert!((1500.0..2050.0).contains(&limit), "{limit}");
+    for (arguments, word) in [(["--integrators", "euler"], "thesis-euler"), (["--masses", "0"], "kg")] {
+        let said = place.run([&small[..2], &arguments[..]].concat());
+        assert_eq!(said.status, Some(2), "{}", said.err);
+        assert!(said.err.contains(word), "{}", said.err);
+    }
+}
+
+#[test]
 fn ctrl_c_ends_a_study() {
     let place = Workplace::new();
     let mut program = place.phantom3();

@@ -50,7 +50,7 @@ impl Hand {
             let pushed_m = if tick as f64 * dt_s < PUSHED_S { 0.0 } else { PUSH_M };
             self.step([inside_m + pushed_m, -inside_m + pushed_m], dt_s);
             let body = &self.manipulation.bodies()[0];
-            if !(body.centre_W.norm() < THROWN_M) {
+            if body.centre_W.norm() > THROWN_M || !self.manipulation.parked().is_empty() {
                 return false;
             }
         }
@@ -77,15 +77,14 @@ impl Hand {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{stays as stays_at, *};
 
     #[test]
     fn euler_fails_where_the_spring_is_as_stiff_as_theory_says_and_the_default_does_not() {
         // Two springs, symplectic Euler: 2 k dt^2 / m < 4.
         let limit = |mass: f64| 2.0 * mass / 1e-6;
         for mass in [1e-3, 0.03] {
-            let stays =
-                |integrator, share: f64| super::stays(integrator, mass, share * limit(mass), 0.0, 1e-3);
+            let stays = |integrator, share: f64| stays_at(integrator, mass, share * limit(mass), 0.0, 1e-3);
             assert!(
                 stays(Integrator::ThesisEuler, 0.8) && !stays(Integrator::ThesisEuler, 1.05),
                 "{mass} kg"
