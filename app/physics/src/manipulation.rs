@@ -161,6 +161,7 @@ impl Manipulation {
         self.rows = Vec::with_capacity(room);
         self.solver = Solver::with_capacity(room, bodies);
         self.stages = Stages::with_capacity(room, bodies);
+        self.restitution = Restitution::with_capacity(room, bodies);
         self.fixed = Vec::with_capacity(room);
         self
     }

@@ -108,6 +108,20 @@ fn three_points_with_friction_that_lie_on_no_line_have_closure() {
 }
 
 #[test]
+fn what_can_be_turned_one_way_has_no_closure() {
+    // Two points with friction, and a third in front of the line between them, which only pushes up.
+    let left = contact([-0.02, 0.0, 0.0], [1.0, 0.0, 0.0], 0.8, 0.0);
+    let right = contact([0.02, 0.0, 0.0], [-1.0, 0.0, 0.0], 0.8, 0.0);
+    let up = |z: f64| contact([0.0, -0.01, z], [0.0, 1.0, 0.0], 0.2, 0.0);
+    let three = grasp(&[left, right, up(0.015)]);
+    // Its friction acts 10 mm below the line, a fifth of what it pushes: it does not turn the other way.
+    assert_eq!(three.rank(), 6);
+    assert!(!three.has_force_closure());
+    // One on either side does.
+    assert!(grasp(&[left, right, up(0.015), up(-0.015)]).has_force_closure());
+}
+
+#[test]
 fn without_friction_it_takes_seven_contacts_in_space() {
     let mut noise = Noise(7);
     let frictionless = |noise: &mut Noise, count: usize| {
@@ -301,6 +315,11 @@ fn a_held_cube_tells_how_it_is_held() {
     assert!(points.residual < 1e-9, "{points:?}");
     let soft = quality(SoftFinger::default(), 2.0);
     assert_eq!((soft.contacts, soft.rank, soft.has_force_closure), (2, 6, true));
+    // Held off its centre by torsion alone, it is in equilibrium all the same.
+    let mut held = held::Held::new(SoftFinger::default(), 500.0, 0.5, 0.005, 1.5);
+    held.squeeze_for(3.0, 3.0);
+    let off_centre = held.world.manipulation.grasp_quality(0).unwrap();
+    assert!(off_centre.residual < 1e-9, "{off_centre:?}");
     let viscous = quality(SoftFinger::default().with_model(TorsionModel::of_name("viscous").unwrap()), 2.0);
     assert_eq!((viscous.contacts, viscous.rank), (2, 5));
     // Nothing: it falls, and nothing acts against its weight.

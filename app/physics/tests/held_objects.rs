@@ -218,9 +218,10 @@ fn the_gyroscopic_torque_of_a_held_spinning_object_is_felt() {
     let spin_now = world.body().angular_velocity_W().norm();
     // T = omega x L: about y times along x is along -z.
     let expected = -turn * mass.principal_kg_m2.x * spin_now;
-    assert!(spin_now > 0.8 * spin, "{spin_now}");
-    assert!((torque.z / expected - 1.0).abs() < 0.05, "{torque} {expected}");
-    assert!(torque.y.abs() < 0.1 * expected.abs(), "{torque}");
+    // Points brake no spin; of the mean over 1.5 s a little is the swaying with which it began.
+    assert!((spin_now / spin - 1.0).abs() < 1e-3, "{spin_now}");
+    assert!((torque.z / expected - 1.0).abs() < 1e-3, "{torque} {expected}");
+    assert!(torque.x.abs() + torque.y.abs() < 1e-3 * expected.abs(), "{torque}");
 }
 
 #[test]

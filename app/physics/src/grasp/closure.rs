@@ -72,7 +72,8 @@ fn of_two(one: &GraspContact, other: &GraspContact) -> bool {
 fn is_inside(contact: &GraspContact, line_W: &nalgebra::Vector3<f64>) -> bool {
     let along = contact.normal_W.dot(line_W);
     let across = (line_W - contact.normal_W * along).norm();
-    along > 0.0 && across < contact.mu * along
+    // Not behind it, either: then the right side is not positive.
+    across < contact.mu * along
 }
 
 /// Whether every point counts in some sum of all of them that is zero. Of points that span the whole space: whether their

@@ -83,7 +83,7 @@ pub(super) fn solve(rows: &mut [Row], which: &[usize], motion: &mut Motion, dt_s
     if !is_found {
         // Not what was sought, but forces that contacts can have.
         problem.let_slip(rows, which, &p);
-        which.iter().for_each(|&at| rows[at].force_W = Vector3::zeros());
+        which.iter().for_each(|&at| (rows[at].force_W, rows[at].torsion.torque_nm) = (Vector3::zeros(), 0.0));
         problem.relax(rows, which, MOST_TURNS);
     }
     *motion = problem.moving(&problem.impulse(rows, which));
