@@ -25,6 +25,8 @@ pub struct Anchor {
     force: Vector3<f64>,
     /// Whether it stuck or slid.
     held: Held,
+    /// It came nearer when the last tick began, fast enough to bounce.
+    pub(crate) approached: bool,
     /// How much of a depth that was there from the start is still granted \[m\].
     pub(crate) granted_m: f64,
 }
@@ -39,13 +41,16 @@ impl Anchor {
 
     /// Goes on at this point: takes note of what moved since the last tick.
     pub(crate) fn carry(&mut self, point: &ContactPoint, X_WA: &Isometry3<f64>, X_WB: &Isometry3<f64>) {
-        let [a_A, b_B] = self.materials.map(Point3::from);
-        let moved_W = X_WA * a_A - X_WB * b_B;
+        // What moved before anything pressed stretched nothing.
+        if self.is_pressed() {
+            let [a_A, b_B] = self.materials.map(Point3::from);
+            let moved_W = X_WA * a_A - X_WB * b_B;
+            // Along the normal it is another spring's: here it would be taken for a turn of the stretch.
+            let across_W = moved_W - point.normal_W * point.normal_W.dot(&moved_W);
+            self.stretch += X_WB.inverse_transform_vector(&across_W);
+        }
         self.id = point.id;
         self.touch(point, X_WA, X_WB);
-        // What rolls lifts its last contact, which stretches nothing.
-        let n = point.normal_W;
-        self.stretch += X_WB.inverse_transform_vector(&(moved_W - n * n.dot(&moved_W)));
     }
 
     fn touch(&mut self, point: &ContactPoint, X_WA: &Isometry3<f64>, X_WB: &Isometry3<f64>) {
@@ -70,6 +75,11 @@ impl Anchor {
 
     pub(crate) fn held(&self) -> Held {
         self.held
+    }
+
+    /// Whether it was pressed in the last tick.
+    pub(crate) fn is_pressed(&self) -> bool {
+        self.force != Vector3::zeros()
     }
 
     /// Where it was, when nobody knows what it is now \[m\], in W.

@@ -14,6 +14,7 @@ mod bounds;
 mod convex;
 mod convex_pair;
 mod facet;
+mod follow;
 mod gjk;
 mod lines;
 pub(crate) mod mesh;

@@ -6,8 +6,11 @@ use nalgebra::Vector3;
 use crate::body::Body;
 use crate::collide::{self, MAX_POINTS, can_move};
 use crate::error::BodyError;
-use crate::integrator::Integrator;
+use crate::integrator::explicit::{self, Kept};
+use crate::integrator::rk4::Stages;
+use crate::integrator::{Gets, Integrator, Limits, mean_angular_velocity_W};
 use crate::pair::{Pair, Response, Start, Surfacing};
+use crate::restitution::Restitution;
 use crate::row::Row;
 use crate::solver::{Motion, Solver};
 use crate::touch::Touch;
@@ -55,6 +58,13 @@ pub struct Manipulation {
     rows: Vec<Row>,
     motions: Vec<Motion>,
     solver: Solver,
+    restitution: Restitution,
+    /// The first so many rows are fingers'.
+    touching: usize,
+    gets: Box<[Gets]>,
+    stages: Stages,
+    fixed: Vec<Kept>,
+    parked: Vec<Parked>,
 }
 
 /// What a tick took and did.
@@ -64,8 +74,26 @@ pub struct Made {
     pub rows: usize,
     /// Turns of the solver.
     pub sweeps: usize,
-    /// Bodies that were parked in this tick.
+    /// Bodies that were parked in this tick: the last so many of [`Manipulation::parked`].
     pub parked: usize,
+}
+
+/// A body that does not move any more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Parked {
+    /// Index of the entity.
+    pub entity: usize,
+    /// What became of it.
+    pub why: Reason,
+}
+
+/// Why a body was parked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reason {
+    /// It was farther from the origin than [`Settings::world_radius_m`].
+    LeftTheWorld,
+    /// Where it was or how it moved was no number any more.
+    NotANumber,
 }
 
 /// The most touches of fingers in a tick.
@@ -103,7 +131,13 @@ impl Manipulation {
             pairs: pairs.into(),
             rows: Vec::with_capacity(room),
             motions: Vec::with_capacity(bodies.len()),
-            solver: Solver::with_capacity(room),
+            solver: Solver::with_capacity(room, bodies.len()),
+            restitution: Restitution::with_capacity(room, bodies.len()),
+            touching: 0,
+            gets: vec![Gets::default(); bodies.len()].into(),
+            stages: Stages::with_capacity(room, bodies.len()),
+            fixed: Vec::with_capacity(room),
+            parked: Vec::with_capacity(bodies.len()),
         })
     }
 
@@ -117,28 +151,20 @@ impl Manipulation {
         &self.rows
     }
 
+    /// Bodies that do not move any more, in the order in which they were parked: the last [`Made::parked`] of them in the last
+    /// tick.
+    pub fn parked(&self) -> &[Parked] {
+        &self.parked
+    }
+
     /// One tick: moves the bodies and their entities; of each touch, `force_on_user_W` becomes what the body got, times -1.
     pub fn step(&mut self, entities: &mut [Entity], touches: &mut [Touch], dt_s: f64) -> Made {
         if !(dt_s > 0.0 && dt_s.is_finite()) {
             return Made::default();
         }
         self.fall_freely(dt_s);
-        self.rows.clear();
-        let start = Start { entities, bodies: &self.bodies, motions: &self.motions, dt_s };
-        // Fingers first: they are never left out.
-        let mut fingers = [None; MAX_TOUCHES];
-        for (touch, place) in touches.iter().zip(&mut fingers) {
-            let Some(body) = self.entities.iter().position(|&entity| entity == touch.entity) else {
-                continue;
-            };
-            let (state, motion) = (&self.bodies[body], moving(&self.bodies[body]));
-            *place = Some(self.rows.len());
-            self.rows.push(touch.row(body, &state.centre_W, &motion, &entities[touch.entity], dt_s));
-        }
-        for pair in &mut self.pairs {
-            pair.gather(&start, &mut self.rows);
-        }
-        let sweeps = self.solver.solve(&mut self.rows, &mut self.motions, dt_s);
+        let fingers = self.gather(entities, touches, dt_s);
+        let sweeps = self.find_forces(dt_s);
         for (touch, row) in touches.iter_mut().zip(fingers) {
             if let Some(row) = row {
                 touch.force_on_user_W = -self.rows[row].force_W;
@@ -147,6 +173,7 @@ impl Manipulation {
         for pair in &mut self.pairs {
             pair.settle(&self.rows, &self.motions, entities, dt_s);
         }
+        self.sum_up();
         let parked = self.advance(entities, dt_s);
         Made { rows: self.rows.len(), sweeps, parked }
     }
@@ -161,15 +188,95 @@ impl Manipulation {
                 (motion.inverse_mass, motion.inverse_inertia_W) = (0.0, nalgebra::Matrix3::zeros());
             } else {
                 motion.velocity_W += fall_W;
+                if self.settings.integrator.is_implicit() {
+                    motion.angular_velocity_W = mean_angular_velocity_W(body, dt_s);
+                }
             }
             self.motions.push(motion);
         }
     }
 
+    /// All contact points of the tick; says which are whose touch.
+    fn gather(&mut self, entities: &[Entity], touches: &[Touch], dt_s: f64) -> [Option<usize>; MAX_TOUCHES] {
+        self.rows.clear();
+        let mut fingers = [None; MAX_TOUCHES];
+        // Fingers first: they are never left out.
+        for (touch, place) in touches.iter().zip(&mut fingers) {
+            let Some(body) = self.entities.iter().position(|&entity| entity == touch.entity) else {
+                continue;
+            };
+            let (state, motion) = (&self.bodies[body], moving(&self.bodies[body]));
+            *place = Some(self.rows.len());
+            self.rows.push(touch.row(body, &state.centre_W, &motion, &entities[touch.entity], dt_s));
+        }
+        self.touching = self.rows.len();
+        self.restitution.impacts.clear();
+        let start = Start {
+            entities,
+            bodies: &self.bodies,
+            motions: &self.motions,
+            dt_s,
+            is_implicit: self.settings.integrator.is_implicit(),
+        };
+        for pair in &mut self.pairs {
+            pair.gather(&start, &mut self.rows, &mut self.restitution.impacts);
+        }
+        fingers
+    }
+
+    /// What all contact points do in the tick; returns the turns of the solver.
+    fn find_forces(&mut self, dt_s: f64) -> usize {
+        for (gets, &is_parked) in self.gets.iter_mut().zip(&self.is_parked) {
+            *gets = Gets { gravity_W: self.settings.gravity_W, is_parked, ..Gets::default() };
+        }
+        // Impulses are always solved for.
+        let springs = match self.settings.response {
+            Response::Force => self.rows.len(),
+            Response::Impulse { .. } => self.touching,
+        };
+        match self.settings.integrator {
+            Integrator::Implicit => {}
+            Integrator::Rk4 => {
+                self.stages.run(&self.bodies, &self.rows, self.touching, springs, &mut self.gets, dt_s);
+                for at in 0..springs {
+                    let (force_W, torque_nm) = self.stages.means(at);
+                    explicit::fix(&mut self.rows, at, &force_W, torque_nm, &mut self.fixed);
+                }
+            }
+            Integrator::ThesisEuler | Integrator::ThesisEulerGyroscopic => {
+                for at in 0..springs {
+                    let (force_W, torque_nm) =
+                        explicit::at_start(&self.rows[at], &self.bodies, at < self.touching, dt_s);
+                    explicit::fix(&mut self.rows, at, &force_W, torque_nm, &mut self.fixed);
+                }
+            }
+        }
+        let sweeps = self.restitution.solve(&mut self.solver, &mut self.rows, &mut self.motions, dt_s);
+        explicit::release(&mut self.rows, &mut self.fixed);
+        sweeps
+    }
+
+    /// What each body gets: the Residual Force and Torque Algorithms.
+    fn sum_up(&mut self) {
+        self.gets.iter_mut().for_each(|gets| gets.is_free = true);
+        for row in &self.rows {
+            let torque_W = row.normal_W * row.torsion.torque_nm;
+            let sides = [(Some(row.body), 1.0), (row.other, -1.0)];
+            for ((body, sign), arm_W) in sides.into_iter().zip(&row.arms_W) {
+                let Some(body) = body else { continue };
+                let gets = &mut self.gets[body];
+                gets.wrench.add(&(row.force_W * sign), arm_W);
+                gets.wrench.torque_W += torque_W * sign;
+                gets.is_free &= row.force_W == Vector3::zeros() && torque_W == Vector3::zeros();
+            }
+        }
+    }
+
     /// Takes the bodies to the end of the tick; says how many had to be parked.
     fn advance(&mut self, entities: &mut [Entity], dt_s: f64) -> usize {
-        let settings = self.settings;
-        let mut parked = 0;
+        let settings = &self.settings;
+        let limits = Limits { speed_m_s: settings.most_speed_m_s, spin_rad_s: settings.most_spin_rad_s };
+        let before_parked = self.parked.len();
         for (number, body) in self.bodies.iter_mut().enumerate() {
             let entity = &mut entities[self.entities[number]];
             if self.is_parked[number] {
@@ -177,42 +284,20 @@ impl Manipulation {
                 continue;
             }
             let before = *body;
-            let mut wrench = crate::wrench::Wrench::default();
-            let mut is_free = true;
-            for row in &self.rows {
-                let sides = [(Some(row.body), row.force_W), (row.other, -row.force_W)];
-                for ((side, force_W), arm_W) in sides.iter().zip(&row.arms_W) {
-                    if *side == Some(number) && *force_W != Vector3::zeros() {
-                        wrench.add(force_W, arm_W);
-                        is_free = false;
-                    }
-                }
-                let torque_W = row.normal_W * row.torsion.torque_nm;
-                for (side, torque_W) in [(Some(row.body), torque_W), (row.other, -torque_W)] {
-                    if side == Some(number) {
-                        wrench.torque_W += torque_W;
-                    }
-                }
-            }
-            //= melder#5.7
-            let acceleration_W = settings.gravity_W + wrench.force_W / body.mass.mass_kg;
-            body.velocity_W = limited(body.velocity_W + acceleration_W * dt_s, settings.most_speed_m_s);
-            if !body.rotation_locked {
-                body.angular_momentum_W += wrench.torque_W * dt_s;
-                let spin = body.angular_velocity_W().norm();
-                if spin > settings.most_spin_rad_s {
-                    body.angular_momentum_W *= settings.most_spin_rad_s / spin;
-                }
-            }
-            settings.integrator.advance(body, is_free.then_some(settings.gravity_W), dt_s);
-            if !body.is_finite() || body.centre_W.norm() > settings.world_radius_m {
+            settings.integrator.advance(body, &self.gets[number], &limits, dt_s);
+            let why = if !body.is_finite() {
+                Some(Reason::NotANumber)
+            } else {
+                (body.centre_W.norm() > settings.world_radius_m).then_some(Reason::LeftTheWorld)
+            };
+            if let Some(why) = why {
                 *body = Body { velocity_W: Vector3::zeros(), angular_momentum_W: Vector3::zeros(), ..before };
                 self.is_parked[number] = true;
-                parked += 1;
+                self.parked.push(Parked { entity: self.entities[number], why });
             }
             entity.move_to(body.pose());
         }
-        parked
+        self.parked.len() - before_parked
     }
 }
 
@@ -223,9 +308,4 @@ fn moving(body: &Body) -> Motion {
         inverse_mass: body.mass.mass_kg.recip(),
         inverse_inertia_W: body.inverse_inertia_W(),
     }
-}
-
-fn limited(v: Vector3<f64>, most: f64) -> Vector3<f64> {
-    let length = v.norm();
-    if length > most { v * (most / length) } else { v }
 }

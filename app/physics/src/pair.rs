@@ -79,6 +79,8 @@ pub(crate) struct Start<'t> {
     /// As they are without contacts, at the end of the tick.
     pub(crate) motions: &'t [Motion],
     pub(crate) dt_s: f64,
+    /// Whether forces are those of the end of the tick.
+    pub(crate) is_implicit: bool,
 }
 
 impl Pair {
@@ -96,8 +98,8 @@ impl Pair {
         }
     }
 
-    /// Finds where it touches, and appends a row for each point.
-    pub(crate) fn gather(&mut self, start: &Start<'_>, rows: &mut Vec<Row>) {
+    /// Finds where it touches, and appends a row for each point; notes which rows are impacts.
+    pub(crate) fn gather(&mut self, start: &Start<'_>, rows: &mut Vec<Row>, impacts: &mut Vec<usize>) {
         (self.first_row, self.rows) = (rows.len(), 0);
         let [a, b] = self.entities.map(|index| &start.entities[index]);
         let speed_m_s = self.closing_speed(start);
@@ -116,9 +118,13 @@ impl Pair {
             if rows.len() == rows.capacity() {
                 return;
             }
-            anchor.granted_m =
-                (anchor.granted_m - LET_OUT_M_S * start.dt_s).clamp(0.0, (-point.gap_m).max(0.0));
-            rows.push(row(self.bodies, &self.surfacing, anchor, point, &b.X_WB, start));
+            let let_out_m = let_out_m_s(anchor.granted_m, start.dt_s) * start.dt_s;
+            anchor.granted_m = (anchor.granted_m - let_out_m).clamp(0.0, (-point.gap_m).max(0.0));
+            let (row, is_impact) = row(self.bodies, &self.surfacing, anchor, point, &b.X_WB, start);
+            if is_impact {
+                impacts.push(rows.len());
+            }
+            rows.push(row);
             self.rows += 1;
         }
     }
@@ -205,11 +211,11 @@ fn is_near(a: &Entity, b: &Entity, reach_m: f64) -> bool {
 fn row(
     (body, other): (usize, Option<usize>),
     surfacing: &Surfacing,
-    anchor: &Anchor,
+    anchor: &mut Anchor,
     point: &ContactPoint,
     X_WB: &Isometry3<f64>,
     start: &Start<'_>,
-) -> Row {
+) -> (Row, bool) {
     let arm = |body: usize| point.point_W - start.bodies[body].centre_W;
     let dt_s = start.dt_s;
     let (k, b) = (surfacing.stiffness_n_per_m, surfacing.damping_n_s_per_m);
@@ -232,32 +238,68 @@ fn row(
     let rest_n = match surfacing.response {
         //= melder#6.2
         Response::Force if gap_m < 0.0 => -k * gap_m,
+        // Of a force that is known when the tick begins nothing is damped before they meet.
+        Response::Force if !start.is_implicit => {
+            row.damping[0] = 0.0;
+            -k * gap_m
+        }
         // Only what is left of the tick when they meet is damped.
         Response::Force => {
             (row.stiffness[0], row.damping[0]) = (k + b / dt_s, 0.0);
             -row.stiffness[0] * gap_m
         }
         Response::Impulse { restitution } => {
-            let stop = hard(&row, start);
-            let approach_m_s = -n.dot(&relative(&row, start));
-            // Slower than what gravity brings up in a few ticks, it rests.
-            //= melder#6.1
-            let bounce_m_s = if approach_m_s > SLOW_M_S && gap_m < approach_m_s * dt_s {
-                restitution * approach_m_s
-            } else {
-                0.0
-            };
-            let wanted_m_s = if gap_m < 0.0 { -gap_m * CORRECTED / dt_s } else { -gap_m / dt_s };
+            let stop = stop_n_s_per_m(&row, start);
             (row.stiffness, row.damping) = ([0.0, k], [stop, b]);
-            stop * if bounce_m_s > 0.0 { bounce_m_s } else { wanted_m_s.min(LET_OUT_M_S) }
+            let impact = Impact::of(&row, gap_m, restitution, anchor, start);
+            if impact.is_one {
+                // What an impulse gives across the normal lasts no longer than the impulse.
+                row.stiffness[1] = stop / dt_s;
+            }
+            let wanted_m_s = match gap_m {
+                _ if impact.bounce_m_s > 0.0 => impact.bounce_m_s,
+                gap_m if gap_m < 0.0 => let_out_m_s(-gap_m, dt_s),
+                _ => -gap_m / dt_s,
+            };
+            if impact.is_one {
+                row.rest_W = n * (stop * wanted_m_s);
+                return (row, true);
+            }
+            stop * wanted_m_s
         }
     };
     row.rest_W = n * rest_n - anchor.stretch_W(X_WB) * row.stiffness[1];
-    row
+    (row, false)
+}
+
+/// What a row's point does that meets the other in a tick.
+struct Impact {
+    is_one: bool,
+    /// With which normal velocity it leaves the tick; 0 and below: it stays.
+    bounce_m_s: f64,
+}
+
+impl Impact {
+    /// The velocity that it leaves with is the reflected one of the beginning of the tick, less what gravity takes from it in
+    /// the whole tick: so a ball that does not lose anything else loses `(g dt)^2 / 2` of energy per mass in each bounce, and never
+    /// gains. What approaches no faster than gravity makes it in a tick rests, and a bounce that gravity would end
+    /// within the tick is none. Nor is one that anything else ended so: a contact that closes in a tick in which it did not
+    /// approach was pushed back before it got off, and rests.
+    fn of(row: &Row, gap_m: f64, restitution: f64, anchor: &mut Anchor, start: &Start<'_>) -> Self {
+        let along = |velocity_W: &Vector3<f64>| row.normal_W.dot(velocity_W);
+        let (now_m_s, freely_m_s) = (along(&at_start(row, start)), along(&freely(row, start)));
+        let falls_m_s = (freely_m_s - now_m_s).min(0.0);
+        let approaches = now_m_s < falls_m_s;
+        let was_pushed_back = anchor.is_pressed() && !anchor.approached;
+        anchor.approached = approaches;
+        let is_one = approaches && !was_pushed_back && gap_m < -freely_m_s * start.dt_s;
+        //= melder#6.1
+        Self { is_one, bounce_m_s: if is_one { restitution * -now_m_s + falls_m_s } else { 0.0 } }
+    }
 }
 
 /// Velocity of A's point relative to B's when the tick begins.
-fn relative(row: &Row, start: &Start<'_>) -> Vector3<f64> {
+fn at_start(row: &Row, start: &Start<'_>) -> Vector3<f64> {
     let at = |body: usize, arm_W: &Vector3<f64>| {
         let body = &start.bodies[body];
         body.velocity_W + body.angular_velocity_W().cross(arm_W)
@@ -265,21 +307,38 @@ fn relative(row: &Row, start: &Start<'_>) -> Vector3<f64> {
     at(row.body, &row.arms_W[0]) - row.other.map_or(Vector3::zeros(), |other| at(other, &row.arms_W[1]))
 }
 
+/// The same at its end, if nothing touched anything.
+fn freely(row: &Row, start: &Start<'_>) -> Vector3<f64> {
+    let at = |body: usize, arm_W: &Vector3<f64>| start.motions[body].at(arm_W);
+    at(row.body, &row.arms_W[0]) - row.other.map_or(Vector3::zeros(), |other| at(other, &row.arms_W[1]))
+}
+
 /// A damping so large that velocities are what is wanted.
-fn hard(row: &Row, start: &Start<'_>) -> f64 {
-    let inverse = |body: usize| start.motions[body].inverse_mass;
-    HARD / ((inverse(row.body) + row.other.map_or(0.0, inverse)) * start.dt_s)
+fn stop_n_s_per_m(row: &Row, start: &Start<'_>) -> f64 {
+    let give = |body: usize, arm_W: &Vector3<f64>| {
+        let motion = &start.motions[body];
+        let turns_W = arm_W.cross(&row.normal_W);
+        motion.inverse_mass + turns_W.dot(&(motion.inverse_inertia_W * turns_W))
+    };
+    let gives = give(row.body, &row.arms_W[0]) + row.other.map_or(0.0, |other| give(other, &row.arms_W[1]));
+    // Nothing can be stopped that nothing moves.
+    if gives > 0.0 { HARD / (gives * start.dt_s) } else { 0.0 }
+}
+
+/// How fast a depth that should not be there is let out.
+fn let_out_m_s(depth_m: f64, dt_s: f64) -> f64 {
+    (depth_m / LET_OUT_S.max(dt_s)).min(LET_OUT_M_S)
 }
 
 /// Contact points are looked for from this distance on \[m\].
 pub(crate) const REACH_M: f64 = 1e-3;
 /// A contact point of another name within this distance is the same one \[m\].
 const NEAR_M: f64 = 2e-4;
-/// How fast a depth that was there from the start is let out \[m/s\].
+/// A depth that should not be there falls by `e` in this time \[s\]. The body then slows down by less than gravity slows it,
+/// for depths up to `g t^2`, 0.1 m: it follows, and does not hop.
+const LET_OUT_S: f64 = 0.1;
+/// And never faster than this \[m/s\].
 const LET_OUT_M_S: f64 = 0.2;
-/// Approaching slower than this, nothing bounces \[m/s\].
-const SLOW_M_S: f64 = 0.02;
-/// How much of a depth an impulse response takes back in a tick.
-const CORRECTED: f64 = 0.2;
-/// How many times harder than the bodies' masses impulses stop.
-const HARD: f64 = 1e4;
+/// How many times harder than what moves impulses stop: velocities are right to one part in so many, and solved for with as
+/// many times the rounding.
+const HARD: f64 = 1e6;

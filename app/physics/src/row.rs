@@ -58,6 +58,26 @@ impl Torsion {
     pub(crate) fn falls(&self, dt_s: f64) -> f64 {
         self.stiffness_nm_per_rad * dt_s + self.damping_nm_s_per_rad
     }
+
+    /// The torque if the body turns about the normal at `spin_rad_s` all the tick \[N m\].
+    #[inline]
+    pub(crate) fn at_end_nm(&self, spin_rad_s: f64, dt_s: f64) -> f64 {
+        (self.rest_nm - self.falls(dt_s) * spin_rad_s).clamp(-self.most_nm, self.most_nm)
+    }
+
+    /// The torque after a turn about the normal (rad), while it turns so fast \[N m\].
+    #[inline]
+    pub(crate) fn after_nm(&self, turned_rad: f64, spin_rad_s: f64) -> f64 {
+        let (k, b) = (self.stiffness_nm_per_rad, self.damping_nm_s_per_rad);
+        (self.rest_nm - k * turned_rad - b * spin_rad_s).clamp(-self.most_nm, self.most_nm)
+    }
+
+    /// By how much that torque falls per angular velocity, where it stands \[N m s\].
+    #[inline]
+    pub(crate) fn falls_at_end(&self, spin_rad_s: f64, dt_s: f64) -> f64 {
+        let falls = self.falls(dt_s);
+        if (self.rest_nm - falls * spin_rad_s).abs() < self.most_nm { falls } else { 0.0 }
+    }
 }
 
 /// What friction does at a contact point.
@@ -91,15 +111,9 @@ impl Row {
             return Vector3::zeros();
         }
         let across_W = trial_W - self.normal_W * normal_n;
-        self.normal_W * normal_n + self.within(&across_W, normal_n)
-    }
-
-    /// A tangential force, cut to what the cone allows at this normal force.
-    #[inline]
-    pub(crate) fn within(&self, across_W: &Vector3<f64>, normal_n: f64) -> Vector3<f64> {
-        let across_n = across_W.norm();
-        let most_n = self.mu() * normal_n;
-        if across_n <= most_n { *across_W } else { across_W * (most_n / across_n) }
+        let (across_n, most_n) = (across_W.norm(), self.mu() * normal_n);
+        // To the last bit what it was, if it may stay.
+        if across_n <= most_n { *trial_W } else { self.normal_W * normal_n + across_W * (most_n / across_n) }
     }
 
     /// The ratio that counts now.
@@ -109,6 +123,26 @@ impl Row {
             Held::Stick => self.mu_hold,
             Held::Slip => self.mu_slide,
         }
+    }
+
+    /// Whether all of it is made of numbers, and springs and dampers take energy rather than give it.
+    pub(crate) fn is_finite(&self) -> bool {
+        let vectors = [&self.arms_W[0], &self.arms_W[1], &self.normal_W, &self.rest_W, &self.force_W];
+        let torsion = &self.torsion;
+        let not_negative = [
+            self.stiffness[0],
+            self.stiffness[1],
+            self.damping[0],
+            self.damping[1],
+            self.mu_hold,
+            self.mu_slide,
+            torsion.stiffness_nm_per_rad,
+            torsion.damping_nm_s_per_rad,
+            torsion.most_nm,
+        ];
+        vectors.iter().all(|v| v.iter().all(|x| x.is_finite()))
+            && not_negative.iter().all(|x| x.is_finite() && *x >= 0.0)
+            && torsion.rest_nm.is_finite()
     }
 
     #[inline]
@@ -128,11 +162,38 @@ impl Row {
         [k_n * dt_s + b_n, k_t * dt_s + b_t]
     }
 
-    /// The same as a matrix in W.
+    /// The force if its point moves at `velocity_W` (m/s) all the tick.
     #[inline]
-    pub(crate) fn falls_W(&self, dt_s: f64) -> Matrix3<f64> {
+    pub(crate) fn at_end_W(&self, velocity_W: &Vector3<f64>, dt_s: f64) -> Vector3<f64> {
+        self.project(&self.trial_at_end_W(velocity_W, dt_s))
+    }
+
+    #[inline]
+    pub(crate) fn trial_at_end_W(&self, velocity_W: &Vector3<f64>, dt_s: f64) -> Vector3<f64> {
+        let [along, across] = self.falls(dt_s);
+        let v_n = self.normal_W.dot(velocity_W);
+        self.rest_W - velocity_W * across - self.normal_W * (v_n * (along - across))
+    }
+
+    /// By how much that force falls per velocity, where it stands \[N s/m\].
+    #[inline]
+    pub(crate) fn falls_at_end_W(&self, velocity_W: &Vector3<f64>, dt_s: f64) -> Matrix3<f64> {
         let [along, across] = self.falls(dt_s);
         let n = self.normal_W;
-        Matrix3::from_diagonal_element(across) + n * n.transpose() * (along - across)
+        let trial_W = self.trial_at_end_W(velocity_W, dt_s);
+        let normal_n = n.dot(&trial_W);
+        if normal_n <= 0.0 {
+            return Matrix3::zeros();
+        }
+        let across_W = trial_W - n * normal_n;
+        let (across_n, mu) = (across_W.norm(), self.mu());
+        if across_n <= mu * normal_n && mu > 0.0 {
+            return Matrix3::from_diagonal_element(across) + n * n.transpose() * (along - across);
+        }
+        // It slides: the tangential part turns with the trial's, and grows with the normal one.
+        let t = if across_n > 0.0 { across_W / across_n } else { Vector3::zeros() };
+        let share = if across_n > 0.0 { mu * normal_n / across_n } else { 0.0 };
+        (n + t * mu) * n.transpose() * along
+            + (Matrix3::identity() - n * n.transpose() - t * t.transpose()) * (across * share)
     }
 }

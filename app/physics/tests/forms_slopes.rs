@@ -203,3 +203,34 @@ fn a_bar_lies_across_the_edges_of_two_others() {
         assert!(world.body().velocity_W.norm() < 1e-9, "{bar:?} {:?}", world.body());
     }
 }
+
+#[test]
+fn a_ring_hangs_on_a_peg_and_a_ball_lies_in_a_ring() {
+    let still = |thing: Form, X: nalgebra::Isometry3<f64>, fixed: Form, X_fixed: nalgebra::Isometry3<f64>, height: f64| {
+        let below = object(fixed, X_fixed, STIFFNESS, 0.5);
+        let thing = object(thing, X, STIFFNESS, 0.5).with_damping(100.0).unwrap();
+        let body = body(&thing, MASS);
+        let mut world = World::new(vec![below, thing], &[(1, body)], Settings::default(), 0);
+        seconds(&mut world, 3.0);
+        let body = world.body();
+        assert!((body.centre_W.y - height).abs() < 1e-4, "{thing:?} {body:?}", thing = world.entities[1].shape);
+        assert!(body.velocity_W.norm() < 1e-6, "{body:?}");
+        let load: f64 = world.manipulation.rows().iter().map(|row| row.force_W.y).sum();
+        assert!((load - MASS * G).abs() < 1e-5, "{load}");
+    };
+    let across = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
+    let none = UnitQuaternion::identity();
+    let (ring, peg): (Form, Form) = (Torus::new(0.03, 0.01).unwrap().into(), Capsule::new(0.008, 0.1).unwrap().into());
+    let rod: Form = Cylinder::new(0.008, 0.1).unwrap().into();
+    for peg in [peg, rod] {
+        // The hole's top on the peg's top.
+        let hangs = 0.008 - 0.02;
+        still(ring, pose(across, Vector3::y() * hangs), peg, pose(across, Vector3::zeros()), hangs);
+    }
+    let ball: Form = Sphere::new(0.03).unwrap().into();
+    let lies = (0.04_f64 * 0.04 - 0.03 * 0.03).sqrt();
+    still(ball, pose(none, Vector3::new(0.0, lies, 0.0)), ring, pose(none, Vector3::zeros()), lies);
+    // A ring about a ball, and on another ring.
+    still(ring, pose(none, Vector3::new(0.0, lies, 0.0)), ball, pose(none, Vector3::zeros()), lies);
+    still(ring, pose(none, Vector3::new(0.0, 0.02, 0.0)), ring, pose(none, Vector3::zeros()), 0.02);
+}

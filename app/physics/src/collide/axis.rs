@@ -8,11 +8,13 @@
 //! one turn, on curved ones each turn leaves a share of `depth / radius of curvature` of the error.
 //! Invariants: n has unit length; continuous where the pose is, as long as the depth is less than the inner radius of
 //! either.
-//! Cost: bounded by [`MAX_TURNS`] searches; mostly one.
+//! Cost: that of [`follow`] if the direction of the last tick can be followed; otherwise bounded by [`MAX_TURNS`]
+//! searches, mostly one or two.
 
 use nalgebra::Vector3;
 
 use super::convex::{Convex, Core};
+use super::follow::follow;
 use super::gjk::Gap;
 
 /// Where two cores touch.
@@ -26,11 +28,17 @@ pub(super) struct Axis {
     pub(super) on_a: Vector3<f64>,
 }
 
-const MAX_TURNS: usize = 6;
+const MAX_TURNS: usize = 4;
 /// Turns that change the direction by less end the search.
-const FOUND: f64 = 1e-9;
+const FOUND: f64 = 1e-5;
 /// The room between the cores, of the smaller one's inner radius.
 const ROOM: f64 = 0.05;
+/// Less deep than this share of the smaller inner radius, a direction that could be followed is right.
+const SHALLOW: f64 = 0.25;
+/// Gaps that differ by this share of it are the same: rounding.
+const SAME: f64 = 1e-12;
+/// What a search leaves open is less.
+const NEAR: f64 = 1e-3;
 /// As deep as this share of the smaller inner radius, other ways out are looked at.
 const DEEP: f64 = 0.75;
 /// Another way out must be shorter by this.
@@ -39,21 +47,36 @@ const SHORTER: f64 = 0.5;
 /// `last`: the direction in the last tick, if there was one.
 pub(super) fn find(a: &Convex, b: &Convex, last: Option<Vector3<f64>>) -> Axis {
     let inner_m = a.inner_m().min(b.inner_m());
+    let radii_m = a.radius_m + b.radius_m;
     let room_m = ROOM * inner_m;
-    let mut normal = match last {
+    if let Some((normal, on_a)) = last.and_then(|last| follow(a, b, &last)) {
+        let axis = Axis { on_a, ..Axis::along(a, b, normal) };
+        // Not so deep that it might have come out on another side, and no way down.
+        let is_better = last.is_some_and(|last| axis.gap_m >= separation(a, b, &last) - SAME * inner_m);
+        if is_better && radii_m - axis.gap_m < SHALLOW * inner_m {
+            return axis;
+        }
+    }
+    let start = match last {
         Some(last) if separation(a, b, &last) >= 0.0 => last,
         last => apart(a, b, room_m).unwrap_or_else(|| last.unwrap_or_else(|| shortest_way_out(a, b))),
     };
-    let mut axis = ascend(a, b, normal, room_m);
-    let depth_m = a.radius_m + b.radius_m - axis.gap_m;
+    let axis = ascend(a, b, start, room_m);
+    let depth_m = radii_m - axis.gap_m;
     if depth_m > DEEP * inner_m {
-        normal = shortest_way_out(a, b);
-        let other = ascend(a, b, normal, room_m);
-        if a.radius_m + b.radius_m - other.gap_m < SHORTER * depth_m {
-            axis = other;
+        let other = ascend(a, b, shortest_way_out(a, b), room_m);
+        if radii_m - other.gap_m < SHORTER * depth_m {
+            return other;
         }
     }
     axis
+}
+
+impl Axis {
+    fn along(a: &Convex, b: &Convex, normal: Vector3<f64>) -> Self {
+        let on_a = a.support(&-normal);
+        Self { normal, gap_m: normal.dot(&(on_a - b.support(&normal))), on_a }
+    }
 }
 
 /// `s(n)`.
@@ -73,7 +96,7 @@ const APART: f64 = 1e-6;
 
 /// The nearest direction in which the gap is largest.
 fn ascend(a: &Convex, b: &Convex, mut normal: Vector3<f64>, room_m: f64) -> Axis {
-    let mut axis = Axis { normal, gap_m: separation(a, b, &normal), on_a: a.support(&-normal) };
+    let mut axis = Axis::along(a, b, normal);
     for _ in 0..MAX_TURNS {
         let shift = normal * (room_m - axis.gap_m).max(0.0);
         let Some(nearest) = (Gap { a, b, shift }).nearest(&normal, 0.0) else { break };
@@ -85,7 +108,14 @@ fn ascend(a: &Convex, b: &Convex, mut normal: Vector3<f64>, room_m: f64) -> Axis
             break;
         }
     }
-    axis
+    // To the last digit, if it can be had.
+    match follow(a, b, &normal) {
+        Some((exact, on_a)) if (exact - normal).norm_squared() < NEAR * NEAR => {
+            let exact = Axis { on_a, ..Axis::along(a, b, exact) };
+            if exact.gap_m >= axis.gap_m - SAME * room_m { exact } else { axis }
+        }
+        _ => axis,
+    }
 }
 
 /// Of the directions in which faces look, and that between the origins, the one with the largest gap.

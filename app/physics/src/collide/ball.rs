@@ -3,7 +3,7 @@
 //! Model: the surface point nearest to its centre is where it touches, and the way from there to the centre the normal;
 //! once the centre is inside, the way out.
 
-use haptics::{Form, Plane, Shape, Surface, SurfacePoint};
+use haptics::{Form, Shape, Surface, SurfacePoint};
 use nalgebra::Vector3;
 
 use super::axis::unit;
@@ -20,11 +20,12 @@ pub(super) struct Touch {
 /// How a ball of this radius touches a form, in whose frame it is.
 pub(super) fn on_form(form: &Form, centre: &Vector3<f64>, radius_m: f64) -> Touch {
     match form {
-        Form::Plane(plane) => on_plane(plane, centre, radius_m),
-        Form::Sphere(_) | Form::Capsule(_) | Form::Torus(_) => Touch {
-            normal: form.nearest(centre).normal_B,
-            gap_m: form.signed_distance(centre) - radius_m,
-        },
+        Form::Plane(plane) => {
+            Touch { normal: plane.normal_B(), gap_m: gap_m(form, centre, radius_m) }
+        }
+        Form::Sphere(_) | Form::Capsule(_) | Form::Torus(_) => {
+            Touch { normal: form.nearest(centre).normal_B, gap_m: gap_m(form, centre, radius_m) }
+        }
         // Sharp forms know their distance where they are round.
         Form::Cuboid(_) | Form::Cylinder(_) | Form::Cone(_) => {
             let round = form.grown(radius_m).unwrap_or(*form);
@@ -33,6 +34,17 @@ pub(super) fn on_form(form: &Form, centre: &Vector3<f64>, radius_m: f64) -> Touc
         Form::Ellipsoid(_) | Form::Scaled(_) => {
             from_nearest(&form.nearest(centre), form.signed_distance(centre), centre, radius_m)
         }
+    }
+}
+
+/// The gap alone \[m\].
+pub(super) fn gap_m(form: &Form, centre: &Vector3<f64>, radius_m: f64) -> f64 {
+    match form {
+        Form::Ellipsoid(_) | Form::Scaled(_) => on_form(form, centre, radius_m).gap_m,
+        Form::Cuboid(_) | Form::Cylinder(_) | Form::Cone(_) => {
+            form.grown(radius_m).unwrap_or(*form).signed_distance(centre)
+        }
+        _ => form.signed_distance(centre) - radius_m,
     }
 }
 
@@ -51,10 +63,6 @@ pub(super) fn on_surface(shape: &Shape, centre: &Vector3<f64>, radius_m: f64) ->
         Shape::Nurbs(nurbs) => Some(touch(&nurbs.surface(0.0))),
         _ => None,
     }
-}
-
-fn on_plane(plane: &Plane, centre: &Vector3<f64>, radius_m: f64) -> Touch {
-    Touch { normal: plane.normal_B(), gap_m: plane.signed_distance(centre) - radius_m }
 }
 
 /// Of the distance only the sign counts.

@@ -124,7 +124,7 @@ impl Core {
             }
             Self::Box { half_m } => half_m.zip_map(d, f64::copysign),
             Self::Frustum { half_m, radii_m: [bottom_m, top_m] } => {
-                let across = d.x.hypot(d.z);
+                let across = (d.x * d.x + d.z * d.z).sqrt();
                 let is_top = top_m * across + half_m * d.y > bottom_m * across - half_m * d.y;
                 let (radius_m, y) = if is_top { (*top_m, *half_m) } else { (*bottom_m, -*half_m) };
                 let part = if across > 0.0 { radius_m / across } else { 0.0 };

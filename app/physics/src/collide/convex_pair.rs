@@ -1,7 +1,8 @@
 //! Contact points of two convex forms.
 //!
-//! Model: along the direction in which they touch ([`axis`](super::axis)), flat pieces that look along it carry what stands
-//! on them ([`overlay`](super::overlay)); otherwise lines cross ([`lines`](super::lines)), or there is a single point.
+//! Model: along the direction in which they touch ([`axis`](super::axis)), lines cross ([`lines`](super::lines)) or there is
+//! a single point, and flat pieces carry what stands on them ([`overlay`](super::overlay)): that alone where one looks
+//! exactly along it. Places that are found twice count once ([`spots`](super::spots)).
 //! Frames: that of the second form, B.
 //! Memory: words 0 to 2 the direction, 3 whether there is one, 4 and 5 where the points of the rims of A and B begin.
 
@@ -18,7 +19,7 @@ use super::spots::{Spot, Spots};
 
 /// A face looks along the contact if it is turned from it by less \[1 - cosine\].
 const LOOKS_ALONG: f64 = 5e-9;
-const SINGLE_ID: u32 = 1;
+const SINGLE_ID: u32 = 1100;
 
 /// nothing if either is no convex form.
 pub(super) fn contact(
@@ -46,23 +47,23 @@ pub(super) fn contact(
         _ => None,
     };
     let exact = looks_along(&facets[1]).or_else(|| looks_along(&facets[0]).map(|normal| -normal));
-    if let Some(normal) = exact {
-        let sides = [(0, a.radius_m), (1, b.radius_m)];
-        let sides = sides.map(|(of, radius_m)| Side { facet: facets[of], radius_m });
-        Overlay { sides, normal, angles: &mut memory.words[4..6], spots: &mut spots }.find();
-    }
-    if !spots.is_empty() {
-        return spots;
-    }
     let on_a = found.on_a - n * a.radius_m;
-    match [Facet::edge_of(&a, &-n), Facet::edge_of(&b, &n)] {
-        [Facet::Line(line_a), Facet::Line(line_b)] if exact.is_none() => {
-            let radii_m = [a.radius_m, b.radius_m];
-            Alongside { lines: [line_a, line_b], radii_m, normal: n, gap_m, on_a }
-                .sharpened()
-                .find(&mut spots);
+    if exact.is_none() {
+        match [Facet::edge_of(&a, &-n), Facet::edge_of(&b, &n)] {
+            [Facet::Line(line_a), Facet::Line(line_b)] => {
+                let radii_m = [a.radius_m, b.radius_m];
+                Alongside { lines: [line_a, line_b], radii_m, normal: n, gap_m, on_a }.find(&mut spots);
+            }
+            _ => spots.push(Spot { id: SINGLE_ID, on_a, normal: n, gap_m }),
         }
-        _ => spots.push(Spot { id: SINGLE_ID, on_a, normal: n, gap_m }),
+    }
+    // Where faces nearly look along it, their corners are hardly less deep than the edges that touch.
+    let sides = [(0, a.radius_m), (1, b.radius_m)];
+    let sides = sides.map(|(of, radius_m)| Side { facet: facets[of], radius_m });
+    let normal = exact.unwrap_or(n);
+    Overlay { sides, normal, angles: &mut memory.words[4..6], spots: &mut spots }.find();
+    if spots.is_empty() {
+        spots.push(Spot { id: SINGLE_ID, on_a, normal: n, gap_m });
     }
     spots
 }

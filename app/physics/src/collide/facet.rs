@@ -205,8 +205,8 @@ impl Plate {
     }
 }
 
-/// A plate that is seen at a smaller sine than this has no area.
-const EDGE_ON: f64 = 1e-6;
+/// A plate that is seen at a smaller sine than this carries nothing.
+const EDGE_ON: f64 = 0.3;
 /// Points this far beyond the outline still lie on it, in shares of its size: rounding.
 const ON_OUTLINE: f64 = 1e-9;
 

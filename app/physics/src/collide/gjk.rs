@@ -29,7 +29,7 @@ pub(super) struct Nearest {
 /// Bound on the search.
 const MAX_ROUNDS: usize = 40;
 /// A distance that can become less only by this share of itself is found.
-const FOUND: f64 = 1e-14;
+const FOUND: f64 = 1e-8;
 
 /// A point of the difference, and A's of which it is one.
 #[derive(Debug, Clone, Copy, Default)]

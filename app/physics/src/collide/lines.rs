@@ -6,7 +6,6 @@
 
 use nalgebra::Vector3;
 
-use super::axis::unit;
 use super::facet::Line;
 use super::spots::{Spot, Spots};
 
@@ -22,55 +21,28 @@ pub(super) struct Alongside {
     pub(super) on_a: Vector3<f64>,
 }
 
-const CROSSING_ID: u32 = 1;
-const END_IDS: [u32; 2] = [2, 3];
+const CROSSING_ID: u32 = 1100;
+const END_IDS: [u32; 2] = [1101, 1102];
 /// An end nearer to the crossing than this counts less \[m\].
 const FADE_M: f64 = 1e-3;
-/// Lines that are not parallel to this sine cross.
+/// Lines at this sine or more only cross.
 const PARALLEL: f64 = 0.3;
 
-/// A direction that is across both lines to this is exactly so.
-const ACROSS: f64 = 1e-5;
-
 impl Alongside {
-    /// The same with what the search for nearest points leaves open taken from the lines, if they cross.
-    pub(super) fn sharpened(self) -> Self {
-        let [a, b] = self.lines.map(|line| line.ends);
-        let (along_a, along_b) = (a[1] - a[0], b[1] - b[0]);
-        let across = along_a.cross(&along_b);
-        let squared = across.norm_squared();
-        if squared <= PARALLEL * PARALLEL * along_a.norm_squared() * along_b.norm_squared() {
-            return self;
-        }
-        let Some(normal) = unit(&(across * across.dot(&self.normal))) else { return self };
-        let from = b[0] - a[0];
-        let place = from.cross(&along_b).dot(&across) / squared;
-        let place_on_b = from.cross(&along_a).dot(&across) / squared;
-        let is_within = [place, place_on_b].iter().all(|place| (0.0..=1.0).contains(place));
-        if !is_within || (normal - self.normal).norm_squared() > ACROSS * ACROSS {
-            return self;
-        }
-        let on_a = a[0] + along_a * place;
-        let on_b = b[0] + along_b * place_on_b;
-        let [radius_a, radius_b] = self.radii_m;
-        let gap_m = normal.dot(&(on_a - on_b)) - radius_a - radius_b;
-        Self { normal, gap_m, on_a: on_a - normal * radius_a, ..self }
-    }
-
     /// Appends up to three points.
     pub(super) fn find(&self, spots: &mut Spots) {
         let mut crossing = 1.0;
-        if let Some(ends) = self.shared() {
+        if let Some((ends, alongside)) = self.shared() {
             let spots_at = ends.map(|at| self.at(at));
+            let apart = |spot: &Spot| alongside * ((spot.on_a - self.on_a).norm() / FADE_M).min(1.0);
             let share = |spot: &Spot| {
-                let apart = ((spot.on_a - self.on_a).norm() / FADE_M).min(1.0);
-                apart * if self.gap_m < 0.0 { (spot.gap_m / self.gap_m).clamp(0.0, 1.0) } else { 0.0 }
+                apart(spot) * if self.gap_m < 0.0 { (spot.gap_m / self.gap_m).clamp(0.0, 1.0) } else { 0.0 }
             };
             crossing -= share(&spots_at[0]).min(share(&spots_at[1]));
             for (mut spot, id) in spots_at.into_iter().zip(END_IDS) {
                 spot.id = id;
                 if spot.gap_m < 0.0 {
-                    spot.gap_m *= ((spot.on_a - self.on_a).norm() / FADE_M).min(1.0);
+                    spot.gap_m *= apart(&spot);
                 }
                 spots.push(spot);
             }
@@ -81,18 +53,19 @@ impl Alongside {
         }
     }
 
-    /// From where to where on A's line B's runs alongside.
-    fn shared(&self) -> Option<[f64; 2]> {
+    /// From where to where on A's line B's runs alongside, and how much so: 1 where they are parallel.
+    fn shared(&self) -> Option<([f64; 2], f64)> {
         let [a, b] = self.lines.map(|line| line.ends);
         let (along_a, along_b) = (a[1] - a[0], b[1] - b[0]);
         let across = along_a.cross(&along_b).norm_squared();
         let squared = along_a.norm_squared();
-        if across > PARALLEL * PARALLEL * squared * along_b.norm_squared() || squared == 0.0 {
+        let sine = (across / (squared * along_b.norm_squared())).sqrt();
+        if sine.is_nan() || sine >= PARALLEL {
             return None;
         }
         let [first, last] = b.map(|end| (end - a[0]).dot(&along_a) / squared);
         let (first, last) = (first.min(last).max(0.0), first.max(last).min(1.0));
-        (first < last).then_some([first, last])
+        (first < last).then_some(([first, last], 1.0 - sine / PARALLEL))
     }
 
     /// The contact at a place of A's line.

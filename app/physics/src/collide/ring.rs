@@ -192,7 +192,7 @@ impl Ring<'_> {
         let step = TAU / PIECES as f64;
         let mut gaps_m = [0.0; PIECES];
         for (piece, gap_m) in gaps_m.iter_mut().enumerate() {
-            *gap_m = self.touch(step * piece as f64).gap_m;
+            *gap_m = ball::gap_m(self.other, &self.middle(step * piece as f64), self.torus.tube_radius_m());
         }
         let has_plates = plates.count > 0;
         let mut places = [(f64::INFINITY, 0.0); SLOTS];

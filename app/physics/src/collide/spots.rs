@@ -33,7 +33,7 @@ const MAX_SPOTS: usize = 24;
 /// Points nearer to each other than this share their depth \[m\].
 const FADE_M: f64 = 1e-3;
 /// A share of less is nothing.
-const NOTHING: f64 = 1e-6;
+const NOTHING: f64 = 1e-4;
 
 impl Spots {
     pub(super) fn within(reach_m: f64) -> Self {
@@ -42,7 +42,10 @@ impl Spots {
 
     /// Adds one that is near enough, after all to which it must give way.
     pub(super) fn push(&mut self, mut spot: Spot) {
-        if !spot.gap_m.is_finite() || spot.gap_m > self.reach_m || self.count == MAX_SPOTS {
+        let is_finite = |v: &Vector3<f64>| v.iter().all(|x| x.is_finite());
+        if !(is_finite(&spot.on_a) && is_finite(&spot.normal) && spot.gap_m <= self.reach_m)
+            || self.count == MAX_SPOTS
+        {
             return;
         }
         let squared = |other: &Spot| (other.on_a - spot.on_a).norm_squared();
