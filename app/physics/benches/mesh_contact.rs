@@ -100,7 +100,8 @@ fn moving(c: &mut Criterion, name: &str, (a, X_WA): (&Shape, Isometry3<f64>), b:
         bench.iter(|| {
             tick = tick.wrapping_add(1);
             let phase = f64::from(tick) * 0.01;
-            let rolls = Vector3::new(0.02 * phase.sin(), 0.01 * (0.7 * phase).cos(), 0.02 * (1.3 * phase).sin());
+            let rolls =
+                Vector3::new(0.02 * phase.sin(), 0.01 * (0.7 * phase).cos(), 0.02 * (1.3 * phase).sin());
             let mut pose = X_WA;
             pose.rotation = UnitQuaternion::from_scaled_axis(rolls) * pose.rotation;
             pose.translation.vector.y += 1e-4 * (3.0 * phase).sin();

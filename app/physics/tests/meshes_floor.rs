@@ -7,9 +7,7 @@ mod meshes;
 
 use common::*;
 use haptics::mesh::make;
-use haptics::{
-    Capsule, Cone, Cuboid, Cylinder, Ellipsoid, Entity, Friction, Plane, Shape, Sphere, Torus,
-};
+use haptics::{Capsule, Cone, Cuboid, Cylinder, Ellipsoid, Entity, Friction, Plane, Shape, Sphere, Torus};
 use meshes::{angle, block, build, cut_in_four, terrain};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use physics::Settings;
@@ -33,14 +31,7 @@ fn over(ground_shape: Shape, angle: f64, mu: f64, shape: Shape, at: Isometry3<f6
 }
 
 /// The same of another mass: a light one hardly sinks into the ground.
-fn over_of(
-    mass: f64,
-    ground_shape: Shape,
-    angle: f64,
-    mu: f64,
-    shape: Shape,
-    at: Isometry3<f64>,
-) -> World {
+fn over_of(mass: f64, ground_shape: Shape, angle: f64, mu: f64, shape: Shape, at: Isometry3<f64>) -> World {
     let turn = lean(angle);
     // So damped, what swings on its springs has come to rest in some tenths of a second.
     let entity = object(shape, turn * at, 1000.0, mu).with_damping(5.0).unwrap();
@@ -79,9 +70,8 @@ fn a_ball_rolls_down_triangles_as_down_the_plane_and_feels_no_edge() {
         for _ in 0..300 {
             run(&mut world, 1);
             run(&mut on_plane, 1);
-            let [force_W, plane_W] = [&world, &on_plane].map(|world| {
-                world.manipulation.rows().iter().map(|row| row.force_W).sum::<Vector3<f64>>()
-            });
+            let [force_W, plane_W] = [&world, &on_plane]
+                .map(|world| world.manipulation.rows().iter().map(|row| row.force_W).sum::<Vector3<f64>>());
             // Heights of one plane, measured by this face or that one: 1e-16 over millimetres, and what the solver leaves.
             assert!((force_W - plane_W).norm() < 1e-8, "{cells}: {force_W} {plane_W}");
         }

@@ -111,8 +111,7 @@ fn an_angle_has_the_moments_of_the_two_boxes_it_is_made_of() {
     let (mesh, parts) = (of(common_meshes::angle(), 0.3), common_meshes::ANGLE_PARTS);
     let volume = |(_, size): &([f64; 3], [f64; 3])| size.iter().product::<f64>();
     let total: f64 = parts.iter().map(volume).sum();
-    let centre: Vector3<f64> =
-        parts.iter().map(|part| Vector3::from(part.0) * (volume(part) / total)).sum();
+    let centre: Vector3<f64> = parts.iter().map(|part| Vector3::from(part.0) * (volume(part) / total)).sum();
     let mut inertia = Matrix3::zeros();
     for part in &parts {
         let mass_kg = 0.3 * volume(part) / total;

@@ -74,7 +74,9 @@ fn signed_distance(mesh: &Mesh, p: &Vector3<f64>) -> f64 {
 fn a_ball_touches_the_nearest_triangle_and_every_point_told_is_locally_nearest() {
     let (mut random, mut several) = (Random(1), 0);
     let bumpy = terrain(12, 0.1, |x, z| 0.01 * (90.0 * x).sin() * (70.0 * z).cos());
-    for mesh in [build(make::bumpy_sphere(30, 16, 0.05)), build(make::star(5, 0.05, 0.02, 0.03)), build(bumpy)] {
+    for mesh in
+        [build(make::bumpy_sphere(30, 16, 0.05)), build(make::star(5, 0.05, 0.02, 0.03)), build(bumpy)]
+    {
         for _ in 0..500 {
             let radius = 0.012;
             let at = random.vector(0.07);
@@ -82,7 +84,8 @@ fn a_ball_touches_the_nearest_triangle_and_every_point_told_is_locally_nearest()
             if !(radius * 0.7..radius + 1e-3).contains(&far) || mesh.is_inside_unbounded(&at) {
                 continue;
             }
-            let (pose, ball) = (Isometry3::from_parts(random.vector(1.0).into(), random.turn()), Sphere::new(radius));
+            let (pose, ball) =
+                (Isometry3::from_parts(random.vector(1.0).into(), random.turn()), Sphere::new(radius));
             let ball = Shape::from(ball.unwrap());
             let shape = Shape::from(Arc::clone(&mesh));
             let X_WA = pose * Isometry3::translation(at.x, at.y, at.z);
@@ -92,7 +95,8 @@ fn a_ball_touches_the_nearest_triangle_and_every_point_told_is_locally_nearest()
             let centre_W = X_WA.translation.vector;
             let is_nearest = |point: &ContactPoint| {
                 let on_mesh = point.point_W - point.normal_W * point.gap_m;
-                near((centre_W - point.point_W).norm(), radius) && distance(&mesh, &(pose.inverse() * Point3::from(on_mesh)).coords) < 0.3 * radius
+                near((centre_W - point.point_W).norm(), radius)
+                    && distance(&mesh, &(pose.inverse() * Point3::from(on_mesh)).coords) < 0.3 * radius
             };
             assert!(found.iter().all(is_nearest), "{found:?}");
             let deepest = found.iter().map(|point| point.gap_m).fold(f64::INFINITY, f64::min);
@@ -107,7 +111,15 @@ fn a_ball_touches_the_nearest_triangle_and_every_point_told_is_locally_nearest()
                     let foot = centre_W - point.normal_W * radius;
                     assert!((foot - point.point_W).norm() < 1e-12);
                 }
-                let most = pressed.iter().map(|one| pressed.iter().map(|other| -other.gap_m * one.normal_W.dot(&other.normal_W).max(0.0)).sum::<f64>()).fold(0.0, f64::max);
+                let most = pressed
+                    .iter()
+                    .map(|one| {
+                        pressed
+                            .iter()
+                            .map(|other| -other.gap_m * one.normal_W.dot(&other.normal_W).max(0.0))
+                            .sum::<f64>()
+                    })
+                    .fold(0.0, f64::max);
                 assert!(most > radius - far - 1e-9, "{most:e} {:e} {found:?}", radius - far);
             }
             // The same seen from the other side.
@@ -116,7 +128,10 @@ fn a_ball_touches_the_nearest_triangle_and_every_point_told_is_locally_nearest()
             for (one, other) in found.iter().zip(&swapped) {
                 assert!((one.normal_W + other.normal_W).norm() < 1e-12 && near(one.gap_m, other.gap_m));
                 // Where depths are shared, points are farther apart than they count.
-                assert!(found.len() > 1 || (one.point_W - one.normal_W * one.gap_m - other.point_W).norm() < 1e-12);
+                assert!(
+                    found.len() > 1
+                        || (one.point_W - one.normal_W * one.gap_m - other.point_W).norm() < 1e-12
+                );
             }
         }
     }
@@ -130,14 +145,16 @@ fn what_is_told_of_solids_is_as_deep_as_they_are_and_the_deepest_is_not_missed()
     let cuboid = Cuboid::new([0.04, 0.05, 0.06]).unwrap();
     let shape = Shape::from(cuboid);
     let half = Vector3::new(0.02, 0.025, 0.03);
-    let corners = (0..8).map(|i| Vector3::from_fn(|axis, _| if i >> axis & 1 == 1 { half[axis] } else { -half[axis] }));
+    let corners =
+        (0..8).map(|i| Vector3::from_fn(|axis, _| if i >> axis & 1 == 1 { half[axis] } else { -half[axis] }));
     let corners: Vec<Vector3<f64>> = corners.collect();
     let (mut tried, mut missed) = (0, 0);
     for mesh in &meshes {
         for _ in 0..600 {
             let X_MO = Isometry3::from_parts(random.vector(0.08).into(), random.turn());
             // All corners and all vertices, one by one.
-            let of_corners = corners.iter().map(|corner| signed_distance(mesh, &(X_MO * Point3::from(*corner)).coords));
+            let of_corners =
+                corners.iter().map(|corner| signed_distance(mesh, &(X_MO * Point3::from(*corner)).coords));
             let of_vertices = mesh.vertices().iter().map(|vertex| {
                 cuboid.signed_distance(&X_MO.inverse_transform_point(&Point3::from(*vertex)).coords)
             });
@@ -155,7 +172,11 @@ fn what_is_told_of_solids_is_as_deep_as_they_are_and_the_deepest_is_not_missed()
                 assert!((point.normal_W.norm() - 1.0).abs() < 1e-12);
                 // On the surface of the box to the depth.
                 let on_a = X_MO.inverse_transform_point(&Point3::from(point.point_W)).coords;
-                assert!(cuboid.signed_distance(&on_a).abs() < 1e-9, "{point:?} {}", cuboid.signed_distance(&on_a));
+                assert!(
+                    cuboid.signed_distance(&on_a).abs() < 1e-9,
+                    "{point:?} {}",
+                    cuboid.signed_distance(&on_a)
+                );
             }
         }
     }
@@ -192,7 +213,11 @@ fn finding_contact_points_never_allocates() {
                 contact_points(a, b, 2e-3, &mut memory, &mut found);
                 let all = found.as_slice();
                 points += all.len();
-                ids += all.iter().enumerate().filter(|(at, point)| all[..*at].iter().any(|one| one.id == point.id)).count();
+                ids += all
+                    .iter()
+                    .enumerate()
+                    .filter(|(at, point)| all[..*at].iter().any(|one| one.id == point.id))
+                    .count();
             }
         }
     }

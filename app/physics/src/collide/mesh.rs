@@ -15,8 +15,8 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::mesh_ball::{self, Ball};
 use super::mesh_other::{Other, Solidity};
-use super::{mesh_plane, mesh_solid};
 use super::{ContactPoint, ContactPoints, PairMemory, Solid};
+use super::{mesh_plane, mesh_solid};
 
 /// Where A and B touch, at least one of them being a mesh.
 pub(super) fn contact_points(

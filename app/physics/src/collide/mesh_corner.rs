@@ -50,8 +50,8 @@ impl Corner {
         while let Some((number, corner)) = fan.next() {
             let face = &mesh.faces()[number as usize];
             let link = face.links[corner];
-            let is_sharp = link.is_boundary()
-                || mesh.faces()[link.face() as usize].normal_B.dot(&face.normal_B) < SHARP;
+            let is_sharp =
+                link.is_boundary() || mesh.faces()[link.face() as usize].normal_B.dot(&face.normal_B) < SHARP;
             if is_sharp {
                 visit(&mesh.vertices()[face.vertices[(corner + 1) % 3] as usize], number, corner);
             }

@@ -36,7 +36,13 @@ impl Edge {
     }
 }
 
-fn cut(mesh: &Mesh, from: &Vector3<f64>, to: &Vector3<f64>, along: &Vector3<f64>, most_m: f64) -> Option<Cut> {
+fn cut(
+    mesh: &Mesh,
+    from: &Vector3<f64>,
+    to: &Vector3<f64>,
+    along: &Vector3<f64>,
+    most_m: f64,
+) -> Option<Cut> {
     let hit = mesh.first_hit(from, to)?;
     // Through the pressed face itself it goes without depth, through its back not at all.
     if mesh.faces()[hit.face as usize].normal_B.dot(along).abs() > ASIDE {

@@ -108,9 +108,8 @@ impl Other<'_> {
                 let first = owns[0].map_or(centre_M, |own| own.at_M);
                 first + way_M * torus.tube_radius_m()
             }
-            Solidity::Form(form) => Convex::of(form, &self.X_MO).map_or(meeting.at_M, |convex| {
-                convex.support(way_M) + way_M * convex.radius_m
-            }),
+            Solidity::Form(form) => Convex::of(form, &self.X_MO)
+                .map_or(meeting.at_M, |convex| convex.support(way_M) + way_M * convex.radius_m),
             Solidity::Mesh(_) => meeting.at_M + way_M * meeting.depth_m,
         }
     }
@@ -186,7 +185,9 @@ impl Other<'_> {
             _ => {
                 if let Some(convex) = Convex::of(form, &Isometry3::identity()) {
                     match convex.core {
-                        Core::Segment { .. } | Core::Ellipsoid { .. } => owns.push(0, convex.support(&way), 0.0),
+                        Core::Segment { .. } | Core::Ellipsoid { .. } => {
+                            owns.push(0, convex.support(&way), 0.0);
+                        }
                         _ => (0..8_u32).for_each(|number| {
                             let part = |bit: u32| if number >> bit & 1 == 1 { 0.3 } else { -0.3 };
                             let aside = Vector3::new(part(0), part(1), part(2));
@@ -209,7 +210,8 @@ struct Points<'p> {
 impl Points<'_> {
     fn push(&mut self, number: u32, at: Vector3<f64>, radius_m: f64) {
         if let Some(place) = self.owns.get_mut(self.count) {
-            *place = Some(Own { number, at_M: (self.X_MO * Point3::from(at)).coords, radius_m, corner: None });
+            *place =
+                Some(Own { number, at_M: (self.X_MO * Point3::from(at)).coords, radius_m, corner: None });
             self.count += 1;
         }
     }

@@ -46,13 +46,7 @@ pub(super) fn contact_points(
 }
 
 /// About where they meet: as in the last tick, or else found by going to and fro; `None` where they are far apart.
-fn meet(
-    mesh: &Mesh,
-    other: &Other<'_>,
-    reach_m: f64,
-    travel_m: f64,
-    memory: &PairMemory,
-) -> Option<Meeting> {
+fn meet(mesh: &Mesh, other: &Other<'_>, reach_m: f64, travel_m: f64, memory: &PairMemory) -> Option<Meeting> {
     let [x, y, z, is_known, at_x, at_y, at_z, depth_m] = memory.words;
     if is_known == 1.0 {
         let normal_M = Vector3::new(x, y, z);

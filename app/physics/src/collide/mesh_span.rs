@@ -147,7 +147,10 @@ impl Standing<'_> {
         let mut kept = kept.iter().flatten().copied().filter(counts);
         let Some(first) = kept.next() else {
             let counts = [&self.below(self.reach_m), &Linear::ONE];
-            return self.mesh.outlying(counts, self.limits, 0.0, MANY_VISITS).map(|(corner, _)| Corner::new(corner));
+            return self
+                .mesh
+                .outlying(counts, self.limits, 0.0, MANY_VISITS)
+                .map(|(corner, _)| Corner::new(corner));
         };
         let known = kept.fold(first, lower);
         // What comes in loaded pushes: a ball that rolls would be driven by what enters below it and leaves behind.
@@ -267,17 +270,19 @@ impl Seek<'_> {
             if self.standing.is_over(corner) { score(corner.point_M(mesh)) } else { 0.0 }
         };
         let least = at_least_m * self.depth.at_most;
-        let kept = self.kept.iter().flatten().fold(
-            (self.deepest, 0.0),
-            |best, &one| if of(one) > best.1 { (one, of(one)) } else { best },
-        );
+        let kept = self
+            .kept
+            .iter()
+            .flatten()
+            .fold((self.deepest, 0.0), |best, &one| if of(one) > best.1 { (one, of(one)) } else { best });
         let (mut best, mut most) = (kept.0, kept.1);
         let (near, near_score) = kept.0.climb(mesh, of);
         if near_score > least.max(self.how.better * kept.1) {
             (best, most) = (near, near_score);
         }
         let needed = least.max(self.how.better * most);
-        let visits = if self.searched.is_none_or(|searched| searched == role) { MANY_VISITS } else { FEW_VISITS };
+        let visits =
+            if self.searched.is_none_or(|searched| searched == role) { MANY_VISITS } else { FEW_VISITS };
         if let Some((corner, score)) =
             mesh.outlying([distance, &self.depth], self.standing.limits, needed, visits)
         {
