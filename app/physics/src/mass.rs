@@ -66,6 +66,21 @@ impl MassProperties {
         }
     }
 
+    /// As it was measured: for shapes that have no volume or whose volume nobody works out. Moments \[kg m^2\] are those
+    /// about the centre of mass \[m, in B\], about the entity's own axes.
+    ///
+    /// # Errors
+    /// A mass that is not finite or not positive, a centre that is not finite, impossible moments.
+    pub fn given(mass_kg: f64, centre_B: Vector3<f64>, moments: [f64; 3]) -> Result<Self, BodyError> {
+        let mass_kg = positive("mass_kg", mass_kg)?;
+        for value in centre_B.iter().copied().filter(|value| !value.is_finite()) {
+            let (parameter, allowed) = ("centre_of_mass_m", "finite numbers");
+            return Err(ParameterError::OutOfRange { parameter, value, allowed }.into());
+        }
+        let (principal_kg_m2, axes_BP) = (moments.into(), UnitQuaternion::identity());
+        Self { mass_kg, centre_B, principal_kg_m2, axes_BP }.with_inertia(moments)
+    }
+
     /// The same with these principal moments \[kg m^2\], about the entity's own axes.
     ///
     /// # Errors

@@ -146,6 +146,12 @@ fn open_meshes_and_those_that_enclose_nothing_are_refused_with_what_to_do() {
     assert!(matches!(refused, BodyError::OpenMesh { faces: 11 }), "{refused:?}");
     let text = refused.to_string();
     assert!(text.contains("inertia_kg_m2") && text.contains("centre_of_mass_m"), "{text}");
+    // What to do instead.
+    let given = MassProperties::given(1.0, Vector3::y() * 0.01, [2e-3, 1e-3, 2e-3]).unwrap();
+    assert_eq!((given.centre_B.y, given.principal_kg_m2.x), (0.01, 2e-3));
+    let endless = Vector3::new(0.0, f64::NAN, 0.0);
+    assert!(MassProperties::given(1.0, endless, [1e-3; 3]).is_err());
+    assert!(MassProperties::given(1.0, Vector3::zeros(), [1e-3, 1e-3, 3e-3]).is_err());
     let strip = shape(make::mobius_strip(40, 4, 0.05, 0.02));
     assert!(matches!(MassProperties::of_shape(&strip, 1.0), Err(BodyError::OpenMesh { .. })));
     let flat = shape(make::cuboid([0.1, 1e-14, 0.1]));

@@ -139,6 +139,36 @@ fn a_ball_touches_the_nearest_triangle_and_every_point_told_is_locally_nearest()
 }
 
 #[test]
+fn a_ball_pushed_through_a_wall_is_pressed_back_to_where_it_came_from() {
+    let radius = 0.01;
+    let ball = Shape::from(Sphere::new(radius).unwrap());
+    let here = Isometry3::identity();
+    let plate = meshes::block(10, 0.2, 0.002, |_, _| 0.0);
+    for wall in [build(plate), build(terrain(10, 0.2, |_, _| 0.0))].map(Shape::from) {
+        for way in [1.0, -1.0] {
+            // The plate's lower face is 2 mm below.
+            let surface = if way < 0.0 && matches!(&wall, Shape::Mesh(mesh) if mesh.vertices().len() > 200) {
+                -0.002
+            } else {
+                0.0
+            };
+            let mut memory = PairMemory::default();
+            for step in 0..40 {
+                let height = 0.0105 - 5e-4 * f64::from(step);
+                let pose = Isometry3::translation(0.0123, surface + way * height, 0.0077);
+                let mut found = ContactPoints::default();
+                let (a, b) = (Solid { shape: &ball, X_W: &pose }, Solid { shape: &wall, X_W: &here });
+                contact_points(a, b, 1e-3, &mut memory, &mut found);
+                let [point] = found.as_slice() else { panic!("{step}: {found:?}") };
+                // Rounding of what was gone since.
+                assert!((point.normal_W - Vector3::y() * way).norm() < 1e-9, "{step}: {point:?}");
+                assert!((point.gap_m - (height - radius)).abs() < 1e-12, "{step}: {point:?}");
+            }
+        }
+    }
+}
+
+#[test]
 fn what_is_told_of_solids_is_as_deep_as_they_are_and_the_deepest_is_not_missed() {
     let mut random = Random(2);
     let meshes = [build(make::cuboid([0.05; 3])), build(make::bumpy_sphere(30, 16, 0.03))];

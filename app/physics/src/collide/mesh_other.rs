@@ -186,7 +186,7 @@ impl Other<'_> {
                 if let Some(convex) = Convex::of(form, &Isometry3::identity()) {
                     match convex.core {
                         Core::Segment { .. } | Core::Ellipsoid { .. } => {
-                            owns.push(0, convex.support(&way), 0.0)
+                            owns.push(0, convex.support(&way), 0.0);
                         }
                         _ => (0..8_u32).for_each(|number| {
                             let part = |bit: u32| if number >> bit & 1 == 1 { 0.3 } else { -0.3 };
