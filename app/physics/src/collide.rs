@@ -216,7 +216,7 @@ fn rank(form: &Form) -> u32 {
 
 /// The one contact point of a ball.
 fn single(touch: &ball::Touch, centre: &Vector3<f64>, radius_m: f64, reach_m: f64) -> Spots {
-    let mut spots = Spots::within(reach_m);
+    let mut spots = Spots::within(reach_m, radius_m);
     let on_a = centre - touch.normal * radius_m;
     spots.push(Spot { id: 0, on_a, normal: touch.normal, gap_m: touch.gap_m });
     spots

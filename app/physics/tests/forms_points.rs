@@ -325,3 +325,31 @@ fn a_ball_lies_on_surfaces_of_ones_own_and_on_patches() {
         }
     }
 }
+
+#[test]
+fn however_small_a_form_is_all_its_corners_carry() {
+    for size in [1e-4, 1e-3, 1e-2, 1.0] {
+        let small = [
+            (Form::from(Cuboid::new([size; 3]).unwrap()), 0.5 * size),
+            (Cylinder::new(0.5 * size, size).unwrap().into(), 0.5 * size),
+            (Torus::new(0.5 * size, 0.1 * size).unwrap().into(), 0.1 * size),
+        ];
+        for (form, height) in small {
+            for (b, X_WB) in
+                [(ground(), Isometry3::identity()), (slab(), Isometry3::translation(0.0, -0.05, 0.0))]
+            {
+                // A slab of 0.2 m carries what is of its size on its own edges.
+                if size == 1.0 && matches!(b, Form::Cuboid(_)) {
+                    continue;
+                }
+                let X = Isometry3::translation(0.0, height - 1e-3 * size, 0.0);
+                let found = points(&form, &X, &b, &X_WB, REACH, &mut PairMemory::default());
+                let deep: Vec<_> = found.iter().filter(|point| point.gap_m < 0.0).collect();
+                assert_eq!(deep.len(), 4, "{form:?}: {found:?}");
+                for point in deep {
+                    assert!((point.gap_m + 1e-3 * size).abs() < 1e-12, "{form:?}: {point:?}");
+                }
+            }
+        }
+    }
+}

@@ -29,9 +29,9 @@ pub(super) fn contact(
     reach_m: f64,
     memory: &mut PairMemory,
 ) -> Spots {
-    let mut spots = Spots::within(reach_m);
     let placed = (Convex::of(a, X_BA), Convex::of(b, &Isometry3::identity()));
-    let (Some(a), Some(b)) = placed else { return spots };
+    let (Some(a), Some(b)) = placed else { return Spots::default() };
+    let mut spots = Spots::within(reach_m, a.inner_m().min(b.inner_m()));
     let [x, y, z, is_known, ..] = memory.words;
     let last = (is_known == 1.0).then(|| Vector3::new(x, y, z));
     let found = axis::find(&a, &b, last);
@@ -76,8 +76,8 @@ pub(super) fn on_plane(
     reach_m: f64,
     memory: &mut PairMemory,
 ) -> Spots {
-    let mut spots = Spots::within(reach_m);
-    let Some(a) = Convex::of(a, X_BA) else { return spots };
+    let Some(a) = Convex::of(a, X_BA) else { return Spots::default() };
+    let mut spots = Spots::within(reach_m, a.inner_m());
     let normal = plane.normal_B();
     let ground = Plate::endless(normal * plane.offset_m(), normal);
     if let super::convex::Core::Box { half_m } = a.core {

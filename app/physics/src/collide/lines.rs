@@ -23,8 +23,6 @@ pub(super) struct Alongside {
 
 const CROSSING_ID: u32 = 1100;
 const END_IDS: [u32; 2] = [1101, 1102];
-/// An end nearer to the crossing than this leaves it more \[m\].
-const FADE_M: f64 = 1e-3;
 /// Lines at this sine or more only cross.
 const PARALLEL: f64 = 0.3;
 
@@ -35,7 +33,7 @@ impl Alongside {
         let Some((ends, alongside)) = self.shared() else { return spots.push(crossing) };
         let ends = ends.map(|at| self.at(at));
         let carries = |end: &Spot| {
-            let apart = ((end.on_a - self.on_a).norm() / FADE_M).min(1.0);
+            let apart = ((end.on_a - self.on_a).norm() / spots.fade_m).min(1.0);
             let deep = if self.gap_m < 0.0 { (end.gap_m / self.gap_m).clamp(0.0, 1.0) } else { 0.0 };
             alongside * apart * deep
         };

@@ -49,7 +49,7 @@ pub(super) fn contact(
 ) -> Spots {
     let ring = Ring { X_BA, torus, other };
     let plates = Plates::of(other);
-    let mut spots = Spots::within(reach_m);
+    let mut spots = Spots::within(reach_m, torus.tube_radius_m());
     for (number, plate) in plates.as_slice().iter().enumerate() {
         ring.lie_on(plate, number as u32, &mut memory.words[0], reach_m, &mut spots);
     }

@@ -1,7 +1,7 @@
 //! Contact points while they are being found.
 //!
 //! Model: where a contact's outline is cut off, its corners change in number; two that come out of one must not press twice
-//! as hard at once. A point that lies nearer than [`FADE_M`] to one that was found before it leaves to that one what both
+//! as hard at once. A point that lies nearer than a millimetre to one that was found before it leaves to that one what both
 //! are deep, the more the nearer it is.
 
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -28,18 +28,22 @@ pub(super) struct Spots {
     count: usize,
     /// No farther than this.
     reach_m: f64,
+    /// Points nearer to each other than this share their depth \[m\].
+    pub(super) fade_m: f64,
 }
 
 /// Room while they are found.
 const MAX_SPOTS: usize = 24;
-/// Points nearer to each other than this share their depth \[m\].
+/// Points nearer to each other than this share their depth \[m\]; of small forms, than a share of their size.
 const FADE_M: f64 = 1e-3;
+const FADE: f64 = 0.1;
 /// A share or a distance of less is nothing.
 const NOTHING: f64 = 1e-4;
 
 impl Spots {
-    pub(super) fn within(reach_m: f64) -> Self {
-        Self { reach_m, ..Self::default() }
+    /// For forms of which the smaller one has this inner radius (m).
+    pub(super) fn within(reach_m: f64, inner_m: f64) -> Self {
+        Self { reach_m, fade_m: FADE_M.min(FADE * inner_m), ..Self::default() }
     }
 
     /// Adds one that is near enough, after all to which it must give way.
@@ -58,7 +62,7 @@ impl Spots {
         let depth_m = (-spot.gap_m).max(0.0);
         let (mut taken_m, mut nearest) = (0.0_f64, f64::INFINITY);
         for other in self.as_slice() {
-            let apart = (other.on_a - spot.on_a).norm() / FADE_M;
+            let apart = (other.on_a - spot.on_a).norm() / self.fade_m;
             let both_m = depth_m.min(-other.gap_m).max(0.0);
             taken_m = taken_m.max((1.0 - apart).max(0.0) * both_m);
             nearest = nearest.min(apart);
