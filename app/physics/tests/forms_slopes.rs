@@ -183,6 +183,7 @@ fn a_bar_lies_across_the_edges_of_two_others() {
     let roof = |x: f64| {
         let mut roof = box_of([0.02, 0.02, 0.1], Vector3::new(x, 0.0, 0.0));
         roof.X_WB.rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::FRAC_PI_4);
+        roof.previous_X_WB = roof.X_WB;
         roof
     };
     let top = 0.01 * 2.0_f64.sqrt();

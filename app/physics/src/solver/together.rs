@@ -16,7 +16,7 @@ use super::{Motion, newton};
 use crate::row::Row;
 
 /// The most turns over all bodies in a tick.
-const MAX_TURNS: usize = 40;
+const MAX_TURNS: usize = 200;
 
 /// Forces that change by less than this share of the largest are found.
 const SETTLED: f64 = 1e-9;
