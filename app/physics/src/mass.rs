@@ -73,7 +73,7 @@ impl MassProperties {
     /// A mass that is not finite or not positive, a centre that is not finite, impossible moments.
     pub fn given(mass_kg: f64, centre_B: Vector3<f64>, moments: [f64; 3]) -> Result<Self, BodyError> {
         let mass_kg = positive("mass_kg", mass_kg)?;
-        for value in centre_B.iter().copied().filter(|value| !value.is_finite()) {
+        if let Some(&value) = centre_B.iter().find(|value| !value.is_finite()) {
             let (parameter, allowed) = ("centre_of_mass_m", "finite numbers");
             return Err(ParameterError::OutOfRange { parameter, value, allowed }.into());
         }

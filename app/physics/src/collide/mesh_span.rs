@@ -10,12 +10,15 @@
 //! stands on a ring of vertices around its lowest point. Sought is from what is known, from neighbour to neighbour as long as
 //! it gets better, and by the hierarchy for what lies apart.
 //! Identity: who was chosen stays chosen while it touches, unless others need the room for a role; one that is to have a
-//! role must be better by [`BETTER`] than all that were chosen, and to be D deeper than all of them by [`DEEPER`]. So, where
-//! something rolls, vertices go unloaded, and what comes in loaded comes in front, and brakes.
+//! role must be better by [`BETTER`] than all that were chosen, and to be D deeper than all of them by [`DEEPER`]. Where all
+//! places are taken it must stick out far ([`CROWDED`]). After the first choice depths beyond a quarter of D's count no more:
+//! what comes in comes in at the rim of the patch, with little load, and goes when it has none. (Loads that come and go feed
+//! what rolls: a ball of a hundred thousand triangles rolled on for ever, or ever faster, with other rules tried.)
 //! While no vertex can have come down or risen by more than [`STILL`] of D's depth since they were sought, they are not
 //! sought anew: a body that rests, slides or spins on its face keeps its points for ever.
 //! Error: what sticks out of the polygon by less than [`BULGE`] of the side that it sticks out of may be missing, so a
-//! tipping threshold is that of the convex hull of the contact patch to about a twentieth of the patch.
+//! tipping threshold is that of the convex hull of the contact patch to about a twentieth of the patch; where eight touch
+//! already while the patch grows beyond them, to half a side of their polygon.
 //! Frames: the mesh's own. Cost: next to nothing while it rests; when it tilts or sinks, a walk and a query of the
 //! hierarchy for each role, both bounded. Of very many triangles in an oblique face a query may miss the best; so in each
 //! tick that of another role looks at more.
@@ -112,7 +115,10 @@ impl Standing<'_> {
         let height_m = self.height_m(deepest);
         let level_m = self.level_m(height_m);
         let kept = kept.map(|one| one.filter(|one| self.is_over(*one) && self.height_m(*one) <= level_m));
-        let depth = self.below(level_m).at_most(level_m - height_m);
+        // Where all places are taken by what touches, only what sticks out far is worth that one of these goes.
+        let is_full = kept.iter().all(Option::is_some);
+        let how = if is_full && how.better > FIRST.better { &CROWDED } else { how };
+        let depth = self.below(level_m).at_most(how.full * (level_m - height_m));
         Seek { standing: self, depth, deepest, kept: &kept, how, searched }.choose(&mut chosen);
         self.keep(kept, &mut chosen);
         chosen
@@ -195,12 +201,15 @@ struct How {
     better: f64,
     /// It sticks out of a side by this share of it.
     bulge: f64,
+    /// Deeper than this share of D's depth is no better: what comes in loaded brakes what rolls, or drives it.
+    full: f64,
 }
 
 /// Where nothing was chosen yet.
-const FIRST: How = How { better: 1.001, bulge: 0.02 };
+const FIRST: How = How { better: 1.001, bulge: 0.02, full: 1.0 };
 /// From then on.
-const LATER: How = How { better: BETTER, bulge: BULGE };
+const LATER: How = How { better: BETTER, bulge: BULGE, full: 0.25 };
+const CROWDED: How = How { better: 3.0, bulge: 0.5, full: 0.25 };
 const FIRST_TURNS: usize = 3;
 
 impl Seek<'_> {
