@@ -21,7 +21,7 @@ use crate::friction_cone::{ConeInput, FrictionCone};
 use crate::friction_law::FrictionState;
 use crate::height_map::Over;
 use crate::hip::Hip;
-use crate::mesh::{Beginning, Mesh, MeshCone, RollingCone};
+use crate::mesh::{BallOnMesh, Beginning, Mesh, MeshCone};
 use crate::nurbs::NurbsCone;
 use crate::shading::Shading;
 use crate::shape::Shape;
@@ -76,7 +76,7 @@ pub(crate) struct Slot {
     cone: Option<FrictionCone>,
     mesh: MeshCone,
     /// Of a ball; large, and points have none.
-    rolling: Option<Box<RollingCone>>,
+    rolling: Option<Box<BallOnMesh>>,
     csg: CsgCone,
     nurbs: NurbsCone,
     own: ContactMemory,
@@ -160,7 +160,7 @@ impl Slot {
         if self.is_used {
             let mut rolling = self.rolling.take();
             if let Some(rolling) = &mut rolling {
-                **rolling = RollingCone::default();
+                **rolling = BallOnMesh::default();
             }
             *self = Self { rolling, ..Self::default() };
         }
@@ -265,7 +265,7 @@ impl Slot {
             Shape::Own(_) => input.of_surface(|grown| self.touch_surface(grown, input))?,
             Shape::Mesh(mesh) => {
                 self.keep(Kept::Rolling);
-                let touched = self.rolling.as_mut()?.update(mesh, input);
+                let touched = self.rolling.as_mut()?.update(&**mesh, input);
                 self.begun(touched)
             }
             Shape::Nurbs(nurbs) => {

@@ -59,6 +59,7 @@ pub mod nurbs;
 pub mod passivity;
 mod plane;
 mod quartic;
+mod rolling;
 mod scaled;
 mod shading;
 mod shape;
