@@ -15,7 +15,7 @@
 //! Cost: independent of the tree while the finger stays in its neighbourhood; a new one looks at each leaf's bounding ball
 //! and at the patches of the leaves nearby. No recursion, no allocation.
 //! Limits: of more than eight patches that meet in one point the eight nearest count. Parts thinner than
-//! [`TOLERANCE`] times the solid's extent are not felt. Only fingers that are points feel trees.
+//! [`TOLERANCE`] times the solid's extent are not felt.
 
 mod corner;
 mod csg_cone;
@@ -24,11 +24,13 @@ mod foresight;
 mod hit;
 mod near;
 mod patch;
+mod rolling;
 mod tree;
 mod walk;
 mod way_out;
 
 pub(crate) use csg_cone::CsgCone;
+pub(crate) use rolling::BallOnCsg;
 pub use tree::{CsgError, CsgOp, CsgPart, CsgTree, MAX_DEPTH, MAX_LEAVES, PartShape};
 
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -30,6 +30,7 @@
 #![allow(non_snake_case)]
 
 mod algorithm;
+mod balls;
 mod capsule;
 mod chart;
 mod classic_god_object;

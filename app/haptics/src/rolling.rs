@@ -95,6 +95,11 @@ impl<F: Foot, V: Copy + Default> RollingCone<F, V> {
         felt.map(|touch| (touch, beginning))
     }
 
+    /// Where the ball's centre is, in contact.
+    pub(crate) fn centre_B(&self) -> Option<Vector3<f64>> {
+        self.touching.as_ref().map(|touching| touching.ball.centre_B)
+    }
+
     /// Whether a contact lives.
     pub(crate) fn is_touching(&self) -> bool {
         self.touching.is_some()

@@ -90,6 +90,19 @@ impl Patch {
         matches!(self, Self::Plane { .. })
     }
 
+    /// Whether one of its points is nearest to a point inside of it and all others lead there downhill: it is not scaled
+    /// by different factors.
+    pub(crate) fn is_round(&self) -> bool {
+        match self {
+            Self::Plane { .. } => true,
+            Self::Curved(curved) => {
+                let scale_m = curved.turn_LB.column(0).norm_squared();
+                let skew = curved.turn_LB.tr_mul(&curved.turn_LB) - Matrix3::identity() * scale_m;
+                skew.amax() <= SKEW * scale_m
+            }
+        }
+    }
+
     /// Negative inside, zero on the surface; no steeper than one.
     #[inline(always)]
     pub(crate) fn level(&self, point_B: &Vector3<f64>) -> f64 {
@@ -115,6 +128,35 @@ impl Patch {
         match self {
             Self::Plane { .. } => f64::INFINITY,
             Self::Curved(curved) => curved.smallest_radius_m(at_B),
+        }
+    }
+
+    /// How much the surface is bent in a direction along it, at a point of it: the normal turns by as much per length
+    /// (1/m). Positive where it is convex.
+    pub(crate) fn bending(&self, at_B: &Vector3<f64>, along_B: &Vector3<f64>) -> f64 {
+        self.mixed_bending(at_B, along_B, along_B)
+    }
+
+    /// As [`Self::bending`], of two directions: how much the normal turns towards one on the way along the other (1/m).
+    pub(crate) fn mixed_bending(
+        &self,
+        at_B: &Vector3<f64>,
+        along_B: &Vector3<f64>,
+        towards_B: &Vector3<f64>,
+    ) -> f64 {
+        match self {
+            Self::Plane { .. } => 0.0,
+            Self::Curved(curved) => curved.bending(at_B, along_B, towards_B),
+        }
+    }
+
+    /// The tip of a cone, if the way between two points leads across its axis.
+    pub(crate) fn tip_between(&self, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<Vector3<f64>> {
+        match self {
+            Self::Curved(curved) if matches!(curved.kind, Kind::Nappe { .. }) => {
+                curved.tip_between(from_B, to_B)
+            }
+            _ => None,
         }
     }
 
@@ -177,6 +219,23 @@ impl Curved {
         // A map that stretches makes sharper at most by its square, over its least stretch; here that of the rigid or
         // evenly scaled patch, and of others a lower bound.
         self.kind.smallest_radius(&self.local(at_B)) * self.least_stretch() / (self.stretch * self.stretch)
+    }
+
+    fn bending(&self, at_B: &Vector3<f64>, along_B: &Vector3<f64>, towards_B: &Vector3<f64>) -> f64 {
+        let at_L = self.local(at_B);
+        let (along_L, towards_L) = (self.turn_LB * along_B, self.turn_LB * towards_B);
+        let slope = self.turn_LB.tr_mul(&self.kind.gradient(&at_L, &at_L)).norm();
+        self.kind.bending(&at_L, &along_L, &towards_L) / slope
+    }
+
+    fn tip_between(&self, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<Vector3<f64>> {
+        let Kind::Nappe { normal_y, offset_m, .. } = self.kind else { return None };
+        let (from_L, to_L) = (self.local(from_B), self.local(to_B));
+        if from_L.x * to_L.x + from_L.z * to_L.z > 0.0 {
+            return None;
+        }
+        let tip_L = Vector3::y() * (offset_m / normal_y) - self.shift_L;
+        self.turn_LB.try_inverse().map(|turn_BL| turn_BL * tip_L)
     }
 
     fn least_stretch(&self) -> f64 {
@@ -245,6 +304,39 @@ impl Kind {
             }
             Self::Pill { half_length_m, .. } => {
                 direction_or(&(p - core(p, half_length_m)), outward(p, seen_from))
+            }
+        }
+    }
+
+    /// `u' H v` with the level's second derivatives H at a point.
+    fn bending(&self, p: &Vector3<f64>, u: &Vector3<f64>, v: &Vector3<f64>) -> f64 {
+        let round = |p: &Vector3<f64>| {
+            let distance = p.norm();
+            (u.dot(v) - p.dot(u) * p.dot(v) / (distance * distance)) / distance
+        };
+        let around = || {
+            let across = Vector3::new(p.z, 0.0, -p.x);
+            let rho = rho(p);
+            across.dot(u) * across.dot(v) / (rho * rho)
+        };
+        match *self {
+            Self::Ball { .. } => round(p),
+            Self::Tube { .. } => around() / rho(p),
+            Self::Nappe { normal_rho, .. } => around() * normal_rho / rho(p),
+            Self::Ring { ring_radius_m, .. } => {
+                let from_core = p - outward(p, p) * ring_radius_m;
+                let distance = from_core.norm();
+                let across = (rho(p) - ring_radius_m) / distance;
+                let around = around();
+                let rest = u.dot(v) - around - from_core.dot(u) * from_core.dot(v) / (distance * distance);
+                rest / distance + around * across / rho(p)
+            }
+            Self::Pill { half_length_m, .. } => {
+                if p.y.abs() > half_length_m {
+                    round(&(p - core(p, half_length_m)))
+                } else {
+                    around() / rho(p)
+                }
             }
         }
     }
@@ -346,3 +438,5 @@ fn core(p: &Vector3<f64>, half_length_m: f64) -> Vector3<f64> {
 const MAX_ENTRY_ROUNDS: u32 = 64;
 /// The smallest step over a path past a ring.
 const MARCH: f64 = 1.0 / 64.0;
+/// Of maps: what rounding may make different of equal factors.
+const SKEW: f64 = 1e-9;

@@ -31,6 +31,10 @@ impl Ground for Mesh {
         self.clearance(point_B, at_most_m)
     }
 
+    fn seen_m(&self, radius_m: f64) -> f64 {
+        radius_m * (1.0 + f64::EPSILON)
+    }
+
     fn is_inside(&self, point_B: &Vector3<f64>) -> bool {
         self.is_inside(point_B)
     }

@@ -27,6 +27,9 @@ pub(crate) trait Ground {
     /// told \[m\].
     fn clearance_m(&self, point_B: &Vector3<f64>, at_most_m: f64) -> f64;
 
+    /// Where nothing was found within `radius_m`, how much of that is known to be clear of both sides of the surface \[m\].
+    fn seen_m(&self, radius_m: f64) -> f64;
+
     /// Whether the material is there.
     fn is_inside(&self, point_B: &Vector3<f64>) -> bool;
 

@@ -129,7 +129,7 @@ impl<F: Foot> Touching<F> {
     fn depth_inside(&self, ground: &impl Ground, hip_B: &Vector3<f64>) -> f64 {
         let radius_m = self.ball.radius_m;
         // All that the hierarchy can say cheaply, and what is known.
-        let clear_m = ground.clearance_m(hip_B, ground.extent_m()).max(radius_m * (1.0 + f64::EPSILON));
+        let clear_m = ground.clearance_m(hip_B, ground.extent_m()).max(ground.seen_m(radius_m));
         // Two balls without a face in them that overlap are on the same side.
         let was_inside =
             self.is_inside && (hip_B - self.tight.centre_B).norm() < clear_m + self.tight.radius_m;
