@@ -28,6 +28,7 @@ use crate::algorithm::{Touch, TouchInput};
 use crate::mesh::{Beginning, TooMany};
 use crate::rolling::{Ground, Plane, RollingCone, Share};
 use crate::surface::Feature;
+use crate::tangent_view::tangential;
 
 /// State of one spherical finger towards one solid.
 #[derive(Debug, Clone, Copy, Default)]
@@ -88,6 +89,32 @@ impl CsgGround<'_> {
         }
         let middle_B = 0.5 * (from_B + to_B);
         Patches::around(self.csg, &middle_B, (to_B - middle_B).norm() + self.csg.tolerance_m())
+    }
+
+    /// The foot of a ball that is drawn to a HIP below a patch: on the line through it across that patch. From an edge or
+    /// a corner it is drawn to the patch on the HIP's side: there is no rest on the way.
+    fn below(&self, foot: &Foot, normal_B: &Vector3<f64>, hip_B: &Vector3<f64>) -> Option<Foot> {
+        if matches!(foot.feature, Feature::Face | Feature::Surface) {
+            let there = self.below_patch(foot, hip_B)?;
+            return (there.normal_B.dot(normal_B) > SAME_SIDE).then_some(there);
+        }
+        let to_hip_B = tangential(&(hip_B - foot.point_B), normal_B);
+        let near = self.around(&foot.point_B);
+        let centre_B = foot.point_B + normal_B;
+        let patches = foot.on.numbers().iter().map(|&number| {
+            let beside = Foot::at(self, &near, On::of([number]), foot.point_B, &centre_B);
+            (beside.normal_B.dot(&to_hip_B), beside)
+        });
+        let (_, beside) = patches.max_by(|(a, _), (b, _)| a.total_cmp(b))?;
+        self.below_patch(&beside, hip_B)
+    }
+
+    fn below_patch(&self, foot: &Foot, hip_B: &Vector3<f64>) -> Option<Foot> {
+        let point_B = nearest_on(self.csg, &foot.on, &foot.point_B, hip_B)?;
+        let near = self.around(&point_B);
+        let there = Foot::at(self, &near, foot.on, point_B, hip_B);
+        let is_boundary = place(self.csg, &near, &point_B, &(point_B + there.normal_B)) == Place::Foot;
+        (is_boundary && there.feature == foot.feature).then_some(there)
     }
 
     fn nearest_in(
@@ -160,11 +187,14 @@ impl Ground for CsgGround<'_> {
     }
 
     #[inline]
-    fn walked(&self, foot: &Foot, centre_B: &Vector3<f64>, radius_m: f64) -> Foot {
-        foot.walked(self, centre_B, radius_m)
+    fn walked(&self, foot: &Foot, centre_B: &Vector3<f64>, radius_m: f64, is_alone: bool) -> Foot {
+        foot.walked(self, centre_B, radius_m, is_alone)
     }
 
-    fn distance_m(&self, foot: &Foot, centre_B: &Vector3<f64>) -> f64 {
+    fn distance_m(&self, foot: &Foot, centre_B: &Vector3<f64>, is_alone: bool) -> f64 {
+        if !is_alone {
+            return (foot.point_B - centre_B).norm();
+        }
         let nearest_B = nearest_on(self.csg, &foot.on, &foot.point_B, centre_B);
         (nearest_B.unwrap_or(foot.point_B) - centre_B).norm()
     }
@@ -227,28 +257,16 @@ impl Ground for CsgGround<'_> {
         hip_B: &Vector3<f64>,
         radius_m: f64,
     ) -> Option<(Foot, Plane)> {
-        let is_patch = matches!(foot.feature, Feature::Face | Feature::Surface);
-        if !is_patch && normal_B.dot(&(hip_B - foot.point_B)) <= LEAST_HEIGHT * radius_m {
-            // Which way the centre lies from an edge a HIP below it cannot tell.
-            return None;
-        }
-        let point_B = nearest_on(self.csg, &foot.on, &foot.point_B, hip_B)?;
-        let near = self.around(&point_B);
-        let mut there = Foot::at(self, &near, foot.on, point_B, hip_B);
-        if is_patch {
-            // The line through the HIP across the patch leads to the centre, on whichever side of it the HIP is.
-            let centre_B = point_B + there.normal_B * radius_m;
-            if place(self.csg, &near, &point_B, &centre_B) != Place::Foot
-                || there.normal_B.dot(normal_B) < 0.5
-            {
-                return None;
-            }
-            there.feature = foot.feature;
-        } else if place(self.csg, &near, &point_B, hip_B) != Place::Foot {
-            return None;
-        }
+        let (there, is_seen) = if normal_B.dot(&(hip_B - foot.point_B)) > LEAST_HEIGHT * radius_m {
+            // Straight away from the nearest point.
+            (foot.followed(self, hip_B)?, true)
+        } else {
+            (self.below(foot, normal_B, hip_B)?, false)
+        };
         let plane = there.plane(self, hip_B, radius_m);
-        (plane.1 - plane.0.dot(hip_B) >= 0.0).then_some((there, plane))
+        let depth_m = plane.1 - plane.0.dot(hip_B);
+        let is_there = depth_m >= 0.0 && (!is_seen || depth_m < (1.0 - LEAST_HEIGHT) * radius_m);
+        is_there.then_some((there, plane))
     }
 }
 
@@ -283,5 +301,8 @@ const MARGIN: f64 = 1.0;
 const LEAST_MARGIN: f64 = 0.25;
 /// A leap through free space is looked ahead for by as much, in radii.
 const LOOK_AHEAD: f64 = 1.0;
+/// Cosine between the normals of two places that are surely not on opposite sides of what is round.
+const SAME_SIDE: f64 = 0.5;
 /// Heights below this share of the radius have no direction worth going by.
 const LEAST_HEIGHT: f64 = 1e-3;
+

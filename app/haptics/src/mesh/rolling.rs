@@ -48,11 +48,11 @@ impl Ground for Mesh {
     }
 
     #[inline(always)]
-    fn walked(&self, foot: &Foot, centre_B: &Vector3<f64>, _radius_m: f64) -> Foot {
+    fn walked(&self, foot: &Foot, centre_B: &Vector3<f64>, _radius_m: f64, _is_alone: bool) -> Foot {
         Foot::from_face(self, foot.face, centre_B)
     }
 
-    fn distance_m(&self, foot: &Foot, centre_B: &Vector3<f64>) -> f64 {
+    fn distance_m(&self, foot: &Foot, centre_B: &Vector3<f64>, _is_alone: bool) -> f64 {
         Foot::on(self, foot.face, centre_B).squared_m2.sqrt()
     }
 

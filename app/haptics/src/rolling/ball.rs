@@ -155,15 +155,27 @@ impl<F: Foot> Ball<F> {
     /// Whether it went so far that it might have passed something.
     #[inline(always)]
     pub(super) fn strayed(&self, start: &Self) -> bool {
-        let strayed_m2 = (self.centre_B - start.centre_B).norm_squared();
-        strayed_m2 > 0.25 * self.radius_m * self.radius_m || strayed_m2.is_nan()
+        !self.is_within_half_a_radius_of(start)
+    }
+
+    #[inline(always)]
+    pub(super) fn is_within_half_a_radius_of(&self, other: &Self) -> bool {
+        (self.centre_B - other.centre_B).norm_squared() <= 0.25 * self.radius_m * self.radius_m
+    }
+
+    /// Whether no foot, or none but this one, is on its piece.
+    #[inline]
+    pub(super) fn is_alone_with(&self, foot: &F) -> bool {
+        let is_other = |other: &F| other.is_on_same_piece(foot) && other.point_B() != foot.point_B();
+        !self.rests().iter().any(|rest| is_other(&rest.foot))
     }
 
     /// Takes note of a feature that it touches.
     pub(super) fn add(&mut self, ground: &impl Ground<Foot = F>, foot: &F) {
         let mut rest = Self::in_free_space(self.centre_B, self.radius_m).rests[0];
         rest.foot = *foot;
-        rest.walk(ground, &self.centre_B, self.radius_m);
+        let is_alone = self.is_alone_with(&rest.foot);
+        rest.walk(ground, &self.centre_B, self.radius_m, is_alone);
         let near_m = SAME_FOOT * self.radius_m;
         if self.rests().iter().any(|other| (other.foot.point_B() - rest.foot.point_B()).amax() <= near_m) {
             return;
@@ -178,8 +190,14 @@ impl<F: Foot> Ball<F> {
 
 impl<F: Foot> Rest<F> {
     #[inline(always)]
-    pub(super) fn walk(&mut self, ground: &impl Ground<Foot = F>, centre_B: &Vector3<f64>, radius_m: f64) {
-        self.foot = ground.walked(&self.foot, centre_B, radius_m);
+    pub(super) fn walk(
+        &mut self,
+        ground: &impl Ground<Foot = F>,
+        centre_B: &Vector3<f64>,
+        radius_m: f64,
+        is_alone: bool,
+    ) {
+        self.foot = ground.walked(&self.foot, centre_B, radius_m, is_alone);
         (self.normal_B, self.offset_m) = ground.plane(&self.foot, centre_B, radius_m);
     }
 }

@@ -140,7 +140,7 @@ impl<F: Foot> Ball<F> {
         for _ in 0..MOST_OBSTACLES {
             work.look();
             let Some(obstacle) = ball.obstacle(ground).ok()? else { return Some(ball) };
-            (end, ball) = touching(ground, work, &path, &obstacle, end);
+            (end, ball) = touching(ground, work, &path, (&obstacle, self.is_alone_with(&obstacle)), end);
             ball.add(ground, &obstacle);
         }
         matches!(ball.obstacle(ground), Ok(None)).then_some(ball)
@@ -154,11 +154,11 @@ fn touching<F: Foot>(
     ground: &impl Ground<Foot = F>,
     work: &Work,
     path: impl Fn(f64) -> Ball<F>,
-    foot: &F,
+    (foot, is_alone): (&F, bool),
     end: f64,
 ) -> (f64, Ball<F>) {
     // Of this feature alone: a walk from it might end at what the ball rests on.
-    let gap = |ball: &Ball<F>| ground.distance_m(foot, &ball.centre_B) - ball.radius_m;
+    let gap = |ball: &Ball<F>| ground.distance_m(foot, &ball.centre_B, is_alone) - ball.radius_m;
     let start = path(0.0);
     let (mut low, mut high) = ((0.0, gap(&start)), (end, gap(&path(end))));
     if low.1.is_nan() || low.1 <= 0.0 || high.1.is_nan() || high.1 >= 0.0 {

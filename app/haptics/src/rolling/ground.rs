@@ -39,11 +39,18 @@ pub(crate) trait Ground {
     /// The normal at a foot, of which the way to the centre says nothing.
     fn normal_B(&self, foot: &Self::Foot) -> Vector3<f64>;
 
-    /// The foot of `centre_B` that one comes to from another foot.
-    fn walked(&self, foot: &Self::Foot, centre_B: &Vector3<f64>, radius_m: f64) -> Self::Foot;
+    /// The foot of `centre_B` that one comes to from another foot; where the ball has others on the same piece, it is not
+    /// alone: on a rim around the ball they must not come together.
+    fn walked(
+        &self,
+        foot: &Self::Foot,
+        centre_B: &Vector3<f64>,
+        radius_m: f64,
+        is_alone: bool,
+    ) -> Self::Foot;
 
-    /// How far `centre_B` is from a foot's feature alone \[m\].
-    fn distance_m(&self, foot: &Self::Foot, centre_B: &Vector3<f64>) -> f64;
+    /// How far `centre_B` is from a foot's feature alone, or where that is not alone from the foot \[m\].
+    fn distance_m(&self, foot: &Self::Foot, centre_B: &Vector3<f64>, is_alone: bool) -> f64;
 
     /// Which way the centre lies from its foot, and `normal . x` of where it then is when it touches.
     fn plane(&self, foot: &Self::Foot, centre_B: &Vector3<f64>, radius_m: f64) -> Plane;

@@ -12,6 +12,7 @@ use nalgebra::Vector3;
 use super::ball::{Ball, Rest, SAME_FOOT, distance, tolerance_m};
 use super::ground::{Foot, Ground};
 use super::press::{MOST, onto, press};
+use crate::tangent_view::tangential;
 
 impl<F: Foot> Ball<F> {
     /// Where it is if its centre moves straight to `target_B` and is brought back onto what it presses on.
@@ -24,7 +25,7 @@ impl<F: Foot> Ball<F> {
         let near_m = tolerance_m(ground, self.radius_m);
         if let [rest] = ball.rests_mut() {
             let before = rest.foot;
-            rest.walk(ground, target_B, self.radius_m);
+            rest.walk(ground, target_B, self.radius_m, true);
             let missing_m = rest.offset_m - rest.normal_B.dot(target_B);
             // Pushed out it would come farther from the HIP, and over the fold in which it belongs.
             let is_blocked = missing_m > near_m && !rest.foot.is_on_same_piece(&before);
@@ -46,7 +47,7 @@ impl<F: Foot> Ball<F> {
         let near_m = tolerance_m(ground, self.radius_m);
         self.rests().iter().filter(|rest| rest.load_m > 0.0).any(|rest| {
             let mut there = *rest;
-            there.walk(ground, &self.centre_B, self.radius_m);
+            there.walk(ground, &self.centre_B, self.radius_m, self.is_alone_with(&rest.foot));
             let height_m = distance(&(there.normal_B, there.offset_m), &self.centre_B);
             height_m < -near_m && !there.foot.is_on_same_piece(&rest.foot)
         })
@@ -78,9 +79,10 @@ impl<F: Foot> Ball<F> {
     /// Takes all feet along; of two that meet one is enough. Returns the set with its members' new numbers.
     fn walk_all(&mut self, ground: &impl Ground<Foot = F>, set: u8) -> u8 {
         let (mut kept, mut kept_set) = (0, 0);
+        let before = *self;
         for i in 0..self.count {
             let mut rest = self.rests[i];
-            rest.walk(ground, &self.centre_B, self.radius_m);
+            rest.walk(ground, &self.centre_B, self.radius_m, before.is_alone_with(&rest.foot));
             let is_held = set >> i & 1;
             let near_m = SAME_FOOT * self.radius_m;
             let same =
@@ -128,7 +130,7 @@ impl<F: Foot> Ball<F> {
         ball.centre_B = *target_B;
         for rest in self.rests().iter().filter(|rest| rest.load_m > 0.0) {
             let mut there = *rest;
-            there.walk(ground, target_B, self.radius_m);
+            there.walk(ground, target_B, self.radius_m, self.is_alone_with(&rest.foot));
             let height_m = distance(&(there.normal_B, there.offset_m), target_B);
             if height_m < -near_m && !there.foot.is_on_same_piece(&rest.foot) && ball.count < MOST {
                 ball.rests[ball.count] = there;
@@ -153,7 +155,16 @@ impl<F: Foot> Ball<F> {
         let mut ball = *self;
         *ball.rests.first_mut()? = Rest { foot, normal_B, offset_m, load_m: rest.load_m };
         ball.centre_B = hip_B + normal_B * (offset_m - normal_B.dot(hip_B));
-        ((ball.centre_B - self.centre_B).norm() <= 0.5 * self.radius_m).then_some(ball)
+        Some(ball)
+    }
+
+    /// A place above what it rests on from which it comes down about where the other one is: straight there it would
+    /// meet what it is to roll round.
+    pub(super) fn towards(&self, other: &Self) -> Vector3<f64> {
+        let way_B = other.centre_B - self.centre_B;
+        let along_B = self.rests().first().map_or(way_B, |rest| tangential(&way_B, &rest.normal_B));
+        let along_m = along_B.norm();
+        if along_m > 0.0 { self.centre_B + along_B * (way_B.norm() / along_m) } else { other.centre_B }
     }
 
     /// Moves to the place nearest to `hip_B` in front of all that it touches.

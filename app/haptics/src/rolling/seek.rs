@@ -128,6 +128,8 @@ fn seek_with<G: Ground>(
         }
         if is_careful {
             let before = (ball.centre_B, ball.rests().len());
+            let seat = is_frictionless.then(|| ball.seat(ground, &input.hip_B)).flatten();
+            let target_B = seat.map_or(target_B, |seat| ball.towards(&seat));
             ball = ball.rolled_until(ground, &target_B, &work);
             if before == (ball.centre_B, ball.rests().len()) {
                 break;
@@ -138,7 +140,11 @@ fn seek_with<G: Ground>(
             }
             continue;
         }
-        if let Some(seat) = is_frictionless.then(|| ball.seat(ground, &input.hip_B)).flatten() {
+        let seat = is_frictionless.then(|| ball.seat(ground, &input.hip_B)).flatten();
+        if let Some(seat) = seat {
+            if !seat.is_within_half_a_radius_of(&ball) {
+                return Sought::Unsure;
+            }
             ball = seat;
             sees = None;
         } else {

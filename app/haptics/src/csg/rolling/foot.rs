@@ -3,9 +3,8 @@
 //! Model: the nearest point of what it lies on is sought again. Where that is no boundary any more the patch has ended on the
 //! way: at the edge with one of the patches that were crossed. Where another feature is nearer, it goes on there.
 //!
-//! On a rim around the ball's axis, or in a hollow of its own radius, all points are about as near: a foot stays where it
-//! is as long as no other is nearer by more than rounding, and goes round by no more than [`LONGEST_STEP`] at once, so that
-//! several feet hold a ball between them.
+//! On a rim around the ball's axis, or in a hollow of its own radius, all points are about as near: several feet hold a ball
+//! between them, and would come together at the first small step aside. There a foot that is not alone stays where it is.
 //!
 //! Invariant: a foot is a point of the solid: a ball that stays clear of it does no wrong, wherever its feet are.
 //! Cost: a few searches of [`nearest_on`], each with a look at what is there; bounded by [`MOST_STEPS`].
@@ -71,14 +70,17 @@ impl Foot {
     }
 
     /// Where it is when the ball's centre is at `centre_B`.
-    pub(super) fn walked(&self, ground: &CsgGround<'_>, centre_B: &Vector3<f64>, radius_m: f64) -> Self {
+    pub(super) fn walked(
+        &self,
+        ground: &CsgGround<'_>,
+        centre_B: &Vector3<f64>,
+        radius_m: f64,
+        is_alone: bool,
+    ) -> Self {
         let Some(there) = self.followed(ground, centre_B) else { return *self };
         let moved_m = (there.point_B - self.point_B).norm();
-        if moved_m <= LITTLE * radius_m {
-            return there;
-        }
         let nearer_m = (centre_B - self.point_B).norm() - (centre_B - there.point_B).norm();
-        if nearer_m <= NEARER * radius_m && self.feature == there.feature {
+        if !is_alone && self.on == there.on && 2.0 * radius_m * nearer_m < CLEAR * moved_m * moved_m {
             return *self;
         }
         let longest_m = LONGEST_STEP * radius_m;
@@ -103,7 +105,8 @@ impl Foot {
         is_boundary.then(|| Self::at(ground, &near, self.on, point_B, centre_B))
     }
 
-    fn followed(&self, ground: &CsgGround<'_>, centre_B: &Vector3<f64>) -> Option<Self> {
+    /// The foot of a point that one comes to from here.
+    pub(super) fn followed(&self, ground: &CsgGround<'_>, centre_B: &Vector3<f64>) -> Option<Self> {
         let (mut on, mut from_B) = (self.on, self.point_B);
         for _ in 0..MOST_STEPS {
             let point_B = nearest_on(ground.csg, &on, &from_B, centre_B)?;
@@ -174,9 +177,7 @@ fn ended(
 const MOST_STEPS: u32 = 6;
 /// Shorter than this share of the radius, the way to the foot has no direction.
 const LEAST_WAY: f64 = 1e-9;
-/// A way of this share of the radius, or less, is gone however little nearer it leads.
-const LITTLE: f64 = 1e-3;
-/// What a foot has to be nearer by to be worth a longer way, in radii: a tenth of what counts as touching.
-const NEARER: f64 = 1e-10;
+/// Where the distance falls by less than this share of what it does on a plane, all around is about as near.
+const CLEAR: f64 = 0.2;
 /// In radii.
 const LONGEST_STEP: f64 = 0.5;

@@ -11,6 +11,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::on::On;
 use crate::csg::Csg;
 use crate::csg::patch::Patch;
+use crate::surface::direction_or_up;
 use crate::tangent_view::tangential;
 
 /// The point nearest to `target_B` that the way downhill from `start_B` leads to.
@@ -63,24 +64,26 @@ fn on_scaled_patch(patch: &Patch, start_B: &Vector3<f64>, target_B: &Vector3<f64
         let lag_B = tangential(&way_B, &normal_B);
         let lag_m = lag_B.norm();
         let resolution_m = resolution_m(&p_B, target_B);
-        if lag_m <= resolution_m && look.height_m.abs() <= resolution_m {
-            break;
-        }
-        if lag_m <= resolution_m {
-            continue;
-        }
-        let along_B = lag_B / lag_m;
+        // Where there is no way left to go, it may yet be a maximum.
+        let is_there = lag_m <= resolution_m;
+        let along_B = if is_there { direction_or_up(&across_any(&normal_B)) } else { lag_B / lag_m };
         let beside_B = normal_B.cross(&along_B);
         // How much of the lag a step takes away: convex as seen from the target more, hollow less than its length.
         let gain = |u: &Vector3<f64>, v: &Vector3<f64>| height_m * patch.mixed_bending(&p_B, u, v);
         let (m11, m12, m22) =
             (1.0 + gain(&along_B, &along_B), gain(&along_B, &beside_B), 1.0 + gain(&beside_B, &beside_B));
         let determinant = m11 * m22 - m12 * m12;
-        let is_downhill = m11 > 0.0 && determinant > 0.0;
-        let step_B = if is_downhill {
-            (along_B * m22 - beside_B * m12) * (lag_m / determinant)
-        } else {
-            along_B * f64::MAX.sqrt()
+        let is_minimum = m11 > -FLAT && determinant > -FLAT;
+        if is_there && is_minimum {
+            if look.height_m.abs() <= resolution_m {
+                break;
+            }
+            continue;
+        }
+        let step_B = match m11 > 0.0 && determinant > 0.0 {
+            true => (along_B * m22 - beside_B * m12) * (lag_m / determinant),
+            false if is_there && m22 < m11 => beside_B * f64::MAX.sqrt(),
+            false => along_B * f64::MAX.sqrt(),
         };
         p_B += cut(step_B, BEND * patch.smallest_radius_m(&p_B).min(way_B.norm()));
     }
@@ -108,11 +111,12 @@ fn on_curve([a, b]: [&Patch; 2], start_B: &Vector3<f64>, target_B: &Vector3<f64>
         let way_B = target_B - p_B;
         let lag_m = way_B.dot(&along_B);
         let resolution_m = resolution_m(&p_B, target_B);
-        if back_B.amax() <= resolution_m / sine && lag_m.abs() <= resolution_m {
-            return Some(p_B);
-        }
         let bend_B = across([a, b].map(|patch| -patch.bending(&p_B, &along_B)));
         let gain = 1.0 - way_B.dot(&bend_B);
+        // Where there is no way left to go, it may yet be a maximum.
+        if back_B.amax() <= resolution_m / sine && lag_m.abs() <= resolution_m && gain > -FLAT {
+            return Some(p_B);
+        }
         let step_m = if gain > 0.0 { lag_m / gain } else { f64::INFINITY.copysign(lag_m) };
         let bent_m = a.smallest_radius_m(&p_B).min(b.smallest_radius_m(&p_B));
         let longest_m = (BEND * sine * bent_m).min(f64::MAX.sqrt());
@@ -147,6 +151,10 @@ fn cut(step_B: Vector3<f64>, longest_m: f64) -> Vector3<f64> {
     if length_m > longest_m { step_B * (longest_m / length_m) } else { step_B }
 }
 
+fn across_any(normal_B: &Vector3<f64>) -> Vector3<f64> {
+    normal_B.cross(&Vector3::ith(normal_B.iamin(), 1.0))
+}
+
 /// What rounding does to positions (m).
 fn resolution_m(a_B: &Vector3<f64>, b_B: &Vector3<f64>) -> f64 {
     4.0 * f64::EPSILON * a_B.amax().max(b_B.amax())
@@ -157,5 +165,7 @@ const MOST_STEPS: u32 = 24;
 const ALONG_THE_NORMAL: f64 = 1e-12;
 /// The longest step, in radii that a patch is bent with.
 const BEND: f64 = 0.7;
+/// A distance that bends less along the way is the same all along it.
+const FLAT: f64 = 1e-9;
 /// Patches that meet under less (rad) have no edge worth going by.
 const LEAST_SINE: f64 = 1e-5;
