@@ -41,7 +41,8 @@ fn half_space(normal: Vector3<f64>, offset_m: f64) -> CsgPart {
 fn boxes() -> [CsgTree; 2] {
     let size = [0.1, 0.06, 0.08];
     let leaf = CsgTree::union([CsgPart::from(Cuboid::new(size).unwrap())]);
-    let faces = (0..6).map(|i| half_space(Vector3::ith(i % 3, if i < 3 { 1.0 } else { -1.0 }), 0.5 * size[i % 3]));
+    let faces =
+        (0..6).map(|i| half_space(Vector3::ith(i % 3, if i < 3 { 1.0 } else { -1.0 }), 0.5 * size[i % 3]));
     [leaf, CsgTree::intersection(faces)]
 }
 
@@ -53,7 +54,8 @@ fn around_the_box(noise: &mut Noise) -> Vec<Vector3<f64>> {
         // Pushed to where a side is.
         let axis = (noise.uniform() * 3.0) as usize % 3;
         let mut at = at;
-        at[axis] = [0.05, 0.03, 0.04][axis] * at[axis].signum() + noise.between(-3e-3, 4e-3) * at[axis].signum();
+        at[axis] =
+            [0.05, 0.03, 0.04][axis] * at[axis].signum() + noise.between(-3e-3, 4e-3) * at[axis].signum();
         places.push(at);
     }
     way(&places, 2e-4)
@@ -71,7 +73,11 @@ fn a_box_in_a_tree_is_felt_as_a_box() {
         for i in 0..40_000 {
             let t = f64::from(i) * 1e-3;
             let direction = v((1.3 * t).sin(), (0.9 * t + 1.0).sin(), (0.7 * t + 2.0).sin()).normalize();
-            let far = [0.05, 0.03, 0.04].iter().zip(&direction).map(|(h, d)| h / f64::abs(*d)).fold(f64::INFINITY, f64::min);
+            let far = [0.05, 0.03, 0.04]
+                .iter()
+                .zip(&direction)
+                .map(|(h, d)| h / f64::abs(*d))
+                .fold(f64::INFINITY, f64::min);
             let hip = direction * (far + 4e-3 * (5.0 * t).sin() + 1e-3 * noise.uniform());
             let [a, b] = [step(&mut fingers[0], &form, &hip), step(&mut fingers[1], &tree, &hip)];
             assert_eq!(a.entity, b.entity, "{i} {hip}");

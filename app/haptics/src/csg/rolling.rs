@@ -294,6 +294,10 @@ impl crate::rolling::Foot for Foot {
     fn is_on_same_piece(&self, other: &Self) -> bool {
         self.on == other.on
     }
+
+    fn is_beside(&self, other: &Self) -> bool {
+        self.on.is_part_of(&other.on) || other.on.is_part_of(&self.on)
+    }
 }
 
 /// How far beyond the ball its vicinity reaches, in radii, and how far at least.
@@ -305,4 +309,3 @@ const LOOK_AHEAD: f64 = 1.0;
 const SAME_SIDE: f64 = 0.5;
 /// Heights below this share of the radius have no direction worth going by.
 const LEAST_HEIGHT: f64 = 1e-3;
-

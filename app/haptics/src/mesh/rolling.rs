@@ -147,6 +147,11 @@ impl crate::rolling::Foot for Foot {
     fn is_on_same_piece(&self, other: &Self) -> bool {
         self.face == other.face
     }
+
+    #[inline(always)]
+    fn is_beside(&self, other: &Self) -> bool {
+        self.face == other.face
+    }
 }
 
 /// Heights above the mesh below this share of the radius have no direction worth going by.

@@ -41,13 +41,8 @@ pub(crate) trait Ground {
 
     /// The foot of `centre_B` that one comes to from another foot; where the ball has others on the same piece, it is not
     /// alone: on a rim around the ball they must not come together.
-    fn walked(
-        &self,
-        foot: &Self::Foot,
-        centre_B: &Vector3<f64>,
-        radius_m: f64,
-        is_alone: bool,
-    ) -> Self::Foot;
+    fn walked(&self, foot: &Self::Foot, centre_B: &Vector3<f64>, radius_m: f64, is_alone: bool)
+    -> Self::Foot;
 
     /// How far `centre_B` is from a foot's feature alone, or where that is not alone from the foot \[m\].
     fn distance_m(&self, foot: &Self::Foot, centre_B: &Vector3<f64>, is_alone: bool) -> f64;
@@ -110,4 +105,7 @@ pub(crate) trait Foot: Copy + std::fmt::Debug {
 
     /// Whether both are on one smooth piece.
     fn is_on_same_piece(&self, other: &Self) -> bool;
+
+    /// Whether no fold is between them: both are on one smooth piece, or on it and on its edge.
+    fn is_beside(&self, other: &Self) -> bool;
 }

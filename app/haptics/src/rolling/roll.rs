@@ -28,7 +28,7 @@ impl<F: Foot> Ball<F> {
             rest.walk(ground, target_B, self.radius_m, true);
             let missing_m = rest.offset_m - rest.normal_B.dot(target_B);
             // Pushed out it would come farther from the HIP, and over the fold in which it belongs.
-            let is_blocked = missing_m > near_m && !rest.foot.is_on_same_piece(&before);
+            let is_blocked = missing_m > near_m && !rest.foot.is_beside(&before);
             if !is_blocked {
                 ball.centre_B = target_B + rest.normal_B * missing_m;
             }
@@ -49,7 +49,7 @@ impl<F: Foot> Ball<F> {
             let mut there = *rest;
             there.walk(ground, &self.centre_B, self.radius_m, self.is_alone_with(&rest.foot));
             let height_m = distance(&(there.normal_B, there.offset_m), &self.centre_B);
-            height_m < -near_m && !there.foot.is_on_same_piece(&rest.foot)
+            height_m < -near_m && !there.foot.is_beside(&rest.foot)
         })
     }
 
@@ -132,7 +132,7 @@ impl<F: Foot> Ball<F> {
             let mut there = *rest;
             there.walk(ground, target_B, self.radius_m, self.is_alone_with(&rest.foot));
             let height_m = distance(&(there.normal_B, there.offset_m), target_B);
-            if height_m < -near_m && !there.foot.is_on_same_piece(&rest.foot) && ball.count < MOST {
+            if height_m < -near_m && !there.foot.is_beside(&rest.foot) && ball.count < MOST {
                 ball.rests[ball.count] = there;
                 ball.count += 1;
             }

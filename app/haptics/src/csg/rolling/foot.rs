@@ -83,26 +83,7 @@ impl Foot {
         if !is_alone && self.on == there.on && 2.0 * radius_m * nearer_m < CLEAR * moved_m * moved_m {
             return *self;
         }
-        let longest_m = LONGEST_STEP * radius_m;
-        let is_round = self.on == there.on && there.feature != Feature::Face;
-        if moved_m <= longest_m || !is_round {
-            return there;
-        }
-        let towards_B = self.point_B + (there.point_B - self.point_B) * (longest_m / moved_m);
-        self.at_nearest(ground, &towards_B, centre_B).unwrap_or(*self)
-    }
-
-    /// On the same patches, nearest to a point, if that is boundary.
-    fn at_nearest(
-        &self,
-        ground: &CsgGround<'_>,
-        to_B: &Vector3<f64>,
-        centre_B: &Vector3<f64>,
-    ) -> Option<Self> {
-        let point_B = nearest_on(ground.csg, &self.on, &self.point_B, to_B)?;
-        let near = ground.around(&point_B);
-        let is_boundary = place(ground.csg, &near, &point_B, centre_B) != Place::Nothing;
-        is_boundary.then(|| Self::at(ground, &near, self.on, point_B, centre_B))
+        there
     }
 
     /// The foot of a point that one comes to from here.
@@ -179,5 +160,3 @@ const MOST_STEPS: u32 = 6;
 const LEAST_WAY: f64 = 1e-9;
 /// Where the distance falls by less than this share of what it does on a plane, all around is about as near.
 const CLEAR: f64 = 0.2;
-/// In radii.
-const LONGEST_STEP: f64 = 0.5;

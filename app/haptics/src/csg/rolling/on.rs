@@ -30,6 +30,10 @@ impl On {
         self.numbers().contains(&number)
     }
 
+    pub(super) fn is_part_of(&self, other: &Self) -> bool {
+        self.numbers().iter().all(|&number| other.has(number))
+    }
+
     pub(super) fn numbers(&self) -> &[u16] {
         self.numbers.get(..usize::from(self.count)).unwrap_or_default()
     }
