@@ -22,6 +22,7 @@
 mod ball;
 mod flight;
 mod ground;
+mod pace;
 mod press;
 mod roll;
 mod seek;

@@ -127,7 +127,7 @@ fn roam(
             }
             leaks += 1;
         }
-        if i % 40 == 39 && !is_settled(sample, &out, &hip, radius_m) {
+        if i % 40 == 39 && !is_settled(contains, sample, &out, &hip, radius_m) {
             if unsettled < 3 {
                 println!("{name} r {radius_m} tick {i}: unsettled at {centre:?} for {hip:?}");
             }
@@ -138,7 +138,13 @@ fn roam(
 }
 
 /// Whether all steps that lead nearer to the HIP lead into the material.
-fn is_settled(sample: &Sample, out: &FingerOutput, hip: &Vector3<f64>, radius_m: f64) -> bool {
+fn is_settled(
+    contains: &Inside<'_>,
+    sample: &Sample,
+    out: &FingerOutput,
+    hip: &Vector3<f64>,
+    radius_m: f64,
+) -> bool {
     let centre = out.god_object_W;
     let way = hip - centre;
     let length = way.norm();
@@ -155,7 +161,18 @@ fn is_settled(sample: &Sample, out: &FingerOutput, hip: &Vector3<f64>, radius_m:
         let there = centre + direction * step_m;
         // Nearer by a good part of the step.
         let nearer = length - (there - hip).norm() > 0.35 * step_m;
-        !nearer || sample.distance(&there, radius_m + unseen_m) < radius_m + 0.5 * unseen_m
+        let is_blocked =
+            |p: &Vector3<f64>| sample.distance(p, radius_m + unseen_m) < radius_m + 0.5 * unseen_m;
+        !nearer || is_blocked(&there) || reaches_into(contains, &there, radius_m)
+    })
+}
+
+/// Whether the outer tenth of a ball has material in it: of thin edges the sample may see nothing.
+fn reaches_into(contains: &Inside<'_>, centre: &Vector3<f64>, radius_m: f64) -> bool {
+    let mut noise = Noise(5);
+    (0..200_000).any(|_| {
+        let direction = noise.vector(1.0).normalize();
+        contains(&(centre + direction * (radius_m * noise.between(0.9, 1.0))))
     })
 }
 

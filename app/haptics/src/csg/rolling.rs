@@ -150,6 +150,7 @@ impl CsgGround<'_> {
 impl Ground for CsgGround<'_> {
     type Foot = Foot;
     type Vicinity = ();
+    const IS_BENT: bool = true;
 
     fn identity(&self) -> u64 {
         self.csg.identity

@@ -17,6 +17,7 @@ pub(crate) type BallOnMesh = RollingCone<Foot, Vicinity>;
 impl Ground for Mesh {
     type Foot = Foot;
     type Vicinity = Vicinity;
+    const IS_BENT: bool = false;
 
     fn identity(&self) -> u64 {
         self.identity

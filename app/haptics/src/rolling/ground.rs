@@ -17,6 +17,9 @@ pub(crate) trait Ground {
     /// What is kept from one tick to the next, so that not every tick has to look at everything.
     type Vicinity: Copy + Default + std::fmt::Debug;
 
+    /// Whether its pieces are bent: how far a slide goes then is another matter than on a plane.
+    const IS_BENT: bool;
+
     /// Of all shapes of its kind, which.
     fn identity(&self) -> u64;
 

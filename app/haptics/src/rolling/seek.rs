@@ -12,6 +12,7 @@ use nalgebra::Vector3;
 use super::ball::{Ball, Look};
 use super::flight::{Flight, Work};
 use super::ground::Ground;
+use super::pace::Pace;
 use crate::friction_cone::ConeInput;
 use crate::mesh::draw::{Draw, Drawn};
 
@@ -80,6 +81,7 @@ fn seek_with<G: Ground>(
     let mut pushes_left = MOST_PUSHES;
     let mut met_something = false;
     let work = Work::default();
+    let mut pace = Pace::default();
     let rounds = if is_careful { MOST_CAREFUL_ROUNDS } else { MOST_ROUNDS };
     let mut sees = None;
     for _ in 0..rounds {
@@ -104,6 +106,9 @@ fn seek_with<G: Ground>(
         let Drawn { target_B, is_at_rest, tangential_B } =
             draw.drawn(&look.view, &(start.centre_B - ball.centre_B));
         sees = Some((look, tangential_B));
+        let centre_B = ball.centre_B;
+        let target_B =
+            if G::IS_BENT { centre_B + pace.step(&centre_B, &(target_B - centre_B)) } else { target_B };
         if is_at_rest {
             let Some(vicinity) = vicinity.as_deref_mut().filter(|_| ball.centre_B != start.centre_B) else {
                 break;
