@@ -101,7 +101,7 @@ fn roam(
     let mut roaming = Roaming::new(11, size_m + radius_m, 4e-4);
     let (mut touched, mut leaks, mut unsettled) = (0, 0, 0);
     let mut hip = Vector3::zeros();
-    for i in 0..6000 {
+    for i in 0..4000 {
         // Every now and then it waits.
         if i % 40 < 30 {
             hip = roaming.next();
@@ -180,7 +180,7 @@ fn reaches_into(contains: &Inside<'_>, centre: &Vector3<f64>, radius_m: f64) -> 
 fn on_every_tree_a_ball_keeps_its_distance_and_rests_where_the_spring_wants_it() {
     let mut bad = Vec::new();
     for tree in trees::all() {
-        let sample = Sample::of(&tree.contains, tree.size_m, 3.5e-4);
+        let sample = Sample::of(&tree.contains, tree.size_m, 5e-4);
         let entity = touchable(&tree.tree, Friction::None);
         for radius_m in [1.5e-3, 5e-3] {
             let [touched, leaks, unsettled] =
@@ -189,7 +189,7 @@ fn on_every_tree_a_ball_keeps_its_distance_and_rests_where_the_spring_wants_it()
                 "{:>20} r {radius_m}: touched {touched}, leaks {leaks}, unsettled {unsettled}",
                 tree.name
             );
-            if leaks + unsettled > 0 || touched < 500 {
+            if leaks + unsettled > 0 || touched < 300 {
                 bad.push((tree.name, radius_m, touched, leaks, unsettled));
             }
         }
@@ -200,9 +200,9 @@ fn on_every_tree_a_ball_keeps_its_distance_and_rests_where_the_spring_wants_it()
 #[test]
 fn on_random_trees_too() {
     let mut bad = Vec::new();
-    for seed in 0..12u64 {
+    for seed in 0..8 {
         let (tree, contains) = random_tree(1000 + seed);
-        let sample = Sample::of(&*contains, 0.05, 4e-4);
+        let sample = Sample::of(&*contains, 0.05, 5e-4);
         let entity = touchable(&tree, Friction::None);
         let radius_m = [2e-3, 4e-3, 8e-3][seed as usize % 3];
         let name = format!("random {seed}");

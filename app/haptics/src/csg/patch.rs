@@ -103,6 +103,14 @@ impl Patch {
         }
     }
 
+    /// Whether it is a plane or a ball: two of them meet in a circle or a line.
+    pub(crate) fn meets_in_circles(&self) -> bool {
+        match self {
+            Self::Plane { .. } => true,
+            Self::Curved(curved) => matches!(curved.kind, Kind::Ball { .. }) && self.is_round(),
+        }
+    }
+
     /// Negative inside, zero on the surface; no steeper than one.
     #[inline(always)]
     pub(crate) fn level(&self, point_B: &Vector3<f64>) -> f64 {

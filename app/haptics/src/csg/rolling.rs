@@ -247,6 +247,9 @@ impl Ground for CsgGround<'_> {
         if known_m >= ahead_m {
             return Some(known_m);
         }
+        // What is listed already costs least.
+        let listed_m = self.vicinity.known_m(centre_B) - radius_m;
+        let ahead_m = if listed_m > LEAST_MARGIN * radius_m { ahead_m.min(listed_m) } else { ahead_m };
         let near = self.nearest_within(centre_B, radius_m + ahead_m).ok()?;
         Some(near.map_or(ahead_m, |(_, distance_m)| distance_m - radius_m))
     }
@@ -302,8 +305,8 @@ impl crate::rolling::Foot for Foot {
 }
 
 /// How far beyond the ball its vicinity reaches, in radii, and how far at least.
-const MARGIN: f64 = 1.0;
-const LEAST_MARGIN: f64 = 0.25;
+const MARGIN: f64 = 0.7;
+const LEAST_MARGIN: f64 = 0.2;
 /// A leap through free space is looked ahead for by as much, in radii.
 const LOOK_AHEAD: f64 = 1.0;
 /// Cosine between the normals of two places that are surely not on opposite sides of what is round.

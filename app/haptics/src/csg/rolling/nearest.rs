@@ -92,7 +92,8 @@ fn on_scaled_patch(patch: &Patch, start_B: &Vector3<f64>, target_B: &Vector3<f64
 
 fn on_curve([a, b]: [&Patch; 2], start_B: &Vector3<f64>, target_B: &Vector3<f64>) -> Option<Vector3<f64>> {
     let mut p_B = *start_B;
-    for _ in 0..MOST_STEPS {
+    let mut missed_m = f64::INFINITY;
+    for step in 1..=MOST_STEPS {
         let looks = [a.look(&p_B, target_B), b.look(&p_B, target_B)];
         let [normal_a_B, normal_b_B] = looks.map(|look| look.normal_B);
         let along_B = normal_a_B.cross(&normal_b_B);
@@ -107,6 +108,13 @@ fn on_curve([a, b]: [&Patch; 2], start_B: &Vector3<f64>, target_B: &Vector3<f64>
             (normal_a_B * (x - cosine * y) + normal_b_B * (y - cosine * x)) / (sine * sine)
         };
         let back_B = across(looks.map(|look| -look.height_m));
+        if step % PATIENCE == 0 {
+            // Patches that do not meet are never come to.
+            let before_m = std::mem::replace(&mut missed_m, back_B.amax());
+            if missed_m > 0.25 * before_m && missed_m > ON_BOTH * p_B.amax() {
+                return None;
+            }
+        }
         p_B += back_B;
         let way_B = target_B - p_B;
         let lag_m = way_B.dot(&along_B);
@@ -161,6 +169,10 @@ fn resolution_m(a_B: &Vector3<f64>, b_B: &Vector3<f64>) -> f64 {
 }
 
 const MOST_STEPS: u32 = 24;
+/// Steps after which a curve must have come nearer.
+const PATIENCE: u32 = 3;
+/// In terms of coordinates: as near to a patch is on it.
+const ON_BOTH: f64 = 1e-6;
 /// A way that deviates less from the normal (rad) has a foot that one more step makes exact.
 const ALONG_THE_NORMAL: f64 = 1e-12;
 /// The longest step, in radii that a patch is bent with.

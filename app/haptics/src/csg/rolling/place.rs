@@ -31,6 +31,32 @@ pub(super) fn place(
     point_B: &Vector3<f64>,
     centre_B: &Vector3<f64>,
 ) -> Place {
+    let (corner, others) = meeting(csg, near, point_B, centre_B);
+    match corner.count {
+        0 => Place::Nothing,
+        1 => {
+            let is_boundary = near.is_solid(others) != near.is_solid(others | 1 << corner.indices[0]);
+            if is_boundary { Place::Foot } else { Place::Nothing }
+        }
+        _ => in_corner(near, &corner, others, &(centre_B - point_B)),
+    }
+}
+
+/// Whether some of what meets at a point is solid, and some is free.
+pub(super) fn is_boundary(csg: &Csg, near: &Neighbourhood, point_B: &Vector3<f64>) -> bool {
+    let (corner, others) = meeting(csg, near, point_B, point_B);
+    let is_solid = |cell: usize| near.is_solid(others | corner.spread(cell));
+    (1..1_usize << corner.count).any(|cell| is_solid(cell) != is_solid(0))
+}
+
+/// The patches at a point, and the sides of the others.
+#[inline]
+fn meeting(
+    csg: &Csg,
+    near: &Neighbourhood,
+    point_B: &Vector3<f64>,
+    centre_B: &Vector3<f64>,
+) -> (Corner, usize) {
     let mut corner = Corner::new();
     let mut others = 0;
     for index in 0..near.count() {
@@ -42,14 +68,7 @@ pub(super) fn place(
             others |= usize::from(level <= 0.0) << index;
         }
     }
-    match corner.count {
-        0 => Place::Nothing,
-        1 => {
-            let is_boundary = near.is_solid(others) != near.is_solid(others | 1 << corner.indices[0]);
-            if is_boundary { Place::Foot } else { Place::Nothing }
-        }
-        _ => in_corner(near, &corner, others, &(centre_B - point_B)),
-    }
+    (corner, others)
 }
 
 #[inline(never)]

@@ -13,8 +13,9 @@ use nalgebra::Vector3;
 
 use super::nearest::nearest_on;
 use super::on::On;
-use super::place::{Place, place};
+use super::place::is_boundary;
 use crate::csg::near::Neighbourhood;
+use crate::csg::patch::Patch;
 use crate::csg::{Csg, Step};
 
 /// What is near an anchor.
@@ -90,6 +91,11 @@ impl Vicinity {
         here
     }
 
+    /// How far around a point all is listed (m).
+    pub(super) fn known_m(&self, point_B: &Vector3<f64>) -> f64 {
+        self.reach_m - (point_B - self.anchor_B).norm()
+    }
+
     /// Whether all that is as near to a point as `reach_m` is listed.
     #[inline]
     pub(super) fn holds(&self, point_B: &Vector3<f64>, reach_m: f64) -> bool {
@@ -132,9 +138,19 @@ impl Vicinity {
 
     fn add_edge(&mut self, csg: &Csg, [a, b]: [u16; 2]) {
         let on = On::of([a, b]);
-        self.add(csg, on, self.anchor_B);
-        if !is_flat(csg, &[a, b]) {
-            for start_B in self.starts() {
+        let meets = self.add(csg, on, self.anchor_B);
+        if [a, b]
+            .iter()
+            .all(|&number| csg.patches.get(usize::from(number)).is_some_and(Patch::meets_in_circles))
+        {
+            // One point is nearest, wherever one starts.
+            return;
+        }
+        let starts = self.starts();
+        // Most patches that are not met from the anchor, nor from above and below, do not meet.
+        let [up_B, .., down_B] = starts;
+        if meets || self.add(csg, on, up_B) || self.add(csg, on, down_B) {
+            for start_B in starts {
                 self.add(csg, on, start_B);
             }
         }
@@ -142,18 +158,20 @@ impl Vicinity {
 
     fn add_corner(&mut self, csg: &Csg, [a, b, c]: [u16; 3]) {
         let on = On::of([a, b, c]);
-        let add = |here: &mut Self, start_B: Vector3<f64>| {
-            let Some(point_B) = nearest_on(csg, &on, &start_B, &start_B) else { return };
-            let way_B = here.anchor_B;
-            if place(csg, &here.near(csg, &point_B), &point_B, &way_B) != Place::Nothing {
-                here.add(csg, on, point_B);
-            }
-        };
-        add(self, self.anchor_B);
+        self.add_corner_from(csg, on, self.anchor_B);
         if !is_flat(csg, &[a, b, c]) {
             for start_B in self.starts() {
-                add(self, start_B);
+                self.add_corner_from(csg, on, start_B);
             }
+        }
+    }
+
+    fn add_corner_from(&mut self, csg: &Csg, on: On, start_B: Vector3<f64>) {
+        let Some(point_B) = nearest_on(csg, &on, &start_B, &self.anchor_B) else { return };
+        if (point_B - self.anchor_B).norm() <= self.reach_m
+            && is_boundary(csg, &self.near(csg, &point_B), &point_B)
+        {
+            self.note(on, point_B);
         }
     }
 
@@ -163,9 +181,16 @@ impl Vicinity {
         std::array::from_fn(|i| self.anchor_B + Vector3::ith(i % 3, if i < 3 { way_m } else { -way_m }))
     }
 
-    /// Adds the nearest point that one comes to from a start, if it is within reach and not known yet.
-    fn add(&mut self, csg: &Csg, on: On, start_B: Vector3<f64>) {
-        let Some(point_B) = nearest_on(csg, &on, &start_B, &self.anchor_B) else { return };
+    /// Adds the nearest point that one comes to from a start, if it is within reach and not known yet; whether there is one.
+    fn add(&mut self, csg: &Csg, on: On, start_B: Vector3<f64>) -> bool {
+        let point_B = nearest_on(csg, &on, &start_B, &self.anchor_B);
+        if let Some(point_B) = point_B {
+            self.note(on, point_B);
+        }
+        point_B.is_some()
+    }
+
+    fn note(&mut self, on: On, point_B: Vector3<f64>) {
         let distance_m = (point_B - self.anchor_B).norm();
         if distance_m.is_nan() || distance_m > self.reach_m {
             return;
