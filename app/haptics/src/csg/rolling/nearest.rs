@@ -92,7 +92,7 @@ fn on_scaled_patch(patch: &Patch, start_B: &Vector3<f64>, target_B: &Vector3<f64
 
 fn on_curve([a, b]: [&Patch; 2], start_B: &Vector3<f64>, target_B: &Vector3<f64>) -> Option<Vector3<f64>> {
     let mut p_B = *start_B;
-    let mut missed_m = f64::INFINITY;
+    let (mut missed_m, mut by_bend_m) = (f64::INFINITY, 0.0);
     for step in 1..=MOST_STEPS {
         let looks = [a.look(&p_B, target_B), b.look(&p_B, target_B)];
         let [normal_a_B, normal_b_B] = looks.map(|look| look.normal_B);
@@ -111,7 +111,7 @@ fn on_curve([a, b]: [&Patch; 2], start_B: &Vector3<f64>, target_B: &Vector3<f64>
         if step % PATIENCE == 0 {
             // Patches that do not meet are never come to.
             let before_m = std::mem::replace(&mut missed_m, back_B.amax());
-            if missed_m > 0.25 * before_m && missed_m > ON_BOTH * p_B.amax() {
+            if missed_m > 0.25 * before_m && missed_m > by_bend_m + ON_BOTH * p_B.amax() {
                 return None;
             }
         }
@@ -128,7 +128,10 @@ fn on_curve([a, b]: [&Patch; 2], start_B: &Vector3<f64>, target_B: &Vector3<f64>
         let step_m = if gain > 0.0 { lag_m / gain } else { f64::INFINITY.copysign(lag_m) };
         let bent_m = a.smallest_radius_m(&p_B).min(b.smallest_radius_m(&p_B));
         let longest_m = (BEND * sine * bent_m).min(f64::MAX.sqrt());
-        p_B += along_B * step_m.clamp(-longest_m, longest_m);
+        let step_m = step_m.clamp(-longest_m, longest_m);
+        p_B += along_B * step_m;
+        // A straight step along a bent curve leads that far from it.
+        by_bend_m = step_m * step_m / (sine * bent_m);
     }
     let on_both = [a, b].iter().all(|patch| patch.level(&p_B).abs() <= 64.0 * resolution_m(&p_B, target_B));
     on_both.then_some(p_B)
