@@ -258,7 +258,13 @@ fn long_walks_never_leak() {
                 let spring = out.force_on_user_W.norm() / K;
                 let apart = (out.god_object_W - hip).norm();
                 slow += u32::from(spring > apart * (1.0 + 1e-9) + 1e-12);
-                if spring > apart * (1.0 + 1e-9) + 1e-12 { println!("{} {tick} r {radius_m} {spring:e} {apart:e} {out:?} {:?}", tree.name, finger.touch_points(from_ref(&entity), 0).as_slice()); }
+                if spring > apart * (1.0 + 1e-9) + 1e-12 {
+                    println!(
+                        "{} {tick} r {radius_m} {spring:e} {apart:e} {out:?} {:?}",
+                        tree.name,
+                        finger.touch_points(from_ref(&entity), 0).as_slice()
+                    );
+                }
                 assert!(
                     tick % 16 != 0 || !is_buried(&csg, &out.god_object_W, radius_m, &directions),
                     "{} {tick} {}",

@@ -103,11 +103,19 @@ impl Patch {
         }
     }
 
-    /// Whether it is a plane or a ball: two of them meet in a circle or a line.
-    pub(crate) fn meets_in_circles(&self) -> bool {
-        match self {
-            Self::Plane { .. } => true,
-            Self::Curved(curved) => matches!(curved.kind, Kind::Ball { .. }) && self.is_round(),
+    /// Whether it meets another patch in one circle or line, of which one point is nearest wherever one starts: planes and
+    /// balls each other, planes what they cut straight across.
+    pub(crate) fn meets_in_one_circle(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Plane { .. }, Self::Plane { .. }) => true,
+            (Self::Plane { normal_B, .. }, Self::Curved(curved))
+            | (Self::Curved(curved), Self::Plane { normal_B, .. }) => {
+                other.is_round() && self.is_round() && curved.is_cut_in_one_circle(normal_B)
+            }
+            (Self::Curved(a), Self::Curved(b)) => {
+                let is_ball = |curved: &Curved| matches!(curved.kind, Kind::Ball { .. });
+                self.is_round() && other.is_round() && is_ball(a) && is_ball(b)
+            }
         }
     }
 
@@ -234,6 +242,17 @@ impl Curved {
         let (along_L, towards_L) = (self.turn_LB * along_B, self.turn_LB * towards_B);
         let slope = self.turn_LB.tr_mul(&self.kind.gradient(&at_L, &at_L)).norm();
         self.kind.bending(&at_L, &along_L, &towards_L) / slope
+    }
+
+    fn is_cut_in_one_circle(&self, normal_B: &Vector3<f64>) -> bool {
+        match self.kind {
+            Kind::Ball { .. } => true,
+            Kind::Ring { .. } => false,
+            Kind::Tube { .. } | Kind::Nappe { .. } | Kind::Pill { .. } => {
+                let normal_L = self.turn_LB * normal_B;
+                normal_L.x.hypot(normal_L.z) <= SKEW * normal_L.norm()
+            }
+        }
     }
 
     fn tip_between(&self, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<Vector3<f64>> {

@@ -6,7 +6,8 @@
 //! reach, a feature whose distance from the anchor exceeds the ball's by more than the way from there need not be looked at.
 //! Corners stand still, so that those which are no boundary are left out.
 //!
-//! Limits: of more than [`MOST_PATCHES`] patches, or [`MOST_FEATURES`] features, within reach the nearest count.
+//! Limits: of more than [`MOST_PATCHES`] patches within reach the nearest count; of more than [`MOST_FEATURES`] places to
+//! start from, those on the nearest patches.
 //! Cost: a level for each patch nearby, a few Newton steps for each pair and triple of them, every few ticks.
 
 use nalgebra::Vector3;
@@ -15,7 +16,6 @@ use super::nearest::nearest_on;
 use super::on::On;
 use super::place::is_boundary;
 use crate::csg::near::Neighbourhood;
-use crate::csg::patch::Patch;
 use crate::csg::{Csg, Step};
 
 /// What is near an anchor.
@@ -43,8 +43,9 @@ pub(super) struct Patches {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Feature {
     pub(super) on: On,
-    /// The point nearest to the anchor.
+    /// Where to start from.
     pub(super) point_B: Vector3<f64>,
+    /// From the anchor to the nearest point of all (m).
     distance_m: f64,
 }
 
@@ -78,9 +79,9 @@ impl Vicinity {
         for (i, &a) in numbers.iter().enumerate() {
             here.add_patch(csg, a);
             for (j, &b) in numbers.iter().enumerate().take(i) {
-                let first = here.count;
+                let before = here.count;
                 here.add_edge(csg, [a, b]);
-                if here.count == first {
+                if here.count == before {
                     continue;
                 }
                 for &c in numbers.iter().take(j) {
@@ -125,34 +126,50 @@ impl Vicinity {
 
     fn add_patch(&mut self, csg: &Csg, number: u16) {
         let on = On::of([number]);
-        self.add(csg, on, self.anchor_B);
         let Some(patch) = csg.patches.get(usize::from(number)) else { return };
         if patch.is_round() || patch.level(&self.anchor_B) > 0.0 {
             // One point of it is nearest, wherever one starts.
-            return;
-        }
-        for start_B in self.starts() {
-            self.add(csg, on, start_B);
+            self.add(csg, on, self.anchor_B);
+        } else {
+            self.add_all_over(csg, on);
         }
     }
 
     fn add_edge(&mut self, csg: &Csg, [a, b]: [u16; 2]) {
         let on = On::of([a, b]);
-        let meets = self.add(csg, on, self.anchor_B);
-        if [a, b]
+        let patch = |number: u16| csg.patches.get(usize::from(number));
+        let (Some(a), Some(b)) = (patch(a), patch(b)) else { return };
+        if a.meets_in_one_circle(b) {
+            self.add(csg, on, self.anchor_B);
+        } else {
+            self.add_all_over(csg, on);
+        }
+    }
+
+    /// Of what is bent more than one point may be near, and others where the ball has moved: from all over.
+    fn add_all_over(&mut self, csg: &Csg, on: On) {
+        let first = self.count;
+        let mut least_m = f64::INFINITY;
+        let [up_B, .., down_B] = self.starts();
+        let meets = [self.anchor_B, up_B, down_B]
             .iter()
-            .all(|&number| csg.patches.get(usize::from(number)).is_some_and(Patch::meets_in_circles))
-        {
-            // One point is nearest, wherever one starts.
+            .any(|start_B| nearest_on(csg, &on, start_B, start_B).is_some());
+        if !meets {
+            // Most patches that are met from none of these do not meet.
             return;
         }
-        let starts = self.starts();
-        // Most patches that are not met from the anchor, nor from above and below, do not meet.
-        let [up_B, .., down_B] = starts;
-        if meets || self.add(csg, on, up_B) || self.add(csg, on, down_B) {
-            for start_B in starts {
-                self.add(csg, on, start_B);
-            }
+        for start_B in std::iter::once(self.anchor_B).chain(self.starts()) {
+            let Some(here_B) = nearest_on(csg, &on, &start_B, &start_B) else { continue };
+            let Some(nearest_B) = nearest_on(csg, &on, &here_B, &self.anchor_B) else { continue };
+            least_m = least_m.min((nearest_B - self.anchor_B).norm());
+            self.note(on, nearest_B, APART);
+            self.note(on, here_B, APART);
+        }
+        if least_m <= self.reach_m {
+            let added = self.features.get_mut(first..self.count).unwrap_or_default();
+            added.iter_mut().for_each(|feature| feature.distance_m = least_m);
+        } else {
+            self.count = first;
         }
     }
 
@@ -171,7 +188,7 @@ impl Vicinity {
         if (point_B - self.anchor_B).norm() <= self.reach_m
             && is_boundary(csg, &self.near(csg, &point_B), &point_B)
         {
-            self.note(on, point_B);
+            self.note(on, point_B, SAME);
         }
     }
 
@@ -181,39 +198,25 @@ impl Vicinity {
         std::array::from_fn(|i| self.anchor_B + Vector3::ith(i % 3, if i < 3 { way_m } else { -way_m }))
     }
 
-    /// Adds the nearest point that one comes to from a start, if it is within reach and not known yet; whether there is one.
-    fn add(&mut self, csg: &Csg, on: On, start_B: Vector3<f64>) -> bool {
-        let point_B = nearest_on(csg, &on, &start_B, &self.anchor_B);
-        if let Some(point_B) = point_B {
-            self.note(on, point_B);
+    /// Adds the nearest point that one comes to from a start, if it is within reach.
+    fn add(&mut self, csg: &Csg, on: On, start_B: Vector3<f64>) {
+        let Some(point_B) = nearest_on(csg, &on, &start_B, &self.anchor_B) else { return };
+        if (point_B - self.anchor_B).norm() <= self.reach_m {
+            self.note(on, point_B, SAME);
         }
-        point_B.is_some()
     }
 
-    fn note(&mut self, on: On, point_B: Vector3<f64>) {
-        let distance_m = (point_B - self.anchor_B).norm();
-        if distance_m.is_nan() || distance_m > self.reach_m {
-            return;
-        }
-        let same_m = SAME * self.reach_m;
+    /// Takes note of a point, if there is room, and none as near as this share of the reach is known.
+    fn note(&mut self, on: On, point_B: Vector3<f64>, same: f64) {
+        let same_m = same * self.reach_m;
         let known = self.features.get(..self.count).unwrap_or_default();
         if known.iter().any(|feature| feature.on == on && (feature.point_B - point_B).amax() <= same_m) {
             return;
         }
-        let mut newcomer = Feature { on, point_B, distance_m };
-        let place = match self.features.get_mut(self.count) {
-            Some(place) => {
-                self.count += 1;
-                place
-            }
-            // The farthest has to go.
-            None => {
-                let farthest = self.features.iter_mut().max_by(|a, b| a.distance_m.total_cmp(&b.distance_m));
-                let Some(place) = farthest.filter(|place| place.distance_m > distance_m) else { return };
-                place
-            }
-        };
-        std::mem::swap(place, &mut newcomer);
+        if let Some(place) = self.features.get_mut(self.count) {
+            *place = Feature { on, point_B, distance_m: (point_B - self.anchor_B).norm() };
+            self.count += 1;
+        }
     }
 }
 
@@ -275,8 +278,10 @@ fn is_flat(csg: &Csg, numbers: &[u16]) -> bool {
 }
 
 const MOST_PATCHES: usize = 24;
-const MOST_FEATURES: usize = 96;
+const MOST_FEATURES: usize = 128;
 /// Of the reach: where starts beside the anchor lie.
 const AWAY: f64 = 0.6;
 /// Of the reach: points that are as near to each other are one.
 const SAME: f64 = 1e-9;
+/// Of the reach: from points that are as near to each other one comes to the same nearest one.
+const APART: f64 = 0.2;
