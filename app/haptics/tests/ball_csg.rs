@@ -6,7 +6,7 @@ mod common;
 mod trees;
 
 use common::*;
-use haptics::{CsgPart, CsgTree, Cuboid, Cylinder, Entity, Finger, FingerOutput, Friction, Plane, Sphere};
+use haptics::{CsgPart, CsgTree, Cuboid, Entity, Finger, FingerOutput, Friction, Plane};
 use nalgebra::Vector3;
 use trees::{touchable, v};
 
@@ -44,21 +44,6 @@ fn boxes() -> [CsgTree; 2] {
     let faces =
         (0..6).map(|i| half_space(Vector3::ith(i % 3, if i < 3 { 1.0 } else { -1.0 }), 0.5 * size[i % 3]));
     [leaf, CsgTree::intersection(faces)]
-}
-
-/// A way all round a box of that size, over faces, edges and corners, up to 8 mm inside of the grown box.
-fn around_the_box(noise: &mut Noise) -> Vec<Vector3<f64>> {
-    let mut places = vec![v(0.0, 0.06, 0.0)];
-    for _ in 0..40 {
-        let at = v(noise.between(-0.06, 0.06), noise.between(-0.04, 0.04), noise.between(-0.05, 0.05));
-        // Pushed to where a side is.
-        let axis = (noise.uniform() * 3.0) as usize % 3;
-        let mut at = at;
-        at[axis] =
-            [0.05, 0.03, 0.04][axis] * at[axis].signum() + noise.between(-3e-3, 4e-3) * at[axis].signum();
-        places.push(at);
-    }
-    way(&places, 2e-4)
 }
 
 #[test]
