@@ -99,6 +99,7 @@ impl Ground for Mesh {
     }
 
     /// Of a HIP that is outside of the mesh, but nearer to it than the radius: straight away from the nearest point.
+    #[inline(always)]
     fn seat(
         &self,
         foot: &Foot,

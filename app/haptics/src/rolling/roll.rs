@@ -149,6 +149,7 @@ impl<F: Foot> Ball<F> {
     }
 
     /// Where it comes to rest without friction, if the ground knows that place.
+    #[inline(always)]
     pub(super) fn seat(&self, ground: &impl Ground<Foot = F>, hip_B: &Vector3<f64>) -> Option<Self> {
         let [rest] = self.rests() else { return None };
         let (foot, (normal_B, offset_m)) = ground.seat(&rest.foot, &rest.normal_B, hip_B, self.radius_m)?;

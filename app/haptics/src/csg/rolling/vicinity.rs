@@ -16,6 +16,7 @@ use super::nearest::nearest_on;
 use super::on::On;
 use super::place::is_boundary;
 use crate::csg::near::Neighbourhood;
+use crate::csg::patch::Patch;
 use crate::csg::{Csg, Step};
 
 /// What is near an anchor.
@@ -274,7 +275,7 @@ impl Patches {
 }
 
 fn is_flat(csg: &Csg, numbers: &[u16]) -> bool {
-    numbers.iter().all(|&number| csg.patches.get(usize::from(number)).is_some_and(|patch| patch.is_plane()))
+    numbers.iter().all(|&number| csg.patches.get(usize::from(number)).is_some_and(Patch::is_plane))
 }
 
 const MOST_PATCHES: usize = 24;
