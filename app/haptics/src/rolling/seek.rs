@@ -133,7 +133,7 @@ fn seek_with<G: Ground>(
         }
         if is_careful {
             let before = (ball.centre_B, ball.rests().len());
-            let seat = is_frictionless.then(|| ball.seat(ground, &input.hip_B)).flatten();
+            let seat = (G::IS_BENT && is_frictionless).then(|| ball.seat(ground, &input.hip_B)).flatten();
             let target_B = seat.map_or(target_B, |seat| ball.towards(&seat));
             ball = ball.rolled_until(ground, &target_B, &work);
             if before == (ball.centre_B, ball.rests().len()) {
@@ -146,10 +146,10 @@ fn seek_with<G: Ground>(
             continue;
         }
         let seat = is_frictionless.then(|| ball.seat(ground, &input.hip_B)).flatten();
-        if let Some(seat) = seat {
-            if !seat.is_within_half_a_radius_of(&ball) {
-                return Sought::Unsure;
-            }
+        if G::IS_BENT && seat.is_some_and(|seat| !seat.is_within_half_a_radius_of(&ball)) {
+            return Sought::Unsure;
+        }
+        if let Some(seat) = seat.filter(|seat| seat.is_within_half_a_radius_of(&ball)) {
             ball = seat;
             sees = None;
         } else {
