@@ -93,9 +93,15 @@ impl CsgGround<'_> {
 
     /// The foot of a ball that is drawn to a HIP below a patch: on the line through it across that patch. From an edge or
     /// a corner it is drawn to the patch on the HIP's side: there is no rest on the way.
-    fn below(&self, foot: &Foot, normal_B: &Vector3<f64>, hip_B: &Vector3<f64>) -> Option<Foot> {
+    fn below(
+        &self,
+        foot: &Foot,
+        normal_B: &Vector3<f64>,
+        hip_B: &Vector3<f64>,
+        radius_m: f64,
+    ) -> Option<Foot> {
         if matches!(foot.feature, Feature::Face | Feature::Surface) {
-            let there = self.below_patch(foot, hip_B)?;
+            let there = self.below_patch(foot, hip_B, radius_m)?;
             return (there.normal_B.dot(normal_B) > SAME_SIDE).then_some(there);
         }
         let to_hip_B = tangential(&(hip_B - foot.point_B), normal_B);
@@ -106,15 +112,19 @@ impl CsgGround<'_> {
             (beside.normal_B.dot(&to_hip_B), beside)
         });
         let (_, beside) = patches.max_by(|(a, _), (b, _)| a.total_cmp(b))?;
-        self.below_patch(&beside, hip_B)
+        self.below_patch(&beside, hip_B, radius_m)
     }
 
-    fn below_patch(&self, foot: &Foot, hip_B: &Vector3<f64>) -> Option<Foot> {
+    fn below_patch(&self, foot: &Foot, hip_B: &Vector3<f64>, radius_m: f64) -> Option<Foot> {
         let point_B = nearest_on(self.csg, &foot.on, &foot.point_B, hip_B)?;
         let near = self.around(&point_B);
         let there = Foot::at(self, &near, foot.on, point_B, hip_B);
-        let is_boundary = place(self.csg, &near, &point_B, &(point_B + there.normal_B)) == Place::Foot;
-        (is_boundary && there.feature == foot.feature).then_some(there)
+        // In a hollow that it does not fit into, a ball would have another point nearer.
+        let centre_B = point_B + there.normal_B * radius_m;
+        let its_foot_B = nearest_on(self.csg, &foot.on, &point_B, &centre_B)?;
+        let is_its_foot = (its_foot_B - point_B).norm() <= SAME_FOOT * radius_m;
+        let is_boundary = place(self.csg, &near, &point_B, &centre_B) == Place::Foot;
+        (is_its_foot && is_boundary && there.feature == foot.feature).then_some(there)
     }
 
     fn nearest_in(
@@ -265,7 +275,7 @@ impl Ground for CsgGround<'_> {
             // Straight away from the nearest point.
             (foot.followed(self, hip_B)?, true)
         } else {
-            (self.below(foot, normal_B, hip_B)?, false)
+            (self.below(foot, normal_B, hip_B, radius_m)?, false)
         };
         let plane = there.plane(self, hip_B, radius_m);
         let depth_m = plane.1 - plane.0.dot(hip_B);
@@ -309,6 +319,8 @@ const MARGIN: f64 = 0.7;
 const LEAST_MARGIN: f64 = 0.2;
 /// A leap through free space is looked ahead for by as much, in radii.
 const LOOK_AHEAD: f64 = 1.0;
+/// In radii: feet that are as near to each other are one.
+const SAME_FOOT: f64 = 1e-6;
 /// Cosine between the normals of two places that are surely not on opposite sides of what is round.
 const SAME_SIDE: f64 = 0.5;
 /// Heights below this share of the radius have no direction worth going by.

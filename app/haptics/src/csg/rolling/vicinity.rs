@@ -141,7 +141,9 @@ impl Vicinity {
         let patch = |number: u16| csg.patches.get(usize::from(number));
         let (Some(a), Some(b)) = (patch(a), patch(b)) else { return };
         if a.meets_in_one_circle(b) {
-            self.add(csg, on, self.anchor_B);
+            // Right above the middle of a circle both normals are the same, and there is no way to it.
+            let mut starts = std::iter::once(self.anchor_B).chain(self.starts());
+            starts.any(|start_B| self.add(csg, on, start_B));
         } else {
             self.add_all_over(csg, on);
         }
@@ -199,12 +201,13 @@ impl Vicinity {
         std::array::from_fn(|i| self.anchor_B + Vector3::ith(i % 3, if i < 3 { way_m } else { -way_m }))
     }
 
-    /// Adds the nearest point that one comes to from a start, if it is within reach.
-    fn add(&mut self, csg: &Csg, on: On, start_B: Vector3<f64>) {
-        let Some(point_B) = nearest_on(csg, &on, &start_B, &self.anchor_B) else { return };
+    /// Adds the nearest point that one comes to from a start, if it is within reach; whether one comes to any.
+    fn add(&mut self, csg: &Csg, on: On, start_B: Vector3<f64>) -> bool {
+        let Some(point_B) = nearest_on(csg, &on, &start_B, &self.anchor_B) else { return false };
         if (point_B - self.anchor_B).norm() <= self.reach_m {
             self.note(on, point_B, SAME);
         }
+        true
     }
 
     /// Takes note of a point, if there is room, and none as near as this share of the reach is known.
