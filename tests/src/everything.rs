@@ -79,7 +79,7 @@ material = "skin"
 vibration = { frequency_hz = 70.0, amplitude_n = 0.1 }
 "#;
 
-/// Writes `scene.toml` and all that belongs to it; with round fingers, or with a solid joined of others.
+/// Writes `scene.toml` and all that belongs to it; with round fingers, or with points.
 pub fn write(directory: &Path, is_round: bool) {
     let mut scene = String::from(EFFECTS);
     let radius = if is_round { "radius_m = 0.003\n" } else { "" };
@@ -88,9 +88,7 @@ pub fn write(directory: &Path, is_round: bool) {
         "[[finger]]\n{radius}[[finger]]\n{radius}passivity = true\n[[finger]]\npassivity = {{ bound_j = 0.001 }}\n"
     );
     scene += BODIES;
-    if !is_round {
-        scene += SOLID;
-    }
+    scene += SOLID;
     let files: [(&str, &[u8]); 5] = [
         ("scene.toml", scene.as_bytes()),
         ("hand.csv", &hand().into_bytes()),

@@ -92,6 +92,38 @@ fn a_csg_slides_at_mu_d_over_its_plane_and_its_curved_parts() {
     }
 }
 
+/// A block with a fingertip of this radius for it.
+fn for_a_ball(radius_m: f64, rest: &str) -> String {
+    block(rest).replace("start_m", &format!("radius_m = {radius_m:?}\nstart_m"))
+}
+
+#[test]
+fn a_ball_on_a_csg_is_felt_by_each_of_its_parts() {
+    // Where it comes from and where to, in the place where its centre is held on the way, and the feature: on the top,
+    // through the bore along its wall, on the rim that it does not fit through, in the groove between wall and top, round the
+    // block's lower edge.
+    let cases = [
+        (5e-3, [0.03, 0.05, 0.02], [0.03, 0.022, 0.02], V::new(0.03, 0.025, 0.02), "face"),
+        (5e-3, [0.0, 0.0, 0.0], [0.017, 0.0, 0.0], V::new(0.015, 0.0, 0.0), "surface"),
+        (0.025, [0.0, 0.08, 0.0], [0.0, 0.032, 0.0], V::new(0.0, 0.035, 0.0), "edge"),
+        (5e-3, [-0.02, 0.05, 0.03], [-0.027, 0.023, 0.0], V::new(-0.025, 0.025, 0.0), "face"),
+        (5e-3, [0.06, -0.03, 0.0], [0.0524, -0.0232, 0.0], V::new(0.053, -0.024, 0.0), "edge"),
+    ];
+    for (radius_m, from, to, centre, feature) in cases {
+        // In the bore it comes in from above.
+        let above = if feature == "surface" { [0.0, 0.06, 0.0] } else { from };
+        let path = hand([(0.0, above), (0.4, from), (0.8, to), (1.2, to)]);
+        let scene = for_a_ball(radius_m, "").replace("[0.0, 0.5, 0.0]", &format!("{above:?}"));
+        let samples = felt(&scene, &path, &[]);
+        let last = samples.last().expect("a recording");
+        assert!(last.touches(), "{centre:?} {last:?}");
+        // On a rim all around it the ball is held by points of it, found to a billionth of the radius.
+        assert!((last.god - centre).norm() < 1e-9, "{centre:?} {last:?}");
+        assert_eq!(last.feature, feature, "{centre:?}");
+        assert!((last.force - (centre - V::from(to)) * STIFFNESS).norm() < 1e-6, "{centre:?} {last:?}");
+    }
+}
+
 #[test]
 fn what_no_csg_can_be_is_refused_with_the_reason() {
     let place = Workplace::new();
@@ -105,8 +137,6 @@ fn what_no_csg_can_be_is_refused_with_the_reason() {
         }
     };
     says(&block("algorithm = \"classic\""), &["entity block is a csg", "classic", "allowed: friction-cone"]);
-    let ball = block("").replace("start_m", "radius_m = 0.005\nstart_m");
-    says(&ball, &["block, a csg, cannot be felt by such a finger", "radius_m = 0"]);
     let many = vec!["{ shape = { kind = \"sphere\", radius_m = 1 } }"; 257].join(",");
     let many =
         format!("[[finger]]\n[[entity]]\nshape = {{ kind = \"csg\", op = \"union\", children = [{many}] }}");

@@ -2,7 +2,7 @@
 //!
 //! `cargo bench -p haptics --bench csg -- table` prints median, p99.9 and maximum of single ticks; without `table`,
 //! Criterion measures whole rounds. The solid is a plate of 0.1 m with knobs, dimples, bores and bricks, every fourth
-//! of a kind; the point finger walks over all of it, 1 mm below the plate's top, or in the open. The ways over it are
+//! of a kind; the finger, a point or a ball, walks over all of it, 1 mm below the plate's top, or in the open. The ways over it are
 //! 0.2 mm a tick and cross edges of all kinds.
 //!
 //! The longest ticks: with friction both god-objects, the one that is felt and the one that knows whether the finger is still
@@ -123,31 +123,41 @@ fn path(height_m: f64) -> Vec<Vector3<f64>> {
 fn print_table() {
     let clock = median(&mut (0..10_001).map(|_| time(|| ())).collect::<Vec<_>>());
     println!(
-        "{:>7} {:>12} {:>10} {:>10} {:>10} {:>9}",
+        "{:>7} {:>14} {:>10} {:>10} {:>10} {:>9}",
         "leaves", "", "median ns", "p99.9 ns", "max ns", "touching"
     );
     for leaves in [2, 20, 100] {
         for (name, friction, height_m) in works() {
-            let (entity, path) = (plate(leaves, friction), path(height_m));
-            let mut best = vec![f64::INFINITY; path.len()];
-            let mut touching = 0;
-            for _ in 0..RUNS {
-                let mut finger = Finger::new(0.0, 1).expect("a finger");
-                touching = 0;
-                for (hip, best) in path.iter().zip(&mut best) {
-                    let mut out = None;
-                    let taken =
-                        time(|| out = Some(finger.step(std::slice::from_ref(&entity), black_box(hip), DT)));
-                    *best = best.min(taken - clock);
-                    touching += usize::from(out.is_some_and(|out| out.entity.is_some()));
-                }
-            }
-            let touching = 100 * touching / path.len();
-            let median = median(&mut best);
-            let [high, most] = [best[best.len() * 999 / 1000], best[best.len() - 1]];
-            println!("{leaves:>7} {name:>12} {median:>10.0} {high:>10.0} {most:>10.0} {touching:>8}%");
+            print_row(leaves, name, 0.0, (friction, height_m), clock);
         }
     }
+    println!("balls, 1 mm deep");
+    for radius_m in [1e-3, 2e-3, 5e-3] {
+        for (name, friction, height_m) in works().into_iter().take(2) {
+            let name = format!("{name}, {:.0} mm", 1e3 * radius_m);
+            print_row(20, &name, radius_m, (friction, height_m + radius_m), clock);
+        }
+    }
+}
+
+fn print_row(leaves: usize, name: &str, radius_m: f64, (friction, height_m): (Friction, f64), clock: f64) {
+    let (entity, path) = (plate(leaves, friction), path(height_m));
+    let mut best = vec![f64::INFINITY; path.len()];
+    let mut touching = 0;
+    for _ in 0..RUNS {
+        let mut finger = Finger::new(radius_m, 1).expect("a finger");
+        touching = 0;
+        for (hip, best) in path.iter().zip(&mut best) {
+            let mut out = None;
+            let taken = time(|| out = Some(finger.step(std::slice::from_ref(&entity), black_box(hip), DT)));
+            *best = best.min(taken - clock);
+            touching += usize::from(out.is_some_and(|out| out.entity.is_some()));
+        }
+    }
+    let touching = 100 * touching / path.len();
+    let median = median(&mut best);
+    let [high, most] = [best[best.len() * 999 / 1000], best[best.len() - 1]];
+    println!("{leaves:>7} {name:>14} {median:>10.0} {high:>10.0} {most:>10.0} {touching:>8}%");
 }
 
 fn time(work: impl FnOnce()) -> f64 {

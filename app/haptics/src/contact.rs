@@ -12,6 +12,7 @@
 use nalgebra::Vector3;
 
 use crate::algorithm::{Algorithm, ContactAlgorithm, ContactMemory, Touch, TouchInput};
+use crate::balls::Balls;
 use crate::classic_god_object::ClassicGodObject;
 use crate::csg::CsgCone;
 use crate::entity::Entity;
@@ -21,7 +22,7 @@ use crate::friction_cone::{ConeInput, FrictionCone};
 use crate::friction_law::FrictionState;
 use crate::height_map::Over;
 use crate::hip::Hip;
-use crate::mesh::{Beginning, Mesh, MeshCone, RollingCone};
+use crate::mesh::{Beginning, Mesh, MeshCone};
 use crate::nurbs::NurbsCone;
 use crate::shading::Shading;
 use crate::shape::Shape;
@@ -76,7 +77,7 @@ pub(crate) struct Slot {
     cone: Option<FrictionCone>,
     mesh: MeshCone,
     /// Of a ball; large, and points have none.
-    rolling: Option<Box<RollingCone>>,
+    balls: Option<Box<Balls>>,
     csg: CsgCone,
     nurbs: NurbsCone,
     own: ContactMemory,
@@ -100,6 +101,7 @@ enum Kept {
     Surface,
     Mesh,
     Rolling,
+    RollingOnCsg,
     Csg,
     Nurbs,
     Own,
@@ -125,8 +127,13 @@ impl Slot {
             Kept::Surface => self.cone = None,
             Kept::Mesh => self.mesh.let_go(),
             Kept::Rolling => {
-                if let Some(rolling) = &mut self.rolling {
-                    rolling.let_go();
+                if let Some(balls) = &mut self.balls {
+                    balls.on_mesh.let_go();
+                }
+            }
+            Kept::RollingOnCsg => {
+                if let Some(balls) = &mut self.balls {
+                    balls.on_csg.let_go();
                 }
             }
             Kept::Csg => self.csg.let_go(),
@@ -151,27 +158,27 @@ impl Slot {
 
     /// For a finger of this radius.
     pub(crate) fn new(finger_radius_m: f64) -> Self {
-        let rolling = (finger_radius_m > 0.0).then(Box::default);
-        Self { rolling, ..Self::default() }
+        let balls = (finger_radius_m > 0.0).then(Box::default);
+        Self { balls, ..Self::default() }
     }
 
     /// Forgets everything, if there is anything to forget.
     pub(crate) fn vacate(&mut self) {
         if self.is_used {
-            let mut rolling = self.rolling.take();
-            if let Some(rolling) = &mut rolling {
-                **rolling = RollingCone::default();
+            let mut balls = self.balls.take();
+            if let Some(balls) = &mut balls {
+                **balls = Balls::default();
             }
-            *self = Self { rolling, ..Self::default() };
+            *self = Self { balls, ..Self::default() };
         }
     }
 
     /// Where the finger touches the entity, in this tick.
     pub(crate) fn touch_points(&self, entity: &Entity, finger_radius_m: f64) -> TouchPoints {
         let Some(contact) = &self.contact else { return TouchPoints::NONE };
-        let rolls = self.rolling.as_ref().filter(|rolling| rolling.is_touching());
+        let rolls = self.balls.as_ref().filter(|balls| balls.is_touching());
         match rolls {
-            Some(rolling) => TouchPoints::of_shares(rolling.shares(), entity, contact, self.strength),
+            Some(balls) => TouchPoints::of_shares(balls.shares(), entity, contact, self.strength),
             None => TouchPoints::single(contact, finger_radius_m),
         }
     }
@@ -265,12 +272,17 @@ impl Slot {
             Shape::Own(_) => input.of_surface(|grown| self.touch_surface(grown, input))?,
             Shape::Mesh(mesh) => {
                 self.keep(Kept::Rolling);
-                let touched = self.rolling.as_mut()?.update(mesh, input);
+                let touched = self.balls.as_mut()?.on_mesh.update(&**mesh, input);
                 self.begun(touched)
             }
             Shape::Nurbs(nurbs) => {
                 self.keep(Kept::Nurbs);
                 let touched = self.nurbs.update(nurbs, input);
+                self.begun(touched)
+            }
+            Shape::Csg(csg) if input.finger_radius_m != 0.0 => {
+                self.keep(Kept::RollingOnCsg);
+                let touched = self.balls.as_mut()?.on_csg.update(csg, input);
                 self.begun(touched)
             }
             Shape::Csg(csg) => {
@@ -366,8 +378,8 @@ impl Slot {
     /// The touch as the entity's facets and heights have it; `None` above a dent.
     #[inline(never)]
     fn shade_and_raise(&mut self, entity: &Entity, mut touch: Touch, sweep: &Sweep<'_>) -> Option<Touch> {
-        match self.rolling.as_ref().filter(|rolling| rolling.is_touching()) {
-            Some(rolling) => entity.shading.turn_shares(&entity.shape, rolling.shares(), &mut touch),
+        match self.balls.as_ref().filter(|balls| balls.is_touching()) {
+            Some(balls) => entity.shading.turn_shares(&entity.shape, balls.shares(), &mut touch),
             None => entity.shading.turn(&entity.shape, &mut touch),
         }
         if let Some(height_map) = &entity.height_map {

@@ -16,7 +16,7 @@
 //! [`cells`] have left of the tree there. In its clearing (see [`god`]) a god-object looks at what holds it only. No
 //! recursion, no allocation.
 //! Limits: of more than eight patches that meet in one point the eight nearest count. Parts thinner than
-//! [`TOLERANCE`] times the solid's extent are not felt. Only fingers that are points feel trees.
+//! [`TOLERANCE`] times the solid's extent are not felt.
 
 mod advance;
 mod cells;
@@ -30,6 +30,7 @@ mod kind;
 mod near;
 mod patch;
 mod pressed_through;
+mod rolling;
 mod settle;
 mod stand;
 mod tree;
@@ -37,6 +38,7 @@ mod walk;
 mod way_out;
 
 pub(crate) use csg_cone::CsgCone;
+pub(crate) use rolling::BallOnCsg;
 pub use tree::{CsgError, CsgOp, CsgPart, CsgTree, MAX_DEPTH, MAX_LEAVES, PartShape};
 
 use std::sync::atomic::{AtomicU64, Ordering};

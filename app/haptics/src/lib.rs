@@ -30,6 +30,7 @@
 #![allow(non_snake_case)]
 
 mod algorithm;
+mod balls;
 mod capsule;
 mod chart;
 mod classic_god_object;
@@ -59,6 +60,7 @@ pub mod nurbs;
 pub mod passivity;
 mod plane;
 mod quartic;
+mod rolling;
 mod scaled;
 mod shading;
 mod shape;

@@ -25,7 +25,7 @@
 mod build;
 mod bvh;
 mod cone;
-mod draw;
+pub(crate) mod draw;
 mod error;
 mod face;
 mod facing;
@@ -50,13 +50,14 @@ mod winding;
 
 #[cfg(test)]
 pub(crate) use bvh::POPPED;
+pub(crate) use bvh::TooMany;
 pub use bvh::{Bvh, Hit, Linear, Nearest, Triangles};
 pub use error::MeshError;
 pub use face::{Face, Link};
 pub use mesh_cone::{Beginning, MeshCone};
 pub use normals::{SHARPEST_CREASE_RAD, VertexNormals};
 pub use report::{Finding, MeshReport};
-pub(crate) use rolling::{RollingCone, Share};
+pub(crate) use rolling::BallOnMesh;
 pub use soup::TriangleSoup;
 pub use uv::CornerUv;
 pub use walk::MAX_FEATURE_CHANGES;

@@ -87,8 +87,7 @@ impl Shape {
         match self {
             Self::Form(form) => is_point || form.grown(finger_radius_m).is_some(),
             Self::Mesh(_) => true,
-            Self::Csg(_) => is_point,
-            Self::Nurbs(_) => finger_radius_m >= 0.0,
+            Self::Csg(_) | Self::Nurbs(_) => finger_radius_m >= 0.0,
             Self::Own(surface) => is_point || surface.show_grown(finger_radius_m, &mut |_| {}),
         }
     }

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use crate::contact::Contact;
 use crate::entity::Entity;
 use crate::frame::{point_into_world, vector_into_world};
-use crate::mesh::Share;
+use crate::rolling::Share;
 
 /// One of the points at which a finger touches an entity, in the world frame.
 #[derive(Debug, Clone, Copy, PartialEq)]

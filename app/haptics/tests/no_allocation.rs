@@ -90,6 +90,31 @@ fn no_tree_of_shapes_makes_a_step_allocate() {
 }
 
 #[test]
+fn a_ball_on_a_tree_of_shapes_never_allocates() {
+    for tree in trees::all() {
+        for radius_m in [1e-3, 6e-3] {
+            let entities = [trees::touchable(&tree.tree, stiction())];
+            let mut finger = Finger::new(radius_m, 1).unwrap();
+            let mut noise = Noise(8);
+            let (mut hip, mut touched) = (Vector3::y(), 0);
+            let before = CALLS.get();
+            for i in 0..5_000u32 {
+                if i.is_multiple_of(100) {
+                    finger.forget(0);
+                }
+                // Fast and slow by turns.
+                let step = if i / 500 % 2 == 0 { 0.1 } else { 2e-3 };
+                hip = hip * (1.0 - 0.1 * step) + noise.vector(step * tree.size_m);
+                finger.step(&entities, &hip, DT);
+                touched += finger.touch_points(&entities, 0).as_slice().len().min(1);
+            }
+            assert_eq!(CALLS.get() - before, 0, "{}", tree.name);
+            assert!(touched > 100, "{}: {touched}", tree.name);
+        }
+    }
+}
+
+#[test]
 fn a_step_on_rational_patches_never_allocates() {
     let solid = std::sync::Arc::new(Nurbs::build(&nurbs::make::vase(0.05)).unwrap().0);
     let sheet = std::sync::Arc::new(Nurbs::build(&nurbs::make::sheet(6, 0.05, 0.002)).unwrap().0);

@@ -126,12 +126,12 @@ impl Corner {
     }
 
     /// From bits of the corner to bits of the neighbourhood.
-    fn spread(&self, cell: usize) -> Sides {
+    pub(super) fn spread(&self, cell: usize) -> Sides {
         (0..self.count).fold(0, |sides, i| sides | (cell >> i & 1) << self.indices[i])
     }
 
     /// The normal of a patch into a cell: out of the patch, or into it where the cell is inside of it.
-    fn outward(&self, i: usize, side: usize) -> Vector3<f64> {
+    pub(super) fn outward(&self, i: usize, side: usize) -> Vector3<f64> {
         if side & 1 == 1 { -self.normals_B[i] } else { self.normals_B[i] }
     }
 
@@ -196,7 +196,7 @@ impl Corner {
 
     /// The point of a cell nearest to the HIP, and the planes that it lies on.
     #[inline]
-    fn nearest(&self, cell: usize, to_hip_B: &Vector3<f64>) -> (Vector3<f64>, usize) {
+    pub(super) fn nearest(&self, cell: usize, to_hip_B: &Vector3<f64>) -> (Vector3<f64>, usize) {
         let mut normals_B = self.normals_B;
         for (i, normal_B) in normals_B.iter_mut().enumerate().take(self.count) {
             *normal_B = self.outward(i, cell >> i);

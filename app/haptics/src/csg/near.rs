@@ -88,6 +88,11 @@ impl Neighbourhood {
         (gather(csg, anchor_B, smallest_m, true).unwrap_or(Self::nowhere(anchor_B)), true)
     }
 
+    /// All that matters within exactly this radius; `None` where that would be more than eight patches.
+    pub(super) fn exactly(csg: &Csg, anchor_B: &Vector3<f64>, radius_m: f64) -> Option<Self> {
+        gather(csg, anchor_B, radius_m, false).ok()
+    }
+
     fn nowhere(anchor_B: &Vector3<f64>) -> Self {
         Self { anchor_B: *anchor_B, radius_m: 0.0, patches: [0; MAX_NEAR], count: 0, table: NOTHING }
     }

@@ -71,6 +71,35 @@ impl Patch {
         matches!(self, Self::Plane { .. })
     }
 
+    /// Whether one of its points is nearest to a point inside of it and all others lead there downhill: it is not scaled
+    /// by different factors.
+    pub(crate) fn is_round(&self) -> bool {
+        match self {
+            Self::Plane { .. } => true,
+            Self::Curved(curved) => {
+                let scale_m = curved.turn_LB.column(0).norm_squared();
+                let skew = curved.turn_LB.tr_mul(&curved.turn_LB) - Matrix3::identity() * scale_m;
+                skew.amax() <= SKEW * scale_m
+            }
+        }
+    }
+
+    /// Whether it meets another patch in one circle or line, of which one point is nearest wherever one starts: planes and
+    /// balls each other, planes what they cut straight across.
+    pub(crate) fn meets_in_one_circle(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Plane { .. }, Self::Plane { .. }) => true,
+            (Self::Plane { normal_B, .. }, Self::Curved(curved))
+            | (Self::Curved(curved), Self::Plane { normal_B, .. }) => {
+                other.is_round() && self.is_round() && curved.is_cut_in_one_circle(normal_B)
+            }
+            (Self::Curved(a), Self::Curved(b)) => {
+                let is_ball = |curved: &Curved| matches!(curved.kind, Kind::Ball { .. });
+                self.is_round() && other.is_round() && is_ball(a) && is_ball(b)
+            }
+        }
+    }
+
     /// Whether heights are distances, everywhere: it is not scaled.
     #[inline(always)]
     pub(crate) fn is_distance(&self) -> bool {
@@ -126,6 +155,16 @@ impl Patch {
         match self {
             Self::Plane { .. } => f64::INFINITY,
             Self::Curved(curved) => curved.smallest_radius_m(at_B),
+        }
+    }
+
+    /// The tip of a cone, if the way between two points leads across its axis.
+    pub(crate) fn tip_between(&self, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<Vector3<f64>> {
+        match self {
+            Self::Curved(curved) if matches!(curved.kind, Kind::Nappe { .. }) => {
+                curved.tip_between(from_B, to_B)
+            }
+            _ => None,
         }
     }
 
@@ -237,6 +276,27 @@ impl Curved {
             / (self.stretch * self.stretch)
     }
 
+    fn is_cut_in_one_circle(&self, normal_B: &Vector3<f64>) -> bool {
+        match self.kind {
+            Kind::Ball { .. } => true,
+            Kind::Ring { .. } => false,
+            Kind::Tube { .. } | Kind::Nappe { .. } | Kind::Pill { .. } => {
+                let normal_L = self.turn_LB * normal_B;
+                normal_L.x.hypot(normal_L.z) <= SKEW * normal_L.norm()
+            }
+        }
+    }
+
+    fn tip_between(&self, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<Vector3<f64>> {
+        let Kind::Nappe { normal_y, offset_m, .. } = self.kind else { return None };
+        let (from_L, to_L) = (self.local(from_B), self.local(to_B));
+        if from_L.x * to_L.x + from_L.z * to_L.z > 0.0 {
+            return None;
+        }
+        let tip_L = Vector3::y() * (offset_m / normal_y) - self.shift_L;
+        self.turn_LB.try_inverse().map(|turn_BL| turn_BL * tip_L)
+    }
+
     fn least_stretch(&self) -> f64 {
         // The columns of a map that scales first and turns then, or the other way round, are at least as long.
         let columns = self.turn_LB.column_iter().map(|column| column.norm());
@@ -276,6 +336,9 @@ impl Curved {
 
 /// A map that changes lengths by less is a turn.
 pub(super) const RIGID: f64 = 1e-14;
+
+/// Of maps: what rounding may make different of equal factors.
+const SKEW: f64 = 1e-9;
 
 #[cfg(test)]
 mod tests {

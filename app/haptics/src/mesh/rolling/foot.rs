@@ -16,7 +16,7 @@ use crate::surface::Feature;
 
 /// A point of a mesh, as seen from another one.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Foot {
+pub(crate) struct Foot {
     pub(super) face: u32,
     pub(super) feature: Feature,
     /// Which edge or corner of the face.

@@ -15,7 +15,7 @@ use crate::mesh::Mesh;
 
 /// Corners, axis by axis.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Vicinity {
+pub(crate) struct Vicinity {
     centre_B: Vector3<f64>,
     /// Balls that are as near to the centre are spoken for \[m\]; negative while none are.
     margin_m: f64,

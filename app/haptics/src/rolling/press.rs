@@ -12,7 +12,7 @@ use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 pub(super) const MOST: usize = 4;
 
 /// In front: `normal . x >= offset`.
-pub(super) type Plane = (Vector3<f64>, f64);
+pub(crate) type Plane = (Vector3<f64>, f64);
 
 /// The answer.
 #[derive(Debug, Clone, Copy)]

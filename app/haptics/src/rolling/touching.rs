@@ -1,0 +1,160 @@
+//! A ball in contact: held by friction, drawn on by the HIP, or round the corner and let go.
+//!
+//! Cost: a look while it is held, else a search for rest ([`super::seek`]).
+
+use std::cell::Cell;
+
+use nalgebra::Vector3;
+
+use super::ball::Ball;
+use super::ground::{Foot, Ground};
+use super::seek::{Rested, seek};
+use crate::algorithm::Touch;
+use crate::friction::Friction;
+use crate::friction_cone::ConeInput;
+use crate::friction_law::FrictionState;
+use crate::grip::Grip;
+use crate::mesh::draw::{Against, Frictionless};
+use crate::surface::{Feature, SurfacePoint, direction_or_up};
+
+/// A contact.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Touching<F> {
+    pub(super) ball: Ball<F>,
+    grip: Grip,
+    /// The frictionless ball on its way to a HIP that is outside.
+    scout: Option<Ball<F>>,
+    /// Here the HIP is where no ball can be.
+    tight: Room,
+    /// There, it is deeper inside than the radius.
+    is_inside: bool,
+    /// What was answered last: tangential spring \[m\], sum of the loads \[m\] and stiffness \[N/m\].
+    pub(super) answered: (Vector3<f64>, f64, f64),
+}
+
+/// A ball of which something is known.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Room {
+    pub(super) centre_B: Vector3<f64>,
+    pub(super) radius_m: f64,
+}
+
+impl Room {
+    pub(super) fn has(&self, point_B: &Vector3<f64>, at_least_m: f64) -> bool {
+        let reach_m = self.radius_m - at_least_m;
+        reach_m > 0.0 && (point_B - self.centre_B).norm_squared() < reach_m * reach_m
+    }
+}
+
+impl<F: Foot> Touching<F> {
+    pub(super) fn new(ball: Ball<F>) -> Self {
+        Self {
+            ball,
+            grip: Grip::default(),
+            scout: None,
+            tight: Room::default(),
+            is_inside: false,
+            answered: Default::default(),
+        }
+    }
+
+    pub(super) fn update<G: Ground<Foot = F>>(
+        &mut self,
+        ground: &G,
+        friction: &Friction,
+        vicinity: &mut G::Vicinity,
+        input: &ConeInput,
+    ) -> Option<Touch> {
+        if matches!(friction, Friction::None) {
+            self.grip.state = FrictionState::Slip;
+            let rested = seek(ground, &self.ball, || Frictionless, true, vicinity, input)?;
+            return Some(self.answer(&rested, input));
+        }
+        if self.is_out(ground, vicinity, input) {
+            return None;
+        }
+        let look = self.ball.look(ground, input);
+        if look.is_free {
+            let rested = seek(ground, &self.ball, || Frictionless, true, vicinity, input)?;
+            return Some(self.answer(&rested, input));
+        }
+        let pull = self.grip.begin_tick(&look.view, input);
+        if let Some(tangential_B) = self.grip.hold(friction, &look.view, &pull, input) {
+            return Some(self.answer(&Rested { ball: self.ball, look, tangential_B }, input));
+        }
+        let memory = &self.grip.memory;
+        let against = || Against { friction, memory, pull: &pull, input, slides_with: Cell::new(None) };
+        let mut rested = seek(ground, &self.ball, against, false, vicinity, input)?;
+        rested.tangential_B +=
+            self.grip.drag(friction, &rested.tangential_B, &rested.look.view, &pull, input);
+        Some(self.answer(&rested, input))
+    }
+
+    /// Whether the finger is round the corner, whatever friction says.
+    fn is_out<G: Ground<Foot = F>>(
+        &mut self,
+        ground: &G,
+        vicinity: &mut G::Vicinity,
+        input: &ConeInput,
+    ) -> bool {
+        let (hip_B, radius_m) = (input.hip_B, self.ball.radius_m);
+        if self.tight.has(&hip_B, 0.0) {
+            return false;
+        }
+        let Ok(near) = ground.nearest_within(&hip_B, radius_m) else {
+            // As far as can be told.
+            return false;
+        };
+        let tight_m = match near {
+            Some((_, distance_m)) => radius_m - distance_m,
+            None => self.depth_inside(ground, &hip_B),
+        };
+        self.is_inside = tight_m > radius_m;
+        if tight_m > 0.0 {
+            self.tight = Room { centre_B: hip_B, radius_m: tight_m };
+            self.scout = None;
+            return false;
+        }
+        let scout = self.scout.unwrap_or(self.ball);
+        match seek(ground, &scout, || Frictionless, true, vicinity, input) {
+            Some(rested) => {
+                self.scout = Some(rested.ball);
+                false
+            }
+            None => true,
+        }
+    }
+
+    /// A lower bound of how far a HIP, which has room around it, would have to go to be outside; 0 if it is.
+    fn depth_inside(&self, ground: &impl Ground, hip_B: &Vector3<f64>) -> f64 {
+        let radius_m = self.ball.radius_m;
+        // All that the hierarchy can say cheaply, and what is known.
+        let clear_m = ground.clearance_m(hip_B, ground.extent_m()).max(ground.seen_m(radius_m));
+        // Two balls without a face in them that overlap are on the same side.
+        let was_inside =
+            self.is_inside && (hip_B - self.tight.centre_B).norm() < clear_m + self.tight.radius_m;
+        if was_inside || ground.is_inside(hip_B) { clear_m } else { 0.0 }
+    }
+
+    fn answer(&mut self, rested: &Rested<F>, input: &ConeInput) -> Touch {
+        let Rested { ball, look, tangential_B } = rested;
+        self.ball = *ball;
+        let (feature, piece) =
+            ball.primary().map_or((Feature::Face, 0), |rest| (rest.foot.feature(), rest.foot.piece()));
+        let k = input.stiffness_n_per_m;
+        let is_pressed = look.view.load_m > 0.0;
+        let tangential_B = ball.free_part(tangential_B);
+        let spring_B = look.normal_spring_B + tangential_B;
+        self.answered = (tangential_B, look.view.load_m, k);
+        // In flight it has no surface.
+        let is_in_flight = ball.rests().is_empty();
+        let normal_B =
+            if is_in_flight { direction_or_up(&(ball.centre_B - input.hip_B)) } else { look.view.normal_B };
+        Touch {
+            god_object: SurfacePoint { point_B: ball.centre_B, normal_B, feature, piece },
+            force_on_user_B: if is_pressed { spring_B * k } else { Vector3::zeros() },
+            normal_force_n: if is_pressed { k * look.normal_spring_B.norm() } else { 0.0 },
+            friction: self.grip.state,
+        }
+    }
+}
