@@ -111,6 +111,11 @@ impl FastStep {
         Ok(self)
     }
 
+    /// All entities.
+    pub fn entities(&self) -> &[Entity] {
+        &self.entities
+    }
+
     /// The entities that move, as the last tick began.
     pub fn bodies(&self) -> &[BodyRow] {
         self.objects.as_ref().map_or(&[], Objects::rows)

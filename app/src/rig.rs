@@ -105,7 +105,7 @@ impl Rig {
             period_ns,
         };
         rig.bases = rig.place_bases()?;
-        rig.fast_step()?;
+        rig.tell_what_passes(rig.fast_step()?.entities());
         if let HandMode::Impedance(simulated) = &rig.hand_mode {
             // What the driver would find wrong is found here, before anything is started, and told in words of what
             // was asked for: the driver knows of files only.

@@ -222,3 +222,52 @@ fn what_leaves_the_world_is_told_by_name_and_stands_still() {
     let last = rocket.last().unwrap();
     assert!((last.position.y - 100.0).abs() < 0.05 && last.velocity == V::zeros(), "{last:?}");
 }
+
+#[test]
+fn what_passes_through_something_because_nobody_finds_where_they_touch_is_told() {
+    let place = Workplace::new();
+    place.write(
+        "scene.toml",
+        "[[finger]]\n[[entity]]\nname = \"die\"\nshape = { kind = \"box\", size_m = [0.1, 0.1, 0.1] }\nmass_kg = 1\n\
+         [[entity]]\nname = \"tray\"\nshape = { kind = \"csg\", op = \"union\", children = [\
+         { shape = { kind = \"sphere\", radius_m = 0.1 } }, { shape = { kind = \"box\", size_m = [1, 0.1, 1] } }] }\n",
+    );
+    let said = place.run(["run", "scene.toml", "--clock", "virtual", "--headless"]);
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    assert!(said.err.contains("die (box) passes through tray (csg)"), "{}", said.err);
+}
+
+#[test]
+fn all_kinds_of_things_come_to_rest_on_a_table_and_weigh_what_they_weigh() {
+    let kinds = [
+        ("ball", "{ kind = \"sphere\", radius_m = 0.02 }"),
+        ("block", "{ kind = \"box\", size_m = [0.04, 0.03, 0.05] }"),
+        ("can", "{ kind = \"cylinder\", radius_m = 0.02, length_m = 0.05 }"),
+        ("cone", "{ kind = \"cone\", radius_bottom_m = 0.025, radius_top_m = 0.0, length_m = 0.05 }"),
+        ("pill", "{ kind = \"capsule\", radius_m = 0.015, length_m = 0.03 }"),
+        ("ring", "{ kind = \"torus\", ring_radius_m = 0.025, tube_radius_m = 0.008 }"),
+    ];
+    let mut scene = String::from(
+        "[[finger]]\n[[entity]]\nname = \"table\"\nshape = { kind = \"plane\", normal = [0, 1, 0], offset_m = 0 }\n\
+         stiffness_n_per_m = 5000\ndamping_n_s_per_m = 5\nfriction = { model = \"coulomb\", mu = 0.5 }\n",
+    );
+    for (place, (name, shape)) in kinds.iter().enumerate() {
+        let _ = write!(
+            scene,
+            "[[entity]]\nname = \"{name}\"\nshape = {shape}\nposition_m = [{}, 0.03, 0]\ndensity_kg_m3 = 1000\n\
+             stiffness_n_per_m = 2000\nfriction = {{ model = \"coulomb\", mu = 0.5 }}\n",
+            0.15 * place as f64
+        );
+    }
+    let table = played(&scene, &alone(3.0));
+    // Half of their height, less a weight on as many springs.
+    for (name, height) in
+        [("ball", 0.02), ("block", 0.015), ("can", 0.025), ("cone", 0.025), ("pill", 0.03), ("ring", 0.008)]
+    {
+        let body = *table.body(name).last().unwrap();
+        assert!(body.velocity.norm() < 1e-6 && body.angular_velocity.norm() < 1e-4, "{name}: {body:?}");
+        // 1000 kg/m^3 make 20 to 63 g: 0.2 to 0.6 N on one to eight springs of 1430 N/m.
+        let sunk = height - body.position.y;
+        assert!(sunk > 1e-5 && sunk < 4.5e-4, "{name}: {sunk}");
+    }
+}

@@ -101,9 +101,9 @@ fn the_study_of_integrators_writes_tables_and_pictures_and_says_what_is_wrong_wi
         assert!(said.out.contains(word), "no `{word}` in:\n{}", said.out);
     }
     for name in ["integrators.svg", "integrators.png"] {
-        assert!(place.path(&format!("a/{name}")).exists(), "{name}");
+        assert!(place.path(format!("a/{name}")).exists(), "{name}");
     }
-    let read = |name: &str| std::fs::read_to_string(place.path(&format!("a/{name}"))).expect(name);
+    let read = |name: &str| std::fs::read_to_string(place.path(format!("a/{name}"))).expect(name);
     assert_eq!(read("integrators-spin.csv").lines().count(), 1 + 4);
     let stays = read("integrators-stiffness.csv");
     // The default has no limit where Euler's method ends near 2 m / dt^2.

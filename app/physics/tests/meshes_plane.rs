@@ -129,7 +129,7 @@ fn a_star_and_an_angle_come_to_rest_on_the_points_of_their_hull() {
     ] {
         let seed_f = f64::from(seed);
         let turn = Vector3::new((3.1 * seed_f).sin(), (1.7 * seed_f).cos(), (2.3 * seed_f).sin()) * 1.5;
-        let world = settled(soup, turn, 0.1, 6000);
+        let world = settled(soup, turn, 0.1, 12_000);
         assert!(is_at_rest(&world), "{seed}: {:?}", world.body());
         // It stands on at least three points, none deeper than its weight presses a spring.
         let depths = depths(&world);

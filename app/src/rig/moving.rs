@@ -1,7 +1,8 @@
 //! From what a scene says of entities that move to bodies.
 
 use haptics::{Entity, ParameterError};
-use physics::collide::can_move;
+use io_driver::say::say;
+use physics::collide::{can_move, is_collidable};
 use physics::{
     Attachment, Body, BodyError, FingerSettings, HeldOrientation, Integrator, MassProperties, Response,
     Settings, SoftFinger, TorsionModel,
@@ -67,6 +68,30 @@ impl Rig {
         let attachment = spec.attach.as_ref().map(attachment).transpose().map_err(refused)?;
         let settings = FingerSettings { soft, attachment };
         Ok(HandFinger { settings, button: spec.attach.map(|attach| attach.button) })
+    }
+
+    /// Says which entities pass through each other, because nobody finds where they touch.
+    pub(super) fn tell_what_passes(&self, entities: &[Entity]) {
+        for (a, ..) in self.moving() {
+            let passes = |b: usize| {
+                let is_body = self.scene.entities[b].motion.is_some();
+                let [a, b] = [a, b].map(|at| &entities[at].shape);
+                !(is_collidable(a, b) || is_body && is_collidable(b, a))
+            };
+            let through: Vec<String> = (0..entities.len())
+                .filter(|&b| b != a && passes(b))
+                .map(|b| format!("{} ({})", self.scene.entities[b].name, self.scene.entities[b].shape.kind()))
+                .collect();
+            if !through.is_empty() {
+                let spec = &self.scene.entities[a];
+                say(format_args!(
+                    "phantom3: {} ({}) passes through {}: contact points between such shapes are not found",
+                    spec.name,
+                    spec.shape.kind(),
+                    through.join(", ")
+                ));
+            }
+        }
     }
 
     fn no_body(&self, spec: &SceneEntity, source: BodyError) -> RigError {
@@ -146,17 +171,19 @@ fn attachment(spec: &AttachSpec) -> Result<Attachment, ParameterError> {
 }
 
 fn body(entity: &Entity, motion: &MotionSpec) -> Result<Body, BodyError> {
-    let mass = match motion.mass {
-        MassSpec::Mass(mass_kg) => MassProperties::of_shape(&entity.shape, mass_kg),
-        MassSpec::Density(density) => MassProperties::of_density(&entity.shape, density),
-    }?;
-    let mass = match motion.inertia_kg_m2 {
-        Some(moments) => mass.with_inertia(moments)?,
-        None => mass,
-    };
-    let mass = match motion.centre_of_mass_m {
-        Some(centre_m) => mass.with_centre(centre_m.into()),
-        None => mass,
+    let mass = match (motion.mass, motion.inertia_kg_m2, motion.centre_of_mass_m) {
+        // What is measured needs no volume.
+        (MassSpec::Mass(mass_kg), Some(moments), Some(centre_m)) => {
+            MassProperties::given(mass_kg, centre_m.into(), moments)?
+        }
+        (mass, moments, centre_m) => {
+            let of_shape = match mass {
+                MassSpec::Mass(mass_kg) => MassProperties::of_shape(&entity.shape, mass_kg),
+                MassSpec::Density(density) => MassProperties::of_density(&entity.shape, density),
+            }?;
+            let turned = moments.map_or(Ok(of_shape), |moments| of_shape.with_inertia(moments))?;
+            centre_m.map_or(turned, |centre_m| turned.with_centre(centre_m.into()))
+        }
     };
     let body = Body::at_rest(mass, &entity.X_WB);
     let body = if motion.rotation_locked { body.with_rotation_locked() } else { body };
