@@ -210,10 +210,8 @@ impl Ground for CsgGround<'_> {
         (nearest_B.unwrap_or(foot.point_B) - centre_B).norm()
     }
 
-    fn followed_m(&self, foot: &Foot, centre_B: &Vector3<f64>) -> f64 {
-        // A patch goes on where its boundary has ended: a ball that came as near to it there would touch nothing.
-        let there = foot.followed(self, centre_B).unwrap_or(*foot);
-        (there.point_B - centre_B).norm()
+    fn followed(&self, foot: &Foot, centre_B: &Vector3<f64>) -> Foot {
+        foot.followed(self, centre_B).unwrap_or(*foot)
     }
 
     #[inline]

@@ -170,6 +170,12 @@ impl<F: Foot> Ball<F> {
         !self.rests().iter().any(|rest| is_other(&rest.foot))
     }
 
+    /// Whether it rests on this foot.
+    pub(super) fn is_at(&self, foot: &F) -> bool {
+        let near_m = SAME_FOOT * self.radius_m;
+        self.rests().iter().any(|rest| (rest.foot.point_B() - foot.point_B()).amax() <= near_m)
+    }
+
     /// Takes note of a feature that it touches.
     pub(super) fn add(&mut self, ground: &impl Ground<Foot = F>, foot: &F) {
         let mut rest = Self::in_free_space(self.centre_B, self.radius_m).rests[0];
