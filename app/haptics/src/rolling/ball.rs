@@ -182,8 +182,7 @@ impl<F: Foot> Ball<F> {
         rest.foot = *foot;
         let is_alone = self.is_alone_with(&rest.foot);
         rest.walk(ground, &self.centre_B, self.radius_m, is_alone);
-        let near_m = SAME_FOOT * self.radius_m;
-        if self.rests().iter().any(|other| (other.foot.point_B() - rest.foot.point_B()).amax() <= near_m) {
+        if self.is_at(&rest.foot) {
             return;
         }
         // No more than three hold it: of four, one is not pressed.

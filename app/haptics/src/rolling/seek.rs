@@ -168,7 +168,7 @@ fn seek_with<G: Ground>(
     {
         return Sought::Unsure;
     }
-    if G::IS_BENT && ball.centre_B != start.centre_B && !sees_all_that_holds(&mut ball, &sees, ground, input) {
+    if G::IS_BENT && !sees_all_that_holds(&mut ball, &sees, ground, input) {
         if !is_careful {
             return Sought::Unsure;
         }
@@ -188,7 +188,7 @@ fn seek_with<G: Ground>(
 /// Whether it touches all that would carry a load if the tick ended here.
 fn sees_all_that_holds<G: Ground>(
     ball: &mut Ball<G::Foot>,
-    sees: &Option<(Look, nalgebra::Vector3<f64>)>,
+    sees: &Option<(Look, Vector3<f64>)>,
     ground: &G,
     input: &ConeInput,
 ) -> bool {
