@@ -77,12 +77,13 @@ fn a_ball_that_leaves_a_face_for_a_bore_leaves_no_load_on_the_face() {
     let entity = touchable(&bored_box().tree, Friction::coulomb(1.0).unwrap());
     let mut noise = Noise(3);
     let mut touched = 0;
-    for _ in 0..300 {
+    for _ in 0..2000 {
         let radius_m = noise.between(1.5e-3, 8e-3);
         let mut finger = finger(radius_m);
         let mut from = v(0.04, 0.04, 0.0);
-        for _ in 0..6 {
-            let to = v(noise.between(-0.05, 0.05), noise.between(0.0, 0.025), noise.between(-0.04, 0.04));
+        for _ in 0..8 {
+            let to =
+                v(noise.between(-0.055, 0.055), noise.between(-0.055, 0.055), noise.between(-0.055, 0.055));
             for i in 1..=25 {
                 let hip = from + (to - from) * (f64::from(i) / 25.0);
                 touched += u32::from(touches_at_the_radius(&mut finger, &entity, &hip, radius_m));
