@@ -210,6 +210,10 @@ impl Ground for CsgGround<'_> {
         (nearest_B.unwrap_or(foot.point_B) - centre_B).norm()
     }
 
+    fn followed(&self, foot: &Foot, centre_B: &Vector3<f64>) -> Foot {
+        foot.followed(self, centre_B).unwrap_or(*foot)
+    }
+
     #[inline]
     fn plane(&self, foot: &Foot, centre_B: &Vector3<f64>, radius_m: f64) -> Plane {
         foot.plane(self, centre_B, radius_m)

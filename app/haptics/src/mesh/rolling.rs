@@ -57,6 +57,11 @@ impl Ground for Mesh {
         Foot::on(self, foot.face, centre_B).squared_m2.sqrt()
     }
 
+    fn followed(&self, foot: &Foot, centre_B: &Vector3<f64>) -> Foot {
+        // A face ends where it does.
+        Foot::on(self, foot.face, centre_B)
+    }
+
     #[inline(always)]
     fn plane(&self, foot: &Foot, centre_B: &Vector3<f64>, radius_m: f64) -> Plane {
         foot.plane(self, centre_B, radius_m)

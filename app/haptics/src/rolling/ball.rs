@@ -170,14 +170,19 @@ impl<F: Foot> Ball<F> {
         !self.rests().iter().any(|rest| is_other(&rest.foot))
     }
 
+    /// Whether it rests on this foot.
+    pub(super) fn is_at(&self, foot: &F) -> bool {
+        let near_m = SAME_FOOT * self.radius_m;
+        self.rests().iter().any(|rest| (rest.foot.point_B() - foot.point_B()).amax() <= near_m)
+    }
+
     /// Takes note of a feature that it touches.
     pub(super) fn add(&mut self, ground: &impl Ground<Foot = F>, foot: &F) {
         let mut rest = Self::in_free_space(self.centre_B, self.radius_m).rests[0];
         rest.foot = *foot;
         let is_alone = self.is_alone_with(&rest.foot);
         rest.walk(ground, &self.centre_B, self.radius_m, is_alone);
-        let near_m = SAME_FOOT * self.radius_m;
-        if self.rests().iter().any(|other| (other.foot.point_B() - rest.foot.point_B()).amax() <= near_m) {
+        if self.is_at(&rest.foot) {
             return;
         }
         // No more than three hold it: of four, one is not pressed.

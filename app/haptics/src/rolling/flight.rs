@@ -157,8 +157,15 @@ fn touching<F: Foot>(
     (foot, is_alone): (&F, bool),
     end: f64,
 ) -> (f64, Ball<F>) {
-    // Of this feature alone: a walk from it might end at what the ball rests on.
-    let gap = |ball: &Ball<F>| ground.distance_m(foot, &ball.centre_B, is_alone) - ball.radius_m;
+    let gap = |ball: &Ball<F>| {
+        let there = ground.followed(foot, &ball.centre_B);
+        // A walk from it might end at what the ball rests on: then of this feature alone.
+        let distance_m = match ball.is_at(&there) {
+            true => ground.distance_m(foot, &ball.centre_B, is_alone),
+            false => (there.point_B() - ball.centre_B).norm(),
+        };
+        distance_m - ball.radius_m
+    };
     let start = path(0.0);
     let (mut low, mut high) = ((0.0, gap(&start)), (end, gap(&path(end))));
     if low.1.is_nan() || low.1 <= 0.0 || high.1.is_nan() || high.1 >= 0.0 {

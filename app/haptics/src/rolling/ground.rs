@@ -50,6 +50,9 @@ pub(crate) trait Ground {
     /// How far `centre_B` is from a foot's feature alone, or where that is not alone from the foot \[m\].
     fn distance_m(&self, foot: &Self::Foot, centre_B: &Vector3<f64>, is_alone: bool) -> f64;
 
+    /// Where one comes to from a foot, also beyond the end of its feature.
+    fn followed(&self, foot: &Self::Foot, centre_B: &Vector3<f64>) -> Self::Foot;
+
     /// Which way the centre lies from its foot, and `normal . x` of where it then is when it touches.
     fn plane(&self, foot: &Self::Foot, centre_B: &Vector3<f64>, radius_m: f64) -> Plane;
 

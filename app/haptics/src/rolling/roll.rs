@@ -187,6 +187,38 @@ impl<F: Foot> Ball<F> {
     }
 }
 
+impl<F: Foot> Ball<F> {
+    /// Whether every foot that carries a load is at the radius.
+    pub(super) fn touches_all_that_holds_it(&self) -> bool {
+        self.rests().iter().filter(|rest| rest.load_m > 0.0).all(|rest| self.touches(rest))
+    }
+
+    /// Where rounds ended before it had settled: on what presses on it, if there is room, else without what it has not come
+    /// to yet. A foot in the air must carry nothing.
+    #[inline(never)]
+    pub(super) fn on_what_holds_it(&self, ground: &impl Ground<Foot = F>) -> Self {
+        let mut settled = *self;
+        settled.settle(ground);
+        let is_there = settled.touches_all_that_holds_it() && settled.is_within_half_a_radius_of(self);
+        if is_there && matches!(settled.obstacle(ground), Ok(None)) {
+            return settled;
+        }
+        let mut ball = *self;
+        ball.count = 0;
+        for rest in self.rests().iter().filter(|rest| self.touches(rest)) {
+            ball.rests[ball.count] = *rest;
+            ball.count += 1;
+        }
+        // Of one that touches nothing the contact lives on: it comes there in the next tick.
+        if ball.count > 0 { ball } else { *self }
+    }
+
+    fn touches(&self, rest: &Rest<F>) -> bool {
+        let gap_m = (rest.foot.point_B() - self.centre_B).norm() - self.radius_m;
+        gap_m.abs() <= BAND * self.radius_m + 1e-12 * self.centre_B.amax()
+    }
+}
+
 /// What is farther than the radius by more than this share of it is not touched any longer.
 const BAND: f64 = 1e-7;
 const MOST_CORRECTIONS: usize = 6;

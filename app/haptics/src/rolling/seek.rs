@@ -117,6 +117,7 @@ fn seek_with<G: Ground>(
                 return Sought::Unsure;
             }
             match ball.obstacle_near(ground, vicinity, &start.centre_B) {
+                Ok(None) if G::IS_BENT && !ball.touches_all_that_holds_it() => return Sought::Unsure,
                 Ok(None) => return Sought::Rested(Rested { ball, look, tangential_B }),
                 Ok(Some(obstacle)) if pushes_left > 0 => {
                     pushes_left -= 1;
@@ -167,6 +168,12 @@ fn seek_with<G: Ground>(
     {
         return Sought::Unsure;
     }
+    if G::IS_BENT && !sees_all_that_holds(&mut ball, &sees, ground, input) {
+        if !is_careful {
+            return Sought::Unsure;
+        }
+        (ball, sees) = (ball.on_what_holds_it(ground), None);
+    }
     let (look, tangential_B) = match sees {
         Some(sees) => sees,
         None => {
@@ -176,6 +183,19 @@ fn seek_with<G: Ground>(
         }
     };
     Sought::Rested(Rested { ball, look, tangential_B })
+}
+
+/// Whether it touches all that would carry a load if the tick ended here.
+fn sees_all_that_holds<G: Ground>(
+    ball: &mut Ball<G::Foot>,
+    sees: &Option<(Look, Vector3<f64>)>,
+    ground: &G,
+    input: &ConeInput,
+) -> bool {
+    if sees.is_none() {
+        ball.look(ground, input);
+    }
+    ball.touches_all_that_holds_it()
 }
 
 const MOST_ROUNDS: u32 = 8;

@@ -54,17 +54,20 @@ impl Foot {
     }
 
     pub(super) fn plane(&self, ground: &CsgGround<'_>, centre_B: &Vector3<f64>, radius_m: f64) -> Plane {
-        if let (Feature::Face, [number]) = (self.feature, self.on.numbers())
+        let way_B = centre_B - self.point_B;
+        let way_m = way_B.norm();
+        let has_way = way_m > LEAST_WAY * radius_m;
+        let is_beside = way_B.dot(&self.normal_B) < (1.0 - BESIDE) * way_m;
+        let is_left_behind = is_beside && way_m > radius_m;
+        if !is_left_behind
+            && let (Feature::Face, [number]) = (self.feature, self.on.numbers())
             && let Some(Patch::Plane { normal_B, offset_m }) = ground.csg.patches.get(usize::from(*number))
         {
             // Known better than through the foot.
             let turned = self.normal_B.dot(normal_B).signum();
             return (self.normal_B, turned * offset_m + radius_m);
         }
-        let way_B = centre_B - self.point_B;
-        let way_m = way_B.norm();
-        let has_way = way_m > LEAST_WAY * radius_m;
-        let is_patch = matches!(self.feature, Feature::Face | Feature::Surface);
+        let is_patch = matches!(self.feature, Feature::Face | Feature::Surface) && !is_left_behind;
         let normal_B = if is_patch || !has_way { self.normal_B } else { way_B / way_m };
         (normal_B, normal_B.dot(&self.point_B) + radius_m)
     }
@@ -156,6 +159,8 @@ fn ended(
 }
 
 const MOST_STEPS: u32 = 6;
+/// One less the cosine between normal and way: of a foot that was left behind, the patch says nothing any more.
+const BESIDE: f64 = 1e-12;
 /// Shorter than this share of the radius, the way to the foot has no direction.
 const LEAST_WAY: f64 = 1e-9;
 /// Where the distance falls by less than this share of what it does on a plane, all around is about as near.
