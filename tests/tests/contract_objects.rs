@@ -183,9 +183,17 @@ fn a_run_with_objects_repeats_to_the_byte() {
 
 #[test]
 fn a_locked_body_never_turns_and_a_given_centre_of_mass_falls_straight() {
-    let scene = cube_on_table(0.0, 0.5, "rotation_locked = true");
-    let cube = played(&scene, &alone(0.5)).body("cube");
-    assert!(cube.iter().all(|cube| cube.orientation == UnitQuaternion::identity()));
+    // On a corner, where anything else would turn.
+    let falls = |rest: &str| {
+        let scene = cube_on_table(0.0, 0.5, rest)
+            .replace("orientation_wxyz = [1.0, 0.0, 0.0, 0.0]", "orientation_wxyz = [0.9, 0.3, 0.1, 0.3]");
+        assert!(scene.contains("0.9, 0.3"), "{scene}");
+        played(&scene, &alone(0.5)).body("cube")
+    };
+    let locked = falls("rotation_locked = true");
+    assert!(locked.iter().all(|cube| cube.orientation == locked[0].orientation), "{:?}", locked.last());
+    let free = falls("");
+    assert!(free.last().unwrap().orientation.angle_to(&free[0].orientation) > 0.1, "{:?}", free.last());
     // Thrown turning about z: its centre of mass, 10 mm from its middle, goes straight down.
     let scene = r#"
         [[finger]]
