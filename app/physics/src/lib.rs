@@ -27,6 +27,7 @@
 mod anchor;
 mod attach;
 mod body;
+mod broad_phase;
 pub mod collide;
 mod error;
 mod gimbal;
@@ -49,6 +50,7 @@ mod wrench;
 pub use anchor::Anchor;
 pub use attach::{Attachment, HeldOrientation};
 pub use body::Body;
+pub use broad_phase::{Aabb, BroadPhase};
 pub use error::BodyError;
 pub use grasp::{Grasp, GraspContact, GraspQuality};
 pub use grasp_axis::GraspAxis;

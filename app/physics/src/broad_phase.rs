@@ -1,0 +1,77 @@
+//! Which entities are near: a register with a box around each of them.
+//!
+//! Problem: ten thousand entities, three fingers, a tick of a millisecond: most entities must not be looked at at all
+//! (Melder ch. 7.2.10).
+//!
+//! Model: each bounded entity has a box in a [tree](tree) that is larger than needed by [`FAT_M`] and the way that it
+//! will go soon; it is put in anew only when the entity has left it. So what rests costs nothing, and who remembers what
+//! overlapped a box need not ask again before [`BroadPhase::version`] changes. Entities without an end are near everything.
+//! Invariants: no allocation after [`BroadPhase::new`]; an entity is inside its box.
+//! Cost: of an entity that moved a comparison, and a logarithmic change of the tree every few centimetres.
+
+mod aabb;
+mod tree;
+
+use haptics::Entity;
+use nalgebra::Vector3;
+
+pub use aabb::Aabb;
+use tree::Tree;
+
+/// All entities, by their indices.
+#[derive(Debug, Clone)]
+pub struct BroadPhase {
+    tree: Tree,
+    /// Of each entity, where its box is.
+    leaves: Box<[Option<u32>]>,
+    /// Entities without an end, in order.
+    boundless: Box<[u32]>,
+    version: u64,
+}
+
+/// A box is larger than its entity by this on each side \[m\].
+pub const FAT_M: f64 = 5e-3;
+/// And longer by the way of so many ticks.
+const TICKS_AHEAD: f64 = 16.0;
+
+impl BroadPhase {
+    /// Where the entities are now.
+    pub fn new(entities: &[Entity]) -> Self {
+        let mut tree = Tree::with_capacity(entities.len());
+        let put = |(index, entity)| tree.insert(index as u32, Aabb::of_entity(entity)?.grown(FAT_M));
+        let leaves: Box<[_]> = entities.iter().enumerate().map(put).collect();
+        let is_boundless = |index: &u32| leaves[*index as usize].is_none();
+        let boundless = (0..entities.len() as u32).filter(is_boundless).collect();
+        Self { tree, leaves, boundless, version: 0 }
+    }
+
+    /// Takes note of an entity that moved, and goes on by so much in a tick (m). Says whether its box changed.
+    pub fn moved(&mut self, index: usize, entity: &Entity, per_tick_W: &Vector3<f64>) -> bool {
+        let Some(Some(leaf)) = self.leaves.get(index).copied() else { return false };
+        let Some(tight) = Aabb::of_entity(entity) else { return false };
+        if self.tree.around(leaf).contains(&tight) {
+            return false;
+        }
+        self.tree.remove(leaf);
+        let fat = tight.grown(FAT_M).swept(&(per_tick_W * TICKS_AHEAD));
+        self.leaves[index] = self.tree.insert(index as u32, fat);
+        self.version += 1;
+        true
+    }
+
+    /// The box that an entity stays in until it is put into another one; `None` of one without an end.
+    pub fn around(&self, index: usize) -> Option<&Aabb> {
+        self.leaves.get(index).copied().flatten().map(|leaf| self.tree.around(leaf))
+    }
+
+    /// Visits all entities whose boxes overlap this one, and those without an end; in no order.
+    pub fn near(&self, around: &Aabb, mut found: impl FnMut(usize)) {
+        self.boundless.iter().for_each(|&index| found(index as usize));
+        self.tree.visit(around, |index| found(index as usize));
+    }
+
+    /// Changes whenever a box does.
+    pub fn version(&self) -> u64 {
+        self.version
+    }
+}
