@@ -184,7 +184,7 @@ impl Slot {
     }
 
     /// Whether it goes on from the last tick.
-    fn has_met(&self) -> bool {
+    pub(crate) fn has_met(&self) -> bool {
         self.contact.is_some() || self.hovers
     }
 

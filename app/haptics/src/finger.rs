@@ -1,10 +1,11 @@
-//! One finger against all entities: sums what its contacts render.
+//! One finger against the entities near it: sums what its contacts render.
 //!
-//! Model: every entity has its own slot with its own god-object, so that a finger in a corner feels
-//! both walls. Forces add. What a single line of a recording can show (entity, god-object, state)
+//! Model: every entity that is touched or near has its own slot with its own god-object, so that a finger in a corner
+//! feels both walls. Forces add. What a single line of a recording can show (entity, god-object, state)
 //! is that of the primary contact: the one with the largest force, the lowest index among equals.
 //!
-//! Frames: world. Cost: linear in the number of entities; slots are allocated once, in `new`.
+//! Frames: world. Cost: linear in the number of entities that are near, which somebody else finds; slots are allocated
+//! once, in `new`, and go from one entity to the next.
 //!
 //! A HIP that is not finite counts as lifted: zero force, all contacts end, and the next finite HIP
 //! is treated as the first. The god-object reported is then the last finite HIP.
@@ -17,6 +18,7 @@ use crate::error::{ParameterError, at_least_zero};
 use crate::frame::is_finite;
 use crate::friction_law::FrictionState;
 use crate::hip::Hip;
+use crate::slots::Slots;
 use crate::surface::Feature;
 use crate::touch_points::TouchPoints;
 
@@ -27,7 +29,7 @@ pub struct Finger {
     ramp_in_s: f64,
     previous_hip_W: Option<Vector3<f64>>,
     last_finite_hip_W: Vector3<f64>,
-    slots: Box<[Slot]>,
+    slots: Slots,
 }
 
 /// What a finger's friction does.
@@ -69,9 +71,9 @@ pub struct FingerOutput {
 }
 
 impl Finger {
-    /// A finger of this radius (0 for a point) for scenes of up to `capacity` entities.
+    /// A finger of this radius (0 for a point) that feels up to `capacity` entities at once.
     ///
-    /// Entities beyond the capacity are not felt. Errors: a radius not finite or negative.
+    /// Of more than that those of the highest indices are not felt. Errors: a radius not finite or negative.
     pub fn new(radius_m: f64, capacity: usize) -> Result<Self, ParameterError> {
         let radius_m = at_least_zero("radius_m", radius_m)?;
         Ok(Self {
@@ -79,7 +81,7 @@ impl Finger {
             ramp_in_s: RAMP_IN_S,
             previous_hip_W: None,
             last_finite_hip_W: Vector3::zeros(),
-            slots: (0..capacity).map(|_| Slot::new(radius_m)).collect(),
+            slots: Slots::new(radius_m, capacity),
         })
     }
 
@@ -109,9 +111,9 @@ impl Finger {
         self.previous_hip_W
     }
 
-    /// How many entities it has slots for.
+    /// How many entities it feels at once.
     pub fn capacity(&self) -> usize {
-        self.slots.len()
+        self.slots.capacity()
     }
 
     /// One tick: the HIP is where `hip` says, the entities at their current poses.
@@ -120,10 +122,30 @@ impl Finger {
     /// `dt_s` that is not positive leaves out damping and speed-dependent friction. `hip` may be a [`Hip`] with a
     /// velocity, which damping then goes by, or `&Vector3`, a position alone.
     pub fn step(&mut self, entities: &[Entity], hip: impl Into<Hip>, dt_s: f64) -> FingerOutput {
-        self.step_to(entities, &hip.into(), dt_s)
+        self.step_to(entities, 0..entities.len() as u32, &hip.into(), dt_s)
     }
 
-    fn step_to(&mut self, entities: &[Entity], hip: &Hip, dt_s: f64) -> FingerOutput {
+    /// As [`Self::step`], where only the entities of these numbers (in ascending order) are near enough to be felt.
+    ///
+    /// What is in contact is stepped whether or not it is among them. An entity is best named a few ticks before it can be
+    /// touched.
+    pub fn step_near(
+        &mut self,
+        entities: &[Entity],
+        near: &[u32],
+        hip: impl Into<Hip>,
+        dt_s: f64,
+    ) -> FingerOutput {
+        self.step_to(entities, near.iter().copied(), &hip.into(), dt_s)
+    }
+
+    fn step_to(
+        &mut self,
+        entities: &[Entity],
+        near: impl ExactSizeIterator<Item = u32> + Clone,
+        hip: &Hip,
+        dt_s: f64,
+    ) -> FingerOutput {
         let hip_W = &hip.position_W;
         if !is_finite(hip_W) {
             self.reset();
@@ -136,20 +158,19 @@ impl Finger {
             ramp_in_s: self.ramp_in_s,
             dt_s,
         };
+        self.slots.go_to(near, entities, &sweep);
         self.previous_hip_W = Some(*hip_W);
         self.last_finite_hip_W = *hip_W;
         let mut total = Total::default();
-        for (index, (slot, entity)) in self.slots.iter_mut().zip(entities).enumerate() {
+        for at in 0..self.slots.len() {
+            let (index, slot) = self.slots.at_mut(at);
+            let Some(entity) = entities.get(index) else { continue };
             if let Some(contact) = slot.step(index, entity, &sweep) {
                 total.add(contact);
                 if self.radius_m > 0.0 {
                     total.turn(slot, entity, self.radius_m);
                 }
             }
-        }
-        // Entities that are gone take their contacts along.
-        for slot in self.slots.iter_mut().skip(entities.len()) {
-            slot.vacate();
         }
         total.output(&self.slots, hip_W)
     }
@@ -161,14 +182,14 @@ impl Finger {
 
     /// The contact of the last tick with one entity.
     pub fn contact(&self, entity: usize) -> Option<&Contact> {
-        self.slots.get(entity)?.contact.as_ref()
+        self.slots.of(entity)?.contact.as_ref()
     }
 
     /// Where the finger touched this entity in the last tick, which must be as it was then.
     ///
     /// A ball in a groove or a corner touches it at two or three points; together they make the contact's force.
     pub fn touch_points(&self, entities: &[Entity], entity: usize) -> TouchPoints {
-        match (self.slots.get(entity), entities.get(entity)) {
+        match (self.slots.of(entity), entities.get(entity)) {
             (Some(slot), Some(entity)) => slot.touch_points(entity, self.radius_m),
             _ => TouchPoints::NONE,
         }
@@ -176,15 +197,13 @@ impl Finger {
 
     /// Ends the contact with one entity, because it is gone or another one has its index.
     pub fn forget(&mut self, entity: usize) {
-        if let Some(slot) = self.slots.get_mut(entity) {
-            slot.vacate();
-        }
+        self.slots.vacate(entity);
     }
 
     /// Ends all contacts and forgets where the finger was: the next step is a first one.
     pub fn reset(&mut self) {
         self.previous_hip_W = None;
-        self.slots.iter_mut().for_each(Slot::vacate);
+        self.slots.vacate_all();
     }
 }
 
@@ -214,8 +233,8 @@ impl Total {
         }
     }
 
-    fn output(&self, slots: &[Slot], hip_W: &Vector3<f64>) -> FingerOutput {
-        let primary = self.primary.and_then(|(_, entity)| slots[entity].contact.as_ref());
+    fn output(&self, slots: &Slots, hip_W: &Vector3<f64>) -> FingerOutput {
+        let primary = self.primary.and_then(|(_, entity)| slots.of(entity)?.contact.as_ref());
         let Some(primary) = primary else { return free(*hip_W) };
         // Finite forces can overflow in the sum; zero is the safe one.
         let force_on_user_W =

@@ -66,6 +66,7 @@ mod shading;
 mod shape;
 mod shared;
 mod slide;
+mod slots;
 mod sphere;
 mod surface;
 mod tangent_view;

@@ -128,6 +128,8 @@ pub(crate) struct TiedFinger<'b> {
     pub(crate) is_held: bool,
     /// By how much the gimbal turned in the tick.
     pub(crate) turn_W: Option<Vector3<f64>>,
+    /// Its body's place among those that are stepped.
+    pub(crate) place: usize,
     pub(crate) body: &'b Body,
     pub(crate) dt_s: f64,
 }
@@ -189,7 +191,7 @@ impl Bond {
         let hand_W = known_W.unwrap_or_else(|| (finger.hip_W - self.hip_W) / dt_s);
         let velocity_W = body.velocity_W + body.angular_velocity_W().cross(&arm_W);
         Row {
-            body: self.body,
+            body: finger.place,
             other: None,
             arms_W: [arm_W, Vector3::zeros()],
             normal_W: Vector3::y(),
@@ -215,7 +217,7 @@ impl Bond {
             let mut axis_W = Vector3::zeros();
             axis_W[axis] = 1.0;
             rows.push(Row::turning(
-                self.body,
+                finger.place,
                 axis_W,
                 Torsion {
                     rest_nm: -of.stiffness_nm_per_rad * off_W[axis],

@@ -30,7 +30,7 @@ pub struct BroadPhase {
 }
 
 /// A box is larger than its entity by this on each side \[m\].
-pub const FAT_M: f64 = 5e-3;
+const FAT_M: f64 = 5e-3;
 /// And longer by the way of so many ticks.
 const TICKS_AHEAD: f64 = 16.0;
 

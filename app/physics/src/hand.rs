@@ -14,6 +14,7 @@ use crate::attach::{Attachment, Bond, ROWS_OF_BOND, TiedFinger};
 use crate::body::Body;
 use crate::gimbal::Gimbal;
 use crate::grasp_axis::{AxisMemory, GraspAxis, Hung, Pad, opposed};
+use crate::roster::Roster;
 use crate::row::Row;
 use crate::soft_finger::SoftFinger;
 use crate::solver::Motion;
@@ -104,10 +105,9 @@ pub(crate) struct HandStart<'t> {
     /// Of each touch, its row.
     pub(crate) touch_rows: &'t [Option<usize>],
     pub(crate) entities: &'t [Entity],
-    /// Of each body, its entity.
-    pub(crate) bodies_are: &'t [usize],
+    pub(crate) roster: &'t Roster,
+    /// Those that are awake.
     pub(crate) bodies: &'t [Body],
-    pub(crate) is_parked: &'t [bool],
     pub(crate) gravity_W: Vector3<f64>,
     pub(crate) dt_s: f64,
 }
@@ -124,7 +124,13 @@ impl Hand {
 
     /// The most rows that it appends in a tick.
     pub(crate) fn most_rows(&self) -> usize {
-        self.fingers.len() * ROWS_OF_BOND + self.axes.len()
+        // No body is held by fewer than two.
+        self.fingers.len() * ROWS_OF_BOND + self.axes.len().min(self.fingers.len() * MAX_PADS)
+    }
+
+    /// Whether a finger holds it by a tie.
+    pub(crate) fn is_tied_to(&self, body: usize) -> bool {
+        self.fingers.iter().any(|finger| finger.bond.is_some_and(|bond| bond.body == body))
     }
 
     /// The grasp axis of a body in the last tick.
@@ -142,8 +148,8 @@ impl Hand {
             finger.turn_W = finger.gimbal.turn_W(orientation);
             finger.pads.iter_mut().for_each(|pad| pad.row = None);
         }
-        for body in 0..start.bodies.len() {
-            self.grasp(start, body, rows);
+        for place in 0..start.bodies.len() {
+            self.grasp(start, place, rows);
         }
         for finger in &mut self.fingers {
             finger.pads.iter_mut().filter(|pad| pad.row.is_none()).for_each(|pad| pad.body = None);
@@ -152,12 +158,14 @@ impl Hand {
     }
 
     /// All that the fingers do to the turning of one body.
-    fn grasp(&mut self, start: &HandStart<'_>, body: usize, rows: &mut Vec<Row>) {
+    fn grasp(&mut self, start: &HandStart<'_>, place: usize, rows: &mut Vec<Row>) {
+        let body = start.roster.awake()[place];
+        let own = start.roster.entities[body];
         let mut pads = [Pad::default(); MAX_TOUCHES_OF_BODY];
         let mut at = [0; MAX_TOUCHES_OF_BODY];
         let mut count = 0;
         for (touch, row) in start.touches.iter().zip(start.touch_rows) {
-            let Some(row) = row.filter(|_| touch.entity == start.bodies_are[body]) else { continue };
+            let Some(row) = row.filter(|_| touch.entity == own) else { continue };
             let Some(finger) = self.fingers.get(touch.finger) else { continue };
             if count == MAX_TOUCHES_OF_BODY {
                 break;
@@ -171,17 +179,17 @@ impl Hand {
         }
         let pads = &pads[..count];
         let pair = opposed(pads);
-        for (place, pad) in pads.iter().enumerate() {
-            let partner = pair.and_then(|(i, j)| match place {
-                _ if place == i => Some(pads[j].finger),
-                _ if place == j => Some(pads[i].finger),
+        for (of, pad) in pads.iter().enumerate() {
+            let partner = pair.and_then(|(i, j)| match of {
+                _ if of == i => Some(pads[j].finger),
+                _ if of == j => Some(pads[i].finger),
                 _ => None,
             });
-            self.press(pad, partner, (body, &start.bodies[body]), at[place], rows);
+            self.press(pad, partner, (body, &start.bodies[place]), at[of], rows);
         }
         self.held[body] = pair.map(|(i, j)| axis_of(&pads[i], &pads[j]));
         match pair {
-            Some((i, j)) => self.turn_about_axis(start, body, [&pads[i], &pads[j]], rows),
+            Some((i, j)) => self.turn_about_axis(start, place, [&pads[i], &pads[j]], rows),
             None => self.axes[body].end(),
         }
     }
@@ -218,14 +226,8 @@ impl Hand {
     }
 
     /// What two pads that hold a body between them do about the line that joins them.
-    fn turn_about_axis(
-        &mut self,
-        start: &HandStart<'_>,
-        number: usize,
-        pads: [&Pad; 2],
-        rows: &mut Vec<Row>,
-    ) {
-        let body = &start.bodies[number];
+    fn turn_about_axis(&mut self, start: &HandStart<'_>, place: usize, pads: [&Pad; 2], rows: &mut Vec<Row>) {
+        let body = &start.bodies[place];
         let smaller = if pads[1].circle.area_m2() < pads[0].circle.area_m2() { pads[1] } else { pads[0] };
         let axis = axis_of(pads[0], pads[1]);
         let turns = pads.map(|pad| self.fingers[pad.finger].turn_W);
@@ -241,12 +243,12 @@ impl Hand {
             gimbals_W,
         };
         let soft = self.fingers[smaller.finger].settings.soft;
-        let memory = &mut self.axes[number];
+        let memory = &mut self.axes[start.roster.awake()[place]];
         memory.row = None;
         let Some(torsion) = memory.torsion(&axis, &soft, &smaller.circle, &hung) else { return };
         if rows.len() < rows.capacity() {
             memory.row = Some(rows.len());
-            rows.push(Row::turning(number, axis.axis_W, torsion));
+            rows.push(Row::turning(place, axis.axis_W, torsion));
         }
     }
 
@@ -260,10 +262,12 @@ impl Hand {
             };
             if finger.bond.is_none() && tick.is_button_held {
                 let touched = touched_by(index, start);
-                finger.bond = touched.map(|body| Bond::begin(body, tick.hip_W, &start.bodies[body]));
+                finger.bond =
+                    touched.map(|(body, place)| Bond::begin(body, tick.hip_W, &start.bodies[place]));
             }
             // What does not move any more would hold the finger for ever.
-            let Some(bond) = finger.bond.as_mut().filter(|bond| !start.is_parked[bond.body]) else {
+            let tied = finger.bond.as_mut().and_then(|bond| Some((start.roster.place(bond.body)?, bond)));
+            let Some((place, bond)) = tied else {
                 finger.bond = None;
                 continue;
             };
@@ -272,7 +276,8 @@ impl Hand {
                 velocity_W: tick.hip_velocity_W,
                 is_held: tick.is_button_held,
                 turn_W: finger.turn_W,
-                body: &start.bodies[bond.body],
+                place,
+                body: &start.bodies[place],
                 dt_s: start.dt_s,
             };
             if !bond.gather(&attachment, &tied, rows) {
@@ -286,7 +291,7 @@ impl Hand {
         &mut self,
         rows: &[Row],
         motions: &[Motion],
-        bodies_are: &[usize],
+        roster: &Roster,
         ticks: &mut [FingerTick],
         dt_s: f64,
     ) {
@@ -299,21 +304,23 @@ impl Hand {
                 (force_W, torque_W) = bond.settle(rows);
             }
             for pad in &mut finger.pads {
-                let (Some(body), Some(row)) = (pad.body, pad.row.and_then(|row| rows.get(row))) else {
-                    continue;
-                };
-                let spin_rad_s = row.normal_W.dot(&motions[body].angular_velocity_W);
+                let Some(row) = pad.row.and_then(|row| rows.get(row)) else { continue };
+                let spin_rad_s = row.normal_W.dot(&motions[row.body].angular_velocity_W);
                 pad.twist.settle(&row.torsion, spin_rad_s, dt_s);
                 torque_W -= row.normal_W * row.torsion.torque_nm;
             }
             if let Some(tick) = ticks.get_mut(index) {
                 (tick.force_on_user_W, tick.torque_on_user_W) = (force_W, torque_W);
-                tick.attached = finger.bond.map(|bond| bodies_are[bond.body]);
+                tick.attached = finger.bond.map(|bond| roster.entities[bond.body]);
             }
         }
-        for (body, (memory, axis)) in self.axes.iter_mut().zip(&self.held).enumerate() {
+        if self.fingers.is_empty() {
+            return;
+        }
+        for &body in roster.awake() {
+            let (memory, axis) = (&mut self.axes[body], &self.held[body]);
             let (Some(row), Some(axis)) = (memory.row.and_then(|row| rows.get(row)), axis) else { continue };
-            let spin_rad_s = row.normal_W.dot(&motions[body].angular_velocity_W);
+            let spin_rad_s = row.normal_W.dot(&motions[row.body].angular_velocity_W);
             memory.settle(&row.torsion, spin_rad_s, dt_s);
             // Of both pads: each has half of it.
             for finger in axis.fingers {
@@ -325,8 +332,8 @@ impl Hand {
     }
 }
 
-/// The body that a finger presses hardest.
-fn touched_by(finger: usize, start: &HandStart<'_>) -> Option<usize> {
+/// The body that a finger presses hardest, and its place.
+fn touched_by(finger: usize, start: &HandStart<'_>) -> Option<(usize, usize)> {
     let mut hardest: Option<(f64, usize)> = None;
     for (touch, row) in start.touches.iter().zip(start.touch_rows) {
         let force_n = touch.force_on_user_W.norm();
@@ -334,8 +341,8 @@ fn touched_by(finger: usize, start: &HandStart<'_>) -> Option<usize> {
             hardest = Some((force_n, touch.entity));
         }
     }
-    let (_, entity) = hardest?;
-    start.bodies_are.iter().position(|&is| is == entity)
+    let place = start.roster.place_of_entity(hardest?.1)?;
+    Some((start.roster.awake()[place], place))
 }
 
 fn axis_of(one: &Pad, other: &Pad) -> GraspAxis {

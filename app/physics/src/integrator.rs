@@ -107,7 +107,7 @@ pub(crate) struct Gets {
     /// Nothing touches it.
     pub(crate) is_free: bool,
     /// Nothing moves it.
-    pub(crate) is_parked: bool,
+    pub(crate) is_fixed: bool,
     /// Where the stages of [`rk4`] led.
     pub(crate) staged: rk4::Staged,
 }

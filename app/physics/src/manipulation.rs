@@ -1,9 +1,15 @@
 //! One tick of all bodies: contact points, forces, residual force and torque, motion.
 
+mod hand_over;
+mod rest;
+
+pub use hand_over::Parcel;
+
 use haptics::Entity;
 use nalgebra::Vector3;
 
 use crate::body::Body;
+use crate::broad_phase::BroadPhase;
 use crate::collide::{self, MAX_POINTS, can_move};
 use crate::error::BodyError;
 use crate::grasp::{self, GraspQuality};
@@ -12,64 +18,47 @@ use crate::hand::{FingerSettings, FingerTick, Hand, HandStart};
 use crate::integrator::explicit::{self, Kept};
 use crate::integrator::rk4::Stages;
 use crate::integrator::{Gets, Integrator, Limits, mean_angular_velocity_W};
-use crate::pair::{Pair, Response, Start, Surfacing, fastest_point_m_s};
+use crate::pair::{Response, Start, fastest_point_m_s};
+use crate::pairs::{Key, Pairs, Who};
 use crate::restitution::Restitution;
+use crate::roster::{Roster, Standing};
 use crate::row::Row;
+use crate::settings::Settings;
+use crate::sleep::Sets;
 use crate::solver::{Motion, Solver};
 use crate::touch::Touch;
-
-/// What holds for all bodies.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
-    /// \[m/s^2\], in W.
-    pub gravity_W: Vector3<f64>,
-    /// How forces become motion.
-    pub integrator: Integrator,
-    /// How contacts between entities answer.
-    pub response: Response,
-    /// Nothing moves faster \[m/s\].
-    pub most_speed_m_s: f64,
-    /// Nothing turns faster \[rad/s\].
-    pub most_spin_rad_s: f64,
-    /// A body farther than this from the origin has left the world and is parked \[m\].
-    pub world_radius_m: f64,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            gravity_W: Vector3::new(0.0, -9.81, 0.0),
-            integrator: Integrator::default(),
-            response: Response::default(),
-            most_speed_m_s: 50.0,
-            most_spin_rad_s: 2000.0,
-            world_radius_m: 100.0,
-        }
-    }
-}
 
 /// All bodies, and what they remember of where they touch.
 #[derive(Debug, Clone)]
 pub struct Manipulation {
     settings: Settings,
-    bodies: Box<[Body]>,
-    /// Of each body, which entity it is.
-    entities: Box<[usize]>,
-    /// Of each body, whether it has left the world, or was lost to a number that is none.
-    is_parked: Box<[bool]>,
-    pairs: Box<[Pair]>,
+    roster: Roster,
+    broad_phase: BroadPhase,
+    pairs: Pairs,
+    /// Those that are awake, by their places: what a tick works on.
+    bodies: Vec<Body>,
+    /// Of each of them, which entity it is.
+    entities: Vec<usize>,
     rows: Vec<Row>,
     motions: Vec<Motion>,
     speeds_m_s: Vec<f64>,
     solver: Solver,
     hand: Hand,
     restitution: Restitution,
+    sets: Sets,
     /// The first so many rows are fingers'.
     touching: usize,
-    gets: Box<[Gets]>,
+    gets: Vec<Gets>,
     stages: Stages,
     fixed: Vec<Kept>,
     parked: Vec<Parked>,
+    ticks: u64,
+    /// The first of the sleeping bodies that are arriving from elsewhere.
+    arriving: Option<usize>,
+    /// Room to list bodies that are near something.
+    neighbours: Vec<u32>,
+    /// Whether bodies that somebody else steps are not there.
+    ignores_elsewhere: bool,
 }
 
 /// What a tick took and did.
@@ -81,6 +70,8 @@ pub struct Made {
     pub sweeps: usize,
     /// Bodies that were parked in this tick: the last so many of [`Manipulation::parked`].
     pub parked: usize,
+    /// Bodies that were stepped.
+    pub awake: usize,
 }
 
 /// A body that does not move any more.
@@ -105,6 +96,8 @@ pub enum Reason {
 const MAX_TOUCHES: usize = 64;
 /// The most contact points between entities in a tick; more are left out.
 const MAX_ROWS: usize = 2048;
+/// The most pairs of entities that are near each other; more are left out.
+const MAX_PAIRS: usize = 4096;
 
 impl Manipulation {
     /// The entities of these numbers are bodies; all others are fixed.
@@ -112,52 +105,50 @@ impl Manipulation {
     /// # Errors
     /// A body whose contact points nobody can find.
     pub fn new(entities: &[Entity], bodies: &[(usize, Body)], settings: Settings) -> Result<Self, BodyError> {
-        let body_of = |entity: usize| bodies.iter().position(|(of, _)| *of == entity);
-        let mut pairs = Vec::new();
-        for (number, &(a, _)) in bodies.iter().enumerate() {
-            if !can_move(&entities[a].shape) {
-                return Err(BodyError::NoContactPoints { shape: collide::name(&entities[a].shape) });
-            }
-            for b in 0..entities.len() {
-                let other = body_of(b);
-                // Of two bodies once.
-                if b != a && other.is_none_or(|other| other > number) {
-                    // Between two that move, springs answer: reflected velocities of many bodies at once are not found in
-                    // a tick's turns.
-                    let response = if other.is_some() { Response::Force } else { settings.response };
-                    let surfacing = Surfacing::between(&entities[a], &entities[b], response);
-                    pairs.push(Pair::new([a, b], (number, other), surfacing));
-                }
-            }
+        if let Some((entity, _)) = bodies.iter().find(|(entity, _)| !can_move(&entities[*entity].shape)) {
+            return Err(BodyError::NoContactPoints { shape: collide::name(&entities[*entity].shape) });
         }
-        let room = (pairs.len() * MAX_POINTS).min(MAX_ROWS) + MAX_TOUCHES;
-        Ok(Self {
+        let count = bodies.len();
+        let pairs = count.saturating_mul(entities.len()).min(MAX_PAIRS);
+        let room = (pairs * MAX_POINTS).min(MAX_ROWS) + MAX_TOUCHES;
+        let mut made = Self {
             settings,
-            bodies: bodies.iter().map(|(_, body)| *body).collect(),
-            entities: bodies.iter().map(|(entity, _)| *entity).collect(),
-            is_parked: vec![false; bodies.len()].into(),
-            pairs: pairs.into(),
+            roster: Roster::new(entities.len(), bodies),
+            broad_phase: BroadPhase::new(entities),
+            pairs: Pairs::with_capacity(pairs),
+            bodies: Vec::with_capacity(count),
+            entities: Vec::with_capacity(count),
             rows: Vec::with_capacity(room),
-            motions: Vec::with_capacity(bodies.len()),
-            hand: Hand::new(&[], bodies.len()),
-            speeds_m_s: Vec::with_capacity(bodies.len()),
-            solver: Solver::with_capacity(room, bodies.len()),
-            restitution: Restitution::with_capacity(room, bodies.len()),
+            motions: Vec::with_capacity(count),
+            speeds_m_s: Vec::with_capacity(count),
+            solver: Solver::with_capacity(room, count),
+            hand: Hand::new(&[], count),
+            restitution: Restitution::with_capacity(room, count),
+            sets: Sets::with_capacity(count),
             touching: 0,
-            gets: vec![Gets::default(); bodies.len()].into(),
-            stages: Stages::with_capacity(room, bodies.len()),
+            gets: Vec::with_capacity(count),
+            stages: Stages::with_capacity(room, count),
             fixed: Vec::with_capacity(room),
-            parked: Vec::with_capacity(bodies.len()),
-        })
+            parked: Vec::with_capacity(count),
+            ticks: 0,
+            arriving: None,
+            neighbours: Vec::with_capacity(count),
+            ignores_elsewhere: false,
+        };
+        for body in 0..count {
+            let who = who(&made.roster, entities, settings.response);
+            made.pairs.follow(body, &who, &made.broad_phase);
+        }
+        Ok(made)
     }
 
     /// With fingers that are more than points: soft, or with a button. What they are must have been
     /// [checked](crate::SoftFinger::validated); a finger beyond them is a point.
     #[must_use]
     pub fn with_fingers(mut self, fingers: &[FingerSettings]) -> Self {
-        self.hand = Hand::new(fingers, self.bodies.len());
+        let bodies = self.roster.bodies.len();
+        self.hand = Hand::new(fingers, bodies);
         let room = self.rows.capacity() + self.hand.most_rows();
-        let bodies = self.bodies.len();
         self.rows = Vec::with_capacity(room);
         self.solver = Solver::with_capacity(room, bodies);
         self.stages = Stages::with_capacity(room, bodies);
@@ -166,32 +157,65 @@ impl Manipulation {
         self
     }
 
+    /// Such that bodies which somebody else steps are not there at all, instead of fixed.
+    #[must_use]
+    pub fn without_those_elsewhere(mut self) -> Self {
+        self.ignores_elsewhere = true;
+        self
+    }
+
     /// How well the fingers held a body in the last tick. Not part of a tick: it takes up to 20 microseconds.
     pub fn grasp_quality(&self, body: usize) -> Option<GraspQuality> {
-        let state = self.bodies.get(body)?;
+        let state = self.roster.bodies.get(body)?;
+        let Some(place) = self.roster.place(body) else { return Some(GraspQuality::default()) };
         let weight_W = self.settings.gravity_W * state.mass.mass_kg;
         // Arms are those of the tick's beginning: any centre will do.
-        Some(grasp::quality(&self.rows, self.touching, body, (&state.centre_W, &weight_W)))
+        Some(grasp::quality(&self.rows, self.touching, place, (&state.centre_W, &weight_W)))
     }
 
     /// The line between the two fingers that held a body in the last tick.
     pub fn grasp_axis(&self, body: usize) -> Option<GraspAxis> {
-        self.hand.axis(body)
+        self.roster.place(body).and_then(|_| self.hand.axis(body))
     }
 
     /// The bodies, in the order in which they were given.
     pub fn bodies(&self) -> &[Body] {
-        &self.bodies
+        &self.roster.bodies
     }
 
     /// Whether the entity of this number is a body.
     pub fn is_body(&self, entity: usize) -> bool {
-        self.entities.contains(&entity)
+        self.body_of(entity).is_some()
     }
 
-    /// The contact points of the last tick, with their forces.
+    /// Which body the entity of this number is.
+    pub fn body_of(&self, entity: usize) -> Option<usize> {
+        self.roster.numbers.get(entity).copied().flatten().map(|body| body as usize)
+    }
+
+    /// Which entity a body is.
+    pub fn entity_of(&self, body: usize) -> usize {
+        self.roster.entities[body]
+    }
+
+    /// What becomes of a body in a tick.
+    pub fn standing(&self, body: usize) -> Standing {
+        self.roster.standing(body)
+    }
+
+    /// Where all entities are, roughly.
+    pub fn broad_phase(&self) -> &BroadPhase {
+        &self.broad_phase
+    }
+
+    /// The contact points of the last tick, with their forces. Their bodies are [places](Self::awake).
     pub fn rows(&self) -> &[Row] {
         &self.rows
+    }
+
+    /// The numbers of the bodies that are stepped, in ascending order; their places here are what rows call bodies.
+    pub fn awake(&self) -> &[usize] {
+        self.roster.awake()
     }
 
     /// Bodies that do not move any more, in the order in which they were parked: the last [`Made::parked`] of them in the last
@@ -216,7 +240,14 @@ impl Manipulation {
         if !(dt_s > 0.0 && dt_s.is_finite()) {
             return Made::default();
         }
-        self.fall_freely(dt_s);
+        self.ticks += 1;
+        for touch in touches.iter() {
+            self.wake_entity(touch.entity, entities);
+        }
+        self.line_up(entities, dt_s);
+        if self.wake_what_is_met(entities, dt_s) {
+            self.line_up(entities, dt_s);
+        }
         let touch_rows = self.gather(entities, touches, fingers, dt_s);
         let sweeps = self.find_forces(dt_s);
         for (touch, row) in touches.iter_mut().zip(touch_rows) {
@@ -224,29 +255,35 @@ impl Manipulation {
                 touch.force_on_user_W = -self.rows[row].force_W;
             }
         }
-        self.hand.settle(&self.rows, &self.motions, &self.entities, fingers, dt_s);
-        for pair in &mut self.pairs {
-            pair.settle(&self.rows, &self.motions, entities, dt_s);
+        self.hand.settle(&self.rows, &self.motions, &self.roster, fingers, dt_s);
+        for at in 0..self.pairs.awake_count() {
+            self.pairs.awake_at(at).1.settle(&self.rows, &self.motions, entities, dt_s);
         }
         self.sum_up();
-        let parked = self.advance(entities, dt_s);
-        Made { rows: self.rows.len(), sweeps, parked }
+        let (awake, parked) = (self.roster.awake().len(), self.advance(entities, dt_s));
+        self.keep_up(entities, dt_s);
+        self.rest(entities, touches, dt_s);
+        Made { rows: self.rows.len(), sweeps, parked, awake }
     }
 
-    /// How the bodies would move without anything that touches them.
-    fn fall_freely(&mut self, dt_s: f64) {
+    /// How the bodies that are awake would move without anything that touches them; behind them those that others
+    /// may lean on.
+    fn line_up(&mut self, entities: &[Entity], dt_s: f64) {
+        self.bodies.clear();
+        self.entities.clear();
         self.motions.clear();
+        self.speeds_m_s.clear();
         let fall_W = self.settings.gravity_W * dt_s;
-        for (body, &is_parked) in self.bodies.iter().zip(&self.is_parked) {
-            let mut motion = moving(body);
-            if is_parked {
-                (motion.inverse_mass, motion.inverse_inertia_W) = (0.0, nalgebra::Matrix3::zeros());
-            } else {
-                motion.velocity_W += fall_W;
-                if self.settings.integrator.is_implicit() {
-                    motion.angular_velocity_W = mean_angular_velocity_W(body, dt_s);
-                }
+        for &number in self.roster.awake() {
+            let (body, entity) = (self.roster.bodies[number], self.roster.entities[number]);
+            let mut motion = moving(&body);
+            motion.velocity_W += fall_W;
+            if self.settings.integrator.is_implicit() {
+                motion.angular_velocity_W = mean_angular_velocity_W(&body, dt_s);
             }
+            self.speeds_m_s.push(fastest_point_m_s(&entities[entity], &body, &motion));
+            self.bodies.push(body);
+            self.entities.push(entity);
             self.motions.push(motion);
         }
     }
@@ -262,22 +299,19 @@ impl Manipulation {
         self.rows.clear();
         let mut touch_rows = [None; MAX_TOUCHES];
         // Fingers first: they are never left out.
-        for (touch, place) in touches.iter().zip(&mut touch_rows) {
-            let Some(body) = self.entities.iter().position(|&entity| entity == touch.entity) else {
-                continue;
-            };
-            let (state, motion) = (&self.bodies[body], moving(&self.bodies[body]));
-            *place = Some(self.rows.len());
-            self.rows.push(touch.row(body, &state.centre_W, &motion, &entities[touch.entity], dt_s));
+        for (touch, row) in touches.iter().zip(&mut touch_rows) {
+            let Some(place) = self.roster.place_of_entity(touch.entity) else { continue };
+            let (state, motion) = (&self.bodies[place], moving(&self.bodies[place]));
+            *row = Some(self.rows.len());
+            self.rows.push(touch.row(place, &state.centre_W, &motion, &entities[touch.entity], dt_s));
         }
         self.hand.gather(
             &HandStart {
                 touches,
                 touch_rows: &touch_rows,
                 entities,
-                bodies_are: &self.entities,
+                roster: &self.roster,
                 bodies: &self.bodies,
-                is_parked: &self.is_parked,
                 gravity_W: self.settings.gravity_W,
                 dt_s,
             },
@@ -286,30 +320,63 @@ impl Manipulation {
         );
         self.touching = self.rows.len();
         self.restitution.impacts.clear();
-        self.speeds_m_s.clear();
-        let moving = self.entities.iter().zip(&self.bodies).zip(&self.motions);
-        self.speeds_m_s.extend(
-            moving.map(|((&entity, body), motion)| fastest_point_m_s(&entities[entity], body, motion)),
-        );
-        let start = Start {
-            entities,
-            bodies: &self.bodies,
-            motions: &self.motions,
-            speeds_m_s: &self.speeds_m_s,
-            dt_s,
-            is_implicit: self.settings.integrator.is_implicit(),
-        };
-        for pair in &mut self.pairs {
+        for at in 0..self.pairs.awake_count() {
+            let (key, _) = self.pairs.awake_at(at);
+            let other = self.roster.place_of_entity(key.entity as usize);
+            if self.ignores_elsewhere && self.is_elsewhere(&key) {
+                self.pairs.awake_at(at).1.pass_by();
+                continue;
+            }
+            // Of two of which only the second is awake the first is what it leans on.
+            let first = match self.roster.place(key.body as usize) {
+                Some(place) => place,
+                None => self.lean_on(key.body as usize),
+            };
+            let (_, pair) = self.pairs.awake_at(at);
+            let start = Start {
+                entities,
+                bodies: &self.bodies,
+                motions: &self.motions,
+                speeds_m_s: &self.speeds_m_s,
+                dt_s,
+                is_implicit: self.settings.integrator.is_implicit(),
+            };
+            pair.bodies = (first, other);
             pair.gather(&start, &mut self.rows, &mut self.restitution.impacts);
         }
         touch_rows
     }
 
+    /// Whether one of a pair is stepped by somebody else.
+    fn is_elsewhere(&self, key: &Key) -> bool {
+        let other = self.roster.numbers[key.entity as usize].map(|other| other as usize);
+        [Some(key.body as usize), other]
+            .into_iter()
+            .flatten()
+            .any(|body| self.roster.standing(body) == Standing::Elsewhere)
+    }
+
+    /// The place of a body that others may lean on: as if it were fixed.
+    fn lean_on(&mut self, number: usize) -> usize {
+        let (awake, entity) = (self.roster.awake().len(), self.roster.entities[number]);
+        if let Some(known) = self.entities[awake..].iter().position(|known| *known == entity) {
+            return awake + known;
+        }
+        let zero = Vector3::zeros();
+        let still = Body { velocity_W: zero, angular_momentum_W: zero, ..self.roster.bodies[number] };
+        let inverse_inertia_W = nalgebra::Matrix3::zeros();
+        self.motions.push(Motion { inverse_mass: 0.0, inverse_inertia_W, ..moving(&still) });
+        self.bodies.push(still);
+        self.entities.push(entity);
+        self.speeds_m_s.push(0.0);
+        self.entities.len() - 1
+    }
+
     /// What all contact points do in the tick; returns the turns of the solver.
     fn find_forces(&mut self, dt_s: f64) -> usize {
-        for (gets, &is_parked) in self.gets.iter_mut().zip(&self.is_parked) {
-            *gets = Gets { gravity_W: self.settings.gravity_W, is_parked, ..Gets::default() };
-        }
+        self.gets.clear();
+        self.gets.resize(self.bodies.len(), Gets { gravity_W: self.settings.gravity_W, ..Gets::default() });
+        self.gets[self.roster.awake().len()..].iter_mut().for_each(|gets| gets.is_fixed = true);
         // Impulses are always solved for.
         let springs = match self.settings.response {
             Response::Force => self.rows.len(),
@@ -358,28 +425,44 @@ impl Manipulation {
         let settings = &self.settings;
         let limits = Limits { speed_m_s: settings.most_speed_m_s, spin_rad_s: settings.most_spin_rad_s };
         let before_parked = self.parked.len();
-        for (number, body) in self.bodies.iter_mut().enumerate() {
-            let entity = &mut entities[self.entities[number]];
-            if self.is_parked[number] {
-                entity.move_to(entity.X_WB);
-                continue;
-            }
-            let before = *body;
-            settings.integrator.advance(body, &self.gets[number], &limits, dt_s);
+        for place in 0..self.roster.awake().len() {
+            let number = self.roster.awake()[place];
+            let (before, mut body) = (self.bodies[place], self.bodies[place]);
+            settings.integrator.advance(&mut body, &self.gets[place], &limits, dt_s);
             let why = if !body.is_finite() {
                 Some(Reason::NotANumber)
             } else {
                 (body.centre_W.norm() > settings.world_radius_m).then_some(Reason::LeftTheWorld)
             };
             if let Some(why) = why {
-                *body = Body { velocity_W: Vector3::zeros(), angular_momentum_W: Vector3::zeros(), ..before };
-                self.is_parked[number] = true;
-                self.parked.push(Parked { entity: self.entities[number], why });
+                body = Body { velocity_W: Vector3::zeros(), angular_momentum_W: Vector3::zeros(), ..before };
+                self.parked.push(Parked { entity: self.entities[place], why });
             }
-            entity.move_to(body.pose());
+            entities[self.entities[place]].move_to(body.pose());
+            self.roster.bodies[number] = body;
+        }
+        for at in before_parked..self.parked.len() {
+            let Some(body) = self.body_of(self.parked[at].entity) else { continue };
+            self.roster.set(body, Standing::Parked);
         }
         self.parked.len() - before_parked
     }
+
+    /// Finds who is near whom now.
+    fn keep_up(&mut self, entities: &[Entity], dt_s: f64) {
+        for &body in self.roster.awake() {
+            let entity = self.roster.entities[body];
+            let per_tick_W = self.roster.bodies[body].velocity_W * dt_s;
+            if self.broad_phase.moved(entity, &entities[entity], &per_tick_W) {
+                let who = who(&self.roster, entities, self.settings.response);
+                self.pairs.follow(body, &who, &self.broad_phase);
+            }
+        }
+    }
+}
+
+fn who<'w>(roster: &'w Roster, all: &'w [Entity], response: Response) -> Who<'w> {
+    Who { all, entities: &roster.entities, bodies: &roster.numbers, response }
 }
 
 fn moving(body: &Body) -> Motion {

@@ -31,7 +31,7 @@ pub enum Response {
 }
 
 /// What two surfaces make of each other.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Surfacing {
     /// Of each contact point \[N/m\].
     pub stiffness_n_per_m: f64,
@@ -57,12 +57,14 @@ impl Surfacing {
 }
 
 /// A pair and its contact points.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Pair {
     /// Of the entities: A's, which is a body, and B's.
     pub(crate) entities: [usize; 2],
-    /// Of the bodies; B may be fixed.
+    /// Places of the bodies in this tick; B may be fixed.
     pub(crate) bodies: (usize, Option<usize>),
+    /// Whether they were near enough to touch in the last tick.
+    pub(crate) is_near: bool,
     pub(crate) surfacing: Surfacing,
     memory: PairMemory,
     anchors: [Anchor; MAX_POINTS],
@@ -86,18 +88,9 @@ pub(crate) struct Start<'t> {
 }
 
 impl Pair {
-    pub(crate) fn new(entities: [usize; 2], bodies: (usize, Option<usize>), surfacing: Surfacing) -> Self {
-        let anchors = [Anchor::default(); MAX_POINTS];
-        Self {
-            entities,
-            bodies,
-            surfacing,
-            memory: PairMemory::default(),
-            anchors,
-            count: 0,
-            first_row: 0,
-            rows: 0,
-        }
+    /// That has not touched yet.
+    pub(crate) fn new(entities: [usize; 2], surfacing: Surfacing) -> Self {
+        Self { entities, surfacing, ..Self::default() }
     }
 
     /// Finds where it touches, and appends a row for each point; notes which rows are impacts.
@@ -106,10 +99,9 @@ impl Pair {
         let [a, b] = self.entities.map(|index| &start.entities[index]);
         let speed_m_s = self.closing_speed(start);
         let reach_m = REACH_M + speed_m_s * start.dt_s;
-        if !is_near(a, b, reach_m) {
-            self.count = 0;
-            // They may meet again from another side.
-            self.memory = PairMemory::default();
+        self.is_near = is_near(a, b, reach_m);
+        if !self.is_near {
+            self.pass_by();
             return;
         }
         let (in_A, in_B) = (Solid { shape: &a.shape, X_W: &a.X_WB }, Solid { shape: &b.shape, X_W: &b.X_WB });
@@ -130,6 +122,13 @@ impl Pair {
             rows.push(row);
             self.rows += 1;
         }
+    }
+
+    /// They do not touch in this tick.
+    pub(crate) fn pass_by(&mut self) {
+        (self.is_near, self.count, self.rows) = (false, 0, 0);
+        // They may meet again from another side.
+        self.memory = PairMemory::default();
     }
 
     /// Takes note of how the tick ended.
@@ -200,7 +199,8 @@ pub(crate) fn fastest_point_m_s(entity: &Entity, body: &Body, motion: &Motion) -
     motion.velocity_W.norm() + motion.angular_velocity_W.norm() * farthest_m
 }
 
-fn is_near(a: &Entity, b: &Entity, reach_m: f64) -> bool {
+/// Whether two entities may touch that come nearer by no more than this (m).
+pub(crate) fn is_near(a: &Entity, b: &Entity, reach_m: f64) -> bool {
     let centre = |entity: &Entity, at_B: Vector3<f64>| (entity.X_WB * nalgebra::Point3::from(at_B)).coords;
     match (bounding_ball(&a.shape), bounding_ball(&b.shape)) {
         (Some((at_a, r_a)), Some((at_b, r_b))) => {

@@ -92,7 +92,7 @@ impl Stages {
             self.press(bodies, rows, springs, dt_s, weight);
             let next_s = STAGES.get(stage + 1).map_or(0.0, |(share, _)| share * dt_s);
             for (number, body) in bodies.iter().enumerate() {
-                if gets[number].is_parked {
+                if gets[number].is_fixed {
                     continue;
                 }
                 let rate = rate(body, &self.now[number], &self.wrenches[number], &gets[number].gravity_W);

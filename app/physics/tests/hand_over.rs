@@ -1,0 +1,162 @@
+//! Islands that go from one to another that steps them: nothing is lost, and nobody can tell.
+
+mod common;
+
+use common::{DT, body, floor, object};
+use haptics::{Cuboid, Entity};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use physics::{Body, Manipulation, Parcel, Settings, Sleep, Standing};
+
+const SIZE: f64 = 0.05;
+
+/// A stack on a slope of so much (rad), and a cube that falls beside it.
+fn entities(slope: f64) -> Vec<Entity> {
+    let mut entities = vec![floor(slope, 2000.0, 0.5)];
+    let lean = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), slope);
+    for at in 0..3 {
+        let place = lean * Vector3::new(0.0, SIZE * (f64::from(at) + 0.5) - 1e-4, 0.0);
+        let pose = Isometry3::from_parts(place.into(), lean);
+        entities.push(object(Cuboid::new([SIZE; 3]).unwrap(), pose, 1000.0, 0.5));
+    }
+    let falls = Isometry3::new(Vector3::new(-0.2, 0.3, 0.0), Vector3::new(0.3, 0.2, 0.1));
+    entities.push(object(Cuboid::new([SIZE; 3]).unwrap(), falls, 1000.0, 0.5));
+    entities
+}
+
+fn manipulation(entities: &[Entity], sleep: bool) -> Manipulation {
+    let bodies: Vec<(usize, Body)> = (1..entities.len()).map(|at| (at, body(&entities[at], 0.1))).collect();
+    let settings = Settings { sleep: sleep.then(Sleep::default), ..Settings::default() };
+    Manipulation::new(entities, &bodies, settings).unwrap()
+}
+
+struct Side {
+    entities: Vec<Entity>,
+    manipulation: Manipulation,
+}
+
+/// Sends the island of a body from one side to the other one.
+fn send(from: &mut Side, to: &mut Side, body: usize) {
+    let mut island = Vec::with_capacity(8);
+    assert!(from.manipulation.island(body, &mut island));
+    let expected = from.manipulation.parcels(&island);
+    let mut parcels: Vec<Parcel> = Vec::new();
+    from.manipulation.release(&island, &from.entities, |parcel| parcels.push(parcel));
+    assert_eq!(parcels.len(), expected);
+    assert!(parcels.last().unwrap().is_last());
+    for parcel in &parcels {
+        to.manipulation.accept(parcel, &mut to.entities);
+    }
+    for body in island {
+        assert_eq!(from.manipulation.standing(body), Standing::Elsewhere);
+        assert_ne!(to.manipulation.standing(body), Standing::Elsewhere);
+    }
+}
+
+#[test]
+fn islands_that_come_and_go_move_like_those_that_stay_to_the_bit() {
+    let mut sides = [true, false].map(|has_all| {
+        let entities = entities(0.2);
+        let mut manipulation = manipulation(&entities, false).without_those_elsewhere();
+        if !has_all {
+            (0..4).for_each(|body| manipulation.give_away(body, &entities));
+        }
+        Side { entities, manipulation }
+    });
+    let mut stays = entities(0.2);
+    let mut staying = manipulation(&stays, false);
+    let mut seed = 7_u64;
+    for tick in 0..6000 {
+        staying.step(&mut stays, &mut [], DT);
+        for side in &mut sides {
+            side.manipulation.step(&mut side.entities, &mut [], DT);
+        }
+        for body in 0..4 {
+            let here = sides
+                .iter()
+                .position(|side| side.manipulation.standing(body) != Standing::Elsewhere)
+                .unwrap();
+            assert_eq!(
+                sides[1 - here].manipulation.standing(body),
+                Standing::Elsewhere,
+                "in one list, tick {tick}"
+            );
+            assert_eq!(
+                sides[here].manipulation.bodies()[body],
+                staying.bodies()[body],
+                "body {body}, tick {tick}"
+            );
+        }
+        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        let body = (seed >> 33) as usize % 4;
+        let [one, other] = &mut sides;
+        match one.manipulation.standing(body) {
+            Standing::Elsewhere => send(other, one, body),
+            _ => send(one, other, body),
+        }
+    }
+    // It fell and slid; and the stack, whose springs let it lean, has toppled.
+    assert!(staying.bodies()[2].centre_W.y < 0.1);
+    assert!(staying.bodies()[3].centre_W.y < 0.2);
+}
+
+#[test]
+fn an_island_that_sleeps_goes_on_sleeping_and_wakes_as_one() {
+    let new = |has_all: bool| {
+        let entities = entities(0.05);
+        let mut manipulation = manipulation(&entities, true);
+        if !has_all {
+            (0..4).for_each(|body| manipulation.give_away(body, &entities));
+        }
+        Side { entities, manipulation }
+    };
+    let [mut one, mut other] = [new(true), new(false)];
+    for _ in 0..20_000 {
+        one.manipulation.step(&mut one.entities, &mut [], DT);
+    }
+    assert!(one.manipulation.awake().is_empty(), "{:?}", one.manipulation.awake());
+    let mut island = Vec::with_capacity(8);
+    one.manipulation.island(1, &mut island);
+    assert_eq!(island, [0, 1, 2]);
+    send(&mut one, &mut other, 1);
+    let asleep = [0, 1, 2].map(|body| other.manipulation.standing(body));
+    assert_eq!(asleep, [Standing::Asleep; 3]);
+    let before: Vec<_> = other.entities.iter().map(|entity| entity.X_WB).collect();
+    other.manipulation.wake(2, &other.entities);
+    assert_eq!(other.manipulation.awake(), [0, 1, 2]);
+    for _ in 0..1000 {
+        other.manipulation.step(&mut other.entities, &mut [], DT);
+    }
+    for (entity, before) in other.entities.iter().zip(before).take(4) {
+        // 1e-6 m/s when it fell asleep, decaying within a tenth of a second.
+        let moved = (entity.X_WB.translation.vector - before.translation.vector).norm();
+        assert!(moved < 1e-7, "{moved:e}");
+    }
+}
+
+#[test]
+fn one_that_is_elsewhere_is_leaned_on_where_it_was_last_said_to_be() {
+    let entities = vec![
+        object(Cuboid::new([SIZE; 3]).unwrap(), Isometry3::identity(), 1000.0, 0.5),
+        object(Cuboid::new([SIZE; 3]).unwrap(), Isometry3::translation(0.0, SIZE, 0.0), 1000.0, 0.5),
+    ];
+    for upper in [0, 1] {
+        let mut entities = entities.clone();
+        entities.swap(0, 1 - upper);
+        let bodies: Vec<_> = (0..2).map(|at| (at, body(&entities[at], 0.1))).collect();
+        let mut manipulation = Manipulation::new(&entities, &bodies, Settings::default()).unwrap();
+        let lower = 1 - upper;
+        manipulation.give_away(lower, &entities);
+        for _ in 0..3000 {
+            manipulation.step(&mut entities, &mut [], DT);
+        }
+        // m g / (4 k / 2) below where it stood: springs in series, on four corners.
+        let rests = SIZE - 0.1 * 9.81 / (4.0 * 500.0);
+        assert!((manipulation.bodies()[upper].centre_W.y - rests).abs() < 1e-9, "{upper}");
+        let mut lowered = manipulation.bodies()[lower];
+        lowered.centre_W.y = -0.1;
+        manipulation.stands_elsewhere(lower, &lowered, &mut entities, DT);
+        manipulation.step(&mut entities, &mut [], DT);
+        manipulation.step(&mut entities, &mut [], DT);
+        assert!(manipulation.bodies()[upper].velocity_W.y < -0.009, "falls");
+    }
+}
