@@ -52,8 +52,8 @@ pub struct FastLoop {
     next_tick: u64,
     /// The row that waits for what the motors did, and the driver's tick it belongs to.
     pending: Option<(u64, Row)>,
-    /// Its bodies.
-    pending_bodies: Vec<BodyRow>,
+    /// The bodies that have changed since the last row that was sent, by their numbers in ascending order.
+    pending_bodies: Vec<(u32, BodyRow)>,
     frame: Frame,
     following: Frame,
     command: Command,
@@ -107,7 +107,7 @@ impl FastLoop {
         period_ns: u64,
     ) -> Self {
         Self {
-            pending_bodies: step.bodies().to_vec(),
+            pending_bodies: (0..).zip(step.bodies().iter().copied()).collect(),
             step,
             rows,
             when_full,
@@ -178,9 +178,21 @@ impl FastLoop {
         self.next_tick = self.row.run_tick + 1;
         if self.row.run_tick < self.total_ticks {
             self.pending = Some((self.frame.tick, self.row));
-            self.pending_bodies.copy_from_slice(self.step.bodies());
+            self.keep_bodies();
             for finger in &self.row.fingers {
                 self.tally.peak_force_n = self.tally.peak_force_n.max(finger.force_on_user.norm());
+            }
+        }
+    }
+
+    fn keep_bodies(&mut self) {
+        let (pending, bodies) = (&mut self.pending_bodies, self.step.bodies());
+        for &number in self.step.changed_bodies() {
+            let body = bodies[number as usize];
+            // In order they come at the end, but for those of a row that was not sent.
+            match pending.binary_search_by_key(&number, |(number, _)| *number) {
+                Ok(at) => pending[at].1 = body,
+                Err(at) => pending.insert(at, (number, body)),
             }
         }
     }
@@ -236,7 +248,10 @@ impl FastLoop {
             }
         }
         match self.rows.send(row, &self.pending_bodies) {
-            true => self.tally.rows += 1,
+            true => {
+                self.tally.rows += 1;
+                self.pending_bodies.clear();
+            }
             false => self.tally.rows_lost += 1,
         }
     }

@@ -9,10 +9,11 @@
 //! Frames and signs: forces are forces on the user.
 //! Invariants: no allocation, clock, lock or panic; the command answers the frame's tick; a device whose
 //! position is not valid gets zero force and forgets its contacts.
-//! Cost: linear in fingers times entities.
+//! Cost: linear in what is near a finger or moves; what is neither costs nothing.
 
 #![allow(non_snake_case)] // Frames are capital letters: tip_D is the tip in D.
 
+mod near;
 mod objects;
 
 pub use objects::{HandFinger, Objects};
@@ -23,7 +24,8 @@ use crate::row::{BodyRow, FingerRow, Row};
 use haptics::passivity::Passivity;
 use haptics::{Effects, Entity, Field, Finger, FingerEffects, Guide, Hip, Moment, RAMP_IN_S};
 use nalgebra::Vector3;
-use physics::{Body, BodyError, Manipulation};
+use near::Near;
+use physics::{Body, BodyError, BroadPhase, Manipulation};
 use shm_abi::MAX_DEVICES;
 use shm_abi::frame::{DEVICE_ORIENTATION_MEASURED, DEVICE_POSITION_VALID};
 use shm_abi::{Command, DeviceFrame, Frame};
@@ -45,8 +47,10 @@ pub struct DeviceFinger {
 pub struct FastStep {
     fingers: Vec<DeviceFinger>,
     entities: Vec<Entity>,
-    /// Those that move.
-    objects: Option<Objects>,
+    /// Those that move, and where all are.
+    objects: Objects,
+    /// Of each finger, what it could touch.
+    near: Vec<Near>,
     effects: Effects,
     /// Of each finger.
     finger_effects: Vec<FingerEffects>,
@@ -70,10 +74,13 @@ impl FastStep {
         let (tips_D, carried_W) = (vec![None; fingers.len()], vec![Vector3::zeros(); fingers.len()]);
         let period_s = period_ns as f64 / 1e9;
         let passivities = vec![None; fingers.len()];
+        let near = vec![Near::new(entities.len()); fingers.len()];
+        let objects = Objects::new(Manipulation::of_none(&entities), &[], false, period_s);
         Self {
             fingers,
             entities,
-            objects: None,
+            objects,
+            near,
             effects: Effects::default(),
             finger_effects: Vec::new(),
             period_s,
@@ -107,7 +114,7 @@ impl FastStep {
         wants_quality: bool,
     ) -> Result<Self, BodyError> {
         let manipulation = Manipulation::new(&self.entities, bodies, settings)?;
-        self.objects = Some(Objects::new(manipulation, hand, wants_quality, self.period_s));
+        self.objects = Objects::new(manipulation, hand, wants_quality, self.period_s);
         Ok(self)
     }
 
@@ -118,17 +125,22 @@ impl FastStep {
 
     /// The entities that move, as the last tick began.
     pub fn bodies(&self) -> &[BodyRow] {
-        self.objects.as_ref().map_or(&[], Objects::rows)
+        self.objects.rows()
+    }
+
+    /// Those of [`Self::bodies`] that are not as they were a tick before.
+    pub fn changed_bodies(&self) -> &[u32] {
+        self.objects.changed()
     }
 
     /// The entities that were parked in the last tick, because they left the world or were lost.
     pub fn parked_now(&self) -> &[physics::Parked] {
-        self.objects.as_ref().map_or(&[], Objects::parked_now)
+        self.objects.parked_now()
     }
 
     /// What moving the entities took in the last tick.
     pub fn made(&self) -> physics::Made {
-        self.objects.as_ref().map_or_else(Default::default, |objects| objects.made)
+        self.objects.made
     }
 
     /// With fingers whose forces do not feed energy into the hand, one for each finger; `None`: as rendered.
@@ -167,8 +179,9 @@ impl FastStep {
         let devices = frame.present_devices();
         let moment = Moment { t_s: row.run_tick as f64 * self.period_s, dt_s };
         let mut hips = [None; MAX_DEVICES];
-        let moved = self.tips_D.iter_mut().zip(&mut self.carried_W).zip(&mut hips);
-        for ((finger, row), ((tip_D, carried_W), hip)) in
+        let broad_phase = self.objects.broad_phase();
+        let moved = self.tips_D.iter_mut().zip(&mut self.carried_W).zip(&mut hips).zip(&mut self.near);
+        for ((finger, row), (((tip_D, carried_W), hip), near)) in
             self.fingers.iter_mut().zip(&mut row.fingers).zip(moved)
         {
             let Some(device) = devices.get(finger.device) else { continue };
@@ -176,15 +189,13 @@ impl FastStep {
             *tip_D = is_valid.then_some(device.position_m_measured);
             let carried_W = std::mem::take(carried_W);
             let velocity_W = self.driver_estimates.then(|| finger.velocity_W(device, carried_W / dt_s));
-            *row = finger.step(device, &self.entities, dt_s, velocity_W);
+            *row = finger.step(device, &self.entities, (broad_phase, near), dt_s, velocity_W);
             *hip =
                 Some(Carried { carried_W, hip: is_valid.then_some(Hip { position_W: row.hip, velocity_W }) });
         }
-        if let Some(objects) = &mut self.objects {
-            objects.note();
-            if frame.run_tick >= 0 {
-                objects.step(&mut self.entities, &self.fingers, &mut row.fingers, dt_s);
-            }
+        self.objects.note();
+        if frame.run_tick >= 0 {
+            self.objects.step(&mut self.entities, &self.fingers, &mut row.fingers, dt_s);
         }
         let tick = Tick::new(frame, &self.entities, dt_s);
         let states = self.finger_effects.iter_mut().zip(&mut self.passivities);
@@ -289,6 +300,7 @@ impl DeviceFinger {
         &mut self,
         device: &DeviceFrame,
         entities: &[Entity],
+        (broad_phase, near): (&BroadPhase, &mut Near),
         dt_s: f64,
         velocity_W: Option<Vector3<f64>>,
     ) -> FingerRow {
@@ -306,7 +318,9 @@ impl DeviceFinger {
             self.finger.reset();
             return seen;
         }
-        let output = self.finger.step(entities, Hip { position_W: hip, velocity_W }, dt_s);
+        let from = self.finger.last_hip_W().unwrap_or(hip);
+        let near = near.update(broad_phase, &from, &hip, self.finger.radius_m());
+        let output = self.finger.step_near(entities, near, Hip { position_W: hip, velocity_W }, dt_s);
         FingerRow {
             god_object: output.god_object_W,
             force_on_user: finite_or_zero(output.force_on_user_W),

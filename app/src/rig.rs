@@ -175,7 +175,7 @@ impl Rig {
             self.scene.entities.iter().map(|entity| self.entity(entity)).collect::<Result<_, _>>()?;
         let entities = self.prepared(entities);
         let fingers = self.scene.fingers.iter().map(|finger| {
-            let made = Finger::new(finger.radius_m, entities.len())
+            let made = Finger::new(finger.radius_m, entities.len().min(MOST_NEAR))
                 .map_err(|source| self.refused(None, format!("finger {}", finger.name), source))?;
             self.check_felt(&entities, finger)?;
             let mount = self.mount(finger.device);
@@ -355,6 +355,9 @@ impl Rig {
         RigError::NotAvailable { file: self.scene_file.clone(), what }
     }
 }
+
+/// A finger feels no more entities at once.
+const MOST_NEAR: usize = 128;
 
 /// Whether contacts turn it: it has a radius, a pad, or something tied to it.
 fn has_torque(finger: &SceneFinger) -> bool {

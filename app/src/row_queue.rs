@@ -1,7 +1,8 @@
-//! The queue between fast and slow side: rows, each followed by its bodies.
+//! The queue between fast and slow side: rows, each followed by those bodies that have changed.
 //!
 //! Model: how many entities move is known when a run begins, so two queues of fixed size hold them: one of rows, one of
-//! bodies, a row's bodies being pushed before the row is. Whoever finds a row finds its bodies.
+//! bodies, a row's bodies being pushed before the row is. Whoever finds a row finds its bodies. A body that rests is sent
+//! once; the receiver keeps all of them as they were last.
 //! Each place has been written to once: where memory is not locked, the first touch would otherwise be a page fault of the
 //! fast thread, every few ticks for eight seconds.
 
@@ -16,14 +17,17 @@ const BODY_QUEUE: usize = 1 << 20;
 
 /// The fast side's end.
 pub struct RowSender {
-    rows: Producer<Row>,
-    bodies: Producer<BodyRow>,
+    rows: Producer<Waiting>,
+    bodies: Producer<(u32, BodyRow)>,
 }
+
+/// A row, and how many bodies come with it.
+type Waiting = (Row, u32);
 
 /// The slow side's end.
 pub struct RowReceiver {
-    rows: Consumer<Row>,
-    bodies: Consumer<BodyRow>,
+    rows: Consumer<Waiting>,
+    bodies: Consumer<(u32, BodyRow)>,
     of_row: Vec<BodyRow>,
 }
 
@@ -35,8 +39,8 @@ pub fn row_queue(bodies: usize) -> (RowSender, RowReceiver) {
 
 /// A queue for so many rows with so many bodies each.
 pub fn row_queue_of(places: usize, bodies: usize) -> (RowSender, RowReceiver) {
-    let (rows, row_ends) = touched(places, Row::empty());
-    let (bodies_in, bodies_out) = touched(places * bodies, BodyRow::default());
+    let (rows, row_ends) = touched(places, (Row::empty(), 0));
+    let (bodies_in, bodies_out) = touched(places * bodies, (0, BodyRow::default()));
     let receiver =
         RowReceiver { rows: row_ends, bodies: bodies_out, of_row: vec![BodyRow::default(); bodies] };
     (RowSender { rows, bodies: bodies_in }, receiver)
@@ -60,8 +64,9 @@ impl RowSender {
         self.rows.is_abandoned()
     }
 
-    /// Sends a row and its bodies; `false`, and nothing is sent, if there is no room.
-    pub fn send(&mut self, row: Row, bodies: &[BodyRow]) -> bool {
+    /// Sends a row and the bodies that have changed since the last one that was sent, by their numbers; `false`, and nothing
+    /// is sent, if there is no room.
+    pub fn send(&mut self, row: Row, bodies: &[(u32, BodyRow)]) -> bool {
         if self.rows.is_full() || self.bodies.slots() < bodies.len() {
             return false;
         }
@@ -69,7 +74,7 @@ impl RowSender {
             // There is room.
             let _ = self.bodies.push(*body);
         }
-        self.rows.push(row).is_ok()
+        self.rows.push((row, bodies.len() as u32)).is_ok()
     }
 }
 
@@ -79,11 +84,15 @@ impl RowReceiver {
         self.rows.slots()
     }
 
-    /// The next row and its bodies, if one waits.
+    /// The next row and all bodies, if one waits.
     pub fn receive(&mut self) -> Option<(Row, &[BodyRow])> {
-        let row = self.rows.pop().ok()?;
-        for body in &mut self.of_row {
-            *body = self.bodies.pop().unwrap_or_default();
+        let (row, bodies) = self.rows.pop().ok()?;
+        for _ in 0..bodies {
+            if let Ok((number, body)) = self.bodies.pop()
+                && let Some(place) = self.of_row.get_mut(number as usize)
+            {
+                *place = body;
+            }
         }
         Some((row, &self.of_row))
     }
@@ -102,8 +111,9 @@ mod tests {
     fn a_row_comes_with_its_own_bodies_however_full_the_queue_was() {
         let (mut sender, mut receiver) = row_queue(300);
         let bodies = |row: u64| (0..300).map(|i| body((1000 * row + i) as f64)).collect::<Vec<_>>();
+        let numbered = |row: u64| (0..300).zip(bodies(row)).collect::<Vec<_>>();
         let mut sent = 0;
-        while sender.send(Row { run_tick: sent, ..Row::empty() }, &bodies(sent)) {
+        while sender.send(Row { run_tick: sent, ..Row::empty() }, &numbered(sent)) {
             sent += 1;
         }
         assert_eq!(sent, (BODY_QUEUE / 300) as u64);
@@ -114,5 +124,11 @@ mod tests {
             assert_eq!(of_row, bodies(row), "row {row}");
         }
         assert!(receiver.receive().is_none());
+        let of_one = [(7, body(-1.0))];
+        assert!(sender.send(Row::empty(), &of_one));
+        let (_, of_row) = receiver.receive().expect("a row");
+        let mut expected = bodies(sent - 1);
+        expected[7] = of_one[0].1;
+        assert_eq!(of_row, expected, "the others are as they were");
     }
 }

@@ -59,6 +59,9 @@ pub struct Manipulation {
     neighbours: Vec<u32>,
     /// Whether bodies that somebody else steps are not there.
     ignores_elsewhere: bool,
+    /// Bodies that are not as they were, each once.
+    changed: Vec<u32>,
+    has_changed: Box<[bool]>,
 }
 
 /// What a tick took and did.
@@ -108,6 +111,15 @@ impl Manipulation {
         if let Some((entity, _)) = bodies.iter().find(|(entity, _)| !can_move(&entities[*entity].shape)) {
             return Err(BodyError::NoContactPoints { shape: collide::name(&entities[*entity].shape) });
         }
+        Ok(Self::of(entities, bodies, settings))
+    }
+
+    /// Nothing moves; where the entities are is known all the same.
+    pub fn of_none(entities: &[Entity]) -> Self {
+        Self::of(entities, &[], Settings::default())
+    }
+
+    fn of(entities: &[Entity], bodies: &[(usize, Body)], settings: Settings) -> Self {
         let count = bodies.len();
         let pairs = count.saturating_mul(entities.len()).min(MAX_PAIRS);
         let room = (pairs * MAX_POINTS).min(MAX_ROWS) + MAX_TOUCHES;
@@ -134,12 +146,14 @@ impl Manipulation {
             arriving: None,
             neighbours: Vec::with_capacity(count),
             ignores_elsewhere: false,
+            changed: Vec::with_capacity(count),
+            has_changed: vec![false; count].into(),
         };
         for body in 0..count {
             let who = who(&made.roster, entities, settings.response);
             made.pairs.follow(body, &who, &made.broad_phase);
         }
-        Ok(made)
+        made
     }
 
     /// With fingers that are more than points: soft, or with a button. What they are must have been
@@ -181,6 +195,24 @@ impl Manipulation {
     /// The bodies, in the order in which they were given.
     pub fn bodies(&self) -> &[Body] {
         &self.roster.bodies
+    }
+
+    /// The bodies that may not be as they were when [`Self::forget_changes`] was last called.
+    pub fn changed(&self) -> &[u32] {
+        &self.changed
+    }
+
+    /// Somebody has taken note of all changes.
+    pub fn forget_changes(&mut self) {
+        for body in self.changed.drain(..) {
+            self.has_changed[body as usize] = false;
+        }
+    }
+
+    fn note_change(&mut self, body: usize) {
+        if !std::mem::replace(&mut self.has_changed[body], true) {
+            self.changed.push(body as u32);
+        }
     }
 
     /// Whether the entity of this number is a body.
@@ -422,7 +454,7 @@ impl Manipulation {
 
     /// Takes the bodies to the end of the tick; says how many had to be parked.
     fn advance(&mut self, entities: &mut [Entity], dt_s: f64) -> usize {
-        let settings = &self.settings;
+        let settings = self.settings;
         let limits = Limits { speed_m_s: settings.most_speed_m_s, spin_rad_s: settings.most_spin_rad_s };
         let before_parked = self.parked.len();
         for place in 0..self.roster.awake().len() {
@@ -440,6 +472,7 @@ impl Manipulation {
             }
             entities[self.entities[place]].move_to(body.pose());
             self.roster.bodies[number] = body;
+            self.note_change(number);
         }
         for at in before_parked..self.parked.len() {
             let Some(body) = self.body_of(self.parked[at].entity) else { continue };

@@ -9,11 +9,13 @@
 
 use haptics::{ContactState, Entity};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use physics::{FingerSettings, FingerTick, Made, Manipulation, Touch};
+use physics::{BroadPhase, FingerSettings, FingerTick, Made, Manipulation, Touch};
 
 use super::DeviceFinger;
 use crate::row::{BodyRow, FingerRow};
 
+/// A finger touches no more bodies at once.
+const MOST_TOUCHED: usize = 16;
 /// Ticks that a single step of the objects makes up for at most.
 const MOST_TICKS: f64 = 4.0;
 
@@ -37,6 +39,8 @@ pub struct Objects {
     wants_quality: bool,
     /// As the tick began.
     rows: Vec<BodyRow>,
+    /// Those of them that are not as they were a tick before.
+    changed: Vec<u32>,
     period_s: f64,
     /// What the last tick took.
     pub made: Made,
@@ -52,9 +56,11 @@ impl Objects {
     ) -> Self {
         let settings: Vec<_> = fingers.iter().map(|finger| finger.settings).collect();
         let manipulation = manipulation.with_fingers(&settings);
-        let room = fingers.len() * manipulation.bodies().len() * haptics::MAX_TOUCH_POINTS;
+        let bodies = manipulation.bodies().len();
+        let room = fingers.len() * bodies.min(MOST_TOUCHED) * haptics::MAX_TOUCH_POINTS;
         let mut objects = Self {
-            rows: vec![BodyRow::default(); manipulation.bodies().len()],
+            rows: vec![BodyRow::default(); bodies],
+            changed: (0..bodies as u32).collect(),
             touches: Vec::with_capacity(room),
             ticks: vec![FingerTick::at(Vector3::zeros()); fingers.len()],
             buttons: fingers.iter().map(|finger| finger.button).collect(),
@@ -63,7 +69,7 @@ impl Objects {
             period_s,
             made: Made::default(),
         };
-        objects.note();
+        objects.note_all();
         objects
     }
 
@@ -78,9 +84,32 @@ impl Objects {
         &parked[parked.len().saturating_sub(self.made.parked)..]
     }
 
+    /// The bodies whose rows are not what they were a tick before.
+    pub fn changed(&self) -> &[u32] {
+        &self.changed
+    }
+
+    /// Where all entities are, roughly.
+    pub fn broad_phase(&self) -> &BroadPhase {
+        self.manipulation.broad_phase()
+    }
+
     /// Takes note of how the bodies are.
     pub fn note(&mut self) {
-        for (row, body) in self.rows.iter_mut().zip(self.manipulation.bodies()) {
+        self.changed.clear();
+        self.changed.extend_from_slice(self.manipulation.changed());
+        self.manipulation.forget_changes();
+        self.note_changed();
+    }
+
+    fn note_all(&mut self) {
+        self.manipulation.forget_changes();
+        self.note_changed();
+    }
+
+    fn note_changed(&mut self) {
+        for &number in &self.changed {
+            let (row, body) = (&mut self.rows[number as usize], &self.manipulation.bodies()[number as usize]);
             let (pose, spin_W) = (body.pose(), body.angular_velocity_W());
             let from_centre_W = pose.translation.vector - body.centre_W;
             *row = BodyRow {
@@ -141,8 +170,8 @@ impl Objects {
             row.attached = tick.attached.map(|entity| entity as u32);
         }
         if self.wants_quality {
-            for (body, row) in self.rows.iter_mut().enumerate() {
-                row.grasp = self.manipulation.grasp_quality(body).unwrap_or_default();
+            for &body in self.manipulation.awake() {
+                self.rows[body].grasp = self.manipulation.grasp_quality(body).unwrap_or_default();
             }
         }
         let got = self.touches.iter().map(|touch| touch.force_on_user_W);

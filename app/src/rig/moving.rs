@@ -5,7 +5,7 @@ use io_driver::say::say;
 use physics::collide::{can_move, is_collidable};
 use physics::{
     Attachment, Body, BodyError, FingerSettings, HeldOrientation, Integrator, MassProperties, Response,
-    Settings, SoftFinger, TorsionModel,
+    Settings, Sleep, SoftFinger, TorsionModel,
 };
 use world::{
     AttachSpec, AttachedOrientation, IntegratorSpec, MassSpec, MotionSpec, ResponseSpec, SceneEntity,
@@ -53,6 +53,7 @@ impl Rig {
                 ResponseSpec::Force => Response::Force,
                 ResponseSpec::Impulse { restitution } => Response::Impulse { restitution },
             },
+            sleep: Some(Sleep::default()),
             ..Settings::default()
         };
         // Which entity it is, is not told; the first that moves is named.

@@ -183,6 +183,7 @@ impl Manipulation {
     fn stand(&mut self, body: usize, state: &Body, entities: &mut [Entity], ahead_s: f64) {
         let entity = self.roster.entities[body];
         self.roster.bodies[body] = *state;
+        self.note_change(body);
         entities[entity].move_to(state.pose());
         self.broad_phase.moved(entity, &entities[entity], &(state.velocity_W * ahead_s));
     }

@@ -113,6 +113,7 @@ impl Manipulation {
     }
 
     fn put_to_sleep(&mut self, body: usize, entities: &mut [Entity]) {
+        self.note_change(body);
         let state = &mut self.roster.bodies[body];
         (state.velocity_W, state.angular_momentum_W) = Default::default();
         let entity = &mut entities[self.roster.entities[body]];
