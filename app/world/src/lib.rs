@@ -45,6 +45,7 @@ mod friction;
 mod guide;
 mod height_map;
 mod layout;
+pub mod lists;
 mod material;
 pub mod model;
 mod motion;
