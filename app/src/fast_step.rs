@@ -30,6 +30,7 @@ use shm_abi::MAX_DEVICES;
 use shm_abi::frame::{DEVICE_ORIENTATION_MEASURED, DEVICE_POSITION_VALID};
 use shm_abi::{Command, DeviceFrame, Frame};
 use world::Layout;
+use world::lists::{Handed, ListSettings, Lists, Reach, SlowList};
 
 /// A finger and the device that is it.
 #[derive(Debug, Clone)]
@@ -43,7 +44,6 @@ pub struct DeviceFinger {
 }
 
 /// The state of rendering from tick to tick.
-#[derive(Debug, Clone)]
 pub struct FastStep {
     fingers: Vec<DeviceFinger>,
     entities: Vec<Entity>,
@@ -110,12 +110,28 @@ impl FastStep {
         mut self,
         bodies: &[(usize, Body)],
         settings: physics::Settings,
+        lists: ListSettings,
         hand: &[HandFinger],
         wants_quality: bool,
     ) -> Result<Self, BodyError> {
-        let manipulation = Manipulation::new(&self.entities, bodies, settings)?;
-        self.objects = Objects::new(manipulation, hand, wants_quality, self.period_s);
+        self.objects = if bodies.len() <= lists.fast_bodies {
+            let manipulation = Manipulation::new(&self.entities, bodies, settings)?;
+            Objects::new(manipulation, hand, wants_quality, self.period_s)
+        } else {
+            let Lists { fast, hand_over, slow } = Lists::new(&self.entities, bodies, settings, lists)?;
+            Objects::new(fast, hand, wants_quality, self.period_s).with_lists(hand_over, slow)
+        };
         Ok(self)
+    }
+
+    /// The slow list, to be stepped by another thread; see [`Objects::take_slow`].
+    pub fn take_slow(&mut self) -> Option<SlowList> {
+        self.objects.take_slow()
+    }
+
+    /// How many bodies are in the fast list, and what has been handed over; `None` where there is no slow list.
+    pub fn handed(&self) -> Option<(usize, Handed)> {
+        self.objects.handed()
     }
 
     /// All entities.
@@ -179,6 +195,11 @@ impl FastStep {
         let devices = frame.present_devices();
         let moment = Moment { t_s: row.run_tick as f64 * self.period_s, dt_s };
         let mut hips = [None; MAX_DEVICES];
+        let reaches =
+            self.fingers.iter().zip(&self.tips_D).filter_map(|(finger, last_D)| {
+                finger.reach(devices.get(finger.device)?, last_D.as_ref(), dt_s)
+            });
+        self.objects.reach(&mut self.entities, reaches);
         let broad_phase = self.objects.broad_phase();
         let moved = self.tips_D.iter_mut().zip(&mut self.carried_W).zip(&mut hips).zip(&mut self.near);
         for ((finger, row), (((tip_D, carried_W), hip), near)) in
@@ -197,6 +218,7 @@ impl FastStep {
         if frame.run_tick >= 0 {
             self.objects.step(&mut self.entities, &self.fingers, &mut row.fingers, dt_s);
         }
+        self.objects.let_go(&self.entities, frame.run_tick >= 0);
         let tick = Tick::new(frame, &self.entities, dt_s);
         let states = self.finger_effects.iter_mut().zip(&mut self.passivities);
         for ((finger, row), (carried, (felt, passivity))) in
@@ -294,6 +316,16 @@ impl DeviceFinger {
     fn velocity_W(&self, device: &DeviceFrame, carried_W: Vector3<f64>) -> Vector3<f64> {
         let own_W = self.mount.velocity_to_world(device.velocity_m_per_s_estimated);
         if carried_W == Vector3::zeros() { own_W } else { own_W + carried_W }
+    }
+
+    /// Where it is and how fast it moves; by its last position `last_D`, if that is known.
+    fn reach(&self, device: &DeviceFrame, last_D: Option<&[f64; 3]>, dt_s: f64) -> Option<Reach> {
+        if device.flags & DEVICE_POSITION_VALID == 0 {
+            return None;
+        }
+        let hip_W = self.mount.point_to_world(device.position_m_measured);
+        let from_W = last_D.map_or(hip_W, |last_D| self.mount.point_to_world(*last_D));
+        Some(Reach { hip_W, velocity_W: (hip_W - from_W) / dt_s, radius_m: self.finger.radius_m() })
     }
 
     fn step(

@@ -31,6 +31,7 @@ pub mod row_queue;
 pub mod run;
 pub mod simulated;
 pub mod slow;
+pub mod slow_thread;
 pub mod study;
 pub mod two_processes;
 pub mod virtual_clock;

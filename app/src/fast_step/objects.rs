@@ -11,9 +11,13 @@ use haptics::{ContactState, Entity};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use physics::{BroadPhase, FingerSettings, FingerTick, Made, Manipulation, Touch};
 
+use world::lists::{FastList, Handed, Reach, SlowList};
+
 use super::DeviceFinger;
 use crate::row::{BodyRow, FingerRow};
 
+/// Ticks between two turns of the slow list, where no thread of its own has it.
+const SLOW_EVERY: u32 = 10;
 /// A finger touches no more bodies at once.
 const MOST_TOUCHED: usize = 16;
 /// Ticks that a single step of the objects makes up for at most.
@@ -29,9 +33,10 @@ pub struct HandFinger {
 }
 
 /// Moving entities and what is known of them.
-#[derive(Debug, Clone)]
 pub struct Objects {
     manipulation: Manipulation,
+    /// Who is in the slow list, where there is one.
+    lists: Option<SlowOnes>,
     touches: Vec<Touch>,
     ticks: Vec<FingerTick>,
     /// The button with which each finger ties.
@@ -44,6 +49,15 @@ pub struct Objects {
     period_s: f64,
     /// What the last tick took.
     pub made: Made,
+}
+
+/// What the slow list has, as the fast side sees it.
+struct SlowOnes {
+    hand_over: FastList,
+    /// The slow side itself, while no other thread has it.
+    slow: Option<SlowList>,
+    /// Ticks that it has not been told of yet.
+    ticks: u32,
 }
 
 impl Objects {
@@ -66,11 +80,49 @@ impl Objects {
             buttons: fingers.iter().map(|finger| finger.button).collect(),
             wants_quality,
             manipulation,
+            lists: None,
             period_s,
             made: Made::default(),
         };
         objects.note_all();
         objects
+    }
+
+    /// With a slow list for those that are too many for the fast one. Until another thread [takes](Self::take_slow) it, it
+    /// has its turns here.
+    #[must_use]
+    pub fn with_lists(mut self, hand_over: FastList, slow: SlowList) -> Self {
+        self.lists = Some(SlowOnes { hand_over, slow: Some(slow), ticks: 0 });
+        self
+    }
+
+    /// The slow list, to be stepped by another thread; `None` where there is none, or another one has it.
+    pub fn take_slow(&mut self) -> Option<SlowList> {
+        self.lists.as_mut()?.slow.take()
+    }
+
+    /// How many bodies are in the fast list, and what has been handed over.
+    pub fn handed(&self) -> Option<(usize, Handed)> {
+        let lists = self.lists.as_ref()?;
+        Some((lists.hand_over.here(), lists.hand_over.handed()))
+    }
+
+    /// Before fingers are stepped: who could be reached soon comes into the fast list. `reaches` are the fingers'.
+    pub fn reach(&mut self, entities: &mut [Entity], reaches: impl Iterator<Item = Reach>) {
+        if let Some(lists) = &mut self.lists {
+            lists.hand_over.begin_tick(&mut self.manipulation, entities, reaches);
+        }
+    }
+
+    /// After all: who is out of reach may go; and the slow list has its turn, if it is here.
+    pub fn let_go(&mut self, entities: &[Entity], is_running: bool) {
+        let Some(lists) = &mut self.lists else { return };
+        lists.hand_over.end_tick(&mut self.manipulation, entities);
+        lists.ticks += 1;
+        if let Some(slow) = lists.slow.as_mut().filter(|_| lists.ticks >= SLOW_EVERY) {
+            slow.turn(if is_running { lists.ticks } else { 0 }, self.period_s);
+            lists.ticks = 0;
+        }
     }
 
     /// The bodies as the tick began.
