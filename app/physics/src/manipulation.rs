@@ -13,6 +13,7 @@ use crate::integrator::explicit::{self, Kept};
 use crate::integrator::rk4::Stages;
 use crate::integrator::{Gets, Integrator, Limits, mean_angular_velocity_W};
 use crate::pair::{Pair, Response, Start, Surfacing, fastest_point_m_s};
+use crate::pull::{MAX_PULLS, Pull};
 use crate::restitution::Restitution;
 use crate::row::Row;
 use crate::solver::{Motion, Solver};
@@ -64,8 +65,9 @@ pub struct Manipulation {
     solver: Solver,
     hand: Hand,
     restitution: Restitution,
-    /// The first so many rows are fingers'.
+    /// The first so many rows are fingers', and the first so many of these press or hold.
     touching: usize,
+    pressing: usize,
     gets: Box<[Gets]>,
     stages: Stages,
     fixed: Vec<Kept>,
@@ -130,7 +132,7 @@ impl Manipulation {
                 }
             }
         }
-        let room = (pairs.len() * MAX_POINTS).min(MAX_ROWS) + MAX_TOUCHES;
+        let room = (pairs.len() * MAX_POINTS).min(MAX_ROWS) + MAX_TOUCHES + MAX_PULLS;
         Ok(Self {
             settings,
             bodies: bodies.iter().map(|(_, body)| *body).collect(),
@@ -144,6 +146,7 @@ impl Manipulation {
             solver: Solver::with_capacity(room, bodies.len()),
             restitution: Restitution::with_capacity(room, bodies.len()),
             touching: 0,
+            pressing: 0,
             gets: vec![Gets::default(); bodies.len()].into(),
             stages: Stages::with_capacity(room, bodies.len()),
             fixed: Vec::with_capacity(room),
@@ -171,7 +174,7 @@ impl Manipulation {
         let state = self.bodies.get(body)?;
         let weight_W = self.settings.gravity_W * state.mass.mass_kg;
         // Arms are those of the tick's beginning: any centre will do.
-        Some(grasp::quality(&self.rows, self.touching, body, (&state.centre_W, &weight_W)))
+        Some(grasp::quality(&self.rows, self.pressing, body, (&state.centre_W, &weight_W)))
     }
 
     /// The line between the two fingers that held a body in the last tick.
@@ -213,16 +216,33 @@ impl Manipulation {
         fingers: &mut [FingerTick],
         dt_s: f64,
     ) -> Made {
+        self.step_pulled(entities, touches, &mut [], fingers, dt_s)
+    }
+
+    /// As [`Self::step_with`], with what acts between fingers and bodies without a touch; of each pull, `force_on_user_W`
+    /// becomes what the body got, times -1.
+    pub fn step_pulled(
+        &mut self,
+        entities: &mut [Entity],
+        touches: &mut [Touch],
+        pulls: &mut [Pull],
+        fingers: &mut [FingerTick],
+        dt_s: f64,
+    ) -> Made {
         if !(dt_s > 0.0 && dt_s.is_finite()) {
             return Made::default();
         }
         self.fall_freely(dt_s);
-        let touch_rows = self.gather(entities, touches, fingers, dt_s);
+        let (touch_rows, pull_rows) = self.gather(entities, touches, pulls, fingers, dt_s);
         let sweeps = self.find_forces(dt_s);
         for (touch, row) in touches.iter_mut().zip(touch_rows) {
             if let Some(row) = row {
                 touch.force_on_user_W = -self.rows[row].force_W;
             }
+        }
+        for (at, pull) in pulls.iter_mut().enumerate() {
+            let row = pull_rows.get(at).copied().flatten();
+            pull.force_on_user_W = row.map_or(Vector3::zeros(), |row| -self.rows[row].force_W);
         }
         self.hand.settle(&self.rows, &self.motions, &self.entities, fingers, dt_s);
         for pair in &mut self.pairs {
@@ -251,14 +271,15 @@ impl Manipulation {
         }
     }
 
-    /// All contact points of the tick; says which are whose touch.
+    /// All contact points of the tick; says which rows are whose touch and pull.
     fn gather(
         &mut self,
         entities: &[Entity],
         touches: &[Touch],
+        pulls: &[Pull],
         fingers: &[FingerTick],
         dt_s: f64,
-    ) -> [Option<usize>; MAX_TOUCHES] {
+    ) -> ([Option<usize>; MAX_TOUCHES], [Option<usize>; MAX_PULLS]) {
         self.rows.clear();
         let mut touch_rows = [None; MAX_TOUCHES];
         // Fingers first: they are never left out.
@@ -284,6 +305,8 @@ impl Manipulation {
             fingers,
             &mut self.rows,
         );
+        self.pressing = self.rows.len();
+        let pull_rows = self.gather_pulls(pulls, dt_s);
         self.touching = self.rows.len();
         self.restitution.impacts.clear();
         self.speeds_m_s.clear();
@@ -302,7 +325,21 @@ impl Manipulation {
         for pair in &mut self.pairs {
             pair.gather(&start, &mut self.rows, &mut self.restitution.impacts);
         }
-        touch_rows
+        (touch_rows, pull_rows)
+    }
+
+    /// The rows of pulls; says which are whose.
+    fn gather_pulls(&mut self, pulls: &[Pull], dt_s: f64) -> [Option<usize>; MAX_PULLS] {
+        let mut pull_rows = [None; MAX_PULLS];
+        for (pull, place) in pulls.iter().zip(&mut pull_rows) {
+            let Some(body) = self.entities.iter().position(|&entity| entity == pull.entity) else { continue };
+            let (state, motion) = (&self.bodies[body], moving(&self.bodies[body]));
+            if let Some(row) = pull.row(body, &state.centre_W, &motion, dt_s) {
+                *place = Some(self.rows.len());
+                self.rows.push(row);
+            }
+        }
+        pull_rows
     }
 
     /// What all contact points do in the tick; returns the turns of the solver.
