@@ -38,6 +38,7 @@ mod manipulation;
 mod mass;
 mod pair;
 mod pair_friction;
+mod pair_restitution;
 mod pull;
 mod restitution;
 mod row;
