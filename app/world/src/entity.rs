@@ -80,7 +80,7 @@ impl SceneEntity {
         let material = read_material(table)?;
         let stiffness_default =
             material.map_or(Self::DEFAULT_STIFFNESS_N_PER_M, |made_of| made_of.stiffness_n_per_m);
-        let motion = MotionSpec::read(table)?;
+        let motion = MotionSpec::read(table, material)?;
         let usual_damping = if motion.is_some() { MotionSpec::DEFAULT_DAMPING_N_S_PER_M } else { 0.0 };
         let damping_default = material.map_or(usual_damping, |made_of| made_of.damping_n_s_per_m);
         let name = names.claim(table, format!("e{i}"))?;
@@ -134,6 +134,7 @@ const KEYS: Vocabulary = Vocabulary {
         "height_map",
         "magnetism",
         "vibration",
+        "movable",
         "mass_kg",
         "density_kg_m3",
         "inertia_kg_m2",
