@@ -39,10 +39,14 @@ impl Pull {
     ) -> Option<Row> {
         let force_W = -self.force_on_user_W;
         let size_n = force_W.norm();
-        if !(size_n > 0.0 && size_n.is_finite()) {
+        let arm_W = self.point_W - centre_W;
+        let is_possible = size_n > 0.0
+            && size_n.is_finite()
+            && arm_W.iter().all(|x| x.is_finite())
+            && (0.0..f64::INFINITY).contains(&self.stiffness_n_per_m);
+        if !is_possible {
             return None;
         }
-        let arm_W = self.point_W - centre_W;
         let mut row = Row {
             body,
             other: None,
