@@ -134,7 +134,7 @@ fn what_is_movable_has_a_mass_a_density_or_a_material() {
     for mass in ["mass_kg", "density_kg_m3"] {
         refused(
             &with_entity(&format!("movable = false\n{mass} = 1")),
-            "s.toml:8: entity[0].movable: found false; allowed: true, or neither `mass_kg` nor `density_kg_m3`",
+            "s.toml:8: entity[0].movable: found the boolean false; allowed: true, or neither `mass_kg` nor `density_kg_m3`",
         );
     }
     refused(&with_entity("movable = 1"), "s.toml:8: entity[0].movable: found 1; allowed: true or false");
