@@ -1,16 +1,15 @@
 //! The entities that move, in the fast step: what the fingers' touches do to them, and what that does to the fingers.
 //!
-//! Model: fingers render against the entities as they are when the tick begins. Each touch on one that moves is handed to
-//! [`physics::Manipulation`], which gives back the force that the body got; the finger's force is changed by the
+//! Model: fingers render against the entities as they are when the tick begins. Each touch on one that moves, and what else
+//! acts between a finger and one (magnetism, vibration), is handed to [`physics::Manipulation`], which gives back the force that the body got; the finger's force is changed by the
 //! difference. So what is commanded is, times -1, what moved the object.
 //!
 //! Invariants: nothing moves before a run's t = 0 (the scene is what it says until then), and no stall of the driver is
 //! made up for at once: objects are late by what was missed.
 
-use haptics::{ContactState, Entity};
+use haptics::{ContactState, Entity, FingerEffects};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use physics::{BroadPhase, FingerSettings, FingerTick, Made, Manipulation, Touch};
-
+use physics::{BroadPhase, FingerSettings, FingerTick, MAX_PULLS, Made, Manipulation, Pull, Touch};
 use world::lists::{FastList, Handed, Reach, SlowList};
 
 use super::DeviceFinger;
@@ -38,6 +37,7 @@ pub struct Objects {
     /// Who is in the slow list, where there is one.
     lists: Option<SlowOnes>,
     touches: Vec<Touch>,
+    pulls: Vec<Pull>,
     ticks: Vec<FingerTick>,
     /// The button with which each finger ties.
     buttons: Vec<Option<u32>>,
@@ -76,6 +76,7 @@ impl Objects {
             rows: vec![BodyRow::default(); bodies],
             changed: (0..bodies as u32).collect(),
             touches: Vec::with_capacity(room),
+            pulls: Vec::with_capacity(MAX_PULLS),
             ticks: vec![FingerTick::at(Vector3::zeros()); fingers.len()],
             buttons: fingers.iter().map(|finger| finger.button).collect(),
             wants_quality,
@@ -179,9 +180,11 @@ impl Objects {
         &mut self,
         entities: &mut [Entity],
         fingers: &[DeviceFinger],
+        felt: &[FingerEffects],
         rows: &mut [FingerRow],
         dt_s: f64,
     ) {
+        self.pull(felt, rows);
         self.touches.clear();
         for (index, finger) in fingers.iter().enumerate() {
             for contact in finger.finger.contacts() {
@@ -215,7 +218,13 @@ impl Objects {
             };
         }
         let dt_s = dt_s.min(MOST_TICKS * self.period_s);
-        self.made = self.manipulation.step_with(entities, &mut self.touches, &mut self.ticks, dt_s);
+        self.made = self.manipulation.step_pulled(
+            entities,
+            &mut self.touches,
+            &mut self.pulls,
+            &mut self.ticks,
+            dt_s,
+        );
         for (row, tick) in rows.iter_mut().zip(&self.ticks) {
             row.force_on_user += tick.force_on_user_W;
             row.torque_on_user += tick.torque_on_user_W;
@@ -228,6 +237,30 @@ impl Objects {
         }
         let got = self.touches.iter().map(|touch| touch.force_on_user_W);
         add_to_rows(got, &self.touches, fingers, rows);
+        for pull in &self.pulls {
+            rows[pull.finger].force_on_user += pull.force_on_user_W;
+        }
+    }
+
+    /// Takes from the fingers' forces what acts between them and bodies beside touches, until it is known what moved those.
+    fn pull(&mut self, felt: &[FingerEffects], rows: &mut [FingerRow]) {
+        self.pulls.clear();
+        for (finger, felt) in felt.iter().enumerate() {
+            for reaction in
+                felt.reactions().iter().filter(|reaction| self.manipulation.is_body(reaction.entity))
+            {
+                rows[finger].force_on_user -= reaction.force_on_user_W;
+                if self.pulls.len() < MAX_PULLS {
+                    self.pulls.push(Pull {
+                        entity: reaction.entity,
+                        finger,
+                        point_W: reaction.point_W,
+                        force_on_user_W: reaction.force_on_user_W,
+                        stiffness_n_per_m: reaction.stiffness_n_per_m,
+                    });
+                }
+            }
+        }
     }
 }
 

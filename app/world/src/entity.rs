@@ -2,6 +2,7 @@
 
 use nalgebra::Isometry3;
 
+use crate::dynamics::ResponseSpec;
 use crate::effects::{MagnetismSpec, VibrationSpec};
 use crate::error::SceneError;
 use crate::friction::FrictionSpec;
@@ -32,6 +33,8 @@ pub struct SceneEntity {
     pub damping_n_s_per_m: f64,
     /// Default none.
     pub friction: FrictionSpec,
+    /// Share of an approaching velocity that comes back, 0 to 1; default what the other entity, or the scene, says.
+    pub restitution: Option<f64>,
     /// Default the Friction Cone Algorithm.
     pub algorithm: AlgorithmSpec,
     /// What it is made of, if the scene says; it gave the values that the scene did not.
@@ -67,12 +70,17 @@ impl SceneEntity {
     pub const DEFAULT_STIFFNESS_N_PER_M: f64 = 1000.0;
 
     /// Reads the `[[entity]]` at position `i` of the list.
-    pub(crate) fn read(table: &Table<'_>, i: usize, names: &mut Names) -> Result<Self, SceneError> {
+    pub(crate) fn read(
+        table: &Table<'_>,
+        i: usize,
+        names: &mut Names,
+        response: ResponseSpec,
+    ) -> Result<Self, SceneError> {
         table.check_keys(&KEYS)?;
         let material = read_material(table)?;
         let stiffness_default =
             material.map_or(Self::DEFAULT_STIFFNESS_N_PER_M, |made_of| made_of.stiffness_n_per_m);
-        let motion = MotionSpec::read(table)?;
+        let motion = MotionSpec::read(table, material)?;
         let usual_damping = if motion.is_some() { MotionSpec::DEFAULT_DAMPING_N_S_PER_M } else { 0.0 };
         let damping_default = material.map_or(usual_damping, |made_of| made_of.damping_n_s_per_m);
         let name = names.claim(table, format!("e{i}"))?;
@@ -84,6 +92,7 @@ impl SceneEntity {
             stiffness_n_per_m: table.number_or("stiffness_n_per_m", Bound::Positive, stiffness_default)?,
             damping_n_s_per_m: table.number_or("damping_n_s_per_m", Bound::NotNegative, damping_default)?,
             friction: FrictionSpec::read(table, material)?,
+            restitution: response.read_restitution(table)?,
             algorithm: AlgorithmSpec::read(table)?,
             material: material.map(|made_of| made_of.name),
             magnetism: MagnetismSpec::read(table)?,
@@ -125,6 +134,7 @@ const KEYS: Vocabulary = Vocabulary {
         "height_map",
         "magnetism",
         "vibration",
+        "movable",
         "mass_kg",
         "density_kg_m3",
         "inertia_kg_m2",
@@ -132,6 +142,7 @@ const KEYS: Vocabulary = Vocabulary {
         "velocity_m_s",
         "angular_velocity_rad_s",
         "rotation_locked",
+        "restitution",
     ],
     later: &[],
 };

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::Vector3;
 
 use crate::document::{Document, LineEnds};
-use crate::dynamics::DynamicsSpec;
+use crate::dynamics::{DynamicsSpec, ResponseSpec};
 use crate::entity::SceneEntity;
 use crate::error::SceneError;
 use crate::field::FieldSpec;
@@ -61,13 +61,14 @@ impl Scene {
         let root = document.parse()?;
         let table = Table::root(document, &root);
         table.check_keys(&KEYS)?;
+        let dynamics = DynamicsSpec::read(&table)?;
         Ok(Self {
             name: read_name(&table, file)?,
             gravity_m_s2: table.numbers_or("gravity_m_s2", Self::DEFAULT_GRAVITY_M_S2)?.into(),
-            dynamics: DynamicsSpec::read(&table)?,
+            dynamics,
             hand: read_hand(&table, file)?,
             fingers: SceneFinger::read_all(&table)?,
-            entities: read_entities(&table)?,
+            entities: read_entities(&table, dynamics.response)?,
             fields: FieldSpec::read_all(&table)?,
             guides: GuideSpec::read_all(&table)?,
         })
@@ -87,10 +88,10 @@ fn read_hand(table: &Table<'_>, file: &Path) -> Result<Option<PathBuf>, SceneErr
     Ok(Some(file.parent().unwrap_or(Path::new("")).join(hand)))
 }
 
-fn read_entities(table: &Table<'_>) -> Result<Vec<SceneEntity>, SceneError> {
+fn read_entities(table: &Table<'_>, response: ResponseSpec) -> Result<Vec<SceneEntity>, SceneError> {
     let mut names = Names::default();
     let tables = table.tables("entity")?;
-    tables.iter().enumerate().map(|(i, table)| SceneEntity::read(table, i, &mut names)).collect()
+    tables.iter().enumerate().map(|(i, table)| SceneEntity::read(table, i, &mut names, response)).collect()
 }
 
 const KEYS: Vocabulary = Vocabulary {
