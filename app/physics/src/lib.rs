@@ -60,6 +60,6 @@ pub use pair::{Response, Surfacing};
 pub use pair_friction::PairFriction;
 pub use row::{Held, Row, Torsion};
 pub use soft_finger::{SoftFinger, TorsionModel};
-pub use solver::{MAX_SWEEPS, Motion, Solver};
+pub use solver::{Islands, MAX_SWEEPS, Motion, Solved, Solver};
 pub use touch::Touch;
 pub use wrench::Wrench;

@@ -15,7 +15,7 @@ use crate::integrator::{Gets, Integrator, Limits, mean_angular_velocity_W};
 use crate::pair::{Pair, Response, Start, Surfacing, fastest_point_m_s};
 use crate::restitution::Restitution;
 use crate::row::Row;
-use crate::solver::{Motion, Solver};
+use crate::solver::{Islands, Motion, Solved, Solver};
 use crate::touch::Touch;
 
 /// What holds for all bodies.
@@ -73,12 +73,16 @@ pub struct Manipulation {
 }
 
 /// What a tick took and did.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Made {
     /// Contact points, those of fingers among them.
     pub rows: usize,
-    /// Turns of the solver.
+    /// Rounds of the solver: of the island that took most.
     pub sweeps: usize,
+    /// What was left of its equations, as a share of all forces ([`Solved::residual`]).
+    pub residual: f64,
+    /// Islands for which it found no answer.
+    pub unsolved: usize,
     /// Bodies that were parked in this tick: the last so many of [`Manipulation::parked`].
     pub parked: usize,
 }
@@ -194,6 +198,11 @@ impl Manipulation {
         &self.rows
     }
 
+    /// Which bodies were in touch in the last tick, by their numbers: whole islands are handed over and put to sleep.
+    pub fn islands(&self) -> &Islands {
+        self.solver.islands()
+    }
+
     /// Bodies that do not move any more, in the order in which they were parked: the last [`Made::parked`] of them in the last
     /// tick.
     pub fn parked(&self) -> &[Parked] {
@@ -218,7 +227,7 @@ impl Manipulation {
         }
         self.fall_freely(dt_s);
         let touch_rows = self.gather(entities, touches, fingers, dt_s);
-        let sweeps = self.find_forces(dt_s);
+        let Solved { sweeps, residual, unsolved } = self.find_forces(dt_s);
         for (touch, row) in touches.iter_mut().zip(touch_rows) {
             if let Some(row) = row {
                 touch.force_on_user_W = -self.rows[row].force_W;
@@ -230,7 +239,7 @@ impl Manipulation {
         }
         self.sum_up();
         let parked = self.advance(entities, dt_s);
-        Made { rows: self.rows.len(), sweeps, parked }
+        Made { rows: self.rows.len(), sweeps, residual, unsolved, parked }
     }
 
     /// How the bodies would move without anything that touches them.
@@ -305,8 +314,8 @@ impl Manipulation {
         touch_rows
     }
 
-    /// What all contact points do in the tick; returns the turns of the solver.
-    fn find_forces(&mut self, dt_s: f64) -> usize {
+    /// What all contact points do in the tick; says how well they were found.
+    fn find_forces(&mut self, dt_s: f64) -> Solved {
         for (gets, &is_parked) in self.gets.iter_mut().zip(&self.is_parked) {
             *gets = Gets { gravity_W: self.settings.gravity_W, is_parked, ..Gets::default() };
         }
@@ -332,9 +341,9 @@ impl Manipulation {
                 }
             }
         }
-        let sweeps = self.restitution.solve(&mut self.solver, &mut self.rows, &mut self.motions, dt_s);
+        let solved = self.restitution.solve(&mut self.solver, &mut self.rows, &mut self.motions, dt_s);
         explicit::release(&mut self.rows, &mut self.fixed);
-        sweeps
+        solved
     }
 
     /// What each body gets: the Residual Force and Torque Algorithms.

@@ -14,7 +14,7 @@
 use nalgebra::Vector3;
 
 use crate::row::Row;
-use crate::solver::{Motion, Solver};
+use crate::solver::{Motion, Solved, Solver};
 
 /// Room for both solutions.
 #[derive(Debug, Clone, Default)]
@@ -39,19 +39,19 @@ impl Restitution {
         }
     }
 
-    /// Solves for all rows' forces such that impacts give no energy; returns the turns made.
+    /// Solves for all rows' forces such that impacts give no energy; says how well.
     pub(crate) fn solve(
         &mut self,
         solver: &mut Solver,
         rows: &mut [Row],
         motions: &mut [Motion],
         dt_s: f64,
-    ) -> usize {
+    ) -> Solved {
         self.freely.clear();
         self.freely.extend_from_slice(motions);
-        let sweeps = solver.solve(rows, motions, dt_s);
+        let solved = solver.solve(rows, motions, dt_s);
         if !self.gives_energy(rows, motions) {
-            return sweeps;
+            return solved;
         }
         self.bouncing.clear();
         self.bouncing.extend_from_slice(motions);
@@ -66,7 +66,7 @@ impl Restitution {
         let more = solver.solve(rows, motions, dt_s);
         self.find_shares(rows, motions);
         self.mix(rows, motions);
-        sweeps + more
+        Solved { sweeps: solved.sweeps + more.sweeps, ..solved.and(more) }
     }
 
     /// Whether the impacts of any body work on it.
