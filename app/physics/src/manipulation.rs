@@ -126,10 +126,7 @@ impl Manipulation {
                 let other = body_of(b);
                 // Of two bodies once.
                 if b != a && other.is_none_or(|other| other > number) {
-                    // Between two that move, springs answer: reflected velocities of many bodies at once are not found in
-                    // a tick's turns.
-                    let response = if other.is_some() { Response::Force } else { settings.response };
-                    let surfacing = Surfacing::between(&entities[a], &entities[b], response);
+                    let surfacing = Surfacing::between(&entities[a], &entities[b], settings.response);
                     pairs.push(Pair::new([a, b], (number, other), surfacing));
                 }
             }
@@ -235,7 +232,7 @@ impl Manipulation {
         }
         self.hand.settle(&self.rows, &self.motions, &self.entities, fingers, dt_s);
         for pair in &mut self.pairs {
-            pair.settle(&self.rows, &self.motions, entities, dt_s);
+            pair.settle(&self.rows, &self.motions, entities, |row| self.restitution.has_met(row), dt_s);
         }
         self.sum_up();
         let parked = self.advance(entities, dt_s);
@@ -294,7 +291,7 @@ impl Manipulation {
             &mut self.rows,
         );
         self.touching = self.rows.len();
-        self.restitution.impacts.clear();
+        self.restitution.meetings.clear();
         self.speeds_m_s.clear();
         let moving = self.entities.iter().zip(&self.bodies).zip(&self.motions);
         self.speeds_m_s.extend(
@@ -309,7 +306,7 @@ impl Manipulation {
             is_implicit: self.settings.integrator.is_implicit(),
         };
         for pair in &mut self.pairs {
-            pair.gather(&start, &mut self.rows, &mut self.restitution.impacts);
+            pair.gather(&start, &mut self.rows, &mut self.restitution.meetings);
         }
         touch_rows
     }

@@ -5,8 +5,8 @@
 //! from `k dt^2 / m` = 4 on). And what lifts the lowest of a stack lifts all of it within the tick (Melder ch. 6.1.3).
 //!
 //! Model: each [`Row`]'s force is that of the end of the tick, `project(rest - (k dt + b) u)`, where `u` is the velocity
-//! that all forces of the tick leave its point with. Bodies that press each other are an island ([`island`]): six unknowns a body,
-//! whatever the number of its contact points, and they are found together by Newton's method ([`newton`]). Islands of more
+//! that all forces of the tick leave its point with. Bodies that press each other are an island ([`island`]): six unknowns a
+//! body, whatever the number of its contact points, and they are found together by Newton's method ([`newton`]). Islands of more
 //! than [`blocks::MAX_BODIES`], or that are more entangled than a tick has time for, are found body by body in turns ([`together`]).
 //! Warm: all begin with the forces of the last tick.
 //!
@@ -91,6 +91,12 @@ impl Solver {
 
     /// The islands of the last tick that was solved.
     pub fn islands(&self) -> &Islands {
+        &self.islands
+    }
+
+    /// Finds which bodies these rows join.
+    pub(crate) fn find_islands(&mut self, rows: &[Row], motions: &[Motion]) -> &Islands {
+        let _ = self.islands.of(rows, motions);
         &self.islands
     }
 

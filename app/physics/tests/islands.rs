@@ -225,18 +225,17 @@ fn islands_are_what_rows_join_and_what_nothing_moves_joins_nobody() {
     for seed in 0..500 {
         let noise = &mut Noise::new(seed);
         let count = 1 + noise.below(30);
-        let still = |motion: Motion| Motion {
+        let still = Motion {
             velocity_W: Vector3::zeros(),
             angular_velocity_W: Vector3::zeros(),
             inverse_mass: 0.0,
             inverse_inertia_W: Matrix3::zeros(),
-            ..motion
         };
         let motions: Vec<_> = (0..count)
             .map(|_| {
                 let is_still = noise.chance(0.2);
                 let motion = motion(noise, 0.1);
-                if is_still { still(motion) } else { motion }
+                if is_still { still } else { motion }
             })
             .collect();
         let rows: Vec<_> = (0..noise.below(30))

@@ -7,7 +7,7 @@
 //! Which bodies depend on which are bits of a word: [`MAX_BODIES`].
 //! Cost: a product of blocks for each two that depend on a body when it is eliminated, at most [`MAX_PRODUCTS`].
 
-use super::six::{Matrix6, Vector6};
+use super::six::{Block, NOTHING, Triangles, Vector6, take_image, take_product};
 
 /// The most bodies that are solved for together.
 pub(super) const MAX_BODIES: usize = 64;
@@ -18,7 +18,7 @@ const MAX_PRODUCTS: usize = 1024;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Blocks {
     stride: usize,
-    blocks: Vec<Matrix6>,
+    blocks: Vec<Block>,
     order: Vec<usize>,
     /// Of each body, which depend on it when it is eliminated.
     later: Vec<u64>,
@@ -29,7 +29,7 @@ impl Blocks {
         let stride = bodies.min(MAX_BODIES);
         Self {
             stride,
-            blocks: vec![Matrix6::zeros(); stride * stride],
+            blocks: vec![NOTHING; stride * stride],
             order: Vec::with_capacity(stride),
             later: Vec::with_capacity(stride),
         }
@@ -65,21 +65,21 @@ impl Blocks {
     /// Makes all blocks zero that elimination needs.
     pub(super) fn clear(&mut self) {
         for &body in &self.order {
-            *block(&mut self.blocks, self.stride, body, body) = Matrix6::zeros();
+            *block(&mut self.blocks, self.stride, body, body) = NOTHING;
             for other in bits(self.later[body]) {
-                *block(&mut self.blocks, self.stride, body, other) = Matrix6::zeros();
-                *block(&mut self.blocks, self.stride, other, body) = Matrix6::zeros();
+                *block(&mut self.blocks, self.stride, body, other) = NOTHING;
+                *block(&mut self.blocks, self.stride, other, body) = NOTHING;
             }
         }
     }
 
     #[inline]
-    pub(super) fn at(&mut self, row: usize, column: usize) -> &mut Matrix6 {
+    pub(super) fn at(&mut self, row: usize, column: usize) -> &mut Block {
         block(&mut self.blocks, self.stride, row, column)
     }
 
     /// Changes all blocks that can be other than zero, by their row and column.
-    pub(super) fn for_each(&mut self, mut change: impl FnMut(usize, usize, &mut Matrix6)) {
+    pub(super) fn for_each(&mut self, mut change: impl FnMut(usize, usize, &mut Block)) {
         for &body in &self.order {
             change(body, body, block(&mut self.blocks, self.stride, body, body));
             for other in bits(self.later[body]) {
@@ -94,28 +94,25 @@ impl Blocks {
         let Self { stride, blocks, order, later } = self;
         let index = |row: usize, column: usize| row * *stride + column;
         for &body in order.iter() {
-            let lu = blocks[index(body, body)].lu();
-            if !lu.solve_mut(&mut side[body]) {
-                return false;
-            }
+            let Some(triangles) = Triangles::of(&blocks[index(body, body)]) else { return false };
+            triangles.solve(&mut side[body]);
             for other in bits(later[body]) {
-                if !lu.solve_mut(&mut blocks[index(body, other)]) {
-                    return false;
-                }
+                triangles.solve_block(&mut blocks[index(body, other)]);
             }
             for row in bits(later[body]) {
                 let factor = blocks[index(row, body)];
-                side[row] -= factor * side[body];
+                let known = side[body];
+                take_image(&mut side[row], &factor, &known);
                 for column in bits(later[body]) {
-                    let product = factor * blocks[index(body, column)];
-                    blocks[index(row, column)] -= product;
+                    let right = blocks[index(body, column)];
+                    take_product(&mut blocks[index(row, column)], &factor, &right);
                 }
             }
         }
         for &body in order.iter().rev() {
             for other in bits(later[body]) {
-                let known = blocks[index(body, other)] * side[other];
-                side[body] -= known;
+                let known = side[other];
+                take_image(&mut side[body], &blocks[index(body, other)], &known);
             }
         }
         true
@@ -123,7 +120,7 @@ impl Blocks {
 }
 
 #[inline]
-fn block(blocks: &mut [Matrix6], stride: usize, row: usize, column: usize) -> &mut Matrix6 {
+fn block(blocks: &mut [Block], stride: usize, row: usize, column: usize) -> &mut Block {
     &mut blocks[row * stride + column]
 }
 
@@ -164,10 +161,13 @@ mod tests {
                 let mut whole = DMatrix::<f64>::zeros(6 * bodies, 6 * bodies);
                 let diagonal = (0..bodies).map(|body| [body, body]);
                 for [a, b] in pairs.iter().flat_map(|&[a, b]| [[a, b], [b, a]]).chain(diagonal) {
-                    let own = if a == b { Matrix6::identity() * 8.0 } else { Matrix6::zeros() };
-                    let part = Matrix6::from_fn(|_, _| noise(seed)) + own;
-                    *blocks.at(a, b) = part;
-                    whole.view_mut((6 * a, 6 * b), (6, 6)).copy_from(&part);
+                    for (row, values) in blocks.at(a, b).iter_mut().enumerate() {
+                        for (column, value) in values.iter_mut().enumerate() {
+                            // The largest is never where elimination begins.
+                            *value = noise(seed) + if a == b && (row + 1) % 6 == column { 8.0 } else { 0.0 };
+                            whole[(6 * a + row, 6 * b + column)] = *value;
+                        }
+                    }
                 }
                 let side = DVector::from_fn(6 * bodies, |_, _| noise(seed));
                 let mut fast: Vec<_> =

@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 
 use super::blocks::Blocks;
 use super::link::{Link, SIGNS};
-use super::six::{Matrix6, Vector6, halves, joined};
+use super::six::{Vector6, halves, joined};
 use super::{Motion, lets_slip};
 use crate::row::Row;
 
@@ -135,23 +135,20 @@ impl Equations<'_> {
                 _ if chords => row.torsion.chord(link.spin_rad_s(row, moving), self.dt_s),
                 _ => row.torsion.falls_at_end(link.spin_rad_s(row, moving), self.dt_s),
             };
-            link.add_falls(row, &falls, twists, |[a, b], parts| {
-                let block = blocks.at(a, b);
-                for (at, part) in parts.iter().enumerate() {
-                    let mut place = block.fixed_view_mut::<3, 3>(at / 2 * 3, at % 2 * 3);
-                    place += part;
-                }
-            });
+            link.add_falls(row, &falls, twists, blocks);
         }
         let acts_s = self.dt_s * load;
         blocks.for_each(|row, column, block| {
             let start = &self.starts[column];
-            let along = block.fixed_columns::<3>(0) * (start.inverse_mass * acts_s);
-            let about = block.fixed_columns::<3>(3) * (start.inverse_inertia_W * acts_s);
-            block.fixed_columns_mut::<3>(0).copy_from(&along);
-            block.fixed_columns_mut::<3>(3).copy_from(&about);
-            if row == column {
-                *block += Matrix6::identity();
+            for (at, values) in block.iter_mut().enumerate() {
+                let about = start.inverse_inertia_W * Vector3::new(values[3], values[4], values[5]);
+                let along = start.inverse_mass;
+                *values =
+                    [values[0] * along, values[1] * along, values[2] * along, about.x, about.y, about.z];
+                values.iter_mut().for_each(|value| *value *= acts_s);
+                if row == column {
+                    values[at] += 1.0;
+                }
             }
         });
     }

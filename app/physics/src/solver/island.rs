@@ -53,6 +53,11 @@ impl Islands {
         self.numbers.get(body).copied()
     }
 
+    /// Whether a body is of an island of several.
+    pub(crate) fn are_many(&self, body: usize) -> bool {
+        self.island_of(body).is_some_and(|at| self.starts[at + 1] - self.starts[at] > 1)
+    }
+
     fn join(&mut self, a: usize, b: usize) {
         let (a, b) = (self.root(a), self.root(b));
         self.roots[a.max(b)] = a.min(b);

@@ -3,6 +3,8 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::Motion;
+use super::blocks::Blocks;
+use super::six::add;
 use crate::row::Row;
 
 /// The sign with which a row's force acts on either side.
@@ -116,27 +118,32 @@ impl Link {
     /// Adds, for each two sides, by how much the first one's force and torque fall with the second one's velocity and spin:
     /// the point's force by `falls` (N s/m), its torque about the normal by `twists` (N m s).
     #[inline]
-    pub(super) fn add_falls(
-        &self,
-        row: &Row,
-        falls: &Matrix3<f64>,
-        twists: f64,
-        mut add: impl FnMut([usize; 2], [Matrix3<f64>; 4]),
-    ) {
-        let n = &row.normal_W;
-        for (side, place) in self.inside() {
-            let r = row.arms_W[side].cross_matrix();
-            let turned = r * falls;
-            for (by_side, by_place) in self.inside() {
-                let s = row.arms_W[by_side].cross_matrix();
-                let mut parts = [*falls, -falls * s, turned, -turned * s];
+    pub(super) fn add_falls(&self, row: &Row, falls: &Matrix3<f64>, twists: f64, blocks: &mut Blocks) {
+        for (by_side, by_place) in self.inside() {
+            // Of the force, by velocity and spin: `D` and `-D [s]`.
+            let s = &row.arms_W[by_side];
+            let of_force = [0, 1, 2].map(|at| {
+                let d = Vector3::new(falls[(at, 0)], falls[(at, 1)], falls[(at, 2)]);
+                let turned = s.cross(&d);
+                [d.x, d.y, d.z, turned.x, turned.y, turned.z]
+            });
+            for (side, place) in self.inside() {
+                let r = &row.arms_W[side];
+                let sign = SIGNS[side] * SIGNS[by_side];
+                let block = blocks.at(place, by_place);
+                for at in 0..3 {
+                    add(&mut block[at], &of_force[at], sign);
+                    // Of the torque: `[r]` times that of the force.
+                    let (next, last) = ((at + 1) % 3, (at + 2) % 3);
+                    add(&mut block[3 + at], &of_force[last], sign * r[next]);
+                    add(&mut block[3 + at], &of_force[next], -sign * r[last]);
+                }
                 if twists != 0.0 {
-                    parts[3] += n * n.transpose() * twists;
+                    let n = &row.normal_W;
+                    for (at, by) in (0..9).map(|at| (at / 3, at % 3)) {
+                        block[3 + at][3 + by] += sign * twists * n[at] * n[by];
+                    }
                 }
-                if side != by_side {
-                    parts.iter_mut().for_each(|part| *part = -*part);
-                }
-                add([place, by_place], parts);
             }
         }
     }

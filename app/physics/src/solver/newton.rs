@@ -6,7 +6,8 @@
 //! that moves fast, whatever it does. Bodies that press each other are as one body of more unknowns, whose
 //! linear equations are mostly zeros ([`Blocks`]): a chain is solved, not passed on from body to body.
 //! A step that does not bring it nearer is halved. Where none does (a light body between points with much friction, one
-//! scene in thousands), the forces are let grow from next to nothing; then the points take some cautious turns one by one. Should
+//! scene in thousands), bodies that press each other make a few that lead farther away: many points change at once behind them. If
+//! that does not help, the forces are let grow from next to nothing; then the points take some cautious turns one by one. Should
 //! all that find nothing (contact points many times farther from the centre than the mass itself is), what such turns leave
 //! stands, and is said to be unsolved.
 
@@ -25,11 +26,15 @@ const SOLVED: f64 = 1e-13;
 const NEARLY_SOLVED: f64 = 1e-9;
 /// How often a step is halved.
 const HALVINGS: usize = 6;
+/// How often a step is made that does not bring it nearer.
+const MOST_LEAPS: usize = 8;
 /// Shares of the tick for which forces last, on the way to all of it.
 const LOADS: [f64; 8] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 0.3, 0.6];
 /// Turns of the points one by one: at first, and the most at once; each time twice as many.
 const FIRST_TURNS: usize = 8;
 const MOST_TURNS: usize = 512;
+/// The most points that are come to in so many turns.
+const MOST_VISITS: usize = 12_288;
 
 /// Room for the equations of as many bodies as are solved for at once.
 #[derive(Debug, Clone, Default)]
@@ -38,6 +43,7 @@ pub(super) struct Newton {
     starts: Vec<Motion>,
     now: Trial,
     next: Trial,
+    best: Trial,
     change: Vec<Vector6>,
     blocks: Blocks,
 }
@@ -51,6 +57,7 @@ impl Newton {
             starts: Vec::with_capacity(bodies),
             now: Trial::with_capacity(bodies),
             next: Trial::with_capacity(bodies),
+            best: Trial::with_capacity(bodies),
             change: Vec::with_capacity(bodies),
             blocks: Blocks::with_capacity(bodies),
         }
@@ -105,9 +112,9 @@ impl Newton {
     }
 
     fn solve(&mut self, rows: &mut [Row], dt_s: f64) -> Solved {
-        let Self { links, starts, now, next, change, blocks } = self;
+        let Self { links, starts, now, next, best, change, blocks } = self;
         let equations = Equations { links, starts, dt_s };
-        let mut search = Search { equations, now, next, change, blocks, rounds: 0, most_rounds: MAX_SWEEPS };
+        let mut search = Search { equations, now, next, best, change, blocks, rounds: 0 };
         search.run(rows)
     }
 }
@@ -117,10 +124,10 @@ struct Search<'a> {
     equations: Equations<'a>,
     now: &'a mut Trial,
     next: &'a mut Trial,
+    best: &'a mut Trial,
     change: &'a mut Vec<Vector6>,
     blocks: &'a mut Blocks,
     rounds: usize,
-    most_rounds: usize,
 }
 
 impl Search<'_> {
@@ -155,7 +162,7 @@ impl Search<'_> {
             if is_solved {
                 continue;
             }
-            if self.rounds >= self.most_rounds || turns > MOST_TURNS {
+            if self.rounds >= MAX_SWEEPS || turns > self.most_turns() {
                 return false;
             }
             if turns == 0 {
@@ -180,8 +187,13 @@ impl Search<'_> {
             let row = &mut rows[link.row];
             (row.force_W, row.torsion.torque_nm) = (Vector3::zeros(), 0.0);
         }
-        self.relax(rows, MOST_TURNS);
+        self.relax(rows, self.most_turns());
         self.equations.evaluate(rows, self.now, 1.0);
+    }
+
+    /// As many turns at once as there is time for.
+    fn most_turns(&self) -> usize {
+        (MOST_VISITS / self.equations.links.len().max(1)).clamp(FIRST_TURNS, MOST_TURNS)
     }
 
     /// Newton's steps until it is solved, when that is said, or nothing brings it nearer.
@@ -191,11 +203,21 @@ impl Search<'_> {
             // What rests does as in the last tick.
             return true;
         }
-        while self.rounds < self.most_rounds {
+        // One body alone finds its way without, and sooner.
+        let most_leaps = if self.now.p.len() > 1 { MOST_LEAPS } else { 0 };
+        let mut leaps = 0;
+        while self.rounds < MAX_SWEEPS {
             self.rounds += 1;
             let was_j = self.now.left_j;
             if !self.step(rows, load) {
-                return self.now.is_within(NEARLY_SOLVED);
+                if self.now.is_within(NEARLY_SOLVED) {
+                    return true;
+                }
+                if leaps == most_leaps || !self.leap(rows, load, leaps) {
+                    break;
+                }
+                leaps += 1;
+                continue;
             }
             // Where roundings are all that is left, a step wins little.
             let stalls = self.now.left_j > 0.25 * was_j;
@@ -203,7 +225,26 @@ impl Search<'_> {
                 return true;
             }
         }
+        if leaps > 0 && (self.now.left_j.is_nan() || self.now.left_j > self.best.left_j) {
+            std::mem::swap(self.now, self.best);
+        }
         false
+    }
+
+    /// Goes all of the step though that leads farther away: behind where many points change at once it may be near. Remembers
+    /// the best place so far. Says whether there is such a step.
+    fn leap(&mut self, rows: &[Row], load: f64, leaps: usize) -> bool {
+        if !self.direction(rows, load, false) {
+            return false;
+        }
+        self.next.p.clear();
+        self.next.p.extend(self.now.p.iter().zip(&*self.change).map(|(p, change)| p - change));
+        self.equations.evaluate(rows, self.next, load);
+        if leaps == 0 || self.now.left_j < self.best.left_j {
+            std::mem::swap(self.best, self.now);
+        }
+        std::mem::swap(self.now, self.next);
+        self.now.left_j.is_finite()
     }
 
     /// The way from forces that do next to nothing to all of them.
