@@ -72,6 +72,6 @@ pub use row::{Held, Row, Torsion};
 pub use settings::Settings;
 pub use sleep::Sleep;
 pub use soft_finger::{SoftFinger, TorsionModel};
-pub use solver::{MAX_SWEEPS, Motion, Solver};
+pub use solver::{Islands, MAX_SWEEPS, Motion, Solved, Solver};
 pub use touch::Touch;
 pub use wrench::Wrench;

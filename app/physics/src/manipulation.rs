@@ -26,7 +26,7 @@ use crate::roster::{Roster, Standing};
 use crate::row::Row;
 use crate::settings::Settings;
 use crate::sleep::Sets;
-use crate::solver::{Motion, Solver};
+use crate::solver::{Islands, Motion, Solved, Solver};
 use crate::touch::Touch;
 
 /// All bodies, and what they remember of where they touch.
@@ -67,12 +67,16 @@ pub struct Manipulation {
 }
 
 /// What a tick took and did.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Made {
     /// Contact points, those of fingers among them.
     pub rows: usize,
-    /// Turns of the solver.
+    /// Rounds of the solver: of the island that took most.
     pub sweeps: usize,
+    /// What was left of its equations, as a share of all forces ([`Solved::residual`]).
+    pub residual: f64,
+    /// Islands for which it found no answer.
+    pub unsolved: usize,
     /// Bodies that were parked in this tick: the last so many of [`Manipulation::parked`].
     pub parked: usize,
     /// Bodies that were stepped.
@@ -248,6 +252,11 @@ impl Manipulation {
         &self.rows
     }
 
+    /// Which bodies were in touch in the last tick, by their places among those that are awake.
+    pub fn islands(&self) -> &Islands {
+        self.solver.islands()
+    }
+
     /// The numbers of the bodies that are stepped, in ascending order; their places here are what rows call bodies.
     pub fn awake(&self) -> &[usize] {
         self.roster.awake()
@@ -300,7 +309,7 @@ impl Manipulation {
             self.line_up(entities, dt_s);
         }
         let (touch_rows, pull_rows) = self.gather(entities, touches, pulls, fingers, dt_s);
-        let sweeps = self.find_forces(dt_s);
+        let Solved { sweeps, residual, unsolved } = self.find_forces(dt_s);
         for (touch, row) in touches.iter_mut().zip(touch_rows) {
             if let Some(row) = row {
                 touch.force_on_user_W = -self.rows[row].force_W;
@@ -315,13 +324,14 @@ impl Manipulation {
         }
         self.hand.settle(&self.rows, &self.motions, &self.roster, fingers, dt_s);
         for at in 0..self.pairs.awake_count() {
-            self.pairs.awake_at(at).1.settle(&self.rows, &self.motions, entities, dt_s);
+            let has_met = |row| self.restitution.has_met(row);
+            self.pairs.awake_at(at).1.settle(&self.rows, &self.motions, entities, has_met, dt_s);
         }
         self.sum_up();
         let (awake, parked) = (self.roster.awake().len(), self.advance(entities, dt_s));
         self.keep_up(entities, dt_s);
         self.rest(entities, touches, dt_s);
-        Made { rows: self.rows.len(), sweeps, parked, awake }
+        Made { rows: self.rows.len(), sweeps, residual, unsolved, parked, awake }
     }
 
     /// How the bodies that are awake would move without anything that touches them; behind them those that others
@@ -380,7 +390,7 @@ impl Manipulation {
         self.pressing = self.rows.len();
         let pull_rows = self.gather_pulls(pulls, dt_s);
         self.touching = self.rows.len();
-        self.restitution.impacts.clear();
+        self.restitution.meetings.clear();
         for at in 0..self.pairs.awake_count() {
             let (key, _) = self.pairs.awake_at(at);
             let other = self.roster.place_of_entity(key.entity as usize);
@@ -403,7 +413,7 @@ impl Manipulation {
                 is_implicit: self.settings.integrator.is_implicit(),
             };
             pair.bodies = (first, other);
-            pair.gather(&start, &mut self.rows, &mut self.restitution.impacts);
+            pair.gather(&start, &mut self.rows, &mut self.restitution.meetings);
         }
         (touch_rows, pull_rows)
     }
@@ -447,8 +457,8 @@ impl Manipulation {
         self.entities.len() - 1
     }
 
-    /// What all contact points do in the tick; returns the turns of the solver.
-    fn find_forces(&mut self, dt_s: f64) -> usize {
+    /// What all contact points do in the tick; says how well they were found.
+    fn find_forces(&mut self, dt_s: f64) -> Solved {
         self.gets.clear();
         self.gets.resize(self.bodies.len(), Gets { gravity_W: self.settings.gravity_W, ..Gets::default() });
         self.gets[self.roster.awake().len()..].iter_mut().for_each(|gets| gets.is_fixed = true);
@@ -474,9 +484,9 @@ impl Manipulation {
                 }
             }
         }
-        let sweeps = self.restitution.solve(&mut self.solver, &mut self.rows, &mut self.motions, dt_s);
+        let solved = self.restitution.solve(&mut self.solver, &mut self.rows, &mut self.motions, dt_s);
         explicit::release(&mut self.rows, &mut self.fixed);
-        sweeps
+        solved
     }
 
     /// What each body gets: the Residual Force and Torque Algorithms.

@@ -14,6 +14,7 @@ use crate::collide::{
     ContactPoint, ContactPoints, MAX_POINTS, PairMemory, Solid, bounding_ball, contact_points,
 };
 use crate::pair_friction::PairFriction;
+use crate::restitution::Meeting;
 use crate::row::{Row, Torsion};
 use crate::solver::Motion;
 
@@ -93,8 +94,8 @@ impl Pair {
         Self { entities, surfacing, ..Self::default() }
     }
 
-    /// Finds where it touches, and appends a row for each point; notes which rows are impacts.
-    pub(crate) fn gather(&mut self, start: &Start<'_>, rows: &mut Vec<Row>, impacts: &mut Vec<usize>) {
+    /// Finds where it touches, and appends a row for each point; notes which rows answer by impulses.
+    pub(crate) fn gather(&mut self, start: &Start<'_>, rows: &mut Vec<Row>, meetings: &mut Vec<Meeting>) {
         (self.first_row, self.rows) = (rows.len(), 0);
         let [a, b] = self.entities.map(|index| &start.entities[index]);
         let speed_m_s = self.closing_speed(start);
@@ -115,9 +116,10 @@ impl Pair {
             }
             let let_out_m = let_out_m_s(anchor.granted_m, start.dt_s) * start.dt_s;
             anchor.granted_m = (anchor.granted_m - let_out_m).clamp(0.0, (-point.gap_m).max(0.0));
-            let (row, is_impact) = row(self.bodies, &self.surfacing, anchor, point, &b.X_WB, start);
-            if is_impact {
-                impacts.push(rows.len());
+            let row = row(self.bodies, &self.surfacing, anchor, point, &b.X_WB, start);
+            if let Response::Impulse { restitution } = self.surfacing.response {
+                let gap_m = point.gap_m + anchor.granted_m;
+                meetings.push(Meeting::of((rows.len(), &row), gap_m, restitution, anchor, start));
             }
             rows.push(row);
             self.rows += 1;
@@ -131,11 +133,19 @@ impl Pair {
         self.memory = PairMemory::default();
     }
 
-    /// Takes note of how the tick ended.
-    pub(crate) fn settle(&mut self, rows: &[Row], motions: &[Motion], entities: &[Entity], dt_s: f64) {
+    /// Takes note of how the tick ended, and of which rows met in it after the tick had begun.
+    pub(crate) fn settle(
+        &mut self,
+        rows: &[Row],
+        motions: &[Motion],
+        entities: &[Entity],
+        has_met: impl Fn(usize) -> bool,
+        dt_s: f64,
+    ) {
         let X_WB = &entities[self.entities[1]].X_WB;
-        let own = rows.iter().skip(self.first_row).take(self.rows);
-        for (anchor, row) in self.anchors.iter_mut().zip(own) {
+        let own = rows.iter().enumerate().skip(self.first_row).take(self.rows);
+        for (anchor, (at, row)) in self.anchors.iter_mut().zip(own) {
+            anchor.approached |= has_met(at);
             let mut velocity_W = motions[row.body].at(&row.arms_W[0]);
             if let Some(other) = row.other {
                 velocity_W -= motions[other].at(&row.arms_W[1]);
@@ -213,11 +223,11 @@ pub(crate) fn is_near(a: &Entity, b: &Entity, reach_m: f64) -> bool {
 fn row(
     (body, other): (usize, Option<usize>),
     surfacing: &Surfacing,
-    anchor: &mut Anchor,
+    anchor: &Anchor,
     point: &ContactPoint,
     X_WB: &Isometry3<f64>,
     start: &Start<'_>,
-) -> (Row, bool) {
+) -> Row {
     let dt_s = start.dt_s;
     let arm = |body: usize, side: usize| {
         let arm_W = point.point_W - start.bodies[body].centre_W;
@@ -226,13 +236,20 @@ fn row(
         let goes_along = anchor.is_same_material[side] && start.is_implicit;
         if goes_along { middle_W(&start.motions[body], dt_s) * arm_W } else { arm_W }
     };
+    let mut arms_W = [arm(body, 0), other.map_or(Vector3::zeros(), |other| arm(other, 1))];
+    if let Some(other) = other {
+        // What one gives the other gets at the same place, or angular momentum would be lost between them.
+        let apart_W = start.bodies[body].centre_W + arms_W[0] - start.bodies[other].centre_W - arms_W[1];
+        arms_W[0] -= apart_W * 0.5;
+        arms_W[1] += apart_W * 0.5;
+    }
     let (k, b) = (surfacing.stiffness_n_per_m, surfacing.damping_n_s_per_m);
     let gap_m = point.gap_m + anchor.granted_m;
     let n = point.normal_W;
     let mut row = Row {
         body,
         other,
-        arms_W: [arm(body, 0), other.map_or(Vector3::zeros(), |other| arm(other, 1))],
+        arms_W,
         normal_W: n,
         rest_W: Vector3::zeros(),
         stiffness: [k; 2],
@@ -257,28 +274,14 @@ fn row(
             (row.stiffness[0], row.damping[0]) = (k + b / dt_s, 0.0);
             -row.stiffness[0] * gap_m
         }
-        Response::Impulse { restitution } => {
+        Response::Impulse { .. } => {
             let stop = stop_n_s_per_m(&row, start);
             (row.stiffness, row.damping) = ([0.0, k], [stop, b]);
-            let impact = Impact::of(&row, gap_m, restitution, anchor, start);
-            if impact.is_one {
-                // What an impulse gives across the normal lasts no longer than the impulse.
-                row.stiffness[1] = stop / dt_s;
-            }
-            let wanted_m_s = match gap_m {
-                _ if impact.bounce_m_s > 0.0 => impact.bounce_m_s,
-                gap_m if gap_m < 0.0 => let_out_m_s(-gap_m, dt_s),
-                _ => -gap_m / dt_s,
-            };
-            if impact.is_one {
-                row.rest_W = n * (stop * wanted_m_s);
-                return (row, true);
-            }
-            stop * wanted_m_s
+            stop * if gap_m < 0.0 { let_out_m_s(-gap_m, dt_s) } else { -gap_m / dt_s }
         }
     };
     row.rest_W = n * rest_n - anchor.stretch_W(X_WB) * row.stiffness[1];
-    (row, false)
+    row
 }
 
 /// How far a body turns in half a tick, if nothing touches it.
@@ -286,47 +289,6 @@ fn middle_W(motion: &Motion, dt_s: f64) -> UnitQuaternion<f64> {
     // Beyond a radian a chord is none.
     let turn_W = motion.angular_velocity_W * (0.5 * dt_s);
     UnitQuaternion::from_scaled_axis(if turn_W.norm_squared() < 0.25 { turn_W } else { Vector3::zeros() })
-}
-
-/// What a row's point does that meets the other in a tick.
-struct Impact {
-    is_one: bool,
-    /// With which normal velocity it leaves the tick; 0 and below: it stays.
-    bounce_m_s: f64,
-}
-
-impl Impact {
-    /// The velocity that it leaves with is the reflected one of the beginning of the tick, less what gravity takes from it in
-    /// the whole tick: so a ball that does not lose anything else loses `(g dt)^2 / 2` of energy per mass in each bounce, and never
-    /// gains. What approaches no faster than gravity makes it in a tick rests, and a bounce that gravity would end
-    /// within the tick is none. Nor is one that anything else ended so: a contact that closes in a tick in which it did not
-    /// approach was pushed back before it got off, and rests.
-    fn of(row: &Row, gap_m: f64, restitution: f64, anchor: &mut Anchor, start: &Start<'_>) -> Self {
-        let along = |velocity_W: &Vector3<f64>| row.normal_W.dot(velocity_W);
-        let (now_m_s, freely_m_s) = (along(&at_start(row, start)), along(&freely(row, start)));
-        let falls_m_s = (freely_m_s - now_m_s).min(0.0);
-        let approaches = now_m_s < falls_m_s;
-        let was_pushed_back = anchor.is_pressed() && !anchor.approached;
-        anchor.approached = approaches;
-        let is_one = approaches && !was_pushed_back && gap_m < -freely_m_s * start.dt_s;
-        //= melder#6.1
-        Self { is_one, bounce_m_s: if is_one { restitution * -now_m_s + falls_m_s } else { 0.0 } }
-    }
-}
-
-/// Velocity of A's point relative to B's when the tick begins.
-fn at_start(row: &Row, start: &Start<'_>) -> Vector3<f64> {
-    let at = |body: usize, arm_W: &Vector3<f64>| {
-        let body = &start.bodies[body];
-        body.velocity_W + body.angular_velocity_W().cross(arm_W)
-    };
-    at(row.body, &row.arms_W[0]) - row.other.map_or(Vector3::zeros(), |other| at(other, &row.arms_W[1]))
-}
-
-/// The same at its end, if nothing touched anything.
-fn freely(row: &Row, start: &Start<'_>) -> Vector3<f64> {
-    let at = |body: usize, arm_W: &Vector3<f64>| start.motions[body].at(arm_W);
-    at(row.body, &row.arms_W[0]) - row.other.map_or(Vector3::zeros(), |other| at(other, &row.arms_W[1]))
 }
 
 /// A damping so large that velocities are what is wanted.
@@ -357,4 +319,4 @@ const LET_OUT_S: f64 = 0.1;
 const LET_OUT_M_S: f64 = 0.2;
 /// How many times harder than what moves impulses stop: velocities are right to one part in so many, and solved for with as
 /// many times the rounding.
-const HARD: f64 = 1e6;
+pub(crate) const HARD: f64 = 1e6;

@@ -43,7 +43,7 @@ pub(crate) struct Who<'w> {
     pub(crate) entities: &'w [usize],
     /// Of each entity, its body.
     pub(crate) bodies: &'w [Option<u32>],
-    /// How contacts with what is fixed answer.
+    /// How contacts between entities answer.
     pub(crate) response: Response,
 }
 
@@ -123,10 +123,8 @@ impl Pairs {
             self.left_out += 1;
             return;
         };
-        // Between two that move, springs answer: reflected velocities of many bodies at once are not found in a tick's turns.
-        let response = if other.is_some() { Response::Force } else { who.response };
         let entities = [who.entities[first], second];
-        let surfacing = Surfacing::between(&who.all[entities[0]], &who.all[second], response);
+        let surfacing = Surfacing::between(&who.all[entities[0]], &who.all[second], who.response);
         self.pool[place as usize] = Pair::new(entities, surfacing);
         self.awake.insert(place_in_order, Key { body: first as u32, entity: second as u32, place });
     }

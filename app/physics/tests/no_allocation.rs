@@ -73,6 +73,30 @@ fn a_step_never_allocates() {
     }
 }
 
+#[test]
+fn nor_does_one_of_bodies_that_press_each_other() {
+    for response in [Response::Force, Response::Impulse { restitution: 0.7 }] {
+        let mut entities = vec![floor(0.1, 2000.0, 0.4)];
+        for place in 0..6 {
+            let at = Isometry3::translation(0.003 * f64::from(place), 0.01 + 0.021 * f64::from(place), 0.0);
+            entities.push(object(Cuboid::new([0.02; 3]).unwrap(), at, 1000.0, 0.5));
+        }
+        let bodies: Vec<_> =
+            entities.iter().enumerate().skip(1).map(|(index, entity)| (index, body(entity, 0.1))).collect();
+        let settings = Settings { response, ..Settings::default() };
+        let mut world = World::new(entities, &bodies, settings, 0);
+        let (mut counted, mut joined) = (0, 0);
+        for _ in 0..1500 {
+            let before = CALLS.get();
+            world.manipulation.step(&mut world.entities, &mut [], DT);
+            counted += CALLS.get() - before;
+            joined += usize::from(world.manipulation.islands().iter().any(|bodies| bodies.len() > 1));
+        }
+        assert_eq!(counted, 0, "{response:?}");
+        assert!(joined > 300, "{response:?}: {joined}");
+    }
+}
+
 fn touch_of(contact: &haptics::Contact, finger: usize) -> Touch {
     Touch {
         entity: contact.entity,

@@ -162,7 +162,7 @@ fn forces_of_a_single_body_are_found_in_few_rounds_whatever_presses_it() {
     for seed in 0..scenes {
         let (body, mut rows) = scene(seed);
         let mut motions = [body];
-        let rounds = solver.solve(&mut rows, &mut motions, DT);
+        let rounds = solver.solve(&mut rows, &mut motions, DT).sweeps;
         (total, most) = (total + rounds, most.max(rounds));
         // 1e-13 of the energy measure's root, of a force that may be one of many and far from the centre.
         let left = residual(&rows, &motions);
@@ -208,7 +208,7 @@ fn a_gram_between_stiff_fingers_that_move_takes_a_few_rounds() {
             let given = row(noise, 0.01, 5000.0, 0.5);
             Row { arms_W, normal_W, rest_W, held: Held::Stick, mu_hold: 0.5, mu_slide: 0.5, ..given }
         });
-        let rounds = solver.solve(&mut rows, &mut [body], DT);
+        let rounds = solver.solve(&mut rows, &mut [body], DT).sweeps;
         most = most.max(rounds);
     }
     // Turns of single points would take 91.
@@ -222,7 +222,7 @@ fn edge_cases_are_solved_like_all_others() {
         let (mut body, mut rows) = scene(seed);
         change(&mut body, &mut rows);
         let mut motions = [body];
-        let rounds = solver.solve(&mut rows, &mut motions, DT);
+        let rounds = solver.solve(&mut rows, &mut motions, DT).sweeps;
         let left = residual(&rows, &motions);
         assert!(left < tolerance, "{name}, seed {seed}: {left} after {rounds} rounds");
         assert_belong_together(&rows, &[body], &motions);
@@ -342,7 +342,7 @@ fn bodies_that_press_each_other_are_solved_together() {
     for seed in 0..3000 {
         let (bodies, mut rows) = chain(seed);
         let mut motions = bodies.clone();
-        let turns = solver.solve(&mut rows, &mut motions, DT);
+        let turns = solver.solve(&mut rows, &mut motions, DT).sweeps;
         let left = residual(&rows, &motions);
         // Changes of 1e-10 a turn, of which some tens may be left.
         assert!(left < 1e-8, "seed {seed}: {left} after {turns}, {} rows", rows.len());

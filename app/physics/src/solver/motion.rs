@@ -40,11 +40,16 @@ impl Motion {
         Matrix3::from_diagonal_element(self.inverse_mass) - r * self.inverse_inertia_W * r
     }
 
-    /// Whether it stands still, whatever presses it.
+    /// Whether it does not move, whatever could move it.
     #[inline]
-    pub(super) fn is_fixed(&self) -> bool {
-        let still = [self.velocity_W, self.angular_velocity_W] == [Vector3::zeros(); 2];
-        still && self.inverse_mass == 0.0 && self.inverse_inertia_W == Matrix3::zeros()
+    pub(super) fn is_still(&self) -> bool {
+        [self.velocity_W, self.angular_velocity_W] == [Vector3::zeros(); 2]
+    }
+
+    /// Whether anything that presses it moves it.
+    #[inline]
+    pub(crate) fn is_movable(&self) -> bool {
+        self.inverse_mass != 0.0 || self.inverse_inertia_W != Matrix3::zeros()
     }
 
     #[inline]

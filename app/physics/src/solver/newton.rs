@@ -1,334 +1,320 @@
-//! A body that only fingers and fixed things press: Newton's method for what all its contact points give it together.
+//! Newton's method for what all contact points give to bodies that press each other, or to one alone.
 //!
-//! Model: with `p` the impulse and angular impulse of the tick, the body leaves it at `u = u_0 + W p` (W: inverse mass and
-//! inertia), and each contact point's force is a function of `u`. What is sought is where `p - dt sum J^T f(u_0 + W p)`
-//! is zero: six equations, whatever the number of points. The forces are linear in `u` while nothing changes between
-//! lying off, holding and sliding, and bend with the direction of sliding; so Newton's method (semi-smooth: the derivative is that
+//! Model: forces are linear in velocities while nothing changes between lying off, holding and sliding, and bend with the
+//! direction of sliding; so Newton's method for the [equations](super::equations) (semi-smooth: the derivative is that
 //! of where it stands) ends after few rounds. A solution exists always: springs and dampers take energy from a body
-//! that moves fast, whatever it does.
+//! that moves fast, whatever it does. Bodies that press each other are as one body of more unknowns, whose
+//! linear equations are mostly zeros ([`Blocks`]): a chain is solved, not passed on from body to body.
 //! A step that does not bring it nearer is halved. Where none does (a light body between points with much friction, one
-//! scene in thousands), the forces are let grow from next to nothing; then the points take some cautious turns one by one. Should
+//! scene in thousands), bodies that press each other make a few that lead farther away: many points change at once behind them. If
+//! that does not help, the forces are let grow from next to nothing; then the points take some cautious turns one by one. Should
 //! all that find nothing (contact points many times farther from the centre than the mass itself is), what such turns leave
-//! stands.
-//!
-//! Measure of what is left: the kinetic energy of the impulse that is too much or too little, over that of all forces.
+//! stands, and is said to be unsolved.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::Vector3;
 
-use super::{MAX_SWEEPS, Motion, lets_slip};
+use super::blocks::{self, Blocks};
+use super::equations::{Equations, Trial};
+use super::link::Link;
+use super::six::Vector6;
+use super::{MAX_SWEEPS, Motion, Solved, relax};
 use crate::row::Row;
-
-type Matrix6 = SMatrix<f64, 6, 6>;
-type Vector6 = SVector<f64, 6>;
 
 /// What is left of the equations, in shares of all forces, when they count as solved.
 const SOLVED: f64 = 1e-13;
 /// When nothing brings it nearer any more, this is solved too.
 const NEARLY_SOLVED: f64 = 1e-9;
-/// Of velocities; points that are very hard make much of it.
-const ROUNDING: f64 = 1e-14;
 /// How often a step is halved.
 const HALVINGS: usize = 6;
+/// How often a step is made that does not bring it nearer.
+const MOST_LEAPS: usize = 8;
 /// Shares of the tick for which forces last, on the way to all of it.
 const LOADS: [f64; 8] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 0.3, 0.6];
 /// Turns of the points one by one: at first, and the most at once; each time twice as many.
 const FIRST_TURNS: usize = 8;
 const MOST_TURNS: usize = 512;
+/// The most points that are come to in so many turns.
+const MOST_VISITS: usize = 12_288;
 
-/// What all points do at some `p`.
-#[derive(Clone, Copy)]
-struct Sum {
-    /// `p` less that.
-    left: Vector6,
-    /// Twice the kinetic energy of what is left \[J\].
-    left_j: f64,
-    /// The like of all forces, each by itself \[J\].
-    all_j: f64,
-    /// The like of the roundings of these forces \[J\].
-    noise_j: f64,
+/// Room for the equations of as many bodies as are solved for at once.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Newton {
+    links: Vec<Link>,
+    starts: Vec<Motion>,
+    now: Trial,
+    next: Trial,
+    best: Trial,
+    change: Vec<Vector6>,
+    blocks: Blocks,
 }
 
-/// The forces of these rows, all of this body, and the motion that they leave; returns the rounds made.
-pub(super) fn solve(rows: &mut [Row], which: &[usize], motion: &mut Motion, dt_s: f64) -> usize {
-    let problem = Problem { start: *motion, dt_s };
-    for &at in which {
-        let row = &mut rows[at];
-        row.force_W = row.project(&row.force_W);
-        row.torsion.begin();
+impl Newton {
+    /// For rows of no more than so many bodies.
+    pub(super) fn with_capacity(rows: usize, bodies: usize) -> Self {
+        let bodies = bodies.min(blocks::MAX_BODIES);
+        Self {
+            links: Vec::with_capacity(rows),
+            starts: Vec::with_capacity(bodies),
+            now: Trial::with_capacity(bodies),
+            next: Trial::with_capacity(bodies),
+            best: Trial::with_capacity(bodies),
+            change: Vec::with_capacity(bodies),
+            blocks: Blocks::with_capacity(bodies),
+        }
     }
-    let mut p = problem.impulse(rows, which);
-    let mut stuck_at = None;
-    let (mut rounds, mut turns) = (0, FIRST_TURNS);
-    let is_found = loop {
-        let is_solved = problem.approach(rows, which, &mut p, 1.0, &mut rounds);
-        if is_solved && !problem.let_slip(rows, which, &p) {
-            break true;
+
+    /// The forces of these rows, all of this body and the others standing still, and the motion that they leave.
+    pub(super) fn solve_alone(
+        &mut self,
+        rows: &mut [Row],
+        which: &[usize],
+        motion: &mut Motion,
+        dt_s: f64,
+    ) -> Solved {
+        self.links.clear();
+        self.links.extend(which.iter().map(|&at| Link::alone(at)));
+        self.starts.clear();
+        self.starts.push(*motion);
+        self.blocks.plan(1, std::iter::empty());
+        let solved = self.solve(rows, dt_s);
+        *motion = self.now.moving[0];
+        solved
+    }
+
+    /// The forces of these rows, all between these bodies or with others that go on as they do, and the motions that they
+    /// leave. `places` says of each of all bodies where among these it is. `None`: they are too many, nothing has changed.
+    pub(super) fn solve_together(
+        &mut self,
+        rows: &mut [Row],
+        which: &[usize],
+        (bodies, places): (&[usize], impl Fn(usize) -> Option<usize>),
+        motions: &mut [Motion],
+        dt_s: f64,
+    ) -> Option<Solved> {
+        if bodies.len() > self.starts.capacity() {
+            return None;
         }
-        if is_solved {
-            continue;
+        self.links.clear();
+        self.links.extend(which.iter().map(|&at| {
+            let row = &rows[at];
+            let sides = [places(row.body), row.other.and_then(&places)];
+            Link::between(at, row, sides, motions)
+        }));
+        let pairs = self.links.iter().filter_map(|link| Some([link.sides[0]?, link.sides[1]?]));
+        if !self.blocks.plan(bodies.len(), pairs) {
+            return None;
         }
-        if rounds >= MAX_SWEEPS || turns > MOST_TURNS {
-            break false;
+        self.starts.clear();
+        self.starts.extend(bodies.iter().map(|&body| motions[body]));
+        let solved = self.solve(rows, dt_s);
+        bodies.iter().zip(&self.now.moving).for_each(|(&body, motion)| motions[body] = *motion);
+        Some(solved)
+    }
+
+    fn solve(&mut self, rows: &mut [Row], dt_s: f64) -> Solved {
+        let Self { links, starts, now, next, best, change, blocks } = self;
+        let equations = Equations { links, starts, dt_s };
+        let mut search = Search { equations, now, next, best, change, blocks, rounds: 0 };
+        search.run(rows)
+    }
+}
+
+/// A search for the impulses at which nothing is left.
+struct Search<'a> {
+    equations: Equations<'a>,
+    now: &'a mut Trial,
+    next: &'a mut Trial,
+    best: &'a mut Trial,
+    change: &'a mut Vec<Vector6>,
+    blocks: &'a mut Blocks,
+    rounds: usize,
+}
+
+impl Search<'_> {
+    fn run(&mut self, rows: &mut [Row]) -> Solved {
+        for link in self.equations.links {
+            let row = &mut rows[link.row];
+            row.force_W = row.project(&row.force_W);
+            row.torsion.begin();
         }
-        if stuck_at.is_none() {
-            stuck_at = Some(p);
-            p = problem.load(rows, which, &mut rounds);
+        self.equations.impulses(rows, self.now);
+        let is_found = self.find(rows);
+        if is_found {
+            self.equations.settle(rows, &self.now.moving);
         } else {
-            problem.settle(rows, which, &if turns == FIRST_TURNS { stuck_at.unwrap_or(p) } else { p });
-            p = problem.relax(rows, which, turns);
+            self.make_do(rows);
+        }
+        let solved =
+            Solved { sweeps: self.rounds, residual: self.now.share_left(), unsolved: usize::from(!is_found) };
+        self.equations.impulses(rows, self.now);
+        self.equations.moving(self.now);
+        solved
+    }
+
+    /// Says whether there is an answer, at `now`.
+    fn find(&mut self, rows: &mut [Row]) -> bool {
+        let mut turns = 0;
+        loop {
+            let is_solved = self.approach(rows, 1.0);
+            if is_solved && !self.equations.let_slip(rows, &self.now.moving) {
+                return true;
+            }
+            if is_solved {
+                continue;
+            }
+            if self.rounds >= MAX_SWEEPS || turns > self.most_turns() {
+                return false;
+            }
+            if turns == 0 {
+                // The turns that may follow begin where it is stuck.
+                self.equations.settle(rows, &self.now.moving);
+                self.load(rows);
+                turns = FIRST_TURNS;
+                continue;
+            }
+            if turns > FIRST_TURNS {
+                self.equations.settle(rows, &self.now.moving);
+            }
+            self.relax(rows, turns);
             turns *= 2;
         }
-    };
-    problem.settle(rows, which, &p);
-    if !is_found {
-        // Not what was sought, but forces that contacts can have.
-        problem.let_slip(rows, which, &p);
-        which.iter().for_each(|&at| (rows[at].force_W, rows[at].torsion.torque_nm) = (Vector3::zeros(), 0.0));
-        problem.relax(rows, which, MOST_TURNS);
-    }
-    *motion = problem.moving(&problem.impulse(rows, which));
-    rounds
-}
-
-impl Sum {
-    fn is_within(&self, share: f64) -> bool {
-        self.left_j <= share * share * self.all_j + self.noise_j
-    }
-}
-
-/// The body as the tick found it.
-struct Problem {
-    start: Motion,
-    dt_s: f64,
-}
-
-impl Problem {
-    /// `u_0 + W p`.
-    fn moving(&self, p: &Vector6) -> Motion {
-        let mut motion = self.start;
-        let (along, about) = halves(p);
-        motion.velocity_W += along * motion.inverse_mass;
-        motion.angular_velocity_W += motion.inverse_inertia_W * about;
-        motion
     }
 
-    /// `dt sum J^T f` of the forces as they stand.
-    fn impulse(&self, rows: &[Row], which: &[usize]) -> Vector6 {
-        let (mut force_W, mut torque_W) = (Vector3::zeros(), Vector3::zeros());
-        for &at in which {
-            let row = &rows[at];
-            force_W += row.force_W;
-            torque_W += row.arms_W[0].cross(&row.force_W) + row.normal_W * row.torsion.torque_nm;
+    /// Not what was sought, but forces that contacts can have.
+    fn make_do(&mut self, rows: &mut [Row]) {
+        self.equations.let_slip(rows, &self.now.moving);
+        for link in self.equations.links {
+            let row = &mut rows[link.row];
+            (row.force_W, row.torsion.torque_nm) = (Vector3::zeros(), 0.0);
         }
-        joined(&(force_W * self.dt_s), &(torque_W * self.dt_s))
+        self.relax(rows, self.most_turns());
+        self.equations.evaluate(rows, self.now, 1.0);
+    }
+
+    /// As many turns at once as there is time for.
+    fn most_turns(&self) -> usize {
+        (MOST_VISITS / self.equations.links.len().max(1)).clamp(FIRST_TURNS, MOST_TURNS)
     }
 
     /// Newton's steps until it is solved, when that is said, or nothing brings it nearer.
-    fn approach(
-        &self,
-        rows: &[Row],
-        which: &[usize],
-        p: &mut Vector6,
-        load: f64,
-        rounds: &mut usize,
-    ) -> bool {
-        let mut now = self.sum(rows, which, p, load);
-        if now.is_within(SOLVED) {
+    fn approach(&mut self, rows: &[Row], load: f64) -> bool {
+        self.equations.evaluate(rows, self.now, load);
+        if self.now.is_within(SOLVED) {
             // What rests does as in the last tick.
             return true;
         }
-        while *rounds < MAX_SWEEPS {
-            *rounds += 1;
-            let Some((next_p, next)) = self.step(rows, which, p, &now, load) else {
-                return now.is_within(NEARLY_SOLVED);
-            };
+        // One body alone finds its way without, and sooner.
+        let most_leaps = if self.now.p.len() > 1 { MOST_LEAPS } else { 0 };
+        let mut leaps = 0;
+        while self.rounds < MAX_SWEEPS {
+            self.rounds += 1;
+            let was_j = self.now.left_j;
+            if !self.step(rows, load) {
+                if self.now.is_within(NEARLY_SOLVED) {
+                    return true;
+                }
+                if leaps == most_leaps || !self.leap(rows, load, leaps) {
+                    break;
+                }
+                leaps += 1;
+                continue;
+            }
             // Where roundings are all that is left, a step wins little.
-            let stalls = next.left_j > 0.25 * now.left_j;
-            (*p, now) = (next_p, next);
-            if now.is_within(SOLVED) || (stalls && now.is_within(NEARLY_SOLVED)) {
+            let stalls = self.now.left_j > 0.25 * was_j;
+            if self.now.is_within(SOLVED) || (stalls && self.now.is_within(NEARLY_SOLVED)) {
                 return true;
             }
+        }
+        if leaps > 0 && (self.now.left_j.is_nan() || self.now.left_j > self.best.left_j) {
+            std::mem::swap(self.now, self.best);
         }
         false
     }
 
+    /// Goes all of the step though that leads farther away: behind where many points change at once it may be near. Remembers
+    /// the best place so far. Says whether there is such a step.
+    fn leap(&mut self, rows: &[Row], load: f64, leaps: usize) -> bool {
+        if !self.direction(rows, load, false) {
+            return false;
+        }
+        self.next.p.clear();
+        self.next.p.extend(self.now.p.iter().zip(&*self.change).map(|(p, change)| p - change));
+        self.equations.evaluate(rows, self.next, load);
+        if leaps == 0 || self.now.left_j < self.best.left_j {
+            std::mem::swap(self.best, self.now);
+        }
+        std::mem::swap(self.now, self.next);
+        self.now.left_j.is_finite()
+    }
+
     /// The way from forces that do next to nothing to all of them.
-    fn load(&self, rows: &[Row], which: &[usize], rounds: &mut usize) -> Vector6 {
-        let mut p = Vector6::zeros();
+    fn load(&mut self, rows: &[Row]) {
+        self.now.p.fill(Vector6::zeros());
         for load in LOADS {
-            self.approach(rows, which, &mut p, load, rounds);
-        }
-        p
-    }
-
-    /// What the points do at `p`.
-    fn sum(&self, rows: &[Row], which: &[usize], p: &Vector6, load: f64) -> Sum {
-        let motion = self.moving(p);
-        let (mut force_W, mut torque_W) = (Vector3::zeros(), Vector3::zeros());
-        let (mut all, mut noise) = (0.0, 0.0);
-        let turns = self.start.inverse_inertia_W.trace();
-        let (speed, spin) = (motion.velocity_W.norm(), motion.angular_velocity_W.norm());
-        for &at in which {
-            let row = &rows[at];
-            let arm_W = &row.arms_W[0];
-            let on_body_W = row.at_end_W(&motion.at(arm_W), self.dt_s);
-            let twist_nm = row.torsion.at_end_nm(row.normal_W.dot(&motion.angular_velocity_W), self.dt_s);
-            force_W += on_body_W;
-            torque_W += arm_W.cross(&on_body_W) + row.normal_W * twist_nm;
-            let arm_m = arm_W.norm();
-            let gives = self.start.inverse_mass + arm_m * arm_m * turns;
-            let [along, across] = row.falls(self.dt_s);
-            let rounding_n = ROUNDING * along.max(across) * (speed + spin * arm_m);
-            all += on_body_W.norm_squared() * gives + twist_nm * twist_nm * turns;
-            noise += rounding_n * rounding_n * gives;
-        }
-        let acts_s = self.dt_s * load;
-        let left = p - joined(&(force_W * acts_s), &(torque_W * acts_s));
-        Sum {
-            left,
-            left_j: self.energy(&left),
-            all_j: all * acts_s * acts_s,
-            noise_j: noise * acts_s * acts_s,
+            self.approach(rows, load);
         }
     }
 
-    /// `p W p`.
-    fn energy(&self, p: &Vector6) -> f64 {
-        let (along, about) = halves(p);
-        along.norm_squared() * self.start.inverse_mass + about.dot(&(self.start.inverse_inertia_W * about))
+    /// So many turns of the points one by one.
+    fn relax(&mut self, rows: &mut [Row], turns: usize) {
+        self.equations.impulses(rows, self.now);
+        self.equations.moving(self.now);
+        relax::turns(&self.equations, rows, &mut self.now.moving, turns);
+        self.equations.impulses(rows, self.now);
     }
 
-    /// A step of Newton's that brings it nearer, and what the points do there.
-    fn step(
-        &self,
-        rows: &[Row],
-        which: &[usize],
-        p: &Vector6,
-        now: &Sum,
-        load: f64,
-    ) -> Option<(Vector6, Sum)> {
-        let change = self.derivative(rows, which, p, load, false).lu().solve(&now.left)?;
+    /// A step of Newton's that brings it nearer; says whether there is one.
+    fn step(&mut self, rows: &[Row], load: f64) -> bool {
+        if !self.direction(rows, load, false) {
+            return false;
+        }
         let mut share = 1.0;
         for halvings in 0..=HALVINGS {
-            if halvings == 1
-                && let Some(step) = self.step_back(rows, which, p, now, load)
-            {
-                return Some(step);
+            if halvings == 1 && self.is_at_limit(rows) {
+                if self.direction(rows, load, true) && self.goes(rows, load, 1.0, 1e-3) {
+                    return true;
+                }
+                if !self.direction(rows, load, false) {
+                    return false;
+                }
             }
-            let next_p = p - change * share;
-            let next = self.sum(rows, which, &next_p, load);
-            if next.left_j < (1.0 - 1e-3 * share) * now.left_j || next.left_j == 0.0 {
-                return Some((next_p, next));
+            if self.goes(rows, load, share, 1e-3 * share) {
+                return true;
             }
             share *= 0.5;
         }
-        None
+        false
     }
 
-    /// A step where the whole one leads too far because torques at their limit do not change on the way, until they turn over:
-    /// with the slopes of their chords, which lead back to where they do.
-    fn step_back(
-        &self,
-        rows: &[Row],
-        which: &[usize],
-        p: &Vector6,
-        now: &Sum,
-        load: f64,
-    ) -> Option<(Vector6, Sum)> {
-        let spin_W = self.moving(p).angular_velocity_W;
-        let is_at_limit = |row: &Row| {
-            row.torsion.most_nm > 0.0 && row.torsion.falls_at_end(row.normal_W.dot(&spin_W), self.dt_s) == 0.0
-        };
-        if !which.iter().any(|&at| is_at_limit(&rows[at])) {
-            return None;
+    /// Goes by this share of the change, if that lessens what is left by so much of it; says whether.
+    fn goes(&mut self, rows: &[Row], load: f64, share: f64, lessens: f64) -> bool {
+        self.next.p.clear();
+        self.next.p.extend(self.now.p.iter().zip(&*self.change).map(|(p, change)| p - change * share));
+        self.equations.evaluate(rows, self.next, load);
+        let is_nearer = self.next.left_j < (1.0 - lessens) * self.now.left_j || self.next.left_j == 0.0;
+        if is_nearer {
+            std::mem::swap(self.now, self.next);
         }
-        let next_p = p - self.derivative(rows, which, p, load, true).lu().solve(&now.left)?;
-        let next = self.sum(rows, which, &next_p, load);
-        (next.left_j < (1.0 - 1e-3) * now.left_j).then_some((next_p, next))
+        is_nearer
     }
 
-    /// Of `p - dt sum J^T f(u_0 + W p)`, by `p`; of torsion the chords, if wanted.
-    fn derivative(&self, rows: &[Row], which: &[usize], p: &Vector6, load: f64, chords: bool) -> Matrix6 {
-        let motion = self.moving(p);
-        let mut falls = [Matrix3::zeros(); 4];
-        for &at in which {
-            let row = &rows[at];
-            let arm_W = &row.arms_W[0];
-            let D = row.falls_at_end_W(&motion.at(arm_W), self.dt_s);
-            let r = arm_W.cross_matrix();
-            let rD = r * D;
-            falls[0] += D;
-            falls[1] -= D * r;
-            falls[2] += rD;
-            falls[3] -= rD * r;
-            let n = &row.normal_W;
-            let (torsion, spin) = (&row.torsion, n.dot(&motion.angular_velocity_W));
-            let twists =
-                if chords { torsion.chord(spin, self.dt_s) } else { torsion.falls_at_end(spin, self.dt_s) };
-            falls[3] += n * n.transpose() * twists;
-        }
-        let (inverse_mass, inverse_inertia_W) = (self.start.inverse_mass, &self.start.inverse_inertia_W);
-        let mut derivative = Matrix6::identity();
-        for (block, falls) in falls.iter().enumerate() {
-            let (row, column) = (block / 2 * 3, block % 2 * 3);
-            let by_p = if column == 0 { falls * inverse_mass } else { falls * inverse_inertia_W };
-            let mut place = derivative.fixed_view_mut::<3, 3>(row, column);
-            place += by_p * (self.dt_s * load);
-        }
-        derivative
+    /// Where to, by the derivative where it stands; says whether that is anywhere.
+    fn direction(&mut self, rows: &[Row], load: f64, chords: bool) -> bool {
+        self.equations.derive(rows, &self.now.moving, load, chords, self.blocks);
+        self.change.clear();
+        self.change.extend_from_slice(&self.now.left);
+        self.blocks.solve(self.change)
     }
 
-    /// Projected Gauss-Seidel: each point in turn goes as far to what its velocity asks for, along the normal and across it, as it
-    /// may if that is to lessen what is left, and stays in its cone.
-    fn relax(&self, rows: &mut [Row], which: &[usize], turns: usize) -> Vector6 {
-        let mut motion = self.moving(&self.impulse(rows, which));
-        for at in (0..turns).flat_map(|_| which.iter()) {
-            let row = &mut rows[*at];
-            let arm_W = row.arms_W[0];
-            let most_give = motion.inverse_mass + arm_W.norm_squared() * motion.inverse_inertia_W.trace();
-            let [along, across] =
-                row.falls(self.dt_s).map(|falls| 1.0 / (1.0 + falls * most_give * self.dt_s));
-            let missing_W = row.trial_at_end_W(&motion.at(&arm_W), self.dt_s) - row.force_W;
-            let missing_n = row.normal_W.dot(&missing_W);
-            let wanted_W = row.force_W + missing_W * across + row.normal_W * (missing_n * (along - across));
-            let change_W = row.project(&wanted_W) - row.force_W;
-            row.force_W += change_W;
-            motion.push(&(change_W * self.dt_s), &arm_W);
-            if row.torsion.most_nm > 0.0 {
-                let n = row.normal_W;
-                let give = n.dot(&(motion.inverse_inertia_W * n)) * self.dt_s;
-                let asked_nm = row.torsion.at_end_nm(n.dot(&motion.angular_velocity_W), self.dt_s);
-                let share = 1.0 / (1.0 + row.torsion.falls(self.dt_s) * give);
-                let change_nm = (asked_nm - row.torsion.torque_nm) * share;
-                row.torsion.torque_nm += change_nm;
-                motion.turn(&(n * (change_nm * self.dt_s)));
+    /// Whether a whole step may lead too far because torques at their limit do not change on the way, until they turn over:
+    /// the slopes of their chords lead back to where they do.
+    fn is_at_limit(&self, rows: &[Row]) -> bool {
+        self.equations.links.iter().any(|link| {
+            let torsion = &rows[link.row].torsion;
+            torsion.most_nm > 0.0 && {
+                let spin_rad_s = link.spin_rad_s(&rows[link.row], &self.now.moving);
+                torsion.falls_at_end(spin_rad_s, self.equations.dt_s) == 0.0
             }
-        }
-        self.impulse(rows, which)
+        })
     }
-
-    /// The rows' forces at `p`.
-    fn settle(&self, rows: &mut [Row], which: &[usize], p: &Vector6) {
-        let motion = self.moving(p);
-        for &at in which {
-            let row = &mut rows[at];
-            row.force_W = row.at_end_W(&motion.at(&row.arms_W[0]), self.dt_s);
-            let spin = row.normal_W.dot(&motion.angular_velocity_W);
-            row.torsion.torque_nm = row.torsion.at_end_nm(spin, self.dt_s);
-        }
-    }
-
-    /// Says whether stiction broke anywhere and takes other forces now.
-    fn let_slip(&self, rows: &mut [Row], which: &[usize], p: &Vector6) -> bool {
-        self.settle(rows, which, p);
-        which.iter().fold(false, |any, &at| lets_slip(&mut rows[at]) | any)
-    }
-}
-
-fn joined(along: &Vector3<f64>, about: &Vector3<f64>) -> Vector6 {
-    Vector6::from_row_slice(&[along.x, along.y, along.z, about.x, about.y, about.z])
-}
-
-fn halves(p: &Vector6) -> (Vector3<f64>, Vector3<f64>) {
-    (Vector3::new(p[0], p[1], p[2]), Vector3::new(p[3], p[4], p[5]))
 }

@@ -1,4 +1,4 @@
-//! Bodies that press each other: body by body in turns, each by Newton's method.
+//! Bodies that press each other and are too many to be solved for at once: body by body in turns, each by Newton's method.
 //!
 //! Model: while a body is solved for, the others go on as they do; a point that it shares with another one is as soft as
 //! that one gives way: with `g` what velocity forces of the tick give to the other's point (as many as they share) and `b` what the row's trial
@@ -8,15 +8,17 @@
 //! point by point they would throw a light box about.
 //!
 //! Invariant: velocities and forces belong together to rounding, however many turns were made.
-//! Cost: bodies times turns, at most [`MAX_TURNS`], times Newton's.
+//! Cost: turns over all rows, at most [`MAX_VISITS`] of them in all, times Newton's.
 
 use nalgebra::Vector3;
 
-use super::{Motion, newton};
+use super::newton::Newton;
+use super::{Motion, Solved};
 use crate::row::Row;
 
-/// The most turns over all bodies in a tick.
+/// The most turns over all bodies in a tick, and the most rows that are come to in them.
 const MAX_TURNS: usize = 200;
+const MAX_VISITS: usize = 20_000;
 
 /// Forces that change by less than this share of the largest are found.
 const SETTLED: f64 = 1e-9;
@@ -24,56 +26,67 @@ const SETTLED: f64 = 1e-9;
 /// Room for the rows of a body as they were, and their numbers.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Room {
-    which: Vec<usize>,
+    by_body: Vec<usize>,
     were: Vec<Row>,
 }
 
 impl Room {
     pub(super) fn with_capacity(rows: usize) -> Self {
-        Self { which: Vec::with_capacity(rows), were: Vec::with_capacity(rows) }
+        Self { by_body: Vec::with_capacity(rows), were: Vec::with_capacity(rows) }
     }
 }
 
-/// The forces of these rows of all bodies, and the motions that they leave; returns the turns made.
+/// The forces of these rows of all bodies, and the motions that they leave.
 pub(super) fn solve(
     room: &mut Room,
+    newton: &mut Newton,
     which: &[usize],
     rows: &mut [Row],
     motions: &mut [Motion],
     dt_s: f64,
-) -> usize {
-    for &at in which {
+) -> Solved {
+    let Room { by_body, were } = room;
+    by_body.clear();
+    by_body.extend_from_slice(which);
+    by_body.sort_unstable_by_key(|&at| (rows[at].body, at));
+    for &at in by_body.iter() {
         let row = &mut rows[at];
         row.force_W = row.project(&row.force_W);
         row.torsion.torque_nm = 0.0;
         push(row, motions, &(row.force_W * dt_s));
     }
-    let mut turns = 0;
-    while turns < MAX_TURNS && !which.is_empty() {
-        turns += 1;
+    let most_turns = (MAX_VISITS / by_body.len().max(1)).clamp(1, MAX_TURNS);
+    let mut solved = Solved { unsolved: 1, ..Solved::default() };
+    while solved.sweeps < most_turns && solved.unsolved > 0 {
+        solved.sweeps += 1;
         let (mut changed, mut most) = (0.0_f64, 0.0_f64);
-        for body in 0..motions.len() {
-            room.which.clear();
-            room.which.extend(which.iter().copied().filter(|&at| rows[at].body == body));
-            let [change, largest] = solve_body(room, rows, motions, body, dt_s);
+        let mut first = 0;
+        while first < by_body.len() {
+            let is_same = |&&at: &&usize| rows[at].body == rows[by_body[first]].body;
+            let end = first + by_body[first..].iter().take_while(is_same).count();
+            let [change, largest] = solve_body(were, newton, &by_body[first..end], rows, motions, dt_s);
             (changed, most) = (changed.max(change), most.max(largest));
+            first = end;
         }
-        if changed <= SETTLED * SETTLED * most {
-            break;
-        }
+        solved.residual = if most > 0.0 { (changed / most).sqrt() } else { 0.0 };
+        solved.unsolved = usize::from(solved.residual > SETTLED);
     }
-    turns
+    solved
 }
 
 /// The forces of one body's rows; returns the squares of their largest change and of the largest of them.
-fn solve_body(room: &mut Room, rows: &mut [Row], motions: &mut [Motion], body: usize, dt_s: f64) -> [f64; 2] {
-    let Room { which, were } = room;
-    if which.is_empty() {
-        return [0.0; 2];
-    }
+fn solve_body(
+    were: &mut Vec<Row>,
+    newton: &mut Newton,
+    which: &[usize],
+    rows: &mut [Row],
+    motions: &mut [Motion],
+    dt_s: f64,
+) -> [f64; 2] {
+    let body = rows[which[0]].body;
     were.clear();
     were.extend(which.iter().map(|&at| rows[at]));
-    for &at in which.iter() {
+    for &at in which {
         let row = &mut rows[at];
         motions[body].push(&(row.force_W * -dt_s), &row.arms_W[0]);
         motions[body].turn(&(row.normal_W * (-row.torsion.torque_nm * dt_s)));
@@ -83,7 +96,7 @@ fn solve_body(room: &mut Room, rows: &mut [Row], motions: &mut [Motion], body: u
             soften(row, &motions[other], sharing as f64, dt_s);
         }
     }
-    newton::solve(rows, which, &mut motions[body], dt_s);
+    newton.solve_alone(rows, which, &mut motions[body], dt_s);
     let (mut change, mut most) = (0.0_f64, 0.0_f64);
     for (&at, was) in which.iter().zip(were.iter()) {
         let row = &mut rows[at];

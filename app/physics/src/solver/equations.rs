@@ -1,0 +1,183 @@
+//! What has to be zero: what bodies get in a tick, less what all their contact points give them when they move so.
+//!
+//! Model: with `p` the impulse and angular impulse of each body, it leaves the tick at `u = u_0 + W p` (W: inverse mass and
+//! inertia), and each contact point's force is a function of the `u` of its two sides. What is left is
+//! `p - dt sum J^T f(u_0 + W p)`: six equations a body, whatever the number of points.
+//!
+//! Measure of what is left: the kinetic energy of the impulses that are too much or too little, over that of all forces.
+
+use nalgebra::Vector3;
+
+use super::blocks::Blocks;
+use super::link::{Link, SIGNS};
+use super::six::{Vector6, halves, joined};
+use super::{Motion, lets_slip};
+use crate::row::Row;
+
+/// Of velocities; points that are very hard make much of it.
+const ROUNDING: f64 = 1e-14;
+
+/// Bodies as the tick found them, and what joins them.
+pub(super) struct Equations<'a> {
+    pub(super) links: &'a [Link],
+    pub(super) starts: &'a [Motion],
+    pub(super) dt_s: f64,
+}
+
+/// Impulses, and what is left of the equations with them.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Trial {
+    pub(super) p: Vec<Vector6>,
+    /// `u_0 + W p`.
+    pub(super) moving: Vec<Motion>,
+    pub(super) left: Vec<Vector6>,
+    /// Twice the kinetic energy of what is left \[J\].
+    pub(super) left_j: f64,
+    /// The like of all forces, each by itself \[J\].
+    all_j: f64,
+    /// The like of the roundings of these forces \[J\].
+    noise_j: f64,
+}
+
+impl Trial {
+    pub(super) fn with_capacity(bodies: usize) -> Self {
+        let room = || Vec::with_capacity(bodies);
+        Self { p: room(), left: room(), moving: Vec::with_capacity(bodies), ..Self::default() }
+    }
+
+    pub(super) fn is_within(&self, share: f64) -> bool {
+        self.left_j <= share * share * self.all_j + self.noise_j
+    }
+
+    /// How much of all forces is left; 0 where it is within their roundings.
+    pub(super) fn share_left(&self) -> f64 {
+        let left_j = (self.left_j - self.noise_j).max(0.0);
+        if left_j > 0.0 { (left_j / self.all_j).sqrt() } else { 0.0 }
+    }
+}
+
+impl Equations<'_> {
+    /// `dt sum J^T f` of the forces as they stand, to `trial`.
+    pub(super) fn impulses(&self, rows: &[Row], trial: &mut Trial) {
+        trial.p.clear();
+        trial.p.resize(self.starts.len(), Vector6::zeros());
+        for link in self.links {
+            let row = &rows[link.row];
+            for (side, place) in link.inside() {
+                trial.p[place] += on_side(row, side, &row.force_W, row.torsion.torque_nm);
+            }
+        }
+        trial.p.iter_mut().for_each(|p| *p *= self.dt_s);
+    }
+
+    /// `u_0 + W p`.
+    pub(super) fn moving(&self, trial: &mut Trial) {
+        trial.moving.clear();
+        trial.moving.extend(self.starts.iter().zip(&trial.p).map(|(start, p)| {
+            let mut motion = *start;
+            let (along, about) = halves(p);
+            motion.velocity_W += along * motion.inverse_mass;
+            motion.angular_velocity_W += motion.inverse_inertia_W * about;
+            motion
+        }));
+    }
+
+    /// What is left at the trial's `p`, if forces act for this share of the tick.
+    pub(super) fn evaluate(&self, rows: &[Row], trial: &mut Trial, load: f64) {
+        self.moving(trial);
+        let Trial { p, moving, left, .. } = trial;
+        left.clear();
+        left.resize(p.len(), Vector6::zeros());
+        let (mut all, mut noise) = (0.0, 0.0);
+        for link in self.links {
+            let row = &rows[link.row];
+            let force_W = row.at_end_W(&link.velocity_W(row, moving), self.dt_s);
+            let twist_nm = match row.torsion.most_nm {
+                0.0 => 0.0,
+                _ => row.torsion.at_end_nm(link.spin_rad_s(row, moving), self.dt_s),
+            };
+            for (side, place) in link.inside() {
+                left[place] -= on_side(row, side, &force_W, twist_nm);
+            }
+            let gives = link.most_give(row, moving);
+            let [along, across] = row.falls(self.dt_s);
+            let rounding_n = ROUNDING * along.max(across) * link.speed_m_s(row, moving);
+            all += force_W.norm_squared() * gives;
+            if twist_nm != 0.0 {
+                all += twist_nm * twist_nm * link.most_turn(moving);
+            }
+            noise += rounding_n * rounding_n * gives;
+        }
+        let acts_s = self.dt_s * load;
+        trial.left_j = 0.0;
+        for ((left, p), start) in left.iter_mut().zip(p).zip(self.starts) {
+            *left = *p + *left * acts_s;
+            trial.left_j += energy(start, left);
+        }
+        (trial.all_j, trial.noise_j) = (all * acts_s * acts_s, noise * acts_s * acts_s);
+    }
+
+    /// Of what is left, by `p`; of torsion the chords, if wanted.
+    pub(super) fn derive(
+        &self,
+        rows: &[Row],
+        moving: &[Motion],
+        load: f64,
+        chords: bool,
+        blocks: &mut Blocks,
+    ) {
+        blocks.clear();
+        for link in self.links {
+            let row = &rows[link.row];
+            let falls = row.falls_at_end_W(&link.velocity_W(row, moving), self.dt_s);
+            let twists = match row.torsion.most_nm {
+                0.0 => 0.0,
+                _ if chords => row.torsion.chord(link.spin_rad_s(row, moving), self.dt_s),
+                _ => row.torsion.falls_at_end(link.spin_rad_s(row, moving), self.dt_s),
+            };
+            link.add_falls(row, &falls, twists, blocks);
+        }
+        let acts_s = self.dt_s * load;
+        blocks.for_each(|row, column, block| {
+            let start = &self.starts[column];
+            for (at, values) in block.iter_mut().enumerate() {
+                let about = start.inverse_inertia_W * Vector3::new(values[3], values[4], values[5]);
+                let along = start.inverse_mass;
+                *values =
+                    [values[0] * along, values[1] * along, values[2] * along, about.x, about.y, about.z];
+                values.iter_mut().for_each(|value| *value *= acts_s);
+                if row == column {
+                    values[at] += 1.0;
+                }
+            }
+        });
+    }
+
+    /// The rows' forces when bodies move so.
+    pub(super) fn settle(&self, rows: &mut [Row], moving: &[Motion]) {
+        for link in self.links {
+            let row = &mut rows[link.row];
+            row.force_W = row.at_end_W(&link.velocity_W(row, moving), self.dt_s);
+            row.torsion.torque_nm = row.torsion.at_end_nm(link.spin_rad_s(row, moving), self.dt_s);
+        }
+    }
+
+    /// Says whether stiction broke anywhere and takes other forces now.
+    pub(super) fn let_slip(&self, rows: &mut [Row], moving: &[Motion]) -> bool {
+        self.settle(rows, moving);
+        self.links.iter().fold(false, |any, link| lets_slip(&mut rows[link.row]) | any)
+    }
+}
+
+/// What a contact point's force (N) and torque about its normal (N m) do to one of its sides.
+#[inline]
+fn on_side(row: &Row, side: usize, force_W: &Vector3<f64>, torque_nm: f64) -> Vector6 {
+    let sign = SIGNS[side];
+    joined(&(force_W * sign), &((row.arms_W[side].cross(force_W) + row.normal_W * torque_nm) * sign))
+}
+
+/// `p W p`.
+fn energy(start: &Motion, p: &Vector6) -> f64 {
+    let (along, about) = halves(p);
+    along.norm_squared() * start.inverse_mass + about.dot(&(start.inverse_inertia_W * about))
+}

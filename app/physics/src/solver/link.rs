@@ -1,0 +1,150 @@
+//! A row as the bodies that are solved for see it.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::Motion;
+use super::blocks::Blocks;
+use super::six::add;
+use crate::row::Row;
+
+/// The sign with which a row's force acts on either side.
+pub(super) const SIGNS: [f64; 2] = [1.0, -1.0];
+
+/// Which row joins which of the bodies that are solved for together.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Link {
+    /// Number of the row.
+    pub(super) row: usize,
+    /// Of the body that is pressed and of that which presses, the place among those that are solved for.
+    pub(super) sides: [Option<usize>; 2],
+    /// How the sides that are not move: the body's less the other's, at the contact point (m/s).
+    given_W: Vector3<f64>,
+    /// The like of how they turn (rad/s).
+    given_spin_W: Vector3<f64>,
+}
+
+impl Link {
+    /// Between one body and what stands still.
+    pub(super) fn alone(row: usize) -> Self {
+        let still = Vector3::zeros();
+        Self { row, sides: [Some(0), None], given_W: still, given_spin_W: still }
+    }
+
+    /// Between bodies whose places these are; the others go on as they do.
+    pub(super) fn between(at: usize, row: &Row, sides: [Option<usize>; 2], motions: &[Motion]) -> Self {
+        let mut link = Self { sides, ..Self::alone(at) };
+        for (side, body) in [Some(row.body), row.other].into_iter().enumerate() {
+            if let (None, Some(body)) = (sides[side], body) {
+                link.given_W += motions[body].at(&row.arms_W[side]) * SIGNS[side];
+                link.given_spin_W += motions[body].angular_velocity_W * SIGNS[side];
+            }
+        }
+        link
+    }
+
+    /// The places of the sides that are solved for, with which side each is.
+    #[inline]
+    pub(super) fn inside(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
+        self.sides.into_iter().enumerate().filter_map(|(side, place)| Some((side, place?)))
+    }
+
+    /// Velocity of the body's point relative to the other's (m/s).
+    #[inline]
+    pub(super) fn velocity_W(&self, row: &Row, moving: &[Motion]) -> Vector3<f64> {
+        self.inside()
+            .fold(self.given_W, |v, (side, place)| v + moving[place].at(&row.arms_W[side]) * SIGNS[side])
+    }
+
+    /// How fast the body turns relative to the other, about the normal (rad/s).
+    #[inline]
+    pub(super) fn spin_rad_s(&self, row: &Row, moving: &[Motion]) -> f64 {
+        let spin_W = self.inside().fold(self.given_spin_W, |spin_W, (side, place)| {
+            spin_W + moving[place].angular_velocity_W * SIGNS[side]
+        });
+        row.normal_W.dot(&spin_W)
+    }
+
+    /// The most velocity that an impulse gives to the point, in whatever direction (1/kg).
+    #[inline]
+    pub(super) fn most_give(&self, row: &Row, moving: &[Motion]) -> f64 {
+        self.inside()
+            .map(|(side, place)| {
+                let (motion, arm_W) = (&moving[place], &row.arms_W[side]);
+                motion.inverse_mass + arm_W.norm_squared() * motion.inverse_inertia_W.trace()
+            })
+            .sum()
+    }
+
+    /// The most spin that an angular impulse gives, in whatever direction (1/(kg m^2)).
+    #[inline]
+    pub(super) fn most_turn(&self, moving: &[Motion]) -> f64 {
+        self.inside().map(|(_, place)| moving[place].inverse_inertia_W.trace()).sum()
+    }
+
+    /// How fast the point goes and turns at most, all sides' roundings counted (m/s).
+    #[inline]
+    pub(super) fn speed_m_s(&self, row: &Row, moving: &[Motion]) -> f64 {
+        self.inside()
+            .map(|(side, place)| {
+                let (motion, arm_W) = (&moving[place], &row.arms_W[side]);
+                motion.velocity_W.norm() + motion.angular_velocity_W.norm() * arm_W.norm()
+            })
+            .sum()
+    }
+
+    /// What spin about the normal an angular impulse about it gives (1/(kg m^2)).
+    #[inline]
+    pub(super) fn turn_about(&self, row: &Row, moving: &[Motion]) -> f64 {
+        let n = &row.normal_W;
+        self.inside().map(|(_, place)| n.dot(&(moving[place].inverse_inertia_W * n))).sum()
+    }
+
+    /// Gives an impulse at the contact point to both sides (N s).
+    #[inline]
+    pub(super) fn push(&self, row: &Row, impulse_W: &Vector3<f64>, moving: &mut [Motion]) {
+        for (side, place) in self.inside() {
+            moving[place].push(&(impulse_W * SIGNS[side]), &row.arms_W[side]);
+        }
+    }
+
+    /// Gives an angular impulse about the normal to both sides (N m s).
+    #[inline]
+    pub(super) fn twist(&self, row: &Row, impulse_nms: f64, moving: &mut [Motion]) {
+        for (side, place) in self.inside() {
+            moving[place].turn(&(row.normal_W * (impulse_nms * SIGNS[side])));
+        }
+    }
+
+    /// Adds, for each two sides, by how much the first one's force and torque fall with the second one's velocity and spin:
+    /// the point's force by `falls` (N s/m), its torque about the normal by `twists` (N m s).
+    #[inline]
+    pub(super) fn add_falls(&self, row: &Row, falls: &Matrix3<f64>, twists: f64, blocks: &mut Blocks) {
+        for (by_side, by_place) in self.inside() {
+            // Of the force, by velocity and spin: `D` and `-D [s]`.
+            let s = &row.arms_W[by_side];
+            let of_force = [0, 1, 2].map(|at| {
+                let d = Vector3::new(falls[(at, 0)], falls[(at, 1)], falls[(at, 2)]);
+                let turned = s.cross(&d);
+                [d.x, d.y, d.z, turned.x, turned.y, turned.z]
+            });
+            for (side, place) in self.inside() {
+                let r = &row.arms_W[side];
+                let sign = SIGNS[side] * SIGNS[by_side];
+                let block = blocks.at(place, by_place);
+                for at in 0..3 {
+                    add(&mut block[at], &of_force[at], sign);
+                    // Of the torque: `[r]` times that of the force.
+                    let (next, last) = ((at + 1) % 3, (at + 2) % 3);
+                    add(&mut block[3 + at], &of_force[last], sign * r[next]);
+                    add(&mut block[3 + at], &of_force[next], -sign * r[last]);
+                }
+                if twists != 0.0 {
+                    let n = &row.normal_W;
+                    for (at, by) in (0..9).map(|at| (at / 3, at % 3)) {
+                        block[3 + at][3 + by] += sign * twists * n[at] * n[by];
+                    }
+                }
+            }
+        }
+    }
+}
