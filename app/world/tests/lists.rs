@@ -177,10 +177,8 @@ fn a_stack_that_changes_lists_does_not_twitch() {
     };
     let before = rests(&world, 1);
     for tick in 0..2000 {
-        world.step(
-            if tick / 100 % 2 == 0 { &[Reach { radius_m: 0.0, ..finger_at(0.0, 0.0) }] } else { &[] },
-            true,
-        );
+        let finger = [finger_at(0.0, 0.0)];
+        world.step(if tick / 100 % 2 == 0 { &finger } else { &[] }, true);
         for body in 0..2 {
             let side = usize::from(world.standings(body)[0] == Standing::Elsewhere);
             if world.standings(body) == [Standing::Elsewhere; 2] {
