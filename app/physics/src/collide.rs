@@ -40,6 +40,7 @@ mod mesh_plane;
 mod mesh_solid;
 mod mesh_span;
 mod overlay;
+mod rim;
 mod ring;
 mod spots;
 
