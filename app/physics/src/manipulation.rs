@@ -12,7 +12,7 @@ use crate::hand::{FingerSettings, FingerTick, Hand, HandStart};
 use crate::integrator::explicit::{self, Kept};
 use crate::integrator::rk4::Stages;
 use crate::integrator::{Gets, Integrator, Limits, mean_angular_velocity_W};
-use crate::pair::{Pair, Response, Start, Surfacing, fastest_point_m_s};
+use crate::pair::{End, Pair, Response, Start, Surfacing, fastest_point_m_s};
 use crate::restitution::Restitution;
 use crate::row::Row;
 use crate::solver::{Motion, Solver};
@@ -61,6 +61,8 @@ pub struct Manipulation {
     rows: Vec<Row>,
     motions: Vec<Motion>,
     speeds_m_s: Vec<f64>,
+    /// Of each body, what a tick took from it \[J\].
+    spare_j: Vec<f64>,
     solver: Solver,
     hand: Hand,
     restitution: Restitution,
@@ -141,6 +143,7 @@ impl Manipulation {
             motions: Vec::with_capacity(bodies.len()),
             hand: Hand::new(&[], bodies.len()),
             speeds_m_s: Vec::with_capacity(bodies.len()),
+            spare_j: Vec::with_capacity(bodies.len()),
             solver: Solver::with_capacity(room, bodies.len()),
             restitution: Restitution::with_capacity(room, bodies.len()),
             touching: 0,
@@ -194,6 +197,12 @@ impl Manipulation {
         &self.rows
     }
 
+    /// What the springs between entities hold after the last tick \[J\]; with the bodies' kinetic energy and gravity's it never
+    /// grows while no finger presses.
+    pub fn elastic_energy_j(&self) -> f64 {
+        self.pairs.iter().map(Pair::elastic_energy_j).sum()
+    }
+
     /// Bodies that do not move any more, in the order in which they were parked: the last [`Made::parked`] of them in the last
     /// tick.
     pub fn parked(&self) -> &[Parked] {
@@ -225,9 +234,7 @@ impl Manipulation {
             }
         }
         self.hand.settle(&self.rows, &self.motions, &self.entities, fingers, dt_s);
-        for pair in &mut self.pairs {
-            pair.settle(&self.rows, &self.motions, entities, dt_s);
-        }
+        self.settle_pairs(entities, dt_s);
         self.sum_up();
         let parked = self.advance(entities, dt_s);
         Made { rows: self.rows.len(), sweeps, parked }
@@ -335,6 +342,19 @@ impl Manipulation {
         let sweeps = self.restitution.solve(&mut self.solver, &mut self.rows, &mut self.motions, dt_s);
         explicit::release(&mut self.rows, &mut self.fixed);
         sweeps
+    }
+
+    /// Tells the pairs how the tick ended, and what its being finite took from the bodies: with the velocity of its end for all of
+    /// it, half of the mass times the velocity's change squared.
+    fn settle_pairs(&mut self, entities: &[Entity], dt_s: f64) {
+        self.spare_j.clear();
+        self.spare_j.extend(self.bodies.iter().zip(&self.motions).map(|(body, motion)| {
+            0.5 * body.mass.mass_kg * (motion.velocity_W - body.velocity_W).norm_squared()
+        }));
+        let end = End { rows: &self.rows, motions: &self.motions, entities, dt_s };
+        for pair in &mut self.pairs {
+            pair.settle(&end, &mut self.spare_j);
+        }
     }
 
     /// What each body gets: the Residual Force and Torque Algorithms.

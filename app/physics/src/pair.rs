@@ -3,6 +3,7 @@
 //! Model: each contact point is a spring of its own; a face at rest on four points is four springs ([`surfacing`],
 //! [`pressed`]). A contact that is found deep at once (objects placed into each other) is let out slowly.
 
+mod ledger;
 mod pressed;
 mod surfacing;
 
@@ -11,9 +12,12 @@ use nalgebra::{Isometry3, Vector3};
 
 use crate::anchor::Anchor;
 use crate::body::Body;
-use crate::collide::{ContactPoints, MAX_POINTS, PairMemory, Solid, bounding_ball, contact_points};
+use crate::collide::{
+    ContactPoint, ContactPoints, MAX_POINTS, PairMemory, Solid, bounding_ball, contact_points,
+};
 use crate::row::Row;
 use crate::solver::Motion;
+use ledger::{Allowed, Ledger, MAX_SPRINGS, Stretched};
 use pressed::{let_out_m_s, row};
 pub use surfacing::{Response, Surfacing};
 
@@ -28,6 +32,9 @@ pub(crate) struct Pair {
     memory: PairMemory,
     anchors: [Anchor; MAX_POINTS],
     count: usize,
+    /// Nobody has looked yet whether it touches.
+    is_new: bool,
+    ledger: Ledger,
     /// Where its rows of this tick begin.
     first_row: usize,
     rows: usize,
@@ -46,6 +53,15 @@ pub(crate) struct Start<'t> {
     pub(crate) is_implicit: bool,
 }
 
+/// The state that it ends with.
+pub(crate) struct End<'t> {
+    pub(crate) rows: &'t [Row],
+    pub(crate) motions: &'t [Motion],
+    /// Where they were when it began.
+    pub(crate) entities: &'t [Entity],
+    pub(crate) dt_s: f64,
+}
+
 impl Pair {
     pub(crate) fn new(entities: [usize; 2], bodies: (usize, Option<usize>), surfacing: Surfacing) -> Self {
         let anchors = [Anchor::default(); MAX_POINTS];
@@ -56,6 +72,8 @@ impl Pair {
             memory: PairMemory::default(),
             anchors,
             count: 0,
+            is_new: true,
+            ledger: Ledger::default(),
             first_row: 0,
             rows: 0,
         }
@@ -69,6 +87,7 @@ impl Pair {
         let reach_m = REACH_M + speed_m_s * start.dt_s;
         if !is_near(a, b, reach_m) {
             self.count = 0;
+            self.ledger = Ledger::default();
             // They may meet again from another side.
             self.memory = PairMemory::default();
             return;
@@ -77,13 +96,17 @@ impl Pair {
         let mut found = ContactPoints::default();
         contact_points(in_A, in_B, reach_m, &mut self.memory, &mut found);
         let poses = [[&a.X_WB, &b.X_WB], [&a.previous_X_WB, &b.previous_X_WB]];
+        let begins = self.count == 0;
         self.carry(&found, poses, reach_m, speed_m_s * start.dt_s);
+        // A contact that is not found for a tick may still be there: until then the account stays.
+        if self.count > 0 {
+            self.press(found.as_slice(), begins, start);
+        }
+        self.is_new = false;
         for (anchor, point) in self.anchors.iter_mut().zip(found.as_slice()) {
             if rows.len() == rows.capacity() {
                 return;
             }
-            let let_out_m = let_out_m_s(anchor.granted_m, start.dt_s) * start.dt_s;
-            anchor.granted_m = (anchor.granted_m - let_out_m).clamp(0.0, (-point.gap_m).max(0.0));
             let (row, is_impact) = row(self.bodies, &self.surfacing, anchor, point, &b.X_WB, start);
             if is_impact {
                 impacts.push(rows.len());
@@ -93,16 +116,79 @@ impl Pair {
         }
     }
 
-    /// Takes note of how the tick ended.
-    pub(crate) fn settle(&mut self, rows: &[Row], motions: &[Motion], entities: &[Entity], dt_s: f64) {
-        let X_WB = &entities[self.entities[1]].X_WB;
-        let own = rows.iter().skip(self.first_row).take(self.rows);
-        for (anchor, row) in self.anchors.iter_mut().zip(own) {
-            let mut velocity_W = motions[row.body].at(&row.arms_W[0]);
-            if let Some(other) = row.other {
-                velocity_W -= motions[other].at(&row.arms_W[1]);
+    /// How far each point's springs are stretched: as far as it is deep and was dragged, if that was worked for.
+    fn press(&mut self, points: &[ContactPoint], begins: bool, start: &Start<'_>) {
+        let k = self.surfacing.stiffness_n_per_m;
+        let has_springs = self.surfacing.response == Response::Force;
+        let mut springs = [Stretched::default(); MAX_SPRINGS];
+        let (mut full, mut is_let_out) = (0.0, false);
+        for (at, (anchor, point)) in self.anchors.iter_mut().zip(points).enumerate() {
+            let depth_m = point.depth_m();
+            let let_out_m = let_out_m_s(anchor.granted_m, start.dt_s) * start.dt_s;
+            anchor.granted_m = (anchor.granted_m - let_out_m).clamp(0.0, depth_m);
+            is_let_out |= anchor.granted_m > 0.0;
+            anchor.pressed_m = if point.gap_m < 0.0 { depth_m - anchor.granted_m } else { -point.gap_m };
+            anchor.share = point.share;
+            let dragged = anchor.stretch_squared();
+            springs[2 * at + 1] = Stretched { found: dragged, worked: anchor.worked[1] };
+            full += dragged;
+            if has_springs {
+                let found = point.share * anchor.pressed_m.max(0.0).powi(2);
+                springs[2 * at] = Stretched { found, worked: anchor.worked[0] };
+                full += point.share * depth_m * depth_m;
             }
-            anchor.settle(row, &(velocity_W * dt_s), X_WB);
+        }
+        let full_j = 0.5 * k * full;
+        if begins && self.ledger.is_closed() && (self.is_new || is_let_out) {
+            self.ledger = Ledger::of(full_j);
+        }
+        self.ledger.begin(self.bodies, start);
+        self.ledger.cut(full_j, is_let_out);
+        let springs = &springs[..2 * points.len().min(MAX_POINTS)];
+        let allowed = self.ledger.allow(springs, k, is_let_out);
+        if allowed == Allowed::Everything || !start.is_implicit {
+            return;
+        }
+        for (anchor, springs) in self.anchors.iter_mut().zip(springs.chunks_exact(2)) {
+            if has_springs && anchor.pressed_m > 0.0 {
+                anchor.pressed_m *= (allowed.of(&springs[0]) / springs[0].found).sqrt().min(1.0);
+            }
+            anchor.slacken(allowed.of(&springs[1]));
+        }
+    }
+
+    /// What its springs may hold \[J\].
+    pub(crate) fn elastic_energy_j(&self) -> f64 {
+        self.ledger.held_j()
+    }
+
+    /// Takes note of how the tick ended. `spare_j`: of each body what the tick itself took from it (J); a pair that can use it takes it.
+    pub(crate) fn settle(&mut self, end: &End<'_>, spare_j: &mut [f64]) {
+        let X_WB = &end.entities[self.entities[1]].X_WB;
+        let own = end.rows.iter().skip(self.first_row).take(self.rows);
+        let mut presses = false;
+        for (anchor, row) in self.anchors.iter_mut().zip(own) {
+            let mut velocity_W = end.motions[row.body].at(&row.arms_W[0]);
+            if let Some(other) = row.other {
+                velocity_W -= end.motions[other].at(&row.arms_W[1]);
+            }
+            anchor.settle(row, &(velocity_W * end.dt_s), X_WB);
+            let is_spring = row.stiffness[1] == self.surfacing.stiffness_n_per_m;
+            let force_W = match self.surfacing.response {
+                Response::Force => row.force_W,
+                // Along the normal impulses are no springs', and those of an impact not across it either.
+                Response::Impulse { .. } if is_spring => {
+                    row.force_W - row.normal_W * row.normal_W.dot(&row.force_W)
+                }
+                Response::Impulse { .. } => continue,
+            };
+            presses |= force_W != Vector3::zeros();
+            self.ledger.enter(row, &force_W, end.motions, end.dt_s);
+        }
+        if presses && self.ledger.owes() {
+            for body in [Some(self.bodies.0), self.bodies.1].into_iter().flatten() {
+                self.ledger.refund(std::mem::take(&mut spare_j[body]));
+            }
         }
     }
 
@@ -141,8 +227,8 @@ impl Pair {
                 continue;
             }
             self.anchors[at] = Anchor::begin(point, now[0], now[1]);
-            if begins && -point.gap_m > reach_m {
-                self.anchors[at].granted_m = -point.gap_m;
+            if begins && self.ledger.is_closed() && -point.gap_m > reach_m {
+                self.anchors[at].granted_m = point.depth_m();
             }
         }
     }

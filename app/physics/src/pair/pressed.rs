@@ -29,7 +29,7 @@ pub(super) fn row(
         if goes_along { middle_W(&start.motions[body], dt_s) * arm_W } else { arm_W }
     };
     let (k, b) = (surfacing.stiffness_n_per_m, surfacing.damping_n_s_per_m);
-    let gap_m = point.gap_m + anchor.granted_m;
+    let gap_m = -anchor.pressed_m;
     let n = point.normal_W;
     let mut row = Row {
         body,
@@ -37,7 +37,7 @@ pub(super) fn row(
         arms_W: [arm(body, 0), other.map_or(Vector3::zeros(), |other| arm(other, 1))],
         normal_W: n,
         rest_W: Vector3::zeros(),
-        stiffness: [k; 2],
+        stiffness: [k * anchor.share, k],
         damping: [b; 2],
         mu_hold: surfacing.friction.mu_hold,
         mu_slide: surfacing.friction.mu_slide,
@@ -48,15 +48,15 @@ pub(super) fn row(
     };
     let rest_n = match surfacing.response {
         //= melder#6.2
-        Response::Force if gap_m < 0.0 => -k * gap_m,
+        Response::Force if gap_m < 0.0 => -row.stiffness[0] * gap_m,
         // Of a force that is known when the tick begins nothing is damped before they meet.
         Response::Force if !start.is_implicit => {
             row.damping[0] = 0.0;
-            -k * gap_m
+            -row.stiffness[0] * gap_m
         }
         // Only what is left of the tick when they meet is damped.
         Response::Force => {
-            (row.stiffness[0], row.damping[0]) = (k + b / dt_s, 0.0);
+            (row.stiffness[0], row.damping[0]) = (row.stiffness[0] + b / dt_s, 0.0);
             -row.stiffness[0] * gap_m
         }
         Response::Impulse { restitution } => {
@@ -64,6 +64,7 @@ pub(super) fn row(
             (row.stiffness, row.damping) = ([0.0, k], [stop, b]);
             let impact = Impact::of(&row, gap_m, restitution, anchor, start);
             if impact.is_one {
+                anchor.release();
                 // What an impulse gives across the normal lasts no longer than the impulse.
                 row.stiffness[1] = stop / dt_s;
             }
