@@ -17,9 +17,9 @@ mod thrown;
 use common::*;
 use haptics::Cuboid;
 use nalgebra::{Isometry3, Vector3};
-use physics::collide::{ContactPoints, PairMemory, Solid, contact_points};
+use physics::collide::{ContactPoints, PairMemory, Solid, bounding_ball, contact_points};
 use physics::{Body, Response, Row, Settings, Surfacing};
-use thrown::{KINDS, Recipe, scene};
+use thrown::{KINDS, PLANES, Recipe, scene};
 
 /// Kinetic energy and gravity's (J).
 fn of_bodies_j(world: &World) -> f64 {
@@ -51,15 +51,26 @@ fn pressing_j(rows: &[Row]) -> f64 {
     rows.iter().map(of).sum()
 }
 
-/// What springs between all that overlaps would hold at their full length (J).
+/// What springs between all that overlaps would hold at their full length (J). Which points a mesh stands on depends on how far it
+/// may move in the tick: they are asked for from there on.
 fn overlap_j(world: &World) -> f64 {
     let solid = |at: usize| Solid { shape: &world.entities[at].shape, X_W: &world.entities[at].X_WB };
+    let fastest = |at: usize| {
+        let Some(body) = at.checked_sub(PLANES).map(|body| &world.manipulation.bodies()[body]) else {
+            return 0.0;
+        };
+        let (centre_B, radius_m) = bounding_ball(&world.entities[at].shape).unwrap();
+        let falling_W = body.velocity_W - Vector3::y() * (G * DT);
+        let farthest_m = radius_m + (centre_B - body.mass.centre_B).norm();
+        falling_W.norm() + body.angular_velocity_W().norm() * farthest_m
+    };
     let mut all_j = 0.0;
-    for a in 2..world.entities.len() {
-        for b in (0..2).chain(a + 1..world.entities.len()) {
+    for a in PLANES..world.entities.len() {
+        for b in (0..PLANES).chain(a + 1..world.entities.len()) {
+            let reach_m = 1e-3 + (fastest(a) + fastest(b)) * DT;
             let surfacing = Surfacing::between(&world.entities[a], &world.entities[b], Response::Force);
             let mut found = ContactPoints::default();
-            contact_points(solid(a), solid(b), 0.0, &mut PairMemory::default(), &mut found);
+            contact_points(solid(a), solid(b), reach_m, &mut PairMemory::default(), &mut found);
             let squares: f64 = found.as_slice().iter().map(|p| p.share * p.depth_m().powi(2)).sum();
             all_j += 0.5 * surfacing.stiffness_n_per_m * squares;
         }

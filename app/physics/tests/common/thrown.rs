@@ -41,6 +41,9 @@ pub const KINDS: [Kind; 10] = [
     Kind::Angle,
 ];
 
+/// The first so many entities; all others are bodies.
+pub const PLANES: usize = 2;
+
 /// What a scene is made of.
 #[derive(Clone, Copy, Debug)]
 pub struct Recipe {
