@@ -31,6 +31,13 @@ pub struct Anchor {
     pub(crate) approached: bool,
     /// How much of a depth that was there from the start is still granted \[m\].
     pub(crate) granted_m: f64,
+    /// How far its spring is pressed \[m\]; negative: how far it is from touching.
+    pub(crate) pressed_m: f64,
+    /// Which part of a spring it is.
+    pub(crate) share: f64,
+    /// How far its springs were stretched when the last tick ended, along the normal and across it \[m^2\], squared: what the
+    /// forces have worked against.
+    pub(crate) worked: [f64; 2],
 }
 
 impl Anchor {
@@ -87,6 +94,22 @@ impl Anchor {
         X_WB.rotation * self.stretch
     }
 
+    /// How far the point has been dragged \[m^2\], squared.
+    pub(crate) fn stretch_squared(&self) -> f64 {
+        self.stretch.norm_squared()
+    }
+
+    /// Lets go of a part of the stretch: what is left of its square.
+    pub(crate) fn slacken(&mut self, squared: f64) {
+        let was = self.stretch.norm_squared();
+        self.stretch *= if was > 0.0 { (squared / was).sqrt() } else { 0.0 };
+    }
+
+    /// Lets go of all of it.
+    pub(crate) fn release(&mut self) {
+        self.stretch = Vector3::zeros();
+    }
+
     pub(crate) fn force_W(&self, X_WB: &Isometry3<f64>) -> Vector3<f64> {
         X_WB.rotation * self.force
     }
@@ -120,6 +143,11 @@ impl Anchor {
         if normal_n == 0.0 {
             self.stretch = Vector3::zeros();
         }
+        let pressed_m = (self.pressed_m - n.dot(moved_W)).max(0.0);
+        let dragged_W = self.stretch_W(X_WB) + moved_W - n * n.dot(moved_W);
+        let is_dragged = normal_n > 0.0;
+        self.worked =
+            [self.share * pressed_m * pressed_m, if is_dragged { dragged_W.norm_squared() } else { 0.0 }];
         self.held = match row.held {
             Held::Slip if normal_n > 0.0 && is_caught(row, normal_n) => Held::Stick,
             Held::Slip if normal_n == 0.0 => Held::Stick,

@@ -40,6 +40,7 @@ mod mesh_plane;
 mod mesh_solid;
 mod mesh_span;
 mod overlay;
+mod rim;
 mod ring;
 mod spots;
 
@@ -58,8 +59,17 @@ pub struct ContactPoint {
     pub point_W: Vector3<f64>,
     /// Unit, from B to A.
     pub normal_W: Vector3<f64>,
-    /// From B's surface to that of A along the normal \[m\]; negative: the depth.
+    /// From B's surface to that of A along the normal \[m\]; negative: what counts of the depth.
     pub gap_m: f64,
+    /// Which part of its depth counts: less than 1 where it is next to other points.
+    pub share: f64,
+}
+
+impl ContactPoint {
+    /// How deep it is, all of it \[m\].
+    pub fn depth_m(&self) -> f64 {
+        if self.gap_m < 0.0 && self.share > 0.0 { -self.gap_m / self.share } else { 0.0 }
+    }
 }
 
 /// All contact points of two entities.

@@ -18,7 +18,7 @@ use crate::hand::{FingerSettings, FingerTick, Hand, HandStart};
 use crate::integrator::explicit::{self, Kept};
 use crate::integrator::rk4::Stages;
 use crate::integrator::{Gets, Integrator, Limits, mean_angular_velocity_W};
-use crate::pair::{Response, Start, fastest_point_m_s};
+use crate::pair::{End, Response, Start, fastest_point_m_s};
 use crate::pairs::{Key, Pairs, Who};
 use crate::pull::{MAX_PULLS, Pull};
 use crate::restitution::Restitution;
@@ -43,6 +43,8 @@ pub struct Manipulation {
     rows: Vec<Row>,
     motions: Vec<Motion>,
     speeds_m_s: Vec<f64>,
+    /// Of each body, what a tick took from it \[J\].
+    spare_j: Vec<f64>,
     solver: Solver,
     hand: Hand,
     restitution: Restitution,
@@ -139,6 +141,7 @@ impl Manipulation {
             rows: Vec::with_capacity(room),
             motions: Vec::with_capacity(count),
             speeds_m_s: Vec::with_capacity(count),
+            spare_j: Vec::with_capacity(count),
             solver: Solver::with_capacity(room, count),
             hand: Hand::new(&[], count),
             restitution: Restitution::with_capacity(room, count),
@@ -262,6 +265,12 @@ impl Manipulation {
         self.roster.awake()
     }
 
+    /// What the springs between entities hold after the last tick \[J\]; with the bodies' kinetic energy and gravity's it never
+    /// grows while no finger presses.
+    pub fn elastic_energy_j(&self) -> f64 {
+        self.pairs.iter().map(|(_, pair)| pair.elastic_energy_j()).sum()
+    }
+
     /// Bodies that do not move any more, in the order in which they were parked: the last [`Made::parked`] of them in the last
     /// tick.
     pub fn parked(&self) -> &[Parked] {
@@ -323,10 +332,7 @@ impl Manipulation {
             }
         }
         self.hand.settle(&self.rows, &self.motions, &self.roster, fingers, dt_s);
-        for at in 0..self.pairs.awake_count() {
-            let has_met = |row| self.restitution.has_met(row);
-            self.pairs.awake_at(at).1.settle(&self.rows, &self.motions, entities, has_met, dt_s);
-        }
+        self.settle_pairs(entities, dt_s);
         self.sum_up();
         let (awake, parked) = (self.roster.awake().len(), self.advance(entities, dt_s));
         self.keep_up(entities, dt_s);
@@ -487,6 +493,20 @@ impl Manipulation {
         let solved = self.restitution.solve(&mut self.solver, &mut self.rows, &mut self.motions, dt_s);
         explicit::release(&mut self.rows, &mut self.fixed);
         solved
+    }
+
+    /// Tells the pairs how the tick ended, and what its being finite took from the bodies: with the velocity of its end for all of
+    /// it, half of the mass times the velocity's change squared.
+    fn settle_pairs(&mut self, entities: &[Entity], dt_s: f64) {
+        self.spare_j.clear();
+        self.spare_j.extend(self.bodies.iter().zip(&self.motions).map(|(body, motion)| {
+            0.5 * body.mass.mass_kg * (motion.velocity_W - body.velocity_W).norm_squared()
+        }));
+        let end = End { rows: &self.rows, motions: &self.motions, entities, dt_s };
+        for at in 0..self.pairs.awake_count() {
+            let has_met = |row| self.restitution.has_met(row);
+            self.pairs.awake_at(at).1.settle(&end, has_met, &mut self.spare_j);
+        }
     }
 
     /// What each body gets: the Residual Force and Torque Algorithms.

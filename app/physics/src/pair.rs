@@ -1,61 +1,27 @@
 //! Two entities that may touch: a body, and another body or what is fixed.
 //!
-//! Model: stiffnesses in series, dampings added, friction the geometric mean (each contact point is a spring of its own; a
-//! face at rest on four points is four springs). The *force response* presses with the depth (Melder eq. 6.2, with damping
-//! and without pulling); the *impulse response* reflects the approaching velocity (eq. 6.1, corrected).
-//! A contact that is found deep at once (objects placed into each other) is let out slowly.
+//! Model: each contact point is a spring of its own; a face at rest on four points is four springs ([`surfacing`],
+//! [`pressed`]). A contact that is found deep at once (objects placed into each other) is let out slowly.
+
+mod ledger;
+mod pressed;
+mod surfacing;
 
 use haptics::Entity;
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Vector3};
 
 use crate::anchor::Anchor;
 use crate::body::Body;
 use crate::collide::{
     ContactPoint, ContactPoints, MAX_POINTS, PairMemory, Solid, bounding_ball, contact_points,
 };
-use crate::pair_friction::PairFriction;
 use crate::restitution::Meeting;
-use crate::row::{Row, Torsion};
+use crate::row::Row;
 use crate::solver::Motion;
-
-/// How a contact between entities answers.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub enum Response {
-    /// A spring and a damper.
-    #[default]
-    Force,
-    /// Velocities are reflected.
-    Impulse {
-        /// e, 0 to 1: how much of the approaching velocity comes back, where neither entity says.
-        restitution: f64,
-    },
-}
-
-/// What two surfaces make of each other.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Surfacing {
-    /// Of each contact point \[N/m\].
-    pub stiffness_n_per_m: f64,
-    /// Of each contact point \[N s/m\].
-    pub damping_n_s_per_m: f64,
-    /// Ratios.
-    pub friction: PairFriction,
-    /// How it answers.
-    pub response: Response,
-}
-
-impl Surfacing {
-    /// Of two entities.
-    pub fn between(a: &Entity, b: &Entity, response: Response) -> Self {
-        let (k_a, k_b) = (a.stiffness_n_per_m, b.stiffness_n_per_m);
-        Self {
-            stiffness_n_per_m: k_a / (1.0 + k_a / k_b),
-            damping_n_s_per_m: a.damping_n_s_per_m + b.damping_n_s_per_m,
-            friction: PairFriction::between(&a.friction, &b.friction),
-            response: response.between(a, b),
-        }
-    }
-}
+use ledger::{Allowed, Ledger, MAX_SPRINGS, Stretched};
+pub(crate) use pressed::HARD;
+use pressed::{let_out_m_s, row};
+pub use surfacing::{Response, Surfacing};
 
 /// A pair and its contact points.
 #[derive(Debug, Clone, Default)]
@@ -70,6 +36,9 @@ pub(crate) struct Pair {
     memory: PairMemory,
     anchors: [Anchor; MAX_POINTS],
     count: usize,
+    /// Nobody has looked yet whether it touches.
+    is_new: bool,
+    ledger: Ledger,
     /// Where its rows of this tick begin.
     first_row: usize,
     rows: usize,
@@ -88,13 +57,22 @@ pub(crate) struct Start<'t> {
     pub(crate) is_implicit: bool,
 }
 
+/// The state that it ends with.
+pub(crate) struct End<'t> {
+    pub(crate) rows: &'t [Row],
+    pub(crate) motions: &'t [Motion],
+    /// Where they were when it began.
+    pub(crate) entities: &'t [Entity],
+    pub(crate) dt_s: f64,
+}
+
 impl Pair {
     /// That has not touched yet.
     pub(crate) fn new(entities: [usize; 2], surfacing: Surfacing) -> Self {
-        Self { entities, surfacing, ..Self::default() }
+        Self { entities, surfacing, is_new: true, ..Self::default() }
     }
 
-    /// Finds where it touches, and appends a row for each point; notes which rows answer by impulses.
+    /// Finds where it touches, and appends a row for each point; notes those that may meet what they touch.
     pub(crate) fn gather(&mut self, start: &Start<'_>, rows: &mut Vec<Row>, meetings: &mut Vec<Meeting>) {
         (self.first_row, self.rows) = (rows.len(), 0);
         let [a, b] = self.entities.map(|index| &start.entities[index]);
@@ -109,16 +87,20 @@ impl Pair {
         let mut found = ContactPoints::default();
         contact_points(in_A, in_B, reach_m, &mut self.memory, &mut found);
         let poses = [[&a.X_WB, &b.X_WB], [&a.previous_X_WB, &b.previous_X_WB]];
+        let begins = self.count == 0;
         self.carry(&found, poses, reach_m, speed_m_s * start.dt_s);
+        // A contact that is not found for a tick may still be there: until then the account stays.
+        if self.count > 0 {
+            self.press(found.as_slice(), begins, start);
+        }
+        self.is_new = false;
         for (anchor, point) in self.anchors.iter_mut().zip(found.as_slice()) {
             if rows.len() == rows.capacity() {
                 return;
             }
-            let let_out_m = let_out_m_s(anchor.granted_m, start.dt_s) * start.dt_s;
-            anchor.granted_m = (anchor.granted_m - let_out_m).clamp(0.0, (-point.gap_m).max(0.0));
             let row = row(self.bodies, &self.surfacing, anchor, point, &b.X_WB, start);
             if let Response::Impulse { restitution } = self.surfacing.response {
-                let gap_m = point.gap_m + anchor.granted_m;
+                let gap_m = -anchor.pressed_m;
                 meetings.push(Meeting::of((rows.len(), &row), gap_m, restitution, anchor, start));
             }
             rows.push(row);
@@ -126,31 +108,93 @@ impl Pair {
         }
     }
 
+    /// How far each point's springs are stretched: as far as it is deep and was dragged, if that was worked for.
+    fn press(&mut self, points: &[ContactPoint], begins: bool, start: &Start<'_>) {
+        let k = self.surfacing.stiffness_n_per_m;
+        let has_springs = self.surfacing.response == Response::Force;
+        let mut springs = [Stretched::default(); MAX_SPRINGS];
+        let (mut full, mut is_let_out) = (0.0, false);
+        for (at, (anchor, point)) in self.anchors.iter_mut().zip(points).enumerate() {
+            let depth_m = point.depth_m();
+            let let_out_m = let_out_m_s(anchor.granted_m, start.dt_s) * start.dt_s;
+            anchor.granted_m = (anchor.granted_m - let_out_m).clamp(0.0, depth_m);
+            is_let_out |= anchor.granted_m > 0.0;
+            anchor.pressed_m = if point.gap_m < 0.0 { depth_m - anchor.granted_m } else { -point.gap_m };
+            anchor.share = point.share;
+            let dragged = anchor.stretch_squared();
+            springs[2 * at + 1] = Stretched { found: dragged, worked: anchor.worked[1] };
+            full += dragged;
+            if has_springs {
+                let found = point.share * anchor.pressed_m.max(0.0).powi(2);
+                springs[2 * at] = Stretched { found, worked: anchor.worked[0] };
+                full += point.share * depth_m * depth_m;
+            }
+        }
+        let full_j = 0.5 * k * full;
+        if begins && self.ledger.is_closed() && (self.is_new || is_let_out) {
+            self.ledger = Ledger::of(full_j);
+        }
+        self.ledger.begin(self.bodies, start);
+        self.ledger.cut(full_j, is_let_out);
+        let springs = &springs[..2 * points.len().min(MAX_POINTS)];
+        let allowed = self.ledger.allow(springs, k, is_let_out);
+        if allowed == Allowed::Everything || !start.is_implicit {
+            return;
+        }
+        for (anchor, springs) in self.anchors.iter_mut().zip(springs.chunks_exact(2)) {
+            if has_springs && anchor.pressed_m > 0.0 {
+                anchor.pressed_m *= (allowed.of(&springs[0]) / springs[0].found).sqrt().min(1.0);
+            }
+            anchor.slacken(allowed.of(&springs[1]));
+        }
+    }
+
+    /// What its springs may hold \[J\].
+    pub(crate) fn elastic_energy_j(&self) -> f64 {
+        self.ledger.held_j()
+    }
+
     /// They do not touch in this tick.
     pub(crate) fn pass_by(&mut self) {
         (self.is_near, self.count, self.rows) = (false, 0, 0);
+        self.ledger = Ledger::default();
         // They may meet again from another side.
         self.memory = PairMemory::default();
     }
 
-    /// Takes note of how the tick ended, and of which rows met in it after the tick had begun.
-    pub(crate) fn settle(
-        &mut self,
-        rows: &[Row],
-        motions: &[Motion],
-        entities: &[Entity],
-        has_met: impl Fn(usize) -> bool,
-        dt_s: f64,
-    ) {
-        let X_WB = &entities[self.entities[1]].X_WB;
-        let own = rows.iter().enumerate().skip(self.first_row).take(self.rows);
+    /// Takes note of how the tick ended, and of which rows met in it after it had begun. `spare_j`: of each body what the tick itself took from it (J);
+    /// a pair that can use it takes it.
+    pub(crate) fn settle(&mut self, end: &End<'_>, has_met: impl Fn(usize) -> bool, spare_j: &mut [f64]) {
+        let X_WB = &end.entities[self.entities[1]].X_WB;
+        let own = end.rows.iter().enumerate().skip(self.first_row).take(self.rows);
+        let mut presses = false;
         for (anchor, (at, row)) in self.anchors.iter_mut().zip(own) {
             anchor.approached |= has_met(at);
-            let mut velocity_W = motions[row.body].at(&row.arms_W[0]);
+            let mut velocity_W = end.motions[row.body].at(&row.arms_W[0]);
             if let Some(other) = row.other {
-                velocity_W -= motions[other].at(&row.arms_W[1]);
+                velocity_W -= end.motions[other].at(&row.arms_W[1]);
             }
-            anchor.settle(row, &(velocity_W * dt_s), X_WB);
+            let is_spring = row.stiffness[1] == self.surfacing.stiffness_n_per_m;
+            if !is_spring {
+                // An impact lets go of what friction had stretched.
+                anchor.release();
+            }
+            anchor.settle(row, &(velocity_W * end.dt_s), X_WB);
+            let force_W = match self.surfacing.response {
+                Response::Force => row.force_W,
+                // Along the normal impulses are no springs', and those of an impact not across it either.
+                Response::Impulse { .. } if is_spring => {
+                    row.force_W - row.normal_W * row.normal_W.dot(&row.force_W)
+                }
+                Response::Impulse { .. } => continue,
+            };
+            presses |= force_W != Vector3::zeros();
+            self.ledger.enter(row, &force_W, end.motions, end.dt_s);
+        }
+        if presses && self.ledger.owes() {
+            for body in [Some(self.bodies.0), self.bodies.1].into_iter().flatten() {
+                self.ledger.refund(std::mem::take(&mut spare_j[body]));
+            }
         }
     }
 
@@ -189,8 +233,8 @@ impl Pair {
                 continue;
             }
             self.anchors[at] = Anchor::begin(point, now[0], now[1]);
-            if begins && -point.gap_m > reach_m {
-                self.anchors[at].granted_m = -point.gap_m;
+            if begins && self.ledger.is_closed() && -point.gap_m > reach_m {
+                self.anchors[at].granted_m = point.depth_m();
             }
         }
     }
@@ -220,103 +264,7 @@ pub(crate) fn is_near(a: &Entity, b: &Entity, reach_m: f64) -> bool {
     }
 }
 
-fn row(
-    (body, other): (usize, Option<usize>),
-    surfacing: &Surfacing,
-    anchor: &Anchor,
-    point: &ContactPoint,
-    X_WB: &Isometry3<f64>,
-    start: &Start<'_>,
-) -> Row {
-    let dt_s = start.dt_s;
-    let arm = |body: usize, side: usize| {
-        let arm_W = point.point_W - start.bodies[body].centre_W;
-        // Material on an arm that turns moves along the chord: at right angles to the arm of the tick's middle. What rolls
-        // touches with other material by then.
-        let goes_along = anchor.is_same_material[side] && start.is_implicit;
-        if goes_along { middle_W(&start.motions[body], dt_s) * arm_W } else { arm_W }
-    };
-    let mut arms_W = [arm(body, 0), other.map_or(Vector3::zeros(), |other| arm(other, 1))];
-    if let Some(other) = other {
-        // What one gives the other gets at the same place, or angular momentum would be lost between them.
-        let apart_W = start.bodies[body].centre_W + arms_W[0] - start.bodies[other].centre_W - arms_W[1];
-        arms_W[0] -= apart_W * 0.5;
-        arms_W[1] += apart_W * 0.5;
-    }
-    let (k, b) = (surfacing.stiffness_n_per_m, surfacing.damping_n_s_per_m);
-    let gap_m = point.gap_m + anchor.granted_m;
-    let n = point.normal_W;
-    let mut row = Row {
-        body,
-        other,
-        arms_W,
-        normal_W: n,
-        rest_W: Vector3::zeros(),
-        stiffness: [k; 2],
-        damping: [b; 2],
-        mu_hold: surfacing.friction.mu_hold,
-        mu_slide: surfacing.friction.mu_slide,
-        held: anchor.held(),
-        force_W: anchor.force_W(X_WB),
-        torsion: Torsion::default(),
-        tie_n: None,
-    };
-    let rest_n = match surfacing.response {
-        //= melder#6.2
-        Response::Force if gap_m < 0.0 => -k * gap_m,
-        // Of a force that is known when the tick begins nothing is damped before they meet.
-        Response::Force if !start.is_implicit => {
-            row.damping[0] = 0.0;
-            -k * gap_m
-        }
-        // Only what is left of the tick when they meet is damped.
-        Response::Force => {
-            (row.stiffness[0], row.damping[0]) = (k + b / dt_s, 0.0);
-            -row.stiffness[0] * gap_m
-        }
-        Response::Impulse { .. } => {
-            let stop = stop_n_s_per_m(&row, start);
-            (row.stiffness, row.damping) = ([0.0, k], [stop, b]);
-            stop * if gap_m < 0.0 { let_out_m_s(-gap_m, dt_s) } else { -gap_m / dt_s }
-        }
-    };
-    row.rest_W = n * rest_n - anchor.stretch_W(X_WB) * row.stiffness[1];
-    row
-}
-
-/// How far a body turns in half a tick, if nothing touches it.
-fn middle_W(motion: &Motion, dt_s: f64) -> UnitQuaternion<f64> {
-    // Beyond a radian a chord is none.
-    let turn_W = motion.angular_velocity_W * (0.5 * dt_s);
-    UnitQuaternion::from_scaled_axis(if turn_W.norm_squared() < 0.25 { turn_W } else { Vector3::zeros() })
-}
-
-/// A damping so large that velocities are what is wanted.
-fn stop_n_s_per_m(row: &Row, start: &Start<'_>) -> f64 {
-    let give = |body: usize, arm_W: &Vector3<f64>| {
-        let motion = &start.motions[body];
-        let turns_W = arm_W.cross(&row.normal_W);
-        motion.inverse_mass + turns_W.dot(&(motion.inverse_inertia_W * turns_W))
-    };
-    let gives = give(row.body, &row.arms_W[0]) + row.other.map_or(0.0, |other| give(other, &row.arms_W[1]));
-    // Nothing can be stopped that nothing moves.
-    if gives > 0.0 { HARD / (gives * start.dt_s) } else { 0.0 }
-}
-
-/// How fast a depth that should not be there is let out.
-fn let_out_m_s(depth_m: f64, dt_s: f64) -> f64 {
-    (depth_m / LET_OUT_S.max(dt_s)).min(LET_OUT_M_S)
-}
-
 /// Contact points are looked for from this distance on \[m\].
 pub(crate) const REACH_M: f64 = 1e-3;
 /// A contact point of another name within this distance is the same one \[m\].
 const NEAR_M: f64 = 2e-4;
-/// A depth that should not be there falls by `e` in this time \[s\]. The body then slows down by less than gravity slows it,
-/// for depths up to `g t^2`, 0.1 m: it follows, and does not hop.
-const LET_OUT_S: f64 = 0.1;
-/// And never faster than this \[m/s\].
-const LET_OUT_M_S: f64 = 0.2;
-/// How many times harder than what moves impulses stop: velocities are right to one part in so many, and solved for with as
-/// many times the rounding.
-pub(crate) const HARD: f64 = 1e6;

@@ -272,7 +272,7 @@ fn a_body_of_given_mass_is_stopped_at_its_rim_as_at_its_centre() {
         Vector3::new(0.0, 0.1 * 0.3_f64.sin() + 0.005 * 0.3_f64.cos() + 1e-6, 0.0).into(),
         turn,
     );
-    let rod = haptics::Entity { X_WB: pose, previous_X_WB: pose, ..rod };
+    let rod = Entity { X_WB: pose, previous_X_WB: pose, ..rod };
     let body = Body::at_rest(mass, &pose).moving(Vector3::new(0.0, -1.0, 0.0), Vector3::zeros());
     let settings = Settings { gravity_W: Vector3::zeros(), ..impulse(0.5) };
     let mut world = World::new(vec![floor(0.0, 2000.0, 0.0), rod], &[(1, body)], settings, 1);

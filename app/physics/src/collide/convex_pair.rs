@@ -11,10 +11,11 @@ use nalgebra::{Isometry3, Vector3};
 
 use super::PairMemory;
 use super::axis;
-use super::convex::Convex;
+use super::convex::{Convex, Core};
 use super::facet::{Facet, Plate};
 use super::lines::Alongside;
 use super::overlay::{Overlay, Side};
+use super::rim;
 use super::spots::{Spot, Spots};
 
 /// A face looks along the contact if it is turned from it by less \[1 - cosine\].
@@ -80,13 +81,17 @@ pub(super) fn on_plane(
     let mut spots = Spots::within(reach_m, a.inner_m());
     let normal = plane.normal_B();
     let ground = Plate::endless(normal * plane.offset_m(), normal);
-    if let super::convex::Core::Box { half_m } = a.core {
+    if let Core::Box { half_m } = a.core {
         for number in 0..8_u32 {
             let corner =
                 half_m.map_with_location(|axis, _, half| if number >> axis & 1 == 1 { half } else { -half });
             let on_a = a.placed_point(&corner);
             spots.push(Spot { id: number, on_a, normal, gap_m: normal.dot(&on_a) - plane.offset_m() });
         }
+        return spots;
+    }
+    if let Core::Frustum { .. } = a.core {
+        rim::on_plane(&a, plane, &mut memory.words[4], &mut spots);
         return spots;
     }
     let sides = [

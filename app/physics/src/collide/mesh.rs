@@ -109,21 +109,30 @@ pub(super) struct Contact {
     pub(super) normal_M: Vector3<f64>,
     /// Negative where they overlap \[m\].
     pub(super) gap_m: f64,
+    /// Which part of its depth that is.
+    pub(super) share: f64,
 }
 
 impl Contact {
     /// Whose gap is that between its points.
     pub(super) fn new(about: About, on_mesh_M: Vector3<f64>, normal_M: Vector3<f64>, gap_m: f64) -> Self {
-        Self { id: about.id(), on_mesh_M, on_other_M: on_mesh_M + normal_M * gap_m, normal_M, gap_m }
+        Self {
+            id: about.id(),
+            on_mesh_M,
+            on_other_M: on_mesh_M + normal_M * gap_m,
+            normal_M,
+            gap_m,
+            share: 1.0,
+        }
     }
 }
 
 impl Told<'_> {
     pub(super) fn tell(&mut self, contact: &Contact) {
-        let Contact { id, on_mesh_M, on_other_M, normal_M, gap_m } = *contact;
+        let Contact { id, on_mesh_M, on_other_M, normal_M, gap_m, share } = *contact;
         let (point_M, sign) = if self.mesh_is_a { (on_mesh_M, -1.0) } else { (on_other_M, 1.0) };
         let point_W = (self.X_WM * Point3::from(point_M)).coords;
-        self.found.push(ContactPoint { id, point_W, normal_W: self.X_WM * normal_M * sign, gap_m });
+        self.found.push(ContactPoint { id, point_W, normal_W: self.X_WM * normal_M * sign, gap_m, share });
     }
 }
 

@@ -267,7 +267,10 @@ fn share(contacts: &mut [Contact]) {
         }
     }
     for (i, contact) in contacts.iter_mut().enumerate().take(count) {
-        contact.gap_m = if carries[i] { -loads[i].max(0.0) } else { contact.gap_m.max(0.0) };
+        (contact.gap_m, contact.share) = match carries[i] {
+            true => (-loads[i].max(0.0), loads[i].max(0.0) / depths[i]),
+            false => (contact.gap_m.max(0.0), 1.0),
+        };
     }
 }
 

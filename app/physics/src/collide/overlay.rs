@@ -33,7 +33,7 @@ pub(super) struct Overlay<'s> {
 const A: usize = 0;
 const B: usize = 1;
 /// Tilted by less, a rim stands flat \[rad\].
-const FLAT: f64 = 1e-4;
+pub(super) const FLAT: f64 = 1e-4;
 /// B's own numbers follow A's.
 const OF_B: u32 = 24;
 const EDGE_EDGE_IDS: u32 = 64;

@@ -110,6 +110,7 @@ impl Spots {
                 point_W: (X_W * Point3::from(on_a)).coords,
                 normal_W: X_W.rotation * normal,
                 gap_m: if spot.gap_m < 0.0 { -depth_m } else { spot.gap_m },
+                share: if spot.gap_m < 0.0 { depth_m / -spot.gap_m } else { 1.0 },
             });
         }
     }
