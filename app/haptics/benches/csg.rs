@@ -5,9 +5,10 @@
 //! of a kind; the finger, a point or a ball, walks over all of it, 1 mm below the plate's top, or in the open. The ways over it are
 //! 0.2 mm a tick and cross edges of all kinds.
 //!
-//! The longest ticks: with friction both god-objects, the one that is felt and the one that knows whether the finger is still
-//! held back, go around a rim and leave what they knew of their neighbourhood (1 us); a finger that is lifted from the wall of
-//! one bore flies across the plate through the neighbourhoods of a dozen other forms (3 us on 100 leaves).
+//! The longest ticks: with friction the one god-object slides around a rim while the other, which knows whether the finger is
+//! still held back, comes from an edge over a corner onto a face (1 us); what friction held on a bore's rim gives way and goes
+//! around it in six rounds (2 us, once in 10,000 ticks); a finger that is lifted from the wall of one bore flies across the
+//! plate through the neighbourhoods of a dozen other forms (3 us on 100 leaves).
 //!
 //! How single ticks are timed: the clock's own time is measured and taken off; the same tick is timed in [`RUNS`]
 //! runs of the same path, and its best time is its cost: what only some runs show is the machine's. The worst of these costs
