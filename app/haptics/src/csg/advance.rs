@@ -10,10 +10,10 @@
 use nalgebra::Vector3;
 
 use super::Csg;
-use super::god::{God, worst_m};
+use super::god::God;
 use super::hit::Events;
 use super::patch::{Look, Patch};
-use super::settle::{settle, settle_on};
+use super::settle::{is_on, settle, settle_on};
 use super::stand::{on_edge, on_patch};
 use crate::friction_cone::ConeInput;
 use crate::tangent_view::TangentView;
@@ -65,7 +65,7 @@ pub(super) fn glide(csg: &Csg, god: &mut God, target: &Target, longest: f64, inp
         (moved_B, on_patch(csg, god, patch, &moved_B, &look, input))
     } else if let Some(patches) = god.both_patches(csg) {
         let (moved_B, looks) = match target.looks {
-            Some(looks) if worst_m(&looks) <= ON_IT * f64::EPSILON * target_B.amax() => (*target_B, looks),
+            Some(looks) if is_on(&looks, target_B) => (*target_B, looks),
             _ => settle_on(patches, target_B, hip_B),
         };
         if (moved_B - hip_B).norm_squared() > longest {
@@ -142,5 +142,3 @@ fn stop_where_it_ends(csg: &Csg, god: &mut God, to_B: &Vector3<f64>, hip_B: &Vec
 
 /// Bound on the attempts to come back onto bent patches within the neighbourhood.
 const MAX_SHORTENED: u32 = 8;
-/// Roundings of its coordinates that a place on the patches may be off.
-const ON_IT: f64 = 8.0;

@@ -16,6 +16,7 @@
 
 use nalgebra::Vector3;
 
+use super::feet::{Feet, Nearest, SLIT, nearest_before, only_both_hold};
 use super::near::{Neighbourhood, Sides};
 use super::patch::Look;
 
@@ -63,6 +64,7 @@ impl Corner {
     }
 
     /// `sides` of the god-object's own cell; `to_hip_B` leads from the god-object to the HIP. `None` if all is solid.
+    #[inline(always)]
     pub(super) fn facing(
         &self,
         near: &Neighbourhood,
@@ -70,48 +72,75 @@ impl Corner {
         to_hip_B: &Vector3<f64>,
         release_m: f64,
     ) -> Option<Facing> {
-        let others = sides & !self.spread((1 << self.count) - 1);
-        let start = (0..self.count).fold(0, |cell, i| cell | (sides >> self.indices[i] & 1) << i);
-        let is_free = |cell: usize| !near.is_solid(others | self.spread(cell)) && self.has_room(cell);
-        let is_walled_in = (0..self.count).all(|i| near.is_solid(sides ^ 1 << self.indices[i]));
-        if is_walled_in && is_free(start) {
-            // The common case, a concave edge or corner: there is no other cell to go to.
-            let (way_B, mask) = self.nearest(start, to_hip_B);
-            let facing = Facing { sides, active: self.spread(mask), way_B };
-            return Some(if mask == 0 { self.held(near, facing, to_hip_B, release_m) } else { facing });
+        let [a_B, b_B, c_B, ..] = self.normals_B;
+        match self.count {
+            2 => {
+                let feet = Feet::<2, 1>::of(&[a_B, b_B], to_hip_B);
+                self.facing_among(near, sides, to_hip_B, release_m, |cell| feet.nearest(cell))
+            }
+            3 => {
+                let feet = Feet::<3, 3>::of(&[a_B, b_B, c_B], to_hip_B);
+                self.facing_among(near, sides, to_hip_B, release_m, |cell| feet.nearest(cell))
+            }
+            _ => self.facing_among(near, sides, to_hip_B, release_m, |cell| self.nearest_of(cell, to_hip_B)),
         }
-        self.facing_of_many(near, others, start, to_hip_B, release_m)
     }
 
     #[inline(never)]
-    fn facing_of_many(
+    fn facing_among(
         &self,
         near: &Neighbourhood,
-        others: Sides,
-        start: usize,
+        sides: Sides,
         to_hip_B: &Vector3<f64>,
         release_m: f64,
+        nearest: impl Fn(usize) -> Nearest,
     ) -> Option<Facing> {
-        let is_free = |cell: usize| !near.is_solid(others | self.spread(cell)) && self.has_room(cell);
-        let free =
-            (0..1usize << self.count).filter(|&cell| is_free(cell)).fold(0u64, |free, cell| free | 1 << cell);
-        let reached = self.reached(free, start);
-        let mut best: Option<(f64, Facing)> = None;
-        for cell in (0..1usize << self.count).filter(|cell| reached >> cell & 1 == 1) {
-            let (way_B, mask) = self.nearest(cell, to_hip_B);
-            let distance_m2 = (way_B - to_hip_B).norm_squared();
-            let is_better = best.is_none_or(|(shortest, other)| {
-                let slack = TIE * to_hip_B.norm_squared();
-                distance_m2 < shortest - slack
-                    || (distance_m2 <= shortest + slack && is_before(&way_B, &other.way_B))
+        let others = sides & !self.spread((1 << self.count) - 1);
+        let start = (0..self.count).fold(0, |cell, i| cell | (sides >> self.indices[i] & 1) << i);
+        let is_clear = self.is_clear();
+        let is_free = |cell: usize| {
+            !near.is_solid(others | self.spread(cell)) && (is_clear || self.has_room_in_between(cell))
+        };
+        let is_walled_in = (0..self.count).all(|i| near.is_solid(sides ^ 1 << self.indices[i]));
+        let facing = if is_walled_in && is_free(start) {
+            // The common case, a concave edge or corner: there is no other cell to go to.
+            let Nearest { way_B, mask, .. } = nearest(start);
+            Facing { sides, active: self.spread(mask), way_B }
+        } else {
+            let free = (0..1usize << self.count)
+                .filter(|&cell| is_free(cell))
+                .fold(0u64, |free, cell| free | 1 << cell);
+            self.best_of(self.reached(free, start), others, to_hip_B, nearest)?
+        };
+        Some(if facing.active == 0 { self.held(near, facing, to_hip_B, release_m) } else { facing })
+    }
+
+    /// The cell whose nearest point is nearest to the HIP.
+    #[inline(always)]
+    fn best_of(
+        &self,
+        mut cells: u64,
+        others: Sides,
+        to_hip_B: &Vector3<f64>,
+        nearest: impl Fn(usize) -> Nearest,
+    ) -> Option<Facing> {
+        let slack_m2 = TIE * to_hip_B.norm_squared();
+        let mut best: Option<(Nearest, usize)> = None;
+        while cells != 0 {
+            let cell = cells.trailing_zeros() as usize;
+            cells &= cells - 1;
+            let here = nearest(cell);
+            let is_better = best.is_none_or(|(other, _)| {
+                here.distance_m2 < other.distance_m2 - slack_m2
+                    || (here.distance_m2 <= other.distance_m2 + slack_m2
+                        && is_before(&here.way_B, &other.way_B))
             });
             if is_better {
-                let cell_sides = others | self.spread(cell);
-                best = Some((distance_m2, Facing { sides: cell_sides, active: self.spread(mask), way_B }));
+                best = Some((here, cell));
             }
         }
-        let (_, facing) = best?;
-        Some(if facing.active == 0 { self.held(near, facing, to_hip_B, release_m) } else { facing })
+        let (Nearest { way_B, mask, .. }, cell) = best?;
+        Some(Facing { sides: others | self.spread(cell), active: self.spread(mask), way_B })
     }
 
     /// In the open: unless it is so little in front of a wall that rounding may have put it there.
@@ -152,21 +181,19 @@ impl Corner {
         reached
     }
 
-    /// Whether a cell is more than a slit: between two planes back to back, or three that meet in one line, nothing fits.
-    fn has_room(&self, cell: usize) -> bool {
-        if self.count == 1 {
-            return true;
-        }
-        // The common cases: two planes that meet in an edge leave four wedges, three that meet in a point eight corners.
+    /// Whether all cells are far more than slits: two planes that meet in an edge leave four wedges, three that meet in a point
+    /// eight corners.
+    fn is_clear(&self) -> bool {
         let [a, b, c, ..] = &self.normals_B;
-        let is_clear = match self.count {
+        match self.count {
+            0 | 1 => true,
             2 => a.cross(b).norm_squared() > CLEAR * CLEAR,
             3 => a.cross(b).dot(c).abs() > CLEAR,
             _ => false,
-        };
-        is_clear || self.has_room_in_between(cell)
+        }
     }
 
+    /// Whether a cell is more than a slit: between two planes back to back, or three that meet in one line, nothing fits.
     #[inline(never)]
     fn has_room_in_between(&self, cell: usize) -> bool {
         let normal = |i: usize| self.outward(i, cell >> i);
@@ -195,16 +222,17 @@ impl Corner {
     }
 
     /// The point of a cell nearest to the HIP, and the planes that it lies on.
-    #[inline]
     pub(super) fn nearest(&self, cell: usize, to_hip_B: &Vector3<f64>) -> (Vector3<f64>, usize) {
+        let Nearest { way_B, mask, .. } = self.nearest_of(cell, to_hip_B);
+        (way_B, mask)
+    }
+
+    fn nearest_of(&self, cell: usize, to_hip_B: &Vector3<f64>) -> Nearest {
         let mut normals_B = self.normals_B;
         for (i, normal_B) in normals_B.iter_mut().enumerate().take(self.count) {
             *normal_B = self.outward(i, cell >> i);
         }
-        match self.count {
-            2 => nearest_before(&[normals_B[0], normals_B[1]], to_hip_B),
-            count => nearest_before(&normals_B[..count], to_hip_B),
-        }
+        nearest_before(&normals_B[..self.count], to_hip_B)
     }
 }
 
@@ -217,49 +245,13 @@ pub(super) fn edge_holds(
     outward_B: &[Vector3<f64>; 2],
     to_hip_B: &Vector3<f64>,
 ) -> Option<Vector3<f64>> {
+    let along_B = outward_B[0].cross(&outward_B[1]);
+    let sine2 = along_B.norm_squared();
     let is_walled_in = !near.is_solid(sides)
         && near.is_solid(sides ^ 1 << first)
         && near.is_solid(sides ^ 1 << second)
-        && outward_B[0].cross(&outward_B[1]).norm_squared() > CLEAR * CLEAR;
-    if !is_walled_in {
-        return None;
-    }
-    let (way_B, mask) = nearest_before(outward_B, to_hip_B);
-    (mask == 0b11).then_some(way_B)
-}
-
-/// The point in front of all planes through the origin nearest to the HIP, and those that it lies on.
-#[inline(always)]
-fn nearest_before(normals_B: &[Vector3<f64>], to_hip_B: &Vector3<f64>) -> (Vector3<f64>, usize) {
-    let slack_m = SLACK * to_hip_B.norm();
-    let is_in = |p: &Vector3<f64>, mask: usize| {
-        (0..normals_B.len()).all(|k| mask >> k & 1 == 1 || normals_B[k].dot(p) >= -slack_m)
-    };
-    if normals_B.iter().all(|normal_B| normal_B.dot(to_hip_B) >= 0.0) {
-        return (*to_hip_B, 0);
-    }
-    // At the tip, if nowhere else.
-    let mut best = (to_hip_B.norm_squared(), (Vector3::zeros(), (1 << normals_B.len()) - 1));
-    let mut offer = |p: Vector3<f64>, mask: usize| {
-        let distance_m2 = (p - to_hip_B).norm_squared();
-        if distance_m2 < best.0 && is_in(&p, mask) {
-            best = (distance_m2, (p, mask));
-        }
-    };
-    for i in 0..normals_B.len() {
-        let height_m = normals_B[i].dot(to_hip_B);
-        if height_m < 0.0 {
-            offer(to_hip_B - normals_B[i] * height_m, 1 << i);
-        }
-        for j in 0..i {
-            let along_B = normals_B[i].cross(&normals_B[j]);
-            let length_squared = along_B.norm_squared();
-            if length_squared > SLIT * SLIT {
-                offer(along_B * (along_B.dot(to_hip_B) / length_squared), 1 << i | 1 << j);
-            }
-        }
-    }
-    best.1
+        && sine2 > CLEAR * CLEAR;
+    (is_walled_in && only_both_hold(outward_B, to_hip_B)).then(|| along_B * (along_B.dot(to_hip_B) / sine2))
 }
 
 /// An order of places.
@@ -277,11 +269,7 @@ const OUTSIDE: [u64; MAX_CORNER] = [
     0x0000_FFFF_0000_FFFF,
     0x0000_0000_FFFF_FFFF,
 ];
-/// Planes closer to parallel than this (rad) are one, or leave a slit between them through which nothing goes.
-const SLIT: f64 = 1e-6;
 /// Planes that meet under more than this (rad) are not parallel by far.
 const CLEAR: f64 = 1e-3;
-/// Points may miss a plane by this share of their distance.
-const SLACK: f64 = 1e-12;
 /// Squares of distances that differ by less, as a share, are equal.
 const TIE: f64 = 1e-14;

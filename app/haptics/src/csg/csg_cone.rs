@@ -10,7 +10,7 @@
 use nalgebra::Vector3;
 
 use super::Csg;
-use super::god::God;
+use super::god::{Clearing, God};
 use super::hit::first_hit;
 use super::near::Neighbourhood;
 use super::pressed_through::holds_outside;
@@ -64,8 +64,10 @@ impl CsgCone {
                 self.touching.insert(Touching::new(god))
             }
         };
+        let before = [touching.shadow.clearing, touching.god_object.clearing];
         match touching.update(csg, input.friction, &input.cone) {
             Some(force) => {
+                touching.look_ahead(csg, &before);
                 let god_object = SurfacePoint {
                     point_B: touching.god_object.point_B,
                     normal_B: touching.normal_B,
@@ -157,6 +159,20 @@ impl Touching {
         let mut slid = walk(csg, &mut self.god_object, stood, &slider)?;
         slid.tangential_B += self.grip.drag(friction, &slid.tangential_B, &slid.view, &pull, input);
         Some(self.answer(&slid, input))
+    }
+
+    /// In a tick in which both have stayed in their clearings one of them, if it must soon, looks around: so that it need not in
+    /// a tick that leads around an edge.
+    #[inline(always)]
+    fn look_ahead(&mut self, csg: &Csg, before: &[Clearing; 2]) {
+        if !self.shadow.clearing.is_around(&before[0]) || !self.god_object.clearing.is_around(&before[1]) {
+            return;
+        }
+        if self.god_object.sees_an_end() {
+            self.god_object.look_ahead(csg);
+        } else if self.shadow.sees_an_end() {
+            self.shadow.look_ahead(csg);
+        }
     }
 
     fn answer(&mut self, slid: &Slid, input: &ConeInput) -> ConeForce {

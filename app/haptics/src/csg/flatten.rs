@@ -7,8 +7,9 @@
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
+use super::curved::{Curved, RIGID};
 use super::kind::Kind;
-use super::patch::{Curved, Patch, RIGID};
+use super::patch::Patch;
 use super::tree::{CsgError, CsgPart, CsgTree, MAX_DEPTH, MAX_LEAVES, PartShape};
 use super::{Item, Step};
 use crate::capsule::Capsule;

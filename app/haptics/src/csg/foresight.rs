@@ -18,7 +18,7 @@ use super::Csg;
 use super::advance::Target;
 use super::god::God;
 use super::patch::{Look, Patch};
-use super::settle::{correction, looks_at, settle_on};
+use super::settle::{Pair, is_on, looks_at, settle_on};
 use crate::slide::Round;
 
 /// A place on the bent patches that hold a god-object, from which little is left to slide; `None` where the way there
@@ -87,46 +87,35 @@ fn on_rim(
 ) -> Option<Target> {
     let mut point_B = *from_B;
     let first = looks;
-    let mut direction_before_B = Vector3::zeros();
+    let mut direction_before_B = None;
     for _ in 0..MAX_STEPS {
-        let bends = |(first, look): (&Look, &Look)| first.normal_B.dot(&look.normal_B) < BENT;
-        if first.iter().zip(&looks).any(bends) {
-            return None;
-        }
-        let along_B = looks[0].normal_B.cross(&looks[1].normal_B);
-        let along_B = along_B / along_B.norm();
+        let planes = Pair::of(&looks);
         let to_hip_B = hip_B - point_B;
-        let is_ahead =
-            along_B.dot(if direction_before_B == Vector3::zeros() { &to_hip_B } else { &direction_before_B })
-                >= 0.0;
-        let along_B = if is_ahead { along_B } else { -along_B };
+        let is_ahead = planes.along_B.dot(&direction_before_B.unwrap_or(to_hip_B)) >= 0.0;
+        let length = planes.sine2.sqrt();
+        let along_B = planes.along_B * (1.0 / if is_ahead { length } else { -length });
         let lag_m = along_B.dot(&to_hip_B);
         let depth_m = (to_hip_B - along_B * lag_m).norm();
         let asked_m = lag_m - left * depth_m;
         if asked_m.abs() <= rest_m {
             break;
         }
-        let bend_B = bend(patches, &looks, &point_B, &along_B);
+        // What leads away from both tangent planes as fast as the patches do.
+        let bend_B = planes.down_B(patches.map(|patch| patch.bending(&point_B, &along_B)));
         let arc = Arc { along_B, bend_B, lag_m, depth_m, to_hip_B };
-        point_B += arc.way_B(asked_m, left)? + correction(&looks);
+        point_B += arc.way_B(asked_m, left)? + planes.down_B([looks[0].height_m, looks[1].height_m]);
         looks = looks_at(&patches, &point_B, hip_B);
-        direction_before_B = along_B;
+        let bends = |(first, look): (&Look, &Look)| first.normal_B.dot(&look.normal_B) < BENT;
+        if first.iter().zip(&looks).any(bends) {
+            return None;
+        }
+        if direction_before_B.is_none() && is_on(&looks, &point_B) {
+            // At once only a circle leads back onto the patches, and on a circle the place is known at once.
+            break;
+        }
+        direction_before_B = Some(along_B);
     }
     Some(Target { point_B, looks: Some(looks) })
-}
-
-/// To the centre of the circle that the curve of two patches bends along, over the square of its radius (1/m).
-#[inline(always)]
-fn bend(
-    patches: [&Patch; 2],
-    looks: &[Look; 2],
-    point_B: &Vector3<f64>,
-    along_B: &Vector3<f64>,
-) -> Vector3<f64> {
-    let bent =
-        |i: usize| Look { height_m: patches[i].bending(point_B, along_B), normal_B: looks[i].normal_B };
-    // What leads away from both tangent planes as fast as the patches do.
-    correction(&[bent(0), bent(1)])
 }
 
 /// A curve as it is near one of its points: a piece of a circle.
@@ -152,21 +141,28 @@ impl Arc {
         // The HIP as seen from the centre: outwards, along, and beside the circle's plane.
         let out_m = radius_m - inward_B.dot(&self.to_hip_B);
         let reach_m = (out_m * out_m + self.lag_m * self.lag_m).sqrt();
-        let beside_m2 =
-            (self.to_hip_B.norm_squared() - (radius_m - out_m).powi(2) - self.lag_m.powi(2)).max(0.0);
-        // `reach sin a = left sqrt((radius - reach cos a)^2 + beside^2)`, solved for the cosine.
-        let l2 = left * left;
-        let (a, b) = (reach_m * reach_m * (1.0 + l2), l2 * radius_m * reach_m);
-        let c = l2 * (radius_m * radius_m + beside_m2) - reach_m * reach_m;
-        let cos_left = (b + (b * b - a * c).sqrt()) / a;
-        let sin_left = (1.0 - cos_left * cos_left).max(0.0).sqrt();
-        let (cos_hip, sin_hip) = (out_m / reach_m, self.lag_m / reach_m);
-        let cos = cos_hip * cos_left + sin_hip * sin_left;
-        let sin = sin_hip * cos_left - cos_hip * sin_left;
+        let (cos_left, sin_left) =
+            if left == 0.0 { (1.0, 0.0) } else { self.left_over(left, radius_m, out_m) };
+        let cos = (out_m * cos_left + self.lag_m * sin_left) / reach_m;
+        let sin = (self.lag_m * cos_left - out_m * sin_left) / reach_m;
         if cos.is_nan() || cos <= BENT {
             return None;
         }
         Some((self.along_B + inward_B * (sin / (1.0 + cos))) * (radius_m * sin))
+    }
+
+    /// Cosine and sine of the angle about the centre that friction leaves between the place and the HIP.
+    #[inline(always)]
+    fn left_over(&self, left: f64, radius_m: f64, out_m: f64) -> (f64, f64) {
+        let reach_m2 = out_m * out_m + self.lag_m * self.lag_m;
+        let beside_m2 =
+            (self.to_hip_B.norm_squared() - (radius_m - out_m).powi(2) - self.lag_m.powi(2)).max(0.0);
+        // `reach sin a = left sqrt((radius - reach cos a)^2 + beside^2)`, solved for the cosine.
+        let l2 = left * left;
+        let (a, b) = (reach_m2 * (1.0 + l2), l2 * radius_m * reach_m2.sqrt());
+        let c = l2 * (radius_m * radius_m + beside_m2) - reach_m2;
+        let cos = (b + (b * b - a * c).sqrt()) / a;
+        (cos, (1.0 - cos * cos).max(0.0).sqrt())
     }
 
     /// Newton's method.
@@ -264,7 +260,8 @@ mod tests {
         let along_B = Vector3::z();
         let to_hip_B = hip - from;
         let depth_m = (to_hip_B - along_B * to_hip_B.z).norm();
-        let bend_B = bend([&top, &wall], &looks, &from, &along_B);
+        let bendings = [&top, &wall].map(|patch| patch.bending(&from, &along_B));
+        let bend_B = Pair::of(&looks).down_B(bendings);
         assert!((bend_B + Vector3::x() * 100.0).norm() < 1e-12, "{bend_B:?}");
         let arc = Arc { along_B, bend_B, lag_m: to_hip_B.z, depth_m, to_hip_B };
         for left in [0.0, 0.2] {

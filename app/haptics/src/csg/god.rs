@@ -2,7 +2,8 @@
 //!
 //! Model: its state is the set of patches that hold it (Melder fig. 9.4): one on a patch, two on an edge, more in a
 //! corner. Around it lies a [`Clearing`] that no other patch reaches into: within it a god-object that stays on its patches
-//! crosses nothing and meets nothing, and nobody has to look at the others.
+//! crosses nothing and meets nothing, and nobody has to look at the others. Where it comes to the end of both its clearing and
+//! its neighbourhood, it looks ahead in a tick that has little else to do.
 //!
 //! Frames: object frame B. Invariants: it is on all patches that hold it, on the free side of each; a clearing is either
 //! true or empty.
@@ -37,13 +38,13 @@ pub(super) struct Clearing {
 impl Clearing {
     pub(super) const NONE: Self = Self { centre_B: Vector3::new(0.0, 0.0, 0.0), radius_m: 0.0 };
 
-    /// Of a god-object on `count` patches, `nearest_m` away from the nearest of the others.
-    pub(super) fn around(god: &God, count: usize, nearest_m: f64) -> Self {
+    /// Of a god-object on `count` patches, `nearest_m` away from the nearest of the others and `room_m` from the end of what
+    /// is known.
+    fn around(god: &God, count: usize, nearest_m: f64, room_m: f64) -> Self {
         if god.active.count_ones() as usize != count || count > MAX_CLEAR {
             return Self::NONE;
         }
-        let radius_m = nearest_m.min(god.near.room_m(&god.point_B));
-        Self { centre_B: god.point_B, radius_m: radius_m.max(0.0) }
+        Self { centre_B: god.point_B, radius_m: nearest_m.min(room_m).max(0.0) }
     }
 
     #[cfg(test)]
@@ -51,6 +52,18 @@ impl Clearing {
         self.radius_m
     }
 
+    /// Whether it is still the same one.
+    #[inline(always)]
+    pub(super) fn is_around(&self, other: &Self) -> bool {
+        self.centre_B == other.centre_B
+    }
+
+    #[inline(always)]
+    fn is_all_but_left(&self, point_B: &Vector3<f64>) -> bool {
+        (point_B - self.centre_B).norm_squared() > (LEFT * self.radius_m).powi(2)
+    }
+
+    /// Whether a point is in it.
     #[inline(always)]
     pub(super) fn holds(&self, point_B: &Vector3<f64>) -> bool {
         (point_B - self.centre_B).norm_squared() < self.radius_m * self.radius_m
@@ -126,6 +139,30 @@ impl God {
         (self.active.count_ones() == 2).then(|| [self.near.patch(csg, first), self.near.patch(csg, second)])
     }
 
+    /// Knows its clearing from how far away the nearest patch is that does not hold it; it is on `count` patches.
+    pub(super) fn clear(&mut self, count: usize, nearest_m: f64) {
+        let room_m = self.near.room_m(&self.point_B);
+        self.clearing = Clearing::around(self, count, nearest_m, room_m);
+    }
+
+    /// Whether it comes to the end of its clearing, and of its neighbourhood.
+    #[inline(always)]
+    pub(super) fn sees_an_end(&self) -> bool {
+        self.clearing.is_all_but_left(&self.point_B)
+            && self.near.room_m(&self.point_B) < SHORT * self.near.radius_m
+    }
+
+    /// Makes its surroundings known anew before it has left them.
+    #[inline(never)]
+    pub(super) fn look_ahead(&mut self, csg: &Csg) {
+        let count = self.active.count_ones() as usize;
+        self.look_around(csg, 0.0);
+        let levels_m = self.near.levels_m(csg, &self.point_B);
+        let others = (0..self.near.count()).filter(|&index| self.active >> index & 1 == 0);
+        let nearest_m = others.fold(f64::INFINITY, |nearest: f64, index| nearest.min(levels_m[index].abs()));
+        self.clear(count, nearest_m - 2.0 * csg.tolerance_m());
+    }
+
     /// Makes its surroundings known anew, if it can be for a way of this length.
     pub(super) fn look_around(&mut self, csg: &Csg, length_m: f64) {
         let wish_m = (LARGER * length_m).max(COMMON * csg.extent_m);
@@ -157,6 +194,10 @@ pub(super) fn worst_m(looks: &[Look]) -> f64 {
 /// The most patches that a god-object in a clearing is held by.
 const MAX_CLEAR: usize = 2;
 /// A neighbourhood is asked for this much larger than the way.
-const LARGER: f64 = 4.0;
+const LARGER: f64 = 2.0;
 /// Radius of a common neighbourhood, in terms of the extent.
-const COMMON: f64 = 0.03;
+const COMMON: f64 = 0.06;
+/// Share of a clearing's radius from which on it ends soon.
+const LEFT: f64 = 0.6;
+/// With less room than this share of its radius, a neighbourhood comes to its end.
+const SHORT: f64 = 0.5;

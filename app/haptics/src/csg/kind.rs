@@ -7,7 +7,7 @@
 
 use nalgebra::Vector3;
 
-use super::patch::Crossings;
+use super::crossings::Crossings;
 use crate::convex::direction_or;
 use crate::surface::SMALLEST_LENGTH_M;
 

@@ -1,9 +1,8 @@
 //! What of a solid matters near a point: a few patches, and the tree as a table over their sides.
 //!
 //! Model: within a ball around an anchor, all patches whose level there exceeds the ball's radius keep their side. The
-//! others, at most eight, make up to 256 combinations of sides; for each the tree is evaluated once, all of them at once:
-//! a leaf is a bit pattern of 256 bits, and union, intersection and difference are single operations on them. With
-//! the table in hand the solid is `table[sides]`, whatever the tree was.
+//! others, at most eight, make up to 256 combinations of sides; for each the tree is evaluated once (see [`gather`](super::gather)).
+//! With the table in hand the solid is `table[sides]`, whatever the tree was.
 //!
 //! Invariants: a patch that is not listed keeps its side within the ball. If more than eight are near, the ball is as
 //! small as it must be for eight, but not smaller than [`SMALLEST`].
@@ -11,9 +10,11 @@
 
 use nalgebra::Vector3;
 
-use super::cells::{CellStep, Part};
+use super::Csg;
+use super::crowd::Crowd;
+use super::gather::{gather, gather_from};
 use super::patch::Patch;
-use super::{Csg, CsgOp, Item, STACK};
+use super::table::{NOTHING, Table, is_set};
 
 /// The patches near an anchor, and the solid in terms of their sides.
 #[derive(Debug, Clone, Copy)]
@@ -24,11 +25,9 @@ pub(super) struct Neighbourhood {
     /// The patches, by their numbers in the solid.
     patches: [u16; MAX_NEAR],
     count: usize,
-    table: Table,
+    /// The solid in terms of their sides.
+    pub(super) table: Table,
 }
-
-/// A bit for each combination of sides: whether that is inside the solid.
-type Table = [u64; 4];
 
 /// Sides of the listed patches: a bit for each, set inside. Their place in the list is their bit's.
 pub(super) type Sides = usize;
@@ -93,13 +92,28 @@ impl Neighbourhood {
         gather(csg, anchor_B, radius_m, false).ok()
     }
 
-    fn nowhere(anchor_B: &Vector3<f64>) -> Self {
+    #[inline(always)]
+    pub(super) fn nowhere(anchor_B: &Vector3<f64>) -> Self {
         Self { anchor_B: *anchor_B, radius_m: 0.0, patches: [0; MAX_NEAR], count: 0, table: NOTHING }
     }
 
     #[inline]
     pub(super) fn holds(&self, point_B: &Vector3<f64>, reach_m: f64) -> bool {
         (point_B - self.anchor_B).norm() + reach_m <= self.radius_m
+    }
+
+    /// Adds a patch, if there is room.
+    #[inline(always)]
+    pub(super) fn list(&mut self, number: u16, height_m: f64, crowd: &mut Crowd) -> Option<usize> {
+        let place = self.count;
+        if place == MAX_NEAR {
+            crowd.overflow(&self.patches, number, height_m);
+            return None;
+        }
+        self.patches[place] = number;
+        crowd.listed(place, height_m);
+        self.count += 1;
+        Some(place)
     }
 
     /// How far a point may go without leaving it (m).
@@ -130,12 +144,12 @@ impl Neighbourhood {
     /// Whether these sides are inside the solid.
     #[inline(always)]
     pub(super) fn is_solid(&self, sides: Sides) -> bool {
-        self.table[(sides >> 6) & 3] >> (sides & 63) & 1 == 1
+        is_set(&self.table, sides)
     }
 
     /// Nothing in it but free space.
     pub(super) fn is_empty(&self) -> bool {
-        self.table == [0; 4]
+        self.table == NOTHING
     }
 
     /// Of the listed patches, at a point.
@@ -157,170 +171,6 @@ impl Neighbourhood {
     }
 }
 
-/// The patches within a radius, or from which distance on there would be too many.
-fn gather(csg: &Csg, anchor_B: &Vector3<f64>, radius_m: f64, keep_eight: bool) -> Result<Neighbourhood, f64> {
-    gather_from(csg, &csg.cells.part(anchor_B, radius_m, u32::MAX), anchor_B, radius_m, keep_eight)
-}
-
-fn gather_from(
-    csg: &Csg,
-    part: &Part<'_>,
-    anchor_B: &Vector3<f64>,
-    radius_m: f64,
-    keep_eight: bool,
-) -> Result<Neighbourhood, f64> {
-    let mut here = Neighbourhood { radius_m, ..Neighbourhood::nowhere(anchor_B) };
-    let mut crowd = Crowd::default();
-    let leaf = |first, count| leaf(csg, &mut here, &mut crowd, part.items(first, count), keep_eight);
-    // A stack is as deep as there are leaves, at the most; most parts have few.
-    let table = if part.steps.len() < 2 * FEW {
-        evaluated::<FEW>(part.steps, leaf)
-    } else {
-        evaluated::<STACK>(part.steps, leaf)
-    };
-    if crowd.is_too_large && !keep_eight {
-        return Err(crowd.ninth_m());
-    }
-    here.table = table;
-    Ok(here)
-}
-
-/// For every combination of sides whether that is inside, from what is inside the leaves.
-#[inline(always)]
-fn evaluated<const DEPTH: usize>(steps: &[CellStep], mut leaf: impl FnMut(u32, u32) -> Table) -> Table {
-    let mut stack = [NOTHING; DEPTH];
-    let mut top = 0;
-    for step in steps {
-        match *step {
-            CellStep::Leaf { first, count } => {
-                stack[top] = leaf(first, count);
-                top += 1;
-            }
-            CellStep::Join(op) => {
-                let (a, b) = (stack[top - 2], stack[top - 1]);
-                stack[top - 2] = match op {
-                    CsgOp::Union => std::array::from_fn(|i| a[i] | b[i]),
-                    CsgOp::Intersection => std::array::from_fn(|i| a[i] & b[i]),
-                    CsgOp::Difference => std::array::from_fn(|i| a[i] & !b[i]),
-                };
-                top -= 1;
-            }
-        }
-    }
-    stack[0]
-}
-
-/// Whether a leaf is inside, for every combination of sides.
-fn leaf(csg: &Csg, here: &mut Neighbourhood, crowd: &mut Crowd, items: &[Item], keep_eight: bool) -> Table {
-    let mut heights_m = [f64::INFINITY; MAX_ITEMS];
-    for (item, height_m) in items.iter().zip(&mut heights_m) {
-        let level = csg.patches[usize::from(item.patch)].level(&here.anchor_B);
-        let is_inside = (level <= 0.0) != item.is_flipped;
-        *height_m = level.abs();
-        if *height_m > here.radius_m && !is_inside {
-            // Whatever the other patches say: they need no place in the list.
-            return NOTHING;
-        }
-    }
-    let mut inside = EVERYTHING;
-    for (item, &height_m) in items.iter().zip(&heights_m) {
-        if height_m > here.radius_m {
-            continue;
-        }
-        let listed = match here.position(item.patch) {
-            Some(index) => Some(index),
-            None => here.list(item.patch, height_m, crowd),
-        };
-        let Some(index) = listed else {
-            // Nowhere to list it. If it cannot be helped, the leaf is as if it went on there.
-            debug_assert!(keep_eight || crowd.is_too_large);
-            if !keep_eight {
-                // It will have to be smaller: whatever is farther need not be looked at any more.
-                here.radius_m = here.radius_m.min(crowd.ninth_m());
-            }
-            continue;
-        };
-        let sides = SIDES[index];
-        inside = std::array::from_fn(|i| inside[i] & if item.is_flipped { !sides[i] } else { sides[i] });
-    }
-    inside
-}
-
-impl Neighbourhood {
-    fn list(&mut self, number: u16, height_m: f64, crowd: &mut Crowd) -> Option<usize> {
-        if self.count == MAX_NEAR {
-            crowd.overflow(&self.patches, number, height_m);
-            return None;
-        }
-        self.patches[self.count] = number;
-        crowd.heights_m[self.count] = height_m;
-        self.count += 1;
-        Some(self.count - 1)
-    }
-}
-
-/// The nearest nine, if there are as many: the ninth decides how large a neighbourhood can be.
-struct Crowd {
-    /// Of those that are listed.
-    heights_m: [f64; MAX_NEAR],
-    nearest: [(f64, u16); MAX_NEAR + 1],
-    is_too_large: bool,
-}
-
-impl Default for Crowd {
-    fn default() -> Self {
-        let nearest = [(f64::INFINITY, u16::MAX); MAX_NEAR + 1];
-        Self { heights_m: [f64::INFINITY; MAX_NEAR], nearest, is_too_large: false }
-    }
-}
-
-impl Crowd {
-    /// Takes note of one more than can be listed.
-    fn overflow(&mut self, listed: &[u16; MAX_NEAR], number: u16, height_m: f64) {
-        if !self.is_too_large {
-            self.is_too_large = true;
-            for (index, &number) in listed.iter().enumerate() {
-                self.add(number, self.heights_m[index]);
-            }
-        }
-        self.add(number, height_m);
-    }
-
-    /// Patches beyond the eighth are not listed, and may come twice.
-    fn add(&mut self, number: u16, height_m: f64) {
-        if self.nearest.iter().any(|&(_, known)| known == number) {
-            return;
-        }
-        let mut newcomer = (height_m, number);
-        for place in &mut self.nearest {
-            if newcomer.0 < place.0 {
-                std::mem::swap(place, &mut newcomer);
-            }
-        }
-    }
-
-    fn ninth_m(&self) -> f64 {
-        self.nearest[MAX_NEAR].0
-    }
-}
-
-/// The most patches of a leaf: a box has as many.
-const MAX_ITEMS: usize = 6;
-/// Leaves of a common part.
-const FEW: usize = 6;
-const NOTHING: Table = [0; 4];
-const EVERYTHING: Table = [u64::MAX; 4];
-/// For each patch, the combinations in which one is inside of it.
-const SIDES: [Table; MAX_NEAR] = [
-    [0xAAAA_AAAA_AAAA_AAAA; 4],
-    [0xCCCC_CCCC_CCCC_CCCC; 4],
-    [0xF0F0_F0F0_F0F0_F0F0; 4],
-    [0xFF00_FF00_FF00_FF00; 4],
-    [0xFFFF_0000_FFFF_0000; 4],
-    [0xFFFF_FFFF_0000_0000; 4],
-    [0, u64::MAX, 0, u64::MAX],
-    [0, 0, u64::MAX, u64::MAX],
-];
 /// Bound on the sizes that are tried: from a metre to the smallest in quarters takes fewer.
 const MAX_TRIES: u32 = 16;
 /// No neighbourhood is smaller, in terms of the solid's extent.

@@ -12,9 +12,10 @@
 //! Frames and signs: object frame B, L that of the unscaled and unturned patch; normals leave the patch.
 //! Cost: a few products, a square root or two.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
-use super::kind::{Axes, Kind};
+use super::crossings::Crossings;
+use super::curved::Curved;
 
 /// A smooth surface with an inside.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,26 +28,6 @@ pub(crate) enum Patch {
     Curved(Curved),
 }
 
-/// A curved surface: its equation, and the way from B to its frame L.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Curved {
-    kind: Kind,
-    /// `p_L = turn * p_B + shift`; it may scale, too.
-    turn_LB: Matrix3<f64>,
-    shift_L: Vector3<f64>,
-    /// How much the map stretches at the most: levels of B are those of L divided by it.
-    stretch: f64,
-    /// If the map only turns and shifts, the equation serves in B.
-    place: Option<Place>,
-}
-
-/// A surface's origin and axes in B.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Place {
-    centre_B: Vector3<f64>,
-    axes: Axes,
-}
-
 /// What a patch shows of a point.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Look {
@@ -55,16 +36,6 @@ pub(crate) struct Look {
     /// Unit normal.
     pub(crate) normal_B: Vector3<f64>,
 }
-
-/// Where a path crosses a patch, in shares of the path, in order.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Crossings {
-    shares: [f64; MAX_CROSSINGS],
-    count: usize,
-}
-
-/// A line meets a ring four times at the most.
-const MAX_CROSSINGS: usize = 4;
 
 impl Patch {
     pub(crate) fn is_plane(&self) -> bool {
@@ -76,11 +47,7 @@ impl Patch {
     pub(crate) fn is_round(&self) -> bool {
         match self {
             Self::Plane { .. } => true,
-            Self::Curved(curved) => {
-                let scale_m = curved.turn_LB.column(0).norm_squared();
-                let skew = curved.turn_LB.tr_mul(&curved.turn_LB) - Matrix3::identity() * scale_m;
-                skew.amax() <= SKEW * scale_m
-            }
+            Self::Curved(curved) => curved.is_round(),
         }
     }
 
@@ -94,8 +61,7 @@ impl Patch {
                 other.is_round() && self.is_round() && curved.is_cut_in_one_circle(normal_B)
             }
             (Self::Curved(a), Self::Curved(b)) => {
-                let is_ball = |curved: &Curved| matches!(curved.kind, Kind::Ball { .. });
-                self.is_round() && other.is_round() && is_ball(a) && is_ball(b)
+                self.is_round() && other.is_round() && a.is_ball() && b.is_ball()
             }
         }
     }
@@ -105,7 +71,7 @@ impl Patch {
     pub(crate) fn is_distance(&self) -> bool {
         match self {
             Self::Plane { .. } => true,
-            Self::Curved(curved) => curved.place.is_some(),
+            Self::Curved(curved) => curved.is_distance(),
         }
     }
 
@@ -161,10 +127,8 @@ impl Patch {
     /// The tip of a cone, if the way between two points leads across its axis.
     pub(crate) fn tip_between(&self, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<Vector3<f64>> {
         match self {
-            Self::Curved(curved) if matches!(curved.kind, Kind::Nappe { .. }) => {
-                curved.tip_between(from_B, to_B)
-            }
-            _ => None,
+            Self::Plane { .. } => None,
+            Self::Curved(curved) => curved.tip_between(from_B, to_B),
         }
     }
 
@@ -189,156 +153,6 @@ impl Patch {
         crossings
     }
 }
-
-impl Crossings {
-    pub(super) fn push(&mut self, share: f64) {
-        if let Some(place) = self.shares.get_mut(self.count) {
-            *place = share.clamp(0.0, 1.0);
-            self.count += 1;
-        }
-    }
-
-    pub(crate) fn shares(&self) -> &[f64] {
-        &self.shares[..self.count]
-    }
-}
-
-impl Curved {
-    /// `stretch` is the largest length that the turn gives a vector of length one.
-    pub(super) fn new(kind: Kind, turn_LB: Matrix3<f64>, shift_L: Vector3<f64>, stretch: f64) -> Self {
-        let is_rigid = (turn_LB.tr_mul(&turn_LB) - Matrix3::identity()).amax() < RIGID;
-        let axis = |row: usize| turn_LB.row(row).transpose();
-        let place = is_rigid
-            .then(|| Place { centre_B: -turn_LB.tr_mul(&shift_L), axes: Axes { y: axis(1), x: axis(0) } });
-        Self { kind, turn_LB, shift_L, stretch, place }
-    }
-
-    /// A point as seen from the surface's origin, along B if that will do.
-    #[inline(always)]
-    fn seen(&self, point_B: &Vector3<f64>) -> Vector3<f64> {
-        match &self.place {
-            Some(place) => point_B - place.centre_B,
-            None => self.local(point_B),
-        }
-    }
-
-    fn local(&self, point_B: &Vector3<f64>) -> Vector3<f64> {
-        self.turn_LB * point_B + self.shift_L
-    }
-
-    #[inline(always)]
-    fn axes(&self) -> &Axes {
-        self.place.as_ref().map_or(&Axes::UPRIGHT, |place| &place.axes)
-    }
-
-    #[inline(always)]
-    fn level(&self, point_B: &Vector3<f64>) -> f64 {
-        match &self.place {
-            Some(place) => self.kind.level(&(point_B - place.centre_B), &place.axes),
-            None => self.kind.level(&self.seen(point_B), &Axes::UPRIGHT) / self.stretch,
-        }
-    }
-
-    #[inline(always)]
-    fn look(&self, point_B: &Vector3<f64>, seen_from_B: &Vector3<f64>) -> Look {
-        if let Some(Place { centre_B, axes }) = &self.place {
-            let (height_m, normal_B) = self.kind.look(&(point_B - centre_B), axes, || seen_from_B - centre_B);
-            return Look { height_m, normal_B };
-        }
-        let (height, gradient_B) = self.mapped(point_B, seen_from_B);
-        let slope = gradient_B.norm();
-        Look { height_m: height / slope, normal_B: gradient_B / slope }
-    }
-
-    /// Level in L, and its gradient along B.
-    #[inline(never)]
-    fn mapped(&self, point_B: &Vector3<f64>, seen_from_B: &Vector3<f64>) -> (f64, Vector3<f64>) {
-        let seen_from = || self.seen(seen_from_B);
-        let (height, gradient_L) = self.kind.look(&self.seen(point_B), &Axes::UPRIGHT, seen_from);
-        (height, self.turn_LB.tr_mul(&gradient_L))
-    }
-
-    #[inline(always)]
-    fn bending(&self, at_B: &Vector3<f64>, along_B: &Vector3<f64>, towards_B: &Vector3<f64>) -> f64 {
-        if let Some(Place { centre_B, axes }) = &self.place {
-            return self.kind.bending(&(at_B - centre_B), axes, along_B, towards_B);
-        }
-        let at_L = self.local(at_B);
-        let (along_L, towards_L) = (self.turn_LB * along_B, self.turn_LB * towards_B);
-        let (_, gradient_B) = self.mapped(at_B, at_B);
-        self.kind.bending(&at_L, &Axes::UPRIGHT, &along_L, &towards_L) / gradient_B.norm()
-    }
-
-    fn smallest_radius_m(&self, at_B: &Vector3<f64>) -> f64 {
-        // A map that stretches makes sharper at most by its square, over its least stretch; here that of the rigid or
-        // evenly scaled patch, and of others a lower bound.
-        self.kind.smallest_radius(&self.seen(at_B), self.axes()) * self.least_stretch()
-            / (self.stretch * self.stretch)
-    }
-
-    fn is_cut_in_one_circle(&self, normal_B: &Vector3<f64>) -> bool {
-        match self.kind {
-            Kind::Ball { .. } => true,
-            Kind::Ring { .. } => false,
-            Kind::Tube { .. } | Kind::Nappe { .. } | Kind::Pill { .. } => {
-                let normal_L = self.turn_LB * normal_B;
-                normal_L.x.hypot(normal_L.z) <= SKEW * normal_L.norm()
-            }
-        }
-    }
-
-    fn tip_between(&self, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<Vector3<f64>> {
-        let Kind::Nappe { normal_y, offset_m, .. } = self.kind else { return None };
-        let (from_L, to_L) = (self.local(from_B), self.local(to_B));
-        if from_L.x * to_L.x + from_L.z * to_L.z > 0.0 {
-            return None;
-        }
-        let tip_L = Vector3::y() * (offset_m / normal_y) - self.shift_L;
-        self.turn_LB.try_inverse().map(|turn_BL| turn_BL * tip_L)
-    }
-
-    fn least_stretch(&self) -> f64 {
-        // The columns of a map that scales first and turns then, or the other way round, are at least as long.
-        let columns = self.turn_LB.column_iter().map(|column| column.norm());
-        let rows = self.turn_LB.row_iter().map(|row| row.norm());
-        columns.fold(f64::INFINITY, f64::min).min(rows.fold(f64::INFINITY, f64::min))
-    }
-
-    fn cross(
-        &self,
-        from_B: &Vector3<f64>,
-        to_B: &Vector3<f64>,
-        is_inside: [bool; 2],
-        crossings: &mut Crossings,
-    ) {
-        let (from_L, to_L, axes) = (self.seen(from_B), self.seen(to_B), self.axes());
-        if matches!(self.kind, Kind::Ring { .. }) {
-            self.kind.march(axes, &from_L, &to_L, is_inside, crossings);
-            return;
-        }
-        let [starts_inside, ends_inside] = is_inside;
-        let entry = match is_inside {
-            [false, true] => Some(self.kind.entry(axes, &from_L, &to_L).unwrap_or(1.0)),
-            [false, false] => self.kind.entry(axes, &from_L, &to_L),
-            _ => None,
-        };
-        // Leaving is entering on the way back.
-        let exit = (!ends_inside && (starts_inside || entry.is_some()))
-            .then(|| 1.0 - self.kind.entry(axes, &to_L, &from_L).unwrap_or(1.0));
-        if let (false, Some(entry), Some(exit)) = (starts_inside, entry, exit)
-            && exit <= entry
-        {
-            return;
-        }
-        entry.into_iter().chain(exit).for_each(|share| crossings.push(share));
-    }
-}
-
-/// A map that changes lengths by less is a turn.
-pub(super) const RIGID: f64 = 1e-14;
-
-/// Of maps: what rounding may make different of equal factors.
-const SKEW: f64 = 1e-9;
 
 #[cfg(test)]
 mod tests {

@@ -5,7 +5,7 @@
 //!
 //! Cost: bounded by [`MAX_ROUNDS`] looks at each of up to three patches.
 
-use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
 use super::Csg;
 use super::god::{God, places, worst_m};
@@ -73,9 +73,44 @@ pub(super) fn looks_at<const N: usize>(
     looks
 }
 
+/// Whether a place is on the patches that show this there, but for a few roundings of its coordinates.
+#[inline(always)]
+pub(super) fn is_on(looks: &[Look], point_B: &Vector3<f64>) -> bool {
+    worst_m(looks) <= ON_IT * f64::EPSILON * point_B.amax()
+}
+
+/// Two tangent planes.
+pub(super) struct Pair {
+    normals_B: [Vector3<f64>; 2],
+    cosine: f64,
+    /// Along both; as long as the sine between them.
+    pub(super) along_B: Vector3<f64>,
+    pub(super) sine2: f64,
+}
+
+impl Pair {
+    #[inline(always)]
+    pub(super) fn of(looks: &[Look; 2]) -> Self {
+        let normals_B = [looks[0].normal_B, looks[1].normal_B];
+        let along_B = normals_B[0].cross(&normals_B[1]);
+        Self { normals_B, cosine: normals_B[0].dot(&normals_B[1]), along_B, sine2: along_B.norm_squared() }
+    }
+
+    /// The shortest step down from both by these heights (m).
+    #[inline(always)]
+    pub(super) fn down_B(&self, [a_m, b_m]: [f64; 2]) -> Vector3<f64> {
+        let [a_B, b_B] = &self.normals_B;
+        if self.sine2 < PARALLEL * PARALLEL {
+            return -a_B * a_m;
+        }
+        let share = 1.0 / self.sine2;
+        a_B * ((self.cosine * b_m - a_m) * share) + b_B * ((self.cosine * a_m - b_m) * share)
+    }
+}
+
 /// The shortest step onto the tangent planes.
 #[inline(always)]
-pub(super) fn correction(looks: &[Look]) -> Vector3<f64> {
+fn correction(looks: &[Look]) -> Vector3<f64> {
     match looks {
         [a] => -a.normal_B * a.height_m,
         [a, b] => onto_both(a, b),
@@ -93,17 +128,12 @@ pub(super) fn correction(looks: &[Look]) -> Vector3<f64> {
 
 #[inline(always)]
 fn onto_both(a: &Look, b: &Look) -> Vector3<f64> {
-    let cosine = a.normal_B.dot(&b.normal_B);
-    let determinant = a.normal_B.cross(&b.normal_B).norm_squared();
-    if determinant < PARALLEL * PARALLEL {
-        return -a.normal_B * a.height_m;
-    }
-    let inverse = Matrix2::new(1.0, -cosine, -cosine, 1.0) / determinant;
-    let shares = inverse * Vector2::new(a.height_m, b.height_m);
-    -(a.normal_B * shares.x + b.normal_B * shares.y)
+    Pair::of(&[*a, *b]).down_B([a.height_m, b.height_m])
 }
 
 /// Bound on Newton's method; patches that touch halve their distance each round.
 const MAX_ROUNDS: u32 = 24;
 /// Patches closer to parallel than this (rad) have no edge.
 const PARALLEL: f64 = 1e-9;
+/// Roundings of its coordinates that a place on the patches may be off.
+const ON_IT: f64 = 8.0;

@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 
 use super::Csg;
 use super::corner::{Corner, edge_holds};
-use super::god::{Clearing, God, worst_m};
+use super::god::{God, worst_m};
 use super::hit::first_hit;
 use super::patch::{Look, Patch};
 use super::settle::looks_at;
@@ -109,7 +109,7 @@ fn stand_anywhere(csg: &Csg, god: &mut God, input: &ConeInput) -> Option<Tangent
         let (corner, nearest_m) = corner(csg, god, &input.hip_B);
         match held(csg, god, &corner, input) {
             Held::By(view) => {
-                god.clearing = Clearing::around(god, corner.count, nearest_m);
+                god.clear(corner.count, nearest_m);
                 return Some(view);
             }
             Held::Nothing => {
@@ -228,6 +228,7 @@ pub(super) const RELEASE: f64 = 4e-12;
 
 #[cfg(test)]
 mod tests {
+    use super::super::settle::settle;
     use super::super::{CsgPart, CsgTree};
     use super::*;
     use crate::cuboid::Cuboid;
@@ -259,12 +260,34 @@ mod tests {
         }
     }
 
+    fn point(i: u32) -> Vector3<f64> {
+        let along = |step: f64| 2.0 * (f64::from(i) * step).fract() - 1.0;
+        Vector3::new(along(0.618_034), along(0.414_214), along(0.732_051))
+    }
+
+    fn keeps_sides(csg: &Csg, god: &God, i: u32) {
+        let before = csg.patches.iter().map(|patch| patch.level(&god.point_B) <= 0.0);
+        let held: Vec<_> = god.held_by().map(|index| usize::from(god.near.number(index))).collect();
+        let radius_m = god.clearing.radius_m();
+        if radius_m == 0.0 {
+            return;
+        }
+        for j in 0..20 {
+            let p = god.point_B + point(9 * i + j).normalize() * radius_m * 0.999_999;
+            assert!(god.clearing.holds(&p) && god.near.holds(&p, 0.0));
+            for (number, was_inside) in before.clone().enumerate().filter(|(n, _)| !held.contains(n)) {
+                let level_m = csg.patches[number].level(&p);
+                let is_relevant = god.near.position(number as u16).is_some();
+                assert!(!is_relevant || (level_m <= 0.0) == was_inside, "{number} {level_m} {god:?}");
+                assert!(!is_relevant || level_m.abs() > csg.tolerance_m());
+            }
+        }
+    }
+
     #[test]
     fn in_a_clearing_all_patches_keep_their_side_but_those_that_hold() {
         let csg = plate();
-        let spread = |i: u32, step: f64| 2.0 * (f64::from(i) * step).fract() - 1.0;
-        let point = |i: u32| Vector3::new(spread(i, 0.618_034), spread(i, 0.414_214), spread(i, 0.732_051));
-        let mut clear = [0; 3];
+        let (mut clear, mut ahead) = ([0; 3], 0);
         for i in 0..4000 {
             let hip_B = point(i).component_mul(&Vector3::new(0.03, 0.005, 0.03));
             let Some(mut god) = csg.is_inside(&hip_B).then(|| way_out(&csg, &hip_B)).flatten() else {
@@ -274,20 +297,15 @@ mod tests {
                 continue;
             }
             clear[god.active.count_ones() as usize] += 1;
-            let before = csg.patches.iter().map(|patch| patch.level(&god.point_B) <= 0.0);
-            let held: Vec<_> = god.held_by().map(|index| usize::from(god.near.number(index))).collect();
-            let radius_m = god.clearing.radius_m();
-            for j in 0..20 {
-                let p = god.point_B + point(9 * i + j).normalize() * radius_m * 0.999_999;
-                assert!(god.clearing.holds(&p) && god.near.holds(&p, 0.0));
-                for (number, was_inside) in before.clone().enumerate().filter(|(n, _)| !held.contains(n)) {
-                    let level_m = csg.patches[number].level(&p);
-                    let is_relevant = god.near.position(number as u16).is_some();
-                    assert!(!is_relevant || (level_m <= 0.0) == was_inside, "{number} {level_m} {god:?}");
-                    assert!(!is_relevant || level_m.abs() > csg.tolerance_m());
-                }
-            }
+            keeps_sides(&csg, &god, i);
+            // The same of what it knows from somewhere else in its clearing.
+            let aside_B = god.point_B + point(i + 1) * (0.5 * god.clearing.radius_m());
+            god.point_B = settle(&csg, &god, god.active, &aside_B, &hip_B);
+            god.look_ahead(&csg);
+            keeps_sides(&csg, &god, i);
+            ahead += usize::from(god.clearing.radius_m() > 0.0);
         }
+        assert!(ahead > 1000, "{ahead}");
         assert!(clear[1] > 1000, "{clear:?}");
     }
 }
