@@ -31,8 +31,6 @@ pub struct BroadPhase {
 
 /// A box is larger than its entity by this on each side \[m\].
 const FAT_M: f64 = 5e-3;
-/// And longer by the way of so many ticks.
-const TICKS_AHEAD: f64 = 16.0;
 
 impl BroadPhase {
     /// Where the entities are now.
@@ -45,15 +43,15 @@ impl BroadPhase {
         Self { tree, leaves, boundless, version: 0 }
     }
 
-    /// Takes note of an entity that moved, and goes on by so much in a tick (m). Says whether its box changed.
-    pub fn moved(&mut self, index: usize, entity: &Entity, per_tick_W: &Vector3<f64>) -> bool {
+    /// Takes note of an entity that moved, and will soon have gone on by so much (m). Says whether its box changed.
+    pub fn moved(&mut self, index: usize, entity: &Entity, ahead_W: &Vector3<f64>) -> bool {
         let Some(Some(leaf)) = self.leaves.get(index).copied() else { return false };
         let Some(tight) = Aabb::of_entity(entity) else { return false };
         if self.tree.around(leaf).contains(&tight) {
             return false;
         }
         self.tree.remove(leaf);
-        let fat = tight.grown(FAT_M).swept(&(per_tick_W * TICKS_AHEAD));
+        let fat = tight.grown(FAT_M).swept(ahead_W);
         self.leaves[index] = self.tree.insert(index as u32, fat);
         self.version += 1;
         true

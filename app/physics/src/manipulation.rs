@@ -107,6 +107,8 @@ pub enum Reason {
 const MAX_TOUCHES: usize = 64;
 /// The most contact points between entities in a tick; more are left out.
 const MAX_ROWS: usize = 2048;
+/// The box of a body is longer by the way of so many ticks than it need be.
+const TICKS_AHEAD: f64 = 16.0;
 /// The most pairs of entities that are near each other; more are left out.
 const MAX_PAIRS: usize = 4096;
 
@@ -558,8 +560,8 @@ impl Manipulation {
     fn keep_up(&mut self, entities: &[Entity], dt_s: f64) {
         for &body in self.roster.awake() {
             let entity = self.roster.entities[body];
-            let per_tick_W = self.roster.bodies[body].velocity_W * dt_s;
-            if self.broad_phase.moved(entity, &entities[entity], &per_tick_W) {
+            let ahead_W = self.roster.bodies[body].velocity_W * (dt_s * TICKS_AHEAD);
+            if self.broad_phase.moved(entity, &entities[entity], &ahead_W) {
                 let who = who(&self.roster, entities, self.settings.response);
                 self.pairs.follow(body, &who, &self.broad_phase);
             }

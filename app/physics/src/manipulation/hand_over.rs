@@ -127,6 +127,18 @@ impl Manipulation {
         true
     }
 
+    /// Whether something that is stepped here and not of the island is so near that the two could soon touch.
+    pub fn is_met(&self, island: &[usize]) -> bool {
+        let is_in = |body: usize| island.binary_search(&body).is_ok();
+        self.pairs.iter().any(|(key, _)| {
+            let (one, other) = (key.body as usize, self.roster.numbers[key.entity as usize]);
+            other.is_some_and(|other| {
+                let other = other as usize;
+                is_in(one) != is_in(other) && self.is_here(one) && self.is_here(other)
+            })
+        })
+    }
+
     /// How many parcels an island makes.
     pub fn parcels(&self, island: &[usize]) -> usize {
         let goes = |(key, _): &(Key, &Pair)| self.goes_along(key, island);

@@ -184,6 +184,7 @@ impl FastList {
         let is_whole = manipulation.island(body, &mut island);
         let goes = is_whole
             && island.iter().all(|&body| self.may_go(body, manipulation))
+            && !manipulation.is_met(&island)
             && manipulation.parcels(&island) <= self.end.out.slots();
         if goes {
             for &body in &island {
