@@ -32,7 +32,7 @@ use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// A chunk has so much of the run (ns): what a killed process loses at most.
+/// A chunk has so much of the run (ns): what a killed process loses at most, besides what waits for the disk.
 const CHUNK_NS: u64 = 500_000_000;
 /// Or so many bytes, with many objects.
 const CHUNK_BYTES: usize = 4 << 20;

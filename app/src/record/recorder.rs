@@ -11,9 +11,10 @@ use crate::recording::{Recording, RecordingError};
 use crate::row::{BodyRow, Row};
 use crate::row_queue::{ROW_QUEUE, RowReceiver, RowSender, row_queue_of};
 use io_driver::say::say;
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -83,6 +84,8 @@ pub struct Recorder {
     rows: RowSender,
     when_full: WhenFull,
     lost: u64,
+    /// Of these, those after the row that was sent last.
+    untold: u64,
     shared: Arc<Shared>,
     thread: JoinHandle<Result<u64, RecordingError>>,
 }
@@ -92,8 +95,8 @@ pub struct Recorder {
 struct Shared {
     /// No more rows will come.
     is_closing: AtomicBool,
-    /// Rows left out so far.
-    lost: AtomicU64,
+    /// Rows that are missing: before which tick, and how many.
+    gaps: Mutex<VecDeque<(u64, u64)>>,
     /// Rows taken from the queue so far.
     taken: AtomicU64,
 }
@@ -113,20 +116,24 @@ impl Recorder {
         let places = MOST_BODIES.checked_div(bodies).map_or(ROW_QUEUE, |places| places.clamp(64, ROW_QUEUE));
         let (rows, receiver) = row_queue_of(places, bodies);
         let shared = Arc::new(Shared::default());
-        let writer = RecorderThread { file: Some(file), told_lost: 0, shared: shared.clone(), period_ns };
+        let writer = RecorderThread { file: Some(file), shared: shared.clone(), period_ns };
         let thread = std::thread::Builder::new()
             .name("recorder".into())
             .spawn(move || writer.run(receiver))
             .map_err(|source| RecordingError::Create { file: path.into(), source })?;
-        Ok(Self { path: path.into(), rows, when_full, lost: 0, shared, thread })
+        Ok(Self { path: path.into(), rows, when_full, lost: 0, untold: 0, shared, thread })
     }
 
     /// Hands a row over.
     pub fn send(&mut self, row: &Row, bodies: &[BodyRow]) {
+        // Before the row itself: whoever finds the row finds what is missing in front of it.
+        if !self.rows.is_full() {
+            self.tell_gap(row.run_tick);
+        }
         while !self.rows.send(*row, bodies) {
             if self.when_full == WhenFull::Drop || self.thread.is_finished() {
                 self.lost += 1;
-                self.shared.lost.store(self.lost, Ordering::Release);
+                self.untold += 1;
                 return;
             }
             self.thread.thread().unpark();
@@ -134,8 +141,16 @@ impl Recorder {
         }
     }
 
+    /// Rows are missing in front of this tick.
+    fn tell_gap(&mut self, before: u64) {
+        if self.untold > 0 {
+            self.shared.gaps().push_back((before, std::mem::take(&mut self.untold)));
+        }
+    }
+
     /// Waits until everything is written.
-    pub fn finish(self) -> Recorded {
+    pub fn finish(mut self) -> Recorded {
+        self.tell_gap(u64::MAX);
         self.shared.is_closing.store(true, Ordering::Release);
         self.thread.thread().unpark();
         let (mut taken, mut since) = (0, Instant::now());
@@ -172,11 +187,17 @@ impl Recorder {
     }
 }
 
+impl Shared {
+    /// Neither side is a real-time thread.
+    fn gaps(&self) -> MutexGuard<'_, VecDeque<(u64, u64)>> {
+        self.gaps.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
 /// The recorder's own thread.
 struct RecorderThread {
     /// `None` once it failed.
     file: Option<RecordFile>,
-    told_lost: u64,
     shared: Arc<Shared>,
     period_ns: u64,
 }
@@ -207,24 +228,24 @@ impl RecorderThread {
             }
             std::thread::park_timeout(PAUSE);
         }
-        self.tell_lost(last);
+        self.tell_lost(last, u64::MAX);
         let Some(file) = self.file else { return result };
         file.finish().inspect_err(|error| say(format_args!("phantom3: {error}")))
     }
 
     fn append(&mut self, row: &Row, bodies: &[BodyRow]) -> Result<(), RecordingError> {
-        self.tell_lost(row.run_tick);
+        self.tell_lost(row.run_tick, row.run_tick);
         self.file.as_mut().map_or(Ok(()), |file| file.append(row, bodies))
     }
 
-    /// Rows are lost while this thread is stuck: about here.
-    fn tell_lost(&mut self, run_tick: u64) {
-        let lost = self.shared.lost.load(Ordering::Acquire);
-        if let Some(file) = &mut self.file
-            && lost > self.told_lost
-        {
-            file.tell_lost(run_tick, lost - self.told_lost);
-            self.told_lost = lost;
+    /// Tells of rows that are missing up to here.
+    fn tell_lost(&mut self, run_tick: u64, up_to: u64) {
+        let mut gaps = self.shared.gaps();
+        while gaps.front().is_some_and(|(before, _)| *before <= up_to) {
+            let Some((_, count)) = gaps.pop_front() else { break };
+            if let Some(file) = &mut self.file {
+                file.tell_lost(run_tick, count);
+            }
         }
     }
 }
