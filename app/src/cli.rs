@@ -1,12 +1,14 @@
 //! The command line of `phantom3`.
 //!
-//! Exit status: 0 done; 2 bad usage or bad input, nothing was started; 3 a fault during the run, the
-//! recording up to it is complete; 128 + n: signal n ended the run, the recording up to it is complete.
+//! Exit status: 0 done; 1 of `replay --expect-same`, something differs; 2 bad usage or bad input, nothing was started;
+//! 3 a fault during the run or of a recording, which up to it is complete; 128 + n: signal n ended the run, the recording up to it is complete.
 
 use crate::calibrate::{self, CalibrateArgs, default_layout};
 use crate::demo;
+use crate::export::{self, ExportArgs};
 use crate::outcome::{RunFailure, Stop};
 use crate::picture::{self, PlotArgs};
+use crate::replay::{self, ReplayArgs};
 use crate::report::Report;
 use crate::rig::{HandMode, Rig};
 use crate::run::{self, Attach, RunPlan};
@@ -28,13 +30,15 @@ use std::time::Duration;
 use world::{Layout, Scene};
 
 const EXIT_USAGE: u8 = 2;
+const EXIT_FAULT: u8 = 3;
 const DEFAULT_RATE_HZ: f64 = 1000.0;
 /// A day: longer runs are asked for by repeating them.
 const MAX_SECONDS: f64 = 86_400.0;
 
 const AFTER_HELP: &str = "Without a command the default scene is played for ten seconds.\n\n\
-Exit status: 0 done; 2 bad usage or bad input, nothing was started; 3 a fault during the run; \
-128 + n: ended by signal n. Whatever was recorded until then is complete on disk.";
+Exit status: 0 done; 1 of replay --expect-same, something differs; 2 bad usage or bad input, nothing was started; \
+3 a fault during the run or of a recording; 128 + n: ended by signal n. \
+Whatever was recorded until then is complete on disk.";
 
 /// Haptic rendering with friction cones for several fingers.
 #[derive(Debug, Parser)]
@@ -53,6 +57,10 @@ enum AppCommand {
     Run(RunArgs),
     /// Find where a device stands, from points that it and another one measured together
     Calibrate(CalibrateArgs),
+    /// Feed a recording's fingers to its scene, or to another one, and tell what differs
+    Replay(ReplayArgs),
+    /// Turn a recording into a table: CSV or Parquet
+    Export(ExportArgs),
     /// Draw a recording: what the fingers felt
     Plot(PlotArgs),
     /// List the materials that an entity of a scene can be made of
@@ -89,9 +97,10 @@ struct RunArgs {
     /// What moves time [default: real; with --attach: the driver's own clock]
     #[arg(long, value_enum)]
     clock: Option<Clock>,
-    /// Write every tick here (CSV)
-    #[arg(long, value_name = "CSV")]
-    record: Option<PathBuf>,
+    /// Write every tick here, as a table (CSV) or, with the ending .mcap, with all that replays and shows it; may be
+    /// given several times
+    #[arg(long, value_name = "FILE")]
+    record: Vec<PathBuf>,
     /// How long; default: as long as the hand file, at least 1 s
     #[arg(long, value_name = "S", value_parser = parse_seconds, allow_negative_numbers = true)]
     seconds: Option<f64>,
@@ -150,6 +159,13 @@ pub fn main() -> ExitCode {
             ExitCode::SUCCESS
         }
         Some(AppCommand::Run(args)) => conclude(run_scene(&args)),
+        Some(AppCommand::Replay(args)) => {
+            let result = install_signals().and_then(|signals| replay::execute(&args, &signals));
+            result.unwrap_or_else(|failure| failed(&failure))
+        }
+        Some(AppCommand::Export(args)) => {
+            export::execute(&args).map_or_else(|failure| failed(&failure), stopped)
+        }
         Some(AppCommand::Plot(args)) => {
             picture::execute(&args).map_or_else(|failure| failed(&failure), stopped)
         }
@@ -283,12 +299,12 @@ fn make_plan(args: &RunArgs, rig: &Rig) -> Result<RunPlan, RunFailure> {
         clock: args.clock.map(ClockMode::from),
         seconds: args.seconds,
         record: args.record.clone(),
+        seed: args.seed,
         attach,
     })
 }
 
 fn refuse_to_overwrite_input(args: &RunArgs, rig: &Rig) -> Result<(), RunFailure> {
-    let Some(record) = &args.record else { return Ok(()) };
     // The hand that counts may be the one that the scene names.
     let hand = rig.hand.as_ref().map(|hand| &hand.path);
     let inputs = [
@@ -299,14 +315,26 @@ fn refuse_to_overwrite_input(args: &RunArgs, rig: &Rig) -> Result<(), RunFailure
         args.hand_model.as_ref(),
         args.device.as_ref(),
     ];
-    match inputs.into_iter().flatten().chain(rig.model_files()).find(|input| is_same_file(record, input)) {
-        Some(input) => Err(RunFailure::Start(format!(
-            "--record {} would overwrite the input {}; name another file",
-            record.display(),
-            input.display()
-        ))),
-        None => Ok(()),
+    let inputs: Vec<&PathBuf> = inputs.into_iter().flatten().chain(rig.model_files()).collect();
+    for (index, record) in args.record.iter().enumerate() {
+        if let Some(input) = inputs.iter().find(|input| is_same_file(record, input)) {
+            return Err(RunFailure::Start(format!(
+                "--record {} would overwrite the input {}; name another file",
+                record.display(),
+                input.display()
+            )));
+        }
+        let absolute = std::path::absolute(record).ok();
+        let is_record =
+            |other: &PathBuf| std::path::absolute(other).ok() == absolute || is_same_file(record, other);
+        if args.record[..index].iter().any(is_record) {
+            return Err(RunFailure::Start(format!(
+                "--record {} is given twice; each recording needs a file of its own",
+                record.display()
+            )));
+        }
     }
+    Ok(())
 }
 
 /// By inode: links of both kinds lead to the same bytes.
@@ -319,7 +347,8 @@ fn conclude(result: Result<(Report, Stop), RunFailure>) -> ExitCode {
     match result {
         Ok((report, stop)) => {
             print_report(&report);
-            stopped(stop)
+            let ended = stopped(stop);
+            if report.lacks_a_recording() { ExitCode::from(EXIT_FAULT) } else { ended }
         }
         Err(failure) => failed(&failure),
     }

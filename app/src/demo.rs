@@ -97,7 +97,7 @@ pub fn plan(rig: &Rig) -> RunPlan {
             None
         }
     };
-    RunPlan { clock: None, seconds: Some(SECONDS), record: Some(recording_place()), attach }
+    RunPlan { clock: None, seconds: Some(SECONDS), record: vec![recording_place()], seed: 0, attach }
 }
 
 /// Here, if one may write here, else among the temporary files.

@@ -332,6 +332,7 @@ impl DeviceFinger {
         let orientation_wxyz = self.mount.orientation_to_world(device.orientation_wxyz_measured);
         let seen = FingerRow {
             hip,
+            velocity: velocity_W.unwrap_or_default(),
             god_object: hip,
             orientation_wxyz,
             has_orientation: device.flags & DEVICE_ORIENTATION_MEASURED != 0,

@@ -5,7 +5,8 @@
 //!
 //! One tick is [`fast_step::FastStep`], pure; [`fast_loop::FastLoop`] puts it between the driver's frame and
 //! the command that answers it. Who moves the clock: [`virtual_clock`] in one process, [`two_processes`]
-//! with [`fast_thread`] in real time or in lockstep. The slow side is [`slow`].
+//! with [`fast_thread`] in real time or in lockstep. The slow side is [`slow`]; what it records is [`record`], and
+//! [`replay`] plays it again.
 
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
@@ -13,7 +14,9 @@
 pub mod calibrate;
 pub mod child;
 pub mod cli;
+pub mod columns;
 pub mod demo;
+pub mod export;
 pub mod fast_loop;
 pub mod fast_step;
 pub mod fast_thread;
@@ -23,7 +26,9 @@ pub mod outcome;
 pub mod passive_port;
 pub mod picture;
 pub mod progress;
+pub mod record;
 pub mod recording;
+pub mod replay;
 pub mod report;
 pub mod rig;
 pub mod row;

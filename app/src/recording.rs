@@ -6,11 +6,10 @@
 //! (a full disk) is cut back to the last row that fits.
 //! Units: SI; world frame; forces are forces on the user.
 
-use crate::row::{BodyRow, FingerRow, Row};
-use haptics::{ContactState, Feature};
-use io_driver::device::{Extras, run_time_s};
-use nalgebra::Vector3;
-use physics::GraspQuality;
+pub use crate::columns::Names;
+use crate::columns::{Cell, columns, each_cell};
+use crate::row::{BodyRow, Row};
+use io_driver::device::run_time_s;
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
@@ -35,7 +34,7 @@ pub enum RecordingError {
     },
     /// It cannot be written any further.
     #[error(
-        "cannot write the recording {file}: {source}; it is complete up to t = {until_s} s ({rows} rows)"
+        "cannot write the recording {file}: {source}; the run goes on without it; it is complete up to t = {until_s} s ({rows} rows)"
     )]
     Write {
         /// Which.
@@ -47,45 +46,6 @@ pub enum RecordingError {
         /// Rows on disk.
         rows: u64,
     },
-}
-
-/// The names that a recording's columns and cells are made of.
-#[derive(Debug, Clone)]
-pub struct Names {
-    /// The fingers.
-    pub fingers: Vec<String>,
-    /// What their devices tell besides positions; fingers beyond the list: nothing.
-    pub extras: Vec<Extras>,
-    /// Which are kept passive; those beyond the list are not.
-    pub passive: Vec<bool>,
-    /// Whether their torques are told; fingers beyond the list: no.
-    pub torques: Vec<bool>,
-    /// The entities.
-    pub entities: Vec<String>,
-    /// Those of them that move, in the order of a row's bodies.
-    pub bodies: Vec<String>,
-    /// Which fingers tie objects to themselves; those beyond the list do not.
-    pub ties: Vec<bool>,
-    /// Whether it is told how the bodies are grasped.
-    pub grasp_quality: bool,
-}
-
-impl Names {
-    fn has_torque(&self, finger: usize) -> bool {
-        self.torques.get(finger).copied().unwrap_or_default()
-    }
-
-    fn ties(&self, finger: usize) -> bool {
-        self.ties.get(finger).copied().unwrap_or_default()
-    }
-
-    fn extras_of(&self, finger: usize) -> Extras {
-        self.extras.get(finger).copied().unwrap_or_default()
-    }
-
-    fn is_passive(&self, finger: usize) -> bool {
-        self.passive.get(finger).copied().unwrap_or_default()
-    }
 }
 
 /// A recording being written.
@@ -136,6 +96,13 @@ impl Recording {
         &self.path
     }
 
+    /// Takes over the entities that others have learnt of since: who reads a table back meets them one by one.
+    pub fn learn_entities(&mut self, names: &Names) {
+        if self.names.entities.len() < names.entities.len() {
+            self.names.entities.clone_from(&names.entities);
+        }
+    }
+
     /// Appends a row and its bodies.
     ///
     /// # Errors
@@ -160,7 +127,11 @@ impl Recording {
         }
     }
 
-    fn flush(&mut self) -> Result<(), RecordingError> {
+    /// Writes the rows that are not on disk yet.
+    ///
+    /// # Errors
+    /// If that fails; rows that did reach the file are complete.
+    pub fn flush(&mut self) -> Result<(), RecordingError> {
         let mut done = 0;
         let bytes = self.buffer.as_bytes();
         let failure = loop {
@@ -206,138 +177,31 @@ impl Recording {
 
 /// The names of all columns.
 fn header(names: &Names) -> String {
-    let mut line = String::from("t");
-    for (index, finger) in names.fingers.iter().enumerate() {
-        for quantity in ["hip", "god", "force"] {
-            push_axes(&mut line, finger, quantity);
-        }
-        for quantity in ["entity", "feature", "friction"] {
-            let _ = write!(line, ",{finger}_{quantity}");
-        }
-        push_axes(&mut line, finger, "applied");
-        push_extras(&mut line, finger, names.extras_of(index));
-        if names.is_passive(index) {
-            let _ = write!(line, ",{finger}_energy,{finger}_controlled");
-        }
-        if names.has_torque(index) {
-            push_axes(&mut line, finger, "torque");
-        }
-        if names.ties(index) {
-            let _ = write!(line, ",{finger}_attached");
-        }
-    }
-    for body in &names.bodies {
-        for quantity in ["x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz"] {
-            let _ = write!(line, ",{body}_{quantity}");
-        }
-        for quantity in
-            ["contacts", "rank", "residual", "closure"].into_iter().filter(|_| names.grasp_quality)
-        {
-            let _ = write!(line, ",{body}_{quantity}");
-        }
-    }
+    let mut line = columns(names).into_iter().map(|column| column.name).collect::<Vec<_>>().join(",");
     line.push('\n');
     line
 }
 
-/// Only where there is something to tell: recordings of all other devices stay as they are.
-fn push_extras(line: &mut String, finger: &str, extras: Extras) {
-    for component in ["qw", "qx", "qy", "qz"].into_iter().filter(|_| extras.orientation) {
-        let _ = write!(line, ",{finger}_{component}");
-    }
-    if extras.buttons {
-        let _ = write!(line, ",{finger}_buttons");
-    }
-}
-
-fn push_axes(line: &mut String, finger: &str, quantity: &str) {
-    for axis in ["x", "y", "z"] {
-        let _ = write!(line, ",{finger}_{quantity}_{axis}");
-    }
-}
-
 fn write_row(line: &mut String, row: &Row, bodies: &[BodyRow], names: &Names, period_ns: u64) {
-    let _ = write!(line, "{:?}", run_time_s(row.run_tick as i64, period_ns));
-    for (index, (_, finger)) in names.fingers.iter().zip(&row.fingers).enumerate() {
-        write_finger(line, finger, names);
-        write_extras(line, finger, names.extras_of(index));
-        if names.is_passive(index) {
-            let _ = write!(line, ",{:?},{:?}", finger.energy_j, finger.controlled_n);
+    let start = line.len();
+    each_cell(row, bodies, names, period_ns, |cell| {
+        if line.len() > start {
+            line.push(',');
         }
-        if names.has_torque(index) {
-            write_vector(line, &finger.torque_on_user);
-        }
-        if names.ties(index) {
-            let _ = write!(line, ",{}", entity_name(finger.attached, names));
-        }
-    }
-    for body in bodies {
-        write_vector(line, &body.position);
-        let q = body.orientation;
-        let _ = write!(line, ",{:?},{:?},{:?},{:?}", q.w, q.i, q.j, q.k);
-        write_vector(line, &body.velocity);
-        write_vector(line, &body.angular_velocity);
-        if names.grasp_quality {
-            let GraspQuality { contacts, rank, residual, has_force_closure } = body.grasp;
-            let _ = write!(line, ",{contacts},{rank},{residual:?},{}", u8::from(has_force_closure));
-        }
-    }
+        let _ = match cell {
+            Cell::Number(number) => write!(line, "{number:?}"),
+            Cell::Whole(number) => write!(line, "{number}"),
+            Cell::Text(text) => line.write_str(text),
+        };
+    });
     line.push('\n');
-}
-
-fn write_finger(line: &mut String, finger: &FingerRow, names: &Names) {
-    for vector in [&finger.hip, &finger.god_object, &finger.force_on_user] {
-        write_vector(line, vector);
-    }
-    let entity = entity_name(finger.entity, names);
-    let (feature, friction) = (feature_name(finger.feature), friction_name(finger.friction));
-    let _ = write!(line, ",{entity},{feature},{friction}");
-    write_vector(line, &finger.applied_on_user);
-}
-
-fn entity_name(index: Option<u32>, names: &Names) -> &str {
-    index.and_then(|index| names.entities.get(index as usize)).map_or("", String::as_str)
-}
-
-fn write_extras(line: &mut String, finger: &FingerRow, extras: Extras) {
-    if extras.orientation {
-        for component in finger.orientation_wxyz {
-            let _ = write!(line, ",{component:?}");
-        }
-    }
-    if extras.buttons {
-        let _ = write!(line, ",{}", finger.buttons);
-    }
-}
-
-/// `{:?}` of an f64 is the shortest text that reads back as the same number.
-fn write_vector(line: &mut String, vector: &Vector3<f64>) {
-    for component in vector {
-        let _ = write!(line, ",{component:?}");
-    }
-}
-
-fn feature_name(feature: Feature) -> &'static str {
-    match feature {
-        Feature::None => "none",
-        Feature::Surface => "surface",
-        Feature::Face => "face",
-        Feature::Edge => "edge",
-        Feature::Vertex => "vertex",
-    }
-}
-
-fn friction_name(friction: ContactState) -> &'static str {
-    match friction {
-        ContactState::Free => "free",
-        ContactState::Stick => "stick",
-        ContactState::Slip => "slip",
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use io_driver::device::Extras;
+    use nalgebra::Vector3;
 
     fn names() -> Names {
         Names {

@@ -1,13 +1,13 @@
 //! What a run tells at its end, a line each; the README explains the lines.
 
 use crate::fast_loop::Tally;
+use crate::record::Recorded;
 use io_driver::meter;
 use io_driver::status::{CounterStatus, Percentiles};
 use rt_core::histogram::Histogram;
 use rt_core::setup::SetupReport;
 use shm_abi::DriverView;
 use std::fmt;
-use std::path::PathBuf;
 
 /// The end of a run in figures.
 pub struct Report {
@@ -27,8 +27,8 @@ pub struct Report {
     pub guarantees: Option<(String, SetupReport)>,
     /// What became of entities that stand still since, a line each.
     pub parked: Vec<String>,
-    /// Where the recording lies, and its rows.
-    pub recording: Option<(PathBuf, u64)>,
+    /// What became of the recordings.
+    pub recordings: Vec<Recorded>,
 }
 
 /// Durations of a run.
@@ -76,6 +76,13 @@ impl Baseline {
     /// What has been counted since.
     pub fn counters(&self, driver: &DriverView) -> CounterStatus {
         CounterStatus::of(driver).since(&self.counters)
+    }
+}
+
+impl Report {
+    /// Whether a recording is not complete, which has been told.
+    pub fn lacks_a_recording(&self) -> bool {
+        self.recordings.iter().any(|recorded| recorded.failure.is_some())
     }
 }
 
@@ -127,19 +134,22 @@ impl fmt::Display for Report {
                 writeln!(f, "{line}")?;
             }
         }
-        match &self.recording {
-            Some((path, rows)) if tally.rows_lost == 0 => {
-                write!(f, "recording    {} ({rows} rows)", path.display())
-            }
-            Some((path, rows)) => {
-                write!(
-                    f,
-                    "recording    {} ({rows} rows, {} LOST: the disk was too slow)",
-                    path.display(),
-                    tally.rows_lost
-                )
-            }
-            None => write!(f, "recording    none; --record FILE makes one"),
+        if self.recordings.is_empty() {
+            return write!(f, "recording    none; --record FILE makes one");
         }
+        for (index, recorded) in self.recordings.iter().enumerate() {
+            if index > 0 {
+                writeln!(f)?;
+            }
+            write!(f, "recording    {} ({} rows", recorded.path.display(), recorded.rows)?;
+            match recorded.lost + tally.rows_lost {
+                0 => write!(f, ")")?,
+                lost => write!(f, ", {lost} LOST: the disk was too slow)")?,
+            }
+            if recorded.failure.is_some() {
+                write!(f, " NOT COMPLETE: see the message above")?;
+            }
+        }
+        Ok(())
     }
 }

@@ -19,6 +19,8 @@ pub struct Row {
 pub struct FingerRow {
     /// The haptic interaction point (m).
     pub hip: Vector3<f64>,
+    /// How fast it moves as its driver estimates it (m/s); zero where nobody does. Recordings as CSV do not have it.
+    pub velocity: Vector3<f64>,
     /// The god-object; the HIP in free space (m).
     pub god_object: Vector3<f64>,
     /// What rendering computed (N).

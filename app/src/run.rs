@@ -5,7 +5,7 @@ use crate::fast_loop::{FastLoop, Tally, WhenFull};
 use crate::not_zeroed;
 use crate::outcome::{RunFailure, Stop};
 use crate::progress::Progress;
-use crate::recording::Recording;
+use crate::record::{self, About, Recorder, View};
 use crate::report::{Baseline, Report};
 use crate::rig::{HandMode, Rig};
 use crate::row_queue::row_queue;
@@ -17,7 +17,7 @@ use physics::Reason;
 use rt_core::signals::StopSignals;
 use shm_abi::client;
 use shm_abi::segment::{ClockMode, DriverInfo};
-use shm_abi::{DriverView, Frame};
+use shm_abi::{CommanderMemory, DriverView, Frame};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -28,8 +28,10 @@ pub struct RunPlan {
     pub clock: Option<ClockMode>,
     /// How long; `None`: as the rig says.
     pub seconds: Option<f64>,
-    /// Where to record.
-    pub record: Option<PathBuf>,
+    /// Where to record; the ending says in which format.
+    pub record: Vec<PathBuf>,
+    /// Seed of everything random, to be told in recordings.
+    pub seed: u64,
     /// Use the driver that listens here, and its devices, instead of a child with the rig's.
     pub attach: Option<Attach>,
 }
@@ -43,7 +45,7 @@ pub struct Attach {
     pub grace: Duration,
 }
 
-/// Runs. What is recorded before a failure is complete on disk.
+/// Runs. What is recorded before a failure is complete on disk; a recording that fails does not end the run.
 ///
 /// # Errors
 /// Whatever kept the run from starting or from going on.
@@ -68,6 +70,7 @@ impl Parts {
         clock: ClockMode,
         period_ns: u64,
         devices: &[Extras],
+        about: &About,
     ) -> Result<Self, RunFailure> {
         let seconds = plan.seconds.unwrap_or_else(|| rig.default_seconds());
         let total_ticks = (seconds * 1e9 / period_ns as f64).round() as u64;
@@ -80,11 +83,15 @@ impl Parts {
         let when_full = if clock == ClockMode::Real { WhenFull::Drop } else { WhenFull::Wait };
         let step = rig.fast_step().map_err(|error| RunFailure::Start(error.to_string()))?;
         let (producer, consumer) = row_queue(step.bodies().len());
-        let record = |path: &PathBuf| Recording::create(path, rig.names(devices), period_ns);
-        let recording = plan.record.as_ref().map(record).transpose()?;
+        let view = View::new(&rig.scene, step.entities());
+        let record = |path: &PathBuf| {
+            let file = record::create(path, rig.names(devices), period_ns, about, &view)?;
+            Recorder::start(path, file, step.bodies().len(), period_ns, when_full)
+        };
+        let recorders = plan.record.iter().map(record).collect::<Result<_, _>>()?;
         Ok(Self {
             fast: FastLoop::new(step, producer, when_full, total_ticks, period_ns),
-            slow: SlowSide::new(consumer, recording),
+            slow: SlowSide::new(consumer, recorders),
             progress: Progress::new(total_ticks, period_ns),
         })
     }
@@ -92,11 +99,13 @@ impl Parts {
 
 fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Report, Stop), RunFailure> {
     let mut driver = VirtualDriver::open(&rig.driver_config(ClockMode::Virtual))?;
+    let about = About::of_run(rig, ClockMode::Virtual, rig.period_ns, plan.seed);
     let Parts { mut fast, mut slow, mut progress } =
-        Parts::new(rig, plan, ClockMode::Virtual, rig.period_ns, &driver.extras())?;
+        Parts::new(rig, plan, ClockMode::Virtual, rig.period_ns, &driver.extras(), &about)?;
     let result = driver.run(&mut fast, &mut slow, &mut progress, signals);
     progress.end();
-    let (stop, rows) = close(result, slow)?;
+    let recordings = slow.finish();
+    let stop = result?;
     let report = Report {
         clock: ClockMode::Virtual.name(),
         period_ns: rig.period_ns,
@@ -106,7 +115,7 @@ fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Repo
         timing: None,
         guarantees: None,
         parked: parked(&fast.tally, rig),
-        recording: plan.record.clone().zip(rows),
+        recordings,
     };
     Ok((report, stop))
 }
@@ -121,11 +130,16 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
     let driver_name = describe(&source, attachment.driver_pid, &info);
     let baseline = Baseline::of(&attachment.driver);
     let step_rig = rig.clone().at_period(info.period_ns);
+    let mut about = About::of_run(rig, info.clock_mode, info.period_ns, plan.seed);
+    about.tell("driver", driver_name.clone());
+    about.tell("driver_setup", info.setup_report.clone());
+    about.tell("lease", attachment.commander.as_ref().map_or(0, CommanderMemory::lease).to_string());
     let Parts { fast, mut slow, mut progress } =
-        Parts::new(&step_rig, plan, info.clock_mode, info.period_ns, &extras)?;
+        Parts::new(&step_rig, plan, info.clock_mode, info.period_ns, &extras, &about)?;
     let result = two_processes::run(&mut source, attachment, fast, &mut slow, &mut progress, signals);
     progress.end();
-    let (end, rows) = close(result, slow)?;
+    let recordings = slow.finish();
+    let end = result?;
     let is_real = info.clock_mode == ClockMode::Real;
     let report = Report {
         clock: info.clock_mode.name(),
@@ -136,7 +150,7 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
         timing: is_real.then(|| baseline.timing(&end.driver, &end.step_ns)),
         guarantees: is_real.then_some((info.setup_report, end.fast_report)),
         parked: parked(&end.tally, rig),
-        recording: plan.record.clone().zip(rows),
+        recordings,
     };
     Ok((report, end.stop))
 }
@@ -162,13 +176,6 @@ fn parked(tally: &Tally, rig: &Rig) -> Vec<String> {
         lines.push(format!("and {untold} more"));
     }
     lines
-}
-
-/// Closes the recording whatever happened; a failure of the run comes before one of the recording.
-fn close<T>(result: Result<T, RunFailure>, slow: SlowSide) -> Result<(T, Option<u64>), RunFailure> {
-    let closed = slow.finish();
-    let value = result?;
-    Ok((value, closed?))
 }
 
 fn connect(rig: &Rig, plan: &RunPlan) -> Result<(Source, client::Attachment), RunFailure> {

@@ -1,47 +1,37 @@
-//! The slow thread's turn: take what the fast thread left and write it down.
+//! The slow thread's turn: take what the fast thread left and hand it to the recorders.
 
-use crate::recording::{Recording, RecordingError};
+use crate::record::{Recorded, Recorder};
 use crate::row::Row;
 use crate::row_queue::RowReceiver;
 
 /// The slow side of a run.
 pub struct SlowSide {
     rows: RowReceiver,
-    recording: Option<Recording>,
+    recorders: Vec<Recorder>,
     /// The newest row, for whoever wants to look.
     pub newest: Option<Row>,
 }
 
 impl SlowSide {
-    /// Takes rows from the queue into the recording, if there is one.
-    pub fn new(rows: RowReceiver, recording: Option<Recording>) -> Self {
-        Self { rows, recording, newest: None }
+    /// Takes rows from the queue into the recordings, if there are any.
+    pub fn new(rows: RowReceiver, recorders: Vec<Recorder>) -> Self {
+        Self { rows, recorders, newest: None }
     }
 
-    /// Takes everything that is there.
-    ///
-    /// # Errors
-    /// If the recording cannot be written; rows are taken and thrown away from then on.
-    pub fn step(&mut self) -> Result<(), RecordingError> {
+    /// Takes everything that is there. A recording that cannot be written tells so itself, and the run goes on.
+    pub fn step(&mut self) {
         for _ in 0..self.rows.waiting() {
             let Some((row, bodies)) = self.rows.receive() else { break };
-            if let Some(recording) = &mut self.recording
-                && let Err(error) = recording.append(&row, bodies)
-            {
-                self.recording = None;
-                return Err(error);
+            for recorder in &mut self.recorders {
+                recorder.send(&row, bodies);
             }
             self.newest = Some(row);
         }
-        Ok(())
     }
 
-    /// Takes the rest and closes the recording. Returns how many rows it has, if there is one.
-    ///
-    /// # Errors
-    /// If it cannot be written to the end.
-    pub fn finish(mut self) -> Result<Option<u64>, RecordingError> {
-        self.step()?;
-        self.recording.map(Recording::finish).transpose()
+    /// Takes the rest and closes the recordings. Returns what became of them.
+    pub fn finish(mut self) -> Vec<Recorded> {
+        self.step();
+        self.recorders.into_iter().map(Recorder::finish).collect()
     }
 }

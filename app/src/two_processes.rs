@@ -1,6 +1,6 @@
 //! A run against a driver in a process of its own, in real time or in lockstep.
 //!
-//! Model: the fast thread answers frames; this thread is the slow one: it writes the recording, shows the
+//! Model: the fast thread answers frames; this thread is the slow one: it feeds the recorders, shows the
 //! progress and watches the connection, which is how the end of the driver is noticed. A driver that was
 //! there before us may be restarted: the run goes on with it if it is back within the grace time.
 
@@ -54,7 +54,7 @@ pub struct TwoProcessEnd {
 /// Runs to the end.
 ///
 /// # Errors
-/// If the driver cannot be attached to, faults or goes away for good, or the recording cannot be written.
+/// If the driver cannot be attached to, faults or goes away for good.
 pub fn run(
     source: &mut Source,
     attachment: Attachment,
@@ -74,7 +74,6 @@ pub fn run(
             WatchEnd::Signal(signal) => Stop::Signal(signal),
             WatchEnd::Fast(FastEnd::Fault(reason)) => return Err(RunFailure::driver_fault(reason)),
             WatchEnd::Fast(FastEnd::Silent) => return Err(RunFailure::DriverSilent { seconds: 5.0 }),
-            WatchEnd::Recording(error) => return Err(error.into()),
             WatchEnd::DriverGone | WatchEnd::Fast(FastEnd::Stopped) => {
                 let words = last_words(&remains.driver);
                 drop(connection);
@@ -95,7 +94,6 @@ enum WatchEnd {
     Fast(FastEnd),
     Signal(i32),
     DriverGone,
-    Recording(crate::recording::RecordingError),
 }
 
 struct Watched {
@@ -119,9 +117,7 @@ fn run_attached(
     let (report, thread) = fast_thread::start(fast, driver, commander, shared.clone())
         .map_err(|error| RunFailure::Start(format!("cannot start the fast thread: {error}")))?;
     let end = loop {
-        if let Err(error) = slow.step() {
-            break Some(WatchEnd::Recording(error));
-        }
+        slow.step();
         if thread.is_finished() {
             break None;
         }

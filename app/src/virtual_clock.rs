@@ -10,7 +10,7 @@ use crate::progress::Progress;
 use crate::slow::SlowSide;
 use io_driver::config::{DriverConfig, ReplyMode};
 use io_driver::cycle::Cycle;
-use io_driver::device::Extras;
+use io_driver::device::{Device, Extras};
 use io_driver::driver::{describe, make_cycle};
 use io_driver::open::open_devices;
 use rt_core::signals::StopSignals;
@@ -40,7 +40,14 @@ impl VirtualDriver {
     /// # Errors
     /// If either cannot be had.
     pub fn open(config: &DriverConfig) -> Result<Self, RunFailure> {
-        let devices = open_devices(config)?;
+        Self::with_devices(config, open_devices(config)?)
+    }
+
+    /// Makes the memory for devices that are open.
+    ///
+    /// # Errors
+    /// If it cannot be had.
+    pub fn with_devices(config: &DriverConfig, devices: Vec<Box<dyn Device>>) -> Result<Self, RunFailure> {
         let info = describe(config, &devices, WaitMode::Spin);
         let memory = Arc::new(DriverMemory::create(&info)?);
         let driver = DriverView::map(memory.fd())?;
@@ -65,7 +72,7 @@ impl VirtualDriver {
     /// Runs to the end.
     ///
     /// # Errors
-    /// A fault, or a recording that cannot be written.
+    /// A fault.
     pub fn run(
         &mut self,
         fast: &mut FastLoop,
@@ -76,7 +83,7 @@ impl VirtualDriver {
         for tick in 1.. {
             let turn = self.tick(tick, fast);
             if tick % SLOW_EVERY == 0 {
-                slow.step()?;
+                slow.step();
                 progress.show(fast.run_ticks());
             }
             match turn {
@@ -94,15 +101,24 @@ impl VirtualDriver {
     /// The driver reads and tells, the application answers, the driver writes; or, where replies are for the next
     /// tick, it writes what the application answered to the tick before.
     pub fn tick(&mut self, tick: u64, fast: &mut FastLoop) -> Turn {
+        self.tick_with(tick, |tick, driver, commander| fast.turn(tick, driver, commander))
+    }
+
+    /// The same with somebody's own turn of the application, which need not answer.
+    pub fn tick_with(
+        &mut self,
+        tick: u64,
+        turn: impl FnOnce(u64, &DriverView, &CommanderMemory) -> Turn,
+    ) -> Turn {
         let deadline_ns = tick * self.period_ns;
         if self.mode == ReplyMode::NextTick {
             self.cycle.take_reply();
             self.cycle.sense(tick, deadline_ns);
             self.cycle.actuate();
-            return fast.turn(tick, &self.driver, &self.commander);
+            return turn(tick, &self.driver, &self.commander);
         }
         self.cycle.sense(tick, deadline_ns);
-        let turn = fast.turn(tick, &self.driver, &self.commander);
+        let turn = turn(tick, &self.driver, &self.commander);
         self.cycle.take_reply();
         self.cycle.actuate();
         turn

@@ -40,9 +40,11 @@ fn a_recording_that_cannot_even_begin_stops_the_run_before_it_starts() {
     }
 }
 
-/// Status 3, one message that says how far the recording goes, and a file that goes exactly so far.
+/// The run goes on to its end; status 3, one message that says how far the recording goes, and a file that goes exactly
+/// so far.
 fn assert_recorded_up_to_the_fault(place: &Workplace, said: &Said, cause: &str) {
-    assert_eq!((said.status, said.out.as_str()), (Some(3), ""), "{}", said.err);
+    assert_eq!(said.status, Some(3), "{}", said.err);
+    assert!(said.out.contains(" NOT COMPLETE: see the message above"), "the report is made: {}", said.out);
     // A slow machine shows progress before.
     let messages: Vec<&str> = said.err.lines().filter(|line| !line.ends_with('%')).collect();
     let [message] = messages[..] else { panic!("not one message:\n{}", said.err) };

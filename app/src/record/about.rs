@@ -1,0 +1,206 @@
+//! What a recording tells of the run that it is of: with what it was made, and everything to play it again.
+//!
+//! Model: facts are words under a name. Files are the run's inputs as they were: the scene, the hand, the layout, and the
+//! models and pictures that the scene names, each under the path that the scene resolves to.
+//! Invariant: nothing here depends on the time of day or on where outputs go, unless the clock is not virtual; so equal
+//! inputs give equal recordings.
+
+use crate::columns::Names;
+use crate::rig::{HandMode, Rig};
+use io_driver::device::Extras;
+use serde_json::{Value, json};
+use shm_abi::segment::ClockMode;
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// More than this of models and pictures is not put into a recording.
+const MOST_MODEL_BYTES: u64 = 64 << 20;
+
+/// A file that the run read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct InputFile {
+    /// What it is to the run: `scene`, `hand`, `layout` or `model`; then `:` and its path.
+    pub name: String,
+    /// Its content.
+    pub bytes: Vec<u8>,
+}
+
+/// Facts and files.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct About {
+    /// The facts.
+    pub facts: BTreeMap<String, String>,
+    /// The files.
+    pub files: Vec<InputFile>,
+}
+
+impl About {
+    /// Of a run of this rig.
+    pub fn of_run(rig: &Rig, clock: ClockMode, period_ns: u64, seed: u64) -> Self {
+        let mut about = Self::default();
+        about.tell("program", format!("phantom3 {}", env!("CARGO_PKG_VERSION")));
+        about.tell("abi", format!("{}.{}", shm_abi::layout::ABI_MAJOR, shm_abi::layout::ABI_MINOR));
+        about.tell("clock", clock.name().into());
+        about.tell("period_ns", period_ns.to_string());
+        about.tell("seed", seed.to_string());
+        about.tell("arguments", json!(inputs_of(std::env::args_os())).to_string());
+        about.tell("scene", rig.scene_file.display().to_string());
+        about.tell("scene_name", rig.scene.name.clone());
+        let hand_mode = match &rig.hand_mode {
+            HandMode::Kinematic => "kinematic".to_owned(),
+            HandMode::Impedance(devices) => format!(
+                "impedance, hand {} ({:?}), device {}",
+                devices.hand_model.display(),
+                devices.firmness,
+                devices.description.display()
+            ),
+        };
+        about.tell("hand_mode", hand_mode);
+        about.tell("host", host());
+        if clock != ClockMode::Virtual {
+            let started = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+            about.tell("started_unix_ns", started.as_nanos().to_string());
+        }
+        about.attach_inputs(rig);
+        about
+    }
+
+    /// Adds a fact.
+    pub fn tell(&mut self, name: &str, fact: String) {
+        self.facts.insert(name.into(), fact);
+    }
+
+    /// Adds the files of a rig, as far as they can be read again.
+    fn attach_inputs(&mut self, rig: &Rig) {
+        self.attach("scene", &rig.scene_file);
+        if let Some(hand) = &rig.hand {
+            // The rig keeps the absolute path, which is another on every machine.
+            let name = hand.path.file_name().map(PathBuf::from).unwrap_or_default();
+            self.attach_as(format!("hand:{}", name.display()), &hand.path);
+        }
+        let mut left = MOST_MODEL_BYTES;
+        let mut models: Vec<&PathBuf> = rig.model_files().collect();
+        models.sort_unstable();
+        models.dedup();
+        for model in models {
+            let length = model.metadata().map_or(0, |file| file.len());
+            match left.checked_sub(length) {
+                Some(rest) => {
+                    left = rest;
+                    self.attach("model", model);
+                }
+                None => self.tell(&format!("left out: {}", model.display()), format!("{length} bytes")),
+            }
+        }
+    }
+
+    fn attach(&mut self, what: &str, path: &Path) {
+        self.attach_as(format!("{what}:{}", path.display()), path);
+    }
+
+    fn attach_as(&mut self, name: String, path: &Path) {
+        // What is no file, as a pipe or a built-in scene, cannot be read twice.
+        let is_file = path.metadata().is_ok_and(|file| file.is_file());
+        if is_file && let Ok(bytes) = std::fs::read(path) {
+            self.files.push(InputFile { name, bytes });
+        }
+    }
+
+    /// The file that is this to the run.
+    pub fn file(&self, what: &str) -> Option<(&str, &[u8])> {
+        self.files.iter().find_map(|file| {
+            let path = file.name.strip_prefix(what)?.strip_prefix(':')?;
+            Some((path, &file.bytes[..]))
+        })
+    }
+}
+
+/// The machine and its kernel, as far as they say.
+fn host() -> String {
+    let word = |file: &str| std::fs::read_to_string(file).unwrap_or_default().trim().to_owned();
+    ["/proc/sys/kernel/hostname", "/proc/sys/kernel/osrelease"].map(word).join(" ")
+}
+
+/// Arguments without the program's name and without where recordings go.
+fn inputs_of(arguments: impl IntoIterator<Item = OsString>) -> Vec<String> {
+    let mut inputs = Vec::new();
+    let mut words = arguments.into_iter().skip(1).map(|word| word.to_string_lossy().into_owned());
+    while let Some(word) = words.next() {
+        if word == "--record" {
+            words.next();
+        } else if !word.starts_with("--record=") {
+            inputs.push(word);
+        }
+    }
+    inputs
+}
+
+/// Names as facts.
+pub(super) fn columns_of(names: &Names) -> BTreeMap<String, String> {
+    let extras = |tells: fn(&Extras) -> bool| json!(names.extras.iter().map(tells).collect::<Vec<_>>());
+    [
+        ("fingers", json!(names.fingers)),
+        ("entities", json!(names.entities)),
+        ("objects", json!(names.bodies)),
+        ("orientations", extras(|extras| extras.orientation)),
+        ("buttons", extras(|extras| extras.buttons)),
+        ("passive", json!(names.passive)),
+        ("torques", json!(names.torques)),
+        ("ties", json!(names.ties)),
+        ("grasp_quality", json!(names.grasp_quality)),
+        ("fields", json!(super::schema::field_names(names))),
+    ]
+    .map(|(name, value)| (name.to_owned(), value.to_string()))
+    .into()
+}
+
+/// Names of such facts; `None` if they are not complete.
+pub(super) fn names_of(facts: &BTreeMap<String, String>) -> Option<Names> {
+    let list = |name: &str| serde_json::from_str::<Value>(facts.get(name)?).ok();
+    let word = |value: &Value| value.as_str().map(str::to_owned);
+    let words = |name: &str| list(name)?.as_array()?.iter().map(word).collect::<Option<Vec<_>>>();
+    let flags = |name: &str| list(name)?.as_array()?.iter().map(Value::as_bool).collect::<Option<Vec<_>>>();
+    let of_device = |(orientation, buttons)| Extras { orientation, buttons };
+    Some(Names {
+        fingers: words("fingers")?,
+        extras: flags("orientations")?.into_iter().zip(flags("buttons")?).map(of_device).collect(),
+        passive: flags("passive")?,
+        torques: flags("torques")?,
+        entities: words("entities")?,
+        bodies: words("objects")?,
+        ties: flags("ties")?,
+        grasp_quality: list("grasp_quality")?.as_bool()?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn where_a_recording_goes_is_no_input_of_it() {
+        let words = |line: &str| line.split(' ').map(OsString::from).collect::<Vec<_>>();
+        let line = "phantom3 run a.toml --record x.mcap --seed 3 --record=y.csv --headless";
+        assert_eq!(inputs_of(words(line)), ["run", "a.toml", "--seed", "3", "--headless"]);
+    }
+
+    #[test]
+    fn names_come_back_from_what_is_told_of_them() {
+        let names = Names {
+            fingers: vec!["a".into(), "b".into()],
+            extras: vec![Extras { orientation: true, buttons: false }, Extras::default()],
+            passive: vec![false, true],
+            torques: vec![true, false],
+            entities: vec!["table".into()],
+            bodies: vec![],
+            ties: vec![false, false],
+            grasp_quality: true,
+        };
+        let facts = columns_of(&names);
+        assert_eq!(names_of(&facts), Some(names));
+        let without = facts.into_iter().filter(|(name, _)| name != "ties").collect();
+        assert_eq!(names_of(&without), None);
+    }
+}

@@ -1,0 +1,339 @@
+//! The recording of a run as MCAP: every tick, events, and what people look at, with all that is needed to play it again.
+//!
+//! | channel | schema | how often |
+//! |---|---|---|
+//! | `/tick` | `phantom3.Tick`, made for the scene | every tick |
+//! | `/events` | `phantom3.Event` | when something happens |
+//! | `/scene` | `foxglove.SceneUpdate` | once |
+//! | `/frames` | `foxglove.FrameTransforms` | 50 times a second |
+//! | `/fingers` | `foxglove.SceneUpdate` | 50 times a second |
+//!
+//! Model: messages are encoded as Protocol Buffers and gathered into chunks of half a second of the run. A chunk goes to
+//! the file in one piece, so that whatever ends the process leaves all chunks before readable. Times are those of the
+//! run: 0 is its first tick.
+//! Invariant: what could not be written as a whole is cut off again; after that nothing more is written.
+
+use super::about::{self, About};
+use super::event::{ContactWatch, Event, EventKind, EventSink};
+use super::schema::{self, event};
+use super::tick;
+use super::view::View;
+use super::wire::Message;
+use crate::columns::Names;
+use crate::recording::RecordingError;
+use crate::row::{BodyRow, Row};
+use io_driver::device::run_time_s;
+use mcap::records::{MessageHeader, Metadata};
+use mcap::write::NoSeek;
+use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// A chunk has so much of the run (ns): what a killed process loses at most, besides what waits for the disk.
+const CHUNK_NS: u64 = 500_000_000;
+/// Or so many bytes, with many objects.
+const CHUNK_BYTES: usize = 4 << 20;
+/// Between two pictures (ns).
+const PICTURE_NS: u64 = 20_000_000;
+
+/// Names of metadata.
+pub(super) const ABOUT: &str = "phantom3.run";
+pub(super) const COLUMNS: &str = "phantom3.columns";
+pub(super) const END: &str = "phantom3.end";
+/// The channel of ticks.
+pub(super) const TICK_TOPIC: &str = "/tick";
+
+/// An MCAP file being written.
+pub struct McapFile {
+    writer: Writer<NoSeek<WholeWrites>>,
+    path: PathBuf,
+    names: Names,
+    period_ns: u64,
+    view: View,
+    watch: Option<ContactWatch>,
+    channels: Channels,
+    message: Message,
+    sequence: u32,
+    /// What the chunk has, and its first tick.
+    chunk_bytes: usize,
+    chunk_rows: u64,
+    chunk_began: u64,
+    next_picture: u64,
+    /// On disk.
+    rows: u64,
+    last_tick: u64,
+    last_in_chunk: u64,
+    lost: u64,
+    failure: Option<McapError>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Channels {
+    tick: u16,
+    events: u16,
+    scene: u16,
+    frames: u16,
+    fingers: u16,
+}
+
+impl McapFile {
+    /// Creates the file, or empties it, and writes what is known before the first tick.
+    ///
+    /// # Errors
+    /// If that cannot be written.
+    pub fn create(
+        path: &Path,
+        names: Names,
+        period_ns: u64,
+        about: &About,
+        view: View,
+    ) -> Result<Self, RecordingError> {
+        let failed = |error| RecordingError::Create { file: path.into(), source: into_io(error) };
+        let file =
+            File::create(path).map_err(|source| RecordingError::Create { file: path.into(), source })?;
+        let mut writer = options().create(NoSeek::new(WholeWrites::new(file))).map_err(failed)?;
+        let channels = begin(&mut writer, &names, about).map_err(failed)?;
+        let mut file = Self {
+            watch: Some(ContactWatch::new(names.fingers.len(), period_ns)),
+            writer,
+            path: path.into(),
+            names,
+            period_ns,
+            view,
+            channels,
+            message: Message::new(),
+            sequence: 0,
+            chunk_bytes: 0,
+            chunk_rows: 0,
+            chunk_began: 0,
+            next_picture: 0,
+            rows: 0,
+            last_tick: 0,
+            last_in_chunk: 0,
+            lost: 0,
+            failure: None,
+        };
+        let scene = std::mem::take(&mut file.view.scene);
+        file.put(channels.scene, 0, &scene).and_then(|()| file.writer.flush()).map_err(failed)?;
+        Ok(file)
+    }
+
+    /// Appends a row and its bodies.
+    ///
+    /// # Errors
+    /// If it or rows before it cannot be written.
+    pub fn append(&mut self, row: &Row, bodies: &[BodyRow]) -> Result<(), RecordingError> {
+        if self.chunk_rows == 0 {
+            self.chunk_began = row.run_tick;
+        } else if self.chunk_bytes > CHUNK_BYTES || self.time_ns(row.run_tick - self.chunk_began) >= CHUNK_NS
+        {
+            self.flush()?;
+            self.chunk_began = row.run_tick;
+        }
+        let written = self.put_row(row, bodies);
+        self.chunk_rows += 1;
+        self.last_in_chunk = row.run_tick;
+        let written = self.failure.take().map_or(written, Err);
+        written.map_err(|error| self.failed(error))
+    }
+
+    /// Writes the chunk to the file.
+    ///
+    /// # Errors
+    /// If that fails.
+    pub fn flush(&mut self) -> Result<(), RecordingError> {
+        self.writer.flush().map_err(|error| self.failed(error))?;
+        self.rows += self.chunk_rows;
+        self.last_tick = self.last_in_chunk;
+        (self.chunk_rows, self.chunk_bytes) = (0, 0);
+        Ok(())
+    }
+
+    /// Tells that rows before `run_tick` are missing.
+    pub fn tell_lost(&mut self, run_tick: u64, count: u64) {
+        self.lost += count;
+        self.event(&Event {
+            kind: EventKind::RowsLost,
+            run_tick,
+            finger: "",
+            entity: "",
+            value: count as f64,
+            text: "the recorder was too slow",
+        });
+    }
+
+    /// Writes what is left, the index, and how the recording ended. Returns the number of rows.
+    ///
+    /// # Errors
+    /// If that fails.
+    pub fn finish(mut self) -> Result<u64, RecordingError> {
+        self.flush()?;
+        let facts = BTreeMap::from([
+            ("rows".to_owned(), self.rows.to_string()),
+            ("rows_lost".to_owned(), self.lost.to_string()),
+            ("until_s".to_owned(), format!("{:?}", self.until_s())),
+        ]);
+        let end = Metadata { name: END.into(), metadata: facts };
+        let closed = self.writer.write_metadata(&end).and_then(|()| self.writer.finish().map(drop));
+        closed.map_err(|error| self.failed(error))?;
+        let (path, rows, until_s) = (self.path.clone(), self.rows, self.until_s());
+        match self.writer.into_inner().into_inner().sync() {
+            Ok(()) => Ok(rows),
+            Err(source) => Err(RecordingError::Write { file: path, source, until_s, rows }),
+        }
+    }
+
+    fn put_row(&mut self, row: &Row, bodies: &[BodyRow]) -> Result<(), McapError> {
+        let mut message = std::mem::take(&mut self.message);
+        message.clear();
+        tick::write(&mut message, row, bodies, &self.names, self.period_ns);
+        let mut written = self.put(self.channels.tick, row.run_tick, message.bytes());
+        if let Some(mut watch) = self.watch.take() {
+            let names = std::mem::take(&mut self.names);
+            watch.look(row, &names, self);
+            (self.names, self.watch) = (names, Some(watch));
+        }
+        let time_ns = self.time_ns(row.run_tick);
+        if time_ns >= self.next_picture {
+            self.next_picture = (time_ns / PICTURE_NS + 1) * PICTURE_NS;
+            message.clear();
+            self.view.frames(&mut message, time_ns, row, bodies, &self.names);
+            written = written.and_then(|()| self.put(self.channels.frames, row.run_tick, message.bytes()));
+            message.clear();
+            self.view.fingers(&mut message, time_ns, row, &self.names);
+            written = written.and_then(|()| self.put(self.channels.fingers, row.run_tick, message.bytes()));
+        }
+        self.message = message;
+        written
+    }
+
+    fn put(&mut self, channel_id: u16, run_tick: u64, data: &[u8]) -> Result<(), McapError> {
+        let time_ns = self.time_ns(run_tick);
+        let header =
+            MessageHeader { channel_id, sequence: self.sequence, log_time: time_ns, publish_time: time_ns };
+        self.sequence = self.sequence.wrapping_add(1);
+        self.chunk_bytes += data.len();
+        self.writer.write_to_known_channel(&header, data)
+    }
+
+    fn time_ns(&self, run_ticks: u64) -> u64 {
+        run_ticks.saturating_mul(self.period_ns)
+    }
+
+    fn until_s(&self) -> f64 {
+        run_time_s(self.last_tick.cast_signed(), self.period_ns)
+    }
+
+    fn failed(&self, error: McapError) -> RecordingError {
+        let (file, until_s, rows) = (self.path.clone(), self.until_s(), self.rows);
+        RecordingError::Write { file, source: into_io(error), until_s, rows }
+    }
+}
+
+impl EventSink for McapFile {
+    fn event(&mut self, event: &Event<'_>) {
+        let mut message = Message::new();
+        message
+            .whole(event::TICK, event.run_tick)
+            .double(event::T, run_time_s(event.run_tick.cast_signed(), self.period_ns))
+            .text(event::KIND, event.kind.name())
+            .text(event::FINGER, event.finger)
+            .text(event::ENTITY, event.entity)
+            .double(event::VALUE, event.value)
+            .text(event::TEXT, event.text);
+        if let Err(error) = self.put(self.channels.events, event.run_tick, message.bytes()) {
+            self.failure.get_or_insert(error);
+        }
+    }
+}
+
+/// Chunks are ended here and nowhere else, and go out in one piece.
+fn options() -> WriteOptions {
+    WriteOptions::new()
+        .compression(Some(Compression::Lz4))
+        .profile("phantom3")
+        .library(concat!("phantom3 ", env!("CARGO_PKG_VERSION")))
+        .chunk_size(None)
+        .disable_seeking(true)
+}
+
+fn begin(
+    writer: &mut Writer<NoSeek<WholeWrites>>,
+    names: &Names,
+    about: &About,
+) -> Result<Channels, McapError> {
+    let facts = [(ABOUT, about.facts.clone()), (COLUMNS, about::columns_of(names))];
+    for (name, metadata) in facts {
+        writer.write_metadata(&Metadata { name: name.into(), metadata })?;
+    }
+    for file in &about.files {
+        let media_type = if file.name.ends_with(".csv") { "text/csv" } else { "application/octet-stream" };
+        writer.attach(&Attachment {
+            log_time: 0,
+            create_time: 0,
+            name: file.name.clone(),
+            media_type: if file.name.starts_with("scene:") { "application/toml" } else { media_type }.into(),
+            data: Cow::Borrowed(&file.bytes),
+        })?;
+    }
+    let set = schema::descriptors(names);
+    let mut channel = |topic: &str, message: &str| {
+        let schema = writer.add_schema(message, "protobuf", &set)?;
+        writer.add_channel(schema, topic, "protobuf", &BTreeMap::new())
+    };
+    Ok(Channels {
+        tick: channel(TICK_TOPIC, schema::TICK)?,
+        events: channel("/events", schema::EVENT)?,
+        scene: channel("/scene", "foxglove.SceneUpdate")?,
+        frames: channel("/frames", "foxglove.FrameTransforms")?,
+        fingers: channel("/fingers", "foxglove.SceneUpdate")?,
+    })
+}
+
+fn into_io(error: McapError) -> io::Error {
+    if let McapError::Io(error) = error { error } else { io::Error::other(error) }
+}
+
+/// Gathers what is written until it is flushed, then writes it whole or, if it does not fit, not at all.
+struct WholeWrites {
+    file: File,
+    pending: Vec<u8>,
+    written_bytes: u64,
+}
+
+impl WholeWrites {
+    fn new(file: File) -> Self {
+        Self { file, pending: Vec::new(), written_bytes: 0 }
+    }
+
+    /// Writes what is left out to the disk itself.
+    fn sync(mut self) -> io::Result<()> {
+        self.flush()?;
+        match self.file.sync_data() {
+            // A pipe or a character device has no disk to reach.
+            Err(error) if error.kind() == io::ErrorKind::InvalidInput => Ok(()),
+            synced => synced,
+        }
+    }
+}
+
+impl Write for WholeWrites {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.pending.extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        let written = self.file.write_all(&self.pending);
+        match written {
+            Ok(()) => self.written_bytes += self.pending.len() as u64,
+            // If even this fails, readers skip the last piece.
+            Err(_) => drop(self.file.set_len(self.written_bytes)),
+        }
+        self.pending.clear();
+        written
+    }
+}

@@ -1,0 +1,51 @@
+//! Recordings: written while a run goes on, and read again.
+//!
+//! Problem: people who felt something want to see it, plot it, publish it and feel it again; and neither a slow disk, a
+//! full one nor a killed process may disturb what is felt or cost what was recorded before.
+//!
+//! Model: the fast thread leaves rows (`row_queue.rs`); the slow side hands them to a [`Recorder`] for each file, which
+//! writes on a thread of its own. The format goes by the file's ending: a table (CSV, `recording.rs`), or
+//! [`McapFile`], which has the events, a picture and the run's inputs beside the rows. [`read`] reads both.
+
+mod about;
+mod descriptor;
+pub mod event;
+mod foxglove;
+mod mcap_file;
+pub mod read;
+mod recorder;
+mod schema;
+mod tick;
+mod view;
+mod wire;
+
+pub use about::{About, InputFile};
+pub use mcap_file::McapFile;
+pub use recorder::{RecordFile, Recorded, Recorder};
+pub use view::View;
+
+use crate::recording::{Names, Recording, RecordingError};
+use std::path::Path;
+
+/// Creates the recording in the format that its name ends with.
+///
+/// # Errors
+/// If it cannot be made.
+pub fn create(
+    path: &Path,
+    names: Names,
+    period_ns: u64,
+    about: &About,
+    view: &View,
+) -> Result<RecordFile, RecordingError> {
+    if is_mcap(path) {
+        let file = McapFile::create(path, names, period_ns, about, view.clone())?;
+        return Ok(RecordFile::Mcap(Box::new(file)));
+    }
+    Ok(RecordFile::Csv(Box::new(Recording::create(path, names, period_ns)?)))
+}
+
+/// Whether the name is that of an MCAP file; every other is a table.
+pub fn is_mcap(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mcap"))
+}

@@ -1,0 +1,131 @@
+//! A recording, row by row, whatever its format; also one whose end is missing.
+//!
+//! Model: what ends in the middle (a killed process, a full disk, a copy that broke off) is read as far as it is whole,
+//! and [`RecordedRun::cut`] says so. What is there but wrong is an error.
+
+mod csv_rows;
+mod mcap_rows;
+
+use super::about::About;
+use super::is_mcap;
+use crate::columns::Names;
+use crate::row::{BodyRow, Row};
+use csv_rows::CsvRows;
+use mcap_rows::McapRows;
+use std::io;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Why a file is no recording.
+#[derive(Debug, Error)]
+pub enum ReadError {
+    /// It cannot be read.
+    #[error("cannot read the recording {file}: {source}")]
+    Io {
+        /// Which.
+        file: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// It is something else.
+    #[error("{file} is no recording of `phantom3 run --record`: {why}")]
+    NoRecording {
+        /// Which.
+        file: PathBuf,
+        /// What is wrong.
+        why: String,
+    },
+    /// A row of a table is wrong.
+    #[error("{file}:{line}: {why}")]
+    BadRow {
+        /// Which.
+        file: PathBuf,
+        /// The line, from 1.
+        line: u64,
+        /// What is wrong.
+        why: String,
+    },
+    /// A part of the file is damaged.
+    #[error("{file}: damaged behind {rows} good rows: {why}")]
+    Damaged {
+        /// Which.
+        file: PathBuf,
+        /// Rows before it.
+        rows: u64,
+        /// What is wrong.
+        why: String,
+    },
+}
+
+/// A recording being read.
+pub struct RecordedRun {
+    rows: Rows,
+}
+
+enum Rows {
+    Csv(Box<CsvRows>),
+    Mcap(Box<McapRows>),
+}
+
+impl RecordedRun {
+    /// Opens it and reads what stands before the first row.
+    ///
+    /// # Errors
+    /// If it cannot be read or is something else.
+    pub fn open(file: &Path) -> Result<Self, ReadError> {
+        let rows = if is_mcap(file) {
+            Rows::Mcap(Box::new(McapRows::open(file)?))
+        } else {
+            Rows::Csv(Box::new(CsvRows::open(file)?))
+        };
+        Ok(Self { rows })
+    }
+
+    /// The names of fingers, objects and entities. A table names entities only as they are touched, so this grows.
+    pub fn names(&self) -> &Names {
+        match &self.rows {
+            Rows::Csv(rows) => &rows.names,
+            Rows::Mcap(rows) => &rows.names,
+        }
+    }
+
+    /// Length of a tick (ns).
+    pub fn period_ns(&self) -> u64 {
+        match &self.rows {
+            Rows::Csv(rows) => rows.period_ns,
+            Rows::Mcap(rows) => rows.period_ns,
+        }
+    }
+
+    /// What it tells of its run, if its format tells any.
+    pub fn about(&self) -> Option<&About> {
+        match &self.rows {
+            Rows::Csv(_) => None,
+            Rows::Mcap(rows) => Some(&rows.about),
+        }
+    }
+
+    /// Whether its rows have the velocities that rendering saw.
+    pub fn has_velocities(&self) -> bool {
+        matches!(self.rows, Rows::Mcap(_))
+    }
+
+    /// The next row and its bodies; `None` behind the last.
+    ///
+    /// # Errors
+    /// If it cannot be read or is damaged.
+    pub fn next_row(&mut self) -> Result<Option<(Row, Vec<BodyRow>)>, ReadError> {
+        match &mut self.rows {
+            Rows::Csv(rows) => rows.next_row(),
+            Rows::Mcap(rows) => rows.next_row(),
+        }
+    }
+
+    /// Known behind the last row: how it ends, if that is in the middle.
+    pub fn cut(&self) -> Option<&str> {
+        match &self.rows {
+            Rows::Csv(rows) => rows.cut.as_deref(),
+            Rows::Mcap(rows) => rows.cut.as_deref(),
+        }
+    }
+}

@@ -1,0 +1,271 @@
+//! Rows of a table.
+//!
+//! Model: the header says which columns there are; they have to be those that such a recording has. The length of a tick
+//! is the shortest time between two of the first rows. A last line without its end is left out: half a number is a number.
+
+use super::ReadError;
+use crate::columns::{Column, Names, columns, feature_named, friction_named};
+use crate::row::{BodyRow, FingerRow, Row};
+use io_driver::device::{Extras, run_time_s};
+use nalgebra::{Quaternion, Vector3};
+use physics::GraspQuality;
+use shm_abi::MAX_DEVICES;
+use std::collections::VecDeque;
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+
+/// So many rows are looked at for the length of a tick.
+const LOOK_AHEAD: usize = 1000;
+/// Where a single row says nothing of it (ns).
+const USUAL_PERIOD_NS: u64 = 1_000_000;
+
+pub(super) struct CsvRows {
+    file: PathBuf,
+    reader: BufReader<File>,
+    ahead: VecDeque<String>,
+    columns: Vec<Column>,
+    line: u64,
+    pub(super) names: Names,
+    pub(super) period_ns: u64,
+    pub(super) cut: Option<String>,
+}
+
+impl CsvRows {
+    pub(super) fn open(file: &Path) -> Result<Self, ReadError> {
+        let opened = File::open(file).map_err(|source| ReadError::Io { file: file.into(), source })?;
+        let mut rows = Self {
+            file: file.into(),
+            reader: BufReader::new(opened),
+            ahead: VecDeque::new(),
+            columns: Vec::new(),
+            line: 0,
+            names: Names::default(),
+            period_ns: USUAL_PERIOD_NS,
+            cut: None,
+        };
+        let no_recording = |why: String| ReadError::NoRecording { file: file.into(), why };
+        let header = rows.read_line()?.ok_or_else(|| no_recording("it has no first line".into()))?;
+        rows.names = names_in(&header);
+        rows.columns = columns(&rows.names);
+        let expected: Vec<&str> = rows.columns.iter().map(|column| &*column.name).collect();
+        if rows.names.fingers.is_empty() || expected != header.split(',').collect::<Vec<_>>() {
+            return Err(no_recording("its first line has not the columns of one".into()));
+        }
+        while rows.ahead.len() < LOOK_AHEAD
+            && let Some(line) = rows.read_line()?
+        {
+            rows.ahead.push_back(line);
+        }
+        rows.period_ns = period_of(&rows.ahead);
+        rows.line = 1;
+        Ok(rows)
+    }
+
+    pub(super) fn next_row(&mut self) -> Result<Option<(Row, Vec<BodyRow>)>, ReadError> {
+        let line = match self.ahead.pop_front() {
+            Some(line) => line,
+            None => match self.read_line()? {
+                Some(line) => line,
+                None => return Ok(None),
+            },
+        };
+        self.line += 1;
+        let row = self.parse(&line).map_err(|why| ReadError::BadRow {
+            file: self.file.clone(),
+            line: self.line,
+            why,
+        })?;
+        Ok(Some(row))
+    }
+
+    /// A whole line without its end.
+    fn read_line(&mut self) -> Result<Option<String>, ReadError> {
+        let mut bytes = Vec::new();
+        let read = self.reader.read_until(b'\n', &mut bytes);
+        read.map_err(|source| ReadError::Io { file: self.file.clone(), source })?;
+        if bytes.pop() != Some(b'\n') {
+            if !bytes.is_empty() {
+                self.cut = Some("the last row is not complete and is left out".into());
+            }
+            return Ok(None);
+        }
+        let no_text = |_| ReadError::NoRecording { file: self.file.clone(), why: "it is no text".into() };
+        String::from_utf8(bytes).map(Some).map_err(no_text)
+    }
+
+    fn parse(&mut self, line: &str) -> Result<(Row, Vec<BodyRow>), String> {
+        let cells: Vec<&str> = line.split(',').collect();
+        if cells.len() != self.columns.len() {
+            return Err(format!("found {} cells, expected {}", cells.len(), self.columns.len()));
+        }
+        let mut cells =
+            Cells { cells: &cells, columns: &self.columns, at: 0, entities: &mut self.names.entities };
+        let t_s = cells.number()?;
+        let ticks = (t_s * 1e9 / self.period_ns as f64).round();
+        let mut row = Row { run_tick: ticks as u64, ..Row::empty() };
+        if ticks < 0.0 || run_time_s(row.run_tick.cast_signed(), self.period_ns) != t_s {
+            return Err(format!("t is {t_s:?}, which is no multiple of the tick of {} ns", self.period_ns));
+        }
+        let shape = &Shape {
+            extras: &self.names.extras,
+            passive: &self.names.passive,
+            torques: &self.names.torques,
+            ties: &self.names.ties,
+        };
+        for (index, finger) in row.fingers.iter_mut().take(self.names.fingers.len()).enumerate() {
+            *finger = cells.finger(index, shape)?;
+        }
+        let grasp = self.names.grasp_quality;
+        let bodies = (0..self.names.bodies.len()).map(|_| cells.body(grasp)).collect::<Result<_, _>>()?;
+        Ok((row, bodies))
+    }
+}
+
+/// Which columns the fingers have.
+struct Shape<'a> {
+    extras: &'a [Extras],
+    passive: &'a [bool],
+    torques: &'a [bool],
+    ties: &'a [bool],
+}
+
+/// The cells of a row, taken one after the other.
+struct Cells<'a> {
+    cells: &'a [&'a str],
+    columns: &'a [Column],
+    at: usize,
+    entities: &'a mut Vec<String>,
+}
+
+impl Cells<'_> {
+    fn take(&mut self) -> (&str, &Column) {
+        self.at += 1;
+        (self.cells[self.at - 1], &self.columns[self.at - 1])
+    }
+
+    fn number(&mut self) -> Result<f64, String> {
+        let (cell, column) = self.take();
+        let number = cell.parse().ok().filter(|number: &f64| number.is_finite());
+        number.ok_or_else(|| format!("{} is {cell:?}, allowed: a number", column.name))
+    }
+
+    fn whole(&mut self) -> Result<u64, String> {
+        let (cell, column) = self.take();
+        cell.parse().map_err(|_| format!("{} is {cell:?}, allowed: a whole number", column.name))
+    }
+
+    fn numbers<const N: usize>(&mut self) -> Result<[f64; N], String> {
+        let mut numbers = [0.0; N];
+        for number in &mut numbers {
+            *number = self.number()?;
+        }
+        Ok(numbers)
+    }
+
+    fn vector(&mut self) -> Result<Vector3<f64>, String> {
+        self.numbers().map(Vector3::from)
+    }
+
+    fn entity(&mut self) -> Option<u32> {
+        let name = self.take().0.to_owned();
+        if name.is_empty() {
+            return None;
+        }
+        let known = self.entities.iter().position(|entity| *entity == name);
+        let index = known.unwrap_or_else(|| {
+            self.entities.push(name);
+            self.entities.len() - 1
+        });
+        Some(index as u32)
+    }
+
+    fn word<T>(&mut self, named: fn(&str) -> Option<T>) -> Result<T, String> {
+        let (cell, column) = self.take();
+        named(cell).ok_or_else(|| format!("{} is {cell:?}, which is no word for it", column.name))
+    }
+
+    fn finger(&mut self, index: usize, shape: &Shape<'_>) -> Result<FingerRow, String> {
+        let is = |flags: &[bool]| flags.get(index).copied().unwrap_or_default();
+        let mut row = FingerRow {
+            hip: self.vector()?,
+            god_object: self.vector()?,
+            force_on_user: self.vector()?,
+            entity: self.entity(),
+            feature: self.word(feature_named)?,
+            friction: self.word(friction_named)?,
+            applied_on_user: self.vector()?,
+            ..FingerRow::default()
+        };
+        let extras = shape.extras.get(index).copied().unwrap_or_default();
+        if extras.orientation {
+            (row.orientation_wxyz, row.has_orientation) = (self.numbers()?, true);
+        }
+        if extras.buttons {
+            row.buttons = self.whole()?;
+        }
+        if is(shape.passive) {
+            [row.energy_j, row.controlled_n] = self.numbers()?;
+        }
+        if is(shape.torques) {
+            row.torque_on_user = self.vector()?;
+        }
+        if is(shape.ties) {
+            row.attached = self.entity();
+        }
+        Ok(row)
+    }
+
+    fn body(&mut self, tells_grasp: bool) -> Result<BodyRow, String> {
+        let position = self.vector()?;
+        let [w, x, y, z] = self.numbers()?;
+        let (velocity, angular_velocity) = (self.vector()?, self.vector()?);
+        let mut grasp = GraspQuality::default();
+        if tells_grasp {
+            grasp = GraspQuality {
+                contacts: self.whole()? as usize,
+                rank: self.whole()? as usize,
+                residual: self.number()?,
+                has_force_closure: self.whole()? != 0,
+            };
+        }
+        Ok(BodyRow { position, orientation: Quaternion::new(w, x, y, z), velocity, angular_velocity, grasp })
+    }
+}
+
+/// Which names a header is made of, as far as it is one.
+fn names_in(header: &str) -> Names {
+    let all: Vec<&str> = header.split(',').collect();
+    let named = |ending: &str| -> Vec<String> {
+        all.iter().filter_map(|column| column.strip_suffix(ending)).map(str::to_owned).collect()
+    };
+    let mut fingers = named("_hip_x");
+    fingers.truncate(MAX_DEVICES);
+    let bodies = named("_vx");
+    // The columns of the fingers end where the first object's begin.
+    let first_body = bodies.first().map(|name| format!("{name}_x"));
+    let end =
+        first_body.and_then(|first| all.iter().position(|column| *column == first)).unwrap_or(all.len());
+    let has = |name: &String, ending: &str| all[..end].contains(&&*format!("{name}_{ending}"));
+    let each = |ending: &str| fingers.iter().map(|name| has(name, ending)).collect::<Vec<bool>>();
+    let extras =
+        fingers.iter().map(|name| Extras { orientation: has(name, "qw"), buttons: has(name, "buttons") });
+    Names {
+        extras: extras.collect(),
+        passive: each("energy"),
+        torques: each("torque_x"),
+        ties: each("attached"),
+        grasp_quality: all[end..].iter().any(|column| column.ends_with("_closure")),
+        entities: Vec::new(),
+        fingers,
+        bodies,
+    }
+}
+
+/// The shortest time between two rows (ns).
+fn period_of(lines: &VecDeque<String>) -> u64 {
+    let time_ns = |line: &String| Some((line.split(',').next()?.parse::<f64>().ok()? * 1e9).round() as u64);
+    let times: Vec<u64> = lines.iter().filter_map(time_ns).collect();
+    let steps = times.windows(2).map(|pair| pair[1].saturating_sub(pair[0])).filter(|step| *step > 0);
+    steps.min().unwrap_or(USUAL_PERIOD_NS)
+}

@@ -1,0 +1,251 @@
+//! A recording on a thread of its own: whatever the disk does, nobody waits for it but the recording itself.
+//!
+//! Model: the slow side hands over rows through a bounded queue. In real time a row that finds no room is left out,
+//! counted, and told in the file where the format has a place for that; on a clock that can wait, it waits. A disk that
+//! takes no more is told at once, and the rows that follow are thrown away: the run goes on. At the end the recorder has
+//! as long as it gets on; one that is stuck is given up.
+
+use super::mcap_file::McapFile;
+use crate::fast_loop::WhenFull;
+use crate::recording::{Recording, RecordingError};
+use crate::row::{BodyRow, Row};
+use crate::row_queue::{ROW_QUEUE, RowReceiver, RowSender, row_queue_of};
+use io_driver::say::say;
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Bodies that may wait, of all rows together.
+const MOST_BODIES: usize = 1 << 18;
+/// CSV goes to the file after so much of the run (ns), if not before.
+const FLUSH_NS: u64 = 500_000_000;
+/// How long the recorder sleeps when there is nothing to write.
+const PAUSE: Duration = Duration::from_millis(10);
+/// A recorder that has not written anything for so long will not any more.
+const STUCK: Duration = Duration::from_secs(30);
+
+/// A recording in one of its formats.
+pub enum RecordFile {
+    /// A table.
+    Csv(Box<Recording>),
+    /// Everything.
+    Mcap(Box<McapFile>),
+}
+
+impl RecordFile {
+    fn append(&mut self, row: &Row, bodies: &[BodyRow]) -> Result<(), RecordingError> {
+        match self {
+            Self::Csv(file) => file.append(row, bodies),
+            Self::Mcap(file) => file.append(row, bodies),
+        }
+    }
+
+    fn flush(&mut self) -> Result<(), RecordingError> {
+        match self {
+            Self::Csv(file) => file.flush(),
+            // Its chunks are its own, and the same on every clock.
+            Self::Mcap(_) => Ok(()),
+        }
+    }
+
+    fn tell_lost(&mut self, run_tick: u64, count: u64) {
+        if let Self::Mcap(file) = self {
+            file.tell_lost(run_tick, count);
+        }
+    }
+
+    fn finish(self) -> Result<u64, RecordingError> {
+        match self {
+            Self::Csv(file) => file.finish(),
+            Self::Mcap(file) => file.finish(),
+        }
+    }
+}
+
+/// What became of a recording.
+#[derive(Debug)]
+pub struct Recorded {
+    /// Where it lies.
+    pub path: PathBuf,
+    /// Rows in it.
+    pub rows: u64,
+    /// Rows that the recorder had no room for.
+    pub lost: u64,
+    /// Why it is not complete, if it is not; has been told.
+    pub failure: Option<String>,
+}
+
+/// The slow side's end of a recording.
+pub struct Recorder {
+    path: PathBuf,
+    rows: RowSender,
+    when_full: WhenFull,
+    lost: u64,
+    /// Of these, those after the row that was sent last.
+    untold: u64,
+    shared: Arc<Shared>,
+    thread: JoinHandle<Result<u64, RecordingError>>,
+}
+
+/// What both ends see.
+#[derive(Debug, Default)]
+struct Shared {
+    /// No more rows will come.
+    is_closing: AtomicBool,
+    /// Rows that are missing: before which tick, and how many.
+    gaps: Mutex<VecDeque<(u64, u64)>>,
+    /// Rows taken from the queue so far.
+    taken: AtomicU64,
+}
+
+impl Recorder {
+    /// Starts to record rows with so many bodies each.
+    ///
+    /// # Errors
+    /// If there can be no thread.
+    pub fn start(
+        path: &Path,
+        file: RecordFile,
+        bodies: usize,
+        period_ns: u64,
+        when_full: WhenFull,
+    ) -> Result<Self, RecordingError> {
+        let places = MOST_BODIES.checked_div(bodies).map_or(ROW_QUEUE, |places| places.clamp(64, ROW_QUEUE));
+        let (rows, receiver) = row_queue_of(places, bodies);
+        let shared = Arc::new(Shared::default());
+        let writer = RecorderThread { file: Some(file), shared: shared.clone(), period_ns };
+        let thread = std::thread::Builder::new()
+            .name("recorder".into())
+            .spawn(move || writer.run(receiver))
+            .map_err(|source| RecordingError::Create { file: path.into(), source })?;
+        Ok(Self { path: path.into(), rows, when_full, lost: 0, untold: 0, shared, thread })
+    }
+
+    /// Hands a row over.
+    pub fn send(&mut self, row: &Row, bodies: &[BodyRow]) {
+        // Before the row itself: whoever finds the row finds what is missing in front of it.
+        if !self.rows.is_full() {
+            self.tell_gap(row.run_tick);
+        }
+        while !self.rows.send(*row, bodies) {
+            if self.when_full == WhenFull::Drop || self.thread.is_finished() {
+                self.lost += 1;
+                self.untold += 1;
+                return;
+            }
+            self.thread.thread().unpark();
+            std::thread::sleep(Duration::from_micros(200));
+        }
+    }
+
+    /// Rows are missing in front of this tick.
+    fn tell_gap(&mut self, before: u64) {
+        if self.untold > 0 {
+            self.shared.gaps().push_back((before, std::mem::take(&mut self.untold)));
+        }
+    }
+
+    /// Waits until everything is written.
+    pub fn finish(mut self) -> Recorded {
+        self.tell_gap(u64::MAX);
+        self.shared.is_closing.store(true, Ordering::Release);
+        self.thread.thread().unpark();
+        let (mut taken, mut since) = (0, Instant::now());
+        while !self.thread.is_finished() {
+            let now = self.shared.taken.load(Ordering::Relaxed);
+            if now != taken {
+                (taken, since) = (now, Instant::now());
+            }
+            if since.elapsed() > STUCK {
+                return self.give_up(taken);
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let Self { path, lost, thread, .. } = self;
+        match thread.join() {
+            Ok(Ok(rows)) => Recorded { path, rows, lost, failure: None },
+            Ok(Err(error)) => {
+                let rows = if let RecordingError::Write { rows, .. } = error { rows } else { 0 };
+                Recorded { path, rows, lost, failure: Some(error.to_string()) }
+            }
+            Err(_) => Recorded { path, rows: 0, lost, failure: Some("the recorder panicked".into()) },
+        }
+    }
+
+    /// The thread ends with the process.
+    fn give_up(self, taken: u64) -> Recorded {
+        let why = format!(
+            "cannot finish the recording {}: nothing was written for {} s; what reached it until now is readable",
+            self.path.display(),
+            STUCK.as_secs()
+        );
+        say(format_args!("phantom3: {why}"));
+        Recorded { path: self.path, rows: taken, lost: self.lost, failure: Some(why) }
+    }
+}
+
+impl Shared {
+    /// Neither side is a real-time thread.
+    fn gaps(&self) -> MutexGuard<'_, VecDeque<(u64, u64)>> {
+        self.gaps.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The recorder's own thread.
+struct RecorderThread {
+    /// `None` once it failed.
+    file: Option<RecordFile>,
+    shared: Arc<Shared>,
+    period_ns: u64,
+}
+
+impl RecorderThread {
+    fn run(mut self, mut rows: RowReceiver) -> Result<u64, RecordingError> {
+        let mut result = Ok(0);
+        let (mut flushed, mut last) = (0, 0);
+        loop {
+            // Looked at first: what was sent before is then in the queue.
+            let is_closing = self.shared.is_closing.load(Ordering::Acquire);
+            while let Some((row, bodies)) = rows.receive() {
+                self.shared.taken.fetch_add(1, Ordering::Relaxed);
+                last = row.run_tick;
+                let mut written = self.append(&row, bodies);
+                if row.run_tick.saturating_sub(flushed).saturating_mul(self.period_ns) >= FLUSH_NS {
+                    flushed = row.run_tick;
+                    written = written.and_then(|()| self.file.as_mut().map_or(Ok(()), RecordFile::flush));
+                }
+                if let Err(error) = written {
+                    say(format_args!("phantom3: {error}"));
+                    self.file = None;
+                    result = Err(error);
+                }
+            }
+            if is_closing {
+                break;
+            }
+            std::thread::park_timeout(PAUSE);
+        }
+        self.tell_lost(last, u64::MAX);
+        let Some(file) = self.file else { return result };
+        file.finish().inspect_err(|error| say(format_args!("phantom3: {error}")))
+    }
+
+    fn append(&mut self, row: &Row, bodies: &[BodyRow]) -> Result<(), RecordingError> {
+        self.tell_lost(row.run_tick, row.run_tick);
+        self.file.as_mut().map_or(Ok(()), |file| file.append(row, bodies))
+    }
+
+    /// Tells of rows that are missing up to here.
+    fn tell_lost(&mut self, run_tick: u64, up_to: u64) {
+        let mut gaps = self.shared.gaps();
+        while gaps.front().is_some_and(|(before, _)| *before <= up_to) {
+            let Some((_, count)) = gaps.pop_front() else { break };
+            if let Some(file) = &mut self.file {
+                file.tell_lost(run_tick, count);
+            }
+        }
+    }
+}

@@ -1,0 +1,190 @@
+//! What a recording shows in three dimensions: the scene once, fingers and objects as they move.
+//!
+//! Model: every entity is drawn once in a frame of its own; that of an entity which moves is told anew many times a
+//! second. Fingers are a ball at the HIP, a ball at the god-object and an arrow for the force on the user.
+//! Closed forms are drawn exactly, meshes in their triangles up to a limit, trees as all of their children (what is taken
+//! away shines through); patches and what is drawn out unevenly have no picture.
+
+use super::foxglove::{Rgba, WORLD, arrow, cube, cylinder, frame_in_world, scene_entity, sphere, triangles};
+use super::wire::Message;
+use crate::columns::Names;
+use crate::row::{BodyRow, Row};
+use haptics::{Entity, Shape};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use std::f64::consts::TAU;
+use world::{CsgOp, Scene, ShapeSpec};
+
+/// Triangles of a mesh that are drawn at most: a picture for people, and a megabyte and a half of the file.
+const MOST_FACES: usize = 50_000;
+/// How far a plane is drawn to each side (m).
+const PLANE_REACH_M: f64 = 0.25;
+/// A newton is drawn so long (m).
+const METRES_PER_NEWTON: f64 = 0.02;
+/// A finger without a radius is drawn with this one (m).
+const POINT_RADIUS_M: f64 = 0.002;
+/// Corners around a ring and around its tube.
+const RING: [u32; 2] = [32, 16];
+
+const SOLID: Rgba = [0.55, 0.65, 0.75, 1.0];
+const MOVING: Rgba = [0.85, 0.65, 0.35, 1.0];
+const TAKEN_AWAY: Rgba = [0.8, 0.3, 0.3, 0.25];
+const HIP: Rgba = [0.3, 0.8, 0.3, 0.5];
+const GOD: Rgba = [0.9, 0.2, 0.2, 1.0];
+const FORCE: Rgba = [0.9, 0.2, 0.2, 0.8];
+
+/// What is drawn.
+#[derive(Debug, Clone, Default)]
+pub struct View {
+    /// A `foxglove.SceneUpdate` of all entities.
+    pub(super) scene: Vec<u8>,
+    /// Radius of each finger (m).
+    radii_m: Vec<f64>,
+}
+
+impl View {
+    /// Of a scene, as it is rendered.
+    pub fn new(scene: &Scene, entities: &[Entity]) -> Self {
+        let mut out = Message::new();
+        for (spec, entity) in scene.entities.iter().zip(entities) {
+            let moves = spec.motion.is_some();
+            let frame = if moves { frame_of(&spec.name) } else { WORLD.into() };
+            let pose = if moves { Isometry3::identity() } else { spec.pose };
+            let rgba = if moves { MOVING } else { SOLID };
+            scene_entity(&mut out, 0, &frame, &spec.name, |out| {
+                draw(out, &spec.shape, Some(entity), &pose, rgba);
+            });
+        }
+        let radii_m = scene.fingers.iter().map(|finger| finger.radius_m.max(POINT_RADIUS_M)).collect();
+        Self { scene: out.bytes().to_vec(), radii_m }
+    }
+
+    /// A `foxglove.FrameTransforms` of all that moves.
+    pub(super) fn frames(
+        &self,
+        out: &mut Message,
+        time_ns: u64,
+        row: &Row,
+        bodies: &[BodyRow],
+        names: &Names,
+    ) {
+        for (body, name) in bodies.iter().zip(&names.bodies) {
+            frame_in_world(out, time_ns, &frame_of(name), &body.position, &body.orientation);
+        }
+        for (finger, name) in row.fingers.iter().zip(&names.fingers) {
+            let [w, x, y, z] = finger.orientation_wxyz;
+            let turned = if finger.has_orientation { [w, x, y, z] } else { [1.0, 0.0, 0.0, 0.0] };
+            let turned = nalgebra::Quaternion::new(turned[0], turned[1], turned[2], turned[3]);
+            frame_in_world(out, time_ns, &format!("finger/{name}"), &finger.hip, &turned);
+        }
+    }
+
+    /// A `foxglove.SceneUpdate` of the fingers.
+    pub(super) fn fingers(&self, out: &mut Message, time_ns: u64, row: &Row, names: &Names) {
+        for ((finger, name), radius_m) in row.fingers.iter().zip(&names.fingers).zip(&self.radii_m) {
+            scene_entity(out, time_ns, WORLD, &format!("finger/{name}"), |out| {
+                let at = |p: Vector3<f64>| Isometry3::translation(p.x, p.y, p.z);
+                let ball = Vector3::repeat(2.0 * radius_m);
+                sphere(out, &at(finger.hip), ball, HIP);
+                if finger.entity.is_some() {
+                    sphere(out, &at(finger.god_object), 0.9 * ball, GOD);
+                }
+                let length = METRES_PER_NEWTON * finger.force_on_user;
+                if length.norm() > 0.0 {
+                    arrow(out, &finger.hip, &length, 0.001, FORCE);
+                }
+            });
+        }
+    }
+}
+
+/// No object's frame is called as the world's, however the object is called.
+fn frame_of(object: &str) -> String {
+    format!("object/{object}")
+}
+
+/// Draws a shape; `entity` has what files hold of it.
+fn draw(out: &mut Message, shape: &ShapeSpec, entity: Option<&Entity>, at: &Isometry3<f64>, rgba: Rgba) {
+    match shape {
+        ShapeSpec::Plane { normal, offset_m } => {
+            let turned = UnitQuaternion::rotation_between(&Vector3::y(), normal)
+                .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.5 * TAU));
+            let thin = 1e-3;
+            let middle = normal.into_inner() * (offset_m - 0.5 * thin);
+            let pose = at * Isometry3::from_parts(middle.into(), turned);
+            cube(out, &pose, Vector3::new(2.0 * PLANE_REACH_M, thin, 2.0 * PLANE_REACH_M), rgba);
+        }
+        ShapeSpec::Sphere { radius_m } => sphere(out, at, Vector3::repeat(2.0 * radius_m), rgba),
+        ShapeSpec::Ellipsoid { radii_m } => sphere(out, at, 2.0 * Vector3::from(*radii_m), rgba),
+        ShapeSpec::Box { size_m } => cube(out, at, (*size_m).into(), rgba),
+        ShapeSpec::Cylinder { radius_m, length_m } => cylinder(out, at, [*radius_m; 2], *length_m, rgba),
+        ShapeSpec::Cone { radius_bottom_m, radius_top_m, length_m } => {
+            cylinder(out, at, [*radius_bottom_m, *radius_top_m], *length_m, rgba);
+        }
+        ShapeSpec::Capsule { radius_m, length_m } => {
+            if *length_m > 0.0 {
+                cylinder(out, at, [*radius_m; 2], *length_m, rgba);
+            }
+            for end in [-0.5 * length_m, 0.5 * length_m] {
+                sphere(out, &(at * Translation3::new(0.0, end, 0.0)), Vector3::repeat(2.0 * radius_m), rgba);
+            }
+        }
+        ShapeSpec::Torus { ring_radius_m, tube_radius_m } => {
+            draw_torus(out, *ring_radius_m, *tube_radius_m, at, rgba);
+        }
+        ShapeSpec::Csg(tree) => {
+            for (index, child) in tree.children.iter().enumerate() {
+                let is_taken_away = tree.op == CsgOp::Difference && index > 0;
+                draw(
+                    out,
+                    &child.shape,
+                    None,
+                    &(at * child.pose),
+                    if is_taken_away { TAKEN_AWAY } else { rgba },
+                );
+            }
+        }
+        ShapeSpec::Mesh(_) => draw_mesh(out, entity, at, rgba),
+        ShapeSpec::Scaled { shape, scale } => draw_scaled(out, shape, (*scale).into(), at, rgba),
+        // Patches, and what later versions add.
+        _ => {}
+    }
+}
+
+/// Balls and boxes stay what they are; others only where all factors are the same, for which scenes have no shape.
+fn draw_scaled(out: &mut Message, shape: &ShapeSpec, scale: Vector3<f64>, at: &Isometry3<f64>, rgba: Rgba) {
+    let size = |size: Vector3<f64>| size.component_mul(&scale);
+    match shape {
+        ShapeSpec::Sphere { radius_m } => sphere(out, at, size(Vector3::repeat(2.0 * radius_m)), rgba),
+        ShapeSpec::Ellipsoid { radii_m } => sphere(out, at, size(2.0 * Vector3::from(*radii_m)), rgba),
+        ShapeSpec::Box { size_m } => cube(out, at, size((*size_m).into()), rgba),
+        _ => {}
+    }
+}
+
+fn draw_mesh(out: &mut Message, entity: Option<&Entity>, at: &Isometry3<f64>, rgba: Rgba) {
+    let Some(Shape::Mesh(mesh)) = entity.map(|entity| &entity.shape) else { return };
+    if mesh.faces().len() > MOST_FACES {
+        return;
+    }
+    let indices: Vec<u32> = mesh.faces().iter().flat_map(|face| face.vertices).collect();
+    triangles(out, at, mesh.vertices().iter().copied(), &indices, rgba);
+}
+
+fn draw_torus(out: &mut Message, ring_m: f64, tube_m: f64, at: &Isometry3<f64>, rgba: Rgba) {
+    let [around, across] = RING;
+    let point = |i: u32, j: u32| {
+        let (sin_u, cos_u) = (TAU * f64::from(i) / f64::from(around)).sin_cos();
+        let (sin_v, cos_v) = (TAU * f64::from(j) / f64::from(across)).sin_cos();
+        let out = ring_m + tube_m * cos_v;
+        Vector3::new(out * cos_u, tube_m * sin_v, out * sin_u)
+    };
+    let each = || (0..around).flat_map(|i| (0..across).map(move |j| (i, j)));
+    let index = |i: u32, j: u32| i % around * across + j % across;
+    let indices: Vec<u32> = each()
+        .flat_map(|(i, j)| {
+            let (a, b, c, d) = (index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1));
+            [a, c, b, a, d, c]
+        })
+        .collect();
+    triangles(out, at, each().map(|(i, j)| point(i, j)), &indices, rgba);
+}

@@ -1,0 +1,270 @@
+//! `phantom3 replay`: the fingers of a recording once more, in the same scene or another.
+//!
+//! Problem: what would these very movements have felt with other friction, another shape, another version of this
+//! program? And is what is published still what the program computes?
+//! Model: devices that are where the recording has the fingers ([`feed`]), on the virtual clock, through the same driver
+//! and fast loop as every run. What comes out is compared with the recording tick by tick ([`difference`]).
+//! Invariant: with the same scene and program a recording of scripted or of free fingers comes out the same to the bit;
+//! what a contact remembers from before t = 0 is not in a recording.
+
+mod difference;
+mod edit;
+mod feed;
+mod stage;
+
+use crate::export::{tell_end, wrong};
+use crate::fast_loop::{FastLoop, Turn, WhenFull};
+use crate::outcome::RunFailure;
+use crate::progress::StatusLine;
+use crate::record::read::{ReadError, RecordedRun};
+use crate::record::{self, Recorder, View};
+use crate::rig::Rig;
+use crate::row_queue::{RowReceiver, row_queue};
+use crate::virtual_clock::VirtualDriver;
+use clap::Args;
+use difference::Difference;
+use edit::Edit;
+use feed::{Feed, ReplayedDevice, SharedFeed};
+use io_driver::device::{Device, run_time_s};
+use nalgebra::Vector3;
+use rt_core::signals::StopSignals;
+use shm_abi::segment::ClockMode;
+use stage::Stage;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Of `--expect-same`, when something differs.
+const EXIT_DIFFERENT: u8 = 1;
+
+/// What is played, and to what.
+#[derive(Debug, Args)]
+pub struct ReplayArgs {
+    /// The recording (MCAP or CSV)
+    recording: PathBuf,
+    /// The scene to play it to [default: the recording's own, which only MCAP has]
+    #[arg(long, value_name = "TOML")]
+    scene: Option<PathBuf>,
+    /// Change the friction of an entity, as in table=stiction,mu_s=0.7,mu_d=0.3; may be given several times
+    #[arg(long, value_name = "NAME=MODEL,..", value_parser = Edit::friction)]
+    friction: Vec<Edit>,
+    /// Change any key of the scene, as in entity.table.stiffness_n_per_m=500; may be given several times
+    #[arg(long, value_name = "KEY=VALUE", value_parser = Edit::set)]
+    set: Vec<Edit>,
+    /// Write what comes out here (CSV, or MCAP with the ending .mcap); may be given several times
+    #[arg(long, value_name = "FILE")]
+    record: Vec<PathBuf>,
+    /// End with status 1 if anything differs, be it the last bit
+    #[arg(long)]
+    expect_same: bool,
+}
+
+/// Plays it.
+///
+/// # Errors
+/// A recording or a scene that cannot be read or is wrong, or a fault while it is played.
+pub fn execute(args: &ReplayArgs, signals: &StopSignals) -> Result<ExitCode, RunFailure> {
+    let recorded = RecordedRun::open(&args.recording).map_err(|error| wrong(&error))?;
+    let edits: Vec<Edit> = args.friction.iter().chain(&args.set).cloned().collect();
+    let mut stage = Stage::set(&args.recording, &recorded, args.scene.as_deref(), &edits)?;
+    refuse_to_overwrite(args, &stage.rig)?;
+    let played_from = args.recording.file_name().unwrap_or_default().to_string_lossy();
+    stage.about.tell("replay_of", played_from.into_owned());
+    let feed = Feed::new(recorded).map_err(|error| wrong(&error))?;
+    if feed.is_empty() {
+        return Err(wrong(&format_args!("{} has no rows", args.recording.display())));
+    }
+    let mut play = Play::new(&stage, Arc::new(Mutex::new(feed)), &args.record)?;
+    let ended = play.run(signals);
+    play.conclude(args, &stage, ended)
+}
+
+fn refuse_to_overwrite(args: &ReplayArgs, rig: &Rig) -> Result<(), RunFailure> {
+    let inputs: Vec<&PathBuf> =
+        [&args.recording].into_iter().chain(&args.scene).chain(rig.model_files()).collect();
+    let both = |record: &PathBuf| {
+        inputs
+            .iter()
+            .find(|input| crate::cli::is_same_file(record, input))
+            .map(|input| (record.clone(), *input))
+    };
+    match args.record.iter().find_map(both) {
+        Some((record, input)) => Err(wrong(&format_args!(
+            "--record {} would overwrite the input {}; name another file",
+            record.display(),
+            input.display()
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// A replay under way.
+struct Play {
+    driver: VirtualDriver,
+    fast: FastLoop,
+    rows: RowReceiver,
+    recorders: Vec<Recorder>,
+    feed: SharedFeed,
+    /// Which finger of the recording each finger of the scene is.
+    fingers: Vec<Option<usize>>,
+    names: crate::columns::Names,
+    difference: Difference,
+    period_ns: u64,
+    missing: u64,
+    rows_read: u64,
+}
+
+impl Play {
+    fn new(stage: &Stage, feed: SharedFeed, records: &[PathBuf]) -> Result<Self, RunFailure> {
+        let rig = &stage.rig;
+        let (recorded_names, period_ns) = {
+            let held = lock(&feed);
+            (held.recorded.names().clone(), held.recorded.period_ns())
+        };
+        let fingers: Vec<Option<usize>> = rig
+            .scene
+            .fingers
+            .iter()
+            .enumerate()
+            .map(|(place, finger)| which(&recorded_names.fingers, &finger.name, place))
+            .collect();
+        let driver = VirtualDriver::with_devices(
+            &rig.driver_config(ClockMode::Virtual),
+            devices(rig, &feed, &fingers),
+        )?;
+        let names = rig.names(&driver.extras());
+        let step = rig.fast_step().map_err(|error| wrong(&error))?;
+        let bodies = step.bodies().len();
+        let view = View::new(&rig.scene, step.entities());
+        let recorder = |path: &PathBuf| {
+            let file = record::create(path, names.clone(), period_ns, &stage.about, &view)?;
+            Recorder::start(path, file, bodies, period_ns, WhenFull::Wait)
+        };
+        let recorders = records.iter().map(recorder).collect::<Result<_, _>>()?;
+        let (sender, rows) = row_queue(bodies);
+        Ok(Self {
+            driver,
+            // It ends with the recording.
+            fast: FastLoop::new(step, sender, WhenFull::Wait, u64::MAX, period_ns),
+            rows,
+            recorders,
+            difference: Difference::new(&fingers, &recorded_names, &names, period_ns),
+            feed,
+            fingers,
+            names,
+            period_ns,
+            missing: 0,
+            rows_read: 0,
+        })
+    }
+
+    fn run(&mut self, signals: &StopSignals) -> Result<(), RunFailure> {
+        let mut line = StatusLine::told_just_now();
+        for tick in 1.. {
+            let (feed, fast, missing) = (&self.feed, &mut self.fast, &mut self.missing);
+            let turn = self.driver.tick_with(tick, |tick, driver, commander| {
+                if lock(feed).is_missing() {
+                    *missing += 1;
+                    return Turn::Skipped;
+                }
+                fast.turn(tick, driver, commander)
+            });
+            self.compare();
+            if let Turn::Fault(reason) = turn {
+                return Err(RunFailure::driver_fault(reason));
+            }
+            let held = lock(&self.feed);
+            if held.is_over() && held.reached.is_empty() {
+                break;
+            }
+            drop(held);
+            if let Some(signal) = signals.requested() {
+                return Err(RunFailure::Results(format!(
+                    "ended by signal {signal} before the recording's end"
+                )));
+            }
+            let t_s = run_time_s(self.fast.run_ticks().cast_signed(), self.period_ns);
+            line.show(|| format!("{t_s:7.2} s"));
+        }
+        Ok(())
+    }
+
+    /// Takes the rows that came out and puts each beside the one that was recorded.
+    fn compare(&mut self) {
+        while let Some((row, bodies)) = self.rows.receive() {
+            let mut feed = lock(&self.feed);
+            while feed.reached.front().is_some_and(|(before, _)| before.run_tick <= row.run_tick) {
+                let Some((before, bodies_before)) = feed.reached.pop_front() else { break };
+                self.rows_read += 1;
+                if before.run_tick == row.run_tick {
+                    let recorded = (&before, &bodies_before[..], feed.recorded.names());
+                    self.difference.add(recorded, (&row, bodies, &self.names), &self.fingers);
+                }
+            }
+            drop(feed);
+            for recorder in &mut self.recorders {
+                recorder.send(&row, bodies);
+            }
+        }
+    }
+
+    fn conclude(
+        self,
+        args: &ReplayArgs,
+        stage: &Stage,
+        ended: Result<(), RunFailure>,
+    ) -> Result<ExitCode, RunFailure> {
+        let Self { feed, difference, recorders, period_ns, missing, rows_read, .. } = self;
+        let recordings: Vec<_> = recorders.into_iter().map(Recorder::finish).collect();
+        let mut feed = lock(&feed);
+        let failure: Result<(), ReadError> = feed.failure.take().map_or(Ok(()), Err);
+        let until_s = run_time_s(self.fast.run_ticks().saturating_sub(1).cast_signed(), period_ns);
+        tell_end(&args.recording, failure, feed.recorded.cut(), rows_read, until_s)?;
+        ended?;
+        let program = feed.recorded.about().and_then(|about| about.facts.get("program"));
+        tell(&format!(
+            "recording    {} ({} ticks compared, {missing} missing in it), by {}",
+            args.recording.display(),
+            difference.ticks(),
+            program.map_or("an unknown version", String::as_str)
+        ));
+        tell(&format!("scene        {}", stage.name));
+        for recorded in &recordings {
+            tell(&format!("written      {} ({} rows)", recorded.path.display(), recorded.rows));
+        }
+        tell(&difference.to_string());
+        // The recorder has told why.
+        if recordings.iter().any(|recorded| recorded.failure.is_some()) {
+            return Ok(ExitCode::from(3));
+        }
+        let is_unexpected = args.expect_same && !difference.is_none();
+        Ok(if is_unexpected { ExitCode::from(EXIT_DIFFERENT) } else { ExitCode::SUCCESS })
+    }
+}
+
+/// The finger of that name, else, if no other has its place, the one there.
+fn which(recorded: &[String], name: &str, place: usize) -> Option<usize> {
+    recorded.iter().position(|other| other == name).or_else(|| (place < recorded.len()).then_some(place))
+}
+
+fn devices(rig: &Rig, feed: &SharedFeed, fingers: &[Option<usize>]) -> Vec<Box<dyn Device>> {
+    let device = |index: usize| {
+        let place = rig.scene.fingers.iter().position(|finger| finger.device == index);
+        let finger = place.map(|place| &rig.scene.fingers[place]);
+        let name = finger.map_or("(unused)", |finger| finger.name.as_str());
+        let start = finger.map_or_else(Vector3::zeros, |finger| finger.start_m.coords);
+        let played = place.and_then(|place| fingers[place]);
+        Box::new(ReplayedDevice::new(name, feed, played, start)) as Box<dyn Device>
+    };
+    (0..rig.device_count()).map(device).collect()
+}
+
+fn lock(feed: &SharedFeed) -> MutexGuard<'_, Feed> {
+    feed.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Nobody to tell is no reason to fail.
+fn tell(line: &str) {
+    use std::io::Write;
+    let _ = writeln!(std::io::stdout(), "{line}");
+}

@@ -1,0 +1,142 @@
+//! The scene that a recording is played to: its own, as it was attached, or another one; with changes.
+
+use super::edit::Edit;
+use crate::outcome::RunFailure;
+use crate::record::read::RecordedRun;
+use crate::record::{About, InputFile};
+use crate::rig::{HandMode, Rig};
+use shm_abi::segment::ClockMode;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+use toml_edit::DocumentMut;
+use world::{Scene, ShapeSpec};
+
+/// A scene that is ready to be played to.
+pub(super) struct Stage {
+    pub(super) rig: Rig,
+    /// In words.
+    pub(super) name: String,
+    /// What a recording of it tells.
+    pub(super) about: About,
+    /// Where attached models lie meanwhile.
+    _directory: Option<TempDir>,
+}
+
+impl Stage {
+    /// The recording's own scene, or `other`, changed by these edits.
+    pub(super) fn set(
+        recording: &Path,
+        recorded: &RecordedRun,
+        other: Option<&Path>,
+        edits: &[Edit],
+    ) -> Result<Self, RunFailure> {
+        let (file, text) = match other {
+            Some(file) => (file.to_path_buf(), read(file)?),
+            None => attached_scene(recording, recorded)?,
+        };
+        let text = edited(&file, text, edits)?;
+        let mut scene = Scene::parse(&text, &file).map_err(|error| wrong(&error))?;
+        scene.hand = None;
+        let directory = match recorded.about() {
+            Some(about) if other.is_none() => unpack_models(&mut scene, about)?,
+            _ => None,
+        };
+        let rig = Rig::new(&file, scene, None, None, HandMode::Kinematic, recorded.period_ns())
+            .map_err(|error| wrong(&error))?;
+        let mut name = match other {
+            Some(file) => file.display().to_string(),
+            None => format!("the recording's own, {}", file.display()),
+        };
+        for edit in edits {
+            name += &format!("; {edit}");
+        }
+        let about = about(&rig, recorded, other.is_none(), text);
+        Ok(Self { rig, name, about, _directory: directory })
+    }
+}
+
+fn wrong(error: &dyn std::fmt::Display) -> RunFailure {
+    RunFailure::Start(error.to_string())
+}
+
+fn read(file: &Path) -> Result<String, RunFailure> {
+    std::fs::read_to_string(file)
+        .map_err(|error| wrong(&format_args!("cannot read the scene {}: {error}", file.display())))
+}
+
+fn attached_scene(recording: &Path, recorded: &RecordedRun) -> Result<(PathBuf, String), RunFailure> {
+    let Some((path, bytes)) = recorded.about().and_then(|about| about.file("scene")) else {
+        return Err(wrong(&format_args!(
+            "{} has no scene in it; name the one to play it to with --scene FILE",
+            recording.display()
+        )));
+    };
+    let text = std::str::from_utf8(bytes);
+    let text = text.map_err(|_| wrong(&format_args!("{}: its scene is no text", recording.display())))?;
+    Ok((path.into(), text.into()))
+}
+
+fn edited(file: &Path, text: String, edits: &[Edit]) -> Result<String, RunFailure> {
+    if edits.is_empty() {
+        return Ok(text);
+    }
+    let mut document: DocumentMut =
+        text.parse().map_err(|error| wrong(&format_args!("{}: {error}", file.display())))?;
+    for edit in edits {
+        edit.apply(&mut document).map_err(|why| wrong(&format_args!("{edit}: {why}")))?;
+    }
+    Ok(document.to_string())
+}
+
+/// Models and pictures that came with the recording take the place of those that the scene names.
+fn unpack_models(scene: &mut Scene, about: &About) -> Result<Option<TempDir>, RunFailure> {
+    let models: Vec<(&Path, &InputFile)> = about
+        .files
+        .iter()
+        .filter_map(|file| Some((Path::new(file.name.strip_prefix("model:")?), file)))
+        .collect();
+    if models.is_empty() {
+        return Ok(None);
+    }
+    let no_room = |error: std::io::Error| {
+        wrong(&format_args!(
+            "cannot unpack the recording's models: {error}; set TMPDIR to a directory that can be written"
+        ))
+    };
+    let directory = tempfile::Builder::new().prefix("phantom3-replay-").tempdir().map_err(no_room)?;
+    for (index, (path, file)) in models.iter().enumerate() {
+        // Only the name's end is taken, for the format that it says: a recording says nothing of where to write.
+        let mut place = directory.path().join(format!("model-{index}"));
+        if let Some(ending) = path.extension() {
+            place.set_extension(ending);
+        }
+        std::fs::write(&place, &file.bytes).map_err(no_room)?;
+        for named in model_files(scene).filter(|named| named.as_path() == *path) {
+            named.clone_from(&place);
+        }
+    }
+    Ok(Some(directory))
+}
+
+fn model_files(scene: &mut Scene) -> impl Iterator<Item = &mut PathBuf> {
+    scene.entities.iter_mut().flat_map(|entity| {
+        let model = match &mut entity.shape {
+            ShapeSpec::Mesh(model) | ShapeSpec::Nurbs(model) => Some(&mut model.file),
+            _ => None,
+        };
+        model.into_iter().chain(entity.height_map.as_mut().map(|map| &mut map.file))
+    })
+}
+
+/// With the scene as it was played, and with the models under the names that it has for them.
+fn about(rig: &Rig, recorded: &RecordedRun, is_own: bool, text: String) -> About {
+    let mut about = About::of_run(rig, ClockMode::Virtual, recorded.period_ns(), 0);
+    let models = match recorded.about() {
+        Some(of_recording) if is_own => of_recording.files.clone(),
+        _ => std::mem::take(&mut about.files),
+    };
+    about.files = models.into_iter().filter(|file| file.name.starts_with("model:")).collect();
+    let name = format!("scene:{}", rig.scene_file.display());
+    about.files.insert(0, InputFile { name, bytes: text.into_bytes() });
+    about
+}
