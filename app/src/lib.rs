@@ -11,8 +11,10 @@
 #![deny(missing_docs)]
 
 pub mod calibrate;
+pub mod check;
 pub mod child;
 pub mod cli;
+pub mod convert;
 pub mod demo;
 pub mod fast_loop;
 pub mod fast_step;
@@ -29,6 +31,7 @@ pub mod rig;
 pub mod row;
 pub mod row_queue;
 pub mod run;
+pub mod settings;
 pub mod simulated;
 pub mod slow;
 pub mod study;
