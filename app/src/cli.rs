@@ -4,6 +4,8 @@
 //! 3 a fault during the run or of a recording, which up to it is complete; 128 + n: signal n ended the run, the recording up to it is complete.
 
 use crate::calibrate::{self, CalibrateArgs, default_layout};
+use crate::check::{self, CheckArgs};
+use crate::convert::{self, ConvertArgs};
 use crate::demo;
 use crate::export::{self, ExportArgs};
 use crate::outcome::{RunFailure, Stop};
@@ -12,6 +14,7 @@ use crate::replay::{self, ReplayArgs};
 use crate::report::Report;
 use crate::rig::{HandMode, Rig};
 use crate::run::{self, Attach, RunPlan};
+use crate::settings::{self, SettingsArgs};
 use crate::simulated::SimulatedDevices;
 use crate::study::{self, StudyCommand};
 use clap::builder::{OsStringValueParser, TypedValueParser};
@@ -27,7 +30,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
-use world::{Layout, Scene};
+use world::{Layout, Scene, Settings};
 
 const EXIT_USAGE: u8 = 2;
 const EXIT_FAULT: u8 = 3;
@@ -47,6 +50,8 @@ pub struct Cli {
     /// Open no window; this version has none to open
     #[arg(long, global = true)]
     headless: bool,
+    #[command(flatten)]
+    settings: SettingsArgs,
     #[command(subcommand)]
     command: Option<AppCommand>,
 }
@@ -55,6 +60,10 @@ pub struct Cli {
 enum AppCommand {
     /// Play a scene with a scripted hand
     Run(RunArgs),
+    /// Say what is wrong with a scene, all of it, and what is in it, without running it
+    Check(CheckArgs),
+    /// Turn the scene files of the thesis' own program into a scene (TOML)
+    Convert(ConvertArgs),
     /// Find where a device stands, from points that it and another one measured together
     Calibrate(CalibrateArgs),
     /// Feed a recording's fingers to its scene, or to another one, and tell what differs
@@ -63,6 +72,8 @@ enum AppCommand {
     Export(ExportArgs),
     /// Draw a recording: what the fingers felt
     Plot(PlotArgs),
+    /// Print the settings of this workplace, and where each comes from
+    Settings,
     /// List the materials that an entity of a scene can be made of
     Materials,
     /// Answer a question about the whole system with a table and a picture
@@ -73,7 +84,7 @@ enum AppCommand {
     Driver(io_driver::cli::DriverCommand),
 }
 
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 struct RunArgs {
     /// The scene (TOML)
     scene: PathBuf,
@@ -139,6 +150,23 @@ enum Clock {
     Real,
 }
 
+impl RunArgs {
+    /// With what the settings say where the command line says nothing.
+    fn with(&self, settings: &Settings) -> Self {
+        let mut args = self.clone();
+        args.scene = settings::find(&args.scene, &settings.scenes.value);
+        args.hand = args.hand.map(|hand| settings::find(&hand, &settings.hands.value));
+        let socket = settings.driver_socket.value.as_ref();
+        args.attach = args
+            .attach
+            .map(|said| if said.as_os_str().is_empty() { socket.unwrap_or(&said).clone() } else { said });
+        if args.clock.is_none() && args.attach.is_none() {
+            args.clock = Clock::from_str(settings.clock.value, false).ok();
+        }
+        args
+    }
+}
+
 impl From<Clock> for ClockMode {
     fn from(clock: Clock) -> Self {
         match clock {
@@ -151,14 +179,30 @@ impl From<Clock> for ClockMode {
 
 /// Runs the program with the process's own arguments.
 pub fn main() -> ExitCode {
-    match Cli::parse().command {
+    let Cli { settings, command, .. } = Cli::parse();
+    match command {
         Some(AppCommand::Driver(command)) => io_driver::cli::execute(command),
         Some(AppCommand::Calibrate(args)) => calibrate::run(&args),
         Some(AppCommand::Materials) => {
             print_materials();
             ExitCode::SUCCESS
         }
-        Some(AppCommand::Run(args)) => conclude(run_scene(&args)),
+        Some(AppCommand::Settings) => match settings.load() {
+            Ok(settings) => {
+                settings::print(&settings);
+                ExitCode::SUCCESS
+            }
+            Err(failure) => failed(&failure),
+        },
+        Some(AppCommand::Run(args)) => {
+            conclude(settings.load().and_then(|settings| run_scene(&args, &settings)))
+        }
+        Some(AppCommand::Check(args)) => settings
+            .load()
+            .map_or_else(|failure| failed(&failure), |settings| check::execute(&args, &settings)),
+        Some(AppCommand::Convert(args)) => {
+            convert::execute(&args).map_or_else(|failure| failed(&failure), stopped)
+        }
         Some(AppCommand::Replay(args)) => {
             let result = install_signals().and_then(|signals| replay::execute(&args, &signals));
             result.unwrap_or_else(|failure| failed(&failure))
@@ -173,23 +217,26 @@ pub fn main() -> ExitCode {
             let result = install_signals().and_then(|signals| study::execute(&command, &signals));
             result.map_or_else(|failure| failed(&failure), stopped)
         }
-        None => conclude(run_demo()),
+        None => conclude(settings.load().and_then(|settings| run_demo(&settings))),
     }
 }
 
-fn run_demo() -> Result<(Report, Stop), RunFailure> {
+fn run_demo(settings: &Settings) -> Result<(Report, Stop), RunFailure> {
     let signals = install_signals()?;
     let mut demo = demo::unpack(period_of(DEFAULT_RATE_HZ))?;
-    let plan = demo::plan(&demo.rig);
+    let directory = settings.recording_directory.value.as_deref();
+    let socket = settings.driver_socket.value.clone().unwrap_or_else(endpoint::for_application);
+    let plan = demo::plan(&demo.rig, socket, directory);
     if plan.attach.is_some() {
         demo.rig.layout = calibrated_layout()?;
     }
     run::run(&demo.rig, &plan, &signals)
 }
 
-fn run_scene(args: &RunArgs) -> Result<(Report, Stop), RunFailure> {
+fn run_scene(args: &RunArgs, settings: &Settings) -> Result<(Report, Stop), RunFailure> {
     let signals = install_signals()?;
-    let rig = make_rig(args)?;
+    let args = &args.with(settings);
+    let rig = make_rig(args, settings)?;
     run::run(&rig, &make_plan(args, &rig)?, &signals)
 }
 
@@ -202,7 +249,7 @@ fn path_or_nothing() -> impl TypedValueParser<Value = PathBuf> {
     OsStringValueParser::new().map(PathBuf::from)
 }
 
-fn make_rig(args: &RunArgs) -> Result<Rig, RunFailure> {
+fn make_rig(args: &RunArgs, settings: &Settings) -> Result<Rig, RunFailure> {
     let wrong = |error: &dyn std::fmt::Display| RunFailure::Start(error.to_string());
     let hand_mode = match args.hand_mode {
         HandModeName::Kinematic => HandMode::Kinematic,
@@ -219,6 +266,7 @@ fn make_rig(args: &RunArgs) -> Result<Rig, RunFailure> {
         // The devices are the fingers; nothing follows a script.
         scene.hand = None;
     }
+    settings::find_data(&mut scene, &args.scene, settings);
     let layout = find_layout(args)?;
     let period_ns = period_of(args.rate_hz.unwrap_or(DEFAULT_RATE_HZ));
     Rig::new(&args.scene, scene, layout, args.hand.as_deref(), hand_mode, period_ns)
@@ -404,7 +452,7 @@ fn parse_firmness(text: &str) -> Result<Firmness, String> {
     Firmness::from_name(text).ok_or_else(|| format!("found {text}, allowed: light, usual, firm"))
 }
 
-fn parse_rate(text: &str) -> Result<f64, String> {
+pub(crate) fn parse_rate(text: &str) -> Result<f64, String> {
     parse_number(text, "Hz", 10.0, 20_000.0)
 }
 
@@ -448,7 +496,7 @@ mod tests {
             let Some(AppCommand::Run(args)) = Cli::try_parse_from(words).expect("good words").command else {
                 panic!("not a run");
             };
-            let said = make_rig(&args).expect_err("kinematic").to_string();
+            let said = make_rig(&args, &Settings::default()).expect_err("kinematic").to_string();
             assert!(said.starts_with(given[0]) && said.contains("--hand-mode impedance"), "{said}");
         }
     }

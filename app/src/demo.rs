@@ -7,7 +7,6 @@ use crate::run::{Attach, RunPlan};
 use crate::simulated::SimulatedDevices;
 use io_driver::say::say;
 use shm_abi::client::{self, AttachError};
-use shm_abi::endpoint;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tempfile::TempDir;
@@ -51,9 +50,9 @@ fn default_rig(hand: &Path, period_ns: u64) -> Result<Rig, RigError> {
     Rig::new(file, scene, None, Some(hand), hand_mode, period_ns)
 }
 
-/// Uses a driver that runs and is free; starts one of our own otherwise, and says why.
-pub fn plan(rig: &Rig) -> RunPlan {
-    let socket = endpoint::for_application();
+/// Uses a driver that runs at this socket and is free; starts one of our own otherwise, and says why. The recording goes
+/// to this directory.
+pub fn plan(rig: &Rig, socket: PathBuf, directory: Option<&Path>) -> RunPlan {
     let attach = match client::observe(&socket, "phantom3 looks around") {
         Ok(seen) if seen.driver.read_latest().is_some_and(|frame| frame.lease != 0) => {
             say(format_args!(
@@ -97,12 +96,13 @@ pub fn plan(rig: &Rig) -> RunPlan {
             None
         }
     };
-    RunPlan { clock: None, seconds: Some(SECONDS), record: vec![recording_place()], seed: 0, attach }
+    let record = vec![recording_place(directory)];
+    RunPlan { clock: None, seconds: Some(SECONDS), record, seed: 0, attach }
 }
 
-/// Here, if one may write here, else among the temporary files.
-fn recording_place() -> PathBuf {
-    let here = PathBuf::from(RECORDING);
+/// In the directory that is set, or here, if one may write there, else among the temporary files.
+fn recording_place(directory: Option<&Path>) -> PathBuf {
+    let here = directory.unwrap_or(Path::new("")).join(RECORDING);
     let writable = std::fs::File::options().append(true).create(true).open(&here).is_ok();
     let place = if writable { here } else { std::env::temp_dir().join(RECORDING) };
     std::path::absolute(&place).unwrap_or(place)

@@ -12,9 +12,11 @@
 #![deny(missing_docs)]
 
 pub mod calibrate;
+pub mod check;
 pub mod child;
 pub mod cli;
 pub mod columns;
+pub mod convert;
 pub mod demo;
 pub mod export;
 pub mod fast_loop;
@@ -34,6 +36,7 @@ pub mod rig;
 pub mod row;
 pub mod row_queue;
 pub mod run;
+pub mod settings;
 pub mod simulated;
 pub mod slow;
 pub mod slow_thread;

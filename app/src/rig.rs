@@ -7,15 +7,22 @@ mod material;
 mod models;
 mod moving;
 mod pictures;
+mod problems;
+mod solids;
 
 pub use self::error::RigError;
 use self::material::Unfit;
 use self::models::Models;
+pub use self::moving::Passing;
+pub(crate) use self::moving::in_words;
 use self::pictures::Pictures;
+pub use self::problems::Problems;
+use self::solids::Solids;
 use crate::fast_step::{DeviceFinger, FastStep};
 use crate::mount::Mount;
 use crate::recording::Names;
 use crate::simulated::{SimulatedDevices, base_for_path};
+use haptics::mesh::MeshReport;
 use haptics::passivity::Passivity;
 use haptics::{Algorithm, Entity, Finger, ParameterError};
 use io_driver::config::{
@@ -28,6 +35,7 @@ use io_driver::open::open_devices;
 use io_driver::say::say;
 use io_driver::sim::script::HandScript;
 use nalgebra::{Isometry3, Vector3};
+use physics::Body;
 use shm_abi::segment::ClockMode;
 use std::path::{Path, PathBuf};
 use world::{AlgorithmSpec, Layout, Scene, SceneEntity, SceneFinger, ShapeSpec};
@@ -87,33 +95,51 @@ impl Rig {
         hand_mode: HandMode,
         period_ns: u64,
     ) -> Result<Self, RigError> {
+        let mut problems = Problems::default();
+        let rig = Self::examine(scene_file, scene, layout, hand, hand_mode, period_ns, &mut problems);
+        problems.first_or(rig)
+    }
+
+    /// The same, but all that is wrong goes to `problems`; `None`: there is too much to go on with.
+    pub fn examine(
+        scene_file: &Path,
+        scene: Scene,
+        layout: Option<Layout>,
+        hand: Option<&Path>,
+        hand_mode: HandMode,
+        period_ns: u64,
+        problems: &mut Problems,
+    ) -> Option<Self> {
         let named = match (hand, &scene.hand) {
             (Some(path), _) => Some((path, "--hand".to_owned())),
             (None, Some(path)) => Some((path.as_path(), scene_file.display().to_string())),
             (None, None) => None,
         };
-        let hand = named.map(|(path, named_by)| check_hand(path, &named_by, &scene)).transpose()?;
+        let hand = named.map(|(path, named_by)| check_hand(path, &named_by, &scene)).transpose();
+        let hand = problems.keep(hand);
+        let scene = without_what_no_finger_reaches(scene);
         let mut rig = Self {
             scene_file: scene_file.into(),
-            models: Models::load(&scene)?,
-            pictures: Pictures::load(&scene)?,
+            models: Models::load(&scene, problems),
+            pictures: Pictures::load(&scene, problems),
             scene,
             layout,
             hand_mode,
             bases: Vec::new(),
-            hand,
+            hand: hand.clone().flatten(),
             period_ns,
         };
-        rig.bases = rig.place_bases()?;
-        rig.tell_what_passes(rig.fast_step()?.entities());
+        rig.bases = problems.keep(rig.place_bases())?;
+        let step = rig.assemble(problems);
+        rig.tell_what_passes(step.as_ref().map_or(&[], FastStep::entities));
         if let HandMode::Impedance(simulated) = &rig.hand_mode {
             // What the driver would find wrong is found here, before anything is started, and told in words of what
             // was asked for: the driver knows of files only.
-            simulated.arm()?;
-            simulated.hand()?;
-            open_devices(&rig.driver_config(ClockMode::Virtual))?;
+            problems.keep(simulated.arm());
+            problems.keep(simulated.hand());
+            problems.keep(open_devices(&rig.driver_config(ClockMode::Virtual)));
         }
-        Ok(rig)
+        hand.and(step).map(|_| rig)
     }
 
     /// The same at another tick length (ns): the running driver's.
@@ -171,29 +197,50 @@ impl Rig {
     /// # Errors
     /// If the scene holds something that rendering refuses.
     pub fn fast_step(&self) -> Result<FastStep, RigError> {
-        let entities: Vec<Entity> =
-            self.scene.entities.iter().map(|entity| self.entity(entity)).collect::<Result<_, _>>()?;
+        let mut problems = Problems::default();
+        let step = self.assemble(&mut problems);
+        problems.first_or(step)
+    }
+
+    fn assemble(&self, problems: &mut Problems) -> Option<FastStep> {
+        let mut solids = Solids::default();
+        let entity = |spec: &SceneEntity| {
+            // That its model or picture cannot be had was told when they were loaded.
+            let is_loaded = self.models.has(spec) && self.pictures.has(spec);
+            is_loaded.then(|| problems.keep(self.entity(spec, &mut solids))).flatten()
+        };
+        let entities: Vec<Option<Entity>> = self.scene.entities.iter().map(entity).collect();
+        let passivities: Vec<Option<Option<Passivity>>> =
+            self.scene.fingers.iter().map(|finger| problems.keep(self.passivity(finger))).collect();
+        let effects = problems.keep(self.effects());
+        let entities: Vec<Entity> = entities.into_iter().collect::<Option<_>>()?;
         let entities = self.prepared(entities);
-        let fingers = self.scene.fingers.iter().map(|finger| {
-            let made = Finger::new(finger.radius_m, entities.len().min(MOST_NEAR))
-                .map_err(|source| self.refused(None, format!("finger {}", finger.name), source))?;
-            self.check_felt(&entities, finger)?;
-            let mount = self.mount(finger.device);
-            Ok(DeviceFinger { finger: made, device: finger.device, mount })
-        });
-        let fingers: Vec<DeviceFinger> = fingers.collect::<Result<_, RigError>>()?;
-        let passivities = self.scene.fingers.iter().map(|finger| {
-            let Some(spec) = &finger.passivity else { return Ok(None) };
-            let what = || format!("passivity of finger {}", finger.name);
-            let refused = |source| self.refused(None, what(), source);
-            material::passivity(spec, self.period_ns as f64 / 1e9).map(Some).map_err(refused)
-        });
-        let passivities: Vec<Option<Passivity>> = passivities.collect::<Result<_, RigError>>()?;
-        let (fields, guides) = self.effects()?;
-        let bodies = self.bodies(&entities)?;
-        let step = FastStep::new(fingers, entities, self.period_ns);
-        let step = if bodies.is_empty() { step } else { self.with_objects(step, &bodies)? };
-        Ok(step.with_effects(fields, guides).with_passivities(passivities))
+        let fingers: Vec<Option<DeviceFinger>> =
+            self.scene.fingers.iter().map(|finger| problems.keep(self.finger(finger, &entities))).collect();
+        let bodies: Vec<(usize, Body)> =
+            self.bodies(&entities).filter_map(|body| problems.keep(body)).collect();
+        let (fields, guides) = effects?;
+        if !problems.is_empty() {
+            return None;
+        }
+        let step = FastStep::new(fingers.into_iter().collect::<Option<_>>()?, entities, self.period_ns);
+        let step = if bodies.is_empty() { step } else { problems.keep(self.with_objects(step, &bodies))? };
+        let passivities: Vec<Option<Passivity>> = passivities.into_iter().collect::<Option<_>>()?;
+        Some(step.with_effects(fields, guides).with_passivities(passivities))
+    }
+
+    fn finger(&self, spec: &SceneFinger, entities: &[Entity]) -> Result<DeviceFinger, RigError> {
+        let finger = Finger::new(spec.radius_m, entities.len().min(MOST_NEAR))
+            .map_err(|source| self.refused(None, format!("finger {}", spec.name), source))?;
+        self.check_felt(entities, spec)?;
+        Ok(DeviceFinger { finger, device: spec.device, mount: self.mount(spec.device) })
+    }
+
+    fn passivity(&self, finger: &SceneFinger) -> Result<Option<Passivity>, RigError> {
+        let Some(spec) = &finger.passivity else { return Ok(None) };
+        let what = || format!("passivity of finger {}", finger.name);
+        let refused = |source| self.refused(None, what(), source);
+        material::passivity(spec, self.period_ns as f64 / 1e9).map(Some).map_err(refused)
     }
 
     /// What the recording's columns are called, for devices that tell so much.
@@ -261,12 +308,13 @@ impl Rig {
         }
     }
 
-    fn entity(&self, spec: &SceneEntity) -> Result<Entity, RigError> {
+    fn entity(&self, spec: &SceneEntity, solids: &mut Solids) -> Result<Entity, RigError> {
         let what = || format!("entity {}", spec.name);
-        let refused = |source| self.refused(Some(spec.line), what(), source);
-        let unfit = |unfit| self.unfit(spec.line, what(), unfit);
+        let refused = |source| refused(spec, source);
+        let unfit = |unfit| self.unfit((&spec.file, spec.line), what(), unfit);
         self.check_rendered(spec, what())?;
-        let shape = material::shape(&spec.shape, &self.models, spec.height_map.is_some()).map_err(unfit)?;
+        let shape =
+            material::shape(&spec.shape, &self.models, spec.height_map.is_some(), solids).map_err(unfit)?;
         let friction = material::friction(&spec.friction).map_err(unfit)?;
         let algorithm = material::algorithm(spec.algorithm).map_err(unfit)?;
         let shading = material::shading(spec, &self.models).map_err(unfit)?;
@@ -285,7 +333,8 @@ impl Rig {
             Some(height_map) => entity.with_height_map(height_map),
             None => entity,
         };
-        self.with_surface_effects(entity, spec)
+        let entity = if spec.is_collidable { entity } else { entity.without_collisions() };
+        if spec.is_haptic { self.with_surface_effects(entity, spec) } else { Ok(entity.without_fingers()) }
     }
 
     /// The algorithms to compare with know surfaces, and trees have none of their own.
@@ -298,28 +347,38 @@ impl Rig {
         if !material::is_csg(&spec.shape) {
             return Ok(());
         }
-        Err(RigError::NotRendered { file: self.scene_file.clone(), line: spec.line, what, found })
+        Err(RigError::NotRendered { file: spec.file.to_path_buf(), line: spec.line, what, found })
     }
 
-    /// What balls cannot feel by its equation they feel in triangles.
+    /// What balls cannot feel by its equation they feel in triangles, made once for all forms that are alike.
     fn prepared(&self, entities: Vec<Entity>) -> Vec<Entity> {
-        let prepare = |entity: Entity, radius_m: f64| {
-            if entity.is_felt_by(radius_m) { entity } else { entity.prepared_for(radius_m) }
+        let mut made: Vec<Entity> = Vec::new();
+        let mut prepare = |entity: Entity, radius_m: f64| {
+            if !entity.is_haptic || entity.is_felt_by(radius_m) {
+                return entity;
+            }
+            if let Some(alike) = made.iter().find(|other| other.shape == entity.shape) {
+                return Entity { for_balls: alike.for_balls.clone(), ..entity };
+            }
+            let entity = entity.prepared_for(radius_m);
+            made.push(entity.clone());
+            entity
         };
         let radii = || self.scene.fingers.iter().map(|finger| finger.radius_m);
-        entities.into_iter().map(|entity| radii().fold(entity, prepare)).collect()
+        entities.into_iter().map(|entity| radii().fold(entity, &mut prepare)).collect()
     }
 
     /// A finger would pass through what it cannot feel, without a word.
     fn check_felt(&self, entities: &[Entity], finger: &SceneFinger) -> Result<(), RigError> {
-        let not_felt = entities.iter().position(|entity| !entity.is_felt_by(finger.radius_m));
+        let is_lost = |entity: &Entity| entity.is_haptic && !entity.is_felt_by(finger.radius_m);
+        let not_felt = entities.iter().position(is_lost);
         let Some(index) = not_felt else { return Ok(()) };
         let spec = &self.scene.entities[index];
         let with_cone = entities[index].clone().with_algorithm(Algorithm::FrictionCone);
         // Somebody's own shape may be felt by small balls only.
         let by_smaller = entities[index].is_felt_by(1e-3 * finger.radius_m);
         Err(RigError::NotFelt {
-            file: self.scene_file.clone(),
+            file: spec.file.to_path_buf(),
             line: spec.line,
             finger: finger.name.clone(),
             radius_m: finger.radius_m,
@@ -331,6 +390,11 @@ impl Rig {
                 () => "",
             },
         })
+    }
+
+    /// The meshes, each with its file and what was found in it.
+    pub fn mesh_reports(&self) -> &[(PathBuf, MeshReport)] {
+        self.models.reports()
     }
 
     /// The model and picture files that it is made of.
@@ -347,10 +411,11 @@ impl Rig {
     }
 
     /// Why something that begins in this line of the scene has no counterpart in rendering.
-    fn unfit(&self, line: usize, what: String, unfit: Unfit) -> RigError {
+    fn unfit(&self, (file, line): (&Path, usize), what: String, unfit: Unfit) -> RigError {
+        let file = file.to_path_buf();
         match unfit {
-            Unfit::Refused(source) => self.refused(Some(line), what, source),
-            Unfit::NoSolid(source) => RigError::NoSolid { file: self.scene_file.clone(), line, what, source },
+            Unfit::Refused(source) => RigError::Refused { file, line: Some(line), what, source },
+            Unfit::NoSolid(source) => RigError::NoSolid { file, line, what, source },
             Unfit::NotAvailable(it) => self.not_available(format!("{what}: {it}")),
         }
     }
@@ -362,6 +427,25 @@ impl Rig {
 
 /// A finger feels no more entities at once.
 const MOST_NEAR: usize = 128;
+
+/// Why an entity of the scene is refused.
+fn refused(spec: &SceneEntity, source: ParameterError) -> RigError {
+    let (file, what) = (spec.file.to_path_buf(), format!("entity {}", spec.name));
+    RigError::Refused { file, line: Some(spec.line), what, source }
+}
+
+/// Fingers do not go through doors yet: what lies behind one would be felt from outside. What is only seen is for the
+/// window; it stays where it has a mass, and moves.
+fn without_what_no_finger_reaches(mut scene: Scene) -> Scene {
+    let behind = scene.entities.iter().filter(|entity| entity.within.is_some()).count();
+    if behind > 0 {
+        say(format_args!(
+            "phantom3: {behind} entities behind doors are left out: in this version fingers do not go through doors"
+        ));
+    }
+    scene.entities.retain(|entity| entity.within.is_none() && (entity.is_met() || entity.motion.is_some()));
+    scene
+}
 
 /// Whether contacts turn it: it has a radius, a pad, or something tied to it.
 fn has_torque(finger: &SceneFinger) -> bool {

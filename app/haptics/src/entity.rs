@@ -46,6 +46,10 @@ pub struct Entity {
     pub vibration: Option<Vibration>,
     /// In triangles, for balls to which the shape itself has nothing to offer; see [`Self::prepared_for`].
     pub for_balls: Option<Shape>,
+    /// Whether fingers feel it.
+    pub is_haptic: bool,
+    /// Whether other entities collide with it.
+    pub is_collidable: bool,
 }
 
 impl Entity {
@@ -71,6 +75,8 @@ impl Entity {
             magnetism: None,
             vibration: None,
             for_balls: None,
+            is_haptic: true,
+            is_collidable: true,
         })
     }
 
@@ -113,6 +119,16 @@ impl Entity {
     /// With a surface that hums.
     pub fn with_vibration(self, vibration: Vibration) -> Self {
         Self { vibration: Some(vibration), ..self }
+    }
+
+    /// One that fingers pass through, feeling nothing; other entities may still meet it.
+    pub fn without_fingers(self) -> Self {
+        Self { is_haptic: false, ..self }
+    }
+
+    /// One that other entities pass through; fingers may still feel it.
+    pub fn without_collisions(self) -> Self {
+        Self { is_collidable: false, ..self }
     }
 
     /// With triangles beside its shape where a finger of this radius could not feel it otherwise: a torus whose hole is too

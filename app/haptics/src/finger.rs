@@ -165,6 +165,10 @@ impl Finger {
         for at in 0..self.slots.len() {
             let (index, slot) = self.slots.at_mut(at);
             let Some(entity) = entities.get(index) else { continue };
+            if !entity.is_haptic {
+                slot.vacate();
+                continue;
+            }
             if let Some(contact) = slot.step(index, entity, &sweep) {
                 total.add(contact);
                 if self.radius_m > 0.0 {

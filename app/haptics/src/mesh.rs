@@ -103,6 +103,12 @@ impl Mesh {
         &self.vertices
     }
 
+    /// The same, felt from both sides though it may be closed: a room, felt by whoever is in it.
+    #[must_use]
+    pub fn into_sheet(self) -> Self {
+        Self { sides: Sides::Sheet, ..self }
+    }
+
     /// Whether it has an inside.
     pub fn sides(&self) -> Sides {
         self.sides

@@ -327,8 +327,9 @@ impl Manipulation {
             }
         }
         for (at, pull) in pulls.iter_mut().enumerate() {
-            // What nobody steps here is as good as fixed.
-            if self.roster.place_of_entity(pull.entity).is_some() {
+            // What somebody else steps is as good as fixed.
+            let body = self.body_of(pull.entity);
+            if body.is_none_or(|body| self.roster.standing(body) != Standing::Elsewhere) {
                 let row = pull_rows.get(at).copied().flatten();
                 pull.force_on_user_W = row.map_or(Vector3::zeros(), |row| -self.rows[row].force_W);
             }

@@ -105,7 +105,7 @@ impl Pairs {
     fn begin(&mut self, body: usize, entity: usize, who: &Who<'_>) {
         let own = who.entities[body];
         let other = who.bodies[entity].map(|other| other as usize);
-        if other == Some(body) {
+        if other == Some(body) || !(who.all[own].is_collidable && who.all[entity].is_collidable) {
             return;
         }
         let [first, second] = match other {

@@ -82,6 +82,10 @@ pub struct Recorded {
 pub struct Recorder {
     path: PathBuf,
     rows: RowSender,
+    /// The bodies as the other end knows them; `None`: it does not know any.
+    known: Vec<Option<BodyRow>>,
+    /// Those that are not so, by their numbers.
+    changed: Vec<(u32, BodyRow)>,
     when_full: WhenFull,
     lost: u64,
     /// Of these, those after the row that was sent last.
@@ -121,7 +125,8 @@ impl Recorder {
             .name("recorder".into())
             .spawn(move || writer.run(receiver))
             .map_err(|source| RecordingError::Create { file: path.into(), source })?;
-        Ok(Self { path: path.into(), rows, when_full, lost: 0, untold: 0, shared, thread })
+        let (known, changed) = (vec![None; bodies], Vec::with_capacity(bodies));
+        Ok(Self { path: path.into(), rows, known, changed, when_full, lost: 0, untold: 0, shared, thread })
     }
 
     /// Hands a row over.
@@ -130,7 +135,10 @@ impl Recorder {
         if !self.rows.is_full() {
             self.tell_gap(row.run_tick);
         }
-        while !self.rows.send(*row, bodies) {
+        self.changed.clear();
+        let numbered = (0..).zip(bodies.iter().copied()).zip(&self.known);
+        self.changed.extend(numbered.filter(|((_, is), was)| Some(*is) != **was).map(|(body, _)| body));
+        while !self.rows.send(*row, &self.changed) {
             if self.when_full == WhenFull::Drop || self.thread.is_finished() {
                 self.lost += 1;
                 self.untold += 1;
@@ -138,6 +146,9 @@ impl Recorder {
             }
             self.thread.thread().unpark();
             std::thread::sleep(Duration::from_micros(200));
+        }
+        for (known, body) in self.known.iter_mut().zip(bodies) {
+            *known = Some(*body);
         }
     }
 

@@ -12,7 +12,8 @@ impl Rig {
         let scene = &self.scene;
         let fields = scene.fields.iter().enumerate().map(|(index, spec)| {
             let what = format!("field[{index}]");
-            field(spec, self.limits(spec.device_mass_kg)).map_err(|unfit| self.unfit(spec.line, what, unfit))
+            field(spec, self.limits(spec.device_mass_kg))
+                .map_err(|unfit| self.unfit((&self.scene_file, spec.line), what, unfit))
         });
         let guides = scene.guides.iter().enumerate().map(|(index, spec)| {
             let refused = |source| self.refused(Some(spec.line), format!("guide[{index}]"), source);
@@ -27,12 +28,12 @@ impl Rig {
         mut entity: Entity,
         spec: &SceneEntity,
     ) -> Result<Entity, RigError> {
-        let refused = |source| self.refused(Some(spec.line), format!("entity {}", spec.name), source);
+        let refused = |source| super::refused(spec, source);
         let limits = self.limits(Limits::DEFAULT_DEVICE_MASS_KG).map_err(refused)?;
         if let Some(magnetism) = &spec.magnetism {
             if !Magnetism::suits(&entity.shape) {
                 return Err(RigError::NoMagnet {
-                    file: self.scene_file.clone(),
+                    file: spec.file.to_path_buf(),
                     line: spec.line,
                     entity: spec.name.clone(),
                     kind: spec.shape.kind(),

@@ -195,6 +195,31 @@ pub enum RigError {
     },
 }
 
+impl RigError {
+    /// Where in a scene's or layout's file it is, if it has one place there.
+    pub fn location(&self) -> Option<Location> {
+        let at = |file: &PathBuf, line: usize, key: &str| {
+            Some(Location { file: file.clone(), line, key: key.into() })
+        };
+        match self {
+            Self::Scene(error) => error.location().cloned(),
+            Self::Refused { file, line: Some(line), what, .. } => at(file, *line, what),
+            Self::NoSolid { file, line, what, .. }
+            | Self::NotRendered { file, line, what, .. }
+            | Self::NoBody { file, line, what, .. } => at(file, *line, what),
+            Self::NoMagnet { file, line, entity, .. } | Self::NotFelt { file, line, entity, .. } => {
+                at(file, *line, entity)
+            }
+            Self::Model { at, .. }
+            | Self::Mesh { at, .. }
+            | Self::Picture { at, .. }
+            | Self::HeightMap { at, .. }
+            | Self::Patches { at, .. } => Some((**at).clone()),
+            _ => None,
+        }
+    }
+}
+
 fn on_line(line: Option<usize>) -> String {
     line.map_or_else(String::new, |line| format!(":{line}"))
 }

@@ -1,6 +1,7 @@
 //! From what a scene says of an entity to what rendering takes: shape, friction, algorithm, shading.
 
 use super::models::Models;
+use super::solids::Solids;
 use haptics::mesh::Mesh;
 use haptics::passivity::{Passivity, PassivitySpec};
 use haptics::{
@@ -54,7 +55,12 @@ impl From<CsgError> for Unfit {
 }
 
 /// A shape; meshes are those that were loaded.
-pub(super) fn shape(spec: &ShapeSpec, models: &Models, has_picture: bool) -> Result<Shape, Unfit> {
+pub(super) fn shape(
+    spec: &ShapeSpec,
+    models: &Models,
+    has_picture: bool,
+    solids: &mut Solids,
+) -> Result<Shape, Unfit> {
     match spec {
         ShapeSpec::Mesh(mesh) => match models.mesh(mesh, has_picture) {
             Some(mesh) => Ok(Arc::clone(mesh).into()),
@@ -64,13 +70,16 @@ pub(super) fn shape(spec: &ShapeSpec, models: &Models, has_picture: bool) -> Res
             Some(nurbs) => Ok(Arc::clone(nurbs).into()),
             None => Err(Unfit::NotAvailable(format!("shape {spec:?}"))),
         },
-        spec if is_csg(spec) => {
-            // As the only part of a tree it may be scaled like any other.
-            let tree = CsgTree::union([part(spec, Isometry3::identity())?]);
-            Ok(Arc::new(Csg::build(&tree)?).into())
-        }
+        spec if is_csg(spec) => Ok(solids.solid(spec)?.into()),
         spec => Ok(Shape::Form(form(spec)?)),
     }
+}
+
+/// The solid of a shape that is joined of others.
+pub(super) fn csg(spec: &ShapeSpec) -> Result<Csg, Unfit> {
+    // As the only part of a tree it may be scaled like any other.
+    let tree = CsgTree::union([part(spec, Isometry3::identity())?]);
+    Ok(Csg::build(&tree)?)
 }
 
 /// Whether a shape is joined of others, scaled or not.

@@ -2,17 +2,16 @@
 //!
 //! What was repaired is told once, what cannot be used is refused with the place in the scene and in the model.
 
-use super::{RigError, material};
+use super::{Problems, RigError, material};
 use haptics::mesh::{CornerUv, Finding, Mesh, MeshError, MeshReport, TriangleSoup};
 use haptics::{Nurbs, Shading};
 use io_driver::say::say;
 use nalgebra::Vector3;
-use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use world::model::{self, Format, ModelError};
-use world::{MeshSpec, Scene, ShadingSpec, ShapeSpec};
+use world::{MeshSpec, Scene, SceneEntity, ShadingSpec, ShapeSpec};
 
 /// From this size on it takes so long that somebody wonders: a third of a million triangles.
 const WORTH_A_LINE_BYTES: usize = 16 << 20;
@@ -23,29 +22,62 @@ pub(super) struct Models {
     meshes: BTreeMap<Key, Arc<Mesh>>,
     shadings: Vec<(Key, ShadingSpec, Shading)>,
     nurbs: BTreeMap<Key, Arc<Nurbs>>,
+    reports: Vec<(PathBuf, MeshReport)>,
 }
 
-/// A file, the bits of the factors along its axes, and whether a picture lies on it.
-type Key = (PathBuf, [u64; 3], bool);
+/// A file, the bits of the factors along its axes, whether a picture lies on it, and whether it is felt from both sides.
+type Key = (PathBuf, [u64; 3], bool, bool);
 
 impl Models {
-    /// Loads every mesh that the scene's entities use.
-    pub(super) fn load(scene: &Scene) -> Result<Self, RigError> {
+    /// Loads every mesh that the scene's entities use; those that cannot be had are noted.
+    pub(super) fn load(scene: &Scene, problems: &mut Problems) -> Self {
         let mut models = Self::default();
+        let mut refused = BTreeSet::new();
         for entity in &scene.entities {
-            if let ShapeSpec::Nurbs(spec) = &entity.shape
-                && let Entry::Vacant(place) = models.nurbs.entry(key_of(spec, false))
-            {
-                place.insert(Arc::new(join(spec)?));
-            }
-            let ShapeSpec::Mesh(spec) = &entity.shape else { continue };
             let has_picture = entity.height_map.is_some();
-            if let Entry::Vacant(place) = models.meshes.entry(key_of(spec, has_picture)) {
-                place.insert(Arc::new(build(spec, has_picture)?));
+            let (ShapeSpec::Nurbs(spec) | ShapeSpec::Mesh(spec)) = &entity.shape else { continue };
+            let key = key_of(spec, has_picture && matches!(entity.shape, ShapeSpec::Mesh(_)));
+            if refused.contains(&key) {
+                continue;
             }
-            models.shade(key_of(spec, has_picture), entity.shading);
+            if let Err(problem) = models.add(&entity.shape, &key) {
+                problems.note(problem);
+                refused.insert(key);
+            } else if matches!(entity.shape, ShapeSpec::Mesh(_)) {
+                models.shade(key, entity.shading);
+            }
         }
-        Ok(models)
+        models
+    }
+
+    /// Loads what is not there yet.
+    fn add(&mut self, shape: &ShapeSpec, key: &Key) -> Result<(), RigError> {
+        match shape {
+            ShapeSpec::Nurbs(spec) if !self.nurbs.contains_key(key) => {
+                self.nurbs.insert(key.clone(), Arc::new(join(spec)?));
+            }
+            ShapeSpec::Mesh(spec) if !self.meshes.contains_key(key) => {
+                let (mesh, report) = build(spec, key.2)?;
+                self.reports.push((spec.file.clone(), report));
+                self.meshes.insert(key.clone(), Arc::new(mesh));
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Whether the model of an entity is there, if it has one.
+    pub(super) fn has(&self, entity: &SceneEntity) -> bool {
+        match &entity.shape {
+            ShapeSpec::Mesh(spec) => self.mesh(spec, entity.height_map.is_some()).is_some(),
+            ShapeSpec::Nurbs(spec) => self.nurbs(spec).is_some(),
+            _ => true,
+        }
+    }
+
+    /// The meshes, each with its file and what was found in it, in the order in which they were loaded.
+    pub(crate) fn reports(&self) -> &[(PathBuf, MeshReport)] {
+        &self.reports
     }
 
     /// Shades a mesh, once for all entities that are shaded alike.
@@ -86,10 +118,10 @@ impl Models {
 }
 
 fn key_of(spec: &MeshSpec, has_picture: bool) -> Key {
-    (spec.file.clone(), spec.scale.map(f64::to_bits), has_picture)
+    (spec.file.clone(), spec.scale.map(f64::to_bits), has_picture, spec.hollow)
 }
 
-fn build(spec: &MeshSpec, has_picture: bool) -> Result<Mesh, RigError> {
+fn build(spec: &MeshSpec, has_picture: bool) -> Result<(Mesh, MeshReport), RigError> {
     let file = &spec.file;
     let (soup, uv) = read(file, has_picture).map_err(|source| RigError::Model {
         at: Box::new(spec.at.clone()),
@@ -108,7 +140,7 @@ fn build(spec: &MeshSpec, has_picture: bool) -> Result<Mesh, RigError> {
         source: Box::new(source),
     })?;
     tell(file, &report);
-    Ok(mesh)
+    Ok((if spec.hollow { mesh.into_sheet() } else { mesh }, report))
 }
 
 /// Reads and joins the patches of a file.

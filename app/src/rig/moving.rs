@@ -1,8 +1,8 @@
 //! From what a scene says of entities that move to bodies.
 
-use haptics::{Entity, ParameterError};
+use haptics::{Entity, ParameterError, Shape};
 use io_driver::say::say;
-use physics::collide::{can_move, is_collidable};
+use physics::collide::{self, can_move, is_collidable};
 use physics::{
     Attachment, Body, BodyError, FingerSettings, HeldOrientation, Integrator, MassProperties, Response,
     Settings, Sleep, SoftFinger, TorsionModel,
@@ -24,16 +24,19 @@ impl Rig {
     }
 
     /// The bodies of these entities, with their numbers.
-    pub(super) fn bodies(&self, entities: &[Entity]) -> Result<Vec<(usize, Body)>, RigError> {
+    pub(super) fn bodies(
+        &self,
+        entities: &[Entity],
+    ) -> impl Iterator<Item = Result<(usize, Body), RigError>> {
         let body = |(index, spec, motion): (usize, &SceneEntity, &MotionSpec)| {
             let body = if can_move(&entities[index].shape) {
                 body(&entities[index], motion)
             } else {
                 Err(BodyError::NoContactPoints { shape: spec.shape.kind() })
             };
-            Ok((index, body.map_err(|source| self.no_body(spec, source))?))
+            Ok((index, body.map_err(|source| no_body(spec, source))?))
         };
-        self.moving().map(body).collect()
+        self.moving().map(body)
     }
 
     pub(super) fn with_objects(
@@ -58,7 +61,7 @@ impl Rig {
             ..Settings::default()
         };
         // Which entity it is, is not told; the first that moves is named.
-        let first = |source| self.no_body(&self.scene.entities[bodies[0].0], source);
+        let first = |source| no_body(&self.scene.entities[bodies[0].0], source);
         let hand: Vec<HandFinger> =
             self.scene.fingers.iter().map(|f| self.hand_finger(f)).collect::<Result<_, _>>()?;
         step.with_objects(bodies, settings, ListSettings::default(), &hand, dynamics.grasp_quality)
@@ -75,32 +78,88 @@ impl Rig {
 
     /// Says which entities pass through each other, because nobody finds where they touch.
     pub(super) fn tell_what_passes(&self, entities: &[Entity]) {
-        for (a, ..) in self.moving() {
-            let passes = |b: usize| {
-                let is_body = self.scene.entities[b].motion.is_some();
-                let [a, b] = [a, b].map(|at| &entities[at].shape);
-                !(is_collidable(a, b) || is_body && is_collidable(b, a))
-            };
-            let through: Vec<String> = (0..entities.len())
-                .filter(|&b| b != a && passes(b))
-                .map(|b| format!("{} ({})", self.scene.entities[b].name, self.scene.entities[b].shape.kind()))
-                .collect();
-            if !through.is_empty() {
-                let spec = &self.scene.entities[a];
-                say(format_args!(
-                    "phantom3: {} ({}) passes through {}: contact points between such shapes are not found",
-                    spec.name,
-                    spec.shape.kind(),
-                    through.join(", ")
-                ));
-            }
+        for Passing { kind, names, through } in self.what_passes(entities) {
+            say(format_args!(
+                "phantom3: {names} ({kind}) passes through {}: contact points between such shapes are not found",
+                through.join(", ")
+            ));
         }
     }
 
-    fn no_body(&self, spec: &SceneEntity, source: BodyError) -> RigError {
-        let what = format!("entity {}", spec.name);
-        RigError::NoBody { file: self.scene_file.clone(), line: spec.line, what, source }
+    /// The same as data. Whether two can meet is a matter of their kinds (and of a mesh whether it is closed), so that
+    /// ten thousand entities are some dozen questions.
+    pub(crate) fn what_passes(&self, entities: &[Entity]) -> Vec<Passing> {
+        let mut kinds: Vec<Kind<'_>> = Vec::new();
+        for (index, (entity, spec)) in entities.iter().zip(&self.scene.entities).enumerate() {
+            if entity.is_collidable {
+                let is_body = spec.motion.is_some();
+                let key = (collide::name(&entity.shape), can_move(&entity.shape), is_body);
+                match kinds.iter_mut().find(|kind| kind.key == key) {
+                    Some(kind) => kind.members.push(index),
+                    None => kinds.push(Kind { key, shape: &entity.shape, members: vec![index] }),
+                }
+            }
+        }
+        let passes = |a: &Kind<'_>, b: &Kind<'_>| {
+            let alone = std::ptr::eq(a, b) && a.members.len() == 1;
+            !alone && !(is_collidable(a.shape, b.shape) || b.key.2 && is_collidable(b.shape, a.shape))
+        };
+        let passing = kinds.iter().filter(|a| a.key.2).filter_map(|a| {
+            let through: Vec<String> =
+                kinds.iter().filter(|b| passes(a, b)).map(|b| self.listed(&b.members)).collect();
+            let kind = self.scene.entities[a.members[0]].shape.kind();
+            let names = in_words(&self.names_of(&a.members).collect::<Vec<_>>());
+            (!through.is_empty()).then_some(Passing { kind, names, through })
+        });
+        passing.collect()
     }
+
+    /// Names and kinds of a few, and how many more there are.
+    fn listed(&self, members: &[usize]) -> String {
+        let kind = self.scene.entities[members[0]].shape.kind();
+        let names = self.names_of(members).map(|name| format!("{name} ({kind})"));
+        in_words(&names.collect::<Vec<_>>())
+    }
+
+    fn names_of(&self, members: &[usize]) -> impl Iterator<Item = &str> {
+        members.iter().map(|&index| self.scene.entities[index].name.as_str())
+    }
+}
+
+/// A few names, and how many more there are.
+pub(crate) fn in_words<S: AsRef<str>>(names: &[S]) -> String {
+    let few: Vec<&str> = names.iter().take(MOST_NAMED).map(AsRef::as_ref).collect();
+    match names.len().saturating_sub(MOST_NAMED) {
+        0 => few.join(", "),
+        more => format!("{} and {more} more", few.join(", ")),
+    }
+}
+
+/// Entities that other ones let through.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Passing {
+    /// Of which shape they are.
+    pub kind: &'static str,
+    /// Who they are.
+    pub names: String,
+    /// Through whom they pass, with their kinds.
+    pub through: Vec<String>,
+}
+
+/// Entities that are all alike for the question whether two can meet.
+struct Kind<'e> {
+    /// The shape's name, whether it could move, whether it does.
+    key: (&'static str, bool, bool),
+    shape: &'e Shape,
+    members: Vec<usize>,
+}
+
+/// More names are no help.
+const MOST_NAMED: usize = 8;
+
+fn no_body(spec: &SceneEntity, source: BodyError) -> RigError {
+    let what = format!("entity {}", spec.name);
+    RigError::NoBody { file: spec.file.to_path_buf(), line: spec.line, what, source }
 }
 
 fn soft_finger(spec: &SoftSpec) -> Result<SoftFinger, ParameterError> {

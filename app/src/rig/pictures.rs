@@ -1,13 +1,12 @@
 //! The pictures of a scene: each file is read once for all entities that it lies on.
 
-use super::RigError;
+use super::{Problems, RigError};
 use haptics::{HeightGrid, HeightMap, HeightMapError, Shape};
-use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 use world::picture::load_png;
-use world::{HeightMapSpec, Scene};
+use world::{HeightMapSpec, Scene, SceneEntity};
 
 /// Heights that are ready to be felt.
 #[derive(Debug, Clone, Default)]
@@ -16,15 +15,25 @@ pub(super) struct Pictures {
 }
 
 impl Pictures {
-    /// Loads every picture of the scene's height maps.
-    pub(super) fn load(scene: &Scene) -> Result<Self, RigError> {
+    /// Loads every picture of the scene's height maps; those that cannot be had are noted.
+    pub(super) fn load(scene: &Scene, problems: &mut Problems) -> Self {
         let mut pictures = Self::default();
+        let mut refused = BTreeSet::new();
         for spec in scene.entities.iter().filter_map(|entity| entity.height_map.as_ref()) {
-            if let Entry::Vacant(place) = pictures.grids.entry(spec.file.clone()) {
-                place.insert(Arc::new(load(spec)?));
+            if pictures.grids.contains_key(&spec.file) || refused.contains(&spec.file) {
+                continue;
             }
+            match problems.keep(load(spec)) {
+                Some(grid) => pictures.grids.insert(spec.file.clone(), Arc::new(grid)).is_none(),
+                None => refused.insert(spec.file.clone()),
+            };
         }
-        Ok(pictures)
+        pictures
+    }
+
+    /// Whether the picture of an entity is there, if it has one.
+    pub(super) fn has(&self, entity: &SceneEntity) -> bool {
+        entity.height_map.as_ref().is_none_or(|spec| self.grids.contains_key(&spec.file))
     }
 
     /// A picture that was loaded, on this shape.

@@ -50,6 +50,16 @@ impl<'d> Document<'d> {
         self.lines.line(offset)
     }
 
+    /// Another place, for a reader who is in this file: `on line 3`, or `in room.toml:3`.
+    pub(crate) fn seen_from_here(&self, other: &Document<'_>, offset: usize) -> String {
+        let line = other.line(offset);
+        if other.file == self.file {
+            format!("on line {line}")
+        } else {
+            format!("in {}:{line}", other.file.display())
+        }
+    }
+
     pub(crate) fn location(&self, offset: usize, key: String) -> Box<Location> {
         Box::new(Location { file: self.file.into(), line: self.line(offset), key })
     }

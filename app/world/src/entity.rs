@@ -1,28 +1,38 @@
 //! An entity of a scene: a shape somewhere in the world, and how it feels.
 
-use nalgebra::Isometry3;
+use std::path::Path;
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Translation3, Vector3};
 
 use crate::dynamics::ResponseSpec;
 use crate::effects::{MagnetismSpec, VibrationSpec};
 use crate::error::SceneError;
 use crate::friction::FrictionSpec;
+use crate::grid::Grid;
 use crate::height_map::HeightMapSpec;
 use crate::material::read_material;
 use crate::motion::MotionSpec;
-use crate::names::Names;
+use crate::names::{Names, name_of};
 use crate::pose::read_pose;
+use crate::problems::Problems;
 use crate::reader::{Bound, Table};
 use crate::shading::ShadingSpec;
 use crate::shape::ShapeSpec;
+use crate::visual::VisualSpec;
 use crate::vocabulary::Vocabulary;
 
-/// One `[[entity]]`: fixed in the world, or with a mass.
+/// One `[[entity]]`, or one of its grid: fixed in the world, or with a mass.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneEntity {
     /// Unique among the entities; default e0, e1, ... by position in the list.
     pub name: String,
-    /// Where its `[[entity]]` stands in the file, for messages; counted from 1.
+    /// The file that its `[[entity]]` stands in, for messages.
+    pub file: Arc<Path>,
+    /// Where in that file; counted from 1.
     pub line: usize,
+    /// What it is in the scene.
+    pub kind: EntityKind,
     /// In the entity's frame B.
     pub shape: ShapeSpec,
     /// `X_WB`, the pose of the entity's frame in the world; default identity.
@@ -49,6 +59,23 @@ pub struct SceneEntity {
     pub height_map: Option<HeightMapSpec>,
     /// How it moves; default it is fixed.
     pub motion: Option<MotionSpec>,
+    /// Whether fingers feel it; default yes.
+    pub is_haptic: bool,
+    /// Whether other entities collide with it; default yes.
+    pub is_collidable: bool,
+    /// What is seen of it; default what is felt.
+    pub visuals: Vec<VisualSpec>,
+    /// The environment behind whose door it is; default in the world outside.
+    pub within: Option<String>,
+}
+
+/// What an entity is in the scene (Melder 7.2.6).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EntityKind {
+    /// A game object: one `[[entity]]`.
+    Object,
+    /// A part of an `[[environment]]`, which never moves.
+    Environment,
 }
 
 /// What works out the force of contacts with an entity.
@@ -69,40 +96,115 @@ impl SceneEntity {
     /// device renders stably at 1 kHz with a tick of delay.
     pub const DEFAULT_STIFFNESS_N_PER_M: f64 = 1000.0;
 
-    /// Reads the `[[entity]]` at position `i` of the list.
+    /// Reads the `[[entity]]` at position `i` of the list, laid over its template; a grid makes many of it.
+    pub(crate) fn read_all<'d>(
+        table: &Table<'d>,
+        i: usize,
+        names: &mut Names<'d>,
+        response: ResponseSpec,
+        problems: &mut Problems,
+    ) -> Vec<Self> {
+        problems.keys(table, &KEYS);
+        let Some(grid) = problems.keep(Grid::read(table)) else { return Vec::new() };
+        let Some(grid) = grid else {
+            let name = problems.keep(names.claim(table, format!("e{i}")));
+            return Self::read(table, name.unwrap_or_default(), None, response, problems)
+                .into_iter()
+                .collect();
+        };
+        let base = problems.keep(name_of(table)).flatten().unwrap_or_else(|| format!("e{i}"));
+        let Some(first) = Self::read(table, base, None, response, problems) else { return Vec::new() };
+        let mut item = |(place, offset_m): (String, Vector3<f64>)| {
+            let name = format!("{}{place}", first.name);
+            let name = problems.keep(names.claim_made(table, name, " (of the grid)"))?;
+            let pose = Translation3::from(offset_m) * first.pose;
+            Some(Self { name, pose, ..first.clone() })
+        };
+        // One refusal says it all.
+        grid.places().map_while(&mut item).collect()
+    }
+
+    /// Reads what a table says of an entity: all of it, or all but the shape and where that is.
     pub(crate) fn read(
         table: &Table<'_>,
-        i: usize,
-        names: &mut Names,
+        name: String,
+        given: Option<(ShapeSpec, Isometry3<f64>)>,
         response: ResponseSpec,
-    ) -> Result<Self, SceneError> {
-        table.check_keys(&KEYS)?;
-        let material = read_material(table)?;
-        let stiffness_default =
-            material.map_or(Self::DEFAULT_STIFFNESS_N_PER_M, |made_of| made_of.stiffness_n_per_m);
-        let motion = MotionSpec::read(table, material)?;
-        let usual_damping = if motion.is_some() { MotionSpec::DEFAULT_DAMPING_N_S_PER_M } else { 0.0 };
-        let damping_default = material.map_or(usual_damping, |made_of| made_of.damping_n_s_per_m);
-        let name = names.claim(table, format!("e{i}"))?;
-        let shape = ShapeSpec::read(table)?;
-        Ok(Self {
+        problems: &mut Problems,
+    ) -> Option<Self> {
+        let made_of = problems.keep(read_material(table)).flatten();
+        let motion = problems.keep(MotionSpec::read(table, made_of));
+        let usual_damping = match motion {
+            Some(Some(_)) => MotionSpec::DEFAULT_DAMPING_N_S_PER_M,
+            _ => 0.0,
+        };
+        let damping = made_of.map_or(usual_damping, |made_of| made_of.damping_n_s_per_m);
+        let stiffness = made_of.map_or(Self::DEFAULT_STIFFNESS_N_PER_M, |made_of| made_of.stiffness_n_per_m);
+        let kind = if given.is_some() { EntityKind::Environment } else { EntityKind::Object };
+        let (shape, pose) = match given {
+            Some((shape, pose)) => (Some(shape), Some(pose)),
+            None => (problems.keep(ShapeSpec::read(table)), problems.keep(read_pose(table))),
+        };
+        let stiffness = table.number_or("stiffness_n_per_m", Bound::Positive, stiffness);
+        let damping = table.number_or("damping_n_s_per_m", Bound::NotNegative, damping);
+        let truth = |key: &str| table.get(key).map_or(Ok(true), |value| value.truth());
+        let (stiffness_n_per_m, damping_n_s_per_m) = (problems.keep(stiffness), problems.keep(damping));
+        let friction = problems.keep(FrictionSpec::read(table, made_of));
+        let restitution = problems.keep(response.read_restitution(table));
+        let algorithm = problems.keep(AlgorithmSpec::read(table));
+        let magnetism = problems.keep(MagnetismSpec::read(table));
+        let vibration = problems.keep(VibrationSpec::read(table));
+        let of_shape = shape.as_ref().map(|shape| {
+            let shading = problems.keep(ShadingSpec::read(table, shape));
+            (shading, problems.keep(HeightMapSpec::read(table, shape)))
+        });
+        let (is_haptic, is_collidable) = (problems.keep(truth("haptic")), problems.keep(truth("collidable")));
+        let visuals = problems.keep(VisualSpec::read_all(table));
+        let within = problems.keep(read_within(table));
+        let (shading, height_map) = of_shape?;
+        Some(Self {
             name,
+            file: table.document().file().into(),
             line: table.document().line(table.offset()),
-            pose: read_pose(table)?,
-            stiffness_n_per_m: table.number_or("stiffness_n_per_m", Bound::Positive, stiffness_default)?,
-            damping_n_s_per_m: table.number_or("damping_n_s_per_m", Bound::NotNegative, damping_default)?,
-            friction: FrictionSpec::read(table, material)?,
-            restitution: response.read_restitution(table)?,
-            algorithm: AlgorithmSpec::read(table)?,
-            material: material.map(|made_of| made_of.name),
-            magnetism: MagnetismSpec::read(table)?,
-            vibration: VibrationSpec::read(table)?,
-            shading: ShadingSpec::read(table, &shape)?,
-            height_map: HeightMapSpec::read(table, &shape)?,
-            motion,
-            shape,
+            kind,
+            shape: shape?,
+            pose: pose?,
+            stiffness_n_per_m: stiffness_n_per_m?,
+            damping_n_s_per_m: damping_n_s_per_m?,
+            friction: friction?,
+            restitution: restitution?,
+            algorithm: algorithm?,
+            material: made_of.map(|made_of| made_of.name),
+            magnetism: magnetism?,
+            vibration: vibration?,
+            shading: shading?,
+            height_map: height_map?,
+            motion: motion?,
+            is_haptic: is_haptic?,
+            is_collidable: is_collidable?,
+            visuals: visuals?,
+            within: within?,
         })
     }
+
+    /// Whether fingers or other entities meet it: what is only seen is of no matter to a run without a window.
+    pub fn is_met(&self) -> bool {
+        self.is_haptic || self.is_collidable
+    }
+
+    /// Checks a template, which may leave out the shape.
+    pub(crate) fn check_template(table: &Table<'_>, response: ResponseSpec, problems: &mut Problems) {
+        problems.keys(table, &KEYS);
+        problems.keep(Grid::read(table));
+        if table.get("shape").is_some() {
+            Self::read(table, String::new(), None, response, problems);
+        }
+    }
+}
+
+fn read_within(table: &Table<'_>) -> Result<Option<String>, SceneError> {
+    let Some(value) = table.get("within") else { return Ok(None) };
+    value.text("the name of an [[environment]] with a door").map(|name| Some(name.to_owned()))
 }
 
 impl AlgorithmSpec {
@@ -143,6 +245,12 @@ const KEYS: Vocabulary = Vocabulary {
         "angular_velocity_rad_s",
         "rotation_locked",
         "restitution",
+        "haptic",
+        "collidable",
+        "visual",
+        "template",
+        "grid",
+        "within",
     ],
     later: &[],
 };

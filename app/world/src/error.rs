@@ -209,14 +209,68 @@ pub enum SceneError {
         limit_bytes: usize,
     },
     /// A name or device index that was already taken.
-    #[error("{at}: found {found}, already taken on line {first_line}; allowed: a value used only once")]
+    #[error("{at}: found {found}, already taken {first}; allowed: a value used only once")]
     Duplicate {
         /// Where the second one stands.
         at: Box<Location>,
         /// The value, and whether it is a default.
         found: String,
-        /// Line of the first one.
-        first_line: usize,
+        /// Where the first one stands: `on line 3`, or `in room.toml:3`.
+        first: String,
+    },
+    /// A name that nothing has.
+    #[error("{at}: found {found}; allowed: {allowed}")]
+    NoSuchName {
+        /// Where it stands.
+        at: Box<Location>,
+        /// The name, and perhaps the one that was meant.
+        found: String,
+        /// The names that there are.
+        allowed: String,
+    },
+    /// Templates that build on each other without end.
+    #[error(
+        "{at}: found templates that build on each other in a circle, or more than {limit} deep; allowed: at most {limit}"
+    )]
+    TemplatesTooDeep {
+        /// Where the template that is too much is named.
+        at: Box<Location>,
+        /// How many there may be.
+        limit: usize,
+    },
+    /// An included file that cannot be read.
+    #[error("{at}: {source}")]
+    Included {
+        /// Where it is included.
+        at: Box<Location>,
+        /// Why; names the file.
+        source: Box<SceneError>,
+    },
+    /// A file that is a part of the scene already.
+    #[error("{at}: found {}, which is {first}; allowed: each file once, since two things alike are two entities of a template", file.display())]
+    IncludedTwice {
+        /// Where it is included again.
+        at: Box<Location>,
+        /// The file.
+        file: PathBuf,
+        /// Where it came from: `the scene itself`, or who included it.
+        first: String,
+    },
+    /// Files that include each other too deep.
+    #[error("{at}: found a file included more than {limit} deep; allowed: at most {limit}")]
+    IncludedTooDeep {
+        /// Where the file that is too much is included.
+        at: Box<Location>,
+        /// How deep it may be.
+        limit: usize,
+    },
+    /// A key that only the scene's own file can have.
+    #[error("{at}: found in an included file, but it is for the scene's own file; allowed here: {allowed}")]
+    OnlyInScene {
+        /// Where it stands.
+        at: Box<Location>,
+        /// What may stand there.
+        allowed: String,
     },
     /// More list entries than there can be.
     #[error("{at}: found {found} entries; allowed: at most {limit}")]
@@ -236,6 +290,36 @@ pub enum SceneError {
         /// How many there may be.
         limit: usize,
     },
+}
+
+impl SceneError {
+    /// Its place, if it has one key in one file.
+    pub fn location(&self) -> Option<&Location> {
+        match self {
+            Self::UnknownKey { at, .. }
+            | Self::KeyNotAvailable { at, .. }
+            | Self::UnknownKind { at, .. }
+            | Self::KindNotAvailable { at, .. }
+            | Self::MissingKey { at, .. }
+            | Self::WrongType { at, .. }
+            | Self::NotFinite { at, .. }
+            | Self::OutOfRange { at, .. }
+            | Self::NoDirection { at }
+            | Self::NotARotation { at, .. }
+            | Self::NotAPlacement { at, .. }
+            | Self::MatrixAndOrientation { at }
+            | Self::BadName { at, .. }
+            | Self::Duplicate { at, .. }
+            | Self::NoSuchName { at, .. }
+            | Self::TemplatesTooDeep { at, .. }
+            | Self::Included { at, .. }
+            | Self::IncludedTwice { at, .. }
+            | Self::IncludedTooDeep { at, .. }
+            | Self::OnlyInScene { at, .. }
+            | Self::TooMany { at, .. } => Some(at),
+            _ => None,
+        }
+    }
 }
 
 fn did_you_mean(suggestion: Option<&str>) -> String {

@@ -9,6 +9,7 @@ use crate::attach::AttachSpec;
 use crate::error::SceneError;
 use crate::names::Names;
 use crate::passivity::PassivitySpec;
+use crate::problems::Problems;
 use crate::reader::{Bound, Table};
 use crate::soft::SoftSpec;
 use crate::vocabulary::Vocabulary;
@@ -34,20 +35,22 @@ pub struct SceneFinger {
 
 impl SceneFinger {
     /// Reads all `[[finger]]`s of a scene.
-    pub(crate) fn read_all(scene: &Table<'_>) -> Result<Vec<Self>, SceneError> {
-        let tables = scene.tables_up_to(MAX_DEVICES, "finger")?;
+    pub(crate) fn read_all(scene: &Table<'_>, problems: &mut Problems) -> Vec<Self> {
+        let Some(tables) = problems.keep(scene.tables_up_to(MAX_DEVICES, "finger")) else {
+            return Vec::new();
+        };
         if tables.is_empty() {
-            return Err(SceneError::NoFinger { file: scene.document().file().into(), limit: MAX_DEVICES });
+            problems.note(SceneError::NoFinger { file: scene.document().file().into(), limit: MAX_DEVICES });
         }
         let (mut names, mut devices) = (Names::default(), BTreeMap::new());
-        let read = |(i, table)| Self::read(table, i, &mut names, &mut devices);
-        tables.iter().enumerate().map(read).collect()
+        let read = |(i, table)| problems.keep(Self::read(table, i, &mut names, &mut devices));
+        tables.iter().enumerate().filter_map(read).collect()
     }
 
-    fn read(
-        table: &Table<'_>,
+    fn read<'d>(
+        table: &Table<'d>,
         i: usize,
-        names: &mut Names,
+        names: &mut Names<'d>,
         devices: &mut BTreeMap<usize, usize>,
     ) -> Result<Self, SceneError> {
         table.check_keys(&KEYS)?;
@@ -76,8 +79,9 @@ fn claim_device(
     match devices.insert(device, offset) {
         None => Ok(device),
         Some(first) => {
-            let (found, first_line) = (format!("{device}{note}"), table.document().line(first));
-            Err(SceneError::Duplicate { at: table.at("device"), found, first_line })
+            let (found, first) =
+                (format!("{device}{note}"), format!("on line {}", table.document().line(first)));
+            Err(SceneError::Duplicate { at: table.at("device"), found, first })
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The height map of an entity: a picture whose greys stand out of its surface.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use haptics::{Border, HeightForm, HeightMap, PictureScale};
 
@@ -40,11 +40,10 @@ impl HeightMapSpec {
         table.check_keys(&KEYS)?;
         let allowed = "the path of a PNG file, relative to this file";
         let file = table.require("file", allowed)?;
-        let beside = table.document().file().parent().unwrap_or(Path::new(""));
         let form = table.get("form").map(|form| form.choose("form of a height map", &FORMS)).transpose()?;
         let border = table.get("border").map(|border| border.choose("border", &BORDERS)).transpose()?;
         Ok(Some(Self {
-            file: beside.join(file.path(allowed)?),
+            file: file.file(allowed)?,
             amplitude_m: read_amplitude(&table)?,
             scale: read_scale(&table, shape)?,
             form: if form == Some("along-force") { HeightForm::AlongForce } else { HeightForm::Gradient },

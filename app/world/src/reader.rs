@@ -6,6 +6,8 @@
 
 use std::fmt;
 use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -14,19 +16,28 @@ use crate::document::Document;
 use crate::error::{Location, SceneError};
 use crate::vocabulary::{Verdict, Vocabulary};
 
-/// A table and where it stands.
+/// A table and where it stands, perhaps laid over another one whose values hold where it has none.
 #[derive(Debug, Clone)]
 pub(crate) struct Table<'d> {
     document: Document<'d>,
     path: String,
     offset: usize,
     entries: &'d DeTable<'d>,
+    beneath: Option<Rc<Table<'d>>>,
 }
 
 impl<'d> Table<'d> {
     /// The whole file.
     pub(crate) fn root(document: Document<'d>, root: &'d Spanned<DeTable<'d>>) -> Self {
-        Self { document, path: String::new(), offset: 0, entries: root.get_ref() }
+        Self { document, path: String::new(), offset: 0, entries: root.get_ref(), beneath: None }
+    }
+
+    /// This table, with the values of another where it has none.
+    ///
+    /// Tables in both are laid over each other in turn, unless the upper one says what it is (`kind`, `model`): a
+    /// sphere has no use for the sizes of a box. A key also hides those that exclude it.
+    pub(crate) fn over(self, beneath: Table<'d>) -> Self {
+        Self { beneath: Some(Rc::new(beneath)), ..self }
     }
 
     pub(crate) fn document(&self) -> &Document<'d> {
@@ -40,23 +51,55 @@ impl<'d> Table<'d> {
 
     /// Refuses the first key, in the order of the file, that is not available.
     pub(crate) fn check_keys(&self, keys: &Vocabulary) -> Result<(), SceneError> {
+        self.wrong_keys(keys).into_iter().next().map_or(Ok(()), Err)
+    }
+
+    /// All keys that are not available, in the order of the file.
+    pub(crate) fn wrong_keys(&self, keys: &Vocabulary) -> Vec<SceneError> {
         let mut written: Vec<_> = self.entries.keys().collect();
         written.sort_by_key(|key| key.span().start);
-        written.into_iter().try_for_each(|key| {
+        let wrong = written.into_iter().filter_map(|key| {
             let at = || self.document.location(key.span().start, self.path_of(key.get_ref()));
             match keys.judge(key.get_ref()) {
-                Verdict::Available(_) => Ok(()),
-                Verdict::Later => Err(SceneError::KeyNotAvailable { at: at(), available: keys.list() }),
+                Verdict::Available(_) => None,
+                Verdict::Later => Some(SceneError::KeyNotAvailable { at: at(), available: keys.list() }),
                 Verdict::Unknown(suggestion) => {
-                    Err(SceneError::UnknownKey { at: at(), allowed: keys.list(), suggestion })
+                    Some(SceneError::UnknownKey { at: at(), allowed: keys.list(), suggestion })
                 }
             }
-        })
+        });
+        let beneath = self.beneath.iter().flat_map(|beneath| beneath.wrong_keys(keys));
+        wrong.chain(beneath).collect()
     }
 
     pub(crate) fn get(&self, key: &str) -> Option<Value<'d>> {
+        let beneath = self.beneath.as_ref().filter(|_| !self.hides(key)).and_then(|table| table.get(key));
+        match self.own(key) {
+            Some(own) => Some(Value { beneath: beneath.map(Box::new), ..own }),
+            None => beneath,
+        }
+    }
+
+    /// The value of a key of this very table, whatever lies beneath.
+    pub(crate) fn own(&self, key: &str) -> Option<Value<'d>> {
         let value = self.entries.get(key)?;
-        Some(Value { document: self.document, path: self.path_of(key), value })
+        Some(Value { document: self.document, path: self.path_of(key), value, beneath: None })
+    }
+
+    /// The keys of this very table, in no order.
+    pub(crate) fn own_keys(&self) -> impl Iterator<Item = &str> {
+        self.entries.keys().map(|key| key.get_ref().as_ref())
+    }
+
+    /// Whether it has a key that excludes this one.
+    fn hides(&self, key: &str) -> bool {
+        let has = |rival: &str| self.entries.contains_key(rival);
+        RIVALS.iter().any(|[a, b]| *a == key && has(b) || *b == key && has(a))
+    }
+
+    /// Whether it says what it is, so that nothing else can be added to it.
+    fn is_whole(&self) -> bool {
+        OF_ITS_OWN.iter().any(|key| self.entries.contains_key(*key))
     }
 
     /// The value of `key`; `allowed` says what may stand there if nothing does.
@@ -109,8 +152,15 @@ impl<'d> Table<'d> {
 
     /// Where `key` stands in this table, or where the table begins if it has no such key.
     pub(crate) fn at(&self, key: &str) -> Box<Location> {
-        let offset = self.entries.get(key).map_or(self.offset, |value| value.span().start);
-        self.document.location(offset, self.path_of(key))
+        if let Some(value) = self.get(key) {
+            return value.at();
+        }
+        self.document.location(self.offset, self.path_of(key))
+    }
+
+    /// Where it begins.
+    pub(crate) fn here(&self) -> Box<Location> {
+        self.document.location(self.offset, self.path.clone())
     }
 
     fn path_of(&self, key: &str) -> String {
@@ -125,6 +175,8 @@ pub(crate) struct Value<'d> {
     document: Document<'d>,
     path: String,
     value: &'d Spanned<DeValue<'d>>,
+    /// What the same key has in a table beneath.
+    beneath: Option<Box<Value<'d>>>,
 }
 
 impl<'d> Value<'d> {
@@ -136,6 +188,10 @@ impl<'d> Value<'d> {
     /// Where it begins, in bytes from the start of the file.
     pub(crate) fn offset(&self) -> usize {
         self.value.span().start
+    }
+
+    pub(crate) fn document(&self) -> &Document<'d> {
+        &self.document
     }
 
     /// A finite number within `bound`; integers count as numbers.
@@ -240,7 +296,7 @@ impl<'d> Value<'d> {
     }
 
     /// A whole number within `range`.
-    fn whole(&self, range: RangeInclusive<u64>) -> Result<u64, SceneError> {
+    pub(crate) fn whole(&self, range: RangeInclusive<u64>) -> Result<u64, SceneError> {
         let allowed = format!("a whole number from {} to {}", range.start(), range.end());
         let DeValue::Integer(_) = self.value.get_ref() else { return Err(self.wrong_type(allowed)) };
         let whole = self.integer().and_then(|integer| u64::try_from(integer).ok());
@@ -295,10 +351,25 @@ impl<'d> Value<'d> {
     pub(crate) fn table(&self, allowed: &str) -> Result<Table<'d>, SceneError> {
         let DeValue::Table(entries) = self.value.get_ref() else { return Err(self.wrong_type(allowed)) };
         let (path, offset) = (self.path.clone(), self.value.span().start);
-        Ok(Table { document: self.document, path, offset, entries })
+        let table = Table { document: self.document, path, offset, entries, beneath: None };
+        match self.beneath.as_ref().and_then(|beneath| beneath.table("").ok()) {
+            Some(beneath) if !table.is_whole() => Ok(table.over(beneath)),
+            _ => Ok(table),
+        }
     }
 
-    fn tables(&self, key: &str) -> Result<Vec<Table<'d>>, SceneError> {
+    /// Whether it is a list.
+    pub(crate) fn is_list(&self) -> bool {
+        matches!(self.value.get_ref(), DeValue::Array(_))
+    }
+
+    /// The name of a file that is given relative to the one that it is written in.
+    pub(crate) fn file(&self, allowed: &str) -> Result<PathBuf, SceneError> {
+        let beside = self.document.file().parent().unwrap_or(Path::new(""));
+        Ok(beside.join(self.path(allowed)?))
+    }
+
+    pub(crate) fn tables(&self, key: &str) -> Result<Vec<Table<'d>>, SceneError> {
         let allowed = format!("a list of tables, each under its own [[{key}]]");
         let DeValue::Array(items) = self.value.get_ref() else { return Err(self.wrong_type(allowed)) };
         items.iter().enumerate().map(|(i, value)| self.item(i, value).table(&allowed)).collect()
@@ -313,7 +384,7 @@ impl<'d> Value<'d> {
     }
 
     fn item(&self, i: usize, value: &'d Spanned<DeValue<'d>>) -> Value<'d> {
-        Value { document: self.document, path: format!("{}[{i}]", self.path), value }
+        Value { document: self.document, path: format!("{}[{i}]", self.path), value, beneath: None }
     }
 
     fn integer(&self) -> Option<i64> {
@@ -388,6 +459,10 @@ fn shown_key(key: &str) -> String {
     if !key.is_empty() && key.chars().all(is_bare) { shortened(key) } else { quoted(key) }
 }
 
+/// Keys of which a table can have one only: the upper table's hides the other beneath.
+const RIVALS: [[&str; 2]; 2] = [["mass_kg", "density_kg_m3"], ["size_m", "repeat"]];
+/// Keys that say what a table is, so that what lies beneath it is of no use to it.
+const OF_ITS_OWN: [&str; 2] = ["kind", "model"];
 const WIDE_INTEGER: &str = "an integer of at most 64 bits, or a number with a point or an exponent";
 /// A message stays one readable line, whatever the file holds.
 const LONGEST_SHOWN_CHARS: usize = 60;

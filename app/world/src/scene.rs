@@ -4,19 +4,26 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 
-use crate::document::{Document, LineEnds};
+use crate::MAX_DEVICES;
+use crate::camera::SceneCamera;
+use crate::document::Document;
 use crate::dynamics::{DynamicsSpec, ResponseSpec};
 use crate::entity::SceneEntity;
+use crate::environment::SceneEnvironment;
 use crate::error::SceneError;
 use crate::field::FieldSpec;
 use crate::finger::SceneFinger;
 use crate::guide::GuideSpec;
-use crate::names::Names;
-use crate::reader::Table;
+use crate::light::SceneLight;
+use crate::problems::Problems;
+use crate::reader::{Table, Value};
 use crate::source::read_text;
+use crate::sources::Sources;
+use crate::templates::SceneTemplate;
+use crate::things::Things;
 use crate::vocabulary::Vocabulary;
 
-/// A validated scene. Plain data; the order of the lists is that of the file.
+/// A validated scene. Plain data; the order of the lists is that of the file, and then of those that it includes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
     /// Shown to people; default the file's name without its ending.
@@ -35,43 +42,114 @@ pub struct Scene {
     pub fields: Vec<FieldSpec>,
     /// Guides; may be empty.
     pub guides: Vec<GuideSpec>,
+    /// What it takes place in; their parts are among the entities. May be empty.
+    pub environments: Vec<SceneEnvironment>,
+    /// For the window; may be empty.
+    pub lights: Vec<SceneLight>,
+    /// For the window; may be empty.
+    pub cameras: Vec<SceneCamera>,
+    /// What entities are made from, in order of their names.
+    pub templates: Vec<SceneTemplate>,
+    /// The files that it includes, in the order in which they were read.
+    pub included: Vec<PathBuf>,
 }
 
 impl Scene {
     /// Gravity of a scene that gives none: y is up.
     pub const DEFAULT_GRAVITY_M_S2: [f64; 3] = [0.0, -9.81, 0.0];
 
-    /// Reads the scene file `path`.
+    /// Reads the scene file `path` and those that it includes.
     ///
     /// # Errors
-    /// The file cannot be read, is too large or not UTF-8, or [`Scene::parse`] refuses its text.
+    /// A file cannot be read, is too large or not UTF-8, or [`Scene::parse`] refuses its text.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, SceneError> {
         let path = path.as_ref();
         Self::parse(&read_text(path)?, path)
     }
 
-    /// Reads a scene from `text`. `file` is named in errors and is what `hand` is relative to;
-    /// it is not opened.
+    /// Reads a scene from `text`. `file` is named in errors and is what other files are relative to; it is not opened
+    /// itself, and no other but those that the text includes.
     ///
     /// # Errors
     /// The first thing found to be wrong, with its place and what is allowed there.
     pub fn parse(text: &str, file: &Path) -> Result<Self, SceneError> {
-        let lines = LineEnds::of(text);
-        let document = Document::new(text, &lines, file);
-        let root = document.parse()?;
-        let table = Table::root(document, &root);
-        table.check_keys(&KEYS)?;
-        let dynamics = DynamicsSpec::read(&table)?;
-        Ok(Self {
-            name: read_name(&table, file)?,
-            gravity_m_s2: table.numbers_or("gravity_m_s2", Self::DEFAULT_GRAVITY_M_S2)?.into(),
-            dynamics,
-            hand: read_hand(&table, file)?,
-            fingers: SceneFinger::read_all(&table)?,
-            entities: read_entities(&table, dynamics.response)?,
-            fields: FieldSpec::read_all(&table)?,
-            guides: GuideSpec::read_all(&table)?,
+        let none = || SceneError::NoFinger { file: file.into(), limit: MAX_DEVICES };
+        Self::examine(text, file).map_err(|problems| problems.into_iter().next().unwrap_or_else(none))
+    }
+
+    /// As [`Scene::load`], but tells all that is wrong, up to a hundred things.
+    ///
+    /// # Errors
+    /// In the order in which they were found, at least one.
+    pub fn load_whole(path: impl AsRef<Path>) -> Result<Self, Vec<SceneError>> {
+        let path = path.as_ref();
+        let text = read_text(path).map_err(|problem| vec![problem])?;
+        Self::examine(&text, path)
+    }
+
+    /// As [`Scene::parse`], but tells all that is wrong, up to a hundred things.
+    ///
+    /// # Errors
+    /// In the order in which they were found, at least one.
+    pub fn examine(text: &str, file: &Path) -> Result<Self, Vec<SceneError>> {
+        let mut problems = Problems::default();
+        let sources = Sources::gather(text, file, &mut problems);
+        let documents: Vec<Document<'_>> = sources.documents().collect();
+        let roots: Vec<_> = documents.iter().filter_map(|document| problems.keep(document.parse())).collect();
+        let mut scene = None;
+        if roots.len() == documents.len() {
+            let tables = documents.iter().zip(&roots).map(|(document, root)| Table::root(*document, root));
+            let tables: Vec<Table<'_>> = tables.collect();
+            scene = Self::read(&tables, &mut problems);
+        }
+        let problems = problems.all();
+        match scene {
+            Some(scene) if problems.is_empty() => Ok(Self { included: sources.included(), ..scene }),
+            _ => Err(problems),
+        }
+    }
+
+    /// Reads the files of a scene, its own first.
+    fn read<'d>(tables: &[Table<'d>], problems: &mut Problems) -> Option<Self> {
+        let (table, included) = tables.split_first()?;
+        let file = table.document().file();
+        problems.keys(table, &KEYS);
+        included.iter().for_each(|table| refuse_what_is_the_scenes(table, problems));
+        let name = problems.keep(read_name(table, file));
+        let gravity = problems.keep(table.numbers_or("gravity_m_s2", Self::DEFAULT_GRAVITY_M_S2));
+        let dynamics = problems.keep(DynamicsSpec::read(table));
+        let hand = problems.keep(read_hand(table));
+        let fingers = SceneFinger::read_all(table, problems);
+        let response = dynamics.map_or_else(ResponseSpec::default, |dynamics| dynamics.response);
+        let things = Things::read(tables, response, problems);
+        let (fields, guides) =
+            (problems.keep(FieldSpec::read_all(table)), problems.keep(GuideSpec::read_all(table)));
+        Some(Self {
+            name: name?,
+            gravity_m_s2: gravity?.into(),
+            dynamics: dynamics?,
+            hand: hand?,
+            fingers,
+            entities: things.entities,
+            fields: fields?,
+            guides: guides?,
+            environments: things.environments,
+            lights: things.lights,
+            cameras: things.cameras,
+            templates: things.templates,
+            included: Vec::new(),
         })
+    }
+}
+
+/// How a run goes is for one file to say.
+fn refuse_what_is_the_scenes(table: &Table<'_>, problems: &mut Problems) {
+    let is_the_scenes = |key: &&str| KEYS.available.contains(key) && !INCLUDED_KEYS.available.contains(key);
+    match table.own_keys().find(is_the_scenes) {
+        Some(key) => {
+            problems.note(SceneError::OnlyInScene { at: table.at(key), allowed: INCLUDED_KEYS.list() });
+        }
+        None => problems.keys(table, &INCLUDED_KEYS),
     }
 }
 
@@ -82,16 +160,9 @@ fn read_name(table: &Table<'_>, file: &Path) -> Result<String, SceneError> {
     }
 }
 
-fn read_hand(table: &Table<'_>, file: &Path) -> Result<Option<PathBuf>, SceneError> {
-    let Some(value) = table.get("hand") else { return Ok(None) };
-    let hand = value.path("the path of a CSV file, relative to this file")?;
-    Ok(Some(file.parent().unwrap_or(Path::new("")).join(hand)))
-}
-
-fn read_entities(table: &Table<'_>, response: ResponseSpec) -> Result<Vec<SceneEntity>, SceneError> {
-    let mut names = Names::default();
-    let tables = table.tables("entity")?;
-    tables.iter().enumerate().map(|(i, table)| SceneEntity::read(table, i, &mut names, response)).collect()
+fn read_hand(table: &Table<'_>) -> Result<Option<PathBuf>, SceneError> {
+    let file = |value: Value<'_>| value.file("the path of a CSV file, relative to this file");
+    table.get("hand").map(file).transpose()
 }
 
 const KEYS: Vocabulary = Vocabulary {
@@ -106,6 +177,15 @@ const KEYS: Vocabulary = Vocabulary {
         "entity",
         "field",
         "guide",
+        "include",
+        "template",
+        "environment",
+        "light",
+        "camera",
     ],
+    later: &[],
+};
+const INCLUDED_KEYS: Vocabulary = Vocabulary {
+    available: &["include", "template", "entity", "environment", "light", "camera"],
     later: &[],
 };

@@ -1,6 +1,6 @@
 //! The shape of an entity, in the entity's frame B.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use nalgebra::{Unit, Vector3};
 
@@ -88,6 +88,8 @@ pub struct MeshSpec {
     pub file: PathBuf,
     /// Factors along x, y and z that make metres of the file's numbers; above 0, default 1.
     pub scale: [f64; 3],
+    /// A mesh that is closed is felt from both sides all the same, as a room is.
+    pub hollow: bool,
     /// Where the scene names it, for messages.
     pub at: Location,
 }
@@ -167,7 +169,7 @@ fn reader_of(kind: &str) -> (&'static Vocabulary, Read) {
         "capsule" => (&CYLINDER_KEYS, read_capsule),
         "ellipsoid" => (&ELLIPSOID_KEYS, read_ellipsoid),
         "csg" => (&CSG_KEYS, read_csg),
-        "nurbs" => (&MESH_KEYS, read_nurbs),
+        "nurbs" => (&NURBS_KEYS, read_nurbs),
         _ => (&MESH_KEYS, read_mesh),
     }
 }
@@ -228,7 +230,18 @@ fn read_ellipsoid(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
 }
 
 fn read_mesh(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
-    Ok(ShapeSpec::Mesh(read_file(table, "the path of an OBJ or STL file, relative to this file")?))
+    let mesh = read_file(table, "the path of an OBJ or STL file, relative to this file")?;
+    let hollow = table.get("hollow").map_or(Ok(false), |value| value.truth())?;
+    Ok(ShapeSpec::Mesh(MeshSpec { hollow, ..mesh }))
+}
+
+impl ShapeSpec {
+    /// That of an environment which is a mesh: `file` and `scale` stand in its own table.
+    pub(crate) fn read_hollow_mesh(environment: &Table<'_>) -> Result<Self, SceneError> {
+        let mesh = read_file(environment, "the path of an OBJ or STL file, relative to this file")?;
+        let scale = environment.get("scale").map_or(Ok([1.0; 3]), |value| value.factors())?;
+        Ok(Self::Mesh(MeshSpec { scale, hollow: true, ..mesh }))
+    }
 }
 
 fn read_nurbs(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
@@ -238,9 +251,7 @@ fn read_nurbs(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
 
 fn read_file(table: &Table<'_>, allowed: &str) -> Result<MeshSpec, SceneError> {
     let value = table.require("file", allowed)?;
-    let beside = table.document().file().parent().unwrap_or(Path::new(""));
-    let file = beside.join(value.path(allowed)?);
-    Ok(MeshSpec { file, scale: [1.0; 3], at: *value.at() })
+    Ok(MeshSpec { file: value.file(allowed)?, scale: [1.0; 3], hollow: false, at: *value.at() })
 }
 
 fn read_csg(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
@@ -266,7 +277,8 @@ const CYLINDER_KEYS: Vocabulary = keys(&["kind", "radius_m", "length_m", "scale"
 const CONE_KEYS: Vocabulary = keys(&["kind", "radius_bottom_m", "radius_top_m", "length_m", "scale"]);
 const TORUS_KEYS: Vocabulary = keys(&["kind", "ring_radius_m", "tube_radius_m", "scale"]);
 const ELLIPSOID_KEYS: Vocabulary = keys(&["kind", "radii_m", "scale"]);
-const MESH_KEYS: Vocabulary = keys(&["kind", "file", "scale"]);
+const NURBS_KEYS: Vocabulary = keys(&["kind", "file", "scale"]);
+const MESH_KEYS: Vocabulary = keys(&["kind", "file", "scale", "hollow"]);
 
 const KINDS: Vocabulary = Vocabulary {
     available: &[

@@ -51,6 +51,12 @@ impl Vocabulary {
     }
 }
 
+/// The nearest of these names, if it is near enough to be what was meant.
+pub(crate) fn nearest<'n>(word: &str, names: impl Iterator<Item = &'n str>) -> Option<&'n str> {
+    let near = names.filter_map(|name| Some((name, likeness(word, name)?)));
+    near.min_by_key(|(_, distance)| *distance).map(|(name, _)| name)
+}
+
 /// Edits from `word` to `known`, if they are few; a known word that begins with `word` counts
 /// as near, because leaving off the unit (`stiffness` for `stiffness_n_per_m`) is the usual slip.
 fn likeness(word: &str, known: &str) -> Option<usize> {

@@ -295,7 +295,10 @@ fn a_layout_gives_each_device_its_pose_and_the_others_identity() {
 #[test]
 fn every_committed_scene_is_in_order_and_its_hand_file_exists() {
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/scenes");
-    for file in scenes.read_dir().expect("the scenes").map(|entry| entry.expect("an entry").path()) {
+    let directories = [scenes.clone(), scenes.join("thesis"), scenes.join("kinds")];
+    let files = directories.iter().flat_map(|directory| directory.read_dir().expect("the scenes"));
+    let is_scene = |file: &PathBuf| file.extension().is_some_and(|ending| ending == "toml");
+    for file in files.map(|entry| entry.expect("an entry").path()).filter(is_scene) {
         let scene = Scene::load(&file).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(Some(scene.name.as_str()), file.file_stem().and_then(|stem| stem.to_str()));
         assert!(scene.hand.is_none_or(|hand| hand.is_file()), "{}", file.display());

@@ -6,12 +6,13 @@ use world::{MassSpec, Scene};
 
 use crate::{refused, with_entity, with_finger, with_shape, with_top};
 
-const SCENE_KEYS: &str =
-    "name, gravity_m_s2, integrator, contact_response, grasp_quality, hand, finger, entity, field, guide";
+const SCENE_KEYS: &str = "name, gravity_m_s2, integrator, contact_response, grasp_quality, hand, finger, entity, field, guide, \
+     include, template, environment, light, camera";
 const FINGER_KEYS: &str = "name, radius_m, start_m, device, passivity, soft, attach";
 const ENTITY_KEYS: &str = "name, shape, position_m, orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction, algorithm, \
                            material, shading, height_map, magnetism, vibration, movable, mass_kg, density_kg_m3, inertia_kg_m2, \
-                           centre_of_mass_m, velocity_m_s, angular_velocity_rad_s, rotation_locked, restitution";
+                           centre_of_mass_m, velocity_m_s, angular_velocity_rad_s, rotation_locked, restitution, haptic, \
+                           collidable, visual, template, grid, within";
 
 #[test]
 fn text_that_is_not_toml_is_refused_with_line_and_column() {
@@ -199,7 +200,7 @@ fn each_shape_knows_its_own_keys() {
             "radius_m: unknown key; allowed: kind, ring_radius_m, tube_radius_m, scale",
         ),
         ("{ kind = \"ellipsoid\", size_m = 1 }", "size_m: unknown key; allowed: kind, radii_m, scale"),
-        ("{ kind = \"mesh\", path = \"a.obj\" }", "path: unknown key; allowed: kind, file, scale"),
+        ("{ kind = \"mesh\", path = \"a.obj\" }", "path: unknown key; allowed: kind, file, scale, hollow"),
         ("{ kind = \"cylinder\", radius_m = 1 }", "length_m: missing; allowed: a number above 0"),
         ("{ kind = \"cone\", radius_bottom_m = 1 }", "radius_top_m: missing; allowed: a number, 0 or more"),
         ("{ kind = \"torus\", ring_radius_m = 1 }", "tube_radius_m: missing; allowed: a number above 0"),

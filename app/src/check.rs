@@ -1,0 +1,123 @@
+//! `phantom3 check`: what is wrong with a scene, all of it, without running it; and what is in it.
+//!
+//! Model: the scene is read, its models and pictures are loaded and everything is made ready to run, as `run` does. What
+//! stands in the way is a *problem*: `run` would refuse the scene, with the first of them. What runs, but hardly as
+//! meant, is a *warning*.
+
+mod report;
+mod summary;
+mod warnings;
+
+use crate::rig::{HandMode, Problems, Rig};
+use crate::settings;
+use clap::Args;
+use io_driver::config::period_of;
+use serde_json::{Value, json};
+use std::fmt::Display;
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use summary::Summary;
+use world::{Layout, Location, Scene, Settings};
+
+/// The arguments of `phantom3 check`.
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// The scene (TOML)
+    scene: PathBuf,
+    /// The hand file that it is to be run with (CSV); default: the scene's own
+    #[arg(long, value_name = "CSV")]
+    hand: Option<PathBuf>,
+    /// Where the devices will stand (TOML)
+    #[arg(long, value_name = "FILE")]
+    layout: Option<PathBuf>,
+    /// At how many ticks per second it is to run
+    #[arg(long, value_name = "HZ", default_value_t = 1000.0, value_parser = crate::cli::parse_rate)]
+    rate_hz: f64,
+    /// Tell everything as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// What came of it.
+#[derive(Debug, Default)]
+struct Checked {
+    problems: Vec<Problem>,
+    warnings: Vec<String>,
+    /// Of a scene that can be run.
+    summary: Option<Summary>,
+}
+
+/// Something that `run` refuses.
+#[derive(Debug)]
+struct Problem {
+    message: String,
+    /// Where it is, if it has one place in a file of ours.
+    at: Option<Location>,
+}
+
+impl Problem {
+    fn new(error: &dyn Display, at: Option<Location>) -> Self {
+        Self { message: error.to_string(), at }
+    }
+
+    fn to_json(&self) -> Value {
+        match &self.at {
+            Some(at) => {
+                json!({ "message": self.message, "file": at.file.display().to_string(), "line": at.line, "key": at.key })
+            }
+            None => json!({ "message": self.message }),
+        }
+    }
+}
+
+/// Runs the command: status 0 if the scene can be run, else 2.
+pub fn execute(args: &CheckArgs, settings: &Settings) -> ExitCode {
+    let checked = check(args, settings);
+    let said =
+        if args.json { format!("{:#}\n", to_json(&checked)) } else { report::text(&checked, &args.scene) };
+    // A closed pipe is no reason to fail.
+    let _ = std::io::stdout().write_all(said.as_bytes());
+    ExitCode::from(if checked.problems.is_empty() { 0 } else { 2 })
+}
+
+fn check(args: &CheckArgs, settings: &Settings) -> Checked {
+    let file = settings::find(&args.scene, &settings.scenes.value);
+    let mut checked = Checked::default();
+    let layout = args.layout.as_ref().map(Layout::load).transpose();
+    let layout = layout.unwrap_or_else(|error| {
+        checked.problems.push(Problem::new(&error, error.location().cloned()));
+        None
+    });
+    let mut scene = match Scene::load_whole(&file) {
+        Ok(scene) => scene,
+        Err(errors) => {
+            checked
+                .problems
+                .extend(errors.iter().map(|error| Problem::new(error, error.location().cloned())));
+            return checked;
+        }
+    };
+    let mut problems = Problems::default();
+    settings::find_data(&mut scene, &file, settings);
+    let hand = args.hand.as_ref().map(|hand| settings::find(hand, &settings.hands.value));
+    let (hand, period_ns) = (hand.as_deref(), period_of(args.rate_hz));
+    let whole = scene.clone();
+    let rig = Rig::examine(&file, scene, layout, hand, HandMode::Kinematic, period_ns, &mut problems);
+    checked.problems.extend(problems.all().iter().map(|error| Problem::new(error, error.location())));
+    let Some((rig, step)) = rig.and_then(|rig| rig.fast_step().ok().map(|step| (rig, step))) else {
+        return checked;
+    };
+    checked.warnings = warnings::all(&rig, &whole, step.entities());
+    checked.summary = Some(Summary::of(&rig, &whole, step.entities()));
+    checked
+}
+
+fn to_json(checked: &Checked) -> Value {
+    json!({
+        "ok": checked.problems.is_empty(),
+        "problems": checked.problems.iter().map(Problem::to_json).collect::<Vec<_>>(),
+        "warnings": checked.warnings,
+        "summary": checked.summary.as_ref().map(Summary::to_json),
+    })
+}

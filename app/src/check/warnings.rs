@@ -1,0 +1,171 @@
+//! What runs, but hardly as meant.
+
+use crate::rig::{Rig, in_words};
+use crate::study::stiffness::bounds::Theory;
+use crate::study::stiffness::case::{Axis, Case, Hand, Mode};
+use crate::study::stiffness::search::Found;
+use crate::study::stiffness::trial::Bench;
+use haptics::{Entity, Finger, Hip};
+use io_driver::sim::hand::model_file::Firmness;
+use physics::collide::{ContactPoints, PairMemory, Solid, bounding_ball, contact_points, is_collidable};
+use std::collections::BTreeMap;
+use std::path::Path;
+use world::model;
+use world::{MassSpec, Scene, ShapeSpec};
+
+/// All of them. `whole` is the scene with what the rig leaves out.
+pub(super) fn all(rig: &Rig, whole: &Scene, entities: &[Entity]) -> Vec<String> {
+    let mut warnings = too_stiff(rig);
+    warnings.extend(overlaps(rig, entities));
+    warnings.extend(inside(rig, entities));
+    warnings.extend(unseen(whole));
+    let unused = whole.templates.iter().filter(|template| template.entities == 0);
+    warnings.extend(unused.map(|template| format!("no entity is made from template {}", template.name)));
+    warnings
+}
+
+/// Against what the sampled linear loop stands, with a Premium held lightly that is answered in the same tick.
+fn too_stiff(rig: &Rig) -> Vec<String> {
+    let mut limits = BTreeMap::new();
+    let mut beyond: BTreeMap<u64, Vec<String>> = BTreeMap::new();
+    for entity in rig.scene.entities.iter().filter(|entity| entity.is_haptic) {
+        let damping = entity.damping_n_s_per_m;
+        let limit = *limits.entry(damping.to_bits()).or_insert_with(|| limit(rig.period_ns, damping));
+        if limit.is_some_and(|limit| entity.stiffness_n_per_m > limit) {
+            let named = format!("{} ({} N/m)", entity.name, entity.stiffness_n_per_m);
+            beyond.entry(damping.to_bits()).or_default().push(named);
+        }
+    }
+    let rate_hz = 1e9 / rig.period_ns as f64;
+    let told = beyond.into_iter().filter_map(|(damping, names)| {
+        let (limit, damping) = (limits.get(&damping).copied().flatten()?, f64::from_bits(damping));
+        Some(format!(
+            "{} may buzz: at {rate_hz} Hz and {damping} N s/m a lightly held Premium stands {limit:.0} N/m by the linear \
+             loop; `passivity` of the finger keeps it quiet",
+            in_words(&names)
+        ))
+    });
+    told.collect()
+}
+
+/// `None`: nobody knows, or there is none.
+fn limit(period_ns: u64, damping_n_s_per_m: f64) -> Option<f64> {
+    let bench = Bench::new(Path::new("premium-1.5"), Axis::Y, [1e-3, 1e-3]).ok()?;
+    let hand = Hand { model: "pen-grip".into(), firmness: Firmness::Light };
+    let case = Case { mode: Mode::SameTick, rate_hz: 1e9 / period_ns as f64, damping_n_s_per_m, hand };
+    match Theory::of(&bench, &case).ok()?.linear {
+        Found::Limit(limit) => Some(limit),
+        Found::None => Some(0.0),
+        Found::All => None,
+    }
+}
+
+/// Things that move and begin deeper in others than their weight brings them.
+fn overlaps(rig: &Rig, entities: &[Entity]) -> Vec<String> {
+    let mut found = Vec::new();
+    let mut pairs = 0_usize;
+    near_pairs(rig, entities, |a, b| {
+        let depth_m = depth(&entities[a], &entities[b]);
+        if depth_m > depth_of_weight(rig, a, entities).max(LEAST_DEPTH_M) {
+            pairs += 1;
+            if found.len() < MOST_OVERLAPS {
+                let [a, b] = [a, b].map(|index| &rig.scene.entities[index].name);
+                found.push(format!("{a} begins {:.2} mm deep in {b}, and will be thrown out", depth_m * 1e3));
+            }
+        }
+    });
+    if pairs > found.len() {
+        found.push(format!("and {} more pairs begin in each other", pairs - found.len()));
+    }
+    found
+}
+
+/// Each pair of which one moves, whose bounding balls meet, once; the one that moves first.
+fn near_pairs(rig: &Rig, entities: &[Entity], mut meet: impl FnMut(usize, usize)) {
+    let is_body = |index: usize| rig.scene.entities[index].motion.is_some();
+    let balls: Vec<_> = entities
+        .iter()
+        .map(|entity| {
+            bounding_ball(&entity.shape).map(|(c, r)| (entity.X_WB.transform_point(&c.into()).coords, r))
+        })
+        .collect();
+    // Swept along x: what has no end is near to everything.
+    let mut order: Vec<usize> = (0..entities.len()).filter(|&index| entities[index].is_collidable).collect();
+    let begin = |index: usize| balls[index].map_or(f64::NEG_INFINITY, |(centre, radius)| centre.x - radius);
+    let end = |index: usize| balls[index].map_or(f64::INFINITY, |(centre, radius)| centre.x + radius);
+    order.sort_by(|&a, &b| begin(a).total_cmp(&begin(b)).then(a.cmp(&b)));
+    let mut open: Vec<usize> = Vec::new();
+    for &next in &order {
+        open.retain(|&other| end(other) >= begin(next));
+        for &other in &open {
+            let apart = balls[other].zip(balls[next]).is_some_and(|((p, r), (q, s))| (p - q).norm() > r + s);
+            match (is_body(next), is_body(other)) {
+                _ if apart => {}
+                (true, _) => meet(next, other),
+                (false, true) => meet(other, next),
+                _ => {}
+            }
+        }
+        open.push(next);
+    }
+}
+
+fn depth(a: &Entity, b: &Entity) -> f64 {
+    let (a, b) = if is_collidable(&a.shape, &b.shape) { (a, b) } else { (b, a) };
+    if !is_collidable(&a.shape, &b.shape) {
+        return 0.0;
+    }
+    let (mut memory, mut points) = (PairMemory::default(), ContactPoints::default());
+    let solid = |entity| -> Solid<'_> {
+        let entity: &Entity = entity;
+        Solid { shape: &entity.shape, X_W: &entity.X_WB }
+    };
+    contact_points(solid(a), solid(b), 0.0, &mut memory, &mut points);
+    points.as_slice().iter().map(|point| -point.gap_m).fold(0.0, f64::max)
+}
+
+/// How deep its weight alone would bring it into something as soft as itself, on one point.
+fn depth_of_weight(rig: &Rig, body: usize, entities: &[Entity]) -> f64 {
+    let mass_kg = match rig.scene.entities[body].motion.map(|motion| motion.mass) {
+        Some(MassSpec::Mass(mass_kg)) => mass_kg,
+        _ => 0.0,
+    };
+    2.0 * mass_kg * rig.scene.gravity_m_s2.norm() / entities[body].stiffness_n_per_m
+}
+
+/// Fingers that begin inside of something: they are pushed out as the run begins.
+fn inside(rig: &Rig, entities: &[Entity]) -> Vec<String> {
+    let touched = |finger: &world::SceneFinger| {
+        let mut probe = Finger::new(finger.radius_m, entities.len()).ok()?;
+        let hip = Hip { position_W: finger.start_m.coords, velocity_W: None };
+        probe.step(entities, hip, 1e-3);
+        let names: Vec<String> =
+            probe.contacts().map(|contact| rig.scene.entities[contact.entity].name.clone()).collect();
+        (!names.is_empty()).then(|| format!("finger {} starts inside of {}", finger.name, in_words(&names)))
+    };
+    // A hand that says otherwise puts it elsewhere at once.
+    let rests = |(index, _): &(usize, &world::SceneFinger)| {
+        rig.hand.as_ref().is_none_or(|hand| hand.bounds.get(*index).copied().flatten().is_none())
+    };
+    rig.scene.fingers.iter().enumerate().filter(rests).filter_map(|(_, finger)| touched(finger)).collect()
+}
+
+/// Models that are only seen are not loaded for a run; the window will want them.
+fn unseen(whole: &Scene) -> Vec<String> {
+    let visuals = whole.entities.iter().flat_map(|entity| &entity.visuals);
+    let mut files = BTreeMap::new();
+    for visual in visuals {
+        if let Some(ShapeSpec::Mesh(mesh)) = &visual.shape {
+            files.entry(&mesh.file).or_insert(&mesh.at);
+        }
+    }
+    let wrong = |(file, at): (&std::path::PathBuf, &world::Location)| {
+        let error = model::load(file).err()?;
+        Some(format!("{at}: {}: {error}; it is for the window only", file.display()))
+    };
+    files.into_iter().filter_map(wrong).collect()
+}
+
+/// A tenth of a millimetre is what rounding in a file leaves.
+const LEAST_DEPTH_M: f64 = 1e-4;
+const MOST_OVERLAPS: usize = 10;

@@ -1,0 +1,298 @@
+//! Scenes of many parts as a user sees them: templates, included files, rooms, flags; and the commands about scenes.
+
+use system_tests::workplace::{Said, Workplace, hand};
+
+const CONFIG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../config");
+
+/// Down onto what is at the origin, along it and up again.
+fn path() -> String {
+    hand([
+        (0.0, [0.0, 0.1, 0.0]),
+        (0.5, [0.0, 0.045, 0.0]),
+        (1.0, [0.01, 0.045, 0.0]),
+        (1.5, [0.0, 0.1, 0.0]),
+    ])
+}
+
+fn check(place: &Workplace, arguments: &[&str]) -> Said {
+    place.run(["check"].iter().chain(arguments))
+}
+
+fn json(said: &Said) -> serde_json::Value {
+    serde_json::from_str(&said.out).unwrap_or_else(|error| panic!("{error}\n{}{}", said.out, said.err))
+}
+
+#[test]
+fn templates_and_included_files_run_like_the_same_scene_written_out() {
+    let written_out = "[[finger]]\n[[entity]]\nname = \"a\"\nshape = { kind = \"sphere\", radius_m = 0.05 }\n\
+                       friction = { model = \"stiction\", mu_s = 0.7, mu_d = 0.2 }\n\
+                       [[entity]]\nname = \"b\"\nmass_kg = 0.1\nposition_m = [0.3, 0.0, 0.0]\n\
+                       shape = { kind = \"sphere\", radius_m = 0.02 }\nfriction = { model = \"coulomb\", mu = 0.5 }\n";
+    let parts = "include = [\"parts/balls.toml\"]\n[[finger]]\n[[entity]]\nname = \"a\"\ntemplate = \"ball\"\n\
+                 friction = { mu_d = 0.2 }\n";
+    let balls = "[[template]]\nname = \"ball\"\nshape = { kind = \"sphere\", radius_m = 0.05 }\n\
+                 friction = { model = \"stiction\", mu_s = 0.7, mu_d = 0.3 }\n\
+                 [[entity]]\nname = \"b\"\ntemplate = \"ball\"\nshape = { radius_m = 0.02 }\nmass_kg = 0.1\n\
+                 position_m = [0.3, 0.0, 0.0]\nfriction = { model = \"coulomb\", mu = 0.5 }\n";
+    let place = Workplace::new();
+    std::fs::create_dir(place.path("parts")).expect("a directory");
+    place.write("parts/balls.toml", balls);
+    let [one, other] = [written_out, parts].map(|scene| place.play(scene, &path(), &[]));
+    assert_eq!(one.columns(), other.columns());
+    assert_eq!(one.rows(), other.rows());
+    assert!(one.finger("f0").iter().any(|sample| sample.touches()), "it was felt");
+}
+
+#[test]
+fn a_room_is_felt_from_inside_and_so_is_a_mesh() {
+    // A cube of 0.1 m around the origin, as walls and as triangles.
+    let cube = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n\
+                f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n";
+    let rooms = [
+        "kind = \"room\"\nsize_m = [0.1, 0.1, 0.1]\n",
+        "kind = \"mesh\"\nfile = \"cube.obj\"\nscale = 0.05\n",
+    ];
+    for room in rooms {
+        let place = Workplace::new();
+        place.write("cube.obj", cube);
+        // To 2 mm beyond the right wall, then beyond the ceiling, and home.
+        let path = hand([
+            (0.0, [0.001, 0.002, 0.003]),
+            (0.5, [0.052, 0.002, 0.003]),
+            (1.0, [0.001, 0.002, 0.003]),
+            (1.5, [0.001, 0.052, 0.003]),
+            (2.0, [0.001, 0.002, 0.003]),
+        ]);
+        let scene = format!("[[finger]]\n[[environment]]\nname = \"cave\"\nstiffness_n_per_m = 1000\n{room}");
+        let samples = place.play(&scene, &path, &[]).finger("f0");
+        for (tick, inwards) in [(500, [-1.0, 0.0, 0.0]), (1500, [0.0, -1.0, 0.0])] {
+            let force = samples[tick].force;
+            // 2 mm at 1000 N/m, without friction.
+            let wanted = nalgebra::Vector3::from(inwards) * 2.0;
+            assert!((force - wanted).norm() < 1e-9, "{room}: {force:?} at tick {tick}");
+        }
+        assert_eq!(samples[1000].force.norm(), 0.0, "{room}: in the middle it is free");
+    }
+}
+
+#[test]
+fn what_is_not_haptic_carries_others_and_what_is_not_collidable_lets_them_fall() {
+    let scene = |flags: &str| {
+        format!(
+            "[[finger]]\n[[entity]]\nname = \"table\"\nshape = {{ kind = \"box\", size_m = [1.0, 0.1, 1.0] }}\n{flags}\n\
+             [[entity]]\nname = \"cube\"\nshape = {{ kind = \"box\", size_m = [0.04, 0.04, 0.04] }}\n\
+             position_m = [0.2, 0.0702, 0.0]\nmass_kg = 0.1\n"
+        )
+    };
+    let played = |flags: &str| {
+        let place = Workplace::new();
+        let table = place.play(&scene(flags), &path(), &[]);
+        let felt = table.finger("f0").iter().any(|sample| sample.touches());
+        let lowest = table.numbers("cube_y").into_iter().fold(f64::INFINITY, f64::min);
+        (felt, lowest)
+    };
+    let (felt, lowest) = played("");
+    // 0.1 kg on four springs of 500 N/m sink by half a millimetre, and by twice that as they fall.
+    assert!(felt && lowest > 0.068, "{felt} {lowest}");
+    let (felt, lowest) = played("haptic = false");
+    assert!(!felt && lowest > 0.068, "{felt} {lowest}");
+    let (felt, lowest) = played("collidable = false");
+    // Free fall for 1.5 s: 11 m.
+    assert!(felt && lowest < -10.0, "{felt} {lowest}");
+}
+
+#[test]
+fn check_tells_all_that_is_wrong_with_places_and_runs_nothing() {
+    let place = Workplace::new();
+    place.write(
+        "scene.toml",
+        "hand = \"none.csv\"\n[[finger]]\n[[entity]]\nname = \"a\"\nshape = { kind = \"mesh\", file = \"none.obj\" }\n\
+         [[entity]]\nname = \"b\"\nalgorithm = \"classic\"\nshape = { kind = \"csg\", op = \"union\", children = \
+         [{ shape = { kind = \"sphere\", radius_m = 1 } }] }\n",
+    );
+    let before = place.snapshot();
+    let said = check(&place, &["scene.toml", "--json"]);
+    assert_eq!(said.status, Some(2));
+    let told = json(&said);
+    let messages: Vec<&str> = told["problems"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .map(|it| it["message"].as_str().expect("text"))
+        .collect();
+    assert_eq!(messages.len(), 3, "{messages:?}");
+    assert!(messages[0].contains("cannot read the hand file"), "{messages:?}");
+    assert!(
+        messages[1].starts_with("scene.toml:5: entity[0].shape.file: none.obj: no such file"),
+        "{messages:?}"
+    );
+    assert!(messages[2].starts_with("scene.toml:6: entity b is a csg"), "{messages:?}");
+    assert_eq!((told["ok"].as_bool(), told["problems"][1]["line"].as_u64()), (Some(false), Some(5)));
+    assert_eq!(told["problems"][1]["key"], "entity[0].shape.file");
+    assert!(place.snapshot() == before, "nothing was written");
+    // The first of them is what `run` says.
+    let run = place.run(["run", "scene.toml", "--clock", "virtual"]);
+    assert_eq!((run.status, run.err.trim_end()), (Some(2), format!("phantom3: {}", messages[0]).as_str()));
+}
+
+#[test]
+fn check_tells_all_that_the_reader_finds_too() {
+    let place = Workplace::new();
+    place.write(
+        "scene.toml",
+        "nam = \"x\"\n[[finger]]\nradius_m = -1\n[[entity]]\nshape = { kind = \"cube\" }\n",
+    );
+    let said = check(&place, &["scene.toml"]);
+    assert_eq!(said.status, Some(2));
+    let lines: Vec<&str> = said.out.lines().collect();
+    assert_eq!(lines.len(), 4, "{lines:?}");
+    assert!(lines[0].starts_with("scene.toml:1: nam: unknown key"), "{lines:?}");
+    assert!(lines[1].starts_with("scene.toml:3: finger[0].radius_m: found -1"), "{lines:?}");
+    assert!(
+        lines[2].starts_with("scene.toml:5: entity[0].shape.kind: unknown shape kind `cube`"),
+        "{lines:?}"
+    );
+    assert_eq!(lines[3], "scene.toml: cannot be run; problems: 3, warnings: 0");
+}
+
+#[test]
+fn check_warns_of_what_runs_but_hardly_as_meant() {
+    let place = Workplace::new();
+    place.write(
+        "scene.toml",
+        "[[finger]]\n[[template]]\nname = \"unused\"\n\
+         [[entity]]\nname = \"rock\"\nstiffness_n_per_m = 90000.0\nposition_m = [1.0, 0.0, 0.0]\nshape = { kind = \"sphere\", radius_m = 0.1 }\n\
+         [[entity]]\nname = \"around\"\nshape = { kind = \"sphere\", radius_m = 0.1 }\n\
+         visual = { shape = { kind = \"mesh\", file = \"none.obj\" } }\n\
+         [[entity]]\nname = \"die\"\nmass_kg = 0.1\nposition_m = [1.1, 0.0, 0.0]\nshape = { kind = \"box\", size_m = [0.04, 0.04, 0.04] }\n",
+    );
+    let said = check(&place, &["scene.toml", "--json"]);
+    assert_eq!(said.status, Some(0), "{}{}", said.out, said.err);
+    let told = json(&said);
+    let warnings: Vec<&str> =
+        told["warnings"].as_array().expect("a list").iter().map(|it| it.as_str().expect("text")).collect();
+    for wanted in [
+        "rock (90000 N/m) may buzz: at 1000 Hz and 0 N s/m a lightly held Premium stands",
+        "die begins 20.00 mm deep in rock",
+        "finger f0 starts inside of around",
+        "none.obj: no such file",
+        "no entity is made from template unused",
+    ] {
+        assert_eq!(
+            warnings.iter().filter(|warning| warning.contains(wanted)).count(),
+            1,
+            "{wanted}: {warnings:?}"
+        );
+    }
+    assert_eq!(warnings.len(), 5, "{warnings:?}");
+    assert_eq!(told["summary"]["entities"]["moving"], 1);
+    assert_eq!(told["summary"]["shapes"]["sphere"], 2);
+}
+
+#[test]
+fn every_committed_scene_can_be_run_as_check_says() {
+    let place = Workplace::new();
+    for directory in ["scenes", "scenes/kinds"] {
+        let files = std::path::Path::new(CONFIG).join(directory).read_dir().expect("scenes");
+        for file in files.map(|entry| entry.expect("an entry").path()) {
+            if file.is_file() {
+                let said = check(&place, &[file.to_str().expect("UTF-8")]);
+                assert_eq!(said.status, Some(0), "{}{}", said.out, said.err);
+                assert!(said.out.ends_with("problems: 0, warnings: 0\n"), "{}", said.out);
+            }
+        }
+    }
+}
+
+#[test]
+fn ten_thousand_things_of_one_mesh_are_a_scene_like_any_other() {
+    let place = Workplace::new();
+    place.write(
+        "scene.toml",
+        format!(
+            "[[finger]]\nstart_m = [0.0, -1.0, 0.0]\n[[template]]\nname = \"thing\"\n\
+             shape = {{ kind = \"mesh\", file = \"{CONFIG}/meshes/bumpy-100k.stl\", scale = 0.1 }}\n\
+             [[entity]]\nname = \"item\"\ntemplate = \"thing\"\ngrid = {{ count = [10, 100, 10], spacing_m = [0.1, 0.1, 0.1] }}\n"
+        ),
+    );
+    let said = check(&place, &["scene.toml", "--json"]);
+    assert_eq!(said.status, Some(0), "{}{}", said.out, said.err);
+    let summary = &json(&said)["summary"];
+    assert_eq!(summary["entities"]["fixed"], 10_000);
+    assert_eq!(summary["meshes"].as_array().map(Vec::len), Some(1), "it is loaded once");
+    // A mesh has some 15 MB; ten thousand of them would have 150 GB.
+    let most = summary["memory_bytes"]["most"].as_u64().expect("Linux says");
+    assert!(most < 400 << 20, "{most} bytes");
+}
+
+#[test]
+fn the_scene_files_of_the_thesis_become_the_committed_scene() {
+    let place = Workplace::new();
+    let list = format!("{CONFIG}/scenes/thesis/objects.ini");
+    let objects = format!("{CONFIG}/scenes/thesis/objects");
+    let out = place.path("figure-7-2.toml");
+    let arguments = ["convert", &list, "--objects", &objects, "--meshes", "../../meshes", "--out"];
+    let said = place.run(arguments.into_iter().chain([out.to_str().expect("UTF-8")]));
+    assert_eq!((said.status, said.out.as_str()), (Some(0), ""), "{}", said.err);
+    let plain = |text: String| text.replace(&format!("{objects}/"), "objects/");
+    let converted = plain(std::fs::read_to_string(out).expect("a scene"));
+    let committed =
+        std::fs::read_to_string(format!("{CONFIG}/scenes/thesis/figure-7-2.toml")).expect("a scene");
+    assert_eq!(converted, committed);
+    assert!(said.err.contains("a moment of inertia is missing"), "{}", said.err);
+    let said = place.run(["run", &format!("{CONFIG}/scenes/thesis/figure-7-2.toml"), "--clock", "virtual"]);
+    assert_eq!(said.status, Some(0), "{}", said.err);
+}
+
+#[test]
+fn an_object_file_by_itself_becomes_an_entity_and_what_is_missing_is_told() {
+    let place = Workplace::new();
+    let object = format!("{CONFIG}/scenes/thesis/objects/Mesh_01.ini");
+    let said = place.run(["convert", &object]);
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    assert!(said.out.starts_with("[[entity]]\nname = \"Mesh_01\"\n"), "{}", said.out);
+    place.write("objects.ini", "GameObject Nothing_01\n");
+    let said = place.run(["convert", "objects.ini"]);
+    assert_eq!(said.status, Some(2));
+    assert!(said.err.starts_with("phantom3: objects.ini:1: no object file Nothing_01"), "{}", said.err);
+}
+
+#[test]
+fn settings_are_layered_and_say_where_data_is() {
+    let place = Workplace::new();
+    for directory in ["scenes", "meshes", "hands"] {
+        std::fs::create_dir(place.path(directory)).expect("a directory");
+    }
+    place.write(
+        "p.toml",
+        "[data]\nscenes = [\"scenes\"]\nmeshes = [\"meshes\"]\nhands = [\"hands\"]\n[driver]\nclock = \"virtual\"\n[window]\nshadows = true\n",
+    );
+    place.write(
+        "scenes/s.toml",
+        "hand = \"h.csv\"\n[[finger]]\n[[entity]]\nshape = { kind = \"mesh\", file = \"tetra.obj\" }\n",
+    );
+    place.write(
+        "meshes/tetra.obj",
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n",
+    );
+    place.write("hands/h.csv", "t,f0_x,f0_y,f0_z\n0,2,2,2\n1,2,2,2\n");
+    let said = place.run(["--settings", "p.toml", "settings", "--set", "window.shadows=false"]);
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    let line = |key: &str| {
+        said.out.lines().find(|line| line.starts_with(key)).unwrap_or_else(|| panic!("{}", said.out))
+    };
+    assert!(line("window.shadows").ends_with("--set:1  (for the window)"), "{}", said.out);
+    assert!(line("driver.clock").ends_with("p.toml:6"), "{}", said.out);
+    assert!(line("stereo.mode").contains("built in"), "{}", said.out);
+    // On the virtual clock no driver is started, and all three files are found.
+    let said = place.run(["run", "s.toml", "--settings", "p.toml"]);
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    assert!(said.out.starts_with("clock        virtual"), "{}", said.out);
+    let said = place.run(["run", "s.toml"]);
+    assert_eq!(said.status, Some(2), "without the settings the scene is not found");
+    let said = place.run(["--settings", "none.toml", "settings"]);
+    assert_eq!(
+        (said.status, said.err.as_str()),
+        (Some(2), "phantom3: none.toml: no such file; name an existing TOML file\n")
+    );
+}
