@@ -2,9 +2,9 @@
 //!
 //! Model: each finger's HIP is taken into the world, steps against the entities, and its force goes back
 //! into its device's base frame. Damping goes by the driver's estimate of the HIP's velocity; a driver of before
-//! 1.1 gives none, and then by the difference of its positions. Entities that move are moved by these forces ([`Objects`]),
-//! and give way to them. What is felt beside contacts (fields, guides, magnets, vibration) is added to their force. The
-//! same step serves all three clocks.
+//! 1.1 gives none, and then by the difference of its positions. What is felt beside contacts (fields, guides, magnets,
+//! vibration) is added to their force. Entities that move are moved by these forces ([`Objects`]) and give way to them; fields
+//! and guides are the world's, and push nothing but fingers. The same step serves all three clocks.
 //!
 //! Frames and signs: forces are forces on the user.
 //! Invariants: no allocation, clock, lock or panic; the command answers the frame's tick; a device whose
@@ -30,6 +30,7 @@ use shm_abi::MAX_DEVICES;
 use shm_abi::frame::{DEVICE_ORIENTATION_MEASURED, DEVICE_POSITION_VALID};
 use shm_abi::{Command, DeviceFrame, Frame};
 use world::Layout;
+use world::lists::{Handed, ListSettings, Lists, Reach, SlowList};
 
 /// A finger and the device that is it.
 #[derive(Debug, Clone)]
@@ -43,7 +44,6 @@ pub struct DeviceFinger {
 }
 
 /// The state of rendering from tick to tick.
-#[derive(Debug, Clone)]
 pub struct FastStep {
     fingers: Vec<DeviceFinger>,
     entities: Vec<Entity>,
@@ -110,12 +110,28 @@ impl FastStep {
         mut self,
         bodies: &[(usize, Body)],
         settings: physics::Settings,
+        lists: ListSettings,
         hand: &[HandFinger],
         wants_quality: bool,
     ) -> Result<Self, BodyError> {
-        let manipulation = Manipulation::new(&self.entities, bodies, settings)?;
-        self.objects = Objects::new(manipulation, hand, wants_quality, self.period_s);
+        self.objects = if bodies.len() <= lists.fast_bodies {
+            let manipulation = Manipulation::new(&self.entities, bodies, settings)?;
+            Objects::new(manipulation, hand, wants_quality, self.period_s)
+        } else {
+            let Lists { fast, hand_over, slow } = Lists::new(&self.entities, bodies, settings, lists)?;
+            Objects::new(fast, hand, wants_quality, self.period_s).with_lists(hand_over, slow)
+        };
         Ok(self)
+    }
+
+    /// The slow list, to be stepped by another thread; see [`Objects::take_slow`].
+    pub fn take_slow(&mut self) -> Option<SlowList> {
+        self.objects.take_slow()
+    }
+
+    /// How many bodies are in the fast list, and what has been handed over; `None` where there is no slow list.
+    pub fn handed(&self) -> Option<(usize, Handed)> {
+        self.objects.handed()
     }
 
     /// All entities.
@@ -178,37 +194,44 @@ impl FastStep {
         row.run_tick = frame.run_tick.max(0).unsigned_abs();
         let devices = frame.present_devices();
         let moment = Moment { t_s: row.run_tick as f64 * self.period_s, dt_s };
-        let mut hips = [None; MAX_DEVICES];
+        let reaches =
+            self.fingers.iter().zip(&self.tips_D).filter_map(|(finger, last_D)| {
+                finger.reach(devices.get(finger.device)?, last_D.as_ref(), dt_s)
+            });
+        self.objects.reach(&mut self.entities, reaches);
         let broad_phase = self.objects.broad_phase();
-        let moved = self.tips_D.iter_mut().zip(&mut self.carried_W).zip(&mut hips).zip(&mut self.near);
-        for ((finger, row), (((tip_D, carried_W), hip), near)) in
-            self.fingers.iter_mut().zip(&mut row.fingers).zip(moved)
+        let mut all_carried_W = [Vector3::zeros(); MAX_DEVICES];
+        let moved = self.tips_D.iter_mut().zip(&mut self.carried_W).zip(&mut all_carried_W);
+        let states = moved.zip(self.finger_effects.iter_mut().zip(&mut self.near));
+        for ((finger, row), (((tip_D, carried_W), was_carried_W), (felt, near))) in
+            self.fingers.iter_mut().zip(&mut row.fingers).zip(states)
         {
-            let Some(device) = devices.get(finger.device) else { continue };
+            let Some(device) = devices.get(finger.device) else {
+                felt.reset();
+                continue;
+            };
             let is_valid = device.flags & DEVICE_POSITION_VALID != 0;
             *tip_D = is_valid.then_some(device.position_m_measured);
-            let carried_W = std::mem::take(carried_W);
-            let velocity_W = self.driver_estimates.then(|| finger.velocity_W(device, carried_W / dt_s));
+            *was_carried_W = std::mem::take(carried_W);
+            let velocity_W = self.driver_estimates.then(|| finger.velocity_W(device, *was_carried_W / dt_s));
             *row = finger.step(device, &self.entities, (broad_phase, near), dt_s, velocity_W);
-            *hip =
-                Some(Carried { carried_W, hip: is_valid.then_some(Hip { position_W: row.hip, velocity_W }) });
+            if !self.effects.is_empty() {
+                let hip = is_valid.then_some(Hip { position_W: row.hip, velocity_W });
+                row.force_on_user += finger.feel(felt, &self.effects, &self.entities, hip, moment);
+            }
         }
         self.objects.note();
         if frame.run_tick >= 0 {
-            self.objects.step(&mut self.entities, &self.fingers, &mut row.fingers, dt_s);
+            let (entities, felt) = (&mut self.entities, &self.finger_effects);
+            self.objects.step(entities, &self.fingers, felt, &mut row.fingers, dt_s);
         }
+        self.objects.let_go(&self.entities, frame.run_tick >= 0);
         let tick = Tick::new(frame, &self.entities, dt_s);
-        let states = self.finger_effects.iter_mut().zip(&mut self.passivities);
-        for ((finger, row), (carried, (felt, passivity))) in
-            self.fingers.iter().zip(&mut row.fingers).zip(hips.iter().zip(states))
+        let states = all_carried_W.iter().zip(self.finger_effects.iter().zip(&mut self.passivities));
+        for ((finger, row), (carried_W, (felt, passivity))) in
+            self.fingers.iter().zip(&mut row.fingers).zip(states)
         {
-            let (Some(device), Some(Carried { carried_W, hip })) = (devices.get(finger.device), carried)
-            else {
-                continue;
-            };
-            if !self.effects.is_empty() {
-                row.force_on_user += finger.feel(felt, &self.effects, &self.entities, *hip, moment);
-            }
+            let Some(device) = devices.get(finger.device) else { continue };
             row.force_on_user = finite_or_zero(row.force_on_user);
             row.torque_on_user = finite_or_zero(row.torque_on_user);
             if let Some(passivity) = passivity {
@@ -276,15 +299,6 @@ impl FastStep {
     }
 }
 
-/// How a finger came to where it is.
-#[derive(Debug, Clone, Copy)]
-struct Carried {
-    /// How far it was carried through the world (m).
-    carried_W: Vector3<f64>,
-    /// Where its device has it, if that is known.
-    hip: Option<Hip>,
-}
-
 /// How fast the devices may be carried through the world while a finger touches: a hand's own fastest.
 const MOST_CARRIED_M_PER_S: f64 = 1.0;
 
@@ -294,6 +308,16 @@ impl DeviceFinger {
     fn velocity_W(&self, device: &DeviceFrame, carried_W: Vector3<f64>) -> Vector3<f64> {
         let own_W = self.mount.velocity_to_world(device.velocity_m_per_s_estimated);
         if carried_W == Vector3::zeros() { own_W } else { own_W + carried_W }
+    }
+
+    /// Where it is and how fast it moves; by its last position `last_D`, if that is known.
+    fn reach(&self, device: &DeviceFrame, last_D: Option<&[f64; 3]>, dt_s: f64) -> Option<Reach> {
+        if device.flags & DEVICE_POSITION_VALID == 0 {
+            return None;
+        }
+        let hip_W = self.mount.point_to_world(device.position_m_measured);
+        let from_W = last_D.map_or(hip_W, |last_D| self.mount.point_to_world(*last_D));
+        Some(Reach { hip_W, velocity_W: (hip_W - from_W) / dt_s, radius_m: self.finger.radius_m() })
     }
 
     fn step(

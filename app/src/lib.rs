@@ -34,6 +34,7 @@ pub mod run;
 pub mod settings;
 pub mod simulated;
 pub mod slow;
+pub mod slow_thread;
 pub mod study;
 pub mod two_processes;
 pub mod virtual_clock;

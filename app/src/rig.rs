@@ -323,6 +323,10 @@ impl Rig {
         let entity = Entity::new(shape, spec.pose, spec.stiffness_n_per_m)
             .and_then(|entity| entity.with_damping(spec.damping_n_s_per_m))
             .and_then(|entity| entity.with_friction(friction))
+            .and_then(|entity| match spec.restitution {
+                Some(restitution) => entity.with_restitution(restitution),
+                None => Ok(entity),
+            })
             .map(|entity| entity.with_algorithm(algorithm).with_shading(shading))
             .map_err(refused)?;
         let entity = match height_map {

@@ -70,7 +70,7 @@ fn files(named: Option<&Path>, variable: impl Fn(&str) -> Option<PathBuf>) -> Ve
 pub fn print(settings: &Settings) {
     let rows = settings.rows();
     let widest = rows.iter().map(|(_, value, ..)| value.chars().count()).max().unwrap_or(0).min(40);
-    let mut out = std::io::stdout();
+    let mut out = io::stdout();
     for (key, value, from, is_for_window) in rows {
         let note = if is_for_window { "  (for the window)" } else { "" };
         // A closed pipe is no reason to fail.

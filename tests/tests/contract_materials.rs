@@ -88,3 +88,31 @@ fn an_unknown_material_is_refused_with_those_that_there_are() {
         assert!(said.err.contains(&name), "{name}: {}", said.err);
     }
 }
+
+#[test]
+fn a_cube_of_a_material_weighs_its_volume_times_the_printed_density() {
+    let said = Workplace::new().run(["materials"]);
+    let density = |name: &str| {
+        let line = said.out.lines().find(|line| line.starts_with(name)).expect("a line");
+        line.split_whitespace().nth(5).expect("a density").parse::<f64>().expect("a number")
+    };
+    for name in ["foam", "wood", "aluminium", "steel"] {
+        let scene = format!(
+            "gravity_m_s2 = [0, 0, 0]\n[[finger]]\n[[entity]]\nname = \"cube\"\n\
+             shape = {{ kind = \"box\", size_m = [0.05, 0.05, 0.05] }}\nmaterial = \"{name}\"\nmovable = true\n"
+        );
+        // A finger pushes it.
+        let way = hand([(0.0, [-0.03, 0.0, 0.0]), (0.5, [0.02, 0.0, 0.0])]);
+        let table = Workplace::new().play(&scene, &way, &[]);
+        let (cube, finger) = (table.body("cube"), table.finger("f0"));
+        let mass = density(name) * 0.05_f64.powi(3);
+        let mut pushed = 0;
+        for (pair, finger) in cube.windows(2).zip(&finger) {
+            let force = (pair[1].velocity - pair[0].velocity) * (mass / 1e-3);
+            // Rounding of 0.2 m/s over a tick, times a kilogram.
+            assert!((force + finger.force).norm() < 1e-12, "{name}: {force} {finger:?}");
+            pushed += usize::from(finger.force.x < -1e-3);
+        }
+        assert!(pushed > 5, "{name}: {pushed}");
+    }
+}

@@ -279,3 +279,106 @@ fn all_kinds_of_things_come_to_rest_on_a_table_and_weigh_what_they_weigh() {
         assert!(sunk > 1e-5 && sunk < 4.5e-4, "{name}: {sunk}");
     }
 }
+
+/// A finger that stays where it is for so long (s).
+fn still(at: V, seconds: f64) -> String {
+    format!("t,f0_x,f0_y,f0_z\n0,{0:?},{1:?},{2:?}\n{seconds:?},{0:?},{1:?},{2:?}\n", at.x, at.y, at.z)
+}
+
+#[test]
+fn a_magnetic_ball_hangs_under_a_finger_that_feels_its_weight() {
+    let (radius, mass, force, reach) = (0.02, 0.03, 1.0, 0.01);
+    // 27/4 F0 x (1 - x)^2 = m g, on the side where it holds: x < 1/3. Newton's way there.
+    let mut x: f64 = 0.0;
+    for _ in 0..50 {
+        let slope = 6.75 * force * (1.0 - x) * (1.0 - 3.0 * x);
+        x += (mass * G - 6.75 * force * x * (1.0 - x) * (1.0 - x)) / slope;
+    }
+    let scene = |below: f64| {
+        format!(
+            "[[finger]]\n[[entity]]\nname = \"ball\"\nshape = {{ kind = \"sphere\", radius_m = {radius} }}\n\
+             position_m = [0.0, {below:?}, 0.0]\nmass_kg = {mass}\n\
+             magnetism = {{ force_n = {force:?}, distance_m = {reach:?} }}\n"
+        )
+    };
+    let table = played(&scene(-radius - x * reach), &still(V::zeros(), 2.0));
+    let (ball, finger) = (table.body("ball"), table.finger("f0"));
+    for (row, (ball, finger)) in ball.iter().zip(&finger).enumerate() {
+        // Rounding of the gap, 1e-3 of 0.02 m, times the magnet's slope.
+        assert!((finger.force + V::y() * mass * G).norm() < 1e-12, "row {row}: {finger:?}");
+        assert!(finger.entity.is_empty() && ball.velocity.norm() < 1e-12, "row {row}: {ball:?}");
+    }
+    // One millimetre lower it swings, and in every tick moves by what the finger feels and its weight.
+    let table = played(&scene(-radius - x * reach - 1e-3), &still(V::zeros(), 1.0));
+    let (ball, finger) = (table.body("ball"), table.finger("f0"));
+    for (pair, finger) in ball.windows(2).zip(&finger) {
+        let got = ((pair[1].velocity - pair[0].velocity) / DT + V::y() * G) * mass;
+        // Differences of numbers near 0.2 m/s over a tick, times 0.03 kg.
+        assert!((got + finger.force).norm() < 1e-14, "{finger:?}: {got}");
+    }
+    assert!(ball.iter().any(|ball| ball.velocity.y > 0.05), "it swings");
+}
+
+#[test]
+fn a_cube_that_hums_is_shaken_by_what_the_finger_feels_of_it() {
+    let scene = "gravity_m_s2 = [0, 0, 0]\n[[finger]]\n[[entity]]\nname = \"cube\"\n\
+        shape = { kind = \"box\", size_m = [0.05, 0.05, 0.05] }\nmass_kg = 0.1\nstiffness_n_per_m = 800\n\
+        vibration = { frequency_hz = 100.0, amplitude_n = 0.4 }\n";
+    // It is pushed off its middle, up and ahead.
+    let hand = "t,f0_x,f0_y,f0_z\n0,0.005,-0.03,0.01\n0.1,0.005,-0.02,0.01\n1.0,0.005,0.07,0.01\n";
+    let table = played(scene, hand);
+    let (cube, finger) = (table.body("cube"), table.finger("f0"));
+    let inertia = 0.1 * 0.05 * 0.05 / 6.0;
+    let mut felt = 0;
+    for (pair, finger) in cube.windows(2).zip(&finger) {
+        let got = (pair[1].velocity - pair[0].velocity) * (0.1 / DT);
+        // Rounding of 0.1 m/s over a tick, times 0.1 kg.
+        assert!((got + finger.force).norm() < 1e-13, "{finger:?}: {got}");
+        let turned = (pair[1].angular_velocity - pair[0].angular_velocity) * (inertia / DT);
+        let torque = (finger.god - pair[0].position).cross(&-finger.force);
+        // Of the cube all moments are the same. The same, of 10 rad/s.
+        assert!((turned - torque).norm() < 1e-14, "{finger:?}: {turned} {torque}");
+        felt += usize::from(finger.entity == "cube");
+    }
+    assert!(felt > 20, "{felt}");
+}
+
+#[test]
+fn a_field_holds_back_the_finger_and_pushes_no_object() {
+    let scene = "gravity_m_s2 = [0, 0, 0]\n[[finger]]\n[[field]]\nkind = \"constant\"\nforce_n = [1.0, 0.0, 0.0]\n\
+        [[entity]]\nname = \"ball\"\nshape = { kind = \"sphere\", radius_m = 0.02 }\nmass_kg = 0.1\n";
+    let table = played(scene, &still(V::new(0.1, 0.0, 0.0), 0.2));
+    assert!(table.finger("f0").iter().all(|finger| finger.force == V::x()));
+    assert!(table.body("ball").iter().all(|ball| ball.position == V::zeros()));
+}
+
+#[test]
+fn each_of_three_balls_bounces_by_its_own_restitution_and_the_floors() {
+    let mut scene = String::from(
+        "contact_response = { kind = \"impulse\", restitution = 0.5 }\n[[finger]]\n[[entity]]\nname = \"floor\"\n\
+         shape = { kind = \"plane\", normal = [0, 1, 0], offset_m = 0 }\nstiffness_n_per_m = 2000\n",
+    );
+    for (name, x, rest) in
+        [("says_nothing", 0.0, ""), ("dead", 0.2, "restitution = 0.0"), ("lively", 0.4, "restitution = 0.9")]
+    {
+        let _ = write!(
+            scene,
+            "[[entity]]\nname = \"{name}\"\nshape = {{ kind = \"sphere\", radius_m = 0.02 }}\n\
+             position_m = [{x:?}, 0.12, 0]\nmass_kg = 0.1\nstiffness_n_per_m = 500\n{rest}\n"
+        );
+    }
+    let floors = scene.replacen("stiffness_n_per_m = 2000", "stiffness_n_per_m = 2000\nrestitution = 0.3", 1);
+    // With a floor that says 0.3 the softer ball's 0.9 has 4/5 of the energy: 0.8 x 0.81 + 0.2 x 0.09.
+    for (scene, shares) in [(scene, [0.25, 0.0, 0.81]), (floors, [0.09, 0.2 * 0.09, 0.8 * 0.81 + 0.2 * 0.09])]
+    {
+        let table = played(&scene, &alone(0.5));
+        for (name, share) in ["says_nothing", "dead", "lively"].into_iter().zip(shares) {
+            let ball = table.body(name);
+            let met =
+                ball.windows(2).position(|pair| pair[0].velocity.y < 0.0 && pair[1].velocity.y >= -1e-6);
+            let highest = ball[met.unwrap()..].iter().map(|ball| ball.position.y - 0.02).fold(0.0, f64::max);
+            // It is turned round in the tick before it would meet: up to 1.4 mm of the way is not fallen.
+            assert!((highest - share * 0.1).abs() < 1.4e-3, "{name}: {highest} for {share}");
+        }
+    }
+}

@@ -9,6 +9,10 @@
 //!
 //! Gains that would make a device swing are refused where an effect is made, by the [`Limits`] of the device and rate.
 //!
+//! Reaction: fields and guides are things of the world; who feels them pushes nothing. Magnetism and vibration are an
+//! entity's own: each [`Reaction`] says what of the force came from which entity, which gets it with the sign turned where
+//! it moves.
+//!
 //! Frames and signs: world, forces on the user. SI.
 //! Invariants: every force is finite and bounded ([`MOST_FORCE_N`] an effect); no allocation, panic or unbounded
 //! loop in a step; entering or leaving the reach of anything gives no step of the force.
@@ -20,6 +24,7 @@ mod finger_effects;
 mod guide;
 mod limits;
 mod magnetism;
+mod reaction;
 mod region;
 mod track;
 mod vibration;
@@ -29,6 +34,7 @@ pub use finger_effects::{FingerEffects, Moment};
 pub use guide::{Guide, HYSTERESIS_M};
 pub use limits::Limits;
 pub use magnetism::Magnetism;
+pub use reaction::Reaction;
 pub use region::Region;
 pub use track::{MAX_PATH_POINTS, Track};
 pub use vibration::Vibration;
@@ -83,6 +89,11 @@ impl Effects {
     /// Its guides.
     pub fn guides(&self) -> &[Guide] {
         &self.guides
+    }
+
+    /// The most entities that act on a finger at once, each as often as it has effects.
+    fn most_reactions(&self) -> usize {
+        self.magnetic.len() + self.vibrating.len()
     }
 }
 

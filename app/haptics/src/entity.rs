@@ -6,7 +6,7 @@ use nalgebra::Isometry3;
 
 use crate::algorithm::Algorithm;
 use crate::effects::{Magnetism, Vibration};
-use crate::error::{ParameterError, above_zero, at_least_zero};
+use crate::error::{ParameterError, above_zero, at_least_zero, share};
 use crate::friction::Friction;
 use crate::height_map::HeightMap;
 use crate::mesh::Mesh;
@@ -31,6 +31,9 @@ pub struct Entity {
     pub damping_n_s_per_m: f64,
     /// Friction of its surface.
     pub friction: Friction,
+    /// How much of an approaching velocity it gives back to what bounces off it, 0 to 1; no finger feels it. `None`: nobody
+    /// says.
+    pub restitution: Option<f64>,
     /// How contacts with it are rendered.
     pub algorithm: Algorithm,
     /// Whether its facets feel smooth.
@@ -65,6 +68,7 @@ impl Entity {
             stiffness_n_per_m: above_zero("stiffness_n_per_m", stiffness_n_per_m)?,
             damping_n_s_per_m: 0.0,
             friction: Friction::None,
+            restitution: None,
             algorithm: Algorithm::FrictionCone,
             shading: Shading::None,
             height_map: None,
@@ -85,6 +89,11 @@ impl Entity {
     pub fn with_damping(self, damping_n_s_per_m: f64) -> Result<Self, ParameterError> {
         let damping_n_s_per_m = at_least_zero("damping_n_s_per_m", damping_n_s_per_m)?;
         Ok(Self { damping_n_s_per_m, ..self })
+    }
+
+    /// With this share of an approaching velocity given back. Errors: a share below 0 or above 1.
+    pub fn with_restitution(self, restitution: f64) -> Result<Self, ParameterError> {
+        Ok(Self { restitution: Some(share("restitution", restitution)?), ..self })
     }
 
     /// Rendered by this algorithm.

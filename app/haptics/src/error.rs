@@ -101,6 +101,16 @@ pub(crate) fn above_zero(parameter: &'static str, value: f64) -> Result<f64, Par
     Err(ParameterError::OutOfRange { parameter, value, allowed: "a finite number > 0" })
 }
 
+/// A share is finite and from 0 to 1.
+pub(crate) fn share(parameter: &'static str, value: f64) -> Result<f64, ParameterError> {
+    let allowed = "a number from 0 to 1";
+    if (0.0..=1.0).contains(&value) {
+        Ok(value)
+    } else {
+        Err(ParameterError::OutOfRange { parameter, value, allowed })
+    }
+}
+
 pub(crate) fn finite(parameter: &'static str, value: f64) -> Result<f64, ParameterError> {
     if value.is_finite() {
         return Ok(value);

@@ -86,7 +86,7 @@ pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
 pub use effects::{
     Effects, Field, FieldKind, FingerEffects, Guide, HYSTERESIS_M, Limits, MAX_PATH_POINTS, MOST_FORCE_N,
-    Magnetism, Moment, Region, Track, Vibration,
+    Magnetism, Moment, Reaction, Region, Track, Vibration,
 };
 pub use ellipsoid::{Ellipsoid, LARGEST_RATIO};
 pub use entity::Entity;

@@ -5,9 +5,28 @@
 //!
 //! Model: the ball's centre C is a god-object on the mesh grown by the radius r ([`ball`]). The spring from the HIP to C
 //! is shared among the touched features: its normal part is the sum of loads `l_i >= 0` along their normals
-//! ([`press`]), its tangential part is bounded by friction, whose circle is that of all loads together. So two walls of
-//! a groove hold a ball better than a plane does (the wedge effect), while the two faces of a nearly flat fold share one
-//! load: nothing is counted twice.
+//! ([`press`]), its tangential part is bounded by friction. So two walls of a groove hold a ball better than a plane does
+//! (the wedge effect), while the two faces of a nearly flat fold share one load: nothing is counted twice.
+//!
+//! A friction cone per contact: each touch has its own load `l_i`, and of the tangential force the part `l_i / sum l` as
+//! its own, inside its own circle `mu l_i` and tangent to its own plane. That this is what separate cones do follows from
+//! two things. What the walls leave of the spring is normal to every wall that carries a load (Moreau), so that it lies
+//! in all those planes at once; and all contacts of one centre slide with its speed, so that each opposes it with all of
+//! `mu(v) l_i`. These add up to one circle on the sum of the loads, for laws whose friction grows as the load does; a force
+//! that does not (a fixed cone) is the entity's, shared out in the same way. `tests/ball_cones.rs` goes contact by contact
+//! instead and comes to the same, tick by tick, to rounding.
+//!
+//! The loads are those of the contacts without friction. Were friction free to raise them, the walls of any groove whose half angle is
+//! below atan mu would hold the ball against any pull by squeezing it, with nobody pressing: no finger could leave.
+//!
+//! Stick and slip are the centre's: a wall that is met while C slides is slid on from the beginning, with the sliding
+//! coefficient; one that is met by a ball from free space begins by sticking, as a point does. Of C's way in that tick the
+//! part up to a face is gone on the old walls alone.
+//!
+//! Limits: of more walls through one place than hold it (four around a pit, the floor of a trough that just fits) the loads are not
+//! unique, and those of the first few are taken; what is felt in all is the same, but where it can slide along all of them its
+//! friction circle depends on the choice. A fifth is not known until it is in the way. Two walls that are parallel but for
+//! an angle `a` (rad) miss `2e-9 k r / a` of the force, and on other walls nothing.
 //!
 //! The ball is free when nothing that it touches is pressed and it can fly straight to the HIP. Friction must not hold a
 //! finger that is round the corner: where the HIP lies with room for the ball around it, a frictionless ball seeks it

@@ -1,7 +1,9 @@
 //! The points at which a finger touches an entity.
 //!
 //! Model: a point finger, and a ball on a closed form, touches at one; a ball in a groove or a corner at two or three.
-//! Their forces sum up to the contact's, their torques about the ball's centre are felt where a device can turn.
+//! Each force has a friction cone of its own: it lies within `mu` of its own normal force ([`crate::rolling`]). They sum up
+//! to the contact's, their torques about the ball's centre are felt where a device can turn. Shading and height maps lean
+//! them afterwards.
 
 use nalgebra::Vector3;
 

@@ -51,6 +51,9 @@ fn every_material_is_named_once_has_a_source_and_keeps_the_limits() {
         assert!(material.source.contains("choice"), "the studies give one number, not two");
         // Two digits are rounded: half of 0.01 each.
         assert!((material.mu_d - 0.8 * material.mu_s).abs() < 0.0091, "{material:?}");
+        // From foam to steel.
+        assert!((10.0..=8000.0).contains(&material.density_kg_m3), "{material:?}");
+        assert!(!material.density_source.is_empty());
         assert!(material.stiffness_n_per_m <= limits.stiffness_n_per_m() + 1e-9, "{material:?}");
         assert!(material.damping_n_s_per_m <= limits.damping_n_s_per_m(), "{material:?}");
     }

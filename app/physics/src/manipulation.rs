@@ -20,6 +20,7 @@ use crate::integrator::rk4::Stages;
 use crate::integrator::{Gets, Integrator, Limits, mean_angular_velocity_W};
 use crate::pair::{Response, Start, fastest_point_m_s};
 use crate::pairs::{Key, Pairs, Who};
+use crate::pull::{MAX_PULLS, Pull};
 use crate::restitution::Restitution;
 use crate::roster::{Roster, Standing};
 use crate::row::Row;
@@ -46,8 +47,9 @@ pub struct Manipulation {
     hand: Hand,
     restitution: Restitution,
     sets: Sets,
-    /// The first so many rows are fingers'.
+    /// The first so many rows are fingers', and the first so many of these press or hold.
     touching: usize,
+    pressing: usize,
     gets: Vec<Gets>,
     stages: Stages,
     fixed: Vec<Kept>,
@@ -122,7 +124,7 @@ impl Manipulation {
     fn of(entities: &[Entity], bodies: &[(usize, Body)], settings: Settings) -> Self {
         let count = bodies.len();
         let pairs = count.saturating_mul(entities.len()).min(MAX_PAIRS);
-        let room = (pairs * MAX_POINTS).min(MAX_ROWS) + MAX_TOUCHES;
+        let room = (pairs * MAX_POINTS).min(MAX_ROWS) + MAX_TOUCHES + MAX_PULLS;
         let mut made = Self {
             settings,
             roster: Roster::new(entities.len(), bodies),
@@ -138,6 +140,7 @@ impl Manipulation {
             restitution: Restitution::with_capacity(room, count),
             sets: Sets::with_capacity(count),
             touching: 0,
+            pressing: 0,
             gets: Vec::with_capacity(count),
             stages: Stages::with_capacity(room, count),
             fixed: Vec::with_capacity(room),
@@ -184,7 +187,7 @@ impl Manipulation {
         let Some(place) = self.roster.place(body) else { return Some(GraspQuality::default()) };
         let weight_W = self.settings.gravity_W * state.mass.mass_kg;
         // Arms are those of the tick's beginning: any centre will do.
-        Some(grasp::quality(&self.rows, self.touching, place, (&state.centre_W, &weight_W)))
+        Some(grasp::quality(&self.rows, self.pressing, place, (&state.centre_W, &weight_W)))
     }
 
     /// The line between the two fingers that held a body in the last tick.
@@ -269,6 +272,19 @@ impl Manipulation {
         fingers: &mut [FingerTick],
         dt_s: f64,
     ) -> Made {
+        self.step_pulled(entities, touches, &mut [], fingers, dt_s)
+    }
+
+    /// As [`Self::step_with`], with what acts between fingers and bodies without a touch; of each pull, `force_on_user_W`
+    /// becomes what the body got, times -1.
+    pub fn step_pulled(
+        &mut self,
+        entities: &mut [Entity],
+        touches: &mut [Touch],
+        pulls: &mut [Pull],
+        fingers: &mut [FingerTick],
+        dt_s: f64,
+    ) -> Made {
         if !(dt_s > 0.0 && dt_s.is_finite()) {
             return Made::default();
         }
@@ -276,15 +292,25 @@ impl Manipulation {
         for touch in touches.iter() {
             self.wake_entity(touch.entity, entities);
         }
+        for pull in pulls.iter() {
+            self.wake_entity(pull.entity, entities);
+        }
         self.line_up(entities, dt_s);
         if self.wake_what_is_met(entities, dt_s) {
             self.line_up(entities, dt_s);
         }
-        let touch_rows = self.gather(entities, touches, fingers, dt_s);
+        let (touch_rows, pull_rows) = self.gather(entities, touches, pulls, fingers, dt_s);
         let sweeps = self.find_forces(dt_s);
         for (touch, row) in touches.iter_mut().zip(touch_rows) {
             if let Some(row) = row {
                 touch.force_on_user_W = -self.rows[row].force_W;
+            }
+        }
+        for (at, pull) in pulls.iter_mut().enumerate() {
+            // What nobody steps here is as good as fixed.
+            if self.roster.place_of_entity(pull.entity).is_some() {
+                let row = pull_rows.get(at).copied().flatten();
+                pull.force_on_user_W = row.map_or(Vector3::zeros(), |row| -self.rows[row].force_W);
             }
         }
         self.hand.settle(&self.rows, &self.motions, &self.roster, fingers, dt_s);
@@ -320,14 +346,15 @@ impl Manipulation {
         }
     }
 
-    /// All contact points of the tick; says which are whose touch.
+    /// All contact points of the tick; says which rows are whose touch and pull.
     fn gather(
         &mut self,
         entities: &[Entity],
         touches: &[Touch],
+        pulls: &[Pull],
         fingers: &[FingerTick],
         dt_s: f64,
-    ) -> [Option<usize>; MAX_TOUCHES] {
+    ) -> ([Option<usize>; MAX_TOUCHES], [Option<usize>; MAX_PULLS]) {
         self.rows.clear();
         let mut touch_rows = [None; MAX_TOUCHES];
         // Fingers first: they are never left out.
@@ -350,6 +377,8 @@ impl Manipulation {
             fingers,
             &mut self.rows,
         );
+        self.pressing = self.rows.len();
+        let pull_rows = self.gather_pulls(pulls, dt_s);
         self.touching = self.rows.len();
         self.restitution.impacts.clear();
         for at in 0..self.pairs.awake_count() {
@@ -376,7 +405,21 @@ impl Manipulation {
             pair.bodies = (first, other);
             pair.gather(&start, &mut self.rows, &mut self.restitution.impacts);
         }
-        touch_rows
+        (touch_rows, pull_rows)
+    }
+
+    /// The rows of pulls; says which are whose.
+    fn gather_pulls(&mut self, pulls: &[Pull], dt_s: f64) -> [Option<usize>; MAX_PULLS] {
+        let mut pull_rows = [None; MAX_PULLS];
+        for (pull, place) in pulls.iter().zip(&mut pull_rows) {
+            let Some(body) = self.roster.place_of_entity(pull.entity) else { continue };
+            let (state, motion) = (&self.bodies[body], moving(&self.bodies[body]));
+            if let Some(row) = pull.row(body, &state.centre_W, &motion, dt_s) {
+                *place = Some(self.rows.len());
+                self.rows.push(row);
+            }
+        }
+        pull_rows
     }
 
     /// Whether one of a pair is stepped by somebody else.

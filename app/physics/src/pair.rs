@@ -25,7 +25,7 @@ pub enum Response {
     Force,
     /// Velocities are reflected.
     Impulse {
-        /// e, 0 to 1: how much of the approaching velocity comes back.
+        /// e, 0 to 1: how much of the approaching velocity comes back, where neither entity says.
         restitution: f64,
     },
 }
@@ -51,7 +51,7 @@ impl Surfacing {
             stiffness_n_per_m: k_a / (1.0 + k_a / k_b),
             damping_n_s_per_m: a.damping_n_s_per_m + b.damping_n_s_per_m,
             friction: PairFriction::between(&a.friction, &b.friction),
-            response,
+            response: response.between(a, b),
         }
     }
 }

@@ -69,6 +69,11 @@ impl Pairs {
         (key, &mut self.pool[key.place as usize])
     }
 
+    /// Those that have a body that is awake, in order.
+    pub(crate) fn iter_awake(&self) -> impl Iterator<Item = (Key, &Pair)> {
+        self.awake.iter().map(|key| (*key, &self.pool[key.place as usize]))
+    }
+
     /// All pairs, those without an awake body last.
     pub(crate) fn iter(&self) -> impl Iterator<Item = (Key, &Pair)> {
         self.awake.iter().chain(&self.asleep).map(|key| (*key, &self.pool[key.place as usize]))

@@ -4,7 +4,7 @@
 mod common;
 
 use common::*;
-use haptics::{Cuboid, Sphere};
+use haptics::{Cuboid, Entity, Sphere};
 use nalgebra::{Isometry3, Vector3};
 use physics::{Body, Integrator, MassProperties, Response, Settings};
 
@@ -301,4 +301,53 @@ fn a_bounce_that_a_finger_ends_within_the_tick_is_none() {
             assert_eq!(bounced, 0, "{mass} kg, {stiffness} N/m, e {restitution}");
         }
     }
+}
+
+/// How high a ball comes back that is dropped from 0.2 m, as a share (m/m); who has which restitution and stiffness.
+fn comes_back(ball_has: (Option<f64>, f64), floor_has: (Option<f64>, f64), scene: f64) -> f64 {
+    let has = |entity: Entity, (restitution, stiffness): (Option<f64>, f64)| Entity {
+        restitution,
+        stiffness_n_per_m: stiffness,
+        ..entity
+    };
+    let height = 0.2;
+    let at = Isometry3::translation(0.0, RADIUS + height, 0.0);
+    let ball = has(object(Sphere::new(RADIUS).unwrap(), at, 1.0, 0.5), ball_has);
+    let body = body(&ball, 0.1);
+    let mut world =
+        World::new(vec![has(floor(0.0, 1.0, 0.5), floor_has), ball], &[(1, body)], impulse(scene), 1);
+    let (mut highest, mut has_met) = (0.0_f64, false);
+    for _ in 0..((2.0 * height / G).sqrt() * 2.1 / DT) as usize {
+        world.step(&AWAY);
+        has_met |= world.body().velocity_W.y > 0.0;
+        highest = if has_met { highest.max(world.body().centre_W.y - RADIUS) } else { 0.0 };
+    }
+    highest / height
+}
+
+#[test]
+fn a_ball_bounces_by_what_both_surfaces_give_back_of_their_share() {
+    let composite = (0.64 * 2000.0 + 0.09 * 500.0) / 2500.0;
+    for (ball, floor, scene, share) in [
+        ((None, 500.0), (None, 2000.0), 0.5, 0.25),
+        ((Some(0.8), 500.0), (None, 2000.0), 0.5, 0.64),
+        ((None, 500.0), (Some(0.8), 2000.0), 0.5, 0.64),
+        ((Some(0.8), 500.0), (Some(0.8), 2000.0), 0.0, 0.64),
+        ((Some(0.8), 500.0), (Some(0.3), 2000.0), 0.0, composite),
+        ((Some(0.0), 500.0), (Some(0.0), 2000.0), 1.0, 0.0),
+    ] {
+        let off = comes_back(ball, floor, scene) - share;
+        // A tick early, v dt of 0.2 m of which a share would be lost, and a tick of falling late.
+        let early = (1.0 - share) * (2.0 * G / 0.2_f64).sqrt() * DT;
+        assert!((-G * DT * DT / 0.2..=early + 1e-12).contains(&off), "{ball:?} {floor:?}: {off}");
+    }
+}
+
+#[test]
+fn a_share_that_is_none_is_refused() {
+    for wrong in [-0.1, 1.1, f64::NAN] {
+        let refused = floor(0.0, 1000.0, 0.5).with_restitution(wrong).unwrap_err().to_string();
+        assert!(refused.contains("restitution") && refused.contains("from 0 to 1"), "{refused}");
+    }
+    assert_eq!(floor(0.0, 1000.0, 0.5).with_restitution(1.0).unwrap().restitution, Some(1.0));
 }

@@ -9,7 +9,7 @@ use common::*;
 use counting::CALLS;
 use haptics::{ContactState, Cuboid, Sphere};
 use nalgebra::{Isometry3, Vector3};
-use physics::{Integrator, Response, Settings, Touch};
+use physics::{Integrator, Pull, Response, Settings, Touch};
 
 #[test]
 fn a_step_never_allocates() {
@@ -49,8 +49,21 @@ fn a_step_never_allocates() {
                     world.touches.extend(finger.contacts().map(|contact| touch_of(contact, index)));
                 }
                 touched += world.touches.len();
+                let mut pulls = [Pull {
+                    entity: 1,
+                    finger: 0,
+                    point_W: centre,
+                    force_on_user_W: Vector3::new(0.01, -0.02, 0.0),
+                    stiffness_n_per_m: 50.0,
+                }; 3];
                 let before = CALLS.get();
-                let made = world.manipulation.step(&mut world.entities, &mut world.touches, DT);
+                let made = world.manipulation.step_pulled(
+                    &mut world.entities,
+                    &mut world.touches,
+                    &mut pulls,
+                    &mut [],
+                    DT,
+                );
                 counted += CALLS.get() - before;
                 rows += made.rows;
             }

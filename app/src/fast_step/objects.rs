@@ -1,19 +1,22 @@
 //! The entities that move, in the fast step: what the fingers' touches do to them, and what that does to the fingers.
 //!
-//! Model: fingers render against the entities as they are when the tick begins. Each touch on one that moves is handed to
-//! [`physics::Manipulation`], which gives back the force that the body got; the finger's force is changed by the
+//! Model: fingers render against the entities as they are when the tick begins. Each touch on one that moves, and what else
+//! acts between a finger and one (magnetism, vibration), is handed to [`physics::Manipulation`], which gives back the force that the body got; the finger's force is changed by the
 //! difference. So what is commanded is, times -1, what moved the object.
 //!
 //! Invariants: nothing moves before a run's t = 0 (the scene is what it says until then), and no stall of the driver is
 //! made up for at once: objects are late by what was missed.
 
-use haptics::{ContactState, Entity};
+use haptics::{ContactState, Entity, FingerEffects};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use physics::{BroadPhase, FingerSettings, FingerTick, Made, Manipulation, Touch};
+use physics::{BroadPhase, FingerSettings, FingerTick, MAX_PULLS, Made, Manipulation, Pull, Touch};
+use world::lists::{FastList, Handed, Reach, SlowList};
 
 use super::DeviceFinger;
 use crate::row::{BodyRow, FingerRow};
 
+/// Ticks between two turns of the slow list, where no thread of its own has it.
+const SLOW_EVERY: u32 = 10;
 /// A finger touches no more bodies at once.
 const MOST_TOUCHED: usize = 16;
 /// Ticks that a single step of the objects makes up for at most.
@@ -29,10 +32,12 @@ pub struct HandFinger {
 }
 
 /// Moving entities and what is known of them.
-#[derive(Debug, Clone)]
 pub struct Objects {
     manipulation: Manipulation,
+    /// Who is in the slow list, where there is one.
+    lists: Option<SlowOnes>,
     touches: Vec<Touch>,
+    pulls: Vec<Pull>,
     ticks: Vec<FingerTick>,
     /// The button with which each finger ties.
     buttons: Vec<Option<u32>>,
@@ -44,6 +49,15 @@ pub struct Objects {
     period_s: f64,
     /// What the last tick took.
     pub made: Made,
+}
+
+/// What the slow list has, as the fast side sees it.
+struct SlowOnes {
+    hand_over: FastList,
+    /// The slow side itself, while no other thread has it.
+    slow: Option<SlowList>,
+    /// Ticks that it has not been told of yet.
+    ticks: u32,
 }
 
 impl Objects {
@@ -62,15 +76,54 @@ impl Objects {
             rows: vec![BodyRow::default(); bodies],
             changed: (0..bodies as u32).collect(),
             touches: Vec::with_capacity(room),
+            pulls: Vec::with_capacity(MAX_PULLS),
             ticks: vec![FingerTick::at(Vector3::zeros()); fingers.len()],
             buttons: fingers.iter().map(|finger| finger.button).collect(),
             wants_quality,
             manipulation,
+            lists: None,
             period_s,
             made: Made::default(),
         };
         objects.note_all();
         objects
+    }
+
+    /// With a slow list for those that are too many for the fast one. Until another thread [takes](Self::take_slow) it, it
+    /// has its turns here.
+    #[must_use]
+    pub fn with_lists(mut self, hand_over: FastList, slow: SlowList) -> Self {
+        self.lists = Some(SlowOnes { hand_over, slow: Some(slow), ticks: 0 });
+        self
+    }
+
+    /// The slow list, to be stepped by another thread; `None` where there is none, or another one has it.
+    pub fn take_slow(&mut self) -> Option<SlowList> {
+        self.lists.as_mut()?.slow.take()
+    }
+
+    /// How many bodies are in the fast list, and what has been handed over.
+    pub fn handed(&self) -> Option<(usize, Handed)> {
+        let lists = self.lists.as_ref()?;
+        Some((lists.hand_over.here(), lists.hand_over.handed()))
+    }
+
+    /// Before fingers are stepped: who could be reached soon comes into the fast list. `reaches` are the fingers'.
+    pub fn reach(&mut self, entities: &mut [Entity], reaches: impl Iterator<Item = Reach>) {
+        if let Some(lists) = &mut self.lists {
+            lists.hand_over.begin_tick(&mut self.manipulation, entities, reaches);
+        }
+    }
+
+    /// After all: who is out of reach may go; and the slow list has its turn, if it is here.
+    pub fn let_go(&mut self, entities: &[Entity], is_running: bool) {
+        let Some(lists) = &mut self.lists else { return };
+        lists.hand_over.end_tick(&mut self.manipulation, entities);
+        lists.ticks += 1;
+        if let Some(slow) = lists.slow.as_mut().filter(|_| lists.ticks >= SLOW_EVERY) {
+            slow.turn(if is_running { lists.ticks } else { 0 }, self.period_s);
+            lists.ticks = 0;
+        }
     }
 
     /// The bodies as the tick began.
@@ -127,9 +180,11 @@ impl Objects {
         &mut self,
         entities: &mut [Entity],
         fingers: &[DeviceFinger],
+        felt: &[FingerEffects],
         rows: &mut [FingerRow],
         dt_s: f64,
     ) {
+        self.pull(felt, rows);
         self.touches.clear();
         for (index, finger) in fingers.iter().enumerate() {
             for contact in finger.finger.contacts() {
@@ -163,7 +218,13 @@ impl Objects {
             };
         }
         let dt_s = dt_s.min(MOST_TICKS * self.period_s);
-        self.made = self.manipulation.step_with(entities, &mut self.touches, &mut self.ticks, dt_s);
+        self.made = self.manipulation.step_pulled(
+            entities,
+            &mut self.touches,
+            &mut self.pulls,
+            &mut self.ticks,
+            dt_s,
+        );
         for (row, tick) in rows.iter_mut().zip(&self.ticks) {
             row.force_on_user += tick.force_on_user_W;
             row.torque_on_user += tick.torque_on_user_W;
@@ -176,6 +237,30 @@ impl Objects {
         }
         let got = self.touches.iter().map(|touch| touch.force_on_user_W);
         add_to_rows(got, &self.touches, fingers, rows);
+        for pull in &self.pulls {
+            rows[pull.finger].force_on_user += pull.force_on_user_W;
+        }
+    }
+
+    /// Takes from the fingers' forces what acts between them and bodies beside touches, until it is known what moved those.
+    fn pull(&mut self, felt: &[FingerEffects], rows: &mut [FingerRow]) {
+        self.pulls.clear();
+        for (finger, felt) in felt.iter().enumerate() {
+            for reaction in
+                felt.reactions().iter().filter(|reaction| self.manipulation.is_body(reaction.entity))
+            {
+                rows[finger].force_on_user -= reaction.force_on_user_W;
+                if self.pulls.len() < MAX_PULLS {
+                    self.pulls.push(Pull {
+                        entity: reaction.entity,
+                        finger,
+                        point_W: reaction.point_W,
+                        force_on_user_W: reaction.force_on_user_W,
+                        stiffness_n_per_m: reaction.stiffness_n_per_m,
+                    });
+                }
+            }
+        }
     }
 }
 

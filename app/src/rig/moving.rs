@@ -7,6 +7,7 @@ use physics::{
     Attachment, Body, BodyError, FingerSettings, HeldOrientation, Integrator, MassProperties, Response,
     Settings, Sleep, SoftFinger, TorsionModel,
 };
+use world::lists::ListSettings;
 use world::{
     AttachSpec, AttachedOrientation, IntegratorSpec, MassSpec, MotionSpec, ResponseSpec, SceneEntity,
     SceneFinger, SoftModelSpec, SoftSpec,
@@ -63,7 +64,8 @@ impl Rig {
         let first = |source| no_body(&self.scene.entities[bodies[0].0], source);
         let hand: Vec<HandFinger> =
             self.scene.fingers.iter().map(|f| self.hand_finger(f)).collect::<Result<_, _>>()?;
-        step.with_objects(bodies, settings, &hand, dynamics.grasp_quality).map_err(first)
+        step.with_objects(bodies, settings, ListSettings::default(), &hand, dynamics.grasp_quality)
+            .map_err(first)
     }
 
     fn hand_finger(&self, spec: &SceneFinger) -> Result<HandFinger, RigError> {

@@ -1,4 +1,5 @@
-//! How a scene's moving entities are computed: `integrator`, `contact_response` and `grasp_quality`.
+//! How a scene's moving entities are computed: `integrator`, `contact_response` and `grasp_quality`; and what an entity's
+//! `restitution` is.
 
 use crate::error::SceneError;
 use crate::reader::{Bound, Table, Value};
@@ -37,7 +38,7 @@ pub enum ResponseSpec {
     Force,
     /// By reflected velocities.
     Impulse {
-        /// Share of the approaching velocity that comes back, 0 to 1.
+        /// Share of the approaching velocity that comes back, 0 to 1, where no entity says.
         restitution: f64,
     },
 }
@@ -71,6 +72,19 @@ impl ResponseSpec {
         match restitution.number(Bound::NotNegative)? {
             share if kind == "impulse" && share <= 1.0 => Ok(Self::Impulse { restitution: share }),
             _ => Err(restitution.out_of_range(allowed)),
+        }
+    }
+
+    /// How much an entity gives back of an approaching velocity, if it says; only velocities that are reflected ask for it.
+    pub(crate) fn read_restitution(self, entity: &Table<'_>) -> Result<Option<f64>, SceneError> {
+        let Some(value) = entity.get("restitution") else { return Ok(None) };
+        match (value.number(Bound::NotNegative)?, self) {
+            (share, _) if share > 1.0 => Err(value.out_of_range("a number from 0 to 1")),
+            (share, Self::Impulse { .. }) => Ok(Some(share)),
+            (_, Self::Force) => Err(value.out_of_range(
+                "none while contacts are springs with dampers: say `contact_response = { kind = \"impulse\" }` at the \
+                 top of the scene, or leave out `restitution`",
+            )),
         }
     }
 }

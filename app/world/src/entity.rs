@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Translation3, Vector3};
 
+use crate::dynamics::ResponseSpec;
 use crate::effects::{MagnetismSpec, VibrationSpec};
 use crate::error::SceneError;
 use crate::friction::FrictionSpec;
@@ -42,6 +43,8 @@ pub struct SceneEntity {
     pub damping_n_s_per_m: f64,
     /// Default none.
     pub friction: FrictionSpec,
+    /// Share of an approaching velocity that comes back, 0 to 1; default what the other entity, or the scene, says.
+    pub restitution: Option<f64>,
     /// Default the Friction Cone Algorithm.
     pub algorithm: AlgorithmSpec,
     /// What it is made of, if the scene says; it gave the values that the scene did not.
@@ -98,16 +101,19 @@ impl SceneEntity {
         table: &Table<'d>,
         i: usize,
         names: &mut Names<'d>,
+        response: ResponseSpec,
         problems: &mut Problems,
     ) -> Vec<Self> {
         problems.keys(table, &KEYS);
         let Some(grid) = problems.keep(Grid::read(table)) else { return Vec::new() };
         let Some(grid) = grid else {
             let name = problems.keep(names.claim(table, format!("e{i}")));
-            return Self::read(table, name.unwrap_or_default(), None, problems).into_iter().collect();
+            return Self::read(table, name.unwrap_or_default(), None, response, problems)
+                .into_iter()
+                .collect();
         };
         let base = problems.keep(name_of(table)).flatten().unwrap_or_else(|| format!("e{i}"));
-        let Some(first) = Self::read(table, base, None, problems) else { return Vec::new() };
+        let Some(first) = Self::read(table, base, None, response, problems) else { return Vec::new() };
         let mut item = |(place, offset_m): (String, Vector3<f64>)| {
             let name = format!("{}{place}", first.name);
             let name = problems.keep(names.claim_made(table, name, " (of the grid)"))?;
@@ -123,10 +129,11 @@ impl SceneEntity {
         table: &Table<'_>,
         name: String,
         given: Option<(ShapeSpec, Isometry3<f64>)>,
+        response: ResponseSpec,
         problems: &mut Problems,
     ) -> Option<Self> {
         let made_of = problems.keep(read_material(table)).flatten();
-        let motion = problems.keep(MotionSpec::read(table));
+        let motion = problems.keep(MotionSpec::read(table, made_of));
         let usual_damping = match motion {
             Some(Some(_)) => MotionSpec::DEFAULT_DAMPING_N_S_PER_M,
             _ => 0.0,
@@ -143,6 +150,7 @@ impl SceneEntity {
         let truth = |key: &str| table.get(key).map_or(Ok(true), |value| value.truth());
         let (stiffness_n_per_m, damping_n_s_per_m) = (problems.keep(stiffness), problems.keep(damping));
         let friction = problems.keep(FrictionSpec::read(table, made_of));
+        let restitution = problems.keep(response.read_restitution(table));
         let algorithm = problems.keep(AlgorithmSpec::read(table));
         let magnetism = problems.keep(MagnetismSpec::read(table));
         let vibration = problems.keep(VibrationSpec::read(table));
@@ -164,6 +172,7 @@ impl SceneEntity {
             stiffness_n_per_m: stiffness_n_per_m?,
             damping_n_s_per_m: damping_n_s_per_m?,
             friction: friction?,
+            restitution: restitution?,
             algorithm: algorithm?,
             material: made_of.map(|made_of| made_of.name),
             magnetism: magnetism?,
@@ -184,11 +193,11 @@ impl SceneEntity {
     }
 
     /// Checks a template, which may leave out the shape.
-    pub(crate) fn check_template(table: &Table<'_>, problems: &mut Problems) {
+    pub(crate) fn check_template(table: &Table<'_>, response: ResponseSpec, problems: &mut Problems) {
         problems.keys(table, &KEYS);
         problems.keep(Grid::read(table));
         if table.get("shape").is_some() {
-            Self::read(table, String::new(), None, problems);
+            Self::read(table, String::new(), None, response, problems);
         }
     }
 }
@@ -227,6 +236,7 @@ const KEYS: Vocabulary = Vocabulary {
         "height_map",
         "magnetism",
         "vibration",
+        "movable",
         "mass_kg",
         "density_kg_m3",
         "inertia_kg_m2",
@@ -234,6 +244,7 @@ const KEYS: Vocabulary = Vocabulary {
         "velocity_m_s",
         "angular_velocity_rad_s",
         "rotation_locked",
+        "restitution",
         "haptic",
         "collidable",
         "visual",

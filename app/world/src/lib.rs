@@ -50,6 +50,7 @@ mod guide;
 mod height_map;
 mod layout;
 mod light;
+pub mod lists;
 mod material;
 pub mod model;
 mod motion;

@@ -1,5 +1,7 @@
-//! How an entity moves: `mass_kg` or `density_kg_m3`, and what goes with them; without either it is fixed.
+//! How an entity moves: `mass_kg` or `density_kg_m3`, or `movable` by the density of its material, and what goes with them;
+//! without any of these it is fixed.
 
+use haptics::Material;
 use nalgebra::Vector3;
 
 use crate::error::SceneError;
@@ -37,10 +39,19 @@ impl MotionSpec {
     pub const DEFAULT_DAMPING_N_S_PER_M: f64 = 1.0;
 
     /// Of an entity; `None`: it is fixed.
-    pub(crate) fn read(entity: &Table<'_>) -> Result<Option<Self>, SceneError> {
+    pub(crate) fn read(entity: &Table<'_>, material: Option<&Material>) -> Result<Option<Self>, SceneError> {
         let number = |key: &str| entity.get(key).map(|value| value.number(Bound::Positive)).transpose();
+        let movable = entity.get("movable").map(|value| value.truth()).transpose()?;
         let mass = match (number("mass_kg")?, number("density_kg_m3")?) {
-            (None, None) => return Self::fixed(entity),
+            (None, None) if movable != Some(true) => return Self::fixed(entity),
+            (None, None) => match material {
+                Some(made_of) => MassSpec::Density(made_of.density_kg_m3),
+                None => return Err(entity.missing("mass_kg", OF_MOVABLE)),
+            },
+            _ if movable == Some(false) => {
+                let value = entity.require("movable", "true")?;
+                return Err(value.out_of_range("true, or neither `mass_kg` nor `density_kg_m3`"));
+            }
             (Some(mass), None) => MassSpec::Mass(mass),
             (None, Some(density)) => MassSpec::Density(density),
             (Some(_), Some(_)) => {
@@ -73,6 +84,9 @@ impl MotionSpec {
     }
 }
 
+/// What makes a mass.
+const OF_MOVABLE: &str = "a number above 0, or `density_kg_m3`, or a `material`, which has a density: an entity with \
+                          `movable = true` has a mass";
 /// Keys that need a mass.
 const OF_MOVING: [&str; 5] =
     ["inertia_kg_m2", "centre_of_mass_m", "velocity_m_s", "angular_velocity_rad_s", "rotation_locked"];

@@ -120,7 +120,8 @@ impl Scene {
         let dynamics = problems.keep(DynamicsSpec::read(table));
         let hand = problems.keep(read_hand(table));
         let fingers = SceneFinger::read_all(table, problems);
-        let things = Things::read(tables, problems);
+        let response = dynamics.unwrap_or_default().response;
+        let things = Things::read(tables, response, problems);
         let (fields, guides) =
             (problems.keep(FieldSpec::read_all(table)), problems.keep(GuideSpec::read_all(table)));
         Some(Self {

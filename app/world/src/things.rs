@@ -3,6 +3,7 @@
 //! The scene's own come before included ones; default names go by the place in that list.
 
 use crate::camera::SceneCamera;
+use crate::dynamics::ResponseSpec;
 use crate::entity::SceneEntity;
 use crate::environment::SceneEnvironment;
 use crate::error::SceneError;
@@ -16,6 +17,8 @@ use crate::templates::{SceneTemplate, Templates, listed};
 /// All of it, as far as it could be read.
 #[derive(Debug, Default)]
 pub(crate) struct Things {
+    /// How contacts between entities answer.
+    response: ResponseSpec,
     pub(crate) entities: Vec<SceneEntity>,
     pub(crate) environments: Vec<SceneEnvironment>,
     pub(crate) lights: Vec<SceneLight>,
@@ -24,9 +27,9 @@ pub(crate) struct Things {
 }
 
 impl Things {
-    pub(crate) fn read<'d>(files: &[Table<'d>], problems: &mut Problems) -> Self {
-        let mut templates = read_templates(files, problems);
-        let mut things = Self::default();
+    pub(crate) fn read<'d>(files: &[Table<'d>], response: ResponseSpec, problems: &mut Problems) -> Self {
+        let mut templates = read_templates(files, response, problems);
+        let mut things = Self { response, ..Self::default() };
         let mut names = Names::default();
         let entities = all(files, "entity", problems);
         things.read_entities(&entities, &mut templates, &mut names, problems);
@@ -52,7 +55,7 @@ impl Things {
     ) {
         for (i, table) in tables.iter().enumerate() {
             let Some(table) = problems.keep(templates.complete(table.clone())) else { continue };
-            let read = SceneEntity::read_all(&table, i, names, problems);
+            let read = SceneEntity::read_all(&table, i, names, self.response, problems);
             templates.used(&table, read.len());
             self.entities.extend(read);
             if self.entities.len() > MAX_ENTITIES {
@@ -71,7 +74,7 @@ impl Things {
         let mut own_names = Names::default();
         for (i, table) in tables.iter().enumerate() {
             let both = (&mut own_names, &mut *names);
-            let read = SceneEnvironment::read(table, i, both, &mut self.entities, problems);
+            let read = SceneEnvironment::read(table, i, both, &mut self.entities, self.response, problems);
             if let Some(door) = read.as_ref().and_then(|environment| environment.door.as_ref())
                 && !names.has(&door.of)
             {
@@ -101,7 +104,7 @@ impl Things {
     }
 }
 
-fn read_templates<'d>(files: &[Table<'d>], problems: &mut Problems) -> Templates<'d> {
+fn read_templates<'d>(files: &[Table<'d>], response: ResponseSpec, problems: &mut Problems) -> Templates<'d> {
     let (mut templates, mut names) = (Templates::default(), Names::default());
     for table in all(files, "template", problems) {
         templates.add(table, &mut names, problems);
@@ -109,7 +112,7 @@ fn read_templates<'d>(files: &[Table<'d>], problems: &mut Problems) -> Templates
     let complete: Vec<_> = templates.tables().map(|table| templates.complete(table.clone())).collect();
     for table in complete {
         if let Some(table) = problems.keep(table) {
-            SceneEntity::check_template(&table, problems);
+            SceneEntity::check_template(&table, response, problems);
         }
     }
     templates

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 
 use super::acceleration::AccelerationFilter;
 use super::guide::Hold;
+use super::reaction::{Reaction, Reactions};
 use super::{Effects, Motion, Pull};
 use crate::contact::RAMP_IN_S;
 use crate::entity::Entity;
@@ -26,6 +27,8 @@ pub struct FingerEffects {
     holds: Box<[Hold]>,
     /// What springs and magnets hold (J).
     stored_j: f64,
+    /// What of the force came from entities.
+    reactions: Reactions,
 }
 
 /// When a tick is.
@@ -47,6 +50,7 @@ impl FingerEffects {
             filters: vec![AccelerationFilter::default(); effects.fields().len()].into(),
             holds: vec![Hold::default(); effects.guides().len()].into(),
             stored_j: 0.0,
+            reactions: Reactions::with_room(effects.most_reactions()),
         }
     }
 
@@ -84,14 +88,17 @@ impl FingerEffects {
             return Vector3::zeros();
         }
         let motion = self.motion(&hip, moment.dt_s);
+        self.reactions.clear();
         let mut pull = self.of_guides(effects, &motion);
         pull.force_on_user_W += self.of_fields(effects, &motion);
-        pull.add(&of_magnets(effects, entities, finger, &hip.position_W));
-        pull.force_on_user_W += of_vibrations(effects, entities, finger, moment.t_s);
+        pull.add(&self.of_magnets(effects, entities, finger, &hip.position_W));
+        pull.force_on_user_W += self.of_vibrations(effects, entities, finger, moment.t_s);
         self.come_on(moment.dt_s);
         if !(is_finite(&pull.force_on_user_W) && pull.stored_j.is_finite()) {
             pull = Pull::default();
+            self.reactions.clear();
         }
+        self.reactions.scale(self.strength);
         self.stored_j = pull.stored_j * self.strength;
         pull.force_on_user_W * self.strength
     }
@@ -100,6 +107,12 @@ impl FingerEffects {
     /// to the track or the surface. Of a magnet that is out of reach, and of fields, nothing.
     pub fn stored_j(&self) -> f64 {
         self.stored_j
+    }
+
+    /// What of the last tick's force came from which entity: each gets its part with the sign turned. Of fields and guides
+    /// there is none.
+    pub fn reactions(&self) -> &[Reaction] {
+        self.reactions.as_slice()
     }
 
     /// Whether it is held by this guide.
@@ -111,6 +124,7 @@ impl FingerEffects {
     pub fn reset(&mut self) {
         (self.strength, self.stored_j) = (0.0, 0.0);
         self.previous_hip_W = None;
+        self.reactions.clear();
         self.filters.fill(AccelerationFilter::default());
         self.holds.fill(Hold::default());
     }
@@ -139,6 +153,45 @@ impl FingerEffects {
         pull
     }
 
+    fn of_magnets(
+        &mut self,
+        effects: &Effects,
+        entities: &[Entity],
+        finger: &Finger,
+        hip_W: &Vector3<f64>,
+    ) -> Pull {
+        let mut total = Pull::default();
+        for &index in &effects.magnetic {
+            let Some(entity) = entities.get(index) else { continue };
+            if let (Some(magnetism), None) = (&entity.magnetism, finger.contact(index))
+                && let Some((pull, reaction)) = magnetism.pull((index, entity), hip_W, finger.radius_m())
+            {
+                total.add(&pull);
+                self.reactions.add(reaction);
+            }
+        }
+        total
+    }
+
+    fn of_vibrations(
+        &mut self,
+        effects: &Effects,
+        entities: &[Entity],
+        finger: &Finger,
+        t_s: f64,
+    ) -> Vector3<f64> {
+        let mut force_W = Vector3::zeros();
+        for &index in &effects.vibrating {
+            let Some(entity) = entities.get(index) else { continue };
+            if let (Some(vibration), Some(contact)) = (&entity.vibration, finger.contact(index)) {
+                let hum = vibration.hum(contact, finger.radius_m(), t_s);
+                force_W += hum.force_on_user_W;
+                self.reactions.add(hum);
+            }
+        }
+        force_W
+    }
+
     fn come_on(&mut self, dt_s: f64) {
         if self.strength < 1.0 {
             let step = dt_s / self.ramp_in_s;
@@ -146,26 +199,4 @@ impl FingerEffects {
             self.strength = if step > 0.0 { (self.strength + step).min(1.0) } else { 1.0 };
         }
     }
-}
-
-fn of_magnets(effects: &Effects, entities: &[Entity], finger: &Finger, hip_W: &Vector3<f64>) -> Pull {
-    let mut pull = Pull::default();
-    for &index in &effects.magnetic {
-        let Some(entity) = entities.get(index) else { continue };
-        if let (Some(magnetism), None) = (&entity.magnetism, finger.contact(index)) {
-            pull.add(&magnetism.pull(entity, hip_W, finger.radius_m()));
-        }
-    }
-    pull
-}
-
-fn of_vibrations(effects: &Effects, entities: &[Entity], finger: &Finger, t_s: f64) -> Vector3<f64> {
-    let mut force_W = Vector3::zeros();
-    for &index in &effects.vibrating {
-        let Some(entity) = entities.get(index) else { continue };
-        if let (Some(vibration), Some(contact)) = (&entity.vibration, finger.contact(index)) {
-            force_W += vibration.force_on_user_W(contact, t_s);
-        }
-    }
-    force_W
 }

@@ -14,10 +14,10 @@
 use nalgebra::Vector3;
 
 use super::limits::not_above;
-use super::{Limits, Pull};
+use super::{Limits, Pull, Reaction};
 use crate::entity::Entity;
 use crate::error::{ParameterError, above_zero, at_least_zero};
-use crate::frame::{is_finite, point_into_body, vector_into_world};
+use crate::frame::{is_finite, point_into_body, point_into_world, vector_into_world};
 use crate::shape::Shape;
 use crate::surface::Surface;
 
@@ -57,6 +57,13 @@ impl Magnetism {
         if x > 0.0 && x < 1.0 { STEEPEST * self.force_n * x * (1.0 - x) * (1.0 - x) } else { 0.0 }
     }
 
+    /// By how much the pull falls on the way to the surface, per way \[N/m\]; 0 where it grows or there is none.
+    pub fn stiffness_n_per_m(&self, distance_m: f64) -> f64 {
+        let x = distance_m / self.distance_m;
+        let slope = STEEPEST * self.force_n / self.distance_m * (1.0 - x) * (1.0 - 3.0 * x);
+        if x > 0.0 && x < 1.0 { slope.max(0.0) } else { 0.0 }
+    }
+
     /// Energy of a finger at this distance \[J\]: 0 out of reach, least at the surface.
     pub fn potential_j(&self, distance_m: f64) -> f64 {
         let rest = 1.0 - (distance_m / self.distance_m).clamp(0.0, 1.0);
@@ -68,24 +75,34 @@ impl Magnetism {
         matches!(shape, Shape::Form(_) | Shape::Mesh(_) | Shape::Own(_))
     }
 
-    /// On a finger of this radius that does not touch the entity.
-    pub(super) fn pull(&self, entity: &Entity, hip_W: &Vector3<f64>, finger_radius_m: f64) -> Pull {
+    /// On a finger of this radius that does not touch the entity, which has this index; `None`: it is out of reach.
+    pub(super) fn pull(
+        &self,
+        (index, entity): (usize, &Entity),
+        hip_W: &Vector3<f64>,
+        finger_radius_m: f64,
+    ) -> Option<(Pull, Reaction)> {
         let hip_B = point_into_body(&entity.X_WB, hip_W);
         let lift_m = entity.height_map.as_ref().map_or(0.0, |map| map.lift_m(&entity.shape, finger_radius_m));
         let touched_m = finger_radius_m + lift_m;
         let reach_m = self.distance_m + touched_m;
-        let Some(nearest_B) = nearest(&entity.shape, &hip_B, reach_m) else { return Pull::default() };
+        let nearest_B = nearest(&entity.shape, &hip_B, reach_m)?;
         let way_B = nearest_B - hip_B;
         let distance_m = way_B.norm();
         let pull_n = self.pull_n(distance_m - touched_m);
         let force_B = way_B * (pull_n / distance_m);
         if pull_n <= 0.0 || !is_finite(&force_B) {
-            return Pull::default();
+            return None;
         }
-        Pull {
-            force_on_user_W: vector_into_world(&entity.X_WB, &force_B),
-            stored_j: self.potential_j(distance_m - touched_m) - self.potential_j(0.0),
-        }
+        let force_on_user_W = vector_into_world(&entity.X_WB, &force_B);
+        let stored_j = self.potential_j(distance_m - touched_m) - self.potential_j(0.0);
+        let reaction = Reaction {
+            entity: index,
+            point_W: point_into_world(&entity.X_WB, &nearest_B),
+            force_on_user_W,
+            stiffness_n_per_m: self.stiffness_n_per_m(distance_m - touched_m),
+        };
+        Some((Pull { force_on_user_W, stored_j }, reaction))
     }
 }
 

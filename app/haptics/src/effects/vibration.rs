@@ -8,9 +8,8 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::Vector3;
-
 use super::Limits;
+use super::Reaction;
 use super::limits::not_above;
 use crate::contact::Contact;
 use crate::error::{ParameterError, above_zero, at_least_zero};
@@ -54,11 +53,17 @@ impl Vibration {
         self.full_load_n
     }
 
-    pub(super) fn force_on_user_W(&self, contact: &Contact, t_s: f64) -> Vector3<f64> {
+    /// What it does to a finger of this radius that touches it.
+    pub(super) fn hum(&self, contact: &Contact, finger_radius_m: f64, t_s: f64) -> Reaction {
         let periods = self.frequency_hz * t_s;
         // Whole periods are taken off first: the sine of a large number would be less exact.
         let wave = (TAU * (periods - periods.floor())).sin();
         let load = (contact.normal_force_n / self.full_load_n).min(1.0);
-        contact.normal_W * (self.amplitude_n * load * wave)
+        Reaction {
+            entity: contact.entity,
+            point_W: contact.touch_point_W(finger_radius_m),
+            force_on_user_W: contact.normal_W * (self.amplitude_n * load * wave),
+            stiffness_n_per_m: 0.0,
+        }
     }
 }

@@ -70,7 +70,9 @@ impl<L: FrictionLaw + ?Sized> Draw for Against<'_, L> {
             target_B: view.surface_point_B + direction_B * radius_m,
             is_at_rest: is_inside || asked_m <= view.rest_m,
             tangential_B: if is_inside {
-                cut_to(view.lag_B, self.friction.held_limit_m(&query, self.memory))
+                // What slides may bear more than what is held: friction that grows with speed.
+                let slides_m = self.slides_with.get().map_or(0.0, |ratio| ratio * view.load_m);
+                cut_to(view.lag_B, self.friction.held_limit_m(&query, self.memory).max(slides_m))
             } else {
                 direction_B * radius_m
             },

@@ -8,7 +8,7 @@
 use nalgebra::Vector3;
 
 use super::ground::{Foot, Ground};
-use super::press::{MOST, Plane, press};
+use super::press::{MOST, Plane, Pressed, press};
 use crate::friction_cone::ConeInput;
 use crate::surface::direction_or_up;
 use crate::tangent_view::{TangentView, tangential};
@@ -87,10 +87,7 @@ impl<F: Foot> Ball<F> {
     fn look_at_many(&mut self, ground: &impl Ground<Foot = F>, input: &ConeInput) -> Look {
         let (planes, count) = self.planes();
         let planes = &planes[..count];
-        let pressed = press(planes, &input.hip_B);
-        for (rest, load_m) in self.rests_mut().iter_mut().zip(pressed.loads_m) {
-            rest.load_m = load_m;
-        }
+        let pressed = self.press_on_what_is_touched(planes, tolerance_m(ground, self.radius_m), &input.hip_B);
         let nearest = planes.iter().map(|plane| distance(plane, &input.hip_B)).enumerate();
         let deepest = nearest.min_by(|(_, a), (_, b)| a.total_cmp(b));
         let set = self.held();
@@ -128,6 +125,24 @@ impl<F: Foot> Ball<F> {
             }
         }
         Look { view, normal_spring_B, is_free: false }
+    }
+
+    /// What the centre is not at, however near, carries nothing: with a wall nearly parallel to another one it would be far
+    /// from where these meet, and what friction does to it on the way there would be lost.
+    fn press_on_what_is_touched(&mut self, planes: &[Plane], near_m: f64, hip_B: &Vector3<f64>) -> Pressed {
+        let centre_B = self.centre_B;
+        let is_touched = |plane: &Plane| distance(plane, &centre_B) <= near_m;
+        let (mut touched, mut count) = ([(Vector3::zeros(), 0.0); MOST], 0);
+        for plane in planes.iter().filter(|plane| is_touched(plane)) {
+            touched[count] = *plane;
+            count += 1;
+        }
+        let pressed = press(&touched[..count], hip_B);
+        let mut loads_m = pressed.loads_m.into_iter();
+        for (rest, plane) in self.rests_mut().iter_mut().zip(planes) {
+            rest.load_m = if is_touched(plane) { loads_m.next().unwrap_or_default() } else { 0.0 };
+        }
+        pressed
     }
 
     /// The part of a vector along which it can move and stay on all that it presses on.

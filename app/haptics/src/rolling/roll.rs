@@ -11,8 +11,30 @@ use nalgebra::Vector3;
 
 use super::ball::{Ball, Rest, SAME_FOOT, distance, tolerance_m};
 use super::ground::{Foot, Ground};
-use super::press::{MOST, onto, press};
+use super::press::{MOST, Plane, onto, press};
 use crate::tangent_view::tangential;
+
+/// How it came to where it met something.
+pub(super) struct Leg {
+    pub(super) from_B: Vector3<f64>,
+    pub(super) is_frictionless: bool,
+}
+
+impl Leg {
+    /// Where on the way to `to_B` it first touched one of these planes. Friction may hold it there; without friction it comes to
+    /// rest at the same place from wherever it is.
+    fn until(&self, to_B: &Vector3<f64>, planes: impl Iterator<Item = Plane>) -> Vector3<f64> {
+        if self.is_frictionless {
+            return *to_B;
+        }
+        let share_at = |plane: Plane| {
+            let (before_m, after_m) = (distance(&plane, &self.from_B), distance(&plane, to_B));
+            if before_m > 0.0 && after_m < 0.0 { before_m / (before_m - after_m) } else { 1.0 }
+        };
+        let share = planes.map(share_at).fold(1.0, f64::min);
+        self.from_B + (to_B - self.from_B) * share
+    }
+}
 
 impl<F: Foot> Ball<F> {
     /// Where it is if its centre moves straight to `target_B` and is brought back onto what it presses on.
@@ -112,11 +134,13 @@ impl<F: Foot> Ball<F> {
         self.count = kept;
     }
 
-    /// Where it is pushed out of a feature that it came too near to.
+    /// Where it is pushed out of a feature that it came too near to: at the place where it first touched that.
     #[inline(never)]
-    pub(super) fn pushed_out_of(&self, ground: &impl Ground<Foot = F>, foot: &F) -> Self {
+    pub(super) fn pushed_out_of(&self, ground: &impl Ground<Foot = F>, foot: &F, way: &Leg) -> Self {
         let mut ball = *self;
         ball.add(ground, foot);
+        let plane = ground.plane(foot, &self.centre_B, self.radius_m);
+        ball.centre_B = way.until(&self.centre_B, std::iter::once(plane));
         ball.settle(ground);
         ball
     }
@@ -124,7 +148,12 @@ impl<F: Foot> Ball<F> {
     /// Where it is in a fold that it is led into on its way to `target_B`: on what it rests on now and on what its feet
     /// come to there.
     #[inline(never)]
-    pub(super) fn in_the_fold(&self, ground: &impl Ground<Foot = F>, target_B: &Vector3<f64>) -> Self {
+    pub(super) fn in_the_fold(
+        &self,
+        ground: &impl Ground<Foot = F>,
+        target_B: &Vector3<f64>,
+        way: &Leg,
+    ) -> Self {
         let near_m = tolerance_m(ground, self.radius_m);
         let mut ball = *self;
         ball.centre_B = *target_B;
@@ -143,7 +172,11 @@ impl<F: Foot> Ball<F> {
         for (rest, load_m) in ball.rests_mut().iter_mut().zip(pressed.loads_m) {
             rest.load_m = rest.load_m.max(load_m);
         }
-        ball.centre_B = pressed.point_B;
+        ball.centre_B = if way.is_frictionless {
+            pressed.point_B
+        } else {
+            way.until(target_B, planes.iter().skip(self.count).take(count - self.count).copied())
+        };
         ball.settle(ground);
         ball
     }

@@ -13,6 +13,7 @@ use super::ball::{Ball, Look};
 use super::flight::{Flight, Work};
 use super::ground::Ground;
 use super::pace::Pace;
+use super::roll::Leg;
 use crate::friction_cone::ConeInput;
 use crate::mesh::draw::{Draw, Drawn};
 
@@ -84,6 +85,8 @@ fn seek_with<G: Ground>(
     let mut pace = Pace::default();
     let rounds = if is_careful { MOST_CAREFUL_ROUNDS } else { MOST_ROUNDS };
     let mut sees = None;
+    // Where it was last before it moved.
+    let mut from_B = start.centre_B;
     for _ in 0..rounds {
         let look = ball.look(ground, input);
         if look.is_free {
@@ -122,8 +125,10 @@ fn seek_with<G: Ground>(
                 Ok(Some(obstacle)) if pushes_left > 0 => {
                     pushes_left -= 1;
                     met_something = true;
-                    ball = ball.pushed_out_of(ground, &obstacle);
-                    sees = None;
+                    let way = Leg { from_B, is_frictionless };
+                    ball = ball.pushed_out_of(ground, &obstacle, &way);
+                    // What the last step took away was of another slide.
+                    (sees, pace) = (None, Pace::default());
                     if ball.strayed(start) {
                         return Sought::Unsure;
                     }
@@ -154,9 +159,11 @@ fn seek_with<G: Ground>(
             ball = seat;
             sees = None;
         } else {
+            from_B = centre_B;
             let rolled = ball.rolled_to(ground, &target_B);
             met_something |= rolled.is_blocked;
-            ball = if rolled.is_blocked { ball.in_the_fold(ground, &target_B) } else { rolled };
+            let way = Leg { from_B, is_frictionless };
+            ball = if rolled.is_blocked { ball.in_the_fold(ground, &target_B, &way) } else { rolled };
             sees = None;
         }
         if ball.strayed(start) {

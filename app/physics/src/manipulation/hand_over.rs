@@ -53,6 +53,33 @@ impl Manipulation {
         self.leave_pairs(body, entities);
     }
 
+    /// As [`Self::give_away`], all of them.
+    pub fn give_all_away(&mut self, entities: &[Entity]) {
+        for body in 0..self.roster.bodies.len() {
+            self.give_away(body, entities);
+        }
+    }
+
+    /// Visits the bodies that somebody else steps and that who is awake here could soon come to.
+    pub fn for_each_met_elsewhere(&self, met: &mut impl FnMut(usize)) {
+        for (key, _) in self.pairs.iter_awake() {
+            let other = self.roster.numbers[key.entity as usize].map(|other| other as usize);
+            for body in [Some(key.body as usize), other].into_iter().flatten() {
+                if self.roster.standing(body) == Standing::Elsewhere {
+                    met(body);
+                }
+            }
+        }
+    }
+
+    /// Whether a finger touched a body in the last tick, or holds it by a tie.
+    pub fn is_held(&self, body: usize) -> bool {
+        let place = self.roster.place(body);
+        let touched =
+            place.is_some_and(|place| self.rows[..self.touching].iter().any(|row| row.body == place));
+        touched || self.hand.is_tied_to(body)
+    }
+
     /// Finds the island of a body: all that could touch, one by one. `island` is filled as far as its capacity goes; says
     /// whether that was far enough.
     pub fn island(&self, body: usize, island: &mut Vec<usize>) -> bool {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use world::Scene;
+use world::{MassSpec, Scene};
 
 use crate::{refused, with_entity, with_finger, with_shape, with_top};
 
@@ -10,9 +10,9 @@ const SCENE_KEYS: &str = "name, gravity_m_s2, integrator, contact_response, gras
      include, template, environment, light, camera";
 const FINGER_KEYS: &str = "name, radius_m, start_m, device, passivity, soft, attach";
 const ENTITY_KEYS: &str = "name, shape, position_m, orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction, algorithm, \
-                           material, shading, height_map, magnetism, vibration, mass_kg, density_kg_m3, inertia_kg_m2, \
-                           centre_of_mass_m, velocity_m_s, angular_velocity_rad_s, rotation_locked, haptic, collidable, visual, \
-                           template, grid, within";
+                           material, shading, height_map, magnetism, vibration, movable, mass_kg, density_kg_m3, inertia_kg_m2, \
+                           centre_of_mass_m, velocity_m_s, angular_velocity_rad_s, rotation_locked, restitution, haptic, collidable, \
+                           visual, template, grid, within";
 
 #[test]
 fn text_that_is_not_toml_is_refused_with_line_and_column() {
@@ -91,6 +91,54 @@ fn what_only_an_entity_that_moves_can_have_is_refused_without_a_mass() {
         );
         refused(&with_entity(key), &message);
     }
+}
+
+#[test]
+fn a_restitution_that_is_no_share_or_that_nobody_asks_for_is_refused() {
+    let impulse = "contact_response = { kind = \"impulse\" }\n";
+    let scene = |top: &str, restitution: &str| {
+        format!("{top}{}", with_entity(&format!("restitution = {restitution}")))
+    };
+    for (restitution, allowed) in [("1.5", "a number from 0 to 1"), ("-0.1", "a number, 0 or more")] {
+        let message = format!("s.toml:9: entity[0].restitution: found {restitution}; allowed: {allowed}");
+        refused(&scene(impulse, restitution), &message);
+    }
+    refused(
+        &scene("", "0.5"),
+        "s.toml:8: entity[0].restitution: found 0.5; allowed: none while contacts are springs with dampers: say \
+         `contact_response = { kind = \"impulse\" }` at the top of the scene, or leave out `restitution`",
+    );
+    let read = Scene::parse(&scene(impulse, "0.5"), Path::new("s.toml")).unwrap();
+    assert_eq!(read.entities[0].restitution, Some(0.5));
+}
+
+#[test]
+fn what_is_movable_has_a_mass_a_density_or_a_material() {
+    let motion = |keys: &str| {
+        Scene::parse(&with_entity(keys), Path::new("s.toml"))
+            .unwrap()
+            .entities
+            .remove(0)
+            .motion
+            .map(|is| is.mass)
+    };
+    assert_eq!(motion("material = \"ice\"\nmovable = true"), Some(MassSpec::Density(917.0)));
+    assert_eq!(motion("material = \"ice\"\nmovable = true\nmass_kg = 2"), Some(MassSpec::Mass(2.0)));
+    assert_eq!(motion("material = \"ice\"\ndensity_kg_m3 = 900"), Some(MassSpec::Density(900.0)));
+    assert_eq!(motion("material = \"ice\""), None, "a material alone moves nothing");
+    assert_eq!(motion("material = \"ice\"\nmovable = false"), None);
+    refused(
+        &with_entity("movable = true"),
+        "s.toml:5: entity[0].mass_kg: missing; allowed: a number above 0, or `density_kg_m3`, or a `material`, which has \
+         a density: an entity with `movable = true` has a mass",
+    );
+    for mass in ["mass_kg", "density_kg_m3"] {
+        refused(
+            &with_entity(&format!("movable = false\n{mass} = 1")),
+            "s.toml:8: entity[0].movable: found the boolean false; allowed: true, or neither `mass_kg` nor `density_kg_m3`",
+        );
+    }
+    refused(&with_entity("movable = 1"), "s.toml:8: entity[0].movable: found 1; allowed: true or false");
 }
 
 const KINDS: &str = "plane, sphere, box, cylinder, cone, torus, capsule, ellipsoid, mesh, csg, nurbs";

@@ -1,0 +1,55 @@
+//! How much of an approaching velocity two surfaces give back.
+//!
+//! Model: a coefficient belongs to a pair, and scenes give one to each entity: what it has against its like, or against what
+//! does not give way. In an impact two springs in series hold the energy, each a share that is the other's stiffness over the
+//! sum of both, and each gives back `e^2` of its own: `e^2 = (e_a^2 k_b + e_b^2 k_a) / (k_a + k_b)`. So equals keep their
+//! coefficient, and of unequals the one that gives way decides: a rubber ball bounces as rubber on steel, and as foam on foam.
+//! Neither the larger one (what games like, where anything bounces off anything) nor the mean or the product does both. Who has none
+//! leaves it to the other.
+//! Reference: L. Coaplen, W. Stronge, B. Ravani, *Work equivalent composite coefficient of restitution*, International Journal
+//! of Impact Engineering 30 (2004), for the idea of weighing by the work of each side.
+
+use haptics::Entity;
+
+use crate::pair::Response;
+
+impl Response {
+    /// What it is between two entities: `self`'s restitution is that of pairs of which neither says one.
+    #[must_use]
+    pub fn between(self, a: &Entity, b: &Entity) -> Self {
+        let Self::Impulse { restitution } = self else { return self };
+        let restitution = match (a.restitution, b.restitution) {
+            (Some(e_a), Some(e_b)) => composite([e_a, e_b], [a.stiffness_n_per_m, b.stiffness_n_per_m]),
+            (one, other) => one.or(other).unwrap_or(restitution),
+        };
+        Self::Impulse { restitution }
+    }
+}
+
+fn composite([e_a, e_b]: [f64; 2], [k_a, k_b]: [f64; 2]) -> f64 {
+    // Shares of the whole, so that no sum of stiffnesses overflows.
+    let of_a = 1.0 / (1.0 + k_a / k_b);
+    (e_a * e_a * of_a + e_b * e_b * (1.0 - of_a)).sqrt().clamp(e_a.min(e_b), e_a.max(e_b))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equals_keep_theirs_and_of_unequals_the_softer_decides() {
+        // Rounding of a square and a root.
+        assert!((composite([0.7, 0.7], [400.0, 90.0]) - 0.7).abs() < 1e-15);
+        assert!(
+            (composite([0.8, 0.2], [1.0, 1e9]) - 0.8).abs() < 1e-8,
+            "all of the energy is in the soft one"
+        );
+        assert!((composite([0.8, 0.2], [1e9, 1.0]) - 0.2).abs() < 1e-8);
+        let even = composite([0.8, 0.2], [500.0, 500.0]);
+        assert!((even * even - 0.34).abs() < 1e-15, "half of 0.64 and half of 0.04: {even}");
+        for [k_a, k_b] in [[f64::MAX, f64::MAX], [f64::MIN_POSITIVE, f64::MAX], [f64::MAX, f64::MIN_POSITIVE]]
+        {
+            assert!((0.2..=0.8).contains(&composite([0.8, 0.2], [k_a, k_b])), "{k_a} {k_b}");
+        }
+    }
+}

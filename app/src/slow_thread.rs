@@ -1,0 +1,62 @@
+//! The thread of the slow list: steps what no finger is near, at its own rate.
+//!
+//! Model: some hundred times a second it looks how many ticks the run has made, and goes on by as many, in steps of a tick.
+//! If that takes longer than it should, what is in the slow list goes slower than the rest, and how much is counted.
+//! It has no real-time rights; nobody waits for it.
+
+use rt_core::clock::{monotonic_ns, sleep_until_ns};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::JoinHandle;
+use world::lists::SlowList;
+
+/// Between two turns (ns).
+const TURN_NS: u64 = 10_000_000;
+/// A turn makes up for no more ticks.
+const MOST_TICKS: u64 = 40;
+
+/// The running thread.
+pub struct SlowThread {
+    thread: JoinHandle<SlowRemains>,
+    stop: Arc<AtomicBool>,
+}
+
+/// What is left when it has ended.
+pub struct SlowRemains {
+    /// The list.
+    pub slow: SlowList,
+    /// Ticks that it did not make up for.
+    pub late_ticks: u64,
+}
+
+impl SlowThread {
+    /// Starts it, with the count of the run's ticks and their length.
+    ///
+    /// # Errors
+    /// If the thread cannot be started.
+    pub fn start(mut slow: SlowList, run_ticks: Arc<AtomicU64>, period_ns: u64) -> std::io::Result<Self> {
+        let stop = Arc::new(AtomicBool::new(false));
+        let stopped = Arc::clone(&stop);
+        let thread = std::thread::Builder::new().name("slow-list".into()).spawn(move || {
+            let (mut seen, mut late_ticks, dt_s) = (0, 0, period_ns as f64 / 1e9);
+            let mut due_ns = monotonic_ns();
+            while !stopped.load(Ordering::Relaxed) {
+                let now = run_ticks.load(Ordering::Relaxed);
+                let passed = now.saturating_sub(seen);
+                seen = now;
+                late_ticks += passed.saturating_sub(MOST_TICKS);
+                slow.turn(passed.min(MOST_TICKS) as u32, dt_s);
+                due_ns = (due_ns + TURN_NS).max(monotonic_ns());
+                sleep_until_ns(due_ns);
+            }
+            SlowRemains { slow, late_ticks }
+        })?;
+        Ok(Self { thread, stop })
+    }
+
+    /// Ends it; `None` if it had panicked.
+    pub fn end(self) -> Option<SlowRemains> {
+        self.stop.store(true, Ordering::Relaxed);
+        self.thread.join().ok()
+    }
+}

@@ -1,0 +1,214 @@
+//! The fast side of the two lists: claims, takes in, gives away.
+
+use haptics::Entity;
+use nalgebra::Vector3;
+use physics::{Aabb, Manipulation, Standing};
+
+use super::ListSettings;
+use super::link::FastEnd;
+
+/// Where a finger is and could be soon.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reach {
+    /// Its HIP \[m\].
+    pub hip_W: Vector3<f64>,
+    /// How fast that moves \[m/s\].
+    pub velocity_W: Vector3<f64>,
+    /// \[m\]
+    pub radius_m: f64,
+}
+
+/// What has been handed over so far.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Handed {
+    /// Bodies that came from the slow list.
+    pub came: u64,
+    /// Bodies that went there.
+    pub went: u64,
+    /// Ticks from a claim until the body was there: of all together, and the most.
+    pub waited_ticks: [u64; 2],
+    /// Claims for which there was no room.
+    pub unclaimed: u64,
+}
+
+/// What the fast side knows of who is where.
+pub struct FastList {
+    end: FastEnd,
+    settings: ListSettings,
+    tick: u64,
+    /// Of each body, in which tick it was claimed; 0: it was not.
+    claimed: Box<[u64]>,
+    /// Of each, how often it went to the slow list.
+    stays: Box<[u32]>,
+    /// How many bodies are in the fast list.
+    here: usize,
+    /// Who is looked at next for being given away.
+    next: usize,
+    island: Vec<usize>,
+    /// Boxes in which fingers could be soon, and in which they are.
+    soon: Vec<Aabb>,
+    around: Vec<Aabb>,
+    handed: Handed,
+}
+
+impl FastList {
+    pub(super) fn new(end: FastEnd, bodies: usize, all_slow: bool, settings: ListSettings) -> Self {
+        Self {
+            end,
+            settings,
+            tick: 0,
+            claimed: vec![0; bodies].into(),
+            stays: vec![u32::from(all_slow); bodies].into(),
+            here: if all_slow { 0 } else { bodies },
+            next: 0,
+            island: Vec::with_capacity(MOST_AT_ONCE),
+            soon: Vec::with_capacity(MOST_FINGERS),
+            around: Vec::with_capacity(MOST_FINGERS),
+            handed: Handed::default(),
+        }
+    }
+
+    /// How many bodies are in the fast list.
+    pub fn here(&self) -> usize {
+        self.here
+    }
+
+    /// What has been handed over so far.
+    pub fn handed(&self) -> Handed {
+        self.handed
+    }
+
+    /// Before a tick: takes in what has come, and claims what the fingers, or what is awake here, could reach.
+    pub fn begin_tick(
+        &mut self,
+        manipulation: &mut Manipulation,
+        entities: &mut [Entity],
+        fingers: impl Iterator<Item = Reach>,
+    ) {
+        self.tick += 1;
+        self.soon.clear();
+        self.around.clear();
+        for finger in fingers.take(MOST_FINGERS).filter(is_finite) {
+            let now = Aabb::of_ball(&finger.hip_W, finger.radius_m);
+            self.soon
+                .push(now.swept(&(finger.velocity_W * self.settings.ahead_s)).grown(self.settings.near_m));
+            self.around.push(now.grown(self.settings.far_m));
+        }
+        self.take_in(manipulation, entities);
+        if self.here < self.claimed.len() {
+            self.claim_what_is_near(manipulation);
+        }
+    }
+
+    /// After a tick: gives an island away that nobody is near, if there is more here than there should be.
+    pub fn end_tick(&mut self, manipulation: &mut Manipulation, entities: &[Entity]) {
+        if self.here <= self.settings.fast_bodies {
+            return;
+        }
+        for _ in 0..LOOKED_AT.min(self.claimed.len()) {
+            let body = self.next;
+            self.next = (self.next + 1) % self.claimed.len();
+            if self.may_go(body, manipulation) && self.give_away(body, manipulation, entities) {
+                return;
+            }
+        }
+    }
+
+    /// Takes in everything that is on its way, whatever it takes: when both threads have ended.
+    pub fn take_in_all(&mut self, manipulation: &mut Manipulation, entities: &mut [Entity]) {
+        while self.end.back.slots() > 0 {
+            self.take_in(manipulation, entities);
+        }
+    }
+
+    fn take_in(&mut self, manipulation: &mut Manipulation, entities: &mut [Entity]) {
+        for _ in 0..STANDS_A_TICK {
+            let Ok(stand) = self.end.stands.pop() else { break };
+            if self.stays[stand.body as usize] == stand.stay {
+                manipulation.stands_elsewhere(
+                    stand.body as usize,
+                    &stand.state,
+                    entities,
+                    self.settings.ahead_s,
+                );
+            }
+        }
+        for _ in 0..PARCELS_A_TICK {
+            let Ok(parcel) = self.end.back.pop() else { break };
+            if let Some(body) = parcel.body() {
+                self.here += 1;
+                self.handed.came += 1;
+                let claimed = std::mem::take(&mut self.claimed[body]);
+                let waited = self.tick.saturating_sub(claimed);
+                if claimed > 0 {
+                    let [all, most] = &mut self.handed.waited_ticks;
+                    (*all, *most) = (*all + waited, waited.max(*most));
+                }
+            }
+            manipulation.accept(&parcel, entities);
+        }
+    }
+
+    fn claim_what_is_near(&mut self, manipulation: &Manipulation) {
+        let Self { soon, claimed, end, handed, tick, .. } = self;
+        let mut claim = |body: usize| {
+            if claimed[body] == 0 && manipulation.standing(body) == Standing::Elsewhere {
+                match end.claims.push(body as u32) {
+                    Ok(()) => claimed[body] = *tick,
+                    Err(_) => handed.unclaimed += 1,
+                }
+            }
+        };
+        for around in soon.iter() {
+            manipulation.broad_phase().near(around, |entity| {
+                if let Some(body) = manipulation.body_of(entity) {
+                    claim(body);
+                }
+            });
+        }
+        manipulation.for_each_met_elsewhere(&mut claim);
+    }
+
+    /// Whether a body is here, and nothing but its neighbours is against its going.
+    fn may_go(&self, body: usize, manipulation: &Manipulation) -> bool {
+        let is_here = matches!(manipulation.standing(body), Standing::Awake | Standing::Asleep);
+        let around = manipulation.broad_phase().around(manipulation.entity_of(body));
+        let is_near =
+            |around: &Aabb| self.around.iter().chain(&self.soon).any(|finger| finger.overlaps(around));
+        is_here && around.is_some_and(|around| !is_near(around)) && !manipulation.is_held(body)
+    }
+
+    fn give_away(&mut self, body: usize, manipulation: &mut Manipulation, entities: &[Entity]) -> bool {
+        let mut island = std::mem::take(&mut self.island);
+        // Larger ones stay: to send them would take more than a tick may.
+        let is_whole = manipulation.island(body, &mut island);
+        let goes = is_whole
+            && island.iter().all(|&body| self.may_go(body, manipulation))
+            && manipulation.parcels(&island) <= self.end.out.slots();
+        if goes {
+            for &body in &island {
+                self.stays[body] += 1;
+            }
+            self.here -= island.len();
+            self.handed.went += island.len() as u64;
+            // There is room.
+            manipulation.release(&island, entities, |parcel| drop(self.end.out.push(parcel)));
+        }
+        self.island = island;
+        goes
+    }
+}
+
+fn is_finite(finger: &Reach) -> bool {
+    finger.hip_W.iter().chain(finger.velocity_W.iter()).all(|x| x.is_finite())
+}
+
+/// No island with more bodies is given away.
+const MOST_AT_ONCE: usize = 16;
+const MOST_FINGERS: usize = crate::MAX_DEVICES;
+/// So many bodies are looked at in a tick for being given away.
+const LOOKED_AT: usize = 4;
+/// So many parcels are taken in in a tick.
+const PARCELS_A_TICK: usize = 48;
+/// So many places of what is in the slow list.
+const STANDS_A_TICK: usize = 16;

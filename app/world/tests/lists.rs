@@ -1,0 +1,251 @@
+//! The fast and the slow list: every body is in one of them, whatever happens.
+//!
+//! `cargo test --release -p world --test lists -- --include-ignored` adds a million hand-overs (about a minute).
+#![allow(non_snake_case)] // Names carry their frame.
+
+use haptics::{Cuboid, Entity, Friction, Plane, Shape, Sphere};
+use nalgebra::{Isometry3, Vector3};
+use physics::{Body, Manipulation, MassProperties, Settings, Sleep, Standing};
+use world::lists::{ListSettings, Lists, Reach};
+
+const DT: f64 = 1e-3;
+const SIZE: f64 = 0.04;
+
+fn object(shape: impl Into<Shape>, at: Vector3<f64>) -> Entity {
+    let entity = Entity::new(shape, Isometry3::translation(at.x, at.y, at.z), 1000.0).unwrap();
+    entity.with_friction(Friction::coulomb(0.5).unwrap()).unwrap().with_damping(1.0).unwrap()
+}
+
+/// A table with stacks of two cubes, 0.2 m from each other, and a ball beside each stack.
+fn table(stacks: usize) -> (Vec<Entity>, Vec<(usize, Body)>) {
+    let floor = Plane::new(Vector3::y(), 0.0).unwrap();
+    let mut entities = vec![Entity::new(floor, Isometry3::identity(), 2000.0).unwrap()];
+    for stack in 0..stacks {
+        let x = 0.2 * stack as f64;
+        let cube = || Cuboid::new([SIZE; 3]).unwrap();
+        entities.push(object(cube(), Vector3::new(x, 0.5 * SIZE, 0.0)));
+        entities.push(object(cube(), Vector3::new(x, 1.5 * SIZE, 0.0)));
+        entities.push(object(Sphere::new(0.02).unwrap(), Vector3::new(x + 0.1, 0.02, 0.0)));
+    }
+    let body = |at: usize| {
+        let entity: &Entity = &entities[at];
+        Body::at_rest(MassProperties::of_shape(&entity.shape, 0.05).unwrap(), &entity.X_WB)
+    };
+    let bodies = (1..entities.len()).map(|at| (at, body(at))).collect();
+    (entities, bodies)
+}
+
+/// Both sides, stepped in turns as the virtual clock does it.
+struct World {
+    entities: Vec<Entity>,
+    lists: Lists,
+    tick: u64,
+}
+
+impl World {
+    fn new(stacks: usize, settings: ListSettings) -> Self {
+        let (entities, bodies) = table(stacks);
+        let physics = Settings { sleep: Some(Sleep::default()), ..Settings::default() };
+        let lists = Lists::new(&entities, &bodies, physics, settings).unwrap();
+        Self { entities, lists, tick: 0 }
+    }
+
+    /// A tick with fingers that touch nothing, and every tenth tick a turn of the slow side, unless it stalls.
+    fn step(&mut self, fingers: &[Reach], slow_runs: bool) {
+        let Lists { fast, hand_over, slow } = &mut self.lists;
+        hand_over.begin_tick(fast, &mut self.entities, fingers.iter().copied());
+        fast.step(&mut self.entities, &mut [], DT);
+        hand_over.end_tick(fast, &self.entities);
+        self.tick += 1;
+        if slow_runs && self.tick % 10 == 0 {
+            slow.turn(10, DT);
+        }
+    }
+
+    fn standings(&self, body: usize) -> [Standing; 2] {
+        [&self.lists.fast, self.lists.slow.manipulation()].map(|side: &Manipulation| side.standing(body))
+    }
+
+    /// No body is in both lists; says how many are in neither.
+    fn on_their_way(&self) -> usize {
+        let is_away = |body: usize| {
+            let standings = self.standings(body);
+            assert!(
+                standings.contains(&Standing::Elsewhere),
+                "in both lists: body {body}, tick {}",
+                self.tick
+            );
+            standings == [Standing::Elsewhere; 2]
+        };
+        (0..self.lists.fast.bodies().len()).filter(|&body| is_away(body)).count()
+    }
+
+    /// Ends as a run does: whatever is on its way is taken in.
+    fn end(&mut self) {
+        let Lists { fast, hand_over, slow } = &mut self.lists;
+        slow.take_in();
+        hand_over.take_in_all(fast, &mut self.entities);
+    }
+}
+
+fn finger_at(x: f64, velocity: f64) -> Reach {
+    Reach { hip_W: Vector3::new(x, SIZE, 0.1), velocity_W: Vector3::new(velocity, 0.0, 0.0), radius_m: 0.0 }
+}
+
+/// Everything goes that nobody is near.
+const STRICT: ListSettings = ListSettings { near_m: 0.11, far_m: 0.13, ahead_s: 0.03, fast_bodies: 0 };
+
+fn random(seed: &mut u64) -> f64 {
+    *seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+    (*seed >> 11) as f64 / (1u64 << 53) as f64
+}
+
+/// Fingers that appear here and there, until so many bodies have changed lists.
+fn hand_over_at_random(changes: u64) {
+    let mut world = World::new(8, STRICT);
+    let bodies = world.lists.fast.bodies().len();
+    let mut seed = 3;
+    let mut fingers = [finger_at(0.0, 0.0); 3];
+    let handed = |world: &World| {
+        let handed = world.lists.hand_over.handed();
+        handed.came + handed.went
+    };
+    while handed(&world) < changes {
+        if random(&mut seed) < 0.05 {
+            let which = (random(&mut seed) * 3.0) as usize;
+            fingers[which] = finger_at(1.6 * random(&mut seed) - 0.1, random(&mut seed) - 0.5);
+        }
+        world.step(&fingers, random(&mut seed) < 0.9);
+        assert!(world.on_their_way() <= bodies);
+        let here = (0..bodies).filter(|&body| world.standings(body)[0] != Standing::Elsewhere).count();
+        assert_eq!(here, world.lists.hand_over.here());
+    }
+    world.end();
+    assert_eq!(world.on_their_way(), 0, "nothing is lost");
+    for body in 0..bodies {
+        let side = usize::from(world.standings(body)[0] == Standing::Elsewhere);
+        let state = [&world.lists.fast, world.lists.slow.manipulation()][side].bodies()[body];
+        let (_, began) = table(8);
+        // They rested all the time, but for the springs' own settling: m g / k of 0.25 mm and less.
+        let moved = (state.centre_W - began[body].1.centre_W).norm();
+        assert!(moved < 1e-3, "body {body} moved {moved}");
+    }
+}
+
+#[test]
+fn bodies_that_change_lists_at_random_are_in_one_of_them_or_on_their_way() {
+    hand_over_at_random(20_000);
+}
+
+#[test]
+#[ignore = "a minute"]
+fn a_million_hand_overs_lose_nobody() {
+    hand_over_at_random(1_000_000);
+}
+
+#[test]
+fn a_finger_that_comes_near_has_what_it_could_touch_in_the_fast_list_in_time() {
+    let mut world = World::new(3, STRICT);
+    (0..2000).for_each(|_| world.step(&[], true));
+    assert_eq!(world.lists.hand_over.here(), 0, "all are out of reach");
+    // At 0.5 m/s along the table: within reach in time, and let go behind it.
+    let mut most_here = 0;
+    for tick in 0..2000 {
+        let x = -0.3 + 0.5e-3 * f64::from(tick);
+        world.step(&[finger_at(x, 0.5)], true);
+        for body in 0..9 {
+            let near = (world.lists.fast.bodies()[body].centre_W.x - x).abs() < 0.05;
+            assert!(!near || world.standings(body)[0] != Standing::Elsewhere, "body {body} at {x}");
+        }
+        most_here = most_here.max(world.lists.hand_over.here());
+    }
+    assert!((3..=7).contains(&most_here), "{most_here}");
+    let handed = world.lists.hand_over.handed();
+    // The slow side has a turn every ten ticks.
+    assert!(handed.came >= 9 && handed.waited_ticks[1] <= 11, "{handed:?}");
+    (0..100).for_each(|_| world.step(&[], true));
+    assert_eq!(world.lists.hand_over.here(), 0);
+}
+
+#[test]
+fn a_stack_that_changes_lists_does_not_twitch() {
+    let mut world = World::new(1, STRICT);
+    (0..3000).for_each(|_| world.step(&[], true));
+    let rests = |world: &World, side: usize| {
+        let side = [&world.lists.fast, world.lists.slow.manipulation()][side];
+        side.bodies().iter().map(|body| body.centre_W).collect::<Vec<_>>()
+    };
+    let before = rests(&world, 1);
+    for tick in 0..2000 {
+        world.step(
+            if tick / 100 % 2 == 0 { &[Reach { radius_m: 0.0, ..finger_at(0.0, 0.0) }] } else { &[] },
+            true,
+        );
+        for body in 0..2 {
+            let side = usize::from(world.standings(body)[0] == Standing::Elsewhere);
+            if world.standings(body) == [Standing::Elsewhere; 2] {
+                continue;
+            }
+            let moved = (rests(&world, side)[body] - before[body]).norm();
+            // It sleeps all along; where it woke it would go on settling by less than 1e-6 m/s.
+            assert!(moved < 1e-9, "tick {tick}: {moved:e}");
+        }
+    }
+    assert!(world.lists.hand_over.handed().came >= 20);
+}
+
+#[test]
+fn a_slow_side_that_stalls_leaves_its_bodies_standing_where_they_were() {
+    let mut world = World::new(2, STRICT);
+    (0..2000).for_each(|_| world.step(&[], true));
+    let poses: Vec<_> = world.entities.iter().map(|entity| entity.X_WB).collect();
+    for _ in 0..5000 {
+        world.step(&[finger_at(0.0, 0.0)], false);
+        assert_eq!(world.lists.hand_over.here(), 0, "claimed, and nobody answers");
+        assert!(world.entities.iter().zip(&poses).all(|(entity, was)| entity.X_WB == *was));
+    }
+    // It goes on: what was claimed comes, after as many ticks as it stalled.
+    (0..20).for_each(|_| world.step(&[finger_at(0.0, 0.0)], true));
+    let handed = world.lists.hand_over.handed();
+    assert!(world.lists.hand_over.here() >= 2 && handed.waited_ticks[1] >= 5000, "{handed:?}");
+}
+
+#[test]
+fn what_falls_in_the_slow_list_is_seen_falling_and_caught_by_what_is_fast() {
+    let floor = Plane::new(Vector3::y(), 0.0).unwrap();
+    let cube = || Cuboid::new([SIZE; 3]).unwrap();
+    let mut entities = vec![
+        Entity::new(floor, Isometry3::identity(), 2000.0).unwrap(),
+        object(cube(), Vector3::new(0.0, 0.5 * SIZE, 0.0)),
+        object(cube(), Vector3::new(0.0, 0.5, 0.0)),
+    ];
+    let body =
+        |entity: &Entity| Body::at_rest(MassProperties::of_shape(&entity.shape, 0.05).unwrap(), &entity.X_WB);
+    let bodies: Vec<_> = (1..3).map(|at| (at, body(&entities[at]))).collect();
+    let settings = ListSettings { far_m: 0.2, ..STRICT };
+    let mut lists = Lists::new(&entities, &bodies, Settings::default(), settings).unwrap();
+    // The lower one is held in the fast list by a finger beside it; the upper one falls on it.
+    let finger = Reach { hip_W: Vector3::new(0.06, 0.02, 0.0), velocity_W: Vector3::zeros(), radius_m: 0.0 };
+    let mut was_apart = false;
+    for tick in 1..1500 {
+        let Lists { fast, hand_over, slow } = &mut lists;
+        hand_over.begin_tick(fast, &mut entities, [finger].into_iter());
+        fast.step(&mut entities, &mut [], DT);
+        hand_over.end_tick(fast, &entities);
+        if tick % 10 == 0 {
+            slow.turn(10, DT);
+        }
+        let standings = [0, 1].map(|body| fast.standing(body));
+        was_apart |= standings == [Standing::Awake, Standing::Elsewhere];
+        let y = entities[2].X_WB.translation.vector.y;
+        if tick == 200 {
+            // g t^2 / 2 as of a turn or two ago.
+            let fallen = 0.5 * 9.81 * 0.2_f64.powi(2);
+            assert!((0.5 - y - fallen).abs() < 9.81 * 0.2 * 0.03, "{y}");
+        }
+        assert!(y > 1.2 * SIZE, "tick {tick}: it went through, {y}");
+    }
+    assert!(was_apart);
+    let y = entities[2].X_WB.translation.vector.y;
+    assert!((y - 1.5 * SIZE).abs() < 2e-3, "it lies on the other one: {y}");
+}
