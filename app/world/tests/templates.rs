@@ -144,7 +144,7 @@ fn all_that_is_wrong_is_told_at_once() {
     let text = "nam = \"x\"\n[[finger]]\nradius_m = -1\n[[entity]]\nshape = { kind = \"sphere\", radius_m = 0 }\n\
                 stiffness_n_per_m = 0\nmass = 2\n[[entity]]\n[[light]]\nkind = \"lamp\"\n";
     let problems = Scene::examine(text, Path::new("s.toml")).expect_err("it is wrong");
-    let lines: Vec<_> = problems.iter().map(|problem| problem.to_string()).collect();
+    let lines: Vec<_> = problems.iter().map(ToString::to_string).collect();
     let places: Vec<_> =
         lines.iter().map(|line| line.split(": ").take(2).collect::<Vec<_>>().join(" ")).collect();
     assert_eq!(
