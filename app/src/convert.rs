@@ -52,7 +52,7 @@ fn convert(args: &ConvertArgs) -> Result<Converted, RunFailure> {
     if text.lines().any(|line| line.split("//").next().is_some_and(|words| words.contains('='))) {
         let object = parsed(&args.file, &text)?;
         let mut conversion = Conversion::of_part(&meshes);
-        conversion.add(ObjectKind::GameObject, &object, &[]).map_err(wrong)?;
+        conversion.add(ObjectKind::GameObject, &object, &[]).map_err(|error| wrong(&error))?;
         return Ok(conversion.finish(false));
     }
     let beside = args.file.parent().unwrap_or(Path::new("")).to_path_buf();
@@ -60,13 +60,13 @@ fn convert(args: &ConvertArgs) -> Result<Converted, RunFailure> {
     // The scene is called as its file, as scenes are.
     let name = args.out.as_ref().unwrap_or(&args.file).file_stem().unwrap_or_default().to_string_lossy();
     let mut conversion = Conversion::new(&name, &meshes);
-    for entry in read_list(&text, &args.file).map_err(wrong)? {
+    for entry in read_list(&text, &args.file).map_err(|error| wrong(&error))? {
         let named_by = format!("{}:{}", args.file.display(), entry.line);
         let object = open(&objects, &entry.object, &named_by)?;
         let named_by = object.file().display().to_string();
         let parts = object.parts().into_iter().map(|part| open(&objects, &part, &named_by));
         let parts: Vec<ObjectFile> = parts.collect::<Result<_, _>>()?;
-        conversion.add(entry.kind, &object, &parts).map_err(wrong)?;
+        conversion.add(entry.kind, &object, &parts).map_err(|error| wrong(&error))?;
     }
     Ok(conversion.finish(true))
 }
@@ -84,7 +84,7 @@ fn open(objects: &Path, name: &str, named_by: &str) -> Result<ObjectFile, RunFai
 }
 
 fn parsed(file: &Path, text: &str) -> Result<ObjectFile, RunFailure> {
-    read_object(text, file).map_err(wrong)
+    read_object(text, file).map_err(|error| wrong(&error))
 }
 
 fn read(file: &Path) -> Result<String, RunFailure> {
@@ -95,6 +95,6 @@ fn read(file: &Path) -> Result<String, RunFailure> {
         .unwrap_or_else(|error| error.into_bytes().iter().map(|byte| char::from(*byte)).collect()))
 }
 
-fn wrong(error: world::thesis::ThesisError) -> RunFailure {
+fn wrong(error: &world::thesis::ThesisError) -> RunFailure {
     RunFailure::Start(error.to_string())
 }

@@ -102,7 +102,7 @@ impl Rig {
         }
         let passes = |a: &Kind<'_>, b: &Kind<'_>| {
             let alone = std::ptr::eq(a, b) && a.members.len() == 1;
-            !alone && !(is_collidable(a.shape, b.shape) || b.key.2 && is_collidable(b.shape, a.shape))
+            !(alone || is_collidable(a.shape, b.shape) || b.key.2 && is_collidable(b.shape, a.shape))
         };
         let passing = kinds.iter().filter(|a| a.key.2).filter_map(|a| {
             let through: Vec<String> =

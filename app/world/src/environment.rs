@@ -76,13 +76,13 @@ impl EnvironmentKind {
 }
 
 impl SceneEnvironment {
-    /// Reads the `[[environment]]` at position `i` of the list of a scene whose contacts answer so; its entities go to
-    /// `entities`.
+    /// Reads the `[[environment]]` at position `i` of the list; its entities go to `entities`.
     pub(crate) fn read<'d>(
         table: &Table<'d>,
-        (i, response): (usize, ResponseSpec),
+        i: usize,
         names: (&mut Names<'d>, &mut Names<'d>),
         entities: &mut Vec<SceneEntity>,
+        response: ResponseSpec,
         problems: &mut Problems,
     ) -> Option<Self> {
         let (own_names, entity_names) = names;
@@ -233,6 +233,7 @@ macro_rules! with_surface {
                 "stiffness_n_per_m",
                 "damping_n_s_per_m",
                 "friction",
+                "restitution",
                 "algorithm",
                 "material",
                 "shading",

@@ -94,7 +94,9 @@ impl<'d> Table<'d> {
     /// Whether it has a key that excludes this one.
     fn hides(&self, key: &str) -> bool {
         let has = |rival: &str| self.entries.contains_key(rival);
+        let is_fixed = || self.own("movable").and_then(|value| value.truth_if_any()) == Some(false);
         RIVALS.iter().any(|[a, b]| *a == key && has(b) || *b == key && has(a))
+            || OF_MOVING.contains(&key) && is_fixed()
     }
 
     /// Whether it says what it is, so that nothing else can be added to it.
@@ -461,6 +463,16 @@ fn shown_key(key: &str) -> String {
 
 /// Keys of which a table can have one only: the upper table's hides the other beneath.
 const RIVALS: [[&str; 2]; 2] = [["mass_kg", "density_kg_m3"], ["size_m", "repeat"]];
+/// Keys that `movable = false` hides: a fixed one of a template that moves.
+const OF_MOVING: [&str; 7] = [
+    "mass_kg",
+    "density_kg_m3",
+    "inertia_kg_m2",
+    "centre_of_mass_m",
+    "velocity_m_s",
+    "angular_velocity_rad_s",
+    "rotation_locked",
+];
 /// Keys that say what a table is, so that what lies beneath it is of no use to it.
 const OF_ITS_OWN: [&str; 2] = ["kind", "model"];
 const WIDE_INTEGER: &str = "an integer of at most 64 bits, or a number with a point or an exponent";

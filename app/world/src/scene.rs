@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use crate::MAX_DEVICES;
 use crate::camera::SceneCamera;
 use crate::document::Document;
-use crate::dynamics::{DynamicsSpec, ResponseSpec};
+use crate::dynamics::DynamicsSpec;
 use crate::entity::SceneEntity;
 use crate::environment::SceneEnvironment;
 use crate::error::SceneError;
@@ -120,7 +120,7 @@ impl Scene {
         let dynamics = problems.keep(DynamicsSpec::read(table));
         let hand = problems.keep(read_hand(table));
         let fingers = SceneFinger::read_all(table, problems);
-        let response = dynamics.map_or_else(ResponseSpec::default, |dynamics| dynamics.response);
+        let response = dynamics.unwrap_or_default().response;
         let things = Things::read(tables, response, problems);
         let (fields, guides) =
             (problems.keep(FieldSpec::read_all(table)), problems.keep(GuideSpec::read_all(table)));

@@ -17,6 +17,8 @@ use crate::templates::{SceneTemplate, Templates, listed};
 /// All of it, as far as it could be read.
 #[derive(Debug, Default)]
 pub(crate) struct Things {
+    /// How contacts between entities answer.
+    response: ResponseSpec,
     pub(crate) entities: Vec<SceneEntity>,
     pub(crate) environments: Vec<SceneEnvironment>,
     pub(crate) lights: Vec<SceneLight>,
@@ -27,12 +29,12 @@ pub(crate) struct Things {
 impl Things {
     pub(crate) fn read<'d>(files: &[Table<'d>], response: ResponseSpec, problems: &mut Problems) -> Self {
         let mut templates = read_templates(files, response, problems);
-        let mut things = Self::default();
+        let mut things = Self { response, ..Self::default() };
         let mut names = Names::default();
         let entities = all(files, "entity", problems);
-        things.read_entities(&entities, response, &mut templates, &mut names, problems);
+        things.read_entities(&entities, &mut templates, &mut names, problems);
         let environments = all(files, "environment", problems);
-        things.read_environments(&environments, response, &mut names, problems);
+        things.read_environments(&environments, &mut names, problems);
         let (mut of_lights, mut of_cameras) = (Names::default(), Names::default());
         for (i, table) in all(files, "light", problems).iter().enumerate() {
             things.lights.extend(problems.keep(SceneLight::read(table, i, &mut of_lights)));
@@ -47,14 +49,13 @@ impl Things {
     fn read_entities<'d>(
         &mut self,
         tables: &[Table<'d>],
-        response: ResponseSpec,
         templates: &mut Templates<'d>,
         names: &mut Names<'d>,
         problems: &mut Problems,
     ) {
         for (i, table) in tables.iter().enumerate() {
             let Some(table) = problems.keep(templates.complete(table.clone())) else { continue };
-            let read = SceneEntity::read_all(&table, i, names, response, problems);
+            let read = SceneEntity::read_all(&table, i, names, self.response, problems);
             templates.used(&table, read.len());
             self.entities.extend(read);
             if self.entities.len() > MAX_ENTITIES {
@@ -67,14 +68,13 @@ impl Things {
     fn read_environments<'d>(
         &mut self,
         tables: &[Table<'d>],
-        response: ResponseSpec,
         names: &mut Names<'d>,
         problems: &mut Problems,
     ) {
         let mut own_names = Names::default();
         for (i, table) in tables.iter().enumerate() {
             let both = (&mut own_names, &mut *names);
-            let read = SceneEnvironment::read(table, (i, response), both, &mut self.entities, problems);
+            let read = SceneEnvironment::read(table, i, both, &mut self.entities, self.response, problems);
             if let Some(door) = read.as_ref().and_then(|environment| environment.door.as_ref())
                 && !names.has(&door.of)
             {

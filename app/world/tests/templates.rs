@@ -51,6 +51,7 @@ fn of_tables_an_entity_says_what_differs_unless_it_says_what_it_is() {
     assert_eq!(ball.friction, FrictionSpec::Coulomb { mu: 0.5 });
     let dense = entity("density_kg_m3 = 900.0");
     assert_eq!(dense.motion.map(|motion| motion.mass), Some(MassSpec::Density(900.0)), "it hides the mass");
+    assert_eq!(entity("movable = false").motion, None, "a fixed one of what moves");
 }
 
 #[test]
@@ -100,8 +101,8 @@ fn what_is_wrong_with_templates_and_grids_is_told_with_line_and_key() {
             "[[finger]]\n[[template]]\nname = \"a\"\nmass = 1\n".into(),
             "s.toml:4: template[0].mass: unknown key (did you mean `mass_kg`?); allowed: name, shape, position_m, \
              orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction, algorithm, material, shading, height_map, \
-             magnetism, vibration, mass_kg, density_kg_m3, inertia_kg_m2, centre_of_mass_m, velocity_m_s, \
-             angular_velocity_rad_s, rotation_locked, haptic, collidable, visual, template, grid, within",
+             magnetism, vibration, movable, mass_kg, density_kg_m3, inertia_kg_m2, centre_of_mass_m, velocity_m_s, \
+             angular_velocity_rad_s, rotation_locked, restitution, haptic, collidable, visual, template, grid, within",
         ),
         (
             // Nobody uses it, but somebody wrote it.
@@ -143,7 +144,7 @@ fn all_that_is_wrong_is_told_at_once() {
     let text = "nam = \"x\"\n[[finger]]\nradius_m = -1\n[[entity]]\nshape = { kind = \"sphere\", radius_m = 0 }\n\
                 stiffness_n_per_m = 0\nmass = 2\n[[entity]]\n[[light]]\nkind = \"lamp\"\n";
     let problems = Scene::examine(text, Path::new("s.toml")).expect_err("it is wrong");
-    let lines: Vec<_> = problems.iter().map(|problem| problem.to_string()).collect();
+    let lines: Vec<_> = problems.iter().map(ToString::to_string).collect();
     let places: Vec<_> =
         lines.iter().map(|line| line.split(": ").take(2).collect::<Vec<_>>().join(" ")).collect();
     assert_eq!(

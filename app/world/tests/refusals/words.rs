@@ -11,8 +11,8 @@ const SCENE_KEYS: &str = "name, gravity_m_s2, integrator, contact_response, gras
 const FINGER_KEYS: &str = "name, radius_m, start_m, device, passivity, soft, attach";
 const ENTITY_KEYS: &str = "name, shape, position_m, orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction, algorithm, \
                            material, shading, height_map, magnetism, vibration, movable, mass_kg, density_kg_m3, inertia_kg_m2, \
-                           centre_of_mass_m, velocity_m_s, angular_velocity_rad_s, rotation_locked, restitution, haptic, \
-                           collidable, visual, template, grid, within";
+                           centre_of_mass_m, velocity_m_s, angular_velocity_rad_s, rotation_locked, restitution, haptic, collidable, \
+                           visual, template, grid, within";
 
 #[test]
 fn text_that_is_not_toml_is_refused_with_line_and_column() {
