@@ -25,7 +25,8 @@ pub(super) fn look_around(
     travel_m: f64,
     patches: &mut Patches,
 ) {
-    if patches.searched.is_some_and(|searched| has_moved_m(&searched, other) + reach_m <= searched.within_m) {
+    let is_known = |searched: &Searched| has_moved_m(searched, mesh, other) + reach_m <= searched.within_m;
+    if patches.searched.as_ref().is_some_and(is_known) {
         return;
     }
     let within_m = reach_m + MARGIN_M + 4.0 * travel_m;
@@ -39,7 +40,9 @@ pub(super) fn look_around(
         |places, face| {
             if !places.knows(mesh, face) {
                 places.tried += 1;
-                if let Some(place) = nearest_to(mesh, face, other, radius_m, within_m) {
+                let place = nearest_to(mesh, face, other, radius_m, within_m);
+                let is_new = |place: &Place| places.is_better(place, is_convex) && place.is_nearest(mesh);
+                if let Some(place) = place.filter(is_new) {
                     places.add(place, is_convex);
                 }
             }
@@ -48,18 +51,25 @@ pub(super) fn look_around(
         MOST_VISITS,
     );
     if places.is_crowded || !is_complete {
-        patches.searched = Some(Searched { X_MO: other.X_MO, within_m: reach_m + CROWDED_M });
+        let margin_m = if places.is_crowded { CROWDED_M } else { 0.5 * MARGIN_M };
+        patches.searched = Some(Searched { X_MO: other.X_MO, within_m: reach_m + margin_m });
     }
     places.settle(patches, is_convex);
 }
 
-/// How far any point of the other one is from where it was \[m\].
-fn has_moved_m(searched: &Searched, other: &Other<'_>) -> f64 {
+/// How far any point of the smaller one is from where it was, seen from the larger one \[m\].
+fn has_moved_m(searched: &Searched, mesh: &Mesh, other: &Other<'_>) -> f64 {
+    let (was, now) = (&searched.X_MO, &other.X_MO);
+    let [low_M, high_M] = mesh.bounds_B();
+    let (middle_M, own_m) = ((low_M + high_M) * 0.5, 0.5 * (high_M - low_M).norm());
     let (centre_M, radius_m) = other.ball();
-    let from: &Isometry3<f64> = &searched.X_MO;
-    let was_M = from * other.X_MO.inverse_transform_point(&centre_M.into());
-    let cosine = from.rotation.coords.dot(&other.X_MO.rotation.coords).abs().min(1.0);
-    (centre_M - was_M.coords).norm() + 2.0 * (2.0 - 2.0 * cosine).sqrt() * radius_m
+    let turned = 2.0 * (2.0 - 2.0 * was.rotation.coords.dot(&now.rotation.coords).abs().min(1.0)).sqrt();
+    if own_m < radius_m {
+        let at = |pose: &Isometry3<f64>| pose.inverse_transform_point(&middle_M.into());
+        return (at(was) - at(now)).norm() + turned * own_m;
+    }
+    let was_M = was * now.inverse_transform_point(&centre_M.into());
+    (centre_M - was_M.coords).norm() + turned * radius_m
 }
 
 #[derive(Clone, Copy, Default)]
@@ -67,8 +77,26 @@ struct Place {
     normal_M: Vector3<f64>,
     at_M: Vector3<f64>,
     gap_m: f64,
+    /// On an edge of a face.
+    is_edge: bool,
     /// It is pressed, and has this number.
     number: Option<usize>,
+}
+
+impl Place {
+    /// Of an edge, only if no other face is nearer.
+    fn is_nearest(&self, mesh: &Mesh) -> bool {
+        if !self.is_edge || self.gap_m <= 0.0 {
+            return true;
+        }
+        let across_M = self.at_M + self.normal_M * self.gap_m;
+        mesh.nearest(&across_M).distance_m >= self.gap_m * (1.0 - ROUNDING)
+    }
+
+    fn is_same(&self, other: &Self, is_convex: bool) -> bool {
+        let (normal_M, at_M, depth_m) = (self.normal_M, self.at_M, (-self.gap_m).max(0.0));
+        Patch { normal_M, at_M, depth_m, ..Patch::default() }.is_same(&other.normal_M, &other.at_M, is_convex)
+    }
 }
 
 struct Places {
@@ -96,7 +124,8 @@ impl Places {
         for (number, patch) in patches.all.iter().enumerate() {
             if number == 0 || patch.is_pressed() {
                 let Patch { normal_M, at_M, depth_m, .. } = *patch;
-                places.all[places.count] = Place { normal_M, at_M, gap_m: -depth_m, number: Some(number) };
+                places.all[places.count] =
+                    Place { normal_M, at_M, gap_m: -depth_m, is_edge: false, number: Some(number) };
                 places.count += 1;
                 places.deepest_m = places.deepest_m.max(depth_m);
             }
@@ -137,21 +166,17 @@ impl Places {
         })
     }
 
-    /// Adds one; without room, in the place of the farthest one, if that is not pressed.
+    /// Whether it is none of those that are known, or nearer.
+    fn is_better(&self, place: &Place, is_convex: bool) -> bool {
+        let same = self.as_slice().iter().find(|one| one.is_same(place, is_convex));
+        same.is_none_or(|same| same.number.is_none() && place.gap_m < same.gap_m)
+    }
+
+    /// Adds one that is better; without room, in the place of the farthest one, if that is not pressed.
     fn add(&mut self, place: Place, is_convex: bool) {
-        let as_patch = |one: &Place| Patch {
-            normal_M: one.normal_M,
-            at_M: one.at_M,
-            depth_m: (-one.gap_m).max(0.0),
-            ..Patch::default()
-        };
-        let same = self.all[..self.count]
-            .iter_mut()
-            .find(|one| as_patch(one).is_same(&place.normal_M, &place.at_M, is_convex));
+        let same = self.all[..self.count].iter_mut().find(|one| one.is_same(&place, is_convex));
         if let Some(same) = same {
-            if same.number.is_none() && place.gap_m < same.gap_m {
-                *same = place;
-            }
+            *same = place;
             return;
         }
         if let Some(free) = self.all.get_mut(self.count) {
@@ -218,14 +243,9 @@ fn nearest_to(mesh: &Mesh, number: u32, other: &Other<'_>, radius_m: f64, within
         return None;
     }
     if feature == Feature::Face {
-        return Some(Place { normal_M: of_face_M, at_M, gap_m: seen.gap_m, number: None });
+        return Some(Place { normal_M: of_face_M, at_M, gap_m: seen.gap_m, ..Place::default() });
     }
-    // Of an edge, only if no other face is nearer.
-    let across_M = at_M - seen.out * seen.gap_m;
-    if seen.gap_m > 0.0 && mesh.nearest(&across_M).distance_m < seen.gap_m * (1.0 - 1e-6) {
-        return None;
-    }
-    Some(Place { normal_M: -seen.out, at_M, gap_m: seen.gap_m, number: None })
+    Some(Place { normal_M: -seen.out, at_M, gap_m: seen.gap_m, is_edge: true, number: None })
 }
 
 /// So much farther than reach is sought \[m\]: so far may two move until the next search.
@@ -240,6 +260,7 @@ const PARALLEL: f64 = 0.98;
 const DEEP_M: f64 = 2e-3;
 /// Cosine between what looks at each other.
 const FACES: f64 = 0.1;
+const ROUNDING: f64 = 1e-6;
 /// Turns between a face and the other one.
 const TO_AND_FRO: usize = 3;
 /// Nodes and runs of the hierarchy that are looked at.
