@@ -13,7 +13,7 @@
 //!
 //! Frames and signs: W; normals leave B and point to A; gaps are negative where they overlap. Of points nearer to each other
 //! than a millimetre the later ones count with a part of their depth.
-//! Invariants: no allocation; at most [`MAX_POINTS`] points; an id stands for the same features from tick to tick; finite for
+//! Invariants: no allocation; at most [`MAX_POINTS`] points, of two forms eight; an id stands for the same features from tick to tick; finite for
 //! every pose; along a continuous way the forces of springs on the points are continuous, save where the way out that a
 //! body came by ends (a rim that is deeper in a tip than that is round).
 //! Cost: mostly below 1 us a pair while the direction of the last tick can be followed, a few where a ring has edges beside
@@ -35,8 +35,15 @@ pub(crate) mod mesh;
 mod mesh_ball;
 mod mesh_corner;
 mod mesh_cut;
+mod mesh_found;
 mod mesh_other;
+mod mesh_own;
+mod mesh_patch;
 mod mesh_plane;
+mod mesh_role;
+mod mesh_search;
+mod mesh_see;
+mod mesh_share;
 mod mesh_solid;
 mod mesh_span;
 mod overlay;
@@ -45,10 +52,13 @@ mod ring;
 mod spots;
 
 pub use bounds::bounding_ball;
+pub use mesh_patch::{Patch, Patches};
 use spots::{Spot, Spots};
 
 /// The most contact points of two entities.
-pub const MAX_POINTS: usize = 8;
+pub const MAX_POINTS: usize = 24;
+/// Of two forms, or of one of the places where a mesh touches.
+const PATCH_POINTS: usize = 8;
 
 /// A contact point.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -113,15 +123,15 @@ pub struct Solid<'s> {
 pub struct PairMemory {
     /// Whatever the pair's algorithm makes of them.
     pub words: [f64; 8],
-    /// Of either, where it is a mesh, which vertices it stands on.
-    pub stands: [Stands; 2],
+    /// Of a mesh, where it touches.
+    pub patches: Patches,
 }
 
 /// The vertices that a mesh stands on, and how it stood when they were chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Stands {
     /// As corners of faces, plus one; 0: none.
-    corners: [u32; MAX_POINTS],
+    corners: [u32; PATCH_POINTS],
     /// Heights were `along . x + base`, and the lowest this one.
     along: Vector3<f64>,
     base: f64,

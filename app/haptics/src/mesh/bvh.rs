@@ -16,6 +16,7 @@
 //! Cost: queries neither allocate nor recurse; how many nodes they visit depends on the geometry nearby, except
 //! [`Bvh::clearance`], which visits a constant number.
 
+mod boxes;
 mod build;
 mod clearance;
 mod closest;

@@ -2,10 +2,11 @@
 
 use nalgebra::Vector3;
 
-use super::bvh::TooMany;
+use super::bvh::{TooMany, closest_on};
 use super::fan::for_each_around;
 use super::place::Side;
 use super::{Face, Hit, Linear, Mesh, Nearest, Sides, Triangles};
+use crate::surface::Feature;
 
 impl Mesh {
     /// The first face that the segment `from_B -> to_B` enters: from outside, or from either side of a sheet.
@@ -145,6 +146,28 @@ impl Mesh {
     /// there, until `visit` says `false`; says whether all were visited, of which there may be too many for a tick.
     pub fn for_each_vertex_within(&self, limits: &[Linear], visit: impl FnMut(u32) -> bool) -> bool {
         self.bvh.for_each_vertex_within(self.triangles(), limits, visit)
+    }
+
+    /// Visits the numbers of the faces in all boxes to which `key_of` gives a key by their middle and half their size, smallest
+    /// keys first; see [`Bvh::for_each_face_in_boxes`](super::Bvh::for_each_face_in_boxes).
+    pub fn for_each_face_in_boxes<S>(
+        &self,
+        state: &mut S,
+        key_of: impl Fn(&S, &Vector3<f64>, &Vector3<f64>) -> Option<f64>,
+        visit: impl FnMut(&mut S, u32) -> bool,
+        most_visits: usize,
+    ) -> bool {
+        self.bvh.for_each_face_in_boxes(state, key_of, visit, most_visits)
+    }
+
+    /// The point of one face that is nearest to a point, and what it lies on.
+    pub fn nearest_of_face(&self, face: u32, p_B: &Vector3<f64>) -> (Vector3<f64>, Feature) {
+        let record = &self.faces[face as usize];
+        let corners = record.vertices.map(|vertex| self.vertices[vertex as usize]);
+        match closest_on(record, &corners, p_B, f64::INFINITY) {
+            Some(closest) => (closest.point_B, closest.feature),
+            None => (corners[0], Feature::Vertex),
+        }
     }
 
     /// Visits the numbers of all faces that may be as near as this \[m\], in no order that means anything, until `visit`

@@ -5,9 +5,9 @@
 //! ([`mesh_solid`](super::mesh_solid)). What is found is told in the mesh's frame, with normals that leave
 //! the mesh or point to it as is handy; [`Told`] turns it into contact points of A and B.
 //!
-//! Identity: what a contact point is about is told by a number below 2^30 and a kind of two bits: a face, an edge (three
+//! Identity: what a contact point is about is told by a number below 2^27, a kind of two bits and three of the place among several: a face, an edge (three
 //! times its face plus its number there; where edges cross, four times that, whose it is and from which end), a vertex, or a
-//! point of the other one. No two of a pair clash as long as a mesh has less than 89,000,000 faces.
+//! point of the other one. No two of a pair clash as long as a mesh has less than 11,000,000 faces.
 
 use haptics::mesh::Mesh;
 use haptics::{Form, Shape};

@@ -20,7 +20,8 @@ use haptics::mesh::{Face, Mesh, Nearest};
 use nalgebra::Vector3;
 
 use super::mesh::{About, Contact, Told};
-use super::{MAX_POINTS, PairMemory};
+use super::mesh_share::share;
+use super::{PATCH_POINTS, PairMemory};
 
 /// In the mesh's frame.
 #[derive(Debug, Clone, Copy)]
@@ -120,7 +121,7 @@ fn edge(face: &Face, number: u32, edge: usize) -> About {
 
 #[derive(Default)]
 struct Found {
-    contacts: [Contact; MAX_POINTS],
+    contacts: [Contact; PATCH_POINTS],
     count: usize,
 }
 
@@ -233,72 +234,6 @@ fn is_nearest_vertex(mesh: &Mesh, number: u32, corner: usize, ball: &Ball) -> bo
     leads_away
 }
 
-/// Takes from each depth what the others' normals share of it: afterwards the depths `l` are such that what presses along
-/// each normal is what its own depth `d` was, `l_i + sum c_ij l_j = d_i`, or they are zero and there is more.
-fn share(contacts: &mut [Contact]) {
-    let count = contacts.len().min(MAX_POINTS);
-    if contacts.iter().filter(|contact| contact.gap_m < 0.0).count() < 2 {
-        return;
-    }
-    let (mut depths, mut cosines) = ([0.0; MAX_POINTS], [[0.0; MAX_POINTS]; MAX_POINTS]);
-    for i in 0..count {
-        depths[i] = -contacts[i].gap_m;
-        for j in 0..count {
-            cosines[i][j] = contacts[i].normal_M.dot(&contacts[j].normal_M).max(0.0);
-        }
-        cosines[i][i] = 1.0 + STIFF;
-    }
-    let mut carries = [false; MAX_POINTS];
-    (0..count).for_each(|i| carries[i] = depths[i] > 0.0);
-    let mut loads = [0.0; MAX_POINTS];
-    for _ in 0..SHARE_ROUNDS {
-        loads = solve(&cosines, &depths, &carries);
-        // Who would pull carries nothing; who is pressed more than the others' loads explain carries again.
-        let least = (0..count).filter(|&i| carries[i]).min_by(|&i, &j| loads[i].total_cmp(&loads[j]));
-        if let Some(least) = least.filter(|&least| loads[least] < 0.0) {
-            carries[least] = false;
-            continue;
-        }
-        let missing = |i: usize| depths[i] - (0..count).map(|j| cosines[i][j] * loads[j]).sum::<f64>();
-        let most = (0..count).filter(|&i| !carries[i]).max_by(|&i, &j| missing(i).total_cmp(&missing(j)));
-        match most.filter(|&most| missing(most) > 1e-12 * depths[most].abs()) {
-            Some(most) => carries[most] = true,
-            None => break,
-        }
-    }
-    for (i, contact) in contacts.iter_mut().enumerate().take(count) {
-        (contact.gap_m, contact.share) = match carries[i] {
-            true => (-loads[i].max(0.0), loads[i].max(0.0) / depths[i]),
-            false => (contact.gap_m.max(0.0), 1.0),
-        };
-    }
-}
-
-/// Loads of those that carry, which take their depths together; by elimination: the matrix is positive definite.
-fn solve(
-    cosines: &[[f64; MAX_POINTS]; MAX_POINTS],
-    depths: &[f64; MAX_POINTS],
-    carries: &[bool; MAX_POINTS],
-) -> [f64; MAX_POINTS] {
-    let (mut m, mut loads) = (*cosines, *depths);
-    for i in (0..MAX_POINTS).filter(|&i| carries[i]) {
-        for j in (i + 1..MAX_POINTS).filter(|&j| carries[j]) {
-            let factor = m[j][i] / m[i][i];
-            (i..MAX_POINTS).for_each(|k| m[j][k] -= factor * m[i][k]);
-            loads[j] -= factor * loads[i];
-        }
-    }
-    for i in (0..MAX_POINTS).rev() {
-        if !carries[i] {
-            loads[i] = 0.0;
-            continue;
-        }
-        let others: f64 = (i + 1..MAX_POINTS).filter(|&j| carries[j]).map(|j| m[i][j] * loads[j]).sum();
-        loads[i] = (loads[i] - others) / m[i][i];
-    }
-    loads
-}
-
 /// Faces that are looked at around a ball.
 const MOST_FACES: usize = 512;
 /// Points nearer than this share of where they are are the same: a foot on an edge of two faces in one plane.
@@ -307,7 +242,3 @@ const SAME: f64 = 1e-9;
 const ROUNDING: f64 = 1e-13;
 /// A fold that turns the normal by less is flat \[rad\]: what it would do sideways is a hundredth of the load at most.
 const FOLD: f64 = 0.01;
-/// Of what shares of a depth cannot be told apart to rounding, each gets the same.
-const STIFF: f64 = 1e-9;
-/// Each changes who carries by one.
-const SHARE_ROUNDS: usize = 16;

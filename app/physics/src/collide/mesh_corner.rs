@@ -1,6 +1,6 @@
 //! A vertex of a mesh, known as a corner of one of its faces: from there its neighbours are found.
 
-use haptics::mesh::Mesh;
+use haptics::mesh::{Mesh, Sides};
 use nalgebra::Vector3;
 
 /// Three times the face's number plus that of the corner.
@@ -42,6 +42,15 @@ impl Corner {
             is_closed = face.links[corner].face() == fan.first && !face.links[corner].is_boundary();
         }
         is_closed
+    }
+
+    /// Whether any face around it looks that way.
+    pub(super) fn looks(self, mesh: &Mesh, way_M: &Vector3<f64>) -> bool {
+        let mut fan = Fan::new(mesh, self.0 / 3, (self.0 % 3) as usize);
+        std::iter::from_fn(|| fan.next()).any(|(face, _)| {
+            let toward = mesh.faces()[face as usize].normal_B.dot(way_M);
+            toward > LOOKS || mesh.sides() == Sides::Sheet && toward < -LOOKS
+        })
     }
 
     /// Visits the ends of all sharp edges that leave it, each with its face and number there.
@@ -109,6 +118,8 @@ impl<'m> Fan<'m> {
 
 /// Normals that differ by less are the same: rounding of what lies in a plane.
 const FLAT: f64 = 1e-6;
+/// Cosine to the normal of a face that looks there.
+const LOOKS: f64 = 0.2;
 /// Cosine between the faces of a sharp edge.
 const SHARP: f64 = 0.9;
 /// Steps of a climb; the next tick goes on.

@@ -25,7 +25,7 @@ pub(super) fn contact_points(
         reach_m,
         travel_m: (reach_m - crate::pair::REACH_M).max(0.0),
     };
-    for corner in standing.choose(&mut memory.stands[0]).into_iter().flatten() {
+    for corner in standing.choose(&mut memory.patches.all[0].stands[0]).into_iter().flatten() {
         let gap_m = standing.height_m(corner);
         if gap_m <= reach_m {
             let about = About::Vertex(corner.vertex(mesh));

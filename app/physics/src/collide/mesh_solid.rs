@@ -5,25 +5,31 @@
 //! against the other one's surface; points of the other one (corners, points of rims, ends of axes, vertices) against the
 //! mesh; and where an outline of the one is cut off by the other, the places where it is. Each counts with its own normal and
 //! gap, which are exact; the plane chooses only. It is that of the last tick's contact points; where there were none, it is
-//! found by going to and fro between the two.
+//! found by going to and fro between the two. In a hole or around a corner there are several planes
+//! ([`mesh_patch`](super::mesh_patch)), each with its points ([`mesh_search`](super::mesh_search) finds them).
 //! A vertex in the middle of a flat face presses nothing that the other one's corners do not: it is left out.
 //! Frames: the mesh's frame M; normals from the mesh to the other one.
-//! Limits: of two that touch in several places at once around a corner or in a hole, points of the other one are found
-//! everywhere, vertices of the mesh only where most of the load is. Crossings are found of a box's edges and of sharp edges
-//! that leave the vertices of a mesh that were chosen: of fine meshes these are short, but vertices lie as near. Rims of round
-//! forms are not cut off.
-//! Memory: words 0 to 2 the normal, 3 whether there is one, 4 to 6 where, 7 how deep.
-//! Cost: two choices of vertices and at most eight queries for the nearest point for each side; bounded.
+//! Limits: six places a pair. Where meshes touch in several places and more vertices than there is room for do, which of them
+//! count may change for ever with movements of micrometres: some mm/s without friction. Crossings are found of a box's edges, of the lines along which cylinders, cones and capsules
+//! touch, and of sharp edges that leave the vertices of a mesh that were chosen: of fine meshes these are short, but vertices
+//! lie as near. Rims of round forms are not cut off.
+//! Cost: for each place two choices of vertices and at most eight queries for the nearest point for each side; and a search
+//! when the two have moved by a millimetre; bounded.
 
 use haptics::mesh::{Linear, Mesh};
 use nalgebra::{Point3, Vector3};
 
+use super::PairMemory;
 use super::mesh::{About, Contact, Told};
 use super::mesh_corner::Corner;
-use super::mesh_cut::Edge;
-use super::mesh_other::{Meeting, Other, Solidity, see};
+use super::mesh_cut::{Edge, WayOut};
+use super::mesh_found::Found;
+use super::mesh_other::{Meeting, Other, Solidity, ball_reaches_m, box_reaches_m};
+use super::mesh_own::Own;
+use super::mesh_patch::{MAX_PATCHES, Patch, Patches};
+use super::mesh_search::look_around;
+use super::mesh_see::{Seen, Side, see, see_side};
 use super::mesh_span::Standing;
-use super::{MAX_POINTS, PairMemory};
 
 pub(super) fn contact_points(
     mesh: &Mesh,
@@ -33,29 +39,38 @@ pub(super) fn contact_points(
     told: &mut Told<'_>,
 ) {
     let travel_m = (reach_m - crate::pair::REACH_M).max(0.0);
-    let Some(meeting) = meet(mesh, other, reach_m, travel_m, memory) else {
+    let patches = &mut memory.patches;
+    if !meet(mesh, other, reach_m, patches) {
         *memory = PairMemory::default();
         return;
-    };
-    let mut found = Found { meeting: &meeting, contacts: [Contact::default(); ROOM], count: 0 };
-    found.vertices(mesh, other, memory);
-    found.owns(mesh, other, memory);
-    let contacts = &found.contacts[..found.count];
-    contacts.iter().for_each(|contact| told.tell(contact));
-    remember(contacts, memory);
+    }
+    look_around(mesh, other, reach_m, travel_m, patches);
+    let mut found = Found::new();
+    for number in 0..MAX_PATCHES {
+        found.begin(number);
+        if patches.all[number].is_known {
+            let meeting = Meeting::of(&patches.all[number], reach_m, travel_m);
+            let mut stands = patches.all[number].stands;
+            let mut place = Place { mesh, other, meeting, number, patches, found: &mut found };
+            place.vertices(&mut stands[0]);
+            place.owns(&mut stands[1]);
+            patches.all[number].stands = stands;
+            patches.all[number].remember(found.end());
+        }
+    }
+    patches.put_a_pressed_one_first();
+    found.all().iter().for_each(|contact| told.tell(contact));
 }
 
-/// About where they meet: as in the last tick, or else found by going to and fro; `None` where they are far apart.
-fn meet(mesh: &Mesh, other: &Other<'_>, reach_m: f64, travel_m: f64, memory: &PairMemory) -> Option<Meeting> {
-    let [x, y, z, is_known, at_x, at_y, at_z, depth_m] = memory.words;
-    if is_known == 1.0 {
-        let normal_M = Vector3::new(x, y, z);
-        return Some(Meeting { normal_M, at_M: Vector3::new(at_x, at_y, at_z), depth_m, reach_m, travel_m });
+/// About where they meet: as in the last tick, or else found by going to and fro; `false` where they are far apart.
+fn meet(mesh: &Mesh, other: &Other<'_>, reach_m: f64, patches: &mut Patches) -> bool {
+    if patches.all[0].is_pressed() {
+        return true;
     }
     let (centre_M, radius_m) = other.ball();
     let mut at_M = mesh.nearest(&centre_M).point_B;
     if (at_M - centre_M).norm() > radius_m + reach_m && !mesh.is_inside(&centre_M) {
-        return None;
+        return false;
     }
     let [low_M, high_M] = mesh.bounds_B();
     // Out of the larger one is where the smaller one's middle is.
@@ -69,104 +84,188 @@ fn meet(mesh: &Mesh, other: &Other<'_>, reach_m: f64, travel_m: f64, memory: &Pa
         at_M = mesh.nearest(&(at_M - seen.out * seen.gap_m)).point_B;
         seen = other.see(&at_M, &out_M(&at_M), 0.0);
     }
-    let normal_M = -seen.out;
-    Some(Meeting { normal_M, at_M, depth_m: (-seen.gap_m).max(0.0), reach_m, travel_m })
-}
-
-/// The mean of the contact points, by their depth.
-fn remember(contacts: &[Contact], memory: &mut PairMemory) {
-    let deepest_m = contacts.iter().fold(0.0_f64, |deepest_m, contact| deepest_m.max(-contact.gap_m));
-    let (mut normal_M, mut at_M, mut sum) = (Vector3::zeros(), Vector3::zeros(), 0.0);
-    for contact in contacts.iter().filter(|contact| contact.gap_m < 0.0) {
-        normal_M -= contact.normal_M * contact.gap_m;
-        at_M -= contact.on_mesh_M * contact.gap_m;
-        sum -= contact.gap_m;
+    let (normal_M, first) = (-seen.out, &mut patches.all[0]);
+    if !first.is_same(&normal_M, &at_M, other.is_convex()) {
+        patches.searched = None;
     }
-    let Some(normal_M) = normal_M.try_normalize(1e-3 * sum).filter(|_| sum > 0.0) else {
-        // Nothing presses: the next tick looks anew.
-        memory.words[3] = 0.0;
-        return;
-    };
-    let [n, at] = [normal_M, at_M / sum];
-    memory.words = [n.x, n.y, n.z, 1.0, at.x, at.y, at.z, deepest_m];
+    (first.normal_M, first.at_M, first.depth_m) = (normal_M, at_M, (-seen.gap_m).max(0.0));
+    first.is_known = true;
+    true
 }
 
-struct Found<'m> {
-    meeting: &'m Meeting,
-    contacts: [Contact; ROOM],
-    count: usize,
+impl Patch {
+    /// The mean of the contact points, by their depth. Where nothing presses any more, it stays where it was.
+    fn remember(&mut self, contacts: &[Contact]) {
+        let deepest_m = contacts.iter().fold(0.0_f64, |deepest_m, contact| deepest_m.max(-contact.gap_m));
+        let (mut normal_M, mut at_M, mut sum) = (Vector3::zeros(), Vector3::zeros(), 0.0);
+        for contact in contacts.iter().filter(|contact| contact.gap_m < 0.0) {
+            normal_M -= contact.normal_M * contact.gap_m;
+            at_M -= contact.on_mesh_M * contact.gap_m;
+            sum -= contact.gap_m;
+        }
+        self.depth_m = 0.0;
+        if let Some(normal_M) = normal_M.try_normalize(1e-3 * sum).filter(|_| sum > 0.0) {
+            (self.normal_M, self.at_M, self.depth_m) = (normal_M, at_M / sum, deepest_m);
+        }
+    }
 }
 
-impl Found<'_> {
+/// A place whose contact points are being found.
+struct Place<'m> {
+    mesh: &'m Mesh,
+    other: &'m Other<'m>,
+    meeting: Meeting,
+    number: usize,
+    patches: &'m Patches,
+    found: &'m mut Found,
+}
+
+impl Place<'_> {
     /// The mesh's vertices against the other one.
-    fn vertices(&mut self, mesh: &Mesh, other: &Other<'_>, memory: &mut PairMemory) {
-        let meeting = self.meeting;
+    fn vertices(&mut self, stands: &mut super::Stands) {
+        let (mesh, other, meeting) = (self.mesh, self.other, self.meeting);
         let n = meeting.normal_M;
-        let standing = Standing {
-            mesh,
-            height: Linear::from(&other.front(&-n, meeting), -n),
-            limits: &meeting.shadow(other.ball()),
-            reach_m: meeting.reach_m,
-            travel_m: meeting.travel_m,
+        let height = Linear::from(&other.front(&-n, &meeting), -n);
+        let several = self.patches.are_several();
+        let reaches_m = |way: &Vector3<f64>| match several {
+            true => other.reaches_m(way),
+            false => ball_reaches_m(other.ball(), way),
         };
-        let chosen = standing.choose(&mut memory.stands[0]);
+        let limits = meeting.limits(reaches_m, &height, self.behind_m());
+        let limits = self.limits(mesh, &limits);
+        let Meeting { reach_m, travel_m, .. } = meeting;
+        let chosen = Standing { mesh, height, limits, reach_m, travel_m }.choose(stands);
         for corner in chosen.into_iter().flatten().filter(|corner| !corner.is_in_a_plane(mesh)) {
             let on_mesh_M = *corner.point_M(mesh);
-            let seen = other.see(&on_mesh_M, &-n, meeting.deep_m());
-            let about = About::Vertex(corner.vertex(mesh));
-            self.push(Contact::new(about, on_mesh_M, -seen.out, seen.gap_m));
+            let seen = self.of_vertex(&on_mesh_M);
+            if !self.patches.are_several() || corner.looks(mesh, &-seen.out) {
+                let about = About::Vertex(corner.vertex(mesh));
+                self.push(Contact::new(about, on_mesh_M, -seen.out, seen.gap_m));
+            }
         }
-        if self.meeting.depth_m > 0.0 {
-            chosen.into_iter().flatten().for_each(|corner| self.edges_of_mesh(mesh, other, corner));
+        if self.may_cut() {
+            chosen.into_iter().flatten().for_each(|corner| self.edges_of_mesh(corner));
         }
+    }
+
+    /// Of one place among several, what lies behind it does not count; but what lies beside it does, where that is the end
+    /// of a long edge.
+    fn limits<'l>(&self, of: &Mesh, limits: &'l [Linear; 5]) -> &'l [Linear] {
+        match (self.patches.are_several(), of.vertices().len() <= COARSE) {
+            (false, _) => &limits[..4],
+            (true, false) => limits,
+            (true, true) => &limits[4..],
+        }
+    }
+
+    /// What lies so far behind a place is another side of the same; the first one takes what is nobody else's \[m\].
+    fn behind_m(&self) -> f64 {
+        let (_, radius_m) = self.other.ball();
+        if self.number == 0 { BEHIND_M.max(0.5 * radius_m) } else { BEHIND_M }
+    }
+
+    fn of_vertex(&self, at_M: &Vector3<f64>) -> Seen {
+        let along_M = -self.meeting.normal_M;
+        self.side(at_M, along_M, -1.0, 0.0)
+            .and_then(|side| self.other.see_side(at_M, &side))
+            .unwrap_or_else(|| self.other.see(at_M, &along_M, self.meeting.deep_m()))
+    }
+
+    fn of_own(&self, own: &Own) -> Seen {
+        let along_M = self.meeting.normal_M;
+        self.side(&own.at_M, along_M, 1.0, own.radius_m)
+            .and_then(|side| see_side(self.mesh, &own.at_M, &side))
+            .unwrap_or_else(|| see(self.mesh, &own.at_M, &along_M, self.meeting.deep_m()))
+    }
+
+    /// The side that is looked at here, if others are pressed, too.
+    fn side(&self, at_M: &Vector3<f64>, along: Vector3<f64>, sign: f64, radius_m: f64) -> Option<Side> {
+        let meeting = &self.meeting;
+        self.patches.others_press(self.number).then(|| Side {
+            along,
+            lift: self.lift_M(at_M, sign),
+            above_m: meeting.deep_m().max(meeting.reach_m),
+            below_m: radius_m + meeting.reach_m,
+        })
+    }
+
+    /// So far at most leads the way out where an edge is cut off \[m\].
+    fn way_m(&self) -> f64 {
+        self.meeting.deep_m().max(2.0 * self.meeting.travel_m)
+    }
+
+    /// To where nothing presses elsewhere: from what is of the other one, or, with the sign -1, of the mesh.
+    fn lift_M(&self, point_M: &Vector3<f64>, sign: f64) -> Vector3<f64> {
+        self.patches.lift_M(self.number, point_M, sign, self.meeting.travel_m)
+    }
+
+    /// Of a single place, corners press first.
+    fn may_cut(&self) -> bool {
+        self.meeting.depth_m > 0.0 || self.patches.are_several()
     }
 
     /// The other one's points against the mesh.
-    fn owns(&mut self, mesh: &Mesh, other: &Other<'_>, memory: &mut PairMemory) {
-        let meeting = self.meeting;
+    fn owns(&mut self, stands: &mut super::Stands) {
+        let (mesh, other, meeting) = (self.mesh, self.other, self.meeting);
         let [low_M, high_M] = mesh.bounds_B();
         let around = ((low_M + high_M) * 0.5, 0.5 * (high_M - low_M).norm());
-        let owns = other.owns(meeting, &meeting.shadow(around), &mut memory.stands[1]);
+        let height = Linear::from(&meeting.at_M, meeting.normal_M);
+        let several = self.patches.are_several();
+        let reaches_m = |way: &Vector3<f64>| match several {
+            true => box_reaches_m([low_M, high_M], way),
+            false => ball_reaches_m(around, way),
+        };
+        let limits = meeting.limits(reaches_m, &height, self.behind_m());
+        let limits = match other.solid {
+            Solidity::Mesh(second) => self.limits(second, &limits),
+            Solidity::Form(_) => &limits,
+        };
+        let owns = other.owns(&meeting, limits, stands);
         let far_m = meeting.reach_m + FAR * meeting.depth_m;
         for own in owns.into_iter().flatten() {
             // Far from all faces it is outside, or so deep inside that it does not matter where others press.
             if mesh.clearance(&own.at_M, own.radius_m + far_m) >= own.radius_m + far_m {
                 continue;
             }
-            let seen = see(mesh, &own.at_M, &meeting.normal_M, meeting.deep_m());
-            let gap_m = seen.gap_m - own.radius_m;
+            let seen = self.of_own(&own);
+            if self.patches.are_several() && !other.looks(&own, &-seen.out) {
+                continue;
+            }
             let on_mesh_M = own.at_M - seen.out * seen.gap_m;
-            self.push(Contact::new(About::Other(own.number), on_mesh_M, seen.out, gap_m));
+            let about = About::Other(own.number);
+            self.push(Contact::new(about, on_mesh_M, seen.out, seen.gap_m - own.radius_m));
         }
-        if meeting.depth_m > 0.0 {
-            self.edges(mesh, other);
+        if self.may_cut() {
+            self.edges();
             let corners = owns.into_iter().flatten().filter_map(|own| own.corner);
-            corners.for_each(|corner| self.edges_of_other(mesh, other, corner));
+            corners.for_each(|corner| self.edges_of_other(corner));
         }
     }
 
     /// Where edges of a form are cut off by the mesh.
-    fn edges(&mut self, mesh: &Mesh, other: &Other<'_>) {
+    fn edges(&mut self) {
         let n = self.meeting.normal_M;
-        for (number, edge) in other.edges(&-n).into_iter().flatten().enumerate() {
-            self.cuts_by_mesh(mesh, &edge, About::Cut { edge: number as u32, of_mesh: false, end: 0 });
+        for (number, edge) in self.other.edges(&-n).into_iter().flatten().enumerate() {
+            self.cuts_by_mesh(&edge, About::Cut { edge: number as u32, of_mesh: false, end: 0 });
         }
     }
 
     /// Where edges that leave a vertex of the other mesh are cut off by this one.
-    fn edges_of_other(&mut self, mesh: &Mesh, other: &Other<'_>, corner: Corner) {
-        let Solidity::Mesh(second) = other.solid else { return };
-        let place = |point: &Vector3<f64>| (other.X_MO * Point3::from(*point)).coords;
+    fn edges_of_other(&mut self, corner: Corner) {
+        let Solidity::Mesh(second) = self.other.solid else { return };
+        let X_MO = self.other.X_MO;
+        let place = |point: &Vector3<f64>| (X_MO * Point3::from(*point)).coords;
         let from = place(corner.point_M(second));
         corner.for_each_sharp_edge(second, |to, face, edge| {
             let about = About::Cut { edge: 3 * face + edge as u32, of_mesh: false, end: 0 };
-            self.cuts_by_mesh(mesh, &Edge { ends: [from, place(to)] }, about);
+            self.cuts_by_mesh(&Edge { ends: [from, place(to)] }, about);
         });
     }
 
-    fn cuts_by_mesh(&mut self, mesh: &Mesh, edge: &Edge, about: About) {
-        let meeting = self.meeting;
-        let cuts = edge.cuts(mesh, &meeting.normal_M, meeting.deep_m());
+    fn cuts_by_mesh(&mut self, edge: &Edge, about: About) {
+        let lift = |point_M: &Vector3<f64>| self.lift_M(point_M, 1.0);
+        let way = WayOut { along: self.meeting.normal_M, most_m: self.way_m(), lift: &lift };
+        let cuts = edge.cuts(self.mesh, &way);
         for (end, cut) in cuts.into_iter().enumerate() {
             if let Some(cut) = cut {
                 let about = about.at_end(end as u32);
@@ -176,48 +275,48 @@ impl Found<'_> {
     }
 
     /// Where edges that leave a vertex of this mesh are cut off by the other one.
-    fn edges_of_mesh(&mut self, mesh: &Mesh, other: &Other<'_>, corner: Corner) {
-        let Solidity::Mesh(second) = other.solid else { return };
-        let meeting = self.meeting;
-        let place = |point: &Vector3<f64>| other.X_MO.inverse_transform_point(&Point3::from(*point)).coords;
-        let along = other.X_MO.inverse_transform_vector(&-meeting.normal_M);
+    fn edges_of_mesh(&mut self, corner: Corner) {
+        let (mesh, meeting, X_MO) = (self.mesh, self.meeting, self.other.X_MO);
+        let Solidity::Mesh(second) = self.other.solid else { return };
+        let place = |point: &Vector3<f64>| X_MO.inverse_transform_point(&Point3::from(*point)).coords;
+        let turned = |v: &Vector3<f64>| X_MO.inverse_transform_vector(v);
+        let (patches, number, most_m) = (self.patches, self.number, self.way_m());
+        let lift = |point: &Vector3<f64>| {
+            let point_M = (X_MO * Point3::from(*point)).coords;
+            turned(&patches.lift_M(number, &point_M, -1.0, meeting.travel_m))
+        };
+        let way = WayOut { along: turned(&-meeting.normal_M), most_m, lift: &lift };
         let from = place(corner.point_M(mesh));
         corner.for_each_sharp_edge(mesh, |to, face, edge| {
-            let cuts = Edge { ends: [from, place(to)] }.cuts(second, &along, meeting.deep_m());
+            let cuts = Edge { ends: [from, place(to)] }.cuts(second, &way);
             for (end, cut) in cuts.into_iter().enumerate() {
                 let about = About::Cut { edge: 3 * face + edge as u32, of_mesh: true, end: end as u32 };
                 if let Some(cut) = cut {
-                    let on_mesh_M = (other.X_MO * Point3::from(cut.on_edge)).coords;
-                    let normal_M = -(other.X_MO * cut.out);
-                    self.push(Contact::new(about, on_mesh_M, normal_M, cut.gap_m));
+                    let on_mesh_M = (X_MO * Point3::from(cut.on_edge)).coords;
+                    self.push(Contact::new(about, on_mesh_M, -(X_MO * cut.out), cut.gap_m));
                 }
             }
         });
     }
 
+    /// What is another place's, that one finds.
     fn push(&mut self, contact: Contact) {
-        if contact.gap_m > self.meeting.reach_m || !contact.gap_m.is_finite() {
+        let is_near = contact.gap_m <= self.meeting.reach_m;
+        if !is_near || self.patches.belongs_elsewhere(self.number, &contact.normal_M) {
             return;
         }
-        // Of a crossing both edges tell, each on its side of the depth.
-        let together_m = TOGETHER_M + 2.0 * contact.gap_m.min(0.0).abs();
-        let is_there =
-            |one: &Contact| (one.on_mesh_M - contact.on_mesh_M).norm_squared() < together_m * together_m;
-        if self.contacts[..self.count].iter().any(is_there) {
-            return;
-        }
-        if let Some(place) = self.contacts.get_mut(self.count) {
-            *place = contact;
-            self.count += 1;
+        match self.patches.are_several() {
+            true => self.found.push_share(contact),
+            false => self.found.push(contact),
         }
     }
 }
 
-/// Room for vertices, points of the other one and crossings.
-const ROOM: usize = 3 * MAX_POINTS;
+/// A mesh of no more vertices has long edges.
+const COARSE: usize = 16;
+/// From a place among several \[m\].
+const BEHIND_M: f64 = 1e-3;
 /// Turns between the two until the nearest points are about found.
 const TO_AND_FRO: usize = 4;
 /// Points at most so many times as deep as the deepest of the last tick are found.
 const FAR: f64 = 2.0;
-/// Nearer to each other they are one \[m\].
-const TOGETHER_M: f64 = 1e-6;

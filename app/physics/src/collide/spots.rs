@@ -6,7 +6,7 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::{ContactPoint, ContactPoints, MAX_POINTS};
+use super::{ContactPoint, ContactPoints, PATCH_POINTS};
 
 /// A contact point in the frame of the second form.
 #[derive(Debug, Clone, Copy, Default)]
@@ -87,7 +87,7 @@ impl Spots {
     /// If there are too many, those of these ids are the first to go.
     pub(super) fn thin_out(&mut self, ids: std::ops::Range<u32>) {
         let mut at = 0;
-        while self.count > MAX_POINTS && at < self.count {
+        while self.count > PATCH_POINTS && at < self.count {
             if ids.contains(&self.all[at].id) {
                 self.all.copy_within(at + 1..self.count, at);
                 self.depths_m.copy_within(at + 1..self.count, at);

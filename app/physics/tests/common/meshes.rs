@@ -91,3 +91,42 @@ pub fn prism(outline: &[[f64; 2]], triangles: &[[u32; 3]], depth: f64) -> Triang
     }
     TriangleSoup { vertices, faces }
 }
+
+/// Boxes of a grid between these planes, those that `is_filled` names, as one closed mesh.
+pub fn cells(planes: [&[f64]; 3], is_filled: impl Fn([usize; 3]) -> bool) -> TriangleSoup {
+    let [nx, ny, nz] = planes.map(<[f64]>::len);
+    let is_filled = |cell: [i64; 3]| {
+        let inside = cell.iter().zip([nx, ny, nz]).all(|(&at, n)| at >= 0 && at + 1 < n as i64);
+        inside && is_filled(cell.map(|at| at as usize))
+    };
+    let mut soup = TriangleSoup { vertices: Vec::new(), faces: Vec::new() };
+    let mut numbers = BTreeMap::new();
+    for cell in (0..nx * ny * nz).map(|i| [i / (ny * nz), i / nz % ny, i % nz].map(|at| at as i64)) {
+        for (axis, side) in (0..6).map(|i| (i / 2, i % 2)) {
+            let mut beside = cell;
+            beside[axis] += 2 * side as i64 - 1;
+            if !is_filled(cell) || is_filled(beside) {
+                continue;
+            }
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            let mut corner = |s: i64, t: i64| {
+                let mut at = cell;
+                (at[axis], at[u], at[v]) = (at[axis] + side as i64, at[u] + s, at[v] + t);
+                *numbers.entry(at).or_insert_with(|| {
+                    soup.vertices.push(Vector3::from_fn(|axis, _| planes[axis][at[axis] as usize]));
+                    (soup.vertices.len() - 1) as u32
+                })
+            };
+            let [a, b, c, d] = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
+            let quad = if side == 1 { [[a, b, c], [a, c, d]] } else { [[a, c, b], [a, d, c]] };
+            soup.faces.extend(quad);
+        }
+    }
+    soup
+}
+
+/// A block of 100 x 60 x 100 mm with a square hole from above, down to `floor`, in whose middle x and z are 0.
+pub fn block_with_hole(half: f64, floor: f64) -> TriangleSoup {
+    let across = [-0.05, -half, half, 0.05];
+    cells([&across, &[-0.03, floor, 0.03], &across], |[x, y, z]| [x, y, z] != [1, 1, 1])
+}

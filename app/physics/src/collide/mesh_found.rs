@@ -1,0 +1,112 @@
+//! Contact points of a mesh with another solid while they are being found, place by place.
+//!
+//! Model: a place keeps the [`PATCH_POINTS`] deepest of its points, a pair [`MAX_POINTS`]; where there are more, the place
+//! with the most loses its least deep one. Points nearer to each other than twice their depth are one, unless they are of
+//! two places and press in different directions: a corner in the corner of a room touches floor and walls.
+
+use super::mesh::Contact;
+use super::mesh_patch::MAX_PATCHES;
+use super::{MAX_POINTS, PATCH_POINTS};
+
+pub(super) struct Found {
+    contacts: [Contact; ROOM],
+    count: usize,
+    /// Where each place's begin.
+    begins: [usize; MAX_PATCHES + 1],
+    patch: usize,
+}
+
+impl Found {
+    pub(super) fn new() -> Self {
+        Self { contacts: [Contact::default(); ROOM], count: 0, begins: [0; MAX_PATCHES + 1], patch: 0 }
+    }
+
+    pub(super) fn begin(&mut self, patch: usize) {
+        self.patch = patch;
+        self.begins[patch..].fill(self.count);
+    }
+
+    /// Those of a place whose turn is over.
+    pub(super) fn end(&mut self) -> &[Contact] {
+        let begin = self.begins[self.patch];
+        while self.count - begin > PATCH_POINTS {
+            self.drop_the_least(begin, self.count);
+        }
+        self.begins[self.patch + 1..].fill(self.count);
+        &self.contacts[begin..self.count]
+    }
+
+    /// Of several places' points those that press in one direction near each other share their depth: what is as near as
+    /// that counts once, and what is farther away ever more.
+    pub(super) fn push_share(&mut self, mut contact: Contact) {
+        let depth_m = -contact.gap_m;
+        let mut taken_m = 0.0_f64;
+        for one in self.contacts[..self.count].iter().filter(|_| depth_m > 0.0) {
+            let apart = (one.on_mesh_M - contact.on_mesh_M).norm() / FADE_M;
+            if apart < 1.0 && one.normal_M.dot(&contact.normal_M) > AGREES {
+                taken_m = taken_m.max((1.0 - apart) * depth_m.min(-one.gap_m).max(0.0));
+            }
+        }
+        contact.gap_m += taken_m;
+        self.push(contact);
+    }
+
+    pub(super) fn push(&mut self, mut contact: Contact) {
+        if !contact.gap_m.is_finite() {
+            return;
+        }
+        // Of a crossing both edges tell, each on its side of the depth.
+        let together_m = TOGETHER_M + 2.0 * contact.gap_m.min(0.0).abs();
+        let begin = self.begins[self.patch];
+        let is_there = |(at, one): (usize, &Contact)| {
+            (at >= begin || one.normal_M.dot(&contact.normal_M) > AGREES)
+                && (one.on_mesh_M - contact.on_mesh_M).norm_squared() < together_m * together_m
+        };
+        if self.contacts[..self.count].iter().enumerate().any(is_there) {
+            return;
+        }
+        contact.id |= (self.patch as u32) << PATCH_SHIFT;
+        if let Some(place) = self.contacts.get_mut(self.count) {
+            *place = contact;
+            self.count += 1;
+        }
+    }
+
+    /// All places' points, as many as a pair may have.
+    pub(super) fn all(&mut self) -> &[Contact] {
+        while self.count > MAX_POINTS {
+            let is_pressed = self.contacts[..self.count].iter().all(|contact| contact.gap_m < 0.0);
+            let (from, to) = if is_pressed { self.largest() } else { (0, self.count) };
+            self.drop_the_least(from, to);
+        }
+        &self.contacts[..self.count]
+    }
+
+    /// The place with the most points.
+    fn largest(&self) -> (usize, usize) {
+        let size = |at: &usize| self.begins[at + 1] - self.begins[*at];
+        let most = (0..MAX_PATCHES).max_by_key(size).unwrap_or(0);
+        (self.begins[most], self.begins[most + 1])
+    }
+
+    fn drop_the_least(&mut self, begin: usize, end: usize) {
+        let least = (begin..end).max_by(|&a, &b| self.contacts[a].gap_m.total_cmp(&self.contacts[b].gap_m));
+        if let Some(least) = least {
+            self.contacts.copy_within(least + 1..self.count, least);
+            self.count -= 1;
+            self.begins.iter_mut().filter(|begin| **begin > least).for_each(|begin| *begin -= 1);
+        }
+    }
+}
+
+/// Room for vertices, points of the other one and crossings of one place, beside what the others have kept.
+const ROOM: usize = (2 + MAX_PATCHES) * PATCH_POINTS;
+/// Points of several places that are nearer share their depth \[m\].
+const FADE_M: f64 = 1e-3;
+/// Nearer to each other they are one \[m\].
+const TOGETHER_M: f64 = 1e-6;
+/// Cosine between directions that are about the same.
+const AGREES: f64 = 0.7;
+/// Names leave three bits for the place.
+const PATCH_SHIFT: u32 = 29;
+const _: () = assert!(MAX_PATCHES <= 1 << (u32::BITS - PATCH_SHIFT));

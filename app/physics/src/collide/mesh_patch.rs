@@ -1,0 +1,118 @@
+//! Places where a mesh and another solid meet: a floor and walls of one hole, the feet of an arch on steps.
+//!
+//! Model: each place is a plane about which either presses on the other, with what chooses their points there. The first is
+//! followed from tick to tick, as if it was the only one; what else there is, [`mesh_search`](super::mesh_search) finds.
+//! Identity: a place keeps its number while it is pressed, and while a search finds it again.
+
+use nalgebra::{Isometry3, Vector3};
+
+use super::Stands;
+
+/// The most places of a pair: the sides of a box inside another one.
+pub(super) const MAX_PATCHES: usize = 6;
+
+/// A place, in the mesh's frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Patch {
+    /// Unit, from the mesh to the other one.
+    pub(super) normal_M: Vector3<f64>,
+    /// On the mesh \[m\].
+    pub(super) at_M: Vector3<f64>,
+    /// How deep they were in each other there; 0: nothing pressed \[m\].
+    pub(super) depth_m: f64,
+    /// Of the mesh and the other one, which vertices stand there.
+    pub(super) stands: [Stands; 2],
+    /// The normal, the point and the depth are those of the last tick.
+    pub(super) is_known: bool,
+}
+
+/// All places of a pair.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Patches {
+    pub(super) all: [Patch; MAX_PATCHES],
+    /// What they are was found by a search from here.
+    pub(super) searched: Option<Searched>,
+}
+
+/// What a search has seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Searched {
+    pub(super) X_MO: Isometry3<f64>,
+    /// All places whose gap was no larger are known \[m\].
+    pub(super) within_m: f64,
+}
+
+impl Patch {
+    /// Whether two places are the same: their normals agree, and, unless the other one is convex, so do their planes.
+    pub(super) fn is_same(&self, normal_M: &Vector3<f64>, at_M: &Vector3<f64>, is_convex: bool) -> bool {
+        let apart_m = self.normal_M.dot(&(at_M - self.at_M)).abs();
+        self.normal_M.dot(normal_M) > SAME && (is_convex || apart_m < APART_M + 2.0 * self.depth_m)
+    }
+
+    pub(super) fn is_pressed(&self) -> bool {
+        self.is_known && self.depth_m > 0.0
+    }
+}
+
+impl Patches {
+    /// Whether there is more than one.
+    pub(super) fn are_several(&self) -> bool {
+        self.all[1..].iter().any(|patch| patch.is_known)
+    }
+
+    /// Whether another place is pressed.
+    pub(super) fn others_press(&self, number: usize) -> bool {
+        self.all.iter().enumerate().any(|(at, patch)| at != number && patch.is_pressed())
+    }
+
+    /// Whether a normal is another place's rather than this one's.
+    pub(super) fn belongs_elsewhere(&self, number: usize, normal_M: &Vector3<f64>) -> bool {
+        let agrees = self.all[number].normal_M.dot(normal_M);
+        let agrees_more = |(at, patch): (usize, &Patch)| {
+            at != number && patch.is_known && patch.normal_M.dot(normal_M) > agrees.max(AGREES)
+        };
+        agrees < AGREES && self.all.iter().enumerate().any(agrees_more)
+    }
+
+    /// The way across this place's normal from a point to where it is clear of what presses elsewhere, or may in this tick
+    /// \[m\]. Against the other one's normals: -1.
+    pub(super) fn lift_M(
+        &self,
+        number: usize,
+        point_M: &Vector3<f64>,
+        sign: f64,
+        travel_m: f64,
+    ) -> Vector3<f64> {
+        let normal_M = self.all[number].normal_M;
+        let mut lift_M = Vector3::zeros();
+        for (at, patch) in self.all.iter().enumerate() {
+            let behind_m = sign * patch.normal_M.dot(&(patch.at_M - point_M));
+            let most_m = 1.5 * patch.depth_m + 2.0 * travel_m;
+            if at != number && patch.is_known && behind_m > -2.0 * travel_m {
+                let across_M = patch.normal_M - normal_M * normal_M.dot(&patch.normal_M);
+                lift_M += across_M * (sign * (behind_m + 2.0 * travel_m + LEAST_M).min(most_m));
+            }
+        }
+        lift_M
+    }
+
+    /// The first place is a pressed one, if any is.
+    pub(super) fn put_a_pressed_one_first(&mut self) {
+        if self.all[0].is_pressed() {
+            return;
+        }
+        if let Some(pressed) = self.all.iter().position(Patch::is_pressed) {
+            self.all.swap(0, pressed);
+            self.searched = None;
+        }
+    }
+}
+
+/// Cosine between normals of one place.
+const SAME: f64 = 0.9;
+/// Places of one normal are two if so far apart along it \[m\].
+const APART_M: f64 = 1e-3;
+/// Cosine between a place's normal and that of a point there, beyond which it is nobody else's.
+const AGREES: f64 = 0.7;
+/// Farther is clear \[m\].
+const LEAST_M: f64 = 1e-6;

@@ -1,0 +1,107 @@
+//! Where a point is with regard to a solid: the way out, and how far that is.
+
+use haptics::mesh::{Mesh, Sides};
+use haptics::{Cuboid, Feature, Form, Surface};
+use nalgebra::Vector3;
+
+/// Where a point is with regard to a surface.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Seen {
+    /// Unit, out of the surface.
+    pub(super) out: Vector3<f64>,
+    /// Negative inside \[m\].
+    pub(super) gap_m: f64,
+}
+
+/// Of a box: inside, the way out is through the face that was come in by, unless another one is very much nearer.
+pub(super) fn in_box(cuboid: &Cuboid, point: &Vector3<f64>, along: &Vector3<f64>) -> Seen {
+    let gap_m = cuboid.signed_distance(point);
+    let axis = along.iamax();
+    let depth_m = 0.5 * cuboid.size_m()[axis] - point[axis] * along[axis].signum();
+    if gap_m <= 0.0 && depth_m < MUCH * -gap_m + LITTLE_M {
+        let mut out = Vector3::zeros();
+        out[axis] = 1.0_f64.copysign(along[axis]);
+        return Seen { out, gap_m: -depth_m };
+    }
+    at_form((*cuboid).into(), point)
+}
+
+pub(super) fn at_form(form: Form, point: &Vector3<f64>) -> Seen {
+    let (nearest, gap_m) = (form.nearest(point), form.signed_distance(point));
+    let away = point - nearest.point_B;
+    // At an edge the way from the nearest point is none of the faces' normals.
+    match away.try_normalize(NOTHING_M).filter(|_| gap_m > 0.0) {
+        Some(out) => Seen { out, gap_m: away.norm() },
+        None => Seen { out: nearest.normal_B, gap_m },
+    }
+}
+
+/// Nearer to a surface, the way from there is rounding \[m\].
+const NOTHING_M: f64 = 1e-9;
+
+/// Where a point is with regard to a mesh; inside, `along` is the way out that it came in by. A sheet is seen from there, and
+/// so is a wall that it cannot have come through otherwise than by going so deep (m).
+pub(super) fn see(mesh: &Mesh, point: &Vector3<f64>, along: &Vector3<f64>, deep_m: f64) -> Seen {
+    let (nearest, is_inside) = mesh.nearest_and_side(point);
+    let face = &mesh.faces()[nearest.face as usize];
+    if mesh.sides() == Sides::Sheet {
+        let side = if face.normal_B.dot(along) < 0.0 { -1.0 } else { 1.0 };
+        let height_m = (face.normal_B.dot(point) - face.offset_m) * side;
+        let is_beside = nearest.feature != Feature::Face && nearest.distance_m > height_m.abs() * 1.01;
+        if is_beside {
+            let out = (point - nearest.point_B) / nearest.distance_m;
+            return Seen { out, gap_m: nearest.distance_m };
+        }
+        return Seen { out: face.normal_B * side, gap_m: height_m };
+    }
+    if !is_inside {
+        let through = if deep_m > 0.0 { mesh.first_hit(&(point + along * deep_m), point) } else { None };
+        let through = through.map(|hit| &mesh.faces()[hit.face as usize]);
+        if let Some(face) = through.filter(|face| face.normal_B.dot(along) > AGREES) {
+            return Seen { out: face.normal_B, gap_m: face.normal_B.dot(point) - face.offset_m };
+        }
+        let away = point - nearest.point_B;
+        let is_flat = nearest.feature == Feature::Face || nearest.distance_m < 1e-9 * mesh.extent_m();
+        let out = if is_flat { face.normal_B } else { away / nearest.distance_m };
+        return Seen { out, gap_m: nearest.distance_m };
+    }
+    if face.normal_B.dot(along) < AGREES {
+        // From far enough outside back to the point.
+        let most_m = MUCH * nearest.distance_m + LITTLE_M;
+        if let Some(hit) = mesh.first_hit(&(point + along * most_m), point) {
+            let through = &mesh.faces()[hit.face as usize];
+            if through.normal_B.dot(along) > AGREES {
+                return Seen { out: through.normal_B, gap_m: through.normal_B.dot(point) - through.offset_m };
+            }
+        }
+    }
+    Seen { out: face.normal_B, gap_m: -nearest.distance_m }
+}
+
+/// One side of a mesh among several that press.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Side {
+    /// Unit, out of it.
+    pub(super) along: Vector3<f64>,
+    /// From a point to where nothing else presses \[m\].
+    pub(super) lift: Vector3<f64>,
+    /// How far above and below a point it is looked for \[m\].
+    pub(super) above_m: f64,
+    pub(super) below_m: f64,
+}
+
+/// Where a point is with regard to a side, if the way through it meets that.
+pub(super) fn see_side(mesh: &Mesh, point: &Vector3<f64>, side: &Side) -> Option<Seen> {
+    let (along, lifted) = (side.along, point + side.lift);
+    let hit = mesh.first_hit(&(lifted + along * side.above_m), &(lifted - along * side.below_m))?;
+    let face = &mesh.faces()[hit.face as usize];
+    let sign = if hit.is_front { 1.0 } else { -1.0 };
+    let (out, gap_m) = (face.normal_B * sign, sign * (face.normal_B.dot(point) - face.offset_m));
+    (out.dot(&along) > AGREES).then_some(Seen { out, gap_m })
+}
+
+/// Another way out must be so many times as short, and a little more \[m\].
+const MUCH: f64 = 5.0;
+const LITTLE_M: f64 = 2e-3;
+/// Cosine between directions that are about the same.
+const AGREES: f64 = 0.7;
