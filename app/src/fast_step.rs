@@ -15,8 +15,10 @@
 
 mod near;
 mod objects;
+mod watched;
 
 pub use objects::{HandFinger, Objects};
+pub use watched::EventTeller;
 
 use crate::mount::Mount;
 use crate::passive_port::{Tick, keep_passive};
