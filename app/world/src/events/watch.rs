@@ -49,7 +49,7 @@ pub struct PairForce {
 }
 
 /// What was so in the tick before.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Watch {
     fingers: Vec<FingerWatch>,
     pairs: Pairs,
@@ -73,7 +73,8 @@ impl Watch {
     /// Of so many fingers, which touch nothing yet, and so many pairs at once.
     pub fn new(fingers: usize, pairs: usize, period_s: f64) -> Self {
         Self {
-            fingers: vec![FingerWatch::new(); fingers],
+            // Each made anew: a clone of a list without entries has no room.
+            fingers: (0..fingers).map(|_| FingerWatch::new()).collect(),
             pairs: Pairs::with_capacity(pairs),
             grasps: Grasps::new(),
             last_tick: None,

@@ -4,7 +4,7 @@ use super::{Life, MOST_TOUCHED, Teller, Touching};
 use crate::events::{Change, Kind};
 
 /// What a finger did in the tick before.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(super) struct FingerWatch {
     touched: Vec<Touched>,
     pub(super) tied: Option<u32>,

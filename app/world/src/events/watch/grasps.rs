@@ -7,7 +7,7 @@ use crate::events::Kind;
 /// Entities that are held at once; each needs a finger at least, and a finger touches few.
 const MOST: usize = 32;
 
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(super) struct Grasps {
     held: Vec<Held>,
     /// Entities in touch with fingers, and bit `i`: with finger `i`.

@@ -5,7 +5,7 @@ use crate::events::{Change, Kind};
 use nalgebra::Vector3;
 
 /// Pairs that touch, in ascending order.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(super) struct Pairs {
     touching: Vec<Pair>,
     most: usize,
