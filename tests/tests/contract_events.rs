@@ -117,7 +117,7 @@ fn a_cube_that_is_lifted_is_grasped_once_and_released_once() {
     let held = |tick: usize| samples.iter().all(|of_finger| of_finger[tick].entity == "cube");
     assert!(held(grasped) && !held(grasped - 1));
     let released: usize = releases[0].parse().expect("a tick");
-    assert!((released - 5..released).all(|tick| !held(tick)) && held(released - 6));
+    assert!((released - 4..=released).all(|tick| !held(tick)) && held(released - 5));
     // As JSON: a line for each, and the same words.
     let text = std::fs::read_to_string(place.path("events.jsonl")).expect("events");
     assert_eq!(text.lines().count(), events.len());
