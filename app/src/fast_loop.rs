@@ -5,11 +5,12 @@
 //! except where the clock itself waits (virtual, lockstep).
 //! Cost: bounded; no allocation, no system call but the wake-up of a sleeping driver.
 
-use crate::fast_step::FastStep;
+use crate::fast_step::{EventTeller, FastStep};
 use crate::row::{BodyRow, Row};
 use crate::row_queue::RowSender;
 use bytemuck::Zeroable;
 use shm_abi::{Command, CommanderMemory, DriverState, DriverView, Frame};
+use world::events::EventSender;
 
 /// How far a missed frame is searched for in the ring: the next one is nearly always among these.
 const SEARCH_TICKS: u64 = 64;
@@ -39,6 +40,8 @@ pub enum Turn {
 /// The fast thread's state.
 pub struct FastLoop {
     step: FastStep,
+    /// Tells others what happens, if anybody wants to know.
+    teller: Option<EventTeller>,
     rows: RowSender,
     when_full: WhenFull,
     /// Rows that the run shall have.
@@ -109,6 +112,7 @@ impl FastLoop {
         Self {
             pending_bodies: (0..).zip(step.bodies().iter().copied()).collect(),
             step,
+            teller: None,
             rows,
             when_full,
             total_ticks,
@@ -123,6 +127,13 @@ impl FastLoop {
             row: Row::empty(),
             tally: Tally::default(),
         }
+    }
+
+    /// With a queue for what happens.
+    #[must_use]
+    pub fn with_events(mut self, events: EventSender) -> Self {
+        self.teller = Some(EventTeller::new(&self.step, events));
+        self
     }
 
     /// Takes the frame of `tick`, steps and answers.
@@ -177,6 +188,10 @@ impl FastLoop {
         self.tally.park(self.step.parked_now(), self.row.run_tick);
         self.next_tick = self.row.run_tick + 1;
         if self.row.run_tick < self.total_ticks {
+            // Before the row is sent, and after the command was.
+            if let Some(teller) = &mut self.teller {
+                teller.tell(&self.step, &self.row);
+            }
             self.pending = Some((self.frame.tick, self.row));
             self.keep_bodies();
             for finger in &self.row.fingers {

@@ -27,6 +27,8 @@ pub struct Report {
     pub guarantees: Option<(String, SetupReport)>,
     /// What became of entities that stand still since, a line each.
     pub parked: Vec<String>,
+    /// How many events of which kind there were.
+    pub events: String,
     /// What became of the recordings.
     pub recordings: Vec<Recorded>,
 }
@@ -123,6 +125,7 @@ impl fmt::Display for Report {
         for line in &self.parked {
             writeln!(f, "parked       {line}")?;
         }
+        writeln!(f, "events       {}", self.events)?;
         if let Some((driver, fast)) = &self.guarantees {
             if !driver.trim().is_empty() {
                 writeln!(f, "guarantees of the driver's loop")?;
@@ -141,7 +144,7 @@ impl fmt::Display for Report {
             if index > 0 {
                 writeln!(f)?;
             }
-            write!(f, "recording    {} ({} rows", recorded.path.display(), recorded.rows)?;
+            write!(f, "recording    {} ({} {}", recorded.path.display(), recorded.rows, recorded.unit)?;
             match recorded.lost + tally.rows_lost {
                 0 => write!(f, ")")?,
                 lost => write!(f, ", {lost} LOST: the disk was too slow)")?,

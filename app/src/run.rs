@@ -20,6 +20,10 @@ use shm_abi::segment::{ClockMode, DriverInfo};
 use shm_abi::{CommanderMemory, DriverView, Frame};
 use std::path::PathBuf;
 use std::time::Duration;
+use world::events::{Hub, event_queue};
+
+/// Events that may wait between fast and slow side.
+pub const EVENT_QUEUE: usize = 8192;
 
 /// What a run is to do with its rig.
 #[derive(Debug, Clone)]
@@ -30,6 +34,8 @@ pub struct RunPlan {
     pub seconds: Option<f64>,
     /// Where to record; the ending says in which format.
     pub record: Vec<PathBuf>,
+    /// Where to write what happens, a line each; the ending says in which format.
+    pub events: Vec<PathBuf>,
     /// Seed of everything random, to be told in recordings.
     pub seed: u64,
     /// Use the driver that listens here, and its devices, instead of a child with the rig's.
@@ -88,10 +94,16 @@ impl Parts {
             let file = record::create(path, rig.names(devices), period_ns, about, &view)?;
             Recorder::start(path, file, step.bodies().len(), period_ns, when_full)
         };
-        let recorders = plan.record.iter().map(record).collect::<Result<_, _>>()?;
+        let record_events = |path: &PathBuf| {
+            let file = record::create_events(path, rig.names(devices), period_ns)?;
+            Recorder::start(path, file, step.bodies().len(), period_ns, when_full)
+        };
+        let all = plan.record.iter().map(record).chain(plan.events.iter().map(record_events));
+        let recorders = all.collect::<Result<_, _>>()?;
+        let (events, event_ends) = event_queue(EVENT_QUEUE);
         Ok(Self {
-            fast: FastLoop::new(step, producer, when_full, total_ticks, period_ns),
-            slow: SlowSide::new(consumer, recorders),
+            fast: FastLoop::new(step, producer, when_full, total_ticks, period_ns).with_events(events),
+            slow: SlowSide::new(consumer, Hub::new(vec![event_ends]), recorders),
             progress: Progress::new(total_ticks, period_ns),
         })
     }
@@ -104,7 +116,7 @@ fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Repo
         Parts::new(rig, plan, ClockMode::Virtual, rig.period_ns, &driver.extras(), &about)?;
     let result = driver.run(&mut fast, &mut slow, &mut progress, signals);
     progress.end();
-    let recordings = slow.finish();
+    let (recordings, events) = slow.finish();
     let stop = result?;
     let report = Report {
         clock: ClockMode::Virtual.name(),
@@ -115,6 +127,7 @@ fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Repo
         timing: None,
         guarantees: None,
         parked: parked(&fast.tally, rig),
+        events,
         recordings,
     };
     Ok((report, stop))
@@ -138,7 +151,7 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
         Parts::new(&step_rig, plan, info.clock_mode, info.period_ns, &extras, &about)?;
     let result = two_processes::run(&mut source, attachment, fast, &mut slow, &mut progress, signals);
     progress.end();
-    let recordings = slow.finish();
+    let (recordings, events) = slow.finish();
     let end = result?;
     let is_real = info.clock_mode == ClockMode::Real;
     let report = Report {
@@ -150,6 +163,7 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
         timing: is_real.then(|| baseline.timing(&end.driver, &end.step_ns)),
         guarantees: is_real.then_some((info.setup_report, end.fast_report)),
         parked: parked(&end.tally, rig),
+        events,
         recordings,
     };
     Ok((report, end.stop))

@@ -365,7 +365,9 @@ fn play_scene(file: &Path, fingers: usize, least: u64) {
     cycle.change_lease();
     let step = rig.fast_step().unwrap();
     let (rows, mut taken) = row_queue_of(1024, step.bodies().len());
-    let mut fast = FastLoop::new(step, rows, WhenFull::Drop, TICKS, period_ns);
+    let (events, mut event_ends) = world::events::event_queue(256);
+    let mut fast = FastLoop::new(step, rows, WhenFull::Drop, TICKS, period_ns).with_events(events);
+    let mut told = 0;
     let (mut seen, mut answered) = ([0_u64; 3], 0);
     for tick in 1..=TICKS {
         cycle.sense(tick, tick * period_ns);
@@ -388,8 +390,12 @@ fn play_scene(file: &Path, fingers: usize, least: u64) {
             for finger in &row.fingers[..fingers] {
                 seen[finger.friction as usize] += 1;
             }
+            while event_ends.receive(u64::MAX).is_some() {
+                told += 1;
+            }
         }
     }
+    assert!(told > 0, "nothing was told");
     assert_eq!(fast.tally.answered, answered);
     assert!(fast.tally.rows_lost > 0 && fast.tally.frames_missed > 0, "{:?}", fast.tally);
     for state in [ContactState::Free, ContactState::Stick, ContactState::Slip] {

@@ -1,6 +1,7 @@
 //! One tick of all bodies: contact points, forces, residual force and torque, motion.
 
 mod hand_over;
+mod pressing;
 mod rest;
 
 pub use hand_over::Parcel;

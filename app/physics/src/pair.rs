@@ -76,6 +76,11 @@ impl Pair {
         Self { entities, surfacing, is_new: true, ..Self::default() }
     }
 
+    /// The force on A in the last tick \[N\], over all points.
+    pub(crate) fn force_W(&self, rows: &[Row]) -> Vector3<f64> {
+        rows.iter().skip(self.first_row).take(self.rows).map(|row| row.force_W).sum()
+    }
+
     /// Finds where it touches, and appends a row for each point; notes those that may meet what they touch.
     pub(crate) fn gather(&mut self, start: &Start<'_>, rows: &mut Vec<Row>, meetings: &mut Vec<Meeting>) {
         (self.first_row, self.rows) = (rows.len(), 0);

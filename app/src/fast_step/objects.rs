@@ -49,6 +49,8 @@ pub struct Objects {
     period_s: f64,
     /// What the last tick took.
     pub made: Made,
+    /// By how much it moved them (s).
+    stepped_s: f64,
 }
 
 /// What the slow list has, as the fast side sees it.
@@ -84,6 +86,7 @@ impl Objects {
             lists: None,
             period_s,
             made: Made::default(),
+            stepped_s: 0.0,
         };
         objects.note_all();
         objects
@@ -140,6 +143,22 @@ impl Objects {
     /// The bodies whose rows are not what they were a tick before.
     pub fn changed(&self) -> &[u32] {
         &self.changed
+    }
+
+    /// The bodies, and what they remember of where they touch.
+    pub fn manipulation(&self) -> &Manipulation {
+        &self.manipulation
+    }
+
+    /// By how much the last tick moved them (s).
+    pub fn stepped_s(&self) -> f64 {
+        self.stepped_s
+    }
+
+    /// The force on the user of a finger's touches on a body, as they moved it in the last tick (N); `None`: there were none.
+    pub fn touch_force_W(&self, finger: usize, entity: usize) -> Option<Vector3<f64>> {
+        let own = self.touches.iter().filter(|touch| (touch.finger, touch.entity) == (finger, entity));
+        own.map(|touch| touch.force_on_user_W).reduce(|sum, force_W| sum + force_W)
     }
 
     /// Where all entities are, roughly.
@@ -218,6 +237,7 @@ impl Objects {
             };
         }
         let dt_s = dt_s.min(MOST_TICKS * self.period_s);
+        self.stepped_s = dt_s;
         self.made = self.manipulation.step_pulled(
             entities,
             &mut self.touches,
