@@ -115,6 +115,7 @@ fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Repo
         timing: None,
         guarantees: None,
         parked: parked(&fast.tally, rig),
+        lists: fast.step_mut().end_lists(None),
         recordings,
     };
     Ok((report, stop))
@@ -150,6 +151,7 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
         timing: is_real.then(|| baseline.timing(&end.driver, &end.step_ns)),
         guarantees: is_real.then_some((info.setup_report, end.fast_report)),
         parked: parked(&end.tally, rig),
+        lists: end.lists,
         recordings,
     };
     Ok((report, end.stop))
