@@ -2,8 +2,8 @@
 //!
 //! Run `cargo bench -p phantom3 --bench shelf`. Almost all cubes are in the slow list and sleep; its turns are made between
 //! ticks and not timed, for they have a thread of their own. The whole fast step (frame in, command out) is timed tick by
-//! tick. `hand-over` is what ticks in which cubes changed lists took more than the median of all, for each cube: three fingers pass
-//! ten cubes a second. `loading` is from the file's text to the first tick. First the cubes have to come to rest, which
+//! tick. `each` is what ticks in which cubes changed lists took more than the median of all, for each cube, the median
+//! of these. `loading` is from the file's text to the first tick. First the cubes have to come to rest, which
 //! takes some seconds.
 #![allow(missing_docs, unused_crate_dependencies)]
 
@@ -60,7 +60,7 @@ impl Run {
     }
 
     fn measure(&mut self, name: &str, hips: impl Fn(f64) -> [[f64; 3]; 3]) {
-        let (mut times, mut changing, mut changed) = (Vec::new(), Vec::new(), 0);
+        let (mut times, mut changing) = (Vec::new(), Vec::new());
         let (mut awake, began) = (0, self.step.handed().expect("two lists").1);
         for tick in 0..TICKS {
             let before = self.step.handed().expect("two lists").1;
@@ -68,15 +68,16 @@ impl Run {
             let after = self.step.handed().expect("two lists").1;
             let bodies = after.came + after.went - before.came - before.went;
             if bodies > 0 {
-                changing.push(took_ns);
-                changed += bodies;
+                changing.push((took_ns, bodies));
             }
             times.push(took_ns);
             awake += self.step.made().awake;
         }
         times.sort_unstable();
         let at = |share: f64| times[((times.len() - 1) as f64 * share) as usize] as f64 / 1e3;
-        let more_ns: f64 = changing.iter().map(|&ns| ns as f64 - at(0.5) * 1e3).sum();
+        let mut each: Vec<f64> =
+            changing.iter().map(|&(ns, bodies)| (ns as f64 / 1e3 - at(0.5)) / bodies as f64).collect();
+        each.sort_unstable_by(f64::total_cmp);
         let (here, handed) = self.step.handed().expect("two lists");
         println!(
             "{name:<26} {:>7.2} {:>7.2} {:>8.2}   {:>6.1} {here:>6} {:>9} {:>9.2}",
@@ -85,7 +86,7 @@ impl Run {
             at(1.0),
             awake as f64 / TICKS as f64,
             handed.came + handed.went - began.came - began.went,
-            if changed > 0 { more_ns / changed as f64 / 1e3 } else { 0.0 },
+            each.get(each.len() / 2).copied().unwrap_or_default(),
         );
     }
 }
