@@ -502,7 +502,12 @@ impl Manipulation {
                 }
             }
         }
-        let solved = self.restitution.solve(&mut self.solver, &mut self.rows, &mut self.motions, dt_s);
+        let solved = self.restitution.solve(
+            &mut self.solver,
+            &mut self.rows,
+            &mut self.motions,
+            (&self.settings.gravity_W, dt_s),
+        );
         explicit::release(&mut self.rows, &mut self.fixed);
         solved
     }
