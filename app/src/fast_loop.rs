@@ -80,6 +80,8 @@ pub struct Tally {
     pub peak_force_n: f64,
     /// The largest force any device was made to render (N).
     pub peak_applied_n: f64,
+    /// Entities that can move, and how many of them the last tick computed.
+    pub moving: [usize; 2],
     /// Entities that left the world, or were lost, and stand still since.
     pub parked: u64,
     /// The first of them, and in which tick of the run.
@@ -153,6 +155,11 @@ impl FastLoop {
         if self.is_finished() { Turn::Finished } else { Turn::Answered }
     }
 
+    /// Its rendering, between two turns.
+    pub fn step_mut(&mut self) -> &mut FastStep {
+        &mut self.step
+    }
+
     /// The frame read last.
     pub fn frame(&self) -> &Frame {
         &self.frame
@@ -186,6 +193,7 @@ impl FastLoop {
         self.place_in_time();
         self.row.run_tick = self.run_ticks();
         self.tally.park(self.step.parked_now(), self.row.run_tick);
+        self.tally.moving = [self.step.bodies().len(), self.step.made().awake];
         self.next_tick = self.row.run_tick + 1;
         if self.row.run_tick < self.total_ticks {
             // Before the row is sent, and after the command was.

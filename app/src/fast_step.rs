@@ -20,9 +20,11 @@ mod watched;
 pub use objects::{HandFinger, Objects};
 pub use watched::EventTeller;
 
+use crate::lists_end::ListsEnd;
 use crate::mount::Mount;
 use crate::passive_port::{Tick, keep_passive};
 use crate::row::{BodyRow, FingerRow, Row};
+use crate::slow_thread::SlowRemains;
 use haptics::passivity::Passivity;
 use haptics::{Effects, Entity, Field, Finger, FingerEffects, Guide, Hip, Moment, RAMP_IN_S};
 use nalgebra::Vector3;
@@ -130,6 +132,11 @@ impl FastStep {
     /// The slow list, to be stepped by another thread; see [`Objects::take_slow`].
     pub fn take_slow(&mut self) -> Option<SlowList> {
         self.objects.take_slow()
+    }
+
+    /// Ends the two lists, of which the slow one is given by who [took](Self::take_slow) it; `None` where there is no slow list.
+    pub fn end_lists(&mut self, slow: Option<SlowRemains>) -> Option<ListsEnd> {
+        self.objects.end_lists(&mut self.entities, slow)
     }
 
     /// How many bodies are in the fast list, and what has been handed over; `None` where there is no slow list.

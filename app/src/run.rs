@@ -128,6 +128,7 @@ fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Repo
         guarantees: None,
         parked: parked(&fast.tally, rig),
         events,
+        lists: fast.step_mut().end_lists(None),
         recordings,
     };
     Ok((report, stop))
@@ -164,6 +165,7 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
         guarantees: is_real.then_some((info.setup_report, end.fast_report)),
         parked: parked(&end.tally, rig),
         events,
+        lists: end.lists,
         recordings,
     };
     Ok((report, end.stop))

@@ -13,7 +13,9 @@ use physics::{BroadPhase, FingerSettings, FingerTick, MAX_PULLS, Made, Manipulat
 use world::lists::{FastList, Handed, Reach, SlowList};
 
 use super::DeviceFinger;
+use crate::lists_end::ListsEnd;
 use crate::row::{BodyRow, FingerRow};
+use crate::slow_thread::SlowRemains;
 
 /// Ticks between two turns of the slow list, where no thread of its own has it.
 const SLOW_EVERY: u32 = 10;
@@ -103,6 +105,27 @@ impl Objects {
     /// The slow list, to be stepped by another thread; `None` where there is none, or another one has it.
     pub fn take_slow(&mut self) -> Option<SlowList> {
         self.lists.as_mut()?.slow.take()
+    }
+
+    /// When no thread steps any more: what is on its way is taken in, so that each body is in one list. `slow` is what
+    /// another thread left, if one had it.
+    pub fn end_lists(&mut self, entities: &mut [Entity], slow: Option<SlowRemains>) -> Option<ListsEnd> {
+        let lists = self.lists.as_mut()?;
+        let late_ticks = slow.as_ref().map_or(0, |slow| slow.late_ticks);
+        lists.slow = lists.slow.take().or(slow.map(|slow| slow.slow));
+        if let Some(slow) = &mut lists.slow {
+            slow.take_in();
+        }
+        lists.hand_over.take_in_all(&mut self.manipulation, entities);
+        let of_slow = lists.slow.as_ref().map_or(0, |slow| slow.manipulation().left_out());
+        Some(ListsEnd {
+            fast: lists.hand_over.here(),
+            slow: lists.slow.as_ref().map(SlowList::here),
+            handed: lists.hand_over.handed(),
+            late_ticks,
+            left_out: self.manipulation.left_out() + of_slow,
+            stuck: lists.slow.as_ref().map_or(0, SlowList::too_large),
+        })
     }
 
     /// How many bodies are in the fast list, and what has been handed over.
