@@ -88,7 +88,9 @@ fn a_slow_cube_that_nobody_hands_over_is_felt_as_one_that_is_fixed() {
     assert!((most_n - 2.55).abs() < 1e-9, "{most_n}");
     assert_eq!(stalled.here(), 0);
     // The slow list goes on: the cube comes, and gives way.
-    (1050..1100).for_each(|tick| drop(stalled.tick(pushing(tick), true)));
+    for tick in 1050..1100 {
+        stalled.tick(pushing(tick), true);
+    }
     assert_eq!(stalled.here(), 1);
     assert!(stalled.step.bodies()[0].velocity.x > 0.05, "{:?}", stalled.step.bodies()[0]);
 }
@@ -100,7 +102,9 @@ fn a_cube_that_was_slow_is_pushed_from_the_first_tick_like_one_that_never_was() 
     assert!(runs[0].slow.is_some() && runs[1].slow.is_none());
     // It comes to rest in either.
     for _ in 0..4000 {
-        runs.iter_mut().for_each(|run| drop(run.tick(pushing(0), true)));
+        for run in &mut runs {
+            run.tick(pushing(0), true);
+        }
     }
     assert_eq!([runs[0].here(), runs[1].step.made().awake], [0, 0]);
     let mut touched = 0;
