@@ -69,7 +69,7 @@ impl Manipulation {
             }
         }
         let is_tired = |body: &usize| self.roster.rested_s[*body] >= sleep.after_s;
-        if self.ticks % TICKS_TO_SLEEP == 0 && self.roster.awake().iter().any(is_tired) {
+        if self.ticks.is_multiple_of(TICKS_TO_SLEEP) && self.roster.awake().iter().any(is_tired) {
             self.put_islands_to_sleep(entities, sleep.after_s);
         }
     }
