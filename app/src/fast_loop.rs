@@ -5,6 +5,8 @@
 //! except where the clock itself waits (virtual, lockstep).
 //! Cost: bounded; no allocation, no system call but the wake-up of a sleeping driver.
 
+use crate::control::queue::OrderReceiver;
+use crate::control::{Control, World};
 use crate::fast_step::FastStep;
 use crate::row::{BodyRow, Row};
 use crate::row_queue::RowSender;
@@ -39,6 +41,10 @@ pub enum Turn {
 /// The fast thread's state.
 pub struct FastLoop {
     step: FastStep,
+    /// What people change meanwhile, if anybody may.
+    control: Option<Control>,
+    /// Whether the bodies are still those that recordings know.
+    tells_bodies: bool,
     rows: RowSender,
     when_full: WhenFull,
     /// Rows that the run shall have.
@@ -109,6 +115,8 @@ impl FastLoop {
         Self {
             pending_bodies: (0..).zip(step.bodies().iter().copied()).collect(),
             step,
+            control: None,
+            tells_bodies: true,
             rows,
             when_full,
             total_ticks,
@@ -123,6 +131,18 @@ impl FastLoop {
             row: Row::empty(),
             tally: Tally::default(),
         }
+    }
+
+    /// With orders that come while it runs.
+    #[must_use]
+    pub fn with_control(mut self, orders: OrderReceiver) -> Self {
+        self.control = Some(Control::new(orders, self.step.entities().len()));
+        self
+    }
+
+    /// How many orders were taken.
+    pub fn orders_taken(&self) -> u64 {
+        self.control.as_ref().map_or(0, Control::taken)
     }
 
     /// Takes the frame of `tick`, steps and answers.
@@ -162,10 +182,28 @@ impl FastLoop {
 
     fn answer(&mut self, commander: &CommanderMemory, driver: &DriverView) {
         self.command = Command::zero(self.frame.tick, commander.lease(), self.frame.device_count);
+        self.take_orders();
         self.step.meet_driver(driver.abi_minor(), driver.ramp_in_ticks());
         self.step.step(&self.frame, &mut self.command, &mut self.row);
         commander.publish(&self.command, driver);
         self.tally.answered += 1;
+    }
+
+    /// Not before t = 0: until then a scene is what it says.
+    fn take_orders(&mut self) {
+        let run_tick = self.run_ticks();
+        let Some(control) = self.control.as_mut().filter(|_| self.frame.run_tick >= 0) else { return };
+        let became = control.turn(&mut self.step, run_tick, self.period_ns as f64 / 1e9);
+        if became == World::Same {
+            return;
+        }
+        self.row = Row::empty();
+        self.pending_bodies.clear();
+        self.tells_bodies &= became == World::Reset;
+        if self.tells_bodies {
+            // Room for all of them was made when the run began.
+            self.pending_bodies.extend((0..).zip(self.step.bodies().iter().copied()));
+        }
     }
 
     fn keep_row(&mut self) {
@@ -186,6 +224,9 @@ impl FastLoop {
     }
 
     fn keep_bodies(&mut self) {
+        if !self.tells_bodies {
+            return;
+        }
         let (pending, bodies) = (&mut self.pending_bodies, self.step.bodies());
         for &number in self.step.changed_bodies() {
             let body = bodies[number as usize];

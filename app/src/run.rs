@@ -1,6 +1,7 @@
 //! A scripted run from start to report.
 
 use crate::child::DriverChild;
+use crate::control::desk::{Desk, OrderSource};
 use crate::fast_loop::{FastLoop, Tally, WhenFull};
 use crate::not_zeroed;
 use crate::outcome::{RunFailure, Stop};
@@ -32,6 +33,8 @@ pub struct RunPlan {
     pub record: Vec<PathBuf>,
     /// Seed of everything random, to be told in recordings.
     pub seed: u64,
+    /// What is to change while it runs.
+    pub orders: Option<OrderSource>,
     /// Use the driver that listens here, and its devices, instead of a child with the rig's.
     pub attach: Option<Attach>,
 }
@@ -82,6 +85,9 @@ impl Parts {
         }
         let when_full = if clock == ClockMode::Real { WhenFull::Drop } else { WhenFull::Wait };
         let step = rig.fast_step().map_err(|error| RunFailure::Start(error.to_string()))?;
+        let is_recorded = !plan.record.is_empty();
+        let open = |source| Desk::open(rig, source, is_recorded).map_err(RunFailure::Start);
+        let (desk, orders) = plan.orders.as_ref().map(open).transpose()?.unzip();
         let (producer, consumer) = row_queue(step.bodies().len());
         let view = View::new(&rig.scene, step.entities());
         let record = |path: &PathBuf| {
@@ -89,9 +95,13 @@ impl Parts {
             Recorder::start(path, file, step.bodies().len(), period_ns, when_full)
         };
         let recorders = plan.record.iter().map(record).collect::<Result<_, _>>()?;
+        let fast = FastLoop::new(step, producer, when_full, total_ticks, period_ns);
         Ok(Self {
-            fast: FastLoop::new(step, producer, when_full, total_ticks, period_ns),
-            slow: SlowSide::new(consumer, recorders),
+            fast: match orders {
+                Some(orders) => fast.with_control(orders),
+                None => fast,
+            },
+            slow: SlowSide::new(consumer, recorders).with_desk(desk),
             progress: Progress::new(total_ticks, period_ns),
         })
     }
