@@ -2,14 +2,14 @@
 //!
 //! Run `cargo bench -p phantom3`. `fast step` is the pure step of two fingers in the default scene (a ball
 //! and a table, both with stiction): both free, both holding, both sliding. `one finger on the ball` leaves
-//! the second one in the air. Each checks that its fingers do what its name says.
+//! the second one in the air. `events` is what telling what happened in a tick takes, beside its step. Each checks that its fingers do what its name says.
 
 use bytemuck::Zeroable;
 use criterion::{Criterion, criterion_group, criterion_main};
 use haptics::ContactState;
 use io_driver::config::period_of;
 use nalgebra::{Rotation3, Vector3};
-use phantom3::fast_step::FastStep;
+use phantom3::fast_step::{EventTeller, FastStep};
 use phantom3::rig::{HandMode, Rig};
 use phantom3::row::Row;
 use shm_abi::frame::DEVICE_POSITION_VALID;
@@ -18,6 +18,7 @@ use std::f64::consts::TAU;
 use std::hint::black_box;
 use std::path::Path;
 use world::Scene;
+use world::events::event_queue;
 
 /// Ticks of one round of a movement, which then repeats.
 const ROUND: usize = 256;
@@ -95,5 +96,32 @@ fn steps(criterion: &mut Criterion) {
     bench(criterion, "one finger on the ball, sliding", [over_the_ball, free], [Slip, Free]);
 }
 
-criterion_group!(benches, steps);
+/// Nothing is new: two fingers in the air, or two that hold.
+fn telling(criterion: &mut Criterion, name: &str, hips: [fn(f64) -> Vector3<f64>; 2]) {
+    let (mut step, mut frames) = (default_scene(), frames(hips));
+    let (mut command, mut row) = (Command::zeroed(), Row::empty());
+    for frame in &mut frames {
+        frame.tick = row.run_tick + 1;
+        frame.run_tick = row.run_tick as i64 + 1;
+        step.step(frame, &mut command, &mut row);
+    }
+    let (out, mut events) = event_queue(64);
+    let mut teller = EventTeller::new(&step, out);
+    teller.tell(&step, &row);
+    while events.receive(u64::MAX).is_some() {}
+    criterion.bench_function(name, |bencher| {
+        bencher.iter(|| {
+            row.run_tick += 1;
+            teller.tell(black_box(&step), black_box(&row));
+        });
+    });
+    assert_eq!(events.receive(u64::MAX), None, "{name}: something was new");
+}
+
+fn events(criterion: &mut Criterion) {
+    telling(criterion, "events, 2 fingers free", [|_| IN_THE_AIR, |_| IN_THE_AIR]);
+    telling(criterion, "events, 2 fingers holding", [|_| over_the_ball(0.0), |_| over_the_table(0.0)]);
+}
+
+criterion_group!(benches, steps, events);
 criterion_main!(benches);

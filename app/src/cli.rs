@@ -113,6 +113,10 @@ struct RunArgs {
     /// given several times
     #[arg(long, value_name = "FILE")]
     record: Vec<PathBuf>,
+    /// Write what happens here, a line each: contacts, slips, grasps and more, as JSON or, with the ending .csv, as a table;
+    /// may be given several times
+    #[arg(long, value_name = "FILE")]
+    events: Vec<PathBuf>,
     /// How long; default: as long as the hand file, at least 1 s
     #[arg(long, value_name = "S", value_parser = parse_seconds, allow_negative_numbers = true)]
     seconds: Option<f64>,
@@ -352,6 +356,7 @@ fn make_plan(args: &RunArgs, rig: &Rig) -> Result<RunPlan, RunFailure> {
         clock: args.clock.map(ClockMode::from),
         seconds: args.seconds,
         record: args.record.clone(),
+        events: args.events.clone(),
         seed: args.seed,
         orders: order_source(args)?,
         attach,
@@ -386,20 +391,27 @@ fn refuse_to_overwrite_input(args: &RunArgs, rig: &Rig) -> Result<(), RunFailure
         args.orders.as_ref(),
     ];
     let inputs: Vec<&PathBuf> = inputs.into_iter().flatten().chain(rig.model_files()).collect();
-    for (index, record) in args.record.iter().enumerate() {
+    let written: Vec<(&str, &PathBuf)> = args
+        .record
+        .iter()
+        .map(|file| ("--record", file))
+        .chain(args.events.iter().map(|file| ("--events", file)))
+        .collect();
+    for (index, (option, record)) in written.iter().enumerate() {
         if let Some(input) = inputs.iter().find(|input| is_same_file(record, input)) {
             return Err(RunFailure::Start(format!(
-                "--record {} would overwrite the input {}; name another file",
+                "{option} {} would overwrite the input {}; name another file",
                 record.display(),
                 input.display()
             )));
         }
         let absolute = std::path::absolute(record).ok();
-        let is_record =
-            |other: &PathBuf| std::path::absolute(other).ok() == absolute || is_same_file(record, other);
-        if args.record[..index].iter().any(is_record) {
+        let is_record = |(_, other): &(&str, &PathBuf)| {
+            std::path::absolute(other).ok() == absolute || is_same_file(record, other)
+        };
+        if written[..index].iter().any(is_record) {
             return Err(RunFailure::Start(format!(
-                "--record {} is given twice; each recording needs a file of its own",
+                "{option} {} is given twice; each recording needs a file of its own",
                 record.display()
             )));
         }

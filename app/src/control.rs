@@ -22,6 +22,10 @@ use gradual::{FADE_S, Gradual};
 use order::{Order, Replacement};
 use queue::OrderReceiver;
 
+/// Why a scene takes no orders.
+pub(crate) const NEEDS_ONE_LIST: &str = "--orders needs everything that moves in the fast list; allowed: a scene with no more of it than \
+                                  lists = { fast_bodies = ... } says (64 if nobody does)";
+
 /// So many orders are taken in a tick.
 const ORDERS_A_TICK: usize = 4;
 

@@ -7,11 +7,12 @@
 
 use crate::control::queue::OrderReceiver;
 use crate::control::{Control, World};
-use crate::fast_step::FastStep;
+use crate::fast_step::{EventTeller, FastStep};
 use crate::row::{BodyRow, Row};
 use crate::row_queue::RowSender;
 use bytemuck::Zeroable;
 use shm_abi::{Command, CommanderMemory, DriverState, DriverView, Frame};
+use world::events::EventSender;
 
 /// How far a missed frame is searched for in the ring: the next one is nearly always among these.
 const SEARCH_TICKS: u64 = 64;
@@ -45,6 +46,10 @@ pub struct FastLoop {
     control: Option<Control>,
     /// Whether the bodies are still those that recordings know.
     tells_bodies: bool,
+    /// And whether the entities are those that events name.
+    tells_events: bool,
+    /// Tells others what happens, if anybody wants to know.
+    teller: Option<EventTeller>,
     rows: RowSender,
     when_full: WhenFull,
     /// Rows that the run shall have.
@@ -83,6 +88,8 @@ pub struct Tally {
     pub peak_force_n: f64,
     /// The largest force any device was made to render (N).
     pub peak_applied_n: f64,
+    /// Entities that can move, and how many of them the last tick computed.
+    pub moving: [usize; 2],
     /// Entities that left the world, or were lost, and stand still since.
     pub parked: u64,
     /// The first of them, and in which tick of the run.
@@ -117,6 +124,8 @@ impl FastLoop {
             step,
             control: None,
             tells_bodies: true,
+            tells_events: true,
+            teller: None,
             rows,
             when_full,
             total_ticks,
@@ -145,6 +154,13 @@ impl FastLoop {
         self.control.as_ref().map_or(0, Control::taken)
     }
 
+    /// With a queue for what happens.
+    #[must_use]
+    pub fn with_events(mut self, events: EventSender) -> Self {
+        self.teller = Some(EventTeller::new(&self.step, events));
+        self
+    }
+
     /// Takes the frame of `tick`, steps and answers.
     pub fn turn(&mut self, tick: u64, driver: &DriverView, commander: &CommanderMemory) -> Turn {
         if driver.read_frame(tick, &mut self.frame).is_err() {
@@ -160,6 +176,11 @@ impl FastLoop {
         self.answer(commander, driver);
         self.keep_row();
         if self.is_finished() { Turn::Finished } else { Turn::Answered }
+    }
+
+    /// Its rendering, between two turns.
+    pub fn step_mut(&mut self) -> &mut FastStep {
+        &mut self.step
     }
 
     /// The frame read last.
@@ -200,6 +221,8 @@ impl FastLoop {
         self.row = Row::empty();
         self.pending_bodies.clear();
         self.tells_bodies &= became == World::Reset;
+        // Whom another scene's numbers mean, nobody was told. Not dropped: nothing is freed here.
+        self.tells_events &= became == World::Reset;
         if self.tells_bodies {
             // Room for all of them was made when the run began.
             self.pending_bodies.extend((0..).zip(self.step.bodies().iter().copied()));
@@ -213,8 +236,13 @@ impl FastLoop {
         self.place_in_time();
         self.row.run_tick = self.run_ticks();
         self.tally.park(self.step.parked_now(), self.row.run_tick);
+        self.tally.moving = [self.step.bodies().len(), self.step.made().awake];
         self.next_tick = self.row.run_tick + 1;
         if self.row.run_tick < self.total_ticks {
+            // Before the row is sent, and after the command was.
+            if let Some(teller) = self.teller.as_mut().filter(|_| self.tells_events) {
+                teller.tell(&self.step, &self.row);
+            }
             self.pending = Some((self.frame.tick, self.row));
             self.keep_bodies();
             for finger in &self.row.fingers {

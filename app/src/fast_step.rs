@@ -15,12 +15,16 @@
 
 mod near;
 mod objects;
+mod watched;
 
 pub use objects::{HandFinger, Objects};
+pub use watched::EventTeller;
 
+use crate::lists_end::ListsEnd;
 use crate::mount::Mount;
 use crate::passive_port::{Tick, keep_passive};
 use crate::row::{BodyRow, FingerRow, Row};
+use crate::slow_thread::SlowRemains;
 use haptics::passivity::Passivity;
 use haptics::{Effects, Entity, Felt, Field, Finger, FingerEffects, Guide, Hip, Moment, RAMP_IN_S};
 use nalgebra::{Isometry3, Vector3};
@@ -76,7 +80,8 @@ impl FastStep {
         let (tips_D, carried_W) = (vec![None; fingers.len()], vec![Vector3::zeros(); fingers.len()]);
         let period_s = period_ns as f64 / 1e9;
         let passivities = vec![None; fingers.len()];
-        let near = vec![Near::new(entities.len()); fingers.len()];
+        // Each made anew: a clone of a list without entries has no room.
+        let near = fingers.iter().map(|_| Near::new(entities.len())).collect();
         let objects = Objects::new(Manipulation::of_none(&entities), &[], false, period_s);
         Self {
             fingers,
@@ -130,6 +135,11 @@ impl FastStep {
     /// The slow list, to be stepped by another thread; see [`Objects::take_slow`].
     pub fn take_slow(&mut self) -> Option<SlowList> {
         self.objects.take_slow()
+    }
+
+    /// Ends the two lists, of which the slow one is given by who [took](Self::take_slow) it; `None` where there is no slow list.
+    pub fn end_lists(&mut self, slow: Option<SlowRemains>) -> Option<ListsEnd> {
+        self.objects.end_lists(&mut self.entities, slow)
     }
 
     /// How many bodies are in the fast list, and what has been handed over; `None` where there is no slow list.
@@ -458,6 +468,29 @@ mod damped {
         let mut command = Command::zero(tick, 1, 1);
         step.step(&frame, &mut command, &mut Row::empty());
         -command.devices[0].force_on_user_n[1]
+    }
+
+    #[test]
+    fn every_finger_feels_the_floor() {
+        let floor = Entity::new(Plane::new(Vector3::y(), 0.0).unwrap(), Isometry3::identity(), K);
+        let finger = |device| DeviceFinger {
+            finger: Finger::new(0.0, 1).unwrap().with_ramp_in(0.0).unwrap(),
+            device,
+            mount: Mount::new(Isometry3::identity()),
+        };
+        let mut step = FastStep::new((0..3).map(finger).collect(), vec![floor.unwrap()], PERIOD_NS);
+        let mut frame = Frame::zeroed();
+        (frame.tick, frame.device_count) = (1, 3);
+        for device in &mut frame.devices[..3] {
+            device.flags = DEVICE_POSITION_VALID;
+            device.position_m_measured[1] = -1e-3;
+        }
+        let mut command = Command::zero(1, 1, 3);
+        step.step(&frame, &mut command, &mut Row::empty());
+        // A product of two numbers.
+        assert!(
+            command.devices[..3].iter().all(|device| (device.force_on_user_n[1] - K * 1e-3).abs() < 1e-15)
+        );
     }
 
     #[test]

@@ -23,6 +23,7 @@ pub mod export;
 pub mod fast_loop;
 pub mod fast_step;
 pub mod fast_thread;
+pub mod lists_end;
 pub mod mount;
 mod not_zeroed;
 pub mod outcome;

@@ -20,6 +20,8 @@ use crate::record::read::{ReadError, RecordedRun};
 use crate::record::{self, Recorder, View};
 use crate::rig::Rig;
 use crate::row_queue::{RowReceiver, row_queue};
+use crate::run::EVENT_QUEUE;
+use crate::slow;
 use crate::virtual_clock::VirtualDriver;
 use clap::Args;
 use difference::Difference;
@@ -33,6 +35,7 @@ use stage::Stage;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use world::events::{Hub, event_queue};
 
 /// Of `--expect-same`, when something differs.
 const EXIT_DIFFERENT: u8 = 1;
@@ -104,6 +107,7 @@ struct Play {
     fast: FastLoop,
     rows: RowReceiver,
     recorders: Vec<Recorder>,
+    events: Hub,
     feed: SharedFeed,
     /// Which finger of the recording each finger of the scene is.
     fingers: Vec<Option<usize>>,
@@ -140,14 +144,18 @@ impl Play {
             let file = record::create(path, names.clone(), period_ns, &stage.about, &view)?;
             Recorder::start(path, file, bodies, period_ns, WhenFull::Wait)
         };
-        let recorders = records.iter().map(recorder).collect::<Result<_, _>>()?;
+        let mut recorders = records.iter().map(recorder).collect::<Result<Vec<_>, _>>()?;
+        let (events, event_ends) = event_queue(EVENT_QUEUE);
+        let mut hub = Hub::new(vec![event_ends]);
+        slow::subscribe(&mut recorders, &mut hub);
         let (sender, rows) = row_queue(bodies);
         Ok(Self {
             driver,
             // It ends with the recording.
-            fast: FastLoop::new(step, sender, WhenFull::Wait, u64::MAX, period_ns),
+            fast: FastLoop::new(step, sender, WhenFull::Wait, u64::MAX, period_ns).with_events(events),
             rows,
             recorders,
+            events: hub,
             difference: Difference::new(&fingers, &recorded_names, &names, period_ns),
             feed,
             fingers,
@@ -202,6 +210,7 @@ impl Play {
                 }
             }
             drop(feed);
+            self.events.deliver(row.run_tick);
             for recorder in &mut self.recorders {
                 recorder.send(&row, bodies);
             }
@@ -214,7 +223,8 @@ impl Play {
         stage: &Stage,
         ended: Result<(), RunFailure>,
     ) -> Result<ExitCode, RunFailure> {
-        let Self { feed, difference, recorders, period_ns, missing, rows_read, .. } = self;
+        let Self { feed, difference, recorders, mut events, period_ns, missing, rows_read, .. } = self;
+        events.deliver(u64::MAX);
         let recordings: Vec<_> = recorders.into_iter().map(Recorder::finish).collect();
         let mut feed = lock(&feed);
         let failure: Result<(), ReadError> = feed.failure.take().map_or(Ok(()), Err);

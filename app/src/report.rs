@@ -1,6 +1,7 @@
 //! What a run tells at its end, a line each; the README explains the lines.
 
 use crate::fast_loop::Tally;
+use crate::lists_end::ListsEnd;
 use crate::record::Recorded;
 use io_driver::meter;
 use io_driver::status::{CounterStatus, Percentiles};
@@ -27,6 +28,10 @@ pub struct Report {
     pub guarantees: Option<(String, SetupReport)>,
     /// What became of entities that stand still since, a line each.
     pub parked: Vec<String>,
+    /// How many events of which kind there were.
+    pub events: String,
+    /// What became of the fast and the slow list, if there are two.
+    pub lists: Option<ListsEnd>,
     /// What became of the recordings.
     pub recordings: Vec<Recorded>,
 }
@@ -120,8 +125,16 @@ impl fmt::Display for Report {
             "peak force   {:.3} N computed, {:.3} N rendered",
             tally.peak_force_n, tally.peak_applied_n
         )?;
+        let [moving, awake] = tally.moving;
+        if moving > 0 {
+            writeln!(f, "objects      {moving}, {awake} of them awake in the last tick")?;
+        }
         for line in &self.parked {
             writeln!(f, "parked       {line}")?;
+        }
+        writeln!(f, "events       {}", self.events)?;
+        if let Some(lists) = &self.lists {
+            writeln!(f, "lists        {lists}")?;
         }
         if let Some((driver, fast)) = &self.guarantees {
             if !driver.trim().is_empty() {
@@ -141,7 +154,7 @@ impl fmt::Display for Report {
             if index > 0 {
                 writeln!(f)?;
             }
-            write!(f, "recording    {} ({} rows", recorded.path.display(), recorded.rows)?;
+            write!(f, "recording    {} ({} {}", recorded.path.display(), recorded.rows, recorded.unit)?;
             match recorded.lost + tally.rows_lost {
                 0 => write!(f, ")")?,
                 lost => write!(f, ", {lost} LOST: the disk was too slow)")?,

@@ -1,6 +1,7 @@
 //! A scripted run from start to report.
 
 use crate::child::DriverChild;
+use crate::control;
 use crate::control::desk::{Desk, OrderSource};
 use crate::fast_loop::{FastLoop, Tally, WhenFull};
 use crate::not_zeroed;
@@ -21,6 +22,10 @@ use shm_abi::segment::{ClockMode, DriverInfo};
 use shm_abi::{CommanderMemory, DriverView, Frame};
 use std::path::PathBuf;
 use std::time::Duration;
+use world::events::{Hub, event_queue};
+
+/// Events that may wait between fast and slow side.
+pub const EVENT_QUEUE: usize = 8192;
 
 /// What a run is to do with its rig.
 #[derive(Debug, Clone)]
@@ -31,6 +36,8 @@ pub struct RunPlan {
     pub seconds: Option<f64>,
     /// Where to record; the ending says in which format.
     pub record: Vec<PathBuf>,
+    /// Where to write what happens, a line each; the ending says in which format.
+    pub events: Vec<PathBuf>,
     /// Seed of everything random, to be told in recordings.
     pub seed: u64,
     /// What is to change while it runs.
@@ -85,6 +92,9 @@ impl Parts {
         }
         let when_full = if clock == ClockMode::Real { WhenFull::Drop } else { WhenFull::Wait };
         let step = rig.fast_step().map_err(|error| RunFailure::Start(error.to_string()))?;
+        if plan.orders.is_some() && step.handed().is_some() {
+            return Err(RunFailure::Start(control::NEEDS_ONE_LIST.into()));
+        }
         let is_recorded = !plan.record.is_empty();
         let open = |source| Desk::open(rig, source, is_recorded).map_err(RunFailure::Start);
         let (desk, orders) = plan.orders.as_ref().map(open).transpose()?.unzip();
@@ -94,14 +104,20 @@ impl Parts {
             let file = record::create(path, rig.names(devices), period_ns, about, &view)?;
             Recorder::start(path, file, step.bodies().len(), period_ns, when_full)
         };
-        let recorders = plan.record.iter().map(record).collect::<Result<_, _>>()?;
-        let fast = FastLoop::new(step, producer, when_full, total_ticks, period_ns);
+        let record_events = |path: &PathBuf| {
+            let file = record::create_events(path, rig.names(devices), period_ns)?;
+            Recorder::start(path, file, step.bodies().len(), period_ns, when_full)
+        };
+        let all = plan.record.iter().map(record).chain(plan.events.iter().map(record_events));
+        let recorders = all.collect::<Result<_, _>>()?;
+        let (events, event_ends) = event_queue(EVENT_QUEUE);
+        let fast = FastLoop::new(step, producer, when_full, total_ticks, period_ns).with_events(events);
         Ok(Self {
             fast: match orders {
                 Some(orders) => fast.with_control(orders),
                 None => fast,
             },
-            slow: SlowSide::new(consumer, recorders).with_desk(desk),
+            slow: SlowSide::new(consumer, Hub::new(vec![event_ends]), recorders).with_desk(desk),
             progress: Progress::new(total_ticks, period_ns),
         })
     }
@@ -114,7 +130,7 @@ fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Repo
         Parts::new(rig, plan, ClockMode::Virtual, rig.period_ns, &driver.extras(), &about)?;
     let result = driver.run(&mut fast, &mut slow, &mut progress, signals);
     progress.end();
-    let recordings = slow.finish();
+    let (recordings, events) = slow.finish();
     let stop = result?;
     let report = Report {
         clock: ClockMode::Virtual.name(),
@@ -125,6 +141,8 @@ fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Repo
         timing: None,
         guarantees: None,
         parked: parked(&fast.tally, rig),
+        events,
+        lists: fast.step_mut().end_lists(None),
         recordings,
     };
     Ok((report, stop))
@@ -148,7 +166,7 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
         Parts::new(&step_rig, plan, info.clock_mode, info.period_ns, &extras, &about)?;
     let result = two_processes::run(&mut source, attachment, fast, &mut slow, &mut progress, signals);
     progress.end();
-    let recordings = slow.finish();
+    let (recordings, events) = slow.finish();
     let end = result?;
     let is_real = info.clock_mode == ClockMode::Real;
     let report = Report {
@@ -160,6 +178,8 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
         timing: is_real.then(|| baseline.timing(&end.driver, &end.step_ns)),
         guarantees: is_real.then_some((info.setup_report, end.fast_report)),
         parked: parked(&end.tally, rig),
+        events,
+        lists: end.lists,
         recordings,
     };
     Ok((report, end.stop))

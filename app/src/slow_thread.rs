@@ -3,6 +3,7 @@
 //! Model: some hundred times a second it looks how many ticks the run has made, and goes on by as many, in steps of a tick.
 //! If that takes longer than it should, what is in the slow list goes slower than the rest, and how much is counted.
 //! It has no real-time rights; nobody waits for it.
+//! Invariant: it ends with its owner, whatever ended that.
 
 use rt_core::clock::{monotonic_ns, sleep_until_ns};
 use std::sync::Arc;
@@ -17,7 +18,7 @@ const MOST_TICKS: u64 = 40;
 
 /// The running thread.
 pub struct SlowThread {
-    thread: JoinHandle<SlowRemains>,
+    thread: Option<JoinHandle<SlowRemains>>,
     stop: Arc<AtomicBool>,
 }
 
@@ -34,29 +35,42 @@ impl SlowThread {
     ///
     /// # Errors
     /// If the thread cannot be started.
-    pub fn start(mut slow: SlowList, run_ticks: Arc<AtomicU64>, period_ns: u64) -> std::io::Result<Self> {
+    pub fn start(slow: SlowList, run_ticks: Arc<AtomicU64>, period_ns: u64) -> std::io::Result<Self> {
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
-        let thread = std::thread::Builder::new().name("slow-list".into()).spawn(move || {
-            let (mut seen, mut late_ticks, dt_s) = (0, 0, period_ns as f64 / 1e9);
-            let mut due_ns = monotonic_ns();
-            while !stopped.load(Ordering::Relaxed) {
-                let now = run_ticks.load(Ordering::Relaxed);
-                let passed = now.saturating_sub(seen);
-                seen = now;
-                late_ticks += passed.saturating_sub(MOST_TICKS);
-                slow.turn(passed.min(MOST_TICKS) as u32, dt_s);
-                due_ns = (due_ns + TURN_NS).max(monotonic_ns());
-                sleep_until_ns(due_ns);
-            }
-            SlowRemains { slow, late_ticks }
-        })?;
-        Ok(Self { thread, stop })
+        let thread = std::thread::Builder::new()
+            .name("slow-list".into())
+            .spawn(move || go_on(slow, &run_ticks, period_ns, &stopped))?;
+        Ok(Self { thread: Some(thread), stop })
     }
 
     /// Ends it; `None` if it had panicked.
-    pub fn end(self) -> Option<SlowRemains> {
+    pub fn end(mut self) -> Option<SlowRemains> {
         self.stop.store(true, Ordering::Relaxed);
-        self.thread.join().ok()
+        self.thread.take()?.join().ok()
     }
+}
+
+impl Drop for SlowThread {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+fn go_on(mut slow: SlowList, run_ticks: &AtomicU64, period_ns: u64, stopped: &AtomicBool) -> SlowRemains {
+    let (mut seen, mut late_ticks, dt_s) = (0, 0, period_ns as f64 / 1e9);
+    let mut due_ns = monotonic_ns();
+    while !stopped.load(Ordering::Relaxed) {
+        // While a driver that was restarted begins again, the count is 0 for a moment.
+        let now = run_ticks.load(Ordering::Relaxed).max(seen);
+        let passed = now - std::mem::replace(&mut seen, now);
+        late_ticks += passed.saturating_sub(MOST_TICKS);
+        slow.turn(passed.min(MOST_TICKS) as u32, dt_s);
+        due_ns = (due_ns + TURN_NS).max(monotonic_ns());
+        sleep_until_ns(due_ns);
+    }
+    SlowRemains { slow, late_ticks }
 }

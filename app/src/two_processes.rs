@@ -7,18 +7,22 @@
 use crate::child::DriverChild;
 use crate::fast_loop::{FastLoop, Tally};
 use crate::fast_thread::{self, FastEnd, FastRemains, FastShared};
+use crate::lists_end::ListsEnd;
 use crate::not_zeroed;
 use crate::outcome::{RunFailure, Stop};
 use crate::progress::Progress;
 use crate::slow::SlowSide;
+use crate::slow_thread::SlowThread;
 use io_driver::say::say;
 use rt_core::histogram::Histogram;
 use rt_core::setup::SetupReport;
 use rt_core::signals::StopSignals;
 use shm_abi::DriverView;
 use shm_abi::client::{self, Attachment, Connection};
+use shm_abi::segment::ClockMode;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 /// The slow thread's own period.
@@ -49,6 +53,8 @@ pub struct TwoProcessEnd {
     pub fast_report: SetupReport,
     /// How long its step took.
     pub step_ns: Histogram,
+    /// What became of the fast and the slow list, if there are two.
+    pub lists: Option<ListsEnd>,
 }
 
 /// Runs to the end.
@@ -65,8 +71,12 @@ pub fn run(
 ) -> Result<TwoProcessEnd, RunFailure> {
     let mut attachment = attachment;
     let mut fast = fast;
+    let run_ticks = Arc::<AtomicU64>::default();
+    let slow_list = start_slow_list(&mut fast, &attachment.driver, &run_ticks)?;
     loop {
-        let (report, connection, watched) = run_attached(attachment, fast, slow, progress, signals)?;
+        let shared = FastShared { run_ticks: Arc::clone(&run_ticks), ..FastShared::default() };
+        let (report, connection, watched) =
+            run_attached(attachment, (fast, shared), slow, progress, signals)?;
         let remains = watched.remains;
         let tally = remains.fast.tally;
         let stop = match watched.end {
@@ -84,9 +94,25 @@ pub fn run(
                 continue;
             }
         };
-        let FastRemains { driver, step_ns, .. } = remains;
-        return Ok(TwoProcessEnd { tally, stop, driver, fast_report: report, step_ns });
+        let FastRemains { driver, step_ns, mut fast, .. } = remains;
+        let lists = fast.step_mut().end_lists(slow_list.and_then(SlowThread::end));
+        return Ok(TwoProcessEnd { tally, stop, driver, fast_report: report, step_ns, lists });
     }
+}
+
+/// Where time waits for nobody the slow list has a thread of its own; else its turns are part of ticks.
+fn start_slow_list(
+    fast: &mut FastLoop,
+    driver: &DriverView,
+    run_ticks: &Arc<AtomicU64>,
+) -> Result<Option<SlowThread>, RunFailure> {
+    let info = driver.info();
+    if info.clock_mode != ClockMode::Real {
+        return Ok(None);
+    }
+    let start = |list| SlowThread::start(list, Arc::clone(run_ticks), info.period_ns);
+    let started = fast.step_mut().take_slow().map(start).transpose();
+    started.map_err(|error| RunFailure::Start(format!("cannot start the slow list's thread: {error}")))
 }
 
 /// Why watching ended.
@@ -103,7 +129,7 @@ struct Watched {
 
 fn run_attached(
     attachment: Attachment,
-    fast: FastLoop,
+    (fast, shared): (FastLoop, FastShared),
     slow: &mut SlowSide,
     progress: &mut Progress,
     signals: &StopSignals,
@@ -113,7 +139,6 @@ fn run_attached(
     if let Some(warning) = fast_thread::shares_a_spinning_cpu(&driver.info()) {
         say(format_args!("phantom3: {warning}"));
     }
-    let shared = FastShared::default();
     let (report, thread) = fast_thread::start(fast, driver, commander, shared.clone())
         .map_err(|error| RunFailure::Start(format!("cannot start the fast thread: {error}")))?;
     let end = loop {

@@ -382,3 +382,47 @@ fn each_of_three_balls_bounces_by_its_own_restitution_and_the_floors() {
         }
     }
 }
+
+/// Three cubes on each other on a table, and a finger that after two seconds comes down on the uppermost.
+fn touched_stack(top: &str) -> Table {
+    let cube = |name: &str, y: f64| {
+        format!(
+            "[[entity]]\nname = \"{name}\"\nshape = {{ kind = \"box\", size_m = [0.05, 0.05, 0.05] }}\n\
+             position_m = [0.0, {y:?}, 0.0]\nmass_kg = 0.1\nstiffness_n_per_m = 1000\ndamping_n_s_per_m = 5\n\
+             friction = {{ model = \"coulomb\", mu = 0.5 }}\n"
+        )
+    };
+    let scene = format!(
+        "{top}\n[[finger]]\n[[entity]]\nname = \"table\"\ndamping_n_s_per_m = 5\n\
+         shape = {{ kind = \"plane\", normal = [0, 1, 0], offset_m = 0 }}\n{}{}{}",
+        cube("low", 0.025),
+        cube("middle", 0.075),
+        cube("top", 0.125)
+    );
+    let hand = "t,f0_x,f0_y,f0_z\n0,0.01,0.3,0\n2,0.01,0.16,0\n3,0.01,0.148,0\n4,0.01,0.148,0\n5,0.03,0.3,0\n6,0.03,0.3,0\n";
+    played(&scene, hand)
+}
+
+#[test]
+fn a_stack_that_slept_is_recorded_as_one_that_never_does() {
+    let [sleeps, awake] = ["", "sleep = false"].map(touched_stack);
+    let times = sleeps.numbers("t");
+    let pressed = sleeps.numbers("f0_force_y").iter().filter(|force| **force > 0.5).count();
+    assert!(pressed > 1000, "{pressed}");
+    for name in ["low", "middle", "top"] {
+        let both = sleeps.body(name).into_iter().zip(awake.body(name));
+        let mut stood = 0;
+        for (t, (one, other)) in times.iter().zip(both) {
+            let apart = (one.position - other.position).norm();
+            assert!(apart < 1e-9, "{name} at {t} s: {apart:e}");
+            stood += usize::from(one.velocity == V::zeros());
+        }
+        // Asleep from about 1 s until it is touched at 2.8 s.
+        assert!(stood > 1000, "{name}: {stood}");
+    }
+    let forces = |table: &Table| table.numbers("f0_force_y");
+    for (t, (one, other)) in times.iter().zip(forces(&sleeps).into_iter().zip(forces(&awake))) {
+        // 1e-9 m of 1000 N/m.
+        assert!((one - other).abs() < 1e-6, "at {t} s: {one} {other}");
+    }
+}

@@ -337,6 +337,43 @@ velocity_m_s = [0, 0, 20]
 mass_kg = 0.1
 "#;
 
+/// A finger goes to and fro over stacks of two, all of which are in the slow list but those that it is near.
+#[test]
+fn the_applications_turn_never_calls_the_heap_while_things_change_lists() {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(directory.path().join("scene.toml"), STACKS).unwrap();
+    let mut hand = String::from("t,f0_x,f0_y,f0_z\n");
+    for step in 0..=100 {
+        // Into the tops now and then, 5 mm deep.
+        let y = if step % 4 == 2 { 0.075 } else { 0.1 };
+        let _ = writeln!(hand, "{:?},{:?},{y:?},0", f64::from(step) * 0.1, 0.45 * f64::from(step % 2));
+    }
+    std::fs::write(directory.path().join("hand.csv"), hand).unwrap();
+    let mut fast = play_scene(&directory.path().join("scene.toml"), 1, 0);
+    let end = fast.step_mut().end_lists(None).unwrap();
+    assert_eq!(end.fast + end.slow.unwrap(), 20, "{end}");
+    assert!(end.handed.came > 50 && end.handed.went > 50, "{end}");
+}
+
+const STACKS: &str = r#"
+hand = "hand.csv"
+lists = { fast_bodies = 0 }
+[[finger]]
+[[entity]]
+name = "floor"
+shape = { kind = "plane", normal = [0, 1, 0], offset_m = 0 }
+friction = { model = "coulomb", mu = 0.5 }
+[[entity]]
+name = "cube"
+shape = { kind = "box", size_m = [0.04, 0.04, 0.04] }
+position_m = [0, 0.02, 0]
+mass_kg = 0.1
+stiffness_n_per_m = 500
+damping_n_s_per_m = 2
+friction = { model = "coulomb", mu = 0.5 }
+grid = { count = [10, 2, 1], spacing_m = [0.05, 0.04, 1] }
+"#;
+
 /// Three fingers over meshes, patches, solids and raised boxes, with fields, guides, magnets, vibration and passivity.
 #[test]
 fn the_applications_turn_never_calls_the_heap_with_everything_that_a_scene_may_have() {
@@ -348,8 +385,8 @@ fn the_applications_turn_never_calls_the_heap_with_everything_that_a_scene_may_h
     }
 }
 
-/// A hundred thousand turns at 10 kHz; every state of friction is seen at least so often.
-fn play_scene(file: &Path, fingers: usize, least: u64) {
+/// A hundred thousand turns at 10 kHz; every state of friction is seen more often than that.
+fn play_scene(file: &Path, fingers: usize, least: u64) -> FastLoop {
     let _turn = in_turn();
     alloc_guard::assert_installed();
     let period_ns = period_of(10_000.0);
@@ -365,7 +402,9 @@ fn play_scene(file: &Path, fingers: usize, least: u64) {
     cycle.change_lease();
     let step = rig.fast_step().unwrap();
     let (rows, mut taken) = row_queue_of(1024, step.bodies().len());
-    let mut fast = FastLoop::new(step, rows, WhenFull::Drop, TICKS, period_ns);
+    let (events, mut event_ends) = world::events::event_queue(256);
+    let mut fast = FastLoop::new(step, rows, WhenFull::Drop, TICKS, period_ns).with_events(events);
+    let mut told = 0;
     let (mut seen, mut answered) = ([0_u64; 3], 0);
     for tick in 1..=TICKS {
         cycle.sense(tick, tick * period_ns);
@@ -388,13 +427,18 @@ fn play_scene(file: &Path, fingers: usize, least: u64) {
             for finger in &row.fingers[..fingers] {
                 seen[finger.friction as usize] += 1;
             }
+            while event_ends.receive(u64::MAX).is_some() {
+                told += 1;
+            }
         }
     }
+    assert!(told > 0, "nothing was told");
     assert_eq!(fast.tally.answered, answered);
     assert!(fast.tally.rows_lost > 0 && fast.tally.frames_missed > 0, "{:?}", fast.tally);
     for state in [ContactState::Free, ContactState::Stick, ContactState::Slip] {
         assert!(seen[state as usize] > least, "hardly ever {state:?}: {seen:?}");
     }
+    fast
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 mod driven;
 mod hand_over;
+mod pressing;
 mod rest;
 
 pub use driven::MAX_DRIVEN;
@@ -110,12 +111,15 @@ pub enum Reason {
 
 /// The most touches of fingers in a tick.
 const MAX_TOUCHES: usize = 64;
-/// The most contact points between entities in a tick; more are left out.
+/// The most contact points between entities in a tick, or so many of each body if that is more; others are left out.
 const MAX_ROWS: usize = 2048;
+const ROWS_OF_BODY: usize = 8;
 /// The box of a body is longer by the way of so many ticks than it need be.
 const TICKS_AHEAD: f64 = 16.0;
-/// The most pairs of entities that are near each other; more are left out.
+/// The most pairs of entities that are near each other, or so many of each body if that is more; others are left out, and
+/// counted.
 const MAX_PAIRS: usize = 4096;
+const PAIRS_OF_BODY: usize = 3;
 
 impl Manipulation {
     /// The entities of these numbers are bodies; all others are fixed.
@@ -137,8 +141,9 @@ impl Manipulation {
     fn of(entities: &[Entity], bodies: &[(usize, Body)], settings: Settings) -> Self {
         let count = bodies.len();
         let places = count + MAX_DRIVEN;
-        let pairs = count.saturating_mul(entities.len()).min(MAX_PAIRS);
-        let room = (pairs * MAX_POINTS).min(MAX_ROWS) + MAX_TOUCHES + MAX_PULLS;
+        let pairs = count.saturating_mul(entities.len()).min(MAX_PAIRS.max(PAIRS_OF_BODY * count));
+        let rows = MAX_ROWS.max(ROWS_OF_BODY * count);
+        let room = (pairs * MAX_POINTS).min(rows) + MAX_TOUCHES + MAX_PULLS;
         let mut made = Self {
             settings,
             roster: Roster::new(entities.len(), bodies),
@@ -170,7 +175,7 @@ impl Manipulation {
         };
         for body in 0..count {
             let who = who(&made.roster, entities, settings.response);
-            made.pairs.follow(body, &who, &made.broad_phase);
+            made.pairs.meet(body, &who, &made.broad_phase);
         }
         made
     }
@@ -220,6 +225,11 @@ impl Manipulation {
     /// The bodies that may not be as they were when [`Self::forget_changes`] was last called.
     pub fn changed(&self) -> &[u32] {
         &self.changed
+    }
+
+    /// How many pairs of entities that are near each other were left out for want of room, each time they came near.
+    pub fn left_out(&self) -> u64 {
+        self.pairs.left_out
     }
 
     /// Somebody has taken note of all changes.
@@ -505,7 +515,12 @@ impl Manipulation {
                 }
             }
         }
-        let solved = self.restitution.solve(&mut self.solver, &mut self.rows, &mut self.motions, dt_s);
+        let solved = self.restitution.solve(
+            &mut self.solver,
+            &mut self.rows,
+            &mut self.motions,
+            (&self.settings.gravity_W, dt_s),
+        );
         explicit::release(&mut self.rows, &mut self.fixed);
         solved
     }

@@ -34,7 +34,11 @@ pub(crate) struct Pair {
     pub(crate) is_near: bool,
     pub(crate) surfacing: Surfacing,
     memory: PairMemory,
+    /// The memory holds anything.
+    remembers: bool,
     anchors: [Anchor; MAX_POINTS],
+    /// Those of the last tick, as many as there were.
+    last: [Anchor; MAX_POINTS],
     count: usize,
     /// Nobody has looked yet whether it touches.
     is_new: bool,
@@ -72,6 +76,11 @@ impl Pair {
         Self { entities, surfacing, is_new: true, ..Self::default() }
     }
 
+    /// The force on A in the last tick \[N\], over all points.
+    pub(crate) fn force_W(&self, rows: &[Row]) -> Vector3<f64> {
+        rows.iter().skip(self.first_row).take(self.rows).map(|row| row.force_W).sum()
+    }
+
     /// Finds where it touches, and appends a row for each point; notes those that may meet what they touch.
     pub(crate) fn gather(&mut self, start: &Start<'_>, rows: &mut Vec<Row>, meetings: &mut Vec<Meeting>) {
         (self.first_row, self.rows) = (rows.len(), 0);
@@ -83,6 +92,7 @@ impl Pair {
             self.pass_by();
             return;
         }
+        self.remembers = true;
         let (in_A, in_B) = (Solid { shape: &a.shape, X_W: &a.X_WB }, Solid { shape: &b.shape, X_W: &b.X_WB });
         let mut found = ContactPoints::default();
         contact_points(in_A, in_B, reach_m, &mut self.memory, &mut found);
@@ -159,7 +169,9 @@ impl Pair {
         (self.is_near, self.count, self.rows) = (false, 0, 0);
         self.ledger = Ledger::default();
         // They may meet again from another side.
-        self.memory = PairMemory::default();
+        if std::mem::take(&mut self.remembers) {
+            self.memory = PairMemory::default();
+        }
     }
 
     /// Takes note of how the tick ended, and of which rows met in it after it had begun. `spare_j`: of each body what the tick itself took from it (J);
@@ -206,14 +218,15 @@ impl Pair {
         reach_m: f64,
         moved_m: f64,
     ) {
-        let was = self.anchors;
+        self.last[..self.count].copy_from_slice(&self.anchors[..self.count]);
+        let was = &self.last[..self.count];
         let mut is_free = [false; MAX_POINTS];
         is_free.iter_mut().take(self.count).for_each(|free| *free = true);
         let begins = self.count == 0;
         self.count = found.as_slice().len();
         let mut is_new = [false; MAX_POINTS];
         for (at, point) in found.as_slice().iter().enumerate() {
-            let same = (0..MAX_POINTS).find(|&old| is_free[old] && was[old].id == point.id);
+            let same = (0..was.len()).find(|&old| is_free[old] && was[old].id == point.id);
             is_new[at] = same.is_none();
             if let Some(old) = same {
                 is_free[old] = false;
@@ -226,7 +239,7 @@ impl Pair {
             let near_m = NEAR_M + 2.0 * moved_m;
             let is_near =
                 |old: &usize| is_free[*old] && (was[*old].point_W(now[1]) - point.point_W).norm() < near_m;
-            if let Some(old) = (0..MAX_POINTS).find(is_near) {
+            if let Some(old) = (0..was.len()).find(is_near) {
                 is_free[old] = false;
                 self.anchors[at] = was[old];
                 self.anchors[at].carry(point, now, last);

@@ -97,8 +97,21 @@ impl Pairs {
             }
             stays
         });
-        if let Some(around) = broad_phase.around(own) {
+        self.meet(body, who, broad_phase);
+    }
+
+    /// Begins the pairs of a body that are missing.
+    pub(crate) fn meet(&mut self, body: usize, who: &Who<'_>, broad_phase: &BroadPhase) {
+        if let Some(around) = broad_phase.around(who.entities[body]) {
             broad_phase.near(around, |entity| self.begin(body, entity, who));
+        }
+    }
+
+    /// Ends all of them.
+    pub(crate) fn clear(&mut self) {
+        for key in self.awake.drain(..).chain(self.asleep.drain(..)) {
+            self.pool[key.place as usize] = Pair::default();
+            self.unused.push(key.place);
         }
     }
 

@@ -15,6 +15,8 @@ mod bounce;
 mod cascade;
 mod meeting;
 
+use nalgebra::Vector3;
+
 use crate::row::Row;
 use crate::solver::{Motion, Solved, Solver};
 use bounce::Bounce;
@@ -52,7 +54,7 @@ impl Restitution {
         solver: &mut Solver,
         rows: &mut [Row],
         motions: &mut [Motion],
-        dt_s: f64,
+        (gravity_W, dt_s): (&Vector3<f64>, f64),
     ) -> Solved {
         let Self { meetings, impacts, bounce, cascade } = self;
         cascade.begin();
@@ -71,14 +73,14 @@ impl Restitution {
             }
         }
         cascade.run(meetings, rows, motions, dt_s);
-        let solved = bounce.solve(solver, rows, impacts, motions, dt_s);
+        let solved = bounce.solve(solver, rows, impacts, motions, (&(gravity_W * dt_s), dt_s));
         cascade.add_to(rows, dt_s);
         solved
     }
 }
 
 /// Velocity of the body's point relative to the other's.
-fn velocity(row: &Row, motions: &[Motion]) -> nalgebra::Vector3<f64> {
+fn velocity(row: &Row, motions: &[Motion]) -> Vector3<f64> {
     let own_W = motions[row.body].at(&row.arms_W[0]);
     row.other.map_or(own_W, |other| own_W - motions[other].at(&row.arms_W[1]))
 }

@@ -96,6 +96,13 @@ impl Roster {
         }
     }
 
+    /// Somebody else steps all of them.
+    pub(crate) fn set_all_elsewhere(&mut self) {
+        self.standings.fill(Standing::Elsewhere);
+        self.rested_s.fill(0.0);
+        self.awake.clear();
+    }
+
     /// Two that sleep will wake together.
     pub(crate) fn join(&mut self, one: usize, other: usize) {
         self.next.swap(one, other);

@@ -167,6 +167,9 @@ impl Desk {
             ));
         }
         let step = rig.fast_step().map_err(|error| error.to_string())?;
+        if step.handed().is_some() {
+            return Err(super::NEEDS_ONE_LIST.into());
+        }
         self.rig = rig;
         self.take_note(&step);
         Ok(Order::Replace(Replacement::new(step, false)))

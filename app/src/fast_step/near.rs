@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use physics::{Aabb, BroadPhase};
 
 /// The entities near a finger.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(super) struct Near {
     entities: Vec<u32>,
     /// Where they were looked for, and in which version of the register.

@@ -13,7 +13,9 @@ use physics::{BroadPhase, FingerSettings, FingerTick, MAX_PULLS, Made, Manipulat
 use world::lists::{FastList, Handed, Reach, SlowList};
 
 use super::DeviceFinger;
+use crate::lists_end::ListsEnd;
 use crate::row::{BodyRow, FingerRow};
+use crate::slow_thread::SlowRemains;
 
 /// Ticks between two turns of the slow list, where no thread of its own has it.
 const SLOW_EVERY: u32 = 10;
@@ -49,6 +51,8 @@ pub struct Objects {
     period_s: f64,
     /// What the last tick took.
     pub made: Made,
+    /// By how much it moved them (s).
+    stepped_s: f64,
 }
 
 /// What the slow list has, as the fast side sees it.
@@ -84,6 +88,7 @@ impl Objects {
             lists: None,
             period_s,
             made: Made::default(),
+            stepped_s: 0.0,
         };
         objects.note_all();
         objects
@@ -100,6 +105,27 @@ impl Objects {
     /// The slow list, to be stepped by another thread; `None` where there is none, or another one has it.
     pub fn take_slow(&mut self) -> Option<SlowList> {
         self.lists.as_mut()?.slow.take()
+    }
+
+    /// When no thread steps any more: what is on its way is taken in, so that each body is in one list. `slow` is what
+    /// another thread left, if one had it.
+    pub fn end_lists(&mut self, entities: &mut [Entity], slow: Option<SlowRemains>) -> Option<ListsEnd> {
+        let lists = self.lists.as_mut()?;
+        let late_ticks = slow.as_ref().map_or(0, |slow| slow.late_ticks);
+        lists.slow = lists.slow.take().or(slow.map(|slow| slow.slow));
+        if let Some(slow) = &mut lists.slow {
+            slow.take_in();
+        }
+        lists.hand_over.take_in_all(&mut self.manipulation, entities);
+        let of_slow = lists.slow.as_ref().map_or(0, |slow| slow.manipulation().left_out());
+        Some(ListsEnd {
+            fast: lists.hand_over.here(),
+            slow: lists.slow.as_ref().map(SlowList::here),
+            handed: lists.hand_over.handed(),
+            late_ticks,
+            left_out: self.manipulation.left_out() + of_slow,
+            stuck: lists.slow.as_ref().map_or(0, SlowList::too_large),
+        })
     }
 
     /// How many bodies are in the fast list, and what has been handed over.
@@ -150,6 +176,22 @@ impl Objects {
     /// The bodies whose rows are not what they were a tick before.
     pub fn changed(&self) -> &[u32] {
         &self.changed
+    }
+
+    /// The bodies, and what they remember of where they touch.
+    pub fn manipulation(&self) -> &Manipulation {
+        &self.manipulation
+    }
+
+    /// By how much the last tick moved them (s).
+    pub fn stepped_s(&self) -> f64 {
+        self.stepped_s
+    }
+
+    /// The force on the user of a finger's touches on a body, as they moved it in the last tick (N); `None`: there were none.
+    pub fn touch_force_W(&self, finger: usize, entity: usize) -> Option<Vector3<f64>> {
+        let own = self.touches.iter().filter(|touch| (touch.finger, touch.entity) == (finger, entity));
+        own.map(|touch| touch.force_on_user_W).reduce(|sum, force_W| sum + force_W)
     }
 
     /// Where all entities are, roughly.
@@ -228,6 +270,7 @@ impl Objects {
             };
         }
         let dt_s = dt_s.min(MOST_TICKS * self.period_s);
+        self.stepped_s = dt_s;
         self.made = self.manipulation.step_pulled(
             entities,
             &mut self.touches,

@@ -14,7 +14,8 @@
 //! Invariant: what could not be written as a whole is cut off again; after that nothing more is written.
 
 use super::about::{self, About};
-use super::event::{ContactWatch, Event, EventKind, EventSink};
+use super::event_line::{holders, name};
+use super::foxglove;
 use super::schema::{self, event};
 use super::tick;
 use super::view::View;
@@ -31,6 +32,7 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use world::events::{Event, Facts};
 
 /// A chunk has so much of the run (ns): what a killed process loses at most, besides what waits for the disk.
 const CHUNK_NS: u64 = 500_000_000;
@@ -53,7 +55,6 @@ pub struct McapFile {
     names: Names,
     period_ns: u64,
     view: View,
-    watch: Option<ContactWatch>,
     channels: Channels,
     message: Message,
     sequence: u32,
@@ -97,7 +98,6 @@ impl McapFile {
         let mut writer = options().create(NoSeek::new(WholeWrites::new(file))).map_err(failed)?;
         let channels = begin(&mut writer, &names, about).map_err(failed)?;
         let mut file = Self {
-            watch: Some(ContactWatch::new(names.fingers.len(), period_ns)),
             writer,
             path: path.into(),
             names,
@@ -155,14 +155,48 @@ impl McapFile {
     /// Tells that rows before `run_tick` are missing.
     pub fn tell_lost(&mut self, run_tick: u64, count: u64) {
         self.lost += count;
-        self.event(&Event {
-            kind: EventKind::RowsLost,
-            run_tick,
-            finger: "",
-            entity: "",
-            value: count as f64,
-            text: "the recorder was too slow",
-        });
+        let mut message = self.begin_event(run_tick, "rows-lost");
+        message.double(event::VALUE, count as f64).text(event::TEXT, "the recorder was too slow");
+        self.put_event(run_tick, &message);
+    }
+
+    /// Writes down what happened. A failure is told with the next row.
+    pub fn event(&mut self, happened: &Event) {
+        let facts = happened.kind.facts();
+        let mut message = self.begin_event(happened.run_tick, facts.word);
+        let held_by;
+        let text = if facts.holders == 0 {
+            facts.text
+        } else {
+            held_by = holders(facts.holders, &self.names.fingers);
+            &held_by
+        };
+        message
+            .text(event::FINGER, facts.finger.map_or("", |finger| name(&self.names.fingers, finger)))
+            .text(event::ENTITY, self.names.entity(facts.entity))
+            .double(event::VALUE, value(&facts))
+            .text(event::TEXT, text)
+            .text(event::OTHER, self.names.entity(facts.other));
+        if let Some(life) = facts.life {
+            foxglove::vector(&mut message, event::IMPULSE, &life.impulse_W);
+            message.double(event::PEAK, life.peak_n);
+        }
+        self.put_event(happened.run_tick, &message);
+    }
+
+    fn begin_event(&self, run_tick: u64, word: &str) -> Message {
+        let mut message = Message::new();
+        message
+            .whole(event::TICK, run_tick)
+            .double(event::T, run_time_s(run_tick.cast_signed(), self.period_ns))
+            .text(event::KIND, word);
+        message
+    }
+
+    fn put_event(&mut self, run_tick: u64, message: &Message) {
+        if let Err(error) = self.put(self.channels.events, run_tick, message.bytes()) {
+            self.failure.get_or_insert(error);
+        }
     }
 
     /// Writes what is left, the index, and how the recording ended. Returns the number of rows.
@@ -191,11 +225,6 @@ impl McapFile {
         message.clear();
         tick::write(&mut message, row, bodies, &self.names, self.period_ns);
         let mut written = self.put(self.channels.tick, row.run_tick, message.bytes());
-        if let Some(mut watch) = self.watch.take() {
-            let names = std::mem::take(&mut self.names);
-            watch.look(row, &names, self);
-            (self.names, self.watch) = (names, Some(watch));
-        }
         let time_ns = self.time_ns(row.run_tick);
         if time_ns >= self.next_picture {
             self.next_picture = (time_ns / PICTURE_NS + 1) * PICTURE_NS;
@@ -233,20 +262,12 @@ impl McapFile {
     }
 }
 
-impl EventSink for McapFile {
-    fn event(&mut self, event: &Event<'_>) {
-        let mut message = Message::new();
-        message
-            .whole(event::TICK, event.run_tick)
-            .double(event::T, run_time_s(event.run_tick.cast_signed(), self.period_ns))
-            .text(event::KIND, event.kind.name())
-            .text(event::FINGER, event.finger)
-            .text(event::ENTITY, event.entity)
-            .double(event::VALUE, event.value)
-            .text(event::TEXT, event.text);
-        if let Err(error) = self.put(self.channels.events, event.run_tick, message.bytes()) {
-            self.failure.get_or_insert(error);
-        }
+/// Of a contact that is over, or a grasp, how long it was (s), else its force (N); else the number that there is.
+fn value(facts: &Facts) -> f64 {
+    match facts.life {
+        Some(life) if matches!(facts.word, "contact-end" | "pair-end") => life.lasted_s,
+        Some(life) => life.force_n,
+        None => facts.lasted_s.unwrap_or(facts.number.unwrap_or(0) as f64),
     }
 }
 

@@ -9,7 +9,8 @@
 
 mod about;
 mod descriptor;
-pub mod event;
+mod event_line;
+mod events_file;
 mod foxglove;
 mod mcap_file;
 pub mod read;
@@ -20,8 +21,9 @@ mod view;
 mod wire;
 
 pub use about::{About, InputFile};
+pub use events_file::EventsFile;
 pub use mcap_file::McapFile;
-pub use recorder::{RecordFile, Recorded, Recorder};
+pub use recorder::{EventFeed, RecordFile, Recorded, Recorder};
 pub use view::View;
 
 use crate::recording::{Names, Recording, RecordingError};
@@ -43,6 +45,14 @@ pub fn create(
         return Ok(RecordFile::Mcap(Box::new(file)));
     }
     Ok(RecordFile::Csv(Box::new(Recording::create(path, names, period_ns)?)))
+}
+
+/// Creates a file of events alone: a line each, as JSON or, with the ending `.csv`, as a table.
+///
+/// # Errors
+/// If it cannot be made.
+pub fn create_events(path: &Path, names: Names, period_ns: u64) -> Result<RecordFile, RecordingError> {
+    Ok(RecordFile::Events(Box::new(EventsFile::create(path, names, period_ns)?)))
 }
 
 /// Whether the name is that of an MCAP file; every other is a table.

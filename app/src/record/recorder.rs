@@ -5,6 +5,7 @@
 //! takes no more is told at once, and the rows that follow are thrown away: the run goes on. At the end the recorder has
 //! as long as it gets on; one that is stuck is given up.
 
+use super::events_file::EventsFile;
 use super::mcap_file::McapFile;
 use crate::fast_loop::WhenFull;
 use crate::recording::{Recording, RecordingError};
@@ -15,11 +16,14 @@ use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::thread::JoinHandle;
+use std::thread::{JoinHandle, Thread};
 use std::time::{Duration, Instant};
+use world::events::{Event, EventReceiver, EventSender, Subscriber, event_queue};
 
 /// Bodies that may wait, of all rows together.
 const MOST_BODIES: usize = 1 << 18;
+/// Events that may wait; more than a tick has.
+const MOST_EVENTS: usize = 8192;
 /// CSV goes to the file after so much of the run (ns), if not before.
 const FLUSH_NS: u64 = 500_000_000;
 /// How long the recorder sleeps when there is nothing to write.
@@ -33,6 +37,8 @@ pub enum RecordFile {
     Csv(Box<Recording>),
     /// Everything.
     Mcap(Box<McapFile>),
+    /// Events alone.
+    Events(Box<EventsFile>),
 }
 
 impl RecordFile {
@@ -40,6 +46,7 @@ impl RecordFile {
         match self {
             Self::Csv(file) => file.append(row, bodies),
             Self::Mcap(file) => file.append(row, bodies),
+            Self::Events(_) => Ok(()),
         }
     }
 
@@ -48,7 +55,18 @@ impl RecordFile {
             Self::Csv(file) => file.flush(),
             // Its chunks are its own, and the same on every clock.
             Self::Mcap(_) => Ok(()),
+            Self::Events(file) => file.flush(),
         }
+    }
+
+    fn event(&mut self, event: &Event) -> Result<(), RecordingError> {
+        match self {
+            // Rows alone.
+            Self::Csv(_) => {}
+            Self::Mcap(file) => file.event(event),
+            Self::Events(file) => file.event(event)?,
+        }
+        Ok(())
     }
 
     fn tell_lost(&mut self, run_tick: u64, count: u64) {
@@ -61,6 +79,7 @@ impl RecordFile {
         match self {
             Self::Csv(file) => file.finish(),
             Self::Mcap(file) => file.finish(),
+            Self::Events(file) => file.finish(),
         }
     }
 }
@@ -70,18 +89,40 @@ impl RecordFile {
 pub struct Recorded {
     /// Where it lies.
     pub path: PathBuf,
-    /// Rows in it.
+    /// Rows in it; or events, where there is nothing else.
     pub rows: u64,
+    /// Which of the two.
+    pub unit: &'static str,
     /// Rows that the recorder had no room for.
     pub lost: u64,
     /// Why it is not complete, if it is not; has been told.
     pub failure: Option<String>,
 }
 
+/// Hands events to a recording, as [`Recorder::send`] does rows.
+pub struct EventFeed {
+    events: EventSender,
+    when_full: WhenFull,
+    thread: Thread,
+}
+
+impl Subscriber for EventFeed {
+    fn event(&mut self, event: &Event) {
+        while self.when_full == WhenFull::Wait && self.events.is_full() && !self.events.is_abandoned() {
+            self.thread.unpark();
+            std::thread::sleep(Duration::from_micros(200));
+        }
+        self.events.send(*event);
+    }
+}
+
 /// The slow side's end of a recording.
 pub struct Recorder {
     path: PathBuf,
+    unit: &'static str,
     rows: RowSender,
+    /// Until somebody takes it.
+    events: Option<EventFeed>,
     /// The bodies as the other end knows them; `None`: it does not know any.
     known: Vec<Option<BodyRow>>,
     /// Those that are not so, by their numbers.
@@ -120,13 +161,23 @@ impl Recorder {
         let places = MOST_BODIES.checked_div(bodies).map_or(ROW_QUEUE, |places| places.clamp(64, ROW_QUEUE));
         let (rows, receiver) = row_queue_of(places, bodies);
         let shared = Arc::new(Shared::default());
-        let writer = RecorderThread { file: Some(file), shared: shared.clone(), period_ns };
+        let unit = if matches!(file, RecordFile::Events(_)) { "events" } else { "rows" };
+        let (events, event_ends) = event_queue(MOST_EVENTS);
+        let writer =
+            RecorderThread { file: Some(file), events: event_ends, shared: shared.clone(), period_ns };
         let thread = std::thread::Builder::new()
             .name("recorder".into())
             .spawn(move || writer.run(receiver))
             .map_err(|source| RecordingError::Create { file: path.into(), source })?;
         let (known, changed) = (vec![None; bodies], Vec::with_capacity(bodies));
-        Ok(Self { path: path.into(), rows, known, changed, when_full, lost: 0, untold: 0, shared, thread })
+        let events = Some(EventFeed { events, when_full, thread: thread.thread().clone() });
+        let path = path.into();
+        Ok(Self { path, unit, rows, events, known, changed, when_full, lost: 0, untold: 0, shared, thread })
+    }
+
+    /// Where to hand events over: those of a tick before its row.
+    pub fn take_events(&mut self) -> Option<EventFeed> {
+        self.events.take()
     }
 
     /// Hands a row over.
@@ -175,14 +226,14 @@ impl Recorder {
             }
             std::thread::sleep(Duration::from_millis(1));
         }
-        let Self { path, lost, thread, .. } = self;
+        let Self { path, unit, lost, thread, .. } = self;
         match thread.join() {
-            Ok(Ok(rows)) => Recorded { path, rows, lost, failure: None },
+            Ok(Ok(rows)) => Recorded { path, rows, unit, lost, failure: None },
             Ok(Err(error)) => {
                 let rows = if let RecordingError::Write { rows, .. } = error { rows } else { 0 };
-                Recorded { path, rows, lost, failure: Some(error.to_string()) }
+                Recorded { path, rows, unit, lost, failure: Some(error.to_string()) }
             }
-            Err(_) => Recorded { path, rows: 0, lost, failure: Some("the recorder panicked".into()) },
+            Err(_) => Recorded { path, rows: 0, unit, lost, failure: Some("the recorder panicked".into()) },
         }
     }
 
@@ -194,7 +245,7 @@ impl Recorder {
             STUCK.as_secs()
         );
         say(format_args!("phantom3: {why}"));
-        Recorded { path: self.path, rows: taken, lost: self.lost, failure: Some(why) }
+        Recorded { path: self.path, rows: taken, unit: self.unit, lost: self.lost, failure: Some(why) }
     }
 }
 
@@ -209,6 +260,7 @@ impl Shared {
 struct RecorderThread {
     /// `None` once it failed.
     file: Option<RecordFile>,
+    events: EventReceiver,
     shared: Arc<Shared>,
     period_ns: u64,
 }
@@ -240,13 +292,26 @@ impl RecorderThread {
             std::thread::park_timeout(PAUSE);
         }
         self.tell_lost(last, u64::MAX);
+        if let Err(error) = self.write_events(u64::MAX) {
+            say(format_args!("phantom3: {error}"));
+            return Err(error);
+        }
         let Some(file) = self.file else { return result };
         file.finish().inspect_err(|error| say(format_args!("phantom3: {error}")))
     }
 
     fn append(&mut self, row: &Row, bodies: &[BodyRow]) -> Result<(), RecordingError> {
         self.tell_lost(row.run_tick, row.run_tick);
-        self.file.as_mut().map_or(Ok(()), |file| file.append(row, bodies))
+        self.file.as_mut().map_or(Ok(()), |file| file.append(row, bodies))?;
+        self.write_events(row.run_tick)
+    }
+
+    /// Those up to this tick.
+    fn write_events(&mut self, up_to: u64) -> Result<(), RecordingError> {
+        while let Some(event) = self.events.receive(up_to) {
+            self.file.as_mut().map_or(Ok(()), |file| file.event(&event))?;
+        }
+        Ok(())
     }
 
     /// Tells of rows that are missing up to here.

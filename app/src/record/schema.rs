@@ -86,6 +86,9 @@ pub(super) mod event {
     pub(in crate::record) const ENTITY: u32 = 5;
     pub(in crate::record) const VALUE: u32 = 6;
     pub(in crate::record) const TEXT: u32 = 7;
+    pub(in crate::record) const OTHER: u32 = 8;
+    pub(in crate::record) const IMPULSE: u32 = 9;
+    pub(in crate::record) const PEAK: u32 = 10;
 }
 
 /// The descriptors of ticks and events of such a scene.
@@ -134,6 +137,9 @@ pub(super) fn descriptors(names: &Names) -> Vec<u8> {
             (event::ENTITY, "entity", Text),
             (event::VALUE, "value", Double),
             (event::TEXT, "text", Text),
+            (event::OTHER, "other", Text),
+            (event::IMPULSE, "impulse", vector),
+            (event::PEAK, "peak", Double),
         ],
     );
     let fields = field_names(names);

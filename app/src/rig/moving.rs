@@ -7,7 +7,6 @@ use physics::{
     Attachment, Body, BodyError, FingerSettings, HeldOrientation, Integrator, MassProperties, Response,
     Settings, Sleep, SoftFinger, TorsionModel,
 };
-use world::lists::ListSettings;
 use world::{
     AttachSpec, AttachedOrientation, IntegratorSpec, MassSpec, MotionSpec, ResponseSpec, SceneEntity,
     SceneFinger, SoftModelSpec, SoftSpec,
@@ -57,15 +56,14 @@ impl Rig {
                 ResponseSpec::Force => Response::Force,
                 ResponseSpec::Impulse { restitution } => Response::Impulse { restitution },
             },
-            sleep: Some(Sleep::default()),
+            sleep: dynamics.sleep.then(Sleep::default),
             ..Settings::default()
         };
         // Which entity it is, is not told; the first that moves is named.
         let first = |source| no_body(&self.scene.entities[bodies[0].0], source);
         let hand: Vec<HandFinger> =
             self.scene.fingers.iter().map(|f| self.hand_finger(f)).collect::<Result<_, _>>()?;
-        step.with_objects(bodies, settings, ListSettings::default(), &hand, dynamics.grasp_quality)
-            .map_err(first)
+        step.with_objects(bodies, settings, dynamics.lists, &hand, dynamics.grasp_quality).map_err(first)
     }
 
     fn hand_finger(&self, spec: &SceneFinger) -> Result<HandFinger, RigError> {

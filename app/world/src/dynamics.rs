@@ -1,12 +1,14 @@
-//! How a scene's moving entities are computed: `integrator`, `contact_response` and `grasp_quality`; and what an entity's
-//! `restitution` is.
+//! How a scene's moving entities are computed: `integrator`, `contact_response`, `grasp_quality`, `sleep` and `lists`; and
+//! what an entity's `restitution` is.
 
 use crate::error::SceneError;
+use crate::grid::MAX_ENTITIES;
+use crate::lists::ListSettings;
 use crate::reader::{Bound, Table, Value};
 use crate::vocabulary::Vocabulary;
 
 /// What holds for all entities that move.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DynamicsSpec {
     /// How forces become motion.
     pub integrator: IntegratorSpec,
@@ -14,6 +16,22 @@ pub struct DynamicsSpec {
     pub response: ResponseSpec,
     /// Whether it is told how good the grasp of each is.
     pub grasp_quality: bool,
+    /// Whether what rests falls asleep.
+    pub sleep: bool,
+    /// Which of them a thread without deadlines steps.
+    pub lists: ListSettings,
+}
+
+impl Default for DynamicsSpec {
+    fn default() -> Self {
+        Self {
+            integrator: IntegratorSpec::default(),
+            response: ResponseSpec::default(),
+            grasp_quality: false,
+            sleep: true,
+            lists: ListSettings::default(),
+        }
+    }
 }
 
 /// How forces become motion.
@@ -56,7 +74,9 @@ impl DynamicsSpec {
         };
         let response = scene.get("contact_response").map(|value| ResponseSpec::read(&value)).transpose()?;
         let grasp_quality = scene.get("grasp_quality").map_or(Ok(false), |value| value.truth())?;
-        Ok(Self { integrator, response: response.unwrap_or_default(), grasp_quality })
+        let sleep = scene.get("sleep").map_or(Ok(true), |value| value.truth())?;
+        let lists = scene.get("lists").map_or(Ok(ListSettings::default()), |value| read_lists(&value))?;
+        Ok(Self { integrator, response: response.unwrap_or_default(), grasp_quality, sleep, lists })
     }
 }
 
@@ -89,6 +109,34 @@ impl ResponseSpec {
     }
 }
 
+fn read_lists(value: &Value<'_>) -> Result<ListSettings, SceneError> {
+    let table = value.table(LISTS_EXAMPLE)?;
+    table.check_keys(&LISTS_KEYS)?;
+    let usual = ListSettings::default();
+    let positive =
+        |key, usual| table.get(key).map_or(Ok(usual), |value: Value<'_>| value.number(Bound::Positive));
+    let lists = ListSettings {
+        near_m: positive("near_m", usual.near_m)?,
+        far_m: positive("far_m", usual.far_m)?,
+        ahead_s: positive("ahead_s", usual.ahead_s)?,
+        fast_bodies: match table.get("fast_bodies") {
+            Some(value) => value.whole(0..=MAX_ENTITIES as u64)? as usize,
+            None => usual.fast_bodies,
+        },
+    };
+    // Who goes at once that has just come would go to and fro.
+    if lists.far_m <= lists.near_m {
+        let key = if table.get("far_m").is_some() { "far_m" } else { "near_m" };
+        let value = table.require(key, LISTS_EXAMPLE)?;
+        return Err(value.out_of_range("far_m has to be larger than near_m; usual are 0.05 and 0.01"));
+    }
+    Ok(lists)
+}
+
+const LISTS_EXAMPLE: &str =
+    "a table such as { near_m = 0.01, far_m = 0.05, ahead_s = 0.05, fast_bodies = 64 }";
+const LISTS_KEYS: Vocabulary =
+    Vocabulary { available: &["near_m", "far_m", "ahead_s", "fast_bodies"], later: &[] };
 const ALLOWED: &str = "a table such as { kind = \"impulse\", restitution = 0.5 } or { kind = \"force\" }";
 const KEYS: Vocabulary = Vocabulary { available: &["kind", "restitution"], later: &[] };
 const RESPONSES: Vocabulary = Vocabulary { available: &["force", "impulse"], later: &[] };

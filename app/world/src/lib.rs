@@ -42,6 +42,7 @@ mod effects;
 mod entity;
 mod environment;
 mod error;
+pub mod events;
 mod field;
 mod finger;
 mod friction;

@@ -72,7 +72,7 @@ impl Lists {
         let mut slow = Manipulation::new(entities, bodies, settings)?.without_those_elsewhere();
         let all_slow = bodies.len() > lists.fast_bodies;
         let without = if all_slow { &mut fast } else { &mut slow };
-        without.give_all_away(entities);
+        without.give_all_away();
         let (fast_end, slow_end) = link::link(bodies.len());
         Ok(Self {
             fast,

@@ -172,6 +172,8 @@ const KEYS: Vocabulary = Vocabulary {
         "integrator",
         "contact_response",
         "grasp_quality",
+        "sleep",
+        "lists",
         "hand",
         "finger",
         "entity",

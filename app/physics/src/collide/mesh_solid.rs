@@ -41,7 +41,9 @@ pub(super) fn contact_points(
     let travel_m = (reach_m - crate::pair::REACH_M).max(0.0);
     let patches = &mut memory.patches;
     if !meet(mesh, other, reach_m, patches) {
-        *memory = PairMemory::default();
+        if patches.all[0].is_known {
+            *patches = Patches::default();
+        }
         return;
     }
     look_around(mesh, other, reach_m, travel_m, patches);

@@ -54,10 +54,9 @@ impl Manipulation {
     }
 
     /// As [`Self::give_away`], all of them.
-    pub fn give_all_away(&mut self, entities: &[Entity]) {
-        for body in 0..self.roster.bodies.len() {
-            self.give_away(body, entities);
-        }
+    pub fn give_all_away(&mut self) {
+        self.roster.set_all_elsewhere();
+        self.pairs.clear();
     }
 
     /// Visits the bodies that somebody else steps and that who is awake here could soon come to.

@@ -6,8 +6,9 @@
 //!
 //! Model: beside the forces with the full bounce those without any are found, which only take. Forces in between are in every
 //! cone too, and the velocities that they leave are as much in between; so the largest share of the bounce whose impulses do not
-//! work on the body is the root of a quadratic equation. The work of an impulse is that with the mean of the velocities
-//! before and after it.
+//! work on the body is the root of a quadratic equation. The work of an impulse P is that with the mean of the velocities
+//! before and after it. Gravity changes both within the tick, while the body goes on with the velocity of the tick's end: of
+//! kinetic energy and height together, `P (v_0 - g dt + v_1) / 2 - m (g dt)^2 / 2` is what contacts put in.
 //! Invariant: forces and velocities still belong together, and forces on users are still those that bodies got.
 //! Cost: a second solution, in ticks with an impact that gives energy only.
 
@@ -25,6 +26,8 @@ pub(super) struct Bounce {
     forces: Vec<(Vector3<f64>, f64)>,
     /// Of each body, how much of the bounce it gets.
     shares: Vec<f64>,
+    /// What gravity changes velocities by in the tick \[m/s\].
+    fall_W: Vector3<f64>,
 }
 
 impl Bounce {
@@ -34,6 +37,7 @@ impl Bounce {
             bouncing: Vec::with_capacity(bodies),
             forces: Vec::with_capacity(rows),
             shares: Vec::with_capacity(bodies),
+            fall_W: Vector3::zeros(),
         }
     }
 
@@ -44,12 +48,13 @@ impl Bounce {
         rows: &mut [Row],
         impacts: &[usize],
         motions: &mut [Motion],
-        dt_s: f64,
+        (fall_W, dt_s): (&Vector3<f64>, f64),
     ) -> Solved {
+        self.fall_W = *fall_W;
         self.freely.clear();
         self.freely.extend_from_slice(motions);
         let solved = solver.solve(rows, motions, dt_s);
-        if !self.gives_energy(rows, impacts, motions) {
+        if !self.gives_energy(rows, impacts, motions, dt_s) {
             return solved;
         }
         self.bouncing.clear();
@@ -63,35 +68,50 @@ impl Bounce {
             row.rest_W -= row.normal_W * rest_n.max(0.0);
         }
         let more = solver.solve(rows, motions, dt_s);
-        self.find_shares(rows, impacts, motions);
+        self.find_shares(rows, impacts, motions, dt_s);
         self.mix(rows, motions);
         Solved { sweeps: solved.sweeps + more.sweeps, ..solved.and(more) }
     }
 
     /// Whether the impacts of any body work on it.
-    fn gives_energy(&mut self, rows: &[Row], impacts: &[usize], motions: &[Motion]) -> bool {
+    fn gives_energy(&mut self, rows: &[Row], impacts: &[usize], motions: &[Motion], dt_s: f64) -> bool {
         self.shares.clear();
         self.shares.resize(motions.len(), 0.0);
         for &at in impacts {
             let row = &rows[at];
-            let work = row.force_W.dot(&(velocity(row, &self.freely) + velocity(row, motions)));
+            let work = row.force_W.dot(&(self.before_W(row) + velocity(row, motions)));
             self.shares[row.body] += work;
             if let Some(other) = row.other {
                 self.shares[other] += work;
             }
         }
-        self.shares.iter().any(|work| *work > 0.0)
+        let mut all = self.shares.iter().zip(motions);
+        all.any(|(work, motion)| *work > self.free_w(motion, dt_s))
+    }
+
+    /// How fast the contact point would have to move before the tick for the work to be that of both ends' mean.
+    fn before_W(&self, row: &Row) -> Vector3<f64> {
+        velocity(row, &self.freely) - self.fall_W * 2.0
+    }
+
+    /// What impulses may seem to put into a body per time, twice, for what gravity takes from it.
+    fn free_w(&self, motion: &Motion, dt_s: f64) -> f64 {
+        if motion.inverse_mass > 0.0 {
+            self.fall_W.norm_squared() / (motion.inverse_mass * dt_s)
+        } else {
+            0.0
+        }
     }
 
     /// With `s` of the bounce, forces `f_0 + s f` and velocities `u_0 + s u` work `a + b s + c s^2`.
-    fn find_shares(&mut self, rows: &[Row], impacts: &[usize], motions: &[Motion]) {
+    fn find_shares(&mut self, rows: &[Row], impacts: &[usize], motions: &[Motion], dt_s: f64) {
         let mut least_coupled = 1.0_f64;
         for body in 0..motions.len() {
-            let (mut a, mut b, mut c) = (0.0, 0.0, 0.0);
+            let (mut a, mut b, mut c) = (-self.free_w(&motions[body], dt_s), 0.0, 0.0);
             for &at in impacts.iter().filter(|&&at| rows[at].body == body || rows[at].other == Some(body)) {
                 let row = &rows[at];
                 let (f_0, f) = (row.force_W, self.forces[at].0 - row.force_W);
-                let u_0 = velocity(row, &self.freely) + velocity(row, motions);
+                let u_0 = self.before_W(row) + velocity(row, motions);
                 let u = velocity(row, &self.bouncing) - velocity(row, motions);
                 a += f_0.dot(&u_0);
                 b += f_0.dot(&u) + f.dot(&u_0);

@@ -90,7 +90,13 @@ impl Cascade {
         dt_s: f64,
     ) {
         self.gather((body, other), meetings, rows, motions, dt_s);
-        self.bounce.solve(&mut self.solver, &mut self.rows, &self.impacts, &mut self.motions, dt_s);
+        self.bounce.solve(
+            &mut self.solver,
+            &mut self.rows,
+            &self.impacts,
+            &mut self.motions,
+            (&Vector3::zeros(), dt_s),
+        );
         let solved = meetings.iter().filter(|meeting| is_of(&rows[meeting.row], body, other));
         for (meeting, row) in solved.zip(&self.rows) {
             self.impulses_W[meeting.row] += row.force_W * dt_s;

@@ -29,6 +29,8 @@ pub struct Handed {
     pub waited_ticks: [u64; 2],
     /// Claims for which there was no room.
     pub unclaimed: u64,
+    /// How often an island was too large to be given away.
+    pub too_large: u64,
 }
 
 /// What the fast side knows of who is where.
@@ -40,9 +42,9 @@ pub struct FastList {
     claimed: Box<[u64]>,
     /// Of each, how often it went to the slow list.
     stays: Box<[u32]>,
-    /// How many bodies are in the fast list.
-    here: usize,
-    /// Who is looked at next for being given away.
+    /// The bodies that are in the fast list, in no order.
+    here: Vec<u32>,
+    /// Which of these is looked at next for being given away.
     next: usize,
     island: Vec<usize>,
     /// Boxes in which fingers could be soon, and in which they are.
@@ -59,7 +61,7 @@ impl FastList {
             tick: 0,
             claimed: vec![0; bodies].into(),
             stays: vec![u32::from(all_slow); bodies].into(),
-            here: if all_slow { 0 } else { bodies },
+            here: all_here(bodies, all_slow),
             next: 0,
             island: Vec::with_capacity(MOST_AT_ONCE),
             soon: Vec::with_capacity(MOST_FINGERS),
@@ -70,7 +72,7 @@ impl FastList {
 
     /// How many bodies are in the fast list.
     pub fn here(&self) -> usize {
-        self.here
+        self.here.len()
     }
 
     /// What has been handed over so far.
@@ -95,19 +97,19 @@ impl FastList {
             self.around.push(now.grown(self.settings.far_m));
         }
         self.take_in(manipulation, entities);
-        if self.here < self.claimed.len() {
+        if self.here.len() < self.claimed.len() {
             self.claim_what_is_near(manipulation);
         }
     }
 
     /// After a tick: gives an island away that nobody is near, if there is more here than there should be.
     pub fn end_tick(&mut self, manipulation: &mut Manipulation, entities: &[Entity]) {
-        if self.here <= self.settings.fast_bodies {
+        if self.here.len() <= self.settings.fast_bodies {
             return;
         }
-        for _ in 0..LOOKED_AT.min(self.claimed.len()) {
-            let body = self.next;
-            self.next = (self.next + 1) % self.claimed.len();
+        for _ in 0..LOOKED_AT.min(self.here.len()) {
+            self.next = (self.next + 1) % self.here.len();
+            let body = self.here[self.next] as usize;
             if self.may_go(body, manipulation) && self.give_away(body, manipulation, entities) {
                 return;
             }
@@ -136,7 +138,7 @@ impl FastList {
         for _ in 0..PARCELS_A_TICK {
             let Ok(parcel) = self.end.back.pop() else { break };
             if let Some(body) = parcel.body() {
-                self.here += 1;
+                self.here.push(body as u32);
                 self.handed.came += 1;
                 let claimed = std::mem::take(&mut self.claimed[body]);
                 let waited = self.tick.saturating_sub(claimed);
@@ -182,6 +184,7 @@ impl FastList {
         let mut island = std::mem::take(&mut self.island);
         // Larger ones stay: to send them would take more than a tick may.
         let is_whole = manipulation.island(body, &mut island);
+        self.handed.too_large += u64::from(!is_whole);
         let goes = is_whole
             && island.iter().all(|&body| self.may_go(body, manipulation))
             && !manipulation.is_met(&island)
@@ -190,7 +193,7 @@ impl FastList {
             for &body in &island {
                 self.stays[body] += 1;
             }
-            self.here -= island.len();
+            self.here.retain(|body| island.binary_search(&(*body as usize)).is_err());
             self.handed.went += island.len() as u64;
             // There is room.
             manipulation.release(&island, entities, |parcel| drop(self.end.out.push(parcel)));
@@ -198,6 +201,15 @@ impl FastList {
         self.island = island;
         goes
     }
+}
+
+/// Room for all bodies, and all of them unless they are in the slow list.
+fn all_here(bodies: usize, all_slow: bool) -> Vec<u32> {
+    let mut here = Vec::with_capacity(bodies);
+    if !all_slow {
+        here.extend(0..bodies as u32);
+    }
+    here
 }
 
 fn is_finite(finger: &Reach) -> bool {

@@ -18,6 +18,8 @@ pub struct SlowList {
     /// Bodies whose place has not been told since it changed, each once.
     untold: Vec<usize>,
     is_untold: Box<[bool]>,
+    /// Bodies that were claimed, and whose island no queue has room for.
+    too_large: Vec<usize>,
     stepped: u64,
 }
 
@@ -34,6 +36,7 @@ impl SlowList {
             island: Vec::with_capacity(bodies),
             untold: Vec::with_capacity(bodies),
             is_untold: vec![false; bodies].into(),
+            too_large: Vec::new(),
             stepped: 0,
         }
     }
@@ -48,6 +51,8 @@ impl SlowList {
             }
             self.manipulation.step(&mut self.entities, &mut [], dt_s);
             self.stepped += 1;
+            // A tick of many bodies takes long, and a finger waits.
+            self.give_away();
         }
         self.tell();
     }
@@ -72,11 +77,22 @@ impl SlowList {
         self.stepped
     }
 
+    /// How many bodies are in this list.
+    pub fn here(&self) -> usize {
+        let is_here = |body: &usize| self.manipulation.standing(*body) != Standing::Elsewhere;
+        (0..self.manipulation.bodies().len()).filter(is_here).count()
+    }
+
+    /// How many bodies were claimed that are part of too large an island to be sent: fingers feel them fixed.
+    pub fn too_large(&self) -> usize {
+        self.too_large.len()
+    }
+
     fn give_away(&mut self) {
         while let Ok(body) = self.end.claims.pop() {
             self.claimed.push(body as usize);
         }
-        let Self { claimed, manipulation, entities, end, island, .. } = self;
+        let Self { claimed, manipulation, entities, end, island, too_large, .. } = self;
         claimed.retain(|&body| {
             if manipulation.standing(body) == Standing::Elsewhere {
                 return false;
@@ -86,7 +102,11 @@ impl SlowList {
                 return false;
             }
             manipulation.island(body, island);
-            let goes = manipulation.parcels(island) <= end.out.slots();
+            let parcels = manipulation.parcels(island);
+            let goes = parcels <= end.out.slots();
+            if parcels > end.out.buffer().capacity() && !too_large.contains(&body) {
+                too_large.push(body);
+            }
             if goes {
                 // There is room.
                 manipulation.release(island, entities, |parcel| drop(end.out.push(parcel)));

@@ -458,3 +458,25 @@ fn a_friction_that_no_surface_has_is_refused() {
         "s.toml:8: entity[0].friction.speed_m_s: found an array of length 64; allowed: at most 63 numbers",
     );
 }
+
+#[test]
+fn lists_have_four_numbers_and_let_go_farther_away_than_they_claim() {
+    refused(
+        &with_top("lists = 64"),
+        "s.toml:2: lists: found 64; allowed: a table such as { near_m = 0.01, far_m = 0.05, ahead_s = 0.05, \
+         fast_bodies = 64 }",
+    );
+    refused(
+        &with_top("lists = { fast_bodies = -1 }"),
+        "s.toml:2: lists.fast_bodies: found -1; allowed: a whole number from 0 to 100000",
+    );
+    refused(
+        &with_top("lists = { ahead_s = 0 }"),
+        "s.toml:2: lists.ahead_s: found 0; allowed: a number above 0",
+    );
+    refused(
+        &with_top("lists = { near_m = 0.05 }"),
+        "s.toml:2: lists.near_m: found 0.05; allowed: far_m has to be larger than near_m; usual are 0.05 and 0.01",
+    );
+    refused(&with_top("sleep = 1"), "s.toml:2: sleep: found 1; allowed: true or false");
+}

@@ -6,7 +6,7 @@ use world::{MassSpec, Scene};
 
 use crate::{refused, with_entity, with_finger, with_shape, with_top};
 
-const SCENE_KEYS: &str = "name, gravity_m_s2, integrator, contact_response, grasp_quality, hand, finger, entity, field, guide, \
+const SCENE_KEYS: &str = "name, gravity_m_s2, integrator, contact_response, grasp_quality, sleep, lists, hand, finger, entity, field, guide, \
      include, template, environment, light, camera";
 const FINGER_KEYS: &str = "name, radius_m, start_m, device, passivity, soft, attach";
 const ENTITY_KEYS: &str = "name, shape, position_m, orientation_wxyz, stiffness_n_per_m, damping_n_s_per_m, friction, algorithm, \

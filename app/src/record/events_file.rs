@@ -1,0 +1,71 @@
+//! What happened in a run, and nothing else: a line for each event.
+
+use super::event_line::{KEYS, csv, json};
+use crate::columns::Names;
+use crate::recording::RecordingError;
+use io_driver::device::run_time_s;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use world::events::Event;
+
+/// A file of events being written.
+pub struct EventsFile {
+    file: BufWriter<File>,
+    path: PathBuf,
+    names: Names,
+    period_ns: u64,
+    is_table: bool,
+    written: u64,
+    last_tick: u64,
+}
+
+impl EventsFile {
+    /// Creates the file, or empties it.
+    ///
+    /// # Errors
+    /// If it cannot be made.
+    pub fn create(path: &Path, names: Names, period_ns: u64) -> Result<Self, RecordingError> {
+        let failed = |source| RecordingError::Create { file: path.into(), source };
+        let mut file = BufWriter::new(File::create(path).map_err(failed)?);
+        let is_table = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
+        if is_table {
+            writeln!(file, "{}", KEYS.join(",")).and_then(|()| file.flush()).map_err(failed)?;
+        }
+        Ok(Self { file, path: path.into(), names, period_ns, is_table, written: 0, last_tick: 0 })
+    }
+
+    /// Appends an event.
+    ///
+    /// # Errors
+    /// If it or what was before it cannot be written.
+    pub fn event(&mut self, event: &Event) -> Result<(), RecordingError> {
+        let line = if self.is_table { csv } else { json }(event, &self.names, self.period_ns);
+        writeln!(self.file, "{line}").map_err(|source| self.failed(source))?;
+        self.written += 1;
+        self.last_tick = event.run_tick;
+        Ok(())
+    }
+
+    /// Hands over to the system what has not been.
+    ///
+    /// # Errors
+    /// If that fails.
+    pub fn flush(&mut self) -> Result<(), RecordingError> {
+        self.file.flush().map_err(|source| self.failed(source))
+    }
+
+    /// Writes the rest; says how many events there are.
+    ///
+    /// # Errors
+    /// If that fails.
+    pub fn finish(mut self) -> Result<u64, RecordingError> {
+        self.flush()?;
+        Ok(self.written)
+    }
+
+    fn failed(&self, source: io::Error) -> RecordingError {
+        let until_s = run_time_s(self.last_tick.cast_signed(), self.period_ns);
+        RecordingError::Write { file: self.path.clone(), source, until_s, rows: self.written }
+    }
+}

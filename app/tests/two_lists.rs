@@ -1,0 +1,179 @@
+//! The fast and the slow list through the whole fast step: frame in, command out.
+
+use bytemuck::Zeroable;
+use nalgebra::Vector3;
+use phantom3::fast_step::FastStep;
+use phantom3::lists_end::ListsEnd;
+use phantom3::rig::{HandMode, Rig};
+use phantom3::row::{FingerRow, Row};
+use phantom3::slow_thread::SlowThread;
+use shm_abi::frame::DEVICE_POSITION_VALID;
+use shm_abi::{Command, Frame};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+use world::Scene;
+use world::lists::SlowList;
+
+const DT: f64 = 1e-3;
+const MASS: f64 = 0.1;
+const ALL_SLOW: &str = "lists = { fast_bodies = 0 }\n";
+const FLOATING: &str = "gravity_m_s2 = [0, 0, 0]\n[[finger]]\n";
+const STANDING: &str = "[[finger]]\n[[entity]]\nname = \"floor\"\ndamping_n_s_per_m = 2.0\n\
+                        shape = { kind = \"plane\", normal = [0, 1, 0], offset_m = 0 }\n\
+                        friction = { model = \"coulomb\", mu = 0.3 }\n";
+
+fn cube(rest: &str) -> String {
+    format!(
+        "[[entity]]\nname = \"cube\"\nshape = {{ kind = \"box\", size_m = [0.04, 0.04, 0.04] }}\n\
+         position_m = [0, 0.02, 0]\nstiffness_n_per_m = 500\ndamping_n_s_per_m = 1\nfriction = {{ model = \"coulomb\", mu = 0.3 }}\n{rest}\n"
+    )
+}
+
+fn step(scene: &str) -> FastStep {
+    let file = Path::new("scene.toml");
+    let scene = Scene::parse(scene, file).expect("a scene");
+    let rig = Rig::new(file, scene, None, None, HandMode::Kinematic, 1_000_000).expect("a rig");
+    rig.fast_step().expect("a step")
+}
+
+/// A run's steps; the slow list is stepped here, if it is at all.
+struct Run {
+    step: FastStep,
+    slow: Option<SlowList>,
+    tick: u64,
+}
+
+impl Run {
+    fn new(scene: &str) -> Self {
+        let mut step = step(scene);
+        Self { slow: step.take_slow(), step, tick: 0 }
+    }
+
+    /// The first finger, of a tick in which it is there.
+    fn tick(&mut self, hip: [f64; 3], slow_runs: bool) -> FingerRow {
+        let (mut frame, mut row) = (Frame::zeroed(), Row::empty());
+        (frame.tick, frame.device_count, frame.run_tick) = (self.tick + 1, 1, self.tick as i64);
+        (frame.devices[0].flags, frame.devices[0].position_m_measured) = (DEVICE_POSITION_VALID, hip);
+        self.step.step(&frame, &mut Command::zeroed(), &mut row);
+        self.tick += 1;
+        if let Some(slow) = self.slow.as_mut().filter(|_| slow_runs && self.tick % 10 == 0) {
+            slow.turn(10, DT);
+        }
+        row.fingers[0]
+    }
+
+    fn here(&self) -> usize {
+        self.step.handed().map_or(0, |(here, _)| here)
+    }
+}
+
+/// Along x, against the middle of the cube's side, from a hand's breadth before it, 0.1 m/s.
+fn pushing(tick: u64) -> [f64; 3] {
+    [-0.12 + 1e-4 * tick as f64, 0.02, 0.0]
+}
+
+#[test]
+fn a_slow_cube_that_nobody_hands_over_is_felt_as_one_that_is_fixed() {
+    let mut stalled = Run::new(&format!("{ALL_SLOW}{STANDING}{}", cube("mass_kg = 0.1")));
+    let mut fixed = Run::new(&format!("{STANDING}{}", cube("")));
+    let mut most_n: f64 = 0.0;
+    for tick in 0..1050 {
+        let [felt, expected] = [&mut stalled, &mut fixed].map(|run| run.tick(pushing(tick), false));
+        assert_eq!(felt, expected, "tick {tick}");
+        most_n = most_n.max(felt.force_on_user.norm());
+    }
+    // 500 N/m, 4.9 mm deep; 1 N s/m, 0.1 m/s. Along the surface nothing moves.
+    assert!((most_n - 2.55).abs() < 1e-9, "{most_n}");
+    assert_eq!(stalled.here(), 0);
+    // The slow list goes on: the cube comes, and gives way.
+    for tick in 1050..1100 {
+        stalled.tick(pushing(tick), true);
+    }
+    assert_eq!(stalled.here(), 1);
+    assert!(stalled.step.bodies()[0].velocity.x > 0.05, "{:?}", stalled.step.bodies()[0]);
+}
+
+#[test]
+fn a_cube_that_was_slow_is_pushed_from_the_first_tick_like_one_that_never_was() {
+    let scene = |lists: &str| format!("{lists}{STANDING}{}", cube("mass_kg = 0.1"));
+    let mut runs = [Run::new(&scene(ALL_SLOW)), Run::new(&scene(""))];
+    assert!(runs[0].slow.is_some() && runs[1].slow.is_none());
+    // It comes to rest in either.
+    for _ in 0..4000 {
+        for run in &mut runs {
+            run.tick(pushing(0), true);
+        }
+    }
+    assert_eq!([runs[0].here(), runs[1].step.made().awake], [0, 0]);
+    let mut touched = 0;
+    for tick in 0..2000 {
+        let [one, other] = runs.each_mut().map(|run| run.tick(pushing(tick), true));
+        touched += u64::from(one.entity.is_some());
+        // Both slept with the same corners on the floor; what is left are roundings.
+        assert!((one.force_on_user - other.force_on_user).norm() < 1e-9, "tick {tick}: {one:?} {other:?}");
+        let [one, other] = [&runs[0], &runs[1]].map(|run| run.step.bodies()[0]);
+        assert!((one.position - other.position).norm() < 1e-9, "tick {tick}: {one:?} {other:?}");
+    }
+    assert!(touched > 500 && runs[0].here() == 1, "{touched}");
+    assert!(runs[0].step.handed().expect("two lists").1.waited_ticks[1] <= 11);
+}
+
+#[test]
+fn what_moves_when_it_is_handed_over_keeps_its_momentum_and_gets_what_the_user_feels() {
+    // It floats towards a finger that waits for it, far away at first.
+    let moving = cube("mass_kg = 0.1\nvelocity_m_s = [-0.1, 0.0, 0.0]\nrotation_locked = true");
+    let mut run = Run::new(&format!("{ALL_SLOW}{FLOATING}{moving}"));
+    let (mut was_slow, mut touched) = (false, 0);
+    let mut momentum = Vector3::new(-0.1 * MASS, 0.0, 0.0);
+    for tick in 0..2000 {
+        let felt = run.tick([-0.1, 0.02, 0.0], true);
+        was_slow |= run.here() == 0 && tick > 300;
+        // As the tick began: what it has got by then.
+        let state = run.step.bodies()[0];
+        // Roundings of 0.01 kg m/s in a thousand sums.
+        assert!((state.velocity * MASS - momentum).norm() < 1e-14, "tick {tick}: {state:?}");
+        momentum -= felt.force_on_user * DT;
+        touched += u64::from(felt.entity.is_some());
+    }
+    assert!(was_slow && touched > 10, "{touched}");
+    assert!(momentum.x > 0.0, "it was thrown back: {momentum}");
+}
+
+#[test]
+fn whenever_a_run_ends_each_body_is_in_one_list() {
+    let grid = "grid = { count = [10, 1, 6], spacing_m = [0.1, 1, 0.1] }";
+    let scene = format!("{ALL_SLOW}{STANDING}{}", cube(&format!("mass_kg = 0.1\n{grid}")));
+    for ticks in [1, 7, 300, 1234] {
+        let mut step = step(&scene);
+        let run_ticks = Arc::<AtomicU64>::default();
+        let slow = step.take_slow().expect("a slow list");
+        let thread = SlowThread::start(slow, Arc::clone(&run_ticks), 1_000_000).expect("a thread");
+        let mut run = Run { step, slow: None, tick: 0 };
+        for tick in 0..ticks {
+            // To and fro over the cubes, far faster than the slow list has turns.
+            let x = 0.5 + 0.5 * (0.02 * tick as f64).sin();
+            run.tick([x, 0.05, 0.25 + 0.25 * (0.017 * tick as f64).cos()], false);
+            run_ticks.store(tick, Ordering::Relaxed);
+            if tick % 8 == 0 {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        }
+        let remains = thread.end().expect("no panic");
+        let end = run.step.end_lists(Some(remains)).expect("two lists");
+        let ListsEnd { fast, slow, left_out, stuck, .. } = end;
+        assert_eq!((fast + slow.expect("it came back"), left_out, stuck), (60, 0, 0), "{end}");
+        assert!(ticks < 1000 || end.handed.came > 0, "{end}");
+    }
+}
+
+#[test]
+fn a_slow_thread_whose_run_failed_ends_with_it() {
+    let mut step = step(&format!("{ALL_SLOW}{FLOATING}{}", cube("mass_kg = 0.1")));
+    let run_ticks = Arc::<AtomicU64>::default();
+    let slow = step.take_slow().expect("a slow list");
+    drop(SlowThread::start(slow, Arc::clone(&run_ticks), 1_000_000).expect("a thread"));
+    assert_eq!(Arc::strong_count(&run_ticks), 1, "nobody else has it any more");
+    assert!(step.end_lists(None).expect("two lists").slow.is_none());
+}

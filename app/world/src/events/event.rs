@@ -1,0 +1,320 @@
+//! What can happen.
+//!
+//! Frames and signs: W; a finger's force and impulse are those on the user, a pair's those on its first entity.
+//! Invariant: an event is `Copy` and has no heap: fingers and entities are numbers in the order of the scene.
+
+use nalgebra::Vector3;
+
+/// Something that happened.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Event {
+    /// In which tick of the run.
+    pub run_tick: u64,
+    /// What.
+    pub kind: Kind,
+}
+
+/// What happened, and to whom.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum Kind {
+    /// A finger's contact with an entity changed.
+    FingerTouch {
+        /// Which finger.
+        finger: u32,
+        /// Which entity.
+        entity: u32,
+        /// How.
+        change: Change,
+        /// The contact so far.
+        life: Life,
+    },
+    /// A contact between two entities began or ended.
+    PairTouch {
+        /// Which two; the first can move.
+        entities: [u32; 2],
+        /// How.
+        change: Change,
+        /// The contact so far.
+        life: Life,
+    },
+    /// An entity that moves is held: by two fingers or more, or by one that it is tied to.
+    Grasp {
+        /// Which entity.
+        entity: u32,
+        /// Bit `i`: by finger `i`.
+        fingers: u32,
+    },
+    /// It is not held any more.
+    Release {
+        /// Which entity.
+        entity: u32,
+        /// For how long it was (s).
+        lasted_s: f64,
+    },
+    /// An entity was tied to a finger (`Begins`), or let go (`Ends`).
+    Tie {
+        /// Which finger.
+        finger: u32,
+        /// Which entity.
+        entity: u32,
+        /// How.
+        change: Change,
+    },
+    /// An entity goes on being stepped by another thread.
+    ListChange {
+        /// Which entity.
+        entity: u32,
+        /// By whose.
+        to: List,
+    },
+    /// An entity stands still for good.
+    Parked {
+        /// Which entity.
+        entity: u32,
+        /// Why.
+        why: Why,
+    },
+    /// A button of a finger's device.
+    Button {
+        /// Which finger.
+        finger: u32,
+        /// Which button of its device.
+        button: u32,
+        /// Whether it went down.
+        is_pressed: bool,
+    },
+    /// A key of the keyboard.
+    Key {
+        /// Which, as the source numbers them.
+        code: u32,
+        /// Whether it went down.
+        is_pressed: bool,
+    },
+    /// A trial of a study began or ended.
+    Trial {
+        /// Which of the two.
+        change: Change,
+        /// Its number.
+        number: u32,
+    },
+    /// The scene was put back to its beginning.
+    Reset,
+    /// So many events are missing here: whoever takes them was too slow.
+    Lost {
+        /// How many.
+        count: u64,
+    },
+}
+
+/// What became of a contact, a tie or a trial.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Change {
+    /// It is new.
+    Begins,
+    /// It slides from this tick on.
+    Slips,
+    /// It holds again.
+    Sticks,
+    /// It is over.
+    Ends,
+}
+
+/// Which thread steps an entity.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum List {
+    /// That which renders forces.
+    Fast,
+    /// That of what no finger is near.
+    Slow,
+}
+
+/// Why an entity was parked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Why {
+    /// It left the world.
+    LeftTheWorld,
+    /// Where it was or how it moved was no number any more.
+    NotANumber,
+}
+
+/// What a contact has done so far.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Life {
+    /// Force in the last tick that it had any in (N).
+    pub force_n: f64,
+    /// The largest so far (N).
+    pub peak_n: f64,
+    /// The sum of force and length of tick (N s).
+    pub impulse_W: Vector3<f64>,
+    /// From its first to its last tick with force, both counted (s).
+    pub lasted_s: f64,
+}
+
+impl Life {
+    /// Another tick of this length (s) with this force (N), the time since the last one (s) being part of its life.
+    pub(super) fn go_on(&mut self, force_W: &Vector3<f64>, dt_s: f64, since_s: f64) {
+        self.force_n = force_W.norm();
+        self.peak_n = self.peak_n.max(self.force_n);
+        self.impulse_W += force_W * dt_s;
+        self.lasted_s += since_s;
+    }
+}
+
+/// Kinds without their details: what filters and counts go by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Class {
+    /// [`Kind::FingerTouch`] that begins or ends.
+    Contact,
+    /// [`Kind::FingerTouch`] that slips or sticks.
+    Slip,
+    /// [`Kind::PairTouch`].
+    Pair,
+    /// [`Kind::Grasp`] and [`Kind::Release`].
+    Grasp,
+    /// [`Kind::Tie`].
+    Tie,
+    /// [`Kind::ListChange`].
+    List,
+    /// [`Kind::Parked`].
+    Parked,
+    /// [`Kind::Button`].
+    Button,
+    /// [`Kind::Key`].
+    Key,
+    /// [`Kind::Trial`].
+    Trial,
+    /// [`Kind::Reset`].
+    Reset,
+    /// [`Kind::Lost`].
+    Lost,
+}
+
+impl Class {
+    /// All of them, with their words.
+    pub const ALL: [(Self, &str); 12] = [
+        (Self::Contact, "contacts"),
+        (Self::Slip, "slips"),
+        (Self::Pair, "pairs"),
+        (Self::Grasp, "grasps"),
+        (Self::Tie, "ties"),
+        (Self::List, "lists"),
+        (Self::Parked, "parked"),
+        (Self::Button, "buttons"),
+        (Self::Key, "keys"),
+        (Self::Trial, "trials"),
+        (Self::Reset, "resets"),
+        (Self::Lost, "lost"),
+    ];
+}
+
+/// What an event says, whatever its kind: for those who write it down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Facts {
+    /// The kind's word, such as `contact-begin`.
+    pub word: &'static str,
+    /// Which finger.
+    pub finger: Option<u32>,
+    /// Which entity.
+    pub entity: Option<u32>,
+    /// Which other entity.
+    pub other: Option<u32>,
+    /// Bit `i`: finger `i` holds the entity.
+    pub holders: u32,
+    /// The contact so far.
+    pub life: Option<Life>,
+    /// How long a grasp lasted (s).
+    pub lasted_s: Option<f64>,
+    /// A number: of the button, the key, the trial; how many were lost.
+    pub number: Option<u64>,
+    /// Which list, or why.
+    pub text: &'static str,
+}
+
+impl Facts {
+    const fn of(word: &'static str) -> Self {
+        Self {
+            word,
+            finger: None,
+            entity: None,
+            other: None,
+            holders: 0,
+            life: None,
+            lasted_s: None,
+            number: None,
+            text: "",
+        }
+    }
+}
+
+impl Kind {
+    /// What it is, roughly.
+    pub fn class(&self) -> Class {
+        match self {
+            Self::FingerTouch { change: Change::Slips | Change::Sticks, .. } => Class::Slip,
+            Self::FingerTouch { .. } => Class::Contact,
+            Self::PairTouch { .. } => Class::Pair,
+            Self::Grasp { .. } | Self::Release { .. } => Class::Grasp,
+            Self::Tie { .. } => Class::Tie,
+            Self::ListChange { .. } => Class::List,
+            Self::Parked { .. } => Class::Parked,
+            Self::Button { .. } => Class::Button,
+            Self::Key { .. } => Class::Key,
+            Self::Trial { .. } => Class::Trial,
+            Self::Reset => Class::Reset,
+            Self::Lost { .. } => Class::Lost,
+        }
+    }
+
+    /// What it says.
+    pub fn facts(&self) -> Facts {
+        let of = Facts::of;
+        match *self {
+            Self::FingerTouch { finger, entity, change, life } => {
+                let word = match change {
+                    Change::Begins => "contact-begin",
+                    Change::Slips => "slip-begin",
+                    Change::Sticks => "slip-end",
+                    Change::Ends => "contact-end",
+                };
+                Facts { finger: Some(finger), entity: Some(entity), life: Some(life), ..of(word) }
+            }
+            Self::PairTouch { entities: [entity, other], change, life } => {
+                let word = if change == Change::Ends { "pair-end" } else { "pair-begin" };
+                Facts { entity: Some(entity), other: Some(other), life: Some(life), ..of(word) }
+            }
+            Self::Grasp { entity, fingers } => {
+                Facts { entity: Some(entity), holders: fingers, ..of("grasp") }
+            }
+            Self::Release { entity, lasted_s } => {
+                Facts { entity: Some(entity), lasted_s: Some(lasted_s), ..of("release") }
+            }
+            Self::Tie { finger, entity, change } => {
+                let word = if change == Change::Ends { "untied" } else { "tied" };
+                Facts { finger: Some(finger), entity: Some(entity), ..of(word) }
+            }
+            Self::ListChange { entity, to } => {
+                let text = if to == List::Fast { "fast" } else { "slow" };
+                Facts { entity: Some(entity), text, ..of("list-change") }
+            }
+            Self::Parked { entity, why } => {
+                let text = if why == Why::LeftTheWorld { "left the world" } else { "not a number" };
+                Facts { entity: Some(entity), text, ..of("parked") }
+            }
+            Self::Button { finger, button, is_pressed } => {
+                let word = if is_pressed { "button-down" } else { "button-up" };
+                Facts { finger: Some(finger), number: Some(button.into()), ..of(word) }
+            }
+            Self::Key { code, is_pressed } => {
+                let word = if is_pressed { "key-down" } else { "key-up" };
+                Facts { number: Some(code.into()), ..of(word) }
+            }
+            Self::Trial { change, number } => {
+                let word = if change == Change::Ends { "trial-end" } else { "trial-begin" };
+                Facts { number: Some(number.into()), ..of(word) }
+            }
+            Self::Reset => of("reset"),
+            Self::Lost { count } => Facts { number: Some(count), ..of("events-lost") },
+        }
+    }
+}

@@ -1,0 +1,153 @@
+//! What is new in a tick.
+//!
+//! Model: whoever steps tells, tick by tick, which fingers touch what ([`Watch::finger`]) and which entities press each other
+//! ([`Watch::pairs`]); what differs from the tick before is sent. A finger's contact begins, slips and ends in the tick in
+//! which rendering says so. A pair's begins with its first force and ends after [`QUIET_S`] without any, so that a box that
+//! settles does not chatter; while both rest, asleep, it goes on. The same holds for grasps.
+//!
+//! Invariants: no allocation after `new`; in a tick at most [`MOST_TOLD`] events, more are counted as lost. What finds no
+//! room in a table is not watched.
+//! Cost: linear in what touches.
+
+mod fingers;
+mod grasps;
+mod pairs;
+
+use super::{Event, EventSender, Kind, Life};
+use fingers::FingerWatch;
+use grasps::Grasps;
+use nalgebra::Vector3;
+use pairs::Pairs;
+
+/// The most events that a tick sends.
+pub const MOST_TOLD: usize = 256;
+/// A finger's contacts beyond these are not watched.
+pub const MOST_TOUCHED: usize = 16;
+/// A pair or a grasp that was not seen for so long has ended (s).
+pub const QUIET_S: f64 = 0.005;
+
+/// A finger's contact in a tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Touching {
+    /// With which entity.
+    pub entity: u32,
+    /// Its force on the user (N).
+    pub force_on_user_W: Vector3<f64>,
+    /// Whether it slides.
+    pub slips: bool,
+    /// Whether the entity can move, and so be held.
+    pub is_body: bool,
+}
+
+/// What two entities do to each other in a tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PairForce {
+    /// Which two; the first can move.
+    pub entities: [u32; 2],
+    /// The force on the first (N).
+    pub force_W: Vector3<f64>,
+}
+
+/// What was so in the tick before.
+#[derive(Debug)]
+pub struct Watch {
+    fingers: Vec<FingerWatch>,
+    pairs: Pairs,
+    grasps: Grasps,
+    last_tick: Option<u64>,
+    now: Now,
+}
+
+/// The tick that is looked at.
+#[derive(Debug, Clone, Copy, Default)]
+struct Now {
+    run_tick: u64,
+    /// Since the one before (s).
+    dt_s: f64,
+    period_s: f64,
+    /// How many events it may still send.
+    left: usize,
+}
+
+impl Watch {
+    /// Of so many fingers, which touch nothing yet, and so many pairs at once.
+    pub fn new(fingers: usize, pairs: usize, period_s: f64) -> Self {
+        Self {
+            // Each made anew: a clone of a list without entries has no room.
+            fingers: (0..fingers).map(|_| FingerWatch::new()).collect(),
+            pairs: Pairs::with_capacity(pairs),
+            grasps: Grasps::new(),
+            last_tick: None,
+            now: Now { period_s, ..Now::default() },
+        }
+    }
+
+    /// Begins a tick of the run; before it all that is told was so in the one before.
+    pub fn begin(&mut self, run_tick: u64) {
+        let ticks = self.last_tick.map_or(1, |last| run_tick.saturating_sub(last).max(1));
+        self.last_tick = Some(run_tick);
+        let period_s = self.now.period_s;
+        self.now = Now { run_tick, dt_s: ticks as f64 * period_s, period_s, left: MOST_TOLD };
+    }
+
+    /// What a finger touches, which buttons of its device are pressed, and which entity is tied to it.
+    pub fn finger(
+        &mut self,
+        finger: usize,
+        touching: &[Touching],
+        buttons: u64,
+        tied: Option<u32>,
+        out: &mut EventSender,
+    ) {
+        if let Some(watched) = self.fingers.get_mut(finger) {
+            let mut teller = Teller { now: &mut self.now, out };
+            watched.look(finger as u32, touching, &mut teller);
+            watched.look_at_device(finger as u32, buttons, tied, &mut teller);
+        }
+    }
+
+    /// Which entities press each other, in a step of this length (s). `rests`: whether two that do not are asleep.
+    pub fn pairs(
+        &mut self,
+        pairs: impl Iterator<Item = PairForce>,
+        dt_s: f64,
+        rests: impl Fn([u32; 2]) -> bool,
+        out: &mut EventSender,
+    ) {
+        self.pairs.look(pairs, dt_s, rests, &mut Teller { now: &mut self.now, out });
+    }
+
+    /// After all fingers: who holds what.
+    pub fn grasps(&mut self, out: &mut EventSender) {
+        self.grasps.look(&self.fingers, &mut Teller { now: &mut self.now, out });
+    }
+
+    /// Something that the caller has found.
+    pub fn tell(&mut self, kind: Kind, out: &mut EventSender) {
+        Teller { now: &mut self.now, out }.tell(kind);
+    }
+}
+
+/// Sends what is new in a tick.
+struct Teller<'t> {
+    now: &'t mut Now,
+    out: &'t mut EventSender,
+}
+
+impl Teller<'_> {
+    fn tell(&mut self, kind: Kind) {
+        let event = Event { run_tick: self.now.run_tick, kind };
+        match self.now.left.checked_sub(1) {
+            Some(left) => {
+                self.now.left = left;
+                self.out.send(event);
+            }
+            None => self.out.lose(),
+        }
+    }
+
+    /// How long so many ticks are (s).
+    fn time_s(&self, ticks: u64) -> f64 {
+        ticks as f64 * self.now.period_s
+    }
+}

@@ -1,0 +1,92 @@
+//! A finger's contacts, ties and buttons.
+
+use super::{Life, MOST_TOUCHED, Teller, Touching};
+use crate::events::{Change, Kind};
+
+/// What a finger did in the tick before.
+#[derive(Debug)]
+pub(super) struct FingerWatch {
+    touched: Vec<Touched>,
+    pub(super) tied: Option<u32>,
+    buttons: u64,
+}
+
+/// A contact that lives.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Touched {
+    pub(super) entity: u32,
+    pub(super) is_body: bool,
+    slips: bool,
+    life: Life,
+}
+
+impl FingerWatch {
+    pub(super) fn new() -> Self {
+        Self { touched: Vec::with_capacity(MOST_TOUCHED), tied: None, buttons: 0 }
+    }
+
+    /// Its contacts.
+    pub(super) fn touched(&self) -> &[Touched] {
+        &self.touched
+    }
+
+    /// First what has ended, then what goes on or begins.
+    pub(super) fn look(&mut self, finger: u32, touching: &[Touching], teller: &mut Teller<'_>) {
+        self.touched.retain(|was| {
+            let stays = touching.iter().any(|is| is.entity == was.entity);
+            if !stays {
+                was.tell(finger, Change::Ends, teller);
+            }
+            stays
+        });
+        for is in touching {
+            let place = self.touched.iter().position(|was| was.entity == is.entity);
+            let at = place.unwrap_or(self.touched.len());
+            if place.is_none() {
+                if at >= MOST_TOUCHED {
+                    continue;
+                }
+                let (entity, is_body) = (is.entity, is.is_body);
+                self.touched.push(Touched { entity, is_body, slips: false, life: Life::default() });
+            }
+            let touched = &mut self.touched[at];
+            touched.life.go_on(&is.force_on_user_W, teller.now.dt_s, teller.now.dt_s);
+            if place.is_none() {
+                touched.tell(finger, Change::Begins, teller);
+            }
+            if std::mem::replace(&mut touched.slips, is.slips) != is.slips {
+                touched.tell(finger, if is.slips { Change::Slips } else { Change::Sticks }, teller);
+            }
+        }
+    }
+
+    pub(super) fn look_at_device(
+        &mut self,
+        finger: u32,
+        buttons: u64,
+        tied: Option<u32>,
+        teller: &mut Teller<'_>,
+    ) {
+        let mut changed = self.buttons ^ buttons;
+        self.buttons = buttons;
+        while changed != 0 {
+            let button = changed.trailing_zeros();
+            changed &= changed - 1;
+            teller.tell(Kind::Button { finger, button, is_pressed: buttons >> button & 1 == 1 });
+        }
+        let was = std::mem::replace(&mut self.tied, tied);
+        if was != tied {
+            for (entity, change) in [(was, Change::Ends), (tied, Change::Begins)] {
+                if let Some(entity) = entity {
+                    teller.tell(Kind::Tie { finger, entity, change });
+                }
+            }
+        }
+    }
+}
+
+impl Touched {
+    fn tell(&self, finger: u32, change: Change, teller: &mut Teller<'_>) {
+        teller.tell(Kind::FingerTouch { finger, entity: self.entity, change, life: self.life });
+    }
+}

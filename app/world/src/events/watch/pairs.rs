@@ -1,0 +1,86 @@
+//! Contacts between entities.
+
+use super::{Life, PairForce, QUIET_S, Teller};
+use crate::events::{Change, Kind};
+use nalgebra::Vector3;
+
+/// Pairs that touch, in ascending order.
+#[derive(Debug)]
+pub(super) struct Pairs {
+    touching: Vec<Pair>,
+    most: usize,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Pair {
+    entities: [u32; 2],
+    life: Life,
+    /// Its last tick with a force.
+    pressed: u64,
+    /// For how long it has had none, awake (s).
+    quiet_s: f64,
+}
+
+impl Pairs {
+    pub(super) fn with_capacity(most: usize) -> Self {
+        Self { touching: Vec::with_capacity(most), most }
+    }
+
+    pub(super) fn look(
+        &mut self,
+        pairs: impl Iterator<Item = PairForce>,
+        dt_s: f64,
+        rests: impl Fn([u32; 2]) -> bool,
+        teller: &mut Teller<'_>,
+    ) {
+        let mut hint = 0;
+        for pair in pairs.filter(|pair| pair.force_W != Vector3::zeros()) {
+            hint = self.press(&pair, hint, dt_s, teller);
+        }
+        let now = teller.now.run_tick;
+        self.touching.retain_mut(|pair| {
+            if pair.pressed == now {
+                return true;
+            }
+            pair.quiet_s = if rests(pair.entities) { 0.0 } else { pair.quiet_s + dt_s };
+            let stays = pair.quiet_s < QUIET_S;
+            if !stays {
+                pair.tell(Change::Ends, teller);
+            }
+            stays
+        });
+    }
+
+    /// Says where the next one is likely to be.
+    fn press(&mut self, pair: &PairForce, hint: usize, dt_s: f64, teller: &mut Teller<'_>) -> usize {
+        let PairForce { entities, force_W } = *pair;
+        let found = match self.touching.get(hint) {
+            Some(next) if next.entities == entities => Ok(hint),
+            _ => self.touching.binary_search_by_key(&entities, |pair| pair.entities),
+        };
+        let now = teller.now.run_tick;
+        match found {
+            Ok(at) => {
+                let since_s = teller.time_s(now.saturating_sub(self.touching[at].pressed));
+                let known = &mut self.touching[at];
+                known.life.go_on(&force_W, dt_s, since_s);
+                (known.pressed, known.quiet_s) = (now, 0.0);
+                at + 1
+            }
+            Err(at) if self.touching.len() < self.most => {
+                let mut begun = Pair { entities, life: Life::default(), pressed: now, quiet_s: 0.0 };
+                begun.life.go_on(&force_W, dt_s, dt_s);
+                begun.tell(Change::Begins, teller);
+                self.touching.insert(at, begun);
+                at + 1
+            }
+            Err(at) => at,
+        }
+    }
+}
+
+impl Pair {
+    fn tell(&self, change: Change, teller: &mut Teller<'_>) {
+        teller.tell(Kind::PairTouch { entities: self.entities, change, life: self.life });
+    }
+}

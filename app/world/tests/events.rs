@@ -1,0 +1,193 @@
+//! The bus and the watch against closed cases.
+
+#![allow(non_snake_case)] // Frames are capital letters.
+
+use nalgebra::Vector3;
+use std::sync::{Arc, Mutex};
+use world::events::{
+    Change, Class, Event, EventReceiver, EventSender, Filter, Hub, Kind, MOST_TOLD, PairForce, Touching,
+    Watch, event_queue,
+};
+
+const PERIOD_S: f64 = 0.001;
+
+fn touching(entity: u32, force_n: f64, slips: bool) -> Touching {
+    let force_on_user_W = Vector3::new(0.0, force_n, 0.0);
+    Touching { entity, force_on_user_W, slips, is_body: entity > 0 }
+}
+
+fn all(events: &mut EventReceiver) -> Vec<Event> {
+    std::iter::from_fn(|| events.receive(u64::MAX)).collect()
+}
+
+fn words(events: &[Event]) -> Vec<String> {
+    events.iter().map(|event| format!("{} {}", event.run_tick, event.kind.facts().word)).collect()
+}
+
+/// One finger, looked at as if it touched these in consecutive ticks.
+fn felt(ticks: &[&[Touching]]) -> Vec<Event> {
+    let (mut out, mut events) = event_queue(1024);
+    let mut watch = Watch::new(1, 0, PERIOD_S);
+    for (run_tick, touching) in (0..).zip(ticks) {
+        watch.begin(run_tick);
+        watch.finger(0, touching, 0, None, &mut out);
+        watch.grasps(&mut out);
+    }
+    all(&mut events)
+}
+
+#[test]
+fn contacts_and_slips_begin_and_end_in_order() {
+    let (on, slips, other) = ([touching(0, 2.0, false)], [touching(0, 2.0, true)], [touching(1, 2.0, true)]);
+    let told = felt(&[&[], &on, &slips, &on, &slips, &other, &[]]);
+    assert_eq!(
+        words(&told),
+        [
+            "1 contact-begin",
+            "2 slip-begin",
+            "3 slip-end",
+            "4 slip-begin",
+            "5 contact-end",
+            "5 contact-begin",
+            "5 slip-begin",
+            "6 contact-end",
+        ]
+    );
+}
+
+#[test]
+fn a_contact_s_impulse_is_the_sum_of_its_forces_times_the_tick() {
+    let forces_n = [0.5, 1.25, 3.0, 0.125];
+    let ticks: Vec<[Touching; 1]> = forces_n.iter().map(|force_n| [touching(0, *force_n, false)]).collect();
+    let ticks: Vec<&[Touching]> = ticks.iter().map(|tick| &tick[..]).chain([&[][..]]).collect();
+    let told = felt(&ticks);
+    let life = told[1].kind.facts().life.expect("a contact's life");
+    // Four sums and products of numbers near 1e-3: each rounds by less than 1e-18.
+    assert!((life.impulse_W.y - 4.875e-3).abs() < 1e-17, "{life:?}");
+    assert_eq!((life.peak_n, life.force_n, life.lasted_s), (3.0, 0.125, 4.0 * PERIOD_S));
+}
+
+/// What is told of a pair that presses with these forces (N) in consecutive ticks; asleep where there is none at all.
+fn pressed(forces_n: &[Option<f64>]) -> Vec<Event> {
+    let (mut out, mut events) = event_queue(1024);
+    let mut watch = Watch::new(0, 4, PERIOD_S);
+    for (run_tick, force_n) in (0..).zip(forces_n) {
+        let pair = force_n.map(|force_n| PairForce { entities: [2, 0], force_W: Vector3::y() * force_n });
+        watch.begin(run_tick);
+        watch.pairs(pair.into_iter(), PERIOD_S, |_| force_n.is_none(), &mut out);
+    }
+    all(&mut events)
+}
+
+#[test]
+fn a_pair_that_is_apart_for_less_than_five_milliseconds_still_touches() {
+    let chatter: Vec<_> = (0..40).map(|tick| Some(if tick % 5 == 0 { 2.0 } else { 0.0 })).collect();
+    assert_eq!(words(&pressed(&chatter)), ["0 pair-begin"]);
+    let apart = [Some(2.0), Some(2.0), Some(0.0), Some(0.0), Some(0.0), Some(0.0), Some(0.0), Some(2.0)];
+    let told = pressed(&apart);
+    assert_eq!(words(&told), ["0 pair-begin", "6 pair-end", "7 pair-begin"]);
+    let life = told[1].kind.facts().life.expect("a contact's life");
+    assert_eq!((life.impulse_W.y, life.lasted_s), (2.0 * PERIOD_S + 2.0 * PERIOD_S, 2.0 * PERIOD_S));
+}
+
+#[test]
+fn a_pair_that_sleeps_still_touches() {
+    let asleep: Vec<_> = [Some(2.0)].into_iter().chain([None; 50]).chain([Some(2.0)]).collect();
+    assert_eq!(words(&pressed(&asleep)), ["0 pair-begin"]);
+}
+
+#[test]
+fn two_fingers_grasp_one_does_not_and_a_tie_does() {
+    let (mut out, mut events) = event_queue(1024);
+    let mut watch = Watch::new(2, 0, PERIOD_S);
+    let (none, some) = ([].as_slice(), [touching(3, 1.0, false)]);
+    for run_tick in 0..40 {
+        watch.begin(run_tick);
+        watch.finger(0, if (2..30).contains(&run_tick) { &some } else { none }, 0, None, &mut out);
+        let tied = (20..25).contains(&run_tick).then_some(3);
+        watch.finger(1, if (5..10).contains(&run_tick) { &some } else { none }, 0, tied, &mut out);
+        watch.grasps(&mut out);
+    }
+    let grasps: Vec<_> =
+        all(&mut events).into_iter().filter(|event| event.kind.class() == Class::Grasp).collect();
+    assert_eq!(words(&grasps), ["5 grasp", "14 release", "20 grasp", "29 release"]);
+    assert_eq!(grasps[0].kind, Kind::Grasp { entity: 3, fingers: 0b11 });
+    assert_eq!(grasps[1].kind, Kind::Release { entity: 3, lasted_s: 5.0 * PERIOD_S });
+}
+
+#[test]
+fn a_full_queue_counts_and_tells_what_it_lost() {
+    let (mut out, mut events) = event_queue(4);
+    let key = |run_tick| Event { run_tick, kind: Kind::Key { code: 1, is_pressed: true } };
+    let sent: Vec<bool> = (0..10).map(|tick| out.send(key(tick))).collect();
+    assert_eq!(sent.iter().filter(|sent| **sent).count(), 4);
+    assert_eq!((events.lost(), words(&all(&mut events)).len()), (6, 4));
+    assert!(out.send(key(10)));
+    let told = all(&mut events);
+    assert_eq!(told, [Event { run_tick: 10, kind: Kind::Lost { count: 6 } }, key(10)]);
+}
+
+#[test]
+fn a_tick_sends_no_more_than_it_may_and_the_rest_is_counted() {
+    let (mut out, mut events) = event_queue(4 * MOST_TOLD);
+    let mut watch = Watch::new(0, 0, PERIOD_S);
+    watch.begin(7);
+    for number in 0..MOST_TOLD as u32 + 3 {
+        watch.tell(Kind::Trial { change: Change::Begins, number }, &mut out);
+    }
+    assert_eq!((all(&mut events).len(), events.lost()), (MOST_TOLD, 3));
+}
+
+fn send_some(out: &mut EventSender) {
+    let life = Default::default();
+    let touch = |finger, entity, change| Kind::FingerTouch { finger, entity, change, life };
+    let kinds = [
+        touch(0, 1, Change::Begins),
+        touch(1, 1, Change::Slips),
+        Kind::PairTouch { entities: [1, 2], change: Change::Begins, life },
+        Kind::Grasp { entity: 1, fingers: 0b10 },
+        Kind::Reset,
+    ];
+    for (run_tick, kind) in (0..).zip(kinds) {
+        out.send(Event { run_tick, kind });
+    }
+}
+
+#[test]
+fn a_subscriber_gets_what_its_filter_lets_through() {
+    let names: Vec<String> = ["table", "cube", "ball"].map(Into::into).into();
+    let named = |name| Filter::ALL.entity_named(name, &names);
+    assert_eq!(named("cone"), None);
+    let cases = [
+        (Filter::ALL, vec![0, 1, 2, 3, 4]),
+        (Filter::of(&[Class::Slip, Class::Reset]), vec![1, 4]),
+        (Filter::ALL.finger(1), vec![1, 3]),
+        (named("ball").expect("an entity"), vec![2]),
+        (Filter::of(&[Class::Contact]).entity(1), vec![0]),
+    ];
+    for (filter, expected) in cases {
+        let (mut out, events) = event_queue(64);
+        let mut hub = Hub::new(vec![events]);
+        let seen = Arc::new(Mutex::new(Vec::new()));
+        let sink = seen.clone();
+        hub.subscribe(filter, Box::new(move |event: &Event| sink.lock().unwrap().push(event.run_tick)));
+        let mut own = hub.subscribe_queue(filter, 64);
+        send_some(&mut out);
+        hub.deliver(u64::MAX);
+        assert_eq!(*seen.lock().unwrap(), expected, "{filter:?}");
+        let queued: Vec<u64> = all(&mut own).iter().map(|event| event.run_tick).collect();
+        assert_eq!(queued, expected, "{filter:?}");
+    }
+}
+
+#[test]
+fn events_of_later_ticks_wait() {
+    let (mut out, events) = event_queue(64);
+    let mut hub = Hub::new(vec![events]);
+    let mut own = hub.subscribe_queue(Filter::ALL, 64);
+    send_some(&mut out);
+    hub.deliver(2);
+    assert_eq!(all(&mut own).len(), 3);
+    hub.deliver(3);
+    assert_eq!(all(&mut own).len(), 1);
+}
