@@ -5,6 +5,7 @@
 
 use crate::calibrate::{self, CalibrateArgs, default_layout};
 use crate::check::{self, CheckArgs};
+use crate::control::desk::OrderSource;
 use crate::convert::{self, ConvertArgs};
 use crate::demo;
 use crate::export::{self, ExportArgs};
@@ -125,6 +126,10 @@ struct RunArgs {
     /// Seed of everything random: with --hand-mode impedance the hand's tremor and the sensors' noise
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse_seed, allow_negative_numbers = true)]
     seed: u64,
+    /// What changes while it runs: a script of lines such as `at 2.5 reset`, or `-` for orders on the standard input, without
+    /// `at`: reset; stiffness 1.1 [of ENTITY]; damping 0.9 [of ENTITY]; move ENTITY to X Y Z in S; swap SCENE
+    #[arg(long, value_name = "FILE")]
+    orders: Option<PathBuf>,
     /// Where the devices stand in the world (TOML) [with --attach: what `calibrate --write` wrote, if it is there]
     #[arg(long, value_name = "FILE")]
     layout: Option<PathBuf>,
@@ -353,8 +358,24 @@ fn make_plan(args: &RunArgs, rig: &Rig) -> Result<RunPlan, RunFailure> {
         record: args.record.clone(),
         events: args.events.clone(),
         seed: args.seed,
+        orders: order_source(args)?,
         attach,
     })
+}
+
+fn order_source(args: &RunArgs) -> Result<Option<OrderSource>, RunFailure> {
+    let Some(file) = &args.orders else { return Ok(None) };
+    if file.as_os_str() != "-" {
+        return Ok(Some(OrderSource::File(file.clone())));
+    }
+    if args.clock == Some(Clock::Virtual) {
+        return Err(RunFailure::Start(
+            "--orders - and --clock virtual exclude each other: that clock waits for nobody; name a script, or use \
+             --clock real"
+                .into(),
+        ));
+    }
+    Ok(Some(OrderSource::Input))
 }
 
 fn refuse_to_overwrite_input(args: &RunArgs, rig: &Rig) -> Result<(), RunFailure> {
@@ -367,6 +388,7 @@ fn refuse_to_overwrite_input(args: &RunArgs, rig: &Rig) -> Result<(), RunFailure
         args.layout.as_ref(),
         args.hand_model.as_ref(),
         args.device.as_ref(),
+        args.orders.as_ref(),
     ];
     let inputs: Vec<&PathBuf> = inputs.into_iter().flatten().chain(rig.model_files()).collect();
     let written: Vec<(&str, &PathBuf)> = args

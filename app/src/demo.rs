@@ -97,7 +97,7 @@ pub fn plan(rig: &Rig, socket: PathBuf, directory: Option<&Path>) -> RunPlan {
         }
     };
     let record = vec![recording_place(directory)];
-    RunPlan { clock: None, seconds: Some(SECONDS), record, events: Vec::new(), seed: 0, attach }
+    RunPlan { clock: None, seconds: Some(SECONDS), record, events: Vec::new(), seed: 0, orders: None, attach }
 }
 
 /// In the directory that is set, or here, if one may write there, else among the temporary files.

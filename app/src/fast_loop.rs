@@ -5,6 +5,8 @@
 //! except where the clock itself waits (virtual, lockstep).
 //! Cost: bounded; no allocation, no system call but the wake-up of a sleeping driver.
 
+use crate::control::queue::OrderReceiver;
+use crate::control::{Control, World};
 use crate::fast_step::{EventTeller, FastStep};
 use crate::row::{BodyRow, Row};
 use crate::row_queue::RowSender;
@@ -40,6 +42,12 @@ pub enum Turn {
 /// The fast thread's state.
 pub struct FastLoop {
     step: FastStep,
+    /// What people change meanwhile, if anybody may.
+    control: Option<Control>,
+    /// Whether the bodies are still those that recordings know.
+    tells_bodies: bool,
+    /// And whether the entities are those that events name.
+    tells_events: bool,
     /// Tells others what happens, if anybody wants to know.
     teller: Option<EventTeller>,
     rows: RowSender,
@@ -114,6 +122,9 @@ impl FastLoop {
         Self {
             pending_bodies: (0..).zip(step.bodies().iter().copied()).collect(),
             step,
+            control: None,
+            tells_bodies: true,
+            tells_events: true,
             teller: None,
             rows,
             when_full,
@@ -129,6 +140,18 @@ impl FastLoop {
             row: Row::empty(),
             tally: Tally::default(),
         }
+    }
+
+    /// With orders that come while it runs.
+    #[must_use]
+    pub fn with_control(mut self, orders: OrderReceiver) -> Self {
+        self.control = Some(Control::new(orders, self.step.entities().len()));
+        self
+    }
+
+    /// How many orders were taken.
+    pub fn orders_taken(&self) -> u64 {
+        self.control.as_ref().map_or(0, Control::taken)
     }
 
     /// With a queue for what happens.
@@ -180,10 +203,30 @@ impl FastLoop {
 
     fn answer(&mut self, commander: &CommanderMemory, driver: &DriverView) {
         self.command = Command::zero(self.frame.tick, commander.lease(), self.frame.device_count);
+        self.take_orders();
         self.step.meet_driver(driver.abi_minor(), driver.ramp_in_ticks());
         self.step.step(&self.frame, &mut self.command, &mut self.row);
         commander.publish(&self.command, driver);
         self.tally.answered += 1;
+    }
+
+    /// Not before t = 0: until then a scene is what it says.
+    fn take_orders(&mut self) {
+        let run_tick = self.run_ticks();
+        let Some(control) = self.control.as_mut().filter(|_| self.frame.run_tick >= 0) else { return };
+        let became = control.turn(&mut self.step, run_tick, self.period_ns as f64 / 1e9);
+        if became == World::Same {
+            return;
+        }
+        self.row = Row::empty();
+        self.pending_bodies.clear();
+        self.tells_bodies &= became == World::Reset;
+        // Whom another scene's numbers mean, nobody was told. Not dropped: nothing is freed here.
+        self.tells_events &= became == World::Reset;
+        if self.tells_bodies {
+            // Room for all of them was made when the run began.
+            self.pending_bodies.extend((0..).zip(self.step.bodies().iter().copied()));
+        }
     }
 
     fn keep_row(&mut self) {
@@ -197,7 +240,7 @@ impl FastLoop {
         self.next_tick = self.row.run_tick + 1;
         if self.row.run_tick < self.total_ticks {
             // Before the row is sent, and after the command was.
-            if let Some(teller) = &mut self.teller {
+            if let Some(teller) = self.teller.as_mut().filter(|_| self.tells_events) {
                 teller.tell(&self.step, &self.row);
             }
             self.pending = Some((self.frame.tick, self.row));
@@ -209,6 +252,9 @@ impl FastLoop {
     }
 
     fn keep_bodies(&mut self) {
+        if !self.tells_bodies {
+            return;
+        }
         let (pending, bodies) = (&mut self.pending_bodies, self.step.bodies());
         for &number in self.step.changed_bodies() {
             let body = bodies[number as usize];

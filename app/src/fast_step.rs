@@ -26,8 +26,8 @@ use crate::passive_port::{Tick, keep_passive};
 use crate::row::{BodyRow, FingerRow, Row};
 use crate::slow_thread::SlowRemains;
 use haptics::passivity::Passivity;
-use haptics::{Effects, Entity, Field, Finger, FingerEffects, Guide, Hip, Moment, RAMP_IN_S};
-use nalgebra::Vector3;
+use haptics::{Effects, Entity, Felt, Field, Finger, FingerEffects, Guide, Hip, Moment, RAMP_IN_S};
+use nalgebra::{Isometry3, Vector3};
 use near::Near;
 use physics::{Body, BodyError, BroadPhase, Manipulation};
 use shm_abi::MAX_DEVICES;
@@ -67,6 +67,8 @@ pub struct FastStep {
     carried_W: Vec<Vector3<f64>>,
     /// What keeps each finger passive, if anything does.
     passivities: Vec<Option<Passivity>>,
+    /// How much of the forces is felt, 0 to 1.
+    strength: f64,
 }
 
 /// The first minor version of the shared-memory contract whose frames tell velocities.
@@ -94,6 +96,7 @@ impl FastStep {
             tips_D,
             carried_W,
             passivities,
+            strength: 1.0,
         }
         .with_effects(Vec::new(), Vec::new())
     }
@@ -195,6 +198,41 @@ impl FastStep {
         }
     }
 
+    /// How much of the forces is felt from the next tick on, 0 to 1; objects get all of them.
+    pub fn set_strength(&mut self, strength: f64) {
+        self.strength = strength;
+    }
+
+    /// In the next tick this entity goes to this pose; `false`: it is a body, or nothing here moves it.
+    pub fn drive(&mut self, entity: usize, to_W: Isometry3<f64>) -> bool {
+        self.objects.drive(entity, to_W)
+    }
+
+    /// Whether [`Self::drive`] moves an entity, when not too many are driven at once.
+    pub fn can_drive(&self, entity: usize) -> bool {
+        self.objects.can_drive(entity)
+    }
+
+    /// How many times the stiffness and damping of an entity fingers feel.
+    pub fn felt(&self, entity: usize) -> Option<[f64; 2]> {
+        self.entities.get(entity).map(|entity| [entity.felt.stiffness, entity.felt.damping])
+    }
+
+    /// Changes that, from the next tick on.
+    pub fn set_felt(&mut self, entity: usize, [stiffness, damping]: [f64; 2]) {
+        if let Some(entity) = self.entities.get_mut(entity) {
+            entity.felt = Felt { stiffness, damping };
+        }
+    }
+
+    /// How much the contacts of a finger pressed in the last tick, all together (N); of the finger for which that is most.
+    pub fn touch_load_n(&self) -> f64 {
+        let of_finger = |finger: &DeviceFinger| -> f64 {
+            finger.finger.contacts().map(|contact| contact.force_on_user_W.norm()).sum()
+        };
+        self.fingers.iter().map(of_finger).fold(0.0, f64::max)
+    }
+
     /// Renders a frame into the command that answers it, and into a row.
     pub fn step(&mut self, frame: &Frame, command: &mut Command, row: &mut Row) {
         // Ticks that the driver skipped, or that were missed here, are time that passed all the same.
@@ -242,8 +280,8 @@ impl FastStep {
             self.fingers.iter().zip(&mut row.fingers).zip(states)
         {
             let Some(device) = devices.get(finger.device) else { continue };
-            row.force_on_user = finite_or_zero(row.force_on_user);
-            row.torque_on_user = finite_or_zero(row.torque_on_user);
+            row.force_on_user = finite_or_zero(row.force_on_user * self.strength);
+            row.torque_on_user = finite_or_zero(row.torque_on_user * self.strength);
             if let Some(passivity) = passivity {
                 keep_passive(passivity, finger, felt, device, *carried_W, &tick, row);
             }
@@ -401,7 +439,7 @@ mod damped {
     use super::*;
     use bytemuck::Zeroable;
     use haptics::Plane;
-    use nalgebra::{Isometry3, UnitQuaternion};
+    use nalgebra::UnitQuaternion;
 
     const PERIOD_NS: u64 = 1_000_000;
     const K: f64 = 1000.0;
@@ -485,7 +523,7 @@ mod passive {
     use bytemuck::Zeroable;
     use haptics::Plane;
     use haptics::passivity::PassivitySpec;
-    use nalgebra::{Isometry3, UnitQuaternion};
+    use nalgebra::UnitQuaternion;
 
     const PERIOD_NS: u64 = 1_000_000;
     const K: f64 = 1000.0;
@@ -575,7 +613,6 @@ mod carried {
     use super::*;
     use bytemuck::Zeroable;
     use haptics::{Friction, Plane, Shape};
-    use nalgebra::Isometry3;
     use std::path::Path;
 
     const PERIOD_NS: u64 = 1_000_000;

@@ -16,6 +16,7 @@ pub mod check;
 pub mod child;
 pub mod cli;
 pub mod columns;
+pub mod control;
 pub mod convert;
 pub mod demo;
 pub mod export;

@@ -148,6 +148,18 @@ impl Rig {
         Self { period_ns, ..self }
     }
 
+    /// Another scene for the same devices, where they are and as they are moved.
+    ///
+    /// # Errors
+    /// The first thing that is wrong with it.
+    pub fn beside(&self, scene_file: &Path) -> Result<Self, RigError> {
+        let scene = Scene { hand: None, ..Scene::load(scene_file)? };
+        let rig =
+            Self::new(scene_file, scene, self.layout.clone(), None, HandMode::Kinematic, self.period_ns)?;
+        let (bases, hand_mode, hand) = (self.bases.clone(), self.hand_mode.clone(), self.hand.clone());
+        Ok(Self { bases, hand_mode, hand, ..rig })
+    }
+
     /// Where a device stands, X_WD.
     pub fn base_in_world(&self, device: usize) -> Isometry3<f64> {
         self.bases.get(device).copied().unwrap_or_else(Isometry3::identity)

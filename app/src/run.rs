@@ -1,6 +1,8 @@
 //! A scripted run from start to report.
 
 use crate::child::DriverChild;
+use crate::control;
+use crate::control::desk::{Desk, OrderSource};
 use crate::fast_loop::{FastLoop, Tally, WhenFull};
 use crate::not_zeroed;
 use crate::outcome::{RunFailure, Stop};
@@ -38,6 +40,8 @@ pub struct RunPlan {
     pub events: Vec<PathBuf>,
     /// Seed of everything random, to be told in recordings.
     pub seed: u64,
+    /// What is to change while it runs.
+    pub orders: Option<OrderSource>,
     /// Use the driver that listens here, and its devices, instead of a child with the rig's.
     pub attach: Option<Attach>,
 }
@@ -88,6 +92,12 @@ impl Parts {
         }
         let when_full = if clock == ClockMode::Real { WhenFull::Drop } else { WhenFull::Wait };
         let step = rig.fast_step().map_err(|error| RunFailure::Start(error.to_string()))?;
+        if plan.orders.is_some() && step.handed().is_some() {
+            return Err(RunFailure::Start(control::NEEDS_ONE_LIST.into()));
+        }
+        let is_recorded = !plan.record.is_empty();
+        let open = |source| Desk::open(rig, source, is_recorded).map_err(RunFailure::Start);
+        let (desk, orders) = plan.orders.as_ref().map(open).transpose()?.unzip();
         let (producer, consumer) = row_queue(step.bodies().len());
         let view = View::new(&rig.scene, step.entities());
         let record = |path: &PathBuf| {
@@ -101,9 +111,13 @@ impl Parts {
         let all = plan.record.iter().map(record).chain(plan.events.iter().map(record_events));
         let recorders = all.collect::<Result<_, _>>()?;
         let (events, event_ends) = event_queue(EVENT_QUEUE);
+        let fast = FastLoop::new(step, producer, when_full, total_ticks, period_ns).with_events(events);
         Ok(Self {
-            fast: FastLoop::new(step, producer, when_full, total_ticks, period_ns).with_events(events),
-            slow: SlowSide::new(consumer, Hub::new(vec![event_ends]), recorders),
+            fast: match orders {
+                Some(orders) => fast.with_control(orders),
+                None => fast,
+            },
+            slow: SlowSide::new(consumer, Hub::new(vec![event_ends]), recorders).with_desk(desk),
             progress: Progress::new(total_ticks, period_ns),
         })
     }

@@ -1,5 +1,6 @@
 //! The slow thread's turn: take what the fast thread left and hand it to the recorders and to those who want events.
 
+use crate::control::desk::Desk;
 use crate::record::{Recorded, Recorder};
 use crate::row::Row;
 use crate::row_queue::RowReceiver;
@@ -10,6 +11,8 @@ use world::events::{Class, Filter, Hub};
 pub struct SlowSide {
     rows: RowReceiver,
     recorders: Vec<Recorder>,
+    /// Who takes orders, if anybody gives them.
+    desk: Option<Desk>,
     /// Who else wants to know what happens.
     pub events: Hub,
     /// The newest row, for whoever wants to look.
@@ -21,11 +24,18 @@ impl SlowSide {
     pub fn new(rows: RowReceiver, events: Hub, recorders: Vec<Recorder>) -> Self {
         let (mut recorders, mut events) = (recorders, events);
         subscribe(&mut recorders, &mut events);
-        Self { rows, recorders, events, newest: None }
+        Self { rows, recorders, desk: None, events, newest: None }
+    }
+
+    /// With somebody who takes orders.
+    #[must_use]
+    pub fn with_desk(self, desk: Option<Desk>) -> Self {
+        Self { desk, ..self }
     }
 
     /// Takes everything that is there. A recording that cannot be written tells so itself, and the run goes on.
     pub fn step(&mut self) {
+        self.desk.iter_mut().for_each(Desk::step);
         for _ in 0..self.rows.waiting() {
             let Some((row, bodies)) = self.rows.receive() else { break };
             // A tick's events are there before its row is.

@@ -82,8 +82,17 @@ fn help_names_everything_that_can_be_asked() {
     );
     let options =
         ["<SCENE>", "--hand ", "--hand-mode", "kinematic", "impedance", "--clock", "virtual", "lockstep"];
-    let more =
-        ["--headless", "--record", "--seconds", "--rate-hz", "--seed", "--layout", "--attach", "--grace"];
+    let more = [
+        "--headless",
+        "--record",
+        "--seconds",
+        "--rate-hz",
+        "--seed",
+        "--layout",
+        "--attach",
+        "--grace",
+        "--orders",
+    ];
     shown(&["run", "--help"], &[&options[..], &more[..]].concat());
     shown(&["run", "-h"], &["--record", "[default: 1000]"]);
     shown(&["driver", "--help"], &["run", "status", "stop", "clear-fault"]);

@@ -202,7 +202,8 @@ impl Slot {
         let previous_B = sweep.previous_hip_W.map(|p_W| point_into_body(&entity.previous_X_WB, &p_W));
         let previous_B = previous_B.filter(is_finite);
         // Nobody else looks at it.
-        let is_asked_for = entity.damping_n_s_per_m != 0.0 || entity.algorithm != Algorithm::FrictionCone;
+        let is_asked_for =
+            entity.felt_damping_n_s_per_m() != 0.0 || entity.algorithm != Algorithm::FrictionCone;
         let cone = ConeInput {
             hip_B,
             hip_velocity_B: if is_asked_for {
@@ -210,8 +211,8 @@ impl Slot {
             } else {
                 Vector3::zeros()
             },
-            stiffness_n_per_m: entity.stiffness_n_per_m,
-            damping_n_s_per_m: entity.damping_n_s_per_m,
+            stiffness_n_per_m: entity.felt_stiffness_n_per_m(),
+            damping_n_s_per_m: entity.felt_damping_n_s_per_m(),
             dt_s: sweep.dt_s,
         };
         let lift_m = match &entity.height_map {
@@ -385,7 +386,7 @@ impl Slot {
         if let Some(height_map) = &entity.height_map {
             let over = Over {
                 shape: &entity.shape,
-                stiffness_n_per_m: entity.stiffness_n_per_m,
+                stiffness_n_per_m: entity.felt_stiffness_n_per_m(),
                 finger_radius_m: sweep.finger_radius_m,
                 hip_B: point_into_body(&entity.X_WB, &sweep.hip.position_W),
             };

@@ -15,6 +15,21 @@ use crate::shape::Shape;
 use crate::shared::Shared;
 use crate::tessellated::tessellated;
 
+/// How many times the stiffness and the damping of an entity fingers feel: what the keys of a running application change.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Felt {
+    /// Of the stiffness, > 0.
+    pub stiffness: f64,
+    /// Of the damping, >= 0.
+    pub damping: f64,
+}
+
+impl Default for Felt {
+    fn default() -> Self {
+        Self { stiffness: 1.0, damping: 1.0 }
+    }
+}
+
 /// An object that fingers can touch.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entity {
@@ -29,6 +44,8 @@ pub struct Entity {
     pub stiffness_n_per_m: f64,
     /// b \[N s/m\], >= 0.
     pub damping_n_s_per_m: f64,
+    /// What fingers feel of both; objects that meet it know nothing of this.
+    pub felt: Felt,
     /// Friction of its surface.
     pub friction: Friction,
     /// How much of an approaching velocity it gives back to what bounces off it, 0 to 1; no finger feels it. `None`: nobody
@@ -67,6 +84,7 @@ impl Entity {
             previous_X_WB: X_WB,
             stiffness_n_per_m: above_zero("stiffness_n_per_m", stiffness_n_per_m)?,
             damping_n_s_per_m: 0.0,
+            felt: Felt::default(),
             friction: Friction::None,
             restitution: None,
             algorithm: Algorithm::FrictionCone,
@@ -141,6 +159,18 @@ impl Entity {
             self.for_balls = mesh.map(|(mesh, _)| Shape::from(Arc::new(mesh)));
         }
         self
+    }
+
+    /// With which a finger that touches it is pushed out \[N/m\].
+    #[inline]
+    pub fn felt_stiffness_n_per_m(&self) -> f64 {
+        self.stiffness_n_per_m * self.felt.stiffness
+    }
+
+    /// With which a finger that touches it is damped \[N s/m\].
+    #[inline]
+    pub fn felt_damping_n_s_per_m(&self) -> f64 {
+        self.damping_n_s_per_m * self.felt.damping
     }
 
     /// The shape that a finger of this radius feels.

@@ -89,7 +89,7 @@ pub use effects::{
     Magnetism, Moment, Reaction, Region, Track, Vibration,
 };
 pub use ellipsoid::{Ellipsoid, LARGEST_RATIO};
-pub use entity::Entity;
+pub use entity::{Entity, Felt};
 pub use error::ParameterError;
 pub use finger::{ContactState, Finger, FingerOutput};
 pub use friction::{

@@ -148,7 +148,7 @@ impl Hand {
             finger.turn_W = finger.gimbal.turn_W(orientation);
             finger.pads.iter_mut().for_each(|pad| pad.row = None);
         }
-        for place in 0..start.bodies.len() {
+        for place in 0..start.roster.awake().len() {
             self.grasp(start, place, rows);
         }
         for finger in &mut self.fingers {

@@ -62,7 +62,7 @@ pub use grasp::{Grasp, GraspContact, GraspQuality};
 pub use grasp_axis::GraspAxis;
 pub use hand::{FingerSettings, FingerTick};
 pub use integrator::Integrator;
-pub use manipulation::{Made, Manipulation, Parcel, Parked, Reason};
+pub use manipulation::{MAX_DRIVEN, Made, Manipulation, Parcel, Parked, Reason};
 pub use mass::MassProperties;
 pub use pair::{Response, Surfacing};
 pub use pair_friction::PairFriction;

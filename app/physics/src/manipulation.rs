@@ -1,11 +1,14 @@
 //! One tick of all bodies: contact points, forces, residual force and torque, motion.
 
+mod driven;
 mod hand_over;
 mod pressing;
 mod rest;
 
+pub use driven::MAX_DRIVEN;
 pub use hand_over::Parcel;
 
+use driven::Driven;
 use haptics::Entity;
 use nalgebra::Vector3;
 
@@ -62,6 +65,8 @@ pub struct Manipulation {
     arriving: Option<usize>,
     /// Room to list bodies that are near something.
     neighbours: Vec<u32>,
+    /// Entities that somebody moves.
+    driven: Vec<Driven>,
     /// Whether bodies that somebody else steps are not there.
     ignores_elsewhere: bool,
     /// Bodies that are not as they were, each once.
@@ -135,6 +140,7 @@ impl Manipulation {
 
     fn of(entities: &[Entity], bodies: &[(usize, Body)], settings: Settings) -> Self {
         let count = bodies.len();
+        let places = count + MAX_DRIVEN;
         let pairs = count.saturating_mul(entities.len()).min(MAX_PAIRS.max(PAIRS_OF_BODY * count));
         let rows = MAX_ROWS.max(ROWS_OF_BODY * count);
         let room = (pairs * MAX_POINTS).min(rows) + MAX_TOUCHES + MAX_PULLS;
@@ -143,25 +149,26 @@ impl Manipulation {
             roster: Roster::new(entities.len(), bodies),
             broad_phase: BroadPhase::new(entities),
             pairs: Pairs::with_capacity(pairs),
-            bodies: Vec::with_capacity(count),
-            entities: Vec::with_capacity(count),
+            bodies: Vec::with_capacity(places),
+            entities: Vec::with_capacity(places),
             rows: Vec::with_capacity(room),
-            motions: Vec::with_capacity(count),
-            speeds_m_s: Vec::with_capacity(count),
-            spare_j: Vec::with_capacity(count),
-            solver: Solver::with_capacity(room, count),
+            motions: Vec::with_capacity(places),
+            speeds_m_s: Vec::with_capacity(places),
+            spare_j: Vec::with_capacity(places),
+            solver: Solver::with_capacity(room, places),
             hand: Hand::new(&[], count),
-            restitution: Restitution::with_capacity(room, count),
+            restitution: Restitution::with_capacity(room, places),
             sets: Sets::with_capacity(count),
             touching: 0,
             pressing: 0,
-            gets: Vec::with_capacity(count),
-            stages: Stages::with_capacity(room, count),
+            gets: Vec::with_capacity(places),
+            stages: Stages::with_capacity(room, places),
             fixed: Vec::with_capacity(room),
             parked: Vec::with_capacity(count),
             ticks: 0,
             arriving: None,
             neighbours: Vec::with_capacity(count),
+            driven: Vec::with_capacity(MAX_DRIVEN),
             ignores_elsewhere: false,
             changed: Vec::with_capacity(count),
             has_changed: vec![false; count].into(),
@@ -180,10 +187,11 @@ impl Manipulation {
         let bodies = self.roster.bodies.len();
         self.hand = Hand::new(fingers, bodies);
         let room = self.rows.capacity() + self.hand.most_rows();
+        let places = bodies + MAX_DRIVEN;
         self.rows = Vec::with_capacity(room);
-        self.solver = Solver::with_capacity(room, bodies);
-        self.stages = Stages::with_capacity(room, bodies);
-        self.restitution = Restitution::with_capacity(room, bodies);
+        self.solver = Solver::with_capacity(room, places);
+        self.stages = Stages::with_capacity(room, places);
+        self.restitution = Restitution::with_capacity(room, places);
         self.fixed = Vec::with_capacity(room);
         self
     }
@@ -325,10 +333,12 @@ impl Manipulation {
         for pull in pulls.iter() {
             self.wake_entity(pull.entity, entities);
         }
+        self.wake_near_driven(entities);
         self.line_up(entities, dt_s);
         if self.wake_what_is_met(entities, dt_s) {
             self.line_up(entities, dt_s);
         }
+        self.line_up_driven(entities, dt_s);
         let (touch_rows, pull_rows) = self.gather(entities, touches, pulls, fingers, dt_s);
         let Solved { sweeps, residual, unsolved } = self.find_forces(dt_s);
         for (touch, row) in touches.iter_mut().zip(touch_rows) {
@@ -348,6 +358,7 @@ impl Manipulation {
         self.settle_pairs(entities, dt_s);
         self.sum_up();
         let (awake, parked) = (self.roster.awake().len(), self.advance(entities, dt_s));
+        self.advance_driven(entities);
         self.keep_up(entities, dt_s);
         self.rest(entities, touches, dt_s);
         Made { rows: self.rows.len(), sweeps, residual, unsolved, parked, awake }
@@ -413,6 +424,7 @@ impl Manipulation {
         for at in 0..self.pairs.awake_count() {
             let (key, _) = self.pairs.awake_at(at);
             let other = self.roster.place_of_entity(key.entity as usize);
+            let other = other.or_else(|| self.place_of_driven(key.entity as usize));
             if self.ignores_elsewhere && self.is_elsewhere(&key) {
                 self.pairs.awake_at(at).1.pass_by();
                 continue;

@@ -156,7 +156,7 @@ impl SoftFinger {
 
     /// The friction circle of a touch that presses with this force.
     pub(crate) fn circle(&self, entity: &Entity, normal_n: f64) -> Circle {
-        let stiffness_n_per_m = entity.stiffness_n_per_m;
+        let stiffness_n_per_m = entity.felt_stiffness_n_per_m();
         let load_m = normal_n.max(0.0) / stiffness_n_per_m;
         let radius_m = match entity.algorithm {
             Algorithm::FrictionCone => friction_circle_m(entity, load_m),

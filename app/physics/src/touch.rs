@@ -40,8 +40,8 @@ impl Touch {
         dt_s: f64,
     ) -> Row {
         let arm_W = self.point_W - centre_W;
-        let k = entity.stiffness_n_per_m;
-        let b = entity.damping_n_s_per_m;
+        let k = entity.felt_stiffness_n_per_m();
+        let b = entity.felt_damping_n_s_per_m();
         let held = if self.is_sticking { Held::Stick } else { Held::Slip };
         let n = -self.normal_W;
         let force_W = -self.force_on_user_W;
@@ -75,14 +75,14 @@ impl Touch {
         if !self.is_sticking {
             return is;
         }
-        let load_m = (normal_n / entity.stiffness_n_per_m).max(LEAST_LOAD_M);
+        let load_m = (normal_n / entity.felt_stiffness_n_per_m()).max(LEAST_LOAD_M);
         is.max(friction_circle_m(entity, load_m) / load_m)
     }
 }
 
 /// Radius of the circle within which an entity's friction holds a god-object that is pressed so deep (m).
 pub(crate) fn friction_circle_m(entity: &Entity, load_m: f64) -> f64 {
-    let stiffness_n_per_m = entity.stiffness_n_per_m;
+    let stiffness_n_per_m = entity.felt_stiffness_n_per_m();
     let query = FrictionQuery { load_m, stiffness_n_per_m, ..FrictionQuery::default() };
     let radius_m = entity.friction.held_limit_m(&query, &FrictionMemory::default());
     if radius_m.is_finite() { radius_m.max(0.0) } else { 0.0 }

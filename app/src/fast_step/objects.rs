@@ -8,7 +8,7 @@
 //! made up for at once: objects are late by what was missed.
 
 use haptics::{ContactState, Entity, FingerEffects};
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 use physics::{BroadPhase, FingerSettings, FingerTick, MAX_PULLS, Made, Manipulation, Pull, Touch};
 use world::lists::{FastList, Handed, Reach, SlowList};
 
@@ -132,6 +132,16 @@ impl Objects {
     pub fn handed(&self) -> Option<(usize, Handed)> {
         let lists = self.lists.as_ref()?;
         Some((lists.hand_over.here(), lists.hand_over.handed()))
+    }
+
+    /// In the next tick this entity goes to this pose; says whether it will.
+    pub fn drive(&mut self, entity: usize, to_W: Isometry3<f64>) -> bool {
+        self.can_drive(entity) && self.manipulation.drive(entity, to_W)
+    }
+
+    /// Whether it may be driven: bodies move by themselves, and of what is moved the slow list knows nothing.
+    pub fn can_drive(&self, entity: usize) -> bool {
+        self.lists.is_none() && !self.manipulation.is_body(entity)
     }
 
     /// Before fingers are stepped: who could be reached soon comes into the fast list. `reaches` are the fingers'.

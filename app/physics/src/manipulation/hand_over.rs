@@ -227,7 +227,7 @@ impl Manipulation {
     }
 
     /// Whoever is awake near a box looks for pairs.
-    fn greet(&mut self, around: &crate::Aabb, entities: &[Entity]) {
+    pub(super) fn greet(&mut self, around: &crate::Aabb, entities: &[Entity]) {
         self.neighbours.clear();
         let (neighbours, numbers) = (&mut self.neighbours, &self.roster.numbers);
         self.broad_phase.near(around, |near| neighbours.extend(numbers[near]));

@@ -50,6 +50,10 @@ impl Ledger {
     pub(super) fn begin(&mut self, (a, b): (usize, Option<usize>), start: &Start<'_>) {
         let begins_W = |body: usize| {
             let motion = &start.motions[body];
+            if motion.inverse_mass == 0.0 {
+                // It turns as it is made to.
+                return motion.angular_velocity_W * 0.5;
+            }
             let turns_W = motion.inverse_inertia_W * start.bodies[body].angular_momentum_W;
             turns_W - motion.angular_velocity_W * 0.5
         };

@@ -1,0 +1,110 @@
+//! Entities that are no bodies, and that somebody moves: plates that carry, walls that push.
+//!
+//! Model: for the tick a driven entity is a body of infinite mass with the velocity that takes it to where it is to be. So
+//! contacts are damped by how the two move against each other, friction drags along what lies on it, and what it lifts is paid
+//! for. Whoever rests near it wakes.
+//! Invariants: a tick after the last move it stands still, and its last pose is its pose; no allocation.
+
+use haptics::Entity;
+use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
+
+use super::{Manipulation, TICKS_AHEAD};
+use crate::body::Body;
+use crate::mass::MassProperties;
+use crate::pair::fastest_point_m_s;
+use crate::solver::Motion;
+
+/// So many entities may be driven at once.
+pub const MAX_DRIVEN: usize = 16;
+
+/// An entity on its way.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Driven {
+    entity: usize,
+    to_W: Isometry3<f64>,
+}
+
+impl Manipulation {
+    /// In the next tick this entity goes to this pose; says whether it will: bodies move by themselves, and no more than
+    /// [`MAX_DRIVEN`] can be driven at once.
+    pub fn drive(&mut self, entity: usize, to_W: Isometry3<f64>) -> bool {
+        let driven = Driven { entity, to_W };
+        if let Some(known) = self.driven.iter_mut().find(|known| known.entity == entity) {
+            *known = driven;
+            return true;
+        }
+        let goes = !self.is_body(entity) && self.driven.len() < MAX_DRIVEN;
+        if goes {
+            self.driven.push(driven);
+        }
+        goes
+    }
+
+    /// Before a tick: wakes who could be carried or pushed.
+    pub(super) fn wake_near_driven(&mut self, entities: &[Entity]) {
+        for at in 0..self.driven.len() {
+            let entity = self.driven[at].entity;
+            self.neighbours.clear();
+            let (neighbours, numbers) = (&mut self.neighbours, &self.roster.numbers);
+            match self.broad_phase.around(entity) {
+                Some(around) => self.broad_phase.near(around, |near| neighbours.extend(numbers[near])),
+                // Without an end it is near everything.
+                None => neighbours.extend(0..self.roster.bodies.len() as u32),
+            }
+            for at in 0..self.neighbours.len() {
+                self.wake(self.neighbours[at] as usize, entities);
+            }
+        }
+    }
+
+    /// Puts the driven entities behind the bodies that are awake.
+    pub(super) fn line_up_driven(&mut self, entities: &[Entity], dt_s: f64) {
+        for &Driven { entity, to_W } in &self.driven {
+            let (body, motion) = carrier(&entities[entity].X_WB, &to_W, dt_s);
+            self.speeds_m_s.push(fastest_point_m_s(&entities[entity], &body, &motion));
+            self.bodies.push(body);
+            self.entities.push(entity);
+            self.motions.push(motion);
+        }
+    }
+
+    /// The place of a driven entity in the tick's arrays.
+    pub(super) fn place_of_driven(&self, entity: usize) -> Option<usize> {
+        let at = self.driven.iter().position(|driven| driven.entity == entity)?;
+        Some(self.roster.awake().len() + at)
+    }
+
+    /// Takes them to the end of the tick; who moved in it is driven on to where it is, and so comes to rest.
+    pub(super) fn advance_driven(&mut self, entities: &mut [Entity]) {
+        for at in 0..self.driven.len() {
+            let Driven { entity, to_W } = self.driven[at];
+            let way_W = to_W.translation.vector - entities[entity].X_WB.translation.vector;
+            entities[entity].move_to(to_W);
+            if self.broad_phase.moved(entity, &entities[entity], &(way_W * TICKS_AHEAD))
+                && let Some(around) = self.broad_phase.around(entity).copied()
+            {
+                self.greet(&around, entities);
+            }
+        }
+        self.driven.retain(|driven| {
+            let entity = &entities[driven.entity];
+            entity.previous_X_WB != entity.X_WB
+        });
+    }
+}
+
+/// A body that nothing can move, on the way between two poses.
+fn carrier(from_W: &Isometry3<f64>, to_W: &Isometry3<f64>, dt_s: f64) -> (Body, Motion) {
+    let turn_W: UnitQuaternion<f64> = to_W.rotation * from_W.rotation.inverse();
+    let velocity_W = (to_W.translation.vector - from_W.translation.vector) / dt_s;
+    let angular_velocity_W = turn_W.scaled_axis() / dt_s;
+    let of_no_matter = MassProperties {
+        mass_kg: 1.0,
+        centre_B: Vector3::zeros(),
+        principal_kg_m2: Vector3::repeat(1.0),
+        axes_BP: UnitQuaternion::identity(),
+    };
+    let body = Body::at_rest(of_no_matter, from_W).moving(velocity_W, angular_velocity_W);
+    let inverse_inertia_W = Matrix3::zeros();
+    (body, Motion { velocity_W, angular_velocity_W, inverse_mass: 0.0, inverse_inertia_W })
+}
