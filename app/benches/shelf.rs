@@ -53,7 +53,7 @@ impl Run {
         black_box(&self.command);
         let took_ns = begin.elapsed().as_nanos() as u64;
         self.tick += 1;
-        if self.tick % TURN == 0 {
+        if self.tick.is_multiple_of(TURN) {
             self.slow.turn(TURN as u32, 1e-3);
         }
         took_ns

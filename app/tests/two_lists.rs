@@ -58,7 +58,7 @@ impl Run {
         (frame.devices[0].flags, frame.devices[0].position_m_measured) = (DEVICE_POSITION_VALID, hip);
         self.step.step(&frame, &mut Command::zeroed(), &mut row);
         self.tick += 1;
-        if let Some(slow) = self.slow.as_mut().filter(|_| slow_runs && self.tick % 10 == 0) {
+        if let Some(slow) = self.slow.as_mut().filter(|_| slow_runs && self.tick.is_multiple_of(10)) {
             slow.turn(10, DT);
         }
         row.fingers[0]

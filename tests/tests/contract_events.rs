@@ -1,7 +1,7 @@
 //! What `run --events` tells, against what the same run's rows say.
 
 use nalgebra::Vector3;
-use system_tests::recording::Table;
+use system_tests::recording::{Sample, Table};
 use system_tests::workplace::Workplace;
 
 const LIFT_SCENE: &str = include_str!("../../config/scenes/lift.toml");
@@ -70,7 +70,7 @@ fn slip_begins_and_ends_in_the_ticks_in_which_the_rows_say_so() {
     let scene = format!("{TABLE}friction = {{ model = \"stiction\", mu_s = 0.7, mu_d = 0.3 }}\n");
     let (_place, rows, events) = ran(&scene, DRAG, "1.7");
     let slips: Vec<bool> = rows.finger("f0").iter().map(|sample| sample.friction == "slip").collect();
-    let touches: Vec<bool> = rows.finger("f0").iter().map(|sample| sample.touches()).collect();
+    let touches: Vec<bool> = rows.finger("f0").iter().map(Sample::touches).collect();
     let changes = |to: bool| {
         let both = 1..slips.len();
         both.filter(|&tick| touches[tick] && slips[tick] == to && slips[tick - 1] != to).collect::<Vec<_>>()

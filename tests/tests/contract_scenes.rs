@@ -1,5 +1,6 @@
 //! Scenes of many parts as a user sees them: templates, included files, rooms, flags; and the commands about scenes.
 
+use system_tests::recording::Sample;
 use system_tests::workplace::{Said, Workplace, hand};
 
 const CONFIG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../config");
@@ -40,7 +41,7 @@ fn templates_and_included_files_run_like_the_same_scene_written_out() {
     let [one, other] = [written_out, parts].map(|scene| place.play(scene, &path(), &[]));
     assert_eq!(one.columns(), other.columns());
     assert_eq!(one.rows(), other.rows());
-    assert!(one.finger("f0").iter().any(|sample| sample.touches()), "it was felt");
+    assert!(one.finger("f0").iter().any(Sample::touches), "it was felt");
 }
 
 #[test]
@@ -87,7 +88,7 @@ fn what_is_not_haptic_carries_others_and_what_is_not_collidable_lets_them_fall()
     let played = |flags: &str| {
         let place = Workplace::new();
         let table = place.play(&scene(flags), &path(), &[]);
-        let felt = table.finger("f0").iter().any(|sample| sample.touches());
+        let felt = table.finger("f0").iter().any(Sample::touches);
         let lowest = table.numbers("cube_y").into_iter().fold(f64::INFINITY, f64::min);
         (felt, lowest)
     };

@@ -57,7 +57,7 @@ impl World {
         fast.step(&mut self.entities, &mut [], DT);
         hand_over.end_tick(fast, &self.entities);
         self.tick += 1;
-        if slow_runs && self.tick % 10 == 0 {
+        if slow_runs && self.tick.is_multiple_of(10) {
             slow.turn(10, DT);
         }
     }
@@ -179,12 +179,12 @@ fn a_stack_that_changes_lists_does_not_twitch() {
     for tick in 0..2000 {
         let finger = [finger_at(0.0, 0.0)];
         world.step(if tick / 100 % 2 == 0 { &finger } else { &[] }, true);
-        for body in 0..2 {
+        for (body, before) in before.iter().enumerate().take(2) {
             let side = usize::from(world.standings(body)[0] == Standing::Elsewhere);
             if world.standings(body) == [Standing::Elsewhere; 2] {
                 continue;
             }
-            let moved = (rests(&world, side)[body] - before[body]).norm();
+            let moved = (rests(&world, side)[body] - before).norm();
             // It sleeps all along; where it woke it would go on settling by less than 1e-6 m/s.
             assert!(moved < 1e-9, "tick {tick}: {moved:e}");
         }
