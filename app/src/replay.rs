@@ -2,8 +2,8 @@
 //!
 //! Problem: what would these very movements have felt with other friction, another shape, another version of this
 //! program? And is what is published still what the program computes?
-//! Model: devices that are where the recording has the fingers ([`feed`]), on the virtual clock, through the same driver
-//! and fast loop as every run. What comes out is compared with the recording tick by tick ([`difference`]).
+//! Model: devices that are where the recording has the fingers (`feed`), on the virtual clock, through the same driver
+//! and fast loop as every run. What comes out is compared with the recording tick by tick (`difference`).
 //! Invariant: with the same scene and program a recording of scripted or of free fingers comes out the same to the bit;
 //! what a contact remembers from before t = 0 is not in a recording.
 
