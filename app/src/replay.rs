@@ -53,7 +53,7 @@ pub struct ReplayArgs {
     friction: Vec<Edit>,
     /// Change any key of the scene, as in entity.table.stiffness_n_per_m=500; may be given several times
     #[arg(long, value_name = "KEY=VALUE", value_parser = Edit::set)]
-    set: Vec<Edit>,
+    change: Vec<Edit>,
     /// Write what comes out here (CSV, or MCAP with the ending .mcap); may be given several times
     #[arg(long, value_name = "FILE")]
     record: Vec<PathBuf>,
@@ -68,7 +68,7 @@ pub struct ReplayArgs {
 /// A recording or a scene that cannot be read or is wrong, or a fault while it is played.
 pub fn execute(args: &ReplayArgs, signals: &StopSignals) -> Result<ExitCode, RunFailure> {
     let recorded = RecordedRun::open(&args.recording).map_err(|error| wrong(&error))?;
-    let edits: Vec<Edit> = args.friction.iter().chain(&args.set).cloned().collect();
+    let edits: Vec<Edit> = args.friction.iter().chain(&args.change).cloned().collect();
     let mut stage = Stage::set(&args.recording, &recorded, args.scene.as_deref(), &edits)?;
     refuse_to_overwrite(args, &stage.rig)?;
     let played_from = args.recording.file_name().unwrap_or_default().to_string_lossy();

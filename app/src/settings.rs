@@ -44,11 +44,13 @@ impl SettingsArgs {
     }
 }
 
-/// Whether there is no such file; a part of its path may be none either.
+/// Whether there is no such file, as far as may be seen; a part of its path may be none either.
 fn is_absent(error: &SceneError) -> bool {
     match error {
         SceneError::NotFound { .. } => true,
-        SceneError::Unreadable { cause, .. } => cause.kind() == io::ErrorKind::NotADirectory,
+        SceneError::Unreadable { cause, .. } => {
+            matches!(cause.kind(), io::ErrorKind::NotADirectory | io::ErrorKind::PermissionDenied)
+        }
         _ => false,
     }
 }

@@ -123,7 +123,7 @@ fn a_replay_s_own_recording_replays_as_well_with_what_was_changed() {
     let (place, seconds) = workplace("everything");
     ran(&place, &["run", "scene.toml", "--clock", "virtual", "--seconds", seconds, "--record", "r.mcap"]);
     let alone = elsewhere(&place, "r.mcap");
-    let change = ["--friction", "table=coulomb,mu=0.1", "--set", "entity.cube-1.stiffness_n_per_m=700"];
+    let change = ["--friction", "table=coulomb,mu=0.1", "--change", "entity.cube-1.stiffness_n_per_m=700"];
     ran(&alone, &[&["replay", "r.mcap", "--record", "changed.mcap"][..], &change].concat());
     let last = elsewhere(&alone, "changed.mcap");
     let said = ran(&last, &["replay", "changed.mcap", "--expect-same"]);
@@ -154,7 +154,7 @@ fn another_friction_is_told_with_sizes_and_the_first_tick_that_differs() {
         (&["replay", "none.mcap"], "cannot read the recording none.mcap"),
         (&["replay", "r.mcap", "--record", "r.mcap"], "would overwrite the input"),
         (&["export", "r.mcap", "--csv", "r.mcap"], "would be overwritten by its own export"),
-        (&["replay", "r.mcap", "--set", "entity.table.stiffness_n_per_m=-1"], "stiffness_n_per_m"),
+        (&["replay", "r.mcap", "--change", "entity.table.stiffness_n_per_m=-1"], "stiffness_n_per_m"),
     ] {
         let said = place.run(wrong);
         assert_eq!(said.status, Some(2), "{wrong:?}: {}", said.err);

@@ -1,4 +1,4 @@
-//! Changes to a scene's text before it is played: `--set KEY=VALUE`, `--friction NAME=MODEL,...`.
+//! Changes to a scene's text before it is played: `--change KEY=VALUE`, `--friction NAME=MODEL,...`.
 //!
 //! Model: a key is a way through the document, `entity.table.stiffness_n_per_m`; in a list of tables the next word is a
 //! name, the default name (`e0`, `f0`) or the place in the list. What a value may be is for the reader of scenes to say.
