@@ -12,6 +12,7 @@ use nalgebra::{Isometry3, Vector3};
 
 use crate::anchor::Anchor;
 use crate::body::Body;
+use crate::broad_phase::Aabb;
 use crate::collide::{
     ContactPoint, ContactPoints, MAX_POINTS, PairMemory, Solid, bounding_ball, contact_points,
 };
@@ -269,12 +270,18 @@ pub(crate) fn fastest_point_m_s(entity: &Entity, body: &Body, motion: &Motion) -
 /// Whether two entities may touch that come nearer by no more than this (m).
 pub(crate) fn is_near(a: &Entity, b: &Entity, reach_m: f64) -> bool {
     let centre = |entity: &Entity, at_B: Vector3<f64>| (entity.X_WB * nalgebra::Point3::from(at_B)).coords;
-    match (bounding_ball(&a.shape), bounding_ball(&b.shape)) {
+    let do_balls_meet = match (bounding_ball(&a.shape), bounding_ball(&b.shape)) {
         (Some((at_a, r_a)), Some((at_b, r_b))) => {
             (centre(a, at_a) - centre(b, at_b)).norm_squared() <= (r_a + r_b + reach_m).powi(2)
         }
-        _ => true,
-    }
+        _ => return true,
+    };
+    // Boxes side by side on a shelf are in each other's balls long before they touch.
+    do_balls_meet
+        && match (Aabb::of_entity(a), Aabb::of_entity(b)) {
+            (Some(one), Some(other)) => one.grown(reach_m).overlaps(&other),
+            _ => true,
+        }
 }
 
 /// Contact points are looked for from this distance on \[m\].

@@ -160,3 +160,19 @@ fn one_that_is_elsewhere_is_leaned_on_where_it_was_last_said_to_be() {
         assert!(manipulation.bodies()[upper].velocity_W.y < -0.009, "falls");
     }
 }
+
+#[test]
+fn boxes_side_by_side_on_a_shelf_are_islands_of_their_own_until_they_touch() {
+    for (apart, is_one) in [(0.01, false), (0.0, true)] {
+        let mut entities = vec![floor(0.0, 2000.0, 0.5)];
+        for at in 0..4 {
+            let pose = Isometry3::translation((SIZE + apart) * f64::from(at), 0.5 * SIZE, 0.0);
+            entities.push(object(Cuboid::new([SIZE; 3]).unwrap(), pose, 1000.0, 0.5));
+        }
+        let mut manipulation = manipulation(&entities, true);
+        manipulation.step(&mut entities, &mut [], DT);
+        let mut island = Vec::with_capacity(8);
+        assert!(manipulation.island(1, &mut island));
+        assert_eq!(island, if is_one { vec![0, 1, 2, 3] } else { vec![1] }, "{apart}");
+    }
+}
