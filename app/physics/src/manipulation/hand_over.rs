@@ -11,7 +11,9 @@ use nalgebra::{Isometry3, Vector3};
 
 use super::{Manipulation, who};
 use crate::body::Body;
-use crate::pair::Pair;
+use crate::broad_phase::Aabb;
+use crate::collide::bounding_ball;
+use crate::pair::{Pair, REACH_M};
 use crate::pairs::Key;
 use crate::roster::Standing;
 
@@ -59,14 +61,15 @@ impl Manipulation {
         self.pairs.clear();
     }
 
-    /// Visits the bodies that somebody else steps and that who is awake here could soon come to.
-    pub fn for_each_met_elsewhere(&self, met: &mut impl FnMut(usize)) {
+    /// Visits the bodies that somebody else steps and that who is awake here could meet within this time (s).
+    pub fn for_each_met_elsewhere(&self, entities: &[Entity], ahead_s: f64, met: &mut impl FnMut(usize)) {
         for (key, _) in self.pairs.iter_awake() {
-            let other = self.roster.numbers[key.entity as usize].map(|other| other as usize);
-            for body in [Some(key.body as usize), other].into_iter().flatten() {
-                if self.roster.standing(body) == Standing::Elsewhere {
-                    met(body);
-                }
+            let Some(bodies) = self.bodies_of(&key) else { continue };
+            let elsewhere = |body: &usize| self.roster.standing(*body) == Standing::Elsewhere;
+            if let Some(body) = bodies.into_iter().find(elsewhere)
+                && self.could_meet(bodies, entities, ahead_s)
+            {
+                met(body);
             }
         }
     }
@@ -126,16 +129,32 @@ impl Manipulation {
         true
     }
 
-    /// Whether something that is stepped here and not of the island is so near that the two could soon touch.
-    pub fn is_met(&self, island: &[usize]) -> bool {
+    /// Whether the island and something else that is stepped here could meet within this time (s).
+    pub fn is_met(&self, island: &[usize], entities: &[Entity], ahead_s: f64) -> bool {
         let is_in = |body: usize| island.binary_search(&body).is_ok();
-        self.pairs.iter().any(|(key, _)| {
-            let (one, other) = (key.body as usize, self.roster.numbers[key.entity as usize]);
-            other.is_some_and(|other| {
-                let other = other as usize;
-                is_in(one) != is_in(other) && self.is_here(one) && self.is_here(other)
-            })
+        self.pairs.iter().filter_map(|(key, _)| self.bodies_of(&key)).any(|[one, other]| {
+            is_in(one) != is_in(other)
+                && self.is_here(one)
+                && self.is_here(other)
+                && self.could_meet([one, other], entities, ahead_s)
         })
+    }
+
+    /// Both bodies of a pair, if it is one of two.
+    fn bodies_of(&self, key: &Key) -> Option<[usize; 2]> {
+        Some([key.body as usize, self.roster.numbers[key.entity as usize]? as usize])
+    }
+
+    /// Whether two bodies that go on as they do could come to touch within this time (s).
+    fn could_meet(&self, bodies: [usize; 2], entities: &[Entity], ahead_s: f64) -> bool {
+        let soon = bodies.map(|body| {
+            let (entity, state) = (&entities[self.roster.entities[body]], &self.roster.bodies[body]);
+            let turned_rad = (state.angular_velocity_W().norm() * ahead_s).min(std::f64::consts::PI);
+            let (_, radius_m) = bounding_ball(&entity.shape)?;
+            let around = Aabb::of_entity(entity)?.swept(&(state.velocity_W * ahead_s));
+            Some(around.grown(REACH_M + radius_m * turned_rad))
+        });
+        !matches!(soon, [Some(one), Some(other)] if !one.overlaps(&other))
     }
 
     /// How many parcels an island makes.
@@ -227,7 +246,7 @@ impl Manipulation {
     }
 
     /// Whoever is awake near a box looks for pairs.
-    pub(super) fn greet(&mut self, around: &crate::Aabb, entities: &[Entity]) {
+    pub(super) fn greet(&mut self, around: &Aabb, entities: &[Entity]) {
         self.neighbours.clear();
         let (neighbours, numbers) = (&mut self.neighbours, &self.roster.numbers);
         self.broad_phase.near(around, |near| neighbours.extend(numbers[near]));

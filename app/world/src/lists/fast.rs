@@ -98,7 +98,7 @@ impl FastList {
         }
         self.take_in(manipulation, entities);
         if self.here.len() < self.claimed.len() {
-            self.claim_what_is_near(manipulation);
+            self.claim_what_is_near(manipulation, entities);
         }
     }
 
@@ -151,8 +151,8 @@ impl FastList {
         }
     }
 
-    fn claim_what_is_near(&mut self, manipulation: &Manipulation) {
-        let Self { soon, claimed, end, handed, tick, .. } = self;
+    fn claim_what_is_near(&mut self, manipulation: &Manipulation, entities: &[Entity]) {
+        let Self { soon, claimed, end, handed, tick, settings, .. } = self;
         let mut claim = |body: usize| {
             if claimed[body] == 0 && manipulation.standing(body) == Standing::Elsewhere {
                 match end.claims.push(body as u32) {
@@ -168,7 +168,7 @@ impl FastList {
                 }
             });
         }
-        manipulation.for_each_met_elsewhere(&mut claim);
+        manipulation.for_each_met_elsewhere(entities, settings.ahead_s, &mut claim);
     }
 
     /// Whether a body is here, and nothing but its neighbours is against its going.
@@ -187,7 +187,7 @@ impl FastList {
         self.handed.too_large += u64::from(!is_whole);
         let goes = is_whole
             && island.iter().all(|&body| self.may_go(body, manipulation))
-            && !manipulation.is_met(&island)
+            && !manipulation.is_met(&island, entities, self.settings.ahead_s)
             && manipulation.parcels(&island) <= self.end.out.slots();
         if goes {
             for &body in &island {
