@@ -11,7 +11,8 @@ use system_tests::faults::amplifiers::wait_for;
 use system_tests::faults::commander::Commander;
 
 const BUDGET_NS: u64 = 500_000;
-const TICKS: u64 = 600;
+/// Of each mode. As many ticks are waited for as it takes: a loaded machine answers few of them.
+const ANSWERED: usize = 300;
 
 /// A tick and what the frame after it tells of it.
 struct Done {
@@ -41,11 +42,16 @@ fn answered_on(clock: &str, mode: &str) -> Vec<Done> {
     let commander = Commander::start(driver.command(), [0.0, 1.0, 0.0]);
     let view = &observer.driver;
     wait_for("the whole force", || view.read_latest().is_some_and(|frame| frame.authority == 1.0));
-    let first = view.latest_tick().expect("a tick");
-    wait_for("enough ticks", || view.latest_tick() > Some(first + TICKS));
+    let mut next = view.latest_tick().expect("a tick");
+    let mut done = Vec::new();
+    wait_for(&format!("{ANSWERED} answered ticks, {mode}"), || {
+        // What a frame's tick came to stands in the frame after it.
+        let told = view.latest_tick().unwrap_or(next);
+        done.extend((next..told).filter_map(|tick| read(view, tick)));
+        next = next.max(told);
+        done.len() >= ANSWERED
+    });
     drop(commander);
-    let done: Vec<Done> = (first..first + TICKS).filter_map(|tick| read(view, tick)).collect();
-    assert!(done.len() as u64 > TICKS / 2, "{mode}: {} of {TICKS} ticks answered", done.len());
     done
 }
 
@@ -103,5 +109,5 @@ fn in_lockstep_a_reply_for_the_next_tick_is_waited_for_and_drives_that_one() {
     for tick in &done {
         assert_eq!(tick.after.previous.command_tick + 1, tick.tick, "a delay of one tick, always");
     }
-    assert!(done.len() as u64 > TICKS - 2, "in lockstep every tick is answered: {}", done.len());
+    assert!(done.windows(2).all(|pair| pair[0].tick + 1 == pair[1].tick), "in lockstep every tick is answered");
 }
