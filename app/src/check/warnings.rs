@@ -100,7 +100,7 @@ fn near_pairs(rig: &Rig, entities: &[Entity], mut meet: impl FnMut(usize, usize)
         for &other in &open {
             let apart = balls[other].zip(balls[next]).is_some_and(|((p, r), (q, s))| (p - q).norm() > r + s);
             match (is_body(next), is_body(other)) {
-                _ if apart => {}
+                _ if apart || entities[other].space != entities[next].space => {}
                 (true, _) => meet(next, other),
                 (false, true) => meet(other, next),
                 _ => {}
@@ -136,7 +136,8 @@ fn depth_of_weight(rig: &Rig, body: usize, entities: &[Entity]) -> f64 {
 /// Fingers that begin inside of something: they are pushed out as the run begins.
 fn inside(rig: &Rig, entities: &[Entity]) -> Vec<String> {
     let touched = |finger: &world::SceneFinger| {
-        let mut probe = Finger::new(finger.radius_m, entities.len()).ok()?;
+        let mut probe =
+            Finger::new(finger.radius_m, entities.len()).ok()?.within(rig.space(finger.within.as_ref()));
         let hip = Hip { position_W: finger.start_m.coords, velocity_W: None };
         probe.step(entities, hip, 1e-3);
         let names: Vec<String> =
