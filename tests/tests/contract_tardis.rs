@@ -122,6 +122,28 @@ fn an_object_that_is_pushed_to_the_door_stays_outside_and_so_does_who_pushes_it(
 }
 
 #[test]
+fn an_object_that_is_tied_to_a_finger_is_let_go_at_the_door() {
+    let place = Workplace::new();
+    let scene = HOUSE.replacen("[[finger]]\n", "[[finger]]\nattach = { button = 0 }\n", 1);
+    // Onto the cube's top, tied, and with it into the door; the button stays down.
+    let path = "t,f0_x,f0_y,f0_z,f0_buttons\n0,0,0.05,0.12,0\n0.3,0,0.039,0.12,0\n0.4,0,0.039,0.12,1\n\
+                1.4,0,0.039,0.02,1\n1.8,0,0.039,0.02,1\n";
+    let rows = place.play(&format!("{scene}position_m = [0, 0.0201, 0.12]\n"), path, &[]);
+    let (spaces, tied) = (rows.texts("f0_space"), rows.texts("f0_attached"));
+    let goes = spaces.iter().position(|space| *space == "inside").expect("it goes in");
+    assert_eq!((tied[500], tied[goes - 1]), ("cube", "cube"));
+    // `fade_s` of the tie is 20 ms.
+    assert!(tied[goes + 25..].iter().all(|tied| tied.is_empty()), "it is let go");
+    assert!(spaces[goes..].iter().all(|space| *space == "inside"));
+    let cube = rows.body("cube").pop().expect("the last row");
+    assert!(cube.position.z > 0.065, "it stays in front of the hull: {cube:?}");
+    let samples = rows.finger("f0");
+    assert_eq!(samples.last().map(|last| last.force), Some(Vector3::zeros()));
+    // The tie's 20 N at most, over 20 ticks; what it pulls at is dropped, and swings.
+    assert!(largest_jump(&samples[goes - 1..]) < 2.5, "{}", largest_jump(&samples[goes - 1..]));
+}
+
+#[test]
 fn an_object_behind_a_door_lies_on_the_floor_of_its_own_space() {
     let place = Workplace::new();
     // At the same place as the hull, and above the world's ground; the room's floor is a decimetre below that.
@@ -148,4 +170,23 @@ fn a_finger_may_begin_inside_and_the_check_tells_what_is_where() {
     assert_eq!(said.status, Some(2));
     let wanted = "bad.toml:1: within: found \"outside\", which no [[environment]] with a door is called; allowed: inside";
     assert!(said.err.contains(wanted) || said.out.contains(wanted), "{}{}", said.out, said.err);
+}
+
+#[test]
+fn a_door_that_is_walled_up_is_told() {
+    let place = Workplace::new();
+    let said = |room_z: &str| {
+        let scene =
+            HOUSE.replacen("position_m = [0, 0.1, -0.15]", &format!("position_m = [0, 0.1, {room_z}]"), 1);
+        place.write("scene.toml", scene + "position_m = [0, 0.0201, 0.12]\n");
+        let said = place.run(["check", "scene.toml"]);
+        assert_eq!(said.status, Some(0), "{}{}", said.out, said.err);
+        said.out
+    };
+    assert!(!said("-0.15").contains("closed"));
+    assert!(
+        !said("-0.145").contains("closed"),
+        "a wall 5 mm in front of it is in nobody's way who is inside"
+    );
+    assert!(said("-0.16").contains("the door of hull is closed by inside_front"), "{}", said("-0.16"));
 }

@@ -66,9 +66,19 @@ impl Door {
         Ok(Self { hull, X_BD, half_m, spaces: [front, behind], opens: opens.into() })
     }
 
+    /// The entity that has it.
+    pub fn hull(&self) -> usize {
+        self.hull
+    }
+
     /// The spaces in front of it and behind.
     pub fn spaces(&self) -> [u32; 2] {
         self.spaces
+    }
+
+    /// So far in front of its middle \[m\].
+    pub fn before_W(&self, entities: &[Entity], height_m: f64) -> Vector3<f64> {
+        self.in_world(entities, &Vector3::new(0.0, 0.0, height_m))
     }
 
     /// A point as it is seen from the door.

@@ -16,7 +16,7 @@ impl Rig {
     }
 
     /// All doors of the scene.
-    pub(super) fn doors(&self) -> impl Iterator<Item = Result<Door, RigError>> {
+    pub(crate) fn doors(&self) -> impl Iterator<Item = Result<Door, RigError>> {
         let doors = self.scene.environments.iter().zip(1..);
         doors.filter_map(|(environment, behind)| {
             let door = environment.door.as_ref()?;

@@ -42,6 +42,7 @@ impl Things {
         let environments = all(files, "environment", problems);
         things.read_environments(&environments, &mut names, problems);
         things.check_within(fingers, files, problems);
+        things.check_hulls(problems);
         let (mut of_lights, mut of_cameras) = (Names::default(), Names::default());
         for (i, table) in all(files, "light", problems).iter().enumerate() {
             things.lights.extend(problems.keep(SceneLight::read(table, i, &mut of_lights)));
@@ -91,7 +92,7 @@ impl Things {
         }
     }
 
-    /// What is within an environment is behind its door; and no door leads into what it is itself within.
+    /// What is within an environment is behind its door.
     fn check_within(&self, fingers: &[SceneFinger], files: &[Table<'_>], problems: &mut Problems) {
         let scene = files.first().map(|table| table.document().file());
         let of_entities = self.entities.iter().map(|entity| (&*entity.file, entity.line, &entity.within));
@@ -105,6 +106,21 @@ impl Things {
                 let allowed = listed(with_door().map(|environment| environment.name.as_str()));
                 problems.note(SceneError::NoSuchName { at: Box::new(at), found, allowed });
             }
+        }
+    }
+
+    /// Nobody comes to a door that is behind itself.
+    fn check_hulls(&self, problems: &mut Problems) {
+        for environment in &self.environments {
+            let of = environment.door.as_ref().map(|door| &door.of);
+            let hull = self.entities.iter().find(|entity| Some(&entity.name) == of);
+            let Some(hull) = hull.filter(|hull| hull.within.as_ref() == Some(&environment.name)) else {
+                continue;
+            };
+            let at = crate::Location { file: hull.file.to_path_buf(), line: hull.line, key: "within".into() };
+            let found = format!("{}, whose door this entity has", quoted(&environment.name));
+            let allowed = "the world, or another environment".into();
+            problems.note(SceneError::NoSuchName { at: Box::new(at), found, allowed });
         }
     }
 }
