@@ -26,7 +26,7 @@ fn hulls() -> [(&'static str, Shape); 2] {
 #[test]
 fn a_finger_goes_in_touches_a_wall_that_lies_outside_of_the_hull_and_comes_out() {
     for (name, hull) in hulls() {
-        let mut visit = Visit::new(hull, Friction::None, 0.0);
+        let mut visit = Visit::new(hull, &Friction::None, 0.0);
         visit.go(v(0.01, 0.0, 0.1));
         let (out, jump) = visit.go(v(0.01, 0.0, -0.1));
         assert_eq!(
@@ -53,13 +53,13 @@ fn a_finger_goes_in_touches_a_wall_that_lies_outside_of_the_hull_and_comes_out()
 fn beside_the_door_the_hull_holds_and_from_within_the_walls_do() {
     for (name, hull) in hulls() {
         for aside in [v(0.021, 0.0, 0.0), v(-0.03, 0.0, 0.0), v(0.0, 0.031, 0.0), v(0.0, -0.04, 0.0)] {
-            let mut visit = Visit::new(hull.clone(), Friction::None, 0.0);
+            let mut visit = Visit::new(hull.clone(), &Friction::None, 0.0);
             visit.go(aside + v(0.0, 0.0, 0.06));
             let (out, _) = visit.go(aside + v(0.0, 0.0, 0.047));
             assert_eq!((visit.space(), out.entity), (0, Some(0)), "{name} {aside:?}");
             assert!((out.force_on_user_W.z - K * 3e-3).abs() < 1e-12, "{name} {aside:?}: {out:?}");
 
-            let mut visit = Visit::new(hull.clone(), Friction::None, 0.0);
+            let mut visit = Visit::new(hull.clone(), &Friction::None, 0.0);
             visit.finger = visit.finger.within(INSIDE);
             visit.go(aside);
             let (out, _) = visit.go(aside + v(0.0, 0.0, 0.053));
@@ -71,7 +71,7 @@ fn beside_the_door_the_hull_holds_and_from_within_the_walls_do() {
 
 #[test]
 fn a_finger_that_is_within_from_the_beginning_feels_the_room_alone() {
-    let mut visit = Visit::new(solid_hull(), Friction::None, 0.0);
+    let mut visit = Visit::new(solid_hull(), &Friction::None, 0.0);
     visit.finger = visit.finger.within(INSIDE);
     // In the middle of the solid hull, and through its side.
     let (out, jump) = visit.go(v(0.0, 0.0, 0.0));
@@ -83,7 +83,7 @@ fn a_finger_that_is_within_from_the_beginning_feels_the_room_alone() {
 #[test]
 fn a_door_is_where_its_hull_is_however_that_is_turned_and_moved() {
     for (name, hull) in hulls() {
-        let mut visit = Visit::new(hull, Friction::None, 0.0);
+        let mut visit = Visit::new(hull, &Friction::None, 0.0);
         let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 0.7);
         let at = Isometry3::from_parts(v(-0.02, 0.03, -0.15).into(), turn);
         (visit.entities[0].X_WB, visit.entities[0].previous_X_WB) = (at, at);
@@ -106,7 +106,7 @@ fn a_door_is_where_its_hull_is_however_that_is_turned_and_moved() {
 fn a_hull_that_moves_over_a_resting_finger_takes_it_in_by_the_door_only() {
     for (name, hull) in hulls() {
         for (x, space) in [(0.0, INSIDE), (0.03, 0)] {
-            let mut visit = Visit::new(hull.clone(), Friction::None, 0.0);
+            let mut visit = Visit::new(hull.clone(), &Friction::None, 0.0);
             let here = v(x, 0.0, 0.06);
             visit.step(here);
             for tick in 1..=40 {
@@ -124,7 +124,7 @@ fn a_hull_that_moves_over_a_resting_finger_takes_it_in_by_the_door_only() {
 #[test]
 fn one_tick_is_enough_to_go_in_or_out_and_not_through_the_hull() {
     for (name, hull) in hulls() {
-        let mut visit = Visit::new(hull, Friction::None, 0.0);
+        let mut visit = Visit::new(hull, &Friction::None, 0.0);
         visit.step(v(0.0, 0.0, 0.2));
         // The way goes through the hull's back, which is not in the way of who is inside.
         let out = visit.step(v(0.0, 0.0, -0.2));
@@ -153,7 +153,7 @@ fn one_tick_is_enough_to_go_in_or_out_and_not_through_the_hull() {
 #[test]
 fn who_is_held_back_in_front_of_a_door_is_not_through_it() {
     for (name, hull) in hulls() {
-        let mut entities = Visit::new(hull, Friction::None, 0.0).entities;
+        let mut entities = Visit::new(hull, &Friction::None, 0.0).entities;
         // A box of 2 cm that stands before the door.
         let at = Isometry3::translation(0.0, 0.0, 0.065);
         entities.push(Entity::new(Cuboid::new([0.1, 0.1, 0.02]).unwrap(), at, K).unwrap());
@@ -237,7 +237,7 @@ fn a_finger_that_is_pressed_on_the_hull_slides_into_the_opening_and_goes_through
     for (name, hull) in hulls() {
         for friction in [Friction::None, Friction::coulomb(0.4).unwrap(), stiction()] {
             for depth in [1e-3, 8e-3] {
-                let mut visit = Visit::new(hull.clone(), friction.clone(), 0.0);
+                let mut visit = Visit::new(hull.clone(), &friction, 0.0);
                 visit.go(v(0.035, 0.0, 0.06));
                 visit.go(v(0.035, 0.0, DOOR_Z - depth));
                 let (out, _) = visit.go(v(0.0, 0.0, DOOR_Z - depth));
@@ -257,7 +257,7 @@ fn a_finger_that_is_pressed_on_the_hull_slides_into_the_opening_and_goes_through
 fn a_ball_goes_through_an_opening_that_it_fits_and_feels_the_rim_of_one_that_is_there() {
     let radius = 5e-3;
     for (name, hull) in hulls() {
-        let mut visit = Visit::new(hull.clone(), Friction::None, radius);
+        let mut visit = Visit::new(hull.clone(), &Friction::None, radius);
         visit.go(v(0.0, 0.0, 0.1));
         let (out, jump) = visit.go(v(0.0, 0.0, -0.1));
         assert_eq!(
@@ -273,7 +273,7 @@ fn a_ball_goes_through_an_opening_that_it_fits_and_feels_the_rim_of_one_that_is_
         assert!((out.force_on_user_W.z - K * 2e-3).abs() < 1e-9, "{name}: {out:?}");
     }
     // 4 mm from the rim: the rim is felt, harder until the centre is in its plane, and then fades.
-    let mut visit = Visit::new(open_hull(), Friction::None, radius);
+    let mut visit = Visit::new(open_hull(), &Friction::None, radius);
     visit.go(v(0.016, 0.0, 0.1));
     let (out, _) = visit.go(v(0.016, 0.0, DOOR_Z + 1e-4));
     assert!((out.force_on_user_W + Vector3::x() * K * 1e-3).norm() < 0.1 * K * 1e-3, "{out:?}");
@@ -281,7 +281,7 @@ fn a_ball_goes_through_an_opening_that_it_fits_and_feels_the_rim_of_one_that_is_
     assert_eq!((visit.space(), out.force_on_user_W), (INSIDE, Vector3::zeros()));
     assert!(jump < A_STEP_N, "{jump}");
     // A solid hull has no rim, but the ball's place is the same.
-    let mut visit = Visit::new(solid_hull(), Friction::None, radius);
+    let mut visit = Visit::new(solid_hull(), &Friction::None, radius);
     visit.go(v(0.016, 0.0, 0.1));
     let (out, jump) = visit.go(v(0.016, 0.0, 0.0));
     assert_eq!((visit.space(), out.entity, jump), (INSIDE, None, 0.0));
@@ -372,7 +372,7 @@ fn ten_thousand_random_walks_end_where_the_crossings_of_the_door_say() {
         // and through it, within one tick: of that nothing is seen outside.
         let sticks = number % 4 == 0;
         let hull = if number % 4 < 2 { open_hull_once() } else { solid_hull() };
-        let mut visit = Visit::new(hull, Friction::None, 0.0);
+        let mut visit = Visit::new(hull, &Friction::None, 0.0);
         if sticks {
             visit.entities[0] = visit.entities[0].clone().with_friction(stiction()).unwrap();
         }
@@ -393,7 +393,7 @@ fn open_hull_once() -> Shape {
 fn a_step_through_a_door_never_allocates() {
     for (name, hull) in hulls() {
         for radius in [0.0, 5e-3] {
-            let mut visit = Visit::new(hull.clone(), stiction(), radius);
+            let mut visit = Visit::new(hull.clone(), &stiction(), radius);
             visit.step(v(0.0, 0.0, 0.06));
             let before = counting::CALLS.get();
             let mut changes = 0;

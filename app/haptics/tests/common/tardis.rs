@@ -57,7 +57,7 @@ pub(crate) struct Visit {
 
 impl Visit {
     /// The hull is the first entity, the room's walls are the next six.
-    pub(crate) fn new(hull: Shape, friction: Friction, radius_m: f64) -> Self {
+    pub(crate) fn new(hull: Shape, friction: &Friction, radius_m: f64) -> Self {
         let mut entities = vec![entity(hull, friction.clone())];
         entities.extend(room(-0.2).into_iter().map(|wall| wall.with_friction(friction.clone()).unwrap()));
         Self::of(entities, radius_m)
