@@ -113,10 +113,7 @@ impl Objects {
         let lists = self.lists.as_mut()?;
         let late_ticks = slow.as_ref().map_or(0, |slow| slow.late_ticks);
         lists.slow = lists.slow.take().or(slow.map(|slow| slow.slow));
-        if let Some(slow) = &mut lists.slow {
-            slow.take_in();
-        }
-        lists.hand_over.take_in_all(&mut self.manipulation, entities);
+        lists.hand_over.end(&mut self.manipulation, entities, lists.slow.as_mut());
         let of_slow = lists.slow.as_ref().map_or(0, |slow| slow.manipulation().left_out());
         Some(ListsEnd {
             fast: lists.hand_over.here(),
@@ -124,7 +121,6 @@ impl Objects {
             handed: lists.hand_over.handed(),
             late_ticks,
             left_out: self.manipulation.left_out() + of_slow,
-            stuck: lists.slow.as_ref().map_or(0, SlowList::too_large),
         })
     }
 
