@@ -62,6 +62,9 @@ struct Tick {
     crossed: [bool; 2],
 }
 
+/// Of a visit: how long it took on either way, in so many ticks.
+type Cost = ([f64; 2], [f64; 2]);
+
 impl Bench {
     /// Stacks of so many cubes; those of more than five stand two high in a row.
     fn new(bodies: usize, sleeps: bool, islands: usize) -> Self {
@@ -152,10 +155,9 @@ impl Bench {
         let came = (handed.came - began.came) as f64 / visits as f64;
         assert!(came > 0.99 * self.bodies as f64 && handed.came == handed.went, "{handed:?}");
         let idle_ns = idle.map(|mut all| share_of(&mut all, 0.5));
-        let per_body = |side: usize, (took_ns, ticks): &([f64; 2], [f64; 2])| {
-            (took_ns[side] - ticks[side] * idle_ns[side]) / 1e3 / came
-        };
-        let column = |of: &dyn Fn(&([f64; 2], [f64; 2])) -> f64| {
+        let per_body =
+            |side: usize, (took_ns, ticks): &Cost| (took_ns[side] - ticks[side] * idle_ns[side]) / 1e3 / came;
+        let column = |of: &dyn Fn(&Cost) -> f64| {
             let mut all: Vec<f64> = costs.iter().map(of).collect();
             format!("{:>6.2} {:>8.2}", share_of(&mut all, 0.5), share_of(&mut all, 0.999))
         };

@@ -1,9 +1,10 @@
 //! What a tick costs with three fingers among ten thousand things that could move and rest (`shelf.toml`).
 //!
-//! Run `cargo bench -p phantom3 --bench shelf`. Almost all cubes are in the slow list and sleep; a thread of its own makes its
-//! turns, which are not timed: between two ticks they are waited for. The whole fast step (frame in, command out) is timed tick by
+//! Run `cargo bench -p phantom3 --bench shelf`. Almost all cubes are in the slow list and sleep; its turns are made between
+//! ticks and not timed, for they have a thread of their own. The whole fast step (frame in, command out) is timed tick by
 //! tick. Ticks in which the thread was preempted are left out and counted (`out`); `faults` are pages that were not there.
-//! Below each row stands what the ticks did that took longest, one in a thousand, and what such ticks mostly take. `each` is what ticks in which cubes changed lists took more
+//! Below each row stands what the ticks did that took longest, one in a thousand, and what such ticks mostly take: one that
+//! follows a turn of the slow list finds the caches full of that. `each` is what ticks in which cubes changed lists took more
 //! than the median of all, for each cube, the median of these. `loading` is from the file's text to the first tick. First the
 //! cubes have to come to rest, which takes some seconds.
 #![allow(missing_docs, unused_crate_dependencies)]
@@ -18,9 +19,6 @@ use shm_abi::frame::DEVICE_POSITION_VALID;
 use shm_abi::{Command, Frame};
 use std::hint::black_box;
 use std::path::Path;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{self, Sender};
-use std::sync::{Arc, Mutex};
 use std::time::Instant;
 use world::Scene;
 use world::lists::SlowList;
@@ -38,13 +36,10 @@ fn shelf() -> FastStep {
     rig.fast_step().expect("rendering")
 }
 
-/// A run whose slow list waits for its turns.
+/// A run whose slow list is stepped here.
 struct Run {
     step: FastStep,
-    slow: Arc<Mutex<SlowList>>,
-    /// Turns that were asked for, and how many are done.
-    turns: Sender<u32>,
-    turns_done: Arc<AtomicU64>,
+    slow: SlowList,
     tick: u64,
     command: Command,
     row: Row,
@@ -64,24 +59,9 @@ impl Run {
         let took_ns = begin.elapsed().as_nanos() as u64;
         self.tick += 1;
         if self.tick.is_multiple_of(TURN) {
-            self.turn();
+            self.slow.turn(TURN as u32, 1e-3);
         }
         took_ns
-    }
-
-    /// Has the slow list's thread make a turn, and keeps the CPU meanwhile.
-    fn turn(&self) {
-        let done = self.turns_done.load(Ordering::Acquire);
-        self.turns.send(TURN as u32).expect("its thread");
-        while self.turns_done.load(Ordering::Acquire) == done {
-            std::hint::spin_loop();
-        }
-    }
-
-    /// How many of the slow list are awake, and how many pairs it had no room for.
-    fn slow(&self) -> (usize, u64) {
-        let slow = self.slow.lock().expect("nobody panicked");
-        (slow.manipulation().awake().len(), slow.manipulation().left_out())
     }
 
     /// A tick in which nobody knows where the fingers are.
@@ -190,19 +170,6 @@ fn along(t_s: f64, y: f64, z: f64) -> [[f64; 3]; 3] {
     [[x, y, z], [x + 0.1, y + 0.1, z], [x + 0.2, y + 0.2, z]]
 }
 
-/// The thread of the slow list, which ends when nobody can ask it any more.
-fn start(slow: &Arc<Mutex<SlowList>>) -> (Sender<u32>, Arc<AtomicU64>) {
-    let ((turns, asked), done) = (mpsc::channel(), Arc::new(AtomicU64::new(0)));
-    let (slow, counted) = (Arc::clone(slow), Arc::clone(&done));
-    std::thread::spawn(move || {
-        for ticks in asked {
-            slow.lock().expect("nobody panicked").turn(ticks, 1e-3);
-            counted.fetch_add(1, Ordering::Release);
-        }
-    });
-    (turns, done)
-}
-
 fn main() {
     if std::env::args().any(|argument| argument == "--test") {
         return;
@@ -210,20 +177,18 @@ fn main() {
     let begin = Instant::now();
     let mut step = shelf();
     println!("loading: {:.2} s", begin.elapsed().as_secs_f64());
-    let slow = Arc::new(Mutex::new(step.take_slow().expect("too many for the fast list")));
-    let (turns, turns_done) = start(&slow);
-    let mut run =
-        Run { step, slow, turns, turns_done, tick: 0, command: Command::zeroed(), row: Row::empty() };
+    let slow = step.take_slow().expect("too many for the fast list");
+    let mut run = Run { step, slow, tick: 0, command: Command::zeroed(), row: Row::empty() };
     let begin = Instant::now();
-    while run.slow().0 > 0 && run.tick < MOST_SETTLING {
+    while !run.slow.manipulation().awake().is_empty() && run.tick < MOST_SETTLING {
         run.tick(AWAY);
     }
     println!(
         "at rest after {} ticks, {:.1} s; {} still awake, {} pairs left out",
         run.tick,
         begin.elapsed().as_secs_f64(),
-        run.slow().0,
-        run.slow().1
+        run.slow.manipulation().awake().len(),
+        run.slow.manipulation().left_out()
     );
     println!(
         "{:<26} {:>7} {:>7} {:>8}   {:>6} {:>6} {:>9} {:>9} {:>6} {:>6}",
