@@ -98,7 +98,7 @@ impl Manipulation {
         self.pairs.iter().map(|(_, pair)| pair.elastic_energy_j()).sum()
     }
 
-    /// Bodies that do not move any more, in the order in which they were parked: the last [`Made::parked`] of them in the last
+    /// Bodies that do not move any more, in the order in which they were parked: the last [`Made::parked`](crate::Made::parked) of them in the last
     /// tick.
     pub fn parked(&self) -> &[Parked] {
         &self.parked

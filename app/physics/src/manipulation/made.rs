@@ -7,11 +7,11 @@ pub struct Made {
     pub rows: usize,
     /// Rounds of the solver: of the island that took most.
     pub sweeps: usize,
-    /// What was left of its equations, as a share of all forces ([`Solved::residual`]).
+    /// What was left of its equations, as a share of all forces ([`Solved::residual`](crate::Solved::residual)).
     pub residual: f64,
     /// Islands for which it found no answer.
     pub unsolved: usize,
-    /// Bodies that were parked in this tick: the last so many of [`Manipulation::parked`].
+    /// Bodies that were parked in this tick: the last so many of [`Manipulation::parked`](crate::Manipulation::parked).
     pub parked: usize,
     /// Bodies that were stepped.
     pub awake: usize,
@@ -29,7 +29,7 @@ pub struct Parked {
 /// Why a body was parked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reason {
-    /// It was farther from the origin than [`Settings::world_radius_m`].
+    /// It was farther from the origin than [`Settings::world_radius_m`](crate::Settings::world_radius_m).
     LeftTheWorld,
     /// Where it was or how it moved was no number any more.
     NotANumber,
