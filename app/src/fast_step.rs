@@ -214,9 +214,10 @@ impl FastStep {
         }
     }
 
-    /// How much of the forces is felt from the next tick on, 0 to 1; objects get all of them.
+    /// How much of the forces is felt from the next tick on, 0 to 1; objects get as much, times -1.
     pub fn set_strength(&mut self, strength: f64) {
         self.strength = strength;
+        self.objects.set_strength(strength);
     }
 
     /// In the next tick this entity goes to this pose; `false`: it is a body, or nothing here moves it.
@@ -284,6 +285,8 @@ impl FastStep {
                 let hip = is_valid.then_some(Hip { position_W: row.hip, velocity_W });
                 row.force_on_user += finger.feel(felt, &self.effects, &self.entities, hip, moment);
             }
+            row.force_on_user *= self.strength;
+            row.torque_on_user *= self.strength;
         }
         self.objects.note();
         if frame.run_tick >= 0 {
@@ -297,8 +300,8 @@ impl FastStep {
             self.fingers.iter().zip(&mut row.fingers).zip(states)
         {
             let Some(device) = devices.get(finger.device) else { continue };
-            row.force_on_user = finite_or_zero(row.force_on_user * self.strength);
-            row.torque_on_user = finite_or_zero(row.torque_on_user * self.strength);
+            row.force_on_user = finite_or_zero(row.force_on_user);
+            row.torque_on_user = finite_or_zero(row.torque_on_user);
             if let Some(passivity) = passivity {
                 keep_passive(passivity, finger, felt, device, *carried_W, &tick, row);
             }

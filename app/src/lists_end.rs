@@ -16,24 +16,23 @@ pub struct ListsEnd {
     pub late_ticks: u64,
     /// Pairs of entities that came near each other and had no room.
     pub left_out: u64,
-    /// Bodies that fingers felt fixed, because they are part of too large an island to be handed over.
-    pub stuck: usize,
 }
 
 impl fmt::Display for ListsEnd {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Handed { came, went, waited_ticks: [_, most_ticks], unclaimed, too_large } = self.handed;
+        let Handed { came, went, waits, unclaimed, parcels: _ } = self.handed;
         match self.slow {
             Some(slow) => write!(f, "{} fast, {slow} slow", self.fast)?,
             None => write!(f, "{} fast; THE SLOW ONE'S THREAD PANICKED: what it had stood still", self.fast)?,
         }
-        write!(f, "; {came} came, {went} went, longest wait {most_ticks} ticks")?;
+        write!(f, "; {came} came, {went} went")?;
+        if waits.count() > 0 {
+            write!(f, ", waits median {} and longest {} ticks", waits.median_ticks(), waits.most_ticks())?;
+        }
         for (count, what) in [
             (self.late_ticks, "ticks that the slow one was late"),
             (self.left_out, "pairs left out"),
             (unclaimed, "claims without room"),
-            (self.stuck as u64, "felt fixed, in islands too large to come"),
-            (too_large, "times an island was too large to go"),
         ] {
             if count > 0 {
                 write!(f, ", {count} {what}")?;

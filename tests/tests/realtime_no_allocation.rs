@@ -352,7 +352,8 @@ fn the_applications_turn_never_calls_the_heap_while_things_change_lists() {
     let mut fast = play_scene(&directory.path().join("scene.toml"), 1, 0);
     let end = fast.step_mut().end_lists(None).unwrap();
     assert_eq!(end.fast + end.slow.unwrap(), 20, "{end}");
-    assert!(end.handed.came > 50 && end.handed.went > 50, "{end}");
+    // A hundred ways along ten stacks of two. What is ahead or near of the finger when it turns stays: 976 come, about half.
+    assert!(end.handed.came > 500 && end.handed.went > 500, "{end}");
 }
 
 const STACKS: &str = r#"

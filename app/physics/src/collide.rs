@@ -52,6 +52,7 @@ mod ring;
 mod spots;
 
 pub use bounds::bounding_ball;
+pub(crate) use mesh_patch::Searched;
 pub use mesh_patch::{Patch, Patches};
 use spots::{Spot, Spots};
 

@@ -3,6 +3,7 @@
 //! Model: each contact point is a spring of its own; a face at rest on four points is four springs ([`surfacing`],
 //! [`pressed`]). A contact that is found deep at once (objects placed into each other) is let out slowly.
 
+mod crossing;
 mod ledger;
 mod pressed;
 mod surfacing;
@@ -19,6 +20,7 @@ use crate::collide::{
 use crate::restitution::Meeting;
 use crate::row::Row;
 use crate::solver::Motion;
+pub(crate) use crossing::{ANCHORS_AT_ONCE, Head};
 use ledger::{Allowed, Ledger, MAX_SPRINGS, Stretched};
 pub(crate) use pressed::HARD;
 use pressed::{let_out_m_s, row};
@@ -31,15 +33,14 @@ pub(crate) struct Pair {
     pub(crate) entities: [usize; 2],
     /// Places of the bodies in this tick; B may be fixed.
     pub(crate) bodies: (usize, Option<usize>),
-    /// Whether they were near enough to touch in the last tick.
-    pub(crate) is_near: bool,
     pub(crate) surfacing: Surfacing,
     memory: PairMemory,
     /// The memory holds anything.
     remembers: bool,
+    /// One of them is a mesh: only then its places are looked at.
+    has_mesh: bool,
+    /// Those beyond the count are whatever was there.
     anchors: [Anchor; MAX_POINTS],
-    /// Those of the last tick, as many as there were.
-    last: [Anchor; MAX_POINTS],
     count: usize,
     /// Nobody has looked yet whether it touches.
     is_new: bool,
@@ -47,6 +48,15 @@ pub(crate) struct Pair {
     /// Where its rows of this tick begin.
     first_row: usize,
     rows: usize,
+}
+
+/// What a tick's contact points are written to.
+pub(crate) struct Gathered<'t> {
+    pub(crate) rows: &'t mut Vec<Row>,
+    /// Those that may meet what they touch.
+    pub(crate) meetings: &'t mut Vec<Meeting>,
+    /// Room for a pair's anchors of the last tick.
+    pub(crate) last: &'t mut [Anchor; MAX_POINTS],
 }
 
 /// The state that a tick begins with.
@@ -72,9 +82,20 @@ pub(crate) struct End<'t> {
 }
 
 impl Pair {
-    /// That has not touched yet.
-    pub(crate) fn new(entities: [usize; 2], surfacing: Surfacing) -> Self {
-        Self { entities, surfacing, is_new: true, ..Self::default() }
+    /// Begins one that has not touched yet, in the place of one that has ended. What nobody reads of that stays.
+    pub(crate) fn begin(&mut self, entities: [usize; 2], has_mesh: bool, surfacing: Surfacing) {
+        self.forget(has_mesh);
+        (self.entities, self.surfacing, self.has_mesh) = (entities, surfacing, has_mesh);
+        (self.bodies, self.is_new) = ((0, None), true);
+    }
+
+    fn forget(&mut self, has_mesh: bool) {
+        (self.count, self.first_row, self.rows, self.remembers) = (0, 0, 0, false);
+        self.ledger = Ledger::default();
+        self.memory.words = Default::default();
+        if has_mesh {
+            self.memory.patches = Default::default();
+        }
     }
 
     /// The force on A in the last tick \[N\], over all points.
@@ -82,16 +103,17 @@ impl Pair {
         rows.iter().skip(self.first_row).take(self.rows).map(|row| row.force_W).sum()
     }
 
-    /// Finds where it touches, and appends a row for each point; notes those that may meet what they touch.
-    pub(crate) fn gather(&mut self, start: &Start<'_>, rows: &mut Vec<Row>, meetings: &mut Vec<Meeting>) {
+    /// Finds where it touches, and appends a row for each point; notes those that may meet what they touch. Says whether the
+    /// two are near enough to touch.
+    pub(crate) fn gather(&mut self, start: &Start<'_>, gathered: &mut Gathered<'_>) -> bool {
+        let Gathered { rows, meetings, last } = gathered;
         (self.first_row, self.rows) = (rows.len(), 0);
         let [a, b] = self.entities.map(|index| &start.entities[index]);
         let speed_m_s = self.closing_speed(start);
         let reach_m = REACH_M + speed_m_s * start.dt_s;
-        self.is_near = is_near(a, b, reach_m);
-        if !self.is_near {
+        if !is_near(a, b, reach_m) {
             self.pass_by();
-            return;
+            return false;
         }
         self.remembers = true;
         let (in_A, in_B) = (Solid { shape: &a.shape, X_W: &a.X_WB }, Solid { shape: &b.shape, X_W: &b.X_WB });
@@ -99,7 +121,7 @@ impl Pair {
         contact_points(in_A, in_B, reach_m, &mut self.memory, &mut found);
         let poses = [[&a.X_WB, &b.X_WB], [&a.previous_X_WB, &b.previous_X_WB]];
         let begins = self.count == 0;
-        self.carry(&found, poses, reach_m, speed_m_s * start.dt_s);
+        self.carry(&found, poses, reach_m, speed_m_s * start.dt_s, last);
         // A contact that is not found for a tick may still be there: until then the account stays.
         if self.count > 0 {
             self.press(found.as_slice(), begins, start);
@@ -107,7 +129,7 @@ impl Pair {
         self.is_new = false;
         for (anchor, point) in self.anchors.iter_mut().zip(found.as_slice()) {
             if rows.len() == rows.capacity() {
-                return;
+                break;
             }
             let row = row(self.bodies, &self.surfacing, anchor, point, &b.X_WB, start);
             if let Response::Impulse { restitution } = self.surfacing.response {
@@ -117,6 +139,7 @@ impl Pair {
             rows.push(row);
             self.rows += 1;
         }
+        true
     }
 
     /// How far each point's springs are stretched: as far as it is deep and was dragged, if that was worked for.
@@ -167,11 +190,14 @@ impl Pair {
 
     /// They do not touch in this tick.
     pub(crate) fn pass_by(&mut self) {
-        (self.is_near, self.count, self.rows) = (false, 0, 0);
+        (self.count, self.rows) = (0, 0);
         self.ledger = Ledger::default();
         // They may meet again from another side.
         if std::mem::take(&mut self.remembers) {
-            self.memory = PairMemory::default();
+            self.memory.words = Default::default();
+            if self.has_mesh {
+                self.memory.patches = Default::default();
+            }
         }
     }
 
@@ -218,9 +244,10 @@ impl Pair {
         [now, last]: [[&Isometry3<f64>; 2]; 2],
         reach_m: f64,
         moved_m: f64,
+        last_anchors: &mut [Anchor; MAX_POINTS],
     ) {
-        self.last[..self.count].copy_from_slice(&self.anchors[..self.count]);
-        let was = &self.last[..self.count];
+        let was = &mut last_anchors[..self.count];
+        was.copy_from_slice(&self.anchors[..self.count]);
         let mut is_free = [false; MAX_POINTS];
         is_free.iter_mut().take(self.count).for_each(|free| *free = true);
         let begins = self.count == 0;

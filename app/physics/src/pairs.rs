@@ -5,11 +5,12 @@
 //! at them until one is woken.
 //! Invariants: of two bodies there is one pair, whose first is the one of the lower number; pairs are gone through in
 //! ascending order; no allocation after `with_capacity`. Where there is no room for one more it is left out, and counted.
+//! What has ended is not cleared: who begins in its place overwrites what is read.
 
-use haptics::Entity;
+use haptics::{Entity, Shape};
 
 use crate::broad_phase::BroadPhase;
-use crate::pair::{Pair, Response, Surfacing};
+use crate::pair::{Head, Pair, Response, Surfacing};
 
 /// Pairs, and which bodies and entities they are of.
 #[derive(Debug, Clone)]
@@ -32,6 +33,15 @@ pub(crate) struct Key {
     /// An entity, which may be a body of a higher number.
     pub(crate) entity: u32,
     place: u32,
+    /// Whether they were near enough to touch in the last tick, or nobody has looked yet.
+    pub(crate) is_near: bool,
+}
+
+impl Key {
+    /// Of two that are at this place in the pool.
+    pub(crate) fn new([body, entity]: [u32; 2], is_near: bool, place: u32) -> Self {
+        Self { body, entity, place, is_near }
+    }
 }
 
 /// Who is who.
@@ -69,6 +79,36 @@ impl Pairs {
         (key, &mut self.pool[key.place as usize])
     }
 
+    /// Takes note whether one of them is near enough to touch.
+    pub(crate) fn set_near(&mut self, at: usize, is_near: bool) {
+        self.awake[at].is_near = is_near;
+    }
+
+    /// One that is known by its key, wherever that is.
+    pub(crate) fn of_key(&self, key: &Key) -> &Pair {
+        &self.pool[key.place as usize]
+    }
+
+    /// The keys of all pairs, those without an awake body last.
+    pub(crate) fn keys(&self) -> impl Iterator<Item = &Key> {
+        self.awake.iter().chain(&self.asleep)
+    }
+
+    /// Those with a body that is awake.
+    pub(crate) fn awake_keys(&self) -> &[Key] {
+        &self.awake
+    }
+
+    /// How many [`Self::keys`] there are.
+    pub(crate) fn key_count(&self) -> usize {
+        self.awake.len() + self.asleep.len()
+    }
+
+    /// One of them.
+    pub(crate) fn key_at(&self, at: usize) -> &Key {
+        self.awake.get(at).unwrap_or_else(|| &self.asleep[at - self.awake.len()])
+    }
+
     /// Those that have a body that is awake, in order.
     pub(crate) fn iter_awake(&self) -> impl Iterator<Item = (Key, &Pair)> {
         self.awake.iter().map(|key| (*key, &self.pool[key.place as usize]))
@@ -88,11 +128,10 @@ impl Pairs {
             matches!(boxes, [Some(one), Some(other)] if one.overlaps(other)) || boxes.contains(&None)
         };
         let is_of_body = |key: &Key| key.body as usize == body || key.entity as usize == own;
-        let (pool, unused) = (&mut self.pool, &mut self.unused);
+        let unused = &mut self.unused;
         self.awake.retain(|key| {
             let stays = !is_of_body(key) || overlap(key);
             if !stays {
-                pool[key.place as usize] = Pair::default();
                 unused.push(key.place);
             }
             stays
@@ -109,10 +148,7 @@ impl Pairs {
 
     /// Ends all of them.
     pub(crate) fn clear(&mut self) {
-        for key in self.awake.drain(..).chain(self.asleep.drain(..)) {
-            self.pool[key.place as usize] = Pair::default();
-            self.unused.push(key.place);
-        }
+        self.unused.extend(self.awake.drain(..).chain(self.asleep.drain(..)).map(|key| key.place));
     }
 
     fn begin(&mut self, body: usize, entity: usize, who: &Who<'_>) {
@@ -139,9 +175,11 @@ impl Pairs {
             return;
         };
         let entities = [who.entities[first], second];
-        let surfacing = Surfacing::between(&who.all[entities[0]], &who.all[second], who.response);
-        self.pool[place as usize] = Pair::new(entities, surfacing);
-        self.awake.insert(place_in_order, Key { body: first as u32, entity: second as u32, place });
+        let both = entities.map(|entity| &who.all[entity]);
+        let surfacing = Surfacing::between(both[0], both[1], who.response);
+        let has_mesh = both.iter().any(|entity| matches!(entity.shape, Shape::Mesh(_)));
+        self.pool[place as usize].begin(entities, has_mesh, surfacing);
+        self.awake.insert(place_in_order, Key::new([first as u32, second as u32], true, place));
     }
 
     /// Takes up the pairs of a body that was woken, and begins those that are missing.
@@ -173,40 +211,74 @@ impl Pairs {
         });
     }
 
-    /// Puts a pair that comes from elsewhere, with all that it remembers; one that is there already becomes it.
-    pub(crate) fn put(&mut self, key: Key, pair: &Pair, is_awake: impl Fn(usize) -> bool, who: &Who<'_>) {
-        let other = who.bodies[key.entity as usize];
-        let is_awake = is_awake(key.body as usize) || other.is_some_and(|other| is_awake(other as usize));
-        let at =
-            |keys: &[Key]| keys.binary_search_by_key(&(key.body, key.entity), |key| (key.body, key.entity));
-        let known = [&self.awake, &self.asleep].into_iter().find_map(|keys| Some(keys[at(keys).ok()?].place));
-        if let Some(place) = known {
-            self.pool[place as usize] = pair.clone();
-            return;
-        }
+    /// Begins a pair as it was elsewhere, in none of the lists: `None` where there is no room.
+    pub(crate) fn begin_as(&mut self, head: &Head) -> Option<u32> {
         let Some(place) = self.unused.pop() else {
             self.left_out += 1;
-            return;
+            return None;
         };
-        self.pool[place as usize] = pair.clone();
-        let keys = if is_awake { &mut self.awake } else { &mut self.asleep };
-        let Err(at) = at(keys) else { return };
-        keys.insert(at, Key { place, ..key });
+        self.pool[place as usize].begin_as(head);
+        Some(place)
     }
 
-    /// Ends all pairs of a body.
-    pub(crate) fn leave(&mut self, body: usize, who: &Who<'_>) {
-        let own = who.entities[body];
-        let (pool, unused) = (&mut self.pool, &mut self.unused);
+    /// One that was [begun](Self::begin_as) there.
+    pub(crate) fn at_place(&mut self, place: u32) -> &mut Pair {
+        &mut self.pool[place as usize]
+    }
+
+    /// Puts pairs into the lists that were [begun](Self::begin_as) apart; one that is there already becomes what comes.
+    pub(crate) fn let_in(&mut self, coming: &[Key], is_awake: impl Fn(usize) -> bool, who: &Who<'_>) {
+        for key in coming {
+            let other = who.bodies[key.entity as usize];
+            let is_awake = is_awake(key.body as usize) || other.is_some_and(|other| is_awake(other as usize));
+            let at = |keys: &[Key]| {
+                keys.binary_search_by_key(&(key.body, key.entity), |key| (key.body, key.entity))
+            };
+            for keys in [&mut self.awake, &mut self.asleep] {
+                if let Ok(known) = at(keys) {
+                    self.unused.push(keys.remove(known).place);
+                }
+            }
+            let keys = if is_awake { &mut self.awake } else { &mut self.asleep };
+            if let Err(at) = at(keys) {
+                keys.insert(at, *key);
+            }
+        }
+    }
+
+    /// Takes the pairs of bodies that leave out of the lists: `taken` are those that go along, with what is fixed and with each
+    /// other. Those with who is awake and stays go on, all others end.
+    pub(crate) fn take_out(
+        &mut self,
+        leaves: impl Fn(usize) -> bool,
+        is_awake: impl Fn(usize) -> bool,
+        who: &Who<'_>,
+        taken: &mut Vec<Key>,
+    ) {
+        let unused = &mut self.unused;
         for keys in [&mut self.awake, &mut self.asleep] {
             keys.retain(|key| {
-                let goes = key.body as usize == body || key.entity as usize == own;
-                if goes {
-                    pool[key.place as usize] = Pair::default();
+                let first = key.body as usize;
+                let other = who.bodies[key.entity as usize].map(|other| other as usize);
+                let stays = match (leaves(first), other.map(&leaves)) {
+                    (false, None | Some(false)) => true,
+                    (true, None | Some(true)) => {
+                        taken.push(*key);
+                        return false;
+                    }
+                    (true, Some(false)) => other.is_some_and(&is_awake),
+                    (false, Some(true)) => is_awake(first),
+                };
+                if !stays {
                     unused.push(key.place);
                 }
-                !goes
+                stays
             });
         }
+    }
+
+    /// Ends one that was [taken out](Self::take_out).
+    pub(crate) fn end(&mut self, key: &Key) {
+        self.unused.push(key.place);
     }
 }

@@ -17,6 +17,15 @@ pub enum Standing {
     Parked,
     /// Somebody else steps it: it is as if it were fixed where that one said last.
     Elsewhere,
+    /// On its way to here: fixed where it was when it left, until all of its island is here.
+    Coming,
+}
+
+impl Standing {
+    /// Whether it is not stepped here because it is elsewhere or on its way.
+    pub fn is_away(self) -> bool {
+        matches!(self, Self::Elsewhere | Self::Coming)
+    }
 }
 
 /// All bodies, by their numbers.
@@ -91,6 +100,24 @@ impl Roster {
             Ok(at) => drop(self.awake.remove(at)),
             Err(at) => self.awake.insert(at, body),
         }
+        for (place, &body) in self.awake.iter().enumerate() {
+            self.places[body] = place;
+        }
+    }
+
+    /// Gives many another standing at once; for how long each has rested stays what it is, and who begins to sleep does so alone.
+    pub(crate) fn set_all(&mut self, bodies: impl Iterator<Item = (usize, Standing)>) {
+        for (body, standing) in bodies {
+            let was = std::mem::replace(&mut self.standings[body], standing);
+            match standing {
+                Standing::Asleep => self.next[body] = body,
+                Standing::Awake if was != standing => self.awake.push(body),
+                _ => {}
+            }
+        }
+        let standings = &self.standings;
+        self.awake.retain(|body| standings[*body] == Standing::Awake);
+        self.awake.sort_unstable();
         for (place, &body) in self.awake.iter().enumerate() {
             self.places[body] = place;
         }

@@ -1,11 +1,13 @@
 //! Islands that go from one to another that steps them: nothing is lost, and nobody can tell.
 
 mod common;
+#[path = "common/meshes.rs"]
+mod meshes;
 
 use common::{DT, body, floor, object};
 use haptics::{Cuboid, Entity};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
-use physics::{Body, Manipulation, Parcel, Settings, Sleep, Standing};
+use physics::{Body, Manipulation, Settings, Sleep, Standing};
 
 const SIZE: f64 = 0.05;
 
@@ -36,36 +38,67 @@ struct Side {
 
 /// Sends the island of a body from one side to the other one.
 fn send(from: &mut Side, to: &mut Side, body: usize) {
-    let mut island = Vec::with_capacity(8);
+    send_with_pauses(from, to, body, |_, _| ());
+}
+
+/// With something to do before each parcel.
+fn send_with_pauses(
+    from: &mut Side,
+    to: &mut Side,
+    body: usize,
+    mut pause: impl FnMut(&mut Side, &mut Side),
+) {
+    let mut island = Vec::with_capacity(64);
     assert!(from.manipulation.island(body, &mut island));
-    let expected = from.manipulation.parcels(&island);
-    let mut parcels: Vec<Parcel> = Vec::new();
-    from.manipulation.release(&island, &from.entities, |parcel| parcels.push(parcel));
-    assert_eq!(parcels.len(), expected);
-    assert!(parcels.last().unwrap().is_last());
-    for parcel in &parcels {
-        to.manipulation.accept(parcel, &mut to.entities);
+    from.manipulation.release(&island, &from.entities);
+    let mut arrived = Vec::new();
+    while from.manipulation.is_releasing() {
+        pause(from, to);
+        assert!(arrived.is_empty());
+        for &body in &island {
+            assert_eq!(from.manipulation.standing(body), Standing::Elsewhere);
+            assert!(to.manipulation.standing(body).is_away(), "nobody steps half an island");
+        }
+        let parcel = from.manipulation.next_parcel(&from.entities).unwrap();
+        to.manipulation.accept(&parcel, &mut to.entities, |body| arrived.push(body));
     }
+    assert!(from.manipulation.next_parcel(&from.entities).is_none());
+    assert_eq!(arrived, island);
     for body in island {
         assert_eq!(from.manipulation.standing(body), Standing::Elsewhere);
-        assert_ne!(to.manipulation.standing(body), Standing::Elsewhere);
+        assert!(!to.manipulation.standing(body).is_away());
     }
 }
 
-#[test]
-fn islands_that_come_and_go_move_like_those_that_stay_to_the_bit() {
-    let mut sides = [true, false].map(|has_all| {
-        let entities = entities(0.2);
+/// As [`entities`], all of them meshes of many faces: their pairs remember places, too.
+fn mesh_entities(slope: f64) -> Vec<Entity> {
+    let mut entities = entities(slope);
+    let block = meshes::build(meshes::block(4, SIZE, SIZE, |_, _| 0.0));
+    for entity in &mut entities[1..] {
+        // A block's frame is in the middle of its top.
+        let pose = entity.X_WB * Isometry3::translation(0.0, 0.5 * SIZE, 0.0);
+        *entity = object(block.clone(), pose, 1000.0, 0.5);
+    }
+    entities
+}
+
+/// Two sides, the first of which has all.
+fn sides(entities: &[Entity]) -> [Side; 2] {
+    [true, false].map(|has_all| {
+        let entities = entities.to_vec();
         let mut manipulation = manipulation(&entities, false).without_those_elsewhere();
         if !has_all {
             (0..4).for_each(|body| manipulation.give_away(body, &entities));
         }
         Side { entities, manipulation }
-    });
-    let mut stays = entities(0.2);
+    })
+}
+
+fn come_and_go_at_random(mut stays: Vec<Entity>, ticks: u32) -> Vec<Body> {
+    let mut sides = sides(&stays);
     let mut staying = manipulation(&stays, false);
     let mut seed = 7_u64;
-    for tick in 0..6000 {
+    for tick in 0..ticks {
         staying.step(&mut stays, &mut [], DT);
         for side in &mut sides {
             side.manipulation.step(&mut side.entities, &mut [], DT);
@@ -94,9 +127,52 @@ fn islands_that_come_and_go_move_like_those_that_stay_to_the_bit() {
             _ => send(one, other, body),
         }
     }
+    staying.bodies().to_vec()
+}
+
+#[test]
+fn islands_that_come_and_go_move_like_those_that_stay_to_the_bit() {
+    let bodies = come_and_go_at_random(entities(0.2), 6000);
     // It fell and slid; and the stack, whose springs let it lean, has toppled.
-    assert!(staying.bodies()[2].centre_W.y < 0.1);
-    assert!(staying.bodies()[3].centre_W.y < 0.2);
+    assert!(bodies[2].centre_W.y < 0.1);
+    assert!(bodies[3].centre_W.y < 0.2);
+}
+
+#[test]
+fn meshes_that_come_and_go_move_like_those_that_stay_to_the_bit() {
+    let bodies = come_and_go_at_random(mesh_entities(0.2), 1500);
+    assert!(bodies[3].centre_W.y < 0.2, "it fell and slid");
+}
+
+#[test]
+fn an_island_that_comes_parcel_by_parcel_stands_still_meanwhile_and_goes_on_to_the_bit() {
+    let begin = mesh_entities(0.2);
+    let [mut one, mut other] = sides(&begin);
+    let mut stays = begin.clone();
+    let mut staying = manipulation(&stays, false);
+    let mut seen_on_the_way = 0;
+    for round in 0..40 {
+        // The fourth falls apart from them, all the time.
+        for _ in 0..1 + round % 3 {
+            staying.step(&mut stays, &mut [], DT);
+            for side in [&mut one, &mut other] {
+                side.manipulation.step(&mut side.entities, &mut [], DT);
+            }
+        }
+        let (from, to) = if round % 2 == 0 { (&mut one, &mut other) } else { (&mut other, &mut one) };
+        let before = from.manipulation.bodies()[..3].to_vec();
+        send_with_pauses(from, to, 0, |from, to| {
+            for side in [from, to] {
+                side.manipulation.step(&mut side.entities, &mut [], DT);
+                assert!(side.manipulation.awake().iter().all(|body| *body == 3));
+                seen_on_the_way += 1;
+            }
+        });
+        assert_eq!(to.manipulation.bodies()[..3], before);
+        assert_eq!(to.manipulation.bodies()[..3], staying.bodies()[..3], "round {round}");
+    }
+    // A block that stands on a block has dozens of points.
+    assert!(seen_on_the_way > 40 * 20, "{seen_on_the_way}");
 }
 
 #[test]

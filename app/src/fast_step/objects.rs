@@ -49,6 +49,7 @@ pub struct Objects {
     /// Those of them that are not as they were a tick before.
     changed: Vec<u32>,
     period_s: f64,
+    strength: f64,
     /// What the last tick took.
     pub made: Made,
     /// By how much it moved them (s).
@@ -87,6 +88,7 @@ impl Objects {
             manipulation,
             lists: None,
             period_s,
+            strength: 1.0,
             made: Made::default(),
             stepped_s: 0.0,
         };
@@ -113,10 +115,7 @@ impl Objects {
         let lists = self.lists.as_mut()?;
         let late_ticks = slow.as_ref().map_or(0, |slow| slow.late_ticks);
         lists.slow = lists.slow.take().or(slow.map(|slow| slow.slow));
-        if let Some(slow) = &mut lists.slow {
-            slow.take_in();
-        }
-        lists.hand_over.take_in_all(&mut self.manipulation, entities);
+        lists.hand_over.end(&mut self.manipulation, entities, lists.slow.as_mut());
         let of_slow = lists.slow.as_ref().map_or(0, |slow| slow.manipulation().left_out());
         Some(ListsEnd {
             fast: lists.hand_over.here(),
@@ -124,7 +123,6 @@ impl Objects {
             handed: lists.hand_over.handed(),
             late_ticks,
             left_out: self.manipulation.left_out() + of_slow,
-            stuck: lists.slow.as_ref().map_or(0, SlowList::too_large),
         })
     }
 
@@ -227,7 +225,14 @@ impl Objects {
         }
     }
 
-    /// Moves them by a tick of this length (s), and changes the fingers' forces to those which moved them.
+    /// Of the forces of fingers only this share acts from now on, on objects and users alike.
+    pub fn set_strength(&mut self, strength: f64) {
+        self.strength = strength;
+        self.manipulation.set_finger_share(strength);
+    }
+
+    /// Moves them by a tick of this length (s), and changes the fingers' forces, of which only the share that acts is there any
+    /// more, to those which moved them.
     pub fn step(
         &mut self,
         entities: &mut [Entity],
@@ -257,7 +262,8 @@ impl Objects {
                 }
             }
         }
-        let rendered = self.touches.iter().map(|touch| -touch.force_on_user_W);
+        let strength = self.strength;
+        let rendered = self.touches.iter().map(|touch| -touch.force_on_user_W * strength);
         add_to_rows(rendered, &self.touches, fingers, rows);
         for ((tick, button), (row, finger)) in
             self.ticks.iter_mut().zip(&self.buttons).zip(rows.iter().zip(fingers))
@@ -304,7 +310,7 @@ impl Objects {
             for reaction in
                 felt.reactions().iter().filter(|reaction| self.manipulation.is_body(reaction.entity))
             {
-                rows[finger].force_on_user -= reaction.force_on_user_W;
+                rows[finger].force_on_user -= reaction.force_on_user_W * self.strength;
                 if self.pulls.len() < MAX_PULLS {
                     self.pulls.push(Pull {
                         entity: reaction.entity,

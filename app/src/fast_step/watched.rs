@@ -6,7 +6,7 @@
 use super::FastStep;
 use crate::row::Row;
 use haptics::ContactState;
-use physics::{Reason, Standing};
+use physics::Reason;
 use world::events::{EventSender, Kind, List, MOST_TOUCHED, PairForce, Touching, Watch, Why};
 use world::lists::Handed;
 
@@ -35,7 +35,7 @@ impl EventTeller {
             watch: Watch::new(step.fingers.len(), pairs, step.period_s),
             out,
             touching: Vec::with_capacity(MOST_TOUCHED),
-            elsewhere: (0..bodies).map(|body| manipulation.standing(body) == Standing::Elsewhere).collect(),
+            elsewhere: (0..bodies).map(|body| manipulation.standing(body).is_away()).collect(),
             handed: Handed::default(),
             spaces: step.fingers.iter().map(|finger| finger.finger.space()).collect(),
         }
@@ -103,7 +103,7 @@ impl EventTeller {
         self.handed = handed;
         let manipulation = step.objects.manipulation();
         for (body, was) in self.elsewhere.iter_mut().enumerate() {
-            let is = manipulation.standing(body) == Standing::Elsewhere;
+            let is = manipulation.standing(body).is_away();
             if std::mem::replace(was, is) != is {
                 let (entity, to) =
                     (manipulation.entity_of(body) as u32, if is { List::Slow } else { List::Fast });

@@ -20,9 +20,11 @@
 mod fast;
 mod link;
 mod slow;
+mod waits;
 
 pub use fast::{FastList, Handed, Reach};
 pub use slow::SlowList;
+pub use waits::Waits;
 
 use haptics::Entity;
 use physics::{Body, BodyError, Manipulation, Settings};

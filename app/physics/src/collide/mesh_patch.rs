@@ -36,7 +36,7 @@ pub struct Patches {
 
 /// What a search has seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Searched {
+pub(crate) struct Searched {
     pub(super) X_MO: Isometry3<f64>,
     /// All places whose gap was no larger are known \[m\].
     pub(super) within_m: f64,
@@ -105,6 +105,32 @@ impl Patches {
             self.all.swap(0, pressed);
             self.searched = None;
         }
+    }
+}
+
+/// What crosses to another thread: only what is not as in new ones.
+impl Patches {
+    /// The next place from this number on that is not as a new one, and its number.
+    pub(crate) fn used_from(&self, first: usize) -> Option<(usize, Patch)> {
+        let is_used = |(_, patch): &(usize, Patch)| *patch != Patch::default();
+        self.all.iter().copied().enumerate().skip(first).find(is_used)
+    }
+
+    /// Puts what [`Self::used_from`] found.
+    pub(crate) fn put(&mut self, number: usize, patch: &Patch) {
+        if let Some(own) = self.all.get_mut(number) {
+            *own = *patch;
+        }
+    }
+
+    /// From where a search found them.
+    pub(crate) fn searched(&self) -> Option<Searched> {
+        self.searched
+    }
+
+    /// Takes note of that.
+    pub(crate) fn go_on_from(&mut self, searched: Option<Searched>) {
+        self.searched = searched;
     }
 }
 

@@ -78,11 +78,11 @@ impl Manipulation {
         let awake = self.roster.awake();
         self.sets.begin(awake.len());
         for at in 0..self.pairs.awake_count() {
-            let (key, pair) = self.pairs.awake_at(at);
+            let (key, _) = self.pairs.awake_at(at);
             let places =
                 [self.roster.place(key.body as usize), self.roster.place_of_entity(key.entity as usize)];
             if let [Some(one), Some(other)] = places
-                && pair.is_near
+                && key.is_near
             {
                 self.sets.join(one, other);
             }

@@ -5,7 +5,9 @@ use nalgebra::Vector3;
 use physics::{Aabb, Manipulation, Standing};
 
 use super::ListSettings;
-use super::link::FastEnd;
+use super::SlowList;
+use super::link::{Came, Claim, FastEnd, Most, send, take_in};
+use super::waits::Waits;
 
 /// Where a finger is and could be soon.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,12 +27,12 @@ pub struct Handed {
     pub came: u64,
     /// Bodies that went there.
     pub went: u64,
-    /// Ticks from a claim until the body was there: of all together, and the most.
-    pub waited_ticks: [u64; 2],
+    /// Parcels in which they came, and in which they went.
+    pub parcels: [u64; 2],
+    /// Ticks from a claim until the body was stepped here.
+    pub waits: Waits,
     /// Claims for which there was no room.
     pub unclaimed: u64,
-    /// How often an island was too large to be given away.
-    pub too_large: u64,
 }
 
 /// What the fast side knows of who is where.
@@ -63,7 +65,7 @@ impl FastList {
             stays: vec![u32::from(all_slow); bodies].into(),
             here: all_here(bodies, all_slow),
             next: 0,
-            island: Vec::with_capacity(MOST_AT_ONCE),
+            island: Vec::with_capacity(bodies),
             soon: Vec::with_capacity(MOST_FINGERS),
             around: Vec::with_capacity(MOST_FINGERS),
             handed: Handed::default(),
@@ -104,22 +106,38 @@ impl FastList {
 
     /// After a tick: gives an island away that nobody is near, if there is more here than there should be.
     pub fn end_tick(&mut self, manipulation: &mut Manipulation, entities: &[Entity]) {
-        if self.here.len() <= self.settings.fast_bodies {
+        if !self.send(manipulation, entities) || self.here.len() <= self.settings.fast_bodies {
             return;
         }
         for _ in 0..LOOKED_AT.min(self.here.len()) {
             self.next = (self.next + 1) % self.here.len();
             let body = self.here[self.next] as usize;
-            if self.may_go(body, manipulation) && self.give_away(body, manipulation, entities) {
+            if self.may_go(body, manipulation) {
+                self.give_away(body, manipulation, entities);
                 return;
             }
         }
     }
 
-    /// Takes in everything that is on its way, whatever it takes: when both threads have ended.
-    pub fn take_in_all(&mut self, manipulation: &mut Manipulation, entities: &mut [Entity]) {
-        while self.end.back.slots() > 0 {
-            self.take_in(manipulation, entities);
+    /// When both threads have ended: everything that is on its way arrives, if the slow side is there.
+    pub fn end(
+        &mut self,
+        manipulation: &mut Manipulation,
+        entities: &mut [Entity],
+        mut slow: Option<&mut SlowList>,
+    ) {
+        loop {
+            let mut all_sent = self.send(manipulation, entities);
+            if let Some(slow) = &mut slow {
+                slow.take_in();
+                all_sent &= slow.send();
+            }
+            while self.end.back.slots() > 0 {
+                self.take_in_parcels(manipulation, entities);
+            }
+            if slow.is_none() || (all_sent && self.end.out.slots() == self.end.out.buffer().capacity()) {
+                return;
+            }
         }
     }
 
@@ -135,27 +153,28 @@ impl FastList {
                 );
             }
         }
-        for _ in 0..PARCELS_A_TICK {
-            let Ok(parcel) = self.end.back.pop() else { break };
-            if let Some(body) = parcel.body() {
-                self.here.push(body as u32);
-                self.handed.came += 1;
-                let claimed = std::mem::take(&mut self.claimed[body]);
-                let waited = self.tick.saturating_sub(claimed);
-                if claimed > 0 {
-                    let [all, most] = &mut self.handed.waited_ticks;
-                    (*all, *most) = (*all + waited, waited.max(*most));
-                }
+        self.take_in_parcels(manipulation, entities);
+    }
+
+    fn take_in_parcels(&mut self, manipulation: &mut Manipulation, entities: &mut [Entity]) {
+        let Self { end, here, handed, claimed, tick, .. } = self;
+        let taken = take_in(&mut end.back, manipulation, entities, TAKEN_A_TICK, |came| {
+            let Came::Whole(body) = came else { return };
+            here.push(body as u32);
+            handed.came += 1;
+            let claimed = std::mem::take(&mut claimed[body]);
+            if claimed > 0 {
+                handed.waits.add(tick.saturating_sub(claimed));
             }
-            manipulation.accept(&parcel, entities);
-        }
+        });
+        self.handed.parcels[0] += taken as u64;
     }
 
     fn claim_what_is_near(&mut self, manipulation: &Manipulation, entities: &[Entity]) {
-        let Self { soon, claimed, end, handed, tick, settings, .. } = self;
+        let Self { soon, claimed, stays, end, handed, tick, settings, .. } = self;
         let mut claim = |body: usize| {
             if claimed[body] == 0 && manipulation.standing(body) == Standing::Elsewhere {
-                match end.claims.push(body as u32) {
+                match end.claims.push(Claim { body: body as u32, stay: stays[body] }) {
                     Ok(()) => claimed[body] = *tick,
                     Err(_) => handed.unclaimed += 1,
                 }
@@ -180,26 +199,30 @@ impl FastList {
         is_here && around.is_some_and(|around| !is_near(around)) && !manipulation.is_held(body)
     }
 
-    fn give_away(&mut self, body: usize, manipulation: &mut Manipulation, entities: &[Entity]) -> bool {
+    fn give_away(&mut self, body: usize, manipulation: &mut Manipulation, entities: &[Entity]) {
         let mut island = std::mem::take(&mut self.island);
-        // Larger ones stay: to send them would take more than a tick may.
-        let is_whole = manipulation.island(body, &mut island);
-        self.handed.too_large += u64::from(!is_whole);
-        let goes = is_whole
+        let goes = manipulation.island(body, &mut island)
             && island.iter().all(|&body| self.may_go(body, manipulation))
-            && !manipulation.is_met(&island, entities, self.settings.ahead_s)
-            && manipulation.parcels(&island) <= self.end.out.slots();
+            && !manipulation.is_met(&island, entities, self.settings.ahead_s);
         if goes {
             for &body in &island {
                 self.stays[body] += 1;
             }
             self.here.retain(|body| island.binary_search(&(*body as usize)).is_err());
             self.handed.went += island.len() as u64;
-            // There is room.
-            manipulation.release(&island, entities, |parcel| drop(self.end.out.push(parcel)));
+            manipulation.release(&island, entities);
+            self.send(manipulation, entities);
         }
         self.island = island;
-        goes
+    }
+
+    /// Sends on what is leaving, as much as a tick may; says whether nothing is left.
+    fn send(&mut self, manipulation: &mut Manipulation, entities: &[Entity]) -> bool {
+        if manipulation.is_releasing() {
+            let sent = send(&mut self.end.out, manipulation, entities, PARCELS_A_TICK);
+            self.handed.parcels[1] += sent as u64;
+        }
+        !manipulation.is_releasing()
     }
 }
 
@@ -216,12 +239,12 @@ fn is_finite(finger: &Reach) -> bool {
     finger.hip_W.iter().chain(finger.velocity_W.iter()).all(|x| x.is_finite())
 }
 
-/// No island with more bodies is given away.
-const MOST_AT_ONCE: usize = 16;
 const MOST_FINGERS: usize = crate::MAX_DEVICES;
 /// So many bodies are looked at in a tick for being given away.
 const LOOKED_AT: usize = 4;
-/// So many parcels are taken in in a tick.
-const PARCELS_A_TICK: usize = 48;
+/// So many parcels are sent in a tick.
+const PARCELS_A_TICK: usize = 64;
+/// So many are taken in: two cubes on a floor, or as much of a large island as is sent.
+const TAKEN_A_TICK: Most = Most { parcels: PARCELS_A_TICK, with_an_end: 6 };
 /// So many places of what is in the slow list.
 const STANDS_A_TICK: usize = 16;

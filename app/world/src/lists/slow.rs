@@ -3,7 +3,7 @@
 use haptics::Entity;
 use physics::{Manipulation, Standing};
 
-use super::link::{SlowEnd, Stand};
+use super::link::{Came, Claim, Most, SlowEnd, Stand, send, take_in};
 
 /// The slow list.
 pub struct SlowList {
@@ -13,13 +13,11 @@ pub struct SlowList {
     /// Of each body, how often it came.
     stays: Box<[u32]>,
     /// Claimed, and not yet given away.
-    claimed: Vec<usize>,
+    claimed: Vec<Claim>,
     island: Vec<usize>,
     /// Bodies whose place has not been told since it changed, each once.
     untold: Vec<usize>,
     is_untold: Box<[bool]>,
-    /// Bodies that were claimed, and whose island no queue has room for.
-    too_large: Vec<usize>,
     stepped: u64,
 }
 
@@ -36,7 +34,6 @@ impl SlowList {
             island: Vec::with_capacity(bodies),
             untold: Vec::with_capacity(bodies),
             is_untold: vec![false; bodies].into(),
-            too_large: Vec::new(),
             stepped: 0,
         }
     }
@@ -59,12 +56,21 @@ impl SlowList {
 
     /// Takes in everything that is on its way.
     pub fn take_in(&mut self) {
-        while let Ok(parcel) = self.end.back.pop() {
-            if let Some(body) = parcel.body() {
-                self.stays[body] += 1;
+        let Self { end, manipulation, entities, stays, .. } = self;
+        take_in(&mut end.back, manipulation, entities, Most::ALL, |came| {
+            if let Came::Part(body) = came {
+                stays[body] += 1;
             }
-            self.manipulation.accept(&parcel, &mut self.entities);
+        });
+    }
+
+    /// Sends on what is leaving, as far as there is room; says whether nothing is left.
+    pub(super) fn send(&mut self) -> bool {
+        let Self { end, manipulation, entities, .. } = self;
+        if manipulation.is_releasing() {
+            send(&mut end.out, manipulation, entities, usize::MAX);
         }
+        !manipulation.is_releasing()
     }
 
     /// All bodies; those that are not in this list as they were when they left it.
@@ -83,36 +89,35 @@ impl SlowList {
         (0..self.manipulation.bodies().len()).filter(is_here).count()
     }
 
-    /// How many bodies were claimed that are part of too large an island to be sent: fingers feel them fixed.
-    pub fn too_large(&self) -> usize {
-        self.too_large.len()
+    /// Answers what is claimed: the islands of these bodies go, one after the other.
+    pub fn give_away(&mut self) {
+        while let Ok(claim) = self.end.claims.pop() {
+            self.claimed.push(claim);
+        }
+        let mut at = 0;
+        while self.send()
+            && let Some(claim) = self.claimed.get(at).copied()
+        {
+            if self.waits(&claim) {
+                at += 1;
+                continue;
+            }
+            self.claimed.swap_remove(at);
+            let body = claim.body as usize;
+            let is_here = matches!(self.manipulation.standing(body), Standing::Awake | Standing::Asleep);
+            if is_here && claim.stay == self.stays[body] {
+                // There is room for all bodies.
+                self.manipulation.island(body, &mut self.island);
+                self.manipulation.release(&self.island, &self.entities);
+            }
+        }
     }
 
-    fn give_away(&mut self) {
-        while let Ok(body) = self.end.claims.pop() {
-            self.claimed.push(body as usize);
-        }
-        let Self { claimed, manipulation, entities, end, island, too_large, .. } = self;
-        claimed.retain(|&body| {
-            if manipulation.standing(body) == Standing::Elsewhere {
-                return false;
-            }
-            // Who was parked here stays, but is what it seems to the other side: fixed.
-            if manipulation.standing(body) == Standing::Parked {
-                return false;
-            }
-            manipulation.island(body, island);
-            let parcels = manipulation.parcels(island);
-            let goes = parcels <= end.out.slots();
-            if parcels > end.out.buffer().capacity() && !too_large.contains(&body) {
-                too_large.push(body);
-            }
-            if goes {
-                // There is room.
-                manipulation.release(island, entities, |parcel| drop(end.out.push(parcel)));
-            }
-            !goes
-        });
+    /// Whether a body that is claimed is still on its way to here. One that is not, and not here either, has gone with
+    /// another's island; and who was parked here stays, but is what it seems to the other side: fixed.
+    fn waits(&self, claim: &Claim) -> bool {
+        let is_late = claim.stay > self.stays[claim.body as usize];
+        is_late || self.manipulation.standing(claim.body as usize) == Standing::Coming
     }
 
     /// Says where everything stands that has moved.

@@ -1,0 +1,52 @@
+//! The end of a tick: motion, and who is near whom then.
+
+use haptics::Entity;
+use nalgebra::Vector3;
+
+use super::{Manipulation, Parked, Reason, TICKS_AHEAD, who};
+use crate::body::Body;
+use crate::integrator::Limits;
+use crate::roster::Standing;
+
+impl Manipulation {
+    /// Takes the bodies to the end of the tick; says how many had to be parked.
+    pub(super) fn advance(&mut self, entities: &mut [Entity], dt_s: f64) -> usize {
+        let settings = self.settings;
+        let limits = Limits { speed_m_s: settings.most_speed_m_s, spin_rad_s: settings.most_spin_rad_s };
+        let before_parked = self.parked.len();
+        for place in 0..self.roster.awake().len() {
+            let number = self.roster.awake()[place];
+            let (before, mut body) = (self.bodies[place], self.bodies[place]);
+            settings.integrator.advance(&mut body, &self.gets[place], &limits, dt_s);
+            let why = if !body.is_finite() {
+                Some(Reason::NotANumber)
+            } else {
+                (body.centre_W.norm() > settings.world_radius_m).then_some(Reason::LeftTheWorld)
+            };
+            if let Some(why) = why {
+                body = Body { velocity_W: Vector3::zeros(), angular_momentum_W: Vector3::zeros(), ..before };
+                self.parked.push(Parked { entity: self.entities[place], why });
+            }
+            entities[self.entities[place]].move_to(body.pose());
+            self.roster.bodies[number] = body;
+            self.note_change(number);
+        }
+        for at in before_parked..self.parked.len() {
+            let Some(body) = self.body_of(self.parked[at].entity) else { continue };
+            self.roster.set(body, Standing::Parked);
+        }
+        self.parked.len() - before_parked
+    }
+
+    /// Finds who is near whom now.
+    pub(super) fn keep_up(&mut self, entities: &[Entity], dt_s: f64) {
+        for &body in self.roster.awake() {
+            let entity = self.roster.entities[body];
+            let ahead_W = self.roster.bodies[body].velocity_W * (dt_s * TICKS_AHEAD);
+            if self.broad_phase.moved(entity, &entities[entity], &ahead_W) {
+                let who = who(&self.roster, entities, self.settings.response);
+                self.pairs.follow(body, &who, &self.broad_phase);
+            }
+        }
+    }
+}
