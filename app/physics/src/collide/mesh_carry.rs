@@ -207,7 +207,7 @@ impl Seen {
         let area = ab.perp(&ac);
         let (of_b, of_c) = (way.perp(&ac) / area, ab.perp(&way) / area);
         let is_in = of_b >= 0.0 && of_c >= 0.0 && of_b + of_c <= 1.0;
-        is_in.then(|| a.depth_m + (b.depth_m - a.depth_m) * of_b + (c.depth_m - a.depth_m) * of_c)
+        is_in.then_some(a.depth_m + (b.depth_m - a.depth_m) * of_b + (c.depth_m - a.depth_m) * of_c)
     }
 }
 
