@@ -33,6 +33,7 @@ mod gjk;
 mod lines;
 pub(crate) mod mesh;
 mod mesh_ball;
+mod mesh_carry;
 mod mesh_corner;
 mod mesh_cut;
 mod mesh_found;

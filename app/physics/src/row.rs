@@ -264,6 +264,45 @@ impl Row {
     }
 }
 
+/// With friction that holds a given force, whatever presses: the slopes of a convex function of the velocity.
+impl Row {
+    /// The most that friction holds if the force is this (N).
+    pub(crate) fn holds_n(&self, force_W: &Vector3<f64>) -> f64 {
+        self.mu() * self.normal_W.dot(force_W).max(0.0)
+    }
+
+    /// As [`Self::at_end_W`].
+    pub(crate) fn at_end_within_W(&self, velocity_W: &Vector3<f64>, dt_s: f64, most_n: f64) -> Vector3<f64> {
+        let trial_W = self.trial_at_end_W(velocity_W, dt_s);
+        if self.tie_n.is_some() {
+            return self.project(&trial_W);
+        }
+        let normal_n = self.normal_W.dot(&trial_W);
+        let across_W = trial_W - self.normal_W * normal_n;
+        self.normal_W * normal_n.max(0.0) + within_ball(&across_W, most_n)
+    }
+
+    /// As [`Self::falls_at_end_W`].
+    pub(crate) fn falls_within_W(&self, velocity_W: &Vector3<f64>, dt_s: f64, most_n: f64) -> Matrix3<f64> {
+        if self.tie_n.is_some() {
+            return self.falls_at_end_W(velocity_W, dt_s);
+        }
+        let [along, across] = self.falls(dt_s);
+        let n = self.normal_W;
+        let trial_W = self.trial_at_end_W(velocity_W, dt_s);
+        let normal_n = n.dot(&trial_W);
+        let across_W = trial_W - n * normal_n;
+        let across_n = across_W.norm();
+        let pressed = if normal_n > 0.0 { n * n.transpose() * along } else { Matrix3::zeros() };
+        let plane = Matrix3::identity() - n * n.transpose();
+        if across_n <= most_n {
+            return pressed + plane * across;
+        }
+        let t = across_W / across_n;
+        pressed + (plane - t * t.transpose()) * (across * most_n / across_n)
+    }
+}
+
 /// A force, cut to this length; one that is no number is none.
 fn within_ball(force_W: &Vector3<f64>, most_n: f64) -> Vector3<f64> {
     let length_n = force_W.norm();

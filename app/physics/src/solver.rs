@@ -17,6 +17,7 @@
 
 mod blocks;
 mod equations;
+mod hold;
 mod island;
 mod link;
 mod motion;

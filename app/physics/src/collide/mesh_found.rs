@@ -1,10 +1,15 @@
 //! Contact points of a mesh with another solid while they are being found, place by place.
 //!
-//! Model: a place keeps the [`PATCH_POINTS`] deepest of its points, a pair [`MAX_POINTS`]; where there are more, the place
-//! with the most loses its least deep one. Points nearer to each other than twice their depth are one, unless they are of
-//! two places and press in different directions: a corner in the corner of a room touches floor and walls.
+//! Model: a place keeps those of its points that [carry](super::mesh_carry), and of them the [`PATCH_POINTS`] deepest, a
+//! pair [`MAX_POINTS`]; where there are more, the place with the most loses its least deep one. Who carried in the last tick
+//! counts as deeper by [`STAYS`]: two as deep as each other do not take turns.
+//! Points nearer to each other than twice their depth are one, unless they are of two places and press in different
+//! directions: a corner in the corner of a room touches floor and walls.
+
+use nalgebra::Vector3;
 
 use super::mesh::Contact;
+use super::mesh_carry::{self, MOST_POINTS};
 use super::mesh_patch::MAX_PATCHES;
 use super::{MAX_POINTS, PATCH_POINTS};
 
@@ -14,21 +19,37 @@ pub(super) struct Found {
     /// Where each place's begin.
     begins: [usize; MAX_PATCHES + 1],
     patch: usize,
+    /// Names of its points of the last tick.
+    carried: Carried,
 }
+
+/// Points that carried in a tick, by what they are about; unused ones are those of no contact.
+pub(super) type Carried = [u32; PATCH_POINTS];
 
 impl Found {
     pub(super) fn new() -> Self {
-        Self { contacts: [Contact::default(); ROOM], count: 0, begins: [0; MAX_PATCHES + 1], patch: 0 }
+        Self {
+            contacts: [Contact::default(); ROOM],
+            count: 0,
+            begins: [0; MAX_PATCHES + 1],
+            patch: 0,
+            carried: Carried::default(),
+        }
     }
 
-    pub(super) fn begin(&mut self, patch: usize) {
-        self.patch = patch;
+    /// Those of a place follow, of which these carried in the last tick.
+    pub(super) fn begin(&mut self, patch: usize, carried: &Carried) {
+        (self.patch, self.carried) = (patch, *carried);
         self.begins[patch..].fill(self.count);
     }
 
-    /// Those of a place whose turn is over.
-    pub(super) fn end(&mut self) -> &[Contact] {
+    /// Those of a place whose turn is over, seen along its normal; if there are several, they share their depths.
+    pub(super) fn end(&mut self, normal_M: &Vector3<f64>, are_several: bool) -> &[Contact] {
         let begin = self.begins[self.patch];
+        self.count = begin + mesh_carry::sort_out(&mut self.contacts[begin..self.count], normal_M);
+        if are_several {
+            (begin..self.count).for_each(|at| self.share(at));
+        }
         while self.count - begin > PATCH_POINTS {
             self.drop_the_least(begin, self.count);
         }
@@ -38,17 +59,18 @@ impl Found {
 
     /// Of several places' points those that press in one direction near each other share their depth: what is as near as
     /// that counts once, and what is farther away ever more.
-    pub(super) fn push_share(&mut self, mut contact: Contact) {
+    fn share(&mut self, at: usize) {
+        let (before, rest) = self.contacts.split_at_mut(at);
+        let contact = &mut rest[0];
         let depth_m = -contact.gap_m;
         let mut taken_m = 0.0_f64;
-        for one in self.contacts[..self.count].iter().filter(|_| depth_m > 0.0) {
+        for one in before.iter().filter(|_| depth_m > 0.0) {
             let apart = (one.on_mesh_M - contact.on_mesh_M).norm() / FADE_M;
             if apart < 1.0 && one.normal_M.dot(&contact.normal_M) > AGREES {
                 taken_m = taken_m.max((1.0 - apart) * depth_m.min(-one.gap_m).max(0.0));
             }
         }
         contact.gap_m += taken_m;
-        self.push(contact);
     }
 
     pub(super) fn push(&mut self, mut contact: Contact) {
@@ -65,6 +87,7 @@ impl Found {
         if self.contacts[..self.count].iter().enumerate().any(is_there) {
             return;
         }
+        contact.carried = self.carried.contains(&contact.id);
         contact.id |= (self.patch as u32) << PATCH_SHIFT;
         if let Some(place) = self.contacts.get_mut(self.count) {
             *place = contact;
@@ -74,12 +97,24 @@ impl Found {
 
     /// All places' points, as many as a pair may have.
     pub(super) fn all(&mut self) -> &[Contact] {
+        self.thin_out();
+        &self.contacts[..self.count]
+    }
+
+    /// The names of a place's.
+    pub(super) fn carried(&self, patch: usize) -> Carried {
+        let mut names = Carried::default();
+        let own = &self.contacts[self.begins[patch]..self.begins[patch + 1]];
+        names.iter_mut().zip(own).for_each(|(name, contact)| *name = contact.id & NAMES);
+        names
+    }
+
+    fn thin_out(&mut self) {
         while self.count > MAX_POINTS {
             let is_pressed = self.contacts[..self.count].iter().all(|contact| contact.gap_m < 0.0);
             let (from, to) = if is_pressed { self.largest() } else { (0, self.count) };
             self.drop_the_least(from, to);
         }
-        &self.contacts[..self.count]
     }
 
     /// The place with the most points.
@@ -90,7 +125,11 @@ impl Found {
     }
 
     fn drop_the_least(&mut self, begin: usize, end: usize) {
-        let least = (begin..end).max_by(|&a, &b| self.contacts[a].gap_m.total_cmp(&self.contacts[b].gap_m));
+        let gap_m = |at: usize| {
+            let Contact { gap_m, carried, .. } = self.contacts[at];
+            if carried { STAYS * gap_m.min(0.0) + gap_m.max(0.0) } else { gap_m }
+        };
+        let least = (begin..end).max_by(|&a, &b| gap_m(a).total_cmp(&gap_m(b)));
         if let Some(least) = least {
             self.contacts.copy_within(least + 1..self.count, least);
             self.count -= 1;
@@ -109,4 +148,8 @@ const TOGETHER_M: f64 = 1e-6;
 const AGREES: f64 = 0.7;
 /// Names leave three bits for the place.
 const PATCH_SHIFT: u32 = 29;
+const NAMES: u32 = (1 << PATCH_SHIFT) - 1;
+/// So many times as deep counts who carried in the last tick.
+const STAYS: f64 = 1.5;
+const _: () = assert!(ROOM <= MOST_POINTS);
 const _: () = assert!(MAX_PATCHES <= 1 << (u32::BITS - PATCH_SHIFT));

@@ -7,6 +7,7 @@
 use nalgebra::{Isometry3, Vector3};
 
 use super::Stands;
+use super::mesh_found::Carried;
 
 /// The most places of a pair: the sides of a box inside another one.
 pub(super) const MAX_PATCHES: usize = 6;
@@ -22,6 +23,8 @@ pub struct Patch {
     pub(super) depth_m: f64,
     /// Of the mesh and the other one, which vertices stand there.
     pub(super) stands: [Stands; 2],
+    /// Which of its points carried in the last tick.
+    pub(super) carried: Carried,
     /// The normal, the point and the depth are those of the last tick.
     pub(super) is_known: bool,
 }
@@ -86,7 +89,9 @@ impl Patches {
         let normal_M = self.all[number].normal_M;
         let mut lift_M = Vector3::zeros();
         for (at, patch) in self.all.iter().enumerate() {
-            let behind_m = sign * patch.normal_M.dot(&(patch.at_M - point_M));
+            // Places are known by points of the mesh, which is deep in the other one there.
+            let surface_m = if sign < 0.0 { patch.depth_m } else { 0.0 };
+            let behind_m = sign * patch.normal_M.dot(&(patch.at_M - point_M)) + surface_m;
             let most_m = 1.5 * patch.depth_m + 2.0 * travel_m;
             if at != number && patch.is_known && behind_m > -2.0 * travel_m {
                 let across_M = patch.normal_M - normal_M * normal_M.dot(&patch.normal_M);
@@ -142,3 +147,29 @@ const APART_M: f64 = 1e-3;
 const AGREES: f64 = 0.7;
 /// Farther is clear \[m\].
 const LEAST_M: f64 = 1e-6;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_presses_elsewhere_is_cleared_by_a_lifted_point_of_either() {
+        // The mesh ends at x = 10 mm, and is 0.1 mm deep in the other one.
+        let (end_m, depth_m) = (0.01, 1e-4);
+        let mut patches = Patches::default();
+        patches.all[0] = Patch { normal_M: -Vector3::y(), is_known: true, ..Patch::default() };
+        let at_M = Vector3::x() * end_m;
+        patches.all[1] = Patch { normal_M: Vector3::x(), at_M, depth_m, is_known: true, ..Patch::default() };
+        for deep_m in [0.1 * depth_m, 0.5 * depth_m, depth_m] {
+            let of_mesh_M = Vector3::x() * (end_m - depth_m + deep_m);
+            let lifted_M = of_mesh_M + patches.lift_M(0, &of_mesh_M, -1.0, 0.0);
+            assert!(
+                lifted_M.x < end_m - depth_m && lifted_M.x > end_m - 2.0 * depth_m,
+                "{deep_m} {lifted_M:?}"
+            );
+            let of_other_M = Vector3::x() * (end_m - deep_m);
+            let lifted_M = of_other_M + patches.lift_M(0, &of_other_M, 1.0, 0.0);
+            assert!(lifted_M.x > end_m && lifted_M.x < end_m + depth_m, "{deep_m} {lifted_M:?}");
+        }
+    }
+}

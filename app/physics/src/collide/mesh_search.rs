@@ -212,10 +212,10 @@ impl Places {
                 };
                 let Some(at) = (1..MAX_PATCHES).find(fits) else { continue };
                 is_taken[at] = true;
-                let stands = if again { patches.all[at].stands } else { Default::default() };
+                let Patch { stands, carried, .. } = if again { patches.all[at] } else { Patch::default() };
                 let (normal_M, at_M) = (place.normal_M, place.at_M);
                 let depth_m = (-place.gap_m).max(0.0);
-                patches.all[at] = Patch { normal_M, at_M, depth_m, stands, is_known: true };
+                patches.all[at] = Patch { normal_M, at_M, depth_m, stands, carried, is_known: true };
             }
         }
     }

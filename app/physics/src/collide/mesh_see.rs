@@ -75,7 +75,9 @@ pub(super) fn see(mesh: &Mesh, point: &Vector3<f64>, along: &Vector3<f64>, deep_
             }
         }
     }
-    Seen { out: face.normal_B, gap_m: -nearest.distance_m }
+    // Behind an inner corner the nearest point is on the corner, and the face's plane is nearer.
+    let depth_m = (face.offset_m - face.normal_B.dot(point)).clamp(0.0, nearest.distance_m);
+    Seen { out: face.normal_B, gap_m: -depth_m }
 }
 
 /// One side of a mesh among several that press.
@@ -105,3 +107,36 @@ const MUCH: f64 = 5.0;
 const LITTLE_M: f64 = 2e-3;
 /// Cosine between directions that are about the same.
 const AGREES: f64 = 0.7;
+
+#[cfg(test)]
+mod tests {
+    use haptics::mesh::TriangleSoup;
+
+    use super::*;
+
+    /// An angle: over x and y a square of 2 m without its upper right quarter, from z = -1 to 1.
+    fn angle() -> Mesh {
+        let outline = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
+        let end = |z: f64| outline.iter().map(move |[x, y]| Vector3::new(*x, *y, z));
+        let vertices = end(1.0).chain(end(-1.0)).collect();
+        let front = [[0, 1, 3], [1, 2, 3], [0, 3, 5], [3, 4, 5]];
+        let mut faces = front.to_vec();
+        faces.extend(front.map(|[a, b, c]| [a + 6, c + 6, b + 6]));
+        (0..6).for_each(|a| faces.extend([[a, a + 6, (a + 1) % 6 + 6], [a, (a + 1) % 6 + 6, (a + 1) % 6]]));
+        Mesh::build(TriangleSoup { vertices, faces }).unwrap().0
+    }
+
+    #[test]
+    fn behind_an_inner_corner_a_point_is_as_deep_as_in_the_side_that_is_looked_at() {
+        let mesh = angle();
+        for (x, y) in [(0.03, 0.01), (0.01, 0.03), (0.02, 0.02)] {
+            let point = Vector3::new(1.0 - x, 1.0 - y, 0.1);
+            for (along, depth_m) in [(Vector3::x(), x), (Vector3::y(), y)] {
+                let seen = see(&mesh, &point, &along, 0.0);
+                // Roundings of metres. Of both sides the one that is looked at, or the one that is nearest.
+                let of_side = if seen.out.dot(&along) > 0.5 { depth_m } else { x + y - depth_m };
+                assert!((seen.gap_m + of_side).abs() < 1e-14, "{x} {y} {along:?}: {seen:?}");
+            }
+        }
+    }
+}

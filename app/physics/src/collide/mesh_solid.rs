@@ -9,8 +9,8 @@
 //! ([`mesh_patch`](super::mesh_patch)), each with its points ([`mesh_search`](super::mesh_search) finds them).
 //! A vertex in the middle of a flat face presses nothing that the other one's corners do not: it is left out.
 //! Frames: the mesh's frame M; normals from the mesh to the other one.
-//! Limits: six places a pair. Where meshes touch in several places and more vertices than there is room for do, which of them
-//! count may change for ever with movements of micrometres: some mm/s without friction. Crossings are found of a box's edges, of the lines along which cylinders, cones and capsules
+//! Of all that is found, what [carries](super::mesh_carry) counts.
+//! Limits: six places a pair. Crossings are found of a box's edges, of the lines along which cylinders, cones and capsules
 //! touch, and of sharp edges that leave the vertices of a mesh that were chosen: of fine meshes these are short, but vertices
 //! lie as near. Rims of round forms are not cut off.
 //! Cost: for each place two choices of vertices and at most eight queries for the nearest point for each side; and a search
@@ -49,7 +49,7 @@ pub(super) fn contact_points(
     look_around(mesh, other, reach_m, travel_m, patches);
     let mut found = Found::new();
     for number in 0..MAX_PATCHES {
-        found.begin(number);
+        found.begin(number, &patches.all[number].carried);
         if patches.all[number].is_known {
             let meeting = Meeting::of(&patches.all[number], reach_m, travel_m);
             let mut stands = patches.all[number].stands;
@@ -57,11 +57,13 @@ pub(super) fn contact_points(
             place.vertices(&mut stands[0]);
             place.owns(&mut stands[1]);
             patches.all[number].stands = stands;
-            patches.all[number].remember(found.end());
+            let are_several = patches.are_several();
+            patches.all[number].remember(found.end(&meeting.normal_M, are_several));
         }
     }
-    patches.put_a_pressed_one_first();
     found.all().iter().for_each(|contact| told.tell(contact));
+    patches.all.iter_mut().enumerate().for_each(|(number, patch)| patch.carried = found.carried(number));
+    patches.put_a_pressed_one_first();
 }
 
 /// About where they meet: as in the last tick, or else found by going to and fro; `false` where they are far apart.
@@ -307,10 +309,7 @@ impl Place<'_> {
         if !is_near || self.patches.belongs_elsewhere(self.number, &contact.normal_M) {
             return;
         }
-        match self.patches.are_several() {
-            true => self.found.push_share(contact),
-            false => self.found.push(contact),
-        }
+        self.found.push(contact);
     }
 }
 

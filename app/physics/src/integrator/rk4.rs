@@ -2,7 +2,8 @@
 //!
 //! Model: position, velocity, orientation and angular momentum of each body; contact points, their normals and whether they
 //! hold stay what they were when the tick began, and their forces follow how far and how fast the bodies' points have moved
-//! in each stage. A finger stands still for the tick: so a hand that holds still is integrated to fourth order, and one that
+//! in each stage. What somebody drives goes on as it does.
+//! A finger stands still for the tick: so a hand that holds still is integrated to fourth order, and one that
 //! carries feels a drag of `k dt / 2`. What the user feels is the mean of the stages, which is what the body got.
 //! The integrator is explicit: beyond `k dt^2 / m` of some units it throws light bodies away.
 
@@ -92,10 +93,12 @@ impl Stages {
             self.press(bodies, rows, springs, dt_s, weight);
             let next_s = STAGES.get(stage + 1).map_or(0.0, |(share, _)| share * dt_s);
             for (number, body) in bodies.iter().enumerate() {
-                if gets[number].is_fixed {
-                    continue;
-                }
-                let rate = rate(body, &self.now[number], &self.wrenches[number], &gets[number].gravity_W);
+                // What nothing moves goes on as it does.
+                let (wrench, gravity_W) = match gets[number].is_fixed {
+                    true => (Wrench::default(), Vector3::zeros()),
+                    false => (self.wrenches[number], gets[number].gravity_W),
+                };
+                let rate = rate(body, &self.now[number], &wrench, &gravity_W);
                 self.sums[number] = self.sums[number].plus(&rate, weight);
                 self.now[number] = self.starts[number].plus(&rate, next_s);
             }

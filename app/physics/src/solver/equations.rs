@@ -18,10 +18,13 @@ use crate::row::Row;
 const ROUNDING: f64 = 1e-14;
 
 /// Bodies as the tick found them, and what joins them.
+#[derive(Clone, Copy)]
 pub(super) struct Equations<'a> {
     pub(super) links: &'a [Link],
     pub(super) starts: &'a [Motion],
     pub(super) dt_s: f64,
+    /// Of each link, the most that friction holds \[N\], if that is not what the point is pressed with.
+    pub(super) holds_n: Option<&'a [f64]>,
 }
 
 /// Impulses, and what is left of the equations with them.
@@ -89,9 +92,13 @@ impl Equations<'_> {
         left.clear();
         left.resize(p.len(), Vector6::zeros());
         let (mut all, mut noise) = (0.0, 0.0);
-        for link in self.links {
+        for (at, link) in self.links.iter().enumerate() {
             let row = &rows[link.row];
-            let force_W = row.at_end_W(&link.velocity_W(row, moving), self.dt_s);
+            let velocity_W = link.velocity_W(row, moving);
+            let force_W = match self.holds_n {
+                None => row.at_end_W(&velocity_W, self.dt_s),
+                Some(holds_n) => row.at_end_within_W(&velocity_W, self.dt_s, holds_n[at]),
+            };
             let twist_nm = match row.torsion.most_nm {
                 0.0 => 0.0,
                 _ => row.torsion.at_end_nm(link.spin_rad_s(row, moving), self.dt_s),
@@ -127,9 +134,13 @@ impl Equations<'_> {
         blocks: &mut Blocks,
     ) {
         blocks.clear();
-        for link in self.links {
+        for (at, link) in self.links.iter().enumerate() {
             let row = &rows[link.row];
-            let falls = row.falls_at_end_W(&link.velocity_W(row, moving), self.dt_s);
+            let velocity_W = link.velocity_W(row, moving);
+            let falls = match self.holds_n {
+                None => row.falls_at_end_W(&velocity_W, self.dt_s),
+                Some(holds_n) => row.falls_within_W(&velocity_W, self.dt_s, holds_n[at]),
+            };
             let twists = match row.torsion.most_nm {
                 0.0 => 0.0,
                 _ if chords => row.torsion.chord(link.spin_rad_s(row, moving), self.dt_s),
@@ -160,6 +171,16 @@ impl Equations<'_> {
             row.force_W = row.at_end_W(&link.velocity_W(row, moving), self.dt_s);
             row.torsion.torque_nm = row.torsion.at_end_nm(link.spin_rad_s(row, moving), self.dt_s);
         }
+    }
+
+    /// Of two sets of impulses, by their kinetic energy \[J\]: `a W b`.
+    pub(super) fn energy_between(&self, a: &[Vector6], b: &[Vector6]) -> f64 {
+        let all = self.starts.iter().zip(a.iter().zip(b));
+        all.map(|(start, (a, b))| {
+            let ((along_a, about_a), (along_b, about_b)) = (halves(a), halves(b));
+            along_a.dot(&along_b) * start.inverse_mass + about_a.dot(&(start.inverse_inertia_W * about_b))
+        })
+        .sum()
     }
 
     /// Says whether stiction broke anywhere and takes other forces now.

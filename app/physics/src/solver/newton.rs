@@ -7,14 +7,16 @@
 //! linear equations are mostly zeros ([`Blocks`]): a chain is solved, not passed on from body to body.
 //! A step that does not bring it nearer is halved. Where none does (a light body between points with much friction, one
 //! scene in thousands), bodies that press each other make a few that lead farther away: many points change at once behind them. If
-//! that does not help, the forces are let grow from next to nothing; then the points take some cautious turns one by one. Should
-//! all that find nothing (contact points many times farther from the centre than the mass itself is), what such turns leave
-//! stands, and is said to be unsolved.
+//! that does not help, friction is [held](super::hold) to what the points were pressed with; then the points take some cautious
+//! turns one by one. Should all that find nothing (contact points many times farther from the centre than the mass itself
+//! is), what such turns leave stands, and is said to be unsolved.
+//! Cost: at most [`MAX_SWEEPS`] rounds of all ways together.
 
 use nalgebra::Vector3;
 
 use super::blocks::{self, Blocks};
 use super::equations::{Equations, Trial};
+use super::hold::Hold;
 use super::link::Link;
 use super::six::Vector6;
 use super::{MAX_SWEEPS, Motion, Solved, relax};
@@ -28,8 +30,10 @@ const NEARLY_SOLVED: f64 = 1e-9;
 const HALVINGS: usize = 6;
 /// How often a step is made that does not bring it nearer.
 const MOST_LEAPS: usize = 8;
-/// Shares of the tick for which forces last, on the way to all of it.
-const LOADS: [f64; 8] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 0.3, 0.6];
+/// Rounds with friction that holds what it held.
+const MOST_HELD: usize = 64;
+/// Rounds of Newton's steps at once.
+const MOST_ROUNDS: usize = 20;
 /// Turns of the points one by one: at first, and the most at once; each time twice as many.
 const FIRST_TURNS: usize = 8;
 const MOST_TURNS: usize = 512;
@@ -46,6 +50,7 @@ pub(super) struct Newton {
     best: Trial,
     change: Vec<Vector6>,
     blocks: Blocks,
+    holds_n: Vec<f64>,
 }
 
 impl Newton {
@@ -60,6 +65,7 @@ impl Newton {
             best: Trial::with_capacity(bodies),
             change: Vec::with_capacity(bodies),
             blocks: Blocks::with_capacity(bodies),
+            holds_n: Vec::with_capacity(rows),
         }
     }
 
@@ -112,9 +118,9 @@ impl Newton {
     }
 
     fn solve(&mut self, rows: &mut [Row], dt_s: f64) -> Solved {
-        let Self { links, starts, now, next, best, change, blocks } = self;
-        let equations = Equations { links, starts, dt_s };
-        let mut search = Search { equations, now, next, best, change, blocks, rounds: 0 };
+        let Self { links, starts, now, next, best, change, blocks, holds_n } = self;
+        let equations = Equations { links, starts, dt_s, holds_n: None };
+        let mut search = Search { equations, now, next, best, change, blocks, holds_n, rounds: 0 };
         search.run(rows)
     }
 }
@@ -127,6 +133,7 @@ struct Search<'a> {
     best: &'a mut Trial,
     change: &'a mut Vec<Vector6>,
     blocks: &'a mut Blocks,
+    holds_n: &'a mut Vec<f64>,
     rounds: usize,
 }
 
@@ -155,7 +162,7 @@ impl Search<'_> {
     fn find(&mut self, rows: &mut [Row]) -> bool {
         let mut turns = 0;
         loop {
-            let is_solved = self.approach(rows, 1.0);
+            let is_solved = self.approach(rows, 1.0) || self.hold(rows);
             if is_solved && !self.equations.let_slip(rows, &self.now.moving) {
                 return true;
             }
@@ -165,19 +172,18 @@ impl Search<'_> {
             if self.rounds >= MAX_SWEEPS || turns > self.most_turns() {
                 return false;
             }
-            if turns == 0 {
-                // The turns that may follow begin where it is stuck.
-                self.equations.settle(rows, &self.now.moving);
-                self.load(rows);
-                turns = FIRST_TURNS;
-                continue;
-            }
-            if turns > FIRST_TURNS {
-                self.equations.settle(rows, &self.now.moving);
-            }
+            turns = (2 * turns).max(FIRST_TURNS);
+            self.equations.settle(rows, &self.now.moving);
             self.relax(rows, turns);
-            turns *= 2;
         }
+    }
+
+    /// The way over friction that holds what was pressed before; says whether it leads to the answer.
+    fn hold(&mut self, rows: &[Row]) -> bool {
+        let rounds = MOST_HELD.min(MAX_SWEEPS - self.rounds.min(MAX_SWEEPS));
+        let Self { equations, now, next, change, blocks, holds_n, .. } = self;
+        self.rounds += Hold { now, next, change, blocks }.run(equations, rows, holds_n, rounds);
+        self.approach(rows, 1.0)
     }
 
     /// Not what was sought, but forces that contacts can have.
@@ -206,7 +212,8 @@ impl Search<'_> {
         // One body alone finds its way without, and sooner.
         let most_leaps = if self.now.p.len() > 1 { MOST_LEAPS } else { 0 };
         let mut leaps = 0;
-        while self.rounds < MAX_SWEEPS {
+        let most_rounds = MAX_SWEEPS.min(self.rounds + MOST_ROUNDS);
+        while self.rounds < most_rounds {
             self.rounds += 1;
             let was_j = self.now.left_j;
             if !self.step(rows, load) {
@@ -245,14 +252,6 @@ impl Search<'_> {
         }
         std::mem::swap(self.now, self.next);
         self.now.left_j.is_finite()
-    }
-
-    /// The way from forces that do next to nothing to all of them.
-    fn load(&mut self, rows: &[Row]) {
-        self.now.p.fill(Vector6::zeros());
-        for load in LOADS {
-            self.approach(rows, load);
-        }
     }
 
     /// So many turns of the points one by one.
