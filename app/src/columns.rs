@@ -28,6 +28,8 @@ pub struct Names {
     pub ties: Vec<bool>,
     /// Whether it is told how the bodies are grasped.
     pub grasp_quality: bool,
+    /// Whether it is told in which list the bodies are: where there are two.
+    pub lists: bool,
 }
 
 impl Names {
@@ -111,6 +113,9 @@ pub fn columns(names: &Names) -> Vec<Column> {
             ] {
                 list.push(format!("{body}_{quantity}"), kind);
             }
+        }
+        if names.lists {
+            list.push(format!("{body}_list"), CellKind::Whole);
         }
     }
     list.0
@@ -216,6 +221,9 @@ fn each_cell_of_body(body: &BodyRow, names: &Names, write: &mut impl FnMut(Cell<
         write(Cell::Whole(rank as u64));
         write(Cell::Number(residual));
         write(Cell::Whole(u64::from(has_force_closure)));
+    }
+    if names.lists {
+        write(Cell::Whole(u64::from(body.is_slow)));
     }
 }
 

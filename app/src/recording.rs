@@ -213,6 +213,7 @@ mod tests {
             bodies: Vec::new(),
             ties: Vec::new(),
             grasp_quality: false,
+            lists: false,
         }
     }
 

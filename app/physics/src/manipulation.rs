@@ -2,6 +2,7 @@
 
 mod driven;
 mod hand_over;
+mod ordered;
 mod pressing;
 mod rest;
 

@@ -180,6 +180,7 @@ impl Pairs {
         let known = [&self.awake, &self.asleep].into_iter().find_map(|keys| Some(keys[at(keys).ok()?].place));
         if let Some(place) = known {
             self.pool[place as usize] = pair.clone();
+            self.pool[place as usize].resurface(who);
             return;
         }
         let Some(place) = self.unused.pop() else {
@@ -187,9 +188,21 @@ impl Pairs {
             return;
         };
         self.pool[place as usize] = pair.clone();
+        // Whoever sent it may not know yet what is known here.
+        self.pool[place as usize].resurface(who);
         let keys = if is_awake { &mut self.awake } else { &mut self.asleep };
         let Err(at) = at(keys) else { return };
         keys.insert(at, Key { place, ..key });
+    }
+
+    /// What the surface of an entity makes of those that it meets is another thing now.
+    pub(crate) fn resurface(&mut self, entity: usize, who: &Who<'_>) {
+        for key in self.awake.iter().chain(&self.asleep) {
+            let pair = &mut self.pool[key.place as usize];
+            if pair.entities.contains(&entity) {
+                pair.resurface(who);
+            }
+        }
     }
 
     /// Ends all pairs of a body.

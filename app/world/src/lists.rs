@@ -19,9 +19,11 @@
 
 mod fast;
 mod link;
+mod order;
 mod slow;
 
 pub use fast::{FastList, Handed, Reach};
+pub use order::SlowOrder;
 pub use slow::SlowList;
 
 use haptics::Entity;

@@ -180,6 +180,7 @@ impl Manipulation {
         give(Parcel(Content::End));
         for &body in island {
             self.roster.set(body, Standing::Elsewhere);
+            self.note_change(body);
         }
         for &body in island {
             self.leave_pairs(body, entities);

@@ -1,5 +1,6 @@
 //! The queues between the two lists.
 
+use super::order::{MOST_ORDERS, SlowOrder};
 use physics::{Body, Parcel};
 use rtrb::{Consumer, Producer, RingBuffer};
 
@@ -16,6 +17,7 @@ pub(super) struct Stand {
 pub(super) struct FastEnd {
     pub(super) out: Producer<Parcel>,
     pub(super) claims: Producer<u32>,
+    pub(super) orders: Producer<SlowOrder>,
     pub(super) back: Consumer<Parcel>,
     pub(super) stands: Consumer<Stand>,
 }
@@ -24,6 +26,7 @@ pub(super) struct FastEnd {
 pub(super) struct SlowEnd {
     pub(super) out: Producer<Parcel>,
     pub(super) claims: Consumer<u32>,
+    pub(super) orders: Consumer<SlowOrder>,
     pub(super) back: Consumer<Parcel>,
     pub(super) stands: Producer<Stand>,
 }
@@ -36,9 +39,16 @@ pub(super) fn link(bodies: usize) -> (FastEnd, SlowEnd) {
     let (slow_out, back) = RingBuffer::new(parcels);
     let (claims, slow_claims) = RingBuffer::new(bodies.clamp(1, MOST_CLAIMS));
     let (slow_stands, stands) = RingBuffer::new(bodies.clamp(1, MOST_STANDS));
+    let (orders, slow_orders) = RingBuffer::new(MOST_ORDERS);
     (
-        FastEnd { out, claims, back, stands },
-        SlowEnd { out: slow_out, claims: slow_claims, back: slow_back, stands: slow_stands },
+        FastEnd { out, claims, orders, back, stands },
+        SlowEnd {
+            out: slow_out,
+            claims: slow_claims,
+            orders: slow_orders,
+            back: slow_back,
+            stands: slow_stands,
+        },
     )
 }
 

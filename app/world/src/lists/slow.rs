@@ -4,16 +4,21 @@ use haptics::Entity;
 use physics::{Manipulation, Standing};
 
 use super::link::{SlowEnd, Stand};
+use crate::events::{Kind, PairForce, SlowPairs};
 
 /// The slow list.
 pub struct SlowList {
-    manipulation: Manipulation,
-    entities: Vec<Entity>,
-    end: SlowEnd,
+    pub(super) manipulation: Manipulation,
+    pub(super) entities: Vec<Entity>,
+    pub(super) end: SlowEnd,
+    pub(super) has_begun: bool,
+    pub(super) is_paused: bool,
     /// Of each body, how often it came.
     stays: Box<[u32]>,
     /// Claimed, and not yet given away.
     claimed: Vec<usize>,
+    /// Those of them that an order waits for.
+    fetched: Vec<usize>,
     island: Vec<usize>,
     /// Bodies whose place has not been told since it changed, each once.
     untold: Vec<usize>,
@@ -21,6 +26,8 @@ pub struct SlowList {
     /// Bodies that were claimed, and whose island no queue has room for.
     too_large: Vec<usize>,
     stepped: u64,
+    /// Who wants to know which entities press each other here.
+    watch: Option<SlowPairs>,
 }
 
 impl SlowList {
@@ -32,25 +39,43 @@ impl SlowList {
             manipulation,
             entities,
             end,
+            has_begun: true,
+            is_paused: false,
             claimed: Vec::with_capacity(bodies),
+            fetched: Vec::with_capacity(bodies),
             island: Vec::with_capacity(bodies),
             untold: Vec::with_capacity(bodies),
             is_untold: vec![false; bodies].into(),
             too_large: Vec::new(),
             stepped: 0,
+            watch: None,
         }
+    }
+
+    /// From now on somebody watches which entities press each other here.
+    pub fn watch(&mut self, pairs: SlowPairs) {
+        self.watch = Some(pairs);
     }
 
     /// A turn: takes in, gives away what is claimed, goes on by so many ticks of this length (s), and tells.
     pub fn turn(&mut self, ticks: u32, dt_s: f64) {
+        self.take_orders();
+        if !self.has_begun {
+            return;
+        }
         self.take_in();
+        if let Some(watch) = &mut self.watch {
+            watch.begin_turn();
+        }
         self.give_away();
+        let ticks = if self.is_paused { 0 } else { ticks };
         for _ in 0..ticks {
             if self.manipulation.awake().is_empty() {
                 break;
             }
-            self.manipulation.step(&mut self.entities, &mut [], dt_s);
+            let made = self.manipulation.step(&mut self.entities, &mut [], dt_s);
             self.stepped += 1;
+            self.look(made.parked, dt_s);
             // A tick of many bodies takes long, and a finger waits.
             self.give_away();
         }
@@ -88,28 +113,63 @@ impl SlowList {
         self.too_large.len()
     }
 
+    /// After a tick of this length (s), in which so many bodies were parked.
+    fn look(&mut self, parked: usize, dt_s: f64) {
+        let (Some(watch), manipulation) = (&mut self.watch, &self.manipulation) else { return };
+        let pairs = manipulation
+            .pair_forces()
+            .map(|(entities, force_W)| PairForce { entities: entities.map(|entity| entity as u32), force_W });
+        let rests = |entities: [u32; 2]| manipulation.rest_together(entities.map(|entity| entity as usize));
+        watch.look(pairs, dt_s, rests);
+        let all = manipulation.parked();
+        for parked in &all[all.len().saturating_sub(parked)..] {
+            watch.tell(Kind::Parked { entity: parked.entity as u32, why: parked.why.into() });
+        }
+    }
+
+    /// A body for which somebody waits, be it parked.
+    pub(super) fn fetch(&mut self, body: usize) {
+        for list in [&mut self.claimed, &mut self.fetched] {
+            if !list.contains(&body) {
+                list.push(body);
+            }
+        }
+    }
+
     fn give_away(&mut self) {
         while let Ok(body) = self.end.claims.pop() {
             self.claimed.push(body as usize);
         }
-        let Self { claimed, manipulation, entities, end, island, too_large, .. } = self;
+        let Self { claimed, fetched, manipulation, entities, end, island, too_large, watch, .. } = self;
         claimed.retain(|&body| {
             if manipulation.standing(body) == Standing::Elsewhere {
                 return false;
             }
+            let is_parked = manipulation.standing(body) == Standing::Parked;
             // Who was parked here stays, but is what it seems to the other side: fixed.
-            if manipulation.standing(body) == Standing::Parked {
+            if is_parked && !fetched.contains(&body) {
                 return false;
             }
             manipulation.island(body, island);
+            if is_parked {
+                island.push(body);
+            }
             let parcels = manipulation.parcels(island);
             let goes = parcels <= end.out.slots();
             if parcels > end.out.buffer().capacity() && !too_large.contains(&body) {
                 too_large.push(body);
             }
             if goes {
+                if let Some(watch) = watch {
+                    let is_in = |entity: u32| {
+                        manipulation.body_of(entity as usize).map(|body| island.contains(&body))
+                    };
+                    // What is fixed goes along with everybody.
+                    watch.go(|entities| entities.into_iter().filter_map(is_in).all(|is_in| is_in));
+                }
                 // There is room.
                 manipulation.release(island, entities, |parcel| drop(end.out.push(parcel)));
+                fetched.retain(|body| !island.contains(body));
             }
             !goes
         });
