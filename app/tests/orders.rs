@@ -344,7 +344,8 @@ fn a_body_that_a_finger_presses_is_taken_from_under_it_without_a_blow() {
             let script = "at 0.5 move cube to 0.01 0.02 0 in 0.5";
             let ticks = Place::new().play(&scene, script, hand_mode, 2.5);
             let strongest = ticks[300..].iter().map(|tick| tick.force).fold(0.0, f64::max);
-            assert!(strongest > 0.5, "{strongest}");
+            // The simulated hand gives way.
+            assert!(strongest > if is_kinematic { 1.0 } else { 0.2 }, "{strongest}");
             // Beside the fading: 10 mm in half a second are 0.04 mm in a tick at most, half of which friction may turn
             // into pressure, at 1000 N/m.
             assert_bounded(&ticks, strongest * DT / FADE_S + 0.02, 1000.0);
