@@ -105,14 +105,14 @@ fn telling(criterion: &mut Criterion, name: &str, hips: [fn(f64) -> Vector3<f64>
         frame.run_tick = row.run_tick as i64 + 1;
         step.step(frame, &mut command, &mut row);
     }
-    let (out, mut events) = event_queue(64);
-    let mut teller = EventTeller::new(&step, out);
-    teller.tell(&step, &row);
+    let (mut out, mut events) = event_queue(64);
+    let mut teller = EventTeller::new(&mut step);
+    teller.tell(&step, &row, &mut out);
     while events.receive(u64::MAX).is_some() {}
     criterion.bench_function(name, |bencher| {
         bencher.iter(|| {
             row.run_tick += 1;
-            teller.tell(black_box(&step), black_box(&row));
+            teller.tell(black_box(&step), black_box(&row), &mut out);
         });
     });
     assert_eq!(events.receive(u64::MAX), None, "{name}: something was new");

@@ -30,6 +30,8 @@ pub struct Names {
     pub grasp_quality: bool,
     /// The spaces but for the world, space 1 first; `None`: there are no doors, and it is not told which one a finger is in.
     pub spaces: Option<Vec<String>>,
+    /// Whether it is told in which list the bodies are: where there are two.
+    pub lists: bool,
 }
 
 impl Names {
@@ -119,6 +121,9 @@ pub fn columns(names: &Names) -> Vec<Column> {
             ] {
                 list.push(format!("{body}_{quantity}"), kind);
             }
+        }
+        if names.lists {
+            list.push(format!("{body}_list"), CellKind::Whole);
         }
     }
     list.0
@@ -230,6 +235,9 @@ fn each_cell_of_body(body: &BodyRow, names: &Names, write: &mut impl FnMut(Cell<
         write(Cell::Whole(rank as u64));
         write(Cell::Number(residual));
         write(Cell::Whole(u64::from(has_force_closure)));
+    }
+    if names.lists {
+        write(Cell::Whole(u64::from(body.is_slow)));
     }
 }
 

@@ -4,104 +4,175 @@
 //!
 //! Model: the slow side ([`desk`]) reads orders in words, checks them and makes whatever takes memory or time; they come to
 //! the fast thread through a queue ([`queue`]), which takes a few in a tick. There everything is spread over ticks
-//! ([`gradual`]): stiffness and damping change by shares, what is moved goes along a smooth path, and a world that takes the
-//! place of another one does so while no force is felt. A reset is such an exchange, with the same scene made anew: so
-//! everything is where it began, to the bit.
-//! Invariants: the fast side neither allocates nor frees: what it is done with goes back to the slow side.
+//! ([`gradual`]): stiffness and damping change by shares, what is moved goes along a smooth path, and what cannot be spread
+//! is done while no force is felt, for which forces fade away and come back: a world that takes the place of another one;
+//! and, where a finger feels it, friction, a pause, a body that is taken or let go. A reset is an exchange of worlds, with
+//! the same scene made anew: so everything is where it began, to the bit.
+//! Invariants: orders are done in the order in which they came; the fast side neither allocates nor frees: what it is done
+//! with goes back to the slow side.
 
 #![allow(non_snake_case)] // Names carry their frame: to_W is a place in W.
 
 pub mod desk;
 pub mod gradual;
 pub mod order;
+pub mod path;
 pub mod queue;
 pub mod words;
 
 use crate::fast_step::FastStep;
 use gradual::{FADE_S, Gradual};
-use order::{Order, Replacement};
+use order::{FrictionChange, Order, Replacement, Spent};
 use queue::OrderReceiver;
-
-/// Why a scene takes no orders.
-pub(crate) const NEEDS_ONE_LIST: &str = "--orders needs everything that moves in the fast list; allowed: a scene with no more of it than \
-                                  lists = { fast_bodies = ... } says (64 if nobody does)";
+use world::events::Kind;
 
 /// So many orders are taken in a tick.
-const ORDERS_A_TICK: usize = 4;
+pub const ORDERS_A_TICK: usize = 4;
 
 /// The fast side of orders.
 pub struct Control {
     orders: OrderReceiver,
     gradual: Gradual,
-    /// Who takes over once no force is felt.
-    next: Option<Box<Replacement>>,
+    /// What is to be done next, and waits for silence.
+    waiting: Option<Waiting>,
     /// How much of the forces is felt, 0 to 1.
     strength: f64,
     taken: u64,
 }
 
-/// What became of the world in a tick.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum World {
-    /// It goes on.
-    Same,
-    /// The same scene was begun anew.
-    Reset,
-    /// It is another scene.
-    Other,
+/// What may have to wait until no force is felt.
+enum Waiting {
+    Replace(Box<Replacement>),
+    Friction(Box<FrictionChange>),
+    Pause(bool),
+}
+
+/// What became of orders in a tick.
+#[derive(Debug, Default)]
+pub struct Turned {
+    /// The world was replaced: this is what it was, with what the new one has beside its step. Goes to
+    /// [`Control::give_back`].
+    pub replaced: Option<Box<Replacement>>,
+    /// What is to be told.
+    pub told: [Option<Kind>; ORDERS_A_TICK],
+    /// Orders that were taken, by their numbers in the run.
+    pub taken: std::ops::Range<u64>,
+}
+
+impl std::fmt::Debug for Replacement {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Replacement").finish_non_exhaustive()
+    }
 }
 
 impl Control {
     /// For a step with so many entities.
     pub fn new(orders: OrderReceiver, entities: usize) -> Self {
-        Self { orders, gradual: Gradual::new(entities), next: None, strength: 1.0, taken: 0 }
+        Self { orders, gradual: Gradual::new(entities), waiting: None, strength: 1.0, taken: 0 }
     }
 
-    /// How many orders were taken.
-    pub fn taken(&self) -> u64 {
-        self.taken
+    /// How many orders were taken, and how many of them could not be done.
+    pub fn taken(&self) -> [u64; 2] {
+        [self.taken, self.gradual.undone()]
     }
 
     /// Before a tick of this length (s), the run's so many-th.
-    pub fn turn(&mut self, step: &mut FastStep, run_tick: u64, dt_s: f64) -> World {
-        for _ in 0..ORDERS_A_TICK {
-            if self.next.is_some() {
+    pub fn turn(&mut self, step: &mut FastStep, run_tick: u64, dt_s: f64) -> Turned {
+        let mut turned = Turned { taken: self.taken..self.taken, ..Turned::default() };
+        for told in &mut turned.told {
+            if self.waiting.is_some() {
                 break;
             }
-            let Some(order) = self.orders.take(run_tick) else { break };
+            let Some(dated) = self.orders.take(run_tick) else { break };
             self.taken += 1;
-            match order {
+            turned.taken.end = self.taken;
+            match dated.order {
                 Order::Scale(scale) => self.gradual.scale(&scale),
-                Order::Move(moved) => self.gradual.set_out(&moved, step),
-                Order::Replace(next) => self.next = Some(next),
+                Order::Move(moved) => self.gradual.set_out(&moved),
+                Order::Tell(kind) => *told = Some(kind),
+                Order::Replace(next) => self.waiting = Some(Waiting::Replace(next)),
+                Order::Friction(change) => self.waiting = Some(Waiting::Friction(change)),
+                Order::Pause(is_paused) => self.waiting = Some(Waiting::Pause(is_paused)),
             }
         }
-        let became = self.fade(step, dt_s);
+        let is_silent = self.fade(step, dt_s);
+        if self.waiting.as_ref().is_some_and(|waiting| is_silent || !needs_silence(waiting, step)) {
+            turned.replaced = self.change(step);
+        }
         step.set_strength(self.strength);
-        self.gradual.advance(step, dt_s);
-        became
+        self.gradual.advance(step, dt_s, is_silent);
+        turned
     }
 
-    fn fade(&mut self, step: &mut FastStep, dt_s: f64) -> World {
+    /// Sends back what was replaced, to be freed.
+    pub fn give_back(&mut self, replaced: Box<Replacement>) {
+        self.orders.give_back(Spent::World(replaced));
+    }
+
+    /// Lets forces go for what needs silence, and come back; says whether there is silence.
+    fn fade(&mut self, step: &FastStep, dt_s: f64) -> bool {
         let share = dt_s / FADE_S;
-        if self.next.is_none() {
+        let waits = self.waiting.as_ref().is_some_and(|waiting| needs_silence(waiting, step));
+        if !waits && !self.gradual.needs_silence() {
             self.strength = (self.strength + share).min(1.0);
-            return World::Same;
+            return false;
         }
         self.strength = (self.strength - share).max(0.0);
         // What rounding leaves of it is nothing.
-        if self.strength > 0.5 * share {
-            return World::Same;
+        if self.strength <= 0.5 * share {
+            self.strength = 0.0;
         }
-        self.strength = 0.0;
-        let Some(mut next) = self.next.take() else { return World::Same };
-        std::mem::swap(step, &mut next.step);
-        std::mem::swap(&mut self.gradual, &mut next.gradual);
-        let became = if next.is_same_scene { World::Reset } else { World::Other };
-        if next.is_same_scene {
-            self.gradual.go_on_from(&next.gradual, step);
+        self.strength == 0.0
+    }
+
+    /// Does what was waiting, as far as the slow side can be told of it.
+    fn change(&mut self, step: &mut FastStep) -> Option<Box<Replacement>> {
+        match self.waiting.take()? {
+            Waiting::Replace(mut next) => {
+                std::mem::swap(step, &mut next.step);
+                std::mem::swap(&mut self.gradual, &mut next.gradual);
+                step.begin();
+                if next.other.is_none() {
+                    self.gradual.go_on_from(&next.gradual, step);
+                    // It is empty, but for its beginning.
+                    step.pause(next.step.is_paused());
+                }
+                return Some(next);
+            }
+            Waiting::Friction(mut change) => {
+                let FrictionChange { entity, friction, for_slow } = &mut *change;
+                if step.exchange_friction(*entity, friction, for_slow) {
+                    self.orders.give_back(Spent::Friction(change));
+                } else {
+                    self.waiting = Some(Waiting::Friction(change));
+                }
+            }
+            Waiting::Pause(is_paused) => {
+                if !step.pause(is_paused) {
+                    self.waiting = Some(Waiting::Pause(is_paused));
+                }
+            }
         }
-        self.orders.give_back(next);
-        became
+        None
+    }
+}
+
+/// So many ticks of this length (s) after a replacement was ordered the other world has its first one.
+pub fn ticks_to_silence(dt_s: f64) -> u64 {
+    let (share, mut strength, mut ticks) = (dt_s / FADE_S, 1.0, 0);
+    loop {
+        strength -= share;
+        if strength <= 0.5 * share {
+            return ticks;
+        }
+        ticks += 1;
+    }
+}
+
+fn needs_silence(waiting: &Waiting, step: &FastStep) -> bool {
+    match waiting {
+        Waiting::Replace(_) => true,
+        Waiting::Friction(change) => step.is_felt(Some(change.entity)),
+        Waiting::Pause(_) => step.is_felt(None),
     }
 }

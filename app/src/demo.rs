@@ -10,7 +10,7 @@ use shm_abi::client::{self, AttachError};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tempfile::TempDir;
-use world::Scene;
+use world::{Scene, Settings};
 
 const SCENE: &str = include_str!("../../config/scenes/default.toml");
 const HAND: &str = include_str!("../../config/hands/default.csv");
@@ -97,7 +97,16 @@ pub fn plan(rig: &Rig, socket: PathBuf, directory: Option<&Path>) -> RunPlan {
         }
     };
     let record = vec![recording_place(directory)];
-    RunPlan { clock: None, seconds: Some(SECONDS), record, events: Vec::new(), seed: 0, orders: None, attach }
+    RunPlan {
+        clock: None,
+        seconds: Some(SECONDS),
+        record,
+        events: Vec::new(),
+        seed: 0,
+        orders: None,
+        settings: Settings::default(),
+        attach,
+    }
 }
 
 /// In the directory that is set, or here, if one may write there, else among the temporary files.

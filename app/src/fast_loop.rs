@@ -5,14 +5,15 @@
 //! except where the clock itself waits (virtual, lockstep).
 //! Cost: bounded; no allocation, no system call but the wake-up of a sleeping driver.
 
+use crate::control::Control;
+use crate::control::order::Replacement;
 use crate::control::queue::OrderReceiver;
-use crate::control::{Control, World};
 use crate::fast_step::{EventTeller, FastStep};
 use crate::row::{BodyRow, Row};
 use crate::row_queue::RowSender;
 use bytemuck::Zeroable;
 use shm_abi::{Command, CommanderMemory, DriverState, DriverView, Frame};
-use world::events::EventSender;
+use world::events::{Event, EventSender, Kind};
 
 /// How far a missed frame is searched for in the ring: the next one is nearly always among these.
 const SEARCH_TICKS: u64 = 64;
@@ -44,12 +45,11 @@ pub struct FastLoop {
     step: FastStep,
     /// What people change meanwhile, if anybody may.
     control: Option<Control>,
-    /// Whether the bodies are still those that recordings know.
-    tells_bodies: bool,
-    /// And whether the entities are those that events name.
-    tells_events: bool,
-    /// Tells others what happens, if anybody wants to know.
-    teller: Option<EventTeller>,
+    /// Finds what happens, and where that is told, if anybody wants to know.
+    teller: EventTeller,
+    events: Option<EventSender>,
+    /// Whether no other scene has taken over.
+    is_first_scene: bool,
     rows: RowSender,
     when_full: WhenFull,
     /// Rows that the run shall have.
@@ -100,9 +100,10 @@ pub struct Tally {
 pub const TOLD: usize = 4;
 
 impl Tally {
-    fn park(&mut self, parked: &[physics::Parked], run_tick: u64) {
+    /// By name only those of the scene with which the run began.
+    fn park(&mut self, parked: &[physics::Parked], run_tick: u64, is_named: bool) {
         for parked in parked {
-            if let Some(place) = self.parked_first.get_mut(self.parked as usize) {
+            if let Some(place) = self.parked_first.get_mut(self.parked as usize).filter(|_| is_named) {
                 *place = Some((*parked, run_tick));
             }
             self.parked += 1;
@@ -113,7 +114,7 @@ impl Tally {
 impl FastLoop {
     /// A run of `total_ticks` rows.
     pub fn new(
-        step: FastStep,
+        mut step: FastStep,
         rows: RowSender,
         when_full: WhenFull,
         total_ticks: u64,
@@ -121,11 +122,11 @@ impl FastLoop {
     ) -> Self {
         Self {
             pending_bodies: (0..).zip(step.bodies().iter().copied()).collect(),
+            teller: EventTeller::new(&mut step),
             step,
             control: None,
-            tells_bodies: true,
-            tells_events: true,
-            teller: None,
+            events: None,
+            is_first_scene: true,
             rows,
             when_full,
             total_ticks,
@@ -149,15 +150,15 @@ impl FastLoop {
         self
     }
 
-    /// How many orders were taken.
-    pub fn orders_taken(&self) -> u64 {
-        self.control.as_ref().map_or(0, Control::taken)
+    /// How many orders were taken, and how many of them could not be done.
+    pub fn orders_taken(&self) -> [u64; 2] {
+        self.control.as_ref().map_or([0; 2], Control::taken)
     }
 
     /// With a queue for what happens.
     #[must_use]
     pub fn with_events(mut self, events: EventSender) -> Self {
-        self.teller = Some(EventTeller::new(&self.step, events));
+        self.events = Some(events);
         self
     }
 
@@ -212,20 +213,44 @@ impl FastLoop {
 
     /// Not before t = 0: until then a scene is what it says.
     fn take_orders(&mut self) {
-        let run_tick = self.run_ticks();
-        let Some(control) = self.control.as_mut().filter(|_| self.frame.run_tick >= 0) else { return };
-        let became = control.turn(&mut self.step, run_tick, self.period_ns as f64 / 1e9);
-        if became == World::Same {
+        if self.frame.run_tick < 0 {
             return;
+        }
+        self.place_in_time();
+        let run_tick = self.run_ticks();
+        let Some(control) = &mut self.control else { return };
+        let turned = control.turn(&mut self.step, run_tick, self.period_ns as f64 / 1e9);
+        if let Some(events) = &mut self.events {
+            for number in turned.taken {
+                events.send(Event { run_tick, kind: Kind::Order { number } });
+            }
+            for kind in turned.told.into_iter().flatten() {
+                events.send(Event { run_tick, kind });
+            }
+        }
+        if let Some(replaced) = turned.replaced {
+            self.take_over(replaced, run_tick);
+        }
+    }
+
+    /// Another world goes on from here. What is of the old one goes back with it.
+    fn take_over(&mut self, mut replaced: Box<Replacement>, run_tick: u64) {
+        std::mem::swap(&mut self.teller, &mut replaced.teller);
+        let why = replaced.other.as_ref().map_or(Kind::Reset, |other| Kind::Scene { number: other.number });
+        if let Some(events) = &mut self.events {
+            replaced.teller.end(&mut self.teller, run_tick, why, events);
         }
         self.row = Row::empty();
         self.pending_bodies.clear();
-        self.tells_bodies &= became == World::Reset;
-        // Whom another scene's numbers mean, nobody was told. Not dropped: nothing is freed here.
-        self.tells_events &= became == World::Reset;
-        if self.tells_bodies {
-            // Room for all of them was made when the run began.
-            self.pending_bodies.extend((0..).zip(self.step.bodies().iter().copied()));
+        if let Some(other) = &mut replaced.other {
+            self.is_first_scene = false;
+            std::mem::swap(&mut self.rows, &mut other.rows);
+            std::mem::swap(&mut self.pending_bodies, &mut other.bodies);
+        }
+        // Room for all of them was made with the world.
+        self.pending_bodies.extend((0..).zip(self.step.bodies().iter().copied()));
+        if let Some(control) = &mut self.control {
+            control.give_back(replaced);
         }
     }
 
@@ -235,13 +260,13 @@ impl FastLoop {
         }
         self.place_in_time();
         self.row.run_tick = self.run_ticks();
-        self.tally.park(self.step.parked_now(), self.row.run_tick);
+        self.tally.park(self.step.parked_now(), self.row.run_tick, self.is_first_scene);
         self.tally.moving = [self.step.bodies().len(), self.step.made().awake];
         self.next_tick = self.row.run_tick + 1;
         if self.row.run_tick < self.total_ticks {
             // Before the row is sent, and after the command was.
-            if let Some(teller) = self.teller.as_mut().filter(|_| self.tells_events) {
-                teller.tell(&self.step, &self.row);
+            if let Some(events) = &mut self.events {
+                self.teller.tell(&self.step, &self.row, events);
             }
             self.pending = Some((self.frame.tick, self.row));
             self.keep_bodies();
@@ -252,9 +277,6 @@ impl FastLoop {
     }
 
     fn keep_bodies(&mut self) {
-        if !self.tells_bodies {
-            return;
-        }
         let (pending, bodies) = (&mut self.pending_bodies, self.step.bodies());
         for &number in self.step.changed_bodies() {
             let body = bodies[number as usize];

@@ -217,6 +217,7 @@ mod tests {
             ties: Vec::new(),
             grasp_quality: false,
             spaces: None,
+            lists: false,
         }
     }
 

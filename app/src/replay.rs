@@ -10,13 +10,15 @@
 mod difference;
 mod edit;
 mod feed;
+mod ordered;
 mod stage;
 
+use crate::book::Book;
 use crate::export::{tell_end, wrong};
 use crate::fast_loop::{FastLoop, Turn, WhenFull};
 use crate::outcome::RunFailure;
 use crate::progress::StatusLine;
-use crate::record::read::{ReadError, RecordedRun};
+use crate::record::read::{self, ReadError, RecordedRun};
 use crate::record::{self, Recorder, View};
 use crate::rig::Rig;
 use crate::row_queue::{RowReceiver, row_queue};
@@ -29,6 +31,7 @@ use edit::Edit;
 use feed::{Feed, ReplayedDevice, SharedFeed};
 use io_driver::device::{Device, run_time_s};
 use nalgebra::Vector3;
+use ordered::Orders;
 use rt_core::signals::StopSignals;
 use shm_abi::segment::ClockMode;
 use stage::Stage;
@@ -77,7 +80,8 @@ pub fn execute(args: &ReplayArgs, signals: &StopSignals) -> Result<ExitCode, Run
     if feed.is_empty() {
         return Err(wrong(&format_args!("{} has no rows", args.recording.display())));
     }
-    let mut play = Play::new(&stage, Arc::new(Mutex::new(feed)), &args.record)?;
+    let orders = read::orders(&args.recording);
+    let mut play = Play::new(&stage, Arc::new(Mutex::new(feed)), orders, &args.record)?;
     let ended = play.run(signals);
     play.conclude(args, &stage, ended)
 }
@@ -105,6 +109,9 @@ fn refuse_to_overwrite(args: &ReplayArgs, rig: &Rig) -> Result<(), RunFailure> {
 struct Play {
     driver: VirtualDriver,
     fast: FastLoop,
+    orders: Option<Orders>,
+    /// The tick in which the recording begins, where that is where another scene ended.
+    begins: Option<u64>,
     rows: RowReceiver,
     recorders: Vec<Recorder>,
     events: Hub,
@@ -119,7 +126,12 @@ struct Play {
 }
 
 impl Play {
-    fn new(stage: &Stage, feed: SharedFeed, records: &[PathBuf]) -> Result<Self, RunFailure> {
+    fn new(
+        stage: &Stage,
+        feed: SharedFeed,
+        orders: Vec<(u64, String)>,
+        records: &[PathBuf],
+    ) -> Result<Self, RunFailure> {
         let rig = &stage.rig;
         let (recorded_names, period_ns) = {
             let held = lock(&feed);
@@ -140,8 +152,9 @@ impl Play {
         let step = rig.fast_step().map_err(|error| wrong(&error))?;
         let bodies = step.bodies().len();
         let view = View::new(&rig.scene, step.entities());
+        let book = Book::default();
         let recorder = |path: &PathBuf| {
-            let file = record::create(path, names.clone(), period_ns, &stage.about, &view)?;
+            let file = record::create(path, names.clone(), period_ns, &stage.about, &view, (&book, 0))?;
             Recorder::start(path, file, bodies, period_ns, WhenFull::Wait)
         };
         let mut recorders = records.iter().map(recorder).collect::<Result<Vec<_>, _>>()?;
@@ -149,10 +162,20 @@ impl Play {
         let mut hub = Hub::new(vec![event_ends]);
         slow::subscribe(&mut recorders, &mut hub);
         let (sender, rows) = row_queue(bodies);
+        // It ends with the recording.
+        let mut fast = FastLoop::new(step, sender, WhenFull::Wait, u64::MAX, period_ns).with_events(events);
+        let begins = stage.follows.then(|| lock(&feed).first_tick());
+        let orders = Orders::new(stage, orders, begins, &driver.extras(), &book);
+        let orders = orders.map_err(|error| wrong(&error))?;
+        let (orders, taken) = orders.unzip();
+        if let Some(taken) = taken {
+            fast = fast.with_control(taken);
+        }
         Ok(Self {
             driver,
-            // It ends with the recording.
-            fast: FastLoop::new(step, sender, WhenFull::Wait, u64::MAX, period_ns).with_events(events),
+            fast,
+            orders,
+            begins,
             rows,
             recorders,
             events: hub,
@@ -169,12 +192,18 @@ impl Play {
     fn run(&mut self, signals: &StopSignals) -> Result<(), RunFailure> {
         let mut line = StatusLine::told_just_now();
         for tick in 1.. {
-            let (feed, fast, missing) = (&self.feed, &mut self.fast, &mut self.missing);
+            if let Some(orders) = &mut self.orders {
+                orders.give(self.fast.run_ticks());
+            }
+            let (feed, fast, missing, follows) =
+                (&self.feed, &mut self.fast, &mut self.missing, self.begins.is_some());
             let turn = self.driver.tick_with(tick, |tick, driver, commander| {
-                if lock(feed).is_missing() {
+                let held = lock(feed);
+                if held.is_missing() && !(follows && held.is_before_first()) {
                     *missing += 1;
                     return Turn::Skipped;
                 }
+                drop(held);
                 fast.turn(tick, driver, commander)
             });
             self.compare();
@@ -211,6 +240,9 @@ impl Play {
             }
             drop(feed);
             self.events.deliver(row.run_tick);
+            if self.begins.is_some_and(|begins| row.run_tick < begins) {
+                continue;
+            }
             for recorder in &mut self.recorders {
                 recorder.send(&row, bodies);
             }

@@ -30,6 +30,8 @@ pub struct Report {
     pub parked: Vec<String>,
     /// How many events of which kind there were.
     pub events: String,
+    /// Orders that were taken, and those of them that could not be done; `None`: nobody may order anything.
+    pub orders: Option<[u64; 2]>,
     /// What became of the fast and the slow list, if there are two.
     pub lists: Option<ListsEnd>,
     /// What became of the recordings.
@@ -133,6 +135,14 @@ impl fmt::Display for Report {
             writeln!(f, "parked       {line}")?;
         }
         writeln!(f, "events       {}", self.events)?;
+        match self.orders {
+            None => {}
+            Some([taken, 0]) => writeln!(f, "orders       {taken}")?,
+            Some([taken, undone]) => writeln!(
+                f,
+                "orders       {taken}, {undone} NOT DONE: too much was moved at once, or touched what was to be moved"
+            )?,
+        }
         if let Some(lists) = &self.lists {
             writeln!(f, "lists        {lists}")?;
         }

@@ -1,8 +1,10 @@
 //! From files and arguments to everything a run needs: whatever can be wrong with the input is found here,
 //! before anything is started.
 
+mod devices;
 mod doors;
 mod effects;
+mod entities;
 mod error;
 mod material;
 mod models;
@@ -11,6 +13,7 @@ mod pictures;
 mod problems;
 mod solids;
 
+use self::devices::check_hand;
 pub use self::error::RigError;
 use self::material::Unfit;
 use self::models::Models;
@@ -20,26 +23,19 @@ use self::pictures::Pictures;
 pub use self::problems::Problems;
 use self::solids::Solids;
 use crate::fast_step::{DeviceFinger, FastStep};
-use crate::mount::Mount;
 use crate::recording::Names;
-use crate::simulated::{SimulatedDevices, base_for_path};
+use crate::settings;
+use crate::simulated::SimulatedDevices;
 use haptics::mesh::MeshReport;
 use haptics::passivity::Passivity;
-use haptics::{Algorithm, Door, Entity, Finger, ParameterError};
-use io_driver::config::{
-    Backend, DeviceConfig, DriverConfig, ProcessConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig, Wish,
-    Zeroing,
-};
+use haptics::{Door, Entity, Finger, Friction, ParameterError};
 use io_driver::device::Extras;
-use io_driver::device_file::Workspace;
 use io_driver::open::open_devices;
-use io_driver::say::say;
-use io_driver::sim::script::HandScript;
 use nalgebra::{Isometry3, Vector3};
 use physics::Body;
 use shm_abi::segment::ClockMode;
 use std::path::{Path, PathBuf};
-use world::{AlgorithmSpec, Layout, Scene, SceneEntity, SceneFinger, ShapeSpec};
+use world::{FrictionSpec, Layout, Scene, SceneEntity, SceneFinger, Settings, ShapeSpec};
 
 /// What a run needs, checked.
 #[derive(Debug, Clone)]
@@ -149,60 +145,19 @@ impl Rig {
         Self { period_ns, ..self }
     }
 
-    /// Another scene for the same devices, where they are and as they are moved.
+    /// Another scene for the same devices, where they are and as they are moved; what is not where the scene says is where
+    /// the settings say.
     ///
     /// # Errors
     /// The first thing that is wrong with it.
-    pub fn beside(&self, scene_file: &Path) -> Result<Self, RigError> {
-        let scene = Scene { hand: None, ..Scene::load(scene_file)? };
+    pub fn beside(&self, scene_file: &Path, settings: &Settings) -> Result<Self, RigError> {
+        let scene_file = &settings::find(scene_file, &settings.scenes.value);
+        let mut scene = Scene { hand: None, ..Scene::load(scene_file)? };
+        settings::find_data(&mut scene, scene_file, settings);
         let rig =
             Self::new(scene_file, scene, self.layout.clone(), None, HandMode::Kinematic, self.period_ns)?;
         let (bases, hand_mode, hand) = (self.bases.clone(), self.hand_mode.clone(), self.hand.clone());
         Ok(Self { bases, hand_mode, hand, ..rig })
-    }
-
-    /// Where a device stands, X_WD.
-    pub fn base_in_world(&self, device: usize) -> Isometry3<f64> {
-        self.bases.get(device).copied().unwrap_or_else(Isometry3::identity)
-    }
-
-    fn mount(&self, device: usize) -> Mount {
-        match &self.layout {
-            Some(layout) => Mount::placed(&layout.placement(device)),
-            None => Mount::new(self.base_in_world(device)),
-        }
-    }
-
-    fn place_bases(&self) -> Result<Vec<Isometry3<f64>>, RigError> {
-        let devices = 0..self.device_count();
-        match (&self.layout, &self.hand_mode) {
-            (Some(layout), _) => Ok(devices.map(|device| layout.pose(device)).collect()),
-            (None, HandMode::Kinematic) => Ok(Vec::new()),
-            (None, HandMode::Impedance(simulated)) => {
-                let workspace = simulated.arm()?.workspace;
-                Ok(devices.map(|device| self.base_near_path(device, &workspace)).collect())
-            }
-        }
-    }
-
-    /// So that the finger's path lies within the workspace.
-    fn base_near_path(&self, device: usize, workspace: &Workspace) -> Isometry3<f64> {
-        let Some(index) = self.scene.fingers.iter().position(|finger| finger.device == device) else {
-            return Isometry3::identity();
-        };
-        let finger = &self.scene.fingers[index];
-        let bounds = self.hand.as_ref().and_then(|hand| hand.bounds.get(index).copied().flatten());
-        let [lowest, highest] = bounds.unwrap_or([finger.start_m.coords; 2]);
-        let base = base_for_path(lowest, highest, workspace);
-        if base != Isometry3::identity() {
-            let [x, y, z]: [f64; 3] = base.translation.vector.into();
-            say(format_args!(
-                "phantom3: the device of finger {} stands at [{x:.4}, {y:.4}, {z:.4}] m, so that the hand's path lies in \
-                 its workspace; --layout says otherwise",
-                finger.name
-            ));
-        }
-        base
     }
 
     /// The rendering of this scene.
@@ -268,145 +223,16 @@ impl Rig {
             ties: self.scene.fingers.iter().map(|finger| finger.attach.is_some()).collect(),
             grasp_quality: self.scene.dynamics.grasp_quality,
             spaces: self.space_names(),
+            lists: self.moving().count() > self.scene.dynamics.lists.fast_bodies,
             fingers: self.scene.fingers.iter().map(|finger| finger.name.clone()).collect(),
             entities: self.scene.entities.iter().map(|entity| entity.name.clone()).collect(),
             bodies: self.moving().map(|(_, entity, _)| entity.name.clone()).collect(),
         }
     }
 
-    /// How many devices the fingers need.
-    pub fn device_count(&self) -> usize {
-        self.scene.fingers.iter().map(|finger| finger.device + 1).max().unwrap_or(0)
-    }
-
     /// How long the run lasts if nobody says: as long as the hand file, and at least a second.
     pub fn default_seconds(&self) -> f64 {
         self.hand.as_ref().map_or(1.0, |hand| hand.duration_s.max(1.0))
-    }
-
-    /// A driver whose devices are the scripted hand's fingers.
-    pub fn driver_config(&self, clock: ClockMode) -> DriverConfig {
-        let period_ns = self.period_ns;
-        let reply = ReplyConfig { mode: ReplyMode::OnArrival, budget_ns: period_ns / 2 };
-        DriverConfig {
-            period_ns,
-            clock,
-            socket: None,
-            real_time: RealTime::usual(period_ns, reply.budget_ns),
-            reply,
-            safety: SafetyConfig::usual(period_ns),
-            process: ProcessConfig::default(),
-            devices: (0..self.device_count()).map(|index| self.device(index)).collect(),
-        }
-    }
-
-    fn device(&self, index: usize) -> DeviceConfig {
-        let finger = self.scene.fingers.iter().find(|finger| finger.device == index);
-        let hand =
-            finger.and_then(|finger| self.hand.as_ref().map(|hand| (hand.path.clone(), finger.name.clone())));
-        let wish = Wish {
-            hand,
-            start_m: finger.map_or_else(Vector3::zeros, |finger| finger.start_m.coords),
-            base_in_world: self.base_in_world(index),
-        };
-        let (backend, compensates_gravity) = match &self.hand_mode {
-            // A device that is no finger's needs no hand.
-            HandMode::Impedance(simulated) if finger.is_some() => (simulated.backend(wish), true),
-            _ => (Backend::Ideal(wish), false),
-        };
-        DeviceConfig {
-            // No finger can be called so: brackets are not allowed in a name.
-            name: finger.map_or_else(|| format!("(unused {index})"), |finger| finger.name.clone()),
-            backend,
-            peak_force_n: None,
-            compensates_gravity,
-            zeroing: Zeroing::Known,
-        }
-    }
-
-    fn entity(&self, spec: &SceneEntity, solids: &mut Solids) -> Result<Entity, RigError> {
-        let what = || format!("entity {}", spec.name);
-        let refused = |source| refused(spec, source);
-        let unfit = |unfit| self.unfit((&spec.file, spec.line), what(), unfit);
-        self.check_rendered(spec, what())?;
-        let shape =
-            material::shape(&spec.shape, &self.models, spec.height_map.is_some(), solids).map_err(unfit)?;
-        let friction = material::friction(&spec.friction).map_err(unfit)?;
-        let algorithm = material::algorithm(spec.algorithm).map_err(unfit)?;
-        let shading = material::shading(spec, &self.models).map_err(unfit)?;
-        let height_map =
-            spec.height_map.as_ref().map(|map| self.pictures.height_map(map, &shape)).transpose()?;
-        let entity = Entity::new(shape, spec.pose, spec.stiffness_n_per_m)
-            .and_then(|entity| entity.with_damping(spec.damping_n_s_per_m))
-            .and_then(|entity| entity.with_friction(friction))
-            .and_then(|entity| match spec.restitution {
-                Some(restitution) => entity.with_restitution(restitution),
-                None => Ok(entity),
-            })
-            .map(|entity| entity.with_algorithm(algorithm).with_shading(shading))
-            .map_err(refused)?;
-        let entity = match height_map {
-            Some(height_map) => entity.with_height_map(height_map),
-            None => entity,
-        };
-        let entity = if spec.is_collidable { entity } else { entity.without_collisions() };
-        let entity = entity.within(self.space(spec.within.as_ref()));
-        if spec.is_haptic { self.with_surface_effects(entity, spec) } else { Ok(entity.without_fingers()) }
-    }
-
-    /// The algorithms to compare with know surfaces, and trees have none of their own.
-    fn check_rendered(&self, spec: &SceneEntity, what: String) -> Result<(), RigError> {
-        let found = match spec.algorithm {
-            AlgorithmSpec::VectorField => "vector-field",
-            AlgorithmSpec::ClassicGodObject => "classic",
-            _ => return Ok(()),
-        };
-        if !material::is_csg(&spec.shape) {
-            return Ok(());
-        }
-        Err(RigError::NotRendered { file: spec.file.to_path_buf(), line: spec.line, what, found })
-    }
-
-    /// What balls cannot feel by its equation they feel in triangles, made once for all forms that are alike.
-    fn prepared(&self, entities: Vec<Entity>) -> Vec<Entity> {
-        let mut made: Vec<Entity> = Vec::new();
-        let mut prepare = |entity: Entity, radius_m: f64| {
-            if !entity.is_haptic || entity.is_felt_by(radius_m) {
-                return entity;
-            }
-            if let Some(alike) = made.iter().find(|other| other.shape == entity.shape) {
-                return Entity { for_balls: alike.for_balls.clone(), ..entity };
-            }
-            let entity = entity.prepared_for(radius_m);
-            made.push(entity.clone());
-            entity
-        };
-        let radii = || self.scene.fingers.iter().map(|finger| finger.radius_m);
-        entities.into_iter().map(|entity| radii().fold(entity, &mut prepare)).collect()
-    }
-
-    /// A finger would pass through what it cannot feel, without a word.
-    fn check_felt(&self, entities: &[Entity], finger: &SceneFinger) -> Result<(), RigError> {
-        let is_lost = |entity: &Entity| entity.is_haptic && !entity.is_felt_by(finger.radius_m);
-        let not_felt = entities.iter().position(is_lost);
-        let Some(index) = not_felt else { return Ok(()) };
-        let spec = &self.scene.entities[index];
-        let with_cone = entities[index].clone().with_algorithm(Algorithm::FrictionCone);
-        // Somebody's own shape may be felt by small balls only.
-        let by_smaller = entities[index].is_felt_by(1e-3 * finger.radius_m);
-        Err(RigError::NotFelt {
-            file: spec.file.to_path_buf(),
-            line: spec.line,
-            finger: finger.name.clone(),
-            radius_m: finger.radius_m,
-            entity: spec.name.clone(),
-            kind: spec.shape.kind(),
-            otherwise: match () {
-                () if with_cone.is_felt_by(finger.radius_m) => ", algorithm = \"friction-cone\"",
-                () if by_smaller => ", a smaller radius",
-                () => "",
-            },
-        })
     }
 
     /// The meshes, each with its file and what was found in it.
@@ -442,30 +268,22 @@ impl Rig {
     }
 }
 
+/// The friction that this says.
+///
+/// # Errors
+/// What rendering refuses of it.
+pub fn friction(spec: &FrictionSpec) -> Result<Friction, String> {
+    material::friction(spec).map_err(|unfit| match unfit {
+        Unfit::Refused(error) => error.to_string(),
+        Unfit::NoSolid(error) => error.to_string(),
+        Unfit::NotAvailable(what) => format!("this version has no {what}"),
+    })
+}
+
 /// A finger feels no more entities at once.
 const MOST_NEAR: usize = 128;
-
-/// Why an entity of the scene is refused.
-fn refused(spec: &SceneEntity, source: ParameterError) -> RigError {
-    let (file, what) = (spec.file.to_path_buf(), format!("entity {}", spec.name));
-    RigError::Refused { file, line: Some(spec.line), what, source }
-}
 
 /// Whether contacts turn it: it has a radius, a pad, or something tied to it.
 fn has_torque(finger: &SceneFinger) -> bool {
     finger.radius_m > 0.0 || finger.soft.is_some() || finger.attach.is_some()
-}
-
-/// Reads the hand file as the driver will, so that its mistakes are told here, by this process.
-fn check_hand(path: &Path, named_by: &str, scene: &Scene) -> Result<HandFile, RigError> {
-    let unreadable = |source| RigError::Unreadable { file: path.into(), named_by: named_by.into(), source };
-    if !path.metadata().map_err(unreadable)?.is_file() {
-        return Err(RigError::NotAFile { file: path.into(), named_by: named_by.into() });
-    }
-    let text = std::fs::read_to_string(path).map_err(unreadable)?;
-    let fingers: Vec<&str> = scene.fingers.iter().map(|finger| finger.name.as_str()).collect();
-    let script = HandScript::parse(&text, path, &fingers)?;
-    let path = std::path::absolute(path).map_err(unreadable)?;
-    let bounds = (0..fingers.len()).map(|finger| script.bounds(finger)).collect();
-    Ok(HandFile { path, duration_s: script.duration_s(), bounds })
 }

@@ -71,4 +71,6 @@ pub struct BodyRow {
     pub angular_velocity: Vector3<f64>,
     /// How the fingers hold it in this tick; recorded where the scene asks for it.
     pub grasp: GraspQuality,
+    /// Whether it is in the slow list; recorded where the scene has two.
+    pub is_slow: bool,
 }

@@ -84,6 +84,11 @@ impl RowReceiver {
         self.rows.slots()
     }
 
+    /// Which tick of the run the next row is of, if one waits.
+    pub fn next_tick(&self) -> Option<u64> {
+        Some(self.rows.peek().ok()?.0.run_tick)
+    }
+
     /// The next row and all bodies, if one waits.
     pub fn receive(&mut self) -> Option<(Row, &[BodyRow])> {
         let (row, bodies) = self.rows.pop().ok()?;

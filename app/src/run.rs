@@ -1,13 +1,13 @@
 //! A scripted run from start to report.
 
+use crate::book::Book;
 use crate::child::DriverChild;
-use crate::control;
-use crate::control::desk::{Desk, OrderSource};
+use crate::control::desk::{Desk, Means, OrderSource};
 use crate::fast_loop::{FastLoop, Tally, WhenFull};
 use crate::not_zeroed;
 use crate::outcome::{RunFailure, Stop};
 use crate::progress::Progress;
-use crate::record::{self, About, Recorder, View};
+use crate::record::{About, Files, View};
 use crate::report::{Baseline, Report};
 use crate::rig::{HandMode, Rig};
 use crate::row_queue::row_queue;
@@ -21,8 +21,11 @@ use shm_abi::client;
 use shm_abi::segment::{ClockMode, DriverInfo};
 use shm_abi::{CommanderMemory, DriverView, Frame};
 use std::path::PathBuf;
+use std::sync::mpsc::{self, Receiver};
 use std::time::Duration;
+use world::Settings;
 use world::events::{Hub, event_queue};
+use world::lists::SlowList;
 
 /// Events that may wait between fast and slow side.
 pub const EVENT_QUEUE: usize = 8192;
@@ -42,6 +45,8 @@ pub struct RunPlan {
     pub seed: u64,
     /// What is to change while it runs.
     pub orders: Option<OrderSource>,
+    /// Where other scenes are looked for, if orders name any.
+    pub settings: Settings,
     /// Use the driver that listens here, and its devices, instead of a child with the rig's.
     pub attach: Option<Attach>,
 }
@@ -71,6 +76,8 @@ struct Parts {
     fast: FastLoop,
     slow: SlowSide,
     progress: Progress,
+    /// In real time, the slow lists of worlds that orders bring.
+    slow_lists: Option<Receiver<SlowList>>,
 }
 
 impl Parts {
@@ -92,32 +99,36 @@ impl Parts {
         }
         let when_full = if clock == ClockMode::Real { WhenFull::Drop } else { WhenFull::Wait };
         let step = rig.fast_step().map_err(|error| RunFailure::Start(error.to_string()))?;
-        if plan.orders.is_some() && step.handed().is_some() {
-            return Err(RunFailure::Start(control::NEEDS_ONE_LIST.into()));
-        }
-        let is_recorded = !plan.record.is_empty();
-        let open = |source| Desk::open(rig, source, is_recorded).map_err(RunFailure::Start);
+        let book = Book::default();
+        let (sender, slow_lists) = mpsc::channel();
+        let means = Means {
+            settings: plan.settings.clone(),
+            extras: devices.to_vec(),
+            book: book.clone(),
+            slow_lists: (clock == ClockMode::Real).then_some(sender),
+        };
+        let open = |source| Desk::open(rig, source, means).map_err(RunFailure::Start);
         let (desk, orders) = plan.orders.as_ref().map(open).transpose()?.unzip();
         let (producer, consumer) = row_queue(step.bodies().len());
-        let view = View::new(&rig.scene, step.entities());
-        let record = |path: &PathBuf| {
-            let file = record::create(path, rig.names(devices), period_ns, about, &view)?;
-            Recorder::start(path, file, step.bodies().len(), period_ns, when_full)
+        let files = Files {
+            record: plan.record.clone(),
+            events: plan.events.clone(),
+            extras: devices.to_vec(),
+            period_ns,
+            when_full,
+            book,
+            about: about.clone(),
         };
-        let record_events = |path: &PathBuf| {
-            let file = record::create_events(path, rig.names(devices), period_ns)?;
-            Recorder::start(path, file, step.bodies().len(), period_ns, when_full)
-        };
-        let all = plan.record.iter().map(record).chain(plan.events.iter().map(record_events));
-        let recorders = all.collect::<Result<_, _>>()?;
+        let recorders = files.first(rig, &View::new(&rig.scene, step.entities()))?;
         let (events, event_ends) = event_queue(EVENT_QUEUE);
         let fast = FastLoop::new(step, producer, when_full, total_ticks, period_ns).with_events(events);
         Ok(Self {
+            slow_lists: (clock == ClockMode::Real && orders.is_some()).then_some(slow_lists),
             fast: match orders {
                 Some(orders) => fast.with_control(orders),
                 None => fast,
             },
-            slow: SlowSide::new(consumer, Hub::new(vec![event_ends]), recorders).with_desk(desk),
+            slow: SlowSide::new(consumer, Hub::new(vec![event_ends]), recorders).with_desk(desk, files),
             progress: Progress::new(total_ticks, period_ns),
         })
     }
@@ -126,7 +137,7 @@ impl Parts {
 fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Report, Stop), RunFailure> {
     let mut driver = VirtualDriver::open(&rig.driver_config(ClockMode::Virtual))?;
     let about = About::of_run(rig, ClockMode::Virtual, rig.period_ns, plan.seed);
-    let Parts { mut fast, mut slow, mut progress } =
+    let Parts { mut fast, mut slow, mut progress, .. } =
         Parts::new(rig, plan, ClockMode::Virtual, rig.period_ns, &driver.extras(), &about)?;
     let result = driver.run(&mut fast, &mut slow, &mut progress, signals);
     progress.end();
@@ -142,6 +153,7 @@ fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Repo
         guarantees: None,
         parked: parked(&fast.tally, rig),
         events,
+        orders: plan.orders.as_ref().map(|_| fast.orders_taken()),
         lists: fast.step_mut().end_lists(None),
         recordings,
     };
@@ -162,9 +174,10 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
     about.tell("driver", driver_name.clone());
     about.tell("driver_setup", info.setup_report.clone());
     about.tell("lease", attachment.commander.as_ref().map_or(0, CommanderMemory::lease).to_string());
-    let Parts { fast, mut slow, mut progress } =
+    let Parts { fast, mut slow, mut progress, slow_lists } =
         Parts::new(&step_rig, plan, info.clock_mode, info.period_ns, &extras, &about)?;
-    let result = two_processes::run(&mut source, attachment, fast, &mut slow, &mut progress, signals);
+    let result =
+        two_processes::run(&mut source, attachment, (fast, slow_lists), &mut slow, &mut progress, signals);
     progress.end();
     let (recordings, events) = slow.finish();
     let end = result?;
@@ -179,6 +192,7 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
         guarantees: is_real.then_some((info.setup_report, end.fast_report)),
         parked: parked(&end.tally, rig),
         events,
+        orders: plan.orders.as_ref().map(|_| end.orders),
         lists: end.lists,
         recordings,
     };

@@ -1,9 +1,10 @@
 //! The slow thread's turn: take what the fast thread left and hand it to the recorders and to those who want events.
 
-use crate::control::desk::Desk;
-use crate::record::{Recorded, Recorder};
+use crate::control::desk::{Coming, Desk};
+use crate::record::{Files, Recorded, Recorder};
 use crate::row::Row;
 use crate::row_queue::RowReceiver;
+use io_driver::say::say;
 use std::fmt::Write;
 use world::events::{Class, Filter, Hub};
 
@@ -11,6 +12,16 @@ use world::events::{Class, Filter, Hub};
 pub struct SlowSide {
     rows: RowReceiver,
     recorders: Vec<Recorder>,
+    /// Those of scenes that are over.
+    closed: Vec<Recorder>,
+    /// What could not be begun.
+    failed: Vec<Recorded>,
+    /// How recordings of other scenes are made.
+    files: Option<Files>,
+    /// Scenes that took over.
+    scenes: u32,
+    /// The one that will.
+    coming: Option<Coming>,
     /// Who takes orders, if anybody gives them.
     desk: Option<Desk>,
     /// Who else wants to know what happens.
@@ -24,18 +35,36 @@ impl SlowSide {
     pub fn new(rows: RowReceiver, events: Hub, recorders: Vec<Recorder>) -> Self {
         let (mut recorders, mut events) = (recorders, events);
         subscribe(&mut recorders, &mut events);
-        Self { rows, recorders, desk: None, events, newest: None }
+        Self {
+            rows,
+            recorders,
+            closed: Vec::new(),
+            failed: Vec::new(),
+            files: None,
+            scenes: 0,
+            coming: None,
+            desk: None,
+            events,
+            newest: None,
+        }
     }
 
-    /// With somebody who takes orders.
+    /// With somebody who takes orders, and with recordings of other scenes than the first made so.
     #[must_use]
-    pub fn with_desk(self, desk: Option<Desk>) -> Self {
-        Self { desk, ..self }
+    pub fn with_desk(self, desk: Option<Desk>, files: Files) -> Self {
+        Self { desk, files: Some(files), ..self }
     }
 
     /// Takes everything that is there. A recording that cannot be written tells so itself, and the run goes on.
     pub fn step(&mut self) {
         self.desk.iter_mut().for_each(Desk::step);
+        self.take_rows();
+        while self.go_on_to_next_scene() {
+            self.take_rows();
+        }
+    }
+
+    fn take_rows(&mut self) {
         for _ in 0..self.rows.waiting() {
             let Some((row, bodies)) = self.rows.receive() else { break };
             // A tick's events are there before its row is.
@@ -47,12 +76,63 @@ impl SlowSide {
         }
     }
 
+    /// Whether another scene has taken over, as its first row tells.
+    fn go_on_to_next_scene(&mut self) -> bool {
+        self.coming = self.coming.take().or_else(|| self.desk.as_mut()?.take_coming());
+        let Some(coming) = self.coming.take_if(|coming| coming.rows.waiting() > 0) else { return false };
+        // What came in before that row did.
+        self.take_rows();
+        self.scenes += 1;
+        let (stay, end): (Vec<_>, Vec<_>) =
+            std::mem::take(&mut self.recorders).into_iter().partition(Recorder::is_of_events);
+        self.recorders = stay;
+        let mut begun = self.begin_recordings(&coming);
+        subscribe(&mut begun, &mut self.events);
+        if let Some(first) = coming.rows.next_tick() {
+            self.events.deliver(first);
+        }
+        self.closed.extend(end.into_iter().map(|mut recorder| {
+            recorder.close();
+            recorder
+        }));
+        self.recorders.extend(begun);
+        self.rows = coming.rows;
+        true
+    }
+
+    fn begin_recordings(&mut self, coming: &Coming) -> Vec<Recorder> {
+        let Some(files) = self.files.as_ref().filter(|files| !files.record.is_empty()) else {
+            return Vec::new();
+        };
+        match files.of_scene(&coming.rig, &coming.view, self.scenes) {
+            Ok(begun) => {
+                for recorder in &begun {
+                    let scene = coming.rig.scene_file.display();
+                    say(format_args!(
+                        "phantom3: {scene} goes on; it is recorded in {}",
+                        recorder.path().display()
+                    ));
+                }
+                begun
+            }
+            Err(error) => {
+                say(format_args!("phantom3: {error}"));
+                let path = files.record[0].clone();
+                let failure = Some(error.to_string());
+                self.failed.push(Recorded { path, rows: 0, unit: "rows", lost: 0, failure });
+                Vec::new()
+            }
+        }
+    }
+
     /// Takes the rest and closes the recordings. Returns what became of them, and what has happened.
     pub fn finish(mut self) -> (Vec<Recorded>, String) {
         self.step();
         self.events.deliver(u64::MAX);
         let told = summary(&self.events);
-        (self.recorders.into_iter().map(Recorder::finish).collect(), told)
+        self.closed.append(&mut self.recorders);
+        self.failed.extend(self.closed.into_iter().map(Recorder::finish));
+        (self.failed, told)
     }
 }
 

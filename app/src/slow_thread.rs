@@ -2,12 +2,14 @@
 //!
 //! Model: some hundred times a second it looks how many ticks the run has made, and goes on by as many, in steps of a tick.
 //! If that takes longer than it should, what is in the slow list goes slower than the rest, and how much is counted.
-//! It has no real-time rights; nobody waits for it.
+//! It has no real-time rights; nobody waits for it. Where orders bring other worlds, it has their lists, too, and steps those
+//! of worlds that run.
 //! Invariant: it ends with its owner, whatever ended that.
 
 use rt_core::clock::{monotonic_ns, sleep_until_ns};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{self, Receiver};
 use std::thread::JoinHandle;
 use world::lists::SlowList;
 
@@ -18,7 +20,7 @@ const MOST_TICKS: u64 = 40;
 
 /// The running thread.
 pub struct SlowThread {
-    thread: Option<JoinHandle<SlowRemains>>,
+    thread: Option<JoinHandle<Option<SlowRemains>>>,
     stop: Arc<AtomicBool>,
 }
 
@@ -36,18 +38,32 @@ impl SlowThread {
     /// # Errors
     /// If the thread cannot be started.
     pub fn start(slow: SlowList, run_ticks: Arc<AtomicU64>, period_ns: u64) -> std::io::Result<Self> {
+        Self::start_with(Some(slow), mpsc::channel().1, run_ticks, period_ns)
+    }
+
+    /// The same with the lists of worlds that will take over, or with none as yet.
+    ///
+    /// # Errors
+    /// If the thread cannot be started.
+    pub fn start_with(
+        first: Option<SlowList>,
+        later: Receiver<SlowList>,
+        run_ticks: Arc<AtomicU64>,
+        period_ns: u64,
+    ) -> std::io::Result<Self> {
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
+        let lists = SlowLists { lists: first.into_iter().collect(), later };
         let thread = std::thread::Builder::new()
             .name("slow-list".into())
-            .spawn(move || go_on(slow, &run_ticks, period_ns, &stopped))?;
+            .spawn(move || go_on(lists, &run_ticks, period_ns, &stopped))?;
         Ok(Self { thread: Some(thread), stop })
     }
 
-    /// Ends it; `None` if it had panicked.
+    /// Ends it; `None` if it had panicked, or has no list of a world that runs.
     pub fn end(mut self) -> Option<SlowRemains> {
         self.stop.store(true, Ordering::Relaxed);
-        self.thread.take()?.join().ok()
+        self.thread.take()?.join().ok()?
     }
 }
 
@@ -60,7 +76,31 @@ impl Drop for SlowThread {
     }
 }
 
-fn go_on(mut slow: SlowList, run_ticks: &AtomicU64, period_ns: u64, stopped: &AtomicBool) -> SlowRemains {
+/// Those of all worlds, in the order in which these take over.
+struct SlowLists {
+    lists: Vec<SlowList>,
+    later: Receiver<SlowList>,
+}
+
+impl SlowLists {
+    fn turn(&mut self, ticks: u32, dt_s: f64) {
+        self.lists.extend(self.later.try_iter());
+        self.lists.retain(|slow| !slow.is_over());
+        self.lists.iter_mut().for_each(|slow| slow.turn(ticks, dt_s));
+    }
+
+    /// That of the world which runs.
+    fn last_begun(self) -> Option<SlowList> {
+        self.lists.into_iter().filter(SlowList::has_begun).next_back()
+    }
+}
+
+fn go_on(
+    mut lists: SlowLists,
+    run_ticks: &AtomicU64,
+    period_ns: u64,
+    stopped: &AtomicBool,
+) -> Option<SlowRemains> {
     let (mut seen, mut late_ticks, dt_s) = (0, 0, period_ns as f64 / 1e9);
     let mut due_ns = monotonic_ns();
     while !stopped.load(Ordering::Relaxed) {
@@ -68,9 +108,9 @@ fn go_on(mut slow: SlowList, run_ticks: &AtomicU64, period_ns: u64, stopped: &At
         let now = run_ticks.load(Ordering::Relaxed).max(seen);
         let passed = now - std::mem::replace(&mut seen, now);
         late_ticks += passed.saturating_sub(MOST_TICKS);
-        slow.turn(passed.min(MOST_TICKS) as u32, dt_s);
+        lists.turn(passed.min(MOST_TICKS) as u32, dt_s);
         due_ns = (due_ns + TURN_NS).max(monotonic_ns());
         sleep_until_ns(due_ns);
     }
-    SlowRemains { slow, late_ticks }
+    lists.last_begun().map(|slow| SlowRemains { slow, late_ticks })
 }

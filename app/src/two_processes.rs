@@ -23,7 +23,9 @@ use shm_abi::segment::ClockMode;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{self, Receiver};
 use std::time::{Duration, Instant};
+use world::lists::SlowList;
 
 /// The slow thread's own period.
 const SLOW_PERIOD: Duration = Duration::from_millis(10);
@@ -53,6 +55,8 @@ pub struct TwoProcessEnd {
     pub fast_report: SetupReport,
     /// How long its step took.
     pub step_ns: Histogram,
+    /// Orders that were taken, and those of them that could not be done.
+    pub orders: [u64; 2],
     /// What became of the fast and the slow list, if there are two.
     pub lists: Option<ListsEnd>,
 }
@@ -64,7 +68,7 @@ pub struct TwoProcessEnd {
 pub fn run(
     source: &mut Source,
     attachment: Attachment,
-    fast: FastLoop,
+    (fast, later): (FastLoop, Option<Receiver<SlowList>>),
     slow: &mut SlowSide,
     progress: &mut Progress,
     signals: &StopSignals,
@@ -72,7 +76,7 @@ pub fn run(
     let mut attachment = attachment;
     let mut fast = fast;
     let run_ticks = Arc::<AtomicU64>::default();
-    let slow_list = start_slow_list(&mut fast, &attachment.driver, &run_ticks)?;
+    let slow_list = start_slow_list(&mut fast, later, &attachment.driver, &run_ticks)?;
     loop {
         let shared = FastShared { run_ticks: Arc::clone(&run_ticks), ..FastShared::default() };
         let (report, connection, watched) =
@@ -96,13 +100,15 @@ pub fn run(
         };
         let FastRemains { driver, step_ns, mut fast, .. } = remains;
         let lists = fast.step_mut().end_lists(slow_list.and_then(SlowThread::end));
-        return Ok(TwoProcessEnd { tally, stop, driver, fast_report: report, step_ns, lists });
+        let orders = fast.orders_taken();
+        return Ok(TwoProcessEnd { tally, stop, driver, fast_report: report, step_ns, orders, lists });
     }
 }
 
 /// Where time waits for nobody the slow list has a thread of its own; else its turns are part of ticks.
 fn start_slow_list(
     fast: &mut FastLoop,
+    later: Option<Receiver<SlowList>>,
     driver: &DriverView,
     run_ticks: &Arc<AtomicU64>,
 ) -> Result<Option<SlowThread>, RunFailure> {
@@ -110,9 +116,15 @@ fn start_slow_list(
     if info.clock_mode != ClockMode::Real {
         return Ok(None);
     }
-    let start = |list| SlowThread::start(list, Arc::clone(run_ticks), info.period_ns);
-    let started = fast.step_mut().take_slow().map(start).transpose();
-    started.map_err(|error| RunFailure::Start(format!("cannot start the slow list's thread: {error}")))
+    let first = fast.step_mut().take_slow();
+    if first.is_none() && later.is_none() {
+        return Ok(None);
+    }
+    let later = later.unwrap_or_else(|| mpsc::channel().1);
+    let started = SlowThread::start_with(first, later, Arc::clone(run_ticks), info.period_ns);
+    started
+        .map(Some)
+        .map_err(|error| RunFailure::Start(format!("cannot start the slow list's thread: {error}")))
 }
 
 /// Why watching ended.

@@ -79,6 +79,14 @@ impl Workplace {
         command
     }
 
+    /// Runs a shell script with the program as `$0`, and `run scene.toml` and these arguments as `"$@"`, to its end.
+    pub fn shell(&self, script: &str, arguments: &[&str]) -> Said {
+        let mut shell = self.prepare(Command::new("sh"));
+        let program = self.phantom3();
+        shell.arg("-c").arg(script).arg(program.get_program()).args(["run", "scene.toml"]).args(arguments);
+        Running::start(shell).wait()
+    }
+
     /// Runs `phantom3` to its end.
     pub fn run<I: IntoIterator<Item = S>, S: AsRef<OsStr>>(&self, arguments: I) -> Said {
         let mut program = self.phantom3();

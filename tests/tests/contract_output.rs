@@ -11,18 +11,6 @@ fn workplace() -> Workplace {
     place
 }
 
-/// A shell script with the program as `$0` and `phantom3 run scene.toml` and these arguments as `"$@"`.
-fn shell(place: &Workplace, script: &str, arguments: &[&str]) -> Said {
-    let mut shell = place.prepare(Command::new("sh"));
-    shell
-        .arg("-c")
-        .arg(script)
-        .arg(place.phantom3().get_program())
-        .args(["run", "scene.toml"])
-        .args(arguments);
-    Running::start(shell).wait()
-}
-
 #[test]
 fn a_recording_that_cannot_even_begin_stops_the_run_before_it_starts() {
     for clock in ["virtual", "lockstep", "real"] {
@@ -70,7 +58,7 @@ fn a_file_that_may_not_grow_any_more_ends_with_a_complete_row_and_status_3() {
     let script = "trap '' XFSZ; ulimit -f 40000; exec \"$0\" \"$@\"";
     for clock in ["virtual", "lockstep"] {
         let place = workplace();
-        let said = shell(&place, script, &["--clock", clock, "--seconds", "120", "--record", "out.csv"]);
+        let said = place.shell(script, &["--clock", clock, "--seconds", "120", "--record", "out.csv"]);
         assert_recorded_up_to_the_fault(&place, &said, "File too large");
     }
 }
@@ -94,8 +82,7 @@ fn a_disk_that_fills_up_leaves_a_recording_that_ends_with_a_complete_row() {
     for clock in ["virtual", "lockstep"] {
         let place = workplace();
         let script = format!("exec unshare --user --map-root-user --mount sh -c '{inside}' \"$0\" \"$@\"");
-        let said =
-            shell(&place, &script, &["--clock", clock, "--seconds", "20", "--record", "small/out.csv"]);
+        let said = place.shell(&script, &["--clock", clock, "--seconds", "20", "--record", "small/out.csv"]);
         assert_recorded_up_to_the_fault(&place, &said, "No space left on device");
     }
 }
@@ -108,10 +95,10 @@ fn a_reader_who_has_gone_changes_neither_the_run_nor_its_status() {
         let script = format!("exec \"$0\" \"$@\" {redirection}");
         for clock in ["virtual", "lockstep", "real"] {
             let place = workplace();
-            let said = shell(&place, &script, &[&good[..], &[clock]].concat());
+            let said = place.shell(&script, &[&good[..], &[clock]].concat());
             assert_eq!(said.status, Some(0), "{redirection} on the {clock} clock: {}", said.err);
             assert!(!Table::read(&place.path("out.csv")).is_empty(), "{redirection} on the {clock} clock");
-            let said = shell(&place, &script, &[&bad[..], &[clock]].concat());
+            let said = place.shell(&script, &[&bad[..], &[clock]].concat());
             assert_eq!(said.status, Some(2), "{redirection} on the {clock} clock: {}", said.err);
             assert_eq!(place.processes(), Vec::<u32>::new());
         }
@@ -157,11 +144,8 @@ fn a_place_for_temporary_files_that_is_missing_or_too_long_for_a_socket_does_not
 #[test]
 fn a_recording_may_go_into_a_pipe() {
     let place = workplace();
-    let said = shell(
-        &place,
-        "\"$0\" \"$@\" | cat",
-        &["--clock", "virtual", "--seconds", "0.2", "--record", "/dev/stdout"],
-    );
+    let said = place
+        .shell("\"$0\" \"$@\" | cat", &["--clock", "virtual", "--seconds", "0.2", "--record", "/dev/stdout"]);
     assert_eq!((said.status, said.err.as_str()), (Some(0), ""));
     let rows = said.out.lines().filter(|line| line.starts_with("0.")).count();
     assert_eq!(rows, 200, "{}", said.out);

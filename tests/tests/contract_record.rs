@@ -245,18 +245,6 @@ fn a_recording_that_was_cut_anywhere_is_read_up_to_there() {
     assert!(bytes(&place, "whole.csv").starts_with(&bytes(&place, "left.csv")));
 }
 
-/// A shell script with the program as `$0` and `phantom3 run scene.toml` and these arguments as `"$@"`.
-fn shell(place: &Workplace, script: &str, arguments: &[&str]) -> Said {
-    let mut shell = place.prepare(Command::new("sh"));
-    shell
-        .arg("-c")
-        .arg(script)
-        .arg(place.phantom3().get_program())
-        .args(["run", "scene.toml"])
-        .args(arguments);
-    Running::start(shell).wait()
-}
-
 /// The run goes on to its end; one message; status 3; what was written is readable and is what was told.
 fn check_full_disk(place: &Workplace, said: &Said, cause: &str, ticks: &str) {
     assert_eq!(said.status, Some(3), "{}{}", said.out, said.err);
@@ -287,7 +275,7 @@ fn a_file_that_may_not_grow_any_more_does_not_end_the_run() {
     });
     let rows: Vec<String> = rows.collect();
     place.write("hand.csv", format!("t,{}\n{}\n", header.join(","), rows.join("\n")));
-    let said = shell(&place, script, &["--clock", "virtual", "--seconds", "200", "--record", "out.mcap"]);
+    let said = place.shell(script, &["--clock", "virtual", "--seconds", "200", "--record", "out.mcap"]);
     check_full_disk(&place, &said, "File too large", "200201 answered");
 }
 
@@ -315,7 +303,7 @@ fn a_disk_that_fills_up_does_not_end_the_run() {
     let script = format!("exec unshare --user --map-root-user --mount sh -c '{inside}' \"$0\" \"$@\"");
     for clock in ["virtual", "lockstep"] {
         let arguments = ["--clock", clock, "--seconds", "20", "--record", "small/out.mcap"];
-        let said = shell(&place, &script, &arguments);
+        let said = place.shell(&script, &arguments);
         check_full_disk(&place, &said, "No space left on device", "answered");
         std::fs::remove_dir(place.path("small")).expect("ours");
     }

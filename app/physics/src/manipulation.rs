@@ -10,6 +10,7 @@ mod gather;
 mod island;
 mod look;
 mod made;
+mod ordered;
 mod parcel;
 mod pressing;
 mod rest;

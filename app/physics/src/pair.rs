@@ -17,6 +17,7 @@ use crate::broad_phase::Aabb;
 use crate::collide::{
     ContactPoint, ContactPoints, MAX_POINTS, PairMemory, Solid, bounding_ball, contact_points,
 };
+use crate::pairs::Who;
 use crate::restitution::Meeting;
 use crate::row::Row;
 use crate::solver::Motion;
@@ -96,6 +97,12 @@ impl Pair {
         if has_mesh {
             self.memory.patches = Default::default();
         }
+    }
+
+    /// Looks again what the two surfaces are.
+    pub(crate) fn resurface(&mut self, who: &Who<'_>) {
+        let [a, b] = self.entities;
+        self.surfacing = Surfacing::between(&who.all[a], &who.all[b], who.response);
     }
 
     /// The force on A in the last tick \[N\], over all points.

@@ -221,6 +221,16 @@ impl Pairs {
         Some(place)
     }
 
+    /// What the surface of an entity makes of those that it meets is another thing now.
+    pub(crate) fn resurface(&mut self, entity: usize, who: &Who<'_>) {
+        for key in self.awake.iter().chain(&self.asleep) {
+            let pair = &mut self.pool[key.place as usize];
+            if pair.entities.contains(&entity) {
+                pair.resurface(who);
+            }
+        }
+    }
+
     /// One that was [begun](Self::begin_as) there.
     pub(crate) fn at_place(&mut self, place: u32) -> &mut Pair {
         &mut self.pool[place as usize]
@@ -239,10 +249,32 @@ impl Pairs {
                     self.unused.push(keys.remove(known).place);
                 }
             }
+            // Whoever sent it may not know yet what is known here.
+            self.pool[key.place as usize].resurface(who);
             let keys = if is_awake { &mut self.awake } else { &mut self.asleep };
             if let Err(at) = at(keys) {
                 keys.insert(at, *key);
             }
+        }
+    }
+
+    /// Ends the pairs of a body that is elsewhere from now on, but for those with who is awake.
+    pub(crate) fn leave(&mut self, body: usize, is_awake: impl Fn(usize) -> bool, who: &Who<'_>) {
+        let unused = &mut self.unused;
+        for keys in [&mut self.awake, &mut self.asleep] {
+            keys.retain(|key| {
+                let first = key.body as usize;
+                let other = who.bodies[key.entity as usize].map(|other| other as usize);
+                let stays = match (first == body, other == Some(body)) {
+                    (true, _) => other.is_some_and(&is_awake),
+                    (_, true) => is_awake(first),
+                    _ => true,
+                };
+                if !stays {
+                    unused.push(key.place);
+                }
+                stays
+            });
         }
     }
 

@@ -4,14 +4,22 @@
 //! The standard input is read by a thread of its own; its orders are for the next tick.
 
 use super::gradual::MOST_TIMES;
-use super::order::{Move, Order, Replacement, Scale, Which};
-use super::queue::{OrderReceiver, OrderSender, order_queue};
+use super::order::{FrictionChange, Move, Order, Other, Replacement, Scale, Turn, Which};
+use super::queue::{Dated, OrderReceiver, OrderSender, order_queue};
 use super::words::{self, Words};
+use crate::book::Book;
 use crate::fast_step::FastStep;
-use crate::rig::Rig;
+use crate::record::View;
+use crate::rig::{self, Rig};
+use crate::row_queue::{RowReceiver, row_queue_of};
+use io_driver::device::Extras;
 use io_driver::say::say;
+use nalgebra::Vector3;
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{self, Receiver};
+use std::sync::mpsc::{self, Receiver, Sender};
+use world::lists::SlowList;
+use world::{FrictionSpec, Settings};
 
 /// Where orders come from.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -28,18 +36,45 @@ const MOST_ORDERS: usize = 1024;
 const MOST_WORLDS: usize = 32;
 /// Lines that may wait to be looked at; who writes more waits.
 const LINES: usize = 64;
+/// Rows of another scene that may wait.
+const ROWS: usize = 2048;
+/// Bodies that come with them.
+const BODIES: usize = 1 << 18;
+
+/// What orders need besides a rig.
+#[derive(Debug, Clone, Default)]
+pub struct Means {
+    /// Where other scenes and their data are looked for.
+    pub settings: Settings,
+    /// What the devices tell besides positions.
+    pub extras: Vec<Extras>,
+    /// Where it is written down what was ordered.
+    pub book: Book,
+    /// Who steps the slow lists of worlds that are still to come; `None`: nobody, they have their turns in ticks.
+    pub slow_lists: Option<Sender<SlowList>>,
+}
+
+/// A scene that will run once an order has been done.
+pub struct Coming {
+    /// Where its rows come from.
+    pub rows: RowReceiver,
+    /// What it is.
+    pub rig: Rig,
+    /// What is to be seen of it.
+    pub view: View,
+}
 
 /// Whoever takes orders.
 pub struct Desk {
     rig: Rig,
     sender: OrderSender,
-    /// Whether anything is recorded: its columns are this scene's.
-    is_recorded: bool,
+    means: Means,
     /// Of each entity, how many times the scene's stiffness and damping fingers will feel.
     times: Vec<[f64; 2]>,
     /// Of each entity, whether it can be moved.
     can_move: Vec<bool>,
     lines: Option<Receiver<String>>,
+    coming: VecDeque<Coming>,
 }
 
 impl Desk {
@@ -47,17 +82,8 @@ impl Desk {
     ///
     /// # Errors
     /// A script that cannot be read or played: its file, the line and what is wrong.
-    pub fn open(rig: &Rig, source: &OrderSource, is_recorded: bool) -> Result<(Self, OrderReceiver), String> {
-        let (sender, receiver) = order_queue(MOST_ORDERS);
-        let mut desk = Self {
-            rig: rig.clone(),
-            sender,
-            is_recorded,
-            times: Vec::new(),
-            can_move: Vec::new(),
-            lines: None,
-        };
-        desk.take_note(&rig.fast_step().map_err(|error| error.to_string())?);
+    pub fn open(rig: &Rig, source: &OrderSource, means: Means) -> Result<(Self, OrderReceiver), String> {
+        let (mut desk, receiver) = Self::silent(rig, means)?;
         match source {
             OrderSource::File(file) => desk.play(file)?,
             OrderSource::Input => desk.lines = Some(listen().map_err(|error| error.to_string())?),
@@ -65,14 +91,36 @@ impl Desk {
         Ok((desk, receiver))
     }
 
+    /// One that takes orders from whoever has it.
+    ///
+    /// # Errors
+    /// A rig that makes no step.
+    pub fn silent(rig: &Rig, means: Means) -> Result<(Self, OrderReceiver), String> {
+        let (sender, receiver) = order_queue(MOST_ORDERS);
+        let mut desk = Self {
+            rig: rig.clone(),
+            sender,
+            means,
+            times: Vec::new(),
+            can_move: Vec::new(),
+            lines: None,
+            coming: VecDeque::new(),
+        };
+        desk.take_note(&rig.fast_step().map_err(|error| error.to_string())?);
+        Ok((desk, receiver))
+    }
+
+    /// The next scene that was ordered, for who takes its rows.
+    pub fn take_coming(&mut self) -> Option<Coming> {
+        self.coming.pop_front()
+    }
+
     /// The slow side's turn: what came in meanwhile. What is refused is told, and the run goes on.
     pub fn step(&mut self) {
-        self.sender.free_replaced();
+        self.sender.free_spent();
         let lines: Vec<String> = self.lines.iter().flat_map(Receiver::try_iter).collect();
         for line in lines {
-            let result = words::parse(&line);
-            let result = result.and_then(|words| words.map_or(Ok(()), |words| self.order(0, &words)));
-            if let Err(error) = result {
+            if let Err(error) = self.order(0, &line) {
                 say(format_args!("phantom3: order refused: {error}"));
             }
         }
@@ -84,9 +132,9 @@ impl Desk {
         let (mut last_s, mut orders, mut worlds) = (0.0, 0, 0);
         for (number, line) in (1..).zip(text.lines()) {
             let wrong = |error: String| format!("{}:{number}: {error}", file.display());
-            let Some((at_s, words)) = words::parse_timed(line).map_err(wrong)? else { continue };
+            let Some((at_s, order)) = words::split_time(line).map_err(wrong)? else { continue };
             orders += 1;
-            worlds += usize::from(matches!(words, Words::Reset | Words::Swap(_)));
+            worlds += usize::from(words::makes_a_world(order));
             if at_s < last_s {
                 return Err(wrong(format!(
                     "found at {at_s}, allowed: {last_s} s or later, as the line before it"
@@ -99,35 +147,77 @@ impl Desk {
             }
             last_s = at_s;
             let at_tick = (at_s * 1e9 / self.rig.period_ns as f64).round() as u64;
-            self.order(at_tick, &words).map_err(wrong)?;
+            self.order(at_tick, order).map_err(wrong)?;
         }
         Ok(())
     }
 
-    /// Makes an order of words, and sends it.
-    fn order(&mut self, at_tick: u64, words: &Words) -> Result<(), String> {
-        let order = match words {
-            Words::Reset => {
-                let step = self.rig.fast_step().map_err(|error| error.to_string())?;
-                Order::Replace(Replacement::new(step, true))
-            }
-            Words::Scale(which, by, entity) => self.scale(*which, *by, entity.as_deref())?,
-            Words::Move(entity, to_W, over_s) => {
-                let number = self.number(entity)?;
-                if !self.can_move[number] {
-                    return Err(format!(
-                        "{entity} cannot be moved: it moves by itself, or the scene has too many things that do \
-                         for one list; allowed: entities without a mass, in scenes with up to 64 that have one"
-                    ));
-                }
-                Order::Move(Move { entity: number, to_W: *to_W, over_s: *over_s })
-            }
-            Words::Swap(scene) => self.swap(scene)?,
-        };
-        match self.sender.send(at_tick, order) {
-            true => Ok(()),
-            false => Err(format!("{MOST_ORDERS} orders wait already")),
+    /// Makes an order of words, and sends it for this tick of the run. A line of nothing is none.
+    ///
+    /// # Errors
+    /// What is wrong with it, and what is allowed.
+    pub fn order(&mut self, at_tick: u64, line: &str) -> Result<(), String> {
+        let Some(words) = words::parse(line)? else { return Ok(()) };
+        if self.sender.is_full() {
+            return Err(format!("{MOST_ORDERS} orders wait already"));
         }
+        let order = self.make(words)?;
+        self.means.book.add_order(words::without_comment(line).trim());
+        // There is room.
+        self.sender.send(Dated { at_tick, order });
+        Ok(())
+    }
+
+    fn make(&mut self, words: Words) -> Result<Order, String> {
+        Ok(match words {
+            Words::Reset => Order::Replace(self.world(None)?),
+            Words::Scale(which, by, entity) => self.scale(which, by, entity.as_deref())?,
+            Words::Friction(entity, spec) => self.friction(&entity, spec)?,
+            Words::Move(entity, to_W, turn, over_s) => self.move_entity(&entity, to_W, turn, over_s)?,
+            Words::Pause(is_paused) => Order::Pause(is_paused),
+            Words::Tell(kind) => Order::Tell(kind),
+            Words::Swap(scene) => self.swap(&scene)?,
+        })
+    }
+
+    /// The running scene as it begins; its slow list, if it is somebody's to step, is his.
+    fn world(&self, other: Option<Other>) -> Result<Box<Replacement>, String> {
+        let step = self.rig.fast_step().map_err(|error| error.to_string())?;
+        let mut world = Replacement::new(step, other);
+        if let Some(slow_lists) = &self.means.slow_lists
+            && let Some(slow) = world.step.take_slow()
+        {
+            // Nobody to step it: the run is over.
+            let _ = slow_lists.send(slow.waiting());
+        }
+        Ok(world)
+    }
+
+    fn friction(&mut self, entity: &str, spec: FrictionSpec) -> Result<Order, String> {
+        let number = self.number(entity)?;
+        let friction = rig::friction(&spec)?;
+        // So a reset keeps it.
+        self.rig.scene.entities[number].friction = spec;
+        let for_slow = Some(friction.clone());
+        Ok(Order::Friction(Box::new(FrictionChange { entity: number, friction, for_slow })))
+    }
+
+    fn move_entity(
+        &self,
+        entity: &str,
+        to_W: Option<Vector3<f64>>,
+        turn: Turn,
+        over_s: f64,
+    ) -> Result<Order, String> {
+        let number = self.number(entity)?;
+        if !self.can_move[number] {
+            return Err(format!(
+                "{entity} cannot be moved: it has no end, and the scene has too many things that move for one list, \
+                 of which all are near it; allowed: what has an end, or a scene with lists = {{ fast_bodies = ... }} \
+                 as large as it has things that move"
+            ));
+        }
+        Ok(Order::Move(Move { entity: number, to_W, turn, over_s }))
     }
 
     fn scale(&mut self, which: Which, by: f64, entity: Option<&str>) -> Result<Order, String> {
@@ -152,12 +242,7 @@ impl Desk {
     }
 
     fn swap(&mut self, scene: &Path) -> Result<Order, String> {
-        if self.is_recorded {
-            return Err("swap: the columns of a recording are those of the scene that it began with; \
-                        leave out --record, or begin another run"
-                .into());
-        }
-        let rig = self.rig.beside(scene).map_err(|error| error.to_string())?;
+        let rig = self.rig.beside(scene, &self.means.settings).map_err(|error| error.to_string())?;
         let (needed, has) = (rig.device_count(), self.rig.device_count());
         if needed > has {
             return Err(format!(
@@ -166,13 +251,23 @@ impl Desk {
                 scene.display()
             ));
         }
-        let step = rig.fast_step().map_err(|error| error.to_string())?;
-        if step.handed().is_some() {
-            return Err(super::NEEDS_ONE_LIST.into());
+        let before = std::mem::replace(&mut self.rig, rig);
+        let bodies = self.rig.names(&self.means.extras).bodies.len();
+        let places = BODIES.checked_div(bodies).map_or(ROWS, |places| places.clamp(2, ROWS));
+        let (sender, rows) = row_queue_of(places, bodies);
+        let other = Other { rows: sender, bodies: Vec::with_capacity(bodies), number: 0 };
+        let mut world = self.world(Some(other)).inspect_err(|_| self.rig = before.clone())?;
+        let number = self
+            .means
+            .book
+            .add_scene(&self.rig.scene_file.display().to_string(), self.rig.names(&self.means.extras));
+        if let Some(other) = &mut world.other {
+            other.number = number;
         }
-        self.rig = rig;
-        self.take_note(&step);
-        Ok(Order::Replace(Replacement::new(step, false)))
+        let view = View::new(&self.rig.scene, world.step.entities());
+        self.coming.push_back(Coming { rows, rig: self.rig.clone(), view });
+        self.take_note(&world.step);
+        Ok(Order::Replace(world))
     }
 
     /// What is known of the scene that will run.

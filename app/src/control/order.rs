@@ -1,8 +1,12 @@
 //! Orders, as the fast thread gets them: checked, and with all memory that they need.
 
 use super::gradual::Gradual;
-use crate::fast_step::FastStep;
-use nalgebra::Vector3;
+use crate::fast_step::{EventTeller, FastStep};
+use crate::row::BodyRow;
+use crate::row_queue::RowSender;
+use haptics::Friction;
+use nalgebra::{UnitQuaternion, Vector3};
+use world::events::Kind;
 
 /// What is to change.
 pub enum Order {
@@ -10,6 +14,12 @@ pub enum Order {
     Scale(Scale),
     /// Where an entity is.
     Move(Move),
+    /// Of what kind its friction is.
+    Friction(Box<FrictionChange>),
+    /// Whether things move by themselves.
+    Pause(bool),
+    /// Nothing; it is told among the events.
+    Tell(Kind),
     /// The world: a reset, or another scene.
     Replace(Box<Replacement>),
 }
@@ -34,15 +44,38 @@ pub struct Scale {
     pub entity: Option<usize>,
 }
 
-/// An entity that is no body goes somewhere.
+/// An entity goes somewhere.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Move {
     /// Its number.
     pub entity: usize,
-    /// Where its frame's origin comes to rest \[m\].
-    pub to_W: Vector3<f64>,
+    /// Where its frame's origin comes to rest \[m\]; `None`: where it is.
+    pub to_W: Option<Vector3<f64>>,
+    /// How it is turned then.
+    pub turn: Turn,
     /// How long it takes \[s\], if that is not too fast.
     pub over_s: f64,
+}
+
+/// How an entity is turned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Turn {
+    /// As it is.
+    Not,
+    /// So, whatever it is now.
+    To(UnitQuaternion<f64>),
+    /// By so much from how it is when it sets out, about axes of the world.
+    By(UnitQuaternion<f64>),
+}
+
+/// An entity gets another friction.
+pub struct FrictionChange {
+    /// Its number.
+    pub entity: usize,
+    /// Which; what it was, once it has been exchanged.
+    pub friction: Friction,
+    /// The same for the slow list.
+    pub for_slow: Option<Friction>,
 }
 
 /// A world that takes the place of the one that runs; what it replaced, once it has.
@@ -51,14 +84,35 @@ pub struct Replacement {
     pub step: FastStep,
     /// Room for what is changed gradually in it.
     pub gradual: Gradual,
-    /// Whether it is the running scene as it began.
-    pub is_same_scene: bool,
+    /// Room for what happens in it.
+    pub teller: EventTeller,
+    /// Another scene: where its rows go. `None`: it is the running scene as it began.
+    pub other: Option<Other>,
+}
+
+/// What another scene has of its own.
+pub struct Other {
+    /// Where its rows go.
+    pub rows: RowSender,
+    /// Room for all of its bodies, by their numbers.
+    pub bodies: Vec<(u32, BodyRow)>,
+    /// The how-many-th of the run, the one that it began with being 0.
+    pub number: u32,
 }
 
 impl Replacement {
     /// A world that nothing has been changed in.
-    pub fn new(step: FastStep, is_same_scene: bool) -> Box<Self> {
+    pub fn new(mut step: FastStep, other: Option<Other>) -> Box<Self> {
         let gradual = Gradual::new(step.entities().len());
-        Box::new(Self { step, gradual, is_same_scene })
+        let teller = EventTeller::new(&mut step);
+        Box::new(Self { step, gradual, teller, other })
     }
+}
+
+/// What goes back to the slow side, to be freed there.
+pub enum Spent {
+    /// A world that was replaced.
+    World(Box<Replacement>),
+    /// A friction that was.
+    Friction(Box<FrictionChange>),
 }

@@ -1,20 +1,28 @@
-//! The queue of orders from the slow side to the fast one, and the way back for worlds that were replaced.
+//! The queue of orders from the slow side to the fast one, and the way back for what was replaced.
 //!
-//! Invariant: there is always room on the way back: a world is taken only where there is.
+//! Invariant: there is always room on the way back: what leaves something over is taken only where there is.
 
-use super::order::{Order, Replacement};
+use super::order::{Order, Spent};
 use rtrb::{Consumer, Producer, RingBuffer};
 
 /// The slow side's end.
 pub struct OrderSender {
-    out: Producer<(u64, Order)>,
-    back: Consumer<Box<Replacement>>,
+    out: Producer<Dated>,
+    back: Consumer<Spent>,
 }
 
 /// The fast side's end.
 pub struct OrderReceiver {
-    orders: Consumer<(u64, Order)>,
-    back: Producer<Box<Replacement>>,
+    orders: Consumer<Dated>,
+    back: Producer<Spent>,
+}
+
+/// An order, and the tick of the run that it is for.
+pub struct Dated {
+    /// Or as soon after as those before it are done.
+    pub at_tick: u64,
+    /// What is to be done.
+    pub order: Order,
 }
 
 /// Both ends, with room for so many orders.
@@ -25,34 +33,40 @@ pub fn order_queue(orders: usize) -> (OrderSender, OrderReceiver) {
 }
 
 impl OrderSender {
-    /// Sends an order for this tick of the run, or as soon after as those before it are done. `false`: there is no room.
-    pub fn send(&mut self, at_tick: u64, order: Order) -> bool {
-        self.free_replaced();
-        self.out.push((at_tick, order)).is_ok()
+    /// Sends an order. `false`: there is no room.
+    pub fn send(&mut self, order: Dated) -> bool {
+        self.free_spent();
+        self.out.push(order).is_ok()
     }
 
-    /// Frees the worlds that were replaced.
-    pub fn free_replaced(&mut self) {
-        while let Ok(replaced) = self.back.pop() {
-            drop(replaced);
+    /// Whether there is no room for another order.
+    pub fn is_full(&self) -> bool {
+        self.out.is_full()
+    }
+
+    /// Frees what was replaced.
+    pub fn free_spent(&mut self) {
+        while let Ok(spent) = self.back.pop() {
+            drop(spent);
         }
     }
 }
 
 impl OrderReceiver {
     /// The next order, if it is due.
-    pub(super) fn take(&mut self, run_tick: u64) -> Option<Order> {
-        let (at_tick, order) = self.orders.peek().ok()?;
-        let has_room = !matches!(order, Order::Replace(_)) || !self.back.is_full();
-        if *at_tick > run_tick || !has_room {
+    pub(super) fn take(&mut self, run_tick: u64) -> Option<Dated> {
+        let next = self.orders.peek().ok()?;
+        let leaves_nothing = !matches!(next.order, Order::Replace(_) | Order::Friction(_));
+        let has_room = leaves_nothing || !self.back.is_full();
+        if next.at_tick > run_tick || !has_room {
             return None;
         }
-        self.orders.pop().ok().map(|(_, order)| order)
+        self.orders.pop().ok()
     }
 
-    /// Sends a world back that was replaced.
-    pub(super) fn give_back(&mut self, replaced: Box<Replacement>) {
-        // There is room: `take` has seen to it, and nobody else pushes.
-        let _ = self.back.push(replaced);
+    /// Sends back what was replaced.
+    pub(super) fn give_back(&mut self, spent: Spent) {
+        // There is room: `take` has seen to it, one at a time, and nobody else pushes.
+        let _ = self.back.push(spent);
     }
 }

@@ -4,16 +4,26 @@
 //! reset
 //! stiffness 1.1             all entities; `stiffness 1.1 of table` one
 //! damping 0.9
+//! friction table coulomb mu=0.3
 //! move table to 0 0.1 0 in 0.5
+//! turn table to 1 0 0 0 in 0.5           a quaternion w x y z
+//! turn table about 0 1 0 by 1.57 in 0.5  an axis of the world, and an angle in rad
+//! pose table at 0 0.1 0 1 0 0 0 in 0.5   both
+//! pause
+//! resume
 //! swap other.toml
+//! key 32 down
+//! trial 7 begins
 //! ```
 //! In a script each line begins with when: `at 2.5 reset`. What follows a `#` is for people.
 
-use nalgebra::Vector3;
+use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
 use std::path::PathBuf;
+use world::FrictionSpec;
+use world::events::{Change, Kind};
 
 use super::gradual::MOST_TIMES;
-use super::order::Which;
+use super::order::{Turn, Which};
 
 /// What a line says; names are those of entities.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,17 +32,26 @@ pub enum Words {
     Reset,
     /// Stiffness or damping, so many times what it is, of an entity or of all.
     Scale(Which, f64, Option<String>),
-    /// An entity is to go there \[m\], within a time \[s\].
-    Move(String, Vector3<f64>, f64),
+    /// An entity is to have this friction.
+    Friction(String, FrictionSpec),
+    /// An entity is to go there \[m\] and to be turned so, within a time \[s\].
+    Move(String, Option<Vector3<f64>>, Turn, f64),
+    /// Things are not to move by themselves, or to do so again.
+    Pause(bool),
     /// Another scene is to be played.
     Swap(PathBuf),
+    /// Something is to be told among the events.
+    Tell(Kind),
 }
 
 /// Farther away nothing is put \[m\].
 const FARTHEST_M: f64 = 100.0;
 const LONGEST_S: f64 = 3600.0;
-const KNOWN: &str = "reset; stiffness FACTOR [of ENTITY]; damping FACTOR [of ENTITY]; \
-                     move ENTITY to X Y Z in SECONDS; swap SCENE.toml";
+const MOST_TURN_RAD: f64 = std::f64::consts::PI;
+const KNOWN: &str = "reset; stiffness FACTOR [of ENTITY]; damping FACTOR [of ENTITY]; friction ENTITY MODEL [KEY=VALUE]...; \
+                     move ENTITY to X Y Z in SECONDS; turn ENTITY to W X Y Z in SECONDS; \
+                     turn ENTITY about X Y Z by RAD in SECONDS; pose ENTITY at X Y Z W X Y Z in SECONDS; pause; resume; \
+                     swap SCENE.toml; key CODE down|up; trial NUMBER begins|ends";
 
 /// What a line says after the comment is cut off; `None`: nothing.
 ///
@@ -45,21 +64,42 @@ pub fn parse(line: &str) -> Result<Option<Words>, String> {
         ["reset"] => Words::Reset,
         [which @ ("stiffness" | "damping"), by] => scale(which, by, None)?,
         [which @ ("stiffness" | "damping"), by, "of", entity] => scale(which, by, Some(entity))?,
+        ["friction", entity, model, ref keys @ ..] => Words::Friction(entity.into(), friction(model, keys)?),
         ["move", entity, "to", x, y, z, "in", over] => {
-            let [x, y, z] = [x, y, z].map(|text| number(text, "m", -FARTHEST_M, FARTHEST_M));
-            Words::Move(entity.into(), Vector3::new(x?, y?, z?), number(over, "s", 0.0, LONGEST_S)?)
+            Words::Move(entity.into(), Some(place([x, y, z])?), Turn::Not, seconds(over)?)
         }
+        ["turn", entity, "to", w, x, y, z, "in", over] => {
+            Words::Move(entity.into(), None, Turn::To(quaternion([w, x, y, z])?), seconds(over)?)
+        }
+        ["turn", entity, "about", x, y, z, "by", angle, "in", over] => {
+            let angle = number(angle, "rad", -MOST_TURN_RAD, MOST_TURN_RAD)?;
+            let turn = UnitQuaternion::from_axis_angle(&axis([x, y, z])?, angle);
+            Words::Move(entity.into(), None, Turn::By(turn), seconds(over)?)
+        }
+        ["pose", entity, "at", x, y, z, w, i, j, k, "in", over] => {
+            let turn = Turn::To(quaternion([w, i, j, k])?);
+            Words::Move(entity.into(), Some(place([x, y, z])?), turn, seconds(over)?)
+        }
+        ["pause"] => Words::Pause(true),
+        ["resume"] => Words::Pause(false),
         ["swap", scene] => Words::Swap(scene.into()),
+        ["key", code, change @ ("down" | "up")] => {
+            Words::Tell(Kind::Key { code: whole(code)?, is_pressed: change == "down" })
+        }
+        ["trial", trial, change @ ("begins" | "ends")] => {
+            let change = if change == "begins" { Change::Begins } else { Change::Ends };
+            Words::Tell(Kind::Trial { change, number: whole(trial)? })
+        }
         _ => return Err(format!("found {}, allowed: {KNOWN}", words.join(" "))),
     };
     Ok(Some(words))
 }
 
-/// A line of a script: when (s), and what.
+/// A line of a script: when (s), and the order.
 ///
 /// # Errors
-/// As of [`parse`]; a line that does not say when.
-pub fn parse_timed(line: &str) -> Result<Option<(f64, Words)>, String> {
+/// A line that does not say when.
+pub fn split_time(line: &str) -> Result<Option<(f64, &str)>, String> {
     let line = without_comment(line).trim();
     if line.is_empty() {
         return Ok(None);
@@ -68,11 +108,16 @@ pub fn parse_timed(line: &str) -> Result<Option<(f64, Words)>, String> {
     let Some((at, order)) = timed else {
         return Err(format!("found {line}, allowed: at SECONDS ORDER, such as `at 2.5 reset`"));
     };
-    let at_s = number(at, "s", 0.0, 24.0 * LONGEST_S)?;
-    Ok(parse(order)?.map(|words| (at_s, words)))
+    Ok(Some((number(at, "s", 0.0, 24.0 * LONGEST_S)?, order.trim_start())))
 }
 
-fn without_comment(line: &str) -> &str {
+/// Whether an order takes the memory of a world.
+pub fn makes_a_world(order: &str) -> bool {
+    matches!(order.split_whitespace().next(), Some("reset" | "swap"))
+}
+
+/// What stands before the `#`.
+pub fn without_comment(line: &str) -> &str {
     line.split('#').next().unwrap_or_default()
 }
 
@@ -81,16 +126,58 @@ fn scale(which: &str, by: &str, entity: Option<&str>) -> Result<Words, String> {
     Ok(Words::Scale(which, number(by, "times", MOST_TIMES.recip(), MOST_TIMES)?, entity.map(String::from)))
 }
 
+/// As a scene says it, in words: `coulomb mu=0.3`.
+fn friction(model: &str, keys: &[&str]) -> Result<FrictionSpec, String> {
+    let keys: String = keys.iter().map(|key| format!(", {key}")).collect();
+    FrictionSpec::parse(&format!("{{ model = \"{model}\"{keys} }}")).map_err(|error| error.to_string())
+}
+
+fn place(words: [&str; 3]) -> Result<Vector3<f64>, String> {
+    let [x, y, z] = words.map(|text| number(text, "m", -FARTHEST_M, FARTHEST_M));
+    Ok(Vector3::new(x?, y?, z?))
+}
+
+fn axis(words: [&str; 3]) -> Result<Unit<Vector3<f64>>, String> {
+    let [x, y, z] = words.map(|text| number(text, "", -1e3, 1e3));
+    let given = Vector3::new(x?, y?, z?);
+    Unit::try_new(given, 1e-3)
+        .ok_or_else(|| format!("found {}, allowed: an axis, which has a length", words.join(" ")))
+}
+
+fn quaternion(words: [&str; 4]) -> Result<UnitQuaternion<f64>, String> {
+    let [w, x, y, z] = words.map(|text| number(text, "", -1e3, 1e3));
+    let given = Quaternion::new(w?, x?, y?, z?);
+    UnitQuaternion::try_new(given, 1e-3)
+        .ok_or_else(|| format!("found {}, allowed: a quaternion, which has a length", words.join(" ")))
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    number(text, "s", 0.0, LONGEST_S)
+}
+
+fn whole(text: &str) -> Result<u32, String> {
+    text.parse().map_err(|_| format!("found {text}, allowed: a whole number from 0 to {}", u32::MAX))
+}
+
 fn number(text: &str, unit: &str, min: f64, max: f64) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if (min..=max).contains(&number) => Ok(number),
-        _ => Err(format!("found {text}, allowed: {min} to {max} {unit}")),
+        _ => Err(format!("found {text}, allowed: {min} to {max} {unit}").trim_end().into()),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn turn(axis: Unit<Vector3<f64>>, angle_rad: f64) -> UnitQuaternion<f64> {
+        UnitQuaternion::from_axis_angle(&axis, angle_rad)
+    }
+
+    /// Without the 6e-17 that the cosine of a rounded right angle is.
+    fn half_a_turn(axis: Unit<Vector3<f64>>) -> UnitQuaternion<f64> {
+        UnitQuaternion::new_unchecked(Quaternion::from_imag(axis.into_inner()))
+    }
 
     #[test]
     fn orders_are_read_as_they_are_told() {
@@ -100,21 +187,56 @@ mod tests {
             ("damping 0.5 of table", Words::Scale(Which::Damping, 0.5, Some("table".into()))),
             (
                 "move plate to 0 0.1 -0.2 in 0.5",
-                Words::Move("plate".into(), Vector3::new(0.0, 0.1, -0.2), 0.5),
+                Words::Move("plate".into(), Some(Vector3::new(0.0, 0.1, -0.2)), Turn::Not, 0.5),
             ),
+            (
+                "turn plate to 0 0 2 0 in 1",
+                Words::Move("plate".into(), None, Turn::To(half_a_turn(Vector3::y_axis())), 1.0),
+            ),
+            (
+                "turn plate about 0 0 3 by 0.5 in 1",
+                Words::Move("plate".into(), None, Turn::By(turn(Vector3::z_axis(), 0.5)), 1.0),
+            ),
+            (
+                "pose plate at 1 2 3 0 1 0 0 in 0",
+                Words::Move(
+                    "plate".into(),
+                    Some(Vector3::new(1.0, 2.0, 3.0)),
+                    Turn::To(half_a_turn(Vector3::x_axis())),
+                    0.0,
+                ),
+            ),
+            (
+                "friction table coulomb mu=0.3",
+                Words::Friction("table".into(), FrictionSpec::Coulomb { mu: 0.3 }),
+            ),
+            ("friction table none", Words::Friction("table".into(), FrictionSpec::None)),
+            ("pause", Words::Pause(true)),
+            ("resume", Words::Pause(false)),
+            ("key 32 down", Words::Tell(Kind::Key { code: 32, is_pressed: true })),
+            ("trial 7 ends", Words::Tell(Kind::Trial { change: Change::Ends, number: 7 })),
             ("swap other.toml", Words::Swap("other.toml".into())),
         ];
         for (line, words) in good {
             assert_eq!(parse(line), Ok(Some(words.clone())), "{line}");
-            assert_eq!(parse_timed(&format!("at 2.5 {line}")), Ok(Some((2.5, words))), "{line}");
+            let timed = format!("at 2.5 {line}");
+            let (at_s, order) = split_time(&timed).expect("timed").expect("an order");
+            assert_eq!((at_s, parse(order)), (2.5, Ok(Some(words))), "{line}");
         }
-        assert_eq!((parse(" # nothing"), parse_timed("")), (Ok(None), Ok(None)));
+        assert_eq!((parse(" # nothing"), split_time("")), (Ok(None), Ok(None)));
     }
 
     #[test]
     fn what_is_no_order_is_refused_with_what_is() {
-        for line in ["reset all", "stiffness", "stiffness 1 table", "move plate 0 0 0 in 1", "Reset", "swap"]
-        {
+        for line in [
+            "reset all",
+            "stiffness",
+            "stiffness 1 table",
+            "move plate 0 0 0 in 1",
+            "Reset",
+            "swap",
+            "key 3 hit",
+        ] {
             let said = parse(line).unwrap_err();
             assert!(said.contains(line) && said.contains("move ENTITY to X Y Z in SECONDS"), "{said}");
         }
@@ -122,7 +244,16 @@ mod tests {
         assert_eq!(parse("damping nan").unwrap_err(), "found nan, allowed: 0.1 to 10 times");
         assert_eq!(parse("move a to 0 inf 0 in 1").unwrap_err(), "found inf, allowed: -100 to 100 m");
         assert_eq!(parse("move a to 0 0 0 in -1").unwrap_err(), "found -1, allowed: 0 to 3600 s");
-        assert!(parse_timed("reset").unwrap_err().contains("at SECONDS ORDER"));
-        assert_eq!(parse_timed("at -1 reset").unwrap_err(), "found -1, allowed: 0 to 86400 s");
+        assert_eq!(
+            parse("turn a about 0 0 0 by 1 in 1").unwrap_err(),
+            "found 0 0 0, allowed: an axis, which has a length"
+        );
+        assert_eq!(parse("key -1 up").unwrap_err(), "found -1, allowed: a whole number from 0 to 4294967295");
+        let said = parse("friction table coulomb mu=-1").unwrap_err();
+        assert!(said.contains("mu") && said.contains("-1"), "{said}");
+        let said = parse("friction table glue").unwrap_err();
+        assert!(said.contains("glue") && said.contains("coulomb"), "{said}");
+        assert!(split_time("reset").unwrap_err().contains("at SECONDS ORDER"));
+        assert_eq!(split_time("at -1 reset").unwrap_err(), "found -1, allowed: 0 to 86400 s");
     }
 }

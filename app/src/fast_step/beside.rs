@@ -2,6 +2,7 @@
 
 use super::*;
 use bytemuck::Zeroable;
+use haptics::Finger;
 use haptics::{Limits, Region, Track};
 use nalgebra::Isometry3;
 

@@ -8,11 +8,13 @@
 //! made up for at once: objects are late by what was missed.
 
 use haptics::{ContactState, Entity, FingerEffects};
-use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use physics::{BroadPhase, FingerSettings, FingerTick, MAX_PULLS, Made, Manipulation, Pull, Touch};
+use world::events::{FastPairs, pair_link};
 use world::lists::{FastList, Handed, Reach, SlowList};
 
 use super::DeviceFinger;
+use super::ordered::Moved;
 use crate::lists_end::ListsEnd;
 use crate::row::{BodyRow, FingerRow};
 use crate::slow_thread::SlowRemains;
@@ -35,12 +37,16 @@ pub struct HandFinger {
 
 /// Moving entities and what is known of them.
 pub struct Objects {
-    manipulation: Manipulation,
+    pub(super) manipulation: Manipulation,
     /// Who is in the slow list, where there is one.
-    lists: Option<SlowOnes>,
-    touches: Vec<Touch>,
-    pulls: Vec<Pull>,
-    ticks: Vec<FingerTick>,
+    pub(super) lists: Option<SlowOnes>,
+    pub(super) touches: Vec<Touch>,
+    pub(super) pulls: Vec<Pull>,
+    /// The first so many of them are felt; the others make up for the tick before.
+    felt_pulls: usize,
+    /// What bodies are to get in the next tick, because their finger was made to feel something else than they got.
+    owed: Vec<Pull>,
+    pub(super) ticks: Vec<FingerTick>,
     /// The button with which each finger ties.
     buttons: Vec<Option<u32>>,
     wants_quality: bool,
@@ -50,19 +56,24 @@ pub struct Objects {
     changed: Vec<u32>,
     period_s: f64,
     strength: f64,
+    /// Whether nothing moves by itself.
+    pub(super) is_paused: bool,
+    /// What was moved, as the slow list has to know it.
+    pub(super) moved: Moved,
     /// What the last tick took.
     pub made: Made,
     /// By how much it moved them (s).
-    stepped_s: f64,
+    pub(super) stepped_s: f64,
 }
 
 /// What the slow list has, as the fast side sees it.
-struct SlowOnes {
-    hand_over: FastList,
+pub(super) struct SlowOnes {
+    pub(super) hand_over: FastList,
     /// The slow side itself, while no other thread has it.
-    slow: Option<SlowList>,
-    /// Ticks that it has not been told of yet.
+    pub(super) slow: Option<SlowList>,
+    /// Ticks that it has not been told of yet, and those since it was told last, in which time may have stood still.
     ticks: u32,
+    passed: u32,
 }
 
 impl Objects {
@@ -82,6 +93,8 @@ impl Objects {
             changed: (0..bodies as u32).collect(),
             touches: Vec::with_capacity(room),
             pulls: Vec::with_capacity(MAX_PULLS),
+            felt_pulls: 0,
+            owed: Vec::with_capacity(MAX_PULLS),
             ticks: vec![FingerTick::at(Vector3::zeros()); fingers.len()],
             buttons: fingers.iter().map(|finger| finger.button).collect(),
             wants_quality,
@@ -89,6 +102,8 @@ impl Objects {
             lists: None,
             period_s,
             strength: 1.0,
+            is_paused: false,
+            moved: Moved::default(),
             made: Made::default(),
             stepped_s: 0.0,
         };
@@ -100,13 +115,22 @@ impl Objects {
     /// has its turns here.
     #[must_use]
     pub fn with_lists(mut self, hand_over: FastList, slow: SlowList) -> Self {
-        self.lists = Some(SlowOnes { hand_over, slow: Some(slow), ticks: 0 });
+        self.lists = Some(SlowOnes { hand_over, slow: Some(slow), ticks: 0, passed: 0 });
+        self.note_all();
         self
     }
 
     /// The slow list, to be stepped by another thread; `None` where there is none, or another one has it.
     pub fn take_slow(&mut self) -> Option<SlowList> {
         self.lists.as_mut()?.slow.take()
+    }
+
+    /// Begins to watch which entities press each other in the slow list, if that is still here, and nobody watches it yet.
+    pub(super) fn watch_slow(&mut self) -> Option<FastPairs> {
+        let slow = self.lists.as_mut()?.slow.as_mut()?;
+        let (fast_end, slow_end) = pair_link();
+        slow.watch(slow_end);
+        Some(fast_end)
     }
 
     /// When no thread steps any more: what is on its way is taken in, so that each body is in one list. `slow` is what
@@ -132,16 +156,6 @@ impl Objects {
         Some((lists.hand_over.here(), lists.hand_over.handed()))
     }
 
-    /// In the next tick this entity goes to this pose; says whether it will.
-    pub fn drive(&mut self, entity: usize, to_W: Isometry3<f64>) -> bool {
-        self.can_drive(entity) && self.manipulation.drive(entity, to_W)
-    }
-
-    /// Whether it may be driven: bodies move by themselves, and of what is moved the slow list knows nothing.
-    pub fn can_drive(&self, entity: usize) -> bool {
-        self.lists.is_none() && !self.manipulation.is_body(entity)
-    }
-
     /// Before fingers are stepped: who could be reached soon comes into the fast list. `reaches` are the fingers'.
     pub fn reach(&mut self, entities: &mut [Entity], reaches: impl Iterator<Item = Reach>) {
         if let Some(lists) = &mut self.lists {
@@ -153,10 +167,12 @@ impl Objects {
     pub fn let_go(&mut self, entities: &[Entity], is_running: bool) {
         let Some(lists) = &mut self.lists else { return };
         lists.hand_over.end_tick(&mut self.manipulation, entities);
-        lists.ticks += 1;
-        if let Some(slow) = lists.slow.as_mut().filter(|_| lists.ticks >= SLOW_EVERY) {
-            slow.turn(if is_running { lists.ticks } else { 0 }, self.period_s);
-            lists.ticks = 0;
+        self.moved.tell(&mut lists.hand_over, entities);
+        lists.ticks += u32::from(is_running && !self.is_paused);
+        lists.passed += 1;
+        if let Some(slow) = lists.slow.as_mut().filter(|_| lists.passed >= SLOW_EVERY) {
+            slow.turn(lists.ticks, self.period_s);
+            (lists.ticks, lists.passed) = (0, 0);
         }
     }
 
@@ -212,6 +228,7 @@ impl Objects {
 
     fn note_changed(&mut self) {
         for &number in &self.changed {
+            let is_slow = self.is_slow(number as usize);
             let (row, body) = (&mut self.rows[number as usize], &self.manipulation.bodies()[number as usize]);
             let (pose, spin_W) = (body.pose(), body.angular_velocity_W());
             let from_centre_W = pose.translation.vector - body.centre_W;
@@ -220,6 +237,7 @@ impl Objects {
                 orientation: pose.rotation.into_inner(),
                 velocity: body.velocity_W + spin_W.cross(&from_centre_W),
                 angular_velocity: spin_W,
+                is_slow,
                 ..*row
             };
         }
@@ -241,6 +259,9 @@ impl Objects {
         rows: &mut [FingerRow],
         dt_s: f64,
     ) {
+        if self.is_paused {
+            return self.stand(entities);
+        }
         self.pull(felt, rows);
         self.touches.clear();
         for (index, finger) in fingers.iter().enumerate() {
@@ -298,9 +319,50 @@ impl Objects {
         }
         let got = self.touches.iter().map(|touch| touch.force_on_user_W);
         add_to_rows(got, &self.touches, fingers, rows);
-        for pull in &self.pulls {
+        for pull in &self.pulls[..self.felt_pulls] {
             rows[pull.finger].force_on_user += pull.force_on_user_W;
         }
+    }
+
+    /// After all, the force on the user of a finger was changed by so much (N). The bodies that it touches have got the other
+    /// one: each gets its share of the difference in the next tick, so that over two ticks action is reaction.
+    pub fn owe(&mut self, finger: usize, changed_W: Vector3<f64>, of: &DeviceFinger, felt: &FingerEffects) {
+        if changed_W == Vector3::zeros() {
+            return;
+        }
+        let own = |touch: &&Touch| touch.finger == finger;
+        let moved =
+            self.touches.iter().filter(own).map(|touch| (touch.entity, touch.point_W, touch.force_on_user_W));
+        let pulled = self.pulls[..self.felt_pulls].iter().filter(|pull| pull.finger == finger);
+        let pulled = pulled.map(|pull| (pull.entity, pull.point_W, pull.force_on_user_W));
+        let fixed_n: f64 = of
+            .finger
+            .contacts()
+            .filter(|contact| !self.manipulation.is_body(contact.entity))
+            .map(|contact| contact.force_on_user_W.norm())
+            .chain(
+                felt.reactions()
+                    .iter()
+                    .filter(|reaction| !self.manipulation.is_body(reaction.entity))
+                    .map(|reaction| reaction.force_on_user_W.norm()),
+            )
+            .sum();
+        let all_n =
+            fixed_n + moved.clone().chain(pulled.clone()).map(|(.., force_W)| force_W.norm()).sum::<f64>();
+        for (entity, point_W, force_W) in moved.chain(pulled) {
+            let share = force_W.norm() / all_n;
+            if share > 0.0 && self.owed.len() < self.owed.capacity() {
+                let force_on_user_W = changed_W * share;
+                self.owed.push(Pull { entity, finger, point_W, force_on_user_W, stiffness_n_per_m: 0.0 });
+            }
+        }
+    }
+
+    /// Nothing acts between fingers and bodies, and nothing is owed.
+    pub(super) fn clear_pulls(&mut self) {
+        self.pulls.clear();
+        self.owed.clear();
+        self.felt_pulls = 0;
     }
 
     /// Takes from the fingers' forces what acts between them and bodies beside touches, until it is known what moved those.
@@ -322,6 +384,9 @@ impl Objects {
                 }
             }
         }
+        self.felt_pulls = self.pulls.len();
+        let room = MAX_PULLS - self.felt_pulls;
+        self.pulls.extend(self.owed.drain(..).take(room));
     }
 }
 

@@ -6,59 +6,69 @@
 use super::FastStep;
 use crate::row::Row;
 use haptics::ContactState;
-use physics::Reason;
-use world::events::{EventSender, Kind, List, MOST_TOUCHED, PairForce, Touching, Watch, Why};
+use world::events::{EventSender, FastPairs, Kind, List, MOST_TOUCHED, PairForce, Touching, Watch};
 use world::lists::Handed;
 
 /// Pairs of entities that are watched at once.
 const MOST_PAIRS: usize = 2048;
 
-/// Tells, after each step, what is new.
+/// More bodies than an island has that is given away in a tick.
+const MOST_GONE: usize = 64;
+
+/// Tells, after each step of a world, what is new.
 pub struct EventTeller {
     watch: Watch,
-    out: EventSender,
+    /// What the slow list tells of its pairs, if there is one.
+    slow: Option<FastPairs>,
     touching: Vec<Touching>,
     /// Of each body, whether another thread has it.
     elsewhere: Vec<bool>,
+    /// Those that have gone there in this tick.
+    gone: Vec<u32>,
     handed: Handed,
     /// In which space each finger was.
     spaces: Vec<u32>,
 }
 
 impl EventTeller {
-    /// Of this step, to that queue.
-    pub fn new(step: &FastStep, out: EventSender) -> Self {
+    /// Of this step.
+    pub fn new(step: &mut FastStep) -> Self {
+        let slow = step.objects.watch_slow();
         let bodies = step.bodies().len();
         let pairs = bodies.saturating_mul(step.entities().len()).min(MOST_PAIRS);
-        let manipulation = step.objects.manipulation();
         Self {
             watch: Watch::new(step.fingers.len(), pairs, step.period_s),
-            out,
+            slow,
             touching: Vec::with_capacity(MOST_TOUCHED),
-            elsewhere: (0..bodies).map(|body| manipulation.standing(body).is_away()).collect(),
+            elsewhere: (0..bodies).map(|body| step.objects.is_slow(body)).collect(),
+            gone: Vec::with_capacity(MOST_GONE.min(bodies)),
             handed: Handed::default(),
             spaces: step.fingers.iter().map(|finger| finger.finger.space()).collect(),
         }
     }
 
     /// Tells what the last step, which was that of this row, brought.
-    pub fn tell(&mut self, step: &FastStep, row: &Row) {
+    pub fn tell(&mut self, step: &FastStep, row: &Row, out: &mut EventSender) {
         self.watch.begin(row.run_tick);
         for (finger, row) in (0..step.fingers.len()).zip(&row.fingers) {
             self.find_touching(step, finger);
-            self.watch.finger(finger, &self.touching, row.buttons, row.attached, &mut self.out);
+            self.watch.finger(finger, &self.touching, row.buttons, row.attached, out);
         }
-        self.watch.grasps(&mut self.out);
-        self.tell_doors(step);
-        self.tell_pairs(step);
+        self.watch.grasps(out);
+        self.tell_doors(step, out);
+        self.tell_lists(step, out);
+        self.tell_pairs(step, out);
         for parked in step.parked_now() {
-            let why = match parked.why {
-                Reason::LeftTheWorld => Why::LeftTheWorld,
-                Reason::NotANumber => Why::NotANumber,
-            };
-            self.watch.tell(Kind::Parked { entity: parked.entity as u32, why }, &mut self.out);
+            let why = parked.why.into();
+            self.watch.tell(Kind::Parked { entity: parked.entity as u32, why }, out);
         }
-        self.tell_lists(step);
+    }
+
+    /// The world ends in this tick of the run, and `next` tells of the one that takes over.
+    pub fn end(&mut self, next: &mut Self, run_tick: u64, why: Kind, out: &mut EventSender) {
+        self.watch.begin(run_tick);
+        self.watch.end(&mut next.watch, out);
+        self.watch.tell(why, out);
     }
 
     fn find_touching(&mut self, step: &FastStep, finger: usize) {
@@ -75,27 +85,38 @@ impl EventTeller {
         }
     }
 
-    fn tell_doors(&mut self, step: &FastStep) {
+    fn tell_doors(&mut self, step: &FastStep, out: &mut EventSender) {
         for ((finger, own), was) in (0..).zip(&step.fingers).zip(&mut self.spaces) {
             let to = own.finger.space();
             let from = std::mem::replace(was, to);
             if from != to {
-                self.watch.tell(Kind::Door { finger, from, to }, &mut self.out);
+                self.watch.tell(Kind::Door { finger, from, to }, out);
             }
         }
     }
 
-    fn tell_pairs(&mut self, step: &FastStep) {
+    fn tell_pairs(&mut self, step: &FastStep, out: &mut EventSender) {
         let manipulation = step.objects.manipulation();
+        if let Some(slow) = &mut self.slow {
+            self.watch.take_from_slow(slow, out);
+            // Not all that are there: the life of a pair may come before the pair itself.
+            let has_gone =
+                |entity: u32| Some(self.gone.contains(&(manipulation.body_of(entity as usize)? as u32)));
+            if !self.gone.is_empty() {
+                self.watch
+                    .go_to_slow(slow, |entities| entities.into_iter().filter_map(has_gone).all(|gone| gone));
+            }
+        }
         let pairs = manipulation
             .pair_forces()
             .map(|(entities, force_W)| PairForce { entities: entities.map(|entity| entity as u32), force_W });
         let rests = |entities: [u32; 2]| manipulation.rest_together(entities.map(|entity| entity as usize));
-        self.watch.pairs(pairs, step.objects.stepped_s(), rests, &mut self.out);
+        self.watch.pairs(pairs, step.objects.stepped_s(), rests, out);
     }
 
     /// Looks for who has been handed over only if anybody was.
-    fn tell_lists(&mut self, step: &FastStep) {
+    fn tell_lists(&mut self, step: &FastStep, out: &mut EventSender) {
+        self.gone.clear();
         let Some((_, handed)) = step.handed() else { return };
         if (handed.came, handed.went) == (self.handed.came, self.handed.went) {
             return;
@@ -103,11 +124,14 @@ impl EventTeller {
         self.handed = handed;
         let manipulation = step.objects.manipulation();
         for (body, was) in self.elsewhere.iter_mut().enumerate() {
-            let is = manipulation.standing(body).is_away();
+            let is = step.objects.is_slow(body);
             if std::mem::replace(was, is) != is {
                 let (entity, to) =
                     (manipulation.entity_of(body) as u32, if is { List::Slow } else { List::Fast });
-                self.watch.tell(Kind::ListChange { entity, to }, &mut self.out);
+                self.watch.tell(Kind::ListChange { entity, to }, out);
+                if is && self.gone.len() < self.gone.capacity() {
+                    self.gone.push(body as u32);
+                }
             }
         }
     }

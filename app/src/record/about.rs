@@ -15,6 +15,9 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
+/// The fact that names the first recording of the run.
+const FOLLOWS: &str = "follows";
+
 /// More than this of models and pictures is not put into a recording.
 const MOST_MODEL_BYTES: u64 = 64 << 20;
 
@@ -65,6 +68,24 @@ impl About {
         }
         about.attach_inputs(rig);
         about
+    }
+
+    /// Of another scene of the same run, whose recording goes on beside this one.
+    #[must_use]
+    pub fn followed_by(&self, rig: &Rig, recording: &Path) -> Self {
+        let mut next = Self { facts: self.facts.clone(), files: Vec::new() };
+        next.facts.retain(|name, _| !name.starts_with("left out: "));
+        next.tell("scene", rig.scene_file.display().to_string());
+        next.tell("scene_name", rig.scene.name.clone());
+        let first = recording.file_name().unwrap_or_default().to_string_lossy();
+        next.tell(FOLLOWS, first.into_owned());
+        next.attach_inputs(rig);
+        next
+    }
+
+    /// Whether the recording is of a scene that took over from another one.
+    pub fn follows(&self) -> bool {
+        self.facts.contains_key(FOLLOWS)
     }
 
     /// Adds a fact.
@@ -151,6 +172,7 @@ pub(super) fn columns_of(names: &Names) -> BTreeMap<String, String> {
         ("ties", json!(names.ties)),
         ("grasp_quality", json!(names.grasp_quality)),
         ("spaces", json!(names.spaces)),
+        ("lists", json!(names.lists)),
         ("fields", json!(super::schema::field_names(names))),
     ]
     .map(|(name, value)| (name.to_owned(), value.to_string()))
@@ -175,6 +197,8 @@ pub(super) fn names_of(facts: &BTreeMap<String, String>) -> Option<Names> {
         grasp_quality: list("grasp_quality")?.as_bool()?,
         // Not in recordings of before there were doors.
         spaces: words("spaces"),
+        // Recordings of before there were orders do not have it.
+        lists: list("lists").and_then(|lists| lists.as_bool()).unwrap_or_default(),
     })
 }
 
@@ -201,6 +225,7 @@ mod tests {
             ties: vec![false, false],
             grasp_quality: true,
             spaces: Some(vec!["inside".into()]),
+            lists: true,
         };
         let facts = columns_of(&names);
         assert_eq!(names_of(&facts), Some(names));

@@ -1,9 +1,10 @@
 //! An event as a line of text: names instead of numbers, SI with the units in the keys.
 
+use crate::book::Book;
 use crate::columns::Names;
 use io_driver::device::run_time_s;
 use serde_json::Value;
-use world::events::Event;
+use world::events::{Event, Kind};
 
 /// The keys, in order; a table's header.
 pub(super) const KEYS: [&str; 17] = [
@@ -26,8 +27,23 @@ pub(super) const KEYS: [&str; 17] = [
     "to",
 ];
 
+/// What the number of an order or of a scene means, in words.
+pub(super) fn said(event: &Event, book: &Book) -> Said {
+    match event.kind {
+        Kind::Order { number } => (book.order(number), None),
+        Kind::Scene { number } => {
+            let scene = book.scene(number);
+            (scene.as_ref().map_or_else(String::new, |(file, _)| file.clone()), scene)
+        }
+        _ => (String::new(), None),
+    }
+}
+
+/// Words, and of a scene what it is called and whom its numbers mean.
+pub(super) type Said = (String, Option<(String, Names)>);
+
 /// What an event says, in the order of [`KEYS`]; null where it says nothing.
-fn values(event: &Event, names: &Names, period_ns: u64) -> [Value; KEYS.len()] {
+fn values(event: &Event, said: &str, names: &Names, period_ns: u64) -> [Value; KEYS.len()] {
     let facts = event.kind.facts();
     let life =
         |of: fn(&world::events::Life) -> f64| facts.life.as_ref().map_or(Value::Null, |life| of(life).into());
@@ -52,24 +68,24 @@ fn values(event: &Event, names: &Names, period_ns: u64) -> [Value; KEYS.len()] {
         life(|life| life.impulse_W.z),
         lasted_s.into(),
         facts.number.into(),
-        text(facts.text),
+        text(if said.is_empty() { facts.text } else { said }),
         space(|[from, _]| from),
         space(|[_, to]| to),
     ]
 }
 
 /// As an object without the keys of which it says nothing.
-pub(super) fn json(event: &Event, names: &Names, period_ns: u64) -> String {
-    let told = KEYS.iter().zip(values(event, names, period_ns)).filter(|(_, value)| !value.is_null());
+pub(super) fn json(event: &Event, said: &str, names: &Names, period_ns: u64) -> String {
+    let told = KEYS.iter().zip(values(event, said, names, period_ns)).filter(|(_, value)| !value.is_null());
     let members: Vec<String> = told.map(|(key, value)| format!("\"{key}\":{value}")).collect();
     format!("{{{}}}", members.join(","))
 }
 
-/// As a row of a table; names have neither commas nor quotes.
-pub(super) fn csv(event: &Event, names: &Names, period_ns: u64) -> String {
-    let cells = values(event, names, period_ns).map(|value| match value {
+/// As a row of a table; names have neither commas nor quotes, and what people wrote loses them.
+pub(super) fn csv(event: &Event, said: &str, names: &Names, period_ns: u64) -> String {
+    let cells = values(event, said, names, period_ns).map(|value| match value {
         Value::Null => String::new(),
-        Value::String(text) => text,
+        Value::String(text) => text.replace([',', '"'], " "),
         number => number.to_string(),
     });
     cells.join(",")

@@ -1,6 +1,7 @@
 //! What happened in a run, and nothing else: a line for each event.
 
-use super::event_line::{KEYS, csv, json};
+use super::event_line::{KEYS, csv, json, said};
+use crate::book::Book;
 use crate::columns::Names;
 use crate::recording::RecordingError;
 use io_driver::device::run_time_s;
@@ -14,6 +15,7 @@ pub struct EventsFile {
     file: BufWriter<File>,
     path: PathBuf,
     names: Names,
+    book: Book,
     period_ns: u64,
     is_table: bool,
     written: u64,
@@ -25,14 +27,14 @@ impl EventsFile {
     ///
     /// # Errors
     /// If it cannot be made.
-    pub fn create(path: &Path, names: Names, period_ns: u64) -> Result<Self, RecordingError> {
+    pub fn create(path: &Path, names: Names, period_ns: u64, book: Book) -> Result<Self, RecordingError> {
         let failed = |source| RecordingError::Create { file: path.into(), source };
         let mut file = BufWriter::new(File::create(path).map_err(failed)?);
         let is_table = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
         if is_table {
             writeln!(file, "{}", KEYS.join(",")).and_then(|()| file.flush()).map_err(failed)?;
         }
-        Ok(Self { file, path: path.into(), names, period_ns, is_table, written: 0, last_tick: 0 })
+        Ok(Self { file, path: path.into(), names, book, period_ns, is_table, written: 0, last_tick: 0 })
     }
 
     /// Appends an event.
@@ -40,7 +42,11 @@ impl EventsFile {
     /// # Errors
     /// If it or what was before it cannot be written.
     pub fn event(&mut self, event: &Event) -> Result<(), RecordingError> {
-        let line = if self.is_table { csv } else { json }(event, &self.names, self.period_ns);
+        let mut said = said(event, &self.book);
+        if let Some((_, names)) = said.1.take() {
+            self.names = names;
+        }
+        let line = if self.is_table { csv } else { json }(event, &said.0, &self.names, self.period_ns);
         writeln!(self.file, "{line}").map_err(|source| self.failed(source))?;
         self.written += 1;
         self.last_tick = event.run_tick;

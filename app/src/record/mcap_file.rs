@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | `/tick` | `phantom3.Tick`, made for the scene | every tick |
 //! | `/events` | `phantom3.Event` | when something happens |
+//! | `/orders` | `phantom3.Order` | when somebody ordered something; not there if nobody did |
 //! | `/scene` | `foxglove.SceneUpdate` | once |
 //! | `/frames` | `foxglove.FrameTransforms` | 50 times a second |
 //! | `/fingers` | `foxglove.SceneUpdate` | 50 times a second |
@@ -14,12 +15,13 @@
 //! Invariant: what could not be written as a whole is cut off again; after that nothing more is written.
 
 use super::about::{self, About};
-use super::event_line::{holders, name};
+use super::event_line::{holders, name, said};
 use super::foxglove;
-use super::schema::{self, event};
+use super::schema::{self, event, order};
 use super::tick;
 use super::view::View;
 use super::wire::Message;
+use crate::book::Book;
 use crate::columns::Names;
 use crate::recording::RecordingError;
 use crate::row::{BodyRow, Row};
@@ -32,7 +34,7 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use world::events::{Event, Facts};
+use world::events::{Event, Facts, Kind};
 
 /// A chunk has so much of the run (ns): what a killed process loses at most, besides what waits for the disk.
 const CHUNK_NS: u64 = 500_000_000;
@@ -47,6 +49,8 @@ pub(super) const COLUMNS: &str = "phantom3.columns";
 pub(super) const END: &str = "phantom3.end";
 /// The channel of ticks.
 pub(super) const TICK_TOPIC: &str = "/tick";
+/// And that of orders.
+pub(super) const ORDER_TOPIC: &str = "/orders";
 
 /// An MCAP file being written.
 pub struct McapFile {
@@ -69,12 +73,17 @@ pub struct McapFile {
     last_in_chunk: u64,
     lost: u64,
     failure: Option<McapError>,
+    book: Book,
+    /// Which scene of the run it is, and whether events are of that one.
+    scene: u32,
+    is_current: bool,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Channels {
     tick: u16,
     events: u16,
+    orders: Option<u16>,
     scene: u16,
     frames: u16,
     fingers: u16,
@@ -115,10 +124,19 @@ impl McapFile {
             last_in_chunk: 0,
             lost: 0,
             failure: None,
+            book: Book::default(),
+            scene: 0,
+            is_current: true,
         };
         let scene = std::mem::take(&mut file.view.scene);
         file.put(channels.scene, 0, &scene).and_then(|()| file.writer.flush()).map_err(failed)?;
         Ok(file)
+    }
+
+    /// Of the scene of this number, in a run in which all that is written here was ordered.
+    #[must_use]
+    pub fn of_scene(self, (book, scene): (&Book, u32)) -> Self {
+        Self { book: book.clone(), scene, is_current: scene == 0, ..self }
     }
 
     /// Appends a row and its bodies.
@@ -162,6 +180,17 @@ impl McapFile {
 
     /// Writes down what happened. A failure is told with the next row.
     pub fn event(&mut self, happened: &Event) {
+        // Between two scenes events are those of either; each has its own names.
+        let begins = matches!(happened.kind, Kind::Scene { number } if number == self.scene);
+        self.is_current |= begins;
+        if !self.is_current {
+            return;
+        }
+        self.is_current = begins || !matches!(happened.kind, Kind::Scene { .. });
+        let (words, _) = said(happened, &self.book);
+        if let Kind::Order { .. } = happened.kind {
+            return self.order(happened.run_tick, &words);
+        }
         let facts = happened.kind.facts();
         let mut message = self.begin_event(happened.run_tick, facts.word);
         let held_by;
@@ -169,7 +198,7 @@ impl McapFile {
             held_by = format!("{}>{}", self.names.space(from), self.names.space(to));
             &held_by
         } else if facts.holders == 0 {
-            facts.text
+            if words.is_empty() { facts.text } else { &words }
         } else {
             held_by = holders(facts.holders, &self.names.fingers);
             &held_by
@@ -185,6 +214,30 @@ impl McapFile {
             message.double(event::PEAK, life.peak_n);
         }
         self.put_event(happened.run_tick, &message);
+    }
+
+    fn order(&mut self, run_tick: u64, words: &str) {
+        let mut message = Message::new();
+        message
+            .whole(order::TICK, run_tick)
+            .double(order::T, run_time_s(run_tick.cast_signed(), self.period_ns))
+            .text(order::WORDS, words);
+        let channel = self.order_channel();
+        let written = channel.and_then(|channel| self.put(channel, run_tick, message.bytes()));
+        if let Err(error) = written {
+            self.failure.get_or_insert(error);
+        }
+    }
+
+    /// Made for the first order.
+    fn order_channel(&mut self) -> Result<u16, McapError> {
+        if let Some(channel) = self.channels.orders {
+            return Ok(channel);
+        }
+        let set = schema::descriptors(&self.names);
+        let channel = add_channel(&mut self.writer, ORDER_TOPIC, schema::ORDER, &set)?;
+        self.channels.orders = Some(channel);
+        Ok(channel)
     }
 
     fn begin_event(&self, run_tick: u64, word: &str) -> Message {
@@ -304,17 +357,25 @@ fn begin(
         })?;
     }
     let set = schema::descriptors(names);
-    let mut channel = |topic: &str, message: &str| {
-        let schema = writer.add_schema(message, "protobuf", &set)?;
-        writer.add_channel(schema, topic, "protobuf", &BTreeMap::new())
-    };
+    let mut channel = |topic: &str, message: &str| add_channel(writer, topic, message, &set);
     Ok(Channels {
         tick: channel(TICK_TOPIC, schema::TICK)?,
         events: channel("/events", schema::EVENT)?,
+        orders: None,
         scene: channel("/scene", "foxglove.SceneUpdate")?,
         frames: channel("/frames", "foxglove.FrameTransforms")?,
         fingers: channel("/fingers", "foxglove.SceneUpdate")?,
     })
+}
+
+fn add_channel(
+    writer: &mut Writer<NoSeek<WholeWrites>>,
+    topic: &str,
+    message: &str,
+    set: &[u8],
+) -> Result<u16, McapError> {
+    let schema = writer.add_schema(message, "protobuf", set)?;
+    writer.add_channel(schema, topic, "protobuf", &BTreeMap::new())
 }
 
 fn into_io(error: McapError) -> io::Error {

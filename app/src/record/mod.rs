@@ -11,6 +11,7 @@ mod about;
 mod descriptor;
 mod event_line;
 mod events_file;
+mod files;
 mod foxglove;
 mod mcap_file;
 pub mod read;
@@ -22,14 +23,16 @@ mod wire;
 
 pub use about::{About, InputFile};
 pub use events_file::EventsFile;
+pub use files::Files;
 pub use mcap_file::McapFile;
 pub use recorder::{EventFeed, RecordFile, Recorded, Recorder};
 pub use view::View;
 
+use crate::book::Book;
 use crate::recording::{Names, Recording, RecordingError};
 use std::path::Path;
 
-/// Creates the recording in the format that its name ends with.
+/// Creates the recording in the format that its name ends with; of the scene of this number in a run that has several.
 ///
 /// # Errors
 /// If it cannot be made.
@@ -39,9 +42,10 @@ pub fn create(
     period_ns: u64,
     about: &About,
     view: &View,
+    scene: (&Book, u32),
 ) -> Result<RecordFile, RecordingError> {
     if is_mcap(path) {
-        let file = McapFile::create(path, names, period_ns, about, view.clone())?;
+        let file = McapFile::create(path, names, period_ns, about, view.clone())?.of_scene(scene);
         return Ok(RecordFile::Mcap(Box::new(file)));
     }
     Ok(RecordFile::Csv(Box::new(Recording::create(path, names, period_ns)?)))
@@ -51,8 +55,13 @@ pub fn create(
 ///
 /// # Errors
 /// If it cannot be made.
-pub fn create_events(path: &Path, names: Names, period_ns: u64) -> Result<RecordFile, RecordingError> {
-    Ok(RecordFile::Events(Box::new(EventsFile::create(path, names, period_ns)?)))
+pub fn create_events(
+    path: &Path,
+    names: Names,
+    period_ns: u64,
+    book: &Book,
+) -> Result<RecordFile, RecordingError> {
+    Ok(RecordFile::Events(Box::new(EventsFile::create(path, names, period_ns, book.clone())?)))
 }
 
 /// Whether the name is that of an MCAP file; every other is a table.

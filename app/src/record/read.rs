@@ -57,6 +57,15 @@ pub enum ReadError {
     },
 }
 
+/// The orders in a recording as far as it can be read, each with the tick in which it was taken. A table has none.
+pub fn orders(file: &Path) -> Vec<(u64, String)> {
+    let Some(mut rows) = is_mcap(file).then(|| McapRows::open(file).ok()).flatten() else {
+        return Vec::new();
+    };
+    while let Ok(Some(_)) = rows.next_row() {}
+    rows.orders
+}
+
 /// A recording being read.
 pub struct RecordedRun {
     rows: Rows,

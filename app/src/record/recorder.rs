@@ -31,6 +31,9 @@ const PAUSE: Duration = Duration::from_millis(10);
 /// A recorder that has not written anything for so long will not any more.
 const STUCK: Duration = Duration::from_secs(30);
 
+/// What files of events count.
+const EVENTS: &str = "events";
+
 /// A recording in one of its formats.
 pub enum RecordFile {
     /// A table.
@@ -103,10 +106,15 @@ pub struct Recorded {
 pub struct EventFeed {
     events: EventSender,
     when_full: WhenFull,
+    shared: Arc<Shared>,
     thread: Thread,
 }
 
 impl Subscriber for EventFeed {
+    fn is_over(&self) -> bool {
+        self.shared.is_closing.load(Ordering::Relaxed)
+    }
+
     fn event(&mut self, event: &Event) {
         while self.when_full == WhenFull::Wait && self.events.is_full() && !self.events.is_abandoned() {
             self.thread.unpark();
@@ -161,7 +169,7 @@ impl Recorder {
         let places = MOST_BODIES.checked_div(bodies).map_or(ROW_QUEUE, |places| places.clamp(64, ROW_QUEUE));
         let (rows, receiver) = row_queue_of(places, bodies);
         let shared = Arc::new(Shared::default());
-        let unit = if matches!(file, RecordFile::Events(_)) { "events" } else { "rows" };
+        let unit = if matches!(file, RecordFile::Events(_)) { EVENTS } else { "rows" };
         let (events, event_ends) = event_queue(MOST_EVENTS);
         let writer =
             RecorderThread { file: Some(file), events: event_ends, shared: shared.clone(), period_ns };
@@ -170,7 +178,8 @@ impl Recorder {
             .spawn(move || writer.run(receiver))
             .map_err(|source| RecordingError::Create { file: path.into(), source })?;
         let (known, changed) = (vec![None; bodies], Vec::with_capacity(bodies));
-        let events = Some(EventFeed { events, when_full, thread: thread.thread().clone() });
+        let events =
+            Some(EventFeed { events, when_full, shared: shared.clone(), thread: thread.thread().clone() });
         let path = path.into();
         Ok(Self { path, unit, rows, events, known, changed, when_full, lost: 0, untold: 0, shared, thread })
     }
@@ -210,11 +219,26 @@ impl Recorder {
         }
     }
 
-    /// Waits until everything is written.
-    pub fn finish(mut self) -> Recorded {
+    /// Nothing more comes: it ends by itself, and [`Self::finish`] says what became of it.
+    pub fn close(&mut self) {
         self.tell_gap(u64::MAX);
         self.shared.is_closing.store(true, Ordering::Release);
         self.thread.thread().unpark();
+    }
+
+    /// Where it goes.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Whether it is of events alone, whatever the scene is.
+    pub fn is_of_events(&self) -> bool {
+        self.unit == EVENTS
+    }
+
+    /// Waits until everything is written.
+    pub fn finish(mut self) -> Recorded {
+        self.close();
         let (mut taken, mut since) = (0, Instant::now());
         while !self.thread.is_finished() {
             let now = self.shared.taken.load(Ordering::Relaxed);

@@ -13,6 +13,9 @@ pub(super) const TICK: &str = "phantom3.Tick";
 /// An event's.
 pub(super) const EVENT: &str = "phantom3.Event";
 
+/// An order's.
+pub(super) const ORDER: &str = "phantom3.Order";
+
 /// Fields of `phantom3.Tick`.
 pub(super) mod tick {
     pub(in crate::record) const TICK: u32 = 1;
@@ -76,6 +79,8 @@ pub(super) mod object {
     pub(in crate::record) const RANK: u32 = 6;
     pub(in crate::record) const RESIDUAL: u32 = 7;
     pub(in crate::record) const CLOSURE: u32 = 8;
+    /// 0: the fast list, 1: the slow one.
+    pub(in crate::record) const LIST: u32 = 9;
 }
 
 /// Fields of `phantom3.Event`.
@@ -90,6 +95,13 @@ pub(super) mod event {
     pub(in crate::record) const OTHER: u32 = 8;
     pub(in crate::record) const IMPULSE: u32 = 9;
     pub(in crate::record) const PEAK: u32 = 10;
+}
+
+/// Fields of `phantom3.Order`.
+pub(super) mod order {
+    pub(in crate::record) const TICK: u32 = 1;
+    pub(in crate::record) const T: u32 = 2;
+    pub(in crate::record) const WORDS: u32 = 3;
 }
 
 /// The descriptors of ticks and events of such a scene.
@@ -127,6 +139,7 @@ pub(super) fn descriptors(names: &Names) -> Vec<u8> {
             (object::RANK, "rank", Uint64),
             (object::RESIDUAL, "residual", Double),
             (object::CLOSURE, "closure", Bool),
+            (object::LIST, "list", Uint64),
         ],
     );
     let event = MessageType::new(
@@ -144,6 +157,10 @@ pub(super) fn descriptors(names: &Names) -> Vec<u8> {
             (event::PEAK, "peak", Double),
         ],
     );
+    let order = MessageType::new(
+        "Order",
+        &[(order::TICK, "tick", Uint64), (order::T, "t", Double), (order::WORDS, "words", Text)],
+    );
     let fields = field_names(names);
     let of_fingers =
         (0..names.fingers.len()).map(|index| (tick::of_finger(index), Message(".phantom3.Finger")));
@@ -159,7 +176,7 @@ pub(super) fn descriptors(names: &Names) -> Vec<u8> {
         name: "phantom3.proto",
         package: "phantom3",
         imports: &[foxglove::FILE],
-        messages: vec![finger, object, tick, event],
+        messages: vec![finger, object, tick, event, order],
     });
     descriptor_set(&files)
 }

@@ -21,7 +21,7 @@ pub(super) fn write(out: &mut Message, row: &Row, bodies: &[BodyRow], names: &Na
         out.message(tick::of_finger(index), |out| write_finger(out, finger, index, names));
     }
     for (index, body) in bodies.iter().enumerate() {
-        out.message(tick::of_object(index), |out| write_body(out, body, names.grasp_quality));
+        out.message(tick::of_object(index), |out| write_body(out, body, names));
     }
 }
 
@@ -56,17 +56,20 @@ fn write_finger(out: &mut Message, row: &FingerRow, index: usize, names: &Names)
     }
 }
 
-fn write_body(out: &mut Message, body: &BodyRow, tells_grasp: bool) {
+fn write_body(out: &mut Message, body: &BodyRow, names: &Names) {
     foxglove::vector(out, object::POSITION, &body.position);
     foxglove::quaternion(out, object::ORIENTATION, &body.orientation);
     foxglove::vector(out, object::VELOCITY, &body.velocity);
     foxglove::vector(out, object::ANGULAR_VELOCITY, &body.angular_velocity);
-    if tells_grasp {
+    if names.grasp_quality {
         let GraspQuality { contacts, rank, residual, has_force_closure } = body.grasp;
         out.whole(object::CONTACTS, contacts as u64)
             .whole(object::RANK, rank as u64)
             .double(object::RESIDUAL, residual)
             .whole(object::CLOSURE, u64::from(has_force_closure));
+    }
+    if names.lists {
+        out.whole(object::LIST, u64::from(body.is_slow));
     }
 }
 
@@ -142,6 +145,7 @@ fn read_body(message: &[u8]) -> Option<BodyRow> {
             object::RANK => body.grasp.rank = usize::try_from(value.whole()?).ok()?,
             object::RESIDUAL => body.grasp.residual = value.double()?,
             object::CLOSURE => body.grasp.has_force_closure = value.whole()? != 0,
+            object::LIST => body.is_slow = value.whole()? != 0,
             _ => {}
         }
         Some(())
@@ -188,6 +192,7 @@ mod tests {
             ties: vec![false, true],
             grasp_quality: true,
             spaces: Some(vec!["hall".into(), "inside".into()]),
+            lists: true,
         }
     }
 
@@ -230,6 +235,7 @@ mod tests {
             velocity: number(8),
             angular_velocity: number(9),
             grasp: GraspQuality { contacts: 3, rank: 6, residual: 1e-9, has_force_closure: true },
+            is_slow: true,
         }];
         let mut message = Message::new();
         write(&mut message, &row, &bodies, &names(), 1_000_000);

@@ -53,6 +53,16 @@ impl Feed {
         self.next.is_none()
     }
 
+    /// Of the row that is reached, which at the beginning is the first.
+    pub(super) fn first_tick(&self) -> u64 {
+        self.current.run_tick
+    }
+
+    /// Whether the first row is still to come.
+    pub(super) fn is_before_first(&self) -> bool {
+        self.next.as_ref().is_some_and(|(row, _)| *row == self.current)
+    }
+
     /// Whether a row of the tick that was gone to last is missing between others.
     pub(super) fn is_missing(&self) -> bool {
         self.run_tick >= 0 && self.next.is_some() && self.current.run_tick.cast_signed() != self.run_tick

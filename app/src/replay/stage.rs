@@ -18,6 +18,8 @@ pub(super) struct Stage {
     pub(super) name: String,
     /// What a recording of it tells.
     pub(super) about: About,
+    /// Whether the recording begins where another scene ended.
+    pub(super) follows: bool,
     /// Where attached models lie meanwhile.
     _directory: Option<TempDir>,
 }
@@ -51,7 +53,8 @@ impl Stage {
             name += &format!("; {edit}");
         }
         let about = about(&rig, recorded, other.is_none(), text);
-        Ok(Self { rig, name, about, _directory: directory })
+        let follows = recorded.about().is_some_and(About::follows);
+        Ok(Self { rig, name, about, follows, _directory: directory })
     }
 }
 
@@ -111,8 +114,12 @@ fn unpack_models(scene: &mut Scene, about: &About) -> Result<Option<TempDir>, Ru
             place.set_extension(ending);
         }
         std::fs::write(&place, &file.bytes).map_err(no_room)?;
-        for named in model_files(scene).filter(|named| named.as_path() == *path) {
-            named.clone_from(&place);
+        // Where settings said where it is, the scene has no more than its name.
+        let is_known = |named: &Path| models.iter().any(|(path, _)| *path == named);
+        for named in model_files(scene) {
+            if named.as_path() == *path || !is_known(named) && named.file_name() == path.file_name() {
+                named.clone_from(&place);
+            }
         }
     }
     Ok(Some(directory))

@@ -28,7 +28,7 @@ impl Rig {
         mut entity: Entity,
         spec: &SceneEntity,
     ) -> Result<Entity, RigError> {
-        let refused = |source| super::refused(spec, source);
+        let refused = |source| super::entities::refused(spec, source);
         let limits = self.limits(Limits::DEFAULT_DEVICE_MASS_KG).map_err(refused)?;
         if let Some(magnetism) = &spec.magnetism {
             if !Magnetism::suits(&entity.shape) {

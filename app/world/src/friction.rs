@@ -1,7 +1,10 @@
 //! The friction of an entity's surface.
 
+use std::path::Path;
+
 use haptics::Material;
 
+use crate::document::{Document, LineEnds};
 use crate::error::SceneError;
 use crate::reader::{Bound, Table};
 use crate::vocabulary::Vocabulary;
@@ -132,6 +135,18 @@ impl FrictionSpec {
     pub const MAX_BRISTLES: usize = haptics::MAX_BRISTLES;
     /// The most points of a curve; one more is kept for the speed 0.
     pub const MAX_CURVE_POINTS: usize = haptics::MAX_CURVE_POINTS - 1;
+
+    /// As an entity of a scene has it, such as `{ model = "coulomb", mu = 0.5 }`.
+    ///
+    /// # Errors
+    /// What is wrong with it, and what is allowed.
+    pub fn parse(text: &str) -> Result<Self, SceneError> {
+        let text = format!("friction = {text}");
+        let lines = LineEnds::of(&text);
+        let document = Document::new(&text, &lines, Path::new("friction"));
+        let root = document.parse()?;
+        Self::read(&Table::root(document, &root), None)
+    }
 
     /// Reads the `friction` of an entity; without such a key its material's, without a material none.
     pub(crate) fn read(entity: &Table<'_>, material: Option<&Material>) -> Result<Self, SceneError> {

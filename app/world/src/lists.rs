@@ -19,10 +19,12 @@
 
 mod fast;
 mod link;
+mod order;
 mod slow;
 mod waits;
 
 pub use fast::{FastList, Handed, Reach};
+pub use order::SlowOrder;
 pub use slow::SlowList;
 pub use waits::Waits;
 

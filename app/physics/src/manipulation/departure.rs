@@ -67,6 +67,9 @@ impl Manipulation {
         let who = who(roster, entities, self.settings.response);
         self.pairs.take_out(|body| is_marked[body], is_awake, &who, keys);
         self.unmark(island);
+        for &body in island {
+            self.note_change(body);
+        }
     }
 
     /// Whether parts of an island have still to go.

@@ -1,4 +1,4 @@
-//! Entities that are no bodies, and that somebody moves: plates that carry, walls that push.
+//! Entities that somebody moves: plates that carry, walls that push, bodies that are held.
 //!
 //! Model: for the tick a driven entity is a body of infinite mass with the velocity that takes it to where it is to be. So
 //! contacts are damped by how the two move against each other, friction drags along what lies on it, and what it lifts is paid
@@ -8,10 +8,12 @@
 use haptics::Entity;
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 
+use super::ordered::at_rest;
 use super::{Manipulation, TICKS_AHEAD};
 use crate::body::Body;
 use crate::mass::MassProperties;
 use crate::pair::fastest_point_m_s;
+use crate::roster::Standing;
 use crate::solver::Motion;
 
 /// So many entities may be driven at once.
@@ -20,24 +22,30 @@ pub const MAX_DRIVEN: usize = 16;
 /// An entity on its way.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Driven {
-    entity: usize,
+    pub(super) entity: usize,
     to_W: Isometry3<f64>,
 }
 
 impl Manipulation {
-    /// In the next tick this entity goes to this pose; says whether it will: bodies move by themselves, and no more than
-    /// [`MAX_DRIVEN`] can be driven at once.
+    /// In the next tick this entity goes to this pose; says whether it will: bodies move by themselves unless they are
+    /// [held](Self::take_hold), and no more than [`MAX_DRIVEN`] can be driven at once.
     pub fn drive(&mut self, entity: usize, to_W: Isometry3<f64>) -> bool {
         let driven = Driven { entity, to_W };
         if let Some(known) = self.driven.iter_mut().find(|known| known.entity == entity) {
             *known = driven;
             return true;
         }
-        let goes = !self.is_body(entity) && self.driven.len() < MAX_DRIVEN;
+        let is_free = self.body_of(entity).is_none_or(|body| self.standing(body) == Standing::Elsewhere);
+        let goes = is_free && self.driven.len() < MAX_DRIVEN;
         if goes {
             self.driven.push(driven);
         }
         goes
+    }
+
+    /// A tick in which nothing else moves.
+    pub fn step_driven(&mut self, entities: &mut [Entity]) {
+        self.advance_driven(entities);
     }
 
     /// Before a tick: wakes who could be carried or pushed.
@@ -80,6 +88,10 @@ impl Manipulation {
             let Driven { entity, to_W } = self.driven[at];
             let way_W = to_W.translation.vector - entities[entity].X_WB.translation.vector;
             entities[entity].move_to(to_W);
+            if let Some(body) = self.body_of(entity) {
+                self.roster.bodies[body] = at_rest(&self.roster.bodies[body], &to_W);
+                self.note_change(body);
+            }
             if self.broad_phase.moved(entity, &entities[entity], &(way_W * TICKS_AHEAD))
                 && let Some(around) = self.broad_phase.around(entity).copied()
             {

@@ -14,11 +14,13 @@ use crate::broad_phase::Aabb;
 use crate::roster::Standing;
 
 impl Manipulation {
-    /// Makes a body one that somebody else steps, before the first tick.
+    /// Makes a body one that somebody else steps, who knows it already: what its contacts remember ends here.
     pub fn give_away(&mut self, body: usize, entities: &[Entity]) {
         self.wake(body, entities);
-        self.release(&[body], entities);
-        while self.next_parcel(entities).is_some() {}
+        self.roster.set(body, Standing::Elsewhere);
+        let roster = &self.roster;
+        let who = who(roster, entities, self.settings.response);
+        self.pairs.leave(body, |body| roster.standing(body) == Standing::Awake, &who);
     }
 
     /// As [`Self::give_away`], all of them.

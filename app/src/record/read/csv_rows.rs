@@ -121,8 +121,8 @@ impl CsvRows {
         for (index, finger) in row.fingers.iter_mut().take(self.names.fingers.len()).enumerate() {
             *finger = cells.finger(index, shape)?;
         }
-        let grasp = self.names.grasp_quality;
-        let bodies = (0..self.names.bodies.len()).map(|_| cells.body(grasp)).collect::<Result<_, _>>()?;
+        let tells = (self.names.grasp_quality, self.names.lists);
+        let bodies = (0..self.names.bodies.len()).map(|_| cells.body(tells)).collect::<Result<_, _>>()?;
         Ok((row, bodies))
     }
 }
@@ -237,7 +237,7 @@ impl Cells<'_> {
         Ok(row)
     }
 
-    fn body(&mut self, tells_grasp: bool) -> Result<BodyRow, String> {
+    fn body(&mut self, (tells_grasp, tells_list): (bool, bool)) -> Result<BodyRow, String> {
         let position = self.vector()?;
         let [w, x, y, z] = self.numbers()?;
         let (velocity, angular_velocity) = (self.vector()?, self.vector()?);
@@ -250,7 +250,9 @@ impl Cells<'_> {
                 has_force_closure: self.whole()? != 0,
             };
         }
-        Ok(BodyRow { position, orientation: Quaternion::new(w, x, y, z), velocity, angular_velocity, grasp })
+        let is_slow = tells_list && self.whole()? != 0;
+        let orientation = Quaternion::new(w, x, y, z);
+        Ok(BodyRow { position, orientation, velocity, angular_velocity, grasp, is_slow })
     }
 }
 
@@ -278,6 +280,7 @@ fn names_in(header: &str) -> Names {
         ties: each("attached"),
         grasp_quality: all[end..].iter().any(|column| column.ends_with("_closure")),
         spaces: each("space").contains(&true).then(Vec::new),
+        lists: bodies.first().is_some_and(|body| all[end..].contains(&&*format!("{body}_list"))),
         entities: Vec::new(),
         fingers,
         bodies,

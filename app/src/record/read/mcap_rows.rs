@@ -3,8 +3,10 @@
 use super::ReadError;
 use crate::columns::Names;
 use crate::record::about::{About, InputFile, names_of};
-use crate::record::mcap_file::{ABOUT, COLUMNS, TICK_TOPIC};
+use crate::record::mcap_file::{ABOUT, COLUMNS, ORDER_TOPIC, TICK_TOPIC};
+use crate::record::schema::order;
 use crate::record::tick;
+use crate::record::wire::each_field;
 use crate::row::{BodyRow, Row};
 use mcap::McapError;
 use mcap::records::Record;
@@ -22,13 +24,22 @@ pub(super) struct McapRows {
     path: PathBuf,
     file: File,
     reader: LinearReader,
-    tick_channel: Option<u16>,
+    channels: Channels,
     first: Option<(Row, Vec<BodyRow>)>,
     rows: u64,
     pub(super) names: Names,
     pub(super) period_ns: u64,
     pub(super) about: About,
     pub(super) cut: Option<String>,
+    /// Orders that were met so far, each with its tick.
+    pub(super) orders: Vec<(u64, String)>,
+}
+
+/// Those that are read.
+#[derive(Debug, Clone, Copy, Default)]
+struct Channels {
+    tick: Option<u16>,
+    orders: Option<u16>,
 }
 
 /// What a record was.
@@ -52,13 +63,14 @@ impl McapRows {
             path: path.into(),
             file,
             reader: LinearReader::new_with_options(options),
-            tick_channel: None,
+            channels: Channels::default(),
             first: None,
             rows: 0,
             names: Names::default(),
             period_ns: 0,
             about: About::default(),
             cut: None,
+            orders: Vec::new(),
         };
         rows.first = rows.read_row()?;
         if rows.names.fingers.is_empty() || rows.period_ns == 0 {
@@ -102,7 +114,7 @@ impl McapRows {
                 }
                 Some(Ok(LinearReadEvent::Record { opcode, data })) => {
                     match mcap::parse_record(opcode, data) {
-                        Ok(record) => break Some(own(record, self.tick_channel, &self.names)),
+                        Ok(record) => break Some(own(record, self.channels, &self.names)),
                         Err(error) => failure = Some(error),
                     }
                 }
@@ -145,7 +157,8 @@ impl McapRows {
                     names.ok_or_else(|| self.damaged("the names of the columns are not complete"))?;
             }
             Kept::File(file) => self.about.files.push(file),
-            Kept::TickChannel(id) => self.tick_channel = Some(id),
+            Kept::Order(order) => self.orders.extend(order),
+            Kept::Channels(found) => self.channels = found,
             Kept::Facts(..) | Kept::Nothing => {}
         }
         Ok(Found::Other)
@@ -163,22 +176,45 @@ enum Kept {
     Row(Box<Option<(Row, Vec<BodyRow>)>>),
     Facts(String, Facts),
     File(InputFile),
-    TickChannel(u16),
+    Order(Option<(u64, String)>),
+    Channels(Channels),
     Nothing,
 }
 
-fn own(record: Record<'_>, tick_channel: Option<u16>, names: &Names) -> Kept {
+fn own(record: Record<'_>, channels: Channels, names: &Names) -> Kept {
     match record {
-        Record::Message { header, data } if Some(header.channel_id) == tick_channel => {
+        Record::Message { header, data } if Some(header.channel_id) == channels.tick => {
             Kept::Row(Box::new(tick::read(&data, names)))
+        }
+        Record::Message { header, data } if Some(header.channel_id) == channels.orders => {
+            Kept::Order(read_order(&data))
         }
         Record::Metadata(metadata) => Kept::Facts(metadata.name, metadata.metadata),
         Record::Attachment { header, data, .. } => {
             Kept::File(InputFile { name: header.name, bytes: data.into_owned() })
         }
-        Record::Channel(channel) if channel.topic == TICK_TOPIC => Kept::TickChannel(channel.id),
+        Record::Channel(channel) if channel.topic == TICK_TOPIC => {
+            Kept::Channels(Channels { tick: Some(channel.id), ..channels })
+        }
+        Record::Channel(channel) if channel.topic == ORDER_TOPIC => {
+            Kept::Channels(Channels { orders: Some(channel.id), ..channels })
+        }
         _ => Kept::Nothing,
     }
+}
+
+/// When it was taken, and its words.
+fn read_order(message: &[u8]) -> Option<(u64, String)> {
+    let (mut tick, mut words) = (0, String::new());
+    each_field(message, |field, value| {
+        match field {
+            order::TICK => tick = value.whole()?,
+            order::WORDS => words = value.text()?.to_owned(),
+            _ => {}
+        }
+        Some(())
+    })?;
+    Some((tick, words))
 }
 
 fn read_some(file: &mut File, room: &mut [u8]) -> io::Result<usize> {

@@ -88,6 +88,11 @@ impl EventReceiver {
 pub trait Subscriber: Send {
     /// Takes one; those of one source come in the order of their ticks.
     fn event(&mut self, event: &Event);
+
+    /// Whether it wants no more, and may be forgotten.
+    fn is_over(&self) -> bool {
+        false
+    }
 }
 
 impl<F: FnMut(&Event) + Send> Subscriber for F {
@@ -136,6 +141,7 @@ impl Hub {
 
     /// Hands on all events up to this tick, source by source.
     pub fn deliver(&mut self, up_to: u64) {
+        self.subscribers.retain(|(_, subscriber)| !subscriber.is_over());
         for source in &mut self.sources {
             while let Some(event) = source.receive(up_to) {
                 self.counts[event.kind.class() as usize] += 1;

@@ -108,8 +108,19 @@ pub enum Kind {
         /// Where it is.
         to: u32,
     },
-    /// The scene was put back to its beginning.
+    /// The scene was put back to its beginning. What touched before has ended.
     Reset,
+    /// Another scene goes on in place of the one that was, whose contacts have ended. Numbers mean its fingers and entities
+    /// from here on.
+    Scene {
+        /// The how-many-th of the run; that with which it began is 0.
+        number: u32,
+    },
+    /// An order was taken.
+    Order {
+        /// Which, in the order in which they came, from 0.
+        number: u64,
+    },
     /// So many events are missing here: whoever takes them was too slow.
     Lost {
         /// How many.
@@ -148,6 +159,15 @@ pub enum Why {
     NotANumber,
 }
 
+impl From<physics::Reason> for Why {
+    fn from(reason: physics::Reason) -> Self {
+        match reason {
+            physics::Reason::LeftTheWorld => Self::LeftTheWorld,
+            physics::Reason::NotANumber => Self::NotANumber,
+        }
+    }
+}
+
 /// What a contact has done so far.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Life {
@@ -162,6 +182,16 @@ pub struct Life {
 }
 
 impl Life {
+    /// This, and then that: of a contact that two sides have watched one after the other.
+    pub(super) fn followed_by(&self, then: &Self) -> Self {
+        Self {
+            force_n: then.force_n,
+            peak_n: self.peak_n.max(then.peak_n),
+            impulse_W: self.impulse_W + then.impulse_W,
+            lasted_s: self.lasted_s + then.lasted_s,
+        }
+    }
+
     /// Another tick of this length (s) with this force (N), the time since the last one (s) being part of its life.
     pub(super) fn go_on(&mut self, force_W: &Vector3<f64>, dt_s: f64, since_s: f64) {
         self.force_n = force_W.norm();
@@ -196,15 +226,17 @@ pub enum Class {
     Trial,
     /// [`Kind::Door`].
     Door,
-    /// [`Kind::Reset`].
+    /// [`Kind::Reset`] and [`Kind::Scene`].
     Reset,
+    /// [`Kind::Order`].
+    Order,
     /// [`Kind::Lost`].
     Lost,
 }
 
 impl Class {
     /// All of them, with their words.
-    pub const ALL: [(Self, &str); 13] = [
+    pub const ALL: [(Self, &str); 14] = [
         (Self::Contact, "contacts"),
         (Self::Slip, "slips"),
         (Self::Pair, "pairs"),
@@ -217,6 +249,7 @@ impl Class {
         (Self::Trial, "trials"),
         (Self::Door, "doors"),
         (Self::Reset, "resets"),
+        (Self::Order, "orders"),
         (Self::Lost, "lost"),
     ];
 }
@@ -278,7 +311,8 @@ impl Kind {
             Self::Key { .. } => Class::Key,
             Self::Trial { .. } => Class::Trial,
             Self::Door { .. } => Class::Door,
-            Self::Reset => Class::Reset,
+            Self::Reset | Self::Scene { .. } => Class::Reset,
+            Self::Order { .. } => Class::Order,
             Self::Lost { .. } => Class::Lost,
         }
     }
@@ -334,6 +368,8 @@ impl Kind {
                 Facts { finger: Some(finger), spaces: Some([from, to]), ..of("door") }
             }
             Self::Reset => of("reset"),
+            Self::Scene { number } => Facts { number: Some(number.into()), ..of("scene") },
+            Self::Order { number } => Facts { number: Some(number), ..of("order") },
             Self::Lost { count } => Facts { number: Some(count), ..of("events-lost") },
         }
     }

@@ -13,11 +13,12 @@ mod fingers;
 mod grasps;
 mod pairs;
 
+use super::slow_pairs::{FastPairs, FromSlow};
 use super::{Event, EventSender, Kind, Life};
 use fingers::FingerWatch;
 use grasps::Grasps;
 use nalgebra::Vector3;
-use pairs::Pairs;
+pub(super) use pairs::{PairLife, Pairs};
 
 /// The most events that a tick sends.
 pub const MOST_TOLD: usize = 256;
@@ -60,13 +61,13 @@ pub struct Watch {
 
 /// The tick that is looked at.
 #[derive(Debug, Clone, Copy, Default)]
-struct Now {
-    run_tick: u64,
+pub(super) struct Now {
+    pub(super) run_tick: u64,
     /// Since the one before (s).
-    dt_s: f64,
-    period_s: f64,
+    pub(super) dt_s: f64,
+    pub(super) period_s: f64,
     /// How many events it may still send.
-    left: usize,
+    pub(super) left: usize,
 }
 
 impl Watch {
@@ -117,9 +118,43 @@ impl Watch {
         self.pairs.look(pairs, dt_s, rests, &mut Teller { now: &mut self.now, out });
     }
 
+    /// Before [`Self::pairs`], where there is a slow list: takes up the pairs that come from there and what happened to those
+    /// that are there, which is told in this tick.
+    pub fn take_from_slow(&mut self, slow: &mut FastPairs, out: &mut EventSender) {
+        for _ in 0..MOST_TOLD {
+            match slow.from_slow.pop() {
+                Ok(FromSlow::Life(life)) => self.pairs.adopt(&life.seen_in(self.now.run_tick)),
+                Ok(FromSlow::Happened(kind)) => self.tell(kind, out),
+                Err(_) => break,
+            }
+        }
+    }
+
+    /// The pairs that go to the slow list.
+    pub fn go_to_slow(&mut self, slow: &mut FastPairs, goes: impl Fn([u32; 2]) -> bool) {
+        let to_slow = &mut slow.to_slow;
+        self.pairs.give_away(goes, |life| to_slow.push(life).is_ok());
+    }
+
     /// After all fingers: who holds what.
     pub fn grasps(&mut self, out: &mut EventSender) {
         self.grasps.look(&self.fingers, &mut Teller { now: &mut self.now, out });
+    }
+
+    /// The world ends: with it all that touches, is held or tied. `next` watches the one that follows; what devices do goes on.
+    pub fn end(&mut self, next: &mut Self, out: &mut EventSender) {
+        let mut teller = Teller { now: &mut self.now, out };
+        for (number, finger) in self.fingers.iter_mut().enumerate() {
+            let buttons = finger.buttons();
+            finger.look(number as u32, &[], &mut teller);
+            finger.look_at_device(number as u32, buttons, None, &mut teller);
+            if let Some(next) = next.fingers.get_mut(number) {
+                next.go_on_from(buttons);
+            }
+        }
+        self.pairs.end(&mut teller);
+        self.grasps.end(&mut teller);
+        next.last_tick = self.last_tick;
     }
 
     /// Something that the caller has found.
@@ -129,9 +164,9 @@ impl Watch {
 }
 
 /// Sends what is new in a tick.
-struct Teller<'t> {
-    now: &'t mut Now,
-    out: &'t mut EventSender,
+pub(super) struct Teller<'t> {
+    pub(super) now: &'t mut Now,
+    pub(super) out: &'t mut EventSender,
 }
 
 impl Teller<'_> {

@@ -2,11 +2,12 @@
 
 use haptics::Entity;
 use nalgebra::Vector3;
-use physics::{Aabb, Manipulation, Standing};
+use physics::{Aabb, MAX_DRIVEN, Manipulation, Standing};
 
 use super::ListSettings;
 use super::SlowList;
 use super::link::{Came, Claim, FastEnd, Most, send, take_in};
+use super::order::SlowOrder;
 use super::waits::Waits;
 
 /// Where a finger is and could be soon.
@@ -52,6 +53,12 @@ pub struct FastList {
     /// Boxes in which fingers could be soon, and in which they are.
     soon: Vec<Aabb>,
     around: Vec<Aabb>,
+    /// Boxes of entities that are being moved: what is near them belongs here.
+    moved: Vec<Aabb>,
+    /// Bodies that an order holds: they are elsewhere, and not in the slow list.
+    held: Vec<u32>,
+    /// Bodies that an order waits for.
+    fetched: Vec<u32>,
     handed: Handed,
 }
 
@@ -66,8 +73,11 @@ impl FastList {
             here: all_here(bodies, all_slow),
             next: 0,
             island: Vec::with_capacity(bodies),
-            soon: Vec::with_capacity(MOST_FINGERS),
-            around: Vec::with_capacity(MOST_FINGERS),
+            soon: Vec::with_capacity(MOST_FINGERS + MAX_DRIVEN),
+            around: Vec::with_capacity(MOST_FINGERS + MAX_DRIVEN),
+            moved: Vec::with_capacity(MAX_DRIVEN),
+            held: Vec::with_capacity(MAX_DRIVEN),
+            fetched: Vec::with_capacity(MAX_DRIVEN),
             handed: Handed::default(),
         }
     }
@@ -80,6 +90,53 @@ impl FastList {
     /// What has been handed over so far.
     pub fn handed(&self) -> Handed {
         self.handed
+    }
+
+    /// What overlaps this box is to come here in the next tick, as what a finger is near does: something is moved there.
+    pub fn call_over(&mut self, around: Aabb) {
+        if self.moved.len() < MAX_DRIVEN {
+            self.moved.push(around);
+        }
+    }
+
+    /// An order takes a body that is here; it is elsewhere from now on, and nobody else's.
+    pub fn hold(&mut self, body: usize) {
+        if self.held.len() < MAX_DRIVEN {
+            self.held.push(body as u32);
+        }
+    }
+
+    /// The order is done with it.
+    pub fn let_go(&mut self, body: usize) {
+        self.held.retain(|held| *held as usize != body);
+    }
+
+    /// Sends an order to the slow side; gives it back if there is no room.
+    ///
+    /// # Errors
+    /// The order.
+    pub fn order(&mut self, order: SlowOrder) -> Result<(), SlowOrder> {
+        self.end.orders.push(order).map_err(|rtrb::PushError::Full(order)| order)
+    }
+
+    /// Whether the slow side can be sent an order.
+    pub fn can_order(&self) -> bool {
+        !self.end.orders.is_full()
+    }
+
+    /// Whether an order has a body.
+    pub fn holds(&self, body: usize) -> bool {
+        self.held.contains(&(body as u32))
+    }
+
+    /// Asks once for a body by itself, whatever it is doing there, asleep or parked for good.
+    pub fn fetch(&mut self, body: usize) {
+        let claim = Claim { body: body as u32, stay: self.stays[body] };
+        let is_asked = self.fetched.contains(&claim.body) || self.fetched.len() == self.fetched.capacity();
+        if !is_asked && self.order(SlowOrder::Fetch(claim)).is_ok() {
+            self.fetched.push(claim.body);
+            self.claimed[body] = self.tick.max(1);
+        }
     }
 
     /// Before a tick: takes in what has come, and claims what the fingers, or what is awake here, could reach.
@@ -97,6 +154,10 @@ impl FastList {
             self.soon
                 .push(now.swept(&(finger.velocity_W * self.settings.ahead_s)).grown(self.settings.near_m));
             self.around.push(now.grown(self.settings.far_m));
+        }
+        for moved in self.moved.drain(..) {
+            self.soon.push(moved);
+            self.around.push(moved);
         }
         self.take_in(manipulation, entities);
         if self.here.len() < self.claimed.len() {
@@ -144,7 +205,8 @@ impl FastList {
     fn take_in(&mut self, manipulation: &mut Manipulation, entities: &mut [Entity]) {
         for _ in 0..STANDS_A_TICK {
             let Ok(stand) = self.end.stands.pop() else { break };
-            if self.stays[stand.body as usize] == stand.stay {
+            let is_there = !self.held.contains(&stand.body);
+            if is_there && self.stays[stand.body as usize] == stand.stay {
                 manipulation.stands_elsewhere(
                     stand.body as usize,
                     &stand.state,
@@ -157,11 +219,12 @@ impl FastList {
     }
 
     fn take_in_parcels(&mut self, manipulation: &mut Manipulation, entities: &mut [Entity]) {
-        let Self { end, here, handed, claimed, tick, .. } = self;
+        let Self { end, here, handed, claimed, fetched, tick, .. } = self;
         let taken = take_in(&mut end.back, manipulation, entities, TAKEN_A_TICK, |came| {
             let Came::Whole(body) = came else { return };
             here.push(body as u32);
             handed.came += 1;
+            fetched.retain(|fetched| *fetched as usize != body);
             let claimed = std::mem::take(&mut claimed[body]);
             if claimed > 0 {
                 handed.waits.add(tick.saturating_sub(claimed));
@@ -171,9 +234,12 @@ impl FastList {
     }
 
     fn claim_what_is_near(&mut self, manipulation: &Manipulation, entities: &[Entity]) {
-        let Self { soon, claimed, stays, end, handed, tick, settings, .. } = self;
+        let Self { soon, claimed, stays, end, handed, tick, settings, held, .. } = self;
         let mut claim = |body: usize| {
-            if claimed[body] == 0 && manipulation.standing(body) == Standing::Elsewhere {
+            if claimed[body] == 0
+                && !held.contains(&(body as u32))
+                && manipulation.standing(body) == Standing::Elsewhere
+            {
                 match end.claims.push(Claim { body: body as u32, stay: stays[body] }) {
                     Ok(()) => claimed[body] = *tick,
                     Err(_) => handed.unclaimed += 1,

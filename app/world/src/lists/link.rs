@@ -1,5 +1,6 @@
 //! The queues between the two lists.
 
+use super::order::{MOST_ORDERS, SlowOrder};
 use haptics::Entity;
 use physics::{Body, Manipulation, Parcel};
 use rtrb::{Consumer, Producer, RingBuffer};
@@ -14,8 +15,8 @@ pub(super) struct Stand {
 }
 
 /// A body that the fast side wants.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Claim {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Claim {
     pub(super) body: u32,
     /// How often it has gone to the slow list: it may still be on its way there.
     pub(super) stay: u32,
@@ -25,6 +26,7 @@ pub(super) struct Claim {
 pub(super) struct FastEnd {
     pub(super) out: Producer<Parcel>,
     pub(super) claims: Producer<Claim>,
+    pub(super) orders: Producer<SlowOrder>,
     pub(super) back: Consumer<Parcel>,
     pub(super) stands: Consumer<Stand>,
 }
@@ -33,6 +35,7 @@ pub(super) struct FastEnd {
 pub(super) struct SlowEnd {
     pub(super) out: Producer<Parcel>,
     pub(super) claims: Consumer<Claim>,
+    pub(super) orders: Consumer<SlowOrder>,
     pub(super) back: Consumer<Parcel>,
     pub(super) stands: Producer<Stand>,
 }
@@ -43,9 +46,16 @@ pub(super) fn link(bodies: usize) -> (FastEnd, SlowEnd) {
     let [(out, slow_back), (slow_out, back)] = [parcels_queue(parcels), parcels_queue(parcels)];
     let (claims, slow_claims) = RingBuffer::new(bodies.clamp(1, MOST_CLAIMS));
     let (slow_stands, stands) = RingBuffer::new(bodies.clamp(1, MOST_STANDS));
+    let (orders, slow_orders) = RingBuffer::new(MOST_ORDERS);
     (
-        FastEnd { out, claims, back, stands },
-        SlowEnd { out: slow_out, claims: slow_claims, back: slow_back, stands: slow_stands },
+        FastEnd { out, claims, orders, back, stands },
+        SlowEnd {
+            out: slow_out,
+            claims: slow_claims,
+            orders: slow_orders,
+            back: slow_back,
+            stands: slow_stands,
+        },
     )
 }
 

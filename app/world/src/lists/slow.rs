@@ -4,21 +4,28 @@ use haptics::Entity;
 use physics::{Manipulation, Standing};
 
 use super::link::{Came, Claim, Most, SlowEnd, Stand, send, take_in};
+use crate::events::{Kind, PairForce, SlowPairs};
 
 /// The slow list.
 pub struct SlowList {
-    manipulation: Manipulation,
-    entities: Vec<Entity>,
-    end: SlowEnd,
+    pub(super) manipulation: Manipulation,
+    pub(super) entities: Vec<Entity>,
+    pub(super) end: SlowEnd,
+    pub(super) has_begun: bool,
+    pub(super) is_paused: bool,
     /// Of each body, how often it came.
     stays: Box<[u32]>,
     /// Claimed, and not yet given away.
     claimed: Vec<Claim>,
+    /// Of them the bodies that an order waits for.
+    fetched: Vec<usize>,
     island: Vec<usize>,
     /// Bodies whose place has not been told since it changed, each once.
     untold: Vec<usize>,
     is_untold: Box<[bool]>,
     stepped: u64,
+    /// Who wants to know which entities press each other here.
+    watch: Option<SlowPairs>,
 }
 
 impl SlowList {
@@ -30,24 +37,42 @@ impl SlowList {
             manipulation,
             entities,
             end,
+            has_begun: true,
+            is_paused: false,
             claimed: Vec::with_capacity(bodies),
+            fetched: Vec::with_capacity(bodies),
             island: Vec::with_capacity(bodies),
             untold: Vec::with_capacity(bodies),
             is_untold: vec![false; bodies].into(),
             stepped: 0,
+            watch: None,
         }
+    }
+
+    /// From now on somebody watches which entities press each other here.
+    pub fn watch(&mut self, pairs: SlowPairs) {
+        self.watch = Some(pairs);
     }
 
     /// A turn: takes in, gives away what is claimed, goes on by so many ticks of this length (s), and tells.
     pub fn turn(&mut self, ticks: u32, dt_s: f64) {
+        self.take_orders();
+        if !self.has_begun {
+            return;
+        }
         self.take_in();
+        if let Some(watch) = &mut self.watch {
+            watch.begin_turn();
+        }
         self.give_away();
+        let ticks = if self.is_paused { 0 } else { ticks };
         for _ in 0..ticks {
             if self.manipulation.awake().is_empty() {
                 break;
             }
-            self.manipulation.step(&mut self.entities, &mut [], dt_s);
+            let made = self.manipulation.step(&mut self.entities, &mut [], dt_s);
             self.stepped += 1;
+            self.look(made.parked, dt_s);
             // A tick of many bodies takes long, and a finger waits.
             self.give_away();
         }
@@ -89,6 +114,31 @@ impl SlowList {
         (0..self.manipulation.bodies().len()).filter(is_here).count()
     }
 
+    /// After a tick of this length (s), in which so many bodies were parked.
+    fn look(&mut self, parked: usize, dt_s: f64) {
+        let (Some(watch), manipulation) = (&mut self.watch, &self.manipulation) else { return };
+        let pairs = manipulation
+            .pair_forces()
+            .map(|(entities, force_W)| PairForce { entities: entities.map(|entity| entity as u32), force_W });
+        let rests = |entities: [u32; 2]| manipulation.rest_together(entities.map(|entity| entity as usize));
+        watch.look(pairs, dt_s, rests);
+        let all = manipulation.parked();
+        for parked in &all[all.len().saturating_sub(parked)..] {
+            watch.tell(Kind::Parked { entity: parked.entity as u32, why: parked.why.into() });
+        }
+    }
+
+    /// A body for which an order waits, be it parked.
+    pub(super) fn fetch(&mut self, claim: Claim) {
+        if !self.claimed.contains(&claim) {
+            self.claimed.push(claim);
+        }
+        let body = claim.body as usize;
+        if !self.fetched.contains(&body) {
+            self.fetched.push(body);
+        }
+    }
+
     /// Answers what is claimed: the islands of these bodies go, one after the other.
     pub fn give_away(&mut self) {
         while let Ok(claim) = self.end.claims.pop() {
@@ -104,17 +154,39 @@ impl SlowList {
             }
             self.claimed.swap_remove(at);
             let body = claim.body as usize;
-            let is_here = matches!(self.manipulation.standing(body), Standing::Awake | Standing::Asleep);
-            if is_here && claim.stay == self.stays[body] {
+            if self.has(body) && claim.stay == self.stays[body] {
                 // There is room for all bodies.
                 self.manipulation.island(body, &mut self.island);
+                if self.manipulation.standing(body) == Standing::Parked {
+                    self.island.push(body);
+                }
+                self.tell_who_goes();
                 self.manipulation.release(&self.island, &self.entities);
+                let Self { fetched, island, .. } = self;
+                fetched.retain(|body| !island.contains(body));
             }
         }
     }
 
+    /// Whether a body is here to be given away. Who was parked here stays, but is what it seems to the other side: fixed; unless
+    /// an order waits for it.
+    fn has(&self, body: usize) -> bool {
+        match self.manipulation.standing(body) {
+            Standing::Awake | Standing::Asleep => true,
+            Standing::Parked => self.fetched.contains(&body),
+            Standing::Elsewhere | Standing::Coming => false,
+        }
+    }
+
+    fn tell_who_goes(&mut self) {
+        let Self { watch: Some(watch), manipulation, island, .. } = self else { return };
+        let is_in = |entity: u32| manipulation.body_of(entity as usize).map(|body| island.contains(&body));
+        // What is fixed goes along with everybody.
+        watch.go(|entities| entities.into_iter().filter_map(is_in).all(|is_in| is_in));
+    }
+
     /// Whether a body that is claimed is still on its way to here. One that is not, and not here either, has gone with
-    /// another's island; and who was parked here stays, but is what it seems to the other side: fixed.
+    /// another's island.
     fn waits(&self, claim: &Claim) -> bool {
         let is_late = claim.stay > self.stays[claim.body as usize];
         is_late || self.manipulation.standing(claim.body as usize) == Standing::Coming

@@ -30,6 +30,16 @@ impl FingerWatch {
         &self.touched
     }
 
+    /// Those of its device that are pressed.
+    pub(super) fn buttons(&self) -> u64 {
+        self.buttons
+    }
+
+    /// They were already.
+    pub(super) fn go_on_from(&mut self, buttons: u64) {
+        self.buttons = buttons;
+    }
+
     /// First what has ended, then what goes on or begins.
     pub(super) fn look(&mut self, finger: u32, touching: &[Touching], teller: &mut Teller<'_>) {
         self.touched.retain(|was| {

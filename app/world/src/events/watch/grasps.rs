@@ -53,11 +53,17 @@ impl Grasps {
         self.held.retain(|held| {
             let stays = teller.time_s(now.saturating_sub(held.last)) < QUIET_S;
             if !stays {
-                let lasted_s = teller.time_s(held.last - held.began + 1);
-                teller.tell(Kind::Release { entity: held.entity, lasted_s });
+                held.tell(teller);
             }
             stays
         });
+    }
+
+    /// All are let go.
+    pub(super) fn end(&mut self, teller: &mut Teller<'_>) {
+        for held in self.held.drain(..) {
+            held.tell(teller);
+        }
     }
 
     fn see(&mut self, entity: u32, finger: usize) {
@@ -67,5 +73,13 @@ impl Grasps {
         } else if self.seen.len() < MOST {
             self.seen.push((entity, bit));
         }
+    }
+}
+
+impl Held {
+    /// That it is not any more.
+    fn tell(&self, teller: &mut Teller<'_>) {
+        let lasted_s = teller.time_s(self.last - self.began + 1);
+        teller.tell(Kind::Release { entity: self.entity, lasted_s });
     }
 }

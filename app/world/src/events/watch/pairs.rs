@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 /// Pairs that touch, in ascending order.
 #[derive(Debug)]
-pub(super) struct Pairs {
+pub(in crate::events) struct Pairs {
     touching: Vec<Pair>,
     most: usize,
 }
@@ -21,12 +21,53 @@ struct Pair {
     quiet_s: f64,
 }
 
+/// A contact that goes on on the other side.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::events) struct PairLife {
+    pub(in crate::events) entities: [u32; 2],
+    pub(in crate::events) life: Life,
+    quiet_s: f64,
+    /// Its last tick with a force, as that side counts.
+    pressed: u64,
+}
+
+impl PairLife {
+    /// As a side knows it whose tick this is.
+    pub(in crate::events) fn seen_in(self, run_tick: u64) -> Self {
+        Self { pressed: run_tick, ..self }
+    }
+}
+
 impl Pairs {
-    pub(super) fn with_capacity(most: usize) -> Self {
+    /// Takes up one that the other side has watched until now.
+    pub(in crate::events) fn adopt(&mut self, from: &PairLife) {
+        let PairLife { entities, life, quiet_s, pressed } = *from;
+        match self.touching.binary_search_by_key(&entities, |pair| pair.entities) {
+            Ok(at) => self.touching[at].life = life.followed_by(&self.touching[at].life),
+            Err(at) if self.touching.len() < self.most => {
+                self.touching.insert(at, Pair { entities, life, pressed, quiet_s });
+            }
+            Err(_) => {}
+        }
+    }
+
+    /// Gives those away that the other side will watch, as far as it takes them.
+    pub(in crate::events) fn give_away(
+        &mut self,
+        goes: impl Fn([u32; 2]) -> bool,
+        mut give: impl FnMut(PairLife) -> bool,
+    ) {
+        self.touching.retain(|pair| {
+            let Pair { entities, life, quiet_s, pressed } = *pair;
+            !(goes(entities) && give(PairLife { entities, life, quiet_s, pressed }))
+        });
+    }
+
+    pub(in crate::events) fn with_capacity(most: usize) -> Self {
         Self { touching: Vec::with_capacity(most), most }
     }
 
-    pub(super) fn look(
+    pub(in crate::events) fn look(
         &mut self,
         pairs: impl Iterator<Item = PairForce>,
         dt_s: f64,
@@ -49,6 +90,13 @@ impl Pairs {
             }
             stays
         });
+    }
+
+    /// All of them end.
+    pub(super) fn end(&mut self, teller: &mut Teller<'_>) {
+        for pair in self.touching.drain(..) {
+            pair.tell(Change::Ends, teller);
+        }
     }
 
     /// Says where the next one is likely to be.

@@ -1,0 +1,85 @@
+//! Which files a run is recorded in: those that were asked for, and beside each one of its own for every other scene.
+
+use super::{About, Recorder, View, create, create_events};
+use crate::book::Book;
+use crate::fast_loop::WhenFull;
+use crate::recording::RecordingError;
+use crate::rig::Rig;
+use io_driver::device::Extras;
+use std::path::{Path, PathBuf};
+
+/// What recordings of a run have in common.
+pub struct Files {
+    /// Where rows are to go.
+    pub record: Vec<PathBuf>,
+    /// Where events alone are to go.
+    pub events: Vec<PathBuf>,
+    /// What the devices tell besides positions.
+    pub extras: Vec<Extras>,
+    /// Length of a tick (ns).
+    pub period_ns: u64,
+    /// Whether the run waits for them.
+    pub when_full: WhenFull,
+    /// What was ordered.
+    pub book: Book,
+    /// What is told of the run that it begins with.
+    pub about: About,
+}
+
+impl Files {
+    /// Those of the scene that the run begins with; and files of events, which go on whatever the scene is.
+    ///
+    /// # Errors
+    /// If one cannot be made.
+    pub fn first(&self, rig: &Rig, view: &View) -> Result<Vec<Recorder>, RecordingError> {
+        let mut all = self.of_scene(rig, view, 0)?;
+        for path in &self.events {
+            let file = create_events(path, rig.names(&self.extras), self.period_ns, &self.book)?;
+            all.push(self.start(path, file, rig)?);
+        }
+        Ok(all)
+    }
+
+    /// Those of the scene of this number.
+    ///
+    /// # Errors
+    /// If one cannot be made.
+    pub fn of_scene(&self, rig: &Rig, view: &View, number: u32) -> Result<Vec<Recorder>, RecordingError> {
+        let record = |path: &PathBuf| {
+            let about = if number == 0 { self.about.clone() } else { self.about.followed_by(rig, path) };
+            let path = place(path, number);
+            let names = rig.names(&self.extras);
+            let file = create(&path, names, self.period_ns, &about, view, (&self.book, number))?;
+            self.start(&path, file, rig)
+        };
+        self.record.iter().map(record).collect()
+    }
+
+    fn start(&self, path: &Path, file: super::RecordFile, rig: &Rig) -> Result<Recorder, RecordingError> {
+        Recorder::start(path, file, rig.names(&self.extras).bodies.len(), self.period_ns, self.when_full)
+    }
+}
+
+/// `out.mcap`, and then `out.2.mcap`, `out.3.mcap`.
+fn place(path: &Path, number: u32) -> PathBuf {
+    if number == 0 {
+        return path.into();
+    }
+    let numbered = number + 1;
+    match path.extension() {
+        Some(ending) => path.with_extension(format!("{numbered}.{}", ending.to_string_lossy())),
+        None => path.with_extension(numbered.to_string()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_second_scene_is_recorded_beside_the_first() {
+        let place = |path: &str, number| place(Path::new(path), number).display().to_string();
+        assert_eq!([place("a/out.mcap", 0), place("a/out.mcap", 1)], ["a/out.mcap", "a/out.2.mcap"]);
+        assert_eq!([place("out", 2), place("o.b.csv", 1)], ["out.3", "o.b.2.csv"]);
+    }
+}

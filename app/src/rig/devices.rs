@@ -1,0 +1,121 @@
+//! Where the devices stand, and the driver that a scripted hand moves.
+
+use super::{HandFile, HandMode, Rig, RigError};
+use crate::mount::Mount;
+use crate::simulated::base_for_path;
+use io_driver::config::{
+    Backend, DeviceConfig, DriverConfig, ProcessConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig, Wish,
+    Zeroing,
+};
+use io_driver::device_file::Workspace;
+use io_driver::say::say;
+use io_driver::sim::script::HandScript;
+use nalgebra::{Isometry3, Vector3};
+use shm_abi::segment::ClockMode;
+use std::path::Path;
+use world::Scene;
+
+impl Rig {
+    /// Where a device stands, X_WD.
+    pub fn base_in_world(&self, device: usize) -> Isometry3<f64> {
+        self.bases.get(device).copied().unwrap_or_else(Isometry3::identity)
+    }
+
+    pub(super) fn mount(&self, device: usize) -> Mount {
+        match &self.layout {
+            Some(layout) => Mount::placed(&layout.placement(device)),
+            None => Mount::new(self.base_in_world(device)),
+        }
+    }
+
+    pub(super) fn place_bases(&self) -> Result<Vec<Isometry3<f64>>, RigError> {
+        let devices = 0..self.device_count();
+        match (&self.layout, &self.hand_mode) {
+            (Some(layout), _) => Ok(devices.map(|device| layout.pose(device)).collect()),
+            (None, HandMode::Kinematic) => Ok(Vec::new()),
+            (None, HandMode::Impedance(simulated)) => {
+                let workspace = simulated.arm()?.workspace;
+                Ok(devices.map(|device| self.base_near_path(device, &workspace)).collect())
+            }
+        }
+    }
+
+    /// So that the finger's path lies within the workspace.
+    fn base_near_path(&self, device: usize, workspace: &Workspace) -> Isometry3<f64> {
+        let Some(index) = self.scene.fingers.iter().position(|finger| finger.device == device) else {
+            return Isometry3::identity();
+        };
+        let finger = &self.scene.fingers[index];
+        let bounds = self.hand.as_ref().and_then(|hand| hand.bounds.get(index).copied().flatten());
+        let [lowest, highest] = bounds.unwrap_or([finger.start_m.coords; 2]);
+        let base = base_for_path(lowest, highest, workspace);
+        if base != Isometry3::identity() {
+            let [x, y, z]: [f64; 3] = base.translation.vector.into();
+            say(format_args!(
+                "phantom3: the device of finger {} stands at [{x:.4}, {y:.4}, {z:.4}] m, so that the hand's path lies in \
+                 its workspace; --layout says otherwise",
+                finger.name
+            ));
+        }
+        base
+    }
+
+    /// How many devices the fingers need.
+    pub fn device_count(&self) -> usize {
+        self.scene.fingers.iter().map(|finger| finger.device + 1).max().unwrap_or(0)
+    }
+
+    /// A driver whose devices are the scripted hand's fingers.
+    pub fn driver_config(&self, clock: ClockMode) -> DriverConfig {
+        let period_ns = self.period_ns;
+        let reply = ReplyConfig { mode: ReplyMode::OnArrival, budget_ns: period_ns / 2 };
+        DriverConfig {
+            period_ns,
+            clock,
+            socket: None,
+            real_time: RealTime::usual(period_ns, reply.budget_ns),
+            reply,
+            safety: SafetyConfig::usual(period_ns),
+            process: ProcessConfig::default(),
+            devices: (0..self.device_count()).map(|index| self.device(index)).collect(),
+        }
+    }
+
+    fn device(&self, index: usize) -> DeviceConfig {
+        let finger = self.scene.fingers.iter().find(|finger| finger.device == index);
+        let hand =
+            finger.and_then(|finger| self.hand.as_ref().map(|hand| (hand.path.clone(), finger.name.clone())));
+        let wish = Wish {
+            hand,
+            start_m: finger.map_or_else(Vector3::zeros, |finger| finger.start_m.coords),
+            base_in_world: self.base_in_world(index),
+        };
+        let (backend, compensates_gravity) = match &self.hand_mode {
+            // A device that is no finger's needs no hand.
+            HandMode::Impedance(simulated) if finger.is_some() => (simulated.backend(wish), true),
+            _ => (Backend::Ideal(wish), false),
+        };
+        DeviceConfig {
+            // No finger can be called so: brackets are not allowed in a name.
+            name: finger.map_or_else(|| format!("(unused {index})"), |finger| finger.name.clone()),
+            backend,
+            peak_force_n: None,
+            compensates_gravity,
+            zeroing: Zeroing::Known,
+        }
+    }
+}
+
+/// Reads the hand file as the driver will, so that its mistakes are told here, by this process.
+pub(super) fn check_hand(path: &Path, named_by: &str, scene: &Scene) -> Result<HandFile, RigError> {
+    let unreadable = |source| RigError::Unreadable { file: path.into(), named_by: named_by.into(), source };
+    if !path.metadata().map_err(unreadable)?.is_file() {
+        return Err(RigError::NotAFile { file: path.into(), named_by: named_by.into() });
+    }
+    let text = std::fs::read_to_string(path).map_err(unreadable)?;
+    let fingers: Vec<&str> = scene.fingers.iter().map(|finger| finger.name.as_str()).collect();
+    let script = HandScript::parse(&text, path, &fingers)?;
+    let path = std::path::absolute(path).map_err(unreadable)?;
+    let bounds = (0..fingers.len()).map(|finger| script.bounds(finger)).collect();
+    Ok(HandFile { path, duration_s: script.duration_s(), bounds })
+}

@@ -1,0 +1,233 @@
+//! Orders through the whole program: what is told of them, what is recorded, and that it plays again.
+
+use system_tests::recording::Table;
+use system_tests::workplace::{Said, Workplace};
+
+/// A finger over a plate with a cube on it, and a second cube far away.
+const SCENE: &str = "hand = \"hand.csv\"\n[[finger]]\nstart_m = [0, 0.06, 0]\n[[entity]]\nname = \"plate\"\n\
+    shape = { kind = \"box\", size_m = [0.6, 0.02, 0.6] }\nposition_m = [0, -0.01, 0]\nstiffness_n_per_m = 2000\n\
+    friction = { model = \"coulomb\", mu = 0.5 }\n[[entity]]\nname = \"cube\"\nmass_kg = 0.1\n\
+    shape = { kind = \"box\", size_m = [0.04, 0.04, 0.04] }\nposition_m = [0, 0.021, 0]\nstiffness_n_per_m = 1000\n\
+    damping_n_s_per_m = 2\nfriction = { model = \"coulomb\", mu = 0.5 }\n[[entity]]\nname = \"other\"\nmass_kg = 0.1\n\
+    shape = { kind = \"box\", size_m = [0.04, 0.04, 0.04] }\nposition_m = [0.25, 0.1, 0.2]\n\
+    friction = { model = \"coulomb\", mu = 0.5 }\n";
+/// Another one: a ball in a mesh's place.
+const NEXT: &str = "[[finger]]\nstart_m = [0, 0.06, 0]\n[[entity]]\nname = \"ground\"\n\
+    shape = { kind = \"plane\", normal = [0, 1, 0], offset_m = 0.04 }\n[[entity]]\nname = \"block\"\nmass_kg = 0.1\n\
+    shape = { kind = \"mesh\", file = \"cube.obj\", scale = 0.02 }\nposition_m = [0.2, 0.1, 0]\n";
+const CUBE: &str = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n\
+    f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 4 8 7 3\nf 1 5 8 4\nf 2 3 7 6\n";
+/// Down onto the cube, then still.
+const HAND: &str = "t,f0_x,f0_y,f0_z\n0,0,0.06,0\n0.3,0,0.037,0\n0.6,0.002,0.037,0\n3,0.002,0.037,0\n";
+const ALL_SLOW: &str = "lists = { fast_bodies = 0 }\n";
+
+fn workplace(scene: &str) -> Workplace {
+    let place = Workplace::new();
+    place.write("scene.toml", scene);
+    place.write("next.toml", NEXT);
+    place.write("hand.csv", HAND);
+    std::fs::create_dir(place.path("models")).expect("a directory");
+    place.write("models/cube.obj", CUBE);
+    place
+}
+
+fn run(place: &Workplace, orders: &str, clock: &str, more: &[&str]) -> Said {
+    place.write("orders.txt", orders);
+    let usual = ["run", "scene.toml", "--clock", clock, "--seconds", "2.5", "--orders", "orders.txt"];
+    let said = place.run(usual.iter().chain(&["--set", "data.meshes=[\"models\"]"]).chain(more));
+    assert_eq!(said.status, Some(0), "{}{}", said.out, said.err);
+    said
+}
+
+fn identical(place: &Workplace, recording: &str) {
+    let said = place.run(["replay", recording, "--expect-same"]);
+    assert!(
+        said.status == Some(0) && said.out.contains("identical"),
+        "{recording}: {}{}",
+        said.out,
+        said.err
+    );
+}
+
+/// The events of a kind: their ticks, and what stands in a column.
+fn told<'t>(events: &'t Table, kind: &str, column: &str) -> Vec<(&'t str, &'t str)> {
+    let of_kind = |((is, tick), cell): ((&'t str, &'t str), &'t str)| (is == kind).then_some((tick, cell));
+    events
+        .texts("kind")
+        .into_iter()
+        .zip(events.texts("tick"))
+        .zip(events.texts(column))
+        .filter_map(of_kind)
+        .collect()
+}
+
+const MANY: &str = "at 0.4 stiffness 1.5\nat 0.5 trial 3 begins\nat 0.5 key 32 down  # space\nat 0.6 friction cube coulomb mu=0.3\n\
+    at 0.9 turn plate about 0 1 0 by 0.2 in 0.3\nat 1.0 pause\nat 1.3 resume\nat 1.5 move other to 0.1 0.06 0 in 0.1\n\
+    at 1.9 reset\nat 2.2 trial 3 ends\n";
+
+#[test]
+fn orders_are_in_a_recording_and_are_given_again_in_their_ticks() {
+    for scene in [SCENE.to_owned(), format!("{ALL_SLOW}{SCENE}")] {
+        let place = workplace(&scene);
+        run(&place, MANY, "virtual", &["--record", "out.mcap", "--record", "out.csv"]);
+        identical(&place, "out.mcap");
+        // And they did something.
+        run(&place, "", "virtual", &["--record", "without.csv"]);
+        let [with, without] = ["out.csv", "without.csv"].map(|file| Table::read(&place.path(file)));
+        let force = |table: &Table| table.numbers("f0_force_y")[480];
+        assert!((force(&with) / force(&without) - 1.5).abs() < 0.2, "{} {}", force(&with), force(&without));
+        assert!(with.numbers("other_x")[1990] < 0.2 && without.numbers("other_x")[1990] > 0.2);
+        assert_eq!(with.columns().contains(&"other_list".into()), scene.starts_with(ALL_SLOW));
+    }
+}
+
+#[test]
+fn keys_trials_orders_and_resets_are_told_in_their_ticks_and_every_contact_that_began_ends() {
+    let place = workplace(SCENE);
+    let said = run(&place, MANY, "virtual", &["--events", "events.csv"]);
+    assert!(said.out.contains("\norders       10\n"), "{}", said.out);
+    let events = Table::read(&place.path("events.csv"));
+    assert_eq!(told(&events, "trial-begin", "number"), [("500", "3")]);
+    assert_eq!(told(&events, "trial-end", "number"), [("2200", "3")]);
+    assert_eq!(told(&events, "key-down", "number"), [("500", "32")]);
+    let orders = told(&events, "order", "text");
+    assert_eq!(orders.len(), 10);
+    assert_eq!(orders[2], ("500", "key 32 down"));
+    // A tenth of a second of fading: its hundredth tick is without force.
+    assert_eq!(told(&events, "reset", "kind"), [("1999", "reset")]);
+    let at_reset = |kind: &str, entity: &str| told(&events, kind, "entity").contains(&("1999", entity));
+    assert!(
+        at_reset("contact-end", "cube") && at_reset("contact-begin", "cube"),
+        "a new contact in the new world"
+    );
+    for (begin, end) in [("contact-begin", "contact-end"), ("pair-begin", "pair-end"), ("grasp", "release")] {
+        let (begun, ended) = (told(&events, begin, "entity").len(), told(&events, end, "entity").len());
+        assert!(begun >= ended && begun <= ended + 4, "{begin}: {begun} {ended}");
+    }
+}
+
+#[test]
+fn another_scene_is_told_by_its_own_names_and_recorded_beside_the_first() {
+    for scene in [SCENE.to_owned(), format!("{ALL_SLOW}{SCENE}")] {
+        let place = workplace(&scene);
+        let more = ["--record", "out.mcap", "--record", "out.csv", "--events", "events.csv"];
+        let said = run(&place, "at 1 swap next.toml\nat 1.5 stiffness 2 of ground", "virtual", &more);
+        assert!(
+            said.out.contains("out.2.mcap") && said.err.contains("next.toml goes on"),
+            "{}{}",
+            said.out,
+            said.err
+        );
+        let [first, second] = ["out.csv", "out.2.csv"].map(|file| Table::read(&place.path(file)));
+        assert_eq!((first.len(), second.len()), (1099, 1401));
+        assert_eq!((first.numbers("t")[1098], second.numbers("t")[0]), (1.098, 1.099));
+        assert!(first.columns().contains(&"cube_x".into()) && second.columns().contains(&"block_x".into()));
+        let events = Table::read(&place.path("events.csv"));
+        assert_eq!(told(&events, "scene", "text"), [("1099", "next.toml")]);
+        // The finger is in the ground at once, and the block falls onto it.
+        assert_eq!(told(&events, "contact-begin", "entity").last(), Some(&("1099", "ground")));
+        assert!(told(&events, "contact-end", "entity").contains(&("1099", "cube")));
+        let fell = told(&events, "pair-begin", "entity");
+        assert!(
+            fell.iter()
+                .any(|(tick, entity)| *entity == "block" && tick.parse::<u64>().is_ok_and(|t| t > 1100))
+        );
+        for recording in ["out.mcap", "out.2.mcap"] {
+            identical(&place, recording);
+        }
+        let said = place.run(["export", "out.2.mcap", "--csv", "again.csv"]);
+        assert_eq!(said.status, Some(0), "{}", said.err);
+        let [second, again] =
+            ["out.2.csv", "again.csv"].map(|file| std::fs::read(place.path(file)).expect("a file"));
+        assert!(second == again);
+    }
+}
+
+#[test]
+fn in_real_time_worlds_with_two_lists_take_over_from_each_other_and_lose_nobody() {
+    let place = workplace(&format!("{ALL_SLOW}{SCENE}"));
+    place.write("next.toml", format!("{ALL_SLOW}{NEXT}"));
+    let orders = "at 0.3 reset\nat 0.8 pause\nat 1 resume\nat 1.2 friction plate none\nat 1.4 swap next.toml\nat 1.8 reset";
+    let said = run(&place, orders, "real", &["--events", "events.jsonl"]);
+    let line = said.out.lines().find(|line| line.starts_with("lists")).expect("two lists");
+    let counts: Vec<usize> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+    assert_eq!(counts[0] + counts[1], 1, "{line}");
+    assert!(said.out.contains("\norders       6\n"), "{}", said.out);
+}
+
+/// Ten cubes, of which a finger goes to and fro over some, and one that falls.
+#[test]
+fn pairs_are_told_once_whichever_list_they_are_in_and_however_often_that_changes() {
+    let scene = "[[finger]]\n[[entity]]\nname = \"floor\"\ndamping_n_s_per_m = 5\n\
+         shape = { kind = \"plane\", normal = [0, 1, 0], offset_m = 0 }\nfriction = { model = \"coulomb\", mu = 0.4 }\n\
+         [[entity]]\nname = \"cube\"\nshape = { kind = \"box\", size_m = [0.04, 0.04, 0.04] }\n\
+         position_m = [0, 0.02, 0]\nmass_kg = 0.1\nstiffness_n_per_m = 500\ndamping_n_s_per_m = 5\n\
+         friction = { model = \"coulomb\", mu = 0.4 }\ngrid = { count = [9, 1, 1], spacing_m = [0.1, 1, 1] }\n\
+         [[entity]]\nname = \"drop\"\nshape = { kind = \"box\", size_m = [0.04, 0.04, 0.04] }\n\
+         position_m = [0.3, 0.3, 0.6]\nmass_kg = 0.1\nstiffness_n_per_m = 500\ndamping_n_s_per_m = 0.1\n\
+         friction = { model = \"coulomb\", mu = 0.4 }\n";
+    let mut hand = String::from("t,f0_x,f0_y,f0_z\n");
+    for step in 0..=20_u32 {
+        // 15 mm above them, 0.8 m in 0.2 s.
+        hand += &format!("{:?},{:?},0.055,0\n", 0.2 * f64::from(step), 0.8 * f64::from(step % 2));
+    }
+    let events = |lists: &str| {
+        let place = Workplace::new();
+        place.write("scene.toml", format!("{lists}{scene}"));
+        place.write("hand.csv", &hand);
+        let said = place.run([
+            "run",
+            "scene.toml",
+            "--hand",
+            "hand.csv",
+            "--clock",
+            "virtual",
+            "--events",
+            "events.csv",
+        ]);
+        assert_eq!(said.status, Some(0), "{}", said.err);
+        Table::read(&place.path("events.csv"))
+    };
+    let [one, two] = ["", ALL_SLOW].map(events);
+    let handed = told(&two, "list-change", "text");
+    let to = |list: &str| handed.iter().filter(|(_, to)| *to == list).count();
+    assert!(to("fast") > 20 && to("slow") > 20, "{} {}", to("fast"), to("slow"));
+    for kind in ["pair-begin", "pair-end"] {
+        let whom = |events: &Table| {
+            let mut names: Vec<String> =
+                told(events, kind, "entity").iter().map(|(_, name)| (*name).into()).collect();
+            names.sort();
+            names
+        };
+        assert_eq!(whom(&one), whom(&two), "{kind}");
+    }
+    assert_eq!(told(&two, "pair-begin", "entity").iter().filter(|(_, name)| *name != "drop").count(), 9);
+    let bounces = |events: &Table| -> Vec<f64> {
+        told(events, "pair-end", "impulse_y_n_s")
+            .iter()
+            .map(|(_, cell)| cell.parse().expect("a number"))
+            .collect()
+    };
+    let [one, two] = [&one, &two].map(bounces);
+    assert!(!one.is_empty() && one.len() == two.len(), "{one:?}");
+    for (one, two) in one.iter().zip(&two) {
+        // The same motion, ten ticks at once or one by one.
+        assert!((one - two).abs() < 1e-12, "{one} {two}");
+    }
+}
+
+#[test]
+fn what_leaves_the_world_is_told_from_either_list() {
+    let leaving = SCENE
+        .replace("position_m = [0.25, 0.1, 0.2]", "position_m = [99.5, 0.1, 0.2]\nvelocity_m_s = [1, 0, 0]");
+    for scene in [leaving.clone(), format!("{ALL_SLOW}{leaving}")] {
+        let place = workplace(&scene);
+        run(&place, "", "virtual", &["--events", "events.csv"]);
+        let events = Table::read(&place.path("events.csv"));
+        let parked = told(&events, "parked", "entity");
+        let [(tick, "other")] = parked[..] else { panic!("{parked:?}") };
+        // It falls meanwhile by a metre, which is next to nothing of 100 m; two turns of the slow list later at most.
+        let tick: u64 = tick.parse().expect("a number");
+        assert!((485..=525).contains(&tick), "{tick}");
+    }
+}
