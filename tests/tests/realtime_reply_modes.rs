@@ -109,5 +109,8 @@ fn in_lockstep_a_reply_for_the_next_tick_is_waited_for_and_drives_that_one() {
     for tick in &done {
         assert_eq!(tick.after.previous.command_tick + 1, tick.tick, "a delay of one tick, always");
     }
-    assert!(done.windows(2).all(|pair| pair[0].tick + 1 == pair[1].tick), "in lockstep every tick is answered");
+    assert!(
+        done.windows(2).all(|pair| pair[0].tick + 1 == pair[1].tick),
+        "in lockstep every tick is answered"
+    );
 }
