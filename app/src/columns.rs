@@ -28,6 +28,8 @@ pub struct Names {
     pub ties: Vec<bool>,
     /// Whether it is told how the bodies are grasped.
     pub grasp_quality: bool,
+    /// The spaces but for the world, space 1 first; `None`: there are no doors, and it is not told which one a finger is in.
+    pub spaces: Option<Vec<String>>,
 }
 
 impl Names {
@@ -49,6 +51,12 @@ impl Names {
     /// Whether a finger is kept passive.
     pub fn is_passive(&self, finger: usize) -> bool {
         self.passive.get(finger).copied().unwrap_or_default()
+    }
+
+    /// The name of a space; empty for the world.
+    pub fn space(&self, space: u32) -> &str {
+        let at = (space as usize).checked_sub(1);
+        at.and_then(|at| self.spaces.as_ref()?.get(at)).map_or("", String::as_str)
     }
 
     /// The name of an entity; empty for none.
@@ -158,6 +166,9 @@ impl ColumnList {
         if names.ties(index) {
             self.push(format!("{finger}_attached"), CellKind::Text);
         }
+        if names.spaces.is_some() {
+            self.push(format!("{finger}_space"), CellKind::Text);
+        }
     }
 }
 
@@ -201,6 +212,9 @@ fn each_cell_of_finger(finger: &FingerRow, index: usize, names: &Names, write: &
     }
     if names.ties(index) {
         write(Cell::Text(names.entity(finger.attached)));
+    }
+    if names.spaces.is_some() {
+        write(Cell::Text(names.space(finger.space)));
     }
 }
 

@@ -26,10 +26,12 @@ use crate::passive_port::{Tick, keep_passive};
 use crate::row::{BodyRow, FingerRow, Row};
 use crate::slow_thread::SlowRemains;
 use haptics::passivity::Passivity;
-use haptics::{Effects, Entity, Felt, Field, Finger, FingerEffects, Guide, Hip, Moment, RAMP_IN_S};
+use haptics::{
+    Door, Effects, Entity, Felt, Field, Finger, FingerEffects, Guide, Hip, Moment, Passage, RAMP_IN_S,
+};
 use nalgebra::{Isometry3, Vector3};
 use near::Near;
-use physics::{Body, BodyError, BroadPhase, Manipulation};
+use physics::{Body, BodyError, Manipulation};
 use shm_abi::MAX_DEVICES;
 use shm_abi::frame::{DEVICE_ORIENTATION_MEASURED, DEVICE_POSITION_VALID};
 use shm_abi::{Command, DeviceFrame, Frame};
@@ -69,6 +71,9 @@ pub struct FastStep {
     passivities: Vec<Option<Passivity>>,
     /// How much of the forces is felt, 0 to 1.
     strength: f64,
+    doors: Vec<Door>,
+    /// Of each finger.
+    passages: Vec<Passage>,
 }
 
 /// The first minor version of the shared-memory contract whose frames tell velocities.
@@ -80,6 +85,7 @@ impl FastStep {
         let (tips_D, carried_W) = (vec![None; fingers.len()], vec![Vector3::zeros(); fingers.len()]);
         let period_s = period_ns as f64 / 1e9;
         let passivities = vec![None; fingers.len()];
+        let passages = vec![Passage::new(&[]); fingers.len()];
         // Each made anew: a clone of a list without entries has no room.
         let near = fingers.iter().map(|_| Near::new(entities.len())).collect();
         let objects = Objects::new(Manipulation::of_none(&entities), &[], false, period_s);
@@ -97,6 +103,8 @@ impl FastStep {
             carried_W,
             passivities,
             strength: 1.0,
+            doors: Vec::new(),
+            passages,
         }
         .with_effects(Vec::new(), Vec::new())
     }
@@ -106,6 +114,14 @@ impl FastStep {
     pub fn with_effects(mut self, fields: Vec<Field>, guides: Vec<Guide>) -> Self {
         self.effects = Effects::new(fields, guides, &self.entities);
         self.finger_effects = vec![FingerEffects::new(&self.effects); self.fingers.len()];
+        self
+    }
+
+    /// With doors that fingers go through.
+    #[must_use]
+    pub fn with_doors(mut self, doors: Vec<Door>) -> Self {
+        self.passages.fill(Passage::new(&doors));
+        self.doors = doors;
         self
     }
 
@@ -247,11 +263,12 @@ impl FastStep {
                 finger.reach(devices.get(finger.device)?, last_D.as_ref(), dt_s)
             });
         self.objects.reach(&mut self.entities, reaches);
-        let broad_phase = self.objects.broad_phase();
+        let world = World { entities: &self.entities, doors: &self.doors, objects: &self.objects };
         let mut all_carried_W = [Vector3::zeros(); MAX_DEVICES];
         let moved = self.tips_D.iter_mut().zip(&mut self.carried_W).zip(&mut all_carried_W);
-        let states = moved.zip(self.finger_effects.iter_mut().zip(&mut self.near));
-        for ((finger, row), (((tip_D, carried_W), was_carried_W), (felt, near))) in
+        let own = self.near.iter_mut().zip(&mut self.passages);
+        let states = moved.zip(self.finger_effects.iter_mut().zip(own));
+        for ((finger, row), (((tip_D, carried_W), was_carried_W), (felt, own))) in
             self.fingers.iter_mut().zip(&mut row.fingers).zip(states)
         {
             let Some(device) = devices.get(finger.device) else {
@@ -262,7 +279,7 @@ impl FastStep {
             *tip_D = is_valid.then_some(device.position_m_measured);
             *was_carried_W = std::mem::take(carried_W);
             let velocity_W = self.driver_estimates.then(|| finger.velocity_W(device, *was_carried_W / dt_s));
-            *row = finger.step(device, &self.entities, (broad_phase, near), dt_s, velocity_W);
+            *row = finger.step(device, &world, own, dt_s, velocity_W);
             if !self.effects.is_empty() {
                 let hip = is_valid.then_some(Hip { position_W: row.hip, velocity_W });
                 row.force_on_user += finger.feel(felt, &self.effects, &self.entities, hip, moment);
@@ -331,6 +348,9 @@ impl FastStep {
                 felt.reset();
             }
         }
+        if !is_near {
+            self.passages.iter_mut().for_each(Passage::reset);
+        }
         true
     }
 
@@ -344,7 +364,15 @@ impl FastStep {
         }
         self.passivities.iter_mut().flatten().for_each(Passivity::reset);
         self.finger_effects.iter_mut().for_each(FingerEffects::reset);
+        self.passages.iter_mut().for_each(Passage::reset);
     }
+}
+
+/// What fingers step against.
+struct World<'a> {
+    entities: &'a [Entity],
+    doors: &'a [Door],
+    objects: &'a Objects,
 }
 
 /// How fast the devices may be carried through the world while a finger touches: a hand's own fastest.
@@ -371,8 +399,8 @@ impl DeviceFinger {
     fn step(
         &mut self,
         device: &DeviceFrame,
-        entities: &[Entity],
-        (broad_phase, near): (&BroadPhase, &mut Near),
+        world: &World<'_>,
+        (near, passage): (&mut Near, &mut Passage),
         dt_s: f64,
         velocity_W: Option<Vector3<f64>>,
     ) -> FingerRow {
@@ -385,15 +413,23 @@ impl DeviceFinger {
             orientation_wxyz,
             has_orientation: device.flags & DEVICE_ORIENTATION_MEASURED != 0,
             buttons: device.buttons,
+            space: self.finger.space(),
             ..FingerRow::default()
         };
         if device.flags & DEVICE_POSITION_VALID == 0 {
             self.finger.reset();
+            passage.reset();
             return seen;
         }
-        let from = self.finger.last_hip_W().unwrap_or(hip);
-        let near = near.update(broad_phase, &from, &hip, self.finger.radius_m());
-        let output = self.finger.step_near(entities, near, Hip { position_W: hip, velocity_W }, dt_s);
+        let &World { entities, doors, objects } = world;
+        let step = |finger: &mut Finger| {
+            let from = finger.last_hip_W().unwrap_or(hip);
+            let around = (objects.broad_phase(), entities);
+            let near = near.update(around, finger.space(), &from, &hip, finger.radius_m());
+            finger.step_near(entities, near, Hip { position_W: hip, velocity_W }, dt_s)
+        };
+        let moves = |entity| objects.manipulation().is_body(entity);
+        let (output, _) = passage.step(&mut self.finger, (entities, doors), dt_s, moves, step);
         FingerRow {
             god_object: output.god_object_W,
             force_on_user: finite_or_zero(output.force_on_user_W),
@@ -401,6 +437,7 @@ impl DeviceFinger {
             entity: output.entity.map(|index| index as u32),
             feature: output.feature,
             friction: output.friction,
+            space: self.finger.space(),
             ..seen
         }
     }

@@ -96,10 +96,13 @@ impl Recording {
         &self.path
     }
 
-    /// Takes over the entities that others have learnt of since: who reads a table back meets them one by one.
+    /// Takes over the entities and spaces that others have learnt of since: who reads a table back meets them one by one.
     pub fn learn_entities(&mut self, names: &Names) {
         if self.names.entities.len() < names.entities.len() {
             self.names.entities.clone_from(&names.entities);
+        }
+        if self.names.spaces != names.spaces {
+            self.names.spaces.clone_from(&names.spaces);
         }
     }
 
@@ -213,6 +216,7 @@ mod tests {
             bodies: Vec::new(),
             ties: Vec::new(),
             grasp_quality: false,
+            spaces: None,
         }
     }
 

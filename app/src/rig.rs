@@ -1,6 +1,7 @@
 //! From files and arguments to everything a run needs: whatever can be wrong with the input is found here,
 //! before anything is started.
 
+mod doors;
 mod effects;
 mod error;
 mod material;
@@ -24,7 +25,7 @@ use crate::recording::Names;
 use crate::simulated::{SimulatedDevices, base_for_path};
 use haptics::mesh::MeshReport;
 use haptics::passivity::Passivity;
-use haptics::{Algorithm, Entity, Finger, ParameterError};
+use haptics::{Algorithm, Door, Entity, Finger, ParameterError};
 use io_driver::config::{
     Backend, DeviceConfig, DriverConfig, ProcessConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig, Wish,
     Zeroing,
@@ -117,7 +118,7 @@ impl Rig {
         };
         let hand = named.map(|(path, named_by)| check_hand(path, &named_by, &scene)).transpose();
         let hand = problems.keep(hand);
-        let scene = without_what_no_finger_reaches(scene);
+        let scene = doors::without_what_is_only_seen(scene);
         let mut rig = Self {
             scene_file: scene_file.into(),
             models: Models::load(&scene, problems),
@@ -231,6 +232,7 @@ impl Rig {
             self.scene.fingers.iter().map(|finger| problems.keep(self.finger(finger, &entities))).collect();
         let bodies: Vec<(usize, Body)> =
             self.bodies(&entities).filter_map(|body| problems.keep(body)).collect();
+        let doors: Vec<Door> = self.doors().filter_map(|door| problems.keep(door)).collect();
         let (fields, guides) = effects?;
         if !problems.is_empty() {
             return None;
@@ -238,13 +240,14 @@ impl Rig {
         let step = FastStep::new(fingers.into_iter().collect::<Option<_>>()?, entities, self.period_ns);
         let step = if bodies.is_empty() { step } else { problems.keep(self.with_objects(step, &bodies))? };
         let passivities: Vec<Option<Passivity>> = passivities.into_iter().collect::<Option<_>>()?;
-        Some(step.with_effects(fields, guides).with_passivities(passivities))
+        Some(step.with_effects(fields, guides).with_passivities(passivities).with_doors(doors))
     }
 
     fn finger(&self, spec: &SceneFinger, entities: &[Entity]) -> Result<DeviceFinger, RigError> {
         let finger = Finger::new(spec.radius_m, entities.len().min(MOST_NEAR))
             .map_err(|source| self.refused(None, format!("finger {}", spec.name), source))?;
         self.check_felt(entities, spec)?;
+        let finger = finger.within(self.space(spec.within.as_ref()));
         Ok(DeviceFinger { finger, device: spec.device, mount: self.mount(spec.device) })
     }
 
@@ -264,6 +267,7 @@ impl Rig {
             torques: self.scene.fingers.iter().map(has_torque).collect(),
             ties: self.scene.fingers.iter().map(|finger| finger.attach.is_some()).collect(),
             grasp_quality: self.scene.dynamics.grasp_quality,
+            spaces: self.space_names(),
             fingers: self.scene.fingers.iter().map(|finger| finger.name.clone()).collect(),
             entities: self.scene.entities.iter().map(|entity| entity.name.clone()).collect(),
             bodies: self.moving().map(|(_, entity, _)| entity.name.clone()).collect(),
@@ -346,6 +350,7 @@ impl Rig {
             None => entity,
         };
         let entity = if spec.is_collidable { entity } else { entity.without_collisions() };
+        let entity = entity.within(self.space(spec.within.as_ref()));
         if spec.is_haptic { self.with_surface_effects(entity, spec) } else { Ok(entity.without_fingers()) }
     }
 
@@ -444,19 +449,6 @@ const MOST_NEAR: usize = 128;
 fn refused(spec: &SceneEntity, source: ParameterError) -> RigError {
     let (file, what) = (spec.file.to_path_buf(), format!("entity {}", spec.name));
     RigError::Refused { file, line: Some(spec.line), what, source }
-}
-
-/// Fingers do not go through doors yet: what lies behind one would be felt from outside. What is only seen is for the
-/// window; it stays where it has a mass, and moves.
-fn without_what_no_finger_reaches(mut scene: Scene) -> Scene {
-    let behind = scene.entities.iter().filter(|entity| entity.within.is_some()).count();
-    if behind > 0 {
-        say(format_args!(
-            "phantom3: {behind} entities behind doors are left out: in this version fingers do not go through doors"
-        ));
-    }
-    scene.entities.retain(|entity| entity.within.is_none() && (entity.is_met() || entity.motion.is_some()));
-    scene
 }
 
 /// Whether contacts turn it: it has a radius, a pad, or something tied to it.

@@ -47,6 +47,8 @@ pub struct FingerRow {
     pub controlled_n: f64,
     /// Index of the entity that is tied to it; recorded where a button ties.
     pub attached: Option<u32>,
+    /// Which space it is in: 0 the world, otherwise behind a door; recorded where the scene has doors.
+    pub space: u32,
 }
 
 impl Row {

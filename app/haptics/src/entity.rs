@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::Isometry3;
 
 use crate::algorithm::Algorithm;
+use crate::door::WORLD;
 use crate::effects::{Magnetism, Vibration};
 use crate::error::{ParameterError, above_zero, at_least_zero, share};
 use crate::friction::Friction;
@@ -67,6 +68,8 @@ pub struct Entity {
     pub is_haptic: bool,
     /// Whether other entities collide with it.
     pub is_collidable: bool,
+    /// Which space it is in: what is in another one neither feels nor meets it; see [`crate::Door`].
+    pub space: u32,
 }
 
 impl Entity {
@@ -95,6 +98,7 @@ impl Entity {
             for_balls: None,
             is_haptic: true,
             is_collidable: true,
+            space: WORLD,
         })
     }
 
@@ -147,6 +151,11 @@ impl Entity {
     /// One that other entities pass through; fingers may still feel it.
     pub fn without_collisions(self) -> Self {
         Self { is_collidable: false, ..self }
+    }
+
+    /// In this space.
+    pub fn within(self, space: u32) -> Self {
+        Self { space, ..self }
     }
 
     /// With triangles beside its shape where a finger of this radius could not feel it otherwise: a torus whose hole is too

@@ -13,6 +13,7 @@
 use nalgebra::Vector3;
 
 use crate::contact::{Contact, RAMP_IN_S, Slot, Sweep};
+use crate::door::{Crossing, WORLD};
 use crate::entity::Entity;
 use crate::error::{ParameterError, at_least_zero};
 use crate::frame::is_finite;
@@ -26,6 +27,8 @@ use crate::touch_points::TouchPoints;
 #[derive(Debug, Clone)]
 pub struct Finger {
     radius_m: f64,
+    /// Which space it is in.
+    space: u32,
     ramp_in_s: f64,
     previous_hip_W: Option<Vector3<f64>>,
     last_finite_hip_W: Vector3<f64>,
@@ -78,6 +81,7 @@ impl Finger {
         let radius_m = at_least_zero("radius_m", radius_m)?;
         Ok(Self {
             radius_m,
+            space: WORLD,
             ramp_in_s: RAMP_IN_S,
             previous_hip_W: None,
             last_finite_hip_W: Vector3::zeros(),
@@ -104,6 +108,17 @@ impl Finger {
     /// Radius \[m\].
     pub fn radius_m(&self) -> f64 {
         self.radius_m
+    }
+
+    /// In this space; it feels no entity of another one.
+    #[must_use]
+    pub fn within(self, space: u32) -> Self {
+        Self { space, ..self }
+    }
+
+    /// Which space it is in.
+    pub fn space(&self) -> u32 {
+        self.space
     }
 
     /// Where its HIP was in the last step (m); `None` where that was not known.
@@ -165,7 +180,7 @@ impl Finger {
         for at in 0..self.slots.len() {
             let (index, slot) = self.slots.at_mut(at);
             let Some(entity) = entities.get(index) else { continue };
-            if !entity.is_haptic {
+            if !entity.is_haptic || entity.space != self.space {
                 slot.vacate();
                 continue;
             }
@@ -177,6 +192,28 @@ impl Finger {
             }
         }
         total.output(&self.slots, hip_W)
+    }
+
+    /// Goes on in another space: all contacts with this one end, and the next step is one from where the crossing
+    /// says.
+    pub fn go_through(&mut self, crossing: &Crossing) {
+        self.slots.vacate_all();
+        self.space = crossing.to;
+        self.previous_hip_W = Some(crossing.begins_W);
+    }
+
+    /// What it feels now, after contacts of the last tick were [forgotten](Self::forget).
+    pub fn output(&self, entities: &[Entity]) -> FingerOutput {
+        let mut total = Total::default();
+        for slot in self.slots.iter() {
+            if let Some(contact) = &slot.contact {
+                total.add(contact);
+                if let (true, Some(entity)) = (self.radius_m > 0.0, entities.get(contact.entity)) {
+                    total.turn(slot, entity, self.radius_m);
+                }
+            }
+        }
+        total.output(&self.slots, &self.last_finite_hip_W)
     }
 
     /// The contacts of the last tick, in order of their entities.
@@ -204,7 +241,7 @@ impl Finger {
         self.slots.vacate(entity);
     }
 
-    /// Ends all contacts and forgets where the finger was: the next step is a first one.
+    /// Ends all contacts and forgets where the finger was: the next step is a first one, in the same space.
     pub fn reset(&mut self) {
         self.previous_hip_W = None;
         self.slots.vacate_all();

@@ -41,6 +41,7 @@ mod convex;
 mod csg;
 mod cuboid;
 mod cylinder;
+mod door;
 mod effects;
 mod ellipsoid;
 mod entity;
@@ -84,6 +85,7 @@ pub use contact::{Contact, RAMP_IN_S};
 pub use csg::{Csg, CsgError, CsgOp, CsgPart, CsgTree, MAX_DEPTH, MAX_LEAVES, PartShape};
 pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
+pub use door::{Crossing, Door, FADE_S, Passage, SLAB_M, WORLD};
 pub use effects::{
     Effects, Field, FieldKind, FingerEffects, Guide, HYSTERESIS_M, Limits, MAX_PATH_POINTS, MOST_FORCE_N,
     Magnetism, Moment, Reaction, Region, Track, Vibration,

@@ -118,7 +118,9 @@ impl Pairs {
     fn begin(&mut self, body: usize, entity: usize, who: &Who<'_>) {
         let own = who.entities[body];
         let other = who.bodies[entity].map(|other| other as usize);
-        if other == Some(body) || !(who.all[own].is_collidable && who.all[entity].is_collidable) {
+        let (one, two) = (&who.all[own], &who.all[entity]);
+        let meet = one.is_collidable && two.is_collidable && one.space == two.space;
+        if other == Some(body) || !meet {
             return;
         }
         let [first, second] = match other {

@@ -5,7 +5,7 @@ use crate::study::stiffness::bounds::Theory;
 use crate::study::stiffness::case::{Axis, Case, Hand, Mode};
 use crate::study::stiffness::search::Found;
 use crate::study::stiffness::trial::Bench;
-use haptics::{Entity, Finger, Hip};
+use haptics::{Door, Entity, Finger, Hip, Passage, SLAB_M};
 use io_driver::sim::hand::model_file::Firmness;
 use physics::collide::{ContactPoints, PairMemory, Solid, bounding_ball, contact_points, is_collidable};
 use std::collections::BTreeMap;
@@ -18,6 +18,7 @@ pub(super) fn all(rig: &Rig, whole: &Scene, entities: &[Entity]) -> Vec<String> 
     let mut warnings = too_stiff(rig);
     warnings.extend(overlaps(rig, entities));
     warnings.extend(inside(rig, entities));
+    warnings.extend(closed(rig, entities));
     warnings.extend(unseen(whole));
     let unused = whole.templates.iter().filter(|template| template.entities == 0);
     warnings.extend(unused.map(|template| format!("no entity is made from template {}", template.name)));
@@ -100,7 +101,7 @@ fn near_pairs(rig: &Rig, entities: &[Entity], mut meet: impl FnMut(usize, usize)
         for &other in &open {
             let apart = balls[other].zip(balls[next]).is_some_and(|((p, r), (q, s))| (p - q).norm() > r + s);
             match (is_body(next), is_body(other)) {
-                _ if apart => {}
+                _ if apart || entities[other].space != entities[next].space => {}
                 (true, _) => meet(next, other),
                 (false, true) => meet(other, next),
                 _ => {}
@@ -136,7 +137,8 @@ fn depth_of_weight(rig: &Rig, body: usize, entities: &[Entity]) -> f64 {
 /// Fingers that begin inside of something: they are pushed out as the run begins.
 fn inside(rig: &Rig, entities: &[Entity]) -> Vec<String> {
     let touched = |finger: &world::SceneFinger| {
-        let mut probe = Finger::new(finger.radius_m, entities.len()).ok()?;
+        let mut probe =
+            Finger::new(finger.radius_m, entities.len()).ok()?.within(rig.space(finger.within.as_ref()));
         let hip = Hip { position_W: finger.start_m.coords, velocity_W: None };
         probe.step(entities, hip, 1e-3);
         let names: Vec<String> =
@@ -148,6 +150,32 @@ fn inside(rig: &Rig, entities: &[Entity]) -> Vec<String> {
         rig.hand.as_ref().is_none_or(|hand| hand.bounds.get(*index).copied().flatten().is_none())
     };
     rig.scene.fingers.iter().enumerate().filter(rests).filter_map(|(_, finger)| touched(finger)).collect()
+}
+
+/// Doors whose middle nobody comes through.
+fn closed(rig: &Rig, entities: &[Entity]) -> Vec<String> {
+    let by_whom = |door: &Door| {
+        let [front, behind] = door.spaces();
+        let by = |(space, height_m): (u32, f64)| {
+            let mut finger = Finger::new(0.0, entities.len()).ok()?.within(space);
+            let mut passage = Passage::new(std::slice::from_ref(door));
+            for height_m in [height_m, -height_m] {
+                let step =
+                    |finger: &mut Finger| finger.step(entities, &door.before_W(entities, height_m), 1e-3);
+                passage.step(&mut finger, (entities, std::slice::from_ref(door)), 1e-3, |_| false, step);
+                if let Some(contact) = finger.contacts().next() {
+                    return Some(contact.entity);
+                }
+            }
+            None
+        };
+        [(front, TRIED_M), (behind, -TRIED_M)].into_iter().find_map(by)
+    };
+    let told = rig.doors().flatten().filter_map(|door| {
+        let name = |entity: usize| &rig.scene.entities[entity].name;
+        Some(format!("the door of {} is closed by {}", name(door.hull()), name(by_whom(&door)?)))
+    });
+    told.collect()
 }
 
 /// Models that are only seen are not loaded for a run; the window will want them.
@@ -168,4 +196,6 @@ fn unseen(whole: &Scene) -> Vec<String> {
 
 /// A tenth of a millimetre is what rounding in a file leaves.
 const LEAST_DEPTH_M: f64 = 1e-4;
+/// Doors are tried from so far to so far (m).
+const TRIED_M: f64 = 2.0 * SLAB_M;
 const MOST_OVERLAPS: usize = 10;

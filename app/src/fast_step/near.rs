@@ -4,6 +4,7 @@
 //! the HIP has gone a few millimetres or some entity's box has changed.
 //! Invariants: no allocation in `update`; numbers in ascending order.
 
+use haptics::Entity;
 use nalgebra::Vector3;
 use physics::{Aabb, BroadPhase};
 
@@ -11,8 +12,8 @@ use physics::{Aabb, BroadPhase};
 #[derive(Debug)]
 pub(super) struct Near {
     entities: Vec<u32>,
-    /// Where they were looked for, and in which version of the register.
-    looked: Option<(Aabb, u64)>,
+    /// Where they were looked for, in which version of the register and in which space.
+    looked: Option<(Aabb, u64, u32)>,
 }
 
 /// They are looked for so far around the finger (m).
@@ -26,28 +27,32 @@ impl Near {
         Self { entities: Vec::with_capacity(entities), looked: None }
     }
 
-    /// What is near a finger of this radius (m) that has come from there to here.
+    /// What is near a finger of this radius (m), and in its space, that has come from there to here.
     pub(super) fn update(
         &mut self,
-        broad_phase: &BroadPhase,
+        (broad_phase, entities): (&BroadPhase, &[Entity]),
+        space: u32,
         from_W: &Vector3<f64>,
         to_W: &Vector3<f64>,
         radius_m: f64,
     ) -> &[u32] {
         let way = Aabb::of_ball(to_W, radius_m).swept(&(from_W - to_W));
         let version = broad_phase.version();
-        let is_known = |(around, of): &(Aabb, u64)| *of == version && around.contains(&way.grown(LEAST_M));
+        let is_known = |(around, of, within): &(Aabb, u64, u32)| {
+            (*of, *within) == (version, space) && around.contains(&way.grown(LEAST_M))
+        };
         if !self.looked.as_ref().is_some_and(is_known) {
             let around = way.grown(AROUND_M);
-            let entities = &mut self.entities;
-            entities.clear();
+            let found = &mut self.entities;
+            found.clear();
             broad_phase.near(&around, |entity| {
-                if entities.len() < entities.capacity() {
-                    entities.push(entity as u32);
+                let is_here = entities.get(entity).is_some_and(|entity| entity.space == space);
+                if is_here && found.len() < found.capacity() {
+                    found.push(entity as u32);
                 }
             });
-            entities.sort_unstable();
-            self.looked = Some((around, version));
+            found.sort_unstable();
+            self.looked = Some((around, version, space));
         }
         &self.entities
     }
@@ -56,7 +61,7 @@ impl Near {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use haptics::{Entity, Plane, Sphere};
+    use haptics::{Plane, Sphere};
     use nalgebra::Isometry3;
 
     /// A floor, and balls of 10 mm along x, 0.1 m from each other.
@@ -76,12 +81,21 @@ mod tests {
 
     #[test]
     fn what_is_near_is_what_has_no_end_and_what_the_way_comes_to() {
-        let broad_phase = BroadPhase::new(&entities());
+        let entities = entities();
+        let broad_phase = BroadPhase::new(&entities);
         let mut near = Near::new(11);
-        assert_eq!(near.update(&broad_phase, &at(0.05), &at(0.05), 0.0), [0]);
-        assert_eq!(near.update(&broad_phase, &at(0.05), &at(0.075), 0.0), [0, 2]);
-        assert_eq!(near.update(&broad_phase, &at(0.075), &at(0.375), 0.0), [0, 2, 3, 4, 5], "a leap");
-        assert_eq!(near.update(&broad_phase, &at(0.55), &at(0.55), 0.03), [0, 6, 7], "a ball of 30 mm");
+        assert_eq!(near.update((&broad_phase, &entities), 0, &at(0.05), &at(0.05), 0.0), [0]);
+        assert_eq!(near.update((&broad_phase, &entities), 0, &at(0.05), &at(0.075), 0.0), [0, 2]);
+        assert_eq!(
+            near.update((&broad_phase, &entities), 0, &at(0.075), &at(0.375), 0.0),
+            [0, 2, 3, 4, 5],
+            "a leap"
+        );
+        assert_eq!(
+            near.update((&broad_phase, &entities), 0, &at(0.55), &at(0.55), 0.03),
+            [0, 6, 7],
+            "a ball of 30 mm"
+        );
     }
 
     #[test]
@@ -89,9 +103,20 @@ mod tests {
         let mut entities = entities();
         let mut broad_phase = BroadPhase::new(&entities);
         let mut near = Near::new(11);
-        assert_eq!(near.update(&broad_phase, &at(0.05), &at(0.05), 0.0), [0]);
+        assert_eq!(near.update((&broad_phase, &entities), 0, &at(0.05), &at(0.05), 0.0), [0]);
         entities[10].move_to(Isometry3::translation(0.05, 0.03, 0.0));
         broad_phase.moved(10, &entities[10], &Vector3::zeros());
-        assert_eq!(near.update(&broad_phase, &at(0.05), &at(0.05), 0.0), [0, 10]);
+        assert_eq!(near.update((&broad_phase, &entities), 0, &at(0.05), &at(0.05), 0.0), [0, 10]);
+    }
+
+    #[test]
+    fn what_is_in_another_space_is_not_near() {
+        let mut entities = entities();
+        entities[1] = entities[1].clone().within(1);
+        let broad_phase = BroadPhase::new(&entities);
+        let mut near = Near::new(11);
+        let mut update =
+            |space| near.update((&broad_phase, &entities), space, &at(0.05), &at(0.06), 0.03).to_vec();
+        assert_eq!((update(0), update(1)), (vec![0, 2], vec![1]), "from one tick to the next");
     }
 }

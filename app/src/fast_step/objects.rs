@@ -262,9 +262,11 @@ impl Objects {
         for ((tick, button), (row, finger)) in
             self.ticks.iter_mut().zip(&self.buttons).zip(rows.iter().zip(fingers))
         {
+            // What is tied to a finger does not follow it through a door.
+            let is_left = tick.attached.is_some_and(|tied| entities[tied].space != finger.finger.space());
             *tick = FingerTick {
                 gimbal: row.has_orientation.then(|| orientation(row.orientation_wxyz)),
-                is_button_held: button.is_some_and(|button| row.buttons >> button & 1 == 1),
+                is_button_held: !is_left && button.is_some_and(|button| row.buttons >> button & 1 == 1),
                 // One that is lost holds nothing.
                 ..FingerTick::at(finger.finger.last_hip_W().unwrap_or_else(|| Vector3::repeat(f64::NAN)))
             };

@@ -21,6 +21,8 @@ pub struct EventTeller {
     /// Of each body, whether another thread has it.
     elsewhere: Vec<bool>,
     handed: Handed,
+    /// In which space each finger was.
+    spaces: Vec<u32>,
 }
 
 impl EventTeller {
@@ -35,6 +37,7 @@ impl EventTeller {
             touching: Vec::with_capacity(MOST_TOUCHED),
             elsewhere: (0..bodies).map(|body| manipulation.standing(body) == Standing::Elsewhere).collect(),
             handed: Handed::default(),
+            spaces: step.fingers.iter().map(|finger| finger.finger.space()).collect(),
         }
     }
 
@@ -46,6 +49,7 @@ impl EventTeller {
             self.watch.finger(finger, &self.touching, row.buttons, row.attached, &mut self.out);
         }
         self.watch.grasps(&mut self.out);
+        self.tell_doors(step);
         self.tell_pairs(step);
         for parked in step.parked_now() {
             let why = match parked.why {
@@ -68,6 +72,16 @@ impl EventTeller {
                 slips: ContactState::from(contact.friction) == ContactState::Slip,
                 is_body,
             });
+        }
+    }
+
+    fn tell_doors(&mut self, step: &FastStep) {
+        for ((finger, own), was) in (0..).zip(&step.fingers).zip(&mut self.spaces) {
+            let to = own.finger.space();
+            let from = std::mem::replace(was, to);
+            if from != to {
+                self.watch.tell(Kind::Door { finger, from, to }, &mut self.out);
+            }
         }
     }
 

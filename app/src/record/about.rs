@@ -150,6 +150,7 @@ pub(super) fn columns_of(names: &Names) -> BTreeMap<String, String> {
         ("torques", json!(names.torques)),
         ("ties", json!(names.ties)),
         ("grasp_quality", json!(names.grasp_quality)),
+        ("spaces", json!(names.spaces)),
         ("fields", json!(super::schema::field_names(names))),
     ]
     .map(|(name, value)| (name.to_owned(), value.to_string()))
@@ -172,6 +173,8 @@ pub(super) fn names_of(facts: &BTreeMap<String, String>) -> Option<Names> {
         bodies: words("objects")?,
         ties: flags("ties")?,
         grasp_quality: list("grasp_quality")?.as_bool()?,
+        // Not in recordings of before there were doors.
+        spaces: words("spaces"),
     })
 }
 
@@ -197,6 +200,7 @@ mod tests {
             bodies: vec![],
             ties: vec![false, false],
             grasp_quality: true,
+            spaces: Some(vec!["inside".into()]),
         };
         let facts = columns_of(&names);
         assert_eq!(names_of(&facts), Some(names));

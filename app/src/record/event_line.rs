@@ -6,7 +6,7 @@ use serde_json::Value;
 use world::events::Event;
 
 /// The keys, in order; a table's header.
-pub(super) const KEYS: [&str; 15] = [
+pub(super) const KEYS: [&str; 17] = [
     "tick",
     "t_s",
     "kind",
@@ -22,6 +22,8 @@ pub(super) const KEYS: [&str; 15] = [
     "lasted_s",
     "number",
     "text",
+    "from",
+    "to",
 ];
 
 /// What an event says, in the order of [`KEYS`]; null where it says nothing.
@@ -31,6 +33,9 @@ fn values(event: &Event, names: &Names, period_ns: u64) -> [Value; KEYS.len()] {
         |of: fn(&world::events::Life) -> f64| facts.life.as_ref().map_or(Value::Null, |life| of(life).into());
     let text = |text: &str| if text.is_empty() { Value::Null } else { text.into() };
     let entity = |entity: Option<u32>| text(names.entity(entity));
+    // The world's name is empty.
+    let space =
+        |of: fn([u32; 2]) -> u32| facts.spaces.map_or(Value::Null, |spaces| names.space(of(spaces)).into());
     let lasted_s = facts.life.map(|life| life.lasted_s).or(facts.lasted_s);
     [
         event.run_tick.into(),
@@ -48,6 +53,8 @@ fn values(event: &Event, names: &Names, period_ns: u64) -> [Value; KEYS.len()] {
         lasted_s.into(),
         facts.number.into(),
         text(facts.text),
+        space(|[from, _]| from),
+        space(|[_, to]| to),
     ]
 }
 

@@ -165,7 +165,10 @@ impl McapFile {
         let facts = happened.kind.facts();
         let mut message = self.begin_event(happened.run_tick, facts.word);
         let held_by;
-        let text = if facts.holders == 0 {
+        let text = if let Some([from, to]) = facts.spaces {
+            held_by = format!("{}>{}", self.names.space(from), self.names.space(to));
+            &held_by
+        } else if facts.holders == 0 {
             facts.text
         } else {
             held_by = holders(facts.holders, &self.names.fingers);

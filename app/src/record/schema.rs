@@ -63,6 +63,7 @@ pub(super) mod finger {
     pub(in crate::record) const ENERGY: u32 = 12;
     pub(in crate::record) const CONTROLLED: u32 = 13;
     pub(in crate::record) const ATTACHED: u32 = 14;
+    pub(in crate::record) const SPACE: u32 = 15;
 }
 
 /// Fields of `phantom3.Object`.
@@ -112,6 +113,7 @@ pub(super) fn descriptors(names: &Names) -> Vec<u8> {
             (finger::ENERGY, "energy", Double),
             (finger::CONTROLLED, "controlled", Double),
             (finger::ATTACHED, "attached", Text),
+            (finger::SPACE, "space", Text),
         ],
     );
     let object = MessageType::new(

@@ -51,6 +51,9 @@ fn write_finger(out: &mut Message, row: &FingerRow, index: usize, names: &Names)
     if names.ties(index) {
         out.text(finger::ATTACHED, names.entity(row.attached));
     }
+    if names.spaces.is_some() {
+        out.text(finger::SPACE, names.space(row.space));
+    }
 }
 
 fn write_body(out: &mut Message, body: &BodyRow, tells_grasp: bool) {
@@ -93,6 +96,11 @@ fn read_finger(message: &[u8], index: usize, names: &Names) -> Option<FingerRow>
         let name = value.text()?;
         Some(names.entities.iter().position(|other| other == name)? as u32)
     };
+    // The world has no name, and is not written.
+    let space = |value: Value<'_>| {
+        let name = value.text()?;
+        Some(names.spaces.as_ref()?.iter().position(|other| other == name)? as u32 + 1)
+    };
     each_field(message, |field, value| {
         match field {
             finger::HIP => row.hip = vector(value)?,
@@ -112,6 +120,7 @@ fn read_finger(message: &[u8], index: usize, names: &Names) -> Option<FingerRow>
             finger::ENERGY => row.energy_j = value.double()?,
             finger::CONTROLLED => row.controlled_n = value.double()?,
             finger::ATTACHED => row.attached = Some(entity(value)?),
+            finger::SPACE => row.space = space(value)?,
             // Of a later version.
             _ => {}
         }
@@ -178,6 +187,7 @@ mod tests {
             bodies: vec!["cube".into()],
             ties: vec![false, true],
             grasp_quality: true,
+            spaces: Some(vec!["hall".into(), "inside".into()]),
         }
     }
 
@@ -213,7 +223,7 @@ mod tests {
         (row.fingers[0].energy_j, row.fingers[0].controlled_n) = (-1.5e-3, 0.25);
         let b = &mut row.fingers[1];
         (b.orientation_wxyz, b.has_orientation) = ([0.5, -0.5, 0.5, -0.0], true);
-        (b.buttons, b.attached) = (u64::MAX, Some(1));
+        (b.buttons, b.attached, b.space) = (u64::MAX, Some(1), 2);
         let bodies = [BodyRow {
             position: number(7),
             orientation: Quaternion::new(0.5, -0.5, 0.5, 0.5),

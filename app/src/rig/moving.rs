@@ -91,7 +91,7 @@ impl Rig {
         for (index, (entity, spec)) in entities.iter().zip(&self.scene.entities).enumerate() {
             if entity.is_collidable {
                 let is_body = spec.motion.is_some();
-                let key = (collide::name(&entity.shape), can_move(&entity.shape), is_body);
+                let key = (collide::name(&entity.shape), can_move(&entity.shape), is_body, entity.space);
                 match kinds.iter_mut().find(|kind| kind.key == key) {
                     Some(kind) => kind.members.push(index),
                     None => kinds.push(Kind { key, shape: &entity.shape, members: vec![index] }),
@@ -100,7 +100,11 @@ impl Rig {
         }
         let passes = |a: &Kind<'_>, b: &Kind<'_>| {
             let alone = std::ptr::eq(a, b) && a.members.len() == 1;
-            !(alone || is_collidable(a.shape, b.shape) || b.key.2 && is_collidable(b.shape, a.shape))
+            let is_elsewhere = a.key.3 != b.key.3;
+            !(alone
+                || is_elsewhere
+                || is_collidable(a.shape, b.shape)
+                || b.key.2 && is_collidable(b.shape, a.shape))
         };
         let passing = kinds.iter().filter(|a| a.key.2).filter_map(|a| {
             let through: Vec<String> =
@@ -146,8 +150,8 @@ pub struct Passing {
 
 /// Entities that are all alike for the question whether two can meet.
 struct Kind<'e> {
-    /// The shape's name, whether it could move, whether it does.
-    key: (&'static str, bool, bool),
+    /// The shape's name, whether it could move, whether it does, and in which space.
+    key: (&'static str, bool, bool, u32),
     shape: &'e Shape,
     members: Vec<usize>,
 }

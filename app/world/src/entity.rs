@@ -202,7 +202,7 @@ impl SceneEntity {
     }
 }
 
-fn read_within(table: &Table<'_>) -> Result<Option<String>, SceneError> {
+pub(crate) fn read_within(table: &Table<'_>) -> Result<Option<String>, SceneError> {
     let Some(value) = table.get("within") else { return Ok(None) };
     value.text("the name of an [[environment]] with a door").map(|name| Some(name.to_owned()))
 }

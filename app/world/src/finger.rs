@@ -6,6 +6,7 @@ use nalgebra::Point3;
 
 use crate::MAX_DEVICES;
 use crate::attach::AttachSpec;
+use crate::entity::read_within;
 use crate::error::SceneError;
 use crate::names::Names;
 use crate::passivity::PassivitySpec;
@@ -31,6 +32,10 @@ pub struct SceneFinger {
     pub soft: Option<SoftSpec>,
     /// How it ties objects to itself; default it does not.
     pub attach: Option<AttachSpec>,
+    /// The environment behind whose door it begins; default in the world outside.
+    pub within: Option<String>,
+    /// Where in the scene's file; counted from 1.
+    pub line: usize,
 }
 
 impl SceneFinger {
@@ -62,6 +67,8 @@ impl SceneFinger {
             passivity: PassivitySpec::read(table)?,
             soft: SoftSpec::read(table)?,
             attach: AttachSpec::read(table)?,
+            within: read_within(table)?,
+            line: table.document().line(table.offset()),
         })
     }
 }
@@ -87,6 +94,6 @@ fn claim_device(
 }
 
 const KEYS: Vocabulary = Vocabulary {
-    available: &["name", "radius_m", "start_m", "device", "passivity", "soft", "attach"],
+    available: &["name", "radius_m", "start_m", "device", "passivity", "soft", "attach", "within"],
     later: &[],
 };

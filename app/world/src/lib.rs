@@ -63,6 +63,7 @@ mod pose;
 mod problems;
 mod reader;
 mod scene;
+pub mod seen;
 mod settings;
 mod shading;
 mod shape;

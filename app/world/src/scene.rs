@@ -121,7 +121,7 @@ impl Scene {
         let hand = problems.keep(read_hand(table));
         let fingers = SceneFinger::read_all(table, problems);
         let response = dynamics.unwrap_or_default().response;
-        let things = Things::read(tables, response, problems);
+        let things = Things::read(tables, &fingers, response, problems);
         let (fields, guides) =
             (problems.keep(FieldSpec::read_all(table)), problems.keep(GuideSpec::read_all(table)));
         Some(Self {

@@ -7,6 +7,7 @@ use crate::dynamics::ResponseSpec;
 use crate::entity::SceneEntity;
 use crate::environment::SceneEnvironment;
 use crate::error::SceneError;
+use crate::finger::SceneFinger;
 use crate::grid::MAX_ENTITIES;
 use crate::light::SceneLight;
 use crate::names::Names;
@@ -27,7 +28,12 @@ pub(crate) struct Things {
 }
 
 impl Things {
-    pub(crate) fn read<'d>(files: &[Table<'d>], response: ResponseSpec, problems: &mut Problems) -> Self {
+    pub(crate) fn read<'d>(
+        files: &[Table<'d>],
+        fingers: &[SceneFinger],
+        response: ResponseSpec,
+        problems: &mut Problems,
+    ) -> Self {
         let mut templates = read_templates(files, response, problems);
         let mut things = Self { response, ..Self::default() };
         let mut names = Names::default();
@@ -35,6 +41,8 @@ impl Things {
         things.read_entities(&entities, &mut templates, &mut names, problems);
         let environments = all(files, "environment", problems);
         things.read_environments(&environments, &mut names, problems);
+        things.check_within(fingers, files, problems);
+        things.check_hulls(problems);
         let (mut of_lights, mut of_cameras) = (Names::default(), Names::default());
         for (i, table) in all(files, "light", problems).iter().enumerate() {
             things.lights.extend(problems.keep(SceneLight::read(table, i, &mut of_lights)));
@@ -82,24 +90,37 @@ impl Things {
             }
             self.environments.extend(read);
         }
-        self.check_within(problems);
     }
 
     /// What is within an environment is behind its door.
-    fn check_within(&self, problems: &mut Problems) {
-        for entity in &self.entities {
-            let Some(within) = &entity.within else { continue };
+    fn check_within(&self, fingers: &[SceneFinger], files: &[Table<'_>], problems: &mut Problems) {
+        let scene = files.first().map(|table| table.document().file());
+        let of_entities = self.entities.iter().map(|entity| (&*entity.file, entity.line, &entity.within));
+        let of_fingers = fingers.iter().filter_map(|finger| Some((scene?, finger.line, &finger.within)));
+        for (file, line, within) in of_entities.chain(of_fingers) {
+            let Some(within) = within else { continue };
             let with_door = || self.environments.iter().filter(|environment| environment.door.is_some());
             if with_door().all(|environment| environment.name != *within) {
-                let at = crate::Location {
-                    file: entity.file.to_path_buf(),
-                    line: entity.line,
-                    key: "within".into(),
-                };
+                let at = crate::Location { file: file.to_path_buf(), line, key: "within".into() };
                 let found = format!("{}, which no [[environment]] with a door is called", quoted(within));
                 let allowed = listed(with_door().map(|environment| environment.name.as_str()));
                 problems.note(SceneError::NoSuchName { at: Box::new(at), found, allowed });
             }
+        }
+    }
+
+    /// Nobody comes to a door that is behind itself.
+    fn check_hulls(&self, problems: &mut Problems) {
+        for environment in &self.environments {
+            let of = environment.door.as_ref().map(|door| &door.of);
+            let hull = self.entities.iter().find(|entity| Some(&entity.name) == of);
+            let Some(hull) = hull.filter(|hull| hull.within.as_ref() == Some(&environment.name)) else {
+                continue;
+            };
+            let at = crate::Location { file: hull.file.to_path_buf(), line: hull.line, key: "within".into() };
+            let found = format!("{}, whose door this entity has", quoted(&environment.name));
+            let allowed = "the world, or another environment".into();
+            problems.note(SceneError::NoSuchName { at: Box::new(at), found, allowed });
         }
     }
 }

@@ -195,6 +195,13 @@ fn what_is_wrong_with_them_is_told_with_line_and_key() {
             "s.toml:4: environment[0].door.of: found \"hull\", which no entity is called; allowed: environment0",
         ),
         (
+            format!(
+                "{}[[environment]]\nname = \"inside\"\nkind = \"plane\"\ndoor = {{ of = \"ball\", size_m = [1, 1] }}\n",
+                ball("within = \"inside\"")
+            ),
+            "s.toml:2: within: found \"inside\", whose door this entity has; allowed: the world, or another environment",
+        ),
+        (
             "[[camera]]\nnear_m = 1\nfar_m = 0.5\n".to_owned(),
             "s.toml:4: camera[0].far_m: found 0.5; allowed: a number above near_m = 1",
         ),

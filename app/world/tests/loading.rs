@@ -61,7 +61,7 @@ fn lines_are_counted_right_after_a_byte_order_mark_and_windows_line_ends() {
     assert_eq!(
         message,
         "dir/s.toml:3: finger[0].radius: unknown key (did you mean `radius_m`?); allowed: name, \
-         radius_m, start_m, device, passivity, soft, attach"
+         radius_m, start_m, device, passivity, soft, attach, within"
     );
 }
 

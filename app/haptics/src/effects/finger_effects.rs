@@ -162,7 +162,9 @@ impl FingerEffects {
     ) -> Pull {
         let mut total = Pull::default();
         for &index in &effects.magnetic {
-            let Some(entity) = entities.get(index) else { continue };
+            let Some(entity) = entities.get(index).filter(|entity| entity.space == finger.space()) else {
+                continue;
+            };
             if let (Some(magnetism), None) = (&entity.magnetism, finger.contact(index))
                 && let Some((pull, reaction)) = magnetism.pull((index, entity), hip_W, finger.radius_m())
             {

@@ -99,8 +99,13 @@ impl CsvRows {
         if cells.len() != self.columns.len() {
             return Err(format!("found {} cells, expected {}", cells.len(), self.columns.len()));
         }
-        let mut cells =
-            Cells { cells: &cells, columns: &self.columns, at: 0, entities: &mut self.names.entities };
+        let mut cells = Cells {
+            cells: &cells,
+            columns: &self.columns,
+            at: 0,
+            entities: &mut self.names.entities,
+            spaces: &mut self.names.spaces,
+        };
         let t_s = cells.number()?;
         let ticks = (t_s * 1e9 / self.period_ns as f64).round();
         let mut row = Row { run_tick: ticks as u64, ..Row::empty() };
@@ -136,6 +141,7 @@ struct Cells<'a> {
     columns: &'a [Column],
     at: usize,
     entities: &'a mut Vec<String>,
+    spaces: &'a mut Option<Vec<String>>,
 }
 
 impl Cells<'_> {
@@ -180,6 +186,20 @@ impl Cells<'_> {
         Some(index as u32)
     }
 
+    fn space(&mut self) -> u32 {
+        if self.spaces.is_none() {
+            return 0;
+        }
+        let name = self.take().0.to_owned();
+        let Some(spaces) = self.spaces.as_mut().filter(|_| !name.is_empty()) else { return 0 };
+        let known = spaces.iter().position(|space| *space == name);
+        let index = known.unwrap_or_else(|| {
+            spaces.push(name);
+            spaces.len() - 1
+        });
+        index as u32 + 1
+    }
+
     fn word<T>(&mut self, named: fn(&str) -> Option<T>) -> Result<T, String> {
         let (cell, column) = self.take();
         named(cell).ok_or_else(|| format!("{} is {cell:?}, which is no word for it", column.name))
@@ -213,6 +233,7 @@ impl Cells<'_> {
         if is(shape.ties) {
             row.attached = self.entity();
         }
+        row.space = self.space();
         Ok(row)
     }
 
@@ -256,6 +277,7 @@ fn names_in(header: &str) -> Names {
         torques: each("torque_x"),
         ties: each("attached"),
         grasp_quality: all[end..].iter().any(|column| column.ends_with("_closure")),
+        spaces: each("space").contains(&true).then(Vec::new),
         entities: Vec::new(),
         fingers,
         bodies,

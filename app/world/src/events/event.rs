@@ -98,6 +98,16 @@ pub enum Kind {
         /// Its number.
         number: u32,
     },
+    /// A finger went through a door: from one space into another. 0 is the world, `i + 1` behind the door of the scene's
+    /// environment `i`.
+    Door {
+        /// Which finger.
+        finger: u32,
+        /// Where it was.
+        from: u32,
+        /// Where it is.
+        to: u32,
+    },
     /// The scene was put back to its beginning.
     Reset,
     /// So many events are missing here: whoever takes them was too slow.
@@ -184,6 +194,8 @@ pub enum Class {
     Key,
     /// [`Kind::Trial`].
     Trial,
+    /// [`Kind::Door`].
+    Door,
     /// [`Kind::Reset`].
     Reset,
     /// [`Kind::Lost`].
@@ -192,7 +204,7 @@ pub enum Class {
 
 impl Class {
     /// All of them, with their words.
-    pub const ALL: [(Self, &str); 12] = [
+    pub const ALL: [(Self, &str); 13] = [
         (Self::Contact, "contacts"),
         (Self::Slip, "slips"),
         (Self::Pair, "pairs"),
@@ -203,6 +215,7 @@ impl Class {
         (Self::Button, "buttons"),
         (Self::Key, "keys"),
         (Self::Trial, "trials"),
+        (Self::Door, "doors"),
         (Self::Reset, "resets"),
         (Self::Lost, "lost"),
     ];
@@ -227,6 +240,8 @@ pub struct Facts {
     pub lasted_s: Option<f64>,
     /// A number: of the button, the key, the trial; how many were lost.
     pub number: Option<u64>,
+    /// From which space into which.
+    pub spaces: Option<[u32; 2]>,
     /// Which list, or why.
     pub text: &'static str,
 }
@@ -242,6 +257,7 @@ impl Facts {
             life: None,
             lasted_s: None,
             number: None,
+            spaces: None,
             text: "",
         }
     }
@@ -261,6 +277,7 @@ impl Kind {
             Self::Button { .. } => Class::Button,
             Self::Key { .. } => Class::Key,
             Self::Trial { .. } => Class::Trial,
+            Self::Door { .. } => Class::Door,
             Self::Reset => Class::Reset,
             Self::Lost { .. } => Class::Lost,
         }
@@ -312,6 +329,9 @@ impl Kind {
             Self::Trial { change, number } => {
                 let word = if change == Change::Ends { "trial-end" } else { "trial-begin" };
                 Facts { number: Some(number.into()), ..of(word) }
+            }
+            Self::Door { finger, from, to } => {
+                Facts { finger: Some(finger), spaces: Some([from, to]), ..of("door") }
             }
             Self::Reset => of("reset"),
             Self::Lost { count } => Facts { number: Some(count), ..of("events-lost") },
