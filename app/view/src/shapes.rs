@@ -2,7 +2,7 @@
 
 use crate::solids;
 use crate::triangles::{Ring, Triangles};
-use haptics::{Shape, mesh::Mesh};
+use haptics::Shape;
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use std::f64::consts::{PI, TAU};
 use world::ShapeSpec;
@@ -39,7 +39,10 @@ pub fn triangles(spec: &ShapeSpec, model: Option<&Shape>) -> Option<Triangles> {
 
 fn modelled(shape: &Shape) -> Option<Triangles> {
     match shape {
-        Shape::Mesh(mesh) => Some(mesh_triangles(mesh)),
+        Shape::Mesh(mesh) => {
+            let faces: Vec<[u32; 3]> = mesh.faces().iter().map(|face| face.vertices).collect();
+            Some(smooth(mesh.vertices(), &faces))
+        }
         Shape::Nurbs(nurbs) => Some(patches(nurbs)),
         Shape::Csg(csg) => Some(solids::triangles(csg)),
         _ => None,
@@ -110,26 +113,26 @@ fn torus(ring_m: f64, tube_m: f64) -> Triangles {
     Triangles::revolved(&(0..=ACROSS).map(ring).collect::<Vec<_>>(), AROUND)
 }
 
-/// Smooth where its faces meet at a small angle; sharp edges stay sharp.
-fn mesh_triangles(mesh: &Mesh) -> Triangles {
-    let mut made = Triangles::default();
-    let normal_of = |face: &haptics::mesh::Face| {
-        let [a, b, c] = face.vertices.map(|vertex| mesh.vertices()[vertex as usize]);
+/// Smooth where faces meet at a small angle; sharp edges stay sharp.
+pub(crate) fn smooth(vertices: &[Vector3<f64>], faces: &[[u32; 3]]) -> Triangles {
+    let normal_of = |face: &[u32; 3]| {
+        let [a, b, c] = face.map(|vertex| vertices[vertex as usize]);
         (b - a).cross(&(c - a))
     };
-    let mut around: Vec<Vec<Vector3<f64>>> = vec![Vec::new(); mesh.vertices().len()];
-    for face in mesh.faces() {
+    let mut around: Vec<Vec<Vector3<f64>>> = vec![Vec::new(); vertices.len()];
+    for face in faces {
         let weighted = normal_of(face);
-        face.vertices.iter().for_each(|vertex| around[*vertex as usize].push(weighted));
+        face.iter().for_each(|vertex| around[*vertex as usize].push(weighted));
     }
-    let least_cos = CREASE_RAD.cos();
-    for face in mesh.faces() {
-        let own = normal_of(face).normalize();
+    let (mut made, least_cos) = (Triangles::default(), CREASE_RAD.cos());
+    for face in faces {
+        // What has no area is not seen.
+        let Some(own) = normal_of(face).try_normalize(0.0) else { continue };
         let first = made.places.len() as u32;
-        for vertex in face.vertices {
+        for vertex in face {
             let alike = |other: &&Vector3<f64>| other.dot(&own) >= least_cos * other.norm();
-            let sum: Vector3<f64> = around[vertex as usize].iter().filter(alike).sum();
-            made.places.push(mesh.vertices()[vertex as usize].into());
+            let sum: Vector3<f64> = around[*vertex as usize].iter().filter(alike).sum();
+            made.places.push(vertices[*vertex as usize].into());
             made.normals.push(sum.try_normalize(0.0).unwrap_or(own));
         }
         made.corners.push([first, first + 1, first + 2]);

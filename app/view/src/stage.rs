@@ -2,10 +2,11 @@
 
 use crate::shapes;
 use crate::triangles::Triangles;
-use haptics::Entity;
+use haptics::mesh::TriangleSoup;
+use haptics::{Entity, Shape};
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::sync::Arc;
-use world::{LightKind, Scene, SceneCamera, SceneLight};
+use world::{LightKind, Scene, SceneCamera, SceneLight, SeenForm, SeenPart, ShapeSpec};
 
 /// What can be seen.
 #[derive(Debug, Clone, Default)]
@@ -38,40 +39,29 @@ pub struct Thing {
 }
 
 impl Stage {
-    /// Of a scene whose entities are these, in the same order.
+    /// Of a scene whose entities, as they are felt, are these, in the same order.
     pub fn new(scene: &Scene, entities: &[Entity]) -> Self {
-        let mut stage = Self {
-            lights: scene.lights.clone(),
-            cameras: scene.cameras.clone(),
-            radii_m: scene.fingers.iter().map(|finger| finger.radius_m).collect(),
-            ..Self::default()
-        };
-        for (index, (spec, entity)) in scene.entities.iter().zip(entities).enumerate() {
-            for visual in &spec.visuals {
-                let (shape, model) = match &visual.shape {
-                    Some(own) => (own, None),
-                    None => (&spec.shape, Some(&entity.shape)),
-                };
-                let alike = stage.things.iter().find(|thing| {
-                    let other = &scene.entities[thing.entity];
-                    visual.shape.is_none()
-                        && other.visuals.iter().all(|v| v.shape.is_none())
-                        && other.shape == *shape
-                });
-                let triangles = match alike {
-                    Some(thing) => Some(Arc::clone(&thing.triangles)),
-                    None => shapes::triangles(shape, model).map(Arc::new),
-                };
-                match triangles {
-                    Some(triangles) => stage.things.push(Thing {
-                        entity: index,
-                        triangles,
-                        pose: visual.pose,
-                        colour: visual.colour,
-                        casts_shadow: visual.casts_shadow,
-                    }),
-                    None => stage.not_drawn.push(format!("{}: its {} is not there", spec.name, shape.kind())),
-                }
+        let seen = scene.seen();
+        let radii_m = scene.fingers.iter().map(|finger| finger.radius_m).collect();
+        let mut stage =
+            Self { lights: seen.lights.to_vec(), cameras: seen.cameras.to_vec(), radii_m, ..Self::default() };
+        let told = seen.unreadable.iter().map(|(at, why)| format!("{at}: {why}"));
+        stage.not_drawn.extend(told);
+        let mut looks = Looks::default();
+        for part in &seen.parts {
+            let index = scene.entities.iter().position(|spec| std::ptr::eq(spec, part.entity)).unwrap_or(0);
+            let felt = entities.get(index).map(|entity| &entity.shape);
+            match looks.of(part, felt) {
+                Some(triangles) => stage.things.push(Thing {
+                    entity: index,
+                    triangles,
+                    pose: part.X_BV,
+                    colour: part.colour,
+                    casts_shadow: part.casts_shadow,
+                }),
+                None => stage
+                    .not_drawn
+                    .push(format!("{}: what it is drawn as has no triangles", part.entity.name)),
             }
         }
         if stage.lights.is_empty() {
@@ -81,6 +71,41 @@ impl Stage {
             stage.cameras = vec![usual_camera(scene, entities)];
         }
         stage
+    }
+}
+
+/// The triangles made so far: what looks alike shares them.
+#[derive(Default)]
+struct Looks<'s> {
+    files: Vec<(*const TriangleSoup, [f64; 3], Arc<Triangles>)>,
+    shapes: Vec<(&'s ShapeSpec, Arc<Triangles>)>,
+}
+
+impl<'s> Looks<'s> {
+    fn of(&mut self, part: &SeenPart<'s>, felt: Option<&Shape>) -> Option<Arc<Triangles>> {
+        match &part.form {
+            SeenForm::Triangles { soup, scale } => {
+                let alike = |(of, by, _): &&(*const TriangleSoup, [f64; 3], _)| {
+                    *of == Arc::as_ptr(soup) && by == scale
+                };
+                if let Some((.., made)) = self.files.iter().find(alike) {
+                    return Some(Arc::clone(made));
+                }
+                let made = Arc::new(shapes::smooth(&soup.vertices, &soup.faces).scaled(&(*scale).into()));
+                self.files.push((Arc::as_ptr(soup), *scale, Arc::clone(&made)));
+                Some(made)
+            }
+            SeenForm::Shape(spec) => {
+                if let Some((_, made)) = self.shapes.iter().find(|(of, _)| of == spec) {
+                    return Some(Arc::clone(made));
+                }
+                // What only a model knows is known of what is felt.
+                let model = felt.filter(|_| std::ptr::eq(*spec, &raw const part.entity.shape));
+                let made = Arc::new(shapes::triangles(spec, model)?);
+                self.shapes.push((spec, Arc::clone(&made)));
+                Some(made)
+            }
+        }
     }
 }
 
