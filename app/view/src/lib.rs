@@ -1,0 +1,27 @@
+//! Pictures of what fingers feel.
+//!
+//! Model: a [`Stage`] is what can be seen of a scene and does not change; a [`Moment`] is where everything is and what the
+//! fingers feel at one time. A [`Painter`](painter::Painter) draws moments of a stage in a graphics context: a window's, or one
+//! without a display ([`picture::Studio`]). Lights, cameras and colours are the scene's.
+//!
+//! Nothing here runs in a tick. A machine without graphics libraries builds and runs it; pictures are then missing, and
+//! the error says what to install.
+//!
+//! Frames and units are those of the scene: metres, y up, cameras look along -z.
+#![deny(missing_docs)]
+
+pub mod moment;
+mod offscreen;
+mod overlay;
+pub mod painter;
+pub mod picture;
+pub mod shapes;
+mod solids;
+pub mod stage;
+pub mod triangles;
+
+pub use moment::{FingerMoment, Moment};
+pub use offscreen::{NoPictures, Offscreen};
+pub use picture::{Picture, Studio};
+pub use stage::{Stage, Thing};
+pub use triangles::Triangles;

@@ -1,0 +1,48 @@
+//! What is to be seen at one moment: where everything is and what the fingers feel.
+
+use nalgebra::{Isometry3, Vector3};
+
+/// A moment of a run.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Moment {
+    /// Since the first tick at full authority (s).
+    pub t_s: f64,
+    /// Of each entity, its frame in the world.
+    pub poses: Vec<Isometry3<f64>>,
+    /// The fingers.
+    pub fingers: Vec<FingerMoment>,
+}
+
+/// A finger then; world frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct FingerMoment {
+    /// Where the device says it is (m).
+    pub hip: Vector3<f64>,
+    /// Where it is felt to be (m).
+    pub god_object: Vector3<f64>,
+    /// On the user (N).
+    pub force: Vector3<f64>,
+    /// Which entity it touches.
+    pub entity: Option<usize>,
+}
+
+impl Moment {
+    /// Between this moment (`share` 0) and a later one (1).
+    #[must_use]
+    pub fn towards(&self, later: &Self, share: f64) -> Self {
+        let between = |a: &Vector3<f64>, b: &Vector3<f64>| a.lerp(b, share);
+        let pose =
+            |(a, b): (&Isometry3<f64>, &Isometry3<f64>)| a.try_lerp_slerp(b, share, 1e-9).unwrap_or(*b);
+        let finger = |(a, b): (&FingerMoment, &FingerMoment)| FingerMoment {
+            hip: between(&a.hip, &b.hip),
+            god_object: between(&a.god_object, &b.god_object),
+            force: between(&a.force, &b.force),
+            entity: b.entity,
+        };
+        Self {
+            t_s: self.t_s + share * (later.t_s - self.t_s),
+            poses: self.poses.iter().zip(&later.poses).map(pose).collect(),
+            fingers: self.fingers.iter().zip(&later.fingers).map(finger).collect(),
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! Drawing without a display: a graphics context of nobody's window.
+//!
+//! Model: `libEGL` is looked for when a picture is wanted, and asked for a context without a surface. Mesa's has one that
+//! draws in software where there is no graphics card. A machine without the library misses pictures and nothing else.
+
+use khronos_egl as egl;
+use std::sync::Arc;
+
+/// `EGL_PLATFORM_SURFACELESS_MESA`.
+const SURFACELESS: egl::Enum = 0x31DD;
+/// What to install where it is missing.
+const REMEDY: &str = "on Debian and Ubuntu: apt install libegl1 libgl1-mesa-dri";
+
+/// Why there are no pictures.
+#[derive(Debug, thiserror::Error)]
+pub enum NoPictures {
+    /// The library is not there.
+    #[error("no pictures: libEGL.so.1 cannot be loaded ({0}); {REMEDY}")]
+    NoLibrary(String),
+    /// It is, and has nothing to draw with.
+    #[error("no pictures: libEGL {step} ({reason}); {REMEDY}")]
+    NoContext {
+        /// What it did not do.
+        step: &'static str,
+        /// In its words.
+        reason: String,
+    },
+    /// There is a context, and it cannot do what is needed.
+    #[error("no pictures: {0}")]
+    Graphics(String),
+}
+
+/// A context in which this thread draws, as long as it lives.
+pub struct Offscreen {
+    /// What draws.
+    pub context: three_d::Context,
+    /// Who draws, in its own words.
+    pub renderer: String,
+    egl: egl::DynamicInstance<egl::EGL1_5>,
+    display: egl::Display,
+    own: egl::Context,
+}
+
+impl Offscreen {
+    /// Makes one and makes it this thread's.
+    ///
+    /// # Errors
+    /// What is missing, and what to do about it.
+    pub fn new() -> Result<Self, NoPictures> {
+        // SAFETY: the library is the system's own graphics library; its initialisers are trusted as every program's are that
+        // draws anything.
+        let egl = unsafe { egl::DynamicInstance::<egl::EGL1_5>::load_required() }
+            .map_err(|error| NoPictures::NoLibrary(error.to_string()))?;
+        let display = open(&egl)?;
+        let own = make_context(&egl, display)?;
+        // SAFETY: the functions are those of the context that was made current on this thread, and used on no other.
+        let gl = unsafe {
+            three_d::context::Context::from_loader_function(|name| {
+                egl.get_proc_address(name).map_or(std::ptr::null(), |function| function as *const _)
+            })
+        };
+        let renderer = name_of(&gl);
+        let context = three_d::Context::from_gl_context(Arc::new(gl))
+            .map_err(|error| NoPictures::Graphics(error.to_string()))?;
+        Ok(Self { context, renderer, egl, display, own })
+    }
+}
+
+impl Drop for Offscreen {
+    fn drop(&mut self) {
+        // It is over either way.
+        let _ = self.egl.make_current(self.display, None, None, None);
+        let _ = self.egl.destroy_context(self.display, self.own);
+    }
+}
+
+fn open(egl: &egl::DynamicInstance<egl::EGL1_5>) -> Result<egl::Display, NoPictures> {
+    // SAFETY: the default display of a platform without displays; nothing is pointed to but the list, which ends as it must.
+    let display = unsafe { egl.get_platform_display(SURFACELESS, egl::DEFAULT_DISPLAY, &[egl::ATTRIB_NONE]) };
+    let display = display.map_err(failed("knows no display without a surface"))?;
+    egl.initialize(display).map_err(failed("cannot be started"))?;
+    Ok(display)
+}
+
+fn make_context(
+    egl: &egl::DynamicInstance<egl::EGL1_5>,
+    display: egl::Display,
+) -> Result<egl::Context, NoPictures> {
+    egl.bind_api(egl::OPENGL_API).map_err(failed("has no OpenGL"))?;
+    // A window's would be wanted if nothing were said.
+    let wanted = [egl::SURFACE_TYPE, egl::PBUFFER_BIT, egl::RENDERABLE_TYPE, egl::OPENGL_BIT, egl::NONE];
+    let config = egl.choose_first_config(display, &wanted).map_err(failed("has no configuration"))?;
+    let config =
+        config.ok_or(NoPictures::NoContext { step: "has no configuration", reason: "none fits".into() })?;
+    let version = [egl::CONTEXT_MAJOR_VERSION, 3, egl::CONTEXT_MINOR_VERSION, 3, egl::NONE];
+    let context = egl
+        .create_context(display, config, None, &version)
+        .map_err(failed("makes no context of OpenGL 3.3"))?;
+    egl.make_current(display, None, None, Some(context)).map_err(failed("does not give its context"))?;
+    Ok(context)
+}
+
+fn failed(step: &'static str) -> impl Fn(egl::Error) -> NoPictures {
+    move |error| NoPictures::NoContext { step, reason: error.to_string() }
+}
+
+fn name_of(gl: &three_d::context::Context) -> String {
+    use three_d::context::HasContext;
+    // SAFETY: a question to the context that is current on this thread.
+    unsafe { gl.get_parameter_string(three_d::context::RENDERER) }
+}

@@ -1,0 +1,191 @@
+//! Draws a moment of a stage.
+
+use crate::moment::Moment;
+use crate::overlay::Overlay;
+use crate::stage::{Stage, Thing};
+use crate::triangles::Triangles;
+use nalgebra::Isometry3;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use three_d::{
+    AmbientLight, Attenuation, Camera, ClearState, Context, CpuMaterial, CpuMesh, DirectionalLight, Gm,
+    Indices, Light, Mat4, Mesh, Object, PhysicalMaterial, PointLight, Positions, RenderTarget, Srgba,
+    Viewport, vec3,
+};
+use world::{LightKind, SceneCamera, SceneLight};
+
+/// Of the shadows' picture, along each side.
+const SHADOW_SIDE: u32 = 2048;
+/// What is behind everything: red, green, blue.
+const BACKGROUND: [f32; 3] = [0.86, 0.89, 0.93];
+
+/// What draws: everything of a stage that lies in the graphics memory.
+pub struct Painter {
+    context: Context,
+    things: Vec<Drawn>,
+    /// The sum of what all lights shed everywhere: shaders take one.
+    everywhere: AmbientLight,
+    lights: Vec<Shining>,
+    overlay: Overlay,
+    /// Whether hands, forces and contacts are drawn.
+    pub with_overlay: bool,
+    /// Whether there are shadows.
+    pub with_shadows: bool,
+}
+
+struct Drawn {
+    thing: Thing,
+    model: Gm<Mesh, PhysicalMaterial>,
+}
+
+enum Shining {
+    Sun { light: DirectionalLight, casts_shadow: bool },
+    Lamp(PointLight),
+}
+
+impl Painter {
+    /// Brings a stage into a context.
+    pub fn new(context: &Context, stage: &Stage) -> Self {
+        let mut meshes = BTreeMap::new();
+        let things = stage.things.iter().map(|thing| {
+            let made =
+                meshes.entry(Arc::as_ptr(&thing.triangles)).or_insert_with(|| mesh_of(&thing.triangles));
+            let model = Gm::new(Mesh::new(context, made), material(context, thing.colour));
+            Drawn { thing: thing.clone(), model }
+        });
+        Self {
+            context: context.clone(),
+            things: things.collect(),
+            everywhere: AmbientLight::new(context, 1.0, colour_of(everywhere(&stage.lights))),
+            lights: stage.lights.iter().filter_map(|light| shining(context, light)).collect(),
+            overlay: Overlay::new(context, &stage.radii_m),
+            with_overlay: true,
+            with_shadows: true,
+        }
+    }
+
+    /// Draws into a target; `eye` is the camera that looks, which has the target's size.
+    pub fn draw(&mut self, moment: &Moment, eye: &Camera, target: &RenderTarget<'_>) {
+        for drawn in &mut self.things {
+            let pose = moment.poses.get(drawn.thing.entity).copied().unwrap_or_default();
+            drawn.model.set_transformation(matrix(&(pose * drawn.thing.pose)));
+        }
+        self.cast_shadows();
+        let own = self.lights.iter().map(Shining::light);
+        let lights: Vec<&dyn Light> = [&self.everywhere as &dyn Light].into_iter().chain(own).collect();
+        let [r, g, b] = BACKGROUND;
+        target.clear(ClearState::color_and_depth(r, g, b, 1.0, 1.0));
+        target.render(eye, self.things.iter().map(|drawn| &drawn.model as &dyn Object), &lights);
+        if self.with_overlay {
+            self.overlay.place(moment);
+            target.render(eye, self.overlay.objects(), &lights);
+        }
+    }
+
+    fn cast_shadows(&mut self) {
+        let (things, with_shadows) = (&self.things, self.with_shadows);
+        for light in &mut self.lights {
+            let Shining::Sun { light, casts_shadow } = light else { continue };
+            let casting =
+                things.iter().filter(|drawn| drawn.thing.casts_shadow).map(|drawn| &drawn.model.geometry);
+            let is_cast = with_shadows && *casts_shadow;
+            if !is_cast || light.generate_shadow_map(SHADOW_SIDE, casting.collect::<Vec<_>>()).is_err() {
+                light.clear_shadow_map();
+            }
+        }
+    }
+
+    /// The context that it draws in.
+    pub fn context(&self) -> &Context {
+        &self.context
+    }
+}
+
+impl Shining {
+    fn light(&self) -> &dyn Light {
+        match self {
+            Self::Sun { light, .. } => light,
+            Self::Lamp(light) => light,
+        }
+    }
+}
+
+fn everywhere(lights: &[SceneLight]) -> [f64; 3] {
+    std::array::from_fn(|colour| lights.iter().map(|light| light.ambient[colour]).sum::<f64>().min(1.0))
+}
+
+/// `None`: it only shines everywhere.
+fn shining(context: &Context, light: &SceneLight) -> Option<Shining> {
+    let colour = colour_of(light.diffuse);
+    Some(match light.kind {
+        LightKind::Ambient => return None,
+        LightKind::Directional { direction } => Shining::Sun {
+            light: DirectionalLight::new(context, BRIGHT, colour, vector(&direction)),
+            casts_shadow: light.casts_shadow,
+        },
+        LightKind::Point { position_m, attenuation } => {
+            let [constant, linear, quadratic] = attenuation.map(|part| part as f32);
+            let attenuation = Attenuation { constant, linear, quadratic };
+            Shining::Lamp(PointLight::new(context, BRIGHT, colour, vector(&position_m.coords), attenuation))
+        }
+    })
+}
+
+/// What three-d's model of a surface divides by and scenes do not.
+const BRIGHT: f32 = std::f32::consts::PI;
+
+/// Shares of white light are of its power; a colour's bytes are of what it looks like.
+fn colour_of(shares: [f64; 3]) -> Srgba {
+    let [r, g, b] = shares.map(|share| {
+        let seen = if share <= 0.003_130_8 { 12.92 * share } else { 1.055 * share.powf(1.0 / 2.4) - 0.055 };
+        (255.0 * seen).round() as u8
+    });
+    Srgba::new(r, g, b, 255)
+}
+
+pub(crate) fn material(context: &Context, [r, g, b, opacity]: [f64; 4]) -> PhysicalMaterial {
+    let byte = |share: f64| (255.0 * share).round() as u8;
+    let made = CpuMaterial {
+        albedo: Srgba::new(byte(r), byte(g), byte(b), byte(opacity)),
+        roughness: 0.7,
+        metallic: 0.0,
+        ..CpuMaterial::default()
+    };
+    if opacity < 1.0 {
+        PhysicalMaterial::new_transparent(context, &made)
+    } else {
+        PhysicalMaterial::new_opaque(context, &made)
+    }
+}
+
+pub(crate) fn mesh_of(triangles: &Triangles) -> CpuMesh {
+    CpuMesh {
+        positions: Positions::F32(triangles.places.iter().map(|place| vector(&place.coords)).collect()),
+        normals: Some(triangles.normals.iter().map(vector).collect()),
+        indices: Indices::U32(triangles.corners.as_flattened().to_vec()),
+        ..CpuMesh::default()
+    }
+}
+
+pub(crate) fn vector(v: &nalgebra::Vector3<f64>) -> three_d::Vec3 {
+    vec3(v.x as f32, v.y as f32, v.z as f32)
+}
+
+pub(crate) fn matrix(pose: &Isometry3<f64>) -> Mat4 {
+    let entries: [[f32; 4]; 4] = pose.to_homogeneous().cast::<f32>().into();
+    entries.into()
+}
+
+/// A scene's camera, for a picture of this size (pixels).
+pub fn camera(of: &SceneCamera, [width, height]: [u32; 2]) -> Camera {
+    let at = |x, y, z| of.pose * nalgebra::Point3::new(x, y, z);
+    Camera::new_perspective(
+        Viewport::new_at_origo(width, height),
+        vector(&at(0.0, 0.0, 0.0).coords),
+        vector(&at(0.0, 0.0, -1.0).coords),
+        vector(&(of.pose.rotation * nalgebra::Vector3::y())),
+        three_d::degrees(of.field_of_view_deg as f32),
+        of.near_m as f32,
+        of.far_m as f32,
+    )
+}

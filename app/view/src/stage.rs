@@ -1,0 +1,149 @@
+//! What can be seen of a scene: who looks like what, what shines, and who looks on.
+
+use crate::shapes;
+use crate::triangles::Triangles;
+use haptics::mesh::TriangleSoup;
+use haptics::{Entity, Shape};
+use nalgebra::{Isometry3, Point3, Vector3};
+use std::sync::Arc;
+use world::{LightKind, Scene, SceneCamera, SceneLight, SeenForm, SeenPart, ShapeSpec};
+
+/// What can be seen.
+#[derive(Debug, Clone, Default)]
+pub struct Stage {
+    /// Things, each of an entity.
+    pub things: Vec<Thing>,
+    /// Lights; never none.
+    pub lights: Vec<SceneLight>,
+    /// Cameras; never none.
+    pub cameras: Vec<SceneCamera>,
+    /// Of each finger, its radius (m); 0 for a point.
+    pub radii_m: Vec<f64>,
+    /// Entities of which something cannot be drawn, and why.
+    pub not_drawn: Vec<String>,
+}
+
+/// Something to be seen of an entity.
+#[derive(Debug, Clone)]
+pub struct Thing {
+    /// Of which.
+    pub entity: usize,
+    /// In its own frame V; things that look alike share them.
+    pub triangles: Arc<Triangles>,
+    /// From V to the entity's frame.
+    pub pose: Isometry3<f64>,
+    /// Red, green, blue, opacity: 0 to 1.
+    pub colour: [f64; 4],
+    /// Whether light does not go through.
+    pub casts_shadow: bool,
+}
+
+impl Stage {
+    /// Of a scene whose entities, as they are felt, are these, in the same order.
+    pub fn new(scene: &Scene, entities: &[Entity]) -> Self {
+        let seen = scene.seen();
+        let radii_m = scene.fingers.iter().map(|finger| finger.radius_m).collect();
+        let mut stage =
+            Self { lights: seen.lights.to_vec(), cameras: seen.cameras.to_vec(), radii_m, ..Self::default() };
+        let told = seen.unreadable.iter().map(|(at, why)| format!("{at}: {why}"));
+        stage.not_drawn.extend(told);
+        let mut looks = Looks::default();
+        for part in &seen.parts {
+            let index = scene.entities.iter().position(|spec| std::ptr::eq(spec, part.entity)).unwrap_or(0);
+            let felt = entities.get(index).map(|entity| &entity.shape);
+            match looks.of(part, felt) {
+                Some(triangles) => stage.things.push(Thing {
+                    entity: index,
+                    triangles,
+                    pose: part.X_BV,
+                    colour: part.colour,
+                    casts_shadow: part.casts_shadow,
+                }),
+                None => stage
+                    .not_drawn
+                    .push(format!("{}: what it is drawn as has no triangles", part.entity.name)),
+            }
+        }
+        if stage.lights.is_empty() {
+            stage.lights = usual_lights();
+        }
+        if stage.cameras.is_empty() {
+            stage.cameras = vec![usual_camera(scene, entities)];
+        }
+        stage
+    }
+}
+
+/// The triangles made so far: what looks alike shares them.
+#[derive(Default)]
+struct Looks<'s> {
+    files: Vec<(*const TriangleSoup, [f64; 3], Arc<Triangles>)>,
+    shapes: Vec<(&'s ShapeSpec, Arc<Triangles>)>,
+}
+
+impl<'s> Looks<'s> {
+    fn of(&mut self, part: &SeenPart<'s>, felt: Option<&Shape>) -> Option<Arc<Triangles>> {
+        match &part.form {
+            SeenForm::Triangles { soup, scale } => {
+                let alike = |(of, by, _): &&(*const TriangleSoup, [f64; 3], _)| {
+                    *of == Arc::as_ptr(soup) && by == scale
+                };
+                if let Some((.., made)) = self.files.iter().find(alike) {
+                    return Some(Arc::clone(made));
+                }
+                let made = Arc::new(shapes::smooth(&soup.vertices, &soup.faces).scaled(&(*scale).into()));
+                self.files.push((Arc::as_ptr(soup), *scale, Arc::clone(&made)));
+                Some(made)
+            }
+            SeenForm::Shape(spec) => {
+                if let Some((_, made)) = self.shapes.iter().find(|(of, _)| of == spec) {
+                    return Some(Arc::clone(made));
+                }
+                // What only a model knows is known of what is felt.
+                let model = felt.filter(|_| std::ptr::eq(*spec, &raw const part.entity.shape));
+                let made = Arc::new(shapes::triangles(spec, model)?);
+                self.shapes.push((spec, Arc::clone(&made)));
+                Some(made)
+            }
+        }
+    }
+}
+
+/// The sun from above, behind the left shoulder, and some light from everywhere.
+fn usual_lights() -> Vec<SceneLight> {
+    let grey = |share| [share; 3];
+    let light = |name: &str, kind, diffuse, ambient, casts_shadow| SceneLight {
+        name: name.into(),
+        kind,
+        diffuse: grey(diffuse),
+        specular: grey(diffuse),
+        ambient: grey(ambient),
+        casts_shadow,
+    };
+    let direction = nalgebra::Unit::new_normalize(Vector3::new(0.45, -1.0, -0.35));
+    vec![
+        light("sky", LightKind::Ambient, 0.0, 0.4, false),
+        light("sun", LightKind::Directional { direction }, 0.6, 0.0, true),
+    ]
+}
+
+/// Sees all that is near the fingers and what moves, from the front and above.
+fn usual_camera(scene: &Scene, entities: &[Entity]) -> SceneCamera {
+    let mut places: Vec<Point3<f64>> = scene.fingers.iter().map(|finger| finger.start_m).collect();
+    let moving = scene.entities.iter().zip(entities).filter(|(spec, _)| spec.motion.is_some());
+    places.extend(moving.map(|(_, entity)| Point3::from(entity.X_WB.translation.vector)));
+    let middle = places.iter().fold(Vector3::zeros(), |sum, at| sum + at.coords) / places.len().max(1) as f64;
+    let reach_m = places.iter().map(|at| (at.coords - middle).norm()).fold(0.1, f64::max);
+    let field_of_view_deg = SceneCamera::DEFAULT_FIELD_OF_VIEW_DEG;
+    let away_m = 1.6 * reach_m / (0.5 * field_of_view_deg.to_radians()).tan();
+    let eye = Point3::from(middle + away_m * Vector3::new(0.25, 0.45, 1.0).normalize());
+    // A frame that looks along z has x to the left; a camera's looks along -z.
+    let pose = Isometry3::face_towards(&eye, &(eye + (eye.coords - middle)), &Vector3::y());
+    SceneCamera {
+        name: "usual".into(),
+        pose,
+        field_of_view_deg,
+        near_m: 0.02 * away_m,
+        far_m: (50.0 * away_m).max(SceneCamera::DEFAULT_FAR_M),
+    }
+}
