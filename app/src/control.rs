@@ -99,7 +99,9 @@ impl Control {
         if self.waiting.as_ref().is_some_and(|waiting| is_silent || !needs_silence(waiting, step)) {
             turned.replaced = self.change(step);
         }
-        step.set_strength(self.strength);
+        // What is held is to be held when forces come back, though nothing holds it now.
+        let stands_still = self.waiting.is_some() || self.gradual.needs_silence();
+        step.set_strength(self.strength, stands_still && self.strength < 1.0);
         self.gradual.advance(step, dt_s, is_silent);
         turned
     }

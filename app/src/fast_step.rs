@@ -246,8 +246,6 @@ impl FastStep {
                 let hip = is_valid.then_some(Hip { position_W: row.hip, velocity_W });
                 row.force_on_user += finger.feel(felt, &self.effects, &self.entities, hip, moment);
             }
-            row.force_on_user *= self.strength;
-            row.torque_on_user *= self.strength;
         }
         self.objects.note();
         if frame.run_tick >= 0 {
@@ -261,8 +259,8 @@ impl FastStep {
             self.fingers.iter().zip(&mut row.fingers).zip(states).enumerate()
         {
             let Some(device) = devices.get(finger.device) else { continue };
-            row.force_on_user = finite_or_zero(row.force_on_user);
-            row.torque_on_user = finite_or_zero(row.torque_on_user);
+            row.force_on_user = finite_or_zero(row.force_on_user * self.strength);
+            row.torque_on_user = finite_or_zero(row.torque_on_user * self.strength);
             if let Some(passivity) = passivity {
                 let wanted_W = row.force_on_user;
                 keep_passive(passivity, finger, felt, device, *carried_W, &tick, row);

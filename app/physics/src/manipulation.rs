@@ -85,8 +85,6 @@ pub struct Manipulation {
     neighbours: Vec<u32>,
     /// Entities that somebody moves.
     driven: Vec<Driven>,
-    /// What share of the fingers' forces acts, 0 to 1.
-    finger_share: f64,
     /// Whether bodies that somebody else steps are not there.
     ignores_elsewhere: bool,
     /// Bodies that are not as they were, each once.
@@ -157,7 +155,6 @@ impl Manipulation {
             last_anchors: Default::default(),
             neighbours: Vec::with_capacity(count),
             driven: Vec::with_capacity(MAX_DRIVEN),
-            finger_share: 1.0,
             ignores_elsewhere: false,
             changed: Vec::with_capacity(count),
             has_changed: vec![false; count].into(),
@@ -183,11 +180,6 @@ impl Manipulation {
         self.restitution = Restitution::with_capacity(room, places);
         self.fixed = Vec::with_capacity(room);
         self
-    }
-
-    /// From the next tick on only this share (0 to 1) of what fingers do acts, on bodies and on users alike.
-    pub fn set_finger_share(&mut self, share: f64) {
-        self.finger_share = if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 };
     }
 
     /// Such that bodies which somebody else steps are not there at all, instead of fixed.
@@ -242,17 +234,14 @@ impl Manipulation {
         let (touch_rows, pull_rows) = self.gather(entities, touches, pulls, fingers, dt_s);
         let Solved { sweeps, residual, unsolved } = self.find_forces(dt_s);
         for (touch, row) in touches.iter_mut().zip(touch_rows) {
-            match row {
-                Some(row) => touch.force_on_user_W = -self.rows[row].force_W,
-                None => touch.force_on_user_W *= self.finger_share,
+            if let Some(row) = row {
+                touch.force_on_user_W = -self.rows[row].force_W;
             }
         }
         for (at, pull) in pulls.iter_mut().enumerate() {
             // What somebody else steps is as good as fixed.
             let body = self.body_of(pull.entity);
-            if body.is_some_and(|body| self.roster.standing(body).is_away()) {
-                pull.force_on_user_W *= self.finger_share;
-            } else {
+            if body.is_none_or(|body| !self.roster.standing(body).is_away()) {
                 let row = pull_rows.get(at).copied().flatten();
                 pull.force_on_user_W = row.map_or(Vector3::zeros(), |row| -self.rows[row].force_W);
             }

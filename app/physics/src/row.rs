@@ -54,22 +54,6 @@ pub struct Torsion {
     pub torque_nm: f64,
 }
 
-impl Row {
-    /// As a spring of which only this share (0 to 1) acts.
-    pub(crate) fn weaken(&mut self, share: f64) {
-        self.rest_W *= share;
-        self.force_W *= share;
-        self.stiffness = self.stiffness.map(|stiffness| stiffness * share);
-        self.damping = self.damping.map(|damping| damping * share);
-        let Torsion { rest_nm, stiffness_nm_per_rad, damping_nm_s_per_rad, most_nm, torque_nm } =
-            &mut self.torsion;
-        for of_torsion in [rest_nm, stiffness_nm_per_rad, damping_nm_s_per_rad, most_nm, torque_nm] {
-            *of_torsion *= share;
-        }
-        self.tie_n = self.tie_n.map(|most_n| most_n * share);
-    }
-}
-
 impl Torsion {
     /// By how much the trial torque falls per angular velocity that lasts for the tick \[N m s\].
     #[inline]

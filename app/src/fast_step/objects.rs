@@ -55,7 +55,8 @@ pub struct Objects {
     /// Those of them that are not as they were a tick before.
     changed: Vec<u32>,
     period_s: f64,
-    strength: f64,
+    /// Whether nothing moves by itself while forces fade.
+    pub(super) stands_still: bool,
     /// Whether nothing moves by itself.
     pub(super) is_paused: bool,
     /// What was moved, as the slow list has to know it.
@@ -101,7 +102,7 @@ impl Objects {
             manipulation,
             lists: None,
             period_s,
-            strength: 1.0,
+            stands_still: false,
             is_paused: false,
             moved: Moved::default(),
             made: Made::default(),
@@ -243,14 +244,7 @@ impl Objects {
         }
     }
 
-    /// Of the forces of fingers only this share acts from now on, on objects and users alike.
-    pub fn set_strength(&mut self, strength: f64) {
-        self.strength = strength;
-        self.manipulation.set_finger_share(strength);
-    }
-
-    /// Moves them by a tick of this length (s), and changes the fingers' forces, of which only the share that acts is there any
-    /// more, to those which moved them.
+    /// Moves them by a tick of this length (s), and changes the fingers' forces to those which moved them.
     pub fn step(
         &mut self,
         entities: &mut [Entity],
@@ -259,7 +253,7 @@ impl Objects {
         rows: &mut [FingerRow],
         dt_s: f64,
     ) {
-        if self.is_paused {
+        if self.is_paused || self.stands_still {
             return self.stand(entities);
         }
         self.pull(felt, rows);
@@ -283,8 +277,7 @@ impl Objects {
                 }
             }
         }
-        let strength = self.strength;
-        let rendered = self.touches.iter().map(|touch| -touch.force_on_user_W * strength);
+        let rendered = self.touches.iter().map(|touch| -touch.force_on_user_W);
         add_to_rows(rendered, &self.touches, fingers, rows);
         for ((tick, button), (row, finger)) in
             self.ticks.iter_mut().zip(&self.buttons).zip(rows.iter().zip(fingers))
@@ -372,7 +365,7 @@ impl Objects {
             for reaction in
                 felt.reactions().iter().filter(|reaction| self.manipulation.is_body(reaction.entity))
             {
-                rows[finger].force_on_user -= reaction.force_on_user_W * self.strength;
+                rows[finger].force_on_user -= reaction.force_on_user_W;
                 if self.pulls.len() < MAX_PULLS {
                     self.pulls.push(Pull {
                         entity: reaction.entity,

@@ -35,10 +35,14 @@ pub enum Hold {
 }
 
 impl FastStep {
-    /// How much of the forces is felt from the next tick on, 0 to 1; objects get as much, times -1.
-    pub fn set_strength(&mut self, strength: f64) {
+    /// How much of the forces is felt from the next tick on, 0 to 1, and whether objects stand still meanwhile; if they do not,
+    /// they get all of them.
+    pub fn set_strength(&mut self, strength: f64, stands_still: bool) {
         self.strength = strength;
-        self.objects.set_strength(strength);
+        if stands_still && !self.objects.stands_still {
+            self.objects.manipulation.pause(&mut self.entities);
+        }
+        self.objects.stands_still = stands_still;
     }
 
     /// Whether [`Self::drive`] may move an entity: of what has no end everything is near, which two lists cannot share.

@@ -71,9 +71,6 @@ impl Manipulation {
         self.pressing = self.rows.len();
         let pull_rows = self.gather_pulls(pulls, dt_s);
         self.touching = self.rows.len();
-        if self.finger_share < 1.0 {
-            self.rows.iter_mut().for_each(|row| row.weaken(self.finger_share));
-        }
         self.restitution.meetings.clear();
         for at in 0..self.pairs.awake_count() {
             let (key, _) = self.pairs.awake_at(at);
