@@ -91,7 +91,7 @@ impl SlowLists {
 
     /// That of the world which runs.
     fn last_begun(self) -> Option<SlowList> {
-        self.lists.into_iter().filter(SlowList::has_begun).next_back()
+        self.lists.into_iter().rfind(SlowList::has_begun)
     }
 }
 

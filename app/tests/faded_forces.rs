@@ -40,7 +40,8 @@ fn tick(step: &mut FastStep, tick: u64) -> Row {
     (frame.tick, frame.device_count, frame.run_tick) = (tick + 1, 2, tick as i64);
     for (device, x) in frame.devices.iter_mut().zip([-1.0, 1.0]) {
         let deep_m = (1e-3 * tick as f64).min(2e-3);
-        (device.flags, device.position_m_measured) = (DEVICE_POSITION_VALID, [x * (0.021 - deep_m), 0.0, 0.0]);
+        (device.flags, device.position_m_measured) =
+            (DEVICE_POSITION_VALID, [x * (0.021 - deep_m), 0.0, 0.0]);
     }
     step.step(&frame, &mut command, &mut row);
     row

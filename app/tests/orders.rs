@@ -313,7 +313,7 @@ fn a_body_is_moved_wherever_it_is_and_falls_when_it_is_let_go() {
         let highest = bodies().map(|at| at.y).fold(0.0, f64::max);
         // There for a tick or two, in which a body without support falls by 1e-5 m.
         assert!((highest - 0.12).abs() < 1e-4, "{highest}");
-        let end = bodies().last().expect("ticks");
+        let end = bodies().next_back().expect("ticks");
         // It sinks in by its weight over four springs in series with the floor's, and does not roll.
         assert!((end - Vector3::new(0.1, 0.02, 0.0)).norm() < 1e-3, "{end}");
         let on_its_way: Vec<_> = bodies().skip((at_s / DT) as usize + 30).take(450).collect();
@@ -369,9 +369,9 @@ fn a_pause_is_time_that_did_not_pass() {
     for scene in both_lists(&falling) {
         let through = Place::new().play(&scene, "", HandMode::Kinematic, 1.0);
         let paused = Place::new().play(&scene, "at 0.1 pause\nat 0.4 resume", HandMode::Kinematic, 1.3);
-        for at in 0..1000 {
+        for (at, tick) in through.iter().enumerate() {
             let same = if at <= 100 { at } else { at + 300 };
-            assert_eq!(through[at].bodies, paused[same].bodies, "{at}");
+            assert_eq!(tick.bodies, paused[same].bodies, "{at}");
         }
         assert_eq!(paused[120].bodies, paused[399].bodies);
     }

@@ -43,7 +43,9 @@ impl Orders {
     /// Gives what is due soon. What this scene cannot do is told and left out.
     pub(super) fn give(&mut self, run_tick: u64) {
         self.desk.step();
-        while let Some((tick, words)) = self.left.pop_front_if(|(tick, _)| *tick <= run_tick + AHEAD_TICKS) {
+        while self.left.front().is_some_and(|(tick, _)| *tick <= run_tick + AHEAD_TICKS)
+            && let Some((tick, words)) = self.left.pop_front()
+        {
             // Where another scene takes over the recording ends; until then forces fade as before a reset.
             let is_swap = words.split_whitespace().next() == Some("swap");
             if let Err(error) = self.desk.order(tick, if is_swap { "reset" } else { &words }) {
