@@ -102,6 +102,7 @@ pub fn plan(rig: &Rig, socket: PathBuf, directory: Option<&Path>) -> RunPlan {
         seconds: Some(SECONDS),
         record,
         events: Vec::new(),
+        pictures: None,
         seed: 0,
         orders: None,
         settings: Settings::default(),

@@ -43,6 +43,7 @@ pub mod settings;
 pub mod simulated;
 pub mod slow;
 pub mod slow_thread;
+pub mod snapshots;
 pub mod study;
 pub mod two_processes;
 pub mod virtual_clock;

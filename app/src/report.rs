@@ -3,6 +3,7 @@
 use crate::fast_loop::Tally;
 use crate::lists_end::ListsEnd;
 use crate::record::Recorded;
+use crate::snapshots::Drawn;
 use io_driver::meter;
 use io_driver::status::{CounterStatus, Percentiles};
 use rt_core::histogram::Histogram;
@@ -36,6 +37,8 @@ pub struct Report {
     pub lists: Option<ListsEnd>,
     /// What became of the recordings.
     pub recordings: Vec<Recorded>,
+    /// What became of the pictures, if any were wanted.
+    pub pictures: Option<Drawn>,
 }
 
 /// Durations of a run.
@@ -87,9 +90,10 @@ impl Baseline {
 }
 
 impl Report {
-    /// Whether a recording is not complete, which has been told.
+    /// Whether a recording is not complete, or a picture could not be written, which has been told.
     pub fn lacks_a_recording(&self) -> bool {
-        self.recordings.iter().any(|recorded| recorded.failure.is_some())
+        let lacks_pictures = self.pictures.as_ref().is_some_and(|drawn| drawn.is_fault);
+        lacks_pictures || self.recordings.iter().any(|recorded| recorded.failure.is_some())
     }
 }
 
@@ -156,6 +160,9 @@ impl fmt::Display for Report {
             for line in fast.to_string().lines().filter(|line| !driver.contains(line)) {
                 writeln!(f, "{line}")?;
             }
+        }
+        if let Some(pictures) = &self.pictures {
+            writeln!(f, "pictures     {pictures}")?;
         }
         if self.recordings.is_empty() {
             return write!(f, "recording    none; --record FILE makes one");

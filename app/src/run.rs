@@ -11,7 +11,8 @@ use crate::record::{About, Files, View};
 use crate::report::{Baseline, Report};
 use crate::rig::{HandMode, Rig};
 use crate::row_queue::row_queue;
-use crate::slow::SlowSide;
+use crate::slow::{SlowEnd, SlowSide};
+use crate::snapshots::{Snapshots, Wanted};
 use crate::two_processes::{self, Source};
 use crate::virtual_clock::VirtualDriver;
 use io_driver::device::Extras;
@@ -23,6 +24,7 @@ use shm_abi::{CommanderMemory, DriverView, Frame};
 use std::path::PathBuf;
 use std::sync::mpsc::{self, Receiver};
 use std::time::Duration;
+use view::Stage;
 use world::Settings;
 use world::events::{Hub, event_queue};
 use world::lists::SlowList;
@@ -41,6 +43,8 @@ pub struct RunPlan {
     pub record: Vec<PathBuf>,
     /// Where to write what happens, a line each; the ending says in which format.
     pub events: Vec<PathBuf>,
+    /// Pictures to be drawn, if any.
+    pub pictures: Option<Wanted>,
     /// Seed of everything random, to be told in recordings.
     pub seed: u64,
     /// What is to change while it runs.
@@ -120,6 +124,13 @@ impl Parts {
             about: about.clone(),
         };
         let recorders = files.first(rig, &View::new(&rig.scene, step.entities()))?;
+        let snapshots = plan.pictures.as_ref().map(|wanted| {
+            let stage = Stage::new(&rig.scene, step.entities());
+            let poses = step.entities().iter().map(|entity| entity.X_WB).collect();
+            let bodies = rig.moving().map(|(index, ..)| index).collect();
+            Snapshots::start(wanted, stage, poses, bodies, period_ns, when_full == WhenFull::Wait)
+        });
+        let snapshots = snapshots.transpose().map_err(RunFailure::Start)?;
         let (events, event_ends) = event_queue(EVENT_QUEUE);
         let fast = FastLoop::new(step, producer, when_full, total_ticks, period_ns).with_events(events);
         Ok(Self {
@@ -128,7 +139,9 @@ impl Parts {
                 Some(orders) => fast.with_control(orders),
                 None => fast,
             },
-            slow: SlowSide::new(consumer, Hub::new(vec![event_ends]), recorders).with_desk(desk, files),
+            slow: SlowSide::new(consumer, Hub::new(vec![event_ends]), recorders)
+                .with_desk(desk, files)
+                .with_snapshots(snapshots),
             progress: Progress::new(total_ticks, period_ns),
         })
     }
@@ -141,7 +154,7 @@ fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Repo
         Parts::new(rig, plan, ClockMode::Virtual, rig.period_ns, &driver.extras(), &about)?;
     let result = driver.run(&mut fast, &mut slow, &mut progress, signals);
     progress.end();
-    let (recordings, events) = slow.finish();
+    let SlowEnd { recordings, events, pictures } = slow.finish();
     let stop = result?;
     let report = Report {
         clock: ClockMode::Virtual.name(),
@@ -156,6 +169,7 @@ fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Repo
         orders: plan.orders.as_ref().map(|_| fast.orders_taken()),
         lists: fast.step_mut().end_lists(None),
         recordings,
+        pictures,
     };
     Ok((report, stop))
 }
@@ -179,7 +193,7 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
     let result =
         two_processes::run(&mut source, attachment, (fast, slow_lists), &mut slow, &mut progress, signals);
     progress.end();
-    let (recordings, events) = slow.finish();
+    let SlowEnd { recordings, events, pictures } = slow.finish();
     let end = result?;
     let is_real = info.clock_mode == ClockMode::Real;
     let report = Report {
@@ -195,6 +209,7 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
         orders: plan.orders.as_ref().map(|_| end.orders),
         lists: end.lists,
         recordings,
+        pictures,
     };
     Ok((report, end.stop))
 }

@@ -4,6 +4,7 @@ use crate::control::desk::{Coming, Desk};
 use crate::record::{Files, Recorded, Recorder};
 use crate::row::Row;
 use crate::row_queue::RowReceiver;
+use crate::snapshots::{Drawn, Snapshots};
 use io_driver::say::say;
 use std::fmt::Write;
 use world::events::{Class, Filter, Hub};
@@ -24,6 +25,10 @@ pub struct SlowSide {
     coming: Option<Coming>,
     /// Who takes orders, if anybody gives them.
     desk: Option<Desk>,
+    /// Who takes pictures of the first scene, if anybody does.
+    snapshots: Option<Snapshots>,
+    /// What became of them, once another scene goes on.
+    drawn: Option<Drawn>,
     /// Who else wants to know what happens.
     pub events: Hub,
     /// The newest row, for whoever wants to look.
@@ -44,6 +49,8 @@ impl SlowSide {
             scenes: 0,
             coming: None,
             desk: None,
+            snapshots: None,
+            drawn: None,
             events,
             newest: None,
         }
@@ -53,6 +60,12 @@ impl SlowSide {
     #[must_use]
     pub fn with_desk(self, desk: Option<Desk>, files: Files) -> Self {
         Self { desk, files: Some(files), ..self }
+    }
+
+    /// With pictures.
+    #[must_use]
+    pub fn with_snapshots(self, snapshots: Option<Snapshots>) -> Self {
+        Self { snapshots, ..self }
     }
 
     /// Takes everything that is there. A recording that cannot be written tells so itself, and the run goes on.
@@ -72,6 +85,9 @@ impl SlowSide {
             for recorder in &mut self.recorders {
                 recorder.send(&row, bodies);
             }
+            if let Some(snapshots) = &mut self.snapshots {
+                snapshots.look(&row, bodies);
+            }
             self.newest = Some(row);
         }
     }
@@ -83,6 +99,7 @@ impl SlowSide {
         // What came in before that row did.
         self.take_rows();
         self.scenes += 1;
+        self.drawn = self.drawn.take().or_else(|| self.snapshots.take().map(Snapshots::finish));
         let (stay, end): (Vec<_>, Vec<_>) =
             std::mem::take(&mut self.recorders).into_iter().partition(Recorder::is_of_events);
         self.recorders = stay;
@@ -125,15 +142,26 @@ impl SlowSide {
         }
     }
 
-    /// Takes the rest and closes the recordings. Returns what became of them, and what has happened.
-    pub fn finish(mut self) -> (Vec<Recorded>, String) {
+    /// Takes the rest, and closes the recordings.
+    pub fn finish(mut self) -> SlowEnd {
         self.step();
         self.events.deliver(u64::MAX);
         let told = summary(&self.events);
         self.closed.append(&mut self.recorders);
         self.failed.extend(self.closed.into_iter().map(Recorder::finish));
-        (self.failed, told)
+        let pictures = self.drawn.or_else(|| self.snapshots.map(Snapshots::finish));
+        SlowEnd { recordings: self.failed, events: told, pictures }
     }
+}
+
+/// What the slow side leaves.
+pub struct SlowEnd {
+    /// What became of the recordings.
+    pub recordings: Vec<Recorded>,
+    /// What has happened, in words.
+    pub events: String,
+    /// What became of the pictures, if any were wanted.
+    pub pictures: Option<Drawn>,
 }
 
 /// The recordings want all events.

@@ -9,6 +9,7 @@ use crate::rig::{HandMode, Rig};
 use crate::run::{Attach, RunPlan};
 use crate::settings;
 use crate::simulated::SimulatedDevices;
+use crate::snapshots::PictureArgs;
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use io_driver::config::period_of;
@@ -52,6 +53,8 @@ pub(super) struct RunArgs {
     /// may be given several times
     #[arg(long, value_name = "FILE")]
     events: Vec<PathBuf>,
+    #[command(flatten)]
+    pictures: PictureArgs,
     /// How long; default: as long as the hand file, at least 1 s
     #[arg(long, value_name = "S", value_parser = parse_seconds, allow_negative_numbers = true)]
     seconds: Option<f64>,
@@ -222,6 +225,7 @@ pub(super) fn make_plan(args: &RunArgs, rig: &Rig, settings: &Settings) -> Resul
         seconds: args.seconds,
         record: args.record.clone(),
         events: args.events.clone(),
+        pictures: args.pictures.wanted(),
         seed: args.seed,
         orders: order_source(args)?,
         settings: settings.clone(),
@@ -262,6 +266,7 @@ fn refuse_to_overwrite_input(args: &RunArgs, rig: &Rig) -> Result<(), RunFailure
         .iter()
         .map(|file| ("--record", file))
         .chain(args.events.iter().map(|file| ("--events", file)))
+        .chain(args.pictures.files().map(|file| ("--snapshot", file)))
         .collect();
     for (index, (option, record)) in written.iter().enumerate() {
         if let Some(input) = inputs.iter().find(|input| is_same_file(record, input)) {

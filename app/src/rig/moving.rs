@@ -17,7 +17,7 @@ use crate::fast_step::{FastStep, HandFinger};
 
 impl Rig {
     /// The entities that move: their numbers, and what the scene says of them.
-    pub(super) fn moving(&self) -> impl Iterator<Item = (usize, &SceneEntity, &MotionSpec)> {
+    pub(crate) fn moving(&self) -> impl Iterator<Item = (usize, &SceneEntity, &MotionSpec)> {
         let entities = self.scene.entities.iter().enumerate();
         entities.filter_map(|(index, entity)| Some((index, entity, entity.motion.as_ref()?)))
     }

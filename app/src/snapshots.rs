@@ -1,0 +1,222 @@
+//! Pictures of a run while it goes on: single ones, and one after the other for a film.
+//!
+//! Model: whoever takes the rows on the slow side looks at each ([`Snapshots::look`]); when a picture is due, the moment goes
+//! to a thread of its own, which draws without a display and writes PNG. On a clock that waits it is waited for; in real
+//! time pictures of a film that are due while the thread is busy are left out, and counted. A machine that cannot draw
+//! says so once, and the run goes on.
+
+mod args;
+
+pub use args::{Film, PictureArgs, Shot, Wanted};
+
+use crate::row::{BodyRow, Row};
+use io_driver::say::say;
+use nalgebra::{Isometry3, UnitQuaternion};
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::thread::JoinHandle;
+use view::{FingerMoment, Moment, Stage, Studio};
+use world::SceneCamera;
+
+/// So many moments wait to be drawn.
+const WAITING: usize = 4;
+
+/// Who takes the pictures of a run.
+pub struct Snapshots {
+    /// In the order of their times.
+    shots: Vec<Shot>,
+    film: Option<Film>,
+    /// Pictures of the film that were due.
+    due: u64,
+    left_out: u64,
+    waits: bool,
+    period_s: f64,
+    fingers: usize,
+    /// Which entity each body is.
+    entities: Vec<usize>,
+    /// Where those are that do not move.
+    poses: Vec<Isometry3<f64>>,
+    out: Option<SyncSender<(Moment, PathBuf)>>,
+    thread: Option<JoinHandle<Drawn>>,
+}
+
+/// What became of the pictures.
+#[derive(Debug, Clone, Default)]
+pub struct Drawn {
+    /// How many were written.
+    pub written: u64,
+    /// Who drew them.
+    pub renderer: String,
+    /// Pictures of a film that were left out: drawing was too slow.
+    pub left_out: u64,
+    /// Single pictures whose time did not come.
+    pub not_reached: usize,
+    /// What went wrong, which has been told.
+    pub failure: Option<String>,
+    /// Whether that is a file that could not be written, rather than a machine that cannot draw.
+    pub is_fault: bool,
+}
+
+impl std::fmt::Display for Drawn {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}", self.written)?;
+        if !self.renderer.is_empty() {
+            write!(f, ", drawn by {}", self.renderer)?;
+        }
+        if self.left_out > 0 {
+            write!(f, ", {} LEFT OUT: drawing was too slow", self.left_out)?;
+        }
+        if self.not_reached > 0 {
+            write!(f, ", {} NOT TAKEN: the run ended before", self.not_reached)?;
+        }
+        if self.failure.is_some() {
+            write!(f, " NOT COMPLETE: see the message above")?;
+        }
+        Ok(())
+    }
+}
+
+impl Snapshots {
+    /// Begins to take what is wanted of this stage, whose entities stand so; `entities` of them are the bodies, in the order of
+    /// the rows. `waits`: the run's clock waits for the drawing.
+    ///
+    /// # Errors
+    /// A camera that the scene does not have, a directory that cannot be made, in words.
+    pub fn start(
+        wanted: &Wanted,
+        stage: Stage,
+        poses: Vec<Isometry3<f64>>,
+        entities: Vec<usize>,
+        period_ns: u64,
+        waits: bool,
+    ) -> Result<Self, String> {
+        let camera = camera_of(&stage, wanted.camera.as_deref())?;
+        if let Some(film) = &wanted.film {
+            std::fs::create_dir_all(&film.directory)
+                .map_err(|error| format!("--frames {}: {error}", film.directory.display()))?;
+        }
+        let (fingers, size) = (stage.radii_m.len(), wanted.size);
+        let (out, moments) = sync_channel(WAITING);
+        let thread = std::thread::Builder::new()
+            .name("pictures".into())
+            .spawn(move || draw_all(&stage, &camera, size, &moments))
+            .map_err(|error| format!("no thread for pictures: {error}"))?;
+        let mut shots = wanted.shots.clone();
+        shots.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
+        Ok(Self {
+            shots,
+            film: wanted.film.clone(),
+            due: 0,
+            left_out: 0,
+            waits,
+            period_s: period_ns as f64 / 1e9,
+            fingers,
+            entities,
+            poses,
+            out: Some(out),
+            thread: Some(thread),
+        })
+    }
+
+    /// A tick, as it began.
+    pub fn look(&mut self, row: &Row, bodies: &[BodyRow]) {
+        // The tick that is nearest to the time.
+        let now_s = (row.run_tick as f64 + 0.5) * self.period_s;
+        while self.shots.first().is_some_and(|shot| shot.t_s < now_s) {
+            let shot = self.shots.remove(0);
+            let moment = self.moment(row, bodies);
+            self.send((moment, shot.file), true);
+        }
+        if let Some(Film { directory, fps }) = &self.film
+            && self.due as f64 / fps < now_s
+        {
+            let file = directory.join(format!("frame-{:06}.png", self.due));
+            self.due += 1;
+            let moment = self.moment(row, bodies);
+            self.send((moment, file), self.waits);
+        }
+    }
+
+    fn moment(&mut self, row: &Row, bodies: &[BodyRow]) -> Moment {
+        for (body, &entity) in bodies.iter().zip(&self.entities) {
+            if let Some(pose) = self.poses.get_mut(entity) {
+                let turned = UnitQuaternion::new_normalize(body.orientation);
+                *pose = Isometry3::from_parts(body.position.into(), turned);
+            }
+        }
+        let fingers = row.fingers[..self.fingers.min(row.fingers.len())].iter().map(|finger| FingerMoment {
+            hip: finger.hip,
+            god_object: finger.god_object,
+            force: finger.force_on_user,
+            entity: finger.entity.map(|entity| entity as usize),
+        });
+        Moment {
+            t_s: row.run_tick as f64 * self.period_s,
+            poses: self.poses.clone(),
+            fingers: fingers.collect(),
+        }
+    }
+
+    fn send(&mut self, picture: (Moment, PathBuf), waits: bool) {
+        let Some(out) = &self.out else { return };
+        if waits {
+            // A thread that has ended has said why.
+            let _ = out.send(picture);
+        } else if let Err(TrySendError::Full(_)) = out.try_send(picture) {
+            self.left_out += 1;
+        }
+    }
+
+    /// Waits for the last picture, and says what became of all.
+    pub fn finish(mut self) -> Drawn {
+        drop(self.out.take());
+        let drawn = self.thread.take().map(JoinHandle::join);
+        let lost = || Drawn { failure: Some("the drawing ended by itself".into()), ..Drawn::default() };
+        let drawn = drawn.and_then(Result::ok).unwrap_or_else(lost);
+        Drawn { left_out: self.left_out, not_reached: self.shots.len(), ..drawn }
+    }
+}
+
+fn camera_of(stage: &Stage, name: Option<&str>) -> Result<SceneCamera, String> {
+    let Some(name) = name else {
+        return stage.cameras.first().cloned().ok_or_else(|| "there is no camera".into());
+    };
+    stage.cameras.iter().find(|camera| camera.name == name).cloned().ok_or_else(|| {
+        let all: Vec<&str> = stage.cameras.iter().map(|camera| camera.name.as_str()).collect();
+        format!("--camera {name}: the scene has no such camera; allowed: {}", all.join(", "))
+    })
+}
+
+fn draw_all(
+    stage: &Stage,
+    camera: &SceneCamera,
+    size: [u32; 2],
+    moments: &Receiver<(Moment, PathBuf)>,
+) -> Drawn {
+    let mut drawn = Drawn::default();
+    for line in &stage.not_drawn {
+        say(format_args!("phantom3: not in pictures: {line}"));
+    }
+    let mut studio = match Studio::new(stage, size) {
+        Ok(studio) => studio,
+        Err(missing) => {
+            say(format_args!("phantom3: {missing}"));
+            drawn.failure = Some(missing.to_string());
+            // Nobody is to wait for room.
+            moments.iter().for_each(drop);
+            return drawn;
+        }
+    };
+    drawn.renderer = studio.renderer().to_owned();
+    for (moment, file) in moments {
+        if let Err(error) = studio.take(&moment, camera).save(&file) {
+            if drawn.failure.is_none() {
+                say(format_args!("phantom3: the picture {} cannot be written: {error}", file.display()));
+            }
+            (drawn.failure, drawn.is_fault) = (Some(error.to_string()), true);
+        } else {
+            drawn.written += 1;
+        }
+    }
+    drawn
+}
