@@ -9,6 +9,7 @@ mod zero;
 use crate::config::{Commissioning, DriverConfig};
 use crate::doctor::cli::{self as doctor, DoctorArgs};
 use crate::driver::{self, Fit, RunOptions};
+use crate::monitor::{self, End};
 use crate::say::say;
 use crate::status::Status;
 use clap::{Args, Parser, Subcommand};
@@ -91,7 +92,8 @@ pub struct StatusArgs {
     /// Print JSON
     #[arg(long)]
     json: bool,
-    /// Print a line (with --json: an object) every second until interrupted
+    /// Show it on the full screen until `q`; with --json, or where there is no terminal, print an object or a line
+    /// every second until interrupted
     #[arg(long)]
     watch: bool,
 }
@@ -128,6 +130,7 @@ pub fn execute(command: DriverCommand) -> ExitCode {
 fn execute_with(command: DriverCommand, fit: Option<Fit>) -> ExitCode {
     match command {
         DriverCommand::Run(args) => run(args, fit),
+        DriverCommand::Status(args) if args.watch && !args.json && monitor::has_terminal() => watch(&args),
         DriverCommand::Status(args) => report(status(&args)),
         DriverCommand::Stop(args) => report(stop(&args.path())),
         DriverCommand::Doctor(args) => doctor::run(&args),
@@ -165,6 +168,14 @@ fn stop(socket: &Path) -> Result<(), AttachError> {
     // It stops, whether or not somebody reads that.
     let _ = print_line(&format!("driver (process {pid}) stops"));
     Ok(())
+}
+
+fn watch(args: &StatusArgs) -> ExitCode {
+    match monitor::run(&args.socket.path()) {
+        Ok(End::Left) => ExitCode::SUCCESS,
+        Ok(End::Signal(number)) => ExitCode::from(128 + number as u8),
+        Err(error) => fail(&error, EXIT_USAGE),
+    }
 }
 
 fn status(args: &StatusArgs) -> Result<(), AttachError> {

@@ -28,6 +28,7 @@ pub mod kinematics;
 mod loop_thread;
 pub mod mail;
 pub mod meter;
+pub mod monitor;
 pub mod motors;
 pub mod open;
 pub mod real_loop;
