@@ -6,7 +6,8 @@ use haptics::mesh::TriangleSoup;
 use haptics::{Entity, Shape};
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::sync::Arc;
-use world::{LightKind, Scene, SceneCamera, SceneLight, SeenForm, SeenPart, ShapeSpec};
+use world::seen::{SeenForm, SeenPart};
+use world::{LightKind, Scene, SceneCamera, SceneLight, ShapeSpec};
 
 /// What can be seen.
 #[derive(Debug, Clone, Default)]
