@@ -10,6 +10,7 @@
 //! Frames and units are those of the scene: metres, y up, cameras look along -z.
 #![deny(missing_docs)]
 
+pub mod eyes;
 pub mod moment;
 mod offscreen;
 mod overlay;
@@ -20,6 +21,7 @@ mod solids;
 pub mod stage;
 pub mod triangles;
 
+pub use eyes::Eyes;
 pub use moment::{FingerMoment, Moment};
 pub use offscreen::{NoPictures, Offscreen};
 pub use picture::{Picture, Studio};

@@ -1,7 +1,7 @@
 //! What is drawn over a scene: fingers, where they are felt to be, and forces.
 
 use crate::moment::Moment;
-use crate::painter::{material, matrix, mesh_of};
+use crate::painter::{mask, material, matrix, mesh_of};
 use crate::shapes;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
@@ -68,6 +68,13 @@ impl Overlay {
             if models.is_pushed {
                 models.point(&finger.god_object, &finger.force.normalize(), long_m);
             }
+        }
+    }
+
+    /// Lets only these of red, green and blue be drawn.
+    pub(crate) fn mask(&mut self, channels: [bool; 3]) {
+        for FingerModels { hip, god, shaft, head, .. } in &mut self.fingers {
+            [hip, god, shaft, head].into_iter().for_each(|model| mask(&mut model.material, channels));
         }
     }
 

@@ -1,5 +1,6 @@
 //! Draws a moment of a stage.
 
+use crate::eyes::{Eyes, Look};
 use crate::moment::Moment;
 use crate::overlay::Overlay;
 use crate::stage::{Stage, Thing};
@@ -8,9 +9,8 @@ use nalgebra::Isometry3;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use three_d::{
-    AmbientLight, Attenuation, Camera, ClearState, Context, CpuMaterial, CpuMesh, DirectionalLight, Gm,
-    Indices, Light, Mat4, Mesh, Object, PhysicalMaterial, PointLight, Positions, RenderTarget, Srgba,
-    Viewport, vec3,
+    AmbientLight, Attenuation, ClearState, Context, CpuMaterial, CpuMesh, DirectionalLight, Gm, Indices,
+    Light, Mat4, Mesh, Object, PhysicalMaterial, PointLight, Positions, RenderTarget, Srgba, WriteMask, vec3,
 };
 use world::{LightKind, SceneCamera, SceneLight};
 
@@ -64,21 +64,34 @@ impl Painter {
         }
     }
 
-    /// Draws into a target; `eye` is the camera that looks, which has the target's size.
-    pub fn draw(&mut self, moment: &Moment, eye: &Camera, target: &RenderTarget<'_>) {
+    /// Draws into a target what eyes at a camera see.
+    pub fn draw(&mut self, moment: &Moment, camera: &SceneCamera, eyes: &Eyes, target: &RenderTarget<'_>) {
+        self.place(moment);
+        self.cast_shadows();
+        let [r, g, b] = BACKGROUND;
+        target.clear(ClearState::color_and_depth(r, g, b, 1.0, 1.0));
+        for look in eyes.looks(camera, [target.width(), target.height()]) {
+            target.clear(ClearState::depth(1.0));
+            self.draw_look(&look, target);
+        }
+    }
+
+    fn place(&mut self, moment: &Moment) {
         for drawn in &mut self.things {
             let pose = moment.poses.get(drawn.thing.entity).copied().unwrap_or_default();
             drawn.model.set_transformation(matrix(&(pose * drawn.thing.pose)));
         }
-        self.cast_shadows();
+        self.overlay.place(moment);
+    }
+
+    fn draw_look(&mut self, look: &Look, target: &RenderTarget<'_>) {
+        self.things.iter_mut().for_each(|drawn| mask(&mut drawn.model.material, look.channels));
+        self.overlay.mask(look.channels);
         let own = self.lights.iter().map(Shining::light);
         let lights: Vec<&dyn Light> = [&self.everywhere as &dyn Light].into_iter().chain(own).collect();
-        let [r, g, b] = BACKGROUND;
-        target.clear(ClearState::color_and_depth(r, g, b, 1.0, 1.0));
-        target.render(eye, self.things.iter().map(|drawn| &drawn.model as &dyn Object), &lights);
+        target.render(&look.eye, self.things.iter().map(|drawn| &drawn.model as &dyn Object), &lights);
         if self.with_overlay {
-            self.overlay.place(moment);
-            target.render(eye, self.overlay.objects(), &lights);
+            target.render(&look.eye, self.overlay.objects(), &lights);
         }
     }
 
@@ -158,6 +171,12 @@ pub(crate) fn material(context: &Context, [r, g, b, opacity]: [f64; 4]) -> Physi
     }
 }
 
+/// Lets only these of red, green and blue be drawn.
+pub(crate) fn mask(material: &mut PhysicalMaterial, [red, green, blue]: [bool; 3]) {
+    let write_mask = &mut material.render_states.write_mask;
+    *write_mask = WriteMask { red, green, blue, ..*write_mask };
+}
+
 pub(crate) fn mesh_of(triangles: &Triangles) -> CpuMesh {
     CpuMesh {
         positions: Positions::F32(triangles.places.iter().map(|place| vector(&place.coords)).collect()),
@@ -174,18 +193,4 @@ pub(crate) fn vector(v: &nalgebra::Vector3<f64>) -> three_d::Vec3 {
 pub(crate) fn matrix(pose: &Isometry3<f64>) -> Mat4 {
     let entries: [[f32; 4]; 4] = pose.to_homogeneous().cast::<f32>().into();
     entries.into()
-}
-
-/// A scene's camera, for a picture of this size (pixels).
-pub fn camera(of: &SceneCamera, [width, height]: [u32; 2]) -> Camera {
-    let at = |x, y, z| of.pose * nalgebra::Point3::new(x, y, z);
-    Camera::new_perspective(
-        Viewport::new_at_origo(width, height),
-        vector(&at(0.0, 0.0, 0.0).coords),
-        vector(&at(0.0, 0.0, -1.0).coords),
-        vector(&(of.pose.rotation * nalgebra::Vector3::y())),
-        three_d::degrees(of.field_of_view_deg as f32),
-        of.near_m as f32,
-        of.far_m as f32,
-    )
 }

@@ -3,7 +3,7 @@
 use haptics::{Cuboid, Cylinder, Entity, Plane, Shape, Torus};
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::path::Path;
-use view::{FingerMoment, Moment, Picture, Stage, Studio};
+use view::{Eyes, FingerMoment, Moment, Picture, Stage, Studio};
 use world::{Scene, SceneCamera};
 
 const SIZE: [u32; 2] = [800, 600];
@@ -79,7 +79,7 @@ fn pictures(change: impl Fn(&mut Studio)) -> Option<(Stage, Picture)> {
         }
     };
     change(&mut studio);
-    let picture = studio.take(&moment, &stage.cameras[0]);
+    let picture = studio.take(&moment, &stage.cameras[0], &Eyes::default());
     Some((stage, picture))
 }
 
