@@ -11,6 +11,7 @@
 #![deny(missing_docs)]
 
 pub mod eyes;
+mod lamp;
 pub mod moment;
 mod offscreen;
 mod overlay;

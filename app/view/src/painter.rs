@@ -1,6 +1,7 @@
 //! Draws a moment of a stage.
 
 use crate::eyes::{Eyes, Look};
+use crate::lamp::Lamp;
 use crate::moment::Moment;
 use crate::overlay::Overlay;
 use crate::stage::{Stage, Thing};
@@ -9,8 +10,8 @@ use nalgebra::Isometry3;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use three_d::{
-    AmbientLight, Attenuation, ClearState, Context, CpuMaterial, CpuMesh, DirectionalLight, Gm, Indices,
-    Light, Mat4, Mesh, Object, PhysicalMaterial, PointLight, Positions, RenderTarget, Srgba, WriteMask, vec3,
+    AmbientLight, ClearState, Context, CpuMaterial, CpuMesh, DirectionalLight, Gm, Indices, Light, Mat4,
+    Mesh, Object, PhysicalMaterial, Positions, RenderTarget, Srgba, WriteMask, vec3,
 };
 use world::{LightKind, SceneCamera, SceneLight};
 
@@ -40,7 +41,7 @@ struct Drawn {
 
 enum Shining {
     Sun { light: DirectionalLight, casts_shadow: bool },
-    Lamp(PointLight),
+    Lamp { light: Lamp, casts_shadow: bool },
 }
 
 impl Painter {
@@ -97,13 +98,18 @@ impl Painter {
 
     fn cast_shadows(&mut self) {
         let (things, with_shadows) = (&self.things, self.with_shadows);
+        let casting = things.iter().filter(|drawn| drawn.thing.casts_shadow);
+        let casting: Vec<&Mesh> = casting.map(|drawn| &drawn.model.geometry).collect();
         for light in &mut self.lights {
-            let Shining::Sun { light, casts_shadow } = light else { continue };
-            let casting =
-                things.iter().filter(|drawn| drawn.thing.casts_shadow).map(|drawn| &drawn.model.geometry);
-            let is_cast = with_shadows && *casts_shadow;
-            if !is_cast || light.generate_shadow_map(SHADOW_SIDE, casting.collect::<Vec<_>>()).is_err() {
-                light.clear_shadow_map();
+            match light {
+                Shining::Sun { light, casts_shadow } => {
+                    let is_cast = with_shadows && *casts_shadow;
+                    if !is_cast || light.generate_shadow_map(SHADOW_SIDE, casting.iter()).is_err() {
+                        light.clear_shadow_map();
+                    }
+                }
+                Shining::Lamp { light, casts_shadow: true } if with_shadows => light.cast(&casting),
+                Shining::Lamp { light, .. } => light.cast_none(),
             }
         }
     }
@@ -118,7 +124,7 @@ impl Shining {
     fn light(&self) -> &dyn Light {
         match self {
             Self::Sun { light, .. } => light,
-            Self::Lamp(light) => light,
+            Self::Lamp { light, .. } => light,
         }
     }
 }
@@ -137,9 +143,9 @@ fn shining(context: &Context, light: &SceneLight) -> Option<Shining> {
             casts_shadow: light.casts_shadow,
         },
         LightKind::Point { position_m, attenuation } => {
-            let [constant, linear, quadratic] = attenuation.map(|part| part as f32);
-            let attenuation = Attenuation { constant, linear, quadratic };
-            Shining::Lamp(PointLight::new(context, BRIGHT, colour, vector(&position_m.coords), attenuation))
+            let lamp =
+                Lamp::new(context, BRIGHT, colour, vector(&position_m.coords), vector(&attenuation.into()));
+            Shining::Lamp { light: lamp, casts_shadow: light.casts_shadow }
         }
     })
 }
