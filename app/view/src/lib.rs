@@ -23,7 +23,7 @@ pub mod stage;
 pub mod triangles;
 
 pub use eyes::Eyes;
-pub use moment::{FingerMoment, Moment};
+pub use moment::{ContactMoment, FingerMoment, Moment};
 pub use offscreen::{NoPictures, Offscreen};
 pub use picture::{Picture, Studio};
 pub use stage::{Stage, Thing};

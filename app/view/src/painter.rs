@@ -19,6 +19,9 @@ use world::{LightKind, SceneCamera, SceneLight};
 const SHADOW_SIDE: u32 = 2048;
 /// What is behind everything: red, green, blue.
 const BACKGROUND: [f32; 3] = [0.86, 0.89, 0.93];
+/// What things that are touched become like: red, green, blue; and how much.
+const MARK: [f64; 3] = [1.0, 0.95, 0.5];
+const MARKED: f64 = 0.3;
 
 /// What draws: everything of a stage that lies in the graphics memory.
 pub struct Painter {
@@ -30,6 +33,8 @@ pub struct Painter {
     overlay: Overlay,
     /// Whether hands, forces and contacts are drawn.
     pub with_overlay: bool,
+    /// Whether things change their colour while they are touched.
+    pub with_highlight: bool,
     /// Whether there are shadows.
     pub with_shadows: bool,
 }
@@ -61,6 +66,7 @@ impl Painter {
             lights: stage.lights.iter().filter_map(|light| shining(context, light)).collect(),
             overlay: Overlay::new(context, &stage.radii_m),
             with_overlay: true,
+            with_highlight: true,
             with_shadows: true,
         }
     }
@@ -81,17 +87,22 @@ impl Painter {
         for drawn in &mut self.things {
             let pose = moment.poses.get(drawn.thing.entity).copied().unwrap_or_default();
             drawn.model.set_transformation(matrix(&(pose * drawn.thing.pose)));
+            let is_touched = moment.fingers.iter().any(|finger| finger.entity == Some(drawn.thing.entity));
+            let is_marked = is_touched && self.with_overlay && self.with_highlight;
+            drawn.model.material.albedo =
+                bytes(if is_marked { touched(drawn.thing.colour) } else { drawn.thing.colour });
         }
         self.overlay.place(moment);
     }
 
     fn draw_look(&mut self, look: &Look, target: &RenderTarget<'_>) {
         self.things.iter_mut().for_each(|drawn| mask(&mut drawn.model.material, look.channels));
-        self.overlay.mask(look.channels);
         let own = self.lights.iter().map(Shining::light);
         let lights: Vec<&dyn Light> = [&self.everywhere as &dyn Light].into_iter().chain(own).collect();
         target.render(&look.eye, self.things.iter().map(|drawn| &drawn.model as &dyn Object), &lights);
-        if self.with_overlay {
+        // What things hide first: what is not hidden would hide it.
+        for is_hidden in [true, false].into_iter().filter(|_| self.with_overlay) {
+            self.overlay.show(look.channels, is_hidden);
             target.render(&look.eye, self.overlay.objects(), &lights);
         }
     }
@@ -162,15 +173,20 @@ fn colour_of(shares: [f64; 3]) -> Srgba {
     Srgba::new(r, g, b, 255)
 }
 
-pub(crate) fn material(context: &Context, [r, g, b, opacity]: [f64; 4]) -> PhysicalMaterial {
-    let byte = |share: f64| (255.0 * share).round() as u8;
-    let made = CpuMaterial {
-        albedo: Srgba::new(byte(r), byte(g), byte(b), byte(opacity)),
-        roughness: 0.7,
-        metallic: 0.0,
-        ..CpuMaterial::default()
-    };
-    if opacity < 1.0 {
+/// Mixed with what marks things that are touched (Melder 8.3.1.2).
+fn touched([r, g, b, opacity]: [f64; 4]) -> [f64; 4] {
+    let mixed = |own: f64, mark: f64| (1.0 - MARKED) * own + MARKED * mark;
+    let [mark_r, mark_g, mark_b] = MARK;
+    [mixed(r, mark_r), mixed(g, mark_g), mixed(b, mark_b), opacity]
+}
+
+fn bytes(colour: [f64; 4]) -> Srgba {
+    colour.map(|share| (255.0 * share).round() as u8).into()
+}
+
+pub(crate) fn material(context: &Context, colour: [f64; 4]) -> PhysicalMaterial {
+    let made = CpuMaterial { albedo: bytes(colour), roughness: 0.7, metallic: 0.0, ..CpuMaterial::default() };
+    if colour[3] < 1.0 {
         PhysicalMaterial::new_transparent(context, &made)
     } else {
         PhysicalMaterial::new_opaque(context, &made)

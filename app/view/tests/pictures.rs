@@ -64,6 +64,7 @@ fn table() -> (Stage, Moment) {
         god_object: Vector3::new(0.0, 0.05, 0.01),
         force: Vector3::new(0.0, 2.0, 0.0),
         entity: Some(1),
+        contact: None,
     };
     (Stage::new(&scene, &entities), Moment { t_s: 0.0, poses, fingers: vec![finger] })
 }
