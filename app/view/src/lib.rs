@@ -21,6 +21,7 @@ pub mod shapes;
 mod solids;
 pub mod stage;
 pub mod triangles;
+mod usual;
 
 pub use eyes::Eyes;
 pub use moment::{ContactMoment, FingerMoment, Moment};
