@@ -49,7 +49,7 @@ impl Eyes {
     pub fn looks(&self, camera: &SceneCamera, [width, height]: [u32; 2]) -> Vec<Look> {
         let all = [true; 3];
         let at = |x: u32, y: u32, width, height| Viewport { x: x as i32, y: y as i32, width, height };
-        // An eye that shares an edge with nobody has at least a pixel.
+        // Windows may be without height or width for a while.
         let (half_width, half_height) = ((width / 2).max(1), (height / 2).max(1));
         let whole = at(0, 0, width, height);
         let (left, right) = match self.mode {
@@ -58,12 +58,12 @@ impl Eyes {
             }
             StereoMode::SideBySide => {
                 let side = |x| at(x, 0, half_width, height);
-                ((side(0), all), (side(width - half_width), all))
+                ((side(0), all), (side(width.saturating_sub(half_width)), all))
             }
             StereoMode::TopBottom => {
                 // Rows count from below.
                 let side = |y| at(0, y, width, half_height);
-                ((side(height - half_height), all), (side(0), all))
+                ((side(height.saturating_sub(half_height)), all), (side(0), all))
             }
             StereoMode::Anaglyph => ((whole, [true, false, false]), (whole, [false, true, true])),
         };

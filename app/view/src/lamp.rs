@@ -23,10 +23,10 @@ const SHADED: LightId = LightId(0x11);
 pub(crate) struct Lamp {
     context: Context,
     /// Red, green, blue; linear, with the brightness in it.
-    pub(crate) colour: Vec3,
-    pub(crate) place: Vec3,
+    colour: Vec3,
+    place: Vec3,
     /// `1 / (a + b d + c d^2)` is left at the distance d.
-    pub(crate) attenuation: Vec3,
+    attenuation: Vec3,
     depths: Option<DepthTextureCubeMap>,
     is_shading: bool,
     nearest: f32,

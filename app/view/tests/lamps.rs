@@ -8,8 +8,8 @@ use world::{Scene, SceneCamera};
 
 const SIZE: [u32; 2] = [800, 600];
 
-/// A ball five centimetres above a floor, a lamp at its upper left.
-fn floor(attenuation: [f64; 3], casts_shadow: bool) -> Option<(SceneCamera, Picture)> {
+/// A ball five centimetres above a floor, a lamp somewhere.
+fn floor(lamp: [f64; 3], attenuation: [f64; 3], casts_shadow: bool) -> Option<(SceneCamera, Picture)> {
     let scene = format!(
         r#"
 name = "lamp"
@@ -32,7 +32,7 @@ look_at_m = [0.0, 0.0, 0.0]
 field_of_view_deg = 35.0
 [[light]]
 kind = "point"
-position_m = [-0.1, 0.2, 0.0]
+position_m = {lamp:?}
 diffuse = [0.6, 0.6, 0.6]
 attenuation = {attenuation:?}
 casts_shadow = {casts_shadow}
@@ -75,12 +75,13 @@ fn light((camera, picture): &(SceneCamera, Picture), x: f64, z: f64) -> f64 {
 
 /// Half a step of 255 in brightness is 1 % of the power at the darkest place (0.31), and places are known to a pixel.
 const ROUNDED: f64 = 0.02;
+const UPPER_LEFT: [f64; 3] = [-0.1, 0.2, 0.0];
 const EVEN: [f64; 3] = [1.0, 0.0, 0.0];
 
 #[test]
 fn a_lamps_shadow_lies_where_the_line_from_it_through_the_ball_meets_the_floor() {
-    let Some(with) = floor(EVEN, true) else { return };
-    let Some(without) = floor(EVEN, false) else { return };
+    let Some(with) = floor(UPPER_LEFT, EVEN, true) else { return };
+    let Some(without) = floor(UPPER_LEFT, EVEN, false) else { return };
     // From (-0.1, 0.2) through (0, 0.05) to the floor.
     let shadow = 0.1 / 3.0;
     assert!(light(&with, shadow, 0.0) < 0.1 * light(&without, shadow, 0.0));
@@ -96,9 +97,25 @@ fn a_lamps_shadow_lies_where_the_line_from_it_through_the_ball_meets_the_floor()
 }
 
 #[test]
+fn shadows_are_right_on_all_sides_of_a_lamp() {
+    for [x, z] in [[-0.1, 0.03], [0.1, 0.03], [0.03, -0.1], [-0.03, 0.1]] {
+        let lamp = [x, 0.09, z];
+        let Some(with) = floor(lamp, EVEN, true) else { return };
+        let Some(without) = floor(lamp, EVEN, false) else { return };
+        // The ball is five ninths as high as the lamp: 9 / 4 of the way to it is the floor.
+        let at = |x: f64, z: f64| light(&with, x, z) / light(&without, x, z);
+        let (shadow_x, shadow_z) = (x - 2.25 * x, z - 2.25 * z);
+        assert!(at(shadow_x, shadow_z) < 0.2, "{lamp:?}: {}", at(shadow_x, shadow_z));
+        for [x, z] in [[-shadow_x, shadow_z], [shadow_x, -shadow_z]] {
+            assert!((at(x, z) - 1.0).abs() < 0.03, "{lamp:?}: {}", at(x, z));
+        }
+    }
+}
+
+#[test]
 fn a_lamps_light_falls_off_with_distance_as_the_scene_says() {
-    let Some(even) = floor(EVEN, true) else { return };
-    let Some(falling) = floor([0.5, 1.0, 20.0], true) else { return };
+    let Some(even) = floor(UPPER_LEFT, EVEN, true) else { return };
+    let Some(falling) = floor(UPPER_LEFT, [0.5, 1.0, 20.0], true) else { return };
     for x in [-0.1, 0.1, 0.15] {
         let d = 0.2_f64.hypot(x + 0.1).hypot(0.08);
         let left = 1.0 / (0.5 + d + 20.0 * d * d);
