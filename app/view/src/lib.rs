@@ -10,6 +10,8 @@
 //! Frames and units are those of the scene: metres, y up, cameras look along -z.
 #![deny(missing_docs)]
 
+pub mod eyes;
+mod lamp;
 pub mod moment;
 mod offscreen;
 mod overlay;
@@ -19,8 +21,10 @@ pub mod shapes;
 mod solids;
 pub mod stage;
 pub mod triangles;
+mod usual;
 
-pub use moment::{FingerMoment, Moment};
+pub use eyes::Eyes;
+pub use moment::{ContactMoment, FingerMoment, Moment};
 pub use offscreen::{NoPictures, Offscreen};
 pub use picture::{Picture, Studio};
 pub use stage::{Stage, Thing};

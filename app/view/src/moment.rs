@@ -1,5 +1,6 @@
 //! What is to be seen at one moment: where everything is and what the fingers feel.
 
+use haptics::Feature;
 use nalgebra::{Isometry3, Vector3};
 
 /// A moment of a run.
@@ -24,6 +25,19 @@ pub struct FingerMoment {
     pub force: Vector3<f64>,
     /// Which entity it touches.
     pub entity: Option<usize>,
+    /// What the touched surface is like there; `None`: nothing of it is drawn.
+    pub contact: Option<ContactMoment>,
+}
+
+/// Where a finger touches a surface; world frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContactMoment {
+    /// Outward from what is touched; unit length.
+    pub normal: Vector3<f64>,
+    /// Of the circle around the HIP's foot on the tangent plane within which the finger sticks (m); `None`: no friction.
+    pub friction_radius_m: Option<f64>,
+    /// What kind of piece of the surface it is.
+    pub feature: Feature,
 }
 
 impl Moment {
@@ -38,6 +52,7 @@ impl Moment {
             god_object: between(&a.god_object, &b.god_object),
             force: between(&a.force, &b.force),
             entity: b.entity,
+            contact: b.contact,
         };
         Self {
             t_s: self.t_s + share * (later.t_s - self.t_s),

@@ -1,5 +1,7 @@
 //! Draws a moment of a stage.
 
+use crate::eyes::{Eyes, Look};
+use crate::lamp::Lamp;
 use crate::moment::Moment;
 use crate::overlay::Overlay;
 use crate::stage::{Stage, Thing};
@@ -8,9 +10,8 @@ use nalgebra::Isometry3;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use three_d::{
-    AmbientLight, Attenuation, Camera, ClearState, Context, CpuMaterial, CpuMesh, DirectionalLight, Gm,
-    Indices, Light, Mat4, Mesh, Object, PhysicalMaterial, PointLight, Positions, RenderTarget, Srgba,
-    Viewport, vec3,
+    AmbientLight, ClearState, Context, CpuMaterial, CpuMesh, DirectionalLight, Gm, Indices, Light, Mat4,
+    Mesh, Object, PhysicalMaterial, Positions, RenderTarget, Srgba, WriteMask, vec3,
 };
 use world::{LightKind, SceneCamera, SceneLight};
 
@@ -18,6 +19,9 @@ use world::{LightKind, SceneCamera, SceneLight};
 const SHADOW_SIDE: u32 = 2048;
 /// What is behind everything: red, green, blue.
 const BACKGROUND: [f32; 3] = [0.86, 0.89, 0.93];
+/// What things that are touched become like: red, green, blue; and how much.
+const MARK: [f64; 3] = [1.0, 0.95, 0.5];
+const MARKED: f64 = 0.3;
 
 /// What draws: everything of a stage that lies in the graphics memory.
 pub struct Painter {
@@ -29,6 +33,8 @@ pub struct Painter {
     overlay: Overlay,
     /// Whether hands, forces and contacts are drawn.
     pub with_overlay: bool,
+    /// Whether things change their colour while they are touched.
+    pub with_highlight: bool,
     /// Whether there are shadows.
     pub with_shadows: bool,
 }
@@ -40,7 +46,7 @@ struct Drawn {
 
 enum Shining {
     Sun { light: DirectionalLight, casts_shadow: bool },
-    Lamp(PointLight),
+    Lamp { light: Lamp, casts_shadow: bool },
 }
 
 impl Painter {
@@ -60,37 +66,61 @@ impl Painter {
             lights: stage.lights.iter().filter_map(|light| shining(context, light)).collect(),
             overlay: Overlay::new(context, &stage.radii_m),
             with_overlay: true,
+            with_highlight: true,
             with_shadows: true,
         }
     }
 
-    /// Draws into a target; `eye` is the camera that looks, which has the target's size.
-    pub fn draw(&mut self, moment: &Moment, eye: &Camera, target: &RenderTarget<'_>) {
+    /// Draws into a target what eyes at a camera see.
+    pub fn draw(&mut self, moment: &Moment, camera: &SceneCamera, eyes: &Eyes, target: &RenderTarget<'_>) {
+        self.place(moment);
+        self.cast_shadows();
+        let [r, g, b] = BACKGROUND;
+        target.clear(ClearState::color_and_depth(r, g, b, 1.0, 1.0));
+        for look in eyes.looks(camera, [target.width(), target.height()]) {
+            target.clear(ClearState::depth(1.0));
+            self.draw_look(&look, target);
+        }
+    }
+
+    fn place(&mut self, moment: &Moment) {
         for drawn in &mut self.things {
             let pose = moment.poses.get(drawn.thing.entity).copied().unwrap_or_default();
             drawn.model.set_transformation(matrix(&(pose * drawn.thing.pose)));
+            let is_touched = moment.fingers.iter().any(|finger| finger.entity == Some(drawn.thing.entity));
+            let is_marked = is_touched && self.with_overlay && self.with_highlight;
+            drawn.model.material.albedo =
+                bytes(if is_marked { touched(drawn.thing.colour) } else { drawn.thing.colour });
         }
-        self.cast_shadows();
+        self.overlay.place(moment);
+    }
+
+    fn draw_look(&mut self, look: &Look, target: &RenderTarget<'_>) {
+        self.things.iter_mut().for_each(|drawn| mask(&mut drawn.model.material, look.channels));
         let own = self.lights.iter().map(Shining::light);
         let lights: Vec<&dyn Light> = [&self.everywhere as &dyn Light].into_iter().chain(own).collect();
-        let [r, g, b] = BACKGROUND;
-        target.clear(ClearState::color_and_depth(r, g, b, 1.0, 1.0));
-        target.render(eye, self.things.iter().map(|drawn| &drawn.model as &dyn Object), &lights);
-        if self.with_overlay {
-            self.overlay.place(moment);
-            target.render(eye, self.overlay.objects(), &lights);
+        target.render(&look.eye, self.things.iter().map(|drawn| &drawn.model as &dyn Object), &lights);
+        // What things hide first: what is not hidden would hide it.
+        for is_hidden in [true, false].into_iter().filter(|_| self.with_overlay) {
+            self.overlay.show(look.channels, is_hidden);
+            target.render(&look.eye, self.overlay.objects(), &lights);
         }
     }
 
     fn cast_shadows(&mut self) {
         let (things, with_shadows) = (&self.things, self.with_shadows);
+        let casting = things.iter().filter(|drawn| drawn.thing.casts_shadow);
+        let casting: Vec<&Mesh> = casting.map(|drawn| &drawn.model.geometry).collect();
         for light in &mut self.lights {
-            let Shining::Sun { light, casts_shadow } = light else { continue };
-            let casting =
-                things.iter().filter(|drawn| drawn.thing.casts_shadow).map(|drawn| &drawn.model.geometry);
-            let is_cast = with_shadows && *casts_shadow;
-            if !is_cast || light.generate_shadow_map(SHADOW_SIDE, casting.collect::<Vec<_>>()).is_err() {
-                light.clear_shadow_map();
+            match light {
+                Shining::Sun { light, casts_shadow } => {
+                    let is_cast = with_shadows && *casts_shadow;
+                    if !is_cast || light.generate_shadow_map(SHADOW_SIDE, casting.iter()).is_err() {
+                        light.clear_shadow_map();
+                    }
+                }
+                Shining::Lamp { light, casts_shadow: true } if with_shadows => light.cast(&casting),
+                Shining::Lamp { light, .. } => light.cast_none(),
             }
         }
     }
@@ -105,7 +135,7 @@ impl Shining {
     fn light(&self) -> &dyn Light {
         match self {
             Self::Sun { light, .. } => light,
-            Self::Lamp(light) => light,
+            Self::Lamp { light, .. } => light,
         }
     }
 }
@@ -124,9 +154,9 @@ fn shining(context: &Context, light: &SceneLight) -> Option<Shining> {
             casts_shadow: light.casts_shadow,
         },
         LightKind::Point { position_m, attenuation } => {
-            let [constant, linear, quadratic] = attenuation.map(|part| part as f32);
-            let attenuation = Attenuation { constant, linear, quadratic };
-            Shining::Lamp(PointLight::new(context, BRIGHT, colour, vector(&position_m.coords), attenuation))
+            let lamp =
+                Lamp::new(context, BRIGHT, colour, vector(&position_m.coords), vector(&attenuation.into()));
+            Shining::Lamp { light: lamp, casts_shadow: light.casts_shadow }
         }
     })
 }
@@ -143,19 +173,30 @@ fn colour_of(shares: [f64; 3]) -> Srgba {
     Srgba::new(r, g, b, 255)
 }
 
-pub(crate) fn material(context: &Context, [r, g, b, opacity]: [f64; 4]) -> PhysicalMaterial {
-    let byte = |share: f64| (255.0 * share).round() as u8;
-    let made = CpuMaterial {
-        albedo: Srgba::new(byte(r), byte(g), byte(b), byte(opacity)),
-        roughness: 0.7,
-        metallic: 0.0,
-        ..CpuMaterial::default()
-    };
-    if opacity < 1.0 {
+/// Mixed with what marks things that are touched (Melder 8.3.1.2).
+fn touched([r, g, b, opacity]: [f64; 4]) -> [f64; 4] {
+    let mixed = |own: f64, mark: f64| (1.0 - MARKED) * own + MARKED * mark;
+    let [mark_r, mark_g, mark_b] = MARK;
+    [mixed(r, mark_r), mixed(g, mark_g), mixed(b, mark_b), opacity]
+}
+
+fn bytes(colour: [f64; 4]) -> Srgba {
+    colour.map(|share| (255.0 * share).round() as u8).into()
+}
+
+pub(crate) fn material(context: &Context, colour: [f64; 4]) -> PhysicalMaterial {
+    let made = CpuMaterial { albedo: bytes(colour), roughness: 0.7, metallic: 0.0, ..CpuMaterial::default() };
+    if colour[3] < 1.0 {
         PhysicalMaterial::new_transparent(context, &made)
     } else {
         PhysicalMaterial::new_opaque(context, &made)
     }
+}
+
+/// Lets only these of red, green and blue be drawn.
+pub(crate) fn mask(material: &mut PhysicalMaterial, [red, green, blue]: [bool; 3]) {
+    let write_mask = &mut material.render_states.write_mask;
+    *write_mask = WriteMask { red, green, blue, ..*write_mask };
 }
 
 pub(crate) fn mesh_of(triangles: &Triangles) -> CpuMesh {
@@ -174,18 +215,4 @@ pub(crate) fn vector(v: &nalgebra::Vector3<f64>) -> three_d::Vec3 {
 pub(crate) fn matrix(pose: &Isometry3<f64>) -> Mat4 {
     let entries: [[f32; 4]; 4] = pose.to_homogeneous().cast::<f32>().into();
     entries.into()
-}
-
-/// A scene's camera, for a picture of this size (pixels).
-pub fn camera(of: &SceneCamera, [width, height]: [u32; 2]) -> Camera {
-    let at = |x, y, z| of.pose * nalgebra::Point3::new(x, y, z);
-    Camera::new_perspective(
-        Viewport::new_at_origo(width, height),
-        vector(&at(0.0, 0.0, 0.0).coords),
-        vector(&at(0.0, 0.0, -1.0).coords),
-        vector(&(of.pose.rotation * nalgebra::Vector3::y())),
-        three_d::degrees(of.field_of_view_deg as f32),
-        of.near_m as f32,
-        of.far_m as f32,
-    )
 }

@@ -1,8 +1,9 @@
 //! Pictures in files, drawn without a display.
 
+use crate::eyes::Eyes;
 use crate::moment::Moment;
 use crate::offscreen::{NoPictures, Offscreen};
-use crate::painter::{Painter, camera};
+use crate::painter::Painter;
 use crate::stage::Stage;
 use std::path::Path;
 use three_d::{DepthTexture2D, Interpolation, RenderTarget, Texture2D, Wrapping};
@@ -63,10 +64,10 @@ impl Studio {
         Ok(Self { painter: Painter::new(context, stage), colour, depth, size, offscreen })
     }
 
-    /// A moment, seen by a camera.
-    pub fn take(&mut self, moment: &Moment, eye: &world::SceneCamera) -> Picture {
+    /// A moment, seen by eyes at a camera.
+    pub fn take(&mut self, moment: &Moment, camera: &world::SceneCamera, eyes: &Eyes) -> Picture {
         let target = RenderTarget::new(self.colour.as_color_target(None), self.depth.as_depth_target());
-        self.painter.draw(moment, &camera(eye, self.size), &target);
+        self.painter.draw(moment, camera, eyes, &target);
         Picture { size: self.size, pixels: target.read_color() }
     }
 

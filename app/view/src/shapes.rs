@@ -107,10 +107,10 @@ fn frustum(radii_m: [f64; 2], length_m: f64) -> Triangles {
 
 fn torus(ring_m: f64, tube_m: f64) -> Triangles {
     let ring = |step: u32| {
-        let (sin, cos) = (TAU * f64::from(step) / f64::from(ACROSS)).sin_cos();
+        let (sin, cos) = (TAU * f64::from(step) / f64::from(AROUND)).sin_cos();
         Ring { place: [ring_m + tube_m * cos, tube_m * sin], normal: [cos, sin] }
     };
-    Triangles::revolved(&(0..=ACROSS).map(ring).collect::<Vec<_>>(), AROUND)
+    Triangles::revolved(&(0..=AROUND).map(ring).collect::<Vec<_>>(), AROUND)
 }
 
 /// Smooth where faces meet at a small angle; sharp edges stay sharp.

@@ -2,12 +2,13 @@
 
 use crate::shapes;
 use crate::triangles::Triangles;
+use crate::usual;
 use haptics::mesh::TriangleSoup;
 use haptics::{Entity, Shape};
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::Isometry3;
 use std::sync::Arc;
 use world::seen::{SeenForm, SeenPart};
-use world::{LightKind, Scene, SceneCamera, SceneLight, ShapeSpec};
+use world::{Scene, SceneCamera, SceneLight, ShapeSpec};
 
 /// What can be seen.
 #[derive(Debug, Clone, Default)]
@@ -65,11 +66,12 @@ impl Stage {
                     .push(format!("{}: what it is drawn as has no triangles", part.entity.name)),
             }
         }
+        usual::colour(scene, &mut stage.things);
         if stage.lights.is_empty() {
-            stage.lights = usual_lights();
+            stage.lights = usual::lights();
         }
         if stage.cameras.is_empty() {
-            stage.cameras = vec![usual_camera(scene, entities)];
+            stage.cameras = vec![usual::camera(scene, entities, &stage.things)];
         }
         stage
     }
@@ -107,44 +109,5 @@ impl<'s> Looks<'s> {
                 Some(made)
             }
         }
-    }
-}
-
-/// The sun from above, behind the left shoulder, and some light from everywhere.
-fn usual_lights() -> Vec<SceneLight> {
-    let grey = |share| [share; 3];
-    let light = |name: &str, kind, diffuse, ambient, casts_shadow| SceneLight {
-        name: name.into(),
-        kind,
-        diffuse: grey(diffuse),
-        specular: grey(diffuse),
-        ambient: grey(ambient),
-        casts_shadow,
-    };
-    let direction = nalgebra::Unit::new_normalize(Vector3::new(0.45, -1.0, -0.35));
-    vec![
-        light("sky", LightKind::Ambient, 0.0, 0.4, false),
-        light("sun", LightKind::Directional { direction }, 0.6, 0.0, true),
-    ]
-}
-
-/// Sees all that is near the fingers and what moves, from the front and above.
-fn usual_camera(scene: &Scene, entities: &[Entity]) -> SceneCamera {
-    let mut places: Vec<Point3<f64>> = scene.fingers.iter().map(|finger| finger.start_m).collect();
-    let moving = scene.entities.iter().zip(entities).filter(|(spec, _)| spec.motion.is_some());
-    places.extend(moving.map(|(_, entity)| Point3::from(entity.X_WB.translation.vector)));
-    let middle = places.iter().fold(Vector3::zeros(), |sum, at| sum + at.coords) / places.len().max(1) as f64;
-    let reach_m = places.iter().map(|at| (at.coords - middle).norm()).fold(0.1, f64::max);
-    let field_of_view_deg = SceneCamera::DEFAULT_FIELD_OF_VIEW_DEG;
-    let away_m = 1.6 * reach_m / (0.5 * field_of_view_deg.to_radians()).tan();
-    let eye = Point3::from(middle + away_m * Vector3::new(0.25, 0.45, 1.0).normalize());
-    // A frame that looks along z has x to the left; a camera's looks along -z.
-    let pose = Isometry3::face_towards(&eye, &(eye + (eye.coords - middle)), &Vector3::y());
-    SceneCamera {
-        name: "usual".into(),
-        pose,
-        field_of_view_deg,
-        near_m: 0.02 * away_m,
-        far_m: (50.0 * away_m).max(SceneCamera::DEFAULT_FAR_M),
     }
 }

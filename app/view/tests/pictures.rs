@@ -3,7 +3,7 @@
 use haptics::{Cuboid, Cylinder, Entity, Plane, Shape, Torus};
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::path::Path;
-use view::{FingerMoment, Moment, Picture, Stage, Studio};
+use view::{Eyes, FingerMoment, Moment, Picture, Stage, Studio};
 use world::{Scene, SceneCamera};
 
 const SIZE: [u32; 2] = [800, 600];
@@ -64,6 +64,7 @@ fn table() -> (Stage, Moment) {
         god_object: Vector3::new(0.0, 0.05, 0.01),
         force: Vector3::new(0.0, 2.0, 0.0),
         entity: Some(1),
+        contact: None,
     };
     (Stage::new(&scene, &entities), Moment { t_s: 0.0, poses, fingers: vec![finger] })
 }
@@ -79,7 +80,7 @@ fn pictures(change: impl Fn(&mut Studio)) -> Option<(Stage, Picture)> {
         }
     };
     change(&mut studio);
-    let picture = studio.take(&moment, &stage.cameras[0]);
+    let picture = studio.take(&moment, &stage.cameras[0], &Eyes::default());
     Some((stage, picture))
 }
 

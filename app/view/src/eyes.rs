@@ -1,0 +1,132 @@
+//! Two eyes: what each of them sees, and where in the picture.
+//!
+//! Model: both eyes look along the camera's -z, half a separation to its left and right; their frusta are skewed so that
+//! both see the same at the convergence distance. What is nearer stands out of the picture, what is farther lies behind it,
+//! and nothing is shifted up or down as it would be by eyes that turn.
+
+use nalgebra::Isometry3;
+use three_d::{Camera, ColorMapping, Mat4, ToneMapping, Vec3, Viewer, Viewport, degrees};
+use world::{SceneCamera, StereoMode};
+
+use crate::painter::vector;
+
+/// How two eyes are served; may change from picture to picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Eyes {
+    /// Left is left, and left is above. Pixels stay square: halves are not squeezed. `QuadBuffer` is for windows that have
+    /// the buffers; other pictures are then for one eye.
+    pub mode: StereoMode,
+    /// Between them (m).
+    pub separation_m: f64,
+    /// How far away, along the view, both see the same (m); above 0.
+    pub convergence_m: f64,
+}
+
+impl Default for Eyes {
+    /// One eye; two would be as far apart as people's are.
+    fn default() -> Self {
+        Self { mode: StereoMode::Off, separation_m: 0.063, convergence_m: 0.6 }
+    }
+}
+
+/// What one eye contributes to a picture.
+pub struct Look {
+    /// The eye.
+    pub eye: Eye,
+    /// Which of red, green and blue it draws.
+    pub channels: [bool; 3],
+}
+
+/// A camera whose frustum may be skewed sideways.
+pub struct Eye {
+    camera: Camera,
+    /// What is added to where things are in the picture, in halves of its width.
+    skew: f32,
+}
+
+impl Eyes {
+    /// The looks that make a picture of this size (pixels), one after the other.
+    pub fn looks(&self, camera: &SceneCamera, [width, height]: [u32; 2]) -> Vec<Look> {
+        let all = [true; 3];
+        let at = |x: u32, y: u32, width, height| Viewport { x: x as i32, y: y as i32, width, height };
+        // Windows may be without height or width for a while.
+        let (half_width, half_height) = ((width / 2).max(1), (height / 2).max(1));
+        let whole = at(0, 0, width, height);
+        let (left, right) = match self.mode {
+            StereoMode::Off | StereoMode::QuadBuffer => {
+                return vec![Look { eye: Eye::new(camera, whole, 0.0, f64::INFINITY), channels: all }];
+            }
+            StereoMode::SideBySide => {
+                let side = |x| at(x, 0, half_width, height);
+                ((side(0), all), (side(width.saturating_sub(half_width)), all))
+            }
+            StereoMode::TopBottom => {
+                // Rows count from below.
+                let side = |y| at(0, y, width, half_height);
+                ((side(height.saturating_sub(half_height)), all), (side(0), all))
+            }
+            StereoMode::Anaglyph => ((whole, [true, false, false]), (whole, [false, true, true])),
+        };
+        let look = |(viewport, channels), side: f64| Look {
+            eye: Eye::new(camera, viewport, side * 0.5 * self.separation_m, self.convergence_m),
+            channels,
+        };
+        vec![look(left, -1.0), look(right, 1.0)]
+    }
+}
+
+impl Eye {
+    /// So far to the right of a camera (m), with whose picture its own agrees at that distance (m).
+    pub fn new(of: &SceneCamera, viewport: Viewport, right_m: f64, convergence_m: f64) -> Self {
+        let pose = of.pose * Isometry3::translation(right_m, 0.0, 0.0);
+        let at = |x, y, z| pose * nalgebra::Point3::new(x, y, z);
+        let camera = Camera::new_perspective(
+            viewport,
+            vector(&at(0.0, 0.0, 0.0).coords),
+            vector(&at(0.0, 0.0, -1.0).coords),
+            vector(&(pose.rotation * nalgebra::Vector3::y())),
+            degrees(of.field_of_view_deg as f32),
+            of.near_m as f32,
+            of.far_m as f32,
+        );
+        let tangent = (0.5 * of.field_of_view_deg).to_radians().tan() * f64::from(viewport.aspect());
+        Self { camera, skew: (right_m / (convergence_m * tangent)) as f32 }
+    }
+}
+
+impl Viewer for Eye {
+    fn position(&self) -> Vec3 {
+        self.camera.position()
+    }
+
+    fn view(&self) -> Mat4 {
+        self.camera.view()
+    }
+
+    fn projection(&self) -> Mat4 {
+        let mut skewed = self.camera.projection();
+        // Depth along the view is -z.
+        skewed.z.x -= self.skew;
+        skewed
+    }
+
+    fn viewport(&self) -> Viewport {
+        self.camera.viewport()
+    }
+
+    fn z_near(&self) -> f32 {
+        self.camera.z_near()
+    }
+
+    fn z_far(&self) -> f32 {
+        self.camera.z_far()
+    }
+
+    fn color_mapping(&self) -> ColorMapping {
+        self.camera.color_mapping
+    }
+
+    fn tone_mapping(&self) -> ToneMapping {
+        self.camera.tone_mapping
+    }
+}
