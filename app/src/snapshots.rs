@@ -15,7 +15,7 @@ use nalgebra::{Isometry3, UnitQuaternion};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
-use view::{FingerMoment, Moment, Stage, Studio};
+use view::{Eyes, FingerMoment, Moment, Stage, Studio};
 use world::SceneCamera;
 
 /// So many moments wait to be drawn.
@@ -95,11 +95,11 @@ impl Snapshots {
             std::fs::create_dir_all(&film.directory)
                 .map_err(|error| format!("--frames {}: {error}", film.directory.display()))?;
         }
-        let (fingers, size) = (stage.radii_m.len(), wanted.size);
+        let (fingers, size, eyes) = (stage.radii_m.len(), wanted.size, wanted.eyes);
         let (out, moments) = sync_channel(WAITING);
         let thread = std::thread::Builder::new()
             .name("pictures".into())
-            .spawn(move || draw_all(&stage, &camera, size, &moments))
+            .spawn(move || draw_all(&stage, (&camera, &eyes), size, &moments))
             .map_err(|error| format!("no thread for pictures: {error}"))?;
         let mut shots = wanted.shots.clone();
         shots.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
@@ -149,6 +149,7 @@ impl Snapshots {
             god_object: finger.god_object,
             force: finger.force_on_user,
             entity: finger.entity.map(|entity| entity as usize),
+            ..FingerMoment::default()
         });
         Moment {
             t_s: row.run_tick as f64 * self.period_s,
@@ -189,7 +190,7 @@ fn camera_of(stage: &Stage, name: Option<&str>) -> Result<SceneCamera, String> {
 
 fn draw_all(
     stage: &Stage,
-    camera: &SceneCamera,
+    (camera, eyes): (&SceneCamera, &Eyes),
     size: [u32; 2],
     moments: &Receiver<(Moment, PathBuf)>,
 ) -> Drawn {
@@ -209,7 +210,7 @@ fn draw_all(
     };
     drawn.renderer = studio.renderer().to_owned();
     for (moment, file) in moments {
-        if let Err(error) = studio.take(&moment, camera).save(&file) {
+        if let Err(error) = studio.take(&moment, camera, eyes).save(&file) {
             if drawn.failure.is_none() {
                 say(format_args!("phantom3: the picture {} cannot be written: {error}", file.display()));
             }

@@ -225,7 +225,7 @@ pub(super) fn make_plan(args: &RunArgs, rig: &Rig, settings: &Settings) -> Resul
         seconds: args.seconds,
         record: args.record.clone(),
         events: args.events.clone(),
-        pictures: args.pictures.wanted(),
+        pictures: args.pictures.wanted(settings),
         seed: args.seed,
         orders: order_source(args)?,
         settings: settings.clone(),

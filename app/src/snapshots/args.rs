@@ -1,7 +1,9 @@
 //! Which pictures of a run are wanted: the command line's words for them.
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use std::path::PathBuf;
+use view::Eyes;
+use world::{Settings, StereoMode};
 
 /// Pictures of a run, drawn without a display.
 #[derive(Debug, Clone, Default, Args)]
@@ -21,6 +23,23 @@ pub struct PictureArgs {
     /// Which of the scene's cameras looks on [default: its first, or one that sees all that moves]
     #[arg(long, value_name = "NAME")]
     camera: Option<String>,
+    /// Pictures for two eyes, as far apart as the settings say
+    #[arg(long, value_name = "HOW", value_enum, default_value_t = Stereo::Off)]
+    stereo: Stereo,
+}
+
+/// How two eyes get their pictures in one file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+enum Stereo {
+    /// One eye
+    #[default]
+    Off,
+    /// The left eye's on the left
+    SideBySide,
+    /// The left eye's above
+    TopBottom,
+    /// For red and cyan glasses
+    Anaglyph,
 }
 
 /// What is wanted.
@@ -34,6 +53,8 @@ pub struct Wanted {
     pub size: [u32; 2],
     /// The camera's name.
     pub camera: Option<String>,
+    /// Who looks.
+    pub eyes: Eyes,
 }
 
 /// A single picture.
@@ -56,13 +77,21 @@ pub struct Film {
 
 impl PictureArgs {
     /// `None`: none.
-    pub fn wanted(&self) -> Option<Wanted> {
+    pub fn wanted(&self, settings: &Settings) -> Option<Wanted> {
+        let mode = match self.stereo {
+            Stereo::Off => StereoMode::Off,
+            Stereo::SideBySide => StereoMode::SideBySide,
+            Stereo::TopBottom => StereoMode::TopBottom,
+            Stereo::Anaglyph => StereoMode::Anaglyph,
+        };
+        let (separation_m, convergence_m) = (settings.eye_separation_m.value, settings.convergence_m.value);
         let film = self.frames.clone().map(|directory| Film { directory, fps: self.fps });
         (film.is_some() || !self.snapshot.is_empty()).then(|| Wanted {
             shots: self.snapshot.clone(),
             film,
             size: self.picture_size,
             camera: self.camera.clone(),
+            eyes: Eyes { mode, separation_m, convergence_m },
         })
     }
 
