@@ -50,7 +50,8 @@ impl Stage {
         let told = seen.unreadable.iter().map(|(at, why)| format!("{at}: {why}"));
         stage.not_drawn.extend(told);
         let mut looks = Looks::default();
-        for part in &seen.parts {
+        // What is behind a door is for eyes that went in, and cameras do not.
+        for part in seen.parts.iter().filter(|part| part.entity.within.is_none()) {
             let index = scene.entities.iter().position(|spec| std::ptr::eq(spec, part.entity)).unwrap_or(0);
             let felt = entities.get(index).map(|entity| &entity.shape);
             match looks.of(part, felt) {
