@@ -107,7 +107,7 @@ impl Pair {
 
     /// The force on A in the last tick \[N\], over all points.
     pub(crate) fn force_W(&self, rows: &[Row]) -> Vector3<f64> {
-        rows.iter().skip(self.first_row).take(self.rows).map(|row| row.force_W).sum()
+        self.rows(rows).iter().map(|row| row.force_W).sum()
     }
 
     /// Finds where it touches, and appends a row for each point; notes those that may meet what they touch. Says whether the
@@ -172,7 +172,8 @@ impl Pair {
             }
         }
         let full_j = 0.5 * k * full;
-        if begins && self.ledger.is_closed() && (self.is_new || is_let_out) {
+        // Whoever is found deep later was not placed there: nobody has paid for that, or will be paid.
+        if begins && self.ledger.is_closed() && self.is_new {
             self.ledger = Ledger::of(full_j);
         }
         self.ledger.begin(self.bodies, start);
@@ -190,7 +191,17 @@ impl Pair {
         }
     }
 
-    /// What its springs may hold \[J\].
+    /// Somebody has put one of them where it is: what they hold there is theirs.
+    pub(crate) fn was_put(&mut self) {
+        self.is_new = true;
+    }
+
+    /// Its rows of the last tick.
+    pub(crate) fn rows<'r>(&self, rows: &'r [Row]) -> &'r [Row] {
+        rows.get(self.first_row..self.first_row + self.rows).unwrap_or_default()
+    }
+
+    /// What its springs may hold \[J\]; negative: what has to be paid back first.
     pub(crate) fn elastic_energy_j(&self) -> f64 {
         self.ledger.held_j()
     }

@@ -231,6 +231,16 @@ impl Pairs {
         }
     }
 
+    /// An entity was put somewhere else by somebody.
+    pub(crate) fn was_put(&mut self, entity: usize) {
+        for key in self.awake.iter().chain(&self.asleep) {
+            let pair = &mut self.pool[key.place as usize];
+            if pair.entities.contains(&entity) {
+                pair.was_put();
+            }
+        }
+    }
+
     /// One that was [begun](Self::begin_as) there.
     pub(crate) fn at_place(&mut self, place: u32) -> &mut Pair {
         &mut self.pool[place as usize]

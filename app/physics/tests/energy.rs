@@ -83,14 +83,19 @@ fn assert_never_grows(seed: u64, recipe: &Recipe, ticks: usize) {
     let mut world = scene(seed, recipe);
     let mut was_j = of_bodies_j(&world) + overlap_j(&world);
     for tick in 0..ticks {
-        let (held_j, slack) = (world.manipulation.elastic_energy_j(), slack_j(&world));
+        let slack = slack_j(&world);
+        let held: Vec<_> = world.manipulation.springs().map(|(pair, held_j, _)| (pair, held_j)).collect();
         world.step(&[]);
-        let pressing_j = pressing_j(world.manipulation.rows());
-        // In the first tick there is no account yet.
-        assert!(
-            tick == 0 || pressing_j <= held_j + slack,
-            "{recipe:?} {seed}, tick {tick}: {pressing_j} J press of {held_j} J"
-        );
+        for (pair, _, rows) in world.manipulation.springs().filter(|(_, _, rows)| !rows.is_empty()) {
+            // What one pair owes is no other one's: it presses with nothing, the others with what is theirs.
+            let known = held.iter().find(|(known, _)| *known == pair);
+            let (held_j, pressing_j) = (known.map_or(0.0, |known| known.1.max(0.0)), pressing_j(rows));
+            // In the first tick there is no account yet.
+            assert!(
+                tick == 0 || pressing_j <= held_j + slack,
+                "{recipe:?} {seed}, tick {tick}, {pair:?}: {pressing_j} J press of {held_j} J"
+            );
+        }
         let now_j = of_bodies_j(&world) + world.manipulation.elastic_energy_j();
         let grown_j = now_j - was_j - slack.max(slack_j(&world));
         assert!(grown_j <= 0.0, "{recipe:?} {seed}, tick {tick}: {was_j} J, then {now_j} J: {grown_j}");
@@ -122,6 +127,19 @@ fn energy_never_grows_where_springs_answer() {
 #[ignore = "some minutes; see the top of the file"]
 fn energy_never_grows_in_thousands_of_scenes() {
     throw_all(250, 4000);
+}
+
+/// A light mesh on the tube of a heavy ring (141), a ring through a cone (153): where they touch was not found for some ticks.
+/// A pair that owes beside one that presses (90, 161).
+#[test]
+fn what_is_found_late_or_beside_a_debt_gains_nothing_either() {
+    for (seed, kind, is_deep) in
+        [(141, None, false), (153, None, true), (90, Some(9), true), (161, Some(7), true)]
+    {
+        let kinds = kind.map_or(&KINDS[..], |kind: usize| &KINDS[kind..=kind]);
+        let bodies = if kind.is_some() { 1 } else { 3 };
+        assert_never_grows(seed, &Recipe { kinds, bodies, is_deep, response: Response::Force }, 4000);
+    }
 }
 
 /// A corner comes up deep inside another box when the upper one slides over the lower one's edge, without friction that would

@@ -53,6 +53,7 @@ impl Manipulation {
     /// Takes note that an entity which is no body was moved by somebody: who rests on it wakes.
     pub fn was_moved(&mut self, entity: usize, entities: &[Entity]) {
         self.broad_phase.moved(entity, &entities[entity], &Vector3::zeros());
+        self.pairs.was_put(entity);
         let Some(around) = self.broad_phase.around(entity).copied() else { return };
         self.neighbours.clear();
         let (neighbours, numbers) = (&mut self.neighbours, &self.roster.numbers);

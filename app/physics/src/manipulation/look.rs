@@ -98,6 +98,12 @@ impl Manipulation {
         self.pairs.iter().map(|(_, pair)| pair.elastic_energy_j()).sum()
     }
 
+    /// Of each pair of entities what its springs may press with in the next tick \[J\], which is nothing where that is negative; and
+    /// its rows of the last tick.
+    pub fn springs(&self) -> impl Iterator<Item = ([usize; 2], f64, &[Row])> {
+        self.pairs.iter().map(|(_, pair)| (pair.entities, pair.elastic_energy_j(), pair.rows(&self.rows)))
+    }
+
     /// Bodies that do not move any more, in the order in which they were parked: the last [`Made::parked`](crate::Made::parked) of them in the last
     /// tick.
     pub fn parked(&self) -> &[Parked] {
