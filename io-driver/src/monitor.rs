@@ -2,7 +2,7 @@
 //!
 //! Problem: whoever stands before a device wants to see at a glance where it is, what it pushes, who commands it and
 //! whether the loop keeps its time.
-//! Model: one more observer. It reads the driver's memory, mapped read-only, [`REFRESH`] after it has drawn, and asks
+//! Model: one more observer. It reads the driver's memory, mapped read-only, a fifteenth of a second after it has drawn, and asks
 //! the driver for nothing but that memory; a driver that ends is waited for.
 //! Invariant: however it ends (key, signal, error, panic), the terminal is as it was before.
 
