@@ -1,4 +1,4 @@
-//! Cameras (Melder 7.2.6, the Camera Entity). Nothing draws yet: they are checked for the window. Devices that go where
+//! Cameras (Melder 7.2.6, the Camera Entity). The crate `view` draws by them. Devices that go where
 //! the view goes are a matter of the layout, `attached_to = "camera"`.
 
 #![allow(non_snake_case)] // Frames are capital letters: X_WC takes C to W.

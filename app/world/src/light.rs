@@ -1,4 +1,4 @@
-//! Lights (Melder 7.2.6, the Light Entity). Nothing draws yet: they are checked for the window.
+//! Lights (Melder 7.2.6, the Light Entity). The crate `view` draws by them.
 
 use nalgebra::{Point3, Unit, Vector3};
 

@@ -6,7 +6,7 @@
 //! visual = [{ shape = ... }, { shape = ..., position_m = [0.0, 0.1, 0.0] }]
 //! visual = false                                   # felt, and not seen
 //! ```
-//! Nothing draws yet: this is checked for the window.
+//! The crate `view` draws it.
 
 use nalgebra::Isometry3;
 
