@@ -2,8 +2,7 @@
 //!
 //! Model: every entity is drawn once in a frame of its own; that of an entity which moves is told anew many times a
 //! second. Fingers are a ball at the HIP, a ball at the god-object and an arrow for the force on the user.
-//! Closed forms are drawn exactly, meshes in their triangles up to a limit, trees as all of their children (what is taken
-//! away shines through); patches and what is drawn out unevenly have no picture.
+//! Boxes, balls, cylinders and what is made of them are drawn exactly, everything else in triangles up to a limit.
 
 use super::foxglove::{Rgba, WORLD, arrow, cube, cylinder, frame_in_world, scene_entity, sphere, triangles};
 use super::wire::Message;
@@ -12,7 +11,7 @@ use crate::row::{BodyRow, Row};
 use haptics::{Entity, Shape};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
-use world::{CsgOp, Scene, ShapeSpec};
+use world::{Scene, ShapeSpec};
 
 /// Triangles of a mesh that are drawn at most: a picture for people, and a megabyte and a half of the file.
 const MOST_FACES: usize = 50_000;
@@ -22,12 +21,9 @@ const PLANE_REACH_M: f64 = 0.25;
 const METRES_PER_NEWTON: f64 = 0.02;
 /// A finger without a radius is drawn with this one (m).
 const POINT_RADIUS_M: f64 = 0.002;
-/// Corners around a ring and around its tube.
-const RING: [u32; 2] = [32, 16];
 
 const SOLID: Rgba = [0.55, 0.65, 0.75, 1.0];
 const MOVING: Rgba = [0.85, 0.65, 0.35, 1.0];
-const TAKEN_AWAY: Rgba = [0.8, 0.3, 0.3, 0.25];
 const HIP: Rgba = [0.3, 0.8, 0.3, 0.5];
 const GOD: Rgba = [0.9, 0.2, 0.2, 1.0];
 const FORCE: Rgba = [0.9, 0.2, 0.2, 0.8];
@@ -128,36 +124,22 @@ fn draw(out: &mut Message, shape: &ShapeSpec, entity: Option<&Entity>, at: &Isom
                 sphere(out, &(at * Translation3::new(0.0, end, 0.0)), Vector3::repeat(2.0 * radius_m), rgba);
             }
         }
-        ShapeSpec::Torus { ring_radius_m, tube_radius_m } => {
-            draw_torus(out, *ring_radius_m, *tube_radius_m, at, rgba);
-        }
-        ShapeSpec::Csg(tree) => {
-            for (index, child) in tree.children.iter().enumerate() {
-                let is_taken_away = tree.op == CsgOp::Difference && index > 0;
-                draw(
-                    out,
-                    &child.shape,
-                    None,
-                    &(at * child.pose),
-                    if is_taken_away { TAKEN_AWAY } else { rgba },
-                );
-            }
-        }
         ShapeSpec::Mesh(_) => draw_mesh(out, entity, at, rgba),
-        ShapeSpec::Scaled { shape, scale } => draw_scaled(out, shape, (*scale).into(), at, rgba),
-        // Patches, and what later versions add.
-        _ => {}
+        other => draw_triangles(out, other, entity, at, rgba),
     }
 }
 
-/// Balls and boxes stay what they are; others only where all factors are the same, for which scenes have no shape.
-fn draw_scaled(out: &mut Message, shape: &ShapeSpec, scale: Vector3<f64>, at: &Isometry3<f64>, rgba: Rgba) {
-    let size = |size: Vector3<f64>| size.component_mul(&scale);
-    match shape {
-        ShapeSpec::Sphere { radius_m } => sphere(out, at, size(Vector3::repeat(2.0 * radius_m)), rgba),
-        ShapeSpec::Ellipsoid { radii_m } => sphere(out, at, size(2.0 * Vector3::from(*radii_m)), rgba),
-        ShapeSpec::Box { size_m } => cube(out, at, size((*size_m).into()), rgba),
-        _ => {}
+/// What has no form of its own there, as pictures have it.
+fn draw_triangles(
+    out: &mut Message,
+    shape: &ShapeSpec,
+    entity: Option<&Entity>,
+    at: &Isometry3<f64>,
+    rgba: Rgba,
+) {
+    let Some(made) = view::shapes::triangles(shape, entity.map(|entity| &entity.shape)) else { return };
+    if made.corners.len() <= MOST_FACES {
+        triangles(out, at, made.places.iter().map(|place| place.coords), made.corners.as_flattened(), rgba);
     }
 }
 
@@ -168,23 +150,4 @@ fn draw_mesh(out: &mut Message, entity: Option<&Entity>, at: &Isometry3<f64>, rg
     }
     let indices: Vec<u32> = mesh.faces().iter().flat_map(|face| face.vertices).collect();
     triangles(out, at, mesh.vertices().iter().copied(), &indices, rgba);
-}
-
-fn draw_torus(out: &mut Message, ring_m: f64, tube_m: f64, at: &Isometry3<f64>, rgba: Rgba) {
-    let [around, across] = RING;
-    let point = |i: u32, j: u32| {
-        let (sin_u, cos_u) = (TAU * f64::from(i) / f64::from(around)).sin_cos();
-        let (sin_v, cos_v) = (TAU * f64::from(j) / f64::from(across)).sin_cos();
-        let out = ring_m + tube_m * cos_v;
-        Vector3::new(out * cos_u, tube_m * sin_v, out * sin_u)
-    };
-    let each = || (0..around).flat_map(|i| (0..across).map(move |j| (i, j)));
-    let index = |i: u32, j: u32| i % around * across + j % across;
-    let indices: Vec<u32> = each()
-        .flat_map(|(i, j)| {
-            let (a, b, c, d) = (index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1));
-            [a, c, b, a, d, c]
-        })
-        .collect();
-    triangles(out, at, each().map(|(i, j)| point(i, j)), &indices, rgba);
 }

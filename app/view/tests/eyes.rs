@@ -1,11 +1,13 @@
 //! What two eyes see of a small ball. Where there is no graphics library they say so and pass.
 
+mod common;
+
+use common::{SIZE, studio};
 use haptics::{Entity, Sphere};
 use std::path::Path;
-use view::{Eyes, Moment, Picture, Stage, Studio};
+use view::{Eyes, Moment, Picture, Stage};
 use world::{Scene, SceneCamera, StereoMode};
 
-const SIZE: [u32; 2] = [800, 600];
 const EYES: Eyes = Eyes { mode: StereoMode::SideBySide, separation_m: 0.06, convergence_m: 0.5 };
 const FIELD_OF_VIEW_DEG: f64 = 30.0;
 
@@ -38,16 +40,9 @@ field_of_view_deg = {FIELD_OF_VIEW_DEG}
 /// `None`, and said so: there are none here.
 fn taken(away_m: f64, size: [u32; 2], eyes: &Eyes) -> Option<Picture> {
     let (stage, moment) = ball(away_m);
-    match Studio::new(&stage, size) {
-        Ok(mut studio) => {
-            studio.painter().with_overlay = false;
-            Some(studio.take(&moment, camera(&stage), eyes))
-        }
-        Err(missing) => {
-            println!("skipped: {missing}");
-            None
-        }
-    }
+    let mut studio = studio(&stage, size)?;
+    studio.painter().with_overlay = false;
+    Some(studio.take(&moment, camera(&stage), eyes))
 }
 
 fn camera(stage: &Stage) -> &SceneCamera {
@@ -95,7 +90,7 @@ fn eyes_beside_each_other_see_a_ball_shifted_as_far_as_it_is_from_the_convergenc
 #[test]
 fn the_left_eye_is_above_and_settings_hold_from_the_next_picture_on() {
     let (stage, moment) = ball(0.35);
-    let Ok(mut studio) = Studio::new(&stage, SIZE) else { return println!("skipped: no pictures here") };
+    let Some(mut studio) = studio(&stage, SIZE) else { return };
     studio.painter().with_overlay = false;
     for (separation_m, convergence_m) in [(0.06, 0.5), (0.03, 0.5), (0.06, 0.3)] {
         let eyes = Eyes { mode: StereoMode::TopBottom, separation_m, convergence_m };

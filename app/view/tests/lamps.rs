@@ -1,12 +1,13 @@
 //! Light from a place: facts about pixels. Where there is no graphics library they say so and pass.
 
-use haptics::{Entity, Plane, Shape, Sphere};
-use nalgebra::{Point3, Vector3};
-use std::path::Path;
-use view::{Eyes, Moment, Picture, Stage, Studio};
-use world::{Scene, SceneCamera};
+mod common;
 
-const SIZE: [u32; 2] = [800, 600];
+use common::{SIZE, colour, studio};
+use haptics::{Entity, Plane, Shape, Sphere};
+use nalgebra::Vector3;
+use std::path::Path;
+use view::{Eyes, Moment, Picture, Stage};
+use world::{Scene, SceneCamera};
 
 /// A ball five centimetres above a floor, a lamp somewhere.
 fn floor(lamp: [f64; 3], attenuation: [f64; 3], casts_shadow: bool) -> Option<(SceneCamera, Picture)> {
@@ -50,27 +51,15 @@ casts_shadow = {casts_shadow}
     let stage = Stage::new(&scene, &entities);
     let poses = entities.iter().map(|entity| entity.X_WB).collect();
     let moment = Moment { t_s: 0.0, poses, fingers: Vec::new() };
-    match Studio::new(&stage, SIZE) {
-        Ok(mut studio) => {
-            studio.painter().with_overlay = false;
-            let picture = studio.take(&moment, &stage.cameras[0], &Eyes::default());
-            Some((stage.cameras[0].clone(), picture))
-        }
-        Err(missing) => {
-            println!("skipped: {missing}");
-            None
-        }
-    }
+    let mut studio = studio(&stage, SIZE)?;
+    studio.painter().with_overlay = false;
+    let picture = studio.take(&moment, &stage.cameras[0], &Eyes::default());
+    Some((stage.cameras[0].clone(), picture))
 }
 
 /// How much light comes from a place of the floor: green, of the greatest.
 fn light((camera, picture): &(SceneCamera, Picture), x: f64, z: f64) -> f64 {
-    let at = camera.pose.inverse() * Point3::new(x, 0.0, z);
-    let half = 0.5 * f64::from(SIZE[1]);
-    let pixels = half / (0.5 * camera.field_of_view_deg).to_radians().tan();
-    let column = 0.5 * f64::from(SIZE[0]) + pixels * at.x / -at.z;
-    let row = half - pixels * at.y / -at.z;
-    f64::from(picture.at(column as u32, row as u32)[1]) / 255.0
+    f64::from(colour(picture, camera, [x, 0.0, z])[1]) / 255.0
 }
 
 /// Half a step of 255 in brightness is 1 % of the power at the darkest place (0.31), and places are known to a pixel.

@@ -1,12 +1,13 @@
 //! What is drawn of contacts: facts about pixels. Where there is no graphics library they say so and pass.
 
+mod common;
+
+use common::{SIZE, colour, studio};
 use haptics::{Cuboid, Entity, Feature};
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use std::path::Path;
 use view::{ContactMoment, Eyes, FingerMoment, Moment, Picture, Stage, Studio};
-use world::{Scene, SceneCamera};
-
-const SIZE: [u32; 2] = [800, 600];
+use world::Scene;
 
 const SCENE: &str = r#"
 name = "block"
@@ -55,13 +56,8 @@ fn set() -> Option<Set> {
     };
     let poses = entities.iter().map(|entity| entity.X_WB).collect();
     let moment = Moment { t_s: 0.0, poses, fingers: vec![finger] };
-    match Studio::new(&stage, SIZE) {
-        Ok(studio) => Some(Set { stage, moment, studio }),
-        Err(missing) => {
-            println!("skipped: {missing}");
-            None
-        }
-    }
+    let studio = studio(&stage, SIZE)?;
+    Some(Set { stage, moment, studio })
 }
 
 impl Set {
@@ -76,13 +72,7 @@ impl Set {
     }
 
     fn at(&self, picture: &Picture, place: [f64; 3]) -> [i32; 3] {
-        let camera: &SceneCamera = &self.stage.cameras[0];
-        let at = camera.pose.inverse() * Point3::from(place);
-        let half = 0.5 * f64::from(SIZE[1]);
-        let pixels = half / (0.5 * camera.field_of_view_deg).to_radians().tan();
-        let (column, row) = (0.5 * f64::from(SIZE[0]) + pixels * at.x / -at.z, half - pixels * at.y / -at.z);
-        let [r, g, b, _] = picture.at(column as u32, row as u32);
-        [r, g, b].map(i32::from)
+        colour(picture, &self.stage.cameras[0], place)
     }
 }
 

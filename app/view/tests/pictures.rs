@@ -1,12 +1,13 @@
 //! Pictures without a display: facts about their pixels. Where there is no graphics library they say so and pass.
 
+mod common;
+
+use common::{SIZE, colour, studio};
 use haptics::{Cuboid, Cylinder, Entity, Plane, Shape, Torus};
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Vector3};
 use std::path::Path;
 use view::{Eyes, FingerMoment, Moment, Picture, Stage, Studio};
-use world::{Scene, SceneCamera};
-
-const SIZE: [u32; 2] = [800, 600];
+use world::Scene;
 
 const SCENE: &str = r#"
 name = "table"
@@ -72,30 +73,10 @@ fn table() -> (Stage, Moment) {
 /// Of the table, after this change to who draws. `None`, and said so: there are none here.
 fn pictures(change: impl Fn(&mut Studio)) -> Option<(Stage, Picture)> {
     let (stage, moment) = table();
-    let mut studio = match Studio::new(&stage, SIZE) {
-        Ok(studio) => studio,
-        Err(missing) => {
-            println!("skipped: {missing}");
-            return None;
-        }
-    };
+    let mut studio = studio(&stage, SIZE)?;
     change(&mut studio);
     let picture = studio.take(&moment, &stage.cameras[0], &Eyes::default());
     Some((stage, picture))
-}
-
-/// The column and row (from above) at which a pinhole camera sees a place.
-fn seen_at(camera: &SceneCamera, place: [f64; 3]) -> [f64; 2] {
-    let at = camera.pose.inverse() * Point3::from(place);
-    let tangent = (0.5 * camera.field_of_view_deg).to_radians().tan();
-    let half = 0.5 * f64::from(SIZE[1]);
-    [0.5 * f64::from(SIZE[0]) + half * at.x / (-at.z * tangent), half - half * at.y / (-at.z * tangent)]
-}
-
-fn colour(picture: &Picture, camera: &SceneCamera, place: [f64; 3]) -> [i32; 3] {
-    let [column, row] = seen_at(camera, place);
-    let [r, g, b, _] = picture.at(column as u32, row as u32);
-    [r, g, b].map(i32::from)
 }
 
 #[test]
