@@ -6,7 +6,7 @@
 use haptics::{Cuboid, Entity, Friction, Plane, Shape, Sphere};
 use nalgebra::{Isometry3, Vector3};
 use physics::{Body, Manipulation, MassProperties, Settings, Sleep, Standing};
-use world::lists::{ListSettings, Lists, Reach};
+use world::lists::{ListSettings, Lists, Reach, SlowOrder};
 
 const DT: f64 = 1e-3;
 const SIZE: f64 = 0.04;
@@ -344,4 +344,22 @@ fn a_claim_that_overtakes_what_is_claimed_is_kept_until_that_has_come() {
         "all that it could touch has come: {:?}",
         world.lists.hand_over.handed()
     );
+}
+
+#[test]
+fn while_time_stands_still_the_slow_list_steps_nothing_and_then_goes_on() {
+    let mut world = World::new(1, STRICT);
+    let Lists { hand_over, slow, .. } = &mut world.lists;
+    let mut steps_of = |order: Option<SlowOrder>| {
+        if let Some(order) = order {
+            hand_over.order(order).expect("room");
+        }
+        let before = slow.stepped();
+        slow.turn(10, DT);
+        slow.stepped() - before
+    };
+    assert_eq!(steps_of(None), 10, "what was let go has yet to come to rest");
+    assert_eq!(steps_of(Some(SlowOrder::Pause(true))), 0);
+    assert_eq!(steps_of(None), 0);
+    assert_eq!(steps_of(Some(SlowOrder::Pause(false))), 10);
 }
