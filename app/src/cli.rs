@@ -30,6 +30,7 @@ use shm_abi::endpoint;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 use std::process::ExitCode;
+use view::{Eyes, WindowSpec};
 use world::Settings;
 
 const EXIT_USAGE: u8 = 2;
@@ -45,7 +46,7 @@ Whatever was recorded until then is complete on disk.";
 #[derive(Debug, Parser)]
 #[command(name = "phantom3", version, after_help = AFTER_HELP)]
 pub struct Cli {
-    /// Open no window; this version has none to open
+    /// Open no window; without this word runs open one where there is a display, but for --clock virtual
     #[arg(long, global = true)]
     headless: bool,
     #[command(flatten)]
@@ -84,7 +85,7 @@ enum AppCommand {
 
 /// Runs the program with the process's own arguments.
 pub fn main() -> ExitCode {
-    let Cli { settings, command, .. } = Cli::parse();
+    let Cli { settings, command, headless } = Cli::parse();
     match command {
         Some(AppCommand::Driver(command)) => io_driver::cli::execute(command),
         Some(AppCommand::Calibrate(args)) => calibrate::run(&args),
@@ -100,7 +101,7 @@ pub fn main() -> ExitCode {
             Err(failure) => failed(&failure),
         },
         Some(AppCommand::Run(args)) => {
-            conclude(settings.load().and_then(|settings| run_scene(&args, &settings)))
+            conclude(settings.load().and_then(|settings| run_scene(&args, &settings, headless)))
         }
         Some(AppCommand::Check(args)) => settings
             .load()
@@ -138,11 +139,29 @@ fn run_demo(settings: &Settings) -> Result<(Report, Stop), RunFailure> {
     run::run(&demo.rig, &plan, &signals)
 }
 
-fn run_scene(args: &RunArgs, settings: &Settings) -> Result<(Report, Stop), RunFailure> {
+fn run_scene(args: &RunArgs, settings: &Settings, is_headless: bool) -> Result<(Report, Stop), RunFailure> {
     let signals = install_signals()?;
     let args = &args.with(settings);
     let rig = make_rig(args, settings)?;
-    run::run(&rig, &make_plan(args, &rig, settings)?, &signals)
+    let mut plan = make_plan(args, &rig, settings)?;
+    plan.window = if is_headless { None } else { window_spec(&rig.scene.name, settings) };
+    run::run(&rig, &plan, &signals)
+}
+
+/// `None`: nobody to show it to.
+fn window_spec(title: &str, settings: &Settings) -> Option<WindowSpec> {
+    view::window::has_display().then(|| WindowSpec {
+        title: format!("{title} - phantom3"),
+        size: settings.window_size_px.value.map(|side| side as f32),
+        position: settings.window_position_px.value.map(|corner| corner.map(|side| side as f32)),
+        is_fullscreen: settings.fullscreen.value,
+        with_shadows: settings.shadows.value,
+        eyes: Eyes {
+            mode: settings.stereo_mode.value,
+            separation_m: settings.eye_separation_m.value,
+            convergence_m: settings.convergence_m.value,
+        },
+    })
 }
 
 fn install_signals() -> Result<StopSignals, RunFailure> {
@@ -168,7 +187,7 @@ fn conclude(result: Result<(Report, Stop), RunFailure>) -> ExitCode {
 
 fn stopped(stop: Stop) -> ExitCode {
     match stop {
-        Stop::Finished => ExitCode::SUCCESS,
+        Stop::Finished | Stop::Closed => ExitCode::SUCCESS,
         Stop::Signal(signal) => {
             say(format_args!("phantom3: ended by signal {signal} before its time"));
             ExitCode::from(128u8.saturating_add(u8::try_from(signal).unwrap_or(0)))

@@ -103,6 +103,7 @@ pub fn plan(rig: &Rig, socket: PathBuf, directory: Option<&Path>) -> RunPlan {
         record,
         events: Vec::new(),
         pictures: None,
+        window: None,
         seed: 0,
         orders: None,
         settings: Settings::default(),

@@ -13,6 +13,8 @@ use thiserror::Error;
 pub enum Stop {
     /// It is over.
     Finished,
+    /// People closed its window.
+    Closed,
     /// This signal asked for it.
     Signal(i32),
 }

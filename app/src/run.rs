@@ -4,6 +4,7 @@ use crate::book::Book;
 use crate::child::DriverChild;
 use crate::control::desk::{Desk, Means, OrderSource};
 use crate::fast_loop::{FastLoop, Tally, WhenFull};
+use crate::moments::Moments;
 use crate::not_zeroed;
 use crate::outcome::{RunFailure, Stop};
 use crate::progress::Progress;
@@ -13,9 +14,11 @@ use crate::rig::{HandMode, Rig};
 use crate::row_queue::row_queue;
 use crate::slow::{SlowEnd, SlowSide};
 use crate::snapshots::{Snapshots, Wanted};
+use crate::spectator::Spectator;
 use crate::two_processes::{self, Source};
 use crate::virtual_clock::VirtualDriver;
 use io_driver::device::Extras;
+use io_driver::say::say;
 use physics::Reason;
 use rt_core::signals::StopSignals;
 use shm_abi::client;
@@ -24,7 +27,7 @@ use shm_abi::{CommanderMemory, DriverView, Frame};
 use std::path::PathBuf;
 use std::sync::mpsc::{self, Receiver};
 use std::time::Duration;
-use view::Stage;
+use view::{OpenWindow, Stage, WindowSpec};
 use world::Settings;
 use world::events::{Hub, event_queue};
 use world::lists::SlowList;
@@ -45,6 +48,8 @@ pub struct RunPlan {
     pub events: Vec<PathBuf>,
     /// Pictures to be drawn, if any.
     pub pictures: Option<Wanted>,
+    /// The window, if there is to be one.
+    pub window: Option<WindowSpec>,
     /// Seed of everything random, to be told in recordings.
     pub seed: u64,
     /// What is to change while it runs.
@@ -111,8 +116,22 @@ impl Parts {
             book: book.clone(),
             slow_lists: (clock == ClockMode::Real).then_some(sender),
         };
-        let open = |source| Desk::open(rig, source, means).map_err(RunFailure::Start);
-        let (desk, orders) = plan.orders.as_ref().map(open).transpose()?.unzip();
+        let stage = || Stage::new(&rig.scene, step.entities());
+        let moments = || {
+            let poses = step.entities().iter().map(|entity| entity.X_WB).collect();
+            let bodies = rig.moving().map(|(index, ..)| index).collect();
+            Moments::new(rig.scene.fingers.len(), poses, bodies, period_ns)
+        };
+        let window = plan.window.as_ref().filter(|_| clock != ClockMode::Virtual);
+        let spectator = window.and_then(|spec| open_window(spec, stage(), moments()));
+        let (desk, orders) = match &plan.orders {
+            Some(source) => Some(Desk::open(rig, source, means)),
+            None if spectator.is_some() => Some(Desk::silent(rig, means)),
+            None => None,
+        }
+        .transpose()
+        .map_err(RunFailure::Start)?
+        .unzip();
         let (producer, consumer) = row_queue(step.bodies().len());
         let files = Files {
             record: plan.record.clone(),
@@ -125,10 +144,7 @@ impl Parts {
         };
         let recorders = files.first(rig, &View::new(&rig.scene, step.entities()))?;
         let snapshots = plan.pictures.as_ref().map(|wanted| {
-            let stage = Stage::new(&rig.scene, step.entities());
-            let poses = step.entities().iter().map(|entity| entity.X_WB).collect();
-            let bodies = rig.moving().map(|(index, ..)| index).collect();
-            Snapshots::start(wanted, stage, poses, bodies, period_ns, when_full == WhenFull::Wait)
+            Snapshots::start(wanted, stage(), moments(), period_ns, when_full == WhenFull::Wait)
         });
         let snapshots = snapshots.transpose().map_err(RunFailure::Start)?;
         let (events, event_ends) = event_queue(EVENT_QUEUE);
@@ -141,9 +157,21 @@ impl Parts {
             },
             slow: SlowSide::new(consumer, Hub::new(vec![event_ends]), recorders)
                 .with_desk(desk, files)
-                .with_snapshots(snapshots),
+                .with_snapshots(snapshots)
+                .with_spectator(spectator),
             progress: Progress::new(total_ticks, period_ns),
         })
+    }
+}
+
+/// `None`: it could not be opened, which is told.
+fn open_window(spec: &WindowSpec, stage: Stage, moments: Moments) -> Option<Spectator> {
+    match OpenWindow::open(spec.clone(), stage, None) {
+        Ok(window) => Some(Spectator::new(window, moments)),
+        Err(error) => {
+            say(format_args!("phantom3: {error}; the run goes on without"));
+            None
+        }
     }
 }
 

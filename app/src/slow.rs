@@ -5,6 +5,7 @@ use crate::record::{Files, Recorded, Recorder};
 use crate::row::Row;
 use crate::row_queue::RowReceiver;
 use crate::snapshots::{Drawn, Snapshots};
+use crate::spectator::Spectator;
 use io_driver::say::say;
 use std::fmt::Write;
 use world::events::{Class, Filter, Hub};
@@ -29,6 +30,8 @@ pub struct SlowSide {
     snapshots: Option<Snapshots>,
     /// What became of them, once another scene goes on.
     drawn: Option<Drawn>,
+    /// Who looks on at a window, if anybody does.
+    spectator: Option<Spectator>,
     /// Who else wants to know what happens.
     pub events: Hub,
     /// The newest row, for whoever wants to look.
@@ -51,6 +54,7 @@ impl SlowSide {
             desk: None,
             snapshots: None,
             drawn: None,
+            spectator: None,
             events,
             newest: None,
         }
@@ -68,6 +72,12 @@ impl SlowSide {
         Self { snapshots, ..self }
     }
 
+    /// With a window.
+    #[must_use]
+    pub fn with_spectator(self, spectator: Option<Spectator>) -> Self {
+        Self { spectator, ..self }
+    }
+
     /// Takes everything that is there. A recording that cannot be written tells so itself, and the run goes on.
     pub fn step(&mut self) {
         self.desk.iter_mut().for_each(Desk::step);
@@ -75,6 +85,14 @@ impl SlowSide {
         while self.go_on_to_next_scene() {
             self.take_rows();
         }
+        if let Some(spectator) = &mut self.spectator {
+            spectator.step(self.desk.as_mut());
+        }
+    }
+
+    /// Whether people closed the window.
+    pub fn wants_end(&self) -> bool {
+        self.spectator.as_ref().is_some_and(Spectator::wants_end)
     }
 
     fn take_rows(&mut self) {
@@ -87,6 +105,9 @@ impl SlowSide {
             }
             if let Some(snapshots) = &mut self.snapshots {
                 snapshots.look(&row, bodies);
+            }
+            if let Some(spectator) = &mut self.spectator {
+                spectator.look(&row, bodies);
             }
             self.newest = Some(row);
         }

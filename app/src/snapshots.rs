@@ -9,13 +9,13 @@ mod args;
 
 pub use args::{Film, PictureArgs, Shot, Wanted};
 
+use crate::moments::Moments;
 use crate::row::{BodyRow, Row};
 use io_driver::say::say;
-use nalgebra::{Isometry3, UnitQuaternion};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
-use view::{Eyes, FingerMoment, Moment, Stage, Studio};
+use view::{Eyes, Moment, Stage, Studio};
 use world::SceneCamera;
 
 /// So many moments wait to be drawn.
@@ -31,11 +31,7 @@ pub struct Snapshots {
     left_out: u64,
     waits: bool,
     period_s: f64,
-    fingers: usize,
-    /// Which entity each body is.
-    entities: Vec<usize>,
-    /// Where those are that do not move.
-    poses: Vec<Isometry3<f64>>,
+    moments: Moments,
     out: Option<SyncSender<(Moment, PathBuf)>>,
     thread: Option<JoinHandle<Drawn>>,
 }
@@ -77,16 +73,14 @@ impl std::fmt::Display for Drawn {
 }
 
 impl Snapshots {
-    /// Begins to take what is wanted of this stage, whose entities stand so; `entities` of them are the bodies, in the order of
-    /// the rows. `waits`: the run's clock waits for the drawing.
+    /// Begins to take what is wanted of this stage. `waits`: the run's clock waits for the drawing.
     ///
     /// # Errors
     /// A camera that the scene does not have, a directory that cannot be made, in words.
     pub fn start(
         wanted: &Wanted,
         stage: Stage,
-        poses: Vec<Isometry3<f64>>,
-        entities: Vec<usize>,
+        moments: Moments,
         period_ns: u64,
         waits: bool,
     ) -> Result<Self, String> {
@@ -95,11 +89,11 @@ impl Snapshots {
             std::fs::create_dir_all(&film.directory)
                 .map_err(|error| format!("--frames {}: {error}", film.directory.display()))?;
         }
-        let (fingers, size, eyes) = (stage.radii_m.len(), wanted.size, wanted.eyes);
-        let (out, moments) = sync_channel(WAITING);
+        let (size, eyes) = (wanted.size, wanted.eyes);
+        let (out, to_draw) = sync_channel(WAITING);
         let thread = std::thread::Builder::new()
             .name("pictures".into())
-            .spawn(move || draw_all(&stage, (&camera, &eyes), size, &moments))
+            .spawn(move || draw_all(&stage, (&camera, &eyes), size, &to_draw))
             .map_err(|error| format!("no thread for pictures: {error}"))?;
         let mut shots = wanted.shots.clone();
         shots.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
@@ -110,9 +104,7 @@ impl Snapshots {
             left_out: 0,
             waits,
             period_s: period_ns as f64 / 1e9,
-            fingers,
-            entities,
-            poses,
+            moments,
             out: Some(out),
             thread: Some(thread),
         })
@@ -124,7 +116,7 @@ impl Snapshots {
         let now_s = (row.run_tick as f64 + 0.5) * self.period_s;
         while self.shots.first().is_some_and(|shot| shot.t_s < now_s) {
             let shot = self.shots.remove(0);
-            let moment = self.moment(row, bodies);
+            let moment = self.moments.moment(row, bodies);
             self.send((moment, shot.file), true);
         }
         if let Some(Film { directory, fps }) = &self.film
@@ -132,29 +124,8 @@ impl Snapshots {
         {
             let file = directory.join(format!("frame-{:06}.png", self.due));
             self.due += 1;
-            let moment = self.moment(row, bodies);
+            let moment = self.moments.moment(row, bodies);
             self.send((moment, file), self.waits);
-        }
-    }
-
-    fn moment(&mut self, row: &Row, bodies: &[BodyRow]) -> Moment {
-        for (body, &entity) in bodies.iter().zip(&self.entities) {
-            if let Some(pose) = self.poses.get_mut(entity) {
-                let turned = UnitQuaternion::new_normalize(body.orientation);
-                *pose = Isometry3::from_parts(body.position.into(), turned);
-            }
-        }
-        let fingers = row.fingers[..self.fingers.min(row.fingers.len())].iter().map(|finger| FingerMoment {
-            hip: finger.hip,
-            god_object: finger.god_object,
-            force: finger.force_on_user,
-            entity: finger.entity.map(|entity| entity as usize),
-            ..FingerMoment::default()
-        });
-        Moment {
-            t_s: row.run_tick as f64 * self.period_s,
-            poses: self.poses.clone(),
-            fingers: fingers.collect(),
         }
     }
 

@@ -86,6 +86,7 @@ pub fn run(
         let stop = match watched.end {
             WatchEnd::Fast(FastEnd::Finished) => Stop::Finished,
             WatchEnd::Signal(signal) => Stop::Signal(signal),
+            WatchEnd::Closed => Stop::Closed,
             WatchEnd::Fast(FastEnd::Fault(reason)) => return Err(RunFailure::driver_fault(reason)),
             WatchEnd::Fast(FastEnd::Silent) => return Err(RunFailure::DriverSilent { seconds: 5.0 }),
             WatchEnd::DriverGone | WatchEnd::Fast(FastEnd::Stopped) => {
@@ -131,6 +132,8 @@ fn start_slow_list(
 enum WatchEnd {
     Fast(FastEnd),
     Signal(i32),
+    /// By people, at the window.
+    Closed,
     DriverGone,
 }
 
@@ -160,6 +163,9 @@ fn run_attached(
         }
         if let Some(signal) = signals.requested() {
             break Some(WatchEnd::Signal(signal));
+        }
+        if slow.wants_end() {
+            break Some(WatchEnd::Closed);
         }
         if !connection.is_open() {
             break Some(WatchEnd::DriverGone);

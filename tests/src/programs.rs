@@ -40,6 +40,8 @@ fn tied(mut command: Command) -> Command {
     command.env(TEST_VARIABLE, std::process::id().to_string());
     // Nobody's own layout may move the devices of a test.
     command.env("XDG_CONFIG_HOME", "/dev/null");
+    // Nor may windows open on it.
+    command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
     command
 }
 

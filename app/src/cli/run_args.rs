@@ -226,6 +226,7 @@ pub(super) fn make_plan(args: &RunArgs, rig: &Rig, settings: &Settings) -> Resul
         record: args.record.clone(),
         events: args.events.clone(),
         pictures: args.pictures.wanted(settings),
+        window: None,
         seed: args.seed,
         orders: order_source(args)?,
         settings: settings.clone(),

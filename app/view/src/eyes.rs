@@ -45,10 +45,16 @@ pub struct Eye {
 }
 
 impl Eyes {
-    /// The looks that make a picture of this size (pixels), one after the other.
-    pub fn looks(&self, camera: &SceneCamera, [width, height]: [u32; 2]) -> Vec<Look> {
+    /// The looks that make a picture within this part of a target (pixels), one after the other.
+    pub fn looks(&self, camera: &SceneCamera, part: Viewport) -> Vec<Look> {
         let all = [true; 3];
-        let at = |x: u32, y: u32, width, height| Viewport { x: x as i32, y: y as i32, width, height };
+        let Viewport { width, height, .. } = part;
+        let at = |x: u32, y: u32, width, height| Viewport {
+            x: part.x + x as i32,
+            y: part.y + y as i32,
+            width,
+            height,
+        };
         // Windows may be without height or width for a while.
         let (half_width, half_height) = ((width / 2).max(1), (height / 2).max(1));
         let whole = at(0, 0, width, height);

@@ -11,21 +11,28 @@
 #![deny(missing_docs)]
 
 pub mod eyes;
+pub mod hand;
 mod lamp;
 pub mod moment;
+pub mod news;
 mod offscreen;
 mod overlay;
 pub mod painter;
+pub mod panel;
 pub mod picture;
+pub mod playback;
 pub mod shapes;
 mod solids;
 pub mod stage;
 pub mod triangles;
 mod usual;
+pub mod window;
 
 pub use eyes::Eyes;
 pub use moment::{ContactMoment, FingerMoment, Moment};
+pub use news::{Ask, Glimpse, News, Reins, Sample, Status, Wish};
 pub use offscreen::{NoPictures, Offscreen};
 pub use picture::{Picture, Studio};
 pub use stage::{Stage, Thing};
 pub use triangles::Triangles;
+pub use window::{NoWindow, OpenWindow, WindowSpec};

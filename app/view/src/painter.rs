@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use three_d::{
     AmbientLight, ClearState, Context, CpuMaterial, CpuMesh, DirectionalLight, Gm, Indices, Light, Mat4,
-    Mesh, Object, PhysicalMaterial, Positions, RenderTarget, Srgba, WriteMask, vec3,
+    Mesh, Object, PhysicalMaterial, Positions, RenderTarget, Srgba, Viewport, WriteMask, vec3,
 };
 use world::{LightKind, SceneCamera, SceneLight};
 
@@ -73,13 +73,26 @@ impl Painter {
 
     /// Draws into a target what eyes at a camera see.
     pub fn draw(&mut self, moment: &Moment, camera: &SceneCamera, eyes: &Eyes, target: &RenderTarget<'_>) {
+        let whole = Viewport::new_at_origo(target.width(), target.height());
+        self.draw_within(moment, camera, eyes, target, whole);
+    }
+
+    /// The same into a part of a target; the rest of it stays as it is.
+    pub fn draw_within(
+        &mut self,
+        moment: &Moment,
+        camera: &SceneCamera,
+        eyes: &Eyes,
+        target: &RenderTarget<'_>,
+        part: Viewport,
+    ) {
         self.place(moment);
         self.cast_shadows();
         let [r, g, b] = BACKGROUND;
-        target.clear(ClearState::color_and_depth(r, g, b, 1.0, 1.0));
-        for look in eyes.looks(camera, [target.width(), target.height()]) {
-            target.clear(ClearState::depth(1.0));
-            self.draw_look(&look, target);
+        target.clear_partially(part.into(), ClearState::color_and_depth(r, g, b, 1.0, 1.0));
+        for look in eyes.looks(camera, part) {
+            target.clear_partially(part.into(), ClearState::depth(1.0));
+            self.draw_look(&look, target, part);
         }
     }
 
@@ -95,15 +108,20 @@ impl Painter {
         self.overlay.place(moment);
     }
 
-    fn draw_look(&mut self, look: &Look, target: &RenderTarget<'_>) {
+    fn draw_look(&mut self, look: &Look, target: &RenderTarget<'_>, part: Viewport) {
         self.things.iter_mut().for_each(|drawn| mask(&mut drawn.model.material, look.channels));
         let own = self.lights.iter().map(Shining::light);
         let lights: Vec<&dyn Light> = [&self.everywhere as &dyn Light].into_iter().chain(own).collect();
-        target.render(&look.eye, self.things.iter().map(|drawn| &drawn.model as &dyn Object), &lights);
+        target.render_partially(
+            part.into(),
+            &look.eye,
+            self.things.iter().map(|drawn| &drawn.model as &dyn Object),
+            &lights,
+        );
         // What things hide first: what is not hidden would hide it.
         for is_hidden in [true, false].into_iter().filter(|_| self.with_overlay) {
             self.overlay.show(look.channels, is_hidden);
-            target.render(&look.eye, self.overlay.objects(), &lights);
+            target.render_partially(part.into(), &look.eye, self.overlay.objects(), &lights);
         }
     }
 

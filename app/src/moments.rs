@@ -1,0 +1,51 @@
+//! What is to be seen of the rows of a run.
+
+use crate::row::{BodyRow, Row};
+use nalgebra::{Isometry3, UnitQuaternion};
+use view::{FingerMoment, Moment};
+
+/// Makes moments of rows.
+#[derive(Debug, Clone)]
+pub struct Moments {
+    fingers: usize,
+    /// Which entity each body is.
+    entities: Vec<usize>,
+    /// Where each entity was last.
+    poses: Vec<Isometry3<f64>>,
+    period_s: f64,
+}
+
+impl Moments {
+    /// Of a scene with so many fingers, whose entities stand so; `entities` of them are the bodies, in the order of the rows.
+    pub fn new(fingers: usize, poses: Vec<Isometry3<f64>>, entities: Vec<usize>, period_ns: u64) -> Self {
+        Self { fingers, entities, poses, period_s: period_ns as f64 / 1e9 }
+    }
+
+    /// Of a tick, as it began.
+    pub fn moment(&mut self, row: &Row, bodies: &[BodyRow]) -> Moment {
+        for (body, &entity) in bodies.iter().zip(&self.entities) {
+            if let Some(pose) = self.poses.get_mut(entity) {
+                let turned = UnitQuaternion::new_normalize(body.orientation);
+                *pose = Isometry3::from_parts(body.position.into(), turned);
+            }
+        }
+        let fingers = row.fingers[..self.fingers.min(row.fingers.len())].iter().map(|finger| FingerMoment {
+            hip: finger.hip,
+            god_object: finger.god_object,
+            force: finger.force_on_user,
+            entity: finger.entity.map(|entity| entity as usize),
+            ..FingerMoment::default()
+        });
+        Moment { t_s: self.time_s(row), poses: self.poses.clone(), fingers: fingers.collect() }
+    }
+
+    /// When a tick was (s).
+    pub fn time_s(&self, row: &Row) -> f64 {
+        row.run_tick as f64 * self.period_s
+    }
+
+    /// The fingers that there are.
+    pub fn fingers(&self) -> usize {
+        self.fingers
+    }
+}

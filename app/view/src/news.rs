@@ -1,0 +1,91 @@
+//! What goes to and fro between a run and a window on it.
+//!
+//! Model: some hundred times a second the run tells a [`Glimpse`]: where everything is, every tick since the last one, and
+//! how the run goes. The window asks for what people want by [`Ask`]s, and pulls the fingers of hands that have no hardware.
+//! Neither waits for the other.
+
+use crate::moment::Moment;
+use crate::stage::Stage;
+use nalgebra::{UnitQuaternion, Vector3};
+
+/// What a run tells.
+#[derive(Debug, Clone)]
+pub enum News {
+    /// How it goes.
+    Glimpse(Box<Glimpse>),
+    /// Another scene goes on.
+    Scene(Box<Stage>),
+    /// Something to read, for some seconds.
+    Text(String),
+    /// It is over: the window closes.
+    Over,
+}
+
+/// A run at one time.
+#[derive(Debug, Clone, Default)]
+pub struct Glimpse {
+    /// Where everything is.
+    pub moment: Moment,
+    /// Of each tick since the glimpse before, in order.
+    pub samples: Vec<Sample>,
+    /// How the run goes.
+    pub status: Status,
+}
+
+/// What is drawn over time, of one tick.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Sample {
+    /// Since the first tick at full authority (s).
+    pub t_s: f64,
+    /// Of each finger, the force on the user (N) and how deep the HIP is below what it touches (m).
+    pub fingers: Vec<[f64; 2]>,
+}
+
+/// How a run goes.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Status {
+    /// Ticks per second, as they came.
+    pub rate_hz: f64,
+    /// Ticks that were too late, or missed.
+    pub overruns: u64,
+    /// From the reading of the devices to the writing of their forces (ns): median, 99 of 100, and the worst.
+    pub latency_ns: Option<[u64; 3]>,
+    /// Entities that can move, in the fast and in the slow list.
+    pub lists: [usize; 2],
+    /// Of each entity, whether it is in the slow list; empty: none is.
+    pub is_slow: Vec<bool>,
+    /// Pairs of entities that touch each other.
+    pub touching: Vec<[usize; 2]>,
+    /// Where it is being recorded on request, if it is.
+    pub recording: Option<String>,
+    /// Whether things stand still.
+    pub is_paused: bool,
+}
+
+/// What people at a window want.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Ask {
+    /// An order, in the words of `run --orders -`.
+    Order(String),
+    /// A recording shall begin, or end.
+    Record(bool),
+    /// The run shall end.
+    End,
+}
+
+/// Where a hand without hardware wants a finger to be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wish {
+    /// Of its tip, in the world (m).
+    pub place: Vector3<f64>,
+    /// `R_WF` of its last link.
+    pub orientation: UnitQuaternion<f64>,
+    /// Bit `i`: button `i` is pressed.
+    pub buttons: u32,
+}
+
+/// Who pulls fingers without hardware where a hand at a window wants them.
+pub trait Reins: Send {
+    /// The wishes of all fingers.
+    fn pull(&mut self, wishes: &[Wish]);
+}

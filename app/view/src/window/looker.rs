@@ -1,0 +1,108 @@
+//! Who looks on: takes the news, draws, and asks.
+
+use super::scene::SceneView;
+use super::{Ends, WindowSpec};
+use crate::eyes::Eyes;
+use crate::hand::MouseHand;
+use crate::news::{Ask, News, Reins};
+use crate::panel::Panel;
+use crate::playback::Playback;
+use crate::stage::Stage;
+use eframe::egui;
+use std::sync::mpsc::{Receiver, Sender, TryRecvError};
+use std::time::Duration;
+use world::SceneCamera;
+
+/// Between two pictures.
+const PICTURE: Duration = Duration::from_millis(16);
+
+/// The window's own state.
+pub(super) struct Looker {
+    told: Receiver<News>,
+    ask: Sender<Ask>,
+    reins: Option<Box<dyn Reins>>,
+    view: SceneView,
+    camera: SceneCamera,
+    eyes: Eyes,
+    playback: Playback,
+    hand: MouseHand,
+    panel: Panel,
+    /// The entity that people have chosen.
+    selected: Option<usize>,
+    is_over: bool,
+}
+
+impl Looker {
+    pub(super) fn new(
+        creation: &eframe::CreationContext<'_>,
+        spec: &WindowSpec,
+        stage: Stage,
+        (told, ask, reins): Ends,
+    ) -> Result<Self, String> {
+        let camera = stage.cameras.first().cloned().ok_or("nobody looks on")?;
+        let view = SceneView::new(creation, stage, spec.with_shadows)?;
+        Ok(Self {
+            told,
+            ask,
+            reins,
+            view,
+            camera,
+            eyes: spec.eyes,
+            playback: Playback::default(),
+            hand: MouseHand::default(),
+            panel: Panel::default(),
+            selected: None,
+            is_over: false,
+        })
+    }
+
+    fn hear(&mut self, now_s: f64) {
+        loop {
+            match self.told.try_recv() {
+                Ok(News::Glimpse(glimpse)) => {
+                    self.panel.take(&glimpse);
+                    self.playback.take(glimpse.moment, now_s);
+                }
+                Ok(News::Scene(stage)) => {
+                    self.playback.clear();
+                    self.panel.clear();
+                    self.camera = stage.cameras.first().cloned().unwrap_or_else(|| self.camera.clone());
+                    self.view.show_stage(*stage);
+                }
+                Ok(News::Text(_)) => {}
+                Ok(News::Over) | Err(TryRecvError::Disconnected) => {
+                    self.is_over = true;
+                    break;
+                }
+                Err(TryRecvError::Empty) => break,
+            }
+        }
+    }
+}
+
+impl eframe::App for Looker {
+    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
+        let now_s = ui.input(|input| input.time);
+        self.hear(now_s);
+        if self.is_over {
+            ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
+            return;
+        }
+        self.panel.show(ui, &self.view.stage, &mut self.selected, &self.ask);
+        let dt_s = f64::from(ui.input(|input| input.stable_dt));
+        egui::CentralPanel::default().frame(egui::Frame::NONE).show_inside(ui, |ui| {
+            let moment = self.playback.shown(now_s).unwrap_or_default();
+            let scene = self.view.show(ui, moment, &self.camera, &self.eyes);
+            if let Some(reins) = &mut self.reins {
+                reins.pull(self.hand.turn(&scene, &self.camera, dt_s));
+            }
+        });
+        ui.ctx().request_repaint_after(PICTURE);
+    }
+
+    fn on_exit(&mut self, _gl: Option<&eframe::glow::Context>) {
+        self.view.forget();
+        // Who listened is gone: the run is over.
+        let _ = self.ask.send(Ask::End);
+    }
+}
