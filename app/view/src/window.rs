@@ -137,8 +137,17 @@ fn show(spec: WindowSpec, stage: Stage, ends: Ends, ready: &Sender<Result<egui::
         }),
     );
     if let Err(error) = made {
-        let _ = ready.send(Err(error.to_string()));
+        let _ = ready.send(Err(in_short(&error.to_string())));
     }
+}
+
+/// What the desktop said, without the places in other people's sources where it was said.
+fn in_short(words: &str) -> String {
+    words
+        .rsplit_once(".rs:")
+        .and_then(|(_, rest)| rest.split_once(": "))
+        .map_or(words, |(_, said)| said)
+        .into()
 }
 
 fn options(spec: &WindowSpec) -> eframe::NativeOptions {
@@ -157,5 +166,18 @@ fn options(spec: &WindowSpec) -> eframe::NativeOptions {
             EventLoopBuilderExtWayland::with_any_thread(builder, true);
         })),
         ..eframe::NativeOptions::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::in_short;
+
+    #[test]
+    fn what_is_told_names_no_source() {
+        let said =
+            "winit EventLoopError: os error at /a/linux/mod.rs:788: Failed to open connection to X server";
+        assert_eq!(in_short(said), "Failed to open connection to X server");
+        assert_eq!(in_short("no OpenGL: none"), "no OpenGL: none");
     }
 }
