@@ -14,6 +14,7 @@ pub mod jitter;
 pub mod lab;
 pub mod programs;
 pub mod recording;
+pub mod screen;
 pub mod slices;
 pub mod strangers;
 pub mod threads;

@@ -1,0 +1,72 @@
+//! A screen that nobody sees: Xvfb, where the machine has it.
+
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+use tempfile::TempDir;
+
+/// Width and height (pixels).
+pub const SIZE: [usize; 2] = [1280, 800];
+
+/// A screen of its own; goes when dropped.
+#[derive(Debug)]
+pub struct Screen {
+    server: Child,
+    memory: TempDir,
+    display: String,
+}
+
+impl Screen {
+    /// `None`: the machine has no Xvfb, which is told.
+    pub fn open() -> Option<Self> {
+        let memory = tempfile::tempdir().expect("a directory");
+        let server = Command::new("Xvfb")
+            .args(["-displayfd", "1", "-ac", "-nolisten", "tcp", "-screen", "0"])
+            .arg(format!("{}x{}x24", SIZE[0], SIZE[1]))
+            .arg("-fbdir")
+            .arg(memory.path())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn();
+        let Ok(mut server) = server else {
+            println!("skipped: there is no Xvfb here");
+            return None;
+        };
+        let mut number = String::new();
+        BufReader::new(server.stdout.take().expect("a pipe")).read_line(&mut number).expect("its number");
+        assert!(!number.trim().is_empty(), "Xvfb does not start");
+        Some(Self { server, memory, display: format!(":{}", number.trim()) })
+    }
+
+    /// What it is called.
+    pub fn display(&self) -> &str {
+        &self.display
+    }
+
+    /// Red, green and blue of a place, counted from the upper left corner.
+    pub fn pixel(&self, column: usize, row: usize) -> [u8; 3] {
+        let dump = std::fs::read(self.memory.path().join("Xvfb_screen0")).expect("the screen's memory");
+        let word =
+            |at: usize| u32::from_be_bytes(dump[4 * at..4 * at + 4].try_into().expect("four bytes")) as usize;
+        // As /usr/include/X11/XWDFile.h has it: sizes, then colours of 12 bytes, then rows.
+        let (header, bits, row_bytes, colours) = (word(0), word(11), word(12), word(19));
+        assert_eq!((bits, word(7)), (32, 0), "rows of blue, green, red and nothing");
+        let at = header + 12 * colours + row * row_bytes + 4 * column;
+        [dump[at + 2], dump[at + 1], dump[at]]
+    }
+
+    /// Presses and releases a key, by its name in X; `false`: the machine has no `xdotool`, which is told.
+    pub fn press(&self, key: &str) -> bool {
+        let done = Command::new("xdotool").args(["key", key]).env("DISPLAY", &self.display).status();
+        if done.is_err() {
+            println!("skipped: there is no xdotool here");
+        }
+        done.is_ok_and(|status| status.success())
+    }
+}
+
+impl Drop for Screen {
+    fn drop(&mut self) {
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}

@@ -1,0 +1,114 @@
+//! The window on a run: it opens where there is a display, shows the scene, closes by a key and by the run's end, and a
+//! run does without it where there is none.
+
+use std::time::{Duration, Instant};
+use system_tests::screen::{SIZE, Screen};
+use system_tests::workplace::{Running, Said, Workplace};
+
+/// A red ball before a camera that looks along -z at it.
+const SCENE: &str = "\
+[[finger]]
+start_m = [0.0, 0.1, 0.0]
+[[entity]]
+name = \"ball\"
+shape = { kind = \"sphere\", radius_m = 0.05 }
+visual = { colour = [0.8, 0.1, 0.1] }
+[[camera]]
+name = \"front\"
+position_m = [0.0, 0.0, 0.5]
+field_of_view_deg = 40.0
+";
+/// A machine that draws in software beside other tests needs so long for a window at most.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+fn start(place: &Workplace, display: &str, arguments: &[&str]) -> Running {
+    place.write("scene.toml", SCENE);
+    let mut run = place.phantom3();
+    run.args(["run", "scene.toml"]).args(arguments).env("DISPLAY", display).env("LIBGL_ALWAYS_SOFTWARE", "1");
+    Running::start(run)
+}
+
+fn is_red([red, green, blue]: [u8; 3]) -> bool {
+    red > 120 && green < 90 && blue < 90
+}
+
+/// Whether the ball is seen, in a picture of which panels may have a part, before anybody's patience ends.
+fn shows_the_ball(screen: &Screen, running: &Running) -> bool {
+    let begun = Instant::now();
+    while begun.elapsed() < PATIENCE {
+        let said = running.said_so_far();
+        if said.contains("no window: ") {
+            println!("skipped: {said}");
+            return false;
+        }
+        let row = SIZE[1] / 2;
+        let red = (0..SIZE[0]).filter(|&column| is_red(screen.pixel(column, row))).count();
+        // 10 cm of 36 cm from the upper edge to the lower one.
+        if red > SIZE[1] / 5 {
+            return true;
+        }
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    panic!("nothing is seen: {}", running.said_so_far());
+}
+
+#[test]
+fn a_display_that_does_not_answer_leaves_the_run_as_it_is() {
+    let place = Workplace::new();
+    let said = start(&place, ":4094", &["--seconds", "0.2", "--record", "run.csv"]).wait();
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    assert!(said.err.contains("no window: "), "{}", said.err);
+    assert!(!said.err.contains(".rs:"), "nobody's sources: {}", said.err);
+    assert!(place.path("run.csv").exists());
+}
+
+#[test]
+fn headless_is_headless_and_the_virtual_clock_has_no_window() {
+    let Some(screen) = Screen::open() else { return };
+    let place = Workplace::new();
+    for words in [&["--headless", "--seconds", "0.3"][..], &["--clock", "virtual", "--seconds", "0.3"]] {
+        let Said { status, err, .. } = start(&place, screen.display(), words).wait();
+        assert_eq!(status, Some(0), "{err}");
+        assert!(!err.contains("window"), "{err}");
+        assert_eq!(screen.pixel(SIZE[0] / 2, SIZE[1] / 2), [0; 3], "nothing was drawn");
+    }
+}
+
+#[test]
+fn a_run_is_seen_and_its_window_closes_with_it() {
+    let Some(screen) = Screen::open() else { return };
+    let place = Workplace::new();
+    let running = start(&place, screen.display(), &["--seconds", "4"]);
+    if !shows_the_ball(&screen, &running) {
+        return;
+    }
+    let said = running.wait();
+    assert_eq!(said.status, Some(0), "{}", said.err);
+}
+
+#[test]
+fn escape_ends_a_run_and_what_was_recorded_is_complete() {
+    let Some(screen) = Screen::open() else { return };
+    let place = Workplace::new();
+    let running = start(&place, screen.display(), &["--seconds", "100", "--record", "run.csv"]);
+    if !shows_the_ball(&screen, &running) || !screen.press("Escape") {
+        return;
+    }
+    let said = running.wait();
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    let recorded = std::fs::read_to_string(place.path("run.csv")).expect("a recording");
+    assert!(recorded.ends_with('\n') && recorded.lines().count() > 100);
+}
+
+#[test]
+fn a_signal_ends_a_run_with_a_window() {
+    let Some(screen) = Screen::open() else { return };
+    let place = Workplace::new();
+    let running = start(&place, screen.display(), &["--seconds", "100"]);
+    if !shows_the_ball(&screen, &running) {
+        return;
+    }
+    let process = rustix::process::Pid::from_raw(running.child.id().cast_signed()).expect("a process");
+    rustix::process::kill_process(process, rustix::process::Signal::INT).expect("it is ours");
+    assert_eq!(running.wait().status, Some(130));
+}
