@@ -30,22 +30,16 @@ impl Sample {
         let mut here = Self { boxes: HashMap::new(), pitch_m };
         let count = (2.2 * size_m / pitch_m) as i32;
         let at = |i: i32| (f64::from(i) + 0.4142) * pitch_m - 1.1 * size_m;
-        for axis in 0..3 {
-            for i in 0..count {
-                for j in 0..count {
-                    let node = |k: i32| {
-                        let mut p = Vector3::zeros();
-                        (p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]) = (at(k), at(i), at(j));
-                        p
-                    };
-                    let mut was_inside = contains(&node(0));
-                    for k in 1..count {
-                        let is_inside = contains(&node(k));
-                        if is_inside != was_inside {
-                            here.add(bisected(contains, node(k - 1), node(k)));
-                        }
-                        was_inside = is_inside;
-                    }
+        let node = |[i, j, k]: [i32; 3]| Vector3::new(at(i), at(j), at(k));
+        let index = |[i, j, k]: [i32; 3]| ((i * count + j) * count + k) as usize;
+        // Rays along all three axes meet in the same nodes: each is asked once.
+        let is_inside: Vec<bool> = nodes(count).map(|n| contains(&node(n))).collect();
+        for n in nodes(count) {
+            for axis in 0..3 {
+                let mut before = n;
+                before[axis] -= 1;
+                if n[axis] > 0 && is_inside[index(before)] != is_inside[index(n)] {
+                    here.add(bisected(contains, node(before), node(n)));
                 }
             }
         }
@@ -72,6 +66,11 @@ impl Sample {
         }
         least.sqrt()
     }
+}
+
+/// All nodes of a cubic grid, the last coordinate first.
+fn nodes(count: i32) -> impl Iterator<Item = [i32; 3]> {
+    (0..count).flat_map(move |i| (0..count).flat_map(move |j| (0..count).map(move |k| [i, j, k])))
 }
 
 fn key(p: &Vector3<f64>) -> [i32; 3] {
