@@ -4,7 +4,7 @@
 //! ```text
 //! cargo test --release -p system-tests --test faults_campaign campaign -- --nocapture
 //! ```
-//! plays half a minute of it and prints a table. `CAMPAIGN_SECONDS=3600` plays an hour, `CAMPAIGN_RUNS=500` so many
+//! plays a minute of it and prints a table. `CAMPAIGN_SECONDS=3600` plays an hour, `CAMPAIGN_RUNS=500` so many
 //! runs whatever the time, `CAMPAIGN_SEED=0x...` begins with another run: the one whose seed a failure tells,
 //! with `CAMPAIGN_RUNS=1` it alone. What happens in a run is drawn from its seed and from nothing else; when a
 //! blow falls within a tick is up to the machine.
@@ -22,7 +22,7 @@ use system_tests::faults::random::Random;
 /// Where the usual campaign begins, so that a checkout that passes passes again.
 const USUAL_SEED: u64 = 0x0070_6861_6e74_6f6d;
 /// As long as a campaign lasts if nobody says.
-const USUAL_SECONDS: u64 = 30;
+const USUAL_SECONDS: u64 = 60;
 /// Begins the line on which a run says what it saw.
 const TELLS: &str = "the run saw ";
 

@@ -13,7 +13,7 @@
 //! two things. What the walls leave of the spring is normal to every wall that carries a load (Moreau), so that it lies
 //! in all those planes at once; and all contacts of one centre slide with its speed, so that each opposes it with all of
 //! `mu(v) l_i`. These add up to one circle on the sum of the loads, for laws whose friction grows as the load does; a force
-//! that does not (a fixed cone) is the entity's, shared out in the same way. `tests/ball_cones.rs` goes contact by contact
+//! that does not (a fixed cone) is the entity's, shared out in the same way. `tests/ball/several_cones.rs` goes contact by contact
 //! instead and comes to the same, tick by tick, to rounding.
 //!
 //! The loads are those of the contacts without friction. Were friction free to raise them, the walls of any groove whose half angle is

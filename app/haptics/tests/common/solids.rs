@@ -63,13 +63,19 @@ impl Solid {
         best
     }
 
-    /// Distance from `p` to the surface: the best of a grid, refined.
-    pub(crate) fn distance(&self, p: &Vector3<f64>) -> f64 {
+    /// Surface points of a grid in `u`, `v`.
+    pub(crate) fn grid(&self) -> Vec<(Vector3<f64>, f64, f64)> {
         let n = 36;
-        let mut grid: Vec<(f64, f64, f64)> = (0..n * n)
+        (0..n * n)
             .map(|i| (f64::from(i % n) / f64::from(n), f64::from(i / n) / f64::from(n)))
-            .map(|(u, v)| ((self.point(u, v) - p).norm(), u, v))
-            .collect();
+            .map(|(u, v)| (self.point(u, v), u, v))
+            .collect()
+    }
+
+    /// Distance from `p` to the surface: the best of a `grid`, refined.
+    pub(crate) fn distance(&self, grid: &[(Vector3<f64>, f64, f64)], p: &Vector3<f64>) -> f64 {
+        let mut grid: Vec<(f64, f64, f64)> =
+            grid.iter().map(|&(point, u, v)| ((point - p).norm(), u, v)).collect();
         grid.sort_by(|a, b| a.0.total_cmp(&b.0));
         grid[..4].iter().map(|&(_, u, v)| self.descend(p, (u, v), 0.02)).fold(f64::INFINITY, f64::min)
     }

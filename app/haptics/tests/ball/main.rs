@@ -1,0 +1,21 @@
+//! Balls that touch, slide and roll: a finger with a radius on every kind of surface.
+#![allow(non_snake_case)]
+
+#[path = "../common/mod.rs"]
+mod common;
+#[path = "../common/cones.rs"]
+mod cones;
+#[path = "../common/trees.rs"]
+mod trees;
+
+mod contacts;
+mod csg;
+mod csg_feel;
+mod csg_oracle;
+mod feet;
+mod forms;
+mod mesh;
+mod quality;
+mod several_cones;
+mod shading;
+mod walks;

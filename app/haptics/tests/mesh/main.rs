@@ -1,0 +1,19 @@
+//! Meshes under a point: how they are built, asked and walked over.
+#![allow(non_snake_case)]
+
+#[path = "../common/mod.rs"]
+mod common;
+#[path = "../mesh_oracle/mod.rs"]
+mod mesh_oracle;
+
+mod accuracy;
+mod build;
+mod energy;
+mod folds;
+mod friction;
+mod moving;
+mod outlying;
+mod parts;
+mod queries;
+mod walk;
+mod wedges;
