@@ -22,6 +22,8 @@ const NEAREST: f64 = 2.0;
 const FARTHEST: f64 = 0.5;
 /// In a second of flight, this share of the way to the focus.
 const FLIGHT: f64 = 0.8;
+/// A window that was busy or covered does not make up for it (s).
+const LONGEST_S: f64 = 0.1;
 
 /// Around a place, by these angles (rad): to the right about the vertical, and up.
 pub fn orbit(camera: &mut SceneCamera, focus: &Point3<f64>, right_rad: f64, up_rad: f64) {
@@ -114,7 +116,7 @@ impl CameraMan {
         let ways = FLIGHT_KEYS.iter().zip(self.flies).filter(|(_, is_held)| *is_held);
         let way: Vector3<f64> = ways.map(|((_, way), _)| Vector3::from(*way)).sum();
         let away_m = depth(camera, &drag.focus).abs().max(NEAREST * camera.near_m);
-        let moved = camera.pose * (FLIGHT * away_m * dt_s * way);
+        let moved = camera.pose * (FLIGHT * away_m * dt_s.min(LONGEST_S) * way);
         camera.pose.translation.vector += moved;
         drag.focus += moved;
     }

@@ -39,8 +39,8 @@ pub fn help(bindings: &Bindings) -> [Vec<HelpLine>; 2] {
     };
     let mouse = MOUSE.iter().map(|(keys, says)| HelpLine::Does { keys: (*keys).into(), says });
     let left = group("Run", Group::Run).chain(group("Picture", Group::Picture));
-    let left = left.chain([HelpLine::Title("Mouse")]).chain(mouse);
-    [left.collect(), group("What is chosen, else the hand", Group::Things).collect()]
+    let right = group("What is chosen, else the hand", Group::Things);
+    [left.collect(), right.chain([HelpLine::Title("Mouse")]).chain(mouse).collect()]
 }
 
 #[cfg(test)]

@@ -252,10 +252,10 @@ impl Controls {
         let now_s = ui.input(|input| input.time);
         let painter = ui.painter_at(scene);
         writing::line(&painter, scene, &status_line(&self.status, moment));
+        writing::notes(&painter, scene, &self.board.shown(now_s));
         if self.with_help {
             writing::help(&painter, scene, &self.bindings);
         }
-        writing::notes(&painter, scene, &self.board.shown(now_s));
     }
 }
 

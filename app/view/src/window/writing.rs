@@ -89,7 +89,8 @@ pub(super) fn help(painter: &Painter, scene: Rect, bindings: &Bindings) {
     let size = LINE.min(room.x / (ASPECT * characters)).min(room.y / (ROW * rows)).max(1.0);
     let column = vec2(ASPECT * size * (KEYS + SAYS) as f32, ROW * size * rows);
     let place = Rect::from_center_size(scene.center(), vec2(2.0 * column.x, column.y) + 4.0 * MARGIN);
-    patch(painter, place, 1.1);
+    // What it lies on is not to be read.
+    patch(painter, place, 0.93 / PATCH);
     for (at, column_lines) in both.iter().enumerate() {
         let corner = place.min + 2.0 * MARGIN + vec2(at as f32 * column.x, 0.0);
         for (row, line) in column_lines.iter().enumerate() {
