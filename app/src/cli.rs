@@ -30,6 +30,7 @@ use shm_abi::endpoint;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 use std::process::ExitCode;
+use view::input::Bindings;
 use view::{Eyes, WindowSpec};
 use world::Settings;
 
@@ -144,13 +145,15 @@ fn run_scene(args: &RunArgs, settings: &Settings, is_headless: bool) -> Result<(
     let args = &args.with(settings);
     let rig = make_rig(args, settings)?;
     let mut plan = make_plan(args, &rig, settings)?;
-    plan.window = if is_headless { None } else { window_spec(&rig.scene.name, settings) };
+    plan.window = if is_headless { None } else { window_spec(&rig.scene.name, settings)? };
     run::run(&rig, &plan, &signals)
 }
 
 /// `None`: nobody to show it to.
-fn window_spec(title: &str, settings: &Settings) -> Option<WindowSpec> {
-    view::window::has_display().then(|| WindowSpec {
+fn window_spec(title: &str, settings: &Settings) -> Result<Option<WindowSpec>, RunFailure> {
+    let bindings = settings.bindings.value.as_deref().map_or_else(|| Ok(Bindings::default()), Bindings::read);
+    let bindings = bindings.map_err(|error| RunFailure::Start(error.to_string()))?;
+    Ok(view::window::has_display().then(|| WindowSpec {
         title: format!("{title} - phantom3"),
         size: settings.window_size_px.value.map(|side| side as f32),
         position: settings.window_position_px.value.map(|corner| corner.map(|side| side as f32)),
@@ -161,7 +164,9 @@ fn window_spec(title: &str, settings: &Settings) -> Option<WindowSpec> {
             separation_m: settings.eye_separation_m.value,
             convergence_m: settings.convergence_m.value,
         },
-    })
+        bindings,
+        pictures: settings.recording_directory.value.clone().unwrap_or_default(),
+    }))
 }
 
 fn install_signals() -> Result<StopSignals, RunFailure> {

@@ -90,6 +90,7 @@ impl Control {
                 Order::Scale(scale) => self.gradual.scale(&scale),
                 Order::Move(moved) => self.gradual.set_out(&moved),
                 Order::Tell(kind) => *told = Some(kind),
+                Order::Text => {}
                 Order::Replace(next) => self.waiting = Some(Waiting::Replace(next)),
                 Order::Friction(change) => self.waiting = Some(Waiting::Friction(change)),
                 Order::Pause(is_paused) => self.waiting = Some(Waiting::Pause(is_paused)),

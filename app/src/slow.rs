@@ -74,7 +74,10 @@ impl SlowSide {
 
     /// With a window.
     #[must_use]
-    pub fn with_spectator(self, spectator: Option<Spectator>) -> Self {
+    pub fn with_spectator(mut self, spectator: Option<Spectator>) -> Self {
+        if let (Some(spectator), Some(files)) = (&spectator, &self.files) {
+            self.events.subscribe(Filter::of(&[Class::Order]), spectator.reader(files.book.clone()));
+        }
         Self { spectator, ..self }
     }
 

@@ -3,12 +3,16 @@
 //! Model: the slow side's turn. Rows come in from the fast thread's queue; the window is told of them some sixty times a
 //! second, and what it asks for becomes orders, as if somebody had written them.
 
+use crate::book::Book;
 use crate::control::desk::Desk;
+use crate::control::words::{self, Words};
 use crate::moments::Moments;
 use crate::row::{BodyRow, Row};
 use nalgebra::Vector3;
 use std::time::{Duration, Instant};
-use view::{Ask, Glimpse, News, OpenWindow, Sample};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use view::{Ask, Glimpse, News, Note, OpenWindow, Sample};
+use world::events::{Event, Kind, Subscriber};
 
 /// Between two glimpses.
 const GLIMPSE: Duration = Duration::from_millis(12);
@@ -20,13 +24,28 @@ pub struct Spectator {
     samples: Vec<Sample>,
     newest: Option<(Row, Vec<BodyRow>)>,
     told: Instant,
+    /// What orders give to read, as they are taken.
+    notes: (Sender<Note>, Receiver<Note>),
     wants_end: bool,
 }
 
 impl Spectator {
     /// For a window that is open.
     pub fn new(window: OpenWindow, moments: Moments) -> Self {
-        Self { window, moments, samples: Vec::new(), newest: None, told: Instant::now(), wants_end: false }
+        Self {
+            window,
+            moments,
+            samples: Vec::new(),
+            newest: None,
+            told: Instant::now(),
+            notes: channel(),
+            wants_end: false,
+        }
+    }
+
+    /// Who finds what there is to read among the orders of this book, as they are taken.
+    pub fn reader(&self, book: Book) -> Box<dyn Subscriber> {
+        reader(book, self.notes.0.clone())
     }
 
     /// A tick, as it began.
@@ -53,6 +72,9 @@ impl Spectator {
             let samples = std::mem::take(&mut self.samples);
             self.window.tell(News::Glimpse(Box::new(Glimpse { moment, samples, ..Glimpse::default() })));
         }
+        for note in self.notes.1.try_iter() {
+            self.window.tell(News::Text(note));
+        }
         self.answer(desk);
     }
 
@@ -63,7 +85,7 @@ impl Spectator {
                 Ask::Order(line) => {
                     let done = desk.as_mut().map(|desk| desk.order(0, &line));
                     if let Some(Err(error)) = done {
-                        self.window.tell(News::Text(error));
+                        self.window.tell(News::Text(error.into()));
                     }
                 }
                 Ask::Record(_) => {}
@@ -76,5 +98,35 @@ impl Spectator {
     /// Whether the run shall end.
     pub fn wants_end(&self) -> bool {
         self.wants_end
+    }
+}
+
+fn reader(book: Book, notes: Sender<Note>) -> Box<dyn Subscriber> {
+    Box::new(move |event: &Event| {
+        if let Kind::Order { number } = event.kind
+            && let Ok(Some(Words::Text(note))) = words::parse(&book.order(number))
+        {
+            // Nobody looks on any more.
+            let _ = notes.send(note);
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_orders_give_to_read_is_read_when_they_are_taken() {
+        let book = Book::default();
+        for order in ["pause", "text 0.5 0.2 3 Press the cube", "key 32 down"] {
+            book.add_order(order);
+        }
+        let (sender, notes) = channel();
+        let mut reader = reader(book, sender);
+        for (number, expected) in [(0, None), (1, Some("Press the cube")), (2, None), (3, None)] {
+            reader.event(&Event { run_tick: 5, kind: Kind::Order { number } });
+            assert_eq!(notes.try_iter().next().map(|note| note.text).as_deref(), expected);
+        }
     }
 }

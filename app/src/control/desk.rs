@@ -176,6 +176,7 @@ impl Desk {
             Words::Move(entity, to_W, turn, over_s) => self.move_entity(&entity, to_W, turn, over_s)?,
             Words::Pause(is_paused) => Order::Pause(is_paused),
             Words::Tell(kind) => Order::Tell(kind),
+            Words::Text(_) => Order::Text,
             Words::Swap(scene) => self.swap(&scene)?,
         })
     }

@@ -20,6 +20,8 @@ pub enum Order {
     Pause(bool),
     /// Nothing; it is told among the events.
     Tell(Kind),
+    /// Nothing; whoever looks on reads it when it is taken.
+    Text,
     /// The world: a reset, or another scene.
     Replace(Box<Replacement>),
 }

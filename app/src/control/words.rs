@@ -14,11 +14,13 @@
 //! swap other.toml
 //! key 32 down
 //! trial 7 begins
+//! text 0.5 0.2 4 Press the red cube      at the window: shares of its width and height, seconds, what to read
 //! ```
 //! In a script each line begins with when: `at 2.5 reset`. What follows a `#` is for people.
 
 use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
 use std::path::PathBuf;
+use view::Note;
 use world::FrictionSpec;
 use world::events::{Change, Kind};
 
@@ -42,6 +44,8 @@ pub enum Words {
     Swap(PathBuf),
     /// Something is to be told among the events.
     Tell(Kind),
+    /// Something is to be read at the window.
+    Text(Note),
 }
 
 /// Farther away nothing is put \[m\].
@@ -51,7 +55,7 @@ const MOST_TURN_RAD: f64 = std::f64::consts::PI;
 const KNOWN: &str = "reset; stiffness FACTOR [of ENTITY]; damping FACTOR [of ENTITY]; friction ENTITY MODEL [KEY=VALUE]...; \
                      move ENTITY to X Y Z in SECONDS; turn ENTITY to W X Y Z in SECONDS; \
                      turn ENTITY about X Y Z by RAD in SECONDS; pose ENTITY at X Y Z W X Y Z in SECONDS; pause; resume; \
-                     swap SCENE.toml; key CODE down|up; trial NUMBER begins|ends";
+                     swap SCENE.toml; key CODE down|up; trial NUMBER begins|ends; text X Y SECONDS WORDS...";
 
 /// What a line says after the comment is cut off; `None`: nothing.
 ///
@@ -89,6 +93,10 @@ pub fn parse(line: &str) -> Result<Option<Words>, String> {
         ["trial", trial, change @ ("begins" | "ends")] => {
             let change = if change == "begins" { Change::Begins } else { Change::Ends };
             Words::Tell(Kind::Trial { change, number: whole(trial)? })
+        }
+        ["text", x, y, over, _, ..] => {
+            let at = [share(x)?, share(y)?];
+            Words::Text(Note { text: words[4..].join(" "), at, seconds: seconds(over)? })
         }
         _ => return Err(format!("found {}, allowed: {KNOWN}", words.join(" "))),
     };
@@ -155,6 +163,10 @@ fn seconds(text: &str) -> Result<f64, String> {
     number(text, "s", 0.0, LONGEST_S)
 }
 
+fn share(text: &str) -> Result<f64, String> {
+    number(text, "of the window", 0.0, 1.0)
+}
+
 fn whole(text: &str) -> Result<u32, String> {
     text.parse().map_err(|_| format!("found {text}, allowed: a whole number from 0 to {}", u32::MAX))
 }
@@ -215,6 +227,10 @@ mod tests {
             ("resume", Words::Pause(false)),
             ("key 32 down", Words::Tell(Kind::Key { code: 32, is_pressed: true })),
             ("trial 7 ends", Words::Tell(Kind::Trial { change: Change::Ends, number: 7 })),
+            (
+                "text 0.5 0.25 4 Press  the cube # softly",
+                Words::Text(Note { text: "Press the cube".into(), at: [0.5, 0.25], seconds: 4.0 }),
+            ),
             ("swap other.toml", Words::Swap("other.toml".into())),
         ];
         for (line, words) in good {
@@ -236,6 +252,7 @@ mod tests {
             "Reset",
             "swap",
             "key 3 hit",
+            "text 0.5 0.5 4",
         ] {
             let said = parse(line).unwrap_err();
             assert!(said.contains(line) && said.contains("move ENTITY to X Y Z in SECONDS"), "{said}");
@@ -253,6 +270,7 @@ mod tests {
         assert!(said.contains("mu") && said.contains("-1"), "{said}");
         let said = parse("friction table glue").unwrap_err();
         assert!(said.contains("glue") && said.contains("coulomb"), "{said}");
+        assert_eq!(parse("text 2 0 1 hello").unwrap_err(), "found 2, allowed: 0 to 1 of the window");
         assert!(split_time("reset").unwrap_err().contains("at SECONDS ORDER"));
         assert_eq!(split_time("at -1 reset").unwrap_err(), "found -1, allowed: 0 to 86400 s");
     }

@@ -10,8 +10,10 @@
 //! Frames and units are those of the scene: metres, y up, cameras look along -z.
 #![deny(missing_docs)]
 
+pub mod camera_man;
 pub mod eyes;
 pub mod hand;
+pub mod input;
 mod lamp;
 pub mod moment;
 pub mod news;
@@ -19,11 +21,15 @@ mod offscreen;
 mod overlay;
 pub mod painter;
 pub mod panel;
+pub mod pick;
 pub mod picture;
 pub mod playback;
 pub mod shapes;
 mod solids;
 pub mod stage;
+pub mod status_line;
+pub mod steering;
+pub mod text;
 pub mod triangles;
 mod usual;
 pub mod window;
@@ -34,5 +40,6 @@ pub use news::{Ask, Glimpse, News, Reins, Sample, Status, Wish};
 pub use offscreen::{NoPictures, Offscreen};
 pub use picture::{Picture, Studio};
 pub use stage::{Stage, Thing};
+pub use text::Note;
 pub use triangles::Triangles;
 pub use window::{NoWindow, OpenWindow, WindowSpec};

@@ -6,6 +6,7 @@
 
 use crate::moment::Moment;
 use crate::stage::Stage;
+use crate::text::Note;
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// What a run tells.
@@ -15,8 +16,8 @@ pub enum News {
     Glimpse(Box<Glimpse>),
     /// Another scene goes on.
     Scene(Box<Stage>),
-    /// Something to read, for some seconds.
-    Text(String),
+    /// Something to read.
+    Text(Note),
     /// It is over: the window closes.
     Over,
 }

@@ -6,7 +6,7 @@ use crate::moment::Moment;
 use crate::overlay::Overlay;
 use crate::stage::{Stage, Thing};
 use crate::triangles::Triangles;
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, UnitQuaternion};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use three_d::{
@@ -22,6 +22,9 @@ const BACKGROUND: [f32; 3] = [0.86, 0.89, 0.93];
 /// What things that are touched become like: red, green, blue; and how much.
 const MARK: [f64; 3] = [1.0, 0.95, 0.5];
 const MARKED: f64 = 0.3;
+/// And the thing that people have chosen.
+const CHOSEN: [f64; 3] = [0.45, 0.1, 1.0];
+const CHOSEN_SHARE: f64 = 0.6;
 
 /// What draws: everything of a stage that lies in the graphics memory.
 pub struct Painter {
@@ -37,6 +40,10 @@ pub struct Painter {
     pub with_highlight: bool,
     /// Whether there are shadows.
     pub with_shadows: bool,
+    /// The entity that people have chosen, which is marked.
+    pub chosen: Option<usize>,
+    /// How the sun is turned from where the scene has it.
+    pub sun: UnitQuaternion<f64>,
 }
 
 struct Drawn {
@@ -45,7 +52,7 @@ struct Drawn {
 }
 
 enum Shining {
-    Sun { light: DirectionalLight, casts_shadow: bool },
+    Sun { light: DirectionalLight, direction: nalgebra::Vector3<f64>, casts_shadow: bool },
     Lamp { light: Lamp, casts_shadow: bool },
 }
 
@@ -68,6 +75,8 @@ impl Painter {
             with_overlay: true,
             with_highlight: true,
             with_shadows: true,
+            chosen: None,
+            sun: UnitQuaternion::identity(),
         }
     }
 
@@ -102,8 +111,14 @@ impl Painter {
             drawn.model.set_transformation(matrix(&(pose * drawn.thing.pose)));
             let is_touched = moment.fingers.iter().any(|finger| finger.entity == Some(drawn.thing.entity));
             let is_marked = is_touched && self.with_overlay && self.with_highlight;
-            drawn.model.material.albedo =
-                bytes(if is_marked { touched(drawn.thing.colour) } else { drawn.thing.colour });
+            let mut colour = drawn.thing.colour;
+            if self.chosen == Some(drawn.thing.entity) {
+                colour = mixed(colour, CHOSEN, CHOSEN_SHARE);
+            }
+            if is_marked {
+                colour = mixed(colour, MARK, MARKED);
+            }
+            drawn.model.material.albedo = bytes(colour);
         }
         self.overlay.place(moment);
     }
@@ -131,7 +146,8 @@ impl Painter {
         let casting: Vec<&Mesh> = casting.map(|drawn| &drawn.model.geometry).collect();
         for light in &mut self.lights {
             match light {
-                Shining::Sun { light, casts_shadow } => {
+                Shining::Sun { light, direction, casts_shadow } => {
+                    light.direction = vector(&(self.sun * *direction));
                     let is_cast = with_shadows && *casts_shadow;
                     if !is_cast || light.generate_shadow_map(SHADOW_SIDE, casting.iter()).is_err() {
                         light.clear_shadow_map();
@@ -169,6 +185,7 @@ fn shining(context: &Context, light: &SceneLight) -> Option<Shining> {
         LightKind::Ambient => return None,
         LightKind::Directional { direction } => Shining::Sun {
             light: DirectionalLight::new(context, BRIGHT, colour, vector(&direction)),
+            direction: *direction,
             casts_shadow: light.casts_shadow,
         },
         LightKind::Point { position_m, attenuation } => {
@@ -191,11 +208,10 @@ fn colour_of(shares: [f64; 3]) -> Srgba {
     Srgba::new(r, g, b, 255)
 }
 
-/// Mixed with what marks things that are touched (Melder 8.3.1.2).
-fn touched([r, g, b, opacity]: [f64; 4]) -> [f64; 4] {
-    let mixed = |own: f64, mark: f64| (1.0 - MARKED) * own + MARKED * mark;
-    let [mark_r, mark_g, mark_b] = MARK;
-    [mixed(r, mark_r), mixed(g, mark_g), mixed(b, mark_b), opacity]
+/// With so much of what marks things: that they are touched (Melder 8.3.1.2), or chosen.
+fn mixed([r, g, b, opacity]: [f64; 4], mark: [f64; 3], share: f64) -> [f64; 4] {
+    let mixed = |own: f64, mark: f64| (1.0 - share) * own + share * mark;
+    [mixed(r, mark[0]), mixed(g, mark[1]), mixed(b, mark[2]), opacity]
 }
 
 fn bytes(colour: [f64; 4]) -> Srgba {

@@ -13,6 +13,8 @@ use world::{Scene, SceneCamera, SceneLight, ShapeSpec};
 /// What can be seen.
 #[derive(Debug, Clone, Default)]
 pub struct Stage {
+    /// Of each entity, its name.
+    pub names: Vec<String>,
     /// Things, each of an entity.
     pub things: Vec<Thing>,
     /// Lights; never none.
@@ -45,8 +47,13 @@ impl Stage {
     pub fn new(scene: &Scene, entities: &[Entity]) -> Self {
         let seen = scene.seen();
         let radii_m = scene.fingers.iter().map(|finger| finger.radius_m).collect();
-        let mut stage =
-            Self { lights: seen.lights.to_vec(), cameras: seen.cameras.to_vec(), radii_m, ..Self::default() };
+        let mut stage = Self {
+            names: scene.entities.iter().map(|spec| spec.name.clone()).collect(),
+            lights: seen.lights.to_vec(),
+            cameras: seen.cameras.to_vec(),
+            radii_m,
+            ..Self::default()
+        };
         let told = seen.unreadable.iter().map(|(at, why)| format!("{at}: {why}"));
         stage.not_drawn.extend(told);
         let mut looks = Looks::default();
@@ -75,6 +82,13 @@ impl Stage {
             stage.cameras = vec![usual::camera(scene, entities, &stage.things)];
         }
         stage
+    }
+}
+
+impl Stage {
+    /// What an entity is called.
+    pub fn name(&self, entity: usize) -> &str {
+        self.names.get(entity).map_or("?", String::as_str)
     }
 }
 

@@ -6,14 +6,18 @@
 //!
 //! One process has one window at most, once.
 
+mod controls;
 mod looker;
 mod scene;
+mod writing;
 
 use crate::eyes::Eyes;
+use crate::input::Bindings;
 use crate::news::{Ask, News, Reins};
 use crate::stage::Stage;
 use eframe::egui;
 use looker::Looker;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, SyncSender, TrySendError, channel, sync_channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -38,6 +42,10 @@ pub struct WindowSpec {
     pub with_shadows: bool,
     /// Who looks.
     pub eyes: Eyes,
+    /// Which keys do what.
+    pub bindings: Bindings,
+    /// Where pictures go that people take.
+    pub pictures: PathBuf,
 }
 
 /// Why there is no window.
@@ -148,6 +156,13 @@ fn in_short(words: &str) -> String {
         .and_then(|(_, rest)| rest.split_once(": "))
         .map_or(words, |(_, said)| said)
         .into()
+}
+
+/// The first of its kind that is not there yet.
+fn snapshot_file(directory: &Path) -> PathBuf {
+    let name = |number: u32| directory.join(format!("phantom3-{number:04}.png"));
+    let free = (1..10_000).find(|number| !name(*number).exists());
+    name(free.unwrap_or(0))
 }
 
 fn options(spec: &WindowSpec) -> eframe::NativeOptions {

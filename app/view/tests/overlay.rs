@@ -153,3 +153,43 @@ fn a_thing_changes_its_colour_while_it_is_touched_and_others_do_not() {
     assert_eq!(set.at(&unmarked, own), set.at(&free, own));
     assert_eq!(set.at(&touched, other), set.at(&free, other));
 }
+
+#[test]
+fn the_chosen_thing_is_marked_otherwise_than_one_that_is_touched() {
+    let Some(mut set) = set() else { return };
+    set.moment.fingers[0].entity = None;
+    let (own, other) = ([0.04, 0.0, 0.02], [0.08, 0.0, 0.0]);
+    let free = set.take();
+    set.studio.painter().chosen = Some(0);
+    let chosen = set.take();
+    set.moment.fingers[0].entity = Some(0);
+    let both = set.take();
+    set.studio.painter().chosen = None;
+    let touched = set.take();
+    let looks = [&free, &chosen, &both, &touched].map(|picture| set.at(picture, own));
+    for (k, look) in looks.iter().enumerate() {
+        assert!(looks[..k].iter().all(|other| apart(*look, *other) > 20), "{looks:?}");
+    }
+    for picture in [&chosen, &both, &touched] {
+        assert_eq!(set.at(picture, other), set.at(&free, other));
+    }
+}
+
+#[test]
+fn shadows_go_where_the_sun_is_turned_away_from() {
+    let Some(mut set) = set() else { return };
+    set.moment.fingers.clear();
+    // Above the block, so that its shadow is on it: straight below, and a hand's breadth beside.
+    set.moment.poses[1].translation.vector = Vector3::new(-0.02, 0.03, 0.0);
+    set.stage.lights.iter().for_each(|light| assert!(light.diffuse.iter().all(|share| *share <= 1.0)));
+    let begun = set.take();
+    // The usual sun shines to +x and away; turned about z it shines to -x.
+    set.studio.painter().sun =
+        nalgebra::UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -2.0 * f64::atan(0.45));
+    let turned = set.take();
+    // 2 cm above, towards +x and -z by 0.45 and 0.35 of the height of its middle.
+    let there = |x: f64| [-0.02 + x * 0.45 * 0.03, 0.0, -0.35 * 0.03];
+    let light = |picture: &Picture, x| set.at(picture, there(x)).iter().sum::<i32>();
+    assert!(light(&begun, 1.2) + 60 < light(&turned, 1.2), "{} {}", light(&begun, 1.2), light(&turned, 1.2));
+    assert!(light(&turned, -1.2) + 60 < light(&begun, -1.2), "{} {}", light(&turned, -1.2), light(&begun, -1.2));
+}

@@ -7,8 +7,7 @@
 //! meshes = ["/srv/meshes"]
 //! ```
 //! Model: files are laid over each other and over what is built in; of each value it is known where it came from. Paths
-//! are relative to the file that they stand in. `window` and `stereo` are for the window, which is not there yet: they
-//! are checked all the same.
+//! are relative to the file that they stand in. `window`, `stereo` and `input` are for the window.
 
 use crate::document::{Document, LineEnds};
 use crate::error::SceneError;
@@ -35,6 +34,8 @@ pub struct Settings {
     pub eye_separation_m: Set<f64>,
     /// How far away both pictures agree (m).
     pub convergence_m: Set<f64>,
+    /// The file that says which keys do what; `None`: what is built in.
+    pub bindings: Set<Option<PathBuf>>,
     /// Where scenes are looked for that are not where they are said to be.
     pub scenes: Set<Vec<PathBuf>>,
     /// Where meshes, patches and pictures are.
@@ -121,6 +122,7 @@ impl Default for Settings {
             stereo_mode: set(StereoMode::Off),
             eye_separation_m: set(0.063),
             convergence_m: set(0.6),
+            bindings: set(None),
             scenes: set(Vec::new()),
             meshes: set(Vec::new()),
             hands: set(Vec::new()),
@@ -172,6 +174,10 @@ impl Settings {
             })?;
             take(&stereo, "convergence_m", &mut self.convergence_m, |value| value.number(Bound::Positive))?;
         }
+        if let Some(input) = table("input", &INPUT_KEYS)? {
+            let file = |value: &Value<'_>| value.file("a file of keys (TOML)").map(Some);
+            take(&input, "bindings", &mut self.bindings, file)?;
+        }
         if let Some(data) = table("data", &DATA_KEYS)? {
             take(&data, "scenes", &mut self.scenes, read_directories)?;
             take(&data, "meshes", &mut self.meshes, read_directories)?;
@@ -200,7 +206,7 @@ impl Settings {
             shown: impl Fn(&T) -> String,
         ) -> (&'static str, String, &'s Origin, bool) {
             let is_for_window =
-                ["window", "stereo", "driver.configuration"].iter().any(|table| key.starts_with(table));
+                ["window", "stereo", "input", "driver.configuration"].iter().any(|table| key.starts_with(table));
             (key, shown(&set.value), &set.from, is_for_window)
         }
         let path = |path: &Option<PathBuf>| {
@@ -220,6 +226,7 @@ impl Settings {
             row("stereo.mode", &self.stereo_mode, |mode| format!("{:?}", mode.name())),
             row("stereo.eye_separation_m", &self.eye_separation_m, f64::to_string),
             row("stereo.convergence_m", &self.convergence_m, f64::to_string),
+            row("input.bindings", &self.bindings, path),
             row("data.scenes", &self.scenes, paths),
             row("data.meshes", &self.meshes, paths),
             row("data.hands", &self.hands, paths),
@@ -285,9 +292,10 @@ const fn words(available: &'static [&'static str]) -> Vocabulary {
     Vocabulary { available, later: &[] }
 }
 
-const TABLES: Vocabulary = words(&["window", "stereo", "data", "driver", "recording"]);
+const TABLES: Vocabulary = words(&["window", "stereo", "input", "data", "driver", "recording"]);
 const WINDOW_KEYS: Vocabulary = words(&["size_px", "position_px", "fullscreen", "shadows"]);
 const STEREO_KEYS: Vocabulary = words(&["mode", "eye_separation_m", "convergence_m"]);
+const INPUT_KEYS: Vocabulary = words(&["bindings"]);
 const DATA_KEYS: Vocabulary = words(&["scenes", "meshes", "hands"]);
 const DRIVER_KEYS: Vocabulary = words(&["socket", "configuration", "clock"]);
 const RECORDING_KEYS: Vocabulary = words(&["directory"]);

@@ -54,7 +54,7 @@ fn what_is_wrong_is_told_with_line_and_key() {
     );
     assert_eq!(
         refused("[windows]\n"),
-        "p.toml:1: windows: unknown key (did you mean `window`?); allowed: window, stereo, data, driver, recording"
+        "p.toml:1: windows: unknown key (did you mean `window`?); allowed: window, stereo, input, data, driver, recording"
     );
     assert_eq!(
         refused("[stereo]\nmode = \"3d\"\n"),

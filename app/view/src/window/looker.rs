@@ -1,5 +1,6 @@
 //! Who looks on: takes the news, draws, and asks.
 
+use super::controls::{Controls, Reach};
 use super::scene::SceneView;
 use super::{Ends, WindowSpec};
 use crate::eyes::Eyes;
@@ -27,6 +28,7 @@ pub(super) struct Looker {
     playback: Playback,
     hand: MouseHand,
     panel: Panel,
+    controls: Controls,
     /// The entity that people have chosen.
     selected: Option<usize>,
     is_over: bool,
@@ -40,6 +42,8 @@ impl Looker {
         (told, ask, reins): Ends,
     ) -> Result<Self, String> {
         let camera = stage.cameras.first().cloned().ok_or("nobody looks on")?;
+        let mut eyes = spec.eyes;
+        let controls = Controls::new(spec, &mut eyes, &stage);
         let view = SceneView::new(creation, stage, spec.with_shadows)?;
         Ok(Self {
             told,
@@ -47,10 +51,11 @@ impl Looker {
             reins,
             view,
             camera,
-            eyes: spec.eyes,
+            eyes,
             playback: Playback::default(),
             hand: MouseHand::default(),
             panel: Panel::default(),
+            controls,
             selected: None,
             is_over: false,
         })
@@ -61,15 +66,18 @@ impl Looker {
             match self.told.try_recv() {
                 Ok(News::Glimpse(glimpse)) => {
                     self.panel.take(&glimpse);
+                    self.controls.take(&glimpse.status);
                     self.playback.take(glimpse.moment, now_s);
                 }
                 Ok(News::Scene(stage)) => {
                     self.playback.clear();
                     self.panel.clear();
+                    self.controls.clear(&stage);
+                    self.selected = None;
                     self.camera = stage.cameras.first().cloned().unwrap_or_else(|| self.camera.clone());
                     self.view.show_stage(*stage);
                 }
-                Ok(News::Text(_)) => {}
+                Ok(News::Text(note)) => self.controls.board.add(note, now_s),
                 Ok(News::Over) | Err(TryRecvError::Disconnected) => {
                     self.is_over = true;
                     break;
@@ -88,11 +96,22 @@ impl eframe::App for Looker {
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
             return;
         }
-        self.panel.show(ui, &self.view.stage, &mut self.selected, &self.ask);
+        if self.controls.with_panel {
+            self.panel.show(ui, &self.view.stage, &mut self.selected, &self.ask);
+        }
         let dt_s = f64::from(ui.input(|input| input.stable_dt));
         egui::CentralPanel::default().frame(egui::Frame::NONE).show_inside(ui, |ui| {
             let moment = self.playback.shown(now_s).unwrap_or_default();
-            let scene = self.view.show(ui, moment, &self.camera, &self.eyes);
+            let scene = self.view.show(ui, moment.clone(), &self.camera, &self.eyes);
+            let mut reach = Reach {
+                view: &mut self.view,
+                camera: &mut self.camera,
+                eyes: &mut self.eyes,
+                selected: &mut self.selected,
+                ask: &self.ask,
+            };
+            self.controls.turn(ui, &scene, &moment, &mut reach);
+            self.controls.write(ui, scene.rect, &moment);
             if let Some(reins) = &mut self.reins {
                 reins.pull(self.hand.turn(&scene, &self.camera, dt_s));
             }

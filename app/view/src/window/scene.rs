@@ -3,10 +3,14 @@
 use crate::eyes::Eyes;
 use crate::moment::Moment;
 use crate::painter::Painter;
+use crate::picture::Picture;
 use crate::stage::Stage;
 use eframe::{egui, egui_glow};
+use nalgebra::UnitQuaternion;
 use std::cell::RefCell;
-use std::sync::Arc;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex};
 use three_d::{RenderTarget, Viewport};
 use world::SceneCamera;
 
@@ -22,8 +26,19 @@ pub(super) struct SceneView {
     pub(super) stage: Arc<Stage>,
     /// Whether hands, forces and contacts are drawn.
     pub(super) with_overlay: bool,
+    /// Whether things change their colour while they are touched.
+    pub(super) with_highlight: bool,
     /// Whether there are shadows.
     pub(super) with_shadows: bool,
+    /// The entity that is marked.
+    pub(super) chosen: Option<usize>,
+    /// How the sun is turned.
+    pub(super) sun: UnitQuaternion<f64>,
+    /// Where the next picture goes as a file, too.
+    pub(super) picture: Option<PathBuf>,
+    /// What became of such files.
+    pub(super) said: Receiver<String>,
+    say: Sender<String>,
 }
 
 impl SceneView {
@@ -34,7 +49,19 @@ impl SceneView {
     ) -> Result<Self, String> {
         let gl = creation.gl.clone().ok_or("the window has no OpenGL")?;
         let context = three_d::Context::from_gl_context(gl).map_err(|error| error.to_string())?;
-        let mut view = Self { context, stage: Arc::default(), with_overlay: true, with_shadows };
+        let (say, said) = channel();
+        let mut view = Self {
+            context,
+            stage: Arc::default(),
+            with_overlay: true,
+            with_highlight: true,
+            with_shadows,
+            chosen: None,
+            sun: UnitQuaternion::identity(),
+            picture: None,
+            said,
+            say,
+        };
         view.show_stage(stage);
         Ok(view)
     }
@@ -47,7 +74,7 @@ impl SceneView {
 
     /// Fills what is left of the window; answers where that is, and what pointers do there.
     pub(super) fn show(
-        &self,
+        &mut self,
         ui: &mut egui::Ui,
         moment: Moment,
         camera: &SceneCamera,
@@ -55,11 +82,18 @@ impl SceneView {
     ) -> egui::Response {
         let (place, response) = ui.allocate_exact_size(ui.available_size(), egui::Sense::click_and_drag());
         let (camera, eyes) = (camera.clone(), *eyes);
-        let (with_overlay, with_shadows) = (self.with_overlay, self.with_shadows);
+        let (with_overlay, with_highlight, with_shadows) =
+            (self.with_overlay, self.with_highlight, self.with_shadows);
+        let (chosen, sun) = (self.chosen, self.sun);
+        let file = Mutex::new(self.picture.take());
+        let say = self.say.clone();
         let draw = move |info: egui::PaintCallbackInfo, _: &egui_glow::Painter| {
             PAINTER.with_borrow_mut(|painter| {
                 let Some(painter) = painter else { return };
-                (painter.with_overlay, painter.with_shadows) = (with_overlay, with_shadows);
+                painter.with_overlay = with_overlay;
+                painter.with_highlight = with_highlight;
+                painter.with_shadows = with_shadows;
+                (painter.chosen, painter.sun) = (chosen, sun);
                 let part = info.viewport_in_pixels();
                 let part = Viewport {
                     x: part.left_px,
@@ -70,6 +104,10 @@ impl SceneView {
                 let [width, height] = info.screen_size_px;
                 let target = RenderTarget::screen(painter.context(), width, height);
                 painter.draw_within(&moment, &camera, &eyes, &target, part);
+                if let Some(file) = file.lock().ok().and_then(|mut file| file.take()) {
+                    // Who listened is gone: so is the window.
+                    let _ = say.send(save(&target, part, &file));
+                }
             });
         };
         let callback = egui_glow::CallbackFn::new(draw);
@@ -80,5 +118,16 @@ impl SceneView {
     /// While the graphics are there still.
     pub(super) fn forget(&self) {
         PAINTER.set(None);
+    }
+}
+
+/// Keeps what is drawn there; says what became of it.
+fn save(target: &RenderTarget<'_>, part: Viewport, file: &Path) -> String {
+    let mut pixels: Vec<[u8; 4]> = target.read_color_partially(part.into());
+    // What a window is made of is opaque, whatever it says.
+    pixels.iter_mut().for_each(|[.., opacity]| *opacity = u8::MAX);
+    match (Picture { size: [part.width, part.height], pixels }).save(file) {
+        Ok(()) => format!("saved {}", file.display()),
+        Err(error) => format!("{}: {error}", file.display()),
     }
 }

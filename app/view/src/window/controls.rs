@@ -1,0 +1,295 @@
+//! What keys and mouse do at the window.
+
+use super::scene::SceneView;
+use super::writing;
+use super::{WindowSpec, snapshot_file};
+use crate::camera_man::{CameraMan, CameraTurn, Sight};
+use crate::eyes::Eyes;
+use crate::input::{Action, Actions, Bindings, Bound, HandKeys, Receiver, Router, Step, Unbound};
+use crate::moment::Moment;
+use crate::news::{Ask, Status};
+use crate::pick::{Hit, Picker};
+use crate::stage::Stage;
+use crate::status_line::status_line;
+use crate::steering::{Steering, next_mode, stereo_word, turned_sun};
+use crate::text::{Board, Note};
+use eframe::egui;
+use nalgebra::Point3;
+use std::path::PathBuf;
+use std::sync::mpsc::Sender;
+use world::{SceneCamera, StereoMode};
+
+/// What it says of settings is read at a glance (s), and stands above.
+const GLANCE_S: f64 = 1.5;
+const ABOVE: [f64; 2] = [0.5, 0.06];
+
+/// Who listens to keys and mouse, and shows text.
+pub(super) struct Controls {
+    bindings: Bindings,
+    router: Router,
+    man: CameraMan,
+    picker: Picker,
+    /// What there is to read.
+    pub(super) board: Board,
+    /// What keys want of the hand.
+    pub(super) hand: HandKeys,
+    steering: Steering,
+    status: Status,
+    home: usize,
+    sun_is_chosen: bool,
+    with_help: bool,
+    /// Whether the panel is shown.
+    pub(super) with_panel: bool,
+    pictures: PathBuf,
+}
+
+/// What keys and mouse change.
+pub(super) struct Reach<'r> {
+    pub(super) view: &'r mut SceneView,
+    pub(super) camera: &'r mut SceneCamera,
+    pub(super) eyes: &'r mut Eyes,
+    pub(super) selected: &'r mut Option<usize>,
+    pub(super) ask: &'r Sender<Ask>,
+}
+
+impl Controls {
+    /// As a window begins; eyes that it cannot serve are one.
+    pub(super) fn new(spec: &WindowSpec, eyes: &mut Eyes, stage: &Stage) -> Self {
+        let mut board = Board::default();
+        if eyes.mode == StereoMode::QuadBuffer {
+            // Who opens windows for us asks for no such buffers.
+            eyes.mode = StereoMode::Off;
+            board.add("no quad-buffer stereo: the window has one picture only; one eye".into(), 0.0);
+        }
+        Self {
+            bindings: spec.bindings.clone(),
+            router: Router::default(),
+            man: CameraMan::default(),
+            picker: Picker::new(stage),
+            board,
+            hand: HandKeys::default(),
+            steering: Steering::default(),
+            status: Status::default(),
+            home: 0,
+            sun_is_chosen: false,
+            with_help: false,
+            with_panel: true,
+            pictures: spec.pictures.clone(),
+        }
+    }
+
+    /// How the run goes.
+    pub(super) fn take(&mut self, status: &Status) {
+        if status.is_paused != self.status.is_paused {
+            self.steering.is_paused = status.is_paused;
+        }
+        self.status = status.clone();
+    }
+
+    /// Another scene goes on.
+    pub(super) fn clear(&mut self, stage: &Stage) {
+        self.picker = Picker::new(stage);
+        self.steering = Steering::default();
+        (self.home, self.sun_is_chosen) = (0, false);
+    }
+
+    /// What people did since the last picture, of which this is the scene.
+    pub(super) fn turn(
+        &mut self,
+        ui: &egui::Ui,
+        scene: &egui::Response,
+        moment: &Moment,
+        reach: &mut Reach<'_>,
+    ) {
+        let (events, now_s, dt_s) =
+            ui.input(|input| (input.events.clone(), input.time, f64::from(input.stable_dt)));
+        let writes = ui.ctx().text_edit_focused();
+        let size = [scene.rect.width(), scene.rect.height()].map(f64::from);
+        let eyes = *reach.eyes;
+        let picker = std::mem::take(&mut self.picker);
+        let hit = |camera: &SceneCamera, at: egui::Pos2| -> (Option<Hit>, Point3<f64>) {
+            let at = at - scene.rect.min;
+            let ray = eyes.point(camera, size, [f64::from(at.x), f64::from(at.y)]).ray;
+            let hit = picker.pick(moment, &ray);
+            (hit, hit.map_or_else(|| ray.at(eyes.convergence_m), |hit| hit.place))
+        };
+        let sight = Sight {
+            scene: scene.rect,
+            point: &|camera, at| hit(camera, at).1,
+            pixel_m: eyes.point(reach.camera, size, [0.0; 2]).pixel_m,
+            is_over: scene.contains_pointer(),
+        };
+        let is_active = self.sun_is_chosen || reach.selected.is_some();
+        let moves = |action: Action| is_active && matches!(action, Action::Move(_) | Action::Turn(_));
+        let (mut active, mut rest, mut unbound) =
+            (Actions::new(&moves), Actions::new(&|_| true), Unbound::default());
+        let mut camera = CameraTurn { man: &mut self.man, camera: reach.camera, sight: &sight };
+        // In the order of Melder 7.2.12: the active entity, the camera, the hand, the application.
+        let receivers: &mut [&mut dyn Receiver] =
+            &mut [&mut active, &mut camera, &mut self.hand, &mut rest, &mut unbound];
+        for event in &events {
+            match event {
+                egui::Event::Key { .. } if writes => {}
+                egui::Event::WindowFocused(false) => self.router.let_go(&self.bindings, receivers),
+                _ => {
+                    self.router.tell(event, &self.bindings, receivers);
+                }
+            }
+        }
+        let (moved, done, orders) = (active.taken, rest.taken, unbound.orders);
+        self.man.fly(reach.camera, dt_s);
+        if let Some(at) = scene.interact_pointer_pos().filter(|_| scene.clicked()) {
+            *reach.selected = hit(reach.camera, at).0.map(|hit| hit.entity);
+            self.sun_is_chosen = false;
+        }
+        self.picker = picker;
+        orders.into_iter().for_each(|order| order_of(reach, order));
+        for bound in moved {
+            self.steer(bound, moment, now_s, reach);
+        }
+        for bound in done {
+            self.act(ui.ctx(), bound.action, now_s, reach);
+        }
+        reach.view.chosen = *reach.selected;
+        for note in reach.view.said.try_iter() {
+            self.board.add(note.into(), now_s);
+        }
+    }
+
+    /// Moves what is chosen.
+    fn steer(&mut self, bound: Bound, moment: &Moment, now_s: f64, reach: &mut Reach<'_>) {
+        if self.sun_is_chosen {
+            reach.view.sun = turned_sun(bound) * reach.view.sun;
+            return;
+        }
+        let Some(entity) = *reach.selected else { return };
+        let Some(pose) = moment.poses.get(entity) else { return };
+        if let Some(order) =
+            self.steering.order(bound, (entity, reach.view.stage.name(entity)), pose, now_s)
+        {
+            order_of(reach, order);
+        }
+    }
+
+    fn act(&mut self, ctx: &egui::Context, action: Action, now_s: f64, reach: &mut Reach<'_>) {
+        let said = match action {
+            Action::Exit if self.with_help => {
+                self.with_help = false;
+                None
+            }
+            Action::Exit => {
+                ctx.send_viewport_cmd(egui::ViewportCommand::Close);
+                None
+            }
+            Action::Help => {
+                self.with_help ^= true;
+                None
+            }
+            Action::Panel => {
+                self.with_panel ^= true;
+                None
+            }
+            Action::Pause | Action::Reset | Action::Stiffness(_) | Action::Damping(_) => {
+                let name = reach.selected.map(|entity| reach.view.stage.name(entity));
+                let order = self.steering.command(action, name);
+                order.into_iter().for_each(|order| order_of(reach, order));
+                None
+            }
+            Action::Record => {
+                // Who listened is gone: the run is over.
+                let _ = reach.ask.send(Ask::Record(self.status.recording.is_none()));
+                None
+            }
+            Action::Snapshot => {
+                reach.view.picture = Some(snapshot_file(&self.pictures));
+                None
+            }
+            Action::Shadows => Some(switch("shadows", &mut reach.view.with_shadows)),
+            Action::Overlay => Some(switch("overlay", &mut reach.view.with_overlay)),
+            Action::Highlight => Some(switch("highlight", &mut reach.view.with_highlight)),
+            Action::Stereo => {
+                reach.eyes.mode = next_mode(reach.eyes.mode);
+                Some(stereo_word(reach.eyes.mode))
+            }
+            Action::Separation(step) => Some(separate(reach.eyes, step)),
+            Action::Convergence(step) => Some(converge(reach.eyes, step)),
+            Action::NextCamera => {
+                self.home = (self.home + 1) % reach.view.stage.cameras.len().max(1);
+                self.go_home(reach)
+            }
+            Action::HomeCamera => self.go_home(reach),
+            Action::Choose(step) => {
+                self.sun_is_chosen = false;
+                *reach.selected = next_thing(&reach.view.stage, *reach.selected, step);
+                reach.selected.map(|entity| reach.view.stage.name(entity).to_owned())
+            }
+            Action::ChooseNone => {
+                (*reach.selected, self.sun_is_chosen) = (None, false);
+                Some("nothing is chosen".into())
+            }
+            Action::ChooseSun => {
+                *reach.selected = None;
+                self.sun_is_chosen ^= true;
+                Some(if self.sun_is_chosen { "the sun: arrows turn it" } else { "nothing is chosen" }.into())
+            }
+            // The hand's, which took them.
+            Action::Move(_) | Action::Turn(_) => None,
+            Action::Grip | Action::GripToggle | Action::Fingers(_) => None,
+        };
+        if let Some(text) = said {
+            self.board.replace(Note { text, at: ABOVE, seconds: GLANCE_S }, now_s);
+        }
+    }
+
+    fn go_home(&self, reach: &mut Reach<'_>) -> Option<String> {
+        let camera = reach.view.stage.cameras.get(self.home)?;
+        *reach.camera = camera.clone();
+        Some(format!("camera {}", camera.name))
+    }
+
+    /// Writes over the scene.
+    pub(super) fn write(&mut self, ui: &egui::Ui, scene: egui::Rect, moment: &Moment) {
+        let now_s = ui.input(|input| input.time);
+        let painter = ui.painter_at(scene);
+        writing::line(&painter, scene, &status_line(&self.status, moment));
+        writing::notes(&painter, scene, &self.board.shown(now_s));
+        if self.with_help {
+            writing::help(&painter, scene, &self.bindings);
+        }
+    }
+}
+
+fn order_of(reach: &Reach<'_>, order: String) {
+    // Who listened is gone: the run is over.
+    let _ = reach.ask.send(Ask::Order(order));
+}
+
+fn switch(what: &str, is_on: &mut bool) -> String {
+    *is_on ^= true;
+    format!("{what} {}", if *is_on { "on" } else { "off" })
+}
+
+fn separate(eyes: &mut Eyes, step: Step) -> String {
+    eyes.separate(step.times(1.0, Eyes::STEP));
+    format!("eyes {:.0} mm apart", 1e3 * eyes.separation_m)
+}
+
+fn converge(eyes: &mut Eyes, step: Step) -> String {
+    eyes.converge(step.times(1.0, Eyes::STEP));
+    format!("eyes agree {:.2} m away", eyes.convergence_m)
+}
+
+/// The next entity of which there is something to be seen.
+fn next_thing(stage: &Stage, chosen: Option<usize>, step: Step) -> Option<usize> {
+    let entities = || stage.things.iter().map(|thing| thing.entity);
+    match step {
+        Step::More => {
+            let after = entities().filter(|entity| chosen.is_none_or(|chosen| *entity > chosen)).min();
+            after.or_else(|| entities().min())
+        }
+        Step::Less => {
+            let before = entities().filter(|entity| chosen.is_none_or(|chosen| *entity < chosen)).max();
+            before.or_else(|| entities().max())
+        }
+    }
+}
