@@ -55,7 +55,7 @@ fn set() -> Option<Set> {
         ..FingerMoment::default()
     };
     let poses = entities.iter().map(|entity| entity.X_WB).collect();
-    let moment = Moment { t_s: 0.0, poses, fingers: vec![finger] };
+    let moment = Moment { poses, fingers: vec![finger], ..Moment::default() };
     let studio = studio(&stage, SIZE)?;
     Some(Set { stage, moment, studio })
 }
