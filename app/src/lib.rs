@@ -28,6 +28,7 @@ pub mod lists_end;
 pub mod moments;
 pub mod mount;
 mod not_zeroed;
+pub mod on_request;
 pub mod outcome;
 pub mod passive_port;
 pub mod picture;

@@ -36,12 +36,27 @@ impl Moments {
             entity: finger.entity.map(|entity| entity as usize),
             ..FingerMoment::default()
         });
-        Moment { t_s: self.time_s(row), poses: self.poses.clone(), fingers: fingers.collect() }
+        Moment {
+            t_s: self.time_s(row),
+            poses: self.poses.clone(),
+            fingers: fingers.collect(),
+            ..Moment::default()
+        }
     }
 
     /// When a tick was (s).
     pub fn time_s(&self, row: &Row) -> f64 {
         row.run_tick as f64 * self.period_s
+    }
+
+    /// Which entity each body is.
+    pub fn bodies(&self) -> &[usize] {
+        &self.entities
+    }
+
+    /// How many entities there are.
+    pub fn entities(&self) -> usize {
+        self.poses.len()
     }
 
     /// The fingers that there are.

@@ -19,7 +19,7 @@ use crate::fast_loop::{FastLoop, Turn, WhenFull};
 use crate::outcome::RunFailure;
 use crate::progress::StatusLine;
 use crate::record::read::{self, ReadError, RecordedRun};
-use crate::record::{self, Recorder, View};
+use crate::record::{self, About, Recorder, View};
 use crate::rig::Rig;
 use crate::row_queue::{RowReceiver, row_queue};
 use crate::run::EVENT_QUEUE;
@@ -71,6 +71,7 @@ pub struct ReplayArgs {
 /// A recording or a scene that cannot be read or is wrong, or a fault while it is played.
 pub fn execute(args: &ReplayArgs, signals: &StopSignals) -> Result<ExitCode, RunFailure> {
     let recorded = RecordedRun::open(&args.recording).map_err(|error| wrong(&error))?;
+    refuse_without_beginning(args, &recorded)?;
     let edits: Vec<Edit> = args.friction.iter().chain(&args.change).cloned().collect();
     let mut stage = Stage::set(&args.recording, &recorded, args.scene.as_deref(), &edits)?;
     refuse_to_overwrite(args, &stage.rig)?;
@@ -84,6 +85,19 @@ pub fn execute(args: &ReplayArgs, signals: &StopSignals) -> Result<ExitCode, Run
     let mut play = Play::new(&stage, Arc::new(Mutex::new(feed)), orders, &args.record)?;
     let ended = play.run(signals);
     play.conclude(args, &stage, ended)
+}
+
+/// What was where, and what contacts remembered, is not in it.
+fn refuse_without_beginning(args: &ReplayArgs, recorded: &RecordedRun) -> Result<(), RunFailure> {
+    let Some(begins) = recorded.about().and_then(About::begins_tick).filter(|begins| *begins > 0) else {
+        return Ok(());
+    };
+    let t_s = run_time_s(begins.cast_signed(), recorded.period_ns());
+    Err(wrong(&format_args!(
+        "{} begins at t = {t_s} s of its run, and a replay needs the run from its beginning; record it with \
+         `run --record FILE`",
+        args.recording.display()
+    )))
 }
 
 fn refuse_to_overwrite(args: &ReplayArgs, rig: &Rig) -> Result<(), RunFailure> {

@@ -6,6 +6,7 @@ use crate::control::desk::{Desk, Means, OrderSource};
 use crate::fast_loop::{FastLoop, Tally, WhenFull};
 use crate::moments::Moments;
 use crate::not_zeroed;
+use crate::on_request::OnRequest;
 use crate::outcome::{RunFailure, Stop};
 use crate::progress::Progress;
 use crate::record::{About, Files, View};
@@ -123,7 +124,14 @@ impl Parts {
             Moments::new(rig.scene.fingers.len(), poses, bodies, period_ns)
         };
         let window = plan.window.as_ref().filter(|_| clock != ClockMode::Virtual);
-        let spectator = window.and_then(|spec| open_window(spec, stage(), moments()));
+        let (events, event_ends) = event_queue(EVENT_QUEUE);
+        let mut hub = Hub::new(vec![event_ends]);
+        let spectator = window
+            .and_then(|spec| open_window(spec, stage()))
+            .map(|window| Spectator::new(window, moments(), &mut hub, book.clone()));
+        let view = View::new(&rig.scene, step.entities());
+        let directory = plan.settings.recording_directory.value.clone();
+        let on_request = spectator.is_some().then(|| OnRequest::new(directory, rig.clone(), view.clone()));
         let (desk, orders) = match &plan.orders {
             Some(source) => Some(Desk::open(rig, source, means)),
             None if spectator.is_some() => Some(Desk::silent(rig, means)),
@@ -142,12 +150,11 @@ impl Parts {
             book,
             about: about.clone(),
         };
-        let recorders = files.first(rig, &View::new(&rig.scene, step.entities()))?;
+        let recorders = files.first(rig, &view)?;
         let snapshots = plan.pictures.as_ref().map(|wanted| {
             Snapshots::start(wanted, stage(), moments(), period_ns, when_full == WhenFull::Wait)
         });
         let snapshots = snapshots.transpose().map_err(RunFailure::Start)?;
-        let (events, event_ends) = event_queue(EVENT_QUEUE);
         let fast = FastLoop::new(step, producer, when_full, total_ticks, period_ns).with_events(events);
         Ok(Self {
             slow_lists: (clock == ClockMode::Real && orders.is_some()).then_some(slow_lists),
@@ -155,24 +162,21 @@ impl Parts {
                 Some(orders) => fast.with_control(orders),
                 None => fast,
             },
-            slow: SlowSide::new(consumer, Hub::new(vec![event_ends]), recorders)
+            slow: SlowSide::new(consumer, hub, recorders)
                 .with_desk(desk, files)
                 .with_snapshots(snapshots)
-                .with_spectator(spectator),
+                .with_spectator(spectator)
+                .with_requests(on_request),
             progress: Progress::new(total_ticks, period_ns),
         })
     }
 }
 
 /// `None`: it could not be opened, which is told.
-fn open_window(spec: &WindowSpec, stage: Stage, moments: Moments) -> Option<Spectator> {
-    match OpenWindow::open(spec.clone(), stage, None) {
-        Ok(window) => Some(Spectator::new(window, moments)),
-        Err(error) => {
-            say(format_args!("phantom3: {error}; the run goes on without"));
-            None
-        }
-    }
+fn open_window(spec: &WindowSpec, stage: Stage) -> Option<OpenWindow> {
+    OpenWindow::open(spec.clone(), stage, None)
+        .inspect_err(|error| say(format_args!("phantom3: {error}; the run goes on without")))
+        .ok()
 }
 
 fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Report, Stop), RunFailure> {
@@ -218,6 +222,7 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
     about.tell("lease", attachment.commander.as_ref().map_or(0, CommanderMemory::lease).to_string());
     let Parts { fast, mut slow, mut progress, slow_lists } =
         Parts::new(&step_rig, plan, info.clock_mode, info.period_ns, &extras, &about)?;
+    slow.watch_driver(source.socket());
     let result =
         two_processes::run(&mut source, attachment, (fast, slow_lists), &mut slow, &mut progress, signals);
     progress.end();

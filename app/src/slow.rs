@@ -1,13 +1,15 @@
 //! The slow thread's turn: take what the fast thread left and hand it to the recorders and to those who want events.
 
 use crate::control::desk::{Coming, Desk};
-use crate::record::{Files, Recorded, Recorder};
+use crate::on_request::OnRequest;
+use crate::record::{Beginning, Files, Recorded, Recorder};
 use crate::row::Row;
 use crate::row_queue::RowReceiver;
 use crate::snapshots::{Drawn, Snapshots};
 use crate::spectator::Spectator;
 use io_driver::say::say;
 use std::fmt::Write;
+use std::path::Path;
 use world::events::{Class, Filter, Hub};
 
 /// The slow side of a run.
@@ -32,6 +34,8 @@ pub struct SlowSide {
     drawn: Option<Drawn>,
     /// Who looks on at a window, if anybody does.
     spectator: Option<Spectator>,
+    /// Who records when people ask for it, if they may.
+    on_request: Option<OnRequest>,
     /// Who else wants to know what happens.
     pub events: Hub,
     /// The newest row, for whoever wants to look.
@@ -55,6 +59,7 @@ impl SlowSide {
             snapshots: None,
             drawn: None,
             spectator: None,
+            on_request: None,
             events,
             newest: None,
         }
@@ -74,11 +79,21 @@ impl SlowSide {
 
     /// With a window.
     #[must_use]
-    pub fn with_spectator(mut self, spectator: Option<Spectator>) -> Self {
-        if let (Some(spectator), Some(files)) = (&spectator, &self.files) {
-            self.events.subscribe(Filter::of(&[Class::Order]), spectator.reader(files.book.clone()));
-        }
+    pub fn with_spectator(self, spectator: Option<Spectator>) -> Self {
         Self { spectator, ..self }
+    }
+
+    /// With recordings that people may ask for.
+    #[must_use]
+    pub fn with_requests(self, on_request: Option<OnRequest>) -> Self {
+        Self { on_request, ..self }
+    }
+
+    /// From now on people at the window, if there are any, see how the loop of the driver goes that listens here.
+    pub fn watch_driver(&mut self, socket: &Path) {
+        if let Some(spectator) = &mut self.spectator {
+            spectator.watch_driver(socket.into());
+        }
     }
 
     /// Takes everything that is there. A recording that cannot be written tells so itself, and the run goes on.
@@ -88,8 +103,63 @@ impl SlowSide {
         while self.go_on_to_next_scene() {
             self.take_rows();
         }
+        self.end_what_failed();
+        let Some(spectator) = &mut self.spectator else { return };
+        let recording = self.on_request.as_ref().and_then(OnRequest::path);
+        spectator.step(self.rows.bodies(), recording, self.desk.as_mut());
+        if let Some(wanted) = spectator.take_record() {
+            let said = self.record(wanted);
+            self.tell(said);
+        }
+    }
+
+    /// Begins a recording with the next row, or ends the one that is under way; says in words what was done.
+    pub fn record(&mut self, wanted: bool) -> String {
+        let Some(on_request) = &mut self.on_request else { return "nothing can be recorded here".into() };
+        if wanted && on_request.path().is_none() {
+            let path = on_request.next_path();
+            return self.record_in(&path);
+        }
+        if let (true, Some(path)) = (wanted, on_request.path()) {
+            return format!("recording {}", path.display());
+        }
+        let ended = on_request.end();
+        let said = ended.as_ref().map(|recorder| format!("recorded {}", recorder.path().display()));
+        self.closed.extend(ended);
+        said.unwrap_or_else(|| "nothing was being recorded".into())
+    }
+
+    /// Begins a recording in this file with the next row, and ends any other that people asked for; says in words what was
+    /// done.
+    pub fn record_in(&mut self, path: &Path) -> String {
+        let beginning = Beginning {
+            run_tick: self.newest.map_or(0, |row| row.run_tick + 1),
+            ordered: self.spectator.as_ref().map(Spectator::ordered).unwrap_or_default(),
+        };
+        let (Some(on_request), Some(files)) = (&mut self.on_request, &self.files) else {
+            return "nothing can be recorded here".into();
+        };
+        self.closed.extend(on_request.end());
+        match on_request.begin(files, path, &beginning) {
+            Ok(recorder) => {
+                subscribe(std::slice::from_mut(recorder), &mut self.events);
+                format!("recording {}", path.display())
+            }
+            Err(error) => error.to_string(),
+        }
+    }
+
+    /// A full disk ends what people asked for; the recorder has said so.
+    fn end_what_failed(&mut self) {
+        if self.on_request.as_ref().is_some_and(OnRequest::has_failed) {
+            let said = self.record(false);
+            self.tell(format!("{said} not to its end: the disk takes no more"));
+        }
+    }
+
+    fn tell(&mut self, words: String) {
         if let Some(spectator) = &mut self.spectator {
-            spectator.step(self.desk.as_mut());
+            spectator.tell(words);
         }
     }
 
@@ -103,14 +173,15 @@ impl SlowSide {
             let Some((row, bodies)) = self.rows.receive() else { break };
             // A tick's events are there before its row is.
             self.events.deliver(row.run_tick);
-            for recorder in &mut self.recorders {
+            let requested = self.on_request.as_mut().and_then(OnRequest::recorder);
+            for recorder in self.recorders.iter_mut().chain(requested) {
                 recorder.send(&row, bodies);
             }
             if let Some(snapshots) = &mut self.snapshots {
                 snapshots.look(&row, bodies);
             }
             if let Some(spectator) = &mut self.spectator {
-                spectator.look(&row, bodies);
+                spectator.look(&row);
             }
             self.newest = Some(row);
         }
@@ -129,15 +200,21 @@ impl SlowSide {
         self.recorders = stay;
         let mut begun = self.begin_recordings(&coming);
         subscribe(&mut begun, &mut self.events);
+        let requested = self.on_request.as_mut().and_then(|all| all.go_on_with(&coming, self.scenes));
+        let goes_on = requested.is_some();
         if let Some(first) = coming.rows.next_tick() {
             self.events.deliver(first);
         }
-        self.closed.extend(end.into_iter().map(|mut recorder| {
+        self.closed.extend(end.into_iter().chain(requested).map(|mut recorder| {
             recorder.close();
             recorder
         }));
         self.recorders.extend(begun);
         self.rows = coming.rows;
+        if goes_on {
+            let said = self.record(true);
+            self.tell(said);
+        }
         true
     }
 
@@ -172,6 +249,7 @@ impl SlowSide {
         self.events.deliver(u64::MAX);
         let told = summary(&self.events);
         self.closed.append(&mut self.recorders);
+        self.closed.extend(self.on_request.as_mut().and_then(OnRequest::end));
         self.failed.extend(self.closed.into_iter().map(Recorder::finish));
         let pictures = self.drawn.or_else(|| self.snapshots.map(Snapshots::finish));
         SlowEnd { recordings: self.failed, events: told, pictures }

@@ -3,16 +3,22 @@
 //! Model: the slow side's turn. Rows come in from the fast thread's queue; the window is told of them some sixty times a
 //! second, and what it asks for becomes orders, as if somebody had written them.
 
+mod gauge;
+mod happened;
+mod notes;
+
 use crate::book::Book;
 use crate::control::desk::Desk;
-use crate::control::words::{self, Words};
 use crate::moments::Moments;
 use crate::row::{BodyRow, Row};
+use gauge::Gauge;
+use happened::Happened;
 use nalgebra::Vector3;
+use notes::Notes;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use std::sync::mpsc::{Receiver, Sender, channel};
-use view::{Ask, Glimpse, News, Note, OpenWindow, Sample};
-use world::events::{Event, Kind, Subscriber};
+use view::{Ask, Glimpse, News, OpenWindow, Sample, Status};
+use world::events::Hub;
 
 /// Between two glimpses.
 const GLIMPSE: Duration = Duration::from_millis(12);
@@ -22,60 +28,100 @@ pub struct Spectator {
     window: OpenWindow,
     moments: Moments,
     samples: Vec<Sample>,
-    newest: Option<(Row, Vec<BodyRow>)>,
+    newest: Option<Row>,
     told: Instant,
-    /// What orders give to read, as they are taken.
-    notes: (Sender<Note>, Receiver<Note>),
+    happened: Happened,
+    notes: Notes,
+    /// Of a driver in a process of its own.
+    gauge: Option<Gauge>,
+    wants_record: Option<bool>,
     wants_end: bool,
 }
 
 impl Spectator {
-    /// For a window that is open.
-    pub fn new(window: OpenWindow, moments: Moments) -> Self {
+    /// For a window that is open. It hears here what happens, and finds in this book what was ordered.
+    pub fn new(window: OpenWindow, moments: Moments, hub: &mut Hub, book: Book) -> Self {
         Self {
             window,
             moments,
             samples: Vec::new(),
             newest: None,
             told: Instant::now(),
-            notes: channel(),
+            notes: Notes::new(hub, book.clone()),
+            happened: Happened::new(hub, book),
+            gauge: None,
+            wants_record: None,
             wants_end: false,
         }
     }
 
-    /// Who finds what there is to read among the orders of this book, as they are taken.
-    pub fn reader(&self, book: Book) -> Box<dyn Subscriber> {
-        reader(book, self.notes.0.clone())
+    /// From now on tells how the loop of the driver goes that listens here.
+    pub fn watch_driver(&mut self, socket: PathBuf) {
+        self.gauge = Some(Gauge::new(socket));
     }
 
     /// A tick, as it began.
-    pub fn look(&mut self, row: &Row, bodies: &[BodyRow]) {
+    pub fn look(&mut self, row: &Row) {
         let fingers = row.fingers[..self.moments.fingers()].iter();
         let depth_m = |hip: &Vector3<f64>, god: Vector3<f64>| (hip - god).norm();
         let felt = fingers
             .map(|finger| [finger.force_on_user.norm(), depth_m(&finger.hip, finger.god_object)])
             .collect();
         self.samples.push(Sample { t_s: self.moments.time_s(row), fingers: felt });
-        let newest = self.newest.get_or_insert_with(|| (*row, Vec::new()));
-        newest.0 = *row;
-        newest.1.clear();
-        newest.1.extend_from_slice(bodies);
+        self.newest = Some(*row);
+        self.happened.step();
     }
 
-    /// The slow side's turn.
-    pub fn step(&mut self, desk: Option<&mut Desk>) {
+    /// The slow side's turn; the bodies are those of the newest row.
+    pub fn step(&mut self, bodies: &[BodyRow], recording: Option<&Path>, desk: Option<&mut Desk>) {
+        if let Some(gauge) = &mut self.gauge {
+            gauge.step();
+        }
         if self.told.elapsed() >= GLIMPSE
-            && let Some((row, bodies)) = &self.newest
+            && let Some(row) = self.newest
         {
             self.told = Instant::now();
-            let moment = self.moments.moment(row, bodies);
+            let status = self.status(&row, bodies, recording);
+            let mut moment = self.moments.moment(&row, bodies);
+            moment.colliding = colliding(&status.touching, self.moments.bodies());
             let samples = std::mem::take(&mut self.samples);
-            self.window.tell(News::Glimpse(Box::new(Glimpse { moment, samples, ..Glimpse::default() })));
+            self.window.tell(News::Glimpse(Box::new(Glimpse { moment, samples, status })));
         }
-        for note in self.notes.1.try_iter() {
+        for note in self.notes.taken() {
             self.window.tell(News::Text(note));
         }
         self.answer(desk);
+    }
+
+    fn status(&self, row: &Row, bodies: &[BodyRow], recording: Option<&Path>) -> Status {
+        let told = self.gauge.as_ref().map(Gauge::told).unwrap_or_default();
+        let so_far = self.happened.so_far();
+        let fingers = row.fingers[..self.moments.fingers()].iter().enumerate();
+        let slow = bodies.iter().filter(|body| body.is_slow).count();
+        Status {
+            rate_hz: told.rate_hz,
+            overruns: told.counts[0],
+            late: told.counts[1],
+            latency_ns: told.latency_ns,
+            lists: [bodies.len() - slow, slow],
+            is_slow: if slow == 0 { Vec::new() } else { self.slow_entities(bodies) },
+            felt: fingers
+                .map(|(number, finger)| so_far.felt(number, finger.entity.map(|entity| entity as usize)))
+                .collect(),
+            touching: so_far.pairs().collect(),
+            recording: recording.map(|path| path.display().to_string()),
+            is_paused: so_far.is_paused,
+        }
+    }
+
+    fn slow_entities(&self, bodies: &[BodyRow]) -> Vec<bool> {
+        let mut is_slow = vec![false; self.moments.entities()];
+        for (body, &entity) in bodies.iter().zip(self.moments.bodies()) {
+            if let Some(place) = is_slow.get_mut(entity) {
+                *place = body.is_slow;
+            }
+        }
+        is_slow
     }
 
     fn answer(&mut self, mut desk: Option<&mut Desk>) {
@@ -88,11 +134,26 @@ impl Spectator {
                         self.window.tell(News::Text(error.into()));
                     }
                 }
-                Ask::Record(_) => {}
+                Ask::Record(wanted) => self.wants_record = Some(wanted),
                 Ask::End => self.wants_end = true,
             }
         }
         self.wants_end |= !self.window.is_open();
+    }
+
+    /// Whether a recording shall begin, or end, since this was last asked.
+    pub fn take_record(&mut self) -> Option<bool> {
+        self.wants_record.take()
+    }
+
+    /// What had been ordered by now, in words.
+    pub fn ordered(&self) -> Vec<String> {
+        self.happened.ordered()
+    }
+
+    /// Tells people something.
+    pub fn tell(&mut self, text: String) {
+        self.window.tell(News::Text(text.into()));
     }
 
     /// Whether the run shall end.
@@ -101,15 +162,13 @@ impl Spectator {
     }
 }
 
-fn reader(book: Book, notes: Sender<Note>) -> Box<dyn Subscriber> {
-    Box::new(move |event: &Event| {
-        if let Kind::Order { number } = event.kind
-            && let Ok(Some(Words::Text(note))) = words::parse(&book.order(number))
-        {
-            // Nobody looks on any more.
-            let _ = notes.send(note);
-        }
-    })
+/// Those of these entities that touch another one, in ascending order.
+fn colliding(pairs: &[[usize; 2]], moving: &[usize]) -> Vec<usize> {
+    let mut touching: Vec<usize> = pairs.iter().flatten().copied().collect();
+    touching.sort_unstable();
+    touching.dedup();
+    touching.retain(|entity| moving.binary_search(entity).is_ok());
+    touching
 }
 
 #[cfg(test)]
@@ -117,16 +176,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_orders_give_to_read_is_read_when_they_are_taken() {
-        let book = Book::default();
-        for order in ["pause", "text 0.5 0.2 3 Press the cube", "key 32 down"] {
-            book.add_order(order);
-        }
-        let (sender, notes) = channel();
-        let mut reader = reader(book, sender);
-        for (number, expected) in [(0, None), (1, Some("Press the cube")), (2, None), (3, None)] {
-            reader.event(&Event { run_tick: 5, kind: Kind::Order { number } });
-            assert_eq!(notes.try_iter().next().map(|note| note.text).as_deref(), expected);
-        }
+    fn what_collides_is_what_can_move_and_touches_anything() {
+        assert_eq!(colliding(&[[0, 4], [0, 3], [3, 4], [1, 2]], &[2, 3, 4, 7]), [2, 3, 4]);
     }
 }

@@ -43,6 +43,16 @@ pub enum Source {
     },
 }
 
+impl Source {
+    /// Where it listens.
+    pub fn socket(&self) -> &Path {
+        match self {
+            Self::Child(child) => child.socket(),
+            Self::Running { socket, .. } => socket,
+        }
+    }
+}
+
 /// What is known after the run.
 pub struct TwoProcessEnd {
     /// Counts.

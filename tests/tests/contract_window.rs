@@ -78,7 +78,7 @@ fn headless_is_headless_and_the_virtual_clock_has_no_window() {
 fn a_run_is_seen_and_its_window_closes_with_it() {
     let Some(screen) = Screen::open() else { return };
     let place = Workplace::new();
-    let running = start(&place, screen.display(), &["--seconds", "4"]);
+    let running = start(&place, screen.display(), &["--seconds", "12"]);
     if !shows_the_ball(&screen, &running) {
         return;
     }

@@ -17,6 +17,9 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 /// The fact that names the first recording of the run.
 const FOLLOWS: &str = "follows";
+/// The facts of a recording that was asked for while the run went on: its first tick, and what had been ordered before.
+const BEGINS_TICK: &str = "begins_tick";
+const ORDERED_BEFORE: &str = "ordered_before";
 
 /// More than this of models and pictures is not put into a recording.
 const MOST_MODEL_BYTES: u64 = 64 << 20;
@@ -28,6 +31,15 @@ pub struct InputFile {
     pub name: String,
     /// Its content.
     pub bytes: Vec<u8>,
+}
+
+/// Where in a run a recording begins that was asked for while it went on.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Beginning {
+    /// Its first tick.
+    pub run_tick: u64,
+    /// What had been ordered by then, in words.
+    pub ordered: Vec<String>,
 }
 
 /// Facts and files.
@@ -81,6 +93,26 @@ impl About {
         next.tell(FOLLOWS, first.into_owned());
         next.attach_inputs(rig);
         next
+    }
+
+    /// Of a recording that begins in the middle of a run; with the inputs of `other` if that is the scene which goes on.
+    #[must_use]
+    pub fn under_way(&self, other: Option<&Rig>, beginning: &Beginning) -> Self {
+        let mut about = match other {
+            Some(rig) => self.followed_by(rig, Path::new("")),
+            None => self.clone(),
+        };
+        about.facts.remove(FOLLOWS);
+        about.tell(BEGINS_TICK, beginning.run_tick.to_string());
+        if !beginning.ordered.is_empty() {
+            about.tell(ORDERED_BEFORE, beginning.ordered.join("\n"));
+        }
+        about
+    }
+
+    /// The first tick of a recording that begins in the middle of a run.
+    pub fn begins_tick(&self) -> Option<u64> {
+        self.facts.get(BEGINS_TICK)?.parse().ok()
     }
 
     /// Whether the recording is of a scene that took over from another one.

@@ -1,6 +1,6 @@
 //! Which files a run is recorded in: those that were asked for, and beside each one of its own for every other scene.
 
-use super::{About, Recorder, View, create, create_events};
+use super::{About, Beginning, Recorder, View, create, create_events, create_under_way};
 use crate::book::Book;
 use crate::fast_loop::WhenFull;
 use crate::recording::RecordingError;
@@ -53,6 +53,22 @@ impl Files {
             self.start(&path, file, rig)
         };
         self.record.iter().map(record).collect()
+    }
+
+    /// One that begins in the middle of the scene of this number.
+    ///
+    /// # Errors
+    /// If it cannot be made.
+    pub fn under_way(
+        &self,
+        path: &Path,
+        (rig, view, number): (&Rig, &View, u32),
+        beginning: &Beginning,
+    ) -> Result<Recorder, RecordingError> {
+        let about = self.about.under_way((number > 0).then_some(rig), beginning);
+        let scene = ((&self.book, number), beginning.run_tick);
+        let file = create_under_way(path, rig.names(&self.extras), self.period_ns, &about, view, scene)?;
+        self.start(path, file, rig)
     }
 
     fn start(&self, path: &Path, file: super::RecordFile, rig: &Rig) -> Result<Recorder, RecordingError> {

@@ -101,6 +101,21 @@ impl McapFile {
         about: &About,
         view: View,
     ) -> Result<Self, RecordingError> {
+        Self::create_at(path, names, period_ns, about, view, 0)
+    }
+
+    /// The same of a recording that begins when the run has come to this tick.
+    ///
+    /// # Errors
+    /// If that cannot be written.
+    pub fn create_at(
+        path: &Path,
+        names: Names,
+        period_ns: u64,
+        about: &About,
+        view: View,
+        begins: u64,
+    ) -> Result<Self, RecordingError> {
         let failed = |error| RecordingError::Create { file: path.into(), source: into_io(error) };
         let file =
             File::create(path).map_err(|source| RecordingError::Create { file: path.into(), source })?;
@@ -129,7 +144,7 @@ impl McapFile {
             is_current: true,
         };
         let scene = std::mem::take(&mut file.view.scene);
-        file.put(channels.scene, 0, &scene).and_then(|()| file.writer.flush()).map_err(failed)?;
+        file.put(channels.scene, begins, &scene).and_then(|()| file.writer.flush()).map_err(failed)?;
         Ok(file)
     }
 
@@ -137,6 +152,12 @@ impl McapFile {
     #[must_use]
     pub fn of_scene(self, (book, scene): (&Book, u32)) -> Self {
         Self { book: book.clone(), scene, is_current: scene == 0, ..self }
+    }
+
+    /// The scene runs already.
+    #[must_use]
+    pub fn under_way(self) -> Self {
+        Self { is_current: true, ..self }
     }
 
     /// Appends a row and its bodies.

@@ -21,7 +21,7 @@ mod tick;
 mod view;
 mod wire;
 
-pub use about::{About, InputFile};
+pub use about::{About, Beginning, InputFile};
 pub use events_file::EventsFile;
 pub use files::Files;
 pub use mcap_file::McapFile;
@@ -49,6 +49,25 @@ pub fn create(
         return Ok(RecordFile::Mcap(Box::new(file)));
     }
     Ok(RecordFile::Csv(Box::new(Recording::create(path, names, period_ns)?)))
+}
+
+/// The same of a recording that begins in the middle of its scene, when the run has come to this tick.
+///
+/// # Errors
+/// If it cannot be made.
+pub fn create_under_way(
+    path: &Path,
+    names: Names,
+    period_ns: u64,
+    about: &About,
+    view: &View,
+    (scene, begins): ((&Book, u32), u64),
+) -> Result<RecordFile, RecordingError> {
+    if is_mcap(path) {
+        let file = McapFile::create_at(path, names, period_ns, about, view.clone(), begins)?;
+        return Ok(RecordFile::Mcap(Box::new(file.of_scene(scene).under_way())));
+    }
+    create(path, names, period_ns, about, view, scene)
 }
 
 /// Creates a file of events alone: a line each, as JSON or, with the ending `.csv`, as a table.

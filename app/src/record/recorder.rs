@@ -152,6 +152,8 @@ struct Shared {
     gaps: Mutex<VecDeque<(u64, u64)>>,
     /// Rows taken from the queue so far.
     taken: AtomicU64,
+    /// The file takes no more, which has been told.
+    has_failed: AtomicBool,
 }
 
 impl Recorder {
@@ -231,6 +233,11 @@ impl Recorder {
         &self.path
     }
 
+    /// Whether the file takes no more, which has been told.
+    pub fn has_failed(&self) -> bool {
+        self.shared.has_failed.load(Ordering::Relaxed)
+    }
+
     /// Whether it is of events alone, whatever the scene is.
     pub fn is_of_events(&self) -> bool {
         self.unit == EVENTS
@@ -306,6 +313,7 @@ impl RecorderThread {
                 }
                 if let Err(error) = written {
                     say(format_args!("phantom3: {error}"));
+                    self.shared.has_failed.store(true, Ordering::Relaxed);
                     self.file = None;
                     result = Err(error);
                 }

@@ -39,7 +39,7 @@ pub use moment::{ContactMoment, FingerMoment, Moment};
 pub use news::{Ask, Glimpse, News, Reins, Sample, Status, Wish};
 pub use offscreen::{NoPictures, Offscreen};
 pub use picture::{Picture, Studio};
-pub use stage::{Stage, Thing};
+pub use stage::{Known, Stage, Thing};
 pub use text::Note;
 pub use triangles::Triangles;
 pub use window::{NoWindow, OpenWindow, WindowSpec};

@@ -12,6 +12,8 @@ pub struct Moment {
     pub poses: Vec<Isometry3<f64>>,
     /// The fingers.
     pub fingers: Vec<FingerMoment>,
+    /// Entities that can move and touch another one, in ascending order.
+    pub colliding: Vec<usize>,
 }
 
 /// A finger then; world frame.
@@ -58,6 +60,7 @@ impl Moment {
             t_s: self.t_s + share * (later.t_s - self.t_s),
             poses: self.poses.iter().zip(&later.poses).map(pose).collect(),
             fingers: self.fingers.iter().zip(&later.fingers).map(finger).collect(),
+            colliding: later.colliding.clone(),
         }
     }
 }

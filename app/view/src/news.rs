@@ -42,20 +42,24 @@ pub struct Sample {
     pub fingers: Vec<[f64; 2]>,
 }
 
-/// How a run goes.
+/// How a run goes. What can be told only of real time is 0 on other clocks.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Status {
     /// Ticks per second, as they came.
     pub rate_hz: f64,
-    /// Ticks that were too late, or missed.
+    /// Deadlines that the driver skipped since the run began.
     pub overruns: u64,
-    /// From the reading of the devices to the writing of their forces (ns): median, 99 of 100, and the worst.
+    /// Ticks since then that were not answered in time.
+    pub late: u64,
+    /// From the reading of the devices to the reply, of the ticks of the last second (ns): median, 99 of 100, and the worst.
     pub latency_ns: Option<[u64; 3]>,
     /// Entities that can move, in the fast and in the slow list.
     pub lists: [usize; 2],
     /// Of each entity, whether it is in the slow list; empty: none is.
     pub is_slow: Vec<bool>,
-    /// Pairs of entities that touch each other.
+    /// Of each finger, the entities that it touches.
+    pub felt: Vec<Vec<usize>>,
+    /// Pairs of entities that touch each other, in ascending order.
     pub touching: Vec<[usize; 2]>,
     /// Where it is being recorded on request, if it is.
     pub recording: Option<String>,

@@ -19,9 +19,12 @@ use world::{LightKind, SceneCamera, SceneLight};
 const SHADOW_SIDE: u32 = 2048;
 /// What is behind everything: red, green, blue.
 const BACKGROUND: [f32; 3] = [0.86, 0.89, 0.93];
-/// What things that are touched become like: red, green, blue; and how much.
-const MARK: [f64; 3] = [1.0, 0.95, 0.5];
-const MARKED: f64 = 0.3;
+/// What things that fingers touch become like: red, green, blue; and how much.
+const TOUCHED: [f64; 3] = [1.0, 0.95, 0.5];
+const TOUCHED_SHARE: f64 = 0.3;
+/// And things that touch each other.
+const COLLIDING: [f64; 3] = [0.9, 0.3, 0.75];
+const COLLIDING_SHARE: f64 = 0.25;
 /// And the thing that people have chosen.
 const CHOSEN: [f64; 3] = [0.45, 0.1, 1.0];
 const CHOSEN_SHARE: f64 = 0.6;
@@ -36,7 +39,7 @@ pub struct Painter {
     overlay: Overlay,
     /// Whether hands, forces and contacts are drawn.
     pub with_overlay: bool,
-    /// Whether things change their colour while they are touched.
+    /// Whether things change their colour while fingers touch them or they touch each other.
     pub with_highlight: bool,
     /// Whether there are shadows.
     pub with_shadows: bool,
@@ -109,14 +112,20 @@ impl Painter {
         for drawn in &mut self.things {
             let pose = moment.poses.get(drawn.thing.entity).copied().unwrap_or_default();
             drawn.model.set_transformation(matrix(&(pose * drawn.thing.pose)));
-            let is_touched = moment.fingers.iter().any(|finger| finger.entity == Some(drawn.thing.entity));
-            let is_marked = is_touched && self.with_overlay && self.with_highlight;
+            let entity = drawn.thing.entity;
+            let is_touched = moment.fingers.iter().any(|finger| finger.entity == Some(entity));
+            let collides = moment.colliding.binary_search(&entity).is_ok();
             let mut colour = drawn.thing.colour;
-            if self.chosen == Some(drawn.thing.entity) {
+            if self.chosen == Some(entity) {
                 colour = mixed(colour, CHOSEN, CHOSEN_SHARE);
             }
-            if is_marked {
-                colour = mixed(colour, MARK, MARKED);
+            if self.with_overlay && self.with_highlight {
+                if collides {
+                    colour = mixed(colour, COLLIDING, COLLIDING_SHARE);
+                }
+                if is_touched {
+                    colour = mixed(colour, TOUCHED, TOUCHED_SHARE);
+                }
             }
             drawn.model.material.albedo = bytes(colour);
         }
@@ -208,7 +217,7 @@ fn colour_of(shares: [f64; 3]) -> Srgba {
     Srgba::new(r, g, b, 255)
 }
 
-/// With so much of what marks things: that they are touched (Melder 8.3.1.2), or chosen.
+/// With so much of what marks things (Melder 8.3.1.2).
 fn mixed([r, g, b, opacity]: [f64; 4], mark: [f64; 3], share: f64) -> [f64; 4] {
     let mixed = |own: f64, mark: f64| (1.0 - share) * own + share * mark;
     [mixed(r, mark[0]), mixed(g, mark[1]), mixed(b, mark[2]), opacity]

@@ -8,13 +8,11 @@ use haptics::{Entity, Shape};
 use nalgebra::Isometry3;
 use std::sync::Arc;
 use world::seen::{SeenForm, SeenPart};
-use world::{Scene, SceneCamera, SceneLight, ShapeSpec};
+use world::{FrictionSpec, MassSpec, Scene, SceneCamera, SceneEntity, SceneLight, ShapeSpec};
 
 /// What can be seen.
 #[derive(Debug, Clone, Default)]
 pub struct Stage {
-    /// Of each entity, its name.
-    pub names: Vec<String>,
     /// Things, each of an entity.
     pub things: Vec<Thing>,
     /// Lights; never none.
@@ -25,6 +23,27 @@ pub struct Stage {
     pub radii_m: Vec<f64>,
     /// Entities of which something cannot be drawn, and why.
     pub not_drawn: Vec<String>,
+    /// Names of the fingers.
+    pub fingers: Vec<String>,
+    /// Of each entity, what the scene says of it.
+    pub known: Vec<Known>,
+}
+
+/// What a scene says of an entity beside its looks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Known {
+    /// Its name.
+    pub name: String,
+    /// Of its shape.
+    pub kind: &'static str,
+    /// How heavy it is; `None`: it does not move by itself.
+    pub mass: Option<MassSpec>,
+    /// N/m.
+    pub stiffness_n_per_m: f64,
+    /// N s/m.
+    pub damping_n_s_per_m: f64,
+    /// Of its surface.
+    pub friction: FrictionSpec,
 }
 
 /// Something to be seen of an entity.
@@ -46,12 +65,12 @@ impl Stage {
     /// Of a scene whose entities, as they are felt, are these, in the same order.
     pub fn new(scene: &Scene, entities: &[Entity]) -> Self {
         let seen = scene.seen();
-        let radii_m = scene.fingers.iter().map(|finger| finger.radius_m).collect();
         let mut stage = Self {
-            names: scene.entities.iter().map(|spec| spec.name.clone()).collect(),
             lights: seen.lights.to_vec(),
             cameras: seen.cameras.to_vec(),
-            radii_m,
+            radii_m: scene.fingers.iter().map(|finger| finger.radius_m).collect(),
+            fingers: scene.fingers.iter().map(|finger| finger.name.clone()).collect(),
+            known: scene.entities.iter().map(Known::new).collect(),
             ..Self::default()
         };
         let told = seen.unreadable.iter().map(|(at, why)| format!("{at}: {why}"));
@@ -88,7 +107,20 @@ impl Stage {
 impl Stage {
     /// What an entity is called.
     pub fn name(&self, entity: usize) -> &str {
-        self.names.get(entity).map_or("?", String::as_str)
+        self.known.get(entity).map_or("?", |known| known.name.as_str())
+    }
+}
+
+impl Known {
+    fn new(entity: &SceneEntity) -> Self {
+        Self {
+            name: entity.name.clone(),
+            kind: entity.shape.kind(),
+            mass: entity.motion.map(|motion| motion.mass),
+            stiffness_n_per_m: entity.stiffness_n_per_m,
+            damping_n_s_per_m: entity.damping_n_s_per_m,
+            friction: entity.friction.clone(),
+        }
     }
 }
 

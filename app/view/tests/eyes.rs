@@ -34,7 +34,7 @@ field_of_view_deg = {FIELD_OF_VIEW_DEG}
     let scene = Scene::parse(&scene, Path::new("ball.toml")).unwrap();
     let entity = Entity::new(Sphere::new(0.004).unwrap(), scene.entities[0].pose, 1000.0).unwrap();
     let poses = vec![entity.X_WB];
-    (Stage::new(&scene, &[entity]), Moment { t_s: 0.0, poses, fingers: Vec::new() })
+    (Stage::new(&scene, &[entity]), Moment { poses, ..Moment::default() })
 }
 
 /// `None`, and said so: there are none here.

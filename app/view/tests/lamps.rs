@@ -50,7 +50,7 @@ casts_shadow = {casts_shadow}
         .collect();
     let stage = Stage::new(&scene, &entities);
     let poses = entities.iter().map(|entity| entity.X_WB).collect();
-    let moment = Moment { t_s: 0.0, poses, fingers: Vec::new() };
+    let moment = Moment { poses, ..Moment::default() };
     let mut studio = studio(&stage, SIZE)?;
     studio.painter().with_overlay = false;
     let picture = studio.take(&moment, &stage.cameras[0], &Eyes::default());

@@ -55,7 +55,7 @@ fn set() -> Option<Set> {
         ..FingerMoment::default()
     };
     let poses = entities.iter().map(|entity| entity.X_WB).collect();
-    let moment = Moment { t_s: 0.0, poses, fingers: vec![finger] };
+    let moment = Moment { poses, fingers: vec![finger], ..Moment::default() };
     let studio = studio(&stage, SIZE)?;
     Some(Set { stage, moment, studio })
 }
@@ -191,5 +191,10 @@ fn shadows_go_where_the_sun_is_turned_away_from() {
     let there = |x: f64| [-0.02 + x * 0.45 * 0.03, 0.0, -0.35 * 0.03];
     let light = |picture: &Picture, x| set.at(picture, there(x)).iter().sum::<i32>();
     assert!(light(&begun, 1.2) + 60 < light(&turned, 1.2), "{} {}", light(&begun, 1.2), light(&turned, 1.2));
-    assert!(light(&turned, -1.2) + 60 < light(&begun, -1.2), "{} {}", light(&turned, -1.2), light(&begun, -1.2));
+    assert!(
+        light(&turned, -1.2) + 60 < light(&begun, -1.2),
+        "{} {}",
+        light(&turned, -1.2),
+        light(&begun, -1.2)
+    );
 }

@@ -67,7 +67,7 @@ fn table() -> (Stage, Moment) {
         entity: Some(1),
         contact: None,
     };
-    (Stage::new(&scene, &entities), Moment { t_s: 0.0, poses, fingers: vec![finger] })
+    (Stage::new(&scene, &entities), Moment { poses, fingers: vec![finger], ..Moment::default() })
 }
 
 /// Of the table, after this change to who draws. `None`, and said so: there are none here.
@@ -123,4 +123,33 @@ fn the_overlay_shows_the_force_as_an_arrow_and_can_be_taken_away() {
         is_yellow(colour(&with, 0.02)) && is_yellow(colour(&with, 0.038)) && !is_yellow(colour(&with, 0.043))
     );
     assert!(!is_yellow(colour(&without, 0.02)));
+}
+
+#[test]
+fn what_collides_looks_other_than_what_a_finger_touches_and_both_other_than_what_nothing_does() {
+    let (stage, mut moment) = table();
+    let Some(mut studio) = studio(&stage, SIZE) else { return };
+    // The front of the cube, and the can's, from the camera.
+    let [cube, can] = [[0.0, 0.02, 0.025], [0.1, 0.03, 0.02]];
+    let camera = stage.cameras[0].clone();
+    let mut look = |moment: &Moment| {
+        let picture = studio.take(moment, &camera, &Eyes::default());
+        [cube, can].map(|at| colour(&picture, &camera, at))
+    };
+    moment.fingers[0].entity = None;
+    let [free, other] = look(&moment);
+    moment.colliding = vec![1];
+    let [collides, beside] = look(&moment);
+    moment.fingers[0].entity = Some(1);
+    let [both, _] = look(&moment);
+    moment.colliding.clear();
+    let [touched, _] = look(&moment);
+    assert_eq!(other, beside, "the can touches nothing");
+    let differ = |a: [i32; 3], b: [i32; 3]| a.iter().zip(b).any(|(a, b)| (a - b).abs() > 12);
+    let looks = [free, collides, touched, both];
+    for (at, a) in looks.iter().enumerate() {
+        assert!(looks[at + 1..].iter().all(|b| differ(*a, *b)), "{looks:?}");
+    }
+    // The mark of what collides is purple, that of what is touched yellow.
+    assert!(collides[2] > free[2] + 12 && touched[2] < collides[2] && touched[1] > collides[1], "{looks:?}");
 }

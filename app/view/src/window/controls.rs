@@ -164,8 +164,7 @@ impl Controls {
         }
         let Some(entity) = *reach.selected else { return };
         let Some(pose) = moment.poses.get(entity) else { return };
-        if let Some(order) =
-            self.steering.order(bound, (entity, reach.view.stage.name(entity)), pose, now_s)
+        if let Some(order) = self.steering.order(bound, (entity, reach.view.stage.name(entity)), pose, now_s)
         {
             order_of(reach, order);
         }
