@@ -4,8 +4,8 @@ use super::{HandFile, HandMode, Rig, RigError};
 use crate::mount::Mount;
 use crate::simulated::base_for_path;
 use io_driver::config::{
-    Backend, DeviceConfig, DriverConfig, ProcessConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig, Wish,
-    Zeroing,
+    Backend, DeviceConfig, DriverConfig, HandSource, ProcessConfig, RealTime, ReplyConfig, ReplyMode,
+    SafetyConfig, Wish, Zeroing,
 };
 use io_driver::device_file::Workspace;
 use io_driver::say::say;
@@ -83,8 +83,12 @@ impl Rig {
 
     fn device(&self, index: usize) -> DeviceConfig {
         let finger = self.scene.fingers.iter().find(|finger| finger.device == index);
-        let hand =
-            finger.and_then(|finger| self.hand.as_ref().map(|hand| (hand.path.clone(), finger.name.clone())));
+        let hand = match (finger, &self.hand) {
+            (Some(finger), Some(hand)) => {
+                HandSource::Script { file: hand.path.clone(), finger: finger.name.clone() }
+            }
+            _ => HandSource::Nobody,
+        };
         let wish = Wish {
             hand,
             start_m: finger.map_or_else(Vector3::zeros, |finger| finger.start_m.coords),
