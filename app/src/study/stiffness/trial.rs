@@ -195,6 +195,7 @@ impl Bench {
             hand_model: case.hand.model.clone(),
             firmness: case.hand.firmness,
             trembles: false,
+            is_live: false,
             seed: 0,
         }
     }

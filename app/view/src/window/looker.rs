@@ -3,7 +3,7 @@
 use super::scene::SceneView;
 use super::{Ends, WindowSpec};
 use crate::eyes::Eyes;
-use crate::hand::MouseHand;
+use crate::hand::{MouseHand, Seen};
 use crate::news::{Ask, News, Reins};
 use crate::panel::Panel;
 use crate::playback::Playback;
@@ -11,7 +11,7 @@ use crate::stage::Stage;
 use eframe::egui;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError};
 use std::time::Duration;
-use world::SceneCamera;
+use world::{SceneCamera, StereoMode};
 
 /// Between two pictures.
 const PICTURE: Duration = Duration::from_millis(16);
@@ -41,6 +41,7 @@ impl Looker {
     ) -> Result<Self, String> {
         let camera = stage.cameras.first().cloned().ok_or("nobody looks on")?;
         let view = SceneView::new(creation, stage, spec.with_shadows)?;
+        let hand = reins.as_ref().map(|reins| reins.hand()).unwrap_or_default();
         Ok(Self {
             told,
             ask,
@@ -49,7 +50,7 @@ impl Looker {
             camera,
             eyes: spec.eyes,
             playback: Playback::default(),
-            hand: MouseHand::default(),
+            hand,
             panel: Panel::default(),
             selected: None,
             is_over: false,
@@ -92,9 +93,14 @@ impl eframe::App for Looker {
         let dt_s = f64::from(ui.input(|input| input.stable_dt));
         egui::CentralPanel::default().frame(egui::Frame::NONE).show_inside(ui, |ui| {
             let moment = self.playback.shown(now_s).unwrap_or_default();
+            let cue = self.reins.as_ref().and_then(|_| self.hand.cue(&self.view.stage, &moment));
             let scene = self.view.show(ui, moment, &self.camera, &self.eyes);
             if let Some(reins) = &mut self.reins {
                 reins.pull(self.hand.turn(&scene, &self.camera, dt_s));
+            }
+            // With two eyes a line that is drawn once would be nowhere.
+            if let Some(cue) = cue.filter(|_| self.eyes.mode == StereoMode::Off) {
+                cue.paint(&ui.painter_at(scene.rect), &Seen::new(&self.camera, scene.rect));
             }
         });
         ui.ctx().request_repaint_after(PICTURE);
