@@ -127,7 +127,7 @@ fn wait_at_most(child: &mut Child, limit: Duration) -> Option<std::process::Exit
 }
 
 /// In the user's runtime directory where there is one, else among the temporary files; mode 0700.
-fn private_directory() -> std::io::Result<TempDir> {
+pub(crate) fn private_directory() -> std::io::Result<TempDir> {
     let mut builder = tempfile::Builder::new();
     builder.prefix("phantom3-");
     let runtime = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from).filter(|path| path.is_absolute());

@@ -5,10 +5,12 @@
 
 mod materials;
 mod numbers;
+mod play_args;
 mod run_args;
 
 use self::materials::print_materials;
 pub(crate) use self::numbers::parse_rate;
+use self::play_args::PlayArgs;
 use self::run_args::{RunArgs, calibrated_layout, make_plan, make_rig};
 use crate::calibrate::{self, CalibrateArgs};
 use crate::check::{self, CheckArgs};
@@ -26,19 +28,20 @@ use clap::{Parser, Subcommand};
 use io_driver::config::period_of;
 use io_driver::say::say;
 use rt_core::signals::StopSignals;
-use shm_abi::endpoint;
+use shm_abi::{client, endpoint};
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 use std::process::ExitCode;
 use view::input::Bindings;
-use view::{Eyes, WindowSpec};
+use view::{Eyes, NoWindow, WindowSpec};
 use world::Settings;
 
 const EXIT_USAGE: u8 = 2;
 const EXIT_FAULT: u8 = 3;
 const DEFAULT_RATE_HZ: f64 = 1000.0;
 
-const AFTER_HELP: &str = "Without a command the default scene is played for ten seconds.\n\n\
+const AFTER_HELP: &str = "Without a command there is a small table to play on with the mouse; without a display, with --headless or with a \
+driver that runs already, the default scene is played for ten seconds.\n\n\
 Exit status: 0 done; 1 of replay --expect-same, something differs; 2 bad usage or bad input, nothing was started; \
 3 a fault during the run or of a recording; 128 + n: ended by signal n. \
 Whatever was recorded until then is complete on disk.";
@@ -60,6 +63,8 @@ pub struct Cli {
 enum AppCommand {
     /// Play a scene with a scripted hand
     Run(RunArgs),
+    /// Play in a scene at a window, with a hand that the mouse moves, until the window is closed
+    Play(PlayArgs),
     /// Say what is wrong with a scene, all of it, and what is in it, without running it
     Check(CheckArgs),
     /// Turn the scene files of the thesis' own program into a scene (TOML)
@@ -104,6 +109,9 @@ pub fn main() -> ExitCode {
         Some(AppCommand::Run(args)) => {
             conclude(settings.load().and_then(|settings| run_scene(&args, &settings, headless)))
         }
+        Some(AppCommand::Play(args)) => {
+            conclude(settings.load().and_then(|settings| play(&args, &settings, headless)))
+        }
         Some(AppCommand::Check(args)) => settings
             .load()
             .map_or_else(|failure| failed(&failure), |settings| check::execute(&args, &settings)),
@@ -124,8 +132,39 @@ pub fn main() -> ExitCode {
             let result = install_signals().and_then(|signals| study::execute(&command, &signals));
             result.map_or_else(|failure| failed(&failure), stopped)
         }
-        None => conclude(settings.load().and_then(|settings| run_demo(&settings))),
+        None => conclude(settings.load().and_then(|settings| play_or_demo(&settings, headless))),
     }
+}
+
+/// Where people can see it and no driver runs, the mouse moves the fingers; else the demonstration.
+fn play_or_demo(settings: &Settings, is_headless: bool) -> Result<(Report, Stop), RunFailure> {
+    let socket = settings.driver_socket.value.clone().unwrap_or_else(endpoint::for_application);
+    let is_for_play = !is_headless
+        && view::window::has_display()
+        && client::observe(&socket, "phantom3 looks around").is_err();
+    match is_for_play.then(|| play(&PlayArgs::default(), settings, false)) {
+        Some(Err(RunFailure::NoWindow(error))) => say(format_args!("phantom3: {error}")),
+        Some(played) => return played,
+        None => {}
+    }
+    run_demo(settings)
+}
+
+fn play(args: &PlayArgs, settings: &Settings, is_headless: bool) -> Result<(Report, Stop), RunFailure> {
+    if is_headless {
+        return Err(RunFailure::Start(
+            "play and --headless exclude each other: the mouse moves the hand in a window; leave one out"
+                .into(),
+        ));
+    }
+    let signals = install_signals()?;
+    let rig = args.rig(settings)?;
+    let mut plan = args.plan(settings);
+    plan.window = window_spec(&rig.scene.name, settings);
+    if plan.window.is_none() {
+        return Err(NoWindow::NoDisplay.into());
+    }
+    run::run(&rig, &plan, &signals)
 }
 
 fn run_demo(settings: &Settings) -> Result<(Report, Stop), RunFailure> {

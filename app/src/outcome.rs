@@ -7,6 +7,7 @@ use shm_abi::client::AttachError;
 use shm_abi::segment::SegmentError;
 use std::borrow::Cow;
 use thiserror::Error;
+use view::NoWindow;
 
 /// Why a run stopped without anything being wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,6 +26,11 @@ pub enum RunFailure {
     /// It could not be started.
     #[error("{0}")]
     Start(String),
+    /// Nobody could see where the hand goes.
+    #[error(
+        "{0}; whoever moves a hand with a mouse needs one: see `phantom3 run --help` for hands that follow a file"
+    )]
+    NoWindow(#[from] NoWindow),
     /// The driver could not be attached to.
     #[error(transparent)]
     Attach(#[from] AttachError),
@@ -64,6 +70,7 @@ impl RunFailure {
     pub fn exit_status(&self) -> u8 {
         match self {
             Self::Start(_)
+            | Self::NoWindow(_)
             | Self::Attach(_)
             | Self::Segment(_)
             | Self::Device(_)

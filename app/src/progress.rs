@@ -66,7 +66,7 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// A line for a run of so many ticks; the first is shown after a while.
+    /// A line for a run of so many ticks, `u64::MAX` of them for one without an end; the first is shown after a while.
     pub fn new(total_ticks: u64, period_ns: u64) -> Self {
         Self { total_ticks, period_ns, line: StatusLine::told_just_now() }
     }
@@ -77,6 +77,9 @@ impl Progress {
         self.line.show(|| {
             let seconds = |ticks: u64| run_time_s(ticks as i64, period_ns);
             let done = run_ticks.min(total_ticks);
+            if total_ticks == u64::MAX {
+                return format!("{:7.2} s", seconds(done));
+            }
             let percent = 100 * done / total_ticks.max(1);
             let total = seconds(total_ticks);
             if run_ticks == 0 {

@@ -230,9 +230,17 @@ impl Rig {
         }
     }
 
-    /// How long the run lasts if nobody says: as long as the hand file, and at least a second.
+    /// How long the run lasts if nobody says (s): as long as the hand file, and at least a second; with a live hand for ever.
     pub fn default_seconds(&self) -> f64 {
+        if self.is_live() {
+            return f64::INFINITY;
+        }
         self.hand.as_ref().map_or(1.0, |hand| hand.duration_s.max(1.0))
+    }
+
+    /// Whether somebody at a window, and no file, says where the fingers shall be.
+    pub fn is_live(&self) -> bool {
+        matches!(&self.hand_mode, HandMode::Impedance(simulated) if simulated.is_live)
     }
 
     /// The meshes, each with its file and what was found in it.

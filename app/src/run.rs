@@ -4,6 +4,7 @@ use crate::book::Book;
 use crate::child::DriverChild;
 use crate::control::desk::{Desk, Means, OrderSource};
 use crate::fast_loop::{FastLoop, Tally, WhenFull};
+use crate::live::LiveHandFile;
 use crate::moments::Moments;
 use crate::not_zeroed;
 use crate::on_request::OnRequest;
@@ -28,7 +29,7 @@ use shm_abi::{CommanderMemory, DriverView, Frame};
 use std::path::PathBuf;
 use std::sync::mpsc::{self, Receiver};
 use std::time::Duration;
-use view::{OpenWindow, Stage, WindowSpec};
+use view::{NoWindow, OpenWindow, Reins, Stage, WindowSpec};
 use world::Settings;
 use world::events::{Hub, event_queue};
 use world::lists::SlowList;
@@ -98,6 +99,7 @@ impl Parts {
         period_ns: u64,
         devices: &[Extras],
         about: &About,
+        reins: Option<Box<dyn Reins>>,
     ) -> Result<Self, RunFailure> {
         let seconds = plan.seconds.unwrap_or_else(|| rig.default_seconds());
         let total_ticks = (seconds * 1e9 / period_ns as f64).round() as u64;
@@ -126,9 +128,12 @@ impl Parts {
         let window = plan.window.as_ref().filter(|_| clock != ClockMode::Virtual);
         let (events, event_ends) = event_queue(EVENT_QUEUE);
         let mut hub = Hub::new(vec![event_ends]);
-        let spectator = window
-            .and_then(|spec| open_window(spec, stage()))
-            .map(|window| Spectator::new(window, moments(), &mut hub, book.clone()));
+        let window = match window {
+            Some(spec) => open_window(spec, stage(), reins)?,
+            None if reins.is_some() => return Err(NoWindow::NoDisplay.into()),
+            None => None,
+        };
+        let spectator = window.map(|window| Spectator::new(window, moments(), &mut hub, book.clone()));
         let view = View::new(&rig.scene, step.entities());
         let directory = plan.settings.recording_directory.value.clone();
         let on_request = spectator.is_some().then(|| OnRequest::new(directory, rig.clone(), view.clone()));
@@ -172,18 +177,28 @@ impl Parts {
     }
 }
 
-/// `None`: it could not be opened, which is told.
-fn open_window(spec: &WindowSpec, stage: Stage) -> Option<OpenWindow> {
-    OpenWindow::open(spec.clone(), stage, None)
-        .inspect_err(|error| say(format_args!("phantom3: {error}; the run goes on without")))
-        .ok()
+/// `None`: it could not be opened, which is told. Who is to move the fingers there needs it.
+fn open_window(
+    spec: &WindowSpec,
+    stage: Stage,
+    reins: Option<Box<dyn Reins>>,
+) -> Result<Option<OpenWindow>, RunFailure> {
+    let is_needed = reins.is_some();
+    match OpenWindow::open(spec.clone(), stage, reins) {
+        Ok(window) => Ok(Some(window)),
+        Err(error) if is_needed => Err(error.into()),
+        Err(error) => {
+            say(format_args!("phantom3: {error}; the run goes on without"));
+            Ok(None)
+        }
+    }
 }
 
 fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Report, Stop), RunFailure> {
     let mut driver = VirtualDriver::open(&rig.driver_config(ClockMode::Virtual))?;
     let about = About::of_run(rig, ClockMode::Virtual, rig.period_ns, plan.seed);
     let Parts { mut fast, mut slow, mut progress, .. } =
-        Parts::new(rig, plan, ClockMode::Virtual, rig.period_ns, &driver.extras(), &about)?;
+        Parts::new(rig, plan, ClockMode::Virtual, rig.period_ns, &driver.extras(), &about, None)?;
     let result = driver.run(&mut fast, &mut slow, &mut progress, signals);
     progress.end();
     let SlowEnd { recordings, events, pictures } = slow.finish();
@@ -207,7 +222,8 @@ fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Repo
 }
 
 fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Report, Stop), RunFailure> {
-    let (mut source, attachment) = connect(rig, plan)?;
+    let live = rig.is_live().then(LiveHandFile::make).transpose()?;
+    let (mut source, attachment) = connect(rig, plan, live.as_ref())?;
     let info = attachment.driver.info();
     check_devices(rig, &info)?;
     check_zeroed(&source, &attachment.driver)?;
@@ -220,8 +236,10 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
     about.tell("driver", driver_name.clone());
     about.tell("driver_setup", info.setup_report.clone());
     about.tell("lease", attachment.commander.as_ref().map_or(0, CommanderMemory::lease).to_string());
+    let reins = live.map(|live| live.into_reins(rig)).transpose()?;
+    let reins = reins.map(|reins| Box::new(reins) as Box<dyn Reins>);
     let Parts { fast, mut slow, mut progress, slow_lists } =
-        Parts::new(&step_rig, plan, info.clock_mode, info.period_ns, &extras, &about)?;
+        Parts::new(&step_rig, plan, info.clock_mode, info.period_ns, &extras, &about, reins)?;
     slow.watch_driver(source.socket());
     let result =
         two_processes::run(&mut source, attachment, (fast, slow_lists), &mut slow, &mut progress, signals);
@@ -270,7 +288,11 @@ fn parked(tally: &Tally, rig: &Rig) -> Vec<String> {
     lines
 }
 
-fn connect(rig: &Rig, plan: &RunPlan) -> Result<(Source, client::Attachment), RunFailure> {
+fn connect(
+    rig: &Rig,
+    plan: &RunPlan,
+    live: Option<&LiveHandFile>,
+) -> Result<(Source, client::Attachment), RunFailure> {
     match &plan.attach {
         Some(Attach { socket, grace }) => {
             let attachment = client::command(socket, "phantom3")?;
@@ -278,7 +300,9 @@ fn connect(rig: &Rig, plan: &RunPlan) -> Result<(Source, client::Attachment), Ru
         }
         None => {
             refuse_unwritable_name(rig)?;
-            let mut child = DriverChild::start(&rig.driver_config(plan.clock.unwrap_or(ClockMode::Real)))?;
+            let mut config = rig.driver_config(plan.clock.unwrap_or(ClockMode::Real));
+            live.into_iter().for_each(|live| live.lead(&mut config));
+            let mut child = DriverChild::start(&config)?;
             let attachment = child.attach("phantom3")?;
             Ok((Source::Child(child), attachment))
         }

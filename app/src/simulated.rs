@@ -30,6 +30,8 @@ pub struct SimulatedDevices {
     pub firmness: Firmness,
     /// Whether it trembles.
     pub trembles: bool,
+    /// Whether somebody at a window, and no file, says where the fingers shall be.
+    pub is_live: bool,
     /// Of tremor and noise.
     pub seed: u64,
 }
@@ -41,6 +43,7 @@ impl Default for SimulatedDevices {
             hand_model: "pen-grip".into(),
             firmness: Firmness::Usual,
             trembles: true,
+            is_live: false,
             seed: 0,
         }
     }
@@ -169,6 +172,17 @@ pub fn base_for_path(lowest: Vector3<f64>, highest: Vector3<f64>, workspace: &Wo
     Isometry3::translation(shift(0), shift(1), shift(2))
 }
 
+/// X_WD of a device whose finger goes wherever people take it, over a table on which things between these corners of W (m)
+/// stand: the middle of the workspace is over theirs, and its lower end where a finger that presses the table is.
+pub fn base_over_table(lowest: Vector3<f64>, highest: Vector3<f64>, workspace: &Workspace) -> Isometry3<f64> {
+    let middle = 0.5 * (lowest + highest) - Vector3::from(workspace.centre_m);
+    let floor_m = workspace.centre_m[1] - 0.5 * workspace.size_m[1];
+    Isometry3::translation(middle.x, lowest.y - PRESSED_M - floor_m, middle.z)
+}
+
+/// From the middle of what stands on a table to a finger that presses beside it, and some more (m).
+const PRESSED_M: f64 = 0.05;
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -200,6 +214,14 @@ mod tests {
         // and 0.01.
         let moved = base([0.0, -0.02, 0.0], [0.24, 0.1, 0.0]);
         assert!((moved - Vector3::new(0.05, -0.03, 0.0)).norm() < 1e-15, "{moved}");
+    }
+
+    #[test]
+    fn a_workspace_for_people_is_over_the_middle_of_the_table_and_begins_below_it() {
+        let lowest = Vector3::new(-0.1, 0.02, -0.25);
+        let base = base_over_table(lowest, Vector3::new(0.3, 0.05, 0.05), &WORKSPACE).translation.vector;
+        // The workspace's own middle is 0.1 m above the base, its lower end on the base's level.
+        assert!((base - Vector3::new(0.1, -0.03, -0.1)).norm() < 1e-15, "{base}");
     }
 
     #[test]

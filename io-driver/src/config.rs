@@ -13,7 +13,7 @@ mod safety;
 mod toml_text;
 mod zeroing;
 
-pub use device::{Backend, DeviceConfig, HandChoice, Wish};
+pub use device::{Backend, DeviceConfig, HandChoice, HandSource, Wish};
 pub use process::ProcessConfig;
 pub use real_time::{OverrunPolicy, RealTime, SpinMargin, longest_spin_margin_ns};
 pub use reply::{ReplyConfig, ReplyMode};
@@ -190,7 +190,9 @@ mod tests {
              [[device]]\nbackend = \"replay\"\ndescription = \"premium-1.5\"\ntrace = \"t.csv\"\n",
         )
         .expect("good");
-        let Backend::Ideal(Wish { hand: Some((path, finger)), .. }) = &config.devices[0].backend else {
+        let Backend::Ideal(Wish { hand: HandSource::Script { file: path, finger }, .. }) =
+            &config.devices[0].backend
+        else {
             panic!()
         };
         assert_eq!((path.as_path(), finger.as_str()), (Path::new("lab/h.csv"), "f0"));
@@ -228,6 +230,18 @@ mod tests {
             (
                 "[[device]]\nbackend = \"ideal\"\nfinger = \"f9\"",
                 "lab/driver.toml:3: `device[0].finger`: found `finger` without `hand`, allowed: both, or `start_m`",
+            ),
+            (
+                "[[device]]\nbackend = \"ideal\"\nhand = \"h.csv\"\nlive_hand = \"h\"",
+                "lab/driver.toml:4: `device[0].live_hand`: found `live_hand` beside `hand`, allowed: one of the two",
+            ),
+            (
+                "[[device]]\nbackend = \"ideal\"\nlive_finger = 1",
+                "lab/driver.toml:3: `device[0].live_finger`: found `live_finger` without `live_hand`, allowed: both",
+            ),
+            (
+                "[[device]]\nbackend = \"ideal\"\nlive_hand = \"h\"\nlive_finger = 8",
+                "lab/driver.toml:4: `device[0].live_finger`: found 8, allowed: a whole number from 0 to 7",
             ),
             (
                 "[[device]]\nbackend = \"simulated\"\ndescription = \"premium-1.5\"\nhand_model = \"nobody\"\nfirmness = \"firm\"",
@@ -307,6 +321,18 @@ mod tests {
         assert_eq!(parse(&config.to_toml()).expect("good as well"), config);
         let plain = parse("[[device]]\nbackend = \"ideal\"\n").expect("good");
         assert_eq!(parse(&plain.to_toml()).expect("good as well"), plain);
+    }
+
+    #[test]
+    fn a_live_hand_has_the_devices_own_finger_unless_told_and_is_read_back_the_same() {
+        let live = "[[device]]\nbackend = \"ideal\"\n[[device]]\nbackend = \"ideal\"\nlive_hand = \"h\"\n";
+        for (more, number) in [("", 1), ("live_finger = 7\n", 7)] {
+            let config = parse(&format!("{live}{more}")).expect("good");
+            let hand = &config.devices[1].backend.wish().expect("an ideal device has one").hand;
+            assert_eq!(*hand, HandSource::Live { file: "lab/h".into(), finger: number });
+            let written = config.to_toml().replace("\"lab/h\"", "\"h\"");
+            assert_eq!(parse(&written).expect("good as well"), config);
+        }
     }
 
     #[test]

@@ -25,6 +25,8 @@ pub mod emulator;
 pub mod encoders;
 pub mod heat;
 pub mod kinematics;
+#[allow(unsafe_code, reason = "wishes mapped from a file")]
+pub mod live_hand;
 mod loop_thread;
 pub mod mail;
 pub mod meter;

@@ -4,7 +4,7 @@ mod simulated;
 
 pub use simulated::ROUND_TRIP_NS;
 
-use crate::config::{Backend, DeviceConfig, DriverConfig, Wish};
+use crate::config::{Backend, DeviceConfig, DriverConfig, HandSource, Wish};
 use crate::device::Device;
 use crate::device::arm::Arm;
 use crate::device::emulated::{Channels, EmulatedDevice};
@@ -13,6 +13,7 @@ use crate::device::ideal::{Hand, IdealDevice};
 use crate::device::replay::ReplayDevice;
 use crate::device_file::{self, ArmFile, DeviceFile, DeviceFileError};
 use crate::emulator::card::{Card, CardError};
+use crate::live_hand::{LiveFinger, LiveHandError, LiveWish};
 use crate::sim::script::{HandError, HandPlayer, HandScript};
 use crate::sim::tip_board::TipBoard;
 use crate::toml_report::TomlReport;
@@ -59,6 +60,14 @@ pub enum OpenError {
     /// The hand file is wrong.
     #[error(transparent)]
     Hand(#[from] HandError),
+    /// The live hand is none.
+    #[error("device {device}: {source}")]
+    LiveHand {
+        /// Whose.
+        device: String,
+        /// Why.
+        source: LiveHandError,
+    },
     /// The trace is wrong.
     #[error(transparent)]
     Trace(#[from] TraceError),
@@ -155,9 +164,10 @@ fn open(
 ) -> Result<Box<dyn Device>, OpenError> {
     match &device.backend {
         Backend::Ideal(wish) => {
-            let hand = match script(device, wish, config)? {
-                Some((player, finger)) => Hand::Scripted(player, finger),
-                None => Hand::Resting(wish.start_m),
+            let hand = match (live_finger(device, wish)?, script(device, wish, config)?) {
+                (Some(live), _) => Hand::Live(live),
+                (None, Some((player, finger))) => Hand::Scripted(player, finger),
+                (None, None) => Hand::Resting(wish.start_m),
             };
             let info = commissioned(ideal_info(device), config);
             Ok(Box::new(IdealDevice::new(info, wish.base_in_world, hand)))
@@ -234,9 +244,12 @@ fn script(
     wish: &Wish,
     config: &DriverConfig,
 ) -> Result<Option<(HandPlayer, usize)>, OpenError> {
-    let Some((file, finger)) = &wish.hand else { return Ok(None) };
-    let wishes = config.devices.iter().filter_map(|other| other.backend.wish()?.hand.as_ref());
-    let fingers: Vec<&str> = wishes.filter(|(path, _)| path == file).map(|(_, name)| name.as_str()).collect();
+    let HandSource::Script { file, finger } = &wish.hand else { return Ok(None) };
+    let wishes = config.devices.iter().filter_map(|other| match &other.backend.wish()?.hand {
+        HandSource::Script { file: path, finger } if path == file => Some(finger.as_str()),
+        _ => None,
+    });
+    let fingers: Vec<&str> = wishes.collect();
     let script = HandScript::parse(&read(device, file)?, file, &fingers)?;
     let index = fingers.iter().position(|name| name == finger).unwrap_or(0);
     if has_switch(device, config) && !script.has_buttons(index) {
@@ -244,6 +257,13 @@ fn script(
         return Err(OpenError::NoButtons { device, file: file.clone(), finger });
     }
     Ok(script.is_scripted(index).then(|| (HandPlayer::new(script), index)))
+}
+
+/// Who moves it live, if anybody does.
+fn live_finger(device: &DeviceConfig, wish: &Wish) -> Result<Option<LiveFinger>, OpenError> {
+    let HandSource::Live { file, finger } = &wish.hand else { return Ok(None) };
+    let opened = LiveFinger::open(file, *finger, LiveWish::at(wish.start_m));
+    opened.map(Some).map_err(|source| OpenError::LiveHand { device: device.name.clone(), source })
 }
 
 fn has_switch(device: &DeviceConfig, config: &DriverConfig) -> bool {

@@ -157,6 +157,7 @@ fn simulated_devices(args: &RunArgs) -> SimulatedDevices {
         hand_model: args.hand_model.clone().unwrap_or(usual.hand_model),
         firmness: args.firmness.unwrap_or(usual.firmness),
         trembles: usual.trembles,
+        is_live: false,
         seed: args.seed,
     }
 }

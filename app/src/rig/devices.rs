@@ -2,18 +2,21 @@
 
 use super::{HandFile, HandMode, Rig, RigError};
 use crate::mount::Mount;
-use crate::simulated::base_for_path;
+use crate::simulated::{base_for_path, base_over_table};
 use io_driver::config::{
-    Backend, DeviceConfig, DriverConfig, ProcessConfig, RealTime, ReplyConfig, ReplyMode, SafetyConfig, Wish,
-    Zeroing,
+    Backend, DeviceConfig, DriverConfig, HandSource, ProcessConfig, RealTime, ReplyConfig, ReplyMode,
+    SafetyConfig, Wish, Zeroing,
 };
 use io_driver::device_file::Workspace;
 use io_driver::say::say;
 use io_driver::sim::script::HandScript;
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use shm_abi::segment::ClockMode;
 use std::path::Path;
 use world::Scene;
+
+/// Farther than that nothing is wanted (m).
+const SLACKEST_M: f64 = 1.0;
 
 impl Rig {
     /// Where a device stands, X_WD.
@@ -35,9 +38,44 @@ impl Rig {
             (None, HandMode::Kinematic) => Ok(Vec::new()),
             (None, HandMode::Impedance(simulated)) => {
                 let workspace = simulated.arm()?.workspace;
+                if simulated.is_live {
+                    return Ok(devices.map(|_| self.base_over_table(&workspace)).collect());
+                }
                 Ok(devices.map(|device| self.base_near_path(device, &workspace)).collect())
             }
         }
+    }
+
+    /// What the devices of fingers all reach: corners of a box in W (m).
+    ///
+    /// # Errors
+    /// If it is not known what the devices are.
+    pub fn reach(&self) -> Result<[Vector3<f64>; 2], RigError> {
+        let everywhere = [Vector3::repeat(-SLACKEST_M), Vector3::repeat(SLACKEST_M)];
+        let HandMode::Impedance(simulated) = &self.hand_mode else { return Ok(everywhere) };
+        let workspace = simulated.arm()?.workspace;
+        let (centre, half) = (Vector3::from(workspace.centre_m), 0.5 * Vector3::from(workspace.size_m));
+        let reaches = self.scene.fingers.iter().map(|finger| {
+            let base = self.base_in_world(finger.device);
+            let middle = (base * Point3::from(centre)).coords;
+            // Of a box that stands askew, the box around it.
+            let half = base.rotation.to_rotation_matrix().matrix().abs() * half;
+            [middle - half, middle + half]
+        });
+        let common = reaches.reduce(|[least, most], [other_least, other_most]| {
+            [least.sup(&other_least), most.inf(&other_most)]
+        });
+        Ok(common.filter(|[least, most]| least <= most).unwrap_or(everywhere))
+    }
+
+    /// Over everything that can be moved, and every finger.
+    fn base_over_table(&self, workspace: &Workspace) -> Isometry3<f64> {
+        let starts = self.scene.fingers.iter().map(|finger| finger.start_m.coords);
+        let things = self.moving().map(|(_, entity, _)| entity.pose.translation.vector);
+        let places = starts.chain(things).map(|place| (place, place));
+        let around = places.reduce(|(least, most), (place, _)| (least.inf(&place), most.sup(&place)));
+        let (lowest, highest) = around.unwrap_or_default();
+        base_over_table(lowest, highest, workspace)
     }
 
     /// So that the finger's path lies within the workspace.
@@ -83,8 +121,12 @@ impl Rig {
 
     fn device(&self, index: usize) -> DeviceConfig {
         let finger = self.scene.fingers.iter().find(|finger| finger.device == index);
-        let hand =
-            finger.and_then(|finger| self.hand.as_ref().map(|hand| (hand.path.clone(), finger.name.clone())));
+        let hand = match (finger, &self.hand) {
+            (Some(finger), Some(hand)) => {
+                HandSource::Script { file: hand.path.clone(), finger: finger.name.clone() }
+            }
+            _ => HandSource::Nobody,
+        };
         let wish = Wish {
             hand,
             start_m: finger.map_or_else(Vector3::zeros, |finger| finger.start_m.coords),

@@ -4,6 +4,7 @@
 //! how the run goes. The window asks for what people want by [`Ask`]s, and pulls the fingers of hands that have no hardware.
 //! Neither waits for the other.
 
+use crate::hand::MouseHand;
 use crate::moment::Moment;
 use crate::stage::Stage;
 use crate::text::Note;
@@ -91,6 +92,8 @@ pub struct Wish {
 
 /// Who pulls fingers without hardware where a hand at a window wants them.
 pub trait Reins: Send {
+    /// The hand as it begins.
+    fn hand(&self) -> MouseHand;
     /// The wishes of all fingers.
     fn pull(&mut self, wishes: &[Wish]);
 }

@@ -74,17 +74,46 @@ pub struct HandChoice {
 /// Where a scripted or simulated finger shall be.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Wish {
-    /// The hand file and the finger in it.
-    pub hand: Option<(PathBuf, String)>,
-    /// Where the tip rests without a script, in the world W (m).
+    /// Who says.
+    pub hand: HandSource,
+    /// Where the tip rests without a script, or until a live hand says otherwise, in the world W (m).
     pub start_m: Vector3<f64>,
     /// X_WD, where the base stands.
     pub base_in_world: Isometry3<f64>,
 }
 
+/// Who says where a finger shall be.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum HandSource {
+    /// Nobody: it rests.
+    Nobody,
+    /// A hand file, and the finger in it.
+    Script {
+        /// The file.
+        file: PathBuf,
+        /// Whose columns.
+        finger: String,
+    },
+    /// Whoever moves a live hand: see [`crate::live_hand`].
+    Live {
+        /// The file that both processes map.
+        file: PathBuf,
+        /// The finger's number in it.
+        finger: usize,
+    },
+}
+
 impl Backend {
     /// Where its finger shall be, if a script may say so.
     pub fn wish(&self) -> Option<&Wish> {
+        match self {
+            Self::Ideal(wish) | Self::Simulated { wish, .. } => Some(wish),
+            Self::Replay { .. } | Self::Emulated { .. } => None,
+        }
+    }
+
+    /// The same, to be changed.
+    pub fn wish_mut(&mut self) -> Option<&mut Wish> {
         match self {
             Self::Ideal(wish) | Self::Simulated { wish, .. } => Some(wish),
             Self::Replay { .. } | Self::Emulated { .. } => None,
@@ -105,7 +134,7 @@ impl Backend {
     /// Whether a hand file has the buttons is seen when it is opened.
     pub(super) fn buttons(&self) -> Option<i64> {
         match self {
-            Self::Ideal(Wish { hand: None, .. }) | Self::Replay { .. } => None,
+            Self::Ideal(Wish { hand: HandSource::Nobody, .. }) | Self::Replay { .. } => None,
             Self::Ideal(_) | Self::Emulated { .. } | Self::Simulated { .. } => Some(32),
         }
     }
@@ -137,6 +166,8 @@ pub(super) struct RawDevice {
     zeroing: Option<Spanned<Zeroing>>,
     hand: Option<Spanned<PathBuf>>,
     finger: Option<Spanned<String>>,
+    live_hand: Option<Spanned<PathBuf>>,
+    live_finger: Option<Spanned<i64>>,
     start_m: Option<SpannedList>,
     base_position_m: Option<SpannedList>,
     base_orientation_wxyz: Option<SpannedList>,
@@ -188,8 +219,8 @@ impl RawDevice {
     ) -> Result<DeviceConfig, TomlReport> {
         let name = self.name.as_ref().map_or_else(|| format!("f{index}"), |name| name.get_ref().clone());
         let backend = match self.backend.get_ref() {
-            RawBackend::Ideal => self.ideal(&name, toml, directory)?,
-            RawBackend::Simulated => self.simulated(&name, span, toml, directory)?,
+            RawBackend::Ideal => self.ideal((&name, index), toml, directory)?,
+            RawBackend::Simulated => self.simulated((&name, index), span, toml, directory)?,
             RawBackend::Replay => self.replay(span, toml, directory)?,
             RawBackend::Emulated => self.emulated(span, toml, directory)?,
         };
@@ -199,7 +230,12 @@ impl RawDevice {
         Ok(DeviceConfig { name, backend, peak_force_n, compensates_gravity, zeroing })
     }
 
-    fn ideal(&self, name: &str, toml: &TomlText<'_>, directory: &Path) -> Result<Backend, TomlReport> {
+    fn ideal(
+        &self,
+        own: (&str, usize),
+        toml: &TomlText<'_>,
+        directory: &Path,
+    ) -> Result<Backend, TomlReport> {
         self.refuse_foreign(
             "ideal",
             &[
@@ -212,12 +248,12 @@ impl RawDevice {
             toml,
         )?;
         self.refuse_foreign("ideal", &self.keys_of_simulated(), toml)?;
-        Ok(Backend::Ideal(self.wish(name, toml, directory)?))
+        Ok(Backend::Ideal(self.wish(own, toml, directory)?))
     }
 
     fn simulated(
         &self,
-        name: &str,
+        own: (&str, usize),
         span: std::ops::Range<usize>,
         toml: &TomlText<'_>,
         directory: &Path,
@@ -226,7 +262,7 @@ impl RawDevice {
         self.refuse_foreign("simulated", &foreign, toml)?;
         Ok(Backend::Simulated {
             description: self.description("simulated", &span, toml, directory)?,
-            wish: self.wish(name, toml, directory)?,
+            wish: self.wish(own, toml, directory)?,
             holder: self.holder(toml, directory)?,
             seed: match &self.seed {
                 Some(seed) => toml.integer(seed, 0..=i64::MAX)?.unsigned_abs(),
@@ -268,17 +304,44 @@ impl RawDevice {
         Ok(Some(HandChoice { model, firmness, trembles }))
     }
 
-    fn wish(&self, name: &str, toml: &TomlText<'_>, directory: &Path) -> Result<Wish, TomlReport> {
-        if let (None, Some(finger)) = (&self.hand, &self.finger) {
-            return Err(toml.refuse(finger.span(), "`finger` without `hand`", "both, or `start_m`"));
-        }
-        let finger = self.finger.as_ref().map_or_else(|| name.to_owned(), |finger| finger.get_ref().clone());
+    fn wish(&self, own: (&str, usize), toml: &TomlText<'_>, directory: &Path) -> Result<Wish, TomlReport> {
         let start = self.start_m.as_ref().map_or(Ok([0.0; 3]), |list| toml.numbers(list, PLACE))?;
         Ok(Wish {
-            hand: self.hand.as_ref().map(|hand| (directory.join(hand.get_ref()), finger)),
+            hand: self.hand_source(own, toml, directory)?,
             start_m: Vector3::from(start),
             base_in_world: self.base(toml)?,
         })
+    }
+
+    /// The device's own name and place are those of its finger, unless told.
+    fn hand_source(
+        &self,
+        (name, index): (&str, usize),
+        toml: &TomlText<'_>,
+        directory: &Path,
+    ) -> Result<HandSource, TomlReport> {
+        if let (None, Some(finger)) = (&self.hand, &self.finger) {
+            return Err(toml.refuse(finger.span(), "`finger` without `hand`", "both, or `start_m`"));
+        }
+        if let (None, Some(finger)) = (&self.live_hand, &self.live_finger) {
+            return Err(toml.refuse(finger.span(), "`live_finger` without `live_hand`", "both"));
+        }
+        match (&self.hand, &self.live_hand) {
+            (Some(_), Some(live)) => {
+                Err(toml.refuse(live.span(), "`live_hand` beside `hand`", "one of the two"))
+            }
+            (None, None) => Ok(HandSource::Nobody),
+            (Some(hand), None) => Ok(HandSource::Script {
+                file: directory.join(hand.get_ref()),
+                finger: self.finger.as_ref().map_or_else(|| name.to_owned(), |key| key.get_ref().clone()),
+            }),
+            (None, Some(live)) => {
+                let number =
+                    self.live_finger.as_ref().map(|key| toml.integer(key, 0..=MAX_DEVICES as i64 - 1));
+                let finger = number.transpose()?.map_or(index, |number| number.unsigned_abs() as usize);
+                Ok(HandSource::Live { file: directory.join(live.get_ref()), finger })
+            }
+        }
     }
 
     fn replay(
@@ -326,10 +389,12 @@ impl RawDevice {
         ]
     }
 
-    fn keys_of_wish(&self) -> [(&'static str, Option<std::ops::Range<usize>>); 3] {
+    fn keys_of_wish(&self) -> [(&'static str, Option<std::ops::Range<usize>>); 5] {
         [
             ("hand", span_of(&self.hand)),
             ("finger", span_of(&self.finger)),
+            ("live_hand", span_of(&self.live_hand)),
+            ("live_finger", span_of(&self.live_finger)),
             ("start_m", span_of(&self.start_m)),
         ]
     }

@@ -1,8 +1,8 @@
 //! Writes a configuration down as TOML.
 
 use super::{
-    Backend, Commissioning, DeviceConfig, DriverConfig, HandChoice, OverrunPolicy, ReplyMode, SpinMargin,
-    Wish,
+    Backend, Commissioning, DeviceConfig, DriverConfig, HandChoice, HandSource, OverrunPolicy, ReplyMode,
+    SpinMargin, Wish,
 };
 use crate::safety::switches::{Switch, Switches};
 use nalgebra::UnitQuaternion;
@@ -117,8 +117,14 @@ fn write_device(text: &mut String, device: &DeviceConfig) -> std::fmt::Result {
 }
 
 fn write_wish(text: &mut String, wish: &Wish) -> std::fmt::Result {
-    if let Some((hand, finger)) = &wish.hand {
-        writeln!(text, "hand = {}\nfinger = {}", quoted(&hand.to_string_lossy()), quoted(finger))?;
+    match &wish.hand {
+        HandSource::Nobody => {}
+        HandSource::Script { file, finger } => {
+            writeln!(text, "hand = {}\nfinger = {}", quoted(&file.to_string_lossy()), quoted(finger))?;
+        }
+        HandSource::Live { file, finger } => {
+            writeln!(text, "live_hand = {}\nlive_finger = {finger}", quoted(&file.to_string_lossy()))?;
+        }
     }
     writeln!(text, "start_m = {:?}", wish.start_m.as_slice())?;
     writeln!(text, "base_position_m = {:?}", wish.base_in_world.translation.vector.as_slice())?;

@@ -9,6 +9,7 @@
 //! it would for a real device. What the script says of the fingertip's orientation and of buttons goes through as well.
 
 use super::{Device, Effort, Extras, Reading, TickTime, Written};
+use crate::live_hand::LiveFinger;
 use crate::sim::script::HandPlayer;
 use crate::velocity::VelocityEstimator;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
@@ -20,6 +21,8 @@ use shm_abi::segment::DeviceInfo;
 pub enum Hand {
     /// A script, and the finger in it that this device is.
     Scripted(HandPlayer, usize),
+    /// Whoever moves this finger live.
+    Live(LiveFinger),
     /// Nobody; it rests here, in W (m).
     Resting(Vector3<f64>),
 }
@@ -49,12 +52,18 @@ impl Device for IdealDevice {
 
     fn read(&mut self, time: TickTime) -> Result<Reading, FaultReason> {
         let time_s = time.run_time_s();
-        let in_world = match &mut self.hand {
+        let (in_world, turned, buttons) = match &mut self.hand {
             // `open` makes sure that the finger is in the script.
-            Hand::Scripted(player, finger) => {
-                player.position(*finger, time_s).ok_or(FaultReason::DeviceRead)?
+            Hand::Scripted(player, finger) => (
+                player.position(*finger, time_s).ok_or(FaultReason::DeviceRead)?,
+                player.orientation(*finger, time_s),
+                player.buttons(*finger, time_s).unwrap_or(0),
+            ),
+            Hand::Live(finger) => {
+                let wish = finger.wish();
+                (wish.place, Some(wish.orientation), wish.buttons)
             }
-            Hand::Resting(at) => *at,
+            Hand::Resting(at) => (*at, None, 0),
         };
         let in_base = match &self.world_to_base {
             Some(transform) => (transform * Point3::from(in_world)).coords,
@@ -62,15 +71,13 @@ impl Device for IdealDevice {
         };
         let velocity_m_per_s = self.velocity.observe(time, in_base.into()).into();
         let mut reading = Reading { velocity_m_per_s, ..Reading::at(in_base) };
-        if let Hand::Scripted(player, finger) = &mut self.hand {
-            reading.buttons = u64::from(player.buttons(*finger, time_s).unwrap_or(0));
-            if let Some(turn) = player.orientation(*finger, time_s) {
-                reading.is_orientation_measured = true;
-                reading.orientation_wxyz = wxyz(&match &self.world_to_base {
-                    Some(transform) => transform.rotation * turn,
-                    None => turn,
-                });
-            }
+        reading.buttons = u64::from(buttons);
+        if let Some(turn) = turned {
+            reading.is_orientation_measured = true;
+            reading.orientation_wxyz = wxyz(&match &self.world_to_base {
+                Some(transform) => transform.rotation * turn,
+                None => turn,
+            });
         }
         Ok(reading)
     }
@@ -86,9 +93,14 @@ impl Device for IdealDevice {
     }
 
     fn extras(&self) -> Extras {
-        let Hand::Scripted(player, finger) = &self.hand else { return Extras::default() };
-        let script = player.script();
-        Extras { orientation: script.has_orientation(*finger), buttons: script.has_buttons(*finger) }
+        match &self.hand {
+            Hand::Scripted(player, finger) => {
+                let script = player.script();
+                Extras { orientation: script.has_orientation(*finger), buttons: script.has_buttons(*finger) }
+            }
+            Hand::Live(_) => Extras { orientation: true, buttons: true },
+            Hand::Resting(_) => Extras::default(),
+        }
     }
 }
 

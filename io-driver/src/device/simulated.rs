@@ -1,7 +1,7 @@
 //! An arm that is simulated in this process, held by a simulated hand.
 //!
 //! Model: the same path as a real device, from raw counters and to converter codes; behind them moves
-//! [`SimulatedArm`], pulled by a hand that wants to be where its script says. Between two readings the time of the
+//! [`SimulatedArm`], pulled by a hand that wants to be where its script, or somebody live, says. Between two readings the time of the
 //! ticks passes, with the former codes until the new ones took effect: as long after the reading as the clock
 //! that is driven says, or on a virtual clock as the way of replying says ([`Latency`]).
 //! Frames: the script is in W, everything else in the device's base frame D.
@@ -11,6 +11,7 @@
 
 use super::arm::Arm;
 use super::{Device, Effort, Extras, Reading, TickTime, Written};
+use crate::live_hand::{LiveFinger, LiveWish};
 use crate::sim::arm::{NobodyHolds, SimulatedArm, Truth};
 use crate::sim::hand::{Felt, ImpedanceHand};
 use crate::sim::script::HandPlayer;
@@ -62,6 +63,8 @@ pub struct HeldBy {
 pub enum Wish {
     /// Where a script, written in W, has this finger.
     Scripted(HandPlayer, usize),
+    /// Where somebody wants this finger by now.
+    Live(LiveFinger),
     /// Here, in W (m).
     Resting(Vector3<f64>),
 }
@@ -84,6 +87,10 @@ impl Wish {
     pub(crate) fn at(&mut self, time_s: f64) -> (Vector3<f64>, Handle) {
         match self {
             Self::Resting(at) => (*at, Handle::default()),
+            Self::Live(live) => {
+                let LiveWish { place, orientation, buttons } = live.wish();
+                (place, Handle { orientation_W: orientation, buttons: u64::from(buttons) })
+            }
             Self::Scripted(player, finger) => {
                 // `open` makes sure that the finger is in the script.
                 let at = player.position(*finger, time_s).unwrap_or_default();
@@ -95,7 +102,11 @@ impl Wish {
     }
 
     pub(crate) fn has_buttons(&self) -> bool {
-        matches!(self, Self::Scripted(player, finger) if player.script().has_buttons(*finger))
+        match self {
+            Self::Scripted(player, finger) => player.script().has_buttons(*finger),
+            Self::Live(_) => true,
+            Self::Resting(_) => false,
+        }
     }
 }
 

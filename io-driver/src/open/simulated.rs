@@ -2,7 +2,9 @@
 
 #![allow(non_snake_case)] // Frames are capital letters: a point p_W is in the world.
 
-use super::{OpenError, arm_info, commissioned, has_switch, holds_its_weight, mechanism, read, script};
+use super::{
+    OpenError, arm_info, commissioned, has_switch, holds_its_weight, live_finger, mechanism, read, script,
+};
 use crate::config::{Backend, DeviceConfig, DriverConfig, HandChoice, ReplyMode, Wish, Zeroing};
 use crate::device::Device;
 use crate::device::arm::Arm;
@@ -32,9 +34,10 @@ pub(super) fn open(
     let file = mechanism(device, description)?;
     let place = config.devices.iter().position(|other| other.name == device.name).unwrap_or(0);
     let [of_plant, of_hand] = seeds(*seed, place);
-    let wanted = match script(device, wish, config)? {
-        Some((player, finger)) => HandWish::Scripted(player, finger),
-        None => HandWish::Resting(wish.start_m),
+    let wanted = match (live_finger(device, wish)?, script(device, wish, config)?) {
+        (Some(live), _) => HandWish::Live(live),
+        (None, Some((player, finger))) => HandWish::Scripted(player, finger),
+        (None, None) => HandWish::Resting(wish.start_m),
     };
     let (wanted, start_W) = beginning(wanted, wish);
     let start_D = wish.base_in_world.inverse_transform_point(&Point3::from(start_W)).coords;
@@ -74,6 +77,8 @@ fn beginning(mut wanted: HandWish, wish: &Wish) -> (HandWish, Vector3<f64>) {
     let start = match &mut wanted {
         HandWish::Scripted(player, finger) => player.position(*finger, 0.0),
         HandWish::Resting(at) => Some(*at),
+        // It goes from there to wherever it is wanted by then.
+        HandWish::Live(_) => None,
     };
     (wanted, start.unwrap_or(wish.start_m))
 }

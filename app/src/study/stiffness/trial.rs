@@ -22,7 +22,8 @@ use bytemuck::Zeroable;
 use haptics::passivity::{Passivity, PassivitySpec};
 use haptics::{Entity, Finger, Plane};
 use io_driver::config::{
-    DeviceConfig, DriverConfig, ProcessConfig, RealTime, ReplyConfig, SafetyConfig, Wish, Zeroing, period_of,
+    DeviceConfig, DriverConfig, HandSource, ProcessConfig, RealTime, ReplyConfig, SafetyConfig, Wish,
+    Zeroing, period_of,
 };
 use io_driver::open::ROUND_TRIP_NS;
 use io_driver::sim::hand::HandModel;
@@ -194,6 +195,7 @@ impl Bench {
             hand_model: case.hand.model.clone(),
             firmness: case.hand.firmness,
             trembles: false,
+            is_live: false,
             seed: 0,
         }
     }
@@ -202,7 +204,7 @@ impl Bench {
         let period_ns = period_of(case.rate_hz);
         let reply = ReplyConfig { mode: case.mode.reply_mode(), budget_ns: period_ns / 2 };
         let wish = Wish {
-            hand: Some((self.script.clone(), "f0".into())),
+            hand: HandSource::Script { file: self.script.clone(), finger: "f0".into() },
             start_m: self.plant.tip_m,
             base_in_world: Isometry3::identity(),
         };

@@ -4,7 +4,7 @@ use super::controls::{Controls, Reach};
 use super::scene::SceneView;
 use super::{Ends, WindowSpec};
 use crate::eyes::Eyes;
-use crate::hand::MouseHand;
+use crate::hand::{MouseHand, Seen};
 use crate::news::{Ask, News, Reins};
 use crate::panel::Panel;
 use crate::playback::Playback;
@@ -12,7 +12,7 @@ use crate::stage::Stage;
 use eframe::egui;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError};
 use std::time::Duration;
-use world::SceneCamera;
+use world::{SceneCamera, StereoMode};
 
 /// Between two pictures.
 const PICTURE: Duration = Duration::from_millis(16);
@@ -45,6 +45,7 @@ impl Looker {
         let mut eyes = spec.eyes;
         let controls = Controls::new(spec, &mut eyes, &stage);
         let view = SceneView::new(creation, stage, spec.with_shadows)?;
+        let hand = reins.as_ref().map(|reins| reins.hand()).unwrap_or_default();
         Ok(Self {
             told,
             ask,
@@ -53,7 +54,7 @@ impl Looker {
             camera,
             eyes,
             playback: Playback::default(),
-            hand: MouseHand::default(),
+            hand,
             panel: Panel::default(),
             controls,
             selected: None,
@@ -102,6 +103,7 @@ impl eframe::App for Looker {
         let dt_s = f64::from(ui.input(|input| input.stable_dt));
         egui::CentralPanel::default().frame(egui::Frame::NONE).show_inside(ui, |ui| {
             let moment = self.playback.shown(now_s).unwrap_or_default();
+            let cue = self.reins.as_ref().and_then(|_| self.hand.cue(&self.view.stage, &moment));
             let scene = self.view.show(ui, moment.clone(), &self.camera, &self.eyes);
             let mut reach = Reach {
                 view: &mut self.view,
@@ -113,7 +115,11 @@ impl eframe::App for Looker {
             self.controls.turn(ui, &scene, &moment, &mut reach);
             self.controls.write(ui, scene.rect, &moment);
             if let Some(reins) = &mut self.reins {
-                reins.pull(self.hand.turn(&scene, &self.camera, dt_s));
+                reins.pull(self.hand.turn(&scene, &self.camera, &mut self.controls.hand, dt_s));
+            }
+            // With two eyes a line that is drawn once would be nowhere.
+            if let Some(cue) = cue.filter(|_| self.eyes.mode == StereoMode::Off) {
+                cue.paint(&ui.painter_at(scene.rect), &Seen::new(&self.camera, scene.rect));
             }
         });
         ui.ctx().request_repaint_after(PICTURE);

@@ -1,6 +1,7 @@
 use super::*;
 use crate::device_file::{ArmFile, DeviceFile, builtin};
 use crate::kinematics::Mechanism;
+use crate::live_hand::{LiveFinger, LiveHand, LiveWish};
 use crate::sim::hand::HandModel;
 use crate::sim::hand::model_file::{self, Firmness};
 use crate::sim::script::HandScript;
@@ -215,4 +216,40 @@ fn a_hand_that_minds_feels_the_force_on_itself_and_presses_towards_its_partner()
     };
     let more = tip_after(true) - tip_after(false);
     assert!(more.x > 2e-3, "{more}");
+}
+
+#[test]
+fn a_live_hand_that_jumps_moves_the_arm_no_faster_than_a_person_and_stays_when_nobody_moves_it_any_more() {
+    let (file, directory) = (file(), tempfile::tempdir().unwrap());
+    let path = directory.path().join("hand");
+    let mut live = LiveHand::create(&path).unwrap();
+    let finger = LiveFinger::open(&path, 2, LiveWish::at(Vector3::zeros())).unwrap();
+    let holder = held(&pen(), Vector3::zeros(), Wish::Live(finger), &Arc::default());
+    let mut device = device(&file, Vector3::zeros(), Isometry3::identity(), holder);
+    let go_to = Vector3::new(0.03, 0.04, 0.0);
+    let (mut fastest, mut buttons) = (0.0f64, 0);
+    for number in 1..3000 {
+        if number == 10 {
+            live.want(2, &LiveWish { buttons: 5, ..LiveWish::at(go_to) });
+        }
+        buttons = device.read(tick(number)).unwrap().buttons;
+        // The motors carry the arm's weight, and nothing else.
+        device.write(push(Vector3::zeros())).unwrap();
+        fastest = fastest.max(device.truth().tip_velocity.norm());
+        assert!(number > 9 || device.truth().tip.norm() < 1e-4, "{number}: {}", device.truth().tip);
+    }
+    // A hand's fastest is 1 m/s; its springs may swing over that.
+    assert!((0.1..1.5).contains(&fastest), "{fastest}");
+    // The weight, which this arm's motors do not carry, moves a soft hand by some millimetres.
+    let arrived = device.truth().tip;
+    assert!((arrived - go_to).norm() < 5e-3, "{arrived}");
+    assert_eq!(buttons, 5);
+    drop(live);
+    let velocity = device.truth().tip_velocity;
+    for number in 3000..4000 {
+        device.read(tick(number)).unwrap();
+        device.write(push(Vector3::zeros())).unwrap();
+    }
+    // What was left of the swinging.
+    assert!((device.truth().tip - arrived).norm() < 1e-4 + velocity.norm(), "{}", device.truth().tip);
 }

@@ -1,0 +1,129 @@
+//! How fingers stand around the hand's place: open, or closed on what is between them.
+//!
+//! Model: two fingers oppose each other along an axis that lies level; of three the first is the thumb and the others stand
+//! side by side against it. Closing brings them to a distance that is smaller than what people hold: what is in between
+//! keeps them away, and their hand's stiffness times what is left of the way is the force. Fingers that take no part are
+//! folded above the hand.
+//!
+//! | hand and surface in series 150 N/m | between wish and surface | force |
+//! |---|---|---|
+//! | a thing of 40 mm, two fingers | 13 mm each | 2 N |
+//! | the same, thumb against two | 17 and 9 mm | 2.6 and 1.3 N |
+//!
+//! Frames: world, y up; metres.
+
+use nalgebra::{UnitQuaternion, Vector3};
+use std::f64::consts::PI;
+
+/// From thumb to fingers, open and closed (m).
+pub const OPEN_M: f64 = 0.075;
+pub const CLOSED_M: f64 = 0.014;
+/// How fast that changes (m/s).
+const PACE_M_PER_S: f64 = 0.08;
+/// Between the two that oppose the thumb (m).
+const BESIDE_M: f64 = 0.024;
+/// How high folded fingers are above the hand (m), and how far from each other.
+const FOLDED_M: f64 = 0.06;
+/// As many fingers close on something at most.
+const MOST: usize = 3;
+
+/// A grip.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grip {
+    /// That the hand has.
+    all: usize,
+    /// That take part.
+    fingers: usize,
+    is_closing: bool,
+    /// From thumb to fingers (m).
+    opening_m: f64,
+    /// Of the axis about y, from x: as who looks stands, and by how much it was turned besides (rad).
+    facing_rad: f64,
+    turned_rad: f64,
+}
+
+impl Default for Grip {
+    fn default() -> Self {
+        Self::new(0)
+    }
+}
+
+impl Grip {
+    /// Open, of a hand with so many fingers, along x.
+    pub fn new(all: usize) -> Self {
+        let fingers = all.min(MOST);
+        Self { all, fingers, is_closing: false, opening_m: OPEN_M, facing_rad: 0.0, turned_rad: 0.0 }
+    }
+
+    /// The fingers draw near to each other from now on.
+    pub fn close(&mut self) {
+        self.is_closing = true;
+    }
+
+    /// They part.
+    pub fn open(&mut self) {
+        self.is_closing = false;
+    }
+
+    /// Whether they close, or are closed.
+    pub fn is_closing(&self) -> bool {
+        self.is_closing
+    }
+
+    /// So many take part, as far as there are so many.
+    pub fn set_fingers(&mut self, fingers: usize) {
+        self.fingers = fingers.clamp(1.min(self.all), self.all.min(MOST));
+    }
+
+    /// As many take part.
+    pub fn fingers(&self) -> usize {
+        self.fingers
+    }
+
+    /// Turns the axis about the vertical, to the left seen from above (rad).
+    pub fn turn(&mut self, by_rad: f64) {
+        self.turned_rad = (self.turned_rad + by_rad) % (2.0 * PI);
+    }
+
+    /// The axis goes with whoever looks, whose right this is, as long as nothing can be held.
+    pub fn face(&mut self, right: &Vector3<f64>) {
+        if !self.is_closing && self.opening_m >= OPEN_M && right.x.hypot(right.z) > 1e-3 {
+            self.facing_rad = (-right.z).atan2(right.x);
+        }
+    }
+
+    /// Time goes by (s).
+    pub fn pass(&mut self, dt_s: f64) {
+        let way_m = PACE_M_PER_S * dt_s;
+        self.opening_m = if self.is_closing {
+            (self.opening_m - way_m).max(CLOSED_M)
+        } else {
+            (self.opening_m + way_m).min(OPEN_M)
+        };
+    }
+
+    /// From thumb to fingers (m).
+    pub fn opening_m(&self) -> f64 {
+        self.opening_m
+    }
+
+    /// From x to the axis.
+    pub fn orientation(&self) -> UnitQuaternion<f64> {
+        UnitQuaternion::from_axis_angle(&Vector3::y_axis(), self.facing_rad + self.turned_rad)
+    }
+
+    /// From the hand's place to that of a finger (m).
+    pub fn stand(&self, finger: usize) -> Vector3<f64> {
+        let half_m = 0.5 * self.opening_m;
+        let stand = match (finger, self.fingers) {
+            (0, 1) => Vector3::zeros(),
+            (0, 2..) => Vector3::new(-half_m, 0.0, 0.0),
+            (1, 2) => Vector3::new(half_m, 0.0, 0.0),
+            (1, 3) => Vector3::new(half_m, 0.0, -0.5 * BESIDE_M),
+            (2, 3) => Vector3::new(half_m, 0.0, 0.5 * BESIDE_M),
+            // In a row, so that they keep out of each other's way.
+            (folded, _) => Vector3::new(BESIDE_M * folded as f64 - BESIDE_M, FOLDED_M, 0.0),
+        };
+        self.orientation() * stand
+    }
+}
