@@ -4,7 +4,6 @@ use crate::book::Book;
 use crate::child::DriverChild;
 use crate::control::desk::{Desk, Means, OrderSource};
 use crate::fast_loop::{FastLoop, Tally, WhenFull};
-use crate::moments::Moments;
 use crate::not_zeroed;
 use crate::outcome::{RunFailure, Stop};
 use crate::progress::Progress;
@@ -12,6 +11,7 @@ use crate::record::{About, Files, View};
 use crate::report::{Baseline, Report};
 use crate::rig::{HandMode, Rig};
 use crate::row_queue::row_queue;
+use crate::shown::Shown;
 use crate::slow::{SlowEnd, SlowSide};
 use crate::snapshots::{Snapshots, Wanted};
 use crate::spectator::Spectator;
@@ -27,7 +27,7 @@ use shm_abi::{CommanderMemory, DriverView, Frame};
 use std::path::PathBuf;
 use std::sync::mpsc::{self, Receiver};
 use std::time::Duration;
-use view::{OpenWindow, Stage, WindowSpec};
+use view::{OpenWindow, WindowSpec};
 use world::Settings;
 use world::events::{Hub, event_queue};
 use world::lists::SlowList;
@@ -110,20 +110,16 @@ impl Parts {
         let step = rig.fast_step().map_err(|error| RunFailure::Start(error.to_string()))?;
         let book = Book::default();
         let (sender, slow_lists) = mpsc::channel();
+        let window = plan.window.as_ref().filter(|_| clock != ClockMode::Virtual);
         let means = Means {
+            is_shown: window.is_some() || plan.pictures.is_some(),
             settings: plan.settings.clone(),
             extras: devices.to_vec(),
             book: book.clone(),
             slow_lists: (clock == ClockMode::Real).then_some(sender),
         };
-        let stage = || Stage::new(&rig.scene, step.entities());
-        let moments = || {
-            let poses = step.entities().iter().map(|entity| entity.X_WB).collect();
-            let bodies = rig.moving().map(|(index, ..)| index).collect();
-            Moments::new(rig.scene.fingers.len(), poses, bodies, period_ns)
-        };
-        let window = plan.window.as_ref().filter(|_| clock != ClockMode::Virtual);
-        let spectator = window.and_then(|spec| open_window(spec, stage(), moments()));
+        let shown = || Shown::new(rig, step.entities());
+        let spectator = window.and_then(|spec| open_window(spec, shown()));
         let (desk, orders) = match &plan.orders {
             Some(source) => Some(Desk::open(rig, source, means)),
             None if spectator.is_some() => Some(Desk::silent(rig, means)),
@@ -143,9 +139,10 @@ impl Parts {
             about: about.clone(),
         };
         let recorders = files.first(rig, &View::new(&rig.scene, step.entities()))?;
-        let snapshots = plan.pictures.as_ref().map(|wanted| {
-            Snapshots::start(wanted, stage(), moments(), period_ns, when_full == WhenFull::Wait)
-        });
+        let snapshots = plan
+            .pictures
+            .as_ref()
+            .map(|wanted| Snapshots::start(wanted, shown(), period_ns, when_full == WhenFull::Wait));
         let snapshots = snapshots.transpose().map_err(RunFailure::Start)?;
         let (events, event_ends) = event_queue(EVENT_QUEUE);
         let fast = FastLoop::new(step, producer, when_full, total_ticks, period_ns).with_events(events);
@@ -165,7 +162,7 @@ impl Parts {
 }
 
 /// `None`: it could not be opened, which is told.
-fn open_window(spec: &WindowSpec, stage: Stage, moments: Moments) -> Option<Spectator> {
+fn open_window(spec: &WindowSpec, Shown { stage, moments }: Shown) -> Option<Spectator> {
     match OpenWindow::open(spec.clone(), stage, None) {
         Ok(window) => Some(Spectator::new(window, moments)),
         Err(error) => {

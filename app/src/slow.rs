@@ -26,10 +26,8 @@ pub struct SlowSide {
     coming: Option<Coming>,
     /// Who takes orders, if anybody gives them.
     desk: Option<Desk>,
-    /// Who takes pictures of the first scene, if anybody does.
+    /// Who takes pictures, if anybody does.
     snapshots: Option<Snapshots>,
-    /// What became of them, once another scene goes on.
-    drawn: Option<Drawn>,
     /// Who looks on at a window, if anybody does.
     spectator: Option<Spectator>,
     /// Who else wants to know what happens.
@@ -53,7 +51,6 @@ impl SlowSide {
             coming: None,
             desk: None,
             snapshots: None,
-            drawn: None,
             spectator: None,
             events,
             newest: None,
@@ -97,19 +94,23 @@ impl SlowSide {
 
     fn take_rows(&mut self) {
         for _ in 0..self.rows.waiting() {
-            let Some((row, bodies)) = self.rows.receive() else { break };
+            let Some((row, _)) = self.rows.receive() else { break };
+            let (bodies, placed) = (self.rows.bodies(), self.rows.placed());
             // A tick's events are there before its row is.
             self.events.deliver(row.run_tick);
             for recorder in &mut self.recorders {
                 recorder.send(&row, bodies);
             }
             if let Some(snapshots) = &mut self.snapshots {
-                snapshots.look(&row, bodies);
+                snapshots.look(&row, bodies, placed);
             }
             if let Some(spectator) = &mut self.spectator {
-                spectator.look(&row, bodies);
+                spectator.look(&row);
             }
             self.newest = Some(row);
+        }
+        if let (Some(spectator), Some(row)) = (&mut self.spectator, &self.newest) {
+            spectator.see(row, self.rows.bodies(), self.rows.placed());
         }
     }
 
@@ -120,7 +121,6 @@ impl SlowSide {
         // What came in before that row did.
         self.take_rows();
         self.scenes += 1;
-        self.drawn = self.drawn.take().or_else(|| self.snapshots.take().map(Snapshots::finish));
         let (stay, end): (Vec<_>, Vec<_>) =
             std::mem::take(&mut self.recorders).into_iter().partition(Recorder::is_of_events);
         self.recorders = stay;
@@ -134,7 +134,12 @@ impl SlowSide {
             recorder
         }));
         self.recorders.extend(begun);
+        if let Some(shown) = coming.shown {
+            self.snapshots.iter_mut().for_each(|snapshots| snapshots.go_on(shown.clone()));
+            self.spectator.iter_mut().for_each(|spectator| spectator.go_on(shown.clone()));
+        }
         self.rows = coming.rows;
+        self.newest = None;
         true
     }
 
@@ -170,7 +175,7 @@ impl SlowSide {
         let told = summary(&self.events);
         self.closed.append(&mut self.recorders);
         self.failed.extend(self.closed.into_iter().map(Recorder::finish));
-        let pictures = self.drawn.or_else(|| self.snapshots.map(Snapshots::finish));
+        let pictures = self.snapshots.map(Snapshots::finish);
         SlowEnd { recordings: self.failed, events: told, pictures }
     }
 }

@@ -10,6 +10,7 @@
 //! Frames and units are those of the scene: metres, y up, cameras look along -z.
 #![deny(missing_docs)]
 
+mod crowd;
 pub mod eyes;
 pub mod hand;
 mod lamp;

@@ -1,5 +1,6 @@
 //! Draws a moment of a stage.
 
+use crate::crowd::Crowd;
 use crate::eyes::{Eyes, Look};
 use crate::lamp::Lamp;
 use crate::moment::Moment;
@@ -7,11 +8,9 @@ use crate::overlay::Overlay;
 use crate::stage::{Stage, Thing};
 use crate::triangles::Triangles;
 use nalgebra::Isometry3;
-use std::collections::BTreeMap;
-use std::sync::Arc;
 use three_d::{
-    AmbientLight, ClearState, Context, CpuMaterial, CpuMesh, DirectionalLight, Gm, Indices, Light, Mat4,
-    Mesh, Object, PhysicalMaterial, Positions, RenderTarget, Srgba, Viewport, WriteMask, vec3,
+    AmbientLight, ClearState, Context, CpuMaterial, CpuMesh, DirectionalLight, Indices, Light, Mat4,
+    PhysicalMaterial, Positions, RenderTarget, Srgba, Viewport, WriteMask, vec3,
 };
 use world::{LightKind, SceneCamera, SceneLight};
 
@@ -26,7 +25,9 @@ const MARKED: f64 = 0.3;
 /// What draws: everything of a stage that lies in the graphics memory.
 pub struct Painter {
     context: Context,
-    things: Vec<Drawn>,
+    things: Crowd,
+    /// Whether the lights' shadows are those of where things are now.
+    is_cast: bool,
     /// The sum of what all lights shed everywhere: shaders take one.
     everywhere: AmbientLight,
     lights: Vec<Shining>,
@@ -39,11 +40,6 @@ pub struct Painter {
     pub with_shadows: bool,
 }
 
-struct Drawn {
-    thing: Thing,
-    model: Gm<Mesh, PhysicalMaterial>,
-}
-
 enum Shining {
     Sun { light: DirectionalLight, casts_shadow: bool },
     Lamp { light: Lamp, casts_shadow: bool },
@@ -52,16 +48,10 @@ enum Shining {
 impl Painter {
     /// Brings a stage into a context.
     pub fn new(context: &Context, stage: &Stage) -> Self {
-        let mut meshes = BTreeMap::new();
-        let things = stage.things.iter().map(|thing| {
-            let made =
-                meshes.entry(Arc::as_ptr(&thing.triangles)).or_insert_with(|| mesh_of(&thing.triangles));
-            let model = Gm::new(Mesh::new(context, made), material(context, thing.colour));
-            Drawn { thing: thing.clone(), model }
-        });
         Self {
             context: context.clone(),
-            things: things.collect(),
+            things: Crowd::new(context, stage),
+            is_cast: false,
             everywhere: AmbientLight::new(context, 1.0, colour_of(everywhere(&stage.lights))),
             lights: stage.lights.iter().filter_map(|light| shining(context, light)).collect(),
             overlay: Overlay::new(context, &stage.radii_m),
@@ -97,27 +87,17 @@ impl Painter {
     }
 
     fn place(&mut self, moment: &Moment) {
-        for drawn in &mut self.things {
-            let pose = moment.poses.get(drawn.thing.entity).copied().unwrap_or_default();
-            drawn.model.set_transformation(matrix(&(pose * drawn.thing.pose)));
-            let is_touched = moment.fingers.iter().any(|finger| finger.entity == Some(drawn.thing.entity));
-            let is_marked = is_touched && self.with_overlay && self.with_highlight;
-            drawn.model.material.albedo =
-                bytes(if is_marked { touched(drawn.thing.colour) } else { drawn.thing.colour });
-        }
+        let (space, marks) = (moment.seen_space(), self.with_overlay && self.with_highlight);
+        let is_moved = self.things.place(|thing| look_of(thing, moment, space, marks));
+        self.is_cast &= !is_moved;
         self.overlay.place(moment);
     }
 
     fn draw_look(&mut self, look: &Look, target: &RenderTarget<'_>, part: Viewport) {
-        self.things.iter_mut().for_each(|drawn| mask(&mut drawn.model.material, look.channels));
+        self.things.mask(look.channels);
         let own = self.lights.iter().map(Shining::light);
         let lights: Vec<&dyn Light> = [&self.everywhere as &dyn Light].into_iter().chain(own).collect();
-        target.render_partially(
-            part.into(),
-            &look.eye,
-            self.things.iter().map(|drawn| &drawn.model as &dyn Object),
-            &lights,
-        );
+        target.render_partially(part.into(), &look.eye, self.things.objects(), &lights);
         // What things hide first: what is not hidden would hide it.
         for is_hidden in [true, false].into_iter().filter(|_| self.with_overlay) {
             self.overlay.show(look.channels, is_hidden);
@@ -125,19 +105,23 @@ impl Painter {
         }
     }
 
+    /// While nothing moves, shadows stay.
     fn cast_shadows(&mut self) {
-        let (things, with_shadows) = (&self.things, self.with_shadows);
-        let casting = things.iter().filter(|drawn| drawn.thing.casts_shadow);
-        let casting: Vec<&Mesh> = casting.map(|drawn| &drawn.model.geometry).collect();
+        if self.is_cast && self.with_shadows {
+            return;
+        }
+        self.is_cast = self.with_shadows;
+        let casting = self.things.casting();
         for light in &mut self.lights {
             match light {
                 Shining::Sun { light, casts_shadow } => {
-                    let is_cast = with_shadows && *casts_shadow;
-                    if !is_cast || light.generate_shadow_map(SHADOW_SIDE, casting.iter()).is_err() {
+                    let is_cast = self.with_shadows && *casts_shadow && !casting.is_empty();
+                    let casting = casting.iter().copied();
+                    if !is_cast || light.generate_shadow_map(SHADOW_SIDE, casting).is_err() {
                         light.clear_shadow_map();
                     }
                 }
-                Shining::Lamp { light, casts_shadow: true } if with_shadows => light.cast(&casting),
+                Shining::Lamp { light, casts_shadow: true } if self.with_shadows => light.cast(&casting),
                 Shining::Lamp { light, .. } => light.cast_none(),
             }
         }
@@ -147,6 +131,14 @@ impl Painter {
     pub fn context(&self) -> &Context {
         &self.context
     }
+}
+
+/// Where a thing is and which colour it has there; `None`: it is in another space than is seen.
+fn look_of(thing: &Thing, moment: &Moment, space: u32, marks: bool) -> Option<(Mat4, [f64; 4])> {
+    let pose = moment.poses.get(thing.entity).copied().unwrap_or_default();
+    let is_touched = || moment.fingers.iter().any(|finger| finger.entity == Some(thing.entity));
+    let colour = if marks && is_touched() { touched(thing.colour) } else { thing.colour };
+    (thing.space == space).then(|| (matrix(&(pose * thing.pose)), colour))
 }
 
 impl Shining {
@@ -198,7 +190,7 @@ fn touched([r, g, b, opacity]: [f64; 4]) -> [f64; 4] {
     [mixed(r, mark_r), mixed(g, mark_g), mixed(b, mark_b), opacity]
 }
 
-fn bytes(colour: [f64; 4]) -> Srgba {
+pub(crate) fn bytes(colour: [f64; 4]) -> Srgba {
     colour.map(|share| (255.0 * share).round() as u8).into()
 }
 
