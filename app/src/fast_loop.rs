@@ -8,6 +8,7 @@
 use crate::control::Control;
 use crate::control::order::Replacement;
 use crate::control::queue::OrderReceiver;
+use crate::displaced::Displaced;
 use crate::fast_step::{EventTeller, FastStep};
 use crate::row::{BodyRow, Row};
 use crate::row_queue::RowSender;
@@ -65,6 +66,8 @@ pub struct FastLoop {
     pending: Option<(u64, Row)>,
     /// The bodies that have changed since the last row that was sent, by their numbers in ascending order.
     pending_bodies: Vec<(u32, BodyRow)>,
+    /// What else was moved.
+    displaced: Displaced,
     frame: Frame,
     following: Frame,
     command: Command,
@@ -123,6 +126,7 @@ impl FastLoop {
         Self {
             pending_bodies: (0..).zip(step.bodies().iter().copied()).collect(),
             teller: EventTeller::new(&mut step),
+            displaced: Displaced::new(step.entities().len()),
             step,
             control: None,
             events: None,
@@ -246,7 +250,9 @@ impl FastLoop {
             self.is_first_scene = false;
             std::mem::swap(&mut self.rows, &mut other.rows);
             std::mem::swap(&mut self.pending_bodies, &mut other.bodies);
+            std::mem::swap(&mut self.displaced, &mut other.displaced);
         }
+        self.displaced.begin_anew(self.step.entities());
         // Room for all of them was made with the world.
         self.pending_bodies.extend((0..).zip(self.step.bodies().iter().copied()));
         if let Some(control) = &mut self.control {
@@ -277,6 +283,7 @@ impl FastLoop {
     }
 
     fn keep_bodies(&mut self) {
+        self.displaced.note(self.step.placed());
         let (pending, bodies) = (&mut self.pending_bodies, self.step.bodies());
         for &number in self.step.changed_bodies() {
             let body = bodies[number as usize];
@@ -338,7 +345,7 @@ impl FastLoop {
                 std::thread::yield_now();
             }
         }
-        match self.rows.send(row, &self.pending_bodies) {
+        match self.rows.send_with(row, &self.pending_bodies, self.displaced.pending()) {
             true => {
                 self.tally.rows += 1;
                 self.pending_bodies.clear();

@@ -24,6 +24,7 @@ pub use objects::{HandFinger, Objects};
 pub use ordered::{Hold, MOST_CALLED};
 pub use watched::EventTeller;
 
+use crate::displaced::Placed;
 use crate::lists_end::ListsEnd;
 use crate::mount::Mount;
 use crate::passive_port::{Tick, keep_passive};
@@ -175,6 +176,11 @@ impl FastStep {
         self.objects.changed()
     }
 
+    /// Entities that are no bodies and that somebody moves, as the last tick began; what is told once stays there.
+    pub fn placed(&self) -> &[Placed] {
+        self.objects.placed()
+    }
+
     /// The entities that were parked in the last tick, because they left the world or were lost.
     pub fn parked_now(&self) -> &[physics::Parked] {
         self.objects.parked_now()
@@ -247,7 +253,7 @@ impl FastStep {
                 row.force_on_user += finger.feel(felt, &self.effects, &self.entities, hip, moment);
             }
         }
-        self.objects.note();
+        self.objects.note(&self.entities);
         if frame.run_tick >= 0 {
             let (entities, felt) = (&mut self.entities, &self.finger_effects);
             self.objects.step(entities, &self.fingers, felt, &mut row.fingers, dt_s);

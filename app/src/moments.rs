@@ -1,8 +1,9 @@
 //! What is to be seen of the rows of a run.
 
-use crate::row::{BodyRow, Row};
-use nalgebra::{Isometry3, UnitQuaternion};
-use view::{FingerMoment, Moment};
+use crate::displaced::Placed;
+use crate::row::{BodyRow, FingerRow, Row};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use view::{ContactMoment, FingerMoment, Moment};
 
 /// Makes moments of rows.
 #[derive(Debug, Clone)]
@@ -21,8 +22,13 @@ impl Moments {
         Self { fingers, entities, poses, period_s: period_ns as f64 / 1e9 }
     }
 
-    /// Of a tick, as it began.
-    pub fn moment(&mut self, row: &Row, bodies: &[BodyRow]) -> Moment {
+    /// Of a tick, as it began; `placed` are other entities that have been moved.
+    pub fn moment(&mut self, row: &Row, bodies: &[BodyRow], placed: &[Placed]) -> Moment {
+        for &(entity, stands) in placed {
+            if let Some(pose) = self.poses.get_mut(entity as usize) {
+                *pose = stands;
+            }
+        }
         for (body, &entity) in bodies.iter().zip(&self.entities) {
             if let Some(pose) = self.poses.get_mut(entity) {
                 let turned = UnitQuaternion::new_normalize(body.orientation);
@@ -34,7 +40,8 @@ impl Moments {
             god_object: finger.god_object,
             force: finger.force_on_user,
             entity: finger.entity.map(|entity| entity as usize),
-            ..FingerMoment::default()
+            contact: contact(finger),
+            space: finger.space,
         });
         Moment {
             t_s: self.time_s(row),
@@ -63,4 +70,13 @@ impl Moments {
     pub fn fingers(&self) -> usize {
         self.fingers
     }
+}
+
+fn contact(finger: &FingerRow) -> Option<ContactMoment> {
+    let radius_m = finger.friction_radius_m;
+    (finger.normal != Vector3::zeros()).then(|| ContactMoment {
+        normal: finger.normal,
+        friction_radius_m: (radius_m > 0.0).then_some(radius_m),
+        feature: finger.feature,
+    })
 }

@@ -39,6 +39,11 @@ pub struct FingerRow {
     pub entity: Option<u32>,
     /// What of it is touched.
     pub feature: Feature,
+    /// Outward from what is touched, of unit length; zero where nothing is. Recordings as CSV do not have it.
+    pub normal: Vector3<f64>,
+    /// Of the friction circle around the HIP's foot on the tangent plane (m); zero without friction. Recordings as CSV do not
+    /// have it.
+    pub friction_radius_m: f64,
     /// What the friction does.
     pub friction: ContactState,
     /// Energy fed into the hand up to this tick (J); zero where nobody keeps the finger passive.

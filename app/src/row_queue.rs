@@ -2,11 +2,14 @@
 //!
 //! Model: how many entities move is known when a run begins, so two queues of fixed size hold them: one of rows, one of
 //! bodies, a row's bodies being pushed before the row is. Whoever finds a row finds its bodies. A body that rests is sent
-//! once; the receiver keeps all of them as they were last.
+//! once; the receiver keeps all of them as they were last. What is not a body and was moved all the same comes with its row,
+//! too.
 //! Each place has been written to once: where memory is not locked, the first touch would otherwise be a page fault of the
 //! fast thread, every few ticks for eight seconds.
 
+use crate::displaced::Placed;
 use crate::row::{BodyRow, Row};
+use nalgebra::Isometry3;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 /// Rows that may wait: eight seconds at 1 kHz, so that a slow disk costs nothing.
@@ -15,20 +18,29 @@ pub const ROW_QUEUE: usize = 8192;
 /// Bodies that may wait, of all rows together (100 MB); with more than 128 of them in a row, fewer rows can.
 const BODY_QUEUE: usize = 1 << 20;
 
+/// What is no body and was moved, for each row that may wait.
+const PLACED_A_ROW: usize = 4;
+/// No fewer of them may wait.
+const PLACED_QUEUE: usize = 1024;
+
 /// The fast side's end.
 pub struct RowSender {
     rows: Producer<Waiting>,
     bodies: Producer<(u32, BodyRow)>,
+    placed: Producer<Placed>,
 }
 
-/// A row, and how many bodies come with it.
-type Waiting = (Row, u32);
+/// A row, and how many bodies and how many others come with it.
+type Waiting = (Row, [u32; 2]);
 
 /// The slow side's end.
 pub struct RowReceiver {
     rows: Consumer<Waiting>,
     bodies: Consumer<(u32, BodyRow)>,
     of_row: Vec<BodyRow>,
+    placed: Consumer<Placed>,
+    /// All that ever came, each entity once.
+    stand: Vec<Placed>,
 }
 
 /// A queue for rows with so many bodies each.
@@ -39,11 +51,18 @@ pub fn row_queue(bodies: usize) -> (RowSender, RowReceiver) {
 
 /// A queue for so many rows with so many bodies each.
 pub fn row_queue_of(places: usize, bodies: usize) -> (RowSender, RowReceiver) {
-    let (rows, row_ends) = touched(places, (Row::empty(), 0));
+    let (rows, row_ends) = touched(places, (Row::empty(), [0; 2]));
     let (bodies_in, bodies_out) = touched(places * bodies, (0, BodyRow::default()));
-    let receiver =
-        RowReceiver { rows: row_ends, bodies: bodies_out, of_row: vec![BodyRow::default(); bodies] };
-    (RowSender { rows, bodies: bodies_in }, receiver)
+    let (placed_in, placed_out) =
+        touched((PLACED_A_ROW * places).max(PLACED_QUEUE), (0, Isometry3::identity()));
+    let receiver = RowReceiver {
+        rows: row_ends,
+        bodies: bodies_out,
+        of_row: vec![BodyRow::default(); bodies],
+        placed: placed_out,
+        stand: Vec::new(),
+    };
+    (RowSender { rows, bodies: bodies_in, placed: placed_in }, receiver)
 }
 
 fn touched<T: Clone>(places: usize, with: T) -> (Producer<T>, Consumer<T>) {
@@ -67,14 +86,25 @@ impl RowSender {
     /// Sends a row and the bodies that have changed since the last one that was sent, by their numbers; `false`, and nothing
     /// is sent, if there is no room.
     pub fn send(&mut self, row: Row, bodies: &[(u32, BodyRow)]) -> bool {
-        if self.rows.is_full() || self.bodies.slots() < bodies.len() {
+        self.send_with(row, bodies, &mut Vec::new())
+    }
+
+    /// The same with what else has been moved, which is taken out of `placed` if it is sent; but for more than may ever wait,
+    /// which is left for the next row.
+    pub fn send_with(&mut self, row: Row, bodies: &[(u32, BodyRow)], placed: &mut Vec<Placed>) -> bool {
+        let others = placed.len().min(PLACED_QUEUE);
+        if self.rows.is_full() || self.bodies.slots() < bodies.len() || self.placed.slots() < others {
             return false;
+        }
+        for other in placed.drain(..others) {
+            // There is room.
+            let _ = self.placed.push(other);
         }
         for body in bodies {
             // There is room.
             let _ = self.bodies.push(*body);
         }
-        self.rows.push((row, bodies.len() as u32)).is_ok()
+        self.rows.push((row, [bodies.len(), others].map(|count| count as u32))).is_ok()
     }
 }
 
@@ -96,7 +126,7 @@ impl RowReceiver {
 
     /// The next row and all bodies, if one waits.
     pub fn receive(&mut self) -> Option<(Row, &[BodyRow])> {
-        let (row, bodies) = self.rows.pop().ok()?;
+        let (row, [bodies, others]) = self.rows.pop().ok()?;
         for _ in 0..bodies {
             if let Ok((number, body)) = self.bodies.pop()
                 && let Some(place) = self.of_row.get_mut(number as usize)
@@ -104,7 +134,24 @@ impl RowReceiver {
                 *place = body;
             }
         }
+        for _ in 0..others {
+            let Ok(other) = self.placed.pop() else { break };
+            match self.stand.iter_mut().find(|(entity, _)| *entity == other.0) {
+                Some(known) => *known = other,
+                None => self.stand.push(other),
+            }
+        }
         Some((row, &self.of_row))
+    }
+
+    /// All bodies as they were with the last row.
+    pub fn bodies(&self) -> &[BodyRow] {
+        &self.of_row
+    }
+
+    /// What is no body and has been moved, where it stood with the last row.
+    pub fn placed(&self) -> &[Placed] {
+        &self.stand
     }
 }
 
@@ -140,5 +187,28 @@ mod tests {
         let mut expected = bodies(sent - 1);
         expected[7] = of_one[0].1;
         assert_eq!(of_row, expected, "the others are as they were");
+    }
+
+    #[test]
+    fn what_is_moved_beside_bodies_comes_with_its_row_and_stays_where_it_was_left() {
+        let (mut sender, mut receiver) = row_queue_of(64, 0);
+        let at = |x: f64| Isometry3::translation(x, 0.0, 0.0);
+        let mut waits: Vec<Placed> = vec![(3, at(0.1)), (1, at(0.2))];
+        assert!(sender.send_with(Row::empty(), &[], &mut waits) && waits.is_empty());
+        assert!(sender.send_with(Row::empty(), &[], &mut vec![(1, at(0.3))]));
+        assert!(sender.send(Row::empty(), &[]));
+        let mut received = || receiver.receive().map(|_| receiver.placed().to_vec()).expect("a row");
+        assert_eq!(received(), [(3, at(0.1)), (1, at(0.2))]);
+        assert_eq!(received(), [(3, at(0.1)), (1, at(0.3))]);
+        assert_eq!(received(), [(3, at(0.1)), (1, at(0.3))]);
+        // Of more than may ever wait each row brings some.
+        let mut many: Vec<Placed> = (0..PLACED_QUEUE as u32 + 5).map(|entity| (entity, at(0.0))).collect();
+        assert!(sender.send_with(Row::empty(), &[], &mut many) && many.len() == 5);
+        assert!(
+            !sender.send_with(Row::empty(), &[], &mut many) && many.len() == 5,
+            "no room: nothing is lost"
+        );
+        assert!(receiver.receive().is_some());
+        assert!(sender.send_with(Row::empty(), &[], &mut many) && many.is_empty());
     }
 }

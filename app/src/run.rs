@@ -5,7 +5,6 @@ use crate::child::DriverChild;
 use crate::control::desk::{Desk, Means, OrderSource};
 use crate::fast_loop::{FastLoop, Tally, WhenFull};
 use crate::live::LiveHandFile;
-use crate::moments::Moments;
 use crate::not_zeroed;
 use crate::on_request::OnRequest;
 use crate::outcome::{RunFailure, Stop};
@@ -14,6 +13,7 @@ use crate::record::{About, Files, View};
 use crate::report::{Baseline, Report};
 use crate::rig::{HandMode, Rig};
 use crate::row_queue::row_queue;
+use crate::shown::Shown;
 use crate::slow::{SlowEnd, SlowSide};
 use crate::snapshots::{Snapshots, Wanted};
 use crate::spectator::Spectator;
@@ -113,27 +113,24 @@ impl Parts {
         let step = rig.fast_step().map_err(|error| RunFailure::Start(error.to_string()))?;
         let book = Book::default();
         let (sender, slow_lists) = mpsc::channel();
+        let window = plan.window.as_ref().filter(|_| clock != ClockMode::Virtual);
         let means = Means {
+            is_shown: window.is_some() || plan.pictures.is_some(),
             settings: plan.settings.clone(),
             extras: devices.to_vec(),
             book: book.clone(),
             slow_lists: (clock == ClockMode::Real).then_some(sender),
         };
-        let stage = || Stage::new(&rig.scene, step.entities());
-        let moments = || {
-            let poses = step.entities().iter().map(|entity| entity.X_WB).collect();
-            let bodies = rig.moving().map(|(index, ..)| index).collect();
-            Moments::new(rig.scene.fingers.len(), poses, bodies, period_ns)
-        };
-        let window = plan.window.as_ref().filter(|_| clock != ClockMode::Virtual);
+        let shown = || Shown::new(rig, step.entities());
         let (events, event_ends) = event_queue(EVENT_QUEUE);
         let mut hub = Hub::new(vec![event_ends]);
-        let window = match window {
-            Some(spec) => open_window(spec, stage(), reins)?,
+        let opened = match window {
+            Some(spec) => open_window(spec, shown(), reins)?,
             None if reins.is_some() => return Err(NoWindow::NoDisplay.into()),
             None => None,
         };
-        let spectator = window.map(|window| Spectator::new(window, moments(), &mut hub, book.clone()));
+        let spectator =
+            opened.map(|(window, moments)| Spectator::new(window, moments, &mut hub, book.clone()));
         let view = View::new(&rig.scene, step.entities());
         let directory = plan.settings.recording_directory.value.clone();
         let on_request = spectator.is_some().then(|| OnRequest::new(directory, rig.clone(), view.clone()));
@@ -156,9 +153,10 @@ impl Parts {
             about: about.clone(),
         };
         let recorders = files.first(rig, &view)?;
-        let snapshots = plan.pictures.as_ref().map(|wanted| {
-            Snapshots::start(wanted, stage(), moments(), period_ns, when_full == WhenFull::Wait)
-        });
+        let snapshots = plan
+            .pictures
+            .as_ref()
+            .map(|wanted| Snapshots::start(wanted, shown(), period_ns, when_full == WhenFull::Wait));
         let snapshots = snapshots.transpose().map_err(RunFailure::Start)?;
         let fast = FastLoop::new(step, producer, when_full, total_ticks, period_ns).with_events(events);
         Ok(Self {
@@ -180,12 +178,12 @@ impl Parts {
 /// `None`: it could not be opened, which is told. Who is to move the fingers there needs it.
 fn open_window(
     spec: &WindowSpec,
-    stage: Stage,
+    Shown { stage, moments }: Shown,
     reins: Option<Box<dyn Reins>>,
-) -> Result<Option<OpenWindow>, RunFailure> {
+) -> Result<Option<(OpenWindow, Moments)>, RunFailure> {
     let is_needed = reins.is_some();
     match OpenWindow::open(spec.clone(), stage, reins) {
-        Ok(window) => Ok(Some(window)),
+        Ok(window) => Ok(Some((window, moments))),
         Err(error) if is_needed => Err(error.into()),
         Err(error) => {
             say(format_args!("phantom3: {error}; the run goes on without"));

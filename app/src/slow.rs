@@ -28,10 +28,8 @@ pub struct SlowSide {
     coming: Option<Coming>,
     /// Who takes orders, if anybody gives them.
     desk: Option<Desk>,
-    /// Who takes pictures of the first scene, if anybody does.
+    /// Who takes pictures, if anybody does.
     snapshots: Option<Snapshots>,
-    /// What became of them, once another scene goes on.
-    drawn: Option<Drawn>,
     /// Who looks on at a window, if anybody does.
     spectator: Option<Spectator>,
     /// Who records when people ask for it, if they may.
@@ -57,7 +55,6 @@ impl SlowSide {
             coming: None,
             desk: None,
             snapshots: None,
-            drawn: None,
             spectator: None,
             on_request: None,
             events,
@@ -106,7 +103,7 @@ impl SlowSide {
         self.end_what_failed();
         let Some(spectator) = &mut self.spectator else { return };
         let recording = self.on_request.as_ref().and_then(OnRequest::path);
-        spectator.step(self.rows.bodies(), recording, self.desk.as_mut());
+        spectator.step(recording, self.desk.as_mut());
         if let Some(wanted) = spectator.take_record() {
             let said = self.record(wanted);
             self.tell(said);
@@ -170,7 +167,8 @@ impl SlowSide {
 
     fn take_rows(&mut self) {
         for _ in 0..self.rows.waiting() {
-            let Some((row, bodies)) = self.rows.receive() else { break };
+            let Some((row, _)) = self.rows.receive() else { break };
+            let (bodies, placed) = (self.rows.bodies(), self.rows.placed());
             // A tick's events are there before its row is.
             self.events.deliver(row.run_tick);
             let requested = self.on_request.as_mut().and_then(OnRequest::recorder);
@@ -178,12 +176,15 @@ impl SlowSide {
                 recorder.send(&row, bodies);
             }
             if let Some(snapshots) = &mut self.snapshots {
-                snapshots.look(&row, bodies);
+                snapshots.look(&row, bodies, placed);
             }
             if let Some(spectator) = &mut self.spectator {
                 spectator.look(&row);
             }
             self.newest = Some(row);
+        }
+        if let (Some(spectator), Some(row)) = (&mut self.spectator, &self.newest) {
+            spectator.see(row, self.rows.bodies(), self.rows.placed());
         }
     }
 
@@ -194,7 +195,6 @@ impl SlowSide {
         // What came in before that row did.
         self.take_rows();
         self.scenes += 1;
-        self.drawn = self.drawn.take().or_else(|| self.snapshots.take().map(Snapshots::finish));
         let (stay, end): (Vec<_>, Vec<_>) =
             std::mem::take(&mut self.recorders).into_iter().partition(Recorder::is_of_events);
         self.recorders = stay;
@@ -210,11 +210,16 @@ impl SlowSide {
             recorder
         }));
         self.recorders.extend(begun);
+        if let Some(shown) = coming.shown {
+            self.snapshots.iter_mut().for_each(|snapshots| snapshots.go_on(shown.clone()));
+            self.spectator.iter_mut().for_each(|spectator| spectator.go_on(shown.clone()));
+        }
         self.rows = coming.rows;
         if goes_on {
             let said = self.record(true);
             self.tell(said);
         }
+        self.newest = None;
         true
     }
 
@@ -251,7 +256,7 @@ impl SlowSide {
         self.closed.append(&mut self.recorders);
         self.closed.extend(self.on_request.as_mut().and_then(OnRequest::end));
         self.failed.extend(self.closed.into_iter().map(Recorder::finish));
-        let pictures = self.drawn.or_else(|| self.snapshots.map(Snapshots::finish));
+        let pictures = self.snapshots.map(Snapshots::finish);
         SlowEnd { recordings: self.failed, events: told, pictures }
     }
 }

@@ -9,10 +9,12 @@ mod args;
 
 pub use args::{Film, PictureArgs, Shot, Wanted};
 
+use crate::displaced::Placed;
 use crate::moments::Moments;
 use crate::row::{BodyRow, Row};
+use crate::shown::Shown;
 use io_driver::say::say;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
 use view::{Eyes, Moment, Stage, Studio};
@@ -32,8 +34,16 @@ pub struct Snapshots {
     waits: bool,
     period_s: f64,
     moments: Moments,
-    out: Option<SyncSender<(Moment, PathBuf)>>,
+    out: Option<SyncSender<Work>>,
     thread: Option<JoinHandle<Drawn>>,
+}
+
+/// What the drawing thread gets to do.
+enum Work {
+    /// A picture, and where to.
+    Picture(Box<Moment>, PathBuf),
+    /// Another scene goes on.
+    Scene(Box<Stage>),
 }
 
 /// What became of the pictures.
@@ -79,21 +89,20 @@ impl Snapshots {
     /// A camera that the scene does not have, a directory that cannot be made, in words.
     pub fn start(
         wanted: &Wanted,
-        stage: Stage,
-        moments: Moments,
+        Shown { stage, moments }: Shown,
         period_ns: u64,
         waits: bool,
     ) -> Result<Self, String> {
-        let camera = camera_of(&stage, wanted.camera.as_deref())?;
+        camera_of(&stage, wanted.camera.as_deref())?;
         if let Some(film) = &wanted.film {
             std::fs::create_dir_all(&film.directory)
                 .map_err(|error| format!("--frames {}: {error}", film.directory.display()))?;
         }
-        let (size, eyes) = (wanted.size, wanted.eyes);
+        let look = wanted.clone();
         let (out, to_draw) = sync_channel(WAITING);
         let thread = std::thread::Builder::new()
             .name("pictures".into())
-            .spawn(move || draw_all(&stage, (&camera, &eyes), size, &to_draw))
+            .spawn(move || draw_all(stage, &look, &to_draw))
             .map_err(|error| format!("no thread for pictures: {error}"))?;
         let mut shots = wanted.shots.clone();
         shots.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
@@ -111,12 +120,12 @@ impl Snapshots {
     }
 
     /// A tick, as it began.
-    pub fn look(&mut self, row: &Row, bodies: &[BodyRow]) {
+    pub fn look(&mut self, row: &Row, bodies: &[BodyRow], placed: &[Placed]) {
         // The tick that is nearest to the time.
         let now_s = (row.run_tick as f64 + 0.5) * self.period_s;
         while self.shots.first().is_some_and(|shot| shot.t_s < now_s) {
             let shot = self.shots.remove(0);
-            let moment = self.moments.moment(row, bodies);
+            let moment = self.moments.moment(row, bodies, placed);
             self.send((moment, shot.file), true);
         }
         if let Some(Film { directory, fps }) = &self.film
@@ -124,13 +133,23 @@ impl Snapshots {
         {
             let file = directory.join(format!("frame-{:06}.png", self.due));
             self.due += 1;
-            let moment = self.moments.moment(row, bodies);
+            let moment = self.moments.moment(row, bodies, placed);
             self.send((moment, file), self.waits);
         }
     }
 
-    fn send(&mut self, picture: (Moment, PathBuf), waits: bool) {
+    /// Another scene goes on: pictures are of that from now on, and of its first camera where it has none of that name.
+    pub fn go_on(&mut self, Shown { stage, moments }: Shown) {
+        self.moments = moments;
+        if let Some(out) = &self.out {
+            // A thread that has ended has said why.
+            let _ = out.send(Work::Scene(Box::new(stage)));
+        }
+    }
+
+    fn send(&mut self, (moment, file): (Moment, PathBuf), waits: bool) {
         let Some(out) = &self.out else { return };
+        let picture = Work::Picture(Box::new(moment), file);
         if waits {
             // A thread that has ended has said why.
             let _ = out.send(picture);
@@ -159,36 +178,63 @@ fn camera_of(stage: &Stage, name: Option<&str>) -> Result<SceneCamera, String> {
     })
 }
 
-fn draw_all(
-    stage: &Stage,
-    (camera, eyes): (&SceneCamera, &Eyes),
-    size: [u32; 2],
-    moments: &Receiver<(Moment, PathBuf)>,
-) -> Drawn {
+/// Who draws one scene.
+struct Drawer {
+    studio: Studio,
+    camera: SceneCamera,
+    eyes: Eyes,
+}
+
+impl Drawer {
+    fn new(stage: &Stage, wanted: &Wanted) -> Result<Self, String> {
+        for line in &stage.not_drawn {
+            say(format_args!("phantom3: not in pictures: {line}"));
+        }
+        let camera = camera_of(stage, wanted.camera.as_deref()).or_else(|_| camera_of(stage, None))?;
+        let studio = Studio::new(stage, wanted.size).map_err(|missing| missing.to_string())?;
+        Ok(Self { studio, camera, eyes: wanted.eyes })
+    }
+}
+
+fn draw_all(first: Stage, wanted: &Wanted, work: &Receiver<Work>) -> Drawn {
     let mut drawn = Drawn::default();
-    for line in &stage.not_drawn {
-        say(format_args!("phantom3: not in pictures: {line}"));
-    }
-    let mut studio = match Studio::new(stage, size) {
-        Ok(studio) => studio,
-        Err(missing) => {
-            say(format_args!("phantom3: {missing}"));
-            drawn.failure = Some(missing.to_string());
-            // Nobody is to wait for room.
-            moments.iter().for_each(drop);
-            return drawn;
-        }
-    };
-    drawn.renderer = studio.renderer().to_owned();
-    for (moment, file) in moments {
-        if let Err(error) = studio.take(&moment, camera, eyes).save(&file) {
-            if drawn.failure.is_none() {
-                say(format_args!("phantom3: the picture {} cannot be written: {error}", file.display()));
+    let (mut next, mut drawer) = (Some(first), None);
+    loop {
+        if let Some(stage) = next.take() {
+            // One graphics context at a time.
+            drop(drawer.take());
+            match Drawer::new(&stage, wanted) {
+                Ok(made) => drawer = Some(made),
+                Err(missing) => {
+                    say(format_args!("phantom3: {missing}"));
+                    drawn.failure = Some(missing);
+                    // Nobody is to wait for room.
+                    work.iter().for_each(drop);
+                    return drawn;
+                }
             }
-            (drawn.failure, drawn.is_fault) = (Some(error.to_string()), true);
-        } else {
-            drawn.written += 1;
+        }
+        match work.recv() {
+            Ok(Work::Scene(stage)) => next = Some(*stage),
+            Ok(Work::Picture(moment, file)) => {
+                let Some(Drawer { studio, camera, eyes }) = &mut drawer else { continue };
+                drawn.renderer = studio.renderer().to_owned();
+                drawn.note(&file, studio.take(&moment, camera, eyes).save(&file));
+            }
+            Err(_) => return drawn,
         }
     }
-    drawn
+}
+
+impl Drawn {
+    fn note(&mut self, file: &Path, saved: std::io::Result<()>) {
+        let Err(error) = saved else {
+            self.written += 1;
+            return;
+        };
+        if self.failure.is_none() {
+            say(format_args!("phantom3: the picture {} cannot be written: {error}", file.display()));
+        }
+        (self.failure, self.is_fault) = (Some(error.to_string()), true);
+    }
 }

@@ -9,8 +9,10 @@ mod notes;
 
 use crate::book::Book;
 use crate::control::desk::Desk;
+use crate::displaced::Placed;
 use crate::moments::Moments;
 use crate::row::{BodyRow, Row};
+use crate::shown::Shown;
 use gauge::Gauge;
 use happened::Happened;
 use nalgebra::Vector3;
@@ -20,15 +22,40 @@ use std::time::{Duration, Instant};
 use view::{Ask, Glimpse, News, OpenWindow, Sample, Status};
 use world::events::Hub;
 
-/// Between two glimpses.
-const GLIMPSE: Duration = Duration::from_millis(12);
+/// Between two glimpses at least: each turn of the slow side has one.
+const GLIMPSE: Duration = Duration::from_millis(8);
+
+/// Who is told what happens, and asks for something: a window, or what stands for one.
+pub trait Onlooker {
+    /// Takes news, if there is time to listen.
+    fn tell(&mut self, news: News);
+    /// What people want.
+    fn asked(&mut self) -> Vec<Ask>;
+    /// Whether anybody is there still.
+    fn is_open(&self) -> bool;
+}
+
+impl Onlooker for OpenWindow {
+    fn tell(&mut self, news: News) {
+        OpenWindow::tell(self, news);
+    }
+
+    fn asked(&mut self) -> Vec<Ask> {
+        OpenWindow::asked(self).collect()
+    }
+
+    fn is_open(&self) -> bool {
+        OpenWindow::is_open(self)
+    }
+}
 
 /// Who looks on.
 pub struct Spectator {
-    window: OpenWindow,
+    window: Box<dyn Onlooker>,
+    pause: Duration,
     moments: Moments,
     samples: Vec<Sample>,
-    newest: Option<Row>,
+    newest: Option<(Row, Vec<BodyRow>, Vec<Placed>)>,
     told: Instant,
     happened: Happened,
     notes: Notes,
@@ -40,9 +67,10 @@ pub struct Spectator {
 
 impl Spectator {
     /// For a window that is open. It hears here what happens, and finds in this book what was ordered.
-    pub fn new(window: OpenWindow, moments: Moments, hub: &mut Hub, book: Book) -> Self {
+    pub fn new(window: impl Onlooker + 'static, moments: Moments, hub: &mut Hub, book: Book) -> Self {
         Self {
-            window,
+            window: Box::new(window),
+            pause: GLIMPSE,
             moments,
             samples: Vec::new(),
             newest: None,
@@ -60,6 +88,12 @@ impl Spectator {
         self.gauge = Some(Gauge::new(socket));
     }
 
+    /// Told no more often than after so long.
+    #[must_use]
+    pub fn every(self, pause: Duration) -> Self {
+        Self { pause, ..self }
+    }
+
     /// A tick, as it began.
     pub fn look(&mut self, row: &Row) {
         let fingers = row.fingers[..self.moments.fingers()].iter();
@@ -68,21 +102,38 @@ impl Spectator {
             .map(|finger| [finger.force_on_user.norm(), depth_m(&finger.hip, finger.god_object)])
             .collect();
         self.samples.push(Sample { t_s: self.moments.time_s(row), fingers: felt });
-        self.newest = Some(*row);
         self.happened.step();
     }
 
-    /// The slow side's turn; the bodies are those of the newest row.
-    pub fn step(&mut self, bodies: &[BodyRow], recording: Option<&Path>, desk: Option<&mut Desk>) {
+    /// The newest tick, and where everything was then.
+    pub fn see(&mut self, row: &Row, bodies: &[BodyRow], placed: &[Placed]) {
+        let newest = self.newest.get_or_insert_with(|| (*row, Vec::new(), Vec::new()));
+        newest.0 = *row;
+        newest.1.clear();
+        newest.1.extend_from_slice(bodies);
+        newest.2.clear();
+        newest.2.extend_from_slice(placed);
+    }
+
+    /// Another scene goes on.
+    pub fn go_on(&mut self, Shown { stage, moments }: Shown) {
+        self.moments = moments;
+        self.newest = None;
+        self.samples.clear();
+        self.window.tell(News::Scene(Box::new(stage)));
+    }
+
+    /// The slow side's turn.
+    pub fn step(&mut self, recording: Option<&Path>, desk: Option<&mut Desk>) {
         if let Some(gauge) = &mut self.gauge {
             gauge.step();
         }
-        if self.told.elapsed() >= GLIMPSE
-            && let Some(row) = self.newest
+        if self.told.elapsed() >= self.pause
+            && let Some((row, bodies, placed)) = &self.newest
         {
             self.told = Instant::now();
-            let status = self.status(&row, bodies, recording);
-            let mut moment = self.moments.moment(&row, bodies);
+            let status = self.status(row, bodies, recording);
+            let mut moment = self.moments.moment(row, bodies, placed);
             moment.colliding = colliding(&status.touching, self.moments.bodies());
             let samples = std::mem::take(&mut self.samples);
             self.window.tell(News::Glimpse(Box::new(Glimpse { moment, samples, status })));
@@ -125,8 +176,7 @@ impl Spectator {
     }
 
     fn answer(&mut self, mut desk: Option<&mut Desk>) {
-        let asked: Vec<Ask> = self.window.asked().collect();
-        for ask in asked {
+        for ask in self.window.asked() {
             match ask {
                 Ask::Order(line) => {
                     let done = desk.as_mut().map(|desk| desk.order(0, &line));

@@ -1,6 +1,7 @@
 //! `run --snapshot` and `--frames`: pictures of a run, where the machine has a graphics library; where it has none the run
 //! says what is missing and goes on.
 
+use nalgebra::{Point3, Vector3};
 use system_tests::workplace::{Said, Workplace};
 
 /// A ball that falls past a finger, before a camera that looks along -z.
@@ -139,4 +140,148 @@ fn what_cannot_be_drawn_or_written_is_told() {
         assert!(said.status == Some(3) && said.err.contains("no/such/place.png"), "{}", said.err);
         assert!(said.out.contains("pictures     0") && said.out.contains("NOT COMPLETE"), "{}", said.out);
     }
+}
+
+/// Red, green and blue of a picture.
+struct Pixels {
+    size: [f64; 2],
+    bytes: Vec<u8>,
+}
+
+impl Pixels {
+    fn read(place: &Workplace, name: &str) -> Self {
+        let file = std::fs::File::open(place.path(name)).expect(name);
+        let mut reader = png::Decoder::new(std::io::BufReader::new(file)).read_info().expect("PNG");
+        let mut bytes = vec![0; reader.output_buffer_size().expect("a size")];
+        let info = reader.next_frame(&mut bytes).expect("a picture");
+        Self { size: [info.width, info.height].map(f64::from), bytes }
+    }
+
+    /// Where a camera that looks from `eye` at the origin, upright, sees a place.
+    fn at(&self, eye: [f64; 3], field_of_view_deg: f64, place: [f64; 3]) -> [i32; 3] {
+        let (eye, place) = (Point3::from(eye), Point3::from(place));
+        let ahead = -eye.coords.normalize();
+        let right = ahead.cross(&Vector3::y()).normalize();
+        let (way, up) = (place - eye, right.cross(&ahead));
+        let [across, half] = self.size.map(|side| 0.5 * side);
+        let pixels = half / (0.5 * field_of_view_deg).to_radians().tan() / way.dot(&ahead);
+        let (column, row) = (across + pixels * way.dot(&right), half - pixels * way.dot(&up));
+        let at = 4 * (row as usize * self.size[0] as usize + column as usize);
+        [0, 1, 2].map(|colour| i32::from(self.bytes[at + colour]))
+    }
+}
+
+fn blueness([red, _, blue]: [i32; 3]) -> i32 {
+    blue - red
+}
+
+fn greenness([red, green, _]: [i32; 3]) -> i32 {
+    green - red
+}
+
+/// A virtual run of half a second or more with these arguments; `None`, and said so: there are no pictures here.
+fn run(place: &Workplace, seconds: &str, arguments: &[&str]) -> Option<()> {
+    let usual =
+        ["run", "scene.toml", "--clock", "virtual", "--picture-size", "800x600", "--seconds", seconds];
+    let said = place.run(usual.iter().chain(arguments));
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    (!are_missing(&said)).then_some(())
+}
+
+/// Two centimetres deep in a plane, and four millimetres aside: it sticks.
+const PRESSED: &str = "\
+hand = \"hand.csv\"
+[[finger]]
+start_m = [0.0, 0.05, 0.0]
+[[entity]]
+name = \"floor\"
+shape = { kind = \"plane\", normal = [0.0, 1.0, 0.0], offset_m = 0.0 }
+stiffness_n_per_m = 100.0
+friction = { model = \"coulomb\", mu = 0.5 }
+visual = { colour = [0.3, 0.3, 0.35] }
+[[camera]]
+position_m = [0.0, 0.2, 0.25]
+look_at_m = [0.0, 0.0, 0.0]
+field_of_view_deg = 35.0
+";
+const HAND: &str = "t,f0_x,f0_y,f0_z\n0,0,0.05,0\n0.2,0,-0.02,0\n0.3,0.004,-0.02,0\n1,0.004,-0.02,0\n";
+
+#[test]
+fn a_runs_picture_has_the_friction_circle_and_the_normal_where_the_finger_presses() {
+    let place = Workplace::new();
+    place.write("scene.toml", PRESSED);
+    place.write("hand.csv", HAND);
+    let Some(()) = run(&place, "0.5", &["--snapshot", "0.02:free.png", "--snapshot", "0.4:pressed.png"])
+    else {
+        return;
+    };
+    let at = |pixels: &Pixels, place| blueness(pixels.at([0.0, 0.2, 0.25], 35.0, place));
+    let (free, pressed) = (Pixels::read(&place, "free.png"), Pixels::read(&place, "pressed.png"));
+    // Around the HIP's foot, with the radius mu times depth.
+    for (x, z) in [(1.0, 0.0), (0.0, 1.0), (0.6, 0.8), (0.8, -0.6)] {
+        let rim = |share: f64| [0.004 + share * 0.01 * x, 0.0, share * 0.01 * z];
+        assert!(at(&pressed, rim(1.0)) > 60, "{x} {z}: {}", at(&pressed, rim(1.0)));
+        for share in [0.8, 1.2] {
+            assert!(at(&pressed, rim(share)) < 40, "{x} {z} {share}: {}", at(&pressed, rim(share)));
+        }
+        assert!(at(&free, rim(1.0)) < 40, "nothing is touched: {}", at(&free, rim(1.0)));
+    }
+    // The force leans aside, the normal does not: it stands on the god-object, which is where the finger came in.
+    let (normal, beside) = ([0.0, 0.02, 0.0], [0.003, 0.02, 0.0]);
+    assert!(at(&pressed, normal) > 60 && at(&pressed, beside) < 40, "{}", at(&pressed, normal));
+}
+
+const TABLE: &str = "\
+[[finger]]
+start_m = [0.0, 0.2, 0.0]
+[[entity]]
+name = \"table\"
+shape = { kind = \"box\", size_m = [0.1, 0.02, 0.1] }
+visual = { colour = [0.1, 0.7, 0.1] }
+[[camera]]
+position_m = [0.0, 0.0, 0.5]
+field_of_view_deg = 40.0
+";
+
+#[test]
+fn what_an_order_moved_is_drawn_where_it_is_and_after_a_reset_where_it_began() {
+    let place = Workplace::new();
+    place.write("scene.toml", TABLE);
+    place.write("orders.txt", "at 0.1 move table to 0.12 0.03 0 in 0.2\nat 0.6 reset\n");
+    let shots = [
+        "--snapshot",
+        "0.05:a.png",
+        "--snapshot",
+        "0.2:b.png",
+        "--snapshot",
+        "0.5:c.png",
+        "--snapshot",
+        "1.1:d.png",
+    ];
+    let Some(()) = run(&place, "1.2", &[&["--orders", "orders.txt"], &shots[..]].concat()) else { return };
+    let is_there = |name: &str, place_m| {
+        let seen = greenness(Pixels::read(&place, name).at([0.0, 0.0, 0.5], 40.0, place_m));
+        assert!(!(15..60).contains(&seen), "{name}: {seen}");
+        seen >= 60
+    };
+    let places = [[0.0, 0.0, 0.05], [0.06, 0.015, 0.05], [0.12, 0.03, 0.05]];
+    // Halfway it is in the middle of its way.
+    for (name, at) in [("a.png", 0), ("b.png", 1), ("c.png", 2), ("d.png", 0)] {
+        let seen = is_there(name, places[at]);
+        assert!(seen, "{name}");
+    }
+    assert!(!is_there("c.png", places[0]) && !is_there("d.png", places[2]));
+}
+
+#[test]
+fn pictures_go_on_with_the_scene_that_takes_over() {
+    let place = Workplace::new();
+    place.write("scene.toml", SCENE);
+    place.write("other.toml", TABLE);
+    place.write("orders.txt", "at 0.1 swap other.toml\n");
+    let shots = ["--orders", "orders.txt", "--snapshot", "0.05:a.png", "--snapshot", "0.5:b.png"];
+    let Some(()) = run(&place, "0.6", &shots) else { return };
+    let green =
+        |name: &str| greenness(Pixels::read(&place, name).at([0.0, 0.0, 0.5], 40.0, [0.03, 0.0, 0.05]));
+    assert!(green("a.png") < 15 && green("b.png") > 60, "{} {}", green("a.png"), green("b.png"));
 }

@@ -210,6 +210,15 @@ impl Friction {
         Ok(self)
     }
 
+    /// Radius of the circle that holds the god-object (m), with the normal force over the stiffness as load (m): while a
+    /// contact sticks, it lies within this of the HIP's foot on its tangent plane. `None`: somebody's own law, which may go
+    /// by what it remembers.
+    pub fn circle_m(&self, load_m: f64, stiffness_n_per_m: f64) -> Option<f64> {
+        let query = FrictionQuery { load_m, stiffness_n_per_m, ..FrictionQuery::default() };
+        let is_own = matches!(self, Self::Own(_));
+        (!is_own).then(|| self.held_limit_m(&query, &FrictionMemory::default()))
+    }
+
     /// The models that are given by coefficients alone.
     fn classical(&self) -> Classical {
         match *self {

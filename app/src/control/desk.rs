@@ -8,10 +8,12 @@ use super::order::{FrictionChange, Move, Order, Other, Replacement, Scale, Turn,
 use super::queue::{Dated, OrderReceiver, OrderSender, order_queue};
 use super::words::{self, Words};
 use crate::book::Book;
+use crate::displaced::Displaced;
 use crate::fast_step::FastStep;
 use crate::record::View;
 use crate::rig::{self, Rig};
 use crate::row_queue::{RowReceiver, row_queue_of};
+use crate::shown::Shown;
 use io_driver::device::Extras;
 use io_driver::say::say;
 use nalgebra::Vector3;
@@ -52,6 +54,8 @@ pub struct Means {
     pub book: Book,
     /// Who steps the slow lists of worlds that are still to come; `None`: nobody, they have their turns in ticks.
     pub slow_lists: Option<Sender<SlowList>>,
+    /// Whether what runs is shown to anybody.
+    pub is_shown: bool,
 }
 
 /// A scene that will run once an order has been done.
@@ -60,8 +64,10 @@ pub struct Coming {
     pub rows: RowReceiver,
     /// What it is.
     pub rig: Rig,
-    /// What is to be seen of it.
+    /// What recordings show of it.
     pub view: View,
+    /// What others are shown of it, if there are any.
+    pub shown: Option<Shown>,
 }
 
 /// Whoever takes orders.
@@ -256,7 +262,8 @@ impl Desk {
         let bodies = self.rig.names(&self.means.extras).bodies.len();
         let places = BODIES.checked_div(bodies).map_or(ROWS, |places| places.clamp(2, ROWS));
         let (sender, rows) = row_queue_of(places, bodies);
-        let other = Other { rows: sender, bodies: Vec::with_capacity(bodies), number: 0 };
+        let displaced = Displaced::new(self.rig.scene.entities.len());
+        let other = Other { rows: sender, bodies: Vec::with_capacity(bodies), displaced, number: 0 };
         let mut world = self.world(Some(other)).inspect_err(|_| self.rig = before.clone())?;
         let number = self
             .means
@@ -266,7 +273,8 @@ impl Desk {
             other.number = number;
         }
         let view = View::new(&self.rig.scene, world.step.entities());
-        self.coming.push_back(Coming { rows, rig: self.rig.clone(), view });
+        let shown = self.means.is_shown.then(|| Shown::new(&self.rig, world.step.entities()));
+        self.coming.push_back(Coming { rows, rig: self.rig.clone(), view, shown });
         self.take_note(&world.step);
         Ok(Order::Replace(world))
     }

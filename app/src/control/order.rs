@@ -1,6 +1,7 @@
 //! Orders, as the fast thread gets them: checked, and with all memory that they need.
 
 use super::gradual::Gradual;
+use crate::displaced::Displaced;
 use crate::fast_step::{EventTeller, FastStep};
 use crate::row::BodyRow;
 use crate::row_queue::RowSender;
@@ -98,6 +99,8 @@ pub struct Other {
     pub rows: RowSender,
     /// Room for all of its bodies, by their numbers.
     pub bodies: Vec<(u32, BodyRow)>,
+    /// Room for what else is moved.
+    pub displaced: Displaced,
     /// The how-many-th of the run, the one that it began with being 0.
     pub number: u32,
 }

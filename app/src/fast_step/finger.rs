@@ -6,7 +6,7 @@ use super::Objects;
 use super::near::Near;
 use crate::mount::Mount;
 use crate::row::FingerRow;
-use haptics::{Door, Effects, Entity, Finger, FingerEffects, Hip, Moment, Passage};
+use haptics::{Contact, Door, Effects, Entity, Finger, FingerEffects, FrictionState, Hip, Moment, Passage};
 use nalgebra::Vector3;
 use shm_abi::DeviceFrame;
 use shm_abi::frame::{DEVICE_ORIENTATION_MEASURED, DEVICE_POSITION_VALID};
@@ -82,7 +82,13 @@ impl DeviceFinger {
         };
         let moves = |entity| objects.manipulation().is_body(entity);
         let (output, _) = passage.step(&mut self.finger, (entities, doors), dt_s, moves, step);
+        let touched = output.entity.and_then(|entity| self.finger.contact(entity).zip(entities.get(entity)));
+        let (normal, friction_radius_m) = touched.map_or_else(Default::default, |(contact, entity)| {
+            (contact.normal_W, friction_radius_m(contact, entity, &hip))
+        });
         FingerRow {
+            normal,
+            friction_radius_m,
             god_object: output.god_object_W,
             force_on_user: finite_or_zero(output.force_on_user_W),
             torque_on_user: finite_or_zero(output.torque_on_user_W),
@@ -109,6 +115,21 @@ impl DeviceFinger {
                 felt.reset();
                 Vector3::zeros()
             }
+        }
+    }
+}
+
+/// Of the circle around the HIP's foot on the tangent plane (m): on its rim the god-object slides, within it it is held.
+fn friction_radius_m(contact: &Contact, entity: &Entity, hip_W: &Vector3<f64>) -> f64 {
+    match contact.friction {
+        FrictionState::Stick => {
+            let stiffness_n_per_m = entity.felt_stiffness_n_per_m();
+            let load_m = contact.normal_force_n / stiffness_n_per_m;
+            entity.friction.circle_m(load_m, stiffness_n_per_m).unwrap_or_default()
+        }
+        FrictionState::Slip => {
+            let gap_W = contact.god_object_W - hip_W;
+            (gap_W - contact.normal_W * contact.normal_W.dot(&gap_W)).norm()
         }
     }
 }

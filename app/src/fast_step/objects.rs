@@ -9,12 +9,15 @@
 
 use haptics::{ContactState, Entity, FingerEffects};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use physics::{BroadPhase, FingerSettings, FingerTick, MAX_PULLS, Made, Manipulation, Pull, Touch};
+use physics::{
+    BroadPhase, FingerSettings, FingerTick, MAX_DRIVEN, MAX_PULLS, Made, Manipulation, Pull, Touch,
+};
 use world::events::{FastPairs, pair_link};
 use world::lists::{FastList, Handed, Reach, SlowList};
 
 use super::DeviceFinger;
 use super::ordered::Moved;
+use crate::displaced::Placed;
 use crate::lists_end::ListsEnd;
 use crate::row::{BodyRow, FingerRow};
 use crate::slow_thread::SlowRemains;
@@ -54,6 +57,8 @@ pub struct Objects {
     rows: Vec<BodyRow>,
     /// Those of them that are not as they were a tick before.
     changed: Vec<u32>,
+    /// What else is being moved.
+    placed: Vec<Placed>,
     period_s: f64,
     /// Whether nothing moves by itself while forces fade.
     pub(super) stands_still: bool,
@@ -92,6 +97,7 @@ impl Objects {
         let mut objects = Self {
             rows: vec![BodyRow::default(); bodies],
             changed: (0..bodies as u32).collect(),
+            placed: Vec::with_capacity(MAX_DRIVEN),
             touches: Vec::with_capacity(room),
             pulls: Vec::with_capacity(MAX_PULLS),
             felt_pulls: 0,
@@ -214,8 +220,17 @@ impl Objects {
         self.manipulation.broad_phase()
     }
 
-    /// Takes note of how the bodies are.
-    pub fn note(&mut self) {
+    /// What is no body and is being moved, as the tick began.
+    pub fn placed(&self) -> &[Placed] {
+        &self.placed
+    }
+
+    /// Takes note of how the bodies are, and of where others stand that are moved.
+    pub fn note(&mut self, entities: &[Entity]) {
+        self.placed.clear();
+        let manipulation = &self.manipulation;
+        let others = manipulation.driven().filter(|entity| !manipulation.is_body(*entity));
+        self.placed.extend(others.map(|entity| (entity as u32, entities[entity].X_WB)));
         self.changed.clear();
         self.changed.extend_from_slice(self.manipulation.changed());
         self.manipulation.forget_changes();

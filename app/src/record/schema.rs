@@ -67,6 +67,8 @@ pub(super) mod finger {
     pub(in crate::record) const CONTROLLED: u32 = 13;
     pub(in crate::record) const ATTACHED: u32 = 14;
     pub(in crate::record) const SPACE: u32 = 15;
+    pub(in crate::record) const NORMAL: u32 = 16;
+    pub(in crate::record) const FRICTION_RADIUS: u32 = 17;
 }
 
 /// Fields of `phantom3.Object`.
@@ -126,6 +128,8 @@ pub(super) fn descriptors(names: &Names) -> Vec<u8> {
             (finger::CONTROLLED, "controlled", Double),
             (finger::ATTACHED, "attached", Text),
             (finger::SPACE, "space", Text),
+            (finger::NORMAL, "normal", vector),
+            (finger::FRICTION_RADIUS, "friction_radius", Double),
         ],
     );
     let object = MessageType::new(

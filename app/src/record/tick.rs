@@ -54,6 +54,10 @@ fn write_finger(out: &mut Message, row: &FingerRow, index: usize, names: &Names)
     if names.spaces.is_some() {
         out.text(finger::SPACE, names.space(row.space));
     }
+    if row.normal != Vector3::zeros() {
+        foxglove::vector(out, finger::NORMAL, &row.normal);
+        out.double(finger::FRICTION_RADIUS, row.friction_radius_m);
+    }
 }
 
 fn write_body(out: &mut Message, body: &BodyRow, names: &Names) {
@@ -124,6 +128,8 @@ fn read_finger(message: &[u8], index: usize, names: &Names) -> Option<FingerRow>
             finger::CONTROLLED => row.controlled_n = value.double()?,
             finger::ATTACHED => row.attached = Some(entity(value)?),
             finger::SPACE => row.space = space(value)?,
+            finger::NORMAL => row.normal = vector(value)?,
+            finger::FRICTION_RADIUS => row.friction_radius_m = value.double()?,
             // Of a later version.
             _ => {}
         }
@@ -229,6 +235,7 @@ mod tests {
         let b = &mut row.fingers[1];
         (b.orientation_wxyz, b.has_orientation) = ([0.5, -0.5, 0.5, -0.0], true);
         (b.buttons, b.attached, b.space) = (u64::MAX, Some(1), 2);
+        (b.normal, b.friction_radius_m) = (Vector3::new(0.6, 0.0, -0.8), 1e-3);
         let bodies = [BodyRow {
             position: number(7),
             orientation: Quaternion::new(0.5, -0.5, 0.5, 0.5),

@@ -1,13 +1,14 @@
 //! What a recording shows in three dimensions: the scene once, fingers and objects as they move.
 //!
 //! Model: every entity is drawn once in a frame of its own; that of an entity which moves is told anew many times a
-//! second. Fingers are a ball at the HIP, a ball at the god-object and an arrow for the force on the user.
+//! second. Fingers are a ball at the HIP, a ball at the god-object and an arrow for the force on the user; where they touch,
+//! an arrow along the normal and the friction circle.
 //! Boxes, balls, cylinders and what is made of them are drawn exactly, everything else in triangles up to a limit.
 
 use super::foxglove::{Rgba, WORLD, arrow, cube, cylinder, frame_in_world, scene_entity, sphere, triangles};
 use super::wire::Message;
 use crate::columns::Names;
-use crate::row::{BodyRow, Row};
+use crate::row::{BodyRow, FingerRow, Row};
 use haptics::{Entity, Shape};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
@@ -27,13 +28,16 @@ const MOVING: Rgba = [0.85, 0.65, 0.35, 1.0];
 const HIP: Rgba = [0.3, 0.8, 0.3, 0.5];
 const GOD: Rgba = [0.9, 0.2, 0.2, 1.0];
 const FORCE: Rgba = [0.9, 0.2, 0.2, 0.8];
+const CIRCLE: Rgba = [0.15, 0.3, 0.9, 0.5];
+/// So long is a contact's normal (m).
+const NORMAL_M: f64 = 0.03;
 
 /// What is drawn.
 #[derive(Debug, Clone, Default)]
 pub struct View {
     /// A `foxglove.SceneUpdate` of all entities.
     pub(super) scene: Vec<u8>,
-    /// Radius of each finger (m).
+    /// Radius of each finger (m); 0 for a point.
     radii_m: Vec<f64>,
 }
 
@@ -50,7 +54,7 @@ impl View {
                 draw(out, &spec.shape, Some(entity), &pose, rgba);
             });
         }
-        let radii_m = scene.fingers.iter().map(|finger| finger.radius_m.max(POINT_RADIUS_M)).collect();
+        let radii_m = scene.fingers.iter().map(|finger| finger.radius_m).collect();
         Self { scene: out.bytes().to_vec(), radii_m }
     }
 
@@ -79,10 +83,13 @@ impl View {
         for ((finger, name), radius_m) in row.fingers.iter().zip(&names.fingers).zip(&self.radii_m) {
             scene_entity(out, time_ns, WORLD, &format!("finger/{name}"), |out| {
                 let at = |p: Vector3<f64>| Isometry3::translation(p.x, p.y, p.z);
-                let ball = Vector3::repeat(2.0 * radius_m);
+                let ball = Vector3::repeat(2.0 * radius_m.max(POINT_RADIUS_M));
                 sphere(out, &at(finger.hip), ball, HIP);
                 if finger.entity.is_some() {
                     sphere(out, &at(finger.god_object), 0.9 * ball, GOD);
+                }
+                if finger.normal != Vector3::zeros() {
+                    touched(out, finger, *radius_m);
                 }
                 let length = METRES_PER_NEWTON * finger.force_on_user;
                 if length.norm() > 0.0 {
@@ -90,6 +97,18 @@ impl View {
                 }
             });
         }
+    }
+}
+
+/// What the surface is like where a finger of this radius touches it: the normal, and the friction circle in the tangent plane.
+fn touched(out: &mut Message, finger: &FingerRow, radius_m: f64) {
+    let FingerRow { normal, god_object, hip, friction_radius_m, .. } = finger;
+    arrow(out, god_object, &(NORMAL_M * normal), 0.0006, CIRCLE);
+    if *friction_radius_m > 0.0 {
+        let up = UnitQuaternion::rotation_between(&Vector3::y(), normal)
+            .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.5 * TAU));
+        let foot = hip + normal * (normal.dot(&(god_object - hip)) - radius_m);
+        cylinder(out, &Isometry3::from_parts(foot.into(), up), [*friction_radius_m; 2], 2e-4, CIRCLE);
     }
 }
 

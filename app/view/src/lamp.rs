@@ -6,7 +6,7 @@
 
 use three_d::{
     Camera, ClearState, Context, CubeMapSide, DepthMaterial, DepthTextureCubeMap, Geometry, Light, LightId,
-    Mesh, Program, RenderStates, Srgba, Vec3, Viewport, Wrapping, WriteMask, degrees,
+    Program, RenderStates, Srgba, Vec3, Viewport, Wrapping, WriteMask, degrees,
 };
 
 /// Of each of the six pictures, along each side.
@@ -59,8 +59,8 @@ impl Lamp {
     }
 
     /// These cast shadows.
-    pub(crate) fn cast(&mut self, casting: &[&Mesh]) {
-        let reach = |mesh: &&Mesh| mesh.aabb().distance_max(self.place);
+    pub(crate) fn cast(&mut self, casting: &[&dyn Geometry]) {
+        let reach = |mesh: &&dyn Geometry| mesh.aabb().distance_max(self.place);
         self.farthest = casting.iter().map(reach).fold(0.0, f32::max);
         self.nearest = NEAREST * self.farthest;
         self.is_shading = self.farthest > 0.0;

@@ -11,6 +11,7 @@
 #![deny(missing_docs)]
 
 pub mod camera_man;
+mod crowd;
 pub mod eyes;
 pub mod hand;
 pub mod input;

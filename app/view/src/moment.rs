@@ -29,6 +29,8 @@ pub struct FingerMoment {
     pub entity: Option<usize>,
     /// What the touched surface is like there; `None`: nothing of it is drawn.
     pub contact: Option<ContactMoment>,
+    /// Which space it is in: 0 the world, otherwise behind a door.
+    pub space: u32,
 }
 
 /// Where a finger touches a surface; world frame.
@@ -43,6 +45,11 @@ pub struct ContactMoment {
 }
 
 impl Moment {
+    /// Which space is seen: that of the first finger that went in somewhere, otherwise the world.
+    pub fn seen_space(&self) -> u32 {
+        self.fingers.iter().map(|finger| finger.space).find(|space| *space != 0).unwrap_or(0)
+    }
+
     /// Between this moment (`share` 0) and a later one (1).
     #[must_use]
     pub fn towards(&self, later: &Self, share: f64) -> Self {
@@ -55,6 +62,7 @@ impl Moment {
             force: between(&a.force, &b.force),
             entity: b.entity,
             contact: b.contact,
+            space: b.space,
         };
         Self {
             t_s: self.t_s + share * (later.t_s - self.t_s),

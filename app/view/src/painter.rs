@@ -1,5 +1,6 @@
 //! Draws a moment of a stage.
 
+use crate::crowd::Crowd;
 use crate::eyes::{Eyes, Look};
 use crate::lamp::Lamp;
 use crate::moment::Moment;
@@ -7,11 +8,9 @@ use crate::overlay::Overlay;
 use crate::stage::{Stage, Thing};
 use crate::triangles::Triangles;
 use nalgebra::{Isometry3, UnitQuaternion};
-use std::collections::BTreeMap;
-use std::sync::Arc;
 use three_d::{
-    AmbientLight, ClearState, Context, CpuMaterial, CpuMesh, DirectionalLight, Gm, Indices, Light, Mat4,
-    Mesh, Object, PhysicalMaterial, Positions, RenderTarget, Srgba, Viewport, WriteMask, vec3,
+    AmbientLight, ClearState, Context, CpuMaterial, CpuMesh, DirectionalLight, Indices, Light, Mat4,
+    PhysicalMaterial, Positions, RenderTarget, Srgba, Viewport, WriteMask, vec3,
 };
 use world::{LightKind, SceneCamera, SceneLight};
 
@@ -32,7 +31,9 @@ const CHOSEN_SHARE: f64 = 0.6;
 /// What draws: everything of a stage that lies in the graphics memory.
 pub struct Painter {
     context: Context,
-    things: Vec<Drawn>,
+    things: Crowd,
+    /// Whether the lights' shadows are those of where things are now.
+    is_cast: bool,
     /// The sum of what all lights shed everywhere: shaders take one.
     everywhere: AmbientLight,
     lights: Vec<Shining>,
@@ -47,11 +48,8 @@ pub struct Painter {
     pub chosen: Option<usize>,
     /// How the sun is turned from where the scene has it.
     pub sun: UnitQuaternion<f64>,
-}
-
-struct Drawn {
-    thing: Thing,
-    model: Gm<Mesh, PhysicalMaterial>,
+    /// How it was when shadows were cast.
+    cast_sun: UnitQuaternion<f64>,
 }
 
 enum Shining {
@@ -62,16 +60,10 @@ enum Shining {
 impl Painter {
     /// Brings a stage into a context.
     pub fn new(context: &Context, stage: &Stage) -> Self {
-        let mut meshes = BTreeMap::new();
-        let things = stage.things.iter().map(|thing| {
-            let made =
-                meshes.entry(Arc::as_ptr(&thing.triangles)).or_insert_with(|| mesh_of(&thing.triangles));
-            let model = Gm::new(Mesh::new(context, made), material(context, thing.colour));
-            Drawn { thing: thing.clone(), model }
-        });
         Self {
             context: context.clone(),
-            things: things.collect(),
+            things: Crowd::new(context, stage),
+            is_cast: false,
             everywhere: AmbientLight::new(context, 1.0, colour_of(everywhere(&stage.lights))),
             lights: stage.lights.iter().filter_map(|light| shining(context, light)).collect(),
             overlay: Overlay::new(context, &stage.radii_m),
@@ -80,6 +72,7 @@ impl Painter {
             with_shadows: true,
             chosen: None,
             sun: UnitQuaternion::identity(),
+            cast_sun: UnitQuaternion::identity(),
         }
     }
 
@@ -109,39 +102,18 @@ impl Painter {
     }
 
     fn place(&mut self, moment: &Moment) {
-        for drawn in &mut self.things {
-            let pose = moment.poses.get(drawn.thing.entity).copied().unwrap_or_default();
-            drawn.model.set_transformation(matrix(&(pose * drawn.thing.pose)));
-            let entity = drawn.thing.entity;
-            let is_touched = moment.fingers.iter().any(|finger| finger.entity == Some(entity));
-            let collides = moment.colliding.binary_search(&entity).is_ok();
-            let mut colour = drawn.thing.colour;
-            if self.chosen == Some(entity) {
-                colour = mixed(colour, CHOSEN, CHOSEN_SHARE);
-            }
-            if self.with_overlay && self.with_highlight {
-                if collides {
-                    colour = mixed(colour, COLLIDING, COLLIDING_SHARE);
-                }
-                if is_touched {
-                    colour = mixed(colour, TOUCHED, TOUCHED_SHARE);
-                }
-            }
-            drawn.model.material.albedo = bytes(colour);
-        }
+        let space = moment.seen_space();
+        let marks = Marks { contacts: self.with_overlay && self.with_highlight, chosen: self.chosen };
+        let is_moved = self.things.place(|thing| look_of(thing, moment, space, &marks));
+        self.is_cast &= !is_moved;
         self.overlay.place(moment);
     }
 
     fn draw_look(&mut self, look: &Look, target: &RenderTarget<'_>, part: Viewport) {
-        self.things.iter_mut().for_each(|drawn| mask(&mut drawn.model.material, look.channels));
+        self.things.mask(look.channels);
         let own = self.lights.iter().map(Shining::light);
         let lights: Vec<&dyn Light> = [&self.everywhere as &dyn Light].into_iter().chain(own).collect();
-        target.render_partially(
-            part.into(),
-            &look.eye,
-            self.things.iter().map(|drawn| &drawn.model as &dyn Object),
-            &lights,
-        );
+        target.render_partially(part.into(), &look.eye, self.things.objects(), &lights);
         // What things hide first: what is not hidden would hide it.
         for is_hidden in [true, false].into_iter().filter(|_| self.with_overlay) {
             self.overlay.show(look.channels, is_hidden);
@@ -149,20 +121,24 @@ impl Painter {
         }
     }
 
+    /// While nothing moves, shadows stay.
     fn cast_shadows(&mut self) {
-        let (things, with_shadows) = (&self.things, self.with_shadows);
-        let casting = things.iter().filter(|drawn| drawn.thing.casts_shadow);
-        let casting: Vec<&Mesh> = casting.map(|drawn| &drawn.model.geometry).collect();
+        if self.is_cast && self.with_shadows && self.cast_sun == self.sun {
+            return;
+        }
+        (self.is_cast, self.cast_sun) = (self.with_shadows, self.sun);
+        let casting = self.things.casting();
         for light in &mut self.lights {
             match light {
                 Shining::Sun { light, direction, casts_shadow } => {
                     light.direction = vector(&(self.sun * *direction));
-                    let is_cast = with_shadows && *casts_shadow;
-                    if !is_cast || light.generate_shadow_map(SHADOW_SIDE, casting.iter()).is_err() {
+                    let is_cast = self.with_shadows && *casts_shadow && !casting.is_empty();
+                    let casting = casting.iter().copied();
+                    if !is_cast || light.generate_shadow_map(SHADOW_SIDE, casting).is_err() {
                         light.clear_shadow_map();
                     }
                 }
-                Shining::Lamp { light, casts_shadow: true } if with_shadows => light.cast(&casting),
+                Shining::Lamp { light, casts_shadow: true } if self.with_shadows => light.cast(&casting),
                 Shining::Lamp { light, .. } => light.cast_none(),
             }
         }
@@ -172,6 +148,36 @@ impl Painter {
     pub fn context(&self) -> &Context {
         &self.context
     }
+}
+
+/// What is marked by colours.
+struct Marks {
+    /// What is touched, and what collides.
+    contacts: bool,
+    chosen: Option<usize>,
+}
+
+/// Where a thing is and which colour it has there; `None`: it is in another space than is seen.
+fn look_of(thing: &Thing, moment: &Moment, space: u32, marks: &Marks) -> Option<(Mat4, [f64; 4])> {
+    if thing.space != space {
+        return None;
+    }
+    let pose = moment.poses.get(thing.entity).copied().unwrap_or_default();
+    Some((matrix(&(pose * thing.pose)), marked(thing, moment, marks)))
+}
+
+fn marked(thing: &Thing, moment: &Moment, marks: &Marks) -> [f64; 4] {
+    let mut colour = thing.colour;
+    if marks.chosen == Some(thing.entity) {
+        colour = mixed(colour, CHOSEN, CHOSEN_SHARE);
+    }
+    if marks.contacts && moment.colliding.binary_search(&thing.entity).is_ok() {
+        colour = mixed(colour, COLLIDING, COLLIDING_SHARE);
+    }
+    if marks.contacts && moment.fingers.iter().any(|finger| finger.entity == Some(thing.entity)) {
+        colour = mixed(colour, TOUCHED, TOUCHED_SHARE);
+    }
+    colour
 }
 
 impl Shining {
@@ -223,7 +229,7 @@ fn mixed([r, g, b, opacity]: [f64; 4], mark: [f64; 3], share: f64) -> [f64; 4] {
     [mixed(r, mark[0]), mixed(g, mark[1]), mixed(b, mark[2]), opacity]
 }
 
-fn bytes(colour: [f64; 4]) -> Srgba {
+pub(crate) fn bytes(colour: [f64; 4]) -> Srgba {
     colour.map(|share| (255.0 * share).round() as u8).into()
 }
 

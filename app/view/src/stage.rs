@@ -59,7 +59,12 @@ pub struct Thing {
     pub colour: [f64; 4],
     /// Whether light does not go through.
     pub casts_shadow: bool,
+    /// Which space it is in: 0 the world, otherwise behind a door.
+    pub space: u32,
 }
+
+/// What is left of the opacity of walls behind a door, so that eyes outside see in.
+const WALL_OPACITY: f64 = 0.25;
 
 impl Stage {
     /// Of a scene whose entities, as they are felt, are these, in the same order.
@@ -76,17 +81,20 @@ impl Stage {
         let told = seen.unreadable.iter().map(|(at, why)| format!("{at}: {why}"));
         stage.not_drawn.extend(told);
         let mut looks = Looks::default();
-        // What is behind a door is for eyes that went in, and cameras do not.
-        for part in seen.parts.iter().filter(|part| part.entity.within.is_none()) {
+        for part in &seen.parts {
             let index = scene.entities.iter().position(|spec| std::ptr::eq(spec, part.entity)).unwrap_or(0);
-            let felt = entities.get(index).map(|entity| &entity.shape);
-            match looks.of(part, felt) {
+            let felt = entities.get(index);
+            let space = felt.map_or(0, |entity| entity.space);
+            let is_clear = space != 0 && is_wall(scene, &part.entity.name);
+            let [r, g, b, opacity] = part.colour;
+            match looks.of(part, felt.map(|entity| &entity.shape)) {
                 Some(triangles) => stage.things.push(Thing {
                     entity: index,
                     triangles,
                     pose: part.X_BV,
-                    colour: part.colour,
-                    casts_shadow: part.casts_shadow,
+                    colour: [r, g, b, if is_clear { WALL_OPACITY * opacity } else { opacity }],
+                    casts_shadow: part.casts_shadow && !is_clear,
+                    space,
                 }),
                 None => stage
                     .not_drawn
@@ -122,6 +130,11 @@ impl Known {
             friction: entity.friction.clone(),
         }
     }
+}
+
+/// Whether an entity is part of an environment itself.
+fn is_wall(scene: &Scene, name: &String) -> bool {
+    scene.environments.iter().any(|environment| environment.parts.contains(name))
 }
 
 /// The triangles made so far: what looks alike shares them.

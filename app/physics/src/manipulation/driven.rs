@@ -43,6 +43,11 @@ impl Manipulation {
         goes
     }
 
+    /// The entities that go somewhere, or came there in the last tick.
+    pub fn driven(&self) -> impl Iterator<Item = usize> {
+        self.driven.iter().map(|driven| driven.entity)
+    }
+
     /// A tick in which nothing else moves.
     pub fn step_driven(&mut self, entities: &mut [Entity]) {
         self.advance_driven(entities);
