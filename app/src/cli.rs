@@ -160,7 +160,7 @@ fn play(args: &PlayArgs, settings: &Settings, is_headless: bool) -> Result<(Repo
     let signals = install_signals()?;
     let rig = args.rig(settings)?;
     let mut plan = args.plan(settings);
-    plan.window = window_spec(&rig.scene.name, settings);
+    plan.window = window_spec(&rig.scene.name, settings)?;
     if plan.window.is_none() {
         return Err(NoWindow::NoDisplay.into());
     }

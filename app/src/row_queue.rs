@@ -119,11 +119,6 @@ impl RowReceiver {
         Some(self.rows.peek().ok()?.0.run_tick)
     }
 
-    /// All bodies, as they were in the row that was received last.
-    pub fn bodies(&self) -> &[BodyRow] {
-        &self.of_row
-    }
-
     /// The next row and all bodies, if one waits.
     pub fn receive(&mut self) -> Option<(Row, &[BodyRow])> {
         let (row, [bodies, others]) = self.rows.pop().ok()?;

@@ -16,8 +16,8 @@ use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 
 /// From thumb to fingers, open and closed (m).
-pub const OPEN_M: f64 = 0.075;
-pub const CLOSED_M: f64 = 0.014;
+pub(crate) const OPEN_M: f64 = 0.075;
+pub(crate) const CLOSED_M: f64 = 0.014;
 /// How fast that changes (m/s).
 const PACE_M_PER_S: f64 = 0.08;
 /// Between the two that oppose the thumb (m).
