@@ -5,7 +5,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use haptics::mesh::make;
-use haptics::{Cuboid, Cylinder, Plane, Shape, Sphere};
+use haptics::{Cuboid, Cylinder, Plane, Shape, Sphere, Torus};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use physics::collide::{ContactPoints, PairMemory, Solid, contact_points};
 
@@ -84,6 +84,17 @@ fn benches(c: &mut Criterion) {
     let cylinder: Shape = Cylinder::new(0.02, 0.05).unwrap().into();
     rest(c, "cylinder on mesh/flat of 80k", (&cylinder, at(0.0123, 0.0249, straight)), &flat);
     rest(c, "mesh on mesh/cube of 49k on flat of 80k", (&cuboid(6, straight), at(0.0, low, straight)), &flat);
+
+    let ring: Shape = Torus::new(0.025, 0.01).unwrap().into();
+    let upright = UnitQuaternion::from_scaled_axis(Vector3::new(1.5, 0.2, 0.1));
+    let block: Shape = Cuboid::new([0.1; 3]).unwrap().into();
+    for (name, cube) in
+        [("box", block), ("cube of 12", cuboid(0, straight)), ("cube of 49k", cuboid(6, straight))]
+    {
+        let (lies, deep) = (at(0.0123, 0.06 - 1e-4, straight), at(0.045, 0.055, upright));
+        rest(c, &format!("ring/on {name}"), (&ring, lies), &cube);
+        rest(c, &format!("ring/30 mm deep in {name}"), (&ring, deep), &cube);
+    }
 
     moving(c, "moving/cube of 49k on plane", (&cuboid(6, straight), at(0.0, low, straight)), &floor);
     moving(c, "moving/ball of 100k on plane", (&balls[0], at(0.0, low, lying)), &floor);

@@ -5,7 +5,8 @@
 //! Who finds them, by the kinds of the two:
 //! - convex forms with each other: `convex_pair`, along the direction in which they touch (`axis`, `follow`, `gjk`), what
 //!   flat pieces (`overlay`) and lines (`lines`) share; on planes the same with the plane's normal;
-//! - balls on anything that tells its nearest point: `ball`; rings, as a ball that is swept along a circle: `ring`;
+//! - balls on anything that tells its nearest point: `ball`; rings, as a ball that is swept along a circle: `ring`, and where
+//!   they are deep, all along it: `ring_deep`;
 //! - meshes with anything: `mesh`.
 //!
 //! Who cannot meet says [`is_collidable`]: trees of shapes with nothing, NURBS and surfaces of one's own with balls only, a
@@ -13,11 +14,11 @@
 //!
 //! Frames and signs: W; normals leave B and point to A; gaps are negative where they overlap. Of points nearer to each other
 //! than a millimetre the later ones count with a part of their depth.
-//! Invariants: no allocation; at most [`MAX_POINTS`] points, of two forms eight; an id stands for the same features from tick to tick; finite for
+//! Invariants: no allocation; at most [`MAX_POINTS`] points, of two forms eight, unless one is a ring; an id stands for the same features from tick to tick; finite for
 //! every pose; along a continuous way the forces of springs on the points are continuous, save where the way out that a
 //! body came by ends (a rim that is deeper in a tip than that is round).
 //! Cost: mostly below 1 us a pair while the direction of the last tick can be followed, a few where a ring has edges beside
-//! it; bounded searches of up to some tens where it cannot. `cargo bench -p physics --bench collide -- table`.
+//! it; bounded searches of up to some tens where it cannot, or where a ring is deep. `cargo bench -p physics --bench collide -- table`.
 
 use haptics::{Form, Shape};
 use nalgebra::{Isometry3, Vector3};
@@ -41,6 +42,7 @@ mod mesh_other;
 mod mesh_own;
 mod mesh_patch;
 mod mesh_plane;
+mod mesh_ring;
 mod mesh_role;
 mod mesh_search;
 mod mesh_see;
@@ -50,6 +52,7 @@ mod mesh_span;
 mod overlay;
 mod rim;
 mod ring;
+mod ring_deep;
 mod spots;
 
 pub use bounds::bounding_ball;

@@ -16,7 +16,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use super::mesh_ball::{self, Ball};
 use super::mesh_other::{Other, Solidity};
 use super::{ContactPoint, ContactPoints, PairMemory, Solid};
-use super::{mesh_plane, mesh_solid};
+use super::{mesh_plane, mesh_ring, mesh_solid};
 
 /// Where A and B touch, at least one of them being a mesh.
 pub(super) fn contact_points(
@@ -28,11 +28,11 @@ pub(super) fn contact_points(
 ) {
     match (a.shape, b.shape) {
         (Shape::Mesh(mesh), other) => {
-            let told = Told { X_WM: a.X_W, mesh_is_a: true, found };
+            let told = Told { X_WM: a.X_W, mesh_is_a: true, part: 1.0, found };
             against(mesh, other, b.X_W, reach_m, memory, told);
         }
         (other, Shape::Mesh(mesh)) => {
-            let told = Told { X_WM: b.X_W, mesh_is_a: false, found };
+            let told = Told { X_WM: b.X_W, mesh_is_a: false, part: 1.0, found };
             against(mesh, other, a.X_W, reach_m, memory, told);
         }
         _ => {}
@@ -76,6 +76,10 @@ fn against(
             let ball = Ball { centre_M: X_MO.translation.vector, radius_m: sphere.radius_m() };
             mesh_ball::contact_points(mesh, &ball, reach_m, memory, &mut told);
         }
+        Shape::Form(form @ Form::Torus(torus)) => {
+            let other = Other { solid: Solidity::Form(form), X_MO };
+            mesh_ring::contact_points(mesh, torus, &other, reach_m, memory, &mut told);
+        }
         Shape::Form(form) => {
             let other = Other { solid: Solidity::Form(form), X_MO };
             mesh_solid::contact_points(mesh, &other, reach_m, memory, &mut told);
@@ -94,6 +98,8 @@ pub(super) struct Told<'t> {
     pub(super) X_WM: &'t Isometry3<f64>,
     /// Or B.
     pub(super) mesh_is_a: bool,
+    /// Of their depths so much counts.
+    pub(super) part: f64,
     pub(super) found: &'t mut ContactPoints,
 }
 
@@ -135,6 +141,8 @@ impl Told<'_> {
         let Contact { id, on_mesh_M, on_other_M, normal_M, gap_m, share, .. } = *contact;
         let (point_M, sign) = if self.mesh_is_a { (on_mesh_M, -1.0) } else { (on_other_M, 1.0) };
         let point_W = (self.X_WM * Point3::from(point_M)).coords;
+        let (gap_m, share) =
+            if gap_m < 0.0 { (gap_m * self.part, share * self.part) } else { (gap_m, share) };
         self.found.push(ContactPoint { id, point_W, normal_W: self.X_WM * normal_M * sign, gap_m, share });
     }
 }

@@ -44,6 +44,29 @@ impl Corner {
         is_closed
     }
 
+    /// Whether an edge that sticks out leaves it: what is flat or hollow around touches no other mesh before the edges and
+    /// corners of that do.
+    pub(super) fn sticks_out(self, mesh: &Mesh) -> bool {
+        let mut fan = Fan::new(mesh, self.0 / 3, (self.0 % 3) as usize);
+        let mut is_closed = false;
+        while let Some((number, corner)) = fan.next() {
+            let face = &mesh.faces()[number as usize];
+            let link = face.links[corner];
+            if link.is_boundary() || link.is_turned() {
+                return true;
+            }
+            let ends = [corner, (corner + 1) % 3].map(|end| mesh.vertices()[face.vertices[end] as usize]);
+            let edge = ends[1] - ends[0];
+            let bend = face.normal_B.cross(&mesh.faces()[link.face() as usize].normal_B).dot(&edge);
+            let bend = if mesh.sides() == Sides::Sheet { bend.abs() } else { bend };
+            if bend > FLAT * edge.norm() {
+                return true;
+            }
+            is_closed = link.face() == fan.first;
+        }
+        !is_closed
+    }
+
     /// Whether any face around it looks that way.
     pub(super) fn looks(self, mesh: &Mesh, way_M: &Vector3<f64>) -> bool {
         let mut fan = Fan::new(mesh, self.0 / 3, (self.0 % 3) as usize);

@@ -149,6 +149,14 @@ impl Other<'_> {
         }
     }
 
+    /// Whether a vertex of its own [sticks out](Corner::sticks_out); forms' points do.
+    pub(super) fn sticks_out(&self, own: &Own) -> bool {
+        match (self.solid, own.corner) {
+            (Solidity::Mesh(mesh), Some(corner)) => corner.sticks_out(mesh),
+            _ => true,
+        }
+    }
+
     /// A point that no other one of it passes in this direction; of a mesh, about where they meet.
     pub(super) fn front(&self, way_M: &Vector3<f64>, meeting: &Meeting) -> Vector3<f64> {
         match self.solid {

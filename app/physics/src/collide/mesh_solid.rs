@@ -7,7 +7,9 @@
 //! gap, which are exact; the plane chooses only. It is that of the last tick's contact points; where there were none, it is
 //! found by going to and fro between the two. In a hole or around a corner there are several planes
 //! ([`mesh_patch`](super::mesh_patch)), each with its points ([`mesh_search`](super::mesh_search) finds them).
-//! A vertex in the middle of a flat face presses nothing that the other one's corners do not: it is left out.
+//! A vertex in the middle of a flat face presses nothing that the other one's corners do not: it is left out. Of two meshes so
+//! is one that no edge sticks out at, be it the one's or the other's: a floor's vertex below the slanted side of a prism
+//! would be as deep as it is far from the edge that stands there, and come and go with micrometres.
 //! Frames: the mesh's frame M; normals from the mesh to the other one.
 //! Of all that is found, what [carries](super::mesh_carry) counts.
 //! Limits: six places a pair. Crossings are found of a box's edges, of the lines along which cylinders, cones and capsules
@@ -139,7 +141,12 @@ impl Place<'_> {
         let limits = self.limits(mesh, &limits);
         let Meeting { reach_m, travel_m, .. } = meeting;
         let chosen = Standing { mesh, height, limits, reach_m, travel_m }.choose(stands);
-        for corner in chosen.into_iter().flatten().filter(|corner| !corner.is_in_a_plane(mesh)) {
+        let is_mesh = matches!(other.solid, Solidity::Mesh(_));
+        let counts = |corner: &Corner| match is_mesh {
+            true => corner.sticks_out(mesh),
+            false => !corner.is_in_a_plane(mesh),
+        };
+        for corner in chosen.into_iter().flatten().filter(counts) {
             let on_mesh_M = *corner.point_M(mesh);
             let seen = self.of_vertex(&on_mesh_M);
             if !self.patches.are_several() || corner.looks(mesh, &-seen.out) {
@@ -227,6 +234,9 @@ impl Place<'_> {
         let owns = other.owns(&meeting, limits, stands);
         let far_m = meeting.reach_m + FAR * meeting.depth_m;
         for own in owns.into_iter().flatten() {
+            if !other.sticks_out(&own) {
+                continue;
+            }
             // Far from all faces it is outside, or so deep inside that it does not matter where others press.
             if mesh.clearance(&own.at_M, own.radius_m + far_m) >= own.radius_m + far_m {
                 continue;

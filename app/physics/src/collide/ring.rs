@@ -3,7 +3,7 @@
 //! Model: it touches wherever the ball's gap is smallest along the ring, at up to [`SLOTS`] places. Lying flat on a plate it
 //! does so all around: on each plate the ring is laid as a rim, four points of it and where it crosses the plate's edges.
 //! Where it has a single deepest place on something round (a ball in its hole, another ring), three more points a quarter
-//! apart stand for the rest of the ring.
+//! apart stand for the rest of the ring. From [`DEEP`] on all of it presses that is in there ([`ring_deep`](super::ring_deep)).
 //! Frames: that of the other form, B, which the ring meets as A.
 //! Memory: word 0 the angle at which the ring's points begin, 1 to 4 the angles of the places found last.
 
@@ -16,6 +16,7 @@ use super::PairMemory;
 use super::ball::{self, Touch};
 use super::convex::Convex;
 use super::facet::{Facet, Outline, Plate};
+use super::ring_deep::DeepRing;
 use super::spots::{Spot, Spots};
 
 /// Places that are told apart on something that is not flat.
@@ -28,6 +29,9 @@ const ROUNDS: usize = 24;
 const FLAT: f64 = 1e-4;
 const QUARTER_IDS: u32 = 8;
 const CROSSING_IDS: u32 = 64;
+const NODE_IDS: u32 = 128;
+/// From and to which shares of the tube's radius all of the ring takes over from its deepest places.
+const DEEP: [f64; 2] = [0.2, 0.4];
 /// Halvings until a crossing is found.
 const HALVINGS: usize = 40;
 /// A ball's normal along that of a plate is told from one across an edge by this cosine.
@@ -49,14 +53,65 @@ pub(super) fn contact(
 ) -> Spots {
     let ring = Ring { X_BA, torus, other };
     let plates = Plates::of(other);
+    let places = if matches!(other, Form::Plane(_)) { Places::default() } else { ring.places(&plates) };
     let mut spots = Spots::within(reach_m, torus.tube_radius_m());
-    for (number, plate) in plates.as_slice().iter().enumerate() {
-        ring.lie_on(plate, number as u32, &mut memory.words[0], reach_m, &mut spots);
+    let all = DeepRing::new(X_BA, torus, DEEP);
+    let part = all.part(places.depth_m);
+    if part < 1.0 {
+        for (number, plate) in plates.as_slice().iter().enumerate() {
+            ring.lie_on(plate, number as u32, &mut memory.words[0], reach_m, &mut spots);
+        }
+        ring.touch_at(places, plates.count > 0, &mut memory.words, &mut spots);
+        spots.fade(1.0 - part);
     }
-    if !matches!(other, Form::Plane(_)) {
-        ring.touches(&plates, &mut memory.words, &mut spots);
+    if part > 0.0 {
+        let tube_m = torus.tube_radius_m();
+        let nodes = all.press(part, |at| ball::gap_m(other, at, tube_m) + tube_m);
+        for (node, part) in nodes.into_iter().flatten() {
+            spots.push_part(Spot { id: NODE_IDS + node.id, ..node }, part);
+        }
     }
     spots
+}
+
+/// Where the gap is smallest along the ring.
+#[derive(Default)]
+struct Places {
+    /// Gaps and angles of those that are on nothing flat.
+    all: [Option<(f64, f64)>; SLOTS],
+    count: usize,
+    /// All of the ring is about as deep.
+    is_flat: bool,
+    /// How deep the deepest is, on anything \[m\].
+    depth_m: f64,
+}
+
+impl Places {
+    /// Adds one; without room, in the place of the least deep one.
+    fn add(&mut self, gap_m: f64, angle: f64) {
+        self.count += 1;
+        let gap_at = |place: &Option<(f64, f64)>| place.map_or(f64::INFINITY, |place| place.0);
+        let least = self.all.iter_mut().max_by(|a, b| gap_at(a).total_cmp(&gap_at(b)));
+        if let Some(least) = least.filter(|least| gap_m < gap_at(least)) {
+            *least = Some((gap_m, angle));
+        }
+    }
+
+    fn deepest(&self) -> Option<(f64, f64)> {
+        self.all.iter().flatten().copied().min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// The angle of the one that is nearest to where one was known.
+    fn take_nearest(&mut self, known: f64) -> Option<f64> {
+        let apart = |place: &Option<(f64, f64)>| {
+            place.map_or(f64::INFINITY, |(_, angle)| {
+                let turn = (angle - known).rem_euclid(TAU);
+                turn.min(TAU - turn)
+            })
+        };
+        let nearest = self.all.iter_mut().min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
+        nearest.take().map(|(_, angle)| angle)
+    }
 }
 
 /// The flat pieces of a form.
@@ -180,16 +235,19 @@ impl Ring<'_> {
         }
     }
 
-    /// Places where the gap is smallest, on all that is not flat; and the quarters.
-    fn touches(&self, plates: &Plates, words: &mut [f64; 8], spots: &mut Spots) {
+    /// Places where the gap is smallest.
+    fn places(&self, plates: &Plates) -> Places {
         let step = TAU / PIECES as f64;
         let mut gaps_m = [0.0; PIECES];
         for (piece, gap_m) in gaps_m.iter_mut().enumerate() {
             *gap_m = ball::gap_m(self.other, &self.middle(step * piece as f64), self.torus.tube_radius_m());
         }
-        let has_plates = plates.count > 0;
-        let mut places = [(f64::INFINITY, 0.0); SLOTS];
-        let mut count = 0;
+        let [least_m, most_m] =
+            gaps_m.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], &gap_m| {
+                [gap_m.min(least), gap_m.max(most)]
+            });
+        let is_flat = most_m - least_m < FLAT * self.torus.ring_radius_m();
+        let mut places = Places { is_flat, depth_m: -least_m, ..Places::default() };
         for piece in 0..PIECES {
             let (before, after) = (gaps_m[(piece + PIECES - 1) % PIECES], gaps_m[(piece + 1) % PIECES]);
             if gaps_m[piece] >= before || gaps_m[piece] > after {
@@ -197,46 +255,29 @@ impl Ring<'_> {
             }
             let angle = self.bottom(step * (piece as f64 - 1.0), step * (piece as f64 + 1.0));
             let touch = self.touch(angle);
-            if plates.hold(&touch.normal) {
-                continue;
-            }
-            count += 1;
-            let deepest = places.iter_mut().max_by(|a, b| a.0.total_cmp(&b.0));
-            if let Some(place) = deepest.filter(|place| touch.gap_m < place.0) {
-                *place = (touch.gap_m, angle);
+            places.depth_m = places.depth_m.max(-touch.gap_m);
+            if !plates.hold(&touch.normal) {
+                places.add(touch.gap_m, angle);
             }
         }
-        let rise = gaps_m.iter().copied().fold(f64::NEG_INFINITY, f64::max)
-            - gaps_m.iter().copied().fold(f64::INFINITY, f64::min);
-        let is_flat = rise < FLAT * self.torus.ring_radius_m();
-        if !has_plates && (is_flat || count == 1) {
-            let first = places.iter().min_by(|a, b| a.0.total_cmp(&b.0)).map_or(0.0, |place| place.1);
-            if !is_flat {
-                words[0] = first;
+        places
+    }
+
+    /// Touches at places, and at the quarters.
+    fn touch_at(&self, mut places: Places, has_plates: bool, words: &mut [f64; 8], spots: &mut Spots) {
+        if !has_plates && (places.is_flat || places.count == 1) {
+            if let (false, Some((_, angle))) = (places.is_flat, places.deepest()) {
+                words[0] = angle;
             }
             for quarter in 0..4_u32 {
                 self.push(QUARTER_IDS + quarter, words[0] + f64::from(quarter) * FRAC_PI_2, spots);
             }
             return;
         }
-        self.keep_places(&mut places, words, spots);
-    }
-
-    /// Gives each place the number under which it was known.
-    fn keep_places(&self, places: &mut [(f64, f64); SLOTS], words: &mut [f64; 8], spots: &mut Spots) {
-        let apart = |a: f64, b: f64| {
-            let turn = (a - b).rem_euclid(TAU);
-            turn.min(TAU - turn)
-        };
         for slot in 0..SLOTS {
-            let known = words[1 + slot];
-            let nearest = (slot..SLOTS)
-                .filter(|&at| places[at].0.is_finite())
-                .min_by(|&i, &j| apart(places[i].1, known).total_cmp(&apart(places[j].1, known)));
-            let Some(nearest) = nearest else { break };
-            places.swap(slot, nearest);
-            words[1 + slot] = places[slot].1;
-            self.push(slot as u32, places[slot].1, spots);
+            let Some(angle) = places.take_nearest(words[1 + slot]) else { break };
+            words[1 + slot] = angle;
+            self.push(slot as u32, angle, spots);
         }
     }
 

@@ -32,8 +32,8 @@ pub(super) struct Spots {
     pub(super) fade_m: f64,
 }
 
-/// Room while they are found.
-const MAX_SPOTS: usize = 24;
+/// Room while they are found: of a ring its places, and those that take over.
+const MAX_SPOTS: usize = 32;
 /// Points nearer to each other than this share their depth \[m\]; of small forms, than a share of their size.
 const FADE_M: f64 = 1e-3;
 const FADE: f64 = 0.1;
@@ -74,6 +74,21 @@ impl Spots {
         self.all[self.count] = spot;
         self.depths_m[self.count] = counts_m;
         self.count += 1;
+    }
+
+    /// Adds one that counts with this part of its depth, whatever is next to it.
+    pub(super) fn push_part(&mut self, spot: Spot, part: f64) {
+        let counts_m = -spot.gap_m * part;
+        if self.count < MAX_SPOTS && counts_m > 0.0 && counts_m.is_finite() {
+            self.all[self.count] = spot;
+            self.depths_m[self.count] = counts_m;
+            self.count += 1;
+        }
+    }
+
+    /// All of those so far count with this part of what they do.
+    pub(super) fn fade(&mut self, part: f64) {
+        self.depths_m[..self.count].iter_mut().for_each(|depth_m| *depth_m *= part);
     }
 
     pub(super) fn as_slice(&self) -> &[Spot] {
