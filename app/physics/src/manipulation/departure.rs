@@ -96,6 +96,7 @@ impl Manipulation {
             body,
             is_asleep,
             rested_s: self.roster.rested_s[at],
+            owed_j: self.roster.owed_j[at],
             state: self.roster.bodies[at],
             previous_X_WB: entities[self.roster.entities[at]].previous_X_WB,
         }))
