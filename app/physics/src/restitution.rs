@@ -60,7 +60,8 @@ impl Restitution {
     ) -> Solved {
         let Self { meetings, impacts, stops, bounce, cascade } = self;
         cascade.begin();
-        (impacts.clear(), stops.clear());
+        impacts.clear();
+        stops.clear();
         if meetings.is_empty() {
             return solver.solve(rows, motions, dt_s);
         }

@@ -122,7 +122,8 @@ impl Cascade {
         self.motions.push(motions[body]);
         self.motions.extend(other.map(|other| motions[other]));
         self.rows.clear();
-        (self.impacts.clear(), self.stops.clear());
+        self.impacts.clear();
+        self.stops.clear();
         for meeting in
             meetings.iter().filter(|meeting| is_of(&rows[meeting.row], body, other)).take(MAX_POINTS)
         {
