@@ -45,8 +45,8 @@ use crate::sleep::Sets;
 use crate::solver::{Motion, Solved, Solver};
 use crate::touch::Touch;
 
-/// All bodies, and what they remember of where they touch.
-#[derive(Debug, Clone)]
+/// All bodies, and what they remember of where they touch. There is no copy of one: it would not have its room.
+#[derive(Debug)]
 pub struct Manipulation {
     settings: Settings,
     roster: Roster,
@@ -161,7 +161,7 @@ impl Manipulation {
         };
         for body in 0..count {
             let who = who(&made.roster, entities, settings.response);
-            made.pairs.meet(body, &who, &made.broad_phase);
+            made.pairs.meet(body, &who, &made.broad_phase, true);
         }
         made
     }
@@ -247,8 +247,8 @@ impl Manipulation {
             }
         }
         self.hand.settle(&self.rows, &self.motions, &self.roster, fingers, dt_s);
-        self.settle_pairs(entities, dt_s);
         self.sum_up();
+        self.settle_pairs(entities, dt_s);
         let (awake, parked) = (self.roster.awake().len(), self.advance(entities, dt_s));
         self.advance_driven(entities);
         self.keep_up(entities, dt_s);

@@ -83,11 +83,18 @@ pub(crate) struct End<'t> {
 }
 
 impl Pair {
-    /// Begins one that has not touched yet, in the place of one that has ended. What nobody reads of that stays.
-    pub(crate) fn begin(&mut self, entities: [usize; 2], has_mesh: bool, surfacing: Surfacing) {
+    /// Begins one that has not touched yet, in the place of one that has ended. What nobody reads of that stays. What they hold
+    /// where they are is theirs if somebody has put one of them there.
+    pub(crate) fn begin(
+        &mut self,
+        entities: [usize; 2],
+        has_mesh: bool,
+        surfacing: Surfacing,
+        was_put: bool,
+    ) {
         self.forget(has_mesh);
         (self.entities, self.surfacing, self.has_mesh) = (entities, surfacing, has_mesh);
-        (self.bodies, self.is_new) = ((0, None), true);
+        (self.bodies, self.is_new) = ((0, None), was_put);
     }
 
     fn forget(&mut self, has_mesh: bool) {
@@ -120,6 +127,8 @@ impl Pair {
         let reach_m = REACH_M + speed_m_s * start.dt_s;
         if !is_near(a, b, reach_m) {
             self.pass_by();
+            // Somebody has looked: whoever is found deep from now on was not placed there.
+            self.is_new = false;
             return false;
         }
         self.remembers = true;
@@ -176,7 +185,6 @@ impl Pair {
         if begins && self.ledger.is_closed() && self.is_new {
             self.ledger = Ledger::of(full_j);
         }
-        self.ledger.begin(self.bodies, start);
         self.ledger.cut(full_j, is_let_out);
         let springs = &springs[..2 * points.len().min(MAX_POINTS)];
         let allowed = self.ledger.allow(springs, k, is_let_out);
@@ -191,8 +199,9 @@ impl Pair {
         }
     }
 
-    /// Somebody has put one of them where it is: what they hold there is theirs.
+    /// Somebody has put one of them where it is: what they held is gone, what they hold there is theirs.
     pub(crate) fn was_put(&mut self) {
+        self.pass_by();
         self.is_new = true;
     }
 
@@ -219,9 +228,17 @@ impl Pair {
         }
     }
 
-    /// Takes note of how the tick ended, and of which rows met in it after it had begun. `spare_j`: of each body what the tick itself took from it (J);
-    /// a pair that can use it takes it.
+    /// Pays what a body owes out of what its springs hold; says what is left of that (J).
+    pub(crate) fn pay(&mut self, owed_j: f64) -> f64 {
+        self.ledger.pay(owed_j)
+    }
+
+    /// Takes note of how the tick ended, and of which rows met in it after it had begun. `spare_j`: of each body what the tick itself
+    /// took from it (J), negative: what it owes; a pair that can use it takes it.
     pub(crate) fn settle(&mut self, end: &End<'_>, has_met: impl Fn(usize) -> bool, spare_j: &mut [f64]) {
+        if self.rows == 0 {
+            return;
+        }
         let X_WB = &end.entities[self.entities[1]].X_WB;
         let own = end.rows.iter().enumerate().skip(self.first_row).take(self.rows);
         let mut presses = false;
@@ -243,15 +260,27 @@ impl Pair {
                 Response::Impulse { .. } if is_spring => {
                     row.force_W - row.normal_W * row.normal_W.dot(&row.force_W)
                 }
-                Response::Impulse { .. } => continue,
+                Response::Impulse { .. } => Vector3::zeros(),
             };
             presses |= force_W != Vector3::zeros();
-            self.ledger.enter(row, &force_W, end.motions, end.dt_s);
+            self.ledger.enter(force_W.dot(&velocity_W) * end.dt_s);
+            // What impulses put in the tick has not taken.
+            let put_in_j = (row.force_W - force_W).dot(&velocity_W) * end.dt_s;
+            let spare_j = &mut spare_j[row.body];
+            *spare_j = spare_j.min((*spare_j - put_in_j.max(0.0)).max(0.0));
         }
+        let moves = |body: &usize| end.motions[*body].is_movable();
+        let bodies = || [Some(self.bodies.0), self.bodies.1].into_iter().flatten().filter(moves);
         if presses && self.ledger.owes() {
-            for body in [Some(self.bodies.0), self.bodies.1].into_iter().flatten() {
-                self.ledger.refund(std::mem::take(&mut spare_j[body]));
+            for body in bodies() {
+                let refunded_j = spare_j[body].max(0.0);
+                spare_j[body] -= refunded_j;
+                self.ledger.refund(refunded_j);
             }
+        }
+        let debt_j = self.ledger.take_debt();
+        if let Some(body) = bodies().next() {
+            spare_j[body] -= debt_j;
         }
     }
 

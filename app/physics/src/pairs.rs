@@ -119,8 +119,8 @@ impl Pairs {
         self.awake.iter().chain(&self.asleep).map(|key| (*key, &self.pool[key.place as usize]))
     }
 
-    /// Begins and ends pairs of a body whose box has changed.
-    pub(crate) fn follow(&mut self, body: usize, who: &Who<'_>, broad_phase: &BroadPhase) {
+    /// Begins and ends pairs of a body whose box has changed. Whether somebody has put it where it is, or what it meets there.
+    pub(crate) fn follow(&mut self, body: usize, who: &Who<'_>, broad_phase: &BroadPhase, was_put: bool) {
         let own = who.entities[body];
         let overlap = |key: &Key| {
             let boxes = [who.entities[key.body as usize], key.entity as usize]
@@ -136,13 +136,13 @@ impl Pairs {
             }
             stays
         });
-        self.meet(body, who, broad_phase);
+        self.meet(body, who, broad_phase, was_put);
     }
 
     /// Begins the pairs of a body that are missing.
-    pub(crate) fn meet(&mut self, body: usize, who: &Who<'_>, broad_phase: &BroadPhase) {
+    pub(crate) fn meet(&mut self, body: usize, who: &Who<'_>, broad_phase: &BroadPhase, was_put: bool) {
         if let Some(around) = broad_phase.around(who.entities[body]) {
-            broad_phase.near(around, |entity| self.begin(body, entity, who));
+            broad_phase.near(around, |entity| self.begin(body, entity, who, was_put));
         }
     }
 
@@ -151,7 +151,7 @@ impl Pairs {
         self.unused.extend(self.awake.drain(..).chain(self.asleep.drain(..)).map(|key| key.place));
     }
 
-    fn begin(&mut self, body: usize, entity: usize, who: &Who<'_>) {
+    fn begin(&mut self, body: usize, entity: usize, who: &Who<'_>, was_put: bool) {
         let own = who.entities[body];
         let other = who.bodies[entity].map(|other| other as usize);
         let (one, two) = (&who.all[own], &who.all[entity]);
@@ -178,7 +178,7 @@ impl Pairs {
         let both = entities.map(|entity| &who.all[entity]);
         let surfacing = Surfacing::between(both[0], both[1], who.response);
         let has_mesh = both.iter().any(|entity| matches!(entity.shape, Shape::Mesh(_)));
-        self.pool[place as usize].begin(entities, has_mesh, surfacing);
+        self.pool[place as usize].begin(entities, has_mesh, surfacing, was_put);
         self.awake.insert(place_in_order, Key::new([first as u32, second as u32], true, place));
     }
 
@@ -194,7 +194,7 @@ impl Pairs {
             }
             !is_woken
         });
-        self.follow(body, who, broad_phase);
+        self.follow(body, who, broad_phase, true);
     }
 
     /// Puts those aside of which no body is awake any more.

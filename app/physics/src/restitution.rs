@@ -19,7 +19,7 @@ use nalgebra::Vector3;
 
 use crate::row::Row;
 use crate::solver::{Motion, Solved, Solver};
-use bounce::Bounce;
+use bounce::{Bounce, Impulses};
 use cascade::Cascade;
 pub(crate) use meeting::Meeting;
 
@@ -29,6 +29,7 @@ pub(crate) struct Restitution {
     /// Rows whose answer is an impulse.
     pub(crate) meetings: Vec<Meeting>,
     impacts: Vec<usize>,
+    stops: Vec<usize>,
     bounce: Bounce,
     cascade: Cascade,
 }
@@ -38,6 +39,7 @@ impl Restitution {
         Self {
             meetings: Vec::with_capacity(rows),
             impacts: Vec::with_capacity(rows),
+            stops: Vec::with_capacity(rows),
             bounce: Bounce::with_capacity(rows, bodies),
             cascade: Cascade::with_capacity(rows),
         }
@@ -56,9 +58,10 @@ impl Restitution {
         motions: &mut [Motion],
         (gravity_W, dt_s): (&Vector3<f64>, f64),
     ) -> Solved {
-        let Self { meetings, impacts, bounce, cascade } = self;
+        let Self { meetings, impacts, stops, bounce, cascade } = self;
         cascade.begin();
         impacts.clear();
+        stops.clear();
         if meetings.is_empty() {
             return solver.solve(rows, motions, dt_s);
         }
@@ -70,10 +73,13 @@ impl Restitution {
             if let (false, Some(leaves_m_s)) = (meeting.is_among_many, meeting.leaves_m_s(dt_s)) {
                 meeting.reflect(row, leaves_m_s, dt_s);
                 impacts.push(meeting.row);
+            } else {
+                stops.push(meeting.row);
             }
         }
         cascade.run(meetings, rows, motions, dt_s);
-        let solved = bounce.solve(solver, rows, impacts, motions, (&(gravity_W * dt_s), dt_s));
+        let solved =
+            bounce.solve(solver, rows, Impulses { impacts, stops }, motions, (&(gravity_W * dt_s), dt_s));
         cascade.add_to(rows, dt_s);
         solved
     }

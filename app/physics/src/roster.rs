@@ -45,6 +45,8 @@ pub(crate) struct Roster {
     next: Box<[usize]>,
     /// For how long each has rested (s).
     pub(crate) rested_s: Box<[f64]>,
+    /// What each has got that nobody has paid for (J).
+    pub(crate) owed_j: Box<[f64]>,
 }
 
 impl Roster {
@@ -64,6 +66,7 @@ impl Roster {
             places: (0..count).collect(),
             next: (0..count).collect(),
             rested_s: vec![0.0; count].into(),
+            owed_j: vec![0.0; count].into(),
         }
     }
 

@@ -363,3 +363,41 @@ fn ties_and_turning_rows_are_what_the_motion_that_they_leave_asks_of_them() {
     // Grams between ties that pull each their way: found 1, which has forces that ties can have, but not those sought.
     assert!(lost <= 3, "{lost}");
 }
+
+#[test]
+fn what_a_tie_pulls_with_falls_evenly_to_nothing_in_the_time_it_fades_in() {
+    let attachment = Attachment { fade_s: 0.04, ..Attachment::default() };
+    let mut tied = Tied::new(0.1, 1000.0, attachment);
+    let hip = top(2e-3);
+    tied.stay(0.1, hip, true);
+    let up = hip + Vector3::y() * 0.05;
+    tied.go(0.5, hip, up);
+    tied.stay(1.0, up, true);
+    // Without what the finger feels of the face that it is in.
+    let carries = tied.world.ticks[0].force_on_user_W;
+    assert!(carries.y < -0.5 * tied.weight(), "{carries}");
+    for tick in 1..=45 {
+        tied.step(up, false);
+        let force = tied.world.ticks[0].force_on_user_W;
+        // While it sinks the tie asks for more than it may: the first tick still has all but a fortieth.
+        let left = carries.norm() * (1.0 - f64::from(tick) / 40.0).max(0.0);
+        assert!((force.norm() - left).abs() < 1e-3 * tied.weight(), "tick {tick}: {force} for {left}");
+    }
+}
+
+#[test]
+fn the_torque_by_which_a_tie_holds_an_orientation_is_felt_as_the_weight_beside_it() {
+    let attachment = Attachment { orientation: HeldOrientation::Locked, ..Attachment::default() };
+    let mut tied = Tied::new(0.1, 1000.0, attachment);
+    let beside = Vector3::new(0.01, 0.0, 0.005);
+    let hip = top(2e-3) + beside;
+    tied.stay(0.1, hip, true);
+    let up = hip + Vector3::y() * 0.05;
+    tied.go(0.5, hip, up);
+    tied.stay(2.0, up, true);
+    // The centre hangs at -x and -z of the finger: what the tie gives the cube against that, the user gets the other way round.
+    let arm = tied.world.body().centre_W - up;
+    let expected = arm.cross(&(Vector3::y() * -tied.weight()));
+    let felt = tied.world.ticks[0].torque_on_user_W;
+    assert!((felt - expected).norm() < 1e-3 * expected.norm(), "{felt} {expected}");
+}

@@ -346,6 +346,27 @@ fn islands_that_are_too_large_are_found_body_by_body_and_it_is_told_when_they_ar
     assert!((weighs - 80.0 * 1e-3 * G).abs() < 1e-8, "{weighs}");
 }
 
+/// 70 cubes whose springs and dampers are a hundred times softer: in turns, forces go from one to the next without much of an echo.
+#[test]
+fn turns_over_the_bodies_of_a_large_island_end_at_what_all_of_its_equations_ask_for() {
+    let (start, mut rows) = stack(70, 0.0);
+    for row in &mut rows {
+        // From the lowest on, all is pressed unevenly at first.
+        (row.stiffness, row.damping) = ([50.0; 2], [0.01; 2]);
+        row.rest_W += Vector3::new(1e-4, 2e-3 * (row.body % 3) as f64, 0.0);
+    }
+    let mut motions = start.clone();
+    let solved = Solver::with_capacity(512, 70).solve(&mut rows, &mut motions, DT);
+    assert!(solved.unsolved == 0 && solved.sweeps > 3, "{solved:?}");
+    for row in &rows {
+        let own = motions[row.body].at(&row.arms_W[0]);
+        let moves = row.other.map_or(own, |other| own - motions[other].at(&row.arms_W[1]));
+        let asked = row.project(&row.trial_W(&(moves * DT), &moves));
+        // Forces that change by less than 1e-9 of the largest, over some turns.
+        assert!((row.force_W - asked).norm() < 1e-7, "{} {asked}", row.force_W);
+    }
+}
+
 #[test]
 fn an_island_comes_out_the_same_whatever_else_there_is() {
     for seed in 0..300 {

@@ -4,7 +4,7 @@
 mod common;
 
 use common::*;
-use haptics::{Cuboid, Sphere};
+use haptics::{Cuboid, Friction, Sphere};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use physics::Settings;
 
@@ -135,4 +135,41 @@ fn a_cube_holds_just_below_the_friction_angle_and_slides_just_above_as_coulomb_s
     let a = (world.body().velocity_W - v).norm() / 0.3;
     let expected = G * (lean.sin() - mu * lean.cos());
     assert!((a - expected).abs() < 1e-6 * expected, "{a} {expected}");
+}
+
+#[test]
+fn what_slides_does_so_with_the_lower_ratio_until_it_stands() {
+    let (hold, slide) = (0.6_f64, 0.3_f64);
+    // On a slope of this tangent, going down at this speed (m/s).
+    let slides = |tangent: f64, speed: f64| {
+        let lean = tangent.atan();
+        let mut world = cube_on(lean, hold);
+        for entity in &mut world.entities {
+            entity.friction = Friction::stiction(hold, slide).unwrap();
+        }
+        let down = Vector3::new(-lean.cos(), -lean.sin(), 0.0);
+        let state = world.manipulation.bodies()[0].moving(down * speed, Vector3::zeros());
+        (World::new(world.entities, &[(1, state)], Settings::default(), 0), down)
+    };
+    let speed_after = |world: &mut World, down: &Vector3<f64>, ticks: usize| {
+        (0..ticks).for_each(|_| drop(world.step(&[])));
+        world.body().velocity_W.dot(down)
+    };
+    // Between both it goes on.
+    for tangent in [0.4_f64, 0.55] {
+        let lean = tangent.atan();
+        let (mut world, down) = slides(tangent, 0.3);
+        let early = speed_after(&mut world, &down, 300);
+        let late = speed_after(&mut world, &down, 300);
+        let expected = G * (lean.sin() - slide * lean.cos());
+        assert!(((late - early) / 0.3 / expected - 1.0).abs() < 1e-5, "{tangent}: {early} {late} {expected}");
+    }
+    // Below both it comes to a stop as it should, and stays.
+    let lean = 0.2_f64.atan();
+    let (mut world, down) = slides(0.2, 0.5);
+    let brakes = G * (slide * lean.cos() - lean.sin());
+    let early = speed_after(&mut world, &down, 100);
+    let late = speed_after(&mut world, &down, 200);
+    assert!(((early - late) / 0.2 / brakes - 1.0).abs() < 1e-5, "{early} {late} {brakes}");
+    assert!(speed_after(&mut world, &down, 2000).abs() < 1e-6, "{:?}", world.body());
 }

@@ -151,3 +151,31 @@ fn what_begins_to_move_ever_so_slowly_does_not_sleep() {
     // g t^2 / 2, and half a tick's rounding of it.
     assert!((world.body().centre_W.y + 0.5e-5 * 9.0).abs() < 1e-9);
 }
+
+#[test]
+fn what_turns_does_not_sleep_and_what_sleeps_does_not_move_at_all() {
+    // 1e-4 rad/s, ten times the threshold, in the middle of nowhere.
+    let mut world = balls(0.0);
+    let mut bodies: Vec<_> = world.manipulation.bodies().iter().copied().enumerate().collect();
+    bodies[0].1 = bodies[0].1.moving(Vector3::zeros(), Vector3::new(0.0, 1e-4, 0.0));
+    // Slower than that: it falls asleep, and is still.
+    bodies[1].1 = bodies[1].1.moving(Vector3::x() * 5e-7, Vector3::new(0.0, 5e-6, 0.0));
+    let settings =
+        Settings { gravity_W: Vector3::zeros(), sleep: Some(Sleep::default()), ..Settings::default() };
+    world = World::new(world.entities, &bodies, settings, 1);
+    (0..2000).for_each(|_| drop(world.step(&[AWAY])));
+    assert_eq!(world.manipulation.awake(), [0]);
+    let sleeper = world.manipulation.bodies()[1];
+    assert_eq!((sleeper.velocity_W, sleeper.angular_momentum_W), (Vector3::zeros(), Vector3::zeros()));
+}
+
+#[test]
+fn what_a_finger_touches_does_not_sleep_under_it() {
+    let mut world = stack(1, Some(Sleep::default()));
+    (0..2000).for_each(|_| drop(world.step(&[Vector3::new(0.0, SIZE, 0.0)])));
+    let top = world.entities[1].X_WB.translation.vector.y + 0.5 * SIZE;
+    for _ in 0..3000 {
+        world.step(&[Vector3::new(0.0, top - 1e-5, 0.0)]);
+        assert_eq!(world.manipulation.standing(0), Standing::Awake);
+    }
+}

@@ -59,7 +59,7 @@ impl Manipulation {
         // What moved in the last tick drags friction along in this one.
         entities[self.roster.entities[body]].previous_X_WB = leaver.previous_X_WB;
         self.roster.set(body, Standing::Coming);
-        self.roster.rested_s[body] = leaver.rested_s;
+        (self.roster.rested_s[body], self.roster.owed_j[body]) = (leaver.rested_s, leaver.owed_j);
         let will_be = if leaver.is_asleep { Standing::Asleep } else { Standing::Awake };
         self.arrival.bodies.push((leaver.body, will_be));
     }
@@ -80,7 +80,7 @@ impl Manipulation {
         pairs.let_in(keys, |body| roster.standing(body) == Standing::Awake, &who);
         for &(body, standing) in &*bodies {
             if standing == Standing::Awake {
-                pairs.meet(body as usize, &who, broad_phase);
+                pairs.meet(body as usize, &who, broad_phase, true);
             }
             arrived(body as usize);
         }

@@ -96,6 +96,7 @@ impl Manipulation {
             body,
             is_asleep,
             rested_s: self.roster.rested_s[at],
+            owed_j: self.roster.owed_j[at],
             state: self.roster.bodies[at],
             previous_X_WB: entities[self.roster.entities[at]].previous_X_WB,
         }))
@@ -129,5 +130,34 @@ impl Manipulation {
             }
         }
         None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use haptics::{Entity, Sphere};
+    use nalgebra::Isometry3;
+
+    use super::Manipulation;
+    use crate::body::Body;
+    use crate::mass::MassProperties;
+    use crate::settings::Settings;
+
+    #[test]
+    fn what_a_body_owes_goes_along() {
+        let ball = Entity::new(Sphere::new(0.02).unwrap(), Isometry3::identity(), 1000.0).unwrap();
+        let state = Body::at_rest(MassProperties::of_shape(&ball.shape, 0.1).unwrap(), &ball.X_WB);
+        let mut entities = vec![ball];
+        let new =
+            |entities: &[Entity]| Manipulation::new(entities, &[(0, state)], Settings::default()).unwrap();
+        let (mut here, mut there) = (new(&entities), new(&entities));
+        there.give_away(0, &entities);
+        here.roster.owed_j[0] = 0.5;
+        here.release(&[0], &entities);
+        while let Some(parcel) = here.next_parcel(&entities) {
+            there.accept(&parcel, &mut entities, |_| ());
+        }
+        assert_eq!((here.owed_j(), there.owed_j()), (0.0, 0.5));
+        assert_eq!(there.elastic_energy_j(), -0.5);
     }
 }

@@ -100,7 +100,7 @@ impl Manipulation {
             if self.broad_phase.moved(entity, &entities[entity], &(way_W * TICKS_AHEAD))
                 && let Some(around) = self.broad_phase.around(entity).copied()
             {
-                self.greet(&around, entities);
+                self.greet(&around, entities, false);
             }
         }
         self.driven.retain(|driven| {

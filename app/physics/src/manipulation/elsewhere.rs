@@ -50,8 +50,10 @@ impl Manipulation {
         self.stand(body, state, entities, ahead_s);
     }
 
-    /// Takes note that an entity which is no body was moved by somebody: who rests on it wakes.
+    /// Takes note that an entity which is no body was moved by somebody: who rests on it wakes. Wherever it was driven to, it is
+    /// not on its way any more.
     pub fn was_moved(&mut self, entity: usize, entities: &[Entity]) {
+        self.driven.retain(|driven| driven.entity != entity);
         self.broad_phase.moved(entity, &entities[entity], &Vector3::zeros());
         self.pairs.was_put(entity);
         let Some(around) = self.broad_phase.around(entity).copied() else { return };
@@ -61,7 +63,7 @@ impl Manipulation {
         for at in 0..self.neighbours.len() {
             self.wake(self.neighbours[at] as usize, entities);
         }
-        self.greet(&around, entities);
+        self.greet(&around, entities, true);
     }
 
     /// Puts a body that is not stepped here; who is awake where it has come to looks for it.
@@ -73,12 +75,12 @@ impl Manipulation {
         if self.broad_phase.moved(entity, &entities[entity], &(state.velocity_W * ahead_s))
             && let Some(around) = self.broad_phase.around(entity).copied()
         {
-            self.greet(&around, entities);
+            self.greet(&around, entities, true);
         }
     }
 
-    /// Whoever is awake near a box looks for pairs.
-    pub(super) fn greet(&mut self, around: &Aabb, entities: &[Entity]) {
+    /// Whoever is awake near a box looks for pairs; whether somebody has put there what is in it.
+    pub(super) fn greet(&mut self, around: &Aabb, entities: &[Entity], was_put: bool) {
         self.neighbours.clear();
         let (neighbours, numbers) = (&mut self.neighbours, &self.roster.numbers);
         self.broad_phase.near(around, |near| neighbours.extend(numbers[near]));
@@ -86,7 +88,7 @@ impl Manipulation {
             let body = self.neighbours[at] as usize;
             if self.roster.standing(body) == Standing::Awake {
                 let who = who(&self.roster, entities, self.settings.response);
-                self.pairs.follow(body, &who, &self.broad_phase);
+                self.pairs.follow(body, &who, &self.broad_phase, was_put);
             }
         }
     }

@@ -4,10 +4,11 @@ use haptics::Entity;
 use nalgebra::Vector3;
 
 use super::Manipulation;
+use crate::body::Body;
 use crate::integrator::explicit;
 use crate::integrator::{Gets, Integrator};
 use crate::pair::{End, Response};
-use crate::solver::Solved;
+use crate::solver::{Motion, Solved};
 
 impl Manipulation {
     /// What all contact points do in the tick; says how well they were found.
@@ -47,17 +48,22 @@ impl Manipulation {
         solved
     }
 
-    /// Tells the pairs how the tick ended, and what its being finite took from the bodies: with the velocity of its end for all of
-    /// it, half of the mass times the velocity's change squared.
+    /// Tells the pairs how the tick ended, and what its being finite took from the bodies; what it gave them they owe.
     pub(super) fn settle_pairs(&mut self, entities: &[Entity], dt_s: f64) {
+        let states = self.bodies.iter().zip(&self.motions).zip(&self.gets);
         self.spare_j.clear();
-        self.spare_j.extend(self.bodies.iter().zip(&self.motions).map(|(body, motion)| {
-            0.5 * body.mass.mass_kg * (motion.velocity_W - body.velocity_W).norm_squared()
-        }));
+        self.spare_j.extend(states.map(|((body, motion), gets)| taken_j(body, motion, gets, dt_s)));
+        for (spare_j, &body) in self.spare_j.iter_mut().zip(self.roster.awake()) {
+            *spare_j -= self.roster.owed_j[body];
+        }
         let end = End { rows: &self.rows, motions: &self.motions, entities, dt_s };
         for at in 0..self.pairs.awake_count() {
             let has_met = |row| self.restitution.has_met(row);
             self.pairs.awake_at(at).1.settle(&end, has_met, &mut self.spare_j);
+        }
+        for place in 0..self.roster.awake().len() {
+            let body = self.roster.awake()[place];
+            self.roster.owed_j[body] = (-self.spare_j[place]).max(0.0);
         }
     }
 
@@ -76,4 +82,18 @@ impl Manipulation {
             }
         }
     }
+}
+
+/// What a tick took from a body (J), negative: what it gave: the work on it as the rows see it, with the velocities that they were
+/// solved for, less what its energy grew by.
+fn taken_j(body: &Body, motion: &Motion, gets: &Gets, dt_s: f64) -> f64 {
+    if gets.is_fixed {
+        return 0.0;
+    }
+    let along_j = 0.5 * body.mass.mass_kg * (motion.velocity_W - body.velocity_W).norm_squared();
+    let turned_W = gets.wrench.torque_W * dt_s;
+    // Momentum grows at once, under axes that stand still.
+    let mean_W = motion.inverse_inertia_W * (body.angular_momentum_W + turned_W * 0.5);
+    let taken_j = along_j + turned_W.dot(&(motion.angular_velocity_W - mean_W));
+    if taken_j.is_finite() { taken_j } else { 0.0 }
 }

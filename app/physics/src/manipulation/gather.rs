@@ -87,6 +87,11 @@ impl Manipulation {
                 None => self.lean_on(key.body as usize),
             };
             let (_, pair) = self.pairs.awake_at(at);
+            for place in [Some(first), other].into_iter().flatten() {
+                if let Some(&body) = self.roster.awake().get(place) {
+                    self.roster.owed_j[body] = pair.pay(self.roster.owed_j[body]);
+                }
+            }
             let start = Start {
                 entities,
                 bodies: &self.bodies,

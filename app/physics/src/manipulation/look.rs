@@ -92,14 +92,19 @@ impl Manipulation {
         self.roster.awake()
     }
 
-    /// What the springs between entities hold after the last tick \[J\]; with the bodies' kinetic energy and gravity's it never
-    /// grows while no finger presses.
+    /// What the springs between entities hold after the last tick, less what bodies [owe](Self::owed_j) \[J\]; with the bodies'
+    /// kinetic energy and gravity's it never grows while no finger presses.
     pub fn elastic_energy_j(&self) -> f64 {
-        self.pairs.iter().map(|(_, pair)| pair.elastic_energy_j()).sum()
+        self.pairs.iter().map(|(_, pair)| pair.elastic_energy_j()).sum::<f64>() - self.owed_j()
     }
 
-    /// Of each pair of entities what its springs may press with in the next tick \[J\], which is nothing where that is negative; and
-    /// its rows of the last tick.
+    /// What the bodies that are stepped here have got by turning in finite steps, and have not paid back yet \[J\].
+    pub fn owed_j(&self) -> f64 {
+        let is_here = |body: &usize| !self.roster.standing(*body).is_away();
+        (0..self.roster.bodies.len()).filter(is_here).map(|body| self.roster.owed_j[body]).sum()
+    }
+
+    /// Of each pair of entities what its springs may press with in the next tick \[J\], and its rows of the last tick.
     pub fn springs(&self) -> impl Iterator<Item = ([usize; 2], f64, &[Row])> {
         self.pairs.iter().map(|(_, pair)| (pair.entities, pair.elastic_energy_j(), pair.rows(&self.rows)))
     }

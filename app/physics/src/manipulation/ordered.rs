@@ -46,7 +46,7 @@ impl Manipulation {
         self.roster.set(body, Standing::Awake);
         self.parked.retain(|parked| parked.entity != entity);
         let who = who(&self.roster, entities, self.settings.response);
-        self.pairs.follow(body, &who, &self.broad_phase);
+        self.pairs.follow(body, &who, &self.broad_phase, true);
     }
 
     /// Takes note that the friction of an entity is another one: who lies on it, or it itself, wakes.

@@ -42,6 +42,7 @@ pub(super) struct Leaver {
     pub(super) body: u32,
     pub(super) is_asleep: bool,
     pub(super) rested_s: f64,
+    pub(super) owed_j: f64,
     pub(super) state: Body,
     pub(super) previous_X_WB: Isometry3<f64>,
 }

@@ -40,8 +40,8 @@ impl Pair {
 
     /// Becomes the pair of this head, in the place of one that has ended.
     pub(crate) fn begin_as(&mut self, head: &Head) {
-        self.begin(head.entities.map(|entity| entity as usize), head.has_mesh, head.surfacing);
-        (self.ledger, self.is_new, self.remembers) = (head.ledger, head.is_new, head.remembers);
+        self.begin(head.entities.map(|entity| entity as usize), head.has_mesh, head.surfacing, head.is_new);
+        (self.ledger, self.remembers) = (head.ledger, head.remembers);
         self.count = (head.count as usize).min(MAX_POINTS);
         self.memory.words = head.words;
         if head.has_mesh {

@@ -12,16 +12,31 @@
 //! rests on all of its depth.
 //! What bodies that are placed into each other hold is theirs: it is in the account when the pair begins, and let out slowly.
 //!
-//! The work on a body that turns is that of its angular momentum's change with the mean of both angular velocities, which is
-//! what its kinetic energy changes by.
-//! Invariant: kinetic energy, gravity's and that of the account never grow by what contacts do.
+//! Invariant: kinetic energy, gravity's and all accounts', less what bodies owe, never grow by what contacts do, however
+//! they begin and end; only work that is put in from outside adds to them.
+//!
+//! Why (each step has its test in `tests/ledger.rs`):
+//! 1. *No account goes below zero.* A tick's forces work with the velocities that they were found with. A spring that begins it
+//!    with force r and ends it with f <= r works `f (r - f) / k` at most, with a damper or at the limit of friction less: half of
+//!    what it held, `r^2 / 2k`, at most. What presses is never more than the account. So a pair that ends has nothing to be
+//!    forgiven, and what it loses is lost. (Where no answer was found a force may be another one; what it gave too much is owed
+//!    as in 3.)
+//! 2. *What bodies get is what pairs give, less what the tick takes.* The tick turns that work into kinetic energy and height but
+//!    for half of the mass times the velocity's change squared, and the like of turning: `dw J dw / 2`, which it takes. That
+//!    is refunded to pairs that do not press with all of their depth, never more than once.
+//! 3. *What turning gives is owed.* Bodies of uneven inertia turn faster in the tick by d than when it begins: they get
+//!    `-dw J (dw / 2 + d)`, `d J d / 2` at most, for nothing. The body owes that, not the pair: it is kept while it flies, sleeps
+//!    or changes hands, and is paid with what the next ticks take, and by the next pair that holds anything. Whoever turns evenly
+//!    never owes.
+//! 4. *Accounts begin empty*, unless somebody from outside has put one of both there ([`Pair::was_put`](super::Pair::was_put)):
+//!    not where a body has come by itself, however deep it is found.
+//!
+//! So mechanical energy is never above what it began with and what was put in by more than what is owed at the time; and that is
+//! never forgiven. What is not in there: that axes turn under an angular momentum that stands still makes kinetic energy swing by
+//! itself (`integrator/midpoint.rs`). It holds for springs and the `implicit` integrator; impulses have a proof of their own
+//! (`restitution/bounce.rs`).
 
-use nalgebra::Vector3;
-
-use super::Start;
 use crate::collide::MAX_POINTS;
-use crate::row::Row;
-use crate::solver::Motion;
 
 /// The account of a pair.
 #[derive(Debug, Clone, Copy, Default)]
@@ -34,8 +49,6 @@ pub(super) struct Ledger {
     most_j: f64,
     /// Whether there is something that has not been paid for.
     owes: bool,
-    /// Of A and B, half of the angular velocity that a tick begins with, and half of what the axes' turning makes of it \[rad/s\].
-    begins_W: [Vector3<f64>; 2],
 }
 
 /// Squares of how far springs are stretched \[m^2\]: as geometry has it, and as the work has it.
@@ -46,29 +59,23 @@ pub(super) struct Stretched {
 }
 
 impl Ledger {
-    /// Takes note of how the bodies turn when the tick begins.
-    pub(super) fn begin(&mut self, (a, b): (usize, Option<usize>), start: &Start<'_>) {
-        let begins_W = |body: usize| {
-            let motion = &start.motions[body];
-            if motion.inverse_mass == 0.0 {
-                // It turns as it is made to.
-                return motion.angular_velocity_W * 0.5;
-            }
-            let turns_W = motion.inverse_inertia_W * start.bodies[body].angular_momentum_W;
-            turns_W - motion.angular_velocity_W * 0.5
-        };
-        self.begins_W = [begins_W(a), b.map_or(Vector3::zeros(), begins_W)];
+    /// Enters what its springs worked on the bodies in the tick \[J\].
+    pub(super) fn enter(&mut self, work_j: f64) {
+        self.held_j -= if work_j.is_finite() { work_j } else { 0.0 };
     }
 
-    /// Enters what a force of this row did to the bodies in the tick.
-    pub(super) fn enter(&mut self, row: &Row, force_W: &Vector3<f64>, motions: &[Motion], dt_s: f64) {
-        let power = |body: usize, side: usize| {
-            let motion = &motions[body];
-            let turns_W = self.begins_W[side] + motion.angular_velocity_W * 0.5;
-            force_W.dot(&(motion.velocity_W + turns_W.cross(&row.arms_W[side])))
-        };
-        let work_j = (power(row.body, 0) - row.other.map_or(0.0, |other| power(other, 1))) * dt_s;
-        self.held_j -= if work_j.is_finite() { work_j } else { 0.0 };
+    /// Pays what a body owes, as far as it goes; says what is left of that \[J\].
+    pub(super) fn pay(&mut self, owed_j: f64) -> f64 {
+        let paid_j = owed_j.min(self.held_j.max(0.0));
+        self.held_j -= paid_j;
+        owed_j - paid_j
+    }
+
+    /// What it has given that it did not have \[J\]: that is somebody else's to pay.
+    pub(super) fn take_debt(&mut self) -> f64 {
+        let debt_j = (-self.held_j).max(0.0);
+        self.held_j += debt_j;
+        debt_j
     }
 
     /// Enters what is left over elsewhere \[J\].
@@ -202,6 +209,18 @@ mod tests {
         ledger.refund(2e-3);
         let allowed = ledger.allow(&springs, K, false);
         assert!((holds_j(allowed, &springs) - 1e-3).abs() < 1e-18);
+    }
+
+    #[test]
+    fn an_account_pays_what_it_has_and_hands_on_what_it_has_not() {
+        let mut ledger = Ledger::of(3.0);
+        assert_eq!(ledger.pay(1.0), 0.0);
+        assert_eq!((ledger.pay(5.0), ledger.held_j()), (3.0, 0.0));
+        ledger.enter(2.0);
+        assert_eq!((ledger.take_debt(), ledger.held_j(), ledger.take_debt()), (2.0, 0.0, 0.0));
+        ledger.enter(-2.0);
+        ledger.enter(f64::NAN);
+        assert_eq!((ledger.take_debt(), ledger.held_j()), (0.0, 2.0));
     }
 
     #[test]

@@ -9,6 +9,7 @@
 //! work on the body is the root of a quadratic equation. The work of an impulse P is that with the mean of the velocities
 //! before and after it. Gravity changes both within the tick, while the body goes on with the velocity of the tick's end: of
 //! kinetic energy and height together, `P (v_0 - g dt + v_1) / 2 - m (g dt)^2 / 2` is what contacts put in.
+//! What stops beside the bounce counts as well: thrown from one wall of a wedge onto the other, a body is pushed by both.
 //! Invariant: forces and velocities still belong together, and forces on users are still those that bodies got.
 //! Cost: a second solution, in ticks with an impact that gives energy only.
 
@@ -30,6 +31,27 @@ pub(super) struct Bounce {
     fall_W: Vector3<f64>,
 }
 
+/// Rows of the impulse response.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Impulses<'a> {
+    /// Those that meet what they touch.
+    pub(super) impacts: &'a [usize],
+    /// The others, which stop.
+    pub(super) stops: &'a [usize],
+}
+
+impl Impulses<'_> {
+    fn all(&self) -> impl Iterator<Item = usize> + use<'_> {
+        self.impacts.iter().chain(self.stops).copied()
+    }
+}
+
+/// What of a force is an impulse's: not what springs across the normal of a contact that stays do.
+fn impulse_W(row: &Row, force_W: &Vector3<f64>) -> Vector3<f64> {
+    let is_impulse = row.stiffness[1] >= row.damping[0];
+    if is_impulse { *force_W } else { row.normal_W * row.normal_W.dot(force_W) }
+}
+
 impl Bounce {
     pub(super) fn with_capacity(rows: usize, bodies: usize) -> Self {
         Self {
@@ -41,12 +63,12 @@ impl Bounce {
         }
     }
 
-    /// Solves for all rows' forces such that the impacts, which are rows that meet what they touch, give no energy.
+    /// Solves for all rows' forces such that the impulses give no energy.
     pub(super) fn solve(
         &mut self,
         solver: &mut Solver,
         rows: &mut [Row],
-        impacts: &[usize],
+        impulses: Impulses<'_>,
         motions: &mut [Motion],
         (fall_W, dt_s): (&Vector3<f64>, f64),
     ) -> Solved {
@@ -54,7 +76,7 @@ impl Bounce {
         self.freely.clear();
         self.freely.extend_from_slice(motions);
         let solved = solver.solve(rows, motions, dt_s);
-        if !self.gives_energy(rows, impacts, motions, dt_s) {
+        if impulses.impacts.is_empty() || !self.gives_energy(rows, impulses, motions, dt_s) {
             return solved;
         }
         self.bouncing.clear();
@@ -62,24 +84,24 @@ impl Bounce {
         self.forces.clear();
         self.forces.extend(rows.iter().map(|row| (row.force_W, row.torsion.torque_nm)));
         motions.copy_from_slice(&self.freely);
-        for &at in impacts {
+        for &at in impulses.impacts {
             let row = &mut rows[at];
             let rest_n = row.normal_W.dot(&row.rest_W);
             row.rest_W -= row.normal_W * rest_n.max(0.0);
         }
         let more = solver.solve(rows, motions, dt_s);
-        self.find_shares(rows, impacts, motions, dt_s);
+        self.find_shares(rows, impulses, motions, dt_s);
         self.mix(rows, motions);
         Solved { sweeps: solved.sweeps + more.sweeps, ..solved.and(more) }
     }
 
-    /// Whether the impacts of any body work on it.
-    fn gives_energy(&mut self, rows: &[Row], impacts: &[usize], motions: &[Motion], dt_s: f64) -> bool {
+    /// Whether the impulses of any body work on it.
+    fn gives_energy(&mut self, rows: &[Row], impulses: Impulses<'_>, motions: &[Motion], dt_s: f64) -> bool {
         self.shares.clear();
         self.shares.resize(motions.len(), 0.0);
-        for &at in impacts {
+        for at in impulses.all() {
             let row = &rows[at];
-            let work = row.force_W.dot(&(self.before_W(row) + velocity(row, motions)));
+            let work = impulse_W(row, &row.force_W).dot(&(self.before_W(row) + velocity(row, motions)));
             self.shares[row.body] += work;
             if let Some(other) = row.other {
                 self.shares[other] += work;
@@ -104,20 +126,22 @@ impl Bounce {
     }
 
     /// With `s` of the bounce, forces `f_0 + s f` and velocities `u_0 + s u` work `a + b s + c s^2`.
-    fn find_shares(&mut self, rows: &[Row], impacts: &[usize], motions: &[Motion], dt_s: f64) {
+    fn find_shares(&mut self, rows: &[Row], impulses: Impulses<'_>, motions: &[Motion], dt_s: f64) {
         let mut least_coupled = 1.0_f64;
         for body in 0..motions.len() {
             let (mut a, mut b, mut c) = (-self.free_w(&motions[body], dt_s), 0.0, 0.0);
-            for &at in impacts.iter().filter(|&&at| rows[at].body == body || rows[at].other == Some(body)) {
+            for at in impulses.all().filter(|&at| rows[at].body == body || rows[at].other == Some(body)) {
                 let row = &rows[at];
-                let (f_0, f) = (row.force_W, self.forces[at].0 - row.force_W);
+                let f_0 = impulse_W(row, &row.force_W);
+                let f = impulse_W(row, &self.forces[at].0) - f_0;
                 let u_0 = self.before_W(row) + velocity(row, motions);
                 let u = velocity(row, &self.bouncing) - velocity(row, motions);
                 a += f_0.dot(&u_0);
                 b += f_0.dot(&u) + f.dot(&u_0);
                 c += f.dot(&u);
             }
-            let share = largest_share(a, b, c);
+            // What was too deep and is let out works without any bounce.
+            let share = largest_share(a.min(0.0), b, c);
             self.shares[body] = share;
             if rows.iter().any(|row| row.other.is_some() && (row.body == body || row.other == Some(body))) {
                 least_coupled = least_coupled.min(share);

@@ -13,7 +13,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Bounce, Meeting, velocity};
+use super::{Bounce, Impulses, Meeting, velocity};
 use crate::pair::HARD;
 use crate::row::{Row, Torsion};
 use crate::solver::{Motion, Solver};
@@ -33,6 +33,7 @@ pub(super) struct Cascade {
     /// Of the two that meet now: points, which of them are reflected, and motions.
     rows: Vec<Row>,
     impacts: Vec<usize>,
+    stops: Vec<usize>,
     motions: Vec<Motion>,
     solver: Solver,
     bounce: Bounce,
@@ -44,6 +45,7 @@ impl Cascade {
             impulses_W: Vec::with_capacity(rows),
             rows: Vec::with_capacity(MAX_POINTS),
             impacts: Vec::with_capacity(MAX_POINTS),
+            stops: Vec::with_capacity(MAX_POINTS),
             motions: Vec::with_capacity(2),
             solver: Solver::with_capacity(MAX_POINTS, 2),
             bounce: Bounce::with_capacity(MAX_POINTS, 2),
@@ -93,7 +95,7 @@ impl Cascade {
         self.bounce.solve(
             &mut self.solver,
             &mut self.rows,
-            &self.impacts,
+            Impulses { impacts: &self.impacts, stops: &self.stops },
             &mut self.motions,
             (&Vector3::zeros(), dt_s),
         );
@@ -121,6 +123,7 @@ impl Cascade {
         self.motions.extend(other.map(|other| motions[other]));
         self.rows.clear();
         self.impacts.clear();
+        self.stops.clear();
         for meeting in
             meetings.iter().filter(|meeting| is_of(&rows[meeting.row], body, other)).take(MAX_POINTS)
         {
@@ -134,9 +137,8 @@ impl Cascade {
             let freely_m_s = n.dot(&velocity(was, motions));
             let more = |m_s: f64| m_s + (m_s - freely_m_s) / HARD;
             meeting.reflect(&mut row, leaves_m_s.map_or(0.0, more), dt_s);
-            if leaves_m_s.is_some() {
-                self.impacts.push(self.rows.len());
-            }
+            let kind = if leaves_m_s.is_some() { &mut self.impacts } else { &mut self.stops };
+            kind.push(self.rows.len());
             self.rows.push(row);
         }
     }

@@ -57,7 +57,7 @@ pub struct Recipe {
 }
 
 /// Some centimetres large.
-fn shape(kind: Kind, noise: &mut Noise) -> Shape {
+pub fn shape(kind: Kind, noise: &mut Noise) -> Shape {
     let form: Form = match kind {
         Kind::Sphere => Sphere::new(noise.within(0.005, 0.04)).unwrap().into(),
         Kind::Box => Cuboid::new([0; 3].map(|_| noise.within(0.01, 0.08))).unwrap().into(),
