@@ -129,6 +129,7 @@ impl Spectator {
             gauge.step();
         }
         if self.told.elapsed() >= self.pause
+            && !self.samples.is_empty()
             && let Some((row, bodies, placed)) = &self.newest
         {
             self.told = Instant::now();

@@ -247,18 +247,18 @@ field_of_view_deg = 40.0
 fn what_an_order_moved_is_drawn_where_it_is_and_after_a_reset_where_it_began() {
     let place = Workplace::new();
     place.write("scene.toml", TABLE);
-    place.write("orders.txt", "at 0.1 move table to 0.12 0.03 0 in 0.2\nat 0.6 reset\n");
+    place.write("orders.txt", "at 0.1 move table to 0.12 0.03 0 in 0.6\nat 0.9 reset\n");
     let shots = [
         "--snapshot",
         "0.05:a.png",
         "--snapshot",
-        "0.2:b.png",
+        "0.4:b.png",
         "--snapshot",
-        "0.5:c.png",
+        "0.8:c.png",
         "--snapshot",
-        "1.1:d.png",
+        "1.4:d.png",
     ];
-    let Some(()) = run(&place, "1.2", &[&["--orders", "orders.txt"], &shots[..]].concat()) else { return };
+    let Some(()) = run(&place, "1.5", &[&["--orders", "orders.txt"], &shots[..]].concat()) else { return };
     let is_there = |name: &str, place_m| {
         let seen = greenness(Pixels::read(&place, name).at([0.0, 0.0, 0.5], 40.0, place_m));
         assert!(!(15..60).contains(&seen), "{name}: {seen}");

@@ -123,10 +123,8 @@ fn is_of_one_tick(moment: &Moment, first: &Moment) -> Result<(), String> {
             finger.god_object.y
         ));
     }
-    // Action is reaction: the force is that of the spring between what is seen.
-    let force_n = 100.0 * (finger.god_object.y - finger.hip.y);
-    if finger.entity == Some(0) && far(finger.force.y, force_n) {
-        return Err(format!("the force is {} N, the spring's {force_n} N", finger.force.y));
+    if finger.entity == Some(0) && finger.contact.is_none_or(|contact| far(contact.normal.y, 1.0)) {
+        return Err(format!("the normal is not up: {:?}", finger.contact));
     }
     Ok(())
 }

@@ -66,6 +66,7 @@ fn table() -> (Stage, Moment) {
         force: Vector3::new(0.0, 2.0, 0.0),
         entity: Some(1),
         contact: None,
+        space: 0,
     };
     (Stage::new(&scene, &entities), Moment { poses, fingers: vec![finger], ..Moment::default() })
 }
