@@ -9,8 +9,9 @@ use crate::control::words::{self, Words};
 use crate::moments::Moments;
 use crate::row::{BodyRow, Row};
 use nalgebra::Vector3;
-use std::time::{Duration, Instant};
+use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::{Duration, Instant};
 use view::{Ask, Glimpse, News, Note, OpenWindow, Sample};
 use world::events::{Event, Kind, Subscriber};
 
@@ -26,6 +27,8 @@ pub struct Spectator {
     told: Instant,
     /// What orders give to read, as they are taken.
     notes: (Sender<Note>, Receiver<Note>),
+    /// Those that the window had no time for.
+    untold: VecDeque<Note>,
     wants_end: bool,
 }
 
@@ -39,6 +42,7 @@ impl Spectator {
             newest: None,
             told: Instant::now(),
             notes: channel(),
+            untold: VecDeque::new(),
             wants_end: false,
         }
     }
@@ -72,10 +76,19 @@ impl Spectator {
             let samples = std::mem::take(&mut self.samples);
             self.window.tell(News::Glimpse(Box::new(Glimpse { moment, samples, ..Glimpse::default() })));
         }
-        for note in self.notes.1.try_iter() {
-            self.window.tell(News::Text(note));
-        }
+        self.give_to_read();
         self.answer(desk);
+    }
+
+    /// Moments may be left out, what people are to read may not.
+    fn give_to_read(&mut self) {
+        self.untold.extend(self.notes.1.try_iter());
+        while let Some(note) = self.untold.pop_front() {
+            if let Some(News::Text(note)) = self.window.tell(News::Text(note)) {
+                self.untold.push_front(note);
+                break;
+            }
+        }
     }
 
     fn answer(&mut self, mut desk: Option<&mut Desk>) {
@@ -83,9 +96,9 @@ impl Spectator {
         for ask in asked {
             match ask {
                 Ask::Order(line) => {
-                    let done = desk.as_mut().map(|desk| desk.order(0, &line));
+                    let done = desk.as_mut().map(|desk| desk.order_now(&line));
                     if let Some(Err(error)) = done {
-                        self.window.tell(News::Text(error.into()));
+                        self.untold.push_back(error.into());
                     }
                 }
                 Ask::Record(_) => {}

@@ -132,7 +132,8 @@ impl CameraTurn<'_> {
         if !self.sight.is_over || !matches!(button, PointerButton::Secondary | PointerButton::Middle) {
             return false;
         }
-        self.man.drag = Some(Drag { button, focus: (self.sight.point)(self.camera, self.sight.scene.center()) });
+        self.man.drag =
+            Some(Drag { button, focus: (self.sight.point)(self.camera, self.sight.scene.center()) });
         true
     }
 

@@ -197,9 +197,7 @@ mod tests {
                 for place in [[0.0, 0.0, -0.5], [0.05, -0.03, -0.4], [-0.1, 0.08, -1.5]] {
                     let place = camera.pose * Point3::from(place);
                     // What graphics make of it.
-                    let seen = look.eye.projection()
-                        * look.eye.view()
-                        * vector(&place.coords).extend(1.0);
+                    let seen = look.eye.projection() * look.eye.view() * vector(&place.coords).extend(1.0);
                     let part = look.eye.viewport();
                     let along = |at: f32, from: i32, side: u32| {
                         f64::from(from) + 0.5 * (1.0 + f64::from(at)) * f64::from(side)

@@ -138,10 +138,7 @@ impl Bundles {
 
 impl Extent {
     fn around(triangles: &Triangles, corners: &[[u32; 3]]) -> Self {
-        let none = Self {
-            least: Vector3::repeat(f64::INFINITY),
-            most: Vector3::repeat(f64::NEG_INFINITY),
-        };
+        let none = Self { least: Vector3::repeat(f64::INFINITY), most: Vector3::repeat(f64::NEG_INFINITY) };
         corners.as_flattened().iter().fold(none, |Self { least, most }, corner| {
             let place = triangles.places[*corner as usize].coords;
             Self { least: least.inf(&place), most: most.sup(&place) }
@@ -229,9 +226,10 @@ mod tests {
             let origin = Point3::new(a.cos(), y, a.sin());
             let aim = Point3::new(0.11 * (3.0 * a).sin(), 0.11 * (5.0 * a).cos(), 0.05 * (7.0 * a).sin());
             let ray = Ray { origin, direction: (aim - origin).normalize() };
-            let all = triangles.corners.iter().filter_map(|corners| {
-                ray.meet(corners.map(|corner| triangles.places[corner as usize]))
-            });
+            let all = triangles
+                .corners
+                .iter()
+                .filter_map(|corners| ray.meet(corners.map(|corner| triangles.places[corner as usize])));
             let nearest = all.reduce(f64::min);
             assert_eq!(bundles.meet(&triangles, &ray, f64::INFINITY), nearest, "{ray:?}");
         }

@@ -56,7 +56,8 @@ mod tests {
             is_paused: true,
             ..status
         };
-        let all = "  12.35 s | 1000 Hz, 2 late | reply 45/80/121 us | fast 3, slow 17 | PAUSED | RECORDING a.mcap";
+        let all =
+            "  12.35 s | 1000 Hz, 2 late | reply 45/80/121 us | fast 3, slow 17 | PAUSED | RECORDING a.mcap";
         assert_eq!(status_line(&status, &moment), all);
     }
 }

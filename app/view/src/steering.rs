@@ -128,7 +128,8 @@ mod tests {
     fn steps_are_orders_and_quick_ones_go_on_from_each_other() {
         let mut steering = Steering::default();
         let pose = Isometry3::translation(0.1, 0.2, -0.3);
-        let mut order = |action, is_fine, now_s| steering.order(Bound { action, is_fine }, CUBE, &pose, now_s);
+        let mut order =
+            |action, is_fine, now_s| steering.order(Bound { action, is_fine }, CUBE, &pose, now_s);
         let right = Action::Move([1, 0, 0]);
         assert_eq!(
             order(right, false, 1.0).as_deref(),

@@ -133,7 +133,10 @@ mod tests {
         board.add("four seconds".into(), 20.0);
         assert_eq!((seen(&mut board, 23.5).len(), seen(&mut board, 24.0).len()), (1, 0));
         board.add(note("short", [0.5, 0.5], 0.2), 30.0);
-        assert!((seen(&mut board, 30.1)[0].2 - 0.5).abs() < 1e-9, "what is shorter than fading fades all the time");
+        assert!(
+            (seen(&mut board, 30.1)[0].2 - 0.5).abs() < 1e-9,
+            "what is shorter than fading fades all the time"
+        );
     }
 
     #[test]

@@ -1,6 +1,8 @@
 //! How people move the camera: closed forms, and the same through the events of a mouse.
 
-use eframe::egui::{Event, Key, Modifiers, MouseWheelUnit, PointerButton, Pos2, Rect, TouchPhase, Vec2, pos2};
+use eframe::egui::{
+    Event, Key, Modifiers, MouseWheelUnit, PointerButton, Pos2, Rect, TouchPhase, Vec2, pos2,
+};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use std::f64::consts::{PI, TAU};
 use view::Eyes;
@@ -67,7 +69,10 @@ fn all_the_way_around_is_where_it_began() {
     let apart = (camera.pose.translation.vector - begun.pose.translation.vector).norm();
     assert!(apart < ROUNDED && camera.pose.rotation.angle_to(&begun.pose.rotation) < 1e-7, "{apart}");
     orbit(&mut camera, &FOCUS, 0.5, 0.2);
-    assert!((camera.pose.translation.vector - begun.pose.translation.vector).norm() > 0.1, "it goes somewhere");
+    assert!(
+        (camera.pose.translation.vector - begun.pose.translation.vector).norm() > 0.1,
+        "it goes somewhere"
+    );
     orbit(&mut camera, &FOCUS, 0.0, -0.2);
     orbit(&mut camera, &FOCUS, -0.5, 0.0);
     assert!((camera.pose.translation.vector - begun.pose.translation.vector).norm() < ROUNDED);

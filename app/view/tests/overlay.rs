@@ -191,5 +191,10 @@ fn shadows_go_where_the_sun_is_turned_away_from() {
     let there = |x: f64| [-0.02 + x * 0.45 * 0.03, 0.0, -0.35 * 0.03];
     let light = |picture: &Picture, x| set.at(picture, there(x)).iter().sum::<i32>();
     assert!(light(&begun, 1.2) + 60 < light(&turned, 1.2), "{} {}", light(&begun, 1.2), light(&turned, 1.2));
-    assert!(light(&turned, -1.2) + 60 < light(&begun, -1.2), "{} {}", light(&turned, -1.2), light(&begun, -1.2));
+    assert!(
+        light(&turned, -1.2) + 60 < light(&begun, -1.2),
+        "{} {}",
+        light(&turned, -1.2),
+        light(&begun, -1.2)
+    );
 }

@@ -205,8 +205,9 @@ impl Settings {
             set: &'s Set<T>,
             shown: impl Fn(&T) -> String,
         ) -> (&'static str, String, &'s Origin, bool) {
-            let is_for_window =
-                ["window", "stereo", "input", "driver.configuration"].iter().any(|table| key.starts_with(table));
+            let is_for_window = ["window", "stereo", "input", "driver.configuration"]
+                .iter()
+                .any(|table| key.starts_with(table));
             (key, shown(&set.value), &set.from, is_for_window)
         }
         let path = |path: &Option<PathBuf>| {

@@ -155,7 +155,9 @@ mod tests {
     fn what_is_wrong_is_told_with_line_and_key_and_what_is_allowed() {
         let refused = |text: &str| parse(text).unwrap_err();
         let said = refused("[keys]\n\nexti = \"A\"\n");
-        assert!(said.starts_with("k.toml:3: keys.exti: unknown key (did you mean `exit`?); allowed: exit, help,"));
+        assert!(
+            said.starts_with("k.toml:3: keys.exti: unknown key (did you mean `exit`?); allowed: exit, help,")
+        );
         assert_eq!(
             refused("[keys]\nexit = [\"Ctrl+Q\", \"Ctl+A\"]\n"),
             format!("k.toml:2: keys.exit[1]: found the string \"Ctl+A\"; allowed: {ALLOWED}")
@@ -172,7 +174,7 @@ mod tests {
         );
         assert_eq!(
             refused("[keys]\npause = 3\n"),
-            "k.toml:2: keys.pause: found the number 3; \
+            "k.toml:2: keys.pause: found 3; \
              allowed: a key such as \"Ctrl+Q\", or an array of keys"
         );
         let said = Bindings::read(Path::new("/there/is/none.toml")).unwrap_err().to_string();

@@ -49,8 +49,10 @@ mod tests {
 
     #[test]
     fn all_actions_are_explained_with_the_keys_that_they_have() {
-        let bindings =
-            Bindings::parse("[keys]\npause = [\"Z\", \"Ctrl+Z\"]\nreset = []", std::path::Path::new("k.toml"));
+        let bindings = Bindings::parse(
+            "[keys]\npause = [\"Z\", \"Ctrl+Z\"]\nreset = []",
+            std::path::Path::new("k.toml"),
+        );
         let lines = help(&bindings.unwrap()).concat();
         let keys_of = |what: &str| {
             lines.iter().find_map(|line| match line {

@@ -132,8 +132,7 @@ mod tests {
         let right = Action::Move([1, 0, 0]);
         let (mut thing, mut hand, mut all) =
             (somebody(|told| is(told, right)), somebody(|told| is(told, Action::Grip)), somebody(|_| true));
-        let mut tell =
-            |event: &Event| router.tell(event, &bindings, &mut [&mut thing, &mut hand, &mut all]);
+        let mut tell = |event: &Event| router.tell(event, &bindings, &mut [&mut thing, &mut hand, &mut all]);
         assert_eq!(tell(&key(Key::ArrowRight, true)), Some(0));
         assert_eq!(tell(&key(Key::Space, true)), Some(1));
         assert_eq!(tell(&key(Key::P, true)), Some(2));
