@@ -149,10 +149,11 @@ fn show(mut studio: Studio, stage: &Stage, told: &Receiver<News>, drawn: &Atomic
 }
 
 impl Onlooker for Screen {
-    fn tell(&mut self, news: News) {
+    fn tell(&mut self, news: News) -> Option<News> {
         if let Some(out) = &self.news {
             let _ = out.try_send(news);
         }
+        None
     }
 
     fn asked(&mut self) -> Vec<Ask> {

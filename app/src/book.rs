@@ -17,9 +17,11 @@ struct Pages {
 }
 
 impl Book {
-    /// An order in words, the next in number.
-    pub fn add_order(&self, words: &str) {
-        self.pages().orders.push(words.into());
+    /// An order in words; answers its number, the next one.
+    pub fn add_order(&self, words: &str) -> u64 {
+        let mut pages = self.pages();
+        pages.orders.push(words.into());
+        pages.orders.len() as u64 - 1
     }
 
     /// The last order was not sent.

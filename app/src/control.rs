@@ -8,7 +8,7 @@
 //! is done while no force is felt, for which forces fade away and come back: a world that takes the place of another one;
 //! and, where a finger feels it, friction, a pause, a body that is taken or let go. A reset is an exchange of worlds, with
 //! the same scene made anew: so everything is where it began, to the bit.
-//! Invariants: orders are done in the order in which they came; the fast side neither allocates nor frees: what it is done
+//! Invariants: orders are done in the order in which they came, but for what somebody wants now while a script waits; the fast side neither allocates nor frees: what it is done
 //! with goes back to the slow side.
 
 #![allow(non_snake_case)] // Names carry their frame: to_W is a place in W.
@@ -56,7 +56,7 @@ pub struct Turned {
     /// What is to be told.
     pub told: [Option<Kind>; ORDERS_A_TICK],
     /// Orders that were taken, by their numbers in the run.
-    pub taken: std::ops::Range<u64>,
+    pub taken: [Option<u64>; ORDERS_A_TICK],
 }
 
 impl std::fmt::Debug for Replacement {
@@ -78,14 +78,14 @@ impl Control {
 
     /// Before a tick of this length (s), the run's so many-th.
     pub fn turn(&mut self, step: &mut FastStep, run_tick: u64, dt_s: f64) -> Turned {
-        let mut turned = Turned { taken: self.taken..self.taken, ..Turned::default() };
-        for told in &mut turned.told {
+        let mut turned = Turned::default();
+        for (told, taken) in turned.told.iter_mut().zip(&mut turned.taken) {
             if self.waiting.is_some() {
                 break;
             }
             let Some(dated) = self.orders.take(run_tick) else { break };
             self.taken += 1;
-            turned.taken.end = self.taken;
+            *taken = Some(dated.number);
             match dated.order {
                 Order::Scale(scale) => self.gradual.scale(&scale),
                 Order::Move(moved) => self.gradual.set_out(&moved),

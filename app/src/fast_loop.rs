@@ -225,7 +225,7 @@ impl FastLoop {
         let Some(control) = &mut self.control else { return };
         let turned = control.turn(&mut self.step, run_tick, self.period_ns as f64 / 1e9);
         if let Some(events) = &mut self.events {
-            for number in turned.taken {
+            for number in turned.taken.into_iter().flatten() {
                 events.send(Event { run_tick, kind: Kind::Order { number } });
             }
             for kind in turned.told.into_iter().flatten() {

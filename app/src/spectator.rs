@@ -17,9 +17,10 @@ use gauge::Gauge;
 use happened::Happened;
 use nalgebra::Vector3;
 use notes::Notes;
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use view::{Ask, Glimpse, News, OpenWindow, Sample, Status};
+use view::{Ask, Glimpse, News, Note, OpenWindow, Sample, Status};
 use world::events::Hub;
 
 /// Between two glimpses at least: each turn of the slow side has one.
@@ -27,8 +28,8 @@ const GLIMPSE: Duration = Duration::from_millis(8);
 
 /// Who is told what happens, and asks for something: a window, or what stands for one.
 pub trait Onlooker {
-    /// Takes news, if there is time to listen.
-    fn tell(&mut self, news: News);
+    /// Takes news, or gives them back if there is no time to listen.
+    fn tell(&mut self, news: News) -> Option<News>;
     /// What people want.
     fn asked(&mut self) -> Vec<Ask>;
     /// Whether anybody is there still.
@@ -36,8 +37,8 @@ pub trait Onlooker {
 }
 
 impl Onlooker for OpenWindow {
-    fn tell(&mut self, news: News) {
-        OpenWindow::tell(self, news);
+    fn tell(&mut self, news: News) -> Option<News> {
+        OpenWindow::tell(self, news)
     }
 
     fn asked(&mut self) -> Vec<Ask> {
@@ -59,6 +60,8 @@ pub struct Spectator {
     told: Instant,
     happened: Happened,
     notes: Notes,
+    /// What there is to read that the window had no time for.
+    untold: VecDeque<Note>,
     /// Of a driver in a process of its own.
     gauge: Option<Gauge>,
     wants_record: Option<bool>,
@@ -76,6 +79,7 @@ impl Spectator {
             newest: None,
             told: Instant::now(),
             notes: Notes::new(hub, book.clone()),
+            untold: VecDeque::new(),
             happened: Happened::new(hub, book),
             gauge: None,
             wants_record: None,
@@ -139,9 +143,7 @@ impl Spectator {
             let samples = std::mem::take(&mut self.samples);
             self.window.tell(News::Glimpse(Box::new(Glimpse { moment, samples, status })));
         }
-        for note in self.notes.taken() {
-            self.window.tell(News::Text(note));
-        }
+        self.give_to_read();
         self.answer(desk);
     }
 
@@ -176,13 +178,24 @@ impl Spectator {
         is_slow
     }
 
+    /// Moments may be left out, what people are to read may not.
+    fn give_to_read(&mut self) {
+        self.untold.extend(self.notes.taken());
+        while let Some(note) = self.untold.pop_front() {
+            if let Some(News::Text(note)) = self.window.tell(News::Text(note)) {
+                self.untold.push_front(note);
+                break;
+            }
+        }
+    }
+
     fn answer(&mut self, mut desk: Option<&mut Desk>) {
         for ask in self.window.asked() {
             match ask {
                 Ask::Order(line) => {
-                    let done = desk.as_mut().map(|desk| desk.order(0, &line));
+                    let done = desk.as_mut().map(|desk| desk.order_now(&line));
                     if let Some(Err(error)) = done {
-                        self.window.tell(News::Text(error.into()));
+                        self.untold.push_back(error.into());
                     }
                 }
                 Ask::Record(wanted) => self.wants_record = Some(wanted),
@@ -204,7 +217,7 @@ impl Spectator {
 
     /// Tells people something.
     pub fn tell(&mut self, text: String) {
-        self.window.tell(News::Text(text.into()));
+        self.untold.push_back(text.into());
     }
 
     /// Whether the run shall end.

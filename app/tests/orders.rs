@@ -5,6 +5,7 @@ mod counting;
 
 use counting::CALLS;
 use nalgebra::Vector3;
+use phantom3::book::Book;
 use phantom3::control::desk::{Coming, Desk, Means, OrderSource};
 use phantom3::control::gradual::{FADE_S, MOST_STEP_N};
 use phantom3::control::path::MOST_SPEED_M_S;
@@ -16,7 +17,9 @@ use phantom3::simulated::SimulatedDevices;
 use phantom3::virtual_clock::VirtualDriver;
 use shm_abi::segment::ClockMode;
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::channel;
 use world::Scene;
+use world::events::{Class, Event, Filter, Hub, Kind, event_queue};
 
 const DT: f64 = 1e-3;
 const K: f64 = 500.0;
@@ -453,4 +456,61 @@ fn too_much_on_what_is_to_be_moved_is_told_and_left_where_it_is() {
     }
     assert_eq!(fast.orders_taken(), [1, 1]);
     assert_eq!(fast.step_mut().entities()[0].X_WB.translation.vector, Vector3::new(0.0, -0.01, 0.0));
+}
+
+/// The orders that were taken within a second of a run with this script, each with its tick, if these come before the run.
+fn taken_with(script: &str, now: &[&str]) -> Vec<(u64, String)> {
+    let place = Place::new();
+    let rig = place.rig(PLATE, HandMode::Kinematic);
+    place.write("other.toml", PLATE);
+    let script = script.replace("OTHER", &place.0.path().join("other.toml").display().to_string());
+    let source = OrderSource::File(place.write("orders.txt", &script));
+    let book = Book::default();
+    let means = Means { book: book.clone(), ..Means::default() };
+    let (mut desk, orders) = Desk::open(&rig, &source, means).expect("good orders");
+    for order in now {
+        desk.order_now(order).expect("good orders");
+    }
+    let mut driver = VirtualDriver::open(&rig.driver_config(ClockMode::Virtual)).expect("devices");
+    let step = rig.fast_step().expect("a step");
+    let (rows, _rows) = row_queue(step.bodies().len());
+    let (events, ends) = event_queue(64);
+    let mut hub = Hub::new(vec![ends]);
+    let (send, told) = channel();
+    hub.subscribe(
+        Filter::of(&[Class::Order]),
+        Box::new(move |event: &Event| {
+            if let Kind::Order { number } = event.kind {
+                let _ = send.send((event.run_tick, number));
+            }
+        }),
+    );
+    let fast = FastLoop::new(step, rows, WhenFull::Drop, u64::MAX, rig.period_ns);
+    let mut fast = fast.with_control(orders).with_events(events);
+    (1..1500).for_each(|tick| {
+        driver.tick(tick, &mut fast);
+        hub.deliver(u64::MAX);
+    });
+    told.try_iter().map(|(tick, number)| (tick, book.order(number))).collect()
+}
+
+#[test]
+fn what_somebody_wants_now_does_not_wait_for_what_a_script_has_for_later() {
+    let taken =
+        taken_with("at 0.2 stiffness 1.1\nat 0.5 pause", &["key 89 down", "move plate to 0 0 0 in 0"]);
+    let ticks: Vec<u64> = taken.iter().map(|(tick, _)| *tick).collect();
+    let words: Vec<&str> = taken.iter().map(|(_, words)| words.as_str()).collect();
+    assert_eq!(words, ["key 89 down", "move plate to 0 0 0 in 0", "stiffness 1.1", "pause"]);
+    assert_eq!(ticks[2..], [200, 500]);
+    assert!(ticks[1] < 10, "{ticks:?}");
+}
+
+#[test]
+fn what_is_known_only_of_a_scene_that_is_to_come_waits_for_it() {
+    let now = ["text 0.5 0.5 4 hello", "move plate to 0 0 0 in 0"];
+    let taken = taken_with("at 0.2 swap OTHER", &now);
+    assert_eq!(taken.len(), 3, "{taken:?}");
+    assert_eq!(taken[0].1, now[0]);
+    assert!(taken[1].1.starts_with("swap") && taken[1].0 == 200);
+    assert!(taken[2].1 == now[1] && taken[2].0 >= 200);
 }

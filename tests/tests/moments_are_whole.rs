@@ -59,10 +59,11 @@ const ROUNDING_M: f64 = 1e-9;
 struct Notes(Rc<RefCell<Vec<Glimpse>>>);
 
 impl Onlooker for Notes {
-    fn tell(&mut self, news: News) {
+    fn tell(&mut self, news: News) -> Option<News> {
         if let News::Glimpse(glimpse) = news {
             self.0.borrow_mut().push(*glimpse);
         }
+        None
     }
 
     fn asked(&mut self) -> Vec<Ask> {

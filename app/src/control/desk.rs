@@ -5,7 +5,7 @@
 
 use super::gradual::MOST_TIMES;
 use super::order::{FrictionChange, Move, Order, Other, Replacement, Scale, Turn, Which};
-use super::queue::{Dated, OrderReceiver, OrderSender, order_queue};
+use super::queue::{Dated, Lane, OrderReceiver, OrderSender, order_queue};
 use super::words::{self, Words};
 use crate::book::Book;
 use crate::displaced::Displaced;
@@ -81,6 +81,19 @@ pub struct Desk {
     can_move: Vec<bool>,
     lines: Option<Receiver<String>>,
     coming: VecDeque<Coming>,
+    script: Script,
+}
+
+/// What is known of orders that were given for later.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+enum Script {
+    /// There are none.
+    #[default]
+    None,
+    /// The scene stays as it is described.
+    SameScene,
+    /// It does not: what the desk knows of it is true only after them.
+    OtherScene,
 }
 
 impl Desk {
@@ -111,6 +124,7 @@ impl Desk {
             can_move: Vec::new(),
             lines: None,
             coming: VecDeque::new(),
+            script: Script::None,
         };
         desk.take_note(&rig.fast_step().map_err(|error| error.to_string())?);
         Ok((desk, receiver))
@@ -126,7 +140,7 @@ impl Desk {
         self.sender.free_spent();
         let lines: Vec<String> = self.lines.iter().flat_map(Receiver::try_iter).collect();
         for line in lines {
-            if let Err(error) = self.order(0, &line) {
+            if let Err(error) = self.order_now(&line) {
                 say(format_args!("phantom3: order refused: {error}"));
             }
         }
@@ -164,13 +178,39 @@ impl Desk {
     /// What is wrong with it, and what is allowed.
     pub fn order(&mut self, at_tick: u64, line: &str) -> Result<(), String> {
         let Some(words) = words::parse(line)? else { return Ok(()) };
-        if self.sender.is_full() {
+        let changes_scene = matches!(words, Words::Swap(_) | Words::Friction(..));
+        self.send(at_tick, Lane::InTurn, words, line)?;
+        if changes_scene {
+            self.script = Script::OtherScene;
+        } else if self.script == Script::None {
+            self.script = Script::SameScene;
+        }
+        Ok(())
+    }
+
+    /// The same for the next tick, past those that wait for theirs as far as it does not concern what they change.
+    ///
+    /// # Errors
+    /// As [`Desk::order`].
+    pub fn order_now(&mut self, line: &str) -> Result<(), String> {
+        let Some(words) = words::parse(line)? else { return Ok(()) };
+        let goes_past = match words {
+            Words::Tell(_) | Words::Text(_) | Words::Pause(_) => true,
+            // A script knows entities by their numbers in its own scene.
+            Words::Swap(_) => self.script == Script::None,
+            _ => self.script != Script::OtherScene,
+        };
+        self.send(0, if goes_past { Lane::Now } else { Lane::InTurn }, words, line)
+    }
+
+    fn send(&mut self, at_tick: u64, lane: Lane, words: Words, line: &str) -> Result<(), String> {
+        if self.sender.is_full(lane) {
             return Err(format!("{MOST_ORDERS} orders wait already"));
         }
         let order = self.make(words)?;
-        self.means.book.add_order(words::without_comment(line).trim());
+        let number = self.means.book.add_order(words::without_comment(line).trim());
         // There is room.
-        self.sender.send(Dated { at_tick, order });
+        self.sender.send(Dated { at_tick, order, number }, lane);
         Ok(())
     }
 

@@ -97,11 +97,11 @@ impl OpenWindow {
         Ok(Self { news, asks, context, thread: Some(thread), left_out: 0 })
     }
 
-    /// Tells it something, if it has time to listen.
-    pub fn tell(&mut self, news: News) {
-        if let Err(TrySendError::Full(_)) = self.news.try_send(news) {
-            self.left_out += 1;
-        }
+    /// Tells it something, if it has time to listen; answers what it had no time for.
+    pub fn tell(&mut self, news: News) -> Option<News> {
+        let Err(TrySendError::Full(news)) = self.news.try_send(news) else { return None };
+        self.left_out += 1;
+        Some(news)
     }
 
     /// What people want; ends with [`Ask::End`] when the window was closed.

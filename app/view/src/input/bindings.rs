@@ -174,7 +174,7 @@ mod tests {
         );
         assert_eq!(
             refused("[keys]\npause = 3\n"),
-            "k.toml:2: keys.pause: found the number 3; \
+            "k.toml:2: keys.pause: found 3; \
              allowed: a key such as \"Ctrl+Q\", or an array of keys"
         );
         let said = Bindings::read(Path::new("/there/is/none.toml")).unwrap_err().to_string();

@@ -4,7 +4,7 @@ use super::scene::SceneView;
 use super::writing;
 use super::{WindowSpec, snapshot_file};
 use crate::camera_man::{CameraMan, CameraTurn, Sight};
-use crate::eyes::Eyes;
+use crate::eyes::{Eyes, Pointed};
 use crate::input::{Action, Actions, Bindings, Bound, HandKeys, Receiver, Router, Step, Unbound};
 use crate::moment::Moment;
 use crate::news::{Ask, Status};
@@ -50,6 +50,38 @@ pub(super) struct Reach<'r> {
     pub(super) eyes: &'r mut Eyes,
     pub(super) selected: &'r mut Option<usize>,
     pub(super) ask: &'r Sender<Ask>,
+}
+
+/// What is to be done of what people did.
+struct Heard {
+    moves: Vec<Bound>,
+    rest: Vec<Bound>,
+    orders: Vec<String>,
+}
+
+/// Everything that can be pointed at.
+struct Pointing<'p> {
+    picker: &'p Picker,
+    moment: &'p Moment,
+    eyes: Eyes,
+    scene: egui::Rect,
+}
+
+impl Pointing<'_> {
+    fn at(&self, camera: &SceneCamera, at: egui::Pos2) -> Pointed {
+        let pair = |vector: egui::Vec2| [f64::from(vector.x), f64::from(vector.y)];
+        self.eyes.point(camera, pair(self.scene.size()), pair(at - self.scene.min))
+    }
+
+    fn hit(&self, camera: &SceneCamera, at: egui::Pos2) -> Option<Hit> {
+        self.picker.pick(self.moment, &self.at(camera, at).ray)
+    }
+
+    /// Of what lies there; of nothing, as far away as both eyes agree (m).
+    fn place(&self, camera: &SceneCamera, at: egui::Pos2) -> Point3<f64> {
+        let ray = self.at(camera, at).ray;
+        self.picker.pick(self.moment, &ray).map_or_else(|| ray.at(self.eyes.convergence_m), |hit| hit.place)
+    }
 }
 
 impl Controls {
@@ -101,59 +133,62 @@ impl Controls {
         moment: &Moment,
         reach: &mut Reach<'_>,
     ) {
-        let (events, now_s, dt_s) =
-            ui.input(|input| (input.events.clone(), input.time, f64::from(input.stable_dt)));
-        let writes = ui.ctx().text_edit_focused();
-        let size = [scene.rect.width(), scene.rect.height()].map(f64::from);
-        let eyes = *reach.eyes;
+        let (now_s, dt_s) = ui.input(|input| (input.time, f64::from(input.stable_dt)));
         let picker = std::mem::take(&mut self.picker);
-        let hit = |camera: &SceneCamera, at: egui::Pos2| -> (Option<Hit>, Point3<f64>) {
-            let at = at - scene.rect.min;
-            let ray = eyes.point(camera, size, [f64::from(at.x), f64::from(at.y)]).ray;
-            let hit = picker.pick(moment, &ray);
-            (hit, hit.map_or_else(|| ray.at(eyes.convergence_m), |hit| hit.place))
-        };
-        let sight = Sight {
-            scene: scene.rect,
-            point: &|camera, at| hit(camera, at).1,
-            pixel_m: eyes.point(reach.camera, size, [0.0; 2]).pixel_m,
-            is_over: scene.contains_pointer(),
-        };
-        let is_active = self.sun_is_chosen || reach.selected.is_some();
-        let moves = |action: Action| is_active && matches!(action, Action::Move(_) | Action::Turn(_));
-        let (mut active, mut rest, mut unbound) =
-            (Actions::new(&moves), Actions::new(&|_| true), Unbound::default());
-        let mut camera = CameraTurn { man: &mut self.man, camera: reach.camera, sight: &sight };
-        // In the order of Melder 7.2.12: the active entity, the camera, the hand, the application.
-        let receivers: &mut [&mut dyn Receiver] =
-            &mut [&mut active, &mut camera, &mut self.hand, &mut rest, &mut unbound];
-        for event in &events {
-            match event {
-                egui::Event::Key { .. } if writes => {}
-                egui::Event::WindowFocused(false) => self.router.let_go(&self.bindings, receivers),
-                _ => {
-                    self.router.tell(event, &self.bindings, receivers);
-                }
-            }
-        }
-        let (moved, done, orders) = (active.taken, rest.taken, unbound.orders);
+        let pointing = Pointing { picker: &picker, moment, eyes: *reach.eyes, scene: scene.rect };
+        let heard = self.hear(ui, scene, &pointing, reach);
         self.man.fly(reach.camera, dt_s);
         if let Some(at) = scene.interact_pointer_pos().filter(|_| scene.clicked()) {
-            *reach.selected = hit(reach.camera, at).0.map(|hit| hit.entity);
+            *reach.selected = pointing.hit(reach.camera, at).map(|hit| hit.entity);
             self.sun_is_chosen = false;
         }
         self.picker = picker;
-        orders.into_iter().for_each(|order| order_of(reach, order));
-        for bound in moved {
+        heard.orders.into_iter().for_each(|order| order_of(reach, order));
+        for bound in heard.moves {
             self.steer(bound, moment, now_s, reach);
         }
-        for bound in done {
+        for bound in heard.rest {
             self.act(ui.ctx(), bound.action, now_s, reach);
         }
         reach.view.chosen = *reach.selected;
         for note in reach.view.said.try_iter() {
             self.board.add(note.into(), now_s);
         }
+    }
+
+    /// Tells everybody what came in, in the order of Melder 7.2.12: the active entity, the camera, the hand, the
+    /// application.
+    fn hear(
+        &mut self,
+        ui: &egui::Ui,
+        scene: &egui::Response,
+        pointing: &Pointing<'_>,
+        reach: &mut Reach<'_>,
+    ) -> Heard {
+        let is_active = self.sun_is_chosen || reach.selected.is_some();
+        let moves = |action: Action| is_active && matches!(action, Action::Move(_) | Action::Turn(_));
+        let (mut active, mut rest) = (Actions::new(&moves), Actions::new(&|_| true));
+        let mut unbound = Unbound::default();
+        let sight = Sight {
+            scene: scene.rect,
+            point: &|camera, at| pointing.place(camera, at),
+            pixel_m: pointing.at(reach.camera, scene.rect.min).pixel_m,
+            is_over: scene.contains_pointer(),
+        };
+        let mut camera = CameraTurn { man: &mut self.man, camera: reach.camera, sight: &sight };
+        let receivers: &mut [&mut dyn Receiver] =
+            &mut [&mut active, &mut camera, &mut self.hand, &mut rest, &mut unbound];
+        let is_elsewhere = elsewhere(ui, scene);
+        for event in ui.input(|input| input.events.clone()) {
+            match event {
+                egui::Event::Key { key, pressed: true, .. } if is_elsewhere(key) => {}
+                egui::Event::WindowFocused(false) => self.router.let_go(&self.bindings, receivers),
+                _ => {
+                    self.router.tell(&event, &self.bindings, receivers);
+                }
+            }
+        }
+        Heard { moves: active.taken, rest: rest.taken, orders: unbound.orders }
     }
 
     /// Moves what is chosen.
@@ -171,73 +206,65 @@ impl Controls {
     }
 
     fn act(&mut self, ctx: &egui::Context, action: Action, now_s: f64, reach: &mut Reach<'_>) {
-        let said = match action {
-            Action::Exit if self.with_help => {
-                self.with_help = false;
-                None
-            }
-            Action::Exit => {
-                ctx.send_viewport_cmd(egui::ViewportCommand::Close);
-                None
-            }
-            Action::Help => {
-                self.with_help ^= true;
-                None
-            }
-            Action::Panel => {
-                self.with_panel ^= true;
-                None
-            }
-            Action::Pause | Action::Reset | Action::Stiffness(_) | Action::Damping(_) => {
-                let name = reach.selected.map(|entity| reach.view.stage.name(entity));
-                let order = self.steering.command(action, name);
-                order.into_iter().for_each(|order| order_of(reach, order));
-                None
-            }
-            Action::Record => {
-                // Who listened is gone: the run is over.
-                let _ = reach.ask.send(Ask::Record(self.status.recording.is_none()));
-                None
-            }
-            Action::Snapshot => {
-                reach.view.picture = Some(snapshot_file(&self.pictures));
-                None
-            }
-            Action::Shadows => Some(switch("shadows", &mut reach.view.with_shadows)),
-            Action::Overlay => Some(switch("overlay", &mut reach.view.with_overlay)),
-            Action::Highlight => Some(switch("highlight", &mut reach.view.with_highlight)),
-            Action::Stereo => {
-                reach.eyes.mode = next_mode(reach.eyes.mode);
-                Some(stereo_word(reach.eyes.mode))
-            }
-            Action::Separation(step) => Some(separate(reach.eyes, step)),
-            Action::Convergence(step) => Some(converge(reach.eyes, step)),
-            Action::NextCamera => {
-                self.home = (self.home + 1) % reach.view.stage.cameras.len().max(1);
-                self.go_home(reach)
-            }
-            Action::HomeCamera => self.go_home(reach),
-            Action::Choose(step) => {
-                self.sun_is_chosen = false;
-                *reach.selected = next_thing(&reach.view.stage, *reach.selected, step);
-                reach.selected.map(|entity| reach.view.stage.name(entity).to_owned())
-            }
-            Action::ChooseNone => {
-                (*reach.selected, self.sun_is_chosen) = (None, false);
-                Some("nothing is chosen".into())
-            }
-            Action::ChooseSun => {
-                *reach.selected = None;
-                self.sun_is_chosen ^= true;
-                Some(if self.sun_is_chosen { "the sun: arrows turn it" } else { "nothing is chosen" }.into())
-            }
-            // The hand's, which took them.
-            Action::Move(_) | Action::Turn(_) => None,
-            Action::Grip | Action::GripToggle | Action::Fingers(_) => None,
-        };
+        self.act_on_run(ctx, action, reach);
+        let said = self.act_on_picture(action, reach).or_else(|| self.choose(action, reach));
         if let Some(text) = said {
             self.board.replace(Note { text, at: ABOVE, seconds: GLANCE_S }, now_s);
         }
+    }
+
+    fn act_on_run(&mut self, ctx: &egui::Context, action: Action, reach: &mut Reach<'_>) {
+        match action {
+            // Who wants the help to go does not want the run to end.
+            Action::Exit if self.with_help => self.with_help = false,
+            Action::Exit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
+            Action::Help => self.with_help ^= true,
+            Action::Panel => self.with_panel ^= true,
+            Action::Record => {
+                // Who listened is gone: the run is over.
+                let _ = reach.ask.send(Ask::Record(self.status.recording.is_none()));
+            }
+            Action::Snapshot => reach.view.picture = Some(snapshot_file(&self.pictures)),
+            _ => {
+                let name = reach.selected.map(|entity| reach.view.stage.name(entity));
+                let order = self.steering.command(action, name);
+                order.into_iter().for_each(|order| order_of(reach, order));
+            }
+        }
+    }
+
+    /// What it says of it, if it is about the picture.
+    fn act_on_picture(&mut self, action: Action, reach: &mut Reach<'_>) -> Option<String> {
+        Some(match action {
+            Action::Shadows => switch("shadows", &mut reach.view.with_shadows),
+            Action::Overlay => switch("overlay", &mut reach.view.with_overlay),
+            Action::Highlight => switch("highlight", &mut reach.view.with_highlight),
+            Action::Stereo => {
+                reach.eyes.mode = next_mode(reach.eyes.mode);
+                stereo_word(reach.eyes.mode)
+            }
+            Action::Separation(step) => separate(reach.eyes, step),
+            Action::Convergence(step) => converge(reach.eyes, step),
+            Action::NextCamera => {
+                self.home = (self.home + 1) % reach.view.stage.cameras.len().max(1);
+                self.go_home(reach)?
+            }
+            Action::HomeCamera => self.go_home(reach)?,
+            _ => return None,
+        })
+    }
+
+    /// What is chosen then, if it is about that.
+    fn choose(&mut self, action: Action, reach: &mut Reach<'_>) -> Option<String> {
+        (*reach.selected, self.sun_is_chosen) = match action {
+            Action::Choose(step) => (next_thing(&reach.view.stage, *reach.selected, step), false),
+            Action::ChooseNone => (None, false),
+            Action::ChooseSun => (None, !self.sun_is_chosen),
+            _ => return None,
+        };
+        let name = reach.selected.map(|entity| reach.view.stage.name(entity));
+        let sun = self.sun_is_chosen.then_some("the sun: arrows turn it");
+        Some(sun.or(name).unwrap_or("nothing is chosen").to_owned())
     }
 
     fn go_home(&self, reach: &mut Reach<'_>) -> Option<String> {
@@ -256,6 +283,18 @@ impl Controls {
             writing::help(&painter, scene, &self.bindings);
         }
     }
+}
+
+/// Which keys are meant for what is written into, or focused, elsewhere; the scene takes focus back when it is pressed.
+fn elsewhere(ui: &egui::Ui, scene: &egui::Response) -> impl Fn(egui::Key) -> bool + use<> {
+    use egui::Key::{ArrowDown, ArrowLeft, ArrowRight, ArrowUp, Enter, Space};
+    let focused = ui.memory(|memory| memory.focused()).filter(|focused| *focused != scene.id);
+    if let Some(focused) = focused.filter(|_| scene.is_pointer_button_down_on()) {
+        ui.memory_mut(|memory| memory.surrender_focus(focused));
+    }
+    let writes = ui.ctx().text_edit_focused();
+    let moving = [ArrowDown, ArrowLeft, ArrowRight, ArrowUp, Enter, Space];
+    move |key| writes || focused.is_some() && moving.contains(&key)
 }
 
 fn order_of(reach: &Reach<'_>, order: String) {
