@@ -76,7 +76,7 @@ fn chart(
     least_top: f64,
     with_times: bool,
 ) {
-    ui.label(RichText::new(title).small());
+    ui.label(title);
     let lines: Vec<Vec<[f64; 2]>> = (0..colours.len()).map(|line| history.line(line)).collect();
     let greatest = lines.iter().flatten().map(|[_, value]| *value).fold(least_top, f64::max);
     let top = round_up(greatest);
@@ -91,7 +91,7 @@ fn chart(
         .allow_axis_zoom_drag(false)
         .show_axes([with_times, true])
         .y_axis_min_width(NUMBERS)
-        .x_grid_spacer(|_| marks(&[-10.0, -8.0, -6.0, -4.0, -2.0, 0.0], 2.0))
+        .x_grid_spacer(|_| marks(&[-10.0, -7.5, -5.0, -2.5, 0.0], 5.0))
         .y_grid_spacer(move |_| marks(&[0.0, 0.5 * top, top], 0.5 * top))
         .x_axis_formatter(
             |mark, _| if mark.value == 0.0 { "now".into() } else { format!("{} s", mark.value) },
@@ -102,9 +102,11 @@ fn chart(
     plot.show(ui, |plot| {
         plot.set_plot_bounds_x(-KEPT_S..=0.0);
         // A line at the top, or at zero, is seen as a whole.
-        plot.set_plot_bounds_y(-0.04 * top..=1.04 * top);
-        for (line, colour) in lines.into_iter().zip(colours) {
-            plot.line(Line::new("", PlotPoints::from(line)).color(*colour).width(1.2).allow_hover(false));
+        plot.set_plot_bounds_y(-0.06 * top..=1.1 * top);
+        // The first are thicker: fingers that feel the same are seen all the same.
+        for ((line, colour), behind) in lines.into_iter().zip(colours).zip((0..colours.len()).rev()) {
+            let width = 1.2 + 1.3 * behind.min(4) as f32;
+            plot.line(Line::new("", PlotPoints::from(line)).color(*colour).width(width).allow_hover(false));
         }
     });
 }

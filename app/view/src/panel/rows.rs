@@ -59,7 +59,10 @@ fn row(
 ) -> bool {
     let (place, response) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::click());
     let visuals = ui.visuals().clone();
-    if selected == Some(entity) {
+    let is_selected = selected == Some(entity);
+    let (strong, weak) = if is_selected { (255, 220) } else { (200, 160) };
+    let [strong, weak] = [strong, weak].map(Color32::from_gray);
+    if is_selected {
         ui.painter().rect_filled(place, 2.0, visuals.selection.bg_fill);
     } else if response.hovered() {
         ui.painter().rect_filled(place, 2.0, visuals.widgets.hovered.weak_bg_fill);
@@ -69,8 +72,8 @@ fn row(
     let cell = |from: f32, to: f32| Rect::from_x_y_ranges(from..=to, place.y_range());
     let words = |cell: Rect, words: &str, colour: Color32| write(ui, cell, words, colour, &font);
     let name = &stage.known[entity].name;
-    words(cell(place.left() + 2.0, list_at - 4.0), name, visuals.text_color());
-    words(cell(list_at, contacts_at - 4.0), list, visuals.weak_text_color());
+    words(cell(place.left() + 2.0, list_at - 4.0), name, strong);
+    words(cell(list_at, contacts_at - 4.0), list, weak);
     let mut at = contacts_at;
     for finger in contacts.fingers(entity) {
         let name = stage.fingers.get(*finger).map_or("finger", String::as_str);
@@ -80,7 +83,7 @@ fn row(
         if at >= place.right() {
             break;
         }
-        at = words(cell(at, place.right()), other, visuals.weak_text_color()) + 5.0;
+        at = words(cell(at, place.right()), other, weak) + 5.0;
     }
     response.clicked()
 }
