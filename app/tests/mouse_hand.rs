@@ -208,6 +208,8 @@ fn what_is_below_the_hand_is_the_cube_at_first() {
     let stage = std::sync::Arc::new(Stage::new(&rig.scene, table.fast.step_mut().entities()));
     let poses: Vec<_> = table.fast.step_mut().entities().iter().map(|entity| entity.X_WB).collect();
     let over = table.cube() + Vector3::new(0.005, 0.1, -0.005);
-    let met = Below::default().first(&stage, &poses, &over).expect("the cube");
+    let met = Below::default().first(&stage, &poses, &over, |_| false).expect("the cube");
     assert!((met - (table.cube() + Vector3::new(0.005, 0.5 * EDGE_M, -0.005))).norm() < 1e-6, "{met}");
+    let met = Below::default().first(&stage, &poses, &over, |entity| entity == CUBE).expect("the table");
+    assert!((met - Vector3::new(over.x, 0.0, over.z)).norm() < 1e-6, "what is held is left out: {met}");
 }

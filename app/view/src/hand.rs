@@ -9,6 +9,7 @@
 
 mod below;
 mod grip;
+mod pad;
 mod seen;
 
 pub use below::{Below, Cue};
@@ -20,6 +21,7 @@ use crate::news::Wish;
 use crate::stage::Stage;
 use eframe::egui::{self, Key, PointerButton, Vec2};
 use nalgebra::{UnitQuaternion, Vector3};
+use pad::{Pad, Push};
 use std::sync::Arc;
 use world::SceneCamera;
 
@@ -27,7 +29,7 @@ use world::SceneCamera;
 pub const NOTCH_M: f64 = 0.004;
 /// What is left of wheel and keys while Shift is held.
 pub const FINE: f64 = 0.25;
-/// How fast keys move the hand (m/s), and turn it (rad/s).
+/// How fast keys and controllers move the hand (m/s), and turn it (rad/s).
 const KEYS_M_PER_S: f64 = 0.08;
 const KEYS_RAD_PER_S: f64 = 1.5;
 /// Touchpads tell points; so many are a notch.
@@ -46,6 +48,7 @@ pub struct MouseHand {
     reach: [Vector3<f64>; 2],
     wishes: Vec<Wish>,
     below: Below,
+    pad: Pad,
     /// Whether the grip stays closed without a key.
     is_latched: bool,
 }
@@ -72,14 +75,19 @@ impl MouseHand {
         // Who writes into a field, or is at a button, does not mean the hand.
         let is_elsewhere = scene.ctx.memory(|memory| memory.focused().is_some());
         let is_over = scene.contains_pointer();
-        scene.ctx.input(|input| {
+        let is_squeezed = scene.ctx.input(|input| {
             if is_over {
                 self.wheel(notches(&input.events), input.modifiers.shift, &seen);
             }
-            if !is_elsewhere {
-                self.keys(input, &seen, dt_s);
-            }
+            !is_elsewhere && self.keys(input, &seen, dt_s)
         });
+        let push = self.pad.push(dt_s);
+        self.follow(&push, &seen, dt_s);
+        if is_squeezed || self.is_latched || push.closes {
+            self.grip.close();
+        } else {
+            self.grip.open();
+        }
         self.pass(dt_s)
     }
 
@@ -129,12 +137,23 @@ impl MouseHand {
 
     /// What shows where the hand is over things.
     pub fn cue(&mut self, stage: &Arc<Stage>, moment: &Moment) -> Option<Cue> {
-        let fingers = moment.fingers.iter().take(self.grip.fingers());
-        let hips: Vec<Vector3<f64>> = fingers.map(|finger| finger.hip).collect();
-        self.below.cue(stage, &moment.poses, &hips)
+        let fingers = &moment.fingers[..self.grip.fingers().min(moment.fingers.len())];
+        let hips: Vec<Vector3<f64>> = fingers.iter().map(|finger| finger.hip).collect();
+        // What two fingers touch they hold: the hand is in it, not over it.
+        let touched: Vec<usize> = fingers.iter().filter_map(|finger| finger.entity).collect();
+        let is_held = |entity: usize| touched.iter().filter(|other| **other == entity).count() > 1;
+        self.below.cue(stage, &moment.poses, &hips, is_held)
     }
 
-    fn keys(&mut self, input: &egui::InputState, seen: &Seen, dt_s: f64) {
+    /// A controller's sticks are held like this.
+    fn follow(&mut self, push: &Push, seen: &Seen, dt_s: f64) {
+        let way = seen.right() * push.right + seen.up() * push.up + seen.along(&self.place) * push.away;
+        self.go(way * (KEYS_M_PER_S * dt_s));
+        self.grip.turn(push.turn * KEYS_RAD_PER_S * dt_s);
+    }
+
+    /// Answers whether one of them squeezes.
+    fn keys(&mut self, input: &egui::InputState, seen: &Seen, dt_s: f64) -> bool {
         let share = if input.modifiers.shift { FINE } else { 1.0 };
         let held =
             |more: Key, less: Key| f64::from(i8::from(input.key_down(more)) - i8::from(input.key_down(less)));
@@ -151,12 +170,17 @@ impl MouseHand {
             }
         }
         self.is_latched ^= input.key_pressed(Key::G);
-        if input.key_down(Key::Space) || self.is_latched {
-            self.grip.close();
-        } else {
-            self.grip.open();
-        }
+        input.key_down(Key::Space)
     }
+}
+
+/// Between the first finger, the thumb, and the middle of the others (m).
+pub fn middle(fingers: &[Vector3<f64>]) -> Vector3<f64> {
+    let Some((thumb, others)) = fingers.split_first() else { return Vector3::zeros() };
+    if others.is_empty() {
+        return *thumb;
+    }
+    0.5 * (thumb + others.iter().sum::<Vector3<f64>>() / others.len() as f64)
 }
 
 /// What the wheel did for the hand; with Ctrl it is the camera's.

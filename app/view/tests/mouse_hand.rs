@@ -174,11 +174,24 @@ fn the_ring_is_on_the_first_thing_straight_below_the_fingers() {
         ..Moment::default()
     };
     let cue = hand(2).cue(&stage, &moment).expect("something is below");
-    assert_eq!(cue.from, Vector3::new(-0.01, 0.1, 0.02));
+    // Sums and quotients of numbers below one.
+    assert!((cue.from - Vector3::new(-0.01, 0.1, 0.02)).norm() < 1e-12, "{}", cue.from);
     assert!((cue.to - Vector3::new(-0.01, 0.04, 0.02)).norm() < 1e-12, "{}", cue.to);
     assert_eq!(cue.feet.len(), 1);
     assert!((cue.feet[0] - Vector3::new(0.04, 0.04, 0.02)).norm() < 1e-12);
+    // What both fingers touch they hold.
+    let touching = |finger: &FingerMoment| FingerMoment { entity: Some(0), ..*finger };
+    let fingers = moment.fingers.iter().map(touching).collect();
+    assert_eq!(hand(2).cue(&stage, &Moment { fingers, ..moment.clone() }), None);
     let mut below = Below::default();
-    assert_eq!(below.first(&stage, &moment.poses, &Vector3::new(0.3, 0.1, 0.0)), None, "beside everything");
-    assert_eq!(below.first(&stage, &moment.poses, &Vector3::new(0.0, -0.1, 0.0)), None, "below everything");
+    assert_eq!(
+        below.first(&stage, &moment.poses, &Vector3::new(0.3, 0.1, 0.0), |_| false),
+        None,
+        "beside everything"
+    );
+    assert_eq!(
+        below.first(&stage, &moment.poses, &Vector3::new(0.0, -0.1, 0.0), |_| false),
+        None,
+        "below everything"
+    );
 }

@@ -15,17 +15,15 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 
-/// From thumb to fingers, open and closed (m).
-pub const OPEN_M: f64 = 0.075;
-pub const CLOSED_M: f64 = 0.014;
+/// From thumb to fingers (m).
+const OPEN_M: f64 = 0.075;
+const CLOSED_M: f64 = 0.014;
 /// How fast that changes (m/s).
 const PACE_M_PER_S: f64 = 0.08;
 /// Between the two that oppose the thumb (m).
 const BESIDE_M: f64 = 0.024;
 /// How high folded fingers are above the hand (m), and how far from each other.
 const FOLDED_M: f64 = 0.06;
-/// As many fingers close on something at most.
-const MOST: usize = 3;
 
 /// A grip.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,9 +47,12 @@ impl Default for Grip {
 }
 
 impl Grip {
+    /// As many fingers close on something at most.
+    pub const MOST: usize = 3;
+
     /// Open, of a hand with so many fingers, along x.
     pub fn new(all: usize) -> Self {
-        let fingers = all.min(MOST);
+        let fingers = all.min(Self::MOST);
         Self { all, fingers, is_closing: false, opening_m: OPEN_M, facing_rad: 0.0, turned_rad: 0.0 }
     }
 
@@ -72,7 +73,7 @@ impl Grip {
 
     /// So many take part, as far as there are so many.
     pub fn set_fingers(&mut self, fingers: usize) {
-        self.fingers = fingers.clamp(1.min(self.all), self.all.min(MOST));
+        self.fingers = fingers.clamp(1.min(self.all), self.all.min(Self::MOST));
     }
 
     /// As many take part.
