@@ -16,7 +16,7 @@ pub use below::{Below, Cue};
 pub use grip::Grip;
 pub use seen::Seen;
 
-use crate::moment::Moment;
+use crate::moment::{FingerMoment, Moment};
 use crate::news::Wish;
 use crate::stage::Stage;
 use eframe::egui::{self, Key, PointerButton, Vec2};
@@ -135,14 +135,19 @@ impl MouseHand {
         &self.wishes
     }
 
+    /// What the fingers feel.
+    pub fn feel(&mut self, moment: &Moment) {
+        let fingers = &moment.fingers[..self.grip.fingers().min(moment.fingers.len())];
+        let held = fingers.iter().filter(|finger| finger.entity.is_some_and(|it| is_held(fingers, it)));
+        self.grip.feel(held.map(|finger| finger.force.norm()).fold(0.0, f64::max));
+    }
+
     /// What shows where the hand is over things.
     pub fn cue(&mut self, stage: &Arc<Stage>, moment: &Moment) -> Option<Cue> {
         let fingers = &moment.fingers[..self.grip.fingers().min(moment.fingers.len())];
         let hips: Vec<Vector3<f64>> = fingers.iter().map(|finger| finger.hip).collect();
-        // What two fingers touch they hold: the hand is in it, not over it.
-        let touched: Vec<usize> = fingers.iter().filter_map(|finger| finger.entity).collect();
-        let is_held = |entity: usize| touched.iter().filter(|other| **other == entity).count() > 1;
-        self.below.cue(stage, &moment.poses, &hips, is_held)
+        // The hand is in what it holds, not over it.
+        self.below.cue(stage, &moment.poses, &hips, |entity| is_held(fingers, entity))
     }
 
     /// A controller's sticks are held like this.
@@ -181,6 +186,11 @@ pub fn middle(fingers: &[Vector3<f64>]) -> Vector3<f64> {
         return *thumb;
     }
     0.5 * (thumb + others.iter().sum::<Vector3<f64>>() / others.len() as f64)
+}
+
+/// What two fingers touch they hold.
+fn is_held(fingers: &[FingerMoment], entity: usize) -> bool {
+    fingers.iter().filter(|finger| finger.entity == Some(entity)).count() > 1
 }
 
 /// What the wheel did for the hand; with Ctrl it is the camera's.

@@ -96,6 +96,7 @@ impl eframe::App for Looker {
             let cue = self.reins.as_ref().and_then(|_| self.hand.cue(&self.view.stage, &moment));
             let scene = self.view.show(ui, moment, &self.camera, &self.eyes);
             if let Some(reins) = &mut self.reins {
+                self.playback.newest().into_iter().for_each(|newest| self.hand.feel(newest));
                 reins.pull(self.hand.turn(&scene, &self.camera, dt_s));
             }
             // With two eyes a line that is drawn once would be nowhere.
