@@ -11,7 +11,7 @@ use io_driver::live_hand::{LiveHand, LiveWish};
 use nalgebra::Vector3;
 use std::path::PathBuf;
 use tempfile::TempDir;
-use view::hand::MouseHand;
+use view::hand::{Grip, MouseHand, middle};
 use view::{Reins, Wish};
 
 /// Where files lie in memory.
@@ -56,14 +56,12 @@ impl LiveHandFile {
     /// If nobody knows how far the devices reach.
     pub fn into_reins(self, rig: &Rig) -> Result<LiveReins, RunFailure> {
         let reach = rig.reach().map_err(|error| RunFailure::Start(error.to_string()))?;
-        let starts = rig.scene.fingers.iter().map(|finger| finger.start_m.coords);
-        let count = rig.scene.fingers.len();
-        let middle = starts.sum::<Vector3<f64>>() / count.max(1) as f64;
+        let fingers = &rig.scene.fingers;
+        let starts: Vec<Vector3<f64>> = fingers.iter().map(|finger| finger.start_m.coords).collect();
         Ok(LiveReins {
             hand: self.hand,
-            devices: rig.scene.fingers.iter().map(|finger| finger.device).collect(),
-            count,
-            middle,
+            devices: fingers.iter().map(|finger| finger.device).collect(),
+            middle: middle(&starts[..starts.len().min(Grip::MOST)]),
             reach,
         })
     }
@@ -75,7 +73,6 @@ pub struct LiveReins {
     hand: LiveHand,
     /// Of each finger.
     devices: Vec<usize>,
-    count: usize,
     /// Of where the fingers begin (m).
     middle: Vector3<f64>,
     /// Corners of what all devices reach (m).
@@ -84,7 +81,7 @@ pub struct LiveReins {
 
 impl Reins for LiveReins {
     fn hand(&self) -> MouseHand {
-        MouseHand::new(self.count, self.middle, self.reach)
+        MouseHand::new(self.devices.len(), self.middle, self.reach)
     }
 
     fn pull(&mut self, wishes: &[Wish]) {

@@ -20,7 +20,7 @@ use notes::Notes;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use view::{Ask, Glimpse, News, Note, OpenWindow, Sample, Status};
+use view::{Ask, Glimpse, News, OpenWindow, Sample, Status};
 use world::events::Hub;
 
 /// Between two glimpses at least: each turn of the slow side has one.
@@ -60,8 +60,8 @@ pub struct Spectator {
     told: Instant,
     happened: Happened,
     notes: Notes,
-    /// What there is to read that the window had no time for.
-    untold: VecDeque<Note>,
+    /// What the window had no time for and has to know.
+    untold: VecDeque<News>,
     /// Of a driver in a process of its own.
     gauge: Option<Gauge>,
     wants_record: Option<bool>,
@@ -124,7 +124,7 @@ impl Spectator {
         self.moments = moments;
         self.newest = None;
         self.samples.clear();
-        self.window.tell(News::Scene(Box::new(stage)));
+        self.untold.push_back(News::Scene(Box::new(stage)));
     }
 
     /// The slow side's turn.
@@ -132,7 +132,9 @@ impl Spectator {
         if let Some(gauge) = &mut self.gauge {
             gauge.step();
         }
+        self.tell_what_must_be();
         if self.told.elapsed() >= self.pause
+            && self.untold.is_empty()
             && !self.samples.is_empty()
             && let Some((row, bodies, placed)) = &self.newest
         {
@@ -143,7 +145,6 @@ impl Spectator {
             let samples = std::mem::take(&mut self.samples);
             self.window.tell(News::Glimpse(Box::new(Glimpse { moment, samples, status })));
         }
-        self.give_to_read();
         self.answer(desk);
     }
 
@@ -178,12 +179,12 @@ impl Spectator {
         is_slow
     }
 
-    /// Moments may be left out, what people are to read may not.
-    fn give_to_read(&mut self) {
-        self.untold.extend(self.notes.taken());
-        while let Some(note) = self.untold.pop_front() {
-            if let Some(News::Text(note)) = self.window.tell(News::Text(note)) {
-                self.untold.push_front(note);
+    /// Moments may be left out; other scenes, and what people are to read, may not.
+    fn tell_what_must_be(&mut self) {
+        self.untold.extend(self.notes.taken().map(News::Text));
+        while let Some(news) = self.untold.pop_front() {
+            if let Some(news) = self.window.tell(news) {
+                self.untold.push_front(news);
                 break;
             }
         }
@@ -195,7 +196,7 @@ impl Spectator {
                 Ask::Order(line) => {
                     let done = desk.as_mut().map(|desk| desk.order_now(&line));
                     if let Some(Err(error)) = done {
-                        self.untold.push_back(error.into());
+                        self.untold.push_back(News::Text(error.into()));
                     }
                 }
                 Ask::Record(wanted) => self.wants_record = Some(wanted),
@@ -217,7 +218,7 @@ impl Spectator {
 
     /// Tells people something.
     pub fn tell(&mut self, text: String) {
-        self.untold.push_back(text.into());
+        self.untold.push_back(News::Text(text.into()));
     }
 
     /// Whether the run shall end.

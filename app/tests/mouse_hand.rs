@@ -12,7 +12,7 @@ use phantom3::virtual_clock::VirtualDriver;
 use shm_abi::Frame;
 use shm_abi::segment::ClockMode;
 use view::hand::{Below, MouseHand, Seen};
-use view::{Reins, Stage};
+use view::{FingerMoment, Moment, Reins, Stage};
 use world::{SceneCamera, Settings};
 
 const PERIOD_NS: u64 = 1_000_000;
@@ -35,6 +35,8 @@ struct Table {
     heat: f64,
     /// Of each finger, the force on the user of the last tick (N).
     forces_n: Vec<f64>,
+    /// What the window was told last.
+    told: Moment,
 }
 
 impl Table {
@@ -65,6 +67,7 @@ impl Table {
             limits,
             heat,
             forces_n,
+            told: Moment::default(),
         };
         table.wait(0.5);
         table
@@ -74,6 +77,7 @@ impl Table {
     fn picture(&mut self, by: Vec2) {
         let seen = Seen::new(&self.camera, window());
         self.hand.face(&seen);
+        self.hand.feel(&self.told);
         self.hand.drag(by, &seen);
         self.reins.pull(self.hand.pass(PICTURE as f64 * 1e-3));
         for _ in 0..PICTURE {
@@ -88,6 +92,12 @@ impl Table {
             while let Some((row, _)) = self.rows.receive() {
                 let fingers = self.forces_n.iter_mut().zip(&row.fingers);
                 fingers.for_each(|(n, finger)| *n = finger.force_on_user.norm());
+                let felt = row.fingers[..self.forces_n.len()].iter().map(|finger| FingerMoment {
+                    force: finger.force_on_user,
+                    entity: finger.entity.map(|entity| entity as usize),
+                    ..FingerMoment::default()
+                });
+                self.told.fingers = felt.collect();
             }
         }
     }
@@ -163,12 +173,13 @@ fn a_mouse_lifts_the_cube_by_5_cm_and_holds_it() {
             let height_m = table.height_m();
             assert!(height_m > 0.5 * EDGE_M + 0.05, "{case}: {height_m}");
             for n in &table.forces_n[..fingers] {
-                assert!((0.5..4.0).contains(n), "{case}: {:?} N", table.forces_n);
+                assert!((0.3..1.8).contains(n), "{case}: {:?} N", table.forces_n);
             }
         }
         println!("{case}: {:.4} m, {:?} N, heat {:.2}", table.height_m(), table.forces_n, table.heat);
         assert_eq!(table.limits, 0, "{case}: a device had to cut something");
-        assert!(table.heat < 0.5, "{case}: {}", table.heat);
+        // A driver that starts takes the housings for as warm as they may be: 0.82. From 0.9 on less is let through.
+        assert!(table.heat < 0.88, "{case}: {}", table.heat);
         table.hand.grip.open();
         table.wait(1.0);
         let height_m = table.height_m();
@@ -208,6 +219,8 @@ fn what_is_below_the_hand_is_the_cube_at_first() {
     let stage = std::sync::Arc::new(Stage::new(&rig.scene, table.fast.step_mut().entities()));
     let poses: Vec<_> = table.fast.step_mut().entities().iter().map(|entity| entity.X_WB).collect();
     let over = table.cube() + Vector3::new(0.005, 0.1, -0.005);
-    let met = Below::default().first(&stage, &poses, &over).expect("the cube");
+    let met = Below::default().first(&stage, &poses, &over, |_| false).expect("the cube");
     assert!((met - (table.cube() + Vector3::new(0.005, 0.5 * EDGE_M, -0.005))).norm() < 1e-6, "{met}");
+    let met = Below::default().first(&stage, &poses, &over, |entity| entity == CUBE).expect("the table");
+    assert!((met - Vector3::new(over.x, 0.0, over.z)).norm() < 1e-6, "what is held is left out: {met}");
 }

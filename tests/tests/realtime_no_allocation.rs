@@ -10,6 +10,7 @@ use io_driver::config::{DriverConfig, period_of};
 use io_driver::cycle::Cycle;
 use io_driver::device::{Device, Effort, Reading, TickTime, Written};
 use io_driver::driver::{describe, make_cycle};
+use io_driver::live_hand::{LiveHand, LiveWish};
 use io_driver::mail::{Inbox, Letter, Sender, mail};
 use io_driver::open::open_devices;
 use io_driver::sim::hand::model_file;
@@ -102,19 +103,25 @@ fn mapped_commanders() -> usize {
     maps.lines().filter(|line| line.contains("phantom3-commander")).count()
 }
 
-/// A hand that minds slip, another hand, and nobody.
+/// A hand that minds slip, another hand that somebody moves live, and nobody.
 fn simulated(directory: &Path) -> String {
     let model = model_file::builtin("pen-grip").unwrap().replace("minds_slip = false", "minds_slip = true");
     let file = directory.join("slip.toml");
     std::fs::write(&file, model).unwrap();
-    let device = |arm: &str, hand: &str| {
+    let live = directory.join("live");
+    LiveHand::create(&live).unwrap().want(3, &LiveWish::at(Vector3::new(0.01, 0.02, 0.0)));
+    let live = format!("live_hand = {:?}\nlive_finger = 3\n", live.to_str().unwrap());
+    let device = |arm: &str, hand: &str, more: &str| {
         format!(
-            "[[device]]\nbackend = \"simulated\"\ndescription = \"{arm}\"\nhand_model = {hand:?}\ngravity_compensation = true\n"
+            "[[device]]\nbackend = \"simulated\"\ndescription = \"{arm}\"\nhand_model = {hand:?}\ngravity_compensation = true\n{more}"
         )
     };
-    let hands =
-        [("premium-1.5", file.to_str().unwrap()), ("wooden-haptics", "fingertip"), ("premium-1.5", "nobody")];
-    hands.map(|(arm, hand)| device(arm, hand)).concat()
+    let hands = [
+        ("premium-1.5", file.to_str().unwrap(), ""),
+        ("wooden-haptics", "fingertip", live.as_str()),
+        ("premium-1.5", "nobody", ""),
+    ];
+    hands.map(|(arm, hand, more)| device(arm, hand, more)).concat()
 }
 
 /// A driver's tick, and what surrounds it.

@@ -68,13 +68,14 @@ impl Rig {
         Ok(common.filter(|[least, most]| least <= most).unwrap_or(everywhere))
     }
 
-    /// Over everything that can be moved, and every finger.
+    /// Over every finger, and what can be moved and is not out of their reach.
     fn base_over_table(&self, workspace: &Workspace) -> Isometry3<f64> {
         let starts = self.scene.fingers.iter().map(|finger| finger.start_m.coords);
+        let [least, most] = around(starts.clone());
+        let (middle, half) = (0.5 * (least + most), 0.5 * Vector3::from(workspace.size_m));
         let things = self.moving().map(|(_, entity, _)| entity.pose.translation.vector);
-        let places = starts.chain(things).map(|place| (place, place));
-        let around = places.reduce(|(least, most), (place, _)| (least.inf(&place), most.sup(&place)));
-        let (lowest, highest) = around.unwrap_or_default();
+        let near = things.filter(|place| (place - middle).abs() <= half);
+        let [lowest, highest] = around(starts.chain(near));
         base_over_table(lowest, highest, workspace)
     }
 
@@ -146,6 +147,15 @@ impl Rig {
             zeroing: Zeroing::Known,
         }
     }
+}
+
+/// Corners of a box.
+fn around(places: impl Iterator<Item = Vector3<f64>>) -> [Vector3<f64>; 2] {
+    let corners = places.map(|place| [place; 2]);
+    let joined = |[least, most]: [Vector3<f64>; 2], [place, _]: [Vector3<f64>; 2]| {
+        [least.inf(&place), most.sup(&place)]
+    };
+    corners.reduce(joined).unwrap_or_default()
 }
 
 /// Reads the hand file as the driver will, so that its mistakes are told here, by this process.

@@ -9,6 +9,7 @@
 
 mod below;
 mod grip;
+mod pad;
 mod seen;
 
 pub use below::{Below, Cue};
@@ -16,11 +17,12 @@ pub use grip::Grip;
 pub use seen::Seen;
 
 use crate::input::HandKeys;
-use crate::moment::Moment;
+use crate::moment::{FingerMoment, Moment};
 use crate::news::Wish;
 use crate::stage::Stage;
 use eframe::egui::{self, PointerButton, Vec2};
 use nalgebra::{UnitQuaternion, Vector3};
+use pad::{Pad, Push};
 use std::sync::Arc;
 use world::SceneCamera;
 
@@ -28,7 +30,7 @@ use world::SceneCamera;
 pub const NOTCH_M: f64 = 0.004;
 /// What is left of wheel and keys while Shift is held.
 pub const FINE: f64 = 0.25;
-/// How fast keys move the hand (m/s), and turn it (rad/s).
+/// How fast keys and controllers move the hand (m/s), and turn it (rad/s).
 const KEYS_M_PER_S: f64 = 0.08;
 const KEYS_RAD_PER_S: f64 = 1.5;
 /// Touchpads tell points; so many are a notch.
@@ -47,6 +49,7 @@ pub struct MouseHand {
     reach: [Vector3<f64>; 2],
     wishes: Vec<Wish>,
     below: Below,
+    pad: Pad,
 }
 
 impl MouseHand {
@@ -79,6 +82,13 @@ impl MouseHand {
             self.wheel(turned, is_fine, &seen);
         }
         self.obey(keys, &seen, dt_s);
+        let push = self.pad.push(dt_s);
+        self.follow(&push, &seen, dt_s);
+        if keys.is_closed() || push.closes {
+            self.grip.close();
+        } else {
+            self.grip.open();
+        }
         self.pass(dt_s)
     }
 
@@ -126,14 +136,29 @@ impl MouseHand {
         &self.wishes
     }
 
-    /// What shows where the hand is over things.
-    pub fn cue(&mut self, stage: &Arc<Stage>, moment: &Moment) -> Option<Cue> {
-        let fingers = moment.fingers.iter().take(self.grip.fingers());
-        let hips: Vec<Vector3<f64>> = fingers.map(|finger| finger.hip).collect();
-        self.below.cue(stage, &moment.poses, &hips)
+    /// What the fingers feel.
+    pub fn feel(&mut self, moment: &Moment) {
+        let fingers = &moment.fingers[..self.grip.fingers().min(moment.fingers.len())];
+        let held = fingers.iter().filter(|finger| finger.entity.is_some_and(|it| is_held(fingers, it)));
+        self.grip.feel(held.map(|finger| finger.force.norm()).fold(0.0, f64::max));
     }
 
-    /// Moves and turns it as keys say that are held for so long (s), closes its grip or opens it.
+    /// What shows where the hand is over things.
+    pub fn cue(&mut self, stage: &Arc<Stage>, moment: &Moment) -> Option<Cue> {
+        let fingers = &moment.fingers[..self.grip.fingers().min(moment.fingers.len())];
+        let hips: Vec<Vector3<f64>> = fingers.iter().map(|finger| finger.hip).collect();
+        // The hand is in what it holds, not over it.
+        self.below.cue(stage, &moment.poses, &hips, |entity| is_held(fingers, entity))
+    }
+
+    /// A controller's sticks are held like this.
+    fn follow(&mut self, push: &Push, seen: &Seen, dt_s: f64) {
+        let way = seen.right() * push.right + seen.up() * push.up + seen.along(&self.place) * push.away;
+        self.go(way * (KEYS_M_PER_S * dt_s));
+        self.grip.turn(push.turn * KEYS_RAD_PER_S * dt_s);
+    }
+
+    /// Moves and turns it as keys say that are held for so long (s).
     fn obey(&mut self, keys: &mut HandKeys, seen: &Seen, dt_s: f64) {
         let share = if keys.is_fine() { FINE } else { 1.0 };
         let level =
@@ -145,12 +170,21 @@ impl MouseHand {
         if let Some(fingers) = keys.take_fingers() {
             self.grip.set_fingers(fingers);
         }
-        if keys.is_closed() {
-            self.grip.close();
-        } else {
-            self.grip.open();
-        }
     }
+}
+
+/// Between the first finger, the thumb, and the middle of the others (m).
+pub fn middle(fingers: &[Vector3<f64>]) -> Vector3<f64> {
+    let Some((thumb, others)) = fingers.split_first() else { return Vector3::zeros() };
+    if others.is_empty() {
+        return *thumb;
+    }
+    0.5 * (thumb + others.iter().sum::<Vector3<f64>>() / others.len() as f64)
+}
+
+/// What two fingers touch they hold.
+fn is_held(fingers: &[FingerMoment], entity: usize) -> bool {
+    fingers.iter().filter(|finger| finger.entity == Some(entity)).count() > 1
 }
 
 /// What the wheel did for the hand; with Ctrl it is the camera's.

@@ -122,6 +122,24 @@ fn a_grip_closes_gradually_to_less_than_what_is_held_and_opens_to_more() {
     }
     assert!(last_m < 0.02, "{last_m}");
     hand.grip.open();
+    hand.pass(10.0);
+    hand.grip.close();
+    // Felt between two fingers it goes on slowly, and when it is enough no further; what one finger feels is not held.
+    for (entities, force_n, pace) in
+        [([Some(3), Some(4)], 1.5, 0.08), ([Some(3); 2], 0.5, 0.02), ([Some(3); 2], 1.2, 0.0)]
+    {
+        let felt = |entity| FingerMoment {
+            entity,
+            force: Vector3::new(force_n, 0.0, 0.0),
+            ..FingerMoment::default()
+        };
+        let fingers = entities.map(felt).to_vec();
+        hand.feel(&Moment { fingers, ..Moment::default() });
+        let before_m = width(&stands(&mut hand, 0.0));
+        let after_m = width(&stands(&mut hand, 0.1));
+        assert!((before_m - after_m - 0.1 * pace).abs() < 1e-12, "{force_n} N: {before_m} {after_m}");
+    }
+    hand.grip.open();
     assert_eq!(width(&stands(&mut hand, 10.0)), open_m);
 }
 
@@ -174,11 +192,24 @@ fn the_ring_is_on_the_first_thing_straight_below_the_fingers() {
         ..Moment::default()
     };
     let cue = hand(2).cue(&stage, &moment).expect("something is below");
-    assert_eq!(cue.from, Vector3::new(-0.01, 0.1, 0.02));
+    // Sums and quotients of numbers below one.
+    assert!((cue.from - Vector3::new(-0.01, 0.1, 0.02)).norm() < 1e-12, "{}", cue.from);
     assert!((cue.to - Vector3::new(-0.01, 0.04, 0.02)).norm() < 1e-12, "{}", cue.to);
     assert_eq!(cue.feet.len(), 1);
     assert!((cue.feet[0] - Vector3::new(0.04, 0.04, 0.02)).norm() < 1e-12);
+    // What both fingers touch they hold.
+    let touching = |finger: &FingerMoment| FingerMoment { entity: Some(0), ..*finger };
+    let fingers = moment.fingers.iter().map(touching).collect();
+    assert_eq!(hand(2).cue(&stage, &Moment { fingers, ..moment.clone() }), None);
     let mut below = Below::default();
-    assert_eq!(below.first(&stage, &moment.poses, &Vector3::new(0.3, 0.1, 0.0)), None, "beside everything");
-    assert_eq!(below.first(&stage, &moment.poses, &Vector3::new(0.0, -0.1, 0.0)), None, "below everything");
+    assert_eq!(
+        below.first(&stage, &moment.poses, &Vector3::new(0.3, 0.1, 0.0), |_| false),
+        None,
+        "beside everything"
+    );
+    assert_eq!(
+        below.first(&stage, &moment.poses, &Vector3::new(0.0, -0.1, 0.0), |_| false),
+        None,
+        "below everything"
+    );
 }

@@ -1,5 +1,6 @@
 //! What is below a hand: pictures do not tell how far away something floats.
 
+use super::middle;
 use super::seen::Seen;
 use crate::stage::{Stage, Thing};
 use eframe::egui::{Color32, Painter, Pos2, Shape, Stroke};
@@ -36,16 +37,17 @@ pub struct Cue {
 }
 
 impl Below {
-    /// Of fingers that are here (m), while entities are there. `None`: nothing is below them.
+    /// Of fingers that are here (m), while entities are there; without those that they hold. `None`: nothing is below them.
     pub fn cue(
         &mut self,
         stage: &Arc<Stage>,
         poses: &[Isometry3<f64>],
         fingers: &[Vector3<f64>],
+        is_held: impl Fn(usize) -> bool,
     ) -> Option<Cue> {
-        let from = fingers.iter().sum::<Vector3<f64>>() / fingers.len().max(1) as f64;
-        let to = self.first(stage, poses, &from)?;
-        let feet = fingers.iter().filter_map(|finger| self.first(stage, poses, finger)).collect();
+        let from = middle(fingers);
+        let to = self.first(stage, poses, &from, &is_held)?;
+        let feet = fingers.iter().filter_map(|finger| self.first(stage, poses, finger, &is_held)).collect();
         Some(Cue { from, to, feet })
     }
 
@@ -55,12 +57,14 @@ impl Below {
         stage: &Arc<Stage>,
         poses: &[Isometry3<f64>],
         from: &Vector3<f64>,
+        is_held: impl Fn(usize) -> bool,
     ) -> Option<Vector3<f64>> {
         if !self.stage.as_ref().is_some_and(|known| Arc::ptr_eq(known, stage)) {
             self.balls = stage.things.iter().map(ball_around).collect();
             self.stage = Some(Arc::clone(stage));
         }
-        let near = stage.things.iter().zip(&self.balls).filter_map(|(thing, (centre, radius_m))| {
+        let things = stage.things.iter().zip(&self.balls).filter(|(thing, _)| !is_held(thing.entity));
+        let near = things.filter_map(|(thing, (centre, radius_m))| {
             let pose = poses.get(thing.entity)? * thing.pose;
             let away = (pose * centre).coords - from;
             (away.x.hypot(away.z) <= *radius_m && away.y <= *radius_m).then_some((thing, pose))

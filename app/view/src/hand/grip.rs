@@ -1,31 +1,28 @@
 //! How fingers stand around the hand's place: open, or closed on what is between them.
 //!
 //! Model: two fingers oppose each other along an axis that lies level; of three the first is the thumb and the others stand
-//! side by side against it. Closing brings them to a distance that is smaller than what people hold: what is in between
-//! keeps them away, and their hand's stiffness times what is left of the way is the force. Fingers that take no part are
-//! folded above the hand.
-//!
-//! | hand and surface in series 150 N/m | between wish and surface | force |
-//! |---|---|---|
-//! | a thing of 40 mm, two fingers | 13 mm each | 2 N |
-//! | the same, thumb against two | 17 and 9 mm | 2.6 and 1.3 N |
-//!
+//! side by side against it. Closing brings their wishes nearer to each other than what is in between: it keeps the fingers
+//! away, and their hand's stiffness times what is left of the way is the force. They close quickly until something is felt
+//! between them, then slowly until it is felt enough: what a Premium's motors stand for ever (1.4 N), and what holds 150 g at
+//! a friction of 0.8. Fingers that take no part are folded above the hand.
 //! Frames: world, y up; metres.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 
-/// From thumb to fingers, open and closed (m).
-pub(crate) const OPEN_M: f64 = 0.075;
-pub(crate) const CLOSED_M: f64 = 0.014;
-/// How fast that changes (m/s).
+/// From thumb to fingers (m).
+const OPEN_M: f64 = 0.075;
+const CLOSED_M: f64 = 0.014;
+/// How fast that changes, and how fast when something is held (m/s).
 const PACE_M_PER_S: f64 = 0.08;
+const SQUEEZE_M_PER_S: f64 = 0.02;
+/// What is felt, and what is enough (N).
+const FELT_N: f64 = 0.05;
+const ENOUGH_N: f64 = 1.1;
 /// Between the two that oppose the thumb (m).
 const BESIDE_M: f64 = 0.024;
 /// How high folded fingers are above the hand (m), and how far from each other.
 const FOLDED_M: f64 = 0.06;
-/// As many fingers close on something at most.
-const MOST: usize = 3;
 
 /// A grip.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,6 +32,8 @@ pub struct Grip {
     /// That take part.
     fingers: usize,
     is_closing: bool,
+    /// What the finger that presses hardest presses what is held with (N).
+    pressing_n: f64,
     /// From thumb to fingers (m).
     opening_m: f64,
     /// Of the axis about y, from x: as who looks stands, and by how much it was turned besides (rad).
@@ -49,10 +48,21 @@ impl Default for Grip {
 }
 
 impl Grip {
+    /// As many fingers close on something at most.
+    pub const MOST: usize = 3;
+
     /// Open, of a hand with so many fingers, along x.
     pub fn new(all: usize) -> Self {
-        let fingers = all.min(MOST);
-        Self { all, fingers, is_closing: false, opening_m: OPEN_M, facing_rad: 0.0, turned_rad: 0.0 }
+        let fingers = all.min(Self::MOST);
+        Self {
+            all,
+            fingers,
+            is_closing: false,
+            pressing_n: 0.0,
+            opening_m: OPEN_M,
+            facing_rad: 0.0,
+            turned_rad: 0.0,
+        }
     }
 
     /// The fingers draw near to each other from now on.
@@ -72,7 +82,7 @@ impl Grip {
 
     /// So many take part, as far as there are so many.
     pub fn set_fingers(&mut self, fingers: usize) {
-        self.fingers = fingers.clamp(1.min(self.all), self.all.min(MOST));
+        self.fingers = fingers.clamp(1.min(self.all), self.all.min(Self::MOST));
     }
 
     /// As many take part.
@@ -92,14 +102,23 @@ impl Grip {
         }
     }
 
+    /// What is held is pressed so hard (N).
+    pub fn feel(&mut self, pressing_n: f64) {
+        self.pressing_n = pressing_n;
+    }
+
     /// Time goes by (s).
     pub fn pass(&mut self, dt_s: f64) {
-        let way_m = PACE_M_PER_S * dt_s;
-        self.opening_m = if self.is_closing {
-            (self.opening_m - way_m).max(CLOSED_M)
-        } else {
-            (self.opening_m + way_m).min(OPEN_M)
+        if !self.is_closing {
+            self.opening_m = (self.opening_m + PACE_M_PER_S * dt_s).min(OPEN_M);
+            return;
+        }
+        let pace = match self.pressing_n {
+            n if n < FELT_N => PACE_M_PER_S,
+            n if n < ENOUGH_N => SQUEEZE_M_PER_S,
+            _ => 0.0,
         };
+        self.opening_m = (self.opening_m - pace * dt_s).max(CLOSED_M);
     }
 
     /// From thumb to fingers (m).

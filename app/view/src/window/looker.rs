@@ -115,6 +115,7 @@ impl eframe::App for Looker {
             self.controls.turn(ui, &scene, &moment, &mut reach);
             self.controls.write(ui, scene.rect, &moment);
             if let Some(reins) = &mut self.reins {
+                self.playback.newest().into_iter().for_each(|newest| self.hand.feel(newest));
                 reins.pull(self.hand.turn(&scene, &self.camera, &mut self.controls.hand, dt_s));
             }
             // With two eyes a line that is drawn once would be nowhere.
