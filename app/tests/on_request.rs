@@ -63,7 +63,7 @@ impl Run {
         Self { place, driver, fast, slow, tick: 0 }
     }
 
-    /// Goes on until the run has had so many ticks, and the slow side all rows of them but one, as ever.
+    /// Goes on until the slow side has the rows of so many ticks; the next tick is answered, too.
     fn go_on_to(&mut self, run_tick: u64) {
         while self.fast.run_ticks() < run_tick {
             self.tick += 1;
@@ -126,8 +126,7 @@ fn what_is_recorded_in_the_middle_is_to_the_byte_what_the_whole_recording_has_of
     assert!(ends.iter().all(|recorded| recorded.failure.is_none() && recorded.lost == 0), "{ends:?}");
     assert_eq!(ends.len(), 4);
     let whole = lines(&whole);
-    // The row of a tick comes with the tick after it.
-    let expected = [(table, 499..899), (as_table(&first), 999..1299), (as_table(&second), 1399..1999)];
+    let expected = [(table, 500..900), (as_table(&first), 1000..1300), (as_table(&second), 1400..2000)];
     for (file, ticks) in expected {
         let found = lines(&file);
         assert_eq!(found.len(), ticks.len(), "{}", file.display());
@@ -146,7 +145,7 @@ fn a_recording_from_the_middle_says_where_it_begins_and_is_not_replayed() {
     slow.finish();
     let recorded = RecordedRun::open(&file).expect("a recording");
     let about = recorded.about().expect("facts");
-    assert_eq!(about.begins_tick(), Some(299));
+    assert_eq!(about.begins_tick(), Some(300));
     assert!(about.file("scene").is_some() && !about.follows());
     let said = std::process::Command::new(env!("CARGO_BIN_EXE_phantom3"))
         .args([Path::new("replay"), &file])
@@ -154,7 +153,7 @@ fn a_recording_from_the_middle_says_where_it_begins_and_is_not_replayed() {
         .expect("a program");
     let words = String::from_utf8_lossy(&said.stderr);
     assert_eq!(said.status.code(), Some(2), "{words}");
-    assert!(words.contains("begins at t = 0.299 s of its run"), "{words}");
+    assert!(words.contains("begins at t = 0.3 s of its run"), "{words}");
     drop(place);
 }
 
@@ -169,6 +168,6 @@ fn a_directory_that_is_not_there_is_told_and_the_run_goes_on() {
     let whole = run.path("whole.csv");
     let Run { slow, place, .. } = run;
     assert_eq!(slow.finish().recordings.len(), 1);
-    assert_eq!(lines(&whole).len(), 199);
+    assert_eq!(lines(&whole).len(), 200);
     drop(place);
 }
