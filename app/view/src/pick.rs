@@ -71,7 +71,8 @@ impl Picker {
     /// What a ray of the world meets first at this moment.
     pub fn pick(&self, moment: &Moment, ray: &Ray) -> Option<Hit> {
         let mut nearest: Option<Hit> = None;
-        for (thing, bundles) in &self.things {
+        let space = moment.seen_space();
+        for (thing, bundles) in self.things.iter().filter(|(thing, _)| thing.space == space) {
             let Some(frame) = moment.poses.get(thing.entity) else { continue };
             let within_m = nearest.map_or(f64::INFINITY, |hit| hit.distance_m);
             let own = ray.seen_from(&(frame * thing.pose));
@@ -187,6 +188,7 @@ mod tests {
             pose: Isometry3::identity(),
             colour: [1.0; 4],
             casts_shadow: false,
+            space: 0,
         });
         Stage { things: things.collect(), ..Stage::default() }
     }
