@@ -100,12 +100,13 @@ fn chart(
         .show_x(false)
         .show_y(false);
     plot.show(ui, |plot| {
-        plot.set_plot_bounds_x(-KEPT_S..=0.0);
+        // With room for the last word below.
+        plot.set_plot_bounds_x(-KEPT_S..=0.06 * KEPT_S);
         // A line at the top, or at zero, is seen as a whole.
         plot.set_plot_bounds_y(-0.06 * top..=1.1 * top);
         // The first are thicker: fingers that feel the same are seen all the same.
         for ((line, colour), behind) in lines.into_iter().zip(colours).zip((0..colours.len()).rev()) {
-            let width = 1.2 + 1.3 * behind.min(4) as f32;
+            let width = 1.2 + 1.6 * behind.min(3) as f32;
             plot.line(Line::new("", PlotPoints::from(line)).color(*colour).width(width).allow_hover(false));
         }
     });
