@@ -54,9 +54,12 @@ impl Screen {
         [dump[at + 2], dump[at + 1], dump[at]]
     }
 
-    /// Presses and releases a key, by its name in X; `false`: the machine has no `xdotool`, which is told.
+    /// Presses and releases a key in the program's window, by its name in X; `false`: the machine has no `xdotool`, which is told.
     pub fn press(&self, key: &str) -> bool {
-        let done = Command::new("xdotool").args(["key", key]).env("DISPLAY", &self.display).status();
+        // Nobody manages windows here: none has the keys until it is given them.
+        let focus = ["search", "--onlyvisible", "--name", "phantom3", "windowfocus", "sleep", "0.5"];
+        let keys = ["keydown", key, "sleep", "0.2", "keyup", key];
+        let done = Command::new("xdotool").args(focus).args(keys).env("DISPLAY", &self.display).status();
         if done.is_err() {
             println!("skipped: there is no xdotool here");
         }

@@ -113,7 +113,6 @@ impl eframe::App for Looker {
                 ask: &self.ask,
             };
             self.controls.turn(ui, &scene, &moment, &mut reach);
-            self.controls.write(ui, scene.rect, &moment);
             if let Some(reins) = &mut self.reins {
                 self.playback.newest().into_iter().for_each(|newest| self.hand.feel(newest));
                 reins.pull(self.hand.turn(&scene, &self.camera, &mut self.controls.hand, dt_s));
@@ -122,6 +121,7 @@ impl eframe::App for Looker {
             if let Some(cue) = cue.filter(|_| self.eyes.mode == StereoMode::Off) {
                 cue.paint(&ui.painter_at(scene.rect), &Seen::new(&self.camera, scene.rect));
             }
+            self.controls.write(ui, scene.rect, &moment);
         });
         ui.ctx().request_repaint_after(PICTURE);
     }
