@@ -91,7 +91,9 @@ impl Controls {
         if eyes.mode == StereoMode::QuadBuffer {
             // Who opens windows for us asks for no such buffers.
             eyes.mode = StereoMode::Off;
-            board.add("no quad-buffer stereo: the window has one picture only; one eye".into(), 0.0);
+            let note = Note::from("no quad-buffer stereo: the window has one picture only; one eye");
+            // Windows take a while to be seen.
+            board.add(Note { seconds: 10.0, ..note }, 0.0);
         }
         Self {
             bindings: spec.bindings.clone(),
