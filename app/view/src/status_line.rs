@@ -4,13 +4,14 @@ use crate::moment::Moment;
 use crate::news::Status;
 use std::fmt::Write;
 
-/// Rate, overruns, latency, sizes of both lists, the force at each finger, whether it stands still or is recorded. What
+/// Rate, ticks that the driver skipped and replies that were late, latency, sizes of both lists, the force at each finger, whether it stands still or is recorded. What
 /// nobody told yet is left out.
 pub fn status_line(status: &Status, moment: &Moment) -> String {
     let mut line = format!("{:7.2} s", moment.t_s);
     // A string takes everything.
     if status.rate_hz > 0.0 {
-        let _ = write!(line, " | {:.0} Hz, {} late", status.rate_hz, status.overruns);
+        let _ =
+            write!(line, " | {:.0} Hz, {} skipped, {} late", status.rate_hz, status.overruns, status.late);
     }
     if let Some([median, most, worst]) = status.latency_ns {
         let us = |ns: u64| ns as f64 / 1e3;
@@ -50,14 +51,14 @@ mod tests {
         status = Status {
             rate_hz: 999.7,
             overruns: 2,
+            late: 5,
             latency_ns: Some([45_400, 80_000, 120_600]),
             lists: [3, 17],
             recording: Some("a.mcap".into()),
             is_paused: true,
             ..status
         };
-        let all =
-            "  12.35 s | 1000 Hz, 2 late | reply 45/80/121 us | fast 3, slow 17 | PAUSED | RECORDING a.mcap";
+        let all = "  12.35 s | 1000 Hz, 2 skipped, 5 late | reply 45/80/121 us | fast 3, slow 17 | PAUSED | RECORDING a.mcap";
         assert_eq!(status_line(&status, &moment), all);
     }
 }
