@@ -4,8 +4,8 @@ use crate::moment::Moment;
 use crate::news::Status;
 use std::fmt::Write;
 
-/// Rate, ticks that the driver skipped and replies that were late, latency, sizes of both lists, the force at each finger, whether it stands still or is recorded. What
-/// nobody told yet is left out.
+/// Rate, ticks that the driver skipped, replies that were late, latency, sizes of both lists, the force at each finger,
+/// whether it stands still or is recorded. What nobody told yet is left out.
 pub fn status_line(status: &Status, moment: &Moment) -> String {
     let mut line = format!("{:7.2} s", moment.t_s);
     // A string takes everything.
