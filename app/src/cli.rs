@@ -159,6 +159,7 @@ fn play(args: &PlayArgs, settings: &Settings, is_headless: bool) -> Result<(Repo
     }
     let signals = install_signals()?;
     let rig = args.rig(settings)?;
+    args.refuse_to_overwrite(&rig)?;
     let mut plan = args.plan(settings);
     plan.window = window_spec(&rig.scene.name, settings)?;
     if plan.window.is_none() {

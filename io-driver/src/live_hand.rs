@@ -228,6 +228,7 @@ impl Mapping {
 mod tests {
     use super::*;
     use std::sync::atomic::AtomicBool;
+    use std::time::{Duration, Instant};
 
     fn place() -> (tempfile::TempDir, PathBuf) {
         let directory = tempfile::tempdir().unwrap();
@@ -264,23 +265,27 @@ mod tests {
         let mut hand = LiveHand::create(&path).unwrap();
         let mut finger = LiveFinger::open(&path, 3, wish(0)).unwrap();
         let going_on = AtomicBool::new(true);
-        let mut seen = 0;
+        let (mut seen, mut mixed) = (0, Vec::new());
         std::thread::scope(|scope| {
             scope.spawn(|| {
                 let numbers = (0..10_000).cycle().take_while(|_| going_on.load(Ordering::Relaxed));
                 numbers.for_each(|number| hand.want(3, &wish(number)));
             });
-            let mut last = 0;
-            for _ in 0..300_000 {
+            let (mut last, begun) = (0, Instant::now());
+            // On a busy machine the two take turns of some milliseconds.
+            while seen < 10_000 && begun.elapsed() < Duration::from_secs(10) {
                 let read = finger.wish();
                 let written = wish(read.buttons);
-                assert_eq!(read.place, written.place, "{}", read.buttons);
-                assert!(read.orientation.angle_to(&written.orientation) < 1e-15);
+                let turned = read.orientation.angle_to(&written.orientation);
+                if read.place != written.place || turned > 1e-15 {
+                    mixed.push(read);
+                }
                 seen += u32::from(read.buttons != last);
                 last = read.buttons;
             }
             going_on.store(false, Ordering::Relaxed);
         });
+        assert_eq!(mixed, []);
         assert!(seen > 10, "the writer came to nothing: {seen}");
     }
 

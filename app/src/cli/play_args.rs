@@ -1,7 +1,7 @@
 //! The arguments of `play`, and what they make.
 
-use super::DEFAULT_RATE_HZ;
 use super::numbers::parse_seconds;
+use super::{DEFAULT_RATE_HZ, is_same_file};
 use crate::outcome::RunFailure;
 use crate::play;
 use crate::rig::Rig;
@@ -30,6 +30,20 @@ pub(super) struct PlayArgs {
 impl PlayArgs {
     pub(super) fn rig(&self, settings: &Settings) -> Result<Rig, RunFailure> {
         play::rig(self.scene.as_deref(), settings, period_of(DEFAULT_RATE_HZ))
+    }
+
+    /// What is written must not take the place of what is read.
+    pub(super) fn refuse_to_overwrite(&self, rig: &Rig) -> Result<(), RunFailure> {
+        let is_input = |file: &PathBuf| {
+            std::iter::once(&rig.scene_file).chain(rig.model_files()).any(|input| is_same_file(file, input))
+        };
+        match self.record.iter().chain(&self.events).find(|file| is_input(file)) {
+            None => Ok(()),
+            Some(file) => Err(RunFailure::Start(format!(
+                "{} would be overwritten, and is an input; name another file for the recording",
+                file.display()
+            ))),
+        }
     }
 
     pub(super) fn plan(&self, settings: &Settings) -> RunPlan {
