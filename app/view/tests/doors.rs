@@ -55,7 +55,8 @@ fn who_is_behind_a_door_sees_what_is_there_and_nobody_else_does() {
         // Out of sight themselves.
         let finger =
             |space| FingerMoment { hip: Vector3::new(0.0, 0.0, 5.0), space, ..FingerMoment::default() };
-        let moment = Moment { t_s: 0.0, poses: poses.clone(), fingers: spaces.map(finger).to_vec() };
+        let moment =
+            Moment { poses: poses.clone(), fingers: spaces.map(finger).to_vec(), ..Moment::default() };
         colour(&studio.take(&moment, &stage.cameras[0], &Eyes::default()), &stage.cameras[0], place)
     };
     let (hull, console) = ([0.0, 0.08, 0.05], [-0.08, 0.02, 0.0]);
