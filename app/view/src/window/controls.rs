@@ -290,7 +290,7 @@ impl Controls {
 /// Which keys are meant for what is written into, or focused, elsewhere; the scene takes focus back when it is pressed.
 fn elsewhere(ui: &egui::Ui, scene: &egui::Response) -> impl Fn(egui::Key) -> bool + use<> {
     use egui::Key::{ArrowDown, ArrowLeft, ArrowRight, ArrowUp, Enter, Space};
-    let focused = ui.memory(|memory| memory.focused()).filter(|focused| *focused != scene.id);
+    let focused = ui.memory(egui::Memory::focused).filter(|focused| *focused != scene.id);
     if let Some(focused) = focused.filter(|_| scene.is_pointer_button_down_on()) {
         ui.memory_mut(|memory| memory.surrender_focus(focused));
     }
