@@ -20,7 +20,7 @@ fn main() {
         ("default scene", "../../config/scenes/default.toml", None),
         ("shelf of 10,000", "../benches/shelf.toml", Some(before_the_shelf())),
     ] {
-        let scene = Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join(file)).expect("the scene");
+        let scene = Scene::load(Path::new(env!("CARGO_MANIFEST_DIR")).join(file)).expect("the scene");
         measure(name, &scene, camera);
     }
 }

@@ -178,6 +178,7 @@ fn square(height_m: f64) -> Thing {
         pose: Isometry3::translation(0.0, height_m, 0.0),
         colour: [1.0; 4],
         casts_shadow: true,
+        space: 0,
     }
 }
 
