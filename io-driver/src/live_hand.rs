@@ -9,7 +9,7 @@
 //! Frames: places and rotations in the world W; SI.
 //! The file belongs into memory (`/dev/shm`, `$XDG_RUNTIME_DIR`), in a place that nobody else may write: whoever shortens it
 //! under a mapping kills the process that reads it (SIGBUS).
-//! Invariant of the `unsafe` here: a mapping is as long as [`Page`], page-aligned, and made of atomic words only, for which
+//! Invariant of the `unsafe` here: a mapping is as long as `Page`, page-aligned, and made of atomic words only, for which
 //! every bit pattern and every concurrent change is valid.
 //! Cost: a read is some 20 ns, at most [`TRIES`] times; no allocation, no system call.
 
