@@ -143,11 +143,13 @@ fn play_or_demo(settings: &Settings, is_headless: bool) -> Result<(Report, Stop)
         && view::window::has_display()
         && client::observe(&socket, "phantom3 looks around").is_err();
     match is_for_play.then(|| play(&PlayArgs::default(), settings, false)) {
-        Some(Err(RunFailure::NoWindow(error))) => say(format_args!("phantom3: {error}")),
-        Some(played) => return played,
-        None => {}
+        Some(Err(RunFailure::NoWindow(error))) => {
+            say(format_args!("phantom3: {error}"));
+            run_demo(settings, true)
+        }
+        Some(played) => played,
+        None => run_demo(settings, is_headless),
     }
-    run_demo(settings)
 }
 
 fn play(args: &PlayArgs, settings: &Settings, is_headless: bool) -> Result<(Report, Stop), RunFailure> {
@@ -168,12 +170,13 @@ fn play(args: &PlayArgs, settings: &Settings, is_headless: bool) -> Result<(Repo
     run::run(&rig, &plan, &signals)
 }
 
-fn run_demo(settings: &Settings) -> Result<(Report, Stop), RunFailure> {
+fn run_demo(settings: &Settings, is_headless: bool) -> Result<(Report, Stop), RunFailure> {
     let signals = install_signals()?;
     let mut demo = demo::unpack(period_of(DEFAULT_RATE_HZ))?;
     let directory = settings.recording_directory.value.as_deref();
     let socket = settings.driver_socket.value.clone().unwrap_or_else(endpoint::for_application);
-    let plan = demo::plan(&demo.rig, socket, directory);
+    let mut plan = demo::plan(&demo.rig, socket, directory);
+    plan.window = if is_headless { None } else { window_spec(&demo.rig.scene.name, settings)? };
     if plan.attach.is_some() {
         demo.rig.layout = calibrated_layout()?;
     }

@@ -8,8 +8,8 @@
 //! is done while no force is felt, for which forces fade away and come back: a world that takes the place of another one;
 //! and, where a finger feels it, friction, a pause, a body that is taken or let go. A reset is an exchange of worlds, with
 //! the same scene made anew: so everything is where it began, to the bit.
-//! Invariants: orders are done in the order in which they came, but for what somebody wants now while a script waits; the fast side neither allocates nor frees: what it is done
-//! with goes back to the slow side.
+//! Invariants: orders are done in the order in which they came, but for what somebody wants now while a script waits; the
+//! fast side neither allocates nor frees: what it is done with goes back to the slow side.
 
 #![allow(non_snake_case)] // Names carry their frame: to_W is a place in W.
 

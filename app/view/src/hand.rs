@@ -12,18 +12,17 @@ mod grip;
 mod pad;
 mod seen;
 
-pub use below::{Below, Cue};
+pub use below::Cue;
 pub use grip::Grip;
 pub use seen::Seen;
 
 use crate::input::HandKeys;
 use crate::moment::{FingerMoment, Moment};
 use crate::news::Wish;
-use crate::stage::Stage;
+use crate::pick::Picker;
 use eframe::egui::{self, PointerButton, Vec2};
 use nalgebra::{UnitQuaternion, Vector3};
 use pad::{Pad, Push};
-use std::sync::Arc;
 use world::SceneCamera;
 
 /// What a notch of the wheel is (m).
@@ -48,7 +47,6 @@ pub struct MouseHand {
     /// Corners of what the devices reach (m).
     reach: [Vector3<f64>; 2],
     wishes: Vec<Wish>,
-    below: Below,
     pad: Pad,
 }
 
@@ -144,11 +142,11 @@ impl MouseHand {
     }
 
     /// What shows where the hand is over things.
-    pub fn cue(&mut self, stage: &Arc<Stage>, moment: &Moment) -> Option<Cue> {
+    pub fn cue(&self, picker: &Picker, moment: &Moment) -> Option<Cue> {
         let fingers = &moment.fingers[..self.grip.fingers().min(moment.fingers.len())];
         let hips: Vec<Vector3<f64>> = fingers.iter().map(|finger| finger.hip).collect();
         // The hand is in what it holds, not over it.
-        self.below.cue(stage, &moment.poses, &hips, |entity| is_held(fingers, entity))
+        Cue::below(picker, moment, &hips, |entity| is_held(fingers, entity))
     }
 
     /// A controller's sticks are held like this.

@@ -70,9 +70,15 @@ impl Picker {
 
     /// What a ray of the world meets first at this moment.
     pub fn pick(&self, moment: &Moment, ray: &Ray) -> Option<Hit> {
+        self.pick_of(moment, ray, |_| true)
+    }
+
+    /// The same of those entities only that count.
+    pub fn pick_of(&self, moment: &Moment, ray: &Ray, counts: impl Fn(usize) -> bool) -> Option<Hit> {
         let mut nearest: Option<Hit> = None;
         let space = moment.seen_space();
-        for (thing, bundles) in self.things.iter().filter(|(thing, _)| thing.space == space) {
+        let things = self.things.iter().filter(|(thing, _)| thing.space == space && counts(thing.entity));
+        for (thing, bundles) in things {
             let Some(frame) = moment.poses.get(thing.entity) else { continue };
             let within_m = nearest.map_or(f64::INFINITY, |hit| hit.distance_m);
             let own = ray.seen_from(&(frame * thing.pose));

@@ -3,7 +3,8 @@
 use eframe::egui::{Pos2, Rect, pos2, vec2};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use std::sync::Arc;
-use view::hand::{Below, FINE, MouseHand, NOTCH_M, Seen};
+use view::hand::{Cue, FINE, MouseHand, NOTCH_M, Seen};
+use view::pick::Picker;
 use view::{FingerMoment, Moment, Stage, Thing, Triangles};
 use world::SceneCamera;
 
@@ -184,7 +185,8 @@ fn square(height_m: f64) -> Thing {
 
 #[test]
 fn the_ring_is_on_the_first_thing_straight_below_the_fingers() {
-    let stage = Arc::new(Stage { things: vec![square(0.0), square(0.03), square(0.2)], ..Stage::default() });
+    let things = vec![square(0.0), square(0.03), square(0.2)];
+    let picker = Picker::new(&Stage { things, ..Stage::default() });
     let finger = |x: f64| FingerMoment { hip: Vector3::new(x, 0.1, 0.02), ..FingerMoment::default() };
     // The whole is moved by 5 cm; one finger is beside it then.
     let moment = Moment {
@@ -192,7 +194,7 @@ fn the_ring_is_on_the_first_thing_straight_below_the_fingers() {
         fingers: vec![finger(-0.06), finger(0.04)],
         ..Moment::default()
     };
-    let cue = hand(2).cue(&stage, &moment).expect("something is below");
+    let cue = hand(2).cue(&picker, &moment).expect("something is below");
     // Sums and quotients of numbers below one.
     assert!((cue.from - Vector3::new(-0.01, 0.1, 0.02)).norm() < 1e-12, "{}", cue.from);
     assert!((cue.to - Vector3::new(-0.01, 0.04, 0.02)).norm() < 1e-12, "{}", cue.to);
@@ -201,16 +203,8 @@ fn the_ring_is_on_the_first_thing_straight_below_the_fingers() {
     // What both fingers touch they hold.
     let touching = |finger: &FingerMoment| FingerMoment { entity: Some(0), ..*finger };
     let fingers = moment.fingers.iter().map(touching).collect();
-    assert_eq!(hand(2).cue(&stage, &Moment { fingers, ..moment.clone() }), None);
-    let mut below = Below::default();
-    assert_eq!(
-        below.first(&stage, &moment.poses, &Vector3::new(0.3, 0.1, 0.0), |_| false),
-        None,
-        "beside everything"
-    );
-    assert_eq!(
-        below.first(&stage, &moment.poses, &Vector3::new(0.0, -0.1, 0.0), |_| false),
-        None,
-        "below everything"
-    );
+    assert_eq!(hand(2).cue(&picker, &Moment { fingers, ..moment.clone() }), None);
+    let below = |x: f64, y: f64| Cue::below(&picker, &moment, &[Vector3::new(x, y, 0.0)], |_| false);
+    assert_eq!(below(0.3, 0.1), None, "beside everything");
+    assert_eq!(below(0.0, -0.1), None, "below everything");
 }

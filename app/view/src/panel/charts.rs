@@ -47,7 +47,7 @@ impl Charts {
         ui.horizontal_wrapped(|ui| {
             for (finger, force) in self.newest.iter().enumerate() {
                 let name = stage.fingers.get(finger).map_or("finger", String::as_str);
-                ui.label(RichText::new(format!("{name} {force:5.2} N")).monospace().color(fingers[finger]));
+                ui.label(RichText::new(format!("{name} {force:.2}")).monospace().color(fingers[finger]));
             }
         });
         let has_latency = !self.latency.is_empty();

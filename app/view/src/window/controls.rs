@@ -120,6 +120,11 @@ impl Controls {
         self.status = status.clone();
     }
 
+    /// What lies in a direction.
+    pub(super) fn picker(&self) -> &Picker {
+        &self.picker
+    }
+
     /// Another scene goes on.
     pub(super) fn clear(&mut self, stage: &Stage) {
         self.picker = Picker::new(stage);

@@ -103,7 +103,7 @@ impl eframe::App for Looker {
         let dt_s = f64::from(ui.input(|input| input.stable_dt));
         egui::CentralPanel::default().frame(egui::Frame::NONE).show_inside(ui, |ui| {
             let moment = self.playback.shown(now_s).unwrap_or_default();
-            let cue = self.reins.as_ref().and_then(|_| self.hand.cue(&self.view.stage, &moment));
+            let cue = self.reins.as_ref().and_then(|_| self.hand.cue(self.controls.picker(), &moment));
             let scene = self.view.show(ui, moment.clone(), &self.camera, &self.eyes);
             let mut reach = Reach {
                 view: &mut self.view,
