@@ -24,11 +24,6 @@ impl Book {
         pages.orders.len() as u64 - 1
     }
 
-    /// The last order was not sent.
-    pub fn take_back_order(&self) {
-        self.pages().orders.pop();
-    }
-
     /// The order of this number, in words; empty if there is none.
     pub fn order(&self, number: u64) -> String {
         self.pages().orders.get(number as usize).cloned().unwrap_or_default()

@@ -27,8 +27,8 @@ pub(super) struct SoFar {
     pairs: BTreeSet<[usize; 2]>,
     /// Whether nothing moves by itself.
     pub(super) is_paused: bool,
-    /// Orders that were taken.
-    pub(super) orders: u64,
+    /// Orders that were taken, by their numbers, in the order in which they were.
+    orders: Vec<u64>,
 }
 
 impl Happened {
@@ -52,7 +52,7 @@ impl Happened {
 
     /// The orders that were taken, in words.
     pub(super) fn ordered(&self) -> Vec<String> {
-        (0..self.so_far.orders).map(|number| self.book.order(number)).collect()
+        self.so_far.orders.iter().map(|number| self.book.order(*number)).collect()
     }
 }
 
@@ -79,13 +79,15 @@ impl SoFar {
                 };
             }
             Kind::Order { number } => {
-                self.orders = number + 1;
+                self.orders.push(number);
                 if let Ok(Some(Words::Pause(is_paused))) = words::parse(&words_of(number)) {
                     self.is_paused = is_paused;
                 }
             }
             // A reset goes on standing still.
-            Kind::Scene { .. } => *self = Self { orders: self.orders, ..Self::default() },
+            Kind::Scene { .. } => {
+                *self = Self { orders: std::mem::take(&mut self.orders), ..Self::default() };
+            }
             Kind::Reset | Kind::Lost { .. } => {
                 self.fingers.clear();
                 self.pairs.clear();
@@ -175,6 +177,13 @@ mod tests {
         let reset = told(&[Kind::Order { number: 0 }, pair(1, 0, Change::Begins), Kind::Reset]);
         assert!(reset.is_paused && reset.pairs.is_empty(), "a reset keeps the pause");
         let other = told(&[Kind::Order { number: 0 }, Kind::Scene { number: 1 }]);
-        assert_eq!((other.is_paused, other.orders), (false, 1));
+        assert_eq!((other.is_paused, other.orders), (false, vec![0]));
+    }
+
+    #[test]
+    fn what_was_ordered_is_what_was_taken_in_its_own_order() {
+        // One for now went past others of a script, of which the last still waits.
+        let so_far = told(&[Kind::Order { number: 2 }, Kind::Order { number: 0 }]);
+        assert_eq!(so_far.orders, [2, 0]);
     }
 }
