@@ -11,7 +11,8 @@ use phantom3::row_queue::{RowReceiver, row_queue};
 use phantom3::virtual_clock::VirtualDriver;
 use shm_abi::Frame;
 use shm_abi::segment::ClockMode;
-use view::hand::{Below, MouseHand, Seen};
+use view::hand::{Cue, MouseHand, Seen};
+use view::pick::Picker;
 use view::{FingerMoment, Moment, Reins, Stage};
 use world::{SceneCamera, Settings};
 
@@ -216,11 +217,13 @@ fn a_hand_that_is_told_to_jump_goes_there_like_a_hand_and_nothing_has_to_be_cut(
 fn what_is_below_the_hand_is_the_cube_at_first() {
     let mut table = Table::new();
     let rig = play::rig(None, &Settings::default(), PERIOD_NS).expect("the built-in scene");
-    let stage = std::sync::Arc::new(Stage::new(&rig.scene, table.fast.step_mut().entities()));
-    let poses: Vec<_> = table.fast.step_mut().entities().iter().map(|entity| entity.X_WB).collect();
+    let picker = Picker::new(&Stage::new(&rig.scene, table.fast.step_mut().entities()));
+    let poses = table.fast.step_mut().entities().iter().map(|entity| entity.X_WB).collect();
+    let moment = Moment { poses, ..Moment::default() };
     let over = table.cube() + Vector3::new(0.005, 0.1, -0.005);
-    let met = Below::default().first(&stage, &poses, &over, |_| false).expect("the cube");
+    let below = |is_held: fn(usize) -> bool| Cue::below(&picker, &moment, &[over], is_held).map(|cue| cue.to);
+    let met = below(|_| false).expect("the cube");
     assert!((met - (table.cube() + Vector3::new(0.005, 0.5 * EDGE_M, -0.005))).norm() < 1e-6, "{met}");
-    let met = Below::default().first(&stage, &poses, &over, |entity| entity == CUBE).expect("the table");
+    let met = below(|entity| entity == CUBE).expect("the table");
     assert!((met - Vector3::new(over.x, 0.0, over.z)).norm() < 1e-6, "what is held is left out: {met}");
 }
