@@ -28,7 +28,7 @@
 #define PHANTOM_ABI_MAJOR 1
 
 // Raised when something is added that an old reader may ignore.
-#define PHANTOM_ABI_MINOR 2
+#define PHANTOM_ABI_MINOR 3
 
 // Both, the major in the upper half.
 #define PHANTOM_ABI_VERSION (((uint64_t)PHANTOM_ABI_MAJOR << 32) | (uint64_t)PHANTOM_ABI_MINOR)
@@ -65,6 +65,12 @@
 
 // [`DriverHeader::flags`]: forces and speeds are cut to those of commissioning.
 #define PHANTOM_DRIVER_COMMISSIONING 1
+
+// [`Bell::owner_sleeps`]: on the other segment's doorbell.
+#define PHANTOM_SLEEPS_ON_OTHERS_BELL 1
+
+// [`Bell::owner_sleeps`]: on the word of the own segment that the other side rings.
+#define PHANTOM_SLEEPS_ON_OWN_WORD 2
 
 // [`DeviceFrame::flags`]: the position is valid.
 #define PHANTOM_DEVICE_POSITION_VALID 1
@@ -208,6 +214,8 @@ enum PhantomRequestKind
   // Since 1.2. That devices are taken to be in their home pose, in which they lie now; see
   // [`Request::devices`].
   PHANTOM_REQUEST_KIND_ZERO = 6,
+  // Since 1.3. That the lease of whoever commands ends: its force ramps out, and somebody else may command.
+  PHANTOM_REQUEST_KIND_END_LEASE = 7,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -239,6 +247,8 @@ enum PhantomVerdict
   PHANTOM_VERDICT_CROWDED = 7,
   // The driver could not make a segment.
   PHANTOM_VERDICT_NO_SEGMENT = 8,
+  // Since 1.3. Whoever asks may not; [`Answer::allowed_group_plus_one`] says who may.
+  PHANTOM_VERDICT_NOT_ALLOWED = 9,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -332,7 +342,8 @@ typedef struct PHANTOM_ALIGNED(64) PhantomBell {
   uint32_t doorbell;
   // Keeps the next word aligned.
   uint32_t padding;
-  // 1 while the owner of *this* segment sleeps on the *other* segment's doorbell.
+  // [`SLEEPS_ON_OTHERS_BELL`] while the owner of *this* segment sleeps on the *other* segment's doorbell; since
+  // 1.3 [`SLEEPS_ON_OWN_WORD`] while the commander sleeps on its own [`CommanderHeader::frame_doorbell`].
   uint64_t owner_sleeps;
   // Fills the cache line, so that ringing disturbs nothing else.
   uint64_t reserved[5];
@@ -455,8 +466,16 @@ typedef struct PHANTOM_ALIGNED(64) PhantomCommanderHeader {
   uint64_t segment_bytes;
   // The lease.
   uint64_t lease;
+  // Since 1.3. The futex word that the commander sleeps on, and nobody else can: changed and rung by the
+  // driver while [`Bell::owner_sleeps`] is [`SLEEPS_ON_OWN_WORD`].
+  uint32_t frame_doorbell;
+  // Keeps the next word aligned.
+  uint32_t padding;
+  // Since 1.3. 1 once the commander has mapped the segment; written by it, so that the driver may forbid
+  // everybody to map or to punch it again.
+  uint64_t mapped;
   // Fills the cache line.
-  uint64_t reserved[3];
+  uint64_t reserved;
 } PhantomCommanderHeader;
 
 // One [`Command`] under its sequence.
@@ -617,8 +636,11 @@ typedef struct PhantomAnswer {
   uint64_t holder_pid;
   // Its name: UTF-8, padded with zeros.
   uint8_t holder_name[PHANTOM_NAME_BYTES];
+  // Since 1.3. With [`Verdict::NotAllowed`]: the number of the group whose members may, plus one; 0: only root
+  // and the user that the driver runs as.
+  uint64_t allowed_group_plus_one;
   // Zero.
-  uint64_t reserved[7];
+  uint64_t reserved[6];
 } PhantomAnswer;
 
 // Hash of every type, name, size and offset of the contract; both sides must agree on it.
@@ -729,7 +751,10 @@ PHANTOM_ASSERT(offsetof(PhantomCommanderHeader, abi_version) == 8);
 PHANTOM_ASSERT(offsetof(PhantomCommanderHeader, layout_hash) == 16);
 PHANTOM_ASSERT(offsetof(PhantomCommanderHeader, segment_bytes) == 24);
 PHANTOM_ASSERT(offsetof(PhantomCommanderHeader, lease) == 32);
-PHANTOM_ASSERT(offsetof(PhantomCommanderHeader, reserved) == 40);
+PHANTOM_ASSERT(offsetof(PhantomCommanderHeader, frame_doorbell) == 40);
+PHANTOM_ASSERT(offsetof(PhantomCommanderHeader, padding) == 44);
+PHANTOM_ASSERT(offsetof(PhantomCommanderHeader, mapped) == 48);
+PHANTOM_ASSERT(offsetof(PhantomCommanderHeader, reserved) == 56);
 
 PHANTOM_ASSERT(sizeof(PhantomCommandSlot) == 320);
 PHANTOM_ASSERT(PHANTOM_ALIGNOF(PhantomCommandSlot) == 64);
@@ -805,6 +830,7 @@ PHANTOM_ASSERT(offsetof(PhantomAnswer, lease) == 48);
 PHANTOM_ASSERT(offsetof(PhantomAnswer, driver_pid) == 56);
 PHANTOM_ASSERT(offsetof(PhantomAnswer, holder_pid) == 64);
 PHANTOM_ASSERT(offsetof(PhantomAnswer, holder_name) == 72);
-PHANTOM_ASSERT(offsetof(PhantomAnswer, reserved) == 136);
+PHANTOM_ASSERT(offsetof(PhantomAnswer, allowed_group_plus_one) == 136);
+PHANTOM_ASSERT(offsetof(PhantomAnswer, reserved) == 144);
 
 #endif  /* PHANTOM3_SHM_H */

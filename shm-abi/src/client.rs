@@ -141,6 +141,20 @@ pub enum AttachError {
         /// Our version.
         expected: String,
     },
+    /// Whoever asks has not the right to.
+    #[error(
+        "the driver at {socket} does not let user {user} {wish}: {allowed} may; ask one of these, or its administrator"
+    )]
+    NotAllowed {
+        /// Where it was asked.
+        socket: PathBuf,
+        /// What was asked, as [`RequestKind::wish`] has it.
+        wish: &'static str,
+        /// Our own user id.
+        user: u32,
+        /// Who may.
+        allowed: String,
+    },
     /// It refused for a reason of its own.
     #[error("the driver refused: {0}")]
     Refused(String),
@@ -193,6 +207,15 @@ pub fn emergency_stop(socket: &Path, name: &str) -> Result<(), AttachError> {
 pub fn zero(socket: &Path, name: &str, devices: u64) -> Result<(), AttachError> {
     let request = Request { devices, ..Request::new(RequestKind::Zero, name) };
     exchange(socket, &request).map(|_| ())
+}
+
+/// Asks that the lease of whoever commands ends, that one stopped or hung though it be: its force ramps out, and
+/// somebody else may command.
+///
+/// # Errors
+/// [`AttachError::UnknownRequest`] from a driver of before 1.3, [`AttachError::NotAllowed`] without the right.
+pub fn end_lease(socket: &Path, name: &str) -> Result<(), AttachError> {
+    exchange(socket, &Request::new(RequestKind::EndLease, name)).map(|_| ())
 }
 
 /// Attaches with a request of any content; what [`observe`] and [`command`] do, and tests that lie.
@@ -253,11 +276,24 @@ fn judge(socket: &Path, request: &Request, answer: &Answer) -> Result<(), Attach
         Some(Verdict::NoSegment) => {
             Err(AttachError::Refused("it could not create shared memory; see its log for the cause".into()))
         }
+        Some(Verdict::NotAllowed) => Err(not_allowed(socket, request, answer)),
         Some(Verdict::UnknownKind) => {
             Err(AttachError::UnknownRequest { found, kind: request.kind, expected })
         }
         Some(other) => Err(AttachError::Refused(format!("it did not understand the request ({other:?})"))),
         None => Err(AttachError::Refused(format!("it gave the unknown verdict {}", answer.verdict))),
+    }
+}
+
+fn not_allowed(socket: &Path, request: &Request, answer: &Answer) -> AttachError {
+    AttachError::NotAllowed {
+        socket: socket.into(),
+        wish: RequestKind::from_word(request.kind).map_or("do this", RequestKind::wish),
+        user: rustix::process::geteuid().as_raw(),
+        allowed: match answer.allowed_group_plus_one.checked_sub(1) {
+            Some(group) => format!("members of group {group}"),
+            None => "root and the user that the driver runs as".into(),
+        },
     }
 }
 

@@ -68,8 +68,11 @@ pub struct Answer {
     pub holder_pid: u64,
     /// Its name: UTF-8, padded with zeros.
     pub holder_name: [u8; NAME_BYTES],
+    /// Since 1.3. With [`Verdict::NotAllowed`]: the number of the group whose members may, plus one; 0: only root
+    /// and the user that the driver runs as.
+    pub allowed_group_plus_one: u64,
     /// Zero.
-    pub reserved: [u64; 7],
+    pub reserved: [u64; 6],
 }
 
 assert_layout!(Answer: 192, 8 {
@@ -83,7 +86,10 @@ assert_layout!(Answer: 192, 8 {
     driver_pid: u64 = 56,
     holder_pid: u64 = 64,
     holder_name: [u8; NAME_BYTES] = 72,
-    reserved: [u64; 7] = 136,
+    reserved: [u64; 7] = 136 => {
+        allowed_group_plus_one: u64 = 136,
+        reserved: [u64; 6] = 144,
+    },
 });
 
 /// What can be asked for.
@@ -103,9 +109,26 @@ pub enum RequestKind {
     /// Since 1.2. That devices are taken to be in their home pose, in which they lie now; see
     /// [`Request::devices`].
     Zero = 6,
+    /// Since 1.3. That the lease of whoever commands ends: its force ramps out, and somebody else may command.
+    EndLease = 7,
 }
 
-from_word!(RequestKind { Observe, Command, Stop, ClearFault, EmergencyStop, Zero });
+from_word!(RequestKind { Observe, Command, Stop, ClearFault, EmergencyStop, Zero, EndLease });
+
+impl RequestKind {
+    /// What is asked, to stand behind "asked to".
+    pub fn wish(self) -> &'static str {
+        match self {
+            Self::Observe => "look on",
+            Self::Command => "command the devices",
+            Self::Stop => "stop the driver",
+            Self::ClearFault => "clear the fault",
+            Self::EmergencyStop => "stop the motors",
+            Self::Zero => "zero devices",
+            Self::EndLease => "end the lease of whoever commands",
+        }
+    }
+}
 
 /// How the driver decided.
 #[repr(u64)]
@@ -127,6 +150,8 @@ pub enum Verdict {
     Crowded = 7,
     /// The driver could not make a segment.
     NoSegment = 8,
+    /// Since 1.3. Whoever asks may not; [`Answer::allowed_group_plus_one`] says who may.
+    NotAllowed = 9,
 }
 
 from_word!(Verdict {
@@ -138,6 +163,7 @@ from_word!(Verdict {
     UnknownKind,
     Crowded,
     NoSegment,
+    NotAllowed,
 });
 
 impl Request {

@@ -16,7 +16,7 @@ pub const MAGIC: u64 = 0x334D_4F54_4E41_4850;
 /// Raised when an old reader would misread.
 pub const ABI_MAJOR: u32 = 1;
 /// Raised when something is added that an old reader may ignore.
-pub const ABI_MINOR: u32 = 2;
+pub const ABI_MINOR: u32 = 3;
 /// Both, the major in the upper half.
 pub const ABI_VERSION: u64 = ((ABI_MAJOR as u64) << 32) | ABI_MINOR as u64;
 
@@ -222,11 +222,17 @@ pub struct Bell {
     pub doorbell: AtomicU32,
     /// Keeps the next word aligned.
     pub padding: AtomicU32,
-    /// 1 while the owner of *this* segment sleeps on the *other* segment's doorbell.
+    /// [`SLEEPS_ON_OTHERS_BELL`] while the owner of *this* segment sleeps on the *other* segment's doorbell; since
+    /// 1.3 [`SLEEPS_ON_OWN_WORD`] while the commander sleeps on its own [`CommanderHeader::frame_doorbell`].
     pub owner_sleeps: AtomicU64,
     /// Fills the cache line, so that ringing disturbs nothing else.
     pub reserved: [AtomicU64; 5],
 }
+
+/// [`Bell::owner_sleeps`]: on the other segment's doorbell.
+pub const SLEEPS_ON_OTHERS_BELL: u64 = 1;
+/// [`Bell::owner_sleeps`]: on the word of the own segment that the other side rings.
+pub const SLEEPS_ON_OWN_WORD: u64 = 2;
 
 assert_layout!(Bell: 64, 64 {
     latest_plus_one: AtomicU64 = 0,
@@ -404,8 +410,16 @@ pub struct CommanderHeader {
     pub segment_bytes: AtomicU64,
     /// The lease.
     pub lease: AtomicU64,
+    /// Since 1.3. The futex word that the commander sleeps on, and nobody else can: changed and rung by the
+    /// driver while [`Bell::owner_sleeps`] is [`SLEEPS_ON_OWN_WORD`].
+    pub frame_doorbell: AtomicU32,
+    /// Keeps the next word aligned.
+    pub padding: AtomicU32,
+    /// Since 1.3. 1 once the commander has mapped the segment; written by it, so that the driver may forbid
+    /// everybody to map or to punch it again.
+    pub mapped: AtomicU64,
     /// Fills the cache line.
-    pub reserved: [AtomicU64; 3],
+    pub reserved: AtomicU64,
 }
 
 assert_layout!(CommanderHeader: 64, 64 {
@@ -414,7 +428,12 @@ assert_layout!(CommanderHeader: 64, 64 {
     layout_hash: AtomicU64 = 16,
     segment_bytes: AtomicU64 = 24,
     lease: AtomicU64 = 32,
-    reserved: [AtomicU64; 3] = 40,
+    reserved: [AtomicU64; 3] = 40 => {
+        frame_doorbell: AtomicU32 = 40,
+        padding: AtomicU32 = 44,
+        mapped: AtomicU64 = 48,
+        reserved: AtomicU64 = 56,
+    },
 });
 
 /// One [`Command`] under its sequence.

@@ -297,6 +297,7 @@ impl Server {
                 events.push(ServerEvent::EmergencyStopRequested { pid });
                 self.answer(index, &Answer::new(Verdict::Granted), &[])
             }
+            RequestKind::EndLease => self.refuse(index, Verdict::UnknownKind),
             RequestKind::Zero => {
                 events.push(ServerEvent::ZeroRequested { pid, devices: request.devices });
                 self.answer(index, &Answer::new(Verdict::Granted), &[])

@@ -8,11 +8,13 @@ use shm_abi::LAYOUT_HASH;
 use std::path::Path;
 
 /// FNV-1a of the frozen headers. A header that differs is not the one that programs were built with.
-const FROZEN: [(&str, &str, u64); 4] = [
+const FROZEN: [(&str, &str, u64); 6] = [
     ("1.0", "phantom3_shm.h", 0x7fb6_3a4f_44fd_7728),
     ("1.0", "phantom3_client.h", 0x675e_36bc_1463_20f2),
     ("1.1", "phantom3_shm.h", 0x5af1_89fc_0cd6_e58f),
     ("1.1", "phantom3_client.h", 0x0f3f_2557_5fc7_8a8b),
+    ("1.2", "phantom3_shm.h", 0xf28d_cf99_aaec_9e33),
+    ("1.2", "phantom3_client.h", 0x0f3f_2557_5fc7_8a8b),
 ];
 
 /// A row of the table: version, layout hash, what it added.

@@ -29,7 +29,7 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 
 /// Every version of the major one in force, with its minor number.
-const VERSIONS: [(&str, u32); 3] = [("1.0", 0), ("1.1", 1), ("1.2", 2)];
+const VERSIONS: [(&str, u32); 4] = [("1.0", 0), ("1.1", 1), ("1.2", 2), ("1.3", 3)];
 
 fn blesses() -> bool {
     std::env::var_os("PHANTOM3_BLESS").is_some()
@@ -147,7 +147,8 @@ fn answer(minor: u32) -> Answer {
         driver_pid: count(8),
         holder_pid: count(9),
         holder_name: name_bytes(NAME),
-        reserved: [0; 7],
+        allowed_group_plus_one: if minor >= 3 { count(18) } else { 0 },
+        reserved: [0; 6],
     }
 }
 

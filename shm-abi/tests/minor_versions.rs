@@ -12,6 +12,7 @@ use common::fake::{fake_server, hear, send};
 use common::golden::Golden;
 use common::host::Host;
 use common::{HANG, directory, info_of, own_pid, wait_until};
+use shm_abi::client::AttachError;
 use shm_abi::handshake::{Answer, Verdict};
 use shm_abi::segment::DriverInfo;
 use shm_abi::server::ServerEvent;
@@ -26,7 +27,7 @@ use std::process::{Child, Stdio};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The versions before the one in force.
-const OLDER: [&str; 2] = ["1.0", "1.1"];
+const OLDER: [&str; 3] = ["1.0", "1.1", "1.2"];
 /// The tick in the golden frame.
 const TICK: u64 = 1001;
 
@@ -316,7 +317,7 @@ fn command_older(version: &'static str) {
     for device in frame.present_devices() {
         let absent = (device.velocity_m_per_s_estimated, device.limits, device.motor_heat);
         assert_eq!(absent == ([0.0; 3], 0, 0.0), is_first);
-        assert_eq!(device.joint_velocity_rad_per_s_estimated, [0.0; 3], "since 1.2");
+        assert_eq!(device.joint_velocity_rad_per_s_estimated == [0.0; 3], minor < 2, "since 1.2");
     }
     let commander = attached.commander.unwrap();
     let mut command: Command =
@@ -344,7 +345,8 @@ fn command_older_from_c(version: &'static str) {
     let observed = printed_by("observe");
     assert!(observed.starts_with(&format!("built for {}\n", current_version())));
     assert_read(&observed, &current_version(), version);
-    assert!(observed.contains("PhantomFrame.devices[0].joint_velocity_rad_per_s_estimated[0] = 0\n"));
+    let is_silent = observed.contains("PhantomFrame.devices[0].joint_velocity_rad_per_s_estimated[0] = 0\n");
+    assert_eq!(is_silent, minor_of(version) < 2, "since 1.2");
     assert_read(&printed_by("command"), &current_version(), version);
     serving.join().unwrap();
     let command: Command = bytemuck::pod_read_unaligned(&old.command(TICK));
@@ -353,22 +355,53 @@ fn command_older_from_c(version: &'static str) {
 }
 
 #[test]
-fn asking_a_driver_of_before_1_2_to_zero_is_refused_with_both_versions() {
+fn asking_a_driver_for_what_a_later_version_added_is_refused_with_both_versions() {
+    type Ask = fn(&Path) -> Result<(), AttachError>;
+    let later: [(u64, u64, Ask); 2] = [
+        (1, 6, |socket| client::zero(socket, "today", 0)),
+        (2, 7, |socket| client::end_lease(socket, "today")),
+    ];
+    for (minor, kind, ask) in later {
+        let abi_version = (1 << 32) | minor;
+        let refusal = refused_with(Answer { abi_version, ..Answer::new(Verdict::UnknownKind) }, ask);
+        let expected = format!(
+            "the driver speaks version 1.{minor} of the shared-memory contract and does not know requests of kind \
+             {kind}, this program speaks {}; start the driver that belongs to this program",
+            current_version()
+        );
+        assert_eq!(refusal.to_string(), expected);
+    }
+}
+
+/// What a client says of such an answer.
+fn refused_with(answer: Answer, ask: fn(&Path) -> Result<(), AttachError>) -> AttachError {
     let directory = directory();
     let socket = directory.path().join("driver.sock");
-    let serving = fake_server(&socket, 1, |mut stream| {
+    let serving = fake_server(&socket, 1, move |mut stream| {
         hear(&mut stream);
-        let abi_version = (1 << 32) | 1;
-        let answer = Answer { abi_version, ..Answer::new(Verdict::UnknownKind) };
         send(&stream, bytemuck::bytes_of(&answer), &[]);
     });
-    let refusal = client::zero(&socket, "today", 0).unwrap_err();
+    let refusal = ask(&socket).unwrap_err();
     serving.join().unwrap();
-    assert_eq!(
-        refusal.to_string(),
-        "the driver speaks version 1.1 of the shared-memory contract and does not know requests of kind 6, this \
-         program speaks 1.2; start the driver that belongs to this program"
-    );
+    refusal
+}
+
+#[test]
+fn who_may_not_is_told_who_may() {
+    let user = rustix::process::geteuid().as_raw();
+    for (allowed_group_plus_one, allowed) in [
+        (0, "root and the user that the driver runs as"),
+        (1, "members of group 0"),
+        (989, "members of group 988"),
+    ] {
+        let answer = Answer { allowed_group_plus_one, ..Answer::new(Verdict::NotAllowed) };
+        let refusal = refused_with(answer, |socket| client::end_lease(socket, "today")).to_string();
+        let expected = format!(
+            "does not let user {user} end the lease of whoever commands: {allowed} may; ask one of these, or its \
+             administrator"
+        );
+        assert!(refusal.ends_with(&expected), "{refusal}");
+    }
 }
 
 #[test]

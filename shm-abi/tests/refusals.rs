@@ -28,19 +28,19 @@ fn a_driver_refuses_every_other_make_of_client_by_name() {
     let good = Request::new(RequestKind::Observe, "test");
     assert_eq!(
         refusal_of(&Request { abi_version: (3 << 32) | 4, ..good }),
-        "the driver speaks ABI version 1.2, this program 3.4; install both from the same release"
+        "the driver speaks ABI version 1.3, this program 3.4; install both from the same release"
     );
     assert_eq!(
         refusal_of(&Request { layout_hash: 0xbad, ..good }),
         format!(
             "the driver's memory layout is 0x{LAYOUT_HASH:016x}, this program's 0x0000000000000bad, though both \
-             say ABI 1.2; one of them is a modified build: rebuild both from the same source"
+             say ABI 1.3; one of them is a modified build: rebuild both from the same source"
         )
     );
     assert_eq!(
         refusal_of(&Request { kind: 77, ..good }),
-        "the driver speaks version 1.2 of the shared-memory contract and does not know requests of kind 77, this \
-         program speaks 1.2; start the driver that belongs to this program"
+        "the driver speaks version 1.3 of the shared-memory contract and does not know requests of kind 77, this \
+         program speaks 1.3; start the driver that belongs to this program"
     );
     assert_eq!(
         refusal_of(&Request { magic: 1, ..good }),
@@ -90,14 +90,14 @@ fn a_client_refuses_every_other_make_of_driver_by_name() {
     let cases = [
         (
             Answer { abi_version: (2 << 32) | 5, ..granted },
-            "the driver speaks ABI version 2.5, this program 1.2; install both from the same release"
+            "the driver speaks ABI version 2.5, this program 1.3; install both from the same release"
                 .to_string(),
         ),
         (
             Answer { layout_hash: 0xbad, ..granted },
             format!(
                 "the driver's memory layout is 0x0000000000000bad, this program's 0x{LAYOUT_HASH:016x}, though \
-                 both say ABI 1.2; one of them is a modified build: rebuild both from the same source"
+                 both say ABI 1.3; one of them is a modified build: rebuild both from the same source"
             ),
         ),
         (
@@ -223,7 +223,7 @@ fn a_descriptor_that_is_no_segment_is_refused_before_it_is_touched() {
     let wrong_header = |at: usize| {
         message_about_files(vec![forged_driver(move |header| header[at] ^= 0x40, SHRINK_AND_GROW)])
     };
-    assert!(wrong_header(12).starts_with("the segment's ABI version is 0x4100000002, expected 0x100000002;"));
+    assert!(wrong_header(12).starts_with("the segment's ABI version is 0x4100000003, expected 0x100000003;"));
     assert!(wrong_header(16).starts_with("the segment's layout hash is 0x"));
     assert!(wrong_header(120).starts_with("the segment's ready word is 0x41, expected 0x1;"));
     assert_eq!(

@@ -1,0 +1,331 @@
+/* A client of the haptic driver in C11 (GCC or Clang, Linux): attach, read frames, command.
+ *
+ * Everything is static inline; there is nothing to link. Include this before any system header, or define
+ * _GNU_SOURCE yourself.
+ *
+ *     PhantomAttachment driver;
+ *     char error[PHANTOM_ERROR_BYTES];
+ *     if (phantom_attach("/run/phantom3/driver.sock", PHANTOM_REQUEST_KIND_COMMAND, "me", &driver, error)) {
+ *         fprintf(stderr, "%s\n", error);
+ *         return 1;
+ *     }
+ *     uint64_t seen = PHANTOM_NO_TICK;
+ *     PhantomFrame frame;
+ *     while (phantom_is_attached(&driver)) {
+ *         phantom_sleep_for_frame(&driver, seen, 100 * 1000 * 1000);
+ *         uint64_t tick = phantom_latest_tick(driver.segment);
+ *         if (tick == seen || phantom_read_frame(driver.segment, tick, &frame) != PHANTOM_READ_OK) continue;
+ *         seen = tick;
+ *         PhantomCommand command = phantom_answer_to(&frame, driver.lease);
+ *         command.devices[0].force_on_user_n[1] = ...;
+ *         phantom_publish(&driver, &command);
+ *     }
+ *     phantom_detach(&driver);
+ *
+ * The same rules as in Rust: a value is whole or it is not returned; what the driver wrote is checked before
+ * it is believed; the lease lasts as long as the connection is open, and one thread publishes.
+ */
+#ifndef PHANTOM3_CLIENT_H
+#define PHANTOM3_CLIENT_H
+
+#ifndef _GNU_SOURCE
+#define _GNU_SOURCE
+#endif
+
+#include "phantom3_shm.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <linux/futex.h>
+#include <poll.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <sys/time.h>
+#include <sys/un.h>
+#include <time.h>
+#include <unistd.h>
+
+/* Room for the longest message. */
+#define PHANTOM_ERROR_BYTES 512
+/* What phantom_latest_tick returns before the first frame; also "nothing seen yet". */
+#define PHANTOM_NO_TICK UINT64_MAX
+/* A driver that does not answer within this time is stopped or hung [s]. */
+#define PHANTOM_ANSWER_TIMEOUT_S 2
+
+/* What an application holds of the driver. */
+typedef struct PhantomAttachment {
+    /* The driver's segment, mapped read-only. */
+    const PhantomDriverSegment *segment;
+    /* The commander's segment; NULL for an observer. */
+    PhantomCommanderSegment *commander;
+    /* The number to put into every command; 0 for an observer. */
+    uint64_t lease;
+    /* The connection, which is the lease. */
+    int connection;
+} PhantomAttachment;
+
+/* How a read ended. */
+typedef enum PhantomRead {
+    PHANTOM_READ_OK,
+    /* The tick has not come. */
+    PHANTOM_READ_NOT_YET,
+    /* The ring has gone round. */
+    PHANTOM_READ_OVERWRITTEN,
+    /* It was being written; try again, or take a newer one. */
+    PHANTOM_READ_TORN,
+} PhantomRead;
+
+/* The sequence word of value k once it stands whole. */
+static inline uint64_t phantom_stamp(uint64_t k) { return 2 * k + 2; }
+
+/* The tick of the newest frame, or PHANTOM_NO_TICK. */
+static inline uint64_t phantom_latest_tick(const PhantomDriverSegment *segment) {
+    return __atomic_load_n(&segment->bell.latest_plus_one, __ATOMIC_ACQUIRE) - 1;
+}
+
+/* The words of a frame that mean something: the devices come last in it, and their number never changes. */
+static inline size_t phantom_frame_words(const PhantomDriverSegment *segment) {
+    uint64_t count = __atomic_load_n(&segment->header.device_count, __ATOMIC_RELAXED);
+    if (count > PHANTOM_MAX_DEVICES) count = PHANTOM_MAX_DEVICES;
+    return (offsetof(PhantomFrame, devices) + (size_t)count * sizeof(PhantomDeviceFrame)) / sizeof(uint64_t);
+}
+
+/* Reads frame `tick` whole, or says why it cannot be had; `frame` is unchanged then. Devices that the driver has
+ * not are zero. */
+static inline PhantomRead phantom_read_frame(const PhantomDriverSegment *segment, uint64_t tick,
+                                             PhantomFrame *frame) {
+    const PhantomFrameSlot *slot = &segment->frames[tick % PHANTOM_RING_FRAMES];
+    const size_t used = phantom_frame_words(segment);
+    uint64_t words[PHANTOM_FRAME_WORDS];
+    if (tick >= UINT64_MAX / 2) return PHANTOM_READ_NOT_YET;
+    uint64_t before = __atomic_load_n(&slot->sequence, __ATOMIC_ACQUIRE);
+    if (before & 1) return PHANTOM_READ_TORN;
+    for (size_t i = 0; i < used; i++) words[i] = __atomic_load_n(&slot->words[i], __ATOMIC_RELAXED);
+    /* Whoever saw a word of a later write must also see that write's odd sequence. */
+    __atomic_thread_fence(__ATOMIC_ACQUIRE);
+    if (__atomic_load_n(&slot->sequence, __ATOMIC_RELAXED) != before) return PHANTOM_READ_TORN;
+    if (before < phantom_stamp(tick)) return PHANTOM_READ_NOT_YET;
+    if (before > phantom_stamp(tick)) return PHANTOM_READ_OVERWRITTEN;
+    memcpy(frame, words, used * sizeof *words);
+    memset((char *)frame + used * sizeof *words, 0, sizeof *frame - used * sizeof *words);
+    return PHANTOM_READ_OK;
+}
+
+/* A command of zero force that answers `frame`. */
+static inline PhantomCommand phantom_answer_to(const PhantomFrame *frame, uint64_t lease) {
+    PhantomCommand command;
+    memset(&command, 0, sizeof command);
+    command.tick = frame->tick;
+    command.lease = lease;
+    command.device_count = frame->device_count;
+    return command;
+}
+
+/* Answers a tick and wakes the driver if it sleeps. One thread only. */
+static inline void phantom_publish(const PhantomAttachment *driver, const PhantomCommand *command) {
+    PhantomCommandSlot *slot = &driver->commander->commands[command->tick % PHANTOM_RING_COMMANDS];
+    PhantomBell *bell = &driver->commander->bell;
+    uint64_t words[PHANTOM_COMMAND_WORDS];
+    memcpy(words, command, sizeof words);
+    __atomic_store_n(&slot->sequence, phantom_stamp(command->tick) - 1, __ATOMIC_RELAXED);
+    /* No word of the value may become visible before the odd sequence. */
+    __atomic_thread_fence(__ATOMIC_RELEASE);
+    for (size_t i = 0; i < PHANTOM_COMMAND_WORDS; i++) __atomic_store_n(&slot->words[i], words[i], __ATOMIC_RELAXED);
+    __atomic_store_n(&slot->sequence, phantom_stamp(command->tick), __ATOMIC_RELEASE);
+    __atomic_store_n(&bell->latest_plus_one, command->tick + 1, __ATOMIC_RELEASE);
+    __atomic_store_n(&bell->doorbell, (uint32_t)(command->tick + 1), __ATOMIC_RELEASE);
+    /* Pairs with the fence of a sleeper: one of the two sees the other. */
+    __atomic_thread_fence(__ATOMIC_SEQ_CST);
+    if (__atomic_load_n(&driver->segment->bell.owner_sleeps, __ATOMIC_RELAXED))
+        syscall(SYS_futex, &bell->doorbell, FUTEX_WAKE, INT_MAX, NULL, NULL, 0);
+}
+
+/* Sleeps until there is a frame other than `seen`, `timeout_ns` passes or a signal comes; look again in any
+ * case. The driver wakes the commander only: an observer sleeps a millisecond at a time. */
+static inline void phantom_sleep_for_frame(const PhantomAttachment *driver, uint64_t seen, uint64_t timeout_ns) {
+    const uint64_t second = 1000000000, millisecond = 1000000;
+    if (driver->commander == NULL && timeout_ns > millisecond) timeout_ns = millisecond;
+    struct timespec timeout = {(time_t)(timeout_ns / second), (long)(timeout_ns % second)};
+    const PhantomBell *bell = &driver->segment->bell;
+    uint32_t expected = __atomic_load_n(&bell->doorbell, __ATOMIC_ACQUIRE);
+    if (driver->commander) __atomic_store_n(&driver->commander->bell.owner_sleeps, 1, __ATOMIC_RELAXED);
+    __atomic_thread_fence(__ATOMIC_SEQ_CST);
+    if (phantom_latest_tick(driver->segment) == seen)
+        syscall(SYS_futex, &bell->doorbell, FUTEX_WAIT, expected, &timeout, NULL, 0);
+    if (driver->commander) __atomic_store_n(&driver->commander->bell.owner_sleeps, 0, __ATOMIC_RELAXED);
+}
+
+/* Whether the driver still lives; never blocks. */
+static inline int phantom_is_attached(const PhantomAttachment *driver) {
+    struct pollfd fd = {driver->connection, POLLRDHUP, 0};
+    return poll(&fd, 1, 0) <= 0;
+}
+
+/* Ends the lease and unmaps. */
+static inline void phantom_detach(PhantomAttachment *driver) {
+    if (driver->segment) munmap((void *)(uintptr_t)driver->segment, sizeof *driver->segment);
+    if (driver->commander) munmap(driver->commander, sizeof *driver->commander);
+    if (driver->connection >= 0) close(driver->connection);
+    memset(driver, 0, sizeof *driver);
+    driver->connection = -1;
+}
+
+/* A request of this header's version. */
+static inline PhantomRequest phantom_request(uint64_t kind, const char *name) {
+    PhantomRequest request;
+    memset(&request, 0, sizeof request);
+    request.magic = PHANTOM_MAGIC;
+    request.abi_version = PHANTOM_ABI_VERSION;
+    request.layout_hash = PHANTOM_LAYOUT_HASH;
+    request.kind = kind;
+    size_t length = strlen(name);
+    memcpy(request.name, name, length < PHANTOM_NAME_BYTES ? length : PHANTOM_NAME_BYTES);
+    return request;
+}
+
+/* Receives the answer and at most two descriptors. Returns how many bytes of the answer came. */
+static inline size_t phantom_receive(int connection, PhantomAnswer *answer, int fds[2]) {
+    size_t filled = 0;
+    int count = 0;
+    while (filled < sizeof *answer) {
+        union {
+            char bytes[CMSG_SPACE(2 * sizeof(int))];
+            struct cmsghdr align;
+        } control;
+        struct iovec into = {(char *)answer + filled, sizeof *answer - filled};
+        struct msghdr message;
+        memset(&message, 0, sizeof message);
+        message.msg_iov = &into;
+        message.msg_iovlen = 1;
+        message.msg_control = control.bytes;
+        message.msg_controllen = sizeof control.bytes;
+        ssize_t received = recvmsg(connection, &message, MSG_CMSG_CLOEXEC);
+        if (received < 0 && errno == EINTR) continue;
+        if (received <= 0) break;
+        filled += (size_t)received;
+        for (struct cmsghdr *part = CMSG_FIRSTHDR(&message); part; part = CMSG_NXTHDR(&message, part)) {
+            if (part->cmsg_level != SOL_SOCKET || part->cmsg_type != SCM_RIGHTS) continue;
+            size_t arrived = (part->cmsg_len - CMSG_LEN(0)) / sizeof(int);
+            for (size_t i = 0; i < arrived; i++) {
+                int fd;
+                memcpy(&fd, CMSG_DATA(part) + i * sizeof fd, sizeof fd);
+                if (count < 2) fds[count++] = fd;
+                else close(fd);
+            }
+        }
+    }
+    return filled;
+}
+
+/* Maps a descriptor after checking that nobody can change its size under us. NULL: see `error`. */
+static inline void *phantom_map(int fd, size_t bytes, int protection, char *error) {
+    struct stat status;
+    int seals = fcntl(fd, F_GET_SEALS);
+    if (fd < 0 || seals < 0 || (seals & (F_SEAL_SHRINK | F_SEAL_GROW)) != (F_SEAL_SHRINK | F_SEAL_GROW)) {
+        snprintf(error, PHANTOM_ERROR_BYTES, "the driver handed over no sealed segment; do not trust this driver");
+        return NULL;
+    }
+    if (fstat(fd, &status) || (size_t)status.st_size != bytes) {
+        snprintf(error, PHANTOM_ERROR_BYTES,
+                 "the segment handed over does not have %zu bytes; rebuild both sides from one version", bytes);
+        return NULL;
+    }
+    void *map = mmap(NULL, bytes, protection, MAP_SHARED | MAP_POPULATE, fd, 0);
+    if (map != MAP_FAILED) return map;
+    snprintf(error, PHANTOM_ERROR_BYTES, "cannot map the driver's segment: %s", strerror(errno));
+    return NULL;
+}
+
+/* Whether the answer grants what was asked for; else `error` says what was found and what to do. */
+static inline int phantom_is_granted(const PhantomRequest *request, const PhantomAnswer *answer, char *error) {
+    uint64_t found = answer->abi_version, own = request->abi_version;
+    if (answer->magic != PHANTOM_MAGIC) {
+        snprintf(error, PHANTOM_ERROR_BYTES, "this is not a driver's socket: it answered with magic 0x%016llx",
+                 (unsigned long long)answer->magic);
+    } else if (found >> 32 != own >> 32) {
+        snprintf(error, PHANTOM_ERROR_BYTES,
+                 "the driver speaks ABI version %u.%u, this program %u.%u; install both from the same release",
+                 (unsigned)(found >> 32), (unsigned)found, (unsigned)(own >> 32), (unsigned)own);
+    } else if (answer->layout_hash != request->layout_hash) {
+        snprintf(error, PHANTOM_ERROR_BYTES,
+                 "the driver's memory layout is 0x%016llx, this program's 0x%016llx; rebuild both from the same source",
+                 (unsigned long long)answer->layout_hash, (unsigned long long)request->layout_hash);
+    } else if (answer->verdict == PHANTOM_VERDICT_LEASE_HELD) {
+        snprintf(error, PHANTOM_ERROR_BYTES,
+                 "the devices are commanded by process %llu (%.*s) already; end it first, or attach as an observer",
+                 (unsigned long long)answer->holder_pid, PHANTOM_NAME_BYTES, (const char *)answer->holder_name);
+    } else if (answer->verdict != PHANTOM_VERDICT_GRANTED) {
+        snprintf(error, PHANTOM_ERROR_BYTES, "the driver refused with verdict %llu (see PhantomVerdict)",
+                 (unsigned long long)answer->verdict);
+    } else {
+        return 1;
+    }
+    return 0;
+}
+
+/* Connects to a driver's socket. -1: see `error`. */
+static inline int phantom_connect(const char *path, char *error) {
+    struct sockaddr_un address;
+    struct timeval timeout = {PHANTOM_ANSWER_TIMEOUT_S, 0};
+    memset(&address, 0, sizeof address);
+    address.sun_family = AF_UNIX;
+    if (strlen(path) >= sizeof address.sun_path) {
+        snprintf(error, PHANTOM_ERROR_BYTES, "the socket's name is longer than %zu bytes; choose a shorter one",
+                 sizeof address.sun_path - 1);
+        return -1;
+    }
+    memcpy(address.sun_path, path, strlen(path));
+    int connection = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    if (connection >= 0) {
+        setsockopt(connection, SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof timeout);
+        setsockopt(connection, SOL_SOCKET, SO_SNDTIMEO, &timeout, sizeof timeout);
+        if (!connect(connection, (const struct sockaddr *)&address, sizeof address)) return connection;
+    }
+    snprintf(error, PHANTOM_ERROR_BYTES, "cannot reach a driver at %.200s: %s; is one running?", path,
+             strerror(errno));
+    if (connection >= 0) close(connection);
+    return -1;
+}
+
+/* Attaches with a request of any content. 0: done; -1: see `error`, which has PHANTOM_ERROR_BYTES. */
+static inline int phantom_attach_with(const char *path, const PhantomRequest *request, PhantomAttachment *driver,
+                                      char *error) {
+    PhantomAnswer answer;
+    int fds[2] = {-1, -1};
+    memset(driver, 0, sizeof *driver);
+    driver->connection = phantom_connect(path, error);
+    if (driver->connection < 0) return -1;
+    /* A driver without room for us answers unasked and hangs up, so that a failed send is no reason to stop. */
+    (void)!send(driver->connection, request, sizeof *request, MSG_NOSIGNAL);
+    if (phantom_receive(driver->connection, &answer, fds) < sizeof answer) {
+        snprintf(error, PHANTOM_ERROR_BYTES, "the driver at %.200s gives no answer; it may be stopped, or no driver",
+                 path);
+    } else if (phantom_is_granted(request, &answer, error)) {
+        driver->segment = (const PhantomDriverSegment *)phantom_map(fds[0], sizeof *driver->segment, PROT_READ, error);
+        if (driver->segment && request->kind == PHANTOM_REQUEST_KIND_COMMAND) {
+            driver->commander = (PhantomCommanderSegment *)phantom_map(fds[1], sizeof *driver->commander,
+                                                                       PROT_READ | PROT_WRITE, error);
+            driver->lease = answer.lease;
+        }
+    }
+    for (int i = 0; i < 2; i++)
+        if (fds[i] >= 0) close(fds[i]);
+    if (driver->segment && (driver->commander || request->kind != PHANTOM_REQUEST_KIND_COMMAND)) return 0;
+    phantom_detach(driver);
+    return -1;
+}
+
+/* Attaches as PHANTOM_REQUEST_KIND_OBSERVE or PHANTOM_REQUEST_KIND_COMMAND. 0: done; -1: see `error`, which
+ * has PHANTOM_ERROR_BYTES. */
+static inline int phantom_attach(const char *path, uint64_t kind, const char *name, PhantomAttachment *driver,
+                                 char *error) {
+    PhantomRequest request = phantom_request(kind, name);
+    return phantom_attach_with(path, &request, driver, error);
+}
+
+#endif /* PHANTOM3_CLIENT_H */
