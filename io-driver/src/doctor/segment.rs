@@ -148,6 +148,7 @@ fn socket(_: &Machine<'_>, _: &str, answer: &Answer) -> Judged {
         }
         Err(
             AttachError::NoPermission { .. }
+            | AttachError::NotAllowed { .. }
             | AttachError::Refused(_)
             | AttachError::LeaseHeld { .. }
             | AttachError::System { .. },
