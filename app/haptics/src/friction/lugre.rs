@@ -15,6 +15,10 @@
 //! The damping of the strain and the viscous part are felt along the motion of the HIP, beside the
 //! spring. `z'` is taken along that motion too, which it is unless the direction turns.
 //!
+//! On a curved surface the strain goes by the HIP's way along the tangent plane. In a ball of radius R at the depth d that is
+//! shorter than the god-object's by d / R, so the bristle of a steady slide is longer than the curve's by R / (R - d): 5 % at
+//! 5 mm in a ball of 0.1 m.
+//!
 //! Deviation: the damping is cut, which that of the model is not. It never lifts the dry part above `mu_s N`, since
 //! a fast breakaway must not leave the cone, and it never drives: where `z'` is against the motion, as after a rise of
 //! speed on the falling curve, it is left out.

@@ -27,11 +27,12 @@ pub(super) fn remember_speed(query: &FrictionQuery, memory: &mut FrictionMemory)
     }
 }
 
-/// The travel from which the search begins (m): that at the speed before, or, once it has moved in
-/// this tick, where it is. On a curved surface the gap changes a little with every round, and the
-/// search must not hop to another branch then.
+/// The travel from which the search begins (m): that at the speed before, or where it is once it has moved farther than that.
+///
+/// On a curved surface the gap changes a little with every round, and the search must not hop to another branch then. Short
+/// of that travel it may be on an edge of a mesh, on its way to a branch that does not begin yet.
 pub(super) fn start_m(query: &FrictionQuery, memory: &FrictionMemory) -> f64 {
-    if query.travel_m != 0.0 { query.travel_m.max(0.0) } else { memory.words[SPEED] * query.dt_s }
+    query.travel_m.max(memory.words[SPEED] * query.dt_s)
 }
 
 /// A move after which the gap is within `limit_m` to either side of S.

@@ -7,6 +7,7 @@ mod common;
 mod solids;
 
 mod curves;
+mod differential;
 mod energy;
 mod none;
 mod others;

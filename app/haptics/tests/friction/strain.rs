@@ -165,6 +165,29 @@ fn lugre_friction_is_on_the_stribeck_curve_at_every_steady_speed_also_where_it_f
 }
 
 #[test]
+fn inside_a_ball_lugres_bristle_is_longer_by_the_god_objects_way_over_the_fingers() {
+    let (r, rho, step) = (0.1, 0.1 - DEPTH, 1e-3);
+    let curve = Stribeck::new(MU_S, MU_D, 0.05, 0.0).unwrap();
+    let (entity, mut finger) =
+        ([ball(r, Friction::lugre(MU_S, MU_D, 0.05, 0.0, 0.0).unwrap())], point_finger());
+    let mut last = None;
+    for i in 0..2000 {
+        let hip = on_circle(rho, f64::from(i) * step);
+        let out = finger.step(&entity, &hip, DT);
+        let normal = out.god_object_W / r;
+        // Between the two places of the HIP, as its way and its plane are.
+        let cosine = normal.dot(&on_circle(1.0, (f64::from(i) - 0.5) * step));
+        last = Some((ratio(&out, &normal), cosine));
+    }
+    let (found, cosine) = last.unwrap();
+    let along_m_s = rho * step * cosine / DT;
+    let expected = curve.ratio_at(along_m_s) * r / (rho * cosine);
+    // The plane turns by 1e-3 in a tick, the bristle's way and the chord with its square.
+    assert!((found / expected - 1.0).abs() < 1e-4, "{found} {expected}");
+    assert!((found / curve.ratio_at(along_m_s) - 1.05).abs() < 0.005, "{found}");
+}
+
+#[test]
 fn lugre_presliding_is_elastic_with_a_closed_loop() {
     let law = Friction::lugre(MU_S, MU_D, 0.05, 0.0, 0.0).unwrap();
     let (amplitude, per_turn) = (0.2 * MU_S * DEPTH, 4000);
