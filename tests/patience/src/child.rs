@@ -9,49 +9,75 @@ use std::time::Duration;
 use crate::condition::is_met;
 use crate::limit;
 
-/// Runs a command to its end, as [`Command::output`] does: standard output and error are collected.
-#[track_caller]
-pub fn output(command: &mut Command) -> io::Result<Output> {
-    let child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn()?;
-    Ok(output_of(child))
+/// Waits for commands.
+pub trait BoundedCommand {
+    /// As [`Command::output`], within [`limit`]: standard output and error are collected, standard input is empty.
+    fn bounded_output(&mut self) -> io::Result<Output>;
+
+    /// As [`Command::status`], within [`limit`].
+    fn bounded_status(&mut self) -> io::Result<ExitStatus>;
 }
 
-/// Runs a command to its end, as [`Command::status`] does.
-#[track_caller]
-pub fn status(command: &mut Command) -> io::Result<ExitStatus> {
-    Ok(ended(&mut command.spawn()?))
+impl BoundedCommand for Command {
+    #[track_caller]
+    fn bounded_output(&mut self) -> io::Result<Output> {
+        let child = self.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+        // Not by `map`: the place that is told is the caller's.
+        match child {
+            Ok(child) => Ok(child.bounded_output()),
+            Err(error) => Err(error),
+        }
+    }
+
+    #[track_caller]
+    fn bounded_status(&mut self) -> io::Result<ExitStatus> {
+        Ok(self.spawn()?.bounded_wait())
+    }
 }
 
-/// Waits for a child's end and collects what it says into its pipes, as [`Child::wait_with_output`] does.
-#[track_caller]
-pub fn output_of(mut child: Child) -> Output {
-    drop(child.stdin.take());
-    let words = [Words::of(child.stdout.take()), Words::of(child.stderr.take())];
-    let status = end_of(&mut child, limit(), || {
-        let said: Vec<String> = words.iter().map(Words::until_now).collect();
-        format!("; it has said {:?} and on standard error {:?}", said[0], said[1])
-    });
-    let [stdout, stderr] = words.map(Words::all);
-    Output { status, stdout, stderr }
+/// Waits for children. One that does not end in time is killed, and fails the test.
+pub trait BoundedChild {
+    /// As [`Child::wait`], within [`limit`].
+    fn bounded_wait(&mut self) -> ExitStatus;
+
+    /// As [`Child::wait`], within a limit of its own.
+    fn wait_within(&mut self, limit: Duration) -> ExitStatus;
+
+    /// As [`Child::wait_with_output`], within [`limit`].
+    fn bounded_output(self) -> Output;
+
+    /// Kills it and waits until it is gone; also fine for one that has ended.
+    fn end(&mut self);
 }
 
-/// Waits for a child's end. One that takes longer than [`limit`] is killed, and fails the test.
-#[track_caller]
-pub fn ended(child: &mut Child) -> ExitStatus {
-    ended_within(limit(), child)
-}
+impl BoundedChild for Child {
+    #[track_caller]
+    fn bounded_wait(&mut self) -> ExitStatus {
+        self.wait_within(limit())
+    }
 
-/// As [`ended`], with a limit of its own.
-#[track_caller]
-pub fn ended_within(limit: Duration, child: &mut Child) -> ExitStatus {
-    end_of(child, limit, String::new)
-}
+    #[track_caller]
+    fn wait_within(&mut self, limit: Duration) -> ExitStatus {
+        end_of(self, limit, String::new)
+    }
 
-/// Kills a child and waits until it is gone; also fine for one that has ended.
-pub fn end(child: &mut Child) {
-    let _ = child.kill();
-    // Whoever is killed goes, unless the kernel itself waits for something.
-    let _ = is_met(limit(), || child.try_wait().map_or(Some(()), |status| status.map(drop)));
+    #[track_caller]
+    fn bounded_output(mut self) -> Output {
+        drop(self.stdin.take());
+        let words = [Words::of(self.stdout.take()), Words::of(self.stderr.take())];
+        let status = end_of(&mut self, limit(), || {
+            let said = words.each_ref().map(Words::until_now);
+            format!("; it has said {:?} and on standard error {:?}", said[0], said[1])
+        });
+        let [stdout, stderr] = words.map(Words::all);
+        Output { status, stdout, stderr }
+    }
+
+    fn end(&mut self) {
+        let _ = self.kill();
+        // Whoever is killed goes, unless the kernel itself waits for something.
+        let _ = is_met(limit(), || self.try_wait().map_or(Some(()), |status| status.map(drop)));
+    }
 }
 
 #[track_caller]
@@ -59,7 +85,7 @@ fn end_of(child: &mut Child, limit: Duration, said: impl FnOnce() -> String) -> 
     let status = is_met(limit, || child.try_wait().expect("our child"));
     status.unwrap_or_else(|| {
         let said = said();
-        end(child);
+        child.end();
         panic!("process {} did not end within {limit:?} and was killed{said}", child.id())
     })
 }
@@ -92,7 +118,8 @@ impl Words {
     #[track_caller]
     fn all(self) -> Vec<u8> {
         if let Some(thread) = self.thread {
-            crate::joined("the pipe of a child that has ended is closed", thread);
+            let is_closed = is_met(limit(), || thread.is_finished().then_some(())).is_some();
+            assert!(is_closed, "the child has ended, but somebody it left behind holds its pipe open");
         }
         std::mem::take(&mut self.bytes.lock().expect("nobody panics here"))
     }
@@ -112,7 +139,8 @@ mod tests {
     #[test]
     fn a_childs_words_and_its_status_are_collected() {
         // More than a pipe holds.
-        let output = output(&mut shell("head -c 200000 /dev/zero; echo to the side >&2; exit 3")).unwrap();
+        let mut command = shell("head -c 200000 /dev/zero; echo to the side >&2; exit 3");
+        let output = command.bounded_output().unwrap();
         assert_eq!((output.status.code(), output.stdout.len()), (Some(3), 200_000));
         assert_eq!(output.stderr, b"to the side\n");
     }

@@ -18,10 +18,15 @@ mod condition;
 mod socket;
 mod thread;
 
-pub use child::{end, ended, ended_within, output, output_of, status};
+pub use child::{BoundedChild, BoundedCommand};
 pub use condition::{until, until_some, until_within};
 pub use socket::{accepted, patient};
-pub use thread::{Raised, joined, received, watched};
+pub use thread::{BoundedReceiver, BoundedThread, Raised, watched};
+
+/// The waits that read as methods of the standard library's types.
+pub mod prelude {
+    pub use crate::{BoundedChild, BoundedCommand, BoundedReceiver, BoundedThread};
+}
 
 use std::sync::OnceLock;
 use std::time::Duration;

@@ -1,30 +1,54 @@
 //! Waits for threads and channels, and what ends them when a test fails.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::sync::mpsc::{Receiver, RecvError, RecvTimeoutError, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
 use crate::condition::is_met;
 use crate::limit;
 
-/// Joins a thread. Panics with its own panic, or after [`limit`] with what it is.
-#[track_caller]
-pub fn joined<T>(what: &str, thread: JoinHandle<T>) -> T {
-    let limit = limit();
-    let is_finished = is_met(limit, || thread.is_finished().then_some(())).is_some();
-    assert!(is_finished, "waited {limit:?} in vain for the end of a thread: {what}");
-    thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+/// Waits for threads.
+pub trait BoundedThread {
+    /// What the thread returns.
+    type Value;
+
+    /// As [`JoinHandle::join`], within [`limit`]; panics if it takes longer.
+    fn bounded_join(self) -> std::thread::Result<Self::Value>;
 }
 
-/// Receives from a channel. Panics after [`limit`], and if nobody can send any more.
-#[track_caller]
-pub fn received<T>(what: &str, receiver: &Receiver<T>) -> T {
-    let limit = limit();
-    match receiver.recv_timeout(limit) {
-        Ok(value) => value,
-        Err(RecvTimeoutError::Timeout) => panic!("waited {limit:?} in vain for a message: {what}"),
-        Err(RecvTimeoutError::Disconnected) => panic!("whoever was to send is gone: {what}"),
+impl<T> BoundedThread for JoinHandle<T> {
+    type Value = T;
+
+    #[track_caller]
+    fn bounded_join(self) -> std::thread::Result<T> {
+        let limit = limit();
+        let is_finished = is_met(limit, || self.is_finished().then_some(())).is_some();
+        assert!(is_finished, "waited {limit:?} in vain for the end of a thread");
+        self.join()
+    }
+}
+
+/// Waits for messages.
+pub trait BoundedReceiver {
+    /// What comes.
+    type Message;
+
+    /// As [`Receiver::recv`], within [`limit`]; panics if it takes longer.
+    fn bounded_recv(&self) -> Result<Self::Message, RecvError>;
+}
+
+impl<T> BoundedReceiver for Receiver<T> {
+    type Message = T;
+
+    #[track_caller]
+    fn bounded_recv(&self) -> Result<T, RecvError> {
+        let limit = limit();
+        match self.recv_timeout(limit) {
+            Ok(value) => Ok(value),
+            Err(RecvTimeoutError::Disconnected) => Err(RecvError),
+            Err(RecvTimeoutError::Timeout) => panic!("waited {limit:?} in vain for a message"),
+        }
     }
 }
 
@@ -60,6 +84,7 @@ pub fn watched<T>(limit: Duration, what: &str, body: impl FnOnce() -> T) -> T {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::BoundedCommand;
 
     /// What a body panics with.
     pub(crate) fn message_of<T>(body: impl FnOnce() -> T) -> String {
@@ -71,20 +96,12 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_threads_panic_and_its_value_arrive() {
-        assert_eq!(joined("a number", std::thread::spawn(|| 7)), 7);
-        let panics = std::thread::spawn(|| panic!("its own words"));
-        assert_eq!(message_of(|| joined("a panic", panics)), "its own words");
-    }
-
-    #[test]
-    fn a_channel_without_a_sender_says_so() {
+    fn a_threads_value_and_a_channels_messages_arrive() {
+        assert_eq!(std::thread::spawn(|| 7).bounded_join().unwrap(), 7);
         let (send, receive) = channel();
         send.send(1).unwrap();
         drop(send);
-        assert_eq!(received("the first", &receive), 1);
-        let message = message_of(|| received("the second", &receive));
-        assert_eq!(message, "whoever was to send is gone: the second");
+        assert_eq!((receive.bounded_recv(), receive.bounded_recv()), (Ok(1), Err(RecvError)));
     }
 
     #[test]
@@ -116,7 +133,7 @@ pub(crate) mod tests {
         let mut again = std::process::Command::new(std::env::current_exe().unwrap());
         // Two, since a lone thread of tests bears no name of a test.
         again.args(["--exact", name, "--nocapture", "--test-threads", "2"]);
-        let output = crate::output(again.env(HANGS, "").env(crate::LIMIT_VARIABLE, "0.2")).unwrap();
+        let output = again.env(HANGS, "").env(crate::LIMIT_VARIABLE, "0.2").bounded_output().unwrap();
         let said = String::from_utf8_lossy(&output.stderr);
         let words =
             format!("{name}: waited 200ms in vain: a thread that nobody stops; the test program is aborted");
