@@ -146,18 +146,26 @@ static inline void phantom_publish(const PhantomAttachment *driver, const Phanto
 }
 
 /* Sleeps until there is a frame other than `seen`, `timeout_ns` passes or a signal comes; look again in any
- * case. The driver wakes the commander only: an observer sleeps a millisecond at a time. */
+ * case. The driver wakes the commander only: an observer sleeps by the clock, a millisecond at a time. */
 static inline void phantom_sleep_for_frame(const PhantomAttachment *driver, uint64_t seen, uint64_t timeout_ns) {
     const uint64_t second = 1000000000, millisecond = 1000000;
     if (driver->commander == NULL && timeout_ns > millisecond) timeout_ns = millisecond;
     struct timespec timeout = {(time_t)(timeout_ns / second), (long)(timeout_ns % second)};
-    const PhantomBell *bell = &driver->segment->bell;
-    uint32_t expected = __atomic_load_n(&bell->doorbell, __ATOMIC_ACQUIRE);
-    if (driver->commander) __atomic_store_n(&driver->commander->bell.owner_sleeps, 1, __ATOMIC_RELAXED);
+    if (driver->commander == NULL) {
+        if (phantom_latest_tick(driver->segment) == seen) nanosleep(&timeout, NULL);
+        return;
+    }
+    PhantomCommanderSegment *own = driver->commander;
+    /* A driver of before 1.3 rings its own doorbell only. */
+    uint64_t version = __atomic_load_n(&driver->segment->header.abi_version, __ATOMIC_RELAXED);
+    int is_old = (uint32_t)version < 3;
+    const uint32_t *word = is_old ? &driver->segment->bell.doorbell : &own->header.frame_doorbell;
+    uint32_t expected = __atomic_load_n(word, __ATOMIC_ACQUIRE);
+    __atomic_store_n(&own->bell.owner_sleeps, is_old ? PHANTOM_SLEEPS_ON_OTHERS_BELL : PHANTOM_SLEEPS_ON_OWN_WORD,
+                     __ATOMIC_RELAXED);
     __atomic_thread_fence(__ATOMIC_SEQ_CST);
-    if (phantom_latest_tick(driver->segment) == seen)
-        syscall(SYS_futex, &bell->doorbell, FUTEX_WAIT, expected, &timeout, NULL, 0);
-    if (driver->commander) __atomic_store_n(&driver->commander->bell.owner_sleeps, 0, __ATOMIC_RELAXED);
+    if (phantom_latest_tick(driver->segment) == seen) syscall(SYS_futex, word, FUTEX_WAIT, expected, &timeout, NULL, 0);
+    __atomic_store_n(&own->bell.owner_sleeps, 0, __ATOMIC_RELAXED);
 }
 
 /* Whether the driver still lives; never blocks. */
@@ -311,6 +319,8 @@ static inline int phantom_attach_with(const char *path, const PhantomRequest *re
             driver->commander = (PhantomCommanderSegment *)phantom_map(fds[1], sizeof *driver->commander,
                                                                        PROT_READ | PROT_WRITE, error);
             driver->lease = answer.lease;
+            /* From here on the driver may forbid further mappings. */
+            if (driver->commander) __atomic_store_n(&driver->commander->header.mapped, 1, __ATOMIC_RELEASE);
         }
     }
     for (int i = 0; i < 2; i++)

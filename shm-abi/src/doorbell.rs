@@ -9,14 +9,19 @@
 //! store and look on both sides forbids that each misses the other (Dekker). Readers wait on the doorbell,
 //! never on a sequence word, which is odd for part of the time.
 //!
+//! The driver's doorbell lies in memory that every observer maps, and waking costs by the sleeper. So the commander
+//! sleeps on a word of its own segment, which the driver changes and rings while the flag says so, and observers
+//! look by the clock.
+//!
 //! Invariant: a sleeper that saw an old number is woken by the next ring (loom test).
-//! Cost: ringing is two stores, a fence and a load; one system call more if the flag is up.
+//! Cost: ringing is two stores, a fence and a load; if the flag is up, one system call more, which wakes one thread
+//! (eight for a commander of before 1.3), however many sleep.
 
 use crate::enumeration::from_word;
-use crate::layout::Bell;
+use crate::layout::{Bell, SLEEPS_ON_OTHERS_BELL, SLEEPS_ON_OWN_WORD};
 use crate::seqlock::Word;
 use rustix::thread::futex;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::time::Duration;
 
 /// How to wait for the other side.
@@ -41,21 +46,67 @@ impl WaitMode {
     }
 }
 
-/// Announces value `k`, which must stand already. Wakes whoever `sleeps` says is asleep.
+/// Where a reader sleeps.
+#[derive(Debug, Clone, Copy)]
+pub struct Place<'a> {
+    /// The futex word.
+    pub word: &'a AtomicU32,
+    /// How `owner_sleeps` names it.
+    pub flag: u64,
+}
+
+impl<'a> Place<'a> {
+    /// The doorbell of the segment that is waited for.
+    pub fn bell(bell: &'a Bell) -> Self {
+        Self { word: &bell.doorbell, flag: SLEEPS_ON_OTHERS_BELL }
+    }
+}
+
+/// Announces value `k`, which must stand already, and wakes whoever `sleeps` says is asleep on `bell`.
 pub fn ring(bell: &Bell, k: u64, sleeps: &AtomicU64) {
-    announce(&bell.latest_plus_one, k);
-    bell.doorbell.store(k.wrapping_add(1) as u32, Ordering::Release);
-    if is_asleep(sleeps) {
+    tell(bell, k);
+    if sleeper(sleeps) != 0 {
         wake(bell);
     }
 }
 
+/// As [`ring`], from the driver's loop, which anybody may try to stall by sleeping on the bell that all share: it
+/// wakes one sleeper on the commander's own word, or, for a commander that sleeps on the shared bell, as those of
+/// before 1.3 do, [`OLD_SLEEPERS`] there, the kernel choosing them by priority. Returns how many were woken.
+pub fn ring_frame(bell: &Bell, k: u64, sleeps: &AtomicU64, own_word: &AtomicU32) -> usize {
+    tell(bell, k);
+    match sleeper(sleeps) {
+        0 => 0,
+        SLEEPS_ON_OWN_WORD => {
+            own_word.store(low_half(k), Ordering::Release);
+            wake_some(own_word, 1)
+        }
+        _ => wake_some(&bell.doorbell, OLD_SLEEPERS),
+    }
+}
+
+/// Announces value `k`, which must stand already, and wakes nobody.
+pub fn tell(bell: &Bell, k: u64) {
+    announce(&bell.latest_plus_one, k);
+    bell.doorbell.store(low_half(k), Ordering::Release);
+}
+
+/// What a futex word says of value `k`.
+fn low_half(k: u64) -> u32 {
+    k.wrapping_add(1) as u32
+}
+
 /// Wakes everybody who sleeps on `bell`, without a new value: so that they look at something else. The
 /// word does not change, so that this is lost on somebody who is just about to sleep: whoever relies on it
-/// bounds the sleep by a time-out.
-pub fn wake(bell: &Bell) {
-    // The word is mapped; the only errors are those of a bad address.
-    let _ = futex::wake(&bell.doorbell, futex::Flags::empty(), EVERYBODY);
+/// bounds the sleep by a time-out. Returns how many were woken.
+pub fn wake(bell: &Bell) -> usize {
+    wake_some(&bell.doorbell, EVERYBODY)
+}
+
+fn wake_some(word: &AtomicU32, at_most: u32) -> usize {
+    // The word is mapped; the errors are those of a bad address, and of a sleeper who sleeps on it as on a lock,
+    // which is its own fault.
+    futex::wake(word, futex::Flags::empty(), at_most).unwrap_or(0)
 }
 
 /// The number of the newest complete value.
@@ -63,11 +114,11 @@ pub fn latest(bell: &Bell) -> Option<u64> {
     newest(&bell.latest_plus_one)
 }
 
-/// Sleeps until the bell rings, `timeout` passes or a signal comes, unless its newest value is no longer
-/// `seen`. Returns at once then; the caller looks for itself in any case.
-pub fn sleep(bell: &Bell, seen: Option<u64>, own_flag: &AtomicU64, timeout: Duration) {
-    let expected = bell.doorbell.load(Ordering::Acquire);
-    raise_flag(own_flag);
+/// Sleeps at `place` until the other side rings, `timeout` passes or a signal comes, unless the newest value of
+/// `bell` is no longer `seen`. Returns at once then; the caller looks for itself in any case.
+pub fn sleep(place: Place<'_>, bell: &Bell, seen: Option<u64>, own_flag: &AtomicU64, timeout: Duration) {
+    let expected = place.word.load(Ordering::Acquire);
+    raise_flag(own_flag, place.flag);
     if latest(bell) == seen {
         let timeout = futex::Timespec {
             // "For ever" must not become negative: the kernel would refuse, and the caller would spin.
@@ -75,13 +126,16 @@ pub fn sleep(bell: &Bell, seen: Option<u64>, own_flag: &AtomicU64, timeout: Dura
             tv_nsec: timeout.subsec_nanos().into(),
         };
         // Every outcome (woken, changed, interrupted, timed out) means the same: look again.
-        let _ = futex::wait(&bell.doorbell, futex::Flags::empty(), expected, Some(&timeout));
+        let _ = futex::wait(place.word, futex::Flags::empty(), expected, Some(&timeout));
     }
     own_flag.store(0, Ordering::Relaxed);
 }
 
-/// The kernel reads the number of sleepers to wake as a signed one: -1 would wake a single one, and an
-/// observer that sleeps on the same word could take the commander's turn.
+/// How many sleepers on the shared bell the loop wakes for a commander of before 1.3: itself, and some who sleep
+/// there beside it at the same priority.
+pub const OLD_SLEEPERS: u32 = 8;
+
+/// The kernel reads the number of sleepers to wake as a signed one: -1 would wake a single one.
 const EVERYBODY: u32 = i32::MAX as u32;
 
 /// Publishes the number of a value that stands.
@@ -94,14 +148,14 @@ pub fn newest<W: Word>(latest_plus_one: &W) -> Option<u64> {
     latest_plus_one.load(Ordering::Acquire).checked_sub(1)
 }
 
-/// Whether the reader may be asleep: asked after [`announce`], on the writer's side of Dekker's handshake.
-pub fn is_asleep<W: Word>(flag: &W) -> bool {
+/// Where the reader may be asleep, 0: nowhere. Asked after [`announce`], on the writer's side of Dekker's handshake.
+pub fn sleeper<W: Word>(flag: &W) -> u64 {
     W::fence(Ordering::SeqCst);
-    flag.load(Ordering::Relaxed) != 0
+    flag.load(Ordering::Relaxed)
 }
 
-/// Says that the reader is about to sleep: done before it looks at [`newest`] for the last time.
-pub fn raise_flag<W: Word>(own_flag: &W) {
-    own_flag.store(1, Ordering::Relaxed);
+/// Says where the reader is about to sleep: done before it looks at [`newest`] for the last time.
+pub fn raise_flag<W: Word>(own_flag: &W, place: u64) {
+    own_flag.store(place, Ordering::Relaxed);
     W::fence(Ordering::SeqCst);
 }

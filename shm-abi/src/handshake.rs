@@ -217,9 +217,15 @@ pub fn is_compatible(version: u64) -> bool {
     version >> 32 == u64::from(ABI_MAJOR)
 }
 
+/// The minor half of a version.
+pub fn minor_of(version: u64) -> u32 {
+    // The cut takes the major half away.
+    version as u32
+}
+
 /// A version as a person reads it.
 pub fn version_text(version: u64) -> String {
-    format!("{}.{}", version >> 32, version & u64::from(u32::MAX))
+    format!("{}.{}", version >> 32, minor_of(version))
 }
 
 /// This build's version as a person reads it.

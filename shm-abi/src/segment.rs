@@ -1,21 +1,27 @@
 //! The two segments as memory: created, sealed, mapped.
 //!
-//! Model: the driver creates both memfds and maps its own writable. Sealing forbids shrinking and growing,
-//! so nobody can cause SIGBUS, and for the driver's segment also every further writable mapping. Whoever
-//! receives a descriptor checks seals and size before touching a byte.
+//! Model: the driver creates both memfds and maps them. Sealing forbids shrinking and growing, so nobody can cause
+//! SIGBUS; every further writable mapping, and with it every hole, is forbidden for the driver's segment from the
+//! beginning, for the commander's once the commander has mapped it ([`LeaseOffer`]). Whoever receives a descriptor
+//! checks seals and size before touching a byte. The driver writes one word of the commander's segment, the one
+//! that the commander sleeps on.
 //!
 //! Invariant of the `unsafe` here: a mapping lives as long as the value that hands out references into it,
 //! is as long as the segment type, page-aligned, and the type is made of atomic words only, for which
 //! every bit pattern and every concurrent change is valid.
 
+mod offer;
+
+pub use offer::{LeaseOffer, MAPPED_WITHIN};
+
 use crate::command::Command;
-use crate::doorbell::{self, WaitMode};
+use crate::doorbell::{self, Place, WaitMode};
 use crate::enumeration::from_word;
 use crate::frame::{DeviceFrame, Frame};
 use crate::handshake;
 use crate::layout::{
     ABI_VERSION, CommanderSegment, DRIVER_COMMISSIONING, DeviceDescription, DriverSegment, LAYOUT_HASH,
-    MAGIC, MAX_DEVICES, RING_COMMANDS, RING_FRAMES,
+    MAGIC, MAX_DEVICES, RING_COMMANDS, RING_FRAMES, SLEEPS_ON_OWN_WORD,
 };
 use crate::seqlock::{self, Torn};
 use bytemuck::Zeroable;
@@ -207,12 +213,18 @@ impl DriverMemory {
         seqlock::write(&slot.sequence, &slot.words[..used], &words_of(frame)[..used], frame.tick);
     }
 
-    /// Announces frame `tick` and wakes the commander if it sleeps.
+    /// Announces frame `tick` and wakes the commander if it sleeps. Returns how many sleepers were woken.
     #[inline]
-    pub fn ring(&self, tick: u64, commander: Option<&CommanderView>) {
+    pub fn ring(&self, tick: u64, commander: Option<&CommanderView>) -> usize {
         match commander {
-            Some(view) => doorbell::ring(&self.map.bell, tick, &view.map.bell.owner_sleeps),
-            None => doorbell::ring(&self.map.bell, tick, &NOBODY_SLEEPS),
+            Some(view) => {
+                let own = &view.map;
+                doorbell::ring_frame(&self.map.bell, tick, &own.bell.owner_sleeps, &own.header.frame_doorbell)
+            }
+            None => {
+                doorbell::tell(&self.map.bell, tick);
+                0
+            }
         }
     }
 
@@ -228,8 +240,6 @@ impl Deref for DriverMemory {
         &self.map
     }
 }
-
-static NOBODY_SLEEPS: AtomicU64 = AtomicU64::new(0);
 
 /// The driver's segment, everywhere else: read-only.
 #[derive(Debug)]
@@ -255,8 +265,8 @@ impl DriverView {
 
     /// The driver's minor version. What later ones than this added reads as zero.
     pub fn abi_minor(&self) -> u32 {
-        // The major half was checked when the memory was mapped; the cut takes it away.
-        get(&self.map.header.abi_version) as u32
+        // The major half was checked when the memory was mapped.
+        handshake::minor_of(get(&self.map.header.abi_version))
     }
 
     /// Over how many ticks the driver lets forces come on; of [`Self::info`], without the heap.
@@ -324,9 +334,15 @@ impl DriverView {
     }
 
     /// Sleeps until there is a newer frame than `seen`, or `timeout` passes, or a signal comes. The driver
-    /// wakes only the commander, whose memory is passed here; observers had better sleep by the clock.
+    /// wakes only the commander, whose memory is passed here; observers sleep by the clock.
     pub fn sleep_for_frame(&self, seen: Option<u64>, own: &CommanderMemory, timeout: Duration) {
-        doorbell::sleep(&self.map.bell, seen, &own.map.bell.owner_sleeps, timeout);
+        let own = &own.map;
+        let place = if self.abi_minor() >= FIRST_WITH_OWN_WORD {
+            Place { word: &own.header.frame_doorbell, flag: SLEEPS_ON_OWN_WORD }
+        } else {
+            Place::bell(&self.map.bell)
+        };
+        doorbell::sleep(place, &self.map.bell, seen, &own.bell.owner_sleeps, timeout);
     }
 }
 
@@ -354,6 +370,8 @@ impl CommanderMemory {
         expect_compatible(&map.header.abi_version)?;
         expect("layout hash", &map.header.layout_hash, LAYOUT_HASH)?;
         let lease = get(&map.header.lease);
+        // From here on the driver may forbid further mappings.
+        map.header.mapped.store(1, Ordering::Release);
         Ok(Self { map, lease })
     }
 
@@ -378,7 +396,10 @@ impl Deref for CommanderMemory {
     }
 }
 
-/// The commander's segment, in the driver: read-only.
+/// The first minor version whose drivers ring the commander's own word.
+const FIRST_WITH_OWN_WORD: u32 = 3;
+
+/// The commander's segment, in the driver, which writes nothing into it but the word to sleep on.
 #[derive(Debug)]
 pub struct CommanderView {
     map: Mapping<CommanderSegment>,
@@ -386,18 +407,18 @@ pub struct CommanderView {
 }
 
 impl CommanderView {
-    /// Creates the segment for one lease. Returns the driver's view and the descriptor to hand over.
+    /// Creates the segment for one lease. Returns the driver's view and the descriptor to hand over. This alone is for
+    /// a commander in the same process; what another process may get is a [`LeaseOffer`].
     pub fn create(lease: u64) -> Result<(Self, OwnedFd), SegmentError> {
         let fd = create_memfd(c"phantom3-commander", size_of::<CommanderSegment>())?;
-        let writable = Mapping::<CommanderSegment>::writable(&fd)?;
-        let header = &writable.header;
+        let map = Mapping::<CommanderSegment>::writable(&fd)?;
+        let header = &map.header;
         put(&header.magic, MAGIC);
         put(&header.abi_version, ABI_VERSION);
         put(&header.layout_hash, LAYOUT_HASH);
         put(&header.segment_bytes, size_of::<CommanderSegment>() as u64);
         put(&header.lease, lease);
-        seal(&fd, SealFlags::SHRINK | SealFlags::GROW | SealFlags::SEAL)?;
-        let map = Mapping::<CommanderSegment>::read_only(&fd)?;
+        seal(&fd, SealFlags::SHRINK | SealFlags::GROW)?;
         Ok((Self { map, lease }, fd))
     }
 
@@ -421,7 +442,17 @@ impl CommanderView {
 
     /// Sleeps until the commander rings, `timeout` passes or a signal comes.
     pub fn sleep_for_command(&self, seen: Option<u64>, own: &DriverMemory, timeout: Duration) {
-        doorbell::sleep(&self.map.bell, seen, &own.map.bell.owner_sleeps, timeout);
+        let bell = &self.map.bell;
+        doorbell::sleep(Place::bell(bell), bell, seen, &own.map.bell.owner_sleeps, timeout);
+    }
+
+    /// Touches every page, so that the loop's first look at one is no page fault.
+    fn prefault(&self) {
+        for slot in &self.map.commands {
+            // A read of a page that is not there would map it for reading only.
+            slot.padding[0].fetch_add(0, Ordering::Relaxed);
+        }
+        self.map.header.frame_doorbell.fetch_add(0, Ordering::Relaxed);
     }
 
     /// Wakes the driver's own loop out of [`sleep_for_command`](Self::sleep_for_command). If it is only about

@@ -3,14 +3,15 @@
 //! Model: one thread, which is not the real-time loop, polls the listening socket and all connections.
 //! Exactly one connection holds the lease; it ends when the connection does, however that happens. For
 //! each lease a fresh commander's segment is made, so that a former holder that still writes writes into
-//! memory nobody reads. What happens is returned as [`ServerEvent`]s, for the owner to pass to the loop.
+//! memory nobody reads; the loop is given it once it is mapped and sealed ([`LeaseOffer`]). What happens is returned
+//! as [`ServerEvent`]s, for the owner to pass to the loop.
 //!
 //! Invariant: nothing a client sends or withholds blocks the thread; a client that connects and says
 //! nothing is dropped after [`PATIENCE`], and one that says more than its request, at once: what nobody
 //! reads may hold a copy of the connection itself, and so a lease that its holder's death does not end.
 
 use crate::handshake::{self, Answer, Request, RequestKind, Verdict};
-use crate::segment::{CommanderView, DriverMemory};
+use crate::segment::{CommanderView, DriverMemory, LeaseOffer};
 use crate::socket;
 use bytemuck::Zeroable;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -34,6 +35,8 @@ pub const MAX_OBSERVERS: usize = 60;
 pub const PATIENCE: Duration = Duration::from_secs(1);
 /// After a failed accept (no descriptors left, say) the listener rests this long instead of spinning.
 const ACCEPT_REST: Duration = Duration::from_millis(100);
+/// How often it is looked whether a commander has mapped its segment.
+const OFFER_LOOK: Duration = Duration::from_millis(1);
 /// Owner and group may use the socket.
 const SOCKET_MODE: u32 = 0o660;
 
@@ -132,8 +135,8 @@ enum Stage {
     Observing,
     /// Got an answer and nothing to keep.
     Served,
-    /// Holds the lease.
-    Commanding { lease: u64, name: String },
+    /// Holds the lease; with an offer, the loop knows nothing of it yet.
+    Commanding { lease: u64, name: String, offer: Option<LeaseOffer> },
     /// To be forgotten.
     Gone,
 }
@@ -187,6 +190,7 @@ impl Server {
         for index in talking {
             self.listen_to(index, memory, events);
         }
+        self.grant_what_is_mapped(events);
         self.drop_the_silent();
         self.connections.retain(|connection| !matches!(connection.stage, Stage::Gone));
         if newcomer {
@@ -222,6 +226,7 @@ impl Server {
         let now = Instant::now();
         let silence_ends = self.connections.iter().filter_map(|connection| match connection.stage {
             Stage::Asking { since, .. } => Some(since + PATIENCE),
+            Stage::Commanding { offer: Some(_), .. } => Some(now + OFFER_LOOK),
             _ => None,
         });
         let rest_ends = self.accept_after.filter(|after| *after > now);
@@ -258,10 +263,7 @@ impl Server {
         match connection.receive() {
             Heard::Nothing => {}
             Heard::End => {
-                if let Stage::Commanding { lease, .. } = connection.stage {
-                    events.push(ServerEvent::LeaseEnded { lease });
-                }
-                connection.stage = Stage::Gone;
+                connection.end(events);
             }
             Heard::Request(request) => {
                 let stage = self.serve(index, &request, memory, events);
@@ -284,7 +286,7 @@ impl Server {
         let pid = self.connections[index].pid;
         match kind {
             RequestKind::Observe => self.let_observe(index, memory),
-            RequestKind::Command => self.lease_to(index, handshake::name_text(&request.name), memory, events),
+            RequestKind::Command => self.lease_to(index, request, memory, events),
             RequestKind::Stop => {
                 events.push(ServerEvent::StopRequested { pid });
                 self.answer(index, &Answer::new(Verdict::Granted), &[])
@@ -319,7 +321,7 @@ impl Server {
     fn lease_to(
         &mut self,
         index: usize,
-        name: String,
+        request: &Request,
         memory: &DriverMemory,
         events: &mut Vec<ServerEvent>,
     ) -> Stage {
@@ -329,22 +331,38 @@ impl Server {
             return self.refuse(index, Verdict::LeaseHeld);
         }
         let lease = self.next_lease;
-        let (view, fd) = match CommanderView::create(lease) {
-            Ok(made) => made,
+        let offer = match LeaseOffer::create(lease, request.abi_version) {
+            Ok(offer) => offer,
             Err(error) => {
                 events.push(ServerEvent::Trouble { message: error.to_string() });
                 return self.refuse(index, Verdict::NoSegment);
             }
         };
         let answer = Answer { lease, ..Answer::new(Verdict::Granted) };
-        match self.answer(index, &answer, &[memory.fd(), fd.as_fd()]) {
+        match self.answer(index, &answer, &[memory.fd(), offer.fd()]) {
             Stage::Served => {
                 self.next_lease += 1;
-                let pid = self.connections[index].pid;
-                events.push(ServerEvent::LeaseGranted { view, pid, name: name.clone() });
-                Stage::Commanding { lease, name }
+                Stage::Commanding { lease, name: handshake::name_text(&request.name), offer: Some(offer) }
             }
             failed => failed,
+        }
+    }
+
+    /// Puts into force what was offered, once nobody can take its memory away any more.
+    fn grant_what_is_mapped(&mut self, events: &mut Vec<ServerEvent>) {
+        for connection in &mut self.connections {
+            let Stage::Commanding { name, offer, .. } = &mut connection.stage else { continue };
+            let Some(mapped) = offer.take_if(|offer| offer.is_mapped()) else { continue };
+            let (pid, name) = (connection.pid, name.clone());
+            match mapped.seal() {
+                Ok(view) => events.push(ServerEvent::LeaseGranted { view, pid, name }),
+                Err(error) => {
+                    let message =
+                        format!("process {pid} ({name}) gets no lease, it sealed its memory: {error}");
+                    events.push(ServerEvent::Trouble { message });
+                    connection.stage = Stage::Gone;
+                }
+            }
         }
     }
 
@@ -362,11 +380,8 @@ impl Server {
     /// successor must not be told that the dead one commands.
     fn end_lease_of_the_dead(&mut self, events: &mut Vec<ServerEvent>) {
         for connection in &mut self.connections {
-            if let Stage::Commanding { lease, .. } = connection.stage
-                && connection.is_over()
-            {
-                events.push(ServerEvent::LeaseEnded { lease });
-                connection.stage = Stage::Gone;
+            if matches!(connection.stage, Stage::Commanding { .. }) && connection.is_over() {
+                connection.end(events);
             }
         }
     }
@@ -426,6 +441,14 @@ impl Connection {
         let mut request = Request::zeroed();
         bytemuck::bytes_of_mut(&mut request).copy_from_slice(bytes);
         Heard::Request(request)
+    }
+
+    /// Forgets it, and tells the loop if that knew of its lease.
+    fn end(&mut self, events: &mut Vec<ServerEvent>) {
+        if let Stage::Commanding { lease, offer: None, .. } = self.stage {
+            events.push(ServerEvent::LeaseEnded { lease });
+        }
+        self.stage = Stage::Gone;
     }
 
     /// Whether the other end hung up; never blocks.

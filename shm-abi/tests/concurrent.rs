@@ -9,7 +9,8 @@ mod common;
 use bytemuck::Zeroable;
 use common::{HANG, command, frame, info, info_of, is_command, is_frame, is_frame_of, wait_until};
 use proptest::prelude::*;
-use shm_abi::layout::RING_COMMANDS;
+use shm_abi::doorbell::{self, Place};
+use shm_abi::layout::{RING_COMMANDS, SLEEPS_ON_OTHERS_BELL};
 use shm_abi::server::{Server, ServerEvent};
 use shm_abi::{
     Command, CommanderMemory, CommanderView, DriverMemory, DriverView, Frame, FrameUnavailable, MAX_DEVICES,
@@ -17,7 +18,7 @@ use shm_abi::{
 };
 use std::os::fd::AsFd;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 /// A driver's memory and one lease's, each mapped by both sides.
@@ -202,7 +203,6 @@ fn ten_thousand_rounds_of_sleeping_on_each_other_lose_no_wake_up() {
             commander_slept += commander.bell.owner_sleeps.load(Ordering::Relaxed);
             memory.write_frame(&frame(tick));
             memory.ring(tick, Some(&commander_view));
-            // Both sleep on a mapping that is read-only to them.
             sleep_until(
                 tick,
                 || commander_view.latest_tick(),
@@ -215,25 +215,131 @@ fn ten_thousand_rounds_of_sleeping_on_each_other_lose_no_wake_up() {
     assert!(commander_slept > 0, "nobody ever slept: nothing was tested");
 }
 
-#[test]
-fn one_ring_wakes_everybody_who_sleeps_on_the_bell() {
-    let Shared { memory, view, commander, commander_view } = shared();
-    let (other_view, other_fd) = CommanderView::create(2).unwrap();
-    let other = CommanderMemory::map(other_fd.as_fd()).unwrap();
-    std::thread::scope(|scope| {
-        for own in [&other, &commander] {
-            let view = &view;
-            scope.spawn(move || {
-                sleep_until(0, || view.latest_tick(), |seen, t| view.sleep_for_frame(seen, own, t));
+/// Observers that sleep on the bell that all share, as any may, to crowd it.
+struct Crowd {
+    asleep: AtomicU64,
+    woken: AtomicU64,
+}
+
+impl Crowd {
+    /// Runs `body` while they sleep, then wakes them all.
+    fn around(view: &DriverView, memory: &DriverMemory, body: impl FnOnce(&Self)) {
+        let crowd = Self { asleep: AtomicU64::new(0), woken: AtomicU64::new(0) };
+        std::thread::scope(|scope| {
+            for _ in 0..CROWD {
+                let spawned = std::thread::Builder::new()
+                    .stack_size(64 << 10)
+                    .spawn_scoped(scope, || crowd.sleep_on(&view.bell.doorbell));
+                spawned.unwrap();
+            }
+            wait_until("they sleep", || crowd.asleep.load(Ordering::Relaxed) == CROWD);
+            // From there to the kernel's queue. If this is too short, the test checks less, but holds.
+            std::thread::sleep(Duration::from_millis(200));
+            body(&crowd);
+            wait_until("everybody has slept and is woken", || {
+                doorbell::wake(&memory.bell);
+                crowd.woken() == CROWD
             });
-            wait_until("it sleeps", || own.bell.owner_sleeps.load(Ordering::Relaxed) == 1);
-            // From the flag to the kernel's queue. If this is too short, the test checks less, but holds.
-            std::thread::sleep(Duration::from_millis(50));
+        });
+    }
+
+    fn sleep_on(&self, word: &AtomicU32) {
+        use rustix::thread::futex;
+        self.asleep.fetch_add(1, Ordering::Relaxed);
+        while futex::wait(word, futex::Flags::empty(), word.load(Ordering::Relaxed), None).is_err() {}
+        self.woken.fetch_add(1, Ordering::Relaxed);
+    }
+
+    fn woken(&self) -> u64 {
+        self.woken.load(Ordering::Relaxed)
+    }
+}
+
+/// As many as one process may have threads; sixty may attach, and each may have more.
+const CROWD: u64 = 1000;
+
+#[test]
+fn a_thousand_observers_asleep_on_the_shared_bell_are_never_woken_by_the_loop() {
+    const ROUNDS: u64 = 1000;
+    let Shared { memory, view, commander, commander_view } = shared();
+    Crowd::around(&view, &memory, |crowd| {
+        let mut woken = 0;
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                for tick in 0..ROUNDS {
+                    sleep_until(
+                        tick,
+                        || view.latest_tick(),
+                        |seen, t| view.sleep_for_frame(seen, &commander, t),
+                    );
+                    commander.publish(&command(tick), &view);
+                }
+            });
+            for tick in 0..ROUNDS {
+                memory.write_frame(&frame(tick));
+                let now = memory.ring(tick, Some(&commander_view));
+                assert!(now <= 1, "{now} sleepers were woken for tick {tick}");
+                woken += now;
+                sleep_until(
+                    tick,
+                    || commander_view.latest_tick(),
+                    |seen, timeout| commander_view.sleep_for_command(seen, &memory, timeout),
+                );
+            }
+        });
+        assert!(woken > 0, "the commander never slept: nothing was tested");
+        assert_eq!(crowd.woken(), 0, "observers that the loop woke");
+    });
+}
+
+#[test]
+fn for_a_commander_of_before_1_3_the_loop_wakes_a_few_sleepers_at_most() {
+    let Shared { memory, view, commander, commander_view } = shared();
+    // As it sleeps: on the bell that all share.
+    commander.bell.owner_sleeps.store(SLEEPS_ON_OTHERS_BELL, Ordering::Relaxed);
+    Crowd::around(&view, &memory, |crowd| {
+        for tick in 0..10 {
+            let now = memory.ring(tick, Some(&commander_view));
+            assert!(now <= doorbell::OLD_SLEEPERS as usize, "{now} sleepers were woken for tick {tick}");
         }
+        assert!(crowd.woken() <= u64::from(10 * doorbell::OLD_SLEEPERS));
+    });
+}
+
+#[test]
+fn a_commander_of_before_1_3_that_sleeps_alone_is_woken_by_the_ring() {
+    let Shared { memory, view, commander, commander_view } = shared();
+    let (place, flag) = (Place::bell(&view.bell), &commander.bell.owner_sleeps);
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            sleep_until(
+                0,
+                || view.latest_tick(),
+                |seen, t| doorbell::sleep(place, &view.bell, seen, flag, t),
+            );
+        });
+        wait_until("it sleeps", || flag.load(Ordering::Relaxed) == SLEEPS_ON_OTHERS_BELL);
+        // From the flag to the kernel's queue. If this is too short, the test checks less, but holds.
+        std::thread::sleep(Duration::from_millis(50));
         memory.write_frame(&frame(0));
         memory.ring(0, Some(&commander_view));
     });
-    drop(other_view);
+}
+
+#[test]
+fn a_commander_of_today_sleeps_on_the_shared_bell_of_a_driver_of_before_1_3() {
+    let Shared { memory, view, commander, .. } = shared();
+    memory.header.abi_version.store((1 << 32) | 2, Ordering::Relaxed);
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            sleep_until(0, || view.latest_tick(), |seen, t| view.sleep_for_frame(seen, &commander, t));
+        });
+        let flag = &commander.bell.owner_sleeps;
+        wait_until("it sleeps", || flag.load(Ordering::Relaxed) == SLEEPS_ON_OTHERS_BELL);
+        std::thread::sleep(Duration::from_millis(50));
+        // What that driver does.
+        doorbell::ring(&memory.bell, 0, flag);
+    });
 }
 
 #[test]
@@ -241,7 +347,7 @@ fn a_sleep_without_end_sleeps_instead_of_returning_at_once() {
     let Shared { memory, view, commander, commander_view } = shared();
     std::thread::scope(|scope| {
         let sleeper = scope.spawn(|| view.sleep_for_frame(None, &commander, Duration::MAX));
-        wait_until("it sleeps", || commander.bell.owner_sleeps.load(Ordering::Relaxed) == 1);
+        wait_until("it sleeps", || commander.bell.owner_sleeps.load(Ordering::Relaxed) != 0);
         std::thread::sleep(Duration::from_millis(50));
         let slept = !sleeper.is_finished();
         memory.write_frame(&frame(0));

@@ -6,11 +6,11 @@ use bytemuck::Zeroable;
 use common::desk::{Desk, SHORT, is_closed, verdict};
 use common::fake::send;
 use common::host::Host;
-use common::{HANG, command, directory, frame, info, is_frame, own_pid};
-use shm_abi::Command;
+use common::{HANG, command, directory, frame, info, is_frame, own_pid, wait_until};
 use shm_abi::client;
 use shm_abi::handshake::{Request, RequestKind, Verdict};
 use shm_abi::server::ServerEvent;
+use shm_abi::{Command, CommanderMemory};
 use std::io::Write;
 use std::os::fd::AsFd;
 
@@ -104,15 +104,11 @@ fn a_successor_is_not_told_that_the_dead_holder_commands() {
     assert_eq!(verdict(&mut successor), Some(Verdict::Granted));
     assert!(matches!(
         desk.events[..],
-        [
-            ServerEvent::LeaseGranted { .. },
-            ServerEvent::LeaseEnded { lease: 1 },
-            ServerEvent::LeaseGranted { .. }
-        ]
+        [ServerEvent::LeaseGranted { .. }, ServerEvent::LeaseEnded { lease: 1 }]
     ));
     // The end is told once.
     desk.poll(SHORT);
-    assert_eq!(desk.events.len(), 3);
+    assert_eq!(desk.events.len(), 2);
 }
 
 #[test]
@@ -138,4 +134,59 @@ fn a_connection_that_holds_itself_alive_does_not_hold_the_lease() {
     drop(stream);
     desk.poll(HANG);
     assert!(matches!(desk.events.last(), Some(ServerEvent::LeaseEnded { lease: 1 })), "{:?}", desk.events);
+}
+
+#[test]
+fn a_lease_is_in_force_once_its_memory_is_mapped_and_not_before() {
+    let mut desk = Desk::open();
+    let (stream, offered) = desk.offered(RequestKind::Command);
+    for _ in 0..20 {
+        desk.poll(SHORT);
+    }
+    assert!(desk.events.is_empty(), "{:?}", desk.events);
+    let mut rival = desk.connect();
+    rival.write_all(bytemuck::bytes_of(&Request::new(RequestKind::Command, "rival"))).unwrap();
+    desk.poll(HANG);
+    assert_eq!(verdict(&mut rival), Some(Verdict::LeaseHeld), "it is taken all the same");
+    assert!(matches!(desk.events.pop(), Some(ServerEvent::LeaseRefused)));
+    let commander = CommanderMemory::map(offered.unwrap().as_fd()).unwrap();
+    wait_until("it is in force", || {
+        desk.poll(HANG);
+        !desk.events.is_empty()
+    });
+    let Some(ServerEvent::LeaseGranted { view, .. }) = desk.events.pop() else { panic!("no lease") };
+    assert_eq!(view.lease(), commander.lease());
+    drop(stream);
+    desk.poll(HANG);
+    assert!(matches!(desk.events[..], [ServerEvent::LeaseEnded { lease: 1 }]), "{:?}", desk.events);
+}
+
+#[test]
+fn a_lease_that_was_never_in_force_ends_without_a_word_to_the_loop() {
+    let mut desk = Desk::open();
+    let offered = desk.offered(RequestKind::Command);
+    drop(offered);
+    for _ in 0..20 {
+        desk.poll(SHORT);
+    }
+    assert!(desk.events.is_empty(), "{:?}", desk.events);
+    desk.granted(RequestKind::Command);
+}
+
+#[test]
+fn a_commander_that_seals_its_memory_is_hung_up_on_and_the_next_one_commands() {
+    let mut desk = Desk::open();
+    let (mut stream, offered) = desk.offered(RequestKind::Command);
+    let offered = offered.unwrap();
+    rustix::fs::fcntl_add_seals(&offered, rustix::fs::SealFlags::SEAL).unwrap();
+    let _mapped = CommanderMemory::map(offered.as_fd()).unwrap();
+    wait_until("it is found out", || {
+        desk.poll(HANG);
+        !desk.events.is_empty()
+    });
+    let Some(ServerEvent::Trouble { message }) = desk.events.pop() else { panic!("no trouble") };
+    assert!(message.contains("(raw) gets no lease, it sealed its memory"), "{message}");
+    desk.poll(SHORT);
+    assert!(is_closed(&mut stream));
+    desk.granted(RequestKind::Command);
 }

@@ -10,7 +10,8 @@
 use loom::sync::atomic::{AtomicU64, fence};
 use loom::sync::{Arc, Mutex};
 use loom::thread;
-use shm_abi::doorbell::{announce, is_asleep, newest, raise_flag};
+use shm_abi::doorbell::{announce, newest, raise_flag, sleeper};
+use shm_abi::layout::{SLEEPS_ON_OTHERS_BELL, SLEEPS_ON_OWN_WORD};
 use shm_abi::seqlock::{self, Torn, Word, stamp};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -258,9 +259,33 @@ impl Futex {
 #[derive(Default)]
 struct Bell {
     latest_plus_one: LoomWord,
+    /// The word that is slept on: the bell's own, or one of the sleeper's segment.
     doorbell: LoomWord,
     reader_sleeps: LoomWord,
     futex: Futex,
+}
+
+impl Bell {
+    /// The order of steps is that of `doorbell::ring_frame` for a commander that sleeps on its own word.
+    fn ring_own_word(&self, k: u64) {
+        announce(&self.latest_plus_one, k);
+        if sleeper(&self.reader_sleeps) == SLEEPS_ON_OWN_WORD {
+            self.doorbell.store(k + 1, Ordering::Release);
+            self.futex.wake();
+        }
+    }
+
+    /// The order of steps is that of `doorbell::sleep`; the flag stays up. Returns whether the last look found
+    /// nothing new.
+    fn sleep_on_own_word(&self, seen: Option<u64>) -> bool {
+        let expected = self.doorbell.load(Ordering::Acquire);
+        raise_flag(&self.reader_sleeps, SLEEPS_ON_OWN_WORD);
+        let sleeps = newest(&self.latest_plus_one) == seen;
+        if sleeps {
+            self.futex.wait(&self.doorbell, expected);
+        }
+        sleeps
+    }
 }
 
 #[test]
@@ -271,10 +296,10 @@ fn a_sleeper_that_saw_the_old_number_is_always_seen_by_the_publisher() {
             let bell = bell.clone();
             thread::spawn(move || {
                 announce(&bell.latest_plus_one, 0);
-                is_asleep(&bell.reader_sleeps)
+                sleeper(&bell.reader_sleeps) != 0
             })
         };
-        raise_flag(&bell.reader_sleeps);
+        raise_flag(&bell.reader_sleeps, SLEEPS_ON_OTHERS_BELL);
         let sleeps = newest(&bell.latest_plus_one).is_none();
         let wakes = publisher.join().unwrap();
         assert!(wakes || !sleeps, "each missed the other");
@@ -293,19 +318,56 @@ fn no_wake_up_is_lost_between_ring_and_sleep() {
             thread::spawn(move || {
                 announce(&bell.latest_plus_one, 0);
                 bell.doorbell.store(1, Ordering::Release);
-                if is_asleep(&bell.reader_sleeps) {
+                if sleeper(&bell.reader_sleeps) != 0 {
                     bell.futex.wake();
                 }
             })
         };
         let expected = bell.doorbell.load(Ordering::Acquire);
-        raise_flag(&bell.reader_sleeps);
+        raise_flag(&bell.reader_sleeps, SLEEPS_ON_OTHERS_BELL);
         if newest(&bell.latest_plus_one).is_none() {
             bell.futex.wait(&bell.doorbell, expected);
         }
         publisher.join().unwrap();
         bell.futex.assert_nobody_sleeps_on();
     });
+}
+
+#[test]
+fn no_wake_up_is_lost_on_a_word_that_changes_only_while_somebody_sleeps_on_it() {
+    let slept = explore_counting(|slept| {
+        let bell = Arc::new(Bell::default());
+        let publisher = {
+            let bell = bell.clone();
+            thread::spawn(move || bell.ring_own_word(0))
+        };
+        slept.fetch_add(usize::from(bell.sleep_on_own_word(None)), Ordering::Relaxed);
+        publisher.join().unwrap();
+        bell.futex.assert_nobody_sleeps_on();
+    });
+    assert!(slept > 0);
+}
+
+/// A publisher that saw the flag of a former sleep changes the word late, in the middle of the next one.
+#[test]
+fn no_wake_up_is_lost_where_one_sleep_follows_another() {
+    const LAST: u64 = 1;
+    let slept = explore_counting(|slept| {
+        let bell = Arc::new(Bell::default());
+        raise_flag(&bell.reader_sleeps, SLEEPS_ON_OWN_WORD);
+        let publisher = {
+            let bell = bell.clone();
+            thread::spawn(move || (0..=LAST).for_each(|k| bell.ring_own_word(k)))
+        };
+        bell.reader_sleeps.store(0, Ordering::Relaxed);
+        let seen = newest(&bell.latest_plus_one);
+        slept.fetch_add(usize::from(bell.sleep_on_own_word(seen)), Ordering::Relaxed);
+        publisher.join().unwrap();
+        if seen != Some(LAST) {
+            bell.futex.assert_nobody_sleeps_on();
+        }
+    });
+    assert!(slept > 0);
 }
 
 // What follows is broken on purpose: each weakening must be caught, or the models above check nothing.
@@ -406,7 +468,7 @@ fn a_flag_that_goes_up_after_the_last_look_is_caught() {
             thread::spawn(move || {
                 announce(&bell.latest_plus_one, 0);
                 // The doorbell moves too late to stop the sleeper, too.
-                if is_asleep(&bell.reader_sleeps) {
+                if sleeper(&bell.reader_sleeps) != 0 {
                     bell.futex.wake();
                 }
                 bell.doorbell.store(1, Ordering::Release);
@@ -414,9 +476,30 @@ fn a_flag_that_goes_up_after_the_last_look_is_caught() {
         };
         let expected = bell.doorbell.load(Ordering::Acquire);
         if newest(&bell.latest_plus_one).is_none() {
-            raise_flag(&bell.reader_sleeps);
+            raise_flag(&bell.reader_sleeps, SLEEPS_ON_OTHERS_BELL);
             bell.futex.wait(&bell.doorbell, expected);
         }
+        publisher.join().unwrap();
+        bell.futex.assert_nobody_sleeps_on();
+    });
+}
+
+#[test]
+#[should_panic(expected = "the wake-up was lost")]
+fn an_own_word_that_changes_only_after_the_wake_up_is_caught() {
+    loom::model(|| {
+        let bell = Arc::new(Bell::default());
+        let publisher = {
+            let bell = bell.clone();
+            thread::spawn(move || {
+                announce(&bell.latest_plus_one, 0);
+                if sleeper(&bell.reader_sleeps) == SLEEPS_ON_OWN_WORD {
+                    bell.futex.wake();
+                    bell.doorbell.store(1, Ordering::Release);
+                }
+            })
+        };
+        bell.sleep_on_own_word(None);
         publisher.join().unwrap();
         bell.futex.assert_nobody_sleeps_on();
     });

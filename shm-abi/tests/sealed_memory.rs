@@ -4,6 +4,7 @@ mod common;
 
 use bytemuck::Zeroable;
 use common::{command, info, info_of};
+use shm_abi::segment::LeaseOffer;
 use shm_abi::{Command, CommanderMemory, CommanderView, DriverMemory, DriverView};
 use std::fs::File;
 use std::os::fd::AsFd;
@@ -56,6 +57,92 @@ fn a_commander_that_punches_a_hole_into_its_memory_only_erases_its_commands() {
     assert_eq!((view.latest_tick(), found), (None, Command::zeroed()));
     assert_eq!(view.lease(), 1, "the driver's own knowledge");
     assert!(File::from(fd).set_len(0).is_err(), "but it cannot shrink it, which would be SIGBUS");
+}
+
+/// Every way to take a page of the commander's segment away from under the driver.
+fn punch(fd: &impl AsFd, commander: &CommanderMemory) -> [Result<(), rustix::io::Errno>; 2] {
+    let bytes = size_of::<shm_abi::CommanderSegment>();
+    let hole = rustix::fs::FallocateFlags::PUNCH_HOLE | rustix::fs::FallocateFlags::KEEP_SIZE;
+    let page = std::ptr::from_ref::<shm_abi::CommanderSegment>(commander).cast_mut().cast();
+    // SAFETY: the words may change at any time, by the rules of the segment, also to zero.
+    let removed = unsafe { rustix::mm::madvise(page, bytes, rustix::mm::Advice::LinuxRemove) };
+    [rustix::fs::fallocate(fd, hole, 0, bytes as u64), removed]
+}
+
+/// Page faults of this thread so far, of both kinds.
+fn page_faults() -> u64 {
+    use nix::sys::resource::{UsageWho, getrusage};
+    let usage = getrusage(UsageWho::RUSAGE_THREAD).unwrap();
+    (usage.minor_page_faults() + usage.major_page_faults()) as u64
+}
+
+/// What the loop does with a commander in each tick, while that punches holes; returns the loop's page faults.
+fn faults_of_the_loop(view: &CommanderView, fd: &impl AsFd, commander: &CommanderMemory) -> u64 {
+    const TICKS: u64 = 2000;
+    let mut found = Command::zeroed();
+    // The first looks fault in this thread's own stack and code.
+    let mut tick = |k| view.read_command(k, &mut found).is_ok() && view.latest_tick().is_some();
+    for k in 0..10 {
+        std::hint::black_box(tick(k));
+    }
+    let mut faults = 0;
+    for k in 0..TICKS {
+        let _ = punch(fd, commander);
+        let before = page_faults();
+        std::hint::black_box(tick(k));
+        faults += page_faults() - before;
+    }
+    faults
+}
+
+#[test]
+fn a_commander_that_punches_holes_costs_the_loop_no_page_fault_once_the_segment_is_sealed() {
+    for punches_before in [false, true] {
+        let offer = LeaseOffer::create(1, shm_abi::ABI_VERSION).unwrap();
+        assert!(!offer.is_mapped());
+        let fd = offer.fd().try_clone_to_owned().unwrap();
+        let commander = CommanderMemory::map(fd.as_fd()).unwrap();
+        assert!(offer.is_mapped(), "it said so");
+        if punches_before {
+            assert_eq!(punch(&fd, &commander), [Ok(()); 2]);
+        }
+        let view = offer.seal().unwrap();
+        assert_eq!(faults_of_the_loop(&view, &fd, &commander), 0, "punched before: {punches_before}");
+        assert_eq!(punch(&fd, &commander), [Err(rustix::io::Errno::PERM); 2]);
+        assert!(CommanderMemory::map(fd.as_fd()).is_err(), "nobody maps it for writing again");
+    }
+}
+
+#[test]
+fn without_the_seal_every_hole_is_a_page_fault_of_the_loop() {
+    let (view, fd) = CommanderView::create(1).unwrap();
+    let commander = CommanderMemory::map(fd.as_fd()).unwrap();
+    assert!(faults_of_the_loop(&view, &fd, &commander) >= 2000, "the counter sees what it is there for");
+}
+
+#[test]
+fn a_commander_that_seals_its_segment_itself_gets_no_lease() {
+    let offer = LeaseOffer::create(1, shm_abi::ABI_VERSION).unwrap();
+    rustix::fs::fcntl_add_seals(offer.fd(), rustix::fs::SealFlags::SEAL).unwrap();
+    let error = offer.seal().unwrap_err();
+    assert_eq!(error.to_string(), "cannot seal a shared segment: Operation not permitted (os error 1)");
+}
+
+#[test]
+fn a_commander_of_before_1_3_has_mapped_its_segment_once_it_publishes_or_has_had_time_to() {
+    let driver = DriverMemory::create(&info()).unwrap();
+    let driver = DriverView::map(driver.fd()).unwrap();
+    let before = (1 << 32) | 2;
+    let first = LeaseOffer::create(1, before).unwrap();
+    let commander = CommanderMemory::map(first.fd()).unwrap();
+    commander.header.mapped.store(0, std::sync::atomic::Ordering::Relaxed);
+    assert!(!first.is_mapped());
+    commander.publish(&command(0), &driver);
+    assert!(first.is_mapped());
+    let begun = std::time::Instant::now();
+    let second = LeaseOffer::create(2, before).unwrap();
+    common::wait_until("it has had time to", || second.is_mapped());
+    assert!(begun.elapsed() >= shm_abi::segment::MAPPED_WITHIN);
 }
 
 #[test]

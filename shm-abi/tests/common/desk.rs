@@ -1,11 +1,13 @@
 //! A server and its clients in one thread, and the plain sockets that talk to it.
 
-use super::{HANG, directory, info};
+use super::fake::receive;
+use super::{HANG, directory, info, wait_until};
 use bytemuck::Zeroable;
-use shm_abi::DriverMemory;
 use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
 use shm_abi::server::{Server, ServerEvent};
+use shm_abi::{CommanderMemory, DriverMemory};
 use std::io::{Read, Write};
+use std::os::fd::{AsFd, OwnedFd};
 use std::os::unix::net::UnixStream;
 use std::time::Duration;
 
@@ -44,12 +46,29 @@ impl Desk {
         stream
     }
 
+    /// Asks for something that is granted, and maps what is handed over for commanding.
     pub(crate) fn granted(&mut self, kind: RequestKind) -> UnixStream {
+        let (stream, offered) = self.offered(kind);
+        if let Some(fd) = offered {
+            let before = self.events.len();
+            CommanderMemory::map(fd.as_fd()).unwrap();
+            wait_until("the lease is in force", || {
+                self.poll(HANG);
+                self.events.len() > before
+            });
+        }
+        stream
+    }
+
+    /// Asks for something that is granted, and returns the commander's segment, unmapped.
+    pub(crate) fn offered(&mut self, kind: RequestKind) -> (UnixStream, Option<OwnedFd>) {
         let mut stream = self.connect();
         stream.write_all(bytemuck::bytes_of(&Request::new(kind, "raw"))).unwrap();
         self.poll(HANG);
-        assert_eq!(verdict(&mut stream), Some(Verdict::Granted));
-        stream
+        stream.set_read_timeout(Some(HANG)).unwrap();
+        let (answer, fds) = receive(&stream);
+        assert_eq!(Verdict::from_word(answer.verdict), Some(Verdict::Granted));
+        (stream, fds.into_iter().nth(1))
     }
 }
 

@@ -1,7 +1,9 @@
 //! Drivers that lie: a socket on which the test itself answers.
 
-use shm_abi::handshake::Request;
+use bytemuck::Zeroable;
+use shm_abi::handshake::{Answer, Request};
 use std::io::Read;
+use std::os::fd::OwnedFd;
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::Path;
 
@@ -29,4 +31,20 @@ pub(crate) fn send(stream: &UnixStream, bytes: &[u8], fds: &[std::os::fd::Borrow
     let sent =
         rustix::net::sendmsg(stream, &[std::io::IoSlice::new(bytes)], &mut control, SendFlags::empty());
     assert_eq!(sent, Ok(bytes.len()));
+}
+
+/// Receives an answer and the descriptors that come with it.
+pub(crate) fn receive(stream: &UnixStream) -> (Answer, Vec<OwnedFd>) {
+    use rustix::net::{RecvAncillaryBuffer, RecvAncillaryMessage, RecvFlags};
+    let mut space = [std::mem::MaybeUninit::uninit(); rustix::cmsg_space!(ScmRights(4))];
+    let mut control = RecvAncillaryBuffer::new(&mut space);
+    let mut answer = Answer::zeroed();
+    let mut into = [std::io::IoSliceMut::new(bytemuck::bytes_of_mut(&mut answer))];
+    let received = rustix::net::recvmsg(stream, &mut into, &mut control, RecvFlags::CMSG_CLOEXEC).unwrap();
+    assert_eq!(received.bytes, size_of::<Answer>());
+    let fds = control.drain().filter_map(|message| match message {
+        RecvAncillaryMessage::ScmRights(fds) => Some(fds),
+        _ => None,
+    });
+    (answer, fds.flatten().collect())
 }
