@@ -210,7 +210,7 @@ impl RealLoop {
         }
         self.deadline_ns = wake.deadline_ns;
         self.log_phase(wake.tick);
-        let is_made_up_for = wake.latency_ns() >= self.period_ns;
+        let is_made_up_for = wake.into_period_ns() >= self.period_ns;
         let reply_until_ns = wake.deadline_ns + if is_made_up_for { 0 } else { self.budget_ns };
         Some(Begin { tick: wake.tick, deadline_ns: wake.deadline_ns, reply_until_ns })
     }

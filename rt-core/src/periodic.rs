@@ -5,8 +5,8 @@
 //! Model: sleep until `spin_margin` before the deadline, then spin to it. What the deadlines are is
 //! [`Schedule`]'s business. The phase moves the deadlines off the kernel's own timer tick, which
 //! fires on whole milliseconds; a loop may be let to find a quiet phase by itself.
-//! Invariants: a completed wait is never early and less than one period late, save in a loop that catches
-//! up: what it missed before that is in `skipped`. The tick number stays tied to absolute time, but for the 0.382 of a
+//! Invariants: a completed wait is never early, and less than one period after the deadline that it serves, save in
+//! a loop that catches up: what it missed before that is in `skipped`. The tick number stays tied to absolute time, but for the 0.382 of a
 //! period by which a loop that steps aside lags behind with each step. A signal ends the sleep.
 //! Cost: one system call a tick, none when the deadline is within the margin; no allocation.
 
@@ -62,8 +62,11 @@ pub struct Wake {
     /// Number of this tick, from 1; grows by `1 + skipped`. After an interrupted wait: of the last
     /// completed one.
     pub tick: u64,
-    /// The deadline waited for, on the grid.
+    /// The deadline that is served, on the grid.
     pub deadline_ns: u64,
+    /// The deadline that the wait was for: the first that nobody had served. Earlier than `deadline_ns` by what was
+    /// skipped.
+    pub awaited_ns: u64,
     /// When the wait ended.
     pub woke_ns: u64,
     /// Deadlines before this one that passed unserved.
@@ -73,10 +76,19 @@ pub struct Wake {
 }
 
 impl Wake {
-    /// How long after the deadline the wait ended; below one period unless the loop catches up, 0 after an
-    /// interrupted wait.
+    /// Wake-up latency: how long after the *first* unserved deadline the wait ended; 0 after an interrupted wait.
+    ///
+    /// One figure a wake, and a stall of a hundred periods is a hundred periods: as cyclictest counts, which also
+    /// takes one sample a wake, against the time that it had asked to be woken at, and then steps over what has
+    /// passed.
     #[must_use]
     pub fn latency_ns(&self) -> u64 {
+        self.woke_ns.saturating_sub(self.awaited_ns)
+    }
+
+    /// How long after the deadline that is served the wait ended; below one period unless the loop catches up.
+    #[must_use]
+    pub fn into_period_ns(&self) -> u64 {
         self.woke_ns.saturating_sub(self.deadline_ns)
     }
 }
@@ -176,14 +188,15 @@ impl Periodic {
 
     /// Skips by the time of waking, not of going to sleep: a stall inside the sleep is the commonest.
     fn completed(&mut self, now: u64) -> Wake {
+        let awaited_ns = self.schedule.next_deadline_ns();
         let due = self.schedule.advance(now);
         let (tick, deadline_ns, skipped) = (due.tick, due.deadline_ns, due.skipped);
-        Wake { tick, deadline_ns, woke_ns: now, skipped, interrupted: false }
+        Wake { tick, deadline_ns, awaited_ns, woke_ns: now, skipped, interrupted: false }
     }
 
     fn interrupted(&self, now: u64) -> Wake {
         let (tick, deadline_ns) = (self.schedule.tick(), self.schedule.next_deadline_ns());
-        Wake { tick, deadline_ns, woke_ns: now, skipped: 0, interrupted: true }
+        Wake { tick, deadline_ns, awaited_ns: deadline_ns, woke_ns: now, skipped: 0, interrupted: true }
     }
 }
 
@@ -208,7 +221,8 @@ mod tests {
             assert_eq!(wake.tick, last.tick + 1 + wake.skipped);
             assert_eq!(wake.deadline_ns, last.deadline_ns + (1 + wake.skipped) * config.period_ns);
             assert!(wake.woke_ns >= wake.deadline_ns, "early");
-            assert!(wake.latency_ns() < config.period_ns, "late by a period without a skip");
+            assert!(wake.into_period_ns() < config.period_ns, "late by a period without a skip");
+            assert_eq!(wake.latency_ns(), wake.into_period_ns() + wake.skipped * config.period_ns);
             last = wake;
         }
         assert_eq!(last.deadline_ns % config.period_ns, config.phase_offset_ns);
@@ -247,7 +261,36 @@ mod tests {
         // Ten periods after tick k, k + 1 to k + 9 are gone; a busy machine loses more.
         assert!(after.skipped >= 9, "{after:?}");
         assert_eq!(after.tick, before.tick + 1 + after.skipped);
-        assert!(after.latency_ns() < MS);
+        assert_eq!(after.awaited_ns, before.deadline_ns + MS);
+        assert!(after.latency_ns() >= 9 * MS, "{after:?}");
+    }
+
+    /// A clock that the test reads out: no machine, however busy, changes the figures.
+    #[test]
+    fn a_stall_of_106_periods_is_106_periods_late_and_one_wake() {
+        let mut periodic = Periodic::new(PeriodicConfig::hybrid(MS));
+        periodic.start(0);
+        let first = periodic.completed(370_020);
+        assert_eq!((first.tick, first.skipped, first.latency_ns()), (1, 0, 20));
+        // Due at 1.37 ms, served 106.582 ms later: cyclictest's figure under the same load.
+        let stalled = periodic.completed(1_370_000 + 106_582_000);
+        assert_eq!((stalled.tick, stalled.skipped, stalled.latency_ns()), (108, 106, 106_582_000));
+        assert_eq!((stalled.deadline_ns, stalled.into_period_ns()), (107_370_000, 582_000));
+        let next = periodic.completed(108_370_000);
+        assert_eq!((next.tick, next.skipped, next.latency_ns()), (109, 0, 0), "the stall counts once");
+    }
+
+    /// Each deadline made up for is a wake of its own, late by what it is late.
+    #[test]
+    fn a_loop_that_catches_up_tells_the_lateness_of_each_deadline() {
+        let mut periodic = Periodic::new(PeriodicConfig::hybrid(MS)).catching_up(2);
+        periodic.start(0);
+        periodic.completed(370_000);
+        // Due are 1.37 to 9.37 ms; two before the last are made up for.
+        let wakes = [0; 3].map(|_| periodic.completed(9_470_000));
+        assert_eq!(wakes.map(|wake| wake.skipped), [6, 0, 0]);
+        assert_eq!(wakes.map(|wake| wake.latency_ns()), [8_100_000, 1_100_000, 100_000]);
+        assert_eq!(wakes.map(|wake| wake.into_period_ns()), [2_100_000, 1_100_000, 100_000]);
     }
 
     #[test]

@@ -439,7 +439,7 @@ typedef struct PHANTOM_ALIGNED(64) PhantomDriverSegment {
   struct PhantomCounters counters;
   // The devices; constant once `header.ready` is set.
   struct PhantomDeviceDescription devices[PHANTOM_MAX_DEVICES];
-  // How late the driver's loop woke.
+  // How late the driver's loop woke, against the first deadline that it had not served: one value a wake.
   struct PhantomHistogramBlock wake_error_ns;
   // From wake-up to motors written, the wait for the reply not counted.
   struct PhantomHistogramBlock cycle_ns;

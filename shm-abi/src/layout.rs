@@ -124,7 +124,7 @@ pub struct DriverSegment {
     pub counters: Counters,
     /// The devices; constant once `header.ready` is set.
     pub devices: [DeviceDescription; MAX_DEVICES],
-    /// How late the driver's loop woke.
+    /// How late the driver's loop woke, against the first deadline that it had not served: one value a wake.
     pub wake_error_ns: HistogramBlock,
     /// From wake-up to motors written, the wait for the reply not counted.
     pub cycle_ns: HistogramBlock,

@@ -173,7 +173,9 @@ fn lead(shared: &Shared, config: &DriverConfig, seconds: f64, spin: bool, respon
     let mut tick = 0;
     while tick < last {
         let woke_ns = wait_until(deadline_ns, SPIN_MARGIN_NS);
-        let skipped = (woke_ns - deadline_ns) / period_ns;
+        // From the first deadline that nobody served, as the driver and cyclictest count.
+        let late_ns = woke_ns - deadline_ns;
+        let skipped = late_ns / period_ns;
         deadline_ns += skipped * period_ns;
         tick += 1 + skipped;
         shared.deadline_ns.store(deadline_ns, Ordering::Relaxed);
@@ -184,7 +186,7 @@ fn lead(shared: &Shared, config: &DriverConfig, seconds: f64, spin: bool, respon
         if tick > warm_up {
             outcome.ticks += 1;
             outcome.overruns += skipped;
-            outcome.wake_error.record(woke_ns - deadline_ns);
+            outcome.wake_error.record(late_ns);
             match in_time {
                 true => outcome.round_trip.record(monotonic_ns() - told_ns),
                 false => outcome.missed += 1,

@@ -3,6 +3,7 @@
 //! The loop stands still for a while in a tick of the test's choice. Nothing is asserted about time but the
 //! tie between tick numbers and deadlines, and that as many deadlines passed as the standstill is long.
 
+use io_driver::meter;
 use shm_abi::{DriverState, FaultReason, Frame};
 use std::sync::atomic::Ordering;
 use system_tests::faults::amplifiers::wait_for;
@@ -33,6 +34,11 @@ fn stalled(policy: &str) -> (Stand, Vec<Frame>) {
     (stand, frames)
 }
 
+/// The longest wake error that the driver tells (ns); it counts from the first deadline that was left out.
+fn longest_wake_error_ns(stand: &Stand) -> u64 {
+    meter::read(&stand.view().wake_error_ns).max()
+}
+
 /// Deadlines stay on their grid whatever happened.
 fn check_grid(frames: &[Frame]) {
     for pair in frames.windows(2) {
@@ -50,7 +56,9 @@ fn skipped_after_the_stall(frames: &[Frame]) -> u64 {
 fn by_default_missed_deadlines_are_left_out_and_counted() {
     let (stand, frames) = stalled("");
     check_grid(&frames);
-    assert!(skipped_after_the_stall(&frames) >= STALL_TICKS - 1);
+    let skipped = skipped_after_the_stall(&frames);
+    assert!(skipped >= STALL_TICKS - 1);
+    assert!(longest_wake_error_ns(&stand) >= skipped * PERIOD_NS, "{} ns", longest_wake_error_ns(&stand));
     assert!(stand.view().counters.overruns.load(Ordering::Relaxed) >= STALL_TICKS - 1);
     assert!(frames.iter().all(|frame| frame.state == DriverState::Idle as u64));
     stand.finish();
@@ -68,6 +76,8 @@ fn a_driver_that_catches_up_does_the_last_few_at_once() {
         assert_eq!(pair[1].tick, pair[0].tick + 1, "none is left out among them");
     }
     assert!(skipped_after_the_stall(&frames) >= STALL_TICKS - 31);
+    // What was left out, and those that were made up for at once, but for one that was due meanwhile.
+    assert!(longest_wake_error_ns(&stand) >= (STALL_TICKS - 1) * PERIOD_NS);
     stand.finish();
 }
 

@@ -208,7 +208,7 @@ fn hello(report: &SetupReport) -> Hello {
 }
 
 enum Waiter {
-    Hybrid { periodic: Periodic, period_ns: u64 },
+    Hybrid(Periodic),
     Sleep { deadline_ns: u64, period_ns: u64, tick: u64 },
 }
 
@@ -216,7 +216,7 @@ impl Waiter {
     fn new(order: &Order) -> Self {
         let (period_ns, phase_ns) = (order.period_ns, order.phase_offset_ns);
         match order.wait {
-            Wait::Hybrid => Self::Hybrid { periodic: hybrid(order), period_ns },
+            Wait::Hybrid => Self::Hybrid(hybrid(order)),
             Wait::Sleep => {
                 let deadline_ns = (monotonic_ns() / period_ns + 2) * period_ns + phase_ns % period_ns;
                 Self::Sleep { deadline_ns, period_ns, tick: 0 }
@@ -227,11 +227,9 @@ impl Waiter {
     /// The waking and the deadlines that were skipped; `None` if a signal came.
     fn wait(&mut self) -> Option<(Woke, u64)> {
         match self {
-            Self::Hybrid { periodic, period_ns } => {
+            Self::Hybrid(periodic) => {
                 let wake = periodic.wait();
-                let deadline_ns = wake.deadline_ns - wake.skipped * *period_ns;
-                let woke =
-                    Woke { tick: wake.tick, deadline_ns, late_ns: wake.woke_ns.saturating_sub(deadline_ns) };
+                let woke = Woke { tick: wake.tick, deadline_ns: wake.awaited_ns, late_ns: wake.latency_ns() };
                 (!wake.interrupted).then_some((woke, wake.skipped))
             }
             // Written anew and not with `Periodic`, whose mistakes it must not share.
