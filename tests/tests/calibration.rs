@@ -95,6 +95,23 @@ fn a_layout_on_standard_output_places_the_device_where_it_stands() {
 }
 
 #[test]
+fn few_pairs_are_fitted_with_a_warning_and_enough_without() {
+    let place = Workplace::new();
+    place.write("in.toml", format!("[[device]]\n{}", entry(&truth()[0], "")));
+    let calibrated = |count: usize| {
+        place.write("pairs.csv", pairs_csv(count, &Matrix3::identity()));
+        let said = place.run(["calibrate", "--pairs", "pairs.csv", "--layout", "in.toml"]);
+        done(&said);
+        said.err
+    };
+    let few = calibrated(3);
+    assert!(few.contains("WARNING      3 pairs are few: the noise is known to 41 % only"), "{few}");
+    assert!(few.contains("3 degrees of freedom") && few.contains("gather 8 or more"), "{few}");
+    let enough = calibrated(8);
+    assert!(!enough.contains("WARNING") && enough.contains("18 degrees of freedom"), "{enough}");
+}
+
+#[test]
 fn a_written_layout_keeps_comments_and_the_other_devices() {
     let place = Workplace::new();
     place.write("pairs.csv", pairs_csv(300, &Matrix3::identity()));

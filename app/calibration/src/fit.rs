@@ -35,6 +35,12 @@ impl Model {
         }
     }
 
+    /// From so many pairs on, one that does not belong can be found and the noise is known to a fifth; a fit to fewer
+    /// is worth a warning.
+    pub fn enough_pairs(self) -> usize {
+        outliers::fewest_to_search(self)
+    }
+
     /// Numbers that the fit chooses.
     pub(crate) fn parameters(self) -> usize {
         match self {

@@ -58,10 +58,10 @@ pub(crate) fn sort(pairs: &[Pair], model: Model) -> Sorted {
 
 /// The fit to the three quarters that it leaves nearest; `None` if there are too few to leave one out.
 fn concentrate(pairs: &[Pair], model: Model) -> Option<Transform> {
-    let held = pairs.len() * 3 / 4;
-    if held < 2 * model.least_pairs() {
+    if pairs.len() < fewest_to_search(model) {
         return None;
     }
+    let held = held_of(pairs.len());
     let mut transform = raw_fit(pairs, model)?;
     let mut former: Vec<usize> = Vec::new();
     for _ in 0..MAX_ROUNDS {
@@ -78,6 +78,18 @@ fn concentrate(pairs: &[Pair], model: Model) -> Option<Transform> {
         former = order;
     }
     Some(transform)
+}
+
+/// The pairs that are held, of so many.
+fn held_of(count: usize) -> usize {
+    count * 3 / 4
+}
+
+/// Fewer pairs than this hold too few when a quarter is left out: twice as many as determine a fit are wanted.
+pub(crate) fn fewest_to_search(model: Model) -> usize {
+    let wanted = 2 * model.least_pairs();
+    // `held_of` rounds down: the least count with `3 count / 4 >= wanted`.
+    (4 * wanted).div_ceil(3)
 }
 
 fn by_threshold(pairs: &[Pair], transform: &Transform, model: Model) -> Sorted {

@@ -2,9 +2,9 @@
 
 mod support;
 
-use calibration::{Fit, Model, Transform, calibrate};
+use calibration::{Fit, Model, Pair, Transform, calibrate};
 use nalgebra::{Rotation3, Vector3};
-use support::{WIDE, affine_truth, pairs_of, rigid_truth};
+use support::{Random, WIDE, affine_truth, pairs_of, rigid_truth};
 
 const SEEDS: u64 = 400;
 /// The RMS of 400 Gaussian errors is known to 1 / sqrt(800) = 3.5 %; four times that.
@@ -81,6 +81,74 @@ fn an_affine_fit_errs_as_much_as_it_says() {
         [(2, 1), (0, 2), (1, 0)].map(|(i, j)| (off[(i, j)] - off[(j, i)]) / 2.0)
     };
     assert_right(ratio(&truth, Model::Affine, WIDE, rotation, |fit| accuracy(fit).rotation_rad));
+}
+
+/// The share of calibrations whose errors lie within what is claimed for 95 of 100, for each of three numbers.
+fn coverage(count: usize, model: Model, truth: &Transform) -> [f64; 3] {
+    const TRIALS: u64 = 4000;
+    let mut within = [0.0; 3];
+    for seed in 0..TRIALS {
+        // A tetrahedron and more: few random points may lie on a line by chance.
+        let pairs = cornered(truth, count, 2e-4, seed);
+        let fit = calibrate(&pairs, model).expect("good pairs").all;
+        let accuracy = fit.accuracy.expect("more pairs than needed");
+        let errors: [f64; 3] = (fit.transform.position - truth.position).into();
+        for k in 0..3 {
+            let claimed = accuracy.factor_95() * accuracy.position_m[k];
+            within[k] += f64::from(u8::from(errors[k].abs() <= claimed)) / TRIALS as f64;
+        }
+    }
+    within
+}
+
+/// Pairs in the corners of a workspace, and in between when there are more, with noise.
+fn cornered(truth: &Transform, count: usize, noise_m: f64, seed: u64) -> Vec<Pair> {
+    let mut random = Random::new(seed);
+    let corners = [(0.0, 0.0, 0.0), (0.2, 0.0, 0.05), (0.0, 0.15, 0.0), (0.05, 0.0, 0.12)];
+    (0..count)
+        .map(|i| {
+            let other = match corners.get(i) {
+                Some((x, y, z)) => Vector3::new(*x, *y, *z),
+                None => random.in_box(WIDE),
+            };
+            Pair { line: i + 1, fiducial: truth.apply(&other) + random.normal3() * noise_m, other }
+        })
+        .collect()
+}
+
+#[test]
+fn ninety_five_of_a_hundred_errors_lie_within_what_is_claimed_however_few_the_pairs() {
+    // Of 4000 trials the share is known to 0.34 %; four times that, and the noise's curvature.
+    const TOLERANCE: f64 = 0.015;
+    let cases = [3, 4, 5, 6, 8, 12, 40].map(|count| (Model::Rigid, count));
+    let affine = [5, 6, 8, 12, 40].map(|count| (Model::Affine, count));
+    for (model, count) in cases.into_iter().chain(affine) {
+        let truth = if model == Model::Rigid { rigid_truth() } else { affine_truth() };
+        for share in coverage(count, model, &truth) {
+            assert!((share - 0.95).abs() < TOLERANCE, "{} pairs, {}: {share}", count, model.name());
+        }
+    }
+}
+
+#[test]
+fn so_many_pairs_are_enough_as_an_outlier_needs_to_be_found() {
+    for (model, truth) in [(Model::Rigid, rigid_truth()), (Model::Affine, affine_truth())] {
+        let enough = model.enough_pairs();
+        let found = |count: usize| {
+            let mut pairs = cornered(&truth, count, 2e-4, 5);
+            pairs[1].fiducial.z += 0.03;
+            calibrate(&pairs, model)
+                .expect("good pairs")
+                .outliers
+                .listed
+                .iter()
+                .any(|outlier| outlier.line == 2)
+        };
+        assert!(found(enough) && !found(enough - 1), "{} {enough}", model.name());
+        let fit = calibrate(&cornered(&truth, enough, 2e-4, 1), model).expect("good pairs").all;
+        assert!(fit.accuracy.expect("more than needed").noise_uncertainty() <= 0.2);
+    }
+    assert_eq!((Model::Rigid.enough_pairs(), Model::Affine.enough_pairs()), (8, 11));
 }
 
 #[test]

@@ -54,6 +54,9 @@ impl fmt::Display for Report<'_> {
             condition(spread.condition())
         )?;
         self.write_accuracy(out)?;
+        if let Some(warning) = self.warning() {
+            writeln!(out, "WARNING      {warning}")?;
+        }
         self.write_shape(out)?;
         self.write_outliers(out)?;
         write!(
@@ -70,24 +73,41 @@ impl Report<'_> {
         match self.used.accuracy {
             None => writeln!(out, "accuracy     unknown: the fit needed every pair; gather more"),
             Some(accuracy) => {
-                let Accuracy { noise_m, middle_m, position_m, rotation_rad, stretch } = accuracy;
+                let Accuracy { noise_m, middle_m, position_m, rotation_rad, stretch, freedom } = accuracy;
+                let factor = accuracy.factor_95();
                 writeln!(
                     out,
-                    "accuracy     one standard error: {:.4} mm where the points are, {} mm at the base, {} degrees; noise {:.3} mm",
-                    middle_m * 1e3,
-                    three(position_m, 1e3, 3),
-                    three(rotation_rad.map(f64::to_degrees), 1.0, 4),
+                    "accuracy     in 95 of 100 calibrations within {:.4} mm where the points are, {} mm at the base, {} degrees; noise {:.3} mm, {freedom} degrees of freedom",
+                    factor * middle_m * 1e3,
+                    three(position_m, factor * 1e3, 3),
+                    three(rotation_rad.map(f64::to_degrees), factor, 4),
                     noise_m * 1e3
                 )?;
                 stretch.map_or(Ok(()), |stretch| {
                     writeln!(
                         out,
-                        "             of the scale along the main directions {} %",
-                        three(stretch, 100.0, 4)
+                        "             and {} % of the scale along the main directions",
+                        three(stretch, factor * 100.0, 4)
                     )
                 })
             }
         }
+    }
+
+    /// Of a fit to few pairs.
+    fn warning(&self) -> Option<String> {
+        let (count, enough) = (self.used.count, self.found.model.enough_pairs());
+        let noise = match self.used.accuracy {
+            Some(accuracy) => {
+                format!("the noise is known to {:.0} % only", 100.0 * accuracy.noise_uncertainty())
+            }
+            None => "nothing is left to tell the noise from".to_owned(),
+        };
+        (count < enough).then(|| {
+            format!(
+                "{count} pairs are few: {noise}, and one that does not belong cannot be found; gather {enough} or more"
+            )
+        })
     }
 
     fn write_shape(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -173,11 +193,15 @@ impl Report<'_> {
             "condition": Some(used.spread_other.condition()).filter(|condition| condition.is_finite()),
             "accuracy": used.accuracy.map(|accuracy| json!({
                 "noise_m": accuracy.noise_m,
+                "degrees_of_freedom": accuracy.freedom,
+                // So many of the standard errors below are exceeded in 5 of 100 calibrations.
+                "factor_95": accuracy.factor_95(),
                 "middle_m": accuracy.middle_m,
                 "position_m": accuracy.position_m,
                 "rotation_rad": accuracy.rotation_rad,
                 "stretch": accuracy.stretch,
             })),
+            "warning": self.warning(),
             "scale_between_devices": used.scale,
             "scale": shape.scale,
             "shear_rad": shape.shear_rad,
