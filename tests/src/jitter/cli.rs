@@ -10,7 +10,7 @@ use crate::jitter::gate::{Gate, LEAST_RUNS};
 use crate::jitter::live::Live;
 use crate::jitter::options::{self, Command, Measure, Options};
 use crate::jitter::origin::Origin;
-use crate::jitter::plan::{Plan, Reference, WARM_UP};
+use crate::jitter::plan::{Plan, Reference};
 use crate::jitter::save::{RESULT, Saver};
 use crate::jitter::session::{End, Session};
 use crate::jitter::{machine, pictures, roles, sheets, table};
@@ -57,10 +57,11 @@ fn measure(options: &Measure) -> Result<ExitCode, JitterError> {
     let mut saver = Saver::new(&out, Duration::from_secs(options.save_every))?;
     let surroundings = surroundings(&plan, cpu);
     if !options.quiet {
+        say(format_args!("jitter: {}", plan.announce()));
         surroundings.notes.iter().for_each(|note| say(format_args!("jitter: {note}")));
     }
     let cpus = roles::keep_off(cpu);
-    let live = Live::new(options.quiet, expected(&plan), plan.runs);
+    let live = Live::new(options.quiet, plan.expected(), plan.runs);
     let bank = Bank::new(origin, options.worst);
     let (document, end) = {
         let mut session = Session::new(&plan, cpus, &signals, bank, surroundings, &mut saver, live);
@@ -114,12 +115,6 @@ fn surroundings(plan: &Plan, cpu: Option<usize>) -> Surroundings {
         notes: plan.notes.clone(),
         ..Surroundings::default()
     }
-}
-
-fn expected(plan: &Plan) -> Duration {
-    // Starting the two programs and ramping in takes about as long as the warm-up.
-    let turn = plan.slice + if plan.attach.is_some() { Duration::ZERO } else { WARM_UP };
-    turn * (plan.runs * plan.styles.len()) as u32
 }
 
 fn end_words(end: &End) -> String {

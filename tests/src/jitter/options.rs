@@ -7,7 +7,9 @@ use std::time::Duration;
 
 const AFTER_HELP: &str = "\
 Without options: 5 interleaved runs of 4 s each of the hybrid wait alone, of the reference (cyclictest where it is \
-installed, else a plain sleep) and of the real driver with the real application; about a minute. Results go to \
+installed, else a plain sleep) and of the real driver with the real application; about a minute. With --duration \
+that time is shared by all styles, in five runs or more if it is long enough; what comes of it is said before anything \
+is measured. Results go to \
 jitter-YYYYMMDD-HHMMSS (UTC): result.json (everything), runs.csv, timeline.csv, worst.csv, histogram, tail and \
 timeline as SVG and PNG.
 
@@ -50,10 +52,10 @@ pub struct Measure {
     /// Interleaved runs: how often each style has its turn [default: 5]
     #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=10_000), conflicts_with = "duration")]
     pub runs: Option<usize>,
-    /// Length of a turn in seconds [default: 4; from --duration 1h on 60]; whole seconds where the reference takes part
+    /// Length of a turn in seconds [default: 4; with --duration from 1 on, from 1h on 60]; whole seconds where the reference takes part
     #[arg(long, value_name = "S", value_parser = parse_slice)]
     pub slice: Option<f64>,
-    /// How long altogether, instead of --runs: 90s, 30m, 12h, 5d
+    /// How long altogether, all styles with their warm-up, instead of --runs: 90s, 30m, 12h, 5d
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     pub duration: Option<Duration>,
     /// What takes turns: hybrid, reference, driver

@@ -17,6 +17,8 @@ use std::time::Duration;
 pub const WARM_UP: Duration = Duration::from_millis(500);
 const DEFAULT_RUNS: usize = 5;
 const DEFAULT_SLICE_S: f64 = 4.0;
+/// What a short duration is divided into; cyclictest knows no fraction of it.
+const SHORTEST_SLICE_S: f64 = 1.0;
 /// From an hour on, longer slices: each costs a start.
 const LONG: Duration = Duration::from_secs(3600);
 const LONG_SLICE_S: f64 = 60.0;
@@ -90,6 +92,24 @@ impl Plan {
             notes,
             _default_scene: default_scene,
         })
+    }
+
+    /// How long it takes altogether; starting programs and ramping in take about as long as the warm-up.
+    pub fn expected(&self) -> Duration {
+        let warm_up = if self.attach.is_some() { Duration::ZERO } else { WARM_UP };
+        (self.slice + warm_up) * (self.runs * self.styles.len()) as u32
+    }
+
+    /// What is about to be done, in a line.
+    pub fn announce(&self) -> String {
+        let (runs, slice_s) = (self.runs, self.slice.as_secs_f64());
+        let styles: Vec<_> = self.styles.iter().map(|style| style.name()).collect();
+        let measured_s = self.runs as f64 * slice_s;
+        format!(
+            "plan: {runs} runs of {slice_s:.3} s of each style ({}), {measured_s:.3} s a style, about {:.0} s altogether",
+            styles.join(", "),
+            self.expected().as_secs_f64()
+        )
     }
 
     /// What a bare loop is to do.
@@ -233,25 +253,52 @@ fn styles(names: &[String]) -> Result<Vec<Style>, JitterError> {
     Ok(found)
 }
 
+/// How often each of so many styles has its turn, and how long a turn is.
 fn turns(options: &Measure, styles: usize, whole_seconds: bool) -> Result<(usize, Duration), JitterError> {
-    let is_long = options.duration.is_some_and(|duration| duration >= LONG);
-    let usual = if is_long { LONG_SLICE_S } else { DEFAULT_SLICE_S };
-    let slice_s = options.slice.unwrap_or(usual);
+    let (runs, slice_s) = match options.duration {
+        None => (options.runs.unwrap_or(DEFAULT_RUNS), options.slice.unwrap_or(DEFAULT_SLICE_S)),
+        Some(duration) => divide(duration, options.slice, styles, whole_seconds)?,
+    };
     // cyclictest runs for whole seconds, and the turns are to be equal.
     let slice_s = if whole_seconds { slice_s.ceil() } else { slice_s };
-    let slice = Duration::from_secs_f64(slice_s);
-    let runs = match options.duration {
-        Some(duration) => ((duration.as_secs_f64() / (slice_s + WARM_UP.as_secs_f64()) / styles as f64)
-            .floor() as usize)
-            .max(1),
-        None => options.runs.unwrap_or(DEFAULT_RUNS),
-    };
     if runs > MOST_RUNS {
         return Err(JitterError::Usage(format!(
             "{runs} runs of {slice_s} s: at most {MOST_RUNS}; make the slices longer (--slice)"
         )));
     }
-    Ok((runs, slice))
+    Ok((runs, Duration::from_secs_f64(slice_s)))
+}
+
+/// Divides a duration, which is that of all turns with their warm-ups, into runs and slices. Several short runs say
+/// more than one long one: the spread between runs is what a comparison goes by.
+fn divide(
+    duration: Duration,
+    slice: Option<f64>,
+    styles: usize,
+    whole_seconds: bool,
+) -> Result<(usize, f64), JitterError> {
+    let (total_s, warm_up_s, styles) = (duration.as_secs_f64(), WARM_UP.as_secs_f64(), styles as f64);
+    let whole = |slice_s: f64| if whole_seconds { slice_s.ceil() } else { slice_s };
+    let runs_of = |slice_s: f64| (total_s / ((whole(slice_s) + warm_up_s) * styles)).floor();
+    let shortest_s = slice.unwrap_or(SHORTEST_SLICE_S);
+    if runs_of(shortest_s) < 1.0 {
+        return Err(JitterError::Usage(format!(
+            "--duration {total_s}s is for all {styles} styles together; one turn of each takes {} s ({} s after {warm_up_s} s \
+             of warm-up): take longer, fewer --styles, or --runs",
+            (whole(shortest_s) + warm_up_s) * styles,
+            whole(shortest_s)
+        )));
+    }
+    if let Some(slice_s) = slice {
+        return Ok((runs_of(slice_s) as usize, slice_s));
+    }
+    let usual_s = if duration >= LONG { LONG_SLICE_S } else { DEFAULT_SLICE_S };
+    if runs_of(usual_s) >= DEFAULT_RUNS as f64 {
+        return Ok((runs_of(usual_s) as usize, usual_s));
+    }
+    let runs = runs_of(SHORTEST_SLICE_S).min(DEFAULT_RUNS as f64);
+    let slice_s = total_s / (runs * styles) - warm_up_s;
+    Ok((runs as usize, if whole_seconds { slice_s.floor() } else { slice_s }))
 }
 
 fn load(options: &Measure) -> Result<Option<LoadPlan>, JitterError> {
@@ -265,4 +312,42 @@ fn load(options: &Measure) -> Result<Option<LoadPlan>, JitterError> {
         }
     }
     Ok((!kinds.is_empty()).then_some(LoadPlan { kinds, workers: options.load_workers }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Runs, length of a turn and what they take altogether, warm-up included.
+    fn divided(seconds: u64, styles: usize, whole: bool) -> (usize, f64, f64) {
+        let (runs, slice_s) = divide(Duration::from_secs(seconds), None, styles, whole).unwrap();
+        (runs, slice_s, runs as f64 * styles as f64 * (slice_s + WARM_UP.as_secs_f64()))
+    }
+
+    #[test]
+    fn a_duration_is_that_of_all_styles_together_and_is_used() {
+        assert_eq!(divided(20, 3, true), (4, 1.0, 18.0));
+        assert_eq!(divided(20, 1, false), (5, 3.5, 20.0));
+        assert_eq!(divided(5, 3, true), (1, 1.0, 4.5));
+        assert_eq!(divided(90, 3, true), (6, 4.0, 81.0));
+        assert_eq!(divided(7200, 3, true).1, LONG_SLICE_S);
+        for (seconds, styles) in (5..400).flat_map(|seconds| [1, 2, 3].map(|styles| (seconds, styles))) {
+            let (runs, slice_s, total_s) = divided(seconds, styles, true);
+            assert!(slice_s >= 1.0 && slice_s.fract() == 0.0 && runs >= 1);
+            assert!(
+                total_s <= seconds as f64 && total_s > 0.6 * seconds as f64,
+                "{seconds} {styles}: {total_s}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_duration_too_short_for_one_turn_of_each_style_is_refused_with_what_it_takes() {
+        let refused = |slice| divide(Duration::from_secs(4), slice, 3, true).unwrap_err().to_string();
+        assert!(
+            refused(None)
+                .contains("--duration 4s is for all 3 styles together; one turn of each takes 4.5 s")
+        );
+        assert!(refused(Some(10.0)).contains("takes 31.5 s"), "{}", refused(Some(10.0)));
+    }
 }
