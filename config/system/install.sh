@@ -13,16 +13,19 @@ destdir=
 binaries=${CARGO_TARGET_DIR:-$project_dir/target}/release
 loop_cpu=
 fast_cpu=
+cpu_count=
 action=install
 dry_run=false
 purge=false
 changes=0
+edited=0
 
 help() {
     cat <<'END'
 usage: install.sh [OPTIONS]
-  --cpu N          CPU of the driver's loop (default: as installed before, else the last one)
-  --fast-cpu N     keep CPU N free for the application's fast thread as well
+  --cpu N          CPU of the driver's loop (default: as installed before, else the last one); not CPU 0
+  --fast-cpu N     keep CPU N free for the application's fast thread as well; another one than --cpu
+  --cpus N         how many CPUs the machine has (default: as many as this one), for a --destdir that another boots
   --binaries DIR   where io-driver and phantom3 were built (default: target/release)
   --prefix DIR     programs go below it (default: /usr/local); configuration goes to /etc
   --destdir DIR    pretend that DIR is the root directory
@@ -46,7 +49,7 @@ main() {
 read_arguments() {
     while [ $# -gt 0 ]; do
         case $1 in
-        --cpu | --fast-cpu | --binaries | --prefix | --destdir)
+        --cpu | --fast-cpu | --cpus | --binaries | --prefix | --destdir)
             [ $# -gt 1 ] || fail "$1 needs a value"
             set_option "$1" "$2"
             shift
@@ -59,15 +62,21 @@ read_arguments() {
         esac
         shift
     done
+    if $purge && [ "$action" = install ]; then fail "--purge belongs to --uninstall"; fi
 }
 
 set_option() {
     case $1 in
-    --cpu | --fast-cpu)
+    --cpu | --fast-cpu | --cpus)
         case $2 in
-        "" | *[!0-9]*) fail "$1: found \`$2\`, allowed: the number of a CPU" ;;
+        # A shell would take what begins with 0 for octal.
+        "" | *[!0-9]* | 0?* | ??????*) fail "$1: found \`$2\`, allowed: a number, such as 3" ;;
         esac
-        if [ "$1" = --cpu ]; then loop_cpu=$2; else fast_cpu=$2; fi
+        case $1 in
+        --cpu) loop_cpu=$2 ;;
+        --fast-cpu) fast_cpu=$2 ;;
+        --cpus) cpu_count=$2 ;;
+        esac
         ;;
     --binaries) binaries=$2 ;;
     --prefix | --destdir)
@@ -117,6 +126,7 @@ install_all() {
         fail "needs root (sudo), or --destdir, or --dry-run"
     fi
     choose_cpus
+    if ! $dry_run; then make_directory /; fi
     files
     remove_what_is_no_longer_shipped
     write_manifest
@@ -127,7 +137,26 @@ install_all() {
 choose_cpus() {
     if [ -z "$loop_cpu" ]; then loop_cpu=$(installed_cpu LOOP_CPU); fi
     if [ -z "$fast_cpu" ]; then fast_cpu=$(installed_cpu FAST_CPU); fi
-    if [ -z "$loop_cpu" ]; then loop_cpu=$(($(getconf _NPROCESSORS_CONF) - 1)); fi
+    if [ -z "$cpu_count" ]; then cpu_count=$(getconf _NPROCESSORS_CONF); fi
+    [ "$cpu_count" -ge 2 ] || fail "the driver's loop needs a CPU of its own, and there is one CPU only"
+    if [ -z "$loop_cpu" ]; then loop_cpu=$((cpu_count - 1)); fi
+    check_cpu --cpu "$loop_cpu"
+    [ -n "$fast_cpu" ] || return 0
+    check_cpu --fast-cpu "$fast_cpu"
+    if [ "$fast_cpu" = "$loop_cpu" ]; then
+        fail "--fast-cpu: found $fast_cpu, which is the CPU of the driver's loop; choose another one, or leave it out:" \
+            "then no CPU is kept free for the application's fast thread"
+    fi
+}
+
+# check_cpu OPTION NUMBER: also of what stands in a machine.conf that was edited.
+check_cpu() {
+    case $2 in
+    0 | 0?* | ??????*) known=false ;;
+    *) if [ "$2" -lt "$cpu_count" ]; then known=true; else known=false; fi ;;
+    esac
+    $known || fail "$1: found CPU $2, allowed: 1 to $((cpu_count - 1)), those of this machine but CPU 0, which does the" \
+        "kernel's housekeeping; for another machine's CPUs: --cpus"
 }
 
 # installed_cpu KEY: nothing if there is none, or what stands there is no number.
@@ -153,7 +182,8 @@ copy() {
     else
         # Edited. The checksum of what was copied stays on record, so that it goes on counting as edited.
         if [ -n "$former" ]; then record "$1" "$former" "$3"; fi
-        [ "$wanted" = "$former" ] || put_beside "$3"
+        edited=$((edited + 1))
+        if [ "$wanted" = "$former" ]; then tell "kept (edited)" "$3"; else put_beside "$3"; fi
     fi
 }
 
@@ -192,11 +222,16 @@ place() {
     fi
 }
 
-# Records the directories that were not there, the outer ones first.
+# Records the directories that were not there, the outer ones first; `/` is the --destdir itself.
 make_directory() {
     [ -d "$destdir$1" ] && return
-    make_directory "$(dirname "$1")"
-    if ! { mkdir "$destdir$1" && chmod 755 "$destdir$1"; }; then fail "cannot make $destdir$1"; fi
+    if [ "$1" = / ]; then
+        mkdir -p "$destdir" || fail "cannot make $destdir"
+    else
+        make_directory "$(dirname "$1")"
+        mkdir "$destdir$1" || fail "cannot make $destdir$1"
+    fi
+    chmod 755 "$destdir$1" || fail "cannot open $destdir$1 to everybody"
     echo "directory - $1" >>"$scratch/directories"
 }
 
@@ -237,7 +272,11 @@ tell() {
 }
 
 next_steps() {
-    if [ "$changes" = 0 ]; then echo "everything is in its place already"; fi
+    if [ "$edited" != 0 ]; then
+        echo "kept: $edited edited; to have one as it is shipped, remove it and install again"
+    elif [ "$changes" = 0 ]; then
+        echo "everything is in its place already"
+    fi
     cat <<END
 
 CPU $loop_cpu is the driver's (/etc/phantom3/machine.conf and driver.toml). Next, as root:
@@ -272,7 +311,11 @@ uninstall_all() {
     done
     cat <<END
 
-Next, as root: update-grub, deluser phantom3, reboot.
+Next, as root:
+  update-grub
+  userdel phantom3
+  getent group phantom3 && groupdel phantom3    # userdel leaves a group that has members
+  reboot
 END
 }
 

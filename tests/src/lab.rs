@@ -82,6 +82,8 @@ impl Lab {
         let mut command = Command::new("sh");
         command.arg(sources.join("install.sh"));
         command.arg("--destdir").arg(self.root.path()).arg("--binaries").arg(self.programs.path());
+        // Whatever the machine that tests has.
+        command.args(["--cpus", "8"]);
         command
     }
 
