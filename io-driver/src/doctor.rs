@@ -11,6 +11,7 @@ mod json;
 pub mod segment;
 mod user;
 
+pub use cli::plan_names;
 pub use json::to_json;
 
 use rt_core::doctor::Finding;

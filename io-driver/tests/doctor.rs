@@ -294,8 +294,7 @@ fn whole(recorded: &RecordedMachine) -> Vec<Finding> {
 
 fn plan_of(recorded: &RecordedMachine) -> String {
     let names = PlanNames {
-        prefix: "phantom3".into(),
-        group: "realtime".into(),
+        prefix: "phantom3-plan".into(),
         program: "/usr/local/bin/io-driver".into(),
         unit_prefixes: vec![],
     };

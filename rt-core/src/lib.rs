@@ -15,7 +15,8 @@
 //! aside from what comes at the same phase. [`last_act`] is what a
 //! dying process still stores to the hardware. [`clock`] is under all of them, and [`alloc_guard`] lets a test
 //! show that a loop does not allocate.
-//! [`doctor`] says whether the machine is ready for any of this.
+//! [`doctor`] says whether the machine is ready for any of this, [`read_back`] what root has set for it, and
+//! [`installed`] names what a laboratory's installation consists of.
 //!
 //! Invariants: what a module marks as fit for the loop neither allocates nor locks nor opens a file
 //! nor panics; `unsafe` code lives in the private module `sys` alone; nothing is assumed from a
@@ -30,12 +31,14 @@ pub mod cpu;
 pub mod doctor;
 pub mod epitaph;
 pub mod histogram;
+pub mod installed;
 pub mod last_act;
 pub mod log;
 pub mod periodic;
 pub mod phase_keeper;
 pub mod privileges;
 pub mod process;
+pub mod read_back;
 pub mod sandbox;
 pub mod schedule;
 pub mod setup;

@@ -24,6 +24,22 @@ fn check_for(spec: &LoopSpec, (id, verdict, found, changes): Case<'_>) {
     assert!(judgement.found.contains(found), "{id}, {changes}: {:?} lacks {found:?}", judgement.found);
 }
 
+const READ_BACK: &str = "=== /run/phantom3-machine/ mode 0755\n=== /run/phantom3-machine/read-back mode 0644";
+const OLD_KERNEL: &str =
+    "=== /proc/sys/kernel/osrelease\n6.1.0-49-rt-amd64\n=== /proc/irq/31/smp_affinity_list mode 0644\n3\n";
+
+/// What root has published, with the owner and mode of directory and file, where debugfs is closed to this user.
+fn published(directory: &str, file: &str, word: &str, value: &str) -> String {
+    format!(
+        "=== /sys/kernel/debug denied\n=== /run/phantom3-machine/{directory}\n=== /run/phantom3-machine/read-back{file}\n\
+         {word} /sys/kernel/debug/sched/fair_server/cpu3/runtime {value}\n"
+    )
+}
+
+fn open_published() -> String {
+    published("", "", "set", "0").replace("=== /sys/kernel/debug denied\n", "")
+}
+
 #[test]
 fn kernel() {
     const CLOCK: &str = "/sys/devices/system/clocksource/clocksource0/current_clocksource";
@@ -139,6 +155,19 @@ fn starvation() {
         ("starvation.fair_server", Unreadable, "does not exist", "=== /sys/kernel/debug removed\n"),
         ("starvation.fair_server", Unreadable, "permission denied", "=== /sys/kernel/debug denied\n"),
         ("starvation.fair_server", Unreadable, "makes no sense", &format!("{SERVER}\nfifty\n")),
+        // What root set and published counts where debugfs is closed, if root alone can have written it.
+        ("starvation.fair_server", Pass, "off, as root read back", &published("", "", "set", "0")),
+        (
+            "starvation.fair_server",
+            Warn,
+            "50000 us a second",
+            &format!("{SERVER}\n50000000\n{}", open_published()),
+        ),
+        ("starvation.fair_server", Unreadable, "permission denied", &published("", "", "kept", "50000000")),
+        ("starvation.fair_server", Unreadable, "permission denied", &published(" uid 1000", "", "set", "0")),
+        ("starvation.fair_server", Unreadable, "permission denied", &published("", " uid 1000", "set", "0")),
+        ("starvation.fair_server", Unreadable, "permission denied", &published("", " mode 0666", "set", "0")),
+        ("starvation.fair_server", Unreadable, "permission denied", &published(" mode 1777", "", "set", "0")),
         (
             "starvation.fair_server",
             Unreadable,
@@ -222,6 +251,14 @@ fn interference() {
         ("interference.irq_affinity", Warn, "40 iwlwifi", WIFI),
         // No handler: nobody would be interrupted.
         ("interference.irq_affinity", Pass, "none", "=== /proc/irq/31/nvme0q4 removed\n"),
+        // Before 6.11 a managed one's file looks writable, too: only the attempt tells.
+        ("interference.irq_affinity", Warn, "whether 1 of them are managed, and cannot be moved", OLD_KERNEL),
+        (
+            "interference.irq_affinity",
+            Pass,
+            "managed, which cannot be moved: 1 (31 nvme0q4); isolcpus=managed_irq keeps them quiet",
+            &format!("{OLD_KERNEL}{READ_BACK}\nkept /proc/irq/31/smp_affinity 8\n"),
+        ),
         // The debug file of older kernels, where the affinity file looks writable.
         (
             "interference.irq_affinity",

@@ -152,7 +152,6 @@ fn render(machine: &RecordedMachine, cpu: usize) {
     assert!(!table.chars().any(|c| c.is_control() && c != '\n'), "control characters reach the terminal");
     let names = PlanNames {
         prefix: "lab".into(),
-        group: "realtime".into(),
         program: "/usr/bin/loop".into(),
         unit_prefixes: vec!["lab".into()],
     };

@@ -17,8 +17,7 @@ fn plan_of(recorded: &RecordedMachine, cpu: usize) -> String {
     let spec = spec(cpu);
     let machine = Machine { tree: recorded, probes: recorded, spec: &spec };
     let names = PlanNames {
-        prefix: "phantom3".into(),
-        group: "realtime".into(),
+        prefix: "phantom3-plan".into(),
         program: "/usr/local/bin/io-driver".into(),
         unit_prefixes: vec!["io-driver".into()],
     };
@@ -52,9 +51,15 @@ fn where_nothing_is_wrong_nothing_is_planned() {
     assert!(script.ends_with("# Nothing to do.\n") && !script.contains("\nput"), "{script}");
 }
 
-/// What a plan may call; `put` is its own function.
-const HARMLESS: [&str; 22] = [
+/// What a plan may call; `put` and `add` are its own functions.
+const HARMLESS: [&str; 28] = [
     "#",
+    "mark='#",
+    "add",
+    "add()",
+    "}",
+    "for",
+    "done",
     "set",
     "[",
     "put",
@@ -99,9 +104,10 @@ fn check_harmless(script: &str) {
         for danger in ["rm", "dd", "reboot", "mkfs", "curl", "wget", "eval", ">>", "chmod", "kill"] {
             assert!(!code.split_whitespace().any(|word| word == danger), "{line}");
         }
-        // A file that is written whole is one of ours, or the one-line file that a copy was made of.
-        if let Some(path) = code.strip_prefix("cat > ") {
-            assert!(path.contains("phantom3"), "{line}");
+        // Files are only added to, and to none that is installed.
+        assert!(!code.starts_with("cat >"), "{line}");
+        if let Some(path) = code.strip_prefix("add ").and_then(|rest| rest.split(' ').next()) {
+            assert!(path.contains("phantom3-plan"), "{line}");
         }
     }
 }
@@ -145,11 +151,20 @@ fn every_command_that_changes_something_is_preceded_by_what_it_does_and_how_to_u
         let script = plan_of(&machine, cpu);
         let lines = commands(&script);
         for (at, line) in lines.iter().enumerate().filter(|(_, line)| {
-            ["put ", "sysctl ", "systemctl disable", "swapoff", "cat > ", "grubby", "modprobe"]
-                .iter()
-                .any(|command| line.starts_with(command))
+            [
+                "put ",
+                "sysctl ",
+                "systemctl disable",
+                "systemctl restart",
+                "swapoff",
+                "add ",
+                "grubby",
+                "modprobe",
+            ]
+            .iter()
+            .any(|command| line.starts_with(command))
         }) {
-            // `mkdir -p` of the file's directory may stand between.
+            // A comment or the daemon's reload may stand between.
             let explained = lines[at.saturating_sub(3)..at]
                 .iter()
                 .any(|line| line.starts_with("# ") && line.contains("undo: "));
@@ -163,26 +178,38 @@ fn each_boot_loader_gets_its_own_way() {
     let plan = |changes: &str| plan_of(&load_with("debian-laptop", changes), 7);
     let words =
         "isolcpus=managed_irq,domain,7 nohz_full=7 rcu_nocbs=7 irqaffinity=0-6 pcie_aspm.policy=performance";
-    assert!(plan("").contains(&format!(
-        "GRUB_CMDLINE_LINUX_DEFAULT=\"$GRUB_CMDLINE_LINUX_DEFAULT {words}\"\nEND\nupdate-grub"
-    )));
+    let grub = plan("");
+    assert!(grub.contains("add /etc/default/grub.d/zz-phantom3-plan.cfg <<'END'\n"), "{grub}");
+    for word in words.split(' ') {
+        assert!(grub.contains(&format!("=\"$GRUB_CMDLINE_LINUX_DEFAULT {word}\" ;; esac\n")), "{word}");
+    }
     let grubby = plan("=== /usr/sbin/update-grub removed\n=== /usr/sbin/grubby\n");
     assert!(grubby.contains(&format!("grubby --update-kernel=ALL --args='{words}'")));
     let systemd = plan("=== /etc/default/grub removed\n=== /etc/kernel/cmdline\nquiet\n");
-    assert!(systemd.contains("[ -e /etc/kernel/cmdline.before-phantom3 ] || cp /etc/kernel/cmdline"));
+    assert!(systemd.contains("[ -e /etc/kernel/cmdline.before-phantom3-plan ] || cp /etc/kernel/cmdline"));
     let raspberry = plan("=== /etc/default/grub removed\n=== /boot/firmware/cmdline.txt\nquiet\n");
-    assert!(raspberry.contains(&format!("'{words}' > /boot/firmware/cmdline.txt")));
+    assert!(raspberry.contains(&format!("for word in {words}; do")));
+    assert!(raspberry.contains("\"$line\" \"$word\" > /boot/firmware/cmdline.txt\n"), "{raspberry}");
     let none = plan("=== /etc/default/grub removed\n");
     assert!(none.contains("No boot loader was found") && none.contains(&format!("\n# {words}\n")));
 }
 
-/// Where tuned runs it would undo the files of sysctl and of systemd.
+/// Where TuneD runs it would undo what systemd set.
 #[test]
-fn tuned_gets_a_profile_instead_of_files_beside_it() {
-    let script = plan_of(&load_with("debian-laptop", "=== /usr/sbin/tuned-adm\n"), 7);
-    assert!(script.contains("cat > /etc/tuned/phantom3/tuned.conf"));
-    assert!(script.contains("[sysctl]\nkernel.sched_rt_runtime_us=-1\n") && script.contains("[sysfs]\n"));
-    assert!(!script.contains("/etc/sysctl.d") && script.contains("tuned-adm profile phantom3"));
+fn tuned_gets_a_profile_on_top_of_the_active_one() {
+    let active = "=== /usr/sbin/tuned-adm\n=== /etc/tuned/active_profile\nphantom3\n";
+    let script = plan_of(&load_with("debian-laptop", active), 7);
+    let profile = "add /etc/tuned/phantom3-plan/tuned.conf <<'END'\n[main]\nsummary=Settings for a real-time \
+                   loop\ninclude=phantom3\n[sysfs]\n/sys/";
+    assert!(script.contains(profile), "{script}");
+    assert!(
+        script.contains("tuned-adm profile phantom3-plan")
+            && script.contains("undo: tuned-adm profile phantom3\n")
+    );
+    // A second plan adds to the last section of the first's.
+    let again = format!("{active}=== /etc/tuned/phantom3-plan/tuned.conf\n# made by a plan\n[sysfs]\n");
+    let script = plan_of(&load_with("debian-laptop", &again), 7);
+    assert!(script.contains("add /etc/tuned/phantom3-plan/tuned.conf <<'END'\n/sys/"), "{script}");
 }
 
 /// Its script must not stop halfway at a command that is not there.
@@ -200,7 +227,7 @@ fn without_systemd_and_udev_their_commands_are_not_called() {
 fn a_unit_of_the_loop_gets_a_drop_in() {
     let script =
         plan_of(&load_with("debian-laptop", "=== /etc/systemd/system/io-driver.service\n[Service]\n"), 7);
-    assert!(script.contains("cat > /etc/systemd/system/io-driver.service.d/phantom3-rights.conf"));
+    assert!(script.contains("add /etc/systemd/system/io-driver.service.d/phantom3-plan-rights.conf"));
     assert!(script.contains("LimitRTPRIO=95\nLimitMEMLOCK=infinity\nEND"));
 }
 
@@ -268,12 +295,12 @@ fn apply(machine: &mut RecordedMachine, script: &str, cpus: usize) {
             }
             ["systemctl", "disable", "--now", "irqbalance.service"] => machine.remove("/proc/612"),
             ["swapoff", "-a"] => machine.set("/proc/swaps", "Filename Type Size Used Priority\n"),
-            ["@realtime", "-", "rtprio", priority] => grant(machine, priority),
-            _ if line.starts_with("GRUB_CMDLINE_LINUX_DEFAULT=") => {
-                let words = line.split_once("_DEFAULT ").unwrap().1.trim_end_matches('"');
-                boot(machine, words, cpus);
+            ["@phantom3", "-", "rtprio", priority] => grant(machine, priority),
+            _ if line.starts_with("case ") && line.contains("GRUB_CMDLINE_LINUX_DEFAULT=") => {
+                let word = line.split_once("=\"$GRUB_CMDLINE_LINUX_DEFAULT ").unwrap().1;
+                boot(machine, word.trim_end_matches("\" ;; esac"), cpus);
             }
-            _ if line.starts_with("KERNEL==\"cpu_dma_latency\"") => {
+            _ if line.contains("KERNEL==\"cpu_dma_latency\"") => {
                 machine.probes.insert("dma_latency".into(), "us=0".into());
             }
             _ => {}
@@ -311,6 +338,22 @@ fn doing_what_the_laptops_plan_says_leaves_only_what_no_script_can_mend() {
     assert_eq!(left, expected);
 }
 
+/// Two values for one key would replace one another; whoever wrote the first has to say which is meant.
+#[test]
+fn a_key_that_is_booted_with_another_value_is_left_to_people() {
+    let other = "=== /proc/cmdline\nquiet isolcpus=managed_irq,domain,2\n";
+    let script = plan_of(&load_with("debian-laptop", other), 7);
+    let by_hand = "# by hand, isolcpus=managed_irq,domain,7: keep other programs off the CPU; it is booted with \
+                   \"managed_irq,domain,2\" there now: change that where it stands\n";
+    assert!(script.contains(by_hand), "{script}");
+    assert!(!commands_and_files(&script).contains("isolcpus"), "{script}");
+    assert!(commands_and_files(&script).contains("nohz_full=7"));
+}
+
+fn commands_and_files(script: &str) -> String {
+    script.lines().filter(|line| !line.starts_with('#')).map(|line| format!("{line}\n")).collect()
+}
+
 /// One remedy at a time: each mends its own finding.
 #[test]
 fn each_setting_mends_its_own_finding() {
@@ -331,8 +374,14 @@ fn each_setting_mends_its_own_finding() {
         ("power.epp", "=== /sys/devices/system/cpu/cpu3/cpufreq/energy_performance_preference\npower\n"),
         ("power.pcie_aspm", "=== /sys/module/pcie_aspm/parameters/policy\n[default] performance powersave\n"),
         ("power.gpu", "=== /sys/class/drm/card0/device/power/control\nauto\n"),
-        ("kernel.isolcpus", "=== /sys/devices/system/cpu/isolated\n\n"),
-        ("kernel.nohz_full", "=== /sys/devices/system/cpu/nohz_full\n(null)\n"),
+        (
+            "kernel.isolcpus",
+            "=== /proc/cmdline\nnohz_full=3 rcu_nocbs=3 irqaffinity=0-2\n=== /sys/devices/system/cpu/isolated\n\n",
+        ),
+        (
+            "kernel.nohz_full",
+            "=== /proc/cmdline\nisolcpus=managed_irq,domain,3 rcu_nocbs=3 irqaffinity=0-2\n=== /sys/devices/system/cpu/nohz_full\n(null)\n",
+        ),
         (
             "kernel.rcu_nocbs",
             "=== /proc/cmdline\nisolcpus=managed_irq,domain,3\n=== /sys/devices/system/cpu/nohz_full\n(null)\n",

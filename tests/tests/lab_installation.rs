@@ -1,5 +1,8 @@
 //! `config/system/install.sh`: what it puts where, and that it takes away no more than it brought.
 
+#[path = "lab_installation/fix_plan.rs"]
+mod fix_plan;
+
 use io_driver::config::DriverConfig;
 use std::collections::BTreeSet;
 use std::fs;
@@ -42,8 +45,10 @@ fn an_edited_file_is_kept_and_a_newer_version_put_beside_it() {
     lab.write(DRIVER_TOML, &edited);
     let new = format!("{DRIVER_TOML}.new");
 
-    lab.install(&[]);
+    let said = lab.install(&[]);
     assert!(!lab.path(&new).exists(), "there is nothing new");
+    assert!(said.contains("kept (edited) ") && said.contains("remove it and install again"), "{said}");
+    assert!(!said.contains("everything is in its place"), "{said}");
     // Another CPU makes for a new version of the file.
     for _ in 0..2 {
         lab.install(&["--cpu", "2"]);
@@ -189,9 +194,17 @@ fn the_driver_and_the_machine_agree_on_the_cpu() {
 fn bad_usage_is_refused_before_anything_is_changed() {
     let empty = tempfile::tempdir().expect("a directory");
     let empty = empty.path().to_str().expect("plain");
-    let cases: [(&[&str], &str); 6] = [
+    let own =
+        "--fast-cpu: found 7, which is the CPU of the driver's loop; choose another one, or leave it out";
+    let cases: [(&[&str], &str); 12] = [
         (&["--binaries", empty], "cargo build --release --workspace"),
-        (&["--cpu", "two"], "--cpu: found `two`, allowed: the number of a CPU"),
+        (&["--cpu", "two"], "--cpu: found `two`, allowed: a number, such as 3"),
+        (&["--cpu", "03"], "--cpu: found `03`, allowed: a number, such as 3"),
+        (&["--cpu", "8"], "--cpu: found CPU 8, allowed: 1 to 7, those of this machine but CPU 0"),
+        (&["--cpu", "0"], "--cpu: found CPU 0, allowed: 1 to 7"),
+        (&["--cpu", "7", "--fast-cpu", "7"], own),
+        (&["--cpus", "1"], "the driver's loop needs a CPU of its own, and there is one CPU only"),
+        (&["--purge"], "--purge belongs to --uninstall"),
         (&["--prefix", "here"], "--prefix: found `here`, allowed: an absolute path"),
         (&["--prefix", "/a|b"], "--prefix: found `/a|b`, allowed: an absolute path"),
         (&["--frobnicate"], "unknown option --frobnicate"),
@@ -203,6 +216,62 @@ fn bad_usage_is_refused_before_anything_is_changed() {
         assert_eq!(status, Some(2), "{arguments:?}: {err}");
         assert!(err.contains(expected), "{arguments:?}: {err}");
         assert!(lab.files("/").is_empty());
+    }
+}
+
+#[test]
+fn a_cpu_that_this_machine_does_not_have_is_refused() {
+    let destination = tempfile::tempdir().expect("a directory");
+    let mut installer = Command::new("sh");
+    installer.arg(sources().join("install.sh")).arg("--dry-run").args(["--cpu", "9999"]);
+    let output = installer.arg("--destdir").arg(destination.path()).output().expect("it runs");
+    let (status, _, err) = said(&output);
+    // Programs that are not built here are found missing first.
+    let is_refused =
+        err.contains("--cpu: found CPU 9999") || err.contains("cargo build --release --workspace");
+    assert!(status == Some(2) && is_refused, "{err}");
+}
+
+#[test]
+fn a_destination_that_is_not_there_is_made_and_taken_away_again() {
+    let lab = Lab::bare();
+    let outside = tempfile::tempdir().expect("a directory");
+    let destination = outside.path().join("not/yet/there");
+    let programs = lab.installer().get_args().map(|word| word.to_owned()).collect::<Vec<_>>();
+    let with_destination = |more: &[&str]| {
+        // The installer once called itself without end here: a hang is a failure, too.
+        let mut command = Command::new("timeout");
+        command.args(["60", "sh"]).args(&programs).arg("--destdir").arg(&destination).args(more);
+        succeed(&mut command)
+    };
+    with_destination(&["--cpu", "1"]);
+    assert!(destination.join("etc/phantom3/driver.toml").is_file());
+    with_destination(&["--uninstall"]);
+    assert!(!destination.exists());
+}
+
+#[test]
+fn what_is_left_to_undo_by_hand_is_told_alike_by_the_installer_and_the_readme() {
+    let lab = Lab::bare();
+    lab.install(&["--cpu", "1"]);
+    let said = lab.install(&["--uninstall"]);
+    let readme = fs::read_to_string(sources().join("README.md")).expect("there");
+    // Members keep a group alive when its user goes.
+    for command in ["update-grub", "userdel phantom3", "groupdel phantom3"] {
+        assert!(said.contains(command) && readme.contains(command), "{command}: {said}");
+    }
+}
+
+#[test]
+fn every_kernel_has_what_sysctl_is_to_set() {
+    let text = fs::read_to_string(sources().join("sysctl.d/70-phantom3.conf")).expect("there");
+    let settings = text.lines().filter(|line| !line.is_empty() && !line.starts_with('#'));
+    for line in settings {
+        let key = line.trim_start_matches('-').split(" = ").next().expect("a key");
+        let path = Path::new("/proc/sys").join(key.replace('.', "/"));
+        // Debian's sysctl complains of a key that is not there, and of one that can only be read.
+        let mode = fs::metadata(&path).unwrap_or_else(|error| panic!("{key}: {error}")).permissions().mode();
+        assert!(mode & 0o200 != 0, "{key} can only be read on this kernel");
     }
 }
 

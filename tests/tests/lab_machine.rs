@@ -1,5 +1,6 @@
 //! What is set on the machine at boot: the root scripts on a made-up /sys and /proc, and the udev rules.
 
+use rt_core::read_back::{ReadBack, Writers};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
@@ -100,6 +101,35 @@ fn exactly_what_it_says_is_changed_and_undone() {
     lab.write(THP, "always [madvise] never\n");
     assert_eq!(kernel_files(&lab), before);
     assert_eq!(run(&lab, &["undo"]).lines().next(), Some("nothing to undo"));
+}
+
+#[test]
+fn what_was_set_is_read_back_and_published_for_everybody() {
+    const PUBLISHED: &str = "/run/phantom3-machine/read-back";
+    let lab = machine();
+    let refusing = lab.path(governor(3));
+    fs::remove_file(&refusing).expect("ours");
+    symlink("/proc/version", &refusing).expect("a link");
+    run(&lab, &["apply"]);
+    // As the driver and the doctor read it, on a machine where root wrote it.
+    let root = Writers { uid: 0, mode: 0o755 };
+    let told = ReadBack::believed(root, root, lab.read(PUBLISHED)).expect("root's");
+    assert_eq!(told.value(&fair_server(3)), Some("0"));
+    assert_eq!(told.value(IRQ), Some("7"));
+    assert!(told.was_refused(&governor(3)) && !told.was_refused(IRQ));
+    assert_eq!(told.value(&fair_server(2)), None, "another CPU's is not set");
+    for (path, mode) in [(PUBLISHED, 0o644), ("/run/phantom3-machine", 0o755)] {
+        let found = fs::metadata(lab.path(path)).expect("there").permissions().mode() & 0o777;
+        assert_eq!(found, mode, "{path}");
+    }
+    // Once more: what is as it should be is told as well, and nothing twice.
+    let before = lab.read(PUBLISHED);
+    run(&lab, &["apply"]);
+    let sorted = |text: &str| text.lines().map(str::to_owned).collect::<BTreeSet<_>>();
+    assert!(sorted(&before).is_superset(&sorted(&lab.read(PUBLISHED))));
+    assert!(lab.read(PUBLISHED).contains(&format!("set {} 0\n", fair_server(3))));
+    run(&lab, &["undo"]);
+    assert!(!lab.path(PUBLISHED).exists(), "what is undone is told no longer");
 }
 
 #[test]

@@ -126,12 +126,14 @@ fn defaults() -> Result<DriverConfig, String> {
         .map_err(|error| error.to_string())
 }
 
-fn plan_names() -> PlanNames {
+/// Names that a fix plan gives to its files.
+#[must_use]
+pub fn plan_names() -> PlanNames {
     let program = std::env::current_exe().unwrap_or_else(|_| "io-driver".into());
     PlanNames {
-        prefix: "phantom3".into(),
-        group: "realtime".into(),
+        // Not that of what install.sh puts there.
+        prefix: "phantom3-plan".into(),
         program: program.to_string_lossy().into_owned(),
-        unit_prefixes: vec!["phantom3".into(), "io-driver".into()],
+        unit_prefixes: vec!["phantom3-driver".into(), "io-driver".into()],
     }
 }

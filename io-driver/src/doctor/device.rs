@@ -5,6 +5,7 @@ use super::user::User;
 use rt_core::doctor::machine::{Machine, Obstacle, one_line};
 use rt_core::doctor::step::{Action, Step};
 use rt_core::doctor::{Check, Finding, Judged, Judgement, Remedy};
+use rt_core::installed::GROUP as REAL_TIME_GROUP;
 
 const GROUP: &str = "device";
 
@@ -207,7 +208,7 @@ fn permit(card: &Card) -> Remedy {
         card.model.bars.iter().map(|bar| format!("/sys$devpath/resource{bar}")).collect();
     let files = files.join(" ");
     let rule = format!(
-        "{}, RUN+=\"/bin/chgrp realtime {files}\", RUN+=\"/bin/chmod 0660 {files}\"",
+        "{}, RUN+=\"/bin/chgrp {REAL_TIME_GROUP} {files}\", RUN+=\"/bin/chmod 0660 {files}\"",
         card.udev_match()
     );
     let what = format!("let the group map the {}", card.model.name);

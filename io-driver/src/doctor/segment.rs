@@ -5,6 +5,7 @@ use crate::status;
 use rt_core::doctor::machine::{FileStatus, Machine, Obstacle};
 use rt_core::doctor::step::{Action, Step};
 use rt_core::doctor::{Finding, Judged, Judgement, Remedy};
+use rt_core::installed::{DRIVER_UNIT, GROUP as REAL_TIME_GROUP, RUNTIME_DIRECTORY, UNITS};
 use shm_abi::client::{self, AttachError};
 use shm_abi::handshake::own_version_text;
 use std::path::Path;
@@ -120,12 +121,17 @@ fn absent_directory(machine: &Machine<'_>, path: &str) -> Judged {
     if machine.status(parent_of(path)).is_ok_and(|above| user.may_write(&above)) {
         return Ok(Judgement::pass(format!("{path} does not exist yet; the driver makes it")));
     }
+    if path == RUNTIME_DIRECTORY && machine.exists(&format!("{UNITS}/{DRIVER_UNIT}")) {
+        return Ok(Judgement::pass(format!(
+            "{path} does not exist yet; {DRIVER_UNIT} makes it when it starts"
+        )));
+    }
     let step = Step {
         what: "a place for the driver's socket".into(),
         action: Action::Directory { path: path.to_owned(), mode: 0o770 },
     };
     let text = format!(
-        "RuntimeDirectory=phantom3 in the driver's systemd unit, or \"d {path} 0770 root realtime -\" in \
+        "RuntimeDirectory=phantom3 in the driver's systemd unit, or \"d {path} 0770 root {REAL_TIME_GROUP} -\" in \
          /etc/tmpfiles.d; an ordinary login has $XDG_RUNTIME_DIR instead"
     );
     Ok(Judgement::warn(format!("{path} does not exist"), Remedy::steps(text, [step])))

@@ -6,6 +6,8 @@
 
 use super::probe::Probes;
 use crate::cpu::parse_cpu_list;
+use crate::installed::READ_BACK;
+use crate::read_back::{ReadBack, Writers};
 use std::fmt;
 use std::io;
 use std::str::FromStr;
@@ -244,6 +246,18 @@ impl Machine<'_> {
         let target = self.tree.link(path).ok()?;
         let name = target.rsplit('/').next()?;
         (!name.is_empty()).then(|| one_line(name, 80))
+    }
+
+    /// What root has set, read back and published, if that may be believed.
+    #[must_use]
+    pub fn read_back(&self) -> Option<ReadBack> {
+        let writers = |path: &str| {
+            self.status(path).ok().map(|s| (s.is_directory, Writers { uid: s.uid, mode: s.mode }))
+        };
+        let (directory, _) = READ_BACK.rsplit_once('/')?;
+        let (true, directory) = writers(directory)? else { return None };
+        let (false, file) = writers(READ_BACK)? else { return None };
+        ReadBack::believed(directory, file, self.text(READ_BACK).ok()?)
     }
 
     /// The CPUs that are switched on.

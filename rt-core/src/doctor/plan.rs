@@ -1,13 +1,17 @@
 //! The fix plan: a shell script for this machine that does what the remedies say.
 //!
 //! Model: all steps of all findings, each once, sorted by kind; kinds that share a file (kernel command
-//! line, sysctl, udev, ...) are merged into one of our own name, so that undoing is removing it. Every
-//! section says in comments what it does and how to undo it.
+//! line, sysctl, udev, ...) go into one of the plan's own name, so that undoing is removing it. Every
+//! section says in comments what it does and how to undo it. What `config/system/install.sh` has installed is used:
+//! its unit is restarted for what it sets, and a line that another file says already is not said twice.
 //! Invariants: valid for `sh -n` whatever lies in the machine's files, since foreign text goes into
-//! comments as one harmless line, or is quoted; no file of another name than ours is
-//! overwritten, but values under `/sys` and `/proc`; nothing is removed.
+//! comments as one harmless line, or is quoted. A plan only adds: to files that fix plans made, which the script
+//! itself makes sure of when it runs, never lines that are there; to the boot line, never a key that is there.
+//! Nothing is removed or replaced, but values under `/sys` and `/proc`.
 
 mod boot;
+mod by_installation;
+mod file;
 mod rights;
 mod settings;
 #[cfg(test)]
@@ -20,10 +24,8 @@ use super::step::{Action, Step};
 /// Names that the script uses for files of its own.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PlanNames {
-    /// Begins the names of all files that the script makes.
+    /// Begins the names of all files that the script makes. Nothing that is installed has such a name.
     pub prefix: String,
-    /// The group whose members may run the loop.
-    pub group: String,
     /// The program that runs it, for `setcap`.
     pub program: String,
     /// Systemd units of the loop, if they are installed, get a drop-in when their name begins so.
@@ -33,14 +35,15 @@ pub struct PlanNames {
 /// Writes the script.
 #[must_use]
 pub fn script(machine: &Machine<'_>, findings: &[Finding], names: &PlanNames) -> String {
-    let steps = steps_of(findings);
+    let (by_installation, steps) = by_installation::part(machine, steps_of(findings));
     let mut script = Script::new(machine.spec);
-    if steps.is_empty() {
+    if steps.is_empty() && by_installation.is_empty() {
         script.comment("Nothing to do.");
         return script.text;
     }
     script.preamble();
     by_hand(&mut script, &steps);
+    by_installation::write(&mut script, &by_installation);
     boot::write(&mut script, machine, &steps, names);
     settings::write(&mut script, machine, &steps, names);
     rights::write(&mut script, machine, &steps, names);
@@ -96,6 +99,7 @@ impl Script {
             "Writes a value to a file of the kernel, which may refuse it (a managed interrupt, a lockdown).",
         );
         self.line("put() { printf '%s\\n' \"$1\" > \"$2\" || echo \"not taken: $1 > $2\" >&2; }");
+        self.text.push_str(file::ADD);
     }
 
     fn section(&mut self, title: &str) {
@@ -117,16 +121,6 @@ impl Script {
     fn line(&mut self, line: &str) {
         self.text.push_str(line);
         self.text.push('\n');
-    }
-
-    /// A whole file of ours.
-    fn file(&mut self, path: &str, lines: &[String]) {
-        if let Some((directory, _)) = path.rsplit_once('/') {
-            self.line(&format!("mkdir -p {}", quoted(directory)));
-        }
-        self.line(&format!("cat > {} <<'END'", quoted(path)));
-        lines.iter().for_each(|line| self.line(&one_line(line, 4000)));
-        self.line("END");
     }
 }
 

@@ -3,6 +3,7 @@
 use super::machine::{Machine, Obstacle, if_any, one_line};
 use super::step::Step;
 use super::{Check, Group, Judged, Judgement, Remedy};
+use crate::installed::LATENCY_RULE;
 
 /// These checks.
 pub const GROUP: Group = Group {
@@ -108,9 +109,6 @@ fn sleep_states(machine: &Machine<'_>) -> Judged {
         }
     }
 }
-
-/// Debian's rule leaves the file to root.
-const LATENCY_RULE: &str = "KERNEL==\"cpu_dma_latency\", GROUP=\"realtime\", MODE=\"0660\"";
 
 fn hold_latency() -> Remedy {
     let text = format!("a udev rule: {LATENCY_RULE}");

@@ -4,6 +4,7 @@ use super::machine::{Machine, Obstacle};
 use super::step::{Action, Step};
 use super::{Check, Group, Judged, Judgement, Remedy};
 use crate::cpu::parse_cpu_list;
+use crate::installed::GROUP as REAL_TIME_GROUP;
 use crate::setup::memory::field;
 use crate::setup::scheduling::judge_fifo;
 use crate::sys::sched::Policy;
@@ -82,7 +83,7 @@ fn memlock(machine: &Machine<'_>) -> Judged {
 fn limits(item: &str, capability: &str) -> Remedy {
     let what = "let members of the group take real-time priority and lock memory";
     let text = format!(
-        "\"@realtime - {item}\" in /etc/security/limits.d, membership in that group, a new login (in a systemd unit: \
+        "\"@{REAL_TIME_GROUP} - {item}\" in /etc/security/limits.d, membership in that group, a new login (in a systemd unit: \
          LimitRTPRIO=95, LimitMEMLOCK=infinity); or setcap {capability}+ep on the program"
     );
     Remedy::steps(text, [Step { what: what.into(), action: Action::Limits }])

@@ -6,6 +6,8 @@
 
 use super::report::Guarantee;
 use crate::cpu::current_cpu;
+use crate::installed::MACHINE_UNIT;
+use crate::read_back::ReadBack;
 use std::fs::read_to_string;
 
 /// What there is to say about a real-time thread on `cpu`, or else on the one it runs on now.
@@ -25,7 +27,8 @@ pub(super) fn circumstances(cpu: Option<usize>) -> Vec<Guarantee> {
             read("/proc/sys/kernel/sched_rt_period_us").as_deref(),
         ),
     ];
-    guarantees.extend(judge_fair_server(&release, read(&server).as_deref(), &server));
+    let told = ReadBack::of_this_machine();
+    guarantees.extend(judge_fair_server(&release, read(&server).as_deref(), &server, told.as_ref()));
     guarantees
 }
 
@@ -64,24 +67,35 @@ pub(crate) fn fair_server_file(cpu: usize) -> String {
 /// First kernel whose scheduler reserves time for ordinary threads on every CPU.
 const FIRST_WITH_FAIR_SERVER: (u32, u32) = (6, 12);
 
-/// None for kernels that have no fair server.
-pub(crate) fn judge_fair_server(release: &str, runtime: Option<&str>, path: &str) -> Option<Guarantee> {
+/// None for kernels that have no fair server. What root `told` counts where this user cannot read `runtime`.
+pub(crate) fn judge_fair_server(
+    release: &str,
+    runtime: Option<&str>,
+    path: &str,
+    told: Option<&ReadBack>,
+) -> Option<Guarantee> {
     if version_of(release)? < FIRST_WITH_FAIR_SERVER {
         return None;
     }
-    let runtime_ns: Option<u64> = runtime.and_then(|text| text.trim().parse().ok());
+    let told = told.and_then(|told| told.value(path));
+    let runtime_ns: Option<u64> = runtime.or(told).and_then(|text| text.trim().parse().ok());
+    let by_whom = if runtime.is_none() && told.is_some() { READ_BY_ROOT } else { "" };
     let found = match runtime_ns {
-        Some(0) => "off".to_owned(),
-        Some(ns) => format!("{} us a second for ordinary threads", ns / 1_000),
+        Some(0) => format!("off{by_whom}"),
+        Some(ns) => format!("{} us a second for ordinary threads{by_whom}", ns / 1_000),
         None => "unreadable (needs root, debugfs and no lockdown)".to_owned(),
     };
-    let remedy = (runtime_ns != Some(0))
-        .then(|| format!("as root: echo 0 > {path}, if the loop spins on a CPU of its own"));
+    let remedy = (runtime_ns != Some(0)).then(|| {
+        format!("as root: systemctl restart {MACHINE_UNIT}, or echo 0 > {path}, if the loop spins on a CPU of its own")
+    });
     Some(Guarantee::circumstance("fair server", "off", found, remedy))
 }
 
+/// Of a setting that was published.
+pub(crate) const READ_BY_ROOT: &str = ", as root read back when it was set";
+
 /// Major and minor number of a kernel release such as `6.18.44-rt`.
-fn version_of(release: &str) -> Option<(u32, u32)> {
+pub(crate) fn version_of(release: &str) -> Option<(u32, u32)> {
     let mut numbers = release.split(|c: char| !c.is_ascii_digit());
     Some((numbers.next()?.parse().ok()?, numbers.next()?.parse().ok()?))
 }
@@ -89,6 +103,7 @@ fn version_of(release: &str) -> Option<(u32, u32)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::read_back::Writers;
 
     /// uname's version strings as recorded on such kernels.
     const DEBIAN_RT: &str = "#1 SMP PREEMPT_RT Debian 6.12.117-1 (2025-12-04)\n";
@@ -119,12 +134,28 @@ mod tests {
 
     #[test]
     fn the_fair_server_is_told_where_there_is_one() {
-        assert_eq!(judge_fair_server("6.11.9-generic", None, "path"), None);
-        assert_eq!(judge_fair_server("5.15.0", None, "path"), None);
-        assert_eq!(judge_fair_server("who knows", None, "path"), None);
-        assert!(judge_fair_server("6.18.44", Some("0\n"), "path").unwrap().obtained);
-        let usual = judge_fair_server("7.0-rc1", Some("50000000\n"), "path").unwrap();
+        assert_eq!(judge_fair_server("6.11.9-generic", None, "path", None), None);
+        assert_eq!(judge_fair_server("5.15.0", None, "path", None), None);
+        assert_eq!(judge_fair_server("who knows", None, "path", None), None);
+        assert!(judge_fair_server("6.18.44", Some("0\n"), "path", None).unwrap().obtained);
+        let usual = judge_fair_server("7.0-rc1", Some("50000000\n"), "path", None).unwrap();
         assert_eq!((usual.obtained, usual.found.as_str()), (false, "50000 us a second for ordinary threads"));
-        assert!(judge_fair_server("6.12.0", None, "path").unwrap().found.starts_with("unreadable"));
+        assert!(judge_fair_server("6.12.0", None, "path", None).unwrap().found.starts_with("unreadable"));
+    }
+
+    /// The driver's user may not enter debugfs, whatever root has set there.
+    #[test]
+    fn what_root_read_back_counts_where_the_driver_cannot_read() {
+        let root = Writers { uid: 0, mode: 0o755 };
+        let told = |text: &str| ReadBack::believed(root, root, text.to_owned());
+        let judge = |runtime: Option<&str>, text: &str| {
+            judge_fair_server("6.12.117", runtime, "/server", told(text).as_ref()).unwrap()
+        };
+        let off = judge(None, "set /server 0\n");
+        assert!(off.obtained && off.remedy.is_none());
+        assert_eq!(off.found, "off, as root read back when it was set");
+        assert!(!judge(None, "kept /server 50000000\n").obtained, "the kernel refused");
+        assert!(!judge(None, "set /another 0\n").obtained);
+        assert!(!judge(Some("50000000\n"), "set /server 0\n").obtained, "what can be read counts");
     }
 }

@@ -1,6 +1,7 @@
 //! How late the kernel and the CPU may be when they wake the loop.
 
 use super::report::Guarantee;
+use crate::installed::LATENCY_RULE;
 use nix::Result;
 use nix::sys::prctl::{get_timerslack, set_timerslack};
 use std::fs::File;
@@ -49,8 +50,7 @@ fn judge_dma_latency(wanted_us: i32, found: std::result::Result<i32, String>) ->
     let obtained = found.as_ref().is_ok_and(|us| (0..=wanted_us).contains(us));
     let remedy = (!obtained).then(|| {
         format!(
-            "let this user write {DMA_LATENCY}, by a udev rule such as KERNEL==\"cpu_dma_latency\", \
-             GROUP=\"realtime\", MODE=\"0660\""
+            "let this user write {DMA_LATENCY}, by a udev rule such as {LATENCY_RULE} and membership in that group"
         )
     });
     let found = found.map_or_else(|error| format!("no request ({error})"), |us| format!("{us} us"));

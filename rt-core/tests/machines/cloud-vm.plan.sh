@@ -5,6 +5,20 @@ set -eu
 [ "$(id -u)" = 0 ] || { echo 'run this as root' >&2; exit 1; }
 # Writes a value to a file of the kernel, which may refuse it (a managed interrupt, a lockdown).
 put() { printf '%s\n' "$1" > "$2" || echo "not taken: $1 > $2" >&2; }
+# Adds lines to a file of fix plans, each once. One that somebody else made is left alone.
+mark='# made by the fix plan of io-driver doctor'
+add() {
+    if [ -e "$1" ] && [ "$(head -n 1 "$1")" != "$mark" ]; then
+        echo "left alone, no fix plan made it: $1" >&2
+        cat >/dev/null
+        return 0
+    fi
+    mkdir -p "${1%/*}"
+    [ -e "$1" ] || echo "$mark" >"$1"
+    while IFS= read -r line; do
+        grep -qxF -e "$line" "$1" || printf '%s\n' "$line" >>"$1"
+    done
+}
 
 # == By hand: no script should do these
 # - install and boot a PREEMPT_RT kernel: apt-get install linux-image-rt-amd64 (arm64: linux-image-rt-arm64)
@@ -25,9 +39,8 @@ sysctl -w kernel.sched_rt_runtime_us=-1
 sysctl -w kernel.watchdog=0
 # kernel.timer_migration: leave timers where they are; undo: sysctl -w kernel.timer_migration=1
 sysctl -w kernel.timer_migration=0
-# the same after each boot; undo: rm /etc/sysctl.d/90-phantom3.conf
-mkdir -p /etc/sysctl.d
-cat > /etc/sysctl.d/90-phantom3.conf <<'END'
+# the same after each boot; undo: rm /etc/sysctl.d/90-phantom3-plan.conf
+add /etc/sysctl.d/90-phantom3-plan.conf <<'END'
 kernel.sched_rt_runtime_us = -1
 kernel.watchdog = 0
 kernel.timer_migration = 0

@@ -5,6 +5,20 @@ set -eu
 [ "$(id -u)" = 0 ] || { echo 'run this as root' >&2; exit 1; }
 # Writes a value to a file of the kernel, which may refuse it (a managed interrupt, a lockdown).
 put() { printf '%s\n' "$1" > "$2" || echo "not taken: $1 > $2" >&2; }
+# Adds lines to a file of fix plans, each once. One that somebody else made is left alone.
+mark='# made by the fix plan of io-driver doctor'
+add() {
+    if [ -e "$1" ] && [ "$(head -n 1 "$1")" != "$mark" ]; then
+        echo "left alone, no fix plan made it: $1" >&2
+        cat >/dev/null
+        return 0
+    fi
+    mkdir -p "${1%/*}"
+    [ -e "$1" ] || echo "$mark" >"$1"
+    while IFS= read -r line; do
+        grep -qxF -e "$line" "$1" || printf '%s\n' "$line" >>"$1"
+    done
+}
 
 # == By hand: no script should do these
 # - install and boot a PREEMPT_RT kernel: apt-get install linux-image-rt-amd64 (arm64: linux-image-rt-arm64)
@@ -15,10 +29,13 @@ put() { printf '%s\n' "$1" > "$2" || echo "not taken: $1 > $2" >&2; }
 # rcu_nocbs=7: move deferred clean-up to other CPUs
 # irqaffinity=0-6: send interrupts to the other CPUs from the start
 # pcie_aspm.policy=performance: keep PCIe links awake from the start
-# adds them for GRUB; undo: rm /etc/default/grub.d/phantom3.cfg && update-grub
-mkdir -p /etc/default/grub.d
-cat > /etc/default/grub.d/phantom3.cfg <<'END'
-GRUB_CMDLINE_LINUX_DEFAULT="$GRUB_CMDLINE_LINUX_DEFAULT isolcpus=managed_irq,domain,7 nohz_full=7 rcu_nocbs=7 irqaffinity=0-6 pcie_aspm.policy=performance"
+# adds them for GRUB, each unless its key is there; undo: rm /etc/default/grub.d/zz-phantom3-plan.cfg && update-grub
+add /etc/default/grub.d/zz-phantom3-plan.cfg <<'END'
+case " $GRUB_CMDLINE_LINUX $GRUB_CMDLINE_LINUX_DEFAULT " in *" isolcpus="* | *" isolcpus "*) ;; *) GRUB_CMDLINE_LINUX_DEFAULT="$GRUB_CMDLINE_LINUX_DEFAULT isolcpus=managed_irq,domain,7" ;; esac
+case " $GRUB_CMDLINE_LINUX $GRUB_CMDLINE_LINUX_DEFAULT " in *" nohz_full="* | *" nohz_full "*) ;; *) GRUB_CMDLINE_LINUX_DEFAULT="$GRUB_CMDLINE_LINUX_DEFAULT nohz_full=7" ;; esac
+case " $GRUB_CMDLINE_LINUX $GRUB_CMDLINE_LINUX_DEFAULT " in *" rcu_nocbs="* | *" rcu_nocbs "*) ;; *) GRUB_CMDLINE_LINUX_DEFAULT="$GRUB_CMDLINE_LINUX_DEFAULT rcu_nocbs=7" ;; esac
+case " $GRUB_CMDLINE_LINUX $GRUB_CMDLINE_LINUX_DEFAULT " in *" irqaffinity="* | *" irqaffinity "*) ;; *) GRUB_CMDLINE_LINUX_DEFAULT="$GRUB_CMDLINE_LINUX_DEFAULT irqaffinity=0-6" ;; esac
+case " $GRUB_CMDLINE_LINUX $GRUB_CMDLINE_LINUX_DEFAULT " in *" pcie_aspm.policy="* | *" pcie_aspm.policy "*) ;; *) GRUB_CMDLINE_LINUX_DEFAULT="$GRUB_CMDLINE_LINUX_DEFAULT pcie_aspm.policy=performance" ;; esac
 END
 update-grub
 
@@ -38,9 +55,8 @@ sysctl -w kernel.sched_rt_runtime_us=-1
 sysctl -w kernel.watchdog=0
 # kernel.timer_migration: leave timers where they are; undo: sysctl -w kernel.timer_migration=1
 sysctl -w kernel.timer_migration=0
-# the same after each boot; undo: rm /etc/sysctl.d/90-phantom3.conf
-mkdir -p /etc/sysctl.d
-cat > /etc/sysctl.d/90-phantom3.conf <<'END'
+# the same after each boot; undo: rm /etc/sysctl.d/90-phantom3-plan.conf
+add /etc/sysctl.d/90-phantom3-plan.conf <<'END'
 kernel.sched_rt_runtime_us = -1
 kernel.watchdog = 0
 kernel.timer_migration = 0
@@ -69,12 +85,13 @@ put performance /sys/devices/system/cpu/cpu7/cpufreq/energy_performance_preferen
 put performance /sys/module/pcie_aspm/parameters/policy
 # do not switch this graphics card off; undo: put auto /sys/class/drm/card0/device/power/control
 put on /sys/class/drm/card0/device/power/control
-# the same after each boot; undo: systemctl disable phantom3-settings.service && rm /etc/systemd/system/phantom3-settings.service
-mkdir -p /etc/systemd/system
-cat > /etc/systemd/system/phantom3-settings.service <<'END'
+# the same after each boot; undo: systemctl disable phantom3-plan-settings.service && rm /etc/systemd/system/phantom3-plan-settings.service
+add /etc/systemd/system/phantom3-plan-settings.service <<'END'
 [Unit]
 Description=Settings for a real-time loop
 After=sys-kernel-debug.mount
+[Install]
+WantedBy=multi-user.target
 [Service]
 Type=oneshot
 ExecStart=-/bin/sh -c 'echo 0 > /sys/kernel/debug/sched/fair_server/cpu7/runtime'
@@ -86,37 +103,33 @@ ExecStart=-/bin/sh -c 'echo performance > /sys/devices/system/cpu/cpu7/cpufreq/s
 ExecStart=-/bin/sh -c 'echo performance > /sys/devices/system/cpu/cpu7/cpufreq/energy_performance_preference'
 ExecStart=-/bin/sh -c 'echo performance > /sys/module/pcie_aspm/parameters/policy'
 ExecStart=-/bin/sh -c 'echo on > /sys/class/drm/card0/device/power/control'
-[Install]
-WantedBy=multi-user.target
 END
 systemctl daemon-reload
-systemctl enable phantom3-settings.service
+systemctl enable phantom3-plan-settings.service
 
 # == Kernel module msr
 # let root read the SMI count; undo: rmmod msr
 modprobe msr || echo 'no module msr' >&2
 
 # == Group of those who may run the loop
-# makes the group, and whoever called sudo a member; undo: groupdel realtime
-getent group realtime >/dev/null || groupadd --system realtime
-[ -z "${SUDO_USER:-}" ] || usermod -aG realtime "$SUDO_USER"
+# makes the group unless it is there, and whoever called sudo a member; undo: gpasswd --delete NAME phantom3
+getent group phantom3 >/dev/null || groupadd --system phantom3
+[ -z "${SUDO_USER:-}" ] || usermod -aG phantom3 "$SUDO_USER"
 
 # == Rights: real-time priority and locked memory
-# for members of the group, from their next login on; undo: rm /etc/security/limits.d/90-phantom3.conf
-mkdir -p /etc/security/limits.d
-cat > /etc/security/limits.d/90-phantom3.conf <<'END'
-@realtime - rtprio 95
-@realtime - memlock unlimited
+# for members of the group, from their next login on; undo: rm /etc/security/limits.d/90-phantom3-plan.conf
+add /etc/security/limits.d/90-phantom3-plan.conf <<'END'
+@phantom3 - rtprio 95
+@phantom3 - memlock unlimited
 END
 # Or, for the program whoever runs it, again after each build; undo: setcap -r PROGRAM:
 # setcap cap_sys_nice,cap_ipc_lock=ep /usr/local/bin/io-driver
 
 # == Device files
 # let the group keep the CPUs awake
-# rules for udev; undo: rm /etc/udev/rules.d/70-phantom3.rules && udevadm control --reload
-mkdir -p /etc/udev/rules.d
-cat > /etc/udev/rules.d/70-phantom3.rules <<'END'
-KERNEL=="cpu_dma_latency", GROUP="realtime", MODE="0660"
+# rules for udev, read by udevadm control --reload; undo: rm /etc/udev/rules.d/70-phantom3-plan.rules
+add /etc/udev/rules.d/70-phantom3-plan.rules <<'END'
+SUBSYSTEM=="misc", KERNEL=="cpu_dma_latency", GROUP="phantom3", MODE="0660"
 END
 udevadm control --reload
 udevadm trigger --action=add --subsystem-match=misc

@@ -1,22 +1,35 @@
 //! Device interrupts: where they go now, and where those of new devices will go.
 //!
 //! A *managed* interrupt belongs to a queue of a device that has one for each CPU (NVMe, network
-//! cards); nobody may move it. Kernels from 6.11 on show that by a read-only affinity file, older ones
-//! by refusing to take the write.
+//! cards); nobody may move it. Kernels from 6.11 on show that by a read-only affinity file. On older ones only the
+//! attempt tells, which the doctor does not make: the file's mode says nothing there, and what is known is what root
+//! sees in debugfs, or what [`read_back`](crate::read_back) says of root's own attempt at boot.
 
 use super::super::cpus::{list_of, parse_mask, without};
 use super::super::machine::{Machine, Obstacle, if_any, one_line};
 use super::super::step::{Action, Step};
 use super::super::{Judged, Judgement, Remedy};
 use super::mask_without_the_cpu;
+use crate::read_back::ReadBack;
+use crate::setup::kernel::version_of;
 
 /// A device interrupt that goes to the loop's CPU.
 struct Interrupt {
     number: String,
     name: String,
-    movable: bool,
+    movable: Movable,
     /// The CPUs that it may go to.
     allowed: String,
+}
+
+/// Whether root may send an interrupt elsewhere.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Movable {
+    Yes,
+    /// It is managed.
+    No,
+    /// This kernel tells only who tries.
+    Unknown,
 }
 
 pub(super) fn affinity(machine: &Machine<'_>) -> Judged {
@@ -24,8 +37,8 @@ pub(super) fn affinity(machine: &Machine<'_>) -> Judged {
     if interrupts.is_empty() {
         return Ok(Judgement::pass("none"));
     }
-    let (movable, managed): (Vec<_>, Vec<_>) =
-        interrupts.into_iter().partition(|interrupt| interrupt.movable);
+    let (managed, movable): (Vec<_>, Vec<_>) =
+        interrupts.into_iter().partition(|interrupt| interrupt.movable == Movable::No);
     let others = list_of(&without(&machine.online_cpus()?, machine.spec.cpu));
     if others.is_empty() {
         let found = format!("{} interrupts, and there is no other CPU", movable.len() + managed.len());
@@ -35,6 +48,12 @@ pub(super) fn affinity(machine: &Machine<'_>) -> Judged {
         return judge_managed(machine, &managed);
     }
     let mut found = format!("{} ({})", movable.len(), names(&movable));
+    let unknown = movable.iter().filter(|interrupt| interrupt.movable == Movable::Unknown).count();
+    if unknown > 0 {
+        found += &format!(
+            "; whether {unknown} of them are managed, and cannot be moved, this kernel tells only who tries"
+        );
+    }
     if !managed.is_empty() {
         found += &format!("; managed, which cannot be moved: {} ({})", managed.len(), names(&managed));
     }
@@ -88,14 +107,15 @@ fn interrupts_on(machine: &Machine<'_>) -> Result<Vec<Interrupt>, Obstacle> {
     let mut numbers: Vec<u32> = names.iter().filter_map(|name| name.parse().ok()).collect();
     numbers.sort_unstable();
     let mut found = Vec::new();
+    let told = machine.read_back().unwrap_or_default();
     for number in numbers {
-        found.extend(interrupt_on(machine, number)?);
+        found.extend(interrupt_on(machine, number, &told)?);
     }
     Ok(found)
 }
 
 /// None if nobody handles it, or if it does not go to the loop's CPU.
-fn interrupt_on(machine: &Machine<'_>, number: u32) -> Result<Option<Interrupt>, Obstacle> {
+fn interrupt_on(machine: &Machine<'_>, number: u32, told: &ReadBack) -> Result<Option<Interrupt>, Obstacle> {
     let directory = format!("/proc/irq/{number}");
     let (allowed_file, effective_file) =
         (format!("{directory}/smp_affinity_list"), format!("{directory}/effective_affinity_list"));
@@ -107,7 +127,7 @@ fn interrupt_on(machine: &Machine<'_>, number: u32) -> Result<Option<Interrupt>,
     if !effective.as_ref().unwrap_or(&allowed).contains(&machine.spec.cpu) {
         return Ok(None);
     }
-    let movable = machine.status(&allowed_file)?.mode & 0o200 != 0 && !is_marked_managed(machine, number);
+    let movable = movable(machine, number, told)?;
     let allowed = list_of(&allowed);
     Ok(Some(Interrupt { number: number.to_string(), name, movable, allowed }))
 }
@@ -120,11 +140,33 @@ fn handler(machine: &Machine<'_>, directory: &str) -> Result<Option<String>, Obs
     Ok(machine.names(directory)?.into_iter().find(is_handler).map(|name| one_line(&name, 30)))
 }
 
-/// Only root can see that, and not under lockdown.
-fn is_marked_managed(machine: &Machine<'_>, number: u32) -> bool {
-    let state = machine.text(&format!("/sys/kernel/debug/irq/irqs/{number}"));
-    state.is_ok_and(|state| state.contains("IRQD_AFFINITY_MANAGED"))
+fn movable(machine: &Machine<'_>, number: u32, told: &ReadBack) -> Result<Movable, Obstacle> {
+    let directory = format!("/proc/irq/{number}");
+    let is_read_only = machine.status(&format!("{directory}/smp_affinity_list"))?.mode & 0o200 == 0;
+    if is_read_only || told.was_refused(&format!("{directory}/smp_affinity")) {
+        return Ok(Movable::No);
+    }
+    Ok(match is_marked_managed(machine, number) {
+        Some(true) => Movable::No,
+        None if !shows_managed_by_mode(machine)? => Movable::Unknown,
+        _ => Movable::Yes,
+    })
 }
+
+/// Only root can see that, and not under lockdown.
+fn is_marked_managed(machine: &Machine<'_>, number: u32) -> Option<bool> {
+    let state = machine.text(&format!("/sys/kernel/debug/irq/irqs/{number}")).ok()?;
+    Some(state.contains("IRQD_AFFINITY_MANAGED"))
+}
+
+fn shows_managed_by_mode(machine: &Machine<'_>) -> Result<bool, Obstacle> {
+    const RELEASE: &str = "/proc/sys/kernel/osrelease";
+    let release = machine.line(RELEASE)?;
+    let version = version_of(&release).ok_or_else(|| Obstacle::garbled(RELEASE, &release))?;
+    Ok(version >= FIRST_WITH_READ_ONLY_AFFINITY)
+}
+
+const FIRST_WITH_READ_ONLY_AFFINITY: (u32, u32) = (6, 11);
 
 pub(super) fn default_affinity(machine: &Machine<'_>) -> Judged {
     const MASK: &str = "/proc/irq/default_smp_affinity";

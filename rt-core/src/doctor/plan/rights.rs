@@ -3,55 +3,61 @@
 use super::super::machine::Machine;
 use super::super::step::{Action, Step};
 use super::{PlanNames, Script, has_systemd, is_plain, quoted};
+use crate::installed::{GROUP, UNITS};
 
 pub(super) fn write(script: &mut Script, machine: &Machine<'_>, steps: &[Step], names: &PlanNames) {
     let needs_group =
         |step: &Step| matches!(step.action, Action::Limits | Action::Udev { .. } | Action::Directory { .. });
     if steps.iter().any(needs_group) {
-        group(script, names);
+        group(script);
     }
     if steps.iter().any(|step| step.action == Action::Limits) {
         limits(script, machine, names);
     }
-    unbind(script, steps, names);
+    unbind(script, machine, steps, names);
     udev(script, machine, steps, names);
     directories(script, machine, steps, names);
 }
 
-fn group(script: &mut Script, names: &PlanNames) {
-    let group = &names.group;
+fn group(script: &mut Script) {
     script.section("Group of those who may run the loop");
-    script.explain("makes the group, and whoever called sudo a member", &format!("groupdel {group}"));
-    script.line(&format!("getent group {group} >/dev/null || groupadd --system {group}"));
-    script.line(&format!("[ -z \"${{SUDO_USER:-}}\" ] || usermod -aG {group} \"$SUDO_USER\""));
+    script.explain(
+        "makes the group unless it is there, and whoever called sudo a member",
+        &format!("gpasswd --delete NAME {GROUP}"),
+    );
+    script.line(&format!("getent group {GROUP} >/dev/null || groupadd --system {GROUP}"));
+    script.line(&format!("[ -z \"${{SUDO_USER:-}}\" ] || usermod -aG {GROUP} \"$SUDO_USER\""));
 }
 
 fn limits(script: &mut Script, machine: &Machine<'_>, names: &PlanNames) {
-    let PlanNames { prefix, group, program, .. } = names;
+    let PlanNames { prefix, program, .. } = names;
     let path = format!("/etc/security/limits.d/90-{prefix}.conf");
     script.section("Rights: real-time priority and locked memory");
-    script.explain("for members of the group, from their next login on", &format!("rm {path}"));
-    script.file(&path, &[format!("@{group} - rtprio 95"), format!("@{group} - memlock unlimited")]);
+    let lines = [format!("@{GROUP} - rtprio 95"), format!("@{GROUP} - memlock unlimited")];
+    script.lines_of_directory(machine, &path, &lines, "for members of the group, from their next login on");
     script.comment("Or, for the program whoever runs it, again after each build; undo: setcap -r PROGRAM:");
     script.comment(&format!("setcap cap_sys_nice,cap_ipc_lock=ep {}", quoted(program)));
-    let units = machine.names("/etc/systemd/system").unwrap_or_default();
+    let units = machine.names(UNITS).unwrap_or_default();
     let is_ours = |unit: &&String| {
         unit.ends_with(".service")
-            && **unit != format!("{prefix}-settings.service")
             && names.unit_prefixes.iter().any(|prefix| unit.starts_with(prefix.as_str()))
     };
-    for unit in units.iter().filter(is_ours).filter(|unit| is_plain(unit)) {
-        let path = format!("/etc/systemd/system/{unit}.d/{prefix}-rights.conf");
+    let settings = ["LimitRTPRIO=95", "LimitMEMLOCK=infinity"];
+    let has_rights = |unit: &str| {
+        let text = machine.text(&format!("{UNITS}/{unit}")).unwrap_or_default();
+        settings.iter().all(|setting| text.lines().any(|line| line.trim() == *setting))
+    };
+    for unit in units.iter().filter(is_ours).filter(|unit| is_plain(unit) && !has_rights(unit)) {
+        let path = format!("{UNITS}/{unit}.d/{prefix}-rights.conf");
         script.explain(&format!("the same for {unit}"), &format!("rm {path}"));
-        let lines = ["[Service]", "LimitRTPRIO=95", "LimitMEMLOCK=infinity"];
-        script.file(&path, &lines.map(str::to_owned));
+        script.file(&path, &["[Service]", settings[0], settings[1]].map(str::to_owned));
         if has_systemd(machine) {
             script.line("systemctl daemon-reload");
         }
     }
 }
 
-fn unbind(script: &mut Script, steps: &[Step], names: &PlanNames) {
+fn unbind(script: &mut Script, machine: &Machine<'_>, steps: &[Step], names: &PlanNames) {
     let bound: Vec<(&str, &str, &str)> = steps
         .iter()
         .filter_map(|step| match &step.action {
@@ -70,9 +76,9 @@ fn unbind(script: &mut Script, steps: &[Step], names: &PlanNames) {
     let mut drivers: Vec<&str> = bound.iter().map(|(_, _, driver)| *driver).collect();
     drivers.dedup();
     let path = format!("/etc/modprobe.d/{}.conf", names.prefix);
-    script.explain("not loaded at the next boot", &format!("rm {path} && modprobe {first}"));
+    script.comment(&format!("after undoing what follows: modprobe {first}"));
     let lines: Vec<String> = drivers.iter().map(|driver| format!("blacklist {driver}")).collect();
-    script.file(&path, &lines);
+    script.lines_of_directory(machine, &path, &lines, "not loaded at the next boot");
 }
 
 fn udev(script: &mut Script, machine: &Machine<'_>, steps: &[Step], names: &PlanNames) {
@@ -89,12 +95,8 @@ fn udev(script: &mut Script, machine: &Machine<'_>, steps: &[Step], names: &Plan
     let path = format!("/etc/udev/rules.d/70-{}.rules", names.prefix);
     script.section("Device files");
     rules.iter().for_each(|(what, _)| script.comment(what));
-    script.explain("rules for udev", &format!("rm {path} && udevadm control --reload"));
-    let lines: Vec<String> = rules
-        .iter()
-        .map(|(_, rule)| rule.replace("GROUP=\"realtime\"", &format!("GROUP=\"{}\"", names.group)))
-        .collect();
-    script.file(&path, &lines);
+    let lines: Vec<String> = rules.iter().map(|(_, rule)| (*rule).clone()).collect();
+    script.lines_of_directory(machine, &path, &lines, "rules for udev, read by udevadm control --reload");
     if !machine.exists("/run/udev") {
         script.comment("udev does not run here now; it will read the rules when it does.");
         return;
@@ -115,7 +117,7 @@ fn directories(script: &mut Script, machine: &Machine<'_>, steps: &[Step], names
         .iter()
         .filter_map(|step| match &step.action {
             Action::Directory { path, mode } if is_plain(path) => {
-                Some(format!("d {path} {mode:04o} root {} -", names.group))
+                Some(format!("d {path} {mode:04o} root {GROUP} -"))
             }
             _ => None,
         })

@@ -1,6 +1,7 @@
 //! Settings of the running kernel, now and after each boot: sysctl, files of sysfs, services, swap.
 //!
-//! Where tuned runs, it would take back what others set, so its own profile carries the settings.
+//! Where TuneD runs, it would take back what others set below `/sys`, so a profile of its own, on top of the one that is
+//! active, carries these. What stands in sysctl.d it sets itself, after its own (`reapply_sysctl`, on by default).
 
 use super::super::machine::Machine;
 use super::super::step::{Action, Step};
@@ -9,10 +10,10 @@ use super::{PlanNames, Script, has_systemd, is_plain, quoted};
 pub(super) fn write(script: &mut Script, machine: &Machine<'_>, steps: &[Step], names: &PlanNames) {
     let has_tuned = has_tuned(machine);
     services(script, machine, steps);
-    sysctl(script, steps, names, has_tuned);
+    sysctl(script, machine, steps, names);
     puts(script, steps);
     if has_tuned {
-        tuned(script, steps, names);
+        tuned(script, machine, steps, names);
     }
     lasting_puts(script, machine, steps, names);
     modules(script, steps);
@@ -44,7 +45,7 @@ fn services(script: &mut Script, machine: &Machine<'_>, steps: &[Step]) {
     }
 }
 
-fn sysctl(script: &mut Script, steps: &[Step], names: &PlanNames, has_tuned: bool) {
+fn sysctl(script: &mut Script, machine: &Machine<'_>, steps: &[Step], names: &PlanNames) {
     let settings: Vec<_> = steps.iter().filter_map(sysctl_of).collect();
     if settings.is_empty() {
         return;
@@ -54,13 +55,9 @@ fn sysctl(script: &mut Script, steps: &[Step], names: &PlanNames, has_tuned: boo
         script.explain(&format!("{key}: {what}"), &format!("sysctl -w {key}={former}"));
         script.line(&format!("sysctl -w {}", quoted(&format!("{key}={value}"))));
     }
-    if !has_tuned {
-        let path = format!("/etc/sysctl.d/90-{}.conf", names.prefix);
-        let lines: Vec<String> =
-            settings.iter().map(|(_, key, value, _)| format!("{key} = {value}")).collect();
-        script.explain("the same after each boot", &format!("rm {path}"));
-        script.file(&path, &lines);
-    }
+    let path = format!("/etc/sysctl.d/90-{}.conf", names.prefix);
+    let lines: Vec<String> = settings.iter().map(|(_, key, value, _)| format!("{key} = {value}")).collect();
+    script.lines_of_directory(machine, &path, &lines, "the same after each boot");
 }
 
 fn sysctl_of(step: &Step) -> Option<(&str, &str, &str, &str)> {
@@ -120,43 +117,41 @@ fn lasting_puts(script: &mut Script, machine: &Machine<'_>, steps: &[Step], name
     script.line(&format!("systemctl enable {unit}"));
 }
 
-/// A unit that writes all values once; one that is refused does not keep it from the others.
+/// A unit that writes all values once; one that is refused does not keep it from the others. What a later plan adds
+/// goes to the end, so that the section of the values is the last.
 fn unit_lines(puts: &[Put<'_>]) -> Vec<String> {
     let head = ["[Unit]", "Description=Settings for a real-time loop", "After=sys-kernel-debug.mount"];
-    let service = ["[Service]", "Type=oneshot"];
     let install = ["[Install]", "WantedBy=multi-user.target"];
+    let service = ["[Service]", "Type=oneshot"];
     let write = |put: &Put<'_>| format!("ExecStart=-/bin/sh -c 'echo {} > {}'", put.value, put.path);
     let texts = |lines: &[&str]| -> Vec<String> { lines.iter().map(|line| (*line).to_owned()).collect() };
-    [texts(&head), texts(&service), puts.iter().map(write).collect(), texts(&install)].concat()
+    [texts(&head), texts(&install), texts(&service), puts.iter().map(write).collect()].concat()
 }
 
 fn has_tuned(machine: &Machine<'_>) -> bool {
     ["/usr/sbin/tuned-adm", "/usr/bin/tuned-adm"].iter().any(|path| machine.exists(path))
 }
 
-fn tuned(script: &mut Script, steps: &[Step], names: &PlanNames) {
-    let sysctl: Vec<String> =
-        steps.iter().filter_map(sysctl_of).map(|(_, key, value, _)| format!("{key}={value}")).collect();
-    let sysfs: Vec<String> = puts_of(steps)
+fn tuned(script: &mut Script, machine: &Machine<'_>, steps: &[Step], names: &PlanNames) {
+    let settings: Vec<String> = puts_of(steps)
         .filter(|put| put.lasting && put.path.starts_with("/sys/"))
         .map(|put| format!("{}={}", put.path, put.value))
         .collect();
-    if sysctl.is_empty() && sysfs.is_empty() {
+    if settings.is_empty() {
         return;
     }
-    let mut lines = vec!["[main]".to_owned(), "summary=Settings for a real-time loop".to_owned()];
-    for (name, settings) in [("[sysctl]", sysctl), ("[sysfs]", sysfs)] {
-        if !settings.is_empty() {
-            lines.push(name.to_owned());
-            lines.extend(settings);
-        }
+    let path = format!("/etc/tuned/{}/tuned.conf", names.prefix);
+    let active = machine.line("/etc/tuned/active_profile").ok().filter(|name| is_plain(name));
+    let active = active.unwrap_or_else(|| "balanced".to_owned());
+    let mut lines = Vec::new();
+    if !machine.exists(&path) {
+        lines.extend(["[main]", "summary=Settings for a real-time loop"].map(str::to_owned));
+        lines.extend([format!("include={active}"), "[sysfs]".to_owned()]);
     }
-    script.section("tuned, which would take these settings back, keeps them instead");
-    script.explain(
-        "a profile of its own",
-        "tuned-adm recommend names the former kind of profile: tuned-adm profile NAME",
-    );
-    script.file(&format!("/etc/tuned/{}/tuned.conf", names.prefix), &lines);
+    lines.extend(settings);
+    script.section("TuneD, which would take these settings back, keeps them on top of what it has");
+    script.explain("a profile of its own", &format!("tuned-adm profile {active}"));
+    script.file(&path, &lines);
     script.line(&format!("tuned-adm profile {}", names.prefix));
 }
 
