@@ -9,6 +9,7 @@
 //!
 //! Frames and units are those of the scene: metres, y up, cameras look along -z.
 #![deny(missing_docs)]
+#![deny(unsafe_code)]
 
 pub mod camera_man;
 mod crowd;
@@ -18,6 +19,7 @@ pub mod input;
 mod lamp;
 pub mod moment;
 pub mod news;
+#[allow(unsafe_code, reason = "the system's graphics library, which is loaded at run time")]
 mod offscreen;
 mod overlay;
 pub mod painter;

@@ -5,8 +5,11 @@
 //!
 //! Model: [`Scene::parse`] turns TOML text into plain validated data, or into one
 //! [`SceneError`] that names file, line, key, what was found and what is allowed. [`Layout`] does
-//! the same for the file that says where the devices stand. Nothing here renders or moves:
+//! the same for the file that says where the devices stand. Reading renders and moves nothing:
 //! the numbers are handed to the crates that do.
+//!
+//! Two modules do more than read: [`lists`] steps what moves, shared between a fast and a slow list, and [`events`]
+//! carries what happens to whoever wants to know.
 //!
 //! Frames: W world (right-handed, y up), B entity, D device base. A pose `X_WB` takes points
 //! of B into W. SI throughout; quaternions are written w, x, y, z.

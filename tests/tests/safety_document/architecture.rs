@@ -1,0 +1,119 @@
+//! ARCHITECTURE.md names the sources that hold unsafe code and those that a new thing touches; the lists are complete.
+
+use super::root;
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
+/// Paths, from the project's root, of all Rust sources of programs and libraries: no tests, benches or examples.
+fn program_sources() -> Vec<String> {
+    let mut found = Vec::new();
+    collect(&root(), &mut found);
+    let below_root =
+        |path: &str| path.strip_prefix(&format!("{}/", root().display())).expect("below").to_owned();
+    let found: Vec<String> = found.iter().map(|path| below_root(path)).collect();
+    found.into_iter().filter(|path| path.split('/').any(|part| part == "src")).collect()
+}
+
+fn collect(directory: &Path, found: &mut Vec<String>) {
+    for entry in fs::read_dir(directory).expect("a directory").flatten() {
+        let (path, name) = (entry.path(), entry.file_name().to_string_lossy().into_owned());
+        if path.is_dir() && name != "target" && !name.starts_with('.') {
+            collect(&path, found);
+        } else if name.ends_with(".rs") {
+            found.push(path.display().to_string());
+        }
+    }
+}
+
+fn read(path: &str) -> String {
+    fs::read_to_string(root().join(path)).unwrap_or_else(|error| panic!("{path}: {error}"))
+}
+
+/// Sources with one of these words outside of comments.
+fn sources_with(words: &[&str]) -> BTreeSet<String> {
+    let has_word = |path: &String| {
+        read(path).lines().any(|line| {
+            let code = line.split("//").next().unwrap_or_default();
+            words.iter().any(|word| code.contains(word))
+        })
+    };
+    program_sources().into_iter().filter(has_word).collect()
+}
+
+/// The part of the document from a line that begins so up to the next of its kind.
+fn part(document: &str, beginning: &str, end: &str) -> String {
+    let at = document.find(beginning).unwrap_or_else(|| panic!("ARCHITECTURE.md has no {beginning:?}"));
+    let rest = &document[at + beginning.len()..];
+    rest[..rest.find(end).unwrap_or(rest.len())].to_owned()
+}
+
+/// The names in a text that stand between backticks and are paths.
+fn paths_in(text: &str) -> BTreeSet<String> {
+    text.split('`').skip(1).step_by(2).filter(|name| name.contains('/')).map(str::to_owned).collect()
+}
+
+fn architecture() -> String {
+    read("ARCHITECTURE.md")
+}
+
+#[test]
+fn unsafe_code_stands_where_the_document_says_and_nowhere_else() {
+    let table: String = part(&architecture(), "\n## Unsafe code\n", "\n## ")
+        .lines()
+        .filter(|line| line.starts_with("| `"))
+        .map(|line| format!("{line}\n"))
+        .collect();
+    let listed = paths_in(&table);
+    let found = sources_with(&["unsafe {", "unsafe fn", "unsafe impl", "unsafe extern"]);
+    let is_listed = |path: &str| {
+        listed.iter().any(|entry| path == entry || entry.ends_with('/') && path.starts_with(entry))
+    };
+    for path in &found {
+        assert!(is_listed(path), "{path} has unsafe code, which ARCHITECTURE.md does not tell");
+    }
+    for entry in &listed {
+        let is_used =
+            found.iter().any(|path| path == entry || path.starts_with(entry) && entry.ends_with('/'));
+        assert!(is_used, "ARCHITECTURE.md tells of unsafe code in {entry}, which has none");
+    }
+}
+
+#[test]
+fn every_crate_forbids_unsafe_code_or_denies_it_but_for_one_module() {
+    let roots = program_sources()
+        .into_iter()
+        .filter(|path| path.ends_with("src/lib.rs") || path.ends_with("src/main.rs"));
+    let mut seen = 0;
+    for path in roots {
+        let text = read(&path);
+        let allowed = sources_with(&["unsafe {", "unsafe impl"]);
+        let folder = path.trim_end_matches("lib.rs").trim_end_matches("main.rs");
+        let has_some = allowed.iter().any(|source| source.starts_with(folder)) && path.ends_with("lib.rs");
+        let lint = if has_some { "#![deny(unsafe_code)]" } else { "#![forbid(unsafe_code)]" };
+        assert!(text.contains(lint), "{path} lacks {lint}");
+        seen += 1;
+    }
+    assert!(seen >= 10, "{seen} crates");
+}
+
+#[test]
+fn the_lists_of_how_a_thing_is_added_name_every_source_that_names_one_of_its_kind() {
+    let document = architecture();
+    let cases: [(&str, &[&str]); 3] = [
+        ("\n- A new shape with a closed form", &["Shape::Torus", "ShapeSpec::Torus"]),
+        ("\n- A new friction law", &["::Dahl"]),
+        ("\n- A new back end of devices", &["Backend::Replay"]),
+    ];
+    for (beginning, words) in cases {
+        let listed = paths_in(&part(&document, beginning, "\n- "));
+        let found = sources_with(words);
+        assert!(found.len() >= 3, "{words:?}: {found:?}");
+        for path in found {
+            assert!(listed.contains(&path), "{path} names {words:?}; the list {beginning:?} does not tell");
+        }
+        for path in listed {
+            assert!(root().join(&path).exists(), "{beginning:?}: {path} is not there");
+        }
+    }
+}
