@@ -44,8 +44,8 @@ fn plan_on(lab: &Lab, changes: &str) -> String {
     let project = sources().join("../..");
     let recorded = project.join("rt-core/tests/machines/debian-laptop.txt");
     let mut text = fs::read_to_string(recorded).expect("there");
-    for (path, content) in lab.files("/etc") {
-        if lab.path(&path).is_file() {
+    for (path, content) in lab.files("/") {
+        if path.starts_with("/etc/") && lab.path(&path).is_file() {
             text += &format!("=== {path}\n{}", String::from_utf8(content).expect("text"));
         }
     }
