@@ -322,7 +322,7 @@ fn doing_what_the_plans_say_makes_the_cards_pass() {
     assert!(plan_of(&phantom).contains("put 0000:05:02.0 /sys/bus/pci/drivers/phantom/unbind"));
     phantom.remove("/sys/bus/pci/devices/0000:05:02.0/driver");
     let rule =
-        "RUN+=\"/bin/chgrp realtime /sys$devpath/resource0 /sys$devpath/resource2 /sys$devpath/resource3\"";
+        "RUN+=\"/bin/chgrp phantom3 /sys$devpath/resource0 /sys$devpath/resource2 /sys$devpath/resource3\"";
     assert!(plan_of(&phantom).contains(rule));
     let permitted: String = [0, 2, 3]
         .map(|bar| format!("=== /sys/bus/pci/devices/0000:05:02.0/resource{bar} mode 0660 gid 990\n"))

@@ -5,21 +5,34 @@ set -eu
 [ "$(id -u)" = 0 ] || { echo 'run this as root' >&2; exit 1; }
 # Writes a value to a file of the kernel, which may refuse it (a managed interrupt, a lockdown).
 put() { printf '%s\n' "$1" > "$2" || echo "not taken: $1 > $2" >&2; }
+# Adds lines to a file of fix plans, each once. One that somebody else made is left alone.
+mark='# made by the fix plan of io-driver doctor'
+add() {
+    if [ -e "$1" ] && [ "$(head -n 1 "$1")" != "$mark" ]; then
+        echo "left alone, no fix plan made it: $1" >&2
+        cat >/dev/null
+        return 0
+    fi
+    mkdir -p "${1%/*}"
+    [ -e "$1" ] || echo "$mark" >"$1"
+    while IFS= read -r line; do
+        grep -qxF -e "$line" "$1" || printf '%s\n' "$line" >>"$1"
+    done
+}
 
 # == Settings of the running kernel
 # enable the Mesa 5i25; undo: put 0 /sys/bus/pci/devices/0000:04:00.0/enable
 put 1 /sys/bus/pci/devices/0000:04:00.0/enable
 
 # == Group of those who may run the loop
-# makes the group, and whoever called sudo a member; undo: groupdel realtime
-getent group realtime >/dev/null || groupadd --system realtime
-[ -z "${SUDO_USER:-}" ] || usermod -aG realtime "$SUDO_USER"
+# makes the group unless it is there, and whoever called sudo a member; undo: gpasswd --delete NAME phantom3
+getent group phantom3 >/dev/null || groupadd --system phantom3
+[ -z "${SUDO_USER:-}" ] || usermod -aG phantom3 "$SUDO_USER"
 
 # == Device files
 # enable the Mesa 5i25 at each boot
-# rules for udev; undo: rm /etc/udev/rules.d/70-phantom3.rules && udevadm control --reload
-mkdir -p /etc/udev/rules.d
-cat > /etc/udev/rules.d/70-phantom3.rules <<'END'
+# rules for udev, read by udevadm control --reload; undo: rm /etc/udev/rules.d/70-phantom3-plan.rules
+add /etc/udev/rules.d/70-phantom3-plan.rules <<'END'
 ACTION=="add", SUBSYSTEM=="pci", ATTR{vendor}=="0x2718", ATTR{device}=="0x5125", ATTR{enable}="1"
 END
 udevadm control --reload
