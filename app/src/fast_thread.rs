@@ -39,6 +39,10 @@ pub struct FastShared {
     pub stop: Arc<AtomicBool>,
     /// Ticks of the run so far.
     pub run_ticks: Arc<AtomicU64>,
+    /// The run's last row is out.
+    pub is_over: Arc<AtomicBool>,
+    /// Whoever watches ends the lease then; until that is done, replies go on.
+    pub outlasts: bool,
 }
 
 /// Why the fast thread ended.
@@ -184,7 +188,23 @@ impl FastThread {
                 Err(end) => break end,
             }
         };
+        if end == FastEnd::Finished && self.shared.outlasts {
+            self.outlast_lease();
+        }
         FastRemains { fast: self.fast, driver: self.driver, step_ns: self.step_ns, end }
+    }
+
+    /// Whoever ends the lease takes some milliseconds to see that the run is over: ticks that the driver would count as
+    /// missed replies, and would bridge with the last force.
+    fn outlast_lease(&mut self) {
+        self.shared.is_over.store(true, Ordering::Release);
+        while let Ok(tick) = self.wait_for_frame() {
+            self.seen = Some(tick);
+            if !self.fast.answer_on(tick, &self.driver, &self.commander) {
+                return;
+            }
+            self.due_ns = Some(self.fast.frame().deadline_ns.saturating_add(self.period_ns));
+        }
     }
 
     fn turn(&mut self, tick: u64) -> Option<FastEnd> {

@@ -29,6 +29,8 @@ use world::lists::SlowList;
 
 /// The slow thread's own period.
 const SLOW_PERIOD: Duration = Duration::from_millis(10);
+/// A driver that has not taken note of a lease's end by then has other troubles.
+const LEASE_END: Duration = Duration::from_millis(100);
 
 /// Where the driver comes from.
 pub enum Source {
@@ -88,7 +90,9 @@ pub fn run(
     let run_ticks = Arc::<AtomicU64>::default();
     let slow_list = start_slow_list(&mut fast, later, &attachment.driver, &run_ticks)?;
     loop {
-        let shared = FastShared { run_ticks: Arc::clone(&run_ticks), ..FastShared::default() };
+        // In lockstep ticks wait for replies instead.
+        let outlasts = attachment.driver.info().clock_mode == ClockMode::Real;
+        let shared = FastShared { run_ticks: Arc::clone(&run_ticks), outlasts, ..FastShared::default() };
         let (report, connection, watched) =
             run_attached(attachment, (fast, shared), slow, progress, signals)?;
         let remains = watched.remains;
@@ -158,7 +162,7 @@ fn run_attached(
     slow: &mut SlowSide,
     progress: &mut Progress,
     signals: &StopSignals,
-) -> Result<(SetupReport, Connection, Watched), RunFailure> {
+) -> Result<(SetupReport, Option<Connection>, Watched), RunFailure> {
     let Attachment { driver, commander, connection, .. } = attachment;
     let commander = commander.ok_or_else(|| RunFailure::Start("the driver gave no lease".into()))?;
     if let Some(warning) = fast_thread::shares_a_spinning_cpu(&driver.info()) {
@@ -168,7 +172,7 @@ fn run_attached(
         .map_err(|error| RunFailure::Start(format!("cannot start the fast thread: {error}")))?;
     let end = loop {
         slow.step();
-        if thread.is_finished() {
+        if thread.is_finished() || shared.is_over.load(Ordering::Acquire) {
             break None;
         }
         if let Some(signal) = signals.requested() {
@@ -183,6 +187,15 @@ fn run_attached(
         progress.show(shared.run_ticks.load(Ordering::Relaxed));
         std::thread::sleep(SLOW_PERIOD);
     };
+    let mut connection = Some(connection);
+    if end.is_none() {
+        // The lease ends while replies still come; the fast thread sees it end.
+        connection = None;
+        let ended = Instant::now();
+        while !thread.is_finished() && ended.elapsed() < LEASE_END {
+            std::thread::sleep(LEASE_END / 100);
+        }
+    }
     shared.stop.store(true, Ordering::Relaxed);
     let remains = thread.join().map_err(|_| RunFailure::DriverGone("the fast thread panicked".into()))?;
     let end = end.unwrap_or(WatchEnd::Fast(remains.end));

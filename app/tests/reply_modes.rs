@@ -3,24 +3,106 @@
 use bytemuck::Zeroable;
 use io_driver::config::ReplyMode;
 use phantom3::fast_loop::{FastLoop, Turn, WhenFull};
+use phantom3::fast_thread::{self, FastEnd, FastShared};
 use phantom3::rig::{HandMode, Rig};
 use phantom3::row_queue::row_queue;
 use phantom3::simulated::SimulatedDevices;
 use phantom3::virtual_clock::VirtualDriver;
+use shm_abi::doorbell::WaitMode;
+use shm_abi::frame::DEVICE_POSITION_VALID;
 use shm_abi::segment::ClockMode;
-use shm_abi::{Frame, ReplyKind};
+use shm_abi::segment::DriverInfo;
+use shm_abi::{CommanderMemory, CommanderView, DriverMemory, DriverState, DriverView, Frame, ReplyKind};
+use std::os::fd::AsFd;
 use std::path::Path;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
 use world::Scene;
 
 const SCENE: &str = "[[finger]]\n[[entity]]\nname = \"wall\"\nstiffness_n_per_m = 500.0\n\
                      shape = { kind = \"plane\", normal = [0.0, 1.0, 0.0], offset_m = 0.002 }\n";
 
-/// How many ticks old the command is that drives the motors, once somebody commands.
-fn ages(mode: ReplyMode) -> Vec<u64> {
+const LEASE: u64 = 7;
+
+fn rig() -> Rig {
     let file = Path::new("scene.toml");
     let hand_mode = HandMode::Impedance(SimulatedDevices::default());
     let scene = Scene::parse(SCENE, file).expect("a scene");
-    let rig = Rig::new(file, scene, None, None, hand_mode, 1_000_000).expect("a rig");
+    Rig::new(file, scene, None, None, hand_mode, 1_000_000).expect("a rig")
+}
+
+/// A driver in real time that this test plays: no tick is later than the test, however busy the machine.
+fn driver_info() -> DriverInfo {
+    DriverInfo {
+        period_ns: 1_000_000,
+        reply_budget_ns: 500_000,
+        max_command_age_ticks: 5,
+        ramp_in_ticks: 1,
+        ramp_out_ticks: 1,
+        is_commissioning: false,
+        clock_mode: ClockMode::Real,
+        wait_mode: WaitMode::Futex,
+        cpu: None,
+        devices: Vec::new(),
+        setup_report: String::new(),
+    }
+}
+
+fn frame(tick: u64, lease: u64) -> Frame {
+    let mut frame =
+        Frame { tick, lease, device_count: 1, state: DriverState::Active as u64, ..Frame::zeroed() };
+    frame.run_tick = tick as i64 - 1;
+    frame.deadline_ns = tick * 1_000_000;
+    frame.devices[0].flags = DEVICE_POSITION_VALID;
+    frame
+}
+
+/// Whether it comes to be so within as long as the busiest machine takes.
+fn comes_true(mut is_so: impl FnMut() -> bool) -> bool {
+    let begun = Instant::now();
+    while !is_so() {
+        if begun.elapsed() > Duration::from_secs(20) {
+            return false;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    true
+}
+
+/// Whoever gives the lease back needs ticks to do so, and each of them would count as a missed reply.
+#[test]
+fn replies_go_on_after_the_last_row_until_the_lease_is_over() {
+    const ROWS: u64 = 3;
+    let memory = DriverMemory::create(&driver_info()).expect("memory");
+    let view = DriverView::map(memory.fd()).expect("memory");
+    let (replies, fd) = CommanderView::create(LEASE).expect("memory");
+    let commander = CommanderMemory::map(fd.as_fd()).expect("memory");
+    let (rows, _queue) = row_queue(0);
+    let step = rig().fast_step().expect("a step");
+    let fast = FastLoop::new(step, rows, WhenFull::Drop, ROWS, 1_000_000);
+    let shared = FastShared { outlasts: true, ..FastShared::default() };
+    let (_, thread) = fast_thread::start(fast, view, commander, shared.clone()).expect("a thread");
+    let tell = |tick: u64, lease: u64| {
+        memory.write_frame(&frame(tick, lease));
+        memory.ring(tick, Some(&replies));
+    };
+    for tick in 1..=40 {
+        tell(tick, LEASE);
+        assert!(
+            comes_true(|| replies.latest_tick() == Some(tick)),
+            "no reply for tick {tick} of {ROWS} rows"
+        );
+    }
+    assert!(shared.is_over.load(Ordering::Acquire), "whoever watches has been told meanwhile");
+    tell(41, LEASE + 1);
+    assert!(comes_true(|| thread.is_finished()), "it goes on although the lease is over");
+    let remains = thread.join().expect("no panic");
+    assert_eq!((remains.end, remains.fast.tally.rows <= ROWS), (FastEnd::Finished, true));
+}
+
+/// How many ticks old the command is that drives the motors, once somebody commands.
+fn ages(mode: ReplyMode) -> Vec<u64> {
+    let rig = rig();
     let mut config = rig.driver_config(ClockMode::Virtual);
     config.reply.mode = mode;
     let mut driver = VirtualDriver::open(&config).expect("devices");
