@@ -74,6 +74,7 @@ mod sources;
 mod templates;
 pub mod thesis;
 mod things;
+mod units;
 mod visual;
 mod vocabulary;
 
