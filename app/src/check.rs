@@ -4,14 +4,18 @@
 //! stands in the way is a *problem*: `run` would refuse the scene, with the first of them. What runs, but hardly as
 //! meant, is a *warning*.
 
+mod measures;
 mod report;
 mod summary;
+mod suspicions;
 mod warnings;
 
 use crate::rig::{HandMode, Problems, Rig};
 use crate::settings;
 use clap::Args;
 use io_driver::config::period_of;
+use measures::Measures;
+use rt_core::plain_text::PlainJson;
 use serde_json::{Value, json};
 use std::fmt::Display;
 use std::io::Write;
@@ -74,8 +78,11 @@ impl Problem {
 /// Runs the command: status 0 if the scene can be run, else 2.
 pub fn execute(args: &CheckArgs, settings: &Settings) -> ExitCode {
     let checked = check(args, settings);
-    let said =
-        if args.json { format!("{:#}\n", to_json(&checked)) } else { report::text(&checked, &args.scene) };
+    let said = if args.json {
+        format!("{}\n", PlainJson(format_args!("{:#}", to_json(&checked))))
+    } else {
+        report::text(&checked, &args.scene)
+    };
     // A closed pipe is no reason to fail.
     let _ = std::io::stdout().write_all(said.as_bytes());
     ExitCode::from(if checked.problems.is_empty() { 0 } else { 2 })
@@ -108,8 +115,10 @@ fn check(args: &CheckArgs, settings: &Settings) -> Checked {
     let Some((rig, step)) = rig.and_then(|rig| rig.fast_step().ok().map(|step| (rig, step))) else {
         return checked;
     };
-    checked.warnings = warnings::all(&rig, &whole, step.entities());
-    checked.summary = Some(Summary::of(&rig, &whole, step.entities()));
+    let measures = Measures::all(&rig, step.entities());
+    checked.warnings = suspicions::all(&rig, &measures);
+    checked.warnings.extend(warnings::all(&rig, &whole, step.entities()));
+    checked.summary = Some(Summary::of(&rig, &whole, step.entities(), measures));
     checked
 }
 

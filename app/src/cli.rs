@@ -25,8 +25,10 @@ use crate::run;
 use crate::settings::{self, SettingsArgs};
 use crate::study::{self, StudyCommand};
 use clap::{Parser, Subcommand};
+use io_driver::arguments;
 use io_driver::config::period_of;
 use io_driver::say::say;
+use rt_core::plain_text::PlainLines;
 use rt_core::signals::StopSignals;
 use shm_abi::{client, endpoint};
 use std::os::unix::fs::MetadataExt;
@@ -91,7 +93,7 @@ enum AppCommand {
 
 /// Runs the program with the process's own arguments.
 pub fn main() -> ExitCode {
-    let Cli { settings, command, headless } = Cli::parse();
+    let Cli { settings, command, headless } = arguments::parse();
     match command {
         Some(AppCommand::Driver(command)) => io_driver::cli::execute(command),
         Some(AppCommand::Calibrate(args)) => calibrate::run(&args),
@@ -251,7 +253,7 @@ fn failed(failure: &RunFailure) -> ExitCode {
 /// A closed pipe is no reason to fail: the run is done.
 fn print_report(report: &Report) {
     use std::io::Write;
-    let _ = writeln!(std::io::stdout(), "{report}");
+    let _ = writeln!(std::io::stdout(), "{}", PlainLines(report));
 }
 
 // The exit status of a usage error is clap's own, which is the contract's.

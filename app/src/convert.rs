@@ -5,9 +5,11 @@
 use crate::outcome::{RunFailure, Stop};
 use clap::Args;
 use io_driver::say::say;
+use rt_core::input_file;
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use world::MAX_FILE_BYTES;
 use world::thesis::{Conversion, Converted, ObjectFile, ObjectKind, read_list, read_object};
 
 /// The arguments of `phantom3 convert`.
@@ -89,7 +91,8 @@ fn parsed(file: &Path, text: &str) -> Result<ObjectFile, RunFailure> {
 
 fn read(file: &Path) -> Result<String, RunFailure> {
     let unreadable = |what: String| RunFailure::Start(format!("{}: {what}", file.display()));
-    let bytes = fs::read(file).map_err(|error| unreadable(format!("cannot be read: {error}")))?;
+    let bytes = input_file::read(file, MAX_FILE_BYTES)
+        .map_err(|error| unreadable(format!("cannot be read: {error}")))?;
     // Files of that time are in Latin-1 as often as not; what matters in them is ASCII.
     Ok(String::from_utf8(bytes)
         .unwrap_or_else(|error| error.into_bytes().iter().map(|byte| char::from(*byte)).collect()))

@@ -13,7 +13,7 @@ use crate::recording::{Recording, RecordingError};
 use crate::row::{BodyRow, Row};
 use clap::Args;
 use io_driver::device::run_time_s;
-use io_driver::say::say;
+use io_driver::say::{say, tell};
 use parquet_file::ParquetFile;
 use std::path::{Path, PathBuf};
 
@@ -61,7 +61,7 @@ pub fn execute(args: &ExportArgs) -> Result<Stop, RunFailure> {
     let until_s = last.map_or(0.0, |tick| run_time_s(tick.cast_signed(), recorded.period_ns()));
     tell_end(&args.recording, end, recorded.cut(), rows, until_s)?;
     for out in args.csv.iter().chain(&args.parquet) {
-        tell(&format!("{} ({rows} rows)", out.display()));
+        tell(format_args!("{} ({rows} rows)", out.display()));
     }
     Ok(Stop::Finished)
 }
@@ -85,12 +85,6 @@ pub(crate) fn tell_end(
 
 pub(crate) fn wrong(error: &dyn std::fmt::Display) -> RunFailure {
     RunFailure::Start(error.to_string())
-}
-
-/// Nobody to tell is no reason to fail.
-fn tell(line: &str) {
-    use std::io::Write;
-    let _ = writeln!(std::io::stdout(), "{line}");
 }
 
 /// What is written.

@@ -1,6 +1,7 @@
 //! A line that says how far something has come: rewritten in place on a terminal, else now and then.
 
 use io_driver::device::run_time_s;
+use rt_core::plain_text::Plain;
 use std::io::{IsTerminal, Write};
 use std::time::{Duration, Instant};
 
@@ -35,7 +36,7 @@ impl StatusLine {
             return;
         }
         self.last = Some(Instant::now());
-        let line = line();
+        let line = Plain(line());
         let mut out = std::io::stderr().lock();
         // Nobody to tell is no reason to stop.
         let _ = if self.on_terminal { write!(out, "\r{line}\x1b[K") } else { writeln!(out, "{line}") };

@@ -30,6 +30,7 @@ use difference::Difference;
 use edit::Edit;
 use feed::{Feed, ReplayedDevice, SharedFeed};
 use io_driver::device::{Device, run_time_s};
+use io_driver::say::tell;
 use nalgebra::Vector3;
 use ordered::Orders;
 use rt_core::signals::StopSignals;
@@ -81,6 +82,7 @@ pub fn execute(args: &ReplayArgs, signals: &StopSignals) -> Result<ExitCode, Run
     if feed.is_empty() {
         return Err(wrong(&format_args!("{} has no rows", args.recording.display())));
     }
+    refuse_late_beginning(args, &feed, &stage)?;
     let orders = read::orders(&args.recording);
     let mut play = Play::new(&stage, Arc::new(Mutex::new(feed)), orders, &args.record)?;
     let ended = play.run(signals);
@@ -97,6 +99,19 @@ fn refuse_without_beginning(args: &ReplayArgs, recorded: &RecordedRun) -> Result
         "{} begins at t = {t_s} s of its run, and a replay needs the run from its beginning; record it with \
          `run --record FILE`",
         args.recording.display()
+    )))
+}
+
+/// Every tick before the first row would be played.
+fn refuse_late_beginning(args: &ReplayArgs, feed: &Feed, stage: &Stage) -> Result<(), RunFailure> {
+    let t_s = run_time_s(feed.first_tick().cast_signed(), feed.recorded.period_ns());
+    if stage.follows || t_s <= read::LONGEST_GAP_S {
+        return Ok(());
+    }
+    Err(wrong(&format_args!(
+        "{}: its first row is at t = {t_s:?}; allowed: at most {} s, since a replay begins at t = 0",
+        args.recording.display(),
+        read::LONGEST_GAP_S
     )))
 }
 
@@ -278,17 +293,19 @@ impl Play {
         tell_end(&args.recording, failure, feed.recorded.cut(), rows_read, until_s)?;
         ended?;
         let program = feed.recorded.about().and_then(|about| about.facts.get("program"));
-        tell(&format!(
+        tell(format_args!(
             "recording    {} ({} ticks compared, {missing} missing in it), by {}",
             args.recording.display(),
             difference.ticks(),
             program.map_or("an unknown version", String::as_str)
         ));
-        tell(&format!("scene        {}", stage.name));
+        tell(format_args!("scene        {}", stage.name));
         for recorded in &recordings {
-            tell(&format!("written      {} ({} rows)", recorded.path.display(), recorded.rows));
+            tell(format_args!("written      {} ({} rows)", recorded.path.display(), recorded.rows));
         }
-        tell(&difference.to_string());
+        for line in difference.to_string().lines() {
+            tell(format_args!("{line}"));
+        }
         // The recorder has told why.
         if recordings.iter().any(|recorded| recorded.failure.is_some()) {
             return Ok(ExitCode::from(3));
@@ -317,10 +334,4 @@ fn devices(rig: &Rig, feed: &SharedFeed, fingers: &[Option<usize>]) -> Vec<Box<d
 
 fn lock(feed: &SharedFeed) -> MutexGuard<'_, Feed> {
     feed.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Nobody to tell is no reason to fail.
-fn tell(line: &str) {
-    use std::io::Write;
-    let _ = writeln!(std::io::stdout(), "{line}");
 }

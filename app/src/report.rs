@@ -7,6 +7,7 @@ use crate::snapshots::Drawn;
 use io_driver::meter;
 use io_driver::status::{CounterStatus, Percentiles};
 use rt_core::histogram::Histogram;
+use rt_core::plain_text::Plain;
 use rt_core::setup::SetupReport;
 use shm_abi::DriverView;
 use std::fmt;
@@ -101,7 +102,7 @@ impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (tally, counters) = (&self.tally, &self.counters);
         writeln!(f, "clock        {}, {:.6} kHz", self.clock, 1e6 / self.period_ns as f64)?;
-        writeln!(f, "driver       {}", self.driver)?;
+        writeln!(f, "driver       {}", Plain(&self.driver))?;
         writeln!(
             f,
             "ticks        {} under our lease, {} answered",
@@ -171,7 +172,13 @@ impl fmt::Display for Report {
             if index > 0 {
                 writeln!(f)?;
             }
-            write!(f, "recording    {} ({} {}", recorded.path.display(), recorded.rows, recorded.unit)?;
+            write!(
+                f,
+                "recording    {} ({} {}",
+                Plain(recorded.path.display()),
+                recorded.rows,
+                recorded.unit
+            )?;
             match recorded.lost + tally.rows_lost {
                 0 => write!(f, ")")?,
                 lost => write!(f, ", {lost} LOST: the disk was too slow)")?,

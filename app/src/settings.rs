@@ -5,7 +5,8 @@
 
 use crate::outcome::RunFailure;
 use clap::Args;
-use std::io::{self, Write};
+use io_driver::say::tell;
+use std::io;
 use std::path::{Path, PathBuf};
 use world::{MeshSpec, Scene, SceneError, Settings, ShapeSpec};
 
@@ -72,11 +73,9 @@ fn files(named: Option<&Path>, variable: impl Fn(&str) -> Option<PathBuf>) -> Ve
 pub fn print(settings: &Settings) {
     let rows = settings.rows();
     let widest = rows.iter().map(|(_, value, ..)| value.chars().count()).max().unwrap_or(0).min(40);
-    let mut out = io::stdout();
     for (key, value, from, is_for_window) in rows {
         let note = if is_for_window { "  (for the window)" } else { "" };
-        // A closed pipe is no reason to fail.
-        let _ = writeln!(out, "{key:<24} {value:<widest$}  {from}{note}");
+        tell(format_args!("{key:<24} {value:<widest$}  {from}{note}"));
     }
 }
 

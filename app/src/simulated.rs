@@ -10,8 +10,9 @@ use io_driver::config::{Backend, HandChoice, Wish};
 use io_driver::device_file::{self, ArmFile, DeviceFile, DeviceFileError, Workspace};
 use io_driver::sim::hand::HandModel;
 use io_driver::sim::hand::model_file::{self, Firmness};
-use io_driver::toml_report::TomlReport;
+use io_driver::toml_report::{MAX_TOML_BYTES, TomlReport};
 use nalgebra::{Isometry3, Vector3};
+use rt_core::input_file;
 use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -131,28 +132,13 @@ impl SimulatedDevices {
     }
 }
 
-/// A description has some kilobytes; whatever is larger is another file.
-const MAX_FILE_BYTES: u64 = 1 << 20;
-
 fn read(file: &Path, what: &'static str, builtins: &[&str]) -> Result<String, SimulationError> {
-    read_bounded(file, MAX_FILE_BYTES).map_err(|source| SimulationError::Unreadable {
+    input_file::read_text(file, MAX_TOML_BYTES).map_err(|source| SimulationError::Unreadable {
         file: file.into(),
         what,
         builtins: builtins.join(", "),
         source,
     })
-}
-
-/// The driver reads it again, which a pipe does not allow.
-fn read_bounded(file: &Path, most_bytes: u64) -> io::Result<String> {
-    let found = file.metadata()?;
-    if !found.is_file() && !found.is_dir() {
-        return Err(io::Error::other("it is no regular file"));
-    }
-    if found.len() > most_bytes {
-        return Err(io::Error::other(format!("it is larger than {most_bytes} bytes")));
-    }
-    std::fs::read_to_string(file)
 }
 
 /// So that the driver finds it from wherever it runs.
@@ -198,7 +184,7 @@ mod tests {
         let endless = SimulatedDevices { description: "/dev/zero".into(), ..SimulatedDevices::default() };
         let said = endless.arm().expect_err("no file").to_string();
         assert!(
-            said.contains("/dev/zero: it is no regular file; name a file, or one of premium-1.5"),
+            said.contains("/dev/zero: it is a device, no regular file; name a file, or one of premium-1.5"),
             "{said}"
         );
     }

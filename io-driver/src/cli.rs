@@ -15,6 +15,7 @@ use crate::status::Status;
 use clap::{Args, Parser, Subcommand};
 use commission::CommissionArgs;
 use emulate::EmulateArgs;
+use rt_core::plain_text::PlainLines;
 use shm_abi::client::{self, AttachError};
 use shm_abi::endpoint;
 use std::path::{Path, PathBuf};
@@ -114,12 +115,12 @@ impl SocketArgs {
 
 /// Runs the program with the process's own arguments.
 pub fn main() -> ExitCode {
-    execute(Cli::parse().command)
+    execute(crate::arguments::parse::<Cli>().command)
 }
 
 /// The same, with something of one's own around each device.
 pub fn main_with(fit: Fit) -> ExitCode {
-    execute_with(Cli::parse().command, Some(fit))
+    execute_with(crate::arguments::parse::<Cli>().command, Some(fit))
 }
 
 /// Runs one command.
@@ -204,7 +205,7 @@ fn status(args: &StatusArgs) -> Result<(), AttachError> {
 fn print_line(text: &str) -> std::io::Result<()> {
     use std::io::Write;
     let mut out = std::io::stdout().lock();
-    writeln!(out, "{text}")?;
+    writeln!(out, "{}", PlainLines(text))?;
     out.flush()
 }
 

@@ -20,11 +20,12 @@ pub use reply::{ReplyConfig, ReplyMode};
 pub use safety::{Commissioning, SafetyConfig};
 pub use zeroing::Zeroing;
 
-use crate::toml_report::{Allowed, TomlReport, TomlText};
+use crate::toml_report::{Allowed, MAX_TOML_BYTES, TomlReport, TomlText};
 use device::RawDevice;
 use process::RawProcess;
 use real_time::RawRealTime;
 use reply::RawReply;
+use rt_core::input_file;
 use safety::RawSafety;
 use serde::Deserialize;
 use shm_abi::segment::ClockMode;
@@ -76,7 +77,7 @@ impl DriverConfig {
     /// # Errors
     /// Says which file, line and key, what was found and what is allowed.
     pub fn load(file: &Path) -> Result<Self, ConfigError> {
-        let text = std::fs::read_to_string(file)
+        let text = input_file::read_text(file, MAX_TOML_BYTES)
             .map_err(|source| ConfigError::Unreadable { file: file.into(), source })?;
         Ok(Self::parse(&text, file)?)
     }

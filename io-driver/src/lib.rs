@@ -12,6 +12,7 @@
 #![deny(unsafe_code)]
 #![deny(missing_docs)]
 
+pub mod arguments;
 pub mod cli;
 pub mod commission;
 pub mod config;

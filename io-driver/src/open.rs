@@ -16,7 +16,9 @@ use crate::emulator::card::{Card, CardError};
 use crate::live_hand::{LiveFinger, LiveHandError, LiveWish};
 use crate::sim::script::{HandError, HandPlayer, HandScript};
 use crate::sim::tip_board::TipBoard;
+use crate::table::MAX_TABLE_BYTES;
 use crate::toml_report::TomlReport;
+use rt_core::input_file;
 use shm_abi::segment::DeviceInfo;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -298,7 +300,7 @@ fn describe(device: &DeviceConfig, description: &Path) -> Result<DeviceFile, Ope
 }
 
 fn read(device: &DeviceConfig, file: &Path) -> Result<String, OpenError> {
-    std::fs::read_to_string(file).map_err(|source| OpenError::Unreadable {
+    input_file::read_text(file, MAX_TABLE_BYTES).map_err(|source| OpenError::Unreadable {
         device: device.name.clone(),
         file: file.into(),
         source,

@@ -24,6 +24,9 @@ pub use time_cursor::TimeCursor;
 /// microseconds, exactly representable, and its square is still finite.
 pub const MAX_MAGNITUDE: f64 = 1e15;
 
+/// The most a file of a table may have: hours of a finger's path at 1 kHz.
+pub const MAX_TABLE_BYTES: u64 = 512 << 20;
+
 /// Line of the first row: the header has line 1.
 const FIRST_ROW_LINE: usize = 2;
 

@@ -15,6 +15,7 @@
 //! aside from what comes at the same phase. [`last_act`] is what a
 //! dying process still stores to the hardware. [`clock`] is under all of them, and [`alloc_guard`] lets a test
 //! show that a loop does not allocate.
+//! [`input_file`] reads files that others name, [`plain_text`] keeps foreign text from acting on a terminal.
 //! [`doctor`] says whether the machine is ready for any of this, [`read_back`] what root has set for it, and
 //! [`installed`] names what a laboratory's installation consists of.
 //!
@@ -31,11 +32,13 @@ pub mod cpu;
 pub mod doctor;
 pub mod epitaph;
 pub mod histogram;
+pub mod input_file;
 pub mod installed;
 pub mod last_act;
 pub mod log;
 pub mod periodic;
 pub mod phase_keeper;
+pub mod plain_text;
 pub mod privileges;
 pub mod process;
 pub mod read_back;

@@ -167,7 +167,11 @@ fn a_scene_that_is_wrong_is_refused_with_file_line_key_finding_and_remedy() {
         ),
         (
             shape("{ kind = \"sphere\", radius_m = 1e200, scale = 1e200 }"),
-            &["scene.toml:2: entity e0: radius_m is inf"],
+            &["entity[0].shape.radius_m", "found 1e200", "1e6 at most"],
+        ),
+        (
+            entity("damping_n_s_per_m = 1e308"),
+            &["scene.toml:5: entity[0].damping_n_s_per_m", "found 1e308", "1e6 at most"],
         ),
         (
             entity("friction = { model = \"stiction\", mu_s = 0.3, mu_d = 0.7 }"),
@@ -313,7 +317,7 @@ fn a_scene_that_cannot_be_read_is_refused() {
     for (scene, parts) in cases {
         assert_says(&refused(&place, &["run", scene, "--record", "out.csv"]), parts);
     }
-    assert_says(&refused(&place, &["run", "/dev/zero"]), &["/dev/zero", "larger than 16777216 bytes"]);
+    assert_says(&refused(&place, &["run", "/dev/zero"]), &["/dev/zero", "a device, no regular file"]);
 }
 
 #[test]
@@ -399,4 +403,166 @@ fn what_permissions_forbid_is_refused() {
     let record = try_it(&["run", "scene.toml", "--clock", "virtual", "--record", "new.csv"]);
     assert_says(&record, &["cannot create the recording new.csv", "Permission denied", "can be written"]);
     mode(&place.path(""), 0o755);
+}
+
+/// A recording of a tenth of a second in each format.
+fn with_recordings(place: &Workplace) {
+    for file in ["good.mcap", "good.csv"] {
+        let arguments = ["run", "scene.toml", "--clock", "virtual", "--seconds", "0.1", "--record", file];
+        assert_eq!(place.run(arguments).status, Some(0), "{file}");
+    }
+}
+
+/// With room for two gigabytes of addresses, which a recording of some kilobytes does not fill.
+fn run_in_little_memory(place: &Workplace, arguments: &[&str]) -> Said {
+    let mut program = place.prepare(std::process::Command::new("sh"));
+    program.args(["-c", "ulimit -v 2000000; exec \"$0\" \"$@\""]);
+    program.arg(place.phantom3().get_program()).args(arguments);
+    Running::start(program).wait()
+}
+
+#[test]
+fn a_recording_whose_lengths_are_lies_is_told_as_damaged_and_takes_no_memory_for_them() {
+    let place = workplace();
+    with_recordings(&place);
+    let good = std::fs::read(place.path("good.mcap")).expect("a recording");
+    // Behind the magic: the length of the header's first text, and that of a later record and of the texts in it.
+    let metadata = 8 + good[8..].windows(12).position(|at| at == b"phantom3.run").expect("metadata") - 4;
+    let lies: [(usize, &[u8]); 4] = [
+        (8 + 9, &[0xff; 4]),
+        (metadata, &[0xff; 4]),
+        (metadata, &[0, 0, 0, 0x10]),
+        (metadata - 8, &[0xff, 0xff, 0xff, 0x7f, 1, 0, 0, 0]),
+    ];
+    for (at, lie) in lies {
+        let mut bad = good.clone();
+        bad[at..at + lie.len()].copy_from_slice(lie);
+        place.write("bad.mcap", &bad);
+        for command in [&["export", "bad.mcap", "--csv", "out2.csv"][..], &["replay", "bad.mcap"]] {
+            let said = run_in_little_memory(&place, command);
+            assert!(!said.err.contains("panicked") && !said.err.contains("allocation"), "{at}: {}", said.err);
+            assert!(
+                matches!(said.status, Some(0 | 2 | 3)),
+                "{at} {command:?}: {:?} {}",
+                said.status,
+                said.err
+            );
+        }
+    }
+}
+
+#[test]
+fn a_recording_whose_times_leap_or_fall_is_refused_with_its_line() {
+    let place = workplace();
+    with_recordings(&place);
+    let good = std::fs::read_to_string(place.path("good.csv")).expect("a recording");
+    let with_time = |time: &str| {
+        let mut lines: Vec<String> = good.lines().map(str::to_owned).collect();
+        let (_, rest) = lines[50].split_once(',').expect("columns");
+        lines[50] = format!("{time},{rest}");
+        lines.join("\n") + "\n"
+    };
+    for (time, parts) in [
+        ("1e12", ["bad.csv:51:", "t is 1000000000000.0", "allowed: at most"]),
+        ("4000", ["bad.csv:51:", "t is 4000.0 after 0.048", "at most 3600 s from a row to the next"]),
+        ("0.01", ["bad.csv:51:", "t is 0.01 after 0.048", "rise from row to row"]),
+        ("0.048", ["bad.csv:51:", "t is 0.048 after 0.048", "rise from row to row"]),
+    ] {
+        place.write("bad.csv", with_time(time));
+        for command in
+            [&["replay", "bad.csv", "--scene", "scene.toml"][..], &["export", "bad.csv", "--csv", "out2.csv"]]
+        {
+            let said = place.run(command);
+            assert_eq!(said.status, Some(3), "{time} {command:?}: {}{}", said.out, said.err);
+            assert_says(&said.err, &parts);
+        }
+    }
+    let late = good.lines().take(1).chain(good.lines().skip(1).take(1)).collect::<Vec<_>>().join("\n");
+    place.write("late.csv", late.replace("\n0.0,", "\n5000.0,").replace("\n0,", "\n5000,") + "\n");
+    let said = place.run(["replay", "late.csv", "--scene", "scene.toml"]);
+    assert_eq!(said.status, Some(2), "{}{}", said.out, said.err);
+    assert_says(&said.err, &["late.csv", "its first row is at t = 5000.0", "at most 3600 s"]);
+}
+
+#[test]
+fn a_pipe_without_a_writer_holds_nobody_up() {
+    let place = workplace();
+    let mode = rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR;
+    for pipe in ["pipe.toml", "pipe.csv", "pipe.mcap", "pipe.obj", "pipe.ini"] {
+        let kind = rustix::fs::FileType::Fifo;
+        rustix::fs::mknodat(rustix::fs::CWD, place.path(pipe), kind, mode, 0).expect("a pipe");
+    }
+    place.write("includes.toml", format!("include = [\"pipe.toml\"]\n{SCENE}"));
+    place.write("models.toml", "[[finger]]\n[[entity]]\nshape = { kind = \"mesh\", file = \"pipe.obj\" }\n");
+    for arguments in [
+        &["run", "pipe.toml"][..],
+        &["run", "includes.toml"],
+        &["run", "models.toml"],
+        &["run", "scene.toml", "--hand", "pipe.csv"],
+        &["run", "scene.toml", "--orders", "pipe.csv"],
+        &["run", "scene.toml", "--layout", "pipe.toml"],
+        &["run", "scene.toml", "--settings", "pipe.toml"],
+        &["replay", "pipe.mcap"],
+        &["replay", "pipe.csv"],
+        &["export", "pipe.csv", "--csv", "out2.csv"],
+        &["plot", "pipe.csv"],
+        &["convert", "pipe.ini"],
+    ] {
+        let said = place.run(arguments);
+        assert_eq!(said.status, Some(2), "{arguments:?}: {}{}", said.out, said.err);
+        assert!(said.err.contains("regular file"), "{arguments:?}: {}", said.err);
+    }
+}
+
+/// What a terminal would act on.
+fn is_plain(text: &str) -> bool {
+    let is_harmful = |c: char| {
+        c != '\n' && c.is_control()
+            || matches!(c, '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    };
+    !text.contains(is_harmful)
+}
+
+#[test]
+fn foreign_names_never_act_on_the_terminal() {
+    const EVIL: &str = "\u{1b}[2J\u{1b}]0;mine\u{7}\u{9b}31m\u{202e}x";
+    let place = workplace();
+    with_recordings(&place);
+    let (csv, scene) = (format!("{EVIL}\nphantom3: all is well.csv"), format!("{EVIL}.toml"));
+    place.write("named.toml", format!("name = \"\\u001b[2J\\nphantom3: all is well\\u202e\"\n{SCENE}"));
+    place.write(&scene, SCENE.replace("[[finger]]", "[[finger]]\n\"\\u001b[2J\" = 1"));
+    let good = std::fs::read_to_string(place.path("good.csv")).expect("a recording");
+    place.write(&csv, good.replace("f0_", "\u{1b}[2Jf0_"));
+    place.write("broken.csv", good.replace(",none,", ",\u{1b}[2J,"));
+    for arguments in [
+        &["check", "named.toml"][..],
+        &["check", "named.toml", "--json"],
+        &["check", &scene],
+        &["check", &scene, "--json"],
+        &["run", "named.toml", "--clock", "virtual", "--seconds", "0.01"],
+        &["run", &scene],
+        &["run", EVIL],
+        &["run", "scene.toml", "--hand", &csv],
+        &["run", "scene.toml", "--rate-hz", EVIL],
+        &["run", "scene.toml", EVIL],
+        &["replay", &csv, "--scene", "scene.toml"],
+        &["replay", "broken.csv", "--scene", "scene.toml"],
+        &["replay", "good.mcap", "--change", &format!("name=\"{EVIL}\"")],
+        &["export", &csv, "--csv", &format!("{EVIL}.out.csv")],
+        &["plot", &csv],
+        &["plot", EVIL],
+        &["convert", &csv],
+    ] {
+        let said = place.run(arguments);
+        assert!(is_plain(&said.out), "{arguments:?} prints {:?}", said.out);
+        assert!(is_plain(&said.err), "{arguments:?} says {:?}", said.err);
+        let is_forged =
+            said.err.lines().chain(said.out.lines()).any(|line| line.starts_with("phantom3: all is well"));
+        assert!(!is_forged, "{arguments:?}: {}{}", said.out, said.err);
+    }
+    let json = place.run(["check", "named.toml", "--json"]).out;
+    assert!(
+        json.contains(r"\u001b[2J\nphantom3: all is well\u202e"),
+        "what JSON says is what it was: {json}"
+    );
 }

@@ -303,8 +303,8 @@ fn a_model_that_cannot_be_read_is_refused() {
     std::fs::create_dir(place.path("directory.obj")).expect("a directory");
     for (file, part) in [
         ("none.obj", "none.obj: no such file"),
-        ("directory.obj", "directory.obj: not a regular file"),
-        ("/dev/zero", "/dev/zero: not a regular file"),
+        ("directory.obj", "directory.obj: it is a directory, no regular file"),
+        ("/dev/zero", "/dev/zero: it is a device, no regular file"),
         ("scene.toml/a.obj", "scene.toml/a.obj: cannot be read"),
     ] {
         place.write("scene.toml", mesh(file));

@@ -190,6 +190,81 @@ fn check_warns_of_what_runs_but_hardly_as_meant() {
     assert_eq!(told["summary"]["shapes"]["sphere"], 2);
 }
 
+/// A finger over a cube of this size, mass and place.
+fn with_cube(size: &str, mass: &str, place: &str) -> String {
+    format!(
+        "[[finger]]\nstart_m = [0.0, 0.2, 0.0]\n[[entity]]\nname = \"cube\"\n\
+         shape = {{ kind = \"box\", size_m = {size} }}\nmass_kg = {mass}\nposition_m = {place}\n"
+    )
+}
+
+#[test]
+fn check_tells_the_size_the_place_and_the_mass_of_everything() {
+    let place = Workplace::new();
+    place.write("scene.toml", with_cube("[0.05, 0.1, 0.05]", "0.1", "[0.0, 0.05, 0.0]"));
+    let said = check(&place, &["scene.toml"]);
+    assert!(
+        said.out.contains("cube: box, 0.05 x 0.1 x 0.05 m, at (0, 0.05, 0) m, 0.1 kg (400 kg/m^3)"),
+        "{}",
+        said.out
+    );
+    assert!(said.out.contains("problems: 0, warnings: 0"), "{}", said.out);
+    let told = json(&check(&place, &["scene.toml", "--json"]));
+    let measures = &told["summary"]["measures"][0];
+    assert_eq!((measures["size_m"][1].as_f64(), measures["mass_kg"].as_f64()), (Some(0.1), Some(0.1)));
+}
+
+#[test]
+fn check_suspects_numbers_of_another_unit() {
+    let place = Workplace::new();
+    for (scene, warning) in [
+        (
+            with_cube("[50, 50, 50]", "0.1", "[0.0, 30.0, 0.0]"),
+            "cube is 50 m long, as large as a house; lengths are in metres: if millimetres were meant, write 0.05",
+        ),
+        (
+            with_cube("[0.05, 0.05, 0.05]", "100", "[0.0, 0.0, 0.0]"),
+            "cube has 100 kg, 800000 kg/m^3, denser than any metal; masses are in kilograms: if grams were meant, write 0.1",
+        ),
+        (
+            with_cube("[0.05, 0.05, 0.05]", "0.1", "[0.0, 0.0, 300.0]"),
+            "more than 10 m away from every finger: cube; places are in metres",
+        ),
+        (
+            with_cube(
+                "[0.05, 0.05, 0.05]",
+                "0.1",
+                "[0.0, 0.0, 0.0]\nangular_velocity_rad_s = [0.0, 360.0, 0.0]",
+            ),
+            "cube turns at 360 rad/s, 57.3 times a second; if degrees were meant, write 6.283",
+        ),
+        (
+            with_cube(
+                "[0.05, 0.05, 0.05]",
+                "0.1",
+                "[0.0, 0.0, 0.0]\norientation_wxyz = [0.0, 0.0, 0.0, 1.0]",
+            ),
+            "cube is turned by 180 degrees about z; if no turn was meant, orientation_wxyz is [1.0, 0.0, 0.0, 0.0], w first",
+        ),
+        (
+            with_cube("[0.05, 0.05, 0.05]", "0.1", "[0.0, 0.0, 0.0]")
+                .replace("start_m", "radius_m = 8.0\nstart_m"),
+            "finger f0 has a radius of 8 m; if millimetres were meant, write 0.008",
+        ),
+        (
+            format!(
+                "gravity_m_s2 = [0.0, -981.0, 0.0]\n{}",
+                with_cube("[0.05, 0.05, 0.05]", "0.1", "[0.0, 0.0, 0.0]")
+            ),
+            "gravity is 981 m/s^2; on Earth it is 9.81",
+        ),
+    ] {
+        place.write("scene.toml", &scene);
+        let said = check(&place, &["scene.toml"]);
+        assert!(said.out.contains(&format!("warning: {warning}\n")), "{warning}\n{}{}", said.out, said.err);
+    }
+}
+
 #[test]
 fn every_committed_scene_can_be_run_as_check_says() {
     let place = Workplace::new();

@@ -18,6 +18,7 @@
 //! rests on one side of the hollow at a time and goes over to the other when the side it is on lets it go.
 
 mod bezier;
+mod budget;
 mod crossing;
 mod descend;
 mod error;
@@ -142,6 +143,7 @@ impl Nurbs {
         for (index, patch) in patches.iter().enumerate() {
             patch.check(index)?;
         }
+        budget::check(patches)?;
         let coordinates = patches.iter().flat_map(|patch| &patch.points).flat_map(|point| &point[..3]);
         let extent_m = coordinates.fold(f64::MIN_POSITIVE, |most, x| most.max(x.abs()));
         let mut nurbs = Self {

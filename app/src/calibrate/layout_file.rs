@@ -2,12 +2,13 @@
 
 use super::CalibrateArgs;
 use calibration::Fit;
+use rt_core::input_file;
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table, Value};
-use world::{Layout, Placement, SceneError};
+use world::{Layout, MAX_FILE_BYTES, Placement, SceneError};
 
 /// Why there is no new layout.
 #[derive(Debug, Error)]
@@ -57,7 +58,8 @@ pub enum LayoutFileError {
 pub(super) fn read(file: &Path) -> Result<String, SceneError> {
     // Read as every layout is, bounded and checked, so that the messages are the same.
     Layout::load(file)?;
-    fs::read_to_string(file).map_err(|cause| SceneError::Unreadable { file: file.into(), cause })
+    input_file::read_text(file, MAX_FILE_BYTES)
+        .map_err(|cause| SceneError::Unreadable { file: file.into(), cause })
 }
 
 /// Refuses what a file may not take the place of: root could replace `/dev/null` for everybody.

@@ -2,9 +2,9 @@
 
 use super::Checked;
 use super::summary::Summary;
+use rt_core::plain_text::Plain;
 use std::fmt::{Display, Write};
 use std::path::Path;
-use world::MassSpec;
 
 /// Problems and warnings, then what is in the scene.
 pub(super) fn text(checked: &Checked, file: &Path) -> String {
@@ -54,16 +54,10 @@ fn table(text: &mut String, summary: &Summary) {
         told.lines().skip(1).for_each(|finding| row(text, "", format_args!("  {}", finding.trim())));
     }
     rows(text, "fingers", summary.fingers.iter().map(finger));
-    rows(
-        text,
-        "moves",
-        few(&summary.masses).map(|(name, mass)| match mass {
-            MassSpec::Mass(mass_kg) => format!("{name}: {mass_kg} kg"),
-            MassSpec::Density(density) => format!("{name}: {density} kg/m^3"),
-        }),
-    );
-    if summary.masses.len() > FEW {
-        row(text, "", format_args!("and {} more", summary.masses.len() - FEW));
+    rows(text, "sizes", few(&summary.measures).map(ToString::to_string));
+    if summary.measures.len() > FEW {
+        let more = summary.measures.len() - FEW;
+        row(text, "", format_args!("and {more} more, which --json tells"));
     }
     rows(
         text,
@@ -116,5 +110,5 @@ fn row(text: &mut String, name: &str, value: impl Display) {
 
 fn line(text: &mut String, value: impl Display) {
     // Writing to a string cannot fail.
-    let _ = writeln!(text, "{value}");
+    let _ = writeln!(text, "{}", Plain(value));
 }

@@ -1,12 +1,13 @@
 //! What is in a scene.
 
+use super::measures::Measures;
 use crate::rig::{Passing, Rig};
 use haptics::Entity;
 use haptics::mesh::MeshReport;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use world::{EntityKind, LightKind, MassSpec, Scene, SceneEntity};
+use world::{EntityKind, LightKind, Scene, SceneEntity};
 
 /// What is in a scene, counted.
 #[derive(Debug)]
@@ -25,8 +26,8 @@ pub(super) struct Summary {
     pub(super) cameras: Vec<(String, f64)>,
     /// Name, radius (m), device.
     pub(super) fingers: Vec<(String, f64, usize)>,
-    /// Name and what the scene says of its mass.
-    pub(super) masses: Vec<(String, MassSpec)>,
+    /// Sizes and masses.
+    pub(super) measures: Vec<Measures>,
     pub(super) passing: Vec<Passing>,
     /// What is in the process's memory now, and the most that was (bytes); `None`: the system does not say.
     pub(super) memory: Option<[u64; 2]>,
@@ -34,7 +35,7 @@ pub(super) struct Summary {
 
 impl Summary {
     /// Of a scene and of what of it can be run.
-    pub(super) fn of(rig: &Rig, whole: &Scene, entities: &[Entity]) -> Self {
+    pub(super) fn of(rig: &Rig, whole: &Scene, entities: &[Entity], measures: Vec<Measures>) -> Self {
         let count =
             |is: &dyn Fn(&SceneEntity) -> bool| whole.entities.iter().filter(|entity| is(entity)).count();
         let is_outside = |entity: &SceneEntity| entity.within.is_none();
@@ -84,11 +85,7 @@ impl Summary {
                 .iter()
                 .map(|finger| (finger.name.clone(), finger.radius_m, finger.device))
                 .collect(),
-            masses: whole
-                .entities
-                .iter()
-                .filter_map(|entity| Some((entity.name.clone(), entity.motion?.mass)))
-                .collect(),
+            measures,
             passing: rig.what_passes(entities),
             memory: memory(),
         }
@@ -118,10 +115,7 @@ impl Summary {
             "fingers": self.fingers.iter()
                 .map(|(name, radius_m, device)| json!({ "name": name, "radius_m": radius_m, "device": device }))
                 .collect::<Vec<_>>(),
-            "masses": self.masses.iter().map(|(name, mass)| match mass {
-                MassSpec::Mass(mass_kg) => json!({ "name": name, "mass_kg": mass_kg }),
-                MassSpec::Density(density) => json!({ "name": name, "density_kg_m3": density }),
-            }).collect::<Vec<_>>(),
+            "measures": self.measures.iter().map(Measures::to_json).collect::<Vec<_>>(),
             "passing": self.passing.iter()
                 .map(|passing| json!({ "names": passing.names, "kind": passing.kind, "through": passing.through }))
                 .collect::<Vec<_>>(),

@@ -17,6 +17,7 @@ use crate::shown::Shown;
 use io_driver::device::Extras;
 use io_driver::say::say;
 use nalgebra::Vector3;
+use rt_core::input_file;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver, Sender};
@@ -34,6 +35,8 @@ pub enum OrderSource {
 
 /// The most orders of a script; and the most replaced worlds that are kept until the slow side frees them.
 const MOST_ORDERS: usize = 1024;
+/// Room for as many orders as wait, each with a long text.
+const MAX_ORDERS_BYTES: u64 = 16 << 20;
 /// The most worlds of a script: all are made before it begins.
 const MOST_WORLDS: usize = 32;
 /// Lines that may wait to be looked at; who writes more waits.
@@ -147,8 +150,8 @@ impl Desk {
     }
 
     fn play(&mut self, file: &Path) -> Result<(), String> {
-        let text =
-            std::fs::read_to_string(file).map_err(|error| format!("--orders {}: {error}", file.display()))?;
+        let text = input_file::read_text(file, MAX_ORDERS_BYTES)
+            .map_err(|error| format!("--orders {}: {error}", file.display()))?;
         let (mut last_s, mut orders, mut worlds) = (0.0, 0, 0);
         for (number, line) in (1..).zip(text.lines()) {
             let wrong = |error: String| format!("{}:{number}: {error}", file.display());

@@ -62,6 +62,7 @@ const KNOWN: &str = "reset; stiffness FACTOR [of ENTITY]; damping FACTOR [of ENT
 /// # Errors
 /// What is wrong with it, and what is allowed.
 pub fn parse(line: &str) -> Result<Option<Words>, String> {
+    check_length(line)?;
     let words: Vec<&str> = without_comment(line).split_whitespace().collect();
     let words = match words[..] {
         [] => return Ok(None),
@@ -112,12 +113,24 @@ pub fn split_time(line: &str) -> Result<Option<(f64, &str)>, String> {
     if line.is_empty() {
         return Ok(None);
     }
+    check_length(line)?;
     let timed = line.strip_prefix("at ").and_then(|rest| rest.trim_start().split_once(char::is_whitespace));
     let Some((at, order)) = timed else {
         return Err(format!("found {line}, allowed: at SECONDS ORDER, such as `at 2.5 reset`"));
     };
     Ok(Some((number(at, "s", 0.0, 24.0 * LONGEST_S)?, order.trim_start())))
 }
+
+/// A refusal repeats the line.
+fn check_length(line: &str) -> Result<(), String> {
+    if line.len() <= LONGEST_LINE_BYTES {
+        return Ok(());
+    }
+    Err(format!("found a line of {} bytes, allowed: at most {LONGEST_LINE_BYTES}", line.len()))
+}
+
+/// Longer than any text that people can read in a window.
+const LONGEST_LINE_BYTES: usize = 1000;
 
 /// Whether an order takes the memory of a world.
 pub fn makes_a_world(order: &str) -> bool {

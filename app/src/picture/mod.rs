@@ -11,9 +11,9 @@ mod visit;
 use crate::outcome::{RunFailure, Stop};
 use clap::Args;
 use figure::{of_entity, of_objects, of_run};
+use io_driver::say::tell;
 use plot::{Figure, PlotError};
 use recorded::{Recorded, RecordedFinger};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use visit::visits;
 
@@ -106,7 +106,6 @@ fn write(figure: &Figure, stem: &Path, svg_only: bool) -> Result<Stop, RunFailur
         figure.write(stem).map_err(late)?;
         ".svg, .png"
     };
-    // Nobody to tell is no reason to fail.
-    let _ = writeln!(std::io::stdout(), "written      {}{written}", stem.display());
+    tell(format_args!("written      {}{written}", stem.display()));
     Ok(Stop::Finished)
 }

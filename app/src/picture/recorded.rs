@@ -4,6 +4,7 @@
 
 use csv::StringRecord;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use rt_core::input_file;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -63,7 +64,8 @@ struct Columns {
 impl Recorded {
     pub(super) fn read(file: &Path) -> Result<Self, RecordedError> {
         let unreadable = |source| RecordedError::Read { file: file.into(), source };
-        let mut reader = csv::Reader::from_path(file).map_err(unreadable)?;
+        let opened = input_file::open(file).map_err(|error| unreadable(error.into()))?;
+        let mut reader = csv::Reader::from_reader(opened);
         let header = reader.headers().map_err(unreadable)?.clone();
         let at = |column: &str| {
             let no_column = || RecordedError::NoColumn { file: file.into(), column: column.into() };

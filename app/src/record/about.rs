@@ -8,6 +8,8 @@
 use crate::columns::Names;
 use crate::rig::{HandMode, Rig};
 use io_driver::device::Extras;
+use io_driver::table::MAX_TABLE_BYTES;
+use rt_core::input_file;
 use serde_json::{Value, json};
 use shm_abi::segment::ClockMode;
 use std::collections::BTreeMap;
@@ -154,9 +156,8 @@ impl About {
     }
 
     fn attach_as(&mut self, name: String, path: &Path) {
-        // What is no file, as a pipe or a built-in scene, cannot be read twice.
-        let is_file = path.metadata().is_ok_and(|file| file.is_file());
-        if is_file && let Ok(bytes) = std::fs::read(path) {
+        // What is no file, as a built-in scene, cannot be read twice.
+        if let Ok(bytes) = input_file::read(path, MAX_TABLE_BYTES) {
             self.files.push(InputFile { name, bytes });
         }
     }

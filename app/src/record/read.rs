@@ -4,7 +4,10 @@
 //! and [`RecordedRun::cut`] says so. What is there but wrong is an error.
 
 mod csv_rows;
+mod mcap_chunk;
+mod mcap_record;
 mod mcap_rows;
+mod tick_order;
 
 use super::about::About;
 use super::is_mcap;
@@ -15,6 +18,7 @@ use mcap_rows::McapRows;
 use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
+pub(crate) use tick_order::LONGEST_GAP_S;
 
 /// Why a file is no recording.
 #[derive(Debug, Error)]

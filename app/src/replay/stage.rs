@@ -5,11 +5,12 @@ use crate::outcome::RunFailure;
 use crate::record::read::RecordedRun;
 use crate::record::{About, InputFile};
 use crate::rig::{HandMode, Rig};
+use rt_core::input_file;
 use shm_abi::segment::ClockMode;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use toml_edit::DocumentMut;
-use world::{Scene, ShapeSpec};
+use world::{MAX_FILE_BYTES, Scene, ShapeSpec};
 
 /// A scene that is ready to be played to.
 pub(super) struct Stage {
@@ -63,7 +64,7 @@ fn wrong(error: &dyn std::fmt::Display) -> RunFailure {
 }
 
 fn read(file: &Path) -> Result<String, RunFailure> {
-    std::fs::read_to_string(file)
+    input_file::read_text(file, MAX_FILE_BYTES)
         .map_err(|error| wrong(&format_args!("cannot read the scene {}: {error}", file.display())))
 }
 

@@ -10,7 +10,9 @@ use io_driver::config::{
 use io_driver::device_file::Workspace;
 use io_driver::say::say;
 use io_driver::sim::script::HandScript;
+use io_driver::table::MAX_TABLE_BYTES;
 use nalgebra::{Isometry3, Point3, Vector3};
+use rt_core::input_file;
 use shm_abi::segment::ClockMode;
 use std::path::Path;
 use world::Scene;
@@ -164,7 +166,7 @@ pub(super) fn check_hand(path: &Path, named_by: &str, scene: &Scene) -> Result<H
     if !path.metadata().map_err(unreadable)?.is_file() {
         return Err(RigError::NotAFile { file: path.into(), named_by: named_by.into() });
     }
-    let text = std::fs::read_to_string(path).map_err(unreadable)?;
+    let text = input_file::read_text(path, MAX_TABLE_BYTES).map_err(unreadable)?;
     let fingers: Vec<&str> = scene.fingers.iter().map(|finger| finger.name.as_str()).collect();
     let script = HandScript::parse(&text, path, &fingers)?;
     let path = std::path::absolute(path).map_err(unreadable)?;

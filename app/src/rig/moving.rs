@@ -38,6 +38,11 @@ impl Rig {
         self.moving().map(body)
     }
 
+    /// The masses of the entities that move, with their numbers (kg).
+    pub(crate) fn masses(&self, entities: &[Entity]) -> impl Iterator<Item = (usize, f64)> {
+        self.bodies(entities).filter_map(|body| body.ok().map(|(index, body)| (index, body.mass.mass_kg)))
+    }
+
     pub(super) fn with_objects(
         &self,
         step: FastStep,

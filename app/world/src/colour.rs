@@ -20,10 +20,23 @@ pub(crate) fn read_light_colour(value: &Value<'_>) -> Result<[f64; 3], SceneErro
     shares(value)
 }
 
+/// White where colours are counted in bytes.
+const BRIGHTEST_BYTE: f64 = 255.0;
+
 fn shares<const N: usize>(value: &Value<'_>) -> Result<[f64; N], SceneError> {
     let shares: [f64; N] = value.numbers_in(Bound::NotNegative)?;
     if shares.iter().all(|share| *share <= 1.0) {
         return Ok(shares);
     }
-    Err(value.out_of_range(format!("an array of {N} numbers from 0 to 1")))
+    let allowed = format!("an array of {N} numbers from 0 to 1");
+    if shares.iter().all(|share| *share <= BRIGHTEST_BYTE && share.fract() == 0.0) {
+        // Rounded to what the eye can tell.
+        let meant = shares.map(|share| (share / BRIGHTEST_BYTE * 1000.0).round() / 1000.0);
+        return Err(SceneError::OutOfRange {
+            at: value.at(),
+            found: format!("{shares:?}, which looks like numbers from 0 to 255"),
+            allowed: format!("{allowed}: write {meant:?}"),
+        });
+    }
+    Err(value.out_of_range(allowed))
 }

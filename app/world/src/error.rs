@@ -51,6 +51,14 @@ pub enum SceneError {
         /// The most that is read.
         limit_bytes: u64,
     },
+    /// The file is made of more values than any scene.
+    #[error("{}: more than {limit} values, which is the most this file may have", file.display())]
+    TooManyValues {
+        /// The file asked for.
+        file: PathBuf,
+        /// The most that are read.
+        limit: usize,
+    },
     /// The file is not text.
     #[error("{}:{line}: byte {offset_bytes} is not UTF-8 text; save the file as UTF-8", file.display())]
     NotUtf8 {
@@ -163,11 +171,14 @@ pub enum SceneError {
     },
     /// An orientation that is no rotation.
     #[error(
-        "{at}: found a quaternion of length {length}; allowed: w, x, y, z of length 1 (within {tolerance})"
+        "{at}: found a quaternion of length {length}; allowed: w, x, y, z of length 1 (within {tolerance}){}",
+        of_length_1(.wxyz)
     )]
     NotARotation {
         /// Where it stands.
         at: Box<Location>,
+        /// What was found.
+        wxyz: [f64; 4],
         /// Its length.
         length: f64,
         /// The difference from 1 that is taken as rounding in the file.
@@ -320,6 +331,17 @@ impl SceneError {
             _ => None,
         }
     }
+}
+
+/// What to write instead: the same direction, or no turn at all.
+fn of_length_1(wxyz: &[f64; 4]) -> String {
+    let most = wxyz.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    if most == 0.0 {
+        return ": no turn is [1.0, 0.0, 0.0, 0.0]".into();
+    }
+    let length = wxyz.iter().map(|x| (x / most).powi(2)).sum::<f64>().sqrt() * most;
+    let [w, x, y, z] = wxyz.map(|x| x / length);
+    format!(": this direction is [{w:.6}, {x:.6}, {y:.6}, {z:.6}]; angles are not taken")
 }
 
 fn did_you_mean(suggestion: Option<&str>) -> String {

@@ -77,6 +77,7 @@ mod sources;
 mod templates;
 pub mod thesis;
 mod things;
+mod units;
 mod visual;
 mod vocabulary;
 

@@ -29,8 +29,8 @@ pub use stl::read_stl;
 use crate::error::SceneError;
 use haptics::NurbsPatch;
 use haptics::mesh::{CornerUv, TriangleSoup};
-use std::fs::File;
-use std::io::{self, Read};
+use rt_core::input_file;
+use std::io;
 use std::path::Path;
 
 /// The most a model file may have: a binary STL of twenty million triangles. The bound is there so that naming the
@@ -48,13 +48,11 @@ pub enum ModelError {
     #[error("cannot be read: {0}")]
     Unreadable(#[source] io::Error),
     /// A directory, a pipe or a device.
-    #[error("not a regular file; name an OBJ or STL file")]
-    NotAFile,
+    #[error("{0}; name an OBJ or STL file")]
+    NotAFile(#[source] io::Error),
     /// Larger than any model we build.
-    #[error("{bytes} bytes; allowed: at most {limit_bytes}")]
+    #[error("larger than {limit_bytes} bytes; allowed: at most so many")]
     TooLarge {
-        /// How large it is.
-        bytes: u64,
         /// The most that is read.
         limit_bytes: u64,
     },
@@ -130,25 +128,7 @@ impl Format {
 /// # Errors
 /// The file cannot be read, is none, or is too large.
 pub fn read_file(file: &Path) -> Result<Vec<u8>, ModelError> {
-    let metadata = file.metadata().map_err(unreadable)?;
-    if !metadata.is_file() {
-        return Err(ModelError::NotAFile);
-    }
-    check_size(metadata.len())?;
-    let mut bytes = Vec::with_capacity(metadata.len() as usize + 1);
-    // A file that grows while it is read must not fill the memory either.
-    File::open(file)
-        .and_then(|file| file.take(MAX_MODEL_BYTES + 1).read_to_end(&mut bytes))
-        .map_err(unreadable)?;
-    check_size(bytes.len() as u64)?;
-    Ok(bytes)
-}
-
-fn check_size(bytes: u64) -> Result<(), ModelError> {
-    if bytes <= MAX_MODEL_BYTES {
-        return Ok(());
-    }
-    Err(ModelError::TooLarge { bytes, limit_bytes: MAX_MODEL_BYTES })
+    input_file::read(file, MAX_MODEL_BYTES).map_err(unreadable)
 }
 
 /// The triangles in `bytes`, whose format `file`'s name or they themselves say.
@@ -199,6 +179,8 @@ pub fn load(file: &Path) -> Result<TriangleSoup, ModelError> {
 fn unreadable(cause: io::Error) -> ModelError {
     match cause.kind() {
         io::ErrorKind::NotFound => ModelError::NotFound,
+        io::ErrorKind::InvalidInput => ModelError::NotAFile(cause),
+        io::ErrorKind::FileTooLarge => ModelError::TooLarge { limit_bytes: MAX_MODEL_BYTES },
         _ => ModelError::Unreadable(cause),
     }
 }

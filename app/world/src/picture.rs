@@ -12,8 +12,8 @@
 
 use haptics::{HeightGrid, HeightMapError, MAX_GRID_SIDE};
 use png::{BitDepth, ColorType, Decoder, DecodingError, Limits, Transformations};
-use std::fs::File;
-use std::io::{self, Cursor, Read};
+use rt_core::input_file;
+use std::io::{self, Cursor};
 use std::path::Path;
 
 /// The most a picture file may have: the largest picture, uncompressed, and some room.
@@ -30,8 +30,8 @@ pub enum PictureError {
     #[error("cannot be read: {0}")]
     Unreadable(#[source] io::Error),
     /// A directory, a pipe or a device.
-    #[error("not a regular file; name a PNG file")]
-    NotAFile,
+    #[error("{0}; name a PNG file")]
+    NotAFile(#[source] io::Error),
     /// Larger than any picture we read.
     #[error("larger than {limit_bytes} bytes; allowed: at most so many")]
     TooLarge {
@@ -66,19 +66,7 @@ pub enum PictureError {
 /// # Errors
 /// The file cannot be read, or [`read_png`] refuses what is in it.
 pub fn load_png(file: &Path) -> Result<HeightGrid, PictureError> {
-    let metadata = file.metadata().map_err(unreadable)?;
-    if !metadata.is_file() {
-        return Err(PictureError::NotAFile);
-    }
-    let mut bytes = Vec::new();
-    // Whatever its size was a moment ago: a file may grow while it is read.
-    File::open(file)
-        .and_then(|file| file.take(MAX_PICTURE_BYTES + 1).read_to_end(&mut bytes))
-        .map_err(unreadable)?;
-    if bytes.len() as u64 > MAX_PICTURE_BYTES {
-        return Err(PictureError::TooLarge { limit_bytes: MAX_PICTURE_BYTES });
-    }
-    read_png(&bytes)
+    read_png(&input_file::read(file, MAX_PICTURE_BYTES).map_err(unreadable)?)
 }
 
 /// The heights in the bytes of a PNG file.
@@ -149,6 +137,8 @@ fn damaged(cause: &DecodingError) -> PictureError {
 fn unreadable(cause: io::Error) -> PictureError {
     match cause.kind() {
         io::ErrorKind::NotFound => PictureError::NotFound,
+        io::ErrorKind::InvalidInput => PictureError::NotAFile(cause),
+        io::ErrorKind::FileTooLarge => PictureError::TooLarge { limit_bytes: MAX_PICTURE_BYTES },
         _ => PictureError::Unreadable(cause),
     }
 }

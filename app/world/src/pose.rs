@@ -21,7 +21,7 @@ fn read_orientation(value: &Value<'_>) -> Result<UnitQuaternion<f64>, SceneError
     let wxyz: [f64; 4] = value.numbers()?;
     let length = wxyz.into_iter().fold(0.0, f64::hypot);
     if (length - 1.0).abs() > LENGTH_TOLERANCE {
-        return Err(SceneError::NotARotation { at: value.at(), length, tolerance: LENGTH_TOLERANCE });
+        return Err(SceneError::NotARotation { at: value.at(), wxyz, length, tolerance: LENGTH_TOLERANCE });
     }
     let [w, x, y, z] = wxyz;
     Ok(UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z)))

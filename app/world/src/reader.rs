@@ -14,6 +14,7 @@ use toml::de::{DeTable, DeValue};
 
 use crate::document::Document;
 use crate::error::{Location, SceneError};
+use crate::units::most_at;
 use crate::vocabulary::{Verdict, Vocabulary};
 
 /// A table and where it stands, perhaps laid over another one whose values hold where it has none.
@@ -196,8 +197,17 @@ impl<'d> Value<'d> {
         &self.document
     }
 
-    /// A finite number within `bound`; integers count as numbers.
+    /// A finite number within `bound` and within what its unit may have; integers count as numbers.
     pub(crate) fn number(&self, bound: Bound) -> Result<f64, SceneError> {
+        let (number, most) = (self.finite_number(bound)?, most_at(&self.path));
+        if number.abs() <= most {
+            return Ok(number);
+        }
+        Err(self.out_of_range(format_args!("{bound}, {most:e} at most in size")))
+    }
+
+    /// A finite number within `bound`, whatever its unit.
+    pub(crate) fn finite_number(&self, bound: Bound) -> Result<f64, SceneError> {
         let number: f64 = match self.value.get_ref() {
             DeValue::Float(float) => float.as_str().parse().unwrap_or(f64::NAN),
             DeValue::Integer(_) => self.integer().ok_or_else(|| self.out_of_range(WIDE_INTEGER))? as f64,
@@ -373,7 +383,15 @@ impl<'d> Value<'d> {
 
     pub(crate) fn tables(&self, key: &str) -> Result<Vec<Table<'d>>, SceneError> {
         let allowed = format!("a list of tables, each under its own [[{key}]]");
-        let DeValue::Array(items) = self.value.get_ref() else { return Err(self.wrong_type(allowed)) };
+        let items = match self.value.get_ref() {
+            DeValue::Array(items) => items,
+            DeValue::Table(_) => {
+                let found = format!("a single table, as `[{key}]` makes it");
+                let allowed = format!("{allowed}: write it with two brackets, even if there is only one");
+                return Err(SceneError::WrongType { at: self.at(), found, allowed });
+            }
+            _ => return Err(self.wrong_type(allowed)),
+        };
         items.iter().enumerate().map(|(i, value)| self.item(i, value).table(&allowed)).collect()
     }
 

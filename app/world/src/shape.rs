@@ -8,6 +8,7 @@ use crate::csg::{CSG_KEYS, CsgSpec};
 use crate::error::{Location, SceneError};
 use crate::pose::read_direction;
 use crate::reader::{Bound, Table, Value};
+use crate::units::most_at;
 use crate::vocabulary::Vocabulary;
 
 /// A shape with its sizes, as the scene file gives it. Sizes are above 0 unless it is said.
@@ -179,9 +180,12 @@ fn reader_of(kind: &str) -> (&'static Vocabulary, Read) {
 fn read_plane(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
     let (normal, [scale, length]) = read_direction(&table.require("normal", "an array of 3 numbers")?)?;
     let offset: Value<'_> = table.require("offset_m", Bound::Any)?;
-    let offset_m = offset.number(Bound::Any)? / scale / length;
-    if !offset_m.is_finite() {
-        return Err(offset.out_of_range("a number whose quotient by the length of normal is finite"));
+    let offset_m = offset.finite_number(Bound::Any)? / scale / length;
+    if offset_m.is_nan() || offset_m.abs() > most_at("offset_m") {
+        let most = most_at("offset_m");
+        return Err(offset.out_of_range(format_args!(
+            "a number whose quotient by the length of normal is {most:e} at most in size"
+        )));
     }
     Ok(ShapeSpec::Plane { normal, offset_m })
 }

@@ -42,6 +42,10 @@ impl Vocabulary {
     /// The nearest known word, if it is near enough to be what was meant.
     fn suggest(&self, word: &str) -> Option<String> {
         let lower = word.to_lowercase();
+        let synonym = SYNONYMS.iter().find(|(other, ours)| *other == lower && self.available.contains(ours));
+        if let Some((_, ours)) = synonym {
+            return Some(format!("`{ours}`"));
+        }
         let known = self.available.iter().chain(self.later);
         let (meant, _) = known
             .filter_map(|known| likeness(&lower, known).map(|distance| (*known, distance)))
@@ -94,6 +98,40 @@ fn edit_distance(a: &str, b: &str) -> usize {
     last[b.len()]
 }
 
+/// What other programs call things, and what they are called here, if the place knows that word.
+const SYNONYMS: [(&str, &str); 30] = [
+    ("ball", "sphere"),
+    ("cube", "box"),
+    ("cuboid", "box"),
+    ("block", "box"),
+    ("tube", "cylinder"),
+    ("rod", "cylinder"),
+    ("donut", "torus"),
+    ("ring", "torus"),
+    ("pill", "capsule"),
+    ("obj", "mesh"),
+    ("stl", "mesh"),
+    ("model", "mesh"),
+    ("floor", "plane"),
+    ("ground", "plane"),
+    ("diameter_m", "radius_m"),
+    ("diameter", "radius_m"),
+    ("height_m", "length_m"),
+    ("extent", "size_m"),
+    ("dimensions", "size_m"),
+    ("pos", "position_m"),
+    ("location", "position_m"),
+    ("translation", "position_m"),
+    ("rotation", "orientation_wxyz"),
+    ("quaternion", "orientation_wxyz"),
+    ("euler", "orientation_wxyz"),
+    ("weight", "mass_kg"),
+    ("color", "visual"),
+    ("colour", "visual"),
+    ("static", "movable"),
+    ("dynamic", "movable"),
+];
+
 /// No known word is near this length; the bound keeps a megabyte of nonsense cheap.
 const LONGEST_GUESS_BYTES: usize = 64;
 /// Shorter beginnings fit too many words.
@@ -122,6 +160,14 @@ mod tests {
         assert_eq!(meant("stiffness"), Verdict::Unknown(Some("`stiffness_n_per_m`".into())));
         assert_eq!(meant("wobble"), Verdict::Unknown(None));
         assert_eq!(meant(&"n".repeat(1 << 20)), Verdict::Unknown(None));
+    }
+
+    #[test]
+    fn a_word_of_other_programs_leads_to_ours_where_the_place_knows_it() {
+        let shapes = Vocabulary { available: &["sphere", "box"], later: &[] };
+        assert_eq!(shapes.judge("cube"), Verdict::Unknown(Some("`box`".into())));
+        assert_eq!(shapes.judge("Ball"), Verdict::Unknown(Some("`sphere`".into())));
+        assert_eq!(WORDS.judge("cube"), Verdict::Unknown(None));
     }
 
     #[test]

@@ -79,3 +79,36 @@ proptest! {
         ends_well(&bytes[..at.index(bytes.len())]);
     }
 }
+
+/// Patches in TOML, with numbers of them that are ugly: what is read is joined, too.
+fn patches(degree: [usize; 2], extra: [usize; 2], numbers: &[f64]) -> String {
+    let counts = [0, 1].map(|d| degree[d] + 1 + extra[d]);
+    let knots = |d: usize| -> Vec<f64> { (0..counts[d] + degree[d] + 1).map(|k| k as f64).collect() };
+    let number = |k: usize| numbers[k % numbers.len()];
+    let points: Vec<[f64; 3]> =
+        (0..counts[0] * counts[1]).map(|k| [k as f64, number(k), number(k / 2)]).collect();
+    format!(
+        "[[patch]]\ndegree = {degree:?}\nknots_u = {:?}\nknots_v = {:?}\npoints = {points:?}\n",
+        knots(0),
+        knots(1)
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(30) })]
+
+    #[test]
+    fn any_patches_end_in_a_surface_or_a_message(
+        degree in [1usize..8, 1usize..8],
+        extra in [0usize..4, 0usize..4],
+        numbers in prop::collection::vec(prop::sample::select(vec![0.0, 1.0, -1.0, 1e-3, 1e99, -1e-99, 1e150]), 1..5),
+    ) {
+        let text = patches(degree, extra, &numbers);
+        let file = std::path::Path::new("any.toml");
+        match world::model::read_patches(file, text.as_bytes()).map(|patches| haptics::Nurbs::build(&patches)) {
+            Ok(Ok((nurbs, report))) => assert!(nurbs.extent_m().is_finite() && !report.to_string().contains('\n')),
+            Ok(Err(error)) => assert!(!error.to_string().contains('\n')),
+            Err(error) => assert!(!error.to_string().contains('\n')),
+        }
+    }
+}

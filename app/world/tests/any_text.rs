@@ -54,6 +54,39 @@ fn spoilt((at, cut, with): &(prop::sample::Index, usize, String), text: &str) ->
     format!("{head}{with}{tail}")
 }
 
+/// The text with one number after the other, chosen by `which`, in place of its own.
+fn with_numbers(text: &str, which: &[(prop::sample::Index, &str)]) -> String {
+    let is_of_number = |c: char| c.is_ascii_digit() || "+-.eE".contains(c);
+    // Digits stand in names, too; those are spoilt as well, which is as ugly.
+    let mut parts: Vec<String> = Vec::new();
+    for c in text.chars() {
+        match parts.last_mut() {
+            Some(part) if part.ends_with(is_of_number) == is_of_number(c) => part.push(c),
+            _ => parts.push(c.into()),
+        }
+    }
+    for (index, number) in which {
+        let places: Vec<usize> = (0..parts.len()).filter(|i| parts[*i].parse::<f64>().is_ok()).collect();
+        parts[places[index.index(places.len())]] = (*number).into();
+    }
+    parts.concat()
+}
+
+const EXTREMES: [&str; 12] = [
+    "0",
+    "-1",
+    "1e308",
+    "-1e308",
+    "5e-324",
+    "1e-160",
+    "1e160",
+    "nan",
+    "inf",
+    "-inf",
+    "9223372036854775807",
+    "255",
+];
+
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(2000) })]
 
@@ -79,6 +112,28 @@ proptest! {
         changes in prop::collection::vec((any::<prop::sample::Index>(), 0usize..12, piece()), 1..4),
     ) {
         ends_well(&changes.iter().fold(GALLERY.to_owned(), |text, change| spoilt(change, &text)));
+    }
+
+    #[test]
+    fn extreme_numbers_anywhere_end_in_a_scene_or_a_message(
+        which in prop::collection::vec((any::<prop::sample::Index>(), prop::sample::select(&EXTREMES[..])), 1..4),
+    ) {
+        ends_well(&with_numbers(GALLERY, &which));
+    }
+
+    #[test]
+    fn a_good_scene_cut_anywhere_and_twice_ends_in_a_scene_or_a_message(at in any::<prop::sample::Index>()) {
+        let at = at.index(GALLERY.len());
+        let at = (0..=at).rev().find(|at| GALLERY.is_char_boundary(*at)).unwrap_or(0);
+        ends_well(&GALLERY[..at]);
+        ends_well(&GALLERY[at..]);
+        ends_well(&format!("{GALLERY}{}", &GALLERY[..at]));
+    }
+
+    #[test]
+    fn values_within_values_end_in_a_message(depth in 1usize..4000, of in prop::sample::select(vec!["[", "{a=", "[[a]]\n[", "a."])) {
+        ends_well(&format!("x = {}", of.repeat(depth)));
+        ends_well(&of.repeat(depth));
     }
 
     #[test]

@@ -184,7 +184,8 @@ fn what_is_wrong_with_them_is_told_with_line_and_key() {
         ),
         (
             ball("visual = { colour = [1, 0, 2] }"),
-            "s.toml:5: entity[0].visual.colour: found an array of length 3; allowed: an array of 3 numbers from 0 to 1",
+            "s.toml:5: entity[0].visual.colour: found [1.0, 0.0, 2.0], which looks like numbers from 0 to 255; allowed: an array of \
+             3 numbers from 0 to 1: write [0.004, 0.0, 0.008]",
         ),
         (
             ball("within = \"inside\""),

@@ -72,3 +72,29 @@ fn ten_thousand_entities_are_read() {
     let scene = Scene::parse(&text, Path::new("shelf.toml")).expect("nothing is wrong");
     assert_eq!(scene.entities.last().map(|entity| entity.name.as_str()), Some("e9999"));
 }
+
+/// A scene that includes what is no file: with pipes, the test ends only if nobody waits for a writer.
+#[test]
+fn an_include_that_is_a_pipe_a_device_or_a_directory_is_refused_at_once() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let pipe = dir.path().join("pipe.toml");
+    let mode = rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR;
+    rustix::fs::mknodat(rustix::fs::CWD, &pipe, rustix::fs::FileType::Fifo, mode, 0).expect("a pipe");
+    for (include, found) in
+        [("pipe.toml", "a pipe"), ("/dev/zero", "a device"), ("/dev/tty", "a device"), (".", "a directory")]
+    {
+        let file = dir.path().join("s.toml");
+        fs::write(&file, format!("include = [\"{include}\"]\n[[finger]]\n")).expect("write");
+        let message = Scene::load(&file).expect_err("no file").to_string();
+        assert!(message.contains("s.toml:1: include[0]:"), "{message}");
+        assert!(message.contains(&format!("cannot be read: it is {found}, no regular file")), "{message}");
+    }
+}
+
+#[test]
+fn a_file_of_more_values_than_any_scene_has_is_refused_before_they_are_made() {
+    // Two bytes make a value of two hundred.
+    let text = format!("[[finger]]\nx = [{}]\n", "0,".repeat(1 << 20));
+    let message = Scene::parse(&text, Path::new("s.toml")).expect_err("too many").to_string();
+    assert_eq!(message, "s.toml: more than 1048576 values, which is the most this file may have");
+}

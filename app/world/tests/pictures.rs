@@ -106,7 +106,7 @@ fn files_that_are_none_are_refused() {
     let missing = load_png(&place.path().join("bumps.png")).expect_err("not there").to_string();
     assert_eq!(missing, "no such file; name an existing PNG file");
     let directory = load_png(place.path()).expect_err("a directory").to_string();
-    assert_eq!(directory, "not a regular file; name a PNG file");
+    assert_eq!(directory, "it is a directory, no regular file; name a PNG file");
 }
 
 #[test]

@@ -13,8 +13,10 @@ use crate::say::say;
 use crate::sim::hand::HandModel;
 use crate::sim::hand::model_file::{self, Firmness};
 use crate::sim::script::{HandPlayer, HandScript};
+use crate::table::MAX_TABLE_BYTES;
 use clap::Args;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use rt_core::input_file;
 use rt_core::signals::StopSignals;
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -235,7 +237,8 @@ fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
 }
 
 fn read(file: &Path) -> Result<String, Box<dyn Error>> {
-    std::fs::read_to_string(file).map_err(|error| format!("cannot read {}: {error}", file.display()).into())
+    input_file::read_text(file, MAX_TABLE_BYTES)
+        .map_err(|error| format!("cannot read {}: {error}", file.display()).into())
 }
 
 /// Not a number would let everything pass.

@@ -61,15 +61,11 @@ impl<'c> Part<'c> {
 
 impl Cells {
     pub(super) fn build(patches: &[Patch], items: &[Item], steps: &[Step], extent_m: f64) -> Self {
-        let whole = steps.iter().map(|step| match *step {
-            Step::Leaf { first, count, .. } => CellStep::Leaf { first, count },
-            Step::Join(op) => CellStep::Join(op),
-        });
-        let cell = Cell { children: 0, first: 0, count: steps.len() as u32, items: items.len() as u32 };
-        let mut building =
-            Building { patches, cells: vec![cell], steps: whole.collect(), items: items.to_vec() };
-        building.split(0, &Vector3::zeros(), extent_m, 0);
-        let Building { cells, steps, items, .. } = building;
+        // Coarser where all of it would be too much.
+        let build = |levels| Building::of_levels(levels, patches, items, steps, extent_m);
+        let whole = || Building::of_whole(patches, items, steps);
+        let Building { cells, steps, items, .. } =
+            (1..=MAX_DEPTH).rev().find_map(build).unwrap_or_else(whole);
         Self { cells: cells.into(), steps: steps.into(), items: items.into(), half_m: extent_m }
     }
 
@@ -101,6 +97,10 @@ fn octant(point_B: &Vector3<f64>, centre_B: &Vector3<f64>, half_m: f64) -> (usiz
 
 struct Building<'p> {
     patches: &'p [Patch],
+    /// Levels below the whole.
+    levels: u32,
+    /// Levels of patches that may still be looked at.
+    looks: usize,
     cells: Vec<Cell>,
     steps: Vec<CellStep>,
     items: Vec<Item>,
@@ -113,12 +113,37 @@ enum Left {
     Some(Vec<CellStep>),
 }
 
-impl Building<'_> {
-    fn split(&mut self, index: usize, centre_B: &Vector3<f64>, half_m: f64, depth: u32) {
+impl<'p> Building<'p> {
+    /// One cell, which is everywhere.
+    fn of_whole(patches: &'p [Patch], items: &[Item], steps: &[Step]) -> Self {
+        let cell = Cell { children: 0, first: 0, count: steps.len() as u32, items: items.len() as u32 };
+        let steps = steps.iter().map(|step| match *step {
+            Step::Leaf { first, count, .. } => CellStep::Leaf { first, count },
+            Step::Join(op) => CellStep::Join(op),
+        });
+        let (steps, items) = (steps.collect(), items.to_vec());
+        Self { patches, levels: 0, looks: MOST_LOOKS, cells: vec![cell], steps, items }
+    }
+
+    /// Cells of so many levels; `None`: that would be too much.
+    fn of_levels(
+        levels: u32,
+        patches: &'p [Patch],
+        items: &[Item],
+        steps: &[Step],
+        extent_m: f64,
+    ) -> Option<Self> {
+        let mut building = Self { levels, ..Self::of_whole(patches, items, steps) };
+        building.split(0, &Vector3::zeros(), extent_m, 0)?;
+        Some(building)
+    }
+
+    fn split(&mut self, index: usize, centre_B: &Vector3<f64>, half_m: f64, depth: u32) -> Option<()> {
         let cell = self.cells[index];
-        if depth == MAX_DEPTH || cell.items <= FEW {
-            return;
+        if depth == self.levels || cell.items <= FEW {
+            return Some(());
         }
+        self.looks = self.looks.checked_sub(8 * (cell.items + cell.count) as usize)?;
         let children = self.cells.len();
         self.cells[index].children = children as u32;
         let half_m = 0.5 * half_m;
@@ -131,8 +156,9 @@ impl Building<'_> {
             self.cells.push(child);
         }
         for octant in 0..8 {
-            self.split(children + octant, &centre(octant), half_m, depth + 1);
+            self.split(children + octant, &centre(octant), half_m, depth + 1)?;
         }
+        Some(())
     }
 
     /// What of a cell is left in one of its eighths.
@@ -211,6 +237,9 @@ const EVERYTHING: CellStep = CellStep::Leaf { first: 0, count: 0 };
 const REACH: f64 = 1.0;
 /// Levels below the whole: the smallest cells reach farther than a common neighbourhood.
 const MAX_DEPTH: u32 = 5;
+/// Of patches and steps, in all cells: some tenths of a second, and some hundred bytes for each ten of them. Solids of hundred
+/// leaves take a quarter.
+const MOST_LOOKS: usize = 4_000_000;
 /// Cells with no more patches than this are not split.
 const FEW: u32 = 4;
 /// So that rounding prunes nothing that matters.
@@ -281,6 +310,38 @@ mod tests {
                 }
             }
             assert!(answers.iter().all(|&count| count > 500), "{answers:?}");
+        }
+    }
+
+    /// Shells within shells, so that everything is near to many of them.
+    fn onion(shells: u32) -> CsgTree {
+        let shell = |i: u32| {
+            let radius_m = f64::from(shells - i) / f64::from(shells);
+            CsgTree::difference([ball(radius_m), ball(radius_m - 0.3 / f64::from(shells))]).into()
+        };
+        CsgTree::union((0..shells).map(shell).collect::<Vec<CsgPart>>())
+    }
+
+    #[test]
+    fn a_solid_whose_leaves_are_near_everywhere_has_coarser_cells_and_bounded_work() {
+        let deepest = |tree: &CsgTree| {
+            let Csg { patches, items, steps, extent_m, .. } = Csg::build(tree).unwrap();
+            let of_levels = |levels: &u32| Building::of_levels(*levels, &patches, &items, &steps, extent_m);
+            let levels = (1..=MAX_DEPTH).rev().find(|levels| of_levels(levels).is_some());
+            (levels, of_levels(&levels.unwrap_or(1)).map(|building| MOST_LOOKS - building.looks))
+        };
+        for tree in solids() {
+            let (levels, looks) = deepest(&tree);
+            assert_eq!(levels, Some(MAX_DEPTH), "{looks:?} looks");
+        }
+        let (levels, looks) = deepest(&onion(128));
+        assert!(levels < Some(MAX_DEPTH), "{levels:?}, {looks:?} looks");
+        // What is found there is still the same.
+        let csg = Csg::build(&onion(128)).unwrap();
+        for i in 0..1000 {
+            let p = spread(i) * 0.5;
+            let near = Neighbourhood::around(&csg, &p, 1e-4);
+            assert_eq!(near.is_solid(near.sides(&csg, &p)), csg.is_inside(&p), "{p:?}");
         }
     }
 

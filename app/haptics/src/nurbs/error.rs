@@ -26,10 +26,10 @@ pub enum NurbsError {
         /// A point of the edge (m).
         point_B: [f64; 3],
     },
-    /// More cells than memory is meant for.
-    TooManyCells {
-        /// The most that is built.
-        limit: usize,
+    /// More memory than a surface is meant to take.
+    TooLarge {
+        /// The most that it takes (bytes).
+        most_bytes: usize,
     },
 }
 
@@ -44,9 +44,11 @@ impl fmt::Display for NurbsError {
                 f,
                 "patches {a}, {b} and {c} have an edge through ({x}, {y}, {z}) in common; allowed: two patches at an edge"
             ),
-            Self::TooManyCells { limit } => {
-                write!(f, "the patches fall into more than {limit} cells; allowed: fewer knots or patches")
-            }
+            Self::TooLarge { most_bytes } => write!(
+                f,
+                "the patches would take more than {} MB of memory; allowed: fewer or simpler patches, or a lower degree",
+                most_bytes >> 20
+            ),
         }
     }
 }

@@ -8,6 +8,7 @@
 use nalgebra::Vector3;
 
 use super::bezier::{Control, Window, restrict};
+use super::budget::Budget;
 use super::descend::{Crossing, Rest};
 use super::error::NurbsError;
 use super::foot::Foot;
@@ -48,9 +49,7 @@ pub(super) enum Of {
     Cell(u32),
 }
 
-/// The most cells: as many as would fill a gigabyte.
-pub(super) const MAX_CELLS: usize = 1 << 20;
-/// Deeper than the tree of that many.
+/// Deeper than the tree of as many cells as may be.
 pub(super) const STACK: usize = 64;
 /// A cell is flat enough whose control points keep this close to its corners' plane, as a share of its size.
 const FLAT: f64 = 0.1;
@@ -99,17 +98,21 @@ impl Bounds {
     }
 }
 
-/// All cells of the patches, and their tree.
+/// All cells of the patches, and their tree. They are counted first: what would fill the memory is refused before.
 pub(super) fn grow(nurbs: &mut Nurbs) -> Result<(), NurbsError> {
-    let mut cells = Vec::new();
-    for index in 0..nurbs.patches.len() {
-        let (spans_u, spans_v) = {
-            let patch = &nurbs.patches[index];
-            (patch.breaks[0].len() - 1, patch.breaks[1].len() - 1)
-        };
-        for (i, j) in (0..spans_v).flat_map(|j| (0..spans_u).map(move |i| (i, j))) {
-            cut(nurbs, index, [i, j], &mut cells)?;
-        }
+    let (mut count, mut controls, mut budget) = (0, 0, Budget::default());
+    for (index, element) in elements(nurbs) {
+        let size = net_size(&nurbs.patches[index]);
+        each_cell(nurbs, index, element, |_, _| {
+            (count, controls) = (count + 1, controls + size);
+            budget.spend(size_of::<Cell>() + 2 * size_of::<Node>() + size_of::<u32>())?;
+            budget.spend(size * size_of::<Control>())
+        })?;
+    }
+    let mut cells = Vec::with_capacity(count);
+    nurbs.controls.reserve_exact(controls);
+    for (index, element) in elements(nurbs) {
+        cut(nurbs, index, element, &mut cells)?;
     }
     let mut order: Vec<u32> = (0..cells.len() as u32).collect();
     let mut nodes = Vec::with_capacity(2 * cells.len());
@@ -119,27 +122,54 @@ pub(super) fn grow(nurbs: &mut Nurbs) -> Result<(), NurbsError> {
     Ok(())
 }
 
-/// Halves one element until its parts are flat.
-fn cut(nurbs: &mut Nurbs, index: usize, [i, j]: [usize; 2], cells: &mut Vec<Cell>) -> Result<(), NurbsError> {
+/// Patch and place of every element.
+fn elements(nurbs: &Nurbs) -> Vec<(usize, [usize; 2])> {
+    let spans = |patch: &Patch| [0, 1].map(|d| patch.breaks[d].len() - 1);
+    let places = |[u, v]: [usize; 2]| (0..v).flat_map(move |j| (0..u).map(move |i| [i, j]));
+    let patches = nurbs.patches.iter().enumerate();
+    patches.flat_map(|(index, patch)| places(spans(patch)).map(move |place| (index, place))).collect()
+}
+
+/// Halves one element until its parts are flat, and hands out each with its control points.
+fn each_cell(
+    nurbs: &Nurbs,
+    index: usize,
+    [i, j]: [usize; 2],
+    mut take: impl FnMut(Window, Vec<Control>) -> Result<(), NurbsError>,
+) -> Result<(), NurbsError> {
     let patch = &nurbs.patches[index];
     let element = nurbs.elements[patch.first_element + i + j * (patch.breaks[0].len() - 1)];
-    let (degree, size) = (patch.degree, net_size(patch));
-    let span = [[patch.breaks[0][i], patch.breaks[0][i + 1]], [patch.breaks[1][j], patch.breaks[1][j + 1]]];
-    let whole: Vec<Control> = nurbs.controls[element.net..element.net + size].to_vec();
+    let whole = &nurbs.controls[element.net..element.net + net_size(patch)];
     let mut waiting = vec![([[0.0, 1.0], [0.0, 1.0]], 0)];
     while let Some((window, halvings)) = waiting.pop() {
-        let mut net = whole.clone();
-        restrict(&mut net, degree, &window);
-        let (bend, along) = bend(&net, degree);
+        let mut net = whole.to_vec();
+        restrict(&mut net, patch.degree, &window);
+        let (bend, along) = bend(&net, patch.degree);
         if bend > FLAT && halvings < 2 * MAX_HALVINGS {
-            for half in halves(&window, along) {
-                waiting.push((half, halvings + 1));
-            }
-            continue;
+            waiting.extend(halves(&window, along).map(|half| (half, halvings + 1)));
+        } else {
+            take(window, net)?;
         }
-        if cells.len() == MAX_CELLS {
-            return Err(NurbsError::TooManyCells { limit: MAX_CELLS });
-        }
+    }
+    Ok(())
+}
+
+/// The cells of one element.
+fn cut(
+    nurbs: &mut Nurbs,
+    index: usize,
+    place @ [i, j]: [usize; 2],
+    cells: &mut Vec<Cell>,
+) -> Result<(), NurbsError> {
+    let mut flat = Vec::new();
+    each_cell(nurbs, index, place, |window, net| {
+        flat.push((window, net));
+        Ok(())
+    })?;
+    let patch = &nurbs.patches[index];
+    let element = nurbs.elements[patch.first_element + i + j * (patch.breaks[0].len() - 1)];
+    let span = [[patch.breaks[0][i], patch.breaks[0][i + 1]], [patch.breaks[1][j], patch.breaks[1][j + 1]]];
+    for (window, net) in flat {
         let of = |d: usize, x: f64| span[d][0] * (1.0 - x) + span[d][1] * x;
         let window = [0, 1].map(|d| window[d].map(|x| of(d, x)));
         let middle = window.map(|[a, b]| (a + b) / 2.0);

@@ -4,19 +4,29 @@
 //! is the shortest time between two of the first rows. A last line without its end is left out: half a number is a number.
 
 use super::ReadError;
+use super::tick_order::{TickOrder, check_period};
 use crate::columns::{Column, Names, columns, feature_named, friction_named};
 use crate::row::{BodyRow, FingerRow, Row};
 use io_driver::device::{Extras, run_time_s};
 use nalgebra::{Quaternion, Vector3};
 use physics::GraspQuality;
+use rt_core::input_file;
 use shm_abi::MAX_DEVICES;
-use std::collections::VecDeque;
+use std::collections::{HashMap, VecDeque};
 use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 /// So many rows are looked at for the length of a tick.
 const LOOK_AHEAD: usize = 1000;
+/// Or so many bytes of them.
+const LOOK_AHEAD_BYTES: usize = 16 << 20;
+/// The longest row, of as many objects as a scene can have.
+const MOST_ROW_BYTES: u64 = 64 << 20;
+/// As many entities as a scene can have.
+const MOST_NAMES: usize = 100_000;
+/// And more environments with doors than anybody made.
+const MOST_SPACES: usize = 1000;
 /// Where a single row says nothing of it (ns).
 const USUAL_PERIOD_NS: u64 = 1_000_000;
 
@@ -26,6 +36,9 @@ pub(super) struct CsvRows {
     ahead: VecDeque<String>,
     columns: Vec<Column>,
     line: u64,
+    /// Place of an entity in the list of names.
+    known: HashMap<String, u32>,
+    order: TickOrder,
     pub(super) names: Names,
     pub(super) period_ns: u64,
     pub(super) cut: Option<String>,
@@ -33,13 +46,15 @@ pub(super) struct CsvRows {
 
 impl CsvRows {
     pub(super) fn open(file: &Path) -> Result<Self, ReadError> {
-        let opened = File::open(file).map_err(|source| ReadError::Io { file: file.into(), source })?;
+        let opened = input_file::open(file).map_err(|source| ReadError::Io { file: file.into(), source })?;
         let mut rows = Self {
             file: file.into(),
             reader: BufReader::new(opened),
             ahead: VecDeque::new(),
             columns: Vec::new(),
             line: 0,
+            known: HashMap::new(),
+            order: TickOrder::default(),
             names: Names::default(),
             period_ns: USUAL_PERIOD_NS,
             cut: None,
@@ -52,13 +67,17 @@ impl CsvRows {
         if rows.names.fingers.is_empty() || expected != header.split(',').collect::<Vec<_>>() {
             return Err(no_recording("its first line has not the columns of one".into()));
         }
+        let mut bytes = 0;
         while rows.ahead.len() < LOOK_AHEAD
+            && bytes < LOOK_AHEAD_BYTES
             && let Some(line) = rows.read_line()?
         {
+            bytes += line.len();
             rows.ahead.push_back(line);
         }
         rows.period_ns = period_of(&rows.ahead);
         rows.line = 1;
+        check_period(rows.period_ns).map_err(|why| rows.bad_row(2, why))?;
         Ok(rows)
     }
 
@@ -71,19 +90,24 @@ impl CsvRows {
             },
         };
         self.line += 1;
-        let row = self.parse(&line).map_err(|why| ReadError::BadRow {
-            file: self.file.clone(),
-            line: self.line,
-            why,
-        })?;
+        let row = self.parse(&line).map_err(|why| self.bad_row(self.line, why))?;
+        self.order.check(row.0.run_tick, self.period_ns).map_err(|why| self.bad_row(self.line, why))?;
         Ok(Some(row))
+    }
+
+    fn bad_row(&self, line: u64, why: String) -> ReadError {
+        ReadError::BadRow { file: self.file.clone(), line, why }
     }
 
     /// A whole line without its end.
     fn read_line(&mut self) -> Result<Option<String>, ReadError> {
         let mut bytes = Vec::new();
-        let read = self.reader.read_until(b'\n', &mut bytes);
+        let read = self.reader.by_ref().take(MOST_ROW_BYTES).read_until(b'\n', &mut bytes);
         read.map_err(|source| ReadError::Io { file: self.file.clone(), source })?;
+        if bytes.len() as u64 == MOST_ROW_BYTES {
+            let why = format!("a line has more than {MOST_ROW_BYTES} bytes");
+            return Err(ReadError::NoRecording { file: self.file.clone(), why });
+        }
         if bytes.pop() != Some(b'\n') {
             if !bytes.is_empty() {
                 self.cut = Some("the last row is not complete and is left out".into());
@@ -104,6 +128,7 @@ impl CsvRows {
             columns: &self.columns,
             at: 0,
             entities: &mut self.names.entities,
+            known: &mut self.known,
             spaces: &mut self.names.spaces,
         };
         let t_s = cells.number()?;
@@ -141,6 +166,7 @@ struct Cells<'a> {
     columns: &'a [Column],
     at: usize,
     entities: &'a mut Vec<String>,
+    known: &'a mut HashMap<String, u32>,
     spaces: &'a mut Option<Vec<String>>,
 }
 
@@ -173,31 +199,33 @@ impl Cells<'_> {
         self.numbers().map(Vector3::from)
     }
 
-    fn entity(&mut self) -> Option<u32> {
+    fn entity(&mut self) -> Result<Option<u32>, String> {
         let name = self.take().0.to_owned();
         if name.is_empty() {
-            return None;
+            return Ok(None);
         }
-        let known = self.entities.iter().position(|entity| *entity == name);
-        let index = known.unwrap_or_else(|| {
-            self.entities.push(name);
-            self.entities.len() - 1
-        });
-        Some(index as u32)
+        if let Some(index) = self.known.get(&name) {
+            return Ok(Some(*index));
+        }
+        check_count(self.entities.len(), MOST_NAMES, "entities")?;
+        let index = self.entities.len() as u32;
+        self.known.insert(name.clone(), index);
+        self.entities.push(name);
+        Ok(Some(index))
     }
 
-    fn space(&mut self) -> u32 {
+    fn space(&mut self) -> Result<u32, String> {
         if self.spaces.is_none() {
-            return 0;
+            return Ok(0);
         }
         let name = self.take().0.to_owned();
-        let Some(spaces) = self.spaces.as_mut().filter(|_| !name.is_empty()) else { return 0 };
-        let known = spaces.iter().position(|space| *space == name);
-        let index = known.unwrap_or_else(|| {
-            spaces.push(name);
-            spaces.len() - 1
-        });
-        index as u32 + 1
+        let Some(spaces) = self.spaces.as_mut().filter(|_| !name.is_empty()) else { return Ok(0) };
+        if let Some(index) = spaces.iter().position(|space| *space == name) {
+            return Ok(index as u32 + 1);
+        }
+        check_count(spaces.len(), MOST_SPACES, "spaces")?;
+        spaces.push(name);
+        Ok(spaces.len() as u32)
     }
 
     fn word<T>(&mut self, named: fn(&str) -> Option<T>) -> Result<T, String> {
@@ -211,7 +239,7 @@ impl Cells<'_> {
             hip: self.vector()?,
             god_object: self.vector()?,
             force_on_user: self.vector()?,
-            entity: self.entity(),
+            entity: self.entity()?,
             feature: self.word(feature_named)?,
             friction: self.word(friction_named)?,
             applied_on_user: self.vector()?,
@@ -231,9 +259,9 @@ impl Cells<'_> {
             row.torque_on_user = self.vector()?;
         }
         if is(shape.ties) {
-            row.attached = self.entity();
+            row.attached = self.entity()?;
         }
-        row.space = self.space();
+        row.space = self.space()?;
         Ok(row)
     }
 
@@ -254,6 +282,10 @@ impl Cells<'_> {
         let orientation = Quaternion::new(w, x, y, z);
         Ok(BodyRow { position, orientation, velocity, angular_velocity, grasp, is_slow })
     }
+}
+
+fn check_count(known: usize, most: usize, what: &str) -> Result<(), String> {
+    if known < most { Ok(()) } else { Err(format!("more than {most} {what} are named; allowed: as many")) }
 }
 
 /// Which names a header is made of, as far as it is one.

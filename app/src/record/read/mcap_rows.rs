@@ -1,6 +1,9 @@
 //! Rows of an MCAP file, read from front to back: an index, which a killed process did not write, is not needed.
 
 use super::ReadError;
+use super::mcap_chunk;
+use super::mcap_record::{self, McapRecord};
+use super::tick_order::{TickOrder, check_period};
 use crate::columns::Names;
 use crate::record::about::{About, InputFile, names_of};
 use crate::record::mcap_file::{ABOUT, COLUMNS, ORDER_TOPIC, TICK_TOPIC};
@@ -9,13 +12,13 @@ use crate::record::tick;
 use crate::record::wire::each_field;
 use crate::row::{BodyRow, Row};
 use mcap::McapError;
-use mcap::records::Record;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use rt_core::input_file;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-/// A longer record is none of ours: a length that is garbage must not ask for all memory.
+/// A longer record is none of ours.
 const MOST_RECORD_BYTES: usize = 256 << 20;
 /// Read at once.
 const AT_ONCE_BYTES: usize = 256 * 1024;
@@ -24,6 +27,10 @@ pub(super) struct McapRows {
     path: PathBuf,
     file: File,
     reader: LinearReader,
+    /// Bytes of the file that were read.
+    read_bytes: u64,
+    chunk: OpenChunk,
+    order: TickOrder,
     channels: Channels,
     first: Option<(Row, Vec<BodyRow>)>,
     rows: u64,
@@ -33,6 +40,13 @@ pub(super) struct McapRows {
     pub(super) cut: Option<String>,
     /// Orders that were met so far, each with its tick.
     pub(super) orders: Vec<(u64, String)>,
+}
+
+/// The records of a chunk, and where the next one begins.
+#[derive(Debug, Default)]
+struct OpenChunk {
+    records: Vec<u8>,
+    at: usize,
 }
 
 /// Those that are read.
@@ -54,15 +68,18 @@ enum Found {
 
 impl McapRows {
     pub(super) fn open(path: &Path) -> Result<Self, ReadError> {
-        let file = File::open(path).map_err(|source| ReadError::Io { file: path.into(), source })?;
+        let file = input_file::open(path).map_err(|source| ReadError::Io { file: path.into(), source })?;
         let options = LinearReaderOptions::default()
-            .with_prevalidate_chunk_crcs(true)
+            .with_emit_chunks(true)
             .with_validate_data_section_crc(true)
             .with_record_length_limit(MOST_RECORD_BYTES);
         let mut rows = Self {
             path: path.into(),
             file,
             reader: LinearReader::new_with_options(options),
+            read_bytes: 0,
+            chunk: OpenChunk::default(),
+            order: TickOrder::default(),
             channels: Channels::default(),
             first: None,
             rows: 0,
@@ -77,6 +94,7 @@ impl McapRows {
             let why = rows.cut.take().unwrap_or_else(|| "it has no metadata of a run".into());
             return Err(ReadError::NoRecording { file: path.into(), why });
         }
+        check_period(rows.period_ns).map_err(|why| rows.damaged(&why))?;
         Ok(rows)
     }
 
@@ -101,43 +119,56 @@ impl McapRows {
         Ok(None)
     }
 
+    /// The next record: of the chunk that is open, else of the file.
     fn read_record(&mut self) -> Result<Found, ReadError> {
-        let mut failure = None;
-        let found = loop {
+        if let Some(rest) = self.chunk.records.get(self.chunk.at..).filter(|rest| !rest.is_empty()) {
+            let Some(((opcode, body), behind)) = mcap_record::split_record(rest) else {
+                return Err(self.damaged("a chunk ends in the middle of a record"));
+            };
+            self.chunk.at = self.chunk.records.len() - behind.len();
+            let found = own(opcode, body, self.channels, &self.names);
+            return self.keep(found);
+        }
+        loop {
             match self.reader.next_event() {
                 None => return Ok(Found::End),
                 Some(Ok(LinearReadEvent::ReadRequest(least))) => {
-                    let room = self.reader.insert(least.clamp(AT_ONCE_BYTES, MOST_RECORD_BYTES));
-                    let read = read_some(&mut self.file, room);
-                    let read = read.map_err(|source| ReadError::Io { file: self.path.clone(), source })?;
-                    self.reader.notify_read(read);
-                }
-                Some(Ok(LinearReadEvent::Record { opcode, data })) => {
-                    match mcap::parse_record(opcode, data) {
-                        Ok(record) => break Some(own(record, self.channels, &self.names)),
-                        Err(error) => failure = Some(error),
+                    if !self.read_more(least)? {
+                        self.cut = Some(CUT.into());
+                        return Ok(Found::End);
                     }
                 }
-                Some(Err(error)) => failure = Some(error),
-            }
-            if failure.is_some() {
-                break None;
-            }
-        };
-        match (found, failure) {
-            (Some(found), _) => self.keep(found),
-            (None, Some(McapError::UnexpectedEof)) => {
-                self.cut =
-                    Some("it ends in the middle, as when a disk is full or a process was killed".into());
-                Ok(Found::End)
-            }
-            (None, Some(McapError::BadMagic)) if self.rows == 0 => {
-                Err(ReadError::NoRecording { file: self.path.clone(), why: "it is no MCAP file".into() })
-            }
-            (None, failure) => {
-                Err(self.damaged(&failure.map_or_else(String::new, |error| error.to_string())))
+                Some(Ok(LinearReadEvent::Record { opcode, data })) => {
+                    let found = own(opcode, data, self.channels, &self.names);
+                    return self.keep(found);
+                }
+                Some(Err(McapError::UnexpectedEof)) => {
+                    self.cut = Some(CUT.into());
+                    return Ok(Found::End);
+                }
+                Some(Err(McapError::BadMagic)) if self.rows == 0 => {
+                    let why = "it is no MCAP file".into();
+                    return Err(ReadError::NoRecording { file: self.path.clone(), why });
+                }
+                Some(Err(error)) => return Err(self.damaged(&error.to_string())),
             }
         }
+    }
+
+    /// Reads at least so much into the reader, and no more memory is asked for than the file has bytes; `false`: it has
+    /// not so many.
+    fn read_more(&mut self, least: usize) -> Result<bool, ReadError> {
+        let failed = |source| ReadError::Io { file: self.path.clone(), source };
+        // Asked anew: a run that goes on makes it longer.
+        let left = self.file.metadata().map_err(failed)?.len().saturating_sub(self.read_bytes);
+        if least as u64 > left {
+            return Ok(false);
+        }
+        let wanted = least.max(AT_ONCE_BYTES.min(left as usize));
+        let read = read_some(&mut self.file, self.reader.insert(wanted)).map_err(failed)?;
+        self.reader.notify_read(read);
+        self.read_bytes += read as u64;
+        Ok(true)
     }
 
     /// Keeps what was found for later.
@@ -145,6 +176,7 @@ impl McapRows {
         match found {
             Kept::Row(row) => {
                 let (row, bodies) = (*row).ok_or_else(|| self.damaged("a tick is no tick of this scene"))?;
+                self.order.check(row.run_tick, self.period_ns).map_err(|why| self.damaged(&why))?;
                 return Ok(Found::Row(Box::new(row), bodies));
             }
             Kept::Facts(name, facts) if name == ABOUT => {
@@ -156,6 +188,10 @@ impl McapRows {
                 self.names =
                     names.ok_or_else(|| self.damaged("the names of the columns are not complete"))?;
             }
+            Kept::Chunk(records) => {
+                self.chunk = OpenChunk { records: records.map_err(|why| self.damaged(&why))?, at: 0 };
+            }
+            Kept::Damage => return Err(self.damaged("a record is shorter than it says")),
             Kept::File(file) => self.about.files.push(file),
             Kept::Order(order) => self.orders.extend(order),
             Kept::Channels(found) => self.channels = found,
@@ -178,26 +214,31 @@ enum Kept {
     File(InputFile),
     Order(Option<(u64, String)>),
     Channels(Channels),
+    Chunk(Result<Vec<u8>, String>),
     Nothing,
+    /// A record that is none.
+    Damage,
 }
 
-fn own(record: Record<'_>, channels: Channels, names: &Names) -> Kept {
+fn own(opcode: u8, body: &[u8], channels: Channels, names: &Names) -> Kept {
+    let Some(record) = mcap_record::parse(opcode, body) else { return Kept::Damage };
     match record {
-        Record::Message { header, data } if Some(header.channel_id) == channels.tick => {
-            Kept::Row(Box::new(tick::read(&data, names)))
+        McapRecord::Message { channel, data } if Some(channel) == channels.tick => {
+            Kept::Row(Box::new(tick::read(data, names)))
         }
-        Record::Message { header, data } if Some(header.channel_id) == channels.orders => {
-            Kept::Order(read_order(&data))
+        McapRecord::Message { channel, data } if Some(channel) == channels.orders => {
+            Kept::Order(read_order(data))
         }
-        Record::Metadata(metadata) => Kept::Facts(metadata.name, metadata.metadata),
-        Record::Attachment { header, data, .. } => {
-            Kept::File(InputFile { name: header.name, bytes: data.into_owned() })
+        McapRecord::Chunk(chunk) => Kept::Chunk(mcap_chunk::content(&chunk)),
+        McapRecord::Metadata { name, facts } => Kept::Facts(name.to_owned(), facts),
+        McapRecord::Attachment { name, data } => {
+            Kept::File(InputFile { name: name.to_owned(), bytes: data.to_vec() })
         }
-        Record::Channel(channel) if channel.topic == TICK_TOPIC => {
-            Kept::Channels(Channels { tick: Some(channel.id), ..channels })
+        McapRecord::Channel { id, topic: TICK_TOPIC } => {
+            Kept::Channels(Channels { tick: Some(id), ..channels })
         }
-        Record::Channel(channel) if channel.topic == ORDER_TOPIC => {
-            Kept::Channels(Channels { orders: Some(channel.id), ..channels })
+        McapRecord::Channel { id, topic: ORDER_TOPIC } => {
+            Kept::Channels(Channels { orders: Some(id), ..channels })
         }
         _ => Kept::Nothing,
     }
@@ -216,6 +257,8 @@ fn read_order(message: &[u8]) -> Option<(u64, String)> {
     })?;
     Some((tick, words))
 }
+
+const CUT: &str = "it ends in the middle, as when a disk is full or a process was killed";
 
 fn read_some(file: &mut File, room: &mut [u8]) -> io::Result<usize> {
     loop {

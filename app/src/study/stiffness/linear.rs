@@ -13,7 +13,7 @@
 //! tick's map is outside the unit circle. The contact never ends: this is the wall pressed, not tapped.
 //! Reference: Gillespie and Cutkosky, Stable user-specific haptic rendering of the virtual wall, IMECE 1996.
 
-use nalgebra::{SMatrix, SVector, Vector2};
+use nalgebra::{SMatrix, SVector, Schur, Vector2};
 
 /// The numbers of a loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,6 +47,8 @@ pub struct Hand {
 
 /// Tip and its velocity, hand and its velocity, force of the motor.
 const STATES: usize = 5;
+/// Of the QR algorithm on a tick's map, which takes some three for each eigenvalue.
+const MOST_ITERATIONS: usize = 1000;
 /// Besides these the last two values and the last position.
 const SAMPLED: usize = STATES + 3;
 
@@ -57,8 +59,11 @@ impl Loop {
     /// Whether a wall of this stiffness (N/m) is quiet.
     pub fn is_stable(&self, stiffness_n_per_m: f64) -> bool {
         let map = self.tick(stiffness_n_per_m);
-        // Not a number is not stable.
-        map.complex_eigenvalues().iter().all(|eigenvalue| eigenvalue.norm() < 1.0)
+        // Numbers beyond all bounds are not stable, nor is what the iteration finds no eigenvalues of.
+        map.iter().all(|number| number.is_finite())
+            && Schur::try_new(map, f64::EPSILON, MOST_ITERATIONS).is_some_and(|schur| {
+                schur.complex_eigenvalues().iter().all(|eigenvalue| eigenvalue.norm() < 1.0)
+            })
     }
 
     /// The map of a tick.
@@ -182,6 +187,14 @@ mod tests {
             assert!((found / closed - 1.0).abs() < 2e-3, "{mass} {damping} {period}: {found} {closed}");
             // Colgate's bound for any hand is below what this one mass stands, and near it for short ticks.
             assert!(2.0 * damping / period <= closed * (1.0 + 1e-9));
+        }
+    }
+
+    #[test]
+    fn damping_beyond_all_bounds_is_not_stable_and_is_told_at_once() {
+        for damping_n_s_per_m in [1e100, 1e300, 1e308, f64::INFINITY, f64::NAN] {
+            let system = Loop { damping_n_s_per_m, ..FREE };
+            assert!(!system.is_stable(1000.0), "{damping_n_s_per_m}");
         }
     }
 

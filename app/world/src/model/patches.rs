@@ -17,6 +17,7 @@ use super::ModelError;
 use crate::document::{Document, LineEnds};
 use crate::error::SceneError;
 use crate::reader::{Bound, Table, Value};
+use crate::source::MAX_FILE_BYTES;
 use crate::vocabulary::Vocabulary;
 use haptics::{NurbsError, NurbsPatch};
 use std::fmt::Write;
@@ -27,6 +28,10 @@ use std::path::Path;
 /// # Errors
 /// The first thing found to be wrong, with file, line and key.
 pub fn read_patches(file: &Path, bytes: &[u8]) -> Result<Vec<NurbsPatch>, ModelError> {
+    if bytes.len() as u64 > MAX_FILE_BYTES {
+        let error = SceneError::TooLarge { file: file.into(), limit_bytes: MAX_FILE_BYTES };
+        return Err(ModelError::Toml(Box::new(error)));
+    }
     let text = std::str::from_utf8(bytes).map_err(|error| {
         let offset_bytes = error.valid_up_to();
         let line = 1 + bytes[..offset_bytes].iter().filter(|&&byte| byte == b'\n').count();

@@ -57,7 +57,8 @@ fn a_value_of_the_wrong_type_is_named_with_what_was_found() {
     );
     refused(
         "[finger]\n",
-        "s.toml:1: finger: found a table; allowed: a list of tables, each under its own [[finger]]",
+        "s.toml:1: finger: found a single table, as `[finger]` makes it; allowed: a list of tables, each under its own \
+         [[finger]]: write it with two brackets, even if there is only one",
     );
     refused(
         "finger = [1]\n",
@@ -148,6 +149,40 @@ fn a_number_outside_its_range_is_refused() {
 }
 
 #[test]
+fn a_number_that_no_physical_quantity_has_is_refused_with_the_range_of_its_unit() {
+    for (keys, key, found, allowed) in [
+        (
+            "damping_n_s_per_m = 1e308",
+            "damping_n_s_per_m",
+            "1e308",
+            "a number, 0 or more, 1e6 at most in size",
+        ),
+        ("stiffness_n_per_m = 1e10", "stiffness_n_per_m", "1e10", "a number above 0, 1e9 at most in size"),
+        ("mass_kg = 1e12", "mass_kg", "1e12", "a number above 0, 1e9 at most in size"),
+        ("position_m = [0, -1e300, 0]", "position_m[1]", "-1e300", "a number, 1e6 at most in size"),
+    ] {
+        refused(&with_entity(keys), &format!("s.toml:8: entity[0].{key}: found {found}; allowed: {allowed}"));
+    }
+    refused(
+        &with_top("gravity_m_s2 = [0.0, -1e9, 0.0]"),
+        "s.toml:2: gravity_m_s2[1]: found -1e9; allowed: a number, 1e6 at most in size",
+    );
+}
+
+#[test]
+fn a_colour_in_bytes_is_refused_with_the_shares_that_it_would_be() {
+    refused(
+        &with_entity("visual = { colour = [255, 128, 0] }"),
+        "s.toml:8: entity[0].visual.colour: found [255.0, 128.0, 0.0], which looks like numbers from 0 to 255; allowed: \
+         an array of 3 numbers from 0 to 1: write [1.0, 0.502, 0.0]",
+    );
+    refused(
+        &with_entity("visual = { colour = [0, 1.5, 0] }"),
+        "s.toml:8: entity[0].visual.colour: found an array of length 3; allowed: an array of 3 numbers from 0 to 1",
+    );
+}
+
+#[test]
 fn a_plane_without_a_direction_is_refused() {
     refused(
         &with_shape("{ kind = \"plane\", normal = [0, 0.0, -0.0], offset_m = 0 }"),
@@ -157,7 +192,7 @@ fn a_plane_without_a_direction_is_refused() {
     refused(
         &with_shape("{ kind = \"plane\", normal = [0, 1e-320, 0], offset_m = 1 }"),
         "s.toml:4: entity[0].shape.offset_m: found 1; allowed: a number whose quotient by the \
-         length of normal is finite",
+         length of normal is 1e6 at most in size",
     );
 }
 
@@ -166,12 +201,13 @@ fn a_quaternion_that_is_no_rotation_is_refused() {
     refused(
         &with_entity("orientation_wxyz = [0, 0, 0, 0]"),
         "s.toml:8: entity[0].orientation_wxyz: found a quaternion of length 0; allowed: w, x, y, \
-         z of length 1 (within 0.001)",
+         z of length 1 (within 0.001): no turn is [1.0, 0.0, 0.0, 0.0]",
     );
     refused(
         &with_entity("orientation_wxyz = [1, 0, 1, 0]"),
         "s.toml:8: entity[0].orientation_wxyz: found a quaternion of length 1.4142135623730951; \
-         allowed: w, x, y, z of length 1 (within 0.001)",
+         allowed: w, x, y, z of length 1 (within 0.001): this direction is [0.707107, 0.000000, 0.707107, 0.000000]; \
+         angles are not taken",
     );
     refused(
         &with_entity("orientation_wxyz = [0, 0, 1]"),
@@ -207,7 +243,7 @@ fn a_layout_is_refused_in_the_same_way() {
     layout_refused(
         "[[device]]\norientation_wxyz = [0, 0, 0, 2]\n",
         "l.toml:2: device[0].orientation_wxyz: found a quaternion of length 2; allowed: w, x, y, \
-         z of length 1 (within 0.001)",
+         z of length 1 (within 0.001): this direction is [0.000000, 0.000000, 0.000000, 1.000000]; angles are not taken",
     );
     layout_refused(&"[[device]]\n".repeat(9), "l.toml:9: device[8]: found 9 entries; allowed: at most 8");
     layout_refused(

@@ -26,6 +26,19 @@ fn text_that_is_not_toml_is_refused_with_line_and_column() {
         "ä = 1\n",
         "s.toml:1:1: not valid TOML: invalid unquoted key, expected letters, numbers, `-`, `_`",
     );
+    refused(
+        "[[finger]]\nstart_m = [0.0 1.0, 0.0]\n",
+        "s.toml:2:12: not valid TOML: string values must be quoted, expected literal string; between two numbers of an \
+         array stands a comma, as in [0.0, 1.0]",
+    );
+    refused(
+        "shape = { kind = \"sphere\" radius_m = 0.1 }\n",
+        "s.toml:1:27: not valid TOML: missing comma between key-value pairs, expected `,`",
+    );
+    for text in ["shape = { radius_m = 0,1 }\n", "radius_m = 0,1\n"] {
+        let message = Scene::parse(text, Path::new("s.toml")).expect_err("a comma").to_string();
+        assert!(message.ends_with("; a decimal number has a point, as in 0.1"), "{message}");
+    }
     refused("[[finger]\n", "s.toml:1:10: not valid TOML: unclosed array table, expected `]`");
 }
 
@@ -42,7 +55,17 @@ fn an_unknown_key_is_refused_with_what_was_probably_meant() {
             "s.toml:4: finger[0].raduis_m: unknown key (did you mean `radius_m`?)",
             FINGER_KEYS,
         ),
-        (with_entity("colour = \"red\""), "s.toml:8: entity[0].colour: unknown key", ENTITY_KEYS),
+        (
+            with_entity("colour = \"red\""),
+            "s.toml:8: entity[0].colour: unknown key (did you mean `visual`?)",
+            ENTITY_KEYS,
+        ),
+        (
+            with_entity("rotation = [0, 0, 0]"),
+            "s.toml:8: entity[0].rotation: unknown key (did you mean `orientation_wxyz`?)",
+            ENTITY_KEYS,
+        ),
+        (with_entity("texture = \"a\""), "s.toml:8: entity[0].texture: unknown key", ENTITY_KEYS),
         (
             with_entity("stifness_n_per_m = 1"),
             "s.toml:8: entity[0].stifness_n_per_m: unknown key (did you mean `stiffness_n_per_m`?)",

@@ -1,0 +1,143 @@
+//! Sizes and masses of what is in a scene.
+//!
+//! Model: the size of a thing is that of the box around it along its own axes; of a mesh by its vertices, of patches and of
+//! solids that are joined by the triangles that are drawn of them. The mass is the one that a run has, also where the
+//! scene gives a density.
+
+use crate::rig::Rig;
+use haptics::{Entity, Shape};
+use nalgebra::{Point3, Vector3};
+use physics::collide::bounding_ball;
+use serde_json::{Value, json};
+use view::shapes::triangles;
+use world::{EntityKind, SceneEntity, ShapeSpec};
+
+/// What can be measured of an entity.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Measures {
+    pub(super) name: String,
+    pub(super) kind: &'static str,
+    /// Part of an environment, in which fingers are.
+    pub(super) is_around: bool,
+    /// Along its own axes (m); `None`: it has no end.
+    pub(super) size_m: Option<[f64; 3]>,
+    /// The middle of that, in the world (m).
+    pub(super) middle_m: [f64; 3],
+    /// `None`: it is fixed.
+    pub(super) mass_kg: Option<f64>,
+    pub(super) density_kg_m3: Option<f64>,
+}
+
+impl Measures {
+    /// Of all entities.
+    pub(super) fn all(rig: &Rig, entities: &[Entity]) -> Vec<Self> {
+        let mut masses = vec![None; entities.len()];
+        for (index, mass_kg) in rig.masses(entities) {
+            masses[index] = Some(mass_kg);
+        }
+        let pairs = rig.scene.entities.iter().zip(entities).zip(masses);
+        pairs.map(|((spec, entity), mass_kg)| Self::of(spec, entity, mass_kg)).collect()
+    }
+
+    fn of(spec: &SceneEntity, entity: &Entity, mass_kg: Option<f64>) -> Self {
+        let around = corners(&spec.shape, &entity.shape);
+        let middle = around.map_or_else(Vector3::zeros, |[least, most]| 0.5 * (least + most));
+        // A unit of density makes what the volume is.
+        let volume_m3 = mass_kg.and_then(|_| physics::MassProperties::of_density(&entity.shape, 1.0).ok());
+        Self {
+            name: spec.name.clone(),
+            kind: spec.shape.kind(),
+            is_around: spec.kind == EntityKind::Environment,
+            size_m: around.map(|[least, most]| (most - least).into()),
+            middle_m: (spec.pose * Point3::from(middle)).coords.into(),
+            mass_kg,
+            density_kg_m3: mass_kg.zip(volume_m3).map(|(mass_kg, of_one)| mass_kg / of_one.mass_kg),
+        }
+    }
+
+    /// The longest side (m); `None`: it has no end.
+    pub(super) fn length_m(&self) -> Option<f64> {
+        self.size_m.map(|size| size.into_iter().fold(0.0, f64::max))
+    }
+
+    pub(super) fn to_json(&self) -> Value {
+        json!({
+            "name": self.name, "kind": self.kind, "size_m": self.size_m, "middle_m": self.middle_m,
+            "mass_kg": self.mass_kg, "density_kg_m3": self.density_kg_m3,
+        })
+    }
+}
+
+impl std::fmt::Display for Measures {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: {}", self.name, self.kind)?;
+        match self.size_m {
+            Some([x, y, z]) => write!(f, ", {} x {} x {} m", short(x), short(y), short(z))?,
+            None => write!(f, ", without an end")?,
+        }
+        let [x, y, z] = self.middle_m.map(short);
+        write!(f, ", at ({x}, {y}, {z}) m")?;
+        if let Some(mass_kg) = self.mass_kg {
+            write!(f, ", {} kg", short(mass_kg))?;
+        }
+        self.density_kg_m3.map_or(Ok(()), |density| write!(f, " ({} kg/m^3)", short(density)))
+    }
+}
+
+/// Four digits.
+pub(super) fn short(number: f64) -> String {
+    format!("{number:.3e}").parse::<f64>().unwrap_or(number).to_string()
+}
+
+/// Opposite corners of the box around a shape in its own frame (m); `None`: it has no end.
+fn corners(spec: &ShapeSpec, shape: &Shape) -> Option<[Vector3<f64>; 2]> {
+    let half = match spec {
+        ShapeSpec::Plane { .. } => return None,
+        ShapeSpec::Box { size_m } => 0.5 * Vector3::from(*size_m),
+        ShapeSpec::Sphere { radius_m } => Vector3::repeat(*radius_m),
+        ShapeSpec::Ellipsoid { radii_m } => (*radii_m).into(),
+        ShapeSpec::Capsule { radius_m, length_m } => {
+            Vector3::new(*radius_m, radius_m + 0.5 * length_m, *radius_m)
+        }
+        ShapeSpec::Cylinder { radius_m, length_m } => Vector3::new(*radius_m, 0.5 * length_m, *radius_m),
+        ShapeSpec::Cone { radius_bottom_m, radius_top_m, length_m } => {
+            let radius_m = radius_bottom_m.max(*radius_top_m);
+            Vector3::new(radius_m, 0.5 * length_m, radius_m)
+        }
+        ShapeSpec::Torus { ring_radius_m, tube_radius_m } => {
+            Vector3::new(ring_radius_m + tube_radius_m, *tube_radius_m, ring_radius_m + tube_radius_m)
+        }
+        ShapeSpec::Scaled { shape: inner, scale } if spec.is_closed_form() => {
+            let scale = Vector3::from(*scale);
+            return corners(inner, shape).map(|corners| corners.map(|corner| corner.component_mul(&scale)));
+        }
+        _ => return drawn_corners(spec, shape),
+    };
+    Some([-half, half])
+}
+
+fn drawn_corners(spec: &ShapeSpec, shape: &Shape) -> Option<[Vector3<f64>; 2]> {
+    if let Shape::Mesh(mesh) = shape {
+        return around(mesh.vertices().iter().copied());
+    }
+    bounding_ball(shape)?;
+    around(triangles(spec, Some(shape))?.places.iter().map(|place| place.coords))
+}
+
+fn around(mut points: impl Iterator<Item = Vector3<f64>>) -> Option<[Vector3<f64>; 2]> {
+    let first = points.next()?;
+    Some(points.fold([first; 2], |[least, most], point| [least.inf(&point), most.sup(&point)]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_as_short_as_four_digits_allow() {
+        assert_eq!(
+            [0.05, 1.0 / 3.0, 1234.56, 1e-7, 0.0].map(short),
+            ["0.05", "0.3333", "1235", "0.0000001", "0"]
+        );
+    }
+}

@@ -1,0 +1,94 @@
+//! Content of an MCAP chunk: decompressed within bounds and checked.
+//!
+//! Model: a chunk says how large its content is. It is believed up to [`MOST_CHUNK_BYTES`] and up to what its compressed
+//! bytes can make: LZ4 makes at most 255 bytes of one.
+
+use super::mcap_record::Chunk;
+use std::io::Read;
+
+/// The most that a chunk's records may have: chunks of ours have 4 MiB and a message.
+const MOST_CHUNK_BYTES: u64 = 64 << 20;
+/// Of a byte of LZ4.
+const MOST_EXPANSION: u64 = 255;
+
+/// The records of a chunk.
+///
+/// # Errors
+/// What is wrong with it.
+pub(super) fn content(chunk: &Chunk<'_>) -> Result<Vec<u8>, String> {
+    let content = match chunk.compression {
+        "" => chunk.records.to_vec(),
+        "lz4" => expand(chunk)?,
+        other => return Err(format!("a chunk is compressed by {other:?}; allowed: lz4, or nothing")),
+    };
+    if content.len() as u64 != chunk.uncompressed_bytes {
+        return Err(format!("a chunk has {} bytes, and says {}", content.len(), chunk.uncompressed_bytes));
+    }
+    let crc = crc32fast::hash(&content);
+    if chunk.crc != 0 && chunk.crc != crc {
+        return Err(format!("the check sum of a chunk is {crc:08x}, and should be {:08x}", chunk.crc));
+    }
+    Ok(content)
+}
+
+fn expand(chunk: &Chunk<'_>) -> Result<Vec<u8>, String> {
+    let most = MOST_CHUNK_BYTES.min((chunk.records.len() as u64).saturating_mul(MOST_EXPANSION));
+    let said = chunk.uncompressed_bytes;
+    if said > most {
+        return Err(format!("a chunk says that it has {said} bytes; allowed: at most {most}"));
+    }
+    let wrong = |error: std::io::Error| format!("a chunk cannot be expanded: {error}");
+    let mut content = Vec::with_capacity(said as usize);
+    let decoder = lz4::Decoder::new(chunk.records).map_err(wrong)?;
+    decoder.take(said + 1).read_to_end(&mut content).map_err(wrong)?;
+    Ok(content)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    fn compressed(bytes: &[u8]) -> Vec<u8> {
+        let mut encoder = lz4::EncoderBuilder::new().build(Vec::new()).expect("memory");
+        encoder.write_all(bytes).expect("memory");
+        encoder.finish().0
+    }
+
+    fn chunk<'a>(records: &'a [u8], compression: &'a str, of: &[u8]) -> Chunk<'a> {
+        let (uncompressed_bytes, crc) = (of.len() as u64, crc32fast::hash(of));
+        Chunk { uncompressed_bytes, crc, compression, records }
+    }
+
+    #[test]
+    fn what_was_compressed_comes_back_and_every_flipped_bit_is_found() {
+        let records: Vec<u8> = (0..5000u32).map(|i| (i / 7) as u8).collect();
+        let small = compressed(&records);
+        assert_eq!(content(&chunk(&small, "lz4", &records)).expect("whole"), records);
+        assert_eq!(content(&chunk(&records, "", &records)).expect("whole"), records);
+        for at in 0..small.len() {
+            let mut flipped = small.clone();
+            flipped[at] ^= 0x10;
+            // Not every bit of the frame's head is of the content.
+            if let Ok(other) = content(&chunk(&flipped, "lz4", &records)) {
+                assert_eq!(other, records, "byte {at}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_size_that_its_bytes_cannot_have_is_refused_before_memory_is_asked_for() {
+        let records = [0; 100];
+        let small = compressed(&records);
+        let lie = |uncompressed_bytes| {
+            let lie = Chunk { uncompressed_bytes, ..chunk(&small, "lz4", &records) };
+            content(&lie).expect_err("a lie")
+        };
+        assert!(lie(u64::MAX).contains("allowed: at most"), "{}", lie(u64::MAX));
+        assert!(lie(1 << 32).contains("allowed: at most"));
+        assert!(lie(101).contains("has 100 bytes, and says 101"));
+        assert!(lie(99).contains("has 100 bytes, and says 99"));
+        let zstd = Chunk { compression: "zstd", ..chunk(&small, "lz4", &records) };
+        assert!(content(&zstd).expect_err("none of ours").contains("allowed: lz4"));
+    }
+}

@@ -1,0 +1,211 @@
+//! Records of an MCAP file, borrowed from its bytes.
+//!
+//! Problem: a record holds lengths of texts, maps and files inside it. The `mcap` crate's own parser asks for the memory
+//! of a length before it looks whether so many bytes are there, 4 GiB of them in a damaged file, and panics at an
+//! attachment that is too short for its check sum.
+//! Model: every part is a slice of what is there; a length beyond it makes the record none. Only the parts that a replay
+//! needs are taken. Reference: the MCAP specification, "Records".
+//! Cost: nothing is copied but metadata.
+
+use std::collections::BTreeMap;
+
+/// A record's content, as far as it is used here.
+#[derive(Debug, PartialEq)]
+pub(super) enum McapRecord<'a> {
+    /// Where messages of one topic go.
+    Channel { id: u16, topic: &'a str },
+    /// A message of a channel.
+    Message { channel: u16, data: &'a [u8] },
+    /// Many records, perhaps compressed.
+    Chunk(Chunk<'a>),
+    /// A file.
+    Attachment { name: &'a str, data: &'a [u8] },
+    /// Words under a name.
+    Metadata { name: &'a str, facts: BTreeMap<String, String> },
+    /// Anything else.
+    Other,
+}
+
+/// A chunk as it stands in the file.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct Chunk<'a> {
+    /// How many bytes its records have.
+    pub(super) uncompressed_bytes: u64,
+    /// Their check sum, 0: none.
+    pub(super) crc: u32,
+    /// `lz4`, or nothing.
+    pub(super) compression: &'a str,
+    pub(super) records: &'a [u8],
+}
+
+const CHANNEL: u8 = 0x04;
+const MESSAGE: u8 = 0x05;
+const CHUNK: u8 = 0x06;
+const ATTACHMENT: u8 = 0x09;
+const METADATA: u8 = 0x0c;
+
+/// Reads a record; `None` if it is shorter than it says, or a text in it is none.
+pub(super) fn parse(opcode: u8, body: &[u8]) -> Option<McapRecord<'_>> {
+    let mut fields = Fields(body);
+    Some(match opcode {
+        CHANNEL => {
+            let id = fields.u16()?;
+            let _schema = fields.u16()?;
+            McapRecord::Channel { id, topic: fields.text()? }
+        }
+        MESSAGE => {
+            let channel = fields.u16()?;
+            let _sequence_and_times = fields.take(4 + 8 + 8)?;
+            McapRecord::Message { channel, data: fields.0 }
+        }
+        CHUNK => McapRecord::Chunk(chunk(&mut fields)?),
+        ATTACHMENT => attachment(body)?,
+        METADATA => McapRecord::Metadata { name: fields.text()?, facts: fields.map()? },
+        _ => McapRecord::Other,
+    })
+}
+
+/// The first record in the content of a chunk, and what is behind it; `None` if it is cut.
+pub(super) fn split_record(bytes: &[u8]) -> Option<((u8, &[u8]), &[u8])> {
+    let mut fields = Fields(bytes);
+    let [opcode] = fields.array()?;
+    let body = fields.long_bytes()?;
+    Some(((opcode, body), fields.0))
+}
+
+fn chunk<'a>(fields: &mut Fields<'a>) -> Option<Chunk<'a>> {
+    let _times = fields.take(8 + 8)?;
+    Some(Chunk {
+        uncompressed_bytes: fields.u64()?,
+        crc: fields.u32()?,
+        compression: fields.text()?,
+        records: fields.long_bytes()?,
+    })
+}
+
+fn attachment(body: &[u8]) -> Option<McapRecord<'_>> {
+    let mut fields = Fields(body);
+    let _times = fields.take(8 + 8)?;
+    let name = fields.text()?;
+    let _media_type = fields.text()?;
+    let data = fields.long_bytes()?;
+    let summed = &body[..body.len() - fields.0.len()];
+    let crc = fields.u32()?;
+    (crc == 0 || crc == crc32fast::hash(summed)).then_some(McapRecord::Attachment { name, data })
+}
+
+/// What has not been taken of some bytes.
+struct Fields<'a>(&'a [u8]);
+
+impl<'a> Fields<'a> {
+    fn take(&mut self, count: usize) -> Option<&'a [u8]> {
+        let (taken, rest) = self.0.split_at_checked(count)?;
+        self.0 = rest;
+        Some(taken)
+    }
+
+    fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let (taken, rest) = self.0.split_first_chunk()?;
+        self.0 = rest;
+        Some(*taken)
+    }
+
+    fn u16(&mut self) -> Option<u16> {
+        self.array().map(u16::from_le_bytes)
+    }
+
+    fn u32(&mut self) -> Option<u32> {
+        self.array().map(u32::from_le_bytes)
+    }
+
+    fn u64(&mut self) -> Option<u64> {
+        self.array().map(u64::from_le_bytes)
+    }
+
+    /// Bytes behind their length in 8 bytes.
+    fn long_bytes(&mut self) -> Option<&'a [u8]> {
+        let length = usize::try_from(self.u64()?).ok()?;
+        self.take(length)
+    }
+
+    /// Bytes behind their length in 4 bytes.
+    fn short_bytes(&mut self) -> Option<&'a [u8]> {
+        let length = usize::try_from(self.u32()?).ok()?;
+        self.take(length)
+    }
+
+    fn text(&mut self) -> Option<&'a str> {
+        std::str::from_utf8(self.short_bytes()?).ok()
+    }
+
+    fn map(&mut self) -> Option<BTreeMap<String, String>> {
+        let mut pairs = Fields(self.short_bytes()?);
+        let mut map = BTreeMap::new();
+        while !pairs.0.is_empty() {
+            map.insert(pairs.text()?.to_owned(), pairs.text()?.to_owned());
+        }
+        Some(map)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn text(words: &str) -> Vec<u8> {
+        [&(words.len() as u32).to_le_bytes(), words.as_bytes()].concat()
+    }
+
+    /// One record of each kind, in the library's own bytes where it writes them.
+    fn records() -> Vec<(u8, Vec<u8>)> {
+        let map = [text("a"), text("1")].concat();
+        let attached =
+            [vec![0; 16], text("scene:x"), text(""), 3u64.to_le_bytes().into(), b"abc".into()].concat();
+        let crc = crc32fast::hash(&attached).to_le_bytes();
+        vec![
+            (CHANNEL, [vec![7, 0, 1, 0], text("/tick"), text("protobuf"), text("")].concat()),
+            (MESSAGE, [vec![7, 0], vec![0; 20], b"data".into()].concat()),
+            (
+                CHUNK,
+                [vec![0; 16], vec![9; 8], vec![1; 4], text("lz4"), 2u64.to_le_bytes().into(), vec![5, 6]]
+                    .concat(),
+            ),
+            (ATTACHMENT, [attached, crc.into()].concat()),
+            (METADATA, [text("n"), (map.len() as u32).to_le_bytes().into(), map].concat()),
+        ]
+    }
+
+    #[test]
+    fn the_parts_of_records_are_where_the_specification_has_them() {
+        let records = records();
+        let parsed: Vec<_> =
+            records.iter().map(|(opcode, body)| parse(*opcode, body).expect("whole")).collect();
+        assert_eq!(parsed[0], McapRecord::Channel { id: 7, topic: "/tick" });
+        assert_eq!(parsed[1], McapRecord::Message { channel: 7, data: b"data" });
+        let McapRecord::Chunk(chunk) = &parsed[2] else { panic!("a chunk") };
+        assert_eq!((chunk.uncompressed_bytes, chunk.crc), (0x0909_0909_0909_0909, 0x0101_0101));
+        assert_eq!((chunk.compression, chunk.records), ("lz4", &[5, 6][..]));
+        assert_eq!(parsed[3], McapRecord::Attachment { name: "scene:x", data: b"abc" });
+        let facts = [("a".to_owned(), "1".to_owned())].into();
+        assert_eq!(parsed[4], McapRecord::Metadata { name: "n", facts });
+    }
+
+    #[test]
+    fn a_record_that_is_cut_anywhere_or_says_it_is_longer_is_none() {
+        for (opcode, body) in records() {
+            let least = if opcode == MESSAGE { 22 } else { body.len() };
+            // Behind a channel's topic nothing is needed.
+            let least = if opcode == CHANNEL { 4 + 4 + 5 } else { least };
+            for length in 0..least {
+                assert_eq!(parse(opcode, &body[..length]), None, "{opcode:#x} cut to {length}");
+            }
+            for at in 0..body.len() {
+                let mut larger = body.clone();
+                larger[at] = 0xff;
+                let _ = parse(opcode, &larger);
+            }
+        }
+        let long = [&[MESSAGE][..], &u64::MAX.to_le_bytes()].concat();
+        assert_eq!(split_record(&long), None);
+    }
+}

@@ -1,0 +1,148 @@
+//! Bounded reading of regular files that a user or a scene names.
+//!
+//! Problem: a path in a file can lead anywhere. Opening a FIFO waits for a writer for ever, `/dev/zero` never ends, a
+//! terminal steals what is typed, and a directory opens and then fails with a word that explains nothing.
+//! Model: what is no regular file is refused before it is opened, and again on the open descriptor, since the path may
+//! have been replaced in between; that open never waits (`O_NONBLOCK`, which regular files ignore). At most one byte
+//! more than the bound is read, whatever size the file had a moment ago.
+//! Invariant: memory is at most the bound, and is asked for as bytes arrive.
+
+use std::fs::{File, FileType, Metadata, OpenOptions};
+use std::io::{self, ErrorKind, Read};
+use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
+use std::path::Path;
+
+/// Opens a regular file for reading.
+///
+/// # Errors
+/// What the system says; [`ErrorKind::InvalidInput`], with what it is, if it is no regular file.
+pub fn open(path: &Path) -> io::Result<File> {
+    check(&path.metadata()?)?;
+    let file = OpenOptions::new().read(true).custom_flags(libc::O_NONBLOCK | libc::O_NOCTTY).open(path)?;
+    check(&file.metadata()?)?;
+    Ok(file)
+}
+
+/// The content of a regular file.
+///
+/// # Errors
+/// As [`open`]; [`ErrorKind::FileTooLarge`] beyond `most_bytes`.
+pub fn read(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open(path)?.take(most_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > most_bytes {
+        let said = format!("it is larger than {most_bytes} bytes, the most that is read of such a file");
+        return Err(io::Error::new(ErrorKind::FileTooLarge, said));
+    }
+    Ok(bytes)
+}
+
+/// The content of a regular file as text.
+///
+/// # Errors
+/// As [`read`]; [`ErrorKind::InvalidData`], with the line, if it is not UTF-8.
+pub fn read_text(path: &Path, most_bytes: u64) -> io::Result<String> {
+    String::from_utf8(read(path, most_bytes)?).map_err(|error| {
+        let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = 1 + valid.iter().filter(|&&byte| byte == b'\n').count();
+        let said = format!("line {line} is not UTF-8 text; save the file as UTF-8");
+        io::Error::new(ErrorKind::InvalidData, said)
+    })
+}
+
+fn check(found: &Metadata) -> io::Result<()> {
+    if found.is_file() {
+        return Ok(());
+    }
+    let said = format!("it is {}, no regular file", kind(found.file_type()));
+    Err(io::Error::new(ErrorKind::InvalidInput, said))
+}
+
+fn kind(found: FileType) -> &'static str {
+    if found.is_dir() {
+        "a directory"
+    } else if found.is_fifo() {
+        "a pipe"
+    } else if found.is_socket() {
+        "a socket"
+    } else {
+        "a device"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::os::unix::ffi::OsStrExt;
+
+    /// A directory of its own, removed at the end.
+    struct Place(std::path::PathBuf);
+
+    impl Place {
+        fn new(name: &str) -> Self {
+            let path = std::env::temp_dir().join(format!("input-file-{name}-{}", std::process::id()));
+            std::fs::create_dir_all(&path).expect("a directory in TMPDIR");
+            Self(path)
+        }
+
+        fn write(&self, bytes: &[u8]) -> std::path::PathBuf {
+            let path = self.0.join("file");
+            std::fs::write(&path, bytes).expect("our own directory");
+            path
+        }
+    }
+
+    impl Drop for Place {
+        fn drop(&mut self) {
+            let _ = std::fs::remove_dir_all(&self.0);
+        }
+    }
+
+    #[test]
+    fn a_file_is_read_up_to_its_bound_and_refused_beyond() {
+        let place = Place::new("bound");
+        let path = place.write(b"abc\n");
+        assert_eq!(read(&path, 4).expect("as long as allowed"), b"abc\n");
+        let refused = read(&path, 3).expect_err("one byte too long");
+        assert_eq!(refused.kind(), ErrorKind::FileTooLarge);
+        assert!(refused.to_string().contains("larger than 3 bytes"), "{refused}");
+        assert_eq!(read(&place.write(b""), 0).expect("nothing is no more than nothing"), b"");
+    }
+
+    #[test]
+    fn what_is_not_text_is_told_with_its_line() {
+        let place = Place::new("text");
+        let refused = read_text(&place.write(b"a\nb\n\xff\n"), 100).expect_err("no text");
+        assert_eq!(refused.to_string(), "line 3 is not UTF-8 text; save the file as UTF-8");
+        assert_eq!(read_text(&place.write("ä".as_bytes()), 100).expect("text"), "ä");
+    }
+
+    #[test]
+    fn a_pipe_without_a_writer_a_device_and_a_directory_are_refused_at_once() {
+        let place = Place::new("kinds");
+        let pipe = place.0.join("pipe");
+        nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
+        let link = place.0.join("link");
+        std::os::unix::fs::symlink(&pipe, &link).expect("a link");
+        let zero = Path::new("/dev/zero");
+        for (path, found) in
+            [(&*pipe, "a pipe"), (&*link, "a pipe"), (zero, "a device"), (&*place.0, "a directory")]
+        {
+            let refused = read(path, 100).expect_err("no file");
+            assert_eq!(refused.kind(), ErrorKind::InvalidInput, "{}", path.display());
+            assert_eq!(refused.to_string(), format!("it is {found}, no regular file"));
+        }
+    }
+
+    #[test]
+    fn links_in_a_circle_and_names_that_cannot_be_are_the_systems_own_errors() {
+        let place = Place::new("links");
+        let [a, b] = ["a", "b"].map(|name| place.0.join(name));
+        std::os::unix::fs::symlink(&a, &b).expect("a link");
+        std::os::unix::fs::symlink(&b, &a).expect("a link");
+        assert_eq!(open(&a).expect_err("a circle").raw_os_error(), Some(libc::ELOOP));
+        assert_eq!(open(Path::new("")).expect_err("no name").kind(), ErrorKind::NotFound);
+        let with_zero = Path::new(std::ffi::OsStr::from_bytes(b"a\0b"));
+        assert_eq!(open(with_zero).expect_err("no name").kind(), ErrorKind::InvalidInput);
+    }
+}

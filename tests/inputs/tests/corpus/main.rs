@@ -1,0 +1,90 @@
+//! The committed corpora, bytes that once failed, and ugly ones made of these, through every fuzz target.
+//!
+//! Each target has a process of its own: one whose memory grows beyond the bound ends by a failed allocation, which the test
+//! then tells. `INPUT_ROUNDS=100000 cargo test -p input-targets` spoils more inputs than the usual few.
+
+mod spoil;
+
+use input_targets::{TARGETS, Target};
+use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+use spoil::{Random, spoilt};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+/// What a target may take, of address space beyond what the test itself has: as much as the fuzzer allows.
+const MOST_BYTES: u64 = 1 << 30;
+/// For one input: a hundred times what the slowest takes, so that a busy machine does not fail.
+const MOST_TIME: Duration = Duration::from_secs(20);
+/// Spoilt inputs for each target.
+const ROUNDS: u64 = 100;
+/// Set in the process that runs one target.
+const TARGET: &str = "INPUT_TARGET";
+
+fn inputs(target: &str) -> Vec<PathBuf> {
+    let of = |place: &str| Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz").join(place).join(target);
+    let files =
+        |place: &str| std::fs::read_dir(of(place)).into_iter().flatten().flatten().map(|file| file.path());
+    let mut all: Vec<PathBuf> = files("corpus").chain(files("crashes")).collect();
+    all.sort();
+    all
+}
+
+#[test]
+fn every_target_has_a_corpus() {
+    for (name, _) in TARGETS {
+        assert!(!inputs(name).is_empty(), "tests/fuzz/corpus/{name} is empty or not there");
+    }
+}
+
+#[test]
+fn all_inputs_of_every_target_end_soon_and_within_their_memory() {
+    for (name, _) in TARGETS {
+        let mut child = Command::new(std::env::current_exe().expect("this test"));
+        child.args(["--exact", "--ignored", "--nocapture", "one_target"]).env(TARGET, name);
+        let out = child.output().expect("this test once more");
+        let said = String::from_utf8_lossy(&out.stderr);
+        assert!(out.status.success(), "{name}: {}\n{said}", out.status);
+    }
+}
+
+#[test]
+#[ignore = "a part of all_inputs_of_every_target_end_soon_and_within_their_memory, which starts it"]
+fn one_target() {
+    let Ok(name) = std::env::var(TARGET) else { return };
+    let (_, target) = TARGETS.iter().find(|(other, _)| *other == name).expect("a target");
+    limit_memory();
+    let mut corpus = Vec::new();
+    for input in inputs(&name) {
+        eprintln!("{}", input.display());
+        let bytes = std::fs::read(&input).expect("our own file");
+        try_soon(*target, &bytes);
+        corpus.push(bytes);
+    }
+    let rounds = std::env::var("INPUT_ROUNDS").ok().and_then(|rounds| rounds.parse().ok()).unwrap_or(ROUNDS);
+    // Kept until the next is tried, so that what failed is there.
+    let kept = std::env::temp_dir().join(format!("phantom3-spoilt-{name}-{}", std::process::id()));
+    eprintln!("spoilt inputs; the one that fails is left in {}", kept.display());
+    for round in 0..rounds {
+        let mut random = Random::of(&name, round);
+        let [good, other] = [0; 2].map(|_| &corpus[random.below(corpus.len())]);
+        let bytes = spoilt(good, other, &mut random);
+        std::fs::write(&kept, &bytes).expect("a place for it");
+        try_soon(*target, &bytes);
+    }
+    std::fs::remove_file(&kept).expect("our own file");
+}
+
+fn try_soon(target: Target, bytes: &[u8]) {
+    let began = Instant::now();
+    target(bytes);
+    assert!(began.elapsed() < MOST_TIME, "it took {:?}", began.elapsed());
+}
+
+fn limit_memory() {
+    let status = std::fs::read_to_string("/proc/self/status").expect("a process");
+    let line = status.lines().find_map(|line| line.strip_prefix("VmSize:")).expect("its size");
+    let kilobytes: u64 = line.trim().trim_end_matches(" kB").parse().expect("a number");
+    let Rlimit { maximum, .. } = getrlimit(Resource::As);
+    setrlimit(Resource::As, Rlimit { current: Some(kilobytes * 1024 + MOST_BYTES), maximum }).expect("less");
+}
