@@ -46,6 +46,18 @@ impl Rig {
         }
     }
 
+    /// The same with fingers that begin there (m), and devices where these reach that.
+    ///
+    /// # Errors
+    /// If it is not known what the devices are.
+    pub fn starting_at(mut self, starts: &[Vector3<f64>]) -> Result<Self, RigError> {
+        for (finger, start) in self.scene.fingers.iter_mut().zip(starts) {
+            finger.start_m = (*start).into();
+        }
+        self.bases = self.place_bases()?;
+        Ok(self)
+    }
+
     /// What the devices of fingers all reach: corners of a box in W (m).
     ///
     /// # Errors
