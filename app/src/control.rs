@@ -24,7 +24,7 @@ use crate::fast_step::FastStep;
 use gradual::{FADE_S, Gradual};
 use order::{FrictionChange, Order, Replacement, Spent};
 use queue::OrderReceiver;
-use world::events::Kind;
+use world::events::Event;
 
 /// So many orders are taken in a tick.
 pub const ORDERS_A_TICK: usize = 4;
@@ -54,7 +54,7 @@ pub struct Turned {
     /// [`Control::give_back`].
     pub replaced: Option<Box<Replacement>>,
     /// What is to be told.
-    pub told: [Option<Kind>; ORDERS_A_TICK],
+    pub told: [Option<Event>; ORDERS_A_TICK],
     /// Orders that were taken, by their numbers in the run.
     pub taken: [Option<u64>; ORDERS_A_TICK],
 }
@@ -89,7 +89,9 @@ impl Control {
             match dated.order {
                 Order::Scale(scale) => self.gradual.scale(&scale),
                 Order::Move(moved) => self.gradual.set_out(&moved),
-                Order::Tell(kind) => *told = Some(kind),
+                Order::Tell(kind, at) => {
+                    *told = Some(Event { run_tick: at.map_or(run_tick, |at| at.min(run_tick)), kind });
+                }
                 Order::Text => {}
                 Order::Replace(next) => self.waiting = Some(Waiting::Replace(next)),
                 Order::Friction(change) => self.waiting = Some(Waiting::Friction(change)),

@@ -228,8 +228,8 @@ impl FastLoop {
             for number in turned.taken.into_iter().flatten() {
                 events.send(Event { run_tick, kind: Kind::Order { number } });
             }
-            for kind in turned.told.into_iter().flatten() {
-                events.send(Event { run_tick, kind });
+            for event in turned.told.into_iter().flatten() {
+                events.send(event);
             }
         }
         if let Some(replaced) = turned.replaced {
@@ -266,6 +266,7 @@ impl FastLoop {
         }
         self.place_in_time();
         self.row.run_tick = self.run_ticks();
+        self.row.due_ns = self.frame.deadline_ns;
         self.tally.park(self.step.parked_now(), self.row.run_tick, self.is_first_scene);
         self.tally.moving = [self.step.bodies().len(), self.step.made().awake];
         self.next_tick = self.row.run_tick + 1;

@@ -132,6 +132,7 @@ impl Parts {
         };
         let spectator =
             opened.map(|(window, moments)| Spectator::new(window, moments, &mut hub, book.clone()));
+        let spectator = spectator.map(|spectator| spectator.in_real_time(clock == ClockMode::Real));
         let view = View::new(&rig.scene, step.entities());
         let directory = plan.settings.recording_directory.value.clone();
         let on_request = spectator.is_some().then(|| OnRequest::new(directory, rig.clone(), view.clone()));

@@ -166,10 +166,15 @@ impl Desk {
                 )));
             }
             last_s = at_s;
-            let at_tick = (at_s * 1e9 / self.rig.period_ns as f64).round() as u64;
+            let at_tick = self.tick_at(at_s);
             self.order(at_tick, order).map_err(wrong)?;
         }
         Ok(())
+    }
+
+    /// The tick of the run that is nearest to this time of it (s).
+    fn tick_at(&self, at_s: f64) -> u64 {
+        (at_s * 1e9 / self.rig.period_ns as f64).round() as u64
     }
 
     /// Makes an order of words, and sends it for this tick of the run. A line of nothing is none.
@@ -195,7 +200,7 @@ impl Desk {
     pub fn order_now(&mut self, line: &str) -> Result<(), String> {
         let Some(words) = words::parse(line)? else { return Ok(()) };
         let goes_past = match words {
-            Words::Tell(_) | Words::Text(_) | Words::Pause(_) => true,
+            Words::Tell(..) | Words::Text(_) | Words::Pause(_) => true,
             // A script knows entities by their numbers in its own scene.
             Words::Swap(_) => self.script == Script::None,
             _ => self.script != Script::OtherScene,
@@ -221,7 +226,7 @@ impl Desk {
             Words::Friction(entity, spec) => self.friction(&entity, spec)?,
             Words::Move(entity, to_W, turn, over_s) => self.move_entity(&entity, to_W, turn, over_s)?,
             Words::Pause(is_paused) => Order::Pause(is_paused),
-            Words::Tell(kind) => Order::Tell(kind),
+            Words::Tell(kind, at_s) => Order::Tell(kind, at_s.map(|at_s| self.tick_at(at_s))),
             Words::Text(_) => Order::Text,
             Words::Swap(scene) => self.swap(&scene)?,
         })

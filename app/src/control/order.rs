@@ -19,8 +19,8 @@ pub enum Order {
     Friction(Box<FrictionChange>),
     /// Whether things move by themselves.
     Pause(bool),
-    /// Nothing; it is told among the events.
-    Tell(Kind),
+    /// Nothing; it is told among the events, as of this tick of the run if that is not later than now.
+    Tell(Kind, Option<u64>),
     /// Nothing; whoever looks on reads it when it is taken.
     Text,
     /// The world: a reset, or another scene.

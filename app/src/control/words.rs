@@ -12,7 +12,7 @@
 //! pause
 //! resume
 //! swap other.toml
-//! key 32 down
+//! key 32 down               it is told as of now; `key 32 down at 1.25` as of that time of the run
 //! trial 7 begins
 //! text 0.5 0.2 4 Press the red cube      at the window: shares of its width and height, seconds, what to read
 //! ```
@@ -42,8 +42,8 @@ pub enum Words {
     Pause(bool),
     /// Another scene is to be played.
     Swap(PathBuf),
-    /// Something is to be told among the events.
-    Tell(Kind),
+    /// Something is to be told among the events, as of this time of the run \[s\] if it is not of now.
+    Tell(Kind, Option<f64>),
     /// Something is to be read at the window.
     Text(Note),
 }
@@ -51,11 +51,12 @@ pub enum Words {
 /// Farther away nothing is put \[m\].
 const FARTHEST_M: f64 = 100.0;
 const LONGEST_S: f64 = 3600.0;
+const MOST_RUN_S: f64 = 1e9;
 const MOST_TURN_RAD: f64 = std::f64::consts::PI;
 const KNOWN: &str = "reset; stiffness FACTOR [of ENTITY]; damping FACTOR [of ENTITY]; friction ENTITY MODEL [KEY=VALUE]...; \
                      move ENTITY to X Y Z in SECONDS; turn ENTITY to W X Y Z in SECONDS; \
                      turn ENTITY about X Y Z by RAD in SECONDS; pose ENTITY at X Y Z W X Y Z in SECONDS; pause; resume; \
-                     swap SCENE.toml; key CODE down|up; trial NUMBER begins|ends; text X Y SECONDS WORDS...";
+                     swap SCENE.toml; key CODE down|up [at SECONDS]; trial NUMBER begins|ends; text X Y SECONDS WORDS...";
 
 /// What a line says after the comment is cut off; `None`: nothing.
 ///
@@ -88,11 +89,15 @@ pub fn parse(line: &str) -> Result<Option<Words>, String> {
         ["resume"] => Words::Pause(false),
         ["swap", scene] => Words::Swap(scene.into()),
         ["key", code, change @ ("down" | "up")] => {
-            Words::Tell(Kind::Key { code: whole(code)?, is_pressed: change == "down" })
+            Words::Tell(Kind::Key { code: whole(code)?, is_pressed: change == "down" }, None)
         }
+        ["key", code, change @ ("down" | "up"), "at", at] => Words::Tell(
+            Kind::Key { code: whole(code)?, is_pressed: change == "down" },
+            Some(run_seconds(at)?),
+        ),
         ["trial", trial, change @ ("begins" | "ends")] => {
             let change = if change == "begins" { Change::Begins } else { Change::Ends };
-            Words::Tell(Kind::Trial { change, number: whole(trial)? })
+            Words::Tell(Kind::Trial { change, number: whole(trial)? }, None)
         }
         ["text", x, y, over, _, ..] => {
             let at = [share(x)?, share(y)?];
@@ -163,6 +168,11 @@ fn seconds(text: &str) -> Result<f64, String> {
     number(text, "s", 0.0, LONGEST_S)
 }
 
+/// A time of the run.
+fn run_seconds(text: &str) -> Result<f64, String> {
+    number(text, "s", 0.0, MOST_RUN_S)
+}
+
 fn share(text: &str) -> Result<f64, String> {
     number(text, "of the window", 0.0, 1.0)
 }
@@ -225,8 +235,9 @@ mod tests {
             ("friction table none", Words::Friction("table".into(), FrictionSpec::None)),
             ("pause", Words::Pause(true)),
             ("resume", Words::Pause(false)),
-            ("key 32 down", Words::Tell(Kind::Key { code: 32, is_pressed: true })),
-            ("trial 7 ends", Words::Tell(Kind::Trial { change: Change::Ends, number: 7 })),
+            ("key 32 down", Words::Tell(Kind::Key { code: 32, is_pressed: true }, None)),
+            ("key 32 up at 1.25", Words::Tell(Kind::Key { code: 32, is_pressed: false }, Some(1.25))),
+            ("trial 7 ends", Words::Tell(Kind::Trial { change: Change::Ends, number: 7 }, None)),
             (
                 "text 0.5 0.25 4 Press  the cube # softly",
                 Words::Text(Note { text: "Press the cube".into(), at: [0.5, 0.25], seconds: 4.0 }),

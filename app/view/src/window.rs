@@ -7,6 +7,7 @@
 //! One process has one window at most, once.
 
 mod controls;
+mod key_listener;
 mod looker;
 mod scene;
 mod writing;

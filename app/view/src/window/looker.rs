@@ -1,6 +1,7 @@
 //! Who looks on: takes the news, draws, and asks.
 
 use super::controls::{Controls, Reach};
+use super::key_listener::KeyListener;
 use super::scene::SceneView;
 use super::{Ends, WindowSpec};
 use crate::eyes::Eyes;
@@ -43,7 +44,7 @@ impl Looker {
     ) -> Result<Self, String> {
         let camera = stage.cameras.first().cloned().ok_or("nobody looks on")?;
         let mut eyes = spec.eyes;
-        let controls = Controls::new(spec, &mut eyes, &stage);
+        let controls = Controls::new(spec, &mut eyes, &stage, KeyListener::start(creation));
         let view = SceneView::new(creation, stage, spec.with_shadows)?;
         let hand = reins.as_ref().map(|reins| reins.hand()).unwrap_or_default();
         Ok(Self {
