@@ -6,6 +6,7 @@
 //! Cost: bounded; no allocation, no system call but the wake-up of a sleeping driver.
 
 use crate::control::Control;
+use crate::control::carriage::Carriage;
 use crate::control::order::Replacement;
 use crate::control::queue::OrderReceiver;
 use crate::displaced::Displaced;
@@ -151,6 +152,13 @@ impl FastLoop {
     #[must_use]
     pub fn with_control(mut self, orders: OrderReceiver) -> Self {
         self.control = Some(Control::new(orders, self.step.entities().len()));
+        self
+    }
+
+    /// With devices that go with the camera, if orders come.
+    #[must_use]
+    pub fn with_carriage(mut self, carriage: Carriage) -> Self {
+        self.control = self.control.map(|control| control.with_carriage(carriage));
         self
     }
 

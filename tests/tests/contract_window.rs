@@ -204,3 +204,37 @@ fn wait_for(place: &Workplace, column: &str, least: f64) {
         std::thread::sleep(Duration::from_millis(200));
     }
 }
+
+#[test]
+fn devices_that_are_attached_to_the_camera_go_with_the_window_s() {
+    let Some(screen) = Screen::open() else { return };
+    let place = Workplace::new();
+    let other = "[[camera]]\nname = \"aside\"\nposition_m = [0.1, 0.0, 0.55]\nfield_of_view_deg = 40.0\n";
+    place.write("scene.toml", [SCENE, other].concat());
+    let device = "[[device]]\nposition_m = [0.0, 0.1, -0.5]\n";
+    place.write("layout.toml", format!("master = 0\nattached_to = \"camera\"\n{device}"));
+    let mut run = place.phantom3();
+    run.args(["run", "scene.toml", "--layout", "layout.toml", "--seconds", "100", "--record", "run.csv"]);
+    run.env("DISPLAY", screen.display()).env("LIBGL_ALWAYS_SOFTWARE", "1");
+    let running = Running::start(run);
+    if !shows_the_ball(&screen, &running) || !screen.press("c") {
+        return;
+    }
+    wait_for(&place, "f0_hip_x", 0.1 - 1e-7);
+    assert!(screen.press("Escape"));
+    let said = running.wait();
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    let samples = Table::read(&place.path("run.csv")).finger("f0");
+    let (first, last) = (samples[0].hip, samples[samples.len() - 1].hip);
+    // Where the scene has it, though the layout says nothing of where the camera is; then as far as the camera goes.
+    assert!((first - nalgebra::Vector3::new(0.0, 0.1, 0.0)).norm() < 1e-6, "{first}");
+    assert!((last - first - nalgebra::Vector3::new(0.1, 0.0, 0.05)).norm() < 1e-6, "{last}");
+    for ticks in samples.windows(2) {
+        let ticks_between = ((ticks[1].t - ticks[0].t) * 1e3).round();
+        assert!(
+            (ticks[1].hip - ticks[0].hip).norm() <= ticks_between * 0.5e-3 + 1e-9,
+            "{} s: a blow",
+            ticks[1].t
+        );
+    }
+}

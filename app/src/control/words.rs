@@ -9,6 +9,7 @@
 //! turn table to 1 0 0 0 in 0.5           a quaternion w x y z
 //! turn table about 0 1 0 by 1.57 in 0.5  an axis of the world, and an angle in rad
 //! pose table at 0 0.1 0 1 0 0 0 in 0.5   both
+//! camera at 0 0.2 0.4 1 0 0 0             devices that are attached to it go along
 //! pause
 //! resume
 //! swap other.toml
@@ -18,7 +19,7 @@
 //! ```
 //! In a script each line begins with when: `at 2.5 reset`. What follows a `#` is for people.
 
-use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Quaternion, Unit, UnitQuaternion, Vector3};
 use std::path::PathBuf;
 use view::Note;
 use world::FrictionSpec;
@@ -38,6 +39,8 @@ pub enum Words {
     Friction(String, FrictionSpec),
     /// An entity is to go there \[m\] and to be turned so, within a time \[s\].
     Move(String, Option<Vector3<f64>>, Turn, f64),
+    /// The camera, and devices that go with it, are to be there.
+    Camera(Isometry3<f64>),
     /// Things are not to move by themselves, or to do so again.
     Pause(bool),
     /// Another scene is to be played.
@@ -55,7 +58,8 @@ const MOST_RUN_S: f64 = 1e9;
 const MOST_TURN_RAD: f64 = std::f64::consts::PI;
 const KNOWN: &str = "reset; stiffness FACTOR [of ENTITY]; damping FACTOR [of ENTITY]; friction ENTITY MODEL [KEY=VALUE]...; \
                      move ENTITY to X Y Z in SECONDS; turn ENTITY to W X Y Z in SECONDS; \
-                     turn ENTITY about X Y Z by RAD in SECONDS; pose ENTITY at X Y Z W X Y Z in SECONDS; pause; resume; \
+                     turn ENTITY about X Y Z by RAD in SECONDS; pose ENTITY at X Y Z W X Y Z in SECONDS; camera at X Y Z W X Y Z; \
+                     pause; resume; \
                      swap SCENE.toml; key CODE down|up [at SECONDS]; trial NUMBER begins|ends; text X Y SECONDS WORDS...";
 
 /// What a line says after the comment is cut off; `None`: nothing.
@@ -84,6 +88,9 @@ pub fn parse(line: &str) -> Result<Option<Words>, String> {
         ["pose", entity, "at", x, y, z, w, i, j, k, "in", over] => {
             let turn = Turn::To(quaternion([w, i, j, k])?);
             Words::Move(entity.into(), Some(place([x, y, z])?), turn, seconds(over)?)
+        }
+        ["camera", "at", x, y, z, w, i, j, k] => {
+            Words::Camera(Isometry3::from_parts(place([x, y, z])?.into(), quaternion([w, i, j, k])?))
         }
         ["pause"] => Words::Pause(true),
         ["resume"] => Words::Pause(false),
@@ -233,6 +240,10 @@ mod tests {
                 Words::Friction("table".into(), FrictionSpec::Coulomb { mu: 0.3 }),
             ),
             ("friction table none", Words::Friction("table".into(), FrictionSpec::None)),
+            ("camera at 1 2 3 0 1 0 0", {
+                let pose = Isometry3::from_parts([1.0, 2.0, 3.0].into(), half_a_turn(Vector3::x_axis()));
+                Words::Camera(pose)
+            }),
             ("pause", Words::Pause(true)),
             ("resume", Words::Pause(false)),
             ("key 32 down", Words::Tell(Kind::Key { code: 32, is_pressed: true }, None)),

@@ -58,6 +58,21 @@ impl Rig {
         Ok(self)
     }
 
+    /// Whether devices go where the camera goes.
+    pub fn goes_with_the_camera(&self) -> bool {
+        self.layout.as_ref().is_some_and(|layout| layout.camera().is_some())
+    }
+
+    /// The same with the camera there, and all devices that go with it.
+    ///
+    /// # Errors
+    /// If it is not known what the devices are.
+    pub fn seen_from(mut self, camera: Isometry3<f64>) -> Result<Self, RigError> {
+        self.layout = self.layout.map(|layout| layout.with_camera(camera));
+        self.bases = self.place_bases()?;
+        Ok(self)
+    }
+
     /// What the devices of fingers all reach: corners of a box in W (m).
     ///
     /// # Errors
