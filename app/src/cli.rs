@@ -211,6 +211,7 @@ fn window_spec(title: &str, settings: &Settings) -> Result<Option<WindowSpec>, R
         },
         bindings,
         pictures: settings.recording_directory.value.clone().unwrap_or_default(),
+        carries_devices: false,
     }))
 }
 

@@ -8,11 +8,13 @@
 //! is done while no force is felt, for which forces fade away and come back: a world that takes the place of another one;
 //! and, where a finger feels it, friction, a pause, a body that is taken or let go. A reset is an exchange of worlds, with
 //! the same scene made anew: so everything is where it began, to the bit.
+//! Devices that are attached to the camera follow it ([`carriage`]).
 //! Invariants: orders are done in the order in which they came, but for what somebody wants now while a script waits; the
 //! fast side neither allocates nor frees: what it is done with goes back to the slow side.
 
 #![allow(non_snake_case)] // Names carry their frame: to_W is a place in W.
 
+pub mod carriage;
 pub mod desk;
 pub mod gradual;
 pub mod order;
@@ -21,10 +23,11 @@ pub mod queue;
 pub mod words;
 
 use crate::fast_step::FastStep;
+use carriage::Carriage;
 use gradual::{FADE_S, Gradual};
 use order::{FrictionChange, Order, Replacement, Spent};
 use queue::OrderReceiver;
-use world::events::Kind;
+use world::events::Event;
 
 /// So many orders are taken in a tick.
 pub const ORDERS_A_TICK: usize = 4;
@@ -33,6 +36,8 @@ pub const ORDERS_A_TICK: usize = 4;
 pub struct Control {
     orders: OrderReceiver,
     gradual: Gradual,
+    /// Of devices that go with the camera.
+    carriage: Carriage,
     /// What is to be done next, and waits for silence.
     waiting: Option<Waiting>,
     /// How much of the forces is felt, 0 to 1.
@@ -54,7 +59,7 @@ pub struct Turned {
     /// [`Control::give_back`].
     pub replaced: Option<Box<Replacement>>,
     /// What is to be told.
-    pub told: [Option<Kind>; ORDERS_A_TICK],
+    pub told: [Option<Event>; ORDERS_A_TICK],
     /// Orders that were taken, by their numbers in the run.
     pub taken: [Option<u64>; ORDERS_A_TICK],
 }
@@ -68,7 +73,20 @@ impl std::fmt::Debug for Replacement {
 impl Control {
     /// For a step with so many entities.
     pub fn new(orders: OrderReceiver, entities: usize) -> Self {
-        Self { orders, gradual: Gradual::new(entities), waiting: None, strength: 1.0, taken: 0 }
+        Self {
+            orders,
+            gradual: Gradual::new(entities),
+            carriage: Carriage::default(),
+            waiting: None,
+            strength: 1.0,
+            taken: 0,
+        }
+    }
+
+    /// With devices that go with the camera.
+    #[must_use]
+    pub fn with_carriage(self, carriage: Carriage) -> Self {
+        Self { carriage, ..self }
     }
 
     /// How many orders were taken, and how many of them could not be done.
@@ -89,7 +107,10 @@ impl Control {
             match dated.order {
                 Order::Scale(scale) => self.gradual.scale(&scale),
                 Order::Move(moved) => self.gradual.set_out(&moved),
-                Order::Tell(kind) => *told = Some(kind),
+                Order::Camera(X_WC) => self.carriage.go_to(&X_WC),
+                Order::Tell(kind, at) => {
+                    *told = Some(Event { run_tick: at.map_or(run_tick, |at| at.min(run_tick)), kind });
+                }
                 Order::Text => {}
                 Order::Replace(next) => self.waiting = Some(Waiting::Replace(next)),
                 Order::Friction(change) => self.waiting = Some(Waiting::Friction(change)),
@@ -104,6 +125,7 @@ impl Control {
         let stands_still = self.waiting.is_some() || self.gradual.needs_silence();
         step.set_strength(self.strength, stands_still && self.strength < 1.0);
         self.gradual.advance(step, dt_s, is_silent);
+        self.carriage.advance(step, dt_s);
         turned
     }
 
@@ -135,6 +157,7 @@ impl Control {
                 std::mem::swap(step, &mut next.step);
                 std::mem::swap(&mut self.gradual, &mut next.gradual);
                 step.begin();
+                self.carriage.hand_over(step);
                 if next.other.is_none() {
                     self.gradual.go_on_from(&next.gradual, step);
                     // It is empty, but for its beginning.

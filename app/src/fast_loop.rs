@@ -6,6 +6,7 @@
 //! Cost: bounded; no allocation, no system call but the wake-up of a sleeping driver.
 
 use crate::control::Control;
+use crate::control::carriage::Carriage;
 use crate::control::order::Replacement;
 use crate::control::queue::OrderReceiver;
 use crate::displaced::Displaced;
@@ -154,6 +155,13 @@ impl FastLoop {
         self
     }
 
+    /// With devices that go with the camera, if orders come.
+    #[must_use]
+    pub fn with_carriage(mut self, carriage: Carriage) -> Self {
+        self.control = self.control.map(|control| control.with_carriage(carriage));
+        self
+    }
+
     /// How many orders were taken, and how many of them could not be done.
     pub fn orders_taken(&self) -> [u64; 2] {
         self.control.as_ref().map_or([0; 2], Control::taken)
@@ -245,8 +253,8 @@ impl FastLoop {
             for number in turned.taken.into_iter().flatten() {
                 events.send(Event { run_tick, kind: Kind::Order { number } });
             }
-            for kind in turned.told.into_iter().flatten() {
-                events.send(Event { run_tick, kind });
+            for event in turned.told.into_iter().flatten() {
+                events.send(event);
             }
         }
         if let Some(replaced) = turned.replaced {
@@ -283,6 +291,7 @@ impl FastLoop {
         }
         self.place_in_time();
         self.row.run_tick = self.run_ticks();
+        self.row.due_ns = self.frame.deadline_ns;
         self.tally.park(self.step.parked_now(), self.row.run_tick, self.is_first_scene);
         self.tally.moving = [self.step.bodies().len(), self.step.made().awake];
         self.next_tick = self.row.run_tick + 1;

@@ -324,6 +324,13 @@ impl FastStep {
         true
     }
 
+    /// How far a fingertip is from a point of the world (m), at most.
+    pub fn farthest_m(&self, place_W: &Vector3<f64>) -> f64 {
+        let both = self.fingers.iter().zip(&self.tips_D);
+        let tips = both.filter_map(|(finger, tip_D)| Some(finger.mount.point_to_world((*tip_D)?)));
+        tips.map(|tip_W| (tip_W - place_W).norm()).fold(0.0, f64::max)
+    }
+
     /// Forgets all contacts: the connection to the devices was lost meanwhile.
     pub fn reset(&mut self) {
         self.last_tick = None;

@@ -11,7 +11,7 @@ use io_driver::live_hand::{LiveHand, LiveWish};
 use nalgebra::Vector3;
 use std::path::PathBuf;
 use tempfile::TempDir;
-use view::hand::{Grip, MouseHand, middle};
+use view::hand::MouseHand;
 use view::{Reins, Wish};
 
 /// Where files lie in memory.
@@ -57,11 +57,10 @@ impl LiveHandFile {
     pub fn into_reins(self, rig: &Rig) -> Result<LiveReins, RunFailure> {
         let reach = rig.reach().map_err(|error| RunFailure::Start(error.to_string()))?;
         let fingers = &rig.scene.fingers;
-        let starts: Vec<Vector3<f64>> = fingers.iter().map(|finger| finger.start_m.coords).collect();
         Ok(LiveReins {
             hand: self.hand,
             devices: fingers.iter().map(|finger| finger.device).collect(),
-            middle: middle(&starts[..starts.len().min(Grip::MOST)]),
+            starts: fingers.iter().map(|finger| finger.start_m.coords).collect(),
             reach,
         })
     }
@@ -73,15 +72,15 @@ pub struct LiveReins {
     hand: LiveHand,
     /// Of each finger.
     devices: Vec<usize>,
-    /// Of where the fingers begin (m).
-    middle: Vector3<f64>,
+    /// Where each begins (m).
+    starts: Vec<Vector3<f64>>,
     /// Corners of what all devices reach (m).
     reach: [Vector3<f64>; 2],
 }
 
 impl Reins for LiveReins {
     fn hand(&self) -> MouseHand {
-        MouseHand::new(self.devices.len(), self.middle, self.reach)
+        MouseHand::starting_at(&self.starts, self.reach)
     }
 
     fn pull(&mut self, wishes: &[Wish]) {

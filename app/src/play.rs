@@ -1,9 +1,13 @@
 //! Free play: a scene, a window, and a hand that a mouse moves.
 
+mod free_place;
+mod starts;
+
 use crate::outcome::RunFailure;
 use crate::rig::{HandMode, Rig};
 use crate::settings;
 use crate::simulated::SimulatedDevices;
+use io_driver::say::say;
 use io_driver::sim::hand::model_file::Firmness;
 use std::path::Path;
 use world::{Scene, Settings};
@@ -11,7 +15,7 @@ use world::{Scene, Settings};
 const SCENE: &str = include_str!("../../config/scenes/play.toml");
 const SCENE_NAME: &str = "config/scenes/play.toml (built in)";
 
-/// A scene, or the small table that is built in, for a hand that people move.
+/// A scene, or the small table that is built in, for a hand that people move. Its fingers begin outside of everything.
 ///
 /// # Errors
 /// What is wrong with it.
@@ -30,8 +34,13 @@ pub fn rig(scene: Option<&Path>, settings: &Settings, period_ns: u64) -> Result<
     // Nothing follows a script.
     scene.hand = None;
     settings::find_data(&mut scene, &file, settings);
-    Rig::new(&file, scene, None, None, HandMode::Impedance(devices()), period_ns)
-        .map_err(|error| wrong(&error))
+    let rig = Rig::new(&file, scene, None, None, HandMode::Impedance(devices()), period_ns)
+        .map_err(|error| wrong(&error))?;
+    let (starts, told) = starts::starts(&rig).map_err(|error| wrong(&error))?;
+    if !told.is_empty() {
+        say(format_args!("phantom3: fingers begin elsewhere than the scene says: {}", told.join("; ")));
+    }
+    rig.starting_at(&starts).map_err(|error| wrong(&error))
 }
 
 /// Arms that a light finger pulls: its springs are alike along all axes, 200 N/m, so that a grip is as hard however it is

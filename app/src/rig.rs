@@ -14,6 +14,7 @@ mod problems;
 mod solids;
 
 use self::devices::check_hand;
+use self::entities::is_only_seen;
 pub use self::error::RigError;
 use self::material::Unfit;
 use self::models::Models;
@@ -114,7 +115,6 @@ impl Rig {
         };
         let hand = named.map(|(path, named_by)| check_hand(path, &named_by, &scene)).transpose();
         let hand = problems.keep(hand);
-        let scene = doors::without_what_is_only_seen(scene);
         let mut rig = Self {
             scene_file: scene_file.into(),
             models: Models::load(&scene, problems),
@@ -174,8 +174,12 @@ impl Rig {
         let mut solids = Solids::default();
         let entity = |spec: &SceneEntity| {
             // That its model or picture cannot be had was told when they were loaded.
-            let is_loaded = self.models.has(spec) && self.pictures.has(spec);
-            is_loaded.then(|| problems.keep(self.entity(spec, &mut solids))).flatten()
+            let made = if is_only_seen(&self.scene, spec) {
+                self.models.has(spec).then(|| self.only_seen(spec, &mut solids))
+            } else {
+                (self.models.has(spec) && self.pictures.has(spec)).then(|| self.entity(spec, &mut solids))
+            };
+            made.and_then(|made| problems.keep(made))
         };
         let entities: Vec<Option<Entity>> = self.scene.entities.iter().map(entity).collect();
         let passivities: Vec<Option<Option<Passivity>>> =

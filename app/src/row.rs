@@ -10,6 +10,8 @@ use shm_abi::MAX_DEVICES;
 pub struct Row {
     /// Ticks since the first one at full authority.
     pub run_tick: u64,
+    /// When its frame was due, on the driver's clock (ns): in real time the system's monotonic one. Recordings do not have it.
+    pub due_ns: u64,
     /// The fingers; those that do not exist are zero.
     pub fingers: [FingerRow; MAX_DEVICES],
 }
@@ -59,7 +61,7 @@ pub struct FingerRow {
 impl Row {
     /// A row of nothing.
     pub fn empty() -> Self {
-        Self { run_tick: 0, fingers: [FingerRow::default(); MAX_DEVICES] }
+        Self { run_tick: 0, due_ns: 0, fingers: [FingerRow::default(); MAX_DEVICES] }
     }
 }
 

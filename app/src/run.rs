@@ -2,6 +2,7 @@
 
 use crate::book::Book;
 use crate::child::DriverChild;
+use crate::control::carriage::Carriage;
 use crate::control::desk::{Desk, Means, OrderSource};
 use crate::fast_loop::{FastLoop, Tally, WhenFull};
 use crate::live::LiveHandFile;
@@ -12,7 +13,7 @@ use crate::outcome::{RunFailure, Stop};
 use crate::progress::Progress;
 use crate::record::{About, Files, View};
 use crate::report::{Baseline, Report};
-use crate::rig::{HandMode, Rig};
+use crate::rig::{HandMode, Rig, RigError};
 use crate::row_queue::row_queue;
 use crate::shown::Shown;
 use crate::slow::{SlowEnd, SlowSide};
@@ -126,12 +127,16 @@ impl Parts {
         let (events, event_ends) = event_queue(EVENT_QUEUE);
         let mut hub = Hub::new(vec![event_ends]);
         let opened = match window {
-            Some(spec) => open_window(spec, shown(), reins)?,
+            Some(spec) => {
+                let carries_devices = rig.goes_with_the_camera();
+                open_window(&WindowSpec { carries_devices, ..spec.clone() }, shown(), reins)?
+            }
             None if reins.is_some() => return Err(NoWindow::NoDisplay.into()),
             None => None,
         };
         let spectator =
             opened.map(|(window, moments)| Spectator::new(window, moments, &mut hub, book.clone()));
+        let spectator = spectator.map(|spectator| spectator.in_real_time(clock == ClockMode::Real));
         let view = View::new(&rig.scene, step.entities());
         let directory = plan.settings.recording_directory.value.clone();
         let on_request = spectator.is_some().then(|| OnRequest::new(directory, rig.clone(), view.clone()));
@@ -163,7 +168,7 @@ impl Parts {
         Ok(Self {
             slow_lists: (clock == ClockMode::Real && orders.is_some()).then_some(slow_lists),
             fast: match orders {
-                Some(orders) => fast.with_control(orders),
+                Some(orders) => fast.with_control(orders).with_carriage(Carriage::new(rig.layout.clone())),
                 None => fast,
             },
             slow: SlowSide::new(consumer, hub, recorders)
@@ -221,6 +226,7 @@ fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Repo
 }
 
 fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Report, Stop), RunFailure> {
+    let rig = &seen_from_the_window(rig, plan)?;
     let live = rig.is_live().then(LiveHandFile::make).transpose()?;
     let (mut source, attachment) = connect(rig, plan, live.as_ref())?;
     let info = attachment.driver.info();
@@ -262,6 +268,16 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
         pictures,
     };
     Ok((report, end.stop))
+}
+
+/// At a window the camera that devices go with is the window's, from the beginning.
+fn seen_from_the_window(rig: &Rig, plan: &RunPlan) -> Result<Rig, RunFailure> {
+    let wrong = |error: RigError| RunFailure::Start(error.to_string());
+    if plan.window.is_none() || !rig.goes_with_the_camera() {
+        return Ok(rig.clone());
+    }
+    let stage = Shown::new(rig, rig.fast_step().map_err(wrong)?.entities()).stage;
+    rig.clone().seen_from(stage.cameras[0].pose).map_err(wrong)
 }
 
 /// What is told of entities that were parked.

@@ -20,7 +20,7 @@ use notes::Notes;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use view::{Ask, Glimpse, News, OpenWindow, Sample, Status};
+use view::{Ask, Glimpse, KeyChange, News, OpenWindow, Sample, Status};
 use world::events::Hub;
 
 /// Between two glimpses at least: each turn of the slow side has one.
@@ -64,6 +64,8 @@ pub struct Spectator {
     untold: VecDeque<News>,
     /// Of a driver in a process of its own.
     gauge: Option<Gauge>,
+    /// Whether the run's ticks are due by the system's clock.
+    is_real_time: bool,
     wants_record: Option<bool>,
     wants_end: bool,
 }
@@ -82,6 +84,7 @@ impl Spectator {
             untold: VecDeque::new(),
             happened: Happened::new(hub, book),
             gauge: None,
+            is_real_time: false,
             wants_record: None,
             wants_end: false,
         }
@@ -90,6 +93,12 @@ impl Spectator {
     /// From now on tells how the loop of the driver goes that listens here.
     pub fn watch_driver(&mut self, socket: PathBuf) {
         self.gauge = Some(Gauge::new(socket));
+    }
+
+    /// The run's ticks are due by the system's clock: keys have their own times.
+    #[must_use]
+    pub fn in_real_time(self, is_real_time: bool) -> Self {
+        Self { is_real_time, ..self }
     }
 
     /// Told no more often than after so long.
@@ -199,11 +208,26 @@ impl Spectator {
                         self.untold.push_back(News::Text(error.into()));
                     }
                 }
+                Ask::Key(key) => {
+                    let line = self.key_order(&key);
+                    // What has no room is one of a thousand that wait.
+                    let _ = desk.as_mut().map(|desk| desk.order_now(&line));
+                }
                 Ask::Record(wanted) => self.wants_record = Some(wanted),
                 Ask::End => self.wants_end = true,
             }
         }
         self.wants_end |= !self.window.is_open();
+    }
+
+    /// The order that tells of a key, as of when it went down or up.
+    fn key_order(&self, key: &KeyChange) -> String {
+        let change = if key.is_pressed { "down" } else { "up" };
+        let newest = self.newest.as_ref().filter(|_| self.is_real_time);
+        match newest.map(|(row, ..)| run_time_s(row, self.moments.time_s(row), key.at_ns)) {
+            Some(t_s) => format!("key {} {change} at {t_s:.6}", key.code),
+            None => format!("key {} {change}", key.code),
+        }
     }
 
     /// Whether a recording shall begin, or end, since this was last asked.
@@ -227,6 +251,12 @@ impl Spectator {
     }
 }
 
+/// The run's time (s) at this time of the system's clock (ns), by a row that was due at this time of the run (s).
+fn run_time_s(row: &Row, row_s: f64, at_ns: u64) -> f64 {
+    let later_ns = at_ns.cast_signed() - row.due_ns.cast_signed();
+    (row_s + later_ns as f64 / 1e9).max(0.0)
+}
+
 /// Those of these entities that touch another one, in ascending order.
 fn colliding(pairs: &[[usize; 2]], moving: &[usize]) -> Vec<usize> {
     let mut touching: Vec<usize> = pairs.iter().flatten().copied().collect();
@@ -239,6 +269,16 @@ fn colliding(pairs: &[[usize; 2]], moving: &[usize]) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_key_is_of_the_tick_in_which_it_went_down_however_late_its_window_tells() {
+        let row = Row { due_ns: 5_000_000_000, run_tick: 1200, ..Row::empty() };
+        let time_s = |at_ns| run_time_s(&row, 1.2, at_ns);
+        assert!((time_s(4_670_000_000) - 0.87).abs() < 1e-9, "a third of a second ago");
+        assert!((time_s(5_000_400_000) - 1.2004).abs() < 1e-9, "rows come some milliseconds late");
+        assert_eq!(time_s(3_000_000_000), 0.0, "before the run began");
+        assert_eq!(run_time_s(&row, 1.2, 5_020_000_000) - time_s(5_000_000_000), 0.02);
+    }
 
     #[test]
     fn what_collides_is_what_can_move_and_touches_anything() {

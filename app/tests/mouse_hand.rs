@@ -11,6 +11,7 @@ use phantom3::row_queue::{RowReceiver, row_queue};
 use phantom3::virtual_clock::VirtualDriver;
 use shm_abi::Frame;
 use shm_abi::segment::ClockMode;
+use std::path::Path;
 use view::hand::{Cue, MouseHand, Seen};
 use view::pick::Picker;
 use view::{FingerMoment, Moment, Reins, Stage};
@@ -36,6 +37,10 @@ struct Table {
     heat: f64,
     /// Of each finger, the force on the user of the last tick (N).
     forces_n: Vec<f64>,
+    /// The largest that was in any tick (N), the first thing that any finger touched, and ticks of the run.
+    most_n: f64,
+    touched: Option<u32>,
+    ticks: u64,
     /// What the window was told last.
     told: Moment,
 }
@@ -43,11 +48,18 @@ struct Table {
 impl Table {
     fn new() -> Self {
         let rig = play::rig(None, &Settings::default(), PERIOD_NS).expect("the built-in scene");
+        assert_eq!(entity(&rig, "cube"), CUBE);
+        let mut table = Self::of(&rig);
+        table.wait(0.5);
+        table
+    }
+
+    fn of(rig: &Rig) -> Self {
         let live = LiveHandFile::make().expect("a file");
         let mut config = rig.driver_config(ClockMode::Virtual);
         live.lead(&mut config);
         let driver = VirtualDriver::open(&config).expect("simulated arms");
-        let reins = live.into_reins(&rig).expect("a reach");
+        let reins = live.into_reins(rig).expect("a reach");
         let step = rig.fast_step().expect("a step");
         let camera = Stage::new(&rig.scene, step.entities()).cameras[0].clone();
         let (sender, rows) = row_queue(step.bodies().len());
@@ -55,8 +67,7 @@ impl Table {
         let hand = reins.hand();
         let (limits, heat) = (0, 0.0);
         let forces_n = vec![0.0; rig.scene.fingers.len()];
-        assert_eq!(entity(&rig, "cube"), CUBE);
-        let mut table = Self {
+        Self {
             driver,
             fast,
             rows,
@@ -68,10 +79,11 @@ impl Table {
             limits,
             heat,
             forces_n,
+            most_n: 0.0,
+            touched: None,
+            ticks: 0,
             told: Moment::default(),
-        };
-        table.wait(0.5);
-        table
+        }
     }
 
     /// A picture's time goes by, in which the pointer was dragged by so much (points).
@@ -93,6 +105,10 @@ impl Table {
             while let Some((row, _)) = self.rows.receive() {
                 let fingers = self.forces_n.iter_mut().zip(&row.fingers);
                 fingers.for_each(|(n, finger)| *n = finger.force_on_user.norm());
+                self.most_n = self.forces_n.iter().fold(self.most_n, |most, n| most.max(*n));
+                let touches = row.fingers[..self.forces_n.len()].iter().find_map(|finger| finger.entity);
+                self.touched = self.touched.or(touches);
+                self.ticks = row.run_tick + 1;
                 let felt = row.fingers[..self.forces_n.len()].iter().map(|finger| FingerMoment {
                     force: finger.force_on_user,
                     entity: finger.entity.map(|entity| entity as usize),
@@ -226,4 +242,98 @@ fn what_is_below_the_hand_is_the_cube_at_first() {
     assert!((met - (table.cube() + Vector3::new(0.005, 0.5 * EDGE_M, -0.005))).norm() < 1e-6, "{met}");
     let met = below(|entity| entity == CUBE).expect("the table");
     assert!((met - Vector3::new(over.x, 0.0, over.z)).norm() < 1e-6, "what is held is left out: {met}");
+}
+
+/// Plays a scene for 300 ms without anybody doing anything; where the fingers began (m).
+fn untouched(file: &Path) -> Vec<Vector3<f64>> {
+    let rig = play::rig(Some(file), &Settings::default(), PERIOD_NS).expect("a scene");
+    let mut table = Table::of(&rig);
+    while table.ticks < 300 {
+        table.picture(Vec2::ZERO);
+        assert!(table.tick < 10_000, "{}: the run does not begin", file.display());
+    }
+    assert_eq!(table.touched, None, "{}: a finger touches something", file.display());
+    let scene = &rig.scene;
+    let pulls = scene.entities.iter().any(|entity| entity.magnetism.is_some());
+    // A wind pulls wherever a finger begins.
+    if scene.fields.is_empty() && scene.guides.is_empty() && !pulls {
+        assert_eq!(table.most_n, 0.0, "{}: {} N", file.display(), table.most_n);
+    }
+    rig.scene.fingers.iter().map(|finger| finger.start_m.coords).collect()
+}
+
+const CONFIG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../config");
+
+#[test]
+fn in_no_scene_that_comes_with_it_a_hand_begins_in_something_or_feels_anything() {
+    let mut scenes = 0;
+    for directory in ["scenes", "scenes/kinds", "scenes/thesis"] {
+        for entry in std::fs::read_dir(format!("{CONFIG}/{directory}")).expect("scenes").flatten() {
+            let path = entry.path();
+            if path.extension().is_some_and(|ending| ending == "toml") {
+                untouched(&path);
+                scenes += 1;
+            }
+        }
+    }
+    assert!(scenes >= 13, "{scenes}");
+}
+
+/// Where two fingers begin that are to begin there (m), in a scene of these things.
+fn begun(things: &str, starts: [[f64; 3]; 2]) -> Vec<Vector3<f64>> {
+    let place = tempfile::tempdir().expect("a directory");
+    let finger = |start: [f64; 3]| format!("[[finger]]\nradius_m = 0.005\nstart_m = {start:?}\n");
+    let file = place.path().join("scene.toml");
+    std::fs::write(&file, format!("{}{}{things}", finger(starts[0]), finger(starts[1]))).expect("a file");
+    untouched(&file)
+}
+
+#[test]
+fn a_finger_that_would_begin_in_a_thing_begins_at_the_nearest_place_outside_of_all() {
+    let free = [0.0, 0.3, 0.0];
+    let mesh = format!("[[entity]]\nshape = {{ kind = \"mesh\", file = \"{CONFIG}/meshes/cube.obj\" }}\n");
+    let bored = "[[entity]]\nshape = { kind = \"csg\", op = \"difference\", children = \
+        [{ shape = { kind = \"box\", size_m = [0.1, 0.1, 0.1] } }, { shape = { kind = \"cylinder\", radius_m = 0.02, length_m = 1.0 } }] }\n";
+    let walls = [-0.0251, 0.0251].map(|x| {
+        format!("[[entity]]\nshape = {{ kind = \"box\", size_m = [0.04, 0.1, 0.1] }}\nposition_m = [{x}, 0.0, 0.0]\n")
+    });
+    let cases = [
+        ("[[entity]]\nshape = { kind = \"box\", size_m = [0.1, 0.1, 0.1] }\n", [0.01, 0.03, 0.0], 0.08),
+        (mesh.as_str(), [0.0, 0.01, 0.0], 0.5),
+        // Beside the bore, which is wide enough.
+        (bored, [0.03, 0.0, 0.0], 0.05),
+        (
+            "[[entity]]\nshape = { kind = \"plane\", normal = [0.0, 1.0, 0.0], offset_m = 0.0 }\n",
+            [0.0, -0.04, 0.0],
+            0.06,
+        ),
+        // Balls of 5 mm in a slot of 10.2 mm.
+        (&walls.concat(), [0.0, 0.0, 0.01], 0.08),
+        (
+            "[[entity]]\nshape = { kind = \"torus\", ring_radius_m = 0.05, tube_radius_m = 0.02 }\n",
+            [0.05, 0.0, 0.0],
+            0.05,
+        ),
+    ];
+    for (things, wanted, most_m) in cases {
+        let starts = begun(things, [wanted, free]);
+        let way_m = (starts[0] - Vector3::from(wanted)).norm();
+        assert!(way_m > 0.0 && way_m < most_m, "{things}: {way_m} m");
+        assert_eq!(starts[1], Vector3::from(free), "what is free stays as the scene says");
+    }
+}
+
+#[test]
+fn a_hand_of_which_a_scene_says_nothing_begins_over_its_things() {
+    let place = tempfile::tempdir().expect("a directory");
+    let file = place.path().join("scene.toml");
+    let scene = "[[finger]]\n[[finger]]\n[[finger]]\n\
+        [[entity]]\nshape = { kind = \"plane\", normal = [0.0, 1.0, 0.0], offset_m = 0.4 }\n\
+        [[entity]]\nshape = { kind = \"box\", size_m = [0.2, 0.1, 0.2] }\nposition_m = [1.0, 0.45, -0.5]\n";
+    std::fs::write(&file, scene).expect("a file");
+    let starts = untouched(&file);
+    for start in &starts {
+        assert!((start - Vector3::new(1.0, 0.56, -0.5)).norm() < 0.06, "{starts:?}");
+    }
+    assert!((starts[0] - starts[1]).norm() > 0.05, "as an open hand stands: {starts:?}");
 }

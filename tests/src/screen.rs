@@ -2,6 +2,7 @@
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
+use std::time::Instant;
 use tempfile::TempDir;
 
 /// Width and height (pixels).
@@ -56,14 +57,24 @@ impl Screen {
 
     /// Presses and releases a key in the program's window, by its name in X; `false`: the machine has no `xdotool`, which is told.
     pub fn press(&self, key: &str) -> bool {
+        self.press_for(key, "0.2").is_some()
+    }
+
+    /// The same for so long (s), or longer where the machine is busy; how long it took, all in all (s).
+    pub fn press_for(&self, key: &str, seconds: &str) -> Option<f64> {
         // Nobody manages windows here: none has the keys until it is given them.
-        let focus = ["search", "--onlyvisible", "--name", "phantom3", "windowfocus", "sleep", "0.5"];
-        let keys = ["keydown", key, "sleep", "0.2", "keyup", key];
-        let done = Command::new("xdotool").args(focus).args(keys).env("DISPLAY", &self.display).status();
+        self.xdotool(&["search", "--onlyvisible", "--name", "phantom3", "windowfocus", "sleep", "0.5"])?;
+        let begun = Instant::now();
+        self.xdotool(&["keydown", key, "sleep", seconds, "keyup", key])?;
+        Some(begun.elapsed().as_secs_f64())
+    }
+
+    fn xdotool(&self, words: &[&str]) -> Option<()> {
+        let done = Command::new("xdotool").args(words).env("DISPLAY", &self.display).status();
         if done.is_err() {
             println!("skipped: there is no xdotool here");
         }
-        done.is_ok_and(|status| status.success())
+        done.is_ok_and(|status| status.success()).then_some(())
     }
 }
 

@@ -1,5 +1,8 @@
 //! Orders through the whole program: what is told of them, what is recorded, and that it plays again.
 
+#![allow(non_snake_case)] // Names carry their frames: is_WC is the camera's pose in the world.
+
+use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion, Vector3};
 use system_tests::recording::Table;
 use system_tests::workplace::{Said, Workplace};
 
@@ -230,4 +233,83 @@ fn what_leaves_the_world_is_told_from_either_list() {
         let tick: u64 = tick.parse().expect("a number");
         assert!((485..=525).contains(&tick), "{tick}");
     }
+}
+
+/// A finger over a floor whose device goes with the camera; at first its base is the world's origin.
+const CARRIED: &str = "hand = \"hand.csv\"\n[[finger]]\nstart_m = [0, 0.06, 0]\n[[entity]]\nname = \"floor\"\n\
+    shape = { kind = \"plane\", normal = [0, 1, 0], offset_m = 0 }\nstiffness_n_per_m = 500\n\
+    friction = { model = \"coulomb\", mu = 0.5 }\n";
+const LAYOUT: &str = "master = 0\nattached_to = \"camera\"\n[camera]\nposition_m = [0, 0.2, 0.4]\n[[device]]\n\
+    position_m = [0, -0.2, -0.4]\n";
+/// A path's speed and how sharply it changes: 0.5 m/s and 5 m/s^2 in a tick, and what a turn adds at 0.45 m from the camera.
+const MOST_WAY_M: f64 = 0.5e-3 + 1e-9;
+const MOST_CHANGE_M: f64 = 5e-6 + 0.5 * 0.5 / 0.4 * 1e-6;
+
+/// A run of 4.5 s whose devices go with the camera, recorded both ways.
+fn carried(hand: &str, orders: &str) -> (Workplace, Table) {
+    let place = workplace(CARRIED);
+    place.write("hand.csv", hand);
+    place.write("layout.toml", LAYOUT);
+    place.write("orders.txt", orders);
+    let run = ["run", "scene.toml", "--clock", "virtual", "--seconds", "4.5", "--orders", "orders.txt"];
+    let more = ["--layout", "layout.toml", "--record", "run.csv", "--record", "run.mcap"];
+    let said = place.run(run.iter().chain(&more));
+    assert_eq!(said.status, Some(0), "{}{}", said.out, said.err);
+    let table = Table::read(&place.path("run.csv"));
+    (place, table)
+}
+
+#[test]
+fn devices_that_are_attached_to_the_camera_go_where_an_order_has_it_and_stay_there_through_a_reset() {
+    let turned = "at 0.2 camera at 0.1 0.2 0.45 0.92387953 0 0.38268343 0\nat 3.8 reset\n";
+    let (place, table) = carried("t,f0_x,f0_y,f0_z\n0,0,0.06,0\n", turned);
+    let hips: Vec<Vector3<f64>> = table.finger("f0").iter().map(|sample| sample.hip).collect();
+    let was_WC = Isometry3::translation(0.0, 0.2, 0.4);
+    let turn = UnitQuaternion::new_normalize(Quaternion::new(0.92387953, 0.0, 0.38268343, 0.0));
+    let is_WC = Isometry3::from_parts(Vector3::new(0.1, 0.2, 0.45).into(), turn);
+    let start = Vector3::new(0.0, 0.06, 0.0);
+    let end = (is_WC * was_WC.inverse() * Point3::from(start)).coords;
+    assert!(hips[..200].iter().all(|hip| (hip - start).norm() < 1e-12), "before the order");
+    // Eight digits of a quaternion, half a metre away.
+    assert!(hips[3700..].iter().all(|hip| (hip - end).norm() < 1e-7), "{} {end}", hips[hips.len() - 1]);
+    for ticks in hips.windows(3) {
+        let [a, b, c] = [ticks[0], ticks[1], ticks[2]];
+        assert!((b - a).norm() <= MOST_WAY_M && (c - b - (b - a)).norm() <= MOST_CHANGE_M, "{ticks:?}");
+    }
+    identical(&place, "run.mcap");
+}
+
+#[test]
+fn a_finger_that_presses_while_the_camera_goes_feels_no_blow() {
+    // 3 mm deep, then carried 5 cm aside and 1 cm down, and back up before it is there.
+    let hand = "t,f0_x,f0_y,f0_z\n0,0,0.06,0\n0.3,0,-0.003,0\n5,0,-0.003,0\n";
+    let orders = "at 0.5 camera at 0.05 0.19 0.4 1 0 0 0\nat 0.6 camera at 0 0.2 0.4 1 0 0 0\nat 1.2 camera at 0.05 0.19 0.4 1 0 0 0\n";
+    let (place, table) = carried(hand, orders);
+    let samples = table.finger("f0");
+    for ticks in samples[400..].windows(2) {
+        let [step, way] = [ticks[1].force - ticks[0].force, ticks[1].hip - ticks[0].hip];
+        // The spring's way in a tick; what the cone lets go of sideways is as much again at most.
+        assert!(
+            way.norm() <= MOST_WAY_M && step.norm() <= 500.0 * 1.5 * MOST_WAY_M,
+            "{} s: {step} N",
+            ticks[1].t
+        );
+    }
+    let last = &samples[samples.len() - 1];
+    assert!((last.hip - Vector3::new(0.05, -0.013, 0.0)).norm() < 1e-9, "{}", last.hip);
+    assert!((last.force.y - 6.5).abs() < 1e-6, "13 mm of 500 N/m: {}", last.force);
+    identical(&place, "run.mcap");
+}
+
+#[test]
+fn a_camera_that_carries_nobody_is_refused() {
+    let place = workplace(CARRIED);
+    place.write("orders.txt", "at 0.2 camera at 0 0 0 1 0 0 0\n");
+    let said = place.run(["run", "scene.toml", "--clock", "virtual", "--orders", "orders.txt"]);
+    assert_eq!(said.status, Some(2), "{}", said.err);
+    assert!(
+        said.err.contains("orders.txt:1: no device goes with the camera") && said.err.contains("attached_to"),
+        "{}",
+        said.err
+    );
 }

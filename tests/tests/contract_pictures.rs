@@ -285,3 +285,48 @@ fn pictures_go_on_with_the_scene_that_takes_over() {
         |name: &str| greenness(Pixels::read(&place, name).at([0.0, 0.0, 0.5], 40.0, [0.03, 0.0, 0.05]));
     assert!(green("a.png") < 15 && green("b.png") > 60, "{} {}", green("a.png"), green("b.png"));
 }
+
+/// Three faces on one edge: nothing that could be felt. All are seen from the front, 12 cm wide.
+const FAN: &str = "v -0.06 -0.06 0\nv 0.06 -0.06 0\nv 0 0.06 0\nv 0 0.06 -0.02\nv 0 0.06 -0.04\nf 1 2 3\nf 1 2 4\nf 1 2 5\n";
+
+#[test]
+fn what_is_only_seen_is_drawn_whatever_it_is_made_of_and_goes_where_orders_move_it() {
+    let place = Workplace::new();
+    place.write("fan.obj", FAN);
+    place.write("orders.txt", "at 0.1 move table to 0.15 0.0 0 in 0.4\n");
+    let seen_only = "haptic = false\ncollidable = false\nvisual = ";
+    for shape in ["{ kind = \"box\", size_m = [0.1, 0.1, 0.1] }", "{ kind = \"mesh\", file = \"fan.obj\" }"] {
+        let scene = TABLE.replace("{ kind = \"box\", size_m = [0.1, 0.02, 0.1] }", shape);
+        place.write("scene.toml", scene.replace("visual = ", seen_only));
+        let shots = ["--orders", "orders.txt", "--snapshot", "0.05:a.png", "--snapshot", "0.8:b.png"];
+        let Some(()) = run(&place, "0.9", &shots) else { return };
+        let green = |name: &str, x| {
+            let eye = [0.0, 0.0, 0.5];
+            greenness(Pixels::read(&place, name).at(eye, 40.0, [x, -0.01, 0.0]))
+        };
+        assert!(green("a.png", 0.0) > 40 && green("a.png", 0.15) < 15, "{shape}: it is not seen");
+        assert!(green("b.png", 0.15) > 40 && green("b.png", 0.0) < 15, "{shape}: it was not moved");
+    }
+}
+
+#[test]
+fn what_is_only_seen_behind_a_door_is_seen_by_who_is_there() {
+    let place = Workplace::new();
+    let picture = |finger: &str| {
+        let scene = format!(
+            "[[finger]]\n{finger}\n[[entity]]\nname = \"hull\"\nshape = {{ kind = \"box\", size_m = [0.1, 0.12, 0.1] }}\n\
+             visual = false\n[[environment]]\nname = \"inside\"\nkind = \"room\"\nsize_m = [0.4, 0.3, 0.4]\n\
+             position_m = [0.0, 0.0, -0.15]\nvisual = false\n\
+             door = {{ of = \"hull\", position_m = [0.0, 0.0, 0.05], size_m = [0.05, 0.1] }}\n\
+             [[entity]]\nname = \"lamp\"\nwithin = \"inside\"\nshape = {{ kind = \"sphere\", radius_m = 0.05 }}\n\
+             position_m = [0.0, 0.0, -0.1]\nhaptic = false\ncollidable = false\n\
+             visual = {{ colour = [0.1, 0.7, 0.1] }}\n[[camera]]\nposition_m = [0.0, 0.0, 0.5]\nfield_of_view_deg = 40.0\n"
+        );
+        place.write("scene.toml", scene);
+        run(&place, "0.2", &["--snapshot", "0.1:a.png"])?;
+        Some(greenness(Pixels::read(&place, "a.png").at([0.0, 0.0, 0.5], 40.0, [0.01, 0.01, -0.1])))
+    };
+    let Some(inside) = picture("start_m = [0.1, 0.1, -0.2]\nwithin = \"inside\"") else { return };
+    let outside = picture("start_m = [0.1, 0.1, 0.2]").expect("as before");
+    assert!(inside > 40 && outside < 15, "{inside} {outside}");
+}

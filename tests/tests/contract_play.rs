@@ -4,6 +4,7 @@
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
+use system_tests::recording::Table;
 use system_tests::screen::Screen;
 use system_tests::workplace::{Running, Workplace};
 
@@ -68,4 +69,39 @@ fn play_goes_on_until_its_time_is_over_and_records_as_runs_do() {
     for column in ["thumb_hip_x", "middle_force_z", "cube_y"] {
         assert!(recorded.lines().next().is_some_and(|head| head.contains(column)), "{column}");
     }
+}
+
+#[test]
+fn fingers_that_a_scene_puts_into_a_thing_begin_beside_it_which_is_told_and_feel_nothing() {
+    let Some(screen) = Screen::open() else { return };
+    let place = Workplace::new();
+    place.write(
+        "scene.toml",
+        "[[finger]]\nname = \"thumb\"\nstart_m = [0.0, 0.02, 0.0]\n[[finger]]\nname = \"index\"\nstart_m = [0.1, 0.1, 0.0]\n\
+         [[entity]]\nname = \"crate\"\nshape = { kind = \"box\", size_m = [0.1, 0.1, 0.1] }\n",
+    );
+    let mut program = place.phantom3();
+    program.args(["play", "scene.toml", "--seconds", "1", "--record", "play.csv"]);
+    program.env("DISPLAY", screen.display()).env("LIBGL_ALWAYS_SOFTWARE", "1");
+    let said = Running::start(program).wait();
+    if said.err.contains("no window: ") {
+        println!("skipped: {}", said.err);
+        return;
+    }
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    let lines: Vec<&str> = said.err.lines().filter(|line| line.contains("fingers begin elsewhere")).collect();
+    assert!(
+        matches!(lines[..], [line] if line.contains("thumb at ") && line.contains("inside of crate")),
+        "{lines:?}"
+    );
+    assert!(!lines[0].contains("index"), "{lines:?}");
+    let table = Table::read(&place.path("play.csv"));
+    for finger in ["thumb", "index"] {
+        let samples = table.finger(finger);
+        assert!(samples.iter().all(|sample| !sample.touches()), "{finger} touches something");
+    }
+    let (thumb, index) = (&table.finger("thumb")[0], &table.finger("index")[0]);
+    // As far as a simulated arm that a light hand holds stays where it is put.
+    assert!((0.05..0.065).contains(&thumb.hip.y), "above its lid: {}", thumb.hip);
+    assert!((index.hip - nalgebra::Vector3::new(0.1, 0.1, 0.0)).norm() < 3e-3, "{}", index.hip);
 }

@@ -100,6 +100,8 @@ fn what_is_not_haptic_carries_others_and_what_is_not_collidable_lets_them_fall()
     let (felt, lowest) = played("collidable = false");
     // Free fall for 1.5 s: 11 m.
     assert!(felt && lowest < -10.0, "{felt} {lowest}");
+    let (felt, lowest) = played("haptic = false\ncollidable = false");
+    assert!(!felt && lowest < -10.0, "only seen: {felt} {lowest}");
 }
 
 #[test]

@@ -2,6 +2,7 @@
 //! run does without it where there is none.
 
 use std::time::{Duration, Instant};
+use system_tests::recording::Table;
 use system_tests::screen::{SIZE, Screen};
 use system_tests::workplace::{Running, Said, Workplace};
 
@@ -111,4 +112,129 @@ fn a_signal_ends_a_run_with_a_window() {
     let process = rustix::process::Pid::from_raw(running.child.id().cast_signed()).expect("a process");
     rustix::process::kill_process(process, rustix::process::Signal::INT).expect("it is ours");
     assert_eq!(running.wait().status, Some(130));
+}
+
+/// Behind the ball, many more that take long to draw without a graphics card.
+const SLOW: &str = "\
+[[entity]]
+name = \"crowd\"
+shape = { kind = \"sphere\", radius_m = 0.004 }
+position_m = [-0.1, -0.1, -0.2]
+grid = { count = [6, 6, 6], spacing_m = [0.035, 0.035, 0.03] }
+haptic = false
+collidable = false
+";
+
+/// Of the events of a kind, when they were (s).
+fn times(events: &Table, kind: &str) -> Vec<f64> {
+    let kinds = events.texts("kind").into_iter();
+    kinds.zip(events.numbers("t_s")).filter(|(is, _)| *is == kind).map(|(_, t)| t).collect()
+}
+
+#[test]
+fn a_key_s_press_is_as_long_as_it_was_however_slowly_its_window_draws() {
+    let Some(screen) = Screen::open() else { return };
+    let place = Workplace::new();
+    place.write("scene.toml", [SCENE, SLOW].concat());
+    let mut run = place.phantom3();
+    run.args(["run", "scene.toml", "--seconds", "100", "--events", "events.csv"]);
+    run.env("DISPLAY", screen.display()).env("LIBGL_ALWAYS_SOFTWARE", "1");
+    let running = Running::start(run);
+    if !shows_the_ball(&screen, &running) {
+        return;
+    }
+    let mut took = Vec::new();
+    for seconds in ["0.02", "0.05", "0.02", "0.05"] {
+        let Some(all_s) = screen.press_for("y", seconds) else { return };
+        took.push((seconds.parse::<f64>().expect("a number"), all_s));
+    }
+    assert!(screen.press("Escape"));
+    let said = running.wait();
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    let events = Table::read(&place.path("events.csv"));
+    let (downs, ups, orders) =
+        (times(&events, "key-down"), times(&events, "key-up"), times(&events, "order"));
+    assert_eq!((downs.len(), ups.len()), (took.len(), took.len()), "{downs:?} {ups:?}");
+    for (at, ((down, up), (least_s, most_s))) in downs.into_iter().zip(ups).zip(took).enumerate() {
+        let told = [orders[2 * at], orders[2 * at + 1]];
+        println!("a press of {least_s} s: {down} to {up}, told at {told:?}");
+        // The server's times are whole milliseconds, and so are the run's; what the press took beyond its least length the
+        // machine knows, not we.
+        let pressed_s = up - down;
+        assert!(
+            (least_s - 2e-3..most_s + 2e-3).contains(&pressed_s),
+            "{least_s} s: {pressed_s} s of {most_s} s"
+        );
+        assert!(up <= told[1], "nothing is told before it was");
+    }
+}
+
+#[test]
+fn an_arrow_key_moves_what_was_chosen() {
+    let Some(screen) = Screen::open() else { return };
+    let place = Workplace::new();
+    let scene = SCENE.replace("visual =", "mass_kg = 0.1\nvisual =");
+    place.write("scene.toml", format!("gravity_m_s2 = [0.0, 0.0, 0.0]\n{scene}"));
+    let mut run = place.phantom3();
+    run.args(["run", "scene.toml", "--seconds", "100", "--record", "run.csv"]);
+    run.env("DISPLAY", screen.display()).env("LIBGL_ALWAYS_SOFTWARE", "1");
+    let running = Running::start(run);
+    if !shows_the_ball(&screen, &running) || !screen.press("period") || !screen.press("Right") {
+        return;
+    }
+    // A step of 5 mm; a key that a busy machine holds longer makes more of them.
+    wait_for(&place, "ball_x", 0.0049);
+    assert!(screen.press("Escape"));
+    let said = running.wait();
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    assert_eq!(Table::read(&place.path("run.csv")).numbers("ball_x")[0], 0.0);
+}
+
+/// Until a column of the recording that is being written is as much as this.
+fn wait_for(place: &Workplace, column: &str, least: f64) {
+    let newest = || {
+        let text = std::fs::read_to_string(place.path("run.csv")).ok()?;
+        let whole = &text[..=text.rfind('\n')?];
+        let at = whole.lines().next()?.split(',').position(|name| name == column)?;
+        whole.lines().skip(1).last()?.split(',').nth(at)?.parse::<f64>().ok()
+    };
+    let begun = Instant::now();
+    while newest().is_none_or(|newest| newest < least) {
+        assert!(begun.elapsed() < PATIENCE, "{column} is {:?} after {PATIENCE:?}, not {least}", newest());
+        std::thread::sleep(Duration::from_millis(200));
+    }
+}
+
+#[test]
+fn devices_that_are_attached_to_the_camera_go_with_the_window_s() {
+    let Some(screen) = Screen::open() else { return };
+    let place = Workplace::new();
+    let other = "[[camera]]\nname = \"aside\"\nposition_m = [0.1, 0.0, 0.55]\nfield_of_view_deg = 40.0\n";
+    place.write("scene.toml", [SCENE, other].concat());
+    let device = "[[device]]\nposition_m = [0.0, 0.1, -0.5]\n";
+    place.write("layout.toml", format!("master = 0\nattached_to = \"camera\"\n{device}"));
+    let mut run = place.phantom3();
+    run.args(["run", "scene.toml", "--layout", "layout.toml", "--seconds", "100", "--record", "run.csv"]);
+    run.env("DISPLAY", screen.display()).env("LIBGL_ALWAYS_SOFTWARE", "1");
+    let running = Running::start(run);
+    if !shows_the_ball(&screen, &running) || !screen.press("c") {
+        return;
+    }
+    wait_for(&place, "f0_hip_x", 0.1 - 1e-7);
+    assert!(screen.press("Escape"));
+    let said = running.wait();
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    let samples = Table::read(&place.path("run.csv")).finger("f0");
+    let (first, last) = (samples[0].hip, samples[samples.len() - 1].hip);
+    // Where the scene has it, though the layout says nothing of where the camera is; then as far as the camera goes.
+    assert!((first - nalgebra::Vector3::new(0.0, 0.1, 0.0)).norm() < 1e-6, "{first}");
+    assert!((last - first - nalgebra::Vector3::new(0.1, 0.0, 0.05)).norm() < 1e-6, "{last}");
+    for ticks in samples.windows(2) {
+        let ticks_between = ((ticks[1].t - ticks[0].t) * 1e3).round();
+        assert!(
+            (ticks[1].hip - ticks[0].hip).norm() <= ticks_between * 0.5e-3 + 1e-9,
+            "{} s: a blow",
+            ticks[1].t
+        );
+    }
 }

@@ -13,7 +13,7 @@ use std::path::Path;
 use world::model;
 use world::{MassSpec, Scene, ShapeSpec};
 
-/// All of them. `whole` is the scene with what the rig leaves out.
+/// All of them.
 pub(super) fn all(rig: &Rig, whole: &Scene, entities: &[Entity]) -> Vec<String> {
     let mut warnings = too_stiff(rig);
     warnings.extend(overlaps(rig, entities));
@@ -180,11 +180,15 @@ fn closed(rig: &Rig, entities: &[Entity]) -> Vec<String> {
 
 /// Models that are only seen are not loaded for a run; the window will want them.
 fn unseen(whole: &Scene) -> Vec<String> {
-    let visuals = whole.entities.iter().flat_map(|entity| &entity.visuals);
     let mut files = BTreeMap::new();
-    for visual in visuals {
-        if let Some(ShapeSpec::Mesh(mesh)) = &visual.shape {
-            files.entry(&mesh.file).or_insert(&mesh.at);
+    for entity in &whole.entities {
+        // What is felt is refused, and not only warned of.
+        let of_itself = (!entity.is_met() && entity.motion.is_none()).then_some(&entity.shape);
+        let shapes = entity.visuals.iter().filter_map(|visual| visual.shape.as_ref().or(of_itself));
+        for shape in shapes {
+            if let ShapeSpec::Mesh(mesh) = shape {
+                files.entry(&mesh.file).or_insert(&mesh.at);
+            }
         }
     }
     let wrong = |(file, at): (&std::path::PathBuf, &world::Location)| {

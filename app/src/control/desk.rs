@@ -16,13 +16,13 @@ use crate::row_queue::{RowReceiver, row_queue_of};
 use crate::shown::Shown;
 use io_driver::device::Extras;
 use io_driver::say::say;
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Vector3};
 use rt_core::input_file;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver, Sender};
 use world::lists::SlowList;
-use world::{FrictionSpec, Settings};
+use world::{FrictionSpec, Layout, Settings};
 
 /// Where orders come from.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -169,10 +169,15 @@ impl Desk {
                 )));
             }
             last_s = at_s;
-            let at_tick = (at_s * 1e9 / self.rig.period_ns as f64).round() as u64;
+            let at_tick = self.tick_at(at_s);
             self.order(at_tick, order).map_err(wrong)?;
         }
         Ok(())
+    }
+
+    /// The tick of the run that is nearest to this time of it (s).
+    fn tick_at(&self, at_s: f64) -> u64 {
+        (at_s * 1e9 / self.rig.period_ns as f64).round() as u64
     }
 
     /// Makes an order of words, and sends it for this tick of the run. A line of nothing is none.
@@ -198,7 +203,7 @@ impl Desk {
     pub fn order_now(&mut self, line: &str) -> Result<(), String> {
         let Some(words) = words::parse(line)? else { return Ok(()) };
         let goes_past = match words {
-            Words::Tell(_) | Words::Text(_) | Words::Pause(_) => true,
+            Words::Tell(..) | Words::Text(_) | Words::Pause(_) | Words::Camera(_) => true,
             // A script knows entities by their numbers in its own scene.
             Words::Swap(_) => self.script == Script::None,
             _ => self.script != Script::OtherScene,
@@ -223,8 +228,9 @@ impl Desk {
             Words::Scale(which, by, entity) => self.scale(which, by, entity.as_deref())?,
             Words::Friction(entity, spec) => self.friction(&entity, spec)?,
             Words::Move(entity, to_W, turn, over_s) => self.move_entity(&entity, to_W, turn, over_s)?,
+            Words::Camera(pose) => self.camera(pose)?,
             Words::Pause(is_paused) => Order::Pause(is_paused),
-            Words::Tell(kind) => Order::Tell(kind),
+            Words::Tell(kind, at_s) => Order::Tell(kind, at_s.map(|at_s| self.tick_at(at_s))),
             Words::Text(_) => Order::Text,
             Words::Swap(scene) => self.swap(&scene)?,
         })
@@ -289,6 +295,16 @@ impl Desk {
         }
         self.times[chosen].iter_mut().for_each(|times| times[which as usize] *= by);
         Ok(Order::Scale(Scale { which, by, entity }))
+    }
+
+    fn camera(&mut self, pose: Isometry3<f64>) -> Result<Order, String> {
+        let carries = |layout: &&mut Layout| layout.camera().is_some();
+        let layout = self.rig.layout.as_mut().filter(carries).ok_or(
+            "no device goes with the camera; allowed: a run with a --layout that says `attached_to = \"camera\"`",
+        )?;
+        // So worlds to come have it.
+        *layout = std::mem::take(layout).with_camera(pose);
+        Ok(Order::Camera(pose))
     }
 
     fn swap(&mut self, scene: &Path) -> Result<Order, String> {

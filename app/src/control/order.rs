@@ -6,7 +6,7 @@ use crate::fast_step::{EventTeller, FastStep};
 use crate::row::BodyRow;
 use crate::row_queue::RowSender;
 use haptics::Friction;
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use world::events::Kind;
 
 /// What is to change.
@@ -15,12 +15,14 @@ pub enum Order {
     Scale(Scale),
     /// Where an entity is.
     Move(Move),
+    /// Where the camera is that devices go with.
+    Camera(Isometry3<f64>),
     /// Of what kind its friction is.
     Friction(Box<FrictionChange>),
     /// Whether things move by themselves.
     Pause(bool),
-    /// Nothing; it is told among the events.
-    Tell(Kind),
+    /// Nothing; it is told among the events, as of this tick of the run if that is not later than now.
+    Tell(Kind, Option<u64>),
     /// Nothing; whoever looks on reads it when it is taken.
     Text,
     /// The world: a reset, or another scene.

@@ -136,7 +136,7 @@ impl Path {
     }
 }
 
-fn between(from_W: &Isometry3<f64>, to_W: &Isometry3<f64>, part: f64) -> Isometry3<f64> {
+pub(super) fn between(from_W: &Isometry3<f64>, to_W: &Isometry3<f64>, part: f64) -> Isometry3<f64> {
     let place_W = from_W.translation.vector.lerp(&to_W.translation.vector, part);
     let turn: UnitQuaternion<f64> = to_W.rotation * from_W.rotation.inverse();
     // Half a turn has no shorter side, and is taken about some axis.

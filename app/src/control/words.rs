@@ -9,16 +9,17 @@
 //! turn table to 1 0 0 0 in 0.5           a quaternion w x y z
 //! turn table about 0 1 0 by 1.57 in 0.5  an axis of the world, and an angle in rad
 //! pose table at 0 0.1 0 1 0 0 0 in 0.5   both
+//! camera at 0 0.2 0.4 1 0 0 0             devices that are attached to it go along
 //! pause
 //! resume
 //! swap other.toml
-//! key 32 down
+//! key 32 down               it is told as of now; `key 32 down at 1.25` as of that time of the run
 //! trial 7 begins
 //! text 0.5 0.2 4 Press the red cube      at the window: shares of its width and height, seconds, what to read
 //! ```
 //! In a script each line begins with when: `at 2.5 reset`. What follows a `#` is for people.
 
-use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Quaternion, Unit, UnitQuaternion, Vector3};
 use std::path::PathBuf;
 use view::Note;
 use world::FrictionSpec;
@@ -38,12 +39,14 @@ pub enum Words {
     Friction(String, FrictionSpec),
     /// An entity is to go there \[m\] and to be turned so, within a time \[s\].
     Move(String, Option<Vector3<f64>>, Turn, f64),
+    /// The camera, and devices that go with it, are to be there.
+    Camera(Isometry3<f64>),
     /// Things are not to move by themselves, or to do so again.
     Pause(bool),
     /// Another scene is to be played.
     Swap(PathBuf),
-    /// Something is to be told among the events.
-    Tell(Kind),
+    /// Something is to be told among the events, as of this time of the run \[s\] if it is not of now.
+    Tell(Kind, Option<f64>),
     /// Something is to be read at the window.
     Text(Note),
 }
@@ -51,11 +54,13 @@ pub enum Words {
 /// Farther away nothing is put \[m\].
 const FARTHEST_M: f64 = 100.0;
 const LONGEST_S: f64 = 3600.0;
+const MOST_RUN_S: f64 = 1e9;
 const MOST_TURN_RAD: f64 = std::f64::consts::PI;
 const KNOWN: &str = "reset; stiffness FACTOR [of ENTITY]; damping FACTOR [of ENTITY]; friction ENTITY MODEL [KEY=VALUE]...; \
                      move ENTITY to X Y Z in SECONDS; turn ENTITY to W X Y Z in SECONDS; \
-                     turn ENTITY about X Y Z by RAD in SECONDS; pose ENTITY at X Y Z W X Y Z in SECONDS; pause; resume; \
-                     swap SCENE.toml; key CODE down|up; trial NUMBER begins|ends; text X Y SECONDS WORDS...";
+                     turn ENTITY about X Y Z by RAD in SECONDS; pose ENTITY at X Y Z W X Y Z in SECONDS; camera at X Y Z W X Y Z; \
+                     pause; resume; \
+                     swap SCENE.toml; key CODE down|up [at SECONDS]; trial NUMBER begins|ends; text X Y SECONDS WORDS...";
 
 /// What a line says after the comment is cut off; `None`: nothing.
 ///
@@ -85,15 +90,22 @@ pub fn parse(line: &str) -> Result<Option<Words>, String> {
             let turn = Turn::To(quaternion([w, i, j, k])?);
             Words::Move(entity.into(), Some(place([x, y, z])?), turn, seconds(over)?)
         }
+        ["camera", "at", x, y, z, w, i, j, k] => {
+            Words::Camera(Isometry3::from_parts(place([x, y, z])?.into(), quaternion([w, i, j, k])?))
+        }
         ["pause"] => Words::Pause(true),
         ["resume"] => Words::Pause(false),
         ["swap", scene] => Words::Swap(scene.into()),
         ["key", code, change @ ("down" | "up")] => {
-            Words::Tell(Kind::Key { code: whole(code)?, is_pressed: change == "down" })
+            Words::Tell(Kind::Key { code: whole(code)?, is_pressed: change == "down" }, None)
         }
+        ["key", code, change @ ("down" | "up"), "at", at] => Words::Tell(
+            Kind::Key { code: whole(code)?, is_pressed: change == "down" },
+            Some(run_seconds(at)?),
+        ),
         ["trial", trial, change @ ("begins" | "ends")] => {
             let change = if change == "begins" { Change::Begins } else { Change::Ends };
-            Words::Tell(Kind::Trial { change, number: whole(trial)? })
+            Words::Tell(Kind::Trial { change, number: whole(trial)? }, None)
         }
         ["text", x, y, over, _, ..] => {
             let at = [share(x)?, share(y)?];
@@ -176,6 +188,11 @@ fn seconds(text: &str) -> Result<f64, String> {
     number(text, "s", 0.0, LONGEST_S)
 }
 
+/// A time of the run.
+fn run_seconds(text: &str) -> Result<f64, String> {
+    number(text, "s", 0.0, MOST_RUN_S)
+}
+
 fn share(text: &str) -> Result<f64, String> {
     number(text, "of the window", 0.0, 1.0)
 }
@@ -236,10 +253,15 @@ mod tests {
                 Words::Friction("table".into(), FrictionSpec::Coulomb { mu: 0.3 }),
             ),
             ("friction table none", Words::Friction("table".into(), FrictionSpec::None)),
+            ("camera at 1 2 3 0 1 0 0", {
+                let pose = Isometry3::from_parts([1.0, 2.0, 3.0].into(), half_a_turn(Vector3::x_axis()));
+                Words::Camera(pose)
+            }),
             ("pause", Words::Pause(true)),
             ("resume", Words::Pause(false)),
-            ("key 32 down", Words::Tell(Kind::Key { code: 32, is_pressed: true })),
-            ("trial 7 ends", Words::Tell(Kind::Trial { change: Change::Ends, number: 7 })),
+            ("key 32 down", Words::Tell(Kind::Key { code: 32, is_pressed: true }, None)),
+            ("key 32 up at 1.25", Words::Tell(Kind::Key { code: 32, is_pressed: false }, Some(1.25))),
+            ("trial 7 ends", Words::Tell(Kind::Trial { change: Change::Ends, number: 7 }, None)),
             (
                 "text 0.5 0.25 4 Press  the cube # softly",
                 Words::Text(Note { text: "Press the cube".into(), at: [0.5, 0.25], seconds: 4.0 }),

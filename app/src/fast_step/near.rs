@@ -1,6 +1,6 @@
 //! What a finger could touch within the next ticks.
 //!
-//! Model: all entities whose boxes overlap a box around the HIP. It is large, so that it need not be looked for again until
+//! Model: all entities that fingers feel and whose boxes overlap a box around the HIP. It is large, so that it need not be looked for again until
 //! the HIP has gone a few millimetres or some entity's box has changed.
 //! Invariants: no allocation in `update`; numbers in ascending order.
 
@@ -46,7 +46,8 @@ impl Near {
             let found = &mut self.entities;
             found.clear();
             broad_phase.near(&around, |entity| {
-                let is_here = entities.get(entity).is_some_and(|entity| entity.space == space);
+                let is_felt = |entity: &Entity| entity.space == space && entity.is_haptic;
+                let is_here = entities.get(entity).is_some_and(is_felt);
                 if is_here && found.len() < found.capacity() {
                     found.push(entity as u32);
                 }
@@ -107,6 +108,15 @@ mod tests {
         entities[10].move_to(Isometry3::translation(0.05, 0.03, 0.0));
         broad_phase.moved(10, &entities[10], &Vector3::zeros());
         assert_eq!(near.update((&broad_phase, &entities), 0, &at(0.05), &at(0.05), 0.0), [0, 10]);
+    }
+
+    #[test]
+    fn what_fingers_pass_through_is_not_near() {
+        let mut entities = entities();
+        entities[1] = entities[1].clone().without_fingers();
+        let broad_phase = BroadPhase::new(&entities);
+        let mut near = Near::new(11);
+        assert_eq!(near.update((&broad_phase, &entities), 0, &at(0.05), &at(0.06), 0.03), [0, 2]);
     }
 
     #[test]

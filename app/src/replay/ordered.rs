@@ -46,6 +46,10 @@ impl Orders {
         while self.left.front().is_some_and(|(tick, _)| *tick <= run_tick + AHEAD_TICKS)
             && let Some((tick, words)) = self.left.pop_front()
         {
+            // Where fingers were in the world is in the recording's rows, wherever their devices stood.
+            if words.starts_with("camera ") {
+                continue;
+            }
             // Where another scene takes over the recording ends; until then forces fade as before a reset.
             let is_swap = words.split_whitespace().next() == Some("swap");
             if let Err(error) = self.desk.order(tick, if is_swap { "reset" } else { &words }) {

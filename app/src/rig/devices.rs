@@ -48,6 +48,33 @@ impl Rig {
         }
     }
 
+    /// The same with fingers that begin there (m), and devices where these reach that.
+    ///
+    /// # Errors
+    /// If it is not known what the devices are.
+    pub fn starting_at(mut self, starts: &[Vector3<f64>]) -> Result<Self, RigError> {
+        for (finger, start) in self.scene.fingers.iter_mut().zip(starts) {
+            finger.start_m = (*start).into();
+        }
+        self.bases = self.place_bases()?;
+        Ok(self)
+    }
+
+    /// Whether devices go where the camera goes.
+    pub fn goes_with_the_camera(&self) -> bool {
+        self.layout.as_ref().is_some_and(|layout| layout.camera().is_some())
+    }
+
+    /// The same with the camera there, and all devices that go with it.
+    ///
+    /// # Errors
+    /// If it is not known what the devices are.
+    pub fn seen_from(mut self, camera: Isometry3<f64>) -> Result<Self, RigError> {
+        self.layout = self.layout.map(|layout| layout.with_camera(camera));
+        self.bases = self.place_bases()?;
+        Ok(self)
+    }
+
     /// What the devices of fingers all reach: corners of a box in W (m).
     ///
     /// # Errors

@@ -3,7 +3,7 @@
 //! Space 0 is the world, space `i + 1` is behind the door of the environment `i`.
 
 use haptics::{Door, WORLD};
-use world::{DoorSpec, Scene};
+use world::DoorSpec;
 
 use super::{Rig, RigError};
 
@@ -44,17 +44,4 @@ impl Rig {
         let has_doors = environments.iter().any(|environment| environment.door.is_some());
         has_doors.then(|| environments.iter().map(|environment| environment.name.clone()).collect())
     }
-}
-
-/// Without what is only seen: that is for the window. It stays where it has a mass, and moves, or a door.
-pub(super) fn without_what_is_only_seen(mut scene: Scene) -> Scene {
-    let hulls: Vec<String> = scene
-        .environments
-        .iter()
-        .filter_map(|environment| Some(environment.door.as_ref()?.of.clone()))
-        .collect();
-    scene
-        .entities
-        .retain(|entity| entity.is_met() || entity.motion.is_some() || hulls.contains(&entity.name));
-    scene
 }

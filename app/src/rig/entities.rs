@@ -2,8 +2,11 @@
 
 use super::solids::Solids;
 use super::{Rig, RigError, material};
-use haptics::{Algorithm, Entity, ParameterError};
-use world::{AlgorithmSpec, SceneEntity, SceneFinger};
+use haptics::{Algorithm, Entity, ParameterError, Sphere};
+use world::{AlgorithmSpec, Scene, SceneEntity, SceneFinger, ShapeSpec};
+
+/// Radius of what stands in for a mesh that nobody feels (m).
+const STAND_IN_M: f64 = 1e-3;
 
 impl Rig {
     pub(super) fn entity(&self, spec: &SceneEntity, solids: &mut Solids) -> Result<Entity, RigError> {
@@ -34,6 +37,19 @@ impl Rig {
         let entity = if spec.is_collidable { entity } else { entity.without_collisions() };
         let entity = entity.within(self.space(spec.within.as_ref()));
         if spec.is_haptic { self.with_surface_effects(entity, spec) } else { Ok(entity.without_fingers()) }
+    }
+
+    /// An entity that is only seen: it has a place, a space, and a form as far as whoever draws it asks for one. It is among
+    /// the others so that it is seen, chosen and moved by orders as they are.
+    pub(super) fn only_seen(&self, spec: &SceneEntity, solids: &mut Solids) -> Result<Entity, RigError> {
+        let unfit = |unfit| self.unfit((&spec.file, spec.line), format!("entity {}", spec.name), unfit);
+        let shape = match &spec.shape {
+            ShapeSpec::Mesh(_) => Sphere::new(STAND_IN_M).map_err(|source| refused(spec, source))?.into(),
+            shape => material::shape(shape, &self.models, false, solids).map_err(unfit)?,
+        };
+        let entity = Entity::new(shape, spec.pose, spec.stiffness_n_per_m);
+        let entity = entity.map_err(|source| refused(spec, source))?;
+        Ok(entity.without_fingers().without_collisions().within(self.space(spec.within.as_ref())))
     }
 
     /// The algorithms to compare with know surfaces, and trees have none of their own.
@@ -90,6 +106,15 @@ impl Rig {
             },
         })
     }
+}
+
+/// Whether nobody meets an entity, nor does it move by itself or have a door: it is there to be looked at.
+pub(super) fn is_only_seen(scene: &Scene, spec: &SceneEntity) -> bool {
+    let has_door = || {
+        let mut doors = scene.environments.iter().filter_map(|environment| environment.door.as_ref());
+        doors.any(|door| door.of == spec.name)
+    };
+    !spec.is_met() && spec.motion.is_none() && !has_door()
 }
 
 /// Why an entity of the scene is refused.

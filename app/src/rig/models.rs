@@ -2,6 +2,7 @@
 //!
 //! What was repaired is told once, what cannot be used is refused with the place in the scene and in the model.
 
+use super::entities::is_only_seen;
 use super::{Problems, RigError, material};
 use haptics::mesh::{CornerUv, Finding, Mesh, MeshError, MeshReport, TriangleSoup};
 use haptics::{Nurbs, Shading};
@@ -23,6 +24,8 @@ pub(super) struct Models {
     shadings: Vec<(Key, ShadingSpec, Shading)>,
     nurbs: BTreeMap<Key, Arc<Nurbs>>,
     reports: Vec<(PathBuf, MeshReport)>,
+    /// Entities whose meshes nobody feels.
+    only_seen: BTreeSet<String>,
 }
 
 /// A file, the bits of the factors along its axes, whether a picture lies on it, and whether it is felt from both sides.
@@ -34,6 +37,10 @@ impl Models {
         let mut models = Self::default();
         let mut refused = BTreeSet::new();
         for entity in &scene.entities {
+            if is_drawn_from_its_file(scene, entity) {
+                models.only_seen.insert(entity.name.clone());
+                continue;
+            }
             let has_picture = entity.height_map.is_some();
             let (ShapeSpec::Nurbs(spec) | ShapeSpec::Mesh(spec)) = &entity.shape else { continue };
             let key = key_of(spec, has_picture && matches!(entity.shape, ShapeSpec::Mesh(_)));
@@ -66,9 +73,10 @@ impl Models {
         Ok(())
     }
 
-    /// Whether the model of an entity is there, if it has one.
+    /// Whether the model of an entity is there, if it needs one.
     pub(super) fn has(&self, entity: &SceneEntity) -> bool {
         match &entity.shape {
+            ShapeSpec::Mesh(_) if self.only_seen.contains(&entity.name) => true,
             ShapeSpec::Mesh(spec) => self.mesh(spec, entity.height_map.is_some()).is_some(),
             ShapeSpec::Nurbs(spec) => self.nurbs(spec).is_some(),
             _ => true,
@@ -115,6 +123,11 @@ impl Models {
     pub(super) fn nurbs(&self, spec: &MeshSpec) -> Option<&Arc<Nurbs>> {
         self.nurbs.get(&key_of(spec, false))
     }
+}
+
+/// A mesh that nobody feels is not built: its file need not hold one that can be felt.
+fn is_drawn_from_its_file(scene: &Scene, entity: &SceneEntity) -> bool {
+    matches!(entity.shape, ShapeSpec::Mesh(_)) && is_only_seen(scene, entity)
 }
 
 fn key_of(spec: &MeshSpec, has_picture: bool) -> Key {

@@ -1,5 +1,6 @@
 //! The pictures of a scene: each file is read once for all entities that it lies on.
 
+use super::entities::is_only_seen;
 use super::{Problems, RigError};
 use haptics::{HeightGrid, HeightMap, HeightMapError, Shape};
 use std::collections::{BTreeMap, BTreeSet};
@@ -19,7 +20,8 @@ impl Pictures {
     pub(super) fn load(scene: &Scene, problems: &mut Problems) -> Self {
         let mut pictures = Self::default();
         let mut refused = BTreeSet::new();
-        for spec in scene.entities.iter().filter_map(|entity| entity.height_map.as_ref()) {
+        let felt = scene.entities.iter().filter(|entity| !is_only_seen(scene, entity));
+        for spec in felt.filter_map(|entity| entity.height_map.as_ref()) {
             if pictures.grids.contains_key(&spec.file) || refused.contains(&spec.file) {
                 continue;
             }

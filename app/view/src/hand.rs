@@ -4,7 +4,7 @@
 //! it that is parallel to the picture, so that it stays under the pointer; the wheel moves it away and back, along the
 //! view. Keys move it straight up and down, close the grip, turn it and say how many fingers there are. What comes out is
 //! where each finger wants to be; a hand's model and a device are between that and what is felt, so that a mouse that jumps
-//! does no harm.
+//! does no harm. Fingers stay where they began until somebody does anything with the hand; then they gather in the grip.
 //! Frames: world, y up; metres. The pointer's places are the window's (points).
 
 mod below;
@@ -32,6 +32,8 @@ pub const FINE: f64 = 0.25;
 /// How fast keys and controllers move the hand (m/s), and turn it (rad/s).
 const KEYS_M_PER_S: f64 = 0.08;
 const KEYS_RAD_PER_S: f64 = 1.5;
+/// How fast fingers that began elsewhere come into the grip (m/s).
+const GATHERING_M_PER_S: f64 = 0.15;
 /// Touchpads tell points; so many are a notch.
 const POINTS_PER_NOTCH: f64 = 40.0;
 /// Windows that were covered for a while do not make up for it (s).
@@ -47,6 +49,10 @@ pub struct MouseHand {
     /// Corners of what the devices reach (m).
     reach: [Vector3<f64>; 2],
     wishes: Vec<Wish>,
+    /// Whether anybody has done anything with it.
+    is_used: bool,
+    /// From each finger's place in the grip to where it is wanted still (m).
+    astray: Vec<Vector3<f64>>,
     pad: Pad,
 }
 
@@ -54,10 +60,27 @@ impl MouseHand {
     /// With so many fingers, here (m), where devices reach from one corner of a box to the other.
     pub fn new(fingers: usize, place: Vector3<f64>, reach: [Vector3<f64>; 2]) -> Self {
         let wish = Wish { place, orientation: UnitQuaternion::identity(), buttons: 0 };
-        let mut hand =
-            Self { grip: Grip::new(fingers), place, reach, wishes: vec![wish; fingers], ..Self::default() };
+        let mut hand = Self {
+            grip: Grip::new(fingers),
+            place,
+            reach,
+            wishes: vec![wish; fingers],
+            is_used: true,
+            astray: vec![Vector3::zeros(); fingers],
+            ..Self::default()
+        };
         hand.go(Vector3::zeros());
         hand.pass(0.0);
+        hand
+    }
+
+    /// With fingers that begin here (m), and stay there until somebody does anything.
+    pub fn starting_at(starts: &[Vector3<f64>], reach: [Vector3<f64>; 2]) -> Self {
+        let mut hand = Self::new(starts.len(), middle(&starts[..starts.len().min(Grip::MOST)]), reach);
+        for (wish, start) in hand.wishes.iter_mut().zip(starts) {
+            wish.place = *start;
+        }
+        hand.is_used = false;
         hand
     }
 
@@ -104,8 +127,21 @@ impl MouseHand {
 
     /// Moves it by so much (m), as far as devices reach.
     pub fn go(&mut self, by: Vector3<f64>) {
+        if by != Vector3::zeros() {
+            self.begin();
+        }
         let [least, most] = &self.reach;
         self.place = (self.place + by).sup(least).inf(most);
+    }
+
+    /// From now on it is used: fingers leave where they began.
+    fn begin(&mut self) {
+        if std::mem::replace(&mut self.is_used, true) {
+            return;
+        }
+        for (finger, (astray, wish)) in self.astray.iter_mut().zip(&self.wishes).enumerate() {
+            *astray = wish.place - (self.place + self.grip.stand(finger));
+        }
     }
 
     /// An open hand faces whoever looks; one that holds something stays as it is.
@@ -115,10 +151,17 @@ impl MouseHand {
 
     /// Time goes by (s): the fingers close or open.
     pub fn pass(&mut self, dt_s: f64) -> &[Wish] {
+        if !self.grip.is_as_it_began() {
+            self.begin();
+        }
         self.grip.pass(dt_s);
+        if !self.is_used {
+            return &self.wishes;
+        }
         let [least, most] = &self.reach;
-        for (finger, wish) in self.wishes.iter_mut().enumerate() {
-            wish.place = (self.place + self.grip.stand(finger)).sup(least).inf(most);
+        for (finger, (wish, astray)) in self.wishes.iter_mut().zip(&mut self.astray).enumerate() {
+            *astray -= astray.cap_magnitude(GATHERING_M_PER_S * dt_s);
+            wish.place = (self.place + self.grip.stand(finger) + *astray).sup(least).inf(most);
             wish.orientation = self.grip.orientation();
         }
         &self.wishes

@@ -10,6 +10,7 @@ mod chord;
 mod code;
 mod hand_keys;
 mod help;
+mod key_times;
 mod router;
 mod takers;
 
@@ -19,5 +20,6 @@ pub use chord::Chord;
 pub use code::code;
 pub use hand_keys::HandKeys;
 pub use help::{HelpLine, help};
+pub use key_times::{KeyHeard, KeyTimes, ServerClock, without_pad};
 pub use router::{Receiver, Router, Told};
 pub use takers::{Actions, Unbound};

@@ -39,7 +39,7 @@ pub mod window;
 
 pub use eyes::Eyes;
 pub use moment::{ContactMoment, FingerMoment, Moment};
-pub use news::{Ask, Glimpse, News, Reins, Sample, Status, Wish};
+pub use news::{Ask, Glimpse, KeyChange, News, Reins, Sample, Status, Wish};
 pub use offscreen::{NoPictures, Offscreen};
 pub use picture::{Picture, Studio};
 pub use stage::{Known, Stage, Thing};

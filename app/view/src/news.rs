@@ -73,10 +73,23 @@ pub struct Status {
 pub enum Ask {
     /// An order, in the words of `run --orders -`.
     Order(String),
+    /// A key that means nothing here went down or up: the run is to tell of it.
+    Key(KeyChange),
     /// A recording shall begin, or end.
     Record(bool),
     /// The run shall end.
     End,
+}
+
+/// A key that went down or up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct KeyChange {
+    /// Which, by the number that X11 gives its symbol.
+    pub code: u32,
+    /// Whether it went down.
+    pub is_pressed: bool,
+    /// When, on the system's monotonic clock (ns).
+    pub at_ns: u64,
 }
 
 /// Where a hand without hardware wants a finger to be.

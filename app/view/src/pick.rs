@@ -36,6 +36,8 @@ pub struct Hit {
 #[derive(Debug, Default)]
 pub struct Picker {
     things: Vec<(Thing, Arc<Bundles>)>,
+    /// Of each entity, whether fingers feel it.
+    is_felt: Vec<bool>,
 }
 
 /// Of the same triangles all boxes, in the triangles' frame.
@@ -65,12 +67,19 @@ impl Picker {
             });
             (thing.clone(), bundles)
         });
-        Self { things: things.collect() }
+        let is_felt = stage.known.iter().map(|known| known.is_felt).collect();
+        Self { things: things.collect(), is_felt }
     }
 
     /// What a ray of the world meets first at this moment.
     pub fn pick(&self, moment: &Moment, ray: &Ray) -> Option<Hit> {
         self.pick_of(moment, ray, |_| true)
+    }
+
+    /// The same of what fingers feel, as far as it counts.
+    pub fn pick_felt(&self, moment: &Moment, ray: &Ray, counts: impl Fn(usize) -> bool) -> Option<Hit> {
+        let is_felt = |entity: usize| self.is_felt.get(entity).copied().unwrap_or(true);
+        self.pick_of(moment, ray, |entity| is_felt(entity) && counts(entity))
     }
 
     /// The same of those entities only that count.

@@ -44,6 +44,8 @@ pub struct Known {
     pub damping_n_s_per_m: f64,
     /// Of its surface.
     pub friction: FrictionSpec,
+    /// Whether fingers feel it.
+    pub is_felt: bool,
 }
 
 /// Something to be seen of an entity.
@@ -128,6 +130,7 @@ impl Known {
             stiffness_n_per_m: entity.stiffness_n_per_m,
             damping_n_s_per_m: entity.damping_n_s_per_m,
             friction: entity.friction.clone(),
+            is_felt: entity.is_haptic,
         }
     }
 }

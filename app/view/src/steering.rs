@@ -68,6 +68,16 @@ impl Steering {
     }
 }
 
+/// The order that tells where the camera is: devices that are attached to it go along.
+pub fn camera_order(pose: &Isometry3<f64>) -> String {
+    let (place, turned) = (pose.translation.vector, pose.rotation);
+    // A tenth of a micrometre, and of a microradian.
+    format!(
+        "camera at {:.7} {:.7} {:.7} {:.8} {:.8} {:.8} {:.8}",
+        place.x, place.y, place.z, turned.w, turned.i, turned.j, turned.k
+    )
+}
+
 /// How an action that moves or turns what is chosen turns the sun: it goes over the sky where the arrow points.
 pub fn turned_sun(bound: Bound) -> UnitQuaternion<f64> {
     let about = match bound.action {

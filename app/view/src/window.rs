@@ -7,6 +7,7 @@
 //! One process has one window at most, once.
 
 mod controls;
+mod key_listener;
 mod looker;
 mod scene;
 mod writing;
@@ -46,6 +47,8 @@ pub struct WindowSpec {
     pub bindings: Bindings,
     /// Where pictures go that people take.
     pub pictures: PathBuf,
+    /// Whether devices go where its camera goes.
+    pub carries_devices: bool,
 }
 
 /// Why there is no window.

@@ -208,3 +208,29 @@ fn the_ring_is_on_the_first_thing_straight_below_the_fingers() {
     assert_eq!(below(0.3, 0.1), None, "beside everything");
     assert_eq!(below(0.0, -0.1), None, "below everything");
 }
+
+#[test]
+fn fingers_stay_where_they_began_until_somebody_moves_the_hand_and_then_come_into_the_grip() {
+    let starts = [Vector3::new(-0.1, 0.2, 0.05), Vector3::new(0.12, 0.05, 0.0)];
+    let camera = camera();
+    let seen = Seen::new(&camera, part());
+    let mut hand = MouseHand::starting_at(&starts, REACH);
+    for _ in 0..100 {
+        hand.face(&seen);
+        hand.drag(vec2(0.0, 0.0), &seen);
+        let wishes = hand.pass(0.016);
+        assert!(wishes.iter().zip(&starts).all(|(wish, start)| wish.place == *start));
+    }
+    hand.grip.close();
+    let mut before: Vec<Vector3<f64>> = starts.to_vec();
+    for _ in 0..100 {
+        let wishes = hand.pass(0.016);
+        for (wish, before) in wishes.iter().zip(&mut before) {
+            // 0.15 m/s into the grip, and a finger's share of the grip's own 0.08 m/s.
+            assert!((wish.place - *before).norm() < 0.2 * 0.016, "{} {before}", wish.place);
+            *before = wish.place;
+        }
+    }
+    let middle = 0.5 * (before[0] + before[1]);
+    assert!((middle - hand.place()).norm() < 1e-9 && (before[0] - before[1]).norm() < 0.02, "{before:?}");
+}

@@ -187,7 +187,7 @@ impl SceneEntity {
         })
     }
 
-    /// Whether fingers or other entities meet it: what is only seen is of no matter to a run without a window.
+    /// Whether fingers or other entities meet it; if neither do, it is only seen.
     pub fn is_met(&self) -> bool {
         self.is_haptic || self.is_collidable
     }

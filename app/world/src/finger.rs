@@ -24,6 +24,8 @@ pub struct SceneFinger {
     pub radius_m: f64,
     /// Where the finger rests without hand or device; world frame, default the origin.
     pub start_m: Point3<f64>,
+    /// Whether the scene says so.
+    pub has_start: bool,
     /// Index of the haptic device that moves it; unique, default its position in the list.
     pub device: usize,
     /// How its forces are kept from feeding energy into the hand; default they are not.
@@ -63,6 +65,7 @@ impl SceneFinger {
             name: names.claim(table, format!("f{i}"))?,
             radius_m: table.number_or("radius_m", Bound::NotNegative, 0.0)?,
             start_m: table.numbers_or("start_m", [0.0; 3])?.into(),
+            has_start: table.get("start_m").is_some(),
             device: claim_device(table, i, devices)?,
             passivity: PassivitySpec::read(table)?,
             soft: SoftSpec::read(table)?,

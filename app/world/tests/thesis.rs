@@ -71,7 +71,7 @@ fn figure_7_3_is_a_red_half_kilogram_cube_that_does_not_turn() {
         told,
         [
             "Thing.ini: a moment of inertia is missing: that of the shape and the mass is taken",
-            "Thing.ini: Inputtable: nothing is moved by keys and mouse yet",
+            "Thing.ini: Inputtable: at the window keys move whatever is chosen there, and orders move it; nothing has to be said for that",
             "no Phantom in the list: a finger was added, since a scene needs one",
         ]
     );

@@ -37,7 +37,7 @@ impl Cue {
     ) -> Option<Self> {
         let first = |from: &Vector3<f64>| {
             let ray = Ray { origin: (*from).into(), direction: -Vector3::y() };
-            Some(picker.pick_of(moment, &ray, |entity| !is_held(entity))?.place.coords)
+            Some(picker.pick_felt(moment, &ray, |entity| !is_held(entity))?.place.coords)
         };
         let from = middle(fingers);
         Some(Self { from, to: first(&from)?, feet: fingers.iter().filter_map(first).collect() })

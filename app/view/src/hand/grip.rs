@@ -80,6 +80,12 @@ impl Grip {
         self.is_closing
     }
 
+    /// Whether nobody has closed it, turned it, or said how many fingers take part.
+    pub fn is_as_it_began(&self) -> bool {
+        let all_take_part = self.fingers == self.all.min(Self::MOST);
+        !self.is_closing && self.opening_m >= OPEN_M && self.turned_rad == 0.0 && all_take_part
+    }
+
     /// So many take part, as far as there are so many.
     pub fn set_fingers(&mut self, fingers: usize) {
         self.fingers = fingers.clamp(1.min(self.all), self.all.min(Self::MOST));

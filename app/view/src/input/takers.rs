@@ -4,6 +4,7 @@ use super::action::Action;
 use super::bindings::Bound;
 use super::code::code;
 use super::router::{Receiver, Told};
+use crate::news::KeyChange;
 use eframe::egui::Event;
 
 /// Takes the actions that it likes.
@@ -31,21 +32,29 @@ impl Receiver for Actions<'_> {
     }
 }
 
-/// Takes the keys that are bound to nothing, as orders that tell of them: so an experiment's recording has them.
-#[derive(Debug, Default)]
-pub struct Unbound {
-    /// In the words of orders.
-    pub orders: Vec<String>,
+/// Takes the keys that are bound to nothing: so an experiment's recording has them.
+pub struct Unbound<'t> {
+    time_ns: &'t mut dyn FnMut(u32, bool) -> u64,
+    /// In the order in which they came.
+    pub keys: Vec<KeyChange>,
 }
 
-impl Receiver for Unbound {
+impl<'t> Unbound<'t> {
+    /// With somebody who says when a key of this number went down or up.
+    pub fn new(time_ns: &'t mut dyn FnMut(u32, bool) -> u64) -> Self {
+        Self { time_ns, keys: Vec::new() }
+    }
+}
+
+impl Receiver for Unbound<'_> {
     fn take(&mut self, told: &Told<'_>) -> bool {
         let Event::Key { key, pressed, repeat, .. } = told.event else { return false };
         if told.bound.is_some() {
             return false;
         }
         if let Some(code) = code(*key).filter(|_| !repeat) {
-            self.orders.push(format!("key {code} {}", if *pressed { "down" } else { "up" }));
+            let at_ns = (self.time_ns)(code, *pressed);
+            self.keys.push(KeyChange { code, is_pressed: *pressed, at_ns });
         }
         true
     }
@@ -81,9 +90,14 @@ mod tests {
     }
 
     #[test]
-    fn keys_that_are_bound_to_nothing_are_told_as_orders_and_others_are_not() {
+    fn keys_that_are_bound_to_nothing_are_told_with_their_times_and_others_are_not() {
         let (bindings, mut router) = (Bindings::default(), Router::default());
-        let (mut none, mut unbound) = (Actions::new(&|_| false), Unbound::default());
+        let mut clock_ns = 0;
+        let mut time_ns = |_, _| {
+            clock_ns += 7;
+            clock_ns
+        };
+        let (mut none, mut unbound) = (Actions::new(&|_| false), Unbound::new(&mut time_ns));
         for event in [
             key(Key::Y, true, false),
             key(Key::Y, true, true),
@@ -94,6 +108,7 @@ mod tests {
         ] {
             router.tell(&event, &bindings, &mut [&mut none, &mut unbound]);
         }
-        assert_eq!(unbound.orders, ["key 89 down", "key 89 up", "key 65504 down"]);
+        let change = |code, is_pressed, at_ns| KeyChange { code, is_pressed, at_ns };
+        assert_eq!(unbound.keys, [change(89, true, 7), change(89, false, 14), change(65504, true, 21)]);
     }
 }

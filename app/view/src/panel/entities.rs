@@ -88,6 +88,7 @@ mod tests {
             stiffness_n_per_m: 1.0,
             damping_n_s_per_m: 0.0,
             friction: FrictionSpec::None,
+            is_felt: true,
         }
     }
 

@@ -128,6 +128,7 @@ mod tests {
             stiffness_n_per_m: 800.0,
             damping_n_s_per_m: 1.0,
             friction,
+            is_felt: true,
         })
     }
 

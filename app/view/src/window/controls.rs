@@ -1,5 +1,6 @@
 //! What keys and mouse do at the window.
 
+use super::key_listener::KeyListener;
 use super::scene::SceneView;
 use super::writing;
 use super::{WindowSpec, snapshot_file};
@@ -7,7 +8,7 @@ use crate::camera_man::{CameraMan, CameraTurn, Sight};
 use crate::eyes::{Eyes, Pointed};
 use crate::input::{Action, Actions, Bindings, Bound, HandKeys, Receiver, Router, Step, Unbound};
 use crate::moment::Moment;
-use crate::news::{Ask, Status};
+use crate::news::{Ask, KeyChange, Status};
 use crate::pick::{Hit, Picker};
 use crate::stage::Stage;
 use crate::status_line::status_line;
@@ -26,6 +27,7 @@ const ABOVE: [f64; 2] = [0.5, 0.06];
 /// Who listens to keys and mouse, and shows text.
 pub(super) struct Controls {
     bindings: Bindings,
+    listener: KeyListener,
     router: Router,
     man: CameraMan,
     picker: Picker,
@@ -56,7 +58,7 @@ pub(super) struct Reach<'r> {
 struct Heard {
     moves: Vec<Bound>,
     rest: Vec<Bound>,
-    orders: Vec<String>,
+    keys: Vec<KeyChange>,
 }
 
 /// Everything that can be pointed at.
@@ -86,7 +88,7 @@ impl Pointing<'_> {
 
 impl Controls {
     /// As a window begins; eyes that it cannot serve are one.
-    pub(super) fn new(spec: &WindowSpec, eyes: &mut Eyes, stage: &Stage) -> Self {
+    pub(super) fn new(spec: &WindowSpec, eyes: &mut Eyes, stage: &Stage, listener: KeyListener) -> Self {
         let mut board = Board::default();
         if eyes.mode == StereoMode::QuadBuffer {
             // Who opens windows for us asks for no such buffers.
@@ -97,6 +99,7 @@ impl Controls {
         }
         Self {
             bindings: spec.bindings.clone(),
+            listener,
             router: Router::default(),
             man: CameraMan::default(),
             picker: Picker::new(stage),
@@ -150,7 +153,10 @@ impl Controls {
             self.sun_is_chosen = false;
         }
         self.picker = picker;
-        heard.orders.into_iter().for_each(|order| order_of(reach, order));
+        for key in heard.keys {
+            // Who listened is gone: the run is over.
+            let _ = reach.ask.send(Ask::Key(key));
+        }
         for bound in heard.moves {
             self.steer(bound, moment, now_s, reach);
         }
@@ -175,7 +181,9 @@ impl Controls {
         let is_active = self.sun_is_chosen || reach.selected.is_some();
         let moves = |action: Action| is_active && matches!(action, Action::Move(_) | Action::Turn(_));
         let (mut active, mut rest) = (Actions::new(&moves), Actions::new(&|_| true));
-        let mut unbound = Unbound::default();
+        self.listener.begin_picture();
+        let mut time_ns = |code, is_pressed| self.listener.time_ns(code, is_pressed);
+        let mut unbound = Unbound::new(&mut time_ns);
         let sight = Sight {
             scene: scene.rect,
             point: &|camera, at| pointing.place(camera, at),
@@ -195,7 +203,7 @@ impl Controls {
                 }
             }
         }
-        Heard { moves: active.taken, rest: rest.taken, orders: unbound.orders }
+        Heard { moves: active.taken, rest: rest.taken, keys: unbound.keys }
     }
 
     /// Moves what is chosen.

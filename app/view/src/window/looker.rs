@@ -1,6 +1,7 @@
 //! Who looks on: takes the news, draws, and asks.
 
 use super::controls::{Controls, Reach};
+use super::key_listener::KeyListener;
 use super::scene::SceneView;
 use super::{Ends, WindowSpec};
 use crate::eyes::Eyes;
@@ -9,11 +10,15 @@ use crate::news::{Ask, News, Reins};
 use crate::panel::Panel;
 use crate::playback::Playback;
 use crate::stage::Stage;
+use crate::steering::camera_order;
 use eframe::egui;
+use nalgebra::Isometry3;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError};
 use std::time::Duration;
 use world::{SceneCamera, StereoMode};
 
+/// So often at most the run is told where the camera is (s).
+const CARRYING_S: f64 = 0.1;
 /// Between two pictures.
 const PICTURE: Duration = Duration::from_millis(16);
 
@@ -29,6 +34,8 @@ pub(super) struct Looker {
     hand: MouseHand,
     panel: Panel,
     controls: Controls,
+    /// Where the camera was when the run was told last, and when that was (s); `None`: the run need not know.
+    carried: Option<(Isometry3<f64>, f64)>,
     /// The entity that people have chosen.
     selected: Option<usize>,
     is_over: bool,
@@ -43,8 +50,9 @@ impl Looker {
     ) -> Result<Self, String> {
         let camera = stage.cameras.first().cloned().ok_or("nobody looks on")?;
         let mut eyes = spec.eyes;
-        let controls = Controls::new(spec, &mut eyes, &stage);
+        let controls = Controls::new(spec, &mut eyes, &stage, KeyListener::start(creation));
         let view = SceneView::new(creation, stage, spec.with_shadows)?;
+        let carried = spec.carries_devices.then_some((camera.pose, 0.0));
         let hand = reins.as_ref().map(|reins| reins.hand()).unwrap_or_default();
         Ok(Self {
             told,
@@ -55,6 +63,7 @@ impl Looker {
             eyes,
             playback: Playback::default(),
             hand,
+            carried,
             panel: Panel::default(),
             controls,
             selected: None,
@@ -85,6 +94,17 @@ impl Looker {
                 }
                 Err(TryRecvError::Empty) => break,
             }
+        }
+    }
+
+    /// Tells the run where the camera is that devices go with.
+    fn carry(&mut self, now_s: f64) {
+        let pose = self.camera.pose;
+        let Some((was, at_s)) = &mut self.carried else { return };
+        if *was != pose && now_s - *at_s >= CARRYING_S {
+            (*was, *at_s) = (pose, now_s);
+            // Who listened is gone: the run is over.
+            let _ = self.ask.send(Ask::Order(camera_order(&pose)));
         }
     }
 }
@@ -123,6 +143,7 @@ impl eframe::App for Looker {
             }
             self.controls.write(ui, scene.rect, &moment);
         });
+        self.carry(now_s);
         ui.ctx().request_repaint_after(PICTURE);
     }
 

@@ -86,7 +86,8 @@ impl EventReceiver {
 
 /// Whoever wants events.
 pub trait Subscriber: Send {
-    /// Takes one; those of one source come in the order of their ticks.
+    /// Takes one; those of one source come in the order of their ticks, but for keys, which are told as of when they were
+    /// pressed.
     fn event(&mut self, event: &Event);
 
     /// Whether it wants no more, and may be forgotten.

@@ -344,7 +344,11 @@ impl Conversion {
             self.toml.key("friction", &friction);
         }
         if object.truth("Inputtable")? == Some(true) {
-            self.tell_of(object, "Inputtable: nothing is moved by keys and mouse yet");
+            self.tell_of(
+                object,
+                "Inputtable: at the window keys move whatever is chosen there, and orders move it; nothing has to be said \
+                 for that",
+            );
         }
         Ok(())
     }
