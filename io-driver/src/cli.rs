@@ -4,13 +4,14 @@
 
 mod commission;
 mod emulate;
+mod stopping;
 mod zero;
 
 use crate::config::{Commissioning, DriverConfig};
 use crate::doctor::cli::{self as doctor, DoctorArgs};
 use crate::driver::{self, Fit, RunOptions};
 use crate::monitor::{self, End};
-use crate::say::say;
+use crate::say::{self, say};
 use crate::status::Status;
 use clap::{Args, Parser, Subcommand};
 use commission::CommissionArgs;
@@ -18,7 +19,7 @@ use emulate::EmulateArgs;
 use rt_core::plain_text::PlainLines;
 use shm_abi::client::{self, AttachError};
 use shm_abi::endpoint;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 use zero::ZeroArgs;
@@ -52,6 +53,8 @@ pub enum DriverCommand {
     ClearFault(SocketArgs),
     /// Switch all motors off at once and keep them off until `clear-fault`
     EmergencyStop(SocketArgs),
+    /// End the lease of whoever commands: its force ramps out, and somebody else may command
+    EndLease(SocketArgs),
     /// Tell devices that they are in their zeroing pose
     Zero(ZeroArgs),
     /// Try a device for the first time: do its counters and motors turn the right way?
@@ -133,10 +136,11 @@ fn execute_with(command: DriverCommand, fit: Option<Fit>) -> ExitCode {
         DriverCommand::Run(args) => run(args, fit),
         DriverCommand::Status(args) if args.watch && !args.json && monitor::has_terminal() => watch(&args),
         DriverCommand::Status(args) => report(status(&args)),
-        DriverCommand::Stop(args) => report(stop(&args.path())),
+        DriverCommand::Stop(args) => stopping::stop(&args.path()),
         DriverCommand::Doctor(args) => doctor::run(&args),
         DriverCommand::ClearFault(args) => report(client::clear_fault(&args.path(), "io-driver")),
-        DriverCommand::EmergencyStop(args) => report(client::emergency_stop(&args.path(), "io-driver")),
+        DriverCommand::EmergencyStop(args) => stopping::emergency_stop(&args.path()),
+        DriverCommand::EndLease(args) => report(client::end_lease(&args.path(), "io-driver")),
         DriverCommand::Zero(args) => zero::run(&args),
         DriverCommand::Commission(args) => commission::run(&args),
         DriverCommand::Emulate(args) => emulate::run(&args),
@@ -157,19 +161,17 @@ fn run(args: RunArgs, fit: Option<Fit>) -> ExitCode {
     }
     let RunArgs { strict, quiet, parent, socket, .. } = args;
     let options = RunOptions { fit, strict, quiet, parent, socket };
-    match driver::run(&config, &options) {
+    let code = match driver::run(&config, &options) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => fail(&error, if error.is_fault() { EXIT_FAULT } else { EXIT_USAGE }),
-    }
+    };
+    // Whoever holds the other end of standard error does not hold the end of the process.
+    say::flush(LAST_WORDS);
+    code
 }
 
-fn stop(socket: &Path) -> Result<(), AttachError> {
-    // The lease need not be ours, nor free: whoever may open the socket may stop the motors.
-    let pid = client::stop(socket, "io-driver")?;
-    // It stops, whether or not somebody reads that.
-    let _ = print_line(&format!("driver (process {pid}) stops"));
-    Ok(())
-}
+/// How long the lines of a driver that ends may take to be written.
+const LAST_WORDS: Duration = Duration::from_millis(500);
 
 fn watch(args: &StatusArgs) -> ExitCode {
     match monitor::run(&args.socket.path()) {

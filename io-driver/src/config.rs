@@ -5,6 +5,7 @@
 //! Model: TOML. Relative paths are relative to the file. Everything but the devices has a default.
 //! Units: in the names of the keys; SI.
 
+mod access;
 mod device;
 mod process;
 mod real_time;
@@ -13,6 +14,7 @@ mod safety;
 mod toml_text;
 mod zeroing;
 
+pub use access::AccessConfig;
 pub use device::{Backend, DeviceConfig, HandChoice, HandSource, Wish};
 pub use process::ProcessConfig;
 pub use real_time::{OverrunPolicy, RealTime, SpinMargin, longest_spin_margin_ns};
@@ -51,6 +53,8 @@ pub struct DriverConfig {
     pub safety: SafetyConfig,
     /// What the process may do.
     pub process: ProcessConfig,
+    /// Who may do what.
+    pub access: AccessConfig,
     /// The devices, in the order of the frame.
     pub devices: Vec<DeviceConfig>,
 }
@@ -121,7 +125,8 @@ impl DriverConfig {
             real_time: raw.real_time.validate(&toml, period_ns, reply.budget_ns)?,
             reply,
             safety: raw.safety.validate(&toml, period_ns, &devices)?,
-            process: raw.process.validate(),
+            process: raw.process.validate(&toml)?,
+            access: raw.access,
             devices,
         })
     }
@@ -148,6 +153,8 @@ struct RawConfig {
     safety: RawSafety,
     #[serde(default)]
     process: RawProcess,
+    #[serde(default)]
+    access: AccessConfig,
     device: Spanned<Vec<Spanned<RawDevice>>>,
 }
 

@@ -133,12 +133,13 @@ impl Cycle {
         self.next_lease.replace(lease)
     }
 
-    /// The commander is gone: its force ramps out, beginning with the next motor values.
+    /// The commander of this lease, and of any before it, is gone: its force ramps out, beginning with the next motor
+    /// values. To say so again changes nothing.
     pub fn end_lease(&mut self, number: u64) -> Option<CommanderView> {
-        if self.lease.as_ref().is_some_and(|lease| lease.lease() == number) {
+        if self.lease.as_ref().is_some_and(|lease| lease.lease() <= number) {
             self.is_ending = true;
         }
-        self.next_lease.take_if(|lease| lease.lease() == number)
+        self.next_lease.take_if(|lease| lease.lease() <= number)
     }
 
     /// Changes leases when the former's force is gone. Returns the former, for dropping elsewhere.

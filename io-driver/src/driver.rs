@@ -2,11 +2,14 @@
 //!
 //! Model: everything that can fail or allocate happens before the loop's first tick or in this thread.
 //! The order is: open the devices, set up the loop's thread and look at what was obtained, make the
-//! memory, give up all rights, listen, shut the sandbox, go. Whatever ends the process, the loop writes zero first.
+//! memory, give up all rights, listen, start the threads that stop and that log, shut the sandbox, go. Whatever ends the
+//! process, the loop writes zero first.
 
 use crate::config::{DriverConfig, ReplyMode};
 use crate::cycle::{Cycle, Freshness, Protection};
 use crate::device::Device;
+use crate::heartbeat::Heartbeat;
+use crate::log_thread;
 use crate::loop_thread;
 use crate::mail::mail;
 use crate::open::{OpenError, open_devices};
@@ -14,6 +17,7 @@ use crate::real_loop::{RealLoop, Shared, Waiting};
 use crate::safety::{Ramps, Safety};
 use crate::sandbox;
 use crate::service::{Service, remove_directory_of, say};
+use crate::stop_thread;
 use crate::supervisor::Supervisor;
 use rt_core::epitaph::{install_fatal_handlers, install_panic_hook};
 use rt_core::privileges::{User, UserError};
@@ -23,6 +27,7 @@ use shm_abi::DriverMemory;
 use shm_abi::doorbell::WaitMode;
 use shm_abi::segment::{ClockMode, DriverInfo, SegmentError};
 use shm_abi::server::{BindError, Server};
+use shm_abi::stop_socket::StopSocket;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -69,6 +74,9 @@ pub enum RunError {
     /// There is no such user, or it cannot become that user.
     #[error("`user` in [process]: {0}")]
     User(#[from] UserError),
+    /// There is no such group.
+    #[error("[access]: {0}")]
+    Access(#[source] UserError),
     /// `--strict`, and something is missing.
     #[error("--strict: not every real-time guarantee was obtained, so nothing was started:\n{}", .0.to_string().trim_end())]
     Strict(SetupReport),
@@ -119,15 +127,15 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
         Some(fit) => devices.into_iter().map(fit).collect(),
         None => devices,
     };
-    let shared = Shared::default();
+    let heartbeat = Heartbeat::default();
+    let shared =
+        Shared { signals: Some(signals.clone()), heartbeat: Some(heartbeat.clone()), ..Shared::default() };
     let (mut report, spin_margin_ns, starter) = loop_thread::spawn(config, &shared)?;
     refuse_if_strict(&report, options)?;
     let wait_mode = loop_thread::choose_wait_mode(config, &report);
     let waiting = Waiting { reply: wait_mode, spin_margin_ns };
     let memory = Arc::new(DriverMemory::create(&describe(config, &devices, wait_mode))?);
-    if config.process.sandbox {
-        sandbox::say_panics_plainly();
-    }
+    sandbox::say_panics_plainly();
     install_last_words(&memory)?;
     let (sender, inbox) = mail();
     let (log, drain) = rt_core::log::channel(LOG_CAPACITY);
@@ -145,7 +153,14 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
     if rustix::process::geteuid().is_root() {
         say(options, format_args!("{STARTED_AS_ROOT}"));
     }
-    let server = Server::bind(&path)?;
+    let rights = config.access.resolve().map_err(RunError::Access)?;
+    let server = Server::bind_for(&path, rights)?;
+    // The last threads: the sandbox lets none be started.
+    let system = |what| move |source| RunError::System { what, source };
+    let (stop_socket, stop_file) = StopSocket::bind(server.path())?;
+    stop_thread::start(stop_socket, sender.urgent.clone()).map_err(system("start the thread that stops"))?;
+    let lost = drain.lost_count();
+    log_thread::start(drain, options.quiet).map_err(system("start the log's thread"))?;
     report.guarantees.push(sandbox::shut(&config.process));
     memory.tell_setup_report(&report.to_string());
     refuse_if_strict(&report, options)?;
@@ -153,7 +168,8 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
     say(options, format_args!("listening at {}", server.path().display()));
     let thread = starter.start(real_loop);
     supervisor.ready(&format!("listening at {}", server.path().display()));
-    let service = Service { server, sender, drain, memory, signals, shared, options, supervisor };
+    let service =
+        Service { server, stop_file, sender, lost, memory, signals, heartbeat, shared, options, supervisor };
     service.run(thread)
 }
 

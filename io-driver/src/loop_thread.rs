@@ -100,6 +100,8 @@ pub(crate) fn spawn(config: &DriverConfig, shared: &Shared) -> Result<(SetupRepo
     let margin =
         if config.clock == ClockMode::Real { config.real_time.spin_margin } else { SpinMargin::Fixed(0) };
     let body = move || {
+        // It reads their flag; another thread runs their handlers. If that is refused, it runs them too.
+        let _ = rt_core::signals::block_in_this_thread();
         let (mut report, guards) = rt_core::setup::apply(&request);
         let spin_margin_ns = settle_spin_margin(margin, &mut report);
         let _ = send_report.send((report, spin_margin_ns));

@@ -1,35 +1,33 @@
 //! What the socket's thread tells the loop, and what the loop throws back.
 //!
-//! Two bounded lock-free queues: leases and requests travel to the loop by value; mappings that the loop no
-//! longer needs travel back, because unmapping is a system call.
+//! Model: leases and zeroing travel by value through a bounded lock-free queue; mappings that the loop no longer
+//! needs travel back through another, because unmapping is a system call. What must never find a queue full is
+//! [`Urgent`].
+//! Invariant: whoever posts never waits for the loop; what finds no room is given back.
 
 use crate::cycle::Cycle;
+use crate::urgent::Urgent;
 use crate::zeroing::DeviceSet;
 use rtrb::{Consumer, Producer, RingBuffer};
 use shm_abi::{CommanderView, FaultReason};
 
-/// More than can ever be on the way: the socket's thread posts a handful in its poll, the loop collects
-/// them every tick.
-const CAPACITY: usize = 256;
+/// More than come in one tick of a loop that lives.
+pub const CAPACITY: usize = 256;
 
 /// A message to the loop.
 #[derive(Debug)]
 pub enum Letter {
     /// Obey this commander.
     Grant(CommanderView),
-    /// Obey it no more.
-    End(u64),
-    /// Leave the fault state.
-    ClearFault,
     /// These devices are in their zeroing pose; none named: all that count.
     Zero(DeviceSet),
-    /// All motors off, now.
-    EmergencyStop,
 }
 
 /// The socket thread's end.
 #[derive(Debug)]
 pub struct Sender {
+    /// Requests for which there is always room.
+    pub urgent: Urgent,
     letters: Producer<Letter>,
     waste: Consumer<CommanderView>,
 }
@@ -37,6 +35,7 @@ pub struct Sender {
 /// The loop's end.
 #[derive(Debug)]
 pub struct Inbox {
+    urgent: Urgent,
     letters: Consumer<Letter>,
     waste: Producer<CommanderView>,
 }
@@ -45,7 +44,9 @@ pub struct Inbox {
 pub fn mail() -> (Sender, Inbox) {
     let (letters_in, letters_out) = RingBuffer::new(CAPACITY);
     let (waste_in, waste_out) = RingBuffer::new(CAPACITY);
-    (Sender { letters: letters_in, waste: waste_out }, Inbox { letters: letters_out, waste: waste_in })
+    let urgent = Urgent::default();
+    let inbox = Inbox { urgent: urgent.clone(), letters: letters_out, waste: waste_in };
+    (Sender { urgent, letters: letters_in, waste: waste_out }, inbox)
 }
 
 impl Sender {
@@ -64,33 +65,24 @@ impl Inbox {
     /// Collects all mail, at the start of a tick. An emergency stop comes last, whatever else is there: who asked to
     /// leave a fault in the same tick cannot have known of it.
     pub fn deliver(&mut self, cycle: &mut Cycle) {
-        let mut is_emergency = false;
+        // Taken first, done last: a lease that it says has ended was granted before, by a letter that is there now.
+        let asked = self.urgent.take();
         // Bounded by what was there when it began, so that a flood of letters takes turns with ticks.
         for _ in 0..self.letters.slots() {
-            let Ok(letter) = self.letters.pop() else { break };
-            let waste = match letter {
-                Letter::Grant(view) => cycle.grant(view),
-                Letter::End(lease) => cycle.end_lease(lease),
-                Letter::ClearFault => {
-                    cycle.clear_fault();
-                    None
-                }
-                Letter::Zero(devices) => {
-                    cycle.zero(devices);
-                    None
-                }
-                Letter::EmergencyStop => {
-                    is_emergency = true;
-                    None
-                }
-            };
-            self.throw_away(waste);
+            match self.letters.pop() {
+                Ok(Letter::Grant(view)) => self.throw_away(cycle.grant(view)),
+                Ok(Letter::Zero(devices)) => cycle.zero(devices),
+                Err(_) => break,
+            }
         }
-        if is_emergency {
+        self.throw_away(cycle.end_lease(asked.ended_lease));
+        if asked.clear_fault {
+            cycle.clear_fault();
+        }
+        if asked.emergency_stop {
             cycle.fault(FaultReason::EmergencyStop);
         }
-        let former = cycle.change_lease();
-        self.throw_away(former);
+        self.throw_away(cycle.change_lease());
     }
 
     /// With the queue full the view is dropped here: late once, instead of a leak.

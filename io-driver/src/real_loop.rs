@@ -7,17 +7,22 @@
 //! A loop that spins for replies and gets none for a while sleeps for them instead, for a second: a stopped
 //! application leaves no CPU burning, and one that cannot run because of the spinning gets to run.
 //!
+//! It depends on no other thread: it reads the flag of signals and the word of emergency stops itself, and a thread that
+//! serves the socket no more ([`heartbeat`](crate::heartbeat)) is a fault as long as a force might be let through.
+//!
 //! Invariant: whatever ends the loop (a request, a panic), the motors are written zero before anything else.
 //! Cost: in spin mode the timed wait is the only system call, while replies come.
 
 use crate::config::{DriverConfig, OverrunPolicy, ReplyMode, SpinMargin};
 use crate::cycle::Cycle;
+use crate::heartbeat::{Heartbeat, Watch};
 use crate::mail::Inbox;
 use crate::meter::{add, record};
 use crate::zeroing::DeviceSet;
 use rt_core::clock::{monotonic_ns, sleep_until_ns};
 use rt_core::log::{LogLevel, RtLog};
 use rt_core::periodic::{Periodic, PeriodicConfig};
+use rt_core::signals::StopSignals;
 use shm_abi::doorbell::WaitMode;
 use shm_abi::segment::ClockMode;
 use shm_abi::{DriverState, FaultReason, MAX_DEVICES};
@@ -43,6 +48,10 @@ pub struct Shared {
     pub stop: Arc<AtomicBool>,
     /// The loop has ended.
     pub ended: Arc<AtomicBool>,
+    /// Read by the loop itself, so that no other thread can keep a signal from it.
+    pub signals: Option<StopSignals>,
+    /// Of the thread that serves the socket; `None`: there is none to be watched.
+    pub heartbeat: Option<Heartbeat>,
 }
 
 /// How the loop waits.
@@ -86,6 +95,7 @@ pub struct RealLoop {
     retreat_until_ns: u64,
     periodic: Periodic,
     lockstep_tick: u64,
+    watch: Option<Watch>,
     logged_state: Option<DriverState>,
     logged_not_zeroed: DeviceSet,
     logged_phase_steps: u64,
@@ -125,7 +135,11 @@ impl RealLoop {
             OverrunPolicy::CatchUp(ticks) => periodic.catching_up(ticks),
             OverrunPolicy::Skip | OverrunPolicy::Fault(_) => periodic,
         };
+        let limit_ns = config.process.service_silence_ns;
+        let watch =
+            shared.heartbeat.clone().map(|heartbeat| Watch::new(heartbeat, limit_ns, config.period_ns));
         Self {
+            watch,
             cycle,
             inbox,
             log,
@@ -268,9 +282,11 @@ impl RealLoop {
         }
     }
 
-    /// In lockstep a tick has no other end than the reply, the end of the lease or of the driver.
+    /// In lockstep a tick has no other end than the reply, the end of the lease or of the driver, or a fault: the frame
+    /// after it tells.
     fn wait_without_limit(&mut self) {
-        while !self.cycle.take_reply() && !self.is_stopping() {
+        let fault = self.cycle.safety().fault();
+        while !self.cycle.take_reply() && !self.is_stopping() && self.cycle.safety().fault() == fault {
             self.sleep_for_reply(NAP);
             self.collect_mail(self.lockstep_tick);
         }
@@ -278,7 +294,9 @@ impl RealLoop {
 
     /// The same where the motors are written already: the next tick's shall have a reply.
     fn wait_until_answered(&mut self, tick: u64) {
-        while self.cycle.lease().is_some() && !self.is_stopping() {
+        let fault = self.cycle.safety().fault();
+        let goes_on = |this: &Self| !this.is_stopping() && this.cycle.safety().fault() == fault;
+        while self.cycle.lease().is_some() && goes_on(self) {
             self.cycle.take_reply();
             if self.cycle.seen_reply() == Some(tick) {
                 return;
@@ -331,6 +349,7 @@ impl RealLoop {
 
     fn collect_mail(&mut self, tick: u64) {
         self.inbox.deliver(&mut self.cycle);
+        self.watch_service();
         match self.cycle.zero_verdict() {
             None => {}
             Some(Ok(_)) => self.log.push(LogLevel::Info, tick, "zeroed", &[]),
@@ -338,6 +357,14 @@ impl RealLoop {
                 let (words, number) = refusal.for_log();
                 self.log.push(LogLevel::Warning, tick, words, number.as_slice());
             }
+        }
+    }
+
+    /// Without a force there is nothing that anybody would have to stop.
+    fn watch_service(&mut self) {
+        let is_silent = self.watch.as_mut().is_some_and(|watch| watch.looks_silent(monotonic_ns()));
+        if is_silent && (self.cycle.lease().is_some() || !self.cycle.safety().is_released()) {
+            self.cycle.fault(FaultReason::ServiceSilent);
         }
     }
 
@@ -353,6 +380,7 @@ impl RealLoop {
     }
 
     fn is_stopping(&self) -> bool {
-        self.shared.stop.load(Ordering::Relaxed)
+        let Shared { stop, signals, .. } = &self.shared;
+        stop.load(Ordering::Relaxed) || signals.as_ref().is_some_and(|signals| signals.requested().is_some())
     }
 }

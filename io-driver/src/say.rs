@@ -3,20 +3,94 @@
 //! What is told is made plain first ([`Plain`]): names come from files, and must not act on a terminal.
 //!
 //! `eprintln!` panics when the write fails: whoever kills the `tee` behind `io-driver run 2>&1 | tee log`, or
-//! fills the disk under a log, would take the driver with it, motors on.
+//! fills the disk under a log, would take the driver with it, motors on. And a write waits for as long as the other
+//! end likes: a terminal held by Ctrl-S, a pipe that nobody drains. So a driver that runs only queues its lines, and
+//! [`log_thread`](crate::log_thread) writes them.
+//! Invariant: once the log's thread is there, [`say`] never waits; a line that finds the queue full is counted.
 
 use rt_core::plain_text::Plain;
 use std::fmt;
 use std::io::Write;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::time::{Duration, Instant};
 
-/// Writes a line in one piece.
+/// Lines that may wait for standard error.
+const CAPACITY: usize = 1024;
+/// Between two looks whether the queue has room.
+const LOOK: Duration = Duration::from_millis(1);
+
+static QUEUE: OnceLock<Queue> = OnceLock::new();
+
+#[derive(Debug)]
+struct Queue {
+    entries: SyncSender<Entry>,
+    dropped: AtomicU64,
+}
+
+/// What travels to the log's thread.
+#[derive(Debug)]
+pub(crate) enum Entry {
+    /// A line, with its end.
+    Line(String),
+    /// Dropped when everything before it has been written.
+    Flush(SyncSender<()>),
+}
+
+/// Says a line: writes it in one piece, or leaves that to the log's thread where there is one.
 pub fn say(line: fmt::Arguments<'_>) {
-    // Nobody to tell is no reason to stop.
-    let _ = std::io::stderr().write_all(format!("{}\n", Plain(line)).as_bytes());
+    let line = format!("{}\n", Plain(line));
+    match QUEUE.get() {
+        None => write(&line),
+        Some(queue) => {
+            if queue.entries.try_send(Entry::Line(line)).is_err() {
+                queue.dropped.fetch_add(1, Ordering::Relaxed);
+            }
+        }
+    }
 }
 
 /// Writes a line of results on standard output.
 pub fn tell(line: fmt::Arguments<'_>) {
     // A closed pipe is no reason to fail.
     let _ = std::io::stdout().write_all(format!("{}\n", Plain(line)).as_bytes());
+}
+
+/// Waits until everything that was said is written, but no longer than `patience`; returns whether it is.
+pub fn flush(patience: Duration) -> bool {
+    let Some(queue) = QUEUE.get() else { return true };
+    let until = Instant::now() + patience;
+    let (send_done, done) = sync_channel(0);
+    let mut entry = Entry::Flush(send_done);
+    while let Err(refused) = queue.entries.try_send(entry) {
+        let (std::sync::mpsc::TrySendError::Full(back) | std::sync::mpsc::TrySendError::Disconnected(back)) =
+            refused;
+        if Instant::now() >= until {
+            return false;
+        }
+        entry = back;
+        std::thread::sleep(LOOK);
+    }
+    let rest = until.saturating_duration_since(Instant::now());
+    // Nothing is ever sent; the other end is dropped.
+    done.recv_timeout(rest) == Err(std::sync::mpsc::RecvTimeoutError::Disconnected)
+}
+
+/// Lines that found no room so far.
+pub fn dropped() -> u64 {
+    QUEUE.get().map_or(0, |queue| queue.dropped.load(Ordering::Relaxed))
+}
+
+/// From now on lines are queued, for whoever holds what is returned; `None` if somebody does already.
+pub(crate) fn queue() -> Option<Receiver<Entry>> {
+    let (entries, received) = sync_channel(CAPACITY);
+    let queue = Queue { entries, dropped: AtomicU64::new(0) };
+    QUEUE.set(queue).is_ok().then_some(received)
+}
+
+/// May wait for as long as the other end of standard error likes.
+pub(crate) fn write(line: &str) {
+    // Nobody to tell is no reason to stop.
+    let _ = std::io::stderr().write_all(line.as_bytes());
 }

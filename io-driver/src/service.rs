@@ -1,20 +1,27 @@
 //! The driver's socket thread: who comes and goes, what the loop has to know of it, the log, the end.
 //!
-//! Model: it waits at the socket, passes on as mail what concerns the loop, writes down what the loop logged,
-//! tells the service manager that both live, and looks for a reason to stop.
+//! Model: it waits at the socket, passes on as mail what concerns the loop, tells the service manager that both live, and
+//! looks for a reason to stop.
+//! Invariants: it waits for nobody: not for whoever reads the log ([`say`] queues), nor for the loop (mail that finds no
+//! room is dropped or refused). It posts first and speaks after. The loop does not wait for it either: it reads the
+//! flag of signals itself, and [`stop_thread`](crate::stop_thread) can stop the motors without it.
 
 use crate::driver::{RunError, RunOptions, TICK};
+use crate::heartbeat::Heartbeat;
 use crate::mail::{Letter, Sender};
 use crate::meter::bump;
 use crate::real_loop::{Ended, Shared};
 use crate::say;
 use crate::supervisor::Supervisor;
+use crate::urgent::StoppedBy;
 use crate::zeroing::DeviceSet;
 use rt_core::epitaph::{EpitaphKind, EpitaphRef};
-use rt_core::log::{LogLevel, LogLine, RtLogDrain};
+use rt_core::log::LostCount;
 use rt_core::signals::StopSignals;
 use shm_abi::DriverMemory;
-use shm_abi::server::{Server, ServerEvent};
+use shm_abi::handshake::Verdict;
+use shm_abi::server::{Recipient, Server, ServerEvent};
+use shm_abi::socket_file::SocketFile;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
@@ -32,10 +39,15 @@ const POLL: Duration = Duration::from_millis(20);
 /// The socket's thread.
 pub(crate) struct Service<'a> {
     pub(crate) server: Server,
+    /// Removed at the end.
+    pub(crate) stop_file: SocketFile,
     pub(crate) sender: Sender,
-    pub(crate) drain: RtLogDrain,
+    /// Of the loop's own log.
+    pub(crate) lost: LostCount,
     pub(crate) memory: Arc<DriverMemory>,
     pub(crate) signals: StopSignals,
+    /// The loop watches it.
+    pub(crate) heartbeat: Heartbeat,
     pub(crate) shared: Shared,
     pub(crate) options: &'a RunOptions,
     pub(crate) supervisor: Supervisor,
@@ -50,18 +62,17 @@ impl Service<'_> {
 
     /// Serves until something asks the driver to stop; returns what.
     fn serve(&mut self) -> Result<String, RunError> {
-        let mut events = Vec::new();
         loop {
-            self.server
-                .poll(&self.memory, POLL, &mut events)
-                .map_err(|source| RunError::System { what: "wait at the socket", source })?;
-            for event in events.drain(..) {
-                if let Some(reason) = self.pass_on(event) {
-                    return Ok(reason);
-                }
+            self.heartbeat.beat();
+            let Self { server, sender, memory, options, .. } = self;
+            let mut desk = Desk { sender, memory: &**memory, options, stop: None };
+            let polled = server.poll(memory, POLL, &mut desk);
+            if let Some(reason) = desk.stop {
+                return Ok(reason);
             }
+            polled.map_err(|source| RunError::System { what: "wait at the socket", source })?;
             self.sender.clear_waste();
-            self.write_log();
+            self.count_what_the_log_dropped();
             self.supervisor.turn(TICK.load(Ordering::Relaxed), || status_line(&self.memory));
             if let Some(signal) = self.signals.requested() {
                 return Ok(format!("signal {signal}"));
@@ -72,68 +83,22 @@ impl Service<'_> {
         }
     }
 
-    /// Returns why to stop, if the event says so.
-    fn pass_on(&mut self, event: ServerEvent) -> Option<String> {
-        match event {
-            ServerEvent::LeaseGranted { view, pid, name } => {
-                bump(&self.memory.counters.leases_granted);
-                say(self.options, format_args!("lease {} to process {pid} ({name})", view.lease()));
-                self.post(Letter::Grant(view));
-            }
-            ServerEvent::LeaseEnded { lease } => {
-                say(self.options, format_args!("lease {lease} ended"));
-                self.post(Letter::End(lease));
-            }
-            ServerEvent::LeaseRefused => bump(&self.memory.counters.leases_refused),
-            ServerEvent::ClearFaultRequested => self.post(Letter::ClearFault),
-            ServerEvent::EmergencyStopRequested { pid } => {
-                say(self.options, format_args!("emergency stop, asked for by process {pid}"));
-                self.post(Letter::EmergencyStop);
-            }
-            ServerEvent::ZeroRequested { pid, devices } => {
-                say(self.options, format_args!("process {pid} asks to zero devices (bits {devices:#x})"));
-                self.post(Letter::Zero(DeviceSet(devices)));
-            }
-            ServerEvent::Trouble { message } => say::say(format_args!("io-driver: {message}")),
-            ServerEvent::StopRequested { pid } => return Some(format!("request of process {pid}")),
-        }
-        None
-    }
-
-    /// The loop collects its mail every tick; if the queue is full it has stood still for long, and waiting
-    /// here is all that is left.
-    fn post(&mut self, letter: Letter) {
-        let mut letter = letter;
-        while let Err(returned) = self.sender.post(letter) {
-            if self.shared.ended.load(Ordering::Acquire) {
-                return;
-            }
-            letter = returned;
-            std::thread::sleep(POLL);
-        }
-    }
-
-    fn write_log(&mut self) {
-        let quiet = self.options.quiet;
-        self.drain.drain(|line: LogLine| {
-            if !quiet || line.level > LogLevel::Info {
-                say::say(format_args!("io-driver: tick {}: {}", line.tick, line.text));
-            }
-        });
-        self.memory.counters.log_dropped.store(self.drain.lost(), Ordering::Relaxed);
+    fn count_what_the_log_dropped(&self) {
+        let dropped = self.lost.get() + say::dropped();
+        self.memory.counters.log_dropped.store(dropped, Ordering::Relaxed);
     }
 
     /// Ends the loop, writes the last words and says how it was.
-    fn finish(mut self, thread: JoinHandle<Ended>, served: Result<String, RunError>) -> Result<(), RunError> {
-        self.supervisor.stopping(served.as_deref().unwrap_or("a fault of the socket"));
+    fn finish(self, thread: JoinHandle<Ended>, served: Result<String, RunError>) -> Result<(), RunError> {
         self.shared.stop.store(true, Ordering::Relaxed);
+        self.supervisor.stopping(served.as_deref().unwrap_or("a fault of the socket"));
         let has_ended = wait_for_end(&thread);
         if !has_ended {
             // It will not do it any more, and must not undo it.
             rt_core::last_act::perform();
         }
-        self.write_log();
-        tidy_up(self.server, self.options);
+        self.count_what_the_log_dropped();
+        tidy_up(self.server, self.stop_file, self.options);
         let reason = served?;
         if !has_ended {
             let tick = TICK.load(Ordering::Relaxed);
@@ -152,6 +117,58 @@ impl Service<'_> {
                 Err(RunError::Panicked(words.map_or_else(String::new, |words| words.to_string())))
             }
         }
+    }
+}
+
+/// Passes on to the loop what clients ask for: first that, then the words.
+struct Desk<'a> {
+    sender: &'a mut Sender,
+    memory: &'a DriverMemory,
+    options: &'a RunOptions,
+    /// Why to stop.
+    stop: Option<String>,
+}
+
+impl Recipient for Desk<'_> {
+    fn take(&mut self, event: ServerEvent) -> Result<(), Verdict> {
+        match event {
+            ServerEvent::LeaseGranted { view, pid, name } => {
+                let lease = view.lease();
+                self.post(Letter::Grant(view))?;
+                bump(&self.memory.counters.leases_granted);
+                say(self.options, format_args!("lease {lease} to process {pid} ({name})"));
+            }
+            ServerEvent::LeaseEnded { lease } => {
+                self.sender.urgent.end_lease(lease);
+                say(self.options, format_args!("lease {lease} ended"));
+            }
+            ServerEvent::LeaseRefused => bump(&self.memory.counters.leases_refused),
+            ServerEvent::ClearFaultRequested { uid, is_administrator } => {
+                let is_own = |by| by == StoppedBy::Nobody || by == StoppedBy::User(uid);
+                if !self.sender.urgent.clear_fault(|by| is_administrator || is_own(by)) {
+                    return Err(Verdict::NotAllowed);
+                }
+            }
+            ServerEvent::EmergencyStopRequested { pid, uid } => {
+                self.sender.urgent.stop(Some(uid));
+                say(self.options, format_args!("emergency stop, asked for by process {pid} of user {uid}"));
+            }
+            ServerEvent::ZeroRequested { pid, devices } => {
+                self.post(Letter::Zero(DeviceSet(devices)))?;
+                say(self.options, format_args!("process {pid} asks to zero devices (bits {devices:#x})"));
+            }
+            ServerEvent::Trouble { message } => say::say(format_args!("io-driver: {message}")),
+            ServerEvent::StopRequested { pid } => self.stop = Some(format!("request of process {pid}")),
+        }
+        Ok(())
+    }
+}
+
+impl Desk<'_> {
+    /// The loop collects its mail every tick; if the queue is full it has stood still for long, and whoever asked is
+    /// none the better for our waiting.
+    fn post(&mut self, letter: Letter) -> Result<(), Verdict> {
+        self.sender.post(letter).map_err(|_| Verdict::Busy)
     }
 }
 
@@ -186,9 +203,11 @@ pub(crate) fn say(options: &RunOptions, message: std::fmt::Arguments<'_>) {
     }
 }
 
-/// Removes the socket, and with it what a parent that was killed cannot remove.
-fn tidy_up(server: Server, options: &RunOptions) {
+/// Removes the sockets, and with them what a parent that was killed cannot remove.
+fn tidy_up(server: Server, stop_file: SocketFile, options: &RunOptions) {
     let path = server.path().to_path_buf();
+    // In this order: whoever takes the place once the lock is gone has a stop socket of its own.
+    drop(stop_file);
     drop(server);
     if options.parent.is_some() {
         remove_directory_of(&path);

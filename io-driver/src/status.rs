@@ -115,6 +115,8 @@ counters! {
     leases_refused,
     /// Faults entered.
     faults,
+    /// Lines of the log that were dropped because nobody took them.
+    log_dropped,
 }
 
 /// A histogram in short; `None` without values.
@@ -321,6 +323,9 @@ impl fmt::Display for Status {
             "safety      {} faults; forces cut: {} to a peak, {} in growth, {} outside, {} by warmth",
             c.faults, c.forces_limited, c.forces_slewed, c.forces_faded, c.forces_derated
         )?;
+        if c.log_dropped > 0 {
+            writeln!(f, "log         {} lines dropped: standard error took none", c.log_dropped)?;
+        }
         self.write_switches(f)?;
         writeln!(f, "wake error  {}", self.wake_error_ns)?;
         writeln!(f, "cycle       {}", self.cycle_ns)?;

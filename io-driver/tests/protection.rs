@@ -5,7 +5,7 @@ mod common;
 use bytemuck::Zeroable;
 use common::{Bench, publish, usual_device};
 use io_driver::device::Reading;
-use io_driver::mail::{Letter, mail};
+use io_driver::mail::mail;
 use io_driver::safety::switches::{Switch, Switches};
 use nalgebra::Vector3;
 use shm_abi::frame::{
@@ -148,12 +148,17 @@ fn asking_to_leave_a_fault_that_is_none_changes_nothing() {
 /// Who asked to leave some other fault cannot have known of it.
 #[test]
 fn an_emergency_stop_outlasts_a_request_to_leave_a_fault_of_the_same_tick() {
-    for letters in [[Letter::EmergencyStop, Letter::ClearFault], [Letter::ClearFault, Letter::EmergencyStop]]
-    {
+    for stop_comes_first in [true, false] {
         let mut bench = bench(usual_device());
-        let (mut sender, mut inbox) = mail();
+        let (sender, mut inbox) = mail();
         bench.cycle.fault(FaultReason::DeviceRead);
-        letters.into_iter().for_each(|letter| sender.post(letter).unwrap());
+        if stop_comes_first {
+            sender.urgent.stop(None);
+        }
+        sender.urgent.clear_fault(|_| true);
+        if !stop_comes_first {
+            sender.urgent.stop(None);
+        }
         inbox.deliver(&mut bench.cycle);
         assert_eq!(bench.silent_tick().0.fault, FaultReason::EmergencyStop as u64);
     }

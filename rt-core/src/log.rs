@@ -112,6 +112,18 @@ impl RtLog {
     }
 }
 
+/// How many messages were lost in all, for whoever does not drain them.
+#[derive(Clone, Debug)]
+pub struct LostCount(Arc<AtomicU64>);
+
+impl LostCount {
+    /// It.
+    #[must_use]
+    pub fn get(&self) -> u64 {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
 /// The slow end.
 #[derive(Debug)]
 pub struct RtLogDrain {
@@ -143,6 +155,12 @@ impl RtLogDrain {
     #[must_use]
     pub fn lost(&self) -> u64 {
         self.lost.load(Ordering::Relaxed)
+    }
+
+    /// The same for another thread.
+    #[must_use]
+    pub fn lost_count(&self) -> LostCount {
+        LostCount(Arc::clone(&self.lost))
     }
 
     /// True once the loop's end is gone and everything was drained.

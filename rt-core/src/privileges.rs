@@ -17,7 +17,7 @@ mod thread_status;
 mod user;
 
 pub(crate) use thread_status::{ThreadFiles, ThreadStatus};
-pub use user::{User, UserError};
+pub use user::{User, UserError, group_id};
 
 use crate::setup::Guarantee;
 use crate::sys::capability::{self, CAP_SETGID, CAP_SETUID};

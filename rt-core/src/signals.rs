@@ -7,12 +7,16 @@
 //! not mean "now": timeout(1) sends its signal to its child and right after that to the child's group, a terminal sends
 //! SIGINT to parent and child alike, a parent then sends its child SIGTERM, and systemd may send SIGHUP right after
 //! SIGTERM.
+//! The kernel hands a signal to any thread that does not block it, by preference to the first one, and that thread may be
+//! stuck in a system call. A process that must hear them at once blocks them everywhere ([`block_in_this_thread`]) but in
+//! one thread that is never stuck ([`receive_in_this_thread`]).
 //! Invariants: installed for the rest of the process. A signal ends the sleep of the thread that
 //! happens to receive it, not of all: a loop that sleeps long has to wake by itself. SIGPIPE stays
 //! ignored, as Rust's start-up code leaves it: a write to a closed socket is an error, not a death.
 //! Cost: one relaxed load a tick.
 
 use crate::sys::at_once::end_when_repeated;
+use nix::sys::signal::{SigSet, Signal};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
 use std::io;
@@ -23,6 +27,26 @@ use std::time::Duration;
 /// Signals closer together than this are one request: longer than one sender takes to send it twice, shorter than
 /// anybody's patience.
 pub const SAME_REQUEST: Duration = Duration::from_millis(200);
+
+/// Leaves SIGTERM, SIGINT and SIGHUP to the other threads; threads that are started from this one do the same.
+///
+/// # Errors
+/// What pthread_sigmask(3) reports.
+pub fn block_in_this_thread() -> io::Result<()> {
+    Ok(stop_signals().thread_block()?)
+}
+
+/// Undoes [`block_in_this_thread`] for this thread; what came meanwhile is handled now.
+///
+/// # Errors
+/// What pthread_sigmask(3) reports.
+pub fn receive_in_this_thread() -> io::Result<()> {
+    Ok(stop_signals().thread_unblock()?)
+}
+
+fn stop_signals() -> SigSet {
+    [Signal::SIGTERM, Signal::SIGINT, Signal::SIGHUP].into_iter().collect()
+}
 
 /// Whether this process was asked to stop.
 #[derive(Clone, Debug)]
@@ -64,9 +88,24 @@ impl StopSignals {
 mod tests {
     use super::*;
     use crate::test_child;
-    use nix::sys::signal::{Signal, raise};
+    use nix::sys::signal::raise;
     use std::os::unix::process::ExitStatusExt;
     use std::process::ExitStatus;
+
+    #[test]
+    fn a_signal_to_the_process_is_handled_by_the_thread_that_receives_it_while_all_others_block_it() {
+        const OWN: &str = "signals::tests::a_signal_to_the_process_is_handled_by_the_thread_that_receives_it_while_all_others_block_it";
+        if test_child::role(OWN).is_some() {
+            let stop = StopSignals::install().unwrap();
+            // The test runner's own main thread would take it; it is handed to this one by name instead.
+            block_in_this_thread().unwrap();
+            raise(Signal::SIGTERM).unwrap();
+            assert_eq!(stop.requested(), None, "it waits");
+            receive_in_this_thread().unwrap();
+            std::process::exit(stop.requested().unwrap_or(0));
+        }
+        assert_eq!(test_child::command(OWN, "play").status().unwrap().code(), Some(SIGTERM));
+    }
 
     const TEST: &str = "signals::tests::stop_signals_set_the_flag_and_repeated_ones_kill";
 

@@ -163,6 +163,8 @@ enum PhantomFaultReason
   PHANTOM_FAULT_REASON_AMPLIFIER_TRIPPED = 9,
   // Since 1.1. More deadlines in a row were missed than the configuration allows.
   PHANTOM_FAULT_REASON_OVERRUN = 10,
+  // Since 1.3. The driver's thread that hears requests stood still while a force might be let through.
+  PHANTOM_FAULT_REASON_SERVICE_SILENT = 11,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -249,6 +251,8 @@ enum PhantomVerdict
   PHANTOM_VERDICT_NO_SEGMENT = 8,
   // Since 1.3. Whoever asks may not; [`Answer::allowed_group_plus_one`] says who may.
   PHANTOM_VERDICT_NOT_ALLOWED = 9,
+  // Since 1.3. The driver's loop takes no requests at the moment.
+  PHANTOM_VERDICT_BUSY = 10,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L

@@ -276,6 +276,9 @@ fn judge(socket: &Path, request: &Request, answer: &Answer) -> Result<(), Attach
         Some(Verdict::NoSegment) => {
             Err(AttachError::Refused("it could not create shared memory; see its log for the cause".into()))
         }
+        Some(Verdict::Busy) => Err(AttachError::Refused(
+            "its loop collects no requests; see with `io-driver status` whether its ticks go on".into(),
+        )),
         Some(Verdict::NotAllowed) => Err(not_allowed(socket, request, answer)),
         Some(Verdict::UnknownKind) => {
             Err(AttachError::UnknownRequest { found, kind: request.kind, expected })

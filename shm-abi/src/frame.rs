@@ -218,6 +218,8 @@ pub enum FaultReason {
     AmplifierTripped = 9,
     /// Since 1.1. More deadlines in a row were missed than the configuration allows.
     Overrun = 10,
+    /// Since 1.3. The driver's thread that hears requests stood still while a force might be let through.
+    ServiceSilent = 11,
 }
 
 from_word!(FaultReason {
@@ -232,6 +234,7 @@ from_word!(FaultReason {
     EmergencyStop,
     AmplifierTripped,
     Overrun,
+    ServiceSilent,
 });
 
 impl FaultReason {
@@ -249,6 +252,7 @@ impl FaultReason {
             Self::EmergencyStop => "an emergency stop was pressed",
             Self::AmplifierTripped => "an amplifier switched itself off",
             Self::Overrun => "too many deadlines in a row were missed",
+            Self::ServiceSilent => "the driver's thread that hears requests stood still",
         }
     }
 
@@ -294,7 +298,7 @@ mod tests {
         for word in 0..5 {
             assert_eq!(DriverState::from_word(word).map(|s| s as u64), Some(word));
         }
-        for word in 0..11 {
+        for word in 0..12 {
             assert_eq!(FaultReason::from_word(word).map(|r| r as u64), Some(word));
         }
         for word in 0..4 {
@@ -308,7 +312,7 @@ mod tests {
     #[test]
     fn a_fault_of_a_later_version_is_told_by_its_number() {
         assert_eq!(FaultReason::sentence_for(8), "an emergency stop was pressed");
-        assert_eq!(FaultReason::sentence_for(11), "a fault of a kind this version does not know (11)");
+        assert_eq!(FaultReason::sentence_for(12), "a fault of a kind this version does not know (12)");
     }
 
     #[test]

@@ -152,6 +152,8 @@ pub enum Verdict {
     NoSegment = 8,
     /// Since 1.3. Whoever asks may not; [`Answer::allowed_group_plus_one`] says who may.
     NotAllowed = 9,
+    /// Since 1.3. The driver's loop takes no requests at the moment.
+    Busy = 10,
 }
 
 from_word!(Verdict {
@@ -164,6 +166,7 @@ from_word!(Verdict {
     Crowded,
     NoSegment,
     NotAllowed,
+    Busy,
 });
 
 impl Request {

@@ -45,9 +45,14 @@ pub mod endpoint;
 pub mod frame;
 pub mod handshake;
 pub mod layout;
+#[allow(unsafe_code, reason = "socket options that no safe crate wraps")]
+pub mod peer;
+pub mod rights;
 pub mod segment;
 pub mod seqlock;
 pub mod server;
+pub mod socket_file;
+pub mod stop_socket;
 
 mod enumeration;
 mod socket;

@@ -8,8 +8,9 @@ use common::host::Host;
 use common::{HANG, directory, wait_until};
 use shm_abi::client::{self, AttachError};
 use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
-use shm_abi::server::{MAX_CONNECTIONS, MAX_OBSERVERS, PATIENCE};
+use shm_abi::server::{MAX_ASKING, MAX_OBSERVERS_OF_PROCESS, PATIENCE};
 use std::io::Write;
+use std::os::fd::AsFd;
 use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 
@@ -18,7 +19,7 @@ fn observers_in_any_number_leave_room_for_a_commander_and_a_stop() {
     let directory = directory();
     let host = Host::start(directory.path());
     let observers: Vec<_> =
-        (0..MAX_OBSERVERS).map(|_| client::observe(&host.socket, "looker").unwrap()).collect();
+        (0..MAX_OBSERVERS_OF_PROCESS).map(|_| client::observe(&host.socket, "looker").unwrap()).collect();
     let refusal = client::observe(&host.socket, "one too many").unwrap_err();
     let crowded = "the driver refused: it has too many connections; close some observers";
     assert_eq!(refusal.to_string(), crowded);
@@ -30,13 +31,48 @@ fn observers_in_any_number_leave_room_for_a_commander_and_a_stop() {
 }
 
 #[test]
-fn the_connection_after_the_last_is_told_so_even_before_it_asks() {
+fn the_oldest_of_too_many_silent_connections_gives_its_place_to_the_newcomer() {
     let mut desk = Desk::open();
-    let silent: Vec<_> = (0..MAX_CONNECTIONS).map(|_| desk.connect()).collect();
-    let mut last = desk.connect();
-    assert_eq!(verdict(&mut last), Some(Verdict::Crowded));
-    assert!(is_closed(&mut last));
-    drop(silent);
+    let mut silent: Vec<_> = (0..MAX_ASKING).map(|_| desk.connect()).collect();
+    let mut newcomer = desk.connect();
+    assert_eq!(verdict(&mut silent[0]), Some(Verdict::Crowded));
+    assert!(is_closed(&mut silent[0]));
+    // Whoever has said what he wants when he is let in needs no place at all.
+    let mut prompt = UnixStream::connect(desk.server.path()).unwrap();
+    prompt.write_all(bytemuck::bytes_of(&Request::new(RequestKind::EmergencyStop, "prompt"))).unwrap();
+    desk.poll(HANG);
+    assert_eq!(verdict(&mut prompt), Some(Verdict::Granted));
+    newcomer.write_all(bytemuck::bytes_of(&Request::new(RequestKind::Observe, "raw"))).unwrap();
+    desk.poll(HANG);
+    assert_eq!(verdict(&mut newcomer), Some(Verdict::Granted));
+    assert_eq!(desk.events.len(), 1, "{:?}", desk.events);
+}
+
+#[test]
+fn who_got_an_answer_and_has_nothing_to_keep_is_hung_up_on() {
+    let mut desk = Desk::open();
+    for kind in [
+        RequestKind::ClearFault,
+        RequestKind::EmergencyStop,
+        RequestKind::Zero,
+        RequestKind::EndLease,
+        RequestKind::Stop,
+    ] {
+        // The client keeps its end open for ever.
+        let mut stream = desk.granted(kind);
+        assert!(is_closed(&mut stream), "{kind:?}");
+    }
+}
+
+#[test]
+fn descriptors_that_a_client_sends_are_refused_where_the_kernel_can() {
+    let mut desk = Desk::open();
+    let stream = desk.connect();
+    let (end, _other) = UnixStream::pair().unwrap();
+    match common::fake::try_send(&stream, b"x", &[end.as_fd()]) {
+        Err(error) => assert_eq!(error.kind(), std::io::ErrorKind::PermissionDenied),
+        Ok(()) => println!("skipped: this kernel is older than 6.16 and hands over descriptors unasked"),
+    }
 }
 
 #[test]

@@ -55,6 +55,15 @@ impl Stranger {
         command
     }
 
+    /// It, as some other user with these groups besides its own.
+    pub fn as_user(&self, uid: u32, groups: &[u32]) -> Command {
+        let groups: Vec<String> = groups.iter().chain([&uid]).map(u32::to_string).collect();
+        let mut command = Command::new("setpriv");
+        command.arg(format!("--reuid={uid}")).arg(format!("--regid={uid}"));
+        command.arg(format!("--groups={}", groups.join(","))).arg("--").arg(&self.program).current_dir("/");
+        command
+    }
+
     /// The same with arguments.
     pub fn with<S: AsRef<OsStr>>(&self, arguments: impl IntoIterator<Item = S>) -> Command {
         let mut command = self.command(&[]);

@@ -2,13 +2,14 @@
 //! many that only look.
 
 use bytemuck::Zeroable;
+use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
 use shm_abi::{DriverView, Frame};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 use system_tests::driver::Driver;
 use system_tests::faults::commander::{Commander, answer};
 use system_tests::faults::press::{Press, terminate};
-use system_tests::faults::process::{Running, io_driver};
+use system_tests::faults::process::{Running, io_driver, is_alive, myself, role, send};
 use system_tests::faults::ring::RingLog;
 
 /// A former holder keeps its mapping and goes on answering every tick, under its own lease's number and under
@@ -138,5 +139,64 @@ fn any_number_of_observers_disturbs_nobody() {
     assert_eq!(count(&counters.replies_missed), 0);
     assert_eq!((count(&counters.commands_torn), count(&counters.commands_refused)), (0, 0));
     assert_eq!((count(&counters.faults), count(&counters.leases_granted)), (0, 1));
+    press.driver_must_live();
+}
+
+const FORKED: &str = "a_child_that_inherited_the_connection_of_a_dead_parent_does_not_keep_its_lease";
+
+/// Commands, hands its connection down to a child that lives on, and ends.
+fn leave_a_child(socket: &str) -> ! {
+    use std::io::{Read, Write};
+    let mut stream = std::os::unix::net::UnixStream::connect(socket).expect("it listens");
+    stream.write_all(bytemuck::bytes_of(&Request::new(RequestKind::Command, "parent"))).expect("it is heard");
+    let mut answer = Answer::zeroed();
+    stream.read_exact(bytemuck::bytes_of_mut(&mut answer)).expect("an answer");
+    assert_eq!((answer.verdict, answer.lease), (Verdict::Granted as u64, 1));
+    rustix::io::fcntl_setfd(&stream, rustix::io::FdFlags::empty()).expect("our own");
+    let child = std::process::Command::new("sleep").arg("100").spawn().expect("sleep runs");
+    println!("child {}", child.id());
+    std::process::exit(0)
+}
+
+#[test]
+fn a_child_that_inherited_the_connection_of_a_dead_parent_does_not_keep_its_lease() {
+    if let Some(socket) = role() {
+        leave_a_child(&socket);
+    }
+    let driver = Driver::start(&system_tests::faults::press::config("real"));
+    let socket = driver.socket().to_str().expect("plain").to_owned();
+    let end = Running::start(&mut myself(FORKED, &socket)).end();
+    assert_eq!(end.status, Some(0), "{end:?}");
+    let child = end.out.split("child ").nth(1).and_then(|rest| rest.split_whitespace().next());
+    let child: u32 = child.expect("its number").parse().expect("a number");
+    assert!(is_alive(child), "it holds the connection");
+    // It is refused as long as the lease is held.
+    let attachment = driver.command();
+    assert!(is_alive(child));
+    drop(attachment);
+    send(child, rustix::process::Signal::KILL);
+}
+
+#[test]
+fn a_commander_that_was_stopped_is_replaced_on_request() {
+    let mut press = Press::start("real");
+    let holder = press.start_app();
+    let mut log = RingLog::begin(&press.observer.driver);
+    log.follow_to_force(&press.observer.driver);
+    holder.signal(rustix::process::Signal::STOP);
+    let refused = shm_abi::client::command(press.driver.socket(), "newcomer");
+    assert!(matches!(refused, Err(shm_abi::client::AttachError::LeaseHeld { .. })), "{refused:?}");
+    let end = io_driver(&["end-lease"], press.driver.socket());
+    assert_eq!(end.status, Some(0), "{end:?}");
+    log.follow(&press.observer.driver, "the end of the lease and of its force", |told| {
+        told.last().is_some_and(|last| last.lease == 0 && !last.is_pushing())
+    });
+    log.check_promise(&press.observer.driver);
+    let newcomer = Commander::start(press.driver.command(), [1.0, 0.0, 0.0]);
+    log.follow(&press.observer.driver, "the newcomer's force", |told| {
+        told.last().is_some_and(|last| last.first_applied_n == [1.0, 0.0, 0.0])
+    });
+    drop(newcomer);
+    holder.signal(rustix::process::Signal::CONT);
     press.driver_must_live();
 }

@@ -148,3 +148,52 @@ fn an_ordinary_users_driver_is_closed_to_the_next_ordinary_user() {
     let end = Running::start(&mut look).end();
     assert!(end.status != Some(0) && end.err.contains("Permission denied"), "{end:?}");
 }
+
+/// Three groups, a user in each, and one in none, who can all reach the sockets.
+#[test]
+fn who_may_look_may_stop_and_no_more_and_only_administrators_undo_the_stop_of_others() {
+    if role().is_some() || !can_be_others() {
+        return;
+    }
+    let access = "[access]\nlook = \"4100\"\ncommand = \"4200\"\nadminister = \"4300\"\n[real_time]";
+    let config = resting("real", 1).replace("[real_time]", access);
+    let open = open_directory();
+    let socket = open.path().join("driver.sock");
+    let mut driver = Driver::start_at(&config, io_driver(), open, socket.clone());
+    for path in [socket.clone(), shm_abi::stop_socket::path_beside(&socket)] {
+        std::fs::set_permissions(path, PermissionsExt::from_mode(0o666)).expect("root may");
+    }
+    let program = Stranger::of(Path::new(io_driver().get_program()));
+    let ask = |user: u32, groups: &[u32], what: &str| {
+        let mut command = program.as_user(user, groups);
+        Running::start(command.arg(what).arg("--socket").arg(&socket)).end()
+    };
+    let denied = |user: u32, groups: &[u32], what: &str, group: u32| {
+        let end = ask(user, groups, what);
+        assert_eq!(end.status, Some(2), "{what}: {end:?}");
+        assert!(end.err.contains(&format!("members of group {group} may")), "{what}: {end:?}");
+    };
+    let granted = |user: u32, groups: &[u32], what: &str| {
+        let end = ask(user, groups, what);
+        assert_eq!(end.status, Some(0), "{what}: {end:?}");
+    };
+    let (nobody, looker, commander, other, administrator) = (4000, 4001, 4002, 4003, 4004);
+    denied(nobody, &[], "status", 4100);
+    granted(looker, &[4100], "status");
+    granted(looker, &[4100], "emergency-stop");
+    denied(looker, &[4100], "clear-fault", 4200);
+    denied(commander, &[4200], "clear-fault", 4300);
+    granted(administrator, &[4300], "clear-fault");
+    // One's own.
+    granted(commander, &[4200], "emergency-stop");
+    denied(other, &[4200], "clear-fault", 4300);
+    granted(commander, &[4200], "clear-fault");
+    // The lease of somebody else.
+    let lease = driver.command();
+    denied(commander, &[4200], "end-lease", 4300);
+    assert!(lease.connection.is_open());
+    granted(administrator, &[4300], "end-lease");
+    denied(commander, &[4200], "stop", 4300);
+    granted(administrator, &[4300], "stop");
+    assert_eq!(driver.wait().code(), Some(0));
+}

@@ -85,7 +85,7 @@ fn a_lease_that_ended_is_unmapped_by_the_socket_thread_and_not_by_the_loop() {
         let (view, _fd) = CommanderView::create(lease).unwrap();
         play.sender.post(Letter::Grant(view)).unwrap();
         if lease > 1 {
-            play.sender.post(Letter::End(lease - 1)).unwrap();
+            play.sender.urgent.end_lease(lease - 1);
         }
         let before = mapped_commanders();
         for tick in 0..3 {
@@ -172,7 +172,7 @@ impl Play {
     /// What the socket's thread and the commander do before the tick.
     fn prepare(&mut self, tick: u64) {
         if self.cycle.safety().state() == DriverState::Fault && tick.is_multiple_of(10) {
-            self.sender.post(Letter::ClearFault).unwrap();
+            assert!(self.sender.urgent.clear_fault(|_| true));
         }
         if tick.is_multiple_of(37) {
             // The one that breaks; sometimes all, of which two move.
@@ -181,7 +181,7 @@ impl Play {
         }
         if tick % LEASE_TICKS == 1 {
             if self.lease > 0 {
-                self.sender.post(Letter::End(self.lease)).unwrap();
+                self.sender.urgent.end_lease(self.lease);
             }
             self.grant();
             if self.lease.is_multiple_of(5) {

@@ -4,8 +4,8 @@ use super::{HandFile, HandMode, Rig, RigError};
 use crate::mount::Mount;
 use crate::simulated::{base_for_path, base_over_table};
 use io_driver::config::{
-    Backend, DeviceConfig, DriverConfig, HandSource, ProcessConfig, RealTime, ReplyConfig, ReplyMode,
-    SafetyConfig, Wish, Zeroing,
+    AccessConfig, Backend, DeviceConfig, DriverConfig, HandSource, ProcessConfig, RealTime, ReplyConfig,
+    ReplyMode, SafetyConfig, Wish, Zeroing,
 };
 use io_driver::device_file::Workspace;
 use io_driver::say::say;
@@ -145,6 +145,7 @@ impl Rig {
             reply,
             safety: SafetyConfig::usual(period_ns),
             process: ProcessConfig::default(),
+            access: AccessConfig::default(),
             devices: (0..self.device_count()).map(|index| self.device(index)).collect(),
         }
     }

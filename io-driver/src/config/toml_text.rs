@@ -69,7 +69,10 @@ fn head(text: &mut String, config: &DriverConfig) -> std::fmt::Result {
         writeln!(text, "commissioning_speed_m_per_s = {speed_m_per_s:?}")?;
     }
     writeln!(text, "[process]\nsandbox = {}", config.process.sandbox)?;
-    config.process.user.iter().try_for_each(|user| writeln!(text, "user = {}", quoted(user)))
+    writeln!(text, "service_silence_ms = {:?}", config.process.service_silence_ns as f64 / 1e6)?;
+    config.process.user.iter().try_for_each(|user| writeln!(text, "user = {}", quoted(user)))?;
+    writeln!(text, "[access]")?;
+    config.access.groups().try_for_each(|(key, group)| writeln!(text, "{key} = {}", quoted(group)))
 }
 
 fn write_device(text: &mut String, device: &DeviceConfig) -> std::fmt::Result {

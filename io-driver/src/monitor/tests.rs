@@ -46,6 +46,7 @@ fn counters() -> CounterStatus {
         leases_granted: 1,
         leases_refused: 0,
         faults: 0,
+        log_dropped: 0,
     }
 }
 

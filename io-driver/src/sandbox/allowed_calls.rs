@@ -37,8 +37,10 @@ pub const ALLOWED_CALLS: &[AllowedCall] = &[
     // The socket.
     call("ppoll", libc::SYS_ppoll, Any, "the service's wait for clients"),
     call("accept4", libc::SYS_accept4, Any, "a client comes"),
-    call("getsockopt", libc::SYS_getsockopt, Any, "which process it is (SO_PEERCRED)"),
+    call("getsockopt", libc::SYS_getsockopt, Any, "who it is: process, user, groups"),
+    call("pidfd_open", libc::SYS_pidfd_open, Any, "whether the commander's process lives, before Linux 6.5"),
     call("recvfrom", libc::SYS_recvfrom, Any, "its request"),
+    call("recvmsg", libc::SYS_recvmsg, Any, "an emergency stop by datagram, and who sent it"),
     call("sendmsg", libc::SYS_sendmsg, Any, "the answer, with the segments' descriptors"),
     call("close", libc::SYS_close, Any, "it is gone; segments and device files at the end"),
     // A fresh segment for each lease.

@@ -123,7 +123,11 @@ fn by_name(name: &str) -> Result<Entry, UserError> {
     Entry::from_name(name).ok().flatten().ok_or_else(unknown)
 }
 
-fn group_id(text: &str) -> Result<u32, UserError> {
+/// Finds a group by name or number.
+///
+/// # Errors
+/// If there is none of this name.
+pub fn group_id(text: &str) -> Result<u32, UserError> {
     let unknown = || UserError::Unknown { what: "group", name: text.to_owned() };
     let by_name = || Group::from_name(text).ok().flatten().map(|group| group.gid.as_raw());
     text.parse().ok().or_else(by_name).ok_or_else(unknown)

@@ -22,15 +22,25 @@ pub(crate) fn hear(stream: &mut UnixStream) {
     stream.read_exact(&mut [0; size_of::<Request>()]).unwrap();
 }
 
-/// Sends bytes and descriptors in one go.
-pub(crate) fn send(stream: &UnixStream, bytes: &[u8], fds: &[std::os::fd::BorrowedFd<'_>]) {
+/// Sends bytes and descriptors in one go, if the other side takes descriptors.
+pub(crate) fn try_send(
+    stream: &UnixStream,
+    bytes: &[u8],
+    fds: &[std::os::fd::BorrowedFd<'_>],
+) -> std::io::Result<()> {
     use rustix::net::{SendAncillaryBuffer, SendAncillaryMessage, SendFlags};
     let mut space = [std::mem::MaybeUninit::uninit(); rustix::cmsg_space!(ScmRights(4))];
     let mut control = SendAncillaryBuffer::new(&mut space);
     assert!(control.push(SendAncillaryMessage::ScmRights(fds)));
     let sent =
-        rustix::net::sendmsg(stream, &[std::io::IoSlice::new(bytes)], &mut control, SendFlags::empty());
-    assert_eq!(sent, Ok(bytes.len()));
+        rustix::net::sendmsg(stream, &[std::io::IoSlice::new(bytes)], &mut control, SendFlags::empty())?;
+    assert_eq!(sent, bytes.len());
+    Ok(())
+}
+
+/// The same to somebody who takes them.
+pub(crate) fn send(stream: &UnixStream, bytes: &[u8], fds: &[std::os::fd::BorrowedFd<'_>]) {
+    try_send(stream, bytes, fds).unwrap();
 }
 
 /// Receives an answer and the descriptors that come with it.

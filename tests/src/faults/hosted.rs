@@ -109,21 +109,25 @@ impl Desk {
         let mut events = Vec::new();
         while !self.shared.ended.load(Ordering::Acquire) {
             self.server.poll(&self.memory, POLL, &mut events).expect("the socket works");
-            for letter in events.drain(..).filter_map(letter_of) {
-                self.sender.post(letter).expect("the loop collects its mail");
+            for event in events.drain(..) {
+                pass_on(event, &mut self.sender);
             }
             self.sender.clear_waste();
         }
     }
 }
 
-fn letter_of(event: ServerEvent) -> Option<Letter> {
-    match event {
-        ServerEvent::LeaseGranted { view, .. } => Some(Letter::Grant(view)),
-        ServerEvent::LeaseEnded { lease } => Some(Letter::End(lease)),
-        ServerEvent::EmergencyStopRequested { .. } => Some(Letter::EmergencyStop),
-        ServerEvent::ClearFaultRequested => Some(Letter::ClearFault),
-        ServerEvent::ZeroRequested { devices, .. } => Some(Letter::Zero(DeviceSet(devices))),
-        ServerEvent::LeaseRefused | ServerEvent::StopRequested { .. } | ServerEvent::Trouble { .. } => None,
-    }
+fn pass_on(event: ServerEvent, sender: &mut Sender) {
+    let letter = match event {
+        ServerEvent::LeaseGranted { view, .. } => Letter::Grant(view),
+        ServerEvent::ZeroRequested { devices, .. } => Letter::Zero(DeviceSet(devices)),
+        ServerEvent::LeaseEnded { lease } => return sender.urgent.end_lease(lease),
+        ServerEvent::EmergencyStopRequested { uid, .. } => return sender.urgent.stop(Some(uid)),
+        ServerEvent::ClearFaultRequested { .. } => {
+            sender.urgent.clear_fault(|_| true);
+            return;
+        }
+        ServerEvent::LeaseRefused | ServerEvent::StopRequested { .. } | ServerEvent::Trouble { .. } => return,
+    };
+    sender.post(letter).expect("the loop collects its mail");
 }

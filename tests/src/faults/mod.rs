@@ -4,6 +4,7 @@
 pub mod amplifiers;
 pub mod campaign;
 pub mod commander;
+pub mod flood;
 pub mod heal;
 pub mod hog;
 pub mod hosted;
@@ -18,3 +19,4 @@ pub mod ring;
 pub mod saboteur;
 pub mod scarcity;
 pub mod stand;
+pub mod stuck;

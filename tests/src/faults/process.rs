@@ -37,6 +37,12 @@ impl Running {
         Self { child: child.expect("the program starts"), heard: String::new() }
     }
 
+    /// Starts it with a standard error of one's own, which is not listened to.
+    pub fn start_saying_to(command: &mut Command, err: impl Into<Stdio>) -> Self {
+        let child = command.stdout(Stdio::null()).stderr(err).stdin(Stdio::null()).spawn();
+        Self { child: child.expect("the program starts"), heard: String::new() }
+    }
+
     /// Its process id.
     pub fn id(&self) -> u32 {
         self.child.id()

@@ -13,7 +13,7 @@ use rustix::process::Signal;
 use shm_abi::client::{self, Attachment};
 use shm_abi::{DriverState, DriverView};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
@@ -55,6 +55,8 @@ pub struct Setup {
     pub zeroing: &'static str,
     /// Further arguments of the emulator.
     pub emulator: Vec<&'static str>,
+    /// Whether the driver says what it does, on standard error.
+    pub talks: bool,
 }
 
 impl Setup {
@@ -70,6 +72,7 @@ impl Setup {
             config: String::new(),
             zeroing: "at-start",
             emulator: Vec::new(),
+            talks: false,
         }
     }
 
@@ -167,6 +170,12 @@ impl Stand {
         self.observer = observe(&self.socket(), &mut self.driver);
     }
 
+    /// The same with a standard error of one's own.
+    pub fn restart_driver_saying_to(&mut self, err: impl Into<Stdio>) {
+        self.driver = Running::start_saying_to(&mut self.driver_command(), err);
+        self.observer = observe(&self.socket(), &mut self.driver);
+    }
+
     /// Looks on at the present driver, if it listens.
     pub fn try_to_observe(&self) -> Option<Attachment> {
         let attachment = client::observe(&self.socket(), "test").ok()?;
@@ -258,7 +267,7 @@ fn driver_at(setup: &Setup, place: &Path) -> Command {
     let file = place.join("driver.toml");
     std::fs::write(&file, config(setup)).expect("the configuration is written");
     let mut command = programs::io_driver();
-    command.args(["run", "--quiet", "--config"]).arg(&file);
+    command.args(["run", "--config"]).arg(&file).args((!setup.talks).then_some("--quiet"));
     command.arg("--socket").arg(place.join("driver.sock"));
     command.env(SABOTAGE_VARIABLE, &setup.sabotage);
     command

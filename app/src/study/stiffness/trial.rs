@@ -22,8 +22,8 @@ use bytemuck::Zeroable;
 use haptics::passivity::{Passivity, PassivitySpec};
 use haptics::{Entity, Finger, Plane};
 use io_driver::config::{
-    DeviceConfig, DriverConfig, HandSource, ProcessConfig, RealTime, ReplyConfig, SafetyConfig, Wish,
-    Zeroing, period_of,
+    AccessConfig, DeviceConfig, DriverConfig, HandSource, ProcessConfig, RealTime, ReplyConfig, SafetyConfig,
+    Wish, Zeroing, period_of,
 };
 use io_driver::open::ROUND_TRIP_NS;
 use io_driver::sim::hand::HandModel;
@@ -216,6 +216,7 @@ impl Bench {
             reply,
             safety: SafetyConfig::usual(period_ns),
             process: ProcessConfig::default(),
+            access: AccessConfig::default(),
             devices: vec![DeviceConfig {
                 name: "f0".into(),
                 backend: self.simulated(case).backend(wish),

@@ -1,0 +1,165 @@
+//! `io-driver emergency-stop` and `io-driver stop`.
+//!
+//! Model: asked in every way there is, then believed only when seen. An emergency stop goes by datagram first, which
+//! the driver's [stop thread](crate::stop_thread) hears whatever its service does, then over a connection; it is done
+//! when a new frame shows the fault and no force in any device. A stop is done when the driver has ended and its last
+//! words say that the motors were written zero.
+//! Invariant: no exit status of 0 without that sight. Asking and looking have threads of their own: neither a driver
+//! that does not answer nor one without a free place delays the words that motors may still be on.
+
+use super::{EXIT_FAULT, EXIT_USAGE, fail, print_line};
+use crate::say::say;
+use rt_core::epitaph::{self, EpitaphKind};
+use shm_abi::client::{self, AttachError, Attachment};
+use shm_abi::{DriverState, DriverView, FaultReason, Frame, stop_socket};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::time::{Duration, Instant};
+
+/// How long a stop may take before we say that nothing is certain.
+const PROMPT: Duration = Duration::from_millis(100);
+/// How long we look on after that.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// Between two looks at the frames.
+const LOOK: Duration = Duration::from_micros(500);
+/// Between two tries to find a place among those who look on.
+const RETRY: Duration = Duration::from_millis(10);
+const NAME: &str = "io-driver";
+
+/// What the threads tell.
+enum News {
+    /// A frame of this tick shows it.
+    Shown(u64),
+    /// The driver answered that it heard, or why not.
+    Asked(Result<(), AttachError>),
+}
+
+/// Stops the motors, and says whether that was seen.
+pub(super) fn emergency_stop(socket: &Path) -> ExitCode {
+    let begun = Instant::now();
+    let sent = stop_socket::send(socket);
+    let (tell, news) = channel();
+    in_background(socket, &tell, |socket, tell| {
+        let _ = tell.send(News::Asked(client::emergency_stop(&socket, NAME)));
+    });
+    in_background(socket, &tell, |socket, tell| {
+        if let Some(tick) = wait_for_zero(&socket) {
+            let _ = tell.send(News::Shown(tick));
+        }
+    });
+    judge(&news, begun, sent.is_ok())
+}
+
+fn in_background(
+    socket: &Path,
+    tell: &Sender<News>,
+    body: impl FnOnce(PathBuf, Sender<News>) + Send + 'static,
+) {
+    let (socket, tell) = (socket.to_path_buf(), tell.clone());
+    // They end with the process, whatever they wait for.
+    std::thread::spawn(move || body(socket, tell));
+}
+
+fn judge(news: &Receiver<News>, begun: Instant, was_sent: bool) -> ExitCode {
+    let mut is_warned = false;
+    loop {
+        let patience = if is_warned { PATIENCE } else { PROMPT };
+        match news.recv_timeout(patience.saturating_sub(begun.elapsed())) {
+            Ok(News::Shown(tick)) => {
+                let _ = print_line(&format!("emergency stop: tick {tick} shows the fault and no force"));
+                return ExitCode::SUCCESS;
+            }
+            // Nobody is there, by either way.
+            Ok(News::Asked(Err(error))) if !was_sent => return fail(&error, EXIT_USAGE),
+            Ok(News::Asked(_)) => {}
+            Err(_) if !is_warned => {
+                is_warned = true;
+                say(format_args!("io-driver: {UNCERTAIN}"));
+            }
+            Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {
+                say(format_args!("io-driver: the stop was asked for, and no frame has shown it"));
+                return ExitCode::from(EXIT_FAULT);
+            }
+        }
+    }
+}
+
+const UNCERTAIN: &str =
+    "the emergency stop is not confirmed within 100 ms: the motors may still be on; cut their power";
+
+/// The tick whose frame shows that the motors are off; `None`: the driver is gone.
+fn wait_for_zero(socket: &Path) -> Option<u64> {
+    let attachment = loop {
+        match client::observe(socket, NAME) {
+            Ok(attachment) => break attachment,
+            Err(AttachError::NoDriver { .. } | AttachError::DriverGone { .. }) => return None,
+            Err(_) => std::thread::sleep(RETRY),
+        }
+    };
+    let driver = &attachment.driver;
+    // What stands there already may be old, and the loop dead.
+    let stale = driver.latest_tick();
+    loop {
+        match driver.read_latest() {
+            Some(frame) if Some(frame.tick) > stale && is_stopped(&frame) => return Some(frame.tick),
+            _ if !attachment.connection.is_open() => return None,
+            _ => std::thread::sleep(LOOK),
+        }
+    }
+}
+
+fn is_stopped(frame: &Frame) -> bool {
+    frame.state == DriverState::Fault as u64
+        && frame.fault == FaultReason::EmergencyStop as u64
+        && frame.present_devices().iter().all(|device| device.force_on_user_n_applied == [0.0; 3])
+}
+
+/// Ends the driver, and says whether that was seen.
+pub(super) fn stop(socket: &Path) -> ExitCode {
+    // Before, so that its last words can be read; without a place to look on the driver ends all the same.
+    let observer = client::observe(socket, NAME).ok();
+    let pid = match client::stop(socket, NAME) {
+        Ok(pid) => pid,
+        Err(error) => return fail(&error, EXIT_USAGE),
+    };
+    // It stops, whether or not somebody reads that.
+    let _ = print_line(&format!("driver (process {pid}) stops"));
+    let Some(observer) = observer.filter(|observer| observer.driver_pid == pid) else {
+        say(format_args!(
+            "io-driver: it cannot be watched ending; the motors may still be on: look yourself"
+        ));
+        return ExitCode::from(EXIT_FAULT);
+    };
+    wait_for_end(&observer, pid)
+}
+
+fn wait_for_end(observer: &Attachment, pid: u64) -> ExitCode {
+    let begun = Instant::now();
+    let mut is_warned = false;
+    while observer.connection.is_open() && epitaph::read(&observer.driver.epitaph).is_none() {
+        if !is_warned && begun.elapsed() > PROMPT {
+            is_warned = true;
+            say(format_args!("io-driver: it has not stopped within 100 ms: the motors may still be on"));
+        }
+        if begun.elapsed() > PATIENCE {
+            say(format_args!("io-driver: process {pid} lives on; cut the motors' power, then kill it"));
+            return ExitCode::from(EXIT_FAULT);
+        }
+        std::thread::sleep(LOOK);
+    }
+    judge_end(&observer.driver)
+}
+
+fn judge_end(driver: &DriverView) -> ExitCode {
+    let Some(words) = epitaph::read(&driver.epitaph) else {
+        say(format_args!("io-driver: it ended without last words: the motors may still be on"));
+        return ExitCode::from(EXIT_FAULT);
+    };
+    if words.kind != EpitaphKind::Stopped {
+        say(format_args!("io-driver: it ended otherwise: {words}"));
+        return ExitCode::from(EXIT_FAULT);
+    }
+    let _ = print_line(&format!("{words}; the motors were written zero"));
+    ExitCode::SUCCESS
+}

@@ -1,0 +1,71 @@
+//! The one thread of a running driver that writes to standard error.
+//!
+//! Problem: whoever holds the other end of standard error decides how long a write takes, and the thread that writes
+//! can do nothing else meanwhile: no stop, no lease.
+//! Model: everybody else queues lines ([`say`]) or records ([`rt_core::log`]), both bounded; this thread writes
+//! them, and says how many were dropped as soon as it can write again.
+//! Invariant: nobody ever waits for this thread but [`say::flush`], which waits for a bounded time.
+
+use crate::say::{self, Entry};
+use rt_core::log::{LogLevel, LogLine, RtLogDrain};
+use std::io;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::time::Duration;
+
+/// How often it looks at the loop's records when nobody else says anything.
+const POLL: Duration = Duration::from_millis(20);
+/// Formatting, and little else.
+const STACK_BYTES: usize = 128 * 1024;
+
+struct LogThread {
+    entries: Receiver<Entry>,
+    drain: RtLogDrain,
+    quiet: bool,
+    dropped_told: u64,
+}
+
+/// Starts it. From now on nothing that is said waits for standard error.
+///
+/// # Errors
+/// What the system says to another thread.
+pub(crate) fn start(drain: RtLogDrain, quiet: bool) -> io::Result<()> {
+    // A process has one driver; the lines of a second one go the way of the first one's.
+    let Some(entries) = say::queue() else { return Ok(()) };
+    let log = LogThread { entries, drain, quiet, dropped_told: 0 };
+    let thread = std::thread::Builder::new().name("log".into()).stack_size(STACK_BYTES);
+    thread.spawn(move || log.run()).map(drop)
+}
+
+impl LogThread {
+    fn run(mut self) {
+        loop {
+            let next = self.entries.recv_timeout(POLL);
+            self.write_records();
+            match next {
+                Ok(Entry::Line(line)) => say::write(&line),
+                Ok(Entry::Flush(done)) => drop(done),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
+            self.tell_dropped();
+        }
+    }
+
+    fn write_records(&mut self) {
+        let quiet = self.quiet;
+        self.drain.drain(|line: LogLine| {
+            if !quiet || line.level > LogLevel::Info {
+                say::write(&format!("io-driver: tick {}: {}\n", line.tick, line.text));
+            }
+        });
+    }
+
+    fn tell_dropped(&mut self) {
+        let dropped = say::dropped();
+        if dropped > self.dropped_told {
+            let lines = dropped - self.dropped_told;
+            say::write(&format!("io-driver: {lines} lines were dropped: standard error took none\n"));
+            self.dropped_told = dropped;
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! Requests to the loop for which there is always room: emergency stop, leaving a fault, the end of a lease.
+//!
+//! Model: one atomic word holds whether an emergency stop and whether leaving the fault are asked for, and who made
+//! the emergency stop that stands; another one the number of the last lease that has ended. To ask twice is to ask
+//! once, so nothing can be full and nobody waits.
+//! Invariants: a request to leave a fault never undoes an emergency stop that was asked for after it or that the loop
+//! has not seen yet; the emergency stop of somebody stays his until it is left.
+//! Cost: a load for a tick in which nothing is asked.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+const EMERGENCY_STOP: u64 = 1 << 63;
+const CLEAR_FAULT: u64 = 1 << 62;
+const ASKED: u64 = EMERGENCY_STOP | CLEAR_FAULT;
+/// Several users, or one whom the kernel does not name.
+const SEVERAL: u64 = 1 << 33;
+
+/// Whose emergency stop it is that stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StoppedBy {
+    /// Nobody's: there is none, or somebody pressed a switch.
+    Nobody,
+    /// A user's, by id.
+    User(u32),
+    /// More than one user's, or an unknown one's.
+    Several,
+}
+
+/// What is asked of the loop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Asked {
+    /// Motors off, now.
+    pub emergency_stop: bool,
+    /// Leave the fault state.
+    pub clear_fault: bool,
+    /// Every lease up to this number has ended.
+    pub ended_lease: u64,
+}
+
+/// The words, shared between whoever asks and the loop.
+#[derive(Debug, Clone, Default)]
+pub struct Urgent(Arc<Words>);
+
+#[derive(Debug, Default)]
+struct Words {
+    state: AtomicU64,
+    ended_lease: AtomicU64,
+}
+
+impl Urgent {
+    /// All motors off with the loop's next tick. `user` is who asks, if that is known.
+    pub fn stop(&self, user: Option<u32>) {
+        self.update(|state| {
+            let by = merge(by_of(state), user.map_or(StoppedBy::Several, StoppedBy::User));
+            Some(EMERGENCY_STOP | word_of(by))
+        });
+    }
+
+    /// Leave the fault state, if `may` who asks undo what stands; returns whether.
+    pub fn clear_fault(&self, may: impl Fn(StoppedBy) -> bool) -> bool {
+        self.update(|state| {
+            let by = by_of(state);
+            let left = if state & EMERGENCY_STOP == 0 { StoppedBy::Nobody } else { by };
+            may(by).then_some(state & ASKED | CLEAR_FAULT | word_of(left))
+        })
+    }
+
+    /// Whose emergency stop stands.
+    pub fn stopped_by(&self) -> StoppedBy {
+        by_of(self.0.state.load(Ordering::Acquire))
+    }
+
+    /// This lease has ended, and any before it.
+    pub fn end_lease(&self, lease: u64) {
+        self.0.ended_lease.fetch_max(lease, Ordering::Release);
+    }
+
+    /// What is asked since the last call. Fit for the loop.
+    pub fn take(&self) -> Asked {
+        let state = &self.0.state;
+        let asked = if state.load(Ordering::Relaxed) & ASKED == 0 {
+            0
+        } else {
+            state.fetch_and(!ASKED, Ordering::AcqRel)
+        };
+        Asked {
+            emergency_stop: asked & EMERGENCY_STOP != 0,
+            clear_fault: asked & CLEAR_FAULT != 0,
+            ended_lease: self.0.ended_lease.load(Ordering::Acquire),
+        }
+    }
+
+    fn update(&self, change: impl FnMut(u64) -> Option<u64>) -> bool {
+        self.0.state.fetch_update(Ordering::AcqRel, Ordering::Acquire, change).is_ok()
+    }
+}
+
+fn merge(former: StoppedBy, new: StoppedBy) -> StoppedBy {
+    if former == StoppedBy::Nobody || former == new { new } else { StoppedBy::Several }
+}
+
+fn word_of(by: StoppedBy) -> u64 {
+    match by {
+        StoppedBy::Nobody => 0,
+        StoppedBy::User(user) => u64::from(user) + 1,
+        StoppedBy::Several => SEVERAL,
+    }
+}
+
+fn by_of(state: u64) -> StoppedBy {
+    match state & !ASKED {
+        0 => StoppedBy::Nobody,
+        word => u32::try_from(word - 1).map_or(StoppedBy::Several, StoppedBy::User),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ANN: u32 = 0;
+    const BEN: u32 = u32::MAX;
+
+    fn own(user: u32) -> impl Fn(StoppedBy) -> bool {
+        move |by| by == StoppedBy::Nobody || by == StoppedBy::User(user)
+    }
+
+    #[test]
+    fn a_stop_of_several_is_left_by_none_of_them_alone() {
+        let urgent = Urgent::default();
+        urgent.stop(Some(ANN));
+        assert_eq!(urgent.stopped_by(), StoppedBy::User(ANN));
+        urgent.stop(Some(BEN));
+        assert_eq!(urgent.stopped_by(), StoppedBy::Several);
+        assert!(urgent.take().emergency_stop);
+        assert!(!urgent.clear_fault(own(ANN)) && !urgent.clear_fault(own(BEN)));
+        assert!(!urgent.take().clear_fault);
+        assert!(urgent.clear_fault(|_| true));
+        assert_eq!(urgent.stopped_by(), StoppedBy::Nobody);
+        assert!(urgent.take().clear_fault);
+    }
+
+    #[test]
+    fn a_stop_cancels_a_request_to_leave_a_fault_that_came_before_it() {
+        let urgent = Urgent::default();
+        assert!(urgent.clear_fault(own(BEN)));
+        urgent.stop(Some(ANN));
+        let asked = urgent.take();
+        assert!(asked.emergency_stop && !asked.clear_fault, "{asked:?}");
+        assert_eq!(urgent.stopped_by(), StoppedBy::User(ANN));
+    }
+
+    #[test]
+    fn a_stop_that_the_loop_has_not_seen_stays_its_makers() {
+        let urgent = Urgent::default();
+        urgent.stop(Some(ANN));
+        assert!(urgent.clear_fault(own(ANN)));
+        assert_eq!(urgent.stopped_by(), StoppedBy::User(ANN));
+        let asked = urgent.take();
+        assert!(asked.emergency_stop && asked.clear_fault);
+    }
+
+    #[test]
+    fn what_was_taken_is_asked_no_more_and_the_last_lease_that_ended_stays() {
+        let urgent = Urgent::default();
+        urgent.end_lease(7);
+        urgent.end_lease(5);
+        urgent.stop(None);
+        assert_eq!(urgent.take(), Asked { emergency_stop: true, clear_fault: false, ended_lease: 7 });
+        assert_eq!(urgent.take(), Asked { emergency_stop: false, clear_fault: false, ended_lease: 7 });
+        assert_eq!(urgent.stopped_by(), StoppedBy::Several, "nobody knows whose it is");
+    }
+}

@@ -1,0 +1,147 @@
+//! Who is at the other end of a Unix socket, as the kernel tells: user, groups, process.
+//!
+//! Model: a connection keeps the credentials that its client had when it connected (SO_PEERCRED, SO_PEERGROUPS). Its
+//! process is held by a descriptor (SO_PEERPIDFD, else pidfd_open(2)), which no other process can inherit by getting
+//! the same number.
+//! Invariant: nothing here waits for the other end.
+
+use nix::libc;
+use nix::sys::socket::{getsockopt, sockopt};
+use rustix::process::{Pid, PidfdFlags, pidfd_open};
+use std::io;
+use std::os::fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd};
+
+/// The client of a connection.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Peer {
+    /// Its process id; 0: it has none that is visible here.
+    pub pid: u32,
+    /// Its user.
+    pub uid: u32,
+    /// That user's first group.
+    pub gid: u32,
+}
+
+impl Peer {
+    /// The client of this connection.
+    ///
+    /// # Errors
+    /// If the kernel does not tell.
+    pub fn of(connection: BorrowedFd<'_>) -> io::Result<Self> {
+        let credentials = getsockopt(&connection, sockopt::PeerCredentials)?;
+        let (uid, gid) = (credentials.uid(), credentials.gid());
+        Ok(Self { pid: credentials.pid().cast_unsigned(), uid, gid })
+    }
+
+    /// All groups of the client's user when it made this connection.
+    pub fn groups(&self, connection: BorrowedFd<'_>) -> Vec<u32> {
+        let mut groups = supplementary_groups(connection).unwrap_or_default();
+        groups.push(self.gid);
+        groups
+    }
+}
+
+/// A process, as something to wait for.
+#[derive(Debug)]
+pub(crate) enum Process {
+    /// Readable when it has ended.
+    Alive(OwnedFd),
+    /// It has ended.
+    Ended,
+    /// It cannot be held: it lives where this process sees none, or the kernel is older than 5.3.
+    Unknown,
+}
+
+impl Process {
+    /// The process that made this connection.
+    pub(crate) fn of(connection: BorrowedFd<'_>, peer: &Peer) -> Self {
+        if let Ok(fd) = getsockopt(&connection, sockopt::PeerPidfd) {
+            return Self::Alive(fd);
+        }
+        let Some(pid) = Pid::from_raw(peer.pid.cast_signed()) else { return Self::Unknown };
+        match pidfd_open(pid, PidfdFlags::empty()) {
+            Ok(fd) => Self::Alive(fd),
+            Err(rustix::io::Errno::SRCH) => Self::Ended,
+            Err(_) => Self::Unknown,
+        }
+    }
+
+    pub(crate) fn fd(&self) -> Option<BorrowedFd<'_>> {
+        match self {
+            Self::Alive(fd) => Some(fd.as_fd()),
+            Self::Ended | Self::Unknown => None,
+        }
+    }
+}
+
+/// Since Linux 6.16: descriptors that a client sends are refused at its side. Closing the last descriptor of some files
+/// takes as long as their owner likes (SO_LINGER of a TCP connection), and who receives them closes them.
+pub(crate) fn refuse_descriptors(socket: &impl AsFd) {
+    /// Not in libc yet; include/uapi/asm-generic/socket.h.
+    const SO_PASSRIGHTS: libc::c_int = 83;
+    let no: libc::c_int = 0;
+    // SAFETY: the pointer is to an int of the length that is told, and lives as long as the call.
+    let _older_kernels_refuse = unsafe {
+        libc::setsockopt(
+            socket.as_fd().as_raw_fd(),
+            libc::SOL_SOCKET,
+            SO_PASSRIGHTS,
+            (&raw const no).cast(),
+            size_of::<libc::c_int>() as libc::socklen_t,
+        )
+    };
+}
+
+/// As many as the kernel allows a process.
+const MAX_GROUPS: usize = 65_536;
+
+/// `None`: the kernel is older than 4.13, or something failed.
+fn supplementary_groups(connection: BorrowedFd<'_>) -> Option<Vec<u32>> {
+    let mut groups = vec![0; 64];
+    loop {
+        let room = size_of_val(groups.as_slice());
+        let mut length = libc::socklen_t::try_from(room).ok()?;
+        // SAFETY: the pointers are to `length` bytes of groups and to `length` itself, which outlive the call.
+        let result = unsafe {
+            libc::getsockopt(
+                connection.as_raw_fd(),
+                libc::SOL_SOCKET,
+                libc::SO_PEERGROUPS,
+                groups.as_mut_ptr().cast(),
+                &raw mut length,
+            )
+        };
+        let found = length as usize / size_of::<u32>();
+        match result {
+            0 => {
+                groups.truncate(found);
+                return Some(groups);
+            }
+            // Too small; it said how much it takes.
+            _ if found > groups.len() && found <= MAX_GROUPS => groups.resize(found, 0),
+            _ => return None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::os::unix::net::UnixStream;
+
+    #[test]
+    fn the_kernel_tells_user_groups_and_process_of_a_client() {
+        let (ours, _theirs) = UnixStream::pair().unwrap();
+        let peer = Peer::of(ours.as_fd()).unwrap();
+        assert_eq!((peer.pid, peer.uid), (std::process::id(), rustix::process::geteuid().as_raw()));
+        let groups = peer.groups(ours.as_fd());
+        assert!(groups.contains(&rustix::process::getegid().as_raw()));
+        for group in rustix::process::getgroups().unwrap() {
+            assert!(groups.contains(&group.as_raw()), "{groups:?}");
+        }
+        let Process::Alive(fd) = Process::of(ours.as_fd(), &peer) else { panic!("we live") };
+        let mut polled = [rustix::event::PollFd::new(&fd, rustix::event::PollFlags::IN)];
+        let now = rustix::event::Timespec { tv_sec: 0, tv_nsec: 0 };
+        assert_eq!(rustix::event::poll(&mut polled, Some(&now)).unwrap(), 0, "not readable while we live");
+    }
+}

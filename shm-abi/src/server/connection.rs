@@ -1,0 +1,109 @@
+//! One client of the server, and how far it has come.
+
+use super::places::Owner;
+use crate::handshake::Request;
+use crate::peer::{Peer, Process};
+use crate::segment::LeaseOffer;
+use bytemuck::Zeroable;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::io::Errno;
+use rustix::net::RecvFlags;
+use std::os::fd::{AsFd, BorrowedFd};
+use std::os::unix::net::UnixStream;
+use std::time::{Duration, Instant};
+
+#[derive(Debug)]
+pub(super) struct Connection {
+    pub(super) stream: UnixStream,
+    pub(super) peer: Peer,
+    pub(super) stage: Stage,
+}
+
+#[derive(Debug)]
+pub(super) enum Stage {
+    /// Has sent so many bytes of its request.
+    Asking { bytes: [u8; size_of::<Request>()], filled: usize, since: Instant },
+    /// Got the driver's segment.
+    Observing,
+    /// Holds the lease, as long as this process lives.
+    Commanding {
+        lease: u64,
+        name: String,
+        process: Process,
+        /// The loop knows nothing of the lease as long as there is one.
+        offer: Option<LeaseOffer>,
+    },
+    /// To be forgotten.
+    Gone,
+}
+
+/// What a look at a connection brought.
+pub(super) enum Heard {
+    Nothing,
+    Request(Request),
+    End,
+}
+
+impl Connection {
+    pub(super) fn new(stream: UnixStream, peer: Peer) -> Self {
+        let stage = Stage::Asking { bytes: [0; size_of::<Request>()], filled: 0, since: Instant::now() };
+        Self { stream, peer, stage }
+    }
+
+    pub(super) fn owner(&self) -> Owner {
+        Owner { uid: self.peer.uid, pid: self.peer.pid }
+    }
+
+    pub(super) fn is_asking(&self) -> bool {
+        matches!(self.stage, Stage::Asking { .. })
+    }
+
+    pub(super) fn receive(&mut self) -> Heard {
+        let Stage::Asking { bytes, filled, .. } = &mut self.stage else {
+            // Nothing is expected any more: this is the end, or a client that does not keep to the protocol.
+            return Heard::End;
+        };
+        match rustix::net::recv(&self.stream, &mut bytes[*filled..], RecvFlags::empty()) {
+            Ok((_, 0)) => return Heard::End,
+            Ok((_, more)) => *filled += more,
+            Err(errno) => return heard_error(errno),
+        }
+        if *filled < bytes.len() {
+            return Heard::Nothing;
+        }
+        let mut request = Request::zeroed();
+        bytemuck::bytes_of_mut(&mut request).copy_from_slice(bytes);
+        Heard::Request(request)
+    }
+
+    /// Whether the other end hung up, or the process that holds the lease has ended; never blocks.
+    pub(super) fn is_over(&self) -> bool {
+        let mut fds = vec![PollFd::new(&self.stream, PollFlags::RDHUP)];
+        fds.extend(self.process().map(|fd| PollFd::from_borrowed_fd(fd, PollFlags::IN)));
+        poll(&mut fds, Some(&timespec(Duration::ZERO))).is_ok_and(|ready| ready > 0)
+    }
+
+    /// Readable when the process that holds the lease has ended.
+    pub(super) fn process(&self) -> Option<BorrowedFd<'_>> {
+        match &self.stage {
+            Stage::Commanding { process, .. } => process.fd(),
+            _ => None,
+        }
+    }
+
+    /// The groups of the client's user.
+    pub(super) fn groups(&self) -> Vec<u32> {
+        self.peer.groups(self.stream.as_fd())
+    }
+}
+
+fn heard_error(errno: Errno) -> Heard {
+    if errno == Errno::AGAIN || errno == Errno::INTR { Heard::Nothing } else { Heard::End }
+}
+
+pub(super) fn timespec(duration: Duration) -> Timespec {
+    Timespec {
+        tv_sec: i64::try_from(duration.as_secs()).unwrap_or(i64::MAX),
+        tv_nsec: duration.subsec_nanos().into(),
+    }
+}

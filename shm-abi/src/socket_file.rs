@@ -1,0 +1,173 @@
+//! Sockets in the file system: made with the right mode, owned by one driver, removed by nobody else.
+
+use rustix::fs::FlockOperation;
+use rustix::io::Errno;
+use rustix::net::{AddressFamily, SocketAddrUnix, SocketFlags, SocketType};
+use std::fs::{File, Metadata, Permissions};
+use std::io;
+use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt, PermissionsExt};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Owner and group may use the socket.
+const SOCKET_MODE: u32 = 0o660;
+
+/// Why the driver cannot listen.
+#[derive(Debug, Error)]
+pub enum BindError {
+    /// Another driver does.
+    #[error("another driver is running at {socket}; stop it with `io-driver stop`, or use another socket")]
+    AlreadyRunning {
+        /// Where.
+        socket: PathBuf,
+    },
+    /// The file system refused.
+    #[error("cannot {what} {path}: {source}; choose another place with --socket or {variable}", variable = crate::endpoint::SOCKET_VARIABLE)]
+    System {
+        /// What was tried.
+        what: &'static str,
+        /// On what.
+        path: PathBuf,
+        /// What the kernel said.
+        source: io::Error,
+    },
+}
+
+impl BindError {
+    pub(crate) fn system(what: &'static str, path: &Path, source: io::Error) -> Self {
+        Self::System { what, path: path.to_path_buf(), source }
+    }
+}
+
+/// A socket's name, removed with this value as long as it still names our socket.
+#[derive(Debug)]
+pub struct SocketFile {
+    path: PathBuf,
+    identity: Option<Identity>,
+}
+
+impl SocketFile {
+    /// Makes a socket and gives it its name last: there is no moment at which it is too open or not ready. What lies at
+    /// the path is replaced.
+    pub(crate) fn make<S>(
+        path: &Path,
+        bind: impl FnOnce(&Path) -> io::Result<S>,
+        prepare: impl FnOnce(&S) -> io::Result<()>,
+    ) -> Result<(S, Self), BindError> {
+        let unnamed = suffixed(path, &format!(".{}", std::process::id()));
+        let _ = std::fs::remove_file(&unnamed);
+        let socket = bind(&unnamed).map_err(|source| BindError::system("listen at", &unnamed, source))?;
+        let ready = std::fs::set_permissions(&unnamed, Permissions::from_mode(SOCKET_MODE))
+            .and_then(|()| prepare(&socket))
+            .and_then(|()| std::fs::rename(&unnamed, path));
+        if let Err(source) = ready {
+            let _ = std::fs::remove_file(&unnamed);
+            return Err(BindError::system("listen at", path, source));
+        }
+        let identity = std::fs::symlink_metadata(path).ok().map(|meta| identity_of(&meta));
+        Ok((socket, Self { path: path.to_path_buf(), identity }))
+    }
+
+    /// Where it lies.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl Drop for SocketFile {
+    fn drop(&mut self) {
+        remove_if(&self.path, self.identity);
+    }
+}
+
+/// Says that a driver lives at a path; the kernel lets go of it however the driver dies.
+#[derive(Debug)]
+pub(crate) struct Lock {
+    file: File,
+    path: PathBuf,
+}
+
+impl Lock {
+    /// Takes the lock of a socket. The lock file may be removed and remade by a driver that is just ending, so that
+    /// the name is compared again after the lock was taken.
+    pub(crate) fn take(socket: &Path) -> Result<Self, BindError> {
+        let path = suffixed(socket, LOCK_SUFFIX);
+        let failed = |source| BindError::system("lock", &path, source);
+        const TRIES: usize = 16;
+        for _ in 0..TRIES {
+            // The owner's alone: whoever could open it could hold the lock and keep every driver from starting.
+            let mut options = File::options();
+            let file =
+                options.create(true).truncate(false).write(true).mode(0o600).open(&path).map_err(failed)?;
+            match rustix::fs::flock(&file, FlockOperation::NonBlockingLockExclusive) {
+                Ok(()) => {}
+                Err(Errno::WOULDBLOCK) => return Err(already_running(socket)),
+                Err(errno) => return Err(failed(errno.into())),
+            }
+            let held = identity_of(&file.metadata().map_err(failed)?);
+            if std::fs::symlink_metadata(&path).is_ok_and(|named| identity_of(&named) == held) {
+                return Ok(Self { file, path });
+            }
+        }
+        Err(already_running(socket))
+    }
+}
+
+impl Drop for Lock {
+    fn drop(&mut self) {
+        let identity = self.file.metadata().ok().map(|meta| identity_of(&meta));
+        remove_if(&self.path, identity);
+    }
+}
+
+const LOCK_SUFFIX: &str = ".lock";
+
+/// The lock keeps our own kind apart; this also spares whatever else lies at the path: a file that somebody
+/// named by mistake, and a living socket whose lock file was swept away.
+pub(crate) fn make_sure_nobody_listens(path: &Path) -> Result<(), BindError> {
+    let system = |source| BindError::system("listen at", path, source);
+    match std::fs::symlink_metadata(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        Err(error) => return Err(system(error)),
+        Ok(meta) if !meta.file_type().is_socket() => {
+            let found = "something that is not a socket lies there, and it is left alone";
+            return Err(system(io::Error::new(io::ErrorKind::AlreadyExists, found)));
+        }
+        Ok(_) => {}
+    }
+    let address = SocketAddrUnix::new(path).map_err(|errno| system(errno.into()))?;
+    let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
+    let probe = rustix::net::socket_with(AddressFamily::UNIX, SocketType::STREAM, flags, None)
+        .map_err(|errno| system(errno.into()))?;
+    match rustix::net::connect(&probe, &address) {
+        Err(Errno::CONNREFUSED | Errno::NOENT) => Ok(()),
+        // A full queue belongs to somebody who lives but does not look.
+        Ok(()) | Err(Errno::AGAIN) => Err(already_running(path)),
+        Err(errno) => Err(system(errno.into())),
+    }
+}
+
+fn already_running(socket: &Path) -> BindError {
+    BindError::AlreadyRunning { socket: socket.to_path_buf() }
+}
+
+/// Device and inode: the same file, whatever its name.
+type Identity = (u64, u64);
+
+fn identity_of(meta: &Metadata) -> Identity {
+    (meta.dev(), meta.ino())
+}
+
+/// Removes a name only while it still names our file: another driver may have taken the place since.
+fn remove_if(path: &Path, ours: Option<Identity>) {
+    if std::fs::symlink_metadata(path).is_ok_and(|meta| Some(identity_of(&meta)) == ours) {
+        let _ = std::fs::remove_file(path);
+    }
+}
+
+/// A name beside another.
+pub(crate) fn suffixed(path: &Path, suffix: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_os_string();
+    name.push(suffix);
+    PathBuf::from(name)
+}

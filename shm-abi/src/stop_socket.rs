@@ -1,0 +1,101 @@
+//! Emergency stop by datagram: the way to stop the motors that needs no connection.
+//!
+//! Problem: a connection has to be accepted, needs a free descriptor and waits for the thread that serves all others.
+//! Model: a second socket lies beside the driver's, named like it with `.stop` behind. Whatever is sent to it, even
+//! nothing, is an emergency stop; the kernel tells which user sent it. Whoever may connect to the driver may send. A
+//! queue that is full holds stops that are on their way, so sending never waits.
+//! Invariants: the receiver acts on a datagram before it takes it: descriptors in it, which it drops, may take as long
+//! to close as their sender likes. It needs neither memory nor descriptors for it.
+
+use crate::peer;
+use crate::socket_file::{self, BindError, SocketFile};
+use nix::cmsg_space;
+use nix::libc::ucred;
+use nix::sys::socket::{ControlMessageOwned, MsgFlags, recvmsg};
+use rustix::net::{AddressFamily, RecvFlags, SendFlags, SocketAddrUnix, SocketFlags, SocketType};
+use std::io::{self, IoSliceMut};
+use std::os::fd::AsRawFd;
+use std::os::unix::net::UnixDatagram;
+use std::path::{Path, PathBuf};
+
+/// What is taken from the queue in one go: whoever floods it gets no more than a turn.
+pub const MAX_DATAGRAMS: usize = 16;
+const SUFFIX: &str = ".stop";
+
+/// Where the stop socket of the driver at `socket` lies.
+pub fn path_beside(socket: &Path) -> PathBuf {
+    socket_file::suffixed(socket, SUFFIX)
+}
+
+/// Asks the driver at `socket` for an emergency stop; never waits.
+///
+/// # Errors
+/// If there is no driver, or the kernel does not let us send. That it was sent does not say that it was done: a frame
+/// tells.
+pub fn send(socket: &Path) -> io::Result<()> {
+    let address = SocketAddrUnix::new(path_beside(socket))?;
+    let sender =
+        rustix::net::socket_with(AddressFamily::UNIX, SocketType::DGRAM, SocketFlags::CLOEXEC, None)?;
+    match rustix::net::sendto(&sender, b"stop", SendFlags::DONTWAIT | SendFlags::NOSIGNAL, &address) {
+        // The queue is full of stops.
+        Ok(_) | Err(rustix::io::Errno::AGAIN) => Ok(()),
+        Err(errno) => Err(errno.into()),
+    }
+}
+
+/// The driver's end.
+#[derive(Debug)]
+pub struct StopSocket {
+    socket: UnixDatagram,
+    control: Vec<u8>,
+}
+
+impl StopSocket {
+    /// Listens beside `socket`, which must be held already: whoever holds it may replace what lies beside it. Its name
+    /// goes with the second value.
+    ///
+    /// # Errors
+    /// What the file system says.
+    pub fn bind(socket: &Path) -> Result<(Self, SocketFile), BindError> {
+        let tell_sender = |socket: &UnixDatagram| {
+            peer::refuse_descriptors(socket);
+            Ok(rustix::net::sockopt::set_socket_passcred(socket, true)?)
+        };
+        let (socket, file) =
+            SocketFile::make(&path_beside(socket), |path| UnixDatagram::bind(path), tell_sender)?;
+        Ok((Self { socket, control: cmsg_space!(ucred) }, file))
+    }
+
+    /// Waits for a datagram and passes on which user sent it (`None`: the kernel did not say), and the same for those
+    /// that are there already, [`MAX_DATAGRAMS`] at most.
+    ///
+    /// # Errors
+    /// What the kernel says, an interruption by a signal included.
+    pub fn wait(&mut self, mut act: impl FnMut(Option<u32>)) -> io::Result<()> {
+        act(self.peek(MsgFlags::empty())?);
+        self.take();
+        for _ in 1..MAX_DATAGRAMS {
+            let Ok(sender) = self.peek(MsgFlags::MSG_DONTWAIT) else { break };
+            act(sender);
+            self.take();
+        }
+        Ok(())
+    }
+
+    fn take(&self) {
+        let mut nothing = [0; 1];
+        let _ = rustix::net::recv(&self.socket, &mut nothing, RecvFlags::DONTWAIT);
+    }
+
+    fn peek(&mut self, flags: MsgFlags) -> io::Result<Option<u32>> {
+        let mut byte = [0];
+        let mut parts = [IoSliceMut::new(&mut byte)];
+        let fd = self.socket.as_raw_fd();
+        let received = recvmsg::<()>(fd, &mut parts, Some(&mut self.control), MsgFlags::MSG_PEEK | flags)?;
+        let sender = received.cmsgs().into_iter().flatten().find_map(|message| match message {
+            ControlMessageOwned::ScmCredentials(credentials) => Some(credentials.uid()),
+            _ => None,
+        });
+        Ok(sender)
+    }
+}

@@ -1,0 +1,65 @@
+//! The way to stop the motors that needs no connection.
+
+use shm_abi::server::Server;
+use shm_abi::stop_socket::{self, StopSocket, path_beside};
+use std::os::unix::fs::PermissionsExt;
+use std::os::unix::net::UnixDatagram;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
+
+/// Long enough for the most loaded machine; only a hang takes longer.
+const HANG: Duration = Duration::from_secs(60);
+
+/// A driver's place with a thread that hears stops; each is told with the user who sent it.
+fn listening() -> (tempfile::TempDir, Server, Receiver<Option<u32>>) {
+    let directory = tempfile::tempdir().unwrap();
+    let server = Server::bind(&directory.path().join("driver.sock")).unwrap();
+    let (mut socket, file) = StopSocket::bind(server.path()).unwrap();
+    let (tell, told) = channel();
+    std::thread::spawn(move || {
+        let _file = file;
+        while socket.wait(|user| tell.send(user).unwrap_or(())).is_ok() {}
+    });
+    (directory, server, told)
+}
+
+#[test]
+fn whatever_is_sent_is_a_stop_and_the_kernel_tells_whose() {
+    let (_directory, server, told) = listening();
+    let own = Some(rustix::process::geteuid().as_raw());
+    stop_socket::send(server.path()).unwrap();
+    assert_eq!(told.recv_timeout(HANG).unwrap(), own);
+    let stranger = UnixDatagram::unbound().unwrap();
+    for words in [&b""[..], b"help", &[0; 4096]] {
+        stranger.send_to(words, path_beside(server.path())).unwrap();
+        assert_eq!(told.recv_timeout(HANG).unwrap(), own);
+    }
+}
+
+#[test]
+fn sending_never_waits_and_a_full_queue_is_a_stop_on_its_way() {
+    let directory = tempfile::tempdir().unwrap();
+    let server = Server::bind(&directory.path().join("driver.sock")).unwrap();
+    // Nobody listens to this one.
+    let (_socket, _file) = StopSocket::bind(server.path()).unwrap();
+    for _ in 0..10_000 {
+        stop_socket::send(server.path()).unwrap();
+    }
+}
+
+#[test]
+fn it_lies_beside_the_drivers_socket_for_the_same_people_and_goes_with_it() {
+    let directory = tempfile::tempdir().unwrap();
+    let server = Server::bind(&directory.path().join("driver.sock")).unwrap();
+    assert!(stop_socket::send(server.path()).is_err(), "nobody is there");
+    let (socket, file) = StopSocket::bind(server.path()).unwrap();
+    assert_eq!(file.path(), directory.path().join("driver.sock.stop"));
+    let mode = |path| std::fs::metadata(path).unwrap().permissions().mode();
+    assert_eq!(mode(file.path()), mode(server.path()));
+    // One that was left over by a driver that died is replaced.
+    let (_again, file_again) = StopSocket::bind(server.path()).unwrap();
+    drop((socket, file));
+    assert!(file_again.path().exists(), "it is another driver's now");
+    drop(file_again);
+    assert!(!path_beside(server.path()).exists());
+}

@@ -1,0 +1,273 @@
+//! The driver's service hears nobody any more: its standard error takes nothing, it is stuck in a system call, each of
+//! its calls fails. The motors can be stopped all the same, and the loop stops them by itself.
+
+use rustix::process::Signal;
+use shm_abi::{DriverState, FaultReason, stop_socket};
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::Write;
+use std::os::fd::OwnedFd;
+use std::os::unix::fs::OpenOptionsExt;
+use std::time::{Duration, Instant};
+use system_tests::faults::amplifiers::wait_for;
+use system_tests::faults::commander::Commander;
+use system_tests::faults::process::io_driver;
+use system_tests::faults::ring::RingLog;
+use system_tests::faults::stand::{Setup, Stand};
+use system_tests::faults::stuck::{Harm, Tracer, live};
+
+const PUSH: [f64; 3] = [0.0, 1.0, 0.0];
+
+/// The service may be silent for longer than a test takes until it has stopped the motors in another way.
+const PATIENT: &str = "\n[process]\nservice_silence_ms = 5000\n";
+/// It may not.
+const WATCHFUL: &str = "\n[process]\nservice_silence_ms = 100\n";
+
+fn setup(process: &str) -> Setup {
+    Setup { config: process.into(), ..Setup::new("real") }
+}
+
+fn push(stand: &Stand) -> Commander {
+    let commander = Commander::start(stand.command(), PUSH);
+    RingLog::begin(stand.view()).follow_to_force(stand.view());
+    commander
+}
+
+/// By the driver's frames and by the registers of the amplifiers.
+fn check_stopped(stand: &Stand, why: FaultReason, when: &str) {
+    wait_for(when, || {
+        stand.view().read_latest().is_some_and(|frame| {
+            frame.state == DriverState::Fault as u64
+                && frame.fault == why as u64
+                && frame.devices[0].force_on_user_n_applied == [0.0; 3]
+        })
+    });
+    stand.amplifiers.settle();
+    stand.amplifiers.check_off(when);
+}
+
+/// The loop has ended and told the amplifiers so, whatever the rest of the process does.
+fn check_ended(stand: &Stand, when: &str) {
+    wait_for(when, || stand.amplifiers.were_told_off());
+    stand.amplifiers.settle();
+    stand.amplifiers.check_off(when);
+    let last = stand.view().latest_tick();
+    // Many ticks at 2 kHz, if there were any.
+    std::thread::sleep(Duration::from_millis(20));
+    assert_eq!(stand.view().latest_tick(), last, "{when}: its loop goes on");
+}
+
+/// What a test left of a driver that may hang: it is killed.
+fn put_away(stand: Stand) {
+    if stand.driver.id() > 0 {
+        let _ = rustix::process::Pid::from_raw(stand.driver.id().cast_signed())
+            .map(|pid| rustix::process::kill_process(pid, Signal::KILL));
+    }
+}
+
+/// Fills the pipe that is the driver's standard error, by a description of our own that does not wait.
+fn fill_standard_error_of(stand: &Stand) {
+    let path = format!("/proc/{}/fd/2", stand.driver.id());
+    let flags = rustix::fs::OFlags::NONBLOCK.bits().cast_signed();
+    let mut pipe = File::options().write(true).custom_flags(flags).open(path).expect("our own child's");
+    while pipe.write(&[b'\n'; 4096]).is_ok() {}
+    while pipe.write(b"\n").is_ok() {}
+}
+
+/// The driver and a test that holds its standard error: full, and nobody takes anything.
+fn with_a_full_pipe() -> Stand {
+    let stand = Stand::start(Setup { talks: true, ..setup(PATIENT) });
+    fill_standard_error_of(&stand);
+    stand
+}
+
+#[test]
+fn a_driver_whose_standard_error_is_full_is_stopped_over_the_socket_and_by_datagram() {
+    let mut stand = with_a_full_pipe();
+    for by_datagram in [false, true] {
+        let commander = push(&stand);
+        if by_datagram {
+            stop_socket::send(&stand.socket()).expect("it lies there");
+        } else {
+            let end = io_driver(&["emergency-stop"], &stand.socket());
+            assert_eq!(end.status, Some(0), "{end:?}");
+            assert!(end.out.contains("shows the fault and no force"), "{end:?}");
+            let frame = stand.view().read_latest().expect("frames");
+            assert_eq!(frame.fault, FaultReason::EmergencyStop as u64, "done means that a frame shows it");
+        }
+        check_stopped(&stand, FaultReason::EmergencyStop, "a stop with standard error full");
+        drop(commander);
+        assert_eq!(io_driver(&["clear-fault"], &stand.socket()).status, Some(0));
+        wait_for("the end of the fault", || {
+            stand.view().read_latest().is_some_and(|frame| frame.fault == FaultReason::None as u64)
+        });
+    }
+    assert_eq!(io_driver(&["status"], &stand.socket()).status, Some(0));
+    // It says something about each of these, and the queue has an end.
+    for _ in 0..600 {
+        drop(stand.command());
+    }
+    wait_for("dropped lines", || {
+        stand.view().counters.log_dropped.load(std::sync::atomic::Ordering::Relaxed) > 0
+    });
+    let _commander = push(&stand);
+    stand.driver.signal(Signal::TERM);
+    check_ended(&stand, "the first SIGTERM with standard error full");
+    let begun = Instant::now();
+    while !stand.driver.has_ended() {
+        assert!(begun.elapsed() < Duration::from_secs(20), "nobody holds the end of the process either");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// As somebody does who types Ctrl-S to read what went by.
+#[test]
+fn a_driver_whose_terminal_is_held_is_stopped_all_the_same() {
+    use rustix::pty::{OpenptFlags, grantpt, openpt, unlockpt};
+    use rustix::termios::{Action, tcflow};
+    let mut stand = Stand::start(Setup { talks: true, ..setup(PATIENT) });
+    stand.stop_driver();
+    let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).expect("a terminal");
+    grantpt(&master).and_then(|()| unlockpt(&master)).expect("our own");
+    let name = rustix::pty::ptsname(&master, Vec::new()).expect("it has a name");
+    let name = std::path::PathBuf::from(name.into_string().expect("plain"));
+    let slave: OwnedFd = File::options().read(true).write(true).open(name).expect("our own").into();
+    stand.restart_driver_saying_to(slave.try_clone().expect("another"));
+    tcflow(&slave, Action::OOff).expect("Ctrl-S");
+    let _commander = push(&stand);
+    let end = io_driver(&["emergency-stop"], &stand.socket());
+    assert_eq!(end.status, Some(0), "{end:?}");
+    check_stopped(&stand, FaultReason::EmergencyStop, "a stop with the terminal held");
+    stand.driver.signal(Signal::TERM);
+    check_ended(&stand, "SIGTERM with the terminal held");
+    put_away(stand);
+}
+
+/// A pushing driver whose service is harmed in each call of this name. Returns nothing if no life brings that call.
+fn harmed(call: &str, harm: Harm, process: &str) -> Option<(Stand, Tracer, Commander)> {
+    let stand = Stand::start(setup(process));
+    let commander = push(&stand);
+    let tracer = Tracer::harming(&stand, call, harm);
+    let begun = Instant::now();
+    for to_the_end in [false, true] {
+        live(&stand.socket(), to_the_end);
+        // A whole life takes some tenths of a second.
+        let wait = Duration::from_millis(if to_the_end { 5000 } else { 700 });
+        while begun.elapsed() < wait {
+            if tracer.calls().contains(call) {
+                return Some((stand, tracer, commander));
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+    put_away(stand);
+    None
+}
+
+/// Every system call that the service thread makes in a whole life.
+fn calls_of_a_life() -> BTreeSet<String> {
+    let mut stand = Stand::start(Setup { talks: true, ..setup(PATIENT) });
+    let tracer = Tracer::listening(&stand);
+    let commander = push(&stand);
+    drop(commander);
+    live(&stand.socket(), true);
+    let end = stand.driver.end();
+    assert_eq!(end.status, Some(0), "{end:?}");
+    let mut calls = tracer.calls();
+    // It returns to nobody who could be harmed.
+    calls.remove("exit_group");
+    calls
+}
+
+fn traced() -> Option<BTreeSet<String>> {
+    if !Tracer::works() {
+        println!(
+            "skipped: there is no strace that may attach; that a stuck service keeps nobody from stopping is tested \
+             with a full standard error instead"
+        );
+        return None;
+    }
+    let calls = calls_of_a_life();
+    println!("{} calls: {calls:?}", calls.len());
+    for known in ["ppoll", "accept4", "recvfrom", "sendmsg", "memfd_create", "close", "getsockopt"] {
+        assert!(calls.contains(known), "{known} is not among {calls:?}");
+    }
+    Some(calls)
+}
+
+#[test]
+fn whatever_call_the_service_is_stuck_in_a_datagram_and_a_signal_stop_the_motors() {
+    let Some(calls) = traced() else { return };
+    let mut stuck = 0;
+    for call in &calls {
+        let Some((stand, tracer, commander)) = harmed(call, Harm::Stall, PATIENT) else {
+            println!("{call}: not made again");
+            continue;
+        };
+        stuck += 1;
+        let when = format!("stuck in {call}");
+        // A service that was asked to end may have ended the loop before it got stuck.
+        if stand.view().read_latest().is_some_and(|frame| frame.lease != 0)
+            && !stand.amplifiers.were_told_off()
+        {
+            stop_socket::send(&stand.socket()).expect("it lies there");
+            wait_for(&when, || {
+                stand.amplifiers.were_told_off()
+                    || stand
+                        .view()
+                        .read_latest()
+                        .is_some_and(|f| f.fault == FaultReason::EmergencyStop as u64)
+            });
+        }
+        stand.driver.signal(Signal::TERM);
+        check_ended(&stand, &when);
+        drop((tracer, commander));
+        put_away(stand);
+    }
+    assert!(stuck * 2 > calls.len(), "{stuck} of {}", calls.len());
+}
+
+#[test]
+fn whatever_call_the_service_is_stuck_in_the_first_signal_ends_the_loop() {
+    let Some(calls) = traced() else { return };
+    for call in &calls {
+        let Some((stand, tracer, commander)) = harmed(call, Harm::Stall, PATIENT) else { continue };
+        stand.driver.signal(Signal::TERM);
+        check_ended(&stand, &format!("SIGTERM while stuck in {call}"));
+        drop((tracer, commander));
+        put_away(stand);
+    }
+}
+
+#[test]
+fn whatever_call_the_service_is_stuck_in_the_loop_stops_the_motors_by_itself() {
+    let Some(calls) = traced() else { return };
+    for call in &calls {
+        let Some((stand, tracer, commander)) = harmed(call, Harm::Stall, WATCHFUL) else { continue };
+        let when = format!("nobody asked while stuck in {call}");
+        wait_for(&when, || !stand.amplifiers.are_enabled());
+        stand.amplifiers.settle();
+        stand.amplifiers.check_off(&when);
+        drop((tracer, commander));
+        put_away(stand);
+    }
+}
+
+#[test]
+fn whatever_call_of_the_service_fails_the_motors_can_be_stopped_or_are_off() {
+    let Some(calls) = traced() else { return };
+    for call in &calls {
+        let Some((mut stand, tracer, commander)) = harmed(call, Harm::Failure, PATIENT) else { continue };
+        let when = format!("{call} fails");
+        let _ = stop_socket::send(&stand.socket());
+        wait_for(&when, || stand.driver.has_ended() || !stand.amplifiers.are_enabled());
+        stand.amplifiers.settle();
+        stand.amplifiers.check_off(&when);
+        if !stand.driver.has_ended() {
+            stand.driver.signal(Signal::TERM);
+            check_ended(&stand, &when);
+        }
+        drop((tracer, commander));
+        put_away(stand);
+    }
+}
