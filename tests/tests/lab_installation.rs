@@ -237,7 +237,7 @@ fn a_destination_that_is_not_there_is_made_and_taken_away_again() {
     let lab = Lab::bare();
     let outside = tempfile::tempdir().expect("a directory");
     let destination = outside.path().join("not/yet/there");
-    let programs = lab.installer().get_args().map(|word| word.to_owned()).collect::<Vec<_>>();
+    let programs = lab.installer().get_args().map(ToOwned::to_owned).collect::<Vec<_>>();
     let with_destination = |more: &[&str]| {
         // The installer once called itself without end here: a hang is a failure, too.
         let mut command = Command::new("timeout");
