@@ -17,6 +17,7 @@ cpu_count=
 action=install
 dry_run=false
 purge=false
+is_copying=false
 changes=0
 edited=0
 
@@ -39,11 +40,23 @@ main() {
     read_arguments "$@"
     manifest=$prefix/share/phantom3/installed
     scratch=$(mktemp -d) || exit 1
-    trap 'rm -rf "$scratch"' EXIT
+    trap 'finish' EXIT
+    trap 'exit 130' HUP INT PIPE TERM
     : >"$scratch/manifest"
     : >"$scratch/directories"
     if [ -e "$destdir$manifest" ]; then cp "$destdir$manifest" "$scratch/former"; else : >"$scratch/former"; fi
     if [ "$action" = install ]; then install_all; else uninstall_all; fi
+}
+
+# What was copied before an interruption is on record, so that it can be taken away again.
+finish() {
+    if $is_copying; then
+        while read -r kind sum path; do
+            if [ "$kind" != directory ] && ! grep -qF " $path" "$scratch/manifest"; then record "$kind" "$sum" "$path"; fi
+        done <"$scratch/former"
+        write_manifest
+    fi
+    rm -rf "$scratch"
 }
 
 read_arguments() {
@@ -126,10 +139,14 @@ install_all() {
         fail "needs root (sudo), or --destdir, or --dry-run"
     fi
     choose_cpus
-    if ! $dry_run; then make_directory /; fi
+    if ! $dry_run; then
+        is_copying=true
+        make_directory /
+    fi
     files
     remove_what_is_no_longer_shipped
     write_manifest
+    is_copying=false
     next_steps
 }
 

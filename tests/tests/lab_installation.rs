@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
 use system_tests::lab::{Lab, PREFIX, sources, succeed, tool, walk};
 use system_tests::programs::{io_driver, phantom3, said};
 
@@ -248,6 +248,18 @@ fn a_destination_that_is_not_there_is_made_and_taken_away_again() {
     assert!(destination.join("etc/phantom3/driver.toml").is_file());
     with_destination(&["--uninstall"]);
     assert!(!destination.exists());
+}
+
+#[test]
+fn an_installation_that_is_interrupted_can_be_taken_away_again() {
+    let lab = Lab::bare();
+    let mut installer = lab.installer();
+    let mut child = installer.args(["--cpu", "1"]).stdout(Stdio::piped()).spawn().expect("it runs");
+    // Whoever listened goes away, as `| head` does: what is said next ends the installer.
+    drop(child.stdout.take());
+    assert!(!child.wait().expect("it ends").success());
+    lab.install(&["--uninstall"]);
+    assert!(lab.files("/").is_empty());
 }
 
 #[test]
