@@ -27,6 +27,7 @@ use system_tests::programs;
 const RARE: &[&str] = &[
     "clock_gettime",   // only where the vDSO cannot read the clock
     "restart_syscall", // only after stop and continue, and not in every kernel
+    "pidfd_open",      // only before Linux 6.5
     "sched_yield",     // only when two threads meet
     "writev",          // only when the C library finds the heap corrupted
     "brk",             // depends on how the heap happens to grow
@@ -57,6 +58,7 @@ fn live(driver: &mut Driver) {
     be_refused(driver);
     let status = io_driver(&["status", "--json"], driver.socket());
     assert_eq!(status.status, Some(0), "{status:?}");
+    assert_eq!(io_driver(&["emergency-stop"], driver.socket()).status, Some(0));
     assert_eq!(io_driver(&["clear-fault"], driver.socket()).status, Some(0));
     // While it is stopped its waits are interrupted, and go on.
     send(driver.child.id(), Signal::STOP);
