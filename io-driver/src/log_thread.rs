@@ -9,7 +9,7 @@
 use crate::say::{self, Entry};
 use rt_core::log::{LogLevel, LogLine, RtLogDrain};
 use std::io;
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::Duration;
 
 /// How often it looks at the loop's records when nobody else says anything.
@@ -32,8 +32,15 @@ pub(crate) fn start(drain: RtLogDrain, quiet: bool) -> io::Result<()> {
     // A process has one driver; the lines of a second one go the way of the first one's.
     let Some(entries) = say::queue() else { return Ok(()) };
     let log = LogThread { entries, drain, quiet, dropped_told: 0 };
+    let (begun, has_begun) = sync_channel::<()>(0);
     let thread = std::thread::Builder::new().name("log".into()).stack_size(STACK_BYTES);
-    thread.spawn(move || log.run()).map(drop)
+    thread.spawn(move || {
+        drop(begun);
+        log.run();
+    })?;
+    // The sandbox that is shut next knows nothing of the calls by which a thread begins.
+    let _ = has_begun.recv();
+    Ok(())
 }
 
 impl LogThread {

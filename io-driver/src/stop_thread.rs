@@ -9,6 +9,7 @@ use crate::urgent::Urgent;
 use rt_core::signals;
 use shm_abi::stop_socket::StopSocket;
 use std::io;
+use std::sync::mpsc::sync_channel;
 use std::time::Duration;
 
 /// Between two turns, so that a flood of stops, each of which is one too many, costs no CPU.
@@ -22,8 +23,15 @@ const STACK_BYTES: usize = 64 * 1024;
 /// What the system says to another thread, or to its signals.
 pub(crate) fn start(socket: StopSocket, urgent: Urgent) -> io::Result<()> {
     signals::block_in_this_thread()?;
+    let (begun, has_begun) = sync_channel::<()>(0);
     let thread = std::thread::Builder::new().name("stop".into()).stack_size(STACK_BYTES);
-    thread.spawn(move || run(socket, &urgent)).map(drop)
+    thread.spawn(move || {
+        drop(begun);
+        run(socket, &urgent);
+    })?;
+    // The sandbox that is shut next knows nothing of the calls by which a thread begins.
+    let _ = has_begun.recv();
+    Ok(())
 }
 
 fn run(mut socket: StopSocket, urgent: &Urgent) {
