@@ -2,7 +2,7 @@
 //! its calls fails. The motors can be stopped all the same, and the loop stops them by itself.
 
 use rustix::process::Signal;
-use shm_abi::{DriverState, FaultReason, stop_socket};
+use shm_abi::{DriverState, FaultReason, client, stop_socket};
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::Write;
@@ -105,10 +105,11 @@ fn a_driver_whose_standard_error_is_full_is_stopped_over_the_socket_and_by_datag
         });
     }
     assert_eq!(io_driver(&["status"], &stand.socket()).status, Some(0));
-    // It says something about each of these, and the queue has an end.
-    for _ in 0..600 {
-        drop(stand.command());
+    // It says something about each of these, and the queue has an end: 1024 lines.
+    for _ in 0..1200 {
+        client::emergency_stop(&stand.socket(), "test").expect("it is heard");
     }
+    client::clear_fault(&stand.socket(), "test").expect("it is heard");
     wait_for("dropped lines", || {
         stand.view().counters.log_dropped.load(std::sync::atomic::Ordering::Relaxed) > 0
     });
@@ -259,7 +260,9 @@ fn whatever_call_the_service_is_stuck_in_the_loop_stops_the_motors_by_itself() {
 fn whatever_call_of_the_service_fails_the_motors_can_be_stopped_or_are_off() {
     let Some(calls) = traced() else { return };
     for call in &calls {
-        let Some((mut stand, tracer, commander)) = harmed(call, Harm::Failure, WITHOUT_SANDBOX) else { continue };
+        let Some((mut stand, tracer, commander)) = harmed(call, Harm::Failure, WITHOUT_SANDBOX) else {
+            continue;
+        };
         let when = format!("{call} fails");
         let _ = stop_socket::send(&stand.socket());
         wait_for(&when, || stand.driver.has_ended() || !stand.amplifiers.are_enabled());
