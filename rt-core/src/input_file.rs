@@ -28,13 +28,21 @@ pub fn open(path: &Path) -> io::Result<File> {
 /// # Errors
 /// As [`open`]; [`ErrorKind::FileTooLarge`] beyond `most_bytes`.
 pub fn read(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
+    let file = open(path)?;
+    // Nothing is read of what is too large already.
+    check_size(file.metadata()?.len(), most_bytes)?;
     let mut bytes = Vec::new();
-    open(path)?.take(most_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > most_bytes {
-        let said = format!("it is larger than {most_bytes} bytes, the most that is read of such a file");
-        return Err(io::Error::new(ErrorKind::FileTooLarge, said));
-    }
+    file.take(most_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
+    check_size(bytes.len() as u64, most_bytes)?;
     Ok(bytes)
+}
+
+fn check_size(bytes: u64, most_bytes: u64) -> io::Result<()> {
+    if bytes <= most_bytes {
+        return Ok(());
+    }
+    let said = format!("it is larger than {most_bytes} bytes, the most that is read of such a file");
+    Err(io::Error::new(ErrorKind::FileTooLarge, said))
 }
 
 /// The content of a regular file as text.
@@ -107,6 +115,15 @@ mod tests {
         assert_eq!(refused.kind(), ErrorKind::FileTooLarge);
         assert!(refused.to_string().contains("larger than 3 bytes"), "{refused}");
         assert_eq!(read(&place.write(b""), 0).expect("nothing is no more than nothing"), b"");
+    }
+
+    #[test]
+    fn a_file_of_holes_that_is_too_large_is_not_read() {
+        let place = Place::new("holes");
+        let path = place.write(b"");
+        File::options().write(true).open(&path).expect("our own").set_len(1 << 40).expect("holes");
+        // Reading it would take hours and all memory.
+        assert_eq!(read(&path, 1 << 39).expect_err("too large").kind(), ErrorKind::FileTooLarge);
     }
 
     #[test]

@@ -46,7 +46,7 @@ impl<'d> Document<'d> {
 
     /// The text as a tree of values, each with the range of bytes it was written in.
     pub(crate) fn parse(&self) -> Result<Spanned<DeTable<'d>>, SceneError> {
-        // A value takes two hundred times the memory of the shortest text that makes it.
+        // A value takes far more memory than the two bytes that make it.
         let values = self.text.bytes().filter(|byte| matches!(byte, b',' | b'=')).count();
         if values > MAX_VALUES {
             return Err(SceneError::TooManyValues { file: self.file.into(), limit: MAX_VALUES });

@@ -237,8 +237,8 @@ const EVERYTHING: CellStep = CellStep::Leaf { first: 0, count: 0 };
 const REACH: f64 = 1.0;
 /// Levels below the whole: the smallest cells reach farther than a common neighbourhood.
 const MAX_DEPTH: u32 = 5;
-/// Of patches and steps, in all cells: some tenths of a second, and some hundred bytes for each ten of them. Solids of hundred
-/// leaves take a quarter.
+/// Of patches and steps, in all cells: eleven boxes that are near everywhere stay below it with all levels, a hundred shells
+/// within shells do not.
 const MOST_LOOKS: usize = 4_000_000;
 /// Cells with no more patches than this are not split.
 const FEW: u32 = 4;

@@ -44,5 +44,5 @@ pub(super) fn check(patches: &[NurbsPatch]) -> Result<(), NurbsError> {
     Ok(())
 }
 
-/// The body of a car in millimetre detail takes a tenth.
+/// Leaves the rest of 256 MB to everything else.
 const MOST_BYTES: usize = 160 << 20;
