@@ -153,7 +153,10 @@ fn leave_a_child(socket: &str) -> ! {
     stream.read_exact(bytemuck::bytes_of_mut(&mut answer)).expect("an answer");
     assert_eq!((answer.verdict, answer.lease), (Verdict::Granted as u64, 1));
     rustix::io::fcntl_setfd(&stream, rustix::io::FdFlags::empty()).expect("our own");
-    let child = std::process::Command::new("sleep").arg("100").spawn().expect("sleep runs");
+    let mut sleep = std::process::Command::new("sleep");
+    // Nothing of ours but the connection: whoever reads our words waits for their end.
+    sleep.arg("100").stdout(std::process::Stdio::null()).stderr(std::process::Stdio::null());
+    let child = sleep.spawn().expect("sleep runs");
     println!("child {}", child.id());
     std::process::exit(0)
 }
