@@ -65,7 +65,7 @@ impl Service<'_> {
         loop {
             self.heartbeat.beat();
             let Self { server, sender, memory, options, .. } = self;
-            let mut desk = Desk { sender, memory: &**memory, options, stop: None };
+            let mut desk = Desk { sender, memory, options, stop: None };
             let polled = server.poll(memory, POLL, &mut desk);
             if let Some(reason) = desk.stop {
                 return Ok(reason);
