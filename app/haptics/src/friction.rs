@@ -16,7 +16,7 @@
 //! | Stribeck, curve | up to `mu_s N` | where no slide is in balance, with a margin | no |
 //! | Karnopp | up to `mu_s N` | at speeds up to `v_min` | no |
 //! | Dahl, LuGre | never | - | yes |
-//! | Hayward and Armstrong | up to a part of `mu N` | at once | no |
+//! | Hayward and Armstrong | up to a part of `mu N` | at once | where noise reaches beyond that part |
 //! | bristle | until a bond snaps | at once | no |
 //! | reset integrator | up to `mu_s N` | below `mu_d N`, without margin | no |
 //! | fixed cone | up to a force | as stiction, if that is its kind | no |
