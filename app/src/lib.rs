@@ -11,6 +11,7 @@
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
 
+pub mod attachment_totals;
 pub mod book;
 pub mod calibrate;
 pub mod check;
@@ -32,6 +33,7 @@ pub mod mount;
 mod not_zeroed;
 pub mod on_request;
 pub mod outcome;
+mod outputs;
 pub mod passive_port;
 pub mod picture;
 pub mod plausible;

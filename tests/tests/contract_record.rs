@@ -79,6 +79,12 @@ fn a_table_out_of_a_recording_is_byte_for_byte_the_one_that_would_have_been_reco
                 bytes(&place, "exported.csv") == bytes(&place, "both.csv"),
                 "{name} on the {clock} clock"
             );
+            ran(&place, &["export", "both.mcap", "ending.csv", "ending.parquet"]);
+            assert!(bytes(&place, "ending.csv") == bytes(&place, "both.csv"));
+            assert_eq!(bytes(&place, "ending.parquet")[..4], *b"PAR1");
+            let said = ran(&place, &["export", "both.mcap", "-"]);
+            assert!(said.out.as_bytes() == bytes(&place, "both.csv"), "on the standard output");
+            assert!(said.err.contains("the standard output (") && !place.path("-").exists(), "{}", said.err);
             // And a table is read as it was written.
             ran(&place, &["export", "both.csv", "--csv", "again.csv"]);
             assert!(bytes(&place, "again.csv") == bytes(&place, "both.csv"), "{name} on the {clock} clock");
@@ -151,9 +157,14 @@ fn another_friction_is_told_with_sizes_and_the_first_tick_that_differs() {
     for (wrong, words) in [
         (&["replay", "r.mcap", "--friction", "tabel=none"][..], "no entity \"tabel\""),
         (&["replay", "scene.toml"], "is no recording"),
+        (&["run", "r.mcap"], "r.mcap is a recording; `phantom3 replay r.mcap` plays it again"),
         (&["replay", "none.mcap"], "cannot read the recording none.mcap"),
         (&["replay", "r.mcap", "--record", "r.mcap"], "would overwrite the input"),
-        (&["export", "r.mcap", "--csv", "r.mcap"], "would be overwritten by its own export"),
+        (&["export", "r.mcap", "--csv", "r.mcap"], "would overwrite the input"),
+        (&["export", "r.mcap"], "<OUT>"),
+        (&["export", "r.mcap", "r.xyz"], "r.xyz has the ending .xyz; allowed: .csv, .parquet"),
+        (&["export", "r.mcap", "t.csv", "./t.csv"], "is given twice"),
+        (&["replay", "r.mcap", "--record", "r.xyz"], "--record r.xyz has the ending .xyz; allowed: .csv"),
         (&["replay", "r.mcap", "--change", "entity.table.stiffness_n_per_m=-1"], "stiffness_n_per_m"),
     ] {
         let said = place.run(wrong);
@@ -398,4 +409,17 @@ fn the_public_reader_reads_it_where_it_is_installed() {
     place.write("cut.mcap", &whole[..whole.len() * 7 / 10]);
     let said = read(&["cut.mcap"]);
     assert!(said.err.contains("cut short") && said.out.contains("not complete"), "{}{}", said.out, said.err);
+}
+
+#[test]
+fn a_parquet_table_that_a_full_disk_cut_off_is_taken_away() {
+    let (place, seconds) = workplace("lift");
+    ran(&place, &["run", "scene.toml", "--clock", "virtual", "--seconds", seconds, "--record", "r.mcap"]);
+    // 50 or 100 kB, as the shell's blocks have 512 or 1024 bytes.
+    let said = place.shell("trap '' XFSZ; ulimit -f 100; exec \"$0\" export r.mcap out.parquet", &[]);
+    assert_eq!(said.status, Some(3), "{}", said.err);
+    let words =
+        "File too large (os error 27); a Parquet file without its end cannot be read: nothing is left of it";
+    assert!(said.err.contains(words), "{}", said.err);
+    assert!(!place.path("out.parquet").exists());
 }

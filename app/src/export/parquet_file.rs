@@ -6,6 +6,7 @@
 
 use crate::columns::{Cell, CellKind, Names, columns, each_cell};
 use crate::outcome::RunFailure;
+use crate::record::destination::create_file;
 use crate::row::{BodyRow, Row};
 use parquet::basic::{Compression, ConvertedType, Encoding, LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
@@ -43,7 +44,7 @@ enum Cells {
 impl ParquetFile {
     pub(super) fn create(path: &Path, names: &Names, period_ns: u64) -> Result<Self, RunFailure> {
         let columns = columns(names);
-        let file = File::create(path).map_err(|error| {
+        let file = create_file(path).map_err(|error| {
             super::wrong(&format_args!(
                 "cannot create {}: {error}; name a file that can be written",
                 path.display()
@@ -158,8 +159,15 @@ impl Cells {
     }
 }
 
+/// What is there cannot be read, and is taken away.
 fn failed(path: &Path, error: &ParquetError) -> RunFailure {
-    RunFailure::Results(format!("cannot write {}: {error}", path.display()))
+    let is_file = path.symlink_metadata().is_ok_and(|found| found.is_file());
+    let is_gone = is_file && std::fs::remove_file(path).is_ok();
+    let left = if is_gone { "nothing is left of it" } else { "what is there is of no use" };
+    let place = path.display();
+    RunFailure::Results(format!(
+        "cannot write {place}: {error}; a Parquet file without its end cannot be read: {left}"
+    ))
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 
 mod figure;
 mod recorded;
+mod table;
 mod visit;
 
 use crate::outcome::{RunFailure, Stop};
@@ -14,25 +15,26 @@ use figure::{of_entity, of_objects, of_run};
 use io_driver::say::tell;
 use plot::{Figure, PlotError};
 use recorded::{Recorded, RecordedFinger};
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use visit::visits;
 
 /// What is to be drawn.
 #[derive(Debug, Args)]
 pub struct PlotArgs {
-    /// The recording (CSV), as `run --record` wrote it
+    /// The recording (MCAP or CSV, as `run --record` wrote it, or Parquet, as `export` did)
     recording: PathBuf,
     /// Another one, dashed: the same hand on something that differs
-    #[arg(long, value_name = "CSV")]
+    #[arg(long, value_name = "RECORDING")]
     against: Option<PathBuf>,
     /// Which finger [default: each has a panel; with --by-entity: the first]
     #[arg(long, value_name = "NAME")]
     finger: Option<String>,
     /// Only from here on (s)
-    #[arg(long, value_name = "S", default_value_t = 0.0)]
+    #[arg(long, value_name = "S", default_value_t = 0.0, allow_negative_numbers = true)]
     from: f64,
     /// Only up to here (s) [default: the end]
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     to: Option<f64>,
     /// A picture for each entity, along the way that the finger went on it
     #[arg(long)]
@@ -59,9 +61,12 @@ pub fn execute(args: &PlotArgs) -> Result<Stop, RunFailure> {
         let recorded = Recorded::read(file).map_err(|error| wrong(&error))?;
         recorded.between(args.from, args.to.unwrap_or(f64::INFINITY)).map_err(|error| wrong(&error))
     };
+    let out = args.stem();
+    if !args.by_entity {
+        check_place(&out)?;
+    }
     let recorded = read(&args.recording)?;
     let against = args.against.as_deref().map(read).transpose()?;
-    let out = args.out.clone().unwrap_or_else(|| args.recording.with_extension(""));
     let finger = |recorded: &Recorded| recorded.choose(args.finger.as_deref()).map_err(|error| wrong(&error));
     if args.objects {
         let others = against.as_ref().map(|against| (against, &*against.bodies));
@@ -95,6 +100,26 @@ pub fn execute(args: &PlotArgs) -> Result<Stop, RunFailure> {
         write(&of_entity(visit, other), &out.join(&visit.entity), args.svg_only)?;
     }
     Ok(Stop::Finished)
+}
+
+impl PlotArgs {
+    /// Where pictures go, without the ending, which says what they are and not where.
+    fn stem(&self) -> PathBuf {
+        let Some(out) = &self.out else { return self.recording.with_extension("") };
+        let is_picture = |ending: &OsStr| ending == "svg" || ending == "png";
+        if out.extension().is_some_and(is_picture) { out.with_extension("") } else { out.clone() }
+    }
+}
+
+/// Before the work, not after it.
+fn check_place(stem: &Path) -> Result<(), RunFailure> {
+    let directory = stem.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    tempfile::tempfile_in(directory).map(drop).map_err(|error| {
+        let place = directory.display();
+        RunFailure::Start(format!(
+            "cannot write pictures into {place}: {error}; name another place with --out"
+        ))
+    })
 }
 
 fn write(figure: &Figure, stem: &Path, svg_only: bool) -> Result<Stop, RunFailure> {
