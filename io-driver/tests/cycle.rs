@@ -203,3 +203,12 @@ fn dropping_the_cycle_switches_the_motors_off() {
     drop(bench);
     assert!(log.lock().unwrap().releases > 0);
 }
+
+#[test]
+#[should_panic(expected = "answers do not let the force through in full")]
+fn a_driver_that_never_lets_the_force_through_fails_its_test_with_words() {
+    let mut bench = Bench::new(0);
+    let commander = bench.lease(1);
+    bench.log.lock().unwrap().fail_write = true;
+    bench.ramp_in(&commander, UP);
+}

@@ -4,6 +4,7 @@ mod common;
 
 use bytemuck::Zeroable;
 use common::{HANG, frame, info, wait_until};
+use patience::prelude::*;
 use shm_abi::server::{Server, ServerEvent};
 use shm_abi::{Command, CommanderView, DriverMemory};
 use std::path::{Path, PathBuf};
@@ -30,7 +31,7 @@ fn compile(directory: &Path) -> Option<PathBuf> {
         .arg(root().join("tests/c_client.c"))
         .arg("-o")
         .arg(&program)
-        .output()
+        .bounded_output()
         .unwrap();
     assert!(compiled.status.success(), "{}", String::from_utf8_lossy(&compiled.stderr));
     Some(program)
@@ -66,7 +67,7 @@ impl Driver {
             self.poll();
             client.try_wait().unwrap().is_some()
         });
-        client.wait_with_output().unwrap()
+        client.bounded_output()
     }
 
     fn lease(&mut self) -> CommanderView {
@@ -113,7 +114,7 @@ fn a_c_commander_answers_every_tick_under_its_lease() {
         }
     }
     drop(driver.server);
-    let output = client.wait_with_output().unwrap();
+    let output = client.bounded_output();
     assert_eq!(String::from_utf8_lossy(&output.stdout), format!("{TICKS} ticks whole\n"), "{output:?}");
 }
 
@@ -152,7 +153,7 @@ fn the_headers_compile_on_their_own_and_as_cpp() {
                 .args(["-Wall", "-Wextra", "-Werror", "-fsyntax-only", "-include"])
                 .arg(root().join("include").join(header))
                 .arg("/dev/null")
-                .output()
+                .bounded_output()
                 .unwrap();
             let errors = String::from_utf8_lossy(&output.stderr);
             if language[1] == "c++" && !output.status.success() && errors.contains("cc1plus") {
