@@ -1,5 +1,6 @@
 //! Recordings that begin and end while a run goes on.
 
+use patience::prelude::*;
 use phantom3::book::Book;
 use phantom3::fast_loop::{FastLoop, Turn, WhenFull};
 use phantom3::on_request::OnRequest;
@@ -65,7 +66,14 @@ impl Run {
 
     /// Goes on until the slow side has the rows of so many ticks; the next tick is answered, too.
     fn go_on_to(&mut self, run_tick: u64) {
+        let most_ticks = self.tick + 10 * run_tick + 10_000;
         while self.fast.run_ticks() < run_tick {
+            assert!(
+                self.tick < most_ticks,
+                "tick {} and no more than {} of the run",
+                self.tick,
+                self.fast.run_ticks()
+            );
             self.tick += 1;
             let turn = self.driver.tick(self.tick, &mut self.fast);
             assert!(!matches!(turn, Turn::Fault(_)), "{turn:?}");
@@ -149,7 +157,7 @@ fn a_recording_from_the_middle_says_where_it_begins_and_is_not_replayed() {
     assert!(about.file("scene").is_some() && !about.follows());
     let said = std::process::Command::new(env!("CARGO_BIN_EXE_phantom3"))
         .args([Path::new("replay"), &file])
-        .output()
+        .bounded_output()
         .expect("a program");
     let words = String::from_utf8_lossy(&said.stderr);
     assert_eq!(said.status.code(), Some(2), "{words}");

@@ -240,3 +240,12 @@ fn what_a_device_cuts_because_its_motors_are_warm_is_counted_and_nothing_else_is
         assert_eq!(bench.counter(|c| &c.forces_limited) + bench.counter(|c| &c.forces_slewed), 0);
     }
 }
+
+#[test]
+#[should_panic(expected = "answers do not let the force through in full")]
+fn a_driver_that_never_lets_the_force_through_fails_its_test_with_words() {
+    let mut bench = Bench::new(0);
+    let commander = bench.lease(1);
+    bench.log.lock().unwrap().fail_write = true;
+    bench.ramp_in(&commander, UP);
+}

@@ -1,6 +1,7 @@
 //! `io-driver doctor` on the machine at hand, whatever it is: it runs, and says nothing false about what can be seen
 //! by other means.
 
+use patience::prelude::*;
 use serde_json::Value;
 use std::fs::read_to_string;
 use std::io::Write;
@@ -11,7 +12,7 @@ fn doctor(arguments: &[&str]) -> Output {
     let place = tempfile::tempdir().unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_io-driver"));
     command.arg("doctor").args(arguments).env("PHANTOM3_SOCKET", place.path().join("driver.sock"));
-    command.output().unwrap()
+    command.bounded_output().unwrap()
 }
 
 fn json(arguments: &[&str]) -> Value {
@@ -67,7 +68,8 @@ fn what_it_says_of_this_machine_agrees_with_what_can_be_seen_by_other_means() {
 #[test]
 fn a_promotion_passes_where_chrt_succeeds() {
     let value = json(&[]);
-    let Ok(chrt) = Command::new("chrt").args(["-f", "80", "true"]).stderr(Stdio::null()).status() else {
+    let Ok(chrt) = Command::new("chrt").args(["-f", "80", "true"]).stderr(Stdio::null()).bounded_status()
+    else {
         println!("skipped: no chrt here; recorded machines show the same");
         return;
     };
@@ -115,7 +117,7 @@ fn the_fix_plan_for_this_machine_is_a_valid_script() {
     let output = doctor(&["--fix-plan"]);
     let mut sh = Command::new("sh").arg("-n").stdin(Stdio::piped()).spawn().unwrap();
     sh.stdin.take().unwrap().write_all(&output.stdout).unwrap();
-    assert!(sh.wait().unwrap().success(), "{}", String::from_utf8_lossy(&output.stdout));
+    assert!(sh.bounded_wait().success(), "{}", String::from_utf8_lossy(&output.stdout));
     assert!(output.stdout.starts_with(b"#!/bin/sh\n"));
 }
 
@@ -174,7 +176,8 @@ fn a_socket_that_nobody_listens_at_is_found() {
     drop(std::os::unix::net::UnixListener::bind(&socket).unwrap());
     let ask = || {
         let mut command = Command::new(env!("CARGO_BIN_EXE_io-driver"));
-        let output = command.args(["doctor", "--json"]).env("PHANTOM3_SOCKET", &socket).output().unwrap();
+        let output =
+            command.args(["doctor", "--json"]).env("PHANTOM3_SOCKET", &socket).bounded_output().unwrap();
         serde_json::from_slice::<Value>(&output.stdout).unwrap()
     };
     let stale = ask();
@@ -209,12 +212,12 @@ fn a_running_driver_is_asked_and_not_disturbed() {
     });
     let ask = |arguments: &[&str]| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_io-driver"));
-        command.args(arguments).env("PHANTOM3_SOCKET", &socket).output().unwrap()
+        command.args(arguments).env("PHANTOM3_SOCKET", &socket).bounded_output().unwrap()
     };
     let doctor: Value = serde_json::from_slice(&ask(&["doctor", "--json"]).stdout).unwrap_or_default();
     let status: Value = serde_json::from_slice(&ask(&["status", "--json"]).stdout).unwrap_or_default();
     ask(&["stop"]);
-    let ended = driver.wait().unwrap();
+    let ended = driver.bounded_wait();
     assert!(is_up && ended.success());
     let pid = format!("process {}", driver.id());
     assert!(found(&doctor, "segment.socket").contains(&pid), "{}", found(&doctor, "segment.socket"));

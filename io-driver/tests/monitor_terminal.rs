@@ -1,6 +1,7 @@
 //! `io-driver status --watch` on a terminal, over a real driver: what it shows, and that the terminal is as before
 //! however it ends. The terminal is a pseudo-terminal of the test's own.
 
+use patience::prelude::*;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::{Pid, Signal, kill_process};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
@@ -47,8 +48,7 @@ impl Running {
 
 impl Drop for Running {
     fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
+        self.0.end();
     }
 }
 

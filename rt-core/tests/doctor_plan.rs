@@ -3,6 +3,7 @@
 mod machines;
 
 use machines::{complaints, examine, load, load_with, spec};
+use patience::prelude::*;
 use rt_core::cpu::parse_cpu_list;
 use rt_core::doctor::Verdict::Unreadable;
 use rt_core::doctor::cpus::{list_of, mask_of};
@@ -115,7 +116,7 @@ fn check_harmless(script: &str) {
 fn check_syntax(script: &str) {
     let mut sh = Command::new("sh").arg("-n").stdin(Stdio::piped()).spawn().expect("every system has sh");
     sh.stdin.take().unwrap().write_all(script.as_bytes()).unwrap();
-    assert!(sh.wait().unwrap().success(), "{script}");
+    assert!(sh.bounded_wait().success(), "{script}");
 }
 
 /// Machines with each boot loader, with tuned, with a unit of the loop, and with hostile names.

@@ -3,6 +3,7 @@
 //! A program of its own, since locked memory and a tuned allocator last as long as the process. The
 //! expectations are formed by other means than the crate's: `/proc`, not the system calls.
 
+use patience::prelude::*;
 use rt_core::cpu;
 use rt_core::setup::{self, Guarantee, SetupReport, SetupRequest};
 use std::fs::read_to_string;
@@ -22,7 +23,7 @@ fn the_report_says_what_is_in_force() {
         dma_latency_us: Some(100),
     };
     let thread = std::thread::spawn(move || check_in_force(&request, cpu));
-    let report = thread.join().unwrap();
+    let report = thread.bounded_join().unwrap();
     println!("{report}");
     let names: Vec<_> =
         report.guarantees.iter().filter(|g| g.name != "fair server").map(|g| g.name).collect();
@@ -69,7 +70,8 @@ fn check(guarantee: &Guarantee, in_force: bool) {
 
 /// A thread that inherited the priority would preempt the loop that started it.
 fn check_that_children_are_not_real_time() {
-    let stat = std::thread::spawn(|| read_to_string("/proc/thread-self/stat").unwrap()).join().unwrap();
+    let stat =
+        std::thread::spawn(|| read_to_string("/proc/thread-self/stat").unwrap()).bounded_join().unwrap();
     let policy = stat.rsplit_once(')').unwrap().1.split_whitespace().nth(41 - 3).unwrap().to_owned();
     assert_eq!(policy, "0");
 }
@@ -89,7 +91,7 @@ fn what_cannot_be_had_is_missing_and_not_fatal() {
         ..SetupRequest::default()
     };
     let thread = std::thread::spawn(move || setup::apply(&request).0);
-    let report = thread.join().unwrap();
+    let report = thread.bounded_join().unwrap();
     for name in ["scheduling", "cpu", "heap prefaulted"] {
         assert!(!report.find(name).unwrap().obtained, "{report}");
     }

@@ -1,5 +1,6 @@
 //! What a loop built on this crate does to the system: nothing that is not asked for.
 
+use patience::BoundedThread;
 use rt_core::alloc_guard::{self, CountingAllocator};
 use rt_core::epitaph::{EpitaphKind, EpitaphRef, empty_epitaph};
 use rt_core::histogram::Histogram;
@@ -80,5 +81,5 @@ fn other_threads_do_not_disturb_the_count_and_counts_nest() {
         inner
     });
     assert_eq!((inner, outer), (2, 4));
-    noise.join().unwrap();
+    noise.bounded_join().unwrap();
 }

@@ -5,6 +5,7 @@ mod common;
 use bytemuck::Zeroable;
 use common::fake::{fake_server, hear, send};
 use common::{HANG, frame, info, wait_until};
+use patience::prelude::*;
 use shm_abi::handshake::{Answer, Verdict};
 use shm_abi::server::{Server, ServerEvent};
 use shm_abi::{Command, CommanderView, DriverMemory};
@@ -35,10 +36,10 @@ fn has_sanitizers(directory: &Path) -> bool {
     let (source, program) = (directory.join("probe.c"), directory.join("probe"));
     std::fs::write(&source, "int main(void) { return 0; }\n").unwrap();
     let compiled = compiler().is_some_and(|mut compiler| {
-        let made = compiler.args(SANITIZERS).arg(&source).arg("-o").arg(&program).output();
+        let made = compiler.args(SANITIZERS).arg(&source).arg("-o").arg(&program).bounded_output();
         made.is_ok_and(|output| output.status.success())
     });
-    let runs = compiled && std::process::Command::new(&program).status().is_ok_and(|status| status.success());
+    let runs = compiled && std::process::Command::new(&program).bounded_status().is_ok_and(|status| status.success());
     if !runs {
         println!("skipped: sanitizers over the C client: this compiler has none");
     }
@@ -58,7 +59,7 @@ fn compile(directory: &Path) -> Option<PathBuf> {
         compiler.args(SANITIZERS);
     }
     let source = root().join("tests/c_client.c");
-    let compiled = compiler.args(FLAGS).arg(source).arg("-o").arg(&program).output().unwrap();
+    let compiled = compiler.args(FLAGS).arg(source).arg("-o").arg(&program).bounded_output().unwrap();
     assert!(compiled.status.success(), "{}", String::from_utf8_lossy(&compiled.stderr));
     Some(program)
 }
@@ -98,7 +99,7 @@ impl Driver {
             self.poll();
             client.try_wait().unwrap().is_some()
         });
-        client.wait_with_output().unwrap()
+        client.bounded_output()
     }
 
     fn lease(&mut self) -> CommanderView {
@@ -145,7 +146,7 @@ fn a_c_commander_answers_every_tick_under_its_lease() {
         }
     }
     drop(driver.server);
-    let output = client.wait_with_output().unwrap();
+    let output = client.bounded_output();
     assert_eq!(String::from_utf8_lossy(&output.stdout), format!("{TICKS} ticks whole\n"), "{output:?}");
 }
 
@@ -290,7 +291,7 @@ fn the_headers_compile_on_their_own_and_as_cpp() {
                 .args(["-Wall", "-Wextra", "-Werror", "-fsyntax-only", "-include"])
                 .arg(root().join("include").join(header))
                 .arg("/dev/null")
-                .output()
+                .bounded_output()
                 .unwrap();
             let errors = String::from_utf8_lossy(&output.stderr);
             if language[1] == "c++" && !output.status.success() && errors.contains("cc1plus") {

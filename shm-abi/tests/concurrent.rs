@@ -8,6 +8,7 @@ mod common;
 
 use bytemuck::Zeroable;
 use common::{HANG, command, frame, info, info_of, is_command, is_frame, is_frame_of, wait_until};
+use patience::prelude::*;
 use proptest::prelude::*;
 use shm_abi::doorbell::{self, Place};
 use shm_abi::layout::{RING_COMMANDS, SLEEPS_ON_OTHERS_BELL};
@@ -114,6 +115,8 @@ proptest! {
         let done = AtomicBool::new(false);
         let tally = Tally::default();
         std::thread::scope(|scope| {
+            // Also by a panic: the scope waits for its readers.
+            let _done = patience::Raised(&done);
             // The newest, somewhere within, the one about to be overwritten, long gone, still to come.
             for distance in [0, -lag, 1 - ring, -ring - lag, 1 + lag] {
                 let (view, done, tally) = (&view, &done, &tally);
@@ -142,6 +145,8 @@ proptest! {
         let done = AtomicBool::new(false);
         let whole = AtomicU64::new(0);
         std::thread::scope(|scope| {
+            // Also by a panic: the scope waits for its readers.
+            let _done = patience::Raised(&done);
             for lag in 0..RING_COMMANDS as u64 {
                 let (view, done, whole) = (&commander_view, &done, &whole);
                 scope.spawn(move || {
@@ -430,7 +435,7 @@ fn two_processes_exchange_whole_frames_and_commands_by_sleeping_on_each_other() 
         view.read_command(tick, &mut answer).unwrap();
         assert!(is_command(&answer, tick));
     }
-    assert!(child.wait().unwrap().success());
+    assert!(child.bounded_wait().success());
 }
 
 /// Runs only in the process that the test above starts.

@@ -6,6 +6,7 @@ use common::desk::{Desk, SHORT, is_closed, verdict};
 use common::fake::fake_server;
 use common::host::Host;
 use common::{HANG, directory, wait_until};
+use patience::prelude::*;
 use shm_abi::client::{self, AttachError};
 use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
 use shm_abi::server::{MAX_ASKING, MAX_OBSERVERS_OF_PROCESS, PATIENCE};
@@ -88,7 +89,7 @@ fn an_answer_that_came_before_the_request_was_sent_counts() {
         let error = client::observe(&socket, "test").unwrap_err();
         assert!(matches!(error, AttachError::Refused(_)), "{error}");
     }
-    server.join().unwrap();
+    server.bounded_join().unwrap();
 }
 
 #[test]

@@ -12,6 +12,7 @@ use common::fake::{fake_server, hear, send};
 use common::golden::Golden;
 use common::host::Host;
 use common::{HANG, directory, info_of, own_pid, wait_until};
+use patience::prelude::*;
 use shm_abi::client::AttachError;
 use shm_abi::handshake::{Answer, Verdict};
 use shm_abi::segment::DriverInfo;
@@ -43,7 +44,7 @@ fn start(program: &Path, socket: &Path, arguments: &[&str]) -> Child {
 
 /// What the program printed, once it has ended well.
 fn printed(child: Child) -> String {
-    let output = child.wait_with_output().unwrap();
+    let output = child.bounded_output();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).unwrap()
 }
@@ -297,7 +298,7 @@ fn command_older(version: &'static str) {
     let old = OldDriver::forge(version);
     let serving = old.serve(&socket, 1);
     let attached = client::command(&socket, "today").unwrap();
-    serving.join().unwrap();
+    serving.bounded_join().unwrap();
 
     let minor = minor_of(version);
     assert_eq!(u64::from(attached.driver.abi_minor()), minor);
@@ -348,7 +349,7 @@ fn command_older_from_c(version: &'static str) {
     let is_silent = observed.contains("PhantomFrame.devices[0].joint_velocity_rad_per_s_estimated[0] = 0\n");
     assert_eq!(is_silent, minor_of(version) < 2, "since 1.2");
     assert_read(&printed_by("command"), &current_version(), version);
-    serving.join().unwrap();
+    serving.bounded_join().unwrap();
     let command: Command = bytemuck::pod_read_unaligned(&old.command(TICK));
     assert_eq!(command.validate(TICK, 1007, MAX_DEVICES as u64), Ok(()));
     assert_eq!(command.devices[7].force_on_user_n, golden_frame(version).devices[7].position_m_measured);
@@ -382,7 +383,7 @@ fn refused_with(answer: Answer, ask: fn(&Path) -> Result<(), AttachError>) -> At
         send(&stream, bytemuck::bytes_of(&answer), &[]);
     });
     let refusal = ask(&socket).unwrap_err();
-    serving.join().unwrap();
+    serving.bounded_join().unwrap();
     refusal
 }
 

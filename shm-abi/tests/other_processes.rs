@@ -7,6 +7,7 @@ use bytemuck::Zeroable;
 use common::fake::{hear, send};
 use common::host::Host;
 use common::{HANG, directory, frame, info, is_frame, wait_until};
+use patience::prelude::*;
 use shm_abi::client;
 use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
 use shm_abi::server::{Server, ServerEvent};
@@ -59,7 +60,8 @@ fn body_of_another_process() {
 fn line(child: &mut std::process::Child, beginning: &str) -> String {
     use std::io::BufRead;
     let output = std::io::BufReader::new(child.stdout.as_mut().unwrap());
-    let found = output.lines().map(Result::unwrap).find(|line| line.starts_with(beginning));
+    let find = || output.lines().map(Result::unwrap).find(|line| line.starts_with(beginning));
+    let found = patience::watched(HANG, &format!("the other process says {beginning}"), find);
     found.unwrap_or_else(|| panic!("the other process ended without saying {beginning}"))
 }
 
@@ -69,8 +71,7 @@ fn a_driver_killed_with_9_leaves_a_socket_that_clients_recognise_and_the_next_dr
     let socket = directory.path().join("driver.sock");
     let mut driver = process(&own_binary(), "driver", &socket).spawn().unwrap();
     line(&mut driver, "bound");
-    driver.kill().unwrap();
-    driver.wait().unwrap();
+    driver.end();
     assert_eq!(
         client::observe(&socket, "test").unwrap_err().to_string(),
         format!(
@@ -92,8 +93,7 @@ fn a_commander_killed_with_9_ends_its_lease() {
     let granted = host.event();
     assert!(matches!(&granted, ServerEvent::LeaseGranted { pid, name, .. }
         if *pid == u64::from(commander.id()) && name == "doomed"));
-    commander.kill().unwrap();
-    commander.wait().unwrap();
+    commander.end();
     assert!(matches!(host.event(), ServerEvent::LeaseEnded { lease: 1 }));
 }
 
@@ -104,7 +104,7 @@ fn a_client_that_is_stopped_and_continued_while_it_waits_attaches_all_the_same()
     let memory = DriverMemory::create(&info()).unwrap();
     let listener = UnixListener::bind(&socket).unwrap();
     let mut client = process(&own_binary(), "observer", &socket).spawn().unwrap();
-    let (mut stream, _) = listener.accept().unwrap();
+    let mut stream = patience::accepted(&listener);
     hear(&mut stream);
     let pid = rustix::process::Pid::from_child(&client);
     for signal in [rustix::process::Signal::STOP, rustix::process::Signal::CONT] {
@@ -115,7 +115,7 @@ fn a_client_that_is_stopped_and_continued_while_it_waits_attaches_all_the_same()
     std::thread::sleep(Duration::from_millis(100));
     send(&stream, bytemuck::bytes_of(&Answer::new(Verdict::Granted)), &[memory.fd()]);
     line(&mut client, "attached");
-    client.wait().unwrap();
+    client.bounded_wait();
 }
 
 #[test]
@@ -155,7 +155,7 @@ fn a_user_without_permission_is_told_mode_owner_group_and_own_id() {
         let mut command = process(&binary_outside, "observer", &socket);
         let mut child = command.uid(NOBODY).gid(NOBODY).current_dir("/").spawn().unwrap();
         let line = line(&mut child, "refused: ");
-        child.wait().unwrap();
+        child.bounded_wait();
         line
     };
     assert_eq!(refusal(0o755), format!("refused: {}", message(&socket, 0o660, NOBODY)));
@@ -202,7 +202,7 @@ fn a_server_out_of_descriptors_rests_and_then_serves_again() {
     let socket = directory.path().join("driver.sock");
     let mut server = process(&own_binary(), "driver without descriptors", &socket).spawn().unwrap();
     line(&mut server, "served");
-    server.wait().unwrap();
+    server.bounded_wait();
 }
 
 #[test]

@@ -5,6 +5,7 @@ mod common;
 use common::fake::{fake_server, hear, send};
 use common::host::Host;
 use common::{directory, info};
+use patience::prelude::*;
 use shm_abi::client::{self, AttachError};
 use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
 use shm_abi::server::ServerEvent;
@@ -69,7 +70,7 @@ fn error_about(talk: impl Fn(UnixStream) + Send + 'static) -> AttachError {
     let socket = directory.path().join("driver.sock");
     let server = fake_server(&socket, 1, talk);
     let error = client::command(&socket, "test").unwrap_err();
-    server.join().unwrap();
+    server.bounded_join().unwrap();
     error
 }
 
@@ -82,7 +83,7 @@ fn message_about(answer: Answer) -> String {
         stream.write_all(bytemuck::bytes_of(&answer)).unwrap();
     });
     let error = client::command(&socket, "test").unwrap_err();
-    server.join().unwrap();
+    server.bounded_join().unwrap();
     error.to_string().replace(socket.to_str().unwrap(), "SOCKET")
 }
 

@@ -1,6 +1,7 @@
 //! A driver as a child process with a socket of its own.
 
 use crate::programs;
+use patience::prelude::*;
 use shm_abi::client::{self, AttachError, Attachment};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -8,8 +9,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// Long enough for the most loaded machine; only a hang takes longer.
-pub const HANG: Duration = Duration::from_secs(60);
+pub use patience::HANG;
 
 /// A driver that is killed when dropped.
 #[derive(Debug)]
@@ -76,18 +76,13 @@ impl Driver {
     }
 
     fn wait_until_it_listens(&self) {
-        let begun = Instant::now();
-        while client::observe(&self.socket, "test").is_err() {
-            assert!(begun.elapsed() < HANG, "the driver does not listen");
-            std::thread::sleep(Duration::from_millis(2));
-        }
+        patience::until("the driver listens", || client::observe(&self.socket, "test").is_ok());
     }
 }
 
 impl Drop for Driver {
     fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
+        self.child.end();
     }
 }
 
@@ -109,22 +104,12 @@ fn spawn_as(config: &str, socket: &Path, command: Command) -> Child {
 
 /// Waits for a child's end; one that hangs is killed and fails the test.
 pub fn wait_or_kill(child: &mut Child) -> ExitStatus {
-    wait_or_kill_after(child, HANG)
+    wait_or_kill_after(child, patience::limit())
 }
 
 /// The same for one that may take longer.
 pub fn wait_or_kill_after(child: &mut Child, patience: Duration) -> ExitStatus {
-    let begun = Instant::now();
-    loop {
-        if let Some(status) = child.try_wait().expect("our child") {
-            return status;
-        }
-        if begun.elapsed() > patience {
-            let _ = child.kill();
-            panic!("process {} hangs", child.id());
-        }
-        std::thread::sleep(Duration::from_millis(2));
-    }
+    child.wait_within(patience)
 }
 
 /// A configuration of `devices` resting ideal devices with a peak of 8.5 N, without real-time rights, so

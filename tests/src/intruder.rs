@@ -3,6 +3,7 @@
 //! Model: a thread that starts before the driver, as rightless as the driver's own, and waits for SIGUSR1: the
 //! test decides when, for instance while motors push. [`CALL_VARIABLE`] says what it does then.
 
+use patience::prelude::*;
 use rt_core::privileges::{Keep, reduce_thread};
 use std::os::unix::process::CommandExt;
 use std::sync::Arc;
@@ -36,7 +37,7 @@ pub fn start_if_asked() {
         commit(&deed);
     };
     std::thread::Builder::new().name("intruder".into()).spawn(body).expect("a thread");
-    is_ready.recv().expect("it lives");
+    is_ready.bounded_recv().expect("it lives");
 }
 
 fn commit(deed: &str) {

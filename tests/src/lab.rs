@@ -1,6 +1,7 @@
 //! A laboratory's workstation made of directories: the installation of `config/system` under a root of its own.
 
 use crate::programs;
+use patience::prelude::*;
 use std::collections::BTreeMap;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -122,14 +123,15 @@ pub fn walk(directory: &Path, see: &mut impl FnMut(&Path)) {
 
 /// Runs a program that has to succeed without a complaint; returns what it said.
 pub fn succeed(command: &mut Command) -> String {
-    let (status, out, err) = programs::said(&command.output().expect("it runs"));
+    let (status, out, err) = programs::said(&command.bounded_output().expect("it runs"));
     assert_eq!((status, err.as_str()), (Some(0), ""), "{command:?}\n{out}");
     out
 }
 
 /// A tool of the system, if it is installed; else says that a check is skipped and how the same is tested.
 pub fn tool(name: &str, instead: &str) -> Option<Command> {
-    let works = Command::new(name).arg("--version").output().is_ok_and(|output| output.status.success());
+    let works =
+        Command::new(name).arg("--version").bounded_output().is_ok_and(|output| output.status.success());
     if !works {
         println!("skipped: {name} is not installed; {instead}");
     }

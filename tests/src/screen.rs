@@ -1,5 +1,6 @@
 //! A screen that nobody sees: Xvfb, where the machine has it.
 
+use patience::prelude::*;
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::time::Instant;
@@ -33,7 +34,9 @@ impl Screen {
             return None;
         };
         let mut number = String::new();
-        BufReader::new(server.stdout.take().expect("a pipe")).read_line(&mut number).expect("its number");
+        let mut told = BufReader::new(server.stdout.take().expect("a pipe"));
+        let tell = || told.read_line(&mut number).expect("its number");
+        patience::watched(patience::limit(), "Xvfb tells the number of its screen", tell);
         assert!(!number.trim().is_empty(), "Xvfb does not start");
         Some(Self { server, memory, display: format!(":{}", number.trim()) })
     }
@@ -70,7 +73,7 @@ impl Screen {
     }
 
     fn xdotool(&self, words: &[&str]) -> Option<()> {
-        let done = Command::new("xdotool").args(words).env("DISPLAY", &self.display).status();
+        let done = Command::new("xdotool").args(words).env("DISPLAY", &self.display).bounded_status();
         if done.is_err() {
             println!("skipped: there is no xdotool here");
         }
@@ -80,7 +83,6 @@ impl Screen {
 
 impl Drop for Screen {
     fn drop(&mut self) {
-        let _ = self.server.kill();
-        let _ = self.server.wait();
+        self.server.end();
     }
 }

@@ -2,6 +2,7 @@
 //!
 //! Only root can do that; a test that cannot says so, and looks at what it can see as itself.
 
+use patience::prelude::*;
 use std::ffi::OsStr;
 use std::os::unix::fs::{PermissionsExt, chown};
 use std::path::{Path, PathBuf};
@@ -18,7 +19,8 @@ pub fn can_be_others() -> bool {
         println!("skipped: only root can start a program as another user");
         return false;
     }
-    let tried = Command::new("setpriv").args(["--reuid=65534", "true"]).stderr(Stdio::null()).status();
+    let tried =
+        Command::new("setpriv").args(["--reuid=65534", "true"]).stderr(Stdio::null()).bounded_status();
     let can = tried.is_ok_and(|status| status.success());
     if !can {
         println!("skipped: there is no `setpriv` that can start a program as another user");
@@ -40,7 +42,7 @@ impl Stranger {
         let copy = directory.path().join("program");
         // Not by this process: while another thread starts a child, that child would hold the copy open for
         // writing, and nobody may execute what is being written.
-        let copied = Command::new("cp").arg(program).arg(&copy).status().expect("there is `cp`");
+        let copied = Command::new("cp").arg(program).arg(&copy).bounded_status().expect("there is `cp`");
         assert!(copied.success(), "a copy of {}", program.display());
         Self { program: copy, _directory: directory }
     }

@@ -3,6 +3,7 @@
 //! Problem: "the loop sleeps once a tick and faults no page" is a claim of the program about itself; the
 //! kernel's books about that thread are evidence. None of these needs rights for a child of one's own.
 
+use patience::prelude::*;
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use std::fs;
 use std::path::PathBuf;
@@ -110,7 +111,7 @@ pub fn pinned_to<R: Send>(cpu: usize, f: impl FnOnce() -> R + Send) -> R {
             sched_setaffinity(None, &only).expect("a CPU that is ours");
             f()
         };
-        scope.spawn(body).join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        scope.spawn(body).bounded_join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     })
 }
 
@@ -143,7 +144,7 @@ mod tests {
             assert!(begun.elapsed() < crate::driver::HANG);
         }
         drop(stop);
-        thread.join().unwrap();
+        thread.bounded_join().unwrap();
     }
 
     #[test]

@@ -3,6 +3,7 @@
 #![allow(non_snake_case)] // Frames are capital letters: X_WF takes F to W.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Translation3, UnitQuaternion};
+use patience::prelude::*;
 use rustix::process::{Pid, Signal, kill_process};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -405,7 +406,13 @@ fn a_layout_that_did_not_fit_onto_the_disk_is_no_success() {
     place.write("pairs.csv", pairs_csv(300, &Matrix3::identity()));
     let full = std::fs::File::options().write(true).open("/dev/full").expect("every Linux has one");
     let mut program = place.phantom3();
-    let said = program.args(["calibrate", "--pairs", "pairs.csv"]).stdout(full).output().expect("it runs");
+    let said = program
+        .args(["calibrate", "--pairs", "pairs.csv"])
+        .stdout(full)
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("it runs")
+        .bounded_output();
     let err = String::from_utf8_lossy(&said.stderr);
     assert_eq!(said.status.code(), Some(2), "{err}");
     assert!(err.contains("standard output: cannot be written: No space left"), "{err}");

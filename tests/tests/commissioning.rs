@@ -3,6 +3,7 @@
 use io_driver::commission::hand_check::HandVerdict;
 use io_driver::commission::session::Session;
 use nalgebra::Vector3;
+use patience::prelude::*;
 use rt_core::signals::StopSignals;
 use shm_abi::client;
 use std::time::Duration;
@@ -80,9 +81,7 @@ fn a_commissioning_driver_gives_an_application_little_force() {
     let peak_n = stand.view().info().devices[0].peak_force_n;
     assert_eq!(peak_n, 0.5, "and says so");
     let app = stand.start_app();
-    while stand.amplifiers.tally().energised < 1000 {
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    patience::until("1000 torques are written", || stand.amplifiers.tally().energised >= 1000);
     drop(app);
     let seen = stand.finish();
     // The application asks for 1.2 N.
@@ -107,13 +106,14 @@ fn a_tip_that_goes_where_the_hand_moves_it_passes_and_another_does_not() {
         let verdict = std::thread::scope(|scope| {
             let check = scope.spawn(move || session.check_by_hand(axis));
             let mut moved_m = 0.0;
-            while !check.is_finished() {
+            patience::until("the check by hand ends", || {
                 // A tenth of a metre a second, from whenever the check begins.
                 moved_m += 1e-4;
                 strings.move_to(Vector3::new(0.1, 0.2, 0.3) + direction * moved_m);
                 std::thread::sleep(Duration::from_millis(1));
-            }
-            check.join().unwrap()
+                check.is_finished()
+            });
+            check.bounded_join().unwrap()
         });
         assert_eq!(verdict.unwrap(), expected);
     }
@@ -144,7 +144,7 @@ fn wrong_words_are_refused_with_what_is_missing() {
     let said = |arguments: &[&str]| {
         let mut command = programs::io_driver();
         command.args(["commission", "--socket"]).arg(stand.socket()).args(arguments);
-        let output = command.stdin(std::process::Stdio::null()).output().unwrap();
+        let output = command.stdin(std::process::Stdio::null()).bounded_output().unwrap();
         let (status, _, err) = programs::said(&output);
         assert_eq!(status, Some(2), "{err}");
         err

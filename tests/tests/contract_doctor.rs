@@ -1,5 +1,6 @@
 //! The doctor is the same in both programs.
 
+use patience::prelude::*;
 use serde_json::Value;
 use std::process::Command;
 use system_tests::programs::{io_driver, phantom3, said};
@@ -8,7 +9,7 @@ use system_tests::programs::{io_driver, phantom3, said};
 fn ids(mut command: Command) -> Vec<(String, Value)> {
     let place = tempfile::tempdir().expect("a directory");
     command.args(["doctor", "--json"]).env("PHANTOM3_SOCKET", place.path().join("driver.sock"));
-    let (status, out, err) = said(&command.output().expect("it runs"));
+    let (status, out, err) = said(&command.bounded_output().expect("it runs"));
     assert!(matches!(status, Some(0 | 1)) && err.is_empty(), "{status:?} {err}");
     let value: Value = serde_json::from_str(&out).expect("one JSON object");
     let findings = value["findings"].as_array().expect("findings");

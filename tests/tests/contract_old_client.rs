@@ -1,6 +1,7 @@
 //! A commander in C, built with the headers as they were released with an older minor version, moves the motors
 //! of a real driver process of today.
 
+use patience::prelude::*;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 use system_tests::driver::Driver;
@@ -17,7 +18,7 @@ fn pusher(directory: &Path) -> Option<PathBuf> {
     compiler.args(words).args(["-std=c11", "-O2"]);
     compiler.arg("-I").arg(root.join("../shm-abi/tests/frozen/1.0"));
     compiler.arg(root.join("tests/c/pusher.c")).arg("-o").arg(&program);
-    match compiler.output() {
+    match compiler.bounded_output() {
         Err(error) => {
             println!("skipped: no C compiler: {named}: {error}");
             None
@@ -34,8 +35,7 @@ struct Running(Child);
 
 impl Drop for Running {
     fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
+        self.0.end();
     }
 }
 

@@ -1,5 +1,6 @@
 //! What happens to a recording when its disk fails, and to a run when nobody reads what it says.
 
+use patience::prelude::*;
 use std::process::{Command, Stdio};
 use system_tests::recording::Table;
 use system_tests::workplace::{Running, Said, Workplace};
@@ -69,7 +70,7 @@ fn a_disk_that_fills_up_leaves_a_recording_that_ends_with_a_complete_row() {
     let is_possible = |place: &Workplace| {
         let mut unshare = place.prepare(Command::new("unshare"));
         unshare.args(["--user", "--map-root-user", "--mount", "sh", "-c", mount]);
-        unshare.stderr(Stdio::null()).status().is_ok_and(|status| status.success())
+        unshare.stderr(Stdio::null()).bounded_status().is_ok_and(|status| status.success())
     };
     if !is_possible(&workplace()) {
         eprintln!(
@@ -115,7 +116,7 @@ fn closed_pipes_change_neither_the_run_nor_its_status() {
         let mut child = program.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
         // Whoever read has seen enough, as in `| head -0`.
         drop((child.stdout.take(), child.stderr.take()));
-        assert_eq!(child.wait().expect("our child").code(), Some(status));
+        assert_eq!(child.bounded_wait().code(), Some(status));
     }
 }
 

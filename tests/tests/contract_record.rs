@@ -1,5 +1,6 @@
 //! Recordings as MCAP: what they hold, what is left of them when disk or process fail, and that they play again.
 
+use patience::prelude::*;
 use std::io::Read;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -303,7 +304,7 @@ fn a_disk_that_fills_up_does_not_end_the_run() {
         "-c",
         "mkdir tried && mount -t tmpfs none tried",
     ]);
-    if !possible.stderr(Stdio::null()).status().is_ok_and(|status| status.success()) {
+    if !possible.stderr(Stdio::null()).bounded_status().is_ok_and(|status| status.success()) {
         eprintln!(
             "skipped: no small disk can be mounted here; the test with a limited file covers the same path"
         );
@@ -341,7 +342,7 @@ fn a_recording_that_cannot_even_begin_stops_the_run_before_it_starts() {
 fn a_disk_that_stalls_costs_rows_which_are_counted_and_never_the_run() {
     const STALL: Duration = Duration::from_secs(4);
     let (place, _) = workplace("default");
-    let made = Command::new("mkfifo").arg(place.path("slow.mcap")).status().expect("mkfifo");
+    let made = Command::new("mkfifo").arg(place.path("slow.mcap")).bounded_status().expect("mkfifo");
     assert!(made.success());
     let path = place.path("slow.mcap");
     let reader = std::thread::spawn(move || {
@@ -365,7 +366,7 @@ fn a_disk_that_stalls_costs_rows_which_are_counted_and_never_the_run() {
         "--record",
         "fast.csv",
     ]);
-    let written = reader.join().expect("the reader");
+    let written = reader.bounded_join().expect("the reader");
     assert_eq!(said.status, Some(0), "{}", said.err);
     place.write("slow.mcap.copy.mcap", &written);
     let lines = |name: &str| said.out.lines().find(|line| line.contains(name)).unwrap_or_default().to_owned();

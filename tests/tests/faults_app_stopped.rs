@@ -60,12 +60,12 @@ fn in_lockstep_a_stopped_app_stops_time_and_the_driver_can_still_be_stopped() {
         press.observer.driver.latest_tick() == before
     };
     // The signal takes its time to reach all threads.
-    while !stands(&press) {}
+    patience::until("time stands still", || stands(&press));
     app.signal(Signal::CONT);
     log.catch_up(&press.observer.driver);
     log.follow_for(&press.observer.driver, 1000);
     app.signal(Signal::STOP);
-    while !stands(&press) {}
+    patience::until("time stands still", || stands(&press));
     let end = io_driver(&["stop"], press.driver.socket());
     assert_eq!(end.status, Some(0), "{end:?}");
     assert_eq!(press.driver.wait().code(), Some(0));

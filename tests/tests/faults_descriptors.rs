@@ -1,5 +1,6 @@
 //! No descriptors: for the driver, for the application, and because of a crowd.
 
+use patience::prelude::*;
 use rustix::process::{Pid, Resource, Rlimit, prlimit};
 use shm_abi::server::MAX_OBSERVERS_OF_PROCESS;
 use shm_abi::{DriverState, client, stop_socket};
@@ -99,7 +100,7 @@ fn a_driver_whose_descriptors_are_exhausted_goes_on_with_its_app_and_serves_agai
     drop(crowd);
     limit(1024).expect("our own child");
     // Whether it had the patience is its affair; the next one is served.
-    let _ = knocking.join().expect("it does not panic");
+    let _ = knocking.bounded_join().expect("it does not panic");
     assert_eq!(stand.try_to_observe().map(|seen| seen.driver_pid), Some(u64::from(id)));
     drop(app);
     let app = stand.start_app();

@@ -2,7 +2,11 @@
 //! many that only look.
 
 use bytemuck::Zeroable;
+<<<<<<< HEAD
 use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
+=======
+use patience::prelude::*;
+>>>>>>> c2d5191 (tests: bounded waits in the system tests)
 use shm_abi::{DriverView, Frame};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
@@ -129,7 +133,7 @@ fn any_number_of_observers_disturbs_nobody() {
         let end = seen.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
         assert_eq!(end.status, Some(0), "{end:?}");
         for observer in looking {
-            assert!(observer.join().expect("frames are what they should be") > 100);
+            assert!(observer.bounded_join().expect("frames are what they should be") > 100);
         }
     });
     let counters = &press.observer.driver.counters;

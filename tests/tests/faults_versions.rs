@@ -2,6 +2,7 @@
 //! nobody else notices.
 
 use bytemuck::Zeroable;
+use patience::prelude::*;
 use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
 use shm_abi::layout::DriverHeader;
 use shm_abi::{ABI_MAJOR, ABI_MINOR, Frame, LAYOUT_HASH};
@@ -69,14 +70,14 @@ fn an_app_that_meets_a_driver_of_another_version_says_which_both_are() {
         let socket = table.path("driver.sock");
         let listener = UnixListener::bind(&socket).expect("a socket");
         let driver = std::thread::spawn(move || {
-            let (mut stream, _) = listener.accept().expect("a client");
+            let mut stream = patience::accepted(&listener);
             let mut request = Request::zeroed();
             stream.read_exact(bytemuck::bytes_of_mut(&mut request)).expect("a request");
             stream.write_all(bytemuck::bytes_of(&answer)).expect("it is told");
         });
         let mut app = table.app("real");
         let end = Running::start(app.args(["--seconds", "1", "--attach"]).arg(&socket)).end();
-        driver.join().expect("it was asked");
+        driver.bounded_join().expect("it was asked");
         assert_eq!((end.status, end.out.as_str()), (Some(2), ""), "{end:?}");
         for words in expected {
             assert!(end.err.contains(&words), "{words}: {end:?}");

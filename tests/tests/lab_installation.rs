@@ -4,6 +4,7 @@
 mod fix_plan;
 
 use io_driver::config::DriverConfig;
+use patience::prelude::*;
 use std::collections::BTreeSet;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -212,7 +213,7 @@ fn bad_usage_is_refused_before_anything_is_changed() {
     ];
     for (arguments, expected) in cases {
         let lab = Lab::bare();
-        let (status, _, err) = said(&lab.installer().args(arguments).output().expect("it runs"));
+        let (status, _, err) = said(&lab.installer().args(arguments).bounded_output().expect("it runs"));
         assert_eq!(status, Some(2), "{arguments:?}: {err}");
         assert!(err.contains(expected), "{arguments:?}: {err}");
         assert!(lab.files("/").is_empty());

@@ -1,6 +1,10 @@
 //! What is set on the machine at boot: the root scripts on a made-up /sys and /proc, and the udev rules.
 
+<<<<<<< HEAD
 use rt_core::read_back::{ReadBack, Writers};
+=======
+use patience::prelude::*;
+>>>>>>> c2d5191 (tests: bounded waits in the system tests)
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
@@ -219,7 +223,7 @@ fn a_configuration_that_does_not_fit_the_machine_changes_nothing() {
     {
         lab.write("/etc/phantom3/machine.conf", text);
         let before = lab.files("/");
-        let (status, out, err) = said(&script(&lab, &["apply"]).output().expect("it runs"));
+        let (status, out, err) = said(&script(&lab, &["apply"]).bounded_output().expect("it runs"));
         assert_eq!((status, out.as_str()), (Some(2), ""), "{text}");
         assert!(err.contains("machine.conf: ") && err.contains("allowed: the number of a CPU"), "{err}");
         assert!(err.contains("(0,1,2,3)"), "{err}");
@@ -242,7 +246,7 @@ fn the_boot_line_gets_the_arguments_or_stays_as_it_is() {
     // As grub-mkconfig does it: sourced by a shell that ends on any failure.
     let boot_line = || {
         let text = format!("set -e\nGRUB_CMDLINE_LINUX=\"quiet\"\n{dropin}\necho \"$GRUB_CMDLINE_LINUX\"\n");
-        let output = Command::new("sh").args(["-c", &text]).output().expect("it runs");
+        let output = Command::new("sh").args(["-c", &text]).bounded_output().expect("it runs");
         let (status, out, _) = said(&output);
         assert_eq!(status, Some(0));
         out
@@ -302,7 +306,7 @@ fn a_card_of_another_driver_stays_its_own_and_a_dry_run_changes_nothing() {
 }
 
 fn said_status(command: &mut Command) -> Option<i32> {
-    said(&command.output().expect("it runs")).0
+    said(&command.bounded_output().expect("it runs")).0
 }
 
 // --- udev -------------------------------------------------------------------------------------------------
@@ -422,14 +426,18 @@ fn udev_itself_finds_the_rules_well_formed() {
         return;
     };
     // Known since version 254.
-    let knows = Command::new("udevadm").args(["verify", "--help"]).output().is_ok_and(|o| o.status.success());
+    let knows =
+        Command::new("udevadm").args(["verify", "--help"]).bounded_output().is_ok_and(|o| o.status.success());
     if !knows {
         println!("skipped: this udevadm cannot verify; the rules are read by a grammar of our own here");
         return;
     }
     // The group's name is resolved only where the user was made.
     let arguments = ["verify", "--resolve-names=never"];
-    let output =
-        udevadm.args(arguments).arg(sources().join("udev/70-phantom3.rules")).output().expect("it runs");
+    let output = udevadm
+        .args(arguments)
+        .arg(sources().join("udev/70-phantom3.rules"))
+        .bounded_output()
+        .expect("it runs");
     assert!(output.status.success(), "{output:?}");
 }

@@ -1,5 +1,6 @@
 //! The driver as a service of systemd: its units, and the driver as the unit starts it.
 
+use patience::prelude::*;
 use rustix::process::{Pid, Signal, kill_process};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -103,7 +104,8 @@ fn the_driver_is_little_exposed() {
         return;
     };
     let arguments = ["security", "--offline=true", "--no-pager", "--threshold=20"];
-    let output = analyze.args(arguments).arg(installed().path(DRIVER_UNIT)).output().expect("it runs");
+    let output =
+        analyze.args(arguments).arg(installed().path(DRIVER_UNIT)).bounded_output().expect("it runs");
     let (status, out, err) = said(&output);
     if err.contains("unrecognized option") {
         println!(
@@ -123,7 +125,7 @@ fn the_user_and_the_group_are_made() {
     let Some(mut sysusers) = tool("systemd-sysusers", "the line that makes them is there") else { return };
     let mut root = std::ffi::OsString::from("--root=");
     root.push(lab.path("/"));
-    let output = sysusers.arg("--dry-run").arg(root).output().expect("it runs");
+    let output = sysusers.arg("--dry-run").arg(root).bounded_output().expect("it runs");
     let (status, out, err) = said(&output);
     if err.contains("unrecognized option") {
         println!(
@@ -220,8 +222,7 @@ impl Service {
 
 impl Drop for Service {
     fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
+        self.child.end();
     }
 }
 
@@ -302,7 +303,7 @@ fn a_scene_is_felt_through_the_service() {
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/scenes/plane.toml");
     phantom3.arg("run").arg(scene).args(["--attach", "--headless", "--seconds", "0.2"]);
     phantom3.env("RUNTIME_DIRECTORY", service.run.path()).env_remove("PHANTOM3_SOCKET");
-    let (status, out, err) = said(&phantom3.output().expect("it runs"));
+    let (status, out, err) = said(&phantom3.bounded_output().expect("it runs"));
     assert_eq!(status, Some(0), "{err}");
     assert!(out.contains(&format!("process {}, was running", service.child.id())), "{out}");
 }
@@ -317,8 +318,10 @@ fn every_system_call_of_the_driver_passes_the_units_filter() {
     };
     let trace = tempfile::NamedTempFile::new().expect("a file");
     let trace_path = trace.path().to_str().expect("plain");
-    let works =
-        Command::new("strace").args(["-o", "/dev/null", "true"]).output().is_ok_and(|o| o.status.success());
+    let works = Command::new("strace")
+        .args(["-o", "/dev/null", "true"])
+        .bounded_output()
+        .is_ok_and(|o| o.status.success());
     if !works {
         println!("skipped: strace is not installed or may not trace; {instead}");
         return;
@@ -369,8 +372,10 @@ fn calls_allowed() -> Option<BTreeSet<String>> {
 
 /// The calls of a group, those of groups inside it included.
 fn members(group: &str) -> Option<BTreeSet<String>> {
-    let output =
-        Command::new("systemd-analyze").args(["syscall-filter", "--no-pager", group]).output().ok()?;
+    let output = Command::new("systemd-analyze")
+        .args(["syscall-filter", "--no-pager", group])
+        .bounded_output()
+        .ok()?;
     let text = String::from_utf8(output.stdout).ok().filter(|_| output.status.success())?;
     let mut calls = BTreeSet::new();
     for word in text.lines().skip(1).map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'))

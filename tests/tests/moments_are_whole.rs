@@ -5,6 +5,7 @@
 //! what something moves in a tick, 2 um at least.
 
 use nalgebra::Vector3;
+use patience::prelude::*;
 use phantom3::book::Book;
 use phantom3::fast_loop::{FastLoop, Tally, WhenFull};
 use phantom3::fast_thread::{self, FastEnd, FastShared};
@@ -96,11 +97,12 @@ fn watch(places: usize, pause: Duration) -> (Vec<Glimpse>, Tally) {
     let commander = attachment.commander.expect("the lease");
     let (_, thread) =
         fast_thread::start(fast, attachment.driver, commander, FastShared::default()).expect("a thread");
-    while !thread.is_finished() {
+    patience::until("the fast thread has done its ticks", || {
         slow.step();
         std::thread::sleep(pause);
-    }
-    let remains = thread.join().expect("no panic");
+        thread.is_finished()
+    });
+    let remains = thread.bounded_join().expect("no panic");
     assert_eq!(remains.end, FastEnd::Finished);
     slow.finish();
     (notes.0.take(), remains.fast.tally)

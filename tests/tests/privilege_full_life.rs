@@ -4,6 +4,7 @@
 use io_driver::config::ProcessConfig;
 use io_driver::sandbox;
 use io_driver::sandbox::allowed_calls::ALLOWED_CALLS;
+use patience::prelude::*;
 use rustix::process::Signal;
 use shm_abi::client::{self, AttachError};
 use shm_abi::handshake::{Request, RequestKind};
@@ -140,7 +141,8 @@ fn an_allowed_call_is_one_that_a_driver_makes_or_is_rare_for_a_reason() {
 }
 
 fn traced(program: &Command, trace: &Path) -> Option<Command> {
-    let tried = Command::new("strace").args(["-o", "/dev/null", "true"]).stderr(Stdio::null()).status();
+    let tried =
+        Command::new("strace").args(["-o", "/dev/null", "true"]).stderr(Stdio::null()).bounded_status();
     if !tried.is_ok_and(|status| status.success()) {
         println!(
             "skipped: there is no strace that may trace; that nothing is missing is tested elsewhere here"

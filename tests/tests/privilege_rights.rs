@@ -3,6 +3,7 @@
 //! However it got its real-time rights (root, capabilities, limits, not at all), it keeps no capability, and
 //! everything that it has to do later works without.
 
+use patience::prelude::*;
 use rustix::process::Signal;
 use std::collections::BTreeMap;
 use std::os::unix::fs::MetadataExt;
@@ -137,7 +138,7 @@ fn a_driver_that_never_had_a_capability_runs_by_its_limits() {
     let raises = std::process::Command::new("prlimit")
         .args(["--rtprio=1:1", "--memlock=unlimited:unlimited", "--", "true"])
         .stderr(Stdio::null())
-        .status()
+        .bounded_status()
         .is_ok_and(|status| status.success());
     let directory = directory_of_nobody();
     let socket = directory.path().join("driver.sock");
@@ -192,7 +193,7 @@ fn a_user_that_cannot_be_had_is_refused_before_anything_is_started() {
         let socket = directory.path().join("made/driver.sock");
         let mut command = command;
         command.args(["run", "--quiet", "--config"]).arg(&config).arg("--socket").arg(&socket);
-        let (status, _, err) = said(&command.output().expect("it runs"));
+        let (status, _, err) = said(&command.bounded_output().expect("it runs"));
         assert_eq!(status, Some(2), "{err}");
         assert!(!socket.exists());
         err

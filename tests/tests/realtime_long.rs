@@ -9,6 +9,7 @@
 
 use io_driver::meter;
 use io_driver::status::CounterStatus;
+use patience::prelude::*;
 use rt_core::histogram::Histogram;
 use rustix::process::{Pid, Signal, kill_process};
 use shm_abi::DriverView;
@@ -207,7 +208,7 @@ fn reference(config: &str, seconds: f64) -> Outcome {
         .spawn()
         .expect("the bare loop starts");
     child.stdin.take().expect("piped").write_all(config.as_bytes()).expect("it reads its configuration");
-    let output = child.wait_with_output().expect("our child");
+    let output = child.output_within(Duration::from_secs_f64(2.0 * seconds) + HANG);
     Outcome::parse(&String::from_utf8_lossy(&output.stdout)).expect("what the bare loop prints")
 }
 

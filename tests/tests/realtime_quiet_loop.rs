@@ -3,6 +3,8 @@
 //! The driver spins for replies here, as it does on a CPU of its own with real-time rights, though it may
 //! have neither: then it is late more often, and what it asks of the kernel is the same.
 
+use patience::Raised;
+use patience::prelude::*;
 use rustix::process::{Pid, Signal, kill_process};
 use shm_abi::client::Attachment;
 use shm_abi::{Command, DriverView};
@@ -58,18 +60,10 @@ fn with_commander(driver: &Driver, f: impl FnOnce(&DriverView)) {
     let stop = AtomicBool::new(false);
     std::thread::scope(|scope| {
         // If `f` panics the answering must end too, or the scope never would.
-        let _stop_at_the_end = StopAtTheEnd(&stop);
+        let _stop_at_the_end = Raised(&stop);
         scope.spawn(|| answer(&attachment, &stop));
         f(&attachment.driver);
     });
-}
-
-struct StopAtTheEnd<'a>(&'a AtomicBool);
-
-impl Drop for StopAtTheEnd<'_> {
-    fn drop(&mut self) {
-        self.0.store(true, Ordering::Relaxed);
-    }
 }
 
 /// Ticks answered in time.
@@ -140,8 +134,7 @@ fn the_applications_fast_thread_calls_nothing_but_waits_and_wakes() {
     let seen = driver.observe().driver;
     wait_for(|| fresh(&seen), 100);
     check_calls("fast thread", thread.tid, &seen, &["clock_nanosleep", "futex"]);
-    let _ = phantom3.kill();
-    let _ = phantom3.wait();
+    phantom3.end();
 }
 
 /// Traces a thread while the driver does a window of ticks.
@@ -277,8 +270,7 @@ fn the_loops_of_both_programs_fault_no_page_once_warm() {
         for thread in &threads {
             check_that_nothing_faults(thread, || fresh(&seen));
         }
-        let _ = phantom3.kill();
-        let _ = phantom3.wait();
+        phantom3.end();
     }
 }
 

@@ -4,6 +4,7 @@
 //! computer would. Nothing here depends on how fast they are: only that both get on, in every combination of
 //! who is confined.
 
+use patience::prelude::*;
 use shm_abi::doorbell::WaitMode;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -46,8 +47,7 @@ impl Application {
 
 impl Drop for Application {
     fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
+        self.0.end();
     }
 }
 
@@ -236,7 +236,7 @@ fn run_to_its_end(application: &mut Command) -> (Option<i32>, String, String) {
         application.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the application starts");
     // A report is shorter than a pipe is long, so nobody waits for a reader.
     wait_or_kill(&mut child);
-    programs::said(&child.wait_with_output().expect("our child"))
+    programs::said(&child.bounded_output())
 }
 
 /// As [`assert_mostly_fresh`], from the application's report.

@@ -190,12 +190,13 @@ fn a_zero_is_refused_while_the_arm_moves_and_changes_nothing() {
                 std::thread::sleep(Duration::from_millis(5));
             }
         });
+        let raised = patience::Raised(&stop);
         let end = zero(&stand, &["--wait", "1"]);
         client::zero(&stand.socket(), "test", 0).unwrap();
         let after = frame(&stand).tick + 200;
         wait_for("ticks after that", || frame(&stand).tick > after);
         let flags = flags(&stand);
-        stop.store(true, Ordering::Relaxed);
+        drop(raised);
         assert_eq!(end.status, Some(3), "{end:?}");
         assert!(end.err.contains("device f0 did not stand still for half a second within 1 s"), "{end:?}");
         assert_eq!(flags, DEVICE_NOT_ZEROED);

@@ -3,6 +3,8 @@
 
 #[path = "common/noise.rs"]
 mod noise;
+#[path = "solver/torsion.rs"]
+mod torsion;
 
 use nalgebra::{Matrix3, Vector3};
 use noise::Noise;

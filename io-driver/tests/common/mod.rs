@@ -201,7 +201,15 @@ impl Bench {
 
     /// Answers until the force is let through in full.
     pub fn ramp_in(&mut self, commander: &CommanderMemory, force: [f64; 3]) {
-        while self.tick(|frame, view| publish(commander, view, frame.tick, force)).0.authority < 1.0 {}
+        let mut answered = || self.tick(|frame, view| publish(commander, view, frame.tick, force)).0;
+        // Ramped out, answered for the first time, and ramped in.
+        let most_ticks = 2 * (RAMPS.in_ticks + RAMPS.out_ticks + RAMPS.max_command_age_ticks);
+        let last = (0..most_ticks).map(|_| answered()).find(|frame| frame.authority >= 1.0);
+        assert!(
+            last.is_some(),
+            "{most_ticks} answers do not let the force through in full: {:?}",
+            answered()
+        );
     }
 
     pub fn counter(&self, pick: impl Fn(&shm_abi::layout::Counters) -> &std::sync::atomic::AtomicU64) -> u64 {

@@ -2,6 +2,7 @@
 
 use super::c_header::{CHeader, directory_of};
 use super::golden::is_real_in_disguise;
+use patience::prelude::*;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -14,7 +15,7 @@ pub(crate) fn compiler() -> Option<Command> {
     let mut words = named.split_whitespace();
     let program = words.next().expect("CC is empty");
     let words: Vec<&str> = words.collect();
-    if let Err(error) = Command::new(program).args(&words).arg("--version").output() {
+    if let Err(error) = Command::new(program).args(&words).arg("--version").bounded_output() {
         println!("skipped: no C compiler: {named}: {error}");
         return None;
     }
@@ -37,7 +38,7 @@ pub(crate) fn reader_of(version: &str, into: &Path) -> Option<PathBuf> {
     let program = into.join(format!("reader-{version}"));
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/c_reader.c");
     compiler.args(FLAGS).arg("-I").arg(directory_of(version)).arg("-I").arg(into);
-    let compiled = compiler.arg(source).arg("-o").arg(&program).output().unwrap();
+    let compiled = compiler.arg(source).arg("-o").arg(&program).bounded_output().unwrap();
     assert!(compiled.status.success(), "{}", String::from_utf8_lossy(&compiled.stderr));
     Some(program)
 }

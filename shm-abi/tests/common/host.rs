@@ -1,6 +1,7 @@
 //! A server that polls in the background, so that the blocking client can talk to it from the test.
 
 use super::{HANG, info};
+use patience::BoundedThread;
 use shm_abi::DriverMemory;
 use shm_abi::segment::DriverInfo;
 use shm_abi::server::{Server, ServerEvent};
@@ -51,6 +52,6 @@ impl Host {
 impl Drop for Host {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
-        let _ = self.thread.take().map(JoinHandle::join);
+        let _ = self.thread.take().map(BoundedThread::bounded_join);
     }
 }

@@ -46,6 +46,9 @@ pub trait BoundedChild {
     /// As [`Child::wait_with_output`], within [`limit`].
     fn bounded_output(self) -> Output;
 
+    /// As [`Child::wait_with_output`], within a limit of its own.
+    fn output_within(self, limit: Duration) -> Output;
+
     /// Kills it and waits until it is gone; also fine for one that has ended.
     fn end(&mut self);
 }
@@ -62,10 +65,15 @@ impl BoundedChild for Child {
     }
 
     #[track_caller]
-    fn bounded_output(mut self) -> Output {
+    fn bounded_output(self) -> Output {
+        self.output_within(limit())
+    }
+
+    #[track_caller]
+    fn output_within(mut self, limit: Duration) -> Output {
         drop(self.stdin.take());
         let words = [Words::of(self.stdout.take()), Words::of(self.stderr.take())];
-        let status = end_of(&mut self, limit(), || {
+        let status = end_of(&mut self, limit, || {
             let said = words.each_ref().map(Words::until_now);
             format!("; it has said {:?} and on standard error {:?}", said[0], said[1])
         });

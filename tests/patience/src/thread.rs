@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvError, RecvTimeoutError, channel};
-use std::thread::JoinHandle;
+use std::thread::{JoinHandle, ScopedJoinHandle};
 use std::time::Duration;
 
 use crate::condition::is_met;
@@ -26,6 +26,15 @@ impl<T> BoundedThread for JoinHandle<T> {
         let is_finished = is_met(limit, || self.is_finished().then_some(())).is_some();
         assert!(is_finished, "waited {limit:?} in vain for the end of a thread");
         self.join()
+    }
+}
+
+/// Of a scope, which a panic would not end: the program is aborted as by [`watched`].
+impl<T> BoundedThread for ScopedJoinHandle<'_, T> {
+    type Value = T;
+
+    fn bounded_join(self) -> std::thread::Result<T> {
+        watched(limit(), "the end of a thread of a scope", || self.join())
     }
 }
 

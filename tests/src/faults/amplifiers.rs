@@ -275,12 +275,9 @@ fn wait_for_card(file: &Path, process: &mut Running) -> &'static Card {
 }
 
 /// Waits for something that only a hang keeps from coming.
-pub fn wait_for(what: &str, mut has_come: impl FnMut() -> bool) {
-    let begun = Instant::now();
-    while !has_come() {
-        assert!(begun.elapsed() < HANG, "{what} does not come");
-        std::thread::sleep(Duration::from_micros(500));
-    }
+#[track_caller]
+pub fn wait_for(what: &str, has_come: impl FnMut() -> bool) {
+    patience::until(what, has_come);
 }
 
 /// A directory for cards: in memory, where there is such a place.

@@ -1,5 +1,6 @@
 //! A commander that keeps to the rules: it answers every frame at once, always with the same force.
 
+use patience::prelude::*;
 use shm_abi::client::{Attachment, Connection};
 use shm_abi::{Command, CommanderMemory, DriverView};
 use std::sync::Arc;
@@ -45,7 +46,7 @@ impl Commander {
 
     fn join(&mut self) -> Option<CommanderMemory> {
         self.stop.store(true, Ordering::Relaxed);
-        self.thread.take().map(|thread| thread.join().expect("the thread does not panic"))
+        self.thread.take().map(|thread| thread.bounded_join().expect("the thread does not panic"))
     }
 }
 

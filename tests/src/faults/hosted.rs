@@ -9,6 +9,7 @@ use io_driver::driver::{describe, make_cycle};
 use io_driver::mail::{Letter, Sender, mail};
 use io_driver::real_loop::{Ended, RealLoop, Shared, Waiting};
 use io_driver::zeroing::DeviceSet;
+use patience::BoundedThread;
 use rt_core::log::RtLogDrain;
 use shm_abi::DriverMemory;
 use shm_abi::doorbell::WaitMode;
@@ -80,9 +81,9 @@ impl Hosted {
     }
 
     fn join(&mut self) -> Option<std::thread::Result<Ended>> {
-        let ended = self.loop_thread.take().map(JoinHandle::join);
+        let ended = self.loop_thread.take().map(BoundedThread::bounded_join);
         if let Some(thread) = self.socket_thread.take() {
-            let _ = thread.join();
+            let _ = thread.bounded_join();
         }
         ended
     }

@@ -2,6 +2,8 @@
 
 use crate::driver::{HANG, wait_or_kill_after};
 use crate::programs;
+use patience::prelude::*;
+use patience::{limit, watched};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::{Pid, Signal, kill_process};
 use std::io::{BufRead, BufReader, Read};
@@ -55,8 +57,7 @@ impl Running {
 
     /// Kills it, and returns when it is dead.
     pub fn kill(mut self) {
-        self.child.kill().expect("our own child");
-        self.child.wait().expect("our own child");
+        self.child.end();
     }
 
     /// Lets it go on if it was stopped.
@@ -123,16 +124,20 @@ impl Running {
             }
             String::from_utf8_lossy(&bytes).into_owned()
         };
-        let out = text(self.child.stdout.as_mut().map(|pipe| pipe as _));
-        let err = std::mem::take(&mut self.heard) + &text(self.child.stderr.as_mut().map(|pipe| pipe as _));
+        let Self { child, heard } = self;
+        // Whoever it left behind may hold its pipes open.
+        let (out, rest) = watched(limit(), "the pipes of a program that has ended are closed", || {
+            let out = text(child.stdout.as_mut().map(|pipe| pipe as _));
+            (out, text(child.stderr.as_mut().map(|pipe| pipe as _)))
+        });
+        let err = std::mem::take(heard) + &rest;
         End { status: status.code(), signal: status.signal(), out, err }
     }
 }
 
 impl Drop for Running {
     fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
+        self.child.end();
     }
 }
 

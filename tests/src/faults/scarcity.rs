@@ -1,5 +1,6 @@
 //! Programs for which something is scarce: a small disk in place of a directory, short files, few descriptors.
 
+use patience::prelude::*;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -17,7 +18,7 @@ pub fn on_small_disk(command: &Command, directory: &Path, options: &str) -> Opti
     let is_possible = |rights: &&&[&str]| {
         let mut unshare = Command::new("unshare");
         unshare.args(**rights).args(["sh", "-c", &mount]);
-        unshare.stderr(Stdio::null()).status().is_ok_and(|status| status.success())
+        unshare.stderr(Stdio::null()).bounded_status().is_ok_and(|status| status.success())
     };
     let Some(rights) = rights.iter().find(is_possible) else {
         eprintln!("skipped: no small disk can be mounted here; limited files cover the same path");
