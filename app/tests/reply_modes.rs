@@ -2,6 +2,7 @@
 
 use bytemuck::Zeroable;
 use io_driver::config::ReplyMode;
+use patience::prelude::*;
 use phantom3::fast_loop::{FastLoop, Turn, WhenFull};
 use phantom3::fast_thread::{self, FastEnd, FastShared};
 use phantom3::rig::{HandMode, Rig};
@@ -96,7 +97,7 @@ fn replies_go_on_after_the_last_row_until_the_lease_is_over() {
     assert!(shared.is_over.load(Ordering::Acquire), "whoever watches has been told meanwhile");
     tell(41, LEASE + 1);
     assert!(comes_true(|| thread.is_finished()), "it goes on although the lease is over");
-    let remains = thread.join().expect("no panic");
+    let remains = thread.bounded_join().expect("no panic");
     assert_eq!((remains.end, remains.fast.tally.rows <= ROWS), (FastEnd::Finished, true));
 }
 

@@ -7,7 +7,7 @@ use patience::prelude::*;
 use rustix::process::{Pid, Signal, kill_process};
 use std::fmt::Write as _;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 use system_tests::driver::{Driver, HANG};
 use system_tests::recording::Table;

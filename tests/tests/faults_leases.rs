@@ -2,11 +2,8 @@
 //! many that only look.
 
 use bytemuck::Zeroable;
-<<<<<<< HEAD
-use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
-=======
 use patience::prelude::*;
->>>>>>> c2d5191 (tests: bounded waits in the system tests)
+use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
 use shm_abi::{DriverView, Frame};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;

@@ -1,10 +1,7 @@
 //! What is set on the machine at boot: the root scripts on a made-up /sys and /proc, and the udev rules.
 
-<<<<<<< HEAD
-use rt_core::read_back::{ReadBack, Writers};
-=======
 use patience::prelude::*;
->>>>>>> c2d5191 (tests: bounded waits in the system tests)
+use rt_core::read_back::{ReadBack, Writers};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};

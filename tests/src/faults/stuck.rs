@@ -5,6 +5,7 @@
 
 use crate::driver::HANG;
 use crate::faults::stand::Stand;
+use patience::prelude::*;
 use shm_abi::client;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -99,8 +100,7 @@ fn attach(thread: u32, output: &Path, arguments: &[&str]) -> Option<Child> {
 }
 
 fn end(child: &mut Child) {
-    let _ = child.kill();
-    let _ = child.wait();
+    child.end();
 }
 
 /// Everything that clients do, in threads of its own: any of them may wait for a service that is stuck. The last asks the

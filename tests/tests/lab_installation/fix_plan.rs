@@ -1,6 +1,7 @@
 //! The doctor's fix plan on a machine that `install.sh` has set up: it adds, and takes nothing away.
 
 use io_driver::doctor::plan_names;
+use patience::prelude::*;
 use rt_core::doctor::machine::{LoopSpec, Machine};
 use rt_core::doctor::recorded::RecordedMachine;
 use rt_core::doctor::{self, plan};
@@ -182,7 +183,7 @@ fn a_file_of_the_plans_name_that_somebody_else_made_is_left_alone() {
             .map(|line| format!("{line}\n"))
             .collect();
         let call = format!("add {} <<'END'\nkernel.watchdog = 0\nEND\n", lab.path(path).display());
-        Command::new("sh").args(["-c", &(functions + &call)]).output().expect("it runs")
+        Command::new("sh").args(["-c", &(functions + &call)]).bounded_output().expect("it runs")
     };
     let err = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success() && err.contains("left alone, no fix plan made it"), "{err}");
