@@ -1,7 +1,7 @@
 //! From forces to motion: where a body is after a tick.
 //!
 //! Problem: what throws simulations apart is a light body between stiff springs, and a body that spins fast about no axis
-//! of symmetry (Melder ch. 8.2.6 reports that theirs shut down). What the thesis does is offered for comparison.
+//! of symmetry (Melder ch. 8.2.6 reports that theirs shut down). What the thesis does and prints is offered for comparison.
 //!
 //! | name | contact forces | turning | what it stands |
 //! |---|---|---|---|
@@ -9,6 +9,7 @@
 //! | `rk4` | at four [stages](rk4) of the tick, contact points frozen | the same four stages of quaternion and angular momentum | `k dt^2 / m` of some units |
 //! | `thesis-euler` | of the beginning of the tick | Melder eq. 5.9, 5.12-5.14: [no gyroscopic torque](thesis_euler) | the same |
 //! | `thesis-euler-gyroscopic` | of the beginning of the tick | Melder eq. 5.8, 5.12-5.14 | the same, and slow turning |
+//! | `thesis-euler-printed` | of the beginning of the tick | Melder eq. 5.15 as printed: [runs away](thesis_euler) | nothing that turns |
 //!
 //! Invariant: whatever the integrator, the momentum that a body gets in a tick is the sum of its rows' forces (and gravity)
 //! times the tick, and the forces on users are those times -1.
@@ -23,6 +24,7 @@ use nalgebra::Vector3;
 use crate::body::Body;
 use crate::wrench::Wrench;
 pub(crate) use midpoint::mean_angular_velocity_W;
+use thesis_euler::Gyroscopic;
 
 /// How forces become motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -37,15 +39,18 @@ pub enum Integrator {
     ThesisEuler,
     /// As the thesis has it with the gyroscopic torque.
     ThesisEulerGyroscopic,
+    /// The same with that torque as the thesis prints it, which lost a factor.
+    ThesisEulerPrinted,
 }
 
 impl Integrator {
     /// All of them, by what a scene calls them.
-    pub const NAMES: [(&'static str, Self); 4] = [
+    pub const NAMES: [(&'static str, Self); 5] = [
         ("implicit", Self::Implicit),
         ("rk4", Self::Rk4),
         ("thesis-euler", Self::ThesisEuler),
         ("thesis-euler-gyroscopic", Self::ThesisEulerGyroscopic),
+        ("thesis-euler-printed", Self::ThesisEulerPrinted),
     ];
 
     /// The one of this name.
@@ -61,6 +66,15 @@ impl Integrator {
     /// Whether its contact forces are those of the end of the tick.
     pub(crate) fn is_implicit(self) -> bool {
         self == Self::Implicit
+    }
+
+    /// What becomes of the gyroscopic torque in the thesis' own integrators.
+    fn gyroscopic(self) -> Gyroscopic {
+        match self {
+            Self::ThesisEulerGyroscopic => Gyroscopic::Corrected,
+            Self::ThesisEulerPrinted => Gyroscopic::Printed,
+            Self::Implicit | Self::Rk4 | Self::ThesisEuler => Gyroscopic::LeftOut,
+        }
     }
 
     /// Moves a body by what it gets in a tick.
@@ -84,12 +98,11 @@ impl Integrator {
                 }
             }
             Self::Rk4 => rk4::advance(body, velocity_W, gets, limits, dt_s),
-            Self::ThesisEuler | Self::ThesisEulerGyroscopic => {
+            Self::ThesisEuler | Self::ThesisEulerGyroscopic | Self::ThesisEulerPrinted => {
                 body.velocity_W = velocity_W;
                 //= melder#5.11
                 body.centre_W += body.velocity_W * dt_s;
-                let is_gyroscopic = self == Self::ThesisEulerGyroscopic;
-                thesis_euler::turn(body, &gets.wrench.torque_W, is_gyroscopic, limits, dt_s);
+                thesis_euler::turn(body, &gets.wrench.torque_W, self.gyroscopic(), limits, dt_s);
             }
         }
         // The axes have turned under the angular momentum: about a thinner one it is a faster turn.

@@ -56,6 +56,7 @@ impl Rig {
                 IntegratorSpec::Rk4 => Integrator::Rk4,
                 IntegratorSpec::ThesisEuler => Integrator::ThesisEuler,
                 IntegratorSpec::ThesisEulerGyroscopic => Integrator::ThesisEulerGyroscopic,
+                IntegratorSpec::ThesisEulerPrinted => Integrator::ThesisEulerPrinted,
             },
             response: match dynamics.response {
                 ResponseSpec::Force => Response::Force,

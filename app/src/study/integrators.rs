@@ -2,13 +2,15 @@
 //!
 //! Problem: an integrator for haptics has to stand a gram between fingers of 5000 N/m at 1 kHz, and a spinning body without
 //! symmetry for minutes. The thesis found Euler's method sufficient (its ch. 7.5.1), and a gyroscopic torque that shut the
-//! simulation down (ch. 8.2.6).
+//! simulation down (ch. 8.2.6): as printed (eq. 5.15, 8.1) the term lost a factor, which `thesis-euler-printed` shows.
 //!
-//! Model: [`spin`] lets a body of three different moments turn without torque for a minute; [`held`] lets two still fingers
-//! hold a ball that is pushed once, and looks for the largest stiffness that does not throw it, by mass.
+//! Model: [`spin`] lets a body of three different moments turn without torque for a minute; [`lean`] turns a spinning disc a
+//! little and compares what each tick makes of that with its closed form; [`held`] lets two still fingers hold a ball that is
+//! pushed once, and looks for the largest stiffness that does not throw it, by mass.
 //! Cost: some ten seconds of one CPU.
 
 pub mod held;
+pub mod lean;
 pub mod spin;
 pub mod table;
 
@@ -25,8 +27,8 @@ use std::path::PathBuf;
 /// What is asked.
 #[derive(Debug, Args)]
 pub struct IntegratorsArgs {
-    /// Which: implicit, rk4, thesis-euler, thesis-euler-gyroscopic
-    #[arg(long, value_name = "NAME,...", value_delimiter = ',', default_values = ["implicit", "rk4", "thesis-euler", "thesis-euler-gyroscopic"], value_parser = parse_integrator)]
+    /// Which: implicit, rk4, thesis-euler, thesis-euler-gyroscopic, thesis-euler-printed
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',', default_values = ["implicit", "rk4", "thesis-euler", "thesis-euler-gyroscopic", "thesis-euler-printed"], value_parser = parse_integrator)]
     integrators: Vec<Integrator>,
     /// How fast the body spins (rad/s)
     #[arg(long, value_name = "RAD/S,...", value_delimiter = ',', default_values_t = [1.0, 10.0, 100.0, 1000.0], value_parser = parse_spin)]
@@ -43,7 +45,7 @@ pub struct IntegratorsArgs {
     /// Ticks per second (Hz)
     #[arg(long, value_name = "HZ", default_value = "1000", value_parser = parse_rate)]
     rate: f64,
-    /// Where the results go: integrators-spin.csv, integrators-stiffness.csv, integrators.svg, integrators.png
+    /// Where the results go: integrators-spin.csv, integrators-lean.csv, integrators-stiffness.csv, integrators.svg and .png
     #[arg(long, value_name = "DIR", default_value = "study-integrators")]
     out: PathBuf,
 }
@@ -57,6 +59,17 @@ pub struct Spun {
     pub spin_rad_s: f64,
     /// Largest errors.
     pub errors: spin::Errors,
+}
+
+/// What a tick makes of a spinning disc's lean.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Leant {
+    /// How it was integrated.
+    pub integrator: Integrator,
+    /// How fast it spins (rad/s).
+    pub spin_rad_s: f64,
+    /// By what it is multiplied, measured and in theory.
+    pub growth: [f64; 2],
 }
 
 /// How stiff a body may be held.
@@ -93,7 +106,7 @@ pub fn execute(args: &IntegratorsArgs, signals: &StopSignals) -> Result<Stop, Ru
         done += 1;
         line.show(|| format!("{done} of {count} cases"));
     };
-    let (mut spun, mut held) = (Vec::new(), Vec::new());
+    let (mut spun, mut leant, mut held) = (Vec::new(), Vec::new(), Vec::new());
     for &integrator in &args.integrators {
         for &spin_rad_s in &args.spins {
             let Some(errors) = spin::errors(integrator, spin_rad_s, args.seconds, dt_s, &|| stops(signals))
@@ -101,6 +114,9 @@ pub fn execute(args: &IntegratorsArgs, signals: &StopSignals) -> Result<Stop, Ru
                 return Ok(interrupted(signals));
             };
             spun.push(Spun { integrator, spin_rad_s, errors });
+            let theory = lean::growth_in_theory(integrator, spin_rad_s, dt_s);
+            let growth = lean::growth(integrator, spin_rad_s, dt_s).map(|found| [found, theory]);
+            leant.extend(growth.map(|growth| Leant { integrator, spin_rad_s, growth }));
             told();
         }
         for &mass_kg in &args.masses {
@@ -117,14 +133,15 @@ pub fn execute(args: &IntegratorsArgs, signals: &StopSignals) -> Result<Stop, Ru
     }
     line.end();
     // Nobody to tell is no reason to fail.
-    let _ = std::io::stdout().write_all(table::text(args, &spun, &held).as_bytes());
-    write(args, &spun, &held)?;
+    let _ = std::io::stdout().write_all(table::text(args, &spun, &leant, &held).as_bytes());
+    write(args, &spun, &leant, &held)?;
     Ok(Stop::Finished)
 }
 
-fn write(args: &IntegratorsArgs, spun: &[Spun], held: &[Held]) -> Result<(), RunFailure> {
+fn write(args: &IntegratorsArgs, spun: &[Spun], leant: &[Leant], held: &[Held]) -> Result<(), RunFailure> {
     let tables = [
         ("integrators-spin.csv", table::spin_csv(spun)),
+        ("integrators-lean.csv", table::lean_csv(leant)),
         ("integrators-stiffness.csv", table::held_csv(held)),
     ];
     for (name, text) in tables {
@@ -141,7 +158,7 @@ fn write(args: &IntegratorsArgs, spun: &[Spun], held: &[Held]) -> Result<(), Run
         .map_err(|error| RunFailure::Results(format!("cannot write the picture: {error}")))?;
     let place = args.out.display();
     let said = format!(
-        "written      {place}/integrators-spin.csv, integrators-stiffness.csv, integrators.svg, .png\n"
+        "written      {place}/integrators-spin.csv, integrators-lean.csv, integrators-stiffness.csv, integrators.svg, .png\n"
     );
     let _ = std::io::stdout().write_all(said.as_bytes());
     Ok(())

@@ -46,6 +46,8 @@ pub enum IntegratorSpec {
     ThesisEuler,
     /// The same with the gyroscopic term.
     ThesisEulerGyroscopic,
+    /// The same with that term as it is printed, which runs away.
+    ThesisEulerPrinted,
 }
 
 /// How contacts between entities answer.
@@ -69,6 +71,7 @@ impl DynamicsSpec {
                 "rk4" => IntegratorSpec::Rk4,
                 "thesis-euler" => IntegratorSpec::ThesisEuler,
                 "thesis-euler-gyroscopic" => IntegratorSpec::ThesisEulerGyroscopic,
+                "thesis-euler-printed" => IntegratorSpec::ThesisEulerPrinted,
                 _ => IntegratorSpec::Implicit,
             },
         };
@@ -140,5 +143,7 @@ const LISTS_KEYS: Vocabulary =
 const ALLOWED: &str = "a table such as { kind = \"impulse\", restitution = 0.5 } or { kind = \"force\" }";
 const KEYS: Vocabulary = Vocabulary { available: &["kind", "restitution"], later: &[] };
 const RESPONSES: Vocabulary = Vocabulary { available: &["force", "impulse"], later: &[] };
-const INTEGRATORS: Vocabulary =
-    Vocabulary { available: &["implicit", "rk4", "thesis-euler", "thesis-euler-gyroscopic"], later: &[] };
+const INTEGRATORS: Vocabulary = Vocabulary {
+    available: &["implicit", "rk4", "thesis-euler", "thesis-euler-gyroscopic", "thesis-euler-printed"],
+    later: &[],
+};

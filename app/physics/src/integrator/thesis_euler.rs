@@ -1,34 +1,51 @@
 //! Turns a body as the thesis does (Melder eq. 5.8, 5.9, 5.12-5.14), for comparison.
 //!
 //! Model: the angular velocity in W is what goes on from tick to tick; a rotation matrix is turned by a small angle and made
-//! orthonormal again in three steps. Corrected are 5.14 (omega is in W, so that `R = dR R_old`; the thesis has `R_old dR`,
-//! which is right only for an omega in the body's frame) and 5.15, the same as 5.8 written out, which lost its J.
-//! In normal use the thesis leaves the gyroscopic term out (eq. 5.9); with it, angular velocities that grow without end
-//! shut it down (ch. 8.2.6). Both are so here: neither keeps the angular momentum of a body without symmetry.
+//! orthonormal again in three steps. Corrected is 5.14 (omega is in W, so that `R = dR R_old`; the thesis has `R_old dR`,
+//! which is right only for an omega in the body's frame). The gyroscopic term has three forms, [`Gyroscopic`].
+//!
+//! A tick adds to omega a piece that is perpendicular to it, and so makes it longer. A body with an axis of symmetry u
+//! (moments J3 about it, Jt across) that spins at s about u and is turned slowly goes round u in its own frame at
+//! `lambda = s (J3 - Jt) / Jt`; Euler's method stretches what is across by `sqrt(1 + (lambda dt)^2)` a tick, and
+//! the matrix of a small angle (5.13) stretches the axis by `sqrt(1 + (s dt)^2)`. The printed
+//! term lost its J (5.15 and 8.1), and with it its unit: its rate is `lambda / J3`, some 10,000 times too fast where
+//! J3 is 1e-4 kg m^2. There the angular velocity squares itself from tick to tick and is no number after some ten: the end of
+//! the simulation that ch. 8.2.6 tells of. With the J put back (5.8) nothing runs away at the speed of hands, yet
+//! neither form keeps the angular momentum of a body without symmetry.
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use super::{Limits, limited};
 use crate::body::Body;
 
+/// Forms of the gyroscopic term in the thesis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Gyroscopic {
+    /// In normal use (eq. 5.9).
+    LeftOut,
+    /// Eq. 5.8: `J^-1 (omega x J omega)`.
+    Corrected,
+    /// As eq. 5.15 and 8.1 print it: `(J^-1 omega) x omega`.
+    Printed,
+}
+
 /// A tick of turning under a torque (N m).
-pub(super) fn turn(
-    body: &mut Body,
-    torque_W: &Vector3<f64>,
-    is_gyroscopic: bool,
-    limits: &Limits,
-    dt_s: f64,
-) {
+pub(super) fn turn(body: &mut Body, torque_W: &Vector3<f64>, term: Gyroscopic, limits: &Limits, dt_s: f64) {
     if body.rotation_locked {
         return;
     }
     let omega_old_W = body.angular_velocity_W();
-    let accelerates_W = if is_gyroscopic {
+    //= melder#5.9
+    let pressed_W = body.inverse_inertia_W() * torque_W;
+    let accelerates_W = match term {
+        Gyroscopic::LeftOut => pressed_W,
+        //= melder#5.8
+        Gyroscopic::Corrected => {
+            pressed_W - body.inverse_inertia_W() * omega_old_W.cross(&(body.inertia_W() * omega_old_W))
+        }
         //= melder#5.15
-        body.inverse_inertia_W() * (torque_W - omega_old_W.cross(&(body.inertia_W() * omega_old_W)))
-    } else {
-        //= melder#5.9
-        body.inverse_inertia_W() * torque_W
+        //= melder#8.1
+        Gyroscopic::Printed => pressed_W - (body.inverse_inertia_W() * omega_old_W).cross(&omega_old_W),
     };
     //= melder#5.12
     let omega_W = limited(omega_old_W + accelerates_W * dt_s, limits.spin_rad_s);

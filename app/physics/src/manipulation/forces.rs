@@ -30,7 +30,7 @@ impl Manipulation {
                     explicit::fix(&mut self.rows, at, &force_W, torque_nm, &mut self.fixed);
                 }
             }
-            Integrator::ThesisEuler | Integrator::ThesisEulerGyroscopic => {
+            Integrator::ThesisEuler | Integrator::ThesisEulerGyroscopic | Integrator::ThesisEulerPrinted => {
                 for at in 0..springs {
                     let (force_W, torque_nm) =
                         explicit::at_start(&self.rows[at], &self.bodies, at < self.touching, dt_s);
