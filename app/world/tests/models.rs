@@ -321,7 +321,7 @@ fn files_that_cannot_be_read_are_refused() {
     // A file of holes: it takes no room on the disk, and is not read.
     let large = directory.path().join("large.stl");
     std::fs::File::create(&large).and_then(|file| file.set_len((1 << 30) + 1)).expect("a file of holes");
-    assert_eq!(refused(&large), "1073741825 bytes; allowed: at most 1073741824");
+    assert_eq!(refused(&large), "larger than 1073741824 bytes; allowed: at most so many");
 }
 
 /// Corners of all faces as single precision, which is all that binary STL holds.
