@@ -55,7 +55,7 @@ mod tests {
 
     #[test]
     fn one_process_and_one_user_leave_places_for_others() {
-        let process = vec![owner(1, 1); MAX_OBSERVERS_OF_PROCESS];
+        let process = [owner(1, 1); MAX_OBSERVERS_OF_PROCESS];
         assert!(!may_observe(owner(1, 1), process.iter().copied()));
         assert!(may_observe(owner(1, 2), process.iter().copied()));
         let user: Vec<_> = (0..MAX_OBSERVERS_OF_USER as u32).map(|pid| owner(1, pid)).collect();
