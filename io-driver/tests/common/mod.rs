@@ -203,7 +203,7 @@ impl Bench {
     pub fn ramp_in(&mut self, commander: &CommanderMemory, force: [f64; 3]) {
         let mut answered = || self.tick(|frame, view| publish(commander, view, frame.tick, force)).0;
         // Ramped out, answered for the first time, and ramped in.
-        let most_ticks = 2 * (RAMPS.in_ticks + RAMPS.out_ticks + RAMPS.max_command_age_ticks);
+        let most_ticks = 2 * (RAMPS.in_ns + RAMPS.out_ns + RAMPS.max_command_age_ns) / PERIOD_NS;
         let last = (0..most_ticks).map(|_| answered()).find(|frame| frame.authority >= 1.0);
         assert!(
             last.is_some(),
