@@ -276,6 +276,11 @@ mod tests {
     fn a_name_is_cut_between_characters_and_cleaned_of_controls() {
         let long = "ä".repeat(NAME_BYTES);
         assert_eq!(name_text(&name_bytes(&long)), "ä".repeat(NAME_BYTES / 2));
+        // The last character would lie half within the room.
+        assert_eq!(
+            name_text(&name_bytes(&format!("a{long}"))),
+            format!("a{}", "ä".repeat(NAME_BYTES / 2 - 1))
+        );
         assert_eq!(name_text(&name_bytes("a\u{1b}[2J")), "a?[2J");
     }
 }

@@ -2,6 +2,7 @@
 
 mod common;
 
+use common::desk::Desk;
 use common::directory;
 use common::host::Host;
 use shm_abi::client::{self, AttachError};
@@ -116,4 +117,39 @@ fn a_directory_that_cannot_be_made_is_named() {
     let message = Server::bind(&file.join("sub/driver.sock")).unwrap_err().to_string();
     assert!(message.starts_with("cannot create the directory "), "{message}");
     assert!(message.ends_with("; choose another place with --socket or PHANTOM3_SOCKET"), "{message}");
+}
+
+/// The flags of every socket of this process that is bound to `path`, as the kernel tells them.
+fn flags_of_sockets_at(path: &Path) -> Vec<u32> {
+    let table = std::fs::read_to_string("/proc/net/unix").unwrap();
+    let at_path = |line: &&str| line.split_whitespace().nth(7).is_some_and(|name| Path::new(name) == path);
+    let inodes = table.lines().filter(at_path).filter_map(|line| line.split_whitespace().nth(6));
+    let links: Vec<String> = inodes.map(|inode| format!("socket:[{inode}]")).collect();
+    let is_ours = |entry: &std::fs::DirEntry| {
+        let link = std::fs::read_link(entry.path()).unwrap_or_default();
+        links.iter().any(|known| link.as_os_str() == known.as_str())
+    };
+    let flags_of = |entry: std::fs::DirEntry| {
+        let path = Path::new("/proc/self/fdinfo").join(entry.file_name());
+        let text = std::fs::read_to_string(path).unwrap();
+        let flags = text.lines().find_map(|line| line.strip_prefix("flags:")).unwrap().trim().to_string();
+        u32::from_str_radix(&flags, 8).unwrap()
+    };
+    std::fs::read_dir("/proc/self/fd").unwrap().map(Result::unwrap).filter(is_ours).map(flags_of).collect()
+}
+
+#[test]
+fn no_socket_of_the_server_can_block_its_thread_or_is_left_to_a_child() {
+    let mut desk = Desk::open();
+    // The kernel knows the listener by the name under which it was bound.
+    let bound = std::fs::read_to_string("/proc/net/unix").unwrap();
+    let place = desk.server.path().to_str().unwrap().to_string();
+    let name =
+        bound.lines().filter_map(|line| line.split_whitespace().nth(7)).find(|name| name.starts_with(&place));
+    let name = Path::new(name.expect("the listener")).to_path_buf();
+    let _talking = [desk.connect(), desk.connect()];
+    let flags = flags_of_sockets_at(&name);
+    assert_eq!(flags.len(), 3, "the listener and two connections");
+    let needed = (rustix::fs::OFlags::NONBLOCK | rustix::fs::OFlags::CLOEXEC).bits();
+    assert!(flags.iter().all(|flags| flags & needed == needed), "{flags:?}");
 }
