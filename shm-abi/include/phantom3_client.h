@@ -267,6 +267,21 @@ static inline int phantom_is_granted(const PhantomRequest *request, const Phanto
         snprintf(error, PHANTOM_ERROR_BYTES,
                  "the devices are commanded by process %llu (%.*s) already; end it first, or attach as an observer",
                  (unsigned long long)answer->holder_pid, PHANTOM_NAME_BYTES, (const char *)answer->holder_name);
+    } else if (answer->verdict == PHANTOM_VERDICT_NOT_ALLOWED && answer->allowed_group_plus_one) {
+        snprintf(error, PHANTOM_ERROR_BYTES,
+                 "the driver does not let user %u ask for this (kind %llu): members of group %llu may",
+                 (unsigned)geteuid(), (unsigned long long)request->kind,
+                 (unsigned long long)(answer->allowed_group_plus_one - 1));
+    } else if (answer->verdict == PHANTOM_VERDICT_NOT_ALLOWED) {
+        snprintf(error, PHANTOM_ERROR_BYTES,
+                 "the driver does not let user %u ask for this (kind %llu): root and the user that it runs as may",
+                 (unsigned)geteuid(), (unsigned long long)request->kind);
+    } else if (answer->verdict == PHANTOM_VERDICT_UNKNOWN_KIND) {
+        snprintf(error, PHANTOM_ERROR_BYTES,
+                 "the driver speaks version %u.%u and does not know requests of kind %llu, this program speaks %u.%u; "
+                 "start the driver that belongs to this program",
+                 (unsigned)(found >> 32), (unsigned)found, (unsigned long long)request->kind, (unsigned)(own >> 32),
+                 (unsigned)own);
     } else if (answer->verdict != PHANTOM_VERDICT_GRANTED) {
         snprintf(error, PHANTOM_ERROR_BYTES, "the driver refused with verdict %llu (see PhantomVerdict)",
                  (unsigned long long)answer->verdict);
@@ -300,32 +315,92 @@ static inline int phantom_connect(const char *path, char *error) {
     return -1;
 }
 
-/* Attaches with a request of any content. 0: done; -1: see `error`, which has PHANTOM_ERROR_BYTES. */
+/* Closes what descriptors there are. */
+static inline void phantom_close(int fds[2]) {
+    for (int i = 0; i < 2; i++)
+        if (fds[i] >= 0) close(fds[i]);
+}
+
+/* Sends a request and receives the answer, which must grant it. Returns the connection and fills in the descriptors
+ * that came, which are the caller's then; -1: see `error`. */
+static inline int phantom_exchange(const char *path, const PhantomRequest *request, PhantomAnswer *answer, int fds[2],
+                                   char *error) {
+    fds[0] = fds[1] = -1;
+    int connection = phantom_connect(path, error);
+    if (connection < 0) return -1;
+    /* A driver without room for us answers unasked and hangs up, so that a failed send is no reason to stop. */
+    (void)!send(connection, request, sizeof *request, MSG_NOSIGNAL);
+    if (phantom_receive(connection, answer, fds) < sizeof *answer) {
+        snprintf(error, PHANTOM_ERROR_BYTES, "the driver at %.200s gives no answer; it may be stopped, or no driver",
+                 path);
+    } else if (phantom_is_granted(request, answer, error)) {
+        return connection;
+    }
+    phantom_close(fds);
+    close(connection);
+    return -1;
+}
+
+/* Whether the driver says of itself what can be; else `error` says what was found. */
+static inline int phantom_is_possible(const PhantomDriverSegment *segment, char *error) {
+    const PhantomDriverHeader *header = &segment->header;
+    const uint64_t most_ticks = UINT64_C(1) << 32;
+    const struct {
+        const char *what;
+        const uint64_t *word;
+        uint64_t least, most;
+    } bounds[] = {
+        {"segment of so many bytes", &header->segment_bytes, sizeof *segment, sizeof *segment},
+        {"period in nanoseconds", &header->period_ns, 1, UINT64_C(10000000000)},
+        {"reply budget in nanoseconds", &header->reply_budget_ns, 1, UINT64_MAX},
+        {"age of a command in ticks", &header->max_command_age_ticks, 0, most_ticks},
+        {"ramp out in ticks", &header->ramp_out_ticks, 1, most_ticks},
+        {"ramp in in ticks", &header->ramp_in_ticks, 1, most_ticks},
+        {"number of devices", &header->device_count, 0, PHANTOM_MAX_DEVICES},
+    };
+    for (size_t i = 0; i < sizeof bounds / sizeof *bounds; i++) {
+        uint64_t found = __atomic_load_n(bounds[i].word, __ATOMIC_ACQUIRE);
+        if (bounds[i].least <= found && found <= bounds[i].most) continue;
+        snprintf(error, PHANTOM_ERROR_BYTES,
+                 "the driver says of itself: %s: %llu, expected %llu to %llu; do not trust this driver, start the one "
+                 "that belongs to this program",
+                 bounds[i].what, (unsigned long long)found, (unsigned long long)bounds[i].least,
+                 (unsigned long long)bounds[i].most);
+        return 0;
+    }
+    return 1;
+}
+
+/* Attaches with a request of any content, of the two kinds that hand over memory; no other is sent. 0: done; -1: see
+ * `error`, which has PHANTOM_ERROR_BYTES. */
 static inline int phantom_attach_with(const char *path, const PhantomRequest *request, PhantomAttachment *driver,
                                       char *error) {
     PhantomAnswer answer;
-    int fds[2] = {-1, -1};
+    int fds[2];
+    int commands = request->kind == PHANTOM_REQUEST_KIND_COMMAND;
     memset(driver, 0, sizeof *driver);
-    driver->connection = phantom_connect(path, error);
-    if (driver->connection < 0) return -1;
-    /* A driver without room for us answers unasked and hangs up, so that a failed send is no reason to stop. */
-    (void)!send(driver->connection, request, sizeof *request, MSG_NOSIGNAL);
-    if (phantom_receive(driver->connection, &answer, fds) < sizeof answer) {
-        snprintf(error, PHANTOM_ERROR_BYTES, "the driver at %.200s gives no answer; it may be stopped, or no driver",
-                 path);
-    } else if (phantom_is_granted(request, &answer, error)) {
-        driver->segment = (const PhantomDriverSegment *)phantom_map(fds[0], sizeof *driver->segment, PROT_READ, error);
-        if (driver->segment && request->kind == PHANTOM_REQUEST_KIND_COMMAND) {
-            driver->commander = (PhantomCommanderSegment *)phantom_map(fds[1], sizeof *driver->commander,
-                                                                       PROT_READ | PROT_WRITE, error);
-            driver->lease = answer.lease;
-            /* From here on the driver may forbid further mappings. */
-            if (driver->commander) __atomic_store_n(&driver->commander->header.mapped, 1, __ATOMIC_RELEASE);
-        }
+    driver->connection = -1;
+    if (!commands && request->kind != PHANTOM_REQUEST_KIND_OBSERVE) {
+        snprintf(error, PHANTOM_ERROR_BYTES,
+                 "a request of kind %llu hands over nothing to attach to, and was not sent; use phantom_stop, "
+                 "phantom_emergency_stop, phantom_clear_fault, phantom_zero or phantom_end_lease",
+                 (unsigned long long)request->kind);
+        return -1;
     }
-    for (int i = 0; i < 2; i++)
-        if (fds[i] >= 0) close(fds[i]);
-    if (driver->segment && (driver->commander || request->kind != PHANTOM_REQUEST_KIND_COMMAND)) return 0;
+    driver->connection = phantom_exchange(path, request, &answer, fds, error);
+    if (driver->connection < 0) return -1;
+    driver->segment = (const PhantomDriverSegment *)phantom_map(fds[0], sizeof *driver->segment, PROT_READ, error);
+    int is_usable = driver->segment && phantom_is_possible(driver->segment, error);
+    if (is_usable && commands) {
+        driver->commander = (PhantomCommanderSegment *)phantom_map(fds[1], sizeof *driver->commander,
+                                                                   PROT_READ | PROT_WRITE, error);
+        driver->lease = answer.lease;
+        is_usable = driver->commander != NULL;
+        /* From here on the driver may forbid further mappings. */
+        if (is_usable) __atomic_store_n(&driver->commander->header.mapped, 1, __ATOMIC_RELEASE);
+    }
+    phantom_close(fds);
+    if (is_usable) return 0;
     phantom_detach(driver);
     return -1;
 }
@@ -336,6 +411,72 @@ static inline int phantom_attach(const char *path, uint64_t kind, const char *na
                                  char *error) {
     PhantomRequest request = phantom_request(kind, name);
     return phantom_attach_with(path, &request, driver, error);
+}
+
+/* Asks for what hands over nothing. 0: the driver has heard it; whether it is done, a frame tells. -1: see `error`. */
+static inline int phantom_ask(const char *path, const PhantomRequest *request, char *error) {
+    PhantomAnswer answer;
+    int fds[2];
+    int connection = phantom_exchange(path, request, &answer, fds, error);
+    if (connection < 0) return -1;
+    phantom_close(fds);
+    close(connection);
+    return 0;
+}
+
+/* Asks the driver to end: it writes zero to the motors and leaves. As phantom_ask. */
+static inline int phantom_stop(const char *path, const char *name, char *error) {
+    PhantomRequest request = phantom_request(PHANTOM_REQUEST_KIND_STOP, name);
+    return phantom_ask(path, &request, error);
+}
+
+/* Asks the driver to leave its fault state. As phantom_ask. */
+static inline int phantom_clear_fault(const char *path, const char *name, char *error) {
+    PhantomRequest request = phantom_request(PHANTOM_REQUEST_KIND_CLEAR_FAULT, name);
+    return phantom_ask(path, &request, error);
+}
+
+/* Tells the driver that devices lie in their home pose now: bit i of `devices` means device i, 0 all. As phantom_ask. */
+static inline int phantom_zero(const char *path, const char *name, uint64_t devices, char *error) {
+    PhantomRequest request = phantom_request(PHANTOM_REQUEST_KIND_ZERO, name);
+    request.devices = devices;
+    return phantom_ask(path, &request, error);
+}
+
+/* Asks that the lease of whoever commands ends. As phantom_ask. */
+static inline int phantom_end_lease(const char *path, const char *name, char *error) {
+    PhantomRequest request = phantom_request(PHANTOM_REQUEST_KIND_END_LEASE, name);
+    return phantom_ask(path, &request, error);
+}
+
+/* Sends a datagram to the driver's stop socket, which lies beside its own: whatever comes there stops the motors, and
+ * no connection is needed for it. Never waits. 0: it is on its way. */
+static inline int phantom_send_stop(const char *path) {
+    static const char suffix[] = ".stop";
+    struct sockaddr_un address;
+    size_t length = strlen(path);
+    memset(&address, 0, sizeof address);
+    address.sun_family = AF_UNIX;
+    if (length + sizeof suffix > sizeof address.sun_path) return -1;
+    memcpy(address.sun_path, path, length);
+    memcpy(address.sun_path + length, suffix, sizeof suffix);
+    int sender = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    if (sender < 0) return -1;
+    ssize_t sent = sendto(sender, "stop", 4, MSG_DONTWAIT | MSG_NOSIGNAL, (const struct sockaddr *)&address,
+                          sizeof address);
+    /* A queue that is full is full of stops. */
+    int is_on_its_way = sent >= 0 || errno == EAGAIN || errno == EWOULDBLOCK;
+    close(sender);
+    return is_on_its_way ? 0 : -1;
+}
+
+/* Asks the driver to switch all motors off at once; they stay off until phantom_clear_fault. By datagram, or, where the
+ * driver has no stop socket, over a connection. 0: the driver is told; a frame of state PHANTOM_DRIVER_STATE_FAULT tells
+ * that it is done. -1: see `error`. */
+static inline int phantom_emergency_stop(const char *path, const char *name, char *error) {
+    if (!phantom_send_stop(path)) return 0;
+    PhantomRequest request = phantom_request(PHANTOM_REQUEST_KIND_EMERGENCY_STOP, name);
+    return phantom_ask(path, &request, error);
 }
 
 #endif /* PHANTOM3_CLIENT_H */

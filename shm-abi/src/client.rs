@@ -155,6 +155,12 @@ pub enum AttachError {
         /// Who may.
         allowed: String,
     },
+    /// The request is one that is answered, and hands over nothing.
+    #[error("nobody attaches to {wish}, and nothing was sent; that request has a function of its own")]
+    NothingToAttach {
+        /// What was asked, as [`RequestKind::wish`] has it.
+        wish: &'static str,
+    },
     /// It refused for a reason of its own.
     #[error("the driver refused: {0}")]
     Refused(String),
@@ -218,8 +224,16 @@ pub fn end_lease(socket: &Path, name: &str) -> Result<(), AttachError> {
     exchange(socket, &Request::new(RequestKind::EndLease, name)).map(|_| ())
 }
 
-/// Attaches with a request of any content; what [`observe`] and [`command`] do, and tests that lie.
+/// Attaches with a request of any content; what [`observe`] and [`command`] do, and tests that lie. A request that
+/// hands over nothing is not sent: it would be done, and look as if it had failed.
+///
+/// # Errors
+/// Whatever stands in the way.
 pub fn attach(socket: &Path, request: &Request) -> Result<Attachment, AttachError> {
+    match RequestKind::from_word(request.kind) {
+        None | Some(RequestKind::Observe | RequestKind::Command) => {}
+        Some(other) => return Err(AttachError::NothingToAttach { wish: other.wish() }),
+    }
     let (answer, fds, connection) = exchange(socket, request)?;
     let mut fds = fds.into_iter();
     let driver =

@@ -10,6 +10,7 @@
 //! is as long as the segment type, page-aligned, and the type is made of atomic words only, for which
 //! every bit pattern and every concurrent change is valid.
 
+mod bounds;
 mod offer;
 
 pub use offer::{LeaseOffer, MAPPED_WITHIN};
@@ -153,6 +154,21 @@ pub enum SegmentError {
         /// The word expected.
         expected: u64,
     },
+    /// The driver says of itself what cannot be.
+    #[error(
+        "the driver says of itself: {what}: {found}, expected {least} to {most}; do not trust this driver, start the one \
+         that belongs to this program"
+    )]
+    Impossible {
+        /// Which word.
+        what: &'static str,
+        /// The word found.
+        found: u64,
+        /// The least that can be.
+        least: u64,
+        /// The most.
+        most: u64,
+    },
     /// The driver has more devices than a frame has room for.
     #[error("there are {found} devices, and a driver can have {MAX_DEVICES} at most; start a second driver")]
     TooManyDevices {
@@ -259,6 +275,7 @@ impl DriverView {
         expect_compatible(&header.abi_version)?;
         expect("layout hash", &header.layout_hash, LAYOUT_HASH)?;
         expect("ready word", &header.ready, 1)?;
+        bounds::check(header)?;
         let frame_words = frame_words(device_count(&map));
         Ok(Self { map, frame_words })
     }
@@ -274,11 +291,12 @@ impl DriverView {
         get(&self.map.header.ramp_in_ticks)
     }
 
-    /// What the driver says of itself. Values that are no such thing are replaced by the harmless one.
+    /// What the driver says of itself. Values that became impossible since the memory was mapped are replaced by
+    /// harmless ones.
     pub fn info(&self) -> DriverInfo {
         let header = &self.map.header;
         DriverInfo {
-            period_ns: get(&header.period_ns).max(1),
+            period_ns: get(&header.period_ns).clamp(*bounds::PERIOD_NS.start(), *bounds::PERIOD_NS.end()),
             reply_budget_ns: get(&header.reply_budget_ns),
             max_command_age_ticks: get(&header.max_command_age_ticks),
             ramp_in_ticks: get(&header.ramp_in_ticks),

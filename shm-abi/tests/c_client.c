@@ -3,6 +3,8 @@
  *     c_client SOCKET command N   answers ticks 0 to N - 1, each after checking its frame word by word
  *     c_client SOCKET observe N   waits for frame N - 1 and checks it
  *     c_client SOCKET version     claims to be of ABI version 99.7
+ *     c_client SOCKET attach N    attaches with a request of kind N
+ *     c_client SOCKET ask WHAT    stop, emergency-stop, clear-fault, zero (devices 0 and 2) or end-lease
  */
 #include "phantom3_client.h"
 
@@ -50,11 +52,25 @@ static void answer(const PhantomAttachment *driver, const PhantomFrame *frame) {
     phantom_publish(driver, &command);
 }
 
+static int ask(const char *socket, const char *what) {
+    char error[PHANTOM_ERROR_BYTES] = "no such request";
+    int failed = -1;
+    if (!strcmp(what, "stop")) failed = phantom_stop(socket, "c_client", error);
+    if (!strcmp(what, "emergency-stop")) failed = phantom_emergency_stop(socket, "c_client", error);
+    if (!strcmp(what, "clear-fault")) failed = phantom_clear_fault(socket, "c_client", error);
+    if (!strcmp(what, "zero")) failed = phantom_zero(socket, "c_client", 5, error);
+    if (!strcmp(what, "end-lease")) failed = phantom_end_lease(socket, "c_client", error);
+    if (failed) fprintf(stderr, "%s\n", error);
+    return failed ? 1 : 0;
+}
+
 int main(int argc, char **argv) {
     if (argc < 3) return 2;
+    if (argc > 3 && !strcmp(argv[2], "ask")) return ask(argv[1], argv[3]);
     int commands = !strcmp(argv[2], "command");
     PhantomRequest request =
         phantom_request(commands ? PHANTOM_REQUEST_KIND_COMMAND : PHANTOM_REQUEST_KIND_OBSERVE, "c_client");
+    if (argc > 3 && !strcmp(argv[2], "attach")) request.kind = strtoull(argv[3], NULL, 10);
     if (!strcmp(argv[2], "version")) request.abi_version = (UINT64_C(99) << 32) | 7;
 
     PhantomAttachment driver;

@@ -3,11 +3,14 @@
 mod common;
 
 use bytemuck::Zeroable;
+use common::fake::{fake_server, hear, send};
 use common::{HANG, frame, info, wait_until};
+use shm_abi::handshake::{Answer, Verdict};
 use shm_abi::server::{Server, ServerEvent};
 use shm_abi::{Command, CommanderView, DriverMemory};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Output, Stdio};
+use std::sync::OnceLock;
 use std::time::Duration;
 
 const FLAGS: [&str; 6] = ["-std=c11", "-Wall", "-Wextra", "-Werror", "-O2", "-pedantic"];
@@ -23,15 +26,39 @@ fn compiler() -> Option<std::process::Command> {
     Some(compiler)
 }
 
+/// What finds errors of memory and undefined behaviour at run time, where the compiler has it.
+const SANITIZERS: [&str; 4] =
+    ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer"];
+
+/// Whether programs can be made with the sanitizers, and run: their library is a package of its own on some systems.
+fn has_sanitizers(directory: &Path) -> bool {
+    let (source, program) = (directory.join("probe.c"), directory.join("probe"));
+    std::fs::write(&source, "int main(void) { return 0; }\n").unwrap();
+    let compiled = compiler().is_some_and(|mut compiler| {
+        let made = compiler.args(SANITIZERS).arg(&source).arg("-o").arg(&program).output();
+        made.is_ok_and(|output| output.status.success())
+    });
+    let runs = compiled && std::process::Command::new(&program).status().is_ok_and(|status| status.success());
+    if !runs {
+        println!("skipped: sanitizers over the C client: this compiler has none");
+    }
+    runs
+}
+
+/// The program, sanitized where that can be had; made once.
+fn compiled() -> Option<&'static Path> {
+    static PROGRAM: OnceLock<Option<PathBuf>> = OnceLock::new();
+    PROGRAM.get_or_init(|| compile(Path::new(env!("CARGO_TARGET_TMPDIR")))).as_deref()
+}
+
 fn compile(directory: &Path) -> Option<PathBuf> {
     let program = directory.join("c_client");
-    let compiled = compiler()?
-        .args(FLAGS)
-        .arg(root().join("tests/c_client.c"))
-        .arg("-o")
-        .arg(&program)
-        .output()
-        .unwrap();
+    let mut compiler = compiler()?;
+    if has_sanitizers(directory) {
+        compiler.args(SANITIZERS);
+    }
+    let source = root().join("tests/c_client.c");
+    let compiled = compiler.args(FLAGS).arg(source).arg("-o").arg(&program).output().unwrap();
     assert!(compiled.status.success(), "{}", String::from_utf8_lossy(&compiled.stderr));
     Some(program)
 }
@@ -40,19 +67,24 @@ struct Driver {
     memory: DriverMemory,
     server: Server,
     events: Vec<ServerEvent>,
-    directory: tempfile::TempDir,
+    _directory: tempfile::TempDir,
 }
 
 impl Driver {
     fn start() -> Self {
         let directory = tempfile::tempdir().unwrap();
         let server = Server::bind(&directory.path().join("driver.sock")).unwrap();
-        Self { memory: DriverMemory::create(&info()).unwrap(), server, events: Vec::new(), directory }
+        Self {
+            memory: DriverMemory::create(&info()).unwrap(),
+            server,
+            events: Vec::new(),
+            _directory: directory,
+        }
     }
 
     /// `None` without a compiler.
     fn client(&self, arguments: &[&str]) -> Option<Child> {
-        let mut program = std::process::Command::new(compile(self.directory.path())?);
+        let mut program = std::process::Command::new(compiled()?);
         program.arg(self.server.path()).args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
         Some(program.spawn().unwrap())
     }
@@ -125,6 +157,112 @@ fn a_c_observer_reads_frames_without_a_lease() {
     let output = driver.serve_until_it_ends(client);
     assert_eq!(String::from_utf8_lossy(&output.stdout), "10 ticks whole\n", "{output:?}");
     assert!(driver.events.is_empty(), "{:?}", driver.events);
+}
+
+/// What the server is told when a C program asks for something, and how that program ends.
+fn asked(what: &str) -> Option<(Driver, Output)> {
+    let mut driver = Driver::start();
+    let client = driver.client(&["ask", what])?;
+    let output = driver.serve_until_it_ends(client);
+    Some((driver, output))
+}
+
+#[test]
+fn a_c_program_stops_the_driver_and_its_motors_clears_faults_and_zeroes() {
+    type Expected = fn(&ServerEvent) -> bool;
+    let cases: [(&str, Expected); 4] = [
+        ("stop", |event| matches!(event, ServerEvent::StopRequested { .. })),
+        ("emergency-stop", |event| matches!(event, ServerEvent::EmergencyStopRequested { .. })),
+        ("clear-fault", |event| matches!(event, ServerEvent::ClearFaultRequested { .. })),
+        ("zero", |event| matches!(event, ServerEvent::ZeroRequested { devices: 0b101, .. })),
+    ];
+    for (what, expected) in cases {
+        let Some((driver, output)) = asked(what) else { return };
+        assert!(output.status.success(), "{what}: {output:?}");
+        assert!(matches!(&driver.events[..], [event] if expected(event)), "{what}: {:?}", driver.events);
+    }
+}
+
+#[test]
+fn a_c_program_stops_the_motors_by_datagram_where_the_driver_has_a_socket_for_it() {
+    let mut driver = Driver::start();
+    let place = format!("{}.stop", driver.server.path().display());
+    let stops = std::os::unix::net::UnixDatagram::bind(place).unwrap();
+    stops.set_nonblocking(true).unwrap();
+    let Some(client) = driver.client(&["ask", "emergency-stop"]) else { return };
+    let output = driver.serve_until_it_ends(client);
+    assert!(output.status.success(), "{output:?}");
+    assert!(stops.recv(&mut [0; 16]).is_ok(), "nothing came");
+    assert!(driver.events.is_empty(), "and no connection was needed: {:?}", driver.events);
+}
+
+#[test]
+fn a_c_program_that_attaches_with_a_request_that_hands_over_nothing_sends_it_not() {
+    for kind in 3..=7 {
+        let mut driver = Driver::start();
+        let Some(client) = driver.client(&["attach", &kind.to_string()]) else { return };
+        let output = driver.serve_until_it_ends(client);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(
+            said.starts_with(&format!(
+                "a request of kind {kind} hands over nothing to attach to, and was not sent;"
+            )),
+            "{said}"
+        );
+        driver.poll();
+        assert!(driver.events.is_empty(), "kind {kind}: {:?}", driver.events);
+    }
+}
+
+#[test]
+fn a_c_program_is_told_what_a_driver_of_an_older_version_does_not_know_and_who_may_what_it_may_not() {
+    let user = rustix::process::geteuid().as_raw();
+    let cases = [
+        (
+            Answer { abi_version: (1 << 32) | 2, ..Answer::new(Verdict::UnknownKind) },
+            "the driver speaks version 1.2 and does not know requests of kind 7, this program speaks 1.3; start the \
+             driver that belongs to this program\n"
+                .to_string(),
+        ),
+        (
+            Answer { allowed_group_plus_one: 989, ..Answer::new(Verdict::NotAllowed) },
+            format!("the driver does not let user {user} ask for this (kind 7): members of group 988 may\n"),
+        ),
+        (
+            Answer::new(Verdict::NotAllowed),
+            format!("the driver does not let user {user} ask for this (kind 7): root and the user that it runs as may\n"),
+        ),
+    ];
+    for (answer, expected) in cases {
+        let directory = common::directory();
+        let Some(program) = compiled() else { return };
+        let socket = directory.path().join("driver.sock");
+        let serving = fake_server(&socket, 1, move |mut stream| {
+            hear(&mut stream);
+            send(&stream, bytemuck::bytes_of(&answer), &[]);
+        });
+        let output =
+            std::process::Command::new(program).arg(&socket).args(["ask", "end-lease"]).output().unwrap();
+        serving.join().unwrap();
+        assert_eq!(
+            (output.status.code(), String::from_utf8_lossy(&output.stderr).as_ref()),
+            (Some(1), expected.as_str())
+        );
+    }
+}
+
+#[test]
+fn a_c_program_refuses_a_driver_that_says_what_cannot_be() {
+    let mut driver = Driver::start();
+    driver.memory.header.period_ns.store(0, std::sync::atomic::Ordering::Relaxed);
+    let Some(client) = driver.client(&["observe", "1"]) else { return };
+    let output = driver.serve_until_it_ends(client);
+    assert_eq!(
+        String::from_utf8_lossy(&output.stderr),
+        "the driver says of itself: period in nanoseconds: 0, expected 1 to 10000000000; do not trust this driver, start \
+         the one that belongs to this program\n"
+    );
 }
 
 #[test]

@@ -7,12 +7,14 @@ use common::host::Host;
 use common::{directory, info};
 use shm_abi::client::{self, AttachError};
 use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
+use shm_abi::server::ServerEvent;
 use shm_abi::{DriverMemory, DriverView, LAYOUT_HASH};
 use std::fs::File;
 use std::io::Write;
 use std::os::fd::AsFd;
 use std::os::unix::fs::FileExt;
 use std::os::unix::net::{UnixListener, UnixStream};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 fn refusal_of(request: &Request) -> String {
@@ -232,4 +234,56 @@ fn a_descriptor_that_is_no_segment_is_refused_before_it_is_touched() {
     );
     let more_than_asked = (0..4).map(|_| memfd(bytes, rustix::fs::SealFlags::empty())).collect();
     assert!(message_about_files(more_than_asked).contains("is not sealed"));
+}
+
+#[test]
+fn a_driver_that_says_what_cannot_be_is_refused_with_found_and_expected() {
+    type Word = fn(&shm_abi::layout::DriverHeader) -> &AtomicU64;
+    let lies: [(Word, u64, &str); 9] = [
+        (|h| &h.period_ns, 0, "period in nanoseconds: 0, expected 1 to 10000000000"),
+        (
+            |h| &h.period_ns,
+            u64::MAX,
+            "period in nanoseconds: 18446744073709551615, expected 1 to 10000000000",
+        ),
+        (|h| &h.reply_budget_ns, 0, "reply budget in nanoseconds: 0, expected 1 to 18446744073709551615"),
+        (|h| &h.ramp_in_ticks, 0, "ramp in in ticks: 0, expected 1 to 4294967296"),
+        (|h| &h.ramp_out_ticks, 0, "ramp out in ticks: 0, expected 1 to 4294967296"),
+        (
+            |h| &h.ramp_out_ticks,
+            u64::MAX,
+            "ramp out in ticks: 18446744073709551615, expected 1 to 4294967296",
+        ),
+        (
+            |h| &h.max_command_age_ticks,
+            1 << 33,
+            "age of a command in ticks: 8589934592, expected 0 to 4294967296",
+        ),
+        (|h| &h.device_count, 9, "number of devices: 9, expected 0 to 8"),
+        (|h| &h.segment_bytes, 8, "segment of so many bytes: 8, expected 11041024 to 11041024"),
+    ];
+    for (word, lie, expected) in lies {
+        let directory = directory();
+        let host = Host::start(directory.path());
+        word(&host.memory.header).store(lie, Ordering::Relaxed);
+        let error = client::command(&host.socket, "test").unwrap_err();
+        let expected = format!(
+            "the driver says of itself: {expected}; do not trust this driver, start the one that belongs to this program"
+        );
+        assert_eq!(error.to_string(), expected);
+    }
+}
+
+#[test]
+fn a_request_that_hands_over_nothing_is_not_sent_by_attaching_with_it() {
+    use RequestKind::{ClearFault, EmergencyStop, EndLease, Stop, Zero};
+    let directory = directory();
+    let host = Host::start(directory.path());
+    for kind in [Stop, ClearFault, EmergencyStop, Zero, EndLease] {
+        let error = client::attach(&host.socket, &Request::new(kind, "test")).unwrap_err();
+        assert!(matches!(error, AttachError::NothingToAttach { .. }), "{error}");
+    }
+    // Whatever had been sent would have been heard before this.
+    let _commander = client::command(&host.socket, "test").unwrap();
+    assert!(matches!(host.event(), ServerEvent::LeaseGranted { .. }));
 }

@@ -149,17 +149,21 @@ fn a_commander_of_before_1_3_has_mapped_its_segment_once_it_publishes_or_has_had
 fn what_the_driver_says_of_itself_is_cleaned_before_it_is_shown() {
     let mut odd = info();
     odd.devices[0].name = "a\u{1b}[2J".into();
-    odd.devices[1].name = "ä".repeat(40);
+    // 64 bytes end within a character, so that one byte stays free.
+    odd.devices[1].name = format!("a{}", "ä".repeat(40));
+    odd.setup_report = format!("ab{}", "€".repeat(2000));
     let memory = DriverMemory::create(&odd).unwrap();
-    let devices = DriverView::map(memory.fd()).unwrap().info().devices;
+    let view = DriverView::map(memory.fd()).unwrap();
+    let devices = view.info().devices;
     assert_eq!(devices[0].name, "a?[2J");
-    assert_eq!(devices[1].name, "ä".repeat(32), "cut between characters");
+    assert_eq!(devices[1].name, format!("a{}", "ä".repeat(31)), "cut between characters");
+    assert_eq!(view.info().setup_report, format!("ab{}", "€".repeat(1364)), "cut between characters");
     let order = std::sync::atomic::Ordering::Relaxed;
     memory.header.device_count.store(u64::MAX, order);
     memory.header.wait_mode.store(99, order);
     memory.header.period_ns.store(0, order);
-    let info = DriverView::map(memory.fd()).unwrap().info();
-    assert_eq!((info.devices.len(), info.period_ns), (shm_abi::MAX_DEVICES, 1));
+    let info = view.info();
+    assert_eq!((info.devices.len(), info.period_ns), (shm_abi::MAX_DEVICES, 1), "they became so later");
 }
 
 /// What an observer of the driver's own user can still do to the file itself: nothing that anybody notices.

@@ -155,6 +155,7 @@ fn socket(_: &Machine<'_>, _: &str, answer: &Answer) -> Judged {
         Err(
             AttachError::NoPermission { .. }
             | AttachError::NotAllowed { .. }
+            | AttachError::NothingToAttach { .. }
             | AttachError::Refused(_)
             | AttachError::LeaseHeld { .. }
             | AttachError::System { .. },
