@@ -34,8 +34,10 @@ pub enum WhenFull {
 pub enum Turn {
     /// Answered.
     Answered,
-    /// Not for this lease (yet, or any more), or not readable: nothing was done.
+    /// Not for this lease (yet, or any more): nothing was done.
     Skipped,
+    /// Not readable: nothing was done.
+    Unread,
     /// The run's last row is out.
     Finished,
     /// The driver is in its fault state; the word is the reason.
@@ -176,9 +178,16 @@ impl FastLoop {
 
     /// Takes the frame of `tick`, steps and answers.
     pub fn turn(&mut self, tick: u64, driver: &DriverView, commander: &CommanderMemory) -> Turn {
-        if driver.read_frame(tick, &mut self.frame).is_err() {
-            return Turn::Skipped;
-        }
+        if self.read(tick, driver) { self.answer_read(driver, commander) } else { Turn::Unread }
+    }
+
+    /// The first part of a turn: whether the frame of `tick` could be read whole.
+    pub fn read(&mut self, tick: u64, driver: &DriverView) -> bool {
+        driver.read_frame(tick, &mut self.frame).is_ok()
+    }
+
+    /// The rest of it: steps and answers what was read.
+    pub fn answer_read(&mut self, driver: &DriverView, commander: &CommanderMemory) -> Turn {
         self.complete_pending(driver);
         if self.frame.state == DriverState::Fault as u64 {
             return Turn::Fault(self.frame.fault);

@@ -9,6 +9,7 @@
 //! Cost: between frames one or two system calls; in the step none.
 
 use crate::fast_loop::{FastLoop, Turn};
+use crate::plausible::{Implausible, Plausibility};
 use rt_core::clock::{monotonic_ns, sleep_until_ns};
 use rt_core::histogram::Histogram;
 use rt_core::setup::{SetupReport, SetupRequest};
@@ -56,6 +57,8 @@ pub enum FastEnd {
     Fault(u64),
     /// The driver publishes nothing any more.
     Silent,
+    /// The driver tells what cannot be.
+    Implausible(Implausible),
 }
 
 /// What is left when it has ended.
@@ -149,6 +152,7 @@ struct FastThread {
     seen: Option<u64>,
     /// When the next frame is due, if that is known.
     due_ns: Option<u64>,
+    plausibility: Plausibility,
 }
 
 impl FastThread {
@@ -174,6 +178,7 @@ impl FastThread {
             step_ns,
             seen: None,
             due_ns: None,
+            plausibility: Plausibility::new(period_ns),
         }
     }
 
@@ -209,8 +214,12 @@ impl FastThread {
 
     fn turn(&mut self, tick: u64) -> Option<FastEnd> {
         let begun = monotonic_ns();
-        let turn = self.fast.turn(tick, &self.driver, &self.commander);
         self.seen = Some(tick);
+        let is_read = self.fast.read(tick, &self.driver);
+        if let Err(lie) = self.judge(tick, is_read, begun) {
+            return Some(FastEnd::Implausible(lie));
+        }
+        let turn = if is_read { self.fast.answer_read(&self.driver, &self.commander) } else { Turn::Unread };
         self.due_ns = Some(self.fast.frame().deadline_ns.saturating_add(self.period_ns));
         match turn {
             Turn::Answered => {
@@ -218,9 +227,22 @@ impl FastThread {
                 self.shared.run_ticks.store(self.fast.run_ticks(), Ordering::Relaxed);
                 None
             }
-            Turn::Skipped => None,
+            Turn::Skipped | Turn::Unread => None,
             Turn::Finished => Some(FastEnd::Finished),
             Turn::Fault(reason) => Some(FastEnd::Fault(reason)),
+        }
+    }
+
+    /// Before anything is done with what was read.
+    fn judge(&mut self, tick: u64, is_read: bool, now_ns: u64) -> Result<(), Implausible> {
+        self.plausibility.judge_tick(tick, now_ns)?;
+        let frame = self.fast.frame();
+        match is_read {
+            true => {
+                let is_for_us = frame.lease == self.commander.lease();
+                self.plausibility.judge_frame(tick, frame, is_for_us, now_ns)
+            }
+            false => self.plausibility.note_answer(false, now_ns),
         }
     }
 

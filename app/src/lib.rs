@@ -34,6 +34,7 @@ pub mod on_request;
 pub mod outcome;
 pub mod passive_port;
 pub mod picture;
+pub mod plausible;
 pub mod play;
 pub mod progress;
 pub mod record;

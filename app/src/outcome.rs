@@ -1,5 +1,6 @@
 //! How a run can end.
 
+use crate::plausible::Implausible;
 use crate::recording::RecordingError;
 use io_driver::open::OpenError;
 use shm_abi::FaultReason;
@@ -52,6 +53,9 @@ pub enum RunFailure {
         /// For how long.
         seconds: f64,
     },
+    /// The driver tells what no sound driver tells.
+    #[error("the driver tells what cannot be: {0}; do not trust this driver, end it and start it again")]
+    DriverImplausible(#[from] Implausible),
     /// What a study found cannot be written.
     #[error("{0}")]
     Results(String),

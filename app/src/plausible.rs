@@ -57,7 +57,9 @@ pub enum Implausible {
         most_ms: u64,
     },
     /// The time of the run does not go with the ticks.
-    #[error("its time of the run jumps: found {found} in tick {tick}, expected {expected}")]
+    #[error(
+        "its time of the run does not go with its ticks: found {found} in tick {tick}, expected {expected}"
+    )]
     RunTick {
         /// The tick.
         tick: u64,
@@ -149,6 +151,11 @@ impl Plausibility {
                     return Err(Implausible::RunTick { tick, found: frame.run_tick, expected });
                 }
             }
+            // No run began before the driver did.
+            None if frame.run_tick > tick.cast_signed() => {
+                let expected = tick.cast_signed();
+                return Err(Implausible::RunTick { tick, found: frame.run_tick, expected });
+            }
             None if frame.run_tick >= 0 => {
                 self.run = Some((frame.lease, tick.cast_signed().wrapping_sub(frame.run_tick)));
             }
@@ -230,6 +237,13 @@ mod tests {
             let expected = Implausible::RunTick { tick: 100, found: run_tick, expected: 90 };
             assert_eq!(lies(&mut liar, frame(100, run_tick)), expected);
         }
+    }
+
+    #[test]
+    fn a_run_that_is_older_than_its_driver_is_told_at_its_first_frame() {
+        let first = frame(100, i64::MAX);
+        let told = Plausibility::new(PERIOD_NS).judge_frame(100, &first, true, first.deadline_ns);
+        assert_eq!(told, Err(Implausible::RunTick { tick: 100, found: i64::MAX, expected: 100 }));
     }
 
     #[test]

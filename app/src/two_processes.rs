@@ -102,6 +102,7 @@ pub fn run(
             WatchEnd::Signal(signal) => Stop::Signal(signal),
             WatchEnd::Closed => Stop::Closed,
             WatchEnd::Fast(FastEnd::Fault(reason)) => return Err(RunFailure::driver_fault(reason)),
+            WatchEnd::Fast(FastEnd::Implausible(lie)) => return Err(RunFailure::DriverImplausible(lie)),
             WatchEnd::Fast(FastEnd::Silent) => return Err(RunFailure::DriverSilent { seconds: 5.0 }),
             WatchEnd::DriverGone | WatchEnd::Fast(FastEnd::Stopped) => {
                 let words = last_words(&remains.driver);

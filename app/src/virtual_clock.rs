@@ -89,7 +89,7 @@ impl VirtualDriver {
             match turn {
                 Turn::Finished => break,
                 Turn::Fault(reason) => return Err(RunFailure::driver_fault(reason)),
-                Turn::Answered | Turn::Skipped => {}
+                Turn::Answered | Turn::Skipped | Turn::Unread => {}
             }
             if let Some(signal) = signals.requested() {
                 return Ok(Stop::Signal(signal));

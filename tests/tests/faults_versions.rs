@@ -1,13 +1,17 @@
-//! Programs of different releases meet: whoever cannot share memory parts with a message, and nobody else notices.
+//! Programs of different releases meet, and drivers that are none: whoever cannot share memory parts with a message, and
+//! nobody else notices.
 
 use bytemuck::Zeroable;
 use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
-use shm_abi::{ABI_MAJOR, ABI_MINOR, LAYOUT_HASH};
+use shm_abi::layout::DriverHeader;
+use shm_abi::{ABI_MAJOR, ABI_MINOR, Frame, LAYOUT_HASH};
 use std::io::{Read, Write};
 use std::os::unix::net::UnixListener;
+use std::sync::atomic::Ordering;
 use system_tests::faults::knock::{self, foreigners};
+use system_tests::faults::liar::Liar;
 use system_tests::faults::press::Table;
-use system_tests::faults::process::Running;
+use system_tests::faults::process::{End, Running};
 use system_tests::faults::ring::{RingLog, Told};
 use system_tests::faults::stand::{Setup, Stand};
 
@@ -79,5 +83,50 @@ fn an_app_that_meets_a_driver_of_another_version_says_which_both_are() {
         for words in expected {
             assert!(end.err.contains(&words), "{words}: {end:?}");
         }
+    }
+}
+
+/// How the application ends that meets such a driver; whoever waits for ever is killed, and fails the test.
+fn end_with(liar: &Liar) -> End {
+    let table = Table::new();
+    Running::start(table.app("real").args(["--seconds", "80000", "--attach"]).arg(liar.socket())).end()
+}
+
+#[test]
+fn an_app_that_meets_a_driver_whose_header_cannot_be_starts_nothing_and_says_what_it_found() {
+    let lies: [(fn(&DriverHeader), &str); 4] = [
+        (|header| header.period_ns.store(0, Ordering::Relaxed), "period in nanoseconds: 0, expected 1 to"),
+        (
+            |header| header.reply_budget_ns.store(0, Ordering::Relaxed),
+            "reply budget in nanoseconds: 0, expected 1 to",
+        ),
+        (|header| header.ramp_in_ticks.store(0, Ordering::Relaxed), "ramp in in ticks: 0, expected 1 to"),
+        (|header| header.device_count.store(99, Ordering::Relaxed), "number of devices: 99, expected 0 to 8"),
+    ];
+    for (lie, expected) in lies {
+        let end = end_with(&Liar::about_itself(lie));
+        assert_eq!((end.status, end.out.as_str()), (Some(2), ""), "{end:?}");
+        assert!(end.err.contains(expected), "{expected}: {end:?}");
+    }
+}
+
+#[test]
+fn a_run_ends_with_words_when_its_driver_tells_what_cannot_be() {
+    let lies: [(fn(&mut Frame), &str); 6] = [
+        (|frame| frame.tick = 5, "its ticks go back: found tick 5 after"),
+        (|frame| frame.tick += 1 << 40, "its ticks jump: found tick"),
+        (|frame| frame.deadline_ns = u64::MAX, "comes from the future"),
+        (|frame| frame.run_tick = i64::MAX, "does not go with its ticks: found 9223372036854775807 in tick"),
+        // As if it had never begun: a run without end.
+        (|frame| frame.run_tick = -1, "does not go with its ticks: found -1 in tick"),
+        (|frame| (frame.lease, frame.run_tick) = (99, -1), "no frame under this program's lease for 10 s"),
+    ];
+    for (lie, expected) in lies {
+        let end = end_with(&Liar::about_frames(lie));
+        assert_eq!(end.status, Some(3), "{expected}: {end:?}");
+        assert!(
+            end.err.contains("the driver tells what cannot be: ") && end.err.contains(expected),
+            "{expected}: {end:?}"
+        );
     }
 }

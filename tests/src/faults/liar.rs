@@ -15,7 +15,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 use tempfile::TempDir;
 
-/// Truthful frames of a lease before the first lie.
+/// Ticks of a lease that a commander has to answer before the first lie.
 const TRUE_TICKS: u64 = 200;
 /// A tick.
 const PERIOD: Duration = Duration::from_millis(1);
@@ -79,7 +79,10 @@ fn serve(memory: &DriverMemory, mut server: Server, lie: fn(&mut Frame), stop: &
         }
         let view = commander.as_ref().map(|(view, _)| view);
         let mut frame = frame(tick, commander.as_ref().map(|(view, since)| (view.lease(), *since)));
-        if frame.run_tick > TRUE_TICKS.cast_signed() {
+        let is_believed = |(view, since): &(CommanderView, u64)| {
+            view.latest_tick().is_some_and(|answered| answered >= since + TRUE_TICKS)
+        };
+        if commander.as_ref().is_some_and(is_believed) {
             lie(&mut frame);
         }
         memory.write_frame(&frame);

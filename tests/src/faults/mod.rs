@@ -9,6 +9,7 @@ pub mod heal;
 pub mod hog;
 pub mod hosted;
 pub mod knock;
+pub mod liar;
 pub mod madman;
 pub mod plan;
 pub mod press;
