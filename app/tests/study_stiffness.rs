@@ -28,13 +28,13 @@ fn limit(bench: &Bench, case: &Case, is_good: impl Fn(&Outcome) -> bool) -> f64 
     }
 }
 
-/// A Premium that neither sticks nor counts in steps that matter, and whose force may grow at once.
+/// A Premium that neither sticks nor counts in steps that matter, and whose force may change as fast as any.
 fn smooth_premium(directory: &Path) -> PathBuf {
     let replaced = [
         ("counts_per_rev = 4096 ", "counts_per_rev = 4096000 "),
         ("count_bits = 16 ", "count_bits = 32 "),
         ("dac_bits = 12 ", "dac_bits = 16 "),
-        ("slew_n_per_s = 5000.0 ", "slew_n_per_s = 1000000.0 "),
+        ("slew_n_per_s = 5000.0 ", "slew_n_per_s = 10000.0 "),
         ("coulomb_friction_nm = [0.0086, 0.0086, 0.0068]", "coulomb_friction_nm = [0.0, 0.0, 0.0]"),
     ];
     let text =

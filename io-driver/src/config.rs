@@ -117,10 +117,7 @@ impl DriverConfig {
         let devices = device::devices(&raw.device, &toml, directory)?;
         Ok(Self {
             period_ns,
-            clock: match raw.clock.unwrap_or(RawClock::Real) {
-                RawClock::Real => ClockMode::Real,
-                RawClock::Lockstep => ClockMode::Lockstep,
-            },
+            clock: clock(raw.clock.as_ref(), &devices, &toml)?,
             socket: raw.socket.map(|path| directory.join(path)),
             real_time: raw.real_time.validate(&toml, period_ns, reply.budget_ns)?,
             reply,
@@ -143,7 +140,7 @@ const RATE: Allowed = Allowed { min: 10.0, max: 20_000.0, unit: "Hz" };
 #[serde(deny_unknown_fields)]
 struct RawConfig {
     rate_hz: Option<Spanned<f64>>,
-    clock: Option<RawClock>,
+    clock: Option<Spanned<RawClock>>,
     socket: Option<PathBuf>,
     #[serde(default)]
     real_time: RawRealTime,
@@ -158,7 +155,26 @@ struct RawConfig {
     device: Spanned<Vec<Spanned<RawDevice>>>,
 }
 
-#[derive(Deserialize)]
+/// Where ticks are as short as two programs make them, seconds of ramps and guards would be over in a moment.
+fn clock(
+    raw: Option<&Spanned<RawClock>>,
+    devices: &[DeviceConfig],
+    toml: &TomlText<'_>,
+) -> Result<ClockMode, TomlReport> {
+    let Some(clock) = raw.filter(|clock| matches!(clock.get_ref(), RawClock::Lockstep)) else {
+        return Ok(ClockMode::Real);
+    };
+    match devices.iter().find(|device| device.backend.has_registers()) {
+        None => Ok(ClockMode::Lockstep),
+        Some(device) => Err(toml.refuse(
+            clock.span(),
+            format_args!("\"lockstep\" with device \"{}\", which has registers", device.name),
+            "\"real\": motors know no other time; lockstep is for ideal and simulated devices and for traces",
+        )),
+    }
+}
+
+#[derive(Deserialize, Clone, Copy)]
 #[serde(rename_all = "kebab-case")]
 enum RawClock {
     Real,
@@ -185,8 +201,8 @@ mod tests {
         assert_eq!(config.clock, ClockMode::Real);
         assert_eq!(config.reply, ReplyConfig { mode: ReplyMode::OnArrival, budget_ns: 500_000 });
         assert_eq!(config.safety, SafetyConfig::usual(1_000_000));
-        let SafetyConfig { max_command_age_ticks, ramp_in_ticks, ramp_out_ticks, .. } = config.safety;
-        assert_eq!((max_command_age_ticks, ramp_in_ticks, ramp_out_ticks), (5, 200, 10));
+        let SafetyConfig { max_command_age_ns, ramp_in_ns, ramp_out_ns, .. } = config.safety;
+        assert_eq!((max_command_age_ns, ramp_in_ns, ramp_out_ns), (4_000_000, 200_000_000, 5_000_000));
         assert_eq!(config.real_time.spin_margin, SpinMargin::Calibrated { at_most_ns: 200_000 });
         assert_eq!(config.devices[0].name, "f0");
     }
@@ -280,6 +296,18 @@ mod tests {
                 "lab/driver.toml:2: `safety.emergency_stop.device`: found device \"f0\", which has no buttons, allowed: a device with the switch on its card, or a script with a column of buttons",
             ),
             (
+                "clock = \"lockstep\"\n[[device]]\nbackend = \"ideal\"\n[[device]]\nname = \"arm\"\nbackend = \"emulated\"\ndescription = \"premium-1.5\"\ncard = \"c\"",
+                "lab/driver.toml:1: `clock`: found \"lockstep\" with device \"arm\", which has registers, allowed: \"real\": motors know no other time; lockstep is for ideal and simulated devices and for traces",
+            ),
+            (
+                "[[device]]\nbackend = \"ideal\"\nslew_n_per_s = 2e4",
+                "lab/driver.toml:3: `device[0].slew_n_per_s`: found 20000, allowed: 10 to 10000 N/s",
+            ),
+            (
+                "[[device]]\nbackend = \"simulated\"\ndescription = \"premium-1.5\"\nslew_n_per_s = inf",
+                "lab/driver.toml:4: `device[0].slew_n_per_s`: found inf, allowed: 10 to 10000 N/s",
+            ),
+            (
                 "[[device]]\nbackend = \"emulated\"\ndescription = \"premium-1.5\"",
                 "lab/driver.toml:1: `device[0]`: found no key `card` in an emulated device, allowed: `card = \"FILE\"`",
             ),
@@ -302,6 +330,50 @@ mod tests {
     }
 
     #[test]
+    fn ages_and_ramps_are_bounded_as_times_at_every_rate() {
+        let safety = |rate_hz: u64, line: &str| {
+            parse(&format!("rate_hz = {rate_hz}\n[safety]\n{line}\n[[device]]\nbackend = \"ideal\"\n"))
+                .map(|config| config.safety)
+        };
+        let twenty = "found 21 ticks of 1 ms, allowed: 0 to 20 ticks at this rate, which is 20 ms";
+        let refused = [
+            (
+                10,
+                "max_command_age_ticks = 1",
+                "found 1 ticks of 100 ms, allowed: 0 to 0 ticks at this rate, which is 20 ms",
+            ),
+            (1000, "max_command_age_ticks = 21", twenty),
+            (1000, "max_command_age_ticks = -1", &twenty.replace("found 21", "found -1")),
+            (1000, "max_command_age_ms = 20.1", "found 20.1, allowed: 0 to 20 ms"),
+            (
+                1000,
+                "max_command_age_ms = 1\nmax_command_age_ticks = 1",
+                "found `max_command_age_ticks` beside `max_command_age_ms`, allowed: one of the two",
+            ),
+            (1000, "ramp_in_ms = 0", "found 0, allowed: 20 to 10000 ms"),
+            (1000, "ramp_in_ms = 10001", "found 10001, allowed: 20 to 10000 ms"),
+            (1000, "ramp_out_ms = 50.5", "found 50.5, allowed: 0 to 50 ms"),
+        ];
+        for (rate_hz, line, words) in refused {
+            let said = safety(rate_hz, line).expect_err(line);
+            assert!(said.starts_with("lab/driver.toml:") && said.ends_with(words), "{said}");
+        }
+        let times = |rate_hz, line| {
+            let SafetyConfig { max_command_age_ns, ramp_in_ns, ramp_out_ns, .. } =
+                safety(rate_hz, line).unwrap();
+            (max_command_age_ns, ramp_in_ns, ramp_out_ns)
+        };
+        assert_eq!(times(2000, "max_command_age_ticks = 40").0, 20_000_000);
+        assert_eq!(times(1000, "max_command_age_ms = 2.5").0, 2_500_000);
+        // Ramps take whole ticks: in by the nearest number, out by no more than asked for, and one at least.
+        let of_ramps = "ramp_in_ms = 25\nramp_out_ms = 7";
+        assert_eq!(times(250, of_ramps), (4_000_000, 24_000_000, 4_000_000));
+        assert_eq!(times(10, "ramp_out_ms = 0"), (4_000_000, 200_000_000, 100_000_000));
+        // A third of a millisecond, rounded to a nanosecond: fifteen ticks all the same.
+        assert_eq!(times(3000, "").2, 15 * 333_333);
+    }
+
+    #[test]
     fn nine_devices_are_too_many_and_unknown_keys_are_refused() {
         let nine = "[[device]]\nbackend = \"ideal\"\n".repeat(9);
         assert!(parse(&nine).expect_err("nine").contains("found 9 devices, allowed: 1 to 8"));
@@ -311,23 +383,24 @@ mod tests {
 
     #[test]
     fn what_is_written_down_is_read_back_the_same() {
-        let text = "rate_hz = 3000\nclock = \"lockstep\"\nsocket = \"/run/x\"\n\
+        let text = "rate_hz = 3000\nsocket = \"/run/x\"\n\
             [real_time]\ncpu = 1\npriority = 0\nlock_memory = false\nphase_offset_us = 12.345\nwait = \"spin\"\n\
             overruns = { policy = \"catch-up\", ticks = 3 }\n\
             [reply]\nmode = \"next-tick\"\nbudget_us = 99.5\n\
-            [safety]\nmax_command_age_ticks = 7\nramp_in_ms = 33.3\nramp_out_ms = 4\n\
+            [safety]\nmax_command_age_ms = 7.1\nramp_in_ms = 33.3\nramp_out_ms = 4\n\
             workspace_margin_mm = 12.5\ncommissioning = true\ncommissioning_force_n = 0.4\n\
             emergency_stop = { device = \"b\", button = 3, normally_closed = true }\n\
             dead_man = { device = \"b\", button = 0 }\n\
             [[device]]\nname = \"a \\\"quoted\\\" name\"\nbackend = \"ideal\"\nhand = \"/h.csv\"\nfinger = \"thumb\"\n\
             start_m = [0.1, -0.2, 1e-9]\nbase_position_m = [1, 2, 3]\nbase_orientation_wxyz = [0.6, 0.8, 0, 0]\n\
-            peak_force_n = 8.5\n\
-            [[device]]\nbackend = \"replay\"\ndescription = \"premium-1.5\"\ntrace = \"/t.csv\"\n\
+            peak_force_n = 8.5\nslew_n_per_s = inf\n\
+            [[device]]\nbackend = \"replay\"\ndescription = \"premium-1.5\"\ntrace = \"/t.csv\"\nslew_n_per_s = 400\n\
             [[device]]\nname = \"b\"\nbackend = \"emulated\"\ndescription = \"premium-1.5\"\ncard = \"/c\"\ngravity_compensation = true\n\
             base_orientation_wxyz = [0.892399101, -0.099045761, 0.239117618, -0.369643811]\n";
         let config = parse(text).expect("good");
         assert_eq!(parse(&config.to_toml()).expect("good as well"), config);
-        let plain = parse("[[device]]\nbackend = \"ideal\"\n").expect("good");
+        let plain = parse("clock = \"lockstep\"\n[[device]]\nbackend = \"ideal\"\n").expect("good");
+        assert_eq!(plain.clock, ClockMode::Lockstep);
         assert_eq!(parse(&plain.to_toml()).expect("good as well"), plain);
     }
 

@@ -18,7 +18,7 @@ use crate::device::{Device, Effort, Extras, Reading, TickTime};
 use crate::meter::{bump, record};
 use crate::reply::Reply;
 use crate::safety::switches::{Inputs, Switches};
-use crate::safety::{Guard, Limits, Safety};
+use crate::safety::{Elapsed, Guard, Limits, Safety, TickClock};
 use crate::zeroing::{DeviceSet, ZeroRefusal, ZeroState, ZeroWatch};
 use bytemuck::Zeroable;
 use rt_core::clock::monotonic_ns;
@@ -57,6 +57,11 @@ pub struct Cycle {
     /// What became of the last request to zero, until somebody asks.
     zero_verdict: Option<Result<DeviceSet, ZeroRefusal>>,
     period_ns: u64,
+    /// When the devices are read, and when they are written.
+    read_clock: TickClock,
+    write_clock: TickClock,
+    /// When the last tick was due.
+    deadline_ns: u64,
     freshness: Freshness,
     /// The lease whose commands are obeyed.
     lease: Option<CommanderView>,
@@ -83,19 +88,20 @@ impl Cycle {
         assert!(devices.len() <= MAX_DEVICES, "the configuration allows at most {MAX_DEVICES} devices");
         let mut frame = Frame::zeroed();
         frame.device_count = devices.len() as u64;
-        let guards = devices
-            .iter()
-            .map(|device| Guard::new(Limits::of(device.info(), workspace_margin_m), period_ns))
-            .collect();
+        let guards =
+            devices.iter().map(|device| Guard::new(Limits::of(device.info(), workspace_margin_m))).collect();
         Self {
             memory,
             devices,
             guards,
             switches,
             safety,
-            zeros: ZeroWatch::new(period_ns),
+            zeros: ZeroWatch::new(),
             zero_verdict: None,
             period_ns,
+            read_clock: TickClock::counting(period_ns),
+            write_clock: TickClock::counting(period_ns),
+            deadline_ns: 0,
             freshness,
             lease: None,
             next_lease: None,
@@ -105,6 +111,13 @@ impl Cycle {
             started_ns: 0,
             rang_ns: 0,
         }
+    }
+
+    /// The same, whose deadlines are times of the monotonic clock; else its ticks take a period each.
+    pub fn in_real_time(mut self) -> Self {
+        self.read_clock = TickClock::real(self.period_ns);
+        self.write_clock = self.read_clock;
+        self
     }
 
     /// The driver's segment.
@@ -205,10 +218,12 @@ impl Cycle {
     /// Reads all devices and publishes the frame of `tick`, which was due at `deadline_ns`.
     pub fn sense(&mut self, tick: u64, deadline_ns: u64) {
         self.started_ns = monotonic_ns();
+        self.deadline_ns = deadline_ns;
+        let elapsed = self.read_clock.pass(tick, deadline_ns, self.started_ns);
         let time = TickTime { tick, period_ns: self.period_ns, run_tick: self.safety.run_tick(tick) };
         let answered = self.lease().and(self.reply.tick);
         self.zeros.begin_tick(tick, answered);
-        let all_valid = self.read_devices(time);
+        let all_valid = self.read_devices(time, elapsed);
         self.safety.set_positions_valid(all_valid);
         self.read_switches();
         self.describe(time, deadline_ns);
@@ -234,7 +249,7 @@ impl Cycle {
                 record(&self.memory.round_trip_ns, self.reply.round_trip_ns);
             }
         }
-        self.reply.age(tick).is_some_and(|age| age <= self.freshness.0)
+        self.reply.age_ticks(tick).is_some_and(|age| age <= self.freshness.0)
     }
 
     /// The tick last answered, as far as the commander's bell has been looked at.
@@ -245,9 +260,10 @@ impl Cycle {
     /// Writes all motors for this tick with the newest command that may still be used.
     pub fn actuate(&mut self) {
         let actuated_ns = monotonic_ns();
-        let reply = self.judge_reply();
-        let authority = self.safety.advance(reply);
-        self.write_devices(authority);
+        let elapsed = self.write_clock.pass(self.frame.tick, self.deadline_ns, actuated_ns);
+        let reply = self.judge_reply(elapsed);
+        let authority = self.safety.advance(reply, elapsed);
+        self.write_devices(authority, elapsed);
         let written_ns = monotonic_ns();
         self.frame.previous = Outcome {
             reply: reply as u64,
@@ -276,14 +292,14 @@ impl Cycle {
         self.release();
     }
 
-    fn read_devices(&mut self, time: TickTime) -> bool {
+    fn read_devices(&mut self, time: TickTime, elapsed: Elapsed) -> bool {
         let mut all_valid = true;
         for index in 0..self.devices.len() {
             let reading = self.devices[index].read(time).and_then(|reading| {
                 if reading.is_finite() { Ok(reading) } else { Err(FaultReason::PositionNotFinite) }
             });
             match reading {
-                Ok(reading) => all_valid &= self.take_reading(index, time.tick, reading),
+                Ok(reading) => all_valid &= self.take_reading(index, elapsed, reading),
                 Err(reason) => {
                     // The last good position stays in the frame, marked as not to be trusted; nobody knows how
                     // fast it changes.
@@ -293,6 +309,7 @@ impl Cycle {
                     frame.joint_velocity_rad_per_s_estimated = [0.0; 3];
                     all_valid = false;
                     self.zeros.lose_sight(index);
+                    self.guards[index].overlook(elapsed.passed_ns());
                     self.fault(reason);
                 }
             }
@@ -309,13 +326,13 @@ impl Cycle {
     }
 
     /// Returns whether its position can be trusted.
-    fn take_reading(&mut self, index: usize, tick: u64, reading: Reading) -> bool {
-        self.zeros.observe(index, reading.encoder_counts);
+    fn take_reading(&mut self, index: usize, elapsed: Elapsed, reading: Reading) -> bool {
+        self.zeros.observe(index, reading.encoder_counts, elapsed);
         let knows = self.devices[index].zero_state() != ZeroState::Needed && !self.zeros.is_withheld(index);
         let reading = if knows { reading } else { reading.unknown() };
         reading.write_to(&mut self.frame.devices[index]);
         if knows {
-            self.watch_speed(index, tick, &reading);
+            self.watch_speed(index, elapsed, &reading);
         } else {
             // Where it is then will have nothing to do with where it seems to be now.
             self.guards[index].lose_sight();
@@ -323,8 +340,8 @@ impl Cycle {
         reading.is_valid
     }
 
-    fn watch_speed(&mut self, device: usize, tick: u64, reading: &Reading) {
-        match self.guards[device].observe(tick, reading.position_m, reading.velocity_m_per_s) {
+    fn watch_speed(&mut self, device: usize, elapsed: Elapsed, reading: &Reading) {
+        match self.guards[device].observe(elapsed.passed_ns(), reading.position_m, reading.velocity_m_per_s) {
             Ok(()) => {}
             // A hand may be as fast as it likes as long as no motor drives it.
             Err(FaultReason::Overspeed) if self.safety.is_released() => {}
@@ -359,18 +376,19 @@ impl Cycle {
         frame.run_tick = time.run_tick;
     }
 
-    fn judge_reply(&self) -> ReplyKind {
+    fn judge_reply(&mut self, elapsed: Elapsed) -> ReplyKind {
+        let age = self.reply.grow_older(self.frame.tick, elapsed.passed_ns(), self.period_ns);
         match (&self.lease, self.is_ending) {
-            (Some(_), false) => self.safety.judge(self.reply.age(self.frame.tick), self.freshness.0),
+            (Some(_), false) => self.safety.judge(age, self.freshness.0),
             _ => ReplyKind::NoLease,
         }
     }
 
-    fn write_devices(&mut self, authority: f64) {
+    fn write_devices(&mut self, authority: f64, elapsed: Elapsed) {
         let mut fault = None;
         for (index, device) in self.devices.iter_mut().enumerate() {
             let commanded = self.reply.force(index);
-            let restrained = self.guards[index].restrain(commanded, authority);
+            let restrained = self.guards[index].restrain(commanded, authority, elapsed);
             let effort = Effort { force_on_user_n: restrained.force_on_user_n, gravity_share: authority };
             let frame = &mut self.frame.devices[index];
             frame.force_on_user_n_commanded = commanded.into();

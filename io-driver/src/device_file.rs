@@ -34,6 +34,7 @@ mod premium;
 mod simulation;
 mod wooden_haptics;
 use arm::LinkageTable;
+pub(crate) use arm::SLEW;
 
 /// Names of the files that come with the program, see [`builtin`].
 pub const BUILTIN_NAMES: [&str; 3] = ["premium-1.5", "wooden-haptics", "ideal"];

@@ -191,9 +191,9 @@ fn die_with_parent(options: &RunOptions) -> Result<(), RunError> {
 /// The state machine and devices of a configuration over a memory; what every clock runs.
 pub fn make_cycle(config: &DriverConfig, memory: Arc<DriverMemory>, devices: Vec<Box<dyn Device>>) -> Cycle {
     let safety = Safety::new(Ramps {
-        in_ticks: config.safety.ramp_in_ticks,
-        out_ticks: config.safety.ramp_out_ticks,
-        max_command_age_ticks: config.safety.max_command_age_ticks,
+        in_ns: config.safety.ramp_in_ns,
+        out_ns: config.safety.ramp_out_ns,
+        max_command_age_ns: config.safety.max_command_age_ns,
     });
     let freshness = match config.reply.mode {
         ReplyMode::OnArrival | ReplyMode::FixedPhase => Freshness(0),
@@ -215,9 +215,9 @@ pub fn describe(config: &DriverConfig, devices: &[Box<dyn Device>], wait_mode: W
             ClockMode::Real => config.reply.budget_ns,
             ClockMode::Lockstep | ClockMode::Virtual => u64::MAX,
         },
-        max_command_age_ticks: config.safety.max_command_age_ticks,
-        ramp_in_ticks: config.safety.ramp_in_ticks,
-        ramp_out_ticks: config.safety.ramp_out_ticks,
+        max_command_age_ticks: config.safety.max_command_age_ns / config.period_ns,
+        ramp_in_ticks: config.safety.ramp_in_ns.div_ceil(config.period_ns),
+        ramp_out_ticks: config.safety.ramp_out_ns.div_ceil(config.period_ns),
         clock_mode: config.clock,
         wait_mode,
         is_commissioning: config.safety.commissioning.is_some(),

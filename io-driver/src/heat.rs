@@ -169,6 +169,49 @@ mod tests {
         assert!(heat.allowed_current_a(PEAK_A) < PEAK_A, "after a second");
     }
 
+    /// With the heat that it gives off it neither warms nor cools: the slope of the closed form's sum of exponentials,
+    /// `s (q - w) / tau_w + (1 - s) (q - h) / tau_h`, is nothing.
+    #[test]
+    fn under_its_steady_load_the_rise_stays_what_it_is() {
+        for spec in [RE25, HeatSpec { winding_time_constant_s: 3.0, winding_share: 0.7, ..RE25 }] {
+            for (winding, housing) in [(0.0, 1.0), (1.0, 0.0), (2.0, 0.75), (0.3, 1.1), (0.0, 0.0)] {
+                let heat = Heat { winding, housing, ..Heat::cold(spec) };
+                let q = heat.steady_load();
+                let (s, tau_w, tau_h) =
+                    (spec.winding_share, spec.winding_time_constant_s, spec.housing_time_constant_s);
+                let slope = s * (q - winding) / tau_w + (1.0 - s) * (q - housing) / tau_h;
+                // Sums of quotients below one.
+                assert!(slope.abs() < 1e-15, "{winding} {housing}: {slope}");
+                // And that is what `flow` does: in a microsecond no more than its square.
+                let mut later = heat;
+                later.flow(spec.continuous_current_a * q.sqrt(), 1e-6);
+                assert!((later.rise() - heat.rise()).abs() < 1e-12, "{winding} {housing}");
+            }
+        }
+    }
+
+    #[test]
+    fn too_warm_it_is_allowed_the_current_under_which_it_stays_and_never_more_than_the_continuous_one() {
+        // At a rise of 1 and more: the winding is cooler than the housing, or the other way round.
+        for (winding, housing) in [(0.2, 1.3), (3.0, 0.6), (1.0, 1.0)] {
+            let heat = Heat { winding, housing, ..Heat::cold(RE25) };
+            assert!(heat.rise() >= 1.0);
+            let stays_a = RE25.continuous_current_a * heat.steady_load().sqrt();
+            let allowed_a = heat.allowed_current_a(PEAK_A);
+            // A square and its root.
+            assert!(
+                (allowed_a - stays_a.min(RE25.continuous_current_a)).abs() < 1e-12,
+                "{winding} {housing}"
+            );
+        }
+        let derated = Heat { winding: 0.95, housing: 0.95, ..Heat::cold(RE25) };
+        // Half way between the two squares.
+        let least_a = RE25.continuous_current_a * 0.95f64.sqrt();
+        let half_a = (0.5 * (least_a * least_a + PEAK_A * PEAK_A)).sqrt();
+        assert!((derated.allowed_current_a(PEAK_A) - half_a).abs() < 1e-9);
+        assert!(derated.allowed_current_a(0.5) <= 0.5, "an amplifier that gives less than the motor stands");
+    }
+
     #[test]
     fn a_current_that_is_not_a_number_does_no_harm() {
         let mut heat = Heat::unknown(RE25);

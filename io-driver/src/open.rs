@@ -19,7 +19,7 @@ use crate::sim::tip_board::TipBoard;
 use crate::table::MAX_TABLE_BYTES;
 use crate::toml_report::TomlReport;
 use rt_core::input_file;
-use shm_abi::segment::DeviceInfo;
+use shm_abi::segment::{ClockMode, DeviceInfo};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -128,6 +128,17 @@ pub enum OpenError {
         /// Which.
         file: PathBuf,
     },
+    /// Motors know no time but the real one.
+    #[error(
+        "device {device}: it has registers, behind which motors may be, and they know no time but the real one; it was asked \
+         for under the clock \"{clock}\""
+    )]
+    NotInRealTime {
+        /// Whose.
+        device: String,
+        /// The clock.
+        clock: &'static str,
+    },
     /// An emulated card has four converters.
     #[error("device {device}: {file} names motor channel {channel}; an emulated card has 0 to 3")]
     NoConverter {
@@ -164,6 +175,9 @@ fn open(
     config: &DriverConfig,
     board: &Arc<TipBoard>,
 ) -> Result<Box<dyn Device>, OpenError> {
+    if device.backend.has_registers() && config.clock != ClockMode::Real {
+        return Err(OpenError::NotInRealTime { device: device.name.clone(), clock: config.clock.name() });
+    }
     match &device.backend {
         Backend::Ideal(wish) => {
             let hand = match (live_finger(device, wish)?, script(device, wish, config)?) {
@@ -307,6 +321,9 @@ fn read(device: &DeviceConfig, file: &Path) -> Result<String, OpenError> {
     })
 }
 
+/// As the arms that are described here: what is tried with an ideal device shall feel the same limits as what is felt.
+const IDEAL_SLEW_N_PER_S: f64 = 5000.0;
+
 fn ideal_info(device: &DeviceConfig) -> DeviceInfo {
     let peak_force_n = device.peak_force_n.unwrap_or(f64::INFINITY);
     DeviceInfo {
@@ -316,7 +333,7 @@ fn ideal_info(device: &DeviceConfig) -> DeviceInfo {
         continuous_force_n: peak_force_n,
         workspace_min_m: [f64::NEG_INFINITY; 3],
         workspace_max_m: [f64::INFINITY; 3],
-        slew_n_per_s: f64::INFINITY,
+        slew_n_per_s: device.slew_n_per_s.unwrap_or(IDEAL_SLEW_N_PER_S),
         speed_limit_m_per_s: f64::INFINITY,
     }
 }
@@ -334,7 +351,7 @@ fn arm_info(device: &DeviceConfig, arm_file: &ArmFile) -> DeviceInfo {
         continuous_force_n: arm_file.continuous_force_n,
         workspace_min_m: corner(-1.0),
         workspace_max_m: corner(1.0),
-        slew_n_per_s: arm_file.slew_n_per_s,
+        slew_n_per_s: device.slew_n_per_s.unwrap_or(arm_file.slew_n_per_s).min(arm_file.slew_n_per_s),
         speed_limit_m_per_s: arm_file.speed_limit_m_per_s,
     }
 }
@@ -444,5 +461,19 @@ mod tests {
         let message = refused.to_string();
         assert!(message.contains("device f0: a switch") && message.contains("hand.csv"), "{message}");
         assert!(message.contains("no column `f0_buttons`"), "{message}");
+    }
+
+    /// A configuration that was not read from a file has not been asked.
+    #[test]
+    fn registers_are_opened_in_real_time_only() {
+        let text = "[[device]]\nname = \"arm\"\nbackend = \"emulated\"\ndescription = \"premium-1.5\"\ncard = \"/nowhere\"\n";
+        let mut config = DriverConfig::parse(text, Path::new("driver.toml")).unwrap();
+        for clock in [ClockMode::Lockstep, ClockMode::Virtual] {
+            config.clock = clock;
+            let Err(OpenError::NotInRealTime { device, .. }) = open_devices(&config) else {
+                panic!("{clock:?}: opened, or refused for another reason")
+            };
+            assert_eq!(device, "arm");
+        }
     }
 }

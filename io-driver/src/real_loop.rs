@@ -138,6 +138,7 @@ impl RealLoop {
         let limit_ns = config.process.service_silence_ns;
         let watch =
             shared.heartbeat.clone().map(|heartbeat| Watch::new(heartbeat, limit_ns, config.period_ns));
+        let cycle = if config.clock == ClockMode::Real { cycle.in_real_time() } else { cycle };
         Self {
             watch,
             cycle,

@@ -5,6 +5,7 @@
 //! Cost: one command read and validated for each new number on the bell.
 
 use crate::meter::bump;
+use crate::safety::CommandAge;
 use bytemuck::Zeroable;
 use nalgebra::Vector3;
 use shm_abi::{Command, CommanderView, DriverSegment};
@@ -15,6 +16,8 @@ pub(crate) struct Reply {
     command: Command,
     /// Its tick; `None` before the first.
     pub(crate) tick: Option<u64>,
+    /// How old it was when it was last used (ns); `None`: it has not been used yet.
+    age_ns: Option<u64>,
     /// The last number on the commander's bell that was looked into, so that no lie is read twice.
     pub(crate) seen: Option<u64>,
     /// The driver's tick in which that was done.
@@ -28,7 +31,15 @@ pub(crate) struct Reply {
 impl Reply {
     pub(crate) fn none() -> Self {
         let command = Command::zeroed();
-        Self { command, tick: None, seen: None, examined_in: 0, candidate: command, round_trip_ns: 0 }
+        Self {
+            command,
+            tick: None,
+            age_ns: None,
+            seen: None,
+            examined_in: 0,
+            candidate: command,
+            round_trip_ns: 0,
+        }
     }
 
     pub(crate) fn forget(&mut self) {
@@ -56,13 +67,27 @@ impl Reply {
             Ok(()) => {
                 self.command = self.candidate;
                 self.tick = Some(answered);
+                self.age_ns = None;
             }
             Err(_) => bump(&told.counters.commands_refused),
         }
     }
 
-    pub(crate) fn age(&self, tick: u64) -> Option<u64> {
+    /// Ticks since the one that it answers.
+    pub(crate) fn age_ticks(&self, tick: u64) -> Option<u64> {
         self.tick.map(|answered| tick.saturating_sub(answered))
+    }
+
+    /// How old it is when the motors are written, so long (ns) after they were written before. One that comes late was
+    /// on its way for as many periods as it is ticks old.
+    pub(crate) fn grow_older(&mut self, tick: u64, passed_ns: u64, period_ns: u64) -> Option<CommandAge> {
+        let ticks = self.age_ticks(tick)?;
+        let ns = match self.age_ns {
+            Some(age_ns) => age_ns.saturating_add(passed_ns),
+            None => ticks.saturating_mul(period_ns),
+        };
+        self.age_ns = Some(ns);
+        Some(CommandAge { ticks, ns })
     }
 
     pub(crate) fn force(&self, device: usize) -> Vector3<f64> {

@@ -10,6 +10,7 @@
 //! places.
 //! Cost: constant for each device; no allocation.
 
+use crate::safety::elapsed::Elapsed;
 use crate::safety::stillness::Stillness;
 use shm_abi::MAX_DEVICES;
 use std::fmt;
@@ -89,13 +90,13 @@ pub(crate) struct ZeroWatch {
 }
 
 impl ZeroWatch {
-    pub(crate) fn new(period_ns: u64) -> Self {
-        let still = [Stillness::new(period_ns); MAX_DEVICES];
+    pub(crate) fn new() -> Self {
+        let still = [Stillness::default(); MAX_DEVICES];
         Self { still, withheld: DeviceSet(0), withheld_since: None }
     }
 
-    pub(crate) fn observe(&mut self, device: usize, counts: [i64; 6]) {
-        self.still[device].observe(counts);
+    pub(crate) fn observe(&mut self, device: usize, counts: [i64; 6], elapsed: Elapsed) {
+        self.still[device].observe(counts, elapsed);
     }
 
     pub(crate) fn lose_sight(&mut self, device: usize) {
@@ -159,10 +160,12 @@ mod tests {
 
     const STATES: [ZeroState; 3] = [ZeroState::Needed, ZeroState::Innate, ZeroState::Zeroed];
 
+    const TICK: Elapsed = Elapsed::new(100_000_000, 100_000_000);
+
     fn resting() -> ZeroWatch {
-        let mut watch = ZeroWatch::new(100_000_000);
+        let mut watch = ZeroWatch::new();
         for device in [0, 1, 2] {
-            (0..5).for_each(|_| watch.observe(device, [0; 6]));
+            (0..5).for_each(|_| watch.observe(device, [0; 6], TICK));
         }
         watch
     }
@@ -184,7 +187,7 @@ mod tests {
         assert_eq!(choose(&watch, 1 << 63, false), Err(ZeroRefusal::NoSuchDevice));
         assert_eq!(choose(&watch, 0b011, false), Err(ZeroRefusal::Innate));
         assert_eq!(choose(&watch, 0b101, true), Err(ZeroRefusal::Commanded));
-        watch.observe(2, [3, 0, 0, 0, 0, 0]);
+        watch.observe(2, [3, 0, 0, 0, 0, 0], TICK);
         assert_eq!(choose(&watch, 0, false), Err(ZeroRefusal::Moving(2)));
         assert_eq!(choose(&watch, 0b001, false), Ok(0b001), "the one that rests can be zeroed");
         watch.lose_sight(0);

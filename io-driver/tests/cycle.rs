@@ -5,6 +5,7 @@ mod common;
 use common::{Bench, Log, PEAK_N, command, publish};
 use io_driver::device::Reading;
 use nalgebra::Vector3;
+use shm_abi::frame::{LIMIT_HEAT, LIMIT_SATURATION};
 use shm_abi::{Command, CommanderView, DriverState, DriverView, FaultReason, Frame, ReplyKind};
 use std::sync::Arc;
 
@@ -202,4 +203,40 @@ fn dropping_the_cycle_switches_the_motors_off() {
     let log = Arc::clone(&bench.log);
     drop(bench);
     assert!(log.lock().unwrap().releases > 0);
+}
+
+#[test]
+fn what_is_fresh_is_told_as_soon_as_it_comes_and_what_is_older_is_waited_for_on() {
+    for freshness in [0, 1] {
+        let mut bench = Bench::new(freshness);
+        let commander = bench.lease(1);
+        bench.ramp_in(&commander, UP);
+        bench.cycle.sense(bench.tick + 1, 0);
+        bench.tick += 1;
+        // The reply to the tick before is there, which is as fresh as they come where one tick is allowed.
+        assert_eq!(bench.cycle.take_reply(), freshness == 1);
+        publish(&commander, &bench.view, bench.tick, UP);
+        assert!(bench.cycle.take_reply());
+        bench.cycle.actuate();
+        bench.cycle.sense(bench.tick + 2, 0);
+        bench.tick += 2;
+        assert!(!bench.cycle.take_reply(), "a tick was skipped: it is two ticks old");
+        bench.cycle.actuate();
+        assert_eq!(bench.silent_tick().0.previous.reply, ReplyKind::Held as u64);
+    }
+}
+
+#[test]
+fn what_a_device_cuts_because_its_motors_are_warm_is_counted_and_nothing_else_is() {
+    let mut bench = Bench::new(0);
+    let commander = bench.lease(1);
+    bench.ramp_in(&commander, UP);
+    for (limits, derated) in
+        [(0, 0), (LIMIT_HEAT, 1), (LIMIT_SATURATION, 1), (LIMIT_HEAT | LIMIT_SATURATION, 2)]
+    {
+        bench.log.lock().unwrap().limits = limits;
+        bench.tick(|frame, view| publish(&commander, view, frame.tick, UP));
+        assert_eq!(bench.counter(|c| &c.forces_derated), derated);
+        assert_eq!(bench.counter(|c| &c.forces_limited) + bench.counter(|c| &c.forces_slewed), 0);
+    }
 }

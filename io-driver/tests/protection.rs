@@ -3,11 +3,12 @@
 mod common;
 
 use bytemuck::Zeroable;
-use common::{Bench, publish, usual_device};
+use common::{Bench, PERIOD_NS, publish, usual_device};
 use io_driver::device::Reading;
 use io_driver::mail::mail;
 use io_driver::safety::switches::{Switch, Switches};
 use nalgebra::Vector3;
+use rt_core::clock::monotonic_ns;
 use shm_abi::frame::{
     INPUT_DEAD_MAN_HELD, INPUT_DEAD_MAN_PRESENT, INPUT_EMERGENCY_STOP, LIMIT_PEAK, LIMIT_SLEW,
     LIMIT_WORKSPACE,
@@ -51,6 +52,115 @@ fn a_step_of_the_command_becomes_a_ramp_and_its_end_is_an_end() {
     tick_at(&mut bench, &commander, rest(), 0, [9.0, 0.0, 0.0]);
     let told = bench.silent_tick().0.devices[0].limits;
     assert_eq!(told, LIMIT_SLEW | LIMIT_PEAK, "the frame after tells what acted");
+}
+
+#[test]
+fn a_reversed_command_passes_through_zero_and_never_jumps_by_more_than_the_step() {
+    let mut bench = bench(DeviceInfo { slew_n_per_s: 1000.0, ..usual_device() });
+    let commander = bench.lease(1);
+    bench.ramp_in(&commander, [0.0; 3]);
+    let mut force = |y: f64| tick_at(&mut bench, &commander, rest(), 0, [0.0, y, 0.0]).1.y;
+    let pushed: Vec<f64> = (0..3).map(|_| force(3.0)).collect();
+    assert_eq!(pushed, [1.0, 2.0, 3.0]);
+    let reversed: Vec<f64> = (0..5).map(|_| force(-3.0)).collect();
+    assert_eq!(reversed, [0.0, -1.0, -2.0, -3.0, -3.0]);
+}
+
+/// An hour ahead, so that every deadline is in time however slow this test is.
+fn far_ahead() -> u64 {
+    monotonic_ns() + 3_600_000_000_000
+}
+
+/// At full force in real time, with the next deadline.
+fn pushing(info: DeviceInfo, force: [f64; 3]) -> (Bench, CommanderMemory, u64) {
+    let mut bench = bench(info).in_real_time();
+    let commander = bench.lease(1);
+    let mut deadline_ns = far_ahead();
+    for _ in 0..10 {
+        bench.tick_due_at(deadline_ns, |frame, view| publish(&commander, view, frame.tick, force));
+        deadline_ns += PERIOD_NS;
+    }
+    (bench, commander, deadline_ns)
+}
+
+#[test]
+fn skipped_deadlines_age_a_command_and_ramp_a_force_out_by_their_time() {
+    // Two milliseconds of age, two of ramp: the third, fourth... millisecond after the last reply.
+    for (late_ms, share) in [(1, 1.0), (2, 1.0), (3, 0.0), (30, 0.0)] {
+        let (mut bench, _commander, deadline_ns) = pushing(usual_device(), UP);
+        // The deadline is one period after the last reply's.
+        let (_, force) = bench.tick_due_at(deadline_ns + (late_ms - 1) * PERIOD_NS, |_, _| {});
+        assert_eq!(force.y / UP[1], share, "{late_ms} ms");
+    }
+    let (mut bench, _commander, deadline_ns) = pushing(usual_device(), UP);
+    let share = |bench: &mut Bench, at_ms: u64| {
+        bench.tick_due_at(deadline_ns + at_ms * PERIOD_NS, |_, _| {}).1.y / UP[1]
+    };
+    assert_eq!([0, 1, 2].map(|ms| share(&mut bench, ms)), [1.0, 1.0, 0.5]);
+    assert_eq!(share(&mut bench, 9), 0.0);
+}
+
+#[test]
+fn skipped_deadlines_let_no_force_grow_by_more_than_a_tick() {
+    let info = DeviceInfo { slew_n_per_s: 1000.0, ..usual_device() };
+    let (mut bench, commander, mut deadline_ns) = pushing(info, [0.0; 3]);
+    let mut pushed = |passed_ms: u64| {
+        deadline_ns += passed_ms * PERIOD_NS;
+        bench
+            .tick_due_at(deadline_ns, |frame, view| publish(&commander, view, frame.tick, [0.0, 8.0, 0.0]))
+            .1
+            .y
+    };
+    assert_eq!([1, 30, 1, 4].map(&mut pushed), [1.0, 2.0, 3.0, 4.0]);
+    // And authority likewise: four ticks in, however much time they take.
+    let mut bench = self::bench(usual_device()).in_real_time();
+    let commander = bench.lease(1);
+    let mut deadline_ns = far_ahead();
+    let mut share = || {
+        deadline_ns += 7 * PERIOD_NS;
+        bench.tick_due_at(deadline_ns, |frame, view| publish(&commander, view, frame.tick, UP)).1.y / UP[1]
+    };
+    assert_eq!([0; 6].map(|_| share()), [0.0, 0.25, 0.5, 0.75, 1.0, 1.0]);
+}
+
+/// Ticks that are made up for follow each other at once: together they are no more time than really passed.
+#[test]
+fn a_loop_that_catches_up_lets_no_force_grow_faster_than_time_goes() {
+    let mut bench = bench(DeviceInfo { slew_n_per_s: 1000.0, ..usual_device() }).in_real_time();
+    let commander = bench.lease(1);
+    let mut tick = |deadline_ns: u64, y: f64| {
+        bench.tick_due_at(deadline_ns, |frame, view| publish(&commander, view, frame.tick, [0.0, y, 0.0]))
+    };
+    // The ramp, in as much time as it takes.
+    while tick(monotonic_ns(), 0.0).0.authority < 1.0 {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    let began = monotonic_ns();
+    let due = began - 20 * PERIOD_NS;
+    let pushed: Vec<f64> = (0..10).map(|k| tick(due + k * PERIOD_NS, 8.0).1.y).collect();
+    // A newton a millisecond; a tick may have begun up to a period before.
+    let most_n = 1.0 + (monotonic_ns() - began) as f64 / 1e6;
+    assert!(pushed[9] <= most_n, "{pushed:?} within {most_n} ms");
+    assert!(pushed[9] > 0.0);
+}
+
+#[test]
+fn a_device_that_could_not_be_read_for_a_while_may_be_farther_away_afterwards() {
+    for (ticks, fault) in [(2, FaultReason::PositionJump), (3, FaultReason::DeviceRead)] {
+        let mut bench = bench(DeviceInfo { speed_limit_m_per_s: 1.0, ..usual_device() });
+        bench.log.lock().unwrap().needs_zero = Some(false);
+        bench.silent_tick();
+        for _ in 0..ticks {
+            bench.log.lock().unwrap().next_reading = Some(Err(FaultReason::DeviceRead));
+            bench.silent_tick();
+        }
+        // 25 m/s for three or four ticks: 75 or 100 mm.
+        bench.log.lock().unwrap().next_reading = Some(Ok(Reading::at(rest() + Vector3::x() * 0.09)));
+        let (frame, _) = bench.silent_tick();
+        assert_eq!(frame.fault, FaultReason::DeviceRead as u64, "the first reason stands");
+        let lost = bench.log.lock().unwrap().needs_zero == Some(true);
+        assert_eq!(lost, fault == FaultReason::PositionJump, "a jump costs the zero");
+    }
 }
 
 #[test]

@@ -214,3 +214,30 @@ fn the_arms_tip_and_its_joints_tell_the_same_velocity() {
     let last = samples.last().unwrap();
     assert_eq!(arm.read(last.counts, at(last.tick + 1, 1000)).velocity_m_per_s, Vector3::zeros());
 }
+
+/// What one joint does shortens no other's window: each tells what it would if all three did the same.
+#[test]
+fn each_joint_has_a_window_of_its_own() {
+    for rate_hz in RATES_HZ {
+        let mut noise = Noise::new(5);
+        let mut together = VelocityEstimator::of_counts();
+        let mut alone = [0; 3].map(|_| VelocityEstimator::of_counts());
+        let mut differ = 0;
+        for tick in 0..rate_hz / 4 {
+            let t = tick as f64 / rate_hz as f64;
+            // It jerks to and fro, rests and jitters, and goes on steadily.
+            let places = [
+                (200.0 * (300.0 * t).sin()).round(),
+                f64::from(u8::from(noise.uniform() < 0.5)),
+                (700.0 * t).floor(),
+            ];
+            let found = together.observe(at(tick, rate_hz), places);
+            for j in 0..3 {
+                let expected = alone[j].observe(at(tick, rate_hz), [places[j]; 3]);
+                assert_eq!(found[j], expected[j], "{rate_hz} Hz, tick {tick}, joint {j}");
+            }
+            differ += usize::from(found[0] != found[1]);
+        }
+        assert!(differ > 100);
+    }
+}

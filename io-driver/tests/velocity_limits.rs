@@ -59,11 +59,11 @@ fn lead(
 fn notice(rate_hz: u64, limit: f64, acceleration: f64, start_m: f64) -> Option<(Option<u64>, u64)> {
     let way = |t: f64| start_m + 0.5 * acceleration * (t - STILL_S).max(0.0).powi(2);
     let end_s = STILL_S + (0.2 / acceleration).sqrt();
-    let mut speed = Speed::new(limit, 1_000_000_000 / rate_hz);
+    let mut speed = Speed::new(limit);
     let mut mean = MeanOverFourMilliseconds::default();
     let (mut by_estimate, mut by_mean) = (None, None);
     lead(rate_hz, way, false, |tick, time_s, position, velocity| {
-        if speed.observe(tick, position, velocity).is_err() {
+        if speed.observe(1_000_000_000 / rate_hz, position, velocity).is_err() {
             by_estimate.get_or_insert(tick);
         }
         if mean.observe(rate_hz, position).norm() > limit {

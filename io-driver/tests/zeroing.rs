@@ -219,3 +219,17 @@ fn a_device_without_counters_is_not_zeroed_and_its_jump_costs_nothing() {
     bench.cycle.clear_fault();
     assert_eq!(state(&bench.silent_tick().0), Some(DriverState::Idle));
 }
+
+#[test]
+fn the_devices_that_have_to_be_zeroed_are_told_by_their_places() {
+    let bench = Bench::of(0, vec![usual_device(); 4], Switches::default());
+    let needs = [None, Some(true), Some(false), Some(true)];
+    for (log, needs_zero) in bench.logs.iter().zip(needs) {
+        log.lock().unwrap().needs_zero = needs_zero;
+    }
+    assert_eq!(bench.cycle.not_zeroed(), DeviceSet(0b1010));
+    bench.logs[3].lock().unwrap().needs_zero = Some(false);
+    assert_eq!(bench.cycle.not_zeroed(), DeviceSet(0b0010));
+    bench.logs[1].lock().unwrap().needs_zero = None;
+    assert_eq!(bench.cycle.not_zeroed(), DeviceSet(0));
+}

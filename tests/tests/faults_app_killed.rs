@@ -1,10 +1,13 @@
-//! The application is killed at any moment: the driver stays, the force goes, the next one works.
+//! The application is killed at any moment: the driver stays, the force goes, the next one works. How fast it goes is
+//! seen from the amplifiers' side, too.
 
+use bytemuck::Zeroable;
 use rt_core::epitaph::EpitaphKind;
+use rustix::process::Signal;
 use shm_abi::client;
 use shm_abi::segment::DriverInfo;
 use shm_abi::seqlock::stamp;
-use shm_abi::{Command, doorbell};
+use shm_abi::{Command, Frame, ReplyKind, doorbell};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -12,6 +15,7 @@ use system_tests::faults::press::{self, FORCE_N, Press, Table};
 use system_tests::faults::process::{Running, children_of, is_alive, myself, role};
 use system_tests::faults::random::Random;
 use system_tests::faults::ring::{RingLog, Told};
+use system_tests::faults::stand::{Setup, Stand};
 use system_tests::programs;
 
 /// Frames that are looked at after a death: more than the 13 ticks in which the force must go, for whether it
@@ -205,6 +209,65 @@ fn a_driver_that_was_orphaned_at_birth_does_not_start_and_tidies_up() {
     assert_eq!(end.status, Some(2), "{end:?}");
     assert!(end.err.contains("parent (process 0) has ended already"), "{end:?}");
     assert!(!private.exists());
+}
+
+/// At the driver's own defaults and 1 kHz: four ticks of age, five of ramp, of which the last is at zero.
+const SILENT_AFTER_VALUES: u64 = 9;
+
+/// Counted in values that the amplifiers got, of which there is one a tick: a driver that the machine keeps from running
+/// writes fewer in the same time. The milliseconds are told, not judged.
+#[test]
+fn the_amplifiers_get_zero_within_nine_values_of_the_last_reply_at_the_usual_settings() {
+    // The whole force comes soon, so that it is there on a shared machine as well.
+    let mut setup = Setup { safety: "ramp_in_ms = 20", ..Setup::new("real") };
+    setup.limits.rate_hz = 1000.0;
+    let stand = Stand::start(setup);
+    let info = stand.view().info();
+    assert_eq!((info.max_command_age_ticks, info.ramp_out_ticks, info.period_ns), (4, 5, 1_000_000));
+    let mut random = Random::seeded(6);
+    let (mut killed_ms, mut stopped_ms, mut most) = (Vec::new(), Vec::new(), 0);
+    for round in 0..24 {
+        let app = stand.start_app();
+        let mut log = RingLog::begin(stand.view());
+        log.follow(stand.view(), "force", |told| told.last().is_some_and(|told| told.authority == 1.0));
+        std::thread::sleep(random.duration(Duration::from_millis(3)));
+        // Killed, its lease ends as well, if the driver hears of it in time; stopped, only its age tells.
+        let is_kill = round % 2 == 0;
+        if is_kill {
+            app.kill()
+        } else {
+            app.signal(Signal::STOP)
+        }
+        log.follow(stand.view(), "silence", |told| {
+            told.len() > 40 && told[told.len() - 40..].iter().all(|told| !told.is_pushing())
+        });
+        log.check_promise(stand.view());
+        let (values, ns) = silence(&stand, &log);
+        assert!(
+            values <= SILENT_AFTER_VALUES,
+            "round {round}: zero in value {values} after the last reply's"
+        );
+        most = most.max(values);
+        (if is_kill { &mut killed_ms } else { &mut stopped_ms }).push(ns as f64 / 1e6);
+    }
+    for (what, mut ms) in [("killed", killed_ms), ("stopped", stopped_ms)] {
+        ms.sort_by(f64::total_cmp);
+        println!(
+            "{what}: zero {:.2} ms (median), {:.2} ms (longest) after the last reply",
+            ms[ms.len() / 2],
+            ms[ms.len() - 1]
+        );
+    }
+    println!("at most {most} values after the last reply's");
+    stand.finish();
+}
+
+/// From the value that the last fresh reply made.
+fn silence(stand: &Stand, log: &RingLog) -> (u64, u64) {
+    let last = log.told.iter().rev().find(|told| told.reply == ReplyKind::Fresh).expect("a reply");
+    let mut frame = Frame::zeroed();
+    stand.view().read_frame(last.tick, &mut frame).expect("a frame of the ring");
+    stand.amplifiers.silence_after(frame.previous.written_ns).expect("zero is in the amplifiers' log")
 }
 
 fn wait_until_dead(process: u32) {

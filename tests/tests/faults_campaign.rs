@@ -123,48 +123,42 @@ fn the_hog() {
 
 /// So that none depends on being drawn.
 #[test]
-fn every_kind_of_strike_alone_in_both_clocks() {
-    for clock in ["real", "lockstep"] {
-        for strike in Strike::each() {
-            let strikes = vec![(3000, strike, Then::Heal)];
-            let plan = Plan { seed: 1, clock, peak_n: 8.5, slew_n_per_s: 400.0, strikes };
-            println!("{plan}");
-            let account = campaign::run(&plan);
-            assert!(account.written > 0 && account.largest_force_un > 1_000_000, "{plan}: {account:?}");
-        }
+fn every_kind_of_strike_alone() {
+    for strike in Strike::each() {
+        let strikes = vec![(3000, strike, Then::Heal)];
+        let plan = Plan { seed: 1, peak_n: 8.5, slew_n_per_s: 400.0, strikes };
+        println!("{plan}");
+        let account = campaign::run(&plan);
+        assert!(account.written > 0 && account.largest_force_un > 1_000_000, "{plan}: {account:?}");
     }
 }
 
 /// As many as the tests without amplifiers kill.
 #[test]
 fn forty_apps_killed_one_after_the_other_leave_no_value_wrong() {
-    for clock in ["real", "lockstep"] {
-        let strike = |index: u64| match index % 4 {
-            0 => Strike::KillAppStarting(index * 500),
-            _ => Strike::KillApp,
-        };
-        let strikes = (0..40).map(|index| (index * 200, strike(index), Then::Heal)).collect();
-        let plan = Plan { seed: 2, clock, peak_n: 3.0, slew_n_per_s: 400.0, strikes };
-        let account = campaign::run(&plan);
-        assert_eq!((account.deaths, account.last_acts), (0, 0), "the driver stays: {account:?}");
-        assert_eq!(account.checked, account.written, "{account:?}");
-    }
+    let strike = |index: u64| match index % 4 {
+        0 => Strike::KillAppStarting(index * 500),
+        _ => Strike::KillApp,
+    };
+    let strikes = (0..40).map(|index| (index * 200, strike(index), Then::Heal)).collect();
+    let plan = Plan { seed: 2, peak_n: 3.0, slew_n_per_s: 400.0, strikes };
+    let account = campaign::run(&plan);
+    assert_eq!((account.deaths, account.last_acts), (0, 0), "the driver stays: {account:?}");
+    assert_eq!(account.checked, account.written, "{account:?}");
 }
 
 /// Forces of any size, in any direction, in any bits: what reaches the motors uses the limits, and keeps them.
 #[test]
 fn seconds_of_garbage_use_the_amplifiers_limits_and_keep_them() {
-    for clock in ["real", "lockstep"] {
-        for (peak_n, slew_n_per_s) in [(3.0, 400.0), (3.0, 4000.0), (8.5, 4000.0)] {
-            let strikes = vec![(0, Strike::Madman(1000), Then::Heal)];
-            let plan = Plan { seed: 3, clock, peak_n, slew_n_per_s, strikes };
-            let account = campaign::run(&plan);
-            assert_eq!(account.checked, account.written, "{plan}: {account:?}");
-            // The honest force is 1.2 N. One that turns in every tick cannot grow beyond some steps, of 2 N or of
-            // 0.2 N; and a driver that is kept from running writes few values.
-            let longest_n = account.largest_force_un as f64 / 1e6;
-            let may_grow = slew_n_per_s > 1000.0 && account.written > 1000;
-            assert!(!may_grow || longest_n > 0.5 * peak_n, "{plan}: {longest_n} N");
-        }
+    for (peak_n, slew_n_per_s) in [(3.0, 400.0), (3.0, 4000.0), (8.5, 4000.0)] {
+        let strikes = vec![(0, Strike::Madman(1000), Then::Heal)];
+        let plan = Plan { seed: 3, peak_n, slew_n_per_s, strikes };
+        let account = campaign::run(&plan);
+        assert_eq!(account.checked, account.written, "{plan}: {account:?}");
+        // The honest force is 1.2 N. One that turns in every tick cannot grow beyond some steps, of 2 N or of
+        // 0.2 N; and a driver that is kept from running writes few values.
+        let longest_n = account.largest_force_un as f64 / 1e6;
+        let may_grow = slew_n_per_s > 1000.0 && account.written > 1000;
+        assert!(!may_grow || longest_n > 0.5 * peak_n, "{plan}: {longest_n} N");
     }
 }

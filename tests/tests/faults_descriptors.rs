@@ -77,63 +77,58 @@ fn an_app_with_few_descriptors_says_so_or_works_and_the_driver_goes_on() {
 /// As many as it has open. The loop needs none; who knocks waits, and is served once there are some.
 #[test]
 fn a_driver_whose_descriptors_are_exhausted_goes_on_with_its_app_and_serves_again_when_it_can() {
-    for clock in ["real", "lockstep"] {
-        let mut stand = Stand::start(Setup::new(clock));
-        let app = stand.start_app();
-        stand.wait_for_force();
-        let id = stand.driver.id();
-        let open = std::fs::read_dir(format!("/proc/{id}/fd")).expect("our own child").flatten();
-        let highest: u64 =
-            open.filter_map(|entry| entry.file_name().to_str()?.parse().ok()).max().expect("some");
-        let pid = Pid::from_raw(id.cast_signed());
-        let limit =
-            |current| prlimit(pid, Resource::Nofile, Rlimit { current: Some(current), maximum: Some(1024) });
-        limit(highest + 1).expect("our own child");
-        let knocking = {
-            let socket = stand.socket();
-            std::thread::spawn(move || client::observe(&socket, "test").map(|found| found.driver_pid))
-        };
-        let crowd = knock::crowd(&stand.socket(), 30);
-        let mut log = RingLog::begin(stand.view());
-        log.follow_for(stand.view(), 400);
-        log.check_promise(stand.view());
-        assert!(log.told.iter().any(Told::is_pushing));
-        drop(crowd);
-        limit(1024).expect("our own child");
-        // Whether it had the patience is its affair; the next one is served.
-        let _ = knocking.join().expect("it does not panic");
-        assert_eq!(stand.try_to_observe().map(|seen| seen.driver_pid), Some(u64::from(id)));
-        drop(app);
-        let app = stand.start_app();
-        stand.wait_for_force();
-        drop(app);
-        stand.driver.must_run();
-        stand.finish();
-    }
+    let mut stand = Stand::start(Setup::new("real"));
+    let app = stand.start_app();
+    stand.wait_for_force();
+    let id = stand.driver.id();
+    let open = std::fs::read_dir(format!("/proc/{id}/fd")).expect("our own child").flatten();
+    let highest: u64 = open.filter_map(|entry| entry.file_name().to_str()?.parse().ok()).max().expect("some");
+    let pid = Pid::from_raw(id.cast_signed());
+    let limit =
+        |current| prlimit(pid, Resource::Nofile, Rlimit { current: Some(current), maximum: Some(1024) });
+    limit(highest + 1).expect("our own child");
+    let knocking = {
+        let socket = stand.socket();
+        std::thread::spawn(move || client::observe(&socket, "test").map(|found| found.driver_pid))
+    };
+    let crowd = knock::crowd(&stand.socket(), 30);
+    let mut log = RingLog::begin(stand.view());
+    log.follow_for(stand.view(), 400);
+    log.check_promise(stand.view());
+    assert!(log.told.iter().any(Told::is_pushing));
+    drop(crowd);
+    limit(1024).expect("our own child");
+    // Whether it had the patience is its affair; the next one is served.
+    let _ = knocking.join().expect("it does not panic");
+    assert_eq!(stand.try_to_observe().map(|seen| seen.driver_pid), Some(u64::from(id)));
+    drop(app);
+    let app = stand.start_app();
+    stand.wait_for_force();
+    drop(app);
+    stand.driver.must_run();
+    stand.finish();
 }
 
 /// However many look on or say nothing, the one who commands goes on, and somebody can stop the driver.
 #[test]
 fn a_crowd_of_clients_disturbs_nobody_and_leaves_room_for_stopping() {
-    for clock in ["real", "lockstep"] {
-        let stand = Stand::start(Setup::new(clock));
-        let app = stand.start_app();
-        stand.wait_for_force();
-        let observers: Vec<_> =
-            std::iter::from_fn(|| client::observe(&stand.socket(), "crowd").ok()).take(100).collect();
-        // The stand itself is one of this process.
-        assert_eq!(observers.len() + 1, MAX_OBSERVERS_OF_PROCESS);
-        let refused = client::observe(&stand.socket(), "crowd").expect_err("no more");
-        assert!(refused.to_string().contains("the driver refused"), "{refused}");
-        let mut log = RingLog::begin(stand.view());
-        log.follow_for(stand.view(), 200);
-        log.check_promise(stand.view());
-        assert!(log.told.iter().any(Told::is_pushing));
-        drop(app);
-        // Stopping, which the stand does now, needs a connection too.
-        stand.finish();
-        drop(observers);
-    }
+    let stand = Stand::start(Setup::new("real"));
+    let app = stand.start_app();
+    stand.wait_for_force();
+    let observers: Vec<_> =
+        std::iter::from_fn(|| client::observe(&stand.socket(), "crowd").ok()).take(100).collect();
+    // The stand itself is one of this process.
+    assert_eq!(observers.len() + 1, MAX_OBSERVERS_OF_PROCESS);
+    let refused = client::observe(&stand.socket(), "crowd").expect_err("no more");
+    assert!(refused.to_string().contains("the driver refused"), "{refused}");
+    let mut log = RingLog::begin(stand.view());
+    log.follow_for(stand.view(), 200);
+    log.check_promise(stand.view());
+    assert!(log.told.iter().any(Told::is_pushing));
+    drop(app);
+    // Stopping, which the stand does now, needs a connection too.
+    stand.finish();
+    drop(observers);
 }
 
 /// CPU time of a process's first thread (s).

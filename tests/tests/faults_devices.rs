@@ -45,7 +45,7 @@ impl Stage {
 fn hosted(clock: &str, strings: &[Strings]) -> Hosted {
     let config = format!(
         "rate_hz = 2000\nclock = \"{clock}\"\n[reply]\nbudget_us = 400\n\
-         [safety]\nmax_command_age_ticks = 5\nramp_in_ms = 5\nramp_out_ms = 4\n\
+         [safety]\nmax_command_age_ticks = 5\nramp_in_ms = 20\nramp_out_ms = 4\n\
          [[device]]\nbackend = \"ideal\"\n"
     );
     Hosted::start(&config, strings.iter().map(|strings| strings.device("puppet", PEAK_N)).collect())

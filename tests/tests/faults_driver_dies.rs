@@ -18,15 +18,15 @@ struct Death {
 }
 
 /// A driver at full force to which something happens.
-fn die(clock: &'static str, sabotage: &str, strike: impl FnOnce(&Stand)) -> Death {
-    die_in(Setup::new(clock).sabotaged(sabotage), strike)
+fn die(sabotage: &str, strike: impl FnOnce(&Stand)) -> Death {
+    die_in(Setup::new("real").sabotaged(sabotage), strike)
 }
 
 fn die_in(setup: Setup, strike: impl FnOnce(&Stand)) -> Death {
     let mut stand = Stand::start(setup);
     let app = stand.start_app();
     stand.wait_for_force();
-    // In real time a stall of the machine may have let the force go meanwhile; it comes back.
+    // A stall of the machine may have let the force go meanwhile; it comes back.
     stand.amplifiers.settle();
     wait_for("a force", || stand.amplifiers.are_enabled());
     let before = stand.amplifiers.tally();
@@ -69,10 +69,9 @@ impl Death {
         wait_for("the trip", || self.stand.amplifiers.have_tripped());
     }
 
-    /// Whether its last value had the amplifiers on. In lockstep it had: no stall lets the force go.
+    /// Whether its last value had the amplifiers on: a stall of the machine may have let the force go.
     fn died_pushing(&self) -> bool {
         let pushed = !self.stand.amplifiers.were_told_off();
-        assert!(pushed || self.stand.setup.clock == "real", "it let go by itself");
         if !pushed {
             eprintln!("the machine stood still just before the strike: no force was on");
         }
@@ -86,19 +85,17 @@ impl Death {
 
 #[test]
 fn a_driver_whose_loop_panics_leaves_an_epitaph_exit_status_3_and_zero_torque() {
-    for clock in ["real", "lockstep"] {
-        for act in ["panic", "panic-before-write", "panic-after-write"] {
-            let death = die(clock, &format!("{act}@button20"), |stand| stand.amplifiers.press(1 << 20));
-            assert_eq!((death.end.status, death.end.signal), (Some(3), None), "{:?}", death.end);
-            let words = death.words.as_ref().expect("an epitaph");
-            assert_eq!(words.kind, EpitaphKind::Panic, "{words}");
-            assert!(words.complete && words.tick > 0, "{words}");
-            assert!(words.text.contains("saboteur.rs") && words.text.contains("sabotage"), "{words}");
-            let told = "the driver's loop panicked; the motors were written zero: panicked in tick";
-            assert!(death.end.err.contains(told), "{:?}", death.end);
-            death.check_released();
-            death.finish();
-        }
+    for act in ["panic", "panic-before-write", "panic-after-write"] {
+        let death = die(&format!("{act}@button20"), |stand| stand.amplifiers.press(1 << 20));
+        assert_eq!((death.end.status, death.end.signal), (Some(3), None), "{:?}", death.end);
+        let words = death.words.as_ref().expect("an epitaph");
+        assert_eq!(words.kind, EpitaphKind::Panic, "{words}");
+        assert!(words.complete && words.tick > 0, "{words}");
+        assert!(words.text.contains("saboteur.rs") && words.text.contains("sabotage"), "{words}");
+        let told = "the driver's loop panicked; the motors were written zero: panicked in tick";
+        assert!(death.end.err.contains(told), "{:?}", death.end);
+        death.check_released();
+        death.finish();
     }
 }
 
@@ -106,28 +103,24 @@ fn a_driver_whose_loop_panics_leaves_an_epitaph_exit_status_3_and_zero_torque() 
 /// the first signal.
 #[test]
 fn a_driver_whose_loop_overflows_its_stack_switches_off_by_its_last_act() {
-    for clock in ["real", "lockstep"] {
-        let death = die(clock, "overflow@button20", |stand| stand.amplifiers.press(1 << 20));
-        assert_eq!((death.end.status, death.end.signal), (None, Some(6)), "{:?}", death.end);
-        let words = death.words.as_ref().expect("an epitaph");
-        assert_eq!(words.kind, EpitaphKind::Signal(11), "{words}");
-        assert!(words.text.starts_with("SIGSEGV: invalid memory reference at address"), "{words}");
-        death.check_last_act();
-        death.finish();
-    }
+    let death = die("overflow@button20", |stand| stand.amplifiers.press(1 << 20));
+    assert_eq!((death.end.status, death.end.signal), (None, Some(6)), "{:?}", death.end);
+    let words = death.words.as_ref().expect("an epitaph");
+    assert_eq!(words.kind, EpitaphKind::Signal(11), "{words}");
+    assert!(words.text.starts_with("SIGSEGV: invalid memory reference at address"), "{words}");
+    death.check_last_act();
+    death.finish();
 }
 
 #[test]
 fn a_driver_that_is_killed_by_a_signal_that_can_be_caught_switches_off_by_its_last_act() {
     let from_within: [(&str, i32); 2] = [("segv", 11), ("abort", 6)];
-    for clock in ["real", "lockstep"] {
-        for (act, signal) in from_within {
-            let death = die(clock, &format!("{act}@button20"), |stand| stand.amplifiers.press(1 << 20));
-            check_signal_death(death, signal);
-        }
-        for signal in [Signal::SEGV, Signal::BUS, Signal::ILL, Signal::FPE, Signal::ABORT] {
-            check_signal_death(die(clock, "", |stand| stand.driver.signal(signal)), signal.as_raw());
-        }
+    for (act, signal) in from_within {
+        let death = die(&format!("{act}@button20"), |stand| stand.amplifiers.press(1 << 20));
+        check_signal_death(death, signal);
+    }
+    for signal in [Signal::SEGV, Signal::BUS, Signal::ILL, Signal::FPE, Signal::ABORT] {
+        check_signal_death(die("", |stand| stand.driver.signal(signal)), signal.as_raw());
     }
 }
 
@@ -142,82 +135,69 @@ fn check_signal_death(death: Death, signal: i32) {
 /// Shut out by the kernel, the call ends the driver: with its last act, and words that name the call.
 #[test]
 fn a_driver_that_makes_a_forbidden_call_in_its_loop_switches_off_by_its_last_act() {
-    for clock in ["real", "lockstep"] {
-        let death = die(clock, "forbidden-call@button20", |stand| stand.amplifiers.press(1 << 20));
-        // Where the kernel shuts out nothing, the call is made, and is a signal like any other.
-        assert!(matches!(death.end.signal, Some(31 | 11)), "{:?}", death.end);
-        assert!(death.words.is_some());
-        death.check_last_act();
-        death.finish();
-    }
+    let death = die("forbidden-call@button20", |stand| stand.amplifiers.press(1 << 20));
+    // Where the kernel shuts out nothing, the call is made, and is a signal like any other.
+    assert!(matches!(death.end.signal, Some(31 | 11)), "{:?}", death.end);
+    assert!(death.words.is_some());
+    death.check_last_act();
+    death.finish();
 }
 
 /// The loop hangs with a force on, so that the driver cannot end in order, and somebody insists: the amplifiers
 /// do not have to wait for their watchdog.
 #[test]
 fn a_driver_that_is_told_twice_to_stop_while_its_loop_hangs_switches_off_by_its_last_act() {
-    for clock in ["real", "lockstep"] {
-        for signal in [Signal::TERM, Signal::INT] {
-            let mut setup = Setup::new(clock).sabotaged("hang:60000@button20");
-            setup.limits.watchdog_ms = 60_000;
-            let death = die_in(setup, |stand| {
-                stand.amplifiers.press(1 << 20);
-                let ticks = || stand.view().latest_tick();
-                // It hangs when no frame comes any more; 100 ms are 200 ticks.
-                wait_for("the hang", || {
-                    let before = ticks();
-                    std::thread::sleep(std::time::Duration::from_millis(100));
-                    ticks() == before
-                });
-                stand.driver.signal(signal);
-                // Heard sooner, it would be the same request delivered twice.
-                std::thread::sleep(2 * rt_core::signals::SAME_REQUEST);
-                stand.driver.signal(signal);
+    for signal in [Signal::TERM, Signal::INT] {
+        let mut setup = Setup::new("real").sabotaged("hang:60000@button20");
+        setup.limits.watchdog_ms = 60_000;
+        let death = die_in(setup, |stand| {
+            stand.amplifiers.press(1 << 20);
+            let ticks = || stand.view().latest_tick();
+            // It hangs when no frame comes any more; 100 ms are 200 ticks.
+            wait_for("the hang", || {
+                let before = ticks();
+                std::thread::sleep(std::time::Duration::from_millis(100));
+                ticks() == before
             });
-            assert_eq!(
-                (death.end.status, death.end.signal),
-                (None, Some(signal.as_raw())),
-                "{:?}",
-                death.end
-            );
-            death.check_last_act();
-            death.finish();
-        }
+            stand.driver.signal(signal);
+            // Heard sooner, it would be the same request delivered twice.
+            std::thread::sleep(2 * rt_core::signals::SAME_REQUEST);
+            stand.driver.signal(signal);
+        });
+        assert_eq!((death.end.status, death.end.signal), (None, Some(signal.as_raw())), "{:?}", death.end);
+        death.check_last_act();
+        death.finish();
     }
 }
 
 /// Nothing inside the process can help here.
 #[test]
 fn a_driver_that_is_killed_or_exits_without_a_word_is_the_watchdogs() {
-    for clock in ["real", "lockstep"] {
-        let death = die(clock, "", |stand| stand.driver.signal(Signal::KILL));
-        assert_eq!((death.end.signal, death.words.is_none()), (Some(9), true), "{:?}", death.end);
-        death.check_watchdog();
-        death.finish();
-        let death = die(clock, "exit@button20", |stand| stand.amplifiers.press(1 << 20));
-        assert_eq!(death.end.status, Some(0), "{:?}", death.end);
-        death.check_watchdog();
-        death.finish();
-    }
+    let death = die("", |stand| stand.driver.signal(Signal::KILL));
+    assert_eq!((death.end.signal, death.words.is_none()), (Some(9), true), "{:?}", death.end);
+    death.check_watchdog();
+    death.finish();
+    let death = die("exit@button20", |stand| stand.amplifiers.press(1 << 20));
+    assert_eq!(death.end.status, Some(0), "{:?}", death.end);
+    death.check_watchdog();
+    death.finish();
 }
 
 #[test]
 fn a_driver_that_is_asked_to_stop_says_off_to_its_amplifiers() {
-    for clock in ["real", "lockstep"] {
-        for signal in [Signal::TERM, Signal::INT, Signal::HUP] {
-            let death = die(clock, "", |stand| stand.driver.signal(signal));
-            assert_eq!(death.end.status, Some(0), "{:?}", death.end);
-            assert_eq!(death.words.as_ref().map(|words| words.kind), Some(EpitaphKind::Stopped));
-            death.check_released();
-            death.finish();
-        }
-        let death = die(clock, "", |stand| {
-            client::stop(&stand.socket(), "test").expect("it is told");
-        });
+    for signal in [Signal::TERM, Signal::INT, Signal::HUP] {
+        let death = die("", |stand| stand.driver.signal(signal));
         assert_eq!(death.end.status, Some(0), "{:?}", death.end);
+        assert_eq!(death.words.as_ref().map(|words| words.kind), Some(EpitaphKind::Stopped));
         death.check_released();
         death.finish();
     }
+    let death = die("", |stand| {
+        client::stop(&stand.socket(), "test").expect("it is told");
+    });
+    assert_eq!(death.end.status, Some(0), "{:?}", death.end);
+    death.check_released();
+    death.finish();
 }
 
 /// What the device says is no position, or none that a hand could have come to, or nothing at all: the driver
@@ -230,21 +210,19 @@ fn forbidden_values_of_a_device_switch_the_amplifiers_off_until_somebody_clears_
         ("unreadable", FaultReason::DeviceRead),
         ("unwritable", FaultReason::DeviceWrite),
     ];
-    for clock in ["real", "lockstep"] {
-        for (act, reason) in forbidden {
-            let stand = Stand::start(Setup::new(clock).sabotaged(&format!("{act}@button20")));
-            let app = stand.start_app();
-            stand.wait_for_force();
-            stand.amplifiers.press(1 << 20);
-            wait_for_fault(&stand, reason);
-            stand.amplifiers.settle();
-            stand.amplifiers.check_off(act);
-            let tally = stand.amplifiers.tally();
-            assert_eq!((tally.switched_off, tally.watchdog_trips), (0, 0), "{act}: {tally:?}");
-            drop(app);
-            bring_back(&stand);
-            stand.finish();
-        }
+    for (act, reason) in forbidden {
+        let stand = Stand::start(Setup::new("real").sabotaged(&format!("{act}@button20")));
+        let app = stand.start_app();
+        stand.wait_for_force();
+        stand.amplifiers.press(1 << 20);
+        wait_for_fault(&stand, reason);
+        stand.amplifiers.settle();
+        stand.amplifiers.check_off(act);
+        let tally = stand.amplifiers.tally();
+        assert_eq!((tally.switched_off, tally.watchdog_trips), (0, 0), "{act}: {tally:?}");
+        drop(app);
+        bring_back(&stand);
+        stand.finish();
     }
 }
 
@@ -252,71 +230,65 @@ fn forbidden_values_of_a_device_switch_the_amplifiers_off_until_somebody_clears_
 /// tripped, and does not switch them on again until somebody asks.
 #[test]
 fn a_loop_that_hangs_is_the_watchdogs_and_a_loop_that_goes_on_finds_the_amplifiers_tripped() {
-    for clock in ["real", "lockstep"] {
-        let mut setup = Setup::new(clock).sabotaged("hang:1500@button20");
-        setup.limits.watchdog_ms = 500;
-        let stand = Stand::start(setup);
-        let app = stand.start_app();
-        stand.wait_for_force();
-        let before = stand.amplifiers.tally();
-        stand.amplifiers.press(1 << 20);
-        stand.amplifiers.wait_for_trip(before);
-        wait_for_fault(&stand, FaultReason::AmplifierTripped);
-        wait_for("off", || !stand.amplifiers.are_enabled());
-        stand.amplifiers.check_off("after the hang");
-        drop(app);
-        bring_back(&stand);
-        let seen = stand.finish();
-        assert_eq!(seen.tally.watchdog_trips, before.watchdog_trips + 1);
-    }
+    let mut setup = Setup::new("real").sabotaged("hang:1500@button20");
+    setup.limits.watchdog_ms = 500;
+    let stand = Stand::start(setup);
+    let app = stand.start_app();
+    stand.wait_for_force();
+    let before = stand.amplifiers.tally();
+    stand.amplifiers.press(1 << 20);
+    stand.amplifiers.wait_for_trip(before);
+    wait_for_fault(&stand, FaultReason::AmplifierTripped);
+    wait_for("off", || !stand.amplifiers.are_enabled());
+    stand.amplifiers.check_off("after the hang");
+    drop(app);
+    bring_back(&stand);
+    let seen = stand.finish();
+    assert_eq!(seen.tally.watchdog_trips, before.watchdog_trips + 1);
 }
 
 #[test]
 fn a_driver_whose_loop_hangs_for_ever_is_stopped_all_the_same_with_the_motors_off() {
-    for clock in ["real", "lockstep"] {
-        // A watchdog that does not come: the driver has to do it.
-        let mut setup = Setup::new(clock).sabotaged("hang:600000@button20");
-        setup.limits.watchdog_ms = 600_000;
-        let mut stand = Stand::start(setup);
-        let app = stand.start_app();
-        stand.wait_for_force();
-        stand.amplifiers.press(1 << 20);
-        wait_for("a loop that stands", || {
-            let tick = stand.view().latest_tick();
-            std::thread::sleep(std::time::Duration::from_millis(100));
-            stand.view().latest_tick() == tick
-        });
-        assert!(stand.amplifiers.are_enabled(), "the force stays");
-        client::stop(&stand.socket(), "test").expect("it is told");
-        let end = stand.driver.end();
-        assert_eq!(end.status, Some(3), "{end:?}");
-        assert!(end.err.contains("the driver's loop hangs"), "{end:?}");
-        let words = epitaph::read(&stand.view().epitaph).expect("an epitaph");
-        assert_eq!(words.kind, EpitaphKind::Fault, "{words}");
-        stand.amplifiers.settle();
-        stand.amplifiers.check_off("a hung loop");
-        drop(app);
-        let seen = stand.finish_after_death();
-        assert_eq!((seen.tally.watchdog_trips, seen.tally.switched_off), (0, 1));
-    }
+    // A watchdog that does not come: the driver has to do it.
+    let mut setup = Setup::new("real").sabotaged("hang:600000@button20");
+    setup.limits.watchdog_ms = 600_000;
+    let mut stand = Stand::start(setup);
+    let app = stand.start_app();
+    stand.wait_for_force();
+    stand.amplifiers.press(1 << 20);
+    wait_for("a loop that stands", || {
+        let tick = stand.view().latest_tick();
+        std::thread::sleep(std::time::Duration::from_millis(100));
+        stand.view().latest_tick() == tick
+    });
+    assert!(stand.amplifiers.are_enabled(), "the force stays");
+    client::stop(&stand.socket(), "test").expect("it is told");
+    let end = stand.driver.end();
+    assert_eq!(end.status, Some(3), "{end:?}");
+    assert!(end.err.contains("the driver's loop hangs"), "{end:?}");
+    let words = epitaph::read(&stand.view().epitaph).expect("an epitaph");
+    assert_eq!(words.kind, EpitaphKind::Fault, "{words}");
+    stand.amplifiers.settle();
+    stand.amplifiers.check_off("a hung loop");
+    drop(app);
+    let seen = stand.finish_after_death();
+    assert_eq!((seen.tally.watchdog_trips, seen.tally.switched_off), (0, 1));
 }
 
 #[test]
 fn a_driver_that_is_stopped_and_continued_finds_its_amplifiers_tripped() {
-    for clock in ["real", "lockstep"] {
-        let stand = Stand::start(Setup::new(clock));
-        let app = stand.start_app();
-        stand.wait_for_force();
-        let before = stand.amplifiers.tally();
-        stand.driver.signal(Signal::STOP);
-        stand.amplifiers.wait_for_trip(before);
-        stand.driver.signal(Signal::CONT);
-        wait_for_fault(&stand, FaultReason::AmplifierTripped);
-        wait_for("off", || !stand.amplifiers.are_enabled());
-        drop(app);
-        bring_back(&stand);
-        stand.finish();
-    }
+    let stand = Stand::start(Setup::new("real"));
+    let app = stand.start_app();
+    stand.wait_for_force();
+    let before = stand.amplifiers.tally();
+    stand.driver.signal(Signal::STOP);
+    stand.amplifiers.wait_for_trip(before);
+    stand.driver.signal(Signal::CONT);
+    wait_for_fault(&stand, FaultReason::AmplifierTripped);
+    wait_for("off", || !stand.amplifiers.are_enabled());
+    drop(app);
+    bring_back(&stand);
+    stand.finish();
 }
 
 fn wait_for_fault(stand: &Stand, reason: FaultReason) {

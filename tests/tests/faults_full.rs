@@ -87,51 +87,47 @@ fn limit_files(process: u32, bytes: Option<u64>) {
 /// The driver lives, says so, and grants the next one.
 #[test]
 fn an_app_for_whose_lease_there_is_no_room_is_told_and_the_driver_goes_on() {
-    for clock in ["real", "lockstep"] {
-        let stand = Stand::start(Setup::new(clock));
-        limit_files(stand.driver.id(), Some(100));
-        let end = Running::start(&mut stand.app()).end();
-        assert_eq!(end.status, Some(2), "{end:?}");
-        assert!(end.err.contains("the driver refused"), "{end:?}");
-        RingLog::begin(stand.view()).follow_for(stand.view(), 50);
-        limit_files(stand.driver.id(), None);
-        let app = stand.start_app();
-        stand.wait_for_force();
-        drop(app);
-        stand.finish();
-    }
+    let stand = Stand::start(Setup::new("real"));
+    limit_files(stand.driver.id(), Some(100));
+    let end = Running::start(&mut stand.app()).end();
+    assert_eq!(end.status, Some(2), "{end:?}");
+    assert!(end.err.contains("the driver refused"), "{end:?}");
+    RingLog::begin(stand.view()).follow_for(stand.view(), 50);
+    limit_files(stand.driver.id(), None);
+    let app = stand.start_app();
+    stand.wait_for_force();
+    drop(app);
+    stand.finish();
 }
 
 /// The application says so and goes on, with a recording that can be read; once it ends, its force goes as that of any other.
 #[test]
 fn a_recording_that_fills_its_disk_in_the_middle_of_a_force_ends_neither_the_app_nor_the_driver() {
-    for clock in ["real", "lockstep"] {
-        let mut stand = Stand::start(Setup::new(clock));
-        let mut app = stand.app();
-        app.args(["--record", "out.csv"]);
-        // 500 blocks of 512 bytes; a second of rows is as much.
-        let mut app = Running::start(&mut limited(&app, "-f 500"));
-        stand.wait_for_force();
-        app.hear("File too large");
-        stand.wait_for_force();
-        app.must_run();
-        app.signal(Signal::INT);
-        let end = app.end();
-        assert_eq!(end.status, Some(3), "{end:?}");
-        assert!(end.err.contains("File too large"), "{end:?}");
-        let recording = system_tests::recording::Table::read(&stand.path("out.csv"));
-        assert!(!recording.is_empty());
-        let mut log = RingLog::begin(stand.view());
-        log.follow(stand.view(), "the end of the force", |told| {
-            told.last().is_some_and(|last| last.lease == 0 && !last.is_pushing())
-        });
-        log.check_promise(stand.view());
-        stand.driver.must_run();
-        let app = stand.start_app();
-        stand.wait_for_force();
-        drop(app);
-        stand.finish();
-    }
+    let mut stand = Stand::start(Setup::new("real"));
+    let mut app = stand.app();
+    app.args(["--record", "out.csv"]);
+    // 500 blocks of 512 bytes; a second of rows is as much.
+    let mut app = Running::start(&mut limited(&app, "-f 500"));
+    stand.wait_for_force();
+    app.hear("File too large");
+    stand.wait_for_force();
+    app.must_run();
+    app.signal(Signal::INT);
+    let end = app.end();
+    assert_eq!(end.status, Some(3), "{end:?}");
+    assert!(end.err.contains("File too large"), "{end:?}");
+    let recording = system_tests::recording::Table::read(&stand.path("out.csv"));
+    assert!(!recording.is_empty());
+    let mut log = RingLog::begin(stand.view());
+    log.follow(stand.view(), "the end of the force", |told| {
+        told.last().is_some_and(|last| last.lease == 0 && !last.is_pushing())
+    });
+    log.check_promise(stand.view());
+    stand.driver.must_run();
+    let app = stand.start_app();
+    stand.wait_for_force();
+    drop(app);
+    stand.finish();
 }
 
 #[test]

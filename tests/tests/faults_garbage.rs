@@ -135,7 +135,7 @@ impl Bench {
             command.devices[..DEVICES].iter_mut().for_each(|device| device.force_on_user_n = [0.0, 1.0, 0.0]);
             command
         };
-        for _ in 0..20 {
+        for _ in 0..40 {
             self.tick(1, |commander, driver, tick| commander.publish(&command(tick), driver));
         }
         let frame = self.frame();
@@ -144,7 +144,7 @@ impl Bench {
     }
 }
 
-const SAFETY: &str = "[safety]\nmax_command_age_ticks = 3\nramp_in_ms = 10\nramp_out_ms = 5\n";
+const SAFETY: &str = "[safety]\nmax_command_age_ticks = 3\nramp_in_ms = 20\nramp_out_ms = 5\n";
 
 /// A device that refuses to be written what its documentation says it never is.
 struct Strict {

@@ -15,27 +15,25 @@ use system_tests::faults::stand::{Setup, Stand, end_app};
 /// Nothing of the first one's changes: its amplifiers are as on as they were, none of its values is overwritten.
 #[test]
 fn a_second_driver_of_the_same_card_is_refused_wherever_it_listens_and_the_first_goes_on() {
-    for clock in ["real", "lockstep"] {
-        let mut stand = Stand::start(Setup::new(clock));
-        let app = stand.start_app();
-        stand.wait_for_force();
-        let mut elsewhere = stand.driver_command();
-        elsewhere.arg("--socket").arg(stand.path("other.sock"));
-        let same_place = stand.driver_command();
-        for mut command in [same_place, without_first_socket(&elsewhere)] {
-            let end = Running::start(&mut command).end();
-            assert_eq!(end.status, Some(2), "{end:?}");
-            assert!(end.err.contains("belongs to another driver; one card has one driver"), "{end:?}");
-        }
-        let mut log = RingLog::begin(stand.view());
-        log.follow_for(stand.view(), 100);
-        log.check_promise(stand.view());
-        assert!(log.told.iter().any(Told::is_pushing));
-        assert!(!stand.path("other.sock").exists());
-        stand.driver.must_run();
-        drop(app);
-        stand.finish();
+    let mut stand = Stand::start(Setup::new("real"));
+    let app = stand.start_app();
+    stand.wait_for_force();
+    let mut elsewhere = stand.driver_command();
+    elsewhere.arg("--socket").arg(stand.path("other.sock"));
+    let same_place = stand.driver_command();
+    for mut command in [same_place, without_first_socket(&elsewhere)] {
+        let end = Running::start(&mut command).end();
+        assert_eq!(end.status, Some(2), "{end:?}");
+        assert!(end.err.contains("belongs to another driver; one card has one driver"), "{end:?}");
     }
+    let mut log = RingLog::begin(stand.view());
+    log.follow_for(stand.view(), 100);
+    log.check_promise(stand.view());
+    assert!(log.told.iter().any(Told::is_pushing));
+    assert!(!stand.path("other.sock").exists());
+    stand.driver.must_run();
+    drop(app);
+    stand.finish();
 }
 
 /// `--socket` may be given once.
@@ -65,52 +63,48 @@ fn a_second_emulator_of_the_same_card_is_refused_and_the_first_goes_on() {
 /// An arm in treacle, which its motors push away: whoever zeroed its counters anew would be seen.
 #[test]
 fn an_app_is_upgraded_under_a_running_driver_and_no_device_is_zeroed_anew() {
-    for clock in ["real", "lockstep"] {
-        let mut setup = Setup::new(clock);
-        setup.emulator = vec!["--yield", "50"];
-        let mut stand = Stand::start(setup);
-        let (driver, faults) = (stand.driver.id(), &stand.observer.driver.counters.faults);
-        let mut old = stand.start_app();
-        let mut moved = 0;
-        for upgrade in 0..3 {
-            wait_for("a force", || {
-                stand.view().read_latest().is_some_and(|frame| frame.previous.authority > 0.0)
-            });
-            wait_for("a movement", || counts(stand.view())[..3].iter().map(|c| c.abs()).sum::<i64>() > moved);
-            // Killed, and asked to end: the successor finds the same driver.
-            if upgrade % 2 == 0 {
-                old.kill();
-            } else {
-                drop(end_app(old));
-            }
-            wait_for("the end of the force", || !stand.amplifiers.are_enabled());
-            // What was written last is at work until the emulator has seen it.
-            stand.amplifiers.settle();
-            stand.amplifiers.settle();
-            let before = counts(stand.view());
-            let mut log = RingLog::begin(stand.view());
-            old = Running::start(&mut another_phantom3(&stand, upgrade));
-            log.follow(stand.view(), "its first force", |told| told.iter().any(Told::is_pushing));
-            let first = log.told.iter().find(|told| told.lease != 0).expect("it got the lease");
-            let at_lease = counts_in(stand.view(), first.tick).unwrap_or(before);
-            for (before, after) in before.iter().zip(at_lease) {
-                assert!((before - after).abs() <= 1, "{before} counts, then {after}");
-            }
-            check_zero(stand.view());
-            moved = before[..3].iter().map(|count| count.abs()).sum();
-            assert!(moved > 0, "it was pushed away");
-            log.check_promise(stand.view());
-            assert!(
-                log.told.iter().all(|told| !matches!(told.state, DriverState::Zeroing | DriverState::Fault))
-            );
+    let mut setup = Setup::new("real");
+    setup.emulator = vec!["--yield", "50"];
+    let mut stand = Stand::start(setup);
+    let (driver, faults) = (stand.driver.id(), &stand.observer.driver.counters.faults);
+    let mut old = stand.start_app();
+    let mut moved = 0;
+    for upgrade in 0..3 {
+        wait_for("a force", || {
+            stand.view().read_latest().is_some_and(|frame| frame.previous.authority > 0.0)
+        });
+        wait_for("a movement", || counts(stand.view())[..3].iter().map(|c| c.abs()).sum::<i64>() > moved);
+        // Killed, and asked to end: the successor finds the same driver.
+        if upgrade % 2 == 0 {
+            old.kill();
+        } else {
+            drop(end_app(old));
         }
-        assert_eq!(stand.driver.id(), driver);
-        assert_eq!(faults.load(Ordering::Relaxed), 0);
-        assert_eq!(stand.view().counters.leases_granted.load(Ordering::Relaxed), 4);
-        stand.driver.must_run();
-        old.kill();
-        stand.finish();
+        wait_for("the end of the force", || !stand.amplifiers.are_enabled());
+        // What was written last is at work until the emulator has seen it.
+        stand.amplifiers.settle();
+        stand.amplifiers.settle();
+        let before = counts(stand.view());
+        let mut log = RingLog::begin(stand.view());
+        old = Running::start(&mut another_phantom3(&stand, upgrade));
+        log.follow(stand.view(), "its first force", |told| told.iter().any(Told::is_pushing));
+        let first = log.told.iter().find(|told| told.lease != 0).expect("it got the lease");
+        let at_lease = counts_in(stand.view(), first.tick).unwrap_or(before);
+        for (before, after) in before.iter().zip(at_lease) {
+            assert!((before - after).abs() <= 1, "{before} counts, then {after}");
+        }
+        check_zero(stand.view());
+        moved = before[..3].iter().map(|count| count.abs()).sum();
+        assert!(moved > 0, "it was pushed away");
+        log.check_promise(stand.view());
+        assert!(log.told.iter().all(|told| !matches!(told.state, DriverState::Zeroing | DriverState::Fault)));
     }
+    assert_eq!(stand.driver.id(), driver);
+    assert_eq!(faults.load(Ordering::Relaxed), 0);
+    assert_eq!(stand.view().counters.leases_granted.load(Ordering::Relaxed), 4);
+    stand.driver.must_run();
+    old.kill();
+    stand.finish();
 }
 
 /// Counts go on whatever is called zero; angles do not. The emulator's counters began at zero, at home, so an

@@ -29,7 +29,7 @@ fn three_phantoms() -> DriverConfig {
 /// The same, with nobody at the tips, and full authority at once, so that no arm falls before it is held.
 fn let_go(is_compensated: bool) -> DriverConfig {
     let mut config = three_phantoms();
-    config.safety.ramp_in_ticks = 1;
+    config.safety.ramp_in_ns = config.period_ns;
     for device in &mut config.devices {
         device.compensates_gravity = is_compensated;
         let Backend::Simulated { holder, .. } = &mut device.backend else { panic!("simulated") };

@@ -137,7 +137,7 @@ fn an_application_waits_its_grace_for_a_driver_that_came_back_to_be_zeroed() {
 
 #[test]
 fn a_zero_tells_the_pose_the_counts_and_the_tip_before_and_after() {
-    let stand = Stand::start(asking("lockstep"));
+    let stand = Stand::start(asking("real"));
     turn(&stand, [40, 50, -60]);
     let end = zero(&stand, &["--device", "f0"]);
     assert_eq!(end.status, Some(0), "{end:?}");
@@ -266,7 +266,7 @@ const HANDLE: &str = "\n[gimbal]\ncounts_per_rev = 4000\nreduction = [1.0, 1.0, 
 
 #[test]
 fn a_gimbal_and_buttons_reach_the_recording_and_are_no_columns_without_a_handle() {
-    let mut stand = Stand::start(Setup::new("lockstep"));
+    let mut stand = Stand::start(Setup::new("real"));
     record(&stand, "plain.csv");
     let plain = recording::Table::read(&stand.path("plain.csv"));
     stand.stop_driver();

@@ -168,11 +168,14 @@ impl Rig {
             HandMode::Impedance(simulated) if finger.is_some() => (simulated.backend(wish), true),
             _ => (Backend::Ideal(wish), false),
         };
+        // A kinematic run renders what was computed, whatever it is.
+        let slew_n_per_s = matches!(backend, Backend::Ideal(_)).then_some(f64::INFINITY);
         DeviceConfig {
             // No finger can be called so: brackets are not allowed in a name.
             name: finger.map_or_else(|| format!("(unused {index})"), |finger| finger.name.clone()),
             backend,
             peak_force_n: None,
+            slew_n_per_s,
             compensates_gravity,
             zeroing: Zeroing::Known,
         }

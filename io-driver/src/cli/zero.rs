@@ -6,6 +6,7 @@
 
 use super::{EXIT_FAULT, EXIT_USAGE, SocketArgs, fail, print_line};
 use crate::device_file::home_pose;
+use crate::safety::elapsed::Elapsed;
 use crate::safety::stillness::Stillness;
 use bytemuck::Zeroable;
 use clap::Args;
@@ -245,12 +246,15 @@ impl<'a> Zeroing<'a> {
 
     fn wait_for_rest(&mut self, devices: &[usize], wait_s: f64) -> Result<(), ZeroError> {
         let begun = Instant::now();
-        let mut rests = vec![Stillness::new(LOOK.as_nanos() as u64); devices.len()];
+        let mut rests = vec![Stillness::default(); devices.len()];
+        // One reading in each look, however many ticks that is.
+        let look_ns = LOOK.as_nanos() as u64;
+        let elapsed = Elapsed::new(look_ns, look_ns);
         let mut live = LiveLine::new();
         loop {
             self.next_frame(self.frame.tick)?;
             for (rest, index) in rests.iter_mut().zip(devices) {
-                rest.observe(self.device(*index).encoder_counts);
+                rest.observe(self.device(*index).encoder_counts, elapsed);
             }
             live.show(devices.iter().zip(&rests).map(|(index, rest)| {
                 let counts = counts_of(self.device(*index));

@@ -18,6 +18,9 @@ pub struct DeviceConfig {
     pub backend: Backend,
     /// Overrides the peak of its description (N).
     pub peak_force_n: Option<f64>,
+    /// Overrides how fast its force may grow, turn and reverse (N/s), downwards where a description says it; infinite:
+    /// no limit, for an ideal device.
+    pub slew_n_per_s: Option<f64>,
     /// Its motors hold up its own weight while somebody commands.
     pub compensates_gravity: bool,
     /// How it learns where it is, if it has counters.
@@ -130,6 +133,12 @@ impl Backend {
         }
     }
 
+    /// Whether it has registers, behind which motors may be: it knows no time but the real one. Those of an emulated
+    /// card stand for a real one's.
+    pub fn has_registers(&self) -> bool {
+        matches!(self, Self::Emulated { .. })
+    }
+
     /// How many buttons such a device may have; `None`: none, so that no switch could be wired to it.
     /// Whether a hand file has the buttons is seen when it is opened.
     pub(super) fn buttons(&self) -> Option<i64> {
@@ -172,6 +181,7 @@ pub(super) struct RawDevice {
     base_position_m: Option<SpannedList>,
     base_orientation_wxyz: Option<SpannedList>,
     peak_force_n: Option<Spanned<f64>>,
+    slew_n_per_s: Option<Spanned<f64>>,
 }
 
 #[derive(Deserialize, Clone, Copy)]
@@ -225,9 +235,20 @@ impl RawDevice {
             RawBackend::Emulated => self.emulated(span, toml, directory)?,
         };
         let peak_force_n = self.peak_force_n.as_ref().map(|peak| toml.number(peak, PEAK)).transpose()?;
+        let slew_n_per_s = self.slew(&backend, toml)?;
         let compensates_gravity = self.gravity_compensation.as_ref().is_some_and(|key| *key.get_ref());
         let zeroing = self.zeroing.as_ref().map_or(backend.usual_zeroing(), |key| *key.get_ref());
-        Ok(DeviceConfig { name, backend, peak_force_n, compensates_gravity, zeroing })
+        Ok(DeviceConfig { name, backend, peak_force_n, slew_n_per_s, compensates_gravity, zeroing })
+    }
+
+    /// Nothing can be hurt by an ideal device, so it may be told to have no limit.
+    fn slew(&self, backend: &Backend, toml: &TomlText<'_>) -> Result<Option<f64>, TomlReport> {
+        match &self.slew_n_per_s {
+            Some(slew) if *slew.get_ref() == f64::INFINITY && matches!(backend, Backend::Ideal(_)) => {
+                Ok(Some(f64::INFINITY))
+            }
+            slew => slew.as_ref().map(|slew| toml.number(slew, SLEW)).transpose(),
+        }
     }
 
     fn ideal(
@@ -499,4 +520,6 @@ const DEFAULT_HAND: &str = "pen-grip";
 
 const PLACE: Allowed = Allowed { min: -100.0, max: 100.0, unit: "m" };
 const QUATERNION: Allowed = Allowed { min: -2.0, max: 2.0, unit: "(w, x, y, z)" };
+/// The range of a description's.
+const SLEW: Allowed = crate::device_file::SLEW;
 const PEAK: Allowed = Allowed { min: 0.0, max: 1000.0, unit: "N" };

@@ -1,4 +1,8 @@
 //! `[safety]`: ages, ramps, switches, commissioning.
+//!
+//! Ages and ramps are times, whatever the rate, and bounded as such. The usual ones let a force stay for less than 10 ms
+//! after the last reply at 1 kHz: 4 ms held, 5 ms ramped out, and half a millisecond of waiting for a reply that does
+//! not come. A ramp takes whole ticks, so that it ends in one: in by the nearest number, out by no more than asked for.
 
 use super::DeviceConfig;
 use crate::safety::switches::{Switch, Switches};
@@ -9,12 +13,12 @@ use toml::Spanned;
 /// Ages, ramps, switches, and whether somebody is trying the device for the first time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SafetyConfig {
-    /// How many ticks an old command may still drive the motors.
-    pub max_command_age_ticks: u64,
-    /// From no force to all of it for a new lease (ticks).
-    pub ramp_in_ticks: u64,
-    /// From all force to none once commands fail (ticks).
-    pub ramp_out_ticks: u64,
+    /// How old a command may be that still drives the motors (ns).
+    pub max_command_age_ns: u64,
+    /// From no force to all of it for a new lease (ns); whole ticks.
+    pub ramp_in_ns: u64,
+    /// From all force to none once commands fail (ns); whole ticks.
+    pub ramp_out_ns: u64,
     /// Beyond its workspace a device's force fades out over this distance (m).
     pub workspace_margin_m: f64,
     /// Emergency stop and dead-man's switch.
@@ -41,9 +45,9 @@ impl SafetyConfig {
     /// What holds if nobody says.
     pub fn usual(period_ns: u64) -> Self {
         Self {
-            max_command_age_ticks: 5,
-            ramp_in_ticks: ticks_of_ms(200.0, period_ns),
-            ramp_out_ticks: ticks_of_ms(10.0, period_ns),
+            max_command_age_ns: ns_of_ms(4.0),
+            ramp_in_ns: ramp_in_ns(200.0, period_ns),
+            ramp_out_ns: ramp_out_ns(5.0, period_ns),
             workspace_margin_m: 0.02,
             switches: Switches::default(),
             commissioning: None,
@@ -51,14 +55,31 @@ impl SafetyConfig {
     }
 }
 
-/// At least one.
-fn ticks_of_ms(ms: f64, period_ns: u64) -> u64 {
-    ((ms * 1e6 / period_ns as f64).round() as u64).max(1)
+fn ns_of_ms(ms: f64) -> u64 {
+    (ms * 1e6).round() as u64
 }
+
+fn ramp_in_ns(ms: f64, period_ns: u64) -> u64 {
+    let ticks = (ms * 1e6 / period_ns as f64).round() as u64;
+    ticks.max(1) * period_ns
+}
+
+fn ramp_out_ns(ms: f64, period_ns: u64) -> u64 {
+    // A period is rounded to a nanosecond, which must not cost a tick.
+    let ticks = (ms * 1e6 / period_ns as f64 + 1e-3).floor() as u64;
+    ticks.max(1) * period_ns
+}
+
+/// Longer than most stalls of a shared machine; 8.5 N on the 250 g of a hand with an arm make 0.7 m/s and 7 mm of it.
+const AGE: Allowed = Allowed { min: 0.0, max: 20.0, unit: "ms" };
+/// A hand's first reflex takes 20 ms: what is there sooner meets one that does not hold.
+const RAMP_IN: Allowed = Allowed { min: 20.0, max: 10_000.0, unit: "ms" };
+const RAMP_OUT: Allowed = Allowed { min: 0.0, max: 50.0, unit: "ms" };
 
 #[derive(Deserialize, Default)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawSafety {
+    max_command_age_ms: Option<Spanned<f64>>,
     max_command_age_ticks: Option<Spanned<i64>>,
     ramp_in_ms: Option<Spanned<f64>>,
     ramp_out_ms: Option<Spanned<f64>>,
@@ -90,20 +111,21 @@ impl RawSafety {
         let number = |key: &Option<Spanned<f64>>, min: f64, max: f64, unit: &'static str| {
             key.as_ref().map(|number| toml.number(number, Allowed { min, max, unit })).transpose()
         };
-        let ticks = |key: &Option<Spanned<f64>>, usual: u64, max_ms: f64| {
-            let ms = number(key, 0.0, max_ms, "ms")?;
-            Ok::<u64, TomlReport>(ms.map_or(usual, |ms| ticks_of_ms(ms, period_ns)))
+        let time = |key: &Option<Spanned<f64>>, allowed: Allowed| {
+            key.as_ref().map(|ms| toml.number(ms, allowed)).transpose()
         };
         let switch =
             |raw: &Option<RawSwitch>| raw.as_ref().map(|switch| switch.validate(toml, devices)).transpose();
-        let age = self.max_command_age_ticks.as_ref().map(|age| toml.integer(age, 0..=100)).transpose()?;
+        let age_ns = self.command_age_ns(toml, period_ns)?;
+        let ramp_in_ms = time(&self.ramp_in_ms, RAMP_IN)?;
+        let ramp_out_ms = time(&self.ramp_out_ms, RAMP_OUT)?;
         let margin_mm = number(&self.workspace_margin_mm, 0.1, 1000.0, "mm")?;
         let force_n = number(&self.commissioning_force_n, 0.0, 2.0, "N")?;
         let speed_m_per_s = number(&self.commissioning_speed_m_per_s, 0.01, 2.0, "m/s")?;
         Ok(SafetyConfig {
-            max_command_age_ticks: age.map_or(usual.max_command_age_ticks, |age| age as u64),
-            ramp_in_ticks: ticks(&self.ramp_in_ms, usual.ramp_in_ticks, 10_000.0)?,
-            ramp_out_ticks: ticks(&self.ramp_out_ms, usual.ramp_out_ticks, 1000.0)?,
+            max_command_age_ns: age_ns.unwrap_or(usual.max_command_age_ns),
+            ramp_in_ns: ramp_in_ms.map_or(usual.ramp_in_ns, |ms| ramp_in_ns(ms, period_ns)),
+            ramp_out_ns: ramp_out_ms.map_or(usual.ramp_out_ns, |ms| ramp_out_ns(ms, period_ns)),
             workspace_margin_m: margin_mm.map_or(usual.workspace_margin_m, |mm| mm / 1e3),
             switches: Switches {
                 emergency_stop: switch(&self.emergency_stop)?,
@@ -118,6 +140,31 @@ impl RawSafety {
                 speed_m_per_s: speed_m_per_s.unwrap_or(Commissioning::USUAL.speed_m_per_s),
             }),
         })
+    }
+}
+
+impl RawSafety {
+    /// By its time, or by ticks, whose time is bounded alike.
+    fn command_age_ns(&self, toml: &TomlText<'_>, period_ns: u64) -> Result<Option<u64>, TomlReport> {
+        match (&self.max_command_age_ms, &self.max_command_age_ticks) {
+            (None, None) => Ok(None),
+            (Some(ms), None) => Ok(Some(ns_of_ms(toml.number(ms, AGE)?))),
+            (None, Some(ticks)) => {
+                let most = (AGE.max * 1e6 / period_ns as f64 + 1e-3).floor() as i64;
+                let count = *ticks.get_ref();
+                if (0..=most).contains(&count) {
+                    return Ok(Some(count.unsigned_abs() * period_ns));
+                }
+                let found = format_args!("{count} ticks of {} ms", period_ns as f64 / 1e6).to_string();
+                let allowed = format!("0 to {most} ticks at this rate, which is {} ms", AGE.max);
+                Err(toml.refuse(ticks.span(), found, allowed))
+            }
+            (Some(_), Some(ticks)) => Err(toml.refuse(
+                ticks.span(),
+                "`max_command_age_ticks` beside `max_command_age_ms`",
+                "one of the two",
+            )),
+        }
     }
 }
 

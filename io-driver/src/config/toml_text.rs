@@ -21,7 +21,6 @@ pub(super) fn write(config: &DriverConfig) -> String {
 }
 
 fn head(text: &mut String, config: &DriverConfig) -> std::fmt::Result {
-    let period_ms = config.period_ns as f64 / 1e6;
     writeln!(text, "rate_hz = {:?}", 1e9 / config.period_ns as f64)?;
     writeln!(text, "clock = {}", quoted(config.clock.name()))?;
     if let Some(socket) = &config.socket {
@@ -52,9 +51,10 @@ fn head(text: &mut String, config: &DriverConfig) -> std::fmt::Result {
     writeln!(text, "mode = {}", quoted(mode_name(config.reply.mode)))?;
     writeln!(text, "budget_us = {:?}", config.reply.budget_ns as f64 / 1e3)?;
     writeln!(text, "[safety]")?;
-    writeln!(text, "max_command_age_ticks = {}", config.safety.max_command_age_ticks)?;
-    writeln!(text, "ramp_in_ms = {:?}", config.safety.ramp_in_ticks as f64 * period_ms)?;
-    writeln!(text, "ramp_out_ms = {:?}", config.safety.ramp_out_ticks as f64 * period_ms)?;
+    let ms = |ns: u64| ns as f64 / 1e6;
+    writeln!(text, "max_command_age_ms = {:?}", ms(config.safety.max_command_age_ns))?;
+    writeln!(text, "ramp_in_ms = {:?}", ms(config.safety.ramp_in_ns))?;
+    writeln!(text, "ramp_out_ms = {:?}", ms(config.safety.ramp_out_ns))?;
     writeln!(text, "workspace_margin_mm = {:?}", config.safety.workspace_margin_m * 1e3)?;
     let Switches { emergency_stop, dead_man } = &config.safety.switches;
     for (key, switch) in [("emergency_stop", emergency_stop), ("dead_man", dead_man)] {
@@ -79,6 +79,9 @@ fn write_device(text: &mut String, device: &DeviceConfig) -> std::fmt::Result {
     writeln!(text, "[[device]]\nname = {}", quoted(&device.name))?;
     if let Some(peak_force_n) = device.peak_force_n {
         writeln!(text, "peak_force_n = {peak_force_n:?}")?;
+    }
+    if let Some(slew_n_per_s) = device.slew_n_per_s {
+        writeln!(text, "slew_n_per_s = {slew_n_per_s:?}")?;
     }
     if device.compensates_gravity {
         writeln!(text, "gravity_compensation = true")?;

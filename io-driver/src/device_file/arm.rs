@@ -278,7 +278,8 @@ const REDUCTION: Allowed = Allowed { min: 0.1, max: 1000.0, unit: "motor turns p
 const ANGLE: Allowed = Allowed { min: -TAU, max: TAU, unit: "rad" };
 const CURRENT: Allowed = Allowed { min: 1e-3, max: 100.0, unit: "A" };
 const TORQUE_CONSTANT: Allowed = Allowed { min: 1e-4, max: 10.0, unit: "N m/A" };
-const SLEW: Allowed = Allowed { min: 10.0, max: 1e6, unit: "N/s" };
+/// At 1 kHz 10 N a tick: a Premium's 8.5 N reverse in two ticks at the fastest.
+pub(crate) const SLEW: Allowed = Allowed { min: 10.0, max: 1e4, unit: "N/s" };
 const SPEED: Allowed = Allowed { min: 0.01, max: 20.0, unit: "m/s" };
 const SHARE: Allowed = Allowed { min: 0.0, max: 1.0, unit: "of the thermal resistance" };
 const TIME_CONSTANT: Allowed = Allowed { min: 0.1, max: 10_000.0, unit: "s" };

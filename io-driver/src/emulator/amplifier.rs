@@ -2,7 +2,8 @@
 //!
 //! Model: three channels with converters of some bits. Each value is checked against limits that the driver
 //! knows nothing of: the codes' range, the force at the tip that the torques amount to in the pose of the
-//! moment (where the pose can tell, which it cannot near a singular one), and how fast that force grew. How warm the
+//! moment (where the pose can tell, which it cannot near a singular one), and how far that force is from the one before,
+//! unless it only became shorter. How warm the
 //! motors are is not checked. A value that fails trips the amplifiers, and so does silence for longer than the watchdog waits while they are on. Tripped
 //! they give no current until they are armed anew.
 //! Frames and signs: forces on the user in the device's base frame D.
@@ -23,7 +24,7 @@ pub struct AmplifierSpec {
     pub kinematics: Kinematics,
     /// Longest force at the tip (N); infinite: not checked.
     pub peak_n: f64,
-    /// How much a force may grow from one value to the next (N); infinite: not checked.
+    /// How far a force may be from the one before, unless that only became shorter (N); infinite: not checked.
     pub step_n: f64,
     /// Silence that trips it (ns).
     pub watchdog_ns: u64,
@@ -80,7 +81,7 @@ tally! {
     torque_while_off,
     /// Forces beyond the peak.
     beyond_peak,
-    /// Forces that grew too fast.
+    /// Forces that grew, turned or reversed too fast.
     beyond_step,
     /// Times the watchdog was not served.
     watchdog_trips,
@@ -98,7 +99,7 @@ pub struct Amplifier {
     spec: AmplifierSpec,
     value: Value,
     is_tripped: bool,
-    /// The force before this one; the next may grow from there.
+    /// The force before this one.
     last_force: Vector3<f64>,
     tally: Tally,
 }
@@ -200,8 +201,9 @@ impl Amplifier {
         let tally = &mut self.tally;
         tally.largest_force_un = tally.largest_force_un.max((force.norm() * 1e6) as u64);
         tally.beyond_peak += u64::from(force.norm() > self.spec.peak_n + RESOLUTION_N);
-        let growth_n = distance_to_shorter_ones(self.last_force, force);
-        tally.beyond_step += u64::from(growth_n > self.spec.step_n + RESOLUTION_N);
+        let is_step = (force - self.last_force).norm() <= self.spec.step_n + RESOLUTION_N;
+        let is_shortened = distance_to_shorter_ones(self.last_force, force) <= RESOLUTION_N;
+        tally.beyond_step += u64::from(!is_step && !is_shortened);
         self.last_force = force;
     }
 
@@ -348,15 +350,21 @@ mod tests {
     }
 
     #[test]
-    fn a_force_may_vanish_at_once_but_not_reverse() {
-        let mut amplifier = amplifier();
-        amplifier.take(value(MS, Vector3::z() * 4.0), [0.0; 3]);
-        amplifier.take(value(2 * MS, Vector3::z() * 8.0), [0.0; 3]);
-        amplifier.take(value(3 * MS, Vector3::zeros()), [0.0; 3]);
-        assert_eq!(amplifier.tally().wrong(), 0);
-        amplifier.take(value(4 * MS, Vector3::z() * 4.9), [0.0; 3]);
-        amplifier.take(value(5 * MS, Vector3::z() * -5.2), [0.0; 3]);
-        assert_eq!(amplifier.tally().beyond_step, 1);
+    fn a_force_may_vanish_or_shorten_at_once_but_neither_reverse_nor_turn() {
+        let (mut amplifier, mut time_ns) = (amplifier(), 0);
+        let mut is_wrong = |force: Vector3<f64>| {
+            let before = amplifier.tally().beyond_step;
+            time_ns += MS;
+            amplifier.take(value(time_ns, force), [0.0; 3]);
+            amplifier.tally().beyond_step > before
+        };
+        for z in [4.0, 8.0, 1.0, 5.0, 0.0, 4.9, 0.0, -4.9, 0.0, 2.4, -2.4] {
+            assert!(!is_wrong(Vector3::z() * z), "{z}");
+        }
+        assert!(is_wrong(Vector3::z() * 2.8), "5.2 N from one side to the other");
+        assert!(!is_wrong(Vector3::zeros()));
+        assert!(!is_wrong(Vector3::y() * 4.0));
+        assert!(is_wrong(Vector3::z() * 4.0), "as long as before, and 5.7 N away");
     }
 
     #[test]

@@ -1,38 +1,53 @@
 //! How much of the commanded force may reach the motors: the driver's state machine.
 //!
 //! Model: `Starting -> Zeroing -> Idle -> Active`, and from everywhere `Fault`. The share of the force that
-//! is let through, the *authority*, is a level counted in ramp ticks, so that full is exactly 1 and zero
-//! exactly 0. A fresh reply raises it by one; a reply that is missing while the last one is still young
-//! holds it; one that is too old, or a lease that ended, lowers it by a ramp of its own; a fault drops it to
-//! zero at once. Where there is a dead-man's switch and nobody holds it, the level sinks as for a reply that is
-//! too old, and rises again, from wherever it is, once it is held.
+//! is let through, the *authority*, is a level counted in nanoseconds of the ramp, so that full is exactly 1 and zero
+//! exactly 0. A fresh reply raises it by the time since the last tick, but a period at most; a reply that is missing
+//! while the last one is still young holds it; one that is too old, or a lease that ended, lowers it by all the time
+//! since the last tick, on a ramp of its own; a fault drops it to zero at once. Where there is a dead-man's switch and
+//! nobody holds it, the level sinks as for a reply that is too old, and rises again, from wherever it is, once it is
+//! held.
+//!
+//! Time is that of [`Elapsed`]: what was skipped ends forces and lets none grow, and each tick ends them by a period at
+//! least.
 //!
 //! `Zeroing` is left by positions that are valid, entered by ones that are not: when a driver starts whose devices
 //! have to be zeroed, and when a fault is cleared that cost them their zero.
 //!
-//! Invariants: authority is 0 unless a lease gave a valid command; it never jumps up; a new lease begins
-//! only after the former's force has ramped to zero; Fault is left only on request.
-//! Cost: a few comparisons a tick.
+//! Invariants: authority is 0 unless a lease gave a valid command; it never rises by more than a period's part of the
+//! ramp in a tick, and is gone `max_command_age + out` after the last reply, whatever ticks were skipped; a new lease
+//! begins only after the former's force has ramped to zero; Fault is left only on request.
+//! Cost: a few comparisons and a division a tick.
 
+use super::elapsed::Elapsed;
 use shm_abi::{DriverState, FaultReason, ReplyKind};
 
 /// How fast authority comes and goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Ramps {
-    /// Ticks from none to all; at least 1.
-    pub in_ticks: u64,
-    /// Ticks from all to none; at least 1.
-    pub out_ticks: u64,
-    /// How many ticks an old command may still drive the motors.
-    pub max_command_age_ticks: u64,
+    /// Time from none to all (ns); at least 1.
+    pub in_ns: u64,
+    /// Time from all to none (ns); at least 1.
+    pub out_ns: u64,
+    /// How old a command may be that still drives the motors (ns).
+    pub max_command_age_ns: u64,
+}
+
+/// How old the newest valid command of a lease is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CommandAge {
+    /// Ticks since the one that it answers.
+    pub ticks: u64,
+    /// Time since then (ns).
+    pub ns: u64,
 }
 
 /// The state machine; one call of each method per tick.
 #[derive(Debug)]
 pub struct Safety {
     ramps: Ramps,
-    /// 0 to `ramps.in_ticks`.
-    level: u64,
+    /// 0 to `ramps.in_ns`.
+    level_ns: u64,
     fault: FaultReason,
     positions_valid: bool,
     attended: bool,
@@ -43,10 +58,10 @@ pub struct Safety {
 impl Safety {
     /// A driver that has just been started.
     pub fn new(ramps: Ramps) -> Self {
-        let ramps = Ramps { in_ticks: ramps.in_ticks.max(1), out_ticks: ramps.out_ticks.max(1), ..ramps };
+        let ramps = Ramps { in_ns: ramps.in_ns.max(1), out_ns: ramps.out_ns.max(1), ..ramps };
         Self {
             ramps,
-            level: 0,
+            level_ns: 0,
             fault: FaultReason::None,
             positions_valid: false,
             attended: true,
@@ -57,12 +72,12 @@ impl Safety {
 
     /// The share of the force that is let through now, 0 to 1.
     pub fn authority(&self) -> f64 {
-        self.level as f64 / self.ramps.in_ticks as f64
+        self.level_ns as f64 / self.ramps.in_ns as f64
     }
 
     /// Whether nothing is let through.
     pub fn is_released(&self) -> bool {
-        self.level == 0
+        self.level_ns == 0
     }
 
     /// The state that the frame tells.
@@ -98,7 +113,7 @@ impl Safety {
 
     /// Ticks since this lease first had full authority, counted at the start of `tick`; -1 before.
     pub fn run_tick(&mut self, tick: u64) -> i64 {
-        if self.run_started_at.is_none() && self.level == self.ramps.in_ticks {
+        if self.run_started_at.is_none() && self.level_ns == self.ramps.in_ns {
             self.run_started_at = Some(tick);
         }
         self.run_started_at.map_or(-1, |start| tick.wrapping_sub(start) as i64)
@@ -111,37 +126,44 @@ impl Safety {
         self.commanded = false;
     }
 
-    /// What a reply means whose newest valid command is `age` ticks old (`None`: this lease gave none yet).
-    pub fn judge(&self, age: Option<u64>, freshness: u64) -> ReplyKind {
+    /// What a reply means whose newest valid command is so old (`None`: this lease gave none yet), where one of
+    /// `freshness` ticks ago is as fresh as they come.
+    pub fn judge(&self, age: Option<CommandAge>, freshness: u64) -> ReplyKind {
         match age {
-            Some(age) if age <= freshness => ReplyKind::Fresh,
-            Some(age) if age <= self.ramps.max_command_age_ticks => ReplyKind::Held,
+            Some(age) if age.ticks <= freshness => ReplyKind::Fresh,
+            Some(age) if age.ns <= self.ramps.max_command_age_ns => ReplyKind::Held,
             _ => ReplyKind::Expired,
         }
     }
 
-    /// Returns the authority for this tick's motor values, and moves on to the next tick's.
-    pub fn advance(&mut self, reply: ReplyKind) -> f64 {
+    /// Returns the authority for the motor values of a tick, so long after the former ones.
+    pub fn advance(&mut self, reply: ReplyKind, elapsed: Elapsed) -> f64 {
         if self.fault != FaultReason::None || !self.positions_valid {
             self.release();
             return 0.0;
         }
         self.commanded = self.attended && matches!(reply, ReplyKind::Fresh | ReplyKind::Held);
         match reply {
-            _ if !self.attended => self.sink(),
-            ReplyKind::Fresh => {
-                let now = self.authority();
-                self.level = (self.level + 1).min(self.ramps.in_ticks);
-                now
-            }
+            _ if !self.attended => self.sink(elapsed),
+            ReplyKind::Fresh => self.rise(elapsed),
             ReplyKind::Held => self.authority(),
-            ReplyKind::Expired | ReplyKind::NoLease => self.sink(),
+            ReplyKind::Expired | ReplyKind::NoLease => self.sink(elapsed),
         }
     }
 
-    fn sink(&mut self) -> f64 {
-        let step = self.ramps.in_ticks.div_ceil(self.ramps.out_ticks);
-        self.level = self.level.saturating_sub(step);
+    /// What it gains counts for the next tick, so that a ramp begins at nothing.
+    fn rise(&mut self, elapsed: Elapsed) -> f64 {
+        let now = self.authority();
+        self.level_ns = self.level_ns.saturating_add(elapsed.growth_ns()).min(self.ramps.in_ns);
+        now
+    }
+
+    fn sink(&mut self, elapsed: Elapsed) -> f64 {
+        let Ramps { in_ns, out_ns, .. } = self.ramps;
+        // No more than the whole ramp, and rounded towards its end.
+        let part = u128::from(elapsed.passed_ns().min(out_ns)) * u128::from(in_ns);
+        let step = part.div_ceil(u128::from(out_ns)) as u64;
+        self.level_ns = self.level_ns.saturating_sub(step);
         self.authority()
     }
 
@@ -162,7 +184,7 @@ impl Safety {
     }
 
     fn release(&mut self) {
-        self.level = 0;
+        self.level_ns = 0;
         self.commanded = false;
     }
 }
@@ -172,16 +194,22 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const RAMPS: Ramps = Ramps { in_ticks: 200, out_ticks: 10, max_command_age_ticks: 5 };
+    const MS: u64 = 1_000_000;
+    const RAMPS: Ramps = Ramps { in_ns: 200 * MS, out_ns: 10 * MS, max_command_age_ns: 5 * MS };
+    const TICK: Elapsed = Elapsed::new(MS, MS);
 
     fn active(ramps: Ramps) -> Safety {
         let mut safety = Safety::new(ramps);
         safety.set_positions_valid(true);
         safety.begin_lease();
-        for _ in 0..ramps.in_ticks {
-            safety.advance(ReplyKind::Fresh);
+        while safety.authority() < 1.0 {
+            safety.advance(ReplyKind::Fresh, TICK);
         }
         safety
+    }
+
+    fn age(ticks: u64, ns: u64) -> Option<CommandAge> {
+        Some(CommandAge { ticks, ns })
     }
 
     #[test]
@@ -192,27 +220,34 @@ mod tests {
         for tick in 0..200 {
             assert_eq!(safety.run_tick(tick), -1);
             let expected = tick as f64 / 200.0;
-            assert_eq!(safety.advance(ReplyKind::Fresh), expected);
+            assert_eq!(safety.advance(ReplyKind::Fresh, TICK), expected);
         }
         assert_eq!(safety.run_tick(200), 0, "t = 0 is the first tick at full authority");
-        assert_eq!(safety.advance(ReplyKind::Fresh), 1.0);
+        assert_eq!(safety.advance(ReplyKind::Fresh, TICK), 1.0);
         assert_eq!(safety.run_tick(201), 1);
     }
 
     #[test]
     fn a_held_command_keeps_the_force_and_an_expired_one_ramps_it_to_zero() {
         let mut safety = active(RAMPS);
-        assert_eq!(safety.judge(Some(0), 0), ReplyKind::Fresh);
-        assert_eq!(safety.judge(Some(5), 0), ReplyKind::Held);
-        assert_eq!(safety.judge(Some(6), 0), ReplyKind::Expired);
+        assert_eq!(safety.judge(age(0, 0), 0), ReplyKind::Fresh);
+        assert_eq!(safety.judge(age(5, 5 * MS), 0), ReplyKind::Held);
+        assert_eq!(safety.judge(age(5, 5 * MS + 1), 0), ReplyKind::Expired, "it is time that counts");
+        assert_eq!(safety.judge(age(1, 6 * MS), 0), ReplyKind::Expired, "however few the ticks");
+        assert_eq!(
+            safety.judge(age(1, 6 * MS), 1),
+            ReplyKind::Fresh,
+            "as fresh as a reply to the last tick can be"
+        );
+        assert_eq!(safety.judge(age(2, 6 * MS), 1), ReplyKind::Expired);
         assert_eq!(safety.judge(None, 0), ReplyKind::Expired);
         for _ in 0..5 {
-            assert_eq!(safety.advance(ReplyKind::Held), 1.0);
+            assert_eq!(safety.advance(ReplyKind::Held, TICK), 1.0);
         }
         for tick in 1..=10 {
             let expected = 1.0 - f64::from(tick) / 10.0;
             // The levels are integers over 200: exact but for one rounding of the quotient.
-            assert!((safety.advance(ReplyKind::Expired) - expected).abs() < 1e-15);
+            assert!((safety.advance(ReplyKind::Expired, TICK) - expected).abs() < 1e-15);
         }
         assert_eq!(safety.authority(), 0.0);
         assert_eq!(safety.state(), DriverState::Idle);
@@ -220,11 +255,44 @@ mod tests {
 
     #[test]
     fn the_ramp_out_ends_in_time_for_ramps_that_do_not_divide() {
-        let mut safety = active(Ramps { in_ticks: 7, out_ticks: 3, max_command_age_ticks: 0 });
+        let mut safety = active(Ramps { in_ns: 7 * MS, out_ns: 3 * MS, max_command_age_ns: 0 });
         for _ in 0..3 {
-            safety.advance(ReplyKind::NoLease);
+            assert!(!safety.is_released());
+            safety.advance(ReplyKind::NoLease, TICK);
         }
         assert!(safety.is_released());
+    }
+
+    #[test]
+    fn skipped_time_ramps_a_force_out_and_none_in() {
+        let long = |ms: u64| Elapsed::new(ms * MS, MS);
+        let mut safety = active(RAMPS);
+        assert_eq!(safety.advance(ReplyKind::Expired, long(4)), 0.6, "four of ten milliseconds");
+        assert_eq!(safety.advance(ReplyKind::Fresh, long(100)), 0.6);
+        assert_eq!(safety.authority(), 121.0 / 200.0, "one tick's part of the ramp, whatever was skipped");
+        assert_eq!(safety.advance(ReplyKind::Held, long(100)), 121.0 / 200.0);
+        assert_eq!(safety.advance(ReplyKind::NoLease, long(u64::MAX / MS)), 0.0);
+        assert!(safety.is_released());
+    }
+
+    #[test]
+    fn a_ramp_takes_the_same_time_at_every_rate() {
+        for period_ns in [MS / 8, MS / 3, MS, 4 * MS] {
+            let tick = Elapsed::new(period_ns, period_ns);
+            let mut safety = Safety::new(RAMPS);
+            safety.set_positions_valid(true);
+            safety.begin_lease();
+            let count = |safety: &mut Safety, reply, end: f64| {
+                let mut ticks = 0;
+                while safety.authority() != end {
+                    safety.advance(reply, tick);
+                    ticks += 1;
+                }
+                ticks
+            };
+            assert_eq!(count(&mut safety, ReplyKind::Fresh, 1.0), RAMPS.in_ns.div_ceil(period_ns));
+            assert_eq!(count(&mut safety, ReplyKind::NoLease, 0.0), RAMPS.out_ns.div_ceil(period_ns));
+        }
     }
 
     #[test]
@@ -234,7 +302,7 @@ mod tests {
         assert!(!safety.enter_fault(FaultReason::Panic), "the first reason stands");
         assert_eq!(safety.fault(), FaultReason::DeviceRead);
         for _ in 0..1000 {
-            assert_eq!(safety.advance(ReplyKind::Fresh), 0.0);
+            assert_eq!(safety.advance(ReplyKind::Fresh, TICK), 0.0);
             assert_eq!(safety.state(), DriverState::Fault);
         }
         assert!(!safety.enter_fault(FaultReason::EmergencyStop));
@@ -242,15 +310,15 @@ mod tests {
         assert!(!safety.enter_fault(FaultReason::Panic));
         assert_eq!(safety.fault(), FaultReason::EmergencyStop);
         safety.clear_fault();
-        assert_eq!(safety.advance(ReplyKind::Fresh), 0.0, "and then it ramps in again");
-        assert_eq!(safety.advance(ReplyKind::Fresh), 1.0 / 200.0);
+        assert_eq!(safety.advance(ReplyKind::Fresh, TICK), 0.0, "and then it ramps in again");
+        assert_eq!(safety.advance(ReplyKind::Fresh, TICK), 1.0 / 200.0);
     }
 
     #[test]
     fn nothing_is_let_through_while_a_position_is_unknown() {
         let mut safety = active(RAMPS);
         safety.set_positions_valid(false);
-        assert_eq!(safety.advance(ReplyKind::Fresh), 0.0);
+        assert_eq!(safety.advance(ReplyKind::Fresh, TICK), 0.0);
         assert_eq!(safety.state(), DriverState::Zeroing);
     }
 
@@ -260,14 +328,14 @@ mod tests {
         assert!(safety.may_zero(), "before anything is known");
         safety.set_positions_valid(true);
         safety.begin_lease();
-        safety.advance(ReplyKind::Fresh);
+        safety.advance(ReplyKind::Fresh, TICK);
         // The first tick of a ramp lets nothing through yet, and is one of somebody who is obeyed.
         assert_eq!((safety.state(), safety.may_zero()), (DriverState::Active, false));
         let mut safety = active(RAMPS);
-        safety.advance(ReplyKind::Expired);
+        safety.advance(ReplyKind::Expired, TICK);
         assert_eq!((safety.state(), safety.may_zero()), (DriverState::Idle, false), "it still ramps out");
         for _ in 0..10 {
-            safety.advance(ReplyKind::Expired);
+            safety.advance(ReplyKind::Expired, TICK);
         }
         assert!(safety.may_zero());
         let mut safety = active(RAMPS);
@@ -275,7 +343,7 @@ mod tests {
         assert!(safety.may_zero());
         safety.set_positions_valid(false);
         safety.clear_fault();
-        safety.advance(ReplyKind::Fresh);
+        safety.advance(ReplyKind::Fresh, TICK);
         assert_eq!((safety.state(), safety.may_zero()), (DriverState::Zeroing, true));
     }
 
@@ -285,30 +353,37 @@ mod tests {
         safety.set_attended(false);
         for tick in 1..=10 {
             // As for an expired reply: integers over 200, one rounding of the quotient.
-            assert!((safety.advance(ReplyKind::Fresh) - (1.0 - f64::from(tick) / 10.0)).abs() < 1e-15);
+            assert!((safety.advance(ReplyKind::Fresh, TICK) - (1.0 - f64::from(tick) / 10.0)).abs() < 1e-15);
         }
         assert_eq!(safety.state(), DriverState::Idle);
         safety.set_attended(true);
-        assert_eq!(safety.advance(ReplyKind::Fresh), 0.0);
-        assert_eq!(safety.advance(ReplyKind::Fresh), 1.0 / 200.0);
+        assert_eq!(safety.advance(ReplyKind::Fresh, TICK), 0.0);
+        assert_eq!(safety.advance(ReplyKind::Fresh, TICK), 1.0 / 200.0);
         assert_eq!(safety.state(), DriverState::Active);
     }
 
     proptest! {
+        /// What is skipped may end a force and never makes one; a driver that hears nothing is silent in time.
         #[test]
-        fn authority_stays_in_range_and_never_jumps_up(
-            replies in proptest::collection::vec(0u64..4, 1..400),
-            in_ticks in 1u64..50,
-            out_ticks in 1u64..50,
+        fn authority_stays_in_range_falls_with_time_and_rises_by_a_tick_at_most(
+            ticks in proptest::collection::vec((0u64..4, 0u64..20 * MS, any::<bool>()), 1..400),
+            in_ns in 1..50 * MS,
+            out_ns in 1..50 * MS,
         ) {
-            let mut safety = Safety::new(Ramps { in_ticks, out_ticks, max_command_age_ticks: 3 });
+            let mut safety = Safety::new(Ramps { in_ns, out_ns, max_command_age_ns: 3 * MS });
             safety.set_positions_valid(true);
-            let mut former = 0.0;
-            for word in replies {
-                let now = safety.advance(ReplyKind::from_word(word).expect("a kind"));
+            let (mut former, mut sinking_ns) = (0.0, 0);
+            for (word, passed_ns, attended) in ticks {
+                safety.set_attended(attended);
+                let reply = ReplyKind::from_word(word).expect("a kind");
+                let elapsed = Elapsed::new(passed_ns, MS);
+                let now = safety.advance(reply, elapsed);
                 prop_assert!((0.0..=1.0).contains(&now));
-                // One level, and the rounding of two quotients.
-                prop_assert!(now - former <= 1.0 / in_ticks as f64 + 1e-15);
+                // A period's part of the ramp, and the rounding of two quotients.
+                prop_assert!(now - former <= MS as f64 / in_ns as f64 + 1e-15);
+                let sinks = !attended || matches!(reply, ReplyKind::Expired | ReplyKind::NoLease);
+                sinking_ns = if sinks { sinking_ns + passed_ns } else { 0 };
+                prop_assert!(sinking_ns < out_ns || now == 0.0, "{now} after {sinking_ns} of {out_ns}");
                 former = now;
             }
         }

@@ -7,6 +7,7 @@
 //! exactly zero.
 //! Cost: constant; no allocation, no panic.
 
+use super::elapsed::Elapsed;
 use super::peak::limit_force;
 use super::slew::Slew;
 use super::speed::Speed;
@@ -48,7 +49,6 @@ pub struct Guard {
     limits: Limits,
     slew: Slew,
     speed: Speed,
-    period_s: f64,
     position: Vector3<f64>,
 }
 
@@ -63,28 +63,32 @@ pub struct Restrained {
 
 impl Guard {
     /// A device at rest without force.
-    pub fn new(limits: Limits, period_ns: u64) -> Self {
+    pub fn new(limits: Limits) -> Self {
         Self {
             limits,
             slew: Slew::new(limits.slew_n_per_s),
-            speed: Speed::new(limits.speed_m_per_s, period_ns),
-            period_s: period_ns as f64 / 1e9,
+            speed: Speed::new(limits.speed_m_per_s),
             position: Vector3::zeros(),
         }
     }
 
-    /// Takes the tip's position (m) and estimated velocity (m/s) in a tick.
+    /// Takes the tip's position (m) and estimated velocity (m/s), so long (ns) after the last ones.
     ///
     /// # Errors
     /// That it moved faster than it may.
     pub fn observe(
         &mut self,
-        tick: u64,
+        elapsed_ns: u64,
         position: Vector3<f64>,
         velocity: Vector3<f64>,
     ) -> Result<(), FaultReason> {
         self.position = position;
-        self.speed.observe(tick, position, velocity)
+        self.speed.observe(elapsed_ns, position, velocity)
+    }
+
+    /// It could not be read for so long (ns).
+    pub fn overlook(&mut self, elapsed_ns: u64) {
+        self.speed.overlook(elapsed_ns);
     }
 
     /// The position is not known; the next one is compared with nothing.
@@ -92,8 +96,8 @@ impl Guard {
         self.speed.forget();
     }
 
-    /// What may be asked of the motors, given the share of the force that is let through.
-    pub fn restrain(&mut self, commanded: Vector3<f64>, authority: f64) -> Restrained {
+    /// What may be asked of the motors so long after the last time, given the share of the force that is let through.
+    pub fn restrain(&mut self, commanded: Vector3<f64>, authority: f64, elapsed: Elapsed) -> Restrained {
         // Not `commanded * 0.0`: that leaves a negative zero or, for a fault, anything at all.
         if authority <= 0.0 {
             self.release();
@@ -103,8 +107,7 @@ impl Guard {
         let share = self.limits.edge.share(self.position);
         let is_outside = share < 1.0;
         let faded = if is_outside { within_peak * share } else { within_peak };
-        // One tick's step however many were skipped: a longer one would be felt as a blow.
-        let (force, is_slewed) = self.slew.follow(faded * authority, self.period_s);
+        let (force, is_slewed) = self.slew.follow(faded * authority, elapsed.growth_ns() as f64 / 1e9);
         let bit = |acted: bool, bit: u64| if acted { bit } else { 0 };
         let limits = bit(is_cut, LIMIT_PEAK) | bit(is_outside, LIMIT_WORKSPACE) | bit(is_slewed, LIMIT_SLEW);
         Restrained { force_on_user_n: force, limits }
@@ -122,6 +125,7 @@ mod tests {
     use proptest::prelude::*;
 
     const MS: u64 = 1_000_000;
+    const TICK: Elapsed = Elapsed::new(MS, MS);
 
     fn limits() -> Limits {
         let edge = Edge { min_m: Vector3::repeat(-0.1), max_m: Vector3::repeat(0.1), margin_m: 0.02 };
@@ -130,53 +134,56 @@ mod tests {
 
     #[test]
     fn each_limit_that_acts_is_told() {
-        let mut guard = Guard::new(limits(), MS);
-        guard.observe(1, Vector3::zeros(), Vector3::zeros()).unwrap();
-        let small = guard.restrain(Vector3::x(), 1.0);
+        let mut guard = Guard::new(limits());
+        guard.observe(MS, Vector3::zeros(), Vector3::zeros()).unwrap();
+        let small = guard.restrain(Vector3::x(), 1.0, TICK);
         assert_eq!(small, Restrained { force_on_user_n: Vector3::x(), limits: 0 });
-        let step = guard.restrain(Vector3::x() * 9.0, 1.0);
+        let step = guard.restrain(Vector3::x() * 9.0, 1.0, TICK);
         assert_eq!(step.limits, LIMIT_PEAK | LIMIT_SLEW);
         assert_eq!(step.force_on_user_n, Vector3::x() * 3.0);
-        let mut outside = Guard::new(limits(), MS);
-        outside.observe(1, Vector3::x() * 0.11, Vector3::zeros()).unwrap();
-        let faded = outside.restrain(Vector3::x(), 1.0);
+        let mut outside = Guard::new(limits());
+        outside.observe(MS, Vector3::x() * 0.11, Vector3::zeros()).unwrap();
+        let faded = outside.restrain(Vector3::x(), 1.0, TICK);
         assert_eq!(faded.limits, LIMIT_WORKSPACE);
         assert!((faded.force_on_user_n.x - 0.5).abs() < 1e-14, "half of it in mid margin, to rounding");
     }
 
     #[test]
     fn without_authority_there_is_exactly_nothing_and_force_grows_from_there_again() {
-        let mut guard = Guard::new(limits(), MS);
+        let mut guard = Guard::new(limits());
         for _ in 0..10 {
-            guard.restrain(Vector3::x() * 8.0, 1.0);
+            guard.restrain(Vector3::x() * 8.0, 1.0, TICK);
         }
-        let none = guard.restrain(Vector3::new(-8.0, f64::NAN, 1.0), 0.0);
+        let none = guard.restrain(Vector3::new(-8.0, f64::NAN, 1.0), 0.0, TICK);
         assert_eq!(none, Restrained { force_on_user_n: Vector3::zeros(), limits: 0 });
         assert!(none.force_on_user_n.iter().all(|c| c.is_sign_positive()), "and no negative zero");
-        assert_eq!(guard.restrain(Vector3::x() * 8.0, 1.0).force_on_user_n, Vector3::x() * 2.0);
+        assert_eq!(guard.restrain(Vector3::x() * 8.0, 1.0, TICK).force_on_user_n, Vector3::x() * 2.0);
     }
 
     proptest! {
+        /// Also where ticks were skipped, or take no time at all.
         #[test]
         fn whatever_is_commanded_stays_finite_within_the_peak_and_the_step(
             commands in proptest::collection::vec(
-                (prop::array::uniform3(any::<f64>()), 0.0..1.0f64, prop::array::uniform3(-0.2..0.2f64)), 1..60),
+                (prop::array::uniform3(any::<f64>()), 0.0..1.0f64, prop::array::uniform3(-0.2..0.2f64), 0u64..9 * MS),
+                1..60,
+            ),
         ) {
-            let mut guard = Guard::new(limits(), MS);
+            let mut guard = Guard::new(limits());
             let mut last = Vector3::zeros();
-            for (tick, (force, authority, position)) in commands.into_iter().enumerate() {
-                let _ = guard.observe(tick as u64, position.into(), Vector3::zeros());
-                let out = guard.restrain(force.into(), authority).force_on_user_n;
+            for (force, authority, position, passed_ns) in commands {
+                let _ = guard.observe(passed_ns, position.into(), Vector3::zeros());
+                let elapsed = Elapsed::new(passed_ns, MS);
+                let out = guard.restrain(force.into(), authority, elapsed).force_on_user_n;
                 prop_assert!(out.iter().all(|c| c.is_finite()));
                 // A few roundings of numbers below 10.
                 prop_assert!(out.norm() <= 8.5 + 1e-13);
-                prop_assert!(out.norm() <= last_norm(&last) + 2.0 + 1e-13);
+                let step = 2000.0 * elapsed.growth_ns() as f64 / 1e9;
+                prop_assert!(out.norm() <= last.norm() + step + 1e-13);
+                // It shortened along itself, to a billionth, or moved by a step.
+                prop_assert!((out - last).norm() <= last.norm().max(step) + 1e-8);
                 last = out;
             }
         }
-    }
-
-    fn last_norm(last: &Vector3<f64>) -> f64 {
-        last.norm()
     }
 }

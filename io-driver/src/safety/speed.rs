@@ -5,9 +5,7 @@
 //! Model: the speed is that of the device's own estimate (see [`crate::velocity`]), which is on time where something
 //! accelerates and which one encoder count hardly moves. A jump is a position that nothing could have reached since
 //! the last one; it is looked for in the positions, which no estimate has smoothed.
-//! Invariants: time is counted in ticks of the schedule, so skipped ones do not make a movement look fast. A tick
-//! in which the loop steps aside ([`rt_core::phase_keeper`]) is 0.38 of a period longer than it counts: a movement
-//! then looks faster than it is by that part of the estimate's window, a tenth where that is four ticks.
+//! Invariants: it is time that counts, so ticks that were skipped do not make a movement look fast.
 //! Cost: constant; no allocation.
 
 use nalgebra::Vector3;
@@ -20,42 +18,49 @@ const IMPOSSIBLE_M_PER_S: f64 = 25.0;
 #[derive(Debug, Clone)]
 pub struct Speed {
     limit_m_per_s: f64,
-    period_s: f64,
-    /// Tick and position of the last observation.
-    last: Option<(u64, Vector3<f64>)>,
+    last: Option<Vector3<f64>>,
+    /// Time since then (ns) in which it could not be read.
+    unseen_ns: u64,
 }
 
 impl Speed {
     /// A speed above the limit is a fault; infinite: none is, and neither is a jump.
-    pub fn new(limit_m_per_s: f64, period_ns: u64) -> Self {
-        Self { limit_m_per_s, period_s: period_ns as f64 / 1e9, last: None }
+    pub fn new(limit_m_per_s: f64) -> Self {
+        Self { limit_m_per_s, last: None, unseen_ns: 0 }
     }
 
-    /// Takes the position (m) and the estimated velocity (m/s) of a tick.
+    /// Takes the position (m) and the estimated velocity (m/s), so long (ns) after the last ones.
     ///
     /// # Errors
     /// [`FaultReason::PositionJump`] and [`FaultReason::Overspeed`].
     pub fn observe(
         &mut self,
-        tick: u64,
+        elapsed_ns: u64,
         position: Vector3<f64>,
         velocity: Vector3<f64>,
     ) -> Result<(), FaultReason> {
-        let last = self.last.replace((tick, position));
-        if last.is_some_and(|last| self.has_jumped(last, tick, position)) {
+        let last = self.last.replace(position);
+        let elapsed_ns = elapsed_ns.saturating_add(std::mem::take(&mut self.unseen_ns));
+        if last.is_some_and(|last| self.has_jumped(position - last, elapsed_ns)) {
             return Err(FaultReason::PositionJump);
         }
         if velocity.norm() > self.limit_m_per_s { Err(FaultReason::Overspeed) } else { Ok(()) }
     }
 
+    /// It could not be read for so long (ns): the next position may be the farther from the last one.
+    pub fn overlook(&mut self, elapsed_ns: u64) {
+        self.unseen_ns = self.unseen_ns.saturating_add(elapsed_ns);
+    }
+
     /// Forgets what was observed: the next position is not compared with it.
     pub fn forget(&mut self) {
         self.last = None;
+        self.unseen_ns = 0;
     }
 
-    fn has_jumped(&self, last: (u64, Vector3<f64>), tick: u64, position: Vector3<f64>) -> bool {
-        let elapsed_s = tick.saturating_sub(last.0).max(1) as f64 * self.period_s;
-        self.limit_m_per_s.is_finite() && (position - last.1).norm() > IMPOSSIBLE_M_PER_S * elapsed_s
+    fn has_jumped(&self, way: Vector3<f64>, elapsed_ns: u64) -> bool {
+        let elapsed_s = elapsed_ns as f64 / 1e9;
+        self.limit_m_per_s.is_finite() && way.norm() > IMPOSSIBLE_M_PER_S * elapsed_s
     }
 }
 
@@ -68,10 +73,10 @@ mod tests {
     #[test]
     fn faster_than_the_limit_is_a_fault_and_just_below_is_none() {
         for (v, is_fault) in [(0.99, false), (1.01, true)] {
-            let mut speed = Speed::new(1.0, MS);
+            let mut speed = Speed::new(1.0);
             let mut faults = 0;
             for tick in 1..20u64 {
-                let seen = speed.observe(tick, Vector3::x() * v * tick as f64 * 1e-3, Vector3::x() * v);
+                let seen = speed.observe(MS, Vector3::x() * v * tick as f64 * 1e-3, Vector3::x() * v);
                 faults += usize::from(seen == Err(FaultReason::Overspeed));
             }
             assert_eq!(faults > 0, is_fault, "{v} m/s");
@@ -79,34 +84,53 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_is_a_fault_of_its_own_once_whatever_the_estimate_makes_of_it() {
-        let mut speed = Speed::new(2.0, MS);
-        speed.observe(1, Vector3::zeros(), Vector3::zeros()).unwrap();
-        speed.observe(2, Vector3::zeros(), Vector3::zeros()).unwrap();
-        let (there, seen) = (Vector3::x() * 0.1, Vector3::x() * 100.0);
-        assert_eq!(speed.observe(3, there, seen), Err(FaultReason::PositionJump));
-        assert_eq!(speed.observe(4, there, Vector3::zeros()), Ok(()));
+    fn exactly_the_limit_is_none() {
+        assert_eq!(Speed::new(1.0).observe(MS, Vector3::zeros(), Vector3::y()), Ok(()));
     }
 
     #[test]
-    fn many_skipped_ticks_are_time_to_get_anywhere() {
-        let mut speed = Speed::new(2.0, MS);
-        speed.observe(1, Vector3::zeros(), Vector3::zeros()).unwrap();
-        assert_eq!(speed.observe(101, Vector3::x() * 0.1, Vector3::x()), Ok(()));
+    fn a_jump_is_a_fault_of_its_own_once_whatever_the_estimate_makes_of_it() {
+        let mut speed = Speed::new(2.0);
+        speed.observe(MS, Vector3::zeros(), Vector3::zeros()).unwrap();
+        speed.observe(MS, Vector3::zeros(), Vector3::zeros()).unwrap();
+        let (there, seen) = (Vector3::x() * 0.1, Vector3::x() * 100.0);
+        assert_eq!(speed.observe(MS, there, seen), Err(FaultReason::PositionJump));
+        assert_eq!(speed.observe(MS, there, Vector3::zeros()), Ok(()));
+    }
+
+    #[test]
+    fn skipped_ticks_are_time_to_get_somewhere_and_no_time_is_none() {
+        let mut speed = Speed::new(2.0);
+        speed.observe(MS, Vector3::zeros(), Vector3::zeros()).unwrap();
+        assert_eq!(speed.observe(100 * MS, Vector3::x() * 0.1, Vector3::x()), Ok(()));
+        // 25 m/s for 4 ms are 0.1 m.
+        assert_eq!(speed.observe(4 * MS, Vector3::x() * 0.199, Vector3::x()), Ok(()));
+        let back = speed.observe(4 * MS, Vector3::x() * 0.098, Vector3::x());
+        assert_eq!(back, Err(FaultReason::PositionJump), "101 mm");
+    }
+
+    #[test]
+    fn time_in_which_it_could_not_be_read_counts_as_well() {
+        let mut speed = Speed::new(2.0);
+        speed.observe(MS, Vector3::zeros(), Vector3::zeros()).unwrap();
+        (0..3).for_each(|_| speed.overlook(MS));
+        // 25 m/s for 4 ms are 0.1 m.
+        assert_eq!(speed.observe(MS, Vector3::x() * 0.099, Vector3::zeros()), Ok(()));
+        assert!(speed.observe(MS, Vector3::zeros(), Vector3::zeros()).is_err(), "and only once");
     }
 
     #[test]
     fn what_is_forgotten_is_not_jumped_from() {
-        let mut speed = Speed::new(2.0, MS);
-        speed.observe(1, Vector3::zeros(), Vector3::zeros()).unwrap();
+        let mut speed = Speed::new(2.0);
+        speed.observe(MS, Vector3::zeros(), Vector3::zeros()).unwrap();
         speed.forget();
-        assert_eq!(speed.observe(2, Vector3::x() * 0.1, Vector3::zeros()), Ok(()));
+        assert_eq!(speed.observe(MS, Vector3::x() * 0.1, Vector3::zeros()), Ok(()));
     }
 
     #[test]
     fn a_device_without_limit_may_jump() {
-        let mut speed = Speed::new(f64::INFINITY, MS);
-        speed.observe(1, Vector3::zeros(), Vector3::zeros()).unwrap();
-        assert!(speed.observe(2, Vector3::x() * 0.5, Vector3::x() * 500.0).is_ok());
+        let mut speed = Speed::new(f64::INFINITY);
+        speed.observe(MS, Vector3::zeros(), Vector3::zeros()).unwrap();
+        assert!(speed.observe(MS, Vector3::x() * 0.5, Vector3::x() * 500.0).is_ok());
     }
 }

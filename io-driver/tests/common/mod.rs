@@ -18,7 +18,9 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
 pub const PERIOD_NS: u64 = 1_000_000;
-pub const RAMPS: Ramps = Ramps { in_ticks: 4, out_ticks: 2, max_command_age_ticks: 2 };
+/// Four ticks in, two ticks out; commands may be two ticks old.
+pub const RAMPS: Ramps =
+    Ramps { in_ns: 4 * PERIOD_NS, out_ns: 2 * PERIOD_NS, max_command_age_ns: 2 * PERIOD_NS };
 pub const PEAK_N: f64 = 8.5;
 
 /// What a device is made to do by the test, and what it was made to do by the driver.
@@ -27,6 +29,8 @@ pub struct Log {
     pub forces: Vec<Vector3<f64>>,
     pub next_reading: Option<Result<Reading, FaultReason>>,
     pub fail_write: bool,
+    /// What it says that it had to cut itself.
+    pub limits: u64,
     pub releases: u32,
     pub rearms: u32,
     /// Its counters.
@@ -63,7 +67,7 @@ impl Device for TestDevice {
         if log.fail_write {
             Err(FaultReason::DeviceWrite)
         } else {
-            Ok(Written { force_on_user_n, ..Written::default() })
+            Ok(Written { force_on_user_n, limits: log.limits, ..Written::default() })
         }
     }
 
@@ -101,6 +105,8 @@ pub struct Bench {
     pub cycle: Cycle,
     pub view: DriverView,
     pub log: Arc<Mutex<Log>>,
+    /// Those of all devices; the one above is the first's.
+    pub logs: Vec<Arc<Mutex<Log>>>,
     pub tick: u64,
 }
 
@@ -125,28 +131,40 @@ impl Bench {
 
     /// One with a device and switches of the test's own.
     pub fn with(freshness: u64, info: DeviceInfo, switches: Switches) -> Self {
+        Self::of(freshness, vec![info], switches)
+    }
+
+    /// One with several devices.
+    pub fn of(freshness: u64, devices: Vec<DeviceInfo>, switches: Switches) -> Self {
         let memory = DriverMemory::create(&DriverInfo {
             period_ns: PERIOD_NS,
             reply_budget_ns: u64::MAX,
-            max_command_age_ticks: RAMPS.max_command_age_ticks,
-            ramp_in_ticks: RAMPS.in_ticks,
-            ramp_out_ticks: RAMPS.out_ticks,
+            max_command_age_ticks: RAMPS.max_command_age_ns / PERIOD_NS,
+            ramp_in_ticks: RAMPS.in_ns / PERIOD_NS,
+            ramp_out_ticks: RAMPS.out_ns / PERIOD_NS,
             clock_mode: ClockMode::Virtual,
             wait_mode: WaitMode::Spin,
             is_commissioning: false,
             cpu: None,
-            devices: vec![info.clone()],
+            devices: devices.clone(),
             setup_report: String::new(),
         })
         .unwrap();
         let view = DriverView::map(memory.fd()).unwrap();
-        let log = Arc::new(Mutex::new(Log::default()));
-        let device =
-            TestDevice { velocity: VelocityEstimator::of_exact_places(), info, log: Arc::clone(&log) };
+        let logs: Vec<_> = devices.iter().map(|_| Arc::new(Mutex::new(Log::default()))).collect();
+        let device = |(info, log): (DeviceInfo, &Arc<Mutex<Log>>)| -> Box<dyn Device> {
+            let velocity = VelocityEstimator::of_exact_places();
+            Box::new(TestDevice { velocity, info, log: Arc::clone(log) })
+        };
+        let devices = devices.into_iter().zip(&logs).map(device).collect();
         let protection = Protection { safety: Safety::new(RAMPS), switches, workspace_margin_m: 0.02 };
-        let cycle =
-            Cycle::new(Arc::new(memory), vec![Box::new(device)], protection, PERIOD_NS, Freshness(freshness));
-        Self { cycle, view, log, tick: 0 }
+        let cycle = Cycle::new(Arc::new(memory), devices, protection, PERIOD_NS, Freshness(freshness));
+        Self { cycle, view, log: Arc::clone(&logs[0]), logs, tick: 0 }
+    }
+
+    /// The same, whose deadlines are times of the monotonic clock.
+    pub fn in_real_time(self) -> Self {
+        Self { cycle: self.cycle.in_real_time(), ..self }
     }
 
     pub fn lease(&mut self, number: u64) -> CommanderMemory {
@@ -157,9 +175,18 @@ impl Bench {
 
     /// One tick; `answer` gets the frame and may publish. Returns the frame and the force written.
     pub fn tick(&mut self, answer: impl FnOnce(&Frame, &DriverView)) -> (Frame, Vector3<f64>) {
+        self.tick_due_at((self.tick + 1) * PERIOD_NS, answer)
+    }
+
+    /// The same of the deadline `deadline_ns`.
+    pub fn tick_due_at(
+        &mut self,
+        deadline_ns: u64,
+        answer: impl FnOnce(&Frame, &DriverView),
+    ) -> (Frame, Vector3<f64>) {
         self.tick += 1;
         self.cycle.change_lease();
-        self.cycle.sense(self.tick, self.tick * PERIOD_NS);
+        self.cycle.sense(self.tick, deadline_ns);
         let mut frame = Frame::zeroed();
         self.view.read_frame(self.tick, &mut frame).unwrap();
         answer(&frame, &self.view);

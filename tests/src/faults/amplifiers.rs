@@ -129,6 +129,23 @@ impl Amplifiers {
         self.card.outputs.written.load(Ordering::Acquire)
     }
 
+    /// How many values, and how long (ns), after the one that was written last at `time_ns` the first without any torque
+    /// came; `None`: none yet.
+    pub fn silence_after(&self, time_ns: u64) -> Option<(u64, u64)> {
+        let written = self.written();
+        let value = |number: u64| {
+            let record = self.card.record(number)?;
+            let packed = record.codes.load(Ordering::Relaxed);
+            let is_zero = (0..3).all(|channel| (packed >> (16 * channel)) as u16 == ZERO_CODE as u16);
+            Some((record.time_ns.load(Ordering::Relaxed), is_zero))
+        };
+        let is_before = |number: &u64| value(*number).is_some_and(|(at_ns, _)| at_ns <= time_ns);
+        let last = (1..=written).rev().find(is_before)?;
+        let from_ns = value(last)?.0;
+        let first = (last + 1..=written).find(|number| value(*number).is_some_and(|(_, is_zero)| is_zero))?;
+        Some((first - last, value(first)?.0 - from_ns))
+    }
+
     /// Whether the register says that they are to be on.
     pub fn are_enabled(&self) -> bool {
         self.card.outputs.enable.load(Ordering::Acquire) == 1

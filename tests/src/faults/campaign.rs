@@ -26,11 +26,9 @@ const STOP_MS: u64 = 40;
 
 /// Plays a plan to its end.
 pub fn run(plan: &Plan) -> Account {
-    let mut setup = Setup::new(plan.clock).sabotaged(&plan.sabotage());
-    if plan.clock == "real" {
-        // Here a stall of the machine that trips it is one strike more.
-        setup.limits.watchdog_ms = 150;
-    }
+    let mut setup = Setup::new("real").sabotaged(&plan.sabotage());
+    // A stall of the machine that trips it is one strike more.
+    setup.limits.watchdog_ms = 150;
     setup.limits.peak_n = plan.peak_n;
     setup.limits.slew_n_per_s = plan.slew_n_per_s;
     let mut run = Run { ward: Ward::open(setup), random: Random::new(!plan.seed), undisturbed: true };
@@ -396,7 +394,7 @@ impl Run {
         });
     }
 
-    /// In real time the loop goes on; in lockstep as long as its commander does.
+    /// The loop goes on.
     fn frames_go_on(&self, frames: usize) {
         let mut log = RingLog::begin(self.ward.stand.view());
         log.follow_for(self.ward.stand.view(), frames);

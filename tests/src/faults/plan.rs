@@ -96,8 +96,6 @@ pub enum Then {
 pub struct Plan {
     /// What it was drawn from.
     pub seed: u64,
-    /// `real` or `lockstep`.
-    pub clock: &'static str,
     /// Longest force (N).
     pub peak_n: f64,
     /// How fast a force may grow (N/s).
@@ -110,32 +108,29 @@ impl Plan {
     /// The plan of a seed.
     pub fn of(seed: u64) -> Self {
         let mut random = Random::new(seed);
-        let clock = if random.once_in(2) { "real" } else { "lockstep" };
         // Far below what the motors give, and about as much; full force in 40 values and in 4.
         let peak_n = if random.once_in(2) { 3.0 } else { 8.5 };
         let slew_n_per_s = if random.once_in(2) { 400.0 } else { 4000.0 };
         let strikes = (0..1 + random.below(4))
             .map(|_| {
                 let delay_us = random.below(6000);
-                let strike = Strike::draw(&mut random, clock);
+                let strike = Strike::draw(&mut random);
                 let then = if random.once_in(3) { Then::Next(random.below(4000)) } else { Then::Heal };
                 (delay_us, strike, then)
             })
             .collect();
-        Self { seed, clock, peak_n, slew_n_per_s, strikes }
+        Self { seed, peak_n, slew_n_per_s, strikes }
     }
 
     /// The sabotage that the driver has to be prepared for: everything, by its button.
     pub fn sabotage(&self) -> String {
         let item = |(index, act): (usize, &&str)| format!("{act}@button{}", FIRST_BUTTON + index as u32);
-        let items = SABOTAGES.iter().enumerate().map(item);
-        let pace = (self.clock == "lockstep").then(|| "pace@0".to_owned());
-        items.chain(pace).collect::<Vec<_>>().join(",")
+        SABOTAGES.iter().enumerate().map(item).collect::<Vec<_>>().join(",")
     }
 }
 
 impl Strike {
-    fn draw(random: &mut Random, clock: &str) -> Self {
+    fn draw(random: &mut Random) -> Self {
         let us = |random: &mut Random| random.below(25_000);
         match random.below(31) {
             0 | 1 => Self::KillApp,
@@ -159,7 +154,7 @@ impl Strike {
             22 => Self::SecondDriver,
             23 => Self::NoDescriptors,
             24 => Self::EmergencyStop,
-            25 if clock == "real" && random.once_in(3) => Self::Hog(50 + random.below(250)),
+            25 if random.once_in(3) => Self::Hog(50 + random.below(250)),
             25 => Self::StopEmulator(1 + random.below(300)),
             26 => Self::StopAppStarting(us(random)),
             27 => Self::StopAppEnding(us(random) / 5),
@@ -243,8 +238,8 @@ impl Strike {
 
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { seed, clock, peak_n, slew_n_per_s, strikes } = self;
-        write!(f, "0x{seed:016x}: {clock}, {peak_n} N, {slew_n_per_s} N/s")?;
+        let Self { seed, peak_n, slew_n_per_s, strikes } = self;
+        write!(f, "0x{seed:016x}: {peak_n} N, {slew_n_per_s} N/s")?;
         strikes.iter().try_for_each(|(delay, strike, then)| write!(f, "; {delay} us {strike:?} {then:?}"))
     }
 }

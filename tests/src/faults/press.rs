@@ -25,14 +25,14 @@ stiffness_n_per_m = 1000.0
 friction = { model = \"coulomb\", mu = 0.5 }
 ";
 
-/// A driver's configuration: one such finger at 2 kHz, commands obeyed for 5 ticks, ramps of 10 ticks in and
+/// A driver's configuration: one such finger at 2 kHz, commands obeyed for 5 ticks, ramps of 40 ticks in and
 /// 8 ticks out, no real-time rights. Replies may take most of the tick: tests share their CPUs.
 pub fn config(clock: &str) -> String {
     format!(
         "rate_hz = 2000\nclock = \"{clock}\"\n\
          [real_time]\npriority = 0\nlock_memory = false\n\
          [reply]\nbudget_us = 400\n\
-         [safety]\nmax_command_age_ticks = 5\nramp_in_ms = 5\nramp_out_ms = 4\n\
+         [safety]\nmax_command_age_ticks = 5\nramp_in_ms = 20\nramp_out_ms = 4\n\
          [[device]]\nbackend = \"ideal\"\nstart_m = [0.0, -0.004, 0.0]\npeak_force_n = {PEAK_N}\n"
     )
 }
@@ -55,7 +55,7 @@ impl Press {
         let driver = Driver::start(&config(clock));
         let observer = driver.observe();
         let info = observer.driver.info();
-        assert_eq!((info.max_command_age_ticks, info.ramp_in_ticks, info.ramp_out_ticks), (5, 10, 8));
+        assert_eq!((info.max_command_age_ticks, info.ramp_in_ticks, info.ramp_out_ticks), (5, 40, 8));
         Self { driver, observer, clock, table: Table::new() }
     }
 

@@ -45,9 +45,6 @@ pub enum Act {
     Unwritable,
     /// The loop stands still.
     Hang(Duration),
-    /// From now on each reading takes some 0.1 ms: in lockstep ticks would else come faster than a minute's
-    /// queue of a card holds them while its emulator stands still.
-    Pace,
 }
 
 /// When.
@@ -112,7 +109,6 @@ impl Act {
             "unreadable" => Self::Unreadable,
             "unwritable" => Self::Unwritable,
             "hang" => Self::Hang(time),
-            "pace" => Self::Pace,
             _ => return None,
         })
     }
@@ -124,7 +120,6 @@ pub struct Saboteur {
     plan: Vec<Sabotage>,
     /// What is to be done when this tick's force is written.
     at_write: Option<Act>,
-    is_paced: bool,
 }
 
 impl Saboteur {
@@ -138,7 +133,7 @@ impl Saboteur {
         match std::env::var(SABOTAGE_VARIABLE) {
             Ok(text) if !ENGAGED.swap(true, Ordering::Relaxed) => {
                 let plan = Sabotage::plan(&text).expect("a plan");
-                Box::new(Self { inner, plan, at_write: None, is_paced: false })
+                Box::new(Self { inner, plan, at_write: None })
             }
             _ => inner,
         }
@@ -176,7 +171,6 @@ impl Saboteur {
             }
             Act::Unreadable => return Err(FaultReason::DeviceRead),
             Act::Hang(time) => std::thread::sleep(time),
-            Act::Pace => self.is_paced = true,
             Act::PanicBeforeWrite | Act::PanicAfterWrite | Act::Unwritable => self.at_write = Some(act),
         }
         Ok(reading)
@@ -205,9 +199,6 @@ impl Device for Saboteur {
     }
 
     fn read(&mut self, time: TickTime) -> Result<Reading, FaultReason> {
-        if self.is_paced {
-            std::thread::sleep(PACE);
-        }
         let reading = self.inner.read(time)?;
         match self.due(time.tick, reading.buttons) {
             Some(act) => self.spoil(act, reading),
@@ -235,9 +226,6 @@ impl Device for Saboteur {
         self.inner.rearm();
     }
 }
-
-/// With what a sleep takes besides, 10,000 ticks a second at most: the queue holds six seconds.
-const PACE: Duration = Duration::from_micros(50);
 
 /// Never returns: each call needs a page more of a stack that ends.
 #[expect(unconditional_recursion, reason = "that is the sabotage")]

@@ -25,10 +25,8 @@ pub const RATE_HZ: f64 = 2000.0;
 /// over 0.17 m, thrice (N).
 pub const CODE_N: f64 = 0.01;
 
-/// A watchdog for real time (ms): a stall of a loaded virtual machine must not trip it, a dead driver must.
+/// A watchdog (ms): a stall of a loaded virtual machine must not trip it, a dead driver must.
 pub const WATCHDOG_MS: u64 = 500;
-/// One for lockstep (ms), where a tick lasts as long as both sides need.
-pub const LOCKSTEP_WATCHDOG_MS: u64 = 1000;
 
 const SCENE: &str = "\
 [[finger]]
@@ -43,12 +41,14 @@ friction = { model = \"coulomb\", mu = 0.5 }
 /// How a stand is set up.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setup {
-    /// `real` or `lockstep`.
+    /// `real`: a card has no other.
     pub clock: &'static str,
     /// What the amplifiers mind.
     pub limits: Limits,
     /// What goes wrong in the driver's loop; see [`crate::faults::saboteur`].
     pub sabotage: String,
+    /// How long a force stays and how it comes and goes: lines of `[safety]`; none: the driver's own defaults.
+    pub safety: &'static str,
     /// Further lines of the driver's configuration, before its device.
     pub config: String,
     /// How the arm, which is at home, learns that it is.
@@ -62,13 +62,13 @@ pub struct Setup {
 impl Setup {
     /// The usual one.
     pub fn new(clock: &'static str) -> Self {
-        let watchdog_ms = if clock == "real" { WATCHDOG_MS } else { LOCKSTEP_WATCHDOG_MS };
         // 0.2 N a value: the honest force never grows faster, and a mad one always would.
-        let limits = Limits { peak_n: 8.5, slew_n_per_s: 400.0, rate_hz: RATE_HZ, watchdog_ms };
+        let limits = Limits { peak_n: 8.5, slew_n_per_s: 400.0, rate_hz: RATE_HZ, watchdog_ms: WATCHDOG_MS };
         Self {
             clock,
             limits,
             sabotage: String::new(),
+            safety: PATIENT,
             config: String::new(),
             zeroing: "at-start",
             emulator: Vec::new(),
@@ -249,17 +249,19 @@ pub fn end_app(mut app: Running) -> End {
     end
 }
 
-/// Commands are obeyed for 40 ticks, 20 ms, so that most stalls of a shared machine do not show; ramps take 10
-/// ticks in and 8 ticks out; no real-time rights.
+/// Commands are obeyed for 40 ticks, 20 ms, so that most stalls of a shared machine do not show; ramps take 40
+/// ticks in and 8 ticks out.
+const PATIENT: &str = "max_command_age_ticks = 40\nramp_in_ms = 20\nramp_out_ms = 4";
+
+/// Without real-time rights. Replies may take four fifths of a tick at most.
 fn config(setup: &Setup) -> String {
     format!(
-        "rate_hz = {RATE_HZ}\nclock = \"{}\"\n\
+        "rate_hz = {}\nclock = \"{}\"\n\
          [real_time]\npriority = 0\nlock_memory = false\nspin_margin_us = 0\n\
          [reply]\nbudget_us = 400\n\
-         [safety]\nmax_command_age_ticks = 40\nramp_in_ms = 5\nramp_out_ms = 4\n\
-         {}\n\
+         [safety]\n{}\n{}\n\
          [[device]]\nbackend = \"emulated\"\ndescription = \"arm.toml\"\ncard = \"card\"\nzeroing = \"{}\"\n",
-        setup.clock, setup.config, setup.zeroing
+        setup.limits.rate_hz, setup.clock, setup.safety, setup.config, setup.zeroing
     )
 }
 

@@ -167,7 +167,7 @@ impl Bench {
             driver: VirtualDriver::open(&config)?,
             fast: FastLoop::new(step, producer, WhenFull::Drop, u64::MAX, period_ns),
             rows,
-            ticks: config.safety.ramp_in_ticks + ticks(PUSH_S + SETTLE_S + LOOK_S) as u64,
+            ticks: config.safety.ramp_in_ns / config.period_ns + ticks(PUSH_S + SETTLE_S + LOOK_S) as u64,
             look_from: ticks(PUSH_S + SETTLE_S) as i64,
         })
     }
@@ -221,6 +221,7 @@ impl Bench {
                 name: "f0".into(),
                 backend: self.simulated(case).backend(wish),
                 peak_force_n: None,
+                slew_n_per_s: None,
                 compensates_gravity: true,
                 zeroing: Zeroing::Known,
             }],
