@@ -39,7 +39,8 @@ fn has_sanitizers(directory: &Path) -> bool {
         let made = compiler.args(SANITIZERS).arg(&source).arg("-o").arg(&program).bounded_output();
         made.is_ok_and(|output| output.status.success())
     });
-    let runs = compiled && std::process::Command::new(&program).bounded_status().is_ok_and(|status| status.success());
+    let runs = compiled
+        && std::process::Command::new(&program).bounded_status().is_ok_and(|status| status.success());
     if !runs {
         println!("skipped: sanitizers over the C client: this compiler has none");
     }

@@ -51,7 +51,7 @@ fn stop_and_clear_fault_reach_the_loop_with_the_name_of_the_asker() {
     assert_eq!(client::stop(&host.socket, "test").unwrap(), own_pid());
     assert!(matches!(host.event(), ServerEvent::StopRequested { pid } if pid == own_pid()));
     client::emergency_stop(&host.socket, "test").unwrap();
-    assert!(matches!(host.event(), ServerEvent::EmergencyStopRequested { pid } if pid == own_pid()));
+    assert!(matches!(host.event(), ServerEvent::EmergencyStopRequested { pid, .. } if pid == own_pid()));
     client::clear_fault(&host.socket, "test").unwrap();
     assert!(matches!(host.event(), ServerEvent::ClearFaultRequested { .. }));
 }
