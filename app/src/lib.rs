@@ -11,6 +11,7 @@
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
 
+pub mod attachment_totals;
 pub mod book;
 pub mod calibrate;
 pub mod check;

@@ -1,15 +1,13 @@
 //! What a run tells at its end, a line each; the README explains the lines.
 
+use crate::attachment_totals::Timing;
 use crate::fast_loop::Tally;
 use crate::lists_end::ListsEnd;
 use crate::record::Recorded;
 use crate::snapshots::Drawn;
-use io_driver::meter;
-use io_driver::status::{CounterStatus, Percentiles};
-use rt_core::histogram::Histogram;
+use io_driver::status::CounterStatus;
 use rt_core::plain_text::Plain;
 use rt_core::setup::SetupReport;
-use shm_abi::DriverView;
 use std::fmt;
 
 /// The end of a run in figures.
@@ -18,11 +16,11 @@ pub struct Report {
     pub clock: &'static str,
     /// Length of a tick (ns).
     pub period_ns: u64,
-    /// Who drove the devices.
-    pub driver: String,
+    /// Who drove the devices, one after the other; what follows is of all of them together.
+    pub drivers: Vec<String>,
     /// The fast thread's counts.
     pub tally: Tally,
-    /// The driver's.
+    /// The drivers'.
     pub counters: CounterStatus,
     /// The driver's timing and ours; none on a clock that is not real.
     pub timing: Option<Timing>,
@@ -42,54 +40,6 @@ pub struct Report {
     pub pictures: Option<Drawn>,
 }
 
-/// Durations of a run.
-pub struct Timing {
-    /// How late the driver's loop woke.
-    pub wake_error: Percentiles,
-    /// The driver's own work in a tick.
-    pub cycle: Percentiles,
-    /// From frame to reply, seen by the driver.
-    pub round_trip: Percentiles,
-    /// The fast step.
-    pub step: Percentiles,
-}
-
-/// The driver's histograms at the start of a run, to subtract.
-pub struct Baseline {
-    wake_error: Histogram,
-    cycle: Histogram,
-    round_trip: Histogram,
-    counters: CounterStatus,
-}
-
-impl Baseline {
-    /// Reads them.
-    pub fn of(driver: &DriverView) -> Self {
-        Self {
-            wake_error: meter::read(&driver.wake_error_ns),
-            cycle: meter::read(&driver.cycle_ns),
-            round_trip: meter::read(&driver.round_trip_ns),
-            counters: CounterStatus::of(driver),
-        }
-    }
-
-    /// What has come since.
-    pub fn timing(&self, driver: &DriverView, step_ns: &Histogram) -> Timing {
-        let since = |before: &Histogram, block| Percentiles::of(&meter::since(before, &meter::read(block)));
-        Timing {
-            wake_error: since(&self.wake_error, &driver.wake_error_ns),
-            cycle: since(&self.cycle, &driver.cycle_ns),
-            round_trip: since(&self.round_trip, &driver.round_trip_ns),
-            step: Percentiles::of(step_ns),
-        }
-    }
-
-    /// What has been counted since.
-    pub fn counters(&self, driver: &DriverView) -> CounterStatus {
-        CounterStatus::of(driver).since(&self.counters)
-    }
-}
-
 impl Report {
     /// Whether a recording is not complete, or a picture could not be written, which has been told.
     pub fn lacks_a_recording(&self) -> bool {
@@ -102,7 +52,13 @@ impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (tally, counters) = (&self.tally, &self.counters);
         writeln!(f, "clock        {}, {:.6} kHz", self.clock, 1e6 / self.period_ns as f64)?;
-        writeln!(f, "driver       {}", Plain(&self.driver))?;
+        for (index, driver) in self.drivers.iter().enumerate() {
+            let after = if index == 0 { "" } else { "after its end " };
+            writeln!(f, "driver       {after}{}", Plain(driver))?;
+        }
+        if self.drivers.len() > 1 {
+            writeln!(f, "             figures are of these {} drivers together", self.drivers.len())?;
+        }
         writeln!(
             f,
             "ticks        {} under our lease, {} answered",

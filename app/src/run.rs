@@ -1,5 +1,6 @@
 //! A scripted run from start to report.
 
+use crate::attachment_totals::AttachmentTotals;
 use crate::book::Book;
 use crate::child::DriverChild;
 use crate::control::carriage::Carriage;
@@ -12,7 +13,7 @@ use crate::on_request::OnRequest;
 use crate::outcome::{RunFailure, Stop};
 use crate::progress::Progress;
 use crate::record::{About, Files, View};
-use crate::report::{Baseline, Report};
+use crate::report::Report;
 use crate::rig::{HandMode, Rig, RigError};
 use crate::row_queue::row_queue;
 use crate::shown::Shown;
@@ -210,7 +211,7 @@ fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Repo
     let report = Report {
         clock: ClockMode::Virtual.name(),
         period_ns: rig.period_ns,
-        driver: "in this process".into(),
+        drivers: vec!["in this process".into()],
         tally: fast.tally,
         counters: io_driver::status::CounterStatus::of(driver.view()),
         timing: None,
@@ -234,11 +235,11 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
     check_zeroed(&source, &attachment.driver)?;
     check_clock(plan, &info)?;
     let extras = extras_of(&attachment.driver);
-    let driver_name = describe(&source, attachment.driver_pid, &info);
-    let baseline = Baseline::of(&attachment.driver);
+    let driver_name = two_processes::describe(&source, &attachment);
+    let mut totals = AttachmentTotals::begin(&attachment.driver, driver_name.clone());
     let step_rig = rig.clone().at_period(info.period_ns);
     let mut about = About::of_run(rig, info.clock_mode, info.period_ns, plan.seed);
-    about.tell("driver", driver_name.clone());
+    about.tell("driver", driver_name);
     about.tell("driver_setup", info.setup_report.clone());
     about.tell("lease", attachment.commander.as_ref().map_or(0, CommanderMemory::lease).to_string());
     let reins = live.map(|live| live.into_reins(rig)).transpose()?;
@@ -246,8 +247,8 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
     let Parts { fast, mut slow, mut progress, slow_lists } =
         Parts::new(&step_rig, plan, info.clock_mode, info.period_ns, &extras, &about, reins)?;
     slow.watch_driver(source.socket());
-    let result =
-        two_processes::run(&mut source, attachment, (fast, slow_lists), &mut slow, &mut progress, signals);
+    let watched = (&mut slow, &mut progress, signals);
+    let result = two_processes::run(&mut source, attachment, (fast, slow_lists), &mut totals, watched);
     progress.end();
     let SlowEnd { recordings, events, pictures } = slow.finish();
     let end = result?;
@@ -255,11 +256,11 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
     let report = Report {
         clock: info.clock_mode.name(),
         period_ns: info.period_ns,
-        driver: driver_name,
         tally: end.tally,
-        counters: baseline.counters(&end.driver),
-        timing: is_real.then(|| baseline.timing(&end.driver, &end.step_ns)),
-        guarantees: is_real.then_some((info.setup_report, end.fast_report)),
+        counters: totals.counters,
+        timing: is_real.then(|| totals.timing()),
+        drivers: totals.drivers,
+        guarantees: is_real.then(|| (end.driver.info().setup_report, end.fast_report)),
         parked: parked(&end.tally, rig),
         events,
         orders: plan.orders.as_ref().map(|_| end.orders),
@@ -382,14 +383,4 @@ fn check_clock(plan: &RunPlan, info: &DriverInfo) -> Result<(), RunFailure> {
         ))),
         _ => Ok(()),
     }
-}
-
-fn describe(source: &Source, pid: u64, info: &DriverInfo) -> String {
-    let kinds: Vec<&str> = info.devices.iter().map(|device| device.kind.as_str()).collect();
-    let whose = match source {
-        Source::Child(_) => "our own child",
-        Source::Running { .. } => "was running",
-    };
-    let cpu = info.cpu.map_or_else(|| "any CPU".into(), |cpu| format!("CPU {cpu}"));
-    format!("process {pid}, {whose}, {cpu}, {} wait, devices: {}", info.wait_mode.name(), kinds.join(", "))
 }

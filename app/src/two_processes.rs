@@ -4,6 +4,7 @@
 //! progress and watches the connection, which is how the end of the driver is noticed. A driver that was
 //! there before us may be restarted: the run goes on with it if it is back within the grace time.
 
+use crate::attachment_totals::AttachmentTotals;
 use crate::child::DriverChild;
 use crate::fast_loop::{FastLoop, Tally};
 use crate::fast_thread::{self, FastEnd, FastRemains, FastShared};
@@ -14,7 +15,6 @@ use crate::progress::Progress;
 use crate::slow::SlowSide;
 use crate::slow_thread::SlowThread;
 use io_driver::say::say;
-use rt_core::histogram::Histogram;
 use rt_core::setup::SetupReport;
 use rt_core::signals::StopSignals;
 use shm_abi::DriverView;
@@ -61,16 +61,27 @@ pub struct TwoProcessEnd {
     pub tally: Tally,
     /// Why it stopped.
     pub stop: Stop,
-    /// The driver's memory.
+    /// The memory of the last driver.
     pub driver: DriverView,
-    /// What the fast thread obtained.
+    /// What the fast thread obtained with it.
     pub fast_report: SetupReport,
-    /// How long its step took.
-    pub step_ns: Histogram,
     /// Orders that were taken, and those of them that could not be done.
     pub orders: [u64; 2],
     /// What became of the fast and the slow list, if there are two.
     pub lists: Option<ListsEnd>,
+}
+
+/// A driver in words: whose it is, where it runs, what it drives.
+pub fn describe(source: &Source, attachment: &Attachment) -> String {
+    let info = attachment.driver.info();
+    let pid = attachment.driver_pid;
+    let kinds: Vec<&str> = info.devices.iter().map(|device| device.kind.as_str()).collect();
+    let whose = match source {
+        Source::Child(_) => "our own child",
+        Source::Running { .. } => "was running",
+    };
+    let cpu = info.cpu.map_or_else(|| "any CPU".into(), |cpu| format!("CPU {cpu}"));
+    format!("process {pid}, {whose}, {cpu}, {} wait, devices: {}", info.wait_mode.name(), kinds.join(", "))
 }
 
 /// Runs to the end.
@@ -81,9 +92,8 @@ pub fn run(
     source: &mut Source,
     attachment: Attachment,
     (fast, later): (FastLoop, Option<Receiver<SlowList>>),
-    slow: &mut SlowSide,
-    progress: &mut Progress,
-    signals: &StopSignals,
+    totals: &mut AttachmentTotals,
+    (slow, progress, signals): (&mut SlowSide, &mut Progress, &StopSignals),
 ) -> Result<TwoProcessEnd, RunFailure> {
     let mut attachment = attachment;
     let mut fast = fast;
@@ -96,6 +106,7 @@ pub fn run(
         let (report, connection, watched) =
             run_attached(attachment, (fast, shared), slow, progress, signals)?;
         let remains = watched.remains;
+        totals.end(&remains.driver, &remains.step_ns);
         let tally = remains.fast.tally;
         let stop = match watched.end {
             WatchEnd::Fast(FastEnd::Finished) => Stop::Finished,
@@ -109,15 +120,16 @@ pub fn run(
                 drop(connection);
                 progress.end();
                 attachment = reattach(source, &words, signals)?;
+                totals.go_on(&attachment.driver, describe(source, &attachment));
                 fast = remains.fast;
                 fast.reset();
                 continue;
             }
         };
-        let FastRemains { driver, step_ns, mut fast, .. } = remains;
+        let FastRemains { driver, mut fast, .. } = remains;
         let lists = fast.step_mut().end_lists(slow_list.and_then(SlowThread::end));
         let orders = fast.orders_taken();
-        return Ok(TwoProcessEnd { tally, stop, driver, fast_report: report, step_ns, orders, lists });
+        return Ok(TwoProcessEnd { tally, stop, driver, fast_report: report, orders, lists });
     }
 }
 

@@ -65,7 +65,7 @@ pub struct Status {
 macro_rules! counters {
     ($($(#[$doc:meta])* $name:ident,)+) => {
         /// The driver's counters.
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
         pub struct CounterStatus {
             $($(#[$doc])* pub $name: u64,)+
         }
@@ -74,6 +74,11 @@ macro_rules! counters {
             /// Reads a driver's counters.
             pub fn of(driver: &DriverView) -> Self {
                 Self { $($name: driver.counters.$name.load(Ordering::Relaxed),)+ }
+            }
+
+            /// What was counted in both.
+            pub fn plus(&self, other: &Self) -> Self {
+                Self { $($name: self.$name.saturating_add(other.$name),)+ }
             }
 
             /// What was counted after `before`.

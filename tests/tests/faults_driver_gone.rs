@@ -78,6 +78,7 @@ fn a_run_goes_on_when_its_driver_is_killed_and_restarted() {
         let mut app =
             Running::start(press.app().args(["--seconds", seconds, "--record", "out.csv", "--grace", "10"]));
         wait_for_some_run(&press.observer.driver);
+        let first_pid = press.driver.child.id();
         press.driver.child.kill().expect("our own child");
         press.driver.wait();
         let before = published_run_ticks(&press.observer.driver);
@@ -96,7 +97,26 @@ fn a_run_goes_on_when_its_driver_is_killed_and_restarted() {
         assert!(t.last().is_some_and(|last| *last < length && *last > 0.9 * length), "{:?}", t.last());
         let commanded = second.driver.counters.ticks_commanded.load(Ordering::Relaxed);
         assert!(commanded >= after as u64, "{commanded} ticks, {after} rows");
+        // The report is of both drivers. The second may count on until it notices that nobody answers any more.
+        let first = press.observer.driver.counters.ticks_commanded.load(Ordering::Relaxed);
+        let told = reported_ticks(&end.out);
+        assert!(
+            (first + after as u64..=first + commanded).contains(&told),
+            "{first} + {commanded}:\n{}",
+            end.out
+        );
+        for pid in [first_pid, press.driver.child.id()] {
+            assert!(end.out.contains(&format!("process {pid}, was running")), "{pid}:\n{}", end.out);
+        }
+        assert!(end.out.contains("figures are of these 2 drivers together"), "{}", end.out);
     }
+}
+
+/// Ticks under the lease, as the report tells them.
+fn reported_ticks(report: &str) -> u64 {
+    let line = report.lines().find_map(|line| line.strip_prefix("ticks ")).expect("a line of ticks");
+    let (ticks, _) = line.trim_start().split_once(" under our lease").expect("its words");
+    ticks.parse().expect("a number")
 }
 
 #[test]
