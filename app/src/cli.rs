@@ -7,6 +7,7 @@ mod materials;
 mod numbers;
 mod play_args;
 mod run_args;
+mod run_help;
 
 use self::materials::print_materials;
 pub(crate) use self::numbers::parse_rate;
@@ -18,6 +19,7 @@ use crate::convert::{self, ConvertArgs};
 use crate::demo;
 use crate::export::{self, ExportArgs};
 use crate::outcome::{RunFailure, Stop};
+use crate::outputs;
 use crate::picture::{self, PlotArgs};
 use crate::replay::{self, ReplayArgs};
 use crate::report::Report;
@@ -28,7 +30,6 @@ use clap::{Parser, Subcommand};
 use io_driver::arguments;
 use io_driver::config::period_of;
 use io_driver::say::say;
-use rt_core::plain_text::PlainLines;
 use rt_core::signals::StopSignals;
 use shm_abi::{client, endpoint};
 use std::os::unix::fs::MetadataExt;
@@ -163,7 +164,7 @@ fn play(args: &PlayArgs, settings: &Settings, is_headless: bool) -> Result<(Repo
     }
     let signals = install_signals()?;
     let rig = args.rig(settings)?;
-    args.refuse_to_overwrite(&rig)?;
+    args.check_outputs(&rig)?;
     let mut plan = args.plan(settings);
     plan.window = window_spec(&rig.scene.name, settings)?;
     if plan.window.is_none() {
@@ -228,7 +229,7 @@ pub(crate) fn is_same_file(a: &Path, b: &Path) -> bool {
 fn conclude(result: Result<(Report, Stop), RunFailure>) -> ExitCode {
     match result {
         Ok((report, stop)) => {
-            print_report(&report);
+            outputs::tell(&report, report.takes_standard_output());
             let ended = stopped(stop);
             if report.lacks_a_recording() { ExitCode::from(EXIT_FAULT) } else { ended }
         }
@@ -249,12 +250,6 @@ fn stopped(stop: Stop) -> ExitCode {
 fn failed(failure: &RunFailure) -> ExitCode {
     say(format_args!("phantom3: {failure}"));
     ExitCode::from(failure.exit_status())
-}
-
-/// A closed pipe is no reason to fail: the run is done.
-fn print_report(report: &Report) {
-    use std::io::Write;
-    let _ = writeln!(std::io::stdout(), "{}", PlainLines(report));
 }
 
 // The exit status of a usage error is clap's own, which is the contract's.

@@ -6,29 +6,42 @@
 
 mod parquet_file;
 
-use crate::cli::is_same_file;
 use crate::outcome::{RunFailure, Stop};
+use crate::outputs::{self, Output};
+use crate::record::destination::{TableFormat, is_standard_output, shown};
 use crate::record::read::{ReadError, RecordedRun};
 use crate::recording::{Recording, RecordingError};
 use crate::row::{BodyRow, Row};
 use clap::Args;
 use io_driver::device::run_time_s;
-use io_driver::say::{say, tell};
+use io_driver::say::say;
 use parquet_file::ParquetFile;
+use rt_core::plain_text::Plain;
 use std::path::{Path, PathBuf};
 
 /// What becomes what.
 #[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
 pub struct ExportArgs {
     /// The recording (MCAP or CSV)
     recording: PathBuf,
-    /// As CSV, with the columns of `run --record OUT.csv`
+    /// The tables: OUT.csv with the columns of `run --record OUT.csv`, OUT.parquet with the same columns, - for CSV on the
+    /// standard output
+    #[arg(value_name = "OUT", required_unless_present_any = ["csv", "parquet"])]
+    out: Vec<PathBuf>,
+    /// As CSV, whatever the file is called
     #[arg(long, value_name = "OUT")]
     csv: Option<PathBuf>,
-    /// As Parquet, with the same columns
-    #[arg(long, value_name = "OUT", required_unless_present = "csv")]
+    /// As Parquet, whatever the file is called
+    #[arg(long, value_name = "OUT")]
     parquet: Option<PathBuf>,
 }
+
+const EXAMPLES: &str = "\
+Examples:
+  phantom3 export lift.mcap lift.csv
+  phantom3 export lift.mcap lift.parquet
+  phantom3 export lift.mcap - | head -3";
 
 /// Exports.
 ///
@@ -36,34 +49,70 @@ pub struct ExportArgs {
 /// A recording that cannot be read or is none, and tables that cannot be written.
 pub fn execute(args: &ExportArgs) -> Result<Stop, RunFailure> {
     let mut recorded = RecordedRun::open(&args.recording).map_err(|error| wrong(&error))?;
-    for out in args.csv.iter().chain(&args.parquet) {
-        if is_same_file(out, &args.recording) {
-            return Err(wrong(&format_args!(
-                "{} would be overwritten by its own export; name another file",
-                args.recording.display()
-            )));
-        }
-    }
-    let mut tables = Tables::create(args, &recorded)?;
+    let outs = args.outs()?;
+    let mut tables = outs.iter().map(|out| Table::create(out, &recorded)).collect::<Result<Vec<_>, _>>()?;
     let mut last = None;
     let mut rows = 0u64;
     let end = loop {
         match recorded.next_row() {
             Ok(Some((row, bodies))) => {
-                tables.append(&row, &bodies, &recorded)?;
+                if !append(&mut tables, &row, &bodies, &recorded)? {
+                    // Who reads the standard output has seen enough.
+                    return Ok(Stop::Finished);
+                }
                 (last, rows) = (Some(row.run_tick), rows + 1);
             }
             Ok(None) => break Ok(()),
             Err(error) => break Err(error),
         }
     };
-    tables.finish()?;
+    for table in tables {
+        table.finish()?;
+    }
     let until_s = last.map_or(0.0, |tick| run_time_s(tick.cast_signed(), recorded.period_ns()));
     tell_end(&args.recording, end, recorded.cut(), rows, until_s)?;
-    for out in args.csv.iter().chain(&args.parquet) {
-        tell(format_args!("{} ({rows} rows)", out.display()));
+    let is_taken = outs.iter().any(|(out, _)| is_standard_output(out));
+    for (out, _) in &outs {
+        outputs::tell(&format_args!("{} ({rows} rows)", Plain(shown(out).display())), is_taken);
     }
     Ok(Stop::Finished)
+}
+
+impl ExportArgs {
+    /// Where the tables go, and their formats.
+    fn outs(&self) -> Result<Vec<(PathBuf, TableFormat)>, RunFailure> {
+        let by_option = [(&self.csv, TableFormat::Csv), (&self.parquet, TableFormat::Parquet)];
+        let by_option = by_option.into_iter().filter_map(|(out, format)| Some((out.clone()?, format)));
+        let files = self.out.iter().chain(&self.csv).chain(&self.parquet);
+        outputs::check(&files.map(Output::table).collect::<Vec<_>>(), &[&self.recording])?;
+        let by_ending = self
+            .out
+            .iter()
+            .map(|out| Ok((out.clone(), TableFormat::of(out).map_err(|error| wrong(&error))?)));
+        by_ending.chain(by_option.map(Ok)).collect()
+    }
+}
+
+/// `false`: nobody reads the standard output any more.
+fn append(
+    tables: &mut [Table],
+    row: &Row,
+    bodies: &[BodyRow],
+    recorded: &RecordedRun,
+) -> Result<bool, RunFailure> {
+    for table in tables {
+        match table {
+            Table::Csv(csv) => {
+                csv.learn_entities(recorded.names());
+                match csv.append(row, bodies) {
+                    Err(error) if error.is_of_a_reader_who_left() => return Ok(false),
+                    written => written.map_err(|error| late(&error))?,
+                }
+            }
+            Table::Parquet(parquet) => parquet.append(row, bodies, recorded.names())?,
+        }
+    }
+    Ok(true)
 }
 
 /// Says how a recording ends, if not as it should; what is damaged is a fault once good rows were read.
@@ -87,40 +136,32 @@ pub(crate) fn wrong(error: &dyn std::fmt::Display) -> RunFailure {
     RunFailure::Start(error.to_string())
 }
 
-/// What is written.
-struct Tables {
-    csv: Option<Recording>,
-    parquet: Option<ParquetFile>,
+/// A table being written.
+enum Table {
+    Csv(Box<Recording>),
+    Parquet(Box<ParquetFile>),
 }
 
-impl Tables {
-    fn create(args: &ExportArgs, recorded: &RecordedRun) -> Result<Self, RunFailure> {
+impl Table {
+    fn create((out, format): &(PathBuf, TableFormat), recorded: &RecordedRun) -> Result<Self, RunFailure> {
         let (names, period_ns) = (recorded.names(), recorded.period_ns());
-        let csv =
-            |path: &PathBuf| Recording::create(path, names.clone(), period_ns).map_err(|error| late(&error));
-        let parquet = |path: &PathBuf| ParquetFile::create(path, names, period_ns);
-        Ok(Self {
-            csv: args.csv.as_ref().map(csv).transpose()?,
-            parquet: args.parquet.as_ref().map(parquet).transpose()?,
+        Ok(match format {
+            TableFormat::Csv => {
+                let csv = Recording::create(out, names.clone(), period_ns).map_err(|error| late(&error))?;
+                Self::Csv(Box::new(csv))
+            }
+            TableFormat::Parquet => Self::Parquet(Box::new(ParquetFile::create(out, names, period_ns)?)),
         })
     }
 
-    fn append(&mut self, row: &Row, bodies: &[BodyRow], recorded: &RecordedRun) -> Result<(), RunFailure> {
-        if let Some(csv) = &mut self.csv {
-            csv.learn_entities(recorded.names());
-            csv.append(row, bodies).map_err(|error| late(&error))?;
-        }
-        if let Some(parquet) = &mut self.parquet {
-            parquet.append(row, bodies, recorded.names())?;
-        }
-        Ok(())
-    }
-
     fn finish(self) -> Result<(), RunFailure> {
-        if let Some(csv) = self.csv {
-            csv.finish().map_err(|error| late(&error))?;
+        match self {
+            Self::Csv(csv) => match csv.finish() {
+                Err(error) if error.is_of_a_reader_who_left() => Ok(()),
+                finished => finished.map(drop).map_err(|error| late(&error)),
+            },
+            Self::Parquet(parquet) => parquet.finish(),
         }
-        self.parquet.map_or(Ok(()), ParquetFile::finish)
     }
 }
 
@@ -131,6 +172,7 @@ fn late(error: &RecordingError) -> RunFailure {
             "cannot create {}: {source}; name a file that can be written",
             file.display()
         )),
+        RecordingError::Format(error) => wrong(error),
         RecordingError::Write { file, source, rows, .. } => RunFailure::Results(format!(
             "cannot write {}: {source}; it is complete up to its row {rows}",
             file.display()

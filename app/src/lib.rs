@@ -33,6 +33,7 @@ pub mod mount;
 mod not_zeroed;
 pub mod on_request;
 pub mod outcome;
+mod outputs;
 pub mod passive_port;
 pub mod picture;
 pub mod plausible;

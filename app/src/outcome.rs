@@ -15,7 +15,7 @@ use view::NoWindow;
 pub enum Stop {
     /// It is over.
     Finished,
-    /// People closed its window.
+    /// Nobody looks on any more: its window was closed, or the reader of its standard output.
     Closed,
     /// This signal asked for it.
     Signal(i32),
@@ -78,7 +78,7 @@ impl RunFailure {
             | Self::Attach(_)
             | Self::Segment(_)
             | Self::Device(_)
-            | Self::Recording(RecordingError::Create { .. }) => 2,
+            | Self::Recording(RecordingError::Create { .. } | RecordingError::Format(_)) => 2,
             _ => 3,
         }
     }

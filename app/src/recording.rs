@@ -8,6 +8,7 @@
 
 pub use crate::columns::Names;
 use crate::columns::{Cell, columns, each_cell};
+use crate::record::destination::{FormatError, STANDARD_OUTPUT, create_file, shown};
 use crate::row::{BodyRow, Row};
 use io_driver::device::run_time_s;
 use std::fmt::Write as _;
@@ -32,6 +33,9 @@ pub enum RecordingError {
         /// What the system said.
         source: io::Error,
     },
+    /// Its name says no format.
+    #[error("cannot tell the format of {0}")]
+    Format(#[from] FormatError),
     /// It cannot be written any further.
     #[error(
         "cannot write the recording {file}: {source}; the run goes on without it; it is complete up to t = {until_s} s ({rows} rows)"
@@ -46,6 +50,14 @@ pub enum RecordingError {
         /// Rows on disk.
         rows: u64,
     },
+}
+
+impl RecordingError {
+    /// Whether nobody reads the standard output any more: who has seen enough is no failure.
+    pub fn is_of_a_reader_who_left(&self) -> bool {
+        let is_pipe = |file: &Path| file == shown(Path::new(STANDARD_OUTPUT));
+        matches!(self, Self::Write { file, source, .. } if source.kind() == io::ErrorKind::BrokenPipe && is_pipe(file))
+    }
 }
 
 /// A recording being written.
@@ -70,14 +82,16 @@ impl Recording {
     /// # Errors
     /// If the file cannot be made or its first line not be written.
     pub fn create(path: &Path, names: Names, period_ns: u64) -> Result<Self, RecordingError> {
-        let file =
-            File::create(path).map_err(|source| RecordingError::Create { file: path.into(), source })?;
+        let failed = |source| RecordingError::Create { file: shown(path), source };
+        let file = create_file(path).map_err(failed)?;
+        // Behind what others have written to a standard output that is a file.
+        let written_bytes = file.metadata().map_err(failed)?.len();
         let mut recording = Self {
             file,
-            path: path.into(),
+            path: shown(path),
             buffer: String::with_capacity(2 * CHUNK_BYTES),
             ends: Vec::new(),
-            written_bytes: 0,
+            written_bytes,
             rows: 0,
             last_tick: 0,
             period_ns,

@@ -17,7 +17,9 @@ use crate::book::Book;
 use crate::export::{tell_end, wrong};
 use crate::fast_loop::{FastLoop, Turn, WhenFull};
 use crate::outcome::RunFailure;
+use crate::outputs::{self, Output};
 use crate::progress::StatusLine;
+use crate::record::destination::{is_standard_output, shown};
 use crate::record::read::{self, ReadError, RecordedRun};
 use crate::record::{self, About, Recorder, View};
 use crate::rig::Rig;
@@ -30,12 +32,13 @@ use difference::Difference;
 use edit::Edit;
 use feed::{Feed, ReplayedDevice, SharedFeed};
 use io_driver::device::{Device, run_time_s};
-use io_driver::say::tell;
 use nalgebra::Vector3;
 use ordered::Orders;
+use rt_core::plain_text::Plain;
 use rt_core::signals::StopSignals;
 use shm_abi::segment::ClockMode;
 use stage::Stage;
+use std::fmt::Display;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -58,7 +61,8 @@ pub struct ReplayArgs {
     /// Change any key of the scene, as in entity.table.stiffness_n_per_m=500; may be given several times
     #[arg(long, value_name = "KEY=VALUE", value_parser = Edit::set)]
     change: Vec<Edit>,
-    /// Write what comes out here (CSV, or MCAP with the ending .mcap); may be given several times
+    /// Write what comes out here, as `run` does: FILE.csv, FILE.mcap, or - for CSV on the standard output; may be given
+    /// several times
     #[arg(long, value_name = "FILE")]
     record: Vec<PathBuf>,
     /// End with status 1 if anything differs, be it the last bit
@@ -75,7 +79,7 @@ pub fn execute(args: &ReplayArgs, signals: &StopSignals) -> Result<ExitCode, Run
     refuse_without_beginning(args, &recorded)?;
     let edits: Vec<Edit> = args.friction.iter().chain(&args.change).cloned().collect();
     let mut stage = Stage::set(&args.recording, &recorded, args.scene.as_deref(), &edits)?;
-    refuse_to_overwrite(args, &stage.rig)?;
+    check_outputs(args, &stage.rig)?;
     let played_from = args.recording.file_name().unwrap_or_default().to_string_lossy();
     stage.about.tell("replay_of", played_from.into_owned());
     let feed = Feed::new(recorded).map_err(|error| wrong(&error))?;
@@ -115,23 +119,10 @@ fn refuse_late_beginning(args: &ReplayArgs, feed: &Feed, stage: &Stage) -> Resul
     )))
 }
 
-fn refuse_to_overwrite(args: &ReplayArgs, rig: &Rig) -> Result<(), RunFailure> {
+fn check_outputs(args: &ReplayArgs, rig: &Rig) -> Result<(), RunFailure> {
     let inputs: Vec<&PathBuf> =
         [&args.recording].into_iter().chain(&args.scene).chain(rig.model_files()).collect();
-    let both = |record: &PathBuf| {
-        inputs
-            .iter()
-            .find(|input| crate::cli::is_same_file(record, input))
-            .map(|input| (record.clone(), *input))
-    };
-    match args.record.iter().find_map(both) {
-        Some((record, input)) => Err(wrong(&format_args!(
-            "--record {} would overwrite the input {}; name another file",
-            record.display(),
-            input.display()
-        ))),
-        None => Ok(()),
-    }
+    outputs::check(&args.record.iter().map(Output::ticks).collect::<Vec<_>>(), &inputs)
 }
 
 /// A replay under way.
@@ -292,20 +283,21 @@ impl Play {
         let until_s = run_time_s(self.fast.run_ticks().saturating_sub(1).cast_signed(), period_ns);
         tell_end(&args.recording, failure, feed.recorded.cut(), rows_read, until_s)?;
         ended?;
+        let takes_output = recordings.iter().any(|recorded| is_standard_output(&recorded.path));
         let program = feed.recorded.about().and_then(|about| about.facts.get("program"));
-        tell(format_args!(
+        let tell = |words: &dyn Display| outputs::tell(words, takes_output);
+        tell(&format_args!(
             "recording    {} ({} ticks compared, {missing} missing in it), by {}",
-            args.recording.display(),
+            Plain(args.recording.display()),
             difference.ticks(),
-            program.map_or("an unknown version", String::as_str)
+            Plain(program.map_or("an unknown version", String::as_str))
         ));
-        tell(format_args!("scene        {}", stage.name));
+        tell(&format_args!("scene        {}", Plain(&stage.name)));
         for recorded in &recordings {
-            tell(format_args!("written      {} ({} rows)", recorded.path.display(), recorded.rows));
+            let place = shown(&recorded.path);
+            tell(&format_args!("written      {} ({} rows)", Plain(place.display()), recorded.rows));
         }
-        for line in difference.to_string().lines() {
-            tell(format_args!("{line}"));
-        }
+        tell(&difference);
         // The recorder has told why.
         if recordings.iter().any(|recorded| recorded.failure.is_some()) {
             return Ok(ExitCode::from(3));

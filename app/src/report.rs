@@ -4,6 +4,7 @@ use crate::attachment_totals::Timing;
 use crate::fast_loop::Tally;
 use crate::lists_end::ListsEnd;
 use crate::record::Recorded;
+use crate::record::destination::{is_standard_output, shown};
 use crate::snapshots::Drawn;
 use io_driver::status::CounterStatus;
 use rt_core::plain_text::Plain;
@@ -41,6 +42,11 @@ pub struct Report {
 }
 
 impl Report {
+    /// Whether a recording went there, so that people are told elsewhere.
+    pub fn takes_standard_output(&self) -> bool {
+        self.recordings.iter().any(|recorded| is_standard_output(&recorded.path))
+    }
+
     /// Whether a recording is not complete, or a picture could not be written, which has been told.
     pub fn lacks_a_recording(&self) -> bool {
         let lacks_pictures = self.pictures.as_ref().is_some_and(|drawn| drawn.is_fault);
@@ -128,18 +134,14 @@ impl fmt::Display for Report {
             if index > 0 {
                 writeln!(f)?;
             }
-            write!(
-                f,
-                "recording    {} ({} {}",
-                Plain(recorded.path.display()),
-                recorded.rows,
-                recorded.unit
-            )?;
-            match recorded.lost + tally.rows_lost {
+            let Recorded { path, rows, unit, lost, failure } = recorded;
+            write!(f, "recording    {} ({rows} {unit}", Plain(shown(path).display()))?;
+            let who = if is_standard_output(path) { "its reader" } else { "the disk" };
+            match lost + tally.rows_lost {
                 0 => write!(f, ")")?,
-                lost => write!(f, ", {lost} LOST: the disk was too slow)")?,
+                lost => write!(f, ", {lost} LOST: {who} was too slow)")?,
             }
-            if recorded.failure.is_some() {
+            if failure.is_some() {
                 write!(f, " NOT COMPLETE: see the message above")?;
             }
         }

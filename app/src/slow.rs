@@ -160,9 +160,11 @@ impl SlowSide {
         }
     }
 
-    /// Whether people closed the window.
+    /// Whether nobody looks on any more: people closed the window, or stopped to read the standard output, and nothing else
+    /// is recorded.
     pub fn wants_end(&self) -> bool {
-        self.spectator.as_ref().is_some_and(Spectator::wants_end)
+        let is_unread = !self.recorders.is_empty() && self.recorders.iter().all(Recorder::reader_has_gone);
+        is_unread || self.spectator.as_ref().is_some_and(Spectator::wants_end)
     }
 
     fn take_rows(&mut self) {

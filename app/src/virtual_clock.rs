@@ -85,6 +85,9 @@ impl VirtualDriver {
             if tick % SLOW_EVERY == 0 {
                 slow.step();
                 progress.show(fast.run_ticks());
+                if slow.wants_end() {
+                    return Ok(Stop::Closed);
+                }
             }
             match turn {
                 Turn::Finished => break,

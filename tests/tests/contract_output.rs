@@ -150,3 +150,74 @@ fn a_recording_may_go_into_a_pipe() {
     let rows = said.out.lines().filter(|line| line.starts_with("0.")).count();
     assert_eq!(rows, 200, "{}", said.out);
 }
+
+#[test]
+fn a_name_that_says_no_format_is_refused_before_anything_runs() {
+    let cases: &[(&[&str], &[&str])] = &[
+        (&["--record", "out.xyz"], &["--record out.xyz has the ending .xyz", ".csv", ".mcap", "- (CSV"]),
+        (&["--record", "out"], &["--record out has no ending that names a format", ".csv", ".mcap"]),
+        (&["--record", "out.parquet"], &["record out.mcap, and then `phantom3 export out.mcap out.parquet`"]),
+        (&["--events", "out.mcap"], &["--events out.mcap has the ending .mcap", ".jsonl", ".csv"]),
+        (&["--record", "-", "--events", "-"], &["--events - is given twice"]),
+        (&["--record", "-", "--record", "-"], &["--record - is given twice"]),
+    ];
+    let place = workplace();
+    let before = place.snapshot();
+    for clock in ["virtual", "real"] {
+        for (arguments, words) in cases {
+            let said = place.run([&["run", "scene.toml", "--clock", clock], *arguments].concat());
+            assert_eq!((said.status, said.out.as_str()), (Some(2), ""), "{arguments:?}: {}", said.err);
+            for word in *words {
+                assert!(said.err.contains(word), "{arguments:?} does not say `{word}`: {}", said.err);
+            }
+        }
+    }
+    assert!(place.snapshot() == before, "files have changed");
+}
+
+#[test]
+fn a_table_on_the_standard_output_is_that_of_the_file_and_the_report_goes_to_standard_error() {
+    for clock in ["virtual", "lockstep"] {
+        let place = workplace();
+        let said = place.run([
+            "run",
+            "scene.toml",
+            "--clock",
+            clock,
+            "--seconds",
+            "0.2",
+            "--record",
+            "-",
+            "--record",
+            "out.csv",
+        ]);
+        assert_eq!(said.status, Some(0), "{}", said.err);
+        assert!(said.out == std::fs::read_to_string(place.path("out.csv")).expect("a table"), "{clock}");
+        assert!(said.err.contains("recording    the standard output (200 rows)"), "{}", said.err);
+        assert!(!place.path("-").exists(), "no file of that name");
+    }
+    let place = workplace();
+    let said = place.run(["run", "scene.toml", "--clock", "virtual", "--seconds", "0.2", "--events", "-"]);
+    assert_eq!((said.status, said.out.as_str()), (Some(0), ""), "nothing happens: {}", said.err);
+    assert!(said.err.contains("recording    the standard output (0 events)"), "{}", said.err);
+}
+
+#[test]
+fn a_reader_who_has_seen_enough_ends_the_run_quietly_where_nothing_else_is_recorded() {
+    let script = "{ \"$0\" \"$@\"; echo \"status $?\" >&2; } | head -n 2";
+    for clock in ["virtual", "real"] {
+        // Some hours: they are not waited for.
+        let place = workplace();
+        let said = place.shell(script, &["--clock", clock, "--seconds", "40000", "--record", "-"]);
+        assert_eq!(said.out.lines().count(), 2, "{}", said.out);
+        assert!(said.err.contains("status 0\n"), "{clock}: {}", said.err);
+        for word in ["cannot", "pipe", "NOT COMPLETE"] {
+            assert!(!said.err.contains(word), "{clock}: {}", said.err);
+        }
+        assert_eq!(place.processes(), Vec::<u32>::new());
+    }
+    let place = workplace();
+    let both = ["--clock", "virtual", "--seconds", "20", "--record", "-", "--record", "out.csv"];
+    let said = place.shell(script, &both);
+    assert!(said.err.contains("recording    out.csv (20000 rows)"), "{}", said.err);
+}

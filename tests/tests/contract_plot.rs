@@ -65,6 +65,35 @@ fn what_moves_is_drawn_with_its_way_and_its_turn() {
 }
 
 #[test]
+fn a_recording_looks_the_same_in_every_format_and_as_far_as_it_is_whole() {
+    let place = Workplace::new();
+    recorded(&place, "rough", 0.5);
+    let run = ["run", "rough.toml", "--hand", "hand.csv", "--clock", "virtual", "--record", "all.mcap"];
+    assert_eq!(place.run(run).status, Some(0));
+    assert_eq!(place.run(["export", "all.mcap", "columns.parquet"]).status, Some(0));
+    std::fs::copy(place.path("all.mcap"), place.path("renamed.dat")).expect("a copy");
+    let drawn = |recording: &str| {
+        let said = place.run(["plot", recording, "--svg-only", "--out", "picture"]);
+        assert_eq!((said.status, said.err.as_str()), (Some(0), ""), "{recording}");
+        std::fs::read(place.path("picture.svg")).expect("a picture")
+    };
+    let table = drawn("rough.csv");
+    for recording in ["all.mcap", "columns.parquet", "renamed.dat"] {
+        assert!(drawn(recording) == table, "{recording}");
+    }
+    // A killed process leaves half a row.
+    let whole = std::fs::read(place.path("rough.csv")).expect("a table");
+    place.write("cut.csv", &whole[..whole.len() - 3]);
+    let said = place.run(["plot", "cut.csv", "--svg-only"]);
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    assert!(
+        said.err.contains("cut.csv: the last row is not complete and is left out; 999 rows are drawn"),
+        "{}",
+        said.err
+    );
+}
+
+#[test]
 fn what_cannot_be_drawn_is_told_with_the_file_and_what_there_is() {
     let place = Workplace::new();
     recorded(&place, "rough", 0.5);

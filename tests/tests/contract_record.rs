@@ -79,6 +79,12 @@ fn a_table_out_of_a_recording_is_byte_for_byte_the_one_that_would_have_been_reco
                 bytes(&place, "exported.csv") == bytes(&place, "both.csv"),
                 "{name} on the {clock} clock"
             );
+            ran(&place, &["export", "both.mcap", "ending.csv", "ending.parquet"]);
+            assert!(bytes(&place, "ending.csv") == bytes(&place, "both.csv"));
+            assert_eq!(bytes(&place, "ending.parquet")[..4], *b"PAR1");
+            let said = ran(&place, &["export", "both.mcap", "-"]);
+            assert!(said.out.as_bytes() == bytes(&place, "both.csv"), "on the standard output");
+            assert!(said.err.contains("the standard output (") && !place.path("-").exists(), "{}", said.err);
             // And a table is read as it was written.
             ran(&place, &["export", "both.csv", "--csv", "again.csv"]);
             assert!(bytes(&place, "again.csv") == bytes(&place, "both.csv"), "{name} on the {clock} clock");
@@ -153,7 +159,11 @@ fn another_friction_is_told_with_sizes_and_the_first_tick_that_differs() {
         (&["replay", "scene.toml"], "is no recording"),
         (&["replay", "none.mcap"], "cannot read the recording none.mcap"),
         (&["replay", "r.mcap", "--record", "r.mcap"], "would overwrite the input"),
-        (&["export", "r.mcap", "--csv", "r.mcap"], "would be overwritten by its own export"),
+        (&["export", "r.mcap", "--csv", "r.mcap"], "would overwrite the input"),
+        (&["export", "r.mcap"], "<OUT>"),
+        (&["export", "r.mcap", "r.xyz"], "r.xyz has the ending .xyz; allowed: .csv, .parquet"),
+        (&["export", "r.mcap", "t.csv", "./t.csv"], "is given twice"),
+        (&["replay", "r.mcap", "--record", "r.xyz"], "--record r.xyz has the ending .xyz; allowed: .csv"),
         (&["replay", "r.mcap", "--change", "entity.table.stiffness_n_per_m=-1"], "stiffness_n_per_m"),
     ] {
         let said = place.run(wrong);

@@ -1,8 +1,9 @@
 //! The arguments of `play`, and what they make.
 
+use super::DEFAULT_RATE_HZ;
 use super::numbers::parse_seconds;
-use super::{DEFAULT_RATE_HZ, is_same_file};
 use crate::outcome::RunFailure;
+use crate::outputs::{self, Output};
 use crate::play;
 use crate::rig::Rig;
 use crate::run::RunPlan;
@@ -32,18 +33,12 @@ impl PlayArgs {
         play::rig(self.scene.as_deref(), settings, period_of(DEFAULT_RATE_HZ))
     }
 
-    /// What is written must not take the place of what is read.
-    pub(super) fn refuse_to_overwrite(&self, rig: &Rig) -> Result<(), RunFailure> {
-        let is_input = |file: &PathBuf| {
-            std::iter::once(&rig.scene_file).chain(rig.model_files()).any(|input| is_same_file(file, input))
-        };
-        match self.record.iter().chain(&self.events).find(|file| is_input(file)) {
-            None => Ok(()),
-            Some(file) => Err(RunFailure::Start(format!(
-                "{} would be overwritten, and is an input; name another file for the recording",
-                file.display()
-            ))),
-        }
+    /// What is written must not take the place of what is read, and names its format.
+    pub(super) fn check_outputs(&self, rig: &Rig) -> Result<(), RunFailure> {
+        let inputs: Vec<&PathBuf> = std::iter::once(&rig.scene_file).chain(rig.model_files()).collect();
+        let (record, events) =
+            (self.record.iter().map(Output::ticks), self.events.iter().map(Output::events));
+        outputs::check(&record.chain(events).collect::<Vec<_>>(), &inputs)
     }
 
     pub(super) fn plan(&self, settings: &Settings) -> RunPlan {

@@ -1,10 +1,12 @@
 //! The arguments of `run`, and what they make: a rig, and a plan for it.
 
+use super::DEFAULT_RATE_HZ;
 use super::numbers::{parse_grace, parse_rate, parse_seconds, parse_seed};
-use super::{DEFAULT_RATE_HZ, is_same_file};
+use super::run_help::RUN_HELP;
 use crate::calibrate::default_layout;
 use crate::control::desk::OrderSource;
 use crate::outcome::RunFailure;
+use crate::outputs::{self, Output};
 use crate::rig::{HandMode, Rig};
 use crate::run::{Attach, RunPlan};
 use crate::settings;
@@ -22,6 +24,7 @@ use std::time::Duration;
 use world::{Layout, Scene, Settings};
 
 #[derive(Debug, Clone, Args)]
+#[command(after_long_help = RUN_HELP)]
 pub(super) struct RunArgs {
     /// The scene (TOML)
     scene: PathBuf,
@@ -45,12 +48,12 @@ pub(super) struct RunArgs {
     /// What moves time [default: real; with --attach: the driver's own clock]
     #[arg(long, value_enum)]
     clock: Option<Clock>,
-    /// Write every tick here, as a table (CSV) or, with the ending .mcap, with all that replays and shows it; may be
-    /// given several times
+    /// Write every tick here: FILE.csv (a table), FILE.mcap (all that replays and shows it), or - (CSV on the standard
+    /// output; the report then goes to standard error); may be given several times
     #[arg(long, value_name = "FILE")]
     record: Vec<PathBuf>,
-    /// Write what happens here, a line each: contacts, slips, grasps and more, as JSON or, with the ending .csv, as a table;
-    /// may be given several times
+    /// Write what happens here, a line each: contacts, slips, grasps and more: FILE.jsonl, FILE.csv (a table), or - (JSON on
+    /// the standard output); may be given several times
     #[arg(long, value_name = "FILE")]
     events: Vec<PathBuf>,
     #[command(flatten)]
@@ -64,10 +67,8 @@ pub(super) struct RunArgs {
     /// Seed of everything random: with --hand-mode impedance the hand's tremor and the sensors' noise
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse_seed, allow_negative_numbers = true)]
     seed: u64,
-    /// What changes while it runs: a script of lines such as `at 2.5 reset`, or `-` for orders on the standard input, without
-    /// `at`: reset; stiffness 1.1 [of ENTITY]; damping 0.9 [of ENTITY]; friction ENTITY coulomb mu=0.3;
-    /// move ENTITY to X Y Z in S; turn ENTITY to W X Y Z in S; turn ENTITY about X Y Z by RAD in S; pause; resume;
-    /// swap SCENE; key CODE down|up; trial NUMBER begins|ends
+    /// What changes while it runs: a script of lines such as `at 2.5 reset`, or - for orders on the standard input, without
+    /// `at`; all orders are listed below
     #[arg(long, value_name = "FILE")]
     orders: Option<PathBuf>,
     /// Where the devices stand in the world (TOML) [with --attach: what `calibrate --write` wrote, if it is there]
@@ -216,7 +217,7 @@ pub(super) fn make_plan(args: &RunArgs, rig: &Rig, settings: &Settings) -> Resul
             "--attach and --clock virtual exclude each other: a driver that runs has its own clock".into(),
         ));
     }
-    refuse_to_overwrite_input(args, rig)?;
+    check_outputs(args, rig)?;
     let attach = args.attach.as_ref().map(|socket| Attach {
         socket: if socket.as_os_str().is_empty() { endpoint::for_application() } else { socket.clone() },
         grace: Duration::from_secs_f64(args.grace),
@@ -250,7 +251,7 @@ fn order_source(args: &RunArgs) -> Result<Option<OrderSource>, RunFailure> {
     Ok(Some(OrderSource::Input))
 }
 
-fn refuse_to_overwrite_input(args: &RunArgs, rig: &Rig) -> Result<(), RunFailure> {
+fn check_outputs(args: &RunArgs, rig: &Rig) -> Result<(), RunFailure> {
     // The hand that counts may be the one that the scene names.
     let hand = rig.hand.as_ref().map(|hand| &hand.path);
     let inputs = [
@@ -263,33 +264,9 @@ fn refuse_to_overwrite_input(args: &RunArgs, rig: &Rig) -> Result<(), RunFailure
         args.orders.as_ref(),
     ];
     let inputs: Vec<&PathBuf> = inputs.into_iter().flatten().chain(rig.model_files()).collect();
-    let written: Vec<(&str, &PathBuf)> = args
-        .record
-        .iter()
-        .map(|file| ("--record", file))
-        .chain(args.events.iter().map(|file| ("--events", file)))
-        .chain(args.pictures.files().map(|file| ("--snapshot", file)))
-        .collect();
-    for (index, (option, record)) in written.iter().enumerate() {
-        if let Some(input) = inputs.iter().find(|input| is_same_file(record, input)) {
-            return Err(RunFailure::Start(format!(
-                "{option} {} would overwrite the input {}; name another file",
-                record.display(),
-                input.display()
-            )));
-        }
-        let absolute = std::path::absolute(record).ok();
-        let is_record = |(_, other): &(&str, &PathBuf)| {
-            std::path::absolute(other).ok() == absolute || is_same_file(record, other)
-        };
-        if written[..index].iter().any(is_record) {
-            return Err(RunFailure::Start(format!(
-                "{option} {} is given twice; each recording needs a file of its own",
-                record.display()
-            )));
-        }
-    }
-    Ok(())
+    let record = args.record.iter().map(Output::ticks);
+    let others = args.events.iter().map(Output::events).chain(args.pictures.files().map(Output::picture));
+    outputs::check(&record.chain(others).collect::<Vec<_>>(), &inputs)
 }
 
 /// Clap's own paths are never empty, not even by default.

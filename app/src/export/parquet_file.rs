@@ -6,6 +6,7 @@
 
 use crate::columns::{Cell, CellKind, Names, columns, each_cell};
 use crate::outcome::RunFailure;
+use crate::record::destination::create_file;
 use crate::row::{BodyRow, Row};
 use parquet::basic::{Compression, ConvertedType, Encoding, LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
@@ -43,7 +44,7 @@ enum Cells {
 impl ParquetFile {
     pub(super) fn create(path: &Path, names: &Names, period_ns: u64) -> Result<Self, RunFailure> {
         let columns = columns(names);
-        let file = File::create(path).map_err(|error| {
+        let file = create_file(path).map_err(|error| {
             super::wrong(&format_args!(
                 "cannot create {}: {error}; name a file that can be written",
                 path.display()

@@ -6,6 +6,7 @@
 
 mod figure;
 mod recorded;
+mod table;
 mod visit;
 
 use crate::outcome::{RunFailure, Stop};
@@ -20,10 +21,10 @@ use visit::visits;
 /// What is to be drawn.
 #[derive(Debug, Args)]
 pub struct PlotArgs {
-    /// The recording (CSV), as `run --record` wrote it
+    /// The recording (MCAP or CSV, as `run --record` wrote it, or Parquet, as `export` did)
     recording: PathBuf,
     /// Another one, dashed: the same hand on something that differs
-    #[arg(long, value_name = "CSV")]
+    #[arg(long, value_name = "RECORDING")]
     against: Option<PathBuf>,
     /// Which finger [default: each has a panel; with --by-entity: the first]
     #[arg(long, value_name = "NAME")]

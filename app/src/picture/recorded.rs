@@ -2,9 +2,9 @@
 //!
 //! Columns are found by their names, so that a recording may have more of them than this version knows.
 
-use csv::StringRecord;
+use super::table::{Table, TableRow};
+use crate::record::read::ReadError;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use rt_core::input_file;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -41,7 +41,9 @@ pub(super) struct RecordedBody {
 #[derive(Debug, Error)]
 pub(super) enum RecordedError {
     #[error("cannot read the recording {file}: {source}")]
-    Read { file: PathBuf, source: csv::Error },
+    Read { file: PathBuf, source: Box<dyn std::error::Error + Send + Sync> },
+    #[error(transparent)]
+    Run(#[from] ReadError),
     #[error("{file}: no column {column}; is this a recording that `phantom3 run --record` wrote?")]
     NoColumn { file: PathBuf, column: String },
     #[error("{file}:{line}: {column} is {found:?}; allowed: a number")]
@@ -63,10 +65,8 @@ struct Columns {
 
 impl Recorded {
     pub(super) fn read(file: &Path) -> Result<Self, RecordedError> {
-        let unreadable = |source| RecordedError::Read { file: file.into(), source };
-        let opened = input_file::open(file).map_err(|error| unreadable(error.into()))?;
-        let mut reader = csv::Reader::from_reader(opened);
-        let header = reader.headers().map_err(unreadable)?.clone();
+        let mut table = Table::open(file)?;
+        let header = table.columns().to_vec();
         let at = |column: &str| {
             let no_column = || RecordedError::NoColumn { file: file.into(), column: column.into() };
             header.iter().position(|name| name == column).ok_or_else(no_column)
@@ -86,13 +86,13 @@ impl Recorded {
             moving.iter().map(|name| RecordedBody { name: (*name).into(), ..Default::default() }).collect();
         let places: Vec<_> = moving.iter().map(|name| places(name, &at)).collect::<Result<_, _>>()?;
         let mut times_s = Vec::new();
-        for row in reader.records() {
-            let row = Row { file, header: &header, row: row.map_err(unreadable)? };
+        while let Some(row) = table.next_row()? {
+            let row = Row { table: &table, row };
             times_s.push(row.number(time)?);
             for (finger, columns) in fingers.iter_mut().zip(&columns) {
                 finger.hips.push(row.vector(columns.hip)?);
                 finger.forces.push(row.vector(columns.force)?);
-                finger.entities.push(row.row[columns.entity].into());
+                finger.entities.push(row.row.text(columns.entity).into());
             }
             for (body, [x, y, z, qw, qx, qy, qz]) in bodies.iter_mut().zip(&places) {
                 body.positions.push(row.vector([*x, *y, *z])?);
@@ -188,20 +188,14 @@ impl Columns {
 }
 
 /// A row, and what it takes to say what is wrong with it.
-struct Row<'f> {
-    file: &'f Path,
-    header: &'f StringRecord,
-    row: StringRecord,
+struct Row<'t> {
+    table: &'t Table,
+    row: TableRow,
 }
 
 impl Row<'_> {
     fn number(&self, column: usize) -> Result<f64, RecordedError> {
-        self.row[column].parse().map_err(|_| RecordedError::NoNumber {
-            file: self.file.into(),
-            line: self.row.position().map_or(0, csv::Position::line),
-            column: self.header[column].into(),
-            found: self.row[column].into(),
-        })
+        self.table.number(&self.row, column)
     }
 
     fn vector(&self, columns: [usize; 3]) -> Result<Vector3<f64>, RecordedError> {

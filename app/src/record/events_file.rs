@@ -1,5 +1,6 @@
 //! What happened in a run, and nothing else: a line for each event.
 
+use super::destination::{EventFormat, create_file, shown};
 use super::event_line::{KEYS, csv, json, said};
 use crate::book::Book;
 use crate::columns::Names;
@@ -29,12 +30,12 @@ impl EventsFile {
     /// If it cannot be made.
     pub fn create(path: &Path, names: Names, period_ns: u64, book: Book) -> Result<Self, RecordingError> {
         let failed = |source| RecordingError::Create { file: path.into(), source };
-        let mut file = BufWriter::new(File::create(path).map_err(failed)?);
-        let is_table = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
+        let is_table = EventFormat::of(path)? == EventFormat::Csv;
+        let mut file = BufWriter::new(create_file(path).map_err(failed)?);
         if is_table {
             writeln!(file, "{}", KEYS.join(",")).and_then(|()| file.flush()).map_err(failed)?;
         }
-        Ok(Self { file, path: path.into(), names, book, period_ns, is_table, written: 0, last_tick: 0 })
+        Ok(Self { file, path: shown(path), names, book, period_ns, is_table, written: 0, last_tick: 0 })
     }
 
     /// Appends an event.

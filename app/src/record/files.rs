@@ -1,11 +1,13 @@
 //! Which files a run is recorded in: those that were asked for, and beside each one of its own for every other scene.
 
+use super::destination::is_standard_output;
 use super::{About, Beginning, Recorder, View, create, create_events, create_under_way};
 use crate::book::Book;
 use crate::fast_loop::WhenFull;
 use crate::recording::RecordingError;
 use crate::rig::Rig;
 use io_driver::device::Extras;
+use io_driver::say::say;
 use std::path::{Path, PathBuf};
 
 /// What recordings of a run have in common.
@@ -40,7 +42,7 @@ impl Files {
         Ok(all)
     }
 
-    /// Those of the scene of this number.
+    /// Those of the scene of this number. On the standard output a table has one header, which is that of the first scene.
     ///
     /// # Errors
     /// If one cannot be made.
@@ -52,7 +54,14 @@ impl Files {
             let file = create(&path, names, self.period_ns, &about, view, (&self.book, number))?;
             self.start(&path, file, rig)
         };
-        self.record.iter().map(record).collect()
+        let goes_on = |path: &&PathBuf| number == 0 || !is_standard_output(path);
+        if !self.record.iter().all(|path| goes_on(&path)) {
+            say(format_args!(
+                "phantom3: the table on the standard output ends with the scene; other scenes are recorded in files: \
+                 --record FILE"
+            ));
+        }
+        self.record.iter().filter(goes_on).map(record).collect()
     }
 
     /// One that begins in the middle of the scene of this number.

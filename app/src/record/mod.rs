@@ -4,11 +4,12 @@
 //! full one nor a killed process may disturb what is felt or cost what was recorded before.
 //!
 //! Model: the fast thread leaves rows (`row_queue.rs`); the slow side hands them to a [`Recorder`] for each file, which
-//! writes on a thread of its own. The format goes by the file's ending: a table (CSV, `recording.rs`), or
+//! writes on a thread of its own. The format goes by the file's ending ([`destination`]): a table (CSV, `recording.rs`), or
 //! [`McapFile`], which has the events, a picture and the run's inputs beside the rows. [`read`] reads both.
 
 mod about;
 mod descriptor;
+pub mod destination;
 mod event_line;
 mod events_file;
 mod files;
@@ -30,12 +31,13 @@ pub use view::View;
 
 use crate::book::Book;
 use crate::recording::{Names, Recording, RecordingError};
+use destination::RunFormat;
 use std::path::Path;
 
 /// Creates the recording in the format that its name ends with; of the scene of this number in a run that has several.
 ///
 /// # Errors
-/// If it cannot be made.
+/// If it cannot be made, or its name says no format.
 pub fn create(
     path: &Path,
     names: Names,
@@ -44,11 +46,13 @@ pub fn create(
     view: &View,
     scene: (&Book, u32),
 ) -> Result<RecordFile, RecordingError> {
-    if is_mcap(path) {
-        let file = McapFile::create(path, names, period_ns, about, view.clone())?.of_scene(scene);
-        return Ok(RecordFile::Mcap(Box::new(file)));
-    }
-    Ok(RecordFile::Csv(Box::new(Recording::create(path, names, period_ns)?)))
+    Ok(match RunFormat::of(path)? {
+        RunFormat::Csv => RecordFile::Csv(Box::new(Recording::create(path, names, period_ns)?)),
+        RunFormat::Mcap => {
+            let file = McapFile::create(path, names, period_ns, about, view.clone())?.of_scene(scene);
+            RecordFile::Mcap(Box::new(file))
+        }
+    })
 }
 
 /// The same of a recording that begins in the middle of its scene, when the run has come to this tick.
@@ -63,7 +67,7 @@ pub fn create_under_way(
     view: &View,
     (scene, begins): ((&Book, u32), u64),
 ) -> Result<RecordFile, RecordingError> {
-    if is_mcap(path) {
+    if RunFormat::of(path)? == RunFormat::Mcap {
         let file = McapFile::create_at(path, names, period_ns, about, view.clone(), begins)?;
         return Ok(RecordFile::Mcap(Box::new(file.of_scene(scene).under_way())));
     }
@@ -81,9 +85,4 @@ pub fn create_events(
     book: &Book,
 ) -> Result<RecordFile, RecordingError> {
     Ok(RecordFile::Events(Box::new(EventsFile::create(path, names, period_ns, book.clone())?)))
-}
-
-/// Whether the name is that of an MCAP file; every other is a table.
-pub fn is_mcap(path: &Path) -> bool {
-    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mcap"))
 }

@@ -10,12 +10,13 @@ mod mcap_rows;
 mod tick_order;
 
 use super::about::About;
-use super::is_mcap;
+use super::destination::RunFormat;
 use crate::columns::Names;
 use crate::row::{BodyRow, Row};
 use csv_rows::CsvRows;
 use mcap_rows::McapRows;
-use std::io;
+use rt_core::input_file;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 pub(crate) use tick_order::LONGEST_GAP_S;
@@ -88,6 +89,10 @@ impl RecordedRun {
     pub fn open(file: &Path) -> Result<Self, ReadError> {
         let rows = if is_mcap(file) {
             Rows::Mcap(Box::new(McapRows::open(file)?))
+        } else if is_parquet(file) {
+            let why =
+                "it is a Parquet table, which is for other tools; name the MCAP or CSV that it was made of";
+            return Err(ReadError::NoRecording { file: file.into(), why: why.into() });
         } else {
             Rows::Csv(Box::new(CsvRows::open(file)?))
         };
@@ -141,4 +146,22 @@ impl RecordedRun {
             Rows::Mcap(rows) => rows.cut.as_deref(),
         }
     }
+}
+
+/// By its ending; or, whatever it is called, by its first bytes.
+pub(crate) fn is_mcap(file: &Path) -> bool {
+    RunFormat::of(file) == Ok(RunFormat::Mcap) || begins_with(file, mcap::MAGIC)
+}
+
+/// By its first bytes.
+pub(crate) fn is_parquet(file: &Path) -> bool {
+    begins_with(file, b"PAR1")
+}
+
+/// What is no regular file is left alone.
+fn begins_with(file: &Path, magic: &[u8]) -> bool {
+    let mut found = Vec::with_capacity(magic.len());
+    let opened = input_file::open(file).ok();
+    let read = opened.and_then(|file| file.take(magic.len() as u64).read_to_end(&mut found).ok());
+    read.is_some() && found == magic
 }

@@ -3,7 +3,8 @@
 //! Model: the slow side hands over rows through a bounded queue. In real time a row that finds no room is left out,
 //! counted, and told in the file where the format has a place for that; on a clock that can wait, it waits. A disk that
 //! takes no more is told at once, and the rows that follow are thrown away: the run goes on. At the end the recorder has
-//! as long as it gets on; one that is stuck is given up.
+//! as long as it gets on; one that is stuck is given up. A reader of the standard output who has seen enough is no failure:
+//! the recording ends, and so may the run.
 
 use super::events_file::EventsFile;
 use super::mcap_file::McapFile;
@@ -154,6 +155,8 @@ struct Shared {
     taken: AtomicU64,
     /// The file takes no more, which has been told.
     has_failed: AtomicBool,
+    /// Nobody reads the standard output any more.
+    reader_has_gone: AtomicBool,
 }
 
 impl Recorder {
@@ -238,6 +241,11 @@ impl Recorder {
         self.shared.has_failed.load(Ordering::Relaxed)
     }
 
+    /// Whether it went to the standard output, which nobody reads any more.
+    pub fn reader_has_gone(&self) -> bool {
+        self.shared.reader_has_gone.load(Ordering::Relaxed)
+    }
+
     /// Whether it is of events alone, whatever the scene is.
     pub fn is_of_events(&self) -> bool {
         self.unit == EVENTS
@@ -312,10 +320,7 @@ impl RecorderThread {
                     written = written.and_then(|()| self.file.as_mut().map_or(Ok(()), RecordFile::flush));
                 }
                 if let Err(error) = written {
-                    say(format_args!("phantom3: {error}"));
-                    self.shared.has_failed.store(true, Ordering::Relaxed);
-                    self.file = None;
-                    result = Err(error);
+                    result = self.abandon(error);
                 }
             }
             if is_closing {
@@ -325,11 +330,24 @@ impl RecorderThread {
         }
         self.tell_lost(last, u64::MAX);
         if let Err(error) = self.write_events(u64::MAX) {
-            say(format_args!("phantom3: {error}"));
-            return Err(error);
+            return self.abandon(error);
         }
-        let Some(file) = self.file else { return result };
-        file.finish().inspect_err(|error| say(format_args!("phantom3: {error}")))
+        let Some(file) = self.file.take() else { return result };
+        file.finish().or_else(|error| self.abandon(error))
+    }
+
+    /// Goes on without a file that takes no more; says how many rows it has, or what is wrong, which it tells.
+    fn abandon(&mut self, error: RecordingError) -> Result<u64, RecordingError> {
+        self.file = None;
+        if let RecordingError::Write { rows, .. } = &error
+            && error.is_of_a_reader_who_left()
+        {
+            self.shared.reader_has_gone.store(true, Ordering::Relaxed);
+            return Ok(*rows);
+        }
+        say(format_args!("phantom3: {error}"));
+        self.shared.has_failed.store(true, Ordering::Relaxed);
+        Err(error)
     }
 
     fn append(&mut self, row: &Row, bodies: &[BodyRow]) -> Result<(), RecordingError> {

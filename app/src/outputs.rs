@@ -1,0 +1,100 @@
+//! Output files of a command, checked before anything runs.
+
+use crate::cli::is_same_file;
+use crate::outcome::RunFailure;
+use crate::record::destination::{EventFormat, FormatError, RunFormat, is_standard_output};
+use rt_core::plain_text::PlainLines;
+use std::fmt::Display;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// A file to be written.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Output<'a> {
+    option: &'static str,
+    file: &'a Path,
+    kind: Kind,
+}
+
+/// What goes into it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Ticks,
+    Events,
+    Picture,
+    Table,
+}
+
+impl<'a> Output<'a> {
+    /// Of `--record`.
+    pub(crate) fn ticks(file: &'a PathBuf) -> Self {
+        Self { option: "--record", file, kind: Kind::Ticks }
+    }
+
+    /// Of `--events`.
+    pub(crate) fn events(file: &'a PathBuf) -> Self {
+        Self { option: "--events", file, kind: Kind::Events }
+    }
+
+    /// Of `--snapshot`.
+    pub(crate) fn picture(file: &'a PathBuf) -> Self {
+        Self { option: "--snapshot", file, kind: Kind::Picture }
+    }
+
+    /// Of an export; its format has been looked at.
+    pub(crate) fn table(file: &'a PathBuf) -> Self {
+        Self { option: "the table", file, kind: Kind::Table }
+    }
+
+    fn format(&self) -> Result<(), FormatError> {
+        match self.kind {
+            Kind::Ticks => RunFormat::of(self.file).map(drop),
+            Kind::Events => EventFormat::of(self.file).map(drop),
+            Kind::Picture | Kind::Table => Ok(()),
+        }
+    }
+
+    fn is_same(&self, other: &Self) -> bool {
+        let absolute = |output: &Self| std::path::absolute(output.file).ok();
+        match [self, other].map(|output| is_standard_output(output.file)) {
+            [true, true] => true,
+            [false, false] => absolute(self) == absolute(other) || is_same_file(self.file, other.file),
+            _ => false,
+        }
+    }
+}
+
+/// Refuses outputs that would overwrite an input or one another, or whose names say no format.
+///
+/// # Errors
+/// The first that is wrong, with what to do.
+pub(crate) fn check(outputs: &[Output<'_>], inputs: &[&PathBuf]) -> Result<(), RunFailure> {
+    for (index, output) in outputs.iter().enumerate() {
+        let Output { option, file, .. } = output;
+        let place = file.display();
+        if let Some(input) = inputs.iter().find(|input| is_same_file(file, input)) {
+            let input = input.display();
+            return refused(format_args!(
+                "{option} {place} would overwrite the input {input}; name another file"
+            ));
+        }
+        if outputs[..index].iter().any(|other| other.is_same(output)) {
+            return refused(format_args!("{option} {place} is given twice; each needs a file of its own"));
+        }
+        output.format().or_else(|error| refused(format_args!("{option} {error}")))?;
+    }
+    Ok(())
+}
+
+fn refused(words: std::fmt::Arguments<'_>) -> Result<(), RunFailure> {
+    Err(RunFailure::Start(words.to_string()))
+}
+
+/// Tells people a result: on the standard output, or on standard error where that is a table.
+///
+/// Nobody to tell is no reason to fail.
+pub(crate) fn tell(words: &dyn Display, is_output_taken: bool) {
+    let words = PlainLines(words);
+    let _ =
+        if is_output_taken { writeln!(io::stderr(), "{words}") } else { writeln!(io::stdout(), "{words}") };
+}

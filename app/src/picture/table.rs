@@ -1,0 +1,198 @@
+//! A recording's table, whatever file it lies in: CSV, MCAP or Parquet.
+//!
+//! Model: columns have names, rows have cells. A recording whose end is missing is read as far as it is whole.
+
+use super::recorded::RecordedError;
+use crate::columns::{Cell, columns, each_cell};
+use crate::record::read::{RecordedRun, is_mcap, is_parquet};
+use csv::StringRecord;
+use io_driver::say::say;
+use parquet::errors::ParquetError;
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::record::Field;
+use parquet::record::reader::RowIter;
+use rt_core::input_file;
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+/// A table that is read from its first row to its last.
+pub(super) struct Table {
+    file: PathBuf,
+    columns: Vec<String>,
+    rows: Rows,
+    read: u64,
+}
+
+enum Rows {
+    Csv(CsvTable),
+    Run(Box<RecordedRun>),
+    Parquet(Box<RowIter<'static>>),
+}
+
+/// A row of it.
+pub(super) struct TableRow {
+    /// Where it stands, from 1; the header of a text is line 1.
+    line: u64,
+    cells: Vec<Value>,
+}
+
+enum Value {
+    Number(f64),
+    Text(String),
+}
+
+impl Table {
+    /// Opens it and reads which columns there are.
+    pub(super) fn open(file: &Path) -> Result<Self, RecordedError> {
+        let (columns, rows) = if is_mcap(file) {
+            let run = RecordedRun::open(file)?;
+            let columns = columns(run.names()).into_iter().map(|column| column.name).collect();
+            (columns, Rows::Run(Box::new(run)))
+        } else if is_parquet(file) {
+            let (columns, rows) = open_parquet(file).map_err(|source| unreadable(file, source))?;
+            (columns, Rows::Parquet(Box::new(rows)))
+        } else {
+            let (columns, rows) = CsvTable::open(file).map_err(|source| unreadable(file, source))?;
+            (columns, Rows::Csv(rows))
+        };
+        Ok(Self { file: file.into(), columns, rows, read: 0 })
+    }
+
+    /// The names of its columns.
+    pub(super) fn columns(&self) -> &[String] {
+        &self.columns
+    }
+
+    /// The next row; `None` behind the last.
+    pub(super) fn next_row(&mut self) -> Result<Option<TableRow>, RecordedError> {
+        let cells = match &mut self.rows {
+            Rows::Csv(csv) => csv.next_row().map_err(|source| unreadable(&self.file, source))?,
+            Rows::Run(run) => next_of_run(run)?,
+            Rows::Parquet(rows) => next_of_parquet(rows).map_err(|source| unreadable(&self.file, source))?,
+        };
+        match cells {
+            Some(cells) => {
+                self.read += 1;
+                Ok(Some(TableRow { line: self.read + 1, cells }))
+            }
+            None => {
+                self.tell_cut();
+                Ok(None)
+            }
+        }
+    }
+
+    fn tell_cut(&self) {
+        let cut = match &self.rows {
+            Rows::Csv(csv) => csv.is_cut.then_some("the last row is not complete and is left out"),
+            Rows::Run(run) => run.cut(),
+            Rows::Parquet(_) => None,
+        };
+        if let Some(cut) = cut {
+            say(format_args!("phantom3: {}: {cut}; {} rows are drawn", self.file.display(), self.read));
+        }
+    }
+
+    /// The number in this column of a row.
+    pub(super) fn number(&self, row: &TableRow, column: usize) -> Result<f64, RecordedError> {
+        let found = match row.cells.get(column) {
+            Some(Value::Number(number)) => return Ok(*number),
+            Some(Value::Text(text)) => text.as_str(),
+            None => "",
+        };
+        found.parse().map_err(|_| RecordedError::NoNumber {
+            file: self.file.clone(),
+            line: row.line,
+            column: self.columns[column].clone(),
+            found: found.into(),
+        })
+    }
+}
+
+impl TableRow {
+    /// The words in this column; empty in a column of numbers.
+    pub(super) fn text(&self, column: usize) -> &str {
+        match self.cells.get(column) {
+            Some(Value::Text(text)) => text,
+            _ => "",
+        }
+    }
+}
+
+fn unreadable(file: &Path, source: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> RecordedError {
+    RecordedError::Read { file: file.into(), source: source.into() }
+}
+
+/// Text, whose last line may be cut off.
+struct CsvTable {
+    reader: csv::Reader<File>,
+    row: StringRecord,
+    /// Where the file ends, if that is in the middle of a line (bytes).
+    cut_at: Option<u64>,
+    is_cut: bool,
+}
+
+impl CsvTable {
+    fn open(file: &Path) -> Result<(Vec<String>, Self), csv::Error> {
+        let mut opened = input_file::open(file)?;
+        let cut_at = end_of_cut_file(&mut opened)?;
+        let mut reader = csv::Reader::from_reader(opened);
+        let columns = reader.headers()?.iter().map(str::to_owned).collect();
+        Ok((columns, Self { reader, row: StringRecord::new(), cut_at, is_cut: false }))
+    }
+
+    fn next_row(&mut self) -> Result<Option<Vec<Value>>, csv::Error> {
+        let is_row = self.reader.read_record(&mut self.row);
+        // Half a number is a number, and half a row is an error: neither counts.
+        if self.cut_at == Some(self.reader.position().byte()) && !matches!(is_row, Ok(false)) {
+            self.is_cut = true;
+            return Ok(None);
+        }
+        Ok(is_row?.then(|| self.row.iter().map(|cell| Value::Text(cell.into())).collect()))
+    }
+}
+
+/// `None`: it ends with a whole line, or is a pipe.
+fn end_of_cut_file(file: &mut File) -> std::io::Result<Option<u64>> {
+    let length = file.metadata().ok().filter(std::fs::Metadata::is_file).map_or(0, |found| found.len());
+    if length == 0 {
+        return Ok(None);
+    }
+    let mut last = [0];
+    file.seek(SeekFrom::Start(length - 1))?;
+    file.read_exact(&mut last)?;
+    file.rewind()?;
+    Ok((last != *b"\n").then_some(length))
+}
+
+fn next_of_run(run: &mut RecordedRun) -> Result<Option<Vec<Value>>, RecordedError> {
+    let Some((row, bodies)) = run.next_row()? else { return Ok(None) };
+    let mut cells = Vec::new();
+    each_cell(&row, &bodies, run.names(), run.period_ns(), |cell| {
+        cells.push(match cell {
+            Cell::Number(number) => Value::Number(number),
+            Cell::Whole(whole) => Value::Number(whole as f64),
+            Cell::Text(text) => Value::Text(text.into()),
+        });
+    });
+    Ok(Some(cells))
+}
+
+fn open_parquet(file: &Path) -> Result<(Vec<String>, RowIter<'static>), ParquetError> {
+    let reader = SerializedFileReader::new(input_file::open(file)?)?;
+    let schema = reader.metadata().file_metadata().schema_descr_ptr();
+    let columns = schema.columns().iter().map(|column| column.name().to_owned()).collect();
+    Ok((columns, RowIter::from_file_into(Box::new(reader))))
+}
+
+fn next_of_parquet(rows: &mut RowIter<'static>) -> Result<Option<Vec<Value>>, ParquetError> {
+    let Some(row) = rows.next().transpose()? else { return Ok(None) };
+    let value = |field: &Field| match field {
+        Field::Double(number) => Value::Number(*number),
+        Field::Long(whole) => Value::Number(whole.cast_unsigned() as f64),
+        Field::Str(text) => Value::Text(text.clone()),
+        other => Value::Text(other.to_string()),
+    };
+    Ok(Some(row.get_column_iter().map(|(_, field)| value(field)).collect()))
+}
