@@ -82,6 +82,16 @@ pub enum SimulationError {
 }
 
 impl SimulatedDevices {
+    /// What is usual for a scene with so many fingers.
+    ///
+    /// One finger is a stylus in a pen grip. Several are fingertips in thimbles, with which things are taken: at a hand
+    /// script's 4 mm below the surface of 500 N/m two pen grips, of 65 N/m along the grip, press with 0.23 N, and drop
+    /// whatever is heavier than 33 g at a friction of 0.7; fingertips, of 550 N/m, press with 1 N.
+    pub fn for_fingers(count: usize) -> Self {
+        let usual = Self::default();
+        if count > 1 { Self { hand_model: "fingertip".into(), ..usual } } else { usual }
+    }
+
     /// The description.
     ///
     /// # Errors

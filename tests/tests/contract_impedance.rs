@@ -319,3 +319,37 @@ fn wrong_names_are_refused_with_what_is_allowed() {
         }
     }
 }
+
+/// Two fingers, a cube of 100 g, and a hand file that goes 4 mm into its sides and up by 50 mm.
+#[test]
+fn two_fingers_lift_the_cube_of_the_scene_that_comes_with_the_program() {
+    let scene = format!("{}/../config/scenes/lift.toml", env!("CARGO_MANIFEST_DIR"));
+    let lifted_m = |more: &[&str]| {
+        let place = Workplace::new();
+        let run = [
+            "run",
+            &scene,
+            "--hand-mode",
+            "impedance",
+            "--clock",
+            "virtual",
+            "--headless",
+            "--record",
+            "out.csv",
+        ];
+        let said = place.run(run.iter().chain(more));
+        assert_eq!(said.status, Some(0), "{more:?}: {}", said.err);
+        let table = Table::read(&place.path("out.csv"));
+        let (t, y) = (table.numbers("t"), table.numbers("cube_y"));
+        // The hand is up from 2 s to 4 s; half a second later it has settled.
+        let up = t.iter().zip(&y).filter(|(t, _)| (2.5..4.0).contains(*t)).map(|(_, up)| up - y[0]);
+        up.fold(f64::INFINITY, f64::min)
+    };
+    for seed in ["0", "1", "2"] {
+        // A fingertip's 548 N/m give way by 0.9 mm under half of the weight, and its contact by 1 mm.
+        let lifted_m = lifted_m(&["--seed", seed]);
+        assert!(lifted_m > 0.045, "{lifted_m} m with seed {seed}");
+    }
+    // Two pens are held by whole arms, which give way: 0.23 N in place of 0.7 N.
+    assert!(lifted_m(&["--hand-model", "pen-grip"]) < 0.005);
+}

@@ -35,7 +35,7 @@ pub(super) struct RunArgs {
     #[arg(long, value_enum, default_value_t = HandModeName::Kinematic)]
     hand_mode: HandModeName,
     /// With --hand-mode impedance: how the hand pulls, a built-in's name or a file (TOML); nobody: nobody holds them
-    /// [default: pen-grip]
+    /// [default: pen-grip; for several fingers fingertip]
     #[arg(long, value_name = "HAND")]
     hand_model: Option<PathBuf>,
     /// With --hand-mode impedance: how tightly the hand holds: light, usual, firm [default: usual]
@@ -129,15 +129,11 @@ impl From<Clock> for ClockMode {
 
 pub(super) fn make_rig(args: &RunArgs, settings: &Settings) -> Result<Rig, RunFailure> {
     let wrong = |error: &dyn std::fmt::Display| RunFailure::Start(error.to_string());
-    let hand_mode = match args.hand_mode {
-        HandModeName::Kinematic => HandMode::Kinematic,
-        HandModeName::Impedance if args.attach.is_some() => {
-            return Err(wrong(
-                &"--attach and --hand-mode impedance exclude each other: the devices of a driver that runs are moved by whoever holds them",
-            ));
-        }
-        HandModeName::Impedance => HandMode::Impedance(simulated_devices(args)),
-    };
+    if args.hand_mode == HandModeName::Impedance && args.attach.is_some() {
+        return Err(wrong(
+            &"--attach and --hand-mode impedance exclude each other: the devices of a driver that runs are moved by whoever holds them",
+        ));
+    }
     refuse_without_impedance(args)?;
     let mut scene = Scene::load(&args.scene).map_err(|error| wrong(&error))?;
     if args.attach.is_some() {
@@ -145,14 +141,18 @@ pub(super) fn make_rig(args: &RunArgs, settings: &Settings) -> Result<Rig, RunFa
         scene.hand = None;
     }
     settings::find_data(&mut scene, &args.scene, settings);
+    let hand_mode = match args.hand_mode {
+        HandModeName::Kinematic => HandMode::Kinematic,
+        HandModeName::Impedance => HandMode::Impedance(simulated_devices(args, scene.fingers.len())),
+    };
     let layout = find_layout(args)?;
     let period_ns = period_of(args.rate_hz.unwrap_or(DEFAULT_RATE_HZ));
     Rig::new(&args.scene, scene, layout, args.hand.as_deref(), hand_mode, period_ns)
         .map_err(|error| wrong(&error))
 }
 
-fn simulated_devices(args: &RunArgs) -> SimulatedDevices {
-    let usual = SimulatedDevices::default();
+fn simulated_devices(args: &RunArgs, fingers: usize) -> SimulatedDevices {
+    let usual = SimulatedDevices::for_fingers(fingers);
     SimulatedDevices {
         description: args.device.clone().unwrap_or(usual.description),
         hand_model: args.hand_model.clone().unwrap_or(usual.hand_model),
