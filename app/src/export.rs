@@ -66,9 +66,7 @@ pub fn execute(args: &ExportArgs) -> Result<Stop, RunFailure> {
             Err(error) => break Err(error),
         }
     };
-    for table in tables {
-        table.finish()?;
-    }
+    tables.into_iter().try_for_each(Table::finish)?;
     let until_s = last.map_or(0.0, |tick| run_time_s(tick.cast_signed(), recorded.period_ns()));
     tell_end(&args.recording, end, recorded.cut(), rows, until_s)?;
     let is_taken = outs.iter().any(|(out, _)| is_standard_output(out));
@@ -84,7 +82,7 @@ impl ExportArgs {
         let by_option = [(&self.csv, TableFormat::Csv), (&self.parquet, TableFormat::Parquet)];
         let by_option = by_option.into_iter().filter_map(|(out, format)| Some((out.clone()?, format)));
         let files = self.out.iter().chain(&self.csv).chain(&self.parquet);
-        outputs::check(&files.map(Output::table).collect::<Vec<_>>(), &[&self.recording])?;
+        outputs::check(&files.map(|file| Output::table(file)).collect::<Vec<_>>(), &[&self.recording])?;
         let by_ending = self
             .out
             .iter()

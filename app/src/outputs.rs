@@ -27,22 +27,22 @@ enum Kind {
 
 impl<'a> Output<'a> {
     /// Of `--record`.
-    pub(crate) fn ticks(file: &'a PathBuf) -> Self {
+    pub(crate) fn ticks(file: &'a Path) -> Self {
         Self { option: "--record", file, kind: Kind::Ticks }
     }
 
     /// Of `--events`.
-    pub(crate) fn events(file: &'a PathBuf) -> Self {
+    pub(crate) fn events(file: &'a Path) -> Self {
         Self { option: "--events", file, kind: Kind::Events }
     }
 
     /// Of `--snapshot`.
-    pub(crate) fn picture(file: &'a PathBuf) -> Self {
+    pub(crate) fn picture(file: &'a Path) -> Self {
         Self { option: "--snapshot", file, kind: Kind::Picture }
     }
 
     /// Of an export; its format has been looked at.
-    pub(crate) fn table(file: &'a PathBuf) -> Self {
+    pub(crate) fn table(file: &'a Path) -> Self {
         Self { option: "the table", file, kind: Kind::Table }
     }
 

@@ -122,7 +122,7 @@ fn refuse_late_beginning(args: &ReplayArgs, feed: &Feed, stage: &Stage) -> Resul
 fn check_outputs(args: &ReplayArgs, rig: &Rig) -> Result<(), RunFailure> {
     let inputs: Vec<&PathBuf> =
         [&args.recording].into_iter().chain(&args.scene).chain(rig.model_files()).collect();
-    outputs::check(&args.record.iter().map(Output::ticks).collect::<Vec<_>>(), &inputs)
+    outputs::check(&args.record.iter().map(|file| Output::ticks(file)).collect::<Vec<_>>(), &inputs)
 }
 
 /// A replay under way.

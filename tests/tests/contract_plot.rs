@@ -38,6 +38,9 @@ fn a_recording_and_another_one_become_a_picture_per_entity() {
     assert!(!svg.replace("\n", "").contains(">z<"), "what is always zero is not drawn");
     let png = std::fs::read(place.path("pictures/table.png")).expect("a picture");
     assert_eq!(png[1..4], *b"PNG");
+    // Who names the file with its ending gets that file.
+    assert_eq!(place.run(["plot", "rough.csv", "--svg-only", "--out", "named.svg"]).status, Some(0));
+    assert!(place.path("named.svg").exists() && !place.path("named.svg.svg").exists());
     let again = place.run(["plot", "rough.csv", "--from", "0.3", "--to", "0.5", "--svg-only"]);
     assert_eq!(again.status, Some(0), "{}", again.err);
     let svg = std::fs::read_to_string(place.path("rough.svg")).expect("beside the recording");
@@ -106,6 +109,8 @@ fn what_cannot_be_drawn_is_told_with_the_file_and_what_there_is() {
         (&["plot", "rough.toml"], "is this a recording"),
         (&["plot", "rough.csv", "--finger", "thumb"], "there are: f0"),
         (&["plot", "rough.csv", "--from", "7"], "it lasts from 0 s to"),
+        (&["plot", "rough.csv", "--from", "-2", "--to", "-1"], "no row between -2 s and -1 s"),
+        (&["plot", "rough.csv", "--out", "none/x"], "cannot write pictures into none: No such file"),
         (&["plot", "rough.csv", "--against", "hand.csv"], "hand.csv: no column f0_hip_x"),
         (&["plot", "free.csv", "--by-entity"], "touches nothing"),
         (&["plot", "rough.csv", "--by-entity", "--out", "rough.csv"], "cannot make the directory rough.csv"),

@@ -157,6 +157,7 @@ fn another_friction_is_told_with_sizes_and_the_first_tick_that_differs() {
     for (wrong, words) in [
         (&["replay", "r.mcap", "--friction", "tabel=none"][..], "no entity \"tabel\""),
         (&["replay", "scene.toml"], "is no recording"),
+        (&["run", "r.mcap"], "r.mcap is a recording; `phantom3 replay r.mcap` plays it again"),
         (&["replay", "none.mcap"], "cannot read the recording none.mcap"),
         (&["replay", "r.mcap", "--record", "r.mcap"], "would overwrite the input"),
         (&["export", "r.mcap", "--csv", "r.mcap"], "would overwrite the input"),
@@ -408,4 +409,17 @@ fn the_public_reader_reads_it_where_it_is_installed() {
     place.write("cut.mcap", &whole[..whole.len() * 7 / 10]);
     let said = read(&["cut.mcap"]);
     assert!(said.err.contains("cut short") && said.out.contains("not complete"), "{}{}", said.out, said.err);
+}
+
+#[test]
+fn a_parquet_table_that_a_full_disk_cut_off_is_taken_away() {
+    let (place, seconds) = workplace("lift");
+    ran(&place, &["run", "scene.toml", "--clock", "virtual", "--seconds", seconds, "--record", "r.mcap"]);
+    // 50 or 100 kB, as the shell's blocks have 512 or 1024 bytes.
+    let said = place.shell("trap '' XFSZ; ulimit -f 100; exec \"$0\" export r.mcap out.parquet", &[]);
+    assert_eq!(said.status, Some(3), "{}", said.err);
+    let words =
+        "File too large (os error 27); a Parquet file without its end cannot be read: nothing is left of it";
+    assert!(said.err.contains(words), "{}", said.err);
+    assert!(!place.path("out.parquet").exists());
 }

@@ -36,8 +36,10 @@ impl PlayArgs {
     /// What is written must not take the place of what is read, and names its format.
     pub(super) fn check_outputs(&self, rig: &Rig) -> Result<(), RunFailure> {
         let inputs: Vec<&PathBuf> = std::iter::once(&rig.scene_file).chain(rig.model_files()).collect();
-        let (record, events) =
-            (self.record.iter().map(Output::ticks), self.events.iter().map(Output::events));
+        let (record, events) = (
+            self.record.iter().map(|file| Output::ticks(file)),
+            self.events.iter().map(|file| Output::events(file)),
+        );
         outputs::check(&record.chain(events).collect::<Vec<_>>(), &inputs)
     }
 

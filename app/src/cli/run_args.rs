@@ -7,6 +7,7 @@ use crate::calibrate::default_layout;
 use crate::control::desk::OrderSource;
 use crate::outcome::RunFailure;
 use crate::outputs::{self, Output};
+use crate::record::read::is_mcap;
 use crate::rig::{HandMode, Rig};
 use crate::run::{Attach, RunPlan};
 use crate::settings;
@@ -135,6 +136,12 @@ pub(super) fn make_rig(args: &RunArgs, settings: &Settings) -> Result<Rig, RunFa
         ));
     }
     refuse_without_impedance(args)?;
+    if is_mcap(&args.scene) {
+        let recording = args.scene.display();
+        return Err(wrong(&format_args!(
+            "{recording} is a recording; `phantom3 replay {recording}` plays it again"
+        )));
+    }
     let mut scene = Scene::load(&args.scene).map_err(|error| wrong(&error))?;
     if args.attach.is_some() {
         // The devices are the fingers; nothing follows a script.
@@ -264,8 +271,12 @@ fn check_outputs(args: &RunArgs, rig: &Rig) -> Result<(), RunFailure> {
         args.orders.as_ref(),
     ];
     let inputs: Vec<&PathBuf> = inputs.into_iter().flatten().chain(rig.model_files()).collect();
-    let record = args.record.iter().map(Output::ticks);
-    let others = args.events.iter().map(Output::events).chain(args.pictures.files().map(Output::picture));
+    let record = args.record.iter().map(|file| Output::ticks(file));
+    let others = args
+        .events
+        .iter()
+        .map(|file| Output::events(file))
+        .chain(args.pictures.files().map(|file| Output::picture(file)));
     outputs::check(&record.chain(others).collect::<Vec<_>>(), &inputs)
 }
 

@@ -15,6 +15,7 @@ Orders (--orders FILE, or - for the standard input, where each line counts at on
   at 5.0 swap other.toml                         another scene
   at 5.0 trial 1 begins                          a mark among the events; trial 1 ends
   at 5.0 key 32 down                             the like; key 32 up
+  at 5.0 camera at 0 0.2 0.4 1 0 0 0             X Y Z and W X Y Z; devices that are attached to it go along
   at 5.0 text 0.5 0.2 4 Press the red cube       at the window: place (0 to 1), seconds, words
   # what follows a # is for people
 

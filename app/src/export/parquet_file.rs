@@ -159,8 +159,15 @@ impl Cells {
     }
 }
 
+/// What is there cannot be read, and is taken away.
 fn failed(path: &Path, error: &ParquetError) -> RunFailure {
-    RunFailure::Results(format!("cannot write {}: {error}", path.display()))
+    let is_file = path.symlink_metadata().is_ok_and(|found| found.is_file());
+    let is_gone = is_file && std::fs::remove_file(path).is_ok();
+    let left = if is_gone { "nothing is left of it" } else { "what is there is of no use" };
+    let place = path.display();
+    RunFailure::Results(format!(
+        "cannot write {place}: {error}; a Parquet file without its end cannot be read: {left}"
+    ))
 }
 
 #[cfg(test)]

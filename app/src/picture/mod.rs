@@ -15,6 +15,7 @@ use figure::{of_entity, of_objects, of_run};
 use io_driver::say::tell;
 use plot::{Figure, PlotError};
 use recorded::{Recorded, RecordedFinger};
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use visit::visits;
 
@@ -30,10 +31,10 @@ pub struct PlotArgs {
     #[arg(long, value_name = "NAME")]
     finger: Option<String>,
     /// Only from here on (s)
-    #[arg(long, value_name = "S", default_value_t = 0.0)]
+    #[arg(long, value_name = "S", default_value_t = 0.0, allow_negative_numbers = true)]
     from: f64,
     /// Only up to here (s) [default: the end]
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     to: Option<f64>,
     /// A picture for each entity, along the way that the finger went on it
     #[arg(long)]
@@ -60,9 +61,12 @@ pub fn execute(args: &PlotArgs) -> Result<Stop, RunFailure> {
         let recorded = Recorded::read(file).map_err(|error| wrong(&error))?;
         recorded.between(args.from, args.to.unwrap_or(f64::INFINITY)).map_err(|error| wrong(&error))
     };
+    let out = args.stem();
+    if !args.by_entity {
+        check_place(&out)?;
+    }
     let recorded = read(&args.recording)?;
     let against = args.against.as_deref().map(read).transpose()?;
-    let out = args.out.clone().unwrap_or_else(|| args.recording.with_extension(""));
     let finger = |recorded: &Recorded| recorded.choose(args.finger.as_deref()).map_err(|error| wrong(&error));
     if args.objects {
         let others = against.as_ref().map(|against| (against, &*against.bodies));
@@ -96,6 +100,26 @@ pub fn execute(args: &PlotArgs) -> Result<Stop, RunFailure> {
         write(&of_entity(visit, other), &out.join(&visit.entity), args.svg_only)?;
     }
     Ok(Stop::Finished)
+}
+
+impl PlotArgs {
+    /// Where pictures go, without the ending, which says what they are and not where.
+    fn stem(&self) -> PathBuf {
+        let Some(out) = &self.out else { return self.recording.with_extension("") };
+        let is_picture = |ending: &OsStr| ending == "svg" || ending == "png";
+        if out.extension().is_some_and(is_picture) { out.with_extension("") } else { out.clone() }
+    }
+}
+
+/// Before the work, not after it.
+fn check_place(stem: &Path) -> Result<(), RunFailure> {
+    let directory = stem.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    tempfile::tempfile_in(directory).map(drop).map_err(|error| {
+        let place = directory.display();
+        RunFailure::Start(format!(
+            "cannot write pictures into {place}: {error}; name another place with --out"
+        ))
+    })
 }
 
 fn write(figure: &Figure, stem: &Path, svg_only: bool) -> Result<Stop, RunFailure> {

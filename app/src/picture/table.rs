@@ -25,7 +25,7 @@ pub(super) struct Table {
 }
 
 enum Rows {
-    Csv(CsvTable),
+    Csv(Box<CsvTable>),
     Run(Box<RecordedRun>),
     Parquet(Box<RowIter<'static>>),
 }
@@ -54,7 +54,7 @@ impl Table {
             (columns, Rows::Parquet(Box::new(rows)))
         } else {
             let (columns, rows) = CsvTable::open(file).map_err(|source| unreadable(file, source))?;
-            (columns, Rows::Csv(rows))
+            (columns, Rows::Csv(Box::new(rows)))
         };
         Ok(Self { file: file.into(), columns, rows, read: 0 })
     }
