@@ -65,16 +65,16 @@ impl<'e> FreePlaces<'e> {
     pub(super) fn is_free(&mut self, place_W: &Vector3<f64>, beside_m: f64) -> bool {
         let beside =
             [-1.0, 1.0].into_iter().flat_map(|side| (0..3).map(move |axis| Vector3::ith(axis, side)));
-        let all = std::iter::once(Vector3::zeros()).chain(beside);
-        all.into_iter().all(|way| self.touched(&(place_W + beside_m * way)).next().is_none())
+        let mut all = std::iter::once(Vector3::zeros()).chain(beside);
+        all.all(|way| self.touched(&(place_W + beside_m * way)).next().is_none())
     }
 
     /// The free place that is nearest to this one, to some hundredths of the way; `None`: there is none within metres.
     pub(super) fn nearest(&mut self, wanted_W: &Vector3<f64>) -> Option<Vector3<f64>> {
         let mut radius_m = FIRST_M;
         while radius_m < LAST_M {
-            let on_sphere = (0..DIRECTIONS).map(direction);
-            let free = on_sphere.into_iter().find(|way| self.is_free(&(wanted_W + radius_m * way), BESIDE_M));
+            let mut on_sphere = (0..DIRECTIONS).map(direction);
+            let free = on_sphere.find(|way| self.is_free(&(wanted_W + radius_m * way), BESIDE_M));
             if let Some(way) = free {
                 return Some(self.back(wanted_W, &way, radius_m));
             }
