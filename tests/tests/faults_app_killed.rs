@@ -234,9 +234,9 @@ fn the_amplifiers_get_zero_within_nine_values_of_the_last_reply_at_the_usual_set
         // Killed, its lease ends as well, if the driver hears of it in time; stopped, only its age tells.
         let is_kill = round % 2 == 0;
         if is_kill {
-            app.kill()
+            app.kill();
         } else {
-            app.signal(Signal::STOP)
+            app.signal(Signal::STOP);
         }
         log.follow(stand.view(), "silence", |told| {
             told.len() > 40 && told[told.len() - 40..].iter().all(|told| !told.is_pushing())

@@ -60,7 +60,7 @@ fn check_ended(stand: &Stand, when: &str) {
 }
 
 /// What a test left of a driver that may hang: it is killed.
-fn put_away(stand: Stand) {
+fn put_away(stand: &Stand) {
     if stand.driver.id() > 0 {
         let _ = rustix::process::Pid::from_raw(stand.driver.id().cast_signed())
             .map(|pid| rustix::process::kill_process(pid, Signal::KILL));
@@ -143,7 +143,7 @@ fn a_driver_whose_terminal_is_held_is_stopped_all_the_same() {
     check_stopped(&stand, FaultReason::EmergencyStop, "a stop with the terminal held");
     stand.driver.signal(Signal::TERM);
     check_ended(&stand, "SIGTERM with the terminal held");
-    put_away(stand);
+    put_away(&stand);
 }
 
 /// A pushing driver whose service is harmed in each call of this name. Returns nothing if no life brings that call.
@@ -163,7 +163,7 @@ fn harmed(call: &str, harm: Harm, process: &str) -> Option<(Stand, Tracer, Comma
             std::thread::sleep(Duration::from_millis(1));
         }
     }
-    put_away(stand);
+    put_away(&stand);
     None
 }
 
@@ -225,7 +225,7 @@ fn whatever_call_the_service_is_stuck_in_a_datagram_and_a_signal_stop_the_motors
         stand.driver.signal(Signal::TERM);
         check_ended(&stand, &when);
         drop((tracer, commander));
-        put_away(stand);
+        put_away(&stand);
     }
     assert!(stuck * 2 > calls.len(), "{stuck} of {}", calls.len());
 }
@@ -238,7 +238,7 @@ fn whatever_call_the_service_is_stuck_in_the_first_signal_ends_the_loop() {
         stand.driver.signal(Signal::TERM);
         check_ended(&stand, &format!("SIGTERM while stuck in {call}"));
         drop((tracer, commander));
-        put_away(stand);
+        put_away(&stand);
     }
 }
 
@@ -252,7 +252,7 @@ fn whatever_call_the_service_is_stuck_in_the_loop_stops_the_motors_by_itself() {
         stand.amplifiers.settle();
         stand.amplifiers.check_off(&when);
         drop((tracer, commander));
-        put_away(stand);
+        put_away(&stand);
     }
 }
 
@@ -273,6 +273,6 @@ fn whatever_call_of_the_service_fails_the_motors_can_be_stopped_or_are_off() {
             check_ended(&stand, &when);
         }
         drop((tracer, commander));
-        put_away(stand);
+        put_away(&stand);
     }
 }

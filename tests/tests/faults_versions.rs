@@ -93,7 +93,8 @@ fn end_with(liar: &Liar) -> End {
 
 #[test]
 fn an_app_that_meets_a_driver_whose_header_cannot_be_starts_nothing_and_says_what_it_found() {
-    let lies: [(fn(&DriverHeader), &str); 4] = [
+    type Lie = (fn(&DriverHeader), &'static str);
+    let lies: [Lie; 4] = [
         (|header| header.period_ns.store(0, Ordering::Relaxed), "period in nanoseconds: 0, expected 1 to"),
         (
             |header| header.reply_budget_ns.store(0, Ordering::Relaxed),
@@ -111,7 +112,8 @@ fn an_app_that_meets_a_driver_whose_header_cannot_be_starts_nothing_and_says_wha
 
 #[test]
 fn a_run_ends_with_words_when_its_driver_tells_what_cannot_be() {
-    let lies: [(fn(&mut Frame), &str); 6] = [
+    type Lie = (fn(&mut Frame), &'static str);
+    let lies: [Lie; 6] = [
         (|frame| frame.tick = 5, "its ticks go back: found tick 5 after"),
         (|frame| frame.tick += 1 << 40, "its ticks jump: found tick"),
         (|frame| frame.deadline_ns = u64::MAX, "comes from the future"),

@@ -5,7 +5,7 @@ use shm_abi::handshake::{Request, RequestKind};
 use std::collections::VecDeque;
 use std::io::Write;
 use std::os::unix::net::UnixStream;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
@@ -29,7 +29,7 @@ impl Flood {
         let (stop, attempts) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::new(0)));
         let thread = |_| {
             let (socket, stop, attempts) = (socket.to_path_buf(), Arc::clone(&stop), Arc::clone(&attempts));
-            std::thread::spawn(move || attack(socket, per_second / THREADS, &stop, &attempts))
+            std::thread::spawn(move || attack(&socket, per_second / THREADS, &stop, &attempts))
         };
         let threads = (0..THREADS).map(thread).collect();
         Self { stop, attempts, threads }
@@ -48,8 +48,8 @@ impl Drop for Flood {
     }
 }
 
-fn attack(socket: PathBuf, per_second: u64, stop: &AtomicBool, attempts: &AtomicU64) {
-    let address = SocketAddrUnix::new(&socket).expect("a short name");
+fn attack(socket: &Path, per_second: u64, stop: &AtomicBool, attempts: &AtomicU64) {
+    let address = SocketAddrUnix::new(socket).expect("a short name");
     let mut kept = VecDeque::new();
     let (begun, mut made) = (Instant::now(), 0);
     while !stop.load(Ordering::Relaxed) {

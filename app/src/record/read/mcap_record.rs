@@ -65,8 +65,11 @@ pub(super) fn parse(opcode: u8, body: &[u8]) -> Option<McapRecord<'_>> {
     })
 }
 
+/// A record's opcode and its content.
+pub(super) type RawRecord<'a> = (u8, &'a [u8]);
+
 /// The first record in the content of a chunk, and what is behind it; `None` if it is cut.
-pub(super) fn split_record(bytes: &[u8]) -> Option<((u8, &[u8]), &[u8])> {
+pub(super) fn split_record(bytes: &[u8]) -> Option<(RawRecord<'_>, &[u8])> {
     let mut fields = Fields(bytes);
     let [opcode] = fields.array()?;
     let body = fields.long_bytes()?;
