@@ -5,7 +5,7 @@
 //! `eprintln!` panics when the write fails: whoever kills the `tee` behind `io-driver run 2>&1 | tee log`, or
 //! fills the disk under a log, would take the driver with it, motors on. And a write waits for as long as the other
 //! end likes: a terminal held by Ctrl-S, a pipe that nobody drains. So a driver that runs only queues its lines, and
-//! [`log_thread`](crate::log_thread) writes them.
+//! `log_thread` writes them.
 //! Invariant: once the log's thread is there, [`say`] never waits; a line that finds the queue full is counted.
 
 use rt_core::plain_text::Plain;

@@ -4,7 +4,7 @@
 //! fingertip goes.
 //! Model: what devices go by follows the camera. A leading pose goes straight to where the camera is, so fast that no
 //! fingertip is carried faster than [`MOST_SPEED_M_S`]; the carriage itself follows that by a low-pass with the time
-//! [`FOLLOWING_S`], so that its speed changes by no more than [`MOST_ACCELERATION_M_S2`]. A finger that touches feels k times
+//! `FOLLOWING_S`, so that its speed changes by no more than [`MOST_ACCELERATION_M_S2`]. A finger that touches feels k times
 //! the way of a tick more in each tick, at most.
 //! Invariant: no allocation after `new`.
 
