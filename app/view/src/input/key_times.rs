@@ -167,8 +167,8 @@ mod tests {
             let arrived_ns = happened_ns + delay_us * 1000;
             let told_ns = clock.time_ns(server_ms, arrived_ns);
             assert!(told_ns <= arrived_ns && told_ns >= happened_ns, "{k}");
-            // The least delay, and what clocks may drift in 60 ms.
-            assert!(told_ns - happened_ns <= 200_000 + 6_000, "{k}: {}", told_ns - happened_ns);
+            // The least delay, and what clocks may drift until the third event arrived, after 80 ms.
+            assert!(told_ns - happened_ns <= 200_000 + 8_000, "{k}: {}", told_ns - happened_ns);
             assert!(told_ns > last);
             last = told_ns;
         }
