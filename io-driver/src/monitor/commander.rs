@@ -1,8 +1,8 @@
 //! Which process commands a driver, found without asking the driver.
 //!
 //! Problem: the driver tells a lease's holder only to somebody who wants the lease, and an observer wants nothing.
-//! Model: each lease has a commander's segment of its own, which the driver maps read-only and its holder writable. So
-//! the process with a writable mapping of the same inode is it. Processes of other users, and a driver that was
+//! Model: each lease has a commander's segment of its own, which nobody maps but the driver and its holder. So the
+//! other process with a mapping of the same inode is it. Processes of other users, and a driver that was
 //! started with more rights than ours, do not show their mappings: then nobody is found.
 //! Cost: reads `/proc/*/maps`, some milliseconds, hence once a lease and a few times more if that finds nobody.
 
@@ -49,26 +49,26 @@ impl CommanderWatch {
 }
 
 fn find(driver_pid: u64) -> Option<Commander> {
-    let mut inodes: Vec<String> = commander_segments(driver_pid, "r--s");
+    let mut inodes = commander_segments(driver_pid);
     inodes.dedup();
     // Two: a lease ends just now.
     let [inode] = &inodes[..] else { return None };
     let processes = fs::read_dir("/proc").ok()?.flatten();
     let pids = processes.filter_map(|entry| entry.file_name().to_str()?.parse().ok());
     // A process that it forked has the mapping too, and came later.
-    let pid = pids.filter(|pid| commander_segments(*pid, "rw-s").contains(inode)).min()?;
+    let others = pids.filter(|pid| *pid != driver_pid);
+    let pid = others.filter(|pid| commander_segments(*pid).contains(inode)).min()?;
     let name = fs::read_to_string(format!("/proc/{pid}/comm")).unwrap_or_default();
     Some(Commander { pid, name: name.trim_end().into() })
 }
 
-/// Inodes of the commander's segments that a process has mapped this way.
-fn commander_segments(pid: u64, rights: &str) -> Vec<String> {
+/// Inodes of the commander's segments that a process has mapped.
+fn commander_segments(pid: u64) -> Vec<String> {
     let maps = fs::read_to_string(format!("/proc/{pid}/maps")).unwrap_or_default();
     // Addresses, rights, offset, device, inode, name.
     let inode = |line: &str| {
         let words: Vec<&str> = line.split_ascii_whitespace().collect();
-        let is_one = words.get(1) == Some(&rights) && words.get(5) == Some(&"/memfd:phantom3-commander");
-        is_one.then(|| words[4].to_owned())
+        (words.get(5) == Some(&"/memfd:phantom3-commander")).then(|| words[4].to_owned())
     };
     maps.lines().filter_map(inode).collect()
 }
