@@ -347,8 +347,10 @@ fn a_recording_that_cannot_be_made_or_would_destroy_an_input_is_refused() {
     place.write("own.csv", HAND);
     place.write("layout.toml", "");
     std::os::unix::fs::symlink(&scene, place.path("symbolic.csv")).expect("a link");
+    std::os::unix::fs::symlink(place.path("layout.toml"), place.path("layout.csv")).expect("a link");
+    std::fs::create_dir(place.path("folder.csv")).expect("a directory");
     std::fs::hard_link(place.path("own.csv"), place.path("hard.csv")).expect("a link");
-    let long = "n".repeat(300);
+    let long = format!("{}.csv", "n".repeat(300));
     for clock in CLOCKS {
         let onto = |record: &str, more: &[&str]| {
             refused(&place, &[&["run", "named.toml", "--clock", clock, "--record", record], more].concat())
@@ -357,17 +359,18 @@ fn a_recording_that_cannot_be_made_or_would_destroy_an_input_is_refused() {
             &onto("none/out.csv", &[]),
             &["none/out.csv", "No such file or directory", "a directory that exists"],
         );
-        assert_says(&onto(".", &[]), &["cannot create the recording .", "Is a directory"]);
+        assert_says(&onto("folder.csv", &[]), &["cannot create the recording folder.csv", "Is a directory"]);
         assert_says(&onto("", &[]), &["a value is required for '--record"]);
         assert_says(&onto("own.csv/out.csv", &[]), &["own.csv/out.csv", "Not a directory"]);
         assert_says(&onto(&long, &[]), &["too long"]);
-        assert_says(&onto("named.toml", &[]), &["overwrite the input named.toml", "name another"]);
-        assert_says(&onto("./named.toml", &[]), &["overwrite the input named.toml"]);
-        assert_says(&onto("symbolic.csv", &[]), &["overwrite the input named.toml"]);
+        for ending in [".", "named.toml", "./named.toml"] {
+            assert_says(&onto(ending, &[]), &[ending, " ending", "allowed: .csv"]);
+        }
+        assert_says(&onto("symbolic.csv", &[]), &["overwrite the input named.toml", "name another"]);
         assert_says(&onto("own.csv", &[]), &["overwrite the input", "own.csv", "name another"]);
         assert_says(&onto("hard.csv", &[]), &["overwrite the input", "own.csv"]);
         assert_says(&onto("hand.csv", &["--hand", "hand.csv"]), &["overwrite the input hand.csv"]);
-        assert_says(&onto("layout.toml", &["--layout", "layout.toml"]), &["overwrite the input layout.toml"]);
+        assert_says(&onto("layout.csv", &["--layout", "layout.toml"]), &["overwrite the input layout.toml"]);
     }
 }
 
