@@ -109,9 +109,13 @@ fn a_driver_whose_standard_error_is_full_is_stopped_over_the_socket_and_by_datag
     for _ in 0..1200 {
         client::emergency_stop(&stand.socket(), "test").expect("it is heard");
     }
-    client::clear_fault(&stand.socket(), "test").expect("it is heard");
     wait_for("dropped lines", || {
         stand.view().counters.log_dropped.load(std::sync::atomic::Ordering::Relaxed) > 0
+    });
+    wait_for("the end of the fault", || {
+        // A stop that is still on its way outlasts a request to leave the fault.
+        client::clear_fault(&stand.socket(), "test").expect("it is heard");
+        stand.view().read_latest().is_some_and(|frame| frame.fault == FaultReason::None as u64)
     });
     let _commander = push(&stand);
     stand.driver.signal(Signal::TERM);

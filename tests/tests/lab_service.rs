@@ -152,7 +152,7 @@ fn limits_kernel_settings_and_blacklist_keep_to_their_grammar() {
     assert_eq!(limits, [["@phantom3", "-", "rtprio", "95"], ["@phantom3", "-", "memlock", "unlimited"]]);
     for line in lines("/etc/sysctl.d/70-phantom3.conf") {
         let [key, equals, value] = &line[..] else { panic!("{line:?}") };
-        assert!(key.starts_with("-kernel.") || key.starts_with("-vm."), "{key}");
+        assert!(key.starts_with("kernel.") || key.starts_with("vm."), "{key}");
         assert!(equals == "=" && value.parse::<i64>().is_ok(), "{line:?}");
     }
     assert_eq!(lines("/etc/modprobe.d/phantom3.conf"), [["blacklist", "phantom"]]);
