@@ -98,17 +98,27 @@ impl Service<'_> {
             rt_core::last_act::perform();
         }
         self.count_what_the_log_dropped();
+        let end = served.and_then(|reason| self.write_last_words(thread, has_ended, &reason));
+        // Whoever waits for the end reads the last words when its connection closes.
         tidy_up(self.server, self.stop_file, self.options);
-        let reason = served?;
+        end
+    }
+
+    fn write_last_words(
+        &self,
+        thread: JoinHandle<Ended>,
+        has_ended: bool,
+        reason: &str,
+    ) -> Result<(), RunError> {
+        let tick = TICK.load(Ordering::Relaxed);
+        let epitaph = EpitaphRef::new(&self.memory.epitaph);
         if !has_ended {
-            let tick = TICK.load(Ordering::Relaxed);
-            EpitaphRef::new(&self.memory.epitaph).write(EpitaphKind::Fault, tick, HUNG);
+            epitaph.write(EpitaphKind::Fault, tick, HUNG);
             return Err(RunError::Hung(tick));
         }
         match thread.join() {
             Ok(Ended::Stopped) => {
-                let tick = TICK.load(Ordering::Relaxed);
-                EpitaphRef::new(&self.memory.epitaph).write(EpitaphKind::Stopped, tick, &reason);
+                epitaph.write(EpitaphKind::Stopped, tick, reason);
                 say(self.options, format_args!("stopped in tick {tick}: {reason}; motors were written zero"));
                 Ok(())
             }

@@ -65,6 +65,16 @@ impl Driver {
         }
     }
 
+    /// Attaches as the commander, and waits until the driver's loop obeys the lease.
+    pub fn command_in_force(&self) -> Attachment {
+        let attachment = self.command();
+        let lease = attachment.commander.as_ref().expect("a commander's memory").lease();
+        patience::until("the lease is in force", || {
+            attachment.driver.read_latest().is_some_and(|frame| frame.lease == lease)
+        });
+        attachment
+    }
+
     /// Looks on.
     pub fn observe(&self) -> Attachment {
         client::observe(&self.socket, "test").expect("an observer's place")

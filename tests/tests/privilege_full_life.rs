@@ -52,7 +52,7 @@ fn live(driver: &mut Driver) {
     let mut log = RingLog::begin(&observer.driver);
     for _ in 0..100 {
         drop(driver.observe());
-        drop(driver.command());
+        drop(driver.command_in_force());
     }
     let commander = Commander::start(driver.command(), [0.0, 3.0, 0.0]);
     log.follow_to_force(&observer.driver);

@@ -40,7 +40,7 @@ fn threads_of(pid: u32) -> Vec<Status> {
 
 fn check_rights(driver: &Driver) {
     let threads = threads_of(driver.child.id());
-    assert_eq!(threads.len(), 2, "the loop and the service: {threads:?}");
+    assert_eq!(threads.len(), 4, "the loop, the service, the log and the stop: {threads:?}");
     for status in threads {
         for set in ["CapInh", "CapPrm", "CapEff", "CapAmb"] {
             assert_eq!(status[set], "0000000000000000", "{set} of {}", status["Name"]);
@@ -61,7 +61,7 @@ fn check_rights(driver: &Driver) {
 fn check_leases(driver: &Driver, count: u64) {
     let observer = driver.observe();
     for _ in 0..count {
-        drop(driver.command());
+        drop(driver.command_in_force());
     }
     let _commander = Commander::start(driver.command(), [0.0, 3.0, 0.0]);
     let mut log = RingLog::begin(&observer.driver);
