@@ -102,8 +102,8 @@ fn a_lease_that_ends_before_it_began_is_forgotten() {
     assert!(bench.cycle.end_lease(1).is_none());
     let _second = bench.lease(2);
     assert!(bench.cycle.end_lease(2).is_some(), "handed back for dropping");
-    assert_eq!(bench.silent_tick().0.lease, 1, "its force ramps out");
-    assert_eq!(bench.cycle.lease().map(CommanderView::lease), Some(1));
+    assert_eq!(bench.silent_tick().0.lease, 0, "nobody commands");
+    assert_eq!(bench.cycle.lease().map(CommanderView::lease), Some(1), "its force ramps out");
 }
 
 #[test]

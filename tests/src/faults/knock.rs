@@ -1,6 +1,7 @@
 //! Clients that a driver's socket must not be hurt by: of other versions, with other manners, too many.
 
 use bytemuck::Zeroable;
+use rustix::net::{AddressFamily, SocketAddrUnix, SocketFlags, SocketType, connect, socket_with};
 use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
 use shm_abi::{ABI_MAJOR, ABI_MINOR, ABI_VERSION, LAYOUT_HASH};
 use std::io::{self, Read, Write};
@@ -85,8 +86,7 @@ pub fn crowd(socket: &Path, clients: usize) -> Vec<UnixStream> {
     let bytes = bytemuck::bytes_of(&observe);
     let mut crowd = Vec::new();
     for index in 0..clients {
-        let Ok(mut stream) = UnixStream::connect(socket) else { continue };
-        let _ = stream.set_nonblocking(true);
+        let Ok(mut stream) = connect_at_once(socket) else { continue };
         // Whether it is heard is the driver's affair.
         let _ = match index % 4 {
             0 => Ok(()),
@@ -97,4 +97,13 @@ pub fn crowd(socket: &Path, clients: usize) -> Vec<UnixStream> {
         crowd.push(stream);
     }
     crowd
+}
+
+/// Does not wait where the queue of newcomers is full, as that of a stopped driver.
+fn connect_at_once(socket: &Path) -> io::Result<UnixStream> {
+    let address = SocketAddrUnix::new(socket)?;
+    let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
+    let stream = socket_with(AddressFamily::UNIX, SocketType::STREAM, flags, None)?;
+    connect(&stream, &address)?;
+    Ok(stream.into())
 }
