@@ -244,8 +244,11 @@ fn a_c_program_is_told_what_a_driver_of_an_older_version_does_not_know_and_who_m
             hear(&mut stream);
             send(&stream, bytemuck::bytes_of(&answer), &[]);
         });
-        let output =
-            std::process::Command::new(program).arg(&socket).args(["ask", "end-lease"]).bounded_output().unwrap();
+        let output = std::process::Command::new(program)
+            .arg(&socket)
+            .args(["ask", "end-lease"])
+            .bounded_output()
+            .unwrap();
         serving.bounded_join().unwrap();
         assert_eq!(
             (output.status.code(), String::from_utf8_lossy(&output.stderr).as_ref()),
