@@ -25,7 +25,7 @@ use rt_core::periodic::{Periodic, PeriodicConfig};
 use rt_core::signals::StopSignals;
 use shm_abi::doorbell::WaitMode;
 use shm_abi::segment::ClockMode;
-use shm_abi::{DriverState, FaultReason, MAX_DEVICES};
+use shm_abi::{CommanderView, DriverState, FaultReason, MAX_DEVICES};
 use std::hint::spin_loop;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -283,21 +283,25 @@ impl RealLoop {
         }
     }
 
-    /// In lockstep a tick has no other end than the reply, the end of the lease or of the driver, or a fault: the frame
-    /// after it tells.
+    /// In lockstep a tick has no other end than the reply, the end of the driver, a fault, or the end of the lease that
+    /// its frame tells: the frame after it tells the next one, whose holder waits for it.
     fn wait_without_limit(&mut self) {
-        let fault = self.cycle.safety().fault();
-        while !self.cycle.take_reply() && !self.is_stopping() && self.cycle.safety().fault() == fault {
+        let asked = self.asked();
+        while !self.cycle.take_reply() && !self.is_stopping() && self.asked() == asked {
             self.sleep_for_reply(NAP);
             self.collect_mail(self.lockstep_tick);
         }
     }
 
+    /// Whose reply a tick in lockstep waits for, and under which fault.
+    fn asked(&self) -> (Option<u64>, FaultReason) {
+        (self.cycle.lease().map(CommanderView::lease), self.cycle.safety().fault())
+    }
+
     /// The same where the motors are written already: the next tick's shall have a reply.
     fn wait_until_answered(&mut self, tick: u64) {
-        let fault = self.cycle.safety().fault();
-        let goes_on = |this: &Self| !this.is_stopping() && this.cycle.safety().fault() == fault;
-        while self.cycle.lease().is_some() && goes_on(self) {
+        let asked = self.asked();
+        while self.cycle.lease().is_some() && !self.is_stopping() && self.asked() == asked {
             self.cycle.take_reply();
             if self.cycle.seen_reply() == Some(tick) {
                 return;
