@@ -1,4 +1,4 @@
-//! What waking the commander costs the driver's loop while observers crowd the doorbell that all share.
+//! Cost to the driver's loop of waking the commander while observers crowd the doorbell that all share.
 //!
 //! Run `cargo bench -p shm-abi --bench wake`. `everybody` is the way of before 1.3, still in force from the commander
 //! to the driver: whoever sleeps on the shared bell is woken. `own word` is today's. Both take turns within one run; the

@@ -1,4 +1,4 @@
-//! Who is at the other end of a Unix socket, as the kernel tells: user, groups, process.
+//! Credentials of the other end of a Unix socket, as the kernel tells: user, groups, process.
 //!
 //! Model: a connection keeps the credentials that its client had when it connected (SO_PEERCRED, SO_PEERGROUPS). Its
 //! process is held by a descriptor (SO_PEERPIDFD, else pidfd_open(2)), which no other process can inherit by getting

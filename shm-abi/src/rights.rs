@@ -1,4 +1,4 @@
-//! Who may look, command and administer, among those who can reach the driver's socket.
+//! Rights to look, command and administer, among those who can reach the driver's socket.
 //!
 //! Model: three rights, each of which includes those before it, and for each the group that has it. A right without a
 //! group of its own belongs to whoever has the one before; to look belongs to whoever can connect. Root and the

@@ -1,4 +1,4 @@
-//! What `run --help` says below the options: orders and examples.
+//! Help of `run` below its options: orders and examples.
 
 /// Orders, files and examples.
 pub(super) const RUN_HELP: &str = "\

@@ -1,4 +1,4 @@
-//! Where the fingers of a hand that people move begin.
+//! Start positions of the fingers of a hand that people move.
 //!
 //! Model: where the scene says, if that is free; else at the nearest [free place](super::free_place). Fingers of which the
 //! scene says nothing stand as an open hand does: around the others, or over what is in the scene.

@@ -1,4 +1,4 @@
-//! What the application reads: recordings, orders, and whole scenes that are made ready to run.
+//! Fuzz targets of the application: recordings, orders, and whole scenes that are made ready to run.
 
 use crate::check_message;
 use phantom3::control::words;

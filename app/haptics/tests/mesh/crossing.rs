@@ -1,4 +1,4 @@
-//! Where a slide crosses an edge, beside the same geometry with twice the digits.
+//! Crossing points of slides and edges, beside the same geometry with twice the digits.
 //!
 //! Over the ridge of a roof the god-object is drawn from where it crosses the edge to the rim of the circle around the HIP's
 //! foot on the other side: the rim shows where it crossed.

@@ -1,4 +1,4 @@
-//! What the installed unit sets at each boot: the plan restarts it instead of doing the same beside it.
+//! Settings that the installed unit makes at each boot: the plan restarts it instead of doing the same beside it.
 
 use super::super::machine::{Machine, one_line};
 use super::super::step::{Action, Step};

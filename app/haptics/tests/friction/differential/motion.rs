@@ -1,4 +1,4 @@
-//! How a finger is drawn: pieces of even speed, which begin and end with a tick at every rate.
+//! Scripted motion of a finger: pieces of even speed, which begin and end with a tick at every rate.
 
 /// No round numbers: what would come to lie on the very rim of a circle would be decided by rounding. Speeds are multiplied by this.
 pub(crate) const UNEVEN: f64 = 1.0173;

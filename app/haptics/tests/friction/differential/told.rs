@@ -1,4 +1,4 @@
-//! What a finger tells a law in each tick, from a law that writes it down.
+//! Inputs of a friction law in each tick, recorded by a law that writes them down.
 
 use super::ground::{Drawn, GROUNDS, Ground};
 use crate::common::{DEPTH, K, point_finger, table};
