@@ -133,7 +133,8 @@ mod tests {
                 .recv_timeout(std::time::Duration::from_millis(1))
                 .is_err_and(|e| e == std::sync::mpsc::RecvTimeoutError::Timeout)
             {
-                drop(std::hint::black_box(vec![1_u8; 4 << 20]));
+                // A page of its own: an allocator would hand out again what was touched before.
+                memmap2::MmapMut::map_anon(1).unwrap()[0] = 1;
             }
         };
         let thread = std::thread::Builder::new().name("sleepy".into()).spawn(body).unwrap();
@@ -141,7 +142,8 @@ mod tests {
         let (sleeps, faults) = (seen.sleeps(), seen.page_faults());
         let begun = Instant::now();
         while seen.sleeps() < sleeps + 10 || seen.page_faults().minor < faults.minor + 10 {
-            assert!(begun.elapsed() < crate::driver::HANG);
+            assert!(begun.elapsed() < crate::driver::HANG, "{} sleeps, {:?}", seen.sleeps(), seen.page_faults());
+            std::thread::yield_now();
         }
         drop(stop);
         thread.bounded_join().unwrap();
