@@ -142,7 +142,12 @@ mod tests {
         let (sleeps, faults) = (seen.sleeps(), seen.page_faults());
         let begun = Instant::now();
         while seen.sleeps() < sleeps + 10 || seen.page_faults().minor < faults.minor + 10 {
-            assert!(begun.elapsed() < crate::driver::HANG, "{} sleeps, {:?}", seen.sleeps(), seen.page_faults());
+            assert!(
+                begun.elapsed() < crate::driver::HANG,
+                "{} sleeps, {:?}",
+                seen.sleeps(),
+                seen.page_faults()
+            );
             std::thread::yield_now();
         }
         drop(stop);
