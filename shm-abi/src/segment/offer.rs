@@ -11,7 +11,8 @@
 //!
 //! Invariant: after [`LeaseOffer::seal`] no page of the segment can be taken away.
 
-use super::{CommanderView, SegmentError, seal};
+use super::mapping::seal;
+use super::{CommanderView, SegmentError};
 use crate::handshake;
 use rustix::fs::SealFlags;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
