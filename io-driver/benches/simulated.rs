@@ -21,7 +21,7 @@ fn device(rate_hz: u32, hand: &str) -> Box<dyn Device> {
 }
 
 fn tick(device: &mut dyn Device, tick: u64, rate_hz: u32) {
-    let time = TickTime { tick, period_ns: 1_000_000_000 / u64::from(rate_hz), run_tick: tick.cast_signed() };
+    let time = TickTime::counted(tick, 1_000_000_000 / u64::from(rate_hz), tick.cast_signed());
     black_box(device.read(time).expect("it is in order"));
     let effort = Effort { force_on_user_n: Vector3::new(0.3, 0.9, -0.3), gravity_share: 1.0 };
     black_box(device.write(black_box(effort)).expect("it is in order"));

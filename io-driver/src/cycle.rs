@@ -220,7 +220,12 @@ impl Cycle {
         self.started_ns = monotonic_ns();
         self.deadline_ns = deadline_ns;
         let elapsed = self.read_clock.pass(tick, deadline_ns, self.started_ns);
-        let time = TickTime { tick, period_ns: self.period_ns, run_tick: self.safety.run_tick(tick) };
+        let time = TickTime {
+            tick,
+            period_ns: self.period_ns,
+            time_ns: self.read_clock.time_ns(),
+            run_tick: self.safety.run_tick(tick),
+        };
         let answered = self.lease().and(self.reply.tick);
         self.zeros.begin_tick(tick, answered);
         let all_valid = self.read_devices(time, elapsed);

@@ -371,7 +371,7 @@ mod tests {
         );
         let config = DriverConfig::parse(&text, &directory.path().join("driver.toml")).unwrap();
         let device = &mut open_devices(&config).unwrap()[0];
-        device.read(TickTime { tick: 1, period_ns: 1_000_000, run_tick: 0 }).unwrap();
+        device.read(TickTime::counted(1, 1_000_000, 0)).unwrap();
         let effort = Effort { gravity_share: 1.0, ..Effort::default() };
         device.write(effort).unwrap().motor_codes
     }
@@ -447,7 +447,7 @@ mod tests {
             );
             let config = DriverConfig::parse(&text, &directory.path().join("driver.toml")).unwrap();
             let device = &mut open_devices(&config).unwrap()[0];
-            let reading = device.read(TickTime { tick: 1, period_ns: 1_000_000, run_tick: -1 }).unwrap();
+            let reading = device.read(TickTime::counted(1, 1_000_000, -1)).unwrap();
             assert!(reading.is_orientation_measured && device.extras().orientation, "{holder}");
         }
     }
@@ -455,7 +455,7 @@ mod tests {
     #[test]
     fn a_switch_on_an_ideal_device_needs_a_script_with_buttons() {
         let devices = switched("t,f0_x,f0_y,f0_z,f0_buttons\n0,0,0,0,8\n");
-        let time = TickTime { tick: 1, period_ns: 1_000_000, run_tick: 0 };
+        let time = TickTime::counted(1, 1_000_000, 0);
         assert_eq!(devices.unwrap()[0].read(time).unwrap().buttons, 8);
         let Err(refused) = switched("t,f0_x,f0_y,f0_z\n0,0,0,0\n") else { panic!("opened") };
         let message = refused.to_string();

@@ -22,7 +22,8 @@
 //! velocity only if they differ, and the cost stays what it is at 2 kHz.
 //! Units: `places` in counts and velocities in counts per second, or both in metres.
 //! Invariants: with a tolerance of zero it is the plain difference `(place - last place) / (ticks * period)`, bit for
-//! bit. Time is counted in ticks of the schedule, so that skipped ones do not make a movement look fast.
+//! bit: exact places are functions of the tick. Counts are taken at the time that the clock tells, so that deadlines
+//! that were skipped, made up for or moved do not make a movement look fast or slow.
 //! Cost: bounded by 61 blocks of readings and 13 fits: for three joints about 0.25 us at 1 kHz and
 //! 0.5 us from 2 kHz on; no allocation.
 //!
@@ -73,10 +74,10 @@ pub struct VelocityEstimator {
 /// The mean of the readings of some ticks.
 #[derive(Debug, Clone, Copy, Default)]
 struct Block {
-    first_tick: u64,
+    first_ns: u64,
     count: f64,
-    /// Mean of the ticks, after the first.
-    mean_tick: f64,
+    /// Mean of the times after the first (periods).
+    mean_time: f64,
     mean_places: [f64; 3],
 }
 
@@ -121,13 +122,13 @@ impl VelocityEstimator {
             self.forget();
         }
         let Some((last_tick, last)) = self.last.replace((tick, places)) else {
-            self.open.add(tick, places);
+            self.open.add(time, places);
             return [0.0; 3];
         };
         if self.tolerance > 0.0 {
             self.keep(time, places);
             let period_s = period_ns as f64 / 1e9;
-            return self.per_tick(time, places).map(|velocity| velocity / period_s);
+            return self.per_period(time, places).map(|velocity| velocity / period_s);
         }
         // As whoever reads the frames computes it, to the last bit.
         let elapsed_s = (tick - last_tick) as f64 * (period_ns as f64 / 1e9);
@@ -137,20 +138,19 @@ impl VelocityEstimator {
     /// Puts a reading where it belongs.
     fn keep(&mut self, time: TickTime, places: [f64; 3]) {
         let block_ticks = (BLOCK_NS / time.period_ns.max(1)).max(1);
-        if time.tick.saturating_sub(self.open.first_tick) >= block_ticks {
+        if time.time_ns.saturating_sub(self.open.first_ns) >= block_ticks * time.period_ns {
             self.newest = (self.newest + 1) % PLACES;
             self.blocks[self.newest] = self.open;
             self.filled = (self.filled + 1).min(PLACES);
             self.open = Block::default();
         }
-        self.open.add(time.tick, places);
+        self.open.add(time, places);
     }
 
     /// What all windows agree about, from the shortest to the longest that agrees with those before.
-    fn per_tick(&self, time: TickTime, places: [f64; 3]) -> [f64; 3] {
-        let (tick, window_ticks) = (time.tick, WINDOW_NS / time.period_ns.max(1));
+    fn per_period(&self, time: TickTime, places: [f64; 3]) -> [f64; 3] {
         let mut sums = Sums::default();
-        sums.add(&self.open, tick, places);
+        sums.add(&self.open, time, places);
         let mut common = [Interval::EVERYTHING; 3];
         let mut rungs = RUNGS.iter();
         let mut rung = rungs.next();
@@ -158,10 +158,10 @@ impl VelocityEstimator {
         let newest_first = newer.iter().rev().chain(older.iter().rev());
         for (back, block) in newest_first.take(self.filled).enumerate() {
             // The last one is taken however long ago it was: ticks were skipped then, and there is no other.
-            if back > 0 && tick.saturating_sub(block.first_tick) > window_ticks {
+            if back > 0 && time.time_ns.saturating_sub(block.first_ns) > WINDOW_NS {
                 break;
             }
-            sums.add(block, tick, places);
+            sums.add(block, time, places);
             if rung.is_some_and(|blocks| back + 2 == *blocks) {
                 rung = rungs.next();
                 if !sums.narrow(&mut common, self.tolerance) {
@@ -174,20 +174,25 @@ impl VelocityEstimator {
 }
 
 impl Block {
-    fn add(&mut self, tick: u64, places: [f64; 3]) {
+    fn add(&mut self, time: TickTime, places: [f64; 3]) {
         if self.count == 0.0 {
-            self.first_tick = tick;
+            self.first_ns = time.time_ns;
         }
         self.count += 1.0;
         let share = 1.0 / self.count;
-        self.mean_tick += (tick.saturating_sub(self.first_tick) as f64 - self.mean_tick) * share;
+        self.mean_time += (self.periods_until(time) - self.mean_time) * share;
         for (mean, place) in self.mean_places.iter_mut().zip(places) {
             *mean += (place - *mean) * share;
         }
     }
+
+    /// From its first reading to this time.
+    fn periods_until(&self, time: TickTime) -> f64 {
+        time.time_ns.saturating_sub(self.first_ns) as f64 / time.period_ns as f64
+    }
 }
 
-/// Velocities that a window allows, per tick.
+/// Velocities that a window allows, per period.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Interval {
     low: f64,
@@ -216,7 +221,7 @@ impl Interval {
     }
 }
 
-/// Moments of the blocks of a window: time `x` in ticks from now, place `y` from the newest one.
+/// Moments of the blocks of a window: time `x` in periods from now, place `y` from the newest one.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
     x: [f64; 5],
@@ -226,8 +231,8 @@ struct Sums {
 }
 
 impl Sums {
-    fn add(&mut self, block: &Block, tick: u64, places: [f64; 3]) {
-        let x = block.mean_tick - tick.saturating_sub(block.first_tick) as f64;
+    fn add(&mut self, block: &Block, time: TickTime, places: [f64; 3]) {
+        let x = block.mean_time - block.periods_until(time);
         let xx = x * x;
         for (sum, power) in self.x.iter_mut().zip([1.0, x, xx, x * xx, xx * xx]) {
             *sum += power;

@@ -33,7 +33,7 @@ fn open(device: &str) -> Box<dyn Device> {
 }
 
 fn time(tick: u64) -> TickTime {
-    TickTime { tick, period_ns: 1_000_000, run_tick: -1 }
+    TickTime::counted(tick, 1_000_000, -1)
 }
 
 /// A device whose counters stay at home for a tick and then are these.

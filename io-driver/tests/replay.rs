@@ -15,7 +15,7 @@ fn open() -> Box<dyn io_driver::device::Device> {
 }
 
 fn time(tick: u64) -> TickTime {
-    TickTime { tick, period_ns: PERIOD_NS, run_tick: -1 }
+    TickTime::counted(tick, PERIOD_NS, -1)
 }
 
 #[test]

@@ -29,7 +29,7 @@ const COUNT_M: f64 = 29.2e-6;
 const WINDOW_S: f64 = 30e-3;
 
 fn at(tick: u64, rate_hz: u64) -> TickTime {
-    TickTime { tick, period_ns: 1_000_000_000 / rate_hz, run_tick: 0 }
+    TickTime::counted(tick, 1_000_000_000 / rate_hz, 0)
 }
 
 #[test]
@@ -80,6 +80,26 @@ fn of_a_parabola_it_is_the_slope_now_also_where_ticks_are_skipped() {
             tick += if noise.uniform() < 0.05 { 3 } else { 1 };
             readings += 1;
         }
+    }
+}
+
+/// A grid that steps aside by 0.382 of a period, and a stall of 5.3 ms with five ticks that are made up for in 0.1 ms.
+#[test]
+fn ticks_that_come_late_or_in_a_burst_do_not_look_like_another_velocity() {
+    let (period_ns, counts_per_s) = (1_000_000, 5000.0);
+    let mut times_ns: Vec<u64> = (1..60).map(|tick| tick * period_ns).collect();
+    times_ns.extend((60..100).map(|tick| tick * period_ns + 382_000));
+    times_ns.extend((0..5).map(|made_up| 104_682_000 + 20_000 * made_up));
+    times_ns.extend((105..200).map(|tick| tick * period_ns + 382_000));
+    let mut estimator = VelocityEstimator::of_counts();
+    for (tick, time_ns) in (1..).zip(times_ns) {
+        let place = (counts_per_s * time_ns as f64 / 1e9).round();
+        let [found, ..] =
+            estimator.observe(TickTime { time_ns, ..TickTime::counted(tick, period_ns, 0) }, [place; 3]);
+        // After ten readings what is one count off in 5 ms, and what is in the 0.5 ms that the newest block may
+        // lie behind the blocks of a stall: no more than a count in the time between two readings.
+        let bound = 1.0 / 5e-3 + 1.0 / 1e-3;
+        assert!(tick < 10 || (found - counts_per_s).abs() < bound, "tick {tick} at {time_ns} ns: {found}");
     }
 }
 

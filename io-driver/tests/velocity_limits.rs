@@ -46,7 +46,7 @@ fn lead(
         let joints = course.arm.mechanism.inverse(Vector3::x() * way_m(time_s)).unwrap();
         let counts = course.map.angles_to_counts(joints);
         let raw = counts.map(|count| count + i64::from(jitters && noise.uniform() < 0.5));
-        let time = TickTime { tick, period_ns: 1_000_000_000 / rate_hz, run_tick: 0 };
+        let time = TickTime::counted(tick, 1_000_000_000 / rate_hz, 0);
         let reading = arm.read(raw, time);
         if see(tick, time_s, reading.position_m, reading.velocity_m_per_s) {
             return;

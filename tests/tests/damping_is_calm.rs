@@ -47,7 +47,7 @@ fn ripple(rate_hz: u64, knows_velocity: bool) -> (f64, f64) {
     for tick in 0..rate_hz / 2 {
         // The first pose is the home pose; the counters flicker from then on.
         let raw = if tick == 0 { [0; 3] } else { [coin.throw(), coin.throw(), coin.throw()] };
-        let reading = arm.read(raw, TickTime { tick, period_ns, run_tick: 0 });
+        let reading = arm.read(raw, TickTime::counted(tick, period_ns, 0));
         let velocity = knows_velocity.then_some(reading.velocity_m_per_s);
         let hip = Hip { position_W: reading.position_m, velocity_W: velocity };
         let force = finger.step(std::slice::from_ref(&wall), hip, period_ns as f64 / 1e9).force_on_user_W.y;
@@ -89,8 +89,7 @@ fn a_finger_that_presses_on_is_damped_as_its_speed_asks() {
     let (mut arm, mut finger) = (arm(), Finger::new(0.0, 1).unwrap().with_ramp_in(0.0).unwrap());
     for tick in 0..100 {
         // The upper arm sinks by five counts a tick, which is 146 mm/s.
-        let reading =
-            arm.read([0, -5 * tick, 0], TickTime { tick: tick as u64, period_ns: 1_000_000, run_tick: 0 });
+        let reading = arm.read([0, -5 * tick, 0], TickTime::counted(tick as u64, 1_000_000, 0));
         let hip = Hip { position_W: reading.position_m, velocity_W: Some(reading.velocity_m_per_s) };
         let force = finger.step(std::slice::from_ref(&wall), hip, 1e-3).force_on_user_W.y;
         let damper = force - STIFFNESS * (0.02 - reading.position_m.y);

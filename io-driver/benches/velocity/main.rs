@@ -86,7 +86,7 @@ fn call_ns(course: &Course, motion: usize, rate_hz: u32, estimator: &mut dyn riv
         let begun = Instant::now();
         for sample in &samples {
             let tick = round * samples.len() as u64 + sample.tick;
-            let time = TickTime { tick, period_ns, run_tick: 0 };
+            let time = TickTime::counted(tick, period_ns, 0);
             black_box(estimator.observe(time, sample.counts.map(|count| count as f64)));
         }
         begun.elapsed().as_nanos() as f64 / samples.len() as f64

@@ -30,7 +30,7 @@ pub(crate) fn estimate(
 ) -> Vec<(Vector3<f64>, Vector3<f64>)> {
     let rad_per_count = Vector3::from(course.map.rad_per_count());
     let one = |sample: &Sample| {
-        let time = TickTime { tick: sample.tick, period_ns, run_tick: 0 };
+        let time = TickTime::counted(sample.tick, period_ns, 0);
         let rates = estimator.observe(time, sample.counts.map(|count| count as f64));
         let joints = Vector3::from(rates).component_mul(&rad_per_count);
         (joints, course.arm.mechanism.jacobian(sample.joints_rad) * joints)

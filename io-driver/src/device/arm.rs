@@ -33,7 +33,7 @@ pub struct Arm {
     kinematics: Kinematics,
     drive: Drive,
     joints: [f64; 3],
-    last_tick: Option<u64>,
+    last_ns: Option<u64>,
 }
 
 impl Arm {
@@ -52,7 +52,7 @@ impl Arm {
             kinematics,
             drive: Drive::new(kinematics, &file.motors, file.heat, gravity),
             joints: file.encoders.home_joint_angles_rad,
-            last_tick: None,
+            last_ns: None,
         }
     }
 
@@ -69,16 +69,13 @@ impl Arm {
     /// The same with those of an instrumented gimbal, if they are there.
     pub fn read_with_gimbal(&mut self, raw: [i64; 3], gimbal: Option<[i64; 3]>, time: TickTime) -> Reading {
         let counts = self.extend(raw, gimbal);
-        match self.last_tick.replace(time.tick) {
+        match self.last_ns.replace(time.time_ns) {
             None => match self.zeroing {
                 Zeroing::AtStart => self.zero(),
                 Zeroing::Known => self.is_zeroed = true,
                 Zeroing::Ask => {}
             },
-            Some(last) => {
-                let elapsed = i64::try_from(time.tick.saturating_sub(last)).unwrap_or(i64::MAX);
-                self.drive.pass(super::run_time_s(elapsed, time.period_ns));
-            }
+            Some(last_ns) => self.drive.pass(time.time_ns.saturating_sub(last_ns) as f64 / 1e9),
         }
         let (joint_counts, gimbal_counts) = halves(counts);
         if self.is_zeroed {
@@ -128,7 +125,7 @@ impl Arm {
         let [d, e, f] = gimbal.unwrap_or([0; 3]);
         let counts = self.extender.extend([a, b, c, d, e, f]);
         let is_doubtful = |(now, before): (&i64, &i64)| now.abs_diff(*before) > self.doubtful_step;
-        if self.last_tick.is_some() && counts.iter().zip(&former).any(is_doubtful) {
+        if self.last_ns.is_some() && counts.iter().zip(&former).any(is_doubtful) {
             self.lose_zero();
         }
         counts
@@ -183,11 +180,29 @@ mod tests {
     }
 
     fn time(tick: u64) -> TickTime {
-        TickTime { tick, period_ns: 1_000_000, run_tick: -1 }
+        TickTime::counted(tick, 1_000_000, -1)
     }
 
     fn of(reading: &Reading) -> (bool, [i64; 6], [f64; 6]) {
         (reading.is_valid, reading.encoder_counts, reading.joint_angle_rad)
+    }
+
+    /// Three ticks in which 5 s went by, as after a stall that is made up for.
+    #[test]
+    fn motors_warm_by_the_time_that_passes_whatever_the_ticks() {
+        let effort = Effort { force_on_user_n: Vector3::y() * 6.0, gravity_share: 1.0 };
+        let heat_after = |times: &[TickTime]| {
+            let mut arm = arm(Zeroing::AtStart);
+            times.iter().fold(0.0, |_, time| {
+                arm.read([0; 3], *time);
+                arm.render(effort).unwrap().1.motor_heat
+            })
+        };
+        let stalled = [0, 4_990_000_000, 5_000_000_000];
+        let stalled = [0, 1, 2].map(|n| TickTime { time_ns: stalled[n], ..time(n as u64) });
+        let steady = [0, 4990, 5000].map(time);
+        assert_eq!(heat_after(&stalled), heat_after(&steady));
+        assert!(heat_after(&stalled) > heat_after(&[0, 1, 2].map(time)) + 0.1);
     }
 
     #[test]

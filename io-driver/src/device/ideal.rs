@@ -132,7 +132,7 @@ mod tests {
             speed_limit_m_per_s: f64::INFINITY,
         };
         let mut device = IdealDevice::new(info, base, Hand::Scripted(HandPlayer::new(script), finger));
-        device.read(TickTime { tick: 9, period_ns: 1_000_000, run_tick }).unwrap()
+        device.read(TickTime::counted(9, 1_000_000, run_tick)).unwrap()
     }
 
     #[test]

@@ -24,11 +24,18 @@ pub struct TickTime {
     pub tick: u64,
     /// Length of a tick (ns).
     pub period_ns: u64,
+    /// When it is (ns), from any origin: the time that has passed, also where ticks were late, skipped or made up for.
+    pub time_ns: u64,
     /// Ticks since a lease first had full authority; negative before. The clock of scripted hands.
     pub run_tick: i64,
 }
 
 impl TickTime {
+    /// Under a clock that counts ticks, each of which takes a period.
+    pub fn counted(tick: u64, period_ns: u64, run_tick: i64) -> Self {
+        Self { tick, period_ns, time_ns: tick.saturating_mul(period_ns), run_tick }
+    }
+
     /// Time since full authority (s); zero before.
     pub fn run_time_s(&self) -> f64 {
         run_time_s(self.run_tick, self.period_ns)

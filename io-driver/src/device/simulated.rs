@@ -120,7 +120,7 @@ pub struct SimulatedDevice {
     /// X_WD.
     base_in_world: Isometry3<f64>,
     latency: Latency,
-    last_tick: Option<u64>,
+    last_ns: Option<u64>,
     read_at_ns: u64,
     /// What the amplifiers get, and how long after the last reading (ns).
     pending: Option<(u64, Drive)>,
@@ -153,7 +153,7 @@ impl SimulatedDevice {
             holder,
             base_in_world,
             latency,
-            last_tick: None,
+            last_ns: None,
             read_at_ns: 0,
             pending: None,
             is_waiting: false,
@@ -240,8 +240,8 @@ impl Device for SimulatedDevice {
     }
 
     fn read(&mut self, time: TickTime) -> Result<Reading, FaultReason> {
-        let ticks = self.last_tick.replace(time.tick).map_or(0, |last| time.tick.saturating_sub(last));
-        let elapsed_ns = ticks.saturating_mul(time.period_ns).min(time.period_ns.max(LONGEST_STALL_NS));
+        let since_ns = self.last_ns.replace(time.time_ns).map_or(0, |last| time.time_ns.saturating_sub(last));
+        let elapsed_ns = since_ns.min(time.period_ns.max(LONGEST_STALL_NS));
         let (handle, counters) = match self.waiting_counters.filter(|_| self.is_waiting) {
             Some(counters) => (self.handle(time), counters),
             None => self.go_on(time, elapsed_ns),

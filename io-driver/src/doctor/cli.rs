@@ -11,6 +11,7 @@ use rt_core::doctor::machine::{LoopSpec, Machine};
 use rt_core::doctor::plan::{self, PlanNames};
 use rt_core::doctor::table::Table;
 use rt_core::doctor::{Finding, Tally};
+use rt_core::plain_text::{PlainJson, PlainLines};
 use shm_abi::endpoint;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -74,9 +75,9 @@ pub fn run(args: &DoctorArgs) -> ExitCode {
     let answer = segment::ask(&socket);
     let findings = examine(&machine, &socket.to_string_lossy(), &answer);
     let text = match (args.json, args.fix_plan) {
-        (true, _) => to_json(&findings, &spec) + "\n",
+        (true, _) => format!("{}\n", PlainJson(to_json(&findings, &spec))),
         (false, true) => plan::script(&machine, &findings, &plan_names()),
-        (false, false) => Table { findings: &findings, spec: &spec }.to_string(),
+        (false, false) => PlainLines(Table { findings: &findings, spec: &spec }).to_string(),
     };
     // A closed pipe is how `| head` says that it has seen enough.
     let _ = std::io::stdout().write_all(text.as_bytes());

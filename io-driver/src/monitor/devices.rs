@@ -7,6 +7,7 @@ use crate::monitor::state::Monitor;
 use crate::status::DeviceStatus;
 use ratatui_core::style::Stylize;
 use ratatui_core::text::{Line, Span};
+use rt_core::plain_text::Plain;
 
 /// Rows of a device.
 const ROWS: usize = 2;
@@ -42,7 +43,7 @@ pub(super) fn cut_to(lines: &mut Vec<Line<'static>>, height: usize) -> usize {
 
 /// Name, what is wrong with the position, position, buttons, limits, warmth, kind: what matters most is cut last.
 fn place(device: &DeviceStatus, name_width: usize) -> Line<'static> {
-    let name: String = device.name.chars().take(name_width).collect();
+    let name: String = Plain(&device.name).to_string().chars().take(name_width).collect();
     let mut line = Line::from(Span::raw(format!("{name:<name_width$} ")).bold());
     if device.zero_needed {
         line.push_span(Span::raw("not zeroed ").red());

@@ -6,6 +6,7 @@ use crate::monitor::state::{Gone, Monitor};
 use crate::status::Status;
 use ratatui_core::style::{Color, Style, Stylize};
 use ratatui_core::text::{Line, Span};
+use rt_core::plain_text::Plain;
 use std::time::Duration;
 
 /// Longer than a driver sleeps at any rate it can have.
@@ -67,7 +68,7 @@ fn title(monitor: &Monitor, status: &Status, width: usize) -> Line<'static> {
 fn farewell(gone: &Gone) -> String {
     let last_words = gone.last_words.as_ref().map_or_else(String::new, |words| format!(": {words}"));
     let why_not = gone.why_not.as_ref().map_or_else(String::new, |why| format!(" ({why})"));
-    format!("The driver has ended{last_words}. Waiting for its return{why_not}")
+    Plain(format_args!("The driver has ended{last_words}. Waiting for its return{why_not}")).to_string()
 }
 
 /// The state, and why if it is a fault; else how much force is let through.
@@ -117,7 +118,7 @@ fn commander(monitor: &Monitor, status: &Status) -> Line<'static> {
             Line::raw(format!("lease {lease}{GAP}commanded by a process not to be seen from here"))
         }
         (lease, Some(who)) => {
-            Line::raw(format!("lease {lease}{GAP}commanded by process {} ({})", who.pid, who.name))
+            Line::raw(format!("lease {lease}{GAP}commanded by process {} ({})", who.pid, Plain(&who.name)))
         }
     }
 }

@@ -219,7 +219,7 @@ fn values_that_are_no_numbers_are_told_as_such() {
     lost.position_m = [f64::NAN, f64::NEG_INFINITY, 1e300];
     lost.position_valid = false;
     lost.motor_heat = f64::NAN;
-    let mut unzeroed = device("\u{1b}[2Jevil", [f64::NAN; 3], Some(f64::NAN));
+    let mut unzeroed = device("\u{1b}[2J\u{202e}evil", [f64::NAN; 3], Some(f64::NAN));
     unzeroed.zero_needed = true;
     let mut look = look(vec![lost, unzeroed, device("strong", [f64::NAN; 3], Some(0.0))]);
     look.status.authority = f64::NAN;
@@ -231,7 +231,10 @@ fn values_that_are_no_numbers_are_told_as_such() {
         &["not valid      NaN     -inf   +1e300 m", "not zeroed", "authority NaN", "   NaN", "warm NaN %"],
     );
     assert_shows(&rows, &["+inf", "?│?"]);
-    assert!(rows.iter().all(|row| !row.contains('\u{1b}')), "a name must not steer the terminal");
+    assert!(
+        rows.iter().all(|row| !row.contains(['\u{1b}', '\u{202e}'])),
+        "a name must not steer the terminal"
+    );
     // The one that is infinite and the one that is huge are full, those that are no numbers have no length.
     let lengths = bars(&monitor, 80, 24);
     assert!(lengths[1] > 0 && lengths[2] == -lengths[1] && lengths[0] == 0, "{lengths:?}");

@@ -62,6 +62,11 @@ impl TickClock {
         Self { is_real: true, ..Self::counting(period_ns) }
     }
 
+    /// When the last tick was (ns); from any origin if ticks are counted.
+    pub fn time_ns(&self) -> u64 {
+        self.last.map_or(0, |(_, time_ns)| time_ns)
+    }
+
     /// A tick of which the deadline is known, at `now_ns` of the monotonic clock; the time since the one before.
     pub fn pass(&mut self, tick: u64, deadline_ns: u64, now_ns: u64) -> Elapsed {
         let time_ns = self.time_of(tick, deadline_ns, now_ns);

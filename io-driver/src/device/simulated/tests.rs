@@ -51,7 +51,7 @@ fn held(model: &HandModel, at_D: Vector3<f64>, wish: Wish, board: &Arc<TipBoard>
 }
 
 fn tick(tick: u64) -> TickTime {
-    TickTime { tick, period_ns: 1_000_000, run_tick: -1 }
+    TickTime::counted(tick, 1_000_000, -1)
 }
 
 fn push(force: Vector3<f64>) -> Effort {
