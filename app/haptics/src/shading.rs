@@ -25,7 +25,7 @@
 //!   Over a facet that is `s` lower than the round surface it stands for, `k d s` at the depth d; through a region of
 //!   activation of a right-angled edge, 0.31 `k d l` on the way there and 0.29 of what is stored less on the way up.
 //!   In rounds about a ball of 320, 1280, 20,480 triangles: up to 5.9, 1.4, 0.02 % of what the spring stores
-//!   (`tests/shading_energy.rs`). Something passive has to watch over it.
+//!   (`tests/all/shading_energy.rs`). Something passive has to watch over it.
 //!
 //! Frames and signs: object frame B; forces are on the user.
 //! Invariants: size of the force and friction angle are kept ([`ShadingForm::Rotate`]); the force is turned by a right angle

@@ -26,7 +26,7 @@
 //! s = 0.2 mm) and a bias of 0.4 mm, with `mu = 0.3`: a stick fraction of 0.5 (0.75 mm) loses nine tenths of the bias in
 //! three minutes, 0.9 (1.35 mm) less than a tenth, and Coulomb friction, which bears 1.5 mm, nothing. The smooth alpha of the paper,
 //! which is nowhere zero, loses all of it within ten seconds at 0.5. This is the model's, not the tick's: its equation
-//! integrated in steps a hundred times as short loses as much (`tests/friction_drift.rs`).
+//! integrated in steps a hundred times as short loses as much (`tests/all/friction_drift.rs`).
 //!
 //! Invariants: `|F_t| <= mu N`; while the strain is within `z_stick` it holds. Cost: one square root; no memory.
 

@@ -55,7 +55,7 @@ fn three_minutes_of_noise_do_not_move_the_god_object() {
 }
 
 /// 86.4 million ticks at 1 kHz for every model on every shape, each of them about a minute:
-/// `cargo test --release -p haptics --test friction_drift -- --ignored --nocapture`.
+/// `cargo test --release -p haptics --test all friction_drift:: -- --ignored --nocapture`.
 #[test]
 #[ignore = "simulates 24 hours for every model and shape: about 40 minutes; see its comment for the command"]
 fn twenty_four_hours_of_noise_do_not_drift() {

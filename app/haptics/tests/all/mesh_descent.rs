@@ -73,7 +73,7 @@ fn on_small_meshes_the_walk_is_the_obvious_descent() {
     check_all(0..2);
 }
 
-/// `cargo test --release -p haptics --test mesh_descent -- --ignored`
+/// `cargo test --release -p haptics --test all mesh_descent:: -- --ignored`
 #[test]
 #[ignore = "the long version, half a minute"]
 fn on_small_meshes_the_walk_is_the_obvious_descent_for_four_million_ticks() {

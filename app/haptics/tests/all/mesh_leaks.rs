@@ -1,7 +1,7 @@
 //! No finger gets into a mesh unnoticed: random approaches, also at what rounding likes least.
 //!
 //! The long version, a million approaches per mesh, takes about a minute:
-//! `cargo test --release -p haptics --test mesh_leaks -- --ignored`.
+//! `cargo test --release -p haptics --test all mesh_leaks:: -- --ignored`.
 #![allow(non_snake_case)]
 
 use crate::{common, mesh_oracle};

@@ -1,7 +1,7 @@
 //! A finger at rest on a mesh feels rest: nothing chatters, nothing jumps, nothing drifts.
 //!
 //! A day of noise, 86.4 million ticks, takes half a minute to some minutes:
-//! `cargo test --release -p haptics --test mesh_rest -- --ignored`.
+//! `cargo test --release -p haptics --test all mesh_rest:: -- --ignored`.
 #![allow(non_snake_case)]
 
 use crate::common;

@@ -1,7 +1,7 @@
 //! Random walks through meshes: never non-finite, never through the surface, never stuck on it.
 //!
 //! The long version, a million ticks per mesh, with a bumpy ball of a million triangles:
-//! `cargo test --release -p haptics --test mesh_walks -- --ignored`.
+//! `cargo test --release -p haptics --test all mesh_walks:: -- --ignored`.
 #![allow(non_snake_case)]
 
 use crate::{common, mesh_oracle};

@@ -1,6 +1,6 @@
 //! What passivity costs: by how much forces are changed, on material that is passive and on sources that are not.
 //!
-//! `cargo test --release -p haptics --test passivity_fidelity -- --nocapture` prints the table.
+//! `cargo test --release -p haptics --test all passivity_fidelity:: -- --nocapture` prints the table.
 #![allow(non_snake_case)]
 
 use crate::{common, sources};

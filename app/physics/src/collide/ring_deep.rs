@@ -12,7 +12,7 @@
 //! Frames: that of the other one, B. Identity: a node is the ring's own.
 //! Invariant: the force is a continuous function of the pose, and of nothing else. Where no point of the circle moves by more
 //! than `x`, loads shift by a few times `x`, and directions by `sqrt((4 / (3 SOFT tube))^2 + (1 / length of a piece)^2) x`
-//! (`tests/rings_through.rs`). Where the ways out of its pieces cancel, as in the middle of a slab, so do forces.
+//! (`tests/all/rings_through.rs`). Where the ways out of its pieces cancel, as in the middle of a slab, so do forces.
 //! Error: an edge between two pieces is found less deep by up to a seventieth of the tube's radius; rings of more than
 //! [`THIN`] tubes have longer pieces than a third of that, and pass by what is smaller.
 //! Cost: at most [`MOST_PIECES`] distances, fewer the farther they are, and three more for each piece that presses.

@@ -15,7 +15,7 @@
 //! Invariant: kinetic energy, gravity's and all accounts', less what bodies owe, never grow by what contacts do, however
 //! they begin and end; only work that is put in from outside adds to them.
 //!
-//! Why (each step has its test in `tests/ledger.rs`):
+//! Why (each step has its test in `tests/all/ledger.rs`):
 //! 1. *No account goes below zero.* A tick's forces work with the velocities that they were found with. A spring that begins it
 //!    with force r and ends it with f <= r works `f (r - f) / k` at most, with a damper or at the limit of friction less: half of
 //!    what it held, `r^2 / 2k`, at most. What presses is never more than the account. So a pair that ends has nothing to be

@@ -3,7 +3,7 @@
 //! Measured in every tick: kinetic energy, gravity's, and that of the springs between entities, as their account has it and as
 //! the rows press. What overlaps at first counts with all of its depth. Tolerances are those of turning in finite
 //! steps and of rounding; see [`slack_j`].
-//! Thousands of scenes: `cargo test --release -p physics --test energy -- --ignored` (some minutes).
+//! Thousands of scenes: `cargo test --release -p physics --test all energy:: -- --ignored` (some minutes).
 #![allow(non_snake_case)]
 
 use crate::{common, thrown};

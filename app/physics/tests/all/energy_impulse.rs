@@ -1,6 +1,6 @@
 //! Nothing that is left to itself gains energy where impulses answer: random balls and boxes on random planes and each other; and,
 //! to rounding, bodies that turn evenly and are thrown at walls, into wedges, at chains and heaps of others.
-//! More of these: `SEEDS=10000 cargo test --release -p physics --test energy_impulse`.
+//! More of these: `SEEDS=10000 cargo test --release -p physics --test all energy_impulse::`.
 #![allow(non_snake_case)]
 
 use crate::{common, noise, thrown};

@@ -103,7 +103,7 @@ fn for_five_minutes_a_cube_just_below_the_friction_angle_does_not_creep() {
 }
 
 #[test]
-#[ignore = "the long version: cargo test --release -p physics --test ramp -- --ignored"]
+#[ignore = "the long version: cargo test --release -p physics --test all ramp:: -- --ignored"]
 fn for_an_hour_a_cube_just_below_the_friction_angle_does_not_creep() {
     hold(60, 1e-7);
 }

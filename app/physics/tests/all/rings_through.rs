@@ -1,7 +1,7 @@
 //! Rings that go into other solids as deep as they like, and through them: they are pressed in every pose, by forces that
 //! change as little as the poses do, and gain nothing.
 //!
-//! Hundreds of paths: `cargo test --release -p physics --test rings_through -- --ignored` (some minutes).
+//! Hundreds of paths: `cargo test --release -p physics --test all rings_through:: -- --ignored` (some minutes).
 #![allow(non_snake_case)]
 
 use crate::{common, meshes, noise};

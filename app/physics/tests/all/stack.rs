@@ -1,7 +1,7 @@
 //! Stacks, chains and towers: what stands stays, what is lifted weighs, what is pushed passes it on, what falls comes to rest.
 //!
 //! The long version, ten simulated minutes of each stack:
-//! `cargo test --release -p physics --test stack -- --ignored`.
+//! `cargo test --release -p physics --test all stack:: -- --ignored`.
 #![allow(non_snake_case)]
 
 use crate::common;

@@ -1,6 +1,6 @@
 //! The fast and the slow list: every body is in one of them, whatever happens.
 //!
-//! `cargo test --release -p world --test lists -- --include-ignored` adds a million hand-overs (ten seconds, of a debug build a minute).
+//! `cargo test --release -p world --test all lists:: -- --include-ignored` adds a million hand-overs (ten seconds, of a debug build a minute).
 #![allow(non_snake_case)] // Names carry their frame.
 
 use haptics::{Cuboid, Entity, Friction, Plane, Shape, Sphere};

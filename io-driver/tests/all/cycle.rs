@@ -1,6 +1,6 @@
 //! The driver's tick, without a clock: a commander in the same process answers, is late, lies or leaves.
 
-mod common;
+use crate::common;
 
 use common::{Bench, Log, PEAK_N, command, publish};
 use io_driver::device::Reading;

@@ -1,6 +1,6 @@
 //! Pictures without a display: facts about their pixels. Where there is no graphics library they say so and pass.
 
-mod common;
+use crate::common;
 
 use common::{SIZE, colour, studio};
 use haptics::{Cuboid, Cylinder, Entity, Plane, Shape, Torus};

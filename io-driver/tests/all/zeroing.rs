@@ -1,6 +1,6 @@
 //! A device that has to be zeroed: what it gets until then, when a zero is granted, and what follows it.
 
-mod common;
+use crate::common;
 
 use common::{Bench, publish, usual_device};
 use io_driver::device::Reading;

@@ -1,6 +1,6 @@
 //! The driver's guards in its tick: what each lets through, what it tells, what it is left by.
 
-mod common;
+use crate::common;
 
 use bytemuck::Zeroable;
 use common::{Bench, PERIOD_NS, publish, usual_device};

@@ -1,6 +1,6 @@
 //! Light from a place: facts about pixels. Where there is no graphics library they say so and pass.
 
-mod common;
+use crate::common;
 
 use common::{SIZE, colour, studio};
 use haptics::{Entity, Plane, Shape, Sphere};

@@ -1,6 +1,6 @@
 //! What two eyes see of a small ball. Where there is no graphics library they say so and pass.
 
-mod common;
+use crate::common;
 
 use common::{SIZE, studio};
 use haptics::{Entity, Sphere};

@@ -1,6 +1,6 @@
 //! What is behind doors: facts about pixels. Where there is no graphics library they say so and pass.
 
-mod common;
+use crate::common;
 
 use common::{SIZE, colour, studio};
 use haptics::{Cuboid, Entity};

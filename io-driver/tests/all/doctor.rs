@@ -1,7 +1,6 @@
 //! The doctor's questions about cards and about the driver's socket, on recorded machines and made-up answers.
 
-#[path = "../../rt-core/tests/machines/mod.rs"]
-mod machines;
+use crate::machines;
 
 use io_driver::doctor::segment::Answer;
 use io_driver::doctor::{self, device, segment, to_json};

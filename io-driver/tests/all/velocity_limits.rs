@@ -1,8 +1,6 @@
 //! The speed limit on the estimate: no later than on the mean over 4 ms that it went by before, and no more nervous.
 
-#[path = "../benches/velocity/motion.rs"]
-#[allow(dead_code, reason = "the bench uses all of it")]
-mod motion;
+use crate::motion;
 
 use io_driver::device::TickTime;
 use io_driver::device::arm::Arm;

@@ -1,7 +1,6 @@
 //! What people change while a run goes on is never felt as a blow: in every tick the force changes by no more than is stated.
 
-#[path = "../haptics/tests/common/counting.rs"]
-mod counting;
+use crate::counting;
 
 use counting::CALLS;
 use nalgebra::Vector3;

@@ -9,7 +9,7 @@ use io_driver::sim::dynamics::{Dynamics, Inertias};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
-mod rigid_bodies;
+use crate::rigid_bodies;
 
 const LINKS: [f64; 2] = [0.215, 0.170];
 

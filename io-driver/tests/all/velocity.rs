@@ -3,15 +3,7 @@
 //! Bounds are told in counts over time. At the tip of the Premium a count is at most 0.0292 mm: 29 mm/s in a tick at
 //! 1 kHz, 7.3 mm/s in 4 ms, 0.97 mm/s in the longest window of 30 ms.
 
-#[path = "../benches/velocity/motion.rs"]
-#[allow(dead_code, reason = "the bench uses all of it")]
-mod motion;
-#[path = "../benches/velocity/rivals.rs"]
-#[allow(dead_code, reason = "the bench uses all of it")]
-mod rivals;
-#[path = "../benches/velocity/score.rs"]
-#[allow(dead_code, reason = "the bench uses all of it")]
-mod score;
+use crate::{motion, rivals, score};
 
 use io_driver::device::TickTime;
 use io_driver::device::arm::Arm;
