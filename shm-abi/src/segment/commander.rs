@@ -66,7 +66,7 @@ pub struct CommanderView {
 
 impl CommanderView {
     /// Creates the segment for one lease. Returns the driver's view and the descriptor to hand over. This alone is for
-    /// a commander in the same process; what another process may get is a [`LeaseOffer`].
+    /// a commander in the same process; what another process may get is a [`LeaseOffer`](super::LeaseOffer).
     pub fn create(lease: u64) -> Result<(Self, OwnedFd), SegmentError> {
         let fd = create_memfd(c"phantom3-commander", size_of::<CommanderSegment>())?;
         let map = Mapping::<CommanderSegment>::writable(&fd)?;
