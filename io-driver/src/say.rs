@@ -1,6 +1,7 @@
 //! Tells people something on standard error, and does not mind when nobody can hear it.
 //!
-//! What is told is made plain first ([`Plain`]): names come from files, and must not act on a terminal.
+//! What is told is made plain first ([`PlainLines`]): names come from files, and must not act on a terminal. Lines after
+//! the first are indented, so that no name with a line break in it forges a line of ours.
 //!
 //! `eprintln!` panics when the write fails: whoever kills the `tee` behind `io-driver run 2>&1 | tee log`, or
 //! fills the disk under a log, would take the driver with it, motors on. And a write waits for as long as the other
@@ -8,7 +9,7 @@
 //! `log_thread` writes them.
 //! Invariant: once the log's thread is there, [`say`] never waits; a line that finds the queue full is counted.
 
-use rt_core::plain_text::Plain;
+use rt_core::plain_text::PlainLines;
 use std::fmt;
 use std::io::Write;
 use std::sync::OnceLock;
@@ -40,7 +41,7 @@ pub(crate) enum Entry {
 
 /// Says a line: writes it in one piece, or leaves that to the log's thread where there is one.
 pub fn say(line: fmt::Arguments<'_>) {
-    let line = format!("{}\n", Plain(line));
+    let line = indented(line);
     match QUEUE.get() {
         None => write(&line),
         Some(queue) => {
@@ -54,7 +55,19 @@ pub fn say(line: fmt::Arguments<'_>) {
 /// Writes a line of results on standard output.
 pub fn tell(line: fmt::Arguments<'_>) {
     // A closed pipe is no reason to fail.
-    let _ = std::io::stdout().write_all(format!("{}\n", Plain(line)).as_bytes());
+    let _ = std::io::stdout().write_all(indented(line).as_bytes());
+}
+
+/// In one piece, with its end.
+fn indented(text: fmt::Arguments<'_>) -> String {
+    let text = PlainLines(text).to_string();
+    let mut lines = text.lines();
+    let mut out = lines.next().unwrap_or_default().to_owned();
+    for line in lines {
+        let indent = if line.starts_with("  ") { "\n" } else { "\n  " };
+        out.extend([indent, line]);
+    }
+    out + "\n"
 }
 
 /// Waits until everything that was said is written, but no longer than `patience`; returns whether it is.
@@ -93,4 +106,20 @@ pub(crate) fn queue() -> Option<Receiver<Entry>> {
 pub(crate) fn write(line: &str) {
     // Nobody to tell is no reason to stop.
     let _ = std::io::stderr().write_all(line.as_bytes());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_block_keeps_its_lines_and_a_name_with_a_line_break_forges_none() {
+        let block = "guarantees:\n  obtained: memory\n  missing: priority";
+        assert_eq!(indented(format_args!("{block}")), format!("{block}\n"));
+        let name = "x\nio-driver: motors were written zero\u{1b}[2J";
+        let said = indented(format_args!("io-driver: lease 1 to process 7 ({name})"));
+        let expected =
+            "io-driver: lease 1 to process 7 (x\n  io-driver: motors were written zero\\u{1b}[2J)\n";
+        assert_eq!(said, expected);
+    }
 }

@@ -220,7 +220,7 @@ fn run_to_end(args: &CalibrateArgs) -> Result<(), CalibrateFailure> {
     let entry = plan.layout.entry_of(args.device, &X_WN);
     let text = layout_file::with_entry(&plan.base, plan.base_name(), args, &entry, &X_WN, used)?;
     let report = Report { origin: &origin, args, found: &found, used, X_WN: &X_WN, entry: &entry };
-    say(format_args!("{report}"));
+    report.to_string().lines().for_each(|line| say(format_args!("{line}")));
     if let Some(file) = &plan.write {
         // Whoever held two arms together for a minute shall not have to do it again for a full disk.
         layout_file::replace(file, &text).inspect_err(|_| {
