@@ -255,6 +255,11 @@ fn wrong_words_are_refused_with_what_is_missing() {
         assert_eq!(end.status, Some(2), "{end:?}");
         assert!(end.err.contains(words), "{end:?}");
     }
+    let unattended = io_driver(&["zero"], &stand.socket());
+    assert!(
+        unattended.status != Some(0) && unattended.err.contains("standard input has ended"),
+        "{unattended:?}"
+    );
     let nowhere = io_driver(&["zero"], &stand.path("nobody.sock"));
     assert_eq!(nowhere.status, Some(2), "{nowhere:?}");
     assert!(nowhere.err.contains("no driver is running"), "{nowhere:?}");

@@ -183,7 +183,7 @@ impl<'a> Zeroing<'a> {
             let pose = home_pose(&device.kind);
             say(&format!("{}: bring it into its zeroing pose and hold it still: {pose}", device.name));
         }
-        if !yes && std::io::stdin().is_terminal() {
+        if !yes {
             say("Press Enter when it is there.");
             std::io::stdin()
                 .lock()
