@@ -32,6 +32,31 @@ use world::events::Event;
 /// So many orders are taken in a tick.
 pub const ORDERS_A_TICK: usize = 4;
 
+/// What became of a run's orders.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct OrderTally {
+    /// Those that were taken.
+    pub taken: u64,
+    /// Those of them that could not be done.
+    pub undone: u64,
+    /// Those whose time had not come when the run ended.
+    pub never_reached: u64,
+}
+
+impl std::fmt::Display for OrderTally {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { taken, undone, never_reached } = self;
+        write!(f, "{taken}")?;
+        if *undone > 0 {
+            write!(f, ", {undone} NOT DONE: too much was moved at once, or touched what was to be moved")?;
+        }
+        if *never_reached > 0 {
+            write!(f, ", and {never_reached} NEVER REACHED: the run ended before their time")?;
+        }
+        Ok(())
+    }
+}
+
 /// The fast side of orders.
 pub struct Control {
     orders: OrderReceiver,
@@ -89,9 +114,10 @@ impl Control {
         Self { carriage, ..self }
     }
 
-    /// How many orders were taken, and how many of them could not be done.
-    pub fn taken(&self) -> [u64; 2] {
-        [self.taken, self.gradual.undone()]
+    /// What became of all orders so far.
+    pub fn tally(&self) -> OrderTally {
+        let never_reached = self.orders.waiting();
+        OrderTally { taken: self.taken, undone: self.gradual.undone(), never_reached }
     }
 
     /// Before a tick of this length (s), the run's so many-th.

@@ -5,10 +5,10 @@
 //! except where the clock itself waits (virtual, lockstep).
 //! Cost: bounded; no allocation, no system call but the wake-up of a sleeping driver.
 
-use crate::control::Control;
 use crate::control::carriage::Carriage;
 use crate::control::order::Replacement;
 use crate::control::queue::OrderReceiver;
+use crate::control::{Control, OrderTally};
 use crate::displaced::Displaced;
 use crate::fast_step::{EventTeller, FastStep};
 use crate::row::{BodyRow, Row};
@@ -164,9 +164,9 @@ impl FastLoop {
         self
     }
 
-    /// How many orders were taken, and how many of them could not be done.
-    pub fn orders_taken(&self) -> [u64; 2] {
-        self.control.as_ref().map_or([0; 2], Control::taken)
+    /// What became of all orders so far.
+    pub fn orders(&self) -> OrderTally {
+        self.control.as_ref().map_or_else(OrderTally::default, Control::tally)
     }
 
     /// With a queue for what happens.

@@ -47,6 +47,12 @@ pub enum RunFailure {
     /// The driver is gone.
     #[error("the driver is gone: {0}")]
     DriverGone(String),
+    /// Somebody ended the lease of a run whose driver goes on.
+    #[error(
+        "somebody ended this run's lease (`io-driver end-lease`), and its force with it; the driver goes on for whoever \
+         commands next"
+    )]
+    LeaseEnded,
     /// The driver publishes no frames any more.
     #[error("the driver has published no frame for {seconds} s though its process lives; it may be stopped")]
     DriverSilent {

@@ -87,8 +87,8 @@ pub struct Plausibility {
     period_ns: u64,
     /// The tick seen last, and when.
     last: Option<(u64, u64)>,
-    /// The lease, and in which tick its t = 0 was.
-    run: Option<(u64, i64)>,
+    /// In which tick our lease's t = 0 was.
+    run_began: Option<i64>,
     /// When a frame was answered last.
     answered_ns: Option<u64>,
 }
@@ -96,7 +96,7 @@ pub struct Plausibility {
 impl Plausibility {
     /// Of a driver with this period, which has told nothing yet.
     pub fn new(period_ns: u64) -> Self {
-        Self { period_ns: period_ns.max(1), last: None, run: None, answered_ns: None }
+        Self { period_ns: period_ns.max(1), last: None, run_began: None, answered_ns: None }
     }
 
     /// Judges the number of the newest frame, before that is read.
@@ -138,14 +138,15 @@ impl Plausibility {
             let (ahead_ms, most_ms) = (ahead_ns / 1_000_000, most_ns / 1_000_000);
             return Err(Implausible::Future { tick, ahead_ms, most_ms });
         }
-        self.judge_run(tick, frame)?;
+        self.judge_run(tick, frame, is_for_us)?;
         self.note_answer(is_for_us, now_ns)
     }
 
-    /// A lease's t = 0 comes once, and from there on its time goes with the ticks.
-    fn judge_run(&mut self, tick: u64, frame: &Frame) -> Result<(), Implausible> {
-        match self.run.filter(|(lease, _)| *lease == frame.lease) {
-            Some((_, zero)) => {
+    /// Our lease's t = 0 comes once, and from there on its time goes with the ticks. The time of others, and of nobody
+    /// while a force ramps out, is not ours to judge.
+    fn judge_run(&mut self, tick: u64, frame: &Frame, is_for_us: bool) -> Result<(), Implausible> {
+        match self.run_began.filter(|_| is_for_us) {
+            Some(zero) => {
                 let expected = tick.cast_signed().wrapping_sub(zero);
                 if frame.run_tick != expected {
                     return Err(Implausible::RunTick { tick, found: frame.run_tick, expected });
@@ -156,8 +157,8 @@ impl Plausibility {
                 let expected = tick.cast_signed();
                 return Err(Implausible::RunTick { tick, found: frame.run_tick, expected });
             }
-            None if frame.run_tick >= 0 => {
-                self.run = Some((frame.lease, tick.cast_signed().wrapping_sub(frame.run_tick)));
+            None if is_for_us && frame.run_tick >= 0 => {
+                self.run_began = Some(tick.cast_signed().wrapping_sub(frame.run_tick));
             }
             None => {}
         }
@@ -208,10 +209,12 @@ mod tests {
         for (tick, later_ms) in [(150, 51), (99 + 4096, 60), (99 + 4096 + 20_000, 20_000)] {
             sound.judge_tick(tick, now_ns + later_ms * 1_000_000).unwrap();
         }
+        // Our lease ends: while its force ramps out the run's time goes on, then there is none.
         let (mut sound, now_ns) = settled();
-        let other = Frame { lease: 2, run_tick: -1, ..frame(100, 0) };
-        assert_eq!(sound.judge_frame(100, &other, false, now_ns), Ok(()));
-        assert_eq!(sound.judge_frame(101, &Frame { run_tick: 0, tick: 101, ..other }, true, now_ns), Ok(()));
+        for (tick, lease, run_tick) in [(100, 0, 90), (101, 0, -1), (102, 2, -1), (103, 2, 0)] {
+            let other = Frame { lease, ..frame(tick, run_tick) };
+            assert_eq!(sound.judge_frame(tick, &other, false, now_ns), Ok(()));
+        }
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! What a run tells at its end, a line each; the README explains the lines.
 
 use crate::attachment_totals::Timing;
+use crate::control::OrderTally;
 use crate::fast_loop::Tally;
 use crate::lists_end::ListsEnd;
 use crate::record::Recorded;
@@ -31,8 +32,8 @@ pub struct Report {
     pub parked: Vec<String>,
     /// How many events of which kind there were.
     pub events: String,
-    /// Orders that were taken, and those of them that could not be done; `None`: nobody may order anything.
-    pub orders: Option<[u64; 2]>,
+    /// What became of orders; `None`: nobody may order anything.
+    pub orders: Option<OrderTally>,
     /// What became of the fast and the slow list, if there are two.
     pub lists: Option<ListsEnd>,
     /// What became of the recordings.
@@ -102,13 +103,8 @@ impl fmt::Display for Report {
             writeln!(f, "parked       {line}")?;
         }
         writeln!(f, "events       {}", self.events)?;
-        match self.orders {
-            None => {}
-            Some([taken, 0]) => writeln!(f, "orders       {taken}")?,
-            Some([taken, undone]) => writeln!(
-                f,
-                "orders       {taken}, {undone} NOT DONE: too much was moved at once, or touched what was to be moved"
-            )?,
+        if let Some(orders) = &self.orders {
+            writeln!(f, "orders       {orders}")?;
         }
         if let Some(lists) = &self.lists {
             writeln!(f, "lists        {lists}")?;
@@ -130,21 +126,20 @@ impl fmt::Display for Report {
         if self.recordings.is_empty() {
             return write!(f, "recording    none; --record FILE makes one");
         }
-        for (index, recorded) in self.recordings.iter().enumerate() {
-            if index > 0 {
-                writeln!(f)?;
-            }
-            let Recorded { path, rows, unit, lost, failure } = recorded;
-            write!(f, "recording    {} ({rows} {unit}", Plain(shown(path).display()))?;
-            let who = if is_standard_output(path) { "its reader" } else { "the disk" };
-            match lost + tally.rows_lost {
-                0 => write!(f, ")")?,
-                lost => write!(f, ", {lost} LOST: {who} was too slow)")?,
-            }
-            if failure.is_some() {
-                write!(f, " NOT COMPLETE: see the message above")?;
-            }
-        }
-        Ok(())
+        let lines: Vec<String> =
+            self.recordings.iter().map(|recorded| recording_line(recorded, tally.rows_lost)).collect();
+        write!(f, "{}", lines.join("\n"))
     }
+}
+
+/// What became of a recording, of a run that could not hand on so many rows.
+pub(crate) fn recording_line(recorded: &Recorded, rows_lost: u64) -> String {
+    let Recorded { path, rows, unit, lost, failure } = recorded;
+    let who = if is_standard_output(path) { "its reader" } else { "the disk" };
+    let lost = match lost + rows_lost {
+        0 => String::new(),
+        lost => format!(", {lost} LOST: {who} was too slow"),
+    };
+    let end = if failure.is_some() { " NOT COMPLETE: see the message above" } else { "" };
+    format!("recording    {} ({rows} {unit}{lost}){end}", Plain(shown(path).display()))
 }

@@ -12,8 +12,8 @@ use crate::not_zeroed;
 use crate::on_request::OnRequest;
 use crate::outcome::{RunFailure, Stop};
 use crate::progress::Progress;
-use crate::record::{About, Files, View};
-use crate::report::Report;
+use crate::record::{About, Files, Recorded, View};
+use crate::report::{Report, recording_line};
 use crate::rig::{HandMode, Rig, RigError};
 use crate::row_queue::row_queue;
 use crate::shown::Shown;
@@ -218,7 +218,7 @@ fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Repo
         guarantees: None,
         parked: parked(&fast.tally, rig),
         events,
-        orders: plan.orders.as_ref().map(|_| fast.orders_taken()),
+        orders: plan.orders.as_ref().map(|_| fast.orders()),
         lists: fast.step_mut().end_lists(None),
         recordings,
         pictures,
@@ -251,7 +251,7 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
     let result = two_processes::run(&mut source, attachment, (fast, slow_lists), &mut totals, watched);
     progress.end();
     let SlowEnd { recordings, events, pictures } = slow.finish();
-    let end = result?;
+    let end = result.inspect_err(|_| tell_kept(&recordings))?;
     let is_real = info.clock_mode == ClockMode::Real;
     let report = Report {
         clock: info.clock_mode.name(),
@@ -269,6 +269,13 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
         pictures,
     };
     Ok((report, end.stop))
+}
+
+/// There is no report of a run that a fault ended, but what it recorded is there.
+fn tell_kept(recordings: &[Recorded]) {
+    for recorded in recordings {
+        say(format_args!("{}", recording_line(recorded, 0)));
+    }
 }
 
 /// At a window the camera that devices go with is the window's, from the beginning.

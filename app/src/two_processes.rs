@@ -2,10 +2,12 @@
 //!
 //! Model: the fast thread answers frames; this thread is the slow one: it feeds the recorders, shows the
 //! progress and watches the connection, which is how the end of the driver is noticed. A driver that was
-//! there before us may be restarted: the run goes on with it if it is back within the grace time.
+//! there before us may be restarted: the run goes on with it if it is back within the grace time. A driver that hangs up
+//! and goes on has ended our lease on somebody's request, and so the run.
 
 use crate::attachment_totals::AttachmentTotals;
 use crate::child::DriverChild;
+use crate::control::OrderTally;
 use crate::fast_loop::{FastLoop, Tally};
 use crate::fast_thread::{self, FastEnd, FastRemains, FastShared};
 use crate::lists_end::ListsEnd;
@@ -65,8 +67,8 @@ pub struct TwoProcessEnd {
     pub driver: DriverView,
     /// What the fast thread obtained with it.
     pub fast_report: SetupReport,
-    /// Orders that were taken, and those of them that could not be done.
-    pub orders: [u64; 2],
+    /// What became of the orders.
+    pub orders: OrderTally,
     /// What became of the fast and the slow list, if there are two.
     pub lists: Option<ListsEnd>,
 }
@@ -116,6 +118,9 @@ pub fn run(
             WatchEnd::Fast(FastEnd::Implausible(lie)) => return Err(RunFailure::DriverImplausible(lie)),
             WatchEnd::Fast(FastEnd::Silent) => return Err(RunFailure::DriverSilent { seconds: 5.0 }),
             WatchEnd::DriverGone | WatchEnd::Fast(FastEnd::Stopped) => {
+                if goes_on(&remains.driver) {
+                    return Err(RunFailure::LeaseEnded);
+                }
                 let words = last_words(&remains.driver);
                 drop(connection);
                 progress.end();
@@ -128,7 +133,7 @@ pub fn run(
         };
         let FastRemains { driver, mut fast, .. } = remains;
         let lists = fast.step_mut().end_lists(slow_list.and_then(SlowThread::end));
-        let orders = fast.orders_taken();
+        let orders = fast.orders();
         return Ok(TwoProcessEnd { tally, stop, driver, fast_report: report, orders, lists });
     }
 }
@@ -213,6 +218,19 @@ fn run_attached(
     let remains = thread.join().map_err(|_| RunFailure::DriverGone("the fast thread panicked".into()))?;
     let end = end.unwrap_or(WatchEnd::Fast(remains.end));
     Ok((report, connection, Watched { end, remains }))
+}
+
+/// Whether a driver that has hung up tells further ticks. One that ends writes its last words before it hangs up.
+fn goes_on(driver: &DriverView) -> bool {
+    let patience = LEASE_END.max(Duration::from_nanos(driver.info().period_ns) * 3);
+    let (seen, begun) = (driver.latest_tick(), Instant::now());
+    while rt_core::epitaph::read(&driver.epitaph).is_none() && begun.elapsed() < patience {
+        if driver.latest_tick() != seen {
+            return true;
+        }
+        std::thread::sleep(LEASE_END / 100);
+    }
+    false
 }
 
 fn last_words(driver: &DriverView) -> String {

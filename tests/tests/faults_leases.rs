@@ -182,6 +182,27 @@ fn a_child_that_inherited_the_connection_of_a_dead_parent_does_not_keep_its_leas
 }
 
 #[test]
+fn a_run_whose_lease_somebody_ended_says_so_and_does_not_come_back() {
+    for clock in ["real", "lockstep"] {
+        let mut press = Press::start(clock);
+        let mut holder = press.start_app();
+        let mut log = RingLog::begin(&press.observer.driver);
+        log.follow_to_force(&press.observer.driver);
+        let asked = io_driver(&["end-lease"], press.driver.socket());
+        assert_eq!(asked.status, Some(0), "{asked:?}");
+        let end = holder.end();
+        assert_eq!(end.status, Some(3), "{end:?}");
+        assert!(end.err.contains("somebody ended this run's lease"), "{end:?}");
+        log.follow(&press.observer.driver, "the end of the lease and of its force", |told| {
+            told.last().is_some_and(|last| last.lease == 0 && !last.is_pushing())
+        });
+        log.check_promise(&press.observer.driver);
+        drop(Commander::start(press.driver.command(), [1.0, 0.0, 0.0]));
+        press.driver_must_live();
+    }
+}
+
+#[test]
 fn a_commander_that_was_stopped_is_replaced_on_request() {
     let mut press = Press::start("real");
     let holder = press.start_app();

@@ -76,6 +76,11 @@ impl OrderSender {
 }
 
 impl OrderReceiver {
+    /// How many orders wait for their time.
+    pub fn waiting(&self) -> u64 {
+        (self.orders.slots() + self.now.slots()) as u64
+    }
+
     /// The next order, if it is due.
     pub(super) fn take(&mut self, run_tick: u64) -> Option<Dated> {
         let has_room = !self.back.is_full();
