@@ -280,7 +280,7 @@ pub fn subscribe(recorders: &mut [Recorder], events: &mut Hub) {
     }
 }
 
-/// How many events of each class there were, and how many are missing.
+/// How much of each class has happened or begun, and how many events are missing.
 fn summary(events: &Hub) -> String {
     let mut line = String::new();
     for (class, word) in Class::ALL.into_iter().filter(|(class, _)| *class != Class::Lost) {

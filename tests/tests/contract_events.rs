@@ -27,9 +27,20 @@ fn ran(scene: &str, hand: &str, seconds: &str) -> (Workplace, Table, Table) {
     let run = ["run", "scene.toml", "--clock", "virtual", "--seconds", seconds, "--record", "rows.csv"];
     let said = place.run([&run[..], &["--events", "events.csv", "--events", "events.jsonl"]].concat());
     assert_eq!(said.status, Some(0), "{}{}", said.out, said.err);
-    assert!(said.out.contains("\nevents       "), "{}", said.out);
     let (rows, events) = (Table::read(&place.path("rows.csv")), Table::read(&place.path("events.csv")));
+    check_report(&said.out, &events);
     (place, rows, events)
+}
+
+/// The report counts things, not their beginnings and ends.
+fn check_report(report: &str, events: &Table) {
+    let line = report.lines().find_map(|line| line.strip_prefix("events       ")).expect("a line of events");
+    for (class, kind) in
+        [("contacts", "contact-begin"), ("slips", "slip-begin"), ("pairs", "pair-begin"), ("grasps", "grasp")]
+    {
+        let told = line.split(", ").find_map(|part| part.strip_suffix(class)?.trim().parse().ok());
+        assert_eq!(told.unwrap_or(0), of_kind(events, kind, "kind").len(), "{class} of: {line}");
+    }
 }
 
 /// The cells of a column in the events of a kind.

@@ -166,7 +166,10 @@ fn another_friction_is_told_with_sizes_and_the_first_tick_that_differs() {
         (&["export", "r.mcap", "r.xyz"], "r.xyz has the ending .xyz; allowed: .csv, .parquet"),
         (&["export", "r.mcap", "t.csv", "./t.csv"], "is given twice"),
         (&["replay", "r.mcap", "--record", "r.xyz"], "--record r.xyz has the ending .xyz; allowed: .csv"),
-        (&["replay", "r.mcap", "--change", "entity.table.stiffness_n_per_m=-1"], "stiffness_n_per_m"),
+        (
+            &["replay", "r.mcap", "--change", "entity.table.stiffness_n_per_m=-1"],
+            "(a line of the scene as changed: entity.table.stiffness_n_per_m = -1)",
+        ),
     ] {
         let said = place.run(wrong);
         assert_eq!(said.status, Some(2), "{wrong:?}: {}", said.err);

@@ -37,8 +37,12 @@ impl Stage {
             Some(file) => (file.to_path_buf(), read(file)?),
             None => attached_scene(recording, recorded)?,
         };
+        let original = text.clone();
         let text = edited(&file, text, edits)?;
-        let mut scene = Scene::parse(&text, &file).map_err(|error| wrong(&error))?;
+        let mut scene = Scene::parse(&text, &file).map_err(|error| match Scene::parse(&original, &file) {
+            Ok(_) => wrong(&format_args!("{} (a line of the scene as changed: {})", error, list(edits))),
+            Err(error) => wrong(&error),
+        })?;
         scene.hand = None;
         let directory = match recorded.about() {
             Some(about) if other.is_none() => unpack_models(&mut scene, about)?,
@@ -50,13 +54,17 @@ impl Stage {
             Some(file) => file.display().to_string(),
             None => format!("the recording's own, {}", file.display()),
         };
-        for edit in edits {
-            name += &format!("; {edit}");
+        if !edits.is_empty() {
+            name += &format!("; {}", list(edits));
         }
         let about = about(&rig, recorded, other.is_none(), text);
         let follows = recorded.about().is_some_and(About::follows);
         Ok(Self { rig, name, about, follows, _directory: directory })
     }
+}
+
+fn list(edits: &[Edit]) -> String {
+    edits.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
 }
 
 fn wrong(error: &dyn std::fmt::Display) -> RunFailure {

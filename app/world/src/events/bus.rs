@@ -145,7 +145,7 @@ impl Hub {
         self.subscribers.retain(|(_, subscriber)| !subscriber.is_over());
         for source in &mut self.sources {
             while let Some(event) = source.receive(up_to) {
-                self.counts[event.kind.class() as usize] += 1;
+                self.counts[event.kind.class() as usize] += u64::from(!event.kind.is_end());
                 for (_, subscriber) in self.subscribers.iter_mut().filter(|(filter, _)| filter.lets(&event)) {
                     subscriber.event(&event);
                 }
@@ -153,7 +153,7 @@ impl Hub {
         }
     }
 
-    /// How many events of a class have been handed on.
+    /// How many things of a class have happened or begun, as far as their events have been handed on.
     pub fn count(&self, class: Class) -> u64 {
         self.counts[class as usize]
     }

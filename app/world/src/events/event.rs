@@ -317,6 +317,19 @@ impl Kind {
         }
     }
 
+    /// Whether it ends what an event before it began: one contact, grasp or key makes two events.
+    pub fn is_end(&self) -> bool {
+        match self {
+            Self::FingerTouch { change, .. } => matches!(change, Change::Ends | Change::Sticks),
+            Self::PairTouch { change, .. } | Self::Tie { change, .. } | Self::Trial { change, .. } => {
+                *change == Change::Ends
+            }
+            Self::Release { .. } => true,
+            Self::Button { is_pressed, .. } | Self::Key { is_pressed, .. } => !is_pressed,
+            _ => false,
+        }
+    }
+
     /// What it says.
     pub fn facts(&self) -> Facts {
         let of = Facts::of;
