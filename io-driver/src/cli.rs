@@ -2,6 +2,7 @@
 //!
 //! Exit status: 0 done; 2 bad usage or bad input, nothing was started; 3 a fault during the run.
 
+mod clearing;
 mod commission;
 mod emulate;
 mod stopping;
@@ -138,7 +139,7 @@ fn execute_with(command: DriverCommand, fit: Option<Fit>) -> ExitCode {
         DriverCommand::Status(args) => report(status(&args)),
         DriverCommand::Stop(args) => stopping::stop(&args.path()),
         DriverCommand::Doctor(args) => doctor::run(&args),
-        DriverCommand::ClearFault(args) => report(client::clear_fault(&args.path(), "io-driver")),
+        DriverCommand::ClearFault(args) => clearing::clear_fault(&args.path()),
         DriverCommand::EmergencyStop(args) => stopping::emergency_stop(&args.path()),
         DriverCommand::EndLease(args) => report(client::end_lease(&args.path(), "io-driver")),
         DriverCommand::Zero(args) => zero::run(&args),

@@ -115,6 +115,7 @@ impl DriverConfig {
         let directory = file.parent().unwrap_or(Path::new("."));
         let reply = raw.reply.validate(&toml, period_ns)?;
         let devices = device::devices(&raw.device, &toml, directory)?;
+        refuse_slow_registers(raw.rate_hz.as_ref(), &devices, &toml)?;
         Ok(Self {
             period_ns,
             clock: clock(raw.clock.as_ref(), &devices, &toml)?,
@@ -133,6 +134,9 @@ impl DriverConfig {
 pub fn period_of(rate_hz: f64) -> u64 {
     (1e9 / rate_hz).round() as u64
 }
+
+/// Of two milliseconds a tick: with the age of a command and the ramp, well within what a hand may bear.
+const LEAST_RATE_OF_REGISTERS_HZ: f64 = 500.0;
 
 const RATE: Allowed = Allowed { min: 10.0, max: 20_000.0, unit: "Hz" };
 
@@ -153,6 +157,21 @@ struct RawConfig {
     #[serde(default)]
     access: AccessConfig,
     device: Spanned<Vec<Spanned<RawDevice>>>,
+}
+
+/// Motors hold what was written until the next tick: in a slow one a command would outlive its age.
+fn refuse_slow_registers(
+    rate: Option<&Spanned<f64>>,
+    devices: &[DeviceConfig],
+    toml: &TomlText<'_>,
+) -> Result<(), TomlReport> {
+    let Some(rate) = rate.filter(|rate| *rate.get_ref() < LEAST_RATE_OF_REGISTERS_HZ) else { return Ok(()) };
+    let Some(device) = devices.iter().find(|device| device.backend.has_registers()) else { return Ok(()) };
+    Err(toml.refuse(
+        rate.span(),
+        format_args!("{} Hz with device \"{}\", which has registers", rate.get_ref(), device.name),
+        "500 to 20000 Hz: motors hold their force until the next tick",
+    ))
 }
 
 /// Where ticks are as short as two programs make them, seconds of ramps and guards would be over in a moment.
@@ -298,6 +317,10 @@ mod tests {
             (
                 "clock = \"lockstep\"\n[[device]]\nbackend = \"ideal\"\n[[device]]\nname = \"arm\"\nbackend = \"emulated\"\ndescription = \"premium-1.5\"\ncard = \"c\"",
                 "lab/driver.toml:1: `clock`: found \"lockstep\" with device \"arm\", which has registers, allowed: \"real\": motors know no other time; lockstep is for ideal and simulated devices and for traces",
+            ),
+            (
+                "rate_hz = 499\n[[device]]\nbackend = \"ideal\"\n[[device]]\nname = \"arm\"\nbackend = \"emulated\"\ndescription = \"premium-1.5\"\ncard = \"c\"",
+                "lab/driver.toml:1: `rate_hz`: found 499 Hz with device \"arm\", which has registers, allowed: 500 to 20000 Hz: motors hold their force until the next tick",
             ),
             (
                 "[[device]]\nbackend = \"ideal\"\nslew_n_per_s = 2e4",

@@ -13,8 +13,9 @@ use crate::meter::bump;
 use crate::real_loop::{Ended, Shared};
 use crate::say;
 use crate::supervisor::Supervisor;
-use crate::urgent::StoppedBy;
+use crate::urgent::{NotCleared, StoppedBy};
 use crate::zeroing::DeviceSet;
+use rt_core::clock::monotonic_ns;
 use rt_core::epitaph::{EpitaphKind, EpitaphRef};
 use rt_core::log::LostCount;
 use rt_core::signals::StopSignals;
@@ -32,6 +33,8 @@ use std::time::{Duration, Instant};
 /// A loop that was asked to end does so within a tick. A stall of the machine is shorter than this, and so is the
 /// patience of whoever stops a driver whose motors push.
 const PATIENCE: Duration = Duration::from_secs(2);
+/// Who said that an arm is in its zeroing pose held it there; an arm that was left alone since may be elsewhere.
+const ZERO_IN_TIME_NS: u64 = 1_000_000_000;
 const HUNG: &str = "the loop hangs; the motors were switched off behind its back";
 /// How often the socket's thread looks at signals and at the log when nothing else happens.
 const POLL: Duration = Duration::from_millis(20);
@@ -153,17 +156,22 @@ impl Recipient for Desk<'_> {
                 say(self.options, format_args!("lease {lease} ended"));
             }
             ServerEvent::LeaseRefused => bump(&self.memory.counters.leases_refused),
-            ServerEvent::ClearFaultRequested { uid, is_administrator } => {
+            ServerEvent::ClearFaultRequested { uid, is_administrator, asked_ns } => {
                 let is_own = |by| by == StoppedBy::Nobody || by == StoppedBy::User(uid);
-                if !self.sender.urgent.clear_fault(|by| is_administrator || is_own(by)) {
-                    return Err(Verdict::NotAllowed);
-                }
+                let cleared = self.sender.urgent.clear_fault(asked_ns, |by| is_administrator || is_own(by));
+                cleared.map_err(|why| match why {
+                    NotCleared::Outdated => Verdict::Outdated,
+                    NotCleared::NotAllowed => Verdict::NotAllowed,
+                })?;
             }
             ServerEvent::EmergencyStopRequested { pid, uid } => {
                 self.sender.urgent.stop(Some(uid));
                 say(self.options, format_args!("emergency stop, asked for by process {pid} of user {uid}"));
             }
-            ServerEvent::ZeroRequested { pid, devices } => {
+            ServerEvent::ZeroRequested { asked_ns, .. } if monotonic_ns() - asked_ns > ZERO_IN_TIME_NS => {
+                return Err(Verdict::Outdated);
+            }
+            ServerEvent::ZeroRequested { pid, devices, .. } => {
                 self.post(Letter::Zero(DeviceSet(devices)))?;
                 say(self.options, format_args!("process {pid} asks to zero devices (bits {devices:#x})"));
             }

@@ -3,10 +3,11 @@
 //! Model: one atomic word holds whether an emergency stop and whether leaving the fault are asked for, and who made
 //! the emergency stop that stands; another one the number of the last lease that has ended. To ask twice is to ask
 //! once, so nothing can be full and nobody waits.
-//! Invariants: a request to leave a fault never undoes an emergency stop that was asked for after it or that the loop
-//! has not seen yet; the emergency stop of somebody stays his until it is left.
+//! Invariants: a request to leave a fault never undoes an emergency stop that was asked for after it, however late it is
+//! heard, nor one that the loop has not seen yet; the emergency stop of somebody stays his until it is left.
 //! Cost: a load for a tick in which nothing is asked.
 
+use rt_core::clock::monotonic_ns;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -38,6 +39,15 @@ pub struct Asked {
     pub ended_lease: u64,
 }
 
+/// Why a fault is not left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NotCleared {
+    /// An emergency stop came after that was asked.
+    Outdated,
+    /// Who asks may not undo what stands.
+    NotAllowed,
+}
+
 /// The words, shared between whoever asks and the loop.
 #[derive(Debug, Clone, Default)]
 pub struct Urgent(Arc<Words>);
@@ -45,25 +55,39 @@ pub struct Urgent(Arc<Words>);
 #[derive(Debug, Default)]
 struct Words {
     state: AtomicU64,
+    /// When the last emergency stop was asked for (CLOCK_MONOTONIC, ns).
+    stopped_ns: AtomicU64,
     ended_lease: AtomicU64,
 }
 
 impl Urgent {
     /// All motors off with the loop's next tick. `user` is who asks, if that is known.
     pub fn stop(&self, user: Option<u32>) {
+        // Before the stop itself: whoever sees that sees when it was.
+        self.0.stopped_ns.fetch_max(monotonic_ns(), Ordering::Release);
         self.update(|state| {
             let by = merge(by_of(state), user.map_or(StoppedBy::Several, StoppedBy::User));
             Some(EMERGENCY_STOP | word_of(by))
         });
     }
 
-    /// Leave the fault state, if `may` who asks undo what stands; returns whether.
-    pub fn clear_fault(&self, may: impl Fn(StoppedBy) -> bool) -> bool {
-        self.update(|state| {
+    /// Leave the fault state, as was asked at `asked_ns` (CLOCK_MONOTONIC), if `may` who asks undo what stands.
+    ///
+    /// # Errors
+    /// Why not.
+    pub fn clear_fault(&self, asked_ns: u64, may: impl Fn(StoppedBy) -> bool) -> Result<(), NotCleared> {
+        let mut why = NotCleared::Outdated;
+        let is_done = self.update(|state| {
             let by = by_of(state);
+            if self.0.stopped_ns.load(Ordering::Acquire) >= asked_ns {
+                why = NotCleared::Outdated;
+                return None;
+            }
+            why = NotCleared::NotAllowed;
             let left = if state & EMERGENCY_STOP == 0 { StoppedBy::Nobody } else { by };
             may(by).then_some(state & ASKED | CLEAR_FAULT | word_of(left))
-        })
+        });
+        if is_done { Ok(()) } else { Err(why) }
     }
 
     /// Whose emergency stop stands.
@@ -126,6 +150,29 @@ mod tests {
         move |by| by == StoppedBy::Nobody || by == StoppedBy::User(user)
     }
 
+    const NOT_ALLOWED: Result<(), NotCleared> = Err(NotCleared::NotAllowed);
+
+    /// Asked after all that was done so far.
+    fn now(urgent: &Urgent, may: impl Fn(StoppedBy) -> bool) -> Result<(), NotCleared> {
+        urgent.clear_fault(monotonic_ns() + 1, may)
+    }
+
+    /// The request lies in a socket while the service is stuck; the stop comes by datagram meanwhile.
+    #[test]
+    fn a_request_to_leave_a_fault_that_is_heard_late_does_not_undo_a_stop_that_came_after_it() {
+        let urgent = Urgent::default();
+        urgent.stop(Some(ANN));
+        assert!(urgent.take().emergency_stop);
+        let asked_ns = monotonic_ns() + 1;
+        while monotonic_ns() <= asked_ns {}
+        urgent.stop(Some(ANN));
+        assert!(urgent.take().emergency_stop);
+        assert_eq!(urgent.clear_fault(asked_ns, |_| true), Err(NotCleared::Outdated));
+        assert!(!urgent.take().clear_fault);
+        assert_eq!(urgent.stopped_by(), StoppedBy::User(ANN));
+        assert_eq!(now(&urgent, own(ANN)), Ok(()));
+    }
+
     #[test]
     fn a_stop_of_several_is_left_by_none_of_them_alone() {
         let urgent = Urgent::default();
@@ -134,9 +181,9 @@ mod tests {
         urgent.stop(Some(BEN));
         assert_eq!(urgent.stopped_by(), StoppedBy::Several);
         assert!(urgent.take().emergency_stop);
-        assert!(!urgent.clear_fault(own(ANN)) && !urgent.clear_fault(own(BEN)));
+        assert!(now(&urgent, own(ANN)) == NOT_ALLOWED && now(&urgent, own(BEN)) == NOT_ALLOWED);
         assert!(!urgent.take().clear_fault);
-        assert!(urgent.clear_fault(|_| true));
+        assert_eq!(now(&urgent, |_| true), Ok(()));
         assert_eq!(urgent.stopped_by(), StoppedBy::Nobody);
         assert!(urgent.take().clear_fault);
     }
@@ -144,7 +191,7 @@ mod tests {
     #[test]
     fn a_stop_cancels_a_request_to_leave_a_fault_that_came_before_it() {
         let urgent = Urgent::default();
-        assert!(urgent.clear_fault(own(BEN)));
+        assert_eq!(now(&urgent, own(BEN)), Ok(()));
         urgent.stop(Some(ANN));
         let asked = urgent.take();
         assert!(asked.emergency_stop && !asked.clear_fault, "{asked:?}");
@@ -155,7 +202,7 @@ mod tests {
     fn a_stop_that_the_loop_has_not_seen_stays_its_makers() {
         let urgent = Urgent::default();
         urgent.stop(Some(ANN));
-        assert!(urgent.clear_fault(own(ANN)));
+        assert_eq!(now(&urgent, own(ANN)), Ok(()));
         assert_eq!(urgent.stopped_by(), StoppedBy::User(ANN));
         let asked = urgent.take();
         assert!(asked.emergency_stop && asked.clear_fault);

@@ -183,7 +183,7 @@ static inline void phantom_detach(PhantomAttachment *driver) {
     driver->connection = -1;
 }
 
-/* A request of this header's version. */
+/* A request of this header's version, asked now. */
 static inline PhantomRequest phantom_request(uint64_t kind, const char *name) {
     PhantomRequest request;
     memset(&request, 0, sizeof request);
@@ -191,6 +191,9 @@ static inline PhantomRequest phantom_request(uint64_t kind, const char *name) {
     request.abi_version = PHANTOM_ABI_VERSION;
     request.layout_hash = PHANTOM_LAYOUT_HASH;
     request.kind = kind;
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    request.asked_ns = (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
     size_t length = strlen(name);
     memcpy(request.name, name, length < PHANTOM_NAME_BYTES ? length : PHANTOM_NAME_BYTES);
     return request;
@@ -276,6 +279,10 @@ static inline int phantom_is_granted(const PhantomRequest *request, const Phanto
         snprintf(error, PHANTOM_ERROR_BYTES,
                  "the driver does not let user %u ask for this (kind %llu): root and the user that it runs as may",
                  (unsigned)geteuid(), (unsigned long long)request->kind);
+    } else if (answer->verdict == PHANTOM_VERDICT_OUTDATED) {
+        snprintf(error, PHANTOM_ERROR_BYTES,
+                 "the driver heard this too late: an emergency stop came after it was asked, or more than a second "
+                 "went by; look how things stand, then ask again");
     } else if (answer->verdict == PHANTOM_VERDICT_UNKNOWN_KIND) {
         snprintf(error, PHANTOM_ERROR_BYTES,
                  "the driver speaks version %u.%u and does not know requests of kind %llu, this program speaks %u.%u; "

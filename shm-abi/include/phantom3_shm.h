@@ -253,6 +253,8 @@ enum PhantomVerdict
   PHANTOM_VERDICT_NOT_ALLOWED = 9,
   // Since 1.3. The driver's loop takes no requests at the moment.
   PHANTOM_VERDICT_BUSY = 10,
+  // Since 1.3. It was asked before what it would undo, or too long ago.
+  PHANTOM_VERDICT_OUTDATED = 11,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -614,8 +616,10 @@ typedef struct PhantomRequest {
   uint8_t name[PHANTOM_NAME_BYTES];
   // Since 1.2. Bit `i`: device `i` is meant; 0: all are. Only [`RequestKind::Zero`] looks at it.
   uint64_t devices;
+  // Since 1.3. When it was asked, by CLOCK_MONOTONIC (ns); 0: not told.
+  uint64_t asked_ns;
   // Zero.
-  uint64_t reserved[3];
+  uint64_t reserved[2];
 } PhantomRequest;
 
 // What the driver says to it.
@@ -821,7 +825,8 @@ PHANTOM_ASSERT(offsetof(PhantomRequest, layout_hash) == 16);
 PHANTOM_ASSERT(offsetof(PhantomRequest, kind) == 24);
 PHANTOM_ASSERT(offsetof(PhantomRequest, name) == 32);
 PHANTOM_ASSERT(offsetof(PhantomRequest, devices) == 96);
-PHANTOM_ASSERT(offsetof(PhantomRequest, reserved) == 104);
+PHANTOM_ASSERT(offsetof(PhantomRequest, asked_ns) == 104);
+PHANTOM_ASSERT(offsetof(PhantomRequest, reserved) == 112);
 
 PHANTOM_ASSERT(sizeof(PhantomAnswer) == 192);
 PHANTOM_ASSERT(offsetof(PhantomAnswer, magic) == 0);

@@ -293,6 +293,11 @@ fn judge(socket: &Path, request: &Request, answer: &Answer) -> Result<(), Attach
         Some(Verdict::Busy) => Err(AttachError::Refused(
             "its loop collects no requests; see with `io-driver status` whether its ticks go on".into(),
         )),
+        Some(Verdict::Outdated) => Err(AttachError::Refused(
+            "it heard this too late: an emergency stop came after it was asked, or more than a second went by; look \
+             how things stand, then ask again"
+                .into(),
+        )),
         Some(Verdict::NotAllowed) => Err(not_allowed(socket, request, answer)),
         Some(Verdict::UnknownKind) => {
             Err(AttachError::UnknownRequest { found, kind: request.kind, expected })

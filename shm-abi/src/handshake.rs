@@ -28,8 +28,10 @@ pub struct Request {
     pub name: [u8; NAME_BYTES],
     /// Since 1.2. Bit `i`: device `i` is meant; 0: all are. Only [`RequestKind::Zero`] looks at it.
     pub devices: u64,
+    /// Since 1.3. When it was asked, by CLOCK_MONOTONIC (ns); 0: not told.
+    pub asked_ns: u64,
     /// Zero.
-    pub reserved: [u64; 3],
+    pub reserved: [u64; 2],
 }
 
 assert_layout!(Request: 128, 8 {
@@ -40,7 +42,8 @@ assert_layout!(Request: 128, 8 {
     name: [u8; NAME_BYTES] = 32,
     reserved: [u64; 4] = 96 => {
         devices: u64 = 96,
-        reserved: [u64; 3] = 104,
+        asked_ns: u64 = 104,
+        reserved: [u64; 2] = 112,
     },
 });
 
@@ -154,6 +157,8 @@ pub enum Verdict {
     NotAllowed = 9,
     /// Since 1.3. The driver's loop takes no requests at the moment.
     Busy = 10,
+    /// Since 1.3. It was asked before what it would undo, or too long ago.
+    Outdated = 11,
 }
 
 from_word!(Verdict {
@@ -167,10 +172,11 @@ from_word!(Verdict {
     NoSegment,
     NotAllowed,
     Busy,
+    Outdated,
 });
 
 impl Request {
-    /// A request of this version.
+    /// A request of this version, asked now.
     pub fn new(kind: RequestKind, name: &str) -> Self {
         let kind = kind as u64;
         Self {
@@ -180,7 +186,8 @@ impl Request {
             kind,
             name: name_bytes(name),
             devices: 0,
-            reserved: [0; 3],
+            asked_ns: monotonic_ns(),
+            reserved: [0; 2],
         }
     }
 
@@ -213,6 +220,13 @@ impl Answer {
             ..Self::zeroed()
         }
     }
+}
+
+/// Now, by the clock of [`Request::asked_ns`].
+pub(crate) fn monotonic_ns() -> u64 {
+    let now = rustix::time::clock_gettime(rustix::time::ClockId::Monotonic);
+    // Neither is negative.
+    now.tv_sec.unsigned_abs() * 1_000_000_000 + now.tv_nsec.unsigned_abs()
 }
 
 /// Two builds can share memory when their major versions are equal; the layout hash has the last word.

@@ -37,7 +37,8 @@ use std::time::{Duration, Instant};
 
 pub use crate::socket_file::BindError;
 pub use places::{
-    MAX_ASKING, MAX_CONNECTIONS, MAX_OBSERVERS, MAX_OBSERVERS_OF_PROCESS, MAX_OBSERVERS_OF_USER,
+    FOR_ADMINISTRATORS, MAX_ASKING, MAX_CONNECTIONS, MAX_OBSERVERS, MAX_OBSERVERS_OF_PROCESS,
+    MAX_OBSERVERS_OF_USER,
 };
 
 /// How long a new connection may take to say what it wants.
@@ -83,6 +84,8 @@ pub enum ServerEvent {
         uid: u32,
         /// Whether he may undo what others did.
         is_administrator: bool,
+        /// When it was asked, by CLOCK_MONOTONIC (ns); no later than it was.
+        asked_ns: u64,
     },
     /// Somebody asks for all motors off, now.
     EmergencyStopRequested {
@@ -97,6 +100,8 @@ pub enum ServerEvent {
         pid: u64,
         /// Bit `i`: device `i` does; 0: all do.
         devices: u64,
+        /// When it was asked, by CLOCK_MONOTONIC (ns); no later than it was.
+        asked_ns: u64,
     },
     /// A segment for a lease could not be made.
     Trouble {
@@ -132,6 +137,8 @@ pub struct Server {
     connections: Vec<Connection>,
     next_lease: u64,
     accept_after: Option<Instant>,
+    /// When the last two turns began, the older first (CLOCK_MONOTONIC, ns).
+    turns_ns: [u64; 2],
 }
 
 impl Server {
@@ -164,7 +171,16 @@ impl Server {
         };
         let (listener, file) = SocketFile::make(path, |path| UnixListener::bind(path), prepare)?;
         let connections = Vec::with_capacity(MAX_CONNECTIONS);
-        Ok(Self { listener, file, _lock: lock, rights, connections, next_lease: 1, accept_after: None })
+        Ok(Self {
+            listener,
+            file,
+            _lock: lock,
+            rights,
+            connections,
+            next_lease: 1,
+            accept_after: None,
+            turns_ns: [handshake::monotonic_ns(); 2],
+        })
     }
 
     /// Where it listens.
@@ -182,6 +198,7 @@ impl Server {
         timeout: Duration,
         to: &mut impl Recipient,
     ) -> io::Result<()> {
+        self.turns_ns = [self.turns_ns[1], handshake::monotonic_ns()];
         let (newcomer, talking) = self.wait(timeout)?;
         for index in talking {
             self.listen_to(index, memory, to);
@@ -317,6 +334,7 @@ impl Server {
         }
         let Peer { pid, uid, .. } = self.connections[index].peer;
         let pid = u64::from(pid);
+        let asked_ns = self.asked_ns(request);
         match kind {
             RequestKind::Observe => self.let_observe(index, memory),
             RequestKind::Command => self.lease_to(index, request, memory, to),
@@ -324,14 +342,25 @@ impl Server {
             RequestKind::Stop => self.pass_on(index, ServerEvent::StopRequested { pid }, to),
             RequestKind::ClearFault => {
                 let is_administrator = self.check(index, Right::Administer).is_ok();
-                self.pass_on(index, ServerEvent::ClearFaultRequested { uid, is_administrator }, to)
+                self.pass_on(index, ServerEvent::ClearFaultRequested { uid, is_administrator, asked_ns }, to)
             }
             RequestKind::EmergencyStop => {
                 self.pass_on(index, ServerEvent::EmergencyStopRequested { pid, uid }, to)
             }
-            RequestKind::Zero => {
-                self.pass_on(index, ServerEvent::ZeroRequested { pid, devices: request.devices }, to)
-            }
+            RequestKind::Zero => self.pass_on(
+                index,
+                ServerEvent::ZeroRequested { pid, devices: request.devices, asked_ns },
+                to,
+            ),
+        }
+    }
+
+    /// When it was asked. Clients of before 1.3 do not tell; what they say is heard in the turn after they said it, unless
+    /// there is a crowd.
+    fn asked_ns(&self, request: &Request) -> u64 {
+        match request.asked_ns {
+            0 => self.turns_ns[0],
+            told => told.min(handshake::monotonic_ns()),
         }
     }
 
@@ -358,7 +387,9 @@ impl Server {
 
     fn let_observe(&self, index: usize, memory: &DriverMemory) -> Stage {
         let observers = self.connections.iter().filter(|c| matches!(c.stage, Stage::Observing));
-        if !places::may_observe(self.connections[index].owner(), observers.map(Connection::owner)) {
+        let is_administrator = self.check(index, Right::Administer).is_ok();
+        let owner = self.connections[index].owner();
+        if !places::may_observe(owner, is_administrator, observers.map(Connection::owner)) {
             return self.refuse(index, Verdict::Crowded);
         }
         match self.answer(index, &Answer::new(Verdict::Granted), &[memory.fd()]) {

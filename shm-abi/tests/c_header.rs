@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 const BLESS: &str = "PHANTOM3_BLESS";
 const GUARD_END: &str = "#endif  /* PHANTOM3_SHM_H */\n";
 /// The files with what crosses the border, in the order in which the header tells it.
-const SOURCES: [&str; 6] = ["layout", "frame", "command", "handshake", "doorbell", "segment"];
+const SOURCES: [&str; 6] = ["layout", "frame", "command", "handshake", "doorbell", "segment/description"];
 
 #[test]
 fn the_committed_header_is_what_the_sources_give() {

@@ -131,7 +131,8 @@ fn request(minor: u32) -> Request {
         kind: RequestKind::Command as u64,
         name: name_bytes(NAME),
         devices: if minor >= 2 { count(13) } else { 0 },
-        reserved: [0; 3],
+        asked_ns: if minor >= 3 { count(14) } else { 0 },
+        reserved: [0; 2],
     }
 }
 

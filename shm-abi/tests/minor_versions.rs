@@ -411,7 +411,7 @@ fn a_request_to_zero_names_its_devices_and_who_asks() {
     let host = Host::start(directory.path());
     for mask in [0, 0b101] {
         client::zero(&host.socket, "today", mask).unwrap();
-        let ServerEvent::ZeroRequested { pid, devices } = host.event() else { panic!("not heard") };
+        let ServerEvent::ZeroRequested { pid, devices, .. } = host.event() else { panic!("not heard") };
         assert_eq!((pid, devices), (own_pid(), mask));
     }
 }

@@ -11,10 +11,11 @@ use std::os::unix::fs::OpenOptionsExt;
 use std::time::{Duration, Instant};
 use system_tests::faults::amplifiers::wait_for;
 use system_tests::faults::commander::Commander;
-use system_tests::faults::process::io_driver;
+use system_tests::faults::process::{Running, io_driver};
 use system_tests::faults::ring::RingLog;
 use system_tests::faults::stand::{Setup, Stand};
 use system_tests::faults::stuck::{Harm, Tracer, live};
+use system_tests::programs;
 
 const PUSH: [f64; 3] = [0.0, 1.0, 0.0];
 
@@ -50,13 +51,14 @@ fn check_stopped(stand: &Stand, why: FaultReason, when: &str) {
 
 /// The loop has ended and told the amplifiers so, whatever the rest of the process does.
 fn check_ended(stand: &Stand, when: &str) {
-    wait_for(when, || stand.amplifiers.were_told_off());
+    wait_for(when, || {
+        let last = stand.view().latest_tick();
+        // Many ticks at 2 kHz, if there were any.
+        std::thread::sleep(Duration::from_millis(50));
+        stand.amplifiers.were_told_off() && stand.view().latest_tick() == last
+    });
     stand.amplifiers.settle();
     stand.amplifiers.check_off(when);
-    let last = stand.view().latest_tick();
-    // Many ticks at 2 kHz, if there were any.
-    std::thread::sleep(Duration::from_millis(20));
-    assert_eq!(stand.view().latest_tick(), last, "{when}: its loop goes on");
 }
 
 /// What a test left of a driver that may hang: it is killed.
@@ -258,6 +260,36 @@ fn whatever_call_the_service_is_stuck_in_the_loop_stops_the_motors_by_itself() {
         drop((tracer, commander));
         put_away(&stand);
     }
+}
+
+#[test]
+fn an_emergency_stop_that_finds_no_socket_tells_of_the_driver_that_made_it() {
+    let stand = Stand::start(Setup::new("real"));
+    let commander = push(&stand);
+    for file in [stand.socket(), stop_socket::path_beside(&stand.socket())] {
+        std::fs::rename(&file, file.with_extension("moved")).expect("its file");
+    }
+    let end = io_driver(&["emergency-stop"], &stand.socket());
+    assert_eq!(end.status, Some(3), "{end:?}");
+    let words = format!("process {} listens there", stand.driver.id());
+    assert!(end.err.contains(&words) && end.err.contains("motors may still be on"), "{end:?}");
+    drop(commander);
+    put_away(&stand);
+}
+
+#[test]
+fn an_emergency_stop_that_gets_no_threads_stops_and_looks_all_the_same() {
+    /// Of each thread's stack (bytes): more than any machine has addresses for.
+    const ENDLESS: &str = "100000000000000";
+    let stand = Stand::start(Setup::new("real"));
+    let commander = push(&stand);
+    let mut stop = programs::io_driver();
+    stop.env("RUST_MIN_STACK", ENDLESS).args(["emergency-stop", "--socket"]).arg(stand.socket());
+    let end = Running::start(&mut stop).end();
+    assert_eq!(end.status, Some(0), "{end:?}");
+    check_stopped(&stand, FaultReason::EmergencyStop, "no threads");
+    drop(commander);
+    put_away(&stand);
 }
 
 #[test]

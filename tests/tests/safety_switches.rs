@@ -1,7 +1,11 @@
 //! Emergency stop and dead-man's switch, pressed on the card of a real driver with a force on.
 
+use bytemuck::Zeroable;
 use rustix::process::Signal;
+use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
 use shm_abi::{DriverState, FaultReason};
+use std::io::{Read, Write};
+use std::os::unix::net::UnixStream;
 use system_tests::faults::amplifiers::wait_for;
 use system_tests::faults::process::io_driver;
 use system_tests::faults::stand::{Setup, Stand, end_app};
@@ -32,7 +36,9 @@ fn an_emergency_stop_on_the_card_switches_off_and_only_a_request_switches_on_aga
     let status = io_driver(&["status"], &stand.socket());
     assert!(status.out.contains("emergency stop pressed"), "{status:?}");
     let energised = stand.amplifiers.tally().energised;
-    assert_eq!(io_driver(&["clear-fault"], &stand.socket()).status, Some(0));
+    let end = io_driver(&["clear-fault"], &stand.socket());
+    assert_eq!(end.status, Some(3), "{end:?}");
+    assert!(end.err.contains("all the same: an emergency stop was pressed"), "{end:?}");
     stand.amplifiers.settle();
     assert!(is_in_fault(&stand), "while it is pressed");
     assert_eq!(stand.amplifiers.tally().energised, energised);
@@ -57,6 +63,24 @@ fn an_emergency_stop_over_the_socket_switches_off_whoever_commands() {
     stand.wait_for_force();
     end_app(app);
     stand.driver.must_run();
+    stand.finish();
+}
+
+/// It lay in the socket of a service that was stuck, and was heard when the stop had long been seen.
+#[test]
+fn a_request_to_leave_a_fault_that_was_asked_before_an_emergency_stop_does_not_undo_it() {
+    let stand = Stand::start(Setup::new("real"));
+    let request = Request::new(RequestKind::ClearFault, "late");
+    assert_eq!(io_driver(&["emergency-stop"], &stand.socket()).status, Some(0));
+    let mut driver = UnixStream::connect(stand.socket()).expect("it listens");
+    driver.set_read_timeout(Some(system_tests::driver::HANG)).expect("a time-out");
+    driver.write_all(bytemuck::bytes_of(&request)).expect("it reads");
+    let mut answer = Answer::zeroed();
+    driver.read_exact(bytemuck::bytes_of_mut(&mut answer)).expect("it answers");
+    assert_eq!(Verdict::from_word(answer.verdict), Some(Verdict::Outdated));
+    stand.amplifiers.settle();
+    assert!(is_in_fault(&stand));
+    assert_eq!(io_driver(&["clear-fault"], &stand.socket()).status, Some(0));
     stand.finish();
 }
 

@@ -40,60 +40,100 @@ pub(super) fn emergency_stop(socket: &Path) -> ExitCode {
     let begun = Instant::now();
     let sent = stop_socket::send(socket);
     let (tell, news) = channel();
-    in_background(socket, &tell, |socket, tell| {
+    let asks = in_background(socket, &tell, |socket, tell| {
         let _ = tell.send(News::Asked(client::emergency_stop(&socket, NAME)));
     });
-    in_background(socket, &tell, |socket, tell| {
-        if let Some(tick) = wait_for_zero(&socket) {
+    let looks = in_background(socket, &tell, move |socket, tell| {
+        if let Some(tick) = wait_for_zero(&socket, begun + PATIENCE) {
             let _ = tell.send(News::Shown(tick));
         }
     });
-    judge(&news, begun, sent.is_ok())
+    match (asks, looks) {
+        (Ok(()), Ok(())) => judge(&news, socket, begun, sent.is_ok()),
+        _ => ask_and_look(socket, begun),
+    }
+}
+
+/// One after the other, where the system gives no threads.
+fn ask_and_look(socket: &Path, begun: Instant) -> ExitCode {
+    say(format_args!("io-driver: {UNCERTAIN}"));
+    if let Err(error) = client::emergency_stop(socket, NAME) {
+        say(format_args!("io-driver: {error}"));
+    }
+    match wait_for_zero(socket, begun + PATIENCE) {
+        Some(tick) => shown(tick),
+        None => not_shown(),
+    }
 }
 
 fn in_background(
     socket: &Path,
     tell: &Sender<News>,
     body: impl FnOnce(PathBuf, Sender<News>) + Send + 'static,
-) {
+) -> std::io::Result<()> {
     let (socket, tell) = (socket.to_path_buf(), tell.clone());
     // They end with the process, whatever they wait for.
-    std::thread::spawn(move || body(socket, tell));
+    std::thread::Builder::new().spawn(move || body(socket, tell)).map(drop)
 }
 
-fn judge(news: &Receiver<News>, begun: Instant, was_sent: bool) -> ExitCode {
+fn judge(news: &Receiver<News>, socket: &Path, begun: Instant, was_sent: bool) -> ExitCode {
     let mut is_warned = false;
     loop {
         let patience = if is_warned { PATIENCE } else { PROMPT };
         match news.recv_timeout(patience.saturating_sub(begun.elapsed())) {
-            Ok(News::Shown(tick)) => {
-                let _ = print_line(&format!("emergency stop: tick {tick} shows the fault and no force"));
-                return ExitCode::SUCCESS;
-            }
+            Ok(News::Shown(tick)) => return shown(tick),
             // Nobody is there, by either way.
-            Ok(News::Asked(Err(error))) if !was_sent => return fail(&error, EXIT_USAGE),
+            Ok(News::Asked(Err(error))) if !was_sent => return unreachable_driver(socket, &error),
             Ok(News::Asked(_)) => {}
             Err(_) if !is_warned => {
                 is_warned = true;
                 say(format_args!("io-driver: {UNCERTAIN}"));
             }
-            Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {
-                say(format_args!("io-driver: the stop was asked for, and no frame has shown it"));
-                return ExitCode::from(EXIT_FAULT);
-            }
+            Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => return not_shown(),
         }
     }
+}
+
+fn shown(tick: u64) -> ExitCode {
+    let _ = print_line(&format!("emergency stop: tick {tick} shows the fault and no force"));
+    ExitCode::SUCCESS
+}
+
+fn not_shown() -> ExitCode {
+    say(format_args!("io-driver: the stop was asked for, and no frame has shown it"));
+    ExitCode::from(EXIT_FAULT)
+}
+
+/// Nobody can be asked there. A driver whose socket's file was moved or deleted pushes on.
+fn unreachable_driver(socket: &Path, error: &AttachError) -> ExitCode {
+    let Some(pid) = listener(socket) else { return fail(error, EXIT_USAGE) };
+    say(format_args!("io-driver: {error}"));
+    say(format_args!(
+        "io-driver: but process {pid} listens there, and its socket's file was moved or deleted: the motors may still be \
+         on; cut their power, or end it with `kill -TERM {pid}`"
+    ));
+    ExitCode::from(EXIT_FAULT)
+}
+
+/// The process of a driver that listens at this path, whatever became of the file: the kernel keeps the name under which
+/// the socket was made, which ends with the process's number.
+fn listener(socket: &Path) -> Option<u32> {
+    let table = std::fs::read_to_string("/proc/net/unix").ok()?;
+    let made = format!(" {}.", socket.display());
+    let pids = table.lines().filter_map(|line| line.rsplit_once(made.as_str())?.1.parse().ok());
+    pids.into_iter().find(|pid: &u32| Path::new(&format!("/proc/{pid}")).exists())
 }
 
 const UNCERTAIN: &str =
     "the emergency stop is not confirmed within 100 ms: the motors may still be on; cut their power";
 
-/// The tick whose frame shows that the motors are off; `None`: the driver is gone.
-fn wait_for_zero(socket: &Path) -> Option<u64> {
+/// The tick whose frame shows that the motors are off; `None`: the driver is gone, or no frame shows that in time.
+fn wait_for_zero(socket: &Path, until: Instant) -> Option<u64> {
     let attachment = loop {
         match client::observe(socket, NAME) {
             Ok(attachment) => break attachment,
             Err(AttachError::NoDriver { .. } | AttachError::DriverGone { .. }) => return None,
+            Err(_) if Instant::now() > until => return None,
             Err(_) => std::thread::sleep(RETRY),
         }
     };
@@ -103,7 +143,7 @@ fn wait_for_zero(socket: &Path) -> Option<u64> {
     loop {
         match driver.read_latest() {
             Some(frame) if Some(frame.tick) > stale && is_stopped(&frame) => return Some(frame.tick),
-            _ if !attachment.connection.is_open() => return None,
+            _ if !attachment.connection.is_open() || Instant::now() > until => return None,
             _ => std::thread::sleep(LOOK),
         }
     }

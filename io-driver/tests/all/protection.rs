@@ -265,7 +265,7 @@ fn an_emergency_stop_outlasts_a_request_to_leave_a_fault_of_the_same_tick() {
         if stop_comes_first {
             sender.urgent.stop(None);
         }
-        sender.urgent.clear_fault(|_| true);
+        sender.urgent.clear_fault(u64::MAX, |_| true).unwrap();
         if !stop_comes_first {
             sender.urgent.stop(None);
         }

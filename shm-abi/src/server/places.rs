@@ -3,7 +3,7 @@
 //! Problem: connections are few and strangers are many; one process could take all places by looking on, or by asking
 //! nothing again and again.
 //! Model: only who looks on or commands keeps a place. Observers have [`MAX_OBSERVERS`] places, of which one user and
-//! one process get only some. Those who have yet to say what they want have places of their own; a newcomer that finds
+//! one process get only some, and [`FOR_ADMINISTRATORS`] are kept for administrators, however many others look on. Those who have yet to say what they want have places of their own; a newcomer that finds
 //! them taken gets the place of the oldest silent connection of whoever has the most, so that opening more of them
 //! costs nobody but the opener.
 
@@ -11,6 +11,8 @@
 pub const MAX_CONNECTIONS: usize = MAX_OBSERVERS + 1 + MAX_ASKING;
 /// Who looks on.
 pub const MAX_OBSERVERS: usize = 60;
+/// Of these, administrators': whoever is to find out what is wrong can look on.
+pub const FOR_ADMINISTRATORS: usize = 8;
 /// Of these, one user's: others can look on, too.
 pub const MAX_OBSERVERS_OF_USER: usize = 48;
 /// Of these, one process's.
@@ -26,14 +28,19 @@ pub(super) struct Owner {
 }
 
 /// Whether there is a place for one more observer beside these.
-pub(super) fn may_observe(newcomer: Owner, observers: impl Iterator<Item = Owner>) -> bool {
+pub(super) fn may_observe(
+    newcomer: Owner,
+    is_administrator: bool,
+    observers: impl Iterator<Item = Owner>,
+) -> bool {
+    let most = if is_administrator { MAX_OBSERVERS } else { MAX_OBSERVERS - FOR_ADMINISTRATORS };
     let (mut all, mut of_user, mut of_process) = (0, 0, 0);
     for owner in observers {
         all += 1;
         of_user += usize::from(owner.uid == newcomer.uid);
         of_process += usize::from(owner == newcomer);
     }
-    all < MAX_OBSERVERS && of_user < MAX_OBSERVERS_OF_USER && of_process < MAX_OBSERVERS_OF_PROCESS
+    all < most && of_user < MAX_OBSERVERS_OF_USER && of_process < MAX_OBSERVERS_OF_PROCESS
 }
 
 /// Which of these silent connections, oldest first, loses its place.
@@ -56,13 +63,21 @@ mod tests {
     #[test]
     fn one_process_and_one_user_leave_places_for_others() {
         let process = [owner(1, 1); MAX_OBSERVERS_OF_PROCESS];
-        assert!(!may_observe(owner(1, 1), process.iter().copied()));
-        assert!(may_observe(owner(1, 2), process.iter().copied()));
+        assert!(!may_observe(owner(1, 1), true, process.iter().copied()));
+        assert!(may_observe(owner(1, 2), false, process.iter().copied()));
         let user: Vec<_> = (0..MAX_OBSERVERS_OF_USER as u32).map(|pid| owner(1, pid)).collect();
-        assert!(!may_observe(owner(1, 999), user.iter().copied()));
-        assert!(may_observe(owner(2, 999), user.iter().copied()));
+        assert!(!may_observe(owner(1, 999), true, user.iter().copied()));
+        assert!(may_observe(owner(2, 999), false, user.iter().copied()));
+    }
+
+    #[test]
+    fn the_last_places_are_kept_for_administrators() {
+        let strangers = MAX_OBSERVERS - FOR_ADMINISTRATORS;
         let all: Vec<_> = (0..MAX_OBSERVERS as u32).map(|id| owner(id, id)).collect();
-        assert!(!may_observe(owner(999, 999), all.iter().copied()));
+        assert!(may_observe(owner(999, 999), false, all[1..strangers].iter().copied()));
+        assert!(!may_observe(owner(999, 999), false, all[..strangers].iter().copied()));
+        assert!(may_observe(owner(999, 999), true, all[1..].iter().copied()));
+        assert!(!may_observe(owner(999, 999), true, all.iter().copied()));
     }
 
     #[test]

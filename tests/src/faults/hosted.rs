@@ -124,8 +124,8 @@ fn pass_on(event: ServerEvent, sender: &mut Sender) {
         ServerEvent::ZeroRequested { devices, .. } => Letter::Zero(DeviceSet(devices)),
         ServerEvent::LeaseEnded { lease } => return sender.urgent.end_lease(lease),
         ServerEvent::EmergencyStopRequested { uid, .. } => return sender.urgent.stop(Some(uid)),
-        ServerEvent::ClearFaultRequested { .. } => {
-            sender.urgent.clear_fault(|_| true);
+        ServerEvent::ClearFaultRequested { asked_ns, .. } => {
+            let _ = sender.urgent.clear_fault(asked_ns, |_| true);
             return;
         }
         ServerEvent::LeaseRefused | ServerEvent::StopRequested { .. } | ServerEvent::Trouble { .. } => return,
