@@ -10,13 +10,10 @@ use system_tests::faults::amplifiers::wait_for;
 use system_tests::faults::process::io_driver;
 use system_tests::faults::stand::{Setup, Stand, end_app};
 
-fn state(stand: &Stand) -> (Option<DriverState>, Option<FaultReason>) {
-    let frame = stand.view().read_latest().expect("a frame");
-    (DriverState::from_word(frame.state), FaultReason::from_word(frame.fault))
-}
-
+/// False as long as there is no frame.
 fn is_in_fault(stand: &Stand) -> bool {
-    state(stand) == (Some(DriverState::Fault), Some(FaultReason::EmergencyStop))
+    let (state, fault) = (DriverState::Fault as u64, FaultReason::EmergencyStop as u64);
+    stand.view().read_latest().is_some_and(|frame| (frame.state, frame.fault) == (state, fault))
 }
 
 #[test]

@@ -40,14 +40,18 @@ pub(super) fn clear_fault(socket: &Path) -> ExitCode {
     }
 }
 
-/// The fault that stands once the loop had time to leave it.
+/// The fault that stands once the loop had time to leave it, or that came again at once.
 fn fault_after(driver: &DriverView) -> Option<u64> {
-    let until = Instant::now() + PROMPT + Duration::from_nanos(driver.info().period_ns) * 3;
-    loop {
-        let fault = driver.read_latest().filter(|frame| frame.state == DriverState::Fault as u64)?;
-        if Instant::now() > until {
-            return Some(fault.fault);
-        }
+    let few_ticks = Duration::from_nanos(driver.info().period_ns) * 3;
+    let until = Instant::now() + PROMPT + few_ticks;
+    while fault(driver).is_some() && Instant::now() < until {
         std::thread::sleep(LOOK);
     }
+    std::thread::sleep(few_ticks);
+    fault(driver)
+}
+
+fn fault(driver: &DriverView) -> Option<u64> {
+    let frame = driver.read_latest()?;
+    (frame.state == DriverState::Fault as u64).then_some(frame.fault)
 }
