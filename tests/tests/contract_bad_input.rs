@@ -1,6 +1,9 @@
 //! Every mistake in a command line or a file: status 2, one message that a stranger can act on, and nothing
 //! half-started.
 
+#[path = "contract_bad_input/foreign_recordings.rs"]
+mod foreign_recordings;
+
 use std::ffi::{OsStr, OsString};
 use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::PermissionsExt;
