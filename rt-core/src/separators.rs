@@ -22,9 +22,9 @@ pub fn hint_for_row(line: &str, columns: usize) -> &'static str {
     let cells = line.split(',').count();
     let is_whole = |cell: &str| cell.trim().trim_start_matches(['+', '-']).parse::<u64>().is_ok();
     let whole = line.split(',').filter(|cell| is_whole(cell)).count();
-    // A row of decimal commas has no more than twice the cells, and no points.
-    if (columns + 1..=2 * columns).contains(&cells) && !line.contains('.') && 2 * whole > cells {
-        DECIMAL_POINT
+    // A row of decimal commas has no more than twice the cells, and no points; one cell more is only one too many.
+    if (columns + 2..=2 * columns).contains(&cells) && !line.contains('.') && 2 * whole > cells {
+        "; if its numbers have decimal commas, write points, as in 0.1"
     } else {
         ""
     }
@@ -55,10 +55,10 @@ mod tests {
 
     #[test]
     fn rows_of_decimal_commas_are_told_and_rows_that_are_only_longer_are_not() {
-        for comma in ["0,5,0,01,-1,25,0,0", "1,0,5,2,3"] {
-            assert!(hint_for_row(comma, 4).contains("a point"), "{comma:?}");
+        for comma in ["0,5,0,01,-1,25,0,0", "1,0,5,2,25,3"] {
+            assert!(hint_for_row(comma, 4).contains("write points"), "{comma:?}");
         }
-        for other in ["0.5,1,2,3,4", "1,2,3,4", "1,2,3", "a,b,c,d,e", "1,2,3,4,5,6,7,8,9"] {
+        for other in ["0.5,1,2,3,4,5", "1,2,3,4,5", "1,2,3,4", "1,2,3", "a,b,c,d,e,f", "1,2,3,4,5,6,7,8,9"] {
             assert_eq!(hint_for_row(other, 4), "", "{other:?}");
         }
     }
