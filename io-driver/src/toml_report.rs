@@ -87,6 +87,8 @@ impl<'a> TomlText<'a> {
             let start = error.span().map_or(0, |span| span.start);
             let problem = match single_table(error.message(), &key_at(self.text, start)) {
                 Some([found, allowed]) => format!("found {found}, allowed: {allowed}"),
+                // What is TOML has no such slips: its types or keys are wrong.
+                None if DeTable::parse(self.text).is_ok() => error.message().to_owned(),
                 None => toml_slips::explain(self.text, start, error.message()),
             };
             self.report(error.span(), problem)
@@ -294,6 +296,9 @@ mod tests {
     fn usual_slips_are_told_with_what_to_write_instead() {
         let text = "[motor]\ncurrent = [.5]\n";
         assert!(read(text).unwrap_err().problem.ends_with("as in 0.05"), "{}", read(text).unwrap_err());
+
+        let of_another_type = read("[motor]\ncurrent = true\n").unwrap_err();
+        assert!(of_another_type.problem.contains("invalid type: boolean"), "{of_another_type}");
 
         #[derive(Debug, Deserialize)]
         struct Axes {

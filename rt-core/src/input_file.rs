@@ -50,7 +50,14 @@ fn check_size(bytes: u64, most_bytes: u64) -> io::Result<()> {
 /// # Errors
 /// As [`read`]; [`ErrorKind::InvalidData`], with the line, if it is not UTF-8.
 pub fn read_text(path: &Path, most_bytes: u64) -> io::Result<String> {
-    let bytes = read(path, most_bytes)?;
+    text(read(path, most_bytes)?)
+}
+
+/// The text that these bytes of a file are, as [`read_text`] returns it.
+///
+/// # Errors
+/// [`ErrorKind::InvalidData`], with the line, if they are not UTF-8.
+pub fn text(bytes: Vec<u8>) -> io::Result<String> {
     if is_utf16(&bytes) {
         return Err(io::Error::new(ErrorKind::InvalidData, UTF16));
     }

@@ -34,7 +34,8 @@ pub fn tables(key: &str) -> String {
 /// `name = table`
 fn word_without_quotes(before: &str, rest: &str) -> Option<String> {
     const MOST_CHARS: usize = 40;
-    let is_value = before.trim_end().ends_with(['=', '[', ',']);
+    // Not the name of a table: `[motor]`.
+    let is_value = before.contains('=') && before.trim_end().ends_with(['=', '[', ',']);
     let is_in_word = |c: char| c.is_alphanumeric() || matches!(c, '_' | '-' | '.' | '/');
     let word: String = rest.chars().take_while(|&c| is_in_word(c)).take(MOST_CHARS).collect();
     if !is_value || !word.starts_with(|c: char| c.is_alphabetic() || c == '/') {
@@ -111,6 +112,7 @@ mod tests {
         assert!(at("x = [1, two]", "two", boolean).contains("found two without quotes"));
         assert_eq!(at("movable = True", "True", boolean), "found True, allowed: true, in small letters");
         assert!(at("movable = no # not yet", "no", boolean).contains("allowed: false"));
+        assert_eq!(at("[motor]", "motor", boolean), boolean);
         for other in ["x = ", "x = = 1", "x = 1"] {
             assert_eq!(explain(other, 4, boolean), boolean, "{other}");
         }
