@@ -26,7 +26,8 @@ use crate::report::Report;
 use crate::run;
 use crate::settings::{self, SettingsArgs};
 use crate::study::{self, StudyCommand};
-use clap::{Parser, Subcommand};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{CommandFactory, Parser, Subcommand};
 use io_driver::arguments;
 use io_driver::config::period_of;
 use io_driver::say::say;
@@ -94,7 +95,7 @@ enum AppCommand {
 
 /// Runs the program with the process's own arguments.
 pub fn main() -> ExitCode {
-    let Cli { settings, command, headless } = arguments::parse();
+    let Cli { settings, command, headless } = arguments::parse_with(advise);
     match command {
         Some(AppCommand::Driver(command)) => io_driver::cli::execute(command),
         Some(AppCommand::Calibrate(args)) => calibrate::run(&args),
@@ -136,6 +137,21 @@ pub fn main() -> ExitCode {
             result.map_or_else(|failure| failed(&failure), stopped)
         }
         None => conclude(settings.load().and_then(|settings| play_or_demo(&settings, headless))),
+    }
+}
+
+/// Who leaves out the command, or mistypes it, wants to play a scene.
+fn advise(error: &mut clap::Error) {
+    let is_after_a_command = || {
+        let cli = Cli::command();
+        std::env::args().skip(1).any(|word| cli.find_subcommand(word).is_some())
+    };
+    if error.kind() == ErrorKind::InvalidSubcommand
+        && error.get(ContextKind::SuggestedSubcommand).is_none()
+        && !is_after_a_command()
+    {
+        let tip = "a scene is played with 'phantom3 run SCENE.toml'".into();
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip]));
     }
 }
 
@@ -258,7 +274,6 @@ const _: () = assert!(EXIT_USAGE == 2);
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
 
     #[test]
     fn the_command_line_is_consistent() {

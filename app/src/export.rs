@@ -1,8 +1,8 @@
 //! `phantom3 export`: a recording as a table for other tools.
 //!
 //! Model: rows are read from either format and written with the same columns that `run --record OUT.csv` writes, so CSV
-//! out of MCAP is byte for byte what would have been recorded. A recording whose end is missing is exported as far as it
-//! is whole, and that is told.
+//! out of MCAP is byte for byte what would have been recorded. A recording whose end is missing, or that is damaged behind
+//! its first row, is exported as far as it is whole, and that is told; damage is a fault (status 3).
 
 mod parquet_file;
 
@@ -50,11 +50,13 @@ Examples:
 pub fn execute(args: &ExportArgs) -> Result<Stop, RunFailure> {
     let mut recorded = RecordedRun::open(&args.recording).map_err(|error| wrong(&error))?;
     let outs = args.outs()?;
+    // Of a recording without a good row there is no table.
+    let mut next = recorded.next_row().map(Some).map_err(|error| wrong(&error))?;
     let mut tables = outs.iter().map(|out| Table::create(out, &recorded)).collect::<Result<Vec<_>, _>>()?;
     let mut last = None;
     let mut rows = 0u64;
     let end = loop {
-        match recorded.next_row() {
+        match next.take().map_or_else(|| recorded.next_row(), Ok) {
             Ok(Some((row, bodies))) => {
                 if !append(&mut tables, &row, &bodies, &recorded)? {
                     // Who reads the standard output has seen enough.
@@ -68,12 +70,13 @@ pub fn execute(args: &ExportArgs) -> Result<Stop, RunFailure> {
     };
     tables.into_iter().try_for_each(Table::finish)?;
     let until_s = last.map_or(0.0, |tick| run_time_s(tick.cast_signed(), recorded.period_ns()));
-    tell_end(&args.recording, end, recorded.cut(), rows, until_s)?;
+    let part = if end.is_err() { ", up to the damage" } else { "" };
+    let end = tell_end(&args.recording, end, recorded.cut(), rows, until_s);
     let is_taken = outs.iter().any(|(out, _)| is_standard_output(out));
     for (out, _) in &outs {
-        outputs::tell(&format_args!("{} ({rows} rows)", Plain(shown(out).display())), is_taken);
+        outputs::tell(&format_args!("{} ({rows} rows{part})", Plain(shown(out).display())), is_taken);
     }
-    Ok(Stop::Finished)
+    end.map(|()| Stop::Finished)
 }
 
 impl ExportArgs {
@@ -127,7 +130,14 @@ pub(crate) fn tell_end(
             file.display()
         ));
     }
-    end.map_err(|error| RunFailure::Results(error.to_string()))
+    end.map_err(|error| damaged(&error, rows, until_s))
+}
+
+/// The fault that damage behind good rows is.
+pub(crate) fn damaged(error: &dyn std::fmt::Display, rows: u64, until_s: f64) -> RunFailure {
+    RunFailure::Results(format!(
+        "{error}; what is whole before it is used: {rows} rows, up to t = {until_s} s"
+    ))
 }
 
 pub(crate) fn wrong(error: &dyn std::fmt::Display) -> RunFailure {

@@ -38,6 +38,9 @@ use shm_abi::segment::ClockMode;
 use std::path::{Path, PathBuf};
 use world::{FrictionSpec, Layout, Scene, SceneEntity, SceneFinger, Settings, ShapeSpec};
 
+/// A day (s): longer runs are asked for by repeating them.
+pub(crate) const LONGEST_RUN_S: f64 = 86_400.0;
+
 /// What a run needs, checked.
 #[derive(Debug, Clone)]
 pub struct Rig {

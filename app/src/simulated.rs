@@ -118,7 +118,7 @@ impl SimulatedDevices {
         let text = match model_file::builtin(&name) {
             _ if name == "nobody" => return Ok(None),
             Some(text) => text.to_owned(),
-            None => read(file, "hand's model", &model_file::BUILTIN_NAMES)?,
+            None => read(file, "hand's model", &[&model_file::BUILTIN_NAMES[..], &["nobody"]].concat())?,
         };
         Ok(Some(model_file::parse(&text, file, self.firmness)?))
     }

@@ -10,7 +10,15 @@ use std::io::Write;
 
 /// The process's own command line; refusals and `--help` end the process as `clap` would.
 pub fn parse<P: Parser>() -> P {
-    P::try_parse().unwrap_or_else(|error| refuse(&error))
+    parse_with(|_| ())
+}
+
+/// The same; `advise` may add a tip to a refusal.
+pub fn parse_with<P: Parser>(advise: impl FnOnce(&mut clap::Error)) -> P {
+    P::try_parse().unwrap_or_else(|mut error| {
+        advise(&mut error);
+        refuse(&error)
+    })
 }
 
 fn refuse(error: &clap::Error) -> ! {

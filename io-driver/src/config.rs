@@ -261,6 +261,18 @@ mod tests {
                 "[safety]\ndead_man = { device = \"f0\", button = 0, normally_closed = true }\n[[device]]\nbackend = \"ideal\"",
                 "lab/driver.toml:2: `safety.dead_man.normally_closed`: found true, allowed: false: held has to close the circuit, or a cut wire would hold it",
             ),
+            (
+                "rate_hz = 1000\n[device]\nbackend = \"ideal\"",
+                "lab/driver.toml:2: `device`: found a single table, as `[device]` makes it, allowed: a list of tables, each under its own [[device]]: write it with two brackets, even if there is only one",
+            ),
+            (
+                "socket = /run/x\n[[device]]\nbackend = ideal",
+                "lab/driver.toml:1: `socket`: found /run/x without quotes; text stands in quotes, as in \"/run/x\"",
+            ),
+            (
+                "[[device]]\nbackend = ideal",
+                "lab/driver.toml:2: `device[0].backend`: found ideal without quotes; text stands in quotes, as in \"ideal\"",
+            ),
             ("device = []", "lab/driver.toml:1: `device`: found 0 devices, allowed: 1 to 8"),
             (
                 "[[device]]\nbackend = \"replay\"\ntrace = \"t\"",

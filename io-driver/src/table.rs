@@ -14,6 +14,7 @@ use std::fmt::{self, Display};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
+use rt_core::separators;
 use thiserror::Error;
 
 mod time_cursor;
@@ -53,12 +54,14 @@ pub enum TableError {
         at: Place,
     },
     /// The first column is not the time.
-    #[error("{at}: found the first column {found}, allowed: `t`, the time in seconds")]
+    #[error("{at}: found the first column {found}, allowed: `t`, the time in seconds{hint}")]
     NoTime {
         /// Where.
         at: Place,
         /// The cell.
         found: String,
+        /// What may be wrong.
+        hint: &'static str,
     },
     /// A column without a name, or one name twice.
     #[error(
@@ -79,10 +82,12 @@ pub enum TableError {
         at: Place,
     },
     /// A row is longer or shorter than the header.
-    #[error("{at}: found {found} cells, allowed: {allowed}, as in the header")]
+    #[error("{at}: found {found} cells, allowed: {allowed}, as in the header{hint}")]
     RowLength {
         /// Where.
         at: Place,
+        /// What may be wrong.
+        hint: &'static str,
         /// Cells in the row.
         found: usize,
         /// Cells in the header.
@@ -206,7 +211,8 @@ impl<'a> TableReader<'a> {
             return Err(TableError::Empty { at: self.place(1, "") });
         }
         if self.header[0] != "t" {
-            return Err(TableError::NoTime { at: self.place(1, ""), found: quote(self.header[0]) });
+            let hint = separators::hint_for_header(&self.header.join(","));
+            return Err(TableError::NoTime { at: self.place(1, ""), found: quote(self.header[0]), hint });
         }
         let bad = (1..self.header.len())
             .find(|&i| self.header[i].is_empty() || self.header[..i].contains(&self.header[i]));
@@ -266,7 +272,8 @@ impl<'a> TableReader<'a> {
 
     fn row_length(&self, line: usize, row: &str) -> TableError {
         let found = if row.trim().is_empty() { 0 } else { row.split(',').count() };
-        TableError::RowLength { at: self.place(line, ""), found, allowed: self.header.len() }
+        let hint = separators::hint_for_row(row, self.header.len());
+        TableError::RowLength { at: self.place(line, ""), found, allowed: self.header.len(), hint }
     }
 
     fn place(&self, line: usize, column: &str) -> Place {

@@ -11,6 +11,7 @@ use std::fmt::{self, Display};
 use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
 
+use rt_core::toml_slips;
 use serde::de::DeserializeOwned;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -82,7 +83,16 @@ impl<'a> TomlText<'a> {
     /// # Errors
     /// Reports wrong syntax, wrong types and missing or unknown keys.
     pub fn read<T: DeserializeOwned>(&self) -> Result<T, TomlReport> {
-        toml::from_str(self.text).map_err(|error| self.report(error.span(), error.message().to_owned()))
+        toml::from_str(self.text).map_err(|error| {
+            let start = error.span().map_or(0, |span| span.start);
+            let problem = match single_table(error.message(), &key_at(self.text, start)) {
+                Some([found, allowed]) => format!("found {found}, allowed: {allowed}"),
+                // What is TOML has no such slips: its types or keys are wrong.
+                None if DeTable::parse(self.text).is_ok() => error.message().to_owned(),
+                None => toml_slips::explain(self.text, start, error.message()),
+            };
+            self.report(error.span(), problem)
+        })
     }
 
     /// Refuses the value at `span`.
@@ -157,6 +167,12 @@ impl<'a> TomlText<'a> {
         let key = key_at(self.text, start);
         TomlReport { file: self.file.to_owned(), line: line_at(self.text, start), key, problem }
     }
+}
+
+/// What is found and allowed where serde met `[key]` and wanted a list.
+fn single_table(message: &str, key: &str) -> Option<[String; 2]> {
+    let is_one = message.starts_with("invalid type: map, expected a sequence") && !key.is_empty();
+    is_one.then(|| toml_slips::single_table(key))
 }
 
 /// Line, from 1, of a byte offset; offsets beyond the end belong to the last line.
@@ -274,6 +290,26 @@ mod tests {
         assert!(report.problem.contains("two"), "{report}");
 
         assert_eq!(read("\n\n[motor\n").unwrap_err().line, 3);
+    }
+
+    #[test]
+    fn usual_slips_are_told_with_what_to_write_instead() {
+        let text = "[motor]\ncurrent = [.5]\n";
+        assert!(read(text).unwrap_err().problem.ends_with("as in 0.05"), "{}", read(text).unwrap_err());
+
+        let of_another_type = read("[motor]\ncurrent = true\n").unwrap_err();
+        assert!(of_another_type.problem.contains("invalid type: boolean"), "{of_another_type}");
+
+        #[derive(Debug, Deserialize)]
+        struct Axes {
+            #[serde(rename = "axis")]
+            _axis: Spanned<Vec<Spanned<Motor>>>,
+        }
+        let report =
+            TomlText::new("\n[axis]\ncurrent = []\n", Path::new("lab/m.toml")).read::<Axes>().unwrap_err();
+        assert_eq!((report.line, report.key.as_str()), (2, "axis"));
+        let says = "found a single table, as `[axis]` makes it, allowed: a list of tables, each under its own [[axis]]";
+        assert!(report.problem.starts_with(says), "{report}");
     }
 
     #[test]

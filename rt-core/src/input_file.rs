@@ -45,18 +45,38 @@ fn check_size(bytes: u64, most_bytes: u64) -> io::Result<()> {
     Err(io::Error::new(ErrorKind::FileTooLarge, said))
 }
 
-/// The content of a regular file as text.
+/// The content of a regular file as text, without the byte order mark that editors of Windows put before it.
 ///
 /// # Errors
 /// As [`read`]; [`ErrorKind::InvalidData`], with the line, if it is not UTF-8.
 pub fn read_text(path: &Path, most_bytes: u64) -> io::Result<String> {
-    String::from_utf8(read(path, most_bytes)?).map_err(|error| {
+    text(read(path, most_bytes)?)
+}
+
+/// The text that these bytes of a file are, as [`read_text`] returns it.
+///
+/// # Errors
+/// [`ErrorKind::InvalidData`], with the line, if they are not UTF-8.
+pub fn text(bytes: Vec<u8>) -> io::Result<String> {
+    if is_utf16(&bytes) {
+        return Err(io::Error::new(ErrorKind::InvalidData, UTF16));
+    }
+    let text = String::from_utf8(bytes).map_err(|error| {
         let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
         let line = 1 + valid.iter().filter(|&&byte| byte == b'\n').count();
         let said = format!("line {line} is not UTF-8 text; save the file as UTF-8");
         io::Error::new(ErrorKind::InvalidData, said)
-    })
+    })?;
+    Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
 }
+
+/// Whether a file begins as text in UTF-16 does, which Windows calls Unicode.
+pub fn is_utf16(begin: &[u8]) -> bool {
+    begin.starts_with(&[0xff, 0xfe]) || begin.starts_with(&[0xfe, 0xff])
+}
+
+/// What to say of such a file.
+pub const UTF16: &str = "it is UTF-16 text; save the file as UTF-8";
 
 fn check(found: &Metadata) -> io::Result<()> {
     if found.is_file() {
@@ -132,6 +152,11 @@ mod tests {
         let refused = read_text(&place.write(b"a\nb\n\xff\n"), 100).expect_err("no text");
         assert_eq!(refused.to_string(), "line 3 is not UTF-8 text; save the file as UTF-8");
         assert_eq!(read_text(&place.write("ä".as_bytes()), 100).expect("text"), "ä");
+        assert_eq!(read_text(&place.write("\u{feff}ä\u{feff}".as_bytes()), 100).expect("text"), "ä\u{feff}");
+        for utf16 in [b"\xff\xfet\0,\0", b"\xfe\xff\0t\0,"] {
+            let refused = read_text(&place.write(utf16), 100).expect_err("no UTF-8");
+            assert_eq!(refused.to_string(), "it is UTF-16 text; save the file as UTF-8");
+        }
     }
 
     #[test]

@@ -15,7 +15,8 @@
 //! aside from what comes at the same phase. [`last_act`] is what a
 //! dying process still stores to the hardware. [`clock`] is under all of them, and [`alloc_guard`] lets a test
 //! show that a loop does not allocate.
-//! [`input_file`] reads files that others name, [`plain_text`] keeps foreign text from acting on a terminal.
+//! [`input_file`] reads files that others name, [`separators`] and [`toml_slips`] know what is usually wrong
+//! in tables and in TOML, and [`plain_text`] keeps foreign text from acting on a terminal.
 //! [`doctor`] says whether the machine is ready for any of this, [`read_back`] what root has set for it, and
 //! [`installed`] names what a laboratory's installation consists of.
 //!
@@ -44,9 +45,11 @@ pub mod process;
 pub mod read_back;
 pub mod sandbox;
 pub mod schedule;
+pub mod separators;
 pub mod setup;
 pub mod signals;
 pub mod spin_margin;
+pub mod toml_slips;
 pub mod usage;
 
 #[allow(unsafe_code, reason = "the one place for system calls that no safe crate wraps")]

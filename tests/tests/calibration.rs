@@ -82,13 +82,13 @@ fn a_layout_on_standard_output_places_the_device_where_it_stands() {
     let layout = parse(&said.out);
     assert_stands(&layout, 0, &truth()[0]);
     assert_stands(&layout, 1, &truth()[1]);
-    for word in [
-        "rigid, device 1 against device 0, 300 pairs of pairs.csv",
-        "residual",
-        "accuracy",
+    for line in [
+        "fit          rigid, device 1 against device 0, 300 pairs of pairs.csv",
+        "residual ",
+        "accuracy ",
         "outliers     none",
     ] {
-        assert!(said.err.contains(word), "{word}: {}", said.err);
+        assert!(said.err.lines().any(|said| said.starts_with(line)), "{line}: {}", said.err);
     }
     let figure = std::fs::read_to_string(place.path("r.svg")).expect("a figure");
     assert!(figure.starts_with("<svg") || figure.starts_with("<?xml"), "{figure:.40}");
@@ -237,6 +237,7 @@ fn bad_input_ends_with_status_2_and_says_what_to_do() {
     let place = Workplace::new();
     place.write("pairs.csv", pairs_csv(300, &Matrix3::identity()));
     place.write("short.csv", "1 2 3\n");
+    place.write("utf16.csv", b"\xff\xfe1\0,\0");
     place.write("few.csv", pairs_csv(2, &Matrix3::identity()));
     place.write("mm.csv", pairs_csv(100, &(Matrix3::identity() * 1000.0)));
     place.write(
@@ -248,7 +249,11 @@ fn bad_input_ends_with_status_2_and_says_what_to_do() {
     place.write("bad.toml", "[[device]]\nwobble = 1\n");
     place.write("a.toml", "[[device]]\n");
     place.write("b.toml", "[[device]]\n");
-    let cases: [(&[&str], &[&str]); 19] = [
+    let cases: [(&[&str], &[&str]); 20] = [
+        (
+            &["--pairs", "utf16.csv"],
+            &["utf16.csv: cannot be read: it is UTF-16 text; save the file as UTF-8"],
+        ),
         (&[], &["--pairs", "--live"]),
         (&["--pairs", "none.csv"], &["none.csv: cannot be read"]),
         (&["--pairs", "."], &[".: cannot be read"]),

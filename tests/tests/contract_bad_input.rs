@@ -1,6 +1,9 @@
 //! Every mistake in a command line or a file: status 2, one message that a stranger can act on, and nothing
 //! half-started.
 
+#[path = "contract_bad_input/foreign_recordings.rs"]
+mod foreign_recordings;
+
 use std::ffi::{OsStr, OsString};
 use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::PermissionsExt;
@@ -223,7 +226,13 @@ fn a_hand_that_is_wrong_is_refused_with_file_line_column_finding_and_remedy() {
         ("t,f0_x,f0_y,f0_z\n0,1,2\n", &["hand.csv:2", "3 cells", "allowed: 4"]),
         ("t,f0_x,f0_y,f0_z\n0,1,2,3,4\n", &["hand.csv:2", "5 cells", "allowed: 4"]),
         ("t,f0_x,f0_y,f0_z\n0,1,2,3\n\n1,1,2,3\n", &["hand.csv:3", "0 cells"]),
-        ("t;f0_x;f0_y;f0_z\n0;1;2;3\n", &["hand.csv:1", "`t;f0_x;f0_y;f0_z`", "`t`"]),
+        ("t;f0_x;f0_y;f0_z\n0;1;2;3\n", &["hand.csv:1", "`t;f0_x;f0_y;f0_z`", "`t`", "it has semicolons"]),
+        ("t\tf0_x\tf0_y\tf0_z\n0\t1\t2\t3\n", &["hand.csv:1", "it has tabs", "separated by commas"]),
+        ("t,f0_x,f0_y,f0_z\n0,5,0,01,0,2,0,3\n", &["hand.csv:2", "8 cells", "write points, as in 0.1"]),
+        (
+            "t,f0_x,f0_y,f0_z\n1700000000,0,0,0\n1700000001,0,0,0\n",
+            &["hand.csv", "t = 1700000001.00 s", "at most 86400 s", "subtract the first time"],
+        ),
     ];
     let place = workplace();
     for (index, (hand, parts)) in cases.iter().enumerate() {
@@ -485,6 +494,30 @@ fn a_recording_whose_times_leap_or_fall_is_refused_with_its_line() {
     let said = place.run(["replay", "late.csv", "--scene", "scene.toml"]);
     assert_eq!(said.status, Some(2), "{}{}", said.out, said.err);
     assert_says(&said.err, &["late.csv", "its first row is at t = 5000.0", "at most 3600 s"]);
+}
+
+#[test]
+fn orders_that_an_editor_of_windows_saved_are_orders() {
+    let place = workplace();
+    place.write("orders.txt", "\u{feff}at 0.01 stiffness 1.1\r\nat 0.02 reset\r\n");
+    let said = place.run(
+        ["run", "scene.toml", "--clock", "virtual", "--seconds", "0.1", "--orders", "orders.txt"].as_slice(),
+    );
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    assert!(said.out.lines().any(|line| line.starts_with("orders") && line.contains('2')), "{}", said.out);
+}
+
+#[test]
+fn a_command_that_is_left_out_or_mistyped_is_answered_with_how_a_scene_is_played() {
+    let place = workplace();
+    const TIP: &str = "tip: a scene is played with 'phantom3 run SCENE.toml'";
+    for arguments in [&["scene.toml"][..], &["--headless", "scene.toml"], &["rnu", "scene.toml"]] {
+        assert_says(&refused(&place, arguments), &["unrecognized subcommand", TIP]);
+    }
+    for arguments in [&["study", "scene.toml"][..], &["driver", "rnu"], &["replai"]] {
+        let said = refused(&place, arguments);
+        assert!(said.contains("unrecognized subcommand") && !said.contains(TIP), "{said}");
+    }
 }
 
 #[test]

@@ -304,7 +304,7 @@ fn wrong_names_are_refused_with_what_is_allowed() {
     let place = workplace(TABLE, "");
     place.write("wrong.toml", "name = \"x\"\n");
     let cases: &[(&[&str], &[&str])] = &[
-        (&["--hand-model", "pengrip"], &["hand's model pengrip", "pen-grip, fingertip"]),
+        (&["--hand-model", "pengrip"], &["hand's model pengrip", "pen-grip, fingertip, nobody"]),
         (&["--hand-model", "wrong.toml"], &["wrong.toml"]),
         (&["--firmness", "strong"], &["--firmness", "found strong", "light, usual, firm"]),
         (&["--device", "omni"], &["device's description omni", "premium-1.5", "wooden-haptics"]),

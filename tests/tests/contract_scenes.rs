@@ -222,7 +222,12 @@ fn check_suspects_numbers_of_another_unit() {
     for (scene, warning) in [
         (
             with_cube("[50, 50, 50]", "0.1", "[0.0, 30.0, 0.0]"),
-            "cube is 50 m long, as large as a house; lengths are in metres: if millimetres were meant, write 0.05",
+            "cube is 50 m long, as large as a house; lengths are in metres: if millimetres were meant, write `size_m = [0.05, 0.05, 0.05]`",
+        ),
+        (
+            with_cube("[0.05, 0.05, 0.05]", "0.1", "[0.0, 60.0, 0.0]")
+                .replace("kind = \"box\", size_m = [0.05, 0.05, 0.05]", "kind = \"sphere\", radius_m = 50"),
+            "cube is 100 m long, as large as a house; lengths are in metres: if millimetres were meant, write `radius_m = 0.05`",
         ),
         (
             with_cube("[0.05, 0.05, 0.05]", "100", "[0.0, 0.0, 0.0]"),
@@ -264,6 +269,31 @@ fn check_suspects_numbers_of_another_unit() {
         place.write("scene.toml", &scene);
         let said = check(&place, &["scene.toml"]);
         assert!(said.out.contains(&format!("warning: {warning}\n")), "{warning}\n{}{}", said.out, said.err);
+    }
+}
+
+#[test]
+fn check_suspects_hands_and_layouts_that_no_arm_reaches() {
+    let place = Workplace::new();
+    place.write("scene.toml", with_cube("[0.05, 0.05, 0.05]", "0.1", "[0.0, 0.0, 0.0]"));
+    place.write("mm.csv", "t,f0_x,f0_y,f0_z\n0,0,80,0\n1,50,20,0\n");
+    place.write("far.csv", "t,f0_x,f0_y,f0_z\n0,0,80,0\n");
+    place.write("m.csv", "t,f0_x,f0_y,f0_z\n0,0,0.08,0\n1,0.05,0.02,0\n");
+    place.write("mm.toml", "[[device]]\nposition_m = [-150, 0, 0]\n");
+    place.write("m.toml", "[[device]]\nposition_m = [-0.15, 0, 0]\n");
+    let divide =
+        "farther than an arm reaches; places are in metres: if millimetres were meant, divide them by 1000";
+    for (arguments, parts) in [
+        (["--hand", "mm.csv"], &["finger f0 goes along 60 m in", "mm.csv", divide][..]),
+        (["--hand", "far.csv"], &["finger f0 goes as far as 80 m from the origin in", "far.csv", divide]),
+        (["--layout", "mm.toml"], &["device 0 stands at (-150, 0, 0) m", "it is at (-0.15, 0, 0)"]),
+        (["--hand", "m.csv"], &[]),
+        (["--layout", "m.toml"], &[]),
+    ] {
+        let said = check(&place, &["scene.toml", arguments[0], arguments[1]]);
+        let warnings: Vec<_> = said.out.lines().filter(|line| line.starts_with("warning: ")).collect();
+        assert_eq!(warnings.len(), usize::from(!parts.is_empty()), "{arguments:?}: {}", said.out);
+        assert!(parts.iter().all(|part| warnings[0].contains(part)), "{arguments:?}: {warnings:?}");
     }
 }
 

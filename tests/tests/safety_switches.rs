@@ -97,7 +97,12 @@ fn force_comes_with_the_dead_mans_switch_and_goes_with_it() {
         wait_for("the end of the force", || !stand.amplifiers.are_enabled());
         stand.amplifiers.settle();
         stand.amplifiers.check_off("with the dead-man's switch let go");
-        assert_eq!(state(&stand), (Some(DriverState::Idle), Some(FaultReason::None)), "it is no fault");
+        let frame = stand.view().read_latest().expect("a frame");
+        assert_eq!(
+            (frame.state, frame.fault),
+            (DriverState::Idle as u64, FaultReason::None as u64),
+            "it is no fault"
+        );
     }
     app.signal(Signal::TERM);
     drop(app);

@@ -9,9 +9,12 @@ use crate::pairs::{MAX_EXTENT_M, MIN_EXTENT_M};
 pub enum PairsError {
     /// A row is longer or shorter than six.
     #[error(
-        "line {line}: found {found} cells; allowed: 6, x y z of the fiducial, then x y z of the other device, in metres"
+        "line {line}: found {found} cells; allowed: 6, x y z of the fiducial, then x y z of the other device, in metres{}",
+        if *has_decimal_commas { "; a decimal number has a point, as in 0.1" } else { "" }
     )]
     RowLength {
+        /// Whether it would be six numbers with a point for each comma.
+        has_decimal_commas: bool,
         /// The line, from 1.
         line: usize,
         /// Cells in it.

@@ -50,7 +50,7 @@ pub fn parse_pairs(text: &str) -> Result<Vec<Pair>, PairsError> {
 fn parse_row(line: usize, text: &str) -> Result<Pair, PairsError> {
     let found = cells(text).count();
     if found != 6 {
-        return Err(PairsError::RowLength { line, found });
+        return Err(PairsError::RowLength { has_decimal_commas: has_decimal_commas(text), line, found });
     }
     let mut numbers = [0.0; 6];
     for (column, (number, cell)) in numbers.iter_mut().zip(cells(text)).enumerate() {
@@ -82,6 +82,16 @@ fn cells(line: &str) -> impl Iterator<Item = &str> {
         line.split_whitespace().collect()
     };
     parts.into_iter()
+}
+
+/// As a spreadsheet writes them where semicolons separate: then a comma is no separator.
+fn has_decimal_commas(line: &str) -> bool {
+    let cells: Vec<&str> = if line.contains(';') {
+        line.split(';').map(str::trim).collect()
+    } else {
+        line.split_whitespace().collect()
+    };
+    cells.len() == 6 && cells.iter().all(|cell| parse_cell(&cell.replacen(',', ".", 1)).is_some())
 }
 
 /// Names, none of which is a number: half a header is a broken row.

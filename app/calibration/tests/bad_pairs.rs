@@ -262,3 +262,13 @@ fn one_wild_pair_spoils_a_fit_to_all_and_not_one_without_it() {
     // 0.1 mm of noise in 199 pairs.
     assert!((without.transform.position - rigid_truth().position).amax() < 1e-4);
 }
+
+#[test]
+fn decimal_commas_are_told_as_such() {
+    for row in ["0,1;0,2;0,3;-0,4;0,5;0,6", "0,1 0,2 0,3 -0,4 0,5 0,6"] {
+        let said = parse_pairs(row).expect_err("commas").to_string();
+        assert!(said.ends_with("; a decimal number has a point, as in 0.1"), "{said}");
+    }
+    let said = parse_pairs("1;2;3;4;5;6;7").expect_err("seven").to_string();
+    assert!(said.ends_with("in metres"), "{said}");
+}

@@ -24,6 +24,7 @@ use layout_file::LayoutFileError;
 use live::LiveError;
 use plot::PlotError;
 use report::Report;
+use rt_core::input_file;
 use rt_core::signals::StopSignals;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -220,7 +221,10 @@ fn run_to_end(args: &CalibrateArgs) -> Result<(), CalibrateFailure> {
     let entry = plan.layout.entry_of(args.device, &X_WN);
     let text = layout_file::with_entry(&plan.base, plan.base_name(), args, &entry, &X_WN, used)?;
     let report = Report { origin: &origin, args, found: &found, used, X_WN: &X_WN, entry: &entry };
-    report.to_string().lines().for_each(|line| say(format_args!("{line}")));
+    // Each line is one that is said: within a line a break is foreign, and is escaped.
+    for line in report.to_string().lines() {
+        say(format_args!("{line}"));
+    }
     if let Some(file) = &plan.write {
         // Whoever held two arms together for a minute shall not have to do it again for a full disk.
         layout_file::replace(file, &text).inspect_err(|_| {
@@ -331,12 +335,12 @@ fn get_pairs(args: &CalibrateArgs) -> Result<(String, Vec<Pair>), CalibrateFailu
 /// Pipes are welcome; what never ends is not.
 fn read_pairs(file: &Path) -> io::Result<String> {
     use std::io::Read;
-    let mut text = String::new();
-    std::fs::File::open(file)?.take(MAX_PAIRS_BYTES + 1).read_to_string(&mut text)?;
-    if text.len() as u64 > MAX_PAIRS_BYTES {
+    let mut bytes = Vec::new();
+    std::fs::File::open(file)?.take(MAX_PAIRS_BYTES + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > MAX_PAIRS_BYTES {
         return Err(io::Error::other(format!("it is larger than {MAX_PAIRS_BYTES} bytes; take fewer lines")));
     }
-    Ok(text)
+    input_file::text(bytes)
 }
 
 /// Room for as many pairs as there may be, with all their digits.

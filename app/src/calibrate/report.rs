@@ -3,6 +3,7 @@
 use super::CalibrateArgs;
 use calibration::{Accuracy, Calibration, Fit, Transform};
 use nalgebra::{Isometry3, Vector3};
+use rt_core::plain_text::Plain;
 use serde_json::{Value, json};
 use std::fmt;
 use std::path::Path;
@@ -35,7 +36,7 @@ impl fmt::Display for Report<'_> {
             "fit          {}, device {device} against device {fiducial}, {} pairs of {}",
             found.model.name(),
             used.count,
-            self.origin
+            Plain(self.origin)
         )?;
         let r = &used.residuals;
         writeln!(

@@ -7,8 +7,8 @@
 
 use super::measures::{Measures, short};
 use crate::rig::{Rig, in_words};
-use nalgebra::{Point3, Quaternion, Vector3};
-use world::{Scene, ShapeSpec};
+use nalgebra::{Quaternion, Vector3};
+use world::{Scene, SceneEntity, ShapeSpec};
 
 /// All of them.
 pub(super) fn all(rig: &Rig, measures: &[Measures]) -> Vec<String> {
@@ -16,6 +16,8 @@ pub(super) fn all(rig: &Rig, measures: &[Measures]) -> Vec<String> {
     found.extend(measures.iter().filter_map(mass));
     found.extend(far(rig, measures));
     found.extend(fingers(&rig.scene));
+    found.extend(paths(rig));
+    found.extend(devices(rig));
     found.extend(rates(&rig.scene));
     found.extend(gravity(&rig.scene));
     found.truncate(MOST);
@@ -27,9 +29,10 @@ fn length(rig: &Rig, it: &Measures) -> Option<String> {
     if length_m >= HOUSE_M && !it.is_around {
         let instead = match file_of(rig, name) {
             Some(file) => format!("its file {file} may be in millimetres: give the shape `scale = 0.001`"),
-            None => {
-                format!("lengths are in metres: if millimetres were meant, write {}", short(length_m * 1e-3))
-            }
+            None => match keys_in_millimetres(&spec_of(rig, name)?.shape) {
+                Some(keys) => format!("lengths are in metres: if millimetres were meant, write {keys}"),
+                None => "lengths are in metres".to_owned(),
+            },
         };
         return Some(format!("{name} is {} m long, as large as a house; {instead}", short(length_m)));
     }
@@ -37,9 +40,38 @@ fn length(rig: &Rig, it: &Measures) -> Option<String> {
         .then(|| format!("{name} is {} m long, finer than a hair; lengths are in metres", short(length_m)))
 }
 
+fn spec_of<'r>(rig: &'r Rig, name: &str) -> Option<&'r SceneEntity> {
+    rig.scene.entities.iter().find(|entity| entity.name == *name)
+}
+
+/// The keys that give a shape its size, with the values that they have if millimetres were meant.
+fn keys_in_millimetres(shape: &ShapeSpec) -> Option<String> {
+    let key = |(name, length_m): (&str, f64)| format!("`{name} = {}`", short(length_m * 1e-3));
+    let keys = |keys: &[(&str, f64)]| keys.iter().copied().map(key).collect::<Vec<_>>().join(", ");
+    let list = |name: &str, lengths_m: &[f64; 3]| {
+        format!("`{name} = [{}]`", lengths_m.map(|length_m| short(length_m * 1e-3)).join(", "))
+    };
+    Some(match shape {
+        ShapeSpec::Box { size_m } => list("size_m", size_m),
+        ShapeSpec::Ellipsoid { radii_m } => list("radii_m", radii_m),
+        ShapeSpec::Sphere { radius_m } => keys(&[("radius_m", *radius_m)]),
+        ShapeSpec::Capsule { radius_m, length_m } | ShapeSpec::Cylinder { radius_m, length_m } => {
+            keys(&[("radius_m", *radius_m), ("length_m", *length_m)])
+        }
+        ShapeSpec::Cone { radius_bottom_m, radius_top_m, length_m } => keys(&[
+            ("radius_bottom_m", *radius_bottom_m),
+            ("radius_top_m", *radius_top_m),
+            ("length_m", *length_m),
+        ]),
+        ShapeSpec::Torus { ring_radius_m, tube_radius_m } => {
+            keys(&[("ring_radius_m", *ring_radius_m), ("tube_radius_m", *tube_radius_m)])
+        }
+        _ => return None,
+    })
+}
+
 fn file_of(rig: &Rig, name: &str) -> Option<String> {
-    let entity = rig.scene.entities.iter().find(|entity| entity.name == *name)?;
-    match &entity.shape {
+    match &spec_of(rig, name)?.shape {
         ShapeSpec::Mesh(model) | ShapeSpec::Nurbs(model) => Some(model.file.display().to_string()),
         _ => None,
     }
@@ -62,13 +94,14 @@ fn mass(it: &Measures) -> Option<String> {
 
 /// Nobody reaches it.
 fn far(rig: &Rig, measures: &[Measures]) -> Option<String> {
-    let starts: Vec<Point3<f64>> = rig.scene.fingers.iter().map(|finger| finger.start_m).collect();
-    let paths = rig.hand.iter().flat_map(|hand| hand.bounds.iter().flatten().flatten());
-    let fingers: Vec<Vector3<f64>> = starts.iter().map(|start| start.coords).chain(paths.copied()).collect();
+    let starts = rig.scene.fingers.iter().map(|finger| [finger.start_m.coords; 2]);
+    let paths = rig.hand.iter().flat_map(|hand| hand.bounds.iter().copied().flatten());
+    let boxes: Vec<[Vector3<f64>; 2]> = starts.chain(paths).collect();
     let distance_m = |it: &&Measures| {
         let half_m = it.size_m.map_or(f64::INFINITY, |size| 0.5 * Vector3::from(size).norm());
-        let from = |finger: &Vector3<f64>| (Vector3::from(it.middle_m) - finger).norm() - half_m;
-        fingers.iter().map(from).fold(f64::INFINITY, f64::min)
+        let middle = Vector3::from(it.middle_m);
+        let from = |[least, most]: &[Vector3<f64>; 2]| (middle - middle.sup(least).inf(most)).norm() - half_m;
+        boxes.iter().map(from).fold(f64::INFINITY, f64::min)
     };
     let names: Vec<String> =
         measures.iter().filter(|it| distance_m(it) > FAR_M).map(|it| it.name.clone()).collect();
@@ -87,6 +120,48 @@ fn fingers(scene: &Scene) -> Vec<String> {
             finger.name,
             short(radius_m)
         )
+    });
+    told.collect()
+}
+
+/// Hands that go farther than arms are long, or are elsewhere.
+fn paths(rig: &Rig) -> Vec<String> {
+    let Some(hand) = &rig.hand else { return Vec::new() };
+    let told = rig.scene.fingers.iter().zip(&hand.bounds).filter_map(|(finger, bounds)| {
+        let [least, most] = (*bounds)?;
+        let (side_m, away_m) = ((most - least).max(), least.amax().max(most.amax()));
+        let found = if side_m > ARM_M {
+            format!("goes along {} m", short(side_m))
+        } else if away_m > FAR_M {
+            format!("goes as far as {} m from the origin", short(away_m))
+        } else {
+            return None;
+        };
+        Some(format!(
+            "finger {} {found} in {}, farther than an arm reaches; places are in metres: if millimetres were meant, divide \
+             them by 1000",
+            finger.name,
+            hand.path.display()
+        ))
+    });
+    told.collect()
+}
+
+/// Devices that a layout puts where no hand reaches them.
+fn devices(rig: &Rig) -> Vec<String> {
+    if rig.layout.is_none() {
+        return Vec::new();
+    }
+    let told = (0..rig.device_count()).filter_map(|device| {
+        let place = rig.base_in_world(device).translation.vector;
+        let [x, y, z] = [place.x, place.y, place.z].map(short);
+        let instead = [place.x, place.y, place.z].map(|length_m| short(length_m * 1e-3)).join(", ");
+        (place.norm() > FAR_M).then(|| {
+            format!(
+                "device {device} stands at ({x}, {y}, {z}) m, farther away than any arm reaches; places are in metres: if \
+                 millimetres were meant, it is at ({instead})"
+            )
+        })
     });
     told.collect()
 }
@@ -128,6 +203,8 @@ const DENSEST_KG_M3: f64 = 25_000.0;
 const AIR_KG_M3: f64 = 1.2;
 /// No arm reaches a tenth of it.
 const FAR_M: f64 = 10.0;
+/// Both arms stretched out are less.
+const ARM_M: f64 = 3.0;
 /// A finger of a giant.
 const THUMB_M: f64 = 0.2;
 /// Five turns a second are more than fingers bring about; a drill has fifty.

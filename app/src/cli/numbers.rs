@@ -1,10 +1,9 @@
 //! Numbers of the command line: what is found where it is out of range, and what is allowed.
 
-/// A day: longer runs are asked for by repeating them.
-const MAX_SECONDS: f64 = 86_400.0;
+use crate::rig::LONGEST_RUN_S;
 
 pub(super) fn parse_seconds(text: &str) -> Result<f64, String> {
-    parse_number(text, "seconds", f64::MIN_POSITIVE, MAX_SECONDS)
+    parse_number(text, "seconds", f64::MIN_POSITIVE, LONGEST_RUN_S)
 }
 
 pub(crate) fn parse_rate(text: &str) -> Result<f64, String> {

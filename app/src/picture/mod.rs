@@ -2,7 +2,8 @@
 //!
 //! Model: the force on the user along the time, or, with `--by-entity`, along the way that the finger went on each
 //! entity, one picture per entity: this is where two ways to render the same thing are compared (`--against`). With
-//! `--objects`, how far what moves went and turned.
+//! `--objects`, how far what moves went and turned. Of a recording that is damaged behind its first row the rows before are
+//! drawn, and then it is a fault (status 3), as it is for `export`.
 
 mod figure;
 mod recorded;
@@ -67,23 +68,35 @@ pub fn execute(args: &PlotArgs) -> Result<Stop, RunFailure> {
     }
     let recorded = read(&args.recording)?;
     let against = args.against.as_deref().map(read).transpose()?;
+    draw(args, &out, &recorded, against.as_ref())?;
+    let damage = recorded.damage().or_else(|| against.and_then(|against| against.damage()));
+    damage.map_or(Ok(Stop::Finished), Err)
+}
+
+fn draw(
+    args: &PlotArgs,
+    out: &Path,
+    recorded: &Recorded,
+    against: Option<&Recorded>,
+) -> Result<(), RunFailure> {
+    let wrong = |error: &dyn std::fmt::Display| RunFailure::Start(error.to_string());
     let finger = |recorded: &Recorded| recorded.choose(args.finger.as_deref()).map_err(|error| wrong(&error));
     if args.objects {
-        let others = against.as_ref().map(|against| (against, &*against.bodies));
+        let others = against.map(|against| (against, &*against.bodies));
         let bodies = recorded.moving().map_err(|error| wrong(&error))?;
-        return write(&of_objects(&recorded, bodies, others), &out, args.svg_only);
+        return write(&of_objects(recorded, bodies, others), out, args.svg_only);
     }
     if !args.by_entity {
-        let fingers = finger(&recorded)?;
-        let others = against.as_ref().map(finger).transpose()?.unwrap_or_default();
-        let figure = of_run(&recorded, &fingers, against.as_ref().map(|against| (against, &*others)));
-        return write(&figure, &out, args.svg_only);
+        let fingers = finger(recorded)?;
+        let others = against.map(finger).transpose()?.unwrap_or_default();
+        let figure = of_run(recorded, &fingers, against.map(|against| (against, &*others)));
+        return write(&figure, out, args.svg_only);
     }
-    std::fs::create_dir_all(&out)
+    std::fs::create_dir_all(out)
         .map_err(|error| wrong(&format_args!("cannot make the directory {}: {error}", out.display())))?;
     let first = |fingers: Vec<RecordedFinger>| fingers.into_iter().next();
-    let felt = visits(first(finger(&recorded)?).as_ref());
-    let felt_against = match &against {
+    let felt = visits(first(finger(recorded)?).as_ref());
+    let felt_against = match against {
         Some(against) => visits(first(finger(against)?).as_ref()),
         None => Vec::new(),
     };
@@ -95,11 +108,11 @@ pub fn execute(args: &PlotArgs) -> Result<Stop, RunFailure> {
     }
     for visit in &felt {
         let other = felt_against.iter().find(|other| other.entity == visit.entity);
-        let other = against.as_ref().map(Recorded::label).zip(other);
+        let other = against.map(Recorded::label).zip(other);
         let other = other.as_ref().map(|(label, other)| (label.as_str(), *other));
         write(&of_entity(visit, other), &out.join(&visit.entity), args.svg_only)?;
     }
-    Ok(Stop::Finished)
+    Ok(())
 }
 
 impl PlotArgs {
@@ -122,7 +135,7 @@ fn check_place(stem: &Path) -> Result<(), RunFailure> {
     })
 }
 
-fn write(figure: &Figure, stem: &Path, svg_only: bool) -> Result<Stop, RunFailure> {
+fn write(figure: &Figure, stem: &Path, svg_only: bool) -> Result<(), RunFailure> {
     let late = |error: PlotError| RunFailure::Results(error.to_string());
     let written = if svg_only {
         figure.write_svg(stem).map_err(late)?;
@@ -132,5 +145,5 @@ fn write(figure: &Figure, stem: &Path, svg_only: bool) -> Result<Stop, RunFailur
         ".svg, .png"
     };
     tell(format_args!("written      {}{written}", stem.display()));
-    Ok(Stop::Finished)
+    Ok(())
 }

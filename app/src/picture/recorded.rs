@@ -3,8 +3,11 @@
 //! Columns are found by their names, so that a recording may have more of them than this version knows.
 
 use super::table::{Table, TableRow};
+use crate::export::damaged;
+use crate::outcome::RunFailure;
 use crate::record::read::ReadError;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use rt_core::separators;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -16,6 +19,16 @@ pub(super) struct Recorded {
     pub(super) times_s: Vec<f64>,
     pub(super) fingers: Vec<RecordedFinger>,
     pub(super) bodies: Vec<RecordedBody>,
+    /// Why nothing is read behind the last of these rows, if something is wrong there.
+    damage: Option<Damage>,
+}
+
+/// Something wrong behind good rows.
+#[derive(Debug, Clone)]
+struct Damage {
+    why: String,
+    rows: u64,
+    until_s: f64,
 }
 
 /// What it says of a finger, row by row; world frame, SI.
@@ -44,10 +57,12 @@ pub(super) enum RecordedError {
     Read { file: PathBuf, source: Box<dyn std::error::Error + Send + Sync> },
     #[error(transparent)]
     Run(#[from] ReadError),
-    #[error("{file}: no column {column}; is this a recording that `phantom3 run --record` wrote?")]
-    NoColumn { file: PathBuf, column: String },
+    #[error("{file}: no column {column}; is this a recording that `phantom3 run --record` wrote?{hint}")]
+    NoColumn { file: PathBuf, column: String, hint: &'static str },
     #[error("{file}:{line}: {column} is {found:?}; allowed: a number")]
     NoNumber { file: PathBuf, line: u64, column: String, found: String },
+    #[error("{file}: it has no rows")]
+    NoRows { file: PathBuf },
     #[error("{file}: no row between {from_s} s and {to_s} s; it lasts from {first_s} s to {last_s} s")]
     NothingThere { file: PathBuf, from_s: f64, to_s: f64, first_s: f64, last_s: f64 },
     #[error("{file}: no finger {name:?}; there are: {known}")]
@@ -68,7 +83,11 @@ impl Recorded {
         let mut table = Table::open(file)?;
         let header = table.columns().to_vec();
         let at = |column: &str| {
-            let no_column = || RecordedError::NoColumn { file: file.into(), column: column.into() };
+            let no_column = || RecordedError::NoColumn {
+                file: file.into(),
+                column: column.into(),
+                hint: separators::hint_for_header(&header.join(",")),
+            };
             header.iter().position(|name| name == column).ok_or_else(no_column)
         };
         let time = at("t")?;
@@ -86,22 +105,30 @@ impl Recorded {
             moving.iter().map(|name| RecordedBody { name: (*name).into(), ..Default::default() }).collect();
         let places: Vec<_> = moving.iter().map(|name| places(name, &at)).collect::<Result<_, _>>()?;
         let mut times_s = Vec::new();
-        while let Some(row) = table.next_row()? {
-            let row = Row { table: &table, row };
-            times_s.push(row.number(time)?);
-            for (finger, columns) in fingers.iter_mut().zip(&columns) {
-                finger.hips.push(row.vector(columns.hip)?);
-                finger.forces.push(row.vector(columns.force)?);
-                finger.entities.push(row.row.text(columns.entity).into());
-            }
-            for (body, [x, y, z, qw, qx, qy, qz]) in bodies.iter_mut().zip(&places) {
-                body.positions.push(row.vector([*x, *y, *z])?);
-                let imaginary = row.vector([*qx, *qy, *qz])?;
-                let turned = Quaternion::from_parts(row.number(*qw)?, imaginary);
-                body.orientations.push(UnitQuaternion::new_normalize(turned));
+        let mut damage = None;
+        loop {
+            let row = table.next_row().and_then(|row| {
+                row.map(|row| Sample::read(&Row { table: &table, row }, time, &columns, &places)).transpose()
+            });
+            match row {
+                Ok(Some(sample)) => {
+                    times_s.push(sample.time_s);
+                    sample.append_to(&mut fingers, &mut bodies);
+                }
+                Ok(None) => break,
+                Err(error) => {
+                    let Some(&until_s) = times_s.last() else { return Err(error) };
+                    damage = Some(Damage { why: error.to_string(), rows: times_s.len() as u64, until_s });
+                    break;
+                }
             }
         }
-        Ok(Self { file: file.into(), times_s, fingers, bodies })
+        Ok(Self { file: file.into(), times_s, fingers, bodies, damage })
+    }
+
+    /// The fault that damage behind its rows is.
+    pub(super) fn damage(&self) -> Option<RunFailure> {
+        self.damage.as_ref().map(|found| damaged(&found.why, found.rows, found.until_s))
     }
 
     /// What a legend calls it: the file's name without folders and ending.
@@ -111,10 +138,11 @@ impl Recorded {
 
     /// The rows from one time to another (s).
     pub(super) fn between(self, from_s: f64, to_s: f64) -> Result<Self, RecordedError> {
+        let (Some(&first_s), Some(&last_s)) = (self.times_s.first(), self.times_s.last()) else {
+            return Err(RecordedError::NoRows { file: self.file });
+        };
         let is_kept: Vec<_> = self.times_s.iter().map(|t| (from_s..=to_s).contains(t)).collect();
         if !is_kept.contains(&true) {
-            let [first_s, last_s] =
-                [self.times_s.first(), self.times_s.last()].map(|t| t.copied().unwrap_or(f64::NAN));
             return Err(RecordedError::NothingThere { file: self.file, from_s, to_s, first_s, last_s });
         }
         let finger = |finger: &RecordedFinger| RecordedFinger {
@@ -130,7 +158,8 @@ impl Recorded {
             orientations: kept(&body.orientations, &is_kept),
         };
         let bodies = self.bodies.iter().map(body).collect();
-        Ok(Self { times_s: kept(&self.times_s, &is_kept), fingers, bodies, file: self.file })
+        let times_s = kept(&self.times_s, &is_kept);
+        Ok(Self { times_s, fingers, bodies, file: self.file, damage: self.damage })
     }
 
     /// The entities that move.
@@ -204,6 +233,48 @@ impl Row<'_> {
     }
 }
 
+/// What a whole row says.
+struct Sample {
+    time_s: f64,
+    fingers: Vec<(Vector3<f64>, Vector3<f64>, String)>,
+    bodies: Vec<(Vector3<f64>, UnitQuaternion<f64>)>,
+}
+
+impl Sample {
+    fn read(
+        row: &Row<'_>,
+        time: usize,
+        columns: &[Columns],
+        places: &[[usize; 7]],
+    ) -> Result<Self, RecordedError> {
+        let finger = |columns: &Columns| -> Result<_, RecordedError> {
+            let entity = row.row.text(columns.entity).to_owned();
+            Ok((row.vector(columns.hip)?, row.vector(columns.force)?, entity))
+        };
+        let body = |&[x, y, z, qw, qx, qy, qz]: &[usize; 7]| -> Result<_, RecordedError> {
+            let turned = Quaternion::from_parts(row.number(qw)?, row.vector([qx, qy, qz])?);
+            Ok((row.vector([x, y, z])?, UnitQuaternion::new_normalize(turned)))
+        };
+        Ok(Self {
+            time_s: row.number(time)?,
+            fingers: columns.iter().map(finger).collect::<Result<_, _>>()?,
+            bodies: places.iter().map(body).collect::<Result<_, _>>()?,
+        })
+    }
+
+    fn append_to(self, fingers: &mut [RecordedFinger], bodies: &mut [RecordedBody]) {
+        for (finger, (hip, force, entity)) in fingers.iter_mut().zip(self.fingers) {
+            finger.hips.push(hip);
+            finger.forces.push(force);
+            finger.entities.push(entity);
+        }
+        for (body, (position, orientation)) in bodies.iter_mut().zip(self.bodies) {
+            body.positions.push(position);
+            body.orientations.push(orientation);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -233,11 +304,25 @@ mod tests {
             ("x,y\n1,2\n", "no column t"),
             ("t,y\n1,2\n", "no column f0_hip_x"),
             (&*HEADER.replace(",a_force_y", ""), "no column a_force_y"),
-            (&*format!("{HEADER}0,1,2,3,4,5,6,,\n0.1,1,2,3,four,5,6,,\n"), "r.csv:3: a_force_x is \"four\""),
+            ("t;a_hip_x\n0,5;1,2\n", "it has semicolons"),
+            (&*format!("{HEADER}0.1,1,2,3,four,5,6,,\n"), "r.csv:2: a_force_x is \"four\""),
             (&*format!("{HEADER}0,1,2\n"), "cannot read the recording"),
         ] {
             let error = read(text).expect_err("refused").to_string();
             assert!(error.contains(says), "{error}");
+        }
+    }
+
+    #[test]
+    fn rows_before_a_bad_one_are_read_and_the_bad_one_is_a_fault() {
+        let good = format!("{HEADER}0,1,2,3,4,5,6,ball,\n0.1,1,2,3,4,5,6,ball,\n");
+        assert!(read(&good).expect("a recording").damage().is_none());
+        for bad in ["0.2,1,2,3,4,5,six,ball,\n0.3,1,2,3,4,5,6,ball,\n", "0.2,1\n"] {
+            let recorded = read(&format!("{good}{bad}")).expect("two rows").between(0.05, 1.0).expect("one");
+            assert_eq!((&*recorded.times_s, recorded.fingers[0].hips.len()), (&[0.1][..], 1));
+            let fault = recorded.damage().expect("a fault");
+            assert_eq!(fault.exit_status(), 3);
+            assert!(fault.to_string().ends_with("2 rows, up to t = 0.1 s"), "{fault}");
         }
     }
 
@@ -247,6 +332,8 @@ mod tests {
         assert_eq!(recorded.clone().between(0.5, 2.0).expect("a row").times_s, [1.0]);
         let error = recorded.clone().between(3.0, 4.0).expect_err("nothing").to_string();
         assert!(error.contains("from 0 s to 1 s"), "{error}");
+        let error = read(HEADER).expect("a header").between(0.0, 1.0).expect_err("nothing").to_string();
+        assert!(error.ends_with("r.csv: it has no rows"), "{error}");
         let error = recorded.choose(Some("b")).expect_err("no such finger").to_string();
         assert!(error.contains("there are: a"), "{error}");
     }

@@ -4,7 +4,7 @@
 
 use super::recorded::RecordedError;
 use crate::columns::{Cell, columns, each_cell};
-use crate::record::read::{RecordedRun, is_mcap, is_parquet};
+use crate::record::read::{RecordedRun, check_begin, is_mcap, is_parquet};
 use csv::StringRecord;
 use io_driver::say::say;
 use parquet::errors::ParquetError;
@@ -45,6 +45,7 @@ enum Value {
 impl Table {
     /// Opens it and reads which columns there are.
     pub(super) fn open(file: &Path) -> Result<Self, RecordedError> {
+        check_begin(file)?;
         let (columns, rows) = if is_mcap(file) {
             let run = RecordedRun::open(file)?;
             let columns = columns(run.names()).into_iter().map(|column| column.name).collect();

@@ -40,6 +40,14 @@ pub enum ReadError {
         /// What is wrong.
         why: String,
     },
+    /// It may be a recording, in a form that is not read.
+    #[error("{file}: {why}")]
+    Unsupported {
+        /// Which.
+        file: PathBuf,
+        /// What is not read, and what is.
+        why: String,
+    },
     /// A row of a table is wrong.
     #[error("{file}:{line}: {why}")]
     BadRow {
@@ -87,6 +95,7 @@ impl RecordedRun {
     /// # Errors
     /// If it cannot be read or is something else.
     pub fn open(file: &Path) -> Result<Self, ReadError> {
+        check_begin(file)?;
         let rows = if is_mcap(file) {
             Rows::Mcap(Box::new(McapRows::open(file)?))
         } else if is_parquet(file) {
@@ -147,6 +156,24 @@ impl RecordedRun {
         }
     }
 }
+
+/// Refuses what can be told from the first bytes to be no recording in any format.
+pub(crate) fn check_begin(file: &Path) -> Result<(), ReadError> {
+    let mut begin = Vec::with_capacity(BEGIN_BYTES);
+    let opened =
+        input_file::open(file).and_then(|file| file.take(BEGIN_BYTES as u64).read_to_end(&mut begin));
+    opened.map_err(|source| ReadError::Io { file: file.into(), source })?;
+    let why = match &begin[..] {
+        [] => "it is empty",
+        begin if input_file::is_utf16(begin) => input_file::UTF16,
+        [0x1f, 0x8b, ..] => "it is compressed by gzip; unpack it with gunzip",
+        [b'P', b'K', 3, 4] => "it is a ZIP archive, as spreadsheets are; unpack it, or save the table as CSV",
+        _ => return Ok(()),
+    };
+    Err(ReadError::NoRecording { file: file.into(), why: why.into() })
+}
+
+const BEGIN_BYTES: usize = 4;
 
 /// By its ending; or, whatever it is called, by its first bytes.
 pub(crate) fn is_mcap(file: &Path) -> bool {

@@ -1,6 +1,6 @@
 //! Where the devices stand, and the driver that a scripted hand moves.
 
-use super::{HandFile, HandMode, Rig, RigError};
+use super::{HandFile, HandMode, LONGEST_RUN_S, Rig, RigError};
 use crate::mount::Mount;
 use crate::simulated::{base_for_path, base_over_table};
 use io_driver::config::{
@@ -200,6 +200,9 @@ pub(super) fn check_hand(path: &Path, named_by: &str, scene: &Scene) -> Result<H
     let text = input_file::read_text(path, MAX_TABLE_BYTES).map_err(unreadable)?;
     let fingers: Vec<&str> = scene.fingers.iter().map(|finger| finger.name.as_str()).collect();
     let script = HandScript::parse(&text, path, &fingers)?;
+    if script.duration_s() > LONGEST_RUN_S {
+        return Err(RigError::HandTooLong { file: path.into(), last_s: script.duration_s() });
+    }
     let path = std::path::absolute(path).map_err(unreadable)?;
     let bounds = (0..fingers.len()).map(|finger| script.bounds(finger)).collect();
     Ok(HandFile { path, duration_s: script.duration_s(), bounds })

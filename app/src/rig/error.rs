@@ -1,5 +1,6 @@
 //! What can be wrong with the input of a run.
 
+use super::LONGEST_RUN_S;
 use crate::simulated::SimulationError;
 use haptics::mesh::MeshError;
 use haptics::{CsgError, HeightMapError, ParameterError};
@@ -43,6 +44,17 @@ pub enum RigError {
         file: PathBuf,
         /// Who asks for it.
         named_by: String,
+    },
+    /// The hand file would make a run that is longer than any may be.
+    #[error(
+        "{file}: its last time is t = {last_s:.2} s, allowed: at most {LONGEST_RUN_S} s; t counts seconds from the beginning of \
+         the run: subtract the first time from all of them"
+    )]
+    HandTooLong {
+        /// Which.
+        file: PathBuf,
+        /// The last time in it.
+        last_s: f64,
     },
     /// The devices cannot be simulated.
     #[error(transparent)]

@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::path::Path;
 
+use rt_core::toml_slips;
 use toml::Spanned;
 use toml::de::DeTable;
 
@@ -78,29 +79,8 @@ impl<'d> Document<'d> {
             file: self.file.into(),
             line: self.line(offset),
             column: column_of(self.text.as_bytes(), offset),
-            message: message.lines().collect::<Vec<_>>().join("; ") + hint(self.text, offset),
+            message: toml_slips::explain(self.text, offset, message),
         }
-    }
-}
-
-/// What to write instead, where a usual slip makes the parser complain of something else.
-fn hint(text: &str, offset: usize) -> &'static str {
-    let (Some(before), Some(rest)) = (text.get(..offset), text.get(offset..)) else { return "" };
-    let before = before.rsplit('\n').next().unwrap_or_default();
-    let rest = rest.split('\n').next().unwrap_or_default();
-    let ends_in_digit = |text: &str| text.ends_with(|c: char| c.is_ascii_digit());
-    let begins_with_digit = |text: &str| text.starts_with(|c: char| c.is_ascii_digit());
-    let mut numbers = rest.split_whitespace().map(|word| word.trim_end_matches([',', ']', '}']));
-    let is_number = |word: Option<&str>| word.is_some_and(|word| word.parse::<f64>().is_ok());
-    // `0,1`, seen at the comma or behind the second number.
-    let behind = before.trim_end().trim_end_matches(|c: char| c.is_ascii_digit()).strip_suffix(',');
-    let at_comma = ends_in_digit(before) && rest.strip_prefix(',').is_some_and(begins_with_digit);
-    if at_comma || ends_in_digit(before.trim_end()) && behind.is_some_and(ends_in_digit) {
-        "; a decimal number has a point, as in 0.1"
-    } else if is_number(numbers.next()) && is_number(numbers.next()) {
-        "; between two numbers of an array stands a comma, as in [0.0, 1.0]"
-    } else {
-        ""
     }
 }
 

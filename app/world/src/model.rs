@@ -29,7 +29,7 @@ pub use stl::read_stl;
 use crate::error::SceneError;
 use haptics::NurbsPatch;
 use haptics::mesh::{CornerUv, TriangleSoup};
-use rt_core::input_file;
+use rt_core::{input_file, separators};
 use std::io;
 use std::path::Path;
 
@@ -189,6 +189,12 @@ fn unreadable(cause: io::Error) -> ModelError {
 fn number(word: &[u8]) -> Option<f64> {
     let number: f64 = std::str::from_utf8(word).ok()?.parse().ok()?;
     number.is_finite().then_some(number)
+}
+
+/// What is allowed where this is no number.
+fn a_number(word: Option<&[u8]>) -> String {
+    let word = word.and_then(|word| std::str::from_utf8(word).ok()).unwrap_or_default();
+    format!("a finite number{}", separators::hint_for_cell(word))
 }
 
 /// A piece of a file, short enough and harmless for a message.

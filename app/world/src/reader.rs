@@ -9,6 +9,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
+use rt_core::toml_slips;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -382,12 +383,11 @@ impl<'d> Value<'d> {
     }
 
     pub(crate) fn tables(&self, key: &str) -> Result<Vec<Table<'d>>, SceneError> {
-        let allowed = format!("a list of tables, each under its own [[{key}]]");
+        let allowed = toml_slips::tables(key);
         let items = match self.value.get_ref() {
             DeValue::Array(items) => items,
             DeValue::Table(_) => {
-                let found = format!("a single table, as `[{key}]` makes it");
-                let allowed = format!("{allowed}: write it with two brackets, even if there is only one");
+                let [found, allowed] = toml_slips::single_table(key);
                 return Err(SceneError::WrongType { at: self.at(), found, allowed });
             }
             _ => return Err(self.wrong_type(allowed)),

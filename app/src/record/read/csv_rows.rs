@@ -2,6 +2,7 @@
 //!
 //! Model: the header says which columns there are; they have to be those that such a recording has. The length of a tick
 //! is the shortest time between two of the first rows. A last line without its end is left out: half a number is a number.
+//! Windows line ends and a byte order mark, which editors and spreadsheets add, do not count.
 
 use super::ReadError;
 use super::tick_order::{TickOrder, check_period};
@@ -10,7 +11,7 @@ use crate::row::{BodyRow, FingerRow, Row};
 use io_driver::device::{Extras, run_time_s};
 use nalgebra::{Quaternion, Vector3};
 use physics::GraspQuality;
-use rt_core::input_file;
+use rt_core::{input_file, separators};
 use shm_abi::MAX_DEVICES;
 use std::collections::{HashMap, VecDeque};
 use std::fs::File;
@@ -61,12 +62,10 @@ impl CsvRows {
         };
         let no_recording = |why: String| ReadError::NoRecording { file: file.into(), why };
         let header = rows.read_line()?.ok_or_else(|| no_recording("it has no first line".into()))?;
-        rows.names = names_in(&header);
+        let header = header.strip_prefix('\u{feff}').unwrap_or(&header);
+        rows.names = names_in(header);
         rows.columns = columns(&rows.names);
-        let expected: Vec<&str> = rows.columns.iter().map(|column| &*column.name).collect();
-        if rows.names.fingers.is_empty() || expected != header.split(',').collect::<Vec<_>>() {
-            return Err(no_recording("its first line has not the columns of one".into()));
-        }
+        check_header(header, &rows.names, &rows.columns).map_err(no_recording)?;
         let mut bytes = 0;
         while rows.ahead.len() < LOOK_AHEAD
             && bytes < LOOK_AHEAD_BYTES
@@ -114,6 +113,7 @@ impl CsvRows {
             }
             return Ok(None);
         }
+        bytes.pop_if(|last| *last == b'\r');
         let no_text = |_| ReadError::NoRecording { file: self.file.clone(), why: "it is no text".into() };
         String::from_utf8(bytes).map(Some).map_err(no_text)
     }
@@ -121,7 +121,8 @@ impl CsvRows {
     fn parse(&mut self, line: &str) -> Result<(Row, Vec<BodyRow>), String> {
         let cells: Vec<&str> = line.split(',').collect();
         if cells.len() != self.columns.len() {
-            return Err(format!("found {} cells, expected {}", cells.len(), self.columns.len()));
+            let hint = separators::hint_for_row(line, self.columns.len());
+            return Err(format!("found {} cells, expected {}{hint}", cells.len(), self.columns.len()));
         }
         let mut cells = Cells {
             cells: &cells,
@@ -287,6 +288,46 @@ impl Cells<'_> {
 fn check_count(known: usize, most: usize, what: &str) -> Result<(), String> {
     if known < most { Ok(()) } else { Err(format!("more than {most} {what} are named; allowed: as many")) }
 }
+
+/// Says which column of a first line is the first that is not that of a recording.
+fn check_header(header: &str, names: &Names, expected: &[Column]) -> Result<(), String> {
+    let hint = separators::hint_for_header(header);
+    if names.fingers.is_empty() {
+        let begin: String = header.chars().take(SHOWN_CHARS).collect();
+        return Err(format!(
+            "its first line is {begin:?}, without a column such as f0_hip_x of a finger{hint}"
+        ));
+    }
+    let mut found = header.split(',');
+    for (index, column) in expected.iter().enumerate() {
+        match found.next() {
+            Some(name) if name == column.name => {}
+            Some(name) => {
+                return Err(format!(
+                    "its column {} is {name:?}, expected {:?}{hint}",
+                    index + 1,
+                    column.name
+                ));
+            }
+            None => {
+                return Err(format!(
+                    "its first line ends behind {index} columns, expected {:?}{hint}",
+                    column.name
+                ));
+            }
+        }
+    }
+    found.next().map_or(Ok(()), |name| {
+        Err(format!(
+            "its column {} is {name:?}, expected no more than {}",
+            expected.len() + 1,
+            expected.len()
+        ))
+    })
+}
+
+/// Enough of a line to know it again.
+const SHOWN_CHARS: usize = 40;
 
 /// Which names a header is made of, as far as it is one.
 fn names_in(header: &str) -> Names {

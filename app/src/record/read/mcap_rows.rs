@@ -1,7 +1,7 @@
 //! Rows of an MCAP file, read from front to back: an index, which a killed process did not write, is not needed.
 
 use super::ReadError;
-use super::mcap_chunk;
+use super::mcap_chunk::{self, ChunkError};
 use super::mcap_record::{self, McapRecord};
 use super::tick_order::{TickOrder, check_period};
 use crate::columns::Names;
@@ -90,8 +90,8 @@ impl McapRows {
             orders: Vec::new(),
         };
         rows.first = rows.read_row()?;
-        if rows.names.fingers.is_empty() || rows.period_ns == 0 {
-            let why = rows.cut.take().unwrap_or_else(|| "it has no metadata of a run".into());
+        if !rows.is_of_a_run() {
+            let why = rows.cut.take().unwrap_or_else(|| NO_RUN.into());
             return Err(ReadError::NoRecording { file: path.into(), why });
         }
         check_period(rows.period_ns).map_err(|why| rows.damaged(&why))?;
@@ -171,9 +171,17 @@ impl McapRows {
         Ok(true)
     }
 
+    /// Whether it said whose ticks it has, which ours do before the first.
+    fn is_of_a_run(&self) -> bool {
+        !self.names.fingers.is_empty() && self.period_ns != 0
+    }
+
     /// Keeps what was found for later.
     fn keep(&mut self, found: Kept) -> Result<Found, ReadError> {
         match found {
+            Kept::Row(_) | Kept::Chunk(_) if !self.is_of_a_run() => {
+                return Err(ReadError::NoRecording { file: self.path.clone(), why: NO_RUN.into() });
+            }
             Kept::Row(row) => {
                 let (row, bodies) = (*row).ok_or_else(|| self.damaged("a tick is no tick of this scene"))?;
                 self.order.check(row.run_tick, self.period_ns).map_err(|why| self.damaged(&why))?;
@@ -188,9 +196,9 @@ impl McapRows {
                 self.names =
                     names.ok_or_else(|| self.damaged("the names of the columns are not complete"))?;
             }
-            Kept::Chunk(records) => {
-                self.chunk = OpenChunk { records: records.map_err(|why| self.damaged(&why))?, at: 0 };
-            }
+            Kept::Chunk(Ok(records)) => self.chunk = OpenChunk { records, at: 0 },
+            Kept::Chunk(Err(ChunkError::Damage(why))) => return Err(self.damaged(&why)),
+            Kept::Chunk(Err(ChunkError::Compression(other))) => return Err(self.compressed_by(&other)),
             Kept::Damage => return Err(self.damaged("a record is shorter than it says")),
             Kept::File(file) => self.about.files.push(file),
             Kept::Order(order) => self.orders.extend(order),
@@ -198,6 +206,14 @@ impl McapRows {
             Kept::Facts(..) | Kept::Nothing => {}
         }
         Ok(Found::Other)
+    }
+
+    fn compressed_by(&self, other: &str) -> ReadError {
+        let why = format!(
+            "its chunks are compressed by {other}; allowed: lz4, or none: rewrite it with `mcap compress --compression lz4 \
+             IN.mcap -o OUT.mcap`"
+        );
+        ReadError::Unsupported { file: self.path.clone(), why }
     }
 
     fn damaged(&self, why: &str) -> ReadError {
@@ -214,7 +230,7 @@ enum Kept {
     File(InputFile),
     Order(Option<(u64, String)>),
     Channels(Channels),
-    Chunk(Result<Vec<u8>, String>),
+    Chunk(Result<Vec<u8>, ChunkError>),
     Nothing,
     /// A record that is none.
     Damage,
@@ -258,6 +274,8 @@ fn read_order(message: &[u8]) -> Option<(u64, String)> {
     Some((tick, words))
 }
 
+const NO_RUN: &str = "it has no metadata of a run (phantom3.run, phantom3.columns) before its first tick; \
+                      another program made or rewrote it";
 const CUT: &str = "it ends in the middle, as when a disk is full or a process was killed";
 
 fn read_some(file: &mut File, room: &mut [u8]) -> io::Result<usize> {

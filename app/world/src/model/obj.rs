@@ -8,7 +8,7 @@
 //! A face may name a vertex that comes later in the file, so polygons are divided when all vertices are known.
 
 use super::polygon::{MAX_CONCAVE_CORNERS, triangulate};
-use super::{ModelError, number, shown};
+use super::{ModelError, a_number, number, shown};
 use haptics::mesh::{CornerUv, TriangleSoup};
 use nalgebra::Vector3;
 use std::borrow::Cow;
@@ -251,7 +251,7 @@ fn texture<'l>(line: usize, words: impl Iterator<Item = &'l [u8]>) -> Result<[f6
     let (mut uv, mut count) = ([0.0; 2], 0);
     for word in words {
         let Some(number) = number(word) else {
-            return Err(ModelError::Line { line, found: shown(word), allowed: "a finite number".into() });
+            return Err(ModelError::Line { line, found: shown(word), allowed: a_number(Some(word)) });
         };
         if let Some(coordinate) = uv.get_mut(count) {
             *coordinate = number;
@@ -290,7 +290,7 @@ fn vertex<'l>(line: usize, words: impl Iterator<Item = &'l [u8]>) -> Result<Vect
     let mut count = 0;
     for word in words {
         let Some(number) = number(word) else {
-            return Err(ModelError::Line { line, found: shown(word), allowed: "a finite number".into() });
+            return Err(ModelError::Line { line, found: shown(word), allowed: a_number(Some(word)) });
         };
         if let Some(coordinate) = coordinates.get_mut(count) {
             *coordinate = number;

@@ -7,7 +7,8 @@
 //! Normals are ignored: often zero, often wrong, and given by the corners anyway. Each triangle gets three vertices of
 //! its own; `Mesh::build` merges those that are equal to the bit.
 
-use super::{ModelError, number, shown};
+use super::obj::looks_like_obj;
+use super::{ModelError, a_number, number, shown};
 use haptics::mesh::TriangleSoup;
 use nalgebra::Vector3;
 
@@ -21,6 +22,11 @@ const CORNERS_AT: usize = 12;
 /// # Errors
 /// The first thing found to be wrong, with its line or byte.
 pub fn read_stl(bytes: &[u8]) -> Result<TriangleSoup, ModelError> {
+    if !looks_like_stl(bytes) && looks_like_obj(bytes) {
+        let found = format!("a text that looks like OBJ, which begins with {}", shown(bytes));
+        let allowed = "STL; if it is OBJ, let its name end in .obj".into();
+        return Err(ModelError::Byte { offset: 0, found, allowed });
+    }
     let soup = if is_text(bytes) { read_text(bytes) } else { read_binary(bytes) }?;
     if soup.faces.is_empty() { Err(ModelError::NoTriangle) } else { Ok(soup) }
 }
@@ -184,7 +190,7 @@ impl<'t> Words<'t> {
 
     fn number(&mut self) -> Result<f64, ModelError> {
         let word = self.next();
-        word.and_then(number).ok_or_else(|| self.wrong(word, "a finite number"))
+        word.and_then(number).ok_or_else(|| self.wrong(word, &a_number(word)))
     }
 
     fn wrong(&self, found: Option<&[u8]>, allowed: &str) -> ModelError {

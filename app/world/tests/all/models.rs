@@ -276,6 +276,23 @@ fn what_is_wrong_with_an_stl_text_is_told_with_its_line() {
 }
 
 #[test]
+fn decimal_commas_and_an_obj_under_the_name_of_an_stl_are_told_as_what_they_are() {
+    obj_refused(
+        "v 0,5 1 2\n",
+        "line 1: found `0,5`; allowed: a finite number; a decimal number has a point, as in 0.1",
+    );
+    stl_refused(
+        stl_text().replacen("vertex 0", "vertex 0,5", 1),
+        "line 4: found `0,5`; allowed: a finite number; a decimal number has a point, as in 0.1",
+    );
+    let long = format!("{}{PLAIN}", "# made elsewhere\n".repeat(10));
+    for text in [PLAIN, &*long] {
+        let said = read_stl(text.as_bytes()).expect_err("an OBJ").to_string();
+        assert!(said.contains("looks like OBJ") && said.contains("let its name end in .obj"), "{said}");
+    }
+}
+
+#[test]
 fn a_message_stays_short_whatever_the_file_holds() {
     let long = "x".repeat(1_000_000);
     for text in [format!("v 0 0 {long}"), format!("f 1 2 {long}"), long.clone()] {

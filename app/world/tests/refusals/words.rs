@@ -43,6 +43,38 @@ fn text_that_is_not_toml_is_refused_with_line_and_column() {
 }
 
 #[test]
+fn usual_slips_are_refused_with_what_to_write_and_not_with_what_the_parser_wanted_next() {
+    for (text, says) in [
+        (
+            "name = table\n",
+            "1:8: not valid TOML: found table without quotes; text stands in quotes, as in \"table\"",
+        ),
+        (
+            "name = floor\n",
+            "1:8: not valid TOML: found floor without quotes; text stands in quotes, as in \"floor\"",
+        ),
+        (
+            "name = nail\n",
+            "1:8: not valid TOML: found nail without quotes; text stands in quotes, as in \"nail\"",
+        ),
+        ("movable = True\n", "1:11: not valid TOML: found True, allowed: true, in small letters"),
+        ("radius_m = .05\n", "1:12: not valid TOML: a number has a digit before its point, as in 0.05"),
+        ("radius_m = 5.\n", "1:14: not valid TOML: a number has a digit behind its point, as in 5.0"),
+        (
+            "file = \"C:\\Users\\me.obj\"\n",
+            "1:13: not valid TOML: between \" a backslash begins a special character; in a path write / for it, or put the \
+             path between '",
+        ),
+        (
+            "name = \u{201c}table\u{201d}\n",
+            "1:8: not valid TOML: found typographic quotes; text stands between straight ones, as in \"table\"",
+        ),
+    ] {
+        refused(text, &format!("s.toml:{says}"));
+    }
+}
+
+#[test]
 fn an_unknown_key_is_refused_with_what_was_probably_meant() {
     for (scene, found, allowed) in [
         (

@@ -1,0 +1,147 @@
+//! Usual slips in a TOML text, by the place at which the parser stops.
+//!
+//! Problem: a parser complains of what it wanted next. Of `name = table` it says that it wanted `true`, of a path with
+//! backslashes that digits are missing; who wrote that looks for digits.
+//! Model: the characters around the place are looked at; where they are those of a usual slip, the words say what to
+//! write instead. Else the parser's own words stand.
+
+/// What to say of an error at a byte of a text; `said`: the parser's words.
+pub fn explain(text: &str, offset: usize, said: &str) -> String {
+    let said = said.lines().collect::<Vec<_>>().join("; ");
+    let (Some(before), Some(rest)) = (text.get(..offset), text.get(offset..)) else { return said };
+    let before = before.rsplit('\n').next().unwrap_or_default();
+    let rest = rest.split(['\n', '\r']).next().unwrap_or_default();
+    word_without_quotes(before, rest)
+        .or_else(|| half_a_number(before, rest).map(str::to_owned))
+        .or_else(|| backslash(before, &said).map(str::to_owned))
+        .or_else(|| typographic_quotes(before, rest, &said).map(str::to_owned))
+        .unwrap_or_else(|| said.clone() + in_numbers(before, rest))
+}
+
+/// What to say of `[key]` where a list of tables belongs: found, and allowed.
+pub fn single_table(key: &str) -> [String; 2] {
+    [
+        format!("a single table, as `[{key}]` makes it"),
+        format!("{}: write it with two brackets, even if there is only one", tables(key)),
+    ]
+}
+
+/// What a list of tables is.
+pub fn tables(key: &str) -> String {
+    format!("a list of tables, each under its own [[{key}]]")
+}
+
+/// `name = table`
+fn word_without_quotes(before: &str, rest: &str) -> Option<String> {
+    const MOST_CHARS: usize = 40;
+    // Not the name of a table: `[motor]`.
+    let is_value = before.contains('=') && before.trim_end().ends_with(['=', '[', ',']);
+    let is_in_word = |c: char| c.is_alphanumeric() || matches!(c, '_' | '-' | '.' | '/');
+    let word: String = rest.chars().take_while(|&c| is_in_word(c)).take(MOST_CHARS).collect();
+    if !is_value || !word.starts_with(|c: char| c.is_alphabetic() || c == '/') {
+        return None;
+    }
+    let small = word.to_lowercase();
+    Some(match small.as_str() {
+        "true" | "false" => format!("found {word}, allowed: {small}, in small letters"),
+        "yes" | "on" => format!("found {word}, allowed: true; text stands in quotes"),
+        "no" | "off" => format!("found {word}, allowed: false; text stands in quotes"),
+        _ => format!("found {word} without quotes; text stands in quotes, as in \"{word}\""),
+    })
+}
+
+/// `.05`, `5.`
+fn half_a_number(before: &str, rest: &str) -> Option<&'static str> {
+    let unsigned = rest.strip_prefix(['+', '-']).unwrap_or(rest);
+    let begins_with_digit = |text: &str| text.starts_with(|c: char| c.is_ascii_digit());
+    let ends_in_digit = |text: &str| text.ends_with(|c: char| c.is_ascii_digit());
+    if unsigned.strip_prefix('.').is_some_and(begins_with_digit) {
+        Some("a number has a digit before its point, as in 0.05")
+    } else if before.strip_suffix('.').is_some_and(ends_in_digit) {
+        Some("a number has a digit behind its point, as in 5.0")
+    } else {
+        None
+    }
+}
+
+/// `"C:\Users"`
+fn backslash(before: &str, said: &str) -> Option<&'static str> {
+    (before.contains('\\') && (said.contains("unicode") || said.contains("escape"))).then_some(
+        "between \" a backslash begins a special character; in a path write / for it, or put the path between '",
+    )
+}
+
+/// What word processors make of quotes.
+fn typographic_quotes(before: &str, rest: &str, said: &str) -> Option<&'static str> {
+    let is_typographic = |c: char| matches!(c, '\u{2018}'..='\u{201f}' | '\u{ab}' | '\u{bb}');
+    (said.contains("string") && (before.contains(is_typographic) || rest.contains(is_typographic)))
+        .then_some("found typographic quotes; text stands between straight ones, as in \"table\"")
+}
+
+/// `0,5` and `[1 2]`, in which the parser sees the end of a value.
+fn in_numbers(before: &str, rest: &str) -> &'static str {
+    let ends_in_digit = |text: &str| text.ends_with(|c: char| c.is_ascii_digit());
+    let begins_with_digit = |text: &str| text.starts_with(|c: char| c.is_ascii_digit());
+    let mut numbers = rest.split_whitespace().map(|word| word.trim_end_matches([',', ']', '}']));
+    let is_number = |word: Option<&str>| word.is_some_and(|word| word.parse::<f64>().is_ok());
+    // `0,1`, seen at the comma or behind the second number.
+    let behind = before.trim_end().trim_end_matches(|c: char| c.is_ascii_digit()).strip_suffix(',');
+    let at_comma = ends_in_digit(before) && rest.strip_prefix(',').is_some_and(begins_with_digit);
+    if at_comma || ends_in_digit(before.trim_end()) && behind.is_some_and(ends_in_digit) {
+        "; a decimal number has a point, as in 0.1"
+    } else if is_number(numbers.next()) && is_number(numbers.next()) {
+        "; between two numbers of an array stands a comma, as in [0.0, 1.0]"
+    } else {
+        ""
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(text: &str, part: &str, said: &str) -> String {
+        explain(text, text.find(part).expect("a part of it"), said)
+    }
+
+    #[test]
+    fn a_word_without_quotes_is_told_with_its_quotes() {
+        let boolean = "invalid boolean, expected `true`";
+        assert!(at("a = 1\nname = table\n", "table", boolean).ends_with("as in \"table\""));
+        assert!(at("x = /run/x", "/run", boolean).ends_with("as in \"/run/x\""));
+        assert!(at("x = [1, two]", "two", boolean).contains("found two without quotes"));
+        assert_eq!(at("movable = True", "True", boolean), "found True, allowed: true, in small letters");
+        assert!(at("movable = no # not yet", "no", boolean).contains("allowed: false"));
+        assert_eq!(at("[motor]", "motor", boolean), boolean);
+        for other in ["x = ", "x = = 1", "x = 1"] {
+            assert_eq!(explain(other, 4, boolean), boolean, "{other}");
+        }
+    }
+
+    #[test]
+    fn half_numbers_paths_and_typographic_quotes_are_told_with_what_to_write() {
+        let number = "invalid mantissa, expected digits";
+        assert!(at("r = .05", ".05", number).ends_with("as in 0.05"));
+        assert!(at("r = [-.05, 1]", "-.05", number).ends_with("as in 0.05"));
+        assert!(explain("r = 5.\n", 6, number).ends_with("as in 5.0"));
+        let path = "x = \"C:\\Users\\me\"";
+        let said = at(path, "sers", "too few unicode value digits, expected unicode hexadecimal value");
+        assert!(said.contains("write /") && !said.contains("digits"), "{said}");
+        let string = "string values must be quoted, expected literal string";
+        for quotes in ["x = \u{201c}a\u{201d}", "x = \u{2018}a", "x = \u{ab}a\u{bb}"] {
+            assert!(explain(quotes, 4, string).contains("straight"), "{quotes}");
+        }
+        assert_eq!(
+            explain("x = 1 2 # it\u{2019}s", 4, "unexpected key"),
+            "unexpected key; between two numbers of an \
+                   array stands a comma, as in [0.0, 1.0]"
+        );
+    }
+
+    #[test]
+    fn places_outside_of_the_text_or_within_a_character_leave_the_parsers_words() {
+        for offset in [1, 99] {
+            assert_eq!(explain("ä", offset, "wrong\nhere"), "wrong; here");
+        }
+    }
+}
