@@ -173,14 +173,8 @@ impl Play {
         let bodies = step.bodies().len();
         let view = View::new(&rig.scene, step.entities());
         let book = Book::default();
-        let recorder = |path: &PathBuf| {
-            let file = record::create(path, names.clone(), period_ns, &stage.about, &view, (&book, 0))?;
-            Recorder::start(path, file, bodies, period_ns, WhenFull::Wait)
-        };
-        let mut recorders = records.iter().map(recorder).collect::<Result<Vec<_>, _>>()?;
         let (events, event_ends) = event_queue(EVENT_QUEUE);
         let mut hub = Hub::new(vec![event_ends]);
-        slow::subscribe(&mut recorders, &mut hub);
         let (sender, rows) = row_queue(bodies);
         // It ends with the recording.
         let mut fast = FastLoop::new(step, sender, WhenFull::Wait, u64::MAX, period_ns).with_events(events);
@@ -191,6 +185,14 @@ impl Play {
         if let Some(taken) = taken {
             fast = fast.with_control(taken);
         }
+        // The last: it empties files, and nothing may refuse the replay after that.
+        let create =
+            |_, file| record::create(file, names.clone(), period_ns, &stage.about, &view, (&book, 0));
+        let begun = record::begin_all(&records.iter().collect::<Vec<_>>(), create)?;
+        let start =
+            |(path, file): (&PathBuf, _)| Recorder::start(path, file, bodies, period_ns, WhenFull::Wait);
+        let mut recorders = records.iter().zip(begun).map(start).collect::<Result<Vec<_>, _>>()?;
+        slow::subscribe(&mut recorders, &mut hub);
         Ok(Self {
             driver,
             fast,

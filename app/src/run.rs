@@ -159,12 +159,13 @@ impl Parts {
             book,
             about: about.clone(),
         };
-        let recorders = files.first(rig, &view)?;
         let snapshots = plan
             .pictures
             .as_ref()
             .map(|wanted| Snapshots::start(wanted, shown(), period_ns, when_full == WhenFull::Wait));
         let snapshots = snapshots.transpose().map_err(RunFailure::Start)?;
+        // The last: it empties files, and nothing may refuse the run after that.
+        let recorders = files.first(rig, &view)?;
         let fast = FastLoop::new(step, producer, when_full, total_ticks, period_ns).with_events(events);
         Ok(Self {
             slow_lists: (clock == ClockMode::Real && orders.is_some()).then_some(slow_lists),

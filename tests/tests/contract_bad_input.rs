@@ -374,6 +374,24 @@ fn a_recording_that_cannot_be_made_or_would_destroy_an_input_is_refused() {
     }
 }
 
+#[test]
+fn a_recording_that_cannot_be_made_costs_none_of_the_others() {
+    let place = workplace();
+    let outputs = ["--record", "out.csv", "--record", "new.csv", "--events", "out.jsonl"];
+    place.write("out.jsonl", PRECIOUS);
+    for clock in CLOCKS {
+        for bad in [["--record", "/dev/full"], ["--events", "none/x.csv"], ["--frames", "hand.csv"]] {
+            let arguments = [&["run", "scene.toml", "--clock", clock][..], &outputs, &bad].concat();
+            assert_says(&refused(&place, &arguments), &[bad[1]]);
+        }
+    }
+    with_recordings(&place);
+    for bad in ["none/x.csv", "/dev/full"] {
+        let arguments = ["replay", "good.mcap", "--record", "out.csv", "--record", bad];
+        assert_says(&refused(&place, &arguments), &[bad]);
+    }
+}
+
 /// Permissions do not hold for root, who therefore tries as nobody, with a copy of the program that nobody
 /// may start.
 #[test]
