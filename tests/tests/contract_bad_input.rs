@@ -533,6 +533,11 @@ fn a_pipe_without_a_writer_holds_nobody_up() {
         assert_eq!(said.status, Some(2), "{arguments:?}: {}{}", said.out, said.err);
         assert!(said.err.contains("regular file"), "{arguments:?}: {}", said.err);
     }
+    for output in ["--record", "--events"] {
+        let said = place.run(["run", "scene.toml", "--clock", "virtual", output, "pipe.csv"]);
+        assert_eq!(said.status, Some(2), "{output}: {}{}", said.out, said.err);
+        assert_says(&said.err, &["pipe.csv", "nobody reads this pipe"]);
+    }
 }
 
 /// What a terminal would act on.

@@ -2,10 +2,10 @@
 
 use super::destination::is_standard_output;
 use super::{
-    About, Beginning, Opened, RecordFile, Recorder, View, begin_all, create, create_events, create_under_way,
+    About, Backpressure, Beginning, Opened, RecordFile, Recorder, View, begin_all, create, create_events,
+    create_under_way,
 };
 use crate::book::Book;
-use crate::fast_loop::WhenFull;
 use crate::recording::RecordingError;
 use crate::rig::Rig;
 use io_driver::device::Extras;
@@ -23,7 +23,7 @@ pub struct Files {
     /// Length of a tick (ns).
     pub period_ns: u64,
     /// Whether the run waits for them.
-    pub when_full: WhenFull,
+    pub backpressure: Backpressure,
     /// What was ordered.
     pub book: Book,
     /// What is told of the run that it begins with.
@@ -96,7 +96,8 @@ impl Files {
     }
 
     fn start(&self, path: &Path, file: RecordFile, rig: &Rig) -> Result<Recorder, RecordingError> {
-        Recorder::start(path, file, rig.names(&self.extras).bodies.len(), self.period_ns, self.when_full)
+        let bodies = rig.names(&self.extras).bodies.len();
+        Recorder::start(path, file, bodies, self.period_ns, self.backpressure.clone())
     }
 }
 

@@ -28,7 +28,7 @@ pub use events_file::EventsFile;
 pub use files::Files;
 pub use mcap_file::McapFile;
 pub use opened::{Opened, begin_all, create_file};
-pub use recorder::{EventFeed, RecordFile, Recorded, Recorder};
+pub use recorder::{Backpressure, EventFeed, RecordFile, Recorded, Recorder};
 pub use view::View;
 
 use crate::book::Book;
