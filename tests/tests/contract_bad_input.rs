@@ -473,6 +473,26 @@ fn a_recording_whose_lengths_are_lies_is_told_as_damaged_and_takes_no_memory_for
 }
 
 #[test]
+fn a_line_without_an_end_takes_no_memory_for_it() {
+    let place = workplace();
+    // Holes, which are read as zeros.
+    std::fs::File::create(place.path("holes.csv")).and_then(|file| file.set_len(200 << 30)).expect("holes");
+    for command in [
+        &["plot", "holes.csv"][..],
+        &["export", "holes.csv", "--csv", "out2.csv"],
+        &["replay", "holes.csv", "--scene", "scene.toml"],
+    ] {
+        let said = run_in_little_memory(&place, command);
+        assert_eq!(said.status, Some(2), "{command:?}: {}", said.err);
+        assert_says(&said.err, &["holes.csv", "a line has more than 67108864 bytes"]);
+    }
+    let script = "ulimit -v 3000000; \"$0\" \"$@\" < /dev/zero";
+    let said = place.shell(script, &["--clock", "lockstep", "--seconds", "2", "--orders", "-"]);
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    assert_says(&said.err, &["--orders -: a line has more than 65536 bytes", "no orders are read"]);
+}
+
+#[test]
 fn a_recording_whose_times_leap_or_fall_is_refused_with_its_line() {
     let place = workplace();
     with_recordings(&place);

@@ -22,7 +22,7 @@ const LOOK_AHEAD: usize = 1000;
 /// Or so many bytes of them.
 const LOOK_AHEAD_BYTES: usize = 16 << 20;
 /// The longest row, of as many objects as a scene can have.
-const MOST_ROW_BYTES: u64 = 64 << 20;
+pub(crate) const MOST_ROW_BYTES: usize = 64 << 20;
 /// As many entities as a scene can have.
 const MOST_NAMES: usize = 100_000;
 /// And more environments with doors than anybody made.
@@ -102,9 +102,9 @@ impl CsvRows {
     /// A whole line without its end.
     fn read_line(&mut self) -> Result<Option<String>, ReadError> {
         let mut bytes = Vec::new();
-        let read = self.reader.by_ref().take(MOST_ROW_BYTES).read_until(b'\n', &mut bytes);
+        let read = self.reader.by_ref().take(MOST_ROW_BYTES as u64).read_until(b'\n', &mut bytes);
         read.map_err(|source| ReadError::Io { file: self.file.clone(), source })?;
-        if bytes.len() as u64 == MOST_ROW_BYTES {
+        if bytes.len() == MOST_ROW_BYTES {
             let why = format!("a line has more than {MOST_ROW_BYTES} bytes");
             return Err(ReadError::NoRecording { file: self.file.clone(), why });
         }
