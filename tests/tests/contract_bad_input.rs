@@ -506,6 +506,8 @@ fn a_recording_whose_times_leap_or_fall_is_refused_with_its_line() {
     for (time, parts) in [
         ("1e12", ["bad.csv:51:", "t is 1000000000000.0", "allowed: at most"]),
         ("4000", ["bad.csv:51:", "t is 4000.0 after 0.048", "at most 3600 s from a row to the next"]),
+        ("nan", ["bad.csv:51:", "t is \"nan\"", "allowed: a number"]),
+        ("inf", ["bad.csv:51:", "t is \"inf\"", "allowed: a number"]),
         ("0.01", ["bad.csv:51:", "t is 0.01 after 0.048", "rise from row to row"]),
         ("0.048", ["bad.csv:51:", "t is 0.048 after 0.048", "rise from row to row"]),
     ] {
@@ -518,6 +520,13 @@ fn a_recording_whose_times_leap_or_fall_is_refused_with_its_line() {
             assert_says(&said.err, &parts);
         }
     }
+    // No step between two times says how long a tick is.
+    let [header, first] = [0, 1].map(|line| good.lines().nth(line).expect("a recording"));
+    let (_, cells) = first.split_once(',').expect("columns");
+    place.write("bad.csv", format!("{header}\n{first}\ninf,{cells}\n"));
+    let said = place.run(["replay", "bad.csv", "--scene", "scene.toml"]);
+    assert_eq!(said.status, Some(3), "{}{}", said.out, said.err);
+    assert_says(&said.err, &["bad.csv:3:", "t is \"inf\"", "allowed: a number"]);
     let late = good.lines().take(1).chain(good.lines().skip(1).take(1)).collect::<Vec<_>>().join("\n");
     place.write("late.csv", late.replace("\n0.0,", "\n5000.0,").replace("\n0,", "\n5000,") + "\n");
     let said = place.run(["replay", "late.csv", "--scene", "scene.toml"]);

@@ -321,7 +321,9 @@ fn names_in(header: &str) -> Names {
 
 /// The shortest time between two rows (ns).
 fn period_of(lines: &VecDeque<String>) -> u64 {
-    let time_ns = |line: &String| Some((line.split(',').next()?.parse::<f64>().ok()? * 1e9).round() as u64);
+    // A time that is none is told with its line.
+    let time_s = |line: &String| line.split(',').next()?.parse::<f64>().ok().filter(|t| t.is_finite());
+    let time_ns = |line: &String| Some((time_s(line)? * 1e9).round() as u64);
     let times: Vec<u64> = lines.iter().filter_map(time_ns).collect();
     let steps = times.windows(2).map(|pair| pair[1].saturating_sub(pair[0])).filter(|step| *step > 0);
     steps.min().unwrap_or(USUAL_PERIOD_NS)
