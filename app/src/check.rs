@@ -10,6 +10,7 @@ mod summary;
 mod suspicions;
 mod warnings;
 
+use crate::outputs;
 use crate::rig::{HandMode, Problems, Rig};
 use crate::settings;
 use clap::Args;
@@ -18,7 +19,6 @@ use measures::Measures;
 use rt_core::plain_text::PlainJson;
 use serde_json::{Value, json};
 use std::fmt::Display;
-use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use summary::Summary;
@@ -83,8 +83,7 @@ pub fn execute(args: &CheckArgs, settings: &Settings) -> ExitCode {
     } else {
         report::text(&checked, &args.scene)
     };
-    // A closed pipe is no reason to fail.
-    let _ = std::io::stdout().write_all(said.as_bytes());
+    outputs::print(&said);
     ExitCode::from(if checked.problems.is_empty() { 0 } else { 2 })
 }
 

@@ -95,6 +95,11 @@ enum AppCommand {
 
 /// Runs the program with the process's own arguments.
 pub fn main() -> ExitCode {
+    let ended = execute();
+    if outputs::is_lost() && ended == ExitCode::SUCCESS { ExitCode::from(EXIT_FAULT) } else { ended }
+}
+
+fn execute() -> ExitCode {
     let Cli { settings, command, headless } = arguments::parse_with(advise);
     match command {
         Some(AppCommand::Driver(command)) => io_driver::cli::execute(command),

@@ -3,11 +3,11 @@
 //! What the files may hold is told in [`world::thesis`].
 
 use crate::outcome::{RunFailure, Stop};
+use crate::outputs;
 use clap::Args;
 use io_driver::say::say;
 use rt_core::input_file;
 use std::fs;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use world::MAX_FILE_BYTES;
 use world::thesis::{Conversion, Converted, ObjectFile, ObjectKind, read_list, read_object};
@@ -40,10 +40,7 @@ pub fn execute(args: &ConvertArgs) -> Result<Stop, RunFailure> {
     match &args.out {
         Some(out) => fs::write(out, &converted.toml)
             .map_err(|error| RunFailure::Start(format!("cannot write {}: {error}", out.display())))?,
-        None => {
-            // A closed pipe is no reason to fail.
-            let _ = std::io::stdout().write_all(converted.toml.as_bytes());
-        }
+        None => outputs::print(&converted.toml),
     }
     Ok(Stop::Finished)
 }

@@ -47,7 +47,7 @@ pub struct FastShared {
 }
 
 /// Why the fast thread ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FastEnd {
     /// The run is over.
     Finished,

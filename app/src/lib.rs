@@ -13,6 +13,7 @@
 
 pub mod attachment_totals;
 pub mod book;
+mod bounded_lines;
 pub mod calibrate;
 pub mod check;
 pub mod child;

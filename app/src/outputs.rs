@@ -2,11 +2,13 @@
 
 use crate::cli::is_same_file;
 use crate::outcome::RunFailure;
-use crate::record::destination::{EventFormat, FormatError, RunFormat, is_standard_output};
+use crate::record::destination::{EventFormat, FormatError, RunFormat, is_standard_output, shown};
+use io_driver::say::say;
 use rt_core::plain_text::PlainLines;
 use std::fmt::Display;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A file to be written.
 #[derive(Debug, Clone, Copy)]
@@ -78,23 +80,58 @@ pub(crate) fn check(outputs: &[Output<'_>], inputs: &[&PathBuf]) -> Result<(), R
                 "{option} {place} would overwrite the input {input}; name another file"
             ));
         }
-        if outputs[..index].iter().any(|other| other.is_same(output)) {
-            return refused(format_args!("{option} {place} is given twice; each needs a file of its own"));
+        if let Some(other) = outputs[..index].iter().find(|other| other.is_same(output)) {
+            return refused_twice(other, output);
         }
         output.format().or_else(|error| refused(format_args!("{option} {error}")))?;
     }
     Ok(())
 }
 
+fn refused_twice(first: &Output<'_>, second: &Output<'_>) -> Result<(), RunFailure> {
+    let (place, both) = (second.file.display(), shown(second.file));
+    if first.option == second.option {
+        let option = second.option;
+        return refused(format_args!("{option} {place} is given twice; each needs a file of its own"));
+    }
+    refused(format_args!(
+        "{} {} and {} {place} would both write to {}; each needs a file of its own",
+        first.option,
+        first.file.display(),
+        second.option,
+        both.display()
+    ))
+}
+
 fn refused(words: std::fmt::Arguments<'_>) -> Result<(), RunFailure> {
     Err(RunFailure::Start(words.to_string()))
 }
 
+/// Whether something that was to be printed did not fit.
+static IS_LOST: AtomicBool = AtomicBool::new(false);
+
 /// Tells people a result: on the standard output, or on standard error where that is a table.
-///
-/// Nobody to tell is no reason to fail.
 pub(crate) fn tell(words: &dyn Display, is_output_taken: bool) {
     let words = PlainLines(words);
-    let _ =
-        if is_output_taken { writeln!(io::stderr(), "{words}") } else { writeln!(io::stdout(), "{words}") };
+    if is_output_taken {
+        // Where nothing else can be said.
+        let _ = writeln!(io::stderr(), "{words}");
+    } else {
+        print(&format!("{words}\n"));
+    }
+}
+
+/// Prints on the standard output. A closed pipe is no reason to fail: nobody wants to know. A full disk is: the result is
+/// lost, which is told once, and [`is_lost`] says so from then on.
+pub(crate) fn print(text: &str) {
+    let mut out = io::stdout().lock();
+    let Err(error) = out.write_all(text.as_bytes()).and_then(|()| out.flush()) else { return };
+    if error.kind() != io::ErrorKind::BrokenPipe && !IS_LOST.swap(true, Ordering::Relaxed) {
+        say(format_args!("phantom3: cannot write the standard output: {error}; what was to be told is lost"));
+    }
+}
+
+/// Whether something that was to be printed is lost.
+pub(crate) fn is_lost() -> bool {
+    IS_LOST.load(Ordering::Relaxed)
 }

@@ -2,19 +2,22 @@
 //!
 //! Problem: what the driver writes is an allegation. A driver that is broken, or is none, must not make a run wait for
 //! ever or count wrongly: ticks that go back or jump ahead, deadlines in the future, a time of the run that does not go
-//! with the ticks, frames that are never meant for us.
+//! with the ticks, or never begins, frames that are never meant for us, positions that are no places.
 //!
-//! Model: ticks go up, and not faster than the clock allows, with room for a ring of them; within one lease, once t = 0
-//! has come, the time of the run goes with the ticks; a frame is due when it is published. Everything else that is
-//! rare, such as missed frames, overruns and stalls of the machine, keeps to these.
+//! Model: ticks go up, and not faster than the clock allows, with room for a ring of them; within one lease t = 0 comes
+//! when this program's answers have brought full authority, so not before its first frame and not after authority is
+//! full; from there on the time of the run goes with the ticks; a frame is due when it is published; what is measured is
+//! finite. Everything else that is rare, such as missed frames, overruns and stalls of the machine, keeps to these.
 //!
 //! Cost: a dozen comparisons a frame; no allocation, no system call.
 
-use shm_abi::{Frame, RING_FRAMES};
+use io_driver::table::MAX_MAGNITUDE;
+use shm_abi::frame::{DEVICE_ORIENTATION_MEASURED, DEVICE_POSITION_VALID};
+use shm_abi::{DeviceFrame, Frame, RING_FRAMES};
 use thiserror::Error;
 
 /// What no sound driver tells.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum Implausible {
     /// The number of the newest frame became smaller.
     #[error("its ticks go back: found tick {found} after {before}, expected more")]
@@ -68,6 +71,43 @@ pub enum Implausible {
         /// The run's tick that follows from the frames before.
         expected: i64,
     },
+    /// The run is older than this program's first answer.
+    #[error(
+        "its time of the run began before this program's first answer: found {found} in tick {tick}, expected {most} at most"
+    )]
+    RunTooOld {
+        /// The tick.
+        tick: u64,
+        /// The run's tick found.
+        found: i64,
+        /// The largest that can be.
+        most: i64,
+    },
+    /// The whole force is let through, and t = 0 has not come.
+    #[error(
+        "its time of the run does not begin: found {found} in tick {tick} at full authority, expected 0 or more"
+    )]
+    NotBegun {
+        /// The tick.
+        tick: u64,
+        /// The run's tick found.
+        found: i64,
+    },
+    /// A value that is said to be measured is none.
+    #[error(
+        "its {value} of device {device} is said to be valid in tick {tick} and is none: found {found}, expected finite \
+         numbers up to 1e15 in size"
+    )]
+    NoMeasurement {
+        /// The tick.
+        tick: u64,
+        /// Which device, from 0.
+        device: usize,
+        /// Which of its values.
+        value: &'static str,
+        /// The first component that is wrong.
+        found: f64,
+    },
     /// Frames come, and none can be answered.
     #[error("it has told no frame under this program's lease for {seconds} s though its ticks go on")]
     NoneForUs {
@@ -85,6 +125,8 @@ const NONE_FOR_US_NS: u64 = 10_000_000_000;
 #[derive(Debug, Clone, Copy)]
 pub struct Plausibility {
     period_ns: u64,
+    /// The tick seen first: no answer of ours is older.
+    first: Option<u64>,
     /// The tick seen last, and when.
     last: Option<(u64, u64)>,
     /// In which tick our lease's t = 0 was.
@@ -96,7 +138,7 @@ pub struct Plausibility {
 impl Plausibility {
     /// Of a driver with this period, which has told nothing yet.
     pub fn new(period_ns: u64) -> Self {
-        Self { period_ns: period_ns.max(1), last: None, run_began: None, answered_ns: None }
+        Self { period_ns: period_ns.max(1), first: None, last: None, run_began: None, answered_ns: None }
     }
 
     /// Judges the number of the newest frame, before that is read.
@@ -115,6 +157,7 @@ impl Plausibility {
                 return Err(Implausible::Jump { found: tick, before, most });
             }
         }
+        self.first.get_or_insert(tick);
         self.last = Some((tick, now_ns));
         Ok(())
     }
@@ -139,6 +182,9 @@ impl Plausibility {
             return Err(Implausible::Future { tick, ahead_ms, most_ms });
         }
         self.judge_run(tick, frame, is_for_us)?;
+        if is_for_us {
+            judge_measurements(frame)?;
+        }
         self.note_answer(is_for_us, now_ns)
     }
 
@@ -152,10 +198,12 @@ impl Plausibility {
                     return Err(Implausible::RunTick { tick, found: frame.run_tick, expected });
                 }
             }
-            // No run began before the driver did.
-            None if frame.run_tick > tick.cast_signed() => {
-                let expected = tick.cast_signed();
-                return Err(Implausible::RunTick { tick, found: frame.run_tick, expected });
+            None if frame.run_tick > self.oldest_run(tick, is_for_us) => {
+                let most = self.oldest_run(tick, is_for_us);
+                return Err(Implausible::RunTooOld { tick, found: frame.run_tick, most });
+            }
+            None if is_for_us && frame.run_tick < 0 && frame.authority >= 1.0 => {
+                return Err(Implausible::NotBegun { tick, found: frame.run_tick });
             }
             None if is_for_us && frame.run_tick >= 0 => {
                 self.run_began = Some(tick.cast_signed().wrapping_sub(frame.run_tick));
@@ -163,6 +211,12 @@ impl Plausibility {
             None => {}
         }
         Ok(())
+    }
+
+    /// Authority of ours comes with our answers; that of others came no earlier than the driver.
+    fn oldest_run(&self, tick: u64, is_for_us: bool) -> i64 {
+        let first = self.first.filter(|_| is_for_us).unwrap_or(0);
+        tick.saturating_sub(first).cast_signed()
     }
 
     /// A frame that cannot be read is for nobody, too.
@@ -178,6 +232,25 @@ impl Plausibility {
         }
         Ok(())
     }
+}
+
+/// Of the devices that say that they know where they are.
+fn judge_measurements(frame: &Frame) -> Result<(), Implausible> {
+    let knows_its_place = |(_, told): &(usize, &DeviceFrame)| told.flags & DEVICE_POSITION_VALID != 0;
+    for (device, told) in frame.present_devices().iter().enumerate().filter(knows_its_place) {
+        let judge = |value, most: f64, components: &[f64]| {
+            let is_none = |component: &&f64| component.is_nan() || component.abs() > most;
+            let lie = |&found| Err(Implausible::NoMeasurement { tick: frame.tick, device, value, found });
+            components.iter().find(is_none).map_or(Ok(()), lie)
+        };
+        judge("position", MAX_MAGNITUDE, &told.position_m_measured)?;
+        // A hand may leap from any place to any other within a tick.
+        judge("velocity", f64::MAX, &told.velocity_m_per_s_estimated)?;
+        if told.flags & DEVICE_ORIENTATION_MEASURED != 0 {
+            judge("orientation", MAX_MAGNITUDE, &told.orientation_wxyz_measured)?;
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -244,9 +317,51 @@ mod tests {
 
     #[test]
     fn a_run_that_is_older_than_its_driver_is_told_at_its_first_frame() {
-        let first = frame(100, i64::MAX);
-        let told = Plausibility::new(PERIOD_NS).judge_frame(100, &first, true, first.deadline_ns);
-        assert_eq!(told, Err(Implausible::RunTick { tick: 100, found: i64::MAX, expected: 100 }));
+        let told = |run_tick, is_for_us| {
+            let first = frame(100, run_tick);
+            let mut liar = Plausibility::new(PERIOD_NS);
+            liar.judge_tick(90, first.deadline_ns).unwrap();
+            liar.judge_frame(100, &first, is_for_us, first.deadline_ns)
+        };
+        let too_old = |found, most| Err(Implausible::RunTooOld { tick: 100, found, most });
+        assert_eq!(told(i64::MAX, true), too_old(i64::MAX, 10));
+        // As if the run were nearly over.
+        assert_eq!([told(11, true), told(10, true)], [too_old(11, 10), Ok(())]);
+        // Somebody else's may be as old as the driver.
+        assert_eq!([told(101, false), told(100, false)], [too_old(101, 100), Ok(())]);
+    }
+
+    #[test]
+    fn full_authority_without_a_beginning_is_told() {
+        let now_ns = START_NS + 100 * PERIOD_NS;
+        let judge = |authority, is_for_us| {
+            let told = Frame { authority, ..frame(100, -1) };
+            Plausibility::new(PERIOD_NS).judge_frame(100, &told, is_for_us, now_ns)
+        };
+        assert_eq!([judge(0.999, true), judge(1.0, false)], [Ok(()), Ok(())]);
+        assert_eq!(judge(1.0, true), Err(Implausible::NotBegun { tick: 100, found: -1 }));
+    }
+
+    #[test]
+    fn measurements_that_are_no_numbers_are_told_where_they_are_said_to_be_valid() {
+        let (sound, now_ns) = settled();
+        let judge = |flags, lie: fn(&mut DeviceFrame)| {
+            let mut told = Frame { device_count: 2, ..frame(100, 90) };
+            told.devices[1].flags = flags;
+            lie(&mut told.devices[1]);
+            sound.clone().judge_frame(100, &told, true, now_ns).map_err(|lie| lie.to_string())
+        };
+        let both = DEVICE_POSITION_VALID | DEVICE_ORIENTATION_MEASURED;
+        let told = judge(DEVICE_POSITION_VALID, |device| device.position_m_measured[2] = f64::NAN);
+        assert!(
+            told.is_err_and(|words| words.starts_with("its position of device 1") && words.contains("NaN"))
+        );
+        assert!(judge(both, |device| device.position_m_measured[0] = -1e300).is_err());
+        assert!(judge(both, |device| device.orientation_wxyz_measured[3] = f64::INFINITY).is_err());
+        assert!(judge(both, |device| device.velocity_m_per_s_estimated[0] = f64::NAN).is_err());
+        assert_eq!(judge(0, |device| device.position_m_measured[2] = f64::NAN), Ok(()));
+        assert_eq!(judge(1, |device| device.orientation_wxyz_measured[2] = f64::NAN), Ok(()));
+        assert_eq!(judge(both, |device| device.position_m_measured[2] = 1e15), Ok(()));
     }
 
     #[test]

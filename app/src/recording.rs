@@ -8,7 +8,8 @@
 
 pub use crate::columns::Names;
 use crate::columns::{Cell, columns, each_cell};
-use crate::record::destination::{FormatError, STANDARD_OUTPUT, create_file, shown};
+use crate::record::Opened;
+use crate::record::destination::{FormatError, STANDARD_OUTPUT, shown};
 use crate::row::{BodyRow, Row};
 use io_driver::device::run_time_s;
 use std::fmt::Write as _;
@@ -82,13 +83,22 @@ impl Recording {
     /// # Errors
     /// If the file cannot be made or its first line not be written.
     pub fn create(path: &Path, names: Names, period_ns: u64) -> Result<Self, RecordingError> {
-        let failed = |source| RecordingError::Create { file: shown(path), source };
-        let file = create_file(path).map_err(failed)?;
+        Self::begin(Opened::recording(path)?, names, period_ns)
+    }
+
+    /// Empties the file and writes the header.
+    ///
+    /// # Errors
+    /// If its first line cannot be written.
+    pub fn begin(file: Opened, names: Names, period_ns: u64) -> Result<Self, RecordingError> {
+        let path = shown(file.path());
+        let failed = |source| RecordingError::Create { file: path.clone(), source };
+        let file = file.empty().map_err(failed)?;
         // Behind what others have written to a standard output that is a file.
         let written_bytes = file.metadata().map_err(failed)?.len();
         let mut recording = Self {
             file,
-            path: shown(path),
+            path,
             buffer: String::with_capacity(2 * CHUNK_BYTES),
             ends: Vec::new(),
             written_bytes,

@@ -21,7 +21,7 @@ use crate::outputs::{self, Output};
 use crate::progress::StatusLine;
 use crate::record::destination::{is_standard_output, shown};
 use crate::record::read::{self, ReadError, RecordedRun};
-use crate::record::{self, About, Recorder, View};
+use crate::record::{self, About, Backpressure, Recorder, View};
 use crate::rig::Rig;
 use crate::row_queue::{RowReceiver, row_queue};
 use crate::run::EVENT_QUEUE;
@@ -88,7 +88,7 @@ pub fn execute(args: &ReplayArgs, signals: &StopSignals) -> Result<ExitCode, Run
     }
     refuse_late_beginning(args, &feed, &stage)?;
     let orders = read::orders(&args.recording);
-    let mut play = Play::new(&stage, Arc::new(Mutex::new(feed)), orders, &args.record)?;
+    let mut play = Play::new(&stage, Arc::new(Mutex::new(feed)), orders, (&args.record, signals))?;
     let ended = play.run(signals);
     play.conclude(args, &stage, ended)
 }
@@ -150,7 +150,7 @@ impl Play {
         stage: &Stage,
         feed: SharedFeed,
         orders: Vec<(u64, String)>,
-        records: &[PathBuf],
+        (records, signals): (&[PathBuf], &StopSignals),
     ) -> Result<Self, RunFailure> {
         let rig = &stage.rig;
         let (recorded_names, period_ns) = {
@@ -173,14 +173,8 @@ impl Play {
         let bodies = step.bodies().len();
         let view = View::new(&rig.scene, step.entities());
         let book = Book::default();
-        let recorder = |path: &PathBuf| {
-            let file = record::create(path, names.clone(), period_ns, &stage.about, &view, (&book, 0))?;
-            Recorder::start(path, file, bodies, period_ns, WhenFull::Wait)
-        };
-        let mut recorders = records.iter().map(recorder).collect::<Result<Vec<_>, _>>()?;
         let (events, event_ends) = event_queue(EVENT_QUEUE);
         let mut hub = Hub::new(vec![event_ends]);
-        slow::subscribe(&mut recorders, &mut hub);
         let (sender, rows) = row_queue(bodies);
         // It ends with the recording.
         let mut fast = FastLoop::new(step, sender, WhenFull::Wait, u64::MAX, period_ns).with_events(events);
@@ -191,6 +185,16 @@ impl Play {
         if let Some(taken) = taken {
             fast = fast.with_control(taken);
         }
+        // The last: it empties files, and nothing may refuse the replay after that.
+        let create =
+            |_, file| record::create(file, names.clone(), period_ns, &stage.about, &view, (&book, 0));
+        let begun = record::begin_all(&records.iter().collect::<Vec<_>>(), create)?;
+        let backpressure = Backpressure { when_full: WhenFull::Wait, signals: signals.clone() };
+        let start = |(path, file): (&PathBuf, _)| {
+            Recorder::start(path, file, bodies, period_ns, backpressure.clone())
+        };
+        let mut recorders = records.iter().zip(begun).map(start).collect::<Result<Vec<_>, _>>()?;
+        slow::subscribe(&mut recorders, &mut hub);
         Ok(Self {
             driver,
             fast,

@@ -4,8 +4,8 @@
 //! for both. `--set` lies over all, and an option of a command over that.
 
 use crate::outcome::RunFailure;
+use crate::outputs::tell;
 use clap::Args;
-use io_driver::say::tell;
 use std::io;
 use std::path::{Path, PathBuf};
 use world::{MeshSpec, Scene, SceneError, Settings, ShapeSpec};
@@ -75,7 +75,7 @@ pub fn print(settings: &Settings) {
     let widest = rows.iter().map(|(_, value, ..)| value.chars().count()).max().unwrap_or(0).min(40);
     for (key, value, from, is_for_window) in rows {
         let note = if is_for_window { "  (for the window)" } else { "" };
-        tell(format_args!("{key:<24} {value:<widest$}  {from}{note}"));
+        tell(&format_args!("{key:<24} {value:<widest$}  {from}{note}"), false);
     }
 }
 

@@ -48,8 +48,8 @@ fn stop_signals() -> SigSet {
     [Signal::SIGTERM, Signal::SIGINT, Signal::SIGHUP].into_iter().collect()
 }
 
-/// Whether this process was asked to stop.
-#[derive(Clone, Debug)]
+/// Whether this process was asked to stop; by default nothing asks.
+#[derive(Clone, Debug, Default)]
 pub struct StopSignals {
     /// Number of the latest signal, 0 before the first.
     signal: Arc<AtomicUsize>,

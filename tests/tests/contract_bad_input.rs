@@ -383,6 +383,24 @@ fn a_recording_that_cannot_be_made_or_would_destroy_an_input_is_refused() {
     }
 }
 
+#[test]
+fn a_recording_that_cannot_be_made_costs_none_of_the_others() {
+    let place = workplace();
+    let outputs = ["--record", "out.csv", "--record", "new.csv", "--events", "out.jsonl"];
+    place.write("out.jsonl", PRECIOUS);
+    for clock in CLOCKS {
+        for bad in [["--record", "/dev/full"], ["--events", "none/x.csv"], ["--frames", "hand.csv"]] {
+            let arguments = [&["run", "scene.toml", "--clock", clock][..], &outputs, &bad].concat();
+            assert_says(&refused(&place, &arguments), &[bad[1]]);
+        }
+    }
+    with_recordings(&place);
+    for bad in ["none/x.csv", "/dev/full"] {
+        let arguments = ["replay", "good.mcap", "--record", "out.csv", "--record", bad];
+        assert_says(&refused(&place, &arguments), &[bad]);
+    }
+}
+
 /// Permissions do not hold for root, who therefore tries as nobody, with a copy of the program that nobody
 /// may start.
 #[test]
@@ -464,6 +482,26 @@ fn a_recording_whose_lengths_are_lies_is_told_as_damaged_and_takes_no_memory_for
 }
 
 #[test]
+fn a_line_without_an_end_takes_no_memory_for_it() {
+    let place = workplace();
+    // Holes, which are read as zeros.
+    std::fs::File::create(place.path("holes.csv")).and_then(|file| file.set_len(200 << 30)).expect("holes");
+    for command in [
+        &["plot", "holes.csv"][..],
+        &["export", "holes.csv", "--csv", "out2.csv"],
+        &["replay", "holes.csv", "--scene", "scene.toml"],
+    ] {
+        let said = run_in_little_memory(&place, command);
+        assert_eq!(said.status, Some(2), "{command:?}: {}", said.err);
+        assert_says(&said.err, &["holes.csv", "a line has more than 67108864 bytes"]);
+    }
+    let script = "ulimit -v 3000000; \"$0\" \"$@\" < /dev/zero";
+    let said = place.shell(script, &["--clock", "lockstep", "--seconds", "2", "--orders", "-"]);
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    assert_says(&said.err, &["--orders -: a line has more than 65536 bytes", "no orders are read"]);
+}
+
+#[test]
 fn a_recording_whose_times_leap_or_fall_is_refused_with_its_line() {
     let place = workplace();
     with_recordings(&place);
@@ -477,6 +515,8 @@ fn a_recording_whose_times_leap_or_fall_is_refused_with_its_line() {
     for (time, parts) in [
         ("1e12", ["bad.csv:51:", "t is 1000000000000.0", "allowed: at most"]),
         ("4000", ["bad.csv:51:", "t is 4000.0 after 0.048", "at most 3600 s from a row to the next"]),
+        ("nan", ["bad.csv:51:", "t is \"nan\"", "allowed: a number"]),
+        ("inf", ["bad.csv:51:", "t is \"inf\"", "allowed: a number"]),
         ("0.01", ["bad.csv:51:", "t is 0.01 after 0.048", "rise from row to row"]),
         ("0.048", ["bad.csv:51:", "t is 0.048 after 0.048", "rise from row to row"]),
     ] {
@@ -489,6 +529,13 @@ fn a_recording_whose_times_leap_or_fall_is_refused_with_its_line() {
             assert_says(&said.err, &parts);
         }
     }
+    // No step between two times says how long a tick is.
+    let [header, first] = [0, 1].map(|line| good.lines().nth(line).expect("a recording"));
+    let (_, cells) = first.split_once(',').expect("columns");
+    place.write("bad.csv", format!("{header}\n{first}\ninf,{cells}\n"));
+    let said = place.run(["replay", "bad.csv", "--scene", "scene.toml"]);
+    assert_eq!(said.status, Some(3), "{}{}", said.out, said.err);
+    assert_says(&said.err, &["bad.csv:3:", "t is \"inf\"", "allowed: a number"]);
     let late = good.lines().take(1).chain(good.lines().skip(1).take(1)).collect::<Vec<_>>().join("\n");
     place.write("late.csv", late.replace("\n0.0,", "\n5000.0,").replace("\n0,", "\n5000,") + "\n");
     let said = place.run(["replay", "late.csv", "--scene", "scene.toml"]);
@@ -547,6 +594,11 @@ fn a_pipe_without_a_writer_holds_nobody_up() {
         let said = place.run(arguments);
         assert_eq!(said.status, Some(2), "{arguments:?}: {}{}", said.out, said.err);
         assert!(said.err.contains("regular file"), "{arguments:?}: {}", said.err);
+    }
+    for output in ["--record", "--events"] {
+        let said = place.run(["run", "scene.toml", "--clock", "virtual", output, "pipe.csv"]);
+        assert_eq!(said.status, Some(2), "{output}: {}{}", said.out, said.err);
+        assert_says(&said.err, &["pipe.csv", "nobody reads this pipe"]);
     }
 }
 

@@ -113,7 +113,7 @@ fn an_app_that_meets_a_driver_whose_header_cannot_be_starts_nothing_and_says_wha
 #[test]
 fn a_run_ends_with_words_when_its_driver_tells_what_cannot_be() {
     type Lie = (fn(&mut Frame), &'static str);
-    let lies: [Lie; 6] = [
+    let later: [Lie; 8] = [
         (|frame| frame.tick = 5, "its ticks go back: found tick 5 after"),
         (|frame| frame.tick += 1 << 40, "its ticks jump: found tick"),
         (|frame| frame.deadline_ns = u64::MAX, "comes from the future"),
@@ -121,9 +121,21 @@ fn a_run_ends_with_words_when_its_driver_tells_what_cannot_be() {
         // As if it had never begun: a run without end.
         (|frame| frame.run_tick = -1, "does not go with its ticks: found -1 in tick"),
         (|frame| (frame.lease, frame.run_tick) = (99, -1), "no frame under this program's lease for 10 s"),
+        (
+            |frame| frame.devices[0].position_m_measured[1] = f64::NAN,
+            "its position of device 0 is said to be",
+        ),
+        (|frame| frame.devices[0].position_m_measured[1] = 1e300, "its position of device 0 is said to be"),
     ];
-    for (lie, expected) in lies {
-        let end = end_with(&Liar::about_frames(lie));
+    let at_once: [Lie; 2] = [
+        (|frame| frame.run_tick = -1, "its time of the run does not begin: found -1 in tick"),
+        // As if the run were nearly over.
+        (|frame| frame.run_tick += 79_999_000, "began before this program's first answer: found 79999"),
+    ];
+    let begin: [fn(fn(&mut Frame)) -> Liar; 2] = [Liar::about_frames, Liar::about_all_frames];
+    let cases = later.map(|lie| (begin[0], lie)).into_iter().chain(at_once.map(|lie| (begin[1], lie)));
+    for (begin, (lie, expected)) in cases {
+        let end = end_with(&begin(lie));
         assert_eq!(end.status, Some(3), "{expected}: {end:?}");
         assert!(
             end.err.contains("the driver tells what cannot be: ") && end.err.contains(expected),

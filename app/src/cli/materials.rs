@@ -1,11 +1,13 @@
 //! `phantom3 materials`.
 
+use crate::outputs;
 use haptics::Material;
+use std::fmt::Write;
 
 /// What `material = "..."` of an entity stands for, a line each.
 pub(super) fn print_materials() {
-    use std::io::Write;
-    let mut out = std::io::stdout();
+    let mut out = String::new();
+    // A string takes everything.
     let _ = writeln!(
         out,
         "{:<10} {:>5} {:>5} {:>14} {:>15} {:>14}  source of the friction; of the density",
@@ -21,4 +23,5 @@ pub(super) fn print_materials() {
         );
     }
     let _ = writeln!(out, "Friction is that of a dry fingertip; all of stiffness and damping is a choice.");
+    outputs::print(&out);
 }

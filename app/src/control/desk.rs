@@ -8,6 +8,7 @@ use super::order::{FrictionChange, Move, Order, Other, Replacement, Scale, Turn,
 use super::queue::{Dated, Lane, OrderReceiver, OrderSender, order_queue};
 use super::words::{self, Words};
 use crate::book::Book;
+use crate::bounded_lines::BoundedLines;
 use crate::displaced::Displaced;
 use crate::fast_step::FastStep;
 use crate::record::View;
@@ -19,6 +20,7 @@ use io_driver::say::say;
 use nalgebra::{Isometry3, Vector3};
 use rt_core::input_file;
 use std::collections::VecDeque;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver, Sender};
 use world::lists::SlowList;
@@ -39,6 +41,8 @@ const MOST_ORDERS: usize = 1024;
 const MAX_ORDERS_BYTES: u64 = 16 << 20;
 /// The most worlds of a script: all are made before it begins.
 const MOST_WORLDS: usize = 32;
+/// The longest order of the standard input.
+const MOST_LINE_BYTES: usize = 64 << 10;
 /// Lines that may wait to be looked at; who writes more waits.
 const LINES: usize = 64;
 /// Rows of another scene that may wait.
@@ -361,8 +365,18 @@ const TOLD: usize = 20;
 fn listen() -> std::io::Result<Receiver<String>> {
     let (send, receive) = mpsc::sync_channel(LINES);
     std::thread::Builder::new().name("orders".into()).spawn(move || {
-        for line in std::io::stdin().lines() {
-            let Ok(line) = line else { break };
+        let input = BoundedLines::new(std::io::stdin(), MOST_LINE_BYTES);
+        for line in BufReader::new(input).lines() {
+            let line = match line {
+                Ok(line) => line,
+                Err(error) => {
+                    say(format_args!(
+                        "phantom3: --orders -: {error}; no orders are read from here on; allowed: lines of text of \
+                         {MOST_LINE_BYTES} bytes at most"
+                    ));
+                    break;
+                }
+            };
             if send.send(line).is_err() {
                 break;
             }

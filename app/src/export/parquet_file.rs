@@ -6,7 +6,7 @@
 
 use crate::columns::{Cell, CellKind, Names, columns, each_cell};
 use crate::outcome::RunFailure;
-use crate::record::destination::create_file;
+use crate::record::create_file;
 use crate::row::{BodyRow, Row};
 use parquet::basic::{Compression, ConvertedType, Encoding, LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};

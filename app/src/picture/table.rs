@@ -3,8 +3,9 @@
 //! Model: columns have names, rows have cells. A recording whose end is missing is read as far as it is whole.
 
 use super::recorded::RecordedError;
+use crate::bounded_lines::BoundedLines;
 use crate::columns::{Cell, columns, each_cell};
-use crate::record::read::{RecordedRun, check_begin, is_mcap, is_parquet};
+use crate::record::read::{MOST_ROW_BYTES, RecordedRun, check_begin, is_mcap, is_parquet};
 use csv::StringRecord;
 use io_driver::say::say;
 use parquet::errors::ParquetError;
@@ -127,7 +128,7 @@ fn unreadable(file: &Path, source: impl Into<Box<dyn std::error::Error + Send + 
 
 /// Text, whose last line may be cut off.
 struct CsvTable {
-    reader: csv::Reader<File>,
+    reader: csv::Reader<BoundedLines<File>>,
     row: StringRecord,
     /// Where the file ends, if that is in the middle of a line (bytes).
     cut_at: Option<u64>,
@@ -138,7 +139,7 @@ impl CsvTable {
     fn open(file: &Path) -> Result<(Vec<String>, Self), csv::Error> {
         let mut opened = input_file::open(file)?;
         let cut_at = end_of_cut_file(&mut opened)?;
-        let mut reader = csv::Reader::from_reader(opened);
+        let mut reader = csv::Reader::from_reader(BoundedLines::new(opened, MOST_ROW_BYTES));
         let columns = reader.headers()?.iter().map(str::to_owned).collect();
         Ok((columns, Self { reader, row: StringRecord::new(), cut_at, is_cut: false }))
     }

@@ -5,9 +5,6 @@
 //! no need of an ending: it takes a table.
 
 use std::ffi::OsStr;
-use std::fs::File;
-use std::io;
-use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -126,17 +123,6 @@ pub fn is_standard_output(file: &Path) -> bool {
 /// What people are told of where it goes.
 pub fn shown(file: &Path) -> PathBuf {
     if is_standard_output(file) { "the standard output".into() } else { file.into() }
-}
-
-/// Creates the file, or empties it; or gives the standard output another descriptor.
-///
-/// # Errors
-/// If the system refuses.
-pub fn create_file(file: &Path) -> io::Result<File> {
-    if is_standard_output(file) {
-        return io::stdout().as_fd().try_clone_to_owned().map(File::from);
-    }
-    File::create(file)
 }
 
 /// In lower case, empty without one; `None`: a stream, which needs none.

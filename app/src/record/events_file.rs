@@ -1,14 +1,15 @@
 //! What happened in a run, and nothing else: a line for each event.
 
-use super::destination::{EventFormat, create_file, shown};
+use super::destination::{EventFormat, shown};
 use super::event_line::{KEYS, csv, json, said};
+use super::opened::Opened;
 use crate::book::Book;
 use crate::columns::Names;
 use crate::recording::RecordingError;
 use io_driver::device::run_time_s;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use world::events::Event;
 
 /// A file of events being written.
@@ -24,18 +25,19 @@ pub struct EventsFile {
 }
 
 impl EventsFile {
-    /// Creates the file, or empties it.
+    /// Empties the file.
     ///
     /// # Errors
-    /// If it cannot be made.
-    pub fn create(path: &Path, names: Names, period_ns: u64, book: Book) -> Result<Self, RecordingError> {
-        let failed = |source| RecordingError::Create { file: path.into(), source };
-        let is_table = EventFormat::of(path)? == EventFormat::Csv;
-        let mut file = BufWriter::new(create_file(path).map_err(failed)?);
+    /// If that cannot be done, or its name says no format.
+    pub fn create(file: Opened, names: Names, period_ns: u64, book: Book) -> Result<Self, RecordingError> {
+        let path = shown(file.path());
+        let failed = |source| RecordingError::Create { file: path.clone(), source };
+        let is_table = EventFormat::of(file.path())? == EventFormat::Csv;
+        let mut file = BufWriter::new(file.empty().map_err(failed)?);
         if is_table {
             writeln!(file, "{}", KEYS.join(",")).and_then(|()| file.flush()).map_err(failed)?;
         }
-        Ok(Self { file, path: shown(path), names, book, period_ns, is_table, written: 0, last_tick: 0 })
+        Ok(Self { file, path, names, book, period_ns, is_table, written: 0, last_tick: 0 })
     }
 
     /// Appends an event.

@@ -1,9 +1,11 @@
 //! Which files a run is recorded in: those that were asked for, and beside each one of its own for every other scene.
 
 use super::destination::is_standard_output;
-use super::{About, Beginning, Recorder, View, create, create_events, create_under_way};
+use super::{
+    About, Backpressure, Beginning, Opened, RecordFile, Recorder, View, begin_all, create, create_events,
+    create_under_way,
+};
 use crate::book::Book;
-use crate::fast_loop::WhenFull;
 use crate::recording::RecordingError;
 use crate::rig::Rig;
 use io_driver::device::Extras;
@@ -21,7 +23,7 @@ pub struct Files {
     /// Length of a tick (ns).
     pub period_ns: u64,
     /// Whether the run waits for them.
-    pub when_full: WhenFull,
+    pub backpressure: Backpressure,
     /// What was ordered.
     pub book: Book,
     /// What is told of the run that it begins with.
@@ -34,27 +36,40 @@ impl Files {
     /// # Errors
     /// If one cannot be made.
     pub fn first(&self, rig: &Rig, view: &View) -> Result<Vec<Recorder>, RecordingError> {
-        let mut all = self.of_scene(rig, view, 0)?;
-        for path in &self.events {
-            let file = create_events(path, rig.names(&self.extras), self.period_ns, &self.book)?;
-            all.push(self.start(path, file, rig)?);
-        }
-        Ok(all)
+        let paths: Vec<&PathBuf> = self.record.iter().chain(&self.events).collect();
+        let begun = begin_all(&paths, |number, file| self.begin(number, file, rig, view))?;
+        paths.into_iter().zip(begun).map(|(path, file)| self.start(path, file, rig)).collect()
     }
 
-    /// Those of the scene of this number. On the standard output a table has one header, which is that of the first scene.
+    /// The file of this number, of those of rows and then of events.
+    fn begin(
+        &self,
+        number: usize,
+        file: Opened,
+        rig: &Rig,
+        view: &View,
+    ) -> Result<RecordFile, RecordingError> {
+        let names = rig.names(&self.extras);
+        if number < self.record.len() {
+            create(file, names, self.period_ns, &self.about, view, (&self.book, 0))
+        } else {
+            create_events(file, names, self.period_ns, &self.book)
+        }
+    }
+
+    /// Those of the scene of this number, after the first. On the standard output a table has one header, which is that of the first scene.
     ///
     /// # Errors
     /// If one cannot be made.
     pub fn of_scene(&self, rig: &Rig, view: &View, number: u32) -> Result<Vec<Recorder>, RecordingError> {
         let record = |path: &PathBuf| {
-            let about = if number == 0 { self.about.clone() } else { self.about.followed_by(rig, path) };
+            let about = self.about.followed_by(rig, path);
             let path = place(path, number);
-            let names = rig.names(&self.extras);
-            let file = create(&path, names, self.period_ns, &about, view, (&self.book, number))?;
+            let (names, file) = (rig.names(&self.extras), Opened::recording(&path)?);
+            let file = create(file, names, self.period_ns, &about, view, (&self.book, number))?;
             self.start(&path, file, rig)
         };
-        let goes_on = |path: &&PathBuf| number == 0 || !is_standard_output(path);
+        let goes_on = |path: &&PathBuf| !is_standard_output(path);
         if !self.record.iter().all(|path| goes_on(&path)) {
             say(format_args!(
                 "phantom3: the table on the standard output ends with the scene; other scenes are recorded in files: \
@@ -80,8 +95,9 @@ impl Files {
         self.start(path, file, rig)
     }
 
-    fn start(&self, path: &Path, file: super::RecordFile, rig: &Rig) -> Result<Recorder, RecordingError> {
-        Recorder::start(path, file, rig.names(&self.extras).bodies.len(), self.period_ns, self.when_full)
+    fn start(&self, path: &Path, file: RecordFile, rig: &Rig) -> Result<Recorder, RecordingError> {
+        let bodies = rig.names(&self.extras).bodies.len();
+        Recorder::start(path, file, bodies, self.period_ns, self.backpressure.clone())
     }
 }
 

@@ -17,6 +17,7 @@
 use super::about::{self, About};
 use super::event_line::{holders, name, said};
 use super::foxglove;
+use super::opened::Opened;
 use super::schema::{self, event, order};
 use super::tick;
 use super::view::View;
@@ -33,7 +34,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use world::events::{Event, Facts, Kind};
 
 /// A chunk has so much of the run (ns): what a killed process loses at most, besides what waits for the disk.
@@ -90,18 +91,18 @@ struct Channels {
 }
 
 impl McapFile {
-    /// Creates the file, or empties it, and writes what is known before the first tick.
+    /// Empties the file and writes what is known before the first tick.
     ///
     /// # Errors
     /// If that cannot be written.
     pub fn create(
-        path: &Path,
+        file: Opened,
         names: Names,
         period_ns: u64,
         about: &About,
         view: View,
     ) -> Result<Self, RecordingError> {
-        Self::create_at(path, names, period_ns, about, view, 0)
+        Self::create_at(file, names, period_ns, about, view, 0)
     }
 
     /// The same of a recording that begins when the run has come to this tick.
@@ -109,21 +110,21 @@ impl McapFile {
     /// # Errors
     /// If that cannot be written.
     pub fn create_at(
-        path: &Path,
+        file: Opened,
         names: Names,
         period_ns: u64,
         about: &About,
         view: View,
         begins: u64,
     ) -> Result<Self, RecordingError> {
-        let failed = |error| RecordingError::Create { file: path.into(), source: into_io(error) };
-        let file =
-            File::create(path).map_err(|source| RecordingError::Create { file: path.into(), source })?;
+        let path = file.path().to_owned();
+        let failed = |error| RecordingError::Create { file: path.clone(), source: into_io(error) };
+        let file = file.empty().map_err(|error| failed(error.into()))?;
         let mut writer = options().create(NoSeek::new(WholeWrites::new(file))).map_err(failed)?;
         let channels = begin(&mut writer, &names, about).map_err(failed)?;
         let mut file = Self {
             writer,
-            path: path.into(),
+            path: path.clone(),
             names,
             period_ns,
             view,

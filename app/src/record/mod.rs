@@ -15,6 +15,7 @@ mod events_file;
 mod files;
 mod foxglove;
 mod mcap_file;
+mod opened;
 pub mod read;
 mod recorder;
 mod schema;
@@ -26,7 +27,8 @@ pub use about::{About, Beginning, InputFile};
 pub use events_file::EventsFile;
 pub use files::Files;
 pub use mcap_file::McapFile;
-pub use recorder::{EventFeed, RecordFile, Recorded, Recorder};
+pub use opened::{Opened, begin_all, create_file};
+pub use recorder::{Backpressure, EventFeed, RecordFile, Recorded, Recorder};
 pub use view::View;
 
 use crate::book::Book;
@@ -34,22 +36,23 @@ use crate::recording::{Names, Recording, RecordingError};
 use destination::RunFormat;
 use std::path::Path;
 
-/// Creates the recording in the format that its name ends with; of the scene of this number in a run that has several.
+/// Empties the file and begins the recording in the format that its name ends with; of the scene of this number in a run
+/// that has several.
 ///
 /// # Errors
-/// If it cannot be made, or its name says no format.
+/// If that cannot be done, or its name says no format.
 pub fn create(
-    path: &Path,
+    file: Opened,
     names: Names,
     period_ns: u64,
     about: &About,
     view: &View,
     scene: (&Book, u32),
 ) -> Result<RecordFile, RecordingError> {
-    Ok(match RunFormat::of(path)? {
-        RunFormat::Csv => RecordFile::Csv(Box::new(Recording::create(path, names, period_ns)?)),
+    Ok(match RunFormat::of(file.path())? {
+        RunFormat::Csv => RecordFile::Csv(Box::new(Recording::begin(file, names, period_ns)?)),
         RunFormat::Mcap => {
-            let file = McapFile::create(path, names, period_ns, about, view.clone())?.of_scene(scene);
+            let file = McapFile::create(file, names, period_ns, about, view.clone())?.of_scene(scene);
             RecordFile::Mcap(Box::new(file))
         }
     })
@@ -67,22 +70,23 @@ pub fn create_under_way(
     view: &View,
     (scene, begins): ((&Book, u32), u64),
 ) -> Result<RecordFile, RecordingError> {
+    let file = Opened::recording(path)?;
     if RunFormat::of(path)? == RunFormat::Mcap {
-        let file = McapFile::create_at(path, names, period_ns, about, view.clone(), begins)?;
+        let file = McapFile::create_at(file, names, period_ns, about, view.clone(), begins)?;
         return Ok(RecordFile::Mcap(Box::new(file.of_scene(scene).under_way())));
     }
-    create(path, names, period_ns, about, view, scene)
+    create(file, names, period_ns, about, view, scene)
 }
 
-/// Creates a file of events alone: a line each, as JSON or, with the ending `.csv`, as a table.
+/// Begins a file of events alone: a line each, as JSON or, with the ending `.csv`, as a table.
 ///
 /// # Errors
 /// If it cannot be made.
 pub fn create_events(
-    path: &Path,
+    file: Opened,
     names: Names,
     period_ns: u64,
     book: &Book,
 ) -> Result<RecordFile, RecordingError> {
-    Ok(RecordFile::Events(Box::new(EventsFile::create(path, names, period_ns, book.clone())?)))
+    Ok(RecordFile::Events(Box::new(EventsFile::create(file, names, period_ns, book.clone())?)))
 }

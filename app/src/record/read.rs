@@ -14,6 +14,7 @@ use super::destination::RunFormat;
 use crate::columns::Names;
 use crate::row::{BodyRow, Row};
 use csv_rows::CsvRows;
+pub(crate) use csv_rows::MOST_ROW_BYTES;
 use mcap_rows::McapRows;
 use rt_core::input_file;
 use std::io::{self, Read};

@@ -1,11 +1,13 @@
 //! A recording on a thread of its own: whatever the disk does, nobody waits for it but the recording itself.
 //!
 //! Model: the slow side hands over rows through a bounded queue. In real time a row that finds no room is left out,
-//! counted, and told in the file where the format has a place for that; on a clock that can wait, it waits. A disk that
-//! takes no more is told at once, and the rows that follow are thrown away: the run goes on. At the end the recorder has
-//! as long as it gets on; one that is stuck is given up. A reader of the standard output who has seen enough is no failure:
+//! counted, and told in the file where the format has a place for that; on a clock that can wait, it waits, but neither
+//! for a recorder that is stuck nor after a request to stop. A disk that takes no more is told at once, and the rows that
+//! follow are thrown away: the run goes on. At the end the recorder has as long as it gets on; one that is stuck is given
+//! up. A reader of the standard output who has seen enough is no failure:
 //! the recording ends, and so may the run.
 
+use super::destination::shown;
 use super::events_file::EventsFile;
 use super::mcap_file::McapFile;
 use crate::fast_loop::WhenFull;
@@ -13,6 +15,7 @@ use crate::recording::{Recording, RecordingError};
 use crate::row::{BodyRow, Row};
 use crate::row_queue::{ROW_QUEUE, RowReceiver, RowSender, row_queue_of};
 use io_driver::say::say;
+use rt_core::signals::StopSignals;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -103,10 +106,19 @@ pub struct Recorded {
     pub failure: Option<String>,
 }
 
+/// How a recorder treats whoever has more than there is room for.
+#[derive(Debug, Clone)]
+pub struct Backpressure {
+    /// Whether they wait.
+    pub when_full: WhenFull,
+    /// What ends waiting.
+    pub signals: StopSignals,
+}
+
 /// Hands events to a recording, as [`Recorder::send`] does rows.
 pub struct EventFeed {
     events: EventSender,
-    when_full: WhenFull,
+    backpressure: Backpressure,
     shared: Arc<Shared>,
     thread: Thread,
 }
@@ -117,10 +129,11 @@ impl Subscriber for EventFeed {
     }
 
     fn event(&mut self, event: &Event) {
-        while self.when_full == WhenFull::Wait && self.events.is_full() && !self.events.is_abandoned() {
-            self.thread.unpark();
-            std::thread::sleep(Duration::from_micros(200));
-        }
+        let mut wait = Wait::begin(&self.shared);
+        while self.events.is_full()
+            && !self.events.is_abandoned()
+            && wait.goes_on(&self.shared, &self.backpressure, &self.thread)
+        {}
         self.events.send(*event);
     }
 }
@@ -136,7 +149,7 @@ pub struct Recorder {
     known: Vec<Option<BodyRow>>,
     /// Those that are not so, by their numbers.
     changed: Vec<(u32, BodyRow)>,
-    when_full: WhenFull,
+    backpressure: Backpressure,
     lost: u64,
     /// Of these, those after the row that was sent last.
     untold: u64,
@@ -153,6 +166,8 @@ struct Shared {
     gaps: Mutex<VecDeque<(u64, u64)>>,
     /// Rows taken from the queue so far.
     taken: AtomicU64,
+    /// How many there were when nobody waited for it any more, and one; 0: somebody does.
+    stuck: AtomicU64,
     /// The file takes no more, which has been told.
     has_failed: AtomicBool,
     /// Nobody reads the standard output any more.
@@ -169,7 +184,7 @@ impl Recorder {
         file: RecordFile,
         bodies: usize,
         period_ns: u64,
-        when_full: WhenFull,
+        backpressure: Backpressure,
     ) -> Result<Self, RecordingError> {
         let places = MOST_BODIES.checked_div(bodies).map_or(ROW_QUEUE, |places| places.clamp(64, ROW_QUEUE));
         let (rows, receiver) = row_queue_of(places, bodies);
@@ -183,10 +198,26 @@ impl Recorder {
             .spawn(move || writer.run(receiver))
             .map_err(|source| RecordingError::Create { file: path.into(), source })?;
         let (known, changed) = (vec![None; bodies], Vec::with_capacity(bodies));
-        let events =
-            Some(EventFeed { events, when_full, shared: shared.clone(), thread: thread.thread().clone() });
+        let events = Some(EventFeed {
+            events,
+            backpressure: backpressure.clone(),
+            shared: shared.clone(),
+            thread: thread.thread().clone(),
+        });
         let path = path.into();
-        Ok(Self { path, unit, rows, events, known, changed, when_full, lost: 0, untold: 0, shared, thread })
+        Ok(Self {
+            path,
+            unit,
+            rows,
+            events,
+            known,
+            changed,
+            backpressure,
+            lost: 0,
+            untold: 0,
+            shared,
+            thread,
+        })
     }
 
     /// Where to hand events over: those of a tick before its row.
@@ -203,14 +234,14 @@ impl Recorder {
         self.changed.clear();
         let numbered = (0..).zip(bodies.iter().copied()).zip(&self.known);
         self.changed.extend(numbered.filter(|((_, is), was)| Some(*is) != **was).map(|(body, _)| body));
+        let mut wait = Wait::begin(&self.shared);
         while !self.rows.send(*row, &self.changed) {
-            if self.when_full == WhenFull::Drop || self.thread.is_finished() {
+            let thread = &self.thread;
+            if thread.is_finished() || !wait.goes_on(&self.shared, &self.backpressure, thread.thread()) {
                 self.lost += 1;
                 self.untold += 1;
                 return;
             }
-            self.thread.thread().unpark();
-            std::thread::sleep(Duration::from_micros(200));
         }
         for (known, body) in self.known.iter_mut().zip(bodies) {
             *known = Some(*body);
@@ -254,14 +285,10 @@ impl Recorder {
     /// Waits until everything is written.
     pub fn finish(mut self) -> Recorded {
         self.close();
-        let (mut taken, mut since) = (0, Instant::now());
+        let mut wait = Wait::begin(&self.shared);
         while !self.thread.is_finished() {
-            let now = self.shared.taken.load(Ordering::Relaxed);
-            if now != taken {
-                (taken, since) = (now, Instant::now());
-            }
-            if since.elapsed() > STUCK {
-                return self.give_up(taken);
+            if wait.is_in_vain(&self.shared) {
+                return self.give_up(wait.taken);
             }
             std::thread::sleep(Duration::from_millis(1));
         }
@@ -280,11 +307,45 @@ impl Recorder {
     fn give_up(self, taken: u64) -> Recorded {
         let why = format!(
             "cannot finish the recording {}: nothing was written for {} s; what reached it until now is readable",
-            self.path.display(),
+            shown(&self.path).display(),
             STUCK.as_secs()
         );
         say(format_args!("phantom3: {why}"));
         Recorded { path: self.path, rows: taken, unit: self.unit, lost: self.lost, failure: Some(why) }
+    }
+}
+
+/// A wait for the recorder's thread, which ends if that is stuck.
+struct Wait {
+    taken: u64,
+    since: Instant,
+}
+
+impl Wait {
+    fn begin(shared: &Shared) -> Self {
+        Self { taken: shared.taken.load(Ordering::Relaxed), since: Instant::now() }
+    }
+
+    /// Lets the thread go on for a moment; whether that makes sense.
+    fn goes_on(&mut self, shared: &Shared, how: &Backpressure, thread: &Thread) -> bool {
+        if how.when_full == WhenFull::Drop || how.signals.requested().is_some() || self.is_in_vain(shared) {
+            return false;
+        }
+        thread.unpark();
+        std::thread::sleep(Duration::from_micros(200));
+        true
+    }
+
+    /// Whether nothing was taken for long, in this wait or one before.
+    fn is_in_vain(&mut self, shared: &Shared) -> bool {
+        let taken = shared.taken.load(Ordering::Relaxed);
+        if taken != self.taken {
+            *self = Self::begin(shared);
+        }
+        if self.since.elapsed() > STUCK {
+            shared.stuck.store(taken + 1, Ordering::Relaxed);
+        }
+        shared.stuck.load(Ordering::Relaxed) == taken + 1
     }
 }
 

@@ -16,12 +16,12 @@ pub mod table;
 
 use super::stiffness::search::{Found, Search};
 use crate::outcome::{RunFailure, Stop};
+use crate::outputs;
 use crate::progress::StatusLine;
 use clap::Args;
 use io_driver::say::say;
 use physics::Integrator;
 use rt_core::signals::StopSignals;
-use std::io::Write;
 use std::path::PathBuf;
 
 /// What is asked.
@@ -132,8 +132,7 @@ pub fn execute(args: &IntegratorsArgs, signals: &StopSignals) -> Result<Stop, Ru
         }
     }
     line.end();
-    // Nobody to tell is no reason to fail.
-    let _ = std::io::stdout().write_all(table::text(args, &spun, &leant, &held).as_bytes());
+    outputs::print(&table::text(args, &spun, &leant, &held));
     write(args, &spun, &leant, &held)?;
     Ok(Stop::Finished)
 }
@@ -160,7 +159,7 @@ fn write(args: &IntegratorsArgs, spun: &[Spun], leant: &[Leant], held: &[Held]) 
     let said = format!(
         "written      {place}/integrators-spin.csv, integrators-lean.csv, integrators-stiffness.csv, integrators.svg, .png\n"
     );
-    let _ = std::io::stdout().write_all(said.as_bytes());
+    outputs::print(&said);
     Ok(())
 }
 

@@ -23,13 +23,13 @@ pub mod table;
 pub mod trial;
 
 use crate::outcome::{RunFailure, Stop};
+use crate::outputs::print;
 use crate::progress::StatusLine;
 use case::{Axis, Case};
 use clap::Args;
 use io_driver::say::say;
 use rt_core::signals::StopSignals;
 use search::{Found, Search};
-use std::io::Write;
 use std::path::PathBuf;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -125,11 +125,6 @@ pub fn execute(args: &StiffnessArgs, signals: &StopSignals) -> Result<Stop, RunF
         .map_err(|error| late(&format_args!("cannot write the picture: {error}")))?;
     print(&format!("written      {}/stiffness.csv, .svg, .png\n", args.out.display()));
     Ok(Stop::Finished)
-}
-
-/// Nobody to tell is no reason to fail.
-fn print(text: &str) {
-    let _ = std::io::stdout().write_all(text.as_bytes());
 }
 
 /// `None`: a signal came.

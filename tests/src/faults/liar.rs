@@ -15,8 +15,8 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 use tempfile::TempDir;
 
-/// Ticks of a lease that a commander has to answer before the first lie.
-const TRUE_TICKS: u64 = 200;
+/// Ticks of the run before the first lie.
+const TRUE_TICKS: i64 = 200;
 /// A tick.
 const PERIOD: Duration = Duration::from_millis(1);
 
@@ -31,12 +31,17 @@ pub struct Liar {
 impl Liar {
     /// One whose header lies from the beginning.
     pub fn about_itself(lie: fn(&DriverHeader)) -> Self {
-        Self::start(lie, |_| ())
+        Self::start(lie, (0, |_| ()))
     }
 
     /// One whose frames lie after a while.
     pub fn about_frames(lie: fn(&mut Frame)) -> Self {
-        Self::start(|_| (), lie)
+        Self::start(|_| (), (TRUE_TICKS, lie))
+    }
+
+    /// One whose frames lie from t = 0 on.
+    pub fn about_all_frames(lie: fn(&mut Frame)) -> Self {
+        Self::start(|_| (), (0, lie))
     }
 
     /// Where it listens.
@@ -44,7 +49,7 @@ impl Liar {
         &self.socket
     }
 
-    fn start(about_itself: fn(&DriverHeader), about_frames: fn(&mut Frame)) -> Self {
+    fn start(about_itself: fn(&DriverHeader), about_frames: (i64, fn(&mut Frame))) -> Self {
         let directory = tempfile::tempdir().expect("a directory");
         let socket = directory.path().join("driver.sock");
         let memory = DriverMemory::create(&info()).expect("memory");
@@ -64,25 +69,31 @@ impl Drop for Liar {
     }
 }
 
-fn serve(memory: &DriverMemory, mut server: Server, lie: fn(&mut Frame), stop: &AtomicBool) {
+fn serve(
+    memory: &DriverMemory,
+    mut server: Server,
+    (true_ticks, lie): (i64, fn(&mut Frame)),
+    stop: &AtomicBool,
+) {
     let mut events = Vec::new();
-    let mut commander: Option<(CommanderView, u64)> = None;
+    // And the tick of the first answer.
+    let mut commander: Option<(CommanderView, Option<u64>)> = None;
     let mut tick = 0;
     while !stop.load(Ordering::Relaxed) {
         server.poll(memory, PERIOD, &mut events).expect("the socket works");
         for event in events.drain(..) {
             match event {
-                ServerEvent::LeaseGranted { view, .. } => commander = Some((view, tick)),
+                ServerEvent::LeaseGranted { view, .. } => commander = Some((view, None)),
                 ServerEvent::LeaseEnded { .. } => commander = None,
                 _ => {}
             }
         }
+        if let Some((view, began @ None)) = &mut commander {
+            *began = view.latest_tick().map(|_| tick);
+        }
         let view = commander.as_ref().map(|(view, _)| view);
-        let mut frame = frame(tick, commander.as_ref().map(|(view, since)| (view.lease(), *since)));
-        let is_believed = |(view, since): &(CommanderView, u64)| {
-            view.latest_tick().is_some_and(|answered| answered >= since + TRUE_TICKS)
-        };
-        if commander.as_ref().is_some_and(is_believed) {
+        let mut frame = frame(tick, commander.as_ref().map(|(view, began)| (view.lease(), *began)));
+        if frame.run_tick >= true_ticks {
             lie(&mut frame);
         }
         memory.write_frame(&frame);
@@ -91,15 +102,17 @@ fn serve(memory: &DriverMemory, mut server: Server, lie: fn(&mut Frame), stop: &
     }
 }
 
-/// The truth; under a lease, t = 0 was in the tick in which that began.
-fn frame(tick: u64, lease: Option<(u64, u64)>) -> Frame {
+/// The truth; under a lease, t = 0 is in the tick that follows the first answer.
+fn frame(tick: u64, lease: Option<(u64, Option<u64>)>) -> Frame {
     let mut frame =
         Frame { tick, deadline_ns: monotonic_ns(), device_count: 1, run_tick: -1, ..Frame::zeroed() };
     frame.state = DriverState::Idle as u64;
     frame.devices[0].flags = DEVICE_POSITION_VALID;
-    if let Some((lease, since)) = lease {
-        frame.state = DriverState::Active as u64;
-        (frame.lease, frame.authority, frame.run_tick) = (lease, 1.0, (tick - since).cast_signed());
+    if let Some((lease, began)) = lease {
+        (frame.lease, frame.state) = (lease, DriverState::Active as u64);
+        if let Some(began) = began {
+            (frame.authority, frame.run_tick) = (1.0, (tick - began).cast_signed());
+        }
     }
     frame
 }

@@ -23,7 +23,7 @@ const LOOK_AHEAD: usize = 1000;
 /// Or so many bytes of them.
 const LOOK_AHEAD_BYTES: usize = 16 << 20;
 /// The longest row, of as many objects as a scene can have.
-const MOST_ROW_BYTES: u64 = 64 << 20;
+pub(crate) const MOST_ROW_BYTES: usize = 64 << 20;
 /// As many entities as a scene can have.
 const MOST_NAMES: usize = 100_000;
 /// And more environments with doors than anybody made.
@@ -101,9 +101,9 @@ impl CsvRows {
     /// A whole line without its end.
     fn read_line(&mut self) -> Result<Option<String>, ReadError> {
         let mut bytes = Vec::new();
-        let read = self.reader.by_ref().take(MOST_ROW_BYTES).read_until(b'\n', &mut bytes);
+        let read = self.reader.by_ref().take(MOST_ROW_BYTES as u64).read_until(b'\n', &mut bytes);
         read.map_err(|source| ReadError::Io { file: self.file.clone(), source })?;
-        if bytes.len() as u64 == MOST_ROW_BYTES {
+        if bytes.len() == MOST_ROW_BYTES {
             let why = format!("a line has more than {MOST_ROW_BYTES} bytes");
             return Err(ReadError::NoRecording { file: self.file.clone(), why });
         }
@@ -362,7 +362,9 @@ fn names_in(header: &str) -> Names {
 
 /// The shortest time between two rows (ns).
 fn period_of(lines: &VecDeque<String>) -> u64 {
-    let time_ns = |line: &String| Some((line.split(',').next()?.parse::<f64>().ok()? * 1e9).round() as u64);
+    // A time that is none is told with its line.
+    let time_s = |line: &String| line.split(',').next()?.parse::<f64>().ok().filter(|t| t.is_finite());
+    let time_ns = |line: &String| Some((time_s(line)? * 1e9).round() as u64);
     let times: Vec<u64> = lines.iter().filter_map(time_ns).collect();
     let steps = times.windows(2).map(|pair| pair[1].saturating_sub(pair[0])).filter(|step| *step > 0);
     steps.min().unwrap_or(USUAL_PERIOD_NS)
