@@ -132,10 +132,10 @@ fn a_run_ends_with_words_when_its_driver_tells_what_cannot_be() {
         // As if the run were nearly over.
         (|frame| frame.run_tick += 79_999_000, "began before this program's first answer: found 79999"),
     ];
-    let begin: [fn(fn(&mut Frame)) -> Liar; 2] = [Liar::about_frames, Liar::about_all_frames];
-    let cases = later.map(|lie| (begin[0], lie)).into_iter().chain(at_once.map(|lie| (begin[1], lie)));
-    for (begin, (lie, expected)) in cases {
-        let end = end_with(&begin(lie));
+    let later = later.map(|lie| (lie, false));
+    for ((lie, expected), begins_with_it) in later.into_iter().chain(at_once.map(|lie| (lie, true))) {
+        let liar = if begins_with_it { Liar::about_all_frames(lie) } else { Liar::about_frames(lie) };
+        let end = end_with(&liar);
         assert_eq!(end.status, Some(3), "{expected}: {end:?}");
         assert!(
             end.err.contains("the driver tells what cannot be: ") && end.err.contains(expected),
