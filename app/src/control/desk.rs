@@ -366,8 +366,10 @@ fn listen() -> std::io::Result<Receiver<String>> {
     let (send, receive) = mpsc::sync_channel(LINES);
     std::thread::Builder::new().name("orders".into()).spawn(move || {
         let input = BoundedLines::new(std::io::stdin(), MOST_LINE_BYTES);
-        for line in BufReader::new(input).lines() {
+        for (number, line) in BufReader::new(input).lines().enumerate() {
             let line = match line {
+                // Windows' shells put a byte order mark before what they pipe.
+                Ok(line) if number == 0 => line.trim_start_matches('\u{feff}').to_owned(),
                 Ok(line) => line,
                 Err(error) => {
                     say(format_args!(

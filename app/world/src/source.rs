@@ -15,6 +15,9 @@ pub const MAX_FILE_BYTES: u64 = 16 << 20;
 /// The text of `file`.
 pub(crate) fn read_text(file: &Path) -> Result<String, SceneError> {
     let bytes = input_file::read(file, MAX_FILE_BYTES).map_err(|cause| unreadable(file, cause))?;
+    if input_file::is_utf16(&bytes) {
+        return Err(unreadable(file, io::Error::new(io::ErrorKind::InvalidData, input_file::UTF16)));
+    }
     String::from_utf8(bytes).map_err(|error| {
         let offset_bytes = error.utf8_error().valid_up_to();
         let line = line_of(error.as_bytes(), offset_bytes);

@@ -1,4 +1,4 @@
-/* The C side of tests/contract_old_client.rs: answers every frame with 3 N along y until the driver is gone. */
+/* The C side of tests/contract/old_client.rs: answers every frame with 3 N along y until the driver is gone. */
 #include "phantom3_client.h"
 
 int main(int argc, char **argv) {

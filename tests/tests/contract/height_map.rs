@@ -6,7 +6,7 @@ use system_tests::recording::Sample;
 use system_tests::workplace::{Said, Workplace, hand};
 
 /// An egg crate of one hill and one dale: 0.5 + 0.5 sin(2 pi u) sin(2 pi v), 64 texels along a side, 16 bits.
-const BUMPS: &[u8] = include_bytes!("../../config/pictures/bumps.png");
+const BUMPS: &[u8] = include_bytes!("../../../config/pictures/bumps.png");
 const K: f64 = 1000.0;
 const AMPLITUDE_M: f64 = 0.0005;
 const SIZE_M: f64 = 0.01;

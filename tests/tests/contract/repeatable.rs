@@ -7,8 +7,8 @@ use std::path::Path;
 use system_tests::recording::{Sample, Table};
 use system_tests::workplace::{Said, Workplace};
 
-const SCENE: &str = include_str!("../../config/scenes/default.toml");
-const HAND: &str = include_str!("../../config/hands/default.csv");
+const SCENE: &str = include_str!("../../../config/scenes/default.toml");
+const HAND: &str = include_str!("../../../config/hands/default.csv");
 
 /// The default scene in a workplace, its hand beside it.
 fn workplace() -> Workplace {
@@ -134,8 +134,8 @@ fn hash(table: &Table) -> u64 {
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
-/// After a change of behaviour that is meant: `PHANTOM3_BLESS=1 cargo test -p system-tests --test
-/// contract_repeatable`, and say in the commit why the numbers moved.
+/// After a change of behaviour that is meant: `PHANTOM3_BLESS=1 cargo test -p system-tests --test contract
+/// repeatable`, and say in the commit why the numbers moved.
 #[test]
 fn default_scene_is_felt_as_it_was_when_it_was_last_blessed() {
     let place = workplace();

@@ -1,7 +1,6 @@
 //! Every mistake in a command line or a file: status 2, one message that a stranger can act on, and nothing
 //! half-started.
 
-#[path = "contract_bad_input/foreign_recordings.rs"]
 mod foreign_recordings;
 
 use std::ffi::{OsStr, OsString};
@@ -499,6 +498,15 @@ fn a_line_without_an_end_takes_no_memory_for_it() {
     let said = place.shell(script, &["--clock", "lockstep", "--seconds", "2", "--orders", "-"]);
     assert_eq!(said.status, Some(0), "{}", said.err);
     assert_says(&said.err, &["--orders -: a line has more than 65536 bytes", "no orders are read"]);
+}
+
+#[test]
+fn an_order_piped_with_a_byte_order_mark_is_an_order() {
+    let place = workplace();
+    let script = r#"{ sleep 0.3; printf '\357\273\277key 32 down\r\n'; } | "$0" "$@""#;
+    let said = place.shell(script, &["--clock", "lockstep", "--seconds", "2", "--orders", "-"]);
+    assert_eq!((said.status, &*said.err), (Some(0), ""), "{}", said.err);
+    assert_says(&said.out, &["orders       1\n"]);
 }
 
 #[test]

@@ -137,8 +137,8 @@ fn the_scenes_own_hand_is_found_beside_the_scene_and_an_argument_overrides_it() 
 }
 
 /// Two fingers over the default scene, which slide and stick on a ball and a table.
-const DEFAULT_SCENE: &str = include_str!("../../config/scenes/default.toml");
-const DEFAULT_HAND: &str = include_str!("../../config/hands/default.csv");
+const DEFAULT_SCENE: &str = include_str!("../../../config/scenes/default.toml");
+const DEFAULT_HAND: &str = include_str!("../../../config/hands/default.csv");
 
 fn play_default(layout: &str) -> (Table, Vec<u8>) {
     let place = Workplace::new();

@@ -1,14 +1,10 @@
 //! Fingers with volume, felt through scene file, model file, hand file and recording alone.
 
+use crate::written::Format;
 use haptics::mesh::make;
 use nalgebra::Vector3;
 use system_tests::recording::{Sample, Table};
 use system_tests::workplace::{Workplace, hand};
-use written::Format;
-
-#[allow(dead_code, reason = "its kinds are the program's")]
-#[path = "../../app/world/examples/make_mesh/written.rs"]
-mod written;
 
 const RADIUS_M: f64 = 0.008;
 const STIFFNESS_N_PER_M: f64 = 1000.0;

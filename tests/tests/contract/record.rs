@@ -8,10 +8,10 @@ use std::time::{Duration, Instant};
 use system_tests::recording::Table;
 use system_tests::workplace::{Running, Said, Workplace};
 
-const DEFAULT_SCENE: &str = include_str!("../../config/scenes/default.toml");
-const DEFAULT_HAND: &str = include_str!("../../config/hands/default.csv");
-const LIFT_SCENE: &str = include_str!("../../config/scenes/lift.toml");
-const LIFT_HAND: &str = include_str!("../../config/hands/lift.csv");
+const DEFAULT_SCENE: &str = include_str!("../../../config/scenes/default.toml");
+const DEFAULT_HAND: &str = include_str!("../../../config/hands/default.csv");
+const LIFT_SCENE: &str = include_str!("../../../config/scenes/lift.toml");
+const LIFT_HAND: &str = include_str!("../../../config/hands/lift.csv");
 
 /// A ball, a passive point, a finger that turns and ties; an object whose grasp is told; friction and damping.
 const EVERYTHING: &str = r#"

@@ -1,14 +1,10 @@
 //! Force shading, felt through scene file, model file, hand file and recording alone.
 
+use crate::written::Format;
 use haptics::mesh::make;
 use nalgebra::Vector3;
 use system_tests::recording::Sample;
 use system_tests::workplace::{Workplace, hand};
-use written::Format;
-
-#[allow(dead_code, reason = "its kinds are the program's")]
-#[path = "../../app/world/examples/make_mesh/written.rs"]
-mod written;
 
 const BALL: &str = "kind = \"mesh\", file = \"ball.obj\"";
 const BOX: &str = "kind = \"box\", size_m = [0.1, 0.1, 0.1]";

@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 use system_tests::recording::{Sample, Table};
 use system_tests::workplace::Workplace;
 
-const LIFT_SCENE: &str = include_str!("../../config/scenes/lift.toml");
-const LIFT_HAND: &str = include_str!("../../config/hands/lift.csv");
+const LIFT_SCENE: &str = include_str!("../../../config/scenes/lift.toml");
+const LIFT_HAND: &str = include_str!("../../../config/hands/lift.csv");
 const TABLE: &str = "hand = \"hand.csv\"\n[[finger]]\nstart_m = [0, 0.02, 0]\n\
     [[entity]]\nname = \"table\"\nshape = { kind = \"plane\", normal = [0, 1, 0], offset_m = 0 }\n";
 /// Three taps, each deeper than the one before.

@@ -1,14 +1,10 @@
 //! Meshes, felt through scene file, model file, hand file and recording alone; and files that are none.
 
+use crate::written::Format;
 use haptics::mesh::{TriangleSoup, make};
 use nalgebra::Vector3;
 use system_tests::recording::Sample;
 use system_tests::workplace::{Said, Workplace, hand};
-use written::Format;
-
-#[allow(dead_code, reason = "its kinds are the program's")]
-#[path = "../../app/world/examples/make_mesh/written.rs"]
-mod written;
 
 /// A scene around one thing.
 fn scene(shape: &str, rest: &str) -> String {

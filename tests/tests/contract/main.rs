@@ -1,0 +1,47 @@
+//! The program as scripts drive it: what a run prints, writes, refuses and feels like, scene by scene.
+
+mod bad_input;
+mod ball;
+mod csg;
+mod doctor;
+mod driver_cli;
+mod effects;
+mod emulate;
+mod events;
+mod first_run;
+mod frictions;
+mod gallery;
+mod grasp;
+mod height_map;
+mod impedance;
+mod lists;
+mod materials;
+mod mesh;
+mod noise;
+mod nurbs;
+mod objects;
+mod old_client;
+mod orders;
+mod output;
+mod passive;
+mod pictures;
+mod plane;
+mod play;
+mod plot;
+mod record;
+mod repeatable;
+mod scenes;
+mod shading;
+mod shapes;
+mod sphere;
+mod study;
+mod tardis;
+mod time;
+mod together;
+mod viscous;
+mod window;
+
+/// What the example `make_mesh` writes.
+#[allow(dead_code, reason = "its kinds are the program's")]
+#[path = "../../../app/world/examples/make_mesh/written.rs"]
+mod written;
