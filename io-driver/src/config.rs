@@ -400,9 +400,9 @@ mod tests {
         };
         assert_eq!(times(2000, "max_command_age_ticks = 40").0, 20_000_000);
         assert_eq!(times(1000, "max_command_age_ms = 2.5").0, 2_500_000);
-        // Ramps take whole ticks: in by the nearest number, out by no more than asked for, and one at least.
+        // Ramps take whole ticks: in no fewer than asked for, out no more, and one at least.
         let of_ramps = "ramp_in_ms = 25\nramp_out_ms = 7";
-        assert_eq!(times(250, of_ramps), (4_000_000, 24_000_000, 4_000_000));
+        assert_eq!(times(250, of_ramps), (4_000_000, 28_000_000, 4_000_000));
         assert_eq!(times(10, "ramp_out_ms = 0"), (4_000_000, 200_000_000, 100_000_000));
         // A third of a millisecond, rounded to a nanosecond: fifteen ticks all the same.
         assert_eq!(times(3000, "").2, 15 * 333_333);
@@ -437,6 +437,23 @@ mod tests {
         let plain = parse("clock = \"lockstep\"\n[[device]]\nbackend = \"ideal\"\n").expect("good");
         assert_eq!(plain.clock, ClockMode::Lockstep);
         assert_eq!(parse(&plain.to_toml()).expect("good as well"), plain);
+    }
+
+    #[test]
+    fn the_longest_and_shortest_times_of_every_rate_are_read_back_the_same() {
+        let extreme = "[safety]\nmax_command_age_ms = 20\nramp_in_ms = 20\nramp_out_ms = 50";
+        for rate_hz in (10..=120).chain([524, 700, 999, 1000, 3000, 6000, 7777, 10_000]) {
+            let most_ticks = rate_hz * 20 / 1000;
+            let by_ticks = format!("[safety]\nmax_command_age_ticks = {most_ticks}\nramp_in_ms = 10000");
+            for safety in ["", extreme, &by_ticks] {
+                let text = format!("rate_hz = {rate_hz}\n{safety}\n[[device]]\nbackend = \"ideal\"\n");
+                let config = parse(&text).unwrap_or_else(|error| panic!("{error}\n{text}"));
+                assert_eq!(parse(&config.to_toml()).as_ref(), Ok(&config), "{text}");
+                // What a hand does not hold in less: a thousandth of a tick is the period's own rounding.
+                let least_ns = 20e6 - 1e-3 * config.period_ns as f64;
+                assert!(config.safety.ramp_in_ns as f64 >= least_ns, "{text}");
+            }
+        }
     }
 
     #[test]

@@ -19,6 +19,7 @@ use crate::meter::{bump, record};
 use crate::reply::Reply;
 use crate::safety::switches::{Inputs, Switches};
 use crate::safety::{Elapsed, Guard, Limits, Safety, TickClock};
+use crate::urgent::Urgent;
 use crate::zeroing::{DeviceSet, ZeroRefusal, ZeroState, ZeroWatch};
 use bytemuck::Zeroable;
 use rt_core::clock::monotonic_ns;
@@ -73,6 +74,8 @@ pub struct Cycle {
     frame: Frame,
     started_ns: u64,
     rang_ns: u64,
+    /// Told of every fault.
+    urgent: Urgent,
 }
 
 impl Cycle {
@@ -110,7 +113,14 @@ impl Cycle {
             frame,
             started_ns: 0,
             rang_ns: 0,
+            urgent: Urgent::default(),
         }
+    }
+
+    /// The same, whose faults cannot be left by requests of before.
+    pub fn telling_of_faults(mut self, urgent: Urgent) -> Self {
+        self.urgent = urgent;
+        self
     }
 
     /// The same, whose deadlines are times of the monotonic clock; else its ticks take a period each.
@@ -293,6 +303,7 @@ impl Cycle {
     pub fn fault(&mut self, reason: FaultReason) {
         if self.safety.enter_fault(reason) {
             bump(&self.memory.counters.faults);
+            self.urgent.fault_began();
         }
         self.release();
     }

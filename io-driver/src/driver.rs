@@ -99,12 +99,15 @@ pub enum RunError {
     /// The loop panicked.
     #[error("the driver's loop panicked; the motors were written zero: {0}")]
     Panicked(String),
+    /// The thread that serves the socket cannot go on.
+    #[error("the driver's service failed; the loop was ended and the motors were written zero: {0}")]
+    ServiceFailed(String),
 }
 
 impl RunError {
     /// Whether something failed during the run, rather than before it.
     pub fn is_fault(&self) -> bool {
-        matches!(self, Self::Panicked(_) | Self::Hung(_))
+        matches!(self, Self::Panicked(_) | Self::Hung(_) | Self::ServiceFailed(_))
     }
 }
 
@@ -139,7 +142,7 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
     install_last_words(&memory)?;
     let (sender, inbox) = mail();
     let (log, drain) = rt_core::log::channel(LOG_CAPACITY);
-    let cycle = make_cycle(config, Arc::clone(&memory), devices);
+    let cycle = make_cycle(config, Arc::clone(&memory), devices).telling_of_faults(sender.urgent.clone());
     let real_loop = RealLoop::new(config, waiting, cycle, inbox, log, shared.clone(), &TICK);
     // From here on nothing new that the loop touches: it would not be locked.
     let path = options.socket.clone().or_else(|| config.socket.clone());
@@ -158,7 +161,8 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
     // The last threads: the sandbox lets none be started.
     let system = |what| move |source| RunError::System { what, source };
     let (stop_socket, stop_file) = StopSocket::bind(server.path())?;
-    stop_thread::start(stop_socket, sender.urgent.clone()).map_err(system("start the thread that stops"))?;
+    stop_thread::start(stop_socket, sender.urgent.clone(), options.quiet)
+        .map_err(system("start the thread that stops"))?;
     let lost = drain.lost_count();
     log_thread::start(drain, options.quiet).map_err(system("start the log's thread"))?;
     report.guarantees.push(sandbox::shut(&config.process));
@@ -215,7 +219,9 @@ pub fn describe(config: &DriverConfig, devices: &[Box<dyn Device>], wait_mode: W
             ClockMode::Real => config.reply.budget_ns,
             ClockMode::Lockstep | ClockMode::Virtual => u64::MAX,
         },
-        max_command_age_ticks: config.safety.max_command_age_ns / config.period_ns,
+        // A period is rounded to a nanosecond, which is no tick.
+        max_command_age_ticks: (config.safety.max_command_age_ns + config.period_ns / 1000)
+            / config.period_ns,
         ramp_in_ticks: config.safety.ramp_in_ns.div_ceil(config.period_ns),
         ramp_out_ticks: config.safety.ramp_out_ns.div_ceil(config.period_ns),
         clock_mode: config.clock,

@@ -35,8 +35,8 @@ use std::time::Duration;
 /// How long a sleeping loop goes without looking at its mail and at requests to stop.
 const NAP: Duration = Duration::from_millis(10);
 
-/// Spinning without any reply for so long does no good. As long as an old command may drive the motors by
-/// default at 1 kHz; many times what a reply takes, and rare even among stalls of a virtual machine.
+/// Spinning without any reply for so long does no good: many times what a reply takes, and rare even among stalls of a
+/// virtual machine.
 const PATIENCE_NS: u64 = 5_000_000;
 /// How long it sleeps for replies after that before it tries spinning again.
 const RETREAT_NS: u64 = 1_000_000_000;

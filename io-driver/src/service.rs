@@ -1,4 +1,4 @@
-//! The driver's socket thread: who comes and goes, what the loop has to know of it, the log, the end.
+//! The driver's socket thread: who comes and goes, what the loop has to know of it, the end.
 //!
 //! Model: it waits at the socket, passes on as mail what concerns the loop, tells the service manager that both live, and
 //! looks for a reason to stop.
@@ -33,10 +33,11 @@ use std::time::{Duration, Instant};
 /// A loop that was asked to end does so within a tick. A stall of the machine is shorter than this, and so is the
 /// patience of whoever stops a driver whose motors push.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// Who said that an arm is in its zeroing pose held it there; an arm that was left alone since may be elsewhere.
-const ZERO_IN_TIME_NS: u64 = 1_000_000_000;
+/// Who said that an arm is in its zeroing pose held it there, and who asked to leave a fault looked at the arms; what is
+/// heard later than this may be true no more.
+const IN_TIME_NS: u64 = 1_000_000_000;
 const HUNG: &str = "the loop hangs; the motors were switched off behind its back";
-/// How often the socket's thread looks at signals and at the log when nothing else happens.
+/// How often the socket's thread looks at signals when nothing else happens.
 const POLL: Duration = Duration::from_millis(20);
 
 /// The socket's thread.
@@ -64,7 +65,7 @@ impl Service<'_> {
     }
 
     /// Serves until something asks the driver to stop; returns what.
-    fn serve(&mut self) -> Result<String, RunError> {
+    fn serve(&mut self) -> Result<String, String> {
         loop {
             self.heartbeat.beat();
             let Self { server, sender, memory, options, .. } = self;
@@ -73,7 +74,7 @@ impl Service<'_> {
             if let Some(reason) = desk.stop {
                 return Ok(reason);
             }
-            polled.map_err(|source| RunError::System { what: "wait at the socket", source })?;
+            polled.map_err(|error| format!("cannot wait at the socket: {error}"))?;
             self.sender.clear_waste();
             self.count_what_the_log_dropped();
             self.supervisor.turn(TICK.load(Ordering::Relaxed), || status_line(&self.memory));
@@ -92,16 +93,16 @@ impl Service<'_> {
     }
 
     /// Ends the loop, writes the last words and says how it was.
-    fn finish(self, thread: JoinHandle<Ended>, served: Result<String, RunError>) -> Result<(), RunError> {
+    fn finish(self, thread: JoinHandle<Ended>, served: Result<String, String>) -> Result<(), RunError> {
         self.shared.stop.store(true, Ordering::Relaxed);
-        self.supervisor.stopping(served.as_deref().unwrap_or("a fault of the socket"));
+        self.supervisor.stopping(served.as_deref().unwrap_or("a fault of the service"));
         let has_ended = wait_for_end(&thread);
         if !has_ended {
             // It will not do it any more, and must not undo it.
             rt_core::last_act::perform();
         }
         self.count_what_the_log_dropped();
-        let end = served.and_then(|reason| self.write_last_words(thread, has_ended, &reason));
+        let end = self.write_last_words(thread, has_ended, served);
         // Whoever waits for the end reads the last words when its connection closes.
         tidy_up(self.server, self.stop_file, self.options);
         end
@@ -111,7 +112,7 @@ impl Service<'_> {
         &self,
         thread: JoinHandle<Ended>,
         has_ended: bool,
-        reason: &str,
+        served: Result<String, String>,
     ) -> Result<(), RunError> {
         let tick = TICK.load(Ordering::Relaxed);
         let epitaph = EpitaphRef::new(&self.memory.epitaph);
@@ -119,13 +120,17 @@ impl Service<'_> {
             epitaph.write(EpitaphKind::Fault, tick, HUNG);
             return Err(RunError::Hung(tick));
         }
-        match thread.join() {
-            Ok(Ended::Stopped) => {
-                epitaph.write(EpitaphKind::Stopped, tick, reason);
+        match (thread.join(), served) {
+            (Ok(Ended::Stopped), Ok(reason)) => {
+                epitaph.write(EpitaphKind::Stopped, tick, &reason);
                 say(self.options, format_args!("stopped in tick {tick}: {reason}; motors were written zero"));
                 Ok(())
             }
-            Ok(Ended::Panicked) | Err(_) => {
+            (Ok(Ended::Stopped), Err(why)) => {
+                epitaph.write(EpitaphKind::Fault, tick, &why);
+                Err(RunError::ServiceFailed(why))
+            }
+            (Ok(Ended::Panicked) | Err(_), _) => {
                 let words = rt_core::epitaph::read(&self.memory.epitaph);
                 Err(RunError::Panicked(words.map_or_else(String::new, |words| words.to_string())))
             }
@@ -156,6 +161,12 @@ impl Recipient for Desk<'_> {
                 say(self.options, format_args!("lease {lease} ended"));
             }
             ServerEvent::LeaseRefused => bump(&self.memory.counters.leases_refused),
+            ServerEvent::ClearFaultRequested { asked_ns, .. }
+            | ServerEvent::ZeroRequested { asked_ns, .. }
+                if monotonic_ns() - asked_ns > IN_TIME_NS =>
+            {
+                return Err(Verdict::Outdated);
+            }
             ServerEvent::ClearFaultRequested { uid, is_administrator, asked_ns } => {
                 let is_own = |by| by == StoppedBy::Nobody || by == StoppedBy::User(uid);
                 let cleared = self.sender.urgent.clear_fault(asked_ns, |by| is_administrator || is_own(by));
@@ -167,9 +178,6 @@ impl Recipient for Desk<'_> {
             ServerEvent::EmergencyStopRequested { pid, uid } => {
                 self.sender.urgent.stop(Some(uid));
                 say(self.options, format_args!("emergency stop, asked for by process {pid} of user {uid}"));
-            }
-            ServerEvent::ZeroRequested { asked_ns, .. } if monotonic_ns() - asked_ns > ZERO_IN_TIME_NS => {
-                return Err(Verdict::Outdated);
             }
             ServerEvent::ZeroRequested { pid, devices, .. } => {
                 self.post(Letter::Zero(DeviceSet(devices)))?;
@@ -201,9 +209,9 @@ fn wait_for_end(thread: &JoinHandle<Ended>) -> bool {
 
 /// A panic here is an ending like any other: unwound further it would end the process, and the loop in the middle of
 /// a tick.
-fn caught(serve: impl FnOnce() -> Result<String, RunError>) -> Result<String, RunError> {
+fn caught(serve: impl FnOnce() -> Result<String, String>) -> Result<String, String> {
     let result = catch_unwind(AssertUnwindSafe(serve));
-    result.unwrap_or_else(|_| Err(RunError::Panicked("the socket's thread panicked".into())))
+    result.unwrap_or_else(|_| Err("it panicked".into()))
 }
 
 /// For the service manager; the rest is told by `io-driver status`.
@@ -247,7 +255,7 @@ mod tests {
     #[test]
     fn a_panic_of_the_service_is_an_end_that_still_stops_the_loop() {
         let end = caught(|| panic!("no room for a line of the log"));
-        assert!(end.is_err_and(|error| error.is_fault()));
+        assert_eq!(end, Err("it panicked".into()));
         assert_eq!(caught(|| Ok("asked to".into())).ok().as_deref(), Some("asked to"));
     }
 }

@@ -1,45 +1,101 @@
-//! The thread that stops the motors whatever the others are stuck in.
+//! The threads that stop the motors whatever the others are stuck in.
 //!
-//! Model: it does two things only. It waits for emergency stops by datagram ([`StopSocket`]) and hands them to the
-//! loop's word ([`Urgent`]); and it is the thread to which the kernel hands SIGTERM, SIGINT and SIGHUP, whose flag the
-//! loop reads itself. It shares no lock, no queue and no descriptor with the thread that serves connections.
-//! Cost: asleep until somebody stops; under a flood, a turn each [`REST`].
+//! Model: the first does two things only. It waits for emergency stops by datagram ([`StopSocket`]) and hands them to
+//! the loop's word ([`Urgent`]); and it is the thread to which the kernel hands SIGTERM, SIGINT and SIGHUP, whose flag
+//! the loop reads itself. It shares no lock and no descriptor with the thread that serves connections. The second takes
+//! what the first has heard, which may take long ([`Drain`]).
+//! Invariant: while the second is stuck the first goes on hearing, and hears the same stop again and again: the fault
+//! stays.
+//! Cost: both asleep until somebody stops; under a flood, a turn each [`REST`].
 
+use crate::say::say;
 use crate::urgent::Urgent;
 use rt_core::signals;
-use shm_abi::stop_socket::StopSocket;
+use shm_abi::stop_socket::{Drain, StopSocket};
 use std::io;
-use std::sync::mpsc::sync_channel;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Duration;
 
 /// Between two turns, so that a flood of stops, each of which is one too many, costs no CPU.
 const REST: Duration = Duration::from_millis(1);
-/// A receive and a handler of signals.
+/// Taking a datagram takes less, unless something came with it that is slow to close.
+const TAKEN_WITHIN: Duration = Duration::from_millis(5);
+/// A receive, a line of the log and a handler of signals.
 const STACK_BYTES: usize = 64 * 1024;
 
-/// Starts it; from now on all other threads leave signals to it.
+/// Starts them; from now on all other threads leave signals to the first.
 ///
 /// # Errors
-/// What the system says to another thread, or to its signals.
-pub(crate) fn start(socket: StopSocket, urgent: Urgent) -> io::Result<()> {
+/// What the system says to other threads, or to their signals.
+pub(crate) fn start(socket: StopSocket, urgent: Urgent, is_quiet: bool) -> io::Result<()> {
     signals::block_in_this_thread()?;
-    let (begun, has_begun) = sync_channel::<()>(0);
+    let queue = Queue::start(socket.drain()?)?;
+    let (tell_begun, begun) = sync_channel(1);
     let thread = std::thread::Builder::new().name("stop".into()).stack_size(STACK_BYTES);
     thread.spawn(move || {
-        drop(begun);
-        run(socket, &urgent);
+        let receives = signals::receive_in_this_thread();
+        let is_ready = receives.is_ok();
+        let _ = tell_begun.send(receives);
+        if is_ready {
+            run(socket, queue, &urgent, is_quiet);
+        }
     })?;
-    // The sandbox that is shut next knows nothing of the calls by which a thread begins.
-    let _ = has_begun.recv();
-    Ok(())
+    // The sandbox that is shut next knows nothing of the calls by which threads begin.
+    begun.recv().unwrap_or_else(|_| Err(io::Error::other("it ended at once")))
 }
 
-fn run(mut socket: StopSocket, urgent: &Urgent) {
-    // If it fails, signals are as before: the service's thread does not block them for long, and polls.
-    let _ = signals::receive_in_this_thread();
+fn run(mut socket: StopSocket, mut queue: Queue, urgent: &Urgent, is_quiet: bool) {
     loop {
+        let may_take = queue.is_taken();
         // A signal interrupts, which is no failure; of any other one the rest is a slower turn.
-        let _ = socket.wait(|user| urgent.stop(user));
+        if let Ok(user) = socket.hear() {
+            let is_new = urgent.stop(user);
+            if may_take {
+                queue.take();
+            }
+            if is_new && !is_quiet {
+                let user = user.map_or("an unknown user".into(), |user| format!("user {user}"));
+                say(format_args!("io-driver: emergency stop, asked for by {user} by datagram"));
+            }
+        }
         std::thread::sleep(REST);
+    }
+}
+
+/// The first thread's end of the second.
+struct Queue {
+    heard: SyncSender<()>,
+    taken: Receiver<()>,
+    /// One that was heard and is not taken yet.
+    is_taking: bool,
+}
+
+impl Queue {
+    fn start(drain: Drain) -> io::Result<Self> {
+        let (heard, hear) = sync_channel(1);
+        let (tell_taken, taken) = sync_channel(1);
+        let (tell_begun, begun) = sync_channel::<()>(0);
+        let thread = std::thread::Builder::new().name("stops-taken".into()).stack_size(STACK_BYTES);
+        thread.spawn(move || {
+            drop(tell_begun);
+            for () in hear {
+                drain.take();
+                let _ = tell_taken.send(());
+            }
+        })?;
+        let _ = begun.recv();
+        Ok(Self { heard, taken, is_taking: false })
+    }
+
+    /// Whether the first in the queue is one that nobody is about to take.
+    fn is_taken(&mut self) -> bool {
+        self.is_taking &= self.taken.try_recv().is_err();
+        !self.is_taking
+    }
+
+    /// Has the first one taken, which was acted on, and waits for that unless it takes long.
+    fn take(&mut self) {
+        let _ = self.heard.try_send(());
+        self.is_taking = self.taken.recv_timeout(TAKEN_WITHIN).is_err();
     }
 }

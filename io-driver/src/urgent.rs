@@ -1,10 +1,11 @@
 //! Requests to the loop for which there is always room: emergency stop, leaving a fault, the end of a lease.
 //!
-//! Model: one atomic word holds whether an emergency stop and whether leaving the fault are asked for, and who made
-//! the emergency stop that stands; another one the number of the last lease that has ended. To ask twice is to ask
-//! once, so nothing can be full and nobody waits.
-//! Invariants: a request to leave a fault never undoes an emergency stop that was asked for after it, however late it is
-//! heard, nor one that the loop has not seen yet; the emergency stop of somebody stays his until it is left.
+//! Model: one atomic word holds whether an emergency stop and whether leaving the fault are asked for, who made
+//! the emergency stop that stands, and a count of faults and stops, so that who compares the word and swaps it sees one
+//! that came meanwhile; another one holds the number of the last lease that has ended. To ask twice is to ask once, so
+//! nothing can be full and nobody waits.
+//! Invariants: a request to leave a fault never undoes a fault or an emergency stop that came after it, however late it
+//! is heard, nor a stop that the loop has not seen yet; the emergency stop of somebody stays his until it is left.
 //! Cost: a load for a tick in which nothing is asked.
 
 use rt_core::clock::monotonic_ns;
@@ -16,6 +17,8 @@ const CLEAR_FAULT: u64 = 1 << 62;
 const ASKED: u64 = EMERGENCY_STOP | CLEAR_FAULT;
 /// Several users, or one whom the kernel does not name.
 const SEVERAL: u64 = 1 << 33;
+const COUNT_OF_ONE: u64 = SEVERAL << 1;
+const COUNT: u64 = !ASKED & !(COUNT_OF_ONE - 1);
 
 /// Whose emergency stop it is that stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,7 +45,7 @@ pub struct Asked {
 /// Why a fault is not left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NotCleared {
-    /// An emergency stop came after that was asked.
+    /// A fault or an emergency stop came after that was asked.
     Outdated,
     /// Who asks may not undo what stands.
     NotAllowed,
@@ -55,20 +58,31 @@ pub struct Urgent(Arc<Words>);
 #[derive(Debug, Default)]
 struct Words {
     state: AtomicU64,
-    /// When the last emergency stop was asked for (CLOCK_MONOTONIC, ns).
+    /// When the last emergency stop was asked for, or the last fault began (CLOCK_MONOTONIC, ns).
     stopped_ns: AtomicU64,
     ended_lease: AtomicU64,
 }
 
 impl Urgent {
-    /// All motors off with the loop's next tick. `user` is who asks, if that is known.
-    pub fn stop(&self, user: Option<u32>) {
+    /// All motors off with the loop's next tick. `user` is who asks, if that is known. Returns whether no emergency stop
+    /// of anybody stood before.
+    pub fn stop(&self, user: Option<u32>) -> bool {
         // Before the stop itself: whoever sees that sees when it was.
         self.0.stopped_ns.fetch_max(monotonic_ns(), Ordering::Release);
+        let mut former = StoppedBy::Nobody;
         self.update(|state| {
-            let by = merge(by_of(state), user.map_or(StoppedBy::Several, StoppedBy::User));
-            Some(EMERGENCY_STOP | word_of(by))
+            former = by_of(state);
+            let by = merge(former, user.map_or(StoppedBy::Several, StoppedBy::User));
+            Some(EMERGENCY_STOP | counted(state) | word_of(by))
         });
+        former == StoppedBy::Nobody
+    }
+
+    /// The loop is in a fault since now: who asked before to leave one did not know of it. Fit for the loop: it tries
+    /// again only if somebody else changed the word meanwhile.
+    pub fn fault_began(&self) {
+        self.0.stopped_ns.fetch_max(monotonic_ns(), Ordering::Release);
+        self.update(|state| Some(state & !(COUNT | CLEAR_FAULT) | counted(state)));
     }
 
     /// Leave the fault state, as was asked at `asked_ns` (CLOCK_MONOTONIC), if `may` who asks undo what stands.
@@ -85,13 +99,14 @@ impl Urgent {
             }
             why = NotCleared::NotAllowed;
             let left = if state & EMERGENCY_STOP == 0 { StoppedBy::Nobody } else { by };
-            may(by).then_some(state & ASKED | CLEAR_FAULT | word_of(left))
+            may(by).then_some(state & (ASKED | COUNT) | CLEAR_FAULT | word_of(left))
         });
         if is_done { Ok(()) } else { Err(why) }
     }
 
     /// Whose emergency stop stands.
-    pub fn stopped_by(&self) -> StoppedBy {
+    #[cfg(test)]
+    fn stopped_by(&self) -> StoppedBy {
         by_of(self.0.state.load(Ordering::Acquire))
     }
 
@@ -124,6 +139,11 @@ fn merge(former: StoppedBy, new: StoppedBy) -> StoppedBy {
     if former == StoppedBy::Nobody || former == new { new } else { StoppedBy::Several }
 }
 
+/// One more fault or stop than this word counts.
+fn counted(state: u64) -> u64 {
+    state.wrapping_add(COUNT_OF_ONE) & COUNT
+}
+
 fn word_of(by: StoppedBy) -> u64 {
     match by {
         StoppedBy::Nobody => 0,
@@ -133,7 +153,7 @@ fn word_of(by: StoppedBy) -> u64 {
 }
 
 fn by_of(state: u64) -> StoppedBy {
-    match state & !ASKED {
+    match state & !(ASKED | COUNT) {
         0 => StoppedBy::Nobody,
         word => u32::try_from(word - 1).map_or(StoppedBy::Several, StoppedBy::User),
     }
@@ -171,6 +191,31 @@ mod tests {
         assert!(!urgent.take().clear_fault);
         assert_eq!(urgent.stopped_by(), StoppedBy::User(ANN));
         assert_eq!(now(&urgent, own(ANN)), Ok(()));
+    }
+
+    #[test]
+    fn a_request_to_leave_a_fault_does_not_leave_one_that_began_after_it() {
+        let urgent = Urgent::default();
+        let asked_ns = monotonic_ns();
+        while monotonic_ns() <= asked_ns {}
+        urgent.fault_began();
+        assert_eq!(urgent.clear_fault(asked_ns, |_| true), Err(NotCleared::Outdated));
+        assert_eq!(now(&urgent, |_| true), Ok(()));
+        // Granted, and not yet collected.
+        urgent.fault_began();
+        assert!(!urgent.take().clear_fault);
+    }
+
+    /// The count runs over without touching what is beside it.
+    #[test]
+    fn a_stop_stands_whatever_number_of_faults_came_before() {
+        let urgent = Urgent::default();
+        urgent.0.state.store(COUNT, Ordering::Relaxed);
+        assert!(urgent.stop(Some(ANN)) && !urgent.stop(Some(ANN)), "the first one is new");
+        urgent.0.state.fetch_or(COUNT, Ordering::Relaxed);
+        urgent.fault_began();
+        assert_eq!(urgent.stopped_by(), StoppedBy::User(ANN));
+        assert_eq!(urgent.take(), Asked { emergency_stop: true, clear_fault: false, ended_lease: 0 });
     }
 
     #[test]

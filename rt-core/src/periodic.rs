@@ -6,8 +6,8 @@
 //! [`Schedule`]'s business. The phase moves the deadlines off the kernel's own timer tick, which
 //! fires on whole milliseconds; a loop may be let to find a quiet phase by itself.
 //! Invariants: a completed wait is never early, and less than one period after the deadline that it serves, save in
-//! a loop that catches up: what it missed before that is in `skipped`. The tick number stays tied to absolute time, but for the 0.382 of a
-//! period by which a loop that steps aside lags behind with each step. A signal ends the sleep.
+//! a loop that catches up: what it missed before that is in `skipped`. The tick number stays tied to absolute time, but
+//! for the 0.382 of a period by which a loop that steps aside lags behind with each step. A signal ends the sleep.
 //! Cost: one system call a tick, none when the deadline is within the margin; no allocation.
 
 use crate::clock::{monotonic_ns, sleep_until_ns};

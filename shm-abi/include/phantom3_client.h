@@ -348,24 +348,19 @@ static inline int phantom_exchange(const char *path, const PhantomRequest *reque
     return -1;
 }
 
-/* Whether the driver says of itself what can be; else `error` says what was found. */
-static inline int phantom_is_possible(const PhantomDriverSegment *segment, char *error) {
-    const PhantomDriverHeader *header = &segment->header;
-    const uint64_t most_ticks = UINT64_C(1) << 32;
-    const struct {
-        const char *what;
-        const uint64_t *word;
-        uint64_t least, most;
-    } bounds[] = {
-        {"segment of so many bytes", &header->segment_bytes, sizeof *segment, sizeof *segment},
-        {"period in nanoseconds", &header->period_ns, 1, UINT64_C(10000000000)},
-        {"reply budget in nanoseconds", &header->reply_budget_ns, 1, UINT64_MAX},
-        {"age of a command in ticks", &header->max_command_age_ticks, 0, most_ticks},
-        {"ramp out in ticks", &header->ramp_out_ticks, 1, most_ticks},
-        {"ramp in in ticks", &header->ramp_in_ticks, 1, most_ticks},
-        {"number of devices", &header->device_count, 0, PHANTOM_MAX_DEVICES},
-    };
-    for (size_t i = 0; i < sizeof bounds / sizeof *bounds; i++) {
+/* What a word of a segment may be. */
+typedef struct PhantomBound {
+    const char *what;
+    const uint64_t *word;
+    uint64_t least, most;
+} PhantomBound;
+
+#define PHANTOM_LEAST_VERSION ((uint64_t)PHANTOM_ABI_MAJOR << 32)
+#define PHANTOM_MOST_VERSION (PHANTOM_LEAST_VERSION | UINT64_C(0xffffffff))
+
+/* Whether all words are what they may be; else `error` says what was found. */
+static inline int phantom_are_within(const PhantomBound *bounds, size_t count, char *error) {
+    for (size_t i = 0; i < count; i++) {
         uint64_t found = __atomic_load_n(bounds[i].word, __ATOMIC_ACQUIRE);
         if (bounds[i].least <= found && found <= bounds[i].most) continue;
         snprintf(error, PHANTOM_ERROR_BYTES,
@@ -376,6 +371,37 @@ static inline int phantom_is_possible(const PhantomDriverSegment *segment, char 
         return 0;
     }
     return 1;
+}
+
+/* Whether the driver says of itself what can be; else `error` says what was found. */
+static inline int phantom_is_possible(const PhantomDriverSegment *segment, char *error) {
+    const PhantomDriverHeader *header = &segment->header;
+    const uint64_t most_ticks = UINT64_C(1) << 32;
+    const PhantomBound bounds[] = {
+        {"first word", &header->magic, PHANTOM_MAGIC, PHANTOM_MAGIC},
+        {"ABI version", &header->abi_version, PHANTOM_LEAST_VERSION, PHANTOM_MOST_VERSION},
+        {"layout hash", &header->layout_hash, PHANTOM_LAYOUT_HASH, PHANTOM_LAYOUT_HASH},
+        {"ready word", &header->ready, 1, 1},
+        {"segment of so many bytes", &header->segment_bytes, sizeof *segment, sizeof *segment},
+        {"period in nanoseconds", &header->period_ns, 1, UINT64_C(10000000000)},
+        {"reply budget in nanoseconds", &header->reply_budget_ns, 1, UINT64_MAX},
+        {"age of a command in ticks", &header->max_command_age_ticks, 0, most_ticks},
+        {"ramp out in ticks", &header->ramp_out_ticks, 1, most_ticks},
+        {"ramp in in ticks", &header->ramp_in_ticks, 1, most_ticks},
+        {"number of devices", &header->device_count, 0, PHANTOM_MAX_DEVICES},
+    };
+    return phantom_are_within(bounds, sizeof bounds / sizeof *bounds, error);
+}
+
+/* The same for the commander's segment. */
+static inline int phantom_is_for_commands(const PhantomCommanderSegment *segment, char *error) {
+    const PhantomCommanderHeader *header = &segment->header;
+    const PhantomBound bounds[] = {
+        {"commander's first word", &header->magic, PHANTOM_MAGIC, PHANTOM_MAGIC},
+        {"commander's ABI version", &header->abi_version, PHANTOM_LEAST_VERSION, PHANTOM_MOST_VERSION},
+        {"commander's layout hash", &header->layout_hash, PHANTOM_LAYOUT_HASH, PHANTOM_LAYOUT_HASH},
+    };
+    return phantom_are_within(bounds, sizeof bounds / sizeof *bounds, error);
 }
 
 /* Attaches with a request of any content, of the two kinds that hand over memory; no other is sent. 0: done; -1: see
@@ -402,7 +428,7 @@ static inline int phantom_attach_with(const char *path, const PhantomRequest *re
         driver->commander = (PhantomCommanderSegment *)phantom_map(fds[1], sizeof *driver->commander,
                                                                    PROT_READ | PROT_WRITE, error);
         driver->lease = answer.lease;
-        is_usable = driver->commander != NULL;
+        is_usable = driver->commander && phantom_is_for_commands(driver->commander, error);
         /* From here on the driver may forbid further mappings. */
         if (is_usable) __atomic_store_n(&driver->commander->header.mapped, 1, __ATOMIC_RELEASE);
     }

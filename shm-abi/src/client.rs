@@ -7,6 +7,7 @@ use crate::handshake::{self, Answer, Request, RequestKind, Verdict};
 use crate::layout::{LAYOUT_HASH, MAGIC};
 use crate::segment::{CommanderMemory, DriverView, SegmentError};
 use crate::socket;
+use crate::stop_socket;
 use rustix::net::sockopt::{Timeout, set_socket_timeout};
 use rustix::net::{AddressFamily, SocketAddrUnix, SocketFlags, SocketType};
 use std::io;
@@ -199,9 +200,16 @@ pub fn clear_fault(socket: &Path, name: &str) -> Result<(), AttachError> {
     exchange(socket, &Request::new(RequestKind::ClearFault, name)).map(|_| ())
 }
 
-/// Asks the driver to switch all motors off at once. They stay off until [`clear_fault`].
+/// Asks the driver to switch all motors off at once, by datagram and over a connection. They stay off until
+/// [`clear_fault`]. That it was asked does not say that it was done: a frame tells.
+///
+/// # Errors
+/// Why it could be asked in neither way.
 pub fn emergency_stop(socket: &Path, name: &str) -> Result<(), AttachError> {
-    exchange(socket, &Request::new(RequestKind::EmergencyStop, name)).map(|_| ())
+    let sent = stop_socket::send(socket);
+    let answered = exchange(socket, &Request::new(RequestKind::EmergencyStop, name));
+    // A service that is stuck answers nothing, and the datagram is heard all the same.
+    if sent.is_ok() { Ok(()) } else { answered.map(|_| ()) }
 }
 
 /// Tells the driver that devices lie in their home pose now: bit `i` of `devices` means device `i`, 0 all of

@@ -24,7 +24,7 @@
 //! To add a field:
 //! 1. Was the version in force released? Then copy `include/*.h` to `tests/frozen/VERSION`, record their
 //!    hashes in `tests/changelog.rs`, and raise [`ABI_MINOR`].
-//! 2. Take it from the end of what is left of the type's reserved words, "Since 1.N." first in its docs, and
+//! 2. Take it from the beginning of what is left of the type's reserved words, "Since 1.N." first in its docs, and
 //!    zero must mean "not told"; write it behind the arrow in `assert_layout!` (`reserved: .. => { .. }`).
 //! 3. Name it in CHANGELOG.md, in the row of its version.
 //! 4. Give it a value in `tests/golden.rs` (and the version a line in `VERSIONS`), then

@@ -17,7 +17,7 @@ mod text;
 pub use commander::{CommanderMemory, CommanderView};
 pub use description::{ClockMode, DeviceInfo, DriverInfo};
 pub use driver::{DriverMemory, DriverView, FrameUnavailable};
-pub use offer::{LeaseOffer, MAPPED_WITHIN};
+pub use offer::{LeaseOffer, MAPPED_WITHIN, TAKEN_WITHIN};
 
 use crate::handshake;
 use crate::layout::{ABI_VERSION, MAX_DEVICES};

@@ -507,7 +507,13 @@ impl Server {
 
     fn drop_the_silent(&mut self) {
         for connection in &mut self.connections {
-            if matches!(connection.stage, Stage::Asking { since, .. } if since.elapsed() > PATIENCE) {
+            let is_silent = match &connection.stage {
+                Stage::Asking { since, .. } => since.elapsed() > PATIENCE,
+                // The loop knows nothing of this lease yet.
+                Stage::Commanding { offer: Some(offer), .. } => offer.is_overdue(),
+                _ => false,
+            };
+            if is_silent {
                 connection.stage = Stage::Gone;
             }
         }

@@ -47,13 +47,14 @@ pub struct SocketFile {
 }
 
 impl SocketFile {
-    /// Makes a socket and gives it its name last: there is no moment at which it is too open or not ready. What lies at
-    /// the path is replaced.
+    /// Makes a socket and gives it its name last: there is no moment at which it is too open or not ready. A socket that
+    /// lies at the path is replaced; anything else is left alone.
     pub(crate) fn make<S>(
         path: &Path,
         bind: impl FnOnce(&Path) -> io::Result<S>,
         prepare: impl FnOnce(&S) -> io::Result<()>,
     ) -> Result<(S, Self), BindError> {
+        refuse_other_files(path)?;
         let unnamed = suffixed(path, &format!(".{}", std::process::id()));
         let _ = std::fs::remove_file(&unnamed);
         let socket = bind(&unnamed).map_err(|source| BindError::system("listen at", &unnamed, source))?;
@@ -125,16 +126,10 @@ const LOCK_SUFFIX: &str = ".lock";
 /// The lock keeps our own kind apart; this also spares whatever else lies at the path: a file that somebody
 /// named by mistake, and a living socket whose lock file was swept away.
 pub(crate) fn make_sure_nobody_listens(path: &Path) -> Result<(), BindError> {
-    let system = |source| BindError::system("listen at", path, source);
-    match std::fs::symlink_metadata(path) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-        Err(error) => return Err(system(error)),
-        Ok(meta) if !meta.file_type().is_socket() => {
-            let found = "something that is not a socket lies there, and it is left alone";
-            return Err(system(io::Error::new(io::ErrorKind::AlreadyExists, found)));
-        }
-        Ok(_) => {}
+    if !refuse_other_files(path)? {
+        return Ok(());
     }
+    let system = |source| BindError::system("listen at", path, source);
     let address = SocketAddrUnix::new(path).map_err(|errno| system(errno.into()))?;
     let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
     let probe = rustix::net::socket_with(AddressFamily::UNIX, SocketType::STREAM, flags, None)
@@ -145,6 +140,20 @@ pub(crate) fn make_sure_nobody_listens(path: &Path) -> Result<(), BindError> {
         Ok(()) | Err(Errno::AGAIN) => Err(already_running(path)),
         Err(errno) => Err(system(errno.into())),
     }
+}
+
+/// Whether a socket lies there; an error if something else does.
+fn refuse_other_files(path: &Path) -> Result<bool, BindError> {
+    let error = match std::fs::symlink_metadata(path) {
+        Ok(meta) if meta.file_type().is_socket() => return Ok(true),
+        Ok(_) => {
+            let found = "something that is not a socket lies there, and it is left alone";
+            io::Error::new(io::ErrorKind::AlreadyExists, found)
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
+        Err(error) => error,
+    };
+    Err(BindError::system("listen at", path, error))
 }
 
 fn already_running(socket: &Path) -> BindError {

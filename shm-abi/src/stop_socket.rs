@@ -4,8 +4,9 @@
 //! Model: a second socket lies beside the driver's, named like it with `.stop` behind. Whatever is sent to it, even
 //! nothing, is an emergency stop; the kernel tells which user sent it. Whoever may connect to the driver may send. A
 //! queue that is full holds stops that are on their way, so sending never waits.
-//! Invariants: the receiver acts on a datagram before it takes it: descriptors in it, which it drops, may take as long
-//! to close as their sender likes. It needs neither memory nor descriptors for it.
+//! Invariants: the receiver acts on a datagram before anybody takes it, and takes it in another thread ([`Drain`]):
+//! before Linux 6.16 descriptors that come with it take as long to close as their sender likes (a TCP connection that
+//! lingers). It needs neither memory nor descriptors for it.
 
 use crate::peer;
 use crate::socket_file::{self, BindError, SocketFile};
@@ -18,8 +19,6 @@ use std::os::fd::AsRawFd;
 use std::os::unix::net::UnixDatagram;
 use std::path::{Path, PathBuf};
 
-/// What is taken from the queue in one go: whoever floods it gets no more than a turn.
-pub const MAX_DATAGRAMS: usize = 16;
 const SUFFIX: &str = ".stop";
 
 /// Where the stop socket of the driver at `socket` lies.
@@ -66,36 +65,40 @@ impl StopSocket {
         Ok((Self { socket, control: cmsg_space!(ucred) }, file))
     }
 
-    /// Waits for a datagram and passes on which user sent it (`None`: the kernel did not say), and the same for those
-    /// that are there already, [`MAX_DATAGRAMS`] at most.
+    /// Another hold on the socket, for the thread that takes what was heard.
+    ///
+    /// # Errors
+    /// If there is no descriptor left.
+    pub fn drain(&self) -> io::Result<Drain> {
+        self.socket.try_clone().map(Drain)
+    }
+
+    /// Waits for a datagram and tells which user sent it (`None`: the kernel did not say). It stays the first one until
+    /// it is [taken](Drain::take).
     ///
     /// # Errors
     /// What the kernel says, an interruption by a signal included.
-    pub fn wait(&mut self, mut act: impl FnMut(Option<u32>)) -> io::Result<()> {
-        act(self.peek(MsgFlags::empty())?);
-        self.take();
-        for _ in 1..MAX_DATAGRAMS {
-            let Ok(sender) = self.peek(MsgFlags::MSG_DONTWAIT) else { break };
-            act(sender);
-            self.take();
-        }
-        Ok(())
-    }
-
-    fn take(&self) {
-        let mut nothing = [0; 1];
-        let _ = rustix::net::recv(&self.socket, &mut nothing, RecvFlags::DONTWAIT);
-    }
-
-    fn peek(&mut self, flags: MsgFlags) -> io::Result<Option<u32>> {
+    pub fn hear(&mut self) -> io::Result<Option<u32>> {
         let mut byte = [0];
         let mut parts = [IoSliceMut::new(&mut byte)];
         let fd = self.socket.as_raw_fd();
-        let received = recvmsg::<()>(fd, &mut parts, Some(&mut self.control), MsgFlags::MSG_PEEK | flags)?;
+        let received = recvmsg::<()>(fd, &mut parts, Some(&mut self.control), MsgFlags::MSG_PEEK)?;
         let sender = received.cmsgs().into_iter().flatten().find_map(|message| match message {
             ControlMessageOwned::ScmCredentials(credentials) => Some(credentials.uid()),
             _ => None,
         });
         Ok(sender)
+    }
+}
+
+/// The end of the queue.
+#[derive(Debug)]
+pub struct Drain(UnixDatagram);
+
+impl Drain {
+    /// Takes the first datagram, if there is one. Takes as long as whatever came with it takes to close.
+    pub fn take(&self) {
+        let mut nothing = [0; 1];
+        let _ = rustix::net::recv(&self.0, &mut nothing, RecvFlags::DONTWAIT);
     }
 }

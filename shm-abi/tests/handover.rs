@@ -4,7 +4,7 @@ mod common;
 
 use bytemuck::Zeroable;
 use common::desk::{Desk, SHORT, is_closed, verdict};
-use common::fake::try_send;
+use common::fake::{receive, try_send};
 use common::host::Host;
 use common::{HANG, command, directory, frame, info, is_frame, own_pid, wait_until};
 use shm_abi::client;
@@ -13,6 +13,7 @@ use shm_abi::server::{Recipient, ServerEvent};
 use shm_abi::{Command, CommanderMemory};
 use std::io::Write;
 use std::os::fd::AsFd;
+use std::os::unix::net::UnixStream;
 
 #[test]
 fn an_observer_gets_the_frames_and_no_command() {
@@ -225,4 +226,23 @@ fn a_request_that_the_loop_does_not_take_is_refused_instead_of_waited_for() {
     assert_eq!(verdict(&mut stream), Some(Verdict::Busy));
     assert!(is_closed(&mut stream));
     desk.granted(RequestKind::Command);
+}
+
+/// Whoever asked was stopped (Ctrl-Z, a debugger) between the driver's answer and the mapping.
+#[test]
+fn a_lease_that_nobody_maps_is_given_to_somebody_else_within_seconds() {
+    let directory = directory();
+    let host = Host::start(directory.path());
+    let mut stopped = UnixStream::connect(&host.socket).unwrap();
+    stopped.write_all(bytemuck::bytes_of(&Request::new(RequestKind::Command, "stopped"))).unwrap();
+    let (answer, fds) = receive(&stopped);
+    assert_eq!((answer.lease, fds.len()), (1, 2));
+    let refused = client::command(&host.socket, "next").unwrap_err().to_string();
+    assert!(refused.contains("(stopped)"), "{refused}");
+    let mut next = None;
+    wait_until("the offer is withdrawn", || {
+        next = client::command(&host.socket, "next").ok();
+        next.is_some()
+    });
+    assert!(is_closed(&mut stopped), "and is told so");
 }

@@ -18,7 +18,12 @@ fn listening() -> (tempfile::TempDir, Server, Receiver<Option<u32>>) {
     let (tell, told) = channel();
     std::thread::spawn(move || {
         let _file = file;
-        while socket.wait(|user| tell.send(user).unwrap_or(())).is_ok() {}
+        let drain = socket.drain().unwrap();
+        while let Ok(user) = socket.hear()
+            && tell.send(user).is_ok()
+        {
+            drain.take();
+        }
     });
     (directory, server, told)
 }
@@ -62,4 +67,23 @@ fn it_lies_beside_the_drivers_socket_for_the_same_people_and_goes_with_it() {
     assert!(file_again.path().exists(), "it is another driver's now");
     drop(file_again);
     assert!(!path_beside(server.path()).exists());
+}
+
+#[test]
+fn a_file_at_its_place_is_left_alone() {
+    let directory = tempfile::tempdir().unwrap();
+    let server = Server::bind(&directory.path().join("run")).unwrap();
+    let file = directory.path().join("run.stop");
+    std::fs::write(&file, "precious").unwrap();
+    let refused = StopSocket::bind(server.path()).unwrap_err().to_string();
+    assert!(refused.contains("run.stop: something that is not a socket lies there"), "{refused}");
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), "precious");
+}
+
+/// A driver whose service is stuck accepts connections, by its backlog, and answers none.
+#[test]
+fn a_program_that_stops_a_driver_whose_service_is_stuck_is_heard() {
+    let (_directory, server, told) = listening();
+    shm_abi::client::emergency_stop(server.path(), "test").unwrap();
+    assert!(told.recv_timeout(HANG).is_ok());
 }

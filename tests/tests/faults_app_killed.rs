@@ -7,7 +7,7 @@ use rustix::process::Signal;
 use shm_abi::client;
 use shm_abi::segment::DriverInfo;
 use shm_abi::seqlock::stamp;
-use shm_abi::{Command, Frame, ReplyKind, doorbell};
+use shm_abi::{Command, Frame, doorbell};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -262,11 +262,12 @@ fn the_amplifiers_get_zero_within_nine_values_of_the_last_reply_at_the_usual_set
     stand.finish();
 }
 
-/// From the value that the last fresh reply made.
+/// From the value of the tick that the last reply answers, which may have come too late for that one.
 fn silence(stand: &Stand, log: &RingLog) -> (u64, u64) {
-    let last = log.told.iter().rev().find(|told| told.reply == ReplyKind::Fresh).expect("a reply");
+    let answered = log.last_command().expect("a reply");
+    let told = log.told.iter().find(|told| told.tick > answered).expect("the frame after that tick");
     let mut frame = Frame::zeroed();
-    stand.view().read_frame(last.tick, &mut frame).expect("a frame of the ring");
+    stand.view().read_frame(told.tick, &mut frame).expect("a frame of the ring");
     stand.amplifiers.silence_after(frame.previous.written_ns).expect("zero is in the amplifiers' log")
 }
 

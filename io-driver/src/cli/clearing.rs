@@ -1,7 +1,7 @@
 //! `io-driver clear-fault`.
 //!
-//! Model: asked, then believed only when a frame shows that the fault state was left: what caused it may still be there,
-//! a pressed switch or a card without power, and then the next tick is a fault again.
+//! Model: asked, then believed only when a new frame shows that the fault state was left: what caused it may still be
+//! there, a pressed switch or a card without power, and then the next tick is a fault again.
 
 use super::{EXIT_FAULT, EXIT_USAGE, fail, print_line};
 use crate::say::say;
@@ -23,35 +23,116 @@ pub(super) fn clear_fault(socket: &Path) -> ExitCode {
     if let Err(error) = client::clear_fault(socket, NAME) {
         return fail(&error, EXIT_USAGE);
     }
-    match observer.map(|observer| fault_after(&observer.driver)) {
-        Ok(None) => {
+    let failed = |why: std::fmt::Arguments<'_>| {
+        say(format_args!("io-driver: {why}"));
+        ExitCode::from(EXIT_FAULT)
+    };
+    match observer.map(|observer| seen_after(&observer.driver)) {
+        Ok(Some(Seen::NoFault)) => {
             let _ = print_line("the driver is in no fault state");
             ExitCode::SUCCESS
         }
-        Ok(Some(reason)) => {
+        Ok(Some(Seen::Fault(reason))) => {
             let sentence = FaultReason::sentence_for(reason);
-            say(format_args!("io-driver: the driver is in its fault state all the same: {sentence}"));
-            ExitCode::from(EXIT_FAULT)
+            failed(format_args!("the driver is in its fault state all the same: {sentence}"))
         }
-        Err(error) => {
-            say(format_args!("io-driver: it was asked, and cannot be watched: {error}"));
-            ExitCode::from(EXIT_FAULT)
-        }
+        Ok(None) => failed(format_args!("it was asked, and no new frame shows what became of it")),
+        Err(error) => failed(format_args!("it was asked, and cannot be watched: {error}")),
     }
 }
 
-/// The fault that stands once the loop had time to leave it, or that came again at once.
-fn fault_after(driver: &DriverView) -> Option<u64> {
-    let few_ticks = Duration::from_nanos(driver.info().period_ns) * 3;
+enum Seen {
+    NoFault,
+    Fault(u64),
+}
+
+/// What stands once the loop had time to leave the fault, and for the fault to come again at once; `None`: the loop has
+/// told nothing since.
+fn seen_after(driver: &DriverView) -> Option<Seen> {
+    // It collects the request with the next tick but one at the latest, and its cause shows in that one or the next.
+    let settled = driver.latest_tick().unwrap_or(0) + 4;
+    let few_ticks = Duration::from_nanos(driver.info().period_ns) * 5;
     let until = Instant::now() + PROMPT + few_ticks;
-    while fault(driver).is_some() && Instant::now() < until {
-        std::thread::sleep(LOOK);
+    loop {
+        let frame = driver.read_latest().filter(|frame| frame.tick >= settled);
+        let is_fault = frame.is_some_and(|frame| frame.state == DriverState::Fault as u64);
+        match frame {
+            Some(_) if !is_fault => return Some(Seen::NoFault),
+            frame if Instant::now() >= until => return frame.map(|frame| Seen::Fault(frame.fault)),
+            _ => std::thread::sleep(LOOK),
+        }
     }
-    std::thread::sleep(few_ticks);
-    fault(driver)
 }
 
-fn fault(driver: &DriverView) -> Option<u64> {
-    let frame = driver.read_latest()?;
-    (frame.state == DriverState::Fault as u64).then_some(frame.fault)
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+    use shm_abi::doorbell::WaitMode;
+    use shm_abi::segment::{ClockMode, DriverInfo};
+    use shm_abi::{DriverMemory, Frame};
+
+    fn memory() -> DriverMemory {
+        let info = DriverInfo {
+            period_ns: 1_000_000,
+            reply_budget_ns: 500_000,
+            max_command_age_ticks: 4,
+            ramp_in_ticks: 20,
+            ramp_out_ticks: 5,
+            clock_mode: ClockMode::Real,
+            wait_mode: WaitMode::Futex,
+            is_commissioning: false,
+            cpu: None,
+            devices: Vec::new(),
+            setup_report: String::new(),
+        };
+        DriverMemory::create(&info).expect("memory")
+    }
+
+    fn tell(memory: &DriverMemory, tick: u64, state: DriverState) {
+        let fault = if state == DriverState::Fault { FaultReason::EmergencyStop } else { FaultReason::None };
+        memory.write_frame(&Frame { tick, state: state as u64, fault: fault as u64, ..Frame::zeroed() });
+        memory.ring(tick, None);
+    }
+
+    /// The loop hangs, or the machine keeps it from running: what stands there is from before.
+    #[test]
+    fn an_old_frame_without_a_fault_is_not_believed() {
+        let memory = memory();
+        let driver = DriverView::map(memory.fd()).expect("our own");
+        assert!(seen_after(&driver).is_none(), "there is no frame at all");
+        tell(&memory, 7, DriverState::Idle);
+        assert!(seen_after(&driver).is_none());
+    }
+
+    #[test]
+    fn a_fault_that_stands_or_comes_again_is_told_and_one_that_was_left_is_not() {
+        for (states, is_left) in [
+            ([DriverState::Fault; 8], false),
+            ([DriverState::Idle; 8], true),
+            (
+                [0, 1, 2, 3, 4, 5, 6, 7].map(|n| [DriverState::Idle, DriverState::Fault][usize::from(n > 2)]),
+                false,
+            ),
+        ] {
+            let memory = memory();
+            let driver = DriverView::map(memory.fd()).expect("our own");
+            tell(&memory, 7, DriverState::Fault);
+            std::thread::scope(|scope| {
+                let seen = scope.spawn(|| seen_after(&driver));
+                // It has looked at tick 7 by then, or sees less: a later tick makes it wait for one that never comes.
+                std::thread::sleep(Duration::from_millis(20));
+                for (tick, state) in (8..).zip(states) {
+                    tell(&memory, tick, state);
+                }
+                match seen.join().expect("no panic") {
+                    Some(Seen::NoFault) => assert!(is_left, "{states:?}"),
+                    Some(Seen::Fault(reason)) => {
+                        assert!(!is_left && reason == FaultReason::EmergencyStop as u64, "{states:?}");
+                    }
+                    None => println!("the machine was too slow to tell"),
+                }
+            });
+        }
+    }
 }

@@ -1,9 +1,8 @@
 //! `io-driver emergency-stop` and `io-driver stop`.
 //!
-//! Model: asked in every way there is, then believed only when seen. An emergency stop goes by datagram first, which
-//! the driver's [stop thread](crate::stop_thread) hears whatever its service does, then over a connection; it is done
-//! when a new frame shows the fault and no force in any device. A stop is done when the driver has ended and its last
-//! words say that the motors were written zero.
+//! Model: asked in every way there is ([`client::emergency_stop`]), then believed only when seen. An emergency stop is
+//! done when a new frame shows the fault and no force in any device; a stop, when the driver has ended and its last words
+//! say that the motors were written zero.
 //! Invariant: no exit status of 0 without that sight. Asking and looking have threads of their own: neither a driver
 //! that does not answer nor one without a free place delays the words that motors may still be on.
 
@@ -11,7 +10,7 @@ use super::{EXIT_FAULT, EXIT_USAGE, fail, print_line};
 use crate::say::say;
 use rt_core::epitaph::{self, EpitaphKind};
 use shm_abi::client::{self, AttachError, Attachment};
-use shm_abi::{DriverState, DriverView, FaultReason, Frame, stop_socket};
+use shm_abi::{DriverState, DriverView, FaultReason, Frame};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -27,21 +26,22 @@ const LOOK: Duration = Duration::from_micros(500);
 const RETRY: Duration = Duration::from_millis(10);
 const NAME: &str = "io-driver";
 
-/// What the threads tell.
+/// What the threads of an emergency stop tell.
 enum News {
     /// A frame of this tick shows it.
     Shown(u64),
-    /// The driver answered that it heard, or why not.
-    Asked(Result<(), AttachError>),
+    /// Nobody could be asked, in either way.
+    NotAsked(AttachError),
 }
 
 /// Stops the motors, and says whether that was seen.
 pub(super) fn emergency_stop(socket: &Path) -> ExitCode {
     let begun = Instant::now();
-    let sent = stop_socket::send(socket);
     let (tell, news) = channel();
     let asks = in_background(socket, &tell, |socket, tell| {
-        let _ = tell.send(News::Asked(client::emergency_stop(&socket, NAME)));
+        if let Err(error) = client::emergency_stop(&socket, NAME) {
+            let _ = tell.send(News::NotAsked(error));
+        }
     });
     let looks = in_background(socket, &tell, move |socket, tell| {
         if let Some(tick) = wait_for_zero(&socket, begun + PATIENCE) {
@@ -49,7 +49,10 @@ pub(super) fn emergency_stop(socket: &Path) -> ExitCode {
         }
     });
     match (asks, looks) {
-        (Ok(()), Ok(())) => judge(&news, socket, begun, sent.is_ok()),
+        (Ok(()), Ok(())) => {
+            drop(tell);
+            judge(&news, socket, begun)
+        }
         _ => ask_and_look(socket, begun),
     }
 }
@@ -58,7 +61,7 @@ pub(super) fn emergency_stop(socket: &Path) -> ExitCode {
 fn ask_and_look(socket: &Path, begun: Instant) -> ExitCode {
     say(format_args!("io-driver: {UNCERTAIN}"));
     if let Err(error) = client::emergency_stop(socket, NAME) {
-        say(format_args!("io-driver: {error}"));
+        return unreachable_driver(socket, &error);
     }
     match wait_for_zero(socket, begun + PATIENCE) {
         Some(tick) => shown(tick),
@@ -66,7 +69,7 @@ fn ask_and_look(socket: &Path, begun: Instant) -> ExitCode {
     }
 }
 
-fn in_background(
+fn in_background<News: Send + 'static>(
     socket: &Path,
     tell: &Sender<News>,
     body: impl FnOnce(PathBuf, Sender<News>) + Send + 'static,
@@ -76,15 +79,13 @@ fn in_background(
     std::thread::Builder::new().spawn(move || body(socket, tell)).map(drop)
 }
 
-fn judge(news: &Receiver<News>, socket: &Path, begun: Instant, was_sent: bool) -> ExitCode {
+fn judge(news: &Receiver<News>, socket: &Path, begun: Instant) -> ExitCode {
     let mut is_warned = false;
     loop {
         let patience = if is_warned { PATIENCE } else { PROMPT };
         match news.recv_timeout(patience.saturating_sub(begun.elapsed())) {
             Ok(News::Shown(tick)) => return shown(tick),
-            // Nobody is there, by either way.
-            Ok(News::Asked(Err(error))) if !was_sent => return unreachable_driver(socket, &error),
-            Ok(News::Asked(_)) => {}
+            Ok(News::NotAsked(error)) => return unreachable_driver(socket, &error),
             Err(_) if !is_warned => {
                 is_warned = true;
                 say(format_args!("io-driver: {UNCERTAIN}"));
@@ -116,13 +117,29 @@ fn unreachable_driver(socket: &Path, error: &AttachError) -> ExitCode {
 }
 
 /// The process of a driver that listens at this path, whatever became of the file: the kernel keeps the name under which
-/// the socket was made, which ends with the process's number.
+/// the socket was made, which ends with the process's number. A driver with a network of its own, as a service has, is
+/// in that network's table alone.
 fn listener(socket: &Path) -> Option<u32> {
-    let table = std::fs::read_to_string("/proc/net/unix").ok()?;
     let made = format!(" {}.", socket.display());
-    let pids = table.lines().filter_map(|line| line.rsplit_once(made.as_str())?.1.parse().ok());
-    pids.into_iter().find(|pid: &u32| Path::new(&format!("/proc/{pid}")).exists())
+    drivers().find(|pid| {
+        let table = std::fs::read_to_string(format!("/proc/{pid}/net/unix")).unwrap_or_default();
+        let end = pid.to_string();
+        table.lines().any(|line| line.rsplit_once(made.as_str()).is_some_and(|(_, number)| number == end))
+    })
 }
+
+/// All processes that have the driver's name.
+fn drivers() -> impl Iterator<Item = u32> {
+    let all = std::fs::read_dir("/proc").into_iter().flatten().flatten();
+    let pids = all.filter_map(|entry| entry.file_name().to_str()?.parse().ok());
+    pids.filter(|pid: &u32| {
+        let name = std::fs::read_to_string(format!("/proc/{pid}/comm")).unwrap_or_default();
+        PROGRAMS.iter().any(|program| name.starts_with(program))
+    })
+}
+
+/// What a driver's program is called: by itself, or within the application.
+const PROGRAMS: [&str; 2] = ["io-driver", "phantom3"];
 
 const UNCERTAIN: &str =
     "the emergency stop is not confirmed within 100 ms: the motors may still be on; cut their power";
@@ -157,11 +174,25 @@ fn is_stopped(frame: &Frame) -> bool {
 
 /// Ends the driver, and says whether that was seen.
 pub(super) fn stop(socket: &Path) -> ExitCode {
-    // Before, so that its last words can be read; without a place to look on the driver ends all the same.
-    let observer = client::observe(socket, NAME).ok();
-    let pid = match client::stop(socket, NAME) {
+    let (observer, asked) = match ask_to_end(socket) {
+        Ok(answer) => answer,
+        Err(error) => return fail(&error, EXIT_FAULT),
+    };
+    let pid = match asked {
         Ok(pid) => pid,
-        Err(error) => return fail(&error, EXIT_USAGE),
+        Err(error @ (AttachError::NoDriver { .. } | AttachError::DriverGone { .. })) => {
+            return unreachable_driver(socket, &error);
+        }
+        Err(
+            error @ (AttachError::NotAllowed { .. }
+            | AttachError::NoPermission { .. }
+            | AttachError::NotADriver { .. }),
+        ) => return fail(&error, EXIT_USAGE),
+        Err(error) => {
+            say(format_args!("io-driver: {error}"));
+            say(format_args!("io-driver: the motors may still be on; next: io-driver emergency-stop"));
+            return ExitCode::from(EXIT_FAULT);
+        }
     };
     // It stops, whether or not somebody reads that.
     let _ = print_line(&format!("driver (process {pid}) stops"));
@@ -174,13 +205,31 @@ pub(super) fn stop(socket: &Path) -> ExitCode {
     wait_for_end(&observer, pid)
 }
 
+type Ending = (Option<Attachment>, Result<u64, AttachError>);
+
+/// Asks in a thread of its own, so that a driver that does not answer does not delay the words either.
+fn ask_to_end(socket: &Path) -> std::io::Result<Ending> {
+    let (tell, answers) = channel();
+    in_background(socket, &tell, |socket, tell| {
+        // Before, so that its last words can be read; without a place to look on the driver ends all the same.
+        let observer = client::observe(&socket, NAME).ok();
+        let _ = tell.send((observer, client::stop(&socket, NAME)));
+    })?;
+    answers.recv_timeout(PROMPT).or_else(|_| {
+        say(format_args!("io-driver: {NOT_STOPPED}"));
+        answers.recv().map_err(std::io::Error::other)
+    })
+}
+
+const NOT_STOPPED: &str = "it has not stopped within 100 ms: the motors may still be on";
+
 fn wait_for_end(observer: &Attachment, pid: u64) -> ExitCode {
     let begun = Instant::now();
     let mut is_warned = false;
     while observer.connection.is_open() && epitaph::read(&observer.driver.epitaph).is_none() {
         if !is_warned && begun.elapsed() > PROMPT {
             is_warned = true;
-            say(format_args!("io-driver: it has not stopped within 100 ms: the motors may still be on"));
+            say(format_args!("io-driver: {NOT_STOPPED}"));
         }
         if begun.elapsed() > PATIENCE {
             say(format_args!("io-driver: process {pid} lives on; cut the motors' power, then kill it"));

@@ -2,7 +2,7 @@
 //!
 //! Ages and ramps are times, whatever the rate, and bounded as such. The usual ones let a force stay for less than 10 ms
 //! after the last reply at 1 kHz: 4 ms held, 5 ms ramped out, and half a millisecond of waiting for a reply that does
-//! not come. A ramp takes whole ticks, so that it ends in one: in by the nearest number, out by no more than asked for.
+//! not come. A ramp takes whole ticks, so that it ends in one: in by no fewer than asked for, out by no more.
 
 use super::DeviceConfig;
 use crate::safety::switches::{Switch, Switches};
@@ -42,6 +42,13 @@ impl Commissioning {
 }
 
 impl SafetyConfig {
+    /// `max_command_age_ms`, `ramp_in_ms` and `ramp_out_ms` that are read back as these: a ramp of whole ticks may be
+    /// longer than what may be asked for.
+    pub(super) fn times_ms(&self) -> [f64; 3] {
+        let ms = |ns: u64, Allowed { min, max, .. }: Allowed| (ns as f64 / 1e6).clamp(min, max);
+        [ms(self.max_command_age_ns, AGE), ms(self.ramp_in_ns, RAMP_IN), ms(self.ramp_out_ns, RAMP_OUT)]
+    }
+
     /// What holds if nobody says.
     pub fn usual(period_ns: u64) -> Self {
         Self {
@@ -59,14 +66,16 @@ fn ns_of_ms(ms: f64) -> u64 {
     (ms * 1e6).round() as u64
 }
 
+/// A period is rounded to a nanosecond, which must not cost a tick.
+const ROUNDING_TICKS: f64 = 1e-3;
+
 fn ramp_in_ns(ms: f64, period_ns: u64) -> u64 {
-    let ticks = (ms * 1e6 / period_ns as f64).round() as u64;
+    let ticks = (ms * 1e6 / period_ns as f64 - ROUNDING_TICKS).ceil() as u64;
     ticks.max(1) * period_ns
 }
 
 fn ramp_out_ns(ms: f64, period_ns: u64) -> u64 {
-    // A period is rounded to a nanosecond, which must not cost a tick.
-    let ticks = (ms * 1e6 / period_ns as f64 + 1e-3).floor() as u64;
+    let ticks = (ms * 1e6 / period_ns as f64 + ROUNDING_TICKS).floor() as u64;
     ticks.max(1) * period_ns
 }
 
@@ -150,10 +159,10 @@ impl RawSafety {
             (None, None) => Ok(None),
             (Some(ms), None) => Ok(Some(ns_of_ms(toml.number(ms, AGE)?))),
             (None, Some(ticks)) => {
-                let most = (AGE.max * 1e6 / period_ns as f64 + 1e-3).floor() as i64;
+                let most = (AGE.max * 1e6 / period_ns as f64 + ROUNDING_TICKS).floor() as i64;
                 let count = *ticks.get_ref();
                 if (0..=most).contains(&count) {
-                    return Ok(Some(count.unsigned_abs() * period_ns));
+                    return Ok(Some((count.unsigned_abs() * period_ns).min(ns_of_ms(AGE.max))));
                 }
                 let found = format_args!("{count} ticks of {} ms", period_ns as f64 / 1e6).to_string();
                 let allowed = format!("0 to {most} ticks at this rate, which is {} ms", AGE.max);

@@ -51,10 +51,8 @@ fn head(text: &mut String, config: &DriverConfig) -> std::fmt::Result {
     writeln!(text, "mode = {}", quoted(mode_name(config.reply.mode)))?;
     writeln!(text, "budget_us = {:?}", config.reply.budget_ns as f64 / 1e3)?;
     writeln!(text, "[safety]")?;
-    let ms = |ns: u64| ns as f64 / 1e6;
-    writeln!(text, "max_command_age_ms = {:?}", ms(config.safety.max_command_age_ns))?;
-    writeln!(text, "ramp_in_ms = {:?}", ms(config.safety.ramp_in_ns))?;
-    writeln!(text, "ramp_out_ms = {:?}", ms(config.safety.ramp_out_ns))?;
+    let [age_ms, in_ms, out_ms] = config.safety.times_ms();
+    writeln!(text, "max_command_age_ms = {age_ms:?}\nramp_in_ms = {in_ms:?}\nramp_out_ms = {out_ms:?}")?;
     writeln!(text, "workspace_margin_mm = {:?}", config.safety.workspace_margin_m * 1e3)?;
     let Switches { emergency_stop, dead_man } = &config.safety.switches;
     for (key, switch) in [("emergency_stop", emergency_stop), ("dead_man", dead_man)] {

@@ -1,11 +1,10 @@
 //! What a good amplifier does: it checks what it gets, minds its watchdog, and switches itself off.
 //!
 //! Model: three channels with converters of some bits. Each value is checked against limits that the driver
-//! knows nothing of: the codes' range, the force at the tip that the torques amount to in the pose of the
-//! moment (where the pose can tell, which it cannot near a singular one), and how far that force is from the one before,
-//! unless it only became shorter. How warm the
-//! motors are is not checked. A value that fails trips the amplifiers, and so does silence for longer than the watchdog waits while they are on. Tripped
-//! they give no current until they are armed anew.
+//! knows nothing of: the codes' range, the force at the tip that the torques amount to in the pose of the moment (where
+//! the pose can tell, which it cannot near a singular one), and how far that force is from the one before, unless it
+//! only became shorter. How warm the motors are is not checked. A value that fails trips the amplifiers, and so does
+//! silence for longer than the watchdog waits while they are on. Tripped they give no current until they are armed anew.
 //! Frames and signs: forces on the user in the device's base frame D.
 //! Invariants: no current flows while off or tripped; every value is counted once, as good or under what was
 //! wrong with it.

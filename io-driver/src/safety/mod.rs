@@ -11,7 +11,8 @@
 //! | switches: emergency stop, dead-man | [`switches`] | a fault; the share |
 //! | warmth of the motors | [`crate::heat`], in the device | cutting the current |
 //!
-//! Whatever here means time goes by the time of [`elapsed`], not by ticks. [`guard`] is one device's chain of these. `SAFETY.md` tells which hazard each is for and what tests it.
+//! Whatever here means time goes by the time of [`elapsed`], not by ticks. [`guard`] is one device's chain of these.
+//! `SAFETY.md` tells which hazard each is for and what tests it.
 
 pub mod authority;
 pub mod elapsed;

@@ -80,7 +80,12 @@ pub const ALLOWED_CALLS: &[AllowedCall] = &[
     call("exit_group", libc::SYS_exit_group, Any, "the process ends"),
     // Signals and violent ends.
     call("rt_sigaction", libc::SYS_rt_sigaction, Any, "a fatal signal's handler steps aside; abort"),
-    call("rt_sigprocmask", libc::SYS_rt_sigprocmask, Any, "raise, abort, the end of a thread"),
+    call(
+        "rt_sigprocmask",
+        libc::SYS_rt_sigprocmask,
+        Any,
+        "signals handed to the thread that stops; raise, abort, the end of a thread",
+    ),
     call("rt_sigreturn", libc::SYS_rt_sigreturn, Any, "back from a handler"),
     call("sigaltstack", libc::SYS_sigaltstack, Any, "a thread that ends gives its signal stack back"),
     call("getpid", libc::SYS_getpid, Any, "our id in each answer to a client; raise, abort"),

@@ -112,10 +112,4 @@ impl CommanderView {
         }
         self.map.header.frame_doorbell.fetch_add(0, Ordering::Relaxed);
     }
-
-    /// Wakes the driver's own loop out of [`sleep_for_command`](Self::sleep_for_command). If it is only about
-    /// to sleep, it misses this (see [`doorbell::wake`]) and sleeps for its whole time-out.
-    pub fn wake_sleeper(&self) {
-        doorbell::wake(&self.map.bell);
-    }
 }

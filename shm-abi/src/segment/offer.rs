@@ -22,6 +22,9 @@ use std::time::{Duration, Instant};
 /// How long a commander of before 1.3 may take to map its segment: a thousand times what it needs.
 pub const MAPPED_WITHIN: Duration = Duration::from_millis(200);
 
+/// How long one of 1.3 or later may take: whoever asked and was stopped before it mapped must not keep others out.
+pub const TAKEN_WITHIN: Duration = Duration::from_secs(2);
+
 /// The first minor version whose commanders tell that they have mapped their segment.
 const FIRST_THAT_TELLS: u32 = 3;
 
@@ -30,8 +33,9 @@ const FIRST_THAT_TELLS: u32 = 3;
 pub struct LeaseOffer {
     view: CommanderView,
     fd: OwnedFd,
-    /// When it counts as mapped though nobody said so.
-    mapped_at: Option<Instant>,
+    made: Instant,
+    /// Whether the commander says when it has mapped it.
+    tells: bool,
 }
 
 impl LeaseOffer {
@@ -42,7 +46,7 @@ impl LeaseOffer {
     pub fn create(lease: u64, abi_version: u64) -> Result<Self, SegmentError> {
         let (view, fd) = CommanderView::create(lease)?;
         let tells = handshake::minor_of(abi_version) >= FIRST_THAT_TELLS;
-        Ok(Self { view, fd, mapped_at: (!tells).then(|| Instant::now() + MAPPED_WITHIN) })
+        Ok(Self { view, fd, made: Instant::now(), tells })
     }
 
     /// The descriptor to hand over.
@@ -54,7 +58,12 @@ impl LeaseOffer {
     pub fn is_mapped(&self) -> bool {
         self.view.map.header.mapped.load(Ordering::Acquire) != 0
             || self.view.latest_tick().is_some()
-            || self.mapped_at.is_some_and(|at| Instant::now() >= at)
+            || (!self.tells && self.made.elapsed() >= MAPPED_WITHIN)
+    }
+
+    /// Whether the commander had time enough to map it.
+    pub fn is_overdue(&self) -> bool {
+        self.tells && self.made.elapsed() > TAKEN_WITHIN
     }
 
     /// Forbids everybody to map the segment for writing, to punch holes into it and to change the seals, and makes

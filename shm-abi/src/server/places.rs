@@ -3,9 +3,9 @@
 //! Problem: connections are few and strangers are many; one process could take all places by looking on, or by asking
 //! nothing again and again.
 //! Model: only who looks on or commands keeps a place. Observers have [`MAX_OBSERVERS`] places, of which one user and
-//! one process get only some, and [`FOR_ADMINISTRATORS`] are kept for administrators, however many others look on. Those who have yet to say what they want have places of their own; a newcomer that finds
-//! them taken gets the place of the oldest silent connection of whoever has the most, so that opening more of them
-//! costs nobody but the opener.
+//! one process get only some, and [`FOR_ADMINISTRATORS`] are kept for administrators, however many others look on. Those
+//! who have yet to say what they want have places of their own; a newcomer that finds them taken gets the place of the
+//! oldest silent connection of whoever has the most, so that opening more of them costs nobody but the opener.
 
 /// Connections at once: observers, the commander, those who have yet to ask.
 pub const MAX_CONNECTIONS: usize = MAX_OBSERVERS + 1 + MAX_ASKING;

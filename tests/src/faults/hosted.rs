@@ -123,7 +123,10 @@ fn pass_on(event: ServerEvent, sender: &mut Sender) {
         ServerEvent::LeaseGranted { view, .. } => Letter::Grant(view),
         ServerEvent::ZeroRequested { devices, .. } => Letter::Zero(DeviceSet(devices)),
         ServerEvent::LeaseEnded { lease } => return sender.urgent.end_lease(lease),
-        ServerEvent::EmergencyStopRequested { uid, .. } => return sender.urgent.stop(Some(uid)),
+        ServerEvent::EmergencyStopRequested { uid, .. } => {
+            sender.urgent.stop(Some(uid));
+            return;
+        }
         ServerEvent::ClearFaultRequested { asked_ns, .. } => {
             let _ = sender.urgent.clear_fault(asked_ns, |_| true);
             return;

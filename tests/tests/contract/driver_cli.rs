@@ -1,5 +1,10 @@
-//! `io-driver` by itself: refusing to start, and being watched.
+//! `io-driver` by itself: refusing to start, being watched, and not answering.
 
+use patience::prelude::*;
+use rustix::process::{Pid, Signal, kill_process};
+use shm_abi::{FaultReason, stop_socket};
+use std::process::Command;
+use std::time::{Duration, Instant};
 use system_tests::driver::{Driver, HANG, resting};
 use system_tests::faults::process::{self, End, Running};
 use system_tests::programs::io_driver;
@@ -55,4 +60,85 @@ fn tick_of(line: &str, json: bool) -> u64 {
     let words: Vec<&str> = line.split(' ').collect();
     assert_eq!((words[0], words[2]), ("tick", "idle"), "{line}");
     words[1].parse().expect("a number")
+}
+
+/// An administrator may: these tests and the driver have one user.
+fn asked(driver: &Driver, command: &str) -> End {
+    process::io_driver(&[command], driver.socket())
+}
+
+fn signal(driver: &Driver, signal: Signal) {
+    let pid = Pid::from_child(&driver.child);
+    kill_process(pid, signal).expect("our own child");
+}
+
+#[test]
+fn a_driver_that_is_stopped_is_not_taken_for_one_that_obeyed() {
+    let mut driver = Driver::start(&resting("real", 1));
+    signal(&driver, Signal::STOP);
+    let stop = asked(&driver, "stop");
+    assert_eq!(stop.status, Some(3), "{stop:?}");
+    let words = ["not stopped within 100 ms", "does not answer", "io-driver emergency-stop"];
+    assert!(words.iter().all(|words| stop.err.contains(words)), "{stop:?}");
+    let emergency = asked(&driver, "emergency-stop");
+    assert_eq!(emergency.status, Some(3), "{emergency:?}");
+    assert!(emergency.err.contains("no frame has shown it"), "{emergency:?}");
+    // What was asked while it stood still is done once it goes on.
+    signal(&driver, Signal::CONT);
+    assert_eq!(driver.wait().code(), Some(0));
+}
+
+/// Who asked looked at arms that stood still; somebody else continues the driver later.
+#[test]
+fn a_fault_is_not_left_because_somebody_asked_long_ago() {
+    let driver = Driver::start(&resting("real", 1));
+    let stop = asked(&driver, "emergency-stop");
+    assert_eq!(stop.status, Some(0), "{stop:?}");
+    let observer = driver.observe();
+    signal(&driver, Signal::STOP);
+    let late = asked(&driver, "clear-fault");
+    assert_eq!(late.status, Some(2), "{late:?}");
+    let before = observer.driver.latest_tick().expect("frames");
+    signal(&driver, Signal::CONT);
+    // The service hears the request within its next turn, which is 20 ms.
+    let settled = || observer.driver.read_latest().filter(|frame| frame.tick > before + 500);
+    let frame = wait_for(settled);
+    assert_eq!(frame.fault, FaultReason::EmergencyStop as u64, "{frame:?}");
+    let clear = asked(&driver, "clear-fault");
+    assert_eq!(clear.status, Some(0), "{clear:?}");
+}
+
+/// As the installed service has it: with a network, and so a table of sockets, of its own.
+#[test]
+fn a_driver_in_a_network_of_its_own_is_found_though_its_sockets_file_is_gone() {
+    let program = io_driver();
+    let mut apart = Command::new("unshare");
+    apart.arg("--net").arg(program.get_program());
+    if !Command::new("unshare").args(["--net", "true"]).bounded_status().is_ok_and(|status| status.success())
+    {
+        println!("skipped: no network of its own can be had here");
+        return;
+    }
+    let driver = Driver::start_as(&resting("real", 1), apart);
+    for file in [driver.socket().to_path_buf(), stop_socket::path_beside(driver.socket())] {
+        std::fs::remove_file(file).expect("its file");
+    }
+    let words = format!("process {} listens there", driver.child.id());
+    for command in ["emergency-stop", "stop"] {
+        let end = asked(&driver, command);
+        assert_eq!(end.status, Some(3), "{end:?}");
+        assert!(end.err.contains(&words), "{end:?}");
+    }
+    signal(&driver, Signal::TERM);
+}
+
+fn wait_for<T>(mut find: impl FnMut() -> Option<T>) -> T {
+    let until = Instant::now() + HANG;
+    loop {
+        if let Some(found) = find() {
+            return found;
+        }
+        assert!(Instant::now() < until, "waited in vain");
+        std::thread::sleep(Duration::from_millis(1));
+    }
 }
