@@ -4,7 +4,8 @@
 //! Model: a place is free if a finger that begins there touches nothing, nor does one that begins a little beside it. That
 //! is asked of a finger itself: so every shape, picture and algorithm counts as it will in the run. The nearest free place
 //! is looked for on spheres around the wanted one, the smallest first, and then back towards it.
-//! Cost: some ten thousand first steps of a finger at most, each against what is near; before a run begins.
+//! Cost: first steps of a finger against what is near, before a run begins: on each of 135 spheres 256 places with up to
+//! seven of them. Where nothing is free that is 34,560 of them at least and 241,920 at most.
 
 #![allow(non_snake_case)] // Names carry their frame: place_W is a place in W.
 
@@ -71,14 +72,12 @@ impl<'e> FreePlaces<'e> {
 
     /// The free place that is nearest to this one, to some hundredths of the way; `None`: there is none within metres.
     pub(super) fn nearest(&mut self, wanted_W: &Vector3<f64>) -> Option<Vector3<f64>> {
-        let mut radius_m = FIRST_M;
-        while radius_m < LAST_M {
+        for radius_m in radii_m() {
             let mut on_sphere = (0..DIRECTIONS).map(direction);
             let free = on_sphere.find(|way| self.is_free(&(wanted_W + radius_m * way), BESIDE_M));
             if let Some(way) = free {
                 return Some(self.back(wanted_W, &way, radius_m));
             }
-            radius_m *= GROWTH;
         }
         None
     }
@@ -93,6 +92,12 @@ impl<'e> FreePlaces<'e> {
         }
         wanted_W + free_m * way
     }
+}
+
+/// Of the spheres, the smallest first.
+fn radii_m() -> impl Iterator<Item = f64> {
+    std::iter::successors(Some(FIRST_M), |radius_m| Some(radius_m * GROWTH))
+        .take_while(|radius_m| *radius_m < LAST_M)
 }
 
 /// Evenly over a sphere, along a spiral from straight up to straight down.
@@ -142,6 +147,12 @@ mod tests {
         assert!(out.norm() > 0.02 && places.is_free(&out, LEAST_M), "{out}");
         let ghosts = walls.map(Entity::without_fingers);
         assert!(FreePlaces::new(&ghosts, 0.006, 0).unwrap().is_free(&Vector3::zeros(), LEAST_M));
+    }
+
+    #[test]
+    fn a_place_is_looked_for_on_so_many_spheres_as_the_cost_says() {
+        assert_eq!(radii_m().count(), 135);
+        assert_eq!(radii_m().count() as u32 * DIRECTIONS, 34_560);
     }
 
     #[test]
