@@ -125,21 +125,21 @@ fn execute() -> ExitCode {
             .load()
             .map_or_else(|failure| failed(&failure), |settings| check::execute(&args, &settings)),
         Some(AppCommand::Convert(args)) => {
-            convert::execute(&args).map_or_else(|failure| failed(&failure), stopped)
+            convert::execute(&args).map_or_else(|failure| failed(&failure), Stop::conclude)
         }
         Some(AppCommand::Replay(args)) => {
             let result = install_signals().and_then(|signals| replay::execute(&args, &signals));
             result.unwrap_or_else(|failure| failed(&failure))
         }
         Some(AppCommand::Export(args)) => {
-            export::execute(&args).map_or_else(|failure| failed(&failure), stopped)
+            export::execute(&args).map_or_else(|failure| failed(&failure), Stop::conclude)
         }
         Some(AppCommand::Plot(args)) => {
-            picture::execute(&args).map_or_else(|failure| failed(&failure), stopped)
+            picture::execute(&args).map_or_else(|failure| failed(&failure), Stop::conclude)
         }
         Some(AppCommand::Study(command)) => {
             let result = install_signals().and_then(|signals| study::execute(&command, &signals));
-            result.map_or_else(|failure| failed(&failure), stopped)
+            result.map_or_else(|failure| failed(&failure), Stop::conclude)
         }
         None => conclude(settings.load().and_then(|settings| play_or_demo(&settings, headless))),
     }
@@ -251,20 +251,10 @@ fn conclude(result: Result<(Report, Stop), RunFailure>) -> ExitCode {
     match result {
         Ok((report, stop)) => {
             outputs::tell(&report, report.takes_standard_output());
-            let ended = stopped(stop);
+            let ended = stop.conclude();
             if report.lacks_a_recording() { ExitCode::from(EXIT_FAULT) } else { ended }
         }
         Err(failure) => failed(&failure),
-    }
-}
-
-fn stopped(stop: Stop) -> ExitCode {
-    match stop {
-        Stop::Finished | Stop::Closed => ExitCode::SUCCESS,
-        Stop::Signal(signal) => {
-            say(format_args!("phantom3: ended by signal {signal} before its time"));
-            ExitCode::from(128u8.saturating_add(u8::try_from(signal).unwrap_or(0)))
-        }
     }
 }
 

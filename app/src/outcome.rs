@@ -3,10 +3,12 @@
 use crate::plausible::Implausible;
 use crate::recording::RecordingError;
 use io_driver::open::OpenError;
+use io_driver::say::say;
 use shm_abi::FaultReason;
 use shm_abi::client::AttachError;
 use shm_abi::segment::SegmentError;
 use std::borrow::Cow;
+use std::process::ExitCode;
 use thiserror::Error;
 use view::NoWindow;
 
@@ -19,6 +21,15 @@ pub enum Stop {
     Closed,
     /// This signal asked for it.
     Signal(i32),
+}
+
+impl Stop {
+    /// Tells that a signal asked for it; returns the exit status, which then is 128 and the signal's number.
+    pub fn conclude(self) -> ExitCode {
+        let Self::Signal(signal) = self else { return ExitCode::SUCCESS };
+        say(format_args!("phantom3: ended by signal {signal} before its time"));
+        ExitCode::from(128u8.saturating_add(u8::try_from(signal).unwrap_or(0)))
+    }
 }
 
 /// What went wrong.

@@ -16,12 +16,12 @@ mod stage;
 use crate::book::Book;
 use crate::export::{tell_end, wrong};
 use crate::fast_loop::{FastLoop, Turn, WhenFull};
-use crate::outcome::RunFailure;
+use crate::outcome::{RunFailure, Stop};
 use crate::outputs::{self, Output};
 use crate::progress::StatusLine;
 use crate::record::destination::{is_standard_output, shown};
 use crate::record::read::{self, ReadError, RecordedRun};
-use crate::record::{self, About, Backpressure, Recorder, View};
+use crate::record::{self, About, Recorder, View};
 use crate::rig::Rig;
 use crate::row_queue::{RowReceiver, row_queue};
 use crate::run::EVENT_QUEUE;
@@ -88,7 +88,7 @@ pub fn execute(args: &ReplayArgs, signals: &StopSignals) -> Result<ExitCode, Run
     }
     refuse_late_beginning(args, &feed, &stage)?;
     let orders = read::orders(&args.recording);
-    let mut play = Play::new(&stage, Arc::new(Mutex::new(feed)), orders, (&args.record, signals))?;
+    let mut play = Play::new(&stage, Arc::new(Mutex::new(feed)), orders, &args.record)?;
     let ended = play.run(signals);
     play.conclude(args, &stage, ended)
 }
@@ -150,7 +150,7 @@ impl Play {
         stage: &Stage,
         feed: SharedFeed,
         orders: Vec<(u64, String)>,
-        (records, signals): (&[PathBuf], &StopSignals),
+        records: &[PathBuf],
     ) -> Result<Self, RunFailure> {
         let rig = &stage.rig;
         let (recorded_names, period_ns) = {
@@ -189,9 +189,8 @@ impl Play {
         let create =
             |_, file| record::create(file, names.clone(), period_ns, &stage.about, &view, (&book, 0));
         let begun = record::begin_all(&records.iter().collect::<Vec<_>>(), create)?;
-        let backpressure = Backpressure { when_full: WhenFull::Wait, signals: signals.clone() };
         let start = |(path, file): (&PathBuf, _)| {
-            Recorder::start(path, file, bodies, period_ns, backpressure.clone())
+            Recorder::start(path, file, bodies, period_ns, WhenFull::Wait.into())
         };
         let mut recorders = records.iter().zip(begun).map(start).collect::<Result<Vec<_>, _>>()?;
         slow::subscribe(&mut recorders, &mut hub);
@@ -213,7 +212,7 @@ impl Play {
         })
     }
 
-    fn run(&mut self, signals: &StopSignals) -> Result<(), RunFailure> {
+    fn run(&mut self, signals: &StopSignals) -> Result<Stop, RunFailure> {
         let mut line = StatusLine::told_just_now();
         for tick in 1.. {
             if let Some(orders) = &mut self.orders {
@@ -240,14 +239,12 @@ impl Play {
             }
             drop(held);
             if let Some(signal) = signals.requested() {
-                return Err(RunFailure::Results(format!(
-                    "ended by signal {signal} before the recording's end"
-                )));
+                return Ok(Stop::Signal(signal));
             }
             let t_s = run_time_s(self.fast.run_ticks().cast_signed(), self.period_ns);
             line.show(|| format!("{t_s:7.2} s"));
         }
-        Ok(())
+        Ok(Stop::Finished)
     }
 
     /// Takes the rows that came out and puts each beside the one that was recorded.
@@ -277,7 +274,7 @@ impl Play {
         self,
         args: &ReplayArgs,
         stage: &Stage,
-        ended: Result<(), RunFailure>,
+        ended: Result<Stop, RunFailure>,
     ) -> Result<ExitCode, RunFailure> {
         let Self { feed, difference, recorders, mut events, period_ns, missing, rows_read, .. } = self;
         events.deliver(u64::MAX);
@@ -286,7 +283,7 @@ impl Play {
         let failure: Result<(), ReadError> = feed.failure.take().map_or(Ok(()), Err);
         let until_s = run_time_s(self.fast.run_ticks().saturating_sub(1).cast_signed(), period_ns);
         tell_end(&args.recording, failure, feed.recorded.cut(), rows_read, until_s)?;
-        ended?;
+        let stop = ended?;
         let takes_output = recordings.iter().any(|recorded| is_standard_output(&recorded.path));
         let program = feed.recorded.about().and_then(|about| about.facts.get("program"));
         let tell = |words: &dyn Display| outputs::tell(words, takes_output);
@@ -305,6 +302,9 @@ impl Play {
         // The recorder has told why.
         if recordings.iter().any(|recorded| recorded.failure.is_some()) {
             return Ok(ExitCode::from(3));
+        }
+        if let Stop::Signal(_) = stop {
+            return Ok(stop.conclude());
         }
         let is_unexpected = args.expect_same && !difference.is_none();
         Ok(if is_unexpected { ExitCode::from(EXIT_DIFFERENT) } else { ExitCode::SUCCESS })

@@ -12,7 +12,7 @@ use crate::not_zeroed;
 use crate::on_request::OnRequest;
 use crate::outcome::{RunFailure, Stop};
 use crate::progress::Progress;
-use crate::record::{About, Backpressure, Files, Recorded, View};
+use crate::record::{About, Files, Recorded, View};
 use crate::report::{Report, recording_line};
 use crate::rig::{HandMode, Rig, RigError};
 use crate::row_queue::row_queue;
@@ -97,7 +97,7 @@ struct Parts {
 impl Parts {
     fn new(
         rig: &Rig,
-        (plan, signals): (&RunPlan, &StopSignals),
+        plan: &RunPlan,
         clock: ClockMode,
         period_ns: u64,
         devices: &[Extras],
@@ -155,7 +155,7 @@ impl Parts {
             events: plan.events.clone(),
             extras: devices.to_vec(),
             period_ns,
-            backpressure: Backpressure { when_full, signals: signals.clone() },
+            backpressure: when_full.into(),
             book,
             about: about.clone(),
         };
@@ -204,11 +204,11 @@ fn run_virtual(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Repo
     let mut driver = VirtualDriver::open(&rig.driver_config(ClockMode::Virtual))?;
     let about = About::of_run(rig, ClockMode::Virtual, rig.period_ns, plan.seed);
     let Parts { mut fast, mut slow, mut progress, .. } =
-        Parts::new(rig, (plan, signals), ClockMode::Virtual, rig.period_ns, &driver.extras(), &about, None)?;
+        Parts::new(rig, plan, ClockMode::Virtual, rig.period_ns, &driver.extras(), &about, None)?;
     let result = driver.run(&mut fast, &mut slow, &mut progress, signals);
     progress.end();
     let SlowEnd { recordings, events, pictures } = slow.finish();
-    let stop = result?;
+    let stop = result.inspect_err(|_| tell_kept(&recordings))?;
     let report = Report {
         clock: ClockMode::Virtual.name(),
         period_ns: rig.period_ns,
@@ -246,7 +246,7 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
     let reins = live.map(|live| live.into_reins(rig)).transpose()?;
     let reins = reins.map(|reins| Box::new(reins) as Box<dyn Reins>);
     let Parts { fast, mut slow, mut progress, slow_lists } =
-        Parts::new(&step_rig, (plan, signals), info.clock_mode, info.period_ns, &extras, &about, reins)?;
+        Parts::new(&step_rig, plan, info.clock_mode, info.period_ns, &extras, &about, reins)?;
     slow.watch_driver(source.socket());
     let watched = (&mut slow, &mut progress, signals);
     let result = two_processes::run(&mut source, attachment, (fast, slow_lists), &mut totals, watched);

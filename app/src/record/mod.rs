@@ -8,6 +8,7 @@
 //! [`McapFile`], which has the events, a picture and the run's inputs beside the rows. [`read`] reads both.
 
 mod about;
+mod backpressure;
 mod descriptor;
 pub mod destination;
 mod event_line;
@@ -17,6 +18,7 @@ mod foxglove;
 mod mcap_file;
 mod opened;
 pub mod read;
+mod record_file;
 mod recorder;
 mod schema;
 mod tick;
@@ -24,11 +26,13 @@ mod view;
 mod wire;
 
 pub use about::{About, Beginning, InputFile};
+pub use backpressure::Backpressure;
 pub use events_file::EventsFile;
 pub use files::Files;
 pub use mcap_file::McapFile;
 pub use opened::{Opened, begin_all, create_file};
-pub use recorder::{Backpressure, EventFeed, RecordFile, Recorded, Recorder};
+pub use record_file::RecordFile;
+pub use recorder::{EventFeed, Recorded, Recorder};
 pub use view::View;
 
 use crate::book::Book;

@@ -1,27 +1,27 @@
 //! A recording on a thread of its own: whatever the disk does, nobody waits for it but the recording itself.
 //!
 //! Model: the slow side hands over rows through a bounded queue. In real time a row that finds no room is left out,
-//! counted, and told in the file where the format has a place for that; on a clock that can wait, it waits, but neither
-//! for a recorder that is stuck nor after a request to stop. A disk that takes no more is told at once, and the rows that
-//! follow are thrown away: the run goes on. At the end the recorder has as long as it gets on; one that is stuck is given
-//! up. A reader of the standard output who has seen enough is no failure:
-//! the recording ends, and so may the run.
+//! counted, and told in the file where the format has a place for that; on a clock that can wait, it waits
+//! ([`backpressure`](super::backpressure)). A disk that takes no more is told at once, and the rows that follow are thrown
+//! away: the run goes on. At the end the recorder has as long as it gets on; one that is stuck is given up. A reader of the
+//! standard output who has seen enough is no failure: the recording ends, and so may the run.
+//! Invariant: on a clock that waits, a recording that lacks a row lacks all behind it, and says so.
 
+use super::backpressure::{Backpressure, Progress, Wait};
 use super::destination::shown;
-use super::events_file::EventsFile;
-use super::mcap_file::McapFile;
+use super::record_file::RecordFile;
 use crate::fast_loop::WhenFull;
-use crate::recording::{Recording, RecordingError};
+use crate::recording::RecordingError;
 use crate::row::{BodyRow, Row};
 use crate::row_queue::{ROW_QUEUE, RowReceiver, RowSender, row_queue_of};
+use io_driver::device::run_time_s;
 use io_driver::say::say;
-use rt_core::signals::StopSignals;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{JoinHandle, Thread};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use world::events::{Event, EventReceiver, EventSender, Subscriber, event_queue};
 
 /// Bodies that may wait, of all rows together.
@@ -32,64 +32,9 @@ const MOST_EVENTS: usize = 8192;
 const FLUSH_NS: u64 = 500_000_000;
 /// How long the recorder sleeps when there is nothing to write.
 const PAUSE: Duration = Duration::from_millis(10);
-/// A recorder that has not written anything for so long will not any more.
-const STUCK: Duration = Duration::from_secs(30);
 
 /// What files of events count.
 const EVENTS: &str = "events";
-
-/// A recording in one of its formats.
-pub enum RecordFile {
-    /// A table.
-    Csv(Box<Recording>),
-    /// Everything.
-    Mcap(Box<McapFile>),
-    /// Events alone.
-    Events(Box<EventsFile>),
-}
-
-impl RecordFile {
-    fn append(&mut self, row: &Row, bodies: &[BodyRow]) -> Result<(), RecordingError> {
-        match self {
-            Self::Csv(file) => file.append(row, bodies),
-            Self::Mcap(file) => file.append(row, bodies),
-            Self::Events(_) => Ok(()),
-        }
-    }
-
-    fn flush(&mut self) -> Result<(), RecordingError> {
-        match self {
-            Self::Csv(file) => file.flush(),
-            // Its chunks are its own, and the same on every clock.
-            Self::Mcap(_) => Ok(()),
-            Self::Events(file) => file.flush(),
-        }
-    }
-
-    fn event(&mut self, event: &Event) -> Result<(), RecordingError> {
-        match self {
-            // Rows alone.
-            Self::Csv(_) => {}
-            Self::Mcap(file) => file.event(event),
-            Self::Events(file) => file.event(event)?,
-        }
-        Ok(())
-    }
-
-    fn tell_lost(&mut self, run_tick: u64, count: u64) {
-        if let Self::Mcap(file) = self {
-            file.tell_lost(run_tick, count);
-        }
-    }
-
-    fn finish(self) -> Result<u64, RecordingError> {
-        match self {
-            Self::Csv(file) => file.finish(),
-            Self::Mcap(file) => file.finish(),
-            Self::Events(file) => file.finish(),
-        }
-    }
-}
 
 /// What became of a recording.
 #[derive(Debug)]
@@ -106,15 +51,6 @@ pub struct Recorded {
     pub failure: Option<String>,
 }
 
-/// How a recorder treats whoever has more than there is room for.
-#[derive(Debug, Clone)]
-pub struct Backpressure {
-    /// Whether they wait.
-    pub when_full: WhenFull,
-    /// What ends waiting.
-    pub signals: StopSignals,
-}
-
 /// Hands events to a recording, as [`Recorder::send`] does rows.
 pub struct EventFeed {
     events: EventSender,
@@ -125,16 +61,19 @@ pub struct EventFeed {
 
 impl Subscriber for EventFeed {
     fn is_over(&self) -> bool {
-        self.shared.is_closing.load(Ordering::Relaxed)
+        self.shared.is_closing.load(Ordering::Relaxed) || self.shared.progress.is_given_up()
     }
 
     fn event(&mut self, event: &Event) {
-        let mut wait = Wait::begin(&self.shared);
+        let progress = &self.shared.progress;
+        let mut wait = Wait::begin(progress);
         while self.events.is_full()
             && !self.events.is_abandoned()
-            && wait.goes_on(&self.shared, &self.backpressure, &self.thread)
+            && wait.goes_on(progress, &self.backpressure, &self.thread)
         {}
-        self.events.send(*event);
+        if !progress.is_given_up() {
+            self.events.send(*event);
+        }
     }
 }
 
@@ -150,9 +89,14 @@ pub struct Recorder {
     /// Those that are not so, by their numbers.
     changed: Vec<(u32, BodyRow)>,
     backpressure: Backpressure,
+    period_ns: u64,
+    /// The row that was sent last.
+    last_tick: u64,
     lost: u64,
     /// Of these, those after the row that was sent last.
     untold: u64,
+    /// Why it was given up, which has been told.
+    given_up: Option<String>,
     shared: Arc<Shared>,
     thread: JoinHandle<Result<u64, RecordingError>>,
 }
@@ -164,10 +108,8 @@ struct Shared {
     is_closing: AtomicBool,
     /// Rows that are missing: before which tick, and how many.
     gaps: Mutex<VecDeque<(u64, u64)>>,
-    /// Rows taken from the queue so far.
-    taken: AtomicU64,
-    /// How many there were when nobody waited for it any more, and one; 0: somebody does.
-    stuck: AtomicU64,
+    /// How far it is, and whether anybody still waits for it.
+    progress: Progress,
     /// The file takes no more, which has been told.
     has_failed: AtomicBool,
     /// Nobody reads the standard output any more.
@@ -198,12 +140,8 @@ impl Recorder {
             .spawn(move || writer.run(receiver))
             .map_err(|source| RecordingError::Create { file: path.into(), source })?;
         let (known, changed) = (vec![None; bodies], Vec::with_capacity(bodies));
-        let events = Some(EventFeed {
-            events,
-            backpressure: backpressure.clone(),
-            shared: shared.clone(),
-            thread: thread.thread().clone(),
-        });
+        let events =
+            Some(EventFeed { events, backpressure, shared: shared.clone(), thread: thread.thread().clone() });
         let path = path.into();
         Ok(Self {
             path,
@@ -213,8 +151,11 @@ impl Recorder {
             known,
             changed,
             backpressure,
+            period_ns,
+            last_tick: 0,
             lost: 0,
             untold: 0,
+            given_up: None,
             shared,
             thread,
         })
@@ -227,6 +168,11 @@ impl Recorder {
 
     /// Hands a row over.
     pub fn send(&mut self, row: &Row, bodies: &[BodyRow]) {
+        if self.is_given_up() {
+            self.lost += 1;
+            self.untold += 1;
+            return;
+        }
         // Before the row itself: whoever finds the row finds what is missing in front of it.
         if !self.rows.is_full() {
             self.tell_gap(row.run_tick);
@@ -234,18 +180,54 @@ impl Recorder {
         self.changed.clear();
         let numbered = (0..).zip(bodies.iter().copied()).zip(&self.known);
         self.changed.extend(numbered.filter(|((_, is), was)| Some(*is) != **was).map(|(body, _)| body));
-        let mut wait = Wait::begin(&self.shared);
-        while !self.rows.send(*row, &self.changed) {
-            let thread = &self.thread;
-            if thread.is_finished() || !wait.goes_on(&self.shared, &self.backpressure, thread.thread()) {
-                self.lost += 1;
-                self.untold += 1;
-                return;
-            }
+        if !self.hand_over(row) {
+            self.leave_out();
+            return;
         }
+        self.last_tick = row.run_tick;
         for (known, body) in self.known.iter_mut().zip(bodies) {
             *known = Some(*body);
         }
+    }
+
+    /// `false`: there is no room, and will be none as long as somebody waits.
+    fn hand_over(&mut self, row: &Row) -> bool {
+        let mut wait = Wait::begin(&self.shared.progress);
+        while !self.rows.send(*row, &self.changed) {
+            let thread = &self.thread;
+            let progress = &self.shared.progress;
+            if thread.is_finished() || !wait.goes_on(progress, &self.backpressure, thread.thread()) {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Counts a row that is missing.
+    fn leave_out(&mut self) {
+        self.lost += 1;
+        self.untold += 1;
+        if self.backpressure.when_full == WhenFull::Wait {
+            self.shared.progress.give_up();
+            self.is_given_up();
+        }
+    }
+
+    /// Whether nobody waits for it any more; the first time that is told.
+    fn is_given_up(&mut self) -> bool {
+        let is_given_up = self.shared.progress.is_given_up();
+        if is_given_up && self.given_up.is_none() {
+            let why = format!(
+                "cannot write the recording {}: nothing was written for {} s; the run goes on without it; what comes \
+                 behind t = {:?} s is not in it",
+                shown(&self.path).display(),
+                self.backpressure.patience.as_secs(),
+                run_time_s(self.last_tick.cast_signed(), self.period_ns)
+            );
+            say(format_args!("phantom3: {why}"));
+            self.given_up = Some(why);
+        }
+        is_given_up
     }
 
     /// Rows are missing in front of this tick.
@@ -262,6 +244,12 @@ impl Recorder {
         self.thread.thread().unpark();
     }
 
+    /// How far it is.
+    #[cfg(test)]
+    pub(super) fn progress(&self) -> &Progress {
+        &self.shared.progress
+    }
+
     /// Where it goes.
     pub fn path(&self) -> &Path {
         &self.path
@@ -269,7 +257,7 @@ impl Recorder {
 
     /// Whether the file takes no more, which has been told.
     pub fn has_failed(&self) -> bool {
-        self.shared.has_failed.load(Ordering::Relaxed)
+        self.shared.has_failed.load(Ordering::Relaxed) || self.given_up.is_some()
     }
 
     /// Whether it went to the standard output, which nobody reads any more.
@@ -285,67 +273,39 @@ impl Recorder {
     /// Waits until everything is written.
     pub fn finish(mut self) -> Recorded {
         self.close();
-        let mut wait = Wait::begin(&self.shared);
+        self.is_given_up();
+        let mut wait = Wait::begin(&self.shared.progress);
         while !self.thread.is_finished() {
-            if wait.is_in_vain(&self.shared) {
-                return self.give_up(wait.taken);
+            if wait.is_in_vain(&self.shared.progress, self.backpressure.patience) {
+                return self.leave_behind();
             }
             std::thread::sleep(Duration::from_millis(1));
         }
-        let Self { path, unit, lost, thread, .. } = self;
-        match thread.join() {
-            Ok(Ok(rows)) => Recorded { path, rows, unit, lost, failure: None },
+        let Self { path, unit, lost, thread, given_up, .. } = self;
+        let (rows, failure) = match thread.join() {
+            Ok(Ok(rows)) => (rows, None),
             Ok(Err(error)) => {
                 let rows = if let RecordingError::Write { rows, .. } = error { rows } else { 0 };
-                Recorded { path, rows, unit, lost, failure: Some(error.to_string()) }
+                (rows, Some(error.to_string()))
             }
-            Err(_) => Recorded { path, rows: 0, unit, lost, failure: Some("the recorder panicked".into()) },
-        }
+            Err(_) => (0, Some("the recorder panicked".into())),
+        };
+        Recorded { path, rows, unit, lost, failure: failure.or(given_up) }
     }
 
     /// The thread ends with the process.
-    fn give_up(self, taken: u64) -> Recorded {
-        let why = format!(
-            "cannot finish the recording {}: nothing was written for {} s; what reached it until now is readable",
-            shown(&self.path).display(),
-            STUCK.as_secs()
-        );
-        say(format_args!("phantom3: {why}"));
-        Recorded { path: self.path, rows: taken, unit: self.unit, lost: self.lost, failure: Some(why) }
-    }
-}
-
-/// A wait for the recorder's thread, which ends if that is stuck.
-struct Wait {
-    taken: u64,
-    since: Instant,
-}
-
-impl Wait {
-    fn begin(shared: &Shared) -> Self {
-        Self { taken: shared.taken.load(Ordering::Relaxed), since: Instant::now() }
-    }
-
-    /// Lets the thread go on for a moment; whether that makes sense.
-    fn goes_on(&mut self, shared: &Shared, how: &Backpressure, thread: &Thread) -> bool {
-        if how.when_full == WhenFull::Drop || how.signals.requested().is_some() || self.is_in_vain(shared) {
-            return false;
-        }
-        thread.unpark();
-        std::thread::sleep(Duration::from_micros(200));
-        true
-    }
-
-    /// Whether nothing was taken for long, in this wait or one before.
-    fn is_in_vain(&mut self, shared: &Shared) -> bool {
-        let taken = shared.taken.load(Ordering::Relaxed);
-        if taken != self.taken {
-            *self = Self::begin(shared);
-        }
-        if self.since.elapsed() > STUCK {
-            shared.stuck.store(taken + 1, Ordering::Relaxed);
-        }
-        shared.stuck.load(Ordering::Relaxed) == taken + 1
+    fn leave_behind(self) -> Recorded {
+        let why = self.given_up.unwrap_or_else(|| {
+            let why = format!(
+                "cannot finish the recording {}: nothing was written for {} s; what reached it until now is readable",
+                shown(&self.path).display(),
+                self.backpressure.patience.as_secs()
+            );
+            say(format_args!("phantom3: {why}"));
+            why
+        });
+        let rows = self.shared.progress.taken();
+        Recorded { path: self.path, rows, unit: self.unit, lost: self.lost, failure: Some(why) }
     }
 }
 
@@ -373,7 +333,7 @@ impl RecorderThread {
             // Looked at first: what was sent before is then in the queue.
             let is_closing = self.shared.is_closing.load(Ordering::Acquire);
             while let Some((row, bodies)) = rows.receive() {
-                self.shared.taken.fetch_add(1, Ordering::Relaxed);
+                self.shared.progress.take();
                 last = row.run_tick;
                 let mut written = self.append(&row, bodies);
                 if row.run_tick.saturating_sub(flushed).saturating_mul(self.period_ns) >= FLUSH_NS {

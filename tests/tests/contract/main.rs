@@ -7,6 +7,7 @@ mod doctor;
 mod driver_cli;
 mod effects;
 mod emulate;
+mod ended;
 mod events;
 mod first_run;
 mod frictions;

@@ -1,0 +1,172 @@
+//! Backpressure of a recording: whoever has a row for it waits, or leaves the row out.
+//!
+//! Model: in real time a row that finds no room is left out, and later ones follow. On a clock that can wait it is waited
+//! for as long as the recorder gets on, also after a request to stop, so that a slow reader gets every row. The first
+//! wait in vain is the last: what the recording has is whole up to there, and nothing follows.
+
+use crate::fast_loop::WhenFull;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::Thread;
+use std::time::{Duration, Instant};
+
+/// A recorder that has not written anything for so long will not any more.
+const STUCK: Duration = Duration::from_secs(30);
+
+/// How a recorder treats whoever has more than there is room for.
+#[derive(Debug, Clone, Copy)]
+pub struct Backpressure {
+    /// Whether they wait.
+    pub when_full: WhenFull,
+    /// For how long without any progress.
+    pub patience: Duration,
+}
+
+impl From<WhenFull> for Backpressure {
+    fn from(when_full: WhenFull) -> Self {
+        Self { when_full, patience: STUCK }
+    }
+}
+
+/// How far a recorder is, as both of its ends see it.
+#[derive(Debug, Default)]
+pub(super) struct Progress {
+    /// Rows taken from the queue so far.
+    taken: AtomicU64,
+    /// How many there were when a wait was in vain, and one; 0: none was.
+    stuck: AtomicU64,
+    /// Nobody who waits has anything more for it.
+    is_given_up: AtomicBool,
+}
+
+impl Progress {
+    /// A row more is taken.
+    pub(super) fn take(&self) {
+        self.taken.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Rows taken.
+    pub(super) fn taken(&self) -> u64 {
+        self.taken.load(Ordering::Relaxed)
+    }
+
+    /// Ends it for whoever waits, for good.
+    pub(super) fn give_up(&self) {
+        self.is_given_up.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether it was.
+    pub(super) fn is_given_up(&self) -> bool {
+        self.is_given_up.load(Ordering::Relaxed)
+    }
+}
+
+/// A wait for the recorder's thread, which ends if that is stuck.
+pub(super) struct Wait {
+    taken: u64,
+    since: Instant,
+}
+
+impl Wait {
+    pub(super) fn begin(progress: &Progress) -> Self {
+        Self { taken: progress.taken(), since: Instant::now() }
+    }
+
+    /// Lets the thread go on for a moment; whether that makes sense.
+    pub(super) fn goes_on(&mut self, progress: &Progress, how: &Backpressure, thread: &Thread) -> bool {
+        if how.when_full == WhenFull::Drop {
+            return false;
+        }
+        if progress.is_given_up() || self.is_in_vain(progress, how.patience) {
+            progress.give_up();
+            return false;
+        }
+        thread.unpark();
+        std::thread::sleep(Duration::from_micros(200));
+        true
+    }
+
+    /// Whether nothing was taken for long, in this wait or one before.
+    pub(super) fn is_in_vain(&mut self, progress: &Progress, patience: Duration) -> bool {
+        let taken = progress.taken();
+        if taken != self.taken {
+            *self = Self::begin(progress);
+        }
+        if self.since.elapsed() > patience {
+            progress.stuck.store(taken + 1, Ordering::Relaxed);
+        }
+        progress.stuck.load(Ordering::Relaxed) == taken + 1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::columns::Names;
+    use crate::record::{RecordFile, Recorded, Recorder};
+    use crate::recording::Recording;
+    use crate::row::Row;
+    use patience::prelude::*;
+    use rustix::fs::OFlags;
+    use std::fs::{File, OpenOptions};
+    use std::io::{self, Read};
+    use std::os::unix::fs::OpenOptionsExt;
+    use std::path::Path;
+
+    const PERIOD_NS: u64 = 1_000_000;
+
+    /// A recorder into a pipe, and the pipe's other end.
+    fn piped(pipe: &Path, patience: Duration) -> (Recorder, File) {
+        let (kind, mode) = (rustix::fs::FileType::Fifo, rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR);
+        rustix::fs::mknodat(rustix::fs::CWD, pipe, kind, mode, 0).expect("a pipe");
+        let without_waiting = OFlags::NONBLOCK.bits().cast_signed();
+        let reader =
+            OpenOptions::new().read(true).custom_flags(without_waiting).open(pipe).expect("a reader");
+        let file = Recording::create(pipe, Names::default(), PERIOD_NS).expect("a table");
+        let how = Backpressure { when_full: WhenFull::Wait, patience };
+        let recorder = Recorder::start(pipe, RecordFile::Csv(Box::new(file)), 0, PERIOD_NS, how);
+        (recorder.expect("a thread"), reader)
+    }
+
+    /// Everything that comes until the other end is closed.
+    fn read_to_the_end(mut reader: File) -> String {
+        let mut all = Vec::new();
+        let mut piece = vec![0; 1 << 16];
+        loop {
+            match reader.read(&mut piece) {
+                Ok(0) => return String::from_utf8(all).expect("a table"),
+                Ok(count) => all.extend(&piece[..count]),
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
+                    std::thread::sleep(Duration::from_millis(1));
+                }
+                Err(error) => panic!("{error}"),
+            }
+        }
+    }
+
+    #[test]
+    fn a_reader_who_comes_back_too_late_finds_a_table_without_a_gap_and_the_recording_is_not_complete() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let (mut recorder, reader) = piped(&directory.path().join("pipe"), Duration::from_millis(300));
+        let row = |run_tick| Row { run_tick, ..Row::empty() };
+        // A row has eight bytes at least, a pipe 64 KiB, the queue 8192 rows, the table's own buffer 256 KiB.
+        let most = 100_000;
+        let given_up = (0..most).find(|tick| {
+            recorder.send(&row(*tick), &[]);
+            recorder.has_failed()
+        });
+        let given_up = given_up.expect("nobody reads");
+        let table = std::thread::spawn(move || read_to_the_end(reader));
+        patience::until("an empty queue", || recorder.progress().taken() == given_up);
+        for tick in given_up + 1..given_up + 1000 {
+            recorder.send(&row(tick), &[]);
+        }
+        let Recorded { rows, lost, failure, .. } = recorder.finish();
+        assert_eq!((rows, lost), (given_up, 1000));
+        let failure = failure.expect("rows are missing");
+        assert!(failure.contains("nothing was written for"), "{failure}");
+        let table = table.bounded_join().expect("a table");
+        let times = table.lines().skip(1).map(|line| line.split(',').next().unwrap_or_default().to_owned());
+        let without_gap = (0..given_up).map(|tick| format!("{:?}", tick as f64 / 1e3));
+        assert!(times.eq(without_gap), "{given_up} rows");
+    }
+}

@@ -1,0 +1,60 @@
+//! A recording in one of its formats, as its thread writes it.
+
+use super::events_file::EventsFile;
+use super::mcap_file::McapFile;
+use crate::recording::{Recording, RecordingError};
+use crate::row::{BodyRow, Row};
+use world::events::Event;
+
+/// A recording in one of its formats.
+pub enum RecordFile {
+    /// A table.
+    Csv(Box<Recording>),
+    /// Everything.
+    Mcap(Box<McapFile>),
+    /// Events alone.
+    Events(Box<EventsFile>),
+}
+
+impl RecordFile {
+    pub(super) fn append(&mut self, row: &Row, bodies: &[BodyRow]) -> Result<(), RecordingError> {
+        match self {
+            Self::Csv(file) => file.append(row, bodies),
+            Self::Mcap(file) => file.append(row, bodies),
+            Self::Events(_) => Ok(()),
+        }
+    }
+
+    pub(super) fn flush(&mut self) -> Result<(), RecordingError> {
+        match self {
+            Self::Csv(file) => file.flush(),
+            // Its chunks are its own, and the same on every clock.
+            Self::Mcap(_) => Ok(()),
+            Self::Events(file) => file.flush(),
+        }
+    }
+
+    pub(super) fn event(&mut self, event: &Event) -> Result<(), RecordingError> {
+        match self {
+            // Rows alone.
+            Self::Csv(_) => {}
+            Self::Mcap(file) => file.event(event),
+            Self::Events(file) => file.event(event)?,
+        }
+        Ok(())
+    }
+
+    pub(super) fn tell_lost(&mut self, run_tick: u64, count: u64) {
+        if let Self::Mcap(file) = self {
+            file.tell_lost(run_tick, count);
+        }
+    }
+
+    pub(super) fn finish(self) -> Result<u64, RecordingError> {
+        match self {
+            Self::Csv(file) => file.finish(),
+            Self::Mcap(file) => file.finish(),
+            Self::Events(file) => file.finish(),
+        }
+    }
+}
