@@ -33,8 +33,6 @@ use io_driver::config::period_of;
 use io_driver::say::say;
 use rt_core::signals::StopSignals;
 use shm_abi::{client, endpoint};
-use std::os::unix::fs::MetadataExt;
-use std::path::Path;
 use std::process::ExitCode;
 use view::input::Bindings;
 use view::{Eyes, NoWindow, WindowSpec};
@@ -186,7 +184,7 @@ fn play(args: &PlayArgs, settings: &Settings, is_headless: bool) -> Result<(Repo
     let signals = install_signals()?;
     let rig = args.rig(settings)?;
     args.check_outputs(&rig)?;
-    let mut plan = args.plan(settings);
+    let mut plan = args.plan(&rig, settings);
     plan.window = window_spec(&rig.scene.name, settings)?;
     if plan.window.is_none() {
         return Err(NoWindow::NoDisplay.into());
@@ -239,12 +237,6 @@ fn window_spec(title: &str, settings: &Settings) -> Result<Option<WindowSpec>, R
 
 fn install_signals() -> Result<StopSignals, RunFailure> {
     StopSignals::install().map_err(|error| RunFailure::Start(format!("cannot catch signals: {error}")))
-}
-
-/// By inode: links of both kinds lead to the same bytes.
-pub(crate) fn is_same_file(a: &Path, b: &Path) -> bool {
-    let identity = |path: &Path| path.metadata().map(|file| (file.dev(), file.ino()));
-    matches!((identity(a), identity(b)), (Ok(a), Ok(b)) if a == b)
 }
 
 fn conclude(result: Result<(Report, Stop), RunFailure>) -> ExitCode {

@@ -3,11 +3,10 @@
 //! What the files may hold is told in [`world::thesis`].
 
 use crate::outcome::{RunFailure, Stop};
-use crate::outputs;
+use crate::outputs::{self, Output};
 use clap::Args;
 use io_driver::say::say;
-use rt_core::input_file;
-use std::fs;
+use rt_core::{input_file, output_file};
 use std::path::{Path, PathBuf};
 use world::MAX_FILE_BYTES;
 use world::thesis::{Conversion, Converted, ObjectFile, ObjectKind, read_list, read_object};
@@ -33,19 +32,24 @@ pub struct ConvertArgs {
 /// # Errors
 /// A file that cannot be read or holds what it may not; a result that cannot be written.
 pub fn execute(args: &ConvertArgs) -> Result<Stop, RunFailure> {
-    let converted = convert(args)?;
+    let mut inputs = vec![args.file.clone()];
+    let converted = convert(args, &mut inputs)?;
+    if let Some(out) = &args.out {
+        outputs::check(&[Output::scene(out)], &inputs.iter().collect::<Vec<_>>())?;
+    }
     for told in &converted.told {
         say(format_args!("phantom3: {told}"));
     }
     match &args.out {
-        Some(out) => fs::write(out, &converted.toml)
+        Some(out) => output_file::write(out, &converted.toml)
             .map_err(|error| RunFailure::Start(format!("cannot write {}: {error}", out.display())))?,
         None => outputs::print(&converted.toml),
     }
     Ok(Stop::Finished)
 }
 
-fn convert(args: &ConvertArgs) -> Result<Converted, RunFailure> {
+/// The scene; what is read for it besides the list joins the inputs.
+fn convert(args: &ConvertArgs, inputs: &mut Vec<PathBuf>) -> Result<Converted, RunFailure> {
     let text = read(&args.file)?;
     let meshes = args.meshes.as_ref().map_or_else(String::new, |dir| format!("{}/", dir.display()));
     if text.lines().any(|line| line.split("//").next().is_some_and(|words| words.contains('='))) {
@@ -65,6 +69,7 @@ fn convert(args: &ConvertArgs) -> Result<Converted, RunFailure> {
         let named_by = object.file().display().to_string();
         let parts = object.parts().into_iter().map(|part| open(&objects, &part, &named_by));
         let parts: Vec<ObjectFile> = parts.collect::<Result<_, _>>()?;
+        inputs.extend([&object].into_iter().chain(&parts).map(|read| read.file().to_path_buf()));
         conversion.add(entry.kind, &object, &parts).map_err(|error| wrong(&error))?;
     }
     Ok(conversion.finish(true))

@@ -104,6 +104,7 @@ pub fn plan(rig: &Rig, socket: PathBuf, directory: Option<&Path>) -> RunPlan {
         events: Vec::new(),
         pictures: None,
         window: None,
+        inputs: Vec::new(),
         seed: 0,
         orders: None,
         settings: Settings::default(),

@@ -2,22 +2,22 @@
 //!
 //! Model: rows are read from either format and written with the same columns that `run --record OUT.csv` writes, so CSV
 //! out of MCAP is byte for byte what would have been recorded. A recording whose end is missing, or that is damaged behind
-//! its first row, is exported as far as it is whole, and that is told; damage is a fault (status 3).
+//! its first row, is exported as far as it is whole, and that is told; damage is a fault (status 3). Of one without a row
+//! nothing is written.
 
 mod parquet_file;
+mod tables;
 
 use crate::outcome::{RunFailure, Stop};
 use crate::outputs::{self, Output};
 use crate::record::destination::{TableFormat, is_standard_output, shown};
 use crate::record::read::{ReadError, RecordedRun};
-use crate::recording::{Recording, RecordingError};
-use crate::row::{BodyRow, Row};
 use clap::Args;
 use io_driver::device::run_time_s;
 use io_driver::say::say;
-use parquet_file::ParquetFile;
 use rt_core::plain_text::Plain;
 use std::path::{Path, PathBuf};
+use tables::Tables;
 
 /// What becomes what.
 #[derive(Debug, Args)]
@@ -51,32 +51,38 @@ pub fn execute(args: &ExportArgs) -> Result<Stop, RunFailure> {
     let mut recorded = RecordedRun::open(&args.recording).map_err(|error| wrong(&error))?;
     let outs = args.outs()?;
     // Of a recording without a good row there is no table.
-    let mut next = recorded.next_row().map(Some).map_err(|error| wrong(&error))?;
-    let mut tables = outs.iter().map(|out| Table::create(out, &recorded)).collect::<Result<Vec<_>, _>>()?;
-    let mut last = None;
-    let mut rows = 0u64;
+    let first = recorded.next_row().map_err(|error| wrong(&error))?;
+    let first = first.ok_or_else(|| without_rows(&args.recording, recorded.cut()))?;
+    let mut tables = Tables::begin(&outs, &recorded)?;
+    let (mut next, mut last, mut rows) = (Some(first), 0, 0u64);
     let end = loop {
-        match next.take().map_or_else(|| recorded.next_row(), Ok) {
+        match next.take().map_or_else(|| recorded.next_row(), |row| Ok(Some(row))) {
             Ok(Some((row, bodies))) => {
-                if !append(&mut tables, &row, &bodies, &recorded)? {
-                    // Who reads the standard output has seen enough.
-                    return Ok(Stop::Finished);
-                }
-                (last, rows) = (Some(row.run_tick), rows + 1);
+                tables.append(&row, &bodies, recorded.names());
+                (last, rows) = (row.run_tick, rows + 1);
             }
             Ok(None) => break Ok(()),
             Err(error) => break Err(error),
         }
+        if tables.is_empty() {
+            // Nobody is left who wants more rows.
+            return tables.finish().1.map(|()| Stop::Finished);
+        }
     };
-    tables.into_iter().try_for_each(Table::finish)?;
-    let until_s = last.map_or(0.0, |tick| run_time_s(tick.cast_signed(), recorded.period_ns()));
+    let (whole, failure) = tables.finish();
+    let until_s = run_time_s(last.cast_signed(), recorded.period_ns());
     let part = if end.is_err() { ", up to the damage" } else { "" };
     let end = tell_end(&args.recording, end, recorded.cut(), rows, until_s);
     let is_taken = outs.iter().any(|(out, _)| is_standard_output(out));
-    for (out, _) in &outs {
+    for out in &whole {
         outputs::tell(&format_args!("{} ({rows} rows{part})", Plain(shown(out).display())), is_taken);
     }
-    end.map(|()| Stop::Finished)
+    end.and(failure).map(|()| Stop::Finished)
+}
+
+fn without_rows(recording: &Path, cut: Option<&str>) -> RunFailure {
+    let cut = cut.map_or_else(String::new, |cut| format!(": {cut}"));
+    wrong(&format_args!("{}: it has no rows{cut}", recording.display()))
 }
 
 impl ExportArgs {
@@ -92,28 +98,6 @@ impl ExportArgs {
             .map(|out| Ok((out.clone(), TableFormat::of(out).map_err(|error| wrong(&error))?)));
         by_ending.chain(by_option.map(Ok)).collect()
     }
-}
-
-/// `false`: nobody reads the standard output any more.
-fn append(
-    tables: &mut [Table],
-    row: &Row,
-    bodies: &[BodyRow],
-    recorded: &RecordedRun,
-) -> Result<bool, RunFailure> {
-    for table in tables {
-        match table {
-            Table::Csv(csv) => {
-                csv.learn_entities(recorded.names());
-                match csv.append(row, bodies) {
-                    Err(error) if error.is_of_a_reader_who_left() => return Ok(false),
-                    written => written.map_err(|error| late(&error))?,
-                }
-            }
-            Table::Parquet(parquet) => parquet.append(row, bodies, recorded.names())?,
-        }
-    }
-    Ok(true)
 }
 
 /// Says how a recording ends, if not as it should; what is damaged is a fault once good rows were read.
@@ -142,48 +126,4 @@ pub(crate) fn damaged(error: &dyn std::fmt::Display, rows: u64, until_s: f64) ->
 
 pub(crate) fn wrong(error: &dyn std::fmt::Display) -> RunFailure {
     RunFailure::Start(error.to_string())
-}
-
-/// A table being written.
-enum Table {
-    Csv(Box<Recording>),
-    Parquet(Box<ParquetFile>),
-}
-
-impl Table {
-    fn create((out, format): &(PathBuf, TableFormat), recorded: &RecordedRun) -> Result<Self, RunFailure> {
-        let (names, period_ns) = (recorded.names(), recorded.period_ns());
-        Ok(match format {
-            TableFormat::Csv => {
-                let csv = Recording::create(out, names.clone(), period_ns).map_err(|error| late(&error))?;
-                Self::Csv(Box::new(csv))
-            }
-            TableFormat::Parquet => Self::Parquet(Box::new(ParquetFile::create(out, names, period_ns)?)),
-        })
-    }
-
-    fn finish(self) -> Result<(), RunFailure> {
-        match self {
-            Self::Csv(csv) => match csv.finish() {
-                Err(error) if error.is_of_a_reader_who_left() => Ok(()),
-                finished => finished.map(drop).map_err(|error| late(&error)),
-            },
-            Self::Parquet(parquet) => parquet.finish(),
-        }
-    }
-}
-
-/// No run goes on without an export that fails.
-fn late(error: &RecordingError) -> RunFailure {
-    match error {
-        RecordingError::Create { file, source } => wrong(&format_args!(
-            "cannot create {}: {source}; name a file that can be written",
-            file.display()
-        )),
-        RecordingError::Format(error) => wrong(error),
-        RecordingError::Write { file, source, rows, .. } => RunFailure::Results(format!(
-            "cannot write {}: {source}; it is complete up to its row {rows}",
-            file.display()
-        )),
-    }
 }

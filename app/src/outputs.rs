@@ -1,8 +1,7 @@
 //! Output files of a command, checked before anything runs.
 
-use crate::cli::is_same_file;
 use crate::outcome::RunFailure;
-use crate::record::destination::{EventFormat, FormatError, RunFormat, is_standard_output, shown};
+use crate::record::destination::{EventFormat, FormatError, RunFormat, is_same_file, is_same_place, shown};
 use io_driver::say::say;
 use rt_core::plain_text::PlainLines;
 use std::fmt::Display;
@@ -24,6 +23,7 @@ enum Kind {
     Ticks,
     Events,
     Picture,
+    Scene,
     Table,
 }
 
@@ -43,6 +43,11 @@ impl<'a> Output<'a> {
         Self { option: "--snapshot", file, kind: Kind::Picture }
     }
 
+    /// Of a scene that is made of others.
+    pub(crate) fn scene(file: &'a Path) -> Self {
+        Self { option: "--out", file, kind: Kind::Scene }
+    }
+
     /// Of an export; its format has been looked at.
     pub(crate) fn table(file: &'a Path) -> Self {
         Self { option: "the table", file, kind: Kind::Table }
@@ -52,16 +57,7 @@ impl<'a> Output<'a> {
         match self.kind {
             Kind::Ticks => RunFormat::of(self.file).map(drop),
             Kind::Events => EventFormat::of(self.file).map(drop),
-            Kind::Picture | Kind::Table => Ok(()),
-        }
-    }
-
-    fn is_same(&self, other: &Self) -> bool {
-        let absolute = |output: &Self| std::path::absolute(output.file).ok();
-        match [self, other].map(|output| is_standard_output(output.file)) {
-            [true, true] => true,
-            [false, false] => absolute(self) == absolute(other) || is_same_file(self.file, other.file),
-            _ => false,
+            Kind::Picture | Kind::Scene | Kind::Table => Ok(()),
         }
     }
 }
@@ -80,7 +76,7 @@ pub(crate) fn check(outputs: &[Output<'_>], inputs: &[&PathBuf]) -> Result<(), R
                 "{option} {place} would overwrite the input {input}; name another file"
             ));
         }
-        if let Some(other) = outputs[..index].iter().find(|other| other.is_same(output)) {
+        if let Some(other) = outputs[..index].iter().find(|other| is_same_place(other.file, file)) {
             return refused_twice(other, output);
         }
         output.format().or_else(|error| refused(format_args!("{option} {error}")))?;

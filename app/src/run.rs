@@ -55,6 +55,8 @@ pub struct RunPlan {
     pub pictures: Option<Wanted>,
     /// The window, if there is to be one.
     pub window: Option<WindowSpec>,
+    /// What it reads, which nothing is written into.
+    pub inputs: Vec<PathBuf>,
     /// Seed of everything random, to be told in recordings.
     pub seed: u64,
     /// What is to change while it runs.
@@ -150,6 +152,7 @@ impl Parts {
         .map_err(RunFailure::Start)?
         .unzip();
         let (producer, consumer) = row_queue(step.bodies().len());
+        let pictures = plan.pictures.iter().flat_map(|wanted| &wanted.shots).map(|shot| &shot.file);
         let files = Files {
             record: plan.record.clone(),
             events: plan.events.clone(),
@@ -158,6 +161,7 @@ impl Parts {
             backpressure: when_full.into(),
             book,
             about: about.clone(),
+            taken: plan.inputs.iter().chain(pictures).cloned().collect(),
         };
         let snapshots = plan
             .pictures

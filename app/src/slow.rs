@@ -226,7 +226,7 @@ impl SlowSide {
     }
 
     fn begin_recordings(&mut self, coming: &Coming) -> Vec<Recorder> {
-        let Some(files) = self.files.as_ref().filter(|files| !files.record.is_empty()) else {
+        let Some(files) = self.files.as_mut().filter(|files| !files.record.is_empty()) else {
             return Vec::new();
         };
         match files.of_scene(&coming.rig, &coming.view, self.scenes) {

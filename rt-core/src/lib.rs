@@ -15,7 +15,7 @@
 //! aside from what comes at the same phase. [`last_act`] is what a
 //! dying process still stores to the hardware. [`clock`] is under all of them, and [`alloc_guard`] lets a test
 //! show that a loop does not allocate.
-//! [`input_file`] reads files that others name, [`separators`] and [`toml_slips`] know what is usually wrong
+//! [`input_file`] reads files that others name, [`output_file`] opens those to be written, [`separators`] and [`toml_slips`] know what is usually wrong
 //! in tables and in TOML, and [`plain_text`] keeps foreign text from acting on a terminal.
 //! [`doctor`] says whether the machine is ready for any of this, [`read_back`] what root has set for it, and
 //! [`installed`] names what a laboratory's installation consists of.
@@ -37,6 +37,7 @@ pub mod input_file;
 pub mod installed;
 pub mod last_act;
 pub mod log;
+pub mod output_file;
 pub mod periodic;
 pub mod phase_keeper;
 pub mod plain_text;

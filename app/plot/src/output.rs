@@ -4,6 +4,7 @@ use crate::draw::Sheet;
 use crate::figure::Figure;
 use crate::font;
 use plotters::prelude::{BitMapBackend, DrawingBackend, IntoDrawingArea, SVGBackend};
+use rt_core::output_file;
 use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -81,7 +82,7 @@ fn write_file(stem: &Path, suffix: &str, bytes: &[u8]) -> Result<(), PlotError> 
     let mut name = stem.as_os_str().to_owned();
     name.push(suffix);
     let file = PathBuf::from(name);
-    std::fs::write(&file, bytes).map_err(|source| PlotError::Write { file, source })
+    output_file::write(&file, bytes).map_err(|source| PlotError::Write { file, source })
 }
 
 fn render<DB: DrawingBackend>(figure: &Figure, backend: DB, scale: f64) -> Result<(), PlotError> {

@@ -15,6 +15,7 @@ mod layout_file;
 mod live;
 mod report;
 
+use crate::record::destination::is_same_file;
 use calibration::{Calibration, CalibrationError, Fit, Model, Pair, PairsError, calibrate, parse_pairs};
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::{ArgGroup, Args};
@@ -24,8 +25,8 @@ use layout_file::LayoutFileError;
 use live::LiveError;
 use plot::PlotError;
 use report::Report;
-use rt_core::input_file;
 use rt_core::signals::StopSignals;
+use rt_core::{input_file, output_file};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -221,7 +222,7 @@ fn run_to_end(args: &CalibrateArgs) -> Result<(), CalibrateFailure> {
     let entry = plan.layout.entry_of(args.device, &X_WN);
     let text = layout_file::with_entry(&plan.base, plan.base_name(), args, &entry, &X_WN, used)?;
     let report = Report { origin: &origin, args, found: &found, used, X_WN: &X_WN, entry: &entry };
-    // Each line is one that is said: within a line a break is foreign, and is escaped.
+    // Each line by itself: lines behind the first of what is said are indented.
     for line in report.to_string().lines() {
         say(format_args!("{line}"));
     }
@@ -266,7 +267,7 @@ impl Plan {
         write.as_deref().map_or(Ok(()), layout_file::refuse_other_than_file)?;
         let edited = write.as_ref().filter(|file| file.exists());
         if let (Some(edited), Some(given)) = (edited, &args.layout)
-            && !crate::cli::is_same_file(edited, given)
+            && !is_same_file(edited, given)
         {
             return Err(LayoutFileError::WouldReplace { file: edited.clone(), given: given.clone() }.into());
         }
@@ -297,7 +298,7 @@ fn refuse_same_file(args: &CalibrateArgs, write: Option<&Path>) -> Result<(), Ca
     for (index, (b, file)) in all.iter().enumerate() {
         for (a, other) in &all[..index] {
             let may_be_edited = (*a, *b) == ("layout", "write");
-            if !may_be_edited && (file == other || crate::cli::is_same_file(file, other)) {
+            if !may_be_edited && (file == other || is_same_file(file, other)) {
                 return Err(CalibrateFailure::SameFile { a, b, file: file.to_path_buf() });
             }
         }
@@ -355,7 +356,7 @@ fn save_pairs(file: &Path, pairs: &[Pair]) -> Result<(), CalibrateFailure> {
         text += &numbers.join(",");
         text.push('\n');
     }
-    std::fs::write(file, text).map_err(|source| CalibrateFailure::Output { file: file.into(), source })
+    output_file::write(file, text).map_err(|source| CalibrateFailure::Output { file: file.into(), source })
 }
 
 fn refuse_spoilt(found: &Calibration, origin: &str) -> Result<(), CalibrateFailure> {
@@ -384,7 +385,7 @@ fn draw(file: &Path, pairs: &[Pair], found: &Calibration, used: &Fit) -> Result<
         Some(figure::Kind::Png) => figure.png().map_err(plot)?,
         _ => figure.svg().map_err(plot)?.into_bytes(),
     };
-    std::fs::write(file, bytes).map_err(|source| CalibrateFailure::Output { file: file.into(), source })
+    output_file::write(file, bytes).map_err(|source| CalibrateFailure::Output { file: file.into(), source })
 }
 
 /// A closed pipe is no reason to fail: nobody wants to know. A full disk is: the result is lost.

@@ -35,15 +35,15 @@ impl PlayArgs {
 
     /// What is written must not take the place of what is read, and names its format.
     pub(super) fn check_outputs(&self, rig: &Rig) -> Result<(), RunFailure> {
-        let inputs: Vec<&PathBuf> = std::iter::once(&rig.scene_file).chain(rig.model_files()).collect();
+        let inputs = inputs(rig);
         let (record, events) = (
             self.record.iter().map(|file| Output::ticks(file)),
             self.events.iter().map(|file| Output::events(file)),
         );
-        outputs::check(&record.chain(events).collect::<Vec<_>>(), &inputs)
+        outputs::check(&record.chain(events).collect::<Vec<_>>(), &inputs.iter().collect::<Vec<_>>())
     }
 
-    pub(super) fn plan(&self, settings: &Settings) -> RunPlan {
+    pub(super) fn plan(&self, rig: &Rig, settings: &Settings) -> RunPlan {
         RunPlan {
             clock: Some(ClockMode::Real),
             seconds: self.seconds,
@@ -51,10 +51,15 @@ impl PlayArgs {
             events: self.events.clone(),
             pictures: None,
             window: None,
+            inputs: inputs(rig),
             seed: 0,
             orders: None,
             settings: settings.clone(),
             attach: None,
         }
     }
+}
+
+fn inputs(rig: &Rig) -> Vec<PathBuf> {
+    std::iter::once(&rig.scene_file).chain(rig.model_files()).cloned().collect()
 }

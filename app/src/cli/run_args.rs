@@ -224,7 +224,8 @@ pub(super) fn make_plan(args: &RunArgs, rig: &Rig, settings: &Settings) -> Resul
             "--attach and --clock virtual exclude each other: a driver that runs has its own clock".into(),
         ));
     }
-    check_outputs(args, rig)?;
+    let inputs = inputs(args, rig);
+    check_outputs(args, &inputs)?;
     let attach = args.attach.as_ref().map(|socket| Attach {
         socket: if socket.as_os_str().is_empty() { endpoint::for_application() } else { socket.clone() },
         grace: Duration::from_secs_f64(args.grace),
@@ -236,6 +237,7 @@ pub(super) fn make_plan(args: &RunArgs, rig: &Rig, settings: &Settings) -> Resul
         events: args.events.clone(),
         pictures: args.pictures.wanted(settings),
         window: None,
+        inputs,
         seed: args.seed,
         orders: order_source(args)?,
         settings: settings.clone(),
@@ -258,7 +260,7 @@ fn order_source(args: &RunArgs) -> Result<Option<OrderSource>, RunFailure> {
     Ok(Some(OrderSource::Input))
 }
 
-fn check_outputs(args: &RunArgs, rig: &Rig) -> Result<(), RunFailure> {
+fn inputs(args: &RunArgs, rig: &Rig) -> Vec<PathBuf> {
     // The hand that counts may be the one that the scene names.
     let hand = rig.hand.as_ref().map(|hand| &hand.path);
     let inputs = [
@@ -270,14 +272,17 @@ fn check_outputs(args: &RunArgs, rig: &Rig) -> Result<(), RunFailure> {
         args.device.as_ref(),
         args.orders.as_ref(),
     ];
-    let inputs: Vec<&PathBuf> = inputs.into_iter().flatten().chain(rig.model_files()).collect();
+    inputs.into_iter().flatten().chain(rig.model_files()).cloned().collect()
+}
+
+fn check_outputs(args: &RunArgs, inputs: &[PathBuf]) -> Result<(), RunFailure> {
     let record = args.record.iter().map(|file| Output::ticks(file));
     let others = args
         .events
         .iter()
         .map(|file| Output::events(file))
         .chain(args.pictures.files().map(|file| Output::picture(file)));
-    outputs::check(&record.chain(others).collect::<Vec<_>>(), &inputs)
+    outputs::check(&record.chain(others).collect::<Vec<_>>(), &inputs.iter().collect::<Vec<_>>())
 }
 
 /// Clap's own paths are never empty, not even by default.

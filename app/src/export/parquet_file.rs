@@ -6,7 +6,8 @@
 
 use crate::columns::{Cell, CellKind, Names, columns, each_cell};
 use crate::outcome::RunFailure;
-use crate::record::create_file;
+use crate::record::Opened;
+use crate::recording::RecordingError;
 use crate::row::{BodyRow, Row};
 use parquet::basic::{Compression, ConvertedType, Encoding, LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
@@ -16,6 +17,7 @@ use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::{ColumnPath, Type};
 use std::collections::HashMap;
 use std::fs::File;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -42,15 +44,16 @@ enum Cells {
 }
 
 impl ParquetFile {
-    pub(super) fn create(path: &Path, names: &Names, period_ns: u64) -> Result<Self, RunFailure> {
+    /// Empties the file and begins the table.
+    ///
+    /// # Errors
+    /// If that cannot be done.
+    pub(super) fn begin(file: Opened, names: &Names, period_ns: u64) -> Result<Self, RecordingError> {
         let columns = columns(names);
-        let file = create_file(path).map_err(|error| {
-            super::wrong(&format_args!(
-                "cannot create {}: {error}; name a file that can be written",
-                path.display()
-            ))
-        })?;
-        let failed = |error| failed(path, &error);
+        let path = file.path().to_path_buf();
+        let create = |source| RecordingError::Create { file: path.clone(), source };
+        let failed = |error: ParquetError| create(io::Error::other(error));
+        let file = file.empty().map_err(create)?;
         let mut fields = Vec::with_capacity(columns.len());
         let mut properties = WriterProperties::builder()
             .set_compression(Compression::SNAPPY)
@@ -82,8 +85,8 @@ impl ParquetFile {
         let rows = GROUP_CELLS / columns.len();
         let group = columns.iter().map(|column| Cells::of(column.kind)).collect();
         Ok(Self {
-            path: path.into(),
             writer: writer.map_err(failed)?,
+            path,
             group,
             rows_in_group: 0,
             rows_of_group: rows.clamp(*GROUP_ROWS.start(), *GROUP_ROWS.end()),
@@ -189,7 +192,8 @@ mod tests {
         };
         let directory = tempfile::tempdir().expect("a directory");
         let path = directory.path().join("r.parquet");
-        let mut file = ParquetFile::create(&path, &names, 1_000_000).expect("created");
+        let file = Opened::open(&path).expect("created");
+        let mut file = ParquetFile::begin(file, &names, 1_000_000).expect("begun");
         file.rows_of_group = 7;
         let row = |tick: u64| {
             let mut row = Row { run_tick: tick, ..Row::empty() };

@@ -5,6 +5,7 @@
 //! no need of an ending: it takes a table.
 
 use std::ffi::OsStr;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -118,6 +119,24 @@ impl TableFormat {
 /// Whether this stands for the standard output.
 pub fn is_standard_output(file: &Path) -> bool {
     file == Path::new(STANDARD_OUTPUT)
+}
+
+/// Whether both names lead to the same bytes, by links of either kind.
+pub fn is_same_file(a: &Path, b: &Path) -> bool {
+    let identity = |path: &Path| path.metadata().map(|file| (file.dev(), file.ino()));
+    matches!((identity(a), identity(b)), (Ok(a), Ok(b)) if a == b)
+}
+
+/// Whether what is written there replaces the other: the same file, or one that would be.
+pub fn is_same_place(a: &Path, b: &Path) -> bool {
+    match [a, b].map(is_standard_output) {
+        [true, true] => true,
+        [false, false] => {
+            let [first, second] = [a, b].map(|path| std::path::absolute(path).ok());
+            first == second || is_same_file(a, b)
+        }
+        _ => false,
+    }
 }
 
 /// What people are told of where it goes.

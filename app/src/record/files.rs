@@ -1,6 +1,6 @@
 //! Which files a run is recorded in: those that were asked for, and beside each one of its own for every other scene.
 
-use super::destination::is_standard_output;
+use super::destination::{is_same_place, is_standard_output};
 use super::{
     About, Backpressure, Beginning, Opened, RecordFile, Recorder, View, begin_all, create, create_events,
     create_under_way,
@@ -28,6 +28,8 @@ pub struct Files {
     pub book: Book,
     /// What is told of the run that it begins with.
     pub about: About,
+    /// Files that later scenes are not recorded in: what the run reads, and whatever else it writes.
+    pub taken: Vec<PathBuf>,
 }
 
 impl Files {
@@ -61,22 +63,35 @@ impl Files {
     ///
     /// # Errors
     /// If one cannot be made.
-    pub fn of_scene(&self, rig: &Rig, view: &View, number: u32) -> Result<Vec<Recorder>, RecordingError> {
-        let record = |path: &PathBuf| {
-            let about = self.about.followed_by(rig, path);
-            let path = place(path, number);
-            let (names, file) = (rig.names(&self.extras), Opened::recording(&path)?);
-            let file = create(file, names, self.period_ns, &about, view, (&self.book, number))?;
-            self.start(&path, file, rig)
-        };
-        let goes_on = |path: &&PathBuf| !is_standard_output(path);
-        if !self.record.iter().all(|path| goes_on(&path)) {
+    pub fn of_scene(&mut self, rig: &Rig, view: &View, number: u32) -> Result<Vec<Recorder>, RecordingError> {
+        let (streams, files): (Vec<_>, Vec<_>) =
+            self.record.clone().into_iter().partition(|path| is_standard_output(path));
+        if !streams.is_empty() {
             say(format_args!(
                 "phantom3: the table on the standard output ends with the scene; other scenes are recorded in files: \
                  --record FILE"
             ));
         }
-        self.record.iter().filter(goes_on).map(record).collect()
+        files.iter().map(|first| self.begin_beside(first, rig, view, number)).collect()
+    }
+
+    /// The recording of the scene of this number, beside that of the first one.
+    fn begin_beside(
+        &mut self,
+        first: &Path,
+        rig: &Rig,
+        view: &View,
+        number: u32,
+    ) -> Result<Recorder, RecordingError> {
+        let about = self.about.followed_by(rig, first);
+        let inputs = [&rig.scene_file].into_iter().chain(rig.model_files());
+        let taken: Vec<&PathBuf> =
+            self.taken.iter().chain(&self.record).chain(&self.events).chain(inputs).collect();
+        let path = free_place(first, number, &taken);
+        let (names, file) = (rig.names(&self.extras), Opened::recording(&path)?);
+        let file = create(file, names, self.period_ns, &about, view, (&self.book, number))?;
+        self.taken.push(path.clone());
+        self.start(&path, file, rig)
     }
 
     /// One that begins in the middle of the scene of this number.
@@ -97,19 +112,26 @@ impl Files {
 
     fn start(&self, path: &Path, file: RecordFile, rig: &Rig) -> Result<Recorder, RecordingError> {
         let bodies = rig.names(&self.extras).bodies.len();
-        Recorder::start(path, file, bodies, self.period_ns, self.backpressure.clone())
+        Recorder::start(path, file, bodies, self.period_ns, self.backpressure)
     }
 }
 
-/// `out.mcap`, and then `out.2.mcap`, `out.3.mcap`.
-fn place(path: &Path, number: u32) -> PathBuf {
-    if number == 0 {
-        return path.into();
+/// For the second scene `out.2.mcap`, for the next `out.3.mcap`; or the first number behind it that is not taken.
+fn free_place(first: &Path, scene: u32, taken: &[&PathBuf]) -> PathBuf {
+    let mut number = scene + 1;
+    loop {
+        let place = numbered(first, number);
+        if !taken.iter().any(|other| is_same_place(&place, other)) {
+            return place;
+        }
+        number += 1;
     }
-    let numbered = number + 1;
+}
+
+fn numbered(path: &Path, number: u32) -> PathBuf {
     match path.extension() {
-        Some(ending) => path.with_extension(format!("{numbered}.{}", ending.to_string_lossy())),
-        None => path.with_extension(numbered.to_string()),
+        Some(ending) => path.with_extension(format!("{number}.{}", ending.to_string_lossy())),
+        None => path.with_extension(number.to_string()),
     }
 }
 
@@ -119,8 +141,15 @@ mod tests {
 
     #[test]
     fn the_second_scene_is_recorded_beside_the_first() {
-        let place = |path: &str, number| place(Path::new(path), number).display().to_string();
-        assert_eq!([place("a/out.mcap", 0), place("a/out.mcap", 1)], ["a/out.mcap", "a/out.2.mcap"]);
+        let place = |path: &str, scene| free_place(Path::new(path), scene, &[]).display().to_string();
+        assert_eq!([place("a/out.mcap", 1), place("a/out.mcap", 2)], ["a/out.2.mcap", "a/out.3.mcap"]);
         assert_eq!([place("out", 2), place("o.b.csv", 1)], ["out.3", "o.b.2.csv"]);
+    }
+
+    #[test]
+    fn a_number_whose_file_is_taken_is_passed_over() {
+        let taken = ["./w.2.csv", "w.3.csv"].map(PathBuf::from);
+        let place = free_place(Path::new("w.csv"), 1, &taken.iter().collect::<Vec<_>>());
+        assert_eq!(place, Path::new("w.4.csv"));
     }
 }

@@ -30,7 +30,7 @@ pub use backpressure::Backpressure;
 pub use events_file::EventsFile;
 pub use files::Files;
 pub use mcap_file::McapFile;
-pub use opened::{Opened, begin_all, create_file};
+pub use opened::{Opened, begin_all};
 pub use record_file::RecordFile;
 pub use recorder::{EventFeed, Recorded, Recorder};
 pub use view::View;

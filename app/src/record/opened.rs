@@ -5,12 +5,10 @@
 
 use super::destination::{is_standard_output, shown};
 use crate::recording::RecordingError;
-use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
-use rustix::io::Errno;
+use rt_core::output_file;
 use std::fs::{File, OpenOptions};
 use std::io;
 use std::os::fd::AsFd;
-use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 
 /// A file that can be written, with its earlier content.
@@ -115,36 +113,18 @@ pub fn begin_all<T>(
     Ok(begun.into_iter().map(|(_, file)| file).collect())
 }
 
-/// Opens the file and empties it.
-///
-/// # Errors
-/// If the system refuses either.
-pub fn create_file(path: &Path) -> io::Result<File> {
-    Opened::open(path)?.empty()
-}
-
-/// The file, and its name if it was not there. Opening does not wait: a pipe without a reader would never come back.
+/// The file, and its name if it was not there.
 fn open_or_make(path: &Path) -> io::Result<(File, Option<PathBuf>)> {
     let mut options = OpenOptions::new();
-    options.write(true).custom_flags(OFlags::NONBLOCK.bits().cast_signed());
-    let (file, made) = match options.clone().create_new(true).open(path) {
-        Ok(file) => (file, Some(path.into())),
+    options.write(true);
+    match output_file::open(path, options.clone().create_new(true)) {
+        Ok(file) => Ok((file, Some(path.into()))),
         // It is there; or it is a link to a file that is not.
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
-            (options.create(true).open(path).map_err(in_words)?, None)
+            Ok((output_file::open(path, options.create(true))?, None))
         }
-        Err(error) => return Err(error),
-    };
-    // Writing does wait.
-    fcntl_setfl(&file, fcntl_getfl(&file)? - OFlags::NONBLOCK)?;
-    Ok((file, made))
-}
-
-fn in_words(error: io::Error) -> io::Error {
-    if error.raw_os_error() == Some(Errno::NXIO.raw_os_error()) {
-        return io::Error::other("nobody reads this pipe (start its reader first), or its device is gone");
+        Err(error) => Err(error),
     }
-    error
 }
 
 #[cfg(test)]
@@ -163,22 +143,8 @@ mod tests {
         assert_eq!(std::fs::read(&old).expect("readable"), b"earlier");
         assert!(!new.exists());
         for path in [&old, &new] {
-            create_file(path).expect("created");
+            Opened::open(path).and_then(Opened::empty).expect("created");
             assert_eq!(std::fs::read(path).expect("readable"), b"");
         }
-    }
-
-    #[test]
-    fn a_pipe_without_a_reader_is_refused_at_once_and_one_with_a_reader_blocks_when_it_is_full() {
-        let directory = tempfile::tempdir().expect("a directory");
-        let pipe = directory.path().join("pipe");
-        let (kind, mode) = (rustix::fs::FileType::Fifo, rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR);
-        rustix::fs::mknodat(rustix::fs::CWD, &pipe, kind, mode, 0).expect("a pipe");
-        let refused = Opened::open(&pipe).expect_err("nobody reads it").to_string();
-        assert!(refused.starts_with("nobody reads this pipe"), "{refused}");
-        let flags = OFlags::NONBLOCK.bits().cast_signed();
-        let _reader = OpenOptions::new().read(true).custom_flags(flags).open(&pipe).expect("a reader");
-        let file = create_file(&pipe).expect("somebody reads it");
-        assert!(!fcntl_getfl(&file).expect("flags").contains(OFlags::NONBLOCK));
     }
 }

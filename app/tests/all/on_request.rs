@@ -49,6 +49,7 @@ impl Run {
             extras: driver.extras(),
             period_ns: rig.period_ns,
             backpressure: WhenFull::Wait.into(),
+            taken: Vec::new(),
             book: Book::default(),
             about: About::of_run(&rig, ClockMode::Virtual, rig.period_ns, 0),
         };

@@ -5,6 +5,7 @@ use crate::moment::Moment;
 use crate::offscreen::{NoPictures, Offscreen};
 use crate::painter::Painter;
 use crate::stage::Stage;
+use rt_core::output_file;
 use std::path::Path;
 use three_d::{DepthTexture2D, Interpolation, RenderTarget, Texture2D, Wrapping};
 
@@ -28,7 +29,7 @@ impl Picture {
     /// # Errors
     /// Whatever the file system has against it.
     pub fn save(&self, file: &Path) -> std::io::Result<()> {
-        let out = std::io::BufWriter::new(std::fs::File::create(file)?);
+        let out = std::io::BufWriter::new(output_file::create(file)?);
         let mut encoder = png::Encoder::new(out, self.size[0], self.size[1]);
         encoder.set_color(png::ColorType::Rgba);
         encoder.set_depth(png::BitDepth::Eight);

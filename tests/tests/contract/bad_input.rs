@@ -2,6 +2,8 @@
 //! half-started.
 
 mod foreign_recordings;
+mod outputs;
+mod pipes;
 
 use std::ffi::{OsStr, OsString};
 use std::os::unix::ffi::OsStrExt;
@@ -13,6 +15,8 @@ use system_tests::workplace::{Running, Said, Workplace};
 const SCENE: &str = "[[finger]]\n[[entity]]\nname = \"table\"\n\
     shape = { kind = \"plane\", normal = [0.0, 1.0, 0.0], offset_m = 0.0 }\n";
 const HAND: &str = "t,f0_x,f0_y,f0_z\n0,0,0,0\n1,0,0,0\n";
+/// An object file of the thesis' own program.
+const BALL: &str = "Name=ball\nType=Object\nShape=Sphere\nRadius=0.03\nMass=0.1\n";
 /// A recording that must not be lost.
 const PRECIOUS: &str = "an earlier recording\n";
 
@@ -572,41 +576,6 @@ fn a_command_that_is_left_out_or_mistyped_is_answered_with_how_a_scene_is_played
     for arguments in [&["study", "scene.toml"][..], &["driver", "rnu"], &["replai"]] {
         let said = refused(&place, arguments);
         assert!(said.contains("unrecognized subcommand") && !said.contains(TIP), "{said}");
-    }
-}
-
-#[test]
-fn a_pipe_without_a_writer_holds_nobody_up() {
-    let place = workplace();
-    let mode = rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR;
-    for pipe in ["pipe.toml", "pipe.csv", "pipe.mcap", "pipe.obj", "pipe.ini"] {
-        let kind = rustix::fs::FileType::Fifo;
-        rustix::fs::mknodat(rustix::fs::CWD, place.path(pipe), kind, mode, 0).expect("a pipe");
-    }
-    place.write("includes.toml", format!("include = [\"pipe.toml\"]\n{SCENE}"));
-    place.write("models.toml", "[[finger]]\n[[entity]]\nshape = { kind = \"mesh\", file = \"pipe.obj\" }\n");
-    for arguments in [
-        &["run", "pipe.toml"][..],
-        &["run", "includes.toml"],
-        &["run", "models.toml"],
-        &["run", "scene.toml", "--hand", "pipe.csv"],
-        &["run", "scene.toml", "--orders", "pipe.csv"],
-        &["run", "scene.toml", "--layout", "pipe.toml"],
-        &["run", "scene.toml", "--settings", "pipe.toml"],
-        &["replay", "pipe.mcap"],
-        &["replay", "pipe.csv"],
-        &["export", "pipe.csv", "--csv", "out2.csv"],
-        &["plot", "pipe.csv"],
-        &["convert", "pipe.ini"],
-    ] {
-        let said = place.run(arguments);
-        assert_eq!(said.status, Some(2), "{arguments:?}: {}{}", said.out, said.err);
-        assert!(said.err.contains("regular file"), "{arguments:?}: {}", said.err);
-    }
-    for output in ["--record", "--events"] {
-        let said = place.run(["run", "scene.toml", "--clock", "virtual", output, "pipe.csv"]);
-        assert_eq!(said.status, Some(2), "{output}: {}{}", said.out, said.err);
-        assert_says(&said.err, &["pipe.csv", "nobody reads this pipe"]);
     }
 }
 

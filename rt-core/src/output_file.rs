@@ -1,0 +1,76 @@
+//! Files to be written, wherever a user says that they go.
+//!
+//! Problem: opening a FIFO for writing waits for a reader, for ever if nobody reads it.
+//! Model: opening never waits (`O_NONBLOCK`, which regular files ignore): a pipe that nobody reads is refused, with what
+//! to do. Writing does wait, as everybody expects of a pipe.
+
+use nix::errno::Errno;
+use nix::fcntl::{FcntlArg, OFlag, fcntl};
+use std::fs::{File, OpenOptions};
+use std::io::{self, Write};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::Path;
+
+/// Makes the file, or empties it.
+///
+/// # Errors
+/// What the system says; a pipe without a reader.
+pub fn create(path: &Path) -> io::Result<File> {
+    open(path, OpenOptions::new().write(true).create(true).truncate(true))
+}
+
+/// Makes the file, or empties it, with this content.
+///
+/// # Errors
+/// As [`create`], and whatever keeps the content from being written.
+pub fn write(path: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
+    create(path)?.write_all(content.as_ref())
+}
+
+/// Opens the file with these options, among which is writing.
+///
+/// # Errors
+/// What the system says; a pipe without a reader.
+pub fn open(path: &Path, options: &OpenOptions) -> io::Result<File> {
+    let flags = (OFlag::O_NONBLOCK | OFlag::O_NOCTTY).bits();
+    let file = options.clone().custom_flags(flags).open(path).map_err(in_words)?;
+    let flags = OFlag::from_bits_retain(fcntl(&file, FcntlArg::F_GETFL)?);
+    fcntl(&file, FcntlArg::F_SETFL(flags - OFlag::O_NONBLOCK))?;
+    Ok(file)
+}
+
+fn in_words(error: io::Error) -> io::Error {
+    if error.raw_os_error() == Some(Errno::ENXIO as i32) {
+        return io::Error::other("nobody reads this pipe (start its reader first), or its device is gone");
+    }
+    error
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pipe_without_a_reader_is_refused_at_once_and_one_with_a_reader_blocks_when_it_is_full() {
+        let pipe = std::env::temp_dir().join(format!("output-file-{}", std::process::id()));
+        nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).expect("a pipe in TMPDIR");
+        let refused = write(&pipe, "").map_err(|error| error.to_string());
+        let flags = OFlag::O_NONBLOCK.bits();
+        let reader = OpenOptions::new().read(true).custom_flags(flags).open(&pipe);
+        let file = create(&pipe);
+        std::fs::remove_file(&pipe).expect("our own");
+        assert!(refused.is_err_and(|words| words.starts_with("nobody reads this pipe")));
+        let (_reader, file) = (reader.expect("a reader"), file.expect("somebody reads it"));
+        let flags = fcntl(&file, FcntlArg::F_GETFL).expect("flags");
+        assert!(!OFlag::from_bits_retain(flags).contains(OFlag::O_NONBLOCK));
+    }
+
+    #[test]
+    fn a_file_that_is_there_is_replaced() {
+        let path = std::env::temp_dir().join(format!("output-file-replaced-{}", std::process::id()));
+        write(&path, "a longer text").and_then(|()| write(&path, "short")).expect("a file in TMPDIR");
+        let content = std::fs::read(&path).expect("our own");
+        std::fs::remove_file(&path).expect("our own");
+        assert_eq!(content, b"short");
+    }
+}
