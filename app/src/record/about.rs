@@ -25,6 +25,8 @@ const ORDERED_BEFORE: &str = "ordered_before";
 
 /// More than this of models and pictures is not put into a recording.
 const MOST_MODEL_BYTES: u64 = 64 << 20;
+/// More than this a recording's files never have: scene, hand, and the others.
+pub(super) const MOST_FILE_BYTES: u64 = 2 * MAX_TABLE_BYTES + MOST_MODEL_BYTES;
 
 /// A file that the run read.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -1,7 +1,9 @@
 //! Every mistake in a command line or a file: status 2, one message that a stranger can act on, and nothing
 //! half-started.
 
+mod damaged_recordings;
 mod foreign_recordings;
+mod mcap_bytes;
 mod outputs;
 mod pipes;
 

@@ -38,11 +38,17 @@ pub(super) struct Chunk<'a> {
     pub(super) records: &'a [u8],
 }
 
+const HEADER: u8 = 0x01;
+const FOOTER: u8 = 0x02;
 const CHANNEL: u8 = 0x04;
 const MESSAGE: u8 = 0x05;
 const CHUNK: u8 = 0x06;
+const MESSAGE_INDEX: u8 = 0x07;
+const CHUNK_INDEX: u8 = 0x08;
 const ATTACHMENT: u8 = 0x09;
+const ATTACHMENT_INDEX: u8 = 0x0a;
 const METADATA: u8 = 0x0c;
+const DATA_END: u8 = 0x0f;
 
 /// Reads a record; `None` if it is shorter than it says, or a text in it is none.
 pub(super) fn parse(opcode: u8, body: &[u8]) -> Option<McapRecord<'_>> {
@@ -63,6 +69,20 @@ pub(super) fn parse(opcode: u8, body: &[u8]) -> Option<McapRecord<'_>> {
         METADATA => McapRecord::Metadata { name: fields.text()?, facts: fields.map()? },
         _ => McapRecord::Other,
     })
+}
+
+/// What such a record is, if it may not stand in a chunk: there, the format has schemas, channels and messages. Opcodes
+/// that are not known are nobody's concern.
+pub(super) fn refused_in_chunks(opcode: u8) -> Option<&'static str> {
+    match opcode {
+        CHUNK => Some("a chunk"),
+        ATTACHMENT => Some("an attachment"),
+        METADATA => Some("metadata"),
+        HEADER | FOOTER | MESSAGE_INDEX..=CHUNK_INDEX | ATTACHMENT_INDEX..=DATA_END => {
+            Some("a part of the file's frame")
+        }
+        _ => None,
+    }
 }
 
 /// A record's opcode and its content.

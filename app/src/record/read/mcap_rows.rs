@@ -5,7 +5,7 @@ use super::mcap_chunk::{self, ChunkError};
 use super::mcap_record::{self, McapRecord};
 use super::tick_order::{TickOrder, check_period};
 use crate::columns::Names;
-use crate::record::about::{About, InputFile, names_of};
+use crate::record::about::{About, InputFile, MOST_FILE_BYTES, names_of};
 use crate::record::mcap_file::{ABOUT, COLUMNS, ORDER_TOPIC, TICK_TOPIC};
 use crate::record::schema::order;
 use crate::record::tick;
@@ -20,6 +20,8 @@ use std::path::{Path, PathBuf};
 
 /// A longer record is none of ours.
 const MOST_RECORD_BYTES: usize = 256 << 20;
+/// Orders of a run take no more: a key that goes down and up every second for a day takes half of it.
+const MOST_ORDER_BYTES: usize = 16 << 20;
 /// Read at once.
 const AT_ONCE_BYTES: usize = 256 * 1024;
 
@@ -40,6 +42,9 @@ pub(super) struct McapRows {
     pub(super) cut: Option<String>,
     /// Orders that were met so far, each with its tick.
     pub(super) orders: Vec<(u64, String)>,
+    /// What they take, and the files of the run.
+    order_bytes: usize,
+    file_bytes: u64,
 }
 
 /// The records of a chunk, and where the next one begins.
@@ -88,6 +93,8 @@ impl McapRows {
             about: About::default(),
             cut: None,
             orders: Vec::new(),
+            order_bytes: 0,
+            file_bytes: 0,
         };
         rows.first = rows.read_row()?;
         if !rows.is_of_a_run() {
@@ -125,6 +132,10 @@ impl McapRows {
             let Some(((opcode, body), behind)) = mcap_record::split_record(rest) else {
                 return Err(self.damaged("a chunk ends in the middle of a record"));
             };
+            if let Some(what) = mcap_record::refused_in_chunks(opcode) {
+                let why = format!("a chunk holds {what}; allowed: schemas, channels and messages");
+                return Err(self.damaged(&why));
+            }
             self.chunk.at = self.chunk.records.len() - behind.len();
             let found = own(opcode, body, self.channels, &self.names);
             return self.keep(found);
@@ -187,25 +198,58 @@ impl McapRows {
                 self.order.check(row.run_tick, self.period_ns).map_err(|why| self.damaged(&why))?;
                 return Ok(Found::Row(Box::new(row), bodies));
             }
-            Kept::Facts(name, facts) if name == ABOUT => {
-                self.period_ns = facts.get("period_ns").and_then(|text| text.parse().ok()).unwrap_or(0);
-                self.about.facts = facts;
-            }
-            Kept::Facts(name, facts) if name == COLUMNS => {
-                let names = names_of(&facts);
-                self.names =
-                    names.ok_or_else(|| self.damaged("the names of the columns are not complete"))?;
-            }
+            Kept::Facts(name, facts) if name == ABOUT || name == COLUMNS => self.take_facts(&name, facts)?,
             Kept::Chunk(Ok(records)) => self.chunk = OpenChunk { records, at: 0 },
             Kept::Chunk(Err(ChunkError::Damage(why))) => return Err(self.damaged(&why)),
             Kept::Chunk(Err(ChunkError::Compression(other))) => return Err(self.compressed_by(&other)),
             Kept::Damage => return Err(self.damaged("a record is shorter than it says")),
-            Kept::File(file) => self.about.files.push(file),
-            Kept::Order(order) => self.orders.extend(order),
+            Kept::File(file) => self.take_file(file)?,
+            Kept::Order(order) => order.map_or(Ok(()), |order| self.take_order(order))?,
             Kept::Channels(found) => self.channels = found,
             Kept::Facts(..) | Kept::Nothing => {}
         }
         Ok(Found::Other)
+    }
+
+    /// Takes what is told of the run, which its rows are read by: behind the first of them it stays as it is.
+    fn take_facts(&mut self, name: &str, facts: Facts) -> Result<(), ReadError> {
+        let (mut about, mut names) = (None, None);
+        if name == ABOUT {
+            about = Some(facts).filter(|facts| *facts != self.about.facts);
+        } else {
+            let read = names_of(&facts);
+            let read = read.ok_or_else(|| self.damaged("the names of the columns are not complete"))?;
+            names = Some(read).filter(|names| *names != self.names);
+        }
+        if self.rows > 0 && (about.is_some() || names.is_some()) {
+            return Err(self.damaged(&format!("its {name} changes behind the first row")));
+        }
+        if let Some(facts) = about {
+            self.period_ns = facts.get("period_ns").and_then(|text| text.parse().ok()).unwrap_or(0);
+            self.about.facts = facts;
+        }
+        self.names = names.unwrap_or_else(|| std::mem::take(&mut self.names));
+        Ok(())
+    }
+
+    fn take_file(&mut self, file: InputFile) -> Result<(), ReadError> {
+        self.file_bytes += (file.name.len() + file.bytes.len()) as u64;
+        if self.file_bytes > MOST_FILE_BYTES {
+            let why = format!("its files have more than {} MiB, the most of a run", MOST_FILE_BYTES >> 20);
+            return Err(self.damaged(&why));
+        }
+        self.about.files.push(file);
+        Ok(())
+    }
+
+    fn take_order(&mut self, order: (u64, String)) -> Result<(), ReadError> {
+        self.order_bytes += size_of_val(&order) + order.1.len();
+        if self.order_bytes > MOST_ORDER_BYTES {
+            let why = format!("its orders take more than {} MiB", MOST_ORDER_BYTES >> 20);
+            return Err(self.damaged(&why));
+        }
+        self.orders.push(order);
+        Ok(())
     }
 
     fn compressed_by(&self, other: &str) -> ReadError {

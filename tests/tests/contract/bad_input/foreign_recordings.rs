@@ -1,5 +1,6 @@
 //! Recordings that another program made or rewrote: what is said of them is true, and what can be read is read.
 
+use super::mcap_bytes::{CHUNK, chunk, file, record, records, text};
 use super::{assert_says, refused, with_recordings, workplace};
 use std::fs;
 use system_tests::workplace::Workplace;
@@ -12,23 +13,6 @@ fn with_table() -> (Workplace, String) {
     (place, good)
 }
 
-const MAGIC: &[u8] = b"\x89MCAP0\r\n";
-const CHUNK: u8 = 0x06;
-
-fn record(opcode: u8, body: &[u8]) -> Vec<u8> {
-    [&[opcode][..], &(body.len() as u64).to_le_bytes(), body].concat()
-}
-
-fn text(text: &str) -> Vec<u8> {
-    [&(text.len() as u32).to_le_bytes()[..], text.as_bytes()].concat()
-}
-
-fn chunk(times: &[u8], length: u64, compression: &str, records: &[u8]) -> Vec<u8> {
-    let stored = (records.len() as u64).to_le_bytes();
-    let body = [times, &length.to_le_bytes(), &[0; 4], &text(compression), &stored, records].concat();
-    record(CHUNK, &body)
-}
-
 /// A sound file of somebody else, with JSON on a channel that is called as ours is.
 fn of_json(in_chunk: Option<&str>) -> Vec<u8> {
     let channel = [&[7, 0, 0, 0][..], &text("/tick"), &text("json"), &[0; 4]].concat();
@@ -39,27 +23,19 @@ fn of_json(in_chunk: Option<&str>) -> Vec<u8> {
         None => records,
     };
     let header = record(0x01, &[text(""), text("elsewhere")].concat());
-    let end = [record(0x0f, &[0; 4]), record(0x02, &[0; 20])].concat();
-    [MAGIC, &header, &data, &end, MAGIC].concat()
+    file([header, data, record(0x0f, &[0; 4]), record(0x02, &[0; 20])])
 }
 
 /// The same recording, its chunks said to be compressed by zstd.
 fn with_zstd(ours: &[u8]) -> Vec<u8> {
-    let mut rewritten = MAGIC.to_vec();
-    let mut rest = &ours[MAGIC.len()..ours.len() - MAGIC.len()];
-    while let Some((head, behind)) = rest.split_at_checked(9) {
-        let length = u64::from_le_bytes(head[1..].try_into().expect("8 bytes")) as usize;
-        let body = &behind[..length];
-        match head[0] {
-            CHUNK => {
-                let content = u64::from_le_bytes(body[16..24].try_into().expect("8 bytes"));
-                rewritten.extend(chunk(&body[..16], content, "zstd", &body[28 + 4 + 3 + 8..]));
-            }
-            opcode => rewritten.extend(record(opcode, body)),
+    let rewritten = records(ours).into_iter().map(|(opcode, body)| match opcode {
+        CHUNK => {
+            let content = u64::from_le_bytes(body[16..24].try_into().expect("8 bytes"));
+            chunk(&body[..16], content, "zstd", &body[28 + 4 + 3 + 8..])
         }
-        rest = &behind[length..];
-    }
-    [&rewritten, MAGIC].concat()
+        _ => record(opcode, body),
+    });
+    file(rewritten)
 }
 
 #[test]
@@ -178,8 +154,10 @@ fn a_recording_that_is_damaged_is_exported_and_drawn_up_to_there_and_both_end_wi
 }
 
 #[test]
-fn a_recording_without_rows_is_told_as_such_where_there_is_nothing_to_draw() {
+fn of_a_recording_without_rows_nothing_is_drawn_and_no_table_is_made() {
     let (place, good) = with_table();
     place.write("header.csv", good.lines().take(1).map(|line| format!("{line}\n")).collect::<String>());
-    assert_says(&refused(&place, &["plot", "header.csv"]), &["header.csv: it has no rows"]);
+    for command in [&["plot", "header.csv"][..], &["export", "header.csv", "out.csv", "new.parquet"]] {
+        assert_says(&refused(&place, command), &["header.csv: it has no rows"]);
+    }
 }
