@@ -41,7 +41,8 @@ const MOST_ORDERS: usize = 1024;
 const MAX_ORDERS_BYTES: u64 = 16 << 20;
 /// The most worlds of a script: all are made before it begins.
 const MOST_WORLDS: usize = 32;
-/// The longest order of the standard input.
+/// A longer line of the standard input is no text: none is looked for behind it. An order has
+/// [`LONGEST_LINE_BYTES`](words::LONGEST_LINE_BYTES) at most.
 const MOST_LINE_BYTES: usize = 64 << 10;
 /// Lines that may wait to be looked at; who writes more waits.
 const LINES: usize = 64;
@@ -366,23 +367,34 @@ fn listen() -> std::io::Result<Receiver<String>> {
     let (send, receive) = mpsc::sync_channel(LINES);
     std::thread::Builder::new().name("orders".into()).spawn(move || {
         let input = BoundedLines::new(std::io::stdin(), MOST_LINE_BYTES);
-        for (number, line) in BufReader::new(input).lines().enumerate() {
+        for (number, line) in (1..).zip(BufReader::new(input).split(b'\n')) {
             let line = match line {
-                // Windows' shells put a byte order mark before what they pipe.
-                Ok(line) if number == 0 => line.trim_start_matches('\u{feff}').to_owned(),
-                Ok(line) => line,
+                Ok(line) => text(number, line),
                 Err(error) => {
                     say(format_args!(
-                        "phantom3: --orders -: {error}; no orders are read from here on; allowed: lines of text of \
-                         {MOST_LINE_BYTES} bytes at most"
+                        "phantom3: --orders -: {error}; no orders are read from here on; allowed: lines of text of {} \
+                         bytes at most",
+                        words::LONGEST_LINE_BYTES
                     ));
                     break;
                 }
             };
-            if send.send(line).is_err() {
+            if line.is_some_and(|line| send.send(line).is_err()) {
                 break;
             }
         }
     })?;
     Ok(receive)
+}
+
+/// The line of this number as text; `None`, which is told: it is none.
+fn text(number: u64, line: Vec<u8>) -> Option<String> {
+    let Ok(line) = String::from_utf8(line) else {
+        say(format_args!(
+            "phantom3: order refused: line {number} is not UTF-8 text; write it with the characters of UTF-8"
+        ));
+        return None;
+    };
+    // Windows' shells put a byte order mark before what they pipe.
+    Some(if number == 1 { line.trim_start_matches('\u{feff}').to_owned() } else { line })
 }

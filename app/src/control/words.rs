@@ -142,7 +142,7 @@ fn check_length(line: &str) -> Result<(), String> {
 }
 
 /// Longer than any text that people can read in a window.
-const LONGEST_LINE_BYTES: usize = 1000;
+pub const LONGEST_LINE_BYTES: usize = 1000;
 
 /// Whether an order takes the memory of a world.
 pub fn makes_a_world(order: &str) -> bool {

@@ -504,6 +504,21 @@ fn a_line_without_an_end_takes_no_memory_for_it() {
     let said = place.shell(script, &["--clock", "lockstep", "--seconds", "2", "--orders", "-"]);
     assert_eq!(said.status, Some(0), "{}", said.err);
     assert_says(&said.err, &["--orders -: a line has more than 65536 bytes", "no orders are read"]);
+    assert_says(&said.err, &["allowed: lines of text of 1000 bytes at most"]);
+}
+
+#[test]
+fn a_line_of_the_standard_input_that_is_no_order_costs_none_of_those_behind_it() {
+    let place = workplace();
+    let script = r#"{ printf 'key \377 down\n'; printf 'text 0.5 0.5 1 %2000d\n' 0; printf 'key 32 down\n'; } |
+        "$0" "$@""#;
+    let said = place.shell(script, &["--clock", "lockstep", "--seconds", "2", "--orders", "-"]);
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    assert_says(&said.out, &["orders       1\n"]);
+    let refusals: Vec<&str> = said.err.lines().filter(|line| line.contains("order refused: ")).collect();
+    assert_eq!(refusals.len(), 2, "{}", said.err);
+    assert_says(refusals[0], &["line 1 is not UTF-8 text"]);
+    assert_says(refusals[1], &["a line of 2015 bytes, allowed: at most 1000"]);
 }
 
 #[test]
