@@ -40,6 +40,7 @@ mod camera;
 mod colour;
 mod csg;
 mod document;
+mod document_size;
 mod dynamics;
 mod effects;
 mod entity;
