@@ -100,7 +100,7 @@ pub use key_file::{KeyLine, parse_key_lines, read_key_lines};
 pub use layout::Layout;
 pub use light::{LightKind, SceneLight};
 pub use motion::{MassSpec, MotionSpec};
-pub use names::MAX_NAME_BYTES;
+pub use names::{MAX_NAME_BYTES, is_name};
 pub use passivity::PassivitySpec;
 pub use placement::{Affine, LEAST_STRETCH, MOST_STRETCH, Placement};
 pub use scene::Scene;
