@@ -6,10 +6,11 @@
 mod spoil;
 
 use input_targets::{TARGETS, Target};
+use patience::BoundedChild;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use spoil::{Random, spoilt};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// What a target may take, of address space beyond what the test itself has: as much as the fuzzer allows.
@@ -20,6 +21,15 @@ const MOST_TIME: Duration = Duration::from_secs(20);
 const ROUNDS: u64 = 100;
 /// Set in the process that runs one target.
 const TARGET: &str = "INPUT_TARGET";
+
+/// For all inputs of a target. One that hangs is killed, and the last name among its words is that of the input.
+fn longest_run() -> Duration {
+    Duration::from_secs(300) + Duration::from_millis(100) * rounds() as u32
+}
+
+fn rounds() -> u64 {
+    std::env::var("INPUT_ROUNDS").ok().and_then(|rounds| rounds.parse().ok()).unwrap_or(ROUNDS)
+}
 
 fn inputs(target: &str) -> Vec<PathBuf> {
     let of = |place: &str| Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz").join(place).join(target);
@@ -42,7 +52,8 @@ fn all_inputs_of_every_target_end_soon_and_within_their_memory() {
     for (name, _) in TARGETS {
         let mut child = Command::new(std::env::current_exe().expect("this test"));
         child.args(["--exact", "--ignored", "--nocapture", "one_target"]).env(TARGET, name);
-        let out = child.output().expect("this test once more");
+        let child = child.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+        let out = child.expect("this test once more").output_within(longest_run());
         let said = String::from_utf8_lossy(&out.stderr);
         assert!(out.status.success(), "{name}: {}\n{said}", out.status);
     }
@@ -61,11 +72,10 @@ fn one_target() {
         try_soon(*target, &bytes);
         corpus.push(bytes);
     }
-    let rounds = std::env::var("INPUT_ROUNDS").ok().and_then(|rounds| rounds.parse().ok()).unwrap_or(ROUNDS);
     // Kept until the next is tried, so that what failed is there.
     let kept = std::env::temp_dir().join(format!("phantom3-spoilt-{name}-{}", std::process::id()));
     eprintln!("spoilt inputs; the one that fails is left in {}", kept.display());
-    for round in 0..rounds {
+    for round in 0..rounds() {
         let mut random = Random::of(&name, round);
         let [good, other] = [0; 2].map(|_| &corpus[random.below(corpus.len())]);
         let bytes = spoilt(good, other, &mut random);
