@@ -175,8 +175,8 @@ impl Recipient for Desk<'_> {
                     NotCleared::NotAllowed => Verdict::NotAllowed,
                 })?;
             }
-            ServerEvent::EmergencyStopRequested { pid, uid } => {
-                self.sender.urgent.stop(Some(uid));
+            ServerEvent::EmergencyStopRequested { pid, uid, asked_ns } => {
+                self.sender.urgent.stop(Some(uid), asked_ns);
                 say(self.options, format_args!("emergency stop, asked for by process {pid} of user {uid}"));
             }
             ServerEvent::ZeroRequested { pid, devices, .. } => {

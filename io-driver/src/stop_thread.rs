@@ -10,6 +10,7 @@
 
 use crate::say::say;
 use crate::urgent::Urgent;
+use rt_core::clock::monotonic_ns;
 use rt_core::signals;
 use shm_abi::stop_socket::{Drain, StopSocket};
 use std::io;
@@ -49,7 +50,7 @@ fn run(mut socket: StopSocket, mut queue: Queue, urgent: &Urgent, is_quiet: bool
         let may_take = queue.is_taken();
         // A signal interrupts, which is no failure; of any other one the rest is a slower turn.
         if let Ok(user) = socket.hear() {
-            let is_new = urgent.stop(user);
+            let is_new = urgent.stop(user, monotonic_ns());
             if may_take {
                 queue.take();
             }

@@ -64,11 +64,11 @@ struct Words {
 }
 
 impl Urgent {
-    /// All motors off with the loop's next tick. `user` is who asks, if that is known. Returns whether no emergency stop
-    /// of anybody stood before.
-    pub fn stop(&self, user: Option<u32>) -> bool {
+    /// All motors off with the loop's next tick. `user` is who asks, if that is known, and `asked_ns` when (CLOCK_MONOTONIC).
+    /// Returns whether no emergency stop of anybody stood before.
+    pub fn stop(&self, user: Option<u32>, asked_ns: u64) -> bool {
         // Before the stop itself: whoever sees that sees when it was.
-        self.0.stopped_ns.fetch_max(monotonic_ns(), Ordering::Release);
+        self.0.stopped_ns.fetch_max(asked_ns, Ordering::Release);
         let mut former = StoppedBy::Nobody;
         self.update(|state| {
             former = by_of(state);
@@ -181,11 +181,11 @@ mod tests {
     #[test]
     fn a_request_to_leave_a_fault_that_is_heard_late_does_not_undo_a_stop_that_came_after_it() {
         let urgent = Urgent::default();
-        urgent.stop(Some(ANN));
+        urgent.stop(Some(ANN), monotonic_ns());
         assert!(urgent.take().emergency_stop);
         let asked_ns = monotonic_ns() + 1;
         while monotonic_ns() <= asked_ns {}
-        urgent.stop(Some(ANN));
+        urgent.stop(Some(ANN), monotonic_ns());
         assert!(urgent.take().emergency_stop);
         assert_eq!(urgent.clear_fault(asked_ns, |_| true), Err(NotCleared::Outdated));
         assert!(!urgent.take().clear_fault);
@@ -211,7 +211,10 @@ mod tests {
     fn a_stop_stands_whatever_number_of_faults_came_before() {
         let urgent = Urgent::default();
         urgent.0.state.store(COUNT, Ordering::Relaxed);
-        assert!(urgent.stop(Some(ANN)) && !urgent.stop(Some(ANN)), "the first one is new");
+        assert!(
+            urgent.stop(Some(ANN), monotonic_ns()) && !urgent.stop(Some(ANN), monotonic_ns()),
+            "the first one is new"
+        );
         urgent.0.state.fetch_or(COUNT, Ordering::Relaxed);
         urgent.fault_began();
         assert_eq!(urgent.stopped_by(), StoppedBy::User(ANN));
@@ -221,9 +224,9 @@ mod tests {
     #[test]
     fn a_stop_of_several_is_left_by_none_of_them_alone() {
         let urgent = Urgent::default();
-        urgent.stop(Some(ANN));
+        urgent.stop(Some(ANN), monotonic_ns());
         assert_eq!(urgent.stopped_by(), StoppedBy::User(ANN));
-        urgent.stop(Some(BEN));
+        urgent.stop(Some(BEN), monotonic_ns());
         assert_eq!(urgent.stopped_by(), StoppedBy::Several);
         assert!(urgent.take().emergency_stop);
         assert!(now(&urgent, own(ANN)) == NOT_ALLOWED && now(&urgent, own(BEN)) == NOT_ALLOWED);
@@ -237,7 +240,7 @@ mod tests {
     fn a_stop_cancels_a_request_to_leave_a_fault_that_came_before_it() {
         let urgent = Urgent::default();
         assert_eq!(now(&urgent, own(BEN)), Ok(()));
-        urgent.stop(Some(ANN));
+        urgent.stop(Some(ANN), monotonic_ns());
         let asked = urgent.take();
         assert!(asked.emergency_stop && !asked.clear_fault, "{asked:?}");
         assert_eq!(urgent.stopped_by(), StoppedBy::User(ANN));
@@ -246,7 +249,7 @@ mod tests {
     #[test]
     fn a_stop_that_the_loop_has_not_seen_stays_its_makers() {
         let urgent = Urgent::default();
-        urgent.stop(Some(ANN));
+        urgent.stop(Some(ANN), monotonic_ns());
         assert_eq!(now(&urgent, own(ANN)), Ok(()));
         assert_eq!(urgent.stopped_by(), StoppedBy::User(ANN));
         let asked = urgent.take();
@@ -258,7 +261,7 @@ mod tests {
         let urgent = Urgent::default();
         urgent.end_lease(7);
         urgent.end_lease(5);
-        urgent.stop(None);
+        urgent.stop(None, monotonic_ns());
         assert_eq!(urgent.take(), Asked { emergency_stop: true, clear_fault: false, ended_lease: 7 });
         assert_eq!(urgent.take(), Asked { emergency_stop: false, clear_fault: false, ended_lease: 7 });
         assert_eq!(urgent.stopped_by(), StoppedBy::Several, "nobody knows whose it is");

@@ -200,16 +200,19 @@ pub fn clear_fault(socket: &Path, name: &str) -> Result<(), AttachError> {
     exchange(socket, &Request::new(RequestKind::ClearFault, name)).map(|_| ())
 }
 
-/// Asks the driver to switch all motors off at once, by datagram and over a connection. They stay off until
-/// [`clear_fault`]. That it was asked does not say that it was done: a frame tells.
+/// Asks the driver to switch all motors off at once: by datagram, which a driver hears whose service is stuck, else over
+/// a connection. They stay off until [`clear_fault`]. That it was asked does not say that it was done: a frame tells,
+/// and a fault that is to be left is to be waited for first.
 ///
 /// # Errors
 /// Why it could be asked in neither way.
 pub fn emergency_stop(socket: &Path, name: &str) -> Result<(), AttachError> {
-    let sent = stop_socket::send(socket);
-    let answered = exchange(socket, &Request::new(RequestKind::EmergencyStop, name));
-    // A service that is stuck answers nothing, and the datagram is heard all the same.
-    if sent.is_ok() { Ok(()) } else { answered.map(|_| ()) }
+    stop_socket::send(socket).or_else(|_| emergency_stop_over_connection(socket, name))
+}
+
+/// The same over a connection alone, whose answer says that the driver has heard it.
+pub fn emergency_stop_over_connection(socket: &Path, name: &str) -> Result<(), AttachError> {
+    exchange(socket, &Request::new(RequestKind::EmergencyStop, name)).map(|_| ())
 }
 
 /// Tells the driver that devices lie in their home pose now: bit `i` of `devices` means device `i`, 0 all of

@@ -93,6 +93,8 @@ pub enum ServerEvent {
         pid: u64,
         /// Whose process it is.
         uid: u32,
+        /// When it was asked, by CLOCK_MONOTONIC (ns); no later than it was.
+        asked_ns: u64,
     },
     /// Somebody says that devices lie in their home pose now.
     ZeroRequested {
@@ -345,7 +347,7 @@ impl Server {
                 self.pass_on(index, ServerEvent::ClearFaultRequested { uid, is_administrator, asked_ns }, to)
             }
             RequestKind::EmergencyStop => {
-                self.pass_on(index, ServerEvent::EmergencyStopRequested { pid, uid }, to)
+                self.pass_on(index, ServerEvent::EmergencyStopRequested { pid, uid, asked_ns }, to)
             }
             RequestKind::Zero => self.pass_on(
                 index,

@@ -148,7 +148,15 @@ fn wait_for_state(stand: &Stand, is_fault: bool) {
     });
 }
 
-/// Ten thousand attempts a second; whoever stops the motors meanwhile, over a connection or by datagram, is served.
+/// Fewer attempts are no flood (1/s): a machine that is busy with other tests makes several thousand of the ten.
+const LEAST_FLOOD_PER_S: f64 = 1000.0;
+/// Of a CPU, for one attempt (s): 25 us were measured.
+const MOST_ATTEMPT_S: f64 = 75e-6;
+/// Of a CPU, for what the stops ask.
+const REST_SHARE: f64 = 0.1;
+
+/// Attempts to connect without an end, ten thousand a second where the machine has time for so many; whoever stops the motors
+/// meanwhile, over a connection or by datagram, is served.
 fn stops_under_a_flood(duration: Duration) {
     let stand = Stand::start(Setup::new("real"));
     let (cpu, ticks) = (cpu_of_service(stand.driver.id()), stand.view().latest_tick().unwrap_or(0));
@@ -160,7 +168,7 @@ fn stops_under_a_flood(duration: Duration) {
     while begun.elapsed() < duration {
         let asked = std::time::Instant::now();
         if stops % 2 == 0 {
-            client::emergency_stop(&stand.socket(), "test").expect("it is served");
+            client::emergency_stop_over_connection(&stand.socket(), "test").expect("it is served");
         } else {
             stop_socket::send(&stand.socket()).expect("it is heard");
         }
@@ -178,25 +186,26 @@ fn stops_under_a_flood(duration: Duration) {
     drop(flood);
     let share = (cpu_of_service(stand.driver.id()) - cpu) / seconds;
     let ticks = stand.view().latest_tick().unwrap_or(0) - ticks;
-    println!(
+    let told = format!(
         "{attempts:.0} attempts a second, {stops} stops, slowest {slowest:?}; service {:.0} % of a CPU; \
          {} of {ticks} ticks skipped",
         100.0 * share,
         overruns() - overruns_before
     );
-    assert!(stops > 0 && attempts > 1000.0, "{stops} stops, {attempts} attempts a second");
-    // 16 000 connections a second at most, some 20 us each; the rest is a machine that counts roughly.
-    assert!(share < 0.6, "{share} of a CPU");
+    println!("{told}");
+    assert!(stops > 0 && attempts > LEAST_FLOOD_PER_S, "{told}");
+    // A service that did not sleep between attempts would take all of a CPU.
+    assert!(share < REST_SHARE + attempts * MOST_ATTEMPT_S, "{told}");
     stand.finish();
 }
 
 #[test]
-fn stops_are_served_under_ten_thousand_connections_a_second() {
+fn stops_are_served_under_a_flood_of_connections() {
     stops_under_a_flood(Duration::from_secs(3));
 }
 
 #[test]
 #[ignore = "a minute: cargo test -p system-tests --test faults_descriptors -- --ignored --nocapture"]
-fn stops_are_served_under_ten_thousand_connections_a_second_for_a_minute() {
+fn stops_are_served_under_a_flood_of_connections_for_a_minute() {
     stops_under_a_flood(Duration::from_secs(60));
 }

@@ -332,7 +332,7 @@ fn every_system_call_of_the_driver_passes_the_units_filter() {
     service.hear_until("WATCHDOG=1");
     succeed(&mut service.io_driver("status"));
     // A driver that is traced may take longer than the tenth of a second after which it says so.
-    assert!(service.io_driver("stop").status().expect("it runs").success());
+    assert!(service.io_driver("stop").bounded_status().expect("it runs").success());
     assert_eq!(wait_or_kill(&mut service.child).code(), Some(0));
     let text = fs::read_to_string(trace.path()).expect("the trace");
     let calls: BTreeSet<&str> = text

@@ -1,7 +1,10 @@
-//! SAFETY.md names the tests that show each guard, ARCHITECTURE.md sources; each of them is there.
+//! SAFETY.md names the tests that show each guard, ARCHITECTURE.md sources, README.md the lines of a report; each of them is
+//! there.
 
 #[path = "safety_document/architecture.rs"]
 mod architecture;
+#[path = "safety_document/report.rs"]
+mod report;
 
 use std::fs;
 use std::path::{Path, PathBuf};

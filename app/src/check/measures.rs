@@ -1,7 +1,8 @@
 //! Sizes and masses of what is in a scene.
 //!
 //! Model: the size of a thing is that of the box around it along its own axes; of a mesh by its vertices, of patches and of
-//! solids that are joined by the triangles that are drawn of them. The mass is the one that a run has, also where the
+//! solids that are joined by the triangles that are drawn of them. A mesh that is only seen is not among what runs; its
+//! file is read for its vertices. The mass is the one that a run has, also where the
 //! scene gives a density.
 
 use crate::rig::Rig;
@@ -9,8 +10,10 @@ use haptics::{Entity, Shape};
 use nalgebra::{Point3, Vector3};
 use physics::collide::bounding_ball;
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
 use view::shapes::triangles;
-use world::{EntityKind, SceneEntity, ShapeSpec};
+use world::{EntityKind, MeshSpec, SceneEntity, ShapeSpec, model};
 
 /// What can be measured of an entity.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,8 +22,10 @@ pub(super) struct Measures {
     pub(super) kind: &'static str,
     /// Part of an environment, in which fingers are.
     pub(super) is_around: bool,
-    /// Along its own axes (m); `None`: it has no end.
+    /// Along its own axes (m); `None`: it has no end, or is not known.
     pub(super) size_m: Option<[f64; 3]>,
+    /// Whether it has none.
+    is_endless: bool,
     /// The middle of that, in the world (m).
     pub(super) middle_m: [f64; 3],
     /// `None`: it is fixed.
@@ -35,12 +40,21 @@ impl Measures {
         for (index, mass_kg) in rig.masses(entities) {
             masses[index] = Some(mass_kg);
         }
+        let mut seen = SeenMeshes::default();
         let pairs = rig.scene.entities.iter().zip(entities).zip(masses);
-        pairs.map(|((spec, entity), mass_kg)| Self::of(spec, entity, mass_kg)).collect()
+        pairs.map(|((spec, entity), mass_kg)| Self::of(spec, entity, mass_kg, &mut seen)).collect()
     }
 
-    fn of(spec: &SceneEntity, entity: &Entity, mass_kg: Option<f64>) -> Self {
-        let around = corners(&spec.shape, &entity.shape);
+    fn of(spec: &SceneEntity, entity: &Entity, mass_kg: Option<f64>, seen: &mut SeenMeshes) -> Self {
+        let only_seen = match (&spec.shape, &entity.shape) {
+            (ShapeSpec::Mesh(_), Shape::Mesh(_)) => None,
+            (ShapeSpec::Mesh(mesh), _) => Some(mesh),
+            _ => None,
+        };
+        let around = match only_seen {
+            Some(mesh) => seen.corners(mesh),
+            None => corners(&spec.shape, &entity.shape),
+        };
         let middle = around.map_or_else(Vector3::zeros, |[least, most]| 0.5 * (least + most));
         // A unit of density makes what the volume is.
         let volume_m3 = mass_kg.and_then(|_| physics::MassProperties::of_density(&entity.shape, 1.0).ok());
@@ -49,13 +63,14 @@ impl Measures {
             kind: spec.shape.kind(),
             is_around: spec.kind == EntityKind::Environment,
             size_m: around.map(|[least, most]| (most - least).into()),
+            is_endless: around.is_none() && only_seen.is_none(),
             middle_m: (spec.pose * Point3::from(middle)).coords.into(),
             mass_kg,
             density_kg_m3: mass_kg.zip(volume_m3).map(|(mass_kg, of_one)| mass_kg / of_one.mass_kg),
         }
     }
 
-    /// The longest side (m); `None`: it has no end.
+    /// The longest side (m); `None`: it has no end, or is not known.
     pub(super) fn length_m(&self) -> Option<f64> {
         self.size_m.map(|size| size.into_iter().fold(0.0, f64::max))
     }
@@ -73,7 +88,8 @@ impl std::fmt::Display for Measures {
         write!(f, "{}: {}", self.name, self.kind)?;
         match self.size_m {
             Some([x, y, z]) => write!(f, ", {} x {} x {} m", short(x), short(y), short(z))?,
-            None => write!(f, ", without an end")?,
+            None if self.is_endless => write!(f, ", without an end")?,
+            None => write!(f, ", size not measured")?,
         }
         let [x, y, z] = self.middle_m.map(short);
         write!(f, ", at ({x}, {y}, {z}) m")?;
@@ -81,6 +97,19 @@ impl std::fmt::Display for Measures {
             write!(f, ", {} kg", short(mass_kg))?;
         }
         self.density_kg_m3.map_or(Ok(()), |density| write!(f, " ({} kg/m^3)", short(density)))
+    }
+}
+
+/// The boxes around meshes that are only seen (m), each file read once; `None`: it cannot be read, which is warned of.
+#[derive(Debug, Default)]
+struct SeenMeshes(BTreeMap<PathBuf, Option<[Vector3<f64>; 2]>>);
+
+impl SeenMeshes {
+    fn corners(&mut self, mesh: &MeshSpec) -> Option<[Vector3<f64>; 2]> {
+        let measure = || around(model::load(&mesh.file).ok()?.vertices.into_iter());
+        let corners = (*self.0.entry(mesh.file.clone()).or_insert_with(measure))?;
+        let scale = Vector3::from(mesh.scale);
+        around(corners.into_iter().map(|corner| corner.component_mul(&scale)))
     }
 }
 

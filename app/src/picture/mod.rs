@@ -11,14 +11,15 @@ mod table;
 mod visit;
 
 use crate::outcome::{RunFailure, Stop};
+use crate::outputs::tell;
 use clap::Args;
 use figure::{of_entity, of_objects, of_run};
-use io_driver::say::tell;
 use plot::{Figure, PlotError};
 use recorded::{Recorded, RecordedFinger};
+use rt_core::plain_text::Plain;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
-use visit::visits;
+use visit::{file_stems, visits};
 
 /// What is to be drawn.
 #[derive(Debug, Args)]
@@ -106,11 +107,11 @@ fn draw(
             args.recording.display()
         )));
     }
-    for visit in &felt {
+    for (visit, stem) in felt.iter().zip(file_stems(&felt)) {
         let other = felt_against.iter().find(|other| other.entity == visit.entity);
         let other = against.map(Recorded::label).zip(other);
         let other = other.as_ref().map(|(label, other)| (label.as_str(), *other));
-        write(&of_entity(visit, other), &out.join(&visit.entity), args.svg_only)?;
+        write(&of_entity(visit, other), &out.join(stem), args.svg_only)?;
     }
     Ok(())
 }
@@ -144,6 +145,6 @@ fn write(figure: &Figure, stem: &Path, svg_only: bool) -> Result<(), RunFailure>
         figure.write(stem).map_err(late)?;
         ".svg, .png"
     };
-    tell(format_args!("written      {}{written}", stem.display()));
+    tell(&format_args!("written      {}{written}", Plain(stem.display())), false);
     Ok(())
 }

@@ -61,6 +61,8 @@ pub(super) enum RecordedError {
     NoColumn { file: PathBuf, column: String, hint: &'static str },
     #[error("{file}:{line}: {column} is {found:?}; allowed: a number")]
     NoNumber { file: PathBuf, line: u64, column: String, found: String },
+    #[error("{file}:{line}: {why}")]
+    BadTime { file: PathBuf, line: u64, why: String },
     #[error("{file}: it has no rows")]
     NoRows { file: PathBuf },
     #[error("{file}: no row between {from_s} s and {to_s} s; it lasts from {first_s} s to {last_s} s")]
@@ -108,7 +110,7 @@ impl Recorded {
         let mut damage = None;
         loop {
             let row = table.next_row().and_then(|row| {
-                row.map(|row| Sample::read(&Row { table: &table, row }, time, &columns, &places)).transpose()
+                row.map(|row| Sample::read(&mut table, &row, time, &columns, &places)).transpose()
             });
             match row {
                 Ok(Some(sample)) => {
@@ -219,12 +221,12 @@ impl Columns {
 /// A row, and what it takes to say what is wrong with it.
 struct Row<'t> {
     table: &'t Table,
-    row: TableRow,
+    row: &'t TableRow,
 }
 
 impl Row<'_> {
     fn number(&self, column: usize) -> Result<f64, RecordedError> {
-        self.table.number(&self.row, column)
+        self.table.number(self.row, column)
     }
 
     fn vector(&self, columns: [usize; 3]) -> Result<Vector3<f64>, RecordedError> {
@@ -242,11 +244,14 @@ struct Sample {
 
 impl Sample {
     fn read(
-        row: &Row<'_>,
+        table: &mut Table,
+        row: &TableRow,
         time: usize,
         columns: &[Columns],
         places: &[[usize; 7]],
     ) -> Result<Self, RecordedError> {
+        let time_s = table.time(row, time)?;
+        let row = Row { table, row };
         let finger = |columns: &Columns| -> Result<_, RecordedError> {
             let entity = row.row.text(columns.entity).to_owned();
             Ok((row.vector(columns.hip)?, row.vector(columns.force)?, entity))
@@ -256,7 +261,7 @@ impl Sample {
             Ok((row.vector([x, y, z])?, UnitQuaternion::new_normalize(turned)))
         };
         Ok(Self {
-            time_s: row.number(time)?,
+            time_s,
             fingers: columns.iter().map(finger).collect::<Result<_, _>>()?,
             bodies: places.iter().map(body).collect::<Result<_, _>>()?,
         })

@@ -5,7 +5,7 @@
 use super::recorded::RecordedError;
 use crate::bounded_lines::BoundedLines;
 use crate::columns::{Cell, columns, each_cell};
-use crate::record::read::{MOST_ROW_BYTES, RecordedRun, check_begin, is_mcap, is_parquet};
+use crate::record::read::{MOST_ROW_BYTES, RecordedRun, TimeOrder, check_begin, is_mcap, is_parquet};
 use csv::StringRecord;
 use io_driver::say::say;
 use parquet::errors::ParquetError;
@@ -23,6 +23,7 @@ pub(super) struct Table {
     columns: Vec<String>,
     rows: Rows,
     read: u64,
+    times: TimeOrder,
 }
 
 enum Rows {
@@ -58,7 +59,7 @@ impl Table {
             let (columns, rows) = CsvTable::open(file).map_err(|source| unreadable(file, source))?;
             (columns, Rows::Csv(Box::new(rows)))
         };
-        Ok(Self { file: file.into(), columns, rows, read: 0 })
+        Ok(Self { file: file.into(), columns, rows, read: 0, times: TimeOrder::default() })
     }
 
     /// The names of its columns.
@@ -98,17 +99,30 @@ impl Table {
 
     /// The number in this column of a row.
     pub(super) fn number(&self, row: &TableRow, column: usize) -> Result<f64, RecordedError> {
-        let found = match row.cells.get(column) {
-            Some(Value::Number(number)) => return Ok(*number),
-            Some(Value::Text(text)) => text.as_str(),
-            None => "",
+        let cell = row.cells.get(column);
+        let number = match cell {
+            Some(Value::Number(number)) => Some(*number),
+            Some(Value::Text(text)) => text.parse().ok(),
+            None => None,
         };
-        found.parse().map_err(|_| RecordedError::NoNumber {
+        number.filter(|number: &f64| number.is_finite()).ok_or_else(|| RecordedError::NoNumber {
             file: self.file.clone(),
             line: row.line,
             column: self.columns[column].clone(),
-            found: found.into(),
+            found: match cell {
+                Some(Value::Number(number)) => number.to_string(),
+                Some(Value::Text(text)) => text.clone(),
+                None => String::new(),
+            },
         })
+    }
+
+    /// The time in this column of a row (s), which is later than that of the row before.
+    pub(super) fn time(&mut self, row: &TableRow, column: usize) -> Result<f64, RecordedError> {
+        let time_s = self.number(row, column)?;
+        let said = self.times.check(time_s);
+        said.map_err(|why| RecordedError::BadTime { file: self.file.clone(), line: row.line, why })?;
+        Ok(time_s)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::recorded::RecordedFinger;
 use nalgebra::Vector3;
+use world::is_name;
 
 /// From where a finger touches an entity first to where it does so last; between them it may be free.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,6 +24,16 @@ pub(super) fn visits(finger: Option<&RecordedFinger>) -> Vec<Visit> {
         }
     }
     known.into_iter().filter_map(|entity| visit(finger, entity)).collect()
+}
+
+/// What the files of these visits are called: as the entity, if a scene may call something so. Another name comes from
+/// another program and may be a path; its files are called `entity-N`, as nobody else is.
+pub(super) fn file_stems(visits: &[Visit]) -> Vec<String> {
+    let is_free = |made: &String| visits.iter().all(|visit| visit.entity != *made);
+    let mut made = (1u64..).map(|number| format!("entity-{number}")).filter(is_free);
+    let mut stem = |entity: &String| if is_name(entity) { Some(entity.clone()) } else { made.next() };
+    // As many as there are visits, since numbers do not end.
+    visits.iter().filter_map(|visit| stem(&visit.entity)).collect()
 }
 
 fn visit(finger: &RecordedFinger, entity: &String) -> Option<Visit> {

@@ -20,7 +20,7 @@ use rt_core::input_file;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
-pub(crate) use tick_order::LONGEST_GAP_S;
+pub(crate) use tick_order::{LONGEST_GAP_S, TimeOrder};
 
 /// Why a file is no recording.
 #[derive(Debug, Error)]

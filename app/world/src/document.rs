@@ -7,6 +7,7 @@ use rt_core::toml_slips;
 use toml::Spanned;
 use toml::de::DeTable;
 
+use crate::document_size;
 use crate::error::{Location, SceneError};
 
 /// The text and the name of the file it came from: what a byte offset needs to become a line.
@@ -16,9 +17,6 @@ pub(crate) struct Document<'d> {
     text: &'d str,
     lines: &'d LineEnds,
 }
-
-/// The most values in a file: a hundred thousand entities with ten each.
-pub(crate) const MAX_VALUES: usize = 1 << 20;
 
 /// Where the lines of a text end, found once: ten thousand entities that keep their lines would otherwise count them
 /// ten thousand times from the start.
@@ -47,10 +45,8 @@ impl<'d> Document<'d> {
 
     /// The text as a tree of values, each with the range of bytes it was written in.
     pub(crate) fn parse(&self) -> Result<Spanned<DeTable<'d>>, SceneError> {
-        // A value takes far more memory than the two bytes that make it.
-        let values = self.text.bytes().filter(|byte| matches!(byte, b',' | b'=')).count();
-        if values > MAX_VALUES {
-            return Err(SceneError::TooManyValues { file: self.file.into(), limit: MAX_VALUES });
+        if let Some((limit, what)) = document_size::excess(self.text) {
+            return Err(SceneError::TooMuch { file: self.file.into(), limit, what });
         }
         DeTable::parse(self.text).map_err(|error| self.syntax_error(error.span(), error.message()))
     }

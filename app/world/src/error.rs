@@ -51,13 +51,15 @@ pub enum SceneError {
         /// The most that is read.
         limit_bytes: u64,
     },
-    /// The file is made of more values than any scene.
-    #[error("{}: more than {limit} values, which is the most this file may have", file.display())]
-    TooManyValues {
+    /// The file is made of more values or tables than any scene.
+    #[error("{}: more than {limit} {what}, which is the most this file may have", file.display())]
+    TooMuch {
         /// The file asked for.
         file: PathBuf,
         /// The most that are read.
         limit: usize,
+        /// Of what: `values`, `tables`.
+        what: &'static str,
     },
     /// The file is not text.
     #[error("{}:{line}: byte {offset_bytes} is not UTF-8 text; save the file as UTF-8", file.display())]

@@ -79,10 +79,15 @@ pub(crate) fn name_of(table: &Table<'_>) -> Result<Option<String>, SceneError> {
     table.own("name").map(|value| valid(&value)).transpose()
 }
 
+/// Whether a scene may call something so.
+pub fn is_name(text: &str) -> bool {
+    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'_' || byte == b'-';
+    (1..=MAX_NAME_BYTES).contains(&text.len()) && text.bytes().all(is_plain)
+}
+
 fn valid(value: &Value<'_>) -> Result<String, SceneError> {
     let name = value.text(&format!("1 to {MAX_NAME_BYTES} of the characters A-Z a-z 0-9 _ -"))?;
-    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'_' || byte == b'-';
-    if name.len() <= MAX_NAME_BYTES && name.bytes().all(is_plain) {
+    if is_name(name) {
         return Ok(name.into());
     }
     Err(SceneError::BadName { at: value.at(), found: quoted(name), limit_bytes: MAX_NAME_BYTES })

@@ -1,8 +1,8 @@
 //! `io-driver emergency-stop` and `io-driver stop`.
 //!
-//! Model: asked in every way there is ([`client::emergency_stop`]), then believed only when seen. An emergency stop is
-//! done when a new frame shows the fault and no force in any device; a stop, when the driver has ended and its last words
-//! say that the motors were written zero.
+//! Model: asked in every way there is, then believed only when seen. An emergency stop goes by datagram and over a
+//! connection; it is done when a new frame shows the fault and no force in any device. A stop is done when the driver has
+//! ended and its last words say that the motors were written zero.
 //! Invariant: no exit status of 0 without that sight. Asking and looking have threads of their own: neither a driver
 //! that does not answer nor one without a free place delays the words that motors may still be on.
 
@@ -10,7 +10,7 @@ use super::{EXIT_FAULT, EXIT_USAGE, fail, print_line};
 use crate::say::say;
 use rt_core::epitaph::{self, EpitaphKind};
 use shm_abi::client::{self, AttachError, Attachment};
-use shm_abi::{DriverState, DriverView, FaultReason, Frame};
+use shm_abi::{DriverState, DriverView, FaultReason, Frame, stop_socket};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -39,7 +39,7 @@ pub(super) fn emergency_stop(socket: &Path) -> ExitCode {
     let begun = Instant::now();
     let (tell, news) = channel();
     let asks = in_background(socket, &tell, |socket, tell| {
-        if let Err(error) = client::emergency_stop(&socket, NAME) {
+        if let Err(error) = ask(&socket) {
             let _ = tell.send(News::NotAsked(error));
         }
     });
@@ -57,10 +57,16 @@ pub(super) fn emergency_stop(socket: &Path) -> ExitCode {
     }
 }
 
+/// In both ways; an error if nobody can have heard it.
+fn ask(socket: &Path) -> Result<(), AttachError> {
+    let sent = stop_socket::send(socket);
+    client::emergency_stop_over_connection(socket, NAME).or_else(|error| sent.map_err(|_| error))
+}
+
 /// One after the other, where the system gives no threads.
 fn ask_and_look(socket: &Path, begun: Instant) -> ExitCode {
     say(format_args!("io-driver: {UNCERTAIN}"));
-    if let Err(error) = client::emergency_stop(socket, NAME) {
+    if let Err(error) = ask(socket) {
         return unreachable_driver(socket, &error);
     }
     match wait_for_zero(socket, begun + PATIENCE) {

@@ -263,11 +263,11 @@ fn an_emergency_stop_outlasts_a_request_to_leave_a_fault_of_the_same_tick() {
         let (sender, mut inbox) = mail();
         bench.cycle.fault(FaultReason::DeviceRead);
         if stop_comes_first {
-            sender.urgent.stop(None);
+            sender.urgent.stop(None, monotonic_ns());
         }
         sender.urgent.clear_fault(u64::MAX, |_| true).unwrap();
         if !stop_comes_first {
-            sender.urgent.stop(None);
+            sender.urgent.stop(None, monotonic_ns());
         }
         inbox.deliver(&mut bench.cycle);
         assert_eq!(bench.silent_tick().0.fault, FaultReason::EmergencyStop as u64);

@@ -5,6 +5,7 @@ use bytemuck::Zeroable;
 use io_driver::config::DriverConfig;
 use io_driver::device_file::DeviceFile;
 use io_driver::sim::script::HandScript;
+use patience::BoundedThread;
 use shm_abi::doorbell::WaitMode;
 use shm_abi::handshake::{Request, RequestKind};
 use shm_abi::segment::{ClockMode, CommanderMemory, CommanderView, DriverInfo, DriverMemory, DriverView};
@@ -138,7 +139,7 @@ impl Host {
                 break;
             }
         }
-        asking.join().expect("no panic").expect("an observer is served, whoever came before");
+        asking.bounded_join().expect("no panic").expect("an observer is served, whoever came before");
         self.poll();
     }
 

@@ -3,8 +3,8 @@
 //! Problem: a parser is attacked best by a fuzzer with coverage feedback, and what it once found has to be found again by
 //! plain `cargo test`.
 //! Model: a [`Target`] takes any bytes and must return. That it does so soon, without a panic and within the memory that
-//! is allowed, is judged by who calls it: `tests/fuzz` runs each with libFuzzer, `tests/corpus.rs` runs the
-//! committed corpora, and bytes that once failed.
+//! is allowed, is judged by who calls it: `tests/fuzz` runs each with libFuzzer, the test program `corpus` runs
+//! the committed corpora, and bytes that once failed (`tests/fuzz/crashes`).
 //! Invariant: a target depends on its bytes only; it reads no file that they name but such that cannot be there.
 
 #![forbid(unsafe_code)]

@@ -1,5 +1,6 @@
 //! Clients that connect ten thousand times a second, each to be a burden of its own kind.
 
+use patience::BoundedThread;
 use rustix::net::{AddressFamily, SocketAddrUnix, SocketFlags, SocketType, connect, socket_with};
 use shm_abi::handshake::{Request, RequestKind};
 use std::collections::VecDeque;
@@ -44,7 +45,7 @@ impl Flood {
 impl Drop for Flood {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
-        self.threads.drain(..).for_each(|thread| drop(thread.join()));
+        self.threads.drain(..).for_each(|thread| drop(thread.bounded_join()));
     }
 }
 

@@ -1,6 +1,7 @@
 //! A driver that lies: the true socket and memory, and frames that a test makes up.
 
 use bytemuck::Zeroable;
+use patience::BoundedThread;
 use rt_core::clock::monotonic_ns;
 use shm_abi::doorbell::WaitMode;
 use shm_abi::frame::DEVICE_POSITION_VALID;
@@ -65,7 +66,7 @@ impl Liar {
 impl Drop for Liar {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
-        let _ = self.thread.take().map(JoinHandle::join);
+        let _ = self.thread.take().map(BoundedThread::bounded_join);
     }
 }
 

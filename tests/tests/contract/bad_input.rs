@@ -550,13 +550,24 @@ fn a_recording_whose_times_leap_or_fall_is_refused_with_its_line() {
         ("0.048", ["bad.csv:51:", "t is 0.048 after 0.048", "rise from row to row"]),
     ] {
         place.write("bad.csv", with_time(time));
-        for command in
-            [&["replay", "bad.csv", "--scene", "scene.toml"][..], &["export", "bad.csv", "--csv", "out2.csv"]]
-        {
+        for command in [
+            &["replay", "bad.csv", "--scene", "scene.toml"][..],
+            &["export", "bad.csv", "--csv", "out2.csv"],
+            &["plot", "bad.csv", "--svg-only"],
+        ] {
             let said = place.run(command);
             assert_eq!(said.status, Some(3), "{time} {command:?}: {}{}", said.out, said.err);
             assert_says(&said.err, &parts);
         }
+    }
+    // What is no number is none in any column.
+    let row = good.lines().nth(50).expect("a row");
+    let (hip, _) = row.split_once(',').and_then(|(_, cells)| cells.split_once(',')).expect("columns");
+    place.write("bad.csv", good.replacen(row, &row.replacen(&format!(",{hip},"), ",NaN,", 1), 1));
+    for command in [&["export", "bad.csv", "out2.csv"][..], &["plot", "bad.csv", "--svg-only"]] {
+        let said = place.run(command);
+        assert_eq!(said.status, Some(3), "{command:?}: {}{}", said.out, said.err);
+        assert_says(&said.err, &["bad.csv:51:", "f0_hip_x is \"NaN\"", "allowed: a number"]);
     }
     // No step between two times says how long a tick is.
     let [header, first] = [0, 1].map(|line| good.lines().nth(line).expect("a recording"));

@@ -313,3 +313,33 @@ fn a_camera_that_carries_nobody_is_refused() {
         said.err
     );
 }
+
+/// Whether these words are an example of a form: capitals stand for any word, `a|b` for one of them.
+fn is_example(words: &[&str], form: &[&str]) -> bool {
+    let fits = |(word, part): (&&str, &&str)| match part.chars().next() {
+        Some('A'..='Z') => !word.is_empty(),
+        _ => part.split('|').any(|choice| choice == *word),
+    };
+    words.len() == form.len() && words.iter().zip(form).all(fits)
+}
+
+#[test]
+fn every_form_of_an_order_has_an_example_in_the_help_and_in_the_readme() {
+    let place = workplace(SCENE);
+    place.write("orders.txt", "at 1 dance\n");
+    let refusal = place.run(["run", "scene.toml", "--clock", "virtual", "--orders", "orders.txt"]).err;
+    let (_, known) = refusal.split_once("allowed: ").expect("what is allowed");
+    let readme = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../README.md");
+    let readme = std::fs::read_to_string(readme).expect("README.md");
+    for (name, text) in [("help", place.run(["run", "--help"]).out), ("README.md", readme)] {
+        let words: Vec<&str> =
+            text.split_whitespace().map(|word| word.trim_matches(['`', ';', ','])).collect();
+        for form in known.trim().split("; ") {
+            // What may be left out is shown at least once.
+            let form: Vec<&str> =
+                form.split_whitespace().map(|part| part.trim_matches(['[', ']', '.'])).collect();
+            let is_shown = words.windows(form.len()).any(|words| is_example(words, &form));
+            assert!(is_shown, "{name} has no example of {}", form.join(" "));
+        }
+    }
+}

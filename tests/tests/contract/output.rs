@@ -119,6 +119,7 @@ fn a_result_that_cannot_be_printed_is_told_and_is_a_fault() {
         "settings",
         "replay out.mcap",
         "export out.mcap --csv out.csv",
+        "plot out.mcap --svg-only",
     ] {
         let said = place.shell(&format!("\"$0\" {command} > /dev/full"), &[]);
         assert_eq!(said.status, Some(3), "{command}: {}", said.err);

@@ -120,3 +120,25 @@ fn what_cannot_be_drawn_is_told_with_the_file_and_what_there_is() {
         assert!(said.err.contains(says), "{arguments:?}: {}", said.err);
     }
 }
+
+#[test]
+fn pictures_of_entities_lie_in_their_directory_whatever_a_recording_calls_them() {
+    let place = Workplace::new();
+    let away = place.path("away");
+    let names = [away.to_str().expect("plain"), "../away", "..", "entity-1", "a b", "", "ball"];
+    let header = "t,f0_hip_x,f0_hip_y,f0_hip_z,f0_force_x,f0_force_y,f0_force_z,f0_entity\n";
+    let row = |(index, name): (usize, &&str)| format!("{index},0,0,0,0,1,0,{name}\n");
+    place.write("led.csv", names.iter().enumerate().map(row).fold(header.to_owned(), |all, row| all + &row));
+    let said = place.run(["plot", "led.csv", "--by-entity", "--svg-only", "--out", "pictures"]);
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    let files: Vec<String> = place
+        .snapshot()
+        .into_keys()
+        .filter(|file| file.extension().is_some_and(|ending| ending == "svg"))
+        .map(|file| file.strip_prefix(place.path("")).expect("inside").display().to_string())
+        .collect();
+    let expected = ["ball", "entity-1", "entity-2", "entity-3", "entity-4", "entity-5"];
+    assert_eq!(files, expected.map(|name| format!("pictures/{name}.svg")));
+    let title = std::fs::read_to_string(place.path("pictures/entity-3.svg")).expect("a picture");
+    assert!(title.contains("../away"), "it is called by its name in the picture: {title}");
+}

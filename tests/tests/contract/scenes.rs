@@ -217,6 +217,35 @@ fn check_tells_the_size_the_place_and_the_mass_of_everything() {
 }
 
 #[test]
+fn check_measures_a_mesh_that_is_only_seen_by_its_file() {
+    let place = Workplace::new();
+    let scene = |file: &str, scale: f64| {
+        format!(
+            "[[finger]]\n[[entity]]\nname = \"wall\"\nhaptic = false\ncollidable = false\n\
+             shape = {{ kind = \"mesh\", file = \"{file}\", scale = {scale:?} }}\nposition_m = [0, 2, 0]\n"
+        )
+    };
+    // Its middle is beside its origin.
+    place.write("wall.obj", "v 0 0 0\nv 1 0 0\nv 0 4 0\nv 0 0 2\nf 1 2 3\nf 1 2 4\n");
+    place.write("scene.toml", scene("wall.obj", 0.5));
+    let said = check(&place, &["scene.toml"]);
+    assert!(said.out.contains("wall: mesh, 0.5 x 2 x 1 m, at (0.25, 3, 0.5) m"), "{}", said.out);
+    let told = json(&check(&place, &["scene.toml", "--json"]));
+    assert_eq!(told["summary"]["measures"][0]["size_m"], serde_json::json!([0.5, 2.0, 1.0]));
+    place.write("scene.toml", scene("wall.obj", 500.0));
+    let said = check(&place, &["scene.toml"]);
+    assert!(
+        said.out.contains("wall is 2000 m long, as large as a house; its file wall.obj may be"),
+        "{}",
+        said.out
+    );
+    place.write("scene.toml", scene("none.obj", 1.0));
+    let said = check(&place, &["scene.toml"]);
+    assert!(said.out.contains("wall: mesh, size not measured"), "{}", said.out);
+    assert!(said.out.contains("none.obj") && said.out.contains("it is for the window only"), "{}", said.out);
+}
+
+#[test]
 fn check_suspects_numbers_of_another_unit() {
     let place = Workplace::new();
     for (scene, warning) in [

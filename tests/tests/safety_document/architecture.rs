@@ -117,3 +117,18 @@ fn the_lists_of_how_a_thing_is_added_name_every_source_that_names_one_of_its_kin
         }
     }
 }
+
+#[test]
+fn the_table_of_recordings_names_every_source_in_their_directory() {
+    const DIRECTORY: &str = "app/src/record";
+    let table = part(&architecture(), &format!("\n| files in `{DIRECTORY}` | hold |\n"), "\n\n");
+    let cells = table.lines().filter_map(|row| row.split('|').nth(1));
+    let listed: BTreeSet<&str> = cells.flat_map(|cell| cell.split('`').skip(1).step_by(2)).collect();
+    let entries = fs::read_dir(root().join(DIRECTORY)).expect("a directory").flatten();
+    let names = entries.map(|entry| {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if entry.path().is_dir() { name + "/" } else { name }
+    });
+    let found: BTreeSet<String> = names.filter(|name| name != "mod.rs").collect();
+    assert_eq!(found.iter().map(String::as_str).collect::<BTreeSet<_>>(), listed);
+}

@@ -8,6 +8,7 @@
 //! Cost: nothing is copied but metadata.
 
 use std::collections::BTreeMap;
+use thiserror::Error;
 
 /// A record's content, as far as it is used here.
 #[derive(Debug, PartialEq)]
@@ -50,10 +51,21 @@ const ATTACHMENT_INDEX: u8 = 0x0a;
 const METADATA: u8 = 0x0c;
 const DATA_END: u8 = 0x0f;
 
-/// Reads a record; `None` if it is shorter than it says, or a text in it is none.
-pub(super) fn parse(opcode: u8, body: &[u8]) -> Option<McapRecord<'_>> {
+/// Why a record is none.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub(super) enum RecordError {
+    #[error("a record is shorter than it says")]
+    Short,
+    #[error("a text in a record is not UTF-8")]
+    NoText,
+    #[error("the attached file {name} does not have its check sum")]
+    CheckSum { name: String },
+}
+
+/// Reads a record.
+pub(super) fn parse(opcode: u8, body: &[u8]) -> Result<McapRecord<'_>, RecordError> {
     let mut fields = Fields(body);
-    Some(match opcode {
+    Ok(match opcode {
         CHANNEL => {
             let id = fields.u16()?;
             let _schema = fields.u16()?;
@@ -88,17 +100,17 @@ pub(super) fn refused_in_chunks(opcode: u8) -> Option<&'static str> {
 /// A record's opcode and its content.
 pub(super) type RawRecord<'a> = (u8, &'a [u8]);
 
-/// The first record in the content of a chunk, and what is behind it; `None` if it is cut.
-pub(super) fn split_record(bytes: &[u8]) -> Option<(RawRecord<'_>, &[u8])> {
+/// The first record in the content of a chunk, and what is behind it.
+pub(super) fn split_record(bytes: &[u8]) -> Result<(RawRecord<'_>, &[u8]), RecordError> {
     let mut fields = Fields(bytes);
     let [opcode] = fields.array()?;
     let body = fields.long_bytes()?;
-    Some(((opcode, body), fields.0))
+    Ok(((opcode, body), fields.0))
 }
 
-fn chunk<'a>(fields: &mut Fields<'a>) -> Option<Chunk<'a>> {
+fn chunk<'a>(fields: &mut Fields<'a>) -> Result<Chunk<'a>, RecordError> {
     let _times = fields.take(8 + 8)?;
-    Some(Chunk {
+    Ok(Chunk {
         uncompressed_bytes: fields.u64()?,
         crc: fields.u32()?,
         compression: fields.text()?,
@@ -106,7 +118,7 @@ fn chunk<'a>(fields: &mut Fields<'a>) -> Option<Chunk<'a>> {
     })
 }
 
-fn attachment(body: &[u8]) -> Option<McapRecord<'_>> {
+fn attachment(body: &[u8]) -> Result<McapRecord<'_>, RecordError> {
     let mut fields = Fields(body);
     let _times = fields.take(8 + 8)?;
     let name = fields.text()?;
@@ -114,60 +126,64 @@ fn attachment(body: &[u8]) -> Option<McapRecord<'_>> {
     let data = fields.long_bytes()?;
     let summed = &body[..body.len() - fields.0.len()];
     let crc = fields.u32()?;
-    (crc == 0 || crc == crc32fast::hash(summed)).then_some(McapRecord::Attachment { name, data })
+    if crc == 0 || crc == crc32fast::hash(summed) {
+        Ok(McapRecord::Attachment { name, data })
+    } else {
+        Err(RecordError::CheckSum { name: name.to_owned() })
+    }
 }
 
 /// What has not been taken of some bytes.
 struct Fields<'a>(&'a [u8]);
 
 impl<'a> Fields<'a> {
-    fn take(&mut self, count: usize) -> Option<&'a [u8]> {
-        let (taken, rest) = self.0.split_at_checked(count)?;
+    fn take(&mut self, count: usize) -> Result<&'a [u8], RecordError> {
+        let (taken, rest) = self.0.split_at_checked(count).ok_or(RecordError::Short)?;
         self.0 = rest;
-        Some(taken)
+        Ok(taken)
     }
 
-    fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
-        let (taken, rest) = self.0.split_first_chunk()?;
+    fn array<const N: usize>(&mut self) -> Result<[u8; N], RecordError> {
+        let (taken, rest) = self.0.split_first_chunk().ok_or(RecordError::Short)?;
         self.0 = rest;
-        Some(*taken)
+        Ok(*taken)
     }
 
-    fn u16(&mut self) -> Option<u16> {
+    fn u16(&mut self) -> Result<u16, RecordError> {
         self.array().map(u16::from_le_bytes)
     }
 
-    fn u32(&mut self) -> Option<u32> {
+    fn u32(&mut self) -> Result<u32, RecordError> {
         self.array().map(u32::from_le_bytes)
     }
 
-    fn u64(&mut self) -> Option<u64> {
+    fn u64(&mut self) -> Result<u64, RecordError> {
         self.array().map(u64::from_le_bytes)
     }
 
     /// Bytes behind their length in 8 bytes.
-    fn long_bytes(&mut self) -> Option<&'a [u8]> {
-        let length = usize::try_from(self.u64()?).ok()?;
+    fn long_bytes(&mut self) -> Result<&'a [u8], RecordError> {
+        let length = usize::try_from(self.u64()?).map_err(|_| RecordError::Short)?;
         self.take(length)
     }
 
     /// Bytes behind their length in 4 bytes.
-    fn short_bytes(&mut self) -> Option<&'a [u8]> {
-        let length = usize::try_from(self.u32()?).ok()?;
+    fn short_bytes(&mut self) -> Result<&'a [u8], RecordError> {
+        let length = usize::try_from(self.u32()?).map_err(|_| RecordError::Short)?;
         self.take(length)
     }
 
-    fn text(&mut self) -> Option<&'a str> {
-        std::str::from_utf8(self.short_bytes()?).ok()
+    fn text(&mut self) -> Result<&'a str, RecordError> {
+        std::str::from_utf8(self.short_bytes()?).map_err(|_| RecordError::NoText)
     }
 
-    fn map(&mut self) -> Option<BTreeMap<String, String>> {
+    fn map(&mut self) -> Result<BTreeMap<String, String>, RecordError> {
         let mut pairs = Fields(self.short_bytes()?);
         let mut map = BTreeMap::new();
         while !pairs.0.is_empty() {
             map.insert(pairs.text()?.to_owned(), pairs.text()?.to_owned());
         }
-        Some(map)
+        Ok(map)
     }
 }
 
@@ -214,13 +230,29 @@ mod tests {
     }
 
     #[test]
+    fn a_text_that_is_none_and_a_file_without_its_check_sum_are_told() {
+        let records = records();
+        let spoilt = |record: usize, at: usize| {
+            let (opcode, mut body) = records[record].clone();
+            body[at] = 0xff;
+            parse(opcode, &body).expect_err("spoilt")
+        };
+        assert_eq!(spoilt(0, 8), RecordError::NoText);
+        assert_eq!(spoilt(4, 4), RecordError::NoText);
+        let name = "scene:x".to_owned();
+        let data = 16 + 4 + name.len() + 4 + 8;
+        assert_eq!(spoilt(3, data), RecordError::CheckSum { name });
+    }
+
+    #[test]
     fn a_record_that_is_cut_anywhere_or_says_it_is_longer_is_none() {
         for (opcode, body) in records() {
             let least = if opcode == MESSAGE { 22 } else { body.len() };
             // Behind a channel's topic nothing is needed.
             let least = if opcode == CHANNEL { 4 + 4 + 5 } else { least };
             for length in 0..least {
-                assert_eq!(parse(opcode, &body[..length]), None, "{opcode:#x} cut to {length}");
+                let cut = parse(opcode, &body[..length]);
+                assert_eq!(cut, Err(RecordError::Short), "{opcode:#x} cut to {length}");
             }
             for at in 0..body.len() {
                 let mut larger = body.clone();
@@ -229,6 +261,6 @@ mod tests {
             }
         }
         let long = [&[MESSAGE][..], &u64::MAX.to_le_bytes()].concat();
-        assert_eq!(split_record(&long), None);
+        assert_eq!(split_record(&long), Err(RecordError::Short));
     }
 }

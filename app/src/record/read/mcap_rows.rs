@@ -2,7 +2,7 @@
 
 use super::ReadError;
 use super::mcap_chunk::{self, ChunkError};
-use super::mcap_record::{self, McapRecord};
+use super::mcap_record::{self, McapRecord, RecordError};
 use super::tick_order::{TickOrder, check_period};
 use crate::columns::Names;
 use crate::record::about::{About, InputFile, MOST_FILE_BYTES, names_of};
@@ -129,7 +129,7 @@ impl McapRows {
     /// The next record: of the chunk that is open, else of the file.
     fn read_record(&mut self) -> Result<Found, ReadError> {
         if let Some(rest) = self.chunk.records.get(self.chunk.at..).filter(|rest| !rest.is_empty()) {
-            let Some(((opcode, body), behind)) = mcap_record::split_record(rest) else {
+            let Ok(((opcode, body), behind)) = mcap_record::split_record(rest) else {
                 return Err(self.damaged("a chunk ends in the middle of a record"));
             };
             if let Some(what) = mcap_record::refused_in_chunks(opcode) {
@@ -202,7 +202,7 @@ impl McapRows {
             Kept::Chunk(Ok(records)) => self.chunk = OpenChunk { records, at: 0 },
             Kept::Chunk(Err(ChunkError::Damage(why))) => return Err(self.damaged(&why)),
             Kept::Chunk(Err(ChunkError::Compression(other))) => return Err(self.compressed_by(&other)),
-            Kept::Damage => return Err(self.damaged("a record is shorter than it says")),
+            Kept::Damage(error) => return Err(self.damaged(&error.to_string())),
             Kept::File(file) => self.take_file(file)?,
             Kept::Order(order) => order.map_or(Ok(()), |order| self.take_order(order))?,
             Kept::Channels(found) => self.channels = found,
@@ -277,11 +277,14 @@ enum Kept {
     Chunk(Result<Vec<u8>, ChunkError>),
     Nothing,
     /// A record that is none.
-    Damage,
+    Damage(RecordError),
 }
 
 fn own(opcode: u8, body: &[u8], channels: Channels, names: &Names) -> Kept {
-    let Some(record) = mcap_record::parse(opcode, body) else { return Kept::Damage };
+    let record = match mcap_record::parse(opcode, body) {
+        Ok(record) => record,
+        Err(error) => return Kept::Damage(error),
+    };
     match record {
         McapRecord::Message { channel, data } if Some(channel) == channels.tick => {
             Kept::Row(Box::new(tick::read(data, names)))

@@ -9,7 +9,13 @@ use std::ops::RangeInclusive;
 /// Ticks of rows, looked at one after the other.
 #[derive(Debug, Default)]
 pub(super) struct TickOrder {
-    last: Option<u64>,
+    times: TimeOrder,
+}
+
+/// The same by their times (s), where nobody knows how long a tick is.
+#[derive(Debug, Default)]
+pub(crate) struct TimeOrder {
+    last_s: Option<f64>,
 }
 
 /// Between two rows: a driver that is gone is waited for as long (`--grace`).
@@ -22,20 +28,26 @@ const PERIODS_NS: RangeInclusive<u64> = 50_000..=10_000_000_000;
 impl TickOrder {
     /// What is wrong with the next row's tick, if anything is.
     pub(super) fn check(&mut self, tick: u64, period_ns: u64) -> Result<(), String> {
-        let t_s = |tick: u64| tick as f64 * period_ns as f64 / 1e9;
-        if t_s(tick) > LONGEST_RUN_S {
-            return Err(format!("t is {:?}; allowed: at most {LONGEST_RUN_S} s", t_s(tick)));
+        // A tick beyond the signed ones is beyond every run.
+        let tick = i64::try_from(tick).unwrap_or(i64::MAX);
+        self.times.check(run_time_s(tick, period_ns))
+    }
+}
+
+impl TimeOrder {
+    /// What is wrong with the next row's time, if anything is.
+    pub(crate) fn check(&mut self, t_s: f64) -> Result<(), String> {
+        if t_s > LONGEST_RUN_S {
+            return Err(format!("t is {t_s:?}; allowed: at most {LONGEST_RUN_S} s"));
         }
-        if let Some(last) = self.last.replace(tick) {
-            let [t, before] = [tick, last].map(|tick| run_time_s(tick.cast_signed(), period_ns));
-            if tick <= last {
-                return Err(format!("t is {t:?} after {before:?}; allowed: times that rise from row to row"));
-            }
-            if t - before > LONGEST_GAP_S {
-                return Err(format!(
-                    "t is {t:?} after {before:?}; allowed: at most {LONGEST_GAP_S} s from a row to the next"
-                ));
-            }
+        let Some(last_s) = self.last_s.replace(t_s) else { return Ok(()) };
+        if t_s <= last_s {
+            return Err(format!("t is {t_s:?} after {last_s:?}; allowed: times that rise from row to row"));
+        }
+        if t_s - last_s > LONGEST_GAP_S {
+            return Err(format!(
+                "t is {t_s:?} after {last_s:?}; allowed: at most {LONGEST_GAP_S} s from a row to the next"
+            ));
         }
         Ok(())
     }

@@ -100,3 +100,37 @@ fn a_file_of_more_values_than_any_scene_has_is_refused_before_they_are_made() {
     let message = Scene::parse(&text, Path::new("s.toml")).expect_err("too many").to_string();
     assert_eq!(message, "s.toml: more than 1048576 values, which is the most this file may have");
 }
+
+#[test]
+fn tables_that_headers_and_dotted_keys_make_are_bounded_as_well() {
+    let parts = ["a"; 70].join(".");
+    // A megabyte of text, of which each part of a name makes a table with room for eleven keys.
+    let texts = ["[x{}.{}]\n", "x{}.{} = 0\n", "[[x{}.{}]]\n"].map(|form| {
+        let line = |number: usize| form.replacen("{}", &number.to_string(), 1).replacen("{}", &parts, 1);
+        (0..5000).map(line).collect::<String>()
+    });
+    let nested = format!("x = [{}]\n", "{a=0},".repeat(300_000));
+    for text in texts.iter().chain([&nested]) {
+        let message = Scene::parse(text, Path::new("s.toml")).expect_err("too many").to_string();
+        assert_eq!(message, "s.toml: more than 262144 tables, which is the most this file may have");
+    }
+}
+
+#[test]
+fn signs_that_mean_nothing_are_bounded_as_well() {
+    for sign in ["[", ".", "=", ",", "a ", "\"\" "] {
+        let text = format!("[[finger]]\nx = {}\n", sign.repeat((15 << 20) / sign.len()));
+        let message = Scene::parse(&text, Path::new("s.toml")).expect_err("no scene").to_string();
+        assert!(message.starts_with("s.toml: more than 8388608 words and signs"), "{sign}: {message:.200}");
+    }
+}
+
+#[test]
+fn commas_of_comments_and_texts_are_no_values() {
+    let commas = ",= ".repeat(1 << 20);
+    let text = format!("# {commas}\n[[finger]]\nname = \"a\" # {commas}\n");
+    Scene::parse(&text, Path::new("s.toml")).expect("a scene with one finger");
+    let text = format!("[[finger]]\nname = \"{commas}\"\n");
+    let message = Scene::parse(&text, Path::new("s.toml")).expect_err("no name").to_string();
+    assert!(message.contains("s.toml:2: finger[0].name"), "{message:.200}");
+}

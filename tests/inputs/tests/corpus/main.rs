@@ -6,13 +6,15 @@
 mod spoil;
 
 use input_targets::{TARGETS, Target};
+use patience::BoundedChild;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use spoil::{Random, spoilt};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// What a target may take, of address space beyond what the test itself has: as much as the fuzzer allows.
+/// What a target may take, of address space beyond what the test itself has: twice what the fuzzer allows of memory
+/// (docs/testing.md), since addresses that are reserved and not used count as well.
 const MOST_BYTES: u64 = 1 << 30;
 /// For one input: a hundred times what the slowest takes, so that a busy machine does not fail.
 const MOST_TIME: Duration = Duration::from_secs(20);
@@ -20,6 +22,15 @@ const MOST_TIME: Duration = Duration::from_secs(20);
 const ROUNDS: u64 = 100;
 /// Set in the process that runs one target.
 const TARGET: &str = "INPUT_TARGET";
+
+/// For all inputs of a target. One that hangs is killed, and the last name among its words is that of the input.
+fn longest_run() -> Duration {
+    Duration::from_secs(300) + Duration::from_millis(100) * rounds() as u32
+}
+
+fn rounds() -> u64 {
+    std::env::var("INPUT_ROUNDS").ok().and_then(|rounds| rounds.parse().ok()).unwrap_or(ROUNDS)
+}
 
 fn inputs(target: &str) -> Vec<PathBuf> {
     let of = |place: &str| Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz").join(place).join(target);
@@ -37,12 +48,26 @@ fn every_target_has_a_corpus() {
     }
 }
 
+/// Else nobody would try them.
+#[cfg(feature = "application")]
+#[test]
+fn inputs_that_once_failed_lie_under_the_name_of_a_target() {
+    let crashes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/crashes");
+    let directories: Vec<_> = std::fs::read_dir(crashes).expect("tests/fuzz/crashes").flatten().collect();
+    assert!(!directories.is_empty(), "tests/fuzz/crashes is empty");
+    for directory in directories {
+        let name = directory.file_name().into_string().expect("a plain name");
+        assert!(TARGETS.iter().any(|(target, _)| *target == name), "{name} is no target");
+    }
+}
+
 #[test]
 fn all_inputs_of_every_target_end_soon_and_within_their_memory() {
     for (name, _) in TARGETS {
         let mut child = Command::new(std::env::current_exe().expect("this test"));
         child.args(["--exact", "--ignored", "--nocapture", "one_target"]).env(TARGET, name);
-        let out = child.output().expect("this test once more");
+        let child = child.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+        let out = child.expect("this test once more").output_within(longest_run());
         let said = String::from_utf8_lossy(&out.stderr);
         assert!(out.status.success(), "{name}: {}\n{said}", out.status);
     }
@@ -61,11 +86,10 @@ fn one_target() {
         try_soon(*target, &bytes);
         corpus.push(bytes);
     }
-    let rounds = std::env::var("INPUT_ROUNDS").ok().and_then(|rounds| rounds.parse().ok()).unwrap_or(ROUNDS);
     // Kept until the next is tried, so that what failed is there.
     let kept = std::env::temp_dir().join(format!("phantom3-spoilt-{name}-{}", std::process::id()));
     eprintln!("spoilt inputs; the one that fails is left in {}", kept.display());
-    for round in 0..rounds {
+    for round in 0..rounds() {
         let mut random = Random::of(&name, round);
         let [good, other] = [0; 2].map(|_| &corpus[random.below(corpus.len())]);
         let bytes = spoilt(good, other, &mut random);

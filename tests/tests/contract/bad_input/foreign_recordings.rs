@@ -161,3 +161,24 @@ fn of_a_recording_without_rows_nothing_is_drawn_and_no_table_is_made() {
         assert_says(&refused(&place, command), &["header.csv: it has no rows"]);
     }
 }
+
+#[test]
+fn a_record_of_an_mcap_file_that_cannot_be_used_is_told_with_what_is_wrong_with_it() {
+    let (place, _) = with_table();
+    let good = fs::read(place.path("good.mcap")).expect("a recording");
+    let at = |words: &[u8]| good.windows(words.len()).position(|found| found == words).expect("it is there");
+    for (place_of, byte, reason) in [
+        (at(b"[[finger]]"), b'(', "the attached file scene:scene.toml does not have its check sum"),
+        (at(b"scene:scene.toml"), 0xff, "a text in a record is not UTF-8"),
+        (at(b"phantom3.run"), 0xff, "a text in a record is not UTF-8"),
+    ] {
+        let mut bad = good.clone();
+        bad[place_of] = byte;
+        place.write("bad.mcap", bad);
+        for command in [&["export", "bad.mcap", "out2.csv"][..], &["replay", "bad.mcap"]] {
+            let said = place.run(command);
+            assert_says(&said.err, &["bad.mcap", reason]);
+            assert!(said.status == Some(2) || said.status == Some(3), "{command:?}: {:?}", said.status);
+        }
+    }
+}
