@@ -217,7 +217,7 @@ impl Cycle {
     pub fn not_zeroed(&self) -> DeviceSet {
         let needs =
             self.devices.iter().enumerate().filter(|(_, device)| device.zero_state() == ZeroState::Needed);
-        DeviceSet(needs.fold(0, |bits, (index, _)| bits | 1 << index))
+        DeviceSet(needs.map(|(index, _)| 1 << index).sum())
     }
 
     /// What became of the last request to zero; told once.
@@ -334,7 +334,8 @@ impl Cycle {
             }
             if self.devices[index].zero_state() == ZeroState::Needed {
                 let flags = &mut self.frame.devices[index].flags;
-                *flags = *flags & !DEVICE_POSITION_VALID | DEVICE_NOT_ZEROED;
+                *flags &= !DEVICE_POSITION_VALID;
+                *flags |= DEVICE_NOT_ZEROED;
                 all_valid = false;
             }
         }

@@ -2,12 +2,15 @@
 
 use crate::common;
 
-use common::{Bench, Log, PEAK_N, command, publish};
-use io_driver::device::Reading;
+use common::{Bench, Log, PEAK_N, command, publish, usual_device};
+use io_driver::device::{Extras, Reading};
+use io_driver::safety::switches::Switches;
 use nalgebra::Vector3;
-use shm_abi::frame::{LIMIT_HEAT, LIMIT_SATURATION};
+use shm_abi::frame::{DEVICE_HAS_BUTTONS, DEVICE_POSITION_VALID, LIMIT_HEAT, LIMIT_SATURATION};
 use shm_abi::{Command, DriverState, DriverView, FaultReason, Frame, ReplyKind};
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
 
 const UP: [f64; 3] = [0.0, 2.0, 0.0];
 
@@ -240,6 +243,62 @@ fn what_a_device_cuts_because_its_motors_are_warm_is_counted_and_nothing_else_is
         assert_eq!(bench.counter(|c| &c.forces_derated), derated);
         assert_eq!(bench.counter(|c| &c.forces_limited) + bench.counter(|c| &c.forces_slewed), 0);
     }
+}
+
+#[test]
+fn a_bell_is_looked_into_once_a_tick_and_tells_how_long_the_answer_was_on_its_way() {
+    let mut bench = Bench::new(0);
+    let commander = bench.lease(1);
+    bench.ramp_in(&commander, UP);
+    let trips = |bench: &Bench| bench.view.round_trip_ns.count.load(Ordering::Relaxed);
+    let (before, refused) = (trips(&bench), bench.counter(|c| &c.commands_refused));
+    let tick = bench.tick + 1;
+    bench.cycle.sense(tick, 0);
+    assert_eq!((bench.cycle.tick(), bench.cycle.seen_reply()), (tick, Some(tick - 1)));
+    assert!(!bench.cycle.take_reply());
+    assert_eq!(trips(&bench), before, "nobody has answered this tick");
+    publish(&commander, &bench.view, tick, UP);
+    assert!(bench.cycle.take_reply() && bench.cycle.take_reply());
+    assert_eq!((bench.cycle.seen_reply(), trips(&bench)), (Some(tick), before + 1));
+    assert_eq!(bench.counter(|c| &c.commands_refused), refused, "the same answer is no second one");
+    bench.cycle.actuate();
+    bench.tick = tick;
+    let (frame, _) = bench.tick(|_, view| publish(&commander, view, tick, UP));
+    assert!(frame.previous.round_trip_ns > 0);
+    assert_eq!(trips(&bench), before + 1, "an answer to the tick before makes no round trip");
+}
+
+#[test]
+fn nobody_has_answered_a_lease_that_begins() {
+    let mut bench = Bench::new(0);
+    assert_eq!(bench.cycle.seen_reply(), None);
+    let _commander = bench.lease(1);
+    bench.silent_tick();
+    assert_eq!(bench.cycle.seen_reply(), None);
+}
+
+#[test]
+fn a_cycle_takes_what_its_devices_take_without_the_wait_for_the_answer() {
+    const TAKES: Duration = Duration::from_millis(1);
+    const WAITS: Duration = Duration::from_millis(20);
+    let mut bench = Bench::new(0);
+    bench.log.lock().unwrap().takes = TAKES;
+    let begun = Instant::now();
+    bench.tick(|_, _| std::thread::sleep(WAITS));
+    let most = (begun.elapsed() - WAITS).as_nanos();
+    let took = u128::from(bench.view.cycle_ns.sum_ns.load(Ordering::Relaxed));
+    assert!((2 * TAKES.as_nanos()..=most).contains(&took), "{took} ns of {most} ns");
+}
+
+#[test]
+fn buttons_and_orientation_are_told_of_the_devices_that_have_them() {
+    let mut bench = Bench::of(0, vec![usual_device(), usual_device()], Switches::default());
+    let has = Extras { orientation: true, buttons: true };
+    bench.logs[1].lock().unwrap().extras = has;
+    let (frame, _) = bench.silent_tick();
+    assert_eq!(frame.devices[0].flags, DEVICE_POSITION_VALID);
+    assert_eq!(frame.devices[1].flags, DEVICE_POSITION_VALID | DEVICE_HAS_BUTTONS);
+    assert_eq!(bench.cycle.extras(), [Extras::default(), has]);
 }
 
 #[test]

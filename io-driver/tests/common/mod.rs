@@ -4,7 +4,7 @@
 
 use bytemuck::Zeroable;
 use io_driver::cycle::{Cycle, Freshness, Protection};
-use io_driver::device::{Device, Effort, Reading, TickTime, Written};
+use io_driver::device::{Device, Effort, Extras, Reading, TickTime, Written};
 use io_driver::safety::switches::Switches;
 use io_driver::safety::{Ramps, Safety};
 use io_driver::velocity::VelocityEstimator;
@@ -16,6 +16,7 @@ use shm_abi::{Command, CommanderMemory, CommanderView, DriverMemory, DriverView,
 use std::os::fd::AsFd;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 pub const PERIOD_NS: u64 = 1_000_000;
 /// Four ticks in, two ticks out; commands may be two ticks old.
@@ -37,6 +38,9 @@ pub struct Log {
     pub counts: [i64; 6],
     /// Whether it has to be zeroed; `None`: never.
     pub needs_zero: Option<bool>,
+    pub extras: Extras,
+    /// How long it takes to be read, and how long to be written.
+    pub takes: Duration,
 }
 
 /// Its velocity is the plain difference of its positions.
@@ -46,12 +50,22 @@ pub struct TestDevice {
     pub log: Arc<Mutex<Log>>,
 }
 
+impl TestDevice {
+    fn take_time(&self) {
+        let takes = self.log.lock().unwrap().takes;
+        if !takes.is_zero() {
+            std::thread::sleep(takes);
+        }
+    }
+}
+
 impl Device for TestDevice {
     fn info(&self) -> &DeviceInfo {
         &self.info
     }
 
     fn read(&mut self, time: TickTime) -> Result<Reading, FaultReason> {
+        self.take_time();
         let planned = self.log.lock().unwrap().next_reading.take();
         let encoder_counts = self.log.lock().unwrap().counts;
         let usual = Reading { encoder_counts, ..Reading::at(Vector3::new(0.1, 0.2, 0.3)) };
@@ -61,6 +75,7 @@ impl Device for TestDevice {
     }
 
     fn write(&mut self, effort: Effort) -> Result<Written, FaultReason> {
+        self.take_time();
         let force_on_user_n = effort.force_on_user_n;
         let mut log = self.log.lock().unwrap();
         log.forces.push(force_on_user_n);
@@ -78,6 +93,10 @@ impl Device for TestDevice {
     fn rearm(&mut self) {
         self.velocity.forget();
         self.log.lock().unwrap().rearms += 1;
+    }
+
+    fn extras(&self) -> Extras {
+        self.log.lock().unwrap().extras
     }
 
     fn zero_state(&self) -> ZeroState {

@@ -45,35 +45,7 @@ pub fn hand_csv(bytes: &[u8]) {
 /// A segment that its commander spoils after a good reply: what is believed of it is finite and of the tick that was asked
 /// for. The first two bytes say from where on the others are laid over it.
 pub fn reply(bytes: &[u8]) {
-    const LEASE: u64 = 7;
-    const TICK: u64 = 5;
-    let (view, fd) = CommanderView::create(LEASE).expect("a segment");
-    HOST.with_borrow(|host| {
-        let driver = DriverView::map(host.memory.fd()).expect("our own segment");
-        let commander = CommanderMemory::map(fd.as_fd()).expect("a segment");
-        commander.publish(&Command::zero(TICK, LEASE, 2), &driver);
-    });
-    spoil(&File::from(fd), bytes);
-    let rung = view.latest_tick().unwrap_or_default();
-    for tick in [rung, TICK, 0, u64::MAX] {
-        let mut command = Command::zeroed();
-        if view.read_command(tick, &mut command).is_ok() && command.validate(tick, LEASE, 2).is_ok() {
-            let forces = command.devices[..2].iter().flat_map(|device| device.force_on_user_n);
-            assert!(forces.into_iter().all(f64::is_finite), "a force that is none");
-            assert_eq!((command.tick, command.lease), (tick, LEASE));
-        }
-    }
-}
-
-/// Flips the bits that are set in `bytes`; what is beyond the segment's end is not there.
-fn spoil(segment: &File, bytes: &[u8]) {
-    let Some((at, flips)) = bytes.split_first_chunk() else { return };
-    let at = 8 * u64::from(u16::from_le_bytes(*at));
-    let mut there = vec![0; flips.len()];
-    let read = segment.read_at(&mut there, at).unwrap_or_default();
-    there.truncate(read);
-    there.iter_mut().zip(flips).for_each(|(byte, flip)| *byte ^= flip);
-    let _ = segment.write_all_at(&there, at);
+    COMMANDER.with_borrow(|commander| commander.answer(bytes));
 }
 
 /// A client that says anything, in pieces; afterwards another one is still answered.
@@ -82,7 +54,60 @@ pub fn server(bytes: &[u8]) {
 }
 
 thread_local! {
+    static COMMANDER: RefCell<Commander> = RefCell::new(Commander::new());
     static HOST: RefCell<Host> = RefCell::new(Host::new());
+}
+
+/// A commander's segment, and what the driver sees of it.
+struct Commander {
+    driver: DriverView,
+    memory: CommanderMemory,
+    view: CommanderView,
+    segment: File,
+}
+
+impl Commander {
+    const LEASE: u64 = 7;
+    const TICK: u64 = 5;
+
+    fn new() -> Self {
+        let (view, fd) = CommanderView::create(Self::LEASE).expect("a segment");
+        let driver = HOST.with_borrow(|host| DriverView::map(host.memory.fd())).expect("our own segment");
+        let memory = CommanderMemory::map(fd.as_fd()).expect("a segment");
+        Self { driver, memory, view, segment: File::from(fd) }
+    }
+
+    fn answer(&self, bytes: &[u8]) {
+        self.memory.publish(&Command::zero(Self::TICK, Self::LEASE, 2), &self.driver);
+        self.spoil(bytes);
+        self.check();
+        // Flipped again they are what they were.
+        self.spoil(bytes);
+    }
+
+    fn check(&self) {
+        let rung = self.view.latest_tick().unwrap_or_default();
+        for tick in [rung, Self::TICK, 0, u64::MAX] {
+            let mut command = Command::zeroed();
+            let is_read = self.view.read_command(tick, &mut command).is_ok();
+            if is_read && command.validate(tick, Self::LEASE, 2).is_ok() {
+                let forces = command.devices[..2].iter().flat_map(|device| device.force_on_user_n);
+                assert!(forces.into_iter().all(f64::is_finite), "a force that is none");
+                assert_eq!((command.tick, command.lease), (tick, Self::LEASE));
+            }
+        }
+    }
+
+    /// Flips the bits that are set in `bytes`; what is beyond the segment's end is not there.
+    fn spoil(&self, bytes: &[u8]) {
+        let Some((at, flips)) = bytes.split_first_chunk() else { return };
+        let at = 8 * u64::from(u16::from_le_bytes(*at));
+        let mut there = vec![0; flips.len()];
+        let read = self.segment.read_at(&mut there, at).unwrap_or_default();
+        there.truncate(read);
+        there.iter_mut().zip(flips).for_each(|(byte, flip)| *byte ^= flip);
+        let _ = self.segment.write_all_at(&there, at);
+    }
 }
 
 struct Host {
@@ -134,7 +159,7 @@ impl Host {
         let socket = socket.to_path_buf();
         let asking = std::thread::spawn(move || client::observe(&socket, "somebody else").map(drop));
         for _ in 0..MOST_POLLS {
-            self.poll();
+            self.poll_for(Duration::from_millis(1));
             if asking.is_finished() {
                 break;
             }
@@ -144,8 +169,12 @@ impl Host {
     }
 
     fn poll(&mut self) {
+        self.poll_for(Duration::ZERO);
+    }
+
+    fn poll_for(&mut self, wait: Duration) {
         let mut events = Vec::new();
-        self.server.poll(&self.memory, Duration::from_millis(1), &mut events).expect("it goes on");
+        self.server.poll(&self.memory, wait, &mut events).expect("it goes on");
     }
 }
 
