@@ -70,16 +70,10 @@ pub enum Wish {
 }
 
 /// How the hand turns the handle, and what it presses.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Handle {
     pub(crate) orientation_W: UnitQuaternion<f64>,
     pub(crate) buttons: u64,
-}
-
-impl Default for Handle {
-    fn default() -> Self {
-        Self { orientation_W: UnitQuaternion::identity(), buttons: 0 }
-    }
 }
 
 impl Wish {

@@ -5,7 +5,7 @@
 //! executable, no signal sent to others, no right changed.
 //!
 //! The loop's own calls have no conditions, so that the kernel lets them through without running the filter;
-//! therefore their order does not matter. `tests/tests/privilege_full_life.rs` lives through everything that
+//! therefore their order does not matter. `tests/tests/privilege/full_life.rs` lives through everything that
 //! a driver can live through under this list, and shows which entries that takes.
 
 use rt_core::sandbox::Only::{self, Any, OneOf, OwnProcess, Without};

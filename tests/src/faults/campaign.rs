@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// Name of the test that plays [`super::hog`] when it is started as a process of its own.
-pub const HOG_TEST: &str = "the_hog";
+pub const HOG_TEST: &str = "campaign::the_hog";
 
 /// How long a stop lasts that comes at a start or at an end (ms).
 const STOP_MS: u64 = 40;

@@ -4,6 +4,7 @@
 //! written. Asserted are orders of events and, between the modes, medians on either side of the budget, half a
 //! millisecond apart: no stall of a shared machine moves a median so far.
 
+use crate::in_turn;
 use bytemuck::Zeroable;
 use shm_abi::{DriverView, Frame, ReplyKind};
 use system_tests::driver::Driver;
@@ -71,6 +72,7 @@ fn median(done: &[Done], of: impl Fn(&Done) -> u64) -> u64 {
 
 #[test]
 fn on_arrival_the_motors_are_written_as_soon_as_the_same_ticks_reply_is_there() {
+    let _turn = in_turn();
     let done = answered("same-tick");
     for tick in &done {
         assert_eq!(tick.after.previous.command_tick, tick.tick);
@@ -83,6 +85,7 @@ fn on_arrival_the_motors_are_written_as_soon_as_the_same_ticks_reply_is_there() 
 
 #[test]
 fn at_a_fixed_phase_no_reply_is_applied_before_its_time() {
+    let _turn = in_turn();
     let done = answered("fixed-phase");
     for tick in &done {
         assert_eq!(tick.after.previous.command_tick, tick.tick);
@@ -96,6 +99,7 @@ fn at_a_fixed_phase_no_reply_is_applied_before_its_time() {
 
 #[test]
 fn in_next_tick_mode_the_reply_before_drives_the_motors_at_once() {
+    let _turn = in_turn();
     let done = answered("next-tick");
     for tick in &done {
         assert_eq!(tick.after.previous.command_tick + 1, tick.tick, "a delay of one tick, always");
@@ -105,6 +109,7 @@ fn in_next_tick_mode_the_reply_before_drives_the_motors_at_once() {
 
 #[test]
 fn in_lockstep_a_reply_for_the_next_tick_is_waited_for_and_drives_that_one() {
+    let _turn = in_turn();
     let done = answered_on("lockstep", "next-tick");
     for tick in &done {
         assert_eq!(tick.after.previous.command_tick + 1, tick.tick, "a delay of one tick, always");

@@ -10,7 +10,7 @@ use system_tests::faults::process::{Running, role};
 use system_tests::programs::io_driver;
 use system_tests::strangers::{Stranger, can_be_others, directory_of_nobody, open_directory};
 
-const TEST: &str = "another_user_gets_nothing_of_the_driver";
+const TEST: &str = "strangers::another_user_gets_nothing_of_the_driver";
 
 /// The driver as root and as an ordinary user; the stranger is another ordinary one.
 #[test]

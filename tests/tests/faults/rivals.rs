@@ -7,8 +7,9 @@ use shm_abi::{DriverState, DriverView, Frame, client};
 use std::path::Path;
 use std::sync::atomic::Ordering;
 use system_tests::faults::amplifiers::{emulate, wait_for};
+use system_tests::faults::campaign::HOG_TEST;
 use system_tests::faults::heal::another_phantom3;
-use system_tests::faults::process::{Running, myself, role};
+use system_tests::faults::process::{Running, myself};
 use system_tests::faults::ring::{RingLog, Told};
 use system_tests::faults::stand::{Setup, Stand, end_app};
 
@@ -136,7 +137,7 @@ fn counts_in(driver: &DriverView, tick: u64) -> Option<[i64; 6]> {
 
 /// It takes the loop's CPU for twice as long as the amplifiers wait: they switch themselves off, and the loop
 /// that gets its CPU back finds them so. Without the right to take a CPU nobody can do that to it; what a loop
-/// that stands still means is shown in `faults_driver_dies` without any right.
+/// that stands still means is shown in `driver_dies` without any right.
 #[test]
 fn a_hog_on_the_drivers_cpu_is_the_watchdogs_and_the_driver_comes_back() {
     let mut setup = Setup::new("real");
@@ -149,7 +150,7 @@ fn a_hog_on_the_drivers_cpu_is_the_watchdogs_and_the_driver_comes_back() {
     };
     let before = stand.amplifiers.tally();
     let overruns = stand.view().counters.overruns.load(Ordering::Relaxed);
-    let end = Running::start(&mut myself("the_hog", &format!("{cpu} 300"))).end();
+    let end = Running::start(&mut myself(HOG_TEST, &format!("{cpu} 300"))).end();
     assert_eq!(end.status, Some(0), "{end:?}");
     if end.out.contains("skipped") {
         eprintln!("{}", end.out);
@@ -168,12 +169,4 @@ fn a_hog_on_the_drivers_cpu_is_the_watchdogs_and_the_driver_comes_back() {
     stand.wait_for_force();
     drop(app);
     stand.finish();
-}
-
-/// Not a test of its own: the hog.
-#[test]
-fn the_hog() {
-    if let Some(words) = role() {
-        println!("{}", system_tests::faults::hog::take(&words));
-    }
 }

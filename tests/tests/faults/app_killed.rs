@@ -118,7 +118,7 @@ fn forty_commanders_killed_in_the_middle_of_writing_leave_no_force_behind() {
     let mut press = Press::start("real");
     let slow_writer = |press: &Press| {
         let socket = press.driver.socket().to_str().expect("a temporary name");
-        Running::start(&mut myself("the_commander_that_writes_slowly", socket))
+        Running::start(&mut myself("app_killed::the_commander_that_writes_slowly", socket))
     };
     kill_again_and_again(&mut press, &mut Random::seeded(3), 40, slow_writer);
     no_fault_and_every_lease_granted(&press, 41);

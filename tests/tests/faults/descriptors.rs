@@ -205,7 +205,7 @@ fn stops_are_served_under_a_flood_of_connections() {
 }
 
 #[test]
-#[ignore = "a minute: cargo test -p system-tests --test faults_descriptors -- --ignored --nocapture"]
+#[ignore = "a minute: cargo test -p system-tests --test faults flood -- --ignored --nocapture"]
 fn stops_are_served_under_a_flood_of_connections_for_a_minute() {
     stops_under_a_flood(Duration::from_secs(60));
 }

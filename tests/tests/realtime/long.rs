@@ -2,11 +2,12 @@
 //!
 //! The official measurements take half an hour, on a machine with nothing else to do:
 //! ```text
-//! cargo test --release -p system-tests --test realtime_long -- --ignored --nocapture
+//! cargo test --release -p system-tests --test realtime long -- --ignored --nocapture
 //! ```
 //! `REALTIME_SECONDS=20` shortens each of them to twenty seconds of ours and as many of the reference's.
 //! What is asserted, and why no absolute figure is: [`system_tests::slices`].
 
+use crate::in_turn;
 use io_driver::meter;
 use io_driver::status::CounterStatus;
 use patience::prelude::*;
@@ -17,19 +18,11 @@ use shm_abi::client::stop;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Stdio};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use system_tests::bare_loop::{Outcome, WARM_UP};
 use system_tests::driver::{Driver, HANG, wait_or_kill};
 use system_tests::programs;
 use system_tests::slices::Comparison;
-
-/// Measurements take turns: side by side they would measure each other.
-static TURN: Mutex<()> = Mutex::new(());
-
-fn in_turn() -> MutexGuard<'static, ()> {
-    TURN.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 #[test]
 #[ignore = "takes 21 minutes on an otherwise idle machine"]
@@ -68,7 +61,7 @@ fn for_a_few_seconds_most_replies_come_in_time_wherever_a_bare_loop_gets_them_in
 
 /// From frame to reply with nothing in the scene, each program on its own CPU.
 ///
-/// `cargo test --release -p system-tests --test realtime_long round_trip -- --ignored --nocapture`
+/// `cargo test --release -p system-tests --test realtime round_trip -- --ignored --nocapture`
 #[test]
 #[ignore = "a measurement: 20 s on an otherwise idle machine"]
 fn the_round_trip_through_an_empty_scene_is_a_small_multiple_of_a_bare_one() {

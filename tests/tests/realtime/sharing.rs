@@ -4,24 +4,17 @@
 //! computer would. Nothing here depends on how fast they are: only that both get on, in every combination of
 //! who is confined.
 
+use crate::in_turn;
 use patience::prelude::*;
 use shm_abi::doorbell::WaitMode;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::Ordering;
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use system_tests::driver::{Driver, HANG, wait_or_kill};
 use system_tests::programs;
 use system_tests::recording::Table;
 use system_tests::threads::{ThreadOf, last_cpu, pinned_to};
-
-/// These tests keep a CPU busy each: they take turns.
-static TURN: Mutex<()> = Mutex::new(());
-
-fn in_turn() -> MutexGuard<'static, ()> {
-    TURN.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 fn scene() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/scenes/default.toml")

@@ -8,7 +8,7 @@ use io_driver::sandbox::allowed_calls::ALLOWED_CALLS;
 use rt_core::sandbox::Only;
 use system_tests::faults::process::{Running, myself, role};
 
-const TEST: &str = "every_forbidden_call_is_fatal";
+const TEST: &str = "table::every_forbidden_call_is_fatal";
 
 /// A call and its arguments. None of them would do harm if it were let through: the arguments are nonsense.
 type Call = (&'static str, libc::c_long, [u64; 6]);

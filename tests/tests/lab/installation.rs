@@ -1,6 +1,5 @@
 //! `config/system/install.sh`: what it puts where, and that it takes away no more than it brought.
 
-#[path = "lab_installation/fix_plan.rs"]
 mod fix_plan;
 
 use io_driver::config::DriverConfig;

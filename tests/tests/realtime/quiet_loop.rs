@@ -3,6 +3,7 @@
 //! The driver spins for replies here, as it does on a CPU of its own with real-time rights, though it may
 //! have neither: then it is late more often, and what it asks of the kernel is the same.
 
+use crate::in_turn;
 use patience::Raised;
 use patience::prelude::*;
 use rustix::process::{Pid, Signal, kill_process};
@@ -12,18 +13,10 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Child, Command as Process, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use system_tests::driver::{Driver, HANG, wait_or_kill};
 use system_tests::programs;
 use system_tests::threads::{PageFaults, ThreadOf};
-
-/// These tests keep two CPUs busy each: they take turns.
-static TURN: Mutex<()> = Mutex::new(());
-
-fn in_turn() -> MutexGuard<'static, ()> {
-    TURN.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 /// A driver of three resting devices, one of them simulated, that spins for replies, without real-time rights.
 const SPINNING: &str = "\
@@ -86,7 +79,7 @@ fn wait_for(count: impl Fn() -> u64, more: u64) {
 }
 
 /// Ticks of a window in which something is watched.
-const WINDOW: u64 = 2000;
+const WINDOW: u64 = 700;
 
 /// Watches the driver for a window. Returns whether it was steady: a driver that gets no reply for 5 ms, which
 /// a busy machine brings about, sleeps for replies during the next second instead of spinning.
@@ -304,13 +297,13 @@ fn check_that_nothing_faults(thread: &ThreadOf, ticks: impl Fn() -> u64) {
     let mut windows = Vec::new();
     for _ in 0..if locked { 1 } else { 3 } {
         let before = thread.page_faults();
-        wait_for(&ticks, 2000);
+        wait_for(&ticks, WINDOW);
         let after = thread.page_faults();
         windows.push(PageFaults { minor: after.minor - before.minor, major: after.major - before.major });
         if windows.last() == Some(&PageFaults { minor: 0, major: 0 }) {
-            println!("thread {}, locked {locked}: no page fault in 2000 ticks", thread.tid);
+            println!("thread {}, locked {locked}: no page fault in {WINDOW} ticks", thread.tid);
             return;
         }
     }
-    panic!("page faults in windows of 2000 ticks, locked {locked}: {windows:?}");
+    panic!("page faults in windows of {WINDOW} ticks, locked {locked}: {windows:?}");
 }

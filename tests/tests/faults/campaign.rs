@@ -2,9 +2,9 @@
 //! check every value.
 //!
 //! ```text
-//! cargo test --release -p system-tests --test faults_campaign campaign -- --nocapture
+//! cargo test --release -p system-tests --test faults campaign::campaign -- --nocapture
 //! ```
-//! plays a minute of it and prints a table. `CAMPAIGN_SECONDS=3600` plays an hour, `CAMPAIGN_RUNS=500` so many
+//! plays a quarter of a minute of it and prints a table. `CAMPAIGN_SECONDS=3600` plays an hour, `CAMPAIGN_RUNS=500` so many
 //! runs whatever the time, `CAMPAIGN_SEED=0x...` begins with another run: the one whose seed a failure tells,
 //! with `CAMPAIGN_RUNS=1` it alone. What happens in a run is drawn from its seed and from nothing else; when a
 //! blow falls within a tick is up to the machine.
@@ -22,7 +22,7 @@ use system_tests::faults::random::Random;
 /// Where the usual campaign begins, so that a checkout that passes passes again.
 const USUAL_SEED: u64 = 0x0070_6861_6e74_6f6d;
 /// As long as a campaign lasts if nobody says.
-const USUAL_SECONDS: u64 = 60;
+const USUAL_SECONDS: u64 = 15;
 /// Begins the line on which a run says what it saw.
 const TELLS: &str = "the run saw ";
 
@@ -71,12 +71,13 @@ fn campaign() {
 /// In a process of its own: a run that hangs or crashes takes nothing with it.
 fn play(plan: &Plan) -> Result<Account, String> {
     println!("{plan}");
-    let end = Running::start(&mut myself("the_run_of_one_plan", &plan.seed.to_string())).end_within(4 * HANG);
+    let end = Running::start(&mut myself("campaign::the_run_of_one_plan", &plan.seed.to_string()))
+        .end_within(4 * HANG);
     let account = end.out.split(TELLS).nth(1).and_then(|text| Account::from_line(text.lines().next()?));
     account.filter(|_| end.status == Some(0)).ok_or_else(|| {
         format!(
             "the run failed: {plan}\nplay it again: CAMPAIGN_SEED=0x{:016x} CAMPAIGN_RUNS=1 cargo test --release \
-             -p system-tests --test faults_campaign campaign -- --nocapture\n{:?}\n{}\n{}",
+             -p system-tests --test faults campaign::campaign -- --nocapture\n{:?}\n{}\n{}",
             plan.seed, end.status, end.out, end.err
         )
     })
@@ -115,7 +116,7 @@ fn the_run_of_one_plan() {
 /// Not a test of its own: the hog of a run.
 #[test]
 fn the_hog() {
-    assert_eq!(HOG_TEST, "the_hog");
+    assert_eq!(HOG_TEST, "campaign::the_hog");
     if let Some(words) = role() {
         println!("{}", hog::take(&words));
     }

@@ -244,7 +244,7 @@ fn root_without_a_user_is_told_so_in_one_line() {
     assert_eq!(warnings, 1, "{end:?}");
 }
 
-const PARENT_TEST: &str = "a_driver_that_changed_its_user_still_ends_with_its_parent";
+const PARENT_TEST: &str = "rights::a_driver_that_changed_its_user_still_ends_with_its_parent";
 
 /// The kernel forgets that request when the user changes.
 #[test]

@@ -1,6 +1,6 @@
 //! ARCHITECTURE.md names the sources that hold unsafe code and those that a new thing touches; the lists are complete.
 
-use super::root;
+use crate::root;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;

@@ -3,6 +3,7 @@
 //! The loop stands still for a while in a tick of the test's choice. Nothing is asserted about time but the
 //! tie between tick numbers and deadlines, and that as many deadlines passed as the standstill is long.
 
+use crate::in_turn;
 use io_driver::meter;
 use shm_abi::{DriverState, FaultReason, Frame};
 use std::sync::atomic::Ordering;
@@ -54,6 +55,7 @@ fn skipped_after_the_stall(frames: &[Frame]) -> u64 {
 
 #[test]
 fn by_default_missed_deadlines_are_left_out_and_counted() {
+    let _turn = in_turn();
     let (stand, frames) = stalled("");
     check_grid(&frames);
     let skipped = skipped_after_the_stall(&frames);
@@ -66,6 +68,7 @@ fn by_default_missed_deadlines_are_left_out_and_counted() {
 
 #[test]
 fn a_driver_that_catches_up_does_the_last_few_at_once() {
+    let _turn = in_turn();
     let (stand, frames) = stalled("policy = \"catch-up\"\nticks = 30\n");
     check_grid(&frames);
     let first = frames.iter().position(|frame| frame.tick > STALL_AT).expect("it goes on");
@@ -83,6 +86,7 @@ fn a_driver_that_catches_up_does_the_last_few_at_once() {
 
 #[test]
 fn a_driver_that_must_not_miss_many_stops_the_motors() {
+    let _turn = in_turn();
     let (stand, frames) = stalled("policy = \"fault\"\nticks = 70\n");
     let last = frames.last().unwrap();
     // The stall is 80 ticks long; one of the machine's own before it would do as well.
@@ -93,6 +97,7 @@ fn a_driver_that_must_not_miss_many_stops_the_motors() {
 
 #[test]
 fn fewer_misses_than_allowed_are_no_fault() {
+    let _turn = in_turn();
     let (stand, frames) = stalled("policy = \"fault\"\nticks = 900\n");
     assert!(frames.iter().all(|frame| frame.state == DriverState::Idle as u64));
     stand.finish();

@@ -143,7 +143,7 @@ fn any_number_of_observers_disturbs_nobody() {
     press.driver_must_live();
 }
 
-const FORKED: &str = "a_child_that_inherited_the_connection_of_a_dead_parent_does_not_keep_its_lease";
+const FORKED: &str = "leases::a_child_that_inherited_the_connection_of_a_dead_parent_does_not_keep_its_lease";
 
 /// Commands, hands its connection down to a child that lives on, and ends.
 fn leave_a_child(socket: &str) -> ! {

@@ -1,6 +1,6 @@
 //! README.md explains the lines that a run tells at its end; the table is complete.
 
-use super::root;
+use crate::root;
 use std::collections::BTreeSet;
 use std::fs;
 

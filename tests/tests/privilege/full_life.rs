@@ -36,7 +36,7 @@ const RARE: &[&str] = &[
     "mremap",          // the same for large blocks
     "munmap",
     "madvise",      // depends on the stack of the ending thread
-    "write",        // this driver is told to be quiet; that of `privilege_rights` talks
+    "write",        // this driver is told to be quiet; that of `rights` talks
     "rmdir",        // only for a driver that an application started as its child
     "unlinkat",     // the same on architectures without rmdir
     "rt_sigaction", // violent ends: `other_violent_ends_are_not_taken_for_forbidden_calls`
@@ -166,7 +166,7 @@ fn calls_under_the_filter(trace: &Path) -> BTreeSet<String> {
     lines.filter_map(call).filter(|name| name != "seccomp").collect()
 }
 
-const FAULTY_TEST: &str = "faults_and_panics_of_the_loop_are_dealt_with_under_the_filter";
+const FAULTY_TEST: &str = "full_life::faults_and_panics_of_the_loop_are_dealt_with_under_the_filter";
 
 /// With devices that fail when told to: in a process of its own, which has the filter for good.
 #[test]

@@ -1,0 +1,13 @@
+//! What the documents name is there.
+
+mod architecture;
+mod equations;
+mod named;
+mod report;
+
+use std::path::{Path, PathBuf};
+
+/// The project's directory.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}

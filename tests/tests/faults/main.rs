@@ -1,0 +1,15 @@
+//! What happens when something fails, is killed, lies or is in the way: motors off, words, and work that goes on.
+
+mod app_killed;
+mod app_stopped;
+mod campaign;
+mod descriptors;
+mod devices;
+mod driver_dies;
+mod driver_gone;
+mod full;
+mod garbage;
+mod leases;
+mod rivals;
+mod service;
+mod versions;
