@@ -3,7 +3,8 @@
 //! Model: whoever takes the rows on the slow side looks at each ([`Snapshots::look`]); when a picture is due, the moment goes
 //! to a thread of its own, which draws without a display and writes PNG. On a clock that waits it is waited for; in real
 //! time pictures of a film that are due while the thread is busy are left out, and counted. A machine that cannot draw
-//! says so once, and the run goes on.
+//! says so once, and the run goes on; a picture that cannot be written, as into a pipe that nobody reads, is waited for
+//! as long as rows of a recording are.
 
 mod args;
 
@@ -11,17 +12,22 @@ pub use args::{Film, PictureArgs, Shot, Wanted};
 
 use crate::displaced::Placed;
 use crate::moments::Moments;
+use crate::record::backpressure::{Progress, STUCK, Wait};
 use crate::row::{BodyRow, Row};
 use crate::shown::Shown;
 use io_driver::say::say;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
+use std::time::Duration;
 use view::{Eyes, Moment, Stage, Studio};
 use world::SceneCamera;
 
 /// So many moments wait to be drawn.
 const WAITING: usize = 4;
+/// Between two looks at a thread that is waited for.
+const TURN: Duration = Duration::from_millis(1);
 
 /// Who takes the pictures of a run.
 pub struct Snapshots {
@@ -35,6 +41,7 @@ pub struct Snapshots {
     period_s: f64,
     moments: Moments,
     out: Option<SyncSender<Work>>,
+    progress: Arc<Progress>,
     thread: Option<JoinHandle<Drawn>>,
 }
 
@@ -100,9 +107,11 @@ impl Snapshots {
         }
         let look = wanted.clone();
         let (out, to_draw) = sync_channel(WAITING);
+        let progress = Arc::new(Progress::default());
+        let done = Arc::clone(&progress);
         let thread = std::thread::Builder::new()
             .name("pictures".into())
-            .spawn(move || draw_all(stage, &look, &to_draw))
+            .spawn(move || draw_all(stage, &look, &to_draw, &done))
             .map_err(|error| format!("no thread for pictures: {error}"))?;
         let mut shots = wanted.shots.clone();
         shots.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
@@ -115,6 +124,7 @@ impl Snapshots {
             period_s: period_ns as f64 / 1e9,
             moments,
             out: Some(out),
+            progress,
             thread: Some(thread),
         })
     }
@@ -141,30 +151,55 @@ impl Snapshots {
     /// Another scene goes on: pictures are of that from now on, and of its first camera where it has none of that name.
     pub fn go_on(&mut self, Shown { stage, moments }: Shown) {
         self.moments = moments;
-        if let Some(out) = &self.out {
-            // A thread that has ended has said why.
-            let _ = out.send(Work::Scene(Box::new(stage)));
+        if !self.give(Work::Scene(Box::new(stage)), true) {
+            // Pictures of the scene before would be none of this one.
+            self.out = None;
         }
     }
 
     fn send(&mut self, (moment, file): (Moment, PathBuf), waits: bool) {
-        let Some(out) = &self.out else { return };
-        let picture = Work::Picture(Box::new(moment), file);
-        if waits {
-            // A thread that has ended has said why.
-            let _ = out.send(picture);
-        } else if let Err(TrySendError::Full(_)) = out.try_send(picture) {
+        if !self.give(Work::Picture(Box::new(moment), file), waits) {
             self.left_out += 1;
+        }
+    }
+
+    /// Whether there is room for it; `waits`: sooner or later, as long as the thread gets on.
+    fn give(&self, mut work: Work, waits: bool) -> bool {
+        let Some(out) = &self.out else { return false };
+        let mut wait = Wait::begin(&self.progress);
+        loop {
+            match out.try_send(work) {
+                Err(TrySendError::Full(_)) if !waits || wait.is_in_vain(&self.progress, STUCK) => {
+                    return false;
+                }
+                Err(TrySendError::Full(back)) => work = back,
+                // A thread that has ended has said why.
+                Ok(()) | Err(TrySendError::Disconnected(_)) => return true,
+            }
+            std::thread::sleep(TURN);
         }
     }
 
     /// Waits for the last picture, and says what became of all.
     pub fn finish(mut self) -> Drawn {
         drop(self.out.take());
-        let drawn = self.thread.take().map(JoinHandle::join);
-        let lost = || Drawn { failure: Some("the drawing ended by itself".into()), ..Drawn::default() };
-        let drawn = drawn.and_then(Result::ok).unwrap_or_else(lost);
+        let drawn = self.thread.take().map_or_else(Drawn::default, |thread| self.wait_for(thread));
         Drawn { left_out: self.left_out, not_reached: self.shots.len(), ..drawn }
+    }
+
+    fn wait_for(&self, thread: JoinHandle<Drawn>) -> Drawn {
+        let mut wait = Wait::begin(&self.progress);
+        while !thread.is_finished() {
+            if wait.is_in_vain(&self.progress, STUCK) {
+                let stuck = format!("no picture was written for {} s", STUCK.as_secs());
+                say(format_args!("phantom3: {stuck}; those that are missing are left out"));
+                let written = self.progress.taken();
+                return Drawn { written, failure: Some(stuck), is_fault: true, ..Drawn::default() };
+            }
+            std::thread::sleep(TURN);
+        }
+        let lost = || Drawn { failure: Some("the drawing ended by itself".into()), ..Drawn::default() };
+        thread.join().unwrap_or_else(|_| lost())
     }
 }
 
@@ -196,7 +231,7 @@ impl Drawer {
     }
 }
 
-fn draw_all(first: Stage, wanted: &Wanted, work: &Receiver<Work>) -> Drawn {
+fn draw_all(first: Stage, wanted: &Wanted, work: &Receiver<Work>, done: &Progress) -> Drawn {
     let mut drawn = Drawn::default();
     let (mut next, mut drawer) = (Some(first), None);
     loop {
@@ -220,6 +255,7 @@ fn draw_all(first: Stage, wanted: &Wanted, work: &Receiver<Work>) -> Drawn {
                 let Some(Drawer { studio, camera, eyes }) = &mut drawer else { continue };
                 drawn.renderer = studio.renderer().to_owned();
                 drawn.note(&file, studio.take(&moment, camera, eyes).save(&file));
+                done.take();
             }
             Err(_) => return drawn,
         }

@@ -10,7 +10,7 @@ use std::thread::Thread;
 use std::time::{Duration, Instant};
 
 /// A recorder that has not written anything for so long will not any more.
-const STUCK: Duration = Duration::from_secs(30);
+pub(crate) const STUCK: Duration = Duration::from_secs(30);
 
 /// How a recorder treats whoever has more than there is room for.
 #[derive(Debug, Clone, Copy)]
@@ -29,8 +29,8 @@ impl From<WhenFull> for Backpressure {
 
 /// How far a recorder is, as both of its ends see it.
 #[derive(Debug, Default)]
-pub(super) struct Progress {
-    /// Rows taken from the queue so far.
+pub(crate) struct Progress {
+    /// Rows, or pictures, taken from the queue so far.
     taken: AtomicU64,
     /// How many there were when a wait was in vain, and one; 0: none was.
     stuck: AtomicU64,
@@ -39,13 +39,13 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    /// A row more is taken.
-    pub(super) fn take(&self) {
+    /// One more is taken.
+    pub(crate) fn take(&self) {
         self.taken.fetch_add(1, Ordering::Relaxed);
     }
 
     /// Rows taken.
-    pub(super) fn taken(&self) -> u64 {
+    pub(crate) fn taken(&self) -> u64 {
         self.taken.load(Ordering::Relaxed)
     }
 
@@ -61,13 +61,13 @@ impl Progress {
 }
 
 /// A wait for the recorder's thread, which ends if that is stuck.
-pub(super) struct Wait {
+pub(crate) struct Wait {
     taken: u64,
     since: Instant,
 }
 
 impl Wait {
-    pub(super) fn begin(progress: &Progress) -> Self {
+    pub(crate) fn begin(progress: &Progress) -> Self {
         Self { taken: progress.taken(), since: Instant::now() }
     }
 
@@ -86,7 +86,7 @@ impl Wait {
     }
 
     /// Whether nothing was taken for long, in this wait or one before.
-    pub(super) fn is_in_vain(&mut self, progress: &Progress, patience: Duration) -> bool {
+    pub(crate) fn is_in_vain(&mut self, progress: &Progress, patience: Duration) -> bool {
         let taken = progress.taken();
         if taken != self.taken {
             *self = Self::begin(progress);

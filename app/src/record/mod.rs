@@ -8,7 +8,7 @@
 //! [`McapFile`], which has the events, a picture and the run's inputs beside the rows. [`read`] reads both.
 
 mod about;
-mod backpressure;
+pub(crate) mod backpressure;
 mod descriptor;
 pub mod destination;
 mod event_line;

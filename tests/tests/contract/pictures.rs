@@ -207,6 +207,22 @@ field_of_view_deg = 35.0
 const HAND: &str = "t,f0_x,f0_y,f0_z\n0,0,0.05,0\n0.2,0,-0.02,0\n0.3,0.004,-0.02,0\n1,0.004,-0.02,0\n";
 
 #[test]
+fn a_run_whose_picture_nobody_reads_ends_with_words() {
+    let place = place();
+    let pipe = place.path("a.png");
+    let mode = rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR;
+    rustix::fs::mknodat(rustix::fs::CWD, &pipe, rustix::fs::FileType::Fifo, mode, 0).expect("a pipe");
+    let run = ["run", "scene.toml", "--clock", "virtual", "--seconds", "1", "--headless"];
+    let film = ["--snapshot", "0.01:a.png", "--frames", "film", "--picture-size", "32x32"];
+    let said = place.run(run.into_iter().chain(film));
+    if are_missing(&said) {
+        return;
+    }
+    assert_eq!(said.status, Some(3), "{said:?}");
+    assert!(said.err.contains("no picture was written for 30 s"), "{said:?}");
+}
+
+#[test]
 fn a_runs_picture_has_the_friction_circle_and_the_normal_where_the_finger_presses() {
     let place = Workplace::new();
     place.write("scene.toml", PRESSED);
