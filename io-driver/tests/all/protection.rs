@@ -132,9 +132,7 @@ fn a_loop_that_catches_up_lets_no_force_grow_faster_than_time_goes() {
         bench.tick_due_at(deadline_ns, |frame, view| publish(&commander, view, frame.tick, [0.0, y, 0.0]))
     };
     // The ramp, in as much time as it takes.
-    while tick(monotonic_ns(), 0.0).0.authority < 1.0 {
-        std::thread::sleep(std::time::Duration::from_millis(1));
-    }
+    patience::until("a force that is let through in full", || tick(monotonic_ns(), 0.0).0.authority >= 1.0);
     let began = monotonic_ns();
     let due = began - 20 * PERIOD_NS;
     let pushed: Vec<f64> = (0..10).map(|k| tick(due + k * PERIOD_NS, 8.0).1.y).collect();

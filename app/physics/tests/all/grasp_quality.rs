@@ -270,8 +270,10 @@ fn force_closure_is_never_claimed_where_a_direction_is_open_and_nearly_always_wh
 #[test]
 fn the_margin_bounds_what_is_resisted_in_every_direction() {
     let mut noise = Noise(5);
-    let mut seen = 0;
+    let (mut seen, mut tried) = (0, 0);
     while seen < 12 {
+        tried += 1;
+        assert!(tried < 10_000, "{seen} grasps with force closure");
         let contacts = random(&mut noise, 4);
         let grasp = grasp(&contacts);
         let margin = grasp.margin();

@@ -109,7 +109,11 @@ fn hand_over_at_random(changes: u64) {
         let handed = world.lists.hand_over.handed();
         handed.came + handed.went
     };
+    let mut ticks = 0;
     while handed(&world) < changes {
+        ticks += 1;
+        // Each change takes some.
+        assert!(ticks < 1000 * changes, "{} of {changes} changes", handed(&world));
         if random(&mut seed) < 0.05 {
             let which = (random(&mut seed) * 3.0) as usize;
             fingers[which] = finger_at(1.6 * random(&mut seed) - 0.1, random(&mut seed) - 0.5);
@@ -329,9 +333,13 @@ fn a_claim_that_overtakes_what_is_claimed_is_kept_until_that_has_come() {
     assert_eq!(world.lists.hand_over.here(), 3);
     // The slow side has just taken in; then the finger is away for a tick, and there again.
     let goes = |world: &World| world.lists.hand_over.handed().went;
-    while goes(&world) == 0 {
+    for _ in 0..10_000 {
+        if goes(&world) > 0 {
+            break;
+        }
         world.step(&[], false);
     }
+    assert!(goes(&world) > 0, "nobody goes");
     world.step(&[finger_at(0.0, 0.0)], false);
     world.lists.slow.give_away();
     for _ in 0..30 {
