@@ -209,9 +209,13 @@ const HAND: &str = "t,f0_x,f0_y,f0_z\n0,0,0.05,0\n0.2,0,-0.02,0\n0.3,0.004,-0.02
 #[test]
 fn a_run_whose_picture_nobody_reads_ends_with_words() {
     let place = place();
-    let pipe = place.path("a.png");
+    let name = place.path("a.png");
     let mode = rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR;
-    rustix::fs::mknodat(rustix::fs::CWD, &pipe, rustix::fs::FileType::Fifo, mode, 0).expect("a pipe");
+    rustix::fs::mknodat(rustix::fs::CWD, &name, rustix::fs::FileType::Fifo, mode, 0).expect("a pipe");
+    // Both ends: the program finds a reader, who never reads, and no room.
+    let flags = rustix::fs::OFlags::RDWR | rustix::fs::OFlags::NONBLOCK;
+    let pipe = rustix::fs::open(&name, flags, rustix::fs::Mode::empty()).expect("our own pipe");
+    while rustix::io::write(&pipe, &[0; 4096]).is_ok() {}
     let run = ["run", "scene.toml", "--clock", "virtual", "--seconds", "1", "--headless"];
     let film = ["--snapshot", "0.01:a.png", "--frames", "film", "--picture-size", "32x32"];
     let said = place.run(run.into_iter().chain(film));
