@@ -405,12 +405,13 @@ impl Cycle {
         let mut fault = None;
         for (index, device) in self.devices.iter_mut().enumerate() {
             let commanded = self.reply.force(index);
-            let restrained = self.guards[index].restrain(commanded, authority, elapsed);
-            let effort = Effort { force_on_user_n: restrained.force_on_user_n, gravity_share: authority };
+            let effort = |force_on_user_n| Effort { force_on_user_n, gravity_share: authority };
+            let attainable = |force| device.attainable(effort(force));
+            let restrained = self.guards[index].restrain(commanded, authority, elapsed, attainable);
             let frame = &mut self.frame.devices[index];
             frame.force_on_user_n_commanded = commanded.into();
             frame.limits = restrained.limits;
-            match device.write(effort) {
+            match device.write(effort(restrained.force_on_user_n)) {
                 Ok(written) => {
                     frame.force_on_user_n_applied = written.force_on_user_n.into();
                     frame.motor_codes = written.motor_codes;

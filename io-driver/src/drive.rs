@@ -1,8 +1,8 @@
 //! From a force on the user to converter codes, within what motors and amplifiers stand.
 //!
 //! Model: joint torque `tau = J^T F + share * tau_gravity`; codes by [`MotorMap`]. If a motor would need more
-//! than its amplifier gives or than its warmth allows, all three get the same smaller part, so that the force
-//! keeps its direction. The currents then warm the motors ([`Heat`]) until the next codes.
+//! than its amplifier gives or than its warmth allows, the force is cut ([`Drive::attainable`]) before its growth is
+//! bounded, so that it keeps its direction; should there be too much still, all three get the same smaller part. The currents then warm the motors ([`Heat`]) until the next codes.
 //! Frames and signs: forces on the user in D.
 //! Invariants: codes are always valid ones; the rendered force that is told is what the codes amount to, less
 //! what holds the arm's own weight. Where the Jacobian is too near a singularity to tell the force apart from
@@ -14,6 +14,7 @@ use crate::heat::{Heat, HeatSpec};
 use crate::kinematics::gravity::Gravity;
 use crate::kinematics::{Kinematics, Mechanism};
 use crate::motors::{MotorMap, MotorSpec};
+use crate::safety::Restrained;
 use nalgebra::Vector3;
 use shm_abi::FaultReason;
 use shm_abi::frame::{LIMIT_HEAT, LIMIT_SATURATION};
@@ -70,6 +71,19 @@ impl Drive {
         self.is_released = true;
     }
 
+    /// The largest part of an effort's force that the motors can give in a pose, beside what holds the arm's weight.
+    /// A torque that is not a number is left to [`render`](Self::render).
+    pub fn attainable(&self, joints: [f64; 3], effort: Effort) -> Restrained {
+        let weight = self.holding_torque(joints, effort.gravity_share);
+        let wanted = self.kinematics.joint_torque(joints, effort.force_on_user_n);
+        let allowed = self.allowed_current_a();
+        let share = self.motors.share_within(wanted, weight.into(), allowed);
+        if share >= 1.0 {
+            return Restrained::whole(effort.force_on_user_n);
+        }
+        Restrained { force_on_user_n: effort.force_on_user_n * share, limits: self.limits(share, allowed) }
+    }
+
     /// Codes for an effort in a pose, and what they amount to.
     ///
     /// # Errors
@@ -81,7 +95,7 @@ impl Drive {
         if !torque.iter().all(|t| t.is_finite()) {
             return Err(FaultReason::MotorNotFinite);
         }
-        let allowed = self.heat.map(|heat| heat.allowed_current_a(self.peak_current_a));
+        let allowed = self.allowed_current_a();
         let command = self.motors.command_within(torque.into(), allowed);
         self.current_a = self.motors.current_a(command.codes);
         self.is_released = false;
@@ -96,11 +110,13 @@ impl Drive {
         Ok((command.codes, written))
     }
 
+    fn allowed_current_a(&self) -> [f64; 3] {
+        self.heat.map(|heat| heat.allowed_current_a(self.peak_current_a))
+    }
+
     fn holding_torque(&self, joints: [f64; 3], share: f64) -> Vector3<f64> {
-        match &self.gravity {
-            Some(gravity) if share > 0.0 => Vector3::from(gravity.holding_torque(joints)) * share,
-            _ => Vector3::zeros(),
-        }
+        let whole = self.gravity.as_ref().map(|gravity| Vector3::from(gravity.holding_torque(joints)));
+        whole.map_or_else(Vector3::zeros, |whole| whole * share)
     }
 
     /// The force that was scaled, and what the torques that are left over add to it.
@@ -126,6 +142,7 @@ impl Drive {
 mod tests {
     use super::*;
     use crate::device_file::{DeviceFile, builtin};
+    use proptest::prelude::*;
     use std::path::Path;
 
     fn drive(with_gravity: bool) -> Drive {
@@ -209,6 +226,38 @@ mod tests {
         let before = drive.heat[1].rise();
         drive.pass(1.0);
         assert!(drive.heat[1].rise() < before, "off, it cools");
+    }
+
+    proptest! {
+        /// Beside the weight, and whatever each motor had before: then codes cut nothing more, to rounding.
+        #[test]
+        fn what_is_attainable_keeps_its_direction_and_is_rendered_as_it_is(
+            force in prop::array::uniform3(-12.0..12.0f64),
+            before in prop::array::uniform3(0.0..4.0f64),
+            joints in prop::array::uniform3(-0.3..0.3f64),
+        ) {
+            let mut drive = drive(true);
+            for (heat, current_a) in drive.heat.iter_mut().zip(before) {
+                heat.flow(current_a, 30.0);
+            }
+            let force = Vector3::from(force);
+            let attainable = drive.attainable(joints, push(force)).force_on_user_n;
+            prop_assert!(force.cross(&attainable).norm() <= 1e-12 * force.norm_squared());
+            prop_assert!(attainable.dot(&force) >= 0.0 && attainable.norm() <= force.norm());
+            let allowed = drive.allowed_current_a();
+            let weight = drive.holding_torque(joints, 1.0);
+            // Motors so warm that they cannot hold the weight give no force.
+            let holds = drive.motors.command_within(weight.into(), allowed).scale >= 1.0;
+            let wanted = Vector3::from(drive.kinematics.joint_torque(joints, attainable)) + weight;
+            let scale = drive.motors.command_within(wanted.into(), allowed).scale;
+            let is_whole = if holds { scale > 1.0 - 1e-12 } else { attainable == Vector3::zeros() };
+            prop_assert!(is_whole, "{} {}", scale, attainable);
+            // The longest of its direction: a little more is too much.
+            let more = Vector3::from(drive.kinematics.joint_torque(joints, attainable * 1.001)) + weight;
+            let is_cut = attainable.norm() < force.norm() * (1.0 - 1e-9) && holds;
+            prop_assert!(!is_cut || attainable.norm() < 1e-3
+                || drive.motors.command_within(more.into(), allowed).scale < 1.0);
+        }
     }
 
     #[test]

@@ -78,13 +78,26 @@ impl MotorMap {
         if !steps.iter().map(|s| s.abs()).sum::<f64>().is_finite() {
             return MotorCommand { codes: self.zero_codes(), scale: 0.0 };
         }
-        let full = f64::from(self.zero - 1);
         let scale = steps.iter().zip(allowed_a).fold(1.0_f64, |scale, (steps, allowed_a)| {
-            // `max` takes the number of the two: a range that is none allows nothing.
-            let range = full.min((allowed_a / self.step_a).max(0.0));
+            let range = self.range(allowed_a);
             if steps.abs() <= range { scale } else { scale.min(range / steps.abs()) }
         });
         MotorCommand { codes: steps.map(|s| self.code(scale * s)), scale }
+    }
+
+    /// The largest part, 0 to 1, of joint torques (N m) that can be had beside others, within the allowed currents (A)
+    /// and the converters' range. One of what is not finite.
+    pub fn share_within(&self, joint_torque: [f64; 3], beside: [f64; 3], allowed_a: [f64; 3]) -> f64 {
+        let (steps, beside) = (self.steps(joint_torque), self.steps(beside));
+        if !steps.iter().all(|s| s.is_finite()) {
+            return 1.0;
+        }
+        (0..3).fold(1.0_f64, |share, j| {
+            let range = self.range(allowed_a[j]);
+            // Towards the end of the range that the torque points to.
+            let room = range - beside[j] * steps[j].signum();
+            if steps[j].abs() > room { share.min((room / steps[j].abs()).max(0.0)) } else { share }
+        })
     }
 
     /// The codes of zero torque.
@@ -122,6 +135,12 @@ impl MotorMap {
     fn steps(&self, joint_torque: [f64; 3]) -> [f64; 3] {
         let torque_per_step = self.torque_per_step();
         std::array::from_fn(|j| f64::from(self.sign[j]) * joint_torque[j] / torque_per_step[j])
+    }
+
+    /// So many steps a current amounts to, as far as the converter has them.
+    fn range(&self, allowed_a: f64) -> f64 {
+        // `max` takes the number of the two: a range that is none allows nothing.
+        f64::from(self.zero - 1).min((allowed_a / self.step_a).max(0.0))
     }
 
     /// Code of a number of steps within the range.

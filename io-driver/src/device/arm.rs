@@ -13,6 +13,7 @@ use crate::device_file::ArmFile;
 use crate::drive::Drive;
 use crate::encoders::{EncoderExtender, JointMap};
 use crate::kinematics::{Kinematics, Mechanism, gimbal};
+use crate::safety::Restrained;
 use crate::velocity::VelocityEstimator;
 use crate::zeroing::ZeroState;
 use nalgebra::Vector3;
@@ -141,6 +142,11 @@ impl Arm {
     /// What was read so far says nothing about how fast it moves.
     pub fn forget_motion(&mut self) {
         self.velocity.forget();
+    }
+
+    /// What the motors can give of an effort in the pose that was read.
+    pub fn attainable(&self, effort: Effort) -> Restrained {
+        self.drive.attainable(self.joints, effort)
     }
 
     /// Codes for an effort in the pose that was read.

@@ -9,6 +9,7 @@
 use super::arm::Arm;
 use super::{Device, Effort, Extras, Reading, TickTime, Written};
 use crate::emulator::card::{ARM_SHIFT, Card, DriversCard, QUEUE, STATUS_TRIPPED};
+use crate::safety::Restrained;
 use crate::zeroing::ZeroState;
 use rt_core::clock::monotonic_ns;
 use rt_core::last_act;
@@ -155,6 +156,10 @@ impl Device for EmulatedDevice {
             }
         }
         Ok(reading)
+    }
+
+    fn attainable(&self, effort: Effort) -> Restrained {
+        self.arm.attainable(effort)
     }
 
     fn write(&mut self, effort: Effort) -> Result<Written, FaultReason> {

@@ -11,6 +11,7 @@ pub mod ideal;
 pub mod replay;
 pub mod simulated;
 
+use crate::safety::Restrained;
 use crate::zeroing::ZeroState;
 use nalgebra::{UnitQuaternion, Vector3};
 use shm_abi::frame::{DEVICE_HAS_BUTTONS, DEVICE_ORIENTATION_MEASURED, DEVICE_POSITION_VALID};
@@ -173,6 +174,11 @@ pub trait Device: Send {
 
     /// Reads where it is. An error is a fault: it ends in zero force on all devices.
     fn read(&mut self, time: TickTime) -> Result<Reading, FaultReason>;
+
+    /// What its motors can give now of a force, in its own direction.
+    fn attainable(&self, effort: Effort) -> Restrained {
+        Restrained::whole(effort.force_on_user_n)
+    }
 
     /// Makes it render a force on the user.
     fn write(&mut self, effort: Effort) -> Result<Written, FaultReason>;

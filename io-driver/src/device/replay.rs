@@ -6,6 +6,7 @@
 use super::arm::Arm;
 use super::encoder_trace::EncoderReplay;
 use super::{Device, Effort, Reading, TickTime, Written};
+use crate::safety::Restrained;
 use crate::zeroing::ZeroState;
 use shm_abi::FaultReason;
 use shm_abi::segment::DeviceInfo;
@@ -36,6 +37,10 @@ impl Device for ReplayDevice {
         let elapsed = i64::try_from(time.tick.saturating_sub(first)).unwrap_or(i64::MAX);
         let raw = self.replay.counts_at(super::run_time_s(elapsed, time.period_ns));
         Ok(self.arm.read(raw, time))
+    }
+
+    fn attainable(&self, effort: Effort) -> Restrained {
+        self.arm.attainable(effort)
     }
 
     fn write(&mut self, effort: Effort) -> Result<Written, FaultReason> {

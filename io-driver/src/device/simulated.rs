@@ -12,6 +12,7 @@
 use super::arm::Arm;
 use super::{Device, Effort, Extras, Reading, TickTime, Written};
 use crate::live_hand::{LiveFinger, LiveWish};
+use crate::safety::Restrained;
 use crate::sim::arm::{NobodyHolds, SimulatedArm, Truth};
 use crate::sim::hand::{Felt, ImpedanceHand};
 use crate::sim::script::HandPlayer;
@@ -249,6 +250,10 @@ impl Device for SimulatedDevice {
             return Err(FaultReason::AmplifierTripped);
         }
         Ok(reading)
+    }
+
+    fn attainable(&self, effort: Effort) -> Restrained {
+        self.arm.attainable(effort)
     }
 
     fn write(&mut self, effort: Effort) -> Result<Written, FaultReason> {

@@ -1,7 +1,9 @@
 //! One device's chain of limits, between what was commanded and what its motors are asked for.
 //!
-//! Model: peak, workspace edge, authority, slew rate, in this order: the slew rate bounds what all the others
-//! may make of a force from tick to tick, and none of them can make it longer.
+//! Model: peak, workspace edge, authority, what the motors can give, slew rate, in this order: the slew rate bounds what
+//! all the others may make of a force from tick to tick, and none of them can make it longer. What motors can give is
+//! a box of torques, a convex set of forces that has zero in it: between a force within it and another one every force
+//! is, so that what the slew rate lets through is given as it is.
 //! Frames and signs: forces on the user and positions in the device's base frame D.
 //! Invariants: whatever is commanded, what comes out is finite and within the peak; with no authority it is
 //! exactly zero.
@@ -61,6 +63,13 @@ pub struct Restrained {
     pub limits: u64,
 }
 
+impl Restrained {
+    /// A force of which nothing was cut.
+    pub fn whole(force_on_user_n: Vector3<f64>) -> Self {
+        Self { force_on_user_n, limits: 0 }
+    }
+}
+
 impl Guard {
     /// A device at rest without force.
     pub fn new(limits: Limits) -> Self {
@@ -96,8 +105,15 @@ impl Guard {
         self.speed.forget();
     }
 
-    /// What may be asked of the motors so long after the last time, given the share of the force that is let through.
-    pub fn restrain(&mut self, commanded: Vector3<f64>, authority: f64, elapsed: Elapsed) -> Restrained {
+    /// What may be asked of the motors so long after the last time, given the share of the force that is let through,
+    /// and what they can give now of a force in its own direction.
+    pub fn restrain(
+        &mut self,
+        commanded: Vector3<f64>,
+        authority: f64,
+        elapsed: Elapsed,
+        attainable: impl Fn(Vector3<f64>) -> Restrained,
+    ) -> Restrained {
         // Not `commanded * 0.0`: that leaves a negative zero or, for a fault, anything at all.
         if authority <= 0.0 {
             self.release();
@@ -107,10 +123,13 @@ impl Guard {
         let share = self.limits.edge.share(self.position);
         let is_outside = share < 1.0;
         let faded = if is_outside { within_peak * share } else { within_peak };
-        let (force, is_slewed) = self.slew.follow(faded * authority, elapsed.growth_ns() as f64 / 1e9);
+        let wanted = attainable(faded * authority);
+        let held = attainable(self.slew.last()).force_on_user_n;
+        let growth_s = elapsed.growth_ns() as f64 / 1e9;
+        let (force, is_slewed) = self.slew.follow_from(held, wanted.force_on_user_n, growth_s);
         let bit = |acted: bool, bit: u64| if acted { bit } else { 0 };
         let limits = bit(is_cut, LIMIT_PEAK) | bit(is_outside, LIMIT_WORKSPACE) | bit(is_slewed, LIMIT_SLEW);
-        Restrained { force_on_user_n: force, limits }
+        Restrained { force_on_user_n: force, limits: limits | wanted.limits }
     }
 
     /// The force is gone, whatever it was.
@@ -136,14 +155,14 @@ mod tests {
     fn each_limit_that_acts_is_told() {
         let mut guard = Guard::new(limits());
         guard.observe(MS, Vector3::zeros(), Vector3::zeros()).unwrap();
-        let small = guard.restrain(Vector3::x(), 1.0, TICK);
+        let small = guard.restrain(Vector3::x(), 1.0, TICK, Restrained::whole);
         assert_eq!(small, Restrained { force_on_user_n: Vector3::x(), limits: 0 });
-        let step = guard.restrain(Vector3::x() * 9.0, 1.0, TICK);
+        let step = guard.restrain(Vector3::x() * 9.0, 1.0, TICK, Restrained::whole);
         assert_eq!(step.limits, LIMIT_PEAK | LIMIT_SLEW);
         assert_eq!(step.force_on_user_n, Vector3::x() * 3.0);
         let mut outside = Guard::new(limits());
         outside.observe(MS, Vector3::x() * 0.11, Vector3::zeros()).unwrap();
-        let faded = outside.restrain(Vector3::x(), 1.0, TICK);
+        let faded = outside.restrain(Vector3::x(), 1.0, TICK, Restrained::whole);
         assert_eq!(faded.limits, LIMIT_WORKSPACE);
         assert!((faded.force_on_user_n.x - 0.5).abs() < 1e-14, "half of it in mid margin, to rounding");
     }
@@ -152,12 +171,15 @@ mod tests {
     fn without_authority_there_is_exactly_nothing_and_force_grows_from_there_again() {
         let mut guard = Guard::new(limits());
         for _ in 0..10 {
-            guard.restrain(Vector3::x() * 8.0, 1.0, TICK);
+            guard.restrain(Vector3::x() * 8.0, 1.0, TICK, Restrained::whole);
         }
-        let none = guard.restrain(Vector3::new(-8.0, f64::NAN, 1.0), 0.0, TICK);
+        let none = guard.restrain(Vector3::new(-8.0, f64::NAN, 1.0), 0.0, TICK, Restrained::whole);
         assert_eq!(none, Restrained { force_on_user_n: Vector3::zeros(), limits: 0 });
         assert!(none.force_on_user_n.iter().all(|c| c.is_sign_positive()), "and no negative zero");
-        assert_eq!(guard.restrain(Vector3::x() * 8.0, 1.0, TICK).force_on_user_n, Vector3::x() * 2.0);
+        assert_eq!(
+            guard.restrain(Vector3::x() * 8.0, 1.0, TICK, Restrained::whole).force_on_user_n,
+            Vector3::x() * 2.0
+        );
     }
 
     proptest! {
@@ -174,7 +196,7 @@ mod tests {
             for (force, authority, position, passed_ns) in commands {
                 let _ = guard.observe(passed_ns, position.into(), Vector3::zeros());
                 let elapsed = Elapsed::new(passed_ns, MS);
-                let out = guard.restrain(force.into(), authority, elapsed).force_on_user_n;
+                let out = guard.restrain(force.into(), authority, elapsed, Restrained::whole).force_on_user_n;
                 prop_assert!(out.iter().all(|c| c.is_finite()));
                 // A few roundings of numbers below 10.
                 prop_assert!(out.norm() <= 8.5 + 1e-13);

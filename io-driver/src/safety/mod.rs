@@ -9,7 +9,7 @@
 //! | device speed, position jumps | [`speed`] | a fault |
 //! | rest, before a pose is taken for the zeroing pose | [`stillness`] | refusing a zero |
 //! | switches: emergency stop, dead-man | [`switches`] | a fault; the share |
-//! | warmth of the motors | [`crate::heat`], in the device | cutting the current |
+//! | warmth of the motors | [`crate::heat`], in the device | cutting the force, and the current |
 //!
 //! Whatever here means time goes by the time of [`elapsed`], not by ticks. [`guard`] is one device's chain of these.
 //! `SAFETY.md` tells which hazard each is for and what tests it.

@@ -18,6 +18,9 @@
 //! - What a hand bears: 5 N on the 80 g of a Premium's tip for a millisecond are 0.06 m/s and 0.03 mm, which is felt as
 //!   a tap; the 17 N from peak to peak would be 0.2 m/s in every tick.
 //!
+//! A force that the motors do not hold any more, being warmer than they were, is shortened to what they hold, which uses
+//! up as much of the step.
+//!
 //! Invariants: `|F - F_last| <= slew * dt`, or `F` is `F_last` shortened; never longer than the longer of `F_last` and
 //! what was asked for, to rounding; with no time to grow in, a force only shrinks.
 //! Cost: two dozen operations.
@@ -47,6 +50,28 @@ impl Slew {
     /// finite.
     pub fn follow(&mut self, wanted: Vector3<f64>, dt_s: f64) -> (Vector3<f64>, bool) {
         let step = self.n_per_s * dt_s.min(LONGEST_STEP_S);
+        self.step_towards(wanted, step)
+    }
+
+    /// The same where of the last force only `held` can be kept, which is as long or shorter.
+    pub fn follow_from(
+        &mut self,
+        held: Vector3<f64>,
+        wanted: Vector3<f64>,
+        dt_s: f64,
+    ) -> (Vector3<f64>, bool) {
+        let lost = (self.last - held).norm();
+        let step = self.n_per_s * dt_s.min(LONGEST_STEP_S);
+        self.last = held;
+        self.step_towards(wanted, if lost > 0.0 { (step - lost).max(0.0) } else { step })
+    }
+
+    /// The force that was let through last.
+    pub fn last(&self) -> Vector3<f64> {
+        self.last
+    }
+
+    fn step_towards(&mut self, wanted: Vector3<f64>, step: f64) -> (Vector3<f64>, bool) {
         let way = wanted - self.last;
         let length = way.norm();
         let shortened = nearest_on_segment(self.last, wanted);

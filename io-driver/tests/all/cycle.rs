@@ -273,8 +273,12 @@ fn nobody_has_answered_a_lease_that_begins() {
     let mut bench = Bench::new(0);
     assert_eq!(bench.cycle.seen_reply(), None);
     let _commander = bench.lease(1);
-    bench.silent_tick();
+    for _ in 0..10 {
+        bench.silent_tick();
+    }
     assert_eq!(bench.cycle.seen_reply(), None);
+    let counted = [bench.counter(|c| &c.replies_missed), bench.counter(|c| &c.ticks_commanded)];
+    assert_eq!(counted, [0, 0], "nobody has promised anything yet");
 }
 
 #[test]

@@ -26,4 +26,5 @@ mod replay;
 mod sim_dynamics;
 mod velocity;
 mod velocity_limits;
+mod warm_motors;
 mod zeroing;

@@ -39,8 +39,10 @@ fn a_driver_starts_with_enough_descriptors_or_says_why_not() {
             std::thread::sleep(Duration::from_millis(5));
             driver.signal(rustix::process::Signal::TERM);
             let end = driver.end();
-            assert_eq!(end.status, Some(0), "{descriptors}: {end:?}");
-            ran += 1;
+            // It listens before all of its threads are there.
+            let is_refused = end.status == Some(2) && !end.err.is_empty();
+            assert!(is_refused || end.status == Some(0), "{descriptors}: {end:?}");
+            *(if is_refused { &mut refused } else { &mut ran }) += 1;
         }
         stand.amplifiers.check_off("after a driver with few descriptors");
     }
