@@ -165,10 +165,28 @@ mod tests {
         for with_gravity in [false, true] {
             let mut drive = drive(with_gravity);
             let force = Vector3::new(0.7, -0.3, 1.1);
-            let (_, written) = drive.render(JOINTS, push(force)).unwrap();
+            let (codes, written) = drive.render(JOINTS, push(force)).unwrap();
+            let torque = Vector3::from(drive.motors.joint_torque(codes)) - drive.holding_torque(JOINTS, 1.0);
+            let told = Vector3::from(drive.kinematics.joint_torque(JOINTS, written.force_on_user_n));
+            // Roundings of products near 0.1 N m.
+            assert!((told - torque).norm() < 1e-15, "{told} {torque}");
             // Half a step of each converter: 0.035 mN m over levers of 0.05 to 0.3 m, some 5 mN.
             assert!((written.force_on_user_n - force).norm() < 5e-3, "{with_gravity} {written:?}");
             assert_eq!(written.limits, 0);
+        }
+    }
+
+    /// There the codes do not tell it: a rounding would look like newtons.
+    #[test]
+    fn near_a_singular_pose_the_force_before_rounding_is_told() {
+        let mut drive = drive(false);
+        for (from_singular, is_told) in [(0.0, false), (1e-4, false), (0.1, true)] {
+            let joints = [0.4, std::f64::consts::FRAC_PI_2 - from_singular, 0.0];
+            let condition = drive.kinematics.singularity(joints).inverse_condition();
+            assert_eq!(condition >= TELLABLE, is_told, "{condition}");
+            let force = Vector3::new(0.7, -0.3, 1.1);
+            let written = drive.render(joints, push(force)).unwrap().1;
+            assert_eq!(written.force_on_user_n != force, is_told, "{written:?}");
         }
     }
 
@@ -182,6 +200,9 @@ mod tests {
         let expected = Vector3::from(with.gravity.unwrap().holding_torque(JOINTS));
         let step = with.motors.torque_per_step()[0];
         assert!((torque(codes_with) - torque(codes_without) - expected).amax() <= step, "to a step");
+        let half = Effort { force_on_user_n: Vector3::zeros(), gravity_share: 0.5 };
+        let codes_with_half = with.render(JOINTS, half).unwrap().0;
+        assert!((torque(codes_with_half) - 0.5 * expected).amax() <= step, "to a step");
         let none = Effort { force_on_user_n: Vector3::zeros(), gravity_share: 0.0 };
         assert_eq!(with.render(JOINTS, none).unwrap().0, with.zero_codes());
     }

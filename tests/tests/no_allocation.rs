@@ -13,6 +13,7 @@ use io_driver::driver::{describe, make_cycle};
 use io_driver::live_hand::{LiveHand, LiveWish};
 use io_driver::mail::{Inbox, Letter, Sender, mail};
 use io_driver::open::open_devices;
+use io_driver::safety::Restrained;
 use io_driver::sim::hand::model_file;
 use io_driver::status::CounterStatus;
 use io_driver::zeroing::{DeviceSet, ZeroState};
@@ -273,6 +274,10 @@ impl Device for Breaking {
             1000 => Ok(Reading::at(Vector3::repeat(f64::NAN))),
             _ => Ok(Reading::at(Vector3::zeros())),
         }
+    }
+
+    fn attainable(&self, effort: Effort) -> Restrained {
+        Restrained::whole(effort.force_on_user_n)
     }
 
     fn write(&mut self, effort: Effort) -> Result<Written, FaultReason> {

@@ -9,6 +9,7 @@
 use crate::record::read::{ReadError, RecordedRun};
 use crate::row::{BodyRow, FingerRow, Row};
 use io_driver::device::{Device, Effort, Extras, Reading, TickTime, Written};
+use io_driver::safety::Restrained;
 use io_driver::velocity::VelocityEstimator;
 use nalgebra::Vector3;
 use shm_abi::FaultReason;
@@ -143,6 +144,10 @@ impl Device for ReplayedDevice {
             (reading.orientation_wxyz, reading.is_orientation_measured) = (row.orientation_wxyz, true);
         }
         Ok(reading)
+    }
+
+    fn attainable(&self, effort: Effort) -> Restrained {
+        Restrained::whole(effort.force_on_user_n)
     }
 
     fn write(&mut self, effort: Effort) -> Result<Written, FaultReason> {

@@ -10,6 +10,7 @@
 
 use super::{Device, Effort, Extras, Reading, TickTime, Written};
 use crate::live_hand::LiveFinger;
+use crate::safety::Restrained;
 use crate::sim::script::HandPlayer;
 use crate::velocity::VelocityEstimator;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
@@ -80,6 +81,10 @@ impl Device for IdealDevice {
             });
         }
         Ok(reading)
+    }
+
+    fn attainable(&self, effort: Effort) -> Restrained {
+        Restrained::whole(effort.force_on_user_n)
     }
 
     fn write(&mut self, effort: Effort) -> Result<Written, FaultReason> {

@@ -176,9 +176,7 @@ pub trait Device: Send {
     fn read(&mut self, time: TickTime) -> Result<Reading, FaultReason>;
 
     /// What its motors can give now of a force, in its own direction.
-    fn attainable(&self, effort: Effort) -> Restrained {
-        Restrained::whole(effort.force_on_user_n)
-    }
+    fn attainable(&self, effort: Effort) -> Restrained;
 
     /// Makes it render a force on the user.
     fn write(&mut self, effort: Effort) -> Result<Written, FaultReason>;

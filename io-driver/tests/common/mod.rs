@@ -5,6 +5,7 @@
 use bytemuck::Zeroable;
 use io_driver::cycle::{Cycle, Freshness, Protection};
 use io_driver::device::{Device, Effort, Extras, Reading, TickTime, Written};
+use io_driver::safety::Restrained;
 use io_driver::safety::switches::Switches;
 use io_driver::safety::{Ramps, Safety};
 use io_driver::velocity::VelocityEstimator;
@@ -72,6 +73,10 @@ impl Device for TestDevice {
         let reading = planned.unwrap_or(Ok(usual))?;
         let velocity_m_per_s = self.velocity.observe(time, reading.position_m.into()).into();
         Ok(Reading { velocity_m_per_s, ..reading })
+    }
+
+    fn attainable(&self, effort: Effort) -> Restrained {
+        Restrained::whole(effort.force_on_user_n)
     }
 
     fn write(&mut self, effort: Effort) -> Result<Written, FaultReason> {

@@ -202,10 +202,24 @@ impl Amplifiers {
         self.process.signal(Signal::TERM);
         let end = self.process.end();
         let tally = told(&end);
-        assert_eq!((tally.wrong(), tally.lost), (0, 0), "{tally:?}");
+        assert_eq!((tally.wrong(), tally.lost), (0, 0), "{tally:?}{}", self.values_around(tally.first_wrong));
         assert_eq!(tally.checked, written, "checked and written: {tally:?}");
         assert_eq!(end.status, Some(0), "{end:?}");
         Seen { written, tally, judged_again: self.judge_again() }
+    }
+
+    /// The values before one that was wrong and after it, as far as they are still in the queue, a line each.
+    fn values_around(&self, number: u64) -> String {
+        let of = |number: u64| {
+            let record = self.card.record(number)?;
+            let (codes, flags) = (record.codes.load(Ordering::Relaxed), record.flags.load(Ordering::Relaxed));
+            let codes = [0, 16, 32].map(|shift| (codes >> shift) as u16);
+            Some(format!(
+                "\n{number}: {} ns, codes {codes:?}, flags {flags:#x}",
+                record.time_ns.load(Ordering::Relaxed)
+            ))
+        };
+        (number.saturating_sub(4)..=number + 4).filter_map(of).collect()
     }
 
     /// What is left of an emulator that was killed: nobody judged its last values but the test. No driver may

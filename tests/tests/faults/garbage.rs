@@ -7,6 +7,7 @@ use io_driver::cycle::Cycle;
 use io_driver::device::{Device, Effort, Reading, TickTime, Written};
 use io_driver::driver::{describe, make_cycle};
 use io_driver::open::open_devices;
+use io_driver::safety::Restrained;
 use nalgebra::Vector3;
 use shm_abi::client::Attachment;
 use shm_abi::doorbell::WaitMode;
@@ -159,6 +160,10 @@ impl Device for Strict {
 
     fn read(&mut self, _time: TickTime) -> Result<Reading, FaultReason> {
         Ok(Reading::at(Vector3::new(0.1, 0.2, 0.3)))
+    }
+
+    fn attainable(&self, effort: Effort) -> Restrained {
+        Restrained::whole(effort.force_on_user_n)
     }
 
     fn write(&mut self, effort: Effort) -> Result<Written, FaultReason> {
