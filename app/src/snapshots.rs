@@ -18,6 +18,7 @@ use crate::shown::Shown;
 use io_driver::say::say;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -42,6 +43,7 @@ pub struct Snapshots {
     moments: Moments,
     out: Option<SyncSender<Work>>,
     progress: Arc<Progress>,
+    written: Arc<AtomicU64>,
     thread: Option<JoinHandle<Drawn>>,
 }
 
@@ -108,10 +110,11 @@ impl Snapshots {
         let look = wanted.clone();
         let (out, to_draw) = sync_channel(WAITING);
         let progress = Arc::new(Progress::default());
-        let done = Arc::clone(&progress);
+        let written = Arc::new(AtomicU64::new(0));
+        let told = (Arc::clone(&progress), Arc::clone(&written));
         let thread = std::thread::Builder::new()
             .name("pictures".into())
-            .spawn(move || draw_all(stage, &look, &to_draw, &done))
+            .spawn(move || draw_all(stage, &look, &to_draw, &told.0, &told.1))
             .map_err(|error| format!("no thread for pictures: {error}"))?;
         let mut shots = wanted.shots.clone();
         shots.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
@@ -125,6 +128,7 @@ impl Snapshots {
             moments,
             out: Some(out),
             progress,
+            written,
             thread: Some(thread),
         })
     }
@@ -163,7 +167,7 @@ impl Snapshots {
         }
     }
 
-    /// Whether there is room for it; `waits`: sooner or later, as long as the thread gets on.
+    /// Gives work to the thread, which fails where there is no room; `waits`: for as long as the thread gets on.
     fn give(&self, mut work: Work, waits: bool) -> bool {
         let Some(out) = &self.out else { return false };
         let mut wait = Wait::begin(&self.progress);
@@ -193,7 +197,7 @@ impl Snapshots {
             if wait.is_in_vain(&self.progress, STUCK) {
                 let stuck = format!("no picture was written for {} s", STUCK.as_secs());
                 say(format_args!("phantom3: {stuck}; those that are missing are left out"));
-                let written = self.progress.taken();
+                let written = self.written.load(Ordering::Relaxed);
                 return Drawn { written, failure: Some(stuck), is_fault: true, ..Drawn::default() };
             }
             std::thread::sleep(TURN);
@@ -231,7 +235,14 @@ impl Drawer {
     }
 }
 
-fn draw_all(first: Stage, wanted: &Wanted, work: &Receiver<Work>, done: &Progress) -> Drawn {
+/// Tells `steps` of each scene that is made ready, and of each picture that is drawn and that is saved.
+fn draw_all(
+    first: Stage,
+    wanted: &Wanted,
+    work: &Receiver<Work>,
+    steps: &Progress,
+    written: &AtomicU64,
+) -> Drawn {
     let mut drawn = Drawn::default();
     let (mut next, mut drawer) = (Some(first), None);
     loop {
@@ -239,7 +250,10 @@ fn draw_all(first: Stage, wanted: &Wanted, work: &Receiver<Work>, done: &Progres
             // One graphics context at a time.
             drop(drawer.take());
             match Drawer::new(&stage, wanted) {
-                Ok(made) => drawer = Some(made),
+                Ok(made) => {
+                    drawer = Some(made);
+                    steps.take();
+                }
                 Err(missing) => {
                     say(format_args!("phantom3: {missing}"));
                     drawn.failure = Some(missing);
@@ -254,8 +268,11 @@ fn draw_all(first: Stage, wanted: &Wanted, work: &Receiver<Work>, done: &Progres
             Ok(Work::Picture(moment, file)) => {
                 let Some(Drawer { studio, camera, eyes }) = &mut drawer else { continue };
                 drawn.renderer = studio.renderer().to_owned();
-                drawn.note(&file, studio.take(&moment, camera, eyes).save(&file));
-                done.take();
+                let picture = studio.take(&moment, camera, eyes);
+                steps.take();
+                drawn.note(&file, picture.save(&file));
+                written.store(drawn.written, Ordering::Relaxed);
+                steps.take();
             }
             Err(_) => return drawn,
         }

@@ -2,7 +2,8 @@
 //!
 //! Model: joint torque `tau = J^T F + share * tau_gravity`; codes by [`MotorMap`]. If a motor would need more
 //! than its amplifier gives or than its warmth allows, the force is cut ([`Drive::attainable`]) before its growth is
-//! bounded, so that it keeps its direction; should there be too much still, all three get the same smaller part. The currents then warm the motors ([`Heat`]) until the next codes.
+//! bounded, so that it keeps its direction; should there be too much still, all three get the same smaller part.
+//! The currents then warm the motors ([`Heat`]) until the next codes.
 //! Frames and signs: forces on the user in D.
 //! Invariants: codes are always valid ones; the rendered force that is told is what the codes amount to, less
 //! what holds the arm's own weight. Where the Jacobian is too near a singularity to tell the force apart from

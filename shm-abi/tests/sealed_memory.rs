@@ -107,9 +107,9 @@ fn a_commander_that_punches_holes_costs_the_loop_no_page_fault_once_the_segment_
             assert_eq!(punch(&fd, &commander), [Ok(()); 2]);
         }
         let view = offer.seal().unwrap();
-        let faults = faults_of_the_loop(&view, &fd, &commander);
-        // A page that the kernel takes away by itself comes back once; a hole would cost one in each tick.
-        assert!(faults < 20, "punched before: {punches_before}, {faults} faults");
+        // A page that the kernel takes away by itself comes back once, not in each of three rounds.
+        let is_quiet = (0..3).any(|_| faults_of_the_loop(&view, &fd, &commander) == 0);
+        assert!(is_quiet, "punched before: {punches_before}");
         assert_eq!(punch(&fd, &commander), [Err(rustix::io::Errno::PERM); 2]);
         assert!(CommanderMemory::map(fd.as_fd()).is_err(), "nobody maps it for writing again");
     }

@@ -30,7 +30,7 @@ impl From<WhenFull> for Backpressure {
 /// How far a recorder is, as both of its ends see it.
 #[derive(Debug, Default)]
 pub(crate) struct Progress {
-    /// Rows, or pictures, taken from the queue so far.
+    /// Rows taken from the queue so far, or steps of what is slower than rows.
     taken: AtomicU64,
     /// How many there were when a wait was in vain, and one; 0: none was.
     stuck: AtomicU64,

@@ -144,7 +144,7 @@ impl Arm {
         self.velocity.forget();
     }
 
-    /// What the motors can give of an effort in the pose that was read.
+    /// The part of an effort that the motors can give in the pose that was read.
     pub fn attainable(&self, effort: Effort) -> Restrained {
         self.drive.attainable(self.joints, effort)
     }

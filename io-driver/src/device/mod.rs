@@ -175,7 +175,7 @@ pub trait Device: Send {
     /// Reads where it is. An error is a fault: it ends in zero force on all devices.
     fn read(&mut self, time: TickTime) -> Result<Reading, FaultReason>;
 
-    /// What its motors can give now of a force, in its own direction.
+    /// The part of a force, in its own direction, that its motors can give now.
     fn attainable(&self, effort: Effort) -> Restrained;
 
     /// Makes it render a force on the user.

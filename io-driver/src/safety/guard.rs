@@ -105,8 +105,8 @@ impl Guard {
         self.speed.forget();
     }
 
-    /// What may be asked of the motors so long after the last time, given the share of the force that is let through,
-    /// and what they can give now of a force in its own direction.
+    /// The force to ask of the motors so long after the last time, given the share that is let through and the part of
+    /// a force, in its own direction, that they can give now.
     pub fn restrain(
         &mut self,
         commanded: Vector3<f64>,
@@ -165,6 +165,22 @@ mod tests {
         let faded = outside.restrain(Vector3::x(), 1.0, TICK, Restrained::whole);
         assert_eq!(faded.limits, LIMIT_WORKSPACE);
         assert!((faded.force_on_user_n.x - 0.5).abs() < 1e-14, "half of it in mid margin, to rounding");
+    }
+
+    /// As after a stall, in which the motors became warm.
+    #[test]
+    fn a_force_that_motors_hold_no_more_is_shortened_and_grows_by_what_that_leaves_of_the_step() {
+        let mut guard = Guard::new(limits());
+        for _ in 0..4 {
+            guard.restrain(Vector3::x() * 8.0, 1.0, TICK, Restrained::whole);
+        }
+        let within_seven = |force: Vector3<f64>| Restrained::whole(force * (7.0 / force.x.abs()).min(1.0));
+        let wanted = Vector3::new(6.0, 6.0, 0.0);
+        let force = guard.restrain(wanted, 1.0, TICK, within_seven).force_on_user_n;
+        assert!(force.x <= 7.0 && force.y > 0.0, "{force}");
+        // A newton of the two was lost; roundings of numbers below 10.
+        assert!((force - Vector3::x() * 7.0).norm() <= 1.0 + 1e-14, "{force}");
+        assert!((force - Vector3::x() * 8.0).norm() <= 2.0 + 1e-14, "{force}");
     }
 
     #[test]

@@ -40,7 +40,7 @@ pub struct Log {
     /// Whether it has to be zeroed; `None`: never.
     pub needs_zero: Option<bool>,
     pub extras: Extras,
-    /// How long it takes to be read, and how long to be written.
+    /// The time that reading it takes, and writing it.
     pub takes: Duration,
 }
 

@@ -1,4 +1,4 @@
-//! What the documents name is there.
+//! Tests, sources and report lines that the documents name: each is there.
 
 mod architecture;
 mod equations;

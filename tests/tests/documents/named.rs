@@ -19,7 +19,7 @@ fn sources(directory: &Path, text: &mut String, files: &mut Vec<String>) {
     }
 }
 
-/// Whether it is a file of tests, named by its program and itself.
+/// True of a file of tests, named by its program and itself.
 fn is_module(name: &str) -> bool {
     name.contains("::") && root().join("tests/tests").join(name.replace("::", "/") + ".rs").is_file()
 }

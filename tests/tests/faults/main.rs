@@ -1,4 +1,4 @@
-//! What happens when something fails, is killed, lies or is in the way: motors off, words, and work that goes on.
+//! Faults: something fails, is killed, lies or is in the way. Motors go off, words are said, work goes on.
 
 mod app_killed;
 mod app_stopped;

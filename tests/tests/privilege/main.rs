@@ -1,4 +1,4 @@
-//! What a driver may do, and what others may do to it.
+//! Privileges of a running driver, and of others against it.
 
 mod forbidden_call;
 mod full_life;

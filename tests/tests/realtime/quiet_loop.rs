@@ -79,7 +79,7 @@ fn wait_for(count: impl Fn() -> u64, more: u64) {
 }
 
 /// Ticks of a window in which something is watched.
-const WINDOW: u64 = 700;
+const WINDOW: u64 = 2000;
 
 /// Watches the driver for a window. Returns whether it was steady: a driver that gets no reply for 5 ms, which
 /// a busy machine brings about, sleeps for replies during the next second instead of spinning.
