@@ -93,7 +93,8 @@ impl DriverConfig {
     /// As [`load`](Self::load).
     pub fn load_from_stdin() -> Result<Self, ConfigError> {
         let file = Path::new("<standard input>");
-        let text = io::read_to_string(io::stdin())
+        let text = input_file::read_all(io::stdin(), MAX_TOML_BYTES)
+            .and_then(input_file::text)
             .map_err(|source| ConfigError::Unreadable { file: file.into(), source })?;
         Ok(Self::parse(&text, file)?)
     }

@@ -17,7 +17,7 @@ use crate::live_hand::{LiveFinger, LiveHandError, LiveWish};
 use crate::sim::script::{HandError, HandPlayer, HandScript};
 use crate::sim::tip_board::TipBoard;
 use crate::table::MAX_TABLE_BYTES;
-use crate::toml_report::TomlReport;
+use crate::toml_report::{MAX_TOML_BYTES, TomlReport};
 use rt_core::input_file;
 use shm_abi::segment::{ClockMode, DeviceInfo};
 use std::io;
@@ -191,7 +191,11 @@ fn open(
         Backend::Simulated { .. } => simulated::open(device, config, board),
         Backend::Replay { description, trace, .. } => {
             let arm_file = mechanism(device, description)?;
-            let trace = EncoderTrace::parse(&read(device, trace)?, trace, arm_file.encoders.count_bits)?;
+            let trace = EncoderTrace::parse(
+                &read(device, trace, MAX_TABLE_BYTES)?,
+                trace,
+                arm_file.encoders.count_bits,
+            )?;
             let info = commissioned(arm_info(device, &arm_file), config);
             let arm = arm(device, config, &arm_file);
             Ok(Box::new(ReplayDevice::new(info, EncoderReplay::new(trace), arm)))
@@ -266,7 +270,7 @@ fn script(
         _ => None,
     });
     let fingers: Vec<&str> = wishes.collect();
-    let script = HandScript::parse(&read(device, file)?, file, &fingers)?;
+    let script = HandScript::parse(&read(device, file, MAX_TABLE_BYTES)?, file, &fingers)?;
     let index = fingers.iter().position(|name| name == finger).unwrap_or(0);
     if has_switch(device, config) && !script.has_buttons(index) {
         let (device, finger) = (device.name.clone(), finger.clone());
@@ -308,13 +312,13 @@ pub fn mechanism(device: &DeviceConfig, description: &Path) -> Result<ArmFile, O
 fn describe(device: &DeviceConfig, description: &Path) -> Result<DeviceFile, OpenError> {
     let text = match device_file::builtin(&description.to_string_lossy()) {
         Some(text) => text.to_owned(),
-        None => read(device, description)?,
+        None => read(device, description, MAX_TOML_BYTES)?,
     };
     Ok(DeviceFile::parse(&text, description)?)
 }
 
-fn read(device: &DeviceConfig, file: &Path) -> Result<String, OpenError> {
-    input_file::read_text(file, MAX_TABLE_BYTES).map_err(|source| OpenError::Unreadable {
+fn read(device: &DeviceConfig, file: &Path, most_bytes: u64) -> Result<String, OpenError> {
+    input_file::read_text(file, most_bytes).map_err(|source| OpenError::Unreadable {
         device: device.name.clone(),
         file: file.into(),
         source,
@@ -461,6 +465,53 @@ mod tests {
         let message = refused.to_string();
         assert!(message.contains("device f0: a switch") && message.contains("hand.csv"), "{message}");
         assert!(message.contains("no column `f0_buttons`"), "{message}");
+    }
+
+    /// SAFETY.md promises it of the arms that are described here and of ideal devices.
+    #[test]
+    fn a_force_grows_by_five_newton_a_millisecond_at_most_unless_a_configuration_says_otherwise() {
+        let mut simulated = simulated_premium();
+        assert_eq!(ideal_info(&simulated).slew_n_per_s, 5000.0);
+        for name in ["premium-1.5", "wooden-haptics"] {
+            let file = DeviceFile::parse(device_file::builtin(name).unwrap(), Path::new(name));
+            let Ok(DeviceFile::Arm(arm)) = file else { panic!("{name} is an arm") };
+            simulated.slew_n_per_s = None;
+            assert_eq!(arm_info(&simulated, &arm).slew_n_per_s, 5000.0, "{name}");
+            // A configuration may ask for less, and not for more.
+            for (asked, given) in [(1000.0, 1000.0), (9000.0, 5000.0)] {
+                simulated.slew_n_per_s = Some(asked);
+                assert_eq!(arm_info(&simulated, &arm).slew_n_per_s, given, "{name}");
+            }
+        }
+    }
+
+    #[test]
+    fn in_commissioning_every_device_is_weak_and_slow() {
+        let text = "[safety]\ncommissioning = true\n[[device]]\nbackend = \"simulated\"\n\
+                    description = \"premium-1.5\"\n[[device]]\nbackend = \"ideal\"\n";
+        let config = DriverConfig::parse(text, Path::new("driver.toml")).unwrap();
+        for device in open_devices(&config).unwrap() {
+            let DeviceInfo { peak_force_n, continuous_force_n, speed_limit_m_per_s, .. } = *device.info();
+            assert_eq!((peak_force_n, speed_limit_m_per_s), (0.5, 0.25), "SAFETY.md");
+            assert!(continuous_force_n <= 0.5);
+        }
+    }
+
+    fn simulated_premium() -> DeviceConfig {
+        let text = "[[device]]\nbackend = \"simulated\"\ndescription = \"premium-1.5\"\n";
+        DriverConfig::parse(text, Path::new("driver.toml")).unwrap().devices.remove(0)
+    }
+
+    /// A tree of tables takes far more memory than its text.
+    #[test]
+    fn a_description_larger_than_any_is_refused_before_it_is_parsed() {
+        let directory = tempfile::tempdir().unwrap();
+        let large = format!("{}{}", device_file::builtin("premium-1.5").unwrap(), "#".repeat(1 << 16));
+        std::fs::write(directory.path().join("large.toml"), large).unwrap();
+        let text = "[[device]]\nbackend = \"simulated\"\ndescription = \"large.toml\"\n";
+        let config = DriverConfig::parse(text, &directory.path().join("driver.toml")).unwrap();
+        let Err(OpenError::Unreadable { source, .. }) = open_devices(&config) else { panic!("it was read") };
+        assert!(source.to_string().contains("larger than 65536 bytes"), "{source}");
     }
 
     /// A configuration that was not read from a file has not been asked.

@@ -17,8 +17,8 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// The most a description or a configuration may have: such files have some kilobytes, and whatever is larger is another
-/// file.
-pub const MAX_TOML_BYTES: u64 = 1 << 20;
+/// file. A tree of tables takes up to a kilobyte for two bytes of it.
+pub const MAX_TOML_BYTES: u64 = 1 << 16;
 
 /// A list of numbers of which each remembers its place.
 pub type SpannedList = Spanned<Vec<Spanned<f64>>>;

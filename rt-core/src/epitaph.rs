@@ -200,6 +200,7 @@ fn pack(bytes: &[u8]) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use patience::prelude::*;
     use proptest::prelude::*;
 
     #[test]
@@ -240,7 +241,7 @@ mod tests {
             };
             let winners = std::thread::scope(|scope| {
                 let threads: Vec<_> = (1..=4).map(|n| scope.spawn(move || write(n))).collect();
-                threads.into_iter().map(|t| t.join().unwrap()).filter(|won| *won).count()
+                threads.into_iter().map(|t| t.bounded_join().unwrap()).filter(|won| *won).count()
             });
             let epitaph = read(&words).unwrap();
             assert_eq!(winners, 1);

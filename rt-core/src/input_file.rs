@@ -31,8 +31,16 @@ pub fn read(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
     let file = open(path)?;
     // Nothing is read of what is too large already.
     check_size(file.metadata()?.len(), most_bytes)?;
+    read_all(file, most_bytes)
+}
+
+/// All that comes out of a stream, such as standard input.
+///
+/// # Errors
+/// What the system says; [`ErrorKind::FileTooLarge`] beyond `most_bytes`.
+pub fn read_all(stream: impl Read, most_bytes: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    file.take(most_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
+    stream.take(most_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
     check_size(bytes.len() as u64, most_bytes)?;
     Ok(bytes)
 }
@@ -135,6 +143,13 @@ mod tests {
         assert_eq!(refused.kind(), ErrorKind::FileTooLarge);
         assert!(refused.to_string().contains("larger than 3 bytes"), "{refused}");
         assert_eq!(read(&place.write(b""), 0).expect("nothing is no more than nothing"), b"");
+    }
+
+    #[test]
+    fn a_stream_that_never_ends_is_read_up_to_its_bound() {
+        assert_eq!(read_all(&b"abc"[..], 3).expect("as long as allowed"), b"abc");
+        let refused = read_all(io::repeat(b' '), 1 << 16).expect_err("it never ends");
+        assert_eq!(refused.kind(), ErrorKind::FileTooLarge);
     }
 
     #[test]

@@ -179,20 +179,27 @@ mod tests {
             }
             (0..delay).for_each(|_| std::hint::spin_loop());
         };
-        std::thread::scope(|scope| {
-            scope.spawn(|| {
-                for (round, (act, motor)) in (0..).zip(&acts) {
-                    // The register's line is here when the writer stores to it.
-                    act.guard(motor, 2048).unwrap();
-                    motor.store(2048, Ordering::SeqCst);
-                    meet(round, round % 7);
-                    act.perform();
-                }
-            });
+        let dying = || {
+            for (round, (act, motor)) in (0..).zip(&acts) {
+                // The register's line is here when the writer stores to it.
+                act.guard(motor, 2048).unwrap();
+                motor.store(2048, Ordering::SeqCst);
+                meet(round, round % 7);
+                act.perform();
+            }
+        };
+        let writing = || {
             for (round, (act, motor)) in (0..).zip(&acts) {
                 meet(round, round % 11);
                 act.store_unless_begun(|| motor.store(2300, Ordering::Relaxed));
             }
+        };
+        // A thread that fails leaves the other to wait.
+        patience::watched(patience::limit(), "the two threads", || {
+            std::thread::scope(|scope| {
+                scope.spawn(dying);
+                writing();
+            });
         });
         let undone = acts.iter().filter(|(_, motor)| motor.load(Ordering::SeqCst) != 2048).count();
         assert_eq!(undone, 0, "of {ROUNDS} last acts were undone");

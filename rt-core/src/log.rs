@@ -182,6 +182,7 @@ impl RtLogDrain {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use patience::prelude::*;
 
     fn texts(drain: &mut RtLogDrain) -> Vec<String> {
         let mut texts = Vec::new();
@@ -259,17 +260,19 @@ mod tests {
             (1..=PUSHED).for_each(|tick| log.push(LogLevel::Info, tick, "", &[]));
         });
         let (mut arrived, mut last_tick) = (0, 0);
-        while !drain.is_finished() {
-            drain.drain(|line| {
-                // Loss reports repeat the tick before them.
-                if line.level == LogLevel::Info {
-                    assert!(line.tick > last_tick);
-                    last_tick = line.tick;
-                    arrived += 1;
-                }
-            });
-        }
-        loop_thread.join().unwrap();
+        patience::watched(patience::limit(), "the end of the queue", || {
+            while !drain.is_finished() {
+                drain.drain(|line| {
+                    // Loss reports repeat the tick before them.
+                    if line.level == LogLevel::Info {
+                        assert!(line.tick > last_tick);
+                        last_tick = line.tick;
+                        arrived += 1;
+                    }
+                });
+            }
+        });
+        loop_thread.bounded_join().unwrap();
         assert_eq!(arrived + drain.lost(), PUSHED);
     }
 }

@@ -205,10 +205,10 @@ mod tests {
     use super::*;
     use nix::sys::pthread::{pthread_kill, pthread_self};
     use nix::sys::signal::Signal;
+    use patience::prelude::*;
     use std::sync::Arc;
     use std::sync::atomic::{AtomicBool, Ordering};
     use std::sync::mpsc;
-    use std::time::Duration;
 
     const MS: u64 = 1_000_000;
 
@@ -313,13 +313,14 @@ mod tests {
             let (first, deadline) = (periodic.wait(), periodic.next_deadline_ns());
             (first, deadline)
         });
-        let thread = thread.recv().unwrap();
+        let thread = thread.bounded_recv().unwrap();
         // Signals until one of them meets the sleep: the first may come before it.
-        while !sleeper.is_finished() {
+        patience::until("the end of the sleep", || {
+            // Whoever has ended can still be asked.
             pthread_kill(thread, Signal::SIGUSR1).unwrap();
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        let (wake, next_deadline_ns) = sleeper.join().unwrap();
+            sleeper.is_finished()
+        });
+        let (wake, next_deadline_ns) = sleeper.bounded_join().unwrap();
         assert!(wake.interrupted && handled.load(Ordering::SeqCst));
         assert_eq!((wake.tick, wake.skipped, wake.latency_ns()), (0, 0, 0));
         assert_eq!(wake.deadline_ns, next_deadline_ns, "the same deadline is still to come");

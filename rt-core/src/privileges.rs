@@ -149,6 +149,7 @@ fn what_is_left(threads: &[ThreadStatus]) -> String {
 mod tests {
     use super::*;
     use crate::test_child;
+    use patience::prelude::*;
 
     fn thread(name: &str) -> ThreadStatus {
         ThreadStatus {
@@ -200,7 +201,7 @@ mod tests {
         if test_child::role(TEST).is_some() {
             give_up_and_look();
         }
-        let status = test_child::command(TEST, "child").status().unwrap();
+        let status = test_child::command(TEST, "child").bounded_status().unwrap();
         assert_eq!(status.code(), Some(0));
     }
 

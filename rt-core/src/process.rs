@@ -67,6 +67,7 @@ pub fn die_with_parent(expected_parent_pid: u32, signal: i32) -> Result<(), DieW
 mod tests {
     use super::*;
     use crate::test_child;
+    use patience::prelude::*;
     use std::io::Read;
     use std::process::Stdio;
     use std::time::Duration;
@@ -88,7 +89,7 @@ mod tests {
         let mut parent = test_child::command(TEST, "parent").stdout(Stdio::piped()).spawn().unwrap();
         let mut said = String::new();
         parent.stdout.take().unwrap().read_to_string(&mut said).unwrap();
-        assert!(parent.wait().unwrap().success());
+        assert!(parent.bounded_wait().success());
         assert!(said.contains("tied"), "{said}");
         assert!(!said.contains("outlived"), "{said}");
     }

@@ -89,6 +89,7 @@ mod tests {
     use super::*;
     use crate::test_child;
     use nix::sys::signal::raise;
+    use patience::prelude::*;
     use std::os::unix::process::ExitStatusExt;
     use std::process::ExitStatus;
 
@@ -104,7 +105,7 @@ mod tests {
             receive_in_this_thread().unwrap();
             std::process::exit(stop.requested().unwrap_or(0));
         }
-        assert_eq!(test_child::command(OWN, "play").status().unwrap().code(), Some(SIGTERM));
+        assert_eq!(test_child::command(OWN, "play").bounded_status().unwrap().code(), Some(SIGTERM));
     }
 
     const TEST: &str = "signals::tests::stop_signals_set_the_flag_and_repeated_ones_kill";
@@ -142,6 +143,6 @@ mod tests {
     }
 
     fn outcome(signals: &str) -> ExitStatus {
-        test_child::command(TEST, signals).status().unwrap()
+        test_child::command(TEST, signals).bounded_status().unwrap()
     }
 }

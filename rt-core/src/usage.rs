@@ -60,6 +60,7 @@ impl ResourceUsage {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use patience::prelude::*;
     use std::hint::black_box;
     use std::time::Duration;
 
@@ -89,7 +90,7 @@ mod tests {
             drop(black_box(vec![1_u8; 64 << 20]));
             ResourceUsage::of_thread().delta(&before).minor_faults
         });
-        let theirs = theirs.join().unwrap();
+        let theirs = theirs.bounded_join().unwrap();
         // Starting a thread costs this one a few faults, far fewer than theirs.
         assert!(ResourceUsage::of_thread().delta(&before).minor_faults < theirs);
     }

@@ -1,8 +1,8 @@
 //! Rights to look, command and administer, among those who can reach the driver's socket.
 //!
-//! Model: three rights, each of which includes those before it, and for each the group that has it. A right without a
-//! group of its own belongs to whoever has the one before; to look belongs to whoever can connect. Root and the
-//! driver's own user have all of them. Whoever may look may stop the motors.
+//! Model: three rights, each of which includes those before it, and for each the group that has it. Root and the
+//! driver's own user have all of them; without a group of its own, administering is theirs alone, commanding belongs to
+//! whoever may look, and looking to whoever can connect. Whoever may look may stop the motors.
 
 use crate::handshake::RequestKind;
 
@@ -38,36 +38,43 @@ pub struct Rights {
     pub look: Option<u32>,
     /// The group for [`Right::Command`]; `None`: whoever may look.
     pub command: Option<u32>,
-    /// The group for [`Right::Administer`]; `None`: whoever may command.
+    /// The group for [`Right::Administer`]; `None`: only root and the owner.
     pub administer: Option<u32>,
 }
 
 impl Rights {
-    /// Whoever can connect may do everything.
+    /// Whoever can connect may look and command; the process' own user administers.
     pub fn open() -> Self {
         let owner = rustix::process::geteuid().as_raw();
         Self { owner, look: None, command: None, administer: None }
     }
 
-    /// Whether a user in these groups has a right; if not, the group that has it.
+    /// Whether a user in these groups has a right.
     ///
     /// # Errors
-    /// The group.
-    pub fn check(&self, right: Right, uid: u32, groups: impl FnOnce() -> Vec<u32>) -> Result<(), u32> {
-        let by_right = [self.look, self.command, self.administer];
-        let Some(needed) = by_right[..=right as usize].iter().rev().find_map(|group| *group) else {
-            return Ok(());
-        };
+    /// The group that has it, if it is anybody's but root's and the owner's.
+    pub fn check(
+        &self,
+        right: Right,
+        uid: u32,
+        groups: impl FnOnce() -> Vec<u32>,
+    ) -> Result<(), Option<u32>> {
         if uid == 0 || uid == self.owner {
             return Ok(());
         }
+        let needed = match right {
+            Right::Look => self.look,
+            Right::Command => self.command.or(self.look),
+            Right::Administer => Some(self.administer.ok_or(None)?),
+        };
+        let Some(needed) = needed else { return Ok(()) };
         let groups = groups();
         // Those with a greater right have this one.
-        let higher = by_right[right as usize..].iter().flatten();
-        if groups.contains(&needed) || higher.into_iter().any(|group| groups.contains(group)) {
+        let greater = [self.look, self.command, self.administer].into_iter().skip(right as usize).flatten();
+        if std::iter::once(needed).chain(greater).any(|group| groups.contains(&group)) {
             return Ok(());
         }
-        Err(needed)
+        Err(Some(needed))
     }
 }
 
@@ -83,36 +90,40 @@ mod tests {
     }
 
     /// What somebody in these groups may do.
-    fn allowed(rights: Rights, uid: u32, groups: &[u32]) -> [Result<(), u32>; 3] {
+    fn allowed(rights: Rights, uid: u32, groups: &[u32]) -> [Result<(), Option<u32>>; 3] {
         [Right::Look, Right::Command, Right::Administer]
             .map(|right| rights.check(right, uid, || groups.to_vec()))
     }
 
     #[test]
-    fn without_groups_whoever_connects_may_everything() {
-        assert_eq!(allowed(rights(None, None, None), ANN, &[]), [Ok(()); 3]);
+    fn without_groups_whoever_connects_may_look_and_command() {
+        assert_eq!(allowed(rights(None, None, None), ANN, &[5]), [Ok(()), Ok(()), Err(None)]);
     }
 
     #[test]
-    fn a_right_without_a_group_belongs_to_whoever_has_the_one_before_it() {
-        let rights = rights(None, Some(20), None);
-        assert_eq!(allowed(rights, ANN, &[20]), [Ok(()); 3]);
-        assert_eq!(allowed(rights, ANN, &[21]), [Ok(()), Err(20), Err(20)]);
+    fn to_command_belongs_to_whoever_may_look_and_to_administer_to_nobody_unless_there_is_a_group() {
+        let commanders = rights(None, Some(20), None);
+        assert_eq!(allowed(commanders, ANN, &[20]), [Ok(()), Ok(()), Err(None)]);
+        assert_eq!(allowed(commanders, ANN, &[21]), [Ok(()), Err(Some(20)), Err(None)]);
+        let lookers = rights(Some(10), None, Some(30));
+        assert_eq!(allowed(lookers, ANN, &[10]), [Ok(()), Ok(()), Err(Some(30))]);
+        assert_eq!(allowed(lookers, ANN, &[]), [Err(Some(10)), Err(Some(10)), Err(Some(30))]);
     }
 
     #[test]
     fn each_right_includes_those_before_it_and_none_behind_it() {
         let rights = rights(Some(10), Some(20), Some(30));
-        assert_eq!(allowed(rights, ANN, &[]), [Err(10), Err(20), Err(30)]);
-        assert_eq!(allowed(rights, ANN, &[10]), [Ok(()), Err(20), Err(30)]);
-        assert_eq!(allowed(rights, ANN, &[20]), [Ok(()), Ok(()), Err(30)]);
+        assert_eq!(allowed(rights, ANN, &[]), [Err(Some(10)), Err(Some(20)), Err(Some(30))]);
+        assert_eq!(allowed(rights, ANN, &[10]), [Ok(()), Err(Some(20)), Err(Some(30))]);
+        assert_eq!(allowed(rights, ANN, &[20]), [Ok(()), Ok(()), Err(Some(30))]);
         assert_eq!(allowed(rights, ANN, &[5, 30]), [Ok(()); 3]);
     }
 
     #[test]
     fn root_and_the_drivers_own_user_may_everything() {
-        let rights = rights(Some(10), Some(20), Some(30));
-        assert_eq!(allowed(rights, 0, &[]), [Ok(()); 3]);
-        assert_eq!(allowed(rights, OWNER, &[]), [Ok(()); 3]);
+        for rights in [rights(None, None, None), rights(Some(10), Some(20), Some(30))] {
+            assert_eq!(allowed(rights, 0, &[]), [Ok(()); 3]);
+            assert_eq!(allowed(rights, OWNER, &[]), [Ok(()); 3]);
+        }
     }
 }

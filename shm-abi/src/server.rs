@@ -373,16 +373,16 @@ impl Server {
                 let _ = self.answer(index, &Answer::new(Verdict::Granted), &[]);
             }
             Err(Verdict::NotAllowed) => {
-                let group = self.check(index, Right::Administer).err();
-                return self.deny(index, group.unwrap_or(NOBODY));
+                let group = self.check(index, Right::Administer).err().flatten();
+                return self.deny(index, group);
             }
             Err(verdict) => return self.refuse(index, verdict),
         }
         Stage::Gone
     }
 
-    /// The group that has it, if this client has not.
-    fn check(&self, index: usize, right: Right) -> Result<(), u32> {
+    /// The group that has it, if there is one, if this client has it not.
+    fn check(&self, index: usize, right: Right) -> Result<(), Option<u32>> {
         let connection = &self.connections[index];
         self.rights.check(right, connection.peer.uid, || connection.groups())
     }
@@ -469,8 +469,8 @@ impl Server {
         Stage::Gone
     }
 
-    fn deny(&self, index: usize, group: u32) -> Stage {
-        let allowed_group_plus_one = u64::from(group).wrapping_add(1) & u64::from(u32::MAX);
+    fn deny(&self, index: usize, group: Option<u32>) -> Stage {
+        let allowed_group_plus_one = group.map_or(0, |group| u64::from(group) + 1);
         let answer = Answer { allowed_group_plus_one, ..Answer::new(Verdict::NotAllowed) };
         let _ = self.answer(index, &answer, &[]);
         Stage::Gone
@@ -525,6 +525,3 @@ impl Server {
         self.connections.retain(|connection| !matches!(connection.stage, Stage::Gone));
     }
 }
-
-/// Told as: only root and the user that the driver runs as.
-const NOBODY: u32 = u32::MAX;

@@ -176,12 +176,12 @@ proptest! {
 
 /// Sleeps until `newest` is `expected`; a sleep that lasts as long as its time-out was never woken.
 fn sleep_until(expected: u64, newest: impl Fn() -> Option<u64>, sleep: impl Fn(Option<u64>, Duration)) {
+    let start = Instant::now();
     loop {
         let seen = newest();
         if seen == Some(expected) {
             return;
         }
-        let start = Instant::now();
         sleep(seen, HANG);
         assert!(start.elapsed() < HANG, "slept through the announcement of {expected}");
     }
@@ -224,13 +224,16 @@ fn ten_thousand_rounds_of_sleeping_on_each_other_lose_no_wake_up() {
 struct Crowd {
     asleep: AtomicU64,
     woken: AtomicU64,
+    is_over: AtomicBool,
 }
 
 impl Crowd {
     /// Runs `body` while they sleep, then wakes them all.
     fn around(view: &DriverView, memory: &DriverMemory, body: impl FnOnce(&Self)) {
-        let crowd = Self { asleep: AtomicU64::new(0), woken: AtomicU64::new(0) };
+        let crowd =
+            Self { asleep: AtomicU64::new(0), woken: AtomicU64::new(0), is_over: AtomicBool::new(false) };
         std::thread::scope(|scope| {
+            let _over = patience::Raised(&crowd.is_over);
             for _ in 0..CROWD {
                 let spawned = std::thread::Builder::new()
                     .stack_size(64 << 10)
@@ -249,9 +252,12 @@ impl Crowd {
     }
 
     fn sleep_on(&self, word: &AtomicU32) {
-        use rustix::thread::futex;
+        use rustix::thread::{Timespec, futex};
+        // Longer than the test; what they do then is to look whether it failed.
+        let timeout = Timespec { tv_sec: 30, tv_nsec: 0 };
         self.asleep.fetch_add(1, Ordering::Relaxed);
-        while futex::wait(word, futex::Flags::empty(), word.load(Ordering::Relaxed), None).is_err() {}
+        let wait = || futex::wait(word, futex::Flags::empty(), word.load(Ordering::Relaxed), Some(&timeout));
+        while wait().is_err() && !self.is_over.load(Ordering::Relaxed) {}
         self.woken.fetch_add(1, Ordering::Relaxed);
     }
 

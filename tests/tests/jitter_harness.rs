@@ -198,8 +198,12 @@ fn nothing_outlives_a_jitter_that_is_killed() {
 fn two_results_are_compared_and_garbage_is_refused() {
     let place = Workplace::new();
     for out in ["a", "b"] {
-        let arguments = ["--styles", "hybrid", "--runs", "3", "--slice", "0.3", "--out", out];
-        assert_eq!(Running::start(modest(&place, &arguments)).wait().status, Some(0));
+        let arguments =
+            ["--priority", "0", "--styles", "hybrid", "--runs", "3", "--slice", "0.3", "--out", out];
+        let said = Running::start(jitter(&place, &arguments)).wait();
+        assert_eq!(said.status, Some(0), "{}", said.err);
+        let plan = "plan: 3 runs of 0.300 s of each style (hybrid), 0.900 s a style";
+        assert!(said.err.contains(plan), "{}", said.err);
     }
     let said = Running::start(jitter(&place, &["compare", "a/result.json", "b/result.json"])).wait();
     assert_eq!((said.status, said.err.as_str()), (Some(0), ""));

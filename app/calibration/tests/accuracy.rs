@@ -83,22 +83,43 @@ fn an_affine_fit_errs_as_much_as_it_says() {
     assert_right(ratio(&truth, Model::Affine, WIDE, rotation, |fit| accuracy(fit).rotation_rad));
 }
 
-/// The share of calibrations whose errors lie within what is claimed for 95 of 100, for each of three numbers.
-fn coverage(count: usize, model: Model, truth: &Transform) -> [f64; 3] {
+/// The share of calibrations whose errors lie within what is claimed for 95 of 100, for each of the numbers.
+fn coverage<const N: usize>(
+    count: usize,
+    model: Model,
+    truth: &Transform,
+    of: impl Fn(&Fit) -> [(f64, f64); N],
+) -> [f64; N] {
     const TRIALS: u64 = 4000;
-    let mut within = [0.0; 3];
+    let mut within = [0.0; N];
     for seed in 0..TRIALS {
         // A tetrahedron and more: few random points may lie on a line by chance.
         let pairs = cornered(truth, count, 2e-4, seed);
         let fit = calibrate(&pairs, model).expect("good pairs").all;
-        let accuracy = fit.accuracy.expect("more pairs than needed");
-        let errors: [f64; 3] = (fit.transform.position - truth.position).into();
-        for k in 0..3 {
-            let claimed = accuracy.factor_95() * accuracy.position_m[k];
-            within[k] += f64::from(u8::from(errors[k].abs() <= claimed)) / TRIALS as f64;
+        let factor = fit.accuracy.expect("more pairs than needed").factor_95();
+        for (share, (error, claimed)) in within.iter_mut().zip(of(&fit)) {
+            *share += f64::from(u8::from(error.abs() <= factor * claimed)) / TRIALS as f64;
         }
     }
     within
+}
+
+/// Errors and claims of the places of a rigid fit, and of its turns.
+fn of_rigid(fit: &Fit) -> [(f64, f64); 6] {
+    let (truth, accuracy) = (rigid_truth(), fit.accuracy.expect("more pairs than needed"));
+    let moved: [f64; 3] = (fit.transform.position - truth.position).into();
+    let turned = turned(fit, &truth);
+    std::array::from_fn(|k| match k {
+        0..3 => (moved[k], accuracy.position_m[k]),
+        _ => (turned[k - 3], accuracy.rotation_rad[k - 3]),
+    })
+}
+
+/// Errors and claims of the places of an affine fit.
+fn of_affine(fit: &Fit) -> [(f64, f64); 3] {
+    let moved = fit.transform.position - affine_truth().position;
+    let claimed = fit.accuracy.expect("more pairs than needed").position_m;
+    std::array::from_fn(|k| (moved[k], claimed[k]))
 }
 
 /// Pairs in the corners of a workspace, and in between when there are more, with noise.
@@ -120,12 +141,14 @@ fn cornered(truth: &Transform, count: usize, noise_m: f64, seed: u64) -> Vec<Pai
 fn ninety_five_of_a_hundred_errors_lie_within_what_is_claimed_however_few_the_pairs() {
     // Of 4000 trials the share is known to 0.34 %; four times that, and the noise's curvature.
     const TOLERANCE: f64 = 0.015;
-    let cases = [3, 4, 5, 6, 8, 12, 40].map(|count| (Model::Rigid, count));
-    let affine = [5, 6, 8, 12, 40].map(|count| (Model::Affine, count));
-    for (model, count) in cases.into_iter().chain(affine) {
-        let truth = if model == Model::Rigid { rigid_truth() } else { affine_truth() };
-        for share in coverage(count, model, &truth) {
-            assert!((share - 0.95).abs() < TOLERANCE, "{} pairs, {}: {share}", count, model.name());
+    for count in [3, 4, 5, 6, 8, 12, 40] {
+        for share in coverage(count, Model::Rigid, &rigid_truth(), of_rigid) {
+            assert!((share - 0.95).abs() < TOLERANCE, "{count} pairs: {share}");
+        }
+    }
+    for count in [5, 6, 8, 12, 40] {
+        for share in coverage(count, Model::Affine, &affine_truth(), of_affine) {
+            assert!((share - 0.95).abs() < TOLERANCE, "{count} pairs, affine: {share}");
         }
     }
 }

@@ -277,6 +277,14 @@ pub enum SceneError {
         /// How deep it may be.
         limit: usize,
     },
+    /// Files that are too large together.
+    #[error("{at}: found files of more than {limit_bytes} bytes together; allowed: at most that")]
+    IncludedTooLarge {
+        /// Where the file that is too much is included.
+        at: Box<Location>,
+        /// The most that they may have.
+        limit_bytes: u64,
+    },
     /// A key that only the scene's own file can have.
     #[error("{at}: found in an included file, but it is for the scene's own file; allowed here: {allowed}")]
     OnlyInScene {
@@ -328,6 +336,7 @@ impl SceneError {
             | Self::Included { at, .. }
             | Self::IncludedTwice { at, .. }
             | Self::IncludedTooDeep { at, .. }
+            | Self::IncludedTooLarge { at, .. }
             | Self::OnlyInScene { at, .. }
             | Self::TooMany { at, .. } => Some(at),
             _ => None,

@@ -109,7 +109,7 @@ pub use shading::{ShadingFormSpec, ShadingSpec};
 pub use shape::{MeshSpec, ShapeSpec};
 pub use soft::{SoftModelSpec, SoftSpec};
 pub use source::MAX_FILE_BYTES;
-pub use sources::{MAX_FILES, MAX_INCLUDE_DEPTH};
+pub use sources::{MAX_FILES, MAX_INCLUDE_DEPTH, MAX_SCENE_BYTES};
 pub use templates::{MAX_TEMPLATE_DEPTH, SceneTemplate};
 pub use visual::VisualSpec;
 

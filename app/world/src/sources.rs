@@ -15,12 +15,14 @@ use crate::document::{Document, LineEnds};
 use crate::error::{Location, SceneError};
 use crate::problems::Problems;
 use crate::reader::{Table, Value};
-use crate::source::read_text;
+use crate::source::{MAX_FILE_BYTES, read_text};
 
 /// How many files may include each other in turn.
 pub const MAX_INCLUDE_DEPTH: usize = 8;
 /// Of how many files a scene may consist.
 pub const MAX_FILES: usize = 256;
+/// The most that the files of a scene may have together, as many as four of the largest.
+pub const MAX_SCENE_BYTES: u64 = 4 * MAX_FILE_BYTES;
 
 /// The files' texts; the scene's own comes first, then what it includes, each followed by what that includes.
 #[derive(Debug)]
@@ -95,7 +97,13 @@ impl Sources {
             };
             return Err(SceneError::IncludedTwice { at: at(), file: file.into(), first });
         }
-        read_text(file).map_err(|source| SceneError::Included { at: at(), source: Box::new(source) })
+        let text =
+            read_text(file).map_err(|source| SceneError::Included { at: at(), source: Box::new(source) })?;
+        let before: usize = self.0.iter().map(|source| source.text.len()).sum();
+        if (before + text.len()) as u64 > MAX_SCENE_BYTES {
+            return Err(SceneError::IncludedTooLarge { at: at(), limit_bytes: MAX_SCENE_BYTES });
+        }
+        Ok(text)
     }
 }
 

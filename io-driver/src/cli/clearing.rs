@@ -68,6 +68,7 @@ fn seen_after(driver: &DriverView) -> Option<Seen> {
 mod tests {
     use super::*;
     use bytemuck::Zeroable;
+    use patience::prelude::*;
     use shm_abi::doorbell::WaitMode;
     use shm_abi::segment::{ClockMode, DriverInfo};
     use shm_abi::{DriverMemory, Frame};
@@ -125,7 +126,7 @@ mod tests {
                 for (tick, state) in (8..).zip(states) {
                     tell(&memory, tick, state);
                 }
-                match seen.join().expect("no panic") {
+                match seen.bounded_join().expect("no panic") {
                     Some(Seen::NoFault) => assert!(is_left, "{states:?}"),
                     Some(Seen::Fault(reason)) => {
                         assert!(!is_left && reason == FaultReason::EmergencyStop as u64, "{states:?}");

@@ -12,7 +12,7 @@ pub struct AccessConfig {
     pub look: Option<String>,
     /// To command, to zero and to leave a fault; `None`: whoever may look.
     pub command: Option<String>,
-    /// To end the driver, others' leases and others' emergency stops; `None`: whoever may command.
+    /// To end the driver, others' leases and others' emergency stops; `None`: only root and the driver's own user.
     pub administer: Option<String>,
 }
 

@@ -353,17 +353,17 @@ mod tests {
     fn a_card_that_is_played_is_not_replaced_and_one_that_was_left_is() {
         let (_directory, path) = place();
         let card = Card::create(&path).unwrap();
-        let playing = std::sync::atomic::AtomicBool::new(true);
+        let over = std::sync::atomic::AtomicBool::new(false);
         std::thread::scope(|scope| {
+            let _over = patience::Raised(&over);
             scope.spawn(|| {
-                while playing.load(Ordering::Relaxed) {
+                while !over.load(Ordering::Relaxed) {
                     card.inputs.heartbeat.fetch_add(1, Ordering::Relaxed);
                     std::thread::sleep(Duration::from_millis(1));
                 }
             });
             let refused = Card::create(&path).unwrap_err();
             assert!(matches!(refused, CardError::Played { pid, .. } if pid == std::process::id()));
-            playing.store(false, Ordering::Relaxed);
         });
         card.outputs.written.store(7, Ordering::Relaxed);
         let anew = Card::create(&path).unwrap();

@@ -15,6 +15,7 @@ use crate::sim::arm::SimulatedArm;
 use crate::sim::hand::{HandModel, ImpedanceHand, model_file};
 use crate::sim::split_mix::SplitMix64;
 use crate::sim::tip_board::TipBoard;
+use crate::toml_report::MAX_TOML_BYTES;
 use nalgebra::{Point3, Vector3};
 use shm_abi::segment::{ClockMode, DeviceInfo};
 use std::sync::Arc;
@@ -120,7 +121,7 @@ fn hand(device: &DeviceConfig, choice: &HandChoice) -> Result<HandModel, OpenErr
     let HandChoice { model, firmness, trembles } = choice;
     let text = match model_file::builtin(&model.to_string_lossy()) {
         Some(text) => text.to_owned(),
-        None => read(device, model)?,
+        None => read(device, model, MAX_TOML_BYTES)?,
     };
     let mut hand = model_file::parse(&text, model, *firmness)?;
     if !trembles {

@@ -202,9 +202,10 @@ mod tests {
         let mut safety = Safety::new(ramps);
         safety.set_positions_valid(true);
         safety.begin_lease();
-        while safety.authority() < 1.0 {
+        for _ in 0..ramps.in_ns.div_ceil(MS) {
             safety.advance(ReplyKind::Fresh, TICK);
         }
+        assert_eq!(safety.authority(), 1.0);
         safety
     }
 
@@ -282,16 +283,15 @@ mod tests {
             let mut safety = Safety::new(RAMPS);
             safety.set_positions_valid(true);
             safety.begin_lease();
-            let count = |safety: &mut Safety, reply, end: f64| {
-                let mut ticks = 0;
-                while safety.authority() != end {
+            for (reply, ramp_ns, end) in
+                [(ReplyKind::Fresh, RAMPS.in_ns, 1.0), (ReplyKind::NoLease, RAMPS.out_ns, 0.0)]
+            {
+                for _ in 0..ramp_ns.div_ceil(period_ns) {
+                    assert_ne!(safety.authority(), end, "{period_ns}");
                     safety.advance(reply, tick);
-                    ticks += 1;
                 }
-                ticks
-            };
-            assert_eq!(count(&mut safety, ReplyKind::Fresh, 1.0), RAMPS.in_ns.div_ceil(period_ns));
-            assert_eq!(count(&mut safety, ReplyKind::NoLease, 0.0), RAMPS.out_ns.div_ceil(period_ns));
+                assert_eq!(safety.authority(), end, "{period_ns}");
+            }
         }
     }
 

@@ -3,13 +3,13 @@
 
 use io_driver::config::DriverConfig;
 use io_driver::device::{Device, Effort, TickTime};
-use io_driver::device_file::{ArmFile, BUILTIN_NAMES, DeviceFile, builtin};
+use io_driver::device_file::{ArmFile, BUILTIN_NAMES, DeviceFile, Workspace, builtin};
 use io_driver::emulator::card::Card;
 use io_driver::emulator::motion::Motion;
 use io_driver::emulator::process::{Emulator, Play, tally_of};
 use io_driver::kinematics::Mechanism;
 use io_driver::open::open_devices;
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 use rt_core::clock::monotonic_ns;
 use std::path::Path;
 
@@ -123,5 +123,40 @@ fn on_an_emulated_card_the_tip_yields_to_the_side_that_it_is_pushed_to() {
             let tally = tally_of(card);
             assert_eq!((tally.wrong(), tally.lost), (0, 0), "{name}: {tally:?}");
         }
+    }
+}
+
+/// Compensation for a base that stands otherwise than told makes up for a weight that is not there, on top of the real one.
+#[test]
+fn weight_and_mistake_together_are_as_much_as_the_safety_page_says() {
+    let arms: Vec<_> = arms().into_iter().filter_map(|(name, arm)| Some((name, arm.gravity?, arm))).collect();
+    let most = |name: &str| -> (f64, f64) {
+        let (_, gravity, arm) =
+            arms.iter().find(|(other, ..)| *other == name).expect("its bodies are described");
+        // Up may be anywhere: along the axes of the base, and between them.
+        let ups = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1], [1, 1, 1]].map(|up| {
+            let up = Vector3::from(up.map(f64::from));
+            UnitQuaternion::rotation_between(&Vector3::y(), &up).expect("no half turn")
+        });
+        let steps = || (0..=8).map(|step| f64::from(step) / 8.0 - 0.5);
+        let Workspace { size_m, centre_m } = arm.workspace;
+        let places = steps().flat_map(|x| steps().flat_map(move |y| steps().map(move |z| [x, y, z])));
+        let places = places.map(|at| Vector3::from_fn(|axis, _| centre_m[axis] + size_m[axis] * at[axis]));
+        let (mut torque_nm, mut force_n) = (0.0_f64, 0.0_f64);
+        for joints in places.filter_map(|place| arm.mechanism.inverse(place).ok()) {
+            for up in &ups {
+                let held = Vector3::from(gravity.in_base(up).holding_torque(joints));
+                torque_nm = torque_nm.max(held.amax());
+                let at_the_tip = arm.mechanism.jacobian(joints).transpose().try_inverse();
+                force_n = force_n.max(at_the_tip.map_or(0.0, |inverse| (inverse * held).norm()));
+            }
+        }
+        println!("{name}: {:.3} N m, {:.2} N", 2.0 * torque_nm, 2.0 * force_n);
+        (2.0 * torque_nm, 2.0 * force_n)
+    };
+    for (name, torque_nm, force_n) in [("premium-1.5", 0.175, 4.1), ("wooden-haptics", 0.62, 4.5)] {
+        let (found_nm, found_n) = most(name);
+        assert!((0.95 * torque_nm..torque_nm).contains(&found_nm), "{name}: {found_nm} N m");
+        assert!((0.95 * force_n..force_n).contains(&found_n), "{name}: {found_n} N");
     }
 }

@@ -5,6 +5,7 @@ use crate::sys::shared_words;
 use crate::test_child;
 use nix::sys::memfd::{MFdFlags, memfd_create};
 use nix::sys::resource::{Resource, setrlimit};
+use patience::prelude::*;
 use std::fs::File;
 use std::os::fd::AsRawFd;
 use std::os::unix::fs::FileExt;
@@ -103,7 +104,7 @@ fn words_after(role: &str) -> (ExitStatus, EpitaphWords) {
     let file = File::from(memfd_create("epitaph", MFdFlags::MFD_CLOEXEC).unwrap());
     file.set_len(size_of::<EpitaphWords>() as u64).unwrap();
     let path = format!("/proc/{}/fd/{}", std::process::id(), file.as_raw_fd());
-    let status = test_child::command(TEST, role).env(CELL_PATH, path).status().unwrap();
+    let status = test_child::command(TEST, role).env(CELL_PATH, path).bounded_status().unwrap();
     let mut bytes = [0; size_of::<EpitaphWords>()];
     file.read_exact_at(&mut bytes, 0).unwrap();
     let words = bytes.as_chunks().0.iter().map(|word| AtomicU64::new(u64::from_ne_bytes(*word)));

@@ -73,6 +73,7 @@ impl ThreadStatus {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use patience::prelude::*;
 
     #[test]
     fn a_status_is_read_as_the_kernel_writes_it() {
@@ -96,12 +97,12 @@ mod tests {
         let (end, ended) = std::sync::mpsc::channel::<()>();
         let thread = std::thread::Builder::new().name("seen".into()).spawn(move || {
             started.send(()).unwrap();
-            let _ = ended.recv();
+            let _ = ended.bounded_recv();
         });
-        wait.recv().unwrap();
+        wait.bounded_recv().unwrap();
         let seen = ThreadFiles::open().unwrap().read().unwrap();
         assert!(seen.iter().any(|status| status.name == "seen"), "{seen:?}");
         drop(end);
-        thread.unwrap().join().unwrap();
+        thread.unwrap().bounded_join().unwrap();
     }
 }

@@ -189,6 +189,7 @@ fn faults_of<R>(f: impl FnOnce() -> R) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use patience::prelude::*;
 
     /// Lines of `/proc/self/status` as recorded, of a root process before and after locking.
     const UNLOCKED: &str =
@@ -237,7 +238,7 @@ mod tests {
     #[test]
     fn more_stack_than_there_is_does_not_overflow_it() {
         let small = std::thread::Builder::new().stack_size(256 * 1024);
-        let guarantee = small.spawn(|| prefault_stack(1 << 30)).unwrap().join().unwrap();
+        let guarantee = small.spawn(|| prefault_stack(1 << 30)).unwrap().bounded_join().unwrap();
         assert!(!guarantee.obtained);
     }
 
@@ -249,7 +250,7 @@ mod tests {
             let lowest = address_of_a_local() - BYTES;
             (faults_of(|| touch_stack_down_to(lowest)), faults_of(|| touch_stack_down_to(lowest)))
         };
-        let (first, second) = std::thread::spawn(touch).join().unwrap();
+        let (first, second) = std::thread::spawn(touch).bounded_join().unwrap();
         // A thread's stack may be left over from an earlier thread of this program, already mapped,
         // or come as a huge page, so the first count has no lower bound worth asserting.
         assert!(second <= first, "{second} faults after {first}");

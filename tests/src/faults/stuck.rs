@@ -10,6 +10,7 @@ use shm_abi::client;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// What is done to a system call.
@@ -17,8 +18,8 @@ use std::time::{Duration, Instant};
 pub enum Harm {
     /// It does not begin.
     Stall,
-    /// It fails.
-    Failure,
+    /// It fails with this error.
+    Failure(&'static str),
 }
 
 /// strace, attached to a driver's service thread until it is dropped.
@@ -51,7 +52,7 @@ impl Tracer {
         let inject = match harm {
             // Longer than any test (us).
             Harm::Stall => format!("inject={call}:delay_enter=600000000"),
-            Harm::Failure => format!("inject={call}:error=EIO"),
+            Harm::Failure(error) => format!("inject={call}:error={error}"),
         };
         Self::start(stand, &["-e", &format!("trace={call}"), "-e", &inject])
     }
@@ -103,22 +104,41 @@ fn end(child: &mut Child) {
     child.end();
 }
 
-/// Everything that clients do, in threads of its own: any of them may wait for a service that is stuck. The last asks the
-/// driver to end if `to_the_end`.
-pub fn live(socket: &Path, to_the_end: bool) {
+/// What clients ask of a service.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Asking {
+    /// What leaves whoever commands alone: to look, a lease that is another's, a fault to leave where there is none.
+    Nothing,
+    /// Leases, after the end of the one that there is: nobody commands while one is made.
+    Leases,
+    /// That the driver ends.
+    TheEnd,
+}
+
+impl Asking {
+    /// All that happens in a driver's life, in order.
+    pub const LIFE: [Self; 3] = [Self::Nothing, Self::Leases, Self::TheEnd];
+}
+
+/// Clients that ask, in a thread of its own: any of them may wait for a service that is stuck.
+pub fn ask(socket: &Path, what: Asking) -> JoinHandle<()> {
     let socket = socket.to_path_buf();
-    std::thread::spawn(move || {
-        let _ = client::observe(&socket, "life");
-        let _ = client::command(&socket, "life");
-        let _ = client::zero(&socket, "life", 0);
-        let _ = client::clear_fault(&socket, "life");
-        let _ = client::end_lease(&socket, "life");
-        for _ in 0..3 {
-            drop(client::command(&socket, "life"));
-            std::thread::sleep(Duration::from_millis(30));
+    std::thread::spawn(move || match what {
+        Asking::Nothing => {
+            let _ = client::observe(&socket, "life");
+            let _ = client::command(&socket, "life");
+            let _ = client::zero(&socket, "life", 0);
+            let _ = client::clear_fault(&socket, "life");
         }
-        if to_the_end {
+        Asking::Leases => {
+            let _ = client::end_lease(&socket, "life");
+            for _ in 0..3 {
+                drop(client::command(&socket, "life"));
+                std::thread::sleep(Duration::from_millis(30));
+            }
+        }
+        Asking::TheEnd => {
             let _ = client::stop(&socket, "life");
         }
-    });
+    })
 }

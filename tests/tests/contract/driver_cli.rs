@@ -26,6 +26,16 @@ fn strict_refuses_to_start_without_a_guarantee_and_leaves_nothing_behind() {
     assert!(!socket.exists() && !socket.parent().expect("a directory").exists());
 }
 
+/// As its parent gives it: what is no configuration must not fill the memory.
+#[test]
+fn a_configuration_from_standard_input_that_never_ends_is_refused() {
+    let mut command = Command::new("sh");
+    command.args(["-c", "exec \"$0\" run --config - < /dev/zero"]).arg(io_driver().get_program());
+    let End { status, out, err, .. } = Running::start(&mut command).end();
+    assert_eq!((status, out.as_str()), (Some(2), ""), "{err}");
+    assert!(err.contains("<standard input>") && err.contains("larger than 65536 bytes"), "{err}");
+}
+
 #[test]
 fn watching_prints_a_line_a_second_until_the_driver_ends_and_says_how_it_ended() {
     for json in [false, true] {
@@ -72,15 +82,26 @@ fn signal(driver: &Driver, signal: Signal) {
     kill_process(pid, signal).expect("our own child");
 }
 
+/// What is said long before the five seconds for which it is looked on: half of them are for a busy machine.
+fn told_in_time(driver: &Driver, command: &str, words: &str) -> End {
+    let begun = Instant::now();
+    let mut asking = Running::start(io_driver().arg(command).arg("--socket").arg(driver.socket()));
+    asking.hear(words);
+    assert!(begun.elapsed() < Duration::from_millis(2500), "{command}: {:?}", begun.elapsed());
+    asking.end()
+}
+
 #[test]
 fn a_driver_that_is_stopped_is_not_taken_for_one_that_obeyed() {
     let mut driver = Driver::start(&resting("real", 1));
     signal(&driver, Signal::STOP);
-    let stop = asked(&driver, "stop");
+    let stop = told_in_time(&driver, "stop", "it has not stopped within 100 ms: the motors may still be on");
     assert_eq!(stop.status, Some(3), "{stop:?}");
-    let words = ["not stopped within 100 ms", "does not answer", "io-driver emergency-stop"];
+    let words = ["does not answer", "io-driver emergency-stop"];
     assert!(words.iter().all(|words| stop.err.contains(words)), "{stop:?}");
-    let emergency = asked(&driver, "emergency-stop");
+    let uncertain =
+        "the emergency stop is not confirmed within 100 ms: the motors may still be on; cut their power";
+    let emergency = told_in_time(&driver, "emergency-stop", uncertain);
     assert_eq!(emergency.status, Some(3), "{emergency:?}");
     assert!(emergency.err.contains("no frame has shown it"), "{emergency:?}");
     // What was asked while it stood still is done once it goes on.

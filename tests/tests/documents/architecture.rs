@@ -80,7 +80,7 @@ fn unsafe_code_stands_where_the_document_says_and_nowhere_else() {
 }
 
 #[test]
-fn every_crate_forbids_unsafe_code_or_denies_it_but_for_one_module() {
+fn every_crate_forbids_unsafe_code_or_denies_it_but_where_it_is_needed() {
     let roots = program_sources()
         .into_iter()
         .filter(|path| path.ends_with("src/lib.rs") || path.ends_with("src/main.rs"));

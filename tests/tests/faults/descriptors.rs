@@ -1,13 +1,12 @@
-//! No descriptors: for the driver, for the application, and because of a crowd.
+//! No descriptors: for the driver and for the application.
 
 use patience::prelude::*;
 use rustix::process::{Pid, Resource, Rlimit, prlimit};
-use shm_abi::server::MAX_OBSERVERS_OF_PROCESS;
-use shm_abi::{DriverState, client, stop_socket};
+use shm_abi::{FaultReason, client, stop_socket};
 use std::time::Duration;
 use system_tests::driver::HANG;
 use system_tests::faults::amplifiers::wait_for;
-use system_tests::faults::flood::Flood;
+use system_tests::faults::commander::Commander;
 use system_tests::faults::knock;
 use system_tests::faults::process::Running;
 use system_tests::faults::ring::{RingLog, Told};
@@ -77,6 +76,41 @@ fn an_app_with_few_descriptors_says_so_or_works_and_the_driver_goes_on() {
     stand.finish();
 }
 
+/// Leaves the driver as many descriptors as it has open.
+fn exhaust(stand: &Stand) {
+    let id = stand.driver.id();
+    let open = std::fs::read_dir(format!("/proc/{id}/fd")).expect("our own child").flatten();
+    let highest: u64 = open.filter_map(|entry| entry.file_name().to_str()?.parse().ok()).max().expect("some");
+    limit(stand, highest + 1);
+}
+
+fn limit(stand: &Stand, descriptors: u64) {
+    let limits = Rlimit { current: Some(descriptors), maximum: Some(1024) };
+    prlimit(Pid::from_raw(stand.driver.id().cast_signed()), Resource::Nofile, limits).expect("our own child");
+}
+
+#[test]
+fn an_emergency_stop_by_datagram_is_heard_without_a_free_descriptor() {
+    let stand = Stand::start(Setup::new("real"));
+    let commander = Commander::start(stand.command(), [0.0, 1.0, 0.0]);
+    RingLog::begin(stand.view()).follow_to_force(stand.view());
+    exhaust(&stand);
+    // They take whatever is left of the queues before it.
+    let crowd = knock::crowd(&stand.socket(), 30);
+    stop_socket::send(&stand.socket()).expect("it is heard");
+    let fault_of = |frame: Option<shm_abi::Frame>| frame.map_or(0, |frame| frame.fault);
+    wait_for("the stop", || fault_of(stand.view().read_latest()) == FaultReason::EmergencyStop as u64);
+    stand.amplifiers.settle();
+    stand.amplifiers.check_off("a stop without descriptors");
+    limit(&stand, 1024);
+    drop((crowd, commander));
+    wait_for("the end of the fault", || {
+        let _ = client::clear_fault(&stand.socket(), "test");
+        fault_of(stand.view().read_latest()) == 0
+    });
+    stand.finish();
+}
+
 /// As many as it has open. The loop needs none; who knocks waits, and is served once there are some.
 #[test]
 fn a_driver_whose_descriptors_are_exhausted_goes_on_with_its_app_and_serves_again_when_it_can() {
@@ -84,12 +118,7 @@ fn a_driver_whose_descriptors_are_exhausted_goes_on_with_its_app_and_serves_agai
     let app = stand.start_app();
     stand.wait_for_force();
     let id = stand.driver.id();
-    let open = std::fs::read_dir(format!("/proc/{id}/fd")).expect("our own child").flatten();
-    let highest: u64 = open.filter_map(|entry| entry.file_name().to_str()?.parse().ok()).max().expect("some");
-    let pid = Pid::from_raw(id.cast_signed());
-    let limit =
-        |current| prlimit(pid, Resource::Nofile, Rlimit { current: Some(current), maximum: Some(1024) });
-    limit(highest + 1).expect("our own child");
+    exhaust(&stand);
     let knocking = {
         let socket = stand.socket();
         std::thread::spawn(move || client::observe(&socket, "test").map(|found| found.driver_pid))
@@ -100,7 +129,7 @@ fn a_driver_whose_descriptors_are_exhausted_goes_on_with_its_app_and_serves_agai
     log.check_promise(stand.view());
     assert!(log.told.iter().any(Told::is_pushing));
     drop(crowd);
-    limit(1024).expect("our own child");
+    limit(&stand, 1024);
     // Whether it had the patience is its affair; the next one is served.
     let _ = knocking.bounded_join().expect("it does not panic");
     assert_eq!(stand.try_to_observe().map(|seen| seen.driver_pid), Some(u64::from(id)));
@@ -110,104 +139,4 @@ fn a_driver_whose_descriptors_are_exhausted_goes_on_with_its_app_and_serves_agai
     drop(app);
     stand.driver.must_run();
     stand.finish();
-}
-
-/// However many look on or say nothing, the one who commands goes on, and somebody can stop the driver.
-#[test]
-fn a_crowd_of_clients_disturbs_nobody_and_leaves_room_for_stopping() {
-    let stand = Stand::start(Setup::new("real"));
-    let app = stand.start_app();
-    stand.wait_for_force();
-    let observers: Vec<_> =
-        std::iter::from_fn(|| client::observe(&stand.socket(), "crowd").ok()).take(100).collect();
-    // The stand itself is one of this process.
-    assert_eq!(observers.len() + 1, MAX_OBSERVERS_OF_PROCESS);
-    let refused = client::observe(&stand.socket(), "crowd").expect_err("no more");
-    assert!(refused.to_string().contains("the driver refused"), "{refused}");
-    let mut log = RingLog::begin(stand.view());
-    log.follow_for(stand.view(), 200);
-    log.check_promise(stand.view());
-    assert!(log.told.iter().any(Told::is_pushing));
-    drop(app);
-    // Stopping, which the stand does now, needs a connection too.
-    stand.finish();
-    drop(observers);
-}
-
-/// CPU time of a process's first thread (s).
-fn cpu_of_service(process: u32) -> f64 {
-    let text = std::fs::read_to_string(format!("/proc/{process}/task/{process}/stat")).expect("it lives");
-    let fields = text[text.rfind(')').expect("a name") + 2..].split(' ').collect::<Vec<_>>();
-    let ticks = |field: usize| fields[field].parse::<f64>().expect("a number");
-    // Fields 14 and 15, user and system; the first two are cut off. In hundredths of a second on every Linux.
-    (ticks(11) + ticks(12)) / 100.0
-}
-
-fn wait_for_state(stand: &Stand, is_fault: bool) {
-    wait_for("what was asked for under a flood", || {
-        let frame = stand.view().read_latest();
-        frame.is_some_and(|frame| (frame.state == DriverState::Fault as u64) == is_fault)
-    });
-}
-
-/// Fewer attempts are no flood (1/s): a machine that is busy with other tests makes several thousand of the ten.
-const LEAST_FLOOD_PER_S: f64 = 1000.0;
-/// Of a CPU, for one attempt (s): 25 us were measured.
-const MOST_ATTEMPT_S: f64 = 75e-6;
-/// Of a CPU, for what the stops ask.
-const REST_SHARE: f64 = 0.1;
-
-/// Attempts to connect without an end, ten thousand a second where the machine has time for so many; whoever stops the motors
-/// meanwhile, over a connection or by datagram, is served.
-fn stops_under_a_flood(duration: Duration) {
-    let stand = Stand::start(Setup::new("real"));
-    let (cpu, ticks) = (cpu_of_service(stand.driver.id()), stand.view().latest_tick().unwrap_or(0));
-    let overruns = || stand.view().counters.overruns.load(std::sync::atomic::Ordering::Relaxed);
-    let overruns_before = overruns();
-    let begun = std::time::Instant::now();
-    let flood = Flood::start(&stand.socket(), 10_000);
-    let (mut stops, mut slowest) = (0, Duration::ZERO);
-    while begun.elapsed() < duration {
-        let asked = std::time::Instant::now();
-        if stops % 2 == 0 {
-            client::emergency_stop_over_connection(&stand.socket(), "test").expect("it is served");
-        } else {
-            stop_socket::send(&stand.socket()).expect("it is heard");
-        }
-        wait_for_state(&stand, true);
-        slowest = slowest.max(asked.elapsed());
-        client::clear_fault(&stand.socket(), "test").expect("it is served");
-        wait_for_state(&stand, false);
-        // Commanding is served as well.
-        drop(stand.command());
-        stops += 1;
-        std::thread::sleep(Duration::from_millis(20));
-    }
-    let seconds = begun.elapsed().as_secs_f64();
-    let attempts = flood.attempts() as f64 / seconds;
-    drop(flood);
-    let share = (cpu_of_service(stand.driver.id()) - cpu) / seconds;
-    let ticks = stand.view().latest_tick().unwrap_or(0) - ticks;
-    let told = format!(
-        "{attempts:.0} attempts a second, {stops} stops, slowest {slowest:?}; service {:.0} % of a CPU; \
-         {} of {ticks} ticks skipped",
-        100.0 * share,
-        overruns() - overruns_before
-    );
-    println!("{told}");
-    assert!(stops > 0 && attempts > LEAST_FLOOD_PER_S, "{told}");
-    // A service that did not sleep between attempts would take all of a CPU.
-    assert!(share < REST_SHARE + attempts * MOST_ATTEMPT_S, "{told}");
-    stand.finish();
-}
-
-#[test]
-fn stops_are_served_under_a_flood_of_connections() {
-    stops_under_a_flood(Duration::from_secs(3));
-}
-
-#[test]
-#[ignore = "a minute: cargo test -p system-tests --test faults flood -- --ignored --nocapture"]
-fn stops_are_served_under_a_flood_of_connections_for_a_minute() {
-    stops_under_a_flood(Duration::from_secs(60));
 }

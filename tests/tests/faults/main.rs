@@ -3,6 +3,7 @@
 mod app_killed;
 mod app_stopped;
 mod campaign;
+mod crowds;
 mod descriptors;
 mod devices;
 mod driver_dies;
@@ -12,4 +13,5 @@ mod garbage;
 mod leases;
 mod rivals;
 mod service;
+mod stuck_service;
 mod versions;

@@ -1,9 +1,8 @@
-//! The driver's service hears nobody any more: its standard error takes nothing, it is stuck in a system call, each of
-//! its calls fails. The motors can be stopped all the same, and the loop stops them by itself.
+//! The driver's standard error takes nothing, an emergency stop finds no socket or gets no threads: the motors can be
+//! stopped all the same, or whoever asked is told that they may still be on.
 
 use rustix::process::Signal;
 use shm_abi::{DriverState, FaultReason, client, stop_socket};
-use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::Write;
 use std::os::fd::OwnedFd;
@@ -14,30 +13,25 @@ use system_tests::faults::commander::Commander;
 use system_tests::faults::process::{Running, io_driver};
 use system_tests::faults::ring::RingLog;
 use system_tests::faults::stand::{Setup, Stand};
-use system_tests::faults::stuck::{Harm, Tracer, live};
 use system_tests::programs;
 
 const PUSH: [f64; 3] = [0.0, 1.0, 0.0];
 
 /// The service may be silent for longer than a test takes until it has stopped the motors in another way.
-const PATIENT: &str = "\n[process]\nservice_silence_ms = 5000\n";
-/// It may not.
-const WATCHFUL: &str = "\n[process]\nservice_silence_ms = 500\n";
-/// A call that is made to fail is none that the kernel's filter knows.
-const WITHOUT_SANDBOX: &str = "\n[process]\nsandbox = false\nservice_silence_ms = 5000\n";
+pub(crate) const PATIENT: &str = "\n[process]\nservice_silence_ms = 5000\n";
 
-fn setup(process: &str) -> Setup {
+pub(crate) fn setup(process: &str) -> Setup {
     Setup { config: process.into(), ..Setup::new("real") }
 }
 
-fn push(stand: &Stand) -> Commander {
+pub(crate) fn push(stand: &Stand) -> Commander {
     let commander = Commander::start(stand.command(), PUSH);
     RingLog::begin(stand.view()).follow_to_force(stand.view());
     commander
 }
 
 /// By the driver's frames and by the registers of the amplifiers.
-fn check_stopped(stand: &Stand, why: FaultReason, when: &str) {
+pub(crate) fn check_stopped(stand: &Stand, why: FaultReason, when: &str) {
     wait_for(when, || {
         stand.view().read_latest().is_some_and(|frame| {
             frame.state == DriverState::Fault as u64
@@ -50,7 +44,7 @@ fn check_stopped(stand: &Stand, why: FaultReason, when: &str) {
 }
 
 /// The loop has ended and told the amplifiers so, whatever the rest of the process does.
-fn check_ended(stand: &Stand, when: &str) {
+pub(crate) fn check_ended(stand: &Stand, when: &str) {
     wait_for(when, || {
         let last = stand.view().latest_tick();
         // Many ticks at 2 kHz, if there were any.
@@ -62,7 +56,7 @@ fn check_ended(stand: &Stand, when: &str) {
 }
 
 /// What a test left of a driver that may hang: it is killed.
-fn put_away(stand: &Stand) {
+pub(crate) fn put_away(stand: &Stand) {
     if stand.driver.id() > 0 {
         let _ = rustix::process::Pid::from_raw(stand.driver.id().cast_signed())
             .map(|pid| rustix::process::kill_process(pid, Signal::KILL));
@@ -152,124 +146,6 @@ fn a_driver_whose_terminal_is_held_is_stopped_all_the_same() {
     put_away(&stand);
 }
 
-/// A pushing driver whose service is harmed in each call of this name. Returns nothing if no life brings that call.
-fn harmed(call: &str, harm: Harm, process: &str) -> Option<(Stand, Tracer, Commander)> {
-    let stand = Stand::start(setup(process));
-    let commander = push(&stand);
-    let tracer = Tracer::harming(&stand, call, harm);
-    let begun = Instant::now();
-    for to_the_end in [false, true] {
-        live(&stand.socket(), to_the_end);
-        // A whole life takes some tenths of a second.
-        let wait = Duration::from_millis(if to_the_end { 5000 } else { 700 });
-        while begun.elapsed() < wait {
-            if tracer.calls().contains(call) {
-                return Some((stand, tracer, commander));
-            }
-            std::thread::sleep(Duration::from_millis(1));
-        }
-    }
-    put_away(&stand);
-    None
-}
-
-/// Every system call that the service thread makes in a whole life.
-fn calls_of_a_life() -> BTreeSet<String> {
-    let mut stand = Stand::start(Setup { talks: true, ..setup(PATIENT) });
-    let tracer = Tracer::listening(&stand);
-    let commander = push(&stand);
-    drop(commander);
-    live(&stand.socket(), true);
-    let end = stand.driver.end();
-    assert_eq!(end.status, Some(0), "{end:?}");
-    let mut calls = tracer.calls();
-    // It returns to nobody who could be harmed.
-    calls.remove("exit_group");
-    calls
-}
-
-fn traced() -> Option<BTreeSet<String>> {
-    if !Tracer::works() {
-        println!(
-            "skipped: there is no strace that may attach; that a stuck service keeps nobody from stopping is tested \
-             with a full standard error instead"
-        );
-        return None;
-    }
-    let calls = calls_of_a_life();
-    println!("{} calls: {calls:?}", calls.len());
-    for known in ["ppoll", "accept4", "recvfrom", "sendmsg", "memfd_create", "close", "getsockopt"] {
-        assert!(calls.contains(known), "{known} is not among {calls:?}");
-    }
-    Some(calls)
-}
-
-/// Harms the service in each of these calls, every time that of another driver. That a life brings a call again is no matter
-/// of course; that it brings most of them is asserted, since nothing is tested of the others.
-fn for_each_harmed(
-    calls: &BTreeSet<String>,
-    harm: Harm,
-    process: &str,
-    mut check: impl FnMut(&str, &mut Stand),
-) {
-    let mut count = 0;
-    for call in calls {
-        let Some((mut stand, tracer, commander)) = harmed(call, harm, process) else {
-            println!("{call}: not made again");
-            continue;
-        };
-        count += 1;
-        check(call, &mut stand);
-        drop((tracer, commander));
-        put_away(&stand);
-    }
-    println!("harmed in {count} of {} calls", calls.len());
-    assert!(count * 2 > calls.len(), "harmed in {count} of {} calls only", calls.len());
-}
-
-#[test]
-fn whatever_call_the_service_is_stuck_in_a_datagram_and_a_signal_stop_the_motors() {
-    let Some(calls) = traced() else { return };
-    for_each_harmed(&calls, Harm::Stall, PATIENT, |call, stand| {
-        let when = format!("stuck in {call}");
-        // A service that was asked to end may have ended the loop before it got stuck.
-        if stand.view().read_latest().is_some_and(|frame| frame.lease != 0)
-            && !stand.amplifiers.were_told_off()
-        {
-            stop_socket::send(&stand.socket()).expect("it lies there");
-            wait_for(&when, || {
-                stand.amplifiers.were_told_off()
-                    || stand
-                        .view()
-                        .read_latest()
-                        .is_some_and(|f| f.fault == FaultReason::EmergencyStop as u64)
-            });
-        }
-        stand.driver.signal(Signal::TERM);
-        check_ended(stand, &when);
-    });
-}
-
-#[test]
-fn whatever_call_the_service_is_stuck_in_the_first_signal_ends_the_loop() {
-    let Some(calls) = traced() else { return };
-    for_each_harmed(&calls, Harm::Stall, PATIENT, |call, stand| {
-        stand.driver.signal(Signal::TERM);
-        check_ended(stand, &format!("SIGTERM while stuck in {call}"));
-    });
-}
-
-#[test]
-fn whatever_call_the_service_is_stuck_in_the_loop_stops_the_motors_by_itself() {
-    let Some(calls) = traced() else { return };
-    for_each_harmed(&calls, Harm::Stall, WATCHFUL, |call, stand| {
-        let when = format!("nobody asked while stuck in {call}");
-        wait_for(&when, || !stand.amplifiers.are_enabled());
-        stand.amplifiers.settle();
-        stand.amplifiers.check_off(&when);
-    });
-}
-
 #[test]
 fn an_emergency_stop_that_finds_no_socket_tells_of_the_driver_that_made_it() {
     let stand = Stand::start(Setup::new("real"));
@@ -298,20 +174,4 @@ fn an_emergency_stop_that_gets_no_threads_stops_and_looks_all_the_same() {
     check_stopped(&stand, FaultReason::EmergencyStop, "no threads");
     drop(commander);
     put_away(&stand);
-}
-
-#[test]
-fn whatever_call_of_the_service_fails_the_motors_can_be_stopped_or_are_off() {
-    let Some(calls) = traced() else { return };
-    for_each_harmed(&calls, Harm::Failure, WITHOUT_SANDBOX, |call, stand| {
-        let when = format!("{call} fails");
-        let _ = stop_socket::send(&stand.socket());
-        wait_for(&when, || stand.driver.has_ended() || !stand.amplifiers.are_enabled());
-        stand.amplifiers.settle();
-        stand.amplifiers.check_off(&when);
-        if !stand.driver.has_ended() {
-            stand.driver.signal(Signal::TERM);
-            check_ended(stand, &when);
-        }
-    });
 }

@@ -74,6 +74,7 @@ fn a_driver_that_faults_again_and_again_stays_off() {
     assert_eq!(unit["Service"]["RestartPreventExitStatus"], ["2"]);
     let seconds = |section: &str, key: &str| unit[section][key][0].parse::<f64>().expect("seconds");
     let burst = seconds("Unit", "StartLimitBurst");
+    assert_eq!((burst, seconds("Unit", "StartLimitIntervalSec")), (3.0, 60.0), "SAFETY.md");
     // A start limit that restarts are too slow to reach would never bite. Noticing a hang takes the watchdog's time.
     let one_round = seconds("Service", "RestartSec") + 2.0 * seconds("Service", "WatchdogSec");
     assert!(burst * one_round < 0.5 * seconds("Unit", "StartLimitIntervalSec"));

@@ -6,7 +6,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use system_tests::driver::{Driver, resting};
-use system_tests::faults::process::{Running, role};
+use system_tests::faults::process::{End, Running, role};
 use system_tests::programs::io_driver;
 use system_tests::strangers::{Stranger, can_be_others, directory_of_nobody, open_directory};
 
@@ -149,51 +149,89 @@ fn an_ordinary_users_driver_is_closed_to_the_next_ordinary_user() {
     assert!(end.status != Some(0) && end.err.contains("Permission denied"), "{end:?}");
 }
 
-/// Three groups, a user in each, and one in none, who can all reach the sockets.
+/// A driver whose sockets everybody reaches, and people who ask it for something.
+struct Asked {
+    driver: Driver,
+    program: Stranger,
+}
+
+impl Asked {
+    fn with(access: &str) -> Self {
+        let config = resting("real", 1).replace("[real_time]", &format!("{access}[real_time]"));
+        let open = open_directory();
+        let socket = open.path().join("driver.sock");
+        let driver = Driver::start_at(&config, io_driver(), open, socket.clone());
+        for path in [socket.clone(), shm_abi::stop_socket::path_beside(&socket)] {
+            std::fs::set_permissions(path, PermissionsExt::from_mode(0o666)).expect("root may");
+        }
+        Self { driver, program: Stranger::of(Path::new(io_driver().get_program())) }
+    }
+
+    fn ask(&self, user: u32, groups: &[u32], what: &str) -> End {
+        let mut command = self.program.as_user(user, groups);
+        Running::start(command.arg(what).arg("--socket").arg(self.driver.socket())).end()
+    }
+
+    fn denied(&self, user: u32, groups: &[u32], what: &str, who_may: &str) {
+        let end = self.ask(user, groups, what);
+        assert_eq!(end.status, Some(2), "{what}: {end:?}");
+        assert!(end.err.contains(&format!("{who_may} may")), "{what}: {end:?}");
+    }
+
+    fn granted(&self, user: u32, groups: &[u32], what: &str) {
+        let end = self.ask(user, groups, what);
+        assert_eq!(end.status, Some(0), "{what}: {end:?}");
+    }
+}
+
+/// Three groups, a user in each, and one in none.
 #[test]
 fn who_may_look_may_stop_and_no_more_and_only_administrators_undo_the_stop_of_others() {
     if role().is_some() || !can_be_others() {
         return;
     }
-    let access = "[access]\nlook = \"4100\"\ncommand = \"4200\"\nadminister = \"4300\"\n[real_time]";
-    let config = resting("real", 1).replace("[real_time]", access);
-    let open = open_directory();
-    let socket = open.path().join("driver.sock");
-    let mut driver = Driver::start_at(&config, io_driver(), open, socket.clone());
-    for path in [socket.clone(), shm_abi::stop_socket::path_beside(&socket)] {
-        std::fs::set_permissions(path, PermissionsExt::from_mode(0o666)).expect("root may");
-    }
-    let program = Stranger::of(Path::new(io_driver().get_program()));
-    let ask = |user: u32, groups: &[u32], what: &str| {
-        let mut command = program.as_user(user, groups);
-        Running::start(command.arg(what).arg("--socket").arg(&socket)).end()
-    };
-    let denied = |user: u32, groups: &[u32], what: &str, group: u32| {
-        let end = ask(user, groups, what);
-        assert_eq!(end.status, Some(2), "{what}: {end:?}");
-        assert!(end.err.contains(&format!("members of group {group} may")), "{what}: {end:?}");
-    };
-    let granted = |user: u32, groups: &[u32], what: &str| {
-        let end = ask(user, groups, what);
-        assert_eq!(end.status, Some(0), "{what}: {end:?}");
-    };
+    let mut asked = Asked::with("[access]\nlook = \"4100\"\ncommand = \"4200\"\nadminister = \"4300\"\n");
+    let [lookers, commanders, administrators] =
+        [4100, 4200, 4300].map(|group| format!("members of group {group}"));
     let (nobody, looker, commander, other, administrator) = (4000, 4001, 4002, 4003, 4004);
-    denied(nobody, &[], "status", 4100);
-    granted(looker, &[4100], "status");
-    granted(looker, &[4100], "emergency-stop");
-    denied(looker, &[4100], "clear-fault", 4200);
-    denied(commander, &[4200], "clear-fault", 4300);
-    granted(administrator, &[4300], "clear-fault");
+    asked.denied(nobody, &[], "status", &lookers);
+    asked.granted(looker, &[4100], "status");
+    asked.granted(looker, &[4100], "emergency-stop");
+    asked.denied(looker, &[4100], "clear-fault", &commanders);
+    asked.denied(commander, &[4200], "clear-fault", &administrators);
+    asked.granted(administrator, &[4300], "clear-fault");
     // One's own.
-    granted(commander, &[4200], "emergency-stop");
-    denied(other, &[4200], "clear-fault", 4300);
-    granted(commander, &[4200], "clear-fault");
+    asked.granted(commander, &[4200], "emergency-stop");
+    asked.denied(other, &[4200], "clear-fault", &administrators);
+    asked.granted(commander, &[4200], "clear-fault");
     // The lease of somebody else.
-    let lease = driver.command();
-    denied(commander, &[4200], "end-lease", 4300);
+    let lease = asked.driver.command();
+    asked.denied(commander, &[4200], "end-lease", &administrators);
     assert!(lease.connection.is_open());
-    granted(administrator, &[4300], "end-lease");
-    denied(commander, &[4200], "stop", 4300);
-    granted(administrator, &[4300], "stop");
-    assert_eq!(driver.wait().code(), Some(0));
+    asked.granted(administrator, &[4300], "end-lease");
+    asked.denied(commander, &[4200], "stop", &administrators);
+    asked.granted(administrator, &[4300], "stop");
+    assert_eq!(asked.driver.wait().code(), Some(0));
+}
+
+/// As an installed driver begins: its configuration names no groups.
+#[test]
+fn without_groups_a_stop_of_others_is_for_root_and_the_drivers_user_to_undo() {
+    if role().is_some() || !can_be_others() {
+        return;
+    }
+    let mut asked = Asked::with("");
+    let (ann, bob, root) = (4001, 4002, 0);
+    let those = "root and the user that the driver runs as";
+    asked.granted(ann, &[], "emergency-stop");
+    asked.denied(bob, &[], "clear-fault", those);
+    asked.granted(ann, &[], "clear-fault");
+    asked.granted(ann, &[], "emergency-stop");
+    asked.granted(root, &[], "clear-fault");
+    let lease = asked.driver.command();
+    asked.denied(bob, &[], "end-lease", those);
+    assert!(lease.connection.is_open());
+    asked.denied(bob, &[], "stop", those);
+    asked.granted(root, &[], "stop");
+    assert_eq!(asked.driver.wait().code(), Some(0));
 }

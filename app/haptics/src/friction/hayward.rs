@@ -23,7 +23,7 @@
 //! Noise and bias: a bias b in noise of standard deviation s is borne for ever while the strain stays below `z_stick`, so
 //! for three minutes at 1 kHz while `stick_fraction mu load > b + 5 s`, about. Noise that reaches farther takes the excess
 //! away bit by bit, until it reaches no farther or the bias is gone. In the noise of Melder ch. 8.1, test 3 (5 mm deep,
-//! s = 0.2 mm) and a bias of 0.4 mm, with `mu = 0.3`: a stick fraction of 0.5 (0.75 mm) loses nine tenths of the bias in
+//! s = 0.2 mm) and a bias of 0.4 mm, with `mu = 0.3`: a stick fraction of 0.5 (0.75 mm) loses two thirds to all of the bias in
 //! three minutes, 0.9 (1.35 mm) less than a tenth, and Coulomb friction, which bears 1.5 mm, nothing. The smooth alpha of the paper,
 //! which is nowhere zero, loses all of it within ten seconds at 0.5. This is the model's, not the tick's: its equation
 //! integrated in steps a hundred times as short loses as much (`tests/all/friction_drift.rs`).

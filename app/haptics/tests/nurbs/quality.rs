@@ -2,7 +2,7 @@
 
 use crate::common::*;
 use haptics::mesh::{Mesh, TriangleSoup};
-use haptics::nurbs::make;
+use haptics::nurbs::{MAX_DEGREE, make};
 use haptics::{ContactState, Friction, Nurbs, NurbsError, NurbsPatch, Shape, Surface};
 use nalgebra::Vector3;
 use std::sync::Arc;
@@ -327,4 +327,30 @@ fn de_boor(points: &[[f64; 4]], knots: &[f64], degree: usize, x: f64) -> Vector3
         }
     }
     Vector3::new(sum[0], sum[1], sum[2]) / sum[3]
+}
+
+/// A square sheet of `spans` by `spans` polynomials of the highest degree, with this height at each control point (m).
+fn polynomials(spans: usize, height: impl Fn(usize) -> f64) -> NurbsPatch {
+    let count = spans + MAX_DEGREE;
+    let knots: Vec<f64> = (0..count + MAX_DEGREE + 1)
+        .map(|knot| knot.clamp(MAX_DEGREE, count) as f64 - MAX_DEGREE as f64)
+        .collect();
+    let point = |index: usize| [(index % count) as f64, height(index), (index / count) as f64, 1.0];
+    NurbsPatch {
+        degree: [MAX_DEGREE; 2],
+        knots: [knots.clone(), knots],
+        points: (0..count * count).map(point).collect(),
+    }
+}
+
+/// Sound patches, and less than a megabyte in a file.
+#[test]
+fn patches_whose_polynomials_or_cells_would_fill_the_memory_are_refused() {
+    assert!(Nurbs::build(&[polynomials(4, |_| 0.0)]).is_ok());
+    let refused = |patch: NurbsPatch| Nurbs::build(&[patch]).unwrap_err();
+    // 64 control points of 32 bytes for each polynomial, twice: 180 MB.
+    assert!(matches!(refused(polynomials(210, |_| 0.0)), NurbsError::TooLarge { .. }));
+    // A quarter of that, but each of them falls into hundreds of cells.
+    let jagged = |index: usize| if index.is_multiple_of(2) { 50.0 } else { -50.0 };
+    assert!(matches!(refused(polynomials(100, jagged)), NurbsError::TooLarge { .. }));
 }

@@ -94,6 +94,31 @@ fn an_include_that_is_a_pipe_a_device_or_a_directory_is_refused_at_once() {
 }
 
 #[test]
+fn included_files_that_are_too_large_together_are_refused_where_the_first_too_much_is_included() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let names: Vec<String> = (0..5).map(|number| format!("{number}.toml")).collect();
+    // Four of them are the bound, and the scene's own text is a part of it.
+    let large = "#".repeat(MAX_FILE_BYTES as usize);
+    for name in &names {
+        fs::write(dir.path().join(name), &large).expect("write");
+    }
+    let scene = |count: usize| {
+        let file = dir.path().join("s.toml");
+        fs::write(
+            &file,
+            format!("[[finger]]\n").replace("[[", &format!("include = {:?}\n[[", &names[..count])),
+        )
+        .expect("write");
+        Scene::load(&file)
+    };
+    scene(3).expect("below the bound");
+    let message = scene(4).expect_err("above it").to_string();
+    let expected =
+        "s.toml:1: include[3]: found files of more than 67108864 bytes together; allowed: at most that";
+    assert!(message.ends_with(expected), "{message}");
+}
+
+#[test]
 fn a_file_of_more_values_than_any_scene_has_is_refused_before_they_are_made() {
     // Two bytes make a value of two hundred.
     let text = format!("[[finger]]\nx = [{}]\n", "0,".repeat(1 << 20));
