@@ -30,10 +30,11 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, Parser, Subcommand};
 use io_driver::arguments;
 use io_driver::config::period_of;
-use io_driver::say::say;
+use io_driver::say::{self, say};
 use rt_core::signals::StopSignals;
 use shm_abi::{client, endpoint};
 use std::process::ExitCode;
+use std::time::Duration;
 use view::input::Bindings;
 use view::{Eyes, NoWindow, WindowSpec};
 use world::Settings;
@@ -91,9 +92,14 @@ enum AppCommand {
     Driver(io_driver::cli::DriverCommand),
 }
 
+/// How long the lines of a run that has ended may take to be written.
+const LAST_WORDS: Duration = Duration::from_secs(5);
+
 /// Runs the program with the process's own arguments.
 pub fn main() -> ExitCode {
     let ended = execute();
+    // The lease is over: nobody is held up but whoever waits for this program.
+    say::flush(LAST_WORDS);
     if outputs::is_lost() && ended == ExitCode::SUCCESS { ExitCode::from(EXIT_FAULT) } else { ended }
 }
 

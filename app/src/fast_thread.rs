@@ -4,8 +4,9 @@
 //! next is due and only then spins on the doorbell; where it has no CPU of its own it sleeps on the
 //! doorbell itself. With rights it runs under SCHED_FIFO on a CPU that is not the driver's.
 //!
-//! Invariant: it never spins for longer than two ticks on end, so that a driver that stopped does not
-//! leave a CPU burning.
+//! Invariants: it never spins for longer than two ticks on end, so that a driver that stopped does not
+//! leave a CPU burning. Nobody else has to act for the force to go: a signal ends it at once, and the end of the run within
+//! [`FastShared::outlasts`], whatever the thread that ends the lease waits for.
 //! Cost: between frames one or two system calls; in the step none.
 
 use crate::fast_loop::{FastLoop, Turn};
@@ -13,6 +14,7 @@ use crate::plausible::{Implausible, Plausibility};
 use rt_core::clock::{monotonic_ns, sleep_until_ns};
 use rt_core::histogram::Histogram;
 use rt_core::setup::{SetupReport, SetupRequest};
+use rt_core::signals::StopSignals;
 use shm_abi::doorbell::WaitMode;
 use shm_abi::segment::{ClockMode, DriverInfo};
 use shm_abi::{CommanderMemory, DriverView};
@@ -21,7 +23,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc;
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Below the driver's priority: it must be able to run whatever happens here.
 pub const FIFO_PRIORITY: u8 = 70;
@@ -42,8 +44,10 @@ pub struct FastShared {
     pub run_ticks: Arc<AtomicU64>,
     /// The run's last row is out.
     pub is_over: Arc<AtomicBool>,
-    /// Whoever watches ends the lease then; until that is done, replies go on.
-    pub outlasts: bool,
+    /// Whoever watches ends the lease then; until that is done, replies go on, but no longer than this.
+    pub outlasts: Duration,
+    /// End it, too.
+    pub signals: StopSignals,
 }
 
 /// Why the fast thread ended.
@@ -53,6 +57,8 @@ pub enum FastEnd {
     Finished,
     /// It was asked to.
     Stopped,
+    /// The process was asked to, by this signal.
+    Signal(i32),
     /// The driver is in its fault state, for this reason.
     Fault(u64),
     /// The driver publishes nothing any more.
@@ -193,17 +199,20 @@ impl FastThread {
                 Err(end) => break end,
             }
         };
-        if end == FastEnd::Finished && self.shared.outlasts {
+        if end == FastEnd::Finished && !self.shared.outlasts.is_zero() {
             self.outlast_lease();
         }
         FastRemains { fast: self.fast, driver: self.driver, step_ns: self.step_ns, end }
     }
 
     /// Whoever ends the lease takes some milliseconds to see that the run is over: ticks that the driver would count as
-    /// missed replies, and would bridge with the last force.
+    /// missed replies, and would bridge with the last force. Whoever takes longer waits for something else.
     fn outlast_lease(&mut self) {
         self.shared.is_over.store(true, Ordering::Release);
-        while let Ok(tick) = self.wait_for_frame() {
+        let begun = Instant::now();
+        while begun.elapsed() < self.shared.outlasts
+            && let Ok(tick) = self.wait_for_frame()
+        {
             self.seen = Some(tick);
             if !self.fast.answer_on(tick, &self.driver, &self.commander) {
                 return;
@@ -255,6 +264,9 @@ impl FastThread {
             // First of all: while frames come in time, there is always one to go on with.
             if self.shared.stop.load(Ordering::Relaxed) {
                 return Err(FastEnd::Stopped);
+            }
+            if let Some(signal) = self.shared.signals.requested() {
+                return Err(FastEnd::Signal(signal));
             }
             match self.driver.latest_tick() {
                 latest if latest == self.seen => {}

@@ -1,8 +1,9 @@
 //! A line that says how far something has come: rewritten in place on a terminal, else now and then.
 
 use io_driver::device::run_time_s;
+use io_driver::say;
 use rt_core::plain_text::Plain;
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
 const ON_TERMINAL: Duration = Duration::from_millis(200);
@@ -37,17 +38,14 @@ impl StatusLine {
         }
         self.last = Some(Instant::now());
         let line = Plain(line());
-        let mut out = std::io::stderr().lock();
-        // Nobody to tell is no reason to stop.
-        let _ = if self.on_terminal { write!(out, "\r{line}\x1b[K") } else { writeln!(out, "{line}") };
-        let _ = out.flush();
+        say::show(if self.on_terminal { format!("\r{line}\x1b[K") } else { format!("{line}\n") });
         self.is_open = self.on_terminal;
     }
 
     /// Ends the line, so that what follows begins on one of its own.
     pub fn end(&mut self) {
         if std::mem::take(&mut self.is_open) {
-            let _ = writeln!(std::io::stderr());
+            say::show("\n".into());
         }
     }
 }

@@ -23,6 +23,7 @@ use crate::spectator::Spectator;
 use crate::two_processes::{self, Source};
 use crate::virtual_clock::VirtualDriver;
 use io_driver::device::Extras;
+use io_driver::log_thread;
 use io_driver::say::say;
 use physics::Reason;
 use rt_core::signals::StopSignals;
@@ -81,6 +82,9 @@ pub struct Attach {
 /// # Errors
 /// Whatever kept the run from starting or from going on.
 pub fn run(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result<(Report, Stop), RunFailure> {
+    // A terminal held by Ctrl-S holds no run, and no lease.
+    let thread = log_thread::start("phantom3");
+    thread.map_err(|error| RunFailure::Start(format!("cannot start the log's thread: {error}")))?;
     match plan.clock {
         Some(ClockMode::Virtual) => run_virtual(rig, plan, signals),
         _ => run_two_processes(rig, plan, signals),

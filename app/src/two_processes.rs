@@ -103,8 +103,13 @@ pub fn run(
     let slow_list = start_slow_list(&mut fast, later, &attachment.driver, &run_ticks)?;
     loop {
         // In lockstep ticks wait for replies instead.
-        let outlasts = attachment.driver.info().clock_mode == ClockMode::Real;
-        let shared = FastShared { run_ticks: Arc::clone(&run_ticks), outlasts, ..FastShared::default() };
+        let is_real = attachment.driver.info().clock_mode == ClockMode::Real;
+        let shared = FastShared {
+            run_ticks: Arc::clone(&run_ticks),
+            outlasts: if is_real { LEASE_END } else { Duration::ZERO },
+            signals: signals.clone(),
+            ..FastShared::default()
+        };
         let (report, connection, watched) =
             run_attached(attachment, (fast, shared), slow, progress, signals)?;
         let remains = watched.remains;
@@ -112,7 +117,7 @@ pub fn run(
         let tally = remains.fast.tally;
         let stop = match watched.end {
             WatchEnd::Fast(FastEnd::Finished) => Stop::Finished,
-            WatchEnd::Signal(signal) => Stop::Signal(signal),
+            WatchEnd::Signal(signal) | WatchEnd::Fast(FastEnd::Signal(signal)) => Stop::Signal(signal),
             WatchEnd::Closed => Stop::Closed,
             WatchEnd::Fast(FastEnd::Fault(reason)) => return Err(RunFailure::driver_fault(reason)),
             WatchEnd::Fast(FastEnd::Implausible(lie)) => return Err(RunFailure::DriverImplausible(lie)),

@@ -164,7 +164,7 @@ pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> 
     stop_thread::start(stop_socket, sender.urgent.clone(), options.quiet)
         .map_err(system("start the thread that stops"))?;
     let lost = drain.lost_count();
-    log_thread::start(drain, options.quiet).map_err(system("start the log's thread"))?;
+    log_thread::start_for_driver(drain, options.quiet).map_err(system("start the log's thread"))?;
     report.guarantees.push(sandbox::shut(&config.process));
     memory.tell_setup_report(&report.to_string());
     refuse_if_strict(&report, options)?;

@@ -29,7 +29,7 @@ pub mod heat;
 pub mod kinematics;
 #[allow(unsafe_code, reason = "wishes mapped from a file")]
 pub mod live_hand;
-mod log_thread;
+pub mod log_thread;
 mod loop_thread;
 pub mod mail;
 pub mod meter;

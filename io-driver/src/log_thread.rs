@@ -1,4 +1,4 @@
-//! The one thread of a running driver that writes to standard error.
+//! The one thread of a running driver, or of an application's run, that writes to standard error.
 //!
 //! Problem: whoever holds the other end of standard error decides how long a write takes, and the thread that writes
 //! can do nothing else meanwhile: no stop, no lease.
@@ -18,20 +18,32 @@ const POLL: Duration = Duration::from_millis(20);
 const STACK_BYTES: usize = 128 * 1024;
 
 struct LogThread {
+    program: &'static str,
     entries: Receiver<Entry>,
-    drain: RtLogDrain,
+    /// The loop's records, if this process has one.
+    drain: Option<RtLogDrain>,
     quiet: bool,
     dropped_told: u64,
 }
 
-/// Starts it. From now on nothing that is said waits for standard error.
+/// Starts it for an application's run. From now on nothing that is said waits for standard error; a second run says it the
+/// same way.
 ///
 /// # Errors
 /// What the system says to another thread.
-pub(crate) fn start(drain: RtLogDrain, quiet: bool) -> io::Result<()> {
+pub fn start(program: &'static str) -> io::Result<()> {
+    begin(program, None, false)
+}
+
+/// Starts it for a driver.
+pub(crate) fn start_for_driver(drain: RtLogDrain, quiet: bool) -> io::Result<()> {
+    begin("io-driver", Some(drain), quiet)
+}
+
+fn begin(program: &'static str, drain: Option<RtLogDrain>, quiet: bool) -> io::Result<()> {
     // A process has one driver; the lines of a second one go the way of the first one's.
     let Some(entries) = say::queue() else { return Ok(()) };
-    let log = LogThread { entries, drain, quiet, dropped_told: 0 };
+    let log = LogThread { program, entries, drain, quiet, dropped_told: 0 };
     let (begun, has_begun) = sync_channel::<()>(0);
     let thread = std::thread::Builder::new().name("log".into()).stack_size(STACK_BYTES);
     thread.spawn(move || {
@@ -49,7 +61,7 @@ impl LogThread {
             let next = self.entries.recv_timeout(POLL);
             self.write_records();
             match next {
-                Ok(Entry::Line(line)) => say::write(&line),
+                Ok(Entry::Line(line) | Entry::Status(line)) => say::write(&line),
                 Ok(Entry::Flush(done)) => drop(done),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return,
@@ -59,10 +71,11 @@ impl LogThread {
     }
 
     fn write_records(&mut self) {
-        let quiet = self.quiet;
-        self.drain.drain(|line: LogLine| {
+        let (quiet, program) = (self.quiet, self.program);
+        let Some(drain) = &mut self.drain else { return };
+        drain.drain(|line: LogLine| {
             if !quiet || line.level > LogLevel::Info {
-                say::write(&format!("io-driver: tick {}: {}\n", line.tick, line.text));
+                say::write(&format!("{program}: tick {}: {}\n", line.tick, line.text));
             }
         });
     }
@@ -71,7 +84,8 @@ impl LogThread {
         let dropped = say::dropped();
         if dropped > self.dropped_told {
             let lines = dropped - self.dropped_told;
-            say::write(&format!("io-driver: {lines} lines were dropped: standard error took none\n"));
+            let program = self.program;
+            say::write(&format!("{program}: {lines} lines were dropped: standard error took none\n"));
             self.dropped_told = dropped;
         }
     }

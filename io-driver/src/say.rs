@@ -35,6 +35,8 @@ struct Queue {
 pub(crate) enum Entry {
     /// A line, with its end.
     Line(String),
+    /// A line that is told anew again and again.
+    Status(String),
     /// Dropped when everything before it has been written.
     Flush(SyncSender<()>),
 }
@@ -49,6 +51,14 @@ pub fn say(line: fmt::Arguments<'_>) {
                 queue.dropped.fetch_add(1, Ordering::Relaxed);
             }
         }
+    }
+}
+
+/// Shows a text as it is, such as a line that is told anew again and again: one that finds no room is left out.
+pub fn show(text: String) {
+    match QUEUE.get() {
+        None => write(&text),
+        Some(queue) => drop(queue.entries.try_send(Entry::Status(text))),
     }
 }
 

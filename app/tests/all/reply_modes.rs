@@ -4,11 +4,12 @@ use bytemuck::Zeroable;
 use io_driver::config::ReplyMode;
 use patience::prelude::*;
 use phantom3::fast_loop::{FastLoop, Turn, WhenFull};
-use phantom3::fast_thread::{self, FastEnd, FastShared};
+use phantom3::fast_thread::{self, FastEnd, FastRemains, FastShared};
 use phantom3::rig::{HandMode, Rig};
 use phantom3::row_queue::row_queue;
 use phantom3::simulated::SimulatedDevices;
 use phantom3::virtual_clock::VirtualDriver;
+use rt_core::signals::StopSignals;
 use shm_abi::doorbell::WaitMode;
 use shm_abi::frame::DEVICE_POSITION_VALID;
 use shm_abi::segment::ClockMode;
@@ -17,6 +18,7 @@ use shm_abi::{CommanderMemory, CommanderView, DriverMemory, DriverState, DriverV
 use std::os::fd::AsFd;
 use std::path::Path;
 use std::sync::atomic::Ordering;
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use world::Scene;
 
@@ -70,35 +72,86 @@ fn comes_true(mut is_so: impl FnMut() -> bool) -> bool {
     true
 }
 
+/// A run of a few rows against frames that the test tells.
+struct Told {
+    memory: DriverMemory,
+    replies: CommanderView,
+    shared: FastShared,
+    thread: JoinHandle<FastRemains>,
+}
+
+const ROWS: u64 = 3;
+
+impl Told {
+    fn start(shared: FastShared) -> Self {
+        let memory = DriverMemory::create(&driver_info()).expect("memory");
+        let view = DriverView::map(memory.fd()).expect("memory");
+        let (replies, fd) = CommanderView::create(LEASE).expect("memory");
+        let commander = CommanderMemory::map(fd.as_fd()).expect("memory");
+        let (rows, _queue) = row_queue(0);
+        let step = rig().fast_step().expect("a step");
+        let fast = FastLoop::new(step, rows, WhenFull::Drop, ROWS, 1_000_000);
+        let (_, thread) = fast_thread::start(fast, view, commander, shared.clone()).expect("a thread");
+        Self { memory, replies, shared, thread }
+    }
+
+    fn tell(&self, tick: u64, lease: u64) {
+        self.memory.write_frame(&frame(tick, lease));
+        self.memory.ring(tick, Some(&self.replies));
+    }
+
+    /// Tells a tick of the lease; whether it is answered.
+    fn is_answered(&self, tick: u64) -> bool {
+        self.tell(tick, LEASE);
+        comes_true(|| self.replies.latest_tick() == Some(tick) || self.thread.is_finished())
+            && self.replies.latest_tick() == Some(tick)
+    }
+
+    fn end(self) -> FastRemains {
+        assert!(comes_true(|| self.thread.is_finished()), "it goes on");
+        self.thread.bounded_join().expect("no panic")
+    }
+}
+
 /// Whoever gives the lease back needs ticks to do so, and each of them would count as a missed reply.
 #[test]
 fn replies_go_on_after_the_last_row_until_the_lease_is_over() {
-    const ROWS: u64 = 3;
-    let memory = DriverMemory::create(&driver_info()).expect("memory");
-    let view = DriverView::map(memory.fd()).expect("memory");
-    let (replies, fd) = CommanderView::create(LEASE).expect("memory");
-    let commander = CommanderMemory::map(fd.as_fd()).expect("memory");
-    let (rows, _queue) = row_queue(0);
-    let step = rig().fast_step().expect("a step");
-    let fast = FastLoop::new(step, rows, WhenFull::Drop, ROWS, 1_000_000);
-    let shared = FastShared { outlasts: true, ..FastShared::default() };
-    let (_, thread) = fast_thread::start(fast, view, commander, shared.clone()).expect("a thread");
-    let tell = |tick: u64, lease: u64| {
-        memory.write_frame(&frame(tick, lease));
-        memory.ring(tick, Some(&replies));
-    };
+    let told = Told::start(FastShared { outlasts: Duration::from_secs(1000), ..FastShared::default() });
     for tick in 1..=40 {
-        tell(tick, LEASE);
-        assert!(
-            comes_true(|| replies.latest_tick() == Some(tick)),
-            "no reply for tick {tick} of {ROWS} rows"
-        );
+        assert!(told.is_answered(tick), "no reply for tick {tick} of {ROWS} rows");
     }
-    assert!(shared.is_over.load(Ordering::Acquire), "whoever watches has been told meanwhile");
-    tell(41, LEASE + 1);
-    assert!(comes_true(|| thread.is_finished()), "it goes on although the lease is over");
-    let remains = thread.bounded_join().expect("no panic");
+    assert!(told.shared.is_over.load(Ordering::Acquire), "whoever watches has been told meanwhile");
+    told.tell(41, LEASE + 1);
+    let remains = told.end();
     assert_eq!((remains.end, remains.fast.tally.rows <= ROWS), (FastEnd::Finished, true));
+}
+
+/// The one who would give it back may wait for a terminal, for a disk, for a picture.
+#[test]
+fn replies_end_soon_after_the_last_row_though_nobody_gives_the_lease_back() {
+    let told = Told::start(FastShared { outlasts: Duration::from_millis(50), ..FastShared::default() });
+    let last = (1..100_000).find(|tick| !told.is_answered(*tick)).expect("an end");
+    assert!(last > ROWS, "{last}");
+    assert_eq!(told.end().end, FastEnd::Finished);
+}
+
+const SIGNALLED: &str = "reply_modes::a_signal_ends_the_replies_though_nobody_else_looks_at_it";
+
+/// In a process of its own: the handlers are the process's.
+#[test]
+fn a_signal_ends_the_replies_though_nobody_else_looks_at_it() {
+    const ROLE: &str = "REPLY_MODES_TEST_SIGNALLED";
+    if std::env::var_os(ROLE).is_none() {
+        let mut again = std::process::Command::new(std::env::current_exe().expect("this test"));
+        again.args(["--exact", SIGNALLED]).env(ROLE, "");
+        assert!(again.bounded_status().expect("it runs").success());
+        return;
+    }
+    let signals = StopSignals::install().expect("handlers");
+    let told = Told::start(FastShared { signals, ..FastShared::default() });
+    assert!(told.is_answered(1) && told.is_answered(2));
+    rustix::process::kill_process(rustix::process::getpid(), rustix::process::Signal::HUP).expect("itself");
+    assert_eq!(told.end().end, FastEnd::Signal(1));
 }
 
 /// How many ticks old the command is that drives the motors, once somebody commands.

@@ -21,3 +21,4 @@ pub mod saboteur;
 pub mod scarcity;
 pub mod stand;
 pub mod stuck;
+pub mod terminal;

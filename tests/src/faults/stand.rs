@@ -141,9 +141,18 @@ impl Stand {
 
     /// The same of another copy of `phantom3`.
     pub fn prepare_app(&self, program: Command) -> Command {
+        self.prepare_app_for(program, "80000")
+    }
+
+    /// `phantom3` that presses for so long (s).
+    pub fn app_for(&self, seconds: &str) -> Command {
+        self.prepare_app_for(programs::phantom3(), seconds)
+    }
+
+    fn prepare_app_for(&self, program: Command, seconds: &str) -> Command {
         let mut command = program;
         command
-            .args(["run", "press.toml", "--headless", "--seconds", "80000", "--clock", self.setup.clock])
+            .args(["run", "press.toml", "--headless", "--seconds", seconds, "--clock", self.setup.clock])
             .arg("--attach")
             .arg(self.socket())
             .current_dir(self.place.path())

@@ -10,6 +10,7 @@ mod driver_dies;
 mod driver_gone;
 mod full;
 mod garbage;
+mod held_terminal;
 mod leases;
 mod rivals;
 mod service;

@@ -5,7 +5,6 @@ use rustix::process::Signal;
 use shm_abi::{DriverState, FaultReason, client, stop_socket};
 use std::fs::File;
 use std::io::Write;
-use std::os::fd::OwnedFd;
 use std::os::unix::fs::OpenOptionsExt;
 use std::time::{Duration, Instant};
 use system_tests::faults::amplifiers::wait_for;
@@ -13,6 +12,7 @@ use system_tests::faults::commander::Commander;
 use system_tests::faults::process::{Running, io_driver};
 use system_tests::faults::ring::RingLog;
 use system_tests::faults::stand::{Setup, Stand};
+use system_tests::faults::terminal::Terminal;
 use system_tests::programs;
 
 const PUSH: [f64; 3] = [0.0, 1.0, 0.0];
@@ -126,17 +126,11 @@ fn a_driver_whose_standard_error_is_full_is_stopped_over_the_socket_and_by_datag
 /// As somebody does who types Ctrl-S to read what went by.
 #[test]
 fn a_driver_whose_terminal_is_held_is_stopped_all_the_same() {
-    use rustix::pty::{OpenptFlags, grantpt, openpt, unlockpt};
-    use rustix::termios::{Action, tcflow};
     let mut stand = Stand::start(Setup { talks: true, ..setup(PATIENT) });
     stand.stop_driver();
-    let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).expect("a terminal");
-    grantpt(&master).and_then(|()| unlockpt(&master)).expect("our own");
-    let name = rustix::pty::ptsname(&master, Vec::new()).expect("it has a name");
-    let name = std::path::PathBuf::from(name.into_string().expect("plain"));
-    let slave: OwnedFd = File::options().read(true).write(true).open(name).expect("our own").into();
-    stand.restart_driver_saying_to(slave.try_clone().expect("another"));
-    tcflow(&slave, Action::OOff).expect("Ctrl-S");
+    let terminal = Terminal::open();
+    stand.restart_driver_saying_to(terminal.end());
+    terminal.hold();
     let _commander = push(&stand);
     let end = io_driver(&["emergency-stop"], &stand.socket());
     assert_eq!(end.status, Some(0), "{end:?}");

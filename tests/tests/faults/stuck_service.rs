@@ -20,11 +20,12 @@ const WITHOUT_SANDBOX: &str = "\n[process]\nsandbox = false\nservice_silence_ms 
 
 /// A driver whose service is harmed in a call.
 struct Harmed {
+    // Let go first: whom it holds does not die.
+    _tracer: Tracer,
+    _commander: Commander,
     stand: Stand,
     /// It was harmed under the commander's force.
     is_pushed: bool,
-    _tracer: Tracer,
-    _commander: Commander,
 }
 
 impl Drop for Harmed {
@@ -39,7 +40,7 @@ fn harmed(call: &str, harm: Harm, setup: Setup) -> Option<Harmed> {
     let commander = push(&stand);
     let tracer = Tracer::harming(&stand, call, harm);
     for asking in Asking::LIFE {
-        drop(ask(&stand.socket(), asking));
+        let asker = ask(&stand.socket(), asking);
         let begun = Instant::now();
         // Each takes some tenths of a second at most, the end of a driver a little more.
         let wait = Duration::from_millis(if asking == Asking::TheEnd { 4000 } else { 500 });
@@ -47,6 +48,10 @@ fn harmed(call: &str, harm: Harm, setup: Setup) -> Option<Harmed> {
             if tracer.calls().contains(call) {
                 let pushes = |frame: shm_abi::Frame| frame.devices[0].force_on_user_n_applied != [0.0; 3];
                 let is_pushed = asking == Asking::Nothing && stand.view().read_latest().is_some_and(pushes);
+                if matches!(harm, Harm::Failure(_)) {
+                    // Nobody leaves the fault that the test brings about.
+                    asker.bounded_join().expect("it asked");
+                }
                 return Some(Harmed { stand, is_pushed, _tracer: tracer, _commander: commander });
             }
             std::thread::sleep(Duration::from_millis(1));
