@@ -111,7 +111,8 @@ pub enum AttachError {
     },
     /// Somebody commands already.
     #[error(
-        "the devices are commanded by process {pid} ({name}) already; end it first, or attach as an observer"
+        "the devices are commanded by process {pid} ({name}) already; end it, or its lease (`io-driver end-lease`), first; \
+         `io-driver status --watch` looks on"
     )]
     LeaseHeld {
         /// The holder's process id.

@@ -67,7 +67,8 @@ fn a_second_commander_is_refused_with_pid_and_name_of_the_first() {
     assert_eq!(
         refusal.to_string(),
         format!(
-            "the devices are commanded by process {} (first) already; end it first, or attach as an observer",
+            "the devices are commanded by process {} (first) already; end it, or its lease (`io-driver end-lease`), \
+             first; `io-driver status --watch` looks on",
             own_pid()
         )
     );

@@ -1,6 +1,7 @@
 //! Numbers of the command line: what is found where it is out of range, and what is allowed.
 
 use crate::rig::LONGEST_RUN_S;
+use rt_core::separators;
 
 pub(super) fn parse_seconds(text: &str) -> Result<f64, String> {
     parse_number(text, "seconds", f64::MIN_POSITIVE, LONGEST_RUN_S)
@@ -26,7 +27,7 @@ fn parse_number(text: &str, unit: &str, min: f64, max: f64) -> Result<f64, Strin
     };
     match text.parse::<f64>() {
         Ok(number) if (min..=max).contains(&number) => Ok(number),
-        _ => Err(format!("found {text}, allowed: {allowed}")),
+        _ => Err(format!("found {text}, allowed: {allowed}{}", separators::hint_for_cell(text))),
     }
 }
 
@@ -42,6 +43,8 @@ mod tests {
             parse_seconds("nan").unwrap_err(),
             "found nan, allowed: more than 0, at most 86400 seconds"
         );
+        let comma = parse_seconds("1,5").unwrap_err();
+        assert!(comma.ends_with("; a decimal number has a point, as in 0.1"), "{comma}");
         assert_eq!(parse_seconds("-1").unwrap_err(), "found -1, allowed: more than 0, at most 86400 seconds");
     }
 }

@@ -20,6 +20,7 @@
 //! In a script each line begins with when: `at 2.5 reset`. What follows a `#` is for people.
 
 use nalgebra::{Isometry3, Quaternion, Unit, UnitQuaternion, Vector3};
+use rt_core::separators;
 use std::path::PathBuf;
 use view::Note;
 use world::FrictionSpec;
@@ -161,6 +162,11 @@ fn scale(which: &str, by: &str, entity: Option<&str>) -> Result<Words, String> {
 
 /// As a scene says it, in words: `coulomb mu=0.3`.
 fn friction(model: &str, keys: &[&str]) -> Result<FrictionSpec, String> {
+    let is_pair =
+        |key: &str| key.split_once('=').is_some_and(|(key, value)| !key.is_empty() && !value.is_empty());
+    if let Some(found) = keys.iter().find(|key| !is_pair(key)) {
+        return Err(format!("found {found}, allowed: KEY=VALUE, such as mu=0.3"));
+    }
     let keys: String = keys.iter().map(|key| format!(", {key}")).collect();
     FrictionSpec::parse(&format!("{{ model = \"{model}\"{keys} }}")).map_err(|error| error.to_string())
 }
@@ -204,7 +210,10 @@ fn whole(text: &str) -> Result<u32, String> {
 fn number(text: &str, unit: &str, min: f64, max: f64) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if (min..=max).contains(&number) => Ok(number),
-        _ => Err(format!("found {text}, allowed: {min} to {max} {unit}").trim_end().into()),
+        _ => {
+            let hint = separators::hint_for_cell(text);
+            Err(format!("found {text}, allowed: {min} to {max} {unit}").trim_end().to_owned() + hint)
+        }
     }
 }
 
@@ -305,6 +314,10 @@ mod tests {
         assert!(said.contains("mu") && said.contains("-1"), "{said}");
         let said = parse("friction table glue").unwrap_err();
         assert!(said.contains("glue") && said.contains("coulomb"), "{said}");
+        let comma = parse("stiffness 1,5").unwrap_err();
+        assert_eq!(comma, "found 1,5, allowed: 0.1 to 10 times; a decimal number has a point, as in 0.1");
+        let said = parse("friction table coulomb 0.2").unwrap_err();
+        assert_eq!(said, "found 0.2, allowed: KEY=VALUE, such as mu=0.3");
         assert_eq!(parse("text 2 0 1 hello").unwrap_err(), "found 2, allowed: 0 to 1 of the window");
         assert!(split_time("reset").unwrap_err().contains("at SECONDS ORDER"));
         assert_eq!(split_time("at -1 reset").unwrap_err(), "found -1, allowed: 0 to 86400 s");

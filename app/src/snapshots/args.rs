@@ -1,6 +1,7 @@
 //! Which pictures of a run are wanted: the command line's words for them.
 
 use clap::{Args, ValueEnum};
+use rt_core::separators;
 use std::path::PathBuf;
 use view::Eyes;
 use world::{Settings, StereoMode};
@@ -105,7 +106,7 @@ fn parse_shot(text: &str) -> Result<Shot, String> {
     let wrong =
         || format!("found {text}, allowed: a time in s from 0 on, a colon and a file, as in 2.5:grasp.png");
     let (t_s, file) = text.split_once(':').ok_or_else(wrong)?;
-    let t_s: f64 = t_s.parse().map_err(|_| wrong())?;
+    let t_s: f64 = t_s.parse().map_err(|_| wrong() + separators::hint_for_cell(t_s))?;
     let file = PathBuf::from(file);
     let is_png = file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png"));
     if t_s.is_finite() && t_s >= 0.0 && is_png { Ok(Shot { t_s, file }) } else { Err(wrong()) }
@@ -136,6 +137,7 @@ mod tests {
         for wrong in ["a.png", "-1:a.png", "nan:a.png", "1:a.jpg", "1:", ":a.png"] {
             assert!(parse_shot(wrong).unwrap_err().contains(wrong), "{wrong}");
         }
+        assert!(parse_shot("1,5:a.png").unwrap_err().contains("a decimal number has a point"));
     }
 
     #[test]
