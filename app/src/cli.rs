@@ -100,7 +100,13 @@ pub fn main() -> ExitCode {
     let ended = execute();
     // The lease is over: nobody is held up but whoever waits for this program.
     say::flush(LAST_WORDS);
-    if outputs::is_lost() && ended == ExitCode::SUCCESS { ExitCode::from(EXIT_FAULT) } else { ended }
+    let lacks_something = outputs::is_lost() && ended == ExitCode::SUCCESS;
+    let code = if lacks_something { ExitCode::from(EXIT_FAULT) } else { ended };
+    if view::is_display_lost() {
+        // Graphics libraries wait for the window's thread, which waits for ever.
+        rt_core::process::exit_without_handlers(code);
+    }
+    code
 }
 
 fn execute() -> ExitCode {

@@ -6,7 +6,7 @@ use crate::record::{Beginning, Files, Recorded, Recorder};
 use crate::row::Row;
 use crate::row_queue::RowReceiver;
 use crate::snapshots::{Drawn, Snapshots};
-use crate::spectator::Spectator;
+use crate::spectator::{Lost, Spectator};
 use io_driver::say::say;
 use std::fmt::Write;
 use std::path::Path;
@@ -32,6 +32,8 @@ pub struct SlowSide {
     snapshots: Option<Snapshots>,
     /// Who looks on at a window, if anybody does.
     spectator: Option<Spectator>,
+    /// Who moved the fingers is gone.
+    has_lost_its_hand: bool,
     /// Who records when people ask for it, if they may.
     on_request: Option<OnRequest>,
     /// Who else wants to know what happens.
@@ -56,6 +58,7 @@ impl SlowSide {
             desk: None,
             snapshots: None,
             spectator: None,
+            has_lost_its_hand: false,
             on_request: None,
             events,
             newest: None,
@@ -101,12 +104,29 @@ impl SlowSide {
             self.take_rows();
         }
         self.end_what_failed();
+        self.leave_what_shows_nothing();
         let Some(spectator) = &mut self.spectator else { return };
         let recording = self.on_request.as_ref().and_then(OnRequest::path);
         spectator.step(recording, self.desk.as_mut());
         if let Some(wanted) = spectator.take_record() {
             let said = self.record(wanted);
             self.tell(said);
+        }
+    }
+
+    /// A display that is gone ends a run only if the hand was moved there.
+    fn leave_what_shows_nothing(&mut self) {
+        match self.spectator.as_ref().and_then(Spectator::is_lost) {
+            None => {}
+            Some(Lost::Sight) => {
+                say(format_args!("phantom3: the display is gone; the run goes on without a window"));
+                self.spectator = None;
+            }
+            Some(Lost::Hand) => {
+                say(format_args!("phantom3: the display is gone, and with it the hand; the run ends"));
+                self.spectator = None;
+                self.has_lost_its_hand = true;
+            }
         }
     }
 
@@ -164,7 +184,7 @@ impl SlowSide {
     /// is recorded.
     pub fn wants_end(&self) -> bool {
         let is_unread = !self.recorders.is_empty() && self.recorders.iter().all(Recorder::reader_has_gone);
-        is_unread || self.spectator.as_ref().is_some_and(Spectator::wants_end)
+        self.has_lost_its_hand || is_unread || self.spectator.as_ref().is_some_and(Spectator::wants_end)
     }
 
     fn take_rows(&mut self) {

@@ -34,6 +34,19 @@ pub trait Onlooker {
     fn asked(&mut self) -> Vec<Ask>;
     /// Whether anybody is there still.
     fn is_open(&self) -> bool;
+    /// What went with its display, if that is gone, which nobody closed.
+    fn is_lost(&self) -> Option<Lost> {
+        None
+    }
+}
+
+/// A display that is gone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lost {
+    /// And nothing else.
+    Sight,
+    /// With it whoever moves the fingers.
+    Hand,
 }
 
 impl Onlooker for OpenWindow {
@@ -47,6 +60,10 @@ impl Onlooker for OpenWindow {
 
     fn is_open(&self) -> bool {
         OpenWindow::is_open(self)
+    }
+
+    fn is_lost(&self) -> Option<Lost> {
+        view::is_display_lost().then(|| if self.has_reins() { Lost::Hand } else { Lost::Sight })
     }
 }
 
@@ -134,6 +151,11 @@ impl Spectator {
         self.newest = None;
         self.samples.clear();
         self.untold.push_back(News::Scene(Box::new(stage)));
+    }
+
+    /// What went with its display, if that is gone.
+    pub fn is_lost(&self) -> Option<Lost> {
+        self.window.is_lost()
     }
 
     /// The slow side's turn.

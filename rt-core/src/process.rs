@@ -14,6 +14,8 @@ use nix::errno::Errno;
 use nix::sys::prctl::{get_pdeathsig, set_pdeathsig};
 use nix::sys::signal::Signal;
 use nix::unistd::getppid;
+use std::io::Write;
+use std::process::ExitCode;
 use thiserror::Error;
 
 /// Why the child is not tied to its parent.
@@ -61,6 +63,14 @@ pub fn die_with_parent(expected_parent_pid: u32, signal: i32) -> Result<(), DieW
     }
     set_pdeathsig(former).map_err(refused)?;
     Err(DieWithParentError::ParentGone { expected: expected_parent_pid, found })
+}
+
+/// Ends the process at once, without the handlers that libraries have left for its end: one of them may wait for what
+/// never comes.
+pub fn exit_without_handlers(code: ExitCode) -> ! {
+    let _ = std::io::stdout().flush();
+    let number = (0..=u8::MAX).find(|number| ExitCode::from(*number) == code);
+    signal_hook::low_level::exit(number.unwrap_or(u8::MAX).into())
 }
 
 #[cfg(test)]

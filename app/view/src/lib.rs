@@ -45,4 +45,4 @@ pub use picture::{Picture, Studio};
 pub use stage::{Known, Stage, Thing};
 pub use text::Note;
 pub use triangles::Triangles;
-pub use window::{NoWindow, OpenWindow, WindowSpec};
+pub use window::{NoWindow, OpenWindow, WindowSpec, is_display_lost};

@@ -7,6 +7,8 @@
 //! One process has one window at most, once.
 
 mod controls;
+#[allow(unsafe_code, reason = "a handler of errors for a library that is loaded at run time")]
+mod display_loss;
 mod key_listener;
 mod looker;
 mod scene;
@@ -25,6 +27,8 @@ use std::time::Duration;
 
 /// So much news may wait; what is told while nobody looks is left out.
 const WAITING: usize = 64;
+/// Between two looks whether it has closed.
+const CLOSING: Duration = Duration::from_millis(1);
 /// Desktops that answer at all answer within this time.
 const OPENING: Duration = Duration::from_secs(20);
 
@@ -69,11 +73,17 @@ pub struct OpenWindow {
     context: egui::Context,
     thread: Option<JoinHandle<()>>,
     left_out: u64,
+    has_reins: bool,
 }
 
 /// Whether there is anybody to show a window to.
 pub fn has_display() -> bool {
     ["WAYLAND_DISPLAY", "DISPLAY"].iter().any(|name| std::env::var_os(name).is_some_and(|at| !at.is_empty()))
+}
+
+/// Whether the display of the window that was opened is gone: its thread stands still for ever then.
+pub fn is_display_lost() -> bool {
+    display_loss::is_lost()
 }
 
 impl OpenWindow {
@@ -88,7 +98,9 @@ impl OpenWindow {
         let (news, told) = sync_channel(WAITING);
         let (ask, asks) = channel();
         let (ready, is_ready) = channel();
+        let has_reins = reins.is_some();
         let refused = |error: String| NoWindow::Refused(error);
+        display_loss::outlive_the_server();
         let thread = std::thread::Builder::new()
             .name("window".into())
             .spawn(move || show(spec, stage, (told, ask, reins), &ready))
@@ -97,7 +109,7 @@ impl OpenWindow {
             .recv_timeout(OPENING)
             .map_err(|_| refused("the desktop does not answer".into()))?
             .map_err(refused)?;
-        Ok(Self { news, asks, context, thread: Some(thread), left_out: 0 })
+        Ok(Self { news, asks, context, thread: Some(thread), left_out: 0, has_reins })
     }
 
     /// Tells it something, if it has time to listen; answers what it had no time for.
@@ -112,6 +124,11 @@ impl OpenWindow {
         self.asks.try_iter()
     }
 
+    /// Whether its hands are the run's.
+    pub fn has_reins(&self) -> bool {
+        self.has_reins
+    }
+
     /// Whether it is there still.
     pub fn is_open(&self) -> bool {
         self.thread.as_ref().is_some_and(|thread| !thread.is_finished())
@@ -123,7 +140,12 @@ impl Drop for OpenWindow {
         let _ = self.news.try_send(News::Over);
         self.context.send_viewport_cmd(egui::ViewportCommand::Close);
         self.context.request_repaint();
-        if let Some(thread) = self.thread.take() {
+        let Some(thread) = self.thread.take() else { return };
+        // One that waits for a display that is gone does not end.
+        while !thread.is_finished() && !is_display_lost() {
+            std::thread::sleep(CLOSING);
+        }
+        if thread.is_finished() {
             let _ = thread.join();
         }
     }

@@ -114,6 +114,41 @@ fn a_signal_ends_a_run_with_a_window() {
     assert_eq!(running.wait().status, Some(130));
 }
 
+/// As at the end of a session, or of a forwarded connection.
+#[test]
+fn a_display_that_goes_away_ends_neither_a_run_nor_its_recording() {
+    let Some(screen) = Screen::open() else { return };
+    let place = Workplace::new();
+    let running = start(&place, screen.display(), &["--seconds", "12", "--record", "run.csv"]);
+    if !shows_the_ball(&screen, &running) {
+        return;
+    }
+    drop(screen);
+    let said = running.wait();
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    assert!(said.err.contains("the display is gone; the run goes on without a window"), "{}", said.err);
+    let recorded = std::fs::read_to_string(place.path("run.csv")).expect("a recording");
+    let last = recorded.lines().last().and_then(|row| row.split(',').next()?.parse().ok());
+    assert_eq!(last, Some(11.999), "the time of the last row");
+}
+
+#[test]
+fn a_display_that_goes_away_ends_a_play_in_order() {
+    let Some(screen) = Screen::open() else { return };
+    let place = Workplace::new();
+    let mut play = place.phantom3();
+    play.args(["play", "--seconds", "1000", "--record", "play.csv"]);
+    play.env("DISPLAY", screen.display()).env("LIBGL_ALWAYS_SOFTWARE", "1");
+    let running = Running::start(play);
+    let is_open = || place.path("play.csv").metadata().is_ok_and(|file| file.len() > 100_000);
+    patience::until("a window, and rows", is_open);
+    drop(screen);
+    let said = running.wait();
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    assert!(said.err.contains("the display is gone, and with it the hand; the run ends"), "{}", said.err);
+    assert!(said.out.contains("recording"), "{}", said.out);
+}
+
 /// Behind the ball, many more that take long to draw without a graphics card.
 const SLOW: &str = "\
 [[entity]]
