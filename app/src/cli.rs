@@ -18,6 +18,7 @@ use crate::check::{self, CheckArgs};
 use crate::convert::{self, ConvertArgs};
 use crate::demo;
 use crate::export::{self, ExportArgs};
+use crate::interrupted;
 use crate::outcome::{RunFailure, Stop};
 use crate::outputs;
 use crate::picture::{self, PlotArgs};
@@ -134,19 +135,13 @@ fn execute() -> ExitCode {
         Some(AppCommand::Check(args)) => settings
             .load()
             .map_or_else(|failure| failed(&failure), |settings| check::execute(&args, &settings)),
-        Some(AppCommand::Convert(args)) => {
-            convert::execute(&args).map_or_else(|failure| failed(&failure), Stop::conclude)
-        }
+        Some(AppCommand::Convert(args)) => conclude_or_take_back(|| convert::execute(&args)),
         Some(AppCommand::Replay(args)) => {
             let result = install_signals().and_then(|signals| replay::execute(&args, &signals));
             result.unwrap_or_else(|failure| failed(&failure))
         }
-        Some(AppCommand::Export(args)) => {
-            export::execute(&args).map_or_else(|failure| failed(&failure), Stop::conclude)
-        }
-        Some(AppCommand::Plot(args)) => {
-            picture::execute(&args).map_or_else(|failure| failed(&failure), Stop::conclude)
-        }
+        Some(AppCommand::Export(args)) => conclude_or_take_back(|| export::execute(&args)),
+        Some(AppCommand::Plot(args)) => conclude_or_take_back(|| picture::execute(&args)),
         Some(AppCommand::Study(command)) => {
             let result = install_signals().and_then(|signals| study::execute(&command, &signals));
             result.map_or_else(|failure| failed(&failure), Stop::conclude)
@@ -207,9 +202,9 @@ fn play(args: &PlayArgs, settings: &Settings, is_headless: bool) -> Result<(Repo
 fn run_demo(settings: &Settings, is_headless: bool) -> Result<(Report, Stop), RunFailure> {
     let signals = install_signals()?;
     let mut demo = demo::unpack(period_of(DEFAULT_RATE_HZ))?;
-    let directory = settings.recording_directory.value.as_deref();
+    let record = demo::recording_place(settings.recording_directory.value.as_deref())?;
     let socket = settings.driver_socket.value.clone().unwrap_or_else(endpoint::for_application);
-    let mut plan = demo::plan(&demo.rig, socket, directory);
+    let mut plan = demo::plan(&demo.rig, socket, record);
     plan.window = if is_headless { None } else { window_spec(&demo.rig.scene.name, settings)? };
     if plan.attach.is_some() {
         demo.rig.layout = calibrated_layout()?;
@@ -245,6 +240,12 @@ fn window_spec(title: &str, settings: &Settings) -> Result<Option<WindowSpec>, R
         pictures: settings.recording_directory.value.clone().unwrap_or_default(),
         carries_devices: false,
     }))
+}
+
+/// Of a command that a signal ends at once, without half a result.
+fn conclude_or_take_back(execute: impl FnOnce() -> Result<Stop, RunFailure>) -> ExitCode {
+    let result = install_signals().and_then(interrupted::watch).and_then(|()| execute());
+    result.map_or_else(|failure| failed(&failure), Stop::conclude)
 }
 
 fn install_signals() -> Result<StopSignals, RunFailure> {

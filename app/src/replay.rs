@@ -276,7 +276,7 @@ impl Play {
         stage: &Stage,
         ended: Result<Stop, RunFailure>,
     ) -> Result<ExitCode, RunFailure> {
-        let Self { feed, difference, recorders, mut events, period_ns, missing, rows_read, .. } = self;
+        let Self { feed, mut difference, recorders, mut events, period_ns, missing, rows_read, .. } = self;
         events.deliver(u64::MAX);
         let recordings: Vec<_> = recorders.into_iter().map(Recorder::finish).collect();
         let mut feed = lock(&feed);
@@ -284,6 +284,9 @@ impl Play {
         let until_s = run_time_s(self.fast.run_ticks().saturating_sub(1).cast_signed(), period_ns);
         tell_end(&args.recording, failure, feed.recorded.cut(), rows_read, until_s)?;
         let stop = ended?;
+        if let Stop::Signal(_) = stop {
+            difference.end_before(feed.count_with(rows_read));
+        }
         let takes_output = recordings.iter().any(|recorded| is_standard_output(&recorded.path));
         let program = feed.recorded.about().and_then(|about| about.facts.get("program"));
         let tell = |words: &dyn Display| outputs::tell(words, takes_output);

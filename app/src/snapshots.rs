@@ -1,21 +1,25 @@
 //! Pictures of a run while it goes on: single ones, and one after the other for a film.
 //!
 //! Model: whoever takes the rows on the slow side looks at each ([`Snapshots::look`]); when a picture is due, the moment goes
-//! to a thread of its own, which draws without a display and writes PNG. On a clock that waits it is waited for; in real
-//! time pictures of a film that are due while the thread is busy are left out, and counted. A machine that cannot draw
-//! says so once, and the run goes on; a picture that cannot be written, as into a pipe that nobody reads, is waited for
-//! as long as rows of a recording are.
+//! to a thread of its own, which draws without a display and writes PNG. On a clock that waits it is waited for, as rows of
+//! a recording are: the first wait in vain is the last, pictures behind it are missing, and that is a fault. In real time
+//! nobody waits for drawing: pictures of a film that are due while the thread is busy are left out, and counted; single
+//! pictures, as many as were asked for at most, are kept until there is room. A machine that cannot draw says so once, and
+//! the run goes on.
 
 mod args;
 
 pub use args::{Film, PictureArgs, Shot, Wanted};
 
 use crate::displaced::Placed;
+use crate::fast_loop::WhenFull;
 use crate::moments::Moments;
+use crate::record::Backpressure;
 use crate::record::backpressure::{Progress, STUCK, Wait};
 use crate::row::{BodyRow, Row};
 use crate::shown::Shown;
 use io_driver::say::say;
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -39,9 +43,16 @@ pub struct Snapshots {
     due: u64,
     left_out: u64,
     waits: bool,
+    patience: Duration,
     period_s: f64,
     moments: Moments,
     out: Option<SyncSender<Work>>,
+    /// In real time, what found no room: single pictures, and between two of them no more than one scene.
+    pending: VecDeque<Work>,
+    /// Pictures that were due and not left out.
+    asked: u64,
+    /// Why nothing is tried any more, which has been told.
+    given_up: Option<String>,
     progress: Arc<Progress>,
     written: Arc<AtomicU64>,
     thread: Option<JoinHandle<Drawn>>,
@@ -66,6 +77,8 @@ pub struct Drawn {
     pub left_out: u64,
     /// Single pictures whose time did not come.
     pub not_reached: usize,
+    /// Pictures that a fault cost.
+    pub missing: u64,
     /// What went wrong, which has been told.
     pub failure: Option<String>,
     /// Whether that is a file that could not be written, rather than a machine that cannot draw.
@@ -83,6 +96,9 @@ impl std::fmt::Display for Drawn {
         }
         if self.not_reached > 0 {
             write!(f, ", {} NOT TAKEN: the run ended before", self.not_reached)?;
+        }
+        if self.missing > 0 {
+            write!(f, ", {} MISSING", self.missing)?;
         }
         if self.failure.is_some() {
             write!(f, " NOT COMPLETE: see the message above")?;
@@ -108,13 +124,29 @@ impl Snapshots {
                 .map_err(|error| format!("--frames {}: {error}", film.directory.display()))?;
         }
         let look = wanted.clone();
+        let draw = move |work: Receiver<Work>, steps: &Progress, written: &AtomicU64| {
+            draw_all(stage, &look, &work, steps, written)
+        };
+        let backpressure =
+            Backpressure { when_full: if waits { WhenFull::Wait } else { WhenFull::Drop }, patience: STUCK };
+        Self::drawn_by(draw, wanted, moments, period_ns, backpressure)
+    }
+
+    /// The same with somebody else who draws.
+    fn drawn_by(
+        draw: impl FnOnce(Receiver<Work>, &Progress, &AtomicU64) -> Drawn + Send + 'static,
+        wanted: &Wanted,
+        moments: Moments,
+        period_ns: u64,
+        Backpressure { when_full, patience }: Backpressure,
+    ) -> Result<Self, String> {
         let (out, to_draw) = sync_channel(WAITING);
         let progress = Arc::new(Progress::default());
         let written = Arc::new(AtomicU64::new(0));
         let told = (Arc::clone(&progress), Arc::clone(&written));
         let thread = std::thread::Builder::new()
             .name("pictures".into())
-            .spawn(move || draw_all(stage, &look, &to_draw, &told.0, &told.1))
+            .spawn(move || draw(to_draw, &told.0, &told.1))
             .map_err(|error| format!("no thread for pictures: {error}"))?;
         let mut shots = wanted.shots.clone();
         shots.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
@@ -123,10 +155,14 @@ impl Snapshots {
             film: wanted.film.clone(),
             due: 0,
             left_out: 0,
-            waits,
+            waits: when_full == WhenFull::Wait,
+            patience,
             period_s: period_ns as f64 / 1e9,
             moments,
             out: Some(out),
+            pending: VecDeque::new(),
+            asked: 0,
+            given_up: None,
             progress,
             written,
             thread: Some(thread),
@@ -135,12 +171,14 @@ impl Snapshots {
 
     /// A tick, as it began.
     pub fn look(&mut self, row: &Row, bodies: &[BodyRow], placed: &[Placed]) {
+        self.give_pending();
         // The tick that is nearest to the time.
         let now_s = (row.run_tick as f64 + 0.5) * self.period_s;
         while self.shots.first().is_some_and(|shot| shot.t_s < now_s) {
             let shot = self.shots.remove(0);
             let moment = self.moments.moment(row, bodies, placed);
-            self.send((moment, shot.file), true);
+            self.asked += 1;
+            self.keep(Work::Picture(Box::new(moment), shot.file));
         }
         if let Some(Film { directory, fps }) = &self.film
             && self.due as f64 / fps < now_s
@@ -148,62 +186,105 @@ impl Snapshots {
             let file = directory.join(format!("frame-{:06}.png", self.due));
             self.due += 1;
             let moment = self.moments.moment(row, bodies, placed);
-            self.send((moment, file), self.waits);
+            self.give_to_film(Work::Picture(Box::new(moment), file));
         }
     }
 
     /// Another scene goes on: pictures are of that from now on, and of its first camera where it has none of that name.
     pub fn go_on(&mut self, Shown { stage, moments }: Shown) {
         self.moments = moments;
-        if !self.give(Work::Scene(Box::new(stage)), true) {
-            // Pictures of the scene before would be none of this one.
-            self.out = None;
+        if let Some(Work::Scene(_)) = self.pending.back() {
+            self.pending.pop_back();
+        }
+        self.keep(Work::Scene(Box::new(stage)));
+    }
+
+    /// Gives what must not be left out: at once on a clock that waits, else when there is room.
+    fn keep(&mut self, work: Work) {
+        if self.waits {
+            self.give(work);
+        } else {
+            self.pending.push_back(work);
+            self.give_pending();
         }
     }
 
-    fn send(&mut self, (moment, file): (Moment, PathBuf), waits: bool) {
-        if !self.give(Work::Picture(Box::new(moment), file), waits) {
-            self.left_out += 1;
+    /// Gives a picture of a film.
+    fn give_to_film(&mut self, work: Work) {
+        if self.waits {
+            self.asked += 1;
+            return self.give(work);
+        }
+        // None overtakes a scene that waits.
+        let has_room = self.pending.is_empty()
+            && self.out.as_ref().is_some_and(|out| !matches!(out.try_send(work), Err(TrySendError::Full(_))));
+        let count = if has_room { &mut self.asked } else { &mut self.left_out };
+        *count += 1;
+    }
+
+    /// Gives what waits, as far as there is room.
+    fn give_pending(&mut self) {
+        while let (Some(out), Some(work)) = (&self.out, self.pending.pop_front()) {
+            if let Err(TrySendError::Full(work)) = out.try_send(work) {
+                return self.pending.push_front(work);
+            }
         }
     }
 
-    /// Gives work to the thread, which fails where there is no room; `waits`: for as long as the thread gets on.
-    fn give(&self, mut work: Work, waits: bool) -> bool {
-        let Some(out) = &self.out else { return false };
+    /// Gives work to the thread, for whose room is waited as long as it gets on.
+    fn give(&mut self, mut work: Work) {
         let mut wait = Wait::begin(&self.progress);
-        loop {
+        while let Some(out) = &self.out {
             match out.try_send(work) {
-                Err(TrySendError::Full(_)) if !waits || wait.is_in_vain(&self.progress, STUCK) => {
-                    return false;
-                }
                 Err(TrySendError::Full(back)) => work = back,
                 // A thread that has ended has said why.
-                Ok(()) | Err(TrySendError::Disconnected(_)) => return true,
+                Ok(()) | Err(TrySendError::Disconnected(_)) => return,
+            }
+            if wait.is_in_vain(&self.progress, self.patience) {
+                self.give_up();
             }
             std::thread::sleep(TURN);
         }
+    }
+
+    /// Nothing is tried any more.
+    fn give_up(&mut self) {
+        self.out = None;
+        let stuck = format!("no picture was written for {} s", self.patience.as_secs());
+        say(format_args!("phantom3: {stuck}; those that are missing are left out"));
+        self.given_up = Some(stuck);
     }
 
     /// Waits for the last picture, and says what became of all.
     pub fn finish(mut self) -> Drawn {
+        while let Some(work) = self.pending.pop_front() {
+            self.give(work);
+        }
         drop(self.out.take());
         let drawn = self.thread.take().map_or_else(Drawn::default, |thread| self.wait_for(thread));
-        Drawn { left_out: self.left_out, not_reached: self.shots.len(), ..drawn }
+        let is_fault = drawn.is_fault || self.given_up.is_some();
+        let missing = if is_fault { self.asked.saturating_sub(drawn.written) } else { 0 };
+        let failure = self.given_up.or(drawn.failure);
+        Drawn { left_out: self.left_out, not_reached: self.shots.len(), missing, failure, is_fault, ..drawn }
     }
 
-    fn wait_for(&self, thread: JoinHandle<Drawn>) -> Drawn {
+    fn wait_for(&mut self, thread: JoinHandle<Drawn>) -> Drawn {
         let mut wait = Wait::begin(&self.progress);
         while !thread.is_finished() {
-            if wait.is_in_vain(&self.progress, STUCK) {
-                let stuck = format!("no picture was written for {} s", STUCK.as_secs());
-                say(format_args!("phantom3: {stuck}; those that are missing are left out"));
-                let written = self.written.load(Ordering::Relaxed);
-                return Drawn { written, failure: Some(stuck), is_fault: true, ..Drawn::default() };
+            if wait.is_in_vain(&self.progress, self.patience) {
+                if self.given_up.is_none() {
+                    self.give_up();
+                }
+                return Drawn { written: self.written.load(Ordering::Relaxed), ..Drawn::default() };
             }
             std::thread::sleep(TURN);
         }
-        let lost = || Drawn { failure: Some("the drawing ended by itself".into()), ..Drawn::default() };
-        thread.join().unwrap_or_else(|_| lost())
+        thread.join().unwrap_or_else(|_| {
+            let failure = "the drawing ended by itself".to_owned();
+            say(format_args!("phantom3: {failure}; pictures behind it are missing"));
+            let written = self.written.load(Ordering::Relaxed);
+            Drawn { written, failure: Some(failure), is_fault: true, ..Drawn::default() }
+        })
     }
 }
 
@@ -289,5 +370,107 @@ impl Drawn {
             say(format_args!("phantom3: the picture {} cannot be written: {error}", file.display()));
         }
         (self.failure, self.is_fault) = (Some(error.to_string()), true);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::mpsc::{Sender, channel};
+
+    /// Draws nothing, and saves a picture whenever it is told to.
+    fn idle(turns: Receiver<()>) -> impl FnOnce(Receiver<Work>, &Progress, &AtomicU64) -> Drawn + Send {
+        move |work, steps, written| {
+            let mut drawn = Drawn::default();
+            while turns.recv().is_ok()
+                && let Ok(work) = work.recv()
+            {
+                drawn.written += u64::from(matches!(work, Work::Picture(..)));
+                written.store(drawn.written, Ordering::Relaxed);
+                steps.take();
+            }
+            drawn
+        }
+    }
+
+    fn wanted(shots: usize, film: bool) -> Wanted {
+        let shot = |index| Shot { t_s: index as f64 * 1e-3, file: format!("{index}.png").into() };
+        let film = film.then(|| Film { directory: "film".into(), fps: 1000.0 });
+        let shots = (0..shots).map(shot).collect();
+        Wanted { shots, film, size: [16, 16], camera: None, eyes: Eyes::default() }
+    }
+
+    fn start(wanted: &Wanted, when_full: WhenFull, patience_ms: u64) -> (Snapshots, Sender<()>) {
+        let (turn, turns) = channel();
+        let how = Backpressure { when_full, patience: Duration::from_millis(patience_ms) };
+        let moments = Moments::new(1, Vec::new(), Vec::new(), 1_000_000);
+        (Snapshots::drawn_by(idle(turns), wanted, moments, 1_000_000, how).expect("a thread"), turn)
+    }
+
+    fn look(snapshots: &mut Snapshots, ticks: std::ops::Range<u64>) {
+        ticks.for_each(|run_tick| snapshots.look(&Row { run_tick, ..Row::empty() }, &[], &[]));
+    }
+
+    #[test]
+    fn behind_a_wait_in_vain_no_picture_is_tried_also_if_the_reader_comes_back() {
+        let (mut snapshots, turn) = start(&wanted(0, true), WhenFull::Wait, 300);
+        let room = WAITING as u64;
+        look(&mut snapshots, 0..room + 3);
+        for _ in 0..room {
+            turn.send(()).expect("a thread");
+        }
+        let progress = Arc::clone(&snapshots.progress);
+        patience::until("an empty queue", || progress.taken() == room);
+        look(&mut snapshots, room + 3..room + 10);
+        drop(turn);
+        let drawn = snapshots.finish();
+        assert_eq!((drawn.written, drawn.missing, drawn.left_out), (room, 10, 0), "{drawn:?}");
+        assert!(drawn.is_fault && drawn.failure.is_some(), "{drawn:?}");
+        assert_eq!(drawn.to_string(), "4, 10 MISSING NOT COMPLETE: see the message above");
+    }
+
+    #[test]
+    fn in_real_time_nobody_waits_for_drawing_and_single_pictures_come_when_there_is_room() {
+        let (mut snapshots, turn) = start(&wanted(50, true), WhenFull::Drop, 60_000);
+        let begun = std::time::Instant::now();
+        look(&mut snapshots, 0..60);
+        // A wait for the thread, which does nothing, would be a minute long.
+        assert!(begun.elapsed() < Duration::from_secs(30), "{:?}", begun.elapsed());
+        assert_eq!(snapshots.pending.len(), 50 - WAITING + 2, "two pictures of the film found room at first");
+        for _ in 0..200 {
+            turn.send(()).expect("a thread");
+        }
+        let drawn = snapshots.finish();
+        assert_eq!((drawn.written, drawn.left_out, drawn.missing), (52, 58, 0), "{drawn:?}");
+        assert!(!drawn.is_fault, "{drawn:?}");
+    }
+
+    #[test]
+    fn a_single_picture_that_is_never_written_is_a_fault_at_the_end() {
+        let (mut snapshots, turn) = start(&wanted(20, false), WhenFull::Drop, 300);
+        look(&mut snapshots, 0..30);
+        let drawn = snapshots.finish();
+        drop(turn);
+        assert_eq!((drawn.written, drawn.missing, drawn.not_reached), (0, 20, 0), "{drawn:?}");
+        assert!(drawn.is_fault && drawn.failure.is_some(), "{drawn:?}");
+    }
+
+    #[test]
+    fn a_drawing_thread_that_panics_is_a_fault_with_the_pictures_that_were_written() {
+        let how = Backpressure { when_full: WhenFull::Wait, patience: STUCK };
+        let draw = |work: Receiver<Work>, steps: &Progress, written: &AtomicU64| {
+            for _ in work.iter().take(3) {
+                written.fetch_add(1, Ordering::Relaxed);
+                steps.take();
+            }
+            panic!("the graphics library is gone");
+        };
+        let moments = Moments::new(1, Vec::new(), Vec::new(), 1_000_000);
+        let snapshots = Snapshots::drawn_by(draw, &wanted(0, true), moments, 1_000_000, how);
+        let mut snapshots = snapshots.expect("a thread");
+        look(&mut snapshots, 0..50);
+        let drawn = snapshots.finish();
+        assert_eq!((drawn.written, drawn.missing), (3, 47), "{drawn:?}");
+        assert!(drawn.is_fault && drawn.failure.is_some(), "{drawn:?}");
     }
 }

@@ -2,12 +2,13 @@
 //!
 //! Problem: opening a FIFO for writing waits for a reader, for ever if nobody reads it.
 //! Model: opening never waits (`O_NONBLOCK`, which regular files ignore): a pipe that nobody reads is refused, with what
-//! to do. Writing does wait, as everybody expects of a pipe.
+//! to do. Writing does wait, as everybody expects of a pipe. Who fills a regular file for long claims it ([`claim`]), so
+//! that two processes do not write over one another.
 
 use nix::errno::Errno;
 use nix::fcntl::{FcntlArg, OFlag, fcntl};
-use std::fs::{File, OpenOptions};
-use std::io::{self, Write};
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io;
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 
@@ -17,14 +18,6 @@ use std::path::Path;
 /// What the system says; a pipe without a reader.
 pub fn create(path: &Path) -> io::Result<File> {
     open(path, OpenOptions::new().write(true).create(true).truncate(true))
-}
-
-/// Makes the file, or empties it, with this content.
-///
-/// # Errors
-/// As [`create`], and whatever keeps the content from being written.
-pub fn write(path: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
-    create(path)?.write_all(content.as_ref())
 }
 
 /// Opens the file with these options, among which is writing.
@@ -37,6 +30,28 @@ pub fn open(path: &Path, options: &OpenOptions) -> io::Result<File> {
     let flags = OFlag::from_bits_retain(fcntl(&file, FcntlArg::F_GETFL)?);
     fcntl(&file, FcntlArg::F_SETFL(flags - OFlag::O_NONBLOCK))?;
     Ok(file)
+}
+
+/// Claims a regular file for whoever has it open, until they close it: flock(2), which ends with the process, too. Pipes
+/// and devices are left alone, and so are files of file systems without such locks.
+///
+/// # Errors
+/// Another process has claimed it ([`is_claimed`]).
+pub fn claim(file: &File) -> io::Result<()> {
+    if !file.metadata()?.is_file() {
+        return Ok(());
+    }
+    match file.try_lock() {
+        Err(TryLockError::WouldBlock) => {
+            Err(io::Error::new(io::ErrorKind::ResourceBusy, "another process writes it"))
+        }
+        Ok(()) | Err(TryLockError::Error(_)) => Ok(()),
+    }
+}
+
+/// Whether this is the error of a file that another process has claimed.
+pub fn is_claimed(error: &io::Error) -> bool {
+    error.kind() == io::ErrorKind::ResourceBusy && error.raw_os_error().is_none()
 }
 
 fn in_words(error: io::Error) -> io::Error {
@@ -54,7 +69,7 @@ mod tests {
     fn a_pipe_without_a_reader_is_refused_at_once_and_one_with_a_reader_blocks_when_it_is_full() {
         let pipe = std::env::temp_dir().join(format!("output-file-{}", std::process::id()));
         nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).expect("a pipe in TMPDIR");
-        let refused = write(&pipe, "").map_err(|error| error.to_string());
+        let refused = create(&pipe).map(drop).map_err(|error| error.to_string());
         let flags = OFlag::O_NONBLOCK.bits();
         let reader = OpenOptions::new().read(true).custom_flags(flags).open(&pipe);
         let file = create(&pipe);
@@ -66,11 +81,17 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_there_is_replaced() {
-        let path = std::env::temp_dir().join(format!("output-file-replaced-{}", std::process::id()));
-        write(&path, "a longer text").and_then(|()| write(&path, "short")).expect("a file in TMPDIR");
-        let content = std::fs::read(&path).expect("our own");
+    fn a_file_is_claimed_once_until_it_is_closed_and_a_device_by_everybody() {
+        let path = std::env::temp_dir().join(format!("output-file-claimed-{}", std::process::id()));
+        let [first, second] = [(); 2].map(|()| create(&path).expect("a file in TMPDIR"));
+        let claimed = (claim(&first), claim(&second));
+        drop(first);
+        let again = claim(&second);
         std::fs::remove_file(&path).expect("our own");
-        assert_eq!(content, b"short");
+        assert!(claimed.0.is_ok() && again.is_ok());
+        let refused = claimed.1.expect_err("claimed by the first");
+        assert!(is_claimed(&refused) && refused.to_string() == "another process writes it", "{refused}");
+        let [first, second] = [(); 2].map(|()| create(Path::new("/dev/null")).expect("a device"));
+        assert!(claim(&first).is_ok() && claim(&second).is_ok());
     }
 }

@@ -224,6 +224,21 @@ fn two_results_are_compared_and_garbage_is_refused() {
 }
 
 #[test]
+fn a_table_that_cannot_be_written_is_named_and_the_results_are_there() {
+    let place = Workplace::new();
+    std::fs::create_dir(place.path("out")).expect("a directory");
+    // As on a disk that has no room for the table.
+    std::os::unix::fs::symlink("/dev/full", place.path("out/timeline.csv.part")).expect("a link");
+    let arguments = ["--styles", "hybrid", "--runs", "1", "--slice", "0.3", "--out", "out"];
+    let said = Running::start(modest(&place, &arguments)).wait();
+    assert_eq!(said.status, Some(3), "{}", said.err);
+    assert!(said.err.contains("cannot write out/timeline.csv: No space left"), "{}", said.err);
+    assert!(said.err.contains("out/result.json is there with all results"), "{}", said.err);
+    assert!(!said.err.contains("lost"), "{}", said.err);
+    assert!(!result(&place).series.is_empty());
+}
+
+#[test]
 fn what_makes_no_sense_is_refused_before_anything_starts() {
     let place = Workplace::new();
     let gate = place.write("gate.toml", "[ratio_at_most]\np50 = 0.01\n");

@@ -61,6 +61,8 @@ pub(super) struct Difference {
     period_ns: u64,
     /// Names that are in one of both only.
     unmatched: Vec<String>,
+    /// How many rows there are, in words, if not all were to be compared.
+    of_rows: Option<String>,
 }
 
 impl Difference {
@@ -94,7 +96,13 @@ impl Difference {
             ticks: 0,
             period_ns,
             unmatched: lone.chain(rests).chain(objects).collect(),
+            of_rows: None,
         }
+    }
+
+    /// It ended before its time: so many rows there were to compare, in words.
+    pub(super) fn end_before(&mut self, of_rows: String) {
+        self.of_rows = Some(of_rows);
     }
 
     /// Compares a tick. `scene_fingers` has the fingers of the scene that are in both, in their order.
@@ -224,14 +232,22 @@ impl fmt::Display for Difference {
         for line in &self.unmatched {
             writeln!(f, "{line}")?;
         }
-        if self.is_none() {
-            write!(f, "identical: every number is the same to the bit")
-        } else {
-            write!(
-                f,
-                "different: root mean squares and maxima above; of words, the ticks in which they differ"
-            )
+        if self.ticks == 0 {
+            return write!(f, "nothing was compared");
         }
+        write!(f, "{}", if self.is_none() { "identical" } else { "different" })?;
+        if let Some(of_rows) = &self.of_rows {
+            write!(f, " so far ({} of {of_rows} rows)", self.ticks)?;
+        }
+        write!(
+            f,
+            ": {}",
+            if self.is_none() {
+                "every number is the same to the bit"
+            } else {
+                "root mean squares and maxima above; of words, the ticks in which they differ"
+            }
+        )
     }
 }
 
@@ -265,6 +281,21 @@ mod tests {
         // The squares of 0, an epsilon, 3 and 4 over four ticks.
         assert_eq!((finger.force.rms(4), finger.force.most), (2.5, 4.0));
         assert_eq!((finger.friction, finger.entity, finger.first), (1, 0, Some(1)));
+    }
+
+    #[test]
+    fn nothing_is_called_identical_that_was_not_compared() {
+        let names = Names { fingers: vec!["f0".into()], ..Names::default() };
+        let mut difference = Difference::new(&[Some(0)], &names, &names, 1_000_000);
+        let end = |difference: &Difference| difference.to_string().lines().last().map(str::to_owned);
+        assert_eq!(end(&difference).as_deref(), Some("nothing was compared"));
+        let row = Row { run_tick: 0, ..Row::empty() };
+        difference.add((&row, &[], &names), (&row, &[], &names), &[Some(0)]);
+        let whole = "identical: every number is the same to the bit";
+        assert_eq!(end(&difference).as_deref(), Some(whole));
+        difference.end_before("more than 70".into());
+        let part = "identical so far (1 of more than 70 rows): every number is the same to the bit";
+        assert_eq!(end(&difference).as_deref(), Some(part));
     }
 
     #[test]

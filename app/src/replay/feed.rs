@@ -5,6 +5,7 @@
 //! it rests where the first row has it. A table has no velocities: they are the differences of positions then, as an
 //! ideal device has them. Whatever force is asked for is rendered.
 //! Rows that were missing when it was recorded are missed again ([`Feed::is_missing`]): time goes on without an answer.
+//! Damage is the end: what is whole before it is played, to its last row.
 
 use crate::record::read::{ReadError, RecordedRun};
 use crate::row::{BodyRow, FingerRow, Row};
@@ -16,6 +17,10 @@ use shm_abi::FaultReason;
 use shm_abi::segment::DeviceInfo;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Whoever has interrupted a replay waits no longer for the number of its rows.
+const LONGEST_COUNT: Duration = Duration::from_secs(2);
 
 /// A recording at the tick that is being played.
 pub(super) struct Feed {
@@ -80,6 +85,20 @@ impl Feed {
             }
         }
     }
+
+    /// How many rows were not compared yet, in words, with those that were. A large recording is not read to its end for
+    /// that.
+    pub(super) fn count_with(&mut self, compared: u64) -> String {
+        let mut rows = compared + self.reached.len() as u64 + u64::from(self.next.is_some());
+        let begun = Instant::now();
+        while self.failure.is_none() && matches!(self.recorded.next_row(), Ok(Some(_))) {
+            rows += 1;
+            if begun.elapsed() > LONGEST_COUNT {
+                return format!("more than {rows}");
+            }
+        }
+        rows.to_string()
+    }
 }
 
 /// A device that plays one finger.
@@ -128,9 +147,6 @@ impl Device for ReplayedDevice {
         let row = {
             let mut feed = self.feed.lock().unwrap_or_else(PoisonError::into_inner);
             feed.go_to(time.run_tick);
-            if feed.failure.is_some() {
-                return Err(FaultReason::DeviceRead);
-            }
             let resting = FingerRow { hip: self.resting_at, ..FingerRow::default() };
             self.finger.map_or(resting, |finger| feed.current.fingers[finger])
         };

@@ -73,10 +73,9 @@ fn measure(options: &Measure) -> Result<ExitCode, JitterError> {
         print(&table::text(&document));
     }
     if let Some(trouble) = saver.save(&document) {
-        return Err(JitterError::Write { file: out.join(RESULT), detail: trouble });
+        return Err(JitterError::Lost { file: out.join(RESULT), detail: trouble });
     }
-    sheets::write(&document, &out)?;
-    pictures::write(&document, &out)?;
+    write_rest(&document, &out, &out.join(RESULT))?;
     if !options.quiet {
         print(&format!("results    {}\n", out.display()));
     }
@@ -170,9 +169,14 @@ fn report_anew(report: &options::Report) -> Result<ExitCode, JitterError> {
     std::fs::create_dir_all(out)
         .map_err(|error| JitterError::Write { file: out.into(), detail: error.to_string() })?;
     print(&table::text(&document));
-    sheets::write(&document, out)?;
-    pictures::write(&document, out)?;
+    write_rest(&document, out, &report.result)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Tables and pictures of what stands in `result`.
+fn write_rest(document: &Document, out: &Path, result: &Path) -> Result<(), JitterError> {
+    let written = sheets::write(document, out).and_then(|()| pictures::write(document, out));
+    written.map_err(|failure| failure.beside(result))
 }
 
 /// A closed pipe is how `| head` says that it has seen enough.

@@ -1,7 +1,7 @@
 //! What can go wrong, and with which exit status it ends.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use thiserror::Error;
 
@@ -39,13 +39,29 @@ pub enum JitterError {
     /// A child could not be started or did not do its work.
     #[error("{0}")]
     Fault(String),
-    /// Results could not be written.
+    /// The file with everything could not be written.
     #[error("cannot write {file}: {detail}; the results so far are lost unless an earlier file is there")]
+    Lost {
+        /// Which.
+        file: PathBuf,
+        /// What the system said.
+        detail: String,
+    },
+    /// A table or a picture of results could not be written.
+    #[error("cannot write {file}: {detail}")]
     Write {
         /// Which.
         file: PathBuf,
         /// What the system said.
         detail: String,
+    },
+    /// The same, where everything is in another file.
+    #[error("{failure}; {} is there with all results: `jitter report {} --out DIR` makes the rest of it", result.display(), result.display())]
+    Rest {
+        /// What could not be written.
+        failure: Box<JitterError>,
+        /// What was.
+        result: PathBuf,
     },
 }
 
@@ -54,8 +70,13 @@ impl JitterError {
     pub fn exit_code(&self) -> ExitCode {
         ExitCode::from(match self {
             Self::Usage(_) | Self::Unreadable { .. } | Self::BadFile { .. } => EXIT_USAGE,
-            Self::Fault(_) | Self::Write { .. } => EXIT_FAULT,
+            Self::Fault(_) | Self::Lost { .. } | Self::Write { .. } | Self::Rest { .. } => EXIT_FAULT,
         })
+    }
+
+    /// The same, with the file that everything is in.
+    pub fn beside(self, result: &Path) -> Self {
+        Self::Rest { failure: Box::new(self), result: result.into() }
     }
 
     /// A fault with what was tried and what came of it.

@@ -4,7 +4,7 @@ use crate::jitter::document::{Document, Series as Measured};
 use crate::jitter::error::JitterError;
 use crate::jitter::metric::Metric;
 use crate::jitter::timeline::Row;
-use plot::{Axis, Chart, Figure, Look, Series};
+use plot::{Axis, Chart, Figure, Look, PlotError, Series};
 use rt_core::histogram::{BUCKETS, bucket_lower};
 use std::path::Path;
 
@@ -20,7 +20,10 @@ const LEAST_US: f64 = 0.01;
 pub fn write(document: &Document, directory: &Path) -> Result<(), JitterError> {
     let write = |name: &str, figure: Figure| {
         let file = directory.join(name);
-        figure.write(&file).map_err(|error| JitterError::Write { file, detail: error.to_string() })
+        figure.write(&file).map_err(|error| match error {
+            PlotError::Write { file, source } => JitterError::Write { file, detail: source.to_string() },
+            other => JitterError::Write { file, detail: other.to_string() },
+        })
     };
     let all: Vec<(&str, &Document)> = vec![("", document)];
     write("histogram", with_notes(Figure::new("Latency histogram", vec![histogram(&all)]), document))?;

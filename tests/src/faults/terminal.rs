@@ -1,0 +1,37 @@
+//! A terminal that somebody holds by Ctrl-S.
+
+use rustix::pty::{OpenptFlags, grantpt, openpt, unlockpt};
+use rustix::termios::{Action, tcflow};
+use std::fs::File;
+use std::os::fd::OwnedFd;
+use std::path::PathBuf;
+use std::process::Stdio;
+
+/// Nobody reads it, and it takes nothing once it is held.
+#[derive(Debug)]
+pub struct Terminal {
+    _master: OwnedFd,
+    slave: OwnedFd,
+}
+
+impl Terminal {
+    /// One that takes what is written, until it is held.
+    pub fn open() -> Self {
+        let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).expect("a terminal");
+        grantpt(&master).and_then(|()| unlockpt(&master)).expect("our own");
+        let name = rustix::pty::ptsname(&master, Vec::new()).expect("it has a name");
+        let name = PathBuf::from(name.into_string().expect("plain"));
+        let slave = File::options().read(true).write(true).open(name).expect("our own").into();
+        Self { _master: master, slave }
+    }
+
+    /// For a program's standard error.
+    pub fn end(&self) -> Stdio {
+        self.slave.try_clone().expect("another").into()
+    }
+
+    /// Ctrl-S.
+    pub fn hold(&self) {
+        tcflow(&self.slave, Action::OOff).expect("our own");
+    }
+}
