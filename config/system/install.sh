@@ -321,7 +321,7 @@ uninstall_all() {
         if [ "$kind" != directory ]; then remove "$kind" "$sum" "$path"; fi
     done <"$scratch/former"
     if $dry_run; then return; fi
-    rm -f "$destdir$manifest"
+    remember_what_is_kept
     # The inner ones first. One that holds something else stays.
     sed -n '1!G;h;$p' "$scratch/former" | while read -r kind _ path; do
         if [ "$kind" = directory ]; then rmdir "$destdir$path" 2>/dev/null; fi
@@ -334,6 +334,19 @@ Next, as root:
   getent group phantom3 && groupdel phantom3    # userdel leaves a group that has members
   reboot
 END
+}
+
+# What was edited stays, and can be purged later.
+remember_what_is_kept() {
+    : >"$scratch/kept"
+    while read -r kind sum path; do
+        if [ "$kind" = config ] && [ -e "$destdir$path" ]; then echo "$kind $sum $path" >>"$scratch/kept"; fi
+    done <"$scratch/former"
+    if [ -s "$scratch/kept" ]; then
+        { grep '^directory ' "$scratch/former"; cat "$scratch/kept"; } >"$destdir$manifest"
+    else
+        rm -f "$destdir$manifest"
+    fi
 }
 
 stop_services() {

@@ -1,7 +1,7 @@
 //! The ideal device: the scripted hand's position goes straight through, and any force is rendered.
 //!
 //! Problem: to see an algorithm's own behaviour, nothing may stand between the hand and it: no dynamics,
-//! no quantisation, no speed, thermal or slew limit.
+//! no quantisation, no speed or thermal limit. The guard's slew limit does, unless the configuration takes it away.
 //!
 //! Model: the tip is where the hand script, which is written in the world frame W, has the finger at the
 //! time since full authority; before that it rests at the script's start. Without a script it rests at a

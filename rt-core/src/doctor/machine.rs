@@ -105,7 +105,9 @@ impl Obstacle {
     pub(super) fn way_round(&self) -> String {
         match self {
             Self::Absent(path) => format!("look whether this kernel offers {path} at all"),
-            Self::Denied(_) => "run the doctor as root; under kernel lockdown nobody may read it".into(),
+            Self::Denied(_) => {
+                "run the doctor as root; what the kernel locks down root may not read either".into()
+            }
             Self::Garbled { path, .. } => format!("look at {path} yourself"),
             Self::Failed { path, .. } => format!("look at {path} yourself"),
         }

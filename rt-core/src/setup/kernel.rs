@@ -86,7 +86,10 @@ pub(crate) fn judge_fair_server(
         None => "unreadable (needs root, debugfs and no lockdown)".to_owned(),
     };
     let remedy = (runtime_ns != Some(0)).then(|| {
-        format!("as root: systemctl restart {MACHINE_UNIT}, or echo 0 > {path}, if the loop spins on a CPU of its own")
+        format!(
+            "as root: systemctl restart {MACHINE_UNIT} where its machine.conf names this CPU, or echo 0 > {path}, if the loop \
+             spins on a CPU of its own"
+        )
     });
     Some(Guarantee::circumstance("fair server", "off", found, remedy))
 }

@@ -56,8 +56,17 @@ fn judge_isolation<'a>(wanted: usize, lists: impl Iterator<Item = Option<&'a str
     let mut isolated: Vec<usize> = lists.flatten().filter_map(parse_cpu_list).flatten().collect();
     isolated.sort_unstable();
     isolated.dedup();
-    let remedy = (!isolated.contains(&wanted)).then(|| {
-        format!("boot with isolcpus=managed_irq,domain,{wanted} nohz_full={wanted} rcu_nocbs={wanted}")
+    let remedy = (!isolated.contains(&wanted)).then(|| match wanted {
+        0 => "choose another CPU: CPU 0 is left to everything else".to_owned(),
+        // Those that are isolated already stay so.
+        _ => {
+            let mut all = isolated.clone();
+            all.push(wanted);
+            all.sort_unstable();
+            let list: Vec<String> = all.iter().map(usize::to_string).collect();
+            let list = list.join(",");
+            format!("boot with isolcpus=managed_irq,domain,{list} nohz_full={list} rcu_nocbs={list}")
+        }
     });
     let found = if isolated.is_empty() { "none isolated".to_owned() } else { cpu_list(&isolated) };
     Guarantee::circumstance("cpu isolation", &format!("CPU {wanted} isolated"), found, remedy)
@@ -97,5 +106,9 @@ mod tests {
         assert_eq!(missing.found, "none isolated");
         let another = judge(Some("1"), Some("garbage"));
         assert_eq!((another.obtained, another.found.as_str()), (false, "CPU 1"));
+        let all = "boot with isolcpus=managed_irq,domain,1,3 nohz_full=1,3 rcu_nocbs=1,3";
+        assert_eq!(another.remedy.as_deref(), Some(all), "another's isolation is kept");
+        let first = judge_isolation(0, [Some("1")].into_iter()).remedy.expect("it is not isolated");
+        assert!(first.contains("choose another CPU") && !first.contains("isolcpus"), "{first}");
     }
 }

@@ -31,6 +31,7 @@ fn machine() -> Lab {
     lab.write(DEFAULT_IRQ, "f\n");
     lab.write(WORKQUEUE, "0000000f\n");
     lab.write("/sys/devices/virtual/workqueue/writeback/cpumask", "0000000f\n");
+    lab.write("/sys/devices/virtual/workqueue/last/cpumask", "00000008\n");
     lab.write(THP, "always [madvise] never\n");
     lab.write("/etc/phantom3/machine.conf", "# the last one\nLOOP_CPU=3\nFAST_CPU=\n");
     lab
@@ -77,7 +78,7 @@ fn exactly_what_it_says_is_changed_and_undone() {
         before.keys().filter(|path| before[*path] != after[*path]).cloned().collect();
     assert_eq!(before.len(), after.len());
     assert_eq!(paths_told(&said, "set "), changed, "{said}");
-    assert!(said.contains("8 set, 0 could not be set"), "{said}");
+    assert!(said.contains("9 set, 0 could not be set"), "{said}");
 
     let expected = [
         (fair_server(3), "0\n"),
@@ -86,8 +87,10 @@ fn exactly_what_it_says_is_changed_and_undone() {
         (IRQ.into(), "7\n"),
         // Away from the loop's CPU already.
         ("/proc/irq/25/smp_affinity".into(), "3\n"),
-        // No other CPU could serve it.
-        ("/proc/irq/26/smp_affinity".into(), "8\n"),
+        // Of the loop's CPU alone: to those that interrupts go to by default.
+        ("/proc/irq/26/smp_affinity".into(), "7\n"),
+        // Not for interrupts alone; nobody else could serve it.
+        ("/sys/devices/virtual/workqueue/last/cpumask".into(), "00000008\n"),
         (DEFAULT_IRQ.into(), "7\n"),
         (WORKQUEUE.into(), "00000007\n"),
         (THP.into(), "never\n"),
@@ -171,7 +174,7 @@ fn what_the_kernel_refuses_or_does_not_have_is_told_and_no_failure() {
     let said = run(&lab, &["apply"]);
     assert!(said.contains(&format!("COULD NOT set {} to performance: ", governor(3))), "{said}");
     assert!(said.contains(&format!("absent   {}", fair_server(3))), "{said}");
-    assert!(said.contains("6 set, 1 could not be set"), "{said}");
+    assert!(said.contains("7 set, 1 could not be set"), "{said}");
     assert_eq!(lab.read(IRQ), "7\n", "the rest is done all the same");
 }
 

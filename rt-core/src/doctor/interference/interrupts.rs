@@ -59,10 +59,13 @@ pub(super) fn affinity(machine: &Machine<'_>) -> Judged {
     }
     let puts = movable.iter().map(|interrupt| put(interrupt, &others));
     let boot = machine.boot_parameter("irqaffinity")?;
-    let boot = Step::boot("send interrupts to the other CPUs from the start", "irqaffinity", &others, boot);
+    // What stands there already need not be asked for.
+    let boot = (boot.as_deref() != Some(others.as_str())).then(|| {
+        Step::boot("send interrupts to the other CPUs from the start", "irqaffinity", &others, boot)
+    });
     let text =
         format!("echo {others} > /proc/irq/N/smp_affinity_list for each; at boot: irqaffinity={others}");
-    Ok(Judgement::warn(found, Remedy::steps(text, [boot].into_iter().chain(puts))))
+    Ok(Judgement::warn(found, Remedy::steps(text, boot.into_iter().chain(puts))))
 }
 
 fn put(interrupt: &Interrupt, others: &str) -> Step {
