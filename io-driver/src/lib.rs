@@ -43,6 +43,7 @@ pub mod sandbox;
 pub mod say;
 mod service;
 pub mod sim;
+mod state_log;
 pub mod status;
 mod stop_thread;
 pub mod supervisor;

@@ -18,6 +18,7 @@ use crate::cycle::Cycle;
 use crate::heartbeat::{Heartbeat, Watch};
 use crate::mail::Inbox;
 use crate::meter::{add, record};
+use crate::state_log::StateLog;
 use crate::zeroing::DeviceSet;
 use rt_core::clock::{monotonic_ns, sleep_until_ns};
 use rt_core::log::{LogLevel, RtLog};
@@ -25,7 +26,7 @@ use rt_core::periodic::{Periodic, PeriodicConfig};
 use rt_core::signals::StopSignals;
 use shm_abi::doorbell::WaitMode;
 use shm_abi::segment::ClockMode;
-use shm_abi::{CommanderView, DriverState, FaultReason, MAX_DEVICES};
+use shm_abi::{CommanderView, FaultReason, MAX_DEVICES};
 use std::hint::spin_loop;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -96,7 +97,7 @@ pub struct RealLoop {
     periodic: Periodic,
     lockstep_tick: u64,
     watch: Option<Watch>,
-    logged_state: Option<DriverState>,
+    state_log: StateLog,
     logged_not_zeroed: DeviceSet,
     logged_phase_steps: u64,
 }
@@ -158,7 +159,7 @@ impl RealLoop {
             retreat_until_ns: 0,
             periodic,
             lockstep_tick: 0,
-            logged_state: None,
+            state_log: StateLog::new(config.period_ns),
             logged_not_zeroed: DeviceSet(0),
             logged_phase_steps: 0,
         }
@@ -342,14 +343,7 @@ impl RealLoop {
 
     fn log_state(&mut self, tick: u64) {
         let safety = self.cycle.safety();
-        let state = safety.state();
-        if self.logged_state.replace(state) == Some(state) {
-            return;
-        }
-        match state {
-            DriverState::Fault => self.log.push(LogLevel::Error, tick, safety.fault().sentence(), &[]),
-            other => self.log.push(LogLevel::Info, tick, other.name(), &[]),
-        }
+        self.state_log.tell(safety.state(), safety.fault(), tick, &mut self.log);
     }
 
     fn collect_mail(&mut self, tick: u64) {
