@@ -57,7 +57,8 @@ impl SocketFile {
         refuse_other_files(path)?;
         let unnamed = suffixed(path, &format!(".{}", std::process::id()));
         let _ = std::fs::remove_file(&unnamed);
-        let socket = bind(&unnamed).map_err(|source| BindError::system("listen at", &unnamed, source))?;
+        let socket =
+            bind(&in_full(&unnamed)).map_err(|source| BindError::system("listen at", &unnamed, source))?;
         let ready = std::fs::set_permissions(&unnamed, Permissions::from_mode(SOCKET_MODE))
             .and_then(|()| prepare(&socket))
             .and_then(|()| std::fs::rename(&unnamed, path));
@@ -129,17 +130,26 @@ pub(crate) fn make_sure_nobody_listens(path: &Path) -> Result<(), BindError> {
     if !refuse_other_files(path)? {
         return Ok(());
     }
-    let system = |source| BindError::system("listen at", path, source);
-    let address = SocketAddrUnix::new(path).map_err(|errno| system(errno.into()))?;
-    let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
-    let probe = rustix::net::socket_with(AddressFamily::UNIX, SocketType::STREAM, flags, None)
-        .map_err(|errno| system(errno.into()))?;
-    match rustix::net::connect(&probe, &address) {
+    match probe(path) {
         Err(Errno::CONNREFUSED | Errno::NOENT) => Ok(()),
         // A full queue belongs to somebody who lives but does not look.
         Ok(()) | Err(Errno::AGAIN) => Err(already_running(path)),
-        Err(errno) => Err(system(errno.into())),
+        Err(errno) => Err(BindError::system("listen at", path, errno.into())),
     }
+}
+
+/// Whether a socket lies there at which nobody listens.
+pub(crate) fn is_left_over(path: &Path) -> bool {
+    let is_socket = std::fs::metadata(path).is_ok_and(|meta| meta.file_type().is_socket());
+    is_socket && probe(path) == Err(Errno::CONNREFUSED)
+}
+
+/// Connects and hangs up; never waits.
+fn probe(path: &Path) -> Result<(), Errno> {
+    let address = SocketAddrUnix::new(path)?;
+    let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
+    let probe = rustix::net::socket_with(AddressFamily::UNIX, SocketType::STREAM, flags, None)?;
+    rustix::net::connect(&probe, &address)
 }
 
 /// Whether a socket lies there; an error if something else does.
@@ -171,6 +181,24 @@ fn identity_of(meta: &Metadata) -> Identity {
 fn remove_if(path: &Path, ours: Option<Identity>) {
     if std::fs::symlink_metadata(path).is_ok_and(|meta| Some(identity_of(&meta)) == ours) {
         let _ = std::fs::remove_file(path);
+    }
+}
+
+/// The name under which the kernel keeps a socket, and tells whoever looks for one whose file is gone: the directory
+/// in full, if a socket's address has room for that.
+fn in_full(path: &Path) -> PathBuf {
+    let full = whole_path(path);
+    if SocketAddrUnix::new(&full).is_ok() { full } else { path.to_path_buf() }
+}
+
+/// The path with its directory in full, without symbolic links and detours; as well as can be told where that is gone.
+/// The last name is left as it is: it need not exist.
+pub fn whole_path(path: &Path) -> PathBuf {
+    let directory = path.parent().filter(|directory| !directory.as_os_str().is_empty());
+    let directory = std::fs::canonicalize(directory.unwrap_or(Path::new(".")));
+    match (directory, path.file_name()) {
+        (Ok(directory), Some(name)) => directory.join(name),
+        _ => std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf()),
     }
 }
 

@@ -14,5 +14,6 @@ mod held_terminal;
 mod leases;
 mod rivals;
 mod service;
+mod stops;
 mod stuck_service;
 mod versions;
