@@ -18,9 +18,8 @@ pub(super) fn is_lost() -> bool {
 /// From now on the process outlives the server. Where there is no Xlib, nobody connects by it.
 pub(super) fn outlive_the_server() {
     let Ok(xlib) = Xlib::open() else { return };
-    // SAFETY: the handler is a function of the program, and the library stays loaded.
+    // SAFETY: the handler is a function of the program; a library that was opened so is never closed.
     unsafe { (xlib.XSetIOErrorHandler)(Some(keep_this_thread)) };
-    std::mem::forget(xlib);
 }
 
 unsafe extern "C" fn keep_this_thread(_: *mut Display) -> c_int {
