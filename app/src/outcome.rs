@@ -95,7 +95,9 @@ impl RunFailure {
             | Self::Attach(_)
             | Self::Segment(_)
             | Self::Device(_)
-            | Self::Recording(RecordingError::Create { .. } | RecordingError::Format(_)) => 2,
+            | Self::Recording(
+                RecordingError::Create { .. } | RecordingError::Claimed { .. } | RecordingError::Format(_),
+            ) => 2,
             _ => 3,
         }
     }

@@ -1,25 +1,19 @@
 //! The recording of a run as CSV: a header, then one row per fast tick.
 //!
-//! Model: rows are formatted into a buffer and written in whole rows. Numbers are printed so that reading
-//! them back gives the same f64 (the shortest such text).
-//! Invariant: whatever goes wrong, the file on disk ends with a complete row: a write that failed half way
-//! (a full disk) is cut back to the last row that fits.
+//! Model: rows are lines ([`WholeLines`]), so that the file ends with a complete row whatever goes wrong. Numbers are
+//! printed so that reading them back gives the same f64 (the shortest such text).
 //! Units: SI; world frame; forces are forces on the user.
 
 pub use crate::columns::Names;
 use crate::columns::{Cell, columns, each_cell};
-use crate::record::Opened;
 use crate::record::destination::{FormatError, STANDARD_OUTPUT, shown};
+use crate::record::{Opened, WholeLines};
 use crate::row::{BodyRow, Row};
 use io_driver::device::run_time_s;
 use std::fmt::Write as _;
-use std::fs::File;
-use std::io::{self, Seek, SeekFrom, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
-
-/// Written at once when this much has come together.
-const CHUNK_BYTES: usize = 256 * 1024;
 
 /// Why a recording could not be made, or not to its end.
 #[derive(Debug, Error)]
@@ -33,6 +27,14 @@ pub enum RecordingError {
         file: PathBuf,
         /// What the system said.
         source: io::Error,
+    },
+    /// Somebody else records into it.
+    #[error(
+        "cannot create the recording {file}: another process writes it; name another file, or wait until that has ended"
+    )]
+    Claimed {
+        /// Which.
+        file: PathBuf,
     },
     /// Its name says no format.
     #[error("cannot tell the format of {0}")]
@@ -64,17 +66,10 @@ impl RecordingError {
 /// A recording being written.
 #[derive(Debug)]
 pub struct Recording {
-    file: File,
+    lines: WholeLines,
     path: PathBuf,
     names: Names,
     period_ns: u64,
-    /// Whole rows that are not on disk yet.
-    buffer: String,
-    /// End of each of these rows in the buffer, and its tick.
-    ends: Vec<(usize, u64)>,
-    written_bytes: u64,
-    rows: u64,
-    last_tick: u64,
 }
 
 impl Recording {
@@ -86,33 +81,15 @@ impl Recording {
         Self::begin(Opened::recording(path)?, names, period_ns)
     }
 
-    /// Empties the file and writes the header.
+    /// Empties the file and writes the header; into what may wait for a reader, with what follows.
     ///
     /// # Errors
     /// If its first line cannot be written.
     pub fn begin(file: Opened, names: Names, period_ns: u64) -> Result<Self, RecordingError> {
         let path = shown(file.path());
-        let failed = |source| RecordingError::Create { file: path.clone(), source };
-        let file = file.empty().map_err(failed)?;
-        // Behind what others have written to a standard output that is a file.
-        let written_bytes = file.metadata().map_err(failed)?.len();
-        let mut recording = Self {
-            file,
-            path,
-            buffer: String::with_capacity(2 * CHUNK_BYTES),
-            ends: Vec::new(),
-            written_bytes,
-            rows: 0,
-            last_tick: 0,
-            period_ns,
-            names,
-        };
-        recording.buffer = header(&recording.names);
-        recording.flush().map_err(|error| match error {
-            RecordingError::Write { file, source, .. } => RecordingError::Create { file, source },
-            other => other,
-        })?;
-        Ok(recording)
+        let lines = WholeLines::begin(file, &header(&names))
+            .map_err(|source| RecordingError::Create { file: path.clone(), source })?;
+        Ok(Self { lines, path, names, period_ns })
     }
 
     /// Where it lies.
@@ -135,9 +112,9 @@ impl Recording {
     /// # Errors
     /// If the rows before it, or it, cannot be written.
     pub fn append(&mut self, row: &Row, bodies: &[BodyRow]) -> Result<(), RecordingError> {
-        write_row(&mut self.buffer, row, bodies, &self.names, self.period_ns);
-        self.ends.push((self.buffer.len(), row.run_tick));
-        if self.buffer.len() >= CHUNK_BYTES { self.flush() } else { Ok(()) }
+        let Self { lines, names, period_ns, .. } = self;
+        let written = lines.append(row.run_tick, |line| write_row(line, row, bodies, names, *period_ns));
+        written.map_err(|source| self.failed(source))
     }
 
     /// Writes everything out to the disk itself. Returns the number of rows.
@@ -145,13 +122,8 @@ impl Recording {
     /// # Errors
     /// If that fails.
     pub fn finish(mut self) -> Result<u64, RecordingError> {
-        self.flush()?;
-        match self.file.sync_data() {
-            Ok(()) => Ok(self.rows),
-            // A pipe or a character device has no disk to reach.
-            Err(error) if error.kind() == io::ErrorKind::InvalidInput => Ok(self.rows),
-            Err(source) => Err(self.failed(source)),
-        }
+        self.lines.sync().map_err(|source| self.failed(source))?;
+        Ok(self.lines.rows())
     }
 
     /// Writes the rows that are not on disk yet.
@@ -159,54 +131,18 @@ impl Recording {
     /// # Errors
     /// If that fails; rows that did reach the file are complete.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
-        let mut done = 0;
-        let bytes = self.buffer.as_bytes();
-        let failure = loop {
-            if done == bytes.len() {
-                break None;
-            }
-            match self.file.write(&bytes[done..]) {
-                Ok(0) => break Some(io::ErrorKind::WriteZero.into()),
-                Ok(more) => done += more,
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                Err(error) => break Some(error),
-            }
-        };
-        self.keep_whole_rows(done);
-        self.buffer.clear();
-        self.ends.clear();
-        failure.map_or(Ok(()), |source| Err(self.failed(source)))
-    }
-
-    /// Counts what reached the file and cuts a row that did so only in part.
-    fn keep_whole_rows(&mut self, done: usize) {
-        let whole = self.ends.iter().take_while(|(end, _)| *end <= done).count();
-        let mut kept = if done == self.buffer.len() { done } else { 0 };
-        if whole > 0 {
-            let (end, tick) = self.ends[whole - 1];
-            self.rows += whole as u64;
-            self.last_tick = tick;
-            kept = kept.max(end);
-        }
-        self.written_bytes += kept as u64;
-        if kept < done {
-            // If even this fails, the message still says how many rows are good.
-            let _ = self.file.set_len(self.written_bytes);
-            let _ = self.file.seek(SeekFrom::Start(self.written_bytes));
-        }
+        self.lines.flush().map_err(|source| self.failed(source))
     }
 
     fn failed(&self, source: io::Error) -> RecordingError {
-        let until_s = run_time_s(self.last_tick as i64, self.period_ns);
-        RecordingError::Write { file: self.path.clone(), source, until_s, rows: self.rows }
+        let until_s = run_time_s(self.lines.last_tick().cast_signed(), self.period_ns);
+        RecordingError::Write { file: self.path.clone(), source, until_s, rows: self.lines.rows() }
     }
 }
 
 /// The names of all columns.
 fn header(names: &Names) -> String {
-    let mut line = columns(names).into_iter().map(|column| column.name).collect::<Vec<_>>().join(",");
-    line.push('\n');
-    line
+    columns(names).into_iter().map(|column| column.name).collect::<Vec<_>>().join(",")
 }
 
 fn write_row(line: &mut String, row: &Row, bodies: &[BodyRow], names: &Names, period_ns: u64) {
@@ -221,7 +157,6 @@ fn write_row(line: &mut String, row: &Row, bodies: &[BodyRow], names: &Names, pe
             Cell::Text(text) => line.write_str(text),
         };
     });
-    line.push('\n');
 }
 
 #[cfg(test)]
@@ -281,14 +216,14 @@ mod tests {
         let extras = vec![Extras::default(), Extras { orientation: true, buttons: true }];
         let plain = header(&names());
         let names = Names { extras, ..names() };
-        let added = ",b_qw,b_qx,b_qy,b_qz,b_buttons\n";
-        assert_eq!(header(&names), plain.trim_end().to_owned() + added, "behind the last finger's others");
+        let added = ",b_qw,b_qx,b_qy,b_qz,b_buttons";
+        assert_eq!(header(&names), plain + added, "behind the last finger's others");
         let mut told = row(0, 1.0);
         told.fingers[1].orientation_wxyz = [0.5, -0.5, 0.5, -0.5];
         told.fingers[1].buttons = 5;
         let mut line = String::new();
         write_row(&mut line, &told, &[], &names, 1_000_000);
-        assert!(line.ends_with(",0.5,-0.5,0.5,-0.5,5\n"), "{line}");
+        assert!(line.ends_with(",0.5,-0.5,0.5,-0.5,5"), "{line}");
         assert_eq!(line.matches(',').count(), header(&names).matches(',').count());
     }
 
@@ -296,12 +231,12 @@ mod tests {
     fn only_a_finger_that_is_kept_passive_tells_its_energy() {
         let plain = header(&names());
         let names = Names { passive: vec![false, true], ..names() };
-        assert_eq!(header(&names), plain.trim_end().to_owned() + ",b_energy,b_controlled\n");
+        assert_eq!(header(&names), plain + ",b_energy,b_controlled");
         let mut told = row(0, 1.0);
         (told.fingers[1].energy_j, told.fingers[1].controlled_n) = (-1.5e-3, 0.25);
         let mut line = String::new();
         write_row(&mut line, &told, &[], &names, 1_000_000);
-        assert!(line.ends_with(",-0.0015,0.25\n"), "{line}");
+        assert!(line.ends_with(",-0.0015,0.25"), "{line}");
         assert_eq!(line.matches(',').count(), header(&names).matches(',').count());
     }
 
@@ -309,13 +244,13 @@ mod tests {
     fn only_a_finger_with_a_radius_has_columns_for_its_torque() {
         let plain = header(&names());
         let names = Names { torques: vec![false, true], ..names() };
-        let added = ",b_torque_x,b_torque_y,b_torque_z\n";
-        assert_eq!(header(&names), plain.trim_end().to_owned() + added, "behind the last finger's others");
+        let added = ",b_torque_x,b_torque_y,b_torque_z";
+        assert_eq!(header(&names), plain + added, "behind the last finger's others");
         let mut told = row(0, 1.0);
         told.fingers[1].torque_on_user = Vector3::new(0.5, -0.25, 0.0);
         let mut line = String::new();
         write_row(&mut line, &told, &[], &names, 1_000_000);
-        assert!(line.ends_with(",0.5,-0.25,0.0\n"), "{line}");
+        assert!(line.ends_with(",0.5,-0.25,0.0"), "{line}");
     }
 
     #[test]
@@ -323,7 +258,7 @@ mod tests {
         let plain = header(&names());
         let names = Names { bodies: vec!["cube".into()], ..names() };
         let added = "cube_x,cube_y,cube_z,cube_qw,cube_qx,cube_qy,cube_qz,cube_vx,cube_vy,cube_vz,cube_wx,cube_wy,cube_wz";
-        assert_eq!(header(&names), format!("{},{added}\n", plain.trim_end()));
+        assert_eq!(header(&names), format!("{plain},{added}"));
         let body = BodyRow {
             position: Vector3::new(1.0, 2.0, 3.0),
             orientation: nalgebra::Quaternion::new(0.5, -0.5, 0.5, -0.25),
@@ -333,7 +268,7 @@ mod tests {
         };
         let mut line = String::new();
         write_row(&mut line, &row(0, 1.0), &[body], &names, 1_000_000);
-        assert!(line.ends_with(",1.0,2.0,3.0,0.5,-0.5,0.5,-0.25,4.0,5.0,6.0,7.0,8.0,9.0\n"), "{line}");
+        assert!(line.ends_with(",1.0,2.0,3.0,0.5,-0.5,0.5,-0.25,4.0,5.0,6.0,7.0,8.0,9.0"), "{line}");
         assert_eq!(line.matches(',').count(), header(&names).matches(',').count());
     }
 
@@ -345,22 +280,5 @@ mod tests {
             error.to_string().starts_with("cannot create the recording /dev/full: No space left"),
             "{error}"
         );
-    }
-
-    #[test]
-    fn a_row_that_reached_the_file_only_in_part_is_cut_off() {
-        let directory = tempfile::tempdir().expect("a directory");
-        let path = directory.path().join("r.csv");
-        let mut recording = Recording::create(&path, names(), 1_000_000).expect("created");
-        recording.append(&row(0, 1.0), &[]).expect("appended");
-        recording.append(&row(1, 2.0), &[]).expect("appended");
-        let bytes = recording.buffer.clone().into_bytes();
-        let half = recording.ends[0].0 + 5;
-        recording.file.write_all(&bytes[..half]).expect("written");
-        recording.keep_whole_rows(half);
-        let text = std::fs::read_to_string(&path).expect("readable");
-        assert_eq!(text.lines().count(), 2, "header and one row");
-        assert!(text.ends_with('\n'));
-        assert_eq!((recording.rows, recording.last_tick), (1, 0));
     }
 }

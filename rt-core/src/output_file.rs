@@ -2,11 +2,12 @@
 //!
 //! Problem: opening a FIFO for writing waits for a reader, for ever if nobody reads it.
 //! Model: opening never waits (`O_NONBLOCK`, which regular files ignore): a pipe that nobody reads is refused, with what
-//! to do. Writing does wait, as everybody expects of a pipe.
+//! to do. Writing does wait, as everybody expects of a pipe. Who fills a regular file for long claims it ([`claim`]), so
+//! that two processes do not write over one another.
 
 use nix::errno::Errno;
 use nix::fcntl::{FcntlArg, OFlag, fcntl};
-use std::fs::{File, OpenOptions};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Write};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
@@ -39,6 +40,28 @@ pub fn open(path: &Path, options: &OpenOptions) -> io::Result<File> {
     Ok(file)
 }
 
+/// Claims a regular file for whoever has it open, until they close it: flock(2), which ends with the process, too. Pipes
+/// and devices are left alone, and so are files of file systems without such locks.
+///
+/// # Errors
+/// Another process has claimed it ([`is_claimed`]).
+pub fn claim(file: &File) -> io::Result<()> {
+    if !file.metadata()?.is_file() {
+        return Ok(());
+    }
+    match file.try_lock() {
+        Err(TryLockError::WouldBlock) => {
+            Err(io::Error::new(io::ErrorKind::ResourceBusy, "another process writes it"))
+        }
+        Ok(()) | Err(TryLockError::Error(_)) => Ok(()),
+    }
+}
+
+/// Whether this is the error of a file that another process has claimed.
+pub fn is_claimed(error: &io::Error) -> bool {
+    error.kind() == io::ErrorKind::ResourceBusy && error.raw_os_error().is_none()
+}
+
 fn in_words(error: io::Error) -> io::Error {
     if error.raw_os_error() == Some(Errno::ENXIO as i32) {
         return io::Error::other("nobody reads this pipe (start its reader first), or its device is gone");
@@ -65,6 +88,20 @@ mod tests {
         assert!(!OFlag::from_bits_retain(flags).contains(OFlag::O_NONBLOCK));
     }
 
+    #[test]
+    fn a_file_is_claimed_once_until_it_is_closed_and_a_device_by_everybody() {
+        let path = std::env::temp_dir().join(format!("output-file-claimed-{}", std::process::id()));
+        let [first, second] = [(); 2].map(|()| create(&path).expect("a file in TMPDIR"));
+        let claimed = (claim(&first), claim(&second));
+        drop(first);
+        let again = claim(&second);
+        std::fs::remove_file(&path).expect("our own");
+        assert!(claimed.0.is_ok() && again.is_ok());
+        let refused = claimed.1.expect_err("claimed by the first");
+        assert!(is_claimed(&refused) && refused.to_string() == "another process writes it", "{refused}");
+        let [first, second] = [(); 2].map(|()| create(Path::new("/dev/null")).expect("a device"));
+        assert!(claim(&first).is_ok() && claim(&second).is_ok());
+    }
     #[test]
     fn a_file_that_is_there_is_replaced() {
         let path = std::env::temp_dir().join(format!("output-file-replaced-{}", std::process::id()));

@@ -126,6 +126,10 @@ fn late(error: &RecordingError) -> RunFailure {
             "cannot create {}: {source}; name a file that can be written",
             file.display()
         )),
+        RecordingError::Claimed { file } => wrong(&format_args!(
+            "cannot create {}: another process writes it; name another file, or wait until that has ended",
+            file.display()
+        )),
         RecordingError::Format(error) => wrong(error),
         RecordingError::Write { file, source, rows, .. } => RunFailure::Results(format!(
             "cannot write {}: {source}; it is complete up to its row {rows}",

@@ -3,25 +3,23 @@
 use super::destination::{EventFormat, shown};
 use super::event_line::{KEYS, csv, json, said};
 use super::opened::Opened;
+use super::whole_lines::WholeLines;
 use crate::book::Book;
 use crate::columns::Names;
 use crate::recording::RecordingError;
 use io_driver::device::run_time_s;
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io;
 use std::path::PathBuf;
 use world::events::Event;
 
 /// A file of events being written.
 pub struct EventsFile {
-    file: BufWriter<File>,
+    lines: WholeLines,
     path: PathBuf,
     names: Names,
     book: Book,
     period_ns: u64,
     is_table: bool,
-    written: u64,
-    last_tick: u64,
 }
 
 impl EventsFile {
@@ -31,13 +29,11 @@ impl EventsFile {
     /// If that cannot be done, or its name says no format.
     pub fn create(file: Opened, names: Names, period_ns: u64, book: Book) -> Result<Self, RecordingError> {
         let path = shown(file.path());
-        let failed = |source| RecordingError::Create { file: path.clone(), source };
         let is_table = EventFormat::of(file.path())? == EventFormat::Csv;
-        let mut file = BufWriter::new(file.empty().map_err(failed)?);
-        if is_table {
-            writeln!(file, "{}", KEYS.join(",")).and_then(|()| file.flush()).map_err(failed)?;
-        }
-        Ok(Self { file, path, names, book, period_ns, is_table, written: 0, last_tick: 0 })
+        let header = if is_table { KEYS.join(",") } else { String::new() };
+        let lines = WholeLines::begin(file, &header)
+            .map_err(|source| RecordingError::Create { file: path.clone(), source })?;
+        Ok(Self { lines, path, names, book, period_ns, is_table })
     }
 
     /// Appends an event.
@@ -50,10 +46,7 @@ impl EventsFile {
             self.names = names;
         }
         let line = if self.is_table { csv } else { json }(event, &said.0, &self.names, self.period_ns);
-        writeln!(self.file, "{line}").map_err(|source| self.failed(source))?;
-        self.written += 1;
-        self.last_tick = event.run_tick;
-        Ok(())
+        self.lines.append(event.run_tick, |lines| lines.push_str(&line)).map_err(|source| self.failed(source))
     }
 
     /// Hands over to the system what has not been.
@@ -61,7 +54,7 @@ impl EventsFile {
     /// # Errors
     /// If that fails.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
-        self.file.flush().map_err(|source| self.failed(source))
+        self.lines.flush().map_err(|source| self.failed(source))
     }
 
     /// Writes the rest; says how many events there are.
@@ -70,11 +63,11 @@ impl EventsFile {
     /// If that fails.
     pub fn finish(mut self) -> Result<u64, RecordingError> {
         self.flush()?;
-        Ok(self.written)
+        Ok(self.lines.rows())
     }
 
     fn failed(&self, source: io::Error) -> RecordingError {
-        let until_s = run_time_s(self.last_tick.cast_signed(), self.period_ns);
-        RecordingError::Write { file: self.path.clone(), source, until_s, rows: self.written }
+        let until_s = run_time_s(self.lines.last_tick().cast_signed(), self.period_ns);
+        RecordingError::Write { file: self.path.clone(), source, until_s, rows: self.lines.rows() }
     }
 }

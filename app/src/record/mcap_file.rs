@@ -12,7 +12,7 @@
 //! Model: messages are encoded as Protocol Buffers and gathered into chunks of half a second of the run. A chunk goes to
 //! the file in one piece, so that whatever ends the process leaves all chunks before readable. Times are those of the
 //! run: 0 is its first tick.
-//! Invariant: what could not be written as a whole is cut off again; after that nothing more is written.
+//! Invariant: what could not be written as a whole is cut off again; after that nothing more is written, not even an end.
 
 use super::about::{self, About};
 use super::event_line::{holders, name, said};
@@ -33,7 +33,7 @@ use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, Write};
+use std::io::{self, Seek, SeekFrom, Write};
 use std::path::PathBuf;
 use world::events::{Event, Facts, Kind};
 
@@ -91,7 +91,8 @@ struct Channels {
 }
 
 impl McapFile {
-    /// Empties the file and writes what is known before the first tick.
+    /// Empties the file and writes what is known before the first tick; into what may wait for a reader, with the first
+    /// [`Self::flush`].
     ///
     /// # Errors
     /// If that cannot be written.
@@ -119,6 +120,7 @@ impl McapFile {
     ) -> Result<Self, RecordingError> {
         let path = file.path().to_owned();
         let failed = |error| RecordingError::Create { file: path.clone(), source: into_io(error) };
+        let may_wait = file.may_wait();
         let file = file.empty().map_err(|error| failed(error.into()))?;
         let mut writer = options().create(NoSeek::new(WholeWrites::new(file))).map_err(failed)?;
         let channels = begin(&mut writer, &names, about).map_err(failed)?;
@@ -145,7 +147,11 @@ impl McapFile {
             is_current: true,
         };
         let scene = std::mem::take(&mut file.view.scene);
-        file.put(channels.scene, begins, &scene).and_then(|()| file.writer.flush()).map_err(failed)?;
+        file.put(channels.scene, begins, &scene).map_err(failed)?;
+        file.chunk_bytes = 0;
+        if !may_wait {
+            file.writer.flush().map_err(failed)?;
+        }
         Ok(file)
     }
 
@@ -405,15 +411,18 @@ fn into_io(error: McapError) -> io::Error {
 }
 
 /// Gathers what is written until it is flushed, then writes it whole or, if it does not fit, not at all.
+#[derive(Debug)]
 struct WholeWrites {
     file: File,
     pending: Vec<u8>,
     written_bytes: u64,
+    /// Something did not fit. The library still writes an end behind it, which would be that of a whole file.
+    has_ended: bool,
 }
 
 impl WholeWrites {
     fn new(file: File) -> Self {
-        Self { file, pending: Vec::new(), written_bytes: 0 }
+        Self { file, pending: Vec::new(), written_bytes: 0, has_ended: false }
     }
 
     /// Writes what is left out to the disk itself.
@@ -425,6 +434,14 @@ impl WholeWrites {
             synced => synced,
         }
     }
+
+    /// Cuts off what has reached the file in part.
+    fn end(&mut self) {
+        self.has_ended = true;
+        // If even this fails, readers skip the last piece.
+        let _ = self.file.set_len(self.written_bytes);
+        let _ = self.file.seek(SeekFrom::Start(self.written_bytes));
+    }
 }
 
 impl Write for WholeWrites {
@@ -434,13 +451,33 @@ impl Write for WholeWrites {
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        let written = self.file.write_all(&self.pending);
-        match written {
-            Ok(()) => self.written_bytes += self.pending.len() as u64,
-            // If even this fails, readers skip the last piece.
-            Err(_) => drop(self.file.set_len(self.written_bytes)),
+        let pending = std::mem::take(&mut self.pending);
+        if self.has_ended {
+            return Err(io::Error::other("an earlier write failed"));
         }
+        let written = self.file.write_all(&pending);
+        match written {
+            Ok(()) => self.written_bytes += pending.len() as u64,
+            Err(_) => self.end(),
+        }
+        self.pending = pending;
         self.pending.clear();
         written
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_written_behind_a_write_that_did_not_fit() {
+        let mut full = WholeWrites::new(File::options().write(true).open("/dev/full").expect("a device"));
+        full.write_all(b"chunk").and_then(|()| full.flush()).expect_err("full");
+        let directory = tempfile::tempdir().expect("a directory");
+        // Room is there again, as on a disk from which the cut piece has gone.
+        full.file = File::create(directory.path().join("end")).expect("a file");
+        full.write_all(b"end").and_then(|()| full.flush()).expect_err("ended");
+        assert_eq!(full.file.metadata().expect("a file").len(), 0);
     }
 }

@@ -23,6 +23,7 @@ mod recorder;
 mod schema;
 mod tick;
 mod view;
+mod whole_lines;
 mod wire;
 
 pub use about::{About, Beginning, InputFile};
@@ -34,6 +35,7 @@ pub use opened::{Opened, begin_all};
 pub use record_file::RecordFile;
 pub use recorder::{EventFeed, Recorded, Recorder};
 pub use view::View;
+pub(crate) use whole_lines::WholeLines;
 
 use crate::book::Book;
 use crate::recording::{Names, Recording, RecordingError};

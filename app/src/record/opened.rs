@@ -1,15 +1,23 @@
 //! Output file in two steps: opened with what it has, and emptied once nothing can refuse the start any more.
 //!
-//! Problem: a run that cannot start, because another of its files cannot be made, must not cost an earlier recording.
+//! Problem: a run that cannot start, because another of its files cannot be made, must not cost an earlier recording; nor
+//! may one process empty what another one writes.
+//! Model: a regular file is claimed when it is opened, until it is closed. The standard output is not: who opened it lets
+//! whom they want write there.
 //! Invariant: a file that was made here and not emptied is removed again.
 
 use super::destination::{is_standard_output, shown};
 use crate::recording::RecordingError;
 use rt_core::output_file;
-use std::fs::{File, OpenOptions};
+use rustix::termios::isatty;
+use std::fs::{File, Metadata, OpenOptions};
 use std::io;
 use std::os::fd::AsFd;
+use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
+
+/// So often a file that is being opened may be removed by others who made it for nothing.
+const MOST_REMOVED: u32 = 100;
 
 /// A file that can be written, with its earlier content.
 #[derive(Debug)]
@@ -44,27 +52,48 @@ impl Opened {
     /// Opens the file, or makes it; or gives the standard output another descriptor.
     ///
     /// # Errors
-    /// If the system refuses, or it is a pipe that nobody reads.
+    /// If the system refuses, it is a pipe that nobody reads, or another process writes it.
     pub fn open(path: &Path) -> io::Result<Self> {
-        let (file, made) = if is_standard_output(path) {
-            (io::stdout().as_fd().try_clone_to_owned().map(File::from)?, None)
-        } else {
-            open_or_make(path)?
-        };
-        Ok(Self { file, path: path.into(), made: Made(made) })
+        if is_standard_output(path) {
+            let file = io::stdout().as_fd().try_clone_to_owned().map(File::from)?;
+            return Ok(Self { file, path: path.into(), made: Made(None) });
+        }
+        for _ in 0..MOST_REMOVED {
+            let (file, made) = open_or_make(path)?;
+            // Whoever claimed it first writes it: it is not removed, whoever made it.
+            output_file::claim(&file)?;
+            if is_at(&file, path) {
+                return Ok(Self { file, path: path.into(), made: Made(made) });
+            }
+        }
+        Err(io::Error::other("others remove it again and again"))
     }
 
-    /// The same for a recording.
+    /// A file that is open already, of which people are told under this name.
+    pub fn of(file: File, path: &Path) -> Self {
+        Self { file, path: path.into(), made: Made(None) }
+    }
+
+    /// As [`Self::open`], for a recording.
     ///
     /// # Errors
-    /// As above.
+    /// As there.
     pub fn recording(path: &Path) -> Result<Self, RecordingError> {
-        Self::open(path).map_err(|source| RecordingError::Create { file: shown(path), source })
+        Self::open(path).map_err(|source| match source {
+            source if output_file::is_claimed(&source) => RecordingError::Claimed { file: shown(path) },
+            source => RecordingError::Create { file: shown(path), source },
+        })
     }
 
     /// Its name.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Whether writing may wait for a reader: a pipe, a socket, a terminal.
+    pub fn may_wait(&self) -> bool {
+        let Ok(kind) = self.file.metadata().map(|found| found.file_type()) else { return true };
+        kind.is_fifo() || kind.is_socket() || kind.is_char_device() && isatty(&self.file)
     }
 
     /// What emptying it would cost: nothing for a stream, its place for a file that is empty, else its content.
@@ -113,6 +142,15 @@ pub fn begin_all<T>(
     Ok(begun.into_iter().map(|(_, file)| file).collect())
 }
 
+/// Whether the name still leads to this file, which somebody may have removed before it was claimed.
+fn is_at(file: &File, path: &Path) -> bool {
+    let identity = |found: Metadata| (found.dev(), found.ino());
+    match (file.metadata(), path.metadata()) {
+        (Ok(open), Ok(found)) => !open.is_file() || identity(open) == identity(found),
+        _ => false,
+    }
+}
+
 /// The file, and its name if it was not there.
 fn open_or_make(path: &Path) -> io::Result<(File, Option<PathBuf>)> {
     let mut options = OpenOptions::new();
@@ -146,5 +184,18 @@ mod tests {
             Opened::open(path).and_then(Opened::empty).expect("created");
             assert_eq!(std::fs::read(path).expect("readable"), b"");
         }
+    }
+
+    #[test]
+    fn a_file_that_is_being_written_is_neither_emptied_nor_removed_by_who_comes_second() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let path = directory.path().join("new");
+        let first = Opened::open(&path).expect("opened");
+        let refused = Opened::recording(&path).expect_err("it is being written");
+        assert!(refused.to_string().contains("another process writes it"), "{refused}");
+        assert!(path.exists());
+        drop(first);
+        assert!(!path.exists(), "made for nothing");
+        assert!(Opened::open(&path).is_ok());
     }
 }

@@ -17,6 +17,15 @@ pub enum RecordFile {
 }
 
 impl RecordFile {
+    /// Writes what stands before the first row, where creating it did not: into what may wait for a reader.
+    pub(super) fn begin(&mut self) -> Result<(), RecordingError> {
+        match self {
+            Self::Csv(file) => file.flush(),
+            Self::Mcap(file) => file.flush(),
+            Self::Events(file) => file.flush(),
+        }
+    }
+
     pub(super) fn append(&mut self, row: &Row, bodies: &[BodyRow]) -> Result<(), RecordingError> {
         match self {
             Self::Csv(file) => file.append(row, bodies),
