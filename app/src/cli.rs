@@ -195,9 +195,9 @@ fn play(args: &PlayArgs, settings: &Settings, is_headless: bool) -> Result<(Repo
 fn run_demo(settings: &Settings, is_headless: bool) -> Result<(Report, Stop), RunFailure> {
     let signals = install_signals()?;
     let mut demo = demo::unpack(period_of(DEFAULT_RATE_HZ))?;
-    let directory = settings.recording_directory.value.as_deref();
+    let record = demo::recording_place(settings.recording_directory.value.as_deref())?;
     let socket = settings.driver_socket.value.clone().unwrap_or_else(endpoint::for_application);
-    let mut plan = demo::plan(&demo.rig, socket, directory);
+    let mut plan = demo::plan(&demo.rig, socket, record);
     plan.window = if is_headless { None } else { window_spec(&demo.rig.scene.name, settings)? };
     if plan.attach.is_some() {
         demo.rig.layout = calibrated_layout()?;

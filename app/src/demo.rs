@@ -2,11 +2,15 @@
 
 use crate::not_zeroed;
 use crate::outcome::RunFailure;
+use crate::record::Opened;
 use crate::rig::{HandMode, Rig, RigError};
 use crate::run::{Attach, RunPlan};
 use crate::simulated::SimulatedDevices;
 use io_driver::say::say;
+use rt_core::output_file;
 use shm_abi::client::{self, AttachError};
+use std::fs::Permissions;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tempfile::TempDir;
@@ -51,8 +55,8 @@ fn default_rig(hand: &Path, period_ns: u64) -> Result<Rig, RigError> {
 }
 
 /// Uses a driver that runs at this socket and is free; starts one of our own otherwise, and says why. The recording goes
-/// to this directory.
-pub fn plan(rig: &Rig, socket: PathBuf, directory: Option<&Path>) -> RunPlan {
+/// into this file.
+pub fn plan(rig: &Rig, socket: PathBuf, record: PathBuf) -> RunPlan {
     let attach = match client::observe(&socket, "phantom3 looks around") {
         Ok(seen) if seen.driver.read_latest().is_some_and(|frame| frame.lease != 0) => {
             say(format_args!(
@@ -96,11 +100,10 @@ pub fn plan(rig: &Rig, socket: PathBuf, directory: Option<&Path>) -> RunPlan {
             None
         }
     };
-    let record = vec![recording_place(directory)];
     RunPlan {
         clock: None,
         seconds: Some(SECONDS),
-        record,
+        record: vec![record],
         events: Vec::new(),
         pictures: None,
         window: None,
@@ -112,10 +115,66 @@ pub fn plan(rig: &Rig, socket: PathBuf, directory: Option<&Path>) -> RunPlan {
     }
 }
 
-/// In the directory that is set, or here, if one may write there, else among the temporary files.
-fn recording_place(directory: Option<&Path>) -> PathBuf {
+/// Where the recording goes: into the directory that is set; else here, or where one may not write here, into a directory of
+/// its own among the temporary files, which nobody else can have prepared.
+///
+/// # Errors
+/// A directory that is set and cannot be written, or no room for temporary files.
+pub fn recording_place(directory: Option<&Path>) -> Result<PathBuf, RunFailure> {
     let here = directory.unwrap_or(Path::new("")).join(RECORDING);
-    let writable = std::fs::File::options().append(true).create(true).open(&here).is_ok();
-    let place = if writable { here } else { std::env::temp_dir().join(RECORDING) };
-    std::path::absolute(&place).unwrap_or(place)
+    // It is opened by the run, which may find that another process writes it.
+    let refused = match Opened::open(&here) {
+        Err(error) if !output_file::is_claimed(&error) => Some(error),
+        _ => None,
+    };
+    let place = match (refused, directory) {
+        (None, _) => here,
+        (Some(error), Some(directory)) => {
+            return Err(RunFailure::Start(format!(
+                "the setting recording.directory is {}, and {} cannot be written: {error}; make that directory, or set another \
+                 one",
+                directory.display(),
+                here.display()
+            )));
+        }
+        (Some(error), None) => {
+            let rights = Permissions::from_mode(0o700);
+            let own = tempfile::Builder::new().prefix("phantom3-demo-").permissions(rights).tempdir();
+            let own = own.map_err(no_room)?;
+            let place = own.keep().join(RECORDING);
+            say(format_args!(
+                "phantom3: {RECORDING} cannot be written here: {error}; the recording goes to {}",
+                place.display()
+            ));
+            place
+        }
+    };
+    Ok(std::path::absolute(&place).unwrap_or(place))
+}
+
+fn no_room(error: std::io::Error) -> RunFailure {
+    RunFailure::Start(format!(
+        "there is no place for temporary files: {error}; set TMPDIR to a directory that can be written"
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_directory_that_is_set_and_cannot_be_written_is_refused() {
+        let place = tempfile::tempdir().expect("a directory");
+        assert_eq!(recording_place(Some(place.path())).expect("room"), place.path().join(RECORDING));
+        assert_eq!(
+            place.path().read_dir().expect("a directory").count(),
+            0,
+            "nothing is made before the run"
+        );
+        let missing = place.path().join("missing");
+        let refused = recording_place(Some(&missing)).expect_err("there is none");
+        assert_eq!(refused.exit_status(), 2);
+        let words = refused.to_string();
+        assert!(words.contains("recording.directory") && words.contains("No such file"), "{words}");
+    }
 }
