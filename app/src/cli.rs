@@ -18,6 +18,7 @@ use crate::check::{self, CheckArgs};
 use crate::convert::{self, ConvertArgs};
 use crate::demo;
 use crate::export::{self, ExportArgs};
+use crate::interrupted;
 use crate::outcome::{RunFailure, Stop};
 use crate::outputs;
 use crate::picture::{self, PlotArgs};
@@ -122,19 +123,13 @@ fn execute() -> ExitCode {
         Some(AppCommand::Check(args)) => settings
             .load()
             .map_or_else(|failure| failed(&failure), |settings| check::execute(&args, &settings)),
-        Some(AppCommand::Convert(args)) => {
-            convert::execute(&args).map_or_else(|failure| failed(&failure), Stop::conclude)
-        }
+        Some(AppCommand::Convert(args)) => conclude_or_take_back(|| convert::execute(&args)),
         Some(AppCommand::Replay(args)) => {
             let result = install_signals().and_then(|signals| replay::execute(&args, &signals));
             result.unwrap_or_else(|failure| failed(&failure))
         }
-        Some(AppCommand::Export(args)) => {
-            export::execute(&args).map_or_else(|failure| failed(&failure), Stop::conclude)
-        }
-        Some(AppCommand::Plot(args)) => {
-            picture::execute(&args).map_or_else(|failure| failed(&failure), Stop::conclude)
-        }
+        Some(AppCommand::Export(args)) => conclude_or_take_back(|| export::execute(&args)),
+        Some(AppCommand::Plot(args)) => conclude_or_take_back(|| picture::execute(&args)),
         Some(AppCommand::Study(command)) => {
             let result = install_signals().and_then(|signals| study::execute(&command, &signals));
             result.map_or_else(|failure| failed(&failure), Stop::conclude)
@@ -233,6 +228,12 @@ fn window_spec(title: &str, settings: &Settings) -> Result<Option<WindowSpec>, R
         pictures: settings.recording_directory.value.clone().unwrap_or_default(),
         carries_devices: false,
     }))
+}
+
+/// Of a command that a signal ends at once, without half a result.
+fn conclude_or_take_back(execute: impl FnOnce() -> Result<Stop, RunFailure>) -> ExitCode {
+    let result = install_signals().and_then(interrupted::watch).and_then(|()| execute());
+    result.map_or_else(|failure| failed(&failure), Stop::conclude)
 }
 
 fn install_signals() -> Result<StopSignals, RunFailure> {

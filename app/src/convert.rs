@@ -6,7 +6,7 @@ use crate::outcome::{RunFailure, Stop};
 use crate::outputs::{self, Output};
 use clap::Args;
 use io_driver::say::say;
-use rt_core::{input_file, output_file};
+use rt_core::{input_file, replacement};
 use std::path::{Path, PathBuf};
 use world::MAX_FILE_BYTES;
 use world::thesis::{Conversion, Converted, ObjectFile, ObjectKind, read_list, read_object};
@@ -41,7 +41,7 @@ pub fn execute(args: &ConvertArgs) -> Result<Stop, RunFailure> {
         say(format_args!("phantom3: {told}"));
     }
     match &args.out {
-        Some(out) => output_file::write(out, &converted.toml)
+        Some(out) => replacement::write(out, &converted.toml)
             .map_err(|error| RunFailure::Start(format!("cannot write {}: {error}", out.display())))?,
         None => outputs::print(&converted.toml),
     }

@@ -27,6 +27,7 @@ pub mod export;
 pub mod fast_loop;
 pub mod fast_step;
 pub mod fast_thread;
+mod interrupted;
 pub mod lists_end;
 pub mod live;
 pub mod moments;

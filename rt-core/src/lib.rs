@@ -15,7 +15,8 @@
 //! aside from what comes at the same phase. [`last_act`] is what a
 //! dying process still stores to the hardware. [`clock`] is under all of them, and [`alloc_guard`] lets a test
 //! show that a loop does not allocate.
-//! [`input_file`] reads files that others name, [`output_file`] opens those to be written, [`separators`] and [`toml_slips`] know what is usually wrong
+//! [`input_file`] reads files that others name, [`output_file`] opens those to be written, [`replacement`] has them
+//! take their places when they are whole, [`separators`] and [`toml_slips`] know what is usually wrong
 //! in tables and in TOML, and [`plain_text`] keeps foreign text from acting on a terminal.
 //! [`doctor`] says whether the machine is ready for any of this, [`read_back`] what root has set for it, and
 //! [`installed`] names what a laboratory's installation consists of.
@@ -44,6 +45,7 @@ pub mod plain_text;
 pub mod privileges;
 pub mod process;
 pub mod read_back;
+pub mod replacement;
 pub mod sandbox;
 pub mod schedule;
 pub mod separators;

@@ -8,7 +8,7 @@
 use nix::errno::Errno;
 use nix::fcntl::{FcntlArg, OFlag, fcntl};
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{self, Write};
+use std::io;
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 
@@ -18,14 +18,6 @@ use std::path::Path;
 /// What the system says; a pipe without a reader.
 pub fn create(path: &Path) -> io::Result<File> {
     open(path, OpenOptions::new().write(true).create(true).truncate(true))
-}
-
-/// Makes the file, or empties it, with this content.
-///
-/// # Errors
-/// As [`create`], and whatever keeps the content from being written.
-pub fn write(path: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
-    create(path)?.write_all(content.as_ref())
 }
 
 /// Opens the file with these options, among which is writing.
@@ -77,7 +69,7 @@ mod tests {
     fn a_pipe_without_a_reader_is_refused_at_once_and_one_with_a_reader_blocks_when_it_is_full() {
         let pipe = std::env::temp_dir().join(format!("output-file-{}", std::process::id()));
         nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).expect("a pipe in TMPDIR");
-        let refused = write(&pipe, "").map_err(|error| error.to_string());
+        let refused = create(&pipe).map(drop).map_err(|error| error.to_string());
         let flags = OFlag::O_NONBLOCK.bits();
         let reader = OpenOptions::new().read(true).custom_flags(flags).open(&pipe);
         let file = create(&pipe);
@@ -101,13 +93,5 @@ mod tests {
         assert!(is_claimed(&refused) && refused.to_string() == "another process writes it", "{refused}");
         let [first, second] = [(); 2].map(|()| create(Path::new("/dev/null")).expect("a device"));
         assert!(claim(&first).is_ok() && claim(&second).is_ok());
-    }
-    #[test]
-    fn a_file_that_is_there_is_replaced() {
-        let path = std::env::temp_dir().join(format!("output-file-replaced-{}", std::process::id()));
-        write(&path, "a longer text").and_then(|()| write(&path, "short")).expect("a file in TMPDIR");
-        let content = std::fs::read(&path).expect("our own");
-        std::fs::remove_file(&path).expect("our own");
-        assert_eq!(content, b"short");
     }
 }

@@ -4,7 +4,7 @@ use crate::draw::Sheet;
 use crate::figure::Figure;
 use crate::font;
 use plotters::prelude::{BitMapBackend, DrawingBackend, IntoDrawingArea, SVGBackend};
-use rt_core::output_file;
+use rt_core::replacement;
 use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -82,7 +82,7 @@ fn write_file(stem: &Path, suffix: &str, bytes: &[u8]) -> Result<(), PlotError> 
     let mut name = stem.as_os_str().to_owned();
     name.push(suffix);
     let file = PathBuf::from(name);
-    output_file::write(&file, bytes).map_err(|source| PlotError::Write { file, source })
+    replacement::write(&file, bytes).map_err(|source| PlotError::Write { file, source })
 }
 
 fn render<DB: DrawingBackend>(figure: &Figure, backend: DB, scale: f64) -> Result<(), PlotError> {

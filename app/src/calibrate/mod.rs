@@ -26,7 +26,7 @@ use live::LiveError;
 use plot::PlotError;
 use report::Report;
 use rt_core::signals::StopSignals;
-use rt_core::{input_file, output_file};
+use rt_core::{input_file, replacement};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -356,7 +356,7 @@ fn save_pairs(file: &Path, pairs: &[Pair]) -> Result<(), CalibrateFailure> {
         text += &numbers.join(",");
         text.push('\n');
     }
-    output_file::write(file, text).map_err(|source| CalibrateFailure::Output { file: file.into(), source })
+    replacement::write(file, text).map_err(|source| CalibrateFailure::Output { file: file.into(), source })
 }
 
 fn refuse_spoilt(found: &Calibration, origin: &str) -> Result<(), CalibrateFailure> {
@@ -385,7 +385,7 @@ fn draw(file: &Path, pairs: &[Pair], found: &Calibration, used: &Fit) -> Result<
         Some(figure::Kind::Png) => figure.png().map_err(plot)?,
         _ => figure.svg().map_err(plot)?.into_bytes(),
     };
-    output_file::write(file, bytes).map_err(|source| CalibrateFailure::Output { file: file.into(), source })
+    replacement::write(file, bytes).map_err(|source| CalibrateFailure::Output { file: file.into(), source })
 }
 
 /// A closed pipe is no reason to fail: nobody wants to know. A full disk is: the result is lost.

@@ -5,7 +5,6 @@
 //! Parquet file cannot be read before its end is written, which is why runs do not record it.
 
 use crate::columns::{Cell, CellKind, Names, columns, each_cell};
-use crate::outcome::RunFailure;
 use crate::record::Opened;
 use crate::recording::RecordingError;
 use crate::row::{BodyRow, Row};
@@ -18,7 +17,6 @@ use parquet::schema::types::{ColumnPath, Type};
 use std::collections::HashMap;
 use std::fs::File;
 use std::io;
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Cells that are gathered at most.
@@ -27,7 +25,6 @@ const GROUP_ROWS: std::ops::RangeInclusive<usize> = 1024..=131_072;
 
 /// A table being written.
 pub(super) struct ParquetFile {
-    path: PathBuf,
     writer: SerializedFileWriter<File>,
     group: Vec<Cells>,
     rows_in_group: usize,
@@ -86,7 +83,6 @@ impl ParquetFile {
         let group = columns.iter().map(|column| Cells::of(column.kind)).collect();
         Ok(Self {
             writer: writer.map_err(failed)?,
-            path,
             group,
             rows_in_group: 0,
             rows_of_group: rows.clamp(*GROUP_ROWS.start(), *GROUP_ROWS.end()),
@@ -95,7 +91,12 @@ impl ParquetFile {
         })
     }
 
-    pub(super) fn append(&mut self, row: &Row, bodies: &[BodyRow], names: &Names) -> Result<(), RunFailure> {
+    pub(super) fn append(
+        &mut self,
+        row: &Row,
+        bodies: &[BodyRow],
+        names: &Names,
+    ) -> Result<(), ParquetError> {
         let Self { group, words, .. } = self;
         let mut columns = group.iter_mut();
         each_cell(row, bodies, names, self.period_ns, |cell| {
@@ -114,18 +115,16 @@ impl ParquetFile {
         if self.rows_in_group < self.rows_of_group { Ok(()) } else { self.write_group() }
     }
 
-    pub(super) fn finish(mut self) -> Result<(), RunFailure> {
+    pub(super) fn finish(mut self) -> Result<(), ParquetError> {
         if self.rows_in_group > 0 {
             self.write_group()?;
         }
-        let Self { path, writer, .. } = self;
-        writer.close().map(drop).map_err(|error| failed(&path, &error))
+        self.writer.close().map(drop)
     }
 
-    fn write_group(&mut self) -> Result<(), RunFailure> {
+    fn write_group(&mut self) -> Result<(), ParquetError> {
         self.rows_in_group = 0;
-        let written = write_columns(&mut self.writer, &mut self.group);
-        written.map_err(|error| failed(&self.path, &error))
+        write_columns(&mut self.writer, &mut self.group)
     }
 }
 
@@ -160,17 +159,6 @@ impl Cells {
             CellKind::Text => Self::Words(Vec::new()),
         }
     }
-}
-
-/// What is there cannot be read, and is taken away.
-fn failed(path: &Path, error: &ParquetError) -> RunFailure {
-    let is_file = path.symlink_metadata().is_ok_and(|found| found.is_file());
-    let is_gone = is_file && std::fs::remove_file(path).is_ok();
-    let left = if is_gone { "nothing is left of it" } else { "what is there is of no use" };
-    let place = path.display();
-    RunFailure::Results(format!(
-        "cannot write {place}: {error}; a Parquet file without its end cannot be read: {left}"
-    ))
 }
 
 #[cfg(test)]

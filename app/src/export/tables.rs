@@ -1,37 +1,48 @@
 //! The tables of an export, written side by side.
 //!
-//! Invariant: a table that cannot be made leaves the others as they were; one that cannot be written any further, or that
-//! nobody reads any more, ends, and the others go on to their ends.
+//! Invariants: a table that cannot be made leaves the others as they were; one that cannot be written any further, or that
+//! nobody reads any more, ends, and the others go on to their ends. A table takes the place of an earlier one when it is
+//! whole ([`Replacement`]).
 
 use super::parquet_file::ParquetFile;
 use super::wrong;
 use crate::columns::Names;
 use crate::outcome::RunFailure;
-use crate::record::destination::TableFormat;
+use crate::record::Opened;
+use crate::record::destination::{TableFormat, is_standard_output};
 use crate::record::read::RecordedRun;
-use crate::record::{Opened, begin_all};
 use crate::recording::{Recording, RecordingError};
 use crate::row::{BodyRow, Row};
 use io_driver::say::say;
-use std::path::PathBuf;
+use parquet::errors::ParquetError;
+use rt_core::output_file::is_claimed;
+use rt_core::replacement::Replacement;
+use std::io;
+use std::path::{Path, PathBuf};
 
 /// Those that are still written, and the first failure of another.
 pub(super) struct Tables {
-    open: Vec<(PathBuf, Table)>,
+    open: Vec<Table>,
     failure: Result<(), RunFailure>,
 }
 
 /// A table being written.
-enum Table {
+struct Table {
+    out: PathBuf,
+    format: Format,
+    /// `None`: it goes to the standard output.
+    replacement: Option<Replacement>,
+}
+
+enum Format {
     Csv(Box<Recording>),
     Parquet(Box<ParquetFile>),
 }
 
 /// Why a table ended before its end.
 enum Ended {
-    /// Who reads the standard output has seen enough.
-    Unread,
-    Failed(RunFailure),
+    Csv(RecordingError),
+    Parquet(ParquetError),
 }
 
 impl Tables {
@@ -40,10 +51,17 @@ impl Tables {
     /// # Errors
     /// The first that cannot be made.
     pub(super) fn begin(outs: &[(PathBuf, TableFormat)], recorded: &RecordedRun) -> Result<Self, RunFailure> {
-        let paths: Vec<&PathBuf> = outs.iter().map(|(out, _)| out).collect();
-        let begun = begin_all(&paths, |number, file| Table::begin(file, outs[number].1, recorded));
-        let begun = begun.map_err(|error| late(&error))?;
-        Ok(Self { open: paths.into_iter().cloned().zip(begun).collect(), failure: Ok(()) })
+        let replace = |(out, _): &(PathBuf, TableFormat)| {
+            let begun = (!is_standard_output(out)).then(|| Replacement::begin(out)).transpose();
+            begun.map_err(|error| not_created(out, &error))
+        };
+        // All of them before one is emptied.
+        let replacements = outs.iter().map(replace).collect::<Result<Vec<_>, _>>()?;
+        let begin = |((out, format), replacement): (&(PathBuf, TableFormat), Option<Replacement>)| {
+            Table::begin(out, *format, replacement, recorded)
+        };
+        let open = outs.iter().zip(replacements).map(begin).collect::<Result<_, _>>()?;
+        Ok(Self { open, failure: Ok(()) })
     }
 
     /// Whether none is written any more.
@@ -54,10 +72,10 @@ impl Tables {
     /// Appends a row to each.
     pub(super) fn append(&mut self, row: &Row, bodies: &[BodyRow], names: &Names) {
         let Self { open, failure } = self;
-        open.retain_mut(|(_, table)| match table.append(row, bodies, names) {
+        open.retain_mut(|table| match table.format.append(row, bodies, names) {
             Ok(()) => true,
             Err(ended) => {
-                note(failure, ended);
+                note(failure, ended.tell(&table.out, table.replacement.as_ref()));
                 false
             }
         });
@@ -66,74 +84,114 @@ impl Tables {
     /// Writes them to their ends; returns those that are whole, and the first failure.
     pub(super) fn finish(self) -> (Vec<PathBuf>, Result<(), RunFailure>) {
         let Self { open, mut failure } = self;
-        let finish = |(out, table): (PathBuf, Table)| match table.finish() {
-            Ok(()) => Some(out),
-            Err(ended) => {
-                note(&mut failure, ended);
-                None
-            }
+        let finish = |table: Table| {
+            let Table { out, format, replacement } = table;
+            let finished = format.finish().map_err(|ended| ended.tell(&out, replacement.as_ref()));
+            finished.map_err(|told| note(&mut failure, told)).ok().map(|()| (out, replacement))
         };
-        (open.into_iter().filter_map(finish).collect(), failure)
+        let whole: Vec<_> = open.into_iter().filter_map(finish).collect();
+        let keep = |(out, replacement): (PathBuf, Option<Replacement>)| {
+            let kept = replacement.map_or(Ok(()), Replacement::keep);
+            kept.map_err(|error| note(&mut failure, Some(not_kept(&out, &error)))).ok().map(|()| out)
+        };
+        (whole.into_iter().filter_map(keep).collect(), failure)
     }
 }
 
 /// The first failure is told last; others are told at once.
-fn note(first: &mut Result<(), RunFailure>, ended: Ended) {
-    match ended {
-        Ended::Unread => {}
-        Ended::Failed(failure) if first.is_ok() => *first = Err(failure),
-        Ended::Failed(failure) => say(format_args!("phantom3: {failure}")),
+fn note(first: &mut Result<(), RunFailure>, failure: Option<RunFailure>) {
+    match failure {
+        None => {}
+        Some(failure) if first.is_ok() => *first = Err(failure),
+        Some(failure) => say(format_args!("phantom3: {failure}")),
     }
 }
 
 impl Table {
-    fn begin(file: Opened, format: TableFormat, recorded: &RecordedRun) -> Result<Self, RecordingError> {
+    fn begin(
+        out: &Path,
+        format: TableFormat,
+        replacement: Option<Replacement>,
+        recorded: &RecordedRun,
+    ) -> Result<Self, RunFailure> {
+        let refused = |error: &io::Error| not_created(out, error);
+        let file = match &replacement {
+            Some(replacement) => Opened::of(replacement.file().map_err(|error| refused(&error))?, out),
+            None => Opened::open(out).map_err(|error| refused(&error))?,
+        };
         let (names, period_ns) = (recorded.names(), recorded.period_ns());
-        Ok(match format {
-            TableFormat::Csv => Self::Csv(Box::new(Recording::begin(file, names.clone(), period_ns)?)),
-            TableFormat::Parquet => Self::Parquet(Box::new(ParquetFile::begin(file, names, period_ns)?)),
-        })
+        let format = match format {
+            TableFormat::Csv => {
+                Recording::begin(file, names.clone(), period_ns).map(|csv| Format::Csv(Box::new(csv)))
+            }
+            TableFormat::Parquet => {
+                ParquetFile::begin(file, names, period_ns).map(|parquet| Format::Parquet(Box::new(parquet)))
+            }
+        };
+        let format = format.map_err(|error| match error {
+            RecordingError::Create { source, .. } => refused(&source),
+            other => wrong(&other),
+        })?;
+        Ok(Self { out: out.into(), format, replacement })
     }
+}
 
+impl Format {
     fn append(&mut self, row: &Row, bodies: &[BodyRow], names: &Names) -> Result<(), Ended> {
         match self {
             Self::Csv(csv) => {
                 csv.learn_entities(names);
-                Ok(csv.append(row, bodies)?)
+                csv.append(row, bodies).map_err(Ended::Csv)
             }
-            Self::Parquet(parquet) => parquet.append(row, bodies, names).map_err(Ended::Failed),
+            Self::Parquet(parquet) => parquet.append(row, bodies, names).map_err(Ended::Parquet),
         }
     }
 
     fn finish(self) -> Result<(), Ended> {
         match self {
-            Self::Csv(csv) => Ok(csv.finish().map(drop)?),
-            Self::Parquet(parquet) => parquet.finish().map_err(Ended::Failed),
+            Self::Csv(csv) => csv.finish().map(drop).map_err(Ended::Csv),
+            Self::Parquet(parquet) => parquet.finish().map_err(Ended::Parquet),
         }
     }
 }
 
-impl From<RecordingError> for Ended {
-    fn from(error: RecordingError) -> Self {
-        if error.is_of_a_reader_who_left() { Self::Unread } else { Self::Failed(late(&error)) }
+impl Ended {
+    /// In words; `None`: who reads the standard output has seen enough.
+    fn tell(self, out: &Path, replacement: Option<&Replacement>) -> Option<RunFailure> {
+        let is_beside = replacement.is_some_and(Replacement::is_beside);
+        let place = out.display();
+        let words = match self {
+            Self::Csv(error) if error.is_of_a_reader_who_left() => return None,
+            Self::Csv(RecordingError::Write { file, source, .. }) if is_beside => {
+                format!("cannot write {}: {source}; {NOTHING_LEFT}", file.display())
+            }
+            Self::Csv(RecordingError::Write { file, source, rows, .. }) => {
+                format!("cannot write {}: {source}; it is complete up to its row {rows}", file.display())
+            }
+            Self::Csv(error) => error.to_string(),
+            Self::Parquet(error) => {
+                let left = if is_beside { NOTHING_LEFT } else { "what is there is of no use" };
+                format!(
+                    "cannot write {place}: {error}; a Parquet file without its end cannot be read: {left}"
+                )
+            }
+        };
+        Some(RunFailure::Results(words))
     }
 }
 
-/// In the words of an export.
-fn late(error: &RecordingError) -> RunFailure {
-    match error {
-        RecordingError::Create { file, source } => wrong(&format_args!(
-            "cannot create {}: {source}; name a file that can be written",
-            file.display()
-        )),
-        RecordingError::Claimed { file } => wrong(&format_args!(
-            "cannot create {}: another process writes it; name another file, or wait until that has ended",
-            file.display()
-        )),
-        RecordingError::Format(error) => wrong(error),
-        RecordingError::Write { file, source, rows, .. } => RunFailure::Results(format!(
-            "cannot write {}: {source}; it is complete up to its row {rows}",
-            file.display()
-        )),
+const NOTHING_LEFT: &str = "nothing is left of it, and what was there is as it was";
+
+fn not_created(out: &Path, error: &io::Error) -> RunFailure {
+    let place = out.display();
+    if is_claimed(error) {
+        return wrong(&format_args!(
+            "cannot create {place}: {error}; name another file, or wait until that has ended"
+        ));
     }
+    wrong(&format_args!("cannot create {place}: {error}; name a file that can be written"))
+}
+
+fn not_kept(out: &Path, error: &io::Error) -> RunFailure {
+    RunFailure::Results(format!("cannot write {}: {error}; {NOTHING_LEFT}", out.display()))
 }

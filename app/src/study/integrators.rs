@@ -21,7 +21,7 @@ use crate::progress::StatusLine;
 use clap::Args;
 use io_driver::say::say;
 use physics::Integrator;
-use rt_core::output_file;
+use rt_core::replacement;
 use rt_core::signals::StopSignals;
 use std::path::PathBuf;
 
@@ -146,7 +146,7 @@ fn write(args: &IntegratorsArgs, spun: &[Spun], leant: &[Leant], held: &[Held]) 
     ];
     for (name, text) in tables {
         let file = args.out.join(name);
-        output_file::write(&file, text).map_err(|error| {
+        replacement::write(&file, text).map_err(|error| {
             let place = file.display();
             RunFailure::Results(format!(
                 "cannot write {place}: {error}; name a directory that can be written with --out"

@@ -4,7 +4,7 @@ use super::Answer;
 use super::kept::Kept;
 use super::search::{Found, LEAST_N_PER_M, MOST_N_PER_M};
 use super::trial::Bench;
-use rt_core::output_file;
+use rt_core::replacement;
 use std::fmt::Write as _;
 use std::io;
 use std::path::Path;
@@ -132,7 +132,7 @@ fn shown(found: Found) -> String {
 /// # Errors
 /// If it cannot be written.
 pub fn write_csv(file: &Path, bench: &Bench, answers: &[Answer]) -> Result<(), TableError> {
-    output_file::write(file, csv(bench, answers)).map_err(|source| TableError { file: file.into(), source })
+    replacement::write(file, csv(bench, answers)).map_err(|source| TableError { file: file.into(), source })
 }
 
 fn csv(bench: &Bench, answers: &[Answer]) -> String {

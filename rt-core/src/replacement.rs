@@ -1,0 +1,274 @@
+//! File that takes the place of another once it is whole.
+//!
+//! Problem: a command that is interrupted while it writes its result leaves half a file, and what was there before is
+//! gone.
+//! Model: the result goes into a file beside the place, which is renamed at the end. Pipes and devices are written
+//! directly, and so is a file whose directory takes no other. A link goes on leading to its file, which keeps its rights.
+//! Who catches signals calls [`abandon_all`] before the process ends.
+//! Invariant: at the place there is the former file or the whole new one, whatever ends the process; of an end that
+//! nobody catches a file is left whose name begins with a dot and ends in `.part`.
+
+use crate::output_file;
+use std::fs::{File, OpenOptions, Permissions};
+use std::io;
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Files that have not taken their places.
+static UNFINISHED: Mutex<Vec<Unfinished>> = Mutex::new(Vec::new());
+/// A link that leads to so many others leads nowhere.
+const MOST_LINKS: u32 = 40;
+
+struct Unfinished {
+    /// `None`: it is written where it is to be.
+    beside: Option<PathBuf>,
+    place: PathBuf,
+}
+
+/// What became of a file that was not finished.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Abandoned {
+    /// Where it was to be.
+    pub place: PathBuf,
+    /// Whether nothing is left of it, and its place is as it was.
+    pub is_gone: bool,
+}
+
+/// While this is held no file takes its place.
+pub struct Held {
+    _all: MutexGuard<'static, Vec<Unfinished>>,
+}
+
+/// A file being written.
+#[derive(Debug)]
+pub struct Replacement {
+    file: File,
+    /// `None`: it is written where it is to be.
+    beside: Option<PathBuf>,
+    /// Where a link leads to.
+    place: PathBuf,
+    /// Claimed until the other one has its place.
+    former: Option<File>,
+}
+
+impl Replacement {
+    /// Begins a file that is to be here. Where it is written directly it has its former content until it is emptied.
+    ///
+    /// # Errors
+    /// If it could not take its place: what is there cannot be written, another process writes it, a pipe without a reader.
+    pub fn begin(path: &Path) -> io::Result<Self> {
+        let (place, former) = match path.metadata() {
+            Ok(found) if found.is_file() && !is_descriptor(path) => {
+                let former = output_file::open(path, OpenOptions::new().write(true))?;
+                output_file::claim(&former)?;
+                (path.canonicalize()?, Some((former, found.permissions())))
+            }
+            Err(error) if error.kind() == io::ErrorKind::NotFound => (target_of(path)?, None),
+            _ => return Self::directly(path),
+        };
+        let (former, rights) = former.unzip();
+        match create_beside(&place, rights.as_ref()) {
+            Ok((file, beside)) => {
+                unfinished().push(Unfinished { beside: Some(beside.clone()), place: place.clone() });
+                Ok(Self { file, beside: Some(beside), place, former })
+            }
+            Err(_) if former.is_some() => {
+                // The next one makes the same claim.
+                drop(former);
+                Self::directly(&place)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    fn directly(place: &Path) -> io::Result<Self> {
+        let file = output_file::open(place, OpenOptions::new().write(true))?;
+        if file.metadata()?.is_file() {
+            output_file::claim(&file)?;
+            unfinished().push(Unfinished { beside: None, place: place.into() });
+        }
+        Ok(Self { file, beside: None, place: place.into(), former: None })
+    }
+
+    /// Where to write.
+    ///
+    /// # Errors
+    /// What dup(2) reports.
+    pub fn file(&self) -> io::Result<File> {
+        self.file.try_clone()
+    }
+
+    /// Whether the place stays as it was until the end.
+    pub fn is_beside(&self) -> bool {
+        self.beside.is_some()
+    }
+
+    /// Takes the place.
+    ///
+    /// # Errors
+    /// If that fails, which leaves the place as it was; or another process writes there now.
+    pub fn keep(mut self) -> io::Result<()> {
+        let Some(beside) = self.beside.take() else { return Ok(()) };
+        let mut all = unfinished();
+        let renamed = self.claim_newcomer().and_then(|_newcomer| std::fs::rename(&beside, &self.place));
+        if renamed.is_err() {
+            // Should it be gone already, so much the better.
+            let _ = std::fs::remove_file(&beside);
+        }
+        all.retain(|other| other.beside.as_deref() != Some(&beside));
+        renamed
+    }
+
+    /// Claims what is there now and was not before: a run may record into it.
+    fn claim_newcomer(&self) -> io::Result<Option<File>> {
+        if self.former.is_some() {
+            return Ok(None);
+        }
+        match output_file::open(&self.place, OpenOptions::new().write(true)) {
+            Ok(newcomer) => output_file::claim(&newcomer).map(|()| Some(newcomer)),
+            Err(_) => Ok(None),
+        }
+    }
+}
+
+impl Drop for Replacement {
+    fn drop(&mut self) {
+        let Self { beside, place, .. } = &*self;
+        let mut all = unfinished();
+        if let Some(beside) = beside {
+            // Should it be gone already, so much the better.
+            let _ = std::fs::remove_file(beside);
+        }
+        all.retain(|other| &other.beside != beside || &other.place != place);
+    }
+}
+
+/// Makes the file here, or replaces what is there, with this content.
+///
+/// # Errors
+/// As [`Replacement::begin`], and whatever keeps the content from being written; what was there is as it was then.
+pub fn write(path: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
+    use std::io::Write;
+    let replacement = Replacement::begin(path)?;
+    if !replacement.is_beside() && replacement.file.metadata()?.is_file() {
+        replacement.file.set_len(0)?;
+    }
+    (&replacement.file).write_all(content.as_ref())?;
+    replacement.keep()
+}
+
+/// Removes the files that have not taken their places, and tells of each. None takes its place any more while the answer
+/// is held.
+pub fn abandon_all() -> (Vec<Abandoned>, Held) {
+    let mut all = unfinished();
+    let abandon = |file: Unfinished| {
+        let is_gone = file.beside.is_some_and(|beside| std::fs::remove_file(beside).is_ok());
+        Abandoned { place: file.place, is_gone }
+    };
+    (all.drain(..).map(abandon).collect(), Held { _all: all })
+}
+
+fn unfinished() -> MutexGuard<'static, Vec<Unfinished>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Whether this names what the process has open already.
+fn is_descriptor(path: &Path) -> bool {
+    ["/proc", "/dev/fd", "/dev/stdout", "/dev/stderr"].iter().any(|names| path.starts_with(names))
+}
+
+/// Where a link leads to at which there is nothing yet.
+fn target_of(path: &Path) -> io::Result<PathBuf> {
+    let mut place = path.to_path_buf();
+    for _ in 0..MOST_LINKS {
+        match std::fs::read_link(&place) {
+            Ok(target) => place = place.parent().unwrap_or(Path::new("")).join(target),
+            Err(_) => return Ok(place),
+        }
+    }
+    Err(io::Error::other("too many links lead to one another"))
+}
+
+fn create_beside(place: &Path, rights: Option<&Permissions>) -> io::Result<(File, PathBuf)> {
+    static COUNT: AtomicU64 = AtomicU64::new(0);
+    let name = place.file_name().ok_or_else(|| io::Error::from(io::ErrorKind::InvalidInput))?;
+    loop {
+        let count = COUNT.fetch_add(1, Ordering::Relaxed);
+        let mut hidden = std::ffi::OsString::from(".");
+        // A name may have 255 bytes.
+        hidden.push(if name.len() < 200 { name } else { "result".as_ref() });
+        hidden.push(format!(".{}-{count}.part", std::process::id()));
+        let beside = place.with_file_name(hidden);
+        match OpenOptions::new().write(true).create_new(true).mode(0o666).open(&beside) {
+            Ok(file) => {
+                if let Some(rights) = rights {
+                    file.set_permissions(rights.clone())?;
+                }
+                return Ok((file, beside));
+            }
+            // Left by another process of this number.
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(error),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+    use std::os::unix::fs::PermissionsExt;
+
+    fn names(directory: &Path) -> Vec<String> {
+        let entries = std::fs::read_dir(directory).expect("a directory");
+        let mut names: Vec<_> = entries
+            .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn the_former_file_stays_until_the_new_one_is_whole_and_keeps_its_rights_and_links() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let (place, link) = (directory.path().join("a"), directory.path().join("b"));
+        std::fs::write(&place, "former").expect("room");
+        std::fs::set_permissions(&place, Permissions::from_mode(0o640)).expect("our own");
+        std::os::unix::fs::symlink("a", &link).expect("room");
+        let dropped = Replacement::begin(&link).expect("begun");
+        dropped.file().and_then(|mut file| file.write_all(b"half")).expect("room");
+        assert_eq!(names(directory.path()).len(), 3);
+        drop(dropped);
+        assert_eq!(names(directory.path()), ["a", "b"]);
+        assert_eq!(std::fs::read(&place).expect("there"), b"former");
+        write(&link, "whole").expect("room");
+        assert_eq!(names(directory.path()), ["a", "b"]);
+        assert!(link.symlink_metadata().expect("there").is_symlink());
+        assert_eq!(std::fs::read(&place).expect("there"), b"whole");
+        assert_eq!(place.metadata().expect("there").permissions().mode() & 0o777, 0o640);
+    }
+
+    #[test]
+    fn a_file_that_another_process_writes_is_left_alone_also_if_it_came_later() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let place = directory.path().join("a");
+        let begun = Replacement::begin(&place).expect("nothing is there");
+        let other = output_file::create(&place).expect("room");
+        output_file::claim(&other).expect("nobody else");
+        assert!(output_file::is_claimed(&begun.keep().expect_err("another one came")));
+        assert!(output_file::is_claimed(&write(&place, "x").expect_err("another one is there")));
+        assert_eq!(names(directory.path()), ["a"]);
+        assert_eq!(std::fs::read(&place).expect("there"), b"");
+        drop(other);
+        write(&place, "x").expect("free again");
+    }
+
+    #[test]
+    fn devices_are_written_directly_and_directories_are_refused() {
+        assert!(!Replacement::begin(Path::new("/dev/null")).expect("a device").is_beside());
+        assert_eq!(write(Path::new("/dev/full"), "x").expect_err("full").kind(), io::ErrorKind::StorageFull);
+        assert!(write(&std::env::temp_dir(), "x").is_err());
+    }
+}
