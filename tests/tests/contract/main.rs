@@ -15,6 +15,7 @@ mod gallery;
 mod grasp;
 mod height_map;
 mod impedance;
+mod kept;
 mod lists;
 mod materials;
 mod mesh;

@@ -1,0 +1,280 @@
+//! Results that two processes, a signal, a full disk or a reader who does not read must not cost.
+
+use patience::prelude::*;
+use rustix::process::{Pid, Signal, kill_process};
+use std::fs::File;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+use system_tests::recording::Table;
+use system_tests::workplace::{Running, Said, Workplace};
+
+/// The default scene with its hand, and a recording of so many seconds of it.
+fn workplace(seconds: &str) -> Workplace {
+    let place = Workplace::new();
+    let scene = include_str!("../../../config/scenes/default.toml");
+    place.write("scene.toml", scene.replace("../hands/default.csv", "hand.csv"));
+    place.write("hand.csv", include_str!("../../../config/hands/default.csv"));
+    if seconds != "0" {
+        let files = ["--record", "r.mcap", "--record", "r.csv"];
+        let said =
+            place.run(["run", "scene.toml", "--clock", "virtual", "--seconds", seconds].iter().chain(&files));
+        assert_eq!(said.status, Some(0), "{}", said.err);
+    }
+    place
+}
+
+fn signal(running: &Running, signal: Signal) {
+    kill_process(Pid::from_child(&running.child), signal).expect("our child");
+}
+
+/// A pipe with a reader who never reads, and no room.
+fn full_pipe(path: &Path) -> File {
+    let mode = rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR;
+    rustix::fs::mknodat(rustix::fs::CWD, path, rustix::fs::FileType::Fifo, mode, 0).expect("a pipe");
+    let flags = rustix::fs::OFlags::RDWR | rustix::fs::OFlags::NONBLOCK;
+    let pipe = rustix::fs::open(path, flags, rustix::fs::Mode::empty()).expect("our own pipe");
+    while rustix::io::write(&pipe, &[0; 4096]).is_ok() {}
+    pipe.into()
+}
+
+fn hidden(place: &Workplace) -> Vec<String> {
+    let entries = std::fs::read_dir(place.path("")).expect("a directory").flatten();
+    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    names.filter(|name| name.starts_with('.')).collect()
+}
+
+#[test]
+fn a_file_that_a_run_records_into_is_refused_to_everybody_else_and_comes_out_whole() {
+    let place = workplace("1");
+    let mut program = place.phantom3();
+    program.args(["run", "scene.toml", "--headless", "--seconds", "600", "--events", "e.jsonl"]);
+    program.args(["--record", "out.csv", "--record", "out.mcap", "--record", "phantom3-demo.csv"]);
+    let running = Running::start(program);
+    patience::until("a recording", || {
+        std::fs::metadata(place.path("out.csv")).is_ok_and(|file| file.len() > 9000)
+    });
+    let run = ["run", "scene.toml", "--clock", "virtual", "--seconds", "0.1"];
+    let lent = |more: &[&'static str]| [&run[..], more].concat();
+    for second in [
+        lent(&["--record", "out.csv"]),
+        lent(&["--record", "new.csv", "--record", "out.mcap"]),
+        lent(&["--events", "e.jsonl"]),
+        vec!["replay", "r.mcap", "--record", "out.mcap"],
+        vec!["export", "r.mcap", "out.csv"],
+        vec!["--headless"],
+    ] {
+        let said = place.run(&second);
+        assert_eq!((said.status, said.out.as_str()), (Some(2), ""), "{second:?}: {}", said.err);
+        assert!(said.err.contains("another process writes it"), "{second:?}: {}", said.err);
+        assert!(!place.path("new.csv").exists());
+    }
+    signal(&running, Signal::INT);
+    let said = running.wait();
+    assert_eq!(said.status, Some(130), "{}", said.err);
+    for name in ["out.csv", "phantom3-demo.csv"] {
+        let table = Table::read(&place.path(name));
+        assert!(said.out.contains(&format!("{name} ({} rows", table.len())), "{name}: {}", said.out);
+    }
+    let said = place.run(["export", "out.mcap", "again.csv"]);
+    assert_eq!((said.status, said.err.as_str()), (Some(0), ""));
+    let bytes = |name: &str| std::fs::read(place.path(name)).expect("a file");
+    assert!(bytes("again.csv") == bytes("out.csv"));
+    // Whoever comes after it has the file.
+    let said = place.run(lent(&["--record", "out.csv"]));
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    // What everybody may write is nobody's.
+    let null = |seconds: &str| {
+        let mut program = place.phantom3();
+        program.args(["run", "scene.toml", "--headless", "--seconds", seconds, "--record", "/dev/null"]);
+        Running::start(program)
+    };
+    let both = [null("0.5"), null("0.5")].map(Running::wait);
+    assert!(both.iter().all(|said| said.status == Some(0)), "{both:?}");
+}
+
+#[test]
+fn an_export_that_a_signal_ends_leaves_the_earlier_tables_and_nothing_else() {
+    let place = workplace("4");
+    for (name, number, status) in [("csv", Signal::INT, 130), ("parquet", Signal::TERM, 143)] {
+        let out = place.write(format!("out.{name}"), "earlier");
+        let pipe = full_pipe(&place.path(format!("pipe-{name}")));
+        let mut program = place.phantom3();
+        program.arg("export").arg("r.mcap").args([&out, &place.path(format!("pipe-{name}"))]);
+        let running = Running::start(program);
+        patience::until("a file beside", || !hidden(&place).is_empty());
+        signal(&running, number);
+        let said = running.wait();
+        assert_eq!(said.status, Some(status), "{}", said.err);
+        let words = format!("out.{name} is not written; what was there is as it was");
+        assert!(said.err.contains(&words), "{}", said.err);
+        assert_eq!(std::fs::read(&out).expect("the earlier one"), b"earlier");
+        assert_eq!(hidden(&place), Vec::<String>::new());
+        drop(pipe);
+    }
+    let said = place.run(["export", "r.mcap", "out.csv", "new.csv"]);
+    assert_eq!((said.status, said.err.as_str()), (Some(0), ""));
+    let whole = std::fs::read(place.path("r.csv")).expect("a table");
+    assert!(["out.csv", "new.csv"].iter().all(|name| std::fs::read(place.path(name)).unwrap() == whole));
+    assert_eq!(hidden(&place), Vec::<String>::new());
+}
+
+#[test]
+fn an_export_for_which_a_disk_has_no_room_leaves_the_earlier_table() {
+    let place = workplace("2");
+    place.write("out.csv", "earlier");
+    // 50 or 100 kB, as the shell's blocks have 512 or 1024 bytes.
+    let said = place.shell("ulimit -f 100; exec \"$0\" export r.mcap out.csv", &[]);
+    assert_eq!(said.status, Some(3), "{}", said.err);
+    assert!(said.err.contains("nothing is left of it, and what was there is as it was"), "{}", said.err);
+    assert_eq!(std::fs::read(place.path("out.csv")).expect("the earlier one"), b"earlier");
+    assert_eq!(hidden(&place), Vec::<String>::new());
+}
+
+#[test]
+fn a_replay_that_a_signal_ends_calls_identical_only_what_was_compared() {
+    let place = workplace("60");
+    let mut program = place.phantom3();
+    program.args(["replay", "r.mcap", "--record", "again.csv"]);
+    let running = Running::start(program);
+    patience::until("a beginning", || {
+        std::fs::metadata(place.path("again.csv")).is_ok_and(|file| file.len() > 0)
+    });
+    signal(&running, Signal::INT);
+    let said = running.wait();
+    assert_eq!(said.status, Some(130), "{}", said.err);
+    assert!(!said.out.contains("identical: "), "{}", said.out);
+    let end = said.out.lines().last().unwrap_or_default();
+    let (_, ticks) = said.out.split_once("r.mcap (").expect("how many ticks");
+    let (ticks, _) = ticks.split_once(" ticks compared").expect("how many ticks");
+    if ticks == "0" {
+        assert_eq!(end, "nothing was compared");
+        return;
+    }
+    let begins = [
+        format!("identical so far ({ticks} of 60000 rows)"),
+        format!("identical so far ({ticks} of more than "),
+    ];
+    assert!(begins.iter().any(|begin| end.starts_with(begin)), "{}", said.out);
+}
+
+/// How many good rows a command has told, and up to when.
+fn whole_before(said: &Said) -> String {
+    assert_eq!(said.status, Some(3), "{}", said.err);
+    let (_, told) = said.err.split_once("what is whole before it is used: ").expect("how much is whole");
+    told.trim_end().to_owned()
+}
+
+#[test]
+fn export_and_replay_count_the_same_good_rows_of_a_damaged_recording() {
+    let place = workplace("3");
+    let mut bytes = std::fs::read(place.path("r.mcap")).expect("a recording");
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 0x10;
+    place.write("bad.mcap", bytes);
+    let text = std::fs::read_to_string(place.path("r.csv")).expect("a table");
+    let mut lines: Vec<&str> = text.lines().collect();
+    lines[499] = "no row";
+    place.write("bad.csv", lines.join("\n") + "\n");
+    for recording in ["bad.mcap", "bad.csv"] {
+        let told = whole_before(&place.run(["export", recording, "out.csv"]));
+        let replayed = ["replay", recording, "--scene", "scene.toml", "--record", "again.csv"];
+        assert_eq!(whole_before(&place.run(replayed)), told, "{recording}");
+        let rows = Table::read(&place.path("out.csv")).len();
+        assert!(told.starts_with(&format!("{rows} rows, ")), "{recording}: {told}");
+        assert_eq!(Table::read(&place.path("again.csv")).len(), rows, "{recording}");
+    }
+    let told = whole_before(&place.run(["export", "bad.csv", "out.csv"]));
+    assert_eq!(told, "498 rows, up to t = 0.497 s");
+}
+
+#[test]
+fn a_disk_that_is_full_anywhere_leaves_a_recording_without_a_false_end() {
+    let place = workplace("0");
+    let mount = "mkdir -p small && mount -t tmpfs -o size=$SIZE tmpfs small";
+    let inside = format!("{mount} && \"$0\" \"$@\"; end=$?; cp small/out.mcap out.mcap; exit $end");
+    for kilobytes in [200, 260, 332, 408, 500] {
+        let script = format!(
+            "SIZE={kilobytes}k exec unshare --user --map-root-user --mount sh -c '{inside}' \"$0\" \"$@\""
+        );
+        let mut possible = place.prepare(Command::new("unshare"));
+        let tried = "mkdir -p tried && mount -t tmpfs none tried";
+        possible.args(["--user", "--map-root-user", "--mount", "sh", "-c", tried]).stderr(Stdio::null());
+        if !possible.bounded_status().is_ok_and(|status| status.success()) {
+            eprintln!("skipped: no small disk can be mounted here; mcap_file.rs tests the same writes");
+            return;
+        }
+        let said =
+            place.shell(&script, &["--clock", "virtual", "--seconds", "10", "--record", "small/out.mcap"]);
+        assert_eq!(said.status, Some(3), "{kilobytes}: {}{}", said.out, said.err);
+        let (_, told) = said.err.split_once("it is complete up to t = ").expect("how far it goes");
+        let (_, rows) = told.lines().next().and_then(|line| line.split_once(" s (")).expect("how many rows");
+        let said = place.run(["export", "out.mcap", "left.csv"]);
+        assert_eq!(said.status, Some(0), "{kilobytes}: {}", said.err);
+        assert!(said.err.contains("it ends in the middle, as when a disk is full"), "{}", said.err);
+        let left = Table::read(&place.path("left.csv")).len();
+        assert_eq!(format!("{left} rows)"), rows, "{kilobytes}");
+        assert!(left > 0 && left.is_multiple_of(500), "{kilobytes}: {left} rows are no whole half seconds");
+    }
+}
+
+#[test]
+fn events_that_did_not_reach_their_file_are_not_counted() {
+    let place = workplace("0");
+    let said =
+        place.run(["run", "scene.toml", "--clock", "virtual", "--seconds", "3", "--events", "/dev/full"]);
+    assert_eq!(said.status, Some(3), "{}", said.err);
+    assert!(said.err.contains("it is complete up to t = 0 s (0 rows)"), "{}", said.err);
+}
+
+#[test]
+fn a_run_whose_pipe_is_full_from_the_start_begins_and_ends_with_words() {
+    let place = workplace("0");
+    let started = ["out.csv", "out.mcap", "events.csv"].map(|name| {
+        let pipe = full_pipe(&place.path(name));
+        let option = if name.starts_with("events") { "--events" } else { "--record" };
+        let mut program = place.phantom3();
+        program.args(["run", "scene.toml", "--headless", "--seconds", "40000", option, name]);
+        (Running::start(program), pipe)
+    });
+    // Each has begun when it answers a signal; before, it would end at once.
+    std::thread::sleep(Duration::from_secs(5));
+    let begun = Instant::now();
+    for (running, _) in &started {
+        signal(running, Signal::TERM);
+    }
+    for (running, _pipe) in started {
+        let said = running.wait();
+        assert_eq!(said.status, Some(3), "{}", said.err);
+        assert!(said.err.contains("nothing was written for 30 s"), "{}", said.err);
+    }
+    assert!(begun.elapsed() < Duration::from_secs(120), "30 s are waited for: {:?}", begun.elapsed());
+    assert_eq!(place.processes(), Vec::<u32>::new());
+}
+
+#[test]
+fn the_demonstration_records_where_it_was_told_to_or_refuses_and_follows_no_link_of_others() {
+    let place = workplace("0");
+    let said = place.run(["--headless", "--set", "recording.directory=\"missing\""]);
+    assert_eq!((said.status, said.out.as_str()), (Some(2), ""), "{}", said.err);
+    assert!(said.err.contains("recording.directory"), "{}", said.err);
+    // Nobody may write into /proc, not even root. Somebody has prepared the name that was used of old.
+    let temporary = place.path("temporary");
+    std::fs::create_dir(&temporary).expect("a directory");
+    let victim = place.write("victim", "precious");
+    std::os::unix::fs::symlink(&victim, temporary.join("phantom3-demo.csv")).expect("a link");
+    let mut program = place.phantom3();
+    program.arg("--headless").current_dir("/proc").env("TMPDIR", &temporary);
+    let running = Running::start(program);
+    patience::until("words", || running.said_so_far().contains("the recording goes to "));
+    let said = running.wait();
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    let (_, rest) = said.err.split_once("the recording goes to ").expect("where it went");
+    let recording = Path::new(rest.lines().next().expect("a line"));
+    assert!(said.out.contains(&format!("recording    {}", recording.display())), "{}", said.out);
+    assert!(!Table::read(recording).is_empty());
+    assert!(recording.starts_with(&temporary) && recording.parent() != Some(&temporary), "{recording:?}");
+    let rights = std::fs::metadata(recording.parent().expect("its own")).expect("a directory");
+    assert_eq!(std::os::unix::fs::PermissionsExt::mode(&rights.permissions()) & 0o777, 0o700);
+    assert_eq!(std::fs::read(&victim).expect("there"), b"precious");
+}
