@@ -140,7 +140,7 @@ pub fn recording_place(directory: Option<&Path>) -> Result<PathBuf, RunFailure> 
         (Some(error), None) => {
             let rights = Permissions::from_mode(0o700);
             let own = tempfile::Builder::new().prefix("phantom3-demo-").permissions(rights).tempdir();
-            let own = own.map_err(no_room)?;
+            let own = own.map_err(|error| no_room(&error))?;
             let place = own.keep().join(RECORDING);
             say(format_args!(
                 "phantom3: {RECORDING} cannot be written here: {error}; the recording goes to {}",
@@ -152,7 +152,7 @@ pub fn recording_place(directory: Option<&Path>) -> Result<PathBuf, RunFailure> 
     Ok(std::path::absolute(&place).unwrap_or(place))
 }
 
-fn no_room(error: std::io::Error) -> RunFailure {
+fn no_room(error: &std::io::Error) -> RunFailure {
     RunFailure::Start(format!(
         "there is no place for temporary files: {error}; set TMPDIR to a directory that can be written"
     ))
