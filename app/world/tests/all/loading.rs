@@ -104,11 +104,8 @@ fn included_files_that_are_too_large_together_are_refused_where_the_first_too_mu
     }
     let scene = |count: usize| {
         let file = dir.path().join("s.toml");
-        fs::write(
-            &file,
-            format!("[[finger]]\n").replace("[[", &format!("include = {:?}\n[[", &names[..count])),
-        )
-        .expect("write");
+        fs::write(&file, "[[finger]]\n".replace("[[", &format!("include = {:?}\n[[", &names[..count])))
+            .expect("write");
         Scene::load(&file)
     };
     scene(3).expect("below the bound");
