@@ -30,12 +30,17 @@ fn signal(running: &Running, signal: Signal) {
 
 /// A pipe with a reader who never reads, and no room.
 fn full_pipe(path: &Path) -> File {
+    let pipe = unread_pipe(path);
+    while rustix::io::write(&pipe, &[0; 4096]).is_ok() {}
+    pipe
+}
+
+/// A pipe with a reader who never reads.
+fn unread_pipe(path: &Path) -> File {
     let mode = rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR;
     rustix::fs::mknodat(rustix::fs::CWD, path, rustix::fs::FileType::Fifo, mode, 0).expect("a pipe");
     let flags = rustix::fs::OFlags::RDWR | rustix::fs::OFlags::NONBLOCK;
-    let pipe = rustix::fs::open(path, flags, rustix::fs::Mode::empty()).expect("our own pipe");
-    while rustix::io::write(&pipe, &[0; 4096]).is_ok() {}
-    pipe.into()
+    rustix::fs::open(path, flags, rustix::fs::Mode::empty()).expect("our own pipe").into()
 }
 
 fn hidden(place: &Workplace) -> Vec<String> {
@@ -112,11 +117,14 @@ fn an_export_that_a_signal_ends_leaves_the_earlier_tables_and_nothing_else() {
     let place = workplace("4");
     for (name, number, status) in [("csv", Signal::INT, 130), ("parquet", Signal::TERM, 143)] {
         let out = place.write(format!("out.{name}"), "earlier");
-        let pipe = full_pipe(&place.path(format!("pipe-{name}")));
+        let pipe = unread_pipe(&place.path(format!("pipe-{name}")));
         let mut program = place.phantom3();
         program.arg("export").arg("r.mcap").args([&out, &place.path(format!("pipe-{name}"))]);
         let running = Running::start(program);
-        patience::until("a file beside", || !hidden(&place).is_empty());
+        // Beside the earlier one, or in its place.
+        let is_begun =
+            || !hidden(&place).is_empty() || std::fs::read(&out).is_ok_and(|text| text != b"earlier");
+        patience::until("a beginning", is_begun);
         signal(&running, number);
         let said = running.wait();
         assert_eq!(said.status, Some(status), "{}", said.err);
