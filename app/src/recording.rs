@@ -1,6 +1,6 @@
 //! The recording of a run as CSV: a header, then one row per fast tick.
 //!
-//! Model: rows are lines ([`WholeLines`]), so that the file ends with a complete row whatever goes wrong. Numbers are
+//! Model: rows are whole lines (`whole_lines.rs`), so that the file ends with a complete row whatever goes wrong. Numbers are
 //! printed so that reading them back gives the same f64 (the shortest such text).
 //! Units: SI; world frame; forces are forces on the user.
 
