@@ -1,13 +1,14 @@
 //! From a force on the user to converter codes, within what motors and amplifiers stand.
 //!
-//! Model: joint torque `tau = J^T F + share * tau_gravity`; codes by [`MotorMap`]. If a motor would need more
-//! than its amplifier gives or than its warmth allows, the force is cut ([`Drive::attainable`]) before its growth is
-//! bounded, so that it keeps its direction; should there be too much still, all three get the same smaller part.
-//! The currents then warm the motors ([`Heat`]) until the next codes.
+//! Model: joint torque `tau = J^T F + share * tau_gravity`; codes by [`MotorMap`]. If the weight alone would need more of
+//! a motor than its amplifier gives or than its warmth allows, the weight's share is cut first, of all three alike; what
+//! the motors have beyond that is the force's. A force that would need more is cut ([`Drive::attainable`]) before its
+//! growth is bounded, so that it keeps its direction. The currents then warm the motors ([`Heat`]) until the next codes.
 //! Frames and signs: forces on the user in D.
-//! Invariants: codes are always valid ones; the rendered force that is told is what the codes amount to, less
-//! what holds the arm's own weight. Where the Jacobian is too near a singularity to tell the force apart from
-//! the codes, the force before rounding is told.
+//! Invariants: codes are always valid ones. No force is always attainable: the torques that are left for it are a box
+//! that has zero in it. The rendered force that is told is what the codes amount to, less the part of the arm's own
+//! weight that they hold; what they do not hold is weight, as in an arm without compensation. Where the Jacobian is too
+//! near a singularity to tell the force apart from the codes, the force before rounding is told.
 //! Cost: one Jacobian and its inverse; no allocation.
 
 use crate::device::{Effort, Written};
@@ -35,6 +36,15 @@ pub struct Drive {
     current_a: [f64; 3],
     /// The motors were switched off since the time that was last accounted for.
     is_released: bool,
+}
+
+/// What of the arm's weight the motors hold.
+#[derive(Debug, Clone, Copy)]
+struct HeldWeight {
+    /// Of each joint (N m).
+    torque: Vector3<f64>,
+    /// Of the whole, 0 to 1.
+    share: f64,
 }
 
 impl Drive {
@@ -75,9 +85,9 @@ impl Drive {
     /// The largest part of an effort's force that the motors can give in a pose, beside what holds the arm's weight.
     /// A torque that is not a number is left to [`render`](Self::render).
     pub fn attainable(&self, joints: [f64; 3], effort: Effort) -> Restrained {
-        let weight = self.holding_torque(joints, effort.gravity_share);
-        let wanted = self.kinematics.joint_torque(joints, effort.force_on_user_n);
         let allowed = self.allowed_current_a();
+        let weight = self.held_weight(self.holding_torque(joints, effort.gravity_share), allowed).torque;
+        let wanted = self.kinematics.joint_torque(joints, effort.force_on_user_n);
         let share = self.motors.share_within(wanted, weight.into(), allowed);
         if share >= 1.0 {
             return Restrained::whole(effort.force_on_user_n);
@@ -90,22 +100,25 @@ impl Drive {
     /// # Errors
     /// [`FaultReason::MotorNotFinite`] if a torque is not a number.
     pub fn render(&mut self, joints: [f64; 3], effort: Effort) -> Result<([u16; 3], Written), FaultReason> {
-        let weight = self.holding_torque(joints, effort.gravity_share);
+        let whole_weight = self.holding_torque(joints, effort.gravity_share);
         let wanted = Vector3::from(self.kinematics.joint_torque(joints, effort.force_on_user_n));
-        let torque = wanted + weight;
-        if !torque.iter().all(|t| t.is_finite()) {
+        if !(wanted + whole_weight).iter().all(|t| t.is_finite()) {
             return Err(FaultReason::MotorNotFinite);
         }
         let allowed = self.allowed_current_a();
+        let held = self.held_weight(whole_weight, allowed);
+        let share = self.motors.share_within(wanted.into(), held.torque.into(), allowed);
+        let torque = wanted * share + held.torque;
         let command = self.motors.command_within(torque.into(), allowed);
+        // None of a torque for which there is no number of steps.
+        let share = share * command.scale;
         self.current_a = self.motors.current_a(command.codes);
         self.is_released = false;
-        let residual =
-            Vector3::from(self.motors.joint_torque(command.codes)) - weight - wanted * command.scale;
+        let residual = Vector3::from(self.motors.joint_torque(command.codes)) - held.torque - wanted * share;
         let written = Written {
-            force_on_user_n: self.rendered(joints, effort.force_on_user_n * command.scale, residual),
+            force_on_user_n: self.rendered(joints, effort.force_on_user_n * share, residual),
             motor_codes: command.codes.map(i64::from),
-            limits: self.limits(command.scale, allowed),
+            limits: self.limits(share.min(held.share), allowed),
             motor_heat: self.heat.iter().map(Heat::rise).fold(0.0, f64::max),
         };
         Ok((command.codes, written))
@@ -118,6 +131,12 @@ impl Drive {
     fn holding_torque(&self, joints: [f64; 3], share: f64) -> Vector3<f64> {
         let whole = self.gravity.as_ref().map(|gravity| Vector3::from(gravity.holding_torque(joints)));
         whole.map_or_else(Vector3::zeros, |whole| whole * share)
+    }
+
+    /// As much of the weight as the motors can hold.
+    fn held_weight(&self, whole: Vector3<f64>, allowed_a: [f64; 3]) -> HeldWeight {
+        let share = self.motors.share_within(whole.into(), [0.0; 3], allowed_a);
+        HeldWeight { torque: whole * share, share }
     }
 
     /// The force that was scaled, and what the torques that are left over add to it.
@@ -267,16 +286,14 @@ mod tests {
             prop_assert!(force.cross(&attainable).norm() <= 1e-12 * force.norm_squared());
             prop_assert!(attainable.dot(&force) >= 0.0 && attainable.norm() <= force.norm());
             let allowed = drive.allowed_current_a();
-            let weight = drive.holding_torque(joints, 1.0);
-            // Motors so warm that they cannot hold the weight give no force.
-            let holds = drive.motors.command_within(weight.into(), allowed).scale >= 1.0;
+            // Of the weight, what motors hold that are as warm as these.
+            let weight = drive.held_weight(drive.holding_torque(joints, 1.0), allowed).torque;
             let wanted = Vector3::from(drive.kinematics.joint_torque(joints, attainable)) + weight;
             let scale = drive.motors.command_within(wanted.into(), allowed).scale;
-            let is_whole = if holds { scale > 1.0 - 1e-12 } else { attainable == Vector3::zeros() };
-            prop_assert!(is_whole, "{} {}", scale, attainable);
+            prop_assert!(scale > 1.0 - 1e-12, "{} {}", scale, attainable);
             // The longest of its direction: a little more is too much.
             let more = Vector3::from(drive.kinematics.joint_torque(joints, attainable * 1.001)) + weight;
-            let is_cut = attainable.norm() < force.norm() * (1.0 - 1e-9) && holds;
+            let is_cut = attainable.norm() < force.norm() * (1.0 - 1e-9);
             prop_assert!(!is_cut || attainable.norm() < 1e-3
                 || drive.motors.command_within(more.into(), allowed).scale < 1.0);
         }

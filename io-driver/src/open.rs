@@ -1,6 +1,7 @@
 //! From configuration to devices that can be read: files are opened here and nowhere later.
 
 mod simulated;
+mod weight;
 
 pub use simulated::ROUND_TRIP_NS;
 
@@ -24,6 +25,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use thiserror::Error;
+use weight::TooHeavy;
 
 /// Why a device cannot be had.
 #[derive(Debug, Error)]
@@ -31,6 +33,19 @@ pub enum OpenError {
     /// A file cannot be read.
     #[error("device {device}: cannot read {file}: {source}")]
     Unreadable {
+        /// Whose.
+        device: String,
+        /// Which.
+        file: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A description is neither built in nor a file.
+    #[error(
+        "device {device}: `description`: {file} is neither a file that can be read ({source}) nor built in; name a file, or one \
+         of {}", device_file::BUILTIN_NAMES.join(", ")
+    )]
+    NoDescription {
         /// Whose.
         device: String,
         /// Which.
@@ -127,6 +142,26 @@ pub enum OpenError {
         device: String,
         /// Which.
         file: PathBuf,
+    },
+    /// Motors that cannot hold the arm up.
+    #[error(
+        "device {device}: `gravity_compensation`: in its worst pose the weight that {file} describes asks for {weight_nm:.3} N m \
+         of joint {number}, whose motor makes {continuous_nm:.3} N m for ever; expected at least {margin} times the weight, so \
+         that something is left for forces; check [bodies] and [motors], or leave `gravity_compensation` out"
+    )]
+    TooHeavy {
+        /// Whose.
+        device: String,
+        /// Which.
+        file: PathBuf,
+        /// The joint, counted from 1.
+        number: usize,
+        /// What holds it in the worst pose (N m).
+        weight_nm: f64,
+        /// What the continuous current makes (N m).
+        continuous_nm: f64,
+        /// How many times the weight it has to be.
+        margin: f64,
     },
     /// Motors know no time but the real one.
     #[error(
@@ -304,15 +339,29 @@ pub fn mechanism(device: &DeviceConfig, description: &Path) -> Result<ArmFile, O
         DeviceFile::Arm(arm_file) if device.compensates_gravity && arm_file.gravity.is_none() => {
             Err(OpenError::NoBodies { device: name(), file: description.into() })
         }
-        DeviceFile::Arm(arm_file) => Ok(arm_file.in_base(&device.backend.base_orientation())),
+        DeviceFile::Arm(arm_file) => {
+            let arm_file = arm_file.in_base(&device.backend.base_orientation());
+            match weight::too_heavy(&arm_file).filter(|_| device.compensates_gravity) {
+                Some(found) => Err(too_heavy(name(), description, found)),
+                None => Ok(arm_file),
+            }
+        }
         DeviceFile::Ideal(_) => Err(OpenError::NoMechanism { device: name(), file: description.into() }),
     }
+}
+
+fn too_heavy(device: String, file: &Path, found: TooHeavy) -> OpenError {
+    let TooHeavy { joint, weight_nm, continuous_nm } = found;
+    let (file, number, margin) = (file.into(), joint + 1, weight::MARGIN);
+    OpenError::TooHeavy { device, file, number, weight_nm, continuous_nm, margin }
 }
 
 fn describe(device: &DeviceConfig, description: &Path) -> Result<DeviceFile, OpenError> {
     let text = match device_file::builtin(&description.to_string_lossy()) {
         Some(text) => text.to_owned(),
-        None => read(device, description, MAX_TOML_BYTES)?,
+        None => input_file::read_text(description, MAX_TOML_BYTES).map_err(|source| {
+            OpenError::NoDescription { device: device.name.clone(), file: description.into(), source }
+        })?,
     };
     Ok(DeviceFile::parse(&text, description)?)
 }
@@ -510,8 +559,50 @@ mod tests {
         std::fs::write(directory.path().join("large.toml"), large).unwrap();
         let text = "[[device]]\nbackend = \"simulated\"\ndescription = \"large.toml\"\n";
         let config = DriverConfig::parse(text, &directory.path().join("driver.toml")).unwrap();
-        let Err(OpenError::Unreadable { source, .. }) = open_devices(&config) else { panic!("it was read") };
+        let Err(OpenError::NoDescription { source, .. }) = open_devices(&config) else {
+            panic!("it was read")
+        };
         assert!(source.to_string().contains("larger than 65536 bytes"), "{source}");
+    }
+
+    #[test]
+    fn a_description_that_is_not_there_is_refused_with_the_names_of_those_that_are_built_in() {
+        let text = "[[device]]\nbackend = \"simulated\"\ndescription = \"premium-3.0\"\n";
+        let config = DriverConfig::parse(text, Path::new("driver.toml")).unwrap();
+        let error = open_devices(&config).err().expect("there is none").to_string();
+        let names = device_file::BUILTIN_NAMES.iter().chain(&["premium-3.0"]);
+        names.for_each(|name| assert!(error.contains(name), "{error}"));
+    }
+
+    /// Heavier bodies and weaker motors than a WoodenHaptics has.
+    #[test]
+    fn an_arm_that_its_motors_cannot_hold_for_ever_is_not_compensated() {
+        let mut text = device_file::builtin("wooden-haptics").unwrap().to_owned();
+        for (from, to) in [
+            ("continuous_current_a = 3.0 ", "continuous_current_a = 0.6 "),
+            ("mass_a_kg = 0.0817", "mass_a_kg = 0.15"),
+            ("mass_be_kg = 0.170", "mass_be_kg = 0.40"),
+        ] {
+            assert!(text.contains(from), "{from}");
+            text = text.replace(from, to);
+        }
+        let directory = tempfile::tempdir().unwrap();
+        std::fs::write(directory.path().join("heavy.toml"), text).unwrap();
+        let open = |description: &str, keys: &str| {
+            let text =
+                format!("[[device]]\nbackend = \"simulated\"\ndescription = \"{description}\"\n{keys}");
+            let config = DriverConfig::parse(&text, &directory.path().join("driver.toml")).unwrap();
+            open_devices(&config).map(drop)
+        };
+        let refused = open("heavy.toml", "gravity_compensation = true\n").unwrap_err();
+        let OpenError::TooHeavy { weight_nm, continuous_nm, margin, .. } = refused else {
+            panic!("{refused}")
+        };
+        assert!(continuous_nm < margin * weight_nm, "{refused}");
+        let words = [format!("{weight_nm:.3} N m"), format!("{continuous_nm:.3} N m"), "heavy.toml".into()];
+        words.iter().for_each(|word| assert!(refused.to_string().contains(word), "{refused}"));
+        assert!(open("heavy.toml", "").is_ok(), "its weight is the hand's then");
+        assert!(open("wooden-haptics", "gravity_compensation = true\n").is_ok());
     }
 
     /// A configuration that was not read from a file has not been asked.

@@ -2,8 +2,8 @@
 //!
 //! Model: peak, workspace edge, authority, what the motors can give, slew rate, in this order: the slew rate bounds what
 //! all the others may make of a force from tick to tick, and none of them can make it longer. What motors can give is
-//! a box of torques, a convex set of forces that has zero in it: between a force within it and another one every force
-//! is, so that what the slew rate lets through is given as it is.
+//! a box of torques, a convex set of forces that has zero in it, since the arm's own weight is cut first to what they give:
+//! between a force within it and another one every force is, so that what the slew rate lets through is given as it is.
 //! Frames and signs: forces on the user and positions in the device's base frame D.
 //! Invariants: whatever is commanded, what comes out is finite and within the peak; with no authority it is
 //! exactly zero.
@@ -124,11 +124,15 @@ impl Guard {
         let is_outside = share < 1.0;
         let faded = if is_outside { within_peak * share } else { within_peak };
         let wanted = attainable(faded * authority);
-        let held = attainable(self.slew.last()).force_on_user_n;
+        let held = attainable(self.slew.last());
         let growth_s = elapsed.growth_ns() as f64 / 1e9;
-        let (force, is_slewed) = self.slew.follow_from(held, wanted.force_on_user_n, growth_s);
+        let (force, is_slewed) =
+            self.slew.follow_from(held.force_on_user_n, wanted.force_on_user_n, growth_s);
         let bit = |acted: bool, bit: u64| if acted { bit } else { 0 };
-        let limits = bit(is_cut, LIMIT_PEAK) | bit(is_outside, LIMIT_WORKSPACE) | bit(is_slewed, LIMIT_SLEW);
+        // What shortened the last force shortened the step from there, too.
+        let limits = bit(is_cut, LIMIT_PEAK)
+            | bit(is_outside, LIMIT_WORKSPACE)
+            | bit(is_slewed, LIMIT_SLEW | held.limits);
         Restrained { force_on_user_n: force, limits: limits | wanted.limits }
     }
 
@@ -142,6 +146,7 @@ impl Guard {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use shm_abi::frame::LIMIT_HEAT;
 
     const MS: u64 = 1_000_000;
     const TICK: Elapsed = Elapsed::new(MS, MS);
@@ -165,6 +170,25 @@ mod tests {
         let faded = outside.restrain(Vector3::x(), 1.0, TICK, Restrained::whole);
         assert_eq!(faded.limits, LIMIT_WORKSPACE);
         assert!((faded.force_on_user_n.x - 0.5).abs() < 1e-14, "half of it in mid margin, to rounding");
+    }
+
+    #[test]
+    fn a_step_that_the_loss_of_the_last_force_used_up_is_told_of_both_limits() {
+        for (wanted, told) in [
+            (Vector3::new(6.0, 6.0, 0.0), LIMIT_SLEW | LIMIT_HEAT),
+            // Shortened anyway: the loss changes nothing.
+            (Vector3::x() * 6.0, 0),
+        ] {
+            let mut guard = Guard::new(limits());
+            for _ in 0..4 {
+                guard.restrain(Vector3::x() * 8.0, 1.0, TICK, Restrained::whole);
+            }
+            let within_seven = |force: Vector3<f64>| match force.x <= 7.0 {
+                true => Restrained::whole(force),
+                false => Restrained { force_on_user_n: force * (7.0 / force.x), limits: LIMIT_HEAT },
+            };
+            assert_eq!(guard.restrain(wanted, 1.0, TICK, within_seven).limits, told, "{wanted}");
+        }
     }
 
     /// As after a stall, in which the motors became warm.

@@ -18,6 +18,7 @@ mod score;
 mod cycle;
 mod doctor;
 mod every_arm;
+mod heavy_arm;
 mod kinematics_forces;
 mod kinematics_premium;
 mod kinematics_wooden_haptics;
