@@ -29,6 +29,7 @@ use crate::study::{self, StudyCommand};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, Parser, Subcommand};
 use io_driver::arguments;
+use io_driver::cli::usual_socket;
 use io_driver::config::period_of;
 use io_driver::say::say;
 use rt_core::signals::StopSignals;
@@ -196,7 +197,7 @@ fn run_demo(settings: &Settings, is_headless: bool) -> Result<(Report, Stop), Ru
     let signals = install_signals()?;
     let mut demo = demo::unpack(period_of(DEFAULT_RATE_HZ))?;
     let directory = settings.recording_directory.value.as_deref();
-    let socket = settings.driver_socket.value.clone().unwrap_or_else(endpoint::for_application);
+    let socket = settings.driver_socket.value.clone().unwrap_or_else(|| usual_socket("phantom3"));
     let mut plan = demo::plan(&demo.rig, socket, directory);
     plan.window = if is_headless { None } else { window_spec(&demo.rig.scene.name, settings)? };
     if plan.attach.is_some() {

@@ -4,7 +4,10 @@
 
 mod clearing;
 mod commission;
+mod emergency;
 mod emulate;
+mod listeners;
+mod places;
 mod stopping;
 mod zero;
 
@@ -12,14 +15,15 @@ use crate::config::{Commissioning, DriverConfig};
 use crate::doctor::cli::{self as doctor, DoctorArgs};
 use crate::driver::{self, Fit, RunOptions};
 use crate::monitor::{self, End};
+use crate::print::{self, print_line};
 use crate::say::{self, say};
 use crate::status::Status;
 use clap::{Args, Parser, Subcommand};
 use commission::CommissionArgs;
 use emulate::EmulateArgs;
-use rt_core::plain_text::PlainLines;
+use places::SocketArgs;
+pub use places::usual_socket;
 use shm_abi::client::{self, AttachError};
-use shm_abi::endpoint;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -103,20 +107,6 @@ pub struct StatusArgs {
     watch: bool,
 }
 
-/// Where the driver is.
-#[derive(Debug, Args)]
-pub struct SocketArgs {
-    /// The driver's socket
-    #[arg(long, value_name = "PATH")]
-    socket: Option<PathBuf>,
-}
-
-impl SocketArgs {
-    fn path(&self) -> PathBuf {
-        self.socket.clone().unwrap_or_else(endpoint::for_application)
-    }
-}
-
 /// Runs the program with the process's own arguments.
 pub fn main() -> ExitCode {
     execute(crate::arguments::parse::<Cli>().command)
@@ -133,14 +123,20 @@ pub fn execute(command: DriverCommand) -> ExitCode {
 }
 
 fn execute_with(command: DriverCommand, fit: Option<Fit>) -> ExitCode {
+    let code = perform(command, fit);
+    // A result that nobody got is none.
+    if print::is_lost() && code == ExitCode::SUCCESS { ExitCode::from(EXIT_FAULT) } else { code }
+}
+
+fn perform(command: DriverCommand, fit: Option<Fit>) -> ExitCode {
     match command {
         DriverCommand::Run(args) => run(args, fit),
         DriverCommand::Status(args) if args.watch && !args.json && monitor::has_terminal() => watch(&args),
         DriverCommand::Status(args) => report(status(&args)),
-        DriverCommand::Stop(args) => stopping::stop(&args.path()),
+        DriverCommand::Stop(args) => stopping::stop(&args.places()),
         DriverCommand::Doctor(args) => doctor::run(&args),
         DriverCommand::ClearFault(args) => clearing::clear_fault(&args.path()),
-        DriverCommand::EmergencyStop(args) => stopping::emergency_stop(&args.path()),
+        DriverCommand::EmergencyStop(args) => emergency::emergency_stop(&args.places()),
         DriverCommand::EndLease(args) => report(client::end_lease(&args.path(), "io-driver")),
         DriverCommand::Zero(args) => zero::run(&args),
         DriverCommand::Commission(args) => commission::run(&args),
@@ -191,25 +187,17 @@ fn status(args: &StatusArgs) -> Result<(), AttachError> {
             (false, true) => status.line(),
             (false, false) => status.to_string(),
         };
-        // A closed pipe is how `| head` says that it has seen enough.
-        if print_line(&text).is_err() || !args.watch {
+        if !print_line(&text) || !args.watch {
             return Ok(());
         }
         if !attachment.connection.is_open() {
             let words = rt_core::epitaph::read(&attachment.driver.epitaph);
             let words = words.map_or_else(String::new, |words| format!(": {words}"));
-            let _ = print_line(&format!("the driver has ended{words}"));
+            print_line(&format!("the driver has ended{words}"));
             return Ok(());
         }
         std::thread::sleep(Duration::from_secs(1));
     }
-}
-
-fn print_line(text: &str) -> std::io::Result<()> {
-    use std::io::Write;
-    let mut out = std::io::stdout().lock();
-    writeln!(out, "{}", PlainLines(text))?;
-    out.flush()
 }
 
 fn report(result: Result<(), AttachError>) -> ExitCode {

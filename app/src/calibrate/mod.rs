@@ -20,6 +20,7 @@ use calibration::{Calibration, CalibrationError, Fit, Model, Pair, PairsError, c
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::{ArgGroup, Args};
 use default_layout::DefaultLayoutError;
+use io_driver::cli::usual_socket;
 use io_driver::say::say;
 use layout_file::LayoutFileError;
 use live::LiveError;
@@ -318,7 +319,7 @@ fn get_pairs(args: &CalibrateArgs) -> Result<(String, Vec<Pair>), CalibrateFailu
     let signals = StopSignals::install().map_err(CalibrateFailure::Signals)?;
     let socket = args.live.as_ref().filter(|socket| !socket.as_os_str().is_empty());
     let wish = live::Wish {
-        socket: socket.cloned().unwrap_or_else(shm_abi::endpoint::for_application),
+        socket: socket.cloned().unwrap_or_else(|| usual_socket("phantom3")),
         fiducial: args.fiducial,
         other: args.device,
         seconds: args.seconds,

@@ -15,10 +15,10 @@ use crate::simulated::SimulatedDevices;
 use crate::snapshots::PictureArgs;
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
+use io_driver::cli::usual_socket;
 use io_driver::config::period_of;
 use io_driver::say::say;
 use io_driver::sim::hand::model_file::Firmness;
-use shm_abi::endpoint;
 use shm_abi::segment::ClockMode;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -227,7 +227,7 @@ pub(super) fn make_plan(args: &RunArgs, rig: &Rig, settings: &Settings) -> Resul
     let inputs = inputs(args, rig);
     check_outputs(args, &inputs)?;
     let attach = args.attach.as_ref().map(|socket| Attach {
-        socket: if socket.as_os_str().is_empty() { endpoint::for_application() } else { socket.clone() },
+        socket: if socket.as_os_str().is_empty() { usual_socket("phantom3") } else { socket.clone() },
         grace: Duration::from_secs_f64(args.grace),
     });
     Ok(RunPlan {

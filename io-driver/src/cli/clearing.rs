@@ -1,12 +1,14 @@
 //! `io-driver clear-fault`.
 //!
 //! Model: asked, then believed only when a new frame shows that the fault state was left: what caused it may still be
-//! there, a pressed switch or a card without power, and then the next tick is a fault again.
+//! there, a pressed switch or a card without power, and then the next tick is a fault again. Which fault was left is what
+//! the frame before the request tells.
 
-use super::{EXIT_FAULT, EXIT_USAGE, fail, print_line};
+use super::{EXIT_FAULT, EXIT_USAGE, fail};
+use crate::print::print_line;
 use crate::say::say;
 use shm_abi::client;
-use shm_abi::{DriverState, DriverView, FaultReason};
+use shm_abi::{DriverState, DriverView, FaultReason, Frame};
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -20,6 +22,7 @@ const NAME: &str = "io-driver";
 /// Asks, and says what became of it.
 pub(super) fn clear_fault(socket: &Path) -> ExitCode {
     let observer = client::observe(socket, NAME);
+    let before = observer.as_ref().ok().and_then(|observer| observer.driver.read_latest());
     if let Err(error) = client::clear_fault(socket, NAME) {
         return fail(&error, EXIT_USAGE);
     }
@@ -29,15 +32,35 @@ pub(super) fn clear_fault(socket: &Path) -> ExitCode {
     };
     match observer.map(|observer| seen_after(&observer.driver)) {
         Ok(Some(Seen::NoFault)) => {
-            let _ = print_line("the driver is in no fault state");
+            print_line(&cleared(before.as_ref()));
             ExitCode::SUCCESS
         }
         Ok(Some(Seen::Fault(reason))) => {
             let sentence = FaultReason::sentence_for(reason);
-            failed(format_args!("the driver is in its fault state all the same: {sentence}"))
+            let advice = advice(reason);
+            failed(format_args!("the driver is in its fault state all the same: {sentence}{advice}"))
         }
         Ok(None) => failed(format_args!("it was asked, and no new frame shows what became of it")),
         Err(error) => failed(format_args!("it was asked, and cannot be watched: {error}")),
+    }
+}
+
+fn cleared(before: Option<&Frame>) -> String {
+    match before.filter(|frame| frame.state == DriverState::Fault as u64) {
+        Some(frame) => format!("fault cleared: {}", FaultReason::sentence_for(frame.fault)),
+        None => "there was no fault, and there is none".into(),
+    }
+}
+
+/// What to do about a fault that comes again, where something can be said.
+fn advice(reason: u64) -> &'static str {
+    match FaultReason::from_word(reason) {
+        // A driver opens its devices once, when it starts.
+        Some(FaultReason::DeviceRead | FaultReason::DeviceWrite) => {
+            "; a device that was itself started or connected anew since then is not found again by this driver: start the \
+             driver anew (`io-driver stop`, then `io-driver run`)"
+        }
+        _ => "",
     }
 }
 
@@ -69,9 +92,9 @@ mod tests {
     use super::*;
     use bytemuck::Zeroable;
     use patience::prelude::*;
+    use shm_abi::DriverMemory;
     use shm_abi::doorbell::WaitMode;
     use shm_abi::segment::{ClockMode, DriverInfo};
-    use shm_abi::{DriverMemory, Frame};
 
     fn memory() -> DriverMemory {
         let info = DriverInfo {

@@ -1,19 +1,21 @@
 //! `io-driver commission`.
 
+use super::places::SocketArgs;
 use super::zero::Zeroing;
-use super::{EXIT_FAULT, EXIT_USAGE, SocketArgs, fail, print_line};
+use super::{EXIT_FAULT, EXIT_USAGE, fail};
 use crate::commission::hand_check::HandVerdict;
 use crate::commission::motor_check::MotorVerdict;
-use crate::commission::session::Session;
+use crate::commission::session::{Session, SessionError};
 use crate::config::{Backend, DriverConfig};
 use crate::device_file::ArmFile;
 use crate::open;
+use crate::print::print_line;
 use clap::Args;
 use rt_core::signals::StopSignals;
 use shm_abi::client;
 use std::error::Error;
 use std::io::BufRead;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Arguments of `commission`.
@@ -75,8 +77,9 @@ fn commission(args: &CommissionArgs) -> Result<bool, Failure> {
     let config = DriverConfig::load(&args.config).map_err(usage)?;
     let device = choose(&config, args.device.as_deref()).map_err(usage)?;
     let arm_file = describe(&config, device).map_err(usage)?;
-    zero_first(args, device, &signals)?;
-    let attachment = client::command(&args.socket.path(), "io-driver commission").map_err(usage)?;
+    let socket = args.socket.path();
+    prepare(args, &socket, device, &signals)?;
+    let attachment = client::command(&socket, "io-driver commission").map_err(usage)?;
     let mut session = Session::new(attachment, device, &signals).map_err(usage)?;
     let mut all_right = true;
     if !args.motors_only {
@@ -104,10 +107,18 @@ fn commission(args: &CommissionArgs) -> Result<bool, Failure> {
     Ok(all_right)
 }
 
-/// Positions that mean nothing cannot be compared with a hand.
-fn zero_first(args: &CommissionArgs, device: usize, signals: &StopSignals) -> Result<(), Failure> {
-    let socket = args.socket.path();
-    let mut zeroing = Zeroing::attach(&socket, signals).map_err(usage)?;
+/// Nothing is asked of a driver with full force, nor of the person before it. Positions that mean nothing cannot be
+/// compared with a hand, so that zeroing comes first.
+fn prepare(
+    args: &CommissionArgs,
+    socket: &Path,
+    device: usize,
+    signals: &StopSignals,
+) -> Result<(), Failure> {
+    let mut zeroing = Zeroing::attach(socket, signals).map_err(usage)?;
+    if !zeroing.driver().info().is_commissioning {
+        return Err(usage(SessionError::FullForce));
+    }
     if !zeroing.needs(device) {
         return Ok(());
     }
@@ -189,5 +200,5 @@ fn prompt(args: &CommissionArgs, what: &str) -> Result<(), Box<dyn Error>> {
 }
 
 fn say(text: &str) {
-    let _ = print_line(text);
+    print_line(text);
 }

@@ -1,6 +1,6 @@
 //! `io-driver emulate`.
 
-use super::{EXIT_FAULT, EXIT_USAGE, fail, print_line};
+use super::{EXIT_FAULT, EXIT_USAGE, fail};
 use crate::device::encoder_trace::{EncoderReplay, EncoderTrace};
 use crate::device::simulated::Wish;
 use crate::device_file::{self, ArmFile, DeviceFile};
@@ -9,6 +9,7 @@ use crate::emulator::held_arm::HeldArm;
 use crate::emulator::motion::Motion;
 use crate::emulator::process::{Emulator, Play};
 use crate::kinematics::Mechanism;
+use crate::print::print_line;
 use crate::say::say;
 use crate::sim::hand::HandModel;
 use crate::sim::hand::model_file::{self, Firmness};
@@ -121,7 +122,7 @@ fn play(args: &EmulateArgs) -> Result<ExitCode, Box<dyn Error>> {
     say(format_args!("io-driver: playing {}{held_by} at {}", arm_file.name, args.card.display()));
     let tally = Emulator::new(card, arm_file, motion, play).run(play.poll_ns, &signals);
     let _ = std::fs::remove_file(&args.card);
-    let _ = print_line(&serde_json::to_string(&tally)?);
+    print_line(&serde_json::to_string(&tally)?);
     let is_good = tally.wrong() == 0 && tally.lost == 0;
     Ok(if is_good { ExitCode::SUCCESS } else { ExitCode::from(EXIT_FAULT) })
 }
@@ -129,7 +130,9 @@ fn play(args: &EmulateArgs) -> Result<ExitCode, Box<dyn Error>> {
 fn describe(name: &str) -> Result<ArmFile, Box<dyn Error>> {
     let text = match device_file::builtin(name) {
         Some(text) => text.to_owned(),
-        None => read(Path::new(name))?,
+        None => read(Path::new(name)).map_err(|error| {
+            format!("{error}; name a description's file, or one of {}", device_file::BUILTIN_NAMES.join(", "))
+        })?,
     };
     match DeviceFile::parse(&text, Path::new(name))? {
         DeviceFile::Arm(arm_file) => Ok(*arm_file),

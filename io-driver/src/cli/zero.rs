@@ -4,8 +4,10 @@
 //! zero that was granted shows as a device that is not valid and then valid, one that was refused shows as nothing.
 //! The driver judges rest, and whether somebody commands, by itself; what is looked at here is for better words.
 
-use super::{EXIT_FAULT, EXIT_USAGE, SocketArgs, fail, print_line};
+use super::places::SocketArgs;
+use super::{EXIT_FAULT, EXIT_USAGE, fail};
 use crate::device_file::home_pose;
+use crate::print::print_line;
 use crate::safety::elapsed::Elapsed;
 use crate::safety::stillness::Stillness;
 use bytemuck::Zeroable;
@@ -202,7 +204,7 @@ impl<'a> Zeroing<'a> {
         Ok(())
     }
 
-    fn driver(&self) -> &DriverView {
+    pub(super) fn driver(&self) -> &DriverView {
         &self.attachment.driver
     }
 
@@ -380,5 +382,5 @@ impl Drop for LiveLine {
 }
 
 fn say(text: &str) {
-    let _ = print_line(text);
+    print_line(text);
 }

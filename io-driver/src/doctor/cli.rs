@@ -3,6 +3,7 @@
 use super::{examine, segment, to_json};
 use crate::config::DriverConfig;
 use crate::loop_thread::loop_cpu;
+use crate::print;
 use crate::say::say;
 use clap::Args;
 use rt_core::cpu::parse_cpu_list;
@@ -13,7 +14,6 @@ use rt_core::doctor::table::Table;
 use rt_core::doctor::{Finding, Tally};
 use rt_core::plain_text::{PlainJson, PlainLines};
 use shm_abi::endpoint;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -21,6 +21,8 @@ use std::process::ExitCode;
 const EXIT_NOT_READY: u8 = 1;
 /// Bad usage or bad input.
 const EXIT_USAGE: u8 = 2;
+/// What was found could not be told.
+const EXIT_LOST: u8 = 3;
 
 /// Arguments of `doctor`.
 #[derive(Debug, Args)]
@@ -59,7 +61,8 @@ the kernel's command line takes effect at the next boot:
   io-driver doctor --fix-plan > plan.sh
   sudo sh plan.sh
 
-Exit status: 0 nothing fails; 1 something fails, whichever way it is printed; 2 bad usage or input.";
+Exit status: 0 nothing fails; 1 something fails, whichever way it is printed; 2 bad usage or input; \
+3 what was found could not be written.";
 
 /// Examines the machine at hand and prints what was asked for.
 pub fn run(args: &DoctorArgs) -> ExitCode {
@@ -79,9 +82,8 @@ pub fn run(args: &DoctorArgs) -> ExitCode {
         (false, true) => plan::script(&machine, &findings, &plan_names()),
         (false, false) => PlainLines(Table { findings: &findings, spec: &spec }).to_string(),
     };
-    // A closed pipe is how `| head` says that it has seen enough.
-    let _ = std::io::stdout().write_all(text.as_bytes());
-    status_of(&findings)
+    print::print(&text);
+    if print::is_lost() { ExitCode::from(EXIT_LOST) } else { status_of(&findings) }
 }
 
 fn status_of(findings: &[Finding]) -> ExitCode {

@@ -5,6 +5,7 @@ mod ball;
 mod csg;
 mod doctor;
 mod driver_cli;
+mod driver_output;
 mod effects;
 mod emulate;
 mod ended;

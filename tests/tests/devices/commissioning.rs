@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 use patience::prelude::*;
 use rt_core::signals::StopSignals;
 use shm_abi::client;
+use shm_abi::frame::DEVICE_NOT_ZEROED;
 use std::time::Duration;
 use system_tests::faults::hosted::Hosted;
 use system_tests::faults::process::{End, Running, io_driver};
@@ -72,6 +73,18 @@ fn a_driver_with_full_force_is_not_commissioned() {
     assert_eq!(end.status, Some(2), "{end:?}");
     assert!(end.err.contains("not in commissioning mode; start it with `io-driver run --commissioning`"));
     assert_eq!(stand.finish().tally.energised, 0);
+}
+
+/// Not even to zero the device.
+#[test]
+fn nothing_is_asked_of_a_driver_with_full_force_that_has_yet_to_be_zeroed() {
+    let stand = Stand::start(Setup { zeroing: "ask", ..Setup::new("real") });
+    let end = commission(&stand);
+    assert_eq!((end.status, end.out.as_str()), (Some(2), ""), "{end:?}");
+    assert!(end.err.contains("not in commissioning mode"), "{end:?}");
+    let frame = stand.view().read_latest().expect("frames");
+    assert_ne!(frame.devices[0].flags & DEVICE_NOT_ZEROED, 0, "{frame:?}");
+    stand.finish();
 }
 
 #[test]

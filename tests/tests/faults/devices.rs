@@ -7,12 +7,14 @@ use shm_abi::segment::ClockMode;
 use shm_abi::{DriverState, DriverView, FaultReason, Frame};
 use std::sync::atomic::Ordering;
 use system_tests::driver::HANG;
+use system_tests::faults::amplifiers::Amplifiers;
 use system_tests::faults::commander::Commander;
 use system_tests::faults::hosted::Hosted;
 use system_tests::faults::press::{PEAK_N, Table};
 use system_tests::faults::process::{Running, io_driver};
 use system_tests::faults::puppet::{Call, Mood, Strings};
 use system_tests::faults::ring::{RingLog, Told};
+use system_tests::faults::stand::{Setup, Stand};
 use system_tests::recording;
 
 const FORCE: [f64; 3] = [0.0, 2.0, 0.0];
@@ -229,4 +231,29 @@ fn an_app_whose_driver_faults_says_why_and_its_recording_is_complete() {
         assert_eq!(read_latest(&view).state, DriverState::Fault as u64);
         assert_eq!(driver.stop(), Ended::Stopped);
     }
+}
+
+/// The driver holds the registers of the card that was there when it started.
+#[test]
+fn a_card_that_was_started_anew_needs_a_new_driver_and_clear_fault_says_so() {
+    let mut stand = Stand::start(Setup::new("real"));
+    let place = stand.socket().parent().expect("a directory").to_path_buf();
+    let again = Amplifiers::start(&place, stand.setup.limits);
+    drop(std::mem::replace(&mut stand.amplifiers, again));
+    patience::until("the fault", || {
+        stand.view().read_latest().is_some_and(|frame| frame.fault == FaultReason::DeviceRead as u64)
+    });
+    let end = io_driver(&["clear-fault"], &stand.socket());
+    assert_eq!(end.status, Some(3), "{end:?}");
+    assert!(
+        end.err.contains("a device could not be read; ") && end.err.contains("start the driver anew"),
+        "{end:?}"
+    );
+    assert_eq!(io_driver(&["stop"], &stand.socket()).status, Some(0));
+    stand.driver.end();
+    stand.restart_driver();
+    let app = stand.start_app();
+    stand.wait_for_force();
+    drop(app);
+    stand.finish();
 }

@@ -13,5 +13,6 @@ mod garbage;
 mod leases;
 mod rivals;
 mod service;
+mod stops;
 mod stuck_service;
 mod versions;

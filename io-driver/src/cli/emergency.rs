@@ -1,0 +1,229 @@
+//! `io-driver emergency-stop`.
+//!
+//! Model: asked in every way there is, at every place where a driver may be, then believed only when seen. The stop goes
+//! by datagram first, which never waits and needs no thread, then over a connection. It is done when a new frame shows
+//! the fault and no force in any device; in lockstep, where the loop may wait for its commander and tell no new frame,
+//! when the driver has heard it and the frame that stands shows that.
+//! Invariants: no exit status of 0 without that sight from every driver that was asked. Asking comes before any word.
+//! Asking over a connection and looking have threads of their own: neither a driver that does not answer nor one without
+//! a free place delays the words that motors may still be on.
+
+use super::EXIT_FAULT;
+use super::places::{NotAsked, Places, nobody_asked, tell_of_unheard};
+use crate::print::print_outcome;
+use crate::say::say;
+use shm_abi::client::{self, AttachError};
+use shm_abi::segment::ClockMode;
+use shm_abi::{DriverState, DriverView, FaultReason, Frame, stop_socket};
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
+
+/// How long a stop may take before we say that nothing is certain.
+const PROMPT: Duration = Duration::from_millis(100);
+/// How long we look on after that.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// So long a frame stands of a loop in lockstep that waits for its commander.
+const STANDS: Duration = Duration::from_millis(50);
+/// Between two looks at the frames.
+const LOOK: Duration = Duration::from_micros(500);
+/// Between two tries to find a place among those who look on.
+const RETRY: Duration = Duration::from_millis(10);
+const NAME: &str = "io-driver";
+
+const UNCERTAIN: &str =
+    "the emergency stop is not confirmed within 100 ms: the motors may still be on; cut their power";
+
+/// A frame that shows that the motors are off.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Sight {
+    /// That of this tick, told since.
+    New(u64),
+    /// That of this tick, which stands: in lockstep the loop waits for its commander.
+    Stands(u64),
+}
+
+/// What becomes of a stop at one place.
+#[derive(Debug)]
+enum News {
+    Shown(Sight),
+    /// Nobody could be asked, in either way.
+    NotAsked(AttachError),
+}
+
+/// When a driver answered that it has heard the stop.
+type Heard = Arc<OnceLock<Instant>>;
+
+/// Stops the motors, and says whether that was seen.
+pub(super) fn emergency_stop(places: &Places) -> ExitCode {
+    let begun = Instant::now();
+    let sent: Vec<bool> = places.sockets.iter().map(|socket| stop_socket::send(socket).is_ok()).collect();
+    let (tell, news) = channel();
+    let started = places.sockets.iter().zip(&sent).enumerate().try_for_each(|(index, (socket, sent))| {
+        start_threads(socket, *sent, begun, &Teller { index, tell: tell.clone() })
+    });
+    drop(tell);
+    let told = match started {
+        Ok(()) => gather(&news, places.sockets.len(), begun),
+        Err(_) => ask_and_look(places, &sent, begun),
+    };
+    judge(places, told)
+}
+
+/// Passes on what becomes of the stop at one place.
+#[derive(Debug, Clone)]
+struct Teller {
+    index: usize,
+    tell: Sender<(usize, News)>,
+}
+
+impl Teller {
+    fn tell(&self, news: News) {
+        let _ = self.tell.send((self.index, news));
+    }
+}
+
+/// They end with the process, whatever they wait for.
+fn start_threads(socket: &Path, sent: bool, begun: Instant, teller: &Teller) -> std::io::Result<()> {
+    let heard = Heard::default();
+    let (place, ear, asker) = (socket.to_path_buf(), Arc::clone(&heard), teller.clone());
+    std::thread::Builder::new().spawn(move || {
+        if let Err(error) = ask(&place, sent, &ear) {
+            asker.tell(News::NotAsked(error));
+        }
+    })?;
+    let (place, teller) = (socket.to_path_buf(), teller.clone());
+    let looks = move || {
+        if let Some(sight) = wait_for_zero(&place, &heard, begun + PATIENCE) {
+            teller.tell(News::Shown(sight));
+        }
+    };
+    std::thread::Builder::new().spawn(looks).map(drop)
+}
+
+/// Over a connection; an error if nobody can have heard it by datagram either.
+fn ask(socket: &Path, sent: bool, heard: &Heard) -> Result<(), AttachError> {
+    match client::emergency_stop_over_connection(socket, NAME) {
+        Ok(()) => {
+            let _ = heard.set(Instant::now());
+            Ok(())
+        }
+        Err(_) if sent => Ok(()),
+        Err(error) => Err(error),
+    }
+}
+
+/// What is known of each place; `None`: it was asked, and nothing has shown it.
+type Told = Vec<Option<News>>;
+
+fn gather(news: &Receiver<(usize, News)>, places: usize, begun: Instant) -> Told {
+    let mut told: Told = (0..places).map(|_| None).collect();
+    let mut is_warned = false;
+    while told.iter().any(Option::is_none) {
+        let patience = if is_warned { PATIENCE } else { PROMPT };
+        match news.recv_timeout(patience.saturating_sub(begun.elapsed())) {
+            Ok((index, news)) => told[index] = Some(news),
+            Err(_) if !is_warned => {
+                is_warned = true;
+                say(format_args!("io-driver: {UNCERTAIN}"));
+            }
+            Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => break,
+        }
+    }
+    told
+}
+
+/// One after the other, where the system gives no threads: all are asked before anything is said, for nobody may take
+/// the words.
+fn ask_and_look(places: &Places, sent: &[bool], begun: Instant) -> Told {
+    let mut told: Vec<(Heard, Option<News>)> = Vec::new();
+    for (socket, sent) in places.sockets.iter().zip(sent) {
+        let heard = Heard::default();
+        let refused = ask(socket, *sent, &heard).err();
+        told.push((heard, refused.map(News::NotAsked)));
+    }
+    let look = |told: &mut Vec<(Heard, Option<News>)>, until: Instant| {
+        for (socket, (heard, news)) in places.sockets.iter().zip(told) {
+            if news.is_none() {
+                *news = wait_for_zero(socket, heard, until).map(News::Shown);
+            }
+        }
+    };
+    look(&mut told, begun + PROMPT);
+    if told.iter().any(|(_, news)| news.is_none()) {
+        say(format_args!("io-driver: {UNCERTAIN}"));
+        look(&mut told, begun + PATIENCE);
+    }
+    told.into_iter().map(|(_, news)| news).collect()
+}
+
+fn judge(places: &Places, told: Told) -> ExitCode {
+    let (mut shown, mut not_asked, mut unseen) = (Vec::new(), Vec::<NotAsked>::new(), Vec::new());
+    for (socket, news) in places.sockets.iter().cloned().zip(told) {
+        match news {
+            Some(News::Shown(sight)) => shown.push((socket, sight)),
+            Some(News::NotAsked(error)) => not_asked.push((socket, error)),
+            None => unseen.push(socket),
+        }
+    }
+    shown.iter().for_each(|(socket, sight)| print_shown(*sight, &places.told(socket)));
+    for socket in &unseen {
+        let place = places.told(socket);
+        say(format_args!("io-driver: the stop was asked for, and no frame has shown it{place}"));
+    }
+    if shown.is_empty() && unseen.is_empty() {
+        return nobody_asked(places, &not_asked);
+    }
+    if tell_of_unheard(&not_asked) || !unseen.is_empty() {
+        return ExitCode::from(EXIT_FAULT);
+    }
+    ExitCode::SUCCESS
+}
+
+fn print_shown(sight: Sight, place: &str) {
+    let (tick, stands) = match sight {
+        Sight::New(tick) => (tick, ""),
+        Sight::Stands(tick) => {
+            (tick, ", and none has come after it: in lockstep the loop waits for its commander")
+        }
+    };
+    print_outcome(&format!("emergency stop: tick {tick} shows the fault and no force{stands}{place}"));
+}
+
+/// The frame that shows that the motors are off; `None`: the driver is gone, or no frame shows that in time.
+fn wait_for_zero(socket: &Path, heard: &Heard, until: Instant) -> Option<Sight> {
+    let attachment = loop {
+        match client::observe(socket, NAME) {
+            Ok(attachment) => break attachment,
+            Err(AttachError::NoDriver { .. } | AttachError::DriverGone { .. }) => return None,
+            Err(_) if Instant::now() > until => return None,
+            Err(_) => std::thread::sleep(RETRY),
+        }
+    };
+    let driver = &attachment.driver;
+    // What stands there already may be old, and the loop dead.
+    let stale = driver.latest_tick();
+    loop {
+        match driver.read_latest().filter(is_stopped) {
+            Some(frame) if Some(frame.tick) > stale => return Some(Sight::New(frame.tick)),
+            Some(frame) if may_stand(driver, heard) => return Some(Sight::Stands(frame.tick)),
+            _ if !attachment.connection.is_open() || Instant::now() > until => return None,
+            _ => std::thread::sleep(LOOK),
+        }
+    }
+}
+
+/// Whether a frame of before may tell how things stand: in lockstep no motor is written between one frame and the next
+/// but with the reply to it, and what was heard is collected meanwhile. There is no card that runs in lockstep.
+fn may_stand(driver: &DriverView, heard: &Heard) -> bool {
+    driver.info().clock_mode == ClockMode::Lockstep
+        && heard.get().is_some_and(|heard| heard.elapsed() > STANDS)
+}
+
+fn is_stopped(frame: &Frame) -> bool {
+    frame.state == DriverState::Fault as u64
+        && frame.fault == FaultReason::EmergencyStop as u64
+        && frame.present_devices().iter().all(|device| device.force_on_user_n_applied == [0.0; 3])
+}

@@ -1,0 +1,108 @@
+//! Where the driver is: at the socket that somebody named, or in one of the usual places.
+
+use super::{EXIT_FAULT, EXIT_USAGE, listeners};
+use crate::say::say;
+use clap::Args;
+use shm_abi::client::AttachError;
+use shm_abi::endpoint;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Where the driver is.
+#[derive(Debug, Args)]
+pub struct SocketArgs {
+    /// The driver's socket
+    #[arg(long, value_name = "PATH")]
+    socket: Option<PathBuf>,
+}
+
+impl SocketArgs {
+    /// The one driver to ask; says what was passed over.
+    pub(super) fn path(&self) -> PathBuf {
+        self.socket.clone().unwrap_or_else(|| usual_socket("io-driver"))
+    }
+
+    /// Every place where a driver may have to be stopped.
+    pub(super) fn places(&self) -> Places {
+        match self.socket.clone().or_else(endpoint::named) {
+            Some(socket) => Places { sockets: vec![socket], is_named: true },
+            None => Places { sockets: endpoint::candidates(), is_named: false },
+        }
+    }
+}
+
+/// Where `program` finds the driver if nobody names a socket; says what was passed over.
+pub fn usual_socket(program: &str) -> PathBuf {
+    let found = endpoint::find();
+    if let Some(words) = found.words() {
+        say(format_args!("{program}: {words}"));
+    }
+    found.socket
+}
+
+/// Places to ask at.
+#[derive(Debug, Clone)]
+pub(super) struct Places {
+    pub(super) sockets: Vec<PathBuf>,
+    /// Somebody named the one that is in question.
+    pub(super) is_named: bool,
+}
+
+impl Places {
+    /// Where a driver was found: nothing to say if it is the only place.
+    pub(super) fn told(&self, socket: &Path) -> String {
+        if self.sockets.len() > 1 { format!(" ({})", socket.display()) } else { String::new() }
+    }
+}
+
+/// A place where nobody could be asked, and why.
+pub(super) type NotAsked = (PathBuf, AttachError);
+
+/// Tells of the drivers that listen at places where they cannot be asked, a socket's file having been moved, deleted or
+/// closed to us; whether there is one. They push on.
+pub(super) fn tell_of_unheard(not_asked: &[NotAsked]) -> bool {
+    let mut is_one_there = false;
+    for (socket, error) in not_asked {
+        let Some(pid) = listeners::at(socket) else { continue };
+        is_one_there = true;
+        say(format_args!("io-driver: {error}"));
+        let why = match error {
+            AttachError::NoDriver { .. } | AttachError::DriverGone { .. } => {
+                ", and its socket's file was moved or deleted"
+            }
+            _ => "",
+        };
+        say(format_args!(
+            "io-driver: but process {pid} listens there{why}: the motors may still be on; cut their power, or end it with \
+             `kill -TERM {pid}`"
+        ));
+    }
+    is_one_there
+}
+
+/// Nobody could be asked anywhere: says why, and which drivers live elsewhere.
+pub(super) fn nobody_asked(places: &Places, not_asked: &[NotAsked]) -> ExitCode {
+    if tell_of_unheard(not_asked) {
+        return ExitCode::from(EXIT_FAULT);
+    }
+    let is_telling = |(_, error): &&NotAsked| !matches!(error, AttachError::NoDriver { .. });
+    let first = not_asked.iter().find(is_telling).or(not_asked.first());
+    if let Some((_, error)) = first {
+        say(format_args!("io-driver: {error}"));
+    }
+    let mut code = EXIT_USAGE;
+    for other in listeners::all() {
+        let (pid, socket) = (other.pid, other.socket.display());
+        // Whoever names a driver that is not there has at least heard of those that are.
+        if places.is_named {
+            say(format_args!("io-driver: process {pid} is a driver at {socket}, and was not asked"));
+            continue;
+        }
+        code = EXIT_FAULT;
+        say(format_args!(
+            "io-driver: process {pid} is a driver at {socket}, and was not asked: the motors may still be on; use \
+             --socket {socket}, cut their power, or end it with `kill -TERM {pid}`"
+        ));
+    }
+    ExitCode::from(code)
+}
