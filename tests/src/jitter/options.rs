@@ -1,6 +1,6 @@
 //! The command line.
 
-use clap::builder::RangedU64ValueParser;
+use clap::builder::{OsStringValueParser, RangedU64ValueParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -71,7 +71,7 @@ pub struct Measure {
     #[arg(long, value_enum, default_value_t = ReferenceChoice::Auto, conflicts_with = "attach")]
     pub reference: ReferenceChoice,
     /// Look on at a driver that runs already, at this socket or the usual place; nothing else is started
-    #[arg(long, value_name = "SOCKET", num_args = 0..=1, default_missing_value = "", conflicts_with_all = ["load", "gate", "config", "scene", "rate_hz", "cpu", "priority", "phase_us", "spin_margin_us"])]
+    #[arg(long, value_name = "SOCKET", num_args = 0..=1, default_missing_value = "", value_parser = path_or_nothing(), conflicts_with_all = ["load", "gate", "config", "scene", "rate_hz", "cpu", "priority", "phase_us", "spin_margin_us"])]
     pub attach: Option<PathBuf>,
     /// Driver configuration (TOML) [default: two ideal devices that follow the default scene's hand]
     #[arg(long, value_name = "FILE", conflicts_with = "rate_hz")]
@@ -165,6 +165,11 @@ pub struct Judge {
     pub result: PathBuf,
 }
 
+/// Clap's own paths are never empty, not even by default.
+fn path_or_nothing() -> impl TypedValueParser<Value = PathBuf> {
+    OsStringValueParser::new().map(PathBuf::from)
+}
+
 fn parse_slice(text: &str) -> Result<f64, String> {
     let seconds: f64 = text.parse().map_err(|_| "expected a number of seconds".to_owned())?;
     if (0.1..=80_000.0).contains(&seconds) { Ok(seconds) } else { Err("allowed are 0.1 to 80000 s".into()) }
@@ -205,6 +210,16 @@ mod tests {
         assert_eq!(parse_duration("1.5m"), Ok(Duration::from_secs(90)));
         for wrong in ["", "5", "d", "5y", "0s", "1e9d", "-3h", "5µ"] {
             assert!(parse_duration(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn the_socket_to_look_on_at_may_be_left_out() {
+        for (words, socket) in
+            [(&["--attach"][..], ""), (&["--attach", "--quiet"], ""), (&["--attach", "x.sock"], "x.sock")]
+        {
+            let options = Options::try_parse_from([&["jitter"], words].concat()).expect("as --help says");
+            assert_eq!(options.measure.attach, Some(PathBuf::from(socket)), "{words:?}");
         }
     }
 

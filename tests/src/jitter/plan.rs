@@ -7,8 +7,8 @@ use crate::jitter::load::{Kind, LoadPlan};
 use crate::jitter::metric::Style;
 use crate::jitter::options::{Measure, ReferenceChoice};
 use crate::jitter::waiting_loop::{Margin, Order, Wait};
+use io_driver::cli::usual_socket;
 use io_driver::config::{DriverConfig, SpinMargin};
-use shm_abi::endpoint;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -70,7 +70,7 @@ impl Plan {
         let mut notes = Vec::new();
         let reference = choose_reference(options, &config, &mut notes)?;
         let attach = options.attach.as_ref().map(|socket| match socket.as_os_str().is_empty() {
-            true => endpoint::for_application(),
+            true => usual_socket("jitter"),
             false => socket.clone(),
         });
         let styles = if attach.is_some() { vec![Style::Driver] } else { styles(&options.styles)? };
