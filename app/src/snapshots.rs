@@ -376,14 +376,15 @@ impl Drawn {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use patience::prelude::*;
     use std::sync::mpsc::{Sender, channel};
 
     /// Draws nothing, and saves a picture whenever it is told to.
     fn idle(turns: Receiver<()>) -> impl FnOnce(Receiver<Work>, &Progress, &AtomicU64) -> Drawn + Send {
         move |work, steps, written| {
             let mut drawn = Drawn::default();
-            while turns.recv().is_ok()
-                && let Ok(work) = work.recv()
+            while turns.bounded_recv().is_ok()
+                && let Ok(work) = work.bounded_recv()
             {
                 drawn.written += u64::from(matches!(work, Work::Picture(..)));
                 written.store(drawn.written, Ordering::Relaxed);

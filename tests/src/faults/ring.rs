@@ -6,7 +6,7 @@
 
 use crate::driver::HANG;
 use bytemuck::Zeroable;
-use shm_abi::{DriverState, DriverView, Frame, FrameUnavailable, RING_FRAMES, ReplyKind};
+use shm_abi::{DriverState, DriverView, FaultReason, Frame, FrameUnavailable, RING_FRAMES, ReplyKind};
 use std::time::{Duration, Instant};
 
 /// How often waiting looks again; the ring holds far more than what is published meanwhile.
@@ -110,7 +110,10 @@ impl RingLog {
             if pleases(&self.told) {
                 return;
             }
-            assert!(begun.elapsed() < HANG, "{what} does not come; last: {:?}", self.told.last());
+            if begun.elapsed() >= HANG {
+                let fault = FaultReason::sentence_for(driver.read_latest().map_or(0, |frame| frame.fault));
+                panic!("{what} does not come; the driver tells {fault}; last: {:?}", self.told.last());
+            }
             std::thread::sleep(LOOK);
         }
     }

@@ -10,6 +10,7 @@ use std::os::unix::net::{UnixDatagram, UnixListener};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use system_tests::driver::{Driver, resting};
+use system_tests::faults::press::Table;
 use system_tests::faults::process::{End, Running, io_driver};
 use system_tests::programs;
 use tempfile::TempDir;
@@ -55,11 +56,14 @@ impl Places {
 
     /// `io-driver`, which is told no socket.
     fn ask(&self, arguments: &[&str]) -> End {
-        let mut command = programs::io_driver();
-        command.args(arguments).env_remove("PHANTOM3_SOCKET");
+        self.run(programs::io_driver().args(arguments))
+    }
+
+    fn run(&self, command: &mut Command) -> End {
+        command.env_remove("PHANTOM3_SOCKET");
         command.env("RUNTIME_DIRECTORY", self.0.path().join("service"));
         command.env("XDG_RUNTIME_DIR", self.0.path().join("user"));
-        Running::start(&mut command).end()
+        Running::start(command).end()
     }
 }
 
@@ -84,6 +88,9 @@ fn a_socket_of_a_dead_driver_does_not_keep_a_stop_from_the_one_that_lives() {
     let passed = format!("passed over, left over from one that died: {}", places.first().display());
     let status = places.ask(&["status"]);
     assert!(status.status == Some(0) && status.err.contains(&passed), "{status:?}");
+    let table = Table::new();
+    let run = places.run(table.app("real").args(["--seconds", "0.2", "--attach"]));
+    assert!(run.status == Some(0) && run.err.contains(&passed), "{run:?}");
     let stop = places.ask(&["emergency-stop"]);
     assert_eq!(stop.status, Some(0), "{stop:?}");
     assert!(stop.out.contains(&*places.second().to_string_lossy()), "it says which: {stop:?}");
