@@ -100,7 +100,8 @@ mod tests {
             let _ = ended.bounded_recv();
         });
         wait.bounded_recv().unwrap();
-        let seen = ThreadFiles::open().unwrap().read().unwrap();
+        // Threads of other tests end meanwhile.
+        let seen = patience::until_some("all threads", || ThreadFiles::open().ok()?.read().ok());
         assert!(seen.iter().any(|status| status.name == "seen"), "{seen:?}");
         drop(end);
         thread.unwrap().bounded_join().unwrap();
