@@ -209,6 +209,7 @@ impl FastLoop {
         let is_ours = self.frame.lease == commander.lease() && self.frame.state != DriverState::Fault as u64;
         if is_ours {
             self.render(commander, driver);
+            self.tally.answered += 1;
         }
         is_ours
     }

@@ -124,6 +124,7 @@ fn replies_go_on_after_the_last_row_until_the_lease_is_over() {
     told.tell(41, LEASE + 1);
     let remains = told.end();
     assert_eq!((remains.end, remains.fast.tally.rows <= ROWS), (FastEnd::Finished, true));
+    assert_eq!(remains.fast.tally.answered, 40, "as the driver counts them");
 }
 
 /// The one who would give it back may wait for a terminal, for a disk, for a picture.

@@ -72,9 +72,12 @@ pub(super) fn tell_of_unheard(not_asked: &[NotAsked]) -> bool {
             }
             _ => "",
         };
+        let or = match error {
+            AttachError::NoPermission { .. } | AttachError::NotAllowed { .. } => "ask one who may".to_owned(),
+            _ => format!("end it with `kill -TERM {pid}`"),
+        };
         say(format_args!(
-            "io-driver: but process {pid} listens there{why}: the motors may still be on; cut their power, or end it with \
-             `kill -TERM {pid}`"
+            "io-driver: but process {pid} listens there{why}: the motors may still be on; cut their power, or {or}"
         ));
     }
     is_one_there

@@ -296,6 +296,23 @@ mod tests {
     }
 
     #[test]
+    fn the_time_of_a_run_begins_anew_with_each_lease() {
+        let mut safety = active(RAMPS);
+        assert_eq!((safety.run_tick(7), safety.run_tick(9)), (0, 2));
+        for _ in 0..10 {
+            safety.advance(ReplyKind::NoLease, TICK);
+        }
+        assert_eq!(safety.run_tick(19), 12, "until somebody else begins");
+        safety.begin_lease();
+        assert_eq!(safety.run_tick(20), -1);
+        for _ in 0..200 {
+            assert_eq!(safety.run_tick(21), -1);
+            safety.advance(ReplyKind::Fresh, TICK);
+        }
+        assert_eq!((safety.run_tick(221), safety.run_tick(222)), (0, 1));
+    }
+
+    #[test]
     fn a_fault_is_zero_at_once_and_stays_until_it_is_cleared() {
         let mut safety = active(RAMPS);
         assert!(safety.enter_fault(FaultReason::DeviceRead));

@@ -214,6 +214,23 @@ fn who_may_look_may_stop_and_no_more_and_only_administrators_undo_the_stop_of_ot
     assert_eq!(asked.driver.wait().code(), Some(0));
 }
 
+/// Neither was the socket moved, nor may they end the driver.
+#[test]
+fn a_stranger_who_asks_for_an_emergency_stop_is_told_that_others_may() {
+    if role().is_some() || !can_be_others() {
+        return;
+    }
+    let asked = Asked::with("");
+    for path in [asked.driver.socket().to_owned(), shm_abi::stop_socket::path_beside(asked.driver.socket())] {
+        std::fs::set_permissions(path, PermissionsExt::from_mode(0o600)).expect("root may");
+    }
+    let end = asked.ask(4001, &[], "emergency-stop");
+    assert_eq!(end.status, Some(3), "{end:?}");
+    let words = ["no permission", "the motors may still be on", "ask one who may"];
+    assert!(words.iter().all(|word| end.err.contains(word)), "{end:?}");
+    assert!(!end.err.contains("moved or deleted") && !end.err.contains("kill"), "{end:?}");
+}
+
 /// As an installed driver begins: its configuration names no groups.
 #[test]
 fn without_groups_a_stop_of_others_is_for_root_and_the_drivers_user_to_undo() {
