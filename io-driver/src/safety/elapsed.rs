@@ -99,6 +99,23 @@ mod tests {
     }
 
     #[test]
+    fn the_time_of_a_tick_is_its_deadline_unless_it_is_late_and_where_ticks_are_counted_their_sum() {
+        let mut real = TickClock::real(MS);
+        assert_eq!(real.time_ns(), 0, "there was none");
+        for (tick, deadline_ns, now_ns, time_ns) in
+            [(1, 5 * MS, 5 * MS + 7, 5 * MS), (2, 6 * MS, 8 * MS, 8 * MS), (3, 7 * MS, 7 * MS, 8 * MS)]
+        {
+            real.pass(tick, deadline_ns, now_ns);
+            assert_eq!(real.time_ns(), time_ns, "tick {tick}");
+        }
+        let mut counting = TickClock::counting(MS);
+        for (tick, time_ns) in [(7, 0), (8, MS), (11, 4 * MS)] {
+            counting.pass(tick, 99, 1);
+            assert_eq!(counting.time_ns(), time_ns, "tick {tick}");
+        }
+    }
+
+    #[test]
     fn a_clock_that_counts_takes_a_period_for_each_tick_whatever_the_time() {
         let mut clock = TickClock::counting(MS);
         assert_eq!(of(clock.pass(7, 99, 1)), (MS, MS));
