@@ -23,6 +23,17 @@ pub const MAX_TOML_BYTES: u64 = 1 << 16;
 /// A list of numbers of which each remembers its place.
 pub type SpannedList = Spanned<Vec<Spanned<f64>>>;
 
+/// Characters of a value that are repeated to whoever wrote it.
+const MOST_REPEATED: usize = 200;
+
+/// The beginning of a value that is longer than that.
+fn shortened(found: &str) -> String {
+    match found.char_indices().nth(MOST_REPEATED) {
+        Some((end, _)) => format!("{}...", &found[..end]),
+        None => found.to_owned(),
+    }
+}
+
 /// One mistake in a TOML file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TomlReport {
@@ -97,6 +108,7 @@ impl<'a> TomlText<'a> {
 
     /// Refuses the value at `span`.
     pub fn refuse(&self, span: Range<usize>, found: impl Display, allowed: impl Display) -> TomlReport {
+        let found = shortened(&found.to_string());
         self.report(Some(span), format!("found {found}, allowed: {allowed}"))
     }
 

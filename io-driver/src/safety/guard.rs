@@ -176,6 +176,8 @@ mod tests {
     fn a_step_that_the_loss_of_the_last_force_used_up_is_told_of_both_limits() {
         for (wanted, told) in [
             (Vector3::new(6.0, 6.0, 0.0), LIMIT_SLEW | LIMIT_HEAT),
+            // Itself too much for them, as the last one is.
+            (Vector3::new(7.2, 4.4, 0.0), LIMIT_SLEW | LIMIT_HEAT),
             // Shortened anyway: the loss changes nothing.
             (Vector3::x() * 6.0, 0),
         ] {

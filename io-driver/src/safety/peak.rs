@@ -44,6 +44,16 @@ mod tests {
     }
 
     #[test]
+    fn the_peak_is_one_of_length_in_every_direction() {
+        for direction in [[1.0, 0.0, 0.0], [1.0, 1.0, 1.0], [0.0, -3.0, 4.0], [1.0, 2.0, -2.0]] {
+            let unit = Vector3::from(direction).normalize();
+            assert_eq!(limit_force(unit * 8.499, 8.5), (unit * 8.499, false), "{direction:?}");
+            let (limited, was_cut) = limit_force(unit * 8.501, 8.5);
+            assert!(was_cut && (limited - unit * 8.5).norm() < 1e-14, "{direction:?}: {limited}");
+        }
+    }
+
+    #[test]
     fn a_force_that_is_not_finite_becomes_zero() {
         for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             assert_eq!(limit_force(Vector3::new(1.0, bad, 0.0), 8.5), (Vector3::zeros(), true));
