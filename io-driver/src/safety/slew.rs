@@ -174,6 +174,7 @@ mod tests {
         for dt_s in [1e-3, 0.0] {
             assert_eq!(slew.follow(huge, dt_s), (huge, false));
             assert_eq!(slew.follow(-huge, dt_s), (-huge, false));
+            assert_eq!(slew.follow_from(-huge, huge, dt_s), (huge, false), "nothing of it was lost");
             slew.release();
         }
     }
