@@ -32,6 +32,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 use io_driver::arguments;
 use io_driver::cli::usual_socket;
 use io_driver::config::period_of;
+use io_driver::print;
 use io_driver::say::{self, say};
 use rt_core::signals::StopSignals;
 use shm_abi::{client, endpoint};
@@ -94,7 +95,7 @@ enum AppCommand {
     Driver(io_driver::cli::DriverCommand),
 }
 
-/// How long the lines of a run that has ended may take to be written.
+/// Time limit for writing the lines of a run that has ended.
 const LAST_WORDS: Duration = Duration::from_secs(5);
 
 /// Runs the program with the process's own arguments.
@@ -102,7 +103,7 @@ pub fn main() -> ExitCode {
     let ended = execute();
     // The lease is over: nobody is held up but whoever waits for this program.
     say::flush(LAST_WORDS);
-    let lacks_something = outputs::is_lost() && ended == ExitCode::SUCCESS;
+    let lacks_something = print::is_lost() && ended == ExitCode::SUCCESS;
     let code = if lacks_something { ExitCode::from(EXIT_FAULT) } else { ended };
     if view::is_display_lost() {
         // Graphics libraries wait for the window's thread, which waits for ever.

@@ -115,7 +115,7 @@ pub fn plan(rig: &Rig, socket: PathBuf, record: PathBuf) -> RunPlan {
     }
 }
 
-/// Where the recording goes: into the directory that is set; else here, or where one may not write here, into a directory of
+/// Place of the recording: in the directory that is set; else here, or where one may not write here, in a directory of
 /// its own among the temporary files, which nobody else can have prepared.
 ///
 /// # Errors

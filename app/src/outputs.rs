@@ -2,12 +2,11 @@
 
 use crate::outcome::RunFailure;
 use crate::record::destination::{EventFormat, FormatError, RunFormat, is_same_file, is_same_place, shown};
-use io_driver::say::say;
+use io_driver::print::print_for;
 use rt_core::plain_text::PlainLines;
 use std::fmt::Display;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A file to be written.
 #[derive(Debug, Clone, Copy)]
@@ -103,9 +102,6 @@ fn refused(words: std::fmt::Arguments<'_>) -> Result<(), RunFailure> {
     Err(RunFailure::Start(words.to_string()))
 }
 
-/// Whether something that was to be printed did not fit.
-static IS_LOST: AtomicBool = AtomicBool::new(false);
-
 /// Tells people a result: on the standard output, or on standard error where that is a table.
 pub(crate) fn tell(words: &dyn Display, is_output_taken: bool) {
     let words = PlainLines(words);
@@ -117,17 +113,7 @@ pub(crate) fn tell(words: &dyn Display, is_output_taken: bool) {
     }
 }
 
-/// Prints on the standard output. A closed pipe is no reason to fail: nobody wants to know. A full disk is: the result is
-/// lost, which is told once, and [`is_lost`] says so from then on.
+/// Prints on the standard output, as [`io_driver::print`] says.
 pub(crate) fn print(text: &str) {
-    let mut out = io::stdout().lock();
-    let Err(error) = out.write_all(text.as_bytes()).and_then(|()| out.flush()) else { return };
-    if error.kind() != io::ErrorKind::BrokenPipe && !IS_LOST.swap(true, Ordering::Relaxed) {
-        say(format_args!("phantom3: cannot write the standard output: {error}; what was to be told is lost"));
-    }
-}
-
-/// Whether something that was to be printed is lost.
-pub(crate) fn is_lost() -> bool {
-    IS_LOST.load(Ordering::Relaxed)
+    print_for("phantom3", text);
 }

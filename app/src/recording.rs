@@ -33,7 +33,7 @@ pub enum RecordingError {
         "cannot create the recording {file}: another process writes it; name another file, or wait until that has ended"
     )]
     Claimed {
-        /// Which.
+        /// The file.
         file: PathBuf,
     },
     /// Its name says no format.

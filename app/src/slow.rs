@@ -6,7 +6,7 @@ use crate::record::{Beginning, Files, Recorded, Recorder};
 use crate::row::Row;
 use crate::row_queue::RowReceiver;
 use crate::snapshots::{Drawn, Snapshots};
-use crate::spectator::{Lost, Spectator};
+use crate::spectator::{Loss, Spectator};
 use io_driver::say::say;
 use std::fmt::Write;
 use std::path::Path;
@@ -32,7 +32,7 @@ pub struct SlowSide {
     snapshots: Option<Snapshots>,
     /// Who looks on at a window, if anybody does.
     spectator: Option<Spectator>,
-    /// Who moved the fingers is gone.
+    /// The hand that moved the fingers is gone.
     has_lost_its_hand: bool,
     /// Who records when people ask for it, if they may.
     on_request: Option<OnRequest>,
@@ -116,13 +116,13 @@ impl SlowSide {
 
     /// A display that is gone ends a run only if the hand was moved there.
     fn leave_what_shows_nothing(&mut self) {
-        match self.spectator.as_ref().and_then(Spectator::is_lost) {
+        match self.spectator.as_ref().and_then(Spectator::loss) {
             None => {}
-            Some(Lost::Sight) => {
+            Some(Loss::Window) => {
                 say(format_args!("phantom3: the display is gone; the run goes on without a window"));
                 self.spectator = None;
             }
-            Some(Lost::Hand) => {
+            Some(Loss::Hand) => {
                 say(format_args!("phantom3: the display is gone, and with it the hand; the run ends"));
                 self.spectator = None;
                 self.has_lost_its_hand = true;

@@ -34,18 +34,18 @@ pub trait Onlooker {
     fn asked(&mut self) -> Vec<Ask>;
     /// Whether anybody is there still.
     fn is_open(&self) -> bool;
-    /// What went with its display, if that is gone, which nobody closed.
-    fn is_lost(&self) -> Option<Lost> {
+    /// Loss of the display, which nobody closed.
+    fn loss(&self) -> Option<Loss> {
         None
     }
 }
 
-/// A display that is gone.
+/// Loss of a display.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Lost {
-    /// And nothing else.
-    Sight,
-    /// With it whoever moves the fingers.
+pub enum Loss {
+    /// Of the window alone.
+    Window,
+    /// Of the window and of the hand that moved the fingers there.
     Hand,
 }
 
@@ -62,8 +62,8 @@ impl Onlooker for OpenWindow {
         OpenWindow::is_open(self)
     }
 
-    fn is_lost(&self) -> Option<Lost> {
-        view::is_display_lost().then(|| if self.has_reins() { Lost::Hand } else { Lost::Sight })
+    fn loss(&self) -> Option<Loss> {
+        view::is_display_lost().then(|| if self.has_reins() { Loss::Hand } else { Loss::Window })
     }
 }
 
@@ -153,9 +153,9 @@ impl Spectator {
         self.untold.push_back(News::Scene(Box::new(stage)));
     }
 
-    /// What went with its display, if that is gone.
-    pub fn is_lost(&self) -> Option<Lost> {
-        self.window.is_lost()
+    /// Loss of the display.
+    pub fn loss(&self) -> Option<Loss> {
+        self.window.loss()
     }
 
     /// The slow side's turn.

@@ -38,7 +38,7 @@ pub struct Drive {
     is_released: bool,
 }
 
-/// What of the arm's weight the motors hold.
+/// The part of the arm's weight that the motors hold.
 #[derive(Debug, Clone, Copy)]
 struct HeldWeight {
     /// Of each joint (N m).

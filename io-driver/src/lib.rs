@@ -36,7 +36,7 @@ pub mod meter;
 pub mod monitor;
 pub mod motors;
 pub mod open;
-mod print;
+pub mod print;
 pub mod real_loop;
 mod reply;
 pub mod safety;

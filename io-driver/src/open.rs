@@ -48,9 +48,9 @@ pub enum OpenError {
     NoDescription {
         /// Whose.
         device: String,
-        /// Which.
+        /// The file.
         file: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
     /// A switch on a button that the hand file does not tell of: it would never be pressed.
@@ -152,15 +152,15 @@ pub enum OpenError {
     TooHeavy {
         /// Whose.
         device: String,
-        /// Which.
+        /// The description.
         file: PathBuf,
         /// The joint, counted from 1.
         number: usize,
-        /// What holds it in the worst pose (N m).
+        /// Torque that holds it in the worst pose (N m).
         weight_nm: f64,
-        /// What the continuous current makes (N m).
+        /// Torque of the continuous current (N m).
         continuous_nm: f64,
-        /// How many times the weight it has to be.
+        /// Smallest ratio of the two that is allowed.
         margin: f64,
     },
     /// Motors know no time but the real one.

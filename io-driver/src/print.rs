@@ -2,7 +2,7 @@
 //!
 //! Model: a closed pipe is how `| head` says that it has seen enough, and no reason to fail. A full disk is one: the
 //! result is lost, which is told once on standard error and ends a command that only tells something with status 3.
-//! What a stop did counts for more than whether it could be told: it says its words on standard error then, and its
+//! A stop counts for more than the telling of it: it says its words on standard error then, and its
 //! status stays what it is.
 
 use crate::say::say;
@@ -10,7 +10,7 @@ use rt_core::plain_text::PlainLines;
 use std::io::{self, ErrorKind, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Whether something that was to be printed is lost, a stop's words left out.
+/// Something that was to be printed is lost, a stop's words left out.
 static IS_LOST: AtomicBool = AtomicBool::new(false);
 
 /// Prints a line or several; whether somebody reads on.
@@ -20,10 +20,15 @@ pub(crate) fn print_line(text: &str) -> bool {
 
 /// Prints what is plain already; whether somebody reads on.
 pub(crate) fn print(text: &str) -> bool {
+    print_for("io-driver", text)
+}
+
+/// The same for a program of this name.
+pub fn print_for(program: &str, text: &str) -> bool {
     let Err(error) = write(text) else { return true };
     if is_loss(&error) {
         IS_LOST.store(true, Ordering::Relaxed);
-        say_lost(&error);
+        say_lost(program, &error);
     }
     false
 }
@@ -32,15 +37,15 @@ pub(crate) fn print(text: &str) -> bool {
 pub(crate) fn print_outcome(text: &str) {
     match write(&format!("{}\n", PlainLines(text))) {
         Err(error) if is_loss(&error) => {
-            say_lost(&error);
+            say_lost("io-driver", &error);
             say(format_args!("io-driver: {text}"));
         }
         Ok(()) | Err(_) => {}
     }
 }
 
-/// Whether something that was to be printed is lost.
-pub(crate) fn is_lost() -> bool {
+/// Something that was to be printed is lost.
+pub fn is_lost() -> bool {
     IS_LOST.load(Ordering::Relaxed)
 }
 
@@ -54,10 +59,10 @@ fn is_loss(error: &io::Error) -> bool {
 }
 
 /// Once.
-fn say_lost(error: &io::Error) {
+fn say_lost(program: &str, error: &io::Error) {
     static IS_SAID: AtomicBool = AtomicBool::new(false);
     if IS_SAID.swap(true, Ordering::Relaxed) {
         return;
     }
-    say(format_args!("io-driver: cannot write the standard output: {error}; what was to be told is lost"));
+    say(format_args!("{program}: cannot write the standard output: {error}; what was to be told is lost"));
 }

@@ -63,7 +63,7 @@ mod tests {
 
     const MS: u64 = 1_000_000;
 
-    /// What is told of a state for each tick.
+    /// Lines that are told of a state for each tick.
     fn told(states: impl IntoIterator<Item = DriverState>) -> Vec<String> {
         let (mut log, mut drain) = rt_core::log::channel(1024);
         let mut changes = StateLog::new(MS);

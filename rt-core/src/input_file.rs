@@ -37,7 +37,7 @@ pub fn read(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
 /// All that comes out of a stream, such as standard input.
 ///
 /// # Errors
-/// What the system says; [`ErrorKind::FileTooLarge`] beyond `most_bytes`.
+/// The system's error; [`ErrorKind::FileTooLarge`] beyond `most_bytes`.
 pub fn read_all(stream: impl Read, most_bytes: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     stream.take(most_bytes.saturating_add(1)).read_to_end(&mut bytes)?;

@@ -49,7 +49,7 @@ pub fn claim(file: &File) -> io::Result<()> {
     }
 }
 
-/// Whether this is the error of a file that another process has claimed.
+/// The error is that of a file that another process has claimed.
 pub fn is_claimed(error: &io::Error) -> bool {
     error.kind() == io::ErrorKind::ResourceBusy && error.raw_os_error().is_none()
 }

@@ -4,7 +4,7 @@
 //! gone.
 //! Model: the result goes into a file beside the place, which is renamed at the end. Pipes and devices are written
 //! directly, and so is a file whose directory takes no other. A link goes on leading to its file, which keeps its rights.
-//! Who catches signals calls [`abandon_all`] before the process ends.
+//! A process that catches signals calls [`abandon_all`] before it ends.
 //! Invariant: at the place there is the former file or the whole new one, whatever ends the process; of an end that
 //! nobody catches a file is left whose name begins with a dot and ends in `.part`.
 
@@ -27,12 +27,12 @@ struct Unfinished {
     place: PathBuf,
 }
 
-/// What became of a file that was not finished.
+/// Outcome of a file that was not finished.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Abandoned {
-    /// Where it was to be.
+    /// The place that it was to take.
     pub place: PathBuf,
-    /// Whether nothing is left of it, and its place is as it was.
+    /// Nothing is left of it, and its place is as it was.
     pub is_gone: bool,
 }
 
@@ -47,7 +47,7 @@ pub struct Replacement {
     file: File,
     /// `None`: it is written where it is to be.
     beside: Option<PathBuf>,
-    /// Where a link leads to.
+    /// The end of a chain of links.
     place: PathBuf,
     /// Claimed until the other one has its place.
     former: Option<File>,
@@ -92,15 +92,15 @@ impl Replacement {
         Ok(Self { file, beside: None, place: place.into(), former: None })
     }
 
-    /// Where to write.
+    /// The file to write to.
     ///
     /// # Errors
-    /// What dup(2) reports.
+    /// The errors of dup(2).
     pub fn file(&self) -> io::Result<File> {
         self.file.try_clone()
     }
 
-    /// Whether the place stays as it was until the end.
+    /// The place stays as it was until the end.
     pub fn is_beside(&self) -> bool {
         self.beside.is_some()
     }
@@ -174,12 +174,12 @@ fn unfinished() -> MutexGuard<'static, Vec<Unfinished>> {
     UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Whether this names what the process has open already.
+/// The path names a file that the process has open already.
 fn is_descriptor(path: &Path) -> bool {
     ["/proc", "/dev/fd", "/dev/stdout", "/dev/stderr"].iter().any(|names| path.starts_with(names))
 }
 
-/// Where a link leads to at which there is nothing yet.
+/// The end of a chain of links at which there is nothing yet.
 fn target_of(path: &Path) -> io::Result<PathBuf> {
     let mut place = path.to_path_buf();
     for _ in 0..MOST_LINKS {

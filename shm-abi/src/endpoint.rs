@@ -31,12 +31,12 @@ pub fn named() -> Option<PathBuf> {
     named_by(&|name| std::env::var_os(name).map(PathBuf::from))
 }
 
-/// Where an application finds the driver, without a word about what was passed over.
+/// The driver's place for an application, without a word about sockets that were passed over.
 pub fn for_application() -> PathBuf {
     find().socket
 }
 
-/// Where an application finds the driver: the first place where something lies at which somebody may listen, else the
+/// The driver's place for an application: the first place where something lies at which somebody may listen, else the
 /// first that we are not allowed to look at (so that the permission is what gets reported), else the first socket that
 /// is left over, else the preferred place.
 pub fn find() -> Found {
@@ -47,7 +47,7 @@ pub fn find() -> Found {
     }
 }
 
-/// Where the driver is looked for.
+/// The place at which the driver is looked for.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Found {
     /// The place.
@@ -57,7 +57,7 @@ pub struct Found {
 }
 
 impl Found {
-    /// What was passed over, for a person; `None`: nothing was.
+    /// The sockets that were passed over, for a person; `None`: there was none.
     pub fn words(&self) -> Option<String> {
         let names: Vec<String> = self.left_over.iter().map(|path| path.display().to_string()).collect();
         let socket = self.socket.display();
@@ -70,7 +70,7 @@ impl Found {
     }
 }
 
-/// What lies at a place.
+/// State of a place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum There {
     Something,

@@ -49,7 +49,7 @@ impl Rights {
         Self { owner, look: None, command: None, administer: None }
     }
 
-    /// Whether a user in these groups has a right.
+    /// Checks that a user in these groups has a right.
     ///
     /// # Errors
     /// The group that has it, if it is anybody's but root's and the owner's.

@@ -138,7 +138,7 @@ pub(crate) fn make_sure_nobody_listens(path: &Path) -> Result<(), BindError> {
     }
 }
 
-/// Whether a socket lies there at which nobody listens.
+/// A socket lies there at which nobody listens.
 pub(crate) fn is_left_over(path: &Path) -> bool {
     let is_socket = std::fs::metadata(path).is_ok_and(|meta| meta.file_type().is_socket());
     is_socket && probe(path) == Err(Errno::CONNREFUSED)

@@ -90,7 +90,7 @@ impl Opened {
         &self.path
     }
 
-    /// Whether writing may wait for a reader: a pipe, a socket, a terminal.
+    /// Writing to it may wait for a reader: it is a pipe, a socket or a terminal.
     pub fn may_wait(&self) -> bool {
         let Ok(kind) = self.file.metadata().map(|found| found.file_type()) else { return true };
         kind.is_fifo() || kind.is_socket() || kind.is_char_device() && isatty(&self.file)
@@ -142,7 +142,7 @@ pub fn begin_all<T>(
     Ok(begun.into_iter().map(|(_, file)| file).collect())
 }
 
-/// Whether the name still leads to this file, which somebody may have removed before it was claimed.
+/// The name still leads to this file, which somebody may have removed before it was claimed.
 fn is_at(file: &File, path: &Path) -> bool {
     let identity = |found: Metadata| (found.dev(), found.ino());
     match (file.metadata(), path.metadata()) {

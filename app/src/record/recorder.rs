@@ -5,7 +5,7 @@
 //! ([`backpressure`](super::backpressure)). A disk that takes no more is told at once, and the rows that follow are thrown
 //! away: the run goes on. At the end the recorder has as long as it gets on; one that is stuck is given up. A reader of the
 //! standard output who has seen enough is no failure: the recording ends, and so may the run.
-//! What stands before the first row is written here, too, where it may have to wait for a reader.
+//! Everything before the first row is written here, too, if it may have to wait for a reader.
 //! Invariant: on a clock that waits, a recording that lacks a row lacks all behind it, and says so.
 
 use super::backpressure::{Backpressure, Progress, Wait};

@@ -61,7 +61,7 @@ pub(super) struct Difference {
     period_ns: u64,
     /// Names that are in one of both only.
     unmatched: Vec<String>,
-    /// How many rows there are, in words, if not all were to be compared.
+    /// Number of rows, in words, if not all were to be compared.
     of_rows: Option<String>,
 }
 

@@ -86,7 +86,7 @@ impl Feed {
         }
     }
 
-    /// How many rows were not compared yet, in words, with those that were. A large recording is not read to its end for
+    /// Number of rows that were not compared yet, in words, with those that were. A large recording is not read to its end for
     /// that.
     pub(super) fn count_with(&mut self, compared: u64) -> String {
         let mut rows = compared + self.reached.len() as u64 + u64::from(self.next.is_some());

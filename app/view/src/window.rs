@@ -81,7 +81,7 @@ pub fn has_display() -> bool {
     ["WAYLAND_DISPLAY", "DISPLAY"].iter().any(|name| std::env::var_os(name).is_some_and(|at| !at.is_empty()))
 }
 
-/// Whether the display of the window that was opened is gone: its thread stands still for ever then.
+/// The display of the window that was opened is gone: its thread stands still for ever then.
 pub fn is_display_lost() -> bool {
     display_loss::is_lost()
 }
@@ -124,7 +124,7 @@ impl OpenWindow {
         self.asks.try_iter()
     }
 
-    /// Whether its hands are the run's.
+    /// The run's fingers are moved by its hands.
     pub fn has_reins(&self) -> bool {
         self.has_reins
     }

@@ -280,7 +280,7 @@ pub enum SceneError {
     /// Files that are too large together.
     #[error("{at}: found files of more than {limit_bytes} bytes together; allowed: at most that")]
     IncludedTooLarge {
-        /// Where the file that is too much is included.
+        /// Place of the `include` that is too much.
         at: Box<Location>,
         /// The most that they may have.
         limit_bytes: u64,

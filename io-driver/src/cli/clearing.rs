@@ -52,7 +52,7 @@ fn cleared(before: Option<&Frame>) -> String {
     }
 }
 
-/// What to do about a fault that comes again, where something can be said.
+/// Advice for a fault that comes again, if there is any.
 fn advice(reason: u64) -> &'static str {
     match FaultReason::from_word(reason) {
         // A driver opens its devices once, when it starts.

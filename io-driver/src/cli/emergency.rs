@@ -21,9 +21,9 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
-/// How long a stop may take before we say that nothing is certain.
+/// Time limit of a stop, after which we say that nothing is certain.
 const PROMPT: Duration = Duration::from_millis(100);
-/// How long we look on after that.
+/// Time for which we look on after that.
 const PATIENCE: Duration = Duration::from_secs(5);
 /// So long a frame stands of a loop in lockstep that waits for its commander.
 const STANDS: Duration = Duration::from_millis(50);
@@ -45,7 +45,7 @@ enum Sight {
     Stands(u64),
 }
 
-/// What becomes of a stop at one place.
+/// Outcome of a stop at one place.
 #[derive(Debug)]
 enum News {
     Shown(Sight),
@@ -115,7 +115,7 @@ fn ask(socket: &Path, sent: bool, heard: &Heard) -> Result<(), AttachError> {
     }
 }
 
-/// What is known of each place; `None`: it was asked, and nothing has shown it.
+/// Outcome at each place; `None`: it was asked, and nothing has shown it.
 type Told = Vec<Option<News>>;
 
 fn gather(news: &Receiver<(usize, News)>, places: usize, begun: Instant) -> Told {
@@ -215,7 +215,7 @@ fn wait_for_zero(socket: &Path, heard: &Heard, until: Instant) -> Option<Sight> 
     }
 }
 
-/// Whether a frame of before may tell how things stand: in lockstep no motor is written between one frame and the next
+/// An earlier frame may tell how things stand: in lockstep no motor is written between one frame and the next
 /// but with the reply to it, and what was heard is collected meanwhile. There is no card that runs in lockstep.
 fn may_stand(driver: &DriverView, heard: &Heard) -> bool {
     driver.info().clock_mode == ClockMode::Lockstep

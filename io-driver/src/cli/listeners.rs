@@ -8,7 +8,7 @@
 use shm_abi::socket_file::whole_path;
 use std::path::{Path, PathBuf};
 
-/// What a driver's program is called: by itself, or within the application.
+/// Names of a driver's program: by itself, or within the application.
 const PROGRAMS: [&str; 2] = ["io-driver", "phantom3"];
 
 /// A driver's process and the socket that it made.

@@ -1,4 +1,4 @@
-//! Where the driver is: at the socket that somebody named, or in one of the usual places.
+//! Places of drivers: the socket that somebody named, or the usual ones.
 
 use super::{EXIT_FAULT, EXIT_USAGE, listeners};
 use crate::say::say;
@@ -8,7 +8,7 @@ use shm_abi::endpoint;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Where the driver is.
+/// The socket to ask at.
 #[derive(Debug, Args)]
 pub struct SocketArgs {
     /// The driver's socket
@@ -31,7 +31,7 @@ impl SocketArgs {
     }
 }
 
-/// Where `program` finds the driver if nobody names a socket; says what was passed over.
+/// The driver's place for `program` if nobody names a socket; says which sockets were passed over.
 pub fn usual_socket(program: &str) -> PathBuf {
     let found = endpoint::find();
     if let Some(words) = found.words() {
@@ -49,7 +49,7 @@ pub(super) struct Places {
 }
 
 impl Places {
-    /// Where a driver was found: nothing to say if it is the only place.
+    /// The place of a driver, for a message: nothing to say if it is the only one.
     pub(super) fn told(&self, socket: &Path) -> String {
         if self.sockets.len() > 1 { format!(" ({})", socket.display()) } else { String::new() }
     }

@@ -45,7 +45,7 @@ pub(super) fn stop(places: &Places) -> ExitCode {
     nobody_asked(places, &not_asked)
 }
 
-/// Whether there is no driver at this place for us to ask.
+/// There is no driver at this place for us to ask.
 fn is_elsewhere(error: &AttachError) -> bool {
     matches!(
         error,
@@ -90,7 +90,7 @@ fn judge_answer(observer: Option<Attachment>, answer: Result<u64, AttachError>, 
     wait_for_end(&observer, pid)
 }
 
-/// Who looks on, and what the driver answered.
+/// An observer's place, if there was one, and the driver's answer.
 type Ending = (Option<Attachment>, Result<u64, AttachError>);
 
 /// Asks in a thread of its own, so that a driver that does not answer does not delay the words either; where there is

@@ -21,7 +21,7 @@ use std::process::ExitCode;
 const EXIT_NOT_READY: u8 = 1;
 /// Bad usage or bad input.
 const EXIT_USAGE: u8 = 2;
-/// What was found could not be told.
+/// The findings could not be told.
 const EXIT_LOST: u8 = 3;
 
 /// Arguments of `doctor`.

@@ -1,4 +1,4 @@
-//! Whether motors hold an arm's own weight for ever.
+//! Check that motors hold an arm's own weight for ever.
 //!
 //! Problem: motors that cannot hold the weight grow warm without any force, let the arm sag, and leave nothing for the
 //! force.
@@ -14,7 +14,7 @@ use crate::kinematics::{Interval, JointLimits, Mechanism};
 use crate::motors::MotorSpec;
 use std::f64::consts::PI;
 
-/// What continuous currents have to make, in terms of the weight.
+/// Torque that continuous currents have to make, in terms of the weight's.
 pub(super) const MARGIN: f64 = 1.25;
 
 /// On each joint, between its stops.
@@ -25,9 +25,9 @@ const POSES: u32 = 25;
 pub(super) struct TooHeavy {
     /// Its number, from 0.
     pub(super) joint: usize,
-    /// What holds the arm in the worst pose (N m).
+    /// Torque that holds the arm in the worst pose (N m).
     pub(super) weight_nm: f64,
-    /// What the continuous current makes (N m).
+    /// Torque of the continuous current (N m).
     pub(super) continuous_nm: f64,
 }
 

@@ -12,7 +12,7 @@ use shm_abi::frame::LIMIT_HEAT;
 use std::path::Path;
 
 const PERIOD_NS: u64 = 1_000_000;
-/// What the converters' steps make of a force, over the arm's levers (N).
+/// Force of the converters' steps over the arm's levers (N).
 const CODES_N: f64 = 0.05;
 
 /// A WoodenHaptics whose motors stand half as much for ever as its weight asks of them.
@@ -44,7 +44,7 @@ impl Numbers {
     }
 }
 
-/// How an arm is moved, and what is asked of it.
+/// Motion of an arm, and the force that is asked of it.
 #[derive(Debug)]
 struct Trial {
     /// Of the joints, at random (rad/s).
@@ -120,7 +120,7 @@ fn no_force_grows_faster_than_the_slew_rate_where_warm_motors_cannot_hold_the_we
     }
 }
 
-/// Where its weight asks most of a joint, away from where forces cannot be told.
+/// A pose in which its weight asks most of a joint, away from those in which forces cannot be told.
 fn heaviest_pose(arm: &ArmFile) -> [f64; 3] {
     let gravity = arm.gravity.expect("it has bodies");
     let limits = arm.mechanism.joint_limits();

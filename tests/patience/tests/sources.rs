@@ -66,7 +66,7 @@ fn endless_waits(file: &Path, root: &Path) -> Vec<String> {
     lines.collect()
 }
 
-/// Where the tests of a source begin: everything that is there for tests, and modules of tests within other sources.
+/// First line of the tests of a source: the first of all that is there for tests, else that of the module of tests.
 fn first_line_of_tests(file: &Path, text: &str) -> usize {
     let is_for_tests = file.iter().any(|part| part == "tests")
         || file.file_name().is_some_and(|name| name.to_string_lossy().ends_with("tests.rs"));

@@ -104,10 +104,10 @@ fn end(child: &mut Child) {
     child.end();
 }
 
-/// What clients ask of a service.
+/// Requests of clients to a service.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Asking {
-    /// What leaves whoever commands alone: to look, a lease that is another's, a fault to leave where there is none.
+    /// Requests that leave whoever commands alone: to look, a lease that is another's, a fault to leave if there is none.
     Nothing,
     /// Leases, after the end of the one that there is: nobody commands while one is made.
     Leases,

@@ -42,9 +42,9 @@ pub enum JitterError {
     /// The file with everything could not be written.
     #[error("cannot write {file}: {detail}; the results so far are lost unless an earlier file is there")]
     Lost {
-        /// Which.
+        /// The file.
         file: PathBuf,
-        /// What the system said.
+        /// The system's error.
         detail: String,
     },
     /// A table or a picture of results could not be written.
@@ -58,9 +58,9 @@ pub enum JitterError {
     /// The same, where everything is in another file.
     #[error("{failure}; {} is there with all results: `jitter report {} --out DIR` makes the rest of it", result.display(), result.display())]
     Rest {
-        /// What could not be written.
+        /// The file that could not be written.
         failure: Box<JitterError>,
-        /// What was.
+        /// The file that was.
         result: PathBuf,
     },
 }

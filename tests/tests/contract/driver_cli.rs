@@ -82,7 +82,7 @@ fn signal(driver: &Driver, signal: Signal) {
     kill_process(pid, signal).expect("our own child");
 }
 
-/// What is said long before the five seconds for which it is looked on: half of them are for a busy machine.
+/// The words come long before the five seconds for which it is looked on: half of them are for a busy machine.
 fn told_in_time(driver: &Driver, command: &str, words: &str) -> End {
     let begun = Instant::now();
     let mut asking = Running::start(io_driver().arg(command).arg("--socket").arg(driver.socket()));

@@ -1,4 +1,4 @@
-//! What `io-driver` prints, where nothing takes it.
+//! Output of `io-driver` into something that takes nothing.
 
 use patience::prelude::*;
 use shm_abi::FaultReason;

@@ -49,7 +49,7 @@ fn hidden(place: &Workplace) -> Vec<String> {
     names.filter(|name| name.starts_with('.')).collect()
 }
 
-/// Whether a disk of a size can be mounted here that only some processes see.
+/// A disk of a size can be mounted here that only some processes see.
 fn has_small_disks(place: &Workplace) -> bool {
     let mut possible = place.prepare(Command::new("unshare"));
     let tried = "mkdir -p tried && mount -t tmpfs none tried";
@@ -209,7 +209,7 @@ fn a_replay_that_a_signal_ends_calls_identical_only_what_was_compared() {
     }
 }
 
-/// How many good rows a command has told, and up to when.
+/// Number of good rows that a command has told, and the time of the last.
 fn whole_before(said: &Said) -> String {
     assert_eq!(said.status, Some(3), "{}", said.err);
     let (_, told) = said.err.split_once("what is whole before it is used: ").expect("how much is whole");

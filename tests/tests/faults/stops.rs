@@ -18,7 +18,7 @@ use tempfile::TempDir;
 /// Of each thread's stack (bytes): more than any machine has addresses for.
 const ENDLESS: &str = "100000000000000";
 
-/// Whether this machine has a driver of its own, which nobody here may stop.
+/// This machine has a driver of its own, which nobody here may stop.
 fn has_own_driver() -> bool {
     let socket = Path::new("/run/phantom3/driver.sock");
     let has = socket.exists() || stop_socket::path_beside(socket).exists();
@@ -48,7 +48,7 @@ impl Places {
         self.0.path().join("user/phantom3/driver.sock")
     }
 
-    /// What a driver leaves that is killed.
+    /// Remains of a driver that is killed.
     fn leave_sockets_of_a_dead_driver(&self) {
         drop(UnixListener::bind(self.first()).expect("a socket"));
         drop(UnixDatagram::bind(stop_socket::path_beside(&self.first())).expect("a socket"));
@@ -214,7 +214,7 @@ fn a_second_emergency_stop_of_a_driver_in_lockstep_that_waits_for_its_commander_
     assert!(is_stopped(&driver));
 }
 
-/// What stands in lockstep counts only once the driver has answered.
+/// A frame that stands in lockstep counts only once the driver has answered.
 #[test]
 fn a_driver_in_lockstep_that_is_stopped_itself_is_not_believed() {
     let driver = Driver::start(&resting("lockstep", 1));

@@ -200,7 +200,7 @@ fn a_loop_whose_service_is_stuck_finds_its_own_faults() {
     }
 }
 
-/// What a call says if it is harmed in earnest; of others EIO, which none of them says.
+/// Errors of a call that is harmed in earnest; of others EIO, which none of them has.
 fn errors_of(call: &str) -> &'static [&'static str] {
     match call {
         "ppoll" => &["EIO", "EINTR"],

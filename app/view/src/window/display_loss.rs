@@ -10,7 +10,7 @@ use x11_dl::xlib::{Display, Xlib};
 
 static IS_LOST: AtomicBool = AtomicBool::new(false);
 
-/// Whether the server is gone.
+/// The server is gone.
 pub(super) fn is_lost() -> bool {
     IS_LOST.load(Ordering::Acquire)
 }
