@@ -79,6 +79,8 @@ pub struct HandFile {
     pub path: PathBuf,
     /// Its duration (s).
     pub duration_s: f64,
+    /// Number of its rows.
+    pub rows: usize,
     /// Corners of the box that each finger's path fills, in W (m); `None` without a path.
     pub bounds: Vec<Option<[Vector3<f64>; 2]>>,
 }

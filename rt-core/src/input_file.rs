@@ -7,6 +7,7 @@
 //! more than the bound is read, whatever size the file had a moment ago.
 //! Invariant: memory is at most the bound, and is asked for as bytes arrive.
 
+use crate::file_kind;
 use std::fs::{File, FileType, Metadata, OpenOptions};
 use std::io::{self, ErrorKind, Read};
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
@@ -26,12 +27,17 @@ pub fn open(path: &Path) -> io::Result<File> {
 /// The content of a regular file.
 ///
 /// # Errors
-/// As [`open`]; [`ErrorKind::FileTooLarge`] beyond `most_bytes`.
+/// As [`open`]; [`ErrorKind::FileTooLarge`] beyond `most_bytes`; [`ErrorKind::InvalidData`], with what helps, if it is a
+/// kind of file that is never meant ([`file_kind`]).
 pub fn read(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
     let file = open(path)?;
     // Nothing is read of what is too large already.
     check_size(file.metadata()?.len(), most_bytes)?;
-    read_all(file, most_bytes)
+    let bytes = read_all(file, most_bytes)?;
+    match file_kind::mistaken(&bytes) {
+        Some(words) => Err(io::Error::new(ErrorKind::InvalidData, words)),
+        None => Ok(bytes),
+    }
 }
 
 /// All that comes out of a stream, such as standard input.

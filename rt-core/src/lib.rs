@@ -33,6 +33,7 @@ pub mod clock;
 pub mod cpu;
 pub mod doctor;
 pub mod epitaph;
+pub mod file_kind;
 pub mod histogram;
 pub mod input_file;
 pub mod installed;

@@ -65,7 +65,8 @@ pub enum AttachError {
     },
     /// The file system does not let us in.
     #[error(
-        "no permission to use {socket}: it has mode {mode:04o}, owner {owner} and group {group}, and you are user {user}; join the group or ask for access"
+        "no permission to use {socket}: it has mode {mode:04o}, owner {owner} and group {}, and you are user {user}; join the group or ask for access",
+        group_in_words(*group)
     )]
     NoPermission {
         /// Where it was looked for.
@@ -325,10 +326,23 @@ fn not_allowed(socket: &Path, request: &Request, answer: &Answer) -> AttachError
         wish: RequestKind::from_word(request.kind).map_or("do this", RequestKind::wish),
         user: rustix::process::geteuid().as_raw(),
         allowed: match answer.allowed_group_plus_one.checked_sub(1) {
-            Some(group) => format!("members of group {group}"),
+            Some(group) => {
+                format!("members of group {}", group_in_words(u32::try_from(group).unwrap_or(u32::MAX)))
+            }
             None => "root and the user that the driver runs as".into(),
         },
     }
+}
+
+/// Its number, and its name where the file of groups has one; no service of names is asked, which may be slow.
+fn group_in_words(id: u32) -> String {
+    let groups = std::fs::read_to_string("/etc/group").unwrap_or_default();
+    let name = |line: &str| {
+        let mut fields = line.split(':');
+        let name = fields.next()?;
+        (fields.nth(1)?.parse() == Ok(id)).then(|| name.to_owned())
+    };
+    groups.lines().find_map(name).map_or_else(|| id.to_string(), |name| format!("{id} ({name})"))
 }
 
 fn connect(path: &Path) -> Result<OwnedFd, AttachError> {

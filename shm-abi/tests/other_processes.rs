@@ -118,6 +118,12 @@ fn a_client_that_is_stopped_and_continued_while_it_waits_attaches_all_the_same()
     client.bounded_wait();
 }
 
+/// By the system's own services of names.
+fn group_in_words(id: u32) -> String {
+    let found = nix::unistd::Group::from_gid(id.into()).expect("groups can be read");
+    found.map_or_else(|| id.to_string(), |group| format!("{id} ({})", group.name))
+}
+
 #[test]
 fn a_user_without_permission_is_told_mode_owner_group_and_own_id() {
     use std::os::unix::process::CommandExt;
@@ -132,7 +138,7 @@ fn a_user_without_permission_is_told_mode_owner_group_and_own_id() {
              the group or ask for access",
             what.display(),
             meta.uid(),
-            meta.gid()
+            group_in_words(meta.gid())
         )
     };
     let own_uid = rustix::process::geteuid();

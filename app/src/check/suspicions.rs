@@ -1,22 +1,24 @@
 //! Numbers of a wrong unit, by what they would mean.
 //!
-//! Problem: lengths in millimetres, masses in grams and angles in degrees make a scene that can be run and in which nothing
+//! Problem: lengths in millimetres, masses in grams, times in milliseconds and angles in degrees make a scene that can be run and in which nothing
 //! is felt, or everything is thrown out.
 //! Model: things as large as a house or finer than a hair, denser than any metal or lighter than air, farther away than any
-//! arm reaches, or turning faster than a drill are told, with the number that was probably meant.
+//! arm reaches, turning faster than a drill, or written down twice a second at most are told, with the number that was probably meant.
 
 use super::measures::{Measures, short};
 use crate::rig::{Rig, in_words};
 use nalgebra::{Quaternion, Vector3};
-use world::{Scene, SceneEntity, ShapeSpec};
+use world::{MassSpec, Scene, SceneEntity, ShapeSpec};
 
 /// All of them.
 pub(super) fn all(rig: &Rig, measures: &[Measures]) -> Vec<String> {
     let mut found: Vec<String> = measures.iter().filter_map(|it| length(rig, it)).collect();
     found.extend(measures.iter().filter_map(mass));
+    found.extend(densities(&rig.scene));
     found.extend(far(rig, measures));
     found.extend(fingers(&rig.scene));
     found.extend(paths(rig));
+    found.extend(times(rig));
     found.extend(devices(rig));
     found.extend(rates(&rig.scene));
     found.extend(gravity(&rig.scene));
@@ -92,6 +94,23 @@ fn mass(it: &Measures) -> Option<String> {
     }
 }
 
+/// Densities in grams per cubic centimetre.
+fn densities(scene: &Scene) -> Vec<String> {
+    let told = scene.entities.iter().filter_map(|entity| {
+        let MassSpec::Density(density) = entity.motion?.mass else { return None };
+        let name = &entity.name;
+        // What is lighter than air is told already.
+        (AIR_KG_M3..1e-3 * DENSEST_KG_M3).contains(&density).then(|| {
+            format!(
+                "{name} has {} kg/m^3, as light as foam; densities are in kg/m^3: if g/cm^3 were meant, write {}",
+                short(density),
+                short(1e3 * density)
+            )
+        })
+    });
+    told.collect()
+}
+
 /// Nobody reaches it.
 fn far(rig: &Rig, measures: &[Measures]) -> Option<String> {
     let starts = rig.scene.fingers.iter().map(|finger| [finger.start_m.coords; 2]);
@@ -145,6 +164,20 @@ fn paths(rig: &Rig) -> Vec<String> {
         ))
     });
     told.collect()
+}
+
+/// Times in milliseconds.
+fn times(rig: &Rig) -> Option<String> {
+    let hand = rig.hand.as_ref()?;
+    let (duration_s, rows) = (hand.duration_s, hand.rows);
+    let is_slow = duration_s >= SLOW_S * rows as f64 && (rows >= MANY_ROWS || duration_s >= LONG_S);
+    is_slow.then(|| {
+        let (file, duration_s) = (hand.path.display(), short(duration_s));
+        format!(
+            "the hand takes {duration_s} s for {rows} rows in {file}; times are in seconds: if milliseconds were meant, divide \
+             them by 1000"
+        )
+    })
 }
 
 /// Devices that a layout puts where no hand reaches them.
@@ -201,6 +234,12 @@ const HAIR_M: f64 = 5e-5;
 /// Osmium has 22,600.
 const DENSEST_KG_M3: f64 = 25_000.0;
 const AIR_KG_M3: f64 = 1.2;
+/// Nobody writes down more slowly how a hand moves.
+const SLOW_S: f64 = 0.5;
+/// Fewer may be written by hand.
+const MANY_ROWS: usize = 50;
+/// Longer than what is written by hand.
+const LONG_S: f64 = 600.0;
 /// No arm reaches a tenth of it.
 const FAR_M: f64 = 10.0;
 /// Both arms stretched out are less.

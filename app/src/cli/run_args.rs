@@ -79,7 +79,7 @@ pub(super) struct RunArgs {
     #[arg(long, value_name = "SOCKET", num_args = 0..=1, default_missing_value = "", value_parser = path_or_nothing(), conflicts_with_all = ["hand", "rate_hz"])]
     attach: Option<PathBuf>,
     /// With --attach: how long to wait for the driver's return, should it end
-    #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = parse_grace, allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = parse_grace, allow_negative_numbers = true, requires = "attach")]
     grace: f64,
 }
 
@@ -136,6 +136,11 @@ pub(super) fn make_rig(args: &RunArgs, settings: &Settings) -> Result<Rig, RunFa
         ));
     }
     refuse_without_impedance(args)?;
+    if let Some(name) = args.pictures.idle_option() {
+        return Err(wrong(&format_args!(
+            "{name} is for pictures; add --snapshot T:FILE.png or --frames DIR, or leave it out"
+        )));
+    }
     if is_mcap(&args.scene) {
         let recording = args.scene.display();
         return Err(wrong(&format_args!(
@@ -310,5 +315,19 @@ mod tests {
             let said = make_rig(&args, &Settings::default()).expect_err("kinematic").to_string();
             assert!(said.starts_with(given[0]) && said.contains("--hand-mode impedance"), "{said}");
         }
+    }
+
+    #[test]
+    fn what_would_have_no_effect_is_refused() {
+        for given in [["--camera", "side"], ["--stereo", "anaglyph"]] {
+            let words = ["phantom3", "run", "no-scene.toml"].into_iter().chain(given);
+            let Some(AppCommand::Run(args)) = Cli::try_parse_from(words).expect("good words").command else {
+                panic!("not a run");
+            };
+            let said = make_rig(&args, &Settings::default()).expect_err("no pictures").to_string();
+            assert!(said.starts_with(given[0]) && said.contains("--snapshot"), "{said}");
+        }
+        let said = Cli::try_parse_from(["phantom3", "run", "no-scene.toml", "--grace", "3"]).unwrap_err();
+        assert!(said.to_string().contains("--attach"), "{said}");
     }
 }

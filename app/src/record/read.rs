@@ -16,6 +16,7 @@ use crate::row::{BodyRow, Row};
 use csv_rows::CsvRows;
 pub(crate) use csv_rows::MOST_ROW_BYTES;
 use mcap_rows::McapRows;
+use rt_core::file_kind::{self, BEGIN_BYTES};
 use rt_core::input_file;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -165,16 +166,12 @@ pub(crate) fn check_begin(file: &Path) -> Result<(), ReadError> {
         input_file::open(file).and_then(|file| file.take(BEGIN_BYTES as u64).read_to_end(&mut begin));
     opened.map_err(|source| ReadError::Io { file: file.into(), source })?;
     let why = match &begin[..] {
-        [] => "it is empty",
-        begin if input_file::is_utf16(begin) => input_file::UTF16,
-        [0x1f, 0x8b, ..] => "it is compressed by gzip; unpack it with gunzip",
-        [b'P', b'K', 3, 4] => "it is a ZIP archive, as spreadsheets are; unpack it, or save the table as CSV",
-        _ => return Ok(()),
+        [] => Some("it is empty"),
+        begin if input_file::is_utf16(begin) => Some(input_file::UTF16),
+        begin => file_kind::mistaken(begin),
     };
-    Err(ReadError::NoRecording { file: file.into(), why: why.into() })
+    why.map_or(Ok(()), |why| Err(ReadError::NoRecording { file: file.into(), why: why.into() }))
 }
-
-const BEGIN_BYTES: usize = 4;
 
 /// By its ending; or, whatever it is called, by its first bytes.
 pub(crate) fn is_mcap(file: &Path) -> bool {

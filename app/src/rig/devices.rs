@@ -205,5 +205,5 @@ pub(super) fn check_hand(path: &Path, named_by: &str, scene: &Scene) -> Result<H
     }
     let path = std::path::absolute(path).map_err(unreadable)?;
     let bounds = (0..fingers.len()).map(|finger| script.bounds(finger)).collect();
-    Ok(HandFile { path, duration_s: script.duration_s(), bounds })
+    Ok(HandFile { path, duration_s: script.duration_s(), rows: script.rows(), bounds })
 }

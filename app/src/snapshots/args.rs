@@ -96,6 +96,15 @@ impl PictureArgs {
         })
     }
 
+    /// An option that says how pictures are drawn, where none is wanted.
+    pub fn idle_option(&self) -> Option<&'static str> {
+        if self.frames.is_some() || !self.snapshot.is_empty() {
+            return None;
+        }
+        let given = [("--camera", self.camera.is_some()), ("--stereo", self.stereo != Stereo::Off)];
+        given.into_iter().find_map(|(name, is_given)| is_given.then_some(name))
+    }
+
     /// The files of single pictures.
     pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
         self.snapshot.iter().map(|shot| &shot.file)

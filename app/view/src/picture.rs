@@ -5,7 +5,7 @@ use crate::moment::Moment;
 use crate::offscreen::{NoPictures, Offscreen};
 use crate::painter::Painter;
 use crate::stage::Stage;
-use rt_core::output_file;
+use rt_core::replacement;
 use std::path::Path;
 use three_d::{DepthTexture2D, Interpolation, RenderTarget, Texture2D, Wrapping};
 
@@ -24,19 +24,19 @@ impl Picture {
         self.pixels[(row * self.size[0] + column) as usize]
     }
 
-    /// As PNG.
+    /// Writes the whole picture as PNG, or leaves what was there.
     ///
     /// # Errors
-    /// Whatever the file system has against it.
+    /// As [`replacement::write`].
     pub fn save(&self, file: &Path) -> std::io::Result<()> {
-        let out = std::io::BufWriter::new(output_file::create(file)?);
-        let mut encoder = png::Encoder::new(out, self.size[0], self.size[1]);
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, self.size[0], self.size[1]);
         encoder.set_color(png::ColorType::Rgba);
         encoder.set_depth(png::BitDepth::Eight);
         let mut writer = encoder.write_header()?;
         writer.write_image_data(self.pixels.as_flattened())?;
         writer.finish()?;
-        Ok(())
+        replacement::write(file, bytes)
     }
 }
 

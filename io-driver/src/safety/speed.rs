@@ -107,6 +107,8 @@ mod tests {
         assert_eq!(speed.observe(4 * MS, Vector3::x() * 0.199, Vector3::x()), Ok(()));
         let back = speed.observe(4 * MS, Vector3::x() * 0.098, Vector3::x());
         assert_eq!(back, Err(FaultReason::PositionJump), "101 mm");
+        assert_eq!(speed.observe(0, Vector3::x() * 0.098, Vector3::zeros()), Ok(()));
+        assert!(speed.observe(0, Vector3::x() * 0.099, Vector3::zeros()).is_err());
     }
 
     #[test]

@@ -136,6 +136,11 @@ impl HandScript {
         self.times_s.last().map_or(0.0, |last| last.max(0.0))
     }
 
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.times_s.len()
+    }
+
     /// Lowest and highest corner of the box that a finger's path fills (m); `None` without a script.
     pub fn bounds(&self, finger: usize) -> Option<[Vector3<f64>; 2]> {
         let slot = self.slot(finger)?;

@@ -297,11 +297,15 @@ fn a_broken_model_is_refused_with_scene_line_model_and_offender() {
 fn a_model_that_cannot_be_read_is_refused() {
     let place = Workplace::new();
     std::fs::create_dir(place.path("directory.obj")).expect("a directory");
+    place.write("pointer.obj", "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n");
+    place.write("packed.stl", b"\x1f\x8b\x08\x00\x00\x00\x00\x00");
     for (file, part) in [
         ("none.obj", "none.obj: no such file"),
         ("directory.obj", "directory.obj: it is a directory, no regular file"),
         ("/dev/zero", "/dev/zero: it is a device, no regular file"),
         ("scene.toml/a.obj", "scene.toml/a.obj: cannot be read"),
+        ("pointer.obj", "pointer.obj: cannot be read: it is a pointer of Git LFS"),
+        ("packed.stl", "packed.stl: cannot be read: it is compressed by gzip; unpack it with gunzip"),
     ] {
         place.write("scene.toml", mesh(file));
         let said = place.run(["run", "scene.toml", "--clock", "virtual", "--headless"]);

@@ -142,6 +142,35 @@ fn what_cannot_be_drawn_or_written_is_told() {
     }
 }
 
+#[test]
+fn a_disk_that_fills_up_has_whole_pictures_only() {
+    let place = place();
+    let mount = "mkdir small && mount -t tmpfs -o size=200k tmpfs small";
+    let private = "unshare --user --map-root-user --mount sh -c";
+    if place.shell(&format!("exec {private} '{mount}'"), &[]).status != Some(0) {
+        eprintln!("skipped: no small disk can be mounted here");
+        return;
+    }
+    std::fs::remove_dir(place.path("small")).expect("ours");
+    // Only these processes see it.
+    let inside = format!("{mount} && \"$0\" \"$@\"; end=$?; cp -r small/. film; exit $end");
+    let script = format!("exec {private} '{inside}' \"$0\" \"$@\"");
+    let seconds = ["--clock", "virtual", "--seconds", "2"];
+    let said = place.shell(&script, &[&seconds[..], &["--frames", "small", "--fps", "50"]].concat());
+    if are_missing(&said) {
+        return;
+    }
+    assert!(said.status == Some(3) && said.err.contains("No space left"), "{:?} {}", said.status, said.err);
+    let names = std::fs::read_dir(place.path("film"))
+        .expect("copied")
+        .map(|entry| entry.expect("an entry").file_name());
+    let names: Vec<String> = names.map(|name| name.to_string_lossy().into_owned()).collect();
+    assert!((1..100).contains(&names.len()), "{names:?}");
+    for name in names {
+        assert_eq!(Pixels::read(&place, &format!("film/{name}")).size, [1280.0, 720.0], "{name}");
+    }
+}
+
 /// Red, green and blue of a picture.
 struct Pixels {
     size: [f64; 2],

@@ -263,6 +263,11 @@ fn check_suspects_numbers_of_another_unit() {
             "cube has 100 kg, 800000 kg/m^3, denser than any metal; masses are in kilograms: if grams were meant, write 0.1",
         ),
         (
+            with_cube("[0.05, 0.05, 0.05]", "1", "[0.0, 0.0, 0.0]")
+                .replace("mass_kg = 1", "density_kg_m3 = 7.85"),
+            "cube has 7.85 kg/m^3, as light as foam; densities are in kg/m^3: if g/cm^3 were meant, write 7850",
+        ),
+        (
             with_cube("[0.05, 0.05, 0.05]", "0.1", "[0.0, 0.0, 300.0]"),
             "more than 10 m away from every finger: cube; places are in metres",
         ),
@@ -302,12 +307,18 @@ fn check_suspects_numbers_of_another_unit() {
 }
 
 #[test]
-fn check_suspects_hands_and_layouts_that_no_arm_reaches() {
+fn check_suspects_hands_and_layouts_of_another_unit() {
     let place = Workplace::new();
     place.write("scene.toml", with_cube("[0.05, 0.05, 0.05]", "0.1", "[0.0, 0.0, 0.0]"));
     place.write("mm.csv", "t,f0_x,f0_y,f0_z\n0,0,80,0\n1,50,20,0\n");
     place.write("far.csv", "t,f0_x,f0_y,f0_z\n0,0,80,0\n");
     place.write("m.csv", "t,f0_x,f0_y,f0_z\n0,0,0.08,0\n1,0.05,0.02,0\n");
+    place.write("ms.csv", "t,f0_x,f0_y,f0_z\n0,0,0.08,0\n900,0.05,0.02,0\n");
+    let rows = |step_s: f64| {
+        (0..50).map(|row| format!("{},0,0.08,0\n", f64::from(row) * step_s)).collect::<String>()
+    };
+    place.write("many_ms.csv", format!("t,f0_x,f0_y,f0_z\n{}", rows(1.0)));
+    place.write("many.csv", format!("t,f0_x,f0_y,f0_z\n{}", rows(0.4)));
     place.write("mm.toml", "[[device]]\nposition_m = [-150, 0, 0]\n");
     place.write("m.toml", "[[device]]\nposition_m = [-0.15, 0, 0]\n");
     let divide =
@@ -316,6 +327,9 @@ fn check_suspects_hands_and_layouts_that_no_arm_reaches() {
         (["--hand", "mm.csv"], &["finger f0 goes along 60 m in", "mm.csv", divide][..]),
         (["--hand", "far.csv"], &["finger f0 goes as far as 80 m from the origin in", "far.csv", divide]),
         (["--layout", "mm.toml"], &["device 0 stands at (-150, 0, 0) m", "it is at (-0.15, 0, 0)"]),
+        (["--hand", "ms.csv"], &["the hand takes 900 s for 2 rows in", "if milliseconds were meant, divide"]),
+        (["--hand", "many_ms.csv"], &["the hand takes 49 s for 50 rows in", "many_ms.csv"]),
+        (["--hand", "many.csv"], &[]),
         (["--hand", "m.csv"], &[]),
         (["--layout", "m.toml"], &[]),
     ] {
