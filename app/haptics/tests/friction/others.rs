@@ -226,6 +226,36 @@ fn the_fixed_cone_bears_the_same_force_at_every_depth() {
 }
 
 #[test]
+fn a_contact_that_sticks_lies_within_the_circle_of_its_model() {
+    // 2.5 N at 500 N/m.
+    let (load_m, stiffness_n_per_m) = (5e-3, 500.0);
+    let curve = [(0.0, 0.3), (0.1, 0.2)];
+    for (model, circle_m) in [
+        (Ok(Friction::None), 0.0),
+        (Friction::coulomb(0.5), 2.5e-3),
+        (Friction::stiction(0.7, 0.3), 3.5e-3),
+        (Friction::viscous(2.0), 0.0),
+        (Friction::coulomb_viscous(0.4, 2.0), 2e-3),
+        (Friction::stribeck(0.6, 0.3, 0.1, 1.0), 3e-3),
+        (Friction::curve(0.6, &curve), 3e-3),
+        (Friction::karnopp(0.6, 0.3, 0.1, 1.0), 3e-3),
+        (Friction::dahl(0.5), 2.5e-3),
+        (Friction::hayward_armstrong(0.5, 0.6), 2.5e-3),
+        (Friction::lugre(0.6, 0.3, 0.1, 1.0, 1.0), 3e-3),
+        (Friction::reset_integrator(0.6, 0.3, 1.0), 3e-3),
+        (Friction::bristle(0.5, 5, 7), 3.75e-3),
+        (Friction::fixed_cone(1.0, Some(1.5)), 3e-3),
+        (Friction::fixed_cone(1.0, None), 2e-3),
+    ] {
+        let model = model.expect("in range");
+        let found_m = model.circle_m(load_m, stiffness_n_per_m).expect("a model of ours");
+        // The rounding of a product.
+        assert!((found_m - circle_m).abs() <= f64::EPSILON * circle_m, "{model:?}: {found_m}");
+    }
+    assert_eq!(Friction::own(Friction::coulomb(0.5).expect("in range")).circle_m(load_m, 500.0), None);
+}
+
+#[test]
 fn constructors_refuse_what_no_material_has() {
     for bad in [-1e-9, f64::NAN, f64::INFINITY] {
         for refused in [
