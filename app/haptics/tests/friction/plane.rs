@@ -86,6 +86,26 @@ fn backing_off_it_first_stays_in_slip_unmoved_and_then_sticks() {
 }
 
 #[test]
+fn a_finger_that_slid_and_rests_sticks_whatever_the_rounding() {
+    let mut noise = Noise(4);
+    for _ in 0..1000 {
+        let mut vector = || Vector3::new(noise.gaussian(), noise.gaussian(), noise.gaussian());
+        let (normal, along) = (vector().normalize(), vector());
+        let along = (along - normal * along.dot(&normal)).normalize();
+        let entity = entity(Plane::new(normal, 0.1).unwrap(), Friction::coulomb(0.5).unwrap());
+        let mut finger = point_finger();
+        let mut step = |height_m: f64, way_m: f64| {
+            let hip = normal * (0.1 + height_m) + along * way_m;
+            finger.step(std::slice::from_ref(&entity), &hip, DT).friction
+        };
+        step(1e-3, 0.0);
+        (0..5).for_each(|tick| _ = step(-DEPTH, 1e-3 * f64::from(tick)));
+        assert_eq!(step(-DEPTH, 5e-3), ContactState::Slip);
+        assert_eq!([(); 3].map(|()| step(-DEPTH, 5e-3)), [ContactState::Stick; 3]);
+    }
+}
+
+#[test]
 fn a_tick_that_lands_exactly_on_the_surface_is_contact_without_force() {
     let entity = table(stiction()).with_damping(5.0).unwrap();
     let mut finger = point_finger();
