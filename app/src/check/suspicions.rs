@@ -1,9 +1,10 @@
 //! Numbers of a wrong unit, by what they would mean.
 //!
-//! Problem: lengths in millimetres, masses in grams, times in milliseconds and angles in degrees make a scene that can be run and in which nothing
-//! is felt, or everything is thrown out.
+//! Problem: lengths in millimetres, masses in grams, times in milliseconds and angles in degrees make a scene that can be
+//! run and in which nothing is felt, or everything is thrown out.
 //! Model: things as large as a house or finer than a hair, denser than any metal or lighter than air, farther away than any
-//! arm reaches, turning faster than a drill, or written down twice a second at most are told, with the number that was probably meant.
+//! arm reaches, turning faster than a drill, or written down twice a second at most are told, with the number that was
+//! probably meant.
 
 use super::measures::{Measures, short};
 use crate::rig::{Rig, in_words};
