@@ -41,7 +41,7 @@ const MEAN: usize = MAX_BRISTLES;
 const DRAWN: usize = MAX_BRISTLES + 1;
 /// A number of the contact's own, from the first draw on.
 const OWN: usize = MAX_BRISTLES + 2;
-const _: () = assert!(OWN < MEMORY_WORDS);
+const _: () = assert!(MEAN < DRAWN && DRAWN < OWN && OWN < MEMORY_WORDS);
 
 /// `delta_s` over the mean stretch of steady sliding.
 const SNAP_OVER_MEAN: f64 = 1.5;
