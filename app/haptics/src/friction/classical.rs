@@ -141,6 +141,21 @@ mod tests {
     }
 
     #[test]
+    fn a_sliding_contact_without_load_does_not_stick_again() {
+        let law = Friction::stiction(0.7, 0.3).unwrap();
+        assert!(!holds(&law, FrictionQuery { load_m: 0.0, ..query(FrictionState::Slip, 0.0) }));
+    }
+
+    #[test]
+    fn where_time_is_unknown_speeds_count_as_zero() {
+        let law = Friction::coulomb_viscous(0.3, 2.0).unwrap();
+        for dt_s in [0.0, -1e-3, f64::NAN] {
+            let asked = FrictionQuery { dt_s, travel_m: 1e-5, ..query(FrictionState::Slip, 4e-3) };
+            assert_eq!(law.slide(&asked, &FrictionMemory::default()), 4e-3 - 0.3 * LOAD, "{dt_s} s");
+        }
+    }
+
+    #[test]
     fn without_friction_nothing_holds() {
         for law in [Friction::None, Friction::coulomb(0.0).unwrap(), Friction::viscous(2.0).unwrap()] {
             assert!(!holds(&law, query(FrictionState::Stick, 0.0)));

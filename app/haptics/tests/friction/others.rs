@@ -1,9 +1,9 @@
-//! Karnopp's model, bristles, the reset integrator, the fixed cone: what is special to each.
+//! Curves, Karnopp's model, bristles, the reset integrator, the fixed cone: what is special to each.
 
 use crate::common::*;
 use haptics::{
-    Bristles, ContactState, Friction, FrictionLaw, FrictionMemory, FrictionQuery, FrictionState,
-    ParameterError,
+    Bristles, ContactState, Friction, FrictionCurve, FrictionLaw, FrictionMemory, FrictionQuery,
+    FrictionState, ParameterError,
 };
 use nalgebra::Vector3;
 
@@ -253,6 +253,17 @@ fn a_contact_that_sticks_lies_within_the_circle_of_its_model() {
         assert!((found_m - circle_m).abs() <= f64::EPSILON * circle_m, "{model:?}: {found_m}");
     }
     assert_eq!(Friction::own(Friction::coulomb(0.5).expect("in range")).circle_m(load_m, 500.0), None);
+}
+
+#[test]
+fn a_curve_is_what_it_was_drawn_from() {
+    let points = [(0.0, 0.3), (0.1, 0.2), (0.3, 0.4)];
+    let curve = FrictionCurve::new(0.6, &points).expect("in range");
+    assert_eq!((curve.mu_s(), curve.points()), (0.6, &points[..]));
+    for (speed_m_s, ratio) in [(0.0, 0.3), (0.05, 0.25), (-0.05, 0.25), (0.1, 0.2), (0.2, 0.3), (9.0, 0.4)] {
+        // The rounding of an interpolation.
+        assert!((curve.ratio_at(speed_m_s) - ratio).abs() < 1e-15, "{speed_m_s} m/s");
+    }
 }
 
 #[test]
