@@ -267,6 +267,26 @@ fn a_curve_is_what_it_was_drawn_from() {
 }
 
 #[test]
+fn a_curve_that_never_falls_sticks_again_at_once_and_one_that_falls_with_a_margin() {
+    let holds_within_a_thousandth = |mu_s: f64, points: &[(f64, f64)]| {
+        let law = FrictionCurve::new(mu_s, points).expect("in range");
+        let asked = |gap_m: f64| FrictionQuery {
+            state: FrictionState::Slip,
+            gap_m,
+            load_m: DEPTH,
+            dt_s: DT,
+            ..Default::default()
+        };
+        let rim_m = points[0].1 * DEPTH;
+        assert!(law.holds(&asked(0.9 * rim_m), &mut FrictionMemory::default()), "{points:?}");
+        law.holds(&asked(0.999 * rim_m), &mut FrictionMemory::default())
+    };
+    assert!(holds_within_a_thousandth(0.3, &[(0.0, 0.3)]));
+    assert!(holds_within_a_thousandth(0.3, &[(0.0, 0.3), (0.1, 0.5)]));
+    assert!(!holds_within_a_thousandth(0.6, &[(0.0, 0.3), (0.1, 0.5)]));
+}
+
+#[test]
 fn constructors_refuse_what_no_material_has() {
     for bad in [-1e-9, f64::NAN, f64::INFINITY] {
         for refused in [
