@@ -3,8 +3,8 @@
 //! Problem: lengths in millimetres, masses in grams, times in milliseconds and angles in degrees make a scene that can be
 //! run and in which nothing is felt, or everything is thrown out.
 //! Model: things as large as a house or finer than a hair, denser than any metal or lighter than air, farther away than any
-//! arm reaches, turning faster than a drill, or written down twice a second at most are told, with the number that was
-//! probably meant.
+//! arm reaches, turning faster than a drill, or written down twice a second at most while hardly moving are told, with the
+//! number that was probably meant.
 
 use super::measures::{Measures, short};
 use crate::rig::{Rig, in_words};
@@ -171,7 +171,9 @@ fn paths(rig: &Rig) -> Vec<String> {
 fn times(rig: &Rig) -> Option<String> {
     let hand = rig.hand.as_ref()?;
     let (duration_s, rows) = (hand.duration_s, hand.rows);
-    let is_slow = duration_s >= SLOW_S * rows as f64 && (rows >= MANY_ROWS || duration_s >= LONG_S);
+    let is_sparse = duration_s >= SLOW_S * rows as f64 && (rows >= MANY_ROWS || duration_s >= LONG_S);
+    let sides_m = hand.bounds.iter().flatten().map(|[least, most]| (most - least).max());
+    let is_slow = is_sparse && sides_m.fold(0.0, f64::max) < CREEP_M_S * duration_s;
     is_slow.then(|| {
         let (file, duration_s) = (hand.path.display(), short(duration_s));
         format!(
@@ -237,6 +239,8 @@ const DENSEST_KG_M3: f64 = 25_000.0;
 const AIR_KG_M3: f64 = 1.2;
 /// Nobody writes down more slowly how a hand moves.
 const SLOW_S: f64 = 0.5;
+/// Hands that explore go the whole of their way several times faster.
+const CREEP_M_S: f64 = 2e-3;
 /// Fewer may be written by hand.
 const MANY_ROWS: usize = 50;
 /// Longer than what is written by hand.

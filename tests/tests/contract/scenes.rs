@@ -314,11 +314,13 @@ fn check_suspects_hands_and_layouts_of_another_unit() {
     place.write("far.csv", "t,f0_x,f0_y,f0_z\n0,0,80,0\n");
     place.write("m.csv", "t,f0_x,f0_y,f0_z\n0,0,0.08,0\n1,0.05,0.02,0\n");
     place.write("ms.csv", "t,f0_x,f0_y,f0_z\n0,0,0.08,0\n900,0.05,0.02,0\n");
-    let rows = |step_s: f64| {
-        (0..50).map(|row| format!("{},0,0.08,0\n", f64::from(row) * step_s)).collect::<String>()
+    let rows = |step_s: f64, step_m: f64| {
+        let row = |row| format!("{},{},0.08,0\n", f64::from(row) * step_s, f64::from(row % 20) * step_m);
+        format!("t,f0_x,f0_y,f0_z\n{}", (0..50).map(row).collect::<String>())
     };
-    place.write("many_ms.csv", format!("t,f0_x,f0_y,f0_z\n{}", rows(1.0)));
-    place.write("many.csv", format!("t,f0_x,f0_y,f0_z\n{}", rows(0.4)));
+    place.write("many_ms.csv", rows(1.0, 0.001));
+    place.write("many.csv", rows(0.4, 0.001));
+    place.write("sparse.csv", rows(1.0, 0.01));
     place.write("mm.toml", "[[device]]\nposition_m = [-150, 0, 0]\n");
     place.write("m.toml", "[[device]]\nposition_m = [-0.15, 0, 0]\n");
     let divide =
@@ -330,6 +332,7 @@ fn check_suspects_hands_and_layouts_of_another_unit() {
         (["--hand", "ms.csv"], &["the hand takes 900 s for 2 rows in", "if milliseconds were meant, divide"]),
         (["--hand", "many_ms.csv"], &["the hand takes 49 s for 50 rows in", "many_ms.csv"]),
         (["--hand", "many.csv"], &[]),
+        (["--hand", "sparse.csv"], &[]),
         (["--hand", "m.csv"], &[]),
         (["--layout", "m.toml"], &[]),
     ] {
