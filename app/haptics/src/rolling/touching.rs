@@ -90,6 +90,24 @@ impl<F: Foot> Touching<F> {
         Some(self.answer(&rested, input))
     }
 
+    /// A ball smaller than the finger's radius that is free, where the finger itself has no room yet: as large as it may be
+    /// with its centre at the HIP, without a force.
+    pub(super) fn with_less_room(
+        &mut self,
+        ground: &impl Ground<Foot = F>,
+        radius_m: f64,
+        input: &ConeInput,
+    ) -> Option<Touch> {
+        if self.ball.radius_m >= radius_m {
+            return None;
+        }
+        let (foot, distance_m) = ground.nearest_within(&input.hip_B, radius_m).ok()??;
+        let mut ball = Ball::in_free_space(input.hip_B, distance_m);
+        ball.add(ground, &foot);
+        let look = ball.look(ground, input);
+        Some(self.answer(&Rested { ball, look, tangential_B: Vector3::zeros() }, input))
+    }
+
     /// Whether the finger is round the corner, whatever friction says.
     fn is_out<G: Ground<Foot = F>>(
         &mut self,
