@@ -113,8 +113,9 @@ impl<F: Foot, V: Copy + Default> RollingCone<F, V> {
         if touching.ball.radius_m < radius_m
             && let Some(last_hip_B) = last_hip_B
         {
-            let lag_m = (touching.ball.centre_B - last_hip_B).norm();
-            touching.ball = grown(ground, &touching.ball, &input.cone.hip_B, lag_m, radius_m);
+            let hip_B = &input.cone.hip_B;
+            let at_most_m = (touching.ball.centre_B - last_hip_B).norm() + (hip_B - last_hip_B).norm();
+            touching.ball = grown(ground, &touching.ball, hip_B, at_most_m, radius_m);
         }
         let felt = touching.update(ground, input.friction, &mut self.vicinity, &input.cone);
         let felt = felt.or_else(|| touching.with_less_room(ground, radius_m, &input.cone));

@@ -7,10 +7,11 @@
 //! Model: the overlap is the radius r less the HIP's distance to the surface, or r and the depth of a HIP that is inside. The
 //! god-object may be that far from the HIP. Where no ball of radius r has room so near, the largest of a falling series of
 //! radii that does is taken; outside, the ball that just touches the surface always has room. Such a small ball grows
-//! as the hand gives way ([`grown`]): never farther from the HIP than it was in the last tick, so that growing adds no force.
+//! as the hand moves ([`grown`]), so that the spring becomes no longer in a tick than the hand's way.
 //!
 //! Frames: the ground's own, B.
-//! Invariant: the spring from the HIP to the centre is no longer than the overlap, and of a grown ball than it was.
+//! Invariant: the spring from the HIP to the centre is no longer than the overlap, and of a grown ball than it was and
+//! what the HIP moved.
 //! Cost: [`MOST_SIZES`] times [`MOST_CORRECTIONS`] bounded queries where a ball is found, [`MOST_GROWTHS`] times as many in a
 //! tick that it grows in.
 
