@@ -13,7 +13,7 @@
 
 use super::order::Triangle;
 use super::repair::area_vector;
-use super::{Bvh, Face, Link, Mesh, MeshError, MeshReport, TriangleSoup};
+use super::{Bvh, Face, Link, Mesh, MeshError, MeshReport, Sides, TriangleSoup};
 use super::{order, pinch, repair, topology, winding};
 use nalgebra::Vector3;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -46,26 +46,28 @@ impl Mesh {
         pinch::part(&mut triangles, &links, &mut vertices);
         report_edges(&triangles, &links, &mut report);
         let faces: Box<[Face]> =
-            triangles.iter().zip(&links).map(|(triangle, links)| face(triangle, links, &vertices)).collect();
+            (0..triangles.len()).map(|i| face(&triangles[i], &links[i], sides[i], &vertices)).collect();
         triangles.iter().for_each(|triangle| tell_origin(triangle.origin));
         drop((triangles, links));
+        let has_inside = sides.contains(&Sides::Solid);
+        let sides = if sides.contains(&Sides::Sheet) { Sides::Sheet } else { Sides::Solid };
         report.faces = faces.len();
         report.vertices = vertices.len();
         let extent_m = vertices.iter().fold(0.0_f64, |extent, v| extent.max(v.amax()));
         let vertices = vertices.into_boxed_slice();
         let bvh = Bvh::build(&faces, &vertices);
         let identity = BUILT.fetch_add(1, Ordering::Relaxed);
-        Ok((Self { faces, vertices, bvh, sides, extent_m, identity, uv: None }, report))
+        Ok((Self { faces, vertices, bvh, sides, has_inside, extent_m, identity, uv: None }, report))
     }
 }
 
 /// Its offset is the middle of those of its corners, so that none of them is further from the plane than needed.
-fn face(triangle: &Triangle, links: &[Link; 3], vertices: &[Vector3<f64>]) -> Face {
+fn face(triangle: &Triangle, links: &[Link; 3], sides: Sides, vertices: &[Vector3<f64>]) -> Face {
     let corners = triangle.corners.map(|v| vertices[v as usize]);
     let normal_B = area_vector(&corners).normalize();
     let [a, b, c] = corners.map(|corner| normal_B.dot(&corner));
     let offset_m = 0.5 * (a.min(b).min(c) + a.max(b).max(c));
-    Face { normal_B, offset_m, vertices: triangle.corners, links: *links }
+    Face { normal_B, offset_m, vertices: triangle.corners, links: *links, sides }
 }
 
 fn report_edges(triangles: &[Triangle], links: &[[Link; 3]], report: &mut MeshReport) {

@@ -15,13 +15,13 @@ use super::report::MeshReport;
 use super::{Link, Sides};
 use nalgebra::Vector3;
 
-/// Turns faces over where needed, and notes what was found.
+/// Turns faces over where needed, and notes what was found. Says of each face whether its part has an inside.
 pub(super) fn orient(
     triangles: &mut [Triangle],
     links: &mut [[Link; 3]],
     vertices: &[Vector3<f64>],
     report: &mut MeshReport,
-) -> Sides {
+) -> Vec<Sides> {
     let (mut states, mut parts) = flood(links);
     count(&states, triangles, &mut parts);
     for (state, triangle) in states.iter_mut().zip(&*triangles) {
@@ -35,7 +35,9 @@ pub(super) fn orient(
     states.iter_mut().for_each(|state| state.is_turned_over ^= parts[state.part as usize].is_inside_out);
     apply(triangles, links, &states);
     report.components = parts.len();
-    if parts.iter().all(Part::has_inside) { Sides::Solid } else { Sides::Sheet }
+    let sides =
+        |state: &State| if parts[state.part as usize].has_inside() { Sides::Solid } else { Sides::Sheet };
+    states.iter().map(sides).collect()
 }
 
 /// Of a face.

@@ -12,6 +12,7 @@ mod crossing;
 mod energy;
 mod folds;
 mod friction;
+mod inside;
 mod moving;
 mod outlying;
 mod parts;
