@@ -13,6 +13,7 @@ mod energy;
 mod folds;
 mod friction;
 mod inside;
+mod joints;
 mod moving;
 mod outlying;
 mod parts;
