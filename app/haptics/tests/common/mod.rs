@@ -3,6 +3,7 @@
 
 pub(crate) mod laws;
 
+pub(crate) mod flawed;
 pub(crate) mod meshes;
 pub(crate) mod path;
 pub(crate) mod pictures;
