@@ -23,7 +23,7 @@ pub(super) fn divide(
     divided: &mut Finding,
 ) -> bool {
     let open = Open::new(triangles, links, vertices);
-    let (mut looks, mut pieces) = (0, Vec::new());
+    let (mut looks, mut added, mut pieces) = (0, 0, Vec::new());
     for face in 0..links.len() {
         let corners = triangles[face].corners;
         let is_open = |edge: &usize| links[face][*edge].is_boundary();
@@ -33,9 +33,10 @@ pub(super) fn divide(
             open.divided(turned, &upon, vertices)
         });
         if let Some(division) = division {
+            added += division.len() - 1;
             pieces.push((face, division));
         }
-        if looks > MOST_LOOKS {
+        if looks > MOST_LOOKS || links.len() + added > Link::MAX_FACES - MOST_ADDED {
             break;
         }
     }
@@ -43,11 +44,14 @@ pub(super) fn divide(
     for (face, division) in &pieces {
         let origin = triangles[*face].origin;
         divided.note(origin as usize);
-        let piece = |corners: &[u32; 3]| Triangle::new(*corners, &at(vertices, corners), origin, &curve);
-        triangles[*face] = piece(&division[0]);
-        triangles.extend(division[1..].iter().map(piece));
+        let mut pieces =
+            division.iter().map(|corners| Triangle::new(*corners, &at(vertices, corners), origin, &curve));
+        if let Some(first) = pieces.next() {
+            triangles[*face] = first;
+        }
+        triangles.extend(pieces);
     }
-    !pieces.is_empty() && triangles.len() <= Link::MAX_FACES
+    !pieces.is_empty()
 }
 
 /// Where the mesh ends.
@@ -119,5 +123,7 @@ fn at(vertices: &[Vector3<f64>], corners: &[u32; 3]) -> [Vector3<f64>; 3] {
 
 /// Of the mesh's largest coordinate.
 const NEAR: f64 = 1e-6;
+/// Faces that one division may add: no mesh comes near to as many as links can tell apart.
+const MOST_ADDED: usize = 1 << 20;
 /// A mesh of a million loose faces is not searched to the end.
 const MOST_LOOKS: usize = 50_000_000;

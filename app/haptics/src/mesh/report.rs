@@ -54,6 +54,8 @@ pub struct MeshReport {
     pub crowded_edges: Finding,
     /// Holes that were closed with a lid, so that the part is a solid. The face is one beside the hole.
     pub closed_holes: Finding,
+    /// Parts that have no inside, since they are open or cannot be oriented. The face is the first of the part.
+    pub sheets: Finding,
     /// Edges where the mesh ends: the rim of an open mesh, or a crack.
     pub boundary_edges: Finding,
     /// Edges across which inside and outside change places: the mesh cannot be oriented.
@@ -108,6 +110,12 @@ impl fmt::Display for MeshReport {
                 "of three or more faces: two and two joined, the others end there",
             ),
             (self.closed_holes, "hole", "holes", "in parts that are otherwise closed: closed with a lid"),
+            (
+                self.sheets,
+                "part",
+                "parts",
+                "not closed: felt from both sides; a finger that comes in by a rim is free within",
+            ),
             (self.boundary_edges, "edge", "edges", "of one face only: an open rim or a crack"),
             (self.turned_edges, "edge", "edges", "where outside becomes inside: it cannot be oriented"),
         ];

@@ -11,7 +11,7 @@
 //! Cost: linear; step 3 also compares each closed part with those that it overlaps along x.
 
 use super::order::Triangle;
-use super::report::MeshReport;
+use super::report::{Finding, MeshReport};
 use super::{Link, Sides};
 use nalgebra::Vector3;
 
@@ -35,6 +35,8 @@ pub(super) fn orient(
     states.iter_mut().for_each(|state| state.is_turned_over ^= parts[state.part as usize].is_inside_out);
     apply(triangles, links, &states);
     report.components = parts.len();
+    report.sheets = Finding::default();
+    parts.iter().filter(|part| !part.has_inside()).for_each(|part| report.sheets.note(part.first));
     let sides =
         |state: &State| if parts[state.part as usize].has_inside() { Sides::Solid } else { Sides::Sheet };
     states.iter().map(sides).collect()

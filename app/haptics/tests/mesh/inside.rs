@@ -71,7 +71,7 @@ fn the_way_out_leads_to_the_outside_of_all_parts() {
     }
 }
 
-/// What was measured on a scan: a vertex of valence 4 whose fan is folded, beside which free space was "inside".
+/// Around a vertex of valence 4 whose fan is folded, and where the surface is inside out.
 #[test]
 fn beside_a_folded_vertex_a_finger_is_free() {
     let soup = pulled_pyramid([0.06, -0.05, 0.02]);

@@ -202,6 +202,7 @@ fn small_holes_of_what_is_nearly_closed_are_closed_and_a_cup_stays_open() {
     cup.faces = cup.faces.iter().copied().filter(is_below).collect();
     let (mesh, report) = build(cup.clone());
     assert_eq!((mesh.sides(), mesh.has_inside(), report.closed_holes.count), (Sides::Sheet, false, 0));
+    assert!(report.to_string().contains("1 part not closed: felt from both sides"), "{report}");
     for (size_m, is_solid) in [(0.1, false), (0.2, true)] {
         let (mesh, report) = Mesh::build_closing(cup.clone(), CloseHoles::UpTo(size_m)).unwrap();
         assert_eq!(mesh.sides() == Sides::Solid, is_solid, "{report}");
