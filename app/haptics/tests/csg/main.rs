@@ -5,9 +5,13 @@
 mod common;
 #[path = "../common/trees.rs"]
 mod trees;
+#[path = "../common/joints.rs"]
+mod joints;
 
 mod feel;
+mod joined;
 mod oracle;
+mod seams;
 mod states;
 mod trees_of_shapes;
 mod walks;
