@@ -25,6 +25,7 @@ mod crossings;
 mod crowd;
 mod csg_cone;
 mod curved;
+mod detour;
 mod feet;
 mod flatten;
 mod foresight;

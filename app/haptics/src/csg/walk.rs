@@ -15,12 +15,15 @@ use nalgebra::Vector3;
 
 use super::Csg;
 use super::advance::{Glided, Moved, Target, advance, glide};
+use super::detour::{Detour, detour, is_tight};
 use super::foresight::foresee;
 use super::god::God;
 use super::settle::settle;
 use super::stand::{Stood, stand};
 use crate::friction_law::FrictionLaw;
 use crate::slide::{Secant, Slid, Slider};
+use crate::surface::direction_or_up;
+use crate::tangent_view::TangentView;
 
 /// Goes on from where the god-object stands until nothing draws it any further; `None` if it is free and gone.
 #[inline(always)]
@@ -98,12 +101,19 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
         let is_stalled = (god.point_B - before_B).amax() <= csg.tolerance_m();
         stalls = if is_stalled { stalls + 1 } else { 0 };
         round = slider.look(view, &Vector3::zeros(), &god.point_B);
+        if stalls >= MAX_STALLS && round.is_inside_the_circle() {
+            return Some(slider.rested(&round, rounds));
+        }
         if stalls >= MAX_STALLS {
-            return Some(if round.is_inside_the_circle() {
-                slider.rested(&round, rounds)
-            } else {
-                round.arrived(rounds)
-            });
+            match detour(csg, god, &input.hip_B, round.asked_m) {
+                Detour::Along(other) => *god = other,
+                Detour::Free => return None,
+                Detour::None => return Some(held_here(god, slider, rounds)),
+            }
+            stalls = 0;
+            let stood = stand(csg, god, input)?;
+            looks = stood.looks;
+            round = slider.look(stood.view, &Vector3::zeros(), &god.point_B);
         }
         if let (Some(ratio), true) = (slides_with, round.asked_m <= 0.0) {
             round.asked_m = round.gap_m - ratio * round.view.load_m;
@@ -115,6 +125,15 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
     } else {
         round.arrived(MAX_ROUNDS)
     })
+}
+
+/// Of a god-object that cannot come nearer to the HIP, whatever friction says: all of its spring.
+fn held_here<L: FrictionLaw + ?Sized>(god: &God, slider: &Slider<'_, L>, rounds: u32) -> Slid {
+    let hip_B = &slider.input.hip_B;
+    let spring_B = god.point_B - hip_B;
+    let normal_B = direction_or_up(&spring_B);
+    let view = TangentView::new(&god.point_B, normal_B, normal_B.dot(hip_B) + spring_B.norm(), slider.input);
+    slider.look(view, &Vector3::zeros(), &god.point_B).arrived(rounds)
 }
 
 /// Bound on the rounds of one walk.

@@ -130,6 +130,7 @@ impl Trial {
         let mut god_before: Option<Vector3<f64>> = None;
         let is_frictionless = std::ptr::eq(entity, &raw const self.frictionless);
         for (tick, hip) in path.iter().enumerate() {
+            if std::env::var_os("WALK").is_some() { println!("{name} tick {tick} walk"); }
             let out = finger.step(std::slice::from_ref(entity), hip, DT);
             let Some(contact) = finger.contact(0) else {
                 let is_unfelt = tick > 0 && self.is_deep(hip);
