@@ -25,6 +25,8 @@ pub(super) enum Moved {
     There,
     /// Not all the way: only as far as the neighbourhood is known, or to where other patches matter.
     Partly,
+    /// To where another patch matters that is all but parallel to one that holds: tangent planes do not tell them apart.
+    Grazing,
     /// Nowhere: the target would stretch the spring.
     TooFar,
 }
@@ -113,15 +115,15 @@ pub(super) fn advance(
     if !is_flat && (moved_B - hip_B).norm_squared() > longest {
         return Moved::TooFar;
     }
-    if stop_where_it_ends(csg, god, &moved_B, hip_B) {
-        return Moved::Partly;
+    if let Some(stop) = stop_where_it_ends(csg, god, &moved_B, hip_B) {
+        return stop;
     }
     god.point_B = moved_B;
     if share == 1.0 { Moved::There } else { Moved::Partly }
 }
 
-/// Follows the way to where something bars it, or where it is no boundary any longer; whether there is such a place.
-fn stop_where_it_ends(csg: &Csg, god: &mut God, to_B: &Vector3<f64>, hip_B: &Vector3<f64>) -> bool {
+/// Follows the way to where something bars it, or where it is no boundary any longer, if there is such a place.
+fn stop_where_it_ends(csg: &Csg, god: &mut God, to_B: &Vector3<f64>, hip_B: &Vector3<f64>) -> Option<Moved> {
     let from_B = god.point_B;
     for (crossed_at, index) in Events::along(csg, &god.near, god.sides, god.active, &from_B, to_B).iter() {
         let beyond = god.sides ^ 1 << index;
@@ -133,12 +135,21 @@ fn stop_where_it_ends(csg: &Csg, god: &mut God, to_B: &Vector3<f64>, hip_B: &Vec
             let off_m = (edge_B - met_B).norm();
             let hardly_meet = off_m.is_nan() || off_m > (to_B - from_B).norm();
             god.point_B = if hardly_meet { settle(csg, god, god.active, &met_B, hip_B) } else { edge_B };
-            return true;
+            return Some(if is_grazing(csg, god, index, hip_B) { Moved::Grazing } else { Moved::Partly });
         }
         god.sides = beyond;
     }
-    false
+    None
 }
 
+/// Whether a patch is all but parallel to one that holds the god-object.
+fn is_grazing(csg: &Csg, god: &God, index: usize, hip_B: &Vector3<f64>) -> bool {
+    let normal_B = |index: usize| god.near.patch(csg, index).look(&god.point_B, hip_B).normal_B;
+    let met_B = normal_B(index);
+    god.held_by().any(|held| normal_B(held).cross(&met_B).norm_squared() < PARALLEL * PARALLEL)
+}
+
+/// Patches that meet under less (rad) graze each other: within what counts as one place they may bend by as much.
+const PARALLEL: f64 = 1e-3;
 /// Bound on the attempts to come back onto bent patches within the neighbourhood.
 const MAX_SHORTENED: u32 = 8;

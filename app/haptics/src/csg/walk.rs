@@ -73,6 +73,7 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
             Glided::TooFar => (Moved::TooFar, None),
             Glided::Not => (advance(csg, god, &target.point_B, longest, &input.hip_B), None),
         };
+        if std::env::var_os("WALK").is_some() && moved==Moved::TooFar { println!("  toofar step {step_m:e} asked {:e}", round.asked_m); }
         if moved == Moved::TooFar {
             if round.asked_m < 0.0 && round.gap_m > 0.0 {
                 return Some(slider.went_too_far(&round, rounds));
@@ -84,6 +85,7 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
         if !is_seen {
             secant.made(round.asked_m, step_m);
         }
+        if std::env::var_os("WALK").is_some() { let v=round.view; println!("  round {rounds} asked {:e} gap {:e} depth {:e} {moved:?} glided {} step {step_m:e} held {held_before:?}->{:?} off {:e} dist {:.9} longest {longest:e} seen {is_seen} sides {:b} active {:b} n {:?}", round.asked_m, round.gap_m, v.depth_m, view.is_some(), god.held_patches(), (god.point_B-before_B).norm(), (god.point_B-input.hip_B).norm(), god.sides, god.active, v.normal_B.as_slice()); }
         let has_glided = view.is_some();
         let view = match view {
             Some(view) => view,
@@ -101,19 +103,24 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
         let is_stalled = (god.point_B - before_B).amax() <= csg.tolerance_m();
         stalls = if is_stalled { stalls + 1 } else { 0 };
         round = slider.look(view, &Vector3::zeros(), &god.point_B);
-        if stalls >= MAX_STALLS && round.is_inside_the_circle() {
+        let is_stalled = stalls >= MAX_STALLS;
+        if is_stalled && round.is_inside_the_circle() {
             return Some(slider.rested(&round, rounds));
         }
-        if stalls >= MAX_STALLS {
+        if (is_stalled || moved == Moved::Grazing) && round.asked_m > 0.0 {
+            if std::env::var_os("WALK").is_some() { println!("  detour {:?}", match detour(csg, god, &input.hip_B, round.asked_m) {Detour::Along(g)=>format!("{:?} {:?}", g.held_patches(), (g.point_B-god.point_B).norm()), Detour::Free=>"free".into(), Detour::None=>"none".into()}); }
             match detour(csg, god, &input.hip_B, round.asked_m) {
-                Detour::Along(other) => *god = other,
+                Detour::Along(other) => {
+                    *god = other;
+                    stalls = 0;
+                    let stood = stand(csg, god, input)?;
+                    looks = stood.looks;
+                    round = slider.look(stood.view, &Vector3::zeros(), &god.point_B);
+                }
                 Detour::Free => return None,
-                Detour::None => return Some(held_here(god, slider, rounds)),
+                Detour::None if is_stalled => return Some(held_here(god, slider, rounds)),
+                Detour::None => {}
             }
-            stalls = 0;
-            let stood = stand(csg, god, input)?;
-            looks = stood.looks;
-            round = slider.look(stood.view, &Vector3::zeros(), &god.point_B);
         }
         if let (Some(ratio), true) = (slides_with, round.asked_m <= 0.0) {
             round.asked_m = round.gap_m - ratio * round.view.load_m;
