@@ -115,7 +115,12 @@ pub(super) fn advance(
     if !is_flat && (moved_B - hip_B).norm_squared() > longest {
         return Moved::TooFar;
     }
+    let before = *god;
     if let Some(stop) = stop_where_it_ends(csg, god, &moved_B, hip_B) {
+        // Patches that hardly meet may meet elsewhere.
+        if (god.point_B - hip_B).norm_squared() > longest {
+            *god = before;
+        }
         return stop;
     }
     god.point_B = moved_B;

@@ -139,6 +139,13 @@ impl God {
         (self.active.count_ones() == 2).then(|| [self.near.patch(csg, first), self.near.patch(csg, second)])
     }
 
+    /// Whether it is free, and each of the one or two patches that hold it is boundary there.
+    #[inline]
+    pub(super) fn is_before_walls(&self) -> bool {
+        let is_wall = |index: usize| self.near.is_solid(self.sides ^ 1 << index);
+        self.active.count_ones() > 2 || !self.near.is_solid(self.sides) && self.held_by().all(is_wall)
+    }
+
     /// Knows its clearing from how far away the nearest patch is that does not hold it; it is on `count` patches.
     pub(super) fn clear(&mut self, count: usize, nearest_m: f64) {
         let room_m = self.near.room_m(&self.point_B);

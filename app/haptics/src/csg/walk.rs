@@ -36,7 +36,8 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
     let input = slider.input;
     let Stood { view, mut looks } = stood;
     let mut round = slider.look(view, &Vector3::zeros(), &god.point_B);
-    let (mut secant, mut shortened, mut stalls) = (Secant::default(), 1.0, 0);
+    let (mut secant, mut shortened) = (Secant::default(), 1.0);
+    let mut bars = Bars::default();
     let mut longest = f64::NAN;
     // Force ratio with which it already slides: a curve that falls with speed may hold what rests, but not what slides.
     let mut slides_with = None;
@@ -49,8 +50,24 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
         if is_first && round.is_inside_the_circle() {
             return Some(slider.rested(&round, rounds));
         }
-        if round.asked_m.is_nan() || round.asked_m.abs() <= round.view.rest_m {
+        let has_arrived = round.asked_m.is_nan() || round.asked_m.abs() <= round.view.rest_m;
+        if has_arrived && !bars.may_hide_a_way(csg, god) {
             return Some(round.arrived(rounds));
+        }
+        if has_arrived || bars.are_met() {
+            let at_most_m = if has_arrived { csg.ledge_m() } else { round.asked_m };
+            match detour(csg, god, &input.hip_B, at_most_m) {
+                Detour::Along(other) => *god = other,
+                Detour::Free => return None,
+                Detour::None if has_arrived => return Some(round.arrived(rounds)),
+                Detour::None => return Some(held_here(god, slider, rounds)),
+            }
+            bars.passed();
+            let stood = stand(csg, god, input)?;
+            looks = stood.looks;
+            round = slider.look(stood.view, &Vector3::zeros(), &god.point_B);
+            (secant, longest) = (Secant::default(), f64::NAN);
+            continue;
         }
         if is_first {
             longest = slider.longest(&round, &god.point_B);
@@ -73,7 +90,6 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
             Glided::TooFar => (Moved::TooFar, None),
             Glided::Not => (advance(csg, god, &target.point_B, longest, &input.hip_B), None),
         };
-        if std::env::var_os("WALK").is_some() && moved==Moved::TooFar { println!("  toofar step {step_m:e} asked {:e}", round.asked_m); }
         if moved == Moved::TooFar {
             if round.asked_m < 0.0 && round.gap_m > 0.0 {
                 return Some(slider.went_too_far(&round, rounds));
@@ -85,7 +101,6 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
         if !is_seen {
             secant.made(round.asked_m, step_m);
         }
-        if std::env::var_os("WALK").is_some() { let v=round.view; println!("  round {rounds} asked {:e} gap {:e} depth {:e} {moved:?} glided {} step {step_m:e} held {held_before:?}->{:?} off {:e} dist {:.9} longest {longest:e} seen {is_seen} sides {:b} active {:b} n {:?}", round.asked_m, round.gap_m, v.depth_m, view.is_some(), god.held_patches(), (god.point_B-before_B).norm(), (god.point_B-input.hip_B).norm(), god.sides, god.active, v.normal_B.as_slice()); }
         let has_glided = view.is_some();
         let view = match view {
             Some(view) => view,
@@ -101,27 +116,8 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
             continue;
         }
         let is_stalled = (god.point_B - before_B).amax() <= csg.tolerance_m();
-        stalls = if is_stalled { stalls + 1 } else { 0 };
         round = slider.look(view, &Vector3::zeros(), &god.point_B);
-        let is_stalled = stalls >= MAX_STALLS;
-        if is_stalled && round.is_inside_the_circle() {
-            return Some(slider.rested(&round, rounds));
-        }
-        if (is_stalled || moved == Moved::Grazing) && round.asked_m > 0.0 {
-            if std::env::var_os("WALK").is_some() { println!("  detour {:?}", match detour(csg, god, &input.hip_B, round.asked_m) {Detour::Along(g)=>format!("{:?} {:?}", g.held_patches(), (g.point_B-god.point_B).norm()), Detour::Free=>"free".into(), Detour::None=>"none".into()}); }
-            match detour(csg, god, &input.hip_B, round.asked_m) {
-                Detour::Along(other) => {
-                    *god = other;
-                    stalls = 0;
-                    let stood = stand(csg, god, input)?;
-                    looks = stood.looks;
-                    round = slider.look(stood.view, &Vector3::zeros(), &god.point_B);
-                }
-                Detour::Free => return None,
-                Detour::None if is_stalled => return Some(held_here(god, slider, rounds)),
-                Detour::None => {}
-            }
-        }
+        bars.meet(is_stalled, moved == Moved::Grazing || !god.is_before_walls());
         if let (Some(ratio), true) = (slides_with, round.asked_m <= 0.0) {
             round.asked_m = round.gap_m - ratio * round.view.load_m;
         }
@@ -129,9 +125,46 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
     }
     Some(if round.asked_m < 0.0 {
         slider.went_too_far(&round, MAX_ROUNDS)
+    } else if round.asked_m == round.gap_m {
+        // Without friction.
+        held_here(god, slider, MAX_ROUNDS)
     } else {
         round.arrived(MAX_ROUNDS)
     })
+}
+
+/// What a walk came upon that tangent planes do not explain.
+#[derive(Default)]
+struct Bars {
+    /// Stops one after the other without getting anywhere.
+    stalls: u32,
+    is_grazing: bool,
+    detours: u32,
+}
+
+impl Bars {
+    #[inline]
+    fn meet(&mut self, is_stalled: bool, is_grazing: bool) {
+        self.stalls = if is_stalled { self.stalls + 1 } else { 0 };
+        self.is_grazing = is_grazing;
+    }
+
+    fn passed(&mut self) {
+        *self = Self { detours: self.detours + 1, ..Self::default() };
+    }
+
+    fn are_met(&self) -> bool {
+        self.detours < MAX_DETOURS && (self.is_grazing || self.stalls >= MAX_STALLS)
+    }
+
+    /// Whether it may have come to rest before a ledge that is too low to be one.
+    #[inline(always)]
+    fn may_hide_a_way(&self, csg: &Csg, god: &God) -> bool {
+        god.active.count_ones() > 1
+            && !god.clearing.holds(&god.point_B)
+            && self.detours < MAX_DETOURS
+            && is_tight(csg, god)
+    }
 }
 
 /// Of a god-object that cannot come nearer to the HIP, whatever friction says: all of its spring.
@@ -145,5 +178,7 @@ fn held_here<L: FrictionLaw + ?Sized>(god: &God, slider: &Slider<'_, L>, rounds:
 
 /// Bound on the rounds of one walk.
 const MAX_ROUNDS: u32 = 64;
-/// Stops one after the other without getting anywhere, after which a walk is at its end.
+/// Stops one after the other without getting anywhere, after which something bars the walk.
 const MAX_STALLS: u32 = 3;
+/// Bound on the detours of one walk.
+const MAX_DETOURS: u32 = 6;

@@ -253,3 +253,31 @@ const PATHS: u32 = 3;
 const RAYS: u32 = 24;
 /// Steps to the side, as a share of the extent: leaves nearer to each other than 1e-9 of it are one.
 const RESOLUTION: f64 = 1e-7;
+
+#[test]
+fn show() {
+    let Ok(seed) = std::env::var("SHOW") else { return };
+    let tree = joined(seed.parse().unwrap());
+    fn show(tree: &CsgTree, depth: usize) {
+        println!("{}{:?}", " ".repeat(depth), tree.op);
+        for part in &tree.parts {
+            match &part.shape {
+                haptics::PartShape::Form(form) => println!(
+                    "{} {form:?} at {:?} turn {:?}",
+                    " ".repeat(depth), part.pose.translation.vector.as_slice(), part.pose.rotation.scaled_axis().as_slice()
+                ),
+                haptics::PartShape::Tree(tree) => show(tree, depth + 1),
+            }
+        }
+    }
+    println!("extent {}", built(&tree).extent_m());
+    show(&tree, 0);
+    if let Ok(p) = std::env::var("AT") {
+        let p: Vec<f64> = p.split(',').map(|x| x.parse().unwrap()).collect();
+        let p = Vector3::new(p[0], p[1], p[2]);
+        println!("distance {:e}", built(&tree).signed_distance(&p));
+        for leaf in leaves(&tree) {
+            println!("leaf {} {:e}", contains(&leaf, &p), built(&leaf).signed_distance(&p));
+        }
+    }
+}

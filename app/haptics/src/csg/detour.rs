@@ -1,0 +1,217 @@
+//! Where a walk that is barred can go on: steps that are tried out on the patches themselves.
+//!
+//! Problem: what holds a god-object follows from tangent planes, and these say nothing where patches touch (a cylinder and
+//! its round cap have one tangent plane on their whole seam), and too little where they bend away within a step. The walk
+//! then goes along a patch that ends right there, and does not get anywhere.
+//!
+//! Model: all patches within [`TIGHT`] of the god-object count as meeting there. Along each, and along the curve of each
+//! two, a step towards the HIP is made and brought back. It is taken if it ends on the boundary, nearer to the HIP, and if
+//! a way leads there through the open, a little above the boundary: ledges that are lower than this are stepped over. Of steps as
+//! long the one that ends nearest to the HIP wins; if none is possible, shorter ones are tried. If none of these is possible,
+//! the god-object is where it belongs.
+//!
+//! Frames: object frame B. Invariants: no way leads through material, however thin; no step makes the spring longer.
+//! Cost: at most [`SHARES`] times the patches here and their pairs, each a settlement and three paths. No allocation.
+
+use nalgebra::Vector3;
+
+use super::Csg;
+use super::god::{God, places};
+use super::hit::{Events, first_hit};
+use super::near::{MAX_NEAR, Neighbourhood, Sides};
+use super::settle::{Pair, settle};
+
+/// Where a god-object that is barred can go on.
+pub(super) enum Detour {
+    /// Along other patches.
+    Along(God),
+    /// Off the boundary: nothing is between it and the HIP.
+    Free,
+    /// Nowhere: it is at its place.
+    None,
+}
+
+/// Whether more patches than those that hold the god-object are where it is, or all but there.
+pub(super) fn is_tight(csg: &Csg, god: &God) -> bool {
+    here(csg, god).count_ones() > god.active.count_ones()
+}
+
+/// The best step of no more than `at_most_m` from where a god-object stands.
+#[inline(never)]
+pub(super) fn detour(csg: &Csg, god: &God, hip_B: &Vector3<f64>, at_most_m: f64) -> Detour {
+    let mut god = *god;
+    god.look_around(csg, at_most_m);
+    let trial = Trial::new(csg, &god, hip_B);
+    let longest_m = at_most_m.min(0.5 * god.near.room_m(&god.point_B));
+    for share in SHARES {
+        let step_m = longest_m * share;
+        if step_m < trial.lift_m {
+            break;
+        }
+        if let Some(found) = trial.straight(step_m) {
+            return found;
+        }
+        if let Some(god) = trial.best_along(step_m) {
+            return Detour::Along(god);
+        }
+    }
+    Detour::None
+}
+
+/// The patches that meet where a god-object is.
+fn here(csg: &Csg, god: &God) -> Sides {
+    let levels_m = god.near.levels_m(csg, &god.point_B);
+    let tight_m = TIGHT * csg.extent_m;
+    (0..god.near.count()).filter(|&i| levels_m[i].abs() <= tight_m).fold(god.active, |here, i| here | 1 << i)
+}
+
+struct Trial<'t> {
+    csg: &'t Csg,
+    god: &'t God,
+    hip_B: &'t Vector3<f64>,
+    here: Sides,
+    lift_m: f64,
+    /// Above the god-object, in the open.
+    start_B: Vector3<f64>,
+    start_sides: Sides,
+}
+
+impl<'t> Trial<'t> {
+    fn new(csg: &'t Csg, god: &'t God, hip_B: &'t Vector3<f64>) -> Self {
+        let lift_m = LIFT * csg.extent_m;
+        let lifted_B = god.point_B + up(&god.point_B, hip_B) * lift_m;
+        let lifted = god.near.sides(csg, &lifted_B);
+        // In a gap that is narrower than that it stays where it is.
+        let (start_B, start_sides) =
+            if god.near.is_solid(lifted) { (god.point_B, god.sides) } else { (lifted_B, lifted) };
+        Self { csg, god, hip_B, here: here(csg, god), lift_m, start_B, start_sides }
+    }
+
+    fn near(&self) -> &Neighbourhood {
+        &self.god.near
+    }
+
+    /// Towards the HIP, as far as the way is open.
+    fn straight(&self, step_m: f64) -> Option<Detour> {
+        let to_hip_B = self.hip_B - self.start_B;
+        let length_m = to_hip_B.norm();
+        let end_B = self.start_B + to_hip_B * (step_m / length_m).min(1.0);
+        let sides = self.free_sides_after(self.start_sides, &self.start_B, &end_B)?;
+        let hit = first_hit(self.csg, self.near(), sides, &end_B, self.hip_B);
+        Some(hit.map_or(Detour::Free, |hit| Detour::Along(God::hit(&hit))))
+    }
+
+    /// Along a patch, or the curve of two, whichever leads nearest to the HIP.
+    fn best_along(&self, step_m: f64) -> Option<God> {
+        let here_m = (self.god.point_B - self.hip_B).norm();
+        let mut best: Option<(f64, God)> = None;
+        for i in places(self.here) {
+            for k in places(self.here).take_while(|&k| k <= i) {
+                let Some(point_B) = self.step(1 << i | 1 << k, step_m) else { continue };
+                let distance_m = (point_B - self.hip_B).norm();
+                let at_most_m = best.as_ref().map_or(here_m - self.csg.tolerance_m(), |(least_m, _)| *least_m);
+                if distance_m >= at_most_m || !self.near().holds(&point_B, self.lift_m) {
+                    continue;
+                }
+                if let Some(god) = self.landed(&point_B, 1 << i | 1 << k) {
+                    best = Some((distance_m, god));
+                }
+            }
+        }
+        best.map(|(_, god)| god)
+    }
+
+    /// Where a step towards the HIP ends that keeps to these one or two patches.
+    fn step(&self, active: Sides, step_m: f64) -> Option<Vector3<f64>> {
+        let at_B = &self.god.point_B;
+        let to_hip_B = self.hip_B - at_B;
+        let look = |index: usize| self.near().patch(self.csg, index).look(at_B, self.hip_B);
+        let mut held = places(active);
+        let first = look(held.next()?);
+        let way_B = match held.next().map(look) {
+            None => to_hip_B - first.normal_B * first.normal_B.dot(&to_hip_B),
+            Some(second) => {
+                let Pair { along_B, sine2, .. } = Pair::of(&[first, second]);
+                along_B * (along_B.dot(&to_hip_B) / sine2.max(f64::MIN_POSITIVE))
+            }
+        };
+        let length_m = way_B.norm();
+        if length_m.is_nan() || length_m <= self.csg.tolerance_m() {
+            return None;
+        }
+        let aim_B = at_B + way_B * (step_m / length_m).min(1.0);
+        let point_B = settle(self.csg, self.god, active, &aim_B, self.hip_B);
+        // Patches that hardly meet have no curve.
+        ((point_B - aim_B).norm() <= step_m).then_some(point_B)
+    }
+
+    /// A god-object on these patches, if they are boundary there, and a way leads there.
+    fn landed(&self, point_B: &Vector3<f64>, active: Sides) -> Option<God> {
+        let sides = self.free_sides_at(point_B, active)?;
+        let end_B = point_B + up(point_B, self.hip_B) * self.lift_m;
+        if self.near().is_solid(self.near().sides(self.csg, &end_B)) || !self.is_open_way(&end_B) {
+            return None;
+        }
+        Some(God::new(*point_B, self.near().clone(), sides, active))
+    }
+
+    /// Sides of a point on patches such that it is free and each of them a wall. Of others that it is on, either will do.
+    fn free_sides_at(&self, point_B: &Vector3<f64>, active: Sides) -> Option<Sides> {
+        let near = self.near();
+        let levels_m = near.levels_m(self.csg, point_B);
+        let (mut sides, mut either) = (0, active);
+        for (index, level_m) in levels_m.iter().enumerate().take(near.count()) {
+            sides |= usize::from(*level_m <= 0.0) << index;
+            either |= usize::from(level_m.abs() <= self.csg.tolerance_m()) << index;
+        }
+        let is_held = |sides: Sides| {
+            !near.is_solid(sides) && places(active).all(|index| near.is_solid(sides ^ 1 << index))
+        };
+        (0..1_usize << MAX_NEAR).filter(|turned| turned & !either == 0).map(|turned| sides ^ turned).find(|&s| is_held(s))
+    }
+
+    /// Whether the open leads to a point: straight, or over the tangent plane.
+    fn is_open_way(&self, end_B: &Vector3<f64>) -> bool {
+        let is_open = |sides: Sides, from_B: &Vector3<f64>, to_B: &Vector3<f64>| {
+            self.free_sides_after(sides, from_B, to_B)
+        };
+        if is_open(self.start_sides, &self.start_B, end_B).is_some() {
+            return true;
+        }
+        let up_B = up(&self.god.point_B, self.hip_B);
+        let over_B = end_B + up_B * up_B.dot(&(self.start_B - end_B));
+        let over = is_open(self.start_sides, &self.start_B, &over_B);
+        over.is_some_and(|sides| is_open(sides, &over_B, end_B).is_some())
+    }
+
+    /// The sides at the end of a straight way that never enters the material.
+    fn free_sides_after(&self, sides: Sides, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<Sides> {
+        let near = self.near();
+        if near.is_solid(sides) || !near.holds(to_B, 0.0) {
+            return None;
+        }
+        let mut sides = sides;
+        for (_, index) in Events::along(self.csg, near, sides, 0, from_B, to_B).iter() {
+            sides ^= 1 << index;
+            if near.is_solid(sides) {
+                return None;
+            }
+        }
+        Some(sides)
+    }
+}
+
+/// Away from the HIP.
+fn up(point_B: &Vector3<f64>, hip_B: &Vector3<f64>) -> Vector3<f64> {
+    let up_B = point_B - hip_B;
+    let length_m = up_B.norm();
+    if length_m > 0.0 { up_B / length_m } else { up_B }
+}
+
+/// Patches nearer to the god-object than this share of the extent count as meeting there: the same below which surfaces
+/// are one.
+const TIGHT: f64 = 1e-9;
+/// How far above the boundary ways lead, as a share of the extent: over all that counts as one.
+const LIFT: f64 = 2e-9;
+/// Of the step that is asked for.
+const SHARES: [f64; 6] = [1.0, 0.125, 0.015_625, 2e-3, 2.5e-4, 3e-5];
