@@ -130,7 +130,19 @@ pub(super) fn advance(
 /// Follows the way to where something bars it, or where it is no boundary any longer, if there is such a place.
 fn stop_where_it_ends(csg: &Csg, god: &mut God, to_B: &Vector3<f64>, hip_B: &Vector3<f64>) -> Option<Moved> {
     let from_B = god.point_B;
-    for (crossed_at, index) in Events::along(csg, &god.near, god.sides, god.active, &from_B, to_B).iter() {
+    let events = Events::along(csg, &god.near, god.sides, god.active, &from_B, to_B);
+    let mut passed_over = 0;
+    for (crossed_at, index) in events.iter() {
+        if passed_over >> index & 1 == 1 {
+            continue;
+        }
+        if events.left_again(index).is_some_and(|left_at| {
+            let amid_B = from_B + (to_B - from_B) * (0.5 * (crossed_at + left_at));
+            passes_over(csg, god, index, &amid_B, hip_B)
+        }) {
+            passed_over |= 1 << index;
+            continue;
+        }
         let beyond = god.sides ^ 1 << index;
         let goes_on =
             !god.near.is_solid(beyond) && god.held_by().all(|held| god.near.is_solid(beyond ^ 1 << held));
@@ -145,6 +157,16 @@ fn stop_where_it_ends(csg: &Csg, god: &mut God, to_B: &Vector3<f64>, hip_B: &Vec
         god.sides = beyond;
     }
     None
+}
+
+/// Whether it is only the chord that crosses a patch twice, between two places of bent patches, and not the way on them.
+fn passes_over(csg: &Csg, god: &God, index: usize, amid_B: &Vector3<f64>, hip_B: &Vector3<f64>) -> bool {
+    if god.is_on_planes(csg) {
+        return false;
+    }
+    let on_way_B = settle(csg, god, god.active, amid_B, hip_B);
+    let is_inside = god.near.patch(csg, index).level(&on_way_B) <= 0.0;
+    is_inside == (god.sides >> index & 1 == 1)
 }
 
 /// Whether a patch is all but parallel to one that holds the god-object.
