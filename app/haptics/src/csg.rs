@@ -176,7 +176,7 @@ impl Csg {
 /// ordinary angles leaves.
 const TOLERANCE: f64 = 1e-12;
 /// Far more than surfaces are apart that are one, as a share of the extent, and far less than can be felt.
-const LEDGE: f64 = 2e-6;
+const LEDGE: f64 = 1e-5;
 /// Farther from a leaf's ball than this share of its radius, the ball stands for the leaf.
 const FAR: f64 = 0.5;
 /// Of an evaluation: a tree needs one place more than it is deep.

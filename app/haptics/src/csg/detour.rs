@@ -210,8 +210,8 @@ fn up(point_B: &Vector3<f64>, hip_B: &Vector3<f64>) -> Vector3<f64> {
 
 /// Patches nearer to the god-object than this share of the extent count as meeting there: the same below which surfaces
 /// are one.
-const TIGHT: f64 = 1e-9;
+const TIGHT: f64 = 1e-7;
 /// How far above the boundary ways lead, as a share of the extent: over all that counts as one.
-const LIFT: f64 = 2e-9;
+const LIFT: f64 = 2e-7;
 /// Of the step that is asked for.
 const SHARES: [f64; 6] = [1.0, 0.125, 0.015_625, 2e-3, 2.5e-4, 3e-5];

@@ -56,12 +56,15 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
         }
         if has_arrived || bars.are_met() {
             let at_most_m = if has_arrived { csg.ledge_m() } else { round.asked_m };
-            if std::env::var_os("WALK").is_some() { println!("  arrived {has_arrived} stalls {} grazing {} detours {} detour {:?}", bars.stalls, bars.is_grazing, bars.detours, match detour(csg, god, &input.hip_B, at_most_m) {Detour::Along(g)=>format!("{:?} {:?} nearer by {:e}", g.held_patches(), (g.point_B-god.point_B).norm(), (god.point_B-input.hip_B).norm()-(g.point_B-input.hip_B).norm()), Detour::Free=>"free".into(), Detour::None=>"none".into()}); }
             match detour(csg, god, &input.hip_B, at_most_m) {
                 Detour::Along(other) => *god = other,
                 Detour::Free => return None,
                 Detour::None if has_arrived => return Some(round.arrived(rounds)),
-                Detour::None => return Some(held_here(god, slider, rounds)),
+                Detour::None if bars.have_stopped_it() => return Some(held_here(god, slider, rounds)),
+                Detour::None => {
+                    bars.is_grazing = false;
+                    continue;
+                }
             }
             bars.passed();
             let stood = stand(csg, god, input)?;
@@ -91,7 +94,6 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
             Glided::TooFar => (Moved::TooFar, None),
             Glided::Not => (advance(csg, god, &target.point_B, longest, &input.hip_B), None),
         };
-        if std::env::var_os("WALK").is_some() && moved==Moved::TooFar { println!("  toofar step {step_m:e} asked {:e}", round.asked_m); }
         if moved == Moved::TooFar {
             if round.asked_m < 0.0 && round.gap_m > 0.0 {
                 return Some(slider.went_too_far(&round, rounds));
@@ -103,7 +105,6 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
         if !is_seen {
             secant.made(round.asked_m, step_m);
         }
-        if std::env::var_os("WALK").is_some() { let v=round.view; println!("  round {rounds} asked {:e} gap {:e} depth {:e} {moved:?} glided {} step {step_m:e} held {held_before:?}->{:?} off {:e} dist {:.9} seen {is_seen} sides {:b} active {:b} n {:?}", round.asked_m, round.gap_m, v.depth_m, view.is_some(), god.held_patches(), (god.point_B-before_B).norm(), (god.point_B-input.hip_B).norm(), god.sides, god.active, v.normal_B.as_slice()); }
         let has_glided = view.is_some();
         let view = match view {
             Some(view) => view,
@@ -157,7 +158,11 @@ impl Bars {
     }
 
     fn are_met(&self) -> bool {
-        self.detours < MAX_DETOURS && (self.is_grazing || self.stalls >= MAX_STALLS)
+        self.detours < MAX_DETOURS && (self.is_grazing || self.have_stopped_it())
+    }
+
+    fn have_stopped_it(&self) -> bool {
+        self.stalls >= MAX_STALLS
     }
 
     /// Whether it may have come to rest before a ledge that is too low to be one.

@@ -144,6 +144,11 @@ impl Trial {
             faults.touched += 1;
             let god = contact.god_object_W;
             let spring = god - hip;
+            if self.is_on_thin_wall(&god, hip) {
+                // Felt or not: nobody says.
+                god_before = None;
+                continue;
+            }
             let tell_it = |what: &str| tell(name, tick, what, &format!("{hip:?} {out:?} {god:?}"));
             if !self.is_on_boundary(&god) {
                 faults.off_boundary += 1;
@@ -175,6 +180,17 @@ impl Trial {
     fn is_deep(&self, hip: &Vector3<f64>) -> bool {
         let step_m = RESOLUTION * self.extent_m;
         contains(&self.tree, hip) && directions(26).all(|d| contains(&self.tree, &(hip + d * step_m)))
+    }
+
+    /// Whether the god-object is on material that is thinner than two leaves that count as one are apart.
+    fn is_on_thin_wall(&self, god: &Vector3<f64>, hip: &Vector3<f64>) -> bool {
+        let step_m = 0.3 * RESOLUTION * self.extent_m;
+        let is_cut = |leaf: &&CsgTree| {
+            let first = contains(leaf, god);
+            directions(26).any(|d| contains(leaf, &(god + d * step_m)) != first)
+        };
+        let below = god + (hip - god).normalize() * step_m;
+        !contains(&self.tree, &below) && self.leaves.iter().filter(is_cut).count() > 1
     }
 
     /// Whether there is both material and free space right beside a point.
