@@ -6,9 +6,8 @@
 //!
 //! Model: all patches within [`TIGHT`] of the god-object count as meeting there. Along each, and along the curve of each
 //! two, a step towards the HIP is made and brought back. It is taken if it ends on the boundary, nearer to the HIP, and if
-//! a way leads there through the open, a little above the boundary: ledges that are lower than this are stepped over. Of steps as
-//! long the one that ends nearest to the HIP wins; if none is possible, shorter ones are tried. If none of these is possible,
-//! the god-object is where it belongs.
+//! a way leads there through the open, a little above the boundary: ledges that are lower than this are stepped over. The one that ends
+//! nearest to the HIP wins, longer steps being tried first. If none is possible, the god-object is where it belongs.
 //!
 //! Frames: object frame B. Invariants: no way leads through material, however thin; no step makes the spring longer.
 //! Cost: at most [`SHARES`] times the patches here and their pairs, each a settlement and three paths. No allocation.
@@ -43,6 +42,7 @@ pub(super) fn detour(csg: &Csg, god: &God, hip_B: &Vector3<f64>, at_most_m: f64)
     god.look_around(csg, at_most_m);
     let trial = Trial::new(csg, &god, hip_B);
     let longest_m = at_most_m.min(0.5 * god.near.room_m(&god.point_B));
+    let mut best: Option<Landing> = None;
     for share in SHARES {
         let step_m = longest_m * share;
         if step_m < trial.lift_m {
@@ -51,11 +51,19 @@ pub(super) fn detour(csg: &Csg, god: &God, hip_B: &Vector3<f64>, at_most_m: f64)
         if let Some(found) = trial.straight(step_m) {
             return found;
         }
-        if let Some(god) = trial.best_along(step_m) {
-            return Detour::Along(god);
+        best = trial.best_along(step_m, best);
+        if best.as_ref().is_some_and(|landing| landing.god.active.count_ones() == 1) {
+            break;
         }
     }
-    Detour::None
+    best.map_or(Detour::None, |landing| Detour::Along(landing.god))
+}
+
+/// Where a step may end.
+struct Landing {
+    /// From the HIP.
+    distance_m: f64,
+    god: God,
 }
 
 /// The patches that meet where a god-object is.
@@ -102,23 +110,22 @@ impl<'t> Trial<'t> {
     }
 
     /// Along a patch, or the curve of two, whichever leads nearest to the HIP.
-    fn best_along(&self, step_m: f64) -> Option<God> {
+    fn best_along(&self, step_m: f64, mut best: Option<Landing>) -> Option<Landing> {
         let here_m = (self.god.point_B - self.hip_B).norm();
-        let mut best: Option<(f64, God)> = None;
         for i in places(self.here) {
             for k in places(self.here).take_while(|&k| k <= i) {
                 let Some(point_B) = self.step(1 << i | 1 << k, step_m) else { continue };
                 let distance_m = (point_B - self.hip_B).norm();
-                let at_most_m = best.as_ref().map_or(here_m - self.csg.tolerance_m(), |(least_m, _)| *least_m);
-                if distance_m >= at_most_m || !self.near().holds(&point_B, self.lift_m) {
+                let least_m = best.as_ref().map_or(here_m - self.csg.tolerance_m(), |best| best.distance_m);
+                if distance_m >= least_m || !self.near().holds(&point_B, self.lift_m) {
                     continue;
                 }
                 if let Some(god) = self.landed(&point_B, 1 << i | 1 << k) {
-                    best = Some((distance_m, god));
+                    best = Some(Landing { distance_m, god });
                 }
             }
         }
-        best.map(|(_, god)| god)
+        best
     }
 
     /// Where a step towards the HIP ends that keeps to these one or two patches.

@@ -54,18 +54,23 @@ fn form_contains(form: &Form, p: &Vector3<f64>) -> bool {
     }
 }
 
-/// All leaves as trees of their own, in the frame of the whole.
-pub(crate) fn leaves(tree: &CsgTree) -> Vec<CsgTree> {
+/// A leaf as a tree of its own, in the frame of the whole.
+pub(crate) struct Leaf {
+    pub(crate) tree: CsgTree,
+    /// Taken away from something, and not that from something else.
+    pub(crate) is_taken_away: bool,
+}
+
+pub(crate) fn leaves(tree: &CsgTree) -> Vec<Leaf> {
     let mut found = Vec::new();
-    for part in &tree.parts {
+    for (i, part) in tree.parts.iter().enumerate() {
+        let is_taken_away = tree.op == CsgOp::Difference && i > 0;
         match &part.shape {
-            PartShape::Form(_) => found.push(CsgTree::union([part.clone()])),
-            PartShape::Tree(inner) => {
-                found.extend(leaves(inner).into_iter().map(|leaf| {
-                    let tree = CsgPart { shape: PartShape::Tree(leaf), ..part.clone() };
-                    CsgTree::union([tree])
-                }));
-            }
+            PartShape::Form(_) => found.push(Leaf { tree: CsgTree::union([part.clone()]), is_taken_away }),
+            PartShape::Tree(inner) => found.extend(leaves(inner).into_iter().map(|leaf| {
+                let tree = CsgPart { shape: PartShape::Tree(leaf.tree), ..part.clone() };
+                Leaf { tree: CsgTree::union([tree]), is_taken_away: is_taken_away != leaf.is_taken_away }
+            })),
         }
     }
     found

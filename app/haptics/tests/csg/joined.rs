@@ -5,7 +5,7 @@
 use std::ops::AddAssign;
 
 use crate::common::*;
-use crate::joints::{SIZE_M, contains, joined, leaves};
+use crate::joints::{Leaf, SIZE_M, contains, joined, leaves};
 use crate::trees::{built, touchable};
 use haptics::{CsgTree, Entity, Friction};
 use nalgebra::Vector3;
@@ -45,7 +45,7 @@ impl AddAssign for Faults {
 /// A solid under test.
 struct Trial {
     tree: CsgTree,
-    leaves: Vec<CsgTree>,
+    leaves: Vec<Leaf>,
     extent_m: f64,
     frictionless: Entity,
     rough: Entity,
@@ -79,9 +79,9 @@ impl Trial {
                 if contains(&self.tree, &middle) { inside = middle } else { out = middle }
             }
             let around: Vec<_> = (0..6).map(|_| out + noise.vector(0.05 * SIZE_M)).collect();
-            let is_cut = |leaf: &&CsgTree| {
-                let is_in = contains(leaf, &around[0]);
-                around.iter().any(|p| contains(leaf, p) != is_in)
+            let is_cut = |leaf: &&Leaf| {
+                let is_in = contains(&leaf.tree, &around[0]);
+                around.iter().any(|p| contains(&leaf.tree, p) != is_in)
             };
             let meeting = self.leaves.iter().filter(is_cut).count();
             if best.is_none_or(|(most, _)| meeting > most) {
@@ -144,7 +144,7 @@ impl Trial {
             faults.touched += 1;
             let god = contact.god_object_W;
             let spring = god - hip;
-            if self.is_on_thin_wall(&god, hip) {
+            if self.is_on_thin_wall(&god) {
                 // Felt or not: nobody says.
                 god_before = None;
                 continue;
@@ -182,15 +182,17 @@ impl Trial {
         contains(&self.tree, hip) && directions(26).all(|d| contains(&self.tree, &(hip + d * step_m)))
     }
 
-    /// Whether the god-object is on material that is thinner than two leaves that count as one are apart.
-    fn is_on_thin_wall(&self, god: &Vector3<f64>, hip: &Vector3<f64>) -> bool {
+    /// Whether two leaves lie against each other here, one of them taken away from the other or both facing each other: walls
+    /// and gaps without thickness, felt or not.
+    fn is_on_thin_wall(&self, god: &Vector3<f64>) -> bool {
         let step_m = 0.3 * RESOLUTION * self.extent_m;
-        let is_cut = |leaf: &&CsgTree| {
-            let first = contains(leaf, god);
-            directions(26).any(|d| contains(leaf, &(god + d * step_m)) != first)
+        let pattern = |leaf: &Leaf| -> Vec<bool> {
+            directions(26).map(|d| contains(&leaf.tree, &(god + d * step_m)) != leaf.is_taken_away).collect()
         };
-        let below = god + (hip - god).normalize() * step_m;
-        !contains(&self.tree, &below) && self.leaves.iter().filter(is_cut).count() > 1
+        let is_cut = |pattern: &Vec<bool>| pattern.iter().any(|is_in| *is_in != pattern[0]);
+        let cut: Vec<_> = self.leaves.iter().map(pattern).filter(is_cut).collect();
+        let opposed = |a: &[bool], b: &[bool]| a.iter().zip(b).filter(|(a, b)| a == b).count() <= 3;
+        cut.iter().enumerate().any(|(i, a)| cut[..i].iter().any(|b| opposed(a, b)))
     }
 
     /// Whether there is both material and free space right beside a point.
@@ -293,7 +295,7 @@ fn show() {
         let p = Vector3::new(p[0], p[1], p[2]);
         println!("distance {:e}", built(&tree).signed_distance(&p));
         for leaf in leaves(&tree) {
-            println!("leaf {} {:e}", contains(&leaf, &p), built(&leaf).signed_distance(&p));
+            println!("leaf {} {:e} {}", contains(&leaf.tree, &p), built(&leaf.tree).signed_distance(&p), leaf.is_taken_away);
         }
     }
 }
