@@ -15,10 +15,12 @@
 use nalgebra::Vector3;
 
 use super::Csg;
+use super::advance::is_grazing;
 use super::god::{God, places};
 use super::hit::{Events, first_hit};
 use super::near::{MAX_NEAR, Neighbourhood, Sides};
 use super::settle::{Pair, settle};
+use crate::surface::direction_or_up;
 
 /// Where a god-object that is barred can go on.
 pub(super) enum Detour {
@@ -30,9 +32,11 @@ pub(super) enum Detour {
     None,
 }
 
-/// Whether more patches than those that hold the god-object are where it is, or all but there.
-pub(super) fn is_tight(csg: &Csg, god: &God) -> bool {
+/// Whether more patches than those that hold the god-object are where it is, or all but there, or two of these are all but
+/// parallel.
+pub(super) fn is_tight(csg: &Csg, god: &God, hip_B: &Vector3<f64>) -> bool {
     here(csg, god).count_ones() > god.active.count_ones()
+        || god.held_by().any(|index| is_grazing(csg, god, index, hip_B))
 }
 
 /// The best step of no more than `at_most_m` from where a god-object stands.
@@ -79,20 +83,33 @@ struct Trial<'t> {
     hip_B: &'t Vector3<f64>,
     here: Sides,
     lift_m: f64,
-    /// Above the god-object, in the open.
-    start_B: Vector3<f64>,
-    start_sides: Sides,
+    /// Above the god-object, in the open: away from the HIP, and away from what holds it.
+    starts: [Start; 2],
+}
+
+/// Where ways begin.
+#[derive(Clone, Copy)]
+struct Start {
+    point_B: Vector3<f64>,
+    sides: Sides,
 }
 
 impl<'t> Trial<'t> {
     fn new(csg: &'t Csg, god: &'t God, hip_B: &'t Vector3<f64>) -> Self {
         let lift_m = LIFT * csg.extent_m;
-        let lifted_B = god.point_B + up(&god.point_B, hip_B) * lift_m;
-        let lifted = god.near.sides(csg, &lifted_B);
-        // In a gap that is narrower than that it stays where it is.
-        let (start_B, start_sides) =
-            if god.near.is_solid(lifted) { (god.point_B, god.sides) } else { (lifted_B, lifted) };
-        Self { csg, god, hip_B, here: here(csg, god), lift_m, start_B, start_sides }
+        let outward_B = |index: usize| {
+            let normal_B = god.near.patch(csg, index).look(&god.point_B, hip_B).normal_B;
+            if god.sides >> index & 1 == 1 { -normal_B } else { normal_B }
+        };
+        let away_B = direction_or_up(&god.held_by().fold(Vector3::zeros(), |sum, index| sum + outward_B(index)));
+        let starts = [up(&god.point_B, hip_B), away_B].map(|direction_B| {
+            let point_B = god.point_B + direction_B * lift_m;
+            let sides = god.near.sides(csg, &point_B);
+            // In a gap that is narrower than that it stays where it is.
+            let is_open = !god.near.is_solid(sides);
+            if is_open { Start { point_B, sides } } else { Start { point_B: god.point_B, sides: god.sides } }
+        });
+        Self { csg, god, hip_B, here: here(csg, god), lift_m, starts }
     }
 
     fn near(&self) -> &Neighbourhood {
@@ -101,10 +118,10 @@ impl<'t> Trial<'t> {
 
     /// Towards the HIP, as far as the way is open.
     fn straight(&self, step_m: f64) -> Option<Detour> {
-        let to_hip_B = self.hip_B - self.start_B;
-        let length_m = to_hip_B.norm();
-        let end_B = self.start_B + to_hip_B * (step_m / length_m).min(1.0);
-        let sides = self.free_sides_after(self.start_sides, &self.start_B, &end_B)?;
+        let [start, _] = self.starts;
+        let to_hip_B = self.hip_B - start.point_B;
+        let end_B = start.point_B + to_hip_B * (step_m / to_hip_B.norm()).min(1.0);
+        let sides = self.free_sides_after(start.sides, &start.point_B, &end_B)?;
         let hit = first_hit(self.csg, self.near(), sides, &end_B, self.hip_B);
         Some(hit.map_or(Detour::Free, |hit| Detour::Along(God::hit(&hit))))
     }
@@ -179,16 +196,15 @@ impl<'t> Trial<'t> {
 
     /// Whether the open leads to a point: straight, or over the tangent plane.
     fn is_open_way(&self, end_B: &Vector3<f64>) -> bool {
-        let is_open = |sides: Sides, from_B: &Vector3<f64>, to_B: &Vector3<f64>| {
-            self.free_sides_after(sides, from_B, to_B)
-        };
-        if is_open(self.start_sides, &self.start_B, end_B).is_some() {
-            return true;
-        }
         let up_B = up(&self.god.point_B, self.hip_B);
-        let over_B = end_B + up_B * up_B.dot(&(self.start_B - end_B));
-        let over = is_open(self.start_sides, &self.start_B, &over_B);
-        over.is_some_and(|sides| is_open(sides, &over_B, end_B).is_some())
+        self.starts.iter().any(|Start { point_B, sides }| {
+            if self.free_sides_after(*sides, point_B, end_B).is_some() {
+                return true;
+            }
+            let over_B = end_B + up_B * up_B.dot(&(point_B - end_B));
+            let over = self.free_sides_after(*sides, point_B, &over_B);
+            over.is_some_and(|sides| self.free_sides_after(sides, &over_B, end_B).is_some())
+        })
     }
 
     /// The sides at the end of a straight way that never enters the material.

@@ -51,7 +51,7 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
             return Some(slider.rested(&round, rounds));
         }
         let has_arrived = round.asked_m.is_nan() || round.asked_m.abs() <= round.view.rest_m;
-        if has_arrived && !bars.may_hide_a_way(csg, god) {
+        if has_arrived && !bars.may_hide_a_way(csg, god, &input.hip_B) {
             return Some(round.arrived(rounds));
         }
         if has_arrived || bars.are_met() {
@@ -167,11 +167,11 @@ impl Bars {
 
     /// Whether it may have come to rest before a ledge that is too low to be one.
     #[inline(always)]
-    fn may_hide_a_way(&self, csg: &Csg, god: &God) -> bool {
+    fn may_hide_a_way(&self, csg: &Csg, god: &God, hip_B: &Vector3<f64>) -> bool {
         god.active.count_ones() > 1
             && !god.clearing.holds(&god.point_B)
             && self.detours < MAX_DETOURS
-            && is_tight(csg, god)
+            && is_tight(csg, god, hip_B)
     }
 }
 

@@ -185,7 +185,7 @@ impl Trial {
     /// Whether two leaves lie against each other here, one of them taken away from the other or both facing each other: walls
     /// and gaps without thickness, felt or not.
     fn is_on_thin_wall(&self, god: &Vector3<f64>) -> bool {
-        let step_m = 0.3 * RESOLUTION * self.extent_m;
+        let step_m = 3.0 * RESOLUTION * self.extent_m;
         let pattern = |leaf: &Leaf| -> Vec<bool> {
             directions(26).map(|d| contains(&leaf.tree, &(god + d * step_m)) != leaf.is_taken_away).collect()
         };
