@@ -4,7 +4,7 @@
 //! its round cap have one tangent plane on their whole seam), and too little where they bend away within a step. The walk
 //! then goes along a patch that ends right there, and does not get anywhere.
 //!
-//! Model: all patches within [`TIGHT`] of the god-object count as meeting there. Along each, and along the curve of each
+//! Model: all patches within [`Csg::tight_m`] of the god-object count as meeting there. Along each, and along the curve of each
 //! two, a step towards the HIP is made and brought back. It is taken if it ends on the boundary, nearer to the HIP, and if
 //! a way leads there through the open, a little above the boundary: ledges that are lower than this are stepped over. The one that ends
 //! nearest to the HIP wins, longer steps being tried first. If none is possible, the god-object is where it belongs.
@@ -73,7 +73,7 @@ struct Landing {
 /// The patches that meet where a god-object is.
 fn here(csg: &Csg, god: &God) -> Sides {
     let levels_m = god.near.levels_m(csg, &god.point_B);
-    let tight_m = TIGHT * csg.extent_m;
+    let tight_m = csg.tight_m();
     (0..god.near.count()).filter(|&i| levels_m[i].abs() <= tight_m).fold(god.active, |here, i| here | 1 << i)
 }
 
@@ -96,7 +96,7 @@ struct Start {
 
 impl<'t> Trial<'t> {
     fn new(csg: &'t Csg, god: &'t God, hip_B: &'t Vector3<f64>) -> Self {
-        let lift_m = LIFT * csg.extent_m;
+        let lift_m = LIFT * csg.tight_m();
         let outward_B = |index: usize| {
             let normal_B = god.near.patch(csg, index).look(&god.point_B, hip_B).normal_B;
             if god.sides >> index & 1 == 1 { -normal_B } else { normal_B }
@@ -231,10 +231,7 @@ fn up(point_B: &Vector3<f64>, hip_B: &Vector3<f64>) -> Vector3<f64> {
     if length_m > 0.0 { up_B / length_m } else { up_B }
 }
 
-/// Patches nearer to the god-object than this share of the extent count as meeting there: the same below which surfaces
-/// are one.
-const TIGHT: f64 = 1e-7;
-/// How far above the boundary ways lead, as a share of the extent: over all that counts as one.
-const LIFT: f64 = 2e-7;
+/// How far above the boundary ways lead, in terms of what counts as one place: over all that is in it.
+const LIFT: f64 = 2.0;
 /// Of the step that is asked for.
 const SHARES: [f64; 6] = [1.0, 0.125, 0.015_625, 2e-3, 2.5e-4, 3e-5];

@@ -63,6 +63,12 @@ impl Clearing {
         (point_B - self.centre_B).norm_squared() > (LEFT * self.radius_m).powi(2)
     }
 
+    /// How far a point is from its end (m).
+    #[inline(always)]
+    pub(super) fn room_m(&self, point_B: &Vector3<f64>) -> f64 {
+        self.radius_m - (point_B - self.centre_B).norm()
+    }
+
     /// Whether a point is in it.
     #[inline(always)]
     pub(super) fn holds(&self, point_B: &Vector3<f64>) -> bool {

@@ -169,7 +169,7 @@ impl Bars {
     #[inline(always)]
     fn may_hide_a_way(&self, csg: &Csg, god: &God, hip_B: &Vector3<f64>) -> bool {
         god.active.count_ones() > 1
-            && !god.clearing.holds(&god.point_B)
+            && god.clearing.room_m(&god.point_B) < csg.tight_m()
             && self.detours < MAX_DETOURS
             && is_tight(csg, god, hip_B)
     }
