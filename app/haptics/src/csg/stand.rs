@@ -5,6 +5,7 @@
 //! where that way meets the solid. In its clearing only the patches that held it before are looked at.
 //!
 //! Frames: object frame B; normals point to the free side.
+//! Invariants: no god-object is farther from the HIP than before, and none whose HIP is inside is lost.
 //! Cost: in a clearing a look at one patch, or two on an edge; else a level for each patch nearby. Flights are bounded.
 
 use nalgebra::Vector3;
@@ -112,14 +113,30 @@ fn stand_anywhere(csg: &Csg, god: &mut God, input: &ConeInput) -> Option<Tangent
                 god.clear(corner.count, nearest_m);
                 return Some(view);
             }
-            Held::Nothing => {
-                let hit = first_hit(csg, &god.near, god.sides, &god.point_B, &input.hip_B)?;
-                *god = God::hit(&hit);
+            Held::Nothing => match first_hit(csg, &god.near, god.sides, &god.point_B, &input.hip_B) {
+                Some(hit) => *god = God::hit(&hit),
+                None if csg.is_inside(&input.hip_B) => return Some(all_around(&god.point_B, input)),
+                None => return None,
+            },
+            Held::Lost => {
+                let out = way_out(csg, &god.point_B)?;
+                let distance_m = |god: &God| (god.point_B - input.hip_B).norm();
+                let is_on_it = csg.signed_distance(&god.point_B).abs() <= csg.tight_m();
+                if is_on_it && distance_m(&out) > distance_m(god) + csg.tight_m() {
+                    return Some(all_around(&god.point_B, input));
+                }
+                *god = out;
             }
-            Held::Lost => *god = way_out(csg, &god.point_B)?,
         }
     }
     None
+}
+
+/// What a god-object sees that cannot come nearer to the HIP, whatever is around it: all of its spring.
+pub(super) fn all_around(point_B: &Vector3<f64>, input: &ConeInput) -> TangentView {
+    let spring_B = point_B - input.hip_B;
+    let normal_B = direction_or_up(&spring_B);
+    TangentView::new(point_B, normal_B, normal_B.dot(&input.hip_B) + spring_B.norm(), input)
 }
 
 /// What of the boundary is where the god-object is: the patches it is on, and how far away the nearest other is (m).

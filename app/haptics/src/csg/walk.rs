@@ -19,11 +19,9 @@ use super::detour::{Detour, detour, is_tight};
 use super::foresight::foresee;
 use super::god::God;
 use super::settle::settle;
-use super::stand::{Stood, stand};
+use super::stand::{Stood, all_around, stand};
 use crate::friction_law::FrictionLaw;
 use crate::slide::{Secant, Slid, Slider};
-use crate::surface::direction_or_up;
-use crate::tangent_view::TangentView;
 
 /// Goes on from where the god-object stands until nothing draws it any further; `None` if it is free and gone.
 #[inline(always)]
@@ -58,10 +56,10 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
             let at_most_m = if has_arrived { csg.ledge_m() } else { round.asked_m };
             match detour(csg, god, &input.hip_B, at_most_m) {
                 Detour::Along(other) => *god = other,
-                Detour::Free => return None,
-                Detour::None if has_arrived => return Some(round.arrived(rounds)),
-                Detour::None if bars.have_stopped_it() => return Some(held_here(god, slider, rounds)),
-                Detour::None => {
+                Detour::Free if !csg.is_inside(&input.hip_B) => return None,
+                Detour::None | Detour::Free if has_arrived => return Some(round.arrived(rounds)),
+                Detour::None | Detour::Free if bars.have_stopped_it() => return Some(held_here(god, slider, rounds)),
+                Detour::None | Detour::Free => {
                     bars.is_grazing = false;
                     continue;
                 }
@@ -177,10 +175,7 @@ impl Bars {
 
 /// Of a god-object that cannot come nearer to the HIP, whatever friction says: all of its spring.
 fn held_here<L: FrictionLaw + ?Sized>(god: &God, slider: &Slider<'_, L>, rounds: u32) -> Slid {
-    let hip_B = &slider.input.hip_B;
-    let spring_B = god.point_B - hip_B;
-    let normal_B = direction_or_up(&spring_B);
-    let view = TangentView::new(&god.point_B, normal_B, normal_B.dot(hip_B) + spring_B.norm(), slider.input);
+    let view = all_around(&god.point_B, slider.input);
     slider.look(view, &Vector3::zeros(), &god.point_B).arrived(rounds)
 }
 
