@@ -118,7 +118,7 @@ pub(super) fn advance(
     let before = *god;
     if let Some(stop) = stop_where_it_ends(csg, god, &moved_B, hip_B) {
         // Patches that hardly meet may meet elsewhere.
-        if (god.point_B - hip_B).norm_squared() > longest {
+        if (god.point_B - hip_B).norm_squared() > longest || !is_where_it_was_going(csg, god) {
             *god = before;
         }
         return stop;
@@ -157,6 +157,15 @@ fn stop_where_it_ends(csg: &Csg, god: &mut God, to_B: &Vector3<f64>, hip_B: &Vec
         god.sides = beyond;
     }
     None
+}
+
+/// Whether a god-object is on the sides that its way led to, of all patches that it is not on.
+fn is_where_it_was_going(csg: &Csg, god: &God) -> bool {
+    let levels_m = god.near.levels_m(csg, &god.point_B);
+    (0..god.near.count()).all(|index| {
+        let is_inside = levels_m[index] <= 0.0;
+        levels_m[index].abs() <= csg.tight_m() || is_inside == (god.sides >> index & 1 == 1)
+    })
 }
 
 /// Whether it is only the chord that crosses a patch twice, between two places of bent patches, and not the way on them.

@@ -189,7 +189,11 @@ fn held(csg: &Csg, god: &mut God, corner: &Corner, input: &ConeInput) -> Held {
         let view = by_patch(god, index, 0);
         return if view.depth_m < -release_m { Held::Nothing } else { Held::By(view) };
     }
-    let Some(facing) = corner.facing(&god.near, god.sides, &to_hip_B, release_m) else { return Held::Lost };
+    let Some(facing) = corner.facing(&god.near, god.sides, &to_hip_B, release_m) else {
+        let Some(index) = deepest_wall(god, corner, &to_hip_B) else { return Held::Lost };
+        god.active = 1 << index;
+        return Held::By(by_patch(god, index, corner.place(index)));
+    };
     (god.sides, god.active) = (facing.sides, facing.active);
     match facing.active.count_ones() {
         0 => Held::Nothing,
@@ -199,6 +203,17 @@ fn held(csg: &Csg, god: &mut God, corner: &Corner, input: &ConeInput) -> Held {
         }
         _ => Held::By(view_of_edge(corner, god, &god.point_B, &(facing.way_B - to_hip_B), input)),
     }
+}
+
+/// In a gap between patches that touch, for which tangent planes leave no room: the wall that the HIP is deepest behind.
+#[inline(never)]
+fn deepest_wall(god: &God, corner: &Corner, to_hip_B: &Vector3<f64>) -> Option<usize> {
+    if god.near.is_solid(god.sides) {
+        return None;
+    }
+    let walls = (0..corner.count).filter(|&i| god.near.is_solid(god.sides ^ 1 << corner.indices[i]));
+    let height_m = |i: usize| corner.outward(i, god.sides >> corner.indices[i]).dot(to_hip_B);
+    walls.min_by(|&i, &j| height_m(i).total_cmp(&height_m(j))).map(|i| corner.indices[i])
 }
 
 #[inline(always)]
