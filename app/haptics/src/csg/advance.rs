@@ -164,7 +164,7 @@ fn is_where_it_was_going(csg: &Csg, god: &God) -> bool {
     let levels_m = god.near.levels_m(csg, &god.point_B);
     (0..god.near.count()).all(|index| {
         let is_inside = levels_m[index] <= 0.0;
-        levels_m[index].abs() <= csg.tight_m() || is_inside == (god.sides >> index & 1 == 1)
+        levels_m[index].abs() <= 4.0 * csg.tolerance_m() || is_inside == (god.sides >> index & 1 == 1)
     })
 }
 
