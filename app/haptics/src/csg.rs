@@ -10,13 +10,15 @@
 //! where crossing it changes the answer, a difference turns its second solid's normals by itself, and the seam between
 //! two united parts, which the answer does not depend on, is no boundary. On these patches the god-object is walked
 //! by [`walk`], its state being the patches that it rests on: one (a primitive of fig. 9.4), two (an edge) or more (a corner).
+//! Where patches touch, as at each fillet, tangent planes do not tell them apart; there it tries out where it can go on
+//! ([`detour`]).
 //!
 //! Frames and signs: object frame B; normals leave the material; the boundary belongs to the solid.
 //! Cost: independent of the tree while the finger stays in its neighbourhood; a new one looks at the patches that the
 //! [`cells`] have left of the tree there. In its clearing (see [`god`]) a god-object looks at what holds it only. No
 //! recursion, no allocation.
 //! Limits: of more than eight patches that meet in one point the eight nearest count. Parts thinner than
-//! [`TOLERANCE`] times the solid's extent are not felt.
+//! [`TOLERANCE`] times the solid's extent are not felt, and ledges lower than [`TIGHT`] times it hold nobody back.
 
 mod advance;
 mod cells;

@@ -182,7 +182,8 @@ fn passes_over(csg: &Csg, god: &God, index: usize, amid_B: &Vector3<f64>, hip_B:
 pub(super) fn is_grazing(csg: &Csg, god: &God, index: usize, hip_B: &Vector3<f64>) -> bool {
     let normal_B = |index: usize| god.near.patch(csg, index).look(&god.point_B, hip_B).normal_B;
     let met_B = normal_B(index);
-    god.held_by().any(|held| held != index && normal_B(held).cross(&met_B).norm_squared() < PARALLEL * PARALLEL)
+    god.held_by()
+        .any(|held| held != index && normal_B(held).cross(&met_B).norm_squared() < PARALLEL * PARALLEL)
 }
 
 /// Patches that meet under less (rad) graze each other: within what counts as one place they may bend by as much.

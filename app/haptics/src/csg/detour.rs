@@ -101,7 +101,8 @@ impl<'t> Trial<'t> {
             let normal_B = god.near.patch(csg, index).look(&god.point_B, hip_B).normal_B;
             if god.sides >> index & 1 == 1 { -normal_B } else { normal_B }
         };
-        let away_B = direction_or_up(&god.held_by().fold(Vector3::zeros(), |sum, index| sum + outward_B(index)));
+        let away_B =
+            direction_or_up(&god.held_by().fold(Vector3::zeros(), |sum, index| sum + outward_B(index)));
         let starts = [up(&god.point_B, hip_B), away_B].map(|direction_B| {
             let point_B = god.point_B + direction_B * lift_m;
             let sides = god.near.sides(csg, &point_B);
@@ -176,7 +177,7 @@ impl<'t> Trial<'t> {
         if self.near().is_solid(self.near().sides(self.csg, &end_B)) || !self.is_open_way(&end_B) {
             return None;
         }
-        Some(God::new(*point_B, self.near().clone(), sides, active))
+        Some(God::new(*point_B, *self.near(), sides, active))
     }
 
     /// Sides of a point on patches such that it is free and each of them a wall. Of others that it is on, either will do.
@@ -191,7 +192,10 @@ impl<'t> Trial<'t> {
         let is_held = |sides: Sides| {
             !near.is_solid(sides) && places(active).all(|index| near.is_solid(sides ^ 1 << index))
         };
-        (0..1_usize << MAX_NEAR).filter(|turned| turned & !either == 0).map(|turned| sides ^ turned).find(|&s| is_held(s))
+        (0..1_usize << MAX_NEAR)
+            .filter(|turned| turned & !either == 0)
+            .map(|turned| sides ^ turned)
+            .find(|&s| is_held(s))
     }
 
     /// Whether the open leads to a point: straight, or over the tangent plane.

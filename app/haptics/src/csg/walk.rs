@@ -58,7 +58,9 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
                 Detour::Along(other) => *god = other,
                 Detour::Free if !csg.is_inside(&input.hip_B) => return None,
                 Detour::None | Detour::Free if has_arrived => return Some(round.arrived(rounds)),
-                Detour::None | Detour::Free if bars.have_stopped_it() => return Some(held_here(god, slider, rounds)),
+                Detour::None | Detour::Free if bars.have_stopped_it() => {
+                    return Some(held_here(god, slider, rounds));
+                }
                 Detour::None | Detour::Free => {
                     bars.is_grazing = false;
                     continue;

@@ -4,7 +4,8 @@
 #![allow(dead_code, non_snake_case)]
 
 use haptics::{
-    Capsule, Cone, CsgOp, CsgPart, CsgTree, Cuboid, Cylinder, Ellipsoid, Form, PartShape, Plane, Sphere, Torus,
+    Capsule, Cone, CsgOp, CsgPart, CsgTree, Cuboid, Cylinder, Ellipsoid, Form, PartShape, Plane, Sphere,
+    Torus,
 };
 use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
 
@@ -154,7 +155,9 @@ impl Maker {
             0 | 1 => Sphere::new(a).unwrap().into(),
             2 => Cuboid::new([2.0 * a, 2.0 * b, 2.0 * c]).unwrap().into(),
             3 | 4 => Cylinder::new(a, 2.0 * b).unwrap().into(),
-            5 => Cone::new(a, if self.noise.uniform() < 0.5 { 0.0 } else { 0.5 * a }, 2.0 * b).unwrap().into(),
+            5 => {
+                Cone::new(a, if self.noise.uniform() < 0.5 { 0.0 } else { 0.5 * a }, 2.0 * b).unwrap().into()
+            }
             6 => Capsule::new(0.7 * a, b).unwrap().into(),
             _ => {
                 let tube = a.min(b);
@@ -216,9 +219,7 @@ impl Maker {
                 let (r, half) = (tube.radius_m(), 0.5 * tube.length_m());
                 match chance {
                     // A cap.
-                    _ if chance < 0.4 => {
-                        (ball(r * (1.0 + nearly)), at(Vector3::y() * side * half))
-                    }
+                    _ if chance < 0.4 => (ball(r * (1.0 + nearly)), at(Vector3::y() * side * half)),
                     // A plate that lies against it.
                     _ if chance < 0.6 => {
                         let plate = Cuboid::new([0.6 * r, 2.0 * half, 2.0 * r]).unwrap();

@@ -3,10 +3,10 @@
 
 #[path = "../common/mod.rs"]
 mod common;
-#[path = "../common/trees.rs"]
-mod trees;
 #[path = "../common/joints.rs"]
 mod joints;
+#[path = "../common/trees.rs"]
+mod trees;
 
 mod feel;
 mod joined;

@@ -82,7 +82,8 @@ fn caps_that_fit_all_but_exactly_feel_as_a_capsule() {
     for exponent in [-16, -14, -13, -12, -11, -10, -9, -8] {
         for sign in [1.0, -1.0] {
             let larger = sign * 10f64.powi(exponent);
-            let (count, worst_n) = differing(&Friction::None, larger, 1e-9 + 2.0 * K * larger.abs() * RADIUS_M);
+            let (count, worst_n) =
+                differing(&Friction::None, larger, 1e-9 + 2.0 * K * larger.abs() * RADIUS_M);
             println!("{larger}: {count} of 108 differ, {worst_n} N");
             assert_eq!(count, 0, "{larger} {worst_n}");
         }
