@@ -80,7 +80,7 @@ pub(crate) fn leaves(tree: &CsgTree) -> Vec<Leaf> {
 /// A tree of 2 to 20 leaves.
 pub(crate) fn joined(seed: u64) -> CsgTree {
     let mut maker = Maker { noise: Noise(seed.wrapping_mul(0x2545_F491_4F6C_DD1D)), leaves: Vec::new() };
-    let count = 2 + (maker.noise.uniform() * 6.0) as usize * if seed % 4 == 0 { 3 } else { 1 };
+    let count = 2 + (maker.noise.uniform() * 6.0) as usize * if seed.is_multiple_of(4) { 3 } else { 1 };
     let first = maker.leaf(1.0);
     maker.leaves.push((first, Isometry3::identity()));
     let mut tree = CsgTree::union([CsgPart::from(first)]);
