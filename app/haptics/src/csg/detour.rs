@@ -83,8 +83,8 @@ struct Trial<'t> {
     hip_B: &'t Vector3<f64>,
     here: Sides,
     lift_m: f64,
-    /// Above the god-object, in the open: away from the HIP, and away from what holds it.
-    starts: [Start; 2],
+    /// Above the god-object, in the open: away from the HIP, and away from what holds it; and where it is.
+    starts: [Start; 3],
 }
 
 /// Where ways begin.
@@ -103,13 +103,14 @@ impl<'t> Trial<'t> {
         };
         let away_B =
             direction_or_up(&god.held_by().fold(Vector3::zeros(), |sum, index| sum + outward_B(index)));
-        let starts = [up(&god.point_B, hip_B), away_B].map(|direction_B| {
+        let as_it_is = Start { point_B: god.point_B, sides: god.sides };
+        let [up, away] = [up(&god.point_B, hip_B), away_B].map(|direction_B| {
             let point_B = god.point_B + direction_B * lift_m;
             let sides = god.near.sides(csg, &point_B);
             // In a gap that is narrower than that it stays where it is.
-            let is_open = !god.near.is_solid(sides);
-            if is_open { Start { point_B, sides } } else { Start { point_B: god.point_B, sides: god.sides } }
+            if god.near.is_solid(sides) { as_it_is } else { Start { point_B, sides } }
         });
+        let starts = [up, away, as_it_is];
         Self { csg, god, hip_B, here: here(csg, god), lift_m, starts }
     }
 
@@ -119,7 +120,7 @@ impl<'t> Trial<'t> {
 
     /// Towards the HIP, as far as the way is open.
     fn straight(&self, step_m: f64) -> Option<Detour> {
-        let [start, _] = self.starts;
+        let [start, ..] = self.starts;
         let to_hip_B = self.hip_B - start.point_B;
         let end_B = start.point_B + to_hip_B * (step_m / to_hip_B.norm()).min(1.0);
         let sides = self.free_sides_after(start.sides, &start.point_B, &end_B)?;

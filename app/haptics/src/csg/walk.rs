@@ -52,6 +52,9 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
         if has_arrived && !bars.may_hide_a_way(csg, god, &input.hip_B) {
             return Some(round.arrived(rounds));
         }
+        if !has_arrived && bars.leave_no_way() {
+            return Some(held_here(god, slider, rounds));
+        }
         if has_arrived || bars.are_met() {
             let at_most_m = if has_arrived { csg.ledge_m() } else { round.asked_m };
             match detour(csg, god, &input.hip_B, at_most_m) {
@@ -161,6 +164,10 @@ impl Bars {
         self.detours < MAX_DETOURS && (self.is_grazing || self.have_stopped_it())
     }
 
+    fn leave_no_way(&self) -> bool {
+        self.detours >= MAX_DETOURS && self.have_stopped_it()
+    }
+
     fn have_stopped_it(&self) -> bool {
         self.stalls >= MAX_STALLS
     }
@@ -186,4 +193,4 @@ const MAX_ROUNDS: u32 = 64;
 /// Stops one after the other without getting anywhere, after which something bars the walk.
 const MAX_STALLS: u32 = 3;
 /// Bound on the detours of one walk.
-const MAX_DETOURS: u32 = 6;
+const MAX_DETOURS: u32 = 12;
