@@ -3,7 +3,8 @@
 //! Model: straight there and back onto all patches that hold it. If on the way a patch is crossed such that the way is
 //! barred, or what it goes along is no boundary any longer, it stops there: the degenerate transitions of Melder fig. 9.4, from
 //! patch to edge to corner. In its clearing nothing is crossed: it [glides](glide), and the looks with which it came back
-//! onto its patches are what it sees there.
+//! onto its patches are what it sees there. On bent patches the straight way is a chord: what the chord crosses twice and the way
+//! on the patches does not is not crossed.
 //!
 //! Frames: object frame B. Cost: gliding, two or three looks at what holds it; else a level or two for each patch nearby, too.
 

@@ -1,16 +1,18 @@
-//! Where a walk that is barred can go on: steps that are tried out on the patches themselves.
+//! Trial steps of a blocked god-object where tangent planes do not tell which patch holds it.
 //!
-//! Problem: what holds a god-object follows from tangent planes, and these say nothing where patches touch (a cylinder and
-//! its round cap have one tangent plane on their whole seam), and too little where they bend away within a step. The walk
-//! then goes along a patch that ends right there, and does not get anywhere.
+//! Problem: the active set follows from tangent planes. Where patches touch (a cylinder and its round cap have one tangent
+//! plane on their whole seam) these say nothing, and where patches bend away within a step too little. The walk then goes
+//! along a patch that ends right there, and the god-object is trapped.
 //!
-//! Model: all patches within [`Csg::tight_m`] of the god-object count as meeting there. Along each, and along the curve of each
-//! two, a step towards the HIP is made and brought back. It is taken if it ends on the boundary, nearer to the HIP, and if
-//! a way leads there through the open, a little above the boundary: ledges that are lower than this are stepped over. The one that ends
-//! nearest to the HIP wins, longer steps being tried first. If none is possible, the god-object is where it belongs.
+//! Model: all patches within [`Csg::tight_m`] of the god-object count as meeting there. Along each of them, and along the
+//! curve of each two, a step towards the HIP is made and brought back onto the patches. It is possible if it ends on the
+//! boundary, nearer to the HIP, and if a free path leads there: straight or over the tangent plane, a little above the
+//! boundary, so that ledges lower than this are stepped over. The step that ends nearest to the HIP is taken; longer ones
+//! are tried first. If none is possible, the god-object is a local minimum of the distance.
 //!
-//! Frames: object frame B. Invariants: no way leads through material, however thin; no step makes the spring longer.
-//! Cost: at most [`SHARES`] times the patches here and their pairs, each a settlement and three paths. No allocation.
+//! Frames: object frame B. Invariants: no path leads through material, however thin; no step makes the spring longer.
+//! Cost: for each of [`SHARES`], the patches here and their pairs (36 at most), each a settlement and up to nine paths; on
+//! common seams two or three patches. No allocation.
 
 use nalgebra::Vector3;
 

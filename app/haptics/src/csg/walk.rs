@@ -5,7 +5,8 @@
 //!
 //! Model: each round looks at what holds the HIP back here ([`super::stand`]) and goes straight along that patch's
 //! tangent plane, or along the edge's tangent, and back onto all patches that hold it ([`super::advance`]). On curved patches
-//! the rim is sought by secants, as on single shapes (`slide.rs`).
+//! the rim is sought by secants, as on single shapes (`slide.rs`). Where it gets nowhere, or comes upon a patch all but parallel
+//! to one that holds, it tries out steps ([`super::detour`]); where none is possible all of the spring is felt.
 //!
 //! Frames and signs: object frame B; forces are springs on the user (m). Normals point to the free side.
 //! Invariants: the god-object is on the boundary. Cost: one to four rounds in common ticks; bounded by
