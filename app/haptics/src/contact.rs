@@ -368,7 +368,8 @@ impl Slot {
             touch = self.shade_and_raise(entity, touch, sweep)?;
         }
         if !self.onset.is_over() {
-            self.onset.render(&mut touch, input, sweep.dt_s, sweep.ramp_in_s);
+            let raised_m = entity.height_map.as_ref().map_or(0.0, |heights| heights.range_m()[1].max(0.0));
+            self.onset.render(&mut touch, (input, raised_m), sweep.dt_s, sweep.ramp_in_s);
         }
         in_world(index, entity, &touch)
     }
