@@ -21,7 +21,7 @@ fn overlap_m(mesh: &Mesh, hip: &Vector3<f64>, radius_m: f64) -> f64 {
         return (radius_m - ways[0].norm()).max(0.0);
     }
     let beyond = |way: &&Vector3<f64>| !is_inside(&(hip + *way * (1.0 + 1e-9) + way.normalize() * 1e-9));
-    ways.iter().find(beyond).map_or(f64::INFINITY, |way| way.norm()) + radius_m
+    ways.iter().find(beyond).map_or(f64::INFINITY, Vector3::norm) + radius_m
 }
 
 /// A point near a face, most faces being small.

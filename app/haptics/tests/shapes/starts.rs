@@ -41,8 +41,7 @@ fn begin_on(form: &Form, distance: Distance<'_>, starts: usize, seed: u64) {
     for radius_m in [0.0, 1e-3, 0.01, 0.06] {
         for friction in [Friction::None, stiction()] {
             for algorithm in [Algorithm::FrictionCone, Algorithm::VectorField, Algorithm::ClassicGodObject] {
-                let entity =
-                    entity(form.clone(), friction.clone()).with_algorithm(algorithm).prepared_for(radius_m);
+                let entity = entity(*form, friction.clone()).with_algorithm(algorithm).prepared_for(radius_m);
                 if entity.is_felt_by(radius_m) {
                     begin_all_over(distance, &entity, radius_m, starts, seed);
                 }
