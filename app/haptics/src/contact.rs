@@ -363,13 +363,17 @@ impl Slot {
         input: &TouchInput<'_>,
         sweep: &Sweep<'_>,
     ) -> Option<Contact> {
+        let share = match self.onset.is_over() {
+            true => 1.0,
+            false => self.onset.share_of(&touch, input, [sweep.dt_s, sweep.ramp_in_s]),
+        };
         // Apart, so that a touch that stays as it is stays in registers.
         if !matches!(entity.shading, Shading::None) || entity.height_map.is_some() {
             touch = self.shade_and_raise(entity, touch, sweep)?;
         }
-        if !self.onset.is_over() {
-            let raised_m = entity.height_map.as_ref().map_or(0.0, |heights| heights.range_m()[1].max(0.0));
-            self.onset.render(&mut touch, (input, raised_m), sweep.dt_s, sweep.ramp_in_s);
+        if share != 1.0 {
+            touch.force_on_user_B *= share;
+            touch.normal_force_n *= share;
         }
         in_world(index, entity, &touch)
     }

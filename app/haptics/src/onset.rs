@@ -50,28 +50,26 @@ impl Onset {
         self.strength >= 1.0 && matches!(self.longest, Longest::Any)
     }
 
-    /// One tick: takes from the force what is not to be felt yet. Heights stand out of the shape by `raised_m` at most.
+    /// One tick: what to multiply the force of `touch` by, which is the shape's own, before heights.
     #[inline(never)]
-    pub(crate) fn render(
+    pub(crate) fn share_of(
         &mut self,
-        touch: &mut Touch,
-        (input, raised_m): (&TouchInput<'_>, f64),
-        dt_s: f64,
-        ramp_in_s: f64,
-    ) {
+        touch: &Touch,
+        input: &TouchInput<'_>,
+        [dt_s, ramp_in_s]: [f64; 2],
+    ) -> f64 {
         let step = dt_s / ramp_in_s;
         // Where time is unknown or no ramp wanted, there is none.
         self.strength = if step > 0.0 { (self.strength + step).min(1.0) } else { 1.0 };
-        self.share = self.strength * self.bounded(touch, input, raised_m);
-        touch.force_on_user_B *= self.share;
-        touch.normal_force_n *= self.share;
+        self.share = self.strength * self.bounded(touch, input);
+        self.share
     }
 
     /// The part of the force that a spring of the allowed length has.
-    fn bounded(&mut self, touch: &Touch, input: &TouchInput<'_>, raised_m: f64) -> f64 {
+    fn bounded(&mut self, touch: &Touch, input: &TouchInput<'_>) -> f64 {
         let bound_m = match self.longest {
             Longest::Any => return 1.0,
-            Longest::Overlap => input.overlap_m() + raised_m,
+            Longest::Overlap => input.overlap_m(),
             Longest::Bound(bound_m) => {
                 let way_B = input.previous_hip_B.map(|previous_B| input.cone.hip_B - previous_B);
                 bound_m + way_B.map_or(0.0, |way_B| way_B.norm())
