@@ -96,6 +96,8 @@ pub struct Tally {
     pub peak_applied_n: f64,
     /// Entities that can move, and how many of them the last tick computed.
     pub moving: [usize; 2],
+    /// Ticks in which there was more at a finger's place than it can feel at once.
+    pub crowded: u64,
     /// Entities that left the world, or were lost, and stand still since.
     pub parked: u64,
     /// The first of them, and in which tick of the run.
@@ -303,6 +305,7 @@ impl FastLoop {
         self.row.run_tick = self.run_ticks();
         self.row.due_ns = self.frame.deadline_ns;
         self.tally.park(self.step.parked_now(), self.row.run_tick, self.is_first_scene);
+        self.tally.crowded += u64::from(self.step.is_crowded());
         self.tally.moving = [self.step.bodies().len(), self.step.made().awake];
         self.next_tick = self.row.run_tick + 1;
         if self.row.run_tick < self.total_ticks {

@@ -186,6 +186,11 @@ impl FastStep {
         self.objects.parked_now()
     }
 
+    /// Whether there was more at a finger's place in the last tick than it has room for.
+    pub fn is_crowded(&self) -> bool {
+        self.near.iter().any(Near::is_crowded)
+    }
+
     /// What moving the entities took in the last tick.
     pub fn made(&self) -> physics::Made {
         self.objects.made

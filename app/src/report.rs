@@ -104,6 +104,13 @@ impl fmt::Display for Report {
         if moving > 0 {
             writeln!(f, "objects      {moving}, {awake} of them awake in the last tick")?;
         }
+        if tally.crowded > 0 {
+            let crowded = tally.crowded;
+            writeln!(
+                f,
+                "crowded      {crowded} ticks with more entities at a finger's place than it can feel at once"
+            )?;
+        }
         for line in &self.parked {
             writeln!(f, "parked       {line}")?;
         }

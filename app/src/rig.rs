@@ -33,7 +33,7 @@ use haptics::{Door, Entity, Finger, Friction, ParameterError};
 use io_driver::device::Extras;
 use io_driver::open::open_devices;
 use nalgebra::{Isometry3, Vector3};
-use physics::Body;
+use physics::{Aabb, Body, BroadPhase};
 use shm_abi::segment::ClockMode;
 use std::path::{Path, PathBuf};
 use world::{FrictionSpec, Layout, Scene, SceneEntity, SceneFinger, Settings, ShapeSpec};
@@ -208,7 +208,7 @@ impl Rig {
     }
 
     fn finger(&self, spec: &SceneFinger, entities: &[Entity]) -> Result<DeviceFinger, RigError> {
-        let finger = Finger::new(spec.radius_m, entities.len().min(MOST_NEAR))
+        let finger = Finger::new(spec.radius_m, capacity(entities, spec.radius_m))
             .map_err(|source| self.refused(None, format!("finger {}", spec.name), source))?;
         self.check_felt(entities, spec)?;
         let finger = finger.within(self.space(spec.within.as_ref()));
@@ -297,8 +297,27 @@ pub fn friction(spec: &FrictionSpec) -> Result<Friction, String> {
     })
 }
 
-/// A finger feels no more entities at once.
-const MOST_NEAR: usize = 128;
+/// How many entities a finger can feel at once: as many as overlap at one place, and room for more that are near.
+fn capacity(entities: &[Entity], radius_m: f64) -> usize {
+    let broad_phase = BroadPhase::new(entities);
+    let boxes: Vec<Aabb> = entities.iter().filter_map(Aabb::of_entity).collect();
+    let crowd_at = |place: &Aabb| {
+        let mut crowd = 0;
+        broad_phase.near(&Aabb::of_ball(&place.middle_W(), radius_m), |_| crowd += 1);
+        crowd
+    };
+    // Of many, some tell enough.
+    let every = boxes.len().div_ceil(MOST_PLACES).max(1);
+    let crowd = boxes.iter().step_by(every).map(crowd_at).max().unwrap_or_default();
+    entities.len().min(crowd.clamp(LEAST_SLOTS, MOST_SLOTS))
+}
+
+/// Slots of a finger, where there are so many entities.
+const LEAST_SLOTS: usize = 128;
+/// A tick looks at each.
+const MOST_SLOTS: usize = 1024;
+/// Places at which crowds are counted.
+const MOST_PLACES: usize = 1024;
 
 /// Whether contacts turn it: it has a radius, a pad, or something tied to it.
 fn has_torque(finger: &SceneFinger) -> bool {

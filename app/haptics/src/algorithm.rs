@@ -78,6 +78,20 @@ impl TouchInput<'_> {
         }
     }
 
+    /// How far the finger would have to go to touch nothing, at least; 0 outside \[m\].
+    pub(crate) fn overlap_m(&self) -> f64 {
+        let (hip_B, radius_m) = (&self.cone.hip_B, self.finger_radius_m);
+        let depth_m = match self.shape {
+            Shape::Mesh(mesh) => {
+                let (nearest, is_inside) = mesh.nearest_and_side(hip_B);
+                radius_m + if is_inside { nearest.distance_m } else { -nearest.distance_m }
+            }
+            Shape::Csg(csg) => radius_m - csg.signed_distance(hip_B),
+            _ => self.of_surface(|surface| -surface.signed_distance(hip_B)).unwrap_or(0.0),
+        };
+        depth_m.max(0.0)
+    }
+
     /// The surface point nearest to the HIP; `None` if a finger of this size cannot feel the shape.
     ///
     /// Where very many faces of a mesh are about as near, as at the centre of a ball, it is on one of these: not

@@ -24,6 +24,7 @@ use crate::height_map::Over;
 use crate::hip::Hip;
 use crate::mesh::{Beginning, Mesh, MeshCone};
 use crate::nurbs::NurbsCone;
+use crate::onset::Onset;
 use crate::shading::Shading;
 use crate::shape::Shape;
 use crate::surface::{Feature, Surface};
@@ -85,8 +86,7 @@ pub(crate) struct Slot {
     kept: Kept,
     /// Whether anything was noted here since it was new.
     is_used: bool,
-    /// How much of the force is rendered, 0 to 1.
-    strength: f64,
+    onset: Onset,
     /// Inside, but above a dent of the entity's height map: nothing is felt, and nothing begins anew.
     hovers: bool,
     pub(crate) contact: Option<Contact>,
@@ -178,7 +178,7 @@ impl Slot {
         let Some(contact) = &self.contact else { return TouchPoints::NONE };
         let rolls = self.balls.as_ref().filter(|balls| balls.is_touching());
         match rolls {
-            Some(balls) => TouchPoints::of_shares(balls.shares(), entity, contact, self.strength),
+            Some(balls) => TouchPoints::of_shares(balls.shares(), entity, contact, self.onset.share()),
             None => TouchPoints::single(contact, finger_radius_m),
         }
     }
@@ -236,10 +236,10 @@ impl Slot {
             (&entity.algorithm, &entity.shape, is_point)
         {
             let Some(touch) = self.touch_mesh(mesh, &input) else { return self.part() };
-            return self.feel(index, entity, touch, sweep);
+            return self.feel(index, entity, touch, &input, sweep);
         }
         let Some(touch) = self.touch_by_any(entity, &input) else { return self.part() };
-        self.feel(index, entity, touch, sweep)
+        self.feel(index, entity, touch, &input, sweep)
     }
 
     #[inline(never)]
@@ -260,7 +260,7 @@ impl Slot {
         }
         let touch = algorithm.touch(input, &mut self.own)?;
         if begins {
-            self.strength = if input.entry().is_some() { 1.0 } else { 0.0 };
+            self.onset = if input.entry().is_some() { Onset::AT_ONCE } else { Onset::INSIDE };
         }
         Some(touch)
     }
@@ -300,8 +300,8 @@ impl Slot {
         let was_touching = self.mesh.is_touching();
         let (force, beginning) = self.mesh.update(mesh, input.friction, input.previous_hip_B, &input.cone)?;
         match beginning {
-            Beginning::WasInside => self.strength = 0.0,
-            Beginning::Came if !was_touching => self.strength = 1.0,
+            Beginning::WasInside => self.onset = Onset::INSIDE,
+            Beginning::Came if !was_touching => self.onset = Onset::AT_ONCE,
             Beginning::Came => {}
         }
         Some(Touch {
@@ -323,7 +323,7 @@ impl Slot {
                 if entered.is_none() && (distance_m > 0.0 || distance_m.is_nan()) {
                     return None;
                 }
-                self.strength = if entered.is_some() { 1.0 } else { 0.0 };
+                self.onset = if entered.is_some() { Onset::AT_ONCE } else { Onset::INSIDE };
                 let at = entered.unwrap_or_else(|| surface.nearest(&input.cone.hip_B));
                 self.cone.insert(FrictionCone::new(at))
             }
@@ -346,8 +346,8 @@ impl Slot {
     fn begun(&mut self, touched: Option<(Touch, Beginning)>) -> Option<Touch> {
         let (touch, beginning) = touched?;
         match beginning {
-            Beginning::WasInside => self.strength = 0.0,
-            Beginning::Came if !self.has_met() => self.strength = 1.0,
+            Beginning::WasInside => self.onset = Onset::INSIDE,
+            Beginning::Came if !self.has_met() => self.onset = Onset::AT_ONCE,
             Beginning::Came => {}
         }
         Some(touch)
@@ -360,18 +360,20 @@ impl Slot {
         index: usize,
         entity: &Entity,
         mut touch: Touch,
+        input: &TouchInput<'_>,
         sweep: &Sweep<'_>,
     ) -> Option<Contact> {
+        let share = match self.onset.is_over() {
+            true => 1.0,
+            false => self.onset.share_of(&touch, input, [sweep.dt_s, sweep.ramp_in_s]),
+        };
         // Apart, so that a touch that stays as it is stays in registers.
         if !matches!(entity.shading, Shading::None) || entity.height_map.is_some() {
             touch = self.shade_and_raise(entity, touch, sweep)?;
         }
-        if self.strength < 1.0 {
-            let step = sweep.dt_s / sweep.ramp_in_s;
-            // Where time is unknown or no ramp wanted, there is none.
-            self.strength = if step > 0.0 { (self.strength + step).min(1.0) } else { 1.0 };
-            touch.force_on_user_B *= self.strength;
-            touch.normal_force_n *= self.strength;
+        if share != 1.0 {
+            touch.force_on_user_B *= share;
+            touch.normal_force_n *= share;
         }
         in_world(index, entity, &touch)
     }
@@ -393,7 +395,7 @@ impl Slot {
             self.hovers = !height_map.raise(&over, &mut touch);
             if self.hovers {
                 // Whoever comes down from here comes from outside.
-                self.strength = 1.0;
+                self.onset = Onset::AT_ONCE;
                 return None;
             }
         }

@@ -10,13 +10,15 @@
 //! where crossing it changes the answer, a difference turns its second solid's normals by itself, and the seam between
 //! two united parts, which the answer does not depend on, is no boundary. On these patches the god-object is walked
 //! by [`walk`], its state being the patches that it rests on: one (a primitive of fig. 9.4), two (an edge) or more (a corner).
+//! Where patches touch, as at each fillet, tangent planes do not tell them apart; there it tries out where it can go on
+//! ([`detour`]).
 //!
 //! Frames and signs: object frame B; normals leave the material; the boundary belongs to the solid.
 //! Cost: independent of the tree while the finger stays in its neighbourhood; a new one looks at the patches that the
 //! [`cells`] have left of the tree there. In its clearing (see [`god`]) a god-object looks at what holds it only. No
 //! recursion, no allocation.
 //! Limits: of more than eight patches that meet in one point the eight nearest count. Parts thinner than
-//! [`TOLERANCE`] times the solid's extent are not felt.
+//! [`TOLERANCE`] times the solid's extent are not felt, and ledges lower than [`TIGHT`] times it hold nobody back.
 
 mod advance;
 mod cells;
@@ -25,6 +27,7 @@ mod crossings;
 mod crowd;
 mod csg_cone;
 mod curved;
+mod detour;
 mod feet;
 mod flatten;
 mod foresight;
@@ -164,11 +167,24 @@ impl Csg {
     fn tolerance_m(&self) -> f64 {
         TOLERANCE * self.extent_m
     }
+
+    /// Where tangent planes do not tell, patches nearer to the god-object count as meeting there (m).
+    fn tight_m(&self) -> f64 {
+        TIGHT * self.extent_m
+    }
+
+    /// How far a god-object looks for a way over what is too low to be a ledge (m).
+    fn ledge_m(&self) -> f64 {
+        100.0 * self.tight_m()
+    }
 }
 
 /// Nearer to a patch than this share of the extent is on it: a hundred times what iterating onto patches that meet under
 /// ordinary angles leaves.
 const TOLERANCE: f64 = 1e-12;
+/// Ledges lower than this share of the extent hold nobody back: 10 nm on a solid of 0.1 m, far more than rounding makes of
+/// surfaces that were meant to touch, and far less than can be felt.
+const TIGHT: f64 = 1e-7;
 /// Farther from a leaf's ball than this share of its radius, the ball stands for the leaf.
 const FAR: f64 = 0.5;
 /// Of an evaluation: a tree needs one place more than it is deep.

@@ -58,6 +58,7 @@ mod hip;
 mod material;
 pub mod mesh;
 pub mod nurbs;
+mod onset;
 pub mod passivity;
 mod plane;
 mod quartic;

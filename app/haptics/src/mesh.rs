@@ -25,11 +25,14 @@
 mod build;
 mod bvh;
 mod cone;
+mod crowded;
 pub(crate) mod draw;
 mod error;
 mod face;
 mod facing;
 mod fan;
+mod hole;
+mod junction;
 pub mod make;
 mod mesh_cone;
 mod normals;
@@ -54,6 +57,7 @@ pub(crate) use bvh::TooMany;
 pub use bvh::{Bvh, Hit, Linear, Nearest, Triangles};
 pub use error::MeshError;
 pub use face::{Face, Link};
+pub use hole::CloseHoles;
 pub use mesh_cone::{Beginning, MeshCone};
 pub use normals::{SHARPEST_CREASE_RAD, VertexNormals};
 pub use report::{Finding, MeshReport};
@@ -75,6 +79,8 @@ pub struct Mesh {
     vertices: Box<[Vector3<f64>]>,
     bvh: Bvh,
     sides: Sides,
+    /// Whether any part is closed.
+    has_inside: bool,
     extent_m: f64,
     /// Of all meshes that this process has built, which. An address would be another mesh's as soon as this one is gone.
     identity: u64,
@@ -82,7 +88,7 @@ pub struct Mesh {
     uv: Option<Box<[FaceUv]>>,
 }
 
-/// From where a mesh can be felt.
+/// From where a mesh, or a part of it that hangs together by edges, can be felt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sides {
     /// Closed and orientable: it has an inside, and is felt from outside.
@@ -105,13 +111,19 @@ impl Mesh {
 
     /// The same, felt from both sides though it may be closed: a room, felt by whoever is in it.
     #[must_use]
-    pub fn into_sheet(self) -> Self {
-        Self { sides: Sides::Sheet, ..self }
+    pub fn into_sheet(mut self) -> Self {
+        self.faces.iter_mut().for_each(|face| face.sides = Sides::Sheet);
+        Self { sides: Sides::Sheet, has_inside: false, ..self }
     }
 
-    /// Whether it has an inside.
+    /// Solid if all of its parts are; each [`Face`] says it of its own part.
     pub fn sides(&self) -> Sides {
         self.sides
+    }
+
+    /// Whether any of its parts is solid.
+    pub fn has_inside(&self) -> bool {
+        self.has_inside
     }
 
     /// Largest coordinate, without its sign \[m\]: what rounding errors are measured by.

@@ -39,6 +39,7 @@
 //! Cost: a few walks of the feet and one query of the hierarchy that is pruned at r; bounded.
 
 mod ball;
+mod depenetration;
 mod flight;
 mod ground;
 mod pace;
@@ -53,6 +54,7 @@ pub(crate) use self::ground::{Foot, Ground};
 pub(crate) use self::press::Plane;
 
 use self::ball::Ball;
+use self::depenetration::{grown, pushed_out};
 use self::flight::Flight;
 use self::touching::{Room, Touching};
 use crate::algorithm::{Touch, TouchInput};
@@ -108,7 +110,15 @@ impl<F: Foot, V: Copy + Default> RollingCone<F, V> {
             self.touching = Some(Touching::new(ball));
         }
         let touching = self.touching.as_mut()?;
+        if touching.ball.radius_m < radius_m
+            && let Some(last_hip_B) = last_hip_B
+        {
+            let hip_B = &input.cone.hip_B;
+            let at_most_m = (touching.ball.centre_B - last_hip_B).norm() + (hip_B - last_hip_B).norm();
+            touching.ball = grown(ground, &touching.ball, hip_B, at_most_m, radius_m);
+        }
         let felt = touching.update(ground, input.friction, &mut self.vicinity, &input.cone);
+        let felt = felt.or_else(|| touching.with_less_room(ground, radius_m, &input.cone));
         if felt.is_none() {
             self.touching = None;
         }
@@ -181,44 +191,9 @@ impl<F: Foot, V: Copy + Default> RollingCone<F, V> {
             }
         }
         self.clear = Room::default();
-        found_inside(ground, &hip_B, radius_m).map(|ball| (ball, Beginning::WasInside))
+        pushed_out(ground, &hip_B, radius_m).map(|ball| (ball, Beginning::WasInside))
     }
-}
-
-/// Where a ball that is found too near to the ground, or inside, is pushed out; `None` if it is free, or has no room.
-#[cold]
-fn found_inside<F: Foot>(
-    ground: &impl Ground<Foot = F>,
-    hip_B: &Vector3<f64>,
-    radius_m: f64,
-) -> Option<Ball<F>> {
-    let (foot, out_B) = match ground.way_out(hip_B) {
-        Some(way) => (way, way.point_B() - hip_B),
-        None => {
-            let (near, _) = ground.nearest_within(hip_B, radius_m).ok()??;
-            (near, hip_B - near.point_B())
-        }
-    };
-    let out_m = out_B.norm();
-    let has_direction = out_m > ON_THE_GROUND * (radius_m + ground.extent_m());
-    let normal_B = if has_direction { out_B / out_m } else { ground.normal_B(&foot) };
-    FARTHER_OUT.iter().find_map(|share| {
-        let mut ball = Ball::in_free_space(foot.point_B() + normal_B * (radius_m * share), radius_m);
-        for _ in 0..MOST_CORRECTIONS {
-            let Some(obstacle) = ball.obstacle(ground).ok()? else {
-                return (!ground.is_inside(&ball.centre_B)).then_some(ball);
-            };
-            ball.add(ground, &obstacle);
-            ball.give_way(&{ ball.centre_B });
-        }
-        None
-    })
 }
 
 /// Positions that differ by less than this share of the mesh are the same, seen through two equal poses.
 const SAME_PLACE: f64 = 1e-9;
-/// Nearer to the mesh than this share of it, the way out has no direction.
-const ON_THE_GROUND: f64 = 1e-9;
-/// Where to look for room, in radii from the ground.
-const FARTHER_OUT: [f64; 5] = [1.0, 1.5, 2.5, 5.0, 10.0];
-const MOST_CORRECTIONS: usize = 16;

@@ -77,7 +77,10 @@ impl DeviceFinger {
         let step = |finger: &mut Finger| {
             let from = finger.last_hip_W().unwrap_or(hip);
             let around = (objects.broad_phase(), entities);
-            let near = near.update(around, finger.space(), &from, &hip, finger.radius_m());
+            // What is touched keeps its slot, near or not.
+            let others = finger.contacts().filter(|contact| !near.has(contact.entity)).count();
+            let most = finger.capacity().saturating_sub(others);
+            let near = near.update(around, (finger.space(), most), &from, &hip, finger.radius_m());
             finger.step_near(entities, near, Hip { position_W: hip, velocity_W }, dt_s)
         };
         let moves = |entity| objects.manipulation().is_body(entity);

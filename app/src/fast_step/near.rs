@@ -1,8 +1,11 @@
-//! What a finger could touch within the next ticks.
+//! Entities within a finger's reach: the nearest, where there are more than it has room for.
 //!
-//! Model: all entities that fingers feel and whose boxes overlap a box around the HIP. It is large, so that it need not be looked for again until
-//! the HIP has gone a few millimetres or some entity's box has changed.
+//! Model: all entities that fingers feel and whose boxes overlap a box around the HIP's way. It is large, so that it need not be
+//! looked for again until the HIP has gone a few millimetres or some entity's box has changed. Where that finds more
+//! entities than the finger has slots for, the box shrinks, down to the way itself; then the entities' own tight boxes count,
+//! in every tick. What is left out is farther away than what is not.
 //! Invariants: no allocation in `update`; numbers in ascending order.
+//! Cost: one query of the broad phase every few millimetres; in a crowd up to seven, in each tick.
 
 use haptics::Entity;
 use nalgebra::Vector3;
@@ -12,50 +15,97 @@ use physics::{Aabb, BroadPhase};
 #[derive(Debug)]
 pub(super) struct Near {
     entities: Vec<u32>,
-    /// Where they were looked for, in which version of the register and in which space.
-    looked: Option<(Aabb, u64, u32)>,
+    looked: Option<Looked>,
+    is_crowded: bool,
 }
 
-/// They are looked for so far around the finger (m).
-const AROUND_M: f64 = 0.02;
-/// And again when it comes so near to where they were not (m). What moves has a box that is ahead of it.
-const LEAST_M: f64 = 5e-3;
+/// Where entities were looked for.
+#[derive(Debug)]
+struct Looked {
+    around: Aabb,
+    /// They are looked for again when the way comes so near to the rim (m). What moves has a box that is ahead of it.
+    least_m: f64,
+    /// Of the broad phase.
+    version: u64,
+    space: u32,
+}
+
+/// How far around the finger's way entities are looked for (m).
+const AROUND_M: [f64; 6] = [0.02, 0.01, 5e-3, 2.5e-3, 1.25e-3, 0.0];
+/// Of that, what is left when they are looked for again.
+const LEAST: f64 = 0.25;
 
 impl Near {
     /// Room for all of so many entities.
     pub(super) fn new(entities: usize) -> Self {
-        Self { entities: Vec::with_capacity(entities), looked: None }
+        Self { entities: Vec::with_capacity(entities), looked: None, is_crowded: false }
     }
 
-    /// What is near a finger of this radius (m), and in its space, that has come from there to here.
+    /// Whether there was more at the finger's place in the last tick than it has room for.
+    pub(super) fn is_crowded(&self) -> bool {
+        self.is_crowded
+    }
+
+    /// Whether an entity was found in the last tick.
+    pub(super) fn has(&self, entity: usize) -> bool {
+        u32::try_from(entity).is_ok_and(|entity| self.entities.binary_search(&entity).is_ok())
+    }
+
+    /// What is near a finger of this radius (m), and in its space, that has come from there to here: at most so many.
     pub(super) fn update(
         &mut self,
-        (broad_phase, entities): (&BroadPhase, &[Entity]),
-        space: u32,
+        of: (&BroadPhase, &[Entity]),
+        (space, most): (u32, usize),
         from_W: &Vector3<f64>,
         to_W: &Vector3<f64>,
         radius_m: f64,
     ) -> &[u32] {
         let way = Aabb::of_ball(to_W, radius_m).swept(&(from_W - to_W));
-        let version = broad_phase.version();
-        let is_known = |(around, of, within): &(Aabb, u64, u32)| {
-            (*of, *within) == (version, space) && around.contains(&way.grown(LEAST_M))
+        let version = of.0.version();
+        let is_known = |looked: &Looked| {
+            (looked.version, looked.space) == (version, space)
+                && looked.around.contains(&way.grown(looked.least_m))
         };
-        if !self.looked.as_ref().is_some_and(is_known) {
-            let around = way.grown(AROUND_M);
+        self.is_crowded = false;
+        if self.entities.len() > most || !self.looked.as_ref().is_some_and(is_known) {
+            self.looked = self.look(of, (space, most), &way);
+        }
+        &self.entities
+    }
+
+    /// Fills in what is near; `None` if that holds for this tick alone.
+    fn look(
+        &mut self,
+        (broad_phase, entities): (&BroadPhase, &[Entity]),
+        (space, most): (u32, usize),
+        way: &Aabb,
+    ) -> Option<Looked> {
+        let mut find = |around: &Aabb, is_tight: bool| {
             let found = &mut self.entities;
             found.clear();
-            broad_phase.near(&around, |entity| {
+            broad_phase.near(around, |entity| {
                 let is_felt = |entity: &Entity| entity.space == space && entity.is_haptic;
-                let is_here = entities.get(entity).is_some_and(is_felt);
+                let is_there = |entity: &Entity| {
+                    !is_tight || Aabb::of_entity(entity).is_none_or(|tight| tight.overlaps(around))
+                };
+                let is_here = entities.get(entity).is_some_and(|entity| is_felt(entity) && is_there(entity));
                 if is_here && found.len() < found.capacity() {
                     found.push(entity as u32);
                 }
             });
             found.sort_unstable();
-            self.looked = Some((around, version, space));
+            found.len()
+        };
+        for around_m in AROUND_M {
+            let around = way.grown(around_m);
+            if find(&around, false) <= most {
+                let least_m = LEAST * around_m;
+                return Some(Looked { around, least_m, version: broad_phase.version(), space });
+            }
         }
-        &self.entities
+        // Next to each other, they are all at the finger's place by their boxes.
+        self.is_crowded = find(way, true) > most;
+        None
     }
 }
 
@@ -85,18 +135,47 @@ mod tests {
         let entities = entities();
         let broad_phase = BroadPhase::new(&entities);
         let mut near = Near::new(11);
-        assert_eq!(near.update((&broad_phase, &entities), 0, &at(0.05), &at(0.05), 0.0), [0]);
-        assert_eq!(near.update((&broad_phase, &entities), 0, &at(0.05), &at(0.075), 0.0), [0, 2]);
+        assert_eq!(near.update((&broad_phase, &entities), (0, 11), &at(0.05), &at(0.05), 0.0), [0]);
+        assert_eq!(near.update((&broad_phase, &entities), (0, 11), &at(0.05), &at(0.075), 0.0), [0, 2]);
         assert_eq!(
-            near.update((&broad_phase, &entities), 0, &at(0.075), &at(0.375), 0.0),
+            near.update((&broad_phase, &entities), (0, 11), &at(0.075), &at(0.375), 0.0),
             [0, 2, 3, 4, 5],
             "a leap"
         );
         assert_eq!(
-            near.update((&broad_phase, &entities), 0, &at(0.55), &at(0.55), 0.03),
+            near.update((&broad_phase, &entities), (0, 11), &at(0.55), &at(0.55), 0.03),
             [0, 6, 7],
             "a ball of 30 mm"
         );
+    }
+
+    /// 21 x 21 dots, 2.5 mm from each other, and the floor below them, which comes last.
+    #[test]
+    fn of_a_crowd_the_nearest_are_found() {
+        let dot = Sphere::new(1e-3).unwrap();
+        let place = |at: u32| Vector3::new(2.5e-3 * f64::from(at % 21), 0.0, 2.5e-3 * f64::from(at / 21));
+        let put = |at| Entity::new(dot, Isometry3::from_parts(place(at).into(), Default::default()), 1000.0);
+        let mut entities: Vec<Entity> = (0..441).map(|at| put(at).unwrap()).collect();
+        entities.push(
+            Entity::new(Plane::new(Vector3::y(), 0.0).unwrap(), Isometry3::identity(), 1000.0).unwrap(),
+        );
+        let broad_phase = BroadPhase::new(&entities);
+        let mut near = Near::new(442);
+        for most in [5, 20, 128] {
+            for at in 0..441 {
+                let hip = place(at);
+                let found = near.update((&broad_phase, &entities), (0, most), &hip, &hip, 0.0);
+                assert!(
+                    found.contains(&at) && found.contains(&441) && found.len() <= most,
+                    "{at} of {most}: {found:?}"
+                );
+            }
+        }
+        assert!(!near.is_crowded());
+        // All at one place: nobody can say which are nearer, and it is told.
+        let found = near.update((&broad_phase, &entities), (0, 1), &place(7), &place(7), 0.0);
+        assert_eq!(found, [7, 441]);
+        assert!(near.is_crowded());
     }
 
     #[test]
@@ -104,10 +183,10 @@ mod tests {
         let mut entities = entities();
         let mut broad_phase = BroadPhase::new(&entities);
         let mut near = Near::new(11);
-        assert_eq!(near.update((&broad_phase, &entities), 0, &at(0.05), &at(0.05), 0.0), [0]);
+        assert_eq!(near.update((&broad_phase, &entities), (0, 11), &at(0.05), &at(0.05), 0.0), [0]);
         entities[10].move_to(Isometry3::translation(0.05, 0.03, 0.0));
         broad_phase.moved(10, &entities[10], &Vector3::zeros());
-        assert_eq!(near.update((&broad_phase, &entities), 0, &at(0.05), &at(0.05), 0.0), [0, 10]);
+        assert_eq!(near.update((&broad_phase, &entities), (0, 11), &at(0.05), &at(0.05), 0.0), [0, 10]);
     }
 
     #[test]
@@ -116,7 +195,7 @@ mod tests {
         entities[1] = entities[1].clone().without_fingers();
         let broad_phase = BroadPhase::new(&entities);
         let mut near = Near::new(11);
-        assert_eq!(near.update((&broad_phase, &entities), 0, &at(0.05), &at(0.06), 0.03), [0, 2]);
+        assert_eq!(near.update((&broad_phase, &entities), (0, 11), &at(0.05), &at(0.06), 0.03), [0, 2]);
     }
 
     #[test]
@@ -126,7 +205,7 @@ mod tests {
         let broad_phase = BroadPhase::new(&entities);
         let mut near = Near::new(11);
         let mut update =
-            |space| near.update((&broad_phase, &entities), space, &at(0.05), &at(0.06), 0.03).to_vec();
+            |space| near.update((&broad_phase, &entities), (space, 11), &at(0.05), &at(0.06), 0.03).to_vec();
         assert_eq!((update(0), update(1)), (vec![0, 2], vec![1]), "from one tick to the next");
     }
 }

@@ -139,14 +139,12 @@ pub enum RigError {
         source: ModelError,
     },
     /// A model file's triangles make no mesh.
-    #[error("{at}: {}: {source}{place}", .file.display())]
+    #[error("{at}: {}: {source}", .file.display())]
     Mesh {
         /// Where the scene names it.
         at: Box<Location>,
         /// The model's file.
         file: PathBuf,
-        /// Where in that file, if it is known.
-        place: String,
         /// Why.
         source: Box<MeshError>,
     },

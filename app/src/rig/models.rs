@@ -4,14 +4,14 @@
 
 use super::entities::is_only_seen;
 use super::{Problems, RigError, material};
-use haptics::mesh::{CornerUv, Finding, Mesh, MeshError, MeshReport, TriangleSoup};
+use haptics::mesh::{CornerUv, Finding, Mesh, MeshReport, TriangleSoup};
 use haptics::{Nurbs, Shading};
 use io_driver::say::say;
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use world::model::{self, Format, ModelError};
+use world::model::{self, ModelError};
 use world::{MeshSpec, Scene, SceneEntity, ShadingSpec, ShapeSpec};
 
 /// From this size on it takes so long that somebody wonders: a third of a million triangles.
@@ -149,7 +149,6 @@ fn build(spec: &MeshSpec, has_picture: bool) -> Result<(Mesh, MeshReport), RigEr
     let (mesh, report) = built.map_err(|source| RigError::Mesh {
         at: Box::new(spec.at.clone()),
         file: file.clone(),
-        place: place_of(&source, file),
         source: Box::new(source),
     })?;
     tell(file, &report);
@@ -198,17 +197,6 @@ fn scaled(mut soup: TriangleSoup, scale: &[f64; 3]) -> TriangleSoup {
         soup.vertices.iter_mut().for_each(|vertex| vertex.component_mul_assign(&scale));
     }
     soup
-}
-
-/// A mesh knows its faces by number, an author his text by line.
-fn place_of(error: &MeshError, file: &Path) -> String {
-    let MeshError::NonManifold { first_face, .. } = error else { return String::new() };
-    let line = model::read_file(file).ok().and_then(|bytes| {
-        (Format::of(file, &bytes) == Some(Format::Obj))
-            .then(|| model::line_of_face(&bytes, *first_face))
-            .flatten()
-    });
-    line.map_or_else(String::new, |line| format!(" (face {first_face} is on line {line})"))
 }
 
 /// Nothing about a mesh without defects. That equal vertices were merged is none: STL has no other way to share them.

@@ -63,6 +63,12 @@ impl Clearing {
         (point_B - self.centre_B).norm_squared() > (LEFT * self.radius_m).powi(2)
     }
 
+    /// How far a point is from its end (m).
+    #[inline(always)]
+    pub(super) fn room_m(&self, point_B: &Vector3<f64>) -> f64 {
+        self.radius_m - (point_B - self.centre_B).norm()
+    }
+
     /// Whether a point is in it.
     #[inline(always)]
     pub(super) fn holds(&self, point_B: &Vector3<f64>) -> bool {
@@ -137,6 +143,13 @@ impl God {
         let first = self.active.trailing_zeros() as usize;
         let second = (self.active & self.active.wrapping_sub(1)).trailing_zeros() as usize;
         (self.active.count_ones() == 2).then(|| [self.near.patch(csg, first), self.near.patch(csg, second)])
+    }
+
+    /// Whether it is free, and each of the one or two patches that hold it is boundary there.
+    #[inline]
+    pub(super) fn is_before_walls(&self) -> bool {
+        let is_wall = |index: usize| self.near.is_solid(self.sides ^ 1 << index);
+        self.active.count_ones() > 2 || !self.near.is_solid(self.sides) && self.held_by().all(is_wall)
     }
 
     /// Knows its clearing from how far away the nearest patch is that does not hold it; it is on `count` patches.

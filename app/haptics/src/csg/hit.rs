@@ -157,6 +157,13 @@ impl Events {
         self.count += 1;
     }
 
+    /// Where a patch is crossed for the last time, if it is crossed twice: the path ends on the side that it began on.
+    pub(super) fn left_again(&self, index: usize) -> Option<f64> {
+        let mut shares = self.iter().filter(|(_, crossed)| *crossed == index).map(|(share, _)| share);
+        let (_, second, third) = (shares.next()?, shares.next()?, shares.next());
+        if third.is_some() { None } else { Some(second) }
+    }
+
     pub(super) fn iter(&self) -> impl Iterator<Item = (f64, usize)> {
         self.events[..self.count].iter().copied()
     }

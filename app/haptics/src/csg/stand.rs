@@ -5,6 +5,7 @@
 //! where that way meets the solid. In its clearing only the patches that held it before are looked at.
 //!
 //! Frames: object frame B; normals point to the free side.
+//! Invariants: no god-object is farther from the HIP than before, and none whose HIP is inside is lost.
 //! Cost: in a clearing a look at one patch, or two on an edge; else a level for each patch nearby. Flights are bounded.
 
 use nalgebra::Vector3;
@@ -112,14 +113,30 @@ fn stand_anywhere(csg: &Csg, god: &mut God, input: &ConeInput) -> Option<Tangent
                 god.clear(corner.count, nearest_m);
                 return Some(view);
             }
-            Held::Nothing => {
-                let hit = first_hit(csg, &god.near, god.sides, &god.point_B, &input.hip_B)?;
-                *god = God::hit(&hit);
+            Held::Nothing => match first_hit(csg, &god.near, god.sides, &god.point_B, &input.hip_B) {
+                Some(hit) => *god = God::hit(&hit),
+                None if csg.is_inside(&input.hip_B) => return Some(all_around(&god.point_B, input)),
+                None => return None,
+            },
+            Held::Lost => {
+                let out = way_out(csg, &god.point_B)?;
+                let distance_m = |god: &God| (god.point_B - input.hip_B).norm();
+                let is_on_it = csg.signed_distance(&god.point_B).abs() <= csg.tight_m();
+                if is_on_it && distance_m(&out) > distance_m(god) + csg.tight_m() {
+                    return Some(all_around(&god.point_B, input));
+                }
+                *god = out;
             }
-            Held::Lost => *god = way_out(csg, &god.point_B)?,
         }
     }
     None
+}
+
+/// What a god-object sees that cannot come nearer to the HIP, whatever is around it: all of its spring.
+pub(super) fn all_around(point_B: &Vector3<f64>, input: &ConeInput) -> TangentView {
+    let spring_B = point_B - input.hip_B;
+    let normal_B = direction_or_up(&spring_B);
+    TangentView::new(point_B, normal_B, normal_B.dot(&input.hip_B) + spring_B.norm(), input)
 }
 
 /// What of the boundary is where the god-object is: the patches it is on, and how far away the nearest other is (m).
@@ -172,7 +189,11 @@ fn held(csg: &Csg, god: &mut God, corner: &Corner, input: &ConeInput) -> Held {
         let view = by_patch(god, index, 0);
         return if view.depth_m < -release_m { Held::Nothing } else { Held::By(view) };
     }
-    let Some(facing) = corner.facing(&god.near, god.sides, &to_hip_B, release_m) else { return Held::Lost };
+    let Some(facing) = corner.facing(&god.near, god.sides, &to_hip_B, release_m) else {
+        let Some(index) = deepest_wall(god, corner, &to_hip_B) else { return Held::Lost };
+        god.active = 1 << index;
+        return Held::By(by_patch(god, index, corner.place(index)));
+    };
     (god.sides, god.active) = (facing.sides, facing.active);
     match facing.active.count_ones() {
         0 => Held::Nothing,
@@ -182,6 +203,17 @@ fn held(csg: &Csg, god: &mut God, corner: &Corner, input: &ConeInput) -> Held {
         }
         _ => Held::By(view_of_edge(corner, god, &god.point_B, &(facing.way_B - to_hip_B), input)),
     }
+}
+
+/// In a gap between patches that touch, for which tangent planes leave no room: the wall that the HIP is deepest behind.
+#[inline(never)]
+fn deepest_wall(god: &God, corner: &Corner, to_hip_B: &Vector3<f64>) -> Option<usize> {
+    if god.near.is_solid(god.sides) {
+        return None;
+    }
+    let walls = (0..corner.count).filter(|&i| god.near.is_solid(god.sides ^ 1 << corner.indices[i]));
+    let height_m = |i: usize| corner.outward(i, god.sides >> corner.indices[i]).dot(to_hip_B);
+    walls.min_by(|&i, &j| height_m(i).total_cmp(&height_m(j))).map(|i| corner.indices[i])
 }
 
 #[inline(always)]

@@ -5,7 +5,8 @@
 //!
 //! Model: each round looks at what holds the HIP back here ([`super::stand`]) and goes straight along that patch's
 //! tangent plane, or along the edge's tangent, and back onto all patches that hold it ([`super::advance`]). On curved patches
-//! the rim is sought by secants, as on single shapes (`slide.rs`).
+//! the rim is sought by secants, as on single shapes (`slide.rs`). Where it gets nowhere, or comes upon a patch all but parallel
+//! to one that holds, it tries out steps ([`super::detour`]); where none is possible all of the spring is felt.
 //!
 //! Frames and signs: object frame B; forces are springs on the user (m). Normals point to the free side.
 //! Invariants: the god-object is on the boundary. Cost: one to four rounds in common ticks; bounded by
@@ -15,10 +16,11 @@ use nalgebra::Vector3;
 
 use super::Csg;
 use super::advance::{Glided, Moved, Target, advance, glide};
+use super::detour::{Detour, detour, is_tight};
 use super::foresight::foresee;
 use super::god::God;
 use super::settle::settle;
-use super::stand::{Stood, stand};
+use super::stand::{Stood, all_around, stand};
 use crate::friction_law::FrictionLaw;
 use crate::slide::{Secant, Slid, Slider};
 
@@ -33,7 +35,8 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
     let input = slider.input;
     let Stood { view, mut looks } = stood;
     let mut round = slider.look(view, &Vector3::zeros(), &god.point_B);
-    let (mut secant, mut shortened, mut stalls) = (Secant::default(), 1.0, 0);
+    let (mut secant, mut shortened) = (Secant::default(), 1.0);
+    let mut bars = Bars::default();
     let mut longest = f64::NAN;
     // Force ratio with which it already slides: a curve that falls with speed may hold what rests, but not what slides.
     let mut slides_with = None;
@@ -46,8 +49,33 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
         if is_first && round.is_inside_the_circle() {
             return Some(slider.rested(&round, rounds));
         }
-        if round.asked_m.is_nan() || round.asked_m.abs() <= round.view.rest_m {
+        let has_arrived = round.asked_m.is_nan() || round.asked_m.abs() <= round.view.rest_m;
+        if has_arrived && !bars.may_hide_a_way(csg, god, &input.hip_B) {
             return Some(round.arrived(rounds));
+        }
+        if !has_arrived && bars.leave_no_way() {
+            return Some(held_here(god, slider, rounds));
+        }
+        if has_arrived || bars.are_met() {
+            let at_most_m = if has_arrived { csg.ledge_m() } else { round.asked_m };
+            match detour(csg, god, &input.hip_B, at_most_m) {
+                Detour::Along(other) => *god = other,
+                Detour::Free if !csg.is_inside(&input.hip_B) => return None,
+                Detour::None | Detour::Free if has_arrived => return Some(round.arrived(rounds)),
+                Detour::None | Detour::Free if bars.have_stopped_it() => {
+                    return Some(held_here(god, slider, rounds));
+                }
+                Detour::None | Detour::Free => {
+                    bars.is_grazing = false;
+                    continue;
+                }
+            }
+            bars.passed();
+            let stood = stand(csg, god, input)?;
+            looks = stood.looks;
+            round = slider.look(stood.view, &Vector3::zeros(), &god.point_B);
+            (secant, longest) = (Secant::default(), f64::NAN);
+            continue;
         }
         if is_first {
             longest = slider.longest(&round, &god.point_B);
@@ -96,15 +124,8 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
             continue;
         }
         let is_stalled = (god.point_B - before_B).amax() <= csg.tolerance_m();
-        stalls = if is_stalled { stalls + 1 } else { 0 };
         round = slider.look(view, &Vector3::zeros(), &god.point_B);
-        if stalls >= MAX_STALLS {
-            return Some(if round.is_inside_the_circle() {
-                slider.rested(&round, rounds)
-            } else {
-                round.arrived(rounds)
-            });
-        }
+        bars.meet(is_stalled, moved == Moved::Grazing || !god.is_before_walls());
         if let (Some(ratio), true) = (slides_with, round.asked_m <= 0.0) {
             round.asked_m = round.gap_m - ratio * round.view.load_m;
         }
@@ -112,12 +133,65 @@ pub(super) fn walk<L: FrictionLaw + ?Sized>(
     }
     Some(if round.asked_m < 0.0 {
         slider.went_too_far(&round, MAX_ROUNDS)
+    } else if round.asked_m == round.gap_m {
+        // Without friction.
+        held_here(god, slider, MAX_ROUNDS)
     } else {
         round.arrived(MAX_ROUNDS)
     })
 }
 
+/// What a walk came upon that tangent planes do not explain.
+#[derive(Default)]
+struct Bars {
+    /// Stops one after the other without getting anywhere.
+    stalls: u32,
+    is_grazing: bool,
+    detours: u32,
+}
+
+impl Bars {
+    #[inline]
+    fn meet(&mut self, is_stalled: bool, is_grazing: bool) {
+        self.stalls = if is_stalled { self.stalls + 1 } else { 0 };
+        self.is_grazing = is_grazing;
+    }
+
+    fn passed(&mut self) {
+        *self = Self { detours: self.detours + 1, ..Self::default() };
+    }
+
+    fn are_met(&self) -> bool {
+        self.detours < MAX_DETOURS && (self.is_grazing || self.have_stopped_it())
+    }
+
+    fn leave_no_way(&self) -> bool {
+        self.detours >= MAX_DETOURS && self.have_stopped_it()
+    }
+
+    fn have_stopped_it(&self) -> bool {
+        self.stalls >= MAX_STALLS
+    }
+
+    /// Whether it may have come to rest before a ledge that is too low to be one.
+    #[inline(always)]
+    fn may_hide_a_way(&self, csg: &Csg, god: &God, hip_B: &Vector3<f64>) -> bool {
+        god.active.count_ones() > 1
+            && god.clearing.room_m(&god.point_B) < csg.tight_m()
+            && self.detours < MAX_DETOURS
+            && is_tight(csg, god, hip_B)
+    }
+}
+
+/// Of a god-object that cannot come nearer to the HIP, whatever friction says: all of its spring.
+fn held_here<L: FrictionLaw + ?Sized>(god: &God, slider: &Slider<'_, L>, rounds: u32) -> Slid {
+    let view = all_around(&god.point_B, slider.input);
+    slider.look(view, &Vector3::zeros(), &god.point_B).arrived(rounds)
+}
+
 /// Bound on the rounds of one walk.
 const MAX_ROUNDS: u32 = 64;
-/// Stops one after the other without getting anywhere, after which a walk is at its end.
+/// Stops one after the other without getting anywhere, after which something bars the walk.
 const MAX_STALLS: u32 = 3;
+/// Bound on the detours of one walk.
+const MAX_DETOURS: u32 = 12;

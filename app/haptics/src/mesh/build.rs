@@ -3,8 +3,9 @@
 //! Problem: files contain repeated vertices, faces without an area, faces wound the wrong way round and in any
 //! order; a walk over the mesh needs none of these.
 //!
-//! Model: validate, repair ([`repair`]), order in space ([`order`]), link ([`topology`]), wind ([`winding`]). What
-//! can be repaired without guessing is repaired and reported, the rest is refused with the first offender.
+//! Model: validate, repair ([`repair`]), order in space ([`order`]), link ([`topology`]), close cracks ([`junction`]), wind
+//! ([`winding`]), close holes of what is nearly closed ([`hole`]). What was done is reported; what has no meaning is refused with
+//! the first offender.
 //!
 //! Invariants of the result: every face has an area; links are mutual; the same geometry gives the same mesh,
 //! whatever the order of its faces and vertices was in the input.
@@ -13,10 +14,13 @@
 
 use super::order::Triangle;
 use super::repair::area_vector;
-use super::{Bvh, Face, Link, Mesh, MeshError, MeshReport, TriangleSoup};
-use super::{order, pinch, repair, topology, winding};
+use super::{Bvh, CloseHoles, Face, Finding, Link, Mesh, MeshError, MeshReport, Sides, TriangleSoup};
+use super::{hole, junction, order, pinch, repair, topology, winding};
 use nalgebra::Vector3;
 use std::sync::atomic::{AtomicU64, Ordering};
+
+/// A face is divided on one edge at a time.
+const MOST_DIVISIONS: usize = 4;
 
 /// How many meshes there have been.
 static BUILT: AtomicU64 = AtomicU64::new(0);
@@ -27,12 +31,21 @@ impl Mesh {
     /// # Errors
     /// When the input contradicts itself, or has a defect that cannot be repaired without guessing.
     pub fn build(soup: TriangleSoup) -> Result<(Self, MeshReport), MeshError> {
-        Self::build_and_tell(soup, |_| {})
+        Self::build_closing(soup, CloseHoles::Small)
     }
 
-    /// As [`Self::build`]; `tell_origin` hears of each face, in order, of which face of the input it is a part.
+    /// As [`Self::build`], and says which holes are to be closed.
+    ///
+    /// # Errors
+    /// As [`Self::build`].
+    pub fn build_closing(soup: TriangleSoup, holes: CloseHoles) -> Result<(Self, MeshReport), MeshError> {
+        Self::build_and_tell(soup, holes, |_| {})
+    }
+
+    /// As [`Self::build_closing`]; `tell_origin` hears of each face, in order, of which face of the input it is a part.
     pub(super) fn build_and_tell(
         soup: TriangleSoup,
+        holes: CloseHoles,
         mut tell_origin: impl FnMut(u32),
     ) -> Result<(Self, MeshReport), MeshError> {
         soup.validate()?;
@@ -41,31 +54,58 @@ impl Mesh {
         order::sort_spatially(&mut triangles, &soup.vertices, &mut report.duplicate);
         let mut vertices = order::renumber(&mut triangles, &soup.vertices);
         drop(soup);
-        let mut links = topology::link(&triangles, &vertices, &mut report.touching_edges)?;
-        let sides = winding::orient(&mut triangles, &mut links, &vertices, &mut report);
+        let mut links = topology::link(&triangles, &vertices, &mut report)?;
+        for _ in 0..MOST_DIVISIONS {
+            if !junction::divide(&mut triangles, &links, &vertices, &mut report.divided) {
+                break;
+            }
+            links = link_again(&mut triangles, &mut vertices, &mut report)?;
+        }
+        let mut sides = winding::orient(&mut triangles, &mut links, &vertices, &mut report);
+        if hole::close(holes, &mut triangles, &links, &mut vertices, &mut report) {
+            links = link_again(&mut triangles, &mut vertices, &mut report)?;
+            let flipped = std::mem::take(&mut report.flipped);
+            report.cavities = Finding::default();
+            sides = winding::orient(&mut triangles, &mut links, &vertices, &mut report);
+            report.flipped = flipped;
+        }
         pinch::part(&mut triangles, &links, &mut vertices);
         report_edges(&triangles, &links, &mut report);
         let faces: Box<[Face]> =
-            triangles.iter().zip(&links).map(|(triangle, links)| face(triangle, links, &vertices)).collect();
+            (0..triangles.len()).map(|i| face(&triangles[i], &links[i], sides[i], &vertices)).collect();
         triangles.iter().for_each(|triangle| tell_origin(triangle.origin));
         drop((triangles, links));
+        let has_inside = sides.contains(&Sides::Solid);
+        let sides = if sides.contains(&Sides::Sheet) { Sides::Sheet } else { Sides::Solid };
         report.faces = faces.len();
         report.vertices = vertices.len();
         let extent_m = vertices.iter().fold(0.0_f64, |extent, v| extent.max(v.amax()));
         let vertices = vertices.into_boxed_slice();
         let bvh = Bvh::build(&faces, &vertices);
         let identity = BUILT.fetch_add(1, Ordering::Relaxed);
-        Ok((Self { faces, vertices, bvh, sides, extent_m, identity, uv: None }, report))
+        Ok((Self { faces, vertices, bvh, sides, has_inside, extent_m, identity, uv: None }, report))
     }
 }
 
+/// Of faces that were divided or added: in order again, and with their links.
+fn link_again(
+    triangles: &mut Vec<Triangle>,
+    vertices: &mut Vec<Vector3<f64>>,
+    report: &mut MeshReport,
+) -> Result<Vec<[Link; 3]>, MeshError> {
+    order::sort_spatially(triangles, vertices, &mut report.duplicate);
+    *vertices = order::renumber(triangles, vertices);
+    (report.touching_edges, report.crowded_edges) = Default::default();
+    topology::link(triangles, vertices, report)
+}
+
 /// Its offset is the middle of those of its corners, so that none of them is further from the plane than needed.
-fn face(triangle: &Triangle, links: &[Link; 3], vertices: &[Vector3<f64>]) -> Face {
+fn face(triangle: &Triangle, links: &[Link; 3], sides: Sides, vertices: &[Vector3<f64>]) -> Face {
     let corners = triangle.corners.map(|v| vertices[v as usize]);
     let normal_B = area_vector(&corners).normalize();
     let [a, b, c] = corners.map(|corner| normal_B.dot(&corner));
     let offset_m = 0.5 * (a.min(b).min(c) + a.max(b).max(c));
-    Face { normal_B, offset_m, vertices: triangle.corners, links: *links }
+    Face { normal_B, offset_m, vertices: triangle.corners, links: *links, sides }
 }
 
 fn report_edges(triangles: &[Triangle], links: &[[Link; 3]], report: &mut MeshReport) {

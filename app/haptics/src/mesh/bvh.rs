@@ -23,7 +23,7 @@ mod closest;
 mod inside;
 mod nearest;
 mod outlying;
-mod parts;
+mod ray;
 mod segment;
 mod stack;
 

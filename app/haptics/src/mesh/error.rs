@@ -38,17 +38,6 @@ pub enum MeshError {
         /// How many faces there were.
         faces: usize,
     },
-    /// More than two faces meet at an edge, and there is no telling which one comes next.
-    NonManifold {
-        /// How many such edges there are.
-        edges: usize,
-        /// The first face at such an edge.
-        first_face: usize,
-        /// How many faces share that edge.
-        faces: usize,
-        /// Where that edge begins and ends (m).
-        ends_B: [[f64; 3]; 2],
-    },
     /// Not as many triples of texture coordinates as faces.
     UvNumber {
         /// How many triples there are.
@@ -95,12 +84,6 @@ impl fmt::Display for MeshError {
                 "none of the {faces} faces has an area; allowed is a mesh with at least one proper triangle: was \
                  it scaled to nothing?"
             ),
-            Self::NonManifold { edges, first_face, faces, ends_B: [a, b] } => write!(
-                f,
-                "{edges} edges are shared by more than two faces (first: face {first_face}, {faces} faces at the \
-                 edge from {a:?} to {b:?} m); allowed are one or two, or solid parts that touch along the edge: \
-                 remove inner walls, separate sheets that meet, wind faces outward"
-            ),
             Self::UvNumber { found, faces } => write!(
                 f,
                 "{found} faces have texture coordinates, but there are {faces} faces; allowed are three for each"
@@ -133,9 +116,5 @@ mod tests {
         );
         let message = MeshError::Coordinate { vertex: 3, value: [0.0, f64::NAN, 1.0] }.to_string();
         assert!(message.starts_with("vertex 3 is at [0.0, NaN, 1.0]; allowed are finite"), "{message}");
-        let message =
-            MeshError::NonManifold { edges: 2, first_face: 5, faces: 4, ends_B: [[0.0; 3], [1.0; 3]] }
-                .to_string();
-        assert!(message.contains("first: face 5, 4 faces at the edge from [0.0, 0.0, 0.0]"), "{message}");
     }
 }

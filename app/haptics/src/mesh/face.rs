@@ -2,6 +2,8 @@
 
 use nalgebra::Vector3;
 
+use super::Sides;
+
 /// A triangle of a mesh.
 ///
 /// Edge `i` runs from corner `i` to corner `(i + 1) % 3`.
@@ -16,6 +18,8 @@ pub struct Face {
     pub vertices: [u32; 3],
     /// What lies across each edge.
     pub links: [Link; 3],
+    /// From where its part of the mesh is felt.
+    pub sides: Sides,
 }
 
 /// The neighbour across an edge: which face, which of its edges is the shared one, and how it is wound.

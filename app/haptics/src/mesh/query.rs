@@ -15,7 +15,7 @@ impl Mesh {
     /// to 1e-13 of the extent behind a face still counts as in front of it. None for a segment that is not finite
     /// or has no length.
     pub fn first_hit(&self, from_B: &Vector3<f64>, to_B: &Vector3<f64>) -> Option<Hit> {
-        self.bvh.first_hit(self.triangles(), self.sides, from_B, to_B)
+        self.bvh.first_hit(self.triangles(), Sides::Solid, from_B, to_B)
     }
 
     /// As [`Self::first_hit`], of the faces that `is_skipped` does not name.
@@ -25,7 +25,7 @@ impl Mesh {
         to_B: &Vector3<f64>,
         is_skipped: impl Fn(u32) -> bool,
     ) -> Option<Hit> {
-        self.bvh.first_hit_of_others(self.triangles(), self.sides, from_B, to_B, is_skipped)
+        self.bvh.first_hit_of_others(self.triangles(), Sides::Solid, from_B, to_B, is_skipped)
     }
 
     /// A point of the mesh nearest to a point on either side, at a cost that a tick can bear.
@@ -74,47 +74,51 @@ impl Mesh {
         self.bvh.nearest_above(self.triangles(), p_B, at_most_m, plane)
     }
 
-    /// Whether a point is inside or on the surface, at a cost that a tick can bear. A sheet has no inside.
+    /// Whether a point is inside of a closed part or on its surface, at a cost that a tick can bear: where the winding
+    /// number of all closed parts is positive. A sheet has no inside.
     ///
-    /// Exact unless very many faces are about as near. Of these one is chosen, and the way to it tells; in doubt, a
-    /// point is outside.
+    /// Exact but within rounding of the surface. Where so many faces are in line with the point along each of the axes
+    /// that a tick cannot look at all, it is outside.
     pub fn is_inside(&self, p_B: &Vector3<f64>) -> bool {
-        self.way_out(p_B).is_some()
+        self.has_inside && self.bvh.is_inside(self.triangles(), p_B)
     }
 
     /// As [`Self::is_inside`], whatever it costs: for tools and tests.
     pub fn is_inside_unbounded(&self, p_B: &Vector3<f64>) -> bool {
-        self.sides == Sides::Solid && self.bvh.is_inside_unbounded(self.triangles(), p_B)
+        self.has_inside && self.bvh.is_inside_unbounded(self.triangles(), p_B)
     }
 
     /// As [`Self::nearest`], and whether the point is inside, as [`Self::is_inside`] says.
     pub fn nearest_and_side(&self, p_B: &Vector3<f64>) -> (Nearest, bool) {
-        match self.sides {
-            Sides::Solid => self.bvh.nearest_and_side(self.triangles(), p_B),
-            Sides::Sheet => (self.nearest(p_B), false),
+        if self.has_inside {
+            self.bvh.nearest_and_side(self.triangles(), p_B)
+        } else {
+            (self.nearest(p_B), false)
         }
     }
 
     /// A point of the surface through which to push out what is inside, at a cost that a tick can bear.
     ///
-    /// The nearest one, unless very many are as near. `None` outside, hence always for a sheet.
+    /// The nearest one, unless very many are as near or it leads into another part. Just beyond it is outside of all closed
+    /// parts. `None` outside, hence always for a sheet.
     pub fn way_out(&self, p_B: &Vector3<f64>) -> Option<Nearest> {
-        if self.sides == Sides::Sheet {
-            return None;
-        }
-        self.bvh.way_out(self.triangles(), p_B)
+        self.has_inside.then(|| self.bvh.way_out(self.triangles(), p_B)).flatten()
     }
 
-    /// Ways out of what is inside, to be tried one after the other: that of [`Self::way_out`], and, where the nearest
-    /// face is of another part than the one that the point is inside of, or belongs to it in a roundabout way, faces
-    /// of that part. Each has a cost that a tick can bear, and none if it is not asked for.
+    /// Ways out of what is inside, to be tried one after the other: that of [`Self::way_out`], and along the axes, the nearer
+    /// ones first, to where all parts end and to where the first one does. Each has a cost that a tick can bear, and
+    /// none if it is not asked for.
     pub(crate) fn ways_out(&self, p_B: &Vector3<f64>) -> impl Iterator<Item = Nearest> {
-        let may_be_inside = self.sides == Sides::Solid && self.bvh.is_within_box(p_B);
-        let found = may_be_inside.then(|| self.nearest_and_side(p_B));
-        let nearest = found.and_then(|(nearest, is_inside)| is_inside.then_some(nearest));
-        let of_parts = move || self.bvh.ways_out_of_parts(self.triangles(), p_B, &found?.0);
-        let of_parts = std::iter::once_with(of_parts).flatten().flatten();
-        nearest.into_iter().chain(of_parts.filter(|way| way.distance_m.is_finite()))
+        let first = self.way_out(p_B);
+        let along_axes = move || {
+            let mut ways = self.bvh.ways_along_axes(self.triangles(), p_B);
+            let distance_m =
+                |[exit, _]: &[Option<Nearest>; 2]| exit.map_or(f64::INFINITY, |way| way.distance_m);
+            ways.sort_unstable_by(|a, b| distance_m(a).total_cmp(&distance_m(b)));
+            ways
+        };
+        let others = first.is_some().then_some(along_axes).into_iter().flat_map(|ways| ways());
+        first.into_iter().chain(others.flatten().flatten())
     }
 
     /// A lower bound of the distance from a point to the mesh, at most `at_most_m`; 0 if nothing better is known

@@ -36,7 +36,7 @@ pub struct MeshReport {
     pub unused_vertices: Finding,
     /// Faces without an area; left out.
     pub degenerate: Finding,
-    /// Faces divided in two, because a vertex lay on their edge, held there by a face without an area.
+    /// Faces divided, because a vertex of other faces lay on their edge.
     pub divided: Finding,
     /// Faces with the same three vertices as an earlier one; left out.
     pub duplicate: Finding,
@@ -49,6 +49,13 @@ pub struct MeshReport {
     /// Edges along which parts touch, so that four or more faces share them; each face was joined to the next one
     /// across the outside.
     pub touching_edges: Finding,
+    /// Other edges of three and more faces: two of the same piece were joined, or two that bound the same wedge of outside;
+    /// what was left ends there.
+    pub crowded_edges: Finding,
+    /// Holes that were closed with a lid, so that the part is a solid. The face is one beside the hole.
+    pub closed_holes: Finding,
+    /// Parts that have no inside, since they are open or cannot be oriented. The face is the first of the part.
+    pub sheets: Finding,
     /// Edges where the mesh ends: the rim of an open mesh, or a crack.
     pub boundary_edges: Finding,
     /// Edges across which inside and outside change places: the mesh cannot be oriented.
@@ -68,6 +75,8 @@ impl MeshReport {
             self.flipped,
             self.inside_out,
             self.touching_edges,
+            self.crowded_edges,
+            self.closed_holes,
             self.boundary_edges,
             self.turned_edges,
         ];
@@ -94,6 +103,19 @@ impl fmt::Display for MeshReport {
             (self.inside_out, "part", "parts", "inside out: turned"),
             (self.cavities, "part", "parts", "facing inward: taken for a cavity"),
             (self.touching_edges, "edge", "edges", "along which parts touch: joined across the outside"),
+            (
+                self.crowded_edges,
+                "edge",
+                "edges",
+                "of three or more faces: two and two joined, the others end there",
+            ),
+            (self.closed_holes, "hole", "holes", "in parts that are otherwise closed: closed with a lid"),
+            (
+                self.sheets,
+                "part",
+                "parts",
+                "not closed: felt from both sides; a finger that comes in by a rim is free within",
+            ),
             (self.boundary_edges, "edge", "edges", "of one face only: an open rim or a crack"),
             (self.turned_edges, "edge", "edges", "where outside becomes inside: it cannot be oriented"),
         ];

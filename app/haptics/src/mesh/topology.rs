@@ -1,11 +1,12 @@
 //! Finds out which faces share an edge.
 //!
 //! Model: each edge is entered at its lower-numbered vertex; sorted by the other one, the faces at an edge stand
-//! side by side: one on a boundary, two inside, more where parts touch ([`touching`]). Vertices are numbered in spatial order by now, so this runs through memory in order.
+//! side by side: one on a boundary, two inside, more where parts touch or meet ([`crowded`]). Vertices are numbered in
+//! spatial order by now, so this runs through memory in order.
 
+use super::crowded::{self, Crowd};
 use super::order::Triangle;
-use super::report::Finding;
-use super::touching::pair_across_outside;
+use super::report::MeshReport;
 use super::{Link, MAX_VALENCE, MeshError};
 use nalgebra::Vector3;
 
@@ -13,30 +14,25 @@ use nalgebra::Vector3;
 pub(super) fn link(
     triangles: &[Triangle],
     vertices: &[Vector3<f64>],
-    touching: &mut Finding,
+    report: &mut MeshReport,
 ) -> Result<Vec<[Link; 3]>, MeshError> {
     check_valences(triangles, vertices)?;
     let (mut sides, starts) = sides_by_lower_vertex(triangles, vertices.len());
     let mut links = vec![[Link::BOUNDARY; 3]; triangles.len()];
-    let mut crowded = Crowded::default();
+    let (mut crowds, mut rims) = (Vec::new(), Vec::new());
     for (lower, around) in starts.windows(2).enumerate() {
         let around = &mut sides[around[0] as usize..around[1] as usize];
         around.sort_unstable();
         for edge in around.chunk_by(|a, b| a.upper() == b.upper()) {
             match edge {
-                [_] => {}
+                [side] => rims.push(side.face()),
                 [a, b] => join(&mut links, *a, *b),
-                many => match pair_across_outside(many, lower, triangles, vertices) {
-                    Some(pairs) => {
-                        pairs.iter().for_each(|&[a, b]| join(&mut links, a, b));
-                        touching.note(first_of_input(many, triangles));
-                    }
-                    None => crowded.note(many, lower, triangles, vertices),
-                },
+                many => crowds.push(Crowd { lower, sides: many.to_vec() }),
             }
         }
     }
-    crowded.into_result().map(|()| links)
+    crowded::join_crowds(&crowds, &rims, triangles, vertices, &mut links, report);
+    Ok(links)
 }
 
 /// A face's side of an edge. Packed, so that sorting compares one word: bits 32.. the edge's upper vertex, bit 0
@@ -93,13 +89,13 @@ fn sides_by_lower_vertex(triangles: &[Triangle], vertices: usize) -> (Vec<Side>,
     (sides, starts)
 }
 
-fn join(links: &mut [[Link; 3]], a: Side, b: Side) {
+pub(super) fn join(links: &mut [[Link; 3]], a: Side, b: Side) {
     let turned = a.is_upward() == b.is_upward();
     links[a.face() as usize][a.edge()] = Link::new(b.face(), b.edge() as u8, turned);
     links[b.face() as usize][b.edge()] = Link::new(a.face(), a.edge() as u8, turned);
 }
 
-fn first_of_input(sides: &[Side], triangles: &[Triangle]) -> usize {
+pub(super) fn first_of_input(sides: &[Side], triangles: &[Triangle]) -> usize {
     sides.iter().map(|side| triangles[side.face() as usize].origin as usize).min().unwrap_or(0)
 }
 
@@ -115,33 +111,5 @@ fn check_valences(triangles: &[Triangle], vertices: &[Vector3<f64>]) -> Result<(
             allowed: MAX_VALENCE as usize,
         }),
         None => Ok(()),
-    }
-}
-
-/// Edges at which it is not clear which face comes next.
-#[derive(Default)]
-struct Crowded {
-    edges: usize,
-    /// First face of the input at such an edge, number of faces there, the edge's ends.
-    first: Option<(usize, usize, [[f64; 3]; 2])>,
-}
-
-impl Crowded {
-    fn note(&mut self, sides: &[Side], lower: usize, triangles: &[Triangle], vertices: &[Vector3<f64>]) {
-        self.edges += 1;
-        let face = first_of_input(sides, triangles);
-        if self.first.is_none_or(|(first, ..)| face < first) {
-            let ends = [lower, sides[0].upper() as usize].map(|v| vertices[v].into());
-            self.first = Some((face, sides.len(), ends));
-        }
-    }
-
-    fn into_result(self) -> Result<(), MeshError> {
-        match self.first {
-            None => Ok(()),
-            Some((face, faces, ends_B)) => {
-                Err(MeshError::NonManifold { edges: self.edges, first_face: face, faces, ends_B })
-            }
-        }
     }
 }

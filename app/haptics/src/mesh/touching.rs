@@ -5,7 +5,7 @@
 //!
 //! Model: around the edge, material and outside alternate. A finger lives in one of the outside wedges, so the two
 //! faces that bound the same wedge are neighbours: it cannot slip through where the parts touch. This is clear only
-//! if the faces, as wound in the input, do alternate; three faces, crossing sheets and coinciding faces do not.
+//! if the faces do alternate; three faces, crossing sheets and coinciding faces do not ([`crowded`](super::crowded)).
 
 use super::order::Triangle;
 use super::repair::area_vector;
@@ -13,26 +13,21 @@ use super::topology::Side;
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 
-/// The pairs of faces at an edge that bound the same piece of outside; `None` if that is not clear.
-///
-/// `lower` is the end of the edge with the lower number.
+/// The pairs of faces, given with their angles around an edge, that bound the same piece of outside; `None` if that is
+/// not clear.
 pub(super) fn pair_across_outside(
-    sides: &[Side],
-    lower: usize,
-    triangles: &[Triangle],
-    vertices: &[Vector3<f64>],
+    around: &[(f64, Side)],
+    is_upward: impl Fn(Side) -> bool,
 ) -> Option<Vec<[Side; 2]>> {
-    let around = sorted_by_angle(sides, lower, triangles, vertices);
-    let next = |i: usize| around[(i + 1) % around.len()];
-    let mut pairs = Vec::with_capacity(sides.len() / 2);
+    let mut pairs = Vec::with_capacity(around.len() / 2);
     for (i, &(angle, side)) in around.iter().enumerate() {
-        let (next_angle, next_side) = next(i);
+        let (next_angle, next_side) = around[(i + 1) % around.len()];
         let gap = (next_angle - angle).rem_euclid(TAU);
-        if gap < SMALLEST_GAP_RAD || side.is_upward() == next_side.is_upward() {
+        if gap < SMALLEST_GAP_RAD || is_upward(side) == is_upward(next_side) {
             return None;
         }
         // The angle grows along the normal of a face that runs upward, so the outside lies ahead of it.
-        if side.is_upward() {
+        if is_upward(side) {
             pairs.push([side, next_side]);
         }
     }
@@ -42,7 +37,8 @@ pub(super) fn pair_across_outside(
 /// Nearer than this two faces are taken to coincide; normals of needles are hardly better.
 const SMALLEST_GAP_RAD: f64 = 1e-6;
 
-fn sorted_by_angle(
+/// The faces at an edge by their angle around it; `lower` is the end of the edge with the lower number.
+pub(super) fn sorted_by_angle(
     sides: &[Side],
     lower: usize,
     triangles: &[Triangle],

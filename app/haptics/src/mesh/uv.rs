@@ -8,7 +8,7 @@
 //! coordinates keep none.
 //! Cost: a chart takes two cross products.
 
-use super::{Mesh, MeshError, MeshReport, TriangleSoup};
+use super::{CloseHoles, Mesh, MeshError, MeshReport, TriangleSoup};
 use crate::chart::{Chart, Coordinate};
 use nalgebra::Vector3;
 
@@ -30,7 +30,8 @@ impl Mesh {
         validate(&soup, uv)?;
         let given = soup.clone();
         let mut origins = Vec::with_capacity(soup.faces.len());
-        let (mut mesh, report) = Self::build_and_tell(soup, |origin| origins.push(origin as usize))?;
+        let (mut mesh, report) =
+            Self::build_and_tell(soup, CloseHoles::default(), |origin| origins.push(origin as usize))?;
         let of_face = |(face, &origin): (usize, &usize)| {
             let corners = given.faces[origin].map(|v| given.vertices[v as usize]);
             let own = mesh.faces[face].vertices.map(|v| mesh.vertices[v as usize]);

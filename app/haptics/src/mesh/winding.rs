@@ -11,17 +11,17 @@
 //! Cost: linear; step 3 also compares each closed part with those that it overlaps along x.
 
 use super::order::Triangle;
-use super::report::MeshReport;
+use super::report::{Finding, MeshReport};
 use super::{Link, Sides};
 use nalgebra::Vector3;
 
-/// Turns faces over where needed, and notes what was found.
+/// Turns faces over where needed, and notes what was found. Says of each face whether its part has an inside.
 pub(super) fn orient(
     triangles: &mut [Triangle],
     links: &mut [[Link; 3]],
     vertices: &[Vector3<f64>],
     report: &mut MeshReport,
-) -> Sides {
+) -> Vec<Sides> {
     let (mut states, mut parts) = flood(links);
     count(&states, triangles, &mut parts);
     for (state, triangle) in states.iter_mut().zip(&*triangles) {
@@ -35,13 +35,17 @@ pub(super) fn orient(
     states.iter_mut().for_each(|state| state.is_turned_over ^= parts[state.part as usize].is_inside_out);
     apply(triangles, links, &states);
     report.components = parts.len();
-    if parts.iter().all(Part::has_inside) { Sides::Solid } else { Sides::Sheet }
+    report.sheets = Finding::default();
+    parts.iter().filter(|part| !part.has_inside()).for_each(|part| report.sheets.note(part.first));
+    let sides =
+        |state: &State| if parts[state.part as usize].has_inside() { Sides::Solid } else { Sides::Sheet };
+    states.iter().map(sides).collect()
 }
 
 /// Of a face.
 #[derive(Debug, Clone, Copy)]
-struct State {
-    part: u32,
+pub(super) struct State {
+    pub(super) part: u32,
     is_turned_over: bool,
 }
 
@@ -49,7 +53,7 @@ const UNSEEN: u32 = u32::MAX;
 
 /// Faces that hang together by edges.
 #[derive(Debug)]
-struct Part {
+pub(super) struct Part {
     is_closed: bool,
     is_orientable: bool,
     faces: usize,
@@ -84,7 +88,7 @@ impl Part {
 
     /// Whether a face that the flood left in this state is to be turned over: most faces stay as they are, on a
     /// tie the first.
-    fn turns(&self, state: State) -> bool {
+    pub(super) fn turns(&self, state: State) -> bool {
         self.is_orientable && state.is_turned_over != (2 * self.turned_over > self.faces)
     }
 
@@ -102,7 +106,7 @@ impl Part {
 }
 
 /// Winds each part like its first face, and finds out on which this leaves a contradiction.
-fn flood(links: &[[Link; 3]]) -> (Vec<State>, Vec<Part>) {
+pub(super) fn flood(links: &[[Link; 3]]) -> (Vec<State>, Vec<Part>) {
     let mut states = vec![State { part: UNSEEN, is_turned_over: false }; links.len()];
     let mut parts = Vec::new();
     let mut open = Vec::new();
@@ -135,7 +139,7 @@ fn flood(links: &[[Link; 3]]) -> (Vec<State>, Vec<Part>) {
     (states, parts)
 }
 
-fn count(states: &[State], triangles: &[Triangle], parts: &mut [Part]) {
+pub(super) fn count(states: &[State], triangles: &[Triangle], parts: &mut [Part]) {
     for (state, triangle) in states.iter().zip(triangles) {
         let part = &mut parts[state.part as usize];
         part.faces += 1;

@@ -6,7 +6,7 @@ use std::cell::Cell;
 
 use nalgebra::Vector3;
 
-use super::ball::Ball;
+use super::ball::{Ball, tolerance_m};
 use super::ground::{Foot, Ground};
 use super::seek::{Rested, seek};
 use crate::algorithm::Touch;
@@ -68,7 +68,7 @@ impl<F: Foot> Touching<F> {
         if matches!(friction, Friction::None) {
             self.grip.state = FrictionState::Slip;
             let rested = seek(ground, &self.ball, || Frictionless, true, vicinity, input)?;
-            return Some(self.answer(&rested, input));
+            return Some(self.settle(ground, &rested, input));
         }
         if self.is_out(ground, vicinity, input) {
             return None;
@@ -76,7 +76,7 @@ impl<F: Foot> Touching<F> {
         let look = self.ball.look(ground, input);
         if look.is_free {
             let rested = seek(ground, &self.ball, || Frictionless, true, vicinity, input)?;
-            return Some(self.answer(&rested, input));
+            return Some(self.settle(ground, &rested, input));
         }
         let pull = self.grip.begin_tick(&look.view, input);
         if let Some(tangential_B) = self.grip.hold(friction, &look.view, &pull, input) {
@@ -87,7 +87,25 @@ impl<F: Foot> Touching<F> {
         let mut rested = seek(ground, &self.ball, against, false, vicinity, input)?;
         rested.tangential_B +=
             self.grip.drag(friction, &rested.tangential_B, &rested.look.view, &pull, input);
-        Some(self.answer(&rested, input))
+        Some(self.settle(ground, &rested, input))
+    }
+
+    /// A ball smaller than the finger's radius that is free, where the finger itself has no room yet: as large as it may be
+    /// with its centre at the HIP, without a force.
+    pub(super) fn with_less_room(
+        &mut self,
+        ground: &impl Ground<Foot = F>,
+        radius_m: f64,
+        input: &ConeInput,
+    ) -> Option<Touch> {
+        if self.ball.radius_m >= radius_m {
+            return None;
+        }
+        let (foot, distance_m) = ground.nearest_within(&input.hip_B, radius_m).ok()??;
+        let mut ball = Ball::in_free_space(input.hip_B, distance_m);
+        ball.add(ground, &foot);
+        let look = ball.look(ground, input);
+        Some(self.answer(&Rested { ball, look, tangential_B: Vector3::zeros() }, input))
     }
 
     /// Whether the finger is round the corner, whatever friction says.
@@ -134,6 +152,17 @@ impl<F: Foot> Touching<F> {
         let was_inside =
             self.is_inside && (hip_B - self.tight.centre_B).norm() < clear_m + self.tight.radius_m;
         if was_inside || ground.is_inside(hip_B) { clear_m } else { 0.0 }
+    }
+
+    /// The force at a place of rest; a place farther from the HIP than the ball is now is none: it stays where it is.
+    fn settle(&mut self, ground: &impl Ground<Foot = F>, rested: &Rested<F>, input: &ConeInput) -> Touch {
+        let lag_m = |ball: &Ball<F>| (ball.centre_B - input.hip_B).norm();
+        if lag_m(&rested.ball) <= lag_m(&self.ball) + tolerance_m(ground, self.ball.radius_m) {
+            return self.answer(rested, input);
+        }
+        let mut ball = self.ball;
+        let look = ball.look(ground, input);
+        self.answer(&Rested { ball, look, tangential_B: Vector3::zeros() }, input)
     }
 
     fn answer(&mut self, rested: &Rested<F>, input: &ConeInput) -> Touch {

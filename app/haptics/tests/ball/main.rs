@@ -5,6 +5,8 @@
 mod common;
 #[path = "../common/cones.rs"]
 mod cones;
+#[path = "../mesh_oracle/mod.rs"]
+mod mesh_oracle;
 #[path = "../common/trees.rs"]
 mod trees;
 
@@ -12,10 +14,13 @@ mod contacts;
 mod csg;
 mod csg_feel;
 mod csg_oracle;
+mod csg_starts;
 mod feet;
 mod forms;
 mod mesh;
 mod quality;
+mod rises;
 mod several_cones;
 mod shading;
+mod starts;
 mod walks;

@@ -3,9 +3,11 @@
 
 pub(crate) mod laws;
 
+pub(crate) mod flawed;
 pub(crate) mod meshes;
 pub(crate) mod path;
 pub(crate) mod pictures;
+pub(crate) mod ugly;
 
 use haptics::{Entity, Finger, FingerOutput, Form, Friction, Plane, Shape, Sphere};
 use nalgebra::{Isometry3, Vector3};

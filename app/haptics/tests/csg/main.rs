@@ -3,11 +3,15 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../common/joints.rs"]
+mod joints;
 #[path = "../common/trees.rs"]
 mod trees;
 
 mod feel;
+mod joined;
 mod oracle;
+mod seams;
 mod states;
 mod trees_of_shapes;
 mod walks;

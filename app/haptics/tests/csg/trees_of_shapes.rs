@@ -36,7 +36,7 @@ fn a_path_into_a_tree_meets_its_boundary() {
         let entity = touchable(&tree, Friction::None);
         let csg = built(&tree);
         let (mut met, mut through) = (0, 0);
-        for _ in 0..20_000 {
+        for _ in 0..24_000 {
             let mut random = || Vector3::from_fn(|_, _| noise.between(-1.3, 1.3) * size_m);
             let (from, to) = (random(), random());
             if contains(&from) {

@@ -66,6 +66,11 @@ fn volume(mesh: &Mesh) -> f64 {
 /// Every link leads over the same edge and back, says truly how the neighbour is wound, and a boundary has no one
 /// else: found out by comparing all edges, without the links.
 fn assert_linked(mesh: &Mesh) {
+    assert_linked_but_at_crowds(mesh, false);
+}
+
+/// The same; at an edge of three and more faces some end although others go on.
+fn assert_linked_but_at_crowds(mesh: &Mesh, has_crowds: bool) {
     let mut at_edge: BTreeMap<[u32; 2], usize> = BTreeMap::new();
     for face in mesh.faces() {
         for edge in 0..3 {
@@ -77,10 +82,12 @@ fn assert_linked(mesh: &Mesh) {
         for (edge, link) in face.links.iter().enumerate() {
             let [a, b] = edge_of(face, edge);
             if link.is_boundary() {
-                assert_eq!(at_edge[&[a.min(b), a.max(b)]], 1, "face {index} alone at its edge {edge}");
+                let is_alone = at_edge[&[a.min(b), a.max(b)]] == 1;
+                assert!(is_alone || has_crowds, "face {index} alone at its edge {edge}");
                 continue;
             }
-            assert!(at_edge[&[a.min(b), a.max(b)]].is_multiple_of(2), "more than two where parts touch");
+            let is_even = at_edge[&[a.min(b), a.max(b)]].is_multiple_of(2);
+            assert!(is_even || has_crowds, "more than two where parts touch");
             let beyond = &mesh.faces()[link.face() as usize];
             let expected = if link.is_turned() { [a, b] } else { [b, a] };
             assert_eq!(edge_of(beyond, link.edge()), expected, "face {index} over its edge {edge}");
@@ -479,19 +486,6 @@ fn what_contradicts_itself_is_refused_with_the_first_offender() {
 }
 
 #[test]
-fn a_wall_where_three_faces_meet_is_refused() {
-    let mut soup = one_tetrahedron();
-    soup.vertices.push(point(-1.0, -1.0, -1.0));
-    soup.faces.insert(1, [0, 1, 4]);
-    let error = Mesh::build(soup).unwrap_err();
-    let expected = [[0.0; 3], [1.0, 0.0, 0.0]];
-    let MeshError::NonManifold { edges: 1, first_face: 0, faces: 3, ends_B } = error else {
-        panic!("{error}")
-    };
-    assert!(ends_B == expected || ends_B == [expected[1], expected[0]], "{ends_B:?}");
-}
-
-#[test]
 fn cubes_that_stand_edge_to_edge_are_joined_across_the_outside() {
     // Towards +x +y, and towards -x -y: they share the edge on the z axis.
     let mut soup = make::cuboid([1.0; 3]);
@@ -518,13 +512,14 @@ fn cubes_that_stand_edge_to_edge_are_joined_across_the_outside() {
     }
     assert_eq!(met, 4);
 
-    // With one wall wound the wrong way round it is not clear any more.
+    // Also with one wall wound the wrong way round: its cube tells how it is meant.
     let at_edge =
         |face: &[u32; 3]| face.iter().filter(|&&v| soup.vertices[v as usize].xy().norm() == 0.0).count();
     let wall = soup.faces.iter().position(|face| at_edge(face) == 2).unwrap();
     soup.faces[wall].swap(0, 1);
-    let error = Mesh::build(soup).unwrap_err();
-    assert!(matches!(error, MeshError::NonManifold { edges: 1, faces: 4, .. }), "{error}");
+    let (same, report) = build(soup);
+    assert_eq!((report.flipped, report.touching_edges.count), (found(1, wall), 1));
+    assert_eq!(same.faces(), mesh.faces());
 }
 
 #[test]
@@ -569,7 +564,7 @@ proptest! {
         let sides = tetrahedra.iter().flat_map(|t| tetrahedron(0).map(|face| face.map(|v| t[v as usize])));
         let faces = sides.chain(others).map(|face| face.map(|v| v % points.len() as u32)).collect();
         if let Ok((mesh, report)) = Mesh::build(TriangleSoup { vertices, faces }) {
-            assert_linked(&mesh);
+            assert_linked_but_at_crowds(&mesh, report.crowded_edges.count > 0);
             prop_assert_eq!(report.faces, mesh.faces().len());
             prop_assert_eq!(mesh.sides() == Sides::Solid, report.boundary_edges.count + report.turned_edges.count == 0);
         }

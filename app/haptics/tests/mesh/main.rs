@@ -12,6 +12,8 @@ mod crossing;
 mod energy;
 mod folds;
 mod friction;
+mod inside;
+mod joints;
 mod moving;
 mod outlying;
 mod parts;

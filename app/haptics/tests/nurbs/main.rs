@@ -9,3 +9,4 @@ mod curvo;
 mod exact;
 mod leaks;
 mod quality;
+mod starts;

@@ -8,4 +8,5 @@ mod solids;
 
 mod edges;
 mod oracle;
+mod starts;
 mod walks;

@@ -45,6 +45,11 @@ impl Aabb {
         Some(Self { low_W: centre_W.coords - half_W, high_W: centre_W.coords + half_W })
     }
 
+    /// Its middle (m).
+    pub fn middle_W(&self) -> Vector3<f64> {
+        0.5 * (self.low_W + self.high_W)
+    }
+
     /// Larger by so much on each side (m).
     #[must_use]
     pub fn grown(&self, by_m: f64) -> Self {

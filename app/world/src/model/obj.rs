@@ -7,7 +7,7 @@
 //!
 //! A face may name a vertex that comes later in the file, so polygons are divided when all vertices are known.
 
-use super::polygon::{MAX_CONCAVE_CORNERS, triangulate};
+use super::polygon::{Divider, MAX_CONCAVE_CORNERS};
 use super::{ModelError, a_number, number, shown};
 use haptics::mesh::{CornerUv, TriangleSoup};
 use nalgebra::Vector3;
@@ -18,16 +18,16 @@ use std::borrow::Cow;
 /// # Errors
 /// The first thing found to be wrong, with its line.
 pub fn read_obj(bytes: &[u8]) -> Result<TriangleSoup, ModelError> {
-    let Polygons { vertices, corners, polygons } = Polygons::read(bytes)?;
-    let mut faces = Vec::with_capacity(polygons.len());
-    let mut begin = 0;
-    for Polygon { line, end } in polygons {
-        let corners = &corners[begin..end as usize];
-        triangulate(corners, &vertices, &mut faces)
-            .ok_or_else(|| indivisible(line as usize, corners.len()))?;
-        begin = end as usize;
+    let read = Polygons::read(bytes)?;
+    let mut faces = Vec::with_capacity(read.polygons.len());
+    read.for_each_triangle(|corners, begin, face| {
+        faces.push(face.map(|number| corners[begin + number as usize]));
+    })?;
+    if faces.is_empty() {
+        Err(ModelError::NoTriangle)
+    } else {
+        Ok(TriangleSoup { vertices: read.vertices, faces })
     }
-    if faces.is_empty() { Err(ModelError::NoTriangle) } else { Ok(TriangleSoup { vertices, faces }) }
 }
 
 /// Reads an OBJ file whose faces have texture coordinates; one triple for each triangle of the soup.
@@ -35,27 +35,17 @@ pub fn read_obj(bytes: &[u8]) -> Result<TriangleSoup, ModelError> {
 /// # Errors
 /// As [`read_obj`]; a corner of a face without a texture coordinate.
 pub fn read_obj_with_uv(bytes: &[u8]) -> Result<(TriangleSoup, Vec<CornerUv>), ModelError> {
-    let Polygons { vertices, corners, polygons } = Polygons::read(bytes)?;
+    let read = Polygons::read(bytes)?;
     let textures = Textures::read(bytes)?;
-    let (mut faces, mut uv, mut divided) = (Vec::with_capacity(polygons.len()), Vec::new(), Vec::new());
-    let mut begin = 0;
-    for Polygon { line, end } in polygons {
-        let of_polygon = begin..end as usize;
+    let (mut faces, mut uv) = (Vec::with_capacity(read.polygons.len()), Vec::new());
+    read.for_each_triangle(|corners, begin, face| {
         // By the number of the corner within its polygon, which tells its vertex and its texture coordinate.
-        let numbers: Vec<u32> = (0..of_polygon.len() as u32).collect();
-        let places: Vec<Vector3<f64>> =
-            corners[of_polygon.clone()].iter().map(|&corner| vertices[corner as usize]).collect();
-        divided.clear();
-        triangulate(&numbers, &places, &mut divided)
-            .ok_or_else(|| indivisible(line as usize, numbers.len()))?;
-        for face in &divided {
-            let at = face.map(|number| begin + number as usize);
-            faces.push(at.map(|corner| corners[corner]));
-            uv.push(at.map(|corner| textures.uv[textures.corners[corner] as usize]));
-        }
-        begin = end as usize;
-    }
-    if faces.is_empty() { Err(ModelError::NoTriangle) } else { Ok((TriangleSoup { vertices, faces }, uv)) }
+        let at = face.map(|number| begin + number as usize);
+        faces.push(at.map(|corner| corners[corner]));
+        uv.push(at.map(|corner| textures.uv[textures.corners[corner] as usize]));
+    })?;
+    let soup = TriangleSoup { vertices: read.vertices, faces };
+    if soup.faces.is_empty() { Err(ModelError::NoTriangle) } else { Ok((soup, uv)) }
 }
 
 /// The line on which the polygon begins that became triangle `face` (counted from 0) of what [`read_obj`] returns.
@@ -145,6 +135,23 @@ impl Polygons {
             Some((line, index)) => Err(out_of_range(line, &(u64::from(index) + 1).to_string(), count)),
             None => Ok(read),
         }
+    }
+
+    /// Divides all polygons; `tell` hears of all corners, where those of the polygon begin, and of a triangle as numbers of
+    /// the polygon's corners.
+    fn for_each_triangle(&self, mut tell: impl FnMut(&[u32], usize, [u32; 3])) -> Result<(), ModelError> {
+        let begins = std::iter::once(0).chain(self.polygons.iter().map(|polygon| polygon.end as usize));
+        let ranges = begins.zip(&self.polygons).map(|(begin, polygon)| begin..polygon.end as usize);
+        let mut divider = Divider::new(&self.vertices, ranges.clone().map(|range| &self.corners[range]));
+        let mut divided = Vec::new();
+        for (range, polygon) in ranges.zip(&self.polygons) {
+            divided.clear();
+            divider
+                .divide(&self.corners[range.clone()], &mut divided)
+                .ok_or_else(|| indivisible(polygon.line as usize, range.len()))?;
+            divided.iter().for_each(|&face| tell(&self.corners, range.start, face));
+        }
+        Ok(())
     }
 
     fn polygon<'l>(
@@ -325,8 +332,7 @@ fn unknown(line: usize, word: &[u8]) -> ModelError {
 
 fn indivisible(line: usize, corners: usize) -> ModelError {
     let allowed = format!(
-        "faces whose outline does not cross itself, with at most {MAX_CONCAVE_CORNERS} corners where they are concave; \
-         export the model as triangles"
+        "at most {MAX_CONCAVE_CORNERS} corners where a face is concave; export the model as triangles"
     );
     ModelError::Line { line, found: format!("a face of {corners} corners that cannot be divided"), allowed }
 }

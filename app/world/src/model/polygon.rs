@@ -1,74 +1,143 @@
 //! Divides polygons into triangles.
 //!
-//! Model: a polygon whose fan around its first corner turns the same way throughout is divided into that fan; any other
-//! by cutting ears off (G. H. Meisters, *Polygons have ears*, 1975), so that concave ones keep their outline.
+//! Problem: two triangles that meet at a diagonal must be the only ones there. Quads that share two edges, as around a vertex
+//! of two quads, would have four if both were cut along the line that closes the two edges; and what is cut along an edge of
+//! another face would have three.
+//!
+//! Model: a polygon whose fan around a corner turns the same way throughout is divided into that fan, around its first corner if
+//! it can be; any other by cutting ears off (G. H. Meisters, *Polygons have ears*, 1975), so that concave ones keep their
+//! outline. Diagonals that another polygon of the file has as an edge or as its own diagonal are left to it where there are others.
+//! A polygon that crosses itself has no inside that could be divided: it becomes the fan around its first corner, which has its
+//! edges, so that what it closes is closed.
 //!
 //! The turning sense is measured about the polygon's own normal (Newell), so nothing depends on its plane.
 //! Cost: linear for the fan, cubic at worst for ears, hence [`MAX_CONCAVE_CORNERS`].
 
 use nalgebra::Vector3;
+use std::collections::{HashMap, HashSet};
 
 /// Concave polygons may have so many corners.
 pub(super) const MAX_CONCAVE_CORNERS: usize = 500;
 
 /// Of the polygon's area: a part of it that small is none.
 const ROUNDING: f64 = 1e-12;
+/// Corners that a fan is tried around.
+const MOST_FANS: usize = 16;
 
-/// Appends the `corners.len() - 2` triangles of a polygon to `faces`.
-///
-/// `None` if it crosses itself, or is concave and has too many corners. It must have at least three.
-pub(super) fn triangulate(
-    corners: &[u32],
-    vertices: &[Vector3<f64>],
-    faces: &mut Vec<[u32; 3]>,
-) -> Option<()> {
-    if let &[a, b, c] = corners {
-        faces.push([a, b, c]);
-        return Some(());
+/// Divides the polygons of a file, one after the other.
+pub(super) struct Divider<'v> {
+    vertices: &'v [Vector3<f64>],
+    /// For each vertex the first one in the same place. Empty if there are triangles only.
+    names: Vec<u32>,
+    /// Edges and diagonals so far, by the names of their ends, the lower one first.
+    taken: HashSet<[u32; 2]>,
+}
+
+impl<'v> Divider<'v> {
+    /// For polygons that are given as their corners.
+    pub(super) fn new<'c>(
+        vertices: &'v [Vector3<f64>],
+        polygons: impl Iterator<Item = &'c [u32]> + Clone,
+    ) -> Self {
+        let mut divider = Self { vertices, names: Vec::new(), taken: HashSet::new() };
+        if polygons.clone().all(|corners| corners.len() == 3) {
+            return divider;
+        }
+        let mut first = HashMap::with_capacity(vertices.len());
+        let name = |(vertex, place): (usize, &Vector3<f64>)| {
+            *first.entry([place.x, place.y, place.z].map(|x| (x + 0.0).to_bits())).or_insert(vertex as u32)
+        };
+        divider.names = vertices.iter().enumerate().map(name).collect();
+        for corners in polygons {
+            for (i, &from) in corners.iter().enumerate() {
+                let edge = divider.ends(from, corners[(i + 1) % corners.len()]);
+                divider.taken.insert(edge);
+            }
+        }
+        divider
     }
-    let place = |corner: u32| vertices[corner as usize];
-    let outline = Outline { normal: newell(corners.iter().map(|&corner| place(corner))), vertices };
-    let fan = || corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]]);
-    if fan().all(|triangle| outline.turn(triangle) >= 0.0) {
-        faces.extend(fan());
-        return Some(());
+
+    /// Appends the `corners.len() - 2` triangles of a polygon to `faces`, as numbers of its corners.
+    ///
+    /// `None` if it is concave and has too many corners. It must have at least three.
+    pub(super) fn divide(&mut self, corners: &[u32], faces: &mut Vec<[u32; 3]>) -> Option<()> {
+        let begin = faces.len();
+        if corners.len() == 3 {
+            faces.push([0, 1, 2]);
+            return Some(());
+        }
+        let places: Vec<_> = corners.iter().map(|&corner| self.vertices[corner as usize]).collect();
+        let outline = Outline { normal: newell(&places), places: &places };
+        let is_free =
+            |a: u32, b: u32| !self.taken.contains(&self.ends(corners[a as usize], corners[b as usize]));
+        if outline.turns_one_way(0) {
+            let is_good = |start: &usize| {
+                outline.turns_one_way(*start) && outline.fan(*start).skip(1).all(|[a, b, _]| is_free(a, b))
+            };
+            faces.extend(outline.fan((0..places.len().min(MOST_FANS)).find(is_good).unwrap_or(0)));
+        } else if corners.len() > MAX_CONCAVE_CORNERS {
+            return None;
+        } else if outline.cut_ears(is_free, faces).is_none() {
+            faces.truncate(begin);
+            faces.extend(outline.fan(0));
+        }
+        for [a, b, c] in &faces[begin..] {
+            for (a, b) in [(a, b), (b, c), (c, a)] {
+                let edge = self.ends(corners[*a as usize], corners[*b as usize]);
+                self.taken.insert(edge);
+            }
+        }
+        Some(())
     }
-    (corners.len() <= MAX_CONCAVE_CORNERS).then(|| outline.cut_ears(corners, faces)).flatten()
+
+    fn ends(&self, a: u32, b: u32) -> [u32; 2] {
+        let [a, b] = [a, b].map(|vertex| self.names[vertex as usize]);
+        [a.min(b), a.max(b)]
+    }
 }
 
 /// Twice the area, along the normal of whatever plane it lies in.
-fn newell(mut places: impl Iterator<Item = Vector3<f64>>) -> Vector3<f64> {
-    let Some(first) = places.next() else { return Vector3::zeros() };
-    let (mut normal, mut last) = (Vector3::zeros(), Vector3::zeros());
-    for place in places {
-        let arm = place - first;
-        normal += last.cross(&arm);
-        last = arm;
-    }
-    normal
+fn newell(places: &[Vector3<f64>]) -> Vector3<f64> {
+    let arms = places.windows(2).map(|pair| [pair[0] - places[0], pair[1] - places[0]]);
+    arms.map(|[last, arm]| last.cross(&arm)).sum()
 }
 
-struct Outline<'v> {
+struct Outline<'p> {
     normal: Vector3<f64>,
-    vertices: &'v [Vector3<f64>],
+    places: &'p [Vector3<f64>],
 }
 
 impl Outline<'_> {
     /// Above 0 if the triangle runs around like the polygon.
     fn turn(&self, [a, b, c]: [u32; 3]) -> f64 {
-        let [a, b, c] = [a, b, c].map(|corner| self.vertices[corner as usize]);
+        let [a, b, c] = [a, b, c].map(|corner| self.places[corner as usize]);
         (b - a).cross(&(c - a)).dot(&self.normal)
     }
 
-    fn cut_ears(&self, corners: &[u32], faces: &mut Vec<[u32; 3]>) -> Option<()> {
+    /// The triangles around a corner, the one with the edge from there first.
+    fn fan(&self, start: usize) -> impl Iterator<Item = [u32; 3]> {
+        let count = self.places.len();
+        let corner = move |i: usize| ((start + i) % count) as u32;
+        (1..count - 1).map(move |i| [corner(0), corner(i), corner(i + 1)])
+    }
+
+    fn turns_one_way(&self, start: usize) -> bool {
+        self.fan(start).all(|triangle| self.turn(triangle) >= 0.0)
+    }
+
+    /// `None` if it crosses itself. Diagonals that `is_free` are taken first.
+    fn cut_ears(&self, is_free: impl Fn(u32, u32) -> bool, faces: &mut Vec<[u32; 3]>) -> Option<()> {
         let rounding = ROUNDING * self.normal.norm_squared();
-        let mut left = corners.to_vec();
+        let mut left: Vec<u32> = (0..self.places.len() as u32).collect();
         while left.len() > 3 {
             let around =
                 |i: usize| [left[(i + left.len() - 1) % left.len()], left[i], left[(i + 1) % left.len()]];
+            let is_ear = |i: &usize| self.turn(around(*i)) > 0.0 && self.is_empty(around(*i), &left);
+            let cuts_free = |i: &usize| is_free(around(*i)[0], around(*i)[2]);
             // Corners on a straight line leave a triangle without an area, once no proper ear is there.
             let ear = (0..left.len())
-                .find(|&i| self.turn(around(i)) > 0.0 && self.is_empty(around(i), &left))
+                .find(|i| is_ear(i) && cuts_free(i))
+                .or_else(|| (0..left.len()).find(is_ear))
                 .or_else(|| (0..left.len()).find(|&i| self.turn(around(i)).abs() <= rounding))?;
             faces.push(around(ear));
             left.remove(ear);
@@ -81,8 +150,7 @@ impl Outline<'_> {
 
     /// Whether no other corner lies in the triangle.
     fn is_empty(&self, triangle @ [a, b, c]: [u32; 3], corners: &[u32]) -> bool {
-        let is_corner =
-            |p: u32| triangle.iter().any(|&t| self.vertices[t as usize] == self.vertices[p as usize]);
+        let is_corner = |p: u32| triangle.iter().any(|&t| self.places[t as usize] == self.places[p as usize]);
         let is_inside = |p: u32| [[a, b, p], [b, c, p], [c, a, p]].into_iter().all(|t| self.turn(t) >= 0.0);
         !corners.iter().any(|&p| !is_corner(p) && is_inside(p))
     }
@@ -97,7 +165,7 @@ mod tests {
         let vertices: Vec<_> = outline.iter().map(|[x, y]| Vector3::new(*x, *y, *x)).collect();
         let corners: Vec<u32> = (0..vertices.len() as u32).collect();
         let mut faces = Vec::new();
-        triangulate(&corners, &vertices, &mut faces)?;
+        Divider::new(&vertices, std::iter::once(&corners[..])).divide(&corners, &mut faces)?;
         assert_eq!(faces.len(), outline.len() - 2);
         let area = |face: &[u32; 3]| {
             let [a, b, c] = face.map(|corner| outline[corner as usize]);
@@ -138,11 +206,70 @@ mod tests {
     }
 
     #[test]
-    fn a_polygon_that_crosses_itself_is_refused() {
-        // A pentagram turns twice around its middle.
+    fn a_polygon_that_crosses_itself_keeps_its_edges() {
+        // A pentagram turns twice around its middle; a bow tie has two halves that turn against each other.
         let star: Vec<[f64; 2]> =
             (0..5).map(|i| (f64::from(2 * i) * std::f64::consts::TAU / 5.0).sin_cos().into()).collect();
-        assert_eq!(areas(&star), None);
+        let bow_tie = vec![[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]];
+        for outline in [star, bow_tie] {
+            let [_, sum] = areas(&outline).expect("a fan");
+            let twice_area = |i: usize| {
+                let [a, b] = [outline[i], outline[(i + 1) % outline.len()]];
+                a[0] * b[1] - a[1] * b[0]
+            };
+            let whole: f64 = 0.5 * (0..outline.len()).map(twice_area).sum::<f64>();
+            // The sum of signed areas is that of the closed line, up to rounding.
+            assert!((sum - whole).abs() < 1e-15, "{sum} {whole}");
+        }
+    }
+
+    /// How many triangles have each edge.
+    fn edges(faces: &[[u32; 3]]) -> HashMap<[u32; 2], usize> {
+        let mut edges = HashMap::new();
+        for [a, b, c] in faces {
+            for (a, b) in [(a, b), (b, c), (c, a)] {
+                *edges.entry([*a.min(b), *a.max(b)]).or_insert(0) += 1;
+            }
+        }
+        edges
+    }
+
+    #[test]
+    fn polygons_that_share_two_edges_are_not_cut_along_the_same_line() {
+        // A pillow of two quads: every vertex has two. And one of two hexagons.
+        for count in [4, 5, 6, 9] {
+            let corner = |i: usize| (i as f64 * std::f64::consts::TAU / count as f64).sin_cos();
+            let vertices: Vec<_> =
+                (0..count).map(|i| Vector3::new(corner(i).0, corner(i).1, 0.3 * (i % 2) as f64)).collect();
+            let front: Vec<u32> = (0..count as u32).collect();
+            for start in 0..count {
+                let mut back: Vec<u32> = front.iter().rev().copied().collect();
+                back.rotate_left(start);
+                let both = [front.clone(), back];
+                let mut divider = Divider::new(&vertices, both.iter().map(Vec::as_slice));
+                let mut faces = Vec::new();
+                for polygon in &both {
+                    let mut divided = Vec::new();
+                    divider.divide(polygon, &mut divided).unwrap();
+                    faces.extend(divided.iter().map(|face| face.map(|number| polygon[number as usize])));
+                }
+                assert_eq!(faces.len(), 2 * (count - 2));
+                assert!(edges(&faces).values().all(|&faces| faces == 2), "{count} from {start}: {faces:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn no_polygon_is_cut_along_an_edge_of_another_also_where_vertices_are_repeated() {
+        // A roof of two quads over a beam; below the beam's ends a triangle has the line from corner 0 to corner 2 for an edge.
+        let place = |x: f64, y: f64, z: f64| Vector3::new(x, y, z);
+        let mut vertices =
+            vec![place(0.0, 0.0, 0.0), place(1.0, 0.0, 0.2), place(1.0, 1.0, 0.0), place(0.0, 1.0, 0.2)];
+        vertices.extend([vertices[0], vertices[2], place(0.5, 0.5, -1.0)]);
+        let polygons: [&[u32]; 2] = [&[0, 1, 2, 3], &[4, 5, 6]];
+        let mut divided = Vec::new();
+        Divider::new(&vertices, polygons.into_iter()).divide(polygons[0], &mut divided).unwrap();
+        assert_eq!(edges(&divided)[&[1, 3]], 2, "{divided:?}");
     }
 
     #[test]

@@ -1,51 +1,73 @@
-//! Whether a point is inside a closed mesh.
+//! Whether a point is inside the closed parts of a mesh, and the way out.
 //!
-//! Model: the sign of the distance to the nearest point, by the normal there: of a face its own, of an edge the sum
-//! of both faces', of a vertex the sum of all faces' around it, each weighted by its angle (Baerentzen & Aanaes
-//! 2005). With any other weights a sharp vertex would call outside what is inside.
+//! Model: inside is where the winding number is positive ([`ray`](super::ray)). The way out is the nearest point of the
+//! surface, if the winding number is no longer positive just beyond it; beyond is where the normal there points: of a
+//! face its own, of an edge the sum of both faces', of a vertex the sum of all faces' around it, each weighted by its angle
+//! (Baerentzen & Aanaes 2005). Where parts overlap, and at folds, the nearest point may lead from one into another: then it
+//! is the nearest of the places where rays along the axes come out of all parts.
 //!
-//! Cost: that of [`Bvh::nearest_unbounded`], and a walk around a vertex where one is nearest. What a tick asks,
-//! [`Bvh::way_out`] and [`Bvh::nearest_and_side`], gives up looking for the very nearest point in time. Which side the
-//! point is on then shows in how the way to the nearest face found meets the surface first; should that way, too, lead
-//! past more than a tick can look at, the point counts as outside, where nothing is felt.
+//! Invariant: what is inside has a way out, and that leads to where the winding number is not positive.
+//!
+//! Cost: a ray of at most [`MOST_VISITS`] nodes and runs of faces outside, three at worst; inside, also
+//! [`Bvh::nearest`] and one more ray, at folds and overlaps six. Where all rays are too long a point counts as
+//! outside, where nothing is felt.
 
 use nalgebra::Vector3;
 
 use super::nearest::MOST_VISITS;
+use super::ray::{Crossing, Ray};
 use super::{Bvh, Nearest, Triangles};
-use crate::mesh::{MAX_VALENCE, Sides};
+use crate::mesh::MAX_VALENCE;
 use crate::surface::Feature;
 
 impl<const WIDTH: usize> Bvh<WIDTH> {
-    /// Whether a point is inside or on the surface. The faces must be closed and wound consistently.
+    /// Whether a point is inside or on the surface, whatever it costs. The solid faces must be closed and wound consistently.
     pub fn is_inside_unbounded(&self, triangles: Triangles<'_>, p_B: &Vector3<f64>) -> bool {
-        self.is_within_box(p_B) && is_behind(triangles, &self.nearest_unbounded(triangles, p_B), p_B)
+        self.winding_number(triangles, p_B, usize::MAX).is_some_and(|number| number > 0)
+    }
+
+    /// As [`Self::is_inside_unbounded`], at a cost that a tick can bear.
+    pub fn is_inside(&self, triangles: Triangles<'_>, p_B: &Vector3<f64>) -> bool {
+        self.winding_number(triangles, p_B, MOST_VISITS).is_some_and(|number| number > 0)
     }
 
     /// A point of the surface as seen from inside, at a cost that a tick can bear; `None` outside.
     ///
-    /// It is the nearest one unless very many are equally near, as at the centre of a ball: then it is one of these.
+    /// It is the nearest one that leads outside, unless very many are equally near, as at the centre of a ball, or parts
+    /// overlap: then it is one of these.
     pub fn way_out(&self, triangles: Triangles<'_>, p_B: &Vector3<f64>) -> Option<Nearest> {
-        if !self.is_within_box(p_B) {
+        if !self.is_inside(triangles, p_B) {
             return None;
         }
-        let (nearest, is_inside) = self.nearest_and_side(triangles, p_B);
-        is_inside.then_some(nearest)
+        let nearest = self.nearest(triangles, p_B);
+        if self.leads_outside(triangles, &nearest, p_B) {
+            return Some(nearest);
+        }
+        let exits = self.ways_along_axes(triangles, p_B).map(|[exit, _]| exit);
+        let nearer = |a: &Nearest, b: &Nearest| a.distance_m.total_cmp(&b.distance_m);
+        Some(exits.into_iter().flatten().min_by(nearer).unwrap_or(nearest))
     }
 
     /// As [`Bvh::nearest`], and whether the point is inside or on the surface, at a cost that a tick can bear.
     pub fn nearest_and_side(&self, triangles: Triangles<'_>, p_B: &Vector3<f64>) -> (Nearest, bool) {
-        let (nearest, is_sure) = self.nearest_of_visited(triangles, p_B, MOST_VISITS);
-        if !self.is_within_box(p_B) {
-            return (nearest, false);
-        }
-        if is_sure {
-            return (nearest, is_behind(triangles, &nearest, p_B));
-        }
-        match self.shut_off_by(triangles, &nearest, p_B) {
-            Some(first) => (first, true),
-            None => (nearest, false),
-        }
+        (self.nearest(triangles, p_B), self.is_inside(triangles, p_B))
+    }
+
+    /// For each way along an axis, either direction, where it comes out of all parts; and where it leaves a part first of all,
+    /// without having entered another one. The point must be inside.
+    pub fn ways_along_axes(&self, triangles: Triangles<'_>, p_B: &Vector3<f64>) -> [[Option<Nearest>; 2]; 6] {
+        self.rays(p_B).map(|ray| {
+            let mut crossings = Crossings::default();
+            let all =
+                self.for_each_crossing(triangles, &ray, MOST_VISITS, |crossing| crossings.add(crossing));
+            match all {
+                Ok(()) if !crossings.is_full() => {
+                    [crossings.exit(BEYOND * self.extent_m()), crossings.first_left()]
+                        .map(|found| found.map(|at| ray.place(&at)))
+                }
+                _ => [None; 2],
+            }
+        })
     }
 
     /// Whether a point is in the box around all faces, as what is inside must be.
@@ -53,34 +75,83 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
         (0..3).all(|axis| p_B[axis] >= self.lower_B[axis] && p_B[axis] <= self.upper_B[axis])
     }
 
-    /// What the way through the middle of the nearest face found meets first, if it is met from behind: that face, or
-    /// one on the way there.
-    fn shut_off_by(
-        &self,
-        triangles: Triangles<'_>,
-        nearest: &Nearest,
-        p_B: &Vector3<f64>,
-    ) -> Option<Nearest> {
-        let [a, b, c] = triangles.corners(&triangles.faces[nearest.face as usize]);
-        let beyond_B = p_B + ((a + b + c) / 3.0 - p_B) * BEYOND;
-        let first = self
-            .first_hit_of_visited(triangles, Sides::Sheet, p_B, &beyond_B, |_| false, MOST_VISITS)
-            .ok()??;
-        if first.is_front {
-            return None;
-        }
-        if first.face == nearest.face {
-            return Some(*nearest);
-        }
-        let (face, point_B) = (first.face, first.point_B);
-        let distance_m = (point_B - p_B).norm();
-        Some(Nearest { face, feature: Feature::Face, corner: 0, point_B, distance_m })
+    /// Whether the nearest point of the surface is seen from behind, and nothing is inside just beyond it.
+    fn leads_outside(&self, triangles: Triangles<'_>, nearest: &Nearest, p_B: &Vector3<f64>) -> bool {
+        let normal_B = normal_at(triangles, nearest);
+        let Some(normal_B) = normal_B.try_normalize(CANCELLED) else { return false };
+        let is_behind = match nearest.feature {
+            Feature::Edge | Feature::Vertex => normal_B.dot(&(p_B - nearest.point_B)) <= 0.0,
+            _ => true,
+        };
+        let beyond_B = nearest.point_B + normal_B * (BEYOND * self.extent_m());
+        let number = || self.winding_number(triangles, &beyond_B, MOST_VISITS);
+        is_behind && number().is_some_and(|number| number <= 0)
     }
 }
 
-fn is_behind(triangles: Triangles<'_>, nearest: &Nearest, p_B: &Vector3<f64>) -> bool {
+impl Ray {
+    fn place(&self, crossing: &Crossing) -> Nearest {
+        let Crossing { face, ahead_m, .. } = *crossing;
+        Nearest { face, feature: Feature::Face, corner: 0, point_B: self.at(ahead_m), distance_m: ahead_m }
+    }
+}
+
+/// What a ray crosses, up to a bound.
+struct Crossings {
+    all: [Crossing; MOST_CROSSINGS],
+    count: usize,
+}
+
+impl Default for Crossings {
+    fn default() -> Self {
+        let none = Crossing { face: 0, ahead_m: f64::INFINITY, is_leaving: false };
+        Self { all: [none; MOST_CROSSINGS], count: 0 }
+    }
+}
+
+impl Crossings {
+    /// Keeps them in order; of equally far ones those that enter come first, so that what touches hangs together.
+    fn add(&mut self, crossing: Crossing) {
+        if self.is_full() {
+            return;
+        }
+        let key = |of: &Crossing| (of.ahead_m, of.is_leaving);
+        let mut at = self.count;
+        while at > 0 && key(&self.all[at - 1]) > key(&crossing) {
+            self.all[at] = self.all[at - 1];
+            at -= 1;
+        }
+        self.all[at] = crossing;
+        self.count += 1;
+    }
+
+    /// The last place is kept free: one more would not be seen.
+    fn is_full(&self) -> bool {
+        self.count == MOST_CROSSINGS
+    }
+
+    /// Behind which the winding number is not positive any more, for more than `thin_m`: where faces lie upon each other,
+    /// nothing is between them.
+    fn exit(&self, thin_m: f64) -> Option<Crossing> {
+        let all = &self.all[..self.count];
+        let change = |crossing: &Crossing| if crossing.is_leaving { 1 } else { -1 };
+        let mut number: i32 = all.iter().map(change).sum();
+        (0..all.len()).find_map(|i| {
+            number -= change(&all[i]);
+            let has_room = all.get(i + 1).is_none_or(|next| next.ahead_m - all[i].ahead_m > thin_m);
+            (number <= 0 && all[i].is_leaving && has_room).then_some(all[i])
+        })
+    }
+
+    fn first_left(&self) -> Option<Crossing> {
+        self.all[..self.count].first().copied().filter(|first| first.is_leaving)
+    }
+}
+
+/// Out of the surface, not of unit length.
+fn normal_at(triangles: Triangles<'_>, nearest: &Nearest) -> Vector3<f64> {
     let face = &triangles.faces[nearest.face as usize];
-    let normal_B = match nearest.feature {
+    match nearest.feature {
         Feature::Edge => {
             let link = face.links[nearest.corner];
             if link.is_boundary() {
@@ -90,12 +161,11 @@ fn is_behind(triangles: Triangles<'_>, nearest: &Nearest, p_B: &Vector3<f64>) ->
             }
         }
         Feature::Vertex => normal_at_vertex(triangles, nearest.face, nearest.corner),
-        _ => return face.normal_B.dot(p_B) - face.offset_m <= 0.0,
-    };
-    normal_B.dot(&(p_B - nearest.point_B)) <= 0.0
+        _ => face.normal_B,
+    }
 }
 
-/// Sum of the normals around a vertex, weighted by the angle of each face there; not of unit length.
+/// Sum of the normals around a vertex, weighted by the angle of each face there.
 fn normal_at_vertex(triangles: Triangles<'_>, first: u32, corner: usize) -> Vector3<f64> {
     let (mut face, mut corner) = (first, corner);
     let mut sum = Vector3::zeros();
@@ -117,8 +187,13 @@ fn normal_at_vertex(triangles: Triangles<'_>, first: u32, corner: usize) -> Vect
     sum
 }
 
-/// So far beyond the middle of a face does a way end that is sure to meet it.
-const BEYOND: f64 = 1.001;
+/// Most faces that a ray along an axis is followed through.
+const MOST_CROSSINGS: usize = 64;
+/// So far beyond the surface, relative to the mesh, it is asked whether that is outside: a thousand times the rounding of
+/// coordinates and planes, and nothing that a finger could feel.
+const BEYOND: f64 = 1e-12;
+/// Sums of normals shorter than this are rounding.
+const CANCELLED: f64 = 1e-9;
 
 #[cfg(test)]
 mod tests {

@@ -37,7 +37,8 @@ pub struct Hit {
 }
 
 impl<const WIDTH: usize> Bvh<WIDTH> {
-    /// The first face that the segment `from_B -> to_B` enters; a sheet is entered from either side.
+    /// The first face that the segment `from_B -> to_B` enters; faces of a sheet are entered from either side, and so
+    /// are all if `sides` says so.
     ///
     /// None if it is not finite, has no length, or is so long that its rounding hides the mesh (1e12 of its sizes).
     pub fn first_hit(
@@ -59,48 +60,17 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
         to_B: &Vector3<f64>,
         is_skipped: impl Fn(u32) -> bool,
     ) -> Option<Hit> {
-        let segment = Segment::new(from_B, to_B, sides, self.extent_m());
-        self.first_of(triangles, &segment, is_skipped, usize::MAX).unwrap_or(None)
-    }
-
-    /// As [`Self::first_hit_of_others`]; an error if it is not known when so many nodes and runs of faces have been
-    /// visited.
-    pub(super) fn first_hit_of_visited(
-        &self,
-        triangles: Triangles<'_>,
-        sides: Sides,
-        from_B: &Vector3<f64>,
-        to_B: &Vector3<f64>,
-        is_skipped: impl Fn(u32) -> bool,
-        most_visits: usize,
-    ) -> Result<Option<Hit>, TooManyVisits> {
-        let segment = Segment::new(from_B, to_B, sides, self.extent_m());
-        self.first_of(triangles, &segment, is_skipped, most_visits)
-    }
-
-    #[inline(always)]
-    fn first_of(
-        &self,
-        triangles: Triangles<'_>,
-        segment: &Segment,
-        is_skipped: impl Fn(u32) -> bool,
-        most_visits: usize,
-    ) -> Result<Option<Hit>, TooManyVisits> {
-        let Some(clipped) = Clipped::new(segment, &self.lower_B, &self.upper_B) else { return Ok(None) };
+        let segment = &Segment::new(from_B, to_B, sides, self.extent_m());
+        let clipped = Clipped::new(segment, &self.lower_B, &self.upper_B)?;
         let line = Line::new(segment.path, clipped.end);
         let slabs = Slabs::new(&clipped);
         let mut best: Option<Met> = None;
         let mut limit = 1.0;
-        let mut visits = 0;
         let mut stack = Stack::<f32>::new();
         while let Some((entered, child)) = stack.pop() {
             if entered > limit {
                 continue;
             }
-            if visits == most_visits {
-                return Err(TooManyVisits);
-            }
-            visits += 1;
             if child.count() == 0 {
                 let node = &self.nodes[child.index()];
                 stack.push(&slabs.entries(node, limit), &node.children, limit);
@@ -119,13 +89,9 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
                 }
             }
         }
-        Ok(best.map(|met| segment.hit(triangles, met)))
+        best.map(|met| segment.hit(triangles, met))
     }
 }
-
-/// A query met its bound.
-#[derive(Debug)]
-pub(super) struct TooManyVisits;
 
 /// The segment and what its distances from planes are compared with.
 struct Segment {
@@ -154,7 +120,7 @@ impl Segment {
         let (mut before, mut after) =
             (face.normal_B.dot(&self.from) - face.offset_m, face.normal_B.dot(&self.to) - face.offset_m);
         let is_front = after < before;
-        if !is_front && self.sides == Sides::Sheet {
+        if !is_front && (self.sides == Sides::Sheet || face.sides == Sides::Sheet) {
             (before, after) = (-before, -after);
         }
         if !(before >= -self.tolerance_m && after < before && after <= self.tolerance_m) {

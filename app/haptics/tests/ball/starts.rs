@@ -1,0 +1,82 @@
+//! Fingers that begin anywhere on ugly meshes: no force is larger than what the overlap and the hand's way explain.
+
+use std::slice::from_ref;
+use std::sync::Arc;
+
+use crate::common::meshes::{touchable, unit_vector};
+use crate::common::ugly;
+use crate::common::*;
+use crate::mesh_oracle::{closest, corners, winding_number};
+use haptics::Friction;
+use haptics::mesh::{Mesh, Sides};
+use nalgebra::Vector3;
+
+/// How far a finger would have to go at most to touch nothing \[m\]: by all faces, and the winding number beyond them.
+fn overlap_m(mesh: &Mesh, hip: &Vector3<f64>, radius_m: f64) -> f64 {
+    let feet = (0..mesh.faces().len()).map(|face| closest(&corners(mesh, face), hip));
+    let mut ways: Vec<Vector3<f64>> = feet.map(|foot| foot - hip).collect();
+    ways.sort_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()));
+    let is_inside = |p: &Vector3<f64>| mesh.sides() == Sides::Solid && winding_number(mesh, p) > 0.5;
+    if !is_inside(hip) {
+        return (radius_m - ways[0].norm()).max(0.0);
+    }
+    let beyond = |way: &&Vector3<f64>| !is_inside(&(hip + *way * (1.0 + 1e-9) + way.normalize() * 1e-9));
+    ways.iter().find(beyond).map_or(f64::INFINITY, Vector3::norm) + radius_m
+}
+
+/// A point near a face, most faces being small.
+fn near_a_face(mesh: &Mesh, noise: &mut Noise, within_m: f64) -> Vector3<f64> {
+    let face = (noise.uniform() * mesh.faces().len() as f64) as usize;
+    let [a, b, c] = corners(mesh, face);
+    let (u, v) = (noise.uniform().sqrt(), noise.uniform());
+    a * (1.0 - u) + b * (u * (1.0 - v)) + c * (u * v) + unit_vector(noise) * (within_m * noise.uniform())
+}
+
+/// Starts all over a mesh, and a few steps of the hand after each.
+fn begin_all_over(name: &str, mesh: &Arc<Mesh>, friction: Friction, radius_m: f64, starts: usize, seed: u64) {
+    let entity = touchable(mesh, friction);
+    let mut noise = Noise(seed);
+    for start in 0..starts {
+        let mut hip = near_a_face(mesh, &mut noise, 0.8e-3);
+        let overlap_m = overlap_m(mesh, &hip, radius_m);
+        let mut finger = finger(radius_m);
+        let mut way_m = 0.0;
+        for tick in 0..12 {
+            let force_n = finger.step(from_ref(&entity), &hip, DT).force_on_user_W.norm();
+            let most_n = K * (overlap_m + way_m);
+            // What a ball takes for touching, many times over.
+            assert!(
+                force_n <= most_n * (1.0 + 1e-9) + 1e-6,
+                "{name}, {radius_m} m, start {start}, tick {tick} at {hip:?}: {force_n} N, explained {most_n} N"
+            );
+            let step = unit_vector(&mut noise) * (2e-4 * noise.uniform());
+            way_m += step.norm();
+            hip += step;
+        }
+    }
+}
+
+fn begin_on_ugly_meshes(seeds: std::ops::Range<u64>, starts: usize) {
+    for seed in seeds {
+        for (name, soup) in ugly::all(seed) {
+            let mesh = Arc::new(Mesh::build(soup).unwrap().0);
+            for friction in [Friction::None, stiction()] {
+                for radius_m in [2e-4, 1e-3, 5e-3, 0.02] {
+                    begin_all_over(name, &mesh, friction.clone(), radius_m, starts, seed);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn no_ball_that_begins_overlapping_is_flung() {
+    begin_on_ugly_meshes(1..3, 40);
+}
+
+/// A million starts; `cargo test --release -p haptics --test ball -- --ignored begins` takes half an hour.
+#[test]
+#[ignore = "half an hour"]
+fn no_ball_that_begins_anywhere_of_a_million_is_flung() {
+    begin_on_ugly_meshes(3..40, 500);
+}

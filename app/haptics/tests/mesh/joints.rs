@@ -1,0 +1,235 @@
+//! Meshes as people make them: walls and fins on edges, skins upon each other, T-junctions, holes. What is solid stays solid.
+
+use crate::common::flawed::*;
+use crate::common::meshes::*;
+use crate::common::*;
+use crate::mesh_oracle::winding_number;
+use haptics::Friction;
+use haptics::mesh::{CloseHoles, Mesh, MeshReport, Sides, TriangleSoup, make};
+use nalgebra::Vector3;
+
+fn point(x: f64, y: f64, z: f64) -> Vector3<f64> {
+    Vector3::new(x, y, z)
+}
+
+fn build(soup: TriangleSoup) -> (Mesh, MeshReport) {
+    Mesh::build(soup).unwrap()
+}
+
+fn faces_of(mesh: &Mesh, sides: Sides) -> usize {
+    mesh.faces().iter().filter(|face| face.sides == sides).count()
+}
+
+/// A cube of 1 m, a quad beside or within it on some of its edges: four more points and the quads' corners.
+fn cube_and(points: &[Vector3<f64>], quads: &[[u32; 4]]) -> TriangleSoup {
+    let mut soup = make::cuboid([1.0; 3]);
+    soup.vertices.extend(points);
+    soup.faces.extend(quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]));
+    soup
+}
+
+/// The number of the cube's corner.
+fn corner(x: f64, y: f64, z: f64) -> u32 {
+    let cube = make::cuboid([1.0; 3]);
+    cube.vertices.iter().position(|v| *v == point(x, y, z)).unwrap() as u32
+}
+
+#[test]
+fn a_solid_with_a_fin_on_an_edge_stays_solid_and_the_fin_is_a_sheet() {
+    let [a, b] = [corner(0.5, 0.5, 0.5), corner(0.5, 0.5, -0.5)];
+    let fin = [point(1.0, 1.0, -0.5), point(1.0, 1.0, 0.5)];
+    for quad in [[a, b, 8, 9], [9, 8, b, a]] {
+        let (mesh, report) = build(cube_and(&fin, &[quad]));
+        assert_eq!((faces_of(&mesh, Sides::Solid), faces_of(&mesh, Sides::Sheet)), (12, 2));
+        assert_eq!((report.crowded_edges.count, report.boundary_edges.count), (1, 4));
+        assert_eq!((mesh.sides(), mesh.has_inside()), (Sides::Sheet, true));
+        assert!(mesh.is_inside(&point(0.1, 0.2, 0.3)) && !mesh.is_inside(&point(0.7, 0.71, 0.3)));
+        // The fin is felt from either side, the cube from outside.
+        let beside = |from: Vector3<f64>, to: Vector3<f64>| mesh.first_hit(&from, &to).is_some();
+        assert!(beside(point(0.9, 0.7, 0.0), point(0.7, 0.9, 0.0)));
+        assert!(beside(point(0.7, 0.9, 0.0), point(0.9, 0.7, 0.0)));
+        assert!(beside(point(0.6, 0.1, 0.0), point(0.4, 0.1, 0.0)));
+        assert!(!beside(point(0.4, 0.1, 0.0), point(0.6, 0.1, 0.0)));
+    }
+}
+
+#[test]
+fn two_rooms_with_a_wall_between_are_one_solid() {
+    let mut soup = make::cuboid([1.0; 3]);
+    let other = moved(soup.clone(), [1.0, 0.0, 0.0]);
+    soup = together([soup, other]);
+    // The wall that both share comes once: the triangles of the second one are left out as given before, or cut otherwise.
+    let is_wall = |face: &[u32; 3]| face.iter().all(|&v| soup.vertices[v as usize].x == 0.5);
+    let second: Vec<usize> = (12..24).filter(|&i| is_wall(&soup.faces[i])).collect();
+    let mut once = soup.clone();
+    once.faces = (0..24).filter(|i| !second.contains(i)).map(|i| soup.faces[i]).collect();
+    for wound in [false, true] {
+        let mut soup = once.clone();
+        if wound {
+            let wall = soup.faces.iter().position(is_wall).unwrap();
+            soup.faces[wall].swap(0, 1);
+        }
+        let (mesh, report) = build(soup);
+        assert_eq!((faces_of(&mesh, Sides::Solid), faces_of(&mesh, Sides::Sheet)), (20, 2), "{report}");
+        assert!(mesh.is_inside(&point(0.1, 0.2, 0.3)) && mesh.is_inside(&point(1.1, 0.2, 0.3)));
+        assert!(!mesh.is_inside(&point(1.6, 0.2, 0.3)));
+    }
+}
+
+#[test]
+fn a_flange_around_a_solid_leaves_it_solid() {
+    let at = [[0.5, 0.5], [0.5, -0.5], [-0.5, -0.5], [-0.5, 0.5]];
+    let inner = at.map(|[x, z]| corner(x, 0.5, z));
+    let outer = at.map(|[x, z]| point(1.5 * x, 0.8, 1.5 * z));
+    let quads: Vec<_> =
+        (0..4).map(|i| [inner[i], inner[(i + 1) % 4], 8 + (i as u32 + 1) % 4, 8 + i as u32]).collect();
+    for turned in [false, true] {
+        let quads: Vec<_> =
+            quads.iter().map(|&[a, b, c, d]| if turned { [d, c, b, a] } else { [a, b, c, d] }).collect();
+        let (mesh, report) = build(cube_and(&outer, &quads));
+        assert_eq!((faces_of(&mesh, Sides::Solid), faces_of(&mesh, Sides::Sheet)), (12, 8), "{report}");
+        assert_eq!(report.crowded_edges.count, 4);
+        assert!(mesh.is_inside(&point(0.1, 0.2, 0.3)));
+    }
+}
+
+#[test]
+fn a_skin_that_lies_on_a_solid_with_other_diagonals_does_no_harm() {
+    let cube = make::cuboid([1.0; 3]);
+    let mut soup = cube.clone();
+    // Each wall once more, cut along its other diagonal: all edges but the diagonals have four faces.
+    let wall = |face: &[u32; 3]| {
+        let [a, b, c] = face.map(|v| cube.vertices[v as usize]);
+        (b - a).cross(&(c - a))
+    };
+    for (i, one) in cube.faces.iter().enumerate() {
+        let other = cube.faces[i + 1..].iter().find(|other| wall(other) == wall(one));
+        let Some(other) = other else { continue };
+        let alone = |of: &[u32; 3], not: &[u32; 3]| of.iter().position(|v| !not.contains(v)).unwrap();
+        let (i, j) = (alone(one, other), alone(other, one));
+        let (a, b, c, d) = (one[i], one[(i + 1) % 3], other[j], one[(i + 2) % 3]);
+        soup.faces.extend([[a, b, c], [a, c, d]]);
+    }
+    let (mesh, report) = build(soup);
+    assert_eq!(faces_of(&mesh, Sides::Solid), 24, "{report}");
+    for p in [point(0.1, 0.2, 0.3), point(0.4, -0.45, 0.3), point(0.6, 0.1, 0.1), point(0.1, -0.55, 0.0)] {
+        assert_eq!(mesh.is_inside(&p), winding_number(&mesh, &p) > 0.5);
+        assert_eq!(mesh.is_inside(&p), p.amax() < 0.5);
+    }
+}
+
+/// Three sheets meet at an edge, as in a carton: whatever way each is wound, each is felt from both sides.
+#[test]
+fn sheets_that_meet_at_an_edge_are_felt_from_both_sides() {
+    let flat = |angle: f64, z: f64| point(angle.cos(), angle.sin(), z) * 0.1;
+    let angles = [0.2, 2.0, 4.4];
+    let mut vertices = vec![point(0.0, 0.0, -0.1), point(0.0, 0.0, 0.1)];
+    vertices.extend(angles.iter().flat_map(|&angle| [flat(angle, -1.0), flat(angle, 1.0)]));
+    for wound in 0..8_u32 {
+        let sheet = |i: u32| {
+            let [a, b, c, d] = [0, 1, 3 + 2 * i, 2 + 2 * i];
+            let [a, b, c, d] = if wound >> i & 1 == 1 { [d, c, b, a] } else { [a, b, c, d] };
+            [[a, b, c], [a, c, d]]
+        };
+        let faces = (0..3).flat_map(sheet).collect();
+        let (mesh, report) = build(TriangleSoup { vertices: vertices.clone(), faces });
+        // The outer ends and sides, and at the edge the one that was left.
+        assert_eq!((report.faces, report.crowded_edges.count, report.boundary_edges.count), (6, 1, 10));
+        let entity = touchable(&std::sync::Arc::new(mesh), Friction::None);
+        for (angle, side) in angles.iter().flat_map(|&angle| [(angle, 1.0), (angle, -1.0)]) {
+            let mut finger = point_finger();
+            let normal = point(-angle.sin(), angle.cos(), 0.0) * side;
+            let at = |height: f64| flat(angle, 0.0) * 0.5 + normal * height;
+            step(&mut finger, &entity, &at(0.01));
+            let out = step(&mut finger, &entity, &at(-0.002));
+            assert!((out.force_on_user_W - normal * (K * 0.002)).norm() < 1e-12, "{wound} {angle} {out:?}");
+        }
+    }
+}
+
+#[test]
+fn a_face_with_corners_of_others_on_its_edge_is_divided_there() {
+    // A cube whose top has one more point on each of two edges, which the walls below do not know.
+    for off in [0.0, 2e-7] {
+        let cube = make::cuboid([1.0; 3]);
+        let is_top = |face: &[u32; 3]| face.iter().all(|&v| cube.vertices[v as usize].y == 0.5);
+        let mut soup = cube.clone();
+        soup.faces.retain(|face| !is_top(face));
+        let outline = [
+            point(0.5, 0.5, 0.5),
+            point(0.5, 0.5 + off, 0.2),
+            point(0.5, 0.5, -0.1),
+            point(0.5, 0.5, -0.5),
+            point(-0.5, 0.5, -0.5),
+            point(-0.5, 0.5, off),
+            point(-0.5, 0.5, 0.5),
+        ];
+        let first = soup.vertices.len() as u32;
+        soup.vertices.extend(outline);
+        soup.vertices.push(point(0.0, 0.5, 0.0));
+        soup.faces.extend((0..7).map(|i| [first + 7, first + i, first + (i + 1) % 7]));
+        let (mesh, report) = build(soup);
+        assert_eq!((report.divided.count, report.boundary_edges.count), (2, 0), "{report}");
+        assert_eq!((mesh.sides(), mesh.faces().len()), (Sides::Solid, 10 + 7 + 3));
+    }
+}
+
+/// A ball without some of its faces.
+fn pierced_ball(pierced: &[usize]) -> TriangleSoup {
+    let mut soup = icosphere(4, 0.1);
+    soup.faces = (0..soup.faces.len()).filter(|i| !pierced.contains(i)).map(|i| soup.faces[i]).collect();
+    soup
+}
+
+#[test]
+fn small_holes_of_what_is_nearly_closed_are_closed_and_a_cup_stays_open() {
+    let (mesh, report) = build(pierced_ball(&[17, 18, 2000, 3001]));
+    assert_eq!((mesh.sides(), report.boundary_edges.count), (Sides::Solid, 0), "{report}");
+    assert!((3..=4).contains(&report.closed_holes.count), "{report}");
+    let mut noise = Noise(2);
+    for _ in 0..2000 {
+        let p = noise.vector(0.07);
+        assert_eq!(mesh.is_inside(&p), winding_number(&mesh, &p) > 0.5, "{p:?}");
+    }
+    // On demand they stay open.
+    let (mesh, report) =
+        Mesh::build_closing(pierced_ball(&[17, 18, 2000, 3001]), CloseHoles::UpTo(0.0)).unwrap();
+    assert_eq!((mesh.sides(), report.closed_holes.count), (Sides::Sheet, 0));
+    assert!(report.boundary_edges.count >= 10);
+    // A cup: a ball without its top. It is closed only for who says how large its mouth is.
+    let mut cup = icosphere(3, 0.1);
+    let is_below = |face: &[u32; 3]| face.iter().all(|&v| cup.vertices[v as usize].y < 0.08);
+    cup.faces = cup.faces.iter().copied().filter(is_below).collect();
+    let (mesh, report) = build(cup.clone());
+    assert_eq!((mesh.sides(), mesh.has_inside(), report.closed_holes.count), (Sides::Sheet, false, 0));
+    assert!(report.to_string().contains("1 part not closed: felt from both sides"), "{report}");
+    for (size_m, is_solid) in [(0.1, false), (0.2, true)] {
+        let (mesh, report) = Mesh::build_closing(cup.clone(), CloseHoles::UpTo(size_m)).unwrap();
+        assert_eq!(mesh.sides() == Sides::Solid, is_solid, "{report}");
+    }
+}
+
+/// One open part among closed ones made sheets of all, and of fingers that were let go inside of one nothing was known.
+#[test]
+fn an_open_part_beside_solids_that_overlap_leaves_them_solid() {
+    let mut cup = icosphere(2, 0.02);
+    let is_below = |face: &[u32; 3]| face.iter().all(|&v| cup.vertices[v as usize].y < 0.01);
+    cup.faces = cup.faces.iter().copied().filter(is_below).collect();
+    let balls =
+        [[0.0, 0.0, 0.0], [0.04, 0.01, 0.02], [-0.01, 0.05, 0.01]].map(|at| moved(icosphere(2, 0.05), at));
+    let (mesh, _) = build(together(balls.into_iter().chain([moved(cup, [0.2, 0.0, 0.0])])));
+    assert_eq!((mesh.sides(), mesh.has_inside()), (Sides::Sheet, true));
+    let mesh = std::sync::Arc::new(mesh);
+    let entity = touchable(&mesh, Friction::None);
+    let (mut finger, mut roaming) = (point_finger(), Roaming::new(9, 0.09, 5e-4));
+    let mut inside = 0;
+    for tick in 0..30_000 {
+        let hip = roaming.next();
+        let out = step(&mut finger, &entity, &hip);
+        if mesh.is_inside(&hip) {
+            inside += 1;
+            assert!(out.entity.is_some(), "lost in tick {tick} at {hip:?}");
+        }
+    }
+    assert!(inside > 2000, "{inside}");
+}
