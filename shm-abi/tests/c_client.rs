@@ -4,7 +4,8 @@ mod common;
 
 use bytemuck::Zeroable;
 use common::fake::{fake_server, hear, send};
-use common::{HANG, frame, info, wait_until};
+use common::{frame, info, wait_until};
+use patience::limit;
 use patience::prelude::*;
 use shm_abi::handshake::{Answer, Verdict};
 use shm_abi::server::{Server, ServerEvent};
@@ -135,7 +136,7 @@ fn a_c_commander_answers_every_tick_under_its_lease() {
         wait_until("the answer is there", || {
             let newest = view.latest_tick();
             if newest != Some(tick) {
-                view.sleep_for_command(newest, &driver.memory, HANG);
+                view.sleep_for_command(newest, &driver.memory, limit());
             }
             newest == Some(tick)
         });

@@ -7,7 +7,8 @@
 mod common;
 
 use bytemuck::Zeroable;
-use common::{HANG, command, frame, info, info_of, is_command, is_frame, is_frame_of, wait_until};
+use common::{command, frame, info, info_of, is_command, is_frame, is_frame_of, wait_until};
+use patience::limit;
 use patience::prelude::*;
 use proptest::prelude::*;
 use shm_abi::doorbell::{self, Place};
@@ -182,8 +183,8 @@ fn sleep_until(expected: u64, newest: impl Fn() -> Option<u64>, sleep: impl Fn(O
         if seen == Some(expected) {
             return;
         }
-        sleep(seen, HANG);
-        assert!(start.elapsed() < HANG, "slept through the announcement of {expected}");
+        sleep(seen, limit());
+        assert!(start.elapsed() < limit(), "slept through the announcement of {expected}");
     }
 }
 
@@ -373,8 +374,8 @@ fn a_sleeper_that_has_not_seen_the_newest_frame_does_not_sleep() {
     memory.write_frame(&frame(0));
     memory.ring(0, None);
     let start = Instant::now();
-    view.sleep_for_frame(None, &commander, HANG);
-    assert!(start.elapsed() < HANG, "slept though frame 0 was there");
+    view.sleep_for_frame(None, &commander, limit());
+    assert!(start.elapsed() < limit(), "slept though frame 0 was there");
     assert_eq!(commander.bell.owner_sleeps.load(Ordering::Relaxed), 0, "the flag comes down again");
 }
 

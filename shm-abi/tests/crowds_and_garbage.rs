@@ -5,7 +5,8 @@ mod common;
 use common::desk::{Desk, SHORT, is_closed, verdict};
 use common::fake::fake_server;
 use common::host::Host;
-use common::{HANG, directory, wait_until};
+use common::{directory, wait_until};
+use patience::limit;
 use patience::prelude::*;
 use shm_abi::client::{self, AttachError};
 use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
@@ -41,10 +42,10 @@ fn the_oldest_of_too_many_silent_connections_gives_its_place_to_the_newcomer() {
     // Whoever has said what he wants when he is let in needs no place at all.
     let mut prompt = UnixStream::connect(desk.server.path()).unwrap();
     prompt.write_all(bytemuck::bytes_of(&Request::new(RequestKind::EmergencyStop, "prompt"))).unwrap();
-    desk.poll(HANG);
+    desk.poll(limit());
     assert_eq!(verdict(&mut prompt), Some(Verdict::Granted));
     newcomer.write_all(bytemuck::bytes_of(&Request::new(RequestKind::Observe, "raw"))).unwrap();
-    desk.poll(HANG);
+    desk.poll(limit());
     assert_eq!(verdict(&mut newcomer), Some(Verdict::Granted));
     assert_eq!(desk.events.len(), 1, "{:?}", desk.events);
 }
@@ -132,9 +133,9 @@ fn half_a_request_followed_by_the_end_is_forgotten() {
     let mut desk = Desk::open();
     let mut stream = desk.connect();
     stream.write_all(&bytemuck::bytes_of(&Request::new(RequestKind::Command, "half"))[..64]).unwrap();
-    desk.poll(HANG);
+    desk.poll(limit());
     drop(stream);
-    desk.poll(HANG);
+    desk.poll(limit());
     assert!(desk.events.is_empty());
     desk.granted(RequestKind::Command);
 }
@@ -144,7 +145,7 @@ fn garbage_is_answered_and_hung_up_on() {
     let mut desk = Desk::open();
     let mut stream = desk.connect();
     stream.write_all(&[b'G'; size_of::<Request>()]).unwrap();
-    desk.poll(HANG);
+    desk.poll(limit());
     assert_eq!(verdict(&mut stream), Some(Verdict::WrongMagic));
     desk.poll(SHORT);
     assert!(is_closed(&mut stream));
@@ -169,7 +170,7 @@ fn no_bytes_but_a_true_request_are_ever_granted() {
         .run(&(bytes, 1usize..200), |(bytes, piece)| {
             let mut desk = desk.borrow_mut();
             let mut stream = UnixStream::connect(desk.server.path()).unwrap();
-            desk.poll(HANG);
+            desk.poll(limit());
             for piece in bytes.chunks(piece) {
                 // The server may have hung up already.
                 let _ = stream.write_all(piece);

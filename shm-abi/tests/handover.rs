@@ -6,7 +6,8 @@ use bytemuck::Zeroable;
 use common::desk::{Desk, SHORT, is_closed, verdict};
 use common::fake::{receive, try_send};
 use common::host::Host;
-use common::{HANG, command, directory, frame, info, is_frame, own_pid, wait_until};
+use common::{command, directory, frame, info, is_frame, own_pid, wait_until};
+use patience::limit;
 use shm_abi::client;
 use shm_abi::handshake::{Request, RequestKind, Verdict};
 use shm_abi::server::{Recipient, ServerEvent};
@@ -104,7 +105,7 @@ fn a_successor_is_not_told_that_the_dead_holder_commands() {
     let holder = desk.granted(RequestKind::Command);
     drop(holder);
     successor.write_all(bytemuck::bytes_of(&Request::new(RequestKind::Command, "heir"))).unwrap();
-    desk.poll(HANG);
+    desk.poll(limit());
     assert_eq!(verdict(&mut successor), Some(Verdict::Granted));
     assert!(matches!(
         desk.events[..],
@@ -120,7 +121,7 @@ fn a_client_that_says_more_than_its_request_is_hung_up_on() {
     let mut desk = Desk::open();
     let mut stream = desk.granted(RequestKind::Command);
     stream.write_all(b"and another thing").unwrap();
-    desk.poll(HANG);
+    desk.poll(limit());
     assert!(is_closed(&mut stream));
     assert!(matches!(
         desk.events[..],
@@ -136,7 +137,7 @@ fn a_connection_that_holds_itself_alive_does_not_hold_the_lease() {
     // this connection. Where the kernel refuses that, it ends as any other.
     let _ = try_send(&stream, b"x", &[stream.as_fd()]);
     drop(stream);
-    desk.poll(HANG);
+    desk.poll(limit());
     assert!(matches!(desk.events.last(), Some(ServerEvent::LeaseEnded { lease: 1 })), "{:?}", desk.events);
 }
 
@@ -150,18 +151,18 @@ fn a_lease_is_in_force_once_its_memory_is_mapped_and_not_before() {
     assert!(desk.events.is_empty(), "{:?}", desk.events);
     let mut rival = desk.connect();
     rival.write_all(bytemuck::bytes_of(&Request::new(RequestKind::Command, "rival"))).unwrap();
-    desk.poll(HANG);
+    desk.poll(limit());
     assert_eq!(verdict(&mut rival), Some(Verdict::LeaseHeld), "it is taken all the same");
     assert!(matches!(desk.events.pop(), Some(ServerEvent::LeaseRefused)));
     let commander = CommanderMemory::map(offered.unwrap().as_fd()).unwrap();
     wait_until("it is in force", || {
-        desk.poll(HANG);
+        desk.poll(limit());
         !desk.events.is_empty()
     });
     let Some(ServerEvent::LeaseGranted { view, .. }) = desk.events.pop() else { panic!("no lease") };
     assert_eq!(view.lease(), commander.lease());
     drop(stream);
-    desk.poll(HANG);
+    desk.poll(limit());
     assert!(matches!(desk.events[..], [ServerEvent::LeaseEnded { lease: 1 }]), "{:?}", desk.events);
 }
 
@@ -185,7 +186,7 @@ fn a_commander_that_seals_its_memory_is_hung_up_on_and_the_next_one_commands() {
     rustix::fs::fcntl_add_seals(&offered, rustix::fs::SealFlags::SEAL).unwrap();
     let _mapped = CommanderMemory::map(offered.as_fd()).unwrap();
     wait_until("it is found out", || {
-        desk.poll(HANG);
+        desk.poll(limit());
         !desk.events.is_empty()
     });
     let Some(ServerEvent::Trouble { message }) = desk.events.pop() else { panic!("no trouble") };
@@ -202,7 +203,7 @@ fn the_lease_of_somebody_who_does_nothing_any_more_ends_on_request() {
     desk.events.clear();
     let mut asker = desk.connect();
     asker.write_all(bytemuck::bytes_of(&Request::new(RequestKind::EndLease, "raw"))).unwrap();
-    desk.poll(HANG);
+    desk.poll(limit());
     assert_eq!(verdict(&mut asker), Some(Verdict::Granted));
     assert!(matches!(desk.events[..], [ServerEvent::LeaseEnded { lease: 1 }]), "{:?}", desk.events);
     assert!(is_closed(&mut holder));
@@ -223,7 +224,7 @@ fn a_request_that_the_loop_does_not_take_is_refused_instead_of_waited_for() {
     let mut desk = Desk::open();
     let mut stream = desk.connect();
     stream.write_all(bytemuck::bytes_of(&Request::new(RequestKind::Zero, "raw"))).unwrap();
-    desk.server.poll(&desk.memory, HANG, &mut Full).unwrap();
+    desk.server.poll(&desk.memory, limit(), &mut Full).unwrap();
     assert_eq!(verdict(&mut stream), Some(Verdict::Busy));
     assert!(is_closed(&mut stream));
     desk.granted(RequestKind::Command);

@@ -11,7 +11,8 @@ use common::c_header::{CHeader, current_version};
 use common::fake::{fake_server, hear, send};
 use common::golden::Golden;
 use common::host::Host;
-use common::{HANG, directory, info_of, own_pid, wait_until};
+use common::{directory, info_of, own_pid, wait_until};
+use patience::limit;
 use patience::prelude::*;
 use shm_abi::client::AttachError;
 use shm_abi::handshake::{Answer, Verdict};
@@ -187,7 +188,7 @@ fn assert_answer(view: &CommanderView, memory: &DriverMemory, frame: &Frame) {
     wait_until("the answer is there", || {
         let newest = view.latest_tick();
         if newest != Some(frame.tick) {
-            view.sleep_for_command(newest, memory, HANG);
+            view.sleep_for_command(newest, memory, limit());
         }
         newest == Some(frame.tick)
     });

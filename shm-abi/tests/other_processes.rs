@@ -6,7 +6,8 @@ mod common;
 use bytemuck::Zeroable;
 use common::fake::{hear, send};
 use common::host::Host;
-use common::{HANG, directory, frame, info, is_frame, wait_until};
+use common::{directory, frame, info, is_frame, wait_until};
+use patience::limit;
 use patience::prelude::*;
 use shm_abi::client;
 use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
@@ -40,12 +41,12 @@ fn body_of_another_process() {
         "driver" => {
             let _server = Server::bind(&socket).unwrap();
             println!("\nbound");
-            std::thread::sleep(HANG);
+            std::thread::sleep(limit());
         }
         "commander" => {
             let _attached = client::command(&socket, "doomed").unwrap();
             println!("\nattached");
-            std::thread::sleep(HANG);
+            std::thread::sleep(limit());
         }
         "observer" => match client::observe(&socket, "other") {
             Ok(_) => println!("\nattached"),
@@ -61,7 +62,7 @@ fn line(child: &mut std::process::Child, beginning: &str) -> String {
     use std::io::BufRead;
     let output = std::io::BufReader::new(child.stdout.as_mut().unwrap());
     let find = || output.lines().map(Result::unwrap).find(|line| line.starts_with(beginning));
-    let found = patience::watched(HANG, &format!("the other process says {beginning}"), find);
+    let found = patience::watched(limit(), &format!("the other process says {beginning}"), find);
     found.unwrap_or_else(|| panic!("the other process ended without saying {beginning}"))
 }
 
@@ -176,11 +177,11 @@ fn serve_without_descriptors(socket: &Path) {
     let mut events = Vec::new();
     // Beyond the numbers in use now there is room for a single one: the client's end.
     let next = std::os::fd::AsRawFd::as_raw_fd(&File::open("/dev/null").unwrap()) as u64;
-    let limit = |current| {
+    let limit_files = |current| {
         let maximum = rustix::process::getrlimit(Resource::Nofile).maximum;
         setrlimit(Resource::Nofile, Rlimit { current: Some(current), maximum }).unwrap();
     };
-    limit(next + 1);
+    limit_files(next + 1);
     let client = UnixStream::connect(socket).unwrap();
     let start = Instant::now();
     let mut polls = 0;
@@ -191,12 +192,12 @@ fn serve_without_descriptors(socket: &Path) {
     // Two polls each rest of 100 ms: one that fails to accept, one that sleeps. A spinning server makes
     // hundreds of thousands.
     assert!(polls < 50, "it spins: {polls} polls");
-    limit(next + 8);
+    limit_files(next + 8);
     drop(client);
     let mut newcomer = UnixStream::connect(socket).unwrap();
     newcomer.write_all(bytemuck::bytes_of(&Request::new(RequestKind::Stop, "late"))).unwrap();
     wait_until("the newcomer is served", || {
-        server.poll(&memory, HANG, &mut events).unwrap();
+        server.poll(&memory, limit(), &mut events).unwrap();
         !events.is_empty()
     });
     println!("\nserved after {polls} polls");

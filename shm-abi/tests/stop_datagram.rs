@@ -1,14 +1,11 @@
 //! The way to stop the motors that needs no connection.
 
+use patience::limit;
 use shm_abi::server::Server;
 use shm_abi::stop_socket::{self, StopSocket, path_beside};
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixDatagram;
 use std::sync::mpsc::{Receiver, channel};
-use std::time::Duration;
-
-/// Long enough for the most loaded machine; only a hang takes longer.
-const HANG: Duration = Duration::from_secs(60);
 
 /// A driver's place with a thread that hears stops; each is told with the user who sent it.
 fn listening() -> (tempfile::TempDir, Server, Receiver<Option<u32>>) {
@@ -33,11 +30,11 @@ fn whatever_is_sent_is_a_stop_and_the_kernel_tells_whose() {
     let (_directory, server, told) = listening();
     let own = Some(rustix::process::geteuid().as_raw());
     stop_socket::send(server.path()).unwrap();
-    assert_eq!(told.recv_timeout(HANG).unwrap(), own);
+    assert_eq!(told.recv_timeout(limit()).unwrap(), own);
     let stranger = UnixDatagram::unbound().unwrap();
     for words in [&b""[..], b"help", &[0; 4096]] {
         stranger.send_to(words, path_beside(server.path())).unwrap();
-        assert_eq!(told.recv_timeout(HANG).unwrap(), own);
+        assert_eq!(told.recv_timeout(limit()).unwrap(), own);
     }
 }
 
@@ -85,5 +82,5 @@ fn a_file_at_its_place_is_left_alone() {
 fn a_program_that_stops_a_driver_whose_service_is_stuck_is_heard() {
     let (_directory, server, told) = listening();
     shm_abi::client::emergency_stop(server.path(), "test").unwrap();
-    assert!(told.recv_timeout(HANG).is_ok());
+    assert!(told.recv_timeout(limit()).is_ok());
 }

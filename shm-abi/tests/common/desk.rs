@@ -1,8 +1,9 @@
 //! A server and its clients in one thread, and the plain sockets that talk to it.
 
 use super::fake::receive;
-use super::{HANG, directory, info, wait_until};
+use super::{directory, info, wait_until};
 use bytemuck::Zeroable;
+use patience::limit;
 use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
 use shm_abi::server::{Server, ServerEvent};
 use shm_abi::{CommanderMemory, DriverMemory};
@@ -42,7 +43,7 @@ impl Desk {
     /// Connects and lets the server accept.
     pub(crate) fn connect(&mut self) -> UnixStream {
         let stream = UnixStream::connect(self.server.path()).unwrap();
-        self.poll(HANG);
+        self.poll(limit());
         stream
     }
 
@@ -53,7 +54,7 @@ impl Desk {
             let before = self.events.len();
             CommanderMemory::map(fd.as_fd()).unwrap();
             wait_until("the lease is in force", || {
-                self.poll(HANG);
+                self.poll(limit());
                 self.events.len() > before
             });
         }
@@ -64,8 +65,8 @@ impl Desk {
     pub(crate) fn offered(&mut self, kind: RequestKind) -> (UnixStream, Option<OwnedFd>) {
         let mut stream = self.connect();
         stream.write_all(bytemuck::bytes_of(&Request::new(kind, "raw"))).unwrap();
-        self.poll(HANG);
-        stream.set_read_timeout(Some(HANG)).unwrap();
+        self.poll(limit());
+        stream.set_read_timeout(Some(limit())).unwrap();
         let (answer, fds) = receive(&stream);
         assert_eq!(Verdict::from_word(answer.verdict), Some(Verdict::Granted));
         (stream, fds.into_iter().nth(1))
@@ -74,7 +75,7 @@ impl Desk {
 
 /// The verdict of the answer that lies ready; `None` if the connection was closed without one.
 pub(crate) fn verdict(stream: &mut UnixStream) -> Option<Verdict> {
-    stream.set_read_timeout(Some(HANG)).unwrap();
+    stream.set_read_timeout(Some(limit())).unwrap();
     let mut answer = Answer::zeroed();
     stream.read_exact(bytemuck::bytes_of_mut(&mut answer)).ok()?;
     Verdict::from_word(answer.verdict)
@@ -82,7 +83,7 @@ pub(crate) fn verdict(stream: &mut UnixStream) -> Option<Verdict> {
 
 /// Whether the server has hung up; nothing else may lie ready.
 pub(crate) fn is_closed(stream: &mut UnixStream) -> bool {
-    stream.set_read_timeout(Some(HANG)).unwrap();
+    stream.set_read_timeout(Some(limit())).unwrap();
     // With something of ours unread on the other side, the end comes as a reset.
     match stream.read(&mut [0; 1]) {
         Ok(read) => read == 0,

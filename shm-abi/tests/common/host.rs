@@ -1,7 +1,8 @@
 //! A server that polls in the background, so that the blocking client can talk to it from the test.
 
-use super::{HANG, info};
+use super::info;
 use patience::BoundedThread;
+use patience::limit;
 use shm_abi::DriverMemory;
 use shm_abi::segment::DriverInfo;
 use shm_abi::server::{Server, ServerEvent};
@@ -45,7 +46,7 @@ impl Host {
     }
 
     pub(crate) fn event(&self) -> ServerEvent {
-        self.events.recv_timeout(HANG).expect("the server reports what happened")
+        self.events.recv_timeout(limit()).expect("the server reports what happened")
     }
 }
 

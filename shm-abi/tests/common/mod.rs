@@ -10,15 +10,13 @@ pub(crate) mod golden;
 pub(crate) mod host;
 
 use bytemuck::Zeroable;
+use patience::limit;
 use shm_abi::doorbell::WaitMode;
 use shm_abi::frame::DeviceFrame;
 use shm_abi::layout::{COMMAND_WORDS, FRAME_WORDS};
 use shm_abi::segment::{ClockMode, DeviceInfo, DriverInfo};
 use shm_abi::{Command, Frame};
-use std::time::{Duration, Instant};
-
-/// Long enough for the slowest machine; whoever waits longer hangs.
-pub(crate) const HANG: Duration = Duration::from_secs(60);
+use std::time::Instant;
 
 /// How many devices [`info`] has.
 pub(crate) const DEVICES: usize = 2;
@@ -117,11 +115,11 @@ pub(crate) fn own_pid() -> u64 {
     u64::from(std::process::id())
 }
 
-/// Calls `done` until it says so; panics after [`HANG`].
+/// Calls `done` until it says so; panics after [`limit`].
 pub(crate) fn wait_until(what: &str, mut done: impl FnMut() -> bool) {
     let start = Instant::now();
     while !done() {
-        assert!(start.elapsed() < HANG, "waited {HANG:?} in vain until {what}");
+        assert!(start.elapsed() < limit(), "waited {:?} in vain until {what}", limit());
         std::thread::yield_now();
     }
 }
