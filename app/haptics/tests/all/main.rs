@@ -42,6 +42,7 @@ mod no_allocation;
 mod own_parts;
 mod passivity;
 mod passivity_fidelity;
+mod relative_motion;
 mod robustness;
 mod shading;
 mod shading_energy;
