@@ -60,7 +60,8 @@ impl FrictionLaw for Classical {
         // Corrected: implicit in the speed of this very move.
         //= melder#4.8
         let load_per_travel = self.mu_v_s_per_m * query.load_m / query.dt_s;
-        (coulomb_slide - load_per_travel * query.travel_m) / (1.0 + load_per_travel)
+        // In this order neither a short tick nor a long travel overflows.
+        coulomb_slide / (1.0 + load_per_travel) - query.travel_m / (1.0 + 1.0 / load_per_travel)
     }
 
     fn held_limit_m(&self, query: &FrictionQuery, _memory: &FrictionMemory) -> f64 {
@@ -152,6 +153,15 @@ mod tests {
         for dt_s in [0.0, -1e-3, f64::NAN] {
             let asked = FrictionQuery { dt_s, travel_m: 1e-5, ..query(FrictionState::Slip, 4e-3) };
             assert_eq!(law.slide(&asked, &FrictionMemory::default()), 4e-3 - 0.3 * LOAD, "{dt_s} s");
+        }
+    }
+
+    #[test]
+    fn in_no_time_a_viscous_slide_takes_back_what_was_travelled() {
+        let law = Friction::coulomb_viscous(2.0, 4e5).unwrap();
+        for (dt_s, travel_m) in [(1e-300, 100.0), (1e-300, -100.0), (f64::MIN_POSITIVE, 1e-3)] {
+            let asked = FrictionQuery { load_m: 100.0, dt_s, travel_m, ..query(FrictionState::Slip, 4e-3) };
+            assert_eq!(law.slide(&asked, &FrictionMemory::default()), -travel_m, "{dt_s} s");
         }
     }
 
