@@ -325,10 +325,8 @@ fn not_allowed(socket: &Path, request: &Request, answer: &Answer) -> AttachError
         socket: socket.into(),
         wish: RequestKind::from_word(request.kind).map_or("do this", RequestKind::wish),
         user: rustix::process::geteuid().as_raw(),
-        allowed: match answer.allowed_group_plus_one.checked_sub(1) {
-            Some(group) => {
-                format!("members of group {}", group_in_words(u32::try_from(group).unwrap_or(u32::MAX)))
-            }
+        allowed: match answer.allowed_group() {
+            Some(group) => format!("members of group {}", group_in_words(group)),
             None => "root and the user that the driver runs as".into(),
         },
     }

@@ -159,3 +159,29 @@ pub fn raise_flag<W: Word>(own_flag: &W, place: u64) {
     own_flag.store(place, Ordering::Relaxed);
     W::fence(Ordering::SeqCst);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_way_to_wait_has_its_name() {
+        assert_eq!([WaitMode::Spin, WaitMode::Futex].map(WaitMode::name), ["spin", "futex"]);
+    }
+
+    /// Sleepers compare the word with what they saw: it must differ from one value to the next.
+    #[test]
+    fn the_word_of_a_bell_is_the_low_half_of_the_number_behind_the_newest() {
+        let bell = Bell {
+            latest_plus_one: AtomicU64::new(0),
+            doorbell: AtomicU32::new(0),
+            padding: AtomicU32::new(0),
+            owner_sleeps: AtomicU64::new(0),
+            reserved: Default::default(),
+        };
+        for (k, word) in [(0, 1), (1, 2), (u64::from(u32::MAX) - 1, u32::MAX), (u64::from(u32::MAX), 0)] {
+            tell(&bell, k);
+            assert_eq!((latest(&bell), bell.doorbell.load(Ordering::Relaxed)), (Some(k), word));
+        }
+    }
+}

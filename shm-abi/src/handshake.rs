@@ -220,6 +220,18 @@ impl Answer {
             ..Self::zeroed()
         }
     }
+
+    /// That whoever asks may not, but the members of this group; `None`: only root and the driver's own user.
+    pub fn not_allowed(group: Option<u32>) -> Self {
+        let allowed_group_plus_one = group.map_or(0, |group| u64::from(group) + 1);
+        Self { allowed_group_plus_one, ..Self::new(Verdict::NotAllowed) }
+    }
+
+    /// The group whose members may what was asked for; `None`: only root and the driver's own user.
+    pub fn allowed_group(&self) -> Option<u32> {
+        // A driver that names a greater one than there can be names none that we know.
+        self.allowed_group_plus_one.checked_sub(1).map(|group| u32::try_from(group).unwrap_or(u32::MAX))
+    }
 }
 
 /// Now, by the clock of [`Request::asked_ns`].
@@ -284,6 +296,17 @@ mod tests {
         assert_eq!(Request { abi_version: 2 << 32, ..good }.check(), Err(Verdict::WrongVersion));
         assert_eq!(Request { layout_hash: !LAYOUT_HASH, ..good }.check(), Err(Verdict::WrongLayout));
         assert_eq!(Request { kind: 99, ..good }.check(), Err(Verdict::UnknownKind));
+    }
+
+    #[test]
+    fn a_refusal_names_the_group_that_may() {
+        for (group, word) in [(None, 0), (Some(0), 1), (Some(1000), 1001), (Some(u32::MAX), 1 << 32)] {
+            let answer = Answer::not_allowed(group);
+            assert_eq!((answer.verdict, answer.allowed_group_plus_one), (Verdict::NotAllowed as u64, word));
+            assert_eq!(answer.allowed_group(), group);
+        }
+        let beyond = Answer { allowed_group_plus_one: u64::MAX, ..Answer::not_allowed(None) };
+        assert_eq!(beyond.allowed_group(), Some(u32::MAX));
     }
 
     #[test]

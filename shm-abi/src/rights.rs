@@ -76,6 +76,19 @@ impl Rights {
         }
         Err(Some(needed))
     }
+
+    /// Checks that a user in these groups may end the lease of `holder`: one's own anybody may who reaches the socket.
+    ///
+    /// # Errors
+    /// As of [`check`](Self::check), for [`Right::Administer`].
+    pub fn check_end_of_lease(
+        &self,
+        holder: u32,
+        uid: u32,
+        groups: impl FnOnce() -> Vec<u32>,
+    ) -> Result<(), Option<u32>> {
+        if uid == holder { Ok(()) } else { self.check(Right::Administer, uid, groups) }
+    }
 }
 
 #[cfg(test)]
@@ -117,6 +130,16 @@ mod tests {
         assert_eq!(allowed(rights, ANN, &[10]), [Ok(()), Err(Some(20)), Err(Some(30))]);
         assert_eq!(allowed(rights, ANN, &[20]), [Ok(()), Ok(()), Err(Some(30))]);
         assert_eq!(allowed(rights, ANN, &[5, 30]), [Ok(()); 3]);
+    }
+
+    #[test]
+    fn a_lease_is_ended_by_its_holders_user_and_by_administrators() {
+        let rights = rights(None, None, Some(30));
+        let may = |uid, groups: &[u32]| rights.check_end_of_lease(ANN, uid, || groups.to_vec());
+        assert_eq!(may(ANN, &[]), Ok(()));
+        assert_eq!([0, OWNER].map(|uid| may(uid, &[])), [Ok(()); 2]);
+        assert_eq!(may(ANN + 1, &[]), Err(Some(30)));
+        assert_eq!(may(ANN + 1, &[30]), Ok(()));
     }
 
     #[test]

@@ -457,12 +457,12 @@ impl Server {
 
     /// For the holder's own user, and for administrators.
     fn end_lease(&mut self, index: usize, to: &mut impl Recipient) -> Stage {
-        let uid = self.connections[index].peer.uid;
         if let Some((holder, connection)) = self.holder() {
-            let is_own = connection.peer.uid == uid;
-            match self.check(index, Right::Administer) {
-                Err(group) if !is_own => return self.deny(index, group),
-                _ => self.hang_up(holder, to),
+            let asker = &self.connections[index];
+            let may = self.rights.check_end_of_lease(connection.peer.uid, asker.peer.uid, || asker.groups());
+            match may {
+                Err(group) => return self.deny(index, group),
+                Ok(()) => self.hang_up(holder, to),
             }
         }
         let _ = self.answer(index, &Answer::new(Verdict::Granted), &[]);
@@ -470,9 +470,7 @@ impl Server {
     }
 
     fn deny(&self, index: usize, group: Option<u32>) -> Stage {
-        let allowed_group_plus_one = group.map_or(0, |group| u64::from(group) + 1);
-        let answer = Answer { allowed_group_plus_one, ..Answer::new(Verdict::NotAllowed) };
-        let _ = self.answer(index, &answer, &[]);
+        let _ = self.answer(index, &Answer::not_allowed(group), &[]);
         Stage::Gone
     }
 

@@ -71,3 +71,58 @@ pub(crate) fn is_open(socket: &impl AsFd) -> bool {
         Err(errno) => errno == rustix::io::Errno::AGAIN || errno == rustix::io::Errno::INTR,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+    use std::os::unix::net::UnixStream;
+
+    type Message = [u8; 256];
+
+    /// What comes of a message that is sent in parts with pauses between them.
+    fn received(parts: usize, pause: Duration, patience: Duration) -> io::Result<Message> {
+        let (mut far, near) = UnixStream::pair()?;
+        let sender = std::thread::spawn(move || {
+            for part in [7; size_of::<Message>()].chunks(size_of::<Message>() / parts) {
+                // The receiver may have hung up.
+                let _ = far.write_all(part);
+                std::thread::sleep(pause);
+            }
+        });
+        let received = receive::<Message>(near.as_fd(), patience).map(|(message, _)| message);
+        drop(near);
+        sender.join().expect("the sender ends");
+        received
+    }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "sockets are the system's")]
+    fn a_message_that_is_whole_needs_no_patience() {
+        assert_eq!(received(1, Duration::ZERO, Duration::ZERO).expect("whole"), [7; 256]);
+    }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "sockets are the system's")]
+    fn a_message_in_parts_is_waited_for() {
+        let (pause, patience) = (Duration::from_millis(20), Duration::from_secs(600));
+        assert_eq!(received(4, pause, patience).expect("patience enough"), [7; 256]);
+    }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "sockets are the system's")]
+    fn a_message_that_drips_is_given_up() {
+        let error = received(256, Duration::from_millis(2), Duration::from_millis(20)).expect_err("too slow");
+        assert_eq!(error.kind(), io::ErrorKind::TimedOut);
+    }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "sockets are the system's")]
+    fn half_a_message_is_none() {
+        let (mut far, near) = UnixStream::pair().expect("sockets");
+        far.write_all(&[7; 128]).expect("room for it");
+        drop(far);
+        let error = receive::<Message>(near.as_fd(), Duration::from_secs(600)).expect_err("half");
+        assert_eq!(error.kind(), io::ErrorKind::UnexpectedEof);
+    }
+}

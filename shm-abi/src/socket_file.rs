@@ -208,3 +208,47 @@ pub(crate) fn suffixed(path: &Path, suffix: &str) -> PathBuf {
     name.push(suffix);
     PathBuf::from(name)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[cfg_attr(miri, ignore = "sockets and directories are the system's")]
+    fn a_path_is_told_in_full_as_far_as_it_exists() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let real = std::fs::canonicalize(directory.path()).expect("its name").join("real");
+        std::fs::create_dir(&real).expect("a directory");
+        let link = directory.path().join("link");
+        std::os::unix::fs::symlink(&real, &link).expect("a link");
+        assert_eq!(whole_path(&link.join("../link/driver.sock")), real.join("driver.sock"));
+        let absent = directory.path().join("absent/driver.sock");
+        assert_eq!(whole_path(&absent), absent);
+        let here = std::env::current_dir().expect("a directory");
+        assert_eq!(whole_path(Path::new("driver.sock")), here.join("driver.sock"));
+    }
+
+    /// Whoever lives and takes nobody is not waited for, and not taken for dead.
+    #[test]
+    #[cfg_attr(miri, ignore = "sockets and directories are the system's")]
+    fn a_probe_of_a_full_queue_returns_at_once() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let path = directory.path().join("crowded.sock");
+        let listener = std::os::unix::net::UnixListener::bind(&path).expect("a socket");
+        rustix::net::listen(&listener, 0).expect("a short queue");
+        let mut waiting = Vec::new();
+        patience::watched(patience::limit(), "a full queue", || {
+            while probe(&path) == Ok(()) {
+                let (address, kind) = (SocketAddrUnix::new(&path).expect("an address"), SocketType::STREAM);
+                let one = rustix::net::socket_with(AddressFamily::UNIX, kind, SocketFlags::NONBLOCK, None);
+                let one = one.expect("a socket");
+                let _ = rustix::net::connect(&one, &address);
+                waiting.push(one);
+            }
+        });
+        assert_eq!(probe(&path), Err(Errno::AGAIN));
+        let refused = make_sure_nobody_listens(&path).expect_err("somebody does");
+        assert!(matches!(refused, BindError::AlreadyRunning { .. }), "{refused:?}");
+        assert!(!is_left_over(&path));
+    }
+}

@@ -9,10 +9,10 @@ use common::host::Host;
 use common::{directory, frame, info, is_frame, wait_until};
 use patience::limit;
 use patience::prelude::*;
-use shm_abi::client;
 use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
 use shm_abi::server::{Server, ServerEvent};
 use shm_abi::{DriverMemory, Frame};
+use shm_abi::{client, endpoint};
 use std::fs::{File, Permissions};
 use std::io::Write;
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
@@ -52,6 +52,10 @@ fn body_of_another_process() {
             Ok(_) => println!("\nattached"),
             Err(error) => println!("\nrefused: {error}"),
         },
+        "endpoint" => {
+            println!("\nplaces: {:?}", endpoint::candidates());
+            println!("for a driver: {:?}, named: {:?}", endpoint::for_driver(), endpoint::named());
+        }
         "driver without descriptors" => serve_without_descriptors(&socket),
         other => panic!("no such body: {other}"),
     }
@@ -224,4 +228,28 @@ fn frames_of_a_dead_driver_can_still_be_read() {
     let mut found = Frame::zeroed();
     attached.driver.read_frame(1, &mut found).unwrap();
     assert!(is_frame(&found, 1));
+}
+
+#[test]
+fn the_drivers_place_is_the_one_that_the_environment_names() {
+    let told = |variables: &[(&str, &str)]| {
+        let mut command = process(&own_binary(), "endpoint", Path::new("unused"));
+        for variable in ["PHANTOM3_SOCKET", "RUNTIME_DIRECTORY", "XDG_RUNTIME_DIR"] {
+            command.env_remove(variable);
+        }
+        let output = command.envs(variables.iter().copied()).bounded_output().unwrap();
+        let text = String::from_utf8(output.stdout).unwrap();
+        let lines =
+            text.lines().filter(|line| line.starts_with("places: ") || line.starts_with("for a driver: "));
+        lines.collect::<Vec<_>>().join("; ")
+    };
+    assert_eq!(
+        told(&[("PHANTOM3_SOCKET", "/a/b"), ("XDG_RUNTIME_DIR", "/x")]),
+        "places: [\"/a/b\"]; for a driver: \"/a/b\", named: Some(\"/a/b\")"
+    );
+    assert_eq!(
+        told(&[("XDG_RUNTIME_DIR", "/x")]),
+        "places: [\"/x/phantom3/driver.sock\", \"/run/phantom3/driver.sock\"]; for a driver: \
+         \"/x/phantom3/driver.sock\", named: None"
+    );
 }

@@ -1,11 +1,13 @@
 //! The way to stop the motors that needs no connection.
 
 use patience::limit;
+use patience::prelude::*;
 use shm_abi::server::Server;
 use shm_abi::stop_socket::{self, StopSocket, path_beside};
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixDatagram;
 use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
 
 /// A driver's place with a thread that hears stops; each is told with the user who sent it.
 fn listening() -> (tempfile::TempDir, Server, Receiver<Option<u32>>) {
@@ -38,15 +40,38 @@ fn whatever_is_sent_is_a_stop_and_the_kernel_tells_whose() {
     }
 }
 
+/// Told once for each: it waits for the next one, and until then the first is there for whoever asks.
+#[test]
+fn a_stop_is_heard_until_it_is_taken_and_then_waited_for() {
+    let directory = tempfile::tempdir().unwrap();
+    let server = Server::bind(&directory.path().join("driver.sock")).unwrap();
+    let (mut socket, _file) = StopSocket::bind(server.path()).unwrap();
+    let drain = socket.drain().unwrap();
+    stop_socket::send(server.path()).unwrap();
+    let own = Some(rustix::process::geteuid().as_raw());
+    let twice =
+        patience::watched(limit(), "the same stop", || [socket.hear().unwrap(), socket.hear().unwrap()]);
+    assert_eq!(twice, [own, own]);
+    drain.take();
+    let (tell, told) = channel();
+    let hearing = std::thread::spawn(move || tell.send(socket.hear().unwrap()).unwrap());
+    assert!(told.recv_timeout(Duration::from_millis(100)).is_err(), "nothing was sent");
+    stop_socket::send(server.path()).unwrap();
+    assert_eq!(told.recv_timeout(limit()).unwrap(), own);
+    hearing.bounded_join().unwrap();
+}
+
 #[test]
 fn sending_never_waits_and_a_full_queue_is_a_stop_on_its_way() {
     let directory = tempfile::tempdir().unwrap();
     let server = Server::bind(&directory.path().join("driver.sock")).unwrap();
     // Nobody listens to this one.
     let (_socket, _file) = StopSocket::bind(server.path()).unwrap();
-    for _ in 0..10_000 {
-        stop_socket::send(server.path()).unwrap();
-    }
+    patience::watched(limit(), "ten thousand stops that nobody takes", || {
+        for _ in 0..10_000 {
+            stop_socket::send(server.path()).unwrap();
+        }
+    });
 }
 
 #[test]
