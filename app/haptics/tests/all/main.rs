@@ -27,7 +27,6 @@ mod baselines;
 mod beginning_inside;
 mod chapter_8_1;
 mod classic_god_object;
-mod damping;
 mod doors;
 mod effects_robustness;
 mod friction_drift;

@@ -7,6 +7,7 @@ mod common;
 mod solids;
 
 mod curves;
+mod damping;
 mod differential;
 mod energy;
 mod none;
