@@ -32,7 +32,7 @@ use crate::row::{BodyRow, Row};
 use crate::slow_thread::SlowRemains;
 use finger::{World, finite_or_zero};
 use haptics::passivity::Passivity;
-use haptics::{Door, Effects, Entity, Field, FingerEffects, Guide, Hip, Moment, Passage, RAMP_IN_S};
+use haptics::{Contact, Door, Effects, Entity, Field, FingerEffects, Guide, Hip, Moment, Passage, RAMP_IN_S};
 use nalgebra::Vector3;
 use near::Near;
 use physics::{Body, BodyError, Manipulation};
@@ -189,6 +189,14 @@ impl FastStep {
     /// Whether there was more at a finger's place in the last tick than it has room for.
     pub fn is_crowded(&self) -> bool {
         self.near.iter().any(Near::is_crowded)
+    }
+
+    /// The contacts whose force was cut in the last tick, each with its finger's number.
+    pub fn cuts(&self) -> impl Iterator<Item = (usize, &Contact)> {
+        let fingers = self.fingers.iter().enumerate();
+        let contacts =
+            fingers.flat_map(|(number, own)| own.finger.contacts().map(move |contact| (number, contact)));
+        contacts.filter(|(_, contact)| contact.leapt)
     }
 
     /// What moving the entities took in the last tick.
@@ -357,6 +365,8 @@ const MOST_CARRIED_M_PER_S: f64 = 1.0;
 mod beside;
 #[cfg(test)]
 mod carried;
+#[cfg(test)]
+mod cut;
 #[cfg(test)]
 mod damped;
 #[cfg(test)]

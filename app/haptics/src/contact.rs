@@ -48,6 +48,9 @@ pub struct Contact {
     pub feature: Feature,
     /// Whether it holds or slides.
     pub friction: FrictionState,
+    /// Whether the god-object is farther from the HIP than a tick ago by more than finger and entity have moved: the force
+    /// is cut to what that explains, and comes on with what they move.
+    pub leapt: bool,
 }
 
 impl Contact {
@@ -363,10 +366,7 @@ impl Slot {
         input: &TouchInput<'_>,
         sweep: &Sweep<'_>,
     ) -> Option<Contact> {
-        let share = match self.onset.is_over() {
-            true => 1.0,
-            false => self.onset.share_of(&touch, input, [sweep.dt_s, sweep.ramp_in_s]),
-        };
+        let share = self.onset.share_of(&touch, input, [sweep.dt_s, sweep.ramp_in_s]);
         // Apart, so that a touch that stays as it is stays in registers.
         if !matches!(entity.shading, Shading::None) || entity.height_map.is_some() {
             touch = self.shade_and_raise(entity, touch, sweep)?;
@@ -375,7 +375,7 @@ impl Slot {
             touch.force_on_user_B *= share;
             touch.normal_force_n *= share;
         }
-        in_world(index, entity, &touch)
+        in_world(index, entity, &touch, self.onset.leapt())
     }
 
     /// The touch as the entity's facets and heights have it; `None` above a dent.
@@ -395,7 +395,7 @@ impl Slot {
             self.hovers = !height_map.raise(&over, &mut touch);
             if self.hovers {
                 // Whoever comes down from here comes from outside.
-                self.onset = Onset::AT_ONCE;
+                self.onset.end();
                 return None;
             }
         }
@@ -427,7 +427,7 @@ fn hip_velocity(
 }
 
 #[inline(always)]
-fn in_world(entity_index: usize, entity: &Entity, touch: &Touch) -> Option<Contact> {
+fn in_world(entity_index: usize, entity: &Entity, touch: &Touch, leapt: bool) -> Option<Contact> {
     let god_object = &touch.god_object;
     let contact = Contact {
         entity: entity_index,
@@ -437,6 +437,7 @@ fn in_world(entity_index: usize, entity: &Entity, touch: &Touch) -> Option<Conta
         normal_W: vector_into_world(&entity.X_WB, &god_object.normal_B),
         feature: god_object.feature,
         friction: touch.friction,
+        leapt,
     };
     (is_finite(&contact.force_on_user_W) && is_finite(&contact.god_object_W)).then_some(contact)
 }

@@ -1,14 +1,16 @@
-//! Onset of a contact: at once where the HIP came from outside, gently where it is found inside.
+//! Onset of a contact, and its bound: no force that finger and entity have not moved for.
 //!
 //! Problem: a finger that is found inside (first tick, an entity put over it, a part of a mesh that another part let it into)
 //! has a god-object somewhere on the surface. All of that spring at once throws a hand; and where a shape is narrow, or its
-//! surface passes through itself, the way to that place may be longer than the finger is deep.
+//! surface passes through itself, the way to that place may be longer than the finger is deep. And should a god-object ever
+//! leap, for a reason that nobody thought of, its spring must not.
 //!
-//! Model: the force ramps in; and the spring is no longer than the overlap, with what the HIP has moved since, in the
-//! entity's frame. The overlap is a lower bound of the way out that every shape knows. As soon as the spring is within
-//! this bound, the bound is dropped: from there on the god-object only follows.
+//! Model: the force of a contact that begins inside ramps in, and the spring is no longer than the overlap, with what the HIP
+//! has moved since, in the entity's frame. The overlap is a lower bound of the way out that every shape knows. As soon as
+//! the spring is within this bound, the bound is dropped. From there on the god-object only follows: it is never farther from
+//! the HIP than a tick ago, but for what the HIP has moved. A tick in which it is brings the bound back, and is told.
 //!
-//! Cost: nothing for a contact that came from outside; one signed distance where it begins inside.
+//! Cost: of a contact that came from outside two roots a tick; one signed distance where it begins inside.
 
 use crate::algorithm::{Touch, TouchInput};
 
@@ -20,6 +22,10 @@ pub(crate) struct Onset {
     longest: Longest,
     /// What the last tick's force was multiplied by.
     share: f64,
+    /// How far the god-object was from the HIP in the last tick (m).
+    lag_m: f64,
+    /// Whether it is farther away than it can have been left behind.
+    leapt: bool,
 }
 
 /// The longest spring.
@@ -35,29 +41,43 @@ enum Longest {
 
 impl Onset {
     /// All of the force, at once.
-    pub(crate) const AT_ONCE: Self = Self { strength: 1.0, longest: Longest::Any, share: 1.0 };
+    pub(crate) const AT_ONCE: Self =
+        Self { strength: 1.0, longest: Longest::Any, share: 1.0, lag_m: 0.0, leapt: false };
     /// A ramp, from the overlap on.
-    pub(crate) const INSIDE: Self = Self { strength: 0.0, longest: Longest::Overlap, share: 0.0 };
+    pub(crate) const INSIDE: Self =
+        Self { strength: 0.0, longest: Longest::Overlap, share: 0.0, ..Self::AT_ONCE };
+
+    /// All of the force from the next tick on, whatever there was of it.
+    pub(crate) fn end(&mut self) {
+        *self = Self { lag_m: self.lag_m, ..Self::AT_ONCE };
+    }
 
     /// What the last tick's force was multiplied by, 0 to 1.
     pub(crate) fn share(&self) -> f64 {
         self.share
     }
 
-    /// Whether all of the force is rendered.
-    #[inline(always)]
-    pub(crate) fn is_over(&self) -> bool {
-        self.strength >= 1.0 && matches!(self.longest, Longest::Any)
+    /// Whether the god-object leapt in the last tick.
+    pub(crate) fn leapt(&self) -> bool {
+        self.leapt
     }
 
     /// One tick: what to multiply the force of `touch` by, which is the shape's own, before heights.
+    #[inline(always)]
+    pub(crate) fn share_of(&mut self, touch: &Touch, input: &TouchInput<'_>, times: [f64; 2]) -> f64 {
+        let lag_m = (touch.god_object.point_B - input.cone.hip_B).norm();
+        let explained_m = self.lag_m + way_m(input);
+        let was_over = self.strength >= 1.0 && matches!(self.longest, Longest::Any);
+        self.leapt = was_over && lag_m > explained_m + SLACK_M;
+        if self.leapt {
+            self.longest = Longest::Bound(self.lag_m);
+        }
+        self.lag_m = lag_m;
+        if was_over && !self.leapt { 1.0 } else { self.less_than_all(touch, input, times) }
+    }
+
     #[inline(never)]
-    pub(crate) fn share_of(
-        &mut self,
-        touch: &Touch,
-        input: &TouchInput<'_>,
-        [dt_s, ramp_in_s]: [f64; 2],
-    ) -> f64 {
+    fn less_than_all(&mut self, touch: &Touch, input: &TouchInput<'_>, [dt_s, ramp_in_s]: [f64; 2]) -> f64 {
         let step = dt_s / ramp_in_s;
         // Where time is unknown or no ramp wanted, there is none.
         self.strength = if step > 0.0 { (self.strength + step).min(1.0) } else { 1.0 };
@@ -70,10 +90,7 @@ impl Onset {
         let bound_m = match self.longest {
             Longest::Any => return 1.0,
             Longest::Overlap => input.overlap_m(),
-            Longest::Bound(bound_m) => {
-                let way_B = input.previous_hip_B.map(|previous_B| input.cone.hip_B - previous_B);
-                bound_m + way_B.map_or(0.0, |way_B| way_B.norm())
-            }
+            Longest::Bound(bound_m) => bound_m + way_m(input),
         };
         // In this order no force overflows.
         let spring_m = (touch.force_on_user_B / input.cone.stiffness_n_per_m).norm();
@@ -86,4 +103,11 @@ impl Onset {
     }
 }
 
+/// How far the HIP has moved since the last tick, in the entity's frame.
+fn way_m(input: &TouchInput<'_>) -> f64 {
+    input.previous_hip_B.map_or(0.0, |previous_B| (input.cone.hip_B - previous_B).norm())
+}
+
 const ROUNDING: f64 = 1e-9;
+/// Shorter than what walks over a surface of a metre resolve is longer than this; of a stiff wall it is 10 mN.
+const SLACK_M: f64 = 1e-6;

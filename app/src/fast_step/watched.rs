@@ -54,6 +54,9 @@ impl EventTeller {
             self.find_touching(step, finger);
             self.watch.finger(finger, &self.touching, row.buttons, row.attached, out);
         }
+        for (finger, contact) in step.cuts() {
+            self.watch.tell(Kind::Cut { finger: finger as u32, entity: contact.entity as u32 }, out);
+        }
         self.watch.grasps(out);
         self.tell_doors(step, out);
         self.tell_lists(step, out);

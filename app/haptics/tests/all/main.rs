@@ -31,6 +31,7 @@ mod doors;
 mod effects_robustness;
 mod friction_drift;
 mod klein;
+mod leaps;
 mod materials;
 mod mesh_descent;
 mod mesh_leaks;

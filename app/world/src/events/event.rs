@@ -108,6 +108,13 @@ pub enum Kind {
         /// Where it is.
         to: u32,
     },
+    /// The force of a finger's contact was cut: it rose by more than finger and entity have moved for.
+    Cut {
+        /// Which finger.
+        finger: u32,
+        /// Which entity.
+        entity: u32,
+    },
     /// The scene was put back to its beginning. What touched before has ended.
     Reset,
     /// Another scene goes on in place of the one that was, whose contacts have ended. Numbers mean its fingers and entities
@@ -226,6 +233,8 @@ pub enum Class {
     Trial,
     /// [`Kind::Door`].
     Door,
+    /// [`Kind::Cut`].
+    Cut,
     /// [`Kind::Reset`] and [`Kind::Scene`].
     Reset,
     /// [`Kind::Order`].
@@ -236,7 +245,7 @@ pub enum Class {
 
 impl Class {
     /// All of them, with their words.
-    pub const ALL: [(Self, &str); 14] = [
+    pub const ALL: [(Self, &str); 15] = [
         (Self::Contact, "contacts"),
         (Self::Slip, "slips"),
         (Self::Pair, "pairs"),
@@ -248,6 +257,7 @@ impl Class {
         (Self::Key, "keys"),
         (Self::Trial, "trials"),
         (Self::Door, "doors"),
+        (Self::Cut, "cuts"),
         (Self::Reset, "resets"),
         (Self::Order, "orders"),
         (Self::Lost, "lost"),
@@ -311,6 +321,7 @@ impl Kind {
             Self::Key { .. } => Class::Key,
             Self::Trial { .. } => Class::Trial,
             Self::Door { .. } => Class::Door,
+            Self::Cut { .. } => Class::Cut,
             Self::Reset | Self::Scene { .. } => Class::Reset,
             Self::Order { .. } => Class::Order,
             Self::Lost { .. } => Class::Lost,
@@ -380,6 +391,7 @@ impl Kind {
             Self::Door { finger, from, to } => {
                 Facts { finger: Some(finger), spaces: Some([from, to]), ..of("door") }
             }
+            Self::Cut { finger, entity } => Facts { finger: Some(finger), entity: Some(entity), ..of("cut") },
             Self::Reset => of("reset"),
             Self::Scene { number } => Facts { number: Some(number.into()), ..of("scene") },
             Self::Order { number } => Facts { number: Some(number), ..of("order") },
