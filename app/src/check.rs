@@ -117,7 +117,8 @@ fn check(args: &CheckArgs, settings: &Settings) -> Checked {
     let measures = Measures::all(&rig, step.entities());
     checked.warnings = suspicions::all(&rig, &measures);
     checked.warnings.extend(warnings::all(&rig, &whole, step.entities()));
-    checked.summary = Some(Summary::of(&rig, &whole, step.entities(), measures));
+    let suspected = suspicions::suspected(&rig, &measures);
+    checked.summary = Some(Summary::of(&rig, &whole, step.entities(), measures, suspected));
     checked
 }
 

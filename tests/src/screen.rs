@@ -1,9 +1,10 @@
 //! A screen that nobody sees: Xvfb, where the machine has it.
 
 use patience::prelude::*;
+use rt_core::clock::monotonic_ns;
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
-use std::time::Instant;
+use std::time::Duration;
 use tempfile::TempDir;
 
 /// Width and height (pixels).
@@ -60,16 +61,24 @@ impl Screen {
 
     /// Presses and releases a key in the program's window, by its name in X; `false`: the machine has no `xdotool`, which is told.
     pub fn press(&self, key: &str) -> bool {
-        self.press_for(key, "0.2").is_some()
+        self.press_for(key, Duration::from_millis(200)).is_some()
     }
 
-    /// The same for so long (s), or longer where the machine is busy; how long it took, all in all (s).
-    pub fn press_for(&self, key: &str, seconds: &str) -> Option<f64> {
+    /// The same for so long, or longer where the machine is busy; when the key went down and up.
+    pub fn press_for(&self, key: &str, least: Duration) -> Option<Pressed> {
         // Nobody manages windows here: none has the keys until it is given them.
         self.xdotool(&["search", "--onlyvisible", "--name", "phantom3", "windowfocus", "sleep", "0.5"])?;
-        let begun = Instant::now();
-        self.xdotool(&["keydown", key, "sleep", seconds, "keyup", key])?;
-        Some(begun.elapsed().as_secs_f64())
+        let down_ns = self.timed(&["keydown", key])?;
+        std::thread::sleep(least);
+        let up_ns = self.timed(&["keyup", key])?;
+        Some(Pressed { down_ns, up_ns })
+    }
+
+    /// Does something to the keyboard; before and after it (ns). `xdotool` hangs up when the server has done it.
+    fn timed(&self, words: &[&str]) -> Option<[u64; 2]> {
+        let before_ns = monotonic_ns();
+        self.xdotool(words)?;
+        Some([before_ns, monotonic_ns()])
     }
 
     fn xdotool(&self, words: &[&str]) -> Option<()> {
@@ -79,6 +88,15 @@ impl Screen {
         }
         done.is_ok_and(|status| status.success()).then_some(())
     }
+}
+
+/// A key that was pressed, on the system's monotonic clock (ns): it went down between two times, and up between two others.
+#[derive(Debug, Clone, Copy)]
+pub struct Pressed {
+    /// Before and after it went down.
+    pub down_ns: [u64; 2],
+    /// Before and after it went up.
+    pub up_ns: [u64; 2],
 }
 
 impl Drop for Screen {

@@ -54,9 +54,10 @@ fn table(text: &mut String, summary: &Summary) {
         told.lines().skip(1).for_each(|finding| row(text, "", format_args!("  {}", finding.trim())));
     }
     rows(text, "fingers", summary.fingers.iter().map(finger));
-    rows(text, "sizes", few(&summary.measures).map(ToString::to_string));
-    if summary.measures.len() > FEW {
-        let more = summary.measures.len() - FEW;
+    let sizes = sizes(summary);
+    let more = summary.measures.len() - sizes.len();
+    rows(text, "sizes", sizes.into_iter());
+    if more > 0 {
         row(text, "", format_args!("and {more} more, which --json tells"));
     }
     rows(
@@ -86,12 +87,15 @@ fn finger((name, radius_m, device): &(String, f64, usize)) -> String {
     }
 }
 
+/// The first few things, and all whose numbers look like those of another unit.
+fn sizes(summary: &Summary) -> Vec<String> {
+    let things = summary.measures.iter().zip(&summary.suspected).enumerate();
+    let told = things.filter(|(index, (_, is_suspected))| *index < FEW || **is_suspected);
+    told.map(|(_, (it, _))| it.to_string()).collect()
+}
+
 /// Ten thousand lines would hide the rest.
 const FEW: usize = 20;
-
-fn few<T>(all: &[T]) -> impl Iterator<Item = &T> {
-    all.iter().take(FEW)
-}
 
 fn joined(items: impl Iterator<Item = String>) -> String {
     items.collect::<Vec<_>>().join(", ")

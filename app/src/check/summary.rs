@@ -28,6 +28,8 @@ pub(super) struct Summary {
     pub(super) fingers: Vec<(String, f64, usize)>,
     /// Sizes and masses.
     pub(super) measures: Vec<Measures>,
+    /// Of each of them, whether its numbers look like those of another unit.
+    pub(super) suspected: Vec<bool>,
     pub(super) passing: Vec<Passing>,
     /// What is in the process's memory now, and the most that was (bytes); `None`: the system does not say.
     pub(super) memory: Option<[u64; 2]>,
@@ -35,7 +37,13 @@ pub(super) struct Summary {
 
 impl Summary {
     /// Of a scene and of what of it can be run.
-    pub(super) fn of(rig: &Rig, whole: &Scene, entities: &[Entity], measures: Vec<Measures>) -> Self {
+    pub(super) fn of(
+        rig: &Rig,
+        whole: &Scene,
+        entities: &[Entity],
+        measures: Vec<Measures>,
+        suspected: Vec<bool>,
+    ) -> Self {
         let count =
             |is: &dyn Fn(&SceneEntity) -> bool| whole.entities.iter().filter(|entity| is(entity)).count();
         let is_outside = |entity: &SceneEntity| entity.within.is_none();
@@ -86,6 +94,7 @@ impl Summary {
                 .map(|finger| (finger.name.clone(), finger.radius_m, finger.device))
                 .collect(),
             measures,
+            suspected,
             passing: rig.what_passes(entities),
             memory: memory(),
         }

@@ -23,8 +23,14 @@ pub(super) fn all(rig: &Rig, measures: &[Measures]) -> Vec<String> {
     found.extend(devices(rig));
     found.extend(rates(&rig.scene));
     found.extend(gravity(&rig.scene));
-    found.truncate(MOST);
     found
+}
+
+/// Of each thing, whether one of them is about its size, its mass or its place.
+pub(super) fn suspected(rig: &Rig, measures: &[Measures]) -> Vec<bool> {
+    let boxes = reached(rig);
+    let is_suspected = |it: &Measures| length(rig, it).is_some() || mass(it).is_some() || is_far(it, &boxes);
+    measures.iter().map(is_suspected).collect()
 }
 
 fn length(rig: &Rig, it: &Measures) -> Option<String> {
@@ -114,20 +120,26 @@ fn densities(scene: &Scene) -> Vec<String> {
 
 /// Nobody reaches it.
 fn far(rig: &Rig, measures: &[Measures]) -> Option<String> {
-    let starts = rig.scene.fingers.iter().map(|finger| [finger.start_m.coords; 2]);
-    let paths = rig.hand.iter().flat_map(|hand| hand.bounds.iter().copied().flatten());
-    let boxes: Vec<[Vector3<f64>; 2]> = starts.chain(paths).collect();
-    let distance_m = |it: &&Measures| {
-        let half_m = it.size_m.map_or(f64::INFINITY, |size| 0.5 * Vector3::from(size).norm());
-        let middle = Vector3::from(it.middle_m);
-        let from = |[least, most]: &[Vector3<f64>; 2]| (middle - middle.sup(least).inf(most)).norm() - half_m;
-        boxes.iter().map(from).fold(f64::INFINITY, f64::min)
-    };
+    let boxes = reached(rig);
     let names: Vec<String> =
-        measures.iter().filter(|it| distance_m(it) > FAR_M).map(|it| it.name.clone()).collect();
+        measures.iter().filter(|it| is_far(it, &boxes)).map(|it| it.name.clone()).collect();
     (!names.is_empty()).then(|| {
         format!("more than {FAR_M} m away from every finger: {}; places are in metres", in_words(&names))
     })
+}
+
+/// Where fingers begin and go: opposite corners (m).
+fn reached(rig: &Rig) -> Vec<[Vector3<f64>; 2]> {
+    let starts = rig.scene.fingers.iter().map(|finger| [finger.start_m.coords; 2]);
+    let paths = rig.hand.iter().flat_map(|hand| hand.bounds.iter().copied().flatten());
+    starts.chain(paths).collect()
+}
+
+fn is_far(it: &Measures, boxes: &[[Vector3<f64>; 2]]) -> bool {
+    let half_m = it.size_m.map_or(f64::INFINITY, |size| 0.5 * Vector3::from(size).norm());
+    let middle = Vector3::from(it.middle_m);
+    let from = |[least, most]: &[Vector3<f64>; 2]| (middle - middle.sup(least).inf(most)).norm() - half_m;
+    boxes.iter().map(from).fold(f64::INFINITY, f64::min) > FAR_M
 }
 
 fn fingers(scene: &Scene) -> Vec<String> {
@@ -255,5 +267,3 @@ const THUMB_M: f64 = 0.2;
 const DRILL_RAD_S: f64 = 100.0;
 /// Ten times the Earth's.
 const STRONGEST_M_S2: f64 = 100.0;
-/// More would hide the rest.
-const MOST: usize = 20;

@@ -11,6 +11,7 @@ use phantom3::row_queue::{RowReceiver, row_queue};
 use phantom3::virtual_clock::VirtualDriver;
 use shm_abi::Frame;
 use shm_abi::segment::ClockMode;
+use std::f64::consts::PI;
 use std::path::Path;
 use view::hand::{Cue, MouseHand, Seen};
 use view::pick::Picker;
@@ -288,39 +289,116 @@ fn begun(things: &str, starts: [[f64; 3]; 2]) -> Vec<Vector3<f64>> {
     untouched(&file)
 }
 
+/// Half of it is the ball of the fingers here; the other half is what a finger that is put elsewhere keeps from all things,
+/// along the axes (m).
+const AWAY_M: f64 = 0.01;
+
 #[test]
 fn a_finger_that_would_begin_in_a_thing_begins_at_the_nearest_place_outside_of_all() {
     let free = [0.0, 0.3, 0.0];
-    let mesh = format!("[[entity]]\nshape = {{ kind = \"mesh\", file = \"{CONFIG}/meshes/cube.obj\" }}\n");
+    let mesh =
+        |file| format!("[[entity]]\nshape = {{ kind = \"mesh\", file = \"{CONFIG}/meshes/{file}\" }}\n");
     let bored = "[[entity]]\nshape = { kind = \"csg\", op = \"difference\", children = \
         [{ shape = { kind = \"box\", size_m = [0.1, 0.1, 0.1] } }, { shape = { kind = \"cylinder\", radius_m = 0.02, length_m = 1.0 } }] }\n";
     let walls = [-0.0251, 0.0251].map(|x| {
         format!("[[entity]]\nshape = {{ kind = \"box\", size_m = [0.04, 0.1, 0.1] }}\nposition_m = [{x}, 0.0, 0.0]\n")
     });
+    let in_star = [0.012, 0.004, 0.0];
     let cases = [
-        ("[[entity]]\nshape = { kind = \"box\", size_m = [0.1, 0.1, 0.1] }\n", [0.01, 0.03, 0.0], 0.08),
-        (mesh.as_str(), [0.0, 0.01, 0.0], 0.5),
-        // Beside the bore, which is wide enough.
-        (bored, [0.03, 0.0, 0.0], 0.05),
+        // Up through the nearest face.
+        (
+            "[[entity]]\nshape = { kind = \"box\", size_m = [0.1, 0.1, 0.1] }\n",
+            [0.01, 0.03, 0.0],
+            0.02 + AWAY_M,
+        ),
+        (&mesh("cube.obj"), [0.0, 0.01, 0.0], 0.01 + AWAY_M),
+        (&mesh("star.stl"), in_star, slow_way_m("star.stl", &in_star.into())),
+        // Into the bore, of which 5 mm around its axis are wide enough.
+        (bored, [0.03, 0.0, 0.0], 0.01 + AWAY_M),
         (
             "[[entity]]\nshape = { kind = \"plane\", normal = [0.0, 1.0, 0.0], offset_m = 0.0 }\n",
             [0.0, -0.04, 0.0],
-            0.06,
+            0.04 + AWAY_M,
         ),
-        // Balls of 5 mm in a slot of 10.2 mm.
-        (&walls.concat(), [0.0, 0.0, 0.01], 0.08),
+        // A slot of 10.2 mm: the ball fits, and has nothing beside it. Out at an end, 5 mm beyond the rims: those places
+        // count that lie 5 mm to either side.
+        (&walls.concat(), [0.0, 0.0, 0.01], 0.04 + 0.5 * AWAY_M),
+        // Between the axes, where the places 5 mm beside along both are 25 mm from the tube's middle: (20 + 5, 20) - (5, 0) mm.
         (
             "[[entity]]\nshape = { kind = \"torus\", ring_radius_m = 0.05, tube_radius_m = 0.02 }\n",
             [0.05, 0.0, 0.0],
-            0.05,
+            0.02 * 2f64.sqrt(),
         ),
     ];
-    for (things, wanted, most_m) in cases {
+    for (things, wanted, exact_m) in cases {
         let starts = begun(things, [wanted, free]);
         let way_m = (starts[0] - Vector3::from(wanted)).norm();
-        assert!(way_m > 0.0 && way_m < most_m, "{things}: {way_m} m");
+        assert!((way_m - exact_m).abs() < 1e-3, "{things}: {way_m} m, not {exact_m} m");
         assert_eq!(starts[1], Vector3::from(free), "what is free stays as the scene says");
     }
+}
+
+#[test]
+fn a_finger_that_would_begin_within_a_millimetre_of_a_thing_begins_farther_away() {
+    let plane = |offset_m: f64| {
+        format!(
+            "[[entity]]\nshape = {{ kind = \"plane\", normal = [0.0, 1.0, 0.0], offset_m = {offset_m} }}\n"
+        )
+    };
+    let cube = format!("[[entity]]\nshape = {{ kind = \"mesh\", file = \"{CONFIG}/meshes/cube.obj\" }}\n");
+    // Of a ball of 5 mm the lowest point is 0.5 mm above the thing, and then 1.5 mm.
+    for (things, top_m) in [(plane(-0.1), -0.1), (cube, 0.02)] {
+        let [near, far] = [0.5e-3, 1.5e-3].map(|gap_m| [0.0, top_m + 0.5 * AWAY_M + gap_m, 0.0]);
+        let free = [0.0, 0.3, 0.0];
+        assert_eq!(begun(&things, [far, free])[0], Vector3::from(far), "{things}: it is free");
+        let begun = begun(&things, [near, free])[0];
+        let exact = Vector3::new(0.0, top_m + AWAY_M, 0.0);
+        assert!((begun - exact).norm() < 1e-3, "{things}: {begun}, not {exact}");
+    }
+}
+
+/// How far the nearest free place is from one in a mesh (m): of all on a grid the nearest that is outside, and from whose
+/// neighbours along the axes a ball touches none of the triangles. The grid's next place is 0.9 mm away at most.
+fn slow_way_m(file: &str, wanted: &Vector3<f64>) -> f64 {
+    const GRID_M: f64 = 0.5e-3;
+    let soup = world::model::load(&Path::new(CONFIG).join("meshes").join(file)).expect("a mesh");
+    let triangles: Vec<[Vector3<f64>; 3]> =
+        soup.faces.iter().map(|face| face.map(|corner| soup.vertices[corner as usize])).collect();
+    let is_clear = |place: &Vector3<f64>| {
+        let is_far = |triangle: &[Vector3<f64>; 3]| distance_m(place, triangle) >= 0.5 * AWAY_M;
+        triangles.iter().all(is_far)
+            && triangles.iter().map(|it| solid_angle(place, it)).sum::<f64>().abs() < PI
+    };
+    let is_free = |place: &Vector3<f64>| {
+        let beside = (0..3).flat_map(|axis| [-1.0, 1.0].map(|side| Vector3::ith(axis, side * 0.5 * AWAY_M)));
+        std::iter::once(Vector3::zeros()).chain(beside).all(|by| is_clear(&(place + by)))
+    };
+    let counts = || (-40..=40).map(|count| f64::from(count) * GRID_M);
+    let grid =
+        counts().flat_map(|x| counts().flat_map(move |y| counts().map(move |z| Vector3::new(x, y, z))));
+    let mut ways: Vec<Vector3<f64>> = grid.collect();
+    ways.sort_by(|a, b| a.norm().total_cmp(&b.norm()));
+    ways.iter().find(|way| is_free(&(wanted + *way))).expect("a free place within 2 cm").norm()
+}
+
+/// From a triangle (m): from its plane where the foot is in it, else from the nearest of its edges.
+fn distance_m(place: &Vector3<f64>, corners: &[Vector3<f64>; 3]) -> f64 {
+    let edges = [0, 1, 2].map(|at| (corners[at], corners[(at + 1) % 3] - corners[at]));
+    let normal = edges[0].1.cross(&edges[1].1).normalize();
+    if edges.iter().all(|(from, along)| along.cross(&(place - from)).dot(&normal) >= 0.0) {
+        return (place - corners[0]).dot(&normal).abs();
+    }
+    let to_edge = |(from, along): &(Vector3<f64>, Vector3<f64>)| {
+        let share = ((place - from).dot(along) / along.norm_squared()).clamp(0.0, 1.0);
+        (place - (from + along * share)).norm()
+    };
+    edges.iter().map(to_edge).fold(f64::INFINITY, f64::min)
+}
+
+/// As which a triangle is seen (van Oosterom and Strackee); of a closed mesh 4 pi all together from within, 0 from without.
+fn solid_angle(place: &Vector3<f64>, corners: &[Vector3<f64>; 3]) -> f64 {
+    let [a, b, c] = corners.map(|corner| (corner - place).normalize());
+    2.0 * a.dot(&b.cross(&c)).atan2(1.0 + a.dot(&b) + b.dot(&c) + c.dot(&a))
 }
 
 #[test]

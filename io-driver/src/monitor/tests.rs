@@ -136,6 +136,23 @@ fn bars(monitor: &Monitor, width: u16, height: u16) -> Vec<i32> {
 }
 
 #[test]
+fn the_screen_is_drawn_as_often_as_the_documents_say() {
+    let times = (1.0 / super::REFRESH.as_secs_f64()) as u32;
+    let words = format!("up to {times} times a second");
+    let documents = [
+        ("README.md", include_str!("../../../README.md")),
+        ("CHANGELOG.md", include_str!("../../../CHANGELOG.md")),
+    ];
+    for (name, text) in documents {
+        let line = text.lines().find(|line| {
+            line.contains("status --watch` ") && line.contains("on a terminal")
+                || line.contains("On a terminal `driver status --watch`")
+        });
+        assert!(line.is_some_and(|line| line.contains(&words)), "{name} does not say {words:?}");
+    }
+}
+
+#[test]
 fn a_screen_of_the_usual_size_tells_everything() {
     let mut left = device("left", [0.0, 0.5, -2.0], Some(8.5));
     left.limits = vec!["slew", "heat"];

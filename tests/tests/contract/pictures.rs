@@ -335,7 +335,8 @@ fn pictures_go_on_with_the_scene_that_takes_over() {
     assert!(green("a.png") < 15 && green("b.png") > 60, "{} {}", green("a.png"), green("b.png"));
 }
 
-/// Three faces on one edge: nothing that could be felt. All are seen from the front, 12 cm wide.
+/// Three faces on one edge, a sheet without an inside: what a finger would feel from both sides. All are seen from the front,
+/// 12 cm wide.
 const FAN: &str = "v -0.06 -0.06 0\nv 0.06 -0.06 0\nv 0 0.06 0\nv 0 0.06 -0.02\nv 0 0.06 -0.04\nf 1 2 3\nf 1 2 4\nf 1 2 5\n";
 
 #[test]

@@ -245,6 +245,53 @@ fn check_measures_a_mesh_that_is_only_seen_by_its_file() {
     assert!(said.out.contains("none.obj") && said.out.contains("it is for the window only"), "{}", said.out);
 }
 
+/// A finger over a row of cubes of 5 cm, of which some are to be 50 m long.
+fn row_of_cubes(count: usize, large: &[usize]) -> String {
+    let cube = |number: usize| {
+        let size_m = if large.contains(&number) { 50.0 } else { 0.05 };
+        format!(
+            "[[entity]]\nname = \"cube{number}\"\nshape = {{ kind = \"box\", size_m = [{size_m:?}, 0.05, 0.05] }}\n\
+             position_m = [0.0, 0.0, {:?}]\n",
+            0.1 * number as f64
+        )
+    };
+    let cubes: String = (0..count).map(cube).collect();
+    format!("[[finger]]\nstart_m = [0.0, 0.2, 0.0]\n{cubes}")
+}
+
+#[test]
+fn check_tells_the_sizes_of_the_first_twenty_things_and_of_all_that_it_suspects() {
+    let place = Workplace::new();
+    let told = |count: usize, large: &[usize]| {
+        place.write("scene.toml", row_of_cubes(count, large));
+        let said = check(&place, &["scene.toml"]);
+        let cubes = 0..count;
+        let sizes: Vec<usize> =
+            cubes.filter(|number| said.out.contains(&format!(" cube{number}: box,"))).collect();
+        let all = json(&check(&place, &["scene.toml", "--json"]));
+        assert_eq!(all["summary"]["measures"].as_array().map(Vec::len), Some(count));
+        (sizes, said.out)
+    };
+    let (sizes, out) = told(20, &[]);
+    assert_eq!(sizes, (0..20).collect::<Vec<_>>());
+    assert!(!out.contains("which --json tells"), "{out}");
+    let (sizes, out) = told(21, &[]);
+    assert_eq!(sizes, (0..20).collect::<Vec<_>>());
+    assert!(out.contains("and 1 more, which --json tells\n"), "{out}");
+    let (sizes, out) = told(21, &[20]);
+    assert_eq!(sizes, (0..21).collect::<Vec<_>>());
+    assert!(!out.contains("which --json tells"), "{out}");
+    // More than twenty warnings of sizes leave none of them out.
+    let large: Vec<usize> = (5..45).step_by(2).chain([46, 48]).collect();
+    let (sizes, out) = told(50, &large);
+    let expected: Vec<usize> = (0..50).filter(|number| *number < 20 || large.contains(number)).collect();
+    assert_eq!(sizes, expected);
+    assert!(out.contains(&format!("and {} more, which --json tells\n", 50 - expected.len())), "{out}");
+    for number in large {
+        assert!(out.contains(&format!("warning: cube{number} is 50 m long")), "{number}: {out}");
+    }
+}
+
 #[test]
 fn check_suspects_numbers_of_another_unit() {
     let place = Workplace::new();

@@ -7,12 +7,20 @@ use std::path::Path;
 
 /// Paths, from the project's root, of all Rust sources of programs and libraries: no tests, benches or examples.
 fn program_sources() -> Vec<String> {
+    let is_program = |path: &String| {
+        let mut parts = path.split('/').skip_while(|part| *part != "src");
+        parts.next().is_some() && !parts.any(|part| part == "tests" || part == "tests.rs")
+    };
+    sources().into_iter().filter(is_program).collect()
+}
+
+/// Paths, from the project's root, of all Rust sources.
+fn sources() -> Vec<String> {
     let mut found = Vec::new();
     collect(&root(), &mut found);
     let below_root =
-        |path: &str| path.strip_prefix(&format!("{}/", root().display())).expect("below").to_owned();
-    let found: Vec<String> = found.iter().map(|path| below_root(path)).collect();
-    found.into_iter().filter(|path| path.split('/').any(|part| part == "src")).collect()
+        |path: &String| path.strip_prefix(&format!("{}/", root().display())).expect("below").to_owned();
+    found.iter().map(below_root).collect()
 }
 
 fn collect(directory: &Path, found: &mut Vec<String>) {
@@ -100,10 +108,19 @@ fn every_crate_forbids_unsafe_code_or_denies_it_but_where_it_is_needed() {
 #[test]
 fn the_lists_of_how_a_thing_is_added_name_every_source_that_names_one_of_its_kind() {
     let document = architecture();
-    let cases: [(&str, &[&str]); 3] = [
+    let cases: [(&str, &[&str]); 4] = [
         ("\n- A new shape with a closed form", &["Shape::Torus", "ShapeSpec::Torus"]),
         ("\n- A new friction law", &["::Dahl"]),
         ("\n- A new back end of devices", &["Backend::Replay"]),
+        (
+            "\n- A new mechanism",
+            &[
+                "Kinematics::WoodenHaptics",
+                "Self::WoodenHaptics",
+                "for WoodenHaptics",
+                "wooden_haptics::Linkage",
+            ],
+        ),
     ];
     for (beginning, words) in cases {
         let listed = paths_in(&part(&document, beginning, "\n- "));
@@ -115,6 +132,67 @@ fn the_lists_of_how_a_thing_is_added_name_every_source_that_names_one_of_its_kin
         for path in listed {
             assert!(root().join(&path).exists(), "{beginning:?}: {path} is not there");
         }
+    }
+}
+
+#[test]
+fn all_files_are_there_that_the_lists_of_how_a_thing_is_added_name() {
+    let lists = part(&architecture(), "\n## How a thing is added\n", "\n## ");
+    let names = lists.split('`').skip(1).step_by(2).filter(|name| name.ends_with(".rs"));
+    let sources = sources();
+    let mut count = 0;
+    for name in names {
+        let ending = format!("/{name}");
+        let is_there = root().join(name).exists() || sources.iter().any(|path| path.ends_with(&ending));
+        assert!(is_there, "ARCHITECTURE.md tells of {name}, which is not there");
+        count += 1;
+    }
+    assert!(count > 30, "{count}");
+}
+
+#[test]
+fn the_table_of_haptics_names_every_source() {
+    const DIRECTORY: &str = "app/haptics/src/";
+    let table = part(&architecture(), "\n| files in `app/haptics/src` | hold |\n|---|---|\n", "\n\n");
+    let sources: BTreeSet<String> = program_sources()
+        .iter()
+        .filter_map(|path| path.strip_prefix(DIRECTORY))
+        .filter(|path| !path.ends_with("error.rs") && *path != "lib.rs")
+        .map(str::to_owned)
+        .collect();
+    let is_there = |path: &String| {
+        sources.contains(path) || path.ends_with('/') && root().join(DIRECTORY).join(path).is_dir()
+    };
+    let mut listed = BTreeSet::new();
+    for row in table.lines() {
+        // A name is one of the directory that the name before it is in, or of one above.
+        let mut directory = String::new();
+        for name in
+            row.split('|').nth(1).unwrap_or_default().split('`').skip(1).step_by(2).flat_map(alternatives)
+        {
+            let above = std::iter::successors(Some(directory.clone()), |below| {
+                let parent = below.strip_suffix('/')?;
+                Some(parent.rfind('/').map_or(String::new(), |end| parent[..=end].to_owned()))
+            });
+            let found = above.map(|place| place + &name).find(is_there);
+            let found =
+                found.unwrap_or_else(|| panic!("ARCHITECTURE.md tells of {name}, which is not there"));
+            directory = found[..found.rfind('/').map_or(0, |end| end + 1)].to_owned();
+            listed.insert(found);
+        }
+    }
+    for path in sources {
+        let is_listed = listed.contains(&path)
+            || listed.iter().any(|entry| entry.ends_with('/') && path.starts_with(entry.as_str()));
+        assert!(is_listed, "{DIRECTORY}{path} is not in ARCHITECTURE.md's table");
+    }
+}
+
+/// `{a,b}.rs` stands for two names.
+fn alternatives(name: &str) -> Vec<String> {
+    match name.split_once('{').and_then(|(before, rest)| Some((before, rest.split_once('}')?))) {
+        Some((before, (each, after))) => each.split(',').map(|one| format!("{before}{one}{after}")).collect(),
+        None => vec![name.to_owned()],
     }
 }
 

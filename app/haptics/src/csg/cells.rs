@@ -362,4 +362,37 @@ mod tests {
         assert!(patches(0.0, 0.001, 0.0) <= FEW);
         assert!((1..=13).contains(&patches(0.02, 0.001, 0.001)));
     }
+
+    /// Patches and steps that were looked at for the cells that there are.
+    fn looks(cells: &Cells) -> usize {
+        let split = cells.cells.iter().filter(|cell| cell.children != 0);
+        split.map(|cell| 8 * (cell.items + cell.count) as usize).sum()
+    }
+
+    /// Boxes, each ten times as long and thin as the one before, across each other.
+    fn needles() -> CsgTree {
+        let needle = |i: i32| {
+            let (long_m, thin_m) = (1e5 * 10f64.powi(-i), 1e-5 * 10f64.powi(i));
+            CsgPart::at(Cuboid::new([thin_m, long_m, 1.0]).unwrap(), Vector3::x() * (1e-5 * f64::from(i)))
+        };
+        CsgTree::union((0..11).map(needle))
+    }
+
+    #[test]
+    fn cells_of_extreme_solids_are_made_with_a_bounded_number_of_looks() {
+        let built = |tree: &CsgTree| {
+            let csg = Csg::build(tree).unwrap();
+            (looks(&csg.cells), csg.cells.cells.len())
+        };
+        // 66 sides and 21 steps, eight times in each of 4681 cells, if each were near everywhere; none is.
+        let (looks, cells) = built(&needles());
+        println!("needles: {looks} looks, {cells} cells");
+        assert!((1..8 * 4681 * (66 + 21) / 10).contains(&looks), "{looks} looks for {cells} cells");
+        // A tree that would take more has fewer levels, and is left whole at the worst.
+        for shells in [32, 64, 100, 128] {
+            let (looks, cells) = built(&onion(shells));
+            println!("{shells} shells: {looks} looks, {cells} cells");
+            assert!(looks <= 4_000_000, "{shells} shells: {looks} looks for {cells} cells");
+        }
+    }
 }
