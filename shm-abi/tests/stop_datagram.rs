@@ -1,6 +1,6 @@
 //! The way to stop the motors that needs no connection.
 
-use patience::limit;
+use patience::{limit, watched};
 use shm_abi::server::Server;
 use shm_abi::stop_socket::{self, StopSocket, path_beside};
 use std::os::unix::fs::PermissionsExt;
@@ -44,9 +44,11 @@ fn sending_never_waits_and_a_full_queue_is_a_stop_on_its_way() {
     let server = Server::bind(&directory.path().join("driver.sock")).unwrap();
     // Nobody listens to this one.
     let (_socket, _file) = StopSocket::bind(server.path()).unwrap();
-    for _ in 0..10_000 {
-        stop_socket::send(server.path()).unwrap();
-    }
+    watched(limit(), "ten thousand stops that nobody takes", || {
+        for _ in 0..10_000 {
+            stop_socket::send(server.path()).unwrap();
+        }
+    });
 }
 
 #[test]
