@@ -102,7 +102,7 @@ fn block<'a>(lines: &'a [&'a str], begin: usize) -> &'a [&'a str] {
     }
     let closes =
         |line: &&str| line.trim_start().starts_with('}') && indentation(line) == indentation(lines[begin]);
-    let length = lines[begin + 1..].iter().position(|line| closes(line)).unwrap_or(0);
+    let length = lines[begin + 1..].iter().position(closes).unwrap_or(0);
     &lines[begin..=begin + length]
 }
 
