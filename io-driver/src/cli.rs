@@ -8,6 +8,7 @@ mod emergency;
 mod emulate;
 mod listeners;
 mod places;
+mod prompt;
 mod stopping;
 mod zero;
 

@@ -13,7 +13,8 @@
 //! Invariant: nothing a client sends or withholds blocks the thread; a client that connects and says
 //! nothing is dropped after [`PATIENCE`], and one that says more than its request, at once: what nobody
 //! reads may hold a copy of the connection itself, and so a lease that its holder's death does not end.
-//! Cost: some ten microseconds a connection; at most [`BATCH`] of them in each [`FLOOD_REST`].
+//! Cost: some twenty microseconds a connection (22 were measured, `docs/testing.md`); at most [`BATCH`] of them in each
+//! [`FLOOD_REST`].
 
 mod connection;
 mod places;

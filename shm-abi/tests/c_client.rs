@@ -13,7 +13,7 @@ use shm_abi::{Command, CommanderView, DriverMemory};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Output, Stdio};
 use std::sync::OnceLock;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 const FLAGS: [&str; 6] = ["-std=c11", "-Wall", "-Wextra", "-Werror", "-O2", "-pedantic"];
 
@@ -131,12 +131,16 @@ fn a_c_commander_answers_every_tick_under_its_lease() {
     let Some(client) = driver.client(&["command", &TICKS.to_string()]) else { return };
     let view = driver.lease();
     let mut command = Command::zeroed();
+    let begun = Instant::now();
     for tick in 0..TICKS {
         driver.publish(tick, Some(&view));
+        // One limit for all of them: of sleepers that nobody wakes each sleeps to its end.
         wait_until("the answer is there", || {
             let newest = view.latest_tick();
             if newest != Some(tick) {
-                view.sleep_for_command(newest, &driver.memory, limit());
+                let rest = limit().saturating_sub(begun.elapsed());
+                assert!(!rest.is_zero(), "waited {:?} in vain for {TICKS} answers; {tick} came", limit());
+                view.sleep_for_command(newest, &driver.memory, rest);
             }
             newest == Some(tick)
         });

@@ -6,6 +6,7 @@ use common::fake::{fake_server, hear, send};
 use common::host::Host;
 use common::{directory, info};
 use patience::prelude::*;
+use patience::{limit, watched};
 use shm_abi::client::{self, AttachError};
 use shm_abi::handshake::{Answer, Request, RequestKind, Verdict};
 use shm_abi::server::ServerEvent;
@@ -69,7 +70,7 @@ fn error_about(talk: impl Fn(UnixStream) + Send + 'static) -> AttachError {
     let directory = directory();
     let socket = directory.path().join("driver.sock");
     let server = fake_server(&socket, 1, talk);
-    let error = client::command(&socket, "test").unwrap_err();
+    let error = watched(limit(), "the client's end", || client::command(&socket, "test").unwrap_err());
     server.bounded_join().unwrap();
     error
 }

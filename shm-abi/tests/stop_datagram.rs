@@ -1,7 +1,7 @@
 //! The way to stop the motors that needs no connection.
 
-use patience::limit;
 use patience::prelude::*;
+use patience::{limit, watched};
 use shm_abi::server::Server;
 use shm_abi::stop_socket::{self, StopSocket, path_beside};
 use std::os::unix::fs::PermissionsExt;
@@ -49,8 +49,7 @@ fn a_stop_is_heard_until_it_is_taken_and_then_waited_for() {
     let drain = socket.drain().unwrap();
     stop_socket::send(server.path()).unwrap();
     let own = Some(rustix::process::geteuid().as_raw());
-    let twice =
-        patience::watched(limit(), "the same stop", || [socket.hear().unwrap(), socket.hear().unwrap()]);
+    let twice = watched(limit(), "the same stop", || [socket.hear().unwrap(), socket.hear().unwrap()]);
     assert_eq!(twice, [own, own]);
     drain.take();
     let (tell, told) = channel();
@@ -67,7 +66,7 @@ fn sending_never_waits_and_a_full_queue_is_a_stop_on_its_way() {
     let server = Server::bind(&directory.path().join("driver.sock")).unwrap();
     // Nobody listens to this one.
     let (_socket, _file) = StopSocket::bind(server.path()).unwrap();
-    patience::watched(limit(), "ten thousand stops that nobody takes", || {
+    watched(limit(), "ten thousand stops that nobody takes", || {
         for _ in 0..10_000 {
             stop_socket::send(server.path()).unwrap();
         }

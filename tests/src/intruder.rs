@@ -8,7 +8,7 @@ use rt_core::privileges::{Keep, reduce_thread};
 use std::os::unix::process::CommandExt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Environment variable that names the forbidden deed; without it there is no intruder.
 pub const CALL_VARIABLE: &str = "PHANTOM3_TEST_FORBIDDEN_CALL";
@@ -27,11 +27,15 @@ pub fn start_if_asked() {
     let told = Arc::new(AtomicBool::new(false));
     signal_hook::flag::register(signal_hook::consts::SIGUSR1, Arc::clone(&told))
         .expect("a signal to wait for");
+    // The environment is read here: the thread may do little.
+    let limit = patience::limit();
     let (ready, is_ready) = std::sync::mpsc::channel();
     let body = move || {
         reduce_thread(Keep::Nothing);
         let _ = ready.send(());
+        let begun = Instant::now();
         while !told.load(Ordering::Relaxed) {
+            assert!(begun.elapsed() < limit, "nobody asks for the deed");
             std::thread::sleep(Duration::from_millis(1));
         }
         commit(&deed);

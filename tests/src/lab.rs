@@ -80,11 +80,17 @@ impl Lab {
 
     /// The installer of another copy of `config/system`.
     pub fn installer_of(&self, sources: &Path) -> Command {
+        let mut command = self.installer_for_this_machine(sources);
+        // Whatever the machine that tests has.
+        command.args(["--cpus", "8"]);
+        command
+    }
+
+    /// The same with the CPUs that the machine that tests has.
+    pub fn installer_for_this_machine(&self, sources: &Path) -> Command {
         let mut command = Command::new("sh");
         command.arg(sources.join("install.sh"));
         command.arg("--destdir").arg(self.root.path()).arg("--binaries").arg(self.programs.path());
-        // Whatever the machine that tests has.
-        command.args(["--cpus", "8"]);
         command
     }
 

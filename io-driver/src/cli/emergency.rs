@@ -10,6 +10,7 @@
 
 use super::EXIT_FAULT;
 use super::places::{NotAsked, Places, nobody_asked, tell_of_unheard};
+use super::prompt::{PROMPT, PromptWords};
 use crate::print::print_outcome;
 use crate::say::say;
 use shm_abi::client::{self, AttachError};
@@ -21,9 +22,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
-/// Time limit of a stop, after which we say that nothing is certain.
-const PROMPT: Duration = Duration::from_millis(100);
-/// Time for which we look on after that.
+/// Time for which we look on after the words that nothing is certain.
 const PATIENCE: Duration = Duration::from_secs(5);
 /// So long a frame stands of a loop in lockstep that waits for its commander.
 const STANDS: Duration = Duration::from_millis(50);
@@ -32,9 +31,6 @@ const LOOK: Duration = Duration::from_micros(500);
 /// Between two tries to find a place among those who look on.
 const RETRY: Duration = Duration::from_millis(10);
 const NAME: &str = "io-driver";
-
-const UNCERTAIN: &str =
-    "the emergency stop is not confirmed within 100 ms: the motors may still be on; cut their power";
 
 /// A frame that shows that the motors are off.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -127,7 +123,7 @@ fn gather(news: &Receiver<(usize, News)>, places: usize, begun: Instant) -> Told
             Ok((index, news)) => told[index] = Some(news),
             Err(_) if !is_warned => {
                 is_warned = true;
-                say(format_args!("io-driver: {UNCERTAIN}"));
+                say_uncertain();
             }
             Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => break,
         }
@@ -153,10 +149,17 @@ fn ask_and_look(places: &Places, sent: &[bool], begun: Instant) -> Told {
     };
     look(&mut told, begun + PROMPT);
     if told.iter().any(|(_, news)| news.is_none()) {
-        say(format_args!("io-driver: {UNCERTAIN}"));
+        say_uncertain();
         look(&mut told, begun + PATIENCE);
     }
     told.into_iter().map(|(_, news)| news).collect()
+}
+
+fn say_uncertain() {
+    say(format_args!(
+        "io-driver: the emergency stop is not confirmed within {PromptWords}: the motors may still be on; cut their \
+         power"
+    ));
 }
 
 fn judge(places: &Places, told: Told) -> ExitCode {

@@ -7,6 +7,7 @@
 //! before anything is said.
 
 use super::places::{NotAsked, Places, nobody_asked, tell_of_unheard};
+use super::prompt::{PROMPT, PromptWords};
 use super::{EXIT_FAULT, EXIT_USAGE, fail, listeners};
 use crate::print::print_outcome;
 use crate::say::say;
@@ -18,15 +19,11 @@ use std::process::ExitCode;
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 
-/// How long a stop may take before we say that nothing is certain.
-const PROMPT: Duration = Duration::from_millis(100);
-/// How long we look on after that.
+/// How long we look on after the words that nothing is certain.
 const PATIENCE: Duration = Duration::from_secs(5);
 /// Between two looks whether it has ended.
 const LOOK: Duration = Duration::from_micros(500);
 const NAME: &str = "io-driver";
-
-const NOT_STOPPED: &str = "it has not stopped within 100 ms: the motors may still be on";
 
 /// Ends the driver, and says whether that was seen.
 pub(super) fn stop(places: &Places) -> ExitCode {
@@ -106,7 +103,7 @@ fn ask_to_end(socket: &Path) -> Ending {
         return observe_and_stop(socket);
     }
     let answer = answers.recv_timeout(PROMPT).or_else(|_| {
-        say(format_args!("io-driver: {NOT_STOPPED}"));
+        say_not_stopped();
         answers.recv()
     });
     // That thread cannot end without an answer but by a panic.
@@ -125,7 +122,7 @@ fn wait_for_end(observer: &Attachment, pid: u64) -> ExitCode {
     while observer.connection.is_open() && epitaph::read(&observer.driver.epitaph).is_none() {
         if !is_warned && begun.elapsed() > PROMPT {
             is_warned = true;
-            say(format_args!("io-driver: {NOT_STOPPED}"));
+            say_not_stopped();
         }
         if begun.elapsed() > PATIENCE {
             say(format_args!("io-driver: process {pid} lives on; cut the motors' power, then kill it"));
@@ -134,6 +131,10 @@ fn wait_for_end(observer: &Attachment, pid: u64) -> ExitCode {
         std::thread::sleep(LOOK);
     }
     judge_end(&observer.driver)
+}
+
+fn say_not_stopped() {
+    say(format_args!("io-driver: it has not stopped within {PromptWords}: the motors may still be on"));
 }
 
 fn judge_end(driver: &DriverView) -> ExitCode {

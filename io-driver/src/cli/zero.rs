@@ -3,13 +3,17 @@
 //! Model: says what the zeroing pose is, waits until the counters rest, asks the driver, and watches its frames: a
 //! zero that was granted shows as a device that is not valid and then valid, one that was refused shows as nothing.
 //! The driver judges rest, and whether somebody commands, by itself; what is looked at here is for better words.
+//! Invariants: no exit status of 0 without frames that show the zero. A driver that does not show within [`PROMPT`] what
+//! is waited for is told of then, whatever we wait in.
 
 use super::places::SocketArgs;
+use super::prompt::{PROMPT, PromptWords, say_if_late};
 use super::{EXIT_FAULT, EXIT_USAGE, fail};
 use crate::device_file::home_pose;
 use crate::print::print_line;
 use crate::safety::elapsed::Elapsed;
 use crate::safety::stillness::Stillness;
+use crate::say::say as warn;
 use bytemuck::Zeroable;
 use clap::Args;
 use rt_core::signals::StopSignals;
@@ -42,7 +46,8 @@ pub struct ZeroArgs {
 
 const AFTER_HELP: &str = "Counters know how far joints turned, not where they were: a device is told once in which \
 pose it is.\nA zero taken in another pose makes every position, force and limit wrong by as much: look twice.\n\
-Exit status: 0 zeroed; 2 bad usage, or refused at once; 3 it did not stand still, or the driver refused.";
+Exit status: 0 zeroed; 2 bad usage, or refused at once; 3 it did not stand still, or the driver refused, did not answer \
+or did not show the zero.";
 
 /// Why nothing was zeroed.
 #[derive(Debug, Error)]
@@ -91,7 +96,8 @@ impl ZeroError {
     fn is_usage(&self) -> bool {
         !matches!(
             self,
-            Self::Silent(_)
+            Self::Attach(AttachError::NoAnswer { .. })
+                | Self::Silent(_)
                 | Self::DriverGone
                 | Self::Interrupted
                 | Self::Moving { .. }
@@ -110,6 +116,7 @@ const ANSWER: Duration = Duration::from_secs(5);
 const TURN: Duration = Duration::from_millis(200);
 /// How often the frames are looked at for rest.
 const LOOK: Duration = Duration::from_millis(10);
+const NAME: &str = "io-driver zero";
 
 /// Runs it.
 pub(super) fn run(args: &ZeroArgs) -> ExitCode {
@@ -137,7 +144,8 @@ pub(super) struct Zeroing<'a> {
 
 impl<'a> Zeroing<'a> {
     pub(super) fn attach(socket: &'a Path, signals: &'a StopSignals) -> Result<Self, ZeroError> {
-        let attachment = client::observe(socket, "io-driver zero")?;
+        let words = format!("the driver has not answered within {PromptWords}; nothing is zeroed");
+        let attachment = say_if_late(&words, || client::observe(socket, NAME))?;
         let names = attachment.driver.info().devices.into_iter().map(|device| device.name).collect();
         let mut zeroing = Self { socket, attachment, signals, names, frame: Frame::zeroed() };
         if zeroing.driver().abi_minor() < 2 {
@@ -196,7 +204,10 @@ impl<'a> Zeroing<'a> {
         }
         self.wait_for_rest(devices, wait_s)?;
         let before = self.frame;
-        self.ask(devices)?;
+        let words = format!(
+            "the zero is not confirmed within {PromptWords}: positions may be those of before or wrong"
+        );
+        say_if_late(&words, || self.ask(devices))?;
         for index in devices {
             say(&told(&self.names[*index], &before.devices[*index], self.device(*index)));
         }
@@ -216,7 +227,8 @@ impl<'a> Zeroing<'a> {
         if self.frame.state != DriverState::Active as u64 && self.frame.authority == 0.0 {
             return Ok(());
         }
-        match client::command(self.socket, "io-driver zero") {
+        let words = format!("the driver has not told within {PromptWords} who commands");
+        match say_if_late(&words, || client::command(self.socket, NAME)) {
             Err(AttachError::LeaseHeld { pid, name }) => {
                 Err(ZeroError::Commanded(format!("process {pid} ({name})")))
             }
@@ -228,6 +240,7 @@ impl<'a> Zeroing<'a> {
     /// Waits for a frame of a tick after `tick`.
     fn next_frame(&mut self, tick: u64) -> Result<(), ZeroError> {
         let begun = Instant::now();
+        let mut is_warned = false;
         loop {
             if self.signals.requested().is_some() {
                 return Err(ZeroError::Interrupted);
@@ -238,6 +251,10 @@ impl<'a> Zeroing<'a> {
             }
             if !self.attachment.connection.is_open() {
                 return Err(ZeroError::DriverGone);
+            }
+            if !is_warned && begun.elapsed() > PROMPT {
+                is_warned = true;
+                warn(format_args!("io-driver: the driver has told nothing for {PromptWords}; looking on"));
             }
             if begun.elapsed() > SILENCE {
                 return Err(ZeroError::Silent(SILENCE.as_secs()));
@@ -282,7 +299,7 @@ impl<'a> Zeroing<'a> {
         while began.elapsed() < ANSWER {
             let is_due = asked.is_none_or(|asked: Instant| asked.elapsed() > TURN);
             if is_due && !self.was_granted(devices, &was_withheld) {
-                client::zero(self.socket, "io-driver zero", bits)?;
+                client::zero(self.socket, NAME, bits)?;
                 asked = Some(Instant::now());
             }
             self.next_frame(seen)?;

@@ -353,11 +353,11 @@ mod tests {
     fn a_card_that_is_played_is_not_replaced_and_one_that_was_left_is() {
         let (_directory, path) = place();
         let card = Card::create(&path).unwrap();
-        let over = std::sync::atomic::AtomicBool::new(false);
+        let stop = std::sync::atomic::AtomicBool::new(false);
         std::thread::scope(|scope| {
-            let _over = patience::Raised(&over);
+            let _stops = patience::Raised(&stop);
             scope.spawn(|| {
-                while !over.load(Ordering::Relaxed) {
+                while !stop.load(Ordering::Relaxed) {
                     card.inputs.heartbeat.fetch_add(1, Ordering::Relaxed);
                     std::thread::sleep(Duration::from_millis(1));
                 }

@@ -192,6 +192,7 @@ impl Safety {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::SafetyConfig;
     use proptest::prelude::*;
 
     const MS: u64 = 1_000_000;
@@ -252,6 +253,26 @@ mod tests {
         }
         assert_eq!(safety.authority(), 0.0);
         assert_eq!(safety.state(), DriverState::Idle);
+    }
+
+    /// At 1 kHz and the default settings, as the safety page tells it: a tick without a reply waits for the reply's
+    /// budget, half a tick, so that zero comes 9.5 ms after a reply at once.
+    #[test]
+    fn by_default_the_ninth_tick_without_a_reply_is_zero_and_the_fifth_costs_a_fifth() {
+        let usual = SafetyConfig::usual(MS);
+        let ramps = Ramps {
+            in_ns: usual.ramp_in_ns,
+            out_ns: usual.ramp_out_ns,
+            max_command_age_ns: usual.max_command_age_ns,
+        };
+        let mut safety = active(ramps);
+        let mut missed = |ticks: u64| safety.advance(safety.judge(age(ticks, ticks * MS), 0), TICK);
+        let shares: Vec<f64> = (1..=10).map(&mut missed).collect();
+        assert_eq!(shares, [1.0, 1.0, 1.0, 1.0, 0.8, 0.6, 0.4, 0.2, 0.0, 0.0]);
+        // Back by half a percent a millisecond, from the tick after the first answer.
+        for tick in 0..=200 {
+            assert_eq!(safety.advance(ReplyKind::Fresh, TICK), f64::from(tick) * 0.005, "tick {tick}");
+        }
     }
 
     #[test]

@@ -60,6 +60,21 @@ fn without_replies_the_force_is_held_then_ramps_to_zero_and_stays_there() {
 }
 
 #[test]
+fn a_lease_that_has_never_answered_misses_no_reply() {
+    let mut bench = Bench::new(0);
+    let commander = bench.lease(1);
+    for _ in 0..5 {
+        bench.silent_tick();
+    }
+    let counted =
+        |bench: &Bench| (bench.counter(|c| &c.replies_missed), bench.counter(|c| &c.ticks_commanded));
+    assert_eq!(counted(&bench), (0, 0));
+    bench.tick(|frame, view| publish(&commander, view, frame.tick, UP));
+    bench.silent_tick();
+    assert_eq!(counted(&bench), (1, 2));
+}
+
+#[test]
 fn a_late_reply_is_better_than_an_older_one() {
     let mut bench = Bench::new(0);
     let commander = bench.lease(1);

@@ -33,8 +33,17 @@ const PACKAGES: [&str; 12] = [
     "tests",
 ];
 
-/// Waits in time that loom invents; a program for laboratories, whose user sees what it waits for.
-const OTHERS: [&str; 2] = ["shm-abi/tests/loom_protocol.rs", "tests/src/jitter"];
+/// Waits in time that loom invents.
+const OTHERS: [&str; 1] = ["shm-abi/tests/loom_protocol.rs"];
+
+/// A program for laboratories, whose user sees what it waits for: of its sources the unit tests count.
+const PROGRAMS: [&str; 1] = ["tests/src/jitter"];
+
+/// What a loop does that looks again and again.
+const PAUSES: [&str; 4] = ["yield_now(", "sleep(", "spin_loop(", "park("];
+
+/// What a loop asks that ends in time: a clock, or the flag that whoever waits for this thread raises.
+const ENDS: [&str; 4] = ["elapsed()", "Instant::now()", "monotonic_ns()", "stop.load("];
 
 #[test]
 fn no_test_waits_without_a_limit() {
@@ -56,19 +65,82 @@ fn no_test_waits_without_a_limit() {
 fn endless_waits(file: &Path, root: &Path) -> Vec<String> {
     let text = fs::read_to_string(file).unwrap();
     let first = first_line_of_tests(file.strip_prefix(root).unwrap(), &text);
+    let polls = endless_polls(&text, first);
+    let polls =
+        polls.map(|line| format!("{}:{line}: a loop\n    instead: until, or watched", file.display()));
     let lines = text.lines().enumerate().skip(first).filter_map(|(number, line)| {
         let code = line.trim();
-        // A type's own method that joins with a limit.
-        let line = line.replace("self.join()", "");
+        // A type's own method that joins with a limit, and a clock, which comes to its next tick by itself.
+        let line = line.replace("self.join()", "").replace("waiter.wait()", "");
         let (_, instead) = ENDLESS.iter().find(|(pattern, _)| line.contains(pattern))?;
         Some(format!("{}:{}: {code}\n    instead: {instead}", file.display(), number + 1))
     });
-    lines.collect()
+    lines.chain(polls).collect()
+}
+
+/// Numbers of the lines that begin a loop which looks again and again, has no end in time and is not watched.
+fn endless_polls(text: &str, first: usize) -> impl Iterator<Item = usize> {
+    let lines: Vec<&str> = text.lines().collect();
+    let has = |block: &[&str], words: &[&str]| {
+        block.iter().any(|line| words.iter().any(|word| line.contains(word)))
+    };
+    let is_endless = move |begin: &usize| {
+        let body = block(&lines, *begin);
+        let function = (0..*begin)
+            .rev()
+            .find(|line| is_function(lines[*line]) && indentation(lines[*line]) < indentation(lines[*begin]));
+        let is_watched = function.is_some_and(|line| has(block(&lines, line), &["watched("]));
+        is_loop(lines[*begin]) && has(body, &PAUSES) && !has(body, &ENDS) && !is_watched
+    };
+    (first..text.lines().count()).filter(is_endless).map(|line| line + 1).collect::<Vec<_>>().into_iter()
+}
+
+/// From a line to the one that closes what it opens, as the sources are formatted.
+fn block<'a>(lines: &'a [&'a str], begin: usize) -> &'a [&'a str] {
+    if lines[begin].trim_end().ends_with('}') {
+        return &lines[begin..=begin];
+    }
+    let closes =
+        |line: &&str| line.trim_start().starts_with('}') && indentation(line) == indentation(lines[begin]);
+    let length = lines[begin + 1..].iter().position(closes).unwrap_or(0);
+    &lines[begin..=begin + length]
+}
+
+fn is_loop(line: &str) -> bool {
+    let code = line.trim_start();
+    // After a label.
+    let code = code.strip_prefix('\'').and_then(|code| code.split_once(": ")).map_or(code, |(_, code)| code);
+    code.starts_with("while ") || code.starts_with("loop {")
+}
+
+fn is_function(line: &str) -> bool {
+    let code = line.trim_start();
+    code.starts_with("fn ") || code.starts_with("pub fn ") || code.starts_with("pub(crate) fn ")
+}
+
+fn indentation(line: &str) -> usize {
+    line.len() - line.trim_start().len()
+}
+
+#[test]
+fn a_loop_that_polls_without_a_limit_is_found_and_one_with_a_limit_is_none() {
+    let found = |text: &str| endless_polls(text, 0).collect::<Vec<_>>();
+    let polls = "fn test() {\n    while !is_done() {\n        std::thread::yield_now();\n    }\n}\n";
+    assert_eq!(found(polls), [2]);
+    assert_eq!(found(&polls.replace("while !is_done()", "'outer: loop")), [2]);
+    assert_eq!(found(&polls.replace("yield_now()", "sleep(PAUSE)")), [2]);
+    assert_eq!(found(&polls.replace("std::thread::yield_now();", "count += 1;")), []);
+    assert_eq!(found(&polls.replace("is_done()", "stop.load(Ordering::Relaxed)")), []);
+    assert_eq!(found(&polls.replace("!is_done()", "begun.elapsed() < HANG")), []);
+    let watched = "fn test() {\n    watched(limit(), \"it\", || {\n        loop {\n            sleep(PAUSE);\n        }\n    });\n}\n";
+    assert_eq!(found(watched), []);
+    assert_eq!(found(&watched.replace("watched", "thread")), [3]);
 }
 
 /// First line of the tests of a source: the first of all that is there for tests, else that of the module of tests.
 fn first_line_of_tests(file: &Path, text: &str) -> usize {
-    let is_for_tests = file.iter().any(|part| part == "tests")
+    let is_program = PROGRAMS.iter().any(|program| file.starts_with(program));
+    let is_for_tests = file.iter().any(|part| part == "tests") && !is_program
         || file.file_name().is_some_and(|name| name.to_string_lossy().ends_with("tests.rs"));
     if is_for_tests {
         return 0;

@@ -124,9 +124,9 @@ mod tests {
         let mut saver = Saver::new(&directory, Duration::from_secs(1)).unwrap();
         let mut save = || {
             saver.begin_save(&document(&[]));
-            while saver.writer.as_ref().is_some_and(|writer| !writer.is_finished()) {
-                std::thread::yield_now();
-            }
+            patience::until("the end of a write", || {
+                saver.writer.as_ref().is_none_or(JoinHandle::is_finished)
+            });
             saver.news()
         };
         assert_eq!(save(), None);

@@ -266,6 +266,7 @@ fn hybrid(order: &Order) -> Periodic {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use patience::prelude::*;
 
     fn order(wait: Wait) -> Order {
         Order {
@@ -311,7 +312,7 @@ mod tests {
         let (send, receive) = mpsc::sync_channel(1);
         let shared = Shared::default();
         run(&order(Wait::Hybrid), producer, &send, &shared);
-        assert!(receive.recv().unwrap().tid > 0);
+        assert!(receive.bounded_recv().unwrap().tid > 0);
         let woke: Vec<Woke> = std::iter::from_fn(|| consumer.pop().ok()).collect();
         let last = woke.last().unwrap().tick;
         // Tick numbers count what was skipped; a stall across the end overshoots.

@@ -82,7 +82,8 @@ fn signal(driver: &Driver, signal: Signal) {
     kill_process(pid, signal).expect("our own child");
 }
 
-/// The words come long before the five seconds for which it is looked on: half of them are for a busy machine.
+/// The words name the time after which they come, from the constant that it is. They come long before the five seconds
+/// for which it is looked on: half of them are for a busy machine.
 fn told_in_time(driver: &Driver, command: &str, words: &str) -> End {
     let begun = Instant::now();
     let mut asking = Running::start(io_driver().arg(command).arg("--socket").arg(driver.socket()));
@@ -104,6 +105,9 @@ fn a_driver_that_is_stopped_is_not_taken_for_one_that_obeyed() {
     let emergency = told_in_time(&driver, "emergency-stop", uncertain);
     assert_eq!(emergency.status, Some(3), "{emergency:?}");
     assert!(emergency.err.contains("no frame has shown it"), "{emergency:?}");
+    let zero = told_in_time(&driver, "zero", "the driver has not answered within 100 ms; nothing is zeroed");
+    assert_eq!(zero.status, Some(3), "{zero:?}");
+    assert!(zero.err.contains("does not answer within 2 s"), "{zero:?}");
     // What was asked while it stood still is done once it goes on.
     signal(&driver, Signal::CONT);
     assert_eq!(driver.wait().code(), Some(0));

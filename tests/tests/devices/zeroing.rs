@@ -205,6 +205,33 @@ fn a_zero_is_refused_while_the_arm_moves_and_changes_nothing() {
     stand.finish();
 }
 
+/// A device that its commander has not seen without its place stays not valid.
+#[test]
+fn a_zero_that_a_stopped_commander_does_not_see_is_told_of_at_once_and_not_called_done() {
+    let stand = Stand::start(Setup::new("real"));
+    let app = stand.start_app();
+    stand.wait_for_force();
+    app.signal(rustix::process::Signal::STOP);
+    wait_for("the force to ramp out", || {
+        let frame = frame(&stand);
+        frame.authority == 0.0 && frame.state != DriverState::Active as u64
+    });
+    let begun = std::time::Instant::now();
+    let mut zeroing = programs::io_driver();
+    zeroing.args(["zero", "--yes", "--device", "f0", "--socket"]).arg(stand.socket());
+    let mut zeroing = Running::start(&mut zeroing);
+    zeroing.hear(
+        "io-driver: the zero is not confirmed within 100 ms: positions may be those of before or wrong",
+    );
+    // Half a second of rest comes first; it is looked on for five seconds after that.
+    assert!(begun.elapsed() < Duration::from_secs(4), "{:?}", begun.elapsed());
+    let end = zeroing.end();
+    assert_eq!(end.status, Some(3), "{end:?}");
+    assert!(end.err.contains("the process that holds the lease has not answered since"), "{end:?}");
+    app.kill();
+    stand.finish();
+}
+
 #[test]
 fn a_jump_costs_the_zero_and_clearing_the_fault_leads_to_zeroing() {
     for zeroing in ["ask", "at-start"] {

@@ -20,11 +20,12 @@ use std::os::fd::AsFd;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
-use system_tests::driver::Driver;
-use system_tests::faults::commander::Commander;
+use system_tests::driver::{Driver, HANG};
+use system_tests::faults::commander::{Commander, answer};
 use system_tests::faults::madman::rave;
 use system_tests::faults::random::Random;
 use system_tests::faults::ring::{RingLog, Told};
+use system_tests::faults::stand::{Setup, Stand};
 
 const PEAK_N: f64 = 8.5;
 const DEVICES: usize = 2;
@@ -378,6 +379,47 @@ fn honest_successor(driver: &Driver) {
     let _commander = Commander::start(driver.command(), [1.0, 0.0, 0.0]);
     let obeyed = |told: &Told| told.authority == 1.0 && told.first_applied_n == [1.0, 0.0, 0.0];
     log.follow(&view, "obedience", |told| told.iter().any(obeyed));
+}
+
+/// How fast the force of an arm as it is described may grow (N/s).
+const USUAL_SLEW_N_PER_S: f64 = 5000.0;
+
+/// What a converter's step makes at a tip at home (N), of which two forces are told to half each: 5.5 A / 2048 x
+/// 23.4 mN m/A x 11.3 at 0.17 m.
+const CODE_N: f64 = 5.5 / 2048.0 * 0.0234 * 11.3 / 0.17;
+
+/// At 1 kHz: from rest to 8 N takes two ticks, one of them the whole step, and so it does after each reversal. The
+/// amplifiers judge every value by the same limit.
+#[test]
+fn a_force_that_reverses_at_once_grows_by_five_newton_a_tick_in_the_amplifiers() {
+    let mut setup = Setup { safety: "ramp_in_ms = 20", ..Setup::new("real") };
+    (setup.limits.rate_hz, setup.limits.slew_n_per_s) = (1000.0, USUAL_SLEW_N_PER_S);
+    let stand = Stand::start(setup);
+    assert_eq!(stand.view().info().devices[0].slew_n_per_s, USUAL_SLEW_N_PER_S);
+    let commander = Commander::start(stand.command(), [0.0, 0.1, 0.0]);
+    let mut log = RingLog::begin(stand.view());
+    log.follow(stand.view(), "authority", |told| told.last().is_some_and(|told| told.authority == 1.0));
+    drop(commander);
+    let Attachment { driver, commander, connection, .. } = stand.command();
+    let commander = commander.expect("the lease");
+    log.forget();
+    // The age of commands and the ramp begin anew: some of what is asked is let through in part.
+    let begun = std::time::Instant::now();
+    while log.told.len() < 600 {
+        assert!(begun.elapsed() < HANG, "{} frames", log.told.len());
+        log.catch_up(&driver);
+        let sign = if driver.latest_tick().unwrap_or(0) / 8 % 2 == 0 { 8.0 } else { -8.0 };
+        answer(&driver, &commander, commander.lease(), [0.0, sign, 0.0]);
+        std::thread::sleep(std::time::Duration::from_micros(100));
+    }
+    drop(connection);
+    let forces = log.told.iter().map(|told| told.first_applied_n[1]).collect::<Vec<_>>();
+    let grown =
+        |pair: &[f64]| if pair[0] * pair[1] < 0.0 { pair[1].abs() } else { pair[1].abs() - pair[0].abs() };
+    let most = forces.windows(2).map(grown).fold(0.0, f64::max);
+    let step = stand.setup.limits.step_n();
+    assert!(most <= step + CODE_N && most > step - CODE_N, "{most} N of {step} N");
+    stand.finish();
 }
 
 #[test]

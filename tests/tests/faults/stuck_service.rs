@@ -78,12 +78,19 @@ fn calls_of_a_life() -> BTreeSet<String> {
     calls
 }
 
-fn traced() -> Option<BTreeSet<String>> {
-    if !Tracer::works() {
+fn may_trace() -> bool {
+    let works = Tracer::works();
+    if !works {
         println!(
             "skipped: there is no strace that may attach; that a stuck service keeps nobody from stopping is tested \
              with a full standard error instead"
         );
+    }
+    works
+}
+
+fn traced() -> Option<BTreeSet<String>> {
+    if !may_trace() {
         return None;
     }
     let calls = calls_of_a_life();
@@ -170,7 +177,7 @@ fn whatever_call_the_service_is_stuck_in_the_loop_stops_the_motors_by_itself() {
 /// A panic of the service is one of its failures: `service.rs` tests that it is caught as one.
 #[test]
 fn a_service_that_fails_ends_the_loop_with_zero_last_words_and_status_3() {
-    if traced().is_none() {
+    if !may_trace() {
         return;
     }
     let harm = Harm::Failure("ENOMEM");
@@ -186,18 +193,70 @@ fn a_service_that_fails_ends_the_loop_with_zero_last_words_and_status_3() {
     harmed.stand.amplifiers.check_off("a service that fails");
 }
 
+/// What a device may do, and what the loop makes of it.
+const FAULTS: [(&str, FaultReason); 2] =
+    [("nan", FaultReason::PositionNotFinite), ("unreadable", FaultReason::DeviceRead)];
+
+/// The loop finds a fault of its own while the service is harmed in a call.
+fn check_own_fault(call: &str, harm: Harm, (act, reason): (&str, FaultReason)) {
+    let when = format!("{act} under {call}, {harm:?}");
+    let process = if harm == Harm::Stall { PATIENT } else { WITHOUT_SANDBOX };
+    let sabotaged = setup(process).sabotaged(&format!("{act}@button20"));
+    let harmed = harmed(call, harm, sabotaged).unwrap_or_else(|| panic!("{call} was never made again"));
+    assert!(harmed.is_pushed, "{when}");
+    harmed.stand.amplifiers.press(1 << 20);
+    check_stopped(&harmed.stand, reason, &when);
+}
+
+/// A wait that is made to fail ends the driver, but for the one that is interrupted.
+fn failures_of(call: &str) -> Vec<Harm> {
+    let ends = |error: &&str| call == "ppoll" && *error != "EINTR";
+    errors_of(call).iter().filter(|error| !ends(error)).map(|error| Harm::Failure(error)).collect()
+}
+
 #[test]
 fn a_loop_whose_service_is_stuck_finds_its_own_faults() {
-    if traced().is_none() {
+    if !may_trace() {
         return;
     }
-    for (act, reason) in [("nan", FaultReason::PositionNotFinite), ("unreadable", FaultReason::DeviceRead)] {
-        let sabotaged = setup(PATIENT).sabotaged(&format!("{act}@button20"));
-        let harmed = harmed("ppoll", Harm::Stall, sabotaged).expect("it waits for something all the time");
-        assert!(harmed.is_pushed);
-        harmed.stand.amplifiers.press(1 << 20);
-        check_stopped(&harmed.stand, reason, act);
+    for (index, call) in UNDER_FORCE.into_iter().enumerate() {
+        check_own_fault(call, Harm::Stall, FAULTS[index % 2]);
     }
+}
+
+#[test]
+fn a_loop_whose_service_fails_in_a_call_finds_its_own_faults() {
+    if !may_trace() {
+        return;
+    }
+    // Two drivers at a time: most of it is clients that wait for an answer.
+    for pair in UNDER_FORCE.chunks(2) {
+        patience::watched(2 * patience::limit(), "two drivers", || {
+            std::thread::scope(|scope| {
+                for (call, fault) in pair.iter().zip(FAULTS.into_iter().rev()) {
+                    scope.spawn(move || check_own_fault(call, failures_of(call)[0], fault));
+                }
+            });
+        });
+    }
+}
+
+#[test]
+#[ignore = "a minute: cargo test -p system-tests --test faults every_fault -- --ignored --nocapture"]
+fn every_fault_of_the_loops_own_is_found_under_every_harm_of_the_service() {
+    if !may_trace() {
+        return;
+    }
+    let mut cases = 0;
+    for call in UNDER_FORCE {
+        for harm in failures_of(call).into_iter().chain([Harm::Stall]) {
+            for fault in FAULTS {
+                check_own_fault(call, harm, fault);
+                cases += 1;
+            }
+        }
+    }
+    println!("{cases} faults were found");
 }
 
 /// Errors of a call that is harmed in earnest; of others EIO, which none of them has.

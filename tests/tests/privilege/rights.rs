@@ -281,9 +281,7 @@ fn play_parent() -> ! {
     // Its end must not hold the pipes that the test reads.
     command.arg("--socket").arg(&socket).stdout(Stdio::null()).stderr(Stdio::null());
     let driver = command.spawn().expect("it starts");
-    while shm_abi::client::observe(&socket, "parent").is_err() {
-        std::thread::sleep(std::time::Duration::from_millis(2));
-    }
+    patience::until("the driver", || shm_abi::client::observe(&socket, "parent").is_ok());
     // What is killed cannot tidy up.
     drop(directory);
     // In one piece.
