@@ -75,6 +75,7 @@ pub(crate) fn is_open(socket: &impl AsFd) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use patience::prelude::*;
     use std::io::Write;
     use std::os::unix::net::UnixStream;
 
@@ -92,7 +93,7 @@ mod tests {
         });
         let received = receive::<Message>(near.as_fd(), patience).map(|(message, _)| message);
         drop(near);
-        sender.join().expect("the sender ends");
+        sender.bounded_join().expect("the sender ends");
         received
     }
 

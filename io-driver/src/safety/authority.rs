@@ -269,9 +269,9 @@ mod tests {
         let mut missed = |ticks: u64| safety.advance(safety.judge(age(ticks, ticks * MS), 0), TICK);
         let shares: Vec<f64> = (1..=10).map(&mut missed).collect();
         assert_eq!(shares, [1.0, 1.0, 1.0, 1.0, 0.8, 0.6, 0.4, 0.2, 0.0, 0.0]);
-        // Back by half a percent a millisecond, from the tick after the first answer.
+        // Back by a two hundredth a millisecond, from the tick after the first answer.
         for tick in 0..=200 {
-            assert_eq!(safety.advance(ReplyKind::Fresh, TICK), f64::from(tick) * 0.005, "tick {tick}");
+            assert_eq!(safety.advance(ReplyKind::Fresh, TICK), f64::from(tick) / 200.0, "tick {tick}");
         }
     }
 
