@@ -310,6 +310,12 @@ mod tests {
     }
 
     #[test]
+    fn every_state_has_its_name() {
+        let names: Vec<_> = (0..5).filter_map(DriverState::from_word).map(DriverState::name).collect();
+        assert_eq!(names, ["starting", "zeroing", "idle", "active", "fault"]);
+    }
+
+    #[test]
     fn a_fault_of_a_later_version_is_told_by_its_number() {
         assert_eq!(FaultReason::sentence_for(8), "an emergency stop was pressed");
         assert_eq!(FaultReason::sentence_for(12), "a fault of a kind this version does not know (12)");

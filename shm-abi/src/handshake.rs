@@ -299,6 +299,17 @@ mod tests {
     }
 
     #[test]
+    fn a_request_tells_when_it_was_asked_by_the_monotonic_clock() {
+        let now_ns = || {
+            let now = rustix::time::clock_gettime(rustix::time::ClockId::Monotonic);
+            i128::from(now.tv_sec) * 1_000_000_000 + i128::from(now.tv_nsec)
+        };
+        let before = now_ns();
+        let asked = i128::from(Request::new(RequestKind::Observe, "test").asked_ns);
+        assert!((before..=now_ns()).contains(&asked), "{before} {asked}");
+    }
+
+    #[test]
     fn a_refusal_names_the_group_that_may() {
         for (group, word) in [(None, 0), (Some(0), 1), (Some(1000), 1001), (Some(u32::MAX), 1 << 32)] {
             let answer = Answer::not_allowed(group);

@@ -55,6 +55,7 @@ fn body_of_another_process() {
         "endpoint" => {
             println!("\nplaces: {:?}", endpoint::candidates());
             println!("for a driver: {:?}, named: {:?}", endpoint::for_driver(), endpoint::named());
+            println!("for an application: {:?}", endpoint::for_application());
         }
         "driver without descriptors" => serve_without_descriptors(&socket),
         other => panic!("no such body: {other}"),
@@ -230,26 +231,50 @@ fn frames_of_a_dead_driver_can_still_be_read() {
     assert!(is_frame(&found, 1));
 }
 
+/// What a process of ours in this environment says of the driver's place.
+fn places_told(binary: &Path, variables: &[(&str, &Path)], user: Option<u32>) -> String {
+    use std::os::unix::process::CommandExt;
+    let mut command = process(binary, "endpoint", Path::new("unused"));
+    for variable in ["PHANTOM3_SOCKET", "RUNTIME_DIRECTORY", "XDG_RUNTIME_DIR"] {
+        command.env_remove(variable);
+    }
+    if let Some(user) = user {
+        command.uid(user);
+    }
+    let output = command.current_dir("/").envs(variables.iter().copied()).bounded_output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    let is_told = |line: &&str| line.starts_with("places: ") || line.starts_with("for a");
+    text.lines().filter(is_told).collect::<Vec<_>>().join("; ")
+}
+
 #[test]
 fn the_drivers_place_is_the_one_that_the_environment_names() {
-    let told = |variables: &[(&str, &str)]| {
-        let mut command = process(&own_binary(), "endpoint", Path::new("unused"));
-        for variable in ["PHANTOM3_SOCKET", "RUNTIME_DIRECTORY", "XDG_RUNTIME_DIR"] {
-            command.env_remove(variable);
-        }
-        let output = command.envs(variables.iter().copied()).bounded_output().unwrap();
-        let text = String::from_utf8(output.stdout).unwrap();
-        let lines =
-            text.lines().filter(|line| line.starts_with("places: ") || line.starts_with("for a driver: "));
-        lines.collect::<Vec<_>>().join("; ")
-    };
+    let [named, user] = ["/a/b", "/x"].map(Path::new);
     assert_eq!(
-        told(&[("PHANTOM3_SOCKET", "/a/b"), ("XDG_RUNTIME_DIR", "/x")]),
-        "places: [\"/a/b\"]; for a driver: \"/a/b\", named: Some(\"/a/b\")"
+        places_told(&own_binary(), &[("PHANTOM3_SOCKET", named), ("XDG_RUNTIME_DIR", user)], None),
+        "places: [\"/a/b\"]; for a driver: \"/a/b\", named: Some(\"/a/b\"); for an application: \"/a/b\""
     );
-    assert_eq!(
-        told(&[("XDG_RUNTIME_DIR", "/x")]),
-        "places: [\"/x/phantom3/driver.sock\", \"/run/phantom3/driver.sock\"]; for a driver: \
-         \"/x/phantom3/driver.sock\", named: None"
-    );
+    let told = places_told(&own_binary(), &[("XDG_RUNTIME_DIR", user)], None);
+    let expected = "places: [\"/x/phantom3/driver.sock\", \"/run/phantom3/driver.sock\"]; for a driver: \
+                    \"/x/phantom3/driver.sock\", named: None; for an application: ";
+    assert!(told.starts_with(expected), "{told}");
+}
+
+/// The permission is what gets reported, and not that nothing is in another place.
+#[test]
+fn an_application_goes_for_the_place_that_is_hidden_from_it() {
+    const NOBODY: u32 = 65534;
+    let directory = directory();
+    let [absent, hidden] = ["absent", "hidden"].map(|name| directory.path().join(name));
+    std::fs::create_dir(&hidden).unwrap();
+    // Where another user can run it.
+    let shared = tempfile::Builder::new().permissions(Permissions::from_mode(0o755)).tempdir().unwrap();
+    let binary = shared.path().join("test");
+    std::fs::copy(own_binary(), &binary).unwrap();
+    std::fs::set_permissions(directory.path(), Permissions::from_mode(0o755)).unwrap();
+    std::fs::set_permissions(&hidden, Permissions::from_mode(0o000)).unwrap();
+    let user = rustix::process::geteuid().is_root().then_some(NOBODY);
+    let told = places_told(&binary, &[("RUNTIME_DIRECTORY", &absent), ("XDG_RUNTIME_DIR", &hidden)], user);
+    let expected = format!("for an application: {:?}", hidden.join("phantom3/driver.sock"));
+    assert!(told.ends_with(&expected), "{told}; expected {expected}");
 }
