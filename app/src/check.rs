@@ -8,6 +8,7 @@ mod measures;
 mod report;
 mod summary;
 mod suspicions;
+mod together;
 mod warnings;
 
 use crate::outputs;

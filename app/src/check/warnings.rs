@@ -1,5 +1,6 @@
 //! What runs, but hardly as meant.
 
+use super::together;
 use crate::rig::{Rig, in_words};
 use crate::study::stiffness::bounds::Theory;
 use crate::study::stiffness::case::{Axis, Case, Hand, Mode};
@@ -15,7 +16,9 @@ use world::{MassSpec, Scene, ShapeSpec};
 
 /// All of them.
 pub(super) fn all(rig: &Rig, whole: &Scene, entities: &[Entity]) -> Vec<String> {
-    let mut warnings = too_stiff(rig);
+    let mut stands = Stands::of(rig);
+    let mut warnings = too_stiff(rig, &mut stands);
+    warnings.extend(together::too_stiff(rig, entities, &mut stands));
     warnings.extend(overlaps(rig, entities));
     warnings.extend(inside(rig, entities));
     warnings.extend(closed(rig, entities));
@@ -26,20 +29,18 @@ pub(super) fn all(rig: &Rig, whole: &Scene, entities: &[Entity]) -> Vec<String> 
 }
 
 /// Against what the sampled linear loop stands, with a Premium held lightly that is answered in the same tick.
-fn too_stiff(rig: &Rig) -> Vec<String> {
-    let mut limits = BTreeMap::new();
+fn too_stiff(rig: &Rig, stands: &mut Stands) -> Vec<String> {
     let mut beyond: BTreeMap<u64, Vec<String>> = BTreeMap::new();
     for entity in rig.scene.entities.iter().filter(|entity| entity.is_haptic) {
         let damping = entity.damping_n_s_per_m;
-        let limit = *limits.entry(damping.to_bits()).or_insert_with(|| limit(rig.period_ns, damping));
-        if limit.is_some_and(|limit| entity.stiffness_n_per_m > limit) {
+        if stands.limit(damping).is_some_and(|limit| entity.stiffness_n_per_m > limit) {
             let named = format!("{} ({} N/m)", entity.name, entity.stiffness_n_per_m);
             beyond.entry(damping.to_bits()).or_default().push(named);
         }
     }
     let rate_hz = 1e9 / rig.period_ns as f64;
     let told = beyond.into_iter().filter_map(|(damping, names)| {
-        let (limit, damping) = (limits.get(&damping).copied().flatten()?, f64::from_bits(damping));
+        let (limit, damping) = (stands.limit(f64::from_bits(damping))?, f64::from_bits(damping));
         Some(format!(
             "{} may buzz: at {rate_hz} Hz and {damping} N s/m a lightly held Premium stands {limit:.0} N/m by the linear \
              loop; `passivity` of the finger keeps it quiet",
@@ -49,7 +50,24 @@ fn too_stiff(rig: &Rig) -> Vec<String> {
     told.collect()
 }
 
-/// `None`: nobody knows, or there is none.
+/// What stiffness the loop stands, by the damping of what is touched.
+pub(super) struct Stands {
+    period_ns: u64,
+    known: BTreeMap<u64, Option<f64>>,
+}
+
+impl Stands {
+    fn of(rig: &Rig) -> Self {
+        Self { period_ns: rig.period_ns, known: BTreeMap::new() }
+    }
+
+    /// `None`: nobody knows, or there is none.
+    pub(super) fn limit(&mut self, damping_n_s_per_m: f64) -> Option<f64> {
+        let period_ns = self.period_ns;
+        *self.known.entry(damping_n_s_per_m.to_bits()).or_insert_with(|| limit(period_ns, damping_n_s_per_m))
+    }
+}
+
 fn limit(period_ns: u64, damping_n_s_per_m: f64) -> Option<f64> {
     let bench = Bench::new(Path::new("premium-1.5"), Axis::Y, [1e-3, 1e-3]).ok()?;
     let hand = Hand { model: "pen-grip".into(), firmness: Firmness::Light };

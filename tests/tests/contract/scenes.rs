@@ -192,6 +192,35 @@ fn check_warns_of_what_runs_but_hardly_as_meant() {
     assert_eq!(told["summary"]["shapes"]["sphere"], 2);
 }
 
+#[test]
+fn check_judges_stiffness_on_the_sum_at_a_place() {
+    let place = Workplace::new();
+    let wall = |name: &str, normal: &str| {
+        format!(
+            "[[entity]]\nname = \"{name}\"\nstiffness_n_per_m = 600.0\n\
+             shape = {{ kind = \"plane\", normal = {normal}, offset_m = 0.0 }}\n"
+        )
+    };
+    let told = |walls: String| {
+        place.write("scene.toml", format!("[[finger]]\nstart_m = [0.2, 0.2, 0.2]\n{walls}"));
+        let told = json(&check(&place, &["scene.toml", "--json"]));
+        let warnings = told["warnings"].as_array().expect("a list").iter();
+        warnings.map(|it| it.as_str().expect("text").to_owned()).collect::<Vec<_>>()
+    };
+    // A corner of three such walls is no stiffer along any axis than one of them.
+    let corner = ["[1.0, 0.0, 0.0]", "[0.0, 1.0, 0.0]", "[0.0, 0.0, 1.0]"];
+    assert_eq!(told(corner.iter().enumerate().map(|(i, n)| wall(&format!("w{i}"), n)).collect()), [""; 0]);
+    let layers: String = (0..10).map(|i| wall(&format!("w{i}"), "[0.0, 1.0, 0.0]")).collect();
+    let warnings = told(layers);
+    assert_eq!(warnings.len(), 1, "{warnings:?}");
+    assert!(
+        warnings[0].contains(
+            "w7 and 2 more together may buzz: a finger at (0.000, -0.001, 0.000) feels 6000 N/m of them"
+        ),
+        "{warnings:?}"
+    );
+}
+
 /// A finger over a cube of this size, mass and place.
 fn with_cube(size: &str, mass: &str, place: &str) -> String {
     format!(

@@ -154,6 +154,33 @@ mod tests {
     }
 
     #[test]
+    fn a_lag_turns_by_the_triangle_of_both_lags_and_the_path() {
+        let turn = |before_m, gap_m, hip_travel_m| {
+            cosine_of_turn(before_m, &FrictionQuery { gap_m, hip_travel_m, ..Default::default() })
+        };
+        // Equilateral; straight on, and back.
+        assert!((turn(1.0, 1.0, 1.0) - 0.5).abs() < 1e-15);
+        assert_eq!(turn(3.0, 4.0, 1.0), 1.0);
+        assert_eq!(turn(1.0, 2.0, 3.0), -1.0);
+        // Rounding makes sides that no triangle has.
+        assert_eq!(turn(1.0, 2.0, 3.1), -1.0);
+        // What is bent backwards, or not at all, has no direction of its own.
+        assert_eq!([turn(-1.0, 1.0, 1.0), turn(0.0, 1.0, 1.0), turn(1.0, 0.0, 1.0)], [1.0; 3]);
+        assert_eq!(turn(1e200, 1e200, 1e200), 1.0, "no numbers");
+    }
+
+    #[test]
+    fn a_contacts_own_number_is_the_same_at_any_scale() {
+        let number = |scale: f64| {
+            let [gap_m, load_m, hip_travel_m] = [1e-4, 3e-3, 2e-5].map(|length_m| length_m * scale);
+            own_number(&FrictionQuery { gap_m, load_m, hip_travel_m, ..Default::default() })
+        };
+        // Powers of two change no bit of a quotient.
+        assert_eq!([number(2.0), number(0.125)], [number(1.0); 2]);
+        assert!(number(1.0) >= 1.0 && number(1.0).fract() == 0.0);
+    }
+
+    #[test]
     fn deviations_from_the_mean_turn_with_the_line_to_the_surface_point() {
         let bonds = Bristles::new(0.5, 2, 1).expect("in range");
         // From a lag of 1.5 mm to one of 1.6 mm, turned: by the law of cosines on paths from straight on to straight back.
