@@ -127,6 +127,7 @@ fn supplementary_groups(connection: BorrowedFd<'_>) -> Option<Vec<u32>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use patience::prelude::*;
     use std::os::unix::net::UnixStream;
 
     #[test]
@@ -139,9 +140,46 @@ mod tests {
         for group in rustix::process::getgroups().unwrap() {
             assert!(groups.contains(&group.as_raw()), "{groups:?}");
         }
-        let Process::Alive(fd) = Process::of(ours.as_fd(), &peer) else { panic!("we live") };
+        let process = Process::of(ours.as_fd(), &peer);
+        let fd = process.fd().expect("we live");
         let mut polled = [rustix::event::PollFd::new(&fd, rustix::event::PollFlags::IN)];
         let now = rustix::event::Timespec { tv_sec: 0, tv_nsec: 0 };
         assert_eq!(rustix::event::poll(&mut polled, Some(&now)).unwrap(), 0, "not readable while we live");
+    }
+
+    /// More than there is room for at first, too. To the kernel groups belong to a thread; to change them takes root.
+    #[test]
+    fn all_supplementary_groups_are_told_however_many() {
+        if !rustix::process::geteuid().is_root() {
+            println!("skipped: groups of our own choice, which need root");
+            return;
+        }
+        for count in [0, 3, 64, 65, 200] {
+            let expected: Vec<u32> = (5000..5000 + count).collect();
+            let own = expected.iter().map(|id| rustix::fs::Gid::from_raw(*id)).collect::<Vec<_>>();
+            let told = std::thread::spawn(move || {
+                rustix::thread::set_thread_groups(&own).unwrap();
+                let (ours, _theirs) = UnixStream::pair().unwrap();
+                supplementary_groups(ours.as_fd())
+            });
+            assert_eq!(told.bounded_join().unwrap(), Some(expected));
+        }
+    }
+
+    #[test]
+    fn who_refuses_descriptors_gets_none_where_the_kernel_can() {
+        let release = std::fs::read_to_string("/proc/sys/kernel/osrelease").unwrap();
+        let mut numbers = release.split(['.', '-']).map_while(|part| part.parse::<u32>().ok());
+        let version = (numbers.next(), numbers.next());
+        if version < (Some(6), Some(16)) {
+            println!("skipped: Linux {release} passes descriptors to everybody");
+            return;
+        }
+        let (ours, theirs) = UnixStream::pair().unwrap();
+        crate::socket::send(theirs.as_fd(), &0_u64, &[theirs.as_fd()]).unwrap();
+        refuse_descriptors(&ours);
+        let refused = crate::socket::send(theirs.as_fd(), &0_u64, &[theirs.as_fd()]).unwrap_err();
+        assert_eq!(refused.kind(), io::ErrorKind::PermissionDenied);
+        crate::socket::send(theirs.as_fd(), &0_u64, &[]).unwrap();
     }
 }
