@@ -10,7 +10,11 @@
 //! the spring is within this bound, the bound is dropped. From there on the god-object only follows: it is never farther from
 //! the HIP than a tick ago, but for what the HIP has moved. A tick in which it is brings the bound back, and is told.
 //!
-//! Cost: of a contact that came from outside two roots a tick; one signed distance where it begins inside.
+//! A god-object that did not come to rest within its tick's work, or that flies from one part to the next, bears less than
+//! its spring. Where it comes to rest all of the spring would be back at once, after a tick without any: the force grows by
+//! no more than the hand's way, the damper and the ramp.
+//!
+//! Cost: of a contact that came from outside three roots a tick; one signed distance where it begins inside.
 
 use crate::algorithm::{Touch, TouchInput};
 
@@ -24,6 +28,8 @@ pub(crate) struct Onset {
     share: f64,
     /// How far the god-object was from the HIP in the last tick (m).
     lag_m: f64,
+    /// What it bore of that, before the ramp (m).
+    spring_m: f64,
     /// Whether it is farther away than it can have been left behind.
     leapt: bool,
 }
@@ -37,19 +43,21 @@ enum Longest {
     Overlap,
     /// In metres.
     Bound(f64),
+    /// In metres; grows with the ramp until it is all that there is.
+    Growing(f64),
 }
 
 impl Onset {
     /// All of the force, at once.
     pub(crate) const AT_ONCE: Self =
-        Self { strength: 1.0, longest: Longest::Any, share: 1.0, lag_m: 0.0, leapt: false };
+        Self { strength: 1.0, longest: Longest::Any, share: 1.0, lag_m: 0.0, spring_m: 0.0, leapt: false };
     /// A ramp, from the overlap on.
     pub(crate) const INSIDE: Self =
         Self { strength: 0.0, longest: Longest::Overlap, share: 0.0, ..Self::AT_ONCE };
 
     /// All of the force from the next tick on, whatever there was of it.
     pub(crate) fn end(&mut self) {
-        *self = Self { lag_m: self.lag_m, ..Self::AT_ONCE };
+        *self = Self { lag_m: self.lag_m, spring_m: self.spring_m, ..Self::AT_ONCE };
     }
 
     /// What the last tick's force was multiplied by, 0 to 1.
@@ -66,39 +74,62 @@ impl Onset {
     #[inline(always)]
     pub(crate) fn share_of(&mut self, touch: &Touch, input: &TouchInput<'_>, times: [f64; 2]) -> f64 {
         let lag_m = (touch.god_object.point_B - input.cone.hip_B).norm();
-        let explained_m = self.lag_m + way_m(input);
+        // In this order no force overflows.
+        let spring_m = (touch.force_on_user_B / input.cone.stiffness_n_per_m).norm();
+        let moved_m = way_m(input);
         let was_over = self.strength >= 1.0 && matches!(self.longest, Longest::Any);
-        self.leapt = was_over && lag_m > explained_m + SLACK_M;
+        self.leapt = was_over && lag_m > self.lag_m + moved_m + SLACK_M;
         if self.leapt {
             self.longest = Longest::Bound(self.lag_m);
+        } else if spring_m > self.spring_m + moved_m + SLACK_M && matches!(self.longest, Longest::Any) {
+            self.grow_if_it_fell_behind(spring_m, moved_m, input);
         }
         self.lag_m = lag_m;
-        if was_over && !self.leapt { 1.0 } else { self.less_than_all(touch, input, times) }
+        self.spring_m = spring_m;
+        if self.strength >= 1.0 && matches!(self.longest, Longest::Any) {
+            1.0
+        } else {
+            self.less_than_all(spring_m, input, times)
+        }
+    }
+
+    /// Bounds a spring that grew by more than the way, if in the last tick it was not all of what the god-object was behind.
+    #[cold]
+    fn grow_if_it_fell_behind(&mut self, spring_m: f64, moved_m: f64, input: &TouchInput<'_>) {
+        let damper_m = input.cone.damping_s() * input.cone.hip_velocity_B.norm();
+        let fell_behind = self.lag_m > self.spring_m + damper_m + SLACK_M;
+        if fell_behind && spring_m > self.spring_m + moved_m + damper_m + SLACK_M {
+            self.longest = Longest::Growing(self.spring_m + damper_m);
+        }
     }
 
     #[inline(never)]
-    fn less_than_all(&mut self, touch: &Touch, input: &TouchInput<'_>, [dt_s, ramp_in_s]: [f64; 2]) -> f64 {
+    fn less_than_all(&mut self, spring_m: f64, input: &TouchInput<'_>, [dt_s, ramp_in_s]: [f64; 2]) -> f64 {
         let step = dt_s / ramp_in_s;
         // Where time is unknown or no ramp wanted, there is none.
         self.strength = if step > 0.0 { (self.strength + step).min(1.0) } else { 1.0 };
-        self.share = self.strength * self.bounded(touch, input);
+        self.share = self.strength * self.bounded(spring_m, input, step);
         self.share
     }
 
-    /// The part of the force that a spring of the allowed length has.
-    fn bounded(&mut self, touch: &Touch, input: &TouchInput<'_>) -> f64 {
+    /// The part of the force that a spring of the allowed length has; `step` is the ramp's in this tick.
+    fn bounded(&mut self, spring_m: f64, input: &TouchInput<'_>, step: f64) -> f64 {
         let bound_m = match self.longest {
             Longest::Any => return 1.0,
             Longest::Overlap => input.overlap_m(),
             Longest::Bound(bound_m) => bound_m + way_m(input),
+            Longest::Growing(bound_m) if step > 0.0 => bound_m + way_m(input) + step * spring_m,
+            Longest::Growing(_) => f64::INFINITY,
         };
-        // In this order no force overflows.
-        let spring_m = (touch.force_on_user_B / input.cone.stiffness_n_per_m).norm();
         if spring_m <= bound_m * (1.0 + ROUNDING) {
             self.longest = Longest::Any;
             return 1.0;
         }
-        self.longest = Longest::Bound(bound_m);
+        self.longest = match self.longest {
+            Longest::Growing(_) => Longest::Growing(bound_m),
+            _ => Longest::Bound(bound_m),
+        };
+        self.spring_m = bound_m;
         bound_m / spring_m
     }
 }
