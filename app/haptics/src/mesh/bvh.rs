@@ -29,6 +29,7 @@ mod stack;
 
 use nalgebra::Vector3;
 
+pub(super) use self::inside::normal_at;
 use super::Face;
 pub(in crate::mesh) use closest::closest_on;
 pub use nearest::Nearest;

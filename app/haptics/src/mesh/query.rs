@@ -193,7 +193,7 @@ impl Mesh {
         });
     }
 
-    fn triangles(&self) -> Triangles<'_> {
+    pub(super) fn triangles(&self) -> Triangles<'_> {
         Triangles { faces: &self.faces, vertices: &self.vertices }
     }
 }

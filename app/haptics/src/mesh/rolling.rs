@@ -7,9 +7,10 @@ use nalgebra::Vector3;
 
 pub(crate) use self::foot::Foot;
 pub(crate) use self::vicinity::Vicinity;
+use super::bvh::normal_at;
 use super::{Mesh, Nearest, TooMany};
 use crate::rolling::{Ground, Plane, RollingCone};
-use crate::surface::Feature;
+use crate::surface::{Feature, direction_or_up};
 
 /// State of one spherical finger towards one mesh.
 pub(crate) type BallOnMesh = RollingCone<Foot, Vicinity>;
@@ -45,7 +46,9 @@ impl Ground for Mesh {
     }
 
     fn normal_B(&self, foot: &Foot) -> Vector3<f64> {
-        self.faces.get(foot.face as usize).map_or_else(Vector3::y, |face| face.normal_B)
+        let Foot { face, feature, corner, point_B, squared_m2 } = *foot;
+        let at = Nearest { face, feature, corner, point_B, distance_m: squared_m2.sqrt() };
+        direction_or_up(&normal_at(self.triangles(), &at))
     }
 
     #[inline(always)]

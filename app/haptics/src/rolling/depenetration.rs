@@ -20,7 +20,7 @@ use nalgebra::Vector3;
 use super::ball::{Ball, tolerance_m};
 use super::ground::{Foot, Ground};
 
-/// Where a ball that is found too near to the ground, or inside, is pushed out; `None` if it is free, or has no room.
+/// Where a ball that is found too near to the ground, or inside, is pushed out; `None` if it is free.
 #[cold]
 pub(super) fn pushed_out<F: Foot>(
     ground: &impl Ground<Foot = F>,
@@ -37,7 +37,11 @@ pub(super) fn pushed_out<F: Foot>(
     let overlap_m = radius_m + depth_m;
     let out_B = (foot.point_B() - hip_B) * depth_m.signum();
     let has_direction = depth_m.abs() > ON_THE_GROUND * (radius_m + ground.extent_m());
-    let normal_B = if has_direction { out_B / depth_m.abs() } else { ground.normal_B(&foot) };
+    let straight_B = out_B / depth_m.abs();
+    // In a crevice that ends at the foot its walls are in the straight way.
+    let leads_out = || !ground.is_inside(&(foot.point_B() + straight_B * (BEYOND * ground.extent_m())));
+    let normal_B =
+        if has_direction && (depth_m < 0.0 || leads_out()) { straight_B } else { ground.normal_B(&foot) };
     // Outside, the ball that ends at the ground has room.
     let smallest_m = (-depth_m).max(0.0);
     let mut share = 1.0;
@@ -51,7 +55,11 @@ pub(super) fn pushed_out<F: Foot>(
         }
         share *= 0.5;
     }
-    None
+    // Between walls that meet at the foot in an angle too sharp for any of these: as a point, which grows.
+    let ball_m = smallest_m.max(POINT * ground.extent_m()).min(radius_m);
+    let mut ball = Ball::in_free_space(foot.point_B() + normal_B * ball_m, ball_m);
+    ball.add(ground, &foot);
+    Some(ball)
 }
 
 /// A small ball in contact, as large as it may be now: with its centre no farther from the HIP than `at_most_m`, and no larger
@@ -102,6 +110,10 @@ fn with_room<F: Foot>(ground: &impl Ground<Foot = F>, mut ball: Ball<F>) -> Opti
 
 /// Nearer to the mesh than this share of it, the way out has no direction.
 const ON_THE_GROUND: f64 = 1e-9;
+/// So far beyond the foot, relative to the ground, it is asked whether that is outside: far above rounding.
+const BEYOND: f64 = 1e-9;
+/// The radius of a point, relative to the ground.
+const POINT: f64 = 1e-9;
 /// The last of them is a millionth of the first.
 const MOST_SIZES: usize = 20;
 const MOST_CORRECTIONS: usize = 16;

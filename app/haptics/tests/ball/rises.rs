@@ -1,4 +1,4 @@
-//! Strokes over ugly meshes: no tick's force rises by more than the hand's way and the god-object's lag explain.
+//! Strokes over ugly meshes: no tick's force rises by more than the hand's way explains; nothing inside is unfelt.
 
 use std::slice::from_ref;
 use std::sync::Arc;
@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::common::meshes::{touchable, unit_vector};
 use crate::common::ugly;
 use crate::common::*;
-use crate::mesh_oracle::corners;
+use crate::mesh_oracle::{corners, distance};
 use haptics::mesh::Mesh;
 use haptics::{Finger, Friction, RAMP_IN_S};
 use nalgebra::Vector3;
@@ -23,34 +23,49 @@ fn stroke(mesh: &Mesh, noise: &mut Noise, radius_m: f64) -> Vec<Vector3<f64>> {
     down.chain(across).map(|way| (a + b + c) / 3.0 + way + noise.vector(1e-5)).collect()
 }
 
-/// Where the god-object lags behind, all of the spring's force may come with one change of the feature: a wall that is met
-/// turns the normal towards the HIP. It is no more than the lag before, with what the hand moved; a part inside which the
-/// finger was let go begins with the ramp.
+/// A tick's force is the last one's and what the hand moved; a contact that began inside, and one whose god-object came to
+/// rest late, add their ramp. The god-object is outside, and whatever is inside is felt.
 fn stroke_over(name: &str, mesh: &Arc<Mesh>, friction: Friction, radius_m: f64, strokes: usize, seed: u64) {
     let entity = touchable(mesh, friction);
     let mut noise = Noise(seed);
     let mut touched = 0;
+    let is_in = |p: &Vector3<f64>| mesh.has_inside() && mesh.is_inside(p) && distance(mesh, p) > INSIDE_M;
     for stroke_number in 0..strokes {
         let mut finger = Finger::new(radius_m, 1).unwrap();
         let mut before: Option<(Vector3<f64>, f64)> = None;
         for (tick, hip) in stroke(mesh, &mut noise, radius_m).into_iter().enumerate() {
             let out = finger.step(from_ref(&entity), &hip, DT);
+            let here = || format!("{name}, {radius_m} m, stroke {stroke_number}, tick {tick}");
             let lag_m = (out.god_object_W - hip).norm();
-            if let Some((last_hip, last_lag_m)) = before {
+            let force_n = out.force_on_user_W.norm();
+            if let Some((last_hip, last_n)) = before {
                 let way_m = (hip - last_hip).norm();
-                let most_n = K * (last_lag_m + way_m + lag_m * DT / RAMP_IN_S);
-                let force_n = out.force_on_user_W.norm();
+                // Both ramps at once: one that began inside may also come to rest late.
+                let most_n = last_n + K * (way_m + 2.0 * lag_m * DT / RAMP_IN_S);
                 touched += usize::from(force_n > 0.0);
                 assert!(
-                    force_n <= most_n * (1.0 + 1e-9) + 1e-6,
-                    "{name}, {radius_m} m, stroke {stroke_number}, tick {tick}: {force_n} N, explained {most_n} N"
+                    force_n <= most_n * (1.0 + 1e-9) + K * SLACK_M,
+                    "{}: {force_n} N, explained {most_n} N",
+                    here()
                 );
             }
-            before = Some((hip, lag_m));
+            // The oracle goes over all faces: not in every tick.
+            if tick % 10 == 0 {
+                match finger.contact(0) {
+                    Some(_) => assert!(!is_in(&out.god_object_W), "{}: god-object inside", here()),
+                    None => assert!(!is_in(&hip), "{}: inside and not felt", here()),
+                }
+            }
+            before = Some((hip, force_n));
         }
     }
     assert!(touched > 20 * strokes, "{name}, {radius_m} m: {touched}");
 }
+
+/// Far above rounding on a mesh of this size, far below what a finger notices.
+const INSIDE_M: f64 = 1e-6;
+/// What walks over surfaces resolve, and so what is not counted as a leap.
+const SLACK_M: f64 = 1e-6;
 
 fn stroke_over_ugly_meshes(seeds: std::ops::Range<u64>, strokes: usize) {
     for seed in seeds {
@@ -66,13 +81,13 @@ fn stroke_over_ugly_meshes(seeds: std::ops::Range<u64>, strokes: usize) {
 }
 
 #[test]
-fn no_tick_adds_more_force_than_the_lag_and_the_hands_way() {
+fn no_tick_adds_more_force_than_the_hands_way() {
     stroke_over_ugly_meshes(1..2, 12);
 }
 
 /// Two hundred million ticks.
 #[test]
 #[ignore = "half an hour"]
-fn no_tick_of_long_strokes_adds_more_force_than_the_lag_and_the_hands_way() {
+fn no_tick_of_long_strokes_adds_more_force_than_the_hands_way() {
     stroke_over_ugly_meshes(2..32, 300);
 }

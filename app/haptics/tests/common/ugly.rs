@@ -18,6 +18,7 @@ pub(crate) fn all(seed: u64) -> Vec<(&'static str, TriangleSoup)> {
         ("slotted block", slotted(&mut noise)),
         ("slivers", slivers(&mut noise)),
         ("folded fans", folded(&mut noise)),
+        ("crossed boxes", crossed(&mut noise)),
     ]
 }
 
@@ -39,11 +40,29 @@ fn with_holes(noise: &mut Noise, holes: usize) -> TriangleSoup {
 
 /// Boxes from slabs to cubes, each a closed part, thrown together.
 fn heap(noise: &mut Noise, boxes: usize) -> TriangleSoup {
-    let mut soup = TriangleSoup { vertices: Vec::new(), faces: Vec::new() };
-    for _ in 0..boxes {
+    together(noise, boxes, |noise| {
         let part = make::cuboid([0.0; 3].map(|_| 10f64.powf(noise.between(-3.0, -1.3))));
         let turn = Rotation3::new(noise.vector(2.0));
-        let middle = unit_vector(noise) * noise.between(0.0, 0.04);
+        (part, turn, unit_vector(noise) * noise.between(0.0, 0.04))
+    })
+}
+
+/// A few blocks that go deep through each other, as machine parts that nobody joined.
+fn crossed(noise: &mut Noise) -> TriangleSoup {
+    together(noise, 6, |noise| {
+        let part = make::cuboid([0.0; 3].map(|_| noise.between(0.01, 0.06)));
+        (part, Rotation3::new(noise.vector(1.0)), noise.vector(0.02))
+    })
+}
+
+fn together(
+    noise: &mut Noise,
+    parts: usize,
+    mut part: impl FnMut(&mut Noise) -> (TriangleSoup, Rotation3<f64>, Vector3<f64>),
+) -> TriangleSoup {
+    let mut soup = TriangleSoup { vertices: Vec::new(), faces: Vec::new() };
+    for _ in 0..parts {
+        let (part, turn, middle) = part(noise);
         let first = soup.vertices.len() as u32;
         soup.vertices.extend(part.vertices.iter().map(|v| turn * v + middle));
         soup.faces.extend(part.faces.iter().map(|face| face.map(|v| v + first)));

@@ -148,8 +148,9 @@ impl Crossings {
     }
 }
 
-/// Out of the surface, not of unit length.
-fn normal_at(triangles: Triangles<'_>, nearest: &Nearest) -> Vector3<f64> {
+/// Out of the surface, not of unit length: of a face its own, of an edge both faces', of a vertex all of those around it,
+/// weighted by their angles.
+pub(in crate::mesh) fn normal_at(triangles: Triangles<'_>, nearest: &Nearest) -> Vector3<f64> {
     let face = &triangles.faces[nearest.face as usize];
     match nearest.feature {
         Feature::Edge => {
