@@ -99,10 +99,16 @@ impl<'a> TomlText<'a> {
             let problem = match single_table(error.message(), &key_at(self.text, start)) {
                 Some([found, allowed]) => format!("found {found}, allowed: {allowed}"),
                 // What is TOML has no such slips: its types or keys are wrong.
-                None if DeTable::parse(self.text).is_ok() => error.message().to_owned(),
+                None if DeTable::parse(self.text).is_ok() => in_words(error.message()),
                 None => toml_slips::explain(self.text, start, error.message()),
             };
-            self.report(error.span(), problem)
+            // What the whole text lacks has an empty place, and is not missing in the key that stands first.
+            if error.span().is_none_or(|span| span.is_empty()) && error.message().starts_with("missing field")
+            {
+                TomlReport { key: String::new(), ..self.report(None, problem) }
+            } else {
+                self.report(error.span(), problem)
+            }
         })
     }
 
@@ -179,6 +185,19 @@ impl<'a> TomlText<'a> {
         let key = key_at(self.text, start);
         TomlReport { file: self.file.to_owned(), line: line_at(self.text, start), key, problem }
     }
+}
+
+/// serde's message, with the type that it expected in words instead of Rust's.
+fn in_words(message: &str) -> String {
+    let Some((found, expected)) = message.rsplit_once(", expected ") else { return message.to_owned() };
+    let words = match expected {
+        "f32" | "f64" => "a number",
+        "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number",
+        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number, 0 or more",
+        "a sequence" => "a list, as in [1, 2]",
+        _ => return message.to_owned(),
+    };
+    format!("{found}, expected {words}")
 }
 
 /// What is found and allowed where serde met `[key]` and wanted a list.
@@ -322,6 +341,43 @@ mod tests {
         assert_eq!((report.line, report.key.as_str()), (2, "axis"));
         let says = "found a single table, as `[axis]` makes it, allowed: a list of tables, each under its own [[axis]]";
         assert!(report.problem.starts_with(says), "{report}");
+    }
+
+    #[test]
+    fn a_key_that_the_whole_text_lacks_is_not_said_to_be_missing_in_its_first_key() {
+        for text in ["a = 1\n", "a = 1", "# first\na = 1\nb = 'x'\n", "[other]\nb = 2\n", ""] {
+            let report = read(text).unwrap_err();
+            assert_eq!(report.key, "", "{text:?}: {report}");
+            assert_eq!(report.problem, "missing field `motor`", "{text:?}");
+        }
+        // A text that is nothing but a table lacks what that table lacks.
+        for text in ["[motor]", "[motor]\n"] {
+            assert_eq!(read(text).unwrap_err().key, "motor", "{text:?}");
+        }
+    }
+
+    #[test]
+    fn types_are_told_in_words_and_not_in_those_of_rust() {
+        #[derive(Debug, Deserialize)]
+        #[allow(dead_code)]
+        struct Numbers {
+            size: Option<f64>,
+            count: Option<u64>,
+            change: Option<i64>,
+        }
+        let problem =
+            |text: &str| TomlText::new(text, Path::new("lab/m.toml")).read::<Numbers>().unwrap_err().problem;
+        assert_eq!(problem("size = '1 kHz'\n"), "invalid type: string \"1 kHz\", expected a number");
+        assert_eq!(
+            problem("count = 'two'\n"),
+            "invalid type: string \"two\", expected a whole number, 0 or more"
+        );
+        assert_eq!(problem("change = 1.5\n"), "invalid type: floating point `1.5`, expected a whole number");
+        // What a file says is repeated as it stands.
+        assert_eq!(
+            problem("size = ', expected f64'\n"),
+            "invalid type: string \", expected f64\", expected a number"
+        );
     }
 
     #[test]
