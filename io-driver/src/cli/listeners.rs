@@ -5,8 +5,10 @@
 //! is read. Directories are compared in full, without symbolic links and detours.
 //! Cost: a table for each process that is called like a driver; only for who found no driver to ask.
 
-use shm_abi::socket_file::whole_path;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+
+use shm_abi::socket_file::whole_path;
 
 /// Names of a driver's program: by itself, or within the application.
 const PROGRAMS: [&str; 2] = ["io-driver", "phantom3"];
@@ -31,9 +33,8 @@ pub(super) fn all() -> impl Iterator<Item = Listener> {
         let table = std::fs::read(format!("/proc/{pid}/net/unix")).unwrap_or_default();
         let table = String::from_utf8_lossy(&table).into_owned();
         let directory = || std::fs::read_link(format!("/proc/{pid}/cwd")).unwrap_or_default();
-        let sockets = table.lines().filter_map(|line| socket_of(pid, line));
-        let sockets: Vec<PathBuf> = sockets.map(|socket| directory().join(socket)).collect();
-        sockets.into_iter().map(move |socket| Listener { pid, socket })
+        let sockets = sockets_of(pid, &table).into_iter().map(|socket| directory().join(socket));
+        sockets.collect::<Vec<PathBuf>>().into_iter().map(move |socket| Listener { pid, socket })
     })
 }
 
@@ -45,6 +46,11 @@ fn drivers() -> impl Iterator<Item = u32> {
         let name = std::fs::read_to_string(format!("/proc/{pid}/comm")).unwrap_or_default();
         PROGRAMS.iter().any(|program| name.starts_with(program))
     })
+}
+
+/// The driver's sockets that a table tells of, each once: a connection that was taken has a line with the same name.
+fn sockets_of(pid: u32, table: &str) -> BTreeSet<&str> {
+    table.lines().filter_map(|line| socket_of(pid, line)).collect()
 }
 
 /// The driver's socket that a line of the table tells of, if this process made it.
@@ -74,5 +80,12 @@ mod tests {
         ] {
             assert_eq!(socket_of(77, other), None);
         }
+    }
+
+    #[test]
+    fn a_driver_that_serves_somebody_is_told_once() {
+        let table = "0000000000000000: 00000002 00000000 00010000 0001 01 114705 /run/driver.sock.77\n\
+                     0000000000000000: 00000003 00000000 00000000 0001 03 114709 /run/driver.sock.77";
+        assert_eq!(sockets_of(77, table), BTreeSet::from(["/run/driver.sock"]));
     }
 }
