@@ -12,7 +12,7 @@ mod prompt;
 mod stopping;
 mod zero;
 
-use crate::config::{Commissioning, DriverConfig};
+use crate::config::DriverConfig;
 use crate::doctor::cli::{self as doctor, DoctorArgs};
 use crate::driver::{self, Fit, RunOptions};
 use crate::monitor::{self, End};
@@ -155,7 +155,7 @@ fn run(args: RunArgs, fit: Option<Fit>) -> ExitCode {
         Err(error) => return fail(&error, EXIT_USAGE),
     };
     if args.commissioning {
-        config.safety.commissioning.get_or_insert(Commissioning::USUAL);
+        config.safety.begin_trial();
     }
     let RunArgs { strict, quiet, parent, socket, .. } = args;
     let options = RunOptions { fit, strict, quiet, parent, socket };

@@ -417,6 +417,24 @@ mod tests {
         assert!(unknown.starts_with("lab/driver.toml:1: `rate`: unknown field `rate`"), "{unknown}");
     }
 
+    /// `run --commissioning`, as the safety page says, with a file that asks for less than usual.
+    #[test]
+    fn a_trial_that_the_command_line_asks_for_is_as_weak_and_slow_as_the_file_says() {
+        let limits = "commissioning_force_n = 0.1\ncommissioning_speed_m_per_s = 0.05";
+        let text = |safety: &str| ["[safety]\n", safety, "\n[[device]]\nbackend = \"ideal\"\n"].concat();
+        let mut config = parse(&text(limits)).expect("good");
+        assert_eq!(config.safety.commissioning, None);
+        assert_eq!(parse(&config.to_toml()).expect("good as well"), config);
+        config.safety.begin_trial();
+        let expected = Commissioning { force_n: 0.1, speed_m_per_s: 0.05 };
+        assert_eq!(config.safety.commissioning, Some(expected));
+        let both = parse(&text(&["commissioning = true\n", limits].concat())).expect("good");
+        assert_eq!(both.safety, config.safety);
+        let mut usual = parse(&text("")).expect("good");
+        usual.safety.begin_trial();
+        assert_eq!(usual.safety.commissioning, Some(Commissioning::USUAL));
+    }
+
     #[test]
     fn what_is_written_down_is_read_back_the_same() {
         let text = "rate_hz = 3000\nsocket = \"/run/x\"\n\

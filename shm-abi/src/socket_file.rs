@@ -1,6 +1,6 @@
 //! Sockets in the file system: made with the right mode, owned by one driver, removed by nobody else.
 
-use rustix::fs::FlockOperation;
+use rustix::fs::{FlockOperation, OFlags};
 use rustix::io::Errno;
 use rustix::net::{AddressFamily, SocketAddrUnix, SocketFlags, SocketType};
 use std::fs::{File, Metadata, Permissions};
@@ -99,8 +99,16 @@ impl Lock {
         for _ in 0..TRIES {
             // The owner's alone: whoever could open it could hold the lock and keep every driver from starting.
             let mut options = File::options();
+            // Whatever else lies there is not followed, and not waited for.
+            options.custom_flags((OFlags::NOFOLLOW | OFlags::NONBLOCK).bits().cast_signed());
             let file =
                 options.create(true).truncate(false).write(true).mode(0o600).open(&path).map_err(failed)?;
+            if !file.metadata().map_err(failed)?.is_file() {
+                return Err(failed(io::Error::new(
+                    io::ErrorKind::AlreadyExists,
+                    "no file of a lock lies there",
+                )));
+            }
             match rustix::fs::flock(&file, FlockOperation::NonBlockingLockExclusive) {
                 Ok(()) => {}
                 Err(Errno::WOULDBLOCK) => return Err(already_running(socket)),
@@ -226,6 +234,28 @@ mod tests {
         assert_eq!(whole_path(&absent), absent);
         let here = std::env::current_dir().expect("a directory");
         assert_eq!(whole_path(Path::new("driver.sock")), here.join("driver.sock"));
+    }
+
+    /// A pipe would be waited for, and what a link leads to made, both before any signal is heeded.
+    #[test]
+    #[cfg_attr(miri, ignore = "sockets and directories are the system's")]
+    fn what_lies_in_a_locks_place_is_neither_waited_for_nor_followed() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let socket = directory.path().join("driver.sock");
+        let (path, elsewhere) = (suffixed(&socket, LOCK_SUFFIX), directory.path().join("elsewhere"));
+        let refused = || {
+            let socket = socket.clone();
+            let taken = patience::watched(patience::limit(), "a lock", move || Lock::take(&socket));
+            assert!(matches!(taken, Err(BindError::System { what: "lock", .. })), "{taken:?}");
+        };
+        std::os::unix::fs::symlink(&elsewhere, &path).expect("a link");
+        refused();
+        assert!(!elsewhere.exists());
+        std::fs::remove_file(&path).expect("gone");
+        nix::unistd::mkfifo(&path, nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
+        refused();
+        let _reader = File::options().read(true).write(true).open(&path).expect("both its ends");
+        refused();
     }
 
     /// Whoever lives and takes nobody is not waited for, and not taken for dead.

@@ -25,6 +25,8 @@ pub struct SafetyConfig {
     pub switches: Switches,
     /// Little force and little speed, if somebody tries the devices for the first time.
     pub commissioning: Option<Commissioning>,
+    /// Limits of a first trial, whoever asks for one.
+    pub(crate) trial: Commissioning,
 }
 
 /// Limits of the first trial.
@@ -58,7 +60,13 @@ impl SafetyConfig {
             workspace_margin_m: 0.02,
             switches: Switches::default(),
             commissioning: None,
+            trial: Commissioning::USUAL,
         }
+    }
+
+    /// Little force and little speed, as little as the file says.
+    pub(crate) fn begin_trial(&mut self) {
+        self.commissioning = Some(self.trial);
     }
 }
 
@@ -131,6 +139,10 @@ impl RawSafety {
         let margin_mm = number(&self.workspace_margin_mm, 0.1, 1000.0, "mm")?;
         let force_n = number(&self.commissioning_force_n, 0.0, 2.0, "N")?;
         let speed_m_per_s = number(&self.commissioning_speed_m_per_s, 0.01, 2.0, "m/s")?;
+        let trial = Commissioning {
+            force_n: force_n.unwrap_or(Commissioning::USUAL.force_n),
+            speed_m_per_s: speed_m_per_s.unwrap_or(Commissioning::USUAL.speed_m_per_s),
+        };
         Ok(SafetyConfig {
             max_command_age_ns: age_ns.unwrap_or(usual.max_command_age_ns),
             ramp_in_ns: ramp_in_ms.map_or(usual.ramp_in_ns, |ms| ramp_in_ns(ms, period_ns)),
@@ -144,10 +156,8 @@ impl RawSafety {
                     .map(|raw| raw.validate_dead_man(toml, devices))
                     .transpose()?,
             },
-            commissioning: self.commissioning.then(|| Commissioning {
-                force_n: force_n.unwrap_or(Commissioning::USUAL.force_n),
-                speed_m_per_s: speed_m_per_s.unwrap_or(Commissioning::USUAL.speed_m_per_s),
-            }),
+            commissioning: self.commissioning.then_some(trial),
+            trial,
         })
     }
 }

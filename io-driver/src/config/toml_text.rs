@@ -62,10 +62,9 @@ fn head(text: &mut String, config: &DriverConfig) -> std::fmt::Result {
             writeln!(text, "{key} = {{ device = {device}, button = {button}, {wiring} }}")?;
         }
     }
-    if let Some(Commissioning { force_n, speed_m_per_s }) = config.safety.commissioning {
-        writeln!(text, "commissioning = true\ncommissioning_force_n = {force_n:?}")?;
-        writeln!(text, "commissioning_speed_m_per_s = {speed_m_per_s:?}")?;
-    }
+    let Commissioning { force_n, speed_m_per_s } = config.safety.trial;
+    writeln!(text, "commissioning = {}", config.safety.commissioning.is_some())?;
+    writeln!(text, "commissioning_force_n = {force_n:?}\ncommissioning_speed_m_per_s = {speed_m_per_s:?}")?;
     writeln!(text, "[process]\nsandbox = {}", config.process.sandbox)?;
     writeln!(text, "service_silence_ms = {:?}", config.process.service_silence_ns as f64 / 1e6)?;
     config.process.user.iter().try_for_each(|user| writeln!(text, "user = {}", quoted(user)))?;

@@ -39,6 +39,25 @@ fn a_death_leaves_an_epitaph_and_its_true_exit_status() {
     assert!(text.starts_with("SIGILL: illegal instruction at address 0x"), "{text}");
 }
 
+/// Sent by anybody, by a terminal or for a limit: no fault of the program, but its end all the same.
+#[test]
+fn whatever_signal_kills_performs_the_last_act_first() {
+    use libc::{
+        SIGALRM, SIGIO, SIGPROF, SIGPWR, SIGQUIT, SIGSTKFLT, SIGTRAP, SIGUSR1, SIGUSR2, SIGVTALRM, SIGXCPU,
+    };
+    for signal in
+        [SIGQUIT, SIGTRAP, SIGXCPU, SIGALRM, SIGVTALRM, SIGPROF, SIGUSR1, SIGUSR2, SIGIO, SIGPWR, SIGSTKFLT]
+    {
+        let (status, words) = words_after(&["last act ", &signal.to_string()].concat());
+        assert_eq!((status.signal(), words[REGISTER].load(Ordering::Relaxed)), (Some(signal), 2048));
+        assert_eq!(read(&words).map(|epitaph| epitaph.kind), Some(EpitaphKind::Signal(signal)));
+    }
+    // The kernel's own, which names no address and does not come back by itself.
+    let (status, words) = words_after("last act cpu");
+    assert_eq!((status.signal(), words[REGISTER].load(Ordering::Relaxed)), (Some(SIGXCPU), 2048));
+    assert_eq!(read(&words).map(|epitaph| epitaph.text), Some("SIGXCPU: limit of CPU time".into()));
+}
+
 /// The standard library's own check still gets the fault and aborts with its message, after the
 /// epitaph said what came first; that the handler ran at all shows it has a stack of its own.
 #[test]
@@ -119,7 +138,7 @@ fn die(role: &str) -> ! {
     let cell = shared_words::map(&File::options().read(true).write(true).open(path).unwrap());
     match role {
         "panic" => die_by_panic(cell),
-        "last act" => {
+        _ if role.starts_with("last act") => {
             crate::last_act::guard(shared_words::low_half(&cell[REGISTER]), 2048).unwrap();
             install_fatal_handlers(cell, &TICK).unwrap();
         }
@@ -131,6 +150,16 @@ fn die(role: &str) -> ! {
         "illegal" => shared_words::execute_illegal_instruction(),
         "overflow" => assert_ne!(overflow_stack(0), 0),
         "kill" => nix::sys::signal::raise(nix::sys::signal::Signal::SIGKILL).unwrap(),
+        "last act cpu" => {
+            setrlimit(Resource::RLIMIT_CPU, 1, 20).unwrap();
+            loop {
+                std::hint::spin_loop();
+            }
+        }
+        _ if role.starts_with("last act ") => {
+            let number: i32 = role["last act ".len()..].parse().unwrap();
+            nix::sys::signal::raise(number.try_into().unwrap()).unwrap();
+        }
         "twice" => std::process::exit(i32::from(install_fatal_handlers(cell, &TICK).is_ok())),
         _ => std::process::abort(),
     }

@@ -5,7 +5,8 @@
 //! stay what they would have been.
 //! Model: the handler performs the last act ([`crate::last_act`]), writes the epitaph and then steps aside. A fault
 //! that the CPU raised is repeated under the former action, so that action sees the true address; a
-//! signal that was sent (`abort`, `kill`) is raised again under the default action.
+//! signal that was sent (`abort`, `kill`, a terminal's Ctrl-\, a limit of CPU time) is raised again under the default
+//! action. Signals that do not tell of a fault are left to whoever ignores or handles them already.
 //! Invariants: async-signal-safe: no allocation, no lock, no I/O. Runs on the alternate stack that
 //! the standard library gives every thread it starts, so that a stack overflow is handled too.
 //! Two threads that fault at once both come here; the first one's epitaph stays.
@@ -20,13 +21,26 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Those whose default action is to kill with a core dump and that mean "this program is broken".
-const FATAL_SIGNALS: [(libc::c_int, &str); 6] = [
+const FAULTS: usize = 6;
+/// Those first, then others whose default action is to kill, and which nobody here has a use for.
+const FATAL_SIGNALS: [(libc::c_int, &str); FAULTS + 11] = [
     (libc::SIGSEGV, "SIGSEGV: invalid memory reference"),
     (libc::SIGBUS, "SIGBUS: memory that cannot be reached"),
     (libc::SIGILL, "SIGILL: illegal instruction"),
     (libc::SIGFPE, "SIGFPE: arithmetic fault"),
     (libc::SIGABRT, "SIGABRT: abort"),
     (libc::SIGSYS, "SIGSYS: forbidden system call"),
+    (libc::SIGQUIT, "SIGQUIT: asked to quit at once"),
+    (libc::SIGTRAP, "SIGTRAP: breakpoint without debugger"),
+    (libc::SIGXCPU, "SIGXCPU: limit of CPU time"),
+    (libc::SIGALRM, "SIGALRM: alarm"),
+    (libc::SIGVTALRM, "SIGVTALRM: alarm of CPU time"),
+    (libc::SIGPROF, "SIGPROF: alarm of a profiler"),
+    (libc::SIGUSR1, "SIGUSR1"),
+    (libc::SIGUSR2, "SIGUSR2"),
+    (libc::SIGIO, "SIGIO: input or output"),
+    (libc::SIGPWR, "SIGPWR: power failure"),
+    (libc::SIGSTKFLT, "SIGSTKFLT: sent by somebody"),
 ];
 
 /// What the handlers need; set once, before the first handler is installed.
@@ -38,7 +52,7 @@ struct Fatal {
 
 static FATAL: OnceLock<Fatal> = OnceLock::new();
 
-/// Lets SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT and SIGSYS write an epitaph before they kill.
+/// Lets SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT, SIGSYS, and others that would kill now, write an epitaph before they do.
 ///
 /// `tick` is read when it happens. Exit status and core dump stay what they would have been.
 ///
@@ -51,7 +65,17 @@ pub fn install_fatal_handlers(cell: &'static EpitaphWords, tick: &'static Atomic
     }
     let set = FATAL.set(Fatal { cell, tick, former });
     set.map_err(|_| io::Error::new(io::ErrorKind::AlreadyExists, "fatal handlers are already installed"))?;
-    FATAL_SIGNALS.iter().try_for_each(|(signal, _)| set_action(*signal, &handler_action()))
+    let ours = FATAL_SIGNALS
+        .iter()
+        .zip(&former)
+        .enumerate()
+        .filter(|(index, (_, former))| *index < FAULTS || former.sa_sigaction == libc::SIG_DFL);
+    ours.map(|(_, ((signal, _), _))| *signal).try_for_each(|signal| set_action(signal, &handler_action()))
+}
+
+/// An instruction that could not be done, which is tried again when the handler returns.
+fn is_of_an_instruction(signal: libc::c_int) -> bool {
+    matches!(signal, libc::SIGSEGV | libc::SIGBUS | libc::SIGILL | libc::SIGFPE)
 }
 
 extern "C" fn on_fatal(signal: libc::c_int, info: *mut libc::siginfo_t, _context: *mut libc::c_void) {
@@ -59,12 +83,13 @@ extern "C" fn on_fatal(signal: libc::c_int, info: *mut libc::siginfo_t, _context
     crate::last_act::perform();
     // SAFETY: with SA_SIGINFO the kernel passes a valid record that lives as long as the handler.
     let info = unsafe { &*info };
-    // si_code is positive when the kernel raised the signal for what the thread did, sigaction(2).
+    // si_code is positive when the kernel raised the signal, sigaction(2): for what the thread did, a terminal or a limit.
     let raised_by_kernel = info.si_code > 0;
-    fatal.write_epitaph(signal, raised_by_kernel.then_some(info));
+    let tells_more = is_of_an_instruction(signal) || signal == libc::SIGSYS;
+    fatal.write_epitaph(signal, (raised_by_kernel && tells_more).then_some(info));
     // A fault happens again when the handler returns. A forbidden system call does not: the thread would go on
     // behind it.
-    fatal.step_aside(signal, raised_by_kernel && signal != libc::SIGSYS);
+    fatal.step_aside(signal, raised_by_kernel && is_of_an_instruction(signal));
 }
 
 impl Fatal {

@@ -119,7 +119,8 @@ fn a_driver_that_is_killed_by_a_signal_that_can_be_caught_switches_off_by_its_la
         let death = die(&format!("{act}@button20"), |stand| stand.amplifiers.press(1 << 20));
         check_signal_death(death, signal);
     }
-    for signal in [Signal::SEGV, Signal::BUS, Signal::ILL, Signal::FPE, Signal::ABORT] {
+    let sent = [Signal::SEGV, Signal::BUS, Signal::ILL, Signal::FPE, Signal::ABORT];
+    for signal in sent.into_iter().chain([Signal::QUIT, Signal::XCPU, Signal::USR2]) {
         check_signal_death(die("", |stand| stand.driver.signal(signal)), signal.as_raw());
     }
 }
