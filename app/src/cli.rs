@@ -50,7 +50,8 @@ const AFTER_HELP: &str = "Without a command there is a small table to play on wi
 driver that runs already, the default scene is played for ten seconds.\n\n\
 Exit status: 0 done; 1 of replay --expect-same, something differs; 2 bad usage or bad input, nothing was started; \
 3 a fault during the run or of a recording; 128 + n: ended by signal n. \
-Whatever was recorded until then is complete on disk.";
+Whatever was recorded until then is complete on disk, if the signal was SIGINT, SIGTERM or SIGHUP; of others the last half \
+second may be missing.";
 
 /// Haptic rendering with friction cones for several fingers.
 #[derive(Debug, Parser)]

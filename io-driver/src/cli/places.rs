@@ -74,7 +74,7 @@ pub(super) fn tell_of_unheard(not_asked: &[NotAsked]) -> bool {
         };
         let or = match error {
             AttachError::NoPermission { .. } | AttachError::NotAllowed { .. } => "ask one who may".to_owned(),
-            _ => format!("end it with `kill -TERM {pid}`"),
+            _ => ending(pid),
         };
         say(format_args!(
             "io-driver: but process {pid} listens there{why}: the motors may still be on; cut their power, or {or}"
@@ -93,7 +93,9 @@ pub(super) fn nobody_asked(places: &Places, not_asked: &[NotAsked]) -> ExitCode 
     if let Some((_, error)) = first {
         say(format_args!("io-driver: {error}"));
     }
-    let mut code = EXIT_USAGE;
+    // Somebody listens and says nothing: nobody knows what became of the motors.
+    let is_silent = not_asked.iter().any(|(_, error)| !is_elsewhere(error));
+    let mut code = if is_silent { EXIT_FAULT } else { EXIT_USAGE };
     for other in listeners::all() {
         let (pid, socket) = (other.pid, other.socket.display());
         // Whoever names a driver that is not there has at least heard of those that are.
@@ -104,8 +106,51 @@ pub(super) fn nobody_asked(places: &Places, not_asked: &[NotAsked]) -> ExitCode 
         code = EXIT_FAULT;
         say(format_args!(
             "io-driver: process {pid} is a driver at {socket}, and was not asked: the motors may still be on; use \
-             --socket {socket}, cut their power, or end it with `kill -TERM {pid}`"
+             --socket {socket}, cut their power, or {}",
+            ending(pid)
         ));
     }
     ExitCode::from(code)
+}
+
+/// There is no driver at this place for us to ask.
+pub(super) fn is_elsewhere(error: &AttachError) -> bool {
+    matches!(
+        error,
+        AttachError::NoDriver { .. }
+            | AttachError::DriverGone { .. }
+            | AttachError::NoPermission { .. }
+            | AttachError::NotADriver { .. }
+    )
+}
+
+/// How to end a process that does not answer; a stopped one takes no signal but this.
+fn ending(pid: u32) -> String {
+    let signal = if is_stopped(pid) { "KILL" } else { "TERM" };
+    format!("end it with `kill -{signal} {pid}`")
+}
+
+/// Whether a process was stopped, as by SIGSTOP, proc(5).
+fn is_stopped(pid: u32) -> bool {
+    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
+    // The name before it may have any characters.
+    stat.rsplit_once(") ").is_some_and(|(_, rest)| rest.starts_with(['T', 't']))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stopped_process_is_not_asked_to_end_by_a_signal_that_it_does_not_take() {
+        let mut child = std::process::Command::new("sleep").arg("60").spawn().expect("a process");
+        let pid = child.id();
+        assert!(ending(pid).contains("kill -TERM"));
+        let raw = nix::unistd::Pid::from_raw(pid.cast_signed());
+        nix::sys::signal::kill(raw, nix::sys::signal::Signal::SIGSTOP).expect("it is sent");
+        patience::until("a stopped process", || is_stopped(pid));
+        assert!(ending(pid).contains("kill -KILL"));
+        child.kill().expect("it is sent");
+        child.wait().expect("it ends");
+    }
 }

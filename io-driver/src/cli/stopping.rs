@@ -6,7 +6,7 @@
 //! a driver that does not answer does not delay the words that motors may still be on. Without a thread it is asked
 //! before anything is said.
 
-use super::places::{NotAsked, Places, nobody_asked, tell_of_unheard};
+use super::places::{NotAsked, Places, is_elsewhere, nobody_asked, tell_of_unheard};
 use super::prompt::{PROMPT, PromptWords};
 use super::{EXIT_FAULT, EXIT_USAGE, fail, listeners};
 use crate::print::print_outcome;
@@ -40,17 +40,6 @@ pub(super) fn stop(places: &Places) -> ExitCode {
         }
     }
     nobody_asked(places, &not_asked)
-}
-
-/// There is no driver at this place for us to ask.
-fn is_elsewhere(error: &AttachError) -> bool {
-    matches!(
-        error,
-        AttachError::NoDriver { .. }
-            | AttachError::DriverGone { .. }
-            | AttachError::NoPermission { .. }
-            | AttachError::NotADriver { .. }
-    )
 }
 
 /// One driver was asked to end; another one goes on.
