@@ -43,6 +43,7 @@ mod own_parts;
 mod passivity;
 mod passivity_fidelity;
 mod relative_motion;
+mod rises;
 mod robustness;
 mod shading;
 mod shading_energy;

@@ -25,7 +25,7 @@ const SAME_N: f64 = 1e-7;
 const ROUNDING_M: f64 = 2e-15;
 
 /// Each with half the width of the space where fingers roam.
-fn surfaces() -> Vec<(String, Entity, f64)> {
+pub(crate) fn surfaces() -> Vec<(String, Entity, f64)> {
     let mut all = vec![("plane".into(), entity(solids::plane(), Friction::None), 0.02)];
     for solid in solids::all() {
         all.push((solid.name.into(), entity(solid.form, Friction::None), 1.2 * solid.size_m));
