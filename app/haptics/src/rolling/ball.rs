@@ -129,6 +129,10 @@ impl<F: Foot> Ball<F> {
 
     /// What the centre is not at, however near, carries nothing: with a wall nearly parallel to another one it would be far
     /// from where these meet, and what friction does to it on the way there would be lost.
+    ///
+    /// The spring is no longer than to the centre, which is in front of all that it touches. Where it is that but for
+    /// rounding, between walls that nearly face each other, the next place in front of both may be decimetres away: the
+    /// walls are taken to be at the centre.
     fn press_on_what_is_touched(&mut self, planes: &[Plane], near_m: f64, hip_B: &Vector3<f64>) -> Pressed {
         let centre_B = self.centre_B;
         let is_touched = |plane: &Plane| distance(plane, &centre_B) <= near_m;
@@ -137,7 +141,13 @@ impl<F: Foot> Ball<F> {
             touched[count] = *plane;
             count += 1;
         }
-        let pressed = press(&touched[..count], hip_B);
+        let mut pressed = press(&touched[..count], hip_B);
+        if (pressed.point_B - hip_B).norm() > (centre_B - hip_B).norm() + near_m {
+            for plane in &mut touched[..count] {
+                plane.1 = plane.1.min(plane.0.dot(&centre_B));
+            }
+            pressed = press(&touched[..count], hip_B);
+        }
         let mut loads_m = pressed.loads_m.into_iter();
         for (rest, plane) in self.rests_mut().iter_mut().zip(planes) {
             rest.load_m = if is_touched(plane) { loads_m.next().unwrap_or_default() } else { 0.0 };
