@@ -87,7 +87,7 @@ impl<F: Foot> Ball<F> {
     fn look_at_many(&mut self, ground: &impl Ground<Foot = F>, input: &ConeInput) -> Look {
         let (planes, count) = self.planes();
         let planes = &planes[..count];
-        let pressed = self.press_on_what_is_touched(planes, tolerance_m(ground, self.radius_m), &input.hip_B);
+        let pressed = self.press_on_what_is_touched(ground, planes, &input.hip_B);
         let nearest = planes.iter().map(|plane| distance(plane, &input.hip_B)).enumerate();
         let deepest = nearest.min_by(|(_, a), (_, b)| a.total_cmp(b));
         let set = self.held();
@@ -130,10 +130,16 @@ impl<F: Foot> Ball<F> {
     /// What the centre is not at, however near, carries nothing: with a wall nearly parallel to another one it would be far
     /// from where these meet, and what friction does to it on the way there would be lost.
     ///
-    /// The spring is no longer than to the centre, which is in front of all that it touches. Where it is that but for
-    /// rounding, between walls that nearly face each other, the next place in front of both may be decimetres away: the
-    /// walls are taken to be at the centre.
-    fn press_on_what_is_touched(&mut self, planes: &[Plane], near_m: f64, hip_B: &Vector3<f64>) -> Pressed {
+    /// On flat faces the spring is no longer than to the centre, which is in front of all that it touches. Where it is
+    /// that but for what walking feet leave, between walls that nearly face each other, the next place in front of both
+    /// may be decimetres away: the walls are taken to be at the centre.
+    fn press_on_what_is_touched<G: Ground<Foot = F>>(
+        &mut self,
+        ground: &G,
+        planes: &[Plane],
+        hip_B: &Vector3<f64>,
+    ) -> Pressed {
+        let near_m = tolerance_m(ground, self.radius_m);
         let centre_B = self.centre_B;
         let is_touched = |plane: &Plane| distance(plane, &centre_B) <= near_m;
         let (mut touched, mut count) = ([(Vector3::zeros(), 0.0); MOST], 0);
@@ -142,7 +148,7 @@ impl<F: Foot> Ball<F> {
             count += 1;
         }
         let mut pressed = press(&touched[..count], hip_B);
-        if (pressed.point_B - hip_B).norm() > (centre_B - hip_B).norm() + near_m {
+        if !G::IS_BENT && (pressed.point_B - hip_B).norm() > (centre_B - hip_B).norm() + near_m {
             for plane in &mut touched[..count] {
                 plane.1 = plane.1.min(plane.0.dot(&centre_B));
             }
