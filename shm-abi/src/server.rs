@@ -524,3 +524,23 @@ impl Server {
         self.connections.retain(|connection| !matches!(connection.stage, Stage::Gone));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[cfg_attr(miri, ignore = "sockets are the system's")]
+    fn a_right_is_looked_up_for_the_user_of_the_connection() {
+        let directory = tempfile::tempdir().unwrap();
+        let mut server = Server::bind(&directory.path().join("driver.sock")).unwrap();
+        let _far = [server.rights.owner, server.rights.owner + 1].map(|uid| {
+            let (far, near) = UnixStream::pair().unwrap();
+            server.connections.push(Connection::new(near, Peer { uid, ..Peer::of(far.as_fd()).unwrap() }));
+            far
+        });
+        let found =
+            [Right::Command, Right::Administer].map(|right| [0, 1].map(|index| server.check(index, right)));
+        assert_eq!(found, [[Ok(()), Ok(())], [Ok(()), Err(None)]]);
+    }
+}
