@@ -529,18 +529,25 @@ impl Server {
 mod tests {
     use super::*;
 
+    /// One that belongs to no group of this process.
+    const GROUP: u32 = 4242;
+
     #[test]
     #[cfg_attr(miri, ignore = "sockets are the system's")]
-    fn a_right_is_looked_up_for_the_user_of_the_connection() {
+    fn a_right_is_looked_up_for_the_user_and_the_groups_of_the_connection() {
         let directory = tempfile::tempdir().unwrap();
         let mut server = Server::bind(&directory.path().join("driver.sock")).unwrap();
-        let _far = [server.rights.owner, server.rights.owner + 1].map(|uid| {
+        let owner = server.rights.owner;
+        let _far = [(owner, GROUP + 1), (owner + 1, GROUP + 1), (owner + 1, GROUP)].map(|(uid, gid)| {
             let (far, near) = UnixStream::pair().unwrap();
-            server.connections.push(Connection::new(near, Peer { uid, ..Peer::of(far.as_fd()).unwrap() }));
+            let peer = Peer { uid, gid, ..Peer::of(far.as_fd()).unwrap() };
+            server.connections.push(Connection::new(near, peer));
             far
         });
-        let found =
-            [Right::Command, Right::Administer].map(|right| [0, 1].map(|index| server.check(index, right)));
-        assert_eq!(found, [[Ok(()), Ok(())], [Ok(()), Err(None)]]);
+        let found = |server: &Server, right| [0, 1, 2].map(|index| server.check(index, right));
+        assert_eq!(found(&server, Right::Command), [Ok(()); 3]);
+        assert_eq!(found(&server, Right::Administer), [Ok(()), Err(None), Err(None)]);
+        server.rights.administer = Some(GROUP);
+        assert_eq!(found(&server, Right::Administer), [Ok(()), Err(Some(GROUP)), Ok(())]);
     }
 }

@@ -2,12 +2,12 @@
 
 mod common;
 
-use common::desk::{Desk, SHORT, is_closed, verdict};
+use common::desk::{Desk, verdict};
 use patience::limit;
 use rustix::time::{ClockId, clock_gettime};
 use shm_abi::handshake::{Request, RequestKind, Verdict};
-use shm_abi::server::{BATCH, PATIENCE, ServerEvent};
-use std::io::Write;
+use shm_abi::server::{BATCH, MAX_ASKING, PATIENCE, ServerEvent};
+use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 
@@ -30,13 +30,23 @@ fn a_silent_client_costs_no_turn_until_its_patience_ends() {
     let short = PATIENCE / 20;
     assert!(turn(&mut desk, short) >= short, "nothing was to do");
     // Nobody else says anything: the end of its patience alone ends this turn.
-    let began = Instant::now();
-    while began.elapsed() < PATIENCE {
+    silent.set_nonblocking(true).unwrap();
+    while silent.read(&mut [0; 1]).is_err() {
         let waited = turn(&mut desk, limit());
         assert!(waited < limit() / 2, "{waited:?}");
     }
-    desk.poll(SHORT);
-    assert!(is_closed(&mut silent));
+}
+
+/// As many silent clients as there are places for, and one that has long got what it asked for: nobody has to go.
+#[test]
+fn an_observer_takes_no_place_of_those_who_have_not_asked_yet() {
+    let mut desk = Desk::open();
+    let observer = desk.granted(RequestKind::Observe);
+    let silent: Vec<_> = (0..MAX_ASKING).map(|_| desk.connect()).collect();
+    for mut stream in silent.into_iter().chain([observer]) {
+        stream.set_nonblocking(true).unwrap();
+        assert_eq!(stream.read(&mut [0; 1]).unwrap_err().kind(), std::io::ErrorKind::WouldBlock);
+    }
 }
 
 /// It is looked for the mapping every millisecond, not in a loop without a pause.
