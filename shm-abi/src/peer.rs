@@ -160,10 +160,22 @@ mod tests {
             let told = std::thread::spawn(move || {
                 rustix::thread::set_thread_groups(&own).unwrap();
                 let (ours, _theirs) = UnixStream::pair().unwrap();
-                supplementary_groups(ours.as_fd())
+                let peer = Peer::of(ours.as_fd()).unwrap();
+                (supplementary_groups(ours.as_fd()), peer.groups(ours.as_fd()))
             });
-            assert_eq!(told.bounded_join().unwrap(), Some(expected));
+            let (supplementary, all) = told.bounded_join().unwrap();
+            assert_eq!(supplementary.as_ref(), Some(&expected));
+            let own = rustix::process::getegid().as_raw();
+            assert_eq!(all, [&expected[..], &[own]].concat(), "those and the first group");
         }
+    }
+
+    /// A kernel that refuses leaves the length as it was: that must not be taken for "make more room" again and again.
+    #[test]
+    fn who_cannot_be_asked_for_groups_has_none() {
+        let no_socket = std::fs::File::open("/dev/null").unwrap();
+        let asked = std::thread::spawn(move || supplementary_groups(no_socket.as_fd()));
+        assert_eq!(asked.bounded_join().unwrap(), None);
     }
 
     #[test]

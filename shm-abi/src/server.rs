@@ -524,3 +524,30 @@ impl Server {
         self.connections.retain(|connection| !matches!(connection.stage, Stage::Gone));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One that belongs to no group of this process.
+    const GROUP: u32 = 4242;
+
+    #[test]
+    #[cfg_attr(miri, ignore = "sockets are the system's")]
+    fn a_right_is_looked_up_for_the_user_and_the_groups_of_the_connection() {
+        let directory = tempfile::tempdir().unwrap();
+        let mut server = Server::bind(&directory.path().join("driver.sock")).unwrap();
+        let owner = server.rights.owner;
+        let _far = [(owner, GROUP + 1), (owner + 1, GROUP + 1), (owner + 1, GROUP)].map(|(uid, gid)| {
+            let (far, near) = UnixStream::pair().unwrap();
+            let peer = Peer { uid, gid, ..Peer::of(far.as_fd()).unwrap() };
+            server.connections.push(Connection::new(near, peer));
+            far
+        });
+        let found = |server: &Server, right| [0, 1, 2].map(|index| server.check(index, right));
+        assert_eq!(found(&server, Right::Command), [Ok(()); 3]);
+        assert_eq!(found(&server, Right::Administer), [Ok(()), Err(None), Err(None)]);
+        server.rights.administer = Some(GROUP);
+        assert_eq!(found(&server, Right::Administer), [Ok(()), Err(Some(GROUP)), Ok(())]);
+    }
+}

@@ -76,7 +76,7 @@ pub(crate) fn is_open(socket: &impl AsFd) -> bool {
 mod tests {
     use super::*;
     use patience::prelude::*;
-    use std::io::Write;
+    use std::io::{Read, Write};
     use std::os::unix::net::UnixStream;
 
     type Message = [u8; 256];
@@ -125,5 +125,30 @@ mod tests {
         drop(far);
         let error = receive::<Message>(near.as_fd(), Duration::from_secs(600)).expect_err("half");
         assert_eq!(error.kind(), io::ErrorKind::UnexpectedEof);
+    }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "sockets are the system's")]
+    fn an_end_is_open_until_the_other_one_is_closed() {
+        let (mut far, mut near) = UnixStream::pair().expect("sockets");
+        let look = near.try_clone().expect("a descriptor");
+        assert!(std::thread::spawn(move || is_open(&look)).bounded_join().expect("it never blocks"));
+        far.write_all(&[7]).expect("room for it");
+        assert!(is_open(&near), "something lies ready");
+        near.set_nonblocking(true).expect("a socket");
+        let mut byte = [0];
+        assert_eq!(near.read(&mut byte).expect("what lay ready was left there"), 1);
+        drop(far);
+        assert!(!is_open(&near));
+    }
+
+    /// What was never read there comes back as a reset.
+    #[test]
+    #[cfg_attr(miri, ignore = "sockets are the system's")]
+    fn an_end_that_was_reset_is_not_open() {
+        let (far, mut near) = UnixStream::pair().expect("sockets");
+        near.write_all(&[7]).expect("room for it");
+        drop(far);
+        assert!(!is_open(&near));
     }
 }

@@ -204,6 +204,16 @@ fn message_about_files(files: Vec<File>) -> String {
 }
 
 #[test]
+fn a_commanders_segment_that_lacks_a_seal_is_refused() {
+    let bytes = size_of::<shm_abi::layout::CommanderSegment>() as u64;
+    let half_sealed = memfd(bytes, rustix::fs::SealFlags::SHRINK);
+    assert_eq!(
+        shm_abi::CommanderMemory::map(half_sealed.as_fd()).unwrap_err().to_string(),
+        "the segment handed over is not sealed (found 2, expected at least 6); do not trust this driver"
+    );
+}
+
+#[test]
 fn a_descriptor_that_is_no_segment_is_refused_before_it_is_touched() {
     let bytes = size_of::<shm_abi::DriverSegment>() as u64;
     assert_eq!(

@@ -43,6 +43,39 @@ fn a_read_only_mapping_of_the_drivers_segment_cannot_be_made_writable() {
     assert_eq!(changed, Err(rustix::io::Errno::ACCESS));
 }
 
+/// A loop that waits for a command is woken, and does not look for it again and again.
+#[test]
+fn a_driver_sleeps_for_a_command_until_its_time_is_up() {
+    let memory = DriverMemory::create(&info()).unwrap();
+    let (view, _fd) = CommanderView::create(1).unwrap();
+    let timeout = std::time::Duration::from_millis(50);
+    let began = std::time::Instant::now();
+    // A signal may end a single sleep.
+    (0..4).for_each(|_| view.sleep_for_command(None, &memory, timeout));
+    assert!(began.elapsed() >= timeout, "{:?}", began.elapsed());
+}
+
+/// Pages that the commander took away before the seal are there again when the loop first looks at them.
+#[test]
+fn the_loops_first_look_at_a_sealed_segment_is_no_page_fault() {
+    let faults_of_a_first_look = || {
+        let offer = LeaseOffer::create(1, shm_abi::ABI_VERSION).unwrap();
+        let fd = offer.fd().try_clone_to_owned().unwrap();
+        let commander = CommanderMemory::map(fd.as_fd()).unwrap();
+        assert_eq!(punch(&fd, &commander), [Ok(()); 2]);
+        let view = offer.seal().unwrap();
+        let mut found = Command::zeroed();
+        let before = page_faults();
+        for tick in 0..shm_abi::layout::RING_COMMANDS as u64 {
+            let _ = std::hint::black_box(view.read_command(tick, &mut found));
+        }
+        page_faults() - before
+    };
+    // The first time may fault in this thread's own code.
+    let faults = (0..5).map(|_| faults_of_a_first_look()).min();
+    assert_eq!(faults, Some(0));
+}
+
 #[test]
 fn a_commander_that_punches_a_hole_into_its_memory_only_erases_its_commands() {
     let memory = DriverMemory::create(&info()).unwrap();
@@ -145,6 +178,21 @@ fn a_commander_of_before_1_3_has_mapped_its_segment_once_it_publishes_or_has_had
     let second = LeaseOffer::create(2, before).unwrap();
     common::wait_until("it has had time to", || second.is_mapped());
     assert!(begun.elapsed() >= shm_abi::segment::MAPPED_WITHIN);
+}
+
+#[test]
+fn a_view_tells_the_ramp_and_the_last_set_up_report_of_its_driver() {
+    let memory = DriverMemory::create(&info()).unwrap();
+    let view = DriverView::map(memory.fd()).unwrap();
+    assert_eq!(view.ramp_in_ticks(), info().ramp_in_ticks);
+    memory.tell_setup_report("obtained  locked memory");
+    assert_eq!(view.info().setup_report, "obtained  locked memory");
+}
+
+#[test]
+fn clocks_have_the_names_of_the_configuration() {
+    use shm_abi::segment::ClockMode::{Lockstep, Real, Virtual};
+    assert_eq!([Real, Lockstep, Virtual].map(|clock| clock.name()), ["real", "lockstep", "virtual"]);
 }
 
 #[test]

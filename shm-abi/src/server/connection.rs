@@ -107,3 +107,18 @@ pub(super) fn timespec(duration: Duration) -> Timespec {
         tv_nsec: duration.subsec_nanos().into(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_may_come_later_is_no_end() {
+        for errno in [Errno::AGAIN, Errno::INTR] {
+            assert!(matches!(heard_error(errno), Heard::Nothing), "{errno}");
+        }
+        for errno in [Errno::CONNRESET, Errno::PIPE, Errno::BADF] {
+            assert!(matches!(heard_error(errno), Heard::End), "{errno}");
+        }
+    }
+}
