@@ -139,6 +139,8 @@ fn is_stopped(pid: u32) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use rustix::process::{Pid, Signal, kill_process};
+
     use super::*;
 
     #[test]
@@ -146,8 +148,8 @@ mod tests {
         let mut child = std::process::Command::new("sleep").arg("60").spawn().expect("a process");
         let pid = child.id();
         assert!(ending(pid).contains("kill -TERM"));
-        let raw = nix::unistd::Pid::from_raw(pid.cast_signed());
-        nix::sys::signal::kill(raw, nix::sys::signal::Signal::SIGSTOP).expect("it is sent");
+        let own = Pid::from_child(&child);
+        kill_process(own, Signal::STOP).expect("it is sent");
         patience::until("a stopped process", || is_stopped(pid));
         assert!(ending(pid).contains("kill -KILL"));
         child.kill().expect("it is sent");
