@@ -35,6 +35,7 @@ mod hole;
 mod junction;
 pub mod make;
 mod mesh_cone;
+mod nesting;
 mod normals;
 mod order;
 mod pinch;

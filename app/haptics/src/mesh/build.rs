@@ -55,8 +55,9 @@ impl Mesh {
         let mut vertices = order::renumber(&mut triangles, &soup.vertices);
         drop(soup);
         let mut links = topology::link(&triangles, &vertices, &mut report)?;
+        let mut room = (3 * triangles.len()).min(Link::MAX_FACES - triangles.len());
         for _ in 0..MOST_DIVISIONS {
-            if !junction::divide(&mut triangles, &links, &vertices, &mut report.divided) {
+            if !junction::divide(&mut triangles, &links, &vertices, &mut room, &mut report.divided) {
                 break;
             }
             links = link_again(&mut triangles, &mut vertices, &mut report)?;

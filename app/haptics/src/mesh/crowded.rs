@@ -25,6 +25,7 @@ use super::topology::{Side, first_of_input, join};
 use super::touching::{pair_across_outside, sorted_by_angle};
 use super::winding::{Part, State, count, flood};
 use nalgebra::Vector3;
+use std::f64::consts::PI;
 
 /// The faces at an edge of three and more.
 pub(super) struct Crowd {
@@ -56,16 +57,17 @@ pub(super) fn join_crowds(
             continue;
         }
         report.crowded_edges.note(first);
-        let mut left: Vec<Side> = around.iter().map(|(_, side)| *side).collect();
+        let mut left = around;
         let mut pairs = within_pieces(&left, &pieces);
         take_out(&mut left, &pairs);
         for counts in [|has_rim: bool| !has_rim, |_| true] {
-            let of_these = left.iter().copied().filter(|side| counts(pieces.has_rim(*side)));
+            let of_these = left.iter().map(|(_, side)| *side).filter(|side| counts(pieces.has_rim(*side)));
             let more = brackets(&of_these.collect::<Vec<_>>(), is_upward);
             take_out(&mut left, &more);
             pairs.extend(more);
         }
-        pairs.extend(flattest(&left, &around, &pieces));
+        let of_pieces: Vec<_> = left.iter().map(|&(angle, side)| (angle, pieces.piece(side))).collect();
+        pairs.extend(flattest(&of_pieces).map(|pair| pair.map(|at| left[at].1)));
         pairs.iter().for_each(|&[a, b]| join(links, a, b));
     }
 }
@@ -102,50 +104,101 @@ impl Pieces {
 }
 
 /// Faces that are the only two of their piece, and look different ways.
-fn within_pieces(left: &[Side], pieces: &Pieces) -> Vec<[Side; 2]> {
-    let mut pairs = Vec::new();
-    for &side in left {
-        let mut of_piece = left.iter().copied().filter(|&other| pieces.piece(other) == pieces.piece(side));
-        if let (Some(a), Some(b), None) = (of_piece.next(), of_piece.next(), of_piece.next())
-            && a == side
-            && pieces.is_upward(a) != pieces.is_upward(b)
-        {
-            pairs.push([a, b]);
-        }
-    }
-    pairs
+fn within_pieces(left: &[(f64, Side)], pieces: &Pieces) -> Vec<[Side; 2]> {
+    let mut by_piece: Vec<(usize, Side)> = left.iter().map(|&(_, side)| (pieces.piece(side), side)).collect();
+    by_piece.sort_unstable();
+    let of_piece = by_piece.chunk_by(|a, b| a.0 == b.0).filter_map(|piece| match piece {
+        &[(_, a), (_, b)] => (pieces.is_upward(a) != pieces.is_upward(b)).then_some([a, b]),
+        _ => None,
+    });
+    of_piece.collect()
 }
 
 /// Faces that bound the same wedge of outside. The outside lies ahead of a face that runs upward, so that is an opening
 /// bracket, closed by the next one that runs downward and is not closed yet; around the edge and once more.
 fn brackets(around: &[Side], is_upward: impl Fn(Side) -> bool) -> Vec<[Side; 2]> {
-    let (mut open, mut pairs): (Vec<Side>, Vec<[Side; 2]>) = (Vec::new(), Vec::new());
-    for (turn, &side) in around.iter().chain(around).enumerate() {
-        if pairs.as_flattened().contains(&side) {
+    let (mut open, mut pairs): (Vec<usize>, Vec<[Side; 2]>) = (Vec::new(), Vec::new());
+    let mut is_closed = vec![false; around.len()];
+    for turn in 0..2 * around.len() {
+        let at = turn % around.len();
+        if is_closed[at] {
             continue;
         }
-        if is_upward(side) {
+        if is_upward(around[at]) {
             if turn < around.len() {
-                open.push(side);
+                open.push(at);
             }
         } else if let Some(opened) = open.pop() {
-            pairs.push([opened, side]);
+            (is_closed[opened], is_closed[at]) = (true, true);
+            pairs.push([around[opened], around[at]]);
         }
     }
     pairs
 }
 
 /// Of faces that all look the same way, the two of different pieces that lie most nearly in one plane: of sheets nobody
-/// can tell which way they are meant.
-fn flattest(left: &[Side], around: &[(f64, Side)], pieces: &Pieces) -> Option<[Side; 2]> {
-    let angle_of =
-        |side: Side| around.iter().find(|(_, other)| *other == side).map_or(0.0, |(angle, _)| *angle);
-    let bend = |[a, b]: &[Side; 2]| (angle_of(*a) - angle_of(*b)).cos();
-    let pairs = left.iter().enumerate().flat_map(|(i, &a)| left[i + 1..].iter().map(move |&b| [a, b]));
-    let of_two = pairs.filter(|[a, b]| pieces.piece(*a) != pieces.piece(*b));
-    of_two.min_by(|a, b| bend(a).total_cmp(&bend(b)))
+/// can tell which way they are meant. Angles and pieces come by their angle, so that those opposite of a face stand side by side.
+fn flattest(left: &[(f64, usize)]) -> Option<[usize; 2]> {
+    let count = left.len();
+    let piece_at = |at: usize| left[at].1;
+    if (1..count).all(|at| piece_at(at) == piece_at(0)) {
+        return None;
+    }
+    // For each the next one of another piece, going up and going down; twice around, since the first ones need the last.
+    let (mut above, mut below) = (vec![0; count], vec![0; count]);
+    for turn in 0..2 * count {
+        let (at, before) = (turn % count, (turn + count - 1) % count);
+        below[at] = if piece_at(before) == piece_at(at) { below[before] } else { before };
+    }
+    for turn in (0..2 * count).rev() {
+        let (at, after) = (turn % count, (turn + 1) % count);
+        above[at] = if piece_at(after) == piece_at(at) { above[after] } else { after };
+    }
+    let opposite = |at: usize| {
+        let (angle, _) = left[at];
+        let over = if angle > 0.0 { angle - PI } else { angle + PI };
+        let up = left.partition_point(|(angle, _)| *angle < over) % count;
+        let down = (up + count - 1) % count;
+        let other =
+            |near: usize, next: &[usize]| if piece_at(near) == piece_at(at) { next[near] } else { near };
+        [other(up, &above), other(down, &below)].map(|other| [at.min(other), at.max(other)])
+    };
+    let bend = |[a, b]: &[usize; 2]| (left[*a].0 - left[*b].0).cos();
+    (0..count).flat_map(opposite).min_by(|a, b| bend(a).total_cmp(&bend(b)).then(a.cmp(b)))
 }
 
-fn take_out(left: &mut Vec<Side>, pairs: &[[Side; 2]]) {
-    left.retain(|side| !pairs.as_flattened().contains(side));
+fn take_out(left: &mut Vec<(f64, Side)>, pairs: &[[Side; 2]]) {
+    let mut out = pairs.as_flattened().to_vec();
+    out.sort_unstable();
+    left.retain(|(_, side)| out.binary_search(side).is_err());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_flattest_pair_is_that_of_all_pairs() {
+        let mut state = 3_u64;
+        let mut next = |below: u64| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) % below
+        };
+        for round in 0..2000 {
+            let (count, pieces) = (next(12), 1 + next(5));
+            // Some angles are equal or opposite.
+            let steps = if round % 2 == 0 { 16 } else { 1 << 20 };
+            let mut angle = || (2 * next(steps)) as f64 * PI / steps as f64 - PI;
+            let mut angles: Vec<f64> = (0..count).map(|_| angle()).collect();
+            angles.sort_unstable_by(f64::total_cmp);
+            let left: Vec<_> = angles.into_iter().map(|angle| (angle, next(pieces) as usize)).collect();
+            let bend = |a: usize, b: usize| (left[a].0 - left[b].0).cos();
+            let pairs = (0..left.len()).flat_map(|a| (0..a).map(move |b| [b, a]));
+            let of_two = pairs.filter(|&[a, b]| left[a].1 != left[b].1);
+            let least = of_two.map(|[a, b]| bend(a, b)).min_by(f64::total_cmp);
+            let found = flattest(&left);
+            assert_eq!(found.map(|[a, b]| bend(a, b)), least, "{left:?}");
+            assert!(found.is_none_or(|[a, b]| a < b && left[a].1 != left[b].1), "{left:?} {found:?}");
+        }
+    }
 }

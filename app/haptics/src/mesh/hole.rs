@@ -13,7 +13,7 @@
 use super::order::{Curve, Triangle};
 use super::repair::{area_vector, has_area};
 use super::report::MeshReport;
-use super::{Link, winding};
+use super::{Link, MAX_VALENCE, winding};
 use nalgebra::Vector3;
 
 /// Which holes are closed when a mesh is built.
@@ -84,7 +84,7 @@ impl Hole {
         Self { face: rim[0].0, origin, corners, size_m: diagonal_m(&points), area_m2 }
     }
 
-    /// Triangles over it, around a new vertex if there are more than three; `None` if one had no area.
+    /// Triangles over it, around a new vertex if there are more than three; `None` if one had no area, or that vertex too many.
     fn lid(&self, vertices: &mut Vec<Vector3<f64>>) -> Option<Vec<[u32; 3]>> {
         let proper = |corners: &[u32; 3], vertices: &[Vector3<f64>]| {
             has_area(&corners.map(|corner| vertices[corner as usize]))
@@ -92,12 +92,19 @@ impl Hole {
         if let [a, b, c] = *self.corners {
             return proper(&[c, b, a], vertices).then(|| vec![[c, b, a]]);
         }
+        if self.corners.len() > MAX_VALENCE as usize {
+            return None;
+        }
         let sum: Vector3<f64> = self.corners.iter().map(|&corner| vertices[corner as usize]).sum();
         let middle = vertices.len() as u32;
         vertices.push(sum / self.corners.len() as f64);
         let next = self.corners.iter().cycle().skip(1);
         let lid: Vec<_> = self.corners.iter().zip(next).map(|(&a, &b)| [b, a, middle]).collect();
-        lid.iter().all(|corners| proper(corners, vertices)).then_some(lid)
+        if lid.iter().all(|corners| proper(corners, vertices)) {
+            return Some(lid);
+        }
+        vertices.pop();
+        None
     }
 }
 
@@ -170,7 +177,7 @@ fn loops(triangles: &[Triangle], links: &[[Link; 3]], vertices: &[Vector3<f64>])
 /// The open edge that begins where this one ends, of the same fan; `None` if neighbours are not wound alike.
 fn next_open(links: &[[Link; 3]], face: usize, edge: usize) -> Option<(usize, usize)> {
     let (mut face, mut edge) = (face, (edge + 1) % 3);
-    for _ in 0..super::MAX_VALENCE {
+    for _ in 0..MAX_VALENCE {
         let link = links[face][edge];
         if link.is_boundary() {
             return Some((face, edge));

@@ -6,6 +6,8 @@
 //! Model: an edge of one face alone, with vertices of other such edges upon it, is divided at these, if the pieces fit any of
 //! those edges. Upon it is what is nearer than [`NEAR`] of the mesh: files with six digits are no more exact.
 //!
+//! Limit: pieces are to join sides of other faces, so there are no more of them than the input had sides. A division that would
+//! make more is left out: a hundred faces upon the same long edge with a hundred vertices upon it mean nothing.
 //! Cost: nothing for a closed mesh; else sorting the vertices at open edges, and at most [`MOST_LOOKS`] comparisons.
 
 use super::Link;
@@ -15,28 +17,29 @@ use super::report::Finding;
 use nalgebra::Vector3;
 use std::collections::BTreeSet;
 
-/// Divides what can be divided, each face on one edge at most; says whether there was any.
+/// Divides what can be divided, each face on one edge at most; says whether there was any. `room` is how many faces may be added.
 pub(super) fn divide(
     triangles: &mut Vec<Triangle>,
     links: &[[Link; 3]],
     vertices: &[Vector3<f64>],
+    room: &mut usize,
     divided: &mut Finding,
 ) -> bool {
     let open = Open::new(triangles, links, vertices);
-    let (mut looks, mut added, mut pieces) = (0, 0, Vec::new());
+    let (mut looks, mut pieces) = (0, Vec::new());
     for face in 0..links.len() {
         let corners = triangles[face].corners;
         let is_open = |edge: &usize| links[face][*edge].is_boundary();
         let division = (0..3).filter(is_open).find_map(|edge| {
             let turned = [0, 1, 2].map(|i| corners[(edge + i) % 3]);
             let upon = open.upon(turned, vertices, &mut looks);
-            open.divided(turned, &upon, vertices)
+            if upon.len() <= *room { open.divided(turned, &upon, vertices) } else { None }
         });
         if let Some(division) = division {
-            added += division.len() - 1;
+            *room -= division.len() - 1;
             pieces.push((face, division));
         }
-        if looks > MOST_LOOKS || links.len() + added > Link::MAX_FACES - MOST_ADDED {
+        if looks > MOST_LOOKS {
             break;
         }
     }
@@ -123,7 +126,5 @@ fn at(vertices: &[Vector3<f64>], corners: &[u32; 3]) -> [Vector3<f64>; 3] {
 
 /// Of the mesh's largest coordinate.
 const NEAR: f64 = 1e-6;
-/// Faces that one division may add: no mesh comes near to as many as links can tell apart.
-const MOST_ADDED: usize = 1 << 20;
 /// A mesh of a million loose faces is not searched to the end.
 const MOST_LOOKS: usize = 50_000_000;

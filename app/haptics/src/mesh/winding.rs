@@ -8,11 +8,11 @@
 //!    lies within its box turns with it: so a cavity, wound inward, stays a cavity, also in a file that is inside
 //!    out as a whole.
 //!
-//! Cost: linear; step 3 also compares each closed part with those that it overlaps along x.
+//! Cost: linear; step 3 also sorts the closed parts ([`nesting`](super::nesting)).
 
 use super::order::Triangle;
 use super::report::{Finding, MeshReport};
-use super::{Link, Sides};
+use super::{Link, Sides, nesting};
 use nalgebra::Vector3;
 
 /// Turns faces over where needed, and notes what was found. Says of each face whether its part has an inside.
@@ -95,14 +95,6 @@ impl Part {
     fn has_inside(&self) -> bool {
         self.is_closed && self.is_orientable
     }
-
-    fn size_m(&self) -> f64 {
-        (self.high - self.low).sum()
-    }
-
-    fn contains(&self, other: &Self) -> bool {
-        (0..3).all(|i| self.low[i] < other.low[i] && other.high[i] < self.high[i])
-    }
 }
 
 /// Winds each part like its first face, and finds out on which this leaves a contradiction.
@@ -166,18 +158,12 @@ fn measure(states: &[State], triangles: &[Triangle], vertices: &[Vector3<f64>], 
     }
 }
 
-/// Sweeps along x; what may contain a part begins before it and has not ended. The largest of those that do is an
-/// outermost one: what contained that would contain the part too.
+/// Each closed part like the outermost one around it.
 fn turn_outward(parts: &mut [Part], report: &mut MeshReport) {
-    let mut closed: Vec<usize> = (0..parts.len()).filter(|&i| parts[i].has_inside()).collect();
-    closed.sort_by(|&i, &j| parts[i].low.x.total_cmp(&parts[j].low.x));
-    let mut begun: Vec<usize> = Vec::new();
-    for i in closed {
-        begun.retain(|&o| parts[o].high.x > parts[i].low.x);
-        let around = begun.iter().copied().filter(|&o| parts[o].contains(&parts[i]));
-        let outermost = around.max_by(|&o, &p| parts[o].size_m().total_cmp(&parts[p].size_m())).unwrap_or(i);
-        parts[i].is_inside_out = parts[outermost].volume < 0.0;
-        begun.push(i);
+    let closed: Vec<usize> = (0..parts.len()).filter(|&i| parts[i].has_inside()).collect();
+    let boxes: Vec<_> = closed.iter().map(|&i| [parts[i].low, parts[i].high]).collect();
+    for (&i, outermost) in closed.iter().zip(nesting::outermost(&boxes)) {
+        parts[i].is_inside_out = parts[closed[outermost]].volume < 0.0;
         let part = &parts[i];
         if part.is_inside_out {
             report.inside_out.note(part.first);

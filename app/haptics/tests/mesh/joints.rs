@@ -233,3 +233,101 @@ fn an_open_part_beside_solids_that_overlap_leaves_them_solid() {
     }
     assert!(inside > 2000, "{inside}");
 }
+
+/// Sheets that share an edge of 1 m, all wound alike, at the same angle from each other.
+fn book(pages: usize) -> TriangleSoup {
+    let mut soup = TriangleSoup { vertices: vec![Vector3::zeros(), Vector3::x()], faces: Vec::new() };
+    for page in 0..pages {
+        let (sin, cos) = (page as f64 * std::f64::consts::TAU / pages as f64).sin_cos();
+        soup.faces.push([0, 1, soup.vertices.len() as u32]);
+        soup.vertices.push(point(0.5, cos, sin));
+    }
+    soup
+}
+
+/// Every pair of pages was compared, each with a search through all of them: a thousand took a second, and the time grew with
+/// their cube.
+#[test]
+fn of_a_book_of_many_pages_two_opposite_ones_are_neighbours() {
+    let pages = 2000;
+    let (mesh, report) = build(book(pages));
+    assert_eq!((report.crowded_edges.count, report.boundary_edges.count), (1, 3 * pages - 2));
+    let joined: Vec<_> = mesh.faces().iter().filter(|f| f.links.iter().any(|l| !l.is_boundary())).collect();
+    let [one, other] = joined[..] else { panic!("{} pages are joined", joined.len()) };
+    // They lie in one plane, up to rounding, wherever each looks.
+    assert!(one.normal_B.dot(&other.normal_B).abs() > 1.0 - 1e-9);
+}
+
+/// Each was divided at each corner: of 200 faces in 10 kB became 10,000.
+#[test]
+fn many_faces_on_an_edge_with_many_corners_on_it_are_not_all_divided() {
+    let count = 150;
+    let mut soup = book(count);
+    let first = soup.vertices.len() as u32;
+    let along = |i: usize| (i + 1) as f64 / (count + 2) as f64;
+    soup.vertices.extend((0..=count).map(|i| point(along(i), 0.0, 0.0)));
+    for tooth in 0..count as u32 {
+        soup.faces.push([first + tooth + 1, first + tooth, soup.vertices.len() as u32]);
+        soup.vertices.push(point(along(tooth as usize), 0.01, 0.01));
+    }
+    let input = soup.faces.len();
+    let (mesh, report) = build(soup);
+    assert!(report.divided.count > 0 && mesh.faces().len() <= 4 * input, "{report}");
+}
+
+fn assert_all_vertices_are_used(mesh: &Mesh) {
+    let mut is_used = vec![false; mesh.vertices().len()];
+    mesh.faces().iter().flat_map(|face| face.vertices).for_each(|vertex| is_used[vertex as usize] = true);
+    assert!(is_used.iter().all(|&is_used| is_used), "a vertex without a face");
+}
+
+#[test]
+fn a_hole_whose_lid_has_no_area_stays_open_and_leaves_no_vertex() {
+    let mut soup = icosphere(4, 0.1);
+    let removed = soup.faces[17];
+    let has = |face: &[u32; 3], v: u32| face.contains(&v);
+    let other = (0..soup.faces.len())
+        .find(|&i| i != 17 && has(&soup.faces[i], removed[0]) && has(&soup.faces[i], removed[1]))
+        .unwrap();
+    let opposite = soup.faces[other].into_iter().find(|&v| v != removed[0] && v != removed[1]).unwrap();
+    // The hole's corners are 0, opposite, 1, 2. Their mean lies on the edge from 1 to 2.
+    let at = removed.map(|v| soup.vertices[v as usize]);
+    soup.vertices[opposite as usize] = at[1] + at[2] - at[0];
+    soup.faces = (0..soup.faces.len()).filter(|&i| i != 17 && i != other).map(|i| soup.faces[i]).collect();
+    let (mesh, report) = build(soup);
+    assert_eq!((report.closed_holes.count, report.boundary_edges.count), (0, 4), "{report}");
+    assert_all_vertices_are_used(&mesh);
+}
+
+/// The vertex in the middle of a lid had more faces than a vertex may have, and the mesh was refused for it.
+#[test]
+fn a_hole_of_more_corners_than_a_vertex_may_have_stays_open() {
+    // A vase: rings of 2^15 corners at its mouth, 2^14 below, ... 4 at its foot.
+    let mut soup = TriangleSoup::default();
+    for level in (2..=15).rev() {
+        let count = 1_u32 << level;
+        let first = soup.vertices.len() as u32;
+        let radius = 0.1 + 0.1 * f64::from(15 - level);
+        let corner = |i: u32| (f64::from(i) * std::f64::consts::TAU / f64::from(count)).sin_cos();
+        soup.vertices.extend((0..count).map(|i| {
+            let (sin, cos) = corner(i);
+            point(radius * cos, 0.1 * f64::from(level), radius * sin)
+        }));
+        if level < 15 {
+            let above = |i: u32| first - 2 * count + i % (2 * count);
+            let here = |i: u32| first + i % count;
+            soup.faces.extend((0..count).flat_map(|i| {
+                [
+                    [here(i), above(2 * i), above(2 * i + 1)],
+                    [here(i), above(2 * i + 1), here(i + 1)],
+                    [here(i + 1), above(2 * i + 1), above(2 * i + 2)],
+                ]
+            }));
+        }
+    }
+    let foot = soup.vertices.len() as u32 - 4;
+    soup.faces.extend([[foot, foot + 1, foot + 2], [foot, foot + 2, foot + 3]]);
+    let (mesh, report) = build(soup);
+    assert_eq!((report.closed_holes.count, report.boundary_edges.count), (0, 1 << 15), "{report}");
+    assert_all_vertices_are_used(&mesh);
+}

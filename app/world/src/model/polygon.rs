@@ -11,7 +11,8 @@
 //! edges, so that what it closes is closed.
 //!
 //! The turning sense is measured about the polygon's own normal (Newell), so nothing depends on its plane.
-//! Cost: linear for the fan, cubic at worst for ears, hence [`MAX_CONCAVE_CORNERS`].
+//! Cost: linear for the fan; for ears quadratic, since what is known of a corner is kept until something there changes, but cubic
+//! at worst, hence [`MAX_CONCAVE_CORNERS`].
 
 use nalgebra::Vector3;
 use std::collections::{HashMap, HashSet};
@@ -129,18 +130,31 @@ impl Outline<'_> {
     fn cut_ears(&self, is_free: impl Fn(u32, u32) -> bool, faces: &mut Vec<[u32; 3]>) -> Option<()> {
         let rounding = ROUNDING * self.normal.norm_squared();
         let mut left: Vec<u32> = (0..self.places.len() as u32).collect();
+        let mut known = vec![Known::Nothing; left.len()];
         while left.len() > 3 {
             let around =
                 |i: usize| [left[(i + left.len() - 1) % left.len()], left[i], left[(i + 1) % left.len()]];
-            let is_ear = |i: &usize| self.turn(around(*i)) > 0.0 && self.is_empty(around(*i), &left);
-            let cuts_free = |i: &usize| is_free(around(*i)[0], around(*i)[2]);
+            let mut ear = None;
+            for i in 0..left.len() {
+                let known = &mut known[left[i] as usize];
+                if *known == Known::Nothing {
+                    *known = self.look_at(around(i), &left, &is_free);
+                }
+                if *known == Known::FreeEar {
+                    ear = Some(i);
+                    break;
+                }
+                ear = ear.or((*known == Known::Ear).then_some(i));
+            }
             // Corners on a straight line leave a triangle without an area, once no proper ear is there.
-            let ear = (0..left.len())
-                .find(|i| is_ear(i) && cuts_free(i))
-                .or_else(|| (0..left.len()).find(is_ear))
-                .or_else(|| (0..left.len()).find(|&i| self.turn(around(i)).abs() <= rounding))?;
-            faces.push(around(ear));
+            let is_straight = |i: &usize| self.turn(around(*i)).abs() <= rounding;
+            let ear = ear.or_else(|| (0..left.len()).find(is_straight))?;
+            let triangle @ [before, corner, after] = around(ear);
+            faces.push(triangle);
             left.remove(ear);
+            [before, after].iter().for_each(|&neighbour| known[neighbour as usize] = Known::Nothing);
+            let was_held = |known: &&mut Known| **known == Known::HeldBy(corner);
+            known.iter_mut().filter(was_held).for_each(|known| *known = Known::Nothing);
         }
         // Where ears have more area than the polygon, the rest runs the other way: it crosses itself.
         let last = [left[0], left[1], left[2]];
@@ -148,12 +162,36 @@ impl Outline<'_> {
         (self.turn(last) >= -rounding).then_some(())
     }
 
-    /// Whether no other corner lies in the triangle.
-    fn is_empty(&self, triangle @ [a, b, c]: [u32; 3], corners: &[u32]) -> bool {
+    fn look_at(&self, triangle: [u32; 3], left: &[u32], is_free: impl Fn(u32, u32) -> bool) -> Known {
+        if self.turn(triangle) <= 0.0 {
+            return Known::NotConvex;
+        }
+        match self.first_within(triangle, left) {
+            Some(corner) => Known::HeldBy(corner),
+            None if is_free(triangle[0], triangle[2]) => Known::FreeEar,
+            None => Known::Ear,
+        }
+    }
+
+    /// The first other corner that lies in the triangle.
+    fn first_within(&self, triangle @ [a, b, c]: [u32; 3], corners: &[u32]) -> Option<u32> {
         let is_corner = |p: u32| triangle.iter().any(|&t| self.places[t as usize] == self.places[p as usize]);
         let is_inside = |p: u32| [[a, b, p], [b, c, p], [c, a, p]].into_iter().all(|t| self.turn(t) >= 0.0);
-        !corners.iter().any(|&p| !is_corner(p) && is_inside(p))
+        corners.iter().copied().find(|&p| is_inside(p) && !is_corner(p))
     }
+}
+
+/// Of a corner and its neighbours.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Known {
+    Nothing,
+    NotConvex,
+    /// The triangle holds this corner, and is no ear while it is there.
+    HeldBy(u32),
+    /// An ear stays one while its neighbours do.
+    Ear,
+    /// Its diagonal is nobody else's.
+    FreeEar,
 }
 
 #[cfg(test)]
@@ -192,6 +230,59 @@ mod tests {
                 assert_eq!(areas(&turned), Some([area, area]), "from corner {start}");
             }
         }
+    }
+
+    /// Ears by their definition, looked for anew after each cut.
+    fn plainly_cut(outline: &Outline, is_free: impl Fn(u32, u32) -> bool) -> Vec<[u32; 3]> {
+        let mut left: Vec<u32> = (0..outline.places.len() as u32).collect();
+        let mut faces = Vec::new();
+        while left.len() > 3 {
+            let around =
+                |i: usize| [left[(i + left.len() - 1) % left.len()], left[i], left[(i + 1) % left.len()]];
+            let is_ear =
+                |i: usize| outline.turn(around(i)) > 0.0 && outline.first_within(around(i), &left).is_none();
+            let ears: Vec<usize> = (0..left.len()).filter(|&i| is_ear(i)).collect();
+            let free = ears.iter().find(|&&i| is_free(around(i)[0], around(i)[2]));
+            let rounding = ROUNDING * outline.normal.norm_squared();
+            let straight = (0..left.len()).find(|&i| outline.turn(around(i)).abs() <= rounding);
+            let Some(ear) = free.or(ears.first()).copied().or(straight) else { return faces };
+            faces.push(around(ear));
+            left.remove(ear);
+        }
+        faces.push([left[0], left[1], left[2]]);
+        faces
+    }
+
+    #[test]
+    fn ears_are_those_of_the_definition_whatever_was_known_before() {
+        let mut state = 5_u64;
+        let mut next = |below: u64| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) % below
+        };
+        let mut concave = 0;
+        for round in 0..600 {
+            let count = 4 + next(40);
+            // Stars about a middle, which do not cross themselves, and any; on a grid, so that many corners stand on lines.
+            let place = |i: u64| {
+                let (sin, cos) = (i as f64 * std::f64::consts::TAU / count as f64).sin_cos();
+                let radius = 1.0 + next(6) as f64;
+                let any = [next(7) as f64, next(7) as f64];
+                if round % 3 == 0 {
+                    any
+                } else {
+                    [(radius * cos * 8.0).round(), (radius * sin * 8.0).round()]
+                }
+            };
+            let places: Vec<_> = (0..count).map(place).map(|[x, y]| Vector3::new(x, y, 0.0)).collect();
+            let outline = Outline { normal: newell(&places), places: &places };
+            let is_free = |a: u32, b: u32| (a + b) % 3 != 0;
+            let mut faces = Vec::new();
+            outline.cut_ears(is_free, &mut faces);
+            assert_eq!(faces, plainly_cut(&outline, is_free), "{places:?}");
+            concave += u32::from(!outline.turns_one_way(0) && faces.len() as u64 == count - 2);
+        }
+        assert!(concave > 300, "{concave}");
     }
 
     #[test]
