@@ -85,7 +85,7 @@ pub enum ShapeSpec {
 /// A file of triangles or patches and what becomes of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeshSpec {
-    /// OBJ or STL; of patches OBJ or TOML; made relative to where the scene file is. It is not opened by the reader of scenes.
+    /// A model file ([`crate::model`]); of patches OBJ or TOML; made relative to where the scene file is. It is not opened by the reader of scenes.
     pub file: PathBuf,
     /// Factors along x, y and z that make metres of the file's numbers; above 0, default 1.
     pub scale: [f64; 3],
@@ -234,7 +234,7 @@ fn read_ellipsoid(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
 }
 
 fn read_mesh(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
-    let mesh = read_file(table, "the path of an OBJ or STL file, relative to this file")?;
+    let mesh = read_file(table, MODEL_FILE)?;
     let hollow = table.get("hollow").map_or(Ok(false), |value| value.truth())?;
     Ok(ShapeSpec::Mesh(MeshSpec { hollow, ..mesh }))
 }
@@ -242,7 +242,7 @@ fn read_mesh(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
 impl ShapeSpec {
     /// That of an environment which is a mesh: `file` and `scale` stand in its own table.
     pub(crate) fn read_hollow_mesh(environment: &Table<'_>) -> Result<Self, SceneError> {
-        let mesh = read_file(environment, "the path of an OBJ or STL file, relative to this file")?;
+        let mesh = read_file(environment, MODEL_FILE)?;
         let scale = environment.get("scale").map_or(Ok([1.0; 3]), |value| value.factors())?;
         Ok(Self::Mesh(MeshSpec { scale, hollow: true, ..mesh }))
     }
@@ -269,6 +269,8 @@ fn size(table: &Table<'_>, key: &str) -> Result<f64, SceneError> {
 fn sizes(table: &Table<'_>, key: &str) -> Result<[f64; 3], SceneError> {
     table.require(key, "an array of 3 numbers above 0")?.numbers_in(Bound::Positive)
 }
+
+const MODEL_FILE: &str = "the path of an OBJ, STL, PLY, glTF, ASE or 3DS file, relative to this file";
 
 const fn keys(available: &'static [&'static str]) -> Vocabulary {
     Vocabulary { available, later: &[] }

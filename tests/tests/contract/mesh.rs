@@ -276,7 +276,8 @@ fn a_broken_model_is_refused_with_scene_line_model_and_offender() {
             text.replacen("endloop", "loop", 1).into(),
             &["line 7: found `loop`", "allowed: `endloop`"],
         ),
-        ("a.ply", b"ply\nformat ascii 1.0\n".into(), &["neither OBJ nor STL"]),
+        ("a.ply", b"ply\nformat ascii 1.0\n".into(), &["line 3", "`end_header`"]),
+        ("a.fbx", b"Kaydara FBX Binary".into(), &["a file of FBX", "export as glTF"]),
     ];
     for (name, bytes, parts) in cases {
         let said = run_with(name, &bytes);

@@ -264,7 +264,7 @@ fn each_shape_knows_its_own_keys() {
         ("{ kind = \"ellipsoid\" }", "radii_m: missing; allowed: an array of 3 numbers above 0"),
         (
             "{ kind = \"mesh\" }",
-            "file: missing; allowed: the path of an OBJ or STL file, relative to this file",
+            "file: missing; allowed: the path of an OBJ, STL, PLY, glTF, ASE or 3DS file, relative to this file",
         ),
     ] {
         refused(&with_shape(shape), &format!("s.toml:4: entity[0].shape.{message}"));
