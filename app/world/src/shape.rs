@@ -91,6 +91,9 @@ pub struct MeshSpec {
     pub scale: [f64; 3],
     /// A mesh that is closed is felt from both sides all the same, as a room is.
     pub hollow: bool,
+    /// The largest hole that is closed, by the diagonal of the box around it (m); `None`: those that are small beside a
+    /// part that is closed but for them.
+    pub close_holes_m: Option<f64>,
     /// Where the scene names it, for messages.
     pub at: Location,
 }
@@ -236,7 +239,9 @@ fn read_ellipsoid(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
 fn read_mesh(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
     let mesh = read_file(table, MODEL_FILE)?;
     let hollow = table.get("hollow").map_or(Ok(false), |value| value.truth())?;
-    Ok(ShapeSpec::Mesh(MeshSpec { hollow, ..mesh }))
+    let largest = |value: Value<'_>| value.number(Bound::NotNegative);
+    let close_holes_m = table.get("close_holes_m").map(largest).transpose()?;
+    Ok(ShapeSpec::Mesh(MeshSpec { hollow, close_holes_m, ..mesh }))
 }
 
 impl ShapeSpec {
@@ -255,7 +260,8 @@ fn read_nurbs(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
 
 fn read_file(table: &Table<'_>, allowed: &str) -> Result<MeshSpec, SceneError> {
     let value = table.require("file", allowed)?;
-    Ok(MeshSpec { file: value.file(allowed)?, scale: [1.0; 3], hollow: false, at: *value.at() })
+    let file = value.file(allowed)?;
+    Ok(MeshSpec { file, scale: [1.0; 3], hollow: false, close_holes_m: None, at: *value.at() })
 }
 
 fn read_csg(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
@@ -284,7 +290,7 @@ const CONE_KEYS: Vocabulary = keys(&["kind", "radius_bottom_m", "radius_top_m", 
 const TORUS_KEYS: Vocabulary = keys(&["kind", "ring_radius_m", "tube_radius_m", "scale"]);
 const ELLIPSOID_KEYS: Vocabulary = keys(&["kind", "radii_m", "scale"]);
 const NURBS_KEYS: Vocabulary = keys(&["kind", "file", "scale"]);
-const MESH_KEYS: Vocabulary = keys(&["kind", "file", "scale", "hollow"]);
+const MESH_KEYS: Vocabulary = keys(&["kind", "file", "scale", "hollow", "close_holes_m"]);
 
 const KINDS: Vocabulary = Vocabulary {
     available: &[
