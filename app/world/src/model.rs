@@ -27,6 +27,7 @@ mod polygon;
 mod stl;
 mod three_ds;
 mod words;
+mod write;
 
 pub use ase::read_ase;
 pub use free_form::read_free_form;
@@ -36,6 +37,7 @@ pub use patches::{read_patches, write_patches};
 pub use ply::read_ply;
 pub use stl::read_stl;
 pub use three_ds::read_three_ds;
+pub use write::write_obj;
 
 use crate::error::SceneError;
 use haptics::NurbsPatch;
@@ -180,6 +182,12 @@ const LOOKS: [(fn(&[u8]) -> bool, Format); 6] = [
     (stl::looks_like_stl, Format::Stl),
     (obj::looks_like_obj, Format::Obj),
 ];
+
+/// Whether the name is that of a model, of a kind that is read or of one that is refused as such.
+pub fn is_named(file: &Path) -> bool {
+    let ending = file.extension().unwrap_or_default();
+    ENDINGS.iter().any(|(name, _)| ending.eq_ignore_ascii_case(name)) || foreign::foreign(file, b"").is_some()
+}
 
 /// The bytes of a model file.
 ///

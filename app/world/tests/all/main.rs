@@ -31,3 +31,4 @@ mod settings;
 mod shading;
 mod templates;
 mod thesis;
+mod written_models;
