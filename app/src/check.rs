@@ -1,10 +1,12 @@
-//! `phantom3 check`: what is wrong with a scene, all of it, without running it; and what is in it.
+//! `phantom3 check`: what is wrong with a scene, all of it, without running it; and what is in it. Of a model file, how it is
+//! understood (`model_file`).
 //!
 //! Model: the scene is read, its models and pictures are loaded and everything is made ready to run, as `run` does. What
 //! stands in the way is a *problem*: `run` would refuse the scene, with the first of them. What runs, but hardly as
 //! meant, is a *warning*.
 
 mod measures;
+pub(crate) mod model_file;
 mod report;
 mod summary;
 mod suspicions;
@@ -23,12 +25,12 @@ use std::fmt::Display;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use summary::Summary;
-use world::{Layout, Location, Scene, Settings};
+use world::{Layout, Location, Scene, Settings, model};
 
 /// The arguments of `phantom3 check`.
 #[derive(Debug, Args)]
 pub struct CheckArgs {
-    /// The scene (TOML)
+    /// The scene (TOML), or a model file (OBJ, STL, PLY, glTF, ASE, 3DS)
     scene: PathBuf,
     /// The hand file that it is to be run with (CSV); default: the scene's own
     #[arg(long, value_name = "CSV")]
@@ -39,9 +41,27 @@ pub struct CheckArgs {
     /// At how many ticks per second it is to run
     #[arg(long, value_name = "HZ", default_value_t = 1000.0, value_parser = crate::cli::parse_rate)]
     rate_hz: f64,
+    /// Write how the model is understood, as OBJ: merged, turned, divided, with lids as a group
+    #[arg(long, value_name = "OBJ")]
+    repair: Option<PathBuf>,
+    /// Close all holes of the model up to this size, in its own unit; 0: none
+    #[arg(long, value_name = "SIZE", value_parser = parse_size)]
+    close_holes: Option<f64>,
     /// Tell everything as JSON
     #[arg(long)]
     json: bool,
+}
+
+impl CheckArgs {
+    /// Whether it is a model that is to be checked, and no scene.
+    pub(crate) fn is_model(&self) -> bool {
+        model::is_named(&self.scene)
+    }
+}
+
+fn parse_size(text: &str) -> Result<f64, String> {
+    let size = text.parse().ok().filter(|size: &f64| size.is_finite() && *size >= 0.0);
+    size.ok_or_else(|| "allowed: a size in the unit of the model, 0 or more".into())
 }
 
 /// What came of it.
@@ -91,6 +111,12 @@ pub fn execute(args: &CheckArgs, settings: &Settings) -> ExitCode {
 fn check(args: &CheckArgs, settings: &Settings) -> Checked {
     let file = settings::find(&args.scene, &settings.scenes.value);
     let mut checked = Checked::default();
+    if args.repair.is_some() || args.close_holes.is_some() {
+        let words = "--repair and --close-holes are for a model file: `phantom3 check MODEL.obj --repair OUT.obj`; a scene's \
+                     meshes have the key `close_holes_m`";
+        checked.problems.push(Problem::new(&words, None));
+        return checked;
+    }
     let layout = args.layout.as_ref().map(Layout::load).transpose();
     let layout = layout.unwrap_or_else(|error| {
         checked.problems.push(Problem::new(&error, error.location().cloned()));

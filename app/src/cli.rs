@@ -135,6 +135,10 @@ fn execute() -> ExitCode {
         Some(AppCommand::Play(args)) => {
             conclude(settings.load().and_then(|settings| play(&args, &settings, headless)))
         }
+        Some(AppCommand::Check(args)) if args.is_model() => {
+            let result = install_signals().and_then(interrupted::watch);
+            result.map_or_else(|failure| failed(&failure), |()| check::model_file::execute(&args))
+        }
         Some(AppCommand::Check(args)) => settings
             .load()
             .map_or_else(|failure| failed(&failure), |settings| check::execute(&args, &settings)),

@@ -23,6 +23,7 @@ enum Kind {
     Events,
     Picture,
     Scene,
+    Model,
     Table,
 }
 
@@ -47,6 +48,11 @@ impl<'a> Output<'a> {
         Self { option: "--out", file, kind: Kind::Scene }
     }
 
+    /// Of a model that was understood.
+    pub(crate) fn model(file: &'a Path) -> Self {
+        Self { option: "--repair", file, kind: Kind::Model }
+    }
+
     /// Of an export; its format has been looked at.
     pub(crate) fn table(file: &'a Path) -> Self {
         Self { option: "the table", file, kind: Kind::Table }
@@ -56,7 +62,7 @@ impl<'a> Output<'a> {
         match self.kind {
             Kind::Ticks => RunFormat::of(self.file).map(drop),
             Kind::Events => EventFormat::of(self.file).map(drop),
-            Kind::Picture | Kind::Scene | Kind::Table => Ok(()),
+            Kind::Picture | Kind::Scene | Kind::Model | Kind::Table => Ok(()),
         }
     }
 }

@@ -61,7 +61,7 @@ pub use face::{Face, Link};
 pub use hole::CloseHoles;
 pub use mesh_cone::{Beginning, MeshCone};
 pub use normals::{SHARPEST_CREASE_RAD, VertexNormals};
-pub use report::{Finding, MeshReport};
+pub use report::{Finding, MeshReport, OpenHole, OpenHoles};
 pub(crate) use rolling::BallOnMesh;
 pub use soup::TriangleSoup;
 pub use uv::CornerUv;

@@ -4,7 +4,7 @@
 
 use super::entities::is_only_seen;
 use super::{Problems, RigError, material};
-use haptics::mesh::{CornerUv, Finding, Mesh, MeshReport, TriangleSoup};
+use haptics::mesh::{CloseHoles, CornerUv, Finding, Mesh, MeshReport, TriangleSoup};
 use haptics::{Nurbs, Shading};
 use io_driver::say::say;
 use nalgebra::Vector3;
@@ -28,8 +28,9 @@ pub(super) struct Models {
     only_seen: BTreeSet<String>,
 }
 
-/// A file, the bits of the factors along its axes, whether a picture lies on it, and whether it is felt from both sides.
-type Key = (PathBuf, [u64; 3], bool, bool);
+/// A file, the bits of the factors along its axes, whether a picture lies on it, whether it is felt from both sides, and the
+/// bits of the largest hole that is closed.
+type Key = (PathBuf, [u64; 3], bool, bool, Option<u64>);
 
 impl Models {
     /// Loads every mesh that the scene's entities use; those that cannot be had are noted.
@@ -131,7 +132,13 @@ fn is_drawn_from_its_file(scene: &Scene, entity: &SceneEntity) -> bool {
 }
 
 fn key_of(spec: &MeshSpec, has_picture: bool) -> Key {
-    (spec.file.clone(), spec.scale.map(f64::to_bits), has_picture, spec.hollow)
+    (
+        spec.file.clone(),
+        spec.scale.map(f64::to_bits),
+        has_picture,
+        spec.hollow,
+        spec.close_holes_m.map(f64::to_bits),
+    )
 }
 
 fn build(spec: &MeshSpec, has_picture: bool) -> Result<(Mesh, MeshReport), RigError> {
@@ -142,9 +149,10 @@ fn build(spec: &MeshSpec, has_picture: bool) -> Result<(Mesh, MeshReport), RigEr
         source,
     })?;
     let soup = scaled(soup, &spec.scale);
+    let holes = spec.close_holes_m.map_or(CloseHoles::Small, CloseHoles::UpTo);
     let built = match uv {
-        Some(uv) => Mesh::build_with_uv(soup, &uv),
-        None => Mesh::build(soup),
+        Some(uv) => Mesh::build_with_uv_closing(soup, &uv, holes),
+        None => Mesh::build_closing(soup, holes),
     };
     let (mesh, report) = built.map_err(|source| RigError::Mesh {
         at: Box::new(spec.at.clone()),

@@ -1,9 +1,9 @@
-//! Triangles from model files: Wavefront OBJ and STL.
+//! Triangles from model files: Wavefront OBJ, STL, PLY, glTF 2.0, ASE and 3DS.
 //!
 //! Problem: such files come from everywhere, are cut short by full disks and written by programs that take liberties.
 //! Whoever gets a message must find the place in a file of a million lines.
 //!
-//! Model: [`load`] opens the file; [`read_obj`] and [`read_stl`] take bytes. Nothing in a file is believed: every number
+//! Model: [`load`] opens the file; [`read_obj`], [`read_stl`] and the others take bytes. Nothing in a file is believed: every number
 //! is checked to be one, every index to be in range, every length against what is there. What a reader returns is a
 //! [`TriangleSoup`] with finite coordinates and valid indices; whether it makes a mesh is
 //! [`haptics::mesh::Mesh::build`]'s business.
@@ -12,19 +12,32 @@
 //! concave polygon as a fan; `stl_io` 0.11 takes a binary file whose header begins with "solid", which is common, for a
 //! text, names no place, lets NaN pass, and takes as long for a million triangles as reading and building them does here.
 //!
-//! Units: the file's own; a scene's `scale` makes metres of them.
+//! Units and axes: the file's own (glTF: metres, y up); a scene's `scale` makes metres of them, and its orientation turns them.
 //! Cost: one pass; a million triangles take a fraction of a second.
 
+mod ase;
+mod foreign;
 mod free_form;
+#[allow(non_snake_case)] // Names carry their frame.
+mod gltf;
 mod obj;
 mod patches;
+mod ply;
 mod polygon;
 mod stl;
+mod three_ds;
+mod words;
+mod write;
 
+pub use ase::read_ase;
 pub use free_form::read_free_form;
+pub use gltf::read_gltf;
 pub use obj::{line_of_face, read_obj, read_obj_with_uv};
 pub use patches::{read_patches, write_patches};
+pub use ply::read_ply;
 pub use stl::read_stl;
+pub use three_ds::read_three_ds;
+pub use write::write_obj;
 
 use crate::error::SceneError;
 use haptics::NurbsPatch;
@@ -48,7 +61,7 @@ pub enum ModelError {
     #[error("cannot be read: {0}")]
     Unreadable(#[source] io::Error),
     /// A directory, a pipe or a device.
-    #[error("{0}; name an OBJ or STL file")]
+    #[error("{0}; name a model file")]
     NotAFile(#[source] io::Error),
     /// Larger than any model we build.
     #[error("larger than {limit_bytes} bytes; allowed: at most so many")]
@@ -57,10 +70,16 @@ pub enum ModelError {
         limit_bytes: u64,
     },
     /// Neither its name nor its content says what it is.
-    #[error(
-        "neither OBJ nor STL by its name, and it begins like neither; allowed: a file of one of these kinds"
-    )]
+    #[error("of no kind that is read, by its name and by its beginning; allowed: {KINDS} files")]
     UnknownFormat,
+    /// A kind of model file that is not read.
+    #[error("found a file of {kind}, which is not read; {advice}")]
+    Foreign {
+        /// What it is.
+        kind: &'static str,
+        /// How to get what is read.
+        advice: &'static str,
+    },
     /// Something wrong in a text.
     #[error("line {line}: found {found}; allowed: {allowed}")]
     Line {
@@ -81,9 +100,19 @@ pub enum ModelError {
         /// What may stand there.
         allowed: String,
     },
+    /// Something wrong in a file whose parts have names or numbers.
+    #[error("{place}: found {found}; allowed: {allowed}")]
+    Place {
+        /// As the format calls it.
+        place: String,
+        /// What was found.
+        found: String,
+        /// What may stand there.
+        allowed: String,
+    },
     /// A picture is to lie on a model that cannot say where.
     #[error(
-        "found an STL file, which has no texture coordinates; allowed under a height map: an OBJ file with `vt`"
+        "found no OBJ file, and of others no texture coordinates are read; allowed under a height map: an OBJ file with `vt`"
     )]
     NoTexture,
     /// Something wrong in a TOML file of patches; the message names the file.
@@ -100,6 +129,9 @@ pub enum ModelError {
     NoTriangle,
 }
 
+/// What messages call the kinds of files that are read.
+pub(crate) const KINDS: &str = "OBJ, STL, PLY, glTF, ASE or 3DS";
+
 /// How a model is written down.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
@@ -107,20 +139,54 @@ pub enum Format {
     Obj,
     /// STL: text or binary.
     Stl,
+    /// PLY: text or binary.
+    Ply,
+    /// glTF 2.0: JSON, or binary as GLB.
+    Gltf,
+    /// ASCII scene export of 3D Studio MAX: text.
+    Ase,
+    /// 3D Studio: binary.
+    ThreeDs,
 }
 
 impl Format {
     /// By the file's ending, in any case; where that says nothing, by its content.
     pub fn of(file: &Path, bytes: &[u8]) -> Option<Self> {
         let ending = file.extension().unwrap_or_default();
-        if ending.eq_ignore_ascii_case("obj") {
-            Some(Self::Obj)
-        } else if ending.eq_ignore_ascii_case("stl") || stl::looks_like_stl(bytes) {
-            Some(Self::Stl)
-        } else {
-            obj::looks_like_obj(bytes).then_some(Self::Obj)
-        }
+        let named = ENDINGS.iter().find(|(name, _)| ending.eq_ignore_ascii_case(name));
+        named.map(|(_, format)| *format).or_else(|| Self::by_content(bytes))
     }
+
+    fn by_content(bytes: &[u8]) -> Option<Self> {
+        let found = LOOKS.iter().find(|(looks_like_it, _)| looks_like_it(bytes));
+        found.map(|(_, format)| *format)
+    }
+}
+
+const ENDINGS: [(&str, Format); 7] = [
+    ("obj", Format::Obj),
+    ("stl", Format::Stl),
+    ("ply", Format::Ply),
+    ("gltf", Format::Gltf),
+    ("glb", Format::Gltf),
+    ("ase", Format::Ase),
+    ("3ds", Format::ThreeDs),
+];
+
+/// Those whose first bytes leave no doubt come first.
+const LOOKS: [(fn(&[u8]) -> bool, Format); 6] = [
+    (ply::looks_like_ply, Format::Ply),
+    (gltf::looks_like_gltf, Format::Gltf),
+    (ase::looks_like_ase, Format::Ase),
+    (three_ds::looks_like_three_ds, Format::ThreeDs),
+    (stl::looks_like_stl, Format::Stl),
+    (obj::looks_like_obj, Format::Obj),
+];
+
+/// Whether the name is that of a model, of a kind that is read or of one that is refused as such.
+pub fn is_named(file: &Path) -> bool {
+    let ending = file.extension().unwrap_or_default();
+    ENDINGS.iter().any(|(name, _)| ending.eq_ignore_ascii_case(name)) || foreign::foreign(file, b"").is_some()
 }
 
 /// The bytes of a model file.
@@ -136,10 +202,21 @@ pub fn read_file(file: &Path) -> Result<Vec<u8>, ModelError> {
 /// # Errors
 /// The first thing found to be wrong, with its place.
 pub fn read(file: &Path, bytes: &[u8]) -> Result<TriangleSoup, ModelError> {
-    match Format::of(file, bytes).ok_or(ModelError::UnknownFormat)? {
+    match format(file, bytes)? {
         Format::Obj => read_obj(bytes),
         Format::Stl => read_stl(bytes),
+        Format::Ply => read_ply(bytes),
+        Format::Gltf => read_gltf(bytes, Some(file.parent().unwrap_or(Path::new("")))),
+        Format::Ase => read_ase(bytes),
+        Format::ThreeDs => read_three_ds(bytes),
     }
+}
+
+fn format(file: &Path, bytes: &[u8]) -> Result<Format, ModelError> {
+    Format::of(file, bytes).ok_or_else(|| match foreign::foreign(file, bytes) {
+        Some((kind, advice)) => ModelError::Foreign { kind, advice },
+        None => ModelError::UnknownFormat,
+    })
 }
 
 /// The triangles in `bytes` and the texture coordinates of their corners.
@@ -147,9 +224,9 @@ pub fn read(file: &Path, bytes: &[u8]) -> Result<TriangleSoup, ModelError> {
 /// # Errors
 /// As [`read`]; a format or a face without texture coordinates.
 pub fn read_with_uv(file: &Path, bytes: &[u8]) -> Result<(TriangleSoup, Vec<CornerUv>), ModelError> {
-    match Format::of(file, bytes).ok_or(ModelError::UnknownFormat)? {
+    match format(file, bytes)? {
         Format::Obj => read_obj_with_uv(bytes),
-        Format::Stl => Err(ModelError::NoTexture),
+        _ => Err(ModelError::NoTexture),
     }
 }
 

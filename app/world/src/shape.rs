@@ -85,12 +85,15 @@ pub enum ShapeSpec {
 /// A file of triangles or patches and what becomes of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeshSpec {
-    /// OBJ or STL; of patches OBJ or TOML; made relative to where the scene file is. It is not opened by the reader of scenes.
+    /// A model file ([`crate::model`]); of patches OBJ or TOML; made relative to where the scene file is. It is not opened by the reader of scenes.
     pub file: PathBuf,
     /// Factors along x, y and z that make metres of the file's numbers; above 0, default 1.
     pub scale: [f64; 3],
     /// A mesh that is closed is felt from both sides all the same, as a room is.
     pub hollow: bool,
+    /// The largest hole that is closed, by the diagonal of the box around it (m); `None`: those that are small beside a
+    /// part that is closed but for them.
+    pub close_holes_m: Option<f64>,
     /// Where the scene names it, for messages.
     pub at: Location,
 }
@@ -234,15 +237,17 @@ fn read_ellipsoid(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
 }
 
 fn read_mesh(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
-    let mesh = read_file(table, "the path of an OBJ or STL file, relative to this file")?;
+    let mesh = read_file(table, MODEL_FILE)?;
     let hollow = table.get("hollow").map_or(Ok(false), |value| value.truth())?;
-    Ok(ShapeSpec::Mesh(MeshSpec { hollow, ..mesh }))
+    let largest = |value: Value<'_>| value.number(Bound::NotNegative);
+    let close_holes_m = table.get("close_holes_m").map(largest).transpose()?;
+    Ok(ShapeSpec::Mesh(MeshSpec { hollow, close_holes_m, ..mesh }))
 }
 
 impl ShapeSpec {
     /// That of an environment which is a mesh: `file` and `scale` stand in its own table.
     pub(crate) fn read_hollow_mesh(environment: &Table<'_>) -> Result<Self, SceneError> {
-        let mesh = read_file(environment, "the path of an OBJ or STL file, relative to this file")?;
+        let mesh = read_file(environment, MODEL_FILE)?;
         let scale = environment.get("scale").map_or(Ok([1.0; 3]), |value| value.factors())?;
         Ok(Self::Mesh(MeshSpec { scale, hollow: true, ..mesh }))
     }
@@ -255,7 +260,8 @@ fn read_nurbs(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
 
 fn read_file(table: &Table<'_>, allowed: &str) -> Result<MeshSpec, SceneError> {
     let value = table.require("file", allowed)?;
-    Ok(MeshSpec { file: value.file(allowed)?, scale: [1.0; 3], hollow: false, at: *value.at() })
+    let file = value.file(allowed)?;
+    Ok(MeshSpec { file, scale: [1.0; 3], hollow: false, close_holes_m: None, at: *value.at() })
 }
 
 fn read_csg(table: &Table<'_>) -> Result<ShapeSpec, SceneError> {
@@ -270,6 +276,8 @@ fn sizes(table: &Table<'_>, key: &str) -> Result<[f64; 3], SceneError> {
     table.require(key, "an array of 3 numbers above 0")?.numbers_in(Bound::Positive)
 }
 
+const MODEL_FILE: &str = "the path of an OBJ, STL, PLY, glTF, ASE or 3DS file, relative to this file";
+
 const fn keys(available: &'static [&'static str]) -> Vocabulary {
     Vocabulary { available, later: &[] }
 }
@@ -282,7 +290,7 @@ const CONE_KEYS: Vocabulary = keys(&["kind", "radius_bottom_m", "radius_top_m", 
 const TORUS_KEYS: Vocabulary = keys(&["kind", "ring_radius_m", "tube_radius_m", "scale"]);
 const ELLIPSOID_KEYS: Vocabulary = keys(&["kind", "radii_m", "scale"]);
 const NURBS_KEYS: Vocabulary = keys(&["kind", "file", "scale"]);
-const MESH_KEYS: Vocabulary = keys(&["kind", "file", "scale", "hollow"]);
+const MESH_KEYS: Vocabulary = keys(&["kind", "file", "scale", "hollow", "close_holes_m"]);
 
 const KINDS: Vocabulary = Vocabulary {
     available: &[

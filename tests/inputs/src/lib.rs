@@ -18,7 +18,7 @@ mod scenes;
 #[cfg(feature = "application")]
 pub use application::{orders, replay_csv, replay_mcap, rig};
 pub use driver::{config, hand_csv, reply, server};
-pub use models::{obj, patches, patches_obj, png, stl};
+pub use models::{ase, gltf, obj, patches, patches_obj, ply, png, stl, three_ds};
 pub use scenes::{layout, scene, thesis};
 
 /// A function of any bytes.
@@ -26,18 +26,22 @@ pub type Target = fn(&[u8]);
 
 /// All of them by the name of their corpus.
 pub const TARGETS: &[(&str, Target)] = &[
+    ("ase", ase),
     ("config", config),
+    ("gltf", gltf),
     ("hand_csv", hand_csv),
     ("layout", layout),
     ("obj", obj),
     ("patches", patches),
     ("patches_obj", patches_obj),
+    ("ply", ply),
     ("png", png),
     ("reply", reply),
     ("scene", scene),
     ("server", server),
     ("stl", stl),
     ("thesis", thesis),
+    ("three_ds", three_ds),
     #[cfg(feature = "application")]
     ("orders", orders),
     #[cfg(feature = "application")]

@@ -5,8 +5,8 @@ use haptics::mesh::{Mesh, TriangleSoup};
 use haptics::{Nurbs, NurbsPatch};
 use std::path::Path;
 use world::model::{
-    ModelError, line_of_face, read_free_form, read_obj, read_obj_with_uv, read_patches, read_stl,
-    write_patches,
+    ModelError, line_of_face, read_ase, read_free_form, read_gltf, read_obj, read_obj_with_uv, read_patches,
+    read_ply, read_stl, read_three_ds, write_patches,
 };
 use world::picture;
 
@@ -27,6 +27,26 @@ pub fn stl(bytes: &[u8]) {
     build(read_stl(bytes));
 }
 
+/// A PLY, text or binary.
+pub fn ply(bytes: &[u8]) {
+    build(read_ply(bytes));
+}
+
+/// A glTF, text or binary, that may name no file.
+pub fn gltf(bytes: &[u8]) {
+    build(read_gltf(bytes, None));
+}
+
+/// An ASE.
+pub fn ase(bytes: &[u8]) {
+    build(read_ase(bytes));
+}
+
+/// A 3DS.
+pub fn three_ds(bytes: &[u8]) {
+    build(read_three_ds(bytes));
+}
+
 /// Rational patches in TOML.
 pub fn patches(bytes: &[u8]) {
     join(read_patches(Path::new("fuzz.toml"), bytes));
@@ -45,6 +65,17 @@ pub fn png(bytes: &[u8]) {
 }
 
 fn build(read: Result<TriangleSoup, ModelError>) {
+    if let Ok(soup) = &read {
+        assert!(soup.vertices.iter().flatten().all(|x| x.is_finite()), "a vertex that is none");
+        assert!(
+            soup.faces.iter().flatten().all(|index| (*index as usize) < soup.vertices.len()),
+            "a face without its vertex"
+        );
+        // A small file may have millions of faces in common: to build them is another matter.
+        if soup.faces.len() > MOST_BUILT {
+            return;
+        }
+    }
     match read.map(Mesh::build) {
         Ok(Ok((mesh, report))) => {
             let vertices = mesh.vertices().len() as u32;
@@ -56,6 +87,9 @@ fn build(read: Result<TriangleSoup, ModelError>) {
         Err(error) => check_message(&error.to_string()),
     }
 }
+
+/// More take more memory than a fuzzer allows.
+const MOST_BUILT: usize = 200_000;
 
 fn join(read: Result<Vec<NurbsPatch>, ModelError>) {
     let patches = match read {

@@ -171,7 +171,7 @@ fn a_scene_that_is_wrong_is_refused_with_file_line_key_finding_and_remedy() {
         ),
         (
             shape("{ kind = \"mesh\", file = \"hand.csv\" }"),
-            &["entity[0].shape.file: hand.csv", "neither OBJ nor STL"],
+            &["entity[0].shape.file: hand.csv", "of no kind that is read"],
         ),
         (
             shape("{ kind = \"sphere\", radius_m = 1e200, scale = 1e200 }"),

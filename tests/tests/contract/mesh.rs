@@ -276,7 +276,8 @@ fn a_broken_model_is_refused_with_scene_line_model_and_offender() {
             text.replacen("endloop", "loop", 1).into(),
             &["line 7: found `loop`", "allowed: `endloop`"],
         ),
-        ("a.ply", b"ply\nformat ascii 1.0\n".into(), &["neither OBJ nor STL"]),
+        ("a.ply", b"ply\nformat ascii 1.0\n".into(), &["line 3", "`end_header`"]),
+        ("a.fbx", b"Kaydara FBX Binary".into(), &["a file of FBX", "export as glTF"]),
     ];
     for (name, bytes, parts) in cases {
         let said = run_with(name, &bytes);
@@ -405,5 +406,150 @@ fn the_other_algorithms_feel_a_mesh_without_friction() {
             }
             assert!(samples.iter().filter(|s| s.touches()).count() > 700);
         }
+    }
+}
+
+#[test]
+fn check_tells_how_a_model_is_understood_and_writes_what_needs_no_repair() {
+    let place = Workplace::new();
+    // A ball with a face missing and another turned over.
+    let mut soup = make::bumpy_sphere(24, 12, 0.03);
+    soup.faces.remove(100);
+    soup.faces[7].swap(0, 1);
+    place.write("ball.obj", Format::Obj.write(&soup));
+    let said = place.run(["check", "ball.obj", "--repair", "whole.obj"]);
+    assert_eq!((said.status, said.err.as_str()), (Some(0), ""), "{}", said.out);
+    for part in [
+        "1 face wound against the neighbours",
+        "1 hole closed with a lid",
+        "from outside",
+        "group `lid`",
+        "can be felt",
+    ] {
+        assert!(said.out.contains(part), "`{part}` is missing in: {}", said.out);
+    }
+    let checked = |arguments: &[&str]| -> serde_json::Value {
+        let said = place.run(["check"].iter().chain(arguments).chain(&["--json"]));
+        serde_json::from_str(&said.out).unwrap_or_else(|error| panic!("{error}\n{}{}", said.out, said.err))
+    };
+    let [first, again] = ["ball.obj", "whole.obj"].map(|file| checked(&[file]));
+    assert_eq!(
+        (&first["mesh"]["is_clean"], &again["mesh"]["is_clean"]),
+        (&false.into(), &true.into()),
+        "{again}"
+    );
+    assert_eq!((&first["mesh"]["faces_of_lids"], &again["mesh"]["faces_of_lids"]), (&1.into(), &0.into()));
+    for what in ["triangles", "vertices", "low", "high", "area", "volume", "is_solid"] {
+        assert_eq!(first["mesh"][what], again["mesh"][what], "{what}");
+    }
+    // The hole stays open where that is asked for, and is told with its place.
+    let open = checked(&["ball.obj", "--close-holes", "0"]);
+    assert_eq!(
+        (&open["mesh"]["open_holes"], &open["mesh"]["is_solid"]),
+        (&1.into(), &false.into()),
+        "{open}"
+    );
+    assert!(
+        open["mesh"]["largest_open_holes"][0]["size"].as_f64().is_some_and(|size| size > 0.0 && size < 0.02),
+        "{open}"
+    );
+    let said = place.run(["check", "ball.obj", "--close-holes", "0"]);
+    for part in ["1 hole stays open, the largest: ", "from both sides, as a sheet"] {
+        assert!(said.out.contains(part), "`{part}` is missing in: {}", said.out);
+    }
+}
+
+#[test]
+fn check_refuses_models_outputs_and_options_that_do_not_fit() {
+    let place = Workplace::new();
+    place.write("cube.obj", Format::Obj.write(&cube()));
+    place.write("cube.fbx", b"Kaydara FBX Binary");
+    place.write("broken.ply", b"ply\n");
+    place.write("scene.toml", mesh("cube.obj"));
+    let cases: [(&[&str], &str); 6] = [
+        (&["cube.fbx"], "cube.fbx: found a file of FBX, which is not read"),
+        (&["broken.ply"], "broken.ply: line 2: found the end of the file"),
+        (&["none.glb"], "none.glb: no such file"),
+        (&["cube.obj", "--repair", "cube.obj"], "--repair cube.obj would overwrite the input cube.obj"),
+        (&["cube.obj", "--repair", "cube.stl"], "--repair cube.stl writes OBJ; let the name end in .obj"),
+        (&["scene.toml", "--repair", "out.obj"], "--repair and --close-holes are for a model file"),
+    ];
+    for (arguments, words) in cases {
+        let said = place.run(["check"].iter().chain(arguments));
+        assert_eq!(said.status, Some(2), "{arguments:?}: {}{}", said.out, said.err);
+        assert!(said.out.contains(words), "{arguments:?}: `{words}` is missing in: {}", said.out);
+    }
+    assert!(!place.path("out.obj").exists() && !place.path("cube.stl").exists());
+}
+
+#[test]
+fn a_scene_says_which_holes_of_a_mesh_are_closed() {
+    // A cube without one of its sides.
+    let mut open = cube();
+    open.faces.retain(|face| face.iter().any(|&v| open.vertices[v as usize].y < 0.0));
+    let obj = Format::Obj.write(&open);
+    let place = Workplace::new();
+    place.write("cube.obj", obj);
+    let told = |key: &str| {
+        place.write("scene.toml", scene(&format!("kind = \"mesh\", file = \"cube.obj\"{key}"), ""));
+        let said = place.run(["check", "scene.toml"]);
+        assert_eq!(said.status, Some(0), "{}{}", said.out, said.err);
+        said.out
+    };
+    // The box around its rim is 0.0625 m x 0.0625 m.
+    for key in ["", ", close_holes_m = 0", ", close_holes_m = 0.08"] {
+        let said = told(key);
+        assert!(said.contains("1 hole stays open, the largest: 0.0884 m at [0, 0.0312, 0]"), "{key}: {said}");
+    }
+    let said = told(", close_holes_m = 0.09");
+    assert!(said.contains("1 hole closed with a lid") && !said.contains("open"), "{said}");
+}
+
+#[test]
+fn a_mesh_feels_the_same_from_ply_gltf_ase_and_obj() {
+    let soup = cube();
+    let path = around_the_cube();
+    let obj = felt_with(&[("cube.obj", &Format::Obj.write(&soup))], &mesh("cube.obj"), &path);
+    assert!(obj.iter().filter(|s| s.touches()).count() > 2000);
+    let mut ply = format!(
+        "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\nelement face {}\n\
+         property list uchar int vertex_indices\nend_header\n",
+        soup.faces.len()
+    );
+    let mut ase = String::from("*3DSMAX_ASCIIEXPORT 200\n*GEOMOBJECT {\n*MESH {\n*MESH_VERTEX_LIST {\n");
+    let mut buffer = Vec::new();
+    for (index, vertex) in soup.vertices.iter().enumerate() {
+        let [x, y, z] = vertex.data.0[0].map(|x| x as f32);
+        ply += &format!("{x} {y} {z}\n");
+        ase += &format!("*MESH_VERTEX {index} {x} {y} {z}\n");
+        buffer.extend([x, y, z].into_iter().flat_map(f32::to_le_bytes));
+    }
+    ase += "}\n*MESH_FACE_LIST {\n";
+    for (index, face @ [a, b, c]) in soup.faces.iter().enumerate() {
+        ply += &format!("3 {a} {b} {c}\n");
+        ase += &format!("*MESH_FACE {index}: A: {a} B: {b} C: {c}\n");
+        buffer.extend(face.iter().map(|&index| index as u8));
+    }
+    ase += "}\n}\n}\n";
+    let count = 3 * soup.faces.len();
+    let gltf = format!(
+        "{{\"asset\":{{\"version\":\"2.0\"}},\"scenes\":[{{\"nodes\":[0]}}],\"nodes\":[{{\"mesh\":0}}],\
+         \"meshes\":[{{\"primitives\":[{{\"attributes\":{{\"POSITION\":0}},\"indices\":1}}]}}],\
+         \"accessors\":[{{\"bufferView\":0,\"componentType\":5126,\"count\":8,\"type\":\"VEC3\"}},\
+         {{\"bufferView\":1,\"componentType\":5121,\"count\":{count},\"type\":\"SCALAR\"}}],\
+         \"bufferViews\":[{{\"buffer\":0,\"byteLength\":96}},{{\"buffer\":0,\"byteOffset\":96,\"byteLength\":{count}}}],\
+         \"buffers\":[{{\"uri\":\"cube.bin\",\"byteLength\":{}}}]}}",
+        buffer.len()
+    );
+    let others = [
+        ("cube.ply", felt_with(&[("cube.ply", ply.as_bytes())], &mesh("cube.ply"), &path)),
+        ("cube.ase", felt_with(&[("cube.ase", ase.as_bytes())], &mesh("cube.ase"), &path)),
+        (
+            "cube.gltf",
+            felt_with(&[("cube.gltf", gltf.as_bytes()), ("cube.bin", &buffer)], &mesh("cube.gltf"), &path),
+        ),
+    ];
+    for (name, samples) in others {
+        assert!(samples == obj, "{name}");
     }
 }

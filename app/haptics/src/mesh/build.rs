@@ -39,14 +39,18 @@ impl Mesh {
     /// # Errors
     /// As [`Self::build`].
     pub fn build_closing(soup: TriangleSoup, holes: CloseHoles) -> Result<(Self, MeshReport), MeshError> {
-        Self::build_and_tell(soup, holes, |_| {})
+        Self::build_and_tell(soup, holes, |_, _| {})
     }
 
-    /// As [`Self::build_closing`]; `tell_origin` hears of each face, in order, of which face of the input it is a part.
-    pub(super) fn build_and_tell(
+    /// As [`Self::build_closing`]; `tell` hears of each face, in order, of which face of the input it is a part, and whether it
+    /// is one of a lid instead: that face is beside the hole then.
+    ///
+    /// # Errors
+    /// As [`Self::build`].
+    pub fn build_and_tell(
         soup: TriangleSoup,
         holes: CloseHoles,
-        mut tell_origin: impl FnMut(u32),
+        mut tell: impl FnMut(usize, bool),
     ) -> Result<(Self, MeshReport), MeshError> {
         soup.validate()?;
         let mut report = MeshReport::default();
@@ -70,11 +74,12 @@ impl Mesh {
             sides = winding::orient(&mut triangles, &mut links, &vertices, &mut report);
             report.flipped = flipped;
         }
+        report.open_holes = hole::largest(&triangles, &links, &vertices);
         pinch::part(&mut triangles, &links, &mut vertices);
         report_edges(&triangles, &links, &mut report);
         let faces: Box<[Face]> =
             (0..triangles.len()).map(|i| face(&triangles[i], &links[i], sides[i], &vertices)).collect();
-        triangles.iter().for_each(|triangle| tell_origin(triangle.origin));
+        triangles.iter().for_each(|triangle| tell(triangle.origin() as usize, triangle.is_lid()));
         drop((triangles, links));
         let has_inside = sides.contains(&Sides::Solid);
         let sides = if sides.contains(&Sides::Sheet) { Sides::Sheet } else { Sides::Solid };
@@ -113,9 +118,9 @@ fn report_edges(triangles: &[Triangle], links: &[[Link; 3]], report: &mut MeshRe
     for (face, (triangle, own)) in triangles.iter().zip(links).enumerate() {
         for link in own {
             if link.is_boundary() {
-                report.boundary_edges.note(triangle.origin as usize);
+                report.boundary_edges.note(triangle.origin() as usize);
             } else if link.is_turned() && link.face() as usize > face {
-                let origin = triangle.origin.min(triangles[link.face() as usize].origin);
+                let origin = triangle.origin().min(triangles[link.face() as usize].origin());
                 report.turned_edges.note(origin as usize);
             }
         }

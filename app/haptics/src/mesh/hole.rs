@@ -12,7 +12,7 @@
 
 use super::order::{Curve, Triangle};
 use super::repair::{area_vector, has_area};
-use super::report::MeshReport;
+use super::report::{MeshReport, OpenHole, OpenHoles, TOLD};
 use super::{Link, MAX_VALENCE, winding};
 use nalgebra::Vector3;
 
@@ -53,10 +53,21 @@ pub(super) fn close(
         report.closed_holes.note(hole.origin as usize);
         for corners in lid {
             let points = corners.map(|corner| vertices[corner as usize]);
-            triangles.push(Triangle::new(corners, &points, hole.origin, &curve));
+            triangles.push(Triangle::new(corners, &points, hole.origin, &curve).of_lid());
         }
     }
     triangles.len() > faces
+}
+
+/// The holes that there are: how many, and the largest few.
+pub(super) fn largest(triangles: &[Triangle], links: &[[Link; 3]], vertices: &[Vector3<f64>]) -> OpenHoles {
+    let mut loops = loops(triangles, links, vertices);
+    loops.sort_by(|a, b| b.size_m.total_cmp(&a.size_m));
+    let mut largest = [None; TOLD];
+    for (told, hole) in largest.iter_mut().zip(&loops) {
+        *told = Some(OpenHole { size_m: hole.size_m, middle_B: hole.middle_B.into() });
+    }
+    OpenHoles { count: loops.len(), largest }
 }
 
 /// A loop of edges of one face.
@@ -69,6 +80,7 @@ struct Hole {
     corners: Vec<u32>,
     /// Diagonal of the box around it.
     size_m: f64,
+    middle_B: Vector3<f64>,
     /// Of its lid.
     area_m2: f64,
 }
@@ -76,12 +88,12 @@ struct Hole {
 impl Hole {
     fn new(rim: &[(usize, usize)], triangles: &[Triangle], vertices: &[Vector3<f64>]) -> Self {
         let corners: Vec<u32> = rim.iter().map(|&(face, edge)| triangles[face].corners[edge]).collect();
-        let origin = rim.iter().map(|&(face, _)| triangles[face].origin).min().unwrap_or(0);
+        let origin = rim.iter().map(|&(face, _)| triangles[face].origin()).min().unwrap_or(0);
         let points: Vec<_> = corners.iter().map(|&corner| vertices[corner as usize]).collect();
         let middle = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
         let area_m2 = |(a, b): (&Vector3<f64>, &Vector3<f64>)| 0.5 * (a - middle).cross(&(b - middle)).norm();
         let area_m2 = points.iter().zip(points.iter().cycle().skip(1)).map(area_m2).sum();
-        Self { face: rim[0].0, origin, corners, size_m: diagonal_m(&points), area_m2 }
+        Self { face: rim[0].0, origin, corners, size_m: diagonal_m(&points), middle_B: middle, area_m2 }
     }
 
     /// Triangles over it, around a new vertex if there are more than three; `None` if one had no area, or that vertex too many.

@@ -45,7 +45,7 @@ pub(super) fn divide(
     }
     let curve = Curve::through(vertices);
     for (face, division) in &pieces {
-        let origin = triangles[*face].origin;
+        let origin = triangles[*face].origin();
         divided.note(origin as usize);
         let mut pieces =
             division.iter().map(|corners| Triangle::new(*corners, &at(vertices, corners), origin, &curve));

@@ -15,14 +15,32 @@ pub(super) struct Triangle {
     place: u64,
     /// The smallest one first.
     pub(super) corners: [u32; 3],
-    /// Its index in the input.
-    pub(super) origin: u32,
+    /// Its index in the input; of a lid that of a face beside the hole, with [`LID`].
+    origin: u32,
 }
+
+/// Indices of faces are smaller.
+const LID: u32 = 1 << 31;
+const _: () = assert!(super::Link::MAX_FACES < LID as usize);
 
 impl Triangle {
     pub(super) fn new(mut corners: [u32; 3], points: &[Vector3<f64>; 3], origin: u32, curve: &Curve) -> Self {
         corners.rotate_left(smallest(points));
         Self { place: curve.place(&centroid(points)), corners, origin }
+    }
+
+    /// The same as a part of a lid.
+    pub(super) fn of_lid(self) -> Self {
+        Self { origin: self.origin | LID, ..self }
+    }
+
+    pub(super) fn is_lid(&self) -> bool {
+        self.origin & LID != 0
+    }
+
+    /// Its index in the input; of a lid that of a face beside the hole.
+    pub(super) fn origin(&self) -> u32 {
+        self.origin & !LID
     }
 }
 
@@ -97,7 +115,7 @@ fn order_cell(cell: &mut [Triangle], vertices: &[Vector3<f64>], duplicate: &mut 
     for i in 0..cell.len() {
         let triangle = cell[i];
         if kept > 0 && ascending(&cell[kept - 1]) == ascending(&triangle) {
-            duplicate.note(triangle.origin as usize);
+            duplicate.note(triangle.origin() as usize);
         } else {
             cell[kept] = triangle;
             kept += 1;

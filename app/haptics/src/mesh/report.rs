@@ -19,10 +19,48 @@ impl Finding {
     }
 }
 
+/// So many holes are told with their places.
+pub(super) const TOLD: usize = 3;
+
+/// Holes that stay open: loops of edges of one face each.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct OpenHoles {
+    /// How many.
+    pub count: usize,
+    /// The largest few, the largest first.
+    pub largest: [Option<OpenHole>; TOLD],
+}
+
+/// A hole that stays open.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OpenHole {
+    /// Diagonal of the box around its rim (m).
+    pub size_m: f64,
+    /// Mean of its rim's vertices (m).
+    pub middle_B: [f64; 3],
+}
+
+impl fmt::Display for OpenHoles {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { count, largest } = self;
+        write!(f, "{count} {} open, the largest: ", plural(*count, "hole stays", "holes stay"))?;
+        for (index, OpenHole { size_m, middle_B: [x, y, z] }) in largest.iter().flatten().enumerate() {
+            let comma = if index == 0 { "" } else { ", " };
+            write!(f, "{comma}{} m at [{}, {}, {}]", short(*size_m), short(*x), short(*y), short(*z))?;
+        }
+        Ok(())
+    }
+}
+
+/// Three digits that say something.
+fn short(number: f64) -> f64 {
+    format!("{number:.2e}").parse().unwrap_or(number)
+}
+
 /// What a mesh is made of, and what had to be done to the input to make it.
 ///
 /// Indices are those of the input, from 0: of faces, unless a field says vertices.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct MeshReport {
     /// Faces of the mesh.
     pub faces: usize,
@@ -60,6 +98,8 @@ pub struct MeshReport {
     pub boundary_edges: Finding,
     /// Edges across which inside and outside change places: the mesh cannot be oriented.
     pub turned_edges: Finding,
+    /// Rims of the mesh that are whole loops, with their sizes.
+    pub open_holes: OpenHoles,
 }
 
 impl MeshReport {
@@ -109,7 +149,7 @@ impl fmt::Display for MeshReport {
                 "edges",
                 "of three or more faces: two and two joined, the others end there",
             ),
-            (self.closed_holes, "hole", "holes", "in parts that are otherwise closed: closed with a lid"),
+            (self.closed_holes, "hole", "holes", "closed with a lid"),
             (
                 self.sheets,
                 "part",
@@ -123,6 +163,9 @@ impl fmt::Display for MeshReport {
             let Some(first) = first else { continue };
             let of = if one == "vertex" { "vertex" } else { "face" };
             write!(f, "\n{count} {} {what} (first: {of} {first})", plural(count, one, many))?;
+        }
+        if self.open_holes.count > 0 {
+            write!(f, "\n{}", self.open_holes)?;
         }
         Ok(())
     }

@@ -48,7 +48,7 @@ pub(super) fn divide(
     let most = triangles.len() + slivers.len();
     let mut index = 0;
     while index < triangles.len() && triangles.len() < most {
-        let Triangle { corners, origin, .. } = triangles[index];
+        let (corners, origin) = (triangles[index].corners, triangles[index].origin());
         match (0..3).find_map(|edge| halves(corners, edge, &slivers, vertices)) {
             None => index += 1,
             Some(halves) => {

@@ -96,7 +96,7 @@ pub(super) fn join(links: &mut [[Link; 3]], a: Side, b: Side) {
 }
 
 pub(super) fn first_of_input(sides: &[Side], triangles: &[Triangle]) -> usize {
-    sides.iter().map(|side| triangles[side.face() as usize].origin as usize).min().unwrap_or(0)
+    sides.iter().map(|side| triangles[side.face() as usize].origin() as usize).min().unwrap_or(0)
 }
 
 fn check_valences(triangles: &[Triangle], vertices: &[Vector3<f64>]) -> Result<(), MeshError> {

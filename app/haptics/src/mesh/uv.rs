@@ -27,11 +27,22 @@ impl Mesh {
     /// # Errors
     /// As [`Self::build`]; coordinates that are not finite or too large, or not as many as faces.
     pub fn build_with_uv(soup: TriangleSoup, uv: &[CornerUv]) -> Result<(Self, MeshReport), MeshError> {
+        Self::build_with_uv_closing(soup, uv, CloseHoles::default())
+    }
+
+    /// As [`Self::build_with_uv`], and says which holes are to be closed.
+    ///
+    /// # Errors
+    /// As [`Self::build_with_uv`].
+    pub fn build_with_uv_closing(
+        soup: TriangleSoup,
+        uv: &[CornerUv],
+        holes: CloseHoles,
+    ) -> Result<(Self, MeshReport), MeshError> {
         validate(&soup, uv)?;
         let given = soup.clone();
         let mut origins = Vec::with_capacity(soup.faces.len());
-        let (mut mesh, report) =
-            Self::build_and_tell(soup, CloseHoles::default(), |origin| origins.push(origin as usize))?;
+        let (mut mesh, report) = Self::build_and_tell(soup, holes, |origin, _| origins.push(origin))?;
         let of_face = |(face, &origin): (usize, &usize)| {
             let corners = given.faces[origin].map(|v| given.vertices[v as usize]);
             let own = mesh.faces[face].vertices.map(|v| mesh.vertices[v as usize]);

@@ -27,7 +27,7 @@ pub(super) fn orient(
     for (state, triangle) in states.iter_mut().zip(&*triangles) {
         state.is_turned_over = parts[state.part as usize].turns(*state);
         if state.is_turned_over {
-            report.flipped.note(triangle.origin as usize);
+            report.flipped.note(triangle.origin() as usize);
         }
     }
     measure(&states, triangles, vertices, &mut parts);
@@ -136,7 +136,7 @@ pub(super) fn count(states: &[State], triangles: &[Triangle], parts: &mut [Part]
         let part = &mut parts[state.part as usize];
         part.faces += 1;
         part.turned_over += usize::from(state.is_turned_over);
-        part.first = part.first.min(triangle.origin as usize);
+        part.first = part.first.min(triangle.origin() as usize);
     }
 }
 

@@ -209,6 +209,56 @@ fn small_holes_of_what_is_nearly_closed_are_closed_and_a_cup_stays_open() {
     }
 }
 
+#[test]
+fn holes_that_stay_open_are_told_with_their_sizes_and_places_the_largest_first() {
+    let (_, report) = build(pierced_ball(&[17, 18, 2000, 3001]));
+    assert_eq!((report.open_holes.count, report.open_holes.largest), (0, [None; 3]), "{report}");
+    // A cube of 0.2 m without its top and two sides beside that, which leave one hole; and a ball without one triangle.
+    let mut cube = make::cuboid([0.2; 3]);
+    let normal = |face: &[u32; 3]| {
+        let [a, b, c] = face.map(|v| cube.vertices[v as usize]);
+        (b - a).cross(&(c - a)).normalize()
+    };
+    let is_kept = |face: &[u32; 3]| normal(face).y < 0.5 && normal(face).x.abs() < 0.5;
+    cube.faces = cube.faces.iter().copied().filter(is_kept).collect();
+    let mut ball = pierced_ball(&[17]);
+    ball.vertices.iter_mut().for_each(|vertex| vertex.x += 5.0);
+    let open = |soup| Mesh::build_closing(soup, CloseHoles::UpTo(0.0)).unwrap().1.open_holes;
+    let holes = open(together([cube, ball]));
+    assert_eq!(holes.count, 2, "{holes}");
+    let [Some(large), Some(small), None] = holes.largest else { panic!("{holes}") };
+    // Its rim goes around the whole of the cube; sums of lengths, rounded.
+    assert!((large.size_m - 0.2 * 3f64.sqrt()).abs() < 1e-12, "{large:?}");
+    assert!(small.size_m < 0.02 && (small.middle_B[0] - 5.0).abs() < 0.2, "{small:?}");
+    let told = holes.to_string();
+    assert!(told.starts_with("2 holes stay open, the largest: 0.346 m at ["), "{told}");
+}
+
+#[test]
+fn faces_of_lids_are_told_apart_from_those_of_the_input() {
+    let soup = pierced_ball(&[17, 18, 2000, 3001]);
+    let given: std::collections::HashSet<[[u64; 3]; 3]> =
+        soup.faces.iter().map(|face| key(&soup.vertices, face)).collect();
+    let mut is_lid = Vec::new();
+    let (mesh, report) =
+        Mesh::build_and_tell(soup, CloseHoles::Small, |_, of_lid| is_lid.push(of_lid)).unwrap();
+    assert_eq!(is_lid.len(), mesh.faces().len());
+    for (face, is_lid) in mesh.faces().iter().zip(&is_lid) {
+        assert_eq!(*is_lid, !given.contains(&key(mesh.vertices(), &face.vertices)), "{face:?}");
+    }
+    assert!(
+        is_lid.iter().filter(|is_lid| **is_lid).count() >= report.closed_holes.count
+            && report.closed_holes.count >= 3
+    );
+}
+
+/// The corners of a face in an order of their own.
+fn key(vertices: &[Vector3<f64>], face: &[u32; 3]) -> [[u64; 3]; 3] {
+    let mut corners = face.map(|v| vertices[v as usize].data.0[0].map(|x| (x + 0.0).to_bits()));
+    corners.sort_unstable();
+    corners
+}
+
 /// One open part among closed ones made sheets of all, and of fingers that were let go inside of one nothing was known.
 #[test]
 fn an_open_part_beside_solids_that_overlap_leaves_them_solid() {

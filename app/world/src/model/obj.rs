@@ -7,7 +7,8 @@
 //!
 //! A face may name a vertex that comes later in the file, so polygons are divided when all vertices are known.
 
-use super::polygon::{Divider, MAX_CONCAVE_CORNERS};
+use super::polygon::{Divider, indivisible};
+use super::words::BYTE_ORDER_MARK;
 use super::{ModelError, a_number, number, shown};
 use haptics::mesh::{CornerUv, TriangleSoup};
 use nalgebra::Vector3;
@@ -71,8 +72,6 @@ pub(super) fn looks_like_obj(bytes: &[u8]) -> bool {
     let first = lines.find_map(|line| words(line).next());
     first.is_some_and(|word| word == b"v" || word == b"f" || IGNORED.contains(&word))
 }
-
-const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 pub(super) const IGNORED: [&[u8]; 18] = [
     b"vt",
@@ -146,9 +145,10 @@ impl Polygons {
         let mut divided = Vec::new();
         for (range, polygon) in ranges.zip(&self.polygons) {
             divided.clear();
-            divider
-                .divide(&self.corners[range.clone()], &mut divided)
-                .ok_or_else(|| indivisible(polygon.line as usize, range.len()))?;
+            divider.divide(&self.corners[range.clone()], &mut divided).ok_or_else(|| {
+                let (found, allowed) = indivisible(range.len());
+                ModelError::Line { line: polygon.line as usize, found, allowed }
+            })?;
             divided.iter().for_each(|&face| tell(&self.corners, range.start, face));
         }
         Ok(())
@@ -328,13 +328,6 @@ fn free_form(line: usize, word: &[u8]) -> ModelError {
 fn unknown(line: usize, word: &[u8]) -> ModelError {
     let allowed = "statements of OBJ, such as `v`, `f`, `vn`, `g` or `usemtl`, or a comment after `#`".into();
     ModelError::Line { line, found: shown(word), allowed }
-}
-
-fn indivisible(line: usize, corners: usize) -> ModelError {
-    let allowed = format!(
-        "at most {MAX_CONCAVE_CORNERS} corners where a face is concave; export the model as triangles"
-    );
-    ModelError::Line { line, found: format!("a face of {corners} corners that cannot be divided"), allowed }
 }
 
 /// The words of a statement, up to a comment.

@@ -18,12 +18,55 @@ use nalgebra::Vector3;
 use std::collections::{HashMap, HashSet};
 
 /// Concave polygons may have so many corners.
-pub(super) const MAX_CONCAVE_CORNERS: usize = 500;
+const MAX_CONCAVE_CORNERS: usize = 500;
 
 /// Of the polygon's area: a part of it that small is none.
 const ROUNDING: f64 = 1e-12;
 /// Corners that a fan is tried around.
 const MOST_FANS: usize = 16;
+
+/// What was found and what is allowed, of a polygon that cannot be divided.
+pub(super) fn indivisible(corners: usize) -> (String, String) {
+    let allowed = format!(
+        "at most {MAX_CONCAVE_CORNERS} corners where a face is concave; export the model as triangles"
+    );
+    (format!("a face of {corners} corners that cannot be divided"), allowed)
+}
+
+/// Polygons as their corners.
+#[derive(Default)]
+pub(super) struct Polygons {
+    /// Of all, one after another.
+    corners: Vec<u32>,
+    /// For each, behind its last corner.
+    ends: Vec<u32>,
+}
+
+impl Polygons {
+    /// A corner of the polygon that is being told.
+    pub(super) fn corner(&mut self, vertex: u32) {
+        self.corners.push(vertex);
+    }
+
+    /// The polygon that was told is whole. It must have at least three corners.
+    pub(super) fn close(&mut self) {
+        self.ends.push(self.corners.len() as u32);
+    }
+
+    /// All of them as triangles; how many corners the first has that cannot be divided, and its number.
+    pub(super) fn divide(&self, vertices: &[Vector3<f64>]) -> Result<Vec<[u32; 3]>, (usize, usize)> {
+        let begins = std::iter::once(0).chain(self.ends.iter().map(|&end| end as usize));
+        let all = begins.zip(&self.ends).map(|(begin, &end)| &self.corners[begin..end as usize]);
+        let mut divider = Divider::new(vertices, all.clone());
+        let (mut faces, mut divided) = (Vec::with_capacity(self.ends.len()), Vec::new());
+        for (number, corners) in all.enumerate() {
+            divided.clear();
+            divider.divide(corners, &mut divided).ok_or((corners.len(), number))?;
+            faces.extend(divided.iter().map(|face| face.map(|at| corners[at as usize])));
+        }
+        Ok(faces)
+    }
+}
 
 /// Divides the polygons of a file, one after the other.
 pub(super) struct Divider<'v> {

@@ -8,7 +8,8 @@
 //! its own; `Mesh::build` merges those that are equal to the bit.
 
 use super::obj::looks_like_obj;
-use super::{ModelError, a_number, number, shown};
+use super::words::{BYTE_ORDER_MARK, Words};
+use super::{ModelError, shown};
 use haptics::mesh::TriangleSoup;
 use nalgebra::Vector3;
 
@@ -42,7 +43,7 @@ fn is_text(bytes: &[u8]) -> bool {
 }
 
 fn begins_with_solid(bytes: &[u8]) -> bool {
-    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    let text = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes).trim_ascii_start();
     text.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
 }
 
@@ -115,7 +116,7 @@ fn soup_of(vertices: Vec<Vector3<f64>>) -> TriangleSoup {
 
 /// `solid NAME`, facets, `endsolid NAME`; any number of these one after another.
 fn read_text(bytes: &[u8]) -> Result<TriangleSoup, ModelError> {
-    let mut words = Words::new(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
+    let mut words = Words::new(bytes);
     let mut vertices = Vec::new();
     loop {
         let Some(word) = words.next() else { return Ok(soup_of(vertices)) };
@@ -149,52 +150,4 @@ fn read_facet(words: &mut Words<'_>, vertices: &mut Vec<Vector3<f64>>) -> Result
     }
     words.expect("endloop")?;
     words.expect("endfacet")
-}
-
-/// The words of a text and the line each stands on.
-struct Words<'t> {
-    text: &'t [u8],
-    /// Behind the last word.
-    at: usize,
-    line: usize,
-}
-
-impl<'t> Words<'t> {
-    fn new(text: &'t [u8]) -> Self {
-        Self { text, at: 0, line: 1 }
-    }
-
-    fn next(&mut self) -> Option<&'t [u8]> {
-        while self.text.get(self.at)?.is_ascii_whitespace() {
-            self.line += usize::from(self.text[self.at] == b'\n');
-            self.at += 1;
-        }
-        let rest = &self.text[self.at..];
-        let length = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
-        self.at += length;
-        Some(&rest[..length])
-    }
-
-    /// The rest of the line is a name.
-    fn skip_line(&mut self) {
-        let rest = &self.text[self.at..];
-        self.at += rest.iter().position(|&byte| byte == b'\n').unwrap_or(rest.len());
-    }
-
-    fn expect(&mut self, keyword: &str) -> Result<(), ModelError> {
-        match self.next() {
-            Some(word) if word.eq_ignore_ascii_case(keyword.as_bytes()) => Ok(()),
-            other => Err(self.wrong(other, &format!("`{keyword}`"))),
-        }
-    }
-
-    fn number(&mut self) -> Result<f64, ModelError> {
-        let word = self.next();
-        word.and_then(number).ok_or_else(|| self.wrong(word, &a_number(word)))
-    }
-
-    fn wrong(&self, found: Option<&[u8]>, allowed: &str) -> ModelError {
-        let found = found.map_or_else(|| "the end of the file; it may be cut short".into(), shown);
-        ModelError::Line { line: self.line, found, allowed: allowed.into() }
-    }
 }

@@ -2,14 +2,18 @@
 
 use haptics::mesh::TriangleSoup;
 use proptest::prelude::*;
-use world::model::{ModelError, line_of_face, read_obj, read_stl};
+use world::model::{
+    ModelError, line_of_face, read_ase, read_gltf, read_obj, read_ply, read_stl, read_three_ds,
+};
 
+use crate::made::{self, Ply};
 use crate::written;
 
 fn ends_well(bytes: &[u8]) {
-    for read in [read_obj, read_stl] {
+    for read in [read_obj, read_stl, read_ply, read_ase, read_three_ds] {
         check(read(bytes));
     }
+    check(read_gltf(bytes, None));
     if let Ok(soup) = read_obj(bytes) {
         assert!(line_of_face(bytes, soup.faces.len() - 1).is_some());
         assert_eq!(line_of_face(bytes, soup.faces.len()), None);
@@ -34,12 +38,17 @@ fn check(read: Result<TriangleSoup, ModelError>) {
 fn good() -> impl Strategy<Value = Vec<u8>> {
     let formats = [written::Format::Obj, written::Format::Stl, written::Format::StlText];
     let (_, number, make) = written::KINDS[5];
-    prop::sample::select(formats.map(|format| format.write(&make(number, 0.04))).to_vec())
+    let soup = make(number, 0.04);
+    let mut all = formats.map(|format| format.write(&soup)).to_vec();
+    all.extend([Ply::Text, Ply::LittleEndian, Ply::BigEndian].map(|how| made::ply(&soup, how)));
+    all.extend([made::gltf(&soup), made::glb(&made::gltf_text(&soup, ""), &made::buffer(&soup))]);
+    all.extend([made::ase(&soup).into_bytes(), made::three_ds(&soup)]);
+    prop::sample::select(all)
 }
 
 fn piece() -> impl Strategy<Value = Vec<u8>> {
     let words = "v |f |vt |solid |facet |normal |outer |loop |vertex |endloop |endfacet |endsolid |0 |1 |-1 |2/1 |3//3 |\
-                 1e308 |-1e308 |5e-324 |nan |\n|\r\n|\\\n|#|/|\0|\u{feff}|-99 |12345678901234567890 ";
+                 1e308 |-1e308 |5e-324 |nan |ply\n|element vertex |property float |end_header\n|*MESH_FACE |*MESH {|}|{|[|\"count\":|\"mode\":5|4000000000|\n|\r\n|\\\n|#|/|\0|\u{feff}|-99 |12345678901234567890 ";
     let words: Vec<Vec<u8>> = words.split('|').map(|word| word.as_bytes().to_vec()).collect();
     prop_oneof![4 => prop::sample::select(words), 1 => prop::collection::vec(any::<u8>(), 0..9)]
 }

@@ -320,11 +320,11 @@ fn the_ending_says_the_format_and_where_it_does_not_the_content_does() {
         assert_eq!(of(name, text.as_bytes()), Some(Format::Stl));
         assert_eq!(of(name, obj.as_bytes()), Some(Format::Obj));
         assert_eq!(of(name, b"\n# comment\n\nmtllib x\n"), Some(Format::Obj));
-        assert_eq!(of(name, b"ply\nformat ascii 1.0\n"), None);
+        assert_eq!(of(name, b"plyers\nformat ascii 1.0\n"), None);
         assert_eq!(of(name, b""), None);
     }
-    let message = model::read(Path::new("a.ply"), b"ply\n").expect_err("neither").to_string();
-    assert!(message.contains("neither OBJ nor STL"), "{message}");
+    let message = model::read(Path::new("a.csv"), b"t,x\n").expect_err("none of them").to_string();
+    assert!(message.contains("of no kind that is read"), "{message}");
 }
 
 #[test]
@@ -332,8 +332,8 @@ fn files_that_cannot_be_read_are_refused() {
     let directory = tempfile::tempdir().expect("a directory");
     let refused = |file: &Path| model::load(file).expect_err("it cannot be read").to_string();
     assert_eq!(refused(&directory.path().join("none.stl")), "no such file; name an existing one");
-    assert_eq!(refused(directory.path()), "it is a directory, no regular file; name an OBJ or STL file");
-    assert_eq!(refused(Path::new("/dev/zero")), "it is a device, no regular file; name an OBJ or STL file");
+    assert_eq!(refused(directory.path()), "it is a directory, no regular file; name a model file");
+    assert_eq!(refused(Path::new("/dev/zero")), "it is a device, no regular file; name a model file");
     // A file of holes: it takes no room on the disk, and is not read.
     let large = directory.path().join("large.stl");
     std::fs::File::create(&large).and_then(|file| file.set_len((1 << 30) + 1)).expect("a file of holes");

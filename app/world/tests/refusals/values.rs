@@ -357,16 +357,16 @@ fn a_size_that_no_shape_has_is_refused() {
         ),
         (
             "{ kind = \"mesh\", file = 1 }",
-            "file: found 1; allowed: the path of an OBJ or STL file, relative to this file",
+            "file: found 1; allowed: the path of an OBJ, STL, PLY, glTF, ASE or 3DS file, relative to this file",
         ),
         (
             "{ kind = \"mesh\", file = \"\" }",
-            "file: found the string \"\"; allowed: the path of an OBJ or STL file, relative to this file",
+            "file: found the string \"\"; allowed: the path of an OBJ, STL, PLY, glTF, ASE or 3DS file, relative to this file",
         ),
         (
             "{ kind = \"mesh\", file = \"a\\nb\\u001b.obj\" }",
             "file: found the string \"a\\nb\\u{1b}.obj\"; \
-             allowed: the path of an OBJ or STL file, relative to this file, without control characters",
+             allowed: the path of an OBJ, STL, PLY, glTF, ASE or 3DS file, relative to this file, without control characters",
         ),
         ("{ kind = \"mesh\", file = \"a.obj\", scale = 0 }", "scale: found 0; allowed: a number above 0"),
         ("{ kind = \"sphere\", radius_m = 1, scale = -1 }", "scale: found -1; allowed: a number above 0"),

@@ -255,7 +255,14 @@ fn each_shape_knows_its_own_keys() {
             "radius_m: unknown key; allowed: kind, ring_radius_m, tube_radius_m, scale",
         ),
         ("{ kind = \"ellipsoid\", size_m = 1 }", "size_m: unknown key; allowed: kind, radii_m, scale"),
-        ("{ kind = \"mesh\", path = \"a.obj\" }", "path: unknown key; allowed: kind, file, scale, hollow"),
+        (
+            "{ kind = \"mesh\", file = \"a.obj\", close_holes_m = -0.01 }",
+            "close_holes_m: found -0.01; allowed: a number, 0 or more",
+        ),
+        (
+            "{ kind = \"mesh\", path = \"a.obj\" }",
+            "path: unknown key; allowed: kind, file, scale, hollow, close_holes_m",
+        ),
         ("{ kind = \"cylinder\", radius_m = 1 }", "length_m: missing; allowed: a number above 0"),
         ("{ kind = \"cone\", radius_bottom_m = 1 }", "radius_top_m: missing; allowed: a number, 0 or more"),
         ("{ kind = \"torus\", ring_radius_m = 1 }", "tube_radius_m: missing; allowed: a number above 0"),
@@ -264,7 +271,7 @@ fn each_shape_knows_its_own_keys() {
         ("{ kind = \"ellipsoid\" }", "radii_m: missing; allowed: an array of 3 numbers above 0"),
         (
             "{ kind = \"mesh\" }",
-            "file: missing; allowed: the path of an OBJ or STL file, relative to this file",
+            "file: missing; allowed: the path of an OBJ, STL, PLY, glTF, ASE or 3DS file, relative to this file",
         ),
     ] {
         refused(&with_shape(shape), &format!("s.toml:4: entity[0].shape.{message}"));

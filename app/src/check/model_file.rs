@@ -1,0 +1,186 @@
+//! `phantom3 check MODEL`: how a model file is understood; and that written down as OBJ.
+//!
+//! Model: the file is read and its mesh is built as for a scene without a `scale`: lengths are in the file's own unit. What is
+//! written (`--repair`) is what was built: equal vertices merged, faces turned, divided and left out, lids in a group of
+//! their own. A file that was written so has nothing left to repair, but for edges along which parts touch: their vertices are
+//! in the same places, and are merged and parted again.
+
+use super::CheckArgs;
+use crate::outputs::{self, Output};
+use haptics::mesh::{CloseHoles, Mesh, MeshReport, Sides};
+use nalgebra::Vector3;
+use rt_core::plain_text::{PlainJson, PlainLines};
+use rt_core::replacement;
+use serde_json::{Value, json};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use world::model;
+
+/// Runs the command: status 0 if the model can be felt, 2 if it cannot, or the options do not fit.
+pub(crate) fn execute(args: &CheckArgs) -> ExitCode {
+    let found = understand(args).and_then(|understood| {
+        let written = args.repair.as_ref().map(|out| understood.write(out)).transpose();
+        written.map(|_| understood)
+    });
+    let file = args.scene.display();
+    let said = match (&found, args.json) {
+        (_, true) => format!("{}\n", PlainJson(format_args!("{:#}", to_json(args, &found)))),
+        (Ok(understood), false) => understood.text(args),
+        (Err(problem), false) => format!("{file}: {problem}\n{file}: cannot be felt\n"),
+    };
+    outputs::print(&if args.json { said } else { PlainLines(said).to_string() });
+    ExitCode::from(if found.is_ok() { 0 } else { 2 })
+}
+
+/// A model as a mesh.
+struct Understood {
+    mesh: Mesh,
+    report: MeshReport,
+    is_lid: Vec<bool>,
+    low: Vector3<f64>,
+    high: Vector3<f64>,
+    /// What its surface and the space in it measure.
+    area: f64,
+    volume: f64,
+}
+
+fn understand(args: &CheckArgs) -> Result<Understood, String> {
+    if args.hand.is_some() || args.layout.is_some() {
+        return Err("--hand and --layout are for scenes, and this is a model".into());
+    }
+    if let Some(out) = &args.repair {
+        if !out.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("obj")) {
+            return Err(format!("--repair {} writes OBJ; let the name end in .obj", out.display()));
+        }
+        outputs::check(&[Output::model(out)], &[&args.scene]).map_err(|failure| failure.to_string())?;
+    }
+    let soup = model::load(&args.scene).map_err(|error| error.to_string())?;
+    let holes = args.close_holes.map_or(CloseHoles::Small, CloseHoles::UpTo);
+    let mut is_lid = Vec::new();
+    let built = Mesh::build_and_tell(soup, holes, |_, of_lid| is_lid.push(of_lid));
+    let (mesh, report) = built.map_err(|error| error.to_string())?;
+    let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+    for vertex in mesh.vertices() {
+        (low, high) = (low.inf(vertex), high.sup(vertex));
+    }
+    let (mut area, mut volume) = (0.0, 0.0);
+    for face in mesh.faces() {
+        let [a, b, c] = face.vertices.map(|vertex| mesh.vertices()[vertex as usize] - low);
+        area += 0.5 * (b - a).cross(&(c - a)).norm();
+        volume += a.dot(&b.cross(&c)) / 6.0;
+    }
+    Ok(Understood { mesh, report, is_lid, low, high, area, volume })
+}
+
+impl Understood {
+    fn write(&self, out: &Path) -> Result<(), String> {
+        let text = model::write_obj(&self.mesh, &self.is_lid);
+        replacement::write(out, text).map_err(|error| format!("cannot write {}: {error}", out.display()))
+    }
+
+    fn text(&self, args: &CheckArgs) -> String {
+        let mut text = String::new();
+        let told = self.report.to_string();
+        let mut row = |name: &str, value: &str| {
+            // Writing to a string cannot fail.
+            let _ = writeln!(text, "{name:<14} {value}");
+        };
+        row("mesh", told.lines().next().unwrap_or_default());
+        told.lines().skip(1).for_each(|finding| row("", &format!("  {}", finding.trim())));
+        row("felt", &self.felt());
+        let [size, low, high] = [self.high - self.low, self.low, self.high].map(|v| v.map(short));
+        row("size", &format!("{} x {} x {}, from {} to {}", size.x, size.y, size.z, list(&low), list(&high)));
+        row("surface", &format!("{} square", short(self.area)));
+        if self.mesh.sides() == Sides::Solid {
+            row("volume", &format!("{} cubic", short(self.volume)));
+        }
+        row("unit", "the file's own; a scene takes it for metres, times the mesh's `scale`");
+        if let Some(out) = &args.repair {
+            row("written", &format!("{}: {}", out.display(), self.written()));
+        }
+        let file = args.scene.display();
+        if let Some(advice) = self.suspicion() {
+            let _ = writeln!(text, "warning: {advice}");
+        }
+        let _ = writeln!(text, "{file}: can be felt");
+        text
+    }
+
+    /// What it means for a finger.
+    fn felt(&self) -> String {
+        let sheets = self.report.sheets.count;
+        match (self.mesh.sides(), self.mesh.has_inside()) {
+            (Sides::Solid, _) => "from outside; a finger does not get in".into(),
+            (Sides::Sheet, false) => {
+                "from both sides, as a sheet: a finger that comes in through a hole is free within, and feels it from inside".into()
+            }
+            (Sides::Sheet, true) => format!(
+                "solid parts from outside; the others ({sheets}) from both sides, as sheets that a finger gets behind by their rims"
+            ),
+        }
+    }
+
+    fn written(&self) -> String {
+        let lids = self.is_lid.iter().filter(|is_lid| **is_lid).count();
+        let [faces, vertices] = [self.report.faces, self.report.vertices];
+        match lids {
+            0 => format!("{faces} faces, {vertices} vertices"),
+            lids => format!("{faces} faces, {vertices} vertices; {lids} of the faces in the group `lid`"),
+        }
+    }
+
+    fn suspicion(&self) -> Option<String> {
+        let size = (self.high - self.low).amax();
+        let (unit, scale) = match size {
+            size if size > 3000.0 => ("micrometres or inches of a large thing", 1e-6),
+            size if size > 3.0 => ("millimetres", 1e-3),
+            _ => return None,
+        };
+        Some(format!(
+            "{} m is larger than what a hand reaches: numbers in {unit}? Then `scale = {scale:?}`",
+            short(size)
+        ))
+    }
+}
+
+fn to_json(args: &CheckArgs, found: &Result<Understood, String>) -> Value {
+    let file = args.scene.display().to_string();
+    let understood = match found {
+        Ok(understood) => understood,
+        Err(problem) => return json!({ "ok": false, "file": file, "problems": [{ "message": problem }] }),
+    };
+    let Understood { mesh, report, is_lid, low, high, area, volume } = understood;
+    let holes: Vec<Value> = report
+        .open_holes
+        .largest
+        .iter()
+        .flatten()
+        .map(|hole| json!({ "size": hole.size_m, "at": hole.middle_B }))
+        .collect();
+    json!({
+        "ok": true,
+        "file": file,
+        "problems": [],
+        "warnings": understood.suspicion().into_iter().collect::<Vec<_>>(),
+        "mesh": {
+            "triangles": report.faces, "vertices": report.vertices, "parts": report.components,
+            "is_clean": report.is_clean(), "report": report.to_string(),
+            "is_solid": mesh.sides() == Sides::Solid, "has_inside": mesh.has_inside(),
+            "faces_of_lids": is_lid.iter().filter(|is_lid| **is_lid).count(),
+            "open_holes": report.open_holes.count, "largest_open_holes": holes,
+            "low": [low.x, low.y, low.z], "high": [high.x, high.y, high.z], "area": area,
+            "volume": (mesh.sides() == Sides::Solid).then_some(volume),
+        },
+        "written": args.repair.as_ref().map(|out: &PathBuf| out.display().to_string()),
+    })
+}
+
+/// Four digits.
+fn short(number: f64) -> f64 {
+    format!("{number:.3e}").parse().unwrap_or(number)
+}
+
+fn list(v: &Vector3<f64>) -> String {
+    format!("[{}, {}, {}]", v.x, v.y, v.z)
+}

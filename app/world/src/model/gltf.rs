@@ -1,0 +1,209 @@
+//! glTF 2.0: `.gltf` with its buffers within or beside it, and `.glb`.
+//!
+//! Read: of the file's scene (the one that it names, else the first; all nodes if it has none) the meshes of all nodes, each
+//! where its node and those above put it, as one soup; triangles, strips and fans, with and without indices; sparse
+//! accessors; positions as floats or quantised (`KHR_mesh_quantization`). Metres, y up, as in a scene of ours. Passed over:
+//! materials, pictures, cameras, lights, animations, skins and morph targets (the shape is that at rest), points and lines.
+//! Refused: compressed geometry (Draco, meshopt), and glTF 1.0.
+//!
+//! Nothing is believed: every index, range and step is checked against what is there. A node may be reached in one way only, as
+//! the format has it, which bounds the walk. A small file can name the same megabyte a thousand times, or count
+//! what takes no bytes: what is put together may have as many vertices and indices as the files have bytes, or
+//! [`ALWAYS_ALLOWED`], and no more. The text may have [`MOST_OBJECTS`] objects.
+//!
+//! A reader of our own: `gltf` 1.4 brings forty packages, believes counts, and names no place.
+
+mod accessor;
+mod buffers;
+mod document;
+
+use super::ModelError;
+use super::ply::Strip;
+use accessor::Accessors;
+use buffers::Buffers;
+use document::{Document, Node, Primitive};
+use haptics::mesh::TriangleSoup;
+use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
+use std::path::Path;
+
+/// Vertices and indices that every file may have.
+const ALWAYS_ALLOWED: usize = 1 << 22;
+
+/// Reads a glTF file, text or binary; `beside` is the directory in which the files lie that it names.
+///
+/// # Errors
+/// The first thing found to be wrong, with its place in the document.
+pub fn read_gltf(bytes: &[u8], beside: Option<&Path>) -> Result<TriangleSoup, ModelError> {
+    let (text, binary) = buffers::parts(bytes)?;
+    let document = Document::parse(text)?;
+    document.check()?;
+    let buffers = Buffers::load(&document, binary, beside)?;
+    let most = ALWAYS_ALLOWED.max(bytes.len() + buffers.bytes_beside());
+    let mut merged = Merged {
+        document: &document,
+        accessors: Accessors::new(&document, &buffers, most),
+        soup: TriangleSoup { vertices: Vec::new(), faces: Vec::new() },
+    };
+    merged.add_nodes()?;
+    if merged.soup.faces.is_empty() { Err(ModelError::NoTriangle) } else { Ok(merged.soup) }
+}
+
+/// Whether a file without a name would be taken for glTF.
+pub(super) fn looks_like_gltf(bytes: &[u8]) -> bool {
+    let begin = &bytes[..bytes.len().min(LOOKED_AT_BYTES)];
+    let is_text = bytes.trim_ascii_start().starts_with(b"{");
+    bytes.starts_with(b"glTF") || is_text && begin.windows(7).any(|word| word == b"\"asset\"")
+}
+
+const LOOKED_AT_BYTES: usize = 1 << 16;
+
+/// The meshes of all nodes, put together.
+struct Merged<'d> {
+    document: &'d Document,
+    accessors: Accessors<'d>,
+    soup: TriangleSoup,
+}
+
+impl Merged<'_> {
+    fn add_nodes(&mut self) -> Result<(), ModelError> {
+        let nodes = &self.document.nodes;
+        let mut is_reached = vec![false; nodes.len()];
+        let mut open: Vec<(usize, Matrix4<f64>)> =
+            self.document.roots()?.into_iter().rev().map(|node| (node, Matrix4::identity())).collect();
+        while let Some((index, X_WP)) = open.pop() {
+            let place = format!("nodes[{index}]");
+            let node = nodes.get(index).ok_or_else(|| missing(&place, nodes.len()))?;
+            if std::mem::replace(&mut is_reached[index], true) {
+                return Err(wrong(
+                    place,
+                    "a node that is reached in two ways".into(),
+                    "a tree: one parent for each",
+                ));
+            }
+            let X_WN = X_WP * transform(&place, node)?;
+            if let Some(mesh) = node.mesh {
+                self.add_mesh(mesh, &X_WN, &place)?;
+            }
+            open.extend(node.children.iter().rev().map(|&child| (child, X_WN)));
+        }
+        Ok(())
+    }
+
+    fn add_mesh(&mut self, index: usize, X_WN: &Matrix4<f64>, node: &str) -> Result<(), ModelError> {
+        let meshes = &self.document.meshes;
+        let mesh =
+            meshes.get(index).ok_or_else(|| missing(&format!("{node}.mesh = {index}"), meshes.len()))?;
+        for (number, primitive) in mesh.primitives.iter().enumerate() {
+            let place = format!("meshes[{index}].primitives[{number}]");
+            self.add_primitive(primitive, X_WN, &place, node)?;
+        }
+        Ok(())
+    }
+
+    fn add_primitive(
+        &mut self,
+        primitive: &Primitive,
+        X_WN: &Matrix4<f64>,
+        place: &str,
+        node: &str,
+    ) -> Result<(), ModelError> {
+        let mode = primitive.mode.unwrap_or(TRIANGLES);
+        let Some(positions) = primitive.attributes.position else { return Ok(()) };
+        if mode < TRIANGLES {
+            return Ok(());
+        }
+        let positions = self.accessors.positions(positions, place)?;
+        let corners = match primitive.indices {
+            Some(indices) => self.accessors.indices(indices, positions.len(), place)?,
+            None => (0..positions.len() as u32).collect(),
+        };
+        let mut faces = triangles(mode, &corners, place)?;
+        if linear(X_WN).determinant() < 0.0 {
+            faces.iter_mut().for_each(|face| face.swap(1, 2));
+        }
+        // Others may use the other vertices of the same accessor.
+        let mut places = vec![u32::MAX; positions.len()];
+        for corner in faces.iter_mut().flatten() {
+            let own = &mut places[*corner as usize];
+            if *own == u32::MAX {
+                *own = self.soup.vertices.len() as u32;
+                let vertex = X_WN.transform_point(&positions[*corner as usize].into()).coords;
+                if !vertex.iter().all(|x| x.is_finite()) {
+                    let found = format!("vertex {corner} of {place} beyond all numbers");
+                    return Err(wrong(node.into(), found, "a transform that leaves finite coordinates"));
+                }
+                self.soup.vertices.push(vertex);
+            }
+            *corner = *own;
+        }
+        self.soup.faces.extend(faces);
+        Ok(())
+    }
+}
+
+const TRIANGLES: u32 = 4;
+
+fn triangles(mode: u32, corners: &[u32], place: &str) -> Result<Vec<[u32; 3]>, ModelError> {
+    match mode {
+        4 if corners.len().is_multiple_of(3) => {
+            Ok(corners.chunks_exact(3).map(|face| [face[0], face[1], face[2]]).collect())
+        }
+        4 => {
+            let found = format!("{} corners of triangles", corners.len());
+            Err(wrong(place.into(), found, "three for each"))
+        }
+        5 => {
+            let mut strip = Strip::default();
+            Ok(corners.iter().filter_map(|&corner| strip.next(corner)).collect())
+        }
+        6 => {
+            let first = corners.first().copied().unwrap_or(0);
+            Ok(corners
+                .get(1..)
+                .unwrap_or_default()
+                .windows(2)
+                .map(|pair| [first, pair[0], pair[1]])
+                .collect())
+        }
+        mode => Err(wrong(format!("{place}.mode"), mode.to_string(), "0 to 6")),
+    }
+}
+
+fn transform(place: &str, node: &Node) -> Result<Matrix4<f64>, ModelError> {
+    if let Some(matrix) = &node.matrix {
+        let X = Matrix4::from_column_slice(&matrix[..]);
+        if X.row(3) != Matrix4::identity().row(3) {
+            return Err(wrong(format!("{place}.matrix"), "a projection".into(), "a last row of 0, 0, 0, 1"));
+        }
+        return Ok(X);
+    }
+    let [x, y, z, w] = node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]);
+    let rotation = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), f64::MIN_POSITIVE);
+    let Some(rotation) = rotation else {
+        return Err(wrong(
+            format!("{place}.rotation"),
+            "a quaternion of no length".into(),
+            "one of length 1",
+        ));
+    };
+    let scale = Matrix4::new_nonuniform_scaling(&node.scale.unwrap_or([1.0; 3]).into());
+    let shift = Matrix4::new_translation(&Vector3::from(node.translation.unwrap_or_default()));
+    Ok(shift * rotation.to_homogeneous() * scale)
+}
+
+fn linear(X: &Matrix4<f64>) -> Matrix3<f64> {
+    X.fixed_view::<3, 3>(0, 0).into_owned()
+}
+
+fn wrong(place: String, found: String, allowed: &str) -> ModelError {
+    ModelError::Place { place, found, allowed: allowed.into() }
+}
+
+/// Of a reference to what is not there.
+fn missing(place: &str, count: usize) -> ModelError {
+    let allowed = match count {
+        0 => "one that is there, but there is none".into(),
+        count => format!("0 to {}", count - 1),
+    };
+    ModelError::Place { place: place.into(), found: "a reference to nothing".into(), allowed }
+}

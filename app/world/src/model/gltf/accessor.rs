@@ -1,0 +1,253 @@
+//! Positions and indices out of a glTF file's buffers.
+
+use super::buffers::Buffers;
+use super::document::{Accessor, Document, Sparse};
+use super::{missing, wrong};
+use crate::model::ModelError;
+use nalgebra::Vector3;
+
+pub(super) struct Accessors<'d> {
+    document: &'d Document,
+    buffers: &'d Buffers<'d>,
+    /// How many elements may still be read.
+    left: usize,
+    most: usize,
+}
+
+impl<'d> Accessors<'d> {
+    pub(super) fn new(document: &'d Document, buffers: &'d Buffers<'d>, most: usize) -> Self {
+        Self { document, buffers, left: most, most }
+    }
+
+    pub(super) fn positions(
+        &mut self,
+        index: usize,
+        primitive: &str,
+    ) -> Result<Vec<Vector3<f64>>, ModelError> {
+        let (place, accessor) = self.accessor(index, &format!("{primitive}.attributes.POSITION"))?;
+        if accessor.kind != "VEC3" {
+            return Err(kind(&place, accessor, "VEC3, since a primitive has it for its positions"));
+        }
+        let component = Component::of(accessor.component_type)
+            .filter(|component| *component != Component::U32)
+            .ok_or_else(|| {
+                component_type(&place, accessor.component_type, "5120 to 5123 or 5126 for positions")
+            })?;
+        let mut positions = vec![Vector3::zeros(); self.take(accessor.count, &place)?];
+        let read = |bytes: &[u8]| {
+            Vector3::from_fn(|axis, _| {
+                component.value(&bytes[axis * component.bytes()..], accessor.normalized)
+            })
+        };
+        let width = 3 * component.bytes();
+        if let Some(view) = accessor.buffer_view {
+            let elements = self.elements(view, accessor.byte_offset, accessor.count, width, &place)?;
+            positions.iter_mut().zip(elements).for_each(|(position, bytes)| *position = read(bytes));
+        }
+        if let Some(sparse) = &accessor.sparse {
+            let (at, values) = self.sparse(sparse, width, accessor.count, &place)?;
+            at.into_iter().zip(values).for_each(|(at, bytes)| positions[at as usize] = read(bytes));
+        }
+        match positions.iter().position(|position| !position.iter().all(|x| x.is_finite())) {
+            Some(element) => {
+                let [x, y, z] = positions[element].into();
+                Err(wrong(place, format!("element {element} at [{x:?}, {y:?}, {z:?}]"), "finite numbers"))
+            }
+            None => Ok(positions),
+        }
+    }
+
+    /// Indices below a number of vertices.
+    pub(super) fn indices(
+        &mut self,
+        index: usize,
+        vertices: usize,
+        primitive: &str,
+    ) -> Result<Vec<u32>, ModelError> {
+        let (place, accessor) = self.accessor(index, &format!("{primitive}.indices"))?;
+        if accessor.kind != "SCALAR" {
+            return Err(kind(&place, accessor, "SCALAR, since a primitive has it for its indices"));
+        }
+        let component = index_component(&place, accessor.component_type)?;
+        let mut indices = vec![0; self.take(accessor.count, &place)?];
+        if let Some(view) = accessor.buffer_view {
+            let elements =
+                self.elements(view, accessor.byte_offset, accessor.count, component.bytes(), &place)?;
+            indices.iter_mut().zip(elements).for_each(|(index, bytes)| *index = component.index(bytes));
+        }
+        if let Some(sparse) = &accessor.sparse {
+            let (at, values) = self.sparse(sparse, component.bytes(), accessor.count, &place)?;
+            at.into_iter().zip(values).for_each(|(at, bytes)| indices[at as usize] = component.index(bytes));
+        }
+        match indices.iter().position(|&index| index as usize >= vertices) {
+            Some(element) => {
+                let found = format!("element {element} = {}", indices[element]);
+                let allowed = format!("indices of the {vertices} vertices of {primitive}, from 0");
+                Err(wrong(place, found, &allowed))
+            }
+            None => Ok(indices),
+        }
+    }
+
+    fn accessor(&self, index: usize, user: &str) -> Result<(String, &'d Accessor), ModelError> {
+        let all = &self.document.accessors;
+        let accessor = all.get(index).ok_or_else(|| missing(&format!("{user} = {index}"), all.len()))?;
+        Ok((format!("accessors[{index}]"), accessor))
+    }
+
+    fn take(&mut self, count: usize, place: &str) -> Result<usize, ModelError> {
+        match self.left.checked_sub(count) {
+            Some(left) => {
+                self.left = left;
+                Ok(count)
+            }
+            None => {
+                let found = format!(
+                    "{count} elements, which makes more than {} vertices and indices in all",
+                    self.most
+                );
+                Err(wrong(
+                    place.into(),
+                    found,
+                    "at most so many in a file of this size; leave repeated parts out",
+                ))
+            }
+        }
+    }
+
+    /// Which elements are others than the rest, and what they are.
+    fn sparse(
+        &mut self,
+        sparse: &Sparse,
+        width: usize,
+        count: usize,
+        place: &str,
+    ) -> Result<(Vec<u32>, impl Iterator<Item = &'d [u8]>), ModelError> {
+        let place = format!("{place}.sparse");
+        self.take(sparse.count, &place)?;
+        let component = index_component(&place, sparse.indices.component_type)?;
+        let (Some(indices), Some(values)) = (sparse.indices.buffer_view, sparse.values.buffer_view) else {
+            return Err(wrong(place, "no bufferView".into(), "one for the indices and one for the values"));
+        };
+        let at =
+            self.elements(indices, sparse.indices.byte_offset, sparse.count, component.bytes(), &place)?;
+        let at: Vec<u32> = at.map(|bytes| component.index(bytes)).collect();
+        if let Some(beyond) = at.iter().find(|at| **at as usize >= count) {
+            return Err(wrong(
+                place,
+                format!("index {beyond}"),
+                &format!("indices of {count} elements, from 0"),
+            ));
+        }
+        Ok((at, self.elements(values, sparse.values.byte_offset, sparse.count, width, &place)?))
+    }
+
+    /// The bytes of each element.
+    fn elements(
+        &self,
+        view: usize,
+        offset: usize,
+        count: usize,
+        width: usize,
+        place: &str,
+    ) -> Result<impl Iterator<Item = &'d [u8]> + use<'d>, ModelError> {
+        let views = &self.document.buffer_views;
+        let view_place = format!("bufferViews[{view}]");
+        let view =
+            views.get(view).ok_or_else(|| missing(&format!("{place}.bufferView = {view}"), views.len()))?;
+        let buffer = self.buffers.get(view.buffer);
+        let buffer = buffer
+            .ok_or_else(|| missing(&format!("{view_place}.buffer = {}", view.buffer), self.buffers.len()))?;
+        let bytes = buffer.get(view.byte_offset..).and_then(|rest| rest.get(..view.byte_length)).ok_or_else(
+            || {
+                let found = format!("{} bytes from byte {}", view.byte_length, view.byte_offset);
+                wrong(view_place.clone(), found, &format!("a part of a buffer of {} bytes", buffer.len()))
+            },
+        )?;
+        let stride = view.byte_stride.unwrap_or(width);
+        if stride < width {
+            return Err(wrong(view_place, format!("byteStride {stride}"), &format!("{width} or more")));
+        }
+        let end = count
+            .saturating_sub(1)
+            .checked_mul(stride)
+            .and_then(|way| way.checked_add(width)?.checked_add(offset));
+        if count > 0 && end.is_none_or(|end| end > bytes.len()) {
+            let found = format!("{count} elements of {width} bytes from byte {offset}, {stride} apart");
+            return Err(wrong(
+                place.into(),
+                found,
+                &format!("as many as {} bytes of {view_place} hold", bytes.len()),
+            ));
+        }
+        Ok((0..count).map(move |element| &bytes[offset + element * stride..][..width]))
+    }
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Component {
+    I8,
+    U8,
+    I16,
+    U16,
+    U32,
+    F32,
+}
+
+impl Component {
+    fn of(code: u32) -> Option<Self> {
+        Some(match code {
+            5120 => Self::I8,
+            5121 => Self::U8,
+            5122 => Self::I16,
+            5123 => Self::U16,
+            5125 => Self::U32,
+            5126 => Self::F32,
+            _ => return None,
+        })
+    }
+
+    fn bytes(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::U32 | Self::F32 => 4,
+        }
+    }
+
+    fn bits(self, bytes: &[u8]) -> u32 {
+        bytes[..self.bytes()].iter().rev().fold(0, |bits, &byte| bits << 8 | u32::from(byte))
+    }
+
+    fn index(self, bytes: &[u8]) -> u32 {
+        self.bits(bytes)
+    }
+
+    fn value(self, bytes: &[u8], normalized: bool) -> f64 {
+        let bits = self.bits(bytes);
+        let (value, largest) = match self {
+            Self::F32 => return f64::from(f32::from_bits(bits)),
+            Self::I8 => (f64::from(bits as u8 as i8), f64::from(i8::MAX)),
+            Self::I16 => (f64::from(bits as u16 as i16), f64::from(i16::MAX)),
+            Self::U8 => (f64::from(bits), f64::from(u8::MAX)),
+            Self::U16 => (f64::from(bits), f64::from(u16::MAX)),
+            Self::U32 => (f64::from(bits), f64::from(u32::MAX)),
+        };
+        if normalized { (value / largest).max(-1.0) } else { value }
+    }
+}
+
+fn index_component(place: &str, code: u32) -> Result<Component, ModelError> {
+    let component = Component::of(code)
+        .filter(|component| matches!(component, Component::U8 | Component::U16 | Component::U32));
+    component.ok_or_else(|| component_type(place, code, "5121, 5123 or 5125 for indices"))
+}
+
+fn component_type(place: &str, code: u32, allowed: &str) -> ModelError {
+    wrong(format!("{place}.componentType"), code.to_string(), allowed)
+}
+
+fn kind(place: &str, accessor: &Accessor, allowed: &str) -> ModelError {
+    let found: String = accessor.kind.escape_default().take(20).collect();
+    wrong(format!("{place}.type"), format!("\"{found}\""), allowed)
+}

@@ -1,0 +1,169 @@
+//! The text of a glTF file, as far as it is about shapes.
+
+use super::{missing, wrong};
+use crate::model::ModelError;
+use serde::Deserialize;
+
+/// A text of nothing but `{}` must not become gigabytes.
+const MOST_OBJECTS: usize = 1 << 18;
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+#[derive(Default)]
+pub(super) struct Document {
+    asset: Asset,
+    extensions_required: Vec<String>,
+    scene: Option<usize>,
+    scenes: Vec<Scene>,
+    pub(super) nodes: Vec<Node>,
+    pub(super) meshes: Vec<Mesh>,
+    pub(super) accessors: Vec<Accessor>,
+    pub(super) buffer_views: Vec<BufferView>,
+    pub(super) buffers: Vec<Buffer>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default)]
+struct Asset {
+    version: String,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default)]
+struct Scene {
+    nodes: Vec<usize>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default)]
+pub(super) struct Node {
+    pub(super) children: Vec<usize>,
+    pub(super) mesh: Option<usize>,
+    pub(super) matrix: Option<Box<[f64; 16]>>,
+    pub(super) translation: Option<[f64; 3]>,
+    pub(super) rotation: Option<[f64; 4]>,
+    pub(super) scale: Option<[f64; 3]>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default)]
+pub(super) struct Mesh {
+    pub(super) primitives: Vec<Primitive>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default)]
+pub(super) struct Primitive {
+    pub(super) attributes: Attributes,
+    pub(super) indices: Option<usize>,
+    pub(super) mode: Option<u32>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default)]
+pub(super) struct Attributes {
+    #[serde(rename = "POSITION")]
+    pub(super) position: Option<usize>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct Accessor {
+    pub(super) buffer_view: Option<usize>,
+    pub(super) byte_offset: usize,
+    pub(super) component_type: u32,
+    pub(super) normalized: bool,
+    pub(super) count: usize,
+    #[serde(rename = "type")]
+    pub(super) kind: String,
+    pub(super) sparse: Option<Sparse>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default)]
+pub(super) struct Sparse {
+    pub(super) count: usize,
+    pub(super) indices: SparsePart,
+    pub(super) values: SparsePart,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct SparsePart {
+    pub(super) buffer_view: Option<usize>,
+    pub(super) byte_offset: usize,
+    pub(super) component_type: u32,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct BufferView {
+    pub(super) buffer: usize,
+    pub(super) byte_offset: usize,
+    pub(super) byte_length: usize,
+    pub(super) byte_stride: Option<usize>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct Buffer {
+    pub(super) uri: Option<String>,
+    pub(super) byte_length: usize,
+}
+
+impl Document {
+    pub(super) fn parse(text: &[u8]) -> Result<Self, ModelError> {
+        let objects = text.iter().filter(|&&byte| byte == b'{').count();
+        if objects > MOST_OBJECTS {
+            let found = format!("a text of {objects} objects");
+            return Err(wrong(
+                "JSON".into(),
+                found,
+                &format!("{MOST_OBJECTS} at most: join its nodes and meshes"),
+            ));
+        }
+        serde_json::from_slice(text).map_err(|error| {
+            let said = error.to_string();
+            let said = said.split(" at line ").next().unwrap_or_default();
+            let found: String = said.escape_default().take(LONGEST_WORDS).collect();
+            ModelError::Line { line: error.line(), found, allowed: "a text of glTF 2.0 (JSON)".into() }
+        })
+    }
+
+    pub(super) fn check(&self) -> Result<(), ModelError> {
+        let version: String = self.asset.version.escape_default().take(20).collect();
+        if !version.starts_with("2.") {
+            let allowed = "\"2.0\"; export the model as glTF 2.0 or GLB";
+            return Err(wrong("asset.version".into(), format!("\"{version}\""), allowed));
+        }
+        match self.extensions_required.iter().find(|name| COMPRESSED.contains(&name.as_str())) {
+            Some(name) => {
+                let allowed = "geometry that is not compressed: export it without, or unpack it (`gltf-transform copy`)";
+                Err(wrong("extensionsRequired".into(), name.clone(), allowed))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The nodes that a scene begins with.
+    pub(super) fn roots(&self) -> Result<Vec<usize>, ModelError> {
+        if self.scenes.is_empty() {
+            let mut is_child = vec![false; self.nodes.len()];
+            for &child in self.nodes.iter().flat_map(|node| &node.children) {
+                if let Some(is_child) = is_child.get_mut(child) {
+                    *is_child = true;
+                }
+            }
+            return Ok((0..self.nodes.len()).filter(|&node| !is_child[node]).collect());
+        }
+        let scene = self.scene.unwrap_or(0);
+        let found = self.scenes.get(scene);
+        found
+            .map(|scene| scene.nodes.clone())
+            .ok_or_else(|| missing(&format!("scene = {scene}"), self.scenes.len()))
+    }
+}
+
+const COMPRESSED: [&str; 3] =
+    ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"];
+const LONGEST_WORDS: usize = 160;
