@@ -21,9 +21,11 @@
 mod acceleration;
 mod field;
 mod finger_effects;
+mod footing;
 mod guide;
 mod limits;
 mod magnetism;
+mod path;
 mod reaction;
 mod region;
 mod track;
