@@ -143,6 +143,34 @@ impl Guide {
         }
     }
 
+    /// Stretch \[m\] and damping \[N s/m\] at this distance.
+    pub(super) fn strengths(&self, distance_m: f64) -> (f64, f64) {
+        let stretch_m = (distance_m - self.deadband_m).max(0.0);
+        (stretch_m, self.damping_n_s_per_m * self.damped(stretch_m))
+    }
+
+    /// Whether it does so at this stretch \[m\].
+    pub(super) fn lets_go_at(&self, stretch_m: f64) -> bool {
+        self.break_away_n.is_some_and(|most_n| self.stiffness_n_per_m * stretch_m > most_n)
+    }
+
+    /// Distances between which it is felt in full \[m\].
+    pub(super) fn felt_between(&self) -> (f64, f64) {
+        let most_n = self.break_away_n.unwrap_or(self.force_limit_n);
+        let far_m = self.deadband_m + INSIDE * most_n / self.stiffness_n_per_m;
+        ((2.0 * self.deadband_m).min(far_m), far_m)
+    }
+
+    /// k \[N/m\].
+    pub fn stiffness_n_per_m(&self) -> f64 {
+        self.stiffness_n_per_m
+    }
+
+    /// The most it pulls \[N\].
+    pub fn force_limit_n(&self) -> f64 {
+        self.force_limit_n
+    }
+
     /// What its spring gives back on the way to the track (J).
     fn stored_j(&self, stretch_m: f64) -> f64 {
         // From here on the force is its limit.
@@ -190,9 +218,8 @@ pub(super) struct Hold {
 
 impl Hold {
     fn step(&mut self, guide: &Guide, drawn: &Draw, dt_s: f64) {
-        let pull_n = guide.stiffness_n_per_m * drawn.stretch_m;
         self.is_captured = if self.is_captured {
-            guide.break_away_n.is_none_or(|most_n| pull_n <= most_n)
+            !guide.lets_go_at(drawn.stretch_m)
         } else {
             guide.capture_m.is_none_or(|capture_m| drawn.distance_m <= capture_m)
         };
@@ -204,6 +231,8 @@ impl Hold {
     }
 }
 
+/// Of the stretch at which it lets go: there it is surely felt.
+const INSIDE: f64 = 0.99;
 /// How long capturing takes \[s\].
 const CAPTURE_S: f64 = 0.05;
 /// How long letting go takes \[s\].
