@@ -5,6 +5,7 @@
 //! stands in the way is a *problem*: `run` would refuse the scene, with the first of them. What runs, but hardly as
 //! meant, is a *warning*.
 
+mod common_places;
 mod measures;
 pub(crate) mod model_file;
 mod report;

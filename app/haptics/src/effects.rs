@@ -21,9 +21,12 @@
 mod acceleration;
 mod field;
 mod finger_effects;
+mod footing;
+mod gains;
 mod guide;
 mod limits;
 mod magnetism;
+mod path;
 mod reaction;
 mod region;
 mod track;
@@ -31,6 +34,7 @@ mod vibration;
 
 pub use field::{Field, FieldKind};
 pub use finger_effects::{FingerEffects, Moment};
+pub use gains::Gains;
 pub use guide::{Guide, HYSTERESIS_M};
 pub use limits::Limits;
 pub use magnetism::Magnetism;

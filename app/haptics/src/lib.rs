@@ -88,8 +88,8 @@ pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
 pub use door::{Crossing, Door, FADE_S, Passage, SLAB_M, WORLD};
 pub use effects::{
-    Effects, Field, FieldKind, FingerEffects, Guide, HYSTERESIS_M, Limits, MAX_PATH_POINTS, MOST_FORCE_N,
-    Magnetism, Moment, Reaction, Region, Track, Vibration,
+    Effects, Field, FieldKind, FingerEffects, Gains, Guide, HYSTERESIS_M, Limits, MAX_PATH_POINTS,
+    MOST_FORCE_N, Magnetism, Moment, Reaction, Region, Track, Vibration,
 };
 pub use ellipsoid::{Ellipsoid, LARGEST_RATIO};
 pub use entity::{Entity, Felt};

@@ -106,13 +106,17 @@ pub struct NurbsReport {
     pub poles: usize,
     /// Closed parts that were inside out.
     pub turned: usize,
+    /// Patches without an area, since they have collapsed to a point or a curve; left out.
+    pub without_area: usize,
+    /// The first of these, as given, from 0.
+    pub first_without_area: Option<usize>,
     /// Whether it cannot be told which side is outside.
     pub is_one_sided: bool,
 }
 
 impl fmt::Display for NurbsReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { patches, elements, cells, seams, creases, rims, poles, turned, is_one_sided } = self;
+        let Self { patches, elements, cells, seams, creases, rims, poles, turned, .. } = self;
         write!(
             f,
             "{patches} patches of {elements} polynomials in {cells} cells, {seams} seams ({creases} of them"
@@ -121,11 +125,15 @@ impl fmt::Display for NurbsReport {
         if *rims > 0 {
             write!(f, "; it ends at {rims} edges: a sheet, felt from both sides")?;
         }
-        if *is_one_sided {
+        if self.is_one_sided {
             write!(f, "; it has no inside: felt from both sides")?;
         }
         if *turned > 0 {
             write!(f, "; {turned} closed parts were inside out and have been turned")?;
+        }
+        if let Some(first) = self.first_without_area {
+            let patches = if self.without_area == 1 { "patch" } else { "patches" };
+            write!(f, "; {} {patches} without an area: left out (first: patch {first})", self.without_area)?;
         }
         Ok(())
     }
@@ -134,7 +142,7 @@ impl fmt::Display for NurbsReport {
 impl Nurbs {
     /// Joins patches to a surface.
     ///
-    /// Errors: a patch that is none, and edges at which more than two meet.
+    /// Errors: a patch that is none, edges at which more than two meet, and nothing that has an area.
     pub fn build(patches: &[NurbsPatch]) -> Result<(Self, NurbsReport), NurbsError> {
         static NEXT: AtomicU64 = AtomicU64::new(0);
         if patches.is_empty() {
@@ -161,6 +169,17 @@ impl Nurbs {
         for (source, patch) in patches.iter().enumerate() {
             nurbs.add(patch, source);
         }
+        let without_area = nurbs.without_area(patches.len());
+        if without_area.len() == patches.len() {
+            return Err(NurbsError::NoArea { patches: patches.len() });
+        }
+        if !without_area.is_empty() {
+            nurbs.patches.clear();
+            nurbs.elements.clear();
+            nurbs.controls.clear();
+            let rest = patches.iter().enumerate().filter(|(source, _)| !without_area.contains(source));
+            rest.for_each(|(source, patch)| nurbs.add(patch, source));
+        }
         let joined = seams::join(&mut nurbs)?;
         let mut turned = 0;
         if joined.is_closed && joined.is_orientable {
@@ -171,8 +190,13 @@ impl Nurbs {
         nurbs.widen_slack();
         nurbs.group();
         tree::grow(&mut nurbs)?;
-        let report =
-            NurbsReport { turned, is_one_sided: !joined.is_orientable, ..nurbs.report(patches.len()) };
+        let report = NurbsReport {
+            turned,
+            is_one_sided: !joined.is_orientable,
+            without_area: without_area.len(),
+            first_without_area: without_area.first().copied(),
+            ..nurbs.report(patches.len())
+        };
         Ok((nurbs, report))
     }
 
@@ -298,6 +322,32 @@ impl Nurbs {
                 a * b * here.point_B.dot(&here.du.cross(&here.dv))
             })
             .sum()
+    }
+
+    /// Which of the given patches are nowhere wider than what edges that have shrunk to a point may be, ascending.
+    fn without_area(&self, given: usize) -> Vec<usize> {
+        let mut has_area = vec![false; given];
+        for (patch, of) in self.patches.iter().enumerate() {
+            has_area[of.source] = has_area[of.source] || self.has_area(patch as u32);
+        }
+        (0..given).filter(|&source| !has_area[source]).collect()
+    }
+
+    /// By the elements' derivatives, each over the length of its element.
+    fn has_area(&self, patch: u32) -> bool {
+        let breaks = &self.patches[patch as usize].breaks;
+        let places = |d: usize| {
+            breaks[d].windows(2).flat_map(|ends| {
+                let length = ends[1] - ends[0];
+                GAUSS.map(|(x, _)| (ends[0] + length * x, length))
+            })
+        };
+        let tiny_m = 1e-3 * seams::EQUAL * self.extent_m;
+        places(1).flat_map(|v| places(0).map(move |u| (u, v))).any(|((u, du), (v, dv))| {
+            let here = self.local(patch, [u, v]);
+            let (along_u, along_v) = (here.du * du, here.dv * dv);
+            along_u.cross(&along_v).norm() > tiny_m * along_u.norm().max(along_v.norm())
+        })
     }
 
     /// Edges that meet within a tolerance leave gaps as wide: a path must not slip through.

@@ -1,100 +1,313 @@
 //! Places where a finger feels several things at once: whether the loop stands their sum.
 //!
-//! Model: a finger is put to places in and about each thing that another one reaches into. What it touches there adds up
-//! along the normals, `K = sum k n n'`; the largest eigenvalue of K is what the loop feels along its axis.
-//! Cost: some sixty places for each such thing, and none for things that lie apart.
+//! Model: a finger is put to places in and about each thing that another one reaches into, and to places that several
+//! fields and guides have in common. There stiffness and damping add up as matrices, contacts along their normals,
+//! `K = sum k n n'`, effects as their [`Gains`]; masses of inertial fields as numbers. The largest eigenvalue is what the
+//! loop feels along its axis. Contacts are judged by what the loop stands, as single ones are; effects, and the damping of
+//! everything, by the [`Limits`] that single ones are refused above: each counts by its share of its own limit.
+//! Cost: some sixty places for each thing that others reach into, and none for things that lie apart; of effects, as many
+//! groups as there are effects, or pairs of a few.
 
 #![allow(non_snake_case)] // Frames are capital letters.
 
+use super::common_places::{Effect, common_places};
 use super::warnings::Stands;
 use crate::rig::{Rig, in_words};
-use haptics::{Entity, Finger, Hip, Shape, Surface};
+use haptics::{Entity, Field, FieldKind, Finger, Gains, Guide, Hip, Limits, Shape, Surface, WORLD};
 use nalgebra::{Matrix3, Vector3};
 use physics::collide::bounding_ball;
 use std::collections::BTreeMap;
 
-/// Warnings of them, of the stiffest sums first.
-pub(super) fn too_stiff(rig: &Rig, entities: &[Entity], stands: &mut Stands) -> Vec<String> {
-    let mut found: BTreeMap<Vec<usize>, Sum> = BTreeMap::new();
-    for (index, near) in neighbours(entities).into_iter().enumerate().filter(|(_, near)| near.len() > 1) {
-        for radius_m in radii(rig) {
-            for place_W in places(&entities[index]) {
-                let Some((touched, sum)) = sum_at(entities, &near, entities[index].space, radius_m, &place_W)
-                else {
-                    continue;
-                };
-                let kept = found.entry(touched).or_insert(sum);
-                if sum.stiffness_n_per_m > kept.stiffness_n_per_m {
-                    *kept = sum;
-                }
+/// Warnings of them, of the largest sums first.
+pub(super) fn too_much(rig: &Rig, entities: &[Entity], stands: &mut Stands) -> Vec<String> {
+    let Some(world) = World::of(rig, entities) else { return Vec::new() };
+    let mut found = Found::default();
+    for radius_m in radii(rig) {
+        for (index, near) in neighbours(entities).into_iter().enumerate().filter(|(_, near)| !near.is_empty())
+        {
+            let above = drawn_at(&entities[index], radius_m);
+            for place_W in places(&entities[index]).into_iter().chain(above) {
+                world.judge((&near, entities[index].space), radius_m, &place_W, stands, &mut found);
             }
         }
+        for place_W in world.common_places() {
+            let near = world.near(&place_W, radius_m);
+            world.judge((&near, WORLD), radius_m, &place_W, stands, &mut found);
+        }
     }
-    let mut beyond: Vec<(f64, String)> = found
-        .into_iter()
-        .filter_map(|(touched, sum)| {
-            let limit = stands.limit(sum.damping_n_s_per_m)?;
-            let names: Vec<String> =
-                touched.iter().map(|&index| rig.scene.entities[index].name.clone()).collect();
-            let (k, at) = (sum.stiffness_n_per_m, sum.place_W);
-            let told = format!(
-                "{} together may buzz: a finger at ({:.3}, {:.3}, {:.3}) feels {k:.0} N/m of them, and a lightly held \
-                 Premium stands {limit:.0}",
-                in_words(&names), at.x, at.y, at.z
-            );
-            (k > limit).then_some((k, told))
-        })
-        .collect();
-    beyond.sort_by(|(a, _), (b, _)| b.total_cmp(a));
-    let more = beyond.len().saturating_sub(MOST_TOLD);
-    let mut told: Vec<String> = beyond.into_iter().take(MOST_TOLD).map(|(_, told)| told).collect();
-    if more > 0 {
-        told.push(format!("and {more} more groups of things are too stiff together"));
-    }
-    told
+    found.told(|thing| world.name(thing))
 }
 
-/// What a finger feels at a place along the stiffest axis.
+/// All that fingers feel.
+struct World<'a> {
+    rig: &'a Rig,
+    entities: &'a [Entity],
+    fields: Vec<Field>,
+    guides: Vec<Guide>,
+    /// Of entities' magnets and damping, of each field and of each guide.
+    limits: (Limits, Vec<Limits>, Vec<Limits>),
+}
+
+/// A kind of sum, with what it does where it is too large and its unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Kind {
+    Contacts,
+    Stiffness,
+    Damping,
+    Mass,
+}
+
+/// A sum at a place, along its largest axis.
 #[derive(Debug, Clone, Copy)]
 struct Sum {
-    stiffness_n_per_m: f64,
-    damping_n_s_per_m: f64,
+    /// In the kind's unit.
+    value: f64,
+    limit: f64,
     place_W: Vector3<f64>,
 }
 
-/// `None` where less than two things take part.
-fn sum_at(
-    entities: &[Entity],
-    near: &[u32],
-    space: u32,
-    radius_m: f64,
-    place_W: &Vector3<f64>,
-) -> Option<(Vec<usize>, Sum)> {
-    let mut probe = Finger::new(radius_m, near.len()).ok()?.within(space);
-    probe.step_near(entities, near, Hip { position_W: *place_W, velocity_W: None }, 1e-3);
-    let each = || probe.contacts().map(|contact| (contact.entity, contact.normal_W));
-    let along = |entity: usize, share: f64| entities[entity].felt_stiffness_n_per_m() * share;
-    let total: Matrix3<f64> = each().map(|(entity, n_W)| n_W * n_W.transpose() * along(entity, 1.0)).sum();
+/// The largest of each kind and group of things.
+#[derive(Debug, Default)]
+struct Found(BTreeMap<(Kind, Vec<usize>), Sum>);
+
+impl<'a> World<'a> {
+    /// `None`: there are effects that cannot be made, which is told elsewhere.
+    fn of(rig: &'a Rig, entities: &'a [Entity]) -> Option<Self> {
+        let (fields, guides) = rig.effects().ok()?;
+        let of_mass = |mass_kg: f64| rig.limits(mass_kg).ok();
+        let of_fields =
+            rig.scene.fields.iter().map(|spec| of_mass(spec.device_mass_kg)).collect::<Option<_>>()?;
+        let of_guides =
+            rig.scene.guides.iter().map(|spec| of_mass(spec.device_mass_kg)).collect::<Option<_>>()?;
+        let limits = (of_mass(Limits::DEFAULT_DEVICE_MASS_KG)?, of_fields, of_guides);
+        Some(Self { rig, entities, fields, guides, limits })
+    }
+
+    /// Things are counted through: entities, fields, guides.
+    fn name(&self, thing: usize) -> String {
+        let (entities, fields) = (self.entities.len(), self.fields.len());
+        match thing {
+            entity if entity < entities => self.rig.scene.entities[entity].name.clone(),
+            field if field < entities + fields => format!("field[{}]", field - entities),
+            guide => format!("guide[{}]", guide - entities - fields),
+        }
+    }
+
+    fn judge(
+        &self,
+        (near, space): (&[u32], u32),
+        radius_m: f64,
+        place_W: &Vector3<f64>,
+        stands: &mut Stands,
+        found: &mut Found,
+    ) {
+        let effects = self.effects_at(place_W);
+        let magnets = near.iter().filter(|&&at| self.entities[at as usize].magnetism.is_some()).count();
+        if near.len() + effects.len() + magnets < 2 {
+            return;
+        }
+        let (contacts, magnets) = self.touched((near, space), radius_m, place_W);
+        let (_, of_fields, of_guides) = &self.limits;
+        let mut add = |kind, sum: Option<(Vec<usize>, f64, f64)>| {
+            if let Some((things, value, limit)) = sum {
+                found.add(kind, things, Sum { value, limit, place_W: *place_W });
+            }
+        };
+        add(Kind::Contacts, of_contacts(&contacts, stands));
+        let limit_of = |thing: usize| match thing.checked_sub(self.entities.len()) {
+            None => &self.limits.0,
+            Some(field) => of_fields.get(field).unwrap_or_else(|| &of_guides[field - of_fields.len()]),
+        };
+        let pulling: Vec<_> = effects.iter().chain(&magnets).copied().collect();
+        let stiffness = |(thing, gains): &(usize, Gains)| {
+            (*thing, gains.stiffness_n_per_m, limit_of(*thing).stiffness_n_per_m())
+        };
+        add(Kind::Stiffness, beyond(&pulling.iter().map(stiffness).collect::<Vec<_>>()));
+        let damping = |(thing, gains): &(usize, Gains)| {
+            (*thing, gains.damping_n_s_per_m, limit_of(*thing).damping_n_s_per_m())
+        };
+        add(Kind::Damping, beyond(&effects.iter().chain(&contacts).map(damping).collect::<Vec<_>>()));
+        let mass = |(thing, gains): &(usize, Gains)| {
+            let FieldKind::Inertial { cutoff_hz, .. } =
+                self.fields.get(thing.checked_sub(self.entities.len())?)?.kind()
+            else {
+                return None;
+            };
+            let mass = Matrix3::from_diagonal(&Vector3::new(gains.mass_kg, 0.0, 0.0));
+            Some((*thing, mass, limit_of(*thing).mass_kg(*cutoff_hz)))
+        };
+        add(Kind::Mass, beyond(&effects.iter().filter_map(mass).collect::<Vec<_>>()));
+    }
+
+    /// Fields and guides that are felt at a place.
+    fn effects_at(&self, place_W: &Vector3<f64>) -> Vec<(usize, Gains)> {
+        let fields = self.fields.iter().map(|field| field.gains_at(place_W));
+        let guides = self.guides.iter().map(|guide| guide.gains_at(place_W));
+        let all = fields.chain(guides).enumerate().map(|(at, gains)| (self.entities.len() + at, gains));
+        all.filter(|(_, gains)| *gains != Gains::default()).collect()
+    }
+
+    /// Contacts of a finger there, and magnets that draw it without one.
+    #[expect(clippy::type_complexity)]
+    fn touched(
+        &self,
+        (near, space): (&[u32], u32),
+        radius_m: f64,
+        place_W: &Vector3<f64>,
+    ) -> (Vec<(usize, Gains)>, Vec<(usize, Gains)>) {
+        let Ok(probe) = Finger::new(radius_m, near.len()) else { return Default::default() };
+        let mut probe = probe.within(space);
+        probe.step_near(self.entities, near, Hip { position_W: *place_W, velocity_W: None }, 1e-3);
+        let contacts = probe.contacts().map(|contact| {
+            let along: Matrix3<f64> = contact.normal_W * contact.normal_W.transpose();
+            let entity = &self.entities[contact.entity];
+            let gains = Gains {
+                stiffness_n_per_m: along * entity.felt_stiffness_n_per_m(),
+                damping_n_s_per_m: along * entity.felt_damping_n_s_per_m(),
+                mass_kg: 0.0,
+            };
+            (contact.entity, gains)
+        });
+        let magnets = near.iter().map(|&at| at as usize).filter(|&at| probe.contact(at).is_none());
+        let magnets = magnets.map(|at| (at, self.entities[at].magnet_gains_at(place_W, radius_m)));
+        (contacts.collect(), magnets.filter(|(_, gains)| *gains != Gains::default()).collect())
+    }
+
+    /// Places that several effects have in common with each other and with entities.
+    fn common_places(&self) -> Vec<Vector3<f64>> {
+        let fields = self.fields.iter().map(Effect::Field);
+        let effects: Vec<Effect<'_>> = fields.chain(self.guides.iter().map(Effect::Guide)).collect();
+        common_places(&effects, self.entities)
+    }
+
+    /// Entities of the world itself that a finger may touch there.
+    fn near(&self, place_W: &Vector3<f64>, radius_m: f64) -> Vec<u32> {
+        let is_near = |entity: &Entity| {
+            let reach_m = radius_m + entity.magnetism.map_or(0.0, |magnetism| magnetism.distance_m());
+            let ball = bounding_ball(&entity.shape);
+            ball.is_none_or(|(c, r)| {
+                (entity.X_WB.transform_point(&c.into()).coords - place_W).norm() <= r + reach_m
+            })
+        };
+        let felt =
+            self.entities.iter().enumerate().filter(|(_, entity)| entity.is_haptic && entity.space == WORLD);
+        felt.filter(|(_, entity)| is_near(entity)).map(|(at, _)| at as u32).collect()
+    }
+}
+
+/// What a finger feels of contacts along the stiffest axis, and what the loop stands there.
+fn of_contacts(contacts: &[(usize, Gains)], stands: &mut Stands) -> Option<(Vec<usize>, f64, f64)> {
+    let total: Matrix3<f64> = contacts.iter().map(|(_, gains)| gains.stiffness_n_per_m).sum();
+    let (k, axis_W) = largest(&total)?;
+    let along = |of: &Matrix3<f64>| axis_W.dot(&(of * axis_W));
+    let b = contacts.iter().map(|(_, gains)| along(&gains.damping_n_s_per_m)).sum();
+    let part = |(thing, gains): &(usize, Gains)| (*thing, along(&gains.stiffness_n_per_m) / k);
+    let things = taking_part(contacts.iter().map(part))?;
+    let limit = stands.limit(b)?;
+    (k > limit).then_some((things, k, limit))
+}
+
+/// Of things with their gains and limits, those that take part in a sum of shares above 1, with the sum of gains along its
+/// axis and what would be stood of them.
+fn beyond(all: &[(usize, Matrix3<f64>, f64)]) -> Option<(Vec<usize>, f64, f64)> {
+    let total: Matrix3<f64> = all.iter().map(|(_, gain, limit)| gain / *limit).sum();
+    let (share, axis_W) = largest(&total)?;
+    let along = |of: &Matrix3<f64>| axis_W.dot(&(of * axis_W));
+    let part = |(thing, gain, limit): &(usize, Matrix3<f64>, f64)| (*thing, along(gain) / limit / share);
+    let things = taking_part(all.iter().map(part))?;
+    let value: f64 = all.iter().map(|(_, gain, _)| along(gain)).sum();
+    (share > 1.0 + ROUNDING).then_some((things, value, value / share))
+}
+
+/// Largest eigenvalue, with its axis; `None` where there is none above 0.
+fn largest(total: &Matrix3<f64>) -> Option<(f64, Vector3<f64>)> {
     if !total.iter().all(|value| value.is_finite()) {
         return None;
     }
     let eigen = total.symmetric_eigen();
-    let stiffest = eigen.eigenvalues.imax();
-    let (k, axis_W) = (eigen.eigenvalues[stiffest], eigen.eigenvectors.column(stiffest).into_owned());
-    let share = |n_W: &Vector3<f64>| n_W.dot(&axis_W).powi(2);
-    let b = each().map(|(entity, n_W)| entities[entity].felt_damping_n_s_per_m() * share(&n_W)).sum();
-    let touched: Vec<usize> = each()
-        .filter(|(entity, n_W)| along(*entity, share(n_W)) > TAKES_PART * k)
-        .map(|(entity, _)| entity)
-        .collect();
-    let sum = Sum { stiffness_n_per_m: k, damping_n_s_per_m: b, place_W: *place_W };
-    (touched.len() > 1).then_some((touched, sum))
+    let at = eigen.eigenvalues.imax();
+    let value = eigen.eigenvalues[at];
+    (value > 0.0).then(|| (value, eigen.eigenvectors.column(at).into_owned()))
+}
+
+/// `None`: less than two.
+fn taking_part(parts: impl Iterator<Item = (usize, f64)>) -> Option<Vec<usize>> {
+    let parts: Vec<(usize, f64)> = parts.collect();
+    let most = parts.iter().map(|(_, part)| *part).fold(0.0, f64::max);
+    let taking = parts.into_iter().filter(|(_, part)| *part > TAKES_PART * most);
+    let mut things: Vec<usize> = taking.map(|(thing, _)| thing).collect();
+    things.sort_unstable();
+    (things.len() > 1).then_some(things)
+}
+
+impl Found {
+    fn add(&mut self, kind: Kind, things: Vec<usize>, sum: Sum) {
+        let kept = self.0.entry((kind, things)).or_insert(sum);
+        if sum.value > kept.value {
+            *kept = sum;
+        }
+    }
+
+    /// Of groups within others of the same kind only the others.
+    fn told(self, name: impl Fn(usize) -> String) -> Vec<String> {
+        let is_part = |(kind, things): &(Kind, Vec<usize>)| {
+            let holds = |(of, all): &(Kind, Vec<usize>)| {
+                of == kind
+                    && all.len() > things.len()
+                    && things.iter().all(|thing| all.binary_search(thing).is_ok())
+            };
+            *kind != Kind::Contacts && self.0.keys().any(holds)
+        };
+        let mut beyond: Vec<_> = self.0.iter().filter(|(group, _)| !is_part(group)).collect();
+        beyond.sort_by(|((a, _), s), ((b, _), t)| {
+            a.cmp(b).then((t.value / t.limit).total_cmp(&(s.value / s.limit)))
+        });
+        let more = beyond.len().saturating_sub(MOST_TOLD);
+        let told = |((kind, things), sum): &(&(Kind, Vec<usize>), &Sum)| {
+            let names: Vec<String> = things.iter().map(|&thing| name(thing)).collect();
+            kind.told(&in_words(&names), sum)
+        };
+        let mut told: Vec<String> = beyond.iter().take(MOST_TOLD).map(told).collect();
+        if more > 0 {
+            told.push(format!("and {more} more groups of things are too strong together"));
+        }
+        told
+    }
+}
+
+impl Kind {
+    fn told(self, names: &str, sum: &Sum) -> String {
+        let (value, limit, at) = (sum.value, sum.limit, sum.place_W);
+        let there = format!("a finger at ({:.3}, {:.3}, {:.3}) feels", at.x, at.y, at.z);
+        match self {
+            Self::Contacts => format!(
+                "{names} together may buzz: {there} {value:.0} N/m of them, and a lightly held Premium stands {limit:.0}"
+            ),
+            Self::Stiffness => {
+                format!(
+                    "{names} together may swing: {there} {value:.0} N/m of them, and {limit:.0} are stable"
+                )
+            }
+            Self::Damping => {
+                format!(
+                    "{names} together may swing: {there} {value:.1} N s/m of them, and {limit:.1} are stable"
+                )
+            }
+            Self::Mass => {
+                format!(
+                    "{names} together may swing: {there} {value:.2} kg of them, and {limit:.2} are stable"
+                )
+            }
+        }
+    }
 }
 
 /// Of each entity that fingers feel, itself and those in its space that may reach into it; ascending.
 fn neighbours(entities: &[Entity]) -> Vec<Vec<u32>> {
     let ball = |entity: &Entity| {
-        bounding_ball(&entity.shape).map(|(c, r)| (entity.X_WB.transform_point(&c.into()).coords, r))
+        let reach_m = entity.magnetism.map_or(0.0, |magnetism| magnetism.distance_m());
+        bounding_ball(&entity.shape)
+            .map(|(c, r)| (entity.X_WB.transform_point(&c.into()).coords, r + reach_m))
     };
     let balls: Vec<_> = entities.iter().map(ball).collect();
     // Swept along x: what has no end is near to everything.
@@ -129,12 +342,35 @@ fn places(entity: &Entity) -> Vec<Vector3<f64>> {
         let at = form.nearest(&Vector3::zeros());
         return vec![place(at.point_B - at.normal_B * BELOW_M)];
     };
-    let signs = [-1.0, 0.0, 1.0];
-    let directions =
-        signs.iter().flat_map(|x| signs.iter().flat_map(move |y| signs.map(|z| Vector3::new(*x, *y, z))));
-    let directions = directions.filter(|d| *d != Vector3::zeros()).map(|d| d.normalize());
     let along = |d: Vector3<f64>| SHARES.map(|share| centre_B + d * (share * radius_m));
-    directions.flat_map(along).chain([centre_B]).map(place).collect()
+    directions().flat_map(along).chain([centre_B]).map(place).collect()
+}
+
+/// Where its magnet pulls back most: just above its surface.
+fn drawn_at(entity: &Entity, finger_radius_m: f64) -> Vec<Vector3<f64>> {
+    let Some(magnetism) = entity.magnetism else { return Vec::new() };
+    let (centre_B, radius_m) = bounding_ball(&entity.shape).unwrap_or((Vector3::zeros(), BELOW_M));
+    let above_m = finger_radius_m + ABOVE * magnetism.distance_m();
+    let above = |direction: Vector3<f64>| {
+        let from_B = centre_B + direction * (2.0 * radius_m + above_m);
+        let at_B = match &entity.shape {
+            Shape::Form(form) => form.nearest(&from_B).point_B,
+            Shape::Mesh(mesh) => mesh.nearest(&from_B).point_B,
+            _ => return None,
+        };
+        let up_B = (from_B - at_B).try_normalize(0.0)?;
+        Some(entity.X_WB.transform_point(&(at_B + up_B * above_m).into()).coords)
+    };
+    directions().filter_map(above).collect()
+}
+
+/// To the corners, edges and faces of a cube.
+fn directions() -> impl Iterator<Item = Vector3<f64>> {
+    let signs = [-1.0, 0.0, 1.0];
+    let all = signs.into_iter().flat_map(move |x| {
+        signs.into_iter().flat_map(move |y| signs.into_iter().map(move |z| Vector3::new(x, y, z)))
+    });
+    all.filter(|d| *d != Vector3::zeros()).map(|d| d.normalize())
 }
 
 /// Of the scene's fingers, each once.
@@ -149,6 +385,10 @@ fn radii(rig: &Rig) -> Vec<f64> {
 const SHARES: [f64; 4] = [0.25, 0.5, 0.75, 0.95];
 /// As deep as a finger presses.
 const BELOW_M: f64 = 1e-3;
-/// Of the stiffness along an axis: what adds less is not named.
+/// Of a magnet's reach: its pull is steepest at the surface.
+const ABOVE: f64 = 0.01;
+/// Of what adds most along an axis: what adds less is not named.
 const TAKES_PART: f64 = 0.05;
+/// Of shares that are 1 together by what a scene says.
+const ROUNDING: f64 = 1e-9;
 const MOST_TOLD: usize = 10;

@@ -6,7 +6,7 @@ use crate::study::stiffness::bounds::Theory;
 use crate::study::stiffness::case::{Axis, Case, Hand, Mode};
 use crate::study::stiffness::search::Found;
 use crate::study::stiffness::trial::Bench;
-use haptics::{Door, Entity, Finger, Hip, Passage, SLAB_M};
+use haptics::{Door, Entity, Finger, Hip, Limits, Passage, SLAB_M};
 use io_driver::sim::hand::model_file::Firmness;
 use physics::collide::{ContactPoints, PairMemory, Solid, bounding_ball, contact_points, is_collidable};
 use std::collections::BTreeMap;
@@ -18,7 +18,8 @@ use world::{MassSpec, Scene, ShapeSpec};
 pub(super) fn all(rig: &Rig, whole: &Scene, entities: &[Entity]) -> Vec<String> {
     let mut stands = Stands::of(rig);
     let mut warnings = too_stiff(rig, &mut stands);
-    warnings.extend(together::too_stiff(rig, entities, &mut stands));
+    warnings.extend(too_damped(rig));
+    warnings.extend(together::too_much(rig, entities, &mut stands));
     warnings.extend(overlaps(rig, entities));
     warnings.extend(inside(rig, entities));
     warnings.extend(closed(rig, entities));
@@ -48,6 +49,21 @@ fn too_stiff(rig: &Rig, stands: &mut Stands) -> Vec<String> {
         ))
     });
     told.collect()
+}
+
+/// By the limit that effects' damping is refused above.
+fn too_damped(rig: &Rig) -> Option<String> {
+    let limit = rig.limits(Limits::DEFAULT_DEVICE_MASS_KG).ok()?.damping_n_s_per_m();
+    let beyond = rig.scene.entities.iter().filter(|it| it.is_haptic && it.damping_n_s_per_m > limit);
+    let named = |it: &world::SceneEntity| format!("{} ({} N s/m)", it.name, it.damping_n_s_per_m);
+    let names: Vec<String> = beyond.map(named).collect();
+    let (rate_hz, mass_kg) = (1e9 / rig.period_ns as f64, Limits::DEFAULT_DEVICE_MASS_KG);
+    (!names.is_empty()).then(|| {
+        format!(
+            "{} may swing: at {rate_hz} Hz a damping of {limit:.1} N s/m is stable on a device of {mass_kg} kg at its tip",
+            in_words(&names)
+        )
+    })
 }
 
 /// What stiffness the loop stands, by the damping of what is touched.

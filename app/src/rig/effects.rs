@@ -8,7 +8,7 @@ use world::{FieldKindSpec, FieldSpec, GuideSpec, SceneEntity, TrackSpec};
 
 impl Rig {
     /// The scene's fields and guides.
-    pub(super) fn effects(&self) -> Result<(Vec<Field>, Vec<Guide>), RigError> {
+    pub(crate) fn effects(&self) -> Result<(Vec<Field>, Vec<Guide>), RigError> {
         let scene = &self.scene;
         let fields = scene.fields.iter().enumerate().map(|(index, spec)| {
             let what = format!("field[{index}]");
@@ -50,7 +50,8 @@ impl Rig {
         Ok(entity)
     }
 
-    fn limits(&self, device_mass_kg: f64) -> Result<Limits, ParameterError> {
+    /// Limits of effects on a device of this mass at its tip, at the rate.
+    pub(crate) fn limits(&self, device_mass_kg: f64) -> Result<Limits, ParameterError> {
         Limits::at(self.period_ns as f64 / 1e9)?.with_device_mass(device_mass_kg)
     }
 }

@@ -181,7 +181,7 @@ fn join(spec: &MeshSpec) -> Result<Nurbs, RigError> {
         let said = format!("{}: {source}", file.display());
         RigError::Patches { at: at(), said }
     })?;
-    if report.turned > 0 || report.rims > 0 || report.is_one_sided {
+    if report.turned > 0 || report.rims > 0 || report.is_one_sided || report.without_area > 0 {
         say(format_args!("phantom3: {}: {report}", file.display()));
     }
     Ok(nurbs)

@@ -221,6 +221,93 @@ fn check_judges_stiffness_on_the_sum_at_a_place() {
     );
 }
 
+/// What `check` warns of in this scene with a finger.
+fn warnings(scene: &str) -> Vec<String> {
+    let place = Workplace::new();
+    place.write("scene.toml", format!("[[finger]]\nstart_m = [0.2, 0.2, 0.2]\n{scene}"));
+    let told = json(&check(&place, &["scene.toml", "--json"]));
+    let warnings = told["warnings"].as_array().unwrap_or_else(|| panic!("{told}")).iter();
+    warnings.map(|it| it.as_str().expect("text").to_owned()).collect()
+}
+
+/// Viscous fields of this damping in boxes of 0.1 m, so far from each other along x.
+fn fields(count: u32, damping: f64, apart_m: f64) -> String {
+    let field = |at: u32| {
+        format!(
+            "[[field]]\nkind = \"viscous\"\ndamping_n_s_per_m = {damping}\nposition_m = [{}, 0.0, 0.0]\n\
+             shape = {{ kind = \"box\", size_m = [0.1, 0.1, 0.1] }}\n",
+            f64::from(at) * apart_m
+        )
+    };
+    (0..count).map(field).collect()
+}
+
+#[test]
+fn check_judges_damping_and_mass_on_the_sum_at_a_place() {
+    let none: [String; 0] = [];
+    let told = warnings(&"[[field]]\nkind = \"viscous\"\ndamping_n_s_per_m = 5.8\n".repeat(8));
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(told[0].starts_with("field[0], field[1], field[2],"), "{told:?}");
+    assert!(told[0].contains("feels 46.4 N s/m of them, and 5.9 are stable"), "{told:?}");
+    // Side by side they are felt one by one.
+    assert_eq!(warnings(&fields(8, 5.8, 0.1)), none);
+    // Each reaches 10 mm into the next one.
+    let told = warnings(&fields(3, 5.8, 0.09));
+    assert_eq!(told.len(), 2, "{told:?}");
+    assert!(told.iter().any(|it| it.starts_with("field[0], field[1] together may swing")), "{told:?}");
+    assert!(told.iter().any(|it| it.starts_with("field[1], field[2] together may swing")), "{told:?}");
+    // Two are stable, and in the middle there are three.
+    let told = warnings(&fields(3, 2.8, 0.04));
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(told[0].starts_with("field[0], field[1], field[2] together may swing"), "{told:?}");
+    let heavy = "[[field]]\nkind = \"inertial\"\nmass_kg = 0.2\n";
+    assert_eq!(warnings(heavy), none);
+    let told = warnings(&heavy.repeat(2));
+    assert!(told.len() == 1 && told[0].contains("0.40 kg of them, and 0.32 are stable"), "{told:?}");
+}
+
+#[test]
+fn check_judges_effects_and_contacts_together() {
+    let none: [String; 0] = [];
+    let ball = |damping: f64, more: &str| {
+        format!(
+            "[[entity]]\nname = \"ball\"\nstiffness_n_per_m = 500.0\ndamping_n_s_per_m = {damping}\n{more}\
+             shape = {{ kind = \"sphere\", radius_m = 0.03 }}\n"
+        )
+    };
+    assert_eq!(warnings(&ball(4.0, "")), none);
+    let told = warnings(&ball(8.0, ""));
+    assert!(told.len() == 1 && told[0].starts_with("ball (8 N s/m) may swing: at 1000 Hz"), "{told:?}");
+    // What only other things touch may be damped as it likes.
+    assert_eq!(warnings(&ball(8.0, "haptic = false\n")), none);
+    let told = warnings(&(fields(1, 4.0, 0.0) + &ball(4.0, "")));
+    assert!(told.len() == 1 && told[0].starts_with("ball, field[0] together may swing"), "{told:?}");
+    assert!(told[0].contains("feels 8.0 N s/m of them, and 5.9 are stable"), "{told:?}");
+    // In another place it adds nothing.
+    assert_eq!(warnings(&(fields(1, 4.0, 0.0) + &ball(4.0, "position_m = [0.2, 0.0, 0.0]\n"))), none);
+    let rail = |x: f64, direction: &str| {
+        format!(
+            "[[guide]]\nkind = \"line\"\npoint_m = [{x}, 0.0, 0.0]\ndirection = {direction}\n\
+             stiffness_n_per_m = 600.0\ndamping_n_s_per_m = 0.0\n"
+        )
+    };
+    let crossing = rail(0.0, "[0.0, 1.0, 0.0]") + &rail(0.1, "[1.0, 0.0, 0.0]");
+    let told = warnings(&crossing);
+    assert!(told.len() == 1 && told[0].contains("1200 N/m of them, and 1000 are stable"), "{told:?}");
+    assert_eq!(warnings(&(rail(0.0, "[0.0, 1.0, 0.0]") + &rail(0.1, "[0.0, 1.0, 0.0]"))), none, "apart");
+    // A guide that lets go is not felt 20 mm beside its track; one that does not let go is.
+    let beside = |more: &str| {
+        let guide = "[[guide]]\nkind = \"line\"\npoint_m = [0.0, 0.07, 0.0]\ndirection = [1.0, 0.0, 0.0]\n";
+        warnings(&format!("{}{guide}{more}", fields(1, 4.0, 0.0)))
+    };
+    assert_eq!(beside("break_away_n = 3.0\n"), none);
+    assert!(beside("")[0].contains("feels 6.0 N s/m"), "{:?}", beside(""));
+    let magnet = "magnetism = { force_n = 1.0, distance_m = 0.01 }\n";
+    assert_eq!(warnings(&ball(1.0, magnet)), none);
+    let told = warnings(&(ball(1.0, magnet) + &ball(1.0, magnet).replace("\"ball\"", "\"other\"")));
+    assert!(told.iter().any(|it| it.starts_with("ball, other together may swing")), "{told:?}");
+}
+
 /// A finger over a cube of this size, mass and place.
 fn with_cube(size: &str, mass: &str, place: &str) -> String {
     format!(

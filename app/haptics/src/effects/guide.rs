@@ -6,12 +6,15 @@
 //! go when its spring would pull more, and captures anew as any other. Capturing comes on within 50 ms and letting go
 //! fades within 20 ms. It lets go further out than it captures (`HYSTERESIS_M` at least): in a round the user spends more
 //! than he is given.
-//! On the inner side of a path's corner, where two of its pieces are equally near, the pull changes sides.
+//! On a path the track's point is remembered ([`Footing`]): it moves along the path and slides over where it would jump, so
+//! that the pull has no step inside of corners either.
 //! Frames: world. Signs: forces on the user.
 
 use nalgebra::Vector3;
 
+use super::footing::Footing;
 use super::limits::not_above;
+use super::track::{Foot, Kind};
 use super::{Limits, MOST_FORCE_N, Motion, Pull, Track, bounded, smooth_step};
 use crate::error::{ParameterError, above_zero, at_least_zero};
 
@@ -37,6 +40,10 @@ impl Guide {
     pub const DEFAULT_DAMPING_N_S_PER_M: f64 = 2.0;
     /// The most it pulls if nothing is said \[N\].
     pub const DEFAULT_FORCE_LIMIT_N: f64 = 5.0;
+    /// How fast the foot on a path slides over to where its way goes on \[m/s\].
+    pub const SLIDE_M_PER_S: f64 = 0.1;
+    /// By how much another part of a path has to be nearer for a finger to change over to it \[m\].
+    pub const CHANGE_M: f64 = 1e-3;
 
     /// A guide to this track, everywhere and never letting go.
     ///
@@ -103,14 +110,24 @@ impl Guide {
     }
 
     pub(super) fn pull(&self, motion: &Motion, hold: &mut Hold) -> Pull {
-        let foot = self.track.foot(&motion.position_W);
+        let draw = |foot: &Foot| self.draw(foot, motion);
+        let drawn = match &self.track.0 {
+            Kind::Path(path) => hold.footing.step(path, motion, self.stiffness_n_per_m, draw),
+            _ => draw(&self.track.foot(&motion.position_W)),
+        };
+        hold.step(self, &drawn, motion.dt_s);
+        if hold.strength == 0.0 {
+            hold.footing.forget();
+            return Pull::default();
+        }
+        Pull { force_on_user_W: drawn.force_W * hold.strength, stored_j: drawn.stored_j * hold.strength }
+    }
+
+    /// What it does in full towards this foot.
+    fn draw(&self, foot: &Foot, motion: &Motion) -> Draw {
         let off_W = motion.position_W - foot.point_W;
         let distance_m = off_W.norm();
         let stretch_m = (distance_m - self.deadband_m).max(0.0);
-        hold.step(self, distance_m, self.stiffness_n_per_m * stretch_m, motion.dt_s);
-        if hold.strength == 0.0 {
-            return Pull::default();
-        }
         let spring_W = if stretch_m > 0.0 {
             off_W * (-self.stiffness_n_per_m * stretch_m / distance_m)
         } else {
@@ -118,10 +135,40 @@ impl Guide {
         };
         let damping = self.damping_n_s_per_m * self.damped(stretch_m);
         let damper_W = foot.across(&motion.velocity_W, &off_W) * -damping;
-        Pull {
-            force_on_user_W: bounded(spring_W + damper_W, self.force_limit_n) * hold.strength,
-            stored_j: self.stored_j(stretch_m) * hold.strength,
+        Draw {
+            distance_m,
+            stretch_m,
+            force_W: bounded(spring_W + damper_W, self.force_limit_n),
+            stored_j: self.stored_j(stretch_m),
         }
+    }
+
+    /// Stretch \[m\] and damping \[N s/m\] at this distance.
+    pub(super) fn strengths(&self, distance_m: f64) -> (f64, f64) {
+        let stretch_m = (distance_m - self.deadband_m).max(0.0);
+        (stretch_m, self.damping_n_s_per_m * self.damped(stretch_m))
+    }
+
+    /// Whether it does so at this stretch \[m\].
+    pub(super) fn lets_go_at(&self, stretch_m: f64) -> bool {
+        self.break_away_n.is_some_and(|most_n| self.stiffness_n_per_m * stretch_m > most_n)
+    }
+
+    /// Distances between which it is felt in full \[m\].
+    pub(super) fn felt_between(&self) -> (f64, f64) {
+        let most_n = self.break_away_n.unwrap_or(self.force_limit_n);
+        let far_m = self.deadband_m + INSIDE * most_n / self.stiffness_n_per_m;
+        ((2.0 * self.deadband_m).min(far_m), far_m)
+    }
+
+    /// k \[N/m\].
+    pub fn stiffness_n_per_m(&self) -> f64 {
+        self.stiffness_n_per_m
+    }
+
+    /// The most it pulls \[N\].
+    pub fn force_limit_n(&self) -> f64 {
+        self.force_limit_n
     }
 
     /// What its spring gives back on the way to the track (J).
@@ -137,20 +184,44 @@ impl Guide {
     }
 }
 
-/// Whether a finger is held by a guide.
+/// What a guide does towards a foot, once it has the finger.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Draw {
+    distance_m: f64,
+    /// Beyond the deadband (m).
+    pub(super) stretch_m: f64,
+    pub(super) force_W: Vector3<f64>,
+    stored_j: f64,
+}
+
+impl Draw {
+    /// Of two, of which the other one has this weight.
+    pub(super) fn mixed(&self, other: &Self, weight: f64) -> Self {
+        let mix = |one: f64, other: f64| one * (1.0 - weight) + other * weight;
+        Self {
+            distance_m: mix(self.distance_m, other.distance_m),
+            stretch_m: mix(self.stretch_m, other.stretch_m),
+            force_W: self.force_W * (1.0 - weight) + other.force_W * weight,
+            stored_j: mix(self.stored_j, other.stored_j),
+        }
+    }
+}
+
+/// Whether a finger is held by a guide, and where.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Hold {
     pub(super) is_captured: bool,
     /// How much of the force is rendered, 0 to 1.
     strength: f64,
+    footing: Footing,
 }
 
 impl Hold {
-    fn step(&mut self, guide: &Guide, distance_m: f64, pull_n: f64, dt_s: f64) {
+    fn step(&mut self, guide: &Guide, drawn: &Draw, dt_s: f64) {
         self.is_captured = if self.is_captured {
-            guide.break_away_n.is_none_or(|most_n| pull_n <= most_n)
+            !guide.lets_go_at(drawn.stretch_m)
         } else {
-            guide.capture_m.is_none_or(|capture_m| distance_m <= capture_m)
+            guide.capture_m.is_none_or(|capture_m| drawn.distance_m <= capture_m)
         };
         if dt_s.is_nan() || dt_s <= 0.0 {
             return;
@@ -160,6 +231,8 @@ impl Hold {
     }
 }
 
+/// Of the stretch at which it lets go: there it is surely felt.
+const INSIDE: f64 = 0.99;
 /// How long capturing takes \[s\].
 const CAPTURE_S: f64 = 0.05;
 /// How long letting go takes \[s\].

@@ -49,6 +49,11 @@ impl Region {
         smooth_step(depth_m / self.rim_m)
     }
 
+    /// Its form, that one's pose and the rim; `None`: it is everywhere.
+    pub(super) fn parts(&self) -> Option<(&Form, &Isometry3<f64>, f64)> {
+        Some((self.form.as_ref()?, &self.X_WB, self.rim_m))
+    }
+
     /// `v_W` with each component along the region's axes multiplied.
     pub(super) fn multiplied(&self, v_W: &Vector3<f64>, factors: &Vector3<f64>) -> Vector3<f64> {
         let v_B = vector_into_body(&self.X_WB, v_W);

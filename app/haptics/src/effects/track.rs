@@ -4,6 +4,7 @@
 
 use nalgebra::Vector3;
 
+use super::path::Path;
 use crate::error::{ParameterError, finite};
 
 /// The most points of a path.
@@ -11,16 +12,16 @@ pub const MAX_PATH_POINTS: usize = 256;
 
 /// Where a guided finger may go without feeling anything.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Track(Kind);
+pub struct Track(pub(super) Kind);
 
 #[derive(Debug, Clone, PartialEq)]
-enum Kind {
+pub(super) enum Kind {
     Plane { point_W: Vector3<f64>, normal_W: Vector3<f64> },
     Line { point_W: Vector3<f64>, direction_W: Vector3<f64> },
-    Path(Box<[Vector3<f64>]>),
+    Path(Path),
 }
 
-/// The track's point nearest to a finger.
+/// A place of the track that a finger is drawn to.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Foot {
     pub(super) point_W: Vector3<f64>,
@@ -30,7 +31,8 @@ pub(super) struct Foot {
 /// Unit vectors.
 #[derive(Debug, Clone, Copy)]
 enum Direction {
-    Along(Vector3<f64>),
+    /// By their parts, which add up to 1.
+    Along([(Vector3<f64>, f64); 2]),
     Normal(Vector3<f64>),
 }
 
@@ -65,25 +67,37 @@ impl Track {
         for pair in points_W.windows(2) {
             direction("way from one of points_m to the next", pair[1] - pair[0])?;
         }
-        Ok(Self(Kind::Path(points_W.into())))
+        Ok(Self(Kind::Path(Path::new(points_W))))
     }
 
+    /// The nearest place.
     pub(super) fn foot(&self, p_W: &Vector3<f64>) -> Foot {
         match &self.0 {
-            Kind::Plane { point_W, normal_W } => Foot {
-                point_W: p_W - normal_W * normal_W.dot(&(p_W - point_W)),
-                direction: Direction::Normal(*normal_W),
-            },
-            Kind::Line { point_W, direction_W } => Foot {
-                point_W: point_W + direction_W * direction_W.dot(&(p_W - point_W)),
-                direction: Direction::Along(*direction_W),
-            },
-            Kind::Path(points_W) => foot_on_path(points_W, p_W),
+            Kind::Plane { point_W, normal_W } => Foot::on_plane(point_W, normal_W, p_W),
+            Kind::Line { point_W, direction_W } => Foot::on_line(point_W, direction_W, p_W),
+            Kind::Path(path) => path.foot(&path.nearest(p_W)),
         }
     }
 }
 
 impl Foot {
+    /// On a plane through a point.
+    pub(super) fn on_plane(point_W: &Vector3<f64>, normal_W: &Vector3<f64>, p_W: &Vector3<f64>) -> Self {
+        let foot_W = p_W - normal_W * normal_W.dot(&(p_W - point_W));
+        Self { point_W: foot_W, direction: Direction::Normal(*normal_W) }
+    }
+
+    /// On a line through a point.
+    pub(super) fn on_line(point_W: &Vector3<f64>, along_W: &Vector3<f64>, p_W: &Vector3<f64>) -> Self {
+        let foot_W = point_W + along_W * along_W.dot(&(p_W - point_W));
+        Self::along(foot_W, [(*along_W, 1.0), (*along_W, 0.0)])
+    }
+
+    /// Here, with the directions of the track and their parts, which add up to 1.
+    pub(super) fn along(point_W: Vector3<f64>, directions_W: [(Vector3<f64>, f64); 2]) -> Self {
+        Self { point_W, direction: Direction::Along(directions_W) }
+    }
+
     /// The part of a velocity that leaves the track, for a finger at `off_W` from here.
     ///
     /// Beyond the end of a path that is all of it; between, the part along the track fades in over a millimetre, so
@@ -91,27 +105,16 @@ impl Foot {
     pub(super) fn across(&self, velocity_W: &Vector3<f64>, off_W: &Vector3<f64>) -> Vector3<f64> {
         match &self.direction {
             Direction::Normal(normal_W) => normal_W * normal_W.dot(velocity_W),
-            Direction::Along(along_W) => {
-                let beyond = off_W.dot(along_W);
-                let free = 1.0 - beyond * beyond / (off_W.norm_squared() + END_M * END_M);
-                velocity_W - along_W * (along_W.dot(velocity_W) * free)
+            Direction::Along(directions_W) => {
+                let along = |(along_W, part): &(Vector3<f64>, f64)| {
+                    let beyond = off_W.dot(along_W);
+                    let free = 1.0 - beyond * beyond / (off_W.norm_squared() + END_M * END_M);
+                    along_W * (along_W.dot(velocity_W) * free * part)
+                };
+                velocity_W - directions_W.iter().map(along).sum::<Vector3<f64>>()
             }
         }
     }
-}
-
-fn foot_on_path(points_W: &[Vector3<f64>], p_W: &Vector3<f64>) -> Foot {
-    let feet = points_W.windows(2).map(|pair| foot_on_segment(&pair[0], &pair[1], p_W));
-    let far = |foot: &Foot| (p_W - foot.point_W).norm_squared();
-    // The first of equally near ones. There are two points at least.
-    let nearer = |best: Foot, foot: Foot| if far(&foot) < far(&best) { foot } else { best };
-    feet.reduce(nearer).unwrap_or(Foot { point_W: *p_W, direction: Direction::Along(Vector3::x()) })
-}
-
-fn foot_on_segment(from_W: &Vector3<f64>, to_W: &Vector3<f64>, p_W: &Vector3<f64>) -> Foot {
-    let way_W = to_W - from_W;
-    let fraction = (way_W.dot(&(p_W - from_W)) / way_W.norm_squared()).clamp(0.0, 1.0);
-    Foot { point_W: from_W + way_W * fraction, direction: Direction::Along(way_W / way_W.norm()) }
 }
 
 fn place(parameter: &'static str, point: Vector3<f64>) -> Result<Vector3<f64>, ParameterError> {
@@ -128,5 +131,6 @@ fn direction(parameter: &'static str, v: Vector3<f64>) -> Result<Vector3<f64>, P
     Ok(v / length)
 }
 
-/// How far beyond the end of a path the movement along it is damped in full, about \[m\].
-const END_M: f64 = 1e-3;
+/// How far beyond the end of a path the movement along it is damped in full, and how far from a corner its directions
+/// turn from one to the other, about \[m\].
+pub(super) const END_M: f64 = 1e-3;

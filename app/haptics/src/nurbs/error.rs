@@ -8,6 +8,11 @@ use std::fmt;
 pub enum NurbsError {
     /// There is none.
     NoPatch,
+    /// None of them has an area.
+    NoArea {
+        /// How many there are.
+        patches: usize,
+    },
     /// Something about one patch.
     Patch {
         /// Which one.
@@ -37,6 +42,9 @@ impl fmt::Display for NurbsError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoPatch => write!(f, "found no patch; allowed: at least one"),
+            Self::NoArea { patches } => {
+                write!(f, "of {patches} patches none has an area; allowed: at least one with an area")
+            }
             Self::Patch { patch, part, found, allowed } => {
                 write!(f, "patch {patch}: {part}: found {found}; allowed: {allowed}")
             }

@@ -15,6 +15,7 @@ mod csg;
 mod csg_feel;
 mod csg_oracle;
 mod csg_starts;
+mod deep;
 mod feet;
 mod forms;
 mod mesh;

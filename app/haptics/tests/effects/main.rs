@@ -11,4 +11,5 @@ mod solids;
 mod fields;
 mod guides;
 mod limits;
+mod paths;
 mod surfaces;

@@ -3,7 +3,7 @@
 use crate::common::*;
 use haptics::mesh::Sides;
 use haptics::nurbs::make;
-use haptics::{Friction, Nurbs, NurbsPatch, Surface};
+use haptics::{Friction, Nurbs, NurbsError, NurbsPatch, Surface};
 use nalgebra::Vector3;
 use std::sync::Arc;
 
@@ -131,6 +131,48 @@ impl Solid {
         let place = if along == 0.0 { place } else { middle.lerp(&place, low) };
         place + noise.vector(1.0) * off
     }
+}
+
+#[test]
+fn patches_without_an_area_are_left_out_and_told() {
+    let (whole, of_whole) = Nurbs::build(&cube()).unwrap();
+    assert_eq!((whole.sides(), of_whole.without_area, of_whole.first_without_area), (Sides::Solid, 0, None));
+    let [a, b] = [[H; 3], [-H, H, H]];
+    // Collapsed to a point, to an edge of the cube, to a part of it and back, and to a curve within the cube.
+    let point = flat([a; 4], 0);
+    let edge = flat([a, b, a, b], 0);
+    let back = flat([a, [0.0, H, H], [0.3 * H, H, H], b], 0);
+    let arc = [[0.01, 0.0, 0.0, 1.0], [0.01, 0.01, 0.0, 0.7], [0.0, 0.01, 0.0, 1.0]];
+    let curve = NurbsPatch {
+        degree: [2, 1],
+        knots: [vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0], vec![0.0, 0.0, 1.0, 1.0]],
+        points: [arc, arc].concat(),
+    };
+    let narrow = flat([a, b, [H, H + 1e-12, H], [-H, H + 1e-12, H]], 0);
+    for (bad, turn) in [&point, &edge, &back, &curve, &narrow].into_iter().zip(0..) {
+        for at in [0, 3, 6] {
+            let mut patches = cube();
+            patches.insert(at, bad.clone());
+            let (nurbs, report) =
+                Nurbs::build(&patches).unwrap_or_else(|error| panic!("{turn} {at}: {error}"));
+            assert_eq!((report.without_area, report.first_without_area), (1, Some(at)), "{turn}");
+            assert_eq!(
+                (nurbs.sides(), report.seams, report.rims),
+                (Sides::Solid, of_whole.seams, 0),
+                "{turn} {at}"
+            );
+            assert!(
+                report
+                    .to_string()
+                    .contains(&format!("1 patch without an area: left out (first: patch {at})"))
+            );
+            let p = Vector3::new(0.01, 0.6 * H, 0.02);
+            assert_eq!(nurbs.surface(0.0).signed_distance(&p), whole.surface(0.0).signed_distance(&p));
+        }
+    }
+    let alone = Nurbs::build(&[edge, point]).unwrap_err();
+    assert_eq!(alone, NurbsError::NoArea { patches: 2 });
+    assert_eq!(alone.to_string(), "of 2 patches none has an area; allowed: at least one with an area");
 }
 
 #[test]
