@@ -191,7 +191,7 @@ fn a_view_tells_the_ramp_and_the_last_set_up_report_of_its_driver() {
 
 #[test]
 fn clocks_have_the_names_of_the_configuration() {
-    use shm_abi::segment::ClockMode::{Lockstep, Real, Virtual};
+    use shm_abi::segment::ClockMode::{self, Lockstep, Real, Virtual};
     assert_eq!([Real, Lockstep, Virtual].map(ClockMode::name), ["real", "lockstep", "virtual"]);
 }
 

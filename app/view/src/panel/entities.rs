@@ -99,8 +99,8 @@ mod tests {
         assert_eq!(filtered.of(&all, ""), [0, 1, 2, 3]);
         assert_eq!(filtered.of(&all, "CUBE"), [0, 1]);
         assert_eq!(filtered.of(&all, " cube red "), [0]);
-        assert_eq!(filtered.of(&all, "cubes"), []);
-        assert_eq!(filtered.of(&all[..1], "cubes"), []);
+        assert!(filtered.of(&all, "cubes").is_empty());
+        assert!(filtered.of(&all[..1], "cubes").is_empty());
         assert_eq!(filtered.of(&all[1..], "ball"), [2], "another scene");
     }
 
