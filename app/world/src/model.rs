@@ -173,8 +173,11 @@ const ENDINGS: [(&str, Format); 7] = [
     ("3ds", Format::ThreeDs),
 ];
 
+/// Whether bytes look like a format.
+type Looks = fn(&[u8]) -> bool;
+
 /// Those whose first bytes leave no doubt come first.
-const LOOKS: [(fn(&[u8]) -> bool, Format); 6] = [
+const LOOKS: [(Looks, Format); 6] = [
     (ply::looks_like_ply, Format::Ply),
     (gltf::looks_like_gltf, Format::Gltf),
     (ase::looks_like_ase, Format::Ase),

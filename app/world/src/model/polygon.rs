@@ -319,7 +319,7 @@ mod tests {
             };
             let places: Vec<_> = (0..count).map(place).map(|[x, y]| Vector3::new(x, y, 0.0)).collect();
             let outline = Outline { normal: newell(&places), places: &places };
-            let is_free = |a: u32, b: u32| (a + b) % 3 != 0;
+            let is_free = |a: u32, b: u32| !(a + b).is_multiple_of(3);
             let mut faces = Vec::new();
             outline.cut_ears(is_free, &mut faces);
             assert_eq!(faces, plainly_cut(&outline, is_free), "{places:?}");
