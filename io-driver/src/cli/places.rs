@@ -139,6 +139,7 @@ fn is_stopped(pid: u32) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use patience::prelude::*;
     use rustix::process::{Pid, Signal, kill_process};
 
     use super::*;
@@ -153,6 +154,6 @@ mod tests {
         patience::until("a stopped process", || is_stopped(pid));
         assert!(ending(pid).contains("kill -KILL"));
         child.kill().expect("it is sent");
-        child.wait().expect("it ends");
+        child.bounded_wait().expect("it ends");
     }
 }

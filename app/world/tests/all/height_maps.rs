@@ -224,6 +224,6 @@ fn missing_texture_coordinates_are_refused_with_their_line() {
     let stl = read_with_uv(Path::new("a.stl"), &[0; 84]).expect_err("no coordinates").to_string();
     assert_eq!(
         stl,
-        "found an STL file, which has no texture coordinates; allowed under a height map: an OBJ file with `vt`"
+        "found no OBJ file, and of others no texture coordinates are read; allowed under a height map: an OBJ file with `vt`"
     );
 }
