@@ -54,7 +54,7 @@ pub struct CheckArgs {
 }
 
 impl CheckArgs {
-    /// Whether it is a model that is to be checked, and no scene.
+    /// True of a model, false of a scene.
     pub(crate) fn is_model(&self) -> bool {
         model::is_named(&self.scene)
     }

@@ -16,7 +16,7 @@ fn monotonic_ns() -> u64 {
     (now.tv_sec * 1_000_000_000 + now.tv_nsec).cast_unsigned()
 }
 
-/// How long a turn with this time-out takes.
+/// Duration of a turn with this time-out.
 fn turn(desk: &mut Desk, timeout: Duration) -> Duration {
     let began = Instant::now();
     desk.poll(timeout);

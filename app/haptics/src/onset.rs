@@ -28,7 +28,7 @@ pub(crate) struct Onset {
     share: f64,
     /// How far the god-object was from the HIP in the last tick (m).
     lag_m: f64,
-    /// What it bore of that, before the ramp (m).
+    /// The part of that which it bore, before the ramp (m).
     spring_m: f64,
     /// Whether it is farther away than it can have been left behind.
     leapt: bool,

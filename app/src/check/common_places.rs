@@ -51,7 +51,7 @@ pub(super) fn common_places(effects: &[Effect<'_>], entities: &[Entity]) -> Vec<
     places
 }
 
-/// Where these are felt, and as many others as can be found; `None`: they have no place in common.
+/// A place where these are felt, and as many others as can be found; `None`: they have no place in common.
 fn place_of_group(effects: &[Effect<'_>], mut group: Vec<usize>) -> Option<Vector3<f64>> {
     let mut place_W = meeting(effects, &group, Vector3::zeros())?;
     for other in 0..effects.len() {

@@ -40,7 +40,7 @@ struct Understood {
     is_lid: Vec<bool>,
     low: Vector3<f64>,
     high: Vector3<f64>,
-    /// What its surface and the space in it measure.
+    /// Area of its surface and volume of the space in it.
     area: f64,
     volume: f64,
 }
@@ -107,7 +107,7 @@ impl Understood {
         text
     }
 
-    /// What it means for a finger.
+    /// Consequence for a finger.
     fn felt(&self) -> String {
         let sheets = self.report.sheets.count;
         match (self.mesh.sides(), self.mesh.has_inside()) {

@@ -195,7 +195,7 @@ impl<'a> World<'a> {
     }
 }
 
-/// What a finger feels of contacts along the stiffest axis, and what the loop stands there.
+/// Gains of contacts along the stiffest axis, and the loop's limits there.
 fn of_contacts(contacts: &[(usize, Gains)], stands: &mut Stands) -> Option<(Vec<usize>, f64, f64)> {
     let total: Matrix3<f64> = contacts.iter().map(|(_, gains)| gains.stiffness_n_per_m).sum();
     let (k, axis_W) = largest(&total)?;
@@ -346,7 +346,7 @@ fn places(entity: &Entity) -> Vec<Vector3<f64>> {
     directions().flat_map(along).chain([centre_B]).map(place).collect()
 }
 
-/// Where its magnet pulls back most: just above its surface.
+/// Place of its magnet's strongest pull: just above its surface.
 fn drawn_at(entity: &Entity, finger_radius_m: f64) -> Vec<Vector3<f64>> {
     let Some(magnetism) = entity.magnetism else { return Vec::new() };
     let (centre_B, radius_m) = bounding_ball(&entity.shape).unwrap_or((Vector3::zeros(), BELOW_M));

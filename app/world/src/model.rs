@@ -75,9 +75,9 @@ pub enum ModelError {
     /// A kind of model file that is not read.
     #[error("found a file of {kind}, which is not read; {advice}")]
     Foreign {
-        /// What it is.
+        /// Name of the format.
         kind: &'static str,
-        /// How to get what is read.
+        /// Way to get a file that is read.
         advice: &'static str,
     },
     /// Something wrong in a text.
@@ -85,9 +85,9 @@ pub enum ModelError {
     Line {
         /// Counted from 1.
         line: usize,
-        /// What was found.
+        /// Found in its place.
         found: String,
-        /// What may stand there.
+        /// Allowed there.
         allowed: String,
     },
     /// Something wrong in a binary file.
@@ -95,9 +95,9 @@ pub enum ModelError {
     Byte {
         /// Counted from 0.
         offset: usize,
-        /// What was found.
+        /// Found in its place.
         found: String,
-        /// What may stand there.
+        /// Allowed there.
         allowed: String,
     },
     /// Something wrong in a file whose parts have names or numbers.
@@ -105,9 +105,9 @@ pub enum ModelError {
     Place {
         /// As the format calls it.
         place: String,
-        /// What was found.
+        /// Found in its place.
         found: String,
-        /// What may stand there.
+        /// Allowed there.
         allowed: String,
     },
     /// A picture is to lie on a model that cannot say where.
@@ -129,7 +129,7 @@ pub enum ModelError {
     NoTriangle,
 }
 
-/// What messages call the kinds of files that are read.
+/// Names of the kinds of files that are read, for messages.
 pub(crate) const KINDS: &str = "OBJ, STL, PLY, glTF, ASE or 3DS";
 
 /// How a model is written down.
@@ -173,7 +173,7 @@ const ENDINGS: [(&str, Format); 7] = [
     ("3ds", Format::ThreeDs),
 ];
 
-/// Whether bytes look like a format.
+/// Test of bytes for a format.
 type Looks = fn(&[u8]) -> bool;
 
 /// Those whose first bytes leave no doubt come first.

@@ -124,13 +124,13 @@ pub(super) fn is_elsewhere(error: &AttachError) -> bool {
     )
 }
 
-/// How to end a process that does not answer; a stopped one takes no signal but this.
+/// Command that ends a process which does not answer; a stopped one takes no signal but SIGKILL.
 fn ending(pid: u32) -> String {
     let signal = if is_stopped(pid) { "KILL" } else { "TERM" };
     format!("end it with `kill -{signal} {pid}`")
 }
 
-/// Whether a process was stopped, as by SIGSTOP, proc(5).
+/// State of a process: stopped, as by SIGSTOP, proc(5).
 fn is_stopped(pid: u32) -> bool {
     let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
     // The name before it may have any characters.

@@ -221,7 +221,7 @@ fn check_judges_stiffness_on_the_sum_at_a_place() {
     );
 }
 
-/// What `check` warns of in this scene with a finger.
+/// Warnings of `check` for this scene with a finger.
 fn warnings(scene: &str) -> Vec<String> {
     let place = Workplace::new();
     place.write("scene.toml", format!("[[finger]]\nstart_m = [0.2, 0.2, 0.2]\n{scene}"));

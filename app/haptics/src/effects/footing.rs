@@ -20,7 +20,7 @@ use super::guide::{Draw, Guide};
 use super::path::{Ball, Path, Spot};
 use super::track::Foot;
 
-/// What is remembered of a finger on a path.
+/// Memory of a finger on a path.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Footing(Option<Known>);
 
@@ -102,7 +102,7 @@ impl Known {
         self.weight = (self.weight + change).clamp(0.0, 1.0);
     }
 
-    /// Which foot remains.
+    /// The foot that remains.
     fn settle(&mut self, from: Spot) {
         if self.weight == 0.0 {
             self.at = from;

@@ -1,4 +1,4 @@
-//! What effects answer to small motions at a place: stiffness, damping and mass, by direction.
+//! Linear gains of effects at a place: stiffness, damping and mass against small motions, by direction.
 //!
 //! Model: of a finger that rests at a place and is held there for as long as it takes, `dF = -K dx - B dv - m da`. Gains of
 //! several effects add up at a place as their forces do; whether a loop stands the sum is for [`super::Limits`] to say.

@@ -40,7 +40,7 @@ impl Guide {
     pub const DEFAULT_DAMPING_N_S_PER_M: f64 = 2.0;
     /// The most it pulls if nothing is said \[N\].
     pub const DEFAULT_FORCE_LIMIT_N: f64 = 5.0;
-    /// How fast the foot on a path slides over to where its way goes on \[m/s\].
+    /// Speed at which the foot on a path slides over to where its way goes on \[m/s\].
     pub const SLIDE_M_PER_S: f64 = 0.1;
     /// By how much another part of a path has to be nearer for a finger to change over to it \[m\].
     pub const CHANGE_M: f64 = 1e-3;
@@ -123,7 +123,7 @@ impl Guide {
         Pull { force_on_user_W: drawn.force_W * hold.strength, stored_j: drawn.stored_j * hold.strength }
     }
 
-    /// What it does in full towards this foot.
+    /// Its full force towards this foot.
     fn draw(&self, foot: &Foot, motion: &Motion) -> Draw {
         let off_W = motion.position_W - foot.point_W;
         let distance_m = off_W.norm();
@@ -184,7 +184,7 @@ impl Guide {
     }
 }
 
-/// What a guide does towards a foot, once it has the finger.
+/// Force of a guide towards a foot, once it has the finger.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Draw {
     distance_m: f64,

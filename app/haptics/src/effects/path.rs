@@ -94,7 +94,7 @@ impl Path {
         Some(Spot { piece, share })
     }
 
-    /// Where on a piece a point has its projection, 0 to 1.
+    /// Projection of a point on a piece, 0 to 1.
     fn share(&self, piece: usize, p_W: &Vector3<f64>) -> f64 {
         let (from_W, to_W) = self.ends(piece);
         let way_W = to_W - from_W;

@@ -19,7 +19,7 @@ pub enum NurbsError {
         patch: usize,
         /// Which part of it, such as `degree u`.
         part: String,
-        /// What was found.
+        /// Found in its place.
         found: String,
         /// What is allowed.
         allowed: String,

@@ -20,7 +20,7 @@ use nalgebra::Vector3;
 use super::ball::{Ball, tolerance_m};
 use super::ground::{Foot, Ground};
 
-/// Where a ball that is found too near to the ground, or inside, is pushed out; `None` if it is free.
+/// Place to which a ball that is found too near to the ground, or inside, is pushed out; `None` if it is free.
 #[cold]
 pub(super) fn pushed_out<F: Foot>(
     ground: &impl Ground<Foot = F>,

@@ -11,7 +11,7 @@ use crate::relative_motion::surfaces;
 use haptics::{Entity, Finger, Friction, RAMP_IN_S};
 use meshes::Roaming;
 
-/// What walks over surfaces resolve, and so what is not counted as a leap.
+/// Resolution of walks over surfaces: less is not counted as a leap.
 const SLACK_M: f64 = 1e-6;
 
 /// Ticks with a force.

@@ -64,7 +64,7 @@ fn stroke_over(name: &str, mesh: &Arc<Mesh>, friction: Friction, radius_m: f64, 
 
 /// Far above rounding on a mesh of this size, far below what a finger notices.
 const INSIDE_M: f64 = 1e-6;
-/// What walks over surfaces resolve, and so what is not counted as a leap.
+/// Resolution of walks over surfaces: less is not counted as a leap.
 const SLACK_M: f64 = 1e-6;
 
 fn stroke_over_ugly_meshes(seeds: std::ops::Range<u64>, strokes: usize) {

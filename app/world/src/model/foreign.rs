@@ -10,7 +10,7 @@ struct Kind {
     advice: &'static str,
 }
 
-/// What the file is, and what to do with it.
+/// Name of the file's kind, and the remedy.
 pub(super) fn foreign(file: &Path, bytes: &[u8]) -> Option<(&'static str, &'static str)> {
     let ending = file.extension().unwrap_or_default();
     let is_named = |kind: &&Kind| kind.endings.iter().any(|other| ending.eq_ignore_ascii_case(other));

@@ -48,7 +48,7 @@ pub(super) fn looks_like_ply(bytes: &[u8]) -> bool {
 
 #[derive(Default)]
 struct Read {
-    /// How many vertices the header tells of.
+    /// Number of vertices by the header.
     promised: u64,
     vertices: Vec<Vector3<f64>>,
     polygons: Polygons,

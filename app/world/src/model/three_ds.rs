@@ -110,7 +110,7 @@ impl<'b> Part<'b> {
         Ok(())
     }
 
-    /// What follows a name that ends in a zero.
+    /// The rest behind a name that ends in a zero.
     fn behind_name(self) -> Result<Self, ModelError> {
         let length = self.bytes[self.at..self.end].iter().position(|&byte| byte == 0);
         let length = length.ok_or_else(|| {
@@ -119,7 +119,7 @@ impl<'b> Part<'b> {
         Ok(Self { at: self.at + length + 1, ..self })
     }
 
-    /// Where each of the items begins that it counts at its beginning.
+    /// Beginnings of the items that it counts at its own beginning.
     fn items(self, bytes: usize, what: &str) -> Result<impl Iterator<Item = usize> + use<>, ModelError> {
         let room = (self.end - self.at).saturating_sub(2) / bytes;
         let count = if self.end - self.at < 2 { 0 } else { usize::from(self.half(self.at)) };

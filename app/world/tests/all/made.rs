@@ -3,7 +3,7 @@
 use haptics::mesh::TriangleSoup;
 use std::fmt::Write;
 
-/// How PLY is written.
+/// Encodings of PLY.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Ply {
     Text,

@@ -3,7 +3,7 @@
 use haptics::mesh::{CloseHoles, Mesh, MeshReport, TriangleSoup, make};
 use world::model::{read_obj, write_obj};
 
-/// What is built, and the text that says it.
+/// A mesh as built, and the text of its report.
 fn written(soup: TriangleSoup) -> (Mesh, MeshReport, String) {
     let mut is_lid = Vec::new();
     let told = |_, of_lid| is_lid.push(of_lid);

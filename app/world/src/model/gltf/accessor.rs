@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 pub(super) struct Accessors<'d> {
     document: &'d Document,
     buffers: &'d Buffers<'d>,
-    /// How many elements may still be read.
+    /// Number of elements that may still be read.
     left: usize,
     most: usize,
 }
@@ -115,7 +115,7 @@ impl<'d> Accessors<'d> {
         }
     }
 
-    /// Which elements are others than the rest, and what they are.
+    /// Elements that differ from the rest, by index, with their values.
     fn sparse(
         &mut self,
         sparse: &Sparse,

@@ -5,7 +5,7 @@ use crate::model::{ModelError, shown};
 pub(super) struct Header {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element>,
-    /// Where the data begin: byte, and line.
+    /// Beginning of the data: byte, and line.
     pub(super) end: usize,
     pub(super) lines: usize,
 }

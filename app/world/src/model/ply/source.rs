@@ -12,7 +12,7 @@ pub(super) enum Source<'b> {
         bytes: &'b [u8],
         /// Behind the last number.
         at: usize,
-        /// Where the last number begins.
+        /// Beginning of the last number.
         last: usize,
         is_big_endian: bool,
     },
@@ -52,7 +52,7 @@ impl<'b> Source<'b> {
         }
     }
 
-    /// How long a list is.
+    /// Length of a list.
     pub(super) fn count(&mut self, number: Number) -> Result<u64, ModelError> {
         let count = self.number(number)?;
         if count.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&count) {
