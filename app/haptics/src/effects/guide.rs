@@ -107,9 +107,11 @@ impl Guide {
         let off_W = motion.position_W - foot.point_W;
         let distance_m = off_W.norm();
         let stretch_m = (distance_m - self.deadband_m).max(0.0);
+        let before = hold.strength;
         hold.step(self, distance_m, self.stiffness_n_per_m * stretch_m, motion.dt_s);
+        let fading_n = self.force_limit_n * (hold.strength - before).abs();
         if hold.strength == 0.0 {
-            return Pull::default();
+            return Pull { explained_n: fading_n, ..Pull::default() };
         }
         let spring_W = if stretch_m > 0.0 {
             off_W * (-self.stiffness_n_per_m * stretch_m / distance_m)
@@ -121,6 +123,9 @@ impl Guide {
         Pull {
             force_on_user_W: bounded(spring_W + damper_W, self.force_limit_n) * hold.strength,
             stored_j: self.stored_j(stretch_m) * hold.strength,
+            explained_n: fading_n
+                + self.stiffness_n_per_m * motion.way_m
+                + self.damping_n_s_per_m * motion.speeds_m_s,
         }
     }
 
