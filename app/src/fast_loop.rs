@@ -98,6 +98,10 @@ pub struct Tally {
     pub moving: [usize; 2],
     /// Ticks in which there was more at a finger's place than it can feel at once.
     pub crowded: u64,
+    /// How often a force was cut because nothing moved for it.
+    pub cuts: u64,
+    /// The most that was cut at once (N).
+    pub most_cut_n: f64,
     /// Entities that left the world, or were lost, and stand still since.
     pub parked: u64,
     /// The first of them, and in which tick of the run.
@@ -306,6 +310,10 @@ impl FastLoop {
         self.row.due_ns = self.frame.deadline_ns;
         self.tally.park(self.step.parked_now(), self.row.run_tick, self.is_first_scene);
         self.tally.crowded += u64::from(self.step.is_crowded());
+        for cut in self.step.cuts() {
+            self.tally.cuts += 1;
+            self.tally.most_cut_n = self.tally.most_cut_n.max(cut.force_n);
+        }
         self.tally.moving = [self.step.bodies().len(), self.step.made().awake];
         self.next_tick = self.row.run_tick + 1;
         if self.row.run_tick < self.total_ticks {

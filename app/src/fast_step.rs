@@ -14,14 +14,16 @@
 #![allow(non_snake_case)] // Frames are capital letters: tip_D is the tip in D.
 
 mod finger;
+mod last_line;
 mod near;
 mod objects;
 mod ordered;
 mod watched;
 
 pub use finger::DeviceFinger;
+pub use last_line::Cut;
 pub use objects::{HandFinger, Objects};
-pub use ordered::{Hold, MOST_CALLED};
+pub use ordered::{FADE_S, Hold, MOST_CALLED, MOST_SHARE};
 pub use watched::EventTeller;
 
 use crate::displaced::Placed;
@@ -32,7 +34,8 @@ use crate::row::{BodyRow, Row};
 use crate::slow_thread::SlowRemains;
 use finger::{World, finite_or_zero};
 use haptics::passivity::Passivity;
-use haptics::{Contact, Door, Effects, Entity, Field, FingerEffects, Guide, Hip, Moment, Passage, RAMP_IN_S};
+use haptics::{Door, Effects, Entity, Field, FingerEffects, Guide, Hip, Moment, Passage, RAMP_IN_S};
+use last_line::{LastLine, Line};
 use nalgebra::Vector3;
 use near::Near;
 use physics::{Body, BodyError, Manipulation};
@@ -62,6 +65,8 @@ pub struct FastStep {
     carried_W: Vec<Vector3<f64>>,
     /// What keeps each finger passive, if anything does.
     passivities: Vec<Option<Passivity>>,
+    /// Of each finger.
+    lines: Vec<LastLine>,
     /// How much of the forces is felt, 0 to 1.
     strength: f64,
     doors: Vec<Door>,
@@ -79,6 +84,7 @@ impl FastStep {
         let period_s = period_ns as f64 / 1e9;
         let passivities = vec![None; fingers.len()];
         let passages = vec![Passage::new(&[]); fingers.len()];
+        let lines = fingers.iter().map(|own| LastLine::new(&own.finger)).collect();
         // Each made anew: a clone of a list without entries has no room.
         let near = fingers.iter().map(|_| Near::new(entities.len())).collect();
         let objects = Objects::new(Manipulation::of_none(&entities), &[], false, period_s);
@@ -95,6 +101,7 @@ impl FastStep {
             tips_D,
             carried_W,
             passivities,
+            lines,
             strength: 1.0,
             doors: Vec::new(),
             passages,
@@ -191,12 +198,17 @@ impl FastStep {
         self.near.iter().any(Near::is_crowded)
     }
 
-    /// The contacts whose force was cut in the last tick, each with its finger's number.
-    pub fn cuts(&self) -> impl Iterator<Item = (usize, &Contact)> {
-        let fingers = self.fingers.iter().enumerate();
-        let contacts =
-            fingers.flat_map(|(number, own)| own.finger.contacts().map(move |contact| (number, contact)));
-        contacts.filter(|(_, contact)| contact.leapt)
+    /// What was cut from forces in the last tick, because nothing moved for it.
+    pub fn cuts(&self) -> impl Iterator<Item = Cut> {
+        let fingers = self.fingers.iter().zip(&self.lines).enumerate();
+        fingers.flat_map(|(finger, (own, line))| {
+            let leapt = own.finger.contacts().filter(|contact| contact.leapt);
+            let leaps = leapt.map(move |contact| {
+                let entity = Some(contact.entity as u32);
+                Cut { finger, entity, force_n: contact.missing_n }
+            });
+            leaps.chain(line.cuts(finger))
+        })
     }
 
     /// What moving the entities took in the last tick.
@@ -270,16 +282,26 @@ impl FastStep {
         if frame.run_tick >= 0 {
             let (entities, felt) = (&mut self.entities, &self.finger_effects);
             self.objects.step(entities, &self.fingers, felt, &mut row.fingers, dt_s);
+        } else {
+            self.objects.has_not_stepped();
         }
         self.objects.let_go(&self.entities, frame.run_tick >= 0);
         let tick = Tick::new(frame, &self.entities, dt_s);
-        let states = all_carried_W.iter().zip(self.finger_effects.iter().zip(&mut self.passivities));
-        for (index, ((finger, row), (carried_W, (felt, passivity)))) in
+        let guards = self.passivities.iter_mut().zip(&mut self.lines);
+        let states = all_carried_W.iter().zip(self.finger_effects.iter().zip(guards));
+        for (index, ((finger, row), (carried_W, (felt, (passivity, line))))) in
             self.fingers.iter().zip(&mut row.fingers).zip(states).enumerate()
         {
-            let Some(device) = devices.get(finger.device) else { continue };
+            let Some(device) = devices.get(finger.device) else {
+                line.reset();
+                continue;
+            };
             row.force_on_user = finite_or_zero(row.force_on_user * self.strength);
             row.torque_on_user = finite_or_zero(row.torque_on_user * self.strength);
+            let of =
+                Line { index, finger: &finger.finger, felt, strength: self.strength, dt_s, hip_W: row.hip };
+            row.force_on_user =
+                finite_or_zero(line.hold(row.force_on_user, &of, &mut self.objects, &self.entities));
             if let Some(passivity) = passivity {
                 let wanted_W = row.force_on_user;
                 keep_passive(passivity, finger, felt, device, *carried_W, &tick, row);
@@ -353,6 +375,7 @@ impl FastStep {
             finger.finger.reset();
         }
         self.passivities.iter_mut().flatten().for_each(Passivity::reset);
+        self.lines.iter_mut().for_each(LastLine::reset);
         self.finger_effects.iter_mut().for_each(FingerEffects::reset);
         self.passages.iter_mut().for_each(Passage::reset);
     }

@@ -111,6 +111,14 @@ impl fmt::Display for Report {
                 "crowded      {crowded} ticks with more entities at a finger's place than it can feel at once"
             )?;
         }
+        if tally.cuts > 0 {
+            writeln!(
+                f,
+                "cut          {} times a force rose or turned though nothing moved for it, by up to {:.1} N; please \
+                 tell us",
+                tally.cuts, tally.most_cut_n
+            )?;
+        }
         for line in &self.parked {
             writeln!(f, "parked       {line}")?;
         }

@@ -78,6 +78,11 @@ impl TouchInput<'_> {
         }
     }
 
+    /// How far the HIP has moved since the last tick, in the entity's frame \[m\].
+    pub(crate) fn way_m(&self) -> f64 {
+        self.previous_hip_B.map_or(0.0, |previous_B| (self.cone.hip_B - previous_B).norm())
+    }
+
     /// How far the finger would have to go to touch nothing, at least; 0 outside \[m\].
     pub(crate) fn overlap_m(&self) -> f64 {
         let (hip_B, radius_m) = (&self.cone.hip_B, self.finger_radius_m);

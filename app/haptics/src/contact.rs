@@ -19,7 +19,7 @@ use crate::entity::Entity;
 use crate::frame::{is_finite, point_into_body, point_into_world, vector_into_body, vector_into_world};
 use crate::friction::Friction;
 use crate::friction_cone::{ConeInput, FrictionCone};
-use crate::friction_law::FrictionState;
+use crate::friction_law::{FrictionLaw, FrictionState};
 use crate::height_map::Over;
 use crate::hip::Hip;
 use crate::mesh::{Beginning, Mesh, MeshCone};
@@ -51,6 +51,11 @@ pub struct Contact {
     /// Whether the god-object is farther from the HIP than a tick ago by more than finger and entity have moved: the force
     /// is cut to what that explains, and comes on with what they move.
     pub leapt: bool,
+    /// How much was cut in the tick in which it leapt \[N\].
+    pub missing_n: f64,
+    /// By how much the force can have changed since the last tick for what finger and entity moved, and for what the entity
+    /// is made of \[N\]; on top of that a force may fall, and turn as it does.
+    pub explained_n: f64,
 }
 
 impl Contact {
@@ -90,6 +95,8 @@ pub(crate) struct Slot {
     /// Whether anything was noted here since it was new.
     is_used: bool,
     onset: Onset,
+    /// The most that dampers made of the force in the last tick (N).
+    damped_n: f64,
     /// Inside, but above a dent of the entity's height map: nothing is felt, and nothing begins anew.
     hovers: bool,
     pub(crate) contact: Option<Contact>,
@@ -367,6 +374,9 @@ impl Slot {
         sweep: &Sweep<'_>,
     ) -> Option<Contact> {
         let share = self.onset.share_of(&touch, input, [sweep.dt_s, sweep.ramp_in_s]);
+        let spring_n = input.cone.stiffness_n_per_m * input.way_m();
+        let is_plain = self.onset.came_on_n() == 0.0 && entity.is_plain();
+        let explained_n = if is_plain { spring_n } else { self.explained_n(entity, &touch, input, spring_n) };
         // Apart, so that a touch that stays as it is stays in registers.
         if !matches!(entity.shading, Shading::None) || entity.height_map.is_some() {
             touch = self.shade_and_raise(entity, touch, sweep)?;
@@ -375,7 +385,26 @@ impl Slot {
             touch.force_on_user_B *= share;
             touch.normal_force_n *= share;
         }
-        in_world(index, entity, &touch, self.onset.leapt())
+        in_world(index, entity, &touch, &self.onset, explained_n)
+    }
+
+    /// What a change of the force is explained by, if not by the spring's end alone, which moved by so much force (N).
+    #[inline(never)]
+    fn explained_n(&mut self, entity: &Entity, touch: &Touch, input: &TouchInput<'_>, spring_n: f64) -> f64 {
+        let cone = &input.cone;
+        let force_n = touch.force_on_user_B.norm();
+        // A damper answers to both velocities, since it is silent where the spring is relaxed.
+        let dragged_n = if entity.friction.drags() { force_n } else { 0.0 };
+        let damped_n = cone.damping_n_s_per_m * cone.hip_velocity_B.norm() + dragged_n;
+        let damped_n = damped_n + std::mem::replace(&mut self.damped_n, damped_n);
+        // The force turns with the entity.
+        let turn = entity.previous_X_WB.rotation.rotation_to(&entity.X_WB.rotation).angle();
+        // A picture may be as steep as it likes.
+        let heights_n = entity.height_map.as_ref().map_or(0.0, |map| {
+            let [low_m, high_m] = map.range_m();
+            cone.stiffness_n_per_m * (high_m - low_m)
+        });
+        spring_n + damped_n + force_n * turn + self.onset.came_on_n() + heights_n
     }
 
     /// The touch as the entity's facets and heights have it; `None` above a dent.
@@ -427,7 +456,13 @@ fn hip_velocity(
 }
 
 #[inline(always)]
-fn in_world(entity_index: usize, entity: &Entity, touch: &Touch, leapt: bool) -> Option<Contact> {
+fn in_world(
+    entity_index: usize,
+    entity: &Entity,
+    touch: &Touch,
+    onset: &Onset,
+    explained_n: f64,
+) -> Option<Contact> {
     let god_object = &touch.god_object;
     let contact = Contact {
         entity: entity_index,
@@ -437,7 +472,9 @@ fn in_world(entity_index: usize, entity: &Entity, touch: &Touch, leapt: bool) ->
         normal_W: vector_into_world(&entity.X_WB, &god_object.normal_B),
         feature: god_object.feature,
         friction: touch.friction,
-        leapt,
+        leapt: onset.leapt(),
+        missing_n: onset.missing_n(),
+        explained_n,
     };
     (is_finite(&contact.force_on_user_W) && is_finite(&contact.god_object_W)).then_some(contact)
 }

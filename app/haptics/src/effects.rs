@@ -108,6 +108,10 @@ struct Motion {
     /// By the driver's estimate, else by the difference of positions (m/s).
     velocity_W: Vector3<f64>,
     dt_s: f64,
+    /// Since the last tick (m).
+    way_m: f64,
+    /// Of this tick and the last one together (m/s).
+    speeds_m_s: f64,
 }
 
 /// What something that draws a finger does in a tick.
@@ -117,12 +121,15 @@ struct Pull {
     force_on_user_W: Vector3<f64>,
     /// What it gives back if the finger follows (J).
     stored_j: f64,
+    /// By how much the force can have changed in this tick (N), but for turns where two places are equally near.
+    explained_n: f64,
 }
 
 impl Pull {
     fn add(&mut self, other: &Self) {
         self.force_on_user_W += other.force_on_user_W;
         self.stored_j += other.stored_j;
+        self.explained_n += other.explained_n;
     }
 }
 

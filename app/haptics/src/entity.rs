@@ -9,6 +9,7 @@ use crate::door::WORLD;
 use crate::effects::{Magnetism, Vibration};
 use crate::error::{ParameterError, above_zero, at_least_zero, share};
 use crate::friction::Friction;
+use crate::friction_law::FrictionLaw;
 use crate::height_map::HeightMap;
 use crate::mesh::Mesh;
 use crate::shading::Shading;
@@ -180,6 +181,15 @@ impl Entity {
     #[inline]
     pub fn felt_damping_n_s_per_m(&self) -> f64 {
         self.damping_n_s_per_m * self.felt.damping
+    }
+
+    /// Whether what is felt of it changes with the way of the finger alone: it does not turn, damp, drag or have heights.
+    #[inline]
+    pub(crate) fn is_plain(&self) -> bool {
+        self.height_map.is_none()
+            && self.felt_damping_n_s_per_m() == 0.0
+            && !self.friction.drags()
+            && self.X_WB.rotation == self.previous_X_WB.rotation
     }
 
     /// The shape that a finger of this radius feels.

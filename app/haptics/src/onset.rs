@@ -32,6 +32,10 @@ pub(crate) struct Onset {
     spring_m: f64,
     /// Whether it is farther away than it can have been left behind.
     leapt: bool,
+    /// What was cut for it (N).
+    missing_n: f64,
+    /// How much of the force came on in the last tick with a ramp (N).
+    came_on_n: f64,
 }
 
 /// The longest spring.
@@ -49,8 +53,16 @@ enum Longest {
 
 impl Onset {
     /// All of the force, at once.
-    pub(crate) const AT_ONCE: Self =
-        Self { strength: 1.0, longest: Longest::Any, share: 1.0, lag_m: 0.0, spring_m: 0.0, leapt: false };
+    pub(crate) const AT_ONCE: Self = Self {
+        strength: 1.0,
+        longest: Longest::Any,
+        share: 1.0,
+        lag_m: 0.0,
+        spring_m: 0.0,
+        leapt: false,
+        missing_n: 0.0,
+        came_on_n: 0.0,
+    };
     /// A ramp, from the overlap on.
     pub(crate) const INSIDE: Self =
         Self { strength: 0.0, longest: Longest::Overlap, share: 0.0, ..Self::AT_ONCE };
@@ -70,13 +82,23 @@ impl Onset {
         self.leapt
     }
 
+    /// What was cut in the tick in which it leapt (N).
+    pub(crate) fn missing_n(&self) -> f64 {
+        if self.leapt { self.missing_n } else { 0.0 }
+    }
+
+    /// How much of the force came on in the last tick because a ramp did (N).
+    pub(crate) fn came_on_n(&self) -> f64 {
+        self.came_on_n
+    }
+
     /// One tick: what to multiply the force of `touch` by, which is the shape's own, before heights.
     #[inline(always)]
     pub(crate) fn share_of(&mut self, touch: &Touch, input: &TouchInput<'_>, times: [f64; 2]) -> f64 {
         let lag_m = (touch.god_object.point_B - input.cone.hip_B).norm();
         // In this order no force overflows.
         let spring_m = (touch.force_on_user_B / input.cone.stiffness_n_per_m).norm();
-        let moved_m = way_m(input);
+        let moved_m = input.way_m();
         let was_over = self.strength >= 1.0 && matches!(self.longest, Longest::Any);
         self.leapt = was_over && lag_m > self.lag_m + moved_m + SLACK_M;
         if self.leapt {
@@ -86,6 +108,7 @@ impl Onset {
         }
         self.lag_m = lag_m;
         self.spring_m = spring_m;
+        self.came_on_n = 0.0;
         if self.strength >= 1.0 && matches!(self.longest, Longest::Any) {
             1.0
         } else {
@@ -105,10 +128,21 @@ impl Onset {
 
     #[inline(never)]
     fn less_than_all(&mut self, spring_m: f64, input: &TouchInput<'_>, [dt_s, ramp_in_s]: [f64; 2]) -> f64 {
-        let step = dt_s / ramp_in_s;
+        let (step, before) = (dt_s / ramp_in_s, self.strength);
+        let grows = matches!(self.longest, Longest::Growing(_));
         // Where time is unknown or no ramp wanted, there is none.
         self.strength = if step > 0.0 { (self.strength + step).min(1.0) } else { 1.0 };
         self.share = self.strength * self.bounded(spring_m, input, step);
+        let force_n = spring_m * input.cone.stiffness_n_per_m;
+        let growing = if !grows {
+            0.0
+        } else if step > 0.0 {
+            step
+        } else {
+            1.0
+        };
+        self.came_on_n = force_n * (self.strength - before + growing);
+        self.missing_n = force_n * (1.0 - self.share);
         self.share
     }
 
@@ -117,8 +151,8 @@ impl Onset {
         let bound_m = match self.longest {
             Longest::Any => return 1.0,
             Longest::Overlap => input.overlap_m(),
-            Longest::Bound(bound_m) => bound_m + way_m(input),
-            Longest::Growing(bound_m) if step > 0.0 => bound_m + way_m(input) + step * spring_m,
+            Longest::Bound(bound_m) => bound_m + input.way_m(),
+            Longest::Growing(bound_m) if step > 0.0 => bound_m + input.way_m() + step * spring_m,
             Longest::Growing(_) => f64::INFINITY,
         };
         if spring_m <= bound_m * (1.0 + ROUNDING) {
@@ -132,11 +166,6 @@ impl Onset {
         self.spring_m = bound_m;
         bound_m / spring_m
     }
-}
-
-/// How far the HIP has moved since the last tick, in the entity's frame.
-fn way_m(input: &TouchInput<'_>) -> f64 {
-    input.previous_hip_B.map_or(0.0, |previous_B| (input.cone.hip_B - previous_B).norm())
 }
 
 const ROUNDING: f64 = 1e-9;

@@ -9,14 +9,11 @@
 use super::order::{Move, Scale};
 use super::path::{Next, Path};
 use crate::fast_step::FastStep;
+pub use crate::fast_step::{FADE_S, MOST_SHARE};
 use physics::MAX_DRIVEN;
 
 /// The most that a finger's force changes in a tick because stiffness and damping do \[N\].
 pub const MOST_STEP_N: f64 = 0.05;
-/// The most that either changes in a tick, as a share of itself.
-pub const MOST_SHARE: f64 = 0.01;
-/// How long forces take to go before a world is replaced, and to come after that \[s\].
-pub const FADE_S: f64 = 0.1;
 /// Stiffness and damping are between a part of what the scene says and as many times it.
 pub const MOST_TIMES: f64 = 10.0;
 

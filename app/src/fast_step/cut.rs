@@ -62,9 +62,151 @@ fn a_blow_is_not_commanded_and_told_with_finger_and_entity() {
     }
     let mut cuts = Vec::new();
     while let Some(event) = told.receive(u64::MAX) {
-        if let Kind::Cut { finger, entity } = event.kind {
+        if let Kind::Cut { finger, entity, force_n } = event.kind {
+            // The spring of 0.2 m.
+            assert!((force_n - K * 0.2).abs() < 1.0, "{force_n} N");
             cuts.push((event.run_tick, finger, entity));
         }
     }
-    assert_eq!(cuts, [(26, 1, 1)]);
+    assert_eq!(cuts, [(26, 1, Some(1))]);
+}
+
+/// What a finger is commanded (N) and what is told, tick by tick on its way.
+struct Felt {
+    forces: Vec<Vector3<f64>>,
+    told: Vec<(u64, Cut)>,
+}
+
+impl Felt {
+    fn on(step: &mut FastStep, way: impl IntoIterator<Item = Vector3<f64>>) -> Self {
+        let (mut felt, mut row) = (Self { forces: Vec::new(), told: Vec::new() }, Row::empty());
+        for (tick, hip) in (1..).zip(way) {
+            let mut frame = Frame::zeroed();
+            (frame.tick, frame.run_tick, frame.device_count) = (tick, i64::try_from(tick).unwrap(), 1);
+            frame.devices[0].flags = DEVICE_POSITION_VALID;
+            frame.devices[0].position_m_measured = hip.into();
+            let mut command = Command::zero(tick, 1, 1);
+            step.step(&frame, &mut command, &mut row);
+            felt.told.extend(step.cuts().map(|cut| (tick, cut)));
+            felt.forces.push(command.devices[0].force_on_user_n.into());
+        }
+        felt
+    }
+
+    /// The largest change of the force that is no fall (N).
+    fn most_blow_n(&self) -> f64 {
+        let pairs = self.forces.windows(2);
+        let blows = pairs.map(|pair| (pair[1] - pair[0] * 0.5).norm() - 0.5 * pair[0].norm());
+        blows.fold(0.0, f64::max)
+    }
+}
+
+fn one_finger(entities: Vec<Entity>) -> FastStep {
+    let finger = DeviceFinger {
+        finger: Finger::new(0.0, 2).unwrap().with_ramp_in(0.0).unwrap(),
+        device: 0,
+        mount: Mount::new(Isometry3::identity()),
+    };
+    FastStep::new(vec![finger], entities, PERIOD_NS)
+}
+
+/// What becomes of the frictionless god-object's force in one tick, counted since the contact began.
+#[derive(Debug)]
+struct Spoilt {
+    in_tick: f64,
+    how: fn(Vector3<f64>) -> Vector3<f64>,
+    for_good: bool,
+}
+
+impl ContactAlgorithm for Spoilt {
+    fn touch(&self, input: &TouchInput<'_>, memory: &mut ContactMemory) -> Option<Touch> {
+        let at = input.is_inside().then(|| input.nearest())??;
+        let mut touch = Touch::frictionless(at, (at.point_B - input.cone.hip_B).norm(), &input.cone);
+        memory.words[0] += 1.0;
+        let is_now = memory.words[0] == self.in_tick;
+        if is_now || self.for_good && memory.words[0] > self.in_tick {
+            touch.force_on_user_B = (self.how)(touch.force_on_user_B);
+        }
+        Some(touch)
+    }
+}
+
+fn spoilt_floor(spoilt: Spoilt) -> Entity {
+    let floor = Entity::new(Plane::new(Vector3::y(), 0.0).unwrap(), Isometry3::identity(), K).unwrap();
+    floor.with_algorithm(Algorithm::own(spoilt))
+}
+
+/// Down by a tenth of a millimetre a tick, to this depth (m), where it stays.
+fn pressing(depth_m: f64) -> impl Iterator<Item = Vector3<f64>> {
+    let down = move |tick: i32| (1e-4 - 1e-4 * f64::from(tick)).max(-depth_m);
+    (0..400).map(move |tick| Vector3::new(0.0, down(tick), 0.0))
+}
+
+#[test]
+fn a_force_that_drops_out_for_a_tick_comes_back_slowly_and_is_told_once() {
+    let floor = spoilt_floor(Spoilt { in_tick: 250.0, how: |_| Vector3::zeros(), for_good: false });
+    let felt = Felt::on(&mut one_finger(vec![floor]), pressing(0.019));
+    let [(tick, cut)] = felt.told[..] else { panic!("{:?}", felt.told) };
+    assert_eq!((tick, cut.finger, cut.entity), (252, 0, Some(0)));
+    assert!((cut.force_n - 19.0).abs() < 0.1, "{cut:?}");
+    assert_eq!(felt.forces[250], Vector3::zeros(), "a fall is free");
+    // 19 N in 20 ms are 0.95 N in a tick, and a hundredth of what there is.
+    assert!(felt.most_blow_n() < 1.2, "{} N", felt.most_blow_n());
+    assert_eq!(felt.forces[275], Vector3::new(0.0, K * 0.019, 0.0));
+}
+
+#[test]
+fn a_force_that_turns_over_is_cut_and_comes_on_slowly() {
+    let floor = spoilt_floor(Spoilt { in_tick: 250.0, how: |force| -force, for_good: true });
+    let felt = Felt::on(&mut one_finger(vec![floor]), pressing(0.005));
+    let [(251, Cut { finger: 0, entity: Some(0), force_n })] = felt.told[..] else {
+        panic!("{:?}", felt.told)
+    };
+    // Half a newton beyond zero comes at once, and some hundredths.
+    assert!((force_n - 4.45).abs() < 0.05, "{force_n} N");
+    assert!(felt.most_blow_n() < 0.6, "{} N", felt.most_blow_n());
+    assert_eq!(felt.forces[300], Vector3::new(0.0, -K * 0.005, 0.0), "in the end it is what it is");
+}
+
+#[test]
+fn a_magnet_that_changes_sides_is_cut_and_told_of_no_contact() {
+    let limits = haptics::Limits::at(1e-3).unwrap();
+    let ring = Entity::new(haptics::Torus::new(0.03, 0.01).unwrap(), Isometry3::identity(), K).unwrap();
+    let ring = ring.with_magnetism(haptics::Magnetism::new(5.0, 0.04, &limits).unwrap());
+    // Through the hole's middle, where all of the ring is equally near.
+    let mut step = one_finger(vec![ring]).with_effects(Vec::new(), Vec::new());
+    let across = (0..200).map(|tick| Vector3::new(-0.01 + 1e-4 * (f64::from(tick) + 0.5), 0.0, 0.0));
+    let felt = Felt::on(&mut step, across);
+    let [(101, Cut { finger: 0, entity: None, force_n })] = felt.told[..] else { panic!("{:?}", felt.told) };
+    // 4.2 N on either side; one of them is let go, and of the other half a newton comes at once, and what the way explains.
+    assert!((force_n - 3.5).abs() < 0.1, "{force_n} N");
+    assert!(felt.most_blow_n() < 0.8, "{} N", felt.most_blow_n());
+}
+
+#[test]
+fn what_is_cut_from_a_finger_its_body_does_not_get_either() {
+    const MASS_KG: f64 = 0.2;
+    let pose = Isometry3::identity();
+    let ball = Entity::new(haptics::Sphere::new(0.02).unwrap(), pose, K).unwrap();
+    let spoilt = Spoilt { in_tick: 20.0, how: |_| Vector3::zeros(), for_good: false };
+    let ball = ball.with_algorithm(Algorithm::own(spoilt));
+    let mass = physics::MassProperties::of_shape(&ball.shape, MASS_KG).unwrap();
+    let body = Body::at_rest(mass, &pose).with_rotation_locked();
+    let settings = physics::Settings { gravity_W: Vector3::zeros(), ..physics::Settings::default() };
+    let mut step = one_finger(vec![ball])
+        .with_objects(&[(0, body)], settings, ListSettings::default(), &[HandFinger::default()], false)
+        .unwrap();
+    // In by 0.3 mm a tick, and after a while gone.
+    let way = (0..200).map(|tick: i32| {
+        let y = if tick < 100 { 0.0203 - 3e-4 * f64::from(tick.min(30)) } else { 0.5 };
+        Vector3::new(0.0, y, 0.0)
+    });
+    let felt = Felt::on(&mut step, way);
+    let [(_, Cut { entity: Some(0), force_n, .. })] = felt.told[..] else { panic!("{:?}", felt.told) };
+    assert!(force_n > 1.0, "{force_n} N");
+    let felt_n_s = felt.forces.iter().sum::<Vector3<f64>>() * 1e-3;
+    let got_n_s = step.bodies()[0].velocity * MASS_KG;
+    assert!(got_n_s.norm() > 1e-3, "it was pushed");
+    // Roundings of 0.1 N s in 200 sums.
+    assert!((got_n_s + felt_n_s).norm() < 1e-13, "{got_n_s} {felt_n_s}");
 }

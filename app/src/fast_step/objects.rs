@@ -7,10 +7,11 @@
 //! Invariants: nothing moves before a run's t = 0 (the scene is what it says until then), and no stall of the driver is
 //! made up for at once: objects are late by what was missed.
 
-use haptics::{ContactState, Entity, FingerEffects};
+use haptics::{Contact, ContactState, Entity, FingerEffects};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use physics::{
-    BroadPhase, FingerSettings, FingerTick, MAX_DRIVEN, MAX_PULLS, Made, Manipulation, Pull, Touch,
+    Attachment, BroadPhase, FingerSettings, FingerTick, MAX_DRIVEN, MAX_PULLS, Made, Manipulation, Pull,
+    Touch,
 };
 use world::events::{FastPairs, pair_link};
 use world::lists::{FastList, Handed, Reach, SlowList};
@@ -52,6 +53,8 @@ pub struct Objects {
     pub(super) ticks: Vec<FingerTick>,
     /// The button with which each finger ties.
     buttons: Vec<Option<u32>>,
+    /// How that ties.
+    ties: Vec<Option<Attachment>>,
     wants_quality: bool,
     /// As the tick began.
     rows: Vec<BodyRow>,
@@ -104,6 +107,7 @@ impl Objects {
             owed: Vec::with_capacity(MAX_PULLS),
             ticks: vec![FingerTick::at(Vector3::zeros()); fingers.len()],
             buttons: fingers.iter().map(|finger| finger.button).collect(),
+            ties: fingers.iter().map(|finger| finger.settings.attachment).collect(),
             wants_quality,
             manipulation,
             lists: None,
@@ -259,6 +263,12 @@ impl Objects {
         }
     }
 
+    /// Nothing moves before a run begins: what fingers feel of bodies is what was rendered.
+    pub(super) fn has_not_stepped(&mut self) {
+        self.touches.clear();
+        self.felt_pulls = 0;
+    }
+
     /// Moves them by a tick of this length (s), and changes the fingers' forces to those which moved them.
     pub fn step(
         &mut self,
@@ -361,6 +371,68 @@ impl Objects {
             let share = force_W.norm() / all_n;
             if share > 0.0 && self.owed.len() < self.owed.capacity() {
                 let force_on_user_W = changed_W * share;
+                self.owed.push(Pull { entity, finger, point_W, force_on_user_W, stiffness_n_per_m: 0.0 });
+            }
+        }
+    }
+
+    /// The force on the user of a contact as it moved its body, or as it was rendered, and how much of it the body's own
+    /// motion within the tick can explain (N).
+    pub(super) fn touched(
+        &self,
+        finger: usize,
+        contact: &Contact,
+        entities: &[Entity],
+    ) -> (Vector3<f64>, f64) {
+        let moved = self.touches.iter().filter(|own| (own.finger, own.entity) == (finger, contact.entity));
+        let (mut force_W, mut given_n) = (None, 0.0_f64);
+        for touch in moved {
+            force_W = Some(force_W.unwrap_or_else(Vector3::zeros) + touch.force_on_user_W);
+            let entity = &entities[contact.entity];
+            let per_speed =
+                entity.felt_stiffness_n_per_m() * self.stepped_s + entity.felt_damping_n_s_per_m();
+            let [before_W, after_W] = self.velocities_W(contact.entity, &touch.point_W);
+            given_n = given_n.max(per_speed * (after_W - before_W).norm());
+        }
+        (force_W.unwrap_or(contact.force_on_user_W), given_n)
+    }
+
+    /// By how much a finger's tie can pull otherwise for what its body and the finger, which went so far (m), do in a tick (N).
+    pub(super) fn tie_n(&self, finger: usize, way_m: f64) -> f64 {
+        let tied = self.ticks.get(finger).and_then(|tick| Some((tick.attached?, tick.hip_W)));
+        let (Some((entity, hip_W)), Some(Some(tie))) = (tied, self.ties.get(finger)) else { return 0.0 };
+        let [before_W, after_W] = self.velocities_W(entity, &hip_W);
+        let speed_m_s = way_m / self.stepped_s.max(self.period_s) + before_W.norm() + after_W.norm();
+        (2.0 * tie.stiffness_n_per_m * self.stepped_s + tie.damping_n_s_per_m) * speed_m_s
+    }
+
+    /// By how much a finger's magnets and vibrations can pull otherwise because bodies gave way to them within the tick (N).
+    pub(super) fn pulled_n(&self, finger: usize) -> f64 {
+        let own = self.pulls[..self.felt_pulls].iter().filter(|pull| pull.finger == finger);
+        own.map(|pull| {
+            let [before_W, after_W] = self.velocities_W(pull.entity, &pull.point_W);
+            pull.stiffness_n_per_m * self.stepped_s * (after_W - before_W).norm()
+        })
+        .sum()
+    }
+
+    /// How fast a body's point moved when the tick began, and moves now (m/s).
+    fn velocities_W(&self, entity: usize, point_W: &Vector3<f64>) -> [Vector3<f64>; 2] {
+        let Some(number) = self.manipulation.body_of(entity) else { return [Vector3::zeros(); 2] };
+        let (row, body) = (&self.rows[number], &self.manipulation.bodies()[number]);
+        let before_W = row.velocity + row.angular_velocity.cross(&(point_W - row.position));
+        let after_W = body.velocity_W + body.angular_velocity_W().cross(&(point_W - body.centre_W));
+        [before_W, after_W]
+    }
+
+    /// As [`Self::owe`], of what was changed of a finger's contact with one entity.
+    pub(super) fn owe_to(&mut self, finger: usize, entity: usize, changed_W: Vector3<f64>) {
+        let own = |touch: &&Touch| (touch.finger, touch.entity) == (finger, entity);
+        let all_n: f64 = self.touches.iter().filter(own).map(|touch| touch.force_on_user_W.norm()).sum();
+        for touch in self.touches.iter().filter(own) {
+            let share = touch.force_on_user_W.norm() / all_n;
+            if share > 0.0 && self.owed.len() < self.owed.capacity() {
+                let (point_W, force_on_user_W) = (touch.point_W, changed_W * share);
                 self.owed.push(Pull { entity, finger, point_W, force_on_user_W, stiffness_n_per_m: 0.0 });
             }
         }

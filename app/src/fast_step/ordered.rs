@@ -23,6 +23,11 @@ const AHEAD_S: f64 = 0.05;
 /// No more bodies than this, or than the fast list has anyway, are called over for what is moved.
 pub const MOST_CALLED: usize = 64;
 
+/// The most that stiffness or damping changes in a tick, as a share of itself.
+pub const MOST_SHARE: f64 = 0.01;
+/// How long forces take to go before a world is replaced, and to come after that \[s\].
+pub const FADE_S: f64 = 0.1;
+
 /// Who has what is to be moved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Hold {

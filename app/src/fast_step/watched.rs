@@ -3,7 +3,7 @@
 //! Frames and signs: a finger's contact tells its own force on the user, as rendered or, on a body, as that moved it; what
 //! fields and guides add and passivity takes is not part of it.
 
-use super::FastStep;
+use super::{Cut, FastStep};
 use crate::row::Row;
 use haptics::ContactState;
 use world::events::{EventSender, FastPairs, Kind, List, MOST_TOUCHED, PairForce, Touching, Watch};
@@ -54,8 +54,8 @@ impl EventTeller {
             self.find_touching(step, finger);
             self.watch.finger(finger, &self.touching, row.buttons, row.attached, out);
         }
-        for (finger, contact) in step.cuts() {
-            self.watch.tell(Kind::Cut { finger: finger as u32, entity: contact.entity as u32 }, out);
+        for Cut { finger, entity, force_n } in step.cuts() {
+            self.watch.tell(Kind::Cut { finger: finger as u32, entity, force_n }, out);
         }
         self.watch.grasps(out);
         self.tell_doors(step, out);

@@ -61,7 +61,7 @@ fn values(event: &Event, said: &str, names: &Names, period_ns: u64) -> [Value; K
         entity(facts.entity),
         entity(facts.other),
         text(&holders(facts.holders, &names.fingers)),
-        life(|life| life.force_n),
+        facts.life.map(|life| life.force_n).or(facts.force_n).into(),
         life(|life| life.peak_n),
         life(|life| life.impulse_W.x),
         life(|life| life.impulse_W.y),

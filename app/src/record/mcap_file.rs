@@ -346,12 +346,12 @@ impl McapFile {
     }
 }
 
-/// Of a contact that is over, or a grasp, how long it was (s), else its force (N); else the number that there is.
+/// Of a contact that is over, or a grasp, how long it was (s), else its force, or what was cut (N); else the number that there is.
 fn value(facts: &Facts) -> f64 {
     match facts.life {
         Some(life) if matches!(facts.word, "contact-end" | "pair-end") => life.lasted_s,
         Some(life) => life.force_n,
-        None => facts.lasted_s.unwrap_or(facts.number.unwrap_or(0) as f64),
+        None => facts.force_n.or(facts.lasted_s).unwrap_or(facts.number.unwrap_or(0) as f64),
     }
 }
 

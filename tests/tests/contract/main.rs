@@ -3,6 +3,7 @@
 mod bad_input;
 mod ball;
 mod csg;
+mod cut;
 mod doctor;
 mod driver_cli;
 mod driver_output;

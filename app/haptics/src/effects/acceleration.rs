@@ -22,6 +22,8 @@ pub(super) struct AccelerationFilter {
     offset_W: Vector3<f64>,
     /// Of the smoothed place \[m/s\].
     velocity_W: Vector3<f64>,
+    /// The most by which the last step can have changed the acceleration \[m/s^2\].
+    most_change: f64,
 }
 
 impl AccelerationFilter {
@@ -47,6 +49,9 @@ impl AccelerationFilter {
         let e = self.offset_W + speed_W * (2.0 / corner);
         let rate = self.velocity_W - speed_W;
         let slope = rate + e * corner;
+        // Its derivative is -w^2 e' - 2 w e''; within a tick neither of them doubles.
+        let second = (e * corner + rate * 2.0) * corner;
+        self.most_change = 2.0 * dt_s * corner * (corner * rate.norm() + 2.0 * second.norm());
         let decay = (-corner * dt_s).exp();
         let (e, rate) = ((e + slope * dt_s) * decay, (rate - slope * (corner * dt_s)) * decay);
         self.offset_W = e - speed_W * (2.0 / corner);
@@ -57,5 +62,10 @@ impl AccelerationFilter {
         }
         *self = Self::default();
         Vector3::zeros()
+    }
+
+    /// The most by which the last step can have changed the acceleration \[m/s^2\].
+    pub(super) fn most_change(&self) -> f64 {
+        self.most_change
     }
 }

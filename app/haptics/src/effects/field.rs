@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 
 use super::acceleration::AccelerationFilter;
 use super::limits::not_above;
-use super::{Limits, MOST_FORCE_N, Motion, Region, bounded};
+use super::{Limits, MOST_FORCE_N, Motion, Pull, Region, bounded};
 use crate::error::{ParameterError, above_zero, finite};
 
 /// A force field.
@@ -99,19 +99,26 @@ impl Field {
         &self.region
     }
 
-    pub(super) fn force_on_user_W(&self, motion: &Motion, filter: &mut AccelerationFilter) -> Vector3<f64> {
+    pub(super) fn pull(&self, motion: &Motion, filter: &mut AccelerationFilter) -> Pull {
         let weight = self.region.weight(&motion.position_W);
-        let whole = match &self.kind {
+        let (whole, explained_n) = match &self.kind {
             FieldKind::Viscous { damping_n_s_per_m } => {
-                -self.region.multiplied(&motion.velocity_W, damping_n_s_per_m)
+                let whole = -self.region.multiplied(&motion.velocity_W, damping_n_s_per_m);
+                (whole, damping_n_s_per_m.amax() * motion.speeds_m_s)
             }
             // The filter runs outside, too: who comes in brings no jump along.
             FieldKind::Inertial { mass_kg, cutoff_hz } => {
                 let (at, v) = (&motion.position_W, &motion.velocity_W);
-                filter.step(at, v, TAU * cutoff_hz, motion.dt_s) * -mass_kg
+                let acceleration = filter.step(at, v, TAU * cutoff_hz, motion.dt_s);
+                (acceleration * -mass_kg, mass_kg * filter.most_change())
             }
-            FieldKind::Constant { force_W } => *force_W,
+            FieldKind::Constant { force_W } => (*force_W, 0.0),
         };
-        bounded(whole, MOST_FORCE_N) * weight
+        let whole = bounded(whole, MOST_FORCE_N);
+        Pull {
+            force_on_user_W: whole * weight,
+            stored_j: 0.0,
+            explained_n: explained_n + whole.norm() * self.region.most_change(motion.way_m),
+        }
     }
 }

@@ -25,8 +25,12 @@ pub struct FingerEffects {
     previous_hip_W: Option<Vector3<f64>>,
     filters: Box<[AccelerationFilter]>,
     holds: Box<[Hold]>,
+    /// Speed in the last tick (m/s).
+    speed_m_s: f64,
     /// What springs and magnets hold (J).
     stored_j: f64,
+    /// By how much the force can have changed in the last tick (N).
+    explained_n: f64,
     /// What of the force came from entities.
     reactions: Reactions,
 }
@@ -49,7 +53,9 @@ impl FingerEffects {
             previous_hip_W: None,
             filters: vec![AccelerationFilter::default(); effects.fields().len()].into(),
             holds: vec![Hold::default(); effects.guides().len()].into(),
+            speed_m_s: 0.0,
             stored_j: 0.0,
+            explained_n: 0.0,
             reactions: Reactions::with_room(effects.most_reactions()),
         }
     }
@@ -87,12 +93,14 @@ impl FingerEffects {
             self.reset();
             return Vector3::zeros();
         }
+        let last_hip_W = self.previous_hip_W.unwrap_or(hip.position_W);
         let motion = self.motion(&hip, moment.dt_s);
         self.reactions.clear();
         let mut pull = self.of_guides(effects, &motion);
-        pull.force_on_user_W += self.of_fields(effects, &motion);
-        pull.add(&self.of_magnets(effects, entities, finger, &hip.position_W));
-        pull.force_on_user_W += self.of_vibrations(effects, entities, finger, moment.t_s);
+        pull.add(&self.of_fields(effects, &motion));
+        pull.add(&self.of_magnets(effects, entities, finger, [&hip.position_W, &last_hip_W]));
+        pull.add(&self.of_vibrations(effects, entities, finger, moment));
+        let before = self.strength;
         self.come_on(moment.dt_s);
         if !(is_finite(&pull.force_on_user_W) && pull.stored_j.is_finite()) {
             pull = Pull::default();
@@ -100,6 +108,8 @@ impl FingerEffects {
         }
         self.reactions.scale(self.strength);
         self.stored_j = pull.stored_j * self.strength;
+        let came_on_n = pull.force_on_user_W.norm() * (self.strength - before);
+        self.explained_n = pull.explained_n * self.strength + came_on_n;
         pull.force_on_user_W * self.strength
     }
 
@@ -107,6 +117,12 @@ impl FingerEffects {
     /// to the track or the surface. Of a magnet that is out of reach, and of fields, nothing.
     pub fn stored_j(&self) -> f64 {
         self.stored_j
+    }
+
+    /// By how much the force can have changed since the tick before \[N\] for what the finger, the entities and time did, but
+    /// where two places of a track or of a surface are equally near.
+    pub fn explained_n(&self) -> f64 {
+        self.explained_n
     }
 
     /// What of the last tick's force came from which entity: each gets its part with the sign turned. Of fields and guides
@@ -122,7 +138,7 @@ impl FingerEffects {
 
     /// Forgets all: the next step is a first one.
     pub fn reset(&mut self) {
-        (self.strength, self.stored_j) = (0.0, 0.0);
+        (self.strength, self.stored_j, self.explained_n) = (0.0, 0.0, 0.0);
         self.previous_hip_W = None;
         self.reactions.clear();
         self.filters.fill(AccelerationFilter::default());
@@ -137,12 +153,18 @@ impl FingerEffects {
         };
         let known_W = hip.velocity_W.filter(|v_W| is_finite(v_W) && dt_s > 0.0);
         let velocity_W = known_W.or_else(by_difference).unwrap_or_default();
-        Motion { position_W: hip.position_W, velocity_W, dt_s }
+        let speed_m_s = velocity_W.norm();
+        let speeds_m_s = speed_m_s + std::mem::replace(&mut self.speed_m_s, speed_m_s);
+        let way_m = previous_W.map_or(0.0, |previous_W| (hip.position_W - previous_W).norm());
+        Motion { position_W: hip.position_W, velocity_W, dt_s, way_m, speeds_m_s }
     }
 
-    fn of_fields(&mut self, effects: &Effects, motion: &Motion) -> Vector3<f64> {
-        let felt = effects.fields().iter().zip(&mut self.filters);
-        felt.map(|(field, filter)| field.force_on_user_W(motion, filter)).sum()
+    fn of_fields(&mut self, effects: &Effects, motion: &Motion) -> Pull {
+        let mut pull = Pull::default();
+        for (field, filter) in effects.fields().iter().zip(&mut self.filters) {
+            pull.add(&field.pull(motion, filter));
+        }
+        pull
     }
 
     fn of_guides(&mut self, effects: &Effects, motion: &Motion) -> Pull {
@@ -158,7 +180,7 @@ impl FingerEffects {
         effects: &Effects,
         entities: &[Entity],
         finger: &Finger,
-        hip_W: &Vector3<f64>,
+        [hip_W, last_hip_W]: [&Vector3<f64>; 2],
     ) -> Pull {
         let mut total = Pull::default();
         for &index in &effects.magnetic {
@@ -166,7 +188,8 @@ impl FingerEffects {
                 continue;
             };
             if let (Some(magnetism), None) = (&entity.magnetism, finger.contact(index))
-                && let Some((pull, reaction)) = magnetism.pull((index, entity), hip_W, finger.radius_m())
+                && let Some((pull, reaction)) =
+                    magnetism.pull((index, entity), hip_W, last_hip_W, finger.radius_m())
             {
                 total.add(&pull);
                 self.reactions.add(reaction);
@@ -180,18 +203,19 @@ impl FingerEffects {
         effects: &Effects,
         entities: &[Entity],
         finger: &Finger,
-        t_s: f64,
-    ) -> Vector3<f64> {
-        let mut force_W = Vector3::zeros();
+        moment: Moment,
+    ) -> Pull {
+        let mut total = Pull::default();
         for &index in &effects.vibrating {
             let Some(entity) = entities.get(index) else { continue };
             if let (Some(vibration), Some(contact)) = (&entity.vibration, finger.contact(index)) {
-                let hum = vibration.hum(contact, finger.radius_m(), t_s);
-                force_W += hum.force_on_user_W;
+                let hum = vibration.hum(contact, finger.radius_m(), moment.t_s);
+                total.force_on_user_W += hum.force_on_user_W;
+                total.explained_n += vibration.explained_n(contact, moment.dt_s);
                 self.reactions.add(hum);
             }
         }
-        force_W
+        total
     }
 
     fn come_on(&mut self, dt_s: f64) {

@@ -115,12 +115,22 @@ impl Guide {
             Kind::Path(path) => hold.footing.step(path, motion, self.stiffness_n_per_m, draw),
             _ => draw(&self.track.foot(&motion.position_W)),
         };
+        let before = hold.strength;
         hold.step(self, &drawn, motion.dt_s);
+        let fading_n = self.force_limit_n * (hold.strength - before).abs();
         if hold.strength == 0.0 {
             hold.footing.forget();
-            return Pull::default();
+            return Pull { explained_n: fading_n, ..Pull::default() };
         }
-        Pull { force_on_user_W: drawn.force_W * hold.strength, stored_j: drawn.stored_j * hold.strength }
+        // A foot that slides over and a change to another one are as fast, each.
+        let way_m = motion.way_m + 2.0 * Self::SLIDE_M_PER_S * motion.dt_s;
+        Pull {
+            force_on_user_W: drawn.force_W * hold.strength,
+            stored_j: drawn.stored_j * hold.strength,
+            explained_n: fading_n
+                + self.stiffness_n_per_m * way_m
+                + self.damping_n_s_per_m * motion.speeds_m_s,
+        }
     }
 
     /// Its full force towards this foot.

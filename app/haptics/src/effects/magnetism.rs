@@ -80,6 +80,7 @@ impl Magnetism {
         &self,
         (index, entity): (usize, &Entity),
         hip_W: &Vector3<f64>,
+        last_hip_W: &Vector3<f64>,
         finger_radius_m: f64,
     ) -> Option<(Pull, Reaction)> {
         let hip_B = point_into_body(&entity.X_WB, hip_W);
@@ -102,7 +103,11 @@ impl Magnetism {
             force_on_user_W,
             stiffness_n_per_m: self.stiffness_n_per_m(distance_m - touched_m),
         };
-        Some((Pull { force_on_user_W, stored_j }, reaction))
+        // Seen from the entity, which may move.
+        let way_m = (hip_B - point_into_body(&entity.previous_X_WB, last_hip_W)).norm();
+        // Along the way, and across it, where the pull turns.
+        let explained_n = 2.0 * STEEPEST * self.force_n / self.distance_m * way_m;
+        Some((Pull { force_on_user_W, stored_j, explained_n }, reaction))
     }
 }
 

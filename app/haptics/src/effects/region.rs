@@ -54,9 +54,17 @@ impl Region {
         Some((self.form.as_ref()?, &self.X_WB, self.rim_m))
     }
 
+    /// By how much [`Self::weight`] can change over so long a way (m).
+    pub(super) fn most_change(&self, way_m: f64) -> f64 {
+        if self.form.is_none() { 0.0 } else { (STEEPEST * way_m / self.rim_m).min(1.0) }
+    }
+
     /// `v_W` with each component along the region's axes multiplied.
     pub(super) fn multiplied(&self, v_W: &Vector3<f64>, factors: &Vector3<f64>) -> Vector3<f64> {
         let v_B = vector_into_body(&self.X_WB, v_W);
         vector_into_world(&self.X_WB, &v_B.component_mul(factors))
     }
 }
+
+/// Of the weight, over the rim's width: 3/2 by the distance, and twice that where the form's own measure is none.
+const STEEPEST: f64 = 3.0;

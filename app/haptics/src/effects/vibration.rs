@@ -53,6 +53,12 @@ impl Vibration {
         self.full_load_n
     }
 
+    /// By how much its force can have changed in a tick of this length (s) (N).
+    pub(super) fn explained_n(&self, contact: &Contact, dt_s: f64) -> f64 {
+        let wave_n = self.amplitude_n * (TAU * self.frequency_hz * dt_s).min(2.0);
+        wave_n + self.amplitude_n / self.full_load_n * contact.explained_n
+    }
+
     /// What it does to a finger of this radius that touches it.
     pub(super) fn hum(&self, contact: &Contact, finger_radius_m: f64, t_s: f64) -> Reaction {
         let periods = self.frequency_hz * t_s;

@@ -108,12 +108,14 @@ pub enum Kind {
         /// Where it is.
         to: u32,
     },
-    /// The force of a finger's contact was cut: it rose by more than finger and entity have moved for.
+    /// A finger's force was cut: it rose or turned by more than finger and entities have moved for.
     Cut {
         /// Which finger.
         finger: u32,
-        /// Which entity.
-        entity: u32,
+        /// Whose contact; `None`: what is felt beside contacts.
+        entity: Option<u32>,
+        /// By how much (N).
+        force_n: f64,
     },
     /// The scene was put back to its beginning. What touched before has ended.
     Reset,
@@ -279,6 +281,8 @@ pub struct Facts {
     pub holders: u32,
     /// The contact so far.
     pub life: Option<Life>,
+    /// How much force was cut (N).
+    pub force_n: Option<f64>,
     /// How long a grasp lasted (s).
     pub lasted_s: Option<f64>,
     /// A number: of the button, the key, the trial; how many were lost.
@@ -298,6 +302,7 @@ impl Facts {
             other: None,
             holders: 0,
             life: None,
+            force_n: None,
             lasted_s: None,
             number: None,
             spaces: None,
@@ -391,7 +396,9 @@ impl Kind {
             Self::Door { finger, from, to } => {
                 Facts { finger: Some(finger), spaces: Some([from, to]), ..of("door") }
             }
-            Self::Cut { finger, entity } => Facts { finger: Some(finger), entity: Some(entity), ..of("cut") },
+            Self::Cut { finger, entity, force_n } => {
+                Facts { finger: Some(finger), entity, force_n: Some(force_n), ..of("cut") }
+            }
             Self::Reset => of("reset"),
             Self::Scene { number } => Facts { number: Some(number.into()), ..of("scene") },
             Self::Order { number } => Facts { number: Some(number), ..of("order") },
