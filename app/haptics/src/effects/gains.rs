@@ -99,7 +99,8 @@ impl Guide {
 impl Entity {
     /// Of its magnetism on a finger of this radius at this place, that does not touch it.
     pub fn magnet_gains_at(&self, p_W: &Vector3<f64>, finger_radius_m: f64) -> Gains {
-        let pulled = self.magnetism.and_then(|magnetism| magnetism.pull((0, self), p_W, finger_radius_m));
+        let pulled =
+            self.magnetism.and_then(|magnetism| magnetism.pull((0, self), p_W, p_W, finger_radius_m));
         let Some((pull, reaction)) = pulled else { return Gains::default() };
         let along_W = pull.force_on_user_W.normalize();
         Gains {
