@@ -32,6 +32,7 @@ use world::{Layout, Location, Scene, Settings, model};
 #[derive(Debug, Args)]
 pub struct CheckArgs {
     /// The scene (TOML), or a model file (OBJ, STL, PLY, glTF, ASE, 3DS)
+    #[arg(value_name = "SCENE|MODEL")]
     scene: PathBuf,
     /// The hand file that it is to be run with (CSV); default: the scene's own
     #[arg(long, value_name = "CSV")]
