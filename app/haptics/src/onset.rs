@@ -134,13 +134,8 @@ impl Onset {
         self.strength = if step > 0.0 { (self.strength + step).min(1.0) } else { 1.0 };
         self.share = self.strength * self.bounded(spring_m, input, step);
         let force_n = spring_m * input.cone.stiffness_n_per_m;
-        let growing = if !grows {
-            0.0
-        } else if step > 0.0 {
-            step
-        } else {
-            1.0
-        };
+        // Without a ramp none explains what comes at once.
+        let growing = if grows && step.is_finite() { step } else { 0.0 };
         self.came_on_n = force_n * (self.strength - before + growing);
         self.missing_n = force_n * (1.0 - self.share);
         self.share
