@@ -110,6 +110,11 @@ pub fn execute(args: &CheckArgs, settings: &Settings) -> ExitCode {
     ExitCode::from(if checked.problems.is_empty() { 0 } else { 2 })
 }
 
+/// What `run` says of a hand file, too: whoever runs a hand of a wrong unit feels nothing and is told nothing else.
+pub fn suspicions_of_the_hand(rig: &Rig) -> Vec<String> {
+    suspicions::of_the_hand(rig)
+}
+
 fn check(args: &CheckArgs, settings: &Settings) -> Checked {
     let file = settings::find(&args.scene, &settings.scenes.value);
     let mut checked = Checked::default();

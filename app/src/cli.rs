@@ -225,6 +225,9 @@ fn run_scene(args: &RunArgs, settings: &Settings, is_headless: bool) -> Result<(
     let rig = make_rig(args, settings)?;
     let mut plan = make_plan(args, &rig, settings)?;
     plan.window = if is_headless { None } else { window_spec(&rig.scene.name, settings)? };
+    for suspicion in check::suspicions_of_the_hand(&rig) {
+        say(format_args!("phantom3: warning: {suspicion}"));
+    }
     run::run(&rig, &plan, &signals)
 }
 

@@ -6,6 +6,7 @@ mod clearing;
 mod commission;
 mod emergency;
 mod emulate;
+mod lease_end;
 mod listeners;
 mod places;
 mod prompt;
@@ -138,7 +139,7 @@ fn perform(command: DriverCommand, fit: Option<Fit>) -> ExitCode {
         DriverCommand::Doctor(args) => doctor::run(&args),
         DriverCommand::ClearFault(args) => clearing::clear_fault(&args.path()),
         DriverCommand::EmergencyStop(args) => emergency::emergency_stop(&args.places()),
-        DriverCommand::EndLease(args) => report(client::end_lease(&args.path(), "io-driver")),
+        DriverCommand::EndLease(args) => lease_end::end_lease(&args.path()),
         DriverCommand::Zero(args) => zero::run(&args),
         DriverCommand::Commission(args) => commission::run(&args),
         DriverCommand::Emulate(args) => emulate::run(&args),

@@ -11,6 +11,7 @@ use std::fmt::{self, Display};
 use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
 
+use rt_core::likeness::nearest;
 use rt_core::toml_slips;
 use serde::de::DeserializeOwned;
 use toml::Spanned;
@@ -187,8 +188,11 @@ impl<'a> TomlText<'a> {
     }
 }
 
-/// serde's message, with the type that it expected in words instead of Rust's.
+/// serde's message, with the word that was probably meant, or the type that it expected in words instead of Rust's.
 fn in_words(message: &str) -> String {
+    if let Some(meant) = meant(message) {
+        return format!("{message} (did you mean `{meant}`?)");
+    }
     let Some((found, expected)) = message.rsplit_once(", expected ") else { return message.to_owned() };
     let words = match expected {
         "f32" | "f64" => "a number",
@@ -198,6 +202,13 @@ fn in_words(message: &str) -> String {
         _ => return message.to_owned(),
     };
     format!("{found}, expected {words}")
+}
+
+/// Of "unknown field `nmae`, expected one of `name`, `mass_kg`" and the like, the word that was meant.
+fn meant(message: &str) -> Option<&str> {
+    let unknown = message.strip_prefix("unknown field `").or(message.strip_prefix("unknown variant `"))?;
+    let (found, expected) = unknown.rsplit_once("`, expected ")?;
+    nearest(&found.to_lowercase(), expected.split('`').skip(1).step_by(2))
 }
 
 /// What is found and allowed where serde met `[key]` and wanted a list.
@@ -378,6 +389,33 @@ mod tests {
             problem("size = ', expected f64'\n"),
             "invalid type: string \", expected f64\", expected a number"
         );
+    }
+
+    #[test]
+    fn a_slip_of_a_key_is_answered_with_the_key_that_was_meant() {
+        let report = read("[motor]\ncurrent = []\ncurrnet = 3\n").unwrap_err();
+        assert_eq!(report.problem, "unknown field `currnet`, expected `current` (did you mean `current`?)");
+
+        #[derive(Debug, Deserialize)]
+        #[serde(rename_all = "kebab-case")]
+        enum Clock {
+            Real,
+            Lockstep,
+        }
+        #[derive(Debug, Deserialize)]
+        #[allow(dead_code)]
+        struct Config {
+            clock: Clock,
+        }
+        let problem =
+            |text: &str| TomlText::new(text, Path::new("lab/m.toml")).read::<Config>().unwrap_err().problem;
+        assert_eq!(
+            problem("clock = 'Lock-step'\n"),
+            "unknown variant `Lock-step`, expected `real` or `lockstep` (did you mean `lockstep`?)"
+        );
+        assert!(problem("clock = 'sundial'\n").ends_with("expected `real` or `lockstep`"));
+        // What was written may hold anything.
+        assert!(!problem("clock = '`, expected `r'\n").is_empty());
     }
 
     #[test]

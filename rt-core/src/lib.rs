@@ -17,7 +17,7 @@
 //! show that a loop does not allocate.
 //! [`input_file`] reads files that others name, [`output_file`] opens those to be written, [`replacement`] has them
 //! take their places when they are whole, [`separators`] and [`toml_slips`] know what is usually wrong
-//! in tables and in TOML, and [`plain_text`] keeps foreign text from acting on a terminal.
+//! in tables and in TOML, [`likeness`] which word was meant, and [`plain_text`] keeps foreign text from acting on a terminal.
 //! [`doctor`] says whether the machine is ready for any of this, [`read_back`] what root has set for it, and
 //! [`installed`] names what a laboratory's installation consists of.
 //!
@@ -38,6 +38,7 @@ pub mod histogram;
 pub mod input_file;
 pub mod installed;
 pub mod last_act;
+pub mod likeness;
 pub mod log;
 pub mod output_file;
 pub mod periodic;

@@ -18,11 +18,17 @@ pub(super) fn all(rig: &Rig, measures: &[Measures]) -> Vec<String> {
     found.extend(densities(&rig.scene));
     found.extend(far(rig, measures));
     found.extend(fingers(&rig.scene));
-    found.extend(paths(rig));
-    found.extend(times(rig));
+    found.extend(of_the_hand(rig));
     found.extend(devices(rig));
     found.extend(rates(&rig.scene));
     found.extend(gravity(&rig.scene));
+    found
+}
+
+/// Those of the hand file's numbers.
+pub(super) fn of_the_hand(rig: &Rig) -> Vec<String> {
+    let mut found = paths(rig);
+    found.extend(times(rig));
     found
 }
 

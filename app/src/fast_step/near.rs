@@ -3,7 +3,8 @@
 //! Model: all entities that fingers feel and whose boxes overlap a box around the HIP's way. It is large, so that it need not be
 //! looked for again until the HIP has gone a few millimetres or some entity's box has changed. Where that finds more
 //! entities than the finger has slots for, the box shrinks, down to the way itself; then the entities' own tight boxes count,
-//! in every tick. What is left out is farther away than what is not.
+//! in every tick. Of boxes that overlap the way and are too many even so, those count whose middles are nearest to the HIP,
+//! after what has no end. What is left out is farther away than what is not.
 //! Invariants: no allocation in `update`; numbers in ascending order.
 //! Cost: one query of the broad phase every few millimetres; in a crowd up to seven, in each tick.
 
@@ -15,6 +16,8 @@ use physics::{Aabb, BroadPhase};
 #[derive(Debug)]
 pub(super) struct Near {
     entities: Vec<u32>,
+    /// Of a crowd, how far each is.
+    distances: Vec<(f64, u32)>,
     looked: Option<Looked>,
     is_crowded: bool,
 }
@@ -38,7 +41,12 @@ const LEAST: f64 = 0.25;
 impl Near {
     /// Room for all of so many entities.
     pub(super) fn new(entities: usize) -> Self {
-        Self { entities: Vec::with_capacity(entities), looked: None, is_crowded: false }
+        Self {
+            entities: Vec::with_capacity(entities),
+            distances: Vec::with_capacity(entities),
+            looked: None,
+            is_crowded: false,
+        }
     }
 
     /// Whether there was more at the finger's place in the last tick than it has room for.
@@ -69,6 +77,10 @@ impl Near {
         self.is_crowded = false;
         if self.entities.len() > most || !self.looked.as_ref().is_some_and(is_known) {
             self.looked = self.look(of, (space, most), &way);
+            if self.entities.len() > most {
+                self.is_crowded = true;
+                self.keep_nearest(of.1, most, to_W);
+            }
         }
         &self.entities
     }
@@ -103,9 +115,22 @@ impl Near {
                 return Some(Looked { around, least_m, version: broad_phase.version(), space });
             }
         }
-        // Next to each other, they are all at the finger's place by their boxes.
-        self.is_crowded = find(way, true) > most;
+        find(way, true);
         None
+    }
+
+    /// All are at the finger's place by their boxes.
+    fn keep_nearest(&mut self, entities: &[Entity], most: usize, hip_W: &Vector3<f64>) {
+        let Self { entities: found, distances, .. } = self;
+        let distance_m = |entity: u32| {
+            let tight = entities.get(entity as usize).and_then(Aabb::of_entity);
+            tight.map_or(0.0, |tight| (tight.middle_W() - hip_W).norm())
+        };
+        distances.clear();
+        distances.extend(found.drain(..).map(|entity| (distance_m(entity), entity)));
+        distances.sort_unstable_by(|(near_m, _), (far_m, _)| near_m.total_cmp(far_m));
+        found.extend(distances.iter().take(most).map(|&(_, entity)| entity));
+        found.sort_unstable();
     }
 }
 
@@ -172,10 +197,29 @@ mod tests {
             }
         }
         assert!(!near.is_crowded());
-        // All at one place: nobody can say which are nearer, and it is told.
         let found = near.update((&broad_phase, &entities), (0, 1), &place(7), &place(7), 0.0);
-        assert_eq!(found, [7, 441]);
+        assert_eq!(found, [441], "what has no end, of two at one place");
         assert!(near.is_crowded());
+        let found = near.update((&broad_phase, &entities), (0, 2), &place(7), &place(7), 0.0);
+        assert_eq!(found, [7, 441]);
+        assert!(!near.is_crowded());
+    }
+
+    /// A finger of 20 mm on the same dots, more of which its box overlaps than it has room for.
+    #[test]
+    fn of_boxes_at_one_place_those_with_the_nearest_middles_are_found() {
+        let dot = Sphere::new(1e-3).unwrap();
+        let x_m = |at: u32| 2.5e-3 * f64::from(at);
+        let put = |at| Entity::new(dot, Isometry3::translation(x_m(at), 0.0, 0.0), 1000.0).unwrap();
+        let entities: Vec<Entity> = (0..40).map(put).collect();
+        let broad_phase = BroadPhase::new(&entities);
+        let mut near = Near::new(40);
+        for middle in 4..36 {
+            let hip = at(x_m(middle) + 1e-4);
+            let found = near.update((&broad_phase, &entities), (0, 5), &hip, &hip, 0.02);
+            assert_eq!(found, [middle - 2, middle - 1, middle, middle + 1, middle + 2]);
+            assert!(near.is_crowded());
+        }
     }
 
     #[test]

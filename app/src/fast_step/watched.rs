@@ -15,9 +15,14 @@ const MOST_PAIRS: usize = 2048;
 /// More bodies than an island has that is given away in a tick.
 const MOST_GONE: usize = 64;
 
+/// A crowd that is left for less goes on (s).
+const CROWD_S: f64 = 0.1;
+
 /// Tells, after each step of a world, what is new.
 pub struct EventTeller {
     watch: Watch,
+    /// Of each finger, how long it is still said to be in a crowd (s).
+    crowded_s: Vec<f64>,
     /// What the slow list tells of its pairs, if there is one.
     slow: Option<FastPairs>,
     touching: Vec<Touching>,
@@ -38,6 +43,7 @@ impl EventTeller {
         let pairs = bodies.saturating_mul(step.entities().len()).min(MOST_PAIRS);
         Self {
             watch: Watch::new(step.fingers.len(), pairs, step.period_s),
+            crowded_s: vec![0.0; step.fingers.len()],
             slow,
             touching: Vec::with_capacity(MOST_TOUCHED),
             elsewhere: (0..bodies).map(|body| step.objects.is_slow(body)).collect(),
@@ -57,6 +63,7 @@ impl EventTeller {
         for Cut { finger, entity, force_n } in step.cuts() {
             self.watch.tell(Kind::Cut { finger: finger as u32, entity, force_n }, out);
         }
+        self.tell_crowds(step, out);
         self.watch.grasps(out);
         self.tell_doors(step, out);
         self.tell_lists(step, out);
@@ -85,6 +92,19 @@ impl EventTeller {
                 slips: ContactState::from(contact.friction) == ContactState::Slip,
                 is_body,
             });
+        }
+    }
+
+    fn tell_crowds(&mut self, step: &FastStep, out: &mut EventSender) {
+        for ((finger, near), left_s) in (0..).zip(&step.near).zip(&mut self.crowded_s) {
+            if !near.is_crowded() {
+                *left_s -= step.period_s;
+                continue;
+            }
+            if *left_s <= 0.0 {
+                self.watch.tell(Kind::Crowded { finger }, out);
+            }
+            *left_s = CROWD_S;
         }
     }
 

@@ -19,7 +19,7 @@ use crate::error::SceneError;
 use crate::names::Names;
 use crate::problems::Problems;
 use crate::reader::{Table, quoted};
-use crate::vocabulary::nearest;
+use rt_core::likeness::nearest;
 
 /// How many templates may build on each other.
 pub const MAX_TEMPLATE_DEPTH: usize = 8;

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod ball;
+mod crowd;
 mod csg;
 mod cut;
 mod doctor;

@@ -507,6 +507,20 @@ fn check_suspects_hands_and_layouts_of_another_unit() {
 }
 
 #[test]
+fn a_run_suspects_a_hand_of_another_unit_as_check_does() {
+    let place = Workplace::new();
+    place.write("scene.toml", with_cube("[0.05, 0.05, 0.05]", "0.1", "[0.0, 0.0, 0.0]"));
+    place.write("mm.csv", "t,f0_x,f0_y,f0_z\n0,0,80,0\n0.1,50,20,0\n");
+    place.write("m.csv", "t,f0_x,f0_y,f0_z\n0,0,0.08,0\n0.1,0.05,0.02,0\n");
+    for (hand, is_suspected) in [("mm.csv", true), ("m.csv", false)] {
+        let said = place.run(&["run", "scene.toml", "--hand", hand, "--clock", "virtual", "--headless"]);
+        assert_eq!(said.status, Some(0), "{}", said.err);
+        let warning = "phantom3: warning: finger f0 goes along 60 m in";
+        assert_eq!(said.err.contains(warning), is_suspected, "{}", said.err);
+    }
+}
+
+#[test]
 fn every_committed_scene_can_be_run_as_check_says() {
     let place = Workplace::new();
     for directory in ["scenes", "scenes/kinds"] {

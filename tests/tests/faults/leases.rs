@@ -190,6 +190,7 @@ fn a_run_whose_lease_somebody_ended_says_so_and_does_not_come_back() {
         log.follow_to_force(&press.observer.driver);
         let asked = io_driver(&["end-lease"], press.driver.socket());
         assert_eq!(asked.status, Some(0), "{asked:?}");
+        assert_eq!(asked.out, "lease 1 is ended; its force ramps out\n");
         let end = holder.end();
         assert_eq!(end.status, Some(3), "{end:?}");
         assert!(end.err.contains("somebody ended this run's lease"), "{end:?}");
@@ -197,6 +198,8 @@ fn a_run_whose_lease_somebody_ended_says_so_and_does_not_come_back() {
             told.last().is_some_and(|last| last.lease == 0 && !last.is_pushing())
         });
         log.check_promise(&press.observer.driver);
+        let asked_again = io_driver(&["end-lease"], press.driver.socket());
+        assert_eq!((asked_again.status, &*asked_again.out), (Some(0), "nobody commanded the devices\n"));
         drop(Commander::start(press.driver.command(), [1.0, 0.0, 0.0]));
         press.driver_must_live();
     }

@@ -117,6 +117,11 @@ pub enum Kind {
         /// By how much (N).
         force_n: f64,
     },
+    /// There is more at a finger's place than it can feel at once.
+    Crowded {
+        /// Which finger.
+        finger: u32,
+    },
     /// The scene was put back to its beginning. What touched before has ended.
     Reset,
     /// Another scene goes on in place of the one that was, whose contacts have ended. Numbers mean its fingers and entities
@@ -237,6 +242,8 @@ pub enum Class {
     Door,
     /// [`Kind::Cut`].
     Cut,
+    /// [`Kind::Crowded`].
+    Crowd,
     /// [`Kind::Reset`] and [`Kind::Scene`].
     Reset,
     /// [`Kind::Order`].
@@ -247,7 +254,7 @@ pub enum Class {
 
 impl Class {
     /// All of them, with their words.
-    pub const ALL: [(Self, &str); 15] = [
+    pub const ALL: [(Self, &str); 16] = [
         (Self::Contact, "contacts"),
         (Self::Slip, "slips"),
         (Self::Pair, "pairs"),
@@ -260,6 +267,7 @@ impl Class {
         (Self::Trial, "trials"),
         (Self::Door, "doors"),
         (Self::Cut, "cuts"),
+        (Self::Crowd, "crowds"),
         (Self::Reset, "resets"),
         (Self::Order, "orders"),
         (Self::Lost, "lost"),
@@ -327,6 +335,7 @@ impl Kind {
             Self::Trial { .. } => Class::Trial,
             Self::Door { .. } => Class::Door,
             Self::Cut { .. } => Class::Cut,
+            Self::Crowded { .. } => Class::Crowd,
             Self::Reset | Self::Scene { .. } => Class::Reset,
             Self::Order { .. } => Class::Order,
             Self::Lost { .. } => Class::Lost,
@@ -399,6 +408,7 @@ impl Kind {
             Self::Cut { finger, entity, force_n } => {
                 Facts { finger: Some(finger), entity, force_n: Some(force_n), ..of("cut") }
             }
+            Self::Crowded { finger } => Facts { finger: Some(finger), ..of("crowded") },
             Self::Reset => of("reset"),
             Self::Scene { number } => Facts { number: Some(number.into()), ..of("scene") },
             Self::Order { number } => Facts { number: Some(number), ..of("order") },
