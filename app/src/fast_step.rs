@@ -29,7 +29,7 @@ pub use watched::EventTeller;
 use crate::displaced::Placed;
 use crate::lists_end::ListsEnd;
 use crate::mount::Mount;
-use crate::passive_port::{Tick, keep_passive};
+use crate::passive_port::{PassivePort, Rendering, Tick};
 use crate::row::{BodyRow, Row};
 use crate::slow_thread::SlowRemains;
 use finger::{World, finite_or_zero};
@@ -64,7 +64,7 @@ pub struct FastStep {
     /// How far each finger was carried through the world since the last tick (m): no device's velocity tells of it.
     carried_W: Vec<Vector3<f64>>,
     /// What keeps each finger passive, if anything does.
-    passivities: Vec<Option<Passivity>>,
+    passive_ports: Vec<Option<PassivePort>>,
     /// Of each finger.
     lines: Vec<LastLine>,
     /// How much of the forces is felt, 0 to 1.
@@ -82,7 +82,7 @@ impl FastStep {
     pub fn new(fingers: Vec<DeviceFinger>, entities: Vec<Entity>, period_ns: u64) -> Self {
         let (tips_D, carried_W) = (vec![None; fingers.len()], vec![Vector3::zeros(); fingers.len()]);
         let period_s = period_ns as f64 / 1e9;
-        let passivities = vec![None; fingers.len()];
+        let passive_ports = fingers.iter().map(|_| None).collect();
         let passages = vec![Passage::new(&[]); fingers.len()];
         let lines = fingers.iter().map(|own| LastLine::new(&own.finger)).collect();
         // Each made anew: a clone of a list without entries has no room.
@@ -100,7 +100,7 @@ impl FastStep {
             driver_estimates: false,
             tips_D,
             carried_W,
-            passivities,
+            passive_ports,
             lines,
             strength: 1.0,
             doors: Vec::new(),
@@ -219,8 +219,8 @@ impl FastStep {
     /// With fingers whose forces do not feed energy into the hand, one for each finger; `None`: as rendered.
     #[must_use]
     pub fn with_passivities(mut self, passivities: impl IntoIterator<Item = Option<Passivity>>) -> Self {
-        for (own, given) in self.passivities.iter_mut().zip(passivities) {
-            *own = given;
+        for ((own, given), finger) in self.passive_ports.iter_mut().zip(passivities).zip(&self.fingers) {
+            *own = given.map(|passivity| PassivePort::new(passivity, finger.finger.capacity()));
         }
         self
     }
@@ -287,9 +287,9 @@ impl FastStep {
         }
         self.objects.let_go(&self.entities, frame.run_tick >= 0);
         let tick = Tick::new(frame, &self.entities, dt_s);
-        let guards = self.passivities.iter_mut().zip(&mut self.lines);
+        let guards = self.passive_ports.iter_mut().zip(&mut self.lines);
         let states = all_carried_W.iter().zip(self.finger_effects.iter().zip(guards));
-        for (index, ((finger, row), (carried_W, (felt, (passivity, line))))) in
+        for (index, ((finger, row), (carried_W, (felt, (port, line))))) in
             self.fingers.iter().zip(&mut row.fingers).zip(states).enumerate()
         {
             let Some(device) = devices.get(finger.device) else {
@@ -302,9 +302,10 @@ impl FastStep {
                 Line { index, finger: &finger.finger, felt, strength: self.strength, dt_s, hip_W: row.hip };
             row.force_on_user =
                 finite_or_zero(line.hold(row.force_on_user, &of, &mut self.objects, &self.entities));
-            if let Some(passivity) = passivity {
+            if let Some(port) = port {
                 let wanted_W = row.force_on_user;
-                keep_passive(passivity, finger, felt, device, *carried_W, &tick, row);
+                let of = Rendering { finger, felt, strength: self.strength };
+                port.keep(&of, device, *carried_W, &tick, row);
                 self.objects.owe(index, row.force_on_user - wanted_W, finger, felt);
             }
             command.devices[finger.device].force_on_user_n = finger.mount.force_to_device(row.force_on_user);
@@ -374,7 +375,7 @@ impl FastStep {
         for finger in &mut self.fingers {
             finger.finger.reset();
         }
-        self.passivities.iter_mut().flatten().for_each(Passivity::reset);
+        self.passive_ports.iter_mut().flatten().for_each(PassivePort::reset);
         self.lines.iter_mut().for_each(LastLine::reset);
         self.finger_effects.iter_mut().for_each(FingerEffects::reset);
         self.passages.iter_mut().for_each(Passage::reset);

@@ -57,10 +57,12 @@
 //! at rest nothing chatters; no input makes it not finite. No allocation.
 //! Cost: some ten nanoseconds while nothing is changed, about a microsecond while something is.
 
+mod balance;
 mod limit;
 mod port;
 
-pub use port::{Port, Rendered};
+use balance::{Balance, Interval};
+pub use port::{Port, Pressing, Rendered};
 
 use nalgebra::Vector3;
 
@@ -89,16 +91,36 @@ pub struct Passivity {
     period_s: f64,
     /// All that was fed since the beginning (J).
     energy_j: f64,
-    /// What of it nobody has paid for; negative: credit (J).
-    balance_j: f64,
-    /// What springs held in the last tick (J).
-    stored_j: f64,
+    /// Of the whole force, and of what of it presses along normals.
+    whole: Balance,
+    pressing: Balance,
     position_W: Option<Vector3<f64>>,
-    /// Follows the position when it is a count away: what friction acts on.
+    /// Follow the position when it is a count away, all around and along the normal: what friction acts on.
     dragged_W: Vector3<f64>,
+    dragged_along_W: Vector3<f64>,
     /// The force that acts until the next tick, and the one after it where forces come late.
-    acting_W: Vector3<f64>,
-    pending_W: Vector3<f64>,
+    acting: Held,
+    pending: Held,
+}
+
+/// A force that is held between ticks (N), and what of it presses along normals.
+#[derive(Debug, Clone, Copy)]
+struct Held {
+    force_W: Vector3<f64>,
+    normal_W: Vector3<f64>,
+}
+
+impl Held {
+    const NOTHING: Self =
+        Self { force_W: Vector3::new(0.0, 0.0, 0.0), normal_W: Vector3::new(0.0, 0.0, 0.0) };
+
+    /// The same where motors made another force of it: the normal force has the same share.
+    fn applied(&self, applied_W: Option<Vector3<f64>>) -> Self {
+        let Some(force_W) = applied_W.filter(is_finite) else { return *self };
+        let share = force_W.dot(&self.force_W) / self.force_W.norm_squared();
+        let share = if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) };
+        Self { force_W, normal_W: self.normal_W * share }
+    }
 }
 
 impl PassivitySpec {
@@ -156,12 +178,13 @@ impl Passivity {
             spec: spec.validated()?,
             period_s: above_zero("period_s", period_s)?,
             energy_j: 0.0,
-            balance_j: 0.0,
-            stored_j: 0.0,
+            whole: Balance::default(),
+            pressing: Balance::default(),
             position_W: None,
             dragged_W: Vector3::zeros(),
-            acting_W: Vector3::zeros(),
-            pending_W: Vector3::zeros(),
+            dragged_along_W: Vector3::zeros(),
+            acting: Held::NOTHING,
+            pending: Held::NOTHING,
         })
     }
 
@@ -177,7 +200,7 @@ impl Passivity {
 
     /// What was fed and not paid for \[J\]; negative while the hand may have something back.
     pub fn balance_j(&self) -> f64 {
-        self.balance_j
+        self.whole.unpaid_j()
     }
 
     /// One tick: sees what the last force did, and chooses the next.
@@ -186,22 +209,29 @@ impl Passivity {
             self.reset();
             return self.rendered(Vector3::zeros(), port);
         }
-        let (moved_W, ticks) = self.observe(port);
+        let pressing = port.pressing.if_finite();
+        let (moved_W, ticks) = self.observe(port, &pressing);
+        let bound_j = self.spec.bound_j;
         let spread = 0.5 * (ticks + 1.0);
         let surprise_m = self.spec.surprise_m(self.period_s, spread);
-        let mut budget_j = self.spec.bound_j - self.balance_j;
-        let force_W = if port.is_late {
-            // What is on its way has been paid for in the tick before.
-            let due_j = limit::most_j(&self.pending_W, &moved_W, surprise_m);
-            let of_springs_j = self.spec.bound_j + self.stored_j;
-            budget_j = (budget_j - due_j.max(0.0)).clamp(0.0, of_springs_j);
-            let surprise_m = self.spec.surprise_m(self.period_s, spread + 1.0);
-            limit::nearest(port.force_on_user_W, moved_W, surprise_m, budget_j)
-        } else {
-            limit::nearest(port.force_on_user_W, moved_W, surprise_m, budget_j)
+        let next_surprise_m =
+            if port.is_late { self.spec.surprise_m(self.period_s, spread + 1.0) } else { surprise_m };
+        let budget_j = |balance: &Balance, pending_W: &Vector3<f64>| {
+            if port.is_late {
+                balance.budget_beside_j(limit::most_j(pending_W, &moved_W, surprise_m), bound_j)
+            } else {
+                balance.budget_j(bound_j)
+            }
         };
-        self.acting_W = if port.is_late { self.pending_W } else { force_W };
-        self.pending_W = force_W;
+        let normal_j = budget_j(&self.pressing, &self.pending.normal_W);
+        let share = limit::share(&pressing.normal_on_user_W, &moved_W, next_surprise_m, normal_j);
+        let wanted_W = limit::without(port.force_on_user_W, pressing.force_on_user_W * (1.0 - share));
+        let whole_j = budget_j(&self.whole, &self.pending.force_W);
+        let force_W = limit::nearest(wanted_W, moved_W, next_surprise_m, whole_j);
+        let chosen = Held { force_W: wanted_W, normal_W: pressing.normal_on_user_W * share };
+        let chosen = chosen.applied(Some(force_W));
+        self.acting = if port.is_late { self.pending } else { chosen };
+        self.pending = chosen;
         self.rendered(force_W, port)
     }
 
@@ -210,53 +240,67 @@ impl Passivity {
         if let Some(position_W) = &mut self.position_W {
             *position_W += by_W;
             self.dragged_W += by_W;
+            self.dragged_along_W += by_W;
         }
     }
 
     /// Forgets where the finger was, and what it had stored; debts stay.
     pub fn reset(&mut self) {
         self.position_W = None;
-        (self.acting_W, self.pending_W) = (Vector3::zeros(), Vector3::zeros());
-        (self.balance_j, self.stored_j) = (self.balance_j.max(0.0), 0.0);
+        (self.acting, self.pending) = (Held::NOTHING, Held::NOTHING);
+        self.whole.forget();
+        self.pressing.forget();
     }
 
     /// Sums up the interval that ends now. Returns how far a usual tick of it went (m), and how many there were.
-    fn observe(&mut self, port: &Port) -> (Vector3<f64>, f64) {
+    fn observe(&mut self, port: &Port, pressing: &Pressing) -> (Vector3<f64>, f64) {
         let ticks = port.ticks(self.period_s);
         let from_W = self.position_W.replace(port.position_W);
         let moved_W = from_W.map(|from_W| port.position_W - from_W);
         // No hand moves like that: a sensor that was put right, say.
         let most_m = MOST_M_PER_S * ticks * self.period_s;
         let moved_W = moved_W.filter(|moved_W| moved_W.norm() <= most_m).unwrap_or_else(|| {
-            self.dragged_W = port.position_W;
+            (self.dragged_W, self.dragged_along_W) = (port.position_W, port.position_W);
             Vector3::zeros()
         });
-        let held_W = port.applied_on_user_W.filter(is_finite).unwrap_or(self.acting_W);
-        let fed_j = held_W.dot(&moved_W).clamp(-MOST_J, MOST_J);
+        let held = self.acting.applied(port.applied_on_user_W);
+        let fed_j = held.force_W.dot(&moved_W).clamp(-MOST_J, MOST_J);
+        let pressed_j = (held.normal_W.dot(&moved_W) - pressing.turned_j).clamp(-MOST_J, MOST_J);
         if !fed_j.is_nan() {
             self.energy_j += fed_j;
-            self.balance_j += fed_j;
         }
-        self.pay(port.position_W, ticks * self.period_s);
-        let before_j = std::mem::replace(&mut self.stored_j, port.stored_j());
-        // A force that is on its way was the springs' when it was chosen.
-        let credit_j = if port.is_late { self.stored_j.max(before_j) } else { self.stored_j };
-        self.balance_j = self.balance_j.max(-credit_j).min(self.spec.bound_j);
+        let (way_m, way_along_m) = self.drag(port.position_W, &held.normal_W);
+        let paid_j =
+            |way_m: f64| self.spec.recovery_w * (ticks * self.period_s) + self.spec.device_friction_n * way_m;
+        let interval = |fed_j, way_m, stored_j| Interval {
+            fed_j,
+            paid_j: paid_j(way_m),
+            stored_j,
+            is_late: port.is_late,
+        };
+        let whole = interval(fed_j, way_m, port.stored_j());
+        let along = interval(pressed_j, way_along_m, pressing.stored_j);
+        self.whole.take(&whole, self.spec.bound_j);
+        self.pressing.take(&along, self.spec.bound_j);
         (moved_W / ticks, ticks)
     }
 
-    /// A debt becomes smaller, and no credit.
-    fn pay(&mut self, position_W: Vector3<f64>, dt_s: f64) {
+    /// What way the device's friction acted on (m): all of it, and that along the normal force. A counter that flickers
+    /// moves nothing.
+    fn drag(&mut self, position_W: Vector3<f64>, normal_W: &Vector3<f64>) -> (f64, f64) {
+        let slack_m = 2.0 * self.spec.resolution_m;
         let behind_W = position_W - self.dragged_W;
-        // A counter that flickers moves nothing.
-        let way_m = behind_W.norm() - 2.0 * self.spec.resolution_m;
+        let way_m = behind_W.norm() - slack_m;
         if way_m > 0.0 {
             self.dragged_W += behind_W * (way_m / behind_W.norm());
         }
-        if self.balance_j > 0.0 {
-            let paid_j = self.spec.recovery_w * dt_s + self.spec.device_friction_n * way_m.max(0.0);
-            self.balance_j = (self.balance_j - paid_j).max(0.0);
-        }
+        let Some(n_W) = normal_W.try_normalize(0.0) else {
+            self.dragged_along_W = position_W;
+            return (way_m.max(0.0), 0.0);
+        };
+        let behind_m = (position_W - self.dragged_along_W).dot(&n_W);
+        self.dragged_along_W = position_W - n_W * behind_m.clamp(-slack_m, slack_m);
+        (way_m.max(0.0), (behind_m.abs() - slack_m).max(0.0))
     }
 
     fn rendered(&self, force_on_user_W: Vector3<f64>, port: &Port) -> Rendered {

@@ -22,7 +22,8 @@ fn way(places: &[[f64; 3]]) -> String {
 /// The crowd on a plate whose surface is at y = 0, with the plate as the last entity.
 fn scene<'t>(radius_m: f64, things: impl Iterator<Item = (usize, &'t Thing)>) -> String {
     let mut text = format!("[[finger]]\nstart_m = [0.0, 0.05, 0.0]\nradius_m = {radius_m:?}\n");
-    for (at, Thing { shape, place: V { x, y, z, .. } }) in things {
+    for (at, Thing { shape, place }) in things {
+        let [x, y, z]: [f64; 3] = (*place).into();
         let _ = write!(
             text,
             "[[entity]]\nname = \"thing{at}\"\nshape = {{ {shape} }}\nposition_m = [{x:?}, {y:?}, {z:?}]\n\

@@ -50,6 +50,23 @@ pub(super) fn nearest(
     within(found.force_W, &force_W, most_j(&found.force_W, &way_W, surprise_m), budget_j)
 }
 
+/// The largest share, 0 to 1, of this force (N) that cannot feed more than `budget_j`.
+pub(super) fn share(force_W: &Vector3<f64>, way_W: &Vector3<f64>, surprise_m: f64, budget_j: f64) -> f64 {
+    let most = most_j(force_W, way_W, surprise_m);
+    if most <= budget_j {
+        1.0
+    } else if most.is_finite() && budget_j > 0.0 {
+        budget_j / most
+    } else {
+        0.0
+    }
+}
+
+/// A force (N) without this part of it: not longer than with it, and not against it.
+pub(super) fn without(force_W: Vector3<f64>, part_W: Vector3<f64>) -> Vector3<f64> {
+    if part_W == Vector3::zeros() { force_W } else { within(force_W - part_W, &force_W, 0.0, 0.0) }
+}
+
 /// What a multiplier makes of a force.
 struct Braked {
     force_W: Vector3<f64>,

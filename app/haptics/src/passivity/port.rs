@@ -19,6 +19,41 @@ pub struct Port {
     pub is_late: bool,
     /// Time since the last tick \[s\].
     pub dt_s: f64,
+    /// What of the wanted force comes of surfaces.
+    pub pressing: Pressing,
+}
+
+/// The part of a force that comes of surfaces, and of it what presses along their normals; world frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pressing {
+    /// All of it, friction included \[N\].
+    pub force_on_user_W: Vector3<f64>,
+    /// The sum of the contacts' normal forces \[N\].
+    pub normal_on_user_W: Vector3<f64>,
+    /// The most that what renders the normal forces can have stored \[J\].
+    pub stored_j: f64,
+    /// What normals that have turned since the last tick made of tangential forces: the sum of
+    /// `F_n (g - x) . (n - n_before)` over contacts, g the god-object \[J\].
+    pub turned_j: f64,
+}
+
+impl Pressing {
+    /// Nothing is touched.
+    pub const NOTHING: Self = Self {
+        force_on_user_W: Vector3::new(0.0, 0.0, 0.0),
+        normal_on_user_W: Vector3::new(0.0, 0.0, 0.0),
+        stored_j: 0.0,
+        turned_j: 0.0,
+    };
+
+    /// Nothing, where a number is none.
+    pub(super) fn if_finite(&self) -> Self {
+        let is_told = is_finite(&self.force_on_user_W)
+            && is_finite(&self.normal_on_user_W)
+            && self.stored_j.is_finite()
+            && self.turned_j.is_finite();
+        if is_told { Self { stored_j: self.stored_j.max(0.0), ..*self } } else { Self::NOTHING }
+    }
 }
 
 /// What comes out.
@@ -35,7 +70,15 @@ pub struct Rendered {
 impl Port {
     /// A finger here \[m\] that is to feel this force \[N\] at once, of a source that stores nothing.
     pub fn new(position_W: Vector3<f64>, force_on_user_W: Vector3<f64>, dt_s: f64) -> Self {
-        Self { position_W, force_on_user_W, applied_on_user_W: None, stored_j: 0.0, is_late: false, dt_s }
+        Self {
+            position_W,
+            force_on_user_W,
+            applied_on_user_W: None,
+            stored_j: 0.0,
+            is_late: false,
+            dt_s,
+            pressing: Pressing::NOTHING,
+        }
     }
 
     /// From a source that can have stored so much \[J\].
