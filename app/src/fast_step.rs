@@ -286,7 +286,7 @@ impl FastStep {
             self.objects.has_not_stepped();
         }
         self.objects.let_go(&self.entities, frame.run_tick >= 0);
-        let tick = Tick::new(frame, &self.entities, dt_s);
+        let tick = Tick::new(frame, dt_s);
         let guards = self.passive_ports.iter_mut().zip(&mut self.lines);
         let states = all_carried_W.iter().zip(self.finger_effects.iter().zip(guards));
         for (index, ((finger, row), (carried_W, (felt, (port, line))))) in

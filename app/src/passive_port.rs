@@ -11,29 +11,27 @@
 
 use crate::fast_step::DeviceFinger;
 use crate::row::FingerRow;
+use haptics::FingerEffects;
 use haptics::passivity::{Passivity, Port, Pressing};
-use haptics::{Entity, FingerEffects};
 use nalgebra::Vector3;
 use shm_abi::frame::DEVICE_POSITION_VALID;
 use shm_abi::{DeviceFrame, Frame};
 
 /// What happens in a tick, for all fingers.
 #[derive(Debug, Clone, Copy)]
-pub struct Tick<'a> {
-    /// The entities as they were felt.
-    pub entities: &'a [Entity],
+pub struct Tick {
     /// Whether commands drive the motors a tick after the reading that they answer.
     pub is_late: bool,
     /// Time since the last one (s).
     pub dt_s: f64,
 }
 
-impl<'a> Tick<'a> {
+impl Tick {
     /// Of a frame.
-    pub fn new(frame: &Frame, entities: &'a [Entity], dt_s: f64) -> Self {
+    pub fn new(frame: &Frame, dt_s: f64) -> Self {
         let previous = &frame.previous;
         let is_late = previous.authority > 0.0 && previous.command_tick.saturating_add(1) < frame.tick;
-        Self { entities, is_late, dt_s }
+        Self { is_late, dt_s }
     }
 }
 
@@ -76,7 +74,7 @@ impl PassivePort {
         of: &Rendering<'_>,
         device: &DeviceFrame,
         carried_W: Vector3<f64>,
-        tick: &Tick<'_>,
+        tick: &Tick,
         row: &mut FingerRow,
     ) {
         if device.flags & DEVICE_POSITION_VALID == 0 {
@@ -85,7 +83,7 @@ impl PassivePort {
             return;
         }
         self.controller.carry(carried_W);
-        let (springs_j, pressing) = self.springs(of, tick.entities, &row.hip);
+        let (springs_j, pressing) = self.springs(of, &row.hip);
         let rendered = self.controller.step(&Port {
             position_W: row.hip,
             force_on_user_W: row.force_on_user,
@@ -100,12 +98,11 @@ impl PassivePort {
     }
 
     /// What the springs of all contacts hold under their present forces (J), and what of it presses along normals.
-    fn springs(&mut self, of: &Rendering<'_>, entities: &[Entity], hip_W: &Vector3<f64>) -> (f64, Pressing) {
+    fn springs(&mut self, of: &Rendering<'_>, hip_W: &Vector3<f64>) -> (f64, Pressing) {
         let (mut springs_j, mut all) = (0.0, Pressing::NOTHING);
         self.next.clear();
         for contact in of.finger.finger.contacts().take(self.next.capacity()) {
-            let Some(entity) = entities.get(contact.entity) else { continue };
-            let spring_j = |force_squared: f64| 0.5 * force_squared / entity.stiffness_n_per_m;
+            let spring_j = |force_squared: f64| 0.5 * force_squared / contact.stiffness_n_per_m;
             springs_j += spring_j(contact.force_on_user_W.norm_squared());
             let normal_n = contact.normal_force_n * of.strength;
             all.force_on_user_W += contact.force_on_user_W * of.strength;

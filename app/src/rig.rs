@@ -6,6 +6,7 @@ mod doors;
 mod effects;
 mod entities;
 mod error;
+mod face_labels;
 mod material;
 mod models;
 mod moving;

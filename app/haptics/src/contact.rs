@@ -14,15 +14,17 @@ use nalgebra::Vector3;
 use crate::algorithm::{Algorithm, ContactAlgorithm, ContactMemory, Touch, TouchInput};
 use crate::balls::Balls;
 use crate::classic_god_object::ClassicGodObject;
+use crate::contact_stiffness::ContactStiffness;
 use crate::csg::CsgCone;
 use crate::entity::Entity;
+use crate::face_materials::FeltMaterial;
 use crate::frame::{is_finite, point_into_body, point_into_world, vector_into_body, vector_into_world};
 use crate::friction::Friction;
 use crate::friction_cone::{ConeInput, FrictionCone};
 use crate::friction_law::{FrictionLaw, FrictionState};
 use crate::height_map::Over;
 use crate::hip::Hip;
-use crate::mesh::{Beginning, Mesh, MeshCone};
+use crate::mesh::{BallOnMesh, Beginning, Mesh, MeshCone};
 use crate::nurbs::NurbsCone;
 use crate::onset::Onset;
 use crate::shading::Shading;
@@ -46,6 +48,11 @@ pub struct Contact {
     pub normal_W: Vector3<f64>,
     /// What it rests on.
     pub feature: Feature,
+    /// Of a mesh's face on which it was when the tick began: what friction and damping go by
+    /// ([`Entity::felt_material`]).
+    pub label: u16,
+    /// Stiffness in this tick \[N/m\].
+    pub stiffness_n_per_m: f64,
     /// Whether it holds or slides.
     pub friction: FrictionState,
     /// Whether the god-object is farther from the HIP than a tick ago by more than finger and entity have moved: the force
@@ -95,11 +102,37 @@ pub(crate) struct Slot {
     /// Whether anything was noted here since it was new.
     is_used: bool,
     onset: Onset,
+    /// Of the mesh's face that the god-object is on.
+    label: u16,
+    stiffness: ContactStiffness,
     /// The most that dampers made of the force in the last tick (N).
     damped_n: f64,
     /// Inside, but above a dent of the entity's height map: nothing is felt, and nothing begins anew.
     hovers: bool,
     pub(crate) contact: Option<Contact>,
+}
+
+/// What a contact that begins changes of a slot.
+struct Before {
+    mesh: MeshCone,
+    on_mesh: Option<BallOnMesh>,
+    own: ContactMemory,
+    kept: Kept,
+    onset: Onset,
+}
+
+impl Before {
+    fn of(slot: &Slot) -> Self {
+        let on_mesh = slot.balls.as_ref().map(|balls| balls.on_mesh);
+        Self { mesh: slot.mesh, on_mesh, own: slot.own, kept: slot.kept, onset: slot.onset }
+    }
+
+    fn restore(self, slot: &mut Slot) {
+        (slot.mesh, slot.own, slot.kept, slot.onset) = (self.mesh, self.own, self.kept, self.onset);
+        if let (Some(balls), Some(on_mesh)) = (&mut slot.balls, self.on_mesh) {
+            balls.on_mesh = on_mesh;
+        }
+    }
 }
 
 /// Whoever looked after the contact in the last tick. The others know nothing of what happened since they did, and so
@@ -211,9 +244,84 @@ impl Slot {
         }
         let previous_B = sweep.previous_hip_W.map(|p_W| point_into_body(&entity.previous_X_WB, &p_W));
         let previous_B = previous_B.filter(is_finite);
+        if entity.face_materials.is_some() {
+            self.touch_labelled(index, entity, sweep, (hip_B, previous_B))
+        } else {
+            let material = entity.felt_material(0);
+            self.touch_of(index, entity, sweep, (hip_B, previous_B), &material)
+        }
+    }
+
+    /// Of a mesh of several materials.
+    #[inline(never)]
+    fn touch_labelled(
+        &mut self,
+        index: usize,
+        entity: &Entity,
+        sweep: &Sweep<'_>,
+        way: (Vector3<f64>, Option<Vector3<f64>>),
+    ) -> Option<Contact> {
+        let begins = !self.has_met();
+        // Where a contact begins, the face that is met says what is felt: nobody knows before.
+        let before = begins.then(|| Before::of(self));
+        let label = self.label;
+        let own = entity.felt_material(label);
+        if begins {
+            self.stiffness = ContactStiffness::new(own.stiffness_n_per_m);
+        }
+        let mut material = own;
+        let way_m = way.1.map_or(0.0, |previous_B| (way.0 - previous_B).norm());
+        material.stiffness_n_per_m = self.stiffness.step(own.stiffness_n_per_m, way_m, sweep.dt_s);
+        let contact = self.touch_again(index, entity, sweep, way, &material)?;
+        if self.label == label {
+            return Some(contact);
+        }
+        let Some(before) = before else {
+            self.forget_friction();
+            return Some(contact);
+        };
+        before.restore(self);
+        let material = entity.felt_material(self.label);
+        self.stiffness = ContactStiffness::new(material.stiffness_n_per_m);
+        self.touch_again(index, entity, sweep, way, &material)
+    }
+
+    /// Not inlined twice.
+    #[inline(never)]
+    fn touch_again(
+        &mut self,
+        index: usize,
+        entity: &Entity,
+        sweep: &Sweep<'_>,
+        way: (Vector3<f64>, Option<Vector3<f64>>),
+        material: &FeltMaterial<'_>,
+    ) -> Option<Contact> {
+        self.touch_of(index, entity, sweep, way, material)
+    }
+
+    fn forget_friction(&mut self) {
+        match self.kept {
+            Kept::Mesh => self.mesh.forget_friction(),
+            Kept::Rolling => {
+                if let Some(balls) = &mut self.balls {
+                    balls.on_mesh.forget_friction();
+                }
+            }
+            _ => {}
+        }
+    }
+
+    #[inline(always)]
+    fn touch_of(
+        &mut self,
+        index: usize,
+        entity: &Entity,
+        sweep: &Sweep<'_>,
+        (hip_B, previous_B): (Vector3<f64>, Option<Vector3<f64>>),
+        material: &FeltMaterial<'_>,
+    ) -> Option<Contact> {
         // Nobody else looks at it.
-        let is_asked_for =
-            entity.felt_damping_n_s_per_m() != 0.0 || entity.algorithm != Algorithm::FrictionCone;
+        let is_asked_for = material.damping_n_s_per_m != 0.0 || entity.algorithm != Algorithm::FrictionCone;
         let cone = ConeInput {
             hip_B,
             hip_velocity_B: if is_asked_for {
@@ -221,8 +329,8 @@ impl Slot {
             } else {
                 Vector3::zeros()
             },
-            stiffness_n_per_m: entity.felt_stiffness_n_per_m(),
-            damping_n_s_per_m: entity.felt_damping_n_s_per_m(),
+            stiffness_n_per_m: material.stiffness_n_per_m,
+            damping_n_s_per_m: material.damping_n_s_per_m,
             dt_s: sweep.dt_s,
         };
         let lift_m = match &entity.height_map {
@@ -235,7 +343,7 @@ impl Slot {
         let input = TouchInput {
             shape: entity.shape_for(sweep.finger_radius_m),
             // Above a dent nothing holds the god-object back.
-            friction: if self.hovers { &Friction::None } else { &entity.friction },
+            friction: if self.hovers { &Friction::None } else { material.friction },
             finger_radius_m: sweep.finger_radius_m + lift_m,
             previous_hip_B: previous_B,
             cone,
@@ -246,10 +354,10 @@ impl Slot {
             (&entity.algorithm, &entity.shape, is_point)
         {
             let Some(touch) = self.touch_mesh(mesh, &input) else { return self.part() };
-            return self.feel(index, entity, touch, &input, sweep);
+            return self.feel(index, entity, touch, &input, (sweep, material));
         }
         let Some(touch) = self.touch_by_any(entity, &input) else { return self.part() };
-        self.feel(index, entity, touch, &input, sweep)
+        self.feel(index, entity, touch, &input, (sweep, material))
     }
 
     #[inline(never)]
@@ -371,30 +479,41 @@ impl Slot {
         entity: &Entity,
         mut touch: Touch,
         input: &TouchInput<'_>,
-        sweep: &Sweep<'_>,
+        (sweep, material): (&Sweep<'_>, &FeltMaterial<'_>),
     ) -> Option<Contact> {
+        let label = self.label;
         let share = self.onset.share_of(&touch, input, [sweep.dt_s, sweep.ramp_in_s]);
         let spring_n = input.cone.stiffness_n_per_m * input.way_m();
-        let is_plain = self.onset.came_on_n() == 0.0 && entity.is_plain();
-        let explained_n = if is_plain { spring_n } else { self.explained_n(entity, &touch, input, spring_n) };
+        let share =
+            if entity.face_materials.is_some() { share * self.share_of_faces(&touch, input) } else { share };
+        let is_plain = self.onset.came_on_n() == 0.0 && entity.is_plain(material);
+        let explained_n =
+            if is_plain { spring_n } else { self.explained_n(entity, material, &touch, input, spring_n) };
         // Apart, so that a touch that stays as it is stays in registers.
         if !matches!(entity.shading, Shading::None) || entity.height_map.is_some() {
-            touch = self.shade_and_raise(entity, touch, sweep)?;
+            touch = self.shade_and_raise(entity, touch, sweep, input.cone.stiffness_n_per_m)?;
         }
         if share != 1.0 {
             touch.force_on_user_B *= share;
             touch.normal_force_n *= share;
         }
-        in_world(index, entity, &touch, &self.onset, explained_n)
+        in_world(index, entity, &touch, &self.onset, (explained_n, label, input.cone.stiffness_n_per_m))
     }
 
     /// What a change of the force is explained by, if not by the spring's end alone, which moved by so much force (N).
     #[inline(never)]
-    fn explained_n(&mut self, entity: &Entity, touch: &Touch, input: &TouchInput<'_>, spring_n: f64) -> f64 {
+    fn explained_n(
+        &mut self,
+        entity: &Entity,
+        material: &FeltMaterial<'_>,
+        touch: &Touch,
+        input: &TouchInput<'_>,
+        spring_n: f64,
+    ) -> f64 {
         let cone = &input.cone;
         let force_n = touch.force_on_user_B.norm();
         // A damper answers to both velocities, since it is silent where the spring is relaxed.
-        let dragged_n = if entity.friction.drags() { force_n } else { 0.0 };
+        let dragged_n = if material.friction.drags() { force_n } else { 0.0 };
         let damped_n = cone.damping_n_s_per_m * cone.hip_velocity_B.norm() + dragged_n;
         let damped_n = damped_n + std::mem::replace(&mut self.damped_n, damped_n);
         // The force turns with the entity.
@@ -404,12 +523,28 @@ impl Slot {
             let [low_m, high_m] = map.range_m();
             cone.stiffness_n_per_m * (high_m - low_m)
         });
-        spring_n + damped_n + force_n * turn + self.onset.came_on_n() + heights_n
+        let regained_n = self.stiffness.regained_n(input.way_m());
+        spring_n + regained_n + damped_n + force_n * turn + self.onset.came_on_n() + heights_n
+    }
+
+    /// What stiffer faces leave of the spring, and where the next tick begins.
+    #[inline(never)]
+    fn share_of_faces(&mut self, touch: &Touch, input: &TouchInput<'_>) -> f64 {
+        if let Shape::Mesh(mesh) = input.shape {
+            self.label = mesh.label(touch.god_object.piece);
+        }
+        self.stiffness.share((touch.god_object.point_B - input.cone.hip_B).norm())
     }
 
     /// The touch as the entity's facets and heights have it; `None` above a dent.
     #[inline(never)]
-    fn shade_and_raise(&mut self, entity: &Entity, mut touch: Touch, sweep: &Sweep<'_>) -> Option<Touch> {
+    fn shade_and_raise(
+        &mut self,
+        entity: &Entity,
+        mut touch: Touch,
+        sweep: &Sweep<'_>,
+        stiffness_n_per_m: f64,
+    ) -> Option<Touch> {
         match self.balls.as_ref().filter(|balls| balls.is_touching()) {
             Some(balls) => entity.shading.turn_shares(&entity.shape, balls.shares(), &mut touch),
             None => entity.shading.turn(&entity.shape, &mut touch),
@@ -417,7 +552,7 @@ impl Slot {
         if let Some(height_map) = &entity.height_map {
             let over = Over {
                 shape: &entity.shape,
-                stiffness_n_per_m: entity.felt_stiffness_n_per_m(),
+                stiffness_n_per_m,
                 finger_radius_m: sweep.finger_radius_m,
                 hip_B: point_into_body(&entity.X_WB, &sweep.hip.position_W),
             };
@@ -461,7 +596,7 @@ fn in_world(
     entity: &Entity,
     touch: &Touch,
     onset: &Onset,
-    explained_n: f64,
+    (explained_n, label, stiffness_n_per_m): (f64, u16, f64),
 ) -> Option<Contact> {
     let god_object = &touch.god_object;
     let contact = Contact {
@@ -471,6 +606,8 @@ fn in_world(
         god_object_W: point_into_world(&entity.X_WB, &god_object.point_B),
         normal_W: vector_into_world(&entity.X_WB, &god_object.normal_B),
         feature: god_object.feature,
+        label,
+        stiffness_n_per_m,
         friction: touch.friction,
         leapt: onset.leapt(),
         missing_n: onset.missing_n(),

@@ -8,6 +8,7 @@ use crate::algorithm::Algorithm;
 use crate::door::WORLD;
 use crate::effects::{Magnetism, Vibration};
 use crate::error::{ParameterError, above_zero, at_least_zero, share};
+use crate::face_materials::{FaceMaterials, FeltMaterial};
 use crate::friction::Friction;
 use crate::friction_law::FrictionLaw;
 use crate::height_map::HeightMap;
@@ -50,6 +51,8 @@ pub struct Entity {
     pub felt: Felt,
     /// Friction of its surface.
     pub friction: Friction,
+    /// What faces of a mesh are made of that have labels.
+    pub face_materials: Option<Shared<FaceMaterials>>,
     /// How much of an approaching velocity it gives back to what bounces off it, 0 to 1; no finger feels it. `None`: nobody
     /// says.
     pub restitution: Option<f64>,
@@ -90,6 +93,7 @@ impl Entity {
             damping_n_s_per_m: 0.0,
             felt: Felt::default(),
             friction: Friction::None,
+            face_materials: None,
             restitution: None,
             algorithm: Algorithm::FrictionCone,
             shading: Shading::None,
@@ -185,10 +189,10 @@ impl Entity {
 
     /// Whether what is felt of it changes with the way of the finger alone: it does not turn, damp, drag or have heights.
     #[inline]
-    pub(crate) fn is_plain(&self) -> bool {
+    pub(crate) fn is_plain(&self, material: &FeltMaterial<'_>) -> bool {
         self.height_map.is_none()
-            && self.felt_damping_n_s_per_m() == 0.0
-            && !self.friction.drags()
+            && material.damping_n_s_per_m == 0.0
+            && !material.friction.drags()
             && self.X_WB.rotation == self.previous_X_WB.rotation
     }
 

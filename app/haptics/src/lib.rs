@@ -37,6 +37,7 @@ mod classic_god_object;
 mod cone;
 mod constraints;
 mod contact;
+mod contact_stiffness;
 mod convex;
 mod csg;
 mod cuboid;
@@ -46,6 +47,7 @@ mod effects;
 mod ellipsoid;
 mod entity;
 mod error;
+mod face_materials;
 mod finger;
 mod frame;
 mod friction;
@@ -94,6 +96,7 @@ pub use effects::{
 pub use ellipsoid::{Ellipsoid, LARGEST_RATIO};
 pub use entity::{Entity, Felt};
 pub use error::ParameterError;
+pub use face_materials::{FaceMaterial, FaceMaterials, FeltMaterial};
 pub use finger::{ContactState, Finger, FingerOutput};
 pub use friction::{
     Bristles, Dahl, FixedCone, Friction, FrictionCurve, HaywardArmstrong, Karnopp, LuGre, MAX_BRISTLES,

@@ -33,6 +33,7 @@ mod facing;
 mod fan;
 mod hole;
 mod junction;
+mod labels;
 pub mod make;
 mod mesh_cone;
 mod nesting;
@@ -59,6 +60,7 @@ pub use bvh::{Bvh, Hit, Linear, Nearest, Triangles};
 pub use error::MeshError;
 pub use face::{Face, Link};
 pub use hole::CloseHoles;
+pub use labels::FaceData;
 pub use mesh_cone::{Beginning, MeshCone};
 pub use normals::{SHARPEST_CREASE_RAD, VertexNormals};
 pub use report::{Finding, MeshReport, OpenHole, OpenHoles};
@@ -87,6 +89,8 @@ pub struct Mesh {
     identity: u64,
     /// Texture coordinates of each face's corners, where somebody gave any: 24 bytes a face beside its 64.
     uv: Option<Box<[FaceUv]>>,
+    /// The label of each face, where somebody gave any.
+    labels: Option<Box<[u16]>>,
 }
 
 /// From where a mesh, or a part of it that hangs together by edges, can be felt.

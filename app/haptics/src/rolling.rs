@@ -154,6 +154,13 @@ impl<F: Foot, V: Copy + Default> RollingCone<F, V> {
         })
     }
 
+    /// Friction is another one from now on, to which what the last one remembered means nothing.
+    pub(crate) fn forget_friction(&mut self) {
+        if let Some(touching) = &mut self.touching {
+            touching.forget_friction();
+        }
+    }
+
     /// Ends the contact.
     pub(crate) fn let_go(&mut self) {
         if self.touching.is_some() {

@@ -7,7 +7,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use haptics::{ContactState, Cuboid, Entity, Finger, Friction, Plane, Sphere};
+use haptics::{Cuboid, Entity, Finger, Friction, Plane, Sphere};
 use nalgebra::{Isometry3, Vector3};
 use physics::{Body, Integrator, Manipulation, MassProperties, Settings, Touch};
 
@@ -95,14 +95,7 @@ fn held(criterion: &mut Criterion) {
             touches.clear();
             for (index, (finger, hip)) in fingers.iter_mut().zip(hips).enumerate() {
                 finger.step(entities, &(hip + Vector3::y() * up), DT);
-                touches.extend(finger.contacts().map(|contact| Touch {
-                    entity: contact.entity,
-                    finger: index,
-                    point_W: contact.god_object_W,
-                    normal_W: contact.normal_W,
-                    force_on_user_W: contact.force_on_user_W,
-                    is_sticking: ContactState::from(contact.friction) == ContactState::Stick,
-                }));
+                touches.extend(finger.contacts().map(|contact| Touch::of(contact, index)));
             }
         };
         for _ in 0..1700 {

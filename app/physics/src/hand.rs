@@ -171,7 +171,7 @@ impl Hand {
                 break;
             }
             let normal_n = touch.normal_W.dot(&touch.force_on_user_W).max(0.0);
-            let circle = finger.settings.soft.circle(&start.entities[touch.entity], normal_n);
+            let circle = finger.settings.soft.circle(touch, &start.entities[touch.entity], normal_n);
             let (point_W, inward_W) = (touch.point_W, -touch.normal_W);
             pads[count] = Pad { finger: touch.finger, point_W, inward_W, normal_n, circle };
             at[count] = row;

@@ -14,7 +14,7 @@ use std::f64::consts::PI;
 use haptics::{Algorithm, Entity, ParameterError};
 
 use crate::mass::positive;
-use crate::touch::friction_circle_m;
+use crate::touch::{Touch, friction_circle_m};
 
 /// How a finger resists the turning of what it touches.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -155,11 +155,12 @@ impl SoftFinger {
     }
 
     /// The friction circle of a touch that presses with this force.
-    pub(crate) fn circle(&self, entity: &Entity, normal_n: f64) -> Circle {
-        let stiffness_n_per_m = entity.felt_stiffness_n_per_m();
+    pub(crate) fn circle(&self, touch: &Touch, entity: &Entity, normal_n: f64) -> Circle {
+        let material = touch.material(entity);
+        let stiffness_n_per_m = material.stiffness_n_per_m;
         let load_m = normal_n.max(0.0) / stiffness_n_per_m;
         let radius_m = match entity.algorithm {
-            Algorithm::FrictionCone => friction_circle_m(entity, load_m),
+            Algorithm::FrictionCone => friction_circle_m(&material, load_m),
             _ => self.normal_share * load_m,
         };
         let is_number = radius_m.is_finite() && load_m > 0.0;

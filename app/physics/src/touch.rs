@@ -6,7 +6,9 @@
 //! with `k dt^2` of mass added at the contact: stable for every k and m, without drag on a hand that carries. The user is
 //! made to feel that force, the one which the body got.
 
-use haptics::{Entity, FrictionLaw, FrictionMemory, FrictionQuery};
+use haptics::{
+    Contact, ContactState, Entity, FeltMaterial, FrictionLaw, FrictionMemory, FrictionQuery, TouchPoint,
+};
 use nalgebra::Vector3;
 
 use crate::row::{Held, Row, Torsion};
@@ -27,9 +29,38 @@ pub struct Touch {
     pub force_on_user_W: Vector3<f64>,
     /// Whether its friction holds.
     pub is_sticking: bool,
+    /// Stiffness with which it was rendered \[N/m\].
+    pub stiffness_n_per_m: f64,
+    /// Of the face that is touched ([`Entity::felt_material`]).
+    pub label: u16,
 }
 
 impl Touch {
+    /// A finger's whole contact, as at one point.
+    pub fn of(contact: &Contact, finger: usize) -> Self {
+        Self {
+            entity: contact.entity,
+            finger,
+            point_W: contact.god_object_W,
+            normal_W: contact.normal_W,
+            force_on_user_W: contact.force_on_user_W,
+            is_sticking: ContactState::from(contact.friction) == ContactState::Stick,
+            stiffness_n_per_m: contact.stiffness_n_per_m,
+            label: contact.label,
+        }
+    }
+
+    /// One of the points of a finger's contact.
+    pub fn at(point: &TouchPoint, contact: &Contact, finger: usize) -> Self {
+        let TouchPoint { point_W, normal_W, force_on_user_W } = *point;
+        Self { point_W, normal_W, force_on_user_W, ..Self::of(contact, finger) }
+    }
+
+    /// What the entity is made of there.
+    pub(crate) fn material<'e>(&self, entity: &'e Entity) -> FeltMaterial<'e> {
+        FeltMaterial { stiffness_n_per_m: self.stiffness_n_per_m, ..entity.felt_material(self.label) }
+    }
+
     /// As a contact point of this body, whose centre is there and which moves like that when the tick begins.
     pub(crate) fn row(
         &self,
@@ -40,12 +71,12 @@ impl Touch {
         dt_s: f64,
     ) -> Row {
         let arm_W = self.point_W - centre_W;
-        let k = entity.felt_stiffness_n_per_m();
-        let b = entity.felt_damping_n_s_per_m();
+        let material = self.material(entity);
+        let (k, b) = (material.stiffness_n_per_m, material.damping_n_s_per_m);
         let held = if self.is_sticking { Held::Stick } else { Held::Slip };
         let n = -self.normal_W;
         let force_W = -self.force_on_user_W;
-        let mu = self.ratio(&force_W, entity);
+        let mu = self.ratio(&force_W, &material);
         let mut row = Row {
             body,
             other: None,
@@ -67,7 +98,7 @@ impl Touch {
     }
 
     /// Ratio of tangential to normal force that friction allows: the law's while it holds, that which is while it slides.
-    fn ratio(&self, force_W: &Vector3<f64>, entity: &Entity) -> f64 {
+    fn ratio(&self, force_W: &Vector3<f64>, material: &FeltMaterial<'_>) -> f64 {
         let n = -self.normal_W;
         let normal_n = n.dot(force_W);
         let across_n = (force_W - n * normal_n).norm();
@@ -75,16 +106,16 @@ impl Touch {
         if !self.is_sticking {
             return is;
         }
-        let load_m = (normal_n / entity.felt_stiffness_n_per_m()).max(LEAST_LOAD_M);
-        is.max(friction_circle_m(entity, load_m) / load_m)
+        let load_m = (normal_n / material.stiffness_n_per_m).max(LEAST_LOAD_M);
+        is.max(friction_circle_m(material, load_m) / load_m)
     }
 }
 
-/// Radius of the circle within which an entity's friction holds a god-object that is pressed so deep (m).
-pub(crate) fn friction_circle_m(entity: &Entity, load_m: f64) -> f64 {
-    let stiffness_n_per_m = entity.felt_stiffness_n_per_m();
+/// Radius of the circle within which a material's friction holds a god-object that is pressed so deep (m).
+pub(crate) fn friction_circle_m(material: &FeltMaterial<'_>, load_m: f64) -> f64 {
+    let stiffness_n_per_m = material.stiffness_n_per_m;
     let query = FrictionQuery { load_m, stiffness_n_per_m, ..FrictionQuery::default() };
-    let radius_m = entity.friction.held_limit_m(&query, &FrictionMemory::default());
+    let radius_m = material.friction.held_limit_m(&query, &FrictionMemory::default());
     if radius_m.is_finite() { radius_m.max(0.0) } else { 0.0 }
 }
 

@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use world::model;
+use world::model::{self, FaceNames, ModelError};
 
 /// Runs the command: status 0 if the model can be felt, 2 if it cannot, or the options do not fit.
 pub(crate) fn execute(args: &CheckArgs) -> ExitCode {
@@ -38,6 +38,8 @@ struct Understood {
     mesh: Mesh,
     report: MeshReport,
     is_lid: Vec<bool>,
+    /// What its faces are called, if the format has names.
+    names: Option<FaceNames>,
     low: Vector3<f64>,
     high: Vector3<f64>,
     /// Area of its surface and volume of the space in it.
@@ -55,7 +57,11 @@ fn understand(args: &CheckArgs) -> Result<Understood, String> {
         }
         outputs::check(&[Output::model(out)], &[&args.scene]).map_err(|failure| failure.to_string())?;
     }
-    let soup = model::load(&args.scene).map_err(|error| error.to_string())?;
+    let told = |error: ModelError| error.to_string();
+    let bytes = model::read_file(&args.scene).map_err(told)?;
+    let soup = model::read(&args.scene, &bytes).map_err(told)?;
+    let names = model::read_names(&args.scene, &bytes).map_err(told)?;
+    drop(bytes);
     let holes = args.close_holes.map_or(CloseHoles::Small, CloseHoles::UpTo);
     let mut is_lid = Vec::new();
     let built = Mesh::build_and_tell(soup, holes, |_, of_lid| is_lid.push(of_lid));
@@ -70,7 +76,7 @@ fn understand(args: &CheckArgs) -> Result<Understood, String> {
         area += 0.5 * (b - a).cross(&(c - a)).norm();
         volume += a.dot(&b.cross(&c)) / 6.0;
     }
-    Ok(Understood { mesh, report, is_lid, low, high, area, volume })
+    Ok(Understood { mesh, report, is_lid, names, low, high, area, volume })
 }
 
 impl Understood {
@@ -96,6 +102,9 @@ impl Understood {
             row("volume", &format!("{} cubic", short(self.volume)));
         }
         row("unit", "the file's own; a scene takes it for metres, times the mesh's `scale`");
+        if let Some(names) = self.names() {
+            row("names", &names);
+        }
         if let Some(out) = &args.repair {
             row("written", &format!("{}: {}", out.display(), self.written()));
         }
@@ -105,6 +114,17 @@ impl Understood {
         }
         let _ = writeln!(text, "{file}: can be felt");
         text
+    }
+
+    /// What `[[entity.faces]]` can name.
+    fn names(&self) -> Option<String> {
+        let all = self.names.as_ref()?.all();
+        let mut shown: Vec<String> =
+            all.iter().take(MOST_NAMES).map(|(name, faces)| format!("{name} ({faces})")).collect();
+        if all.len() > MOST_NAMES {
+            shown.push(format!("and {} more", all.len() - MOST_NAMES));
+        }
+        (!shown.is_empty()).then(|| format!("{}: of faces, for `[[entity.faces]]`", shown.join(", ")))
     }
 
     /// Consequence for a finger.
@@ -150,7 +170,7 @@ fn to_json(args: &CheckArgs, found: &Result<Understood, String>) -> Value {
         Ok(understood) => understood,
         Err(problem) => return json!({ "ok": false, "file": file, "problems": [{ "message": problem }] }),
     };
-    let Understood { mesh, report, is_lid, low, high, area, volume } = understood;
+    let Understood { mesh, report, is_lid, names, low, high, area, volume } = understood;
     let holes: Vec<Value> = report
         .open_holes
         .largest
@@ -171,10 +191,14 @@ fn to_json(args: &CheckArgs, found: &Result<Understood, String>) -> Value {
             "open_holes": report.open_holes.count, "largest_open_holes": holes,
             "low": [low.x, low.y, low.z], "high": [high.x, high.y, high.z], "area": area,
             "volume": (mesh.sides() == Sides::Solid).then_some(volume),
+            "names": names.as_ref().map(FaceNames::all),
         },
         "written": args.repair.as_ref().map(|out: &PathBuf| out.display().to_string()),
     })
 }
+
+/// In a line.
+const MOST_NAMES: usize = 20;
 
 /// Four digits.
 fn short(number: f64) -> f64 {

@@ -126,9 +126,13 @@ impl DeviceFinger {
 fn friction_radius_m(contact: &Contact, entity: &Entity, hip_W: &Vector3<f64>) -> f64 {
     match contact.friction {
         FrictionState::Stick => {
-            let stiffness_n_per_m = entity.felt_stiffness_n_per_m();
+            let stiffness_n_per_m = contact.stiffness_n_per_m;
             let load_m = contact.normal_force_n / stiffness_n_per_m;
-            entity.friction.circle_m(load_m, stiffness_n_per_m).unwrap_or_default()
+            entity
+                .felt_material(contact.label)
+                .friction
+                .circle_m(load_m, stiffness_n_per_m)
+                .unwrap_or_default()
         }
         FrictionState::Slip => {
             let gap_W = contact.god_object_W - hip_W;

@@ -7,7 +7,7 @@
 //! Invariants: nothing moves before a run's t = 0 (the scene is what it says until then), and no stall of the driver is
 //! made up for at once: objects are late by what was missed.
 
-use haptics::{Contact, ContactState, Entity, FingerEffects};
+use haptics::{Contact, Entity, FingerEffects};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use physics::{
     Attachment, BroadPhase, FingerSettings, FingerTick, MAX_DRIVEN, MAX_PULLS, Made, Manipulation, Pull,
@@ -286,17 +286,9 @@ impl Objects {
         for (index, finger) in fingers.iter().enumerate() {
             for contact in finger.finger.contacts() {
                 if self.manipulation.is_body(contact.entity) {
-                    let is_sticking = ContactState::from(contact.friction) == ContactState::Stick;
                     for point in finger.finger.touch_points(entities, contact.entity).as_slice() {
                         if self.touches.len() < self.touches.capacity() {
-                            self.touches.push(Touch {
-                                entity: contact.entity,
-                                finger: index,
-                                point_W: point.point_W,
-                                normal_W: point.normal_W,
-                                force_on_user_W: point.force_on_user_W,
-                                is_sticking,
-                            });
+                            self.touches.push(Touch::at(point, contact, index));
                         }
                     }
                 }
@@ -388,9 +380,8 @@ impl Objects {
         let (mut force_W, mut given_n) = (None, 0.0_f64);
         for touch in moved {
             force_W = Some(force_W.unwrap_or_else(Vector3::zeros) + touch.force_on_user_W);
-            let entity = &entities[contact.entity];
-            let per_speed =
-                entity.felt_stiffness_n_per_m() * self.stepped_s + entity.felt_damping_n_s_per_m();
+            let damping_n_s_per_m = entities[contact.entity].felt_material(contact.label).damping_n_s_per_m;
+            let per_speed = contact.stiffness_n_per_m * self.stepped_s + damping_n_s_per_m;
             let [before_W, after_W] = self.velocities_W(contact.entity, &touch.point_W);
             given_n = given_n.max(per_speed * (after_W - before_W).norm());
         }

@@ -14,8 +14,7 @@ impl Rig {
         let refused = |source| refused(spec, source);
         let unfit = |unfit| self.unfit((&spec.file, spec.line), what(), unfit);
         self.check_rendered(spec, what())?;
-        let shape =
-            material::shape(&spec.shape, &self.models, spec.height_map.is_some(), solids).map_err(unfit)?;
+        let shape = material::shape(&spec.shape, &self.models, spec, solids).map_err(unfit)?;
         let friction = material::friction(&spec.friction).map_err(unfit)?;
         let algorithm = material::algorithm(spec.algorithm).map_err(unfit)?;
         let shading = material::shading(spec, &self.models).map_err(unfit)?;
@@ -30,6 +29,11 @@ impl Rig {
             })
             .map(|entity| entity.with_algorithm(algorithm).with_shading(shading))
             .map_err(refused)?;
+        let entity = if spec.faces.is_empty() {
+            entity
+        } else {
+            entity.with_face_materials(material::face_materials(spec).map_err(unfit)?)
+        };
         let entity = match height_map {
             Some(height_map) => entity.with_height_map(height_map),
             None => entity,
@@ -45,7 +49,7 @@ impl Rig {
         let unfit = |unfit| self.unfit((&spec.file, spec.line), format!("entity {}", spec.name), unfit);
         let shape = match &spec.shape {
             ShapeSpec::Mesh(_) => Sphere::new(STAND_IN_M).map_err(|source| refused(spec, source))?.into(),
-            shape => material::shape(shape, &self.models, false, solids).map_err(unfit)?,
+            shape => material::shape(shape, &self.models, spec, solids).map_err(unfit)?,
         };
         let entity = Entity::new(shape, spec.pose, spec.stiffness_n_per_m);
         let entity = entity.map_err(|source| refused(spec, source))?;

@@ -148,6 +148,18 @@ pub enum RigError {
         /// Why.
         source: Box<MeshError>,
     },
+    /// A model file has no face of this name.
+    #[error("{at}: found {found:?}, which no face of {} is called; allowed: {allowed}", .file.display())]
+    FaceName {
+        /// Where the scene names it.
+        at: Box<Location>,
+        /// The model's file.
+        file: PathBuf,
+        /// The name.
+        found: String,
+        /// Names in the file.
+        allowed: String,
+    },
     /// A picture file cannot be read.
     #[error("{at}: {}: {source}", .file.display())]
     Picture {
@@ -222,6 +234,7 @@ impl RigError {
             }
             Self::Model { at, .. }
             | Self::Mesh { at, .. }
+            | Self::FaceName { at, .. }
             | Self::Picture { at, .. }
             | Self::HeightMap { at, .. }
             | Self::Patches { at, .. } => Some((**at).clone()),

@@ -5,8 +5,8 @@ use super::solids::Solids;
 use haptics::mesh::Mesh;
 use haptics::passivity::{Passivity, PassivitySpec};
 use haptics::{
-    Algorithm, Capsule, Cone, Csg, CsgError, CsgPart, CsgTree, Cuboid, Cylinder, Ellipsoid, Form, Friction,
-    ParameterError, Plane, Scaled, Shading, ShadingForm, Shape, Sphere, Torus,
+    Algorithm, Capsule, Cone, Csg, CsgError, CsgPart, CsgTree, Cuboid, Cylinder, Ellipsoid, FaceMaterial,
+    FaceMaterials, Form, Friction, ParameterError, Plane, Scaled, Shading, ShadingForm, Shape, Sphere, Torus,
 };
 use nalgebra::Isometry3;
 use std::f64::consts::FRAC_PI_2;
@@ -58,11 +58,11 @@ impl From<CsgError> for Unfit {
 pub(super) fn shape(
     spec: &ShapeSpec,
     models: &Models,
-    has_picture: bool,
+    entity: &SceneEntity,
     solids: &mut Solids,
 ) -> Result<Shape, Unfit> {
     match spec {
-        ShapeSpec::Mesh(mesh) => match models.mesh(mesh, has_picture) {
+        ShapeSpec::Mesh(mesh) => match models.mesh(mesh, entity) {
             Some(mesh) => Ok(Arc::clone(mesh).into()),
             None => Err(Unfit::NotAvailable(format!("shape {spec:?}"))),
         },
@@ -125,6 +125,15 @@ pub(super) fn form(spec: &ShapeSpec) -> Result<Form, Unfit> {
     })
 }
 
+/// What faces of a mesh are made of that are not made of what the entity is, in the order of their labels.
+pub(super) fn face_materials(spec: &SceneEntity) -> Result<FaceMaterials, Unfit> {
+    let made = spec.faces.iter().map(|faces| {
+        let friction = friction(&faces.friction)?;
+        Ok(FaceMaterial::new(friction, faces.stiffness_n_per_m, faces.damping_n_s_per_m)?)
+    });
+    made.collect::<Result<Vec<_>, Unfit>>().map(FaceMaterials::new)
+}
+
 /// A friction model.
 pub(super) fn friction(spec: &FrictionSpec) -> Result<Friction, Unfit> {
     Ok(match *spec {
@@ -178,9 +187,7 @@ pub(super) fn shading(entity: &SceneEntity, models: &Models) -> Result<Shading, 
     let not_available = || Unfit::NotAvailable(format!("shading {spec:?} of a {}", shape.kind()));
     match (spec, shape) {
         (ShadingSpec::None, _) => Ok(Shading::None),
-        (_, ShapeSpec::Mesh(mesh)) => {
-            models.shading(mesh, entity.height_map.is_some(), spec).cloned().ok_or_else(not_available)
-        }
+        (_, ShapeSpec::Mesh(mesh)) => models.shading(mesh, entity).cloned().ok_or_else(not_available),
         (ShadingSpec::Regions { length_m, crease_angle_deg, form }, ShapeSpec::Box { size_m }) => {
             // All its edges are as sharp.
             if crease_angle_deg.to_radians() < FRAC_PI_2 {

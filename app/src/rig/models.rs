@@ -3,8 +3,8 @@
 //! What was repaired is told once, what cannot be used is refused with the place in the scene and in the model.
 
 use super::entities::is_only_seen;
-use super::{Problems, RigError, material};
-use haptics::mesh::{CloseHoles, CornerUv, Finding, Mesh, MeshReport, TriangleSoup};
+use super::{Problems, RigError, face_labels, material};
+use haptics::mesh::{CloseHoles, CornerUv, FaceData, Finding, Mesh, MeshReport, TriangleSoup};
 use haptics::{Nurbs, Shading};
 use io_driver::say::say;
 use nalgebra::Vector3;
@@ -12,7 +12,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use world::model::{self, ModelError};
-use world::{MeshSpec, Scene, SceneEntity, ShadingSpec, ShapeSpec};
+use world::{FacesSpec, MeshSpec, Scene, SceneEntity, ShadingSpec, ShapeSpec};
 
 /// From this size on it takes so long that somebody wonders: a third of a million triangles.
 const WORTH_A_LINE_BYTES: usize = 16 << 20;
@@ -28,9 +28,9 @@ pub(super) struct Models {
     only_seen: BTreeSet<String>,
 }
 
-/// A file, the bits of the factors along its axes, whether a picture lies on it, whether it is felt from both sides, and the
-/// bits of the largest hole that is closed.
-type Key = (PathBuf, [u64; 3], bool, bool, Option<u64>);
+/// A file, the bits of the factors along its axes, whether a picture lies on it, whether it is felt from both sides, the
+/// bits of the largest hole that is closed, and the names of faces that are made of something else.
+type Key = (PathBuf, [u64; 3], bool, bool, Option<u64>, Vec<Vec<String>>);
 
 impl Models {
     /// Loads every mesh that the scene's entities use; those that cannot be had are noted.
@@ -44,11 +44,11 @@ impl Models {
             }
             let has_picture = entity.height_map.is_some();
             let (ShapeSpec::Nurbs(spec) | ShapeSpec::Mesh(spec)) = &entity.shape else { continue };
-            let key = key_of(spec, has_picture && matches!(entity.shape, ShapeSpec::Mesh(_)));
+            let key = key_of(spec, has_picture && matches!(entity.shape, ShapeSpec::Mesh(_)), &entity.faces);
             if refused.contains(&key) {
                 continue;
             }
-            if let Err(problem) = models.add(&entity.shape, &key) {
+            if let Err(problem) = models.add(entity, &key) {
                 problems.note(problem);
                 refused.insert(key);
             } else if matches!(entity.shape, ShapeSpec::Mesh(_)) {
@@ -59,13 +59,13 @@ impl Models {
     }
 
     /// Loads what is not there yet.
-    fn add(&mut self, shape: &ShapeSpec, key: &Key) -> Result<(), RigError> {
-        match shape {
+    fn add(&mut self, entity: &SceneEntity, key: &Key) -> Result<(), RigError> {
+        match &entity.shape {
             ShapeSpec::Nurbs(spec) if !self.nurbs.contains_key(key) => {
                 self.nurbs.insert(key.clone(), Arc::new(join(spec)?));
             }
             ShapeSpec::Mesh(spec) if !self.meshes.contains_key(key) => {
-                let (mesh, report) = build(spec, key.2)?;
+                let (mesh, report) = build(spec, key.2, &entity.faces)?;
                 self.reports.push((spec.file.clone(), report));
                 self.meshes.insert(key.clone(), Arc::new(mesh));
             }
@@ -78,7 +78,7 @@ impl Models {
     pub(super) fn has(&self, entity: &SceneEntity) -> bool {
         match &entity.shape {
             ShapeSpec::Mesh(_) if self.only_seen.contains(&entity.name) => true,
-            ShapeSpec::Mesh(spec) => self.mesh(spec, entity.height_map.is_some()).is_some(),
+            ShapeSpec::Mesh(spec) => self.mesh(spec, entity).is_some(),
             ShapeSpec::Nurbs(spec) => self.nurbs(spec).is_some(),
             _ => true,
         }
@@ -102,27 +102,22 @@ impl Models {
     }
 
     /// The shading of a mesh that was loaded.
-    pub(super) fn shading(
-        &self,
-        spec: &MeshSpec,
-        has_picture: bool,
-        shading: ShadingSpec,
-    ) -> Option<&Shading> {
-        self.shading_of(&key_of(spec, has_picture), shading)
+    pub(super) fn shading(&self, spec: &MeshSpec, entity: &SceneEntity) -> Option<&Shading> {
+        self.shading_of(&key_in(spec, entity), entity.shading)
     }
 
     fn shading_of(&self, key: &Key, shading: ShadingSpec) -> Option<&Shading> {
         self.shadings.iter().find(|(of, by, _)| of == key && *by == shading).map(|(.., made)| made)
     }
 
-    /// A mesh that was loaded, for a picture to lie on or not.
-    pub(super) fn mesh(&self, spec: &MeshSpec, has_picture: bool) -> Option<&Arc<Mesh>> {
-        self.meshes.get(&key_of(spec, has_picture))
+    /// A mesh that was loaded, as this entity uses it.
+    pub(super) fn mesh(&self, spec: &MeshSpec, entity: &SceneEntity) -> Option<&Arc<Mesh>> {
+        self.meshes.get(&key_in(spec, entity))
     }
 
     /// Patches that were loaded.
     pub(super) fn nurbs(&self, spec: &MeshSpec) -> Option<&Arc<Nurbs>> {
-        self.nurbs.get(&key_of(spec, false))
+        self.nurbs.get(&key_of(spec, false, &[]))
     }
 }
 
@@ -131,30 +126,36 @@ fn is_drawn_from_its_file(scene: &Scene, entity: &SceneEntity) -> bool {
     matches!(entity.shape, ShapeSpec::Mesh(_)) && is_only_seen(scene, entity)
 }
 
-fn key_of(spec: &MeshSpec, has_picture: bool) -> Key {
+fn key_in(spec: &MeshSpec, entity: &SceneEntity) -> Key {
+    key_of(spec, entity.height_map.is_some(), &entity.faces)
+}
+
+fn key_of(spec: &MeshSpec, has_picture: bool, faces: &[FacesSpec]) -> Key {
     (
         spec.file.clone(),
         spec.scale.map(f64::to_bits),
         has_picture,
         spec.hollow,
         spec.close_holes_m.map(f64::to_bits),
+        faces.iter().map(|faces| faces.of.clone()).collect(),
     )
 }
 
-fn build(spec: &MeshSpec, has_picture: bool) -> Result<(Mesh, MeshReport), RigError> {
+fn build(spec: &MeshSpec, has_picture: bool, faces: &[FacesSpec]) -> Result<(Mesh, MeshReport), RigError> {
     let file = &spec.file;
-    let (soup, uv) = read(file, has_picture).map_err(|source| RigError::Model {
-        at: Box::new(spec.at.clone()),
-        file: file.clone(),
-        source,
-    })?;
+    let unreadable = |source| RigError::Model { at: Box::new(spec.at.clone()), file: file.clone(), source };
+    let bytes = model::read_file(file).map_err(unreadable)?;
+    let (soup, uv) = read(file, &bytes, has_picture).map_err(unreadable)?;
+    let labels = if faces.is_empty() {
+        None
+    } else {
+        let names = model::read_names(file, &bytes).map_err(unreadable)?;
+        Some(face_labels::labels(file, names.as_ref(), faces)?)
+    };
     let soup = scaled(soup, &spec.scale);
     let holes = spec.close_holes_m.map_or(CloseHoles::Small, CloseHoles::UpTo);
-    let built = match uv {
-        Some(uv) => Mesh::build_with_uv_closing(soup, &uv, holes),
-        None => Mesh::build_closing(soup, holes),
-    };
-    let (mesh, report) = built.map_err(|source| RigError::Mesh {
+    let of_faces = FaceData { uv: uv.as_deref(), labels: labels.as_deref() };
+    let (mesh, report) = Mesh::build_with(soup, of_faces, holes).map_err(|source| RigError::Mesh {
         at: Box::new(spec.at.clone()),
         file: file.clone(),
         source: Box::new(source),
@@ -188,15 +189,18 @@ fn join(spec: &MeshSpec) -> Result<Nurbs, RigError> {
 }
 
 /// Texture coordinates only where a picture needs them.
-fn read(file: &Path, has_picture: bool) -> Result<(TriangleSoup, Option<Vec<CornerUv>>), ModelError> {
-    let bytes = model::read_file(file)?;
+fn read(
+    file: &Path,
+    bytes: &[u8],
+    has_picture: bool,
+) -> Result<(TriangleSoup, Option<Vec<CornerUv>>), ModelError> {
     if bytes.len() >= WORTH_A_LINE_BYTES {
         say(format_args!("phantom3: loading {} ({} MB)", file.display(), bytes.len() / 1_000_000));
     }
     if has_picture {
-        return model::read_with_uv(file, &bytes).map(|(soup, uv)| (soup, Some(uv)));
+        return model::read_with_uv(file, bytes).map(|(soup, uv)| (soup, Some(uv)));
     }
-    Ok((model::read(file, &bytes)?, None))
+    Ok((model::read(file, bytes)?, None))
 }
 
 fn scaled(mut soup: TriangleSoup, scale: &[f64; 3]) -> TriangleSoup {

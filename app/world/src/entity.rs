@@ -8,6 +8,7 @@ use nalgebra::{Isometry3, Translation3, Vector3};
 use crate::dynamics::ResponseSpec;
 use crate::effects::{MagnetismSpec, VibrationSpec};
 use crate::error::SceneError;
+use crate::faces::{FacesSpec, Usual};
 use crate::friction::FrictionSpec;
 use crate::grid::Grid;
 use crate::height_map::HeightMapSpec;
@@ -43,6 +44,8 @@ pub struct SceneEntity {
     pub damping_n_s_per_m: f64,
     /// Default none.
     pub friction: FrictionSpec,
+    /// Faces that are made of something else; of meshes alone.
+    pub faces: Vec<FacesSpec>,
     /// Share of an approaching velocity that comes back, 0 to 1; default what the other entity, or the scene, says.
     pub restitution: Option<f64>,
     /// Default the Friction Cone Algorithm.
@@ -156,12 +159,20 @@ impl SceneEntity {
         let vibration = problems.keep(VibrationSpec::read(table));
         let of_shape = shape.as_ref().map(|shape| {
             let shading = problems.keep(ShadingSpec::read(table, shape));
-            (shading, problems.keep(HeightMapSpec::read(table, shape)))
+            let height_map = problems.keep(HeightMapSpec::read(table, shape));
+            let faces = match (&friction, stiffness_n_per_m, damping_n_s_per_m) {
+                (Some(friction), Some(stiffness_n_per_m), Some(damping_n_s_per_m)) => {
+                    let usual = Usual { friction, stiffness_n_per_m, damping_n_s_per_m };
+                    problems.keep(FacesSpec::read_all(table, shape, &usual))
+                }
+                _ => None,
+            };
+            (shading, height_map, faces)
         });
         let (is_haptic, is_collidable) = (problems.keep(truth("haptic")), problems.keep(truth("collidable")));
         let visuals = problems.keep(VisualSpec::read_all(table));
         let within = problems.keep(read_within(table));
-        let (shading, height_map) = of_shape?;
+        let (shading, height_map, faces) = of_shape?;
         Some(Self {
             name,
             file: table.document().file().into(),
@@ -172,6 +183,7 @@ impl SceneEntity {
             stiffness_n_per_m: stiffness_n_per_m?,
             damping_n_s_per_m: damping_n_s_per_m?,
             friction: friction?,
+            faces: faces?,
             restitution: restitution?,
             algorithm: algorithm?,
             material: made_of.map(|made_of| made_of.name),
@@ -230,6 +242,7 @@ const KEYS: Vocabulary = Vocabulary {
         "stiffness_n_per_m",
         "damping_n_s_per_m",
         "friction",
+        "faces",
         "algorithm",
         "material",
         "shading",

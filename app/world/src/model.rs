@@ -16,6 +16,7 @@
 //! Cost: one pass; a million triangles take a fraction of a second.
 
 mod ase;
+mod face_names;
 mod foreign;
 mod free_form;
 #[allow(non_snake_case)] // Names carry their frame.
@@ -30,6 +31,7 @@ mod words;
 mod write;
 
 pub use ase::read_ase;
+pub use face_names::FaceNames;
 pub use free_form::read_free_form;
 pub use gltf::read_gltf;
 pub use obj::{line_of_face, read_obj, read_obj_with_uv};
@@ -209,10 +211,28 @@ pub fn read(file: &Path, bytes: &[u8]) -> Result<TriangleSoup, ModelError> {
         Format::Obj => read_obj(bytes),
         Format::Stl => read_stl(bytes),
         Format::Ply => read_ply(bytes),
-        Format::Gltf => read_gltf(bytes, Some(file.parent().unwrap_or(Path::new("")))),
+        Format::Gltf => read_gltf(bytes, directory_of(file)),
         Format::Ase => read_ase(bytes),
         Format::ThreeDs => read_three_ds(bytes),
     }
+}
+
+fn directory_of(file: &Path) -> Option<&Path> {
+    Some(file.parent().unwrap_or(Path::new("")))
+}
+
+/// What the faces that [`read`] reads are called; `None`: the format has no names for them.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_names(file: &Path, bytes: &[u8]) -> Result<Option<FaceNames>, ModelError> {
+    Ok(match format(file, bytes)? {
+        Format::Obj => Some(obj::read_obj_names(bytes)?),
+        Format::Stl | Format::Ply => None,
+        Format::Gltf => Some(gltf::read_gltf_names(bytes, directory_of(file))?),
+        Format::Ase => Some(ase::read_ase_names(bytes)?),
+        Format::ThreeDs => Some(three_ds::read_three_ds_names(bytes)?),
+    })
 }
 
 fn format(file: &Path, bytes: &[u8]) -> Result<Format, ModelError> {

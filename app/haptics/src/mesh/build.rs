@@ -89,7 +89,10 @@ impl Mesh {
         let vertices = vertices.into_boxed_slice();
         let bvh = Bvh::build(&faces, &vertices);
         let identity = BUILT.fetch_add(1, Ordering::Relaxed);
-        Ok((Self { faces, vertices, bvh, sides, has_inside, extent_m, identity, uv: None }, report))
+        Ok((
+            Self { faces, vertices, bvh, sides, has_inside, extent_m, identity, uv: None, labels: None },
+            report,
+        ))
     }
 }
 

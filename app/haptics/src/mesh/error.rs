@@ -45,6 +45,13 @@ pub enum MeshError {
         /// How many faces there are.
         faces: usize,
     },
+    /// Not as many labels as faces.
+    LabelNumber {
+        /// How many labels there are.
+        found: usize,
+        /// How many faces there are.
+        faces: usize,
+    },
     /// A texture coordinate that is not finite, or larger than any picture is repeated.
     Uv {
         /// The first face with such a coordinate.
@@ -88,6 +95,9 @@ impl fmt::Display for MeshError {
                 f,
                 "{found} faces have texture coordinates, but there are {faces} faces; allowed are three for each"
             ),
+            Self::LabelNumber { found, faces } => {
+                write!(f, "{found} faces have labels, but there are {faces} faces; allowed is one for each")
+            }
             Self::Uv { face, found } => write!(
                 f,
                 "face {face} has the texture coordinates {found:?}; allowed are finite numbers, at most \

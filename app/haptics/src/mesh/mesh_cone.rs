@@ -21,7 +21,7 @@ use super::place::Place;
 use super::walk::{Walked, stand, walk};
 use crate::friction::Friction;
 use crate::friction_cone::{ConeForce, ConeInput, answer};
-use crate::friction_law::FrictionState;
+use crate::friction_law::{FrictionMemory, FrictionState};
 use crate::grip::Grip;
 use crate::surface::SurfacePoint;
 
@@ -119,6 +119,13 @@ impl MeshCone {
     pub(crate) fn let_go(&mut self) {
         if self.is_touching() {
             *self = Self::default();
+        }
+    }
+
+    /// Friction is another one from now on, to which what the last one remembered means nothing.
+    pub(crate) fn forget_friction(&mut self) {
+        if let Some(touching) = &mut self.touching {
+            touching.grip.memory = FrictionMemory::default();
         }
     }
 

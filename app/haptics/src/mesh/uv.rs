@@ -27,22 +27,25 @@ impl Mesh {
     /// # Errors
     /// As [`Self::build`]; coordinates that are not finite or too large, or not as many as faces.
     pub fn build_with_uv(soup: TriangleSoup, uv: &[CornerUv]) -> Result<(Self, MeshReport), MeshError> {
-        Self::build_with_uv_closing(soup, uv, CloseHoles::default())
+        Self::build_with_uv_and_tell(soup, uv, CloseHoles::default(), |_| {})
     }
 
-    /// As [`Self::build_with_uv`], and says which holes are to be closed.
-    ///
-    /// # Errors
-    /// As [`Self::build_with_uv`].
-    pub fn build_with_uv_closing(
+    /// As [`Self::build_with_uv`], and says which holes are to be closed; `tell` hears of each face of which face of the input
+    /// it is a part.
+    pub(super) fn build_with_uv_and_tell(
         soup: TriangleSoup,
         uv: &[CornerUv],
         holes: CloseHoles,
+        mut tell: impl FnMut(usize),
     ) -> Result<(Self, MeshReport), MeshError> {
         validate(&soup, uv)?;
         let given = soup.clone();
         let mut origins = Vec::with_capacity(soup.faces.len());
-        let (mut mesh, report) = Self::build_and_tell(soup, holes, |origin, _| origins.push(origin))?;
+        let told = |origin, _| {
+            origins.push(origin);
+            tell(origin);
+        };
+        let (mut mesh, report) = Self::build_and_tell(soup, holes, told)?;
         let of_face = |(face, &origin): (usize, &usize)| {
             let corners = given.faces[origin].map(|v| given.vertices[v as usize]);
             let own = mesh.faces[face].vertices.map(|v| mesh.vertices[v as usize]);

@@ -12,7 +12,7 @@ use super::seek::{Rested, seek};
 use crate::algorithm::Touch;
 use crate::friction::Friction;
 use crate::friction_cone::ConeInput;
-use crate::friction_law::FrictionState;
+use crate::friction_law::{FrictionMemory, FrictionState};
 use crate::grip::Grip;
 use crate::mesh::draw::{Against, Frictionless};
 use crate::surface::{Feature, SurfacePoint, direction_or_up};
@@ -56,6 +56,11 @@ impl<F: Foot> Touching<F> {
             is_inside: false,
             answered: Default::default(),
         }
+    }
+
+    /// Friction is another one from now on.
+    pub(super) fn forget_friction(&mut self) {
+        self.grip.memory = FrictionMemory::default();
     }
 
     pub(super) fn update<G: Ground<Foot = F>>(

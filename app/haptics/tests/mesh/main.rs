@@ -14,6 +14,7 @@ mod folds;
 mod friction;
 mod inside;
 mod joints;
+mod materials;
 mod moving;
 mod outlying;
 mod parts;

@@ -78,14 +78,9 @@ impl Hand {
             let is_sticking = output.friction == ContactState::Stick;
             both_stick &= is_sticking;
             let points = finger.touch_points(&self.entities, 0);
-            self.touches.extend(points.as_slice().iter().map(|point| Touch {
-                entity: 0,
-                finger: index,
-                point_W: point.point_W,
-                normal_W: point.normal_W,
-                force_on_user_W: point.force_on_user_W,
-                is_sticking,
-            }));
+            for contact in finger.contacts() {
+                self.touches.extend(points.as_slice().iter().map(|point| Touch::at(point, contact, index)));
+            }
         }
         self.manipulation.step_with(&mut self.entities, &mut self.touches, &mut self.ticks, DT);
         both_stick

@@ -127,6 +127,8 @@ fn touches_that_are_no_numbers_press_nothing() {
                 normal_W: Vector3::x(),
                 force_on_user_W: Vector3::x(),
                 is_sticking: true,
+                stiffness_n_per_m: 1000.0,
+                label: 0,
             };
             change(&mut touch);
             for _ in 0..10 {

@@ -5,7 +5,7 @@ use crate::{common, counting};
 
 use common::*;
 use counting::CALLS;
-use haptics::{ContactState, Cuboid, Sphere};
+use haptics::{Cuboid, Sphere};
 use nalgebra::{Isometry3, Vector3};
 use physics::{Integrator, Pull, Response, Settings, Touch};
 
@@ -44,7 +44,7 @@ fn a_step_never_allocates() {
                 }
                 world.touches.clear();
                 for (index, finger) in world.fingers.iter().enumerate() {
-                    world.touches.extend(finger.contacts().map(|contact| touch_of(contact, index)));
+                    world.touches.extend(finger.contacts().map(|contact| Touch::of(contact, index)));
                 }
                 touched += world.touches.len();
                 let mut pulls = [Pull {
@@ -92,16 +92,5 @@ fn nor_does_one_of_bodies_that_press_each_other() {
         }
         assert_eq!(counted, 0, "{response:?}");
         assert!(joined > 300, "{response:?}: {joined}");
-    }
-}
-
-fn touch_of(contact: &haptics::Contact, finger: usize) -> Touch {
-    Touch {
-        entity: contact.entity,
-        finger,
-        point_W: contact.god_object_W,
-        normal_W: contact.normal_W,
-        force_on_user_W: contact.force_on_user_W,
-        is_sticking: ContactState::from(contact.friction) == ContactState::Stick,
     }
 }

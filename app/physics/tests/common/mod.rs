@@ -1,7 +1,7 @@
 //! A world in a box: entities, bodies and fingers that are stepped together, as the application does it.
 #![allow(dead_code, non_snake_case, unreachable_pub)]
 
-use haptics::{ContactState, Entity, Finger, Friction, Plane, Shape};
+use haptics::{Entity, Finger, Friction, Plane, Shape};
 use nalgebra::{Isometry3, Vector3};
 use physics::{Body, FingerSettings, FingerTick, Made, Manipulation, MassProperties, Settings, Touch};
 
@@ -42,14 +42,7 @@ impl World {
             self.ticks[index].hip_W = *hip;
             forces.push(finger.step(&self.entities, hip, DT).force_on_user_W);
             for contact in finger.contacts() {
-                self.touches.push(Touch {
-                    entity: contact.entity,
-                    finger: index,
-                    point_W: contact.god_object_W,
-                    normal_W: contact.normal_W,
-                    force_on_user_W: contact.force_on_user_W,
-                    is_sticking: ContactState::from(contact.friction) == ContactState::Stick,
-                });
+                self.touches.push(Touch::of(contact, index));
             }
         }
         let rendered = self.touches.clone();

@@ -1,6 +1,6 @@
 //! A ball between two still fingers, pushed once: whether it stays.
 
-use haptics::{ContactState, Entity, Finger, Friction, Sphere};
+use haptics::{Entity, Finger, Friction, Sphere};
 use nalgebra::{Isometry3, Vector3};
 use physics::{Body, Integrator, Manipulation, MassProperties, Settings, Touch};
 
@@ -61,14 +61,7 @@ impl Hand {
         let mut touches = [None; 2];
         for (index, (finger, x)) in self.fingers.iter_mut().zip(hips_x).enumerate() {
             finger.step(&self.entities, &Vector3::new(x, 0.0, 0.0), dt_s);
-            touches[index] = finger.contact(0).map(|contact| Touch {
-                entity: 0,
-                finger: index,
-                point_W: contact.god_object_W,
-                normal_W: contact.normal_W,
-                force_on_user_W: contact.force_on_user_W,
-                is_sticking: ContactState::from(contact.friction) == ContactState::Stick,
-            });
+            touches[index] = finger.contact(0).map(|contact| Touch::of(contact, index));
         }
         let mut given: Vec<Touch> = touches.into_iter().flatten().collect();
         self.manipulation.step(&mut self.entities, &mut given, dt_s);

@@ -1,25 +1,30 @@
 //! ASE, the text of 3D Studio MAX's ASCII scene export.
 //!
 //! Read: of each `*MESH` the lists `*MESH_VERTEX_LIST` and `*MESH_FACE_LIST`. Vertices are in the world already, so that the
-//! nodes' transforms (`*NODE_TM`) have nothing to add; of animated meshes (`*MESH_ANIMATION`) the one before is read. Everything
+//! nodes' transforms (`*NODE_TM`) have nothing to add; names of nodes and materials; of animated meshes (`*MESH_ANIMATION`) the one before is read. Everything
 //! else is passed over. The z axis of such files points up, and their unit is the one that was exported in.
 
 use super::words::BYTE_ORDER_MARK;
-use super::{ModelError, a_number, number, shown};
+use super::{FaceNames, ModelError, a_number, number, shown};
 use haptics::mesh::TriangleSoup;
 use nalgebra::Vector3;
+use std::collections::BTreeMap;
 
 /// Reads an ASE file.
 ///
 /// # Errors
 /// The first thing found to be wrong, with its line.
 pub fn read_ase(bytes: &[u8]) -> Result<TriangleSoup, ModelError> {
-    let mut read = Read { tokens: Tokens::new(bytes), vertices: Vec::new(), faces: Vec::new(), begin: 0 };
-    read.all()?;
-    if read.faces.is_empty() {
-        return Err(ModelError::NoTriangle);
-    }
+    let read = Read::of(bytes)?;
     Ok(TriangleSoup { vertices: read.vertices, faces: read.faces })
+}
+
+/// What the triangles are called: by their node, its material and theirs within that.
+///
+/// # Errors
+/// As [`read_ase`].
+pub(super) fn read_ase_names(bytes: &[u8]) -> Result<FaceNames, ModelError> {
+    Ok(Read::of(bytes)?.names())
 }
 
 /// Whether a file without a name would be taken for ASE.
@@ -37,9 +42,92 @@ struct Read<'t> {
     faces: Vec<[u32; 3]>,
     /// The first vertex of the mesh.
     begin: usize,
+    /// Of each face the number of its material within that of its node.
+    part_of_face: Vec<u32>,
+    nodes: Vec<NodeNames<'t>>,
+    /// By the number of a material, and of one within it.
+    materials: BTreeMap<(u32, Option<u32>), &'t [u8]>,
+    material: (u32, Option<u32>),
+}
+
+/// What is said of a node's name and material.
+#[derive(Default)]
+struct NodeNames<'t> {
+    first_face: usize,
+    name: &'t [u8],
+    material: Option<u32>,
 }
 
 impl<'t> Read<'t> {
+    fn of(bytes: &'t [u8]) -> Result<Self, ModelError> {
+        let mut read = Self {
+            tokens: Tokens::new(bytes),
+            vertices: Vec::new(),
+            faces: Vec::new(),
+            begin: 0,
+            part_of_face: Vec::new(),
+            nodes: Vec::new(),
+            materials: BTreeMap::new(),
+            material: (0, None),
+        };
+        read.all()?;
+        if read.faces.is_empty() { Err(ModelError::NoTriangle) } else { Ok(read) }
+    }
+
+    fn names(&self) -> FaceNames {
+        let mut names = FaceNames::default();
+        let text = |name: &[u8]| {
+            let name = name.strip_prefix(b"\"").unwrap_or(name);
+            String::from_utf8_lossy(name.strip_suffix(b"\"").unwrap_or(name)).into_owned()
+        };
+        let mut nodes = self.nodes.iter().peekable();
+        let nobody = NodeNames::default();
+        let mut node = &nobody;
+        for (face, part) in self.part_of_face.iter().enumerate() {
+            while let Some(next) = nodes.next_if(|next| next.first_face <= face) {
+                node = next;
+            }
+            let material = |part| node.material.and_then(|number| self.materials.get(&(number, part)));
+            let all = [Some(&node.name), material(None), material(Some(*part))];
+            let set = names.set(all.into_iter().flatten().map(|name| text(name)));
+            names.add(set, 1);
+        }
+        names
+    }
+
+    /// What else than shapes is read.
+    fn name(&mut self, keyword: &[u8], block: Option<&[u8]>) {
+        match (keyword, block) {
+            (b"*NODE_NAME", Some(b"*GEOMOBJECT")) => {
+                let name = self.tokens.next().unwrap_or_default();
+                self.nodes.push(NodeNames { first_face: self.faces.len(), name, material: None });
+            }
+            (b"*MATERIAL_REF", _) => {
+                let number = self.number();
+                if let Some(node) = self.nodes.last_mut() {
+                    node.material = number;
+                }
+            }
+            (b"*MATERIAL", _) => self.material = (self.number().unwrap_or(0), None),
+            (b"*SUBMATERIAL", _) => self.material.1 = self.number(),
+            (b"*MATERIAL_NAME", _) => {
+                let name = self.tokens.next().unwrap_or_default();
+                self.materials.insert(self.material, name);
+            }
+            (b"*MESH_MTLID", _) => {
+                let number = self.number().unwrap_or(0);
+                if let Some(last) = self.part_of_face.last_mut() {
+                    *last = number;
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn number(&mut self) -> Option<u32> {
+        std::str::from_utf8(self.tokens.next()?).ok()?.parse().ok()
+    }
+
     fn all(&mut self) -> Result<(), ModelError> {
         match self.tokens.next() {
             Some(b"*3DSMAX_ASCIIEXPORT") => {}
@@ -74,7 +162,7 @@ impl<'t> Read<'t> {
                         _ if animated.is_some() => {}
                         (b"*MESH_VERTEX", Some(&b"*MESH_VERTEX_LIST")) => self.vertex()?,
                         (b"*MESH_FACE", Some(&b"*MESH_FACE_LIST")) => self.face()?,
-                        _ => {}
+                        (_, block) => self.name(keyword, block.copied()),
                     }
                 }
             }
@@ -123,6 +211,7 @@ impl<'t> Read<'t> {
             *corner = (self.begin + index) as u32;
         }
         self.faces.push(face);
+        self.part_of_face.push(0);
         Ok(())
     }
 

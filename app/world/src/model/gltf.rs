@@ -2,8 +2,8 @@
 //!
 //! Read: of the file's scene (the one that it names, else the first; all nodes if it has none) the meshes of all nodes, each
 //! where its node and those above put it, as one soup; triangles, strips and fans, with and without indices; sparse
-//! accessors; positions as floats or quantised (`KHR_mesh_quantization`). Metres, y up, as in a scene of ours. Passed over:
-//! materials, pictures, cameras, lights, animations, skins and morph targets (the shape is that at rest), points and lines.
+//! accessors; positions as floats or quantised (`KHR_mesh_quantization`); names. Metres, y up, as in a scene of ours. Passed
+//! over: pictures, cameras, lights, animations, skins and morph targets (the shape is that at rest), points and lines.
 //! Refused: compressed geometry (Draco, meshopt), and glTF 1.0.
 //!
 //! Nothing is believed: every index, range and step is checked against what is there. A node may be reached in one way only, as
@@ -17,11 +17,11 @@ mod accessor;
 mod buffers;
 mod document;
 
-use super::ModelError;
 use super::ply::Strip;
+use super::{FaceNames, ModelError};
 use accessor::Accessors;
 use buffers::Buffers;
-use document::{Document, Node, Primitive};
+use document::{Document, Name, Node, Primitive};
 use haptics::mesh::TriangleSoup;
 use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
 use std::path::Path;
@@ -34,6 +34,18 @@ const ALWAYS_ALLOWED: usize = 1 << 22;
 /// # Errors
 /// The first thing found to be wrong, with its place in the document.
 pub fn read_gltf(bytes: &[u8], beside: Option<&Path>) -> Result<TriangleSoup, ModelError> {
+    Ok(read(bytes, beside)?.0)
+}
+
+/// What the triangles are called: by their node, its mesh and their material.
+///
+/// # Errors
+/// As [`read_gltf`].
+pub(super) fn read_gltf_names(bytes: &[u8], beside: Option<&Path>) -> Result<FaceNames, ModelError> {
+    Ok(read(bytes, beside)?.1)
+}
+
+fn read(bytes: &[u8], beside: Option<&Path>) -> Result<(TriangleSoup, FaceNames), ModelError> {
     let (text, binary) = buffers::parts(bytes)?;
     let document = Document::parse(text)?;
     document.check()?;
@@ -43,9 +55,10 @@ pub fn read_gltf(bytes: &[u8], beside: Option<&Path>) -> Result<TriangleSoup, Mo
         document: &document,
         accessors: Accessors::new(&document, &buffers, most),
         soup: TriangleSoup { vertices: Vec::new(), faces: Vec::new() },
+        names: FaceNames::default(),
     };
     merged.add_nodes()?;
-    if merged.soup.faces.is_empty() { Err(ModelError::NoTriangle) } else { Ok(merged.soup) }
+    if merged.soup.faces.is_empty() { Err(ModelError::NoTriangle) } else { Ok((merged.soup, merged.names)) }
 }
 
 /// Whether a file without a name would be taken for glTF.
@@ -62,6 +75,7 @@ struct Merged<'d> {
     document: &'d Document,
     accessors: Accessors<'d>,
     soup: TriangleSoup,
+    names: FaceNames,
 }
 
 impl Merged<'_> {
@@ -82,20 +96,30 @@ impl Merged<'_> {
             }
             let X_WN = X_WP * transform(&place, node)?;
             if let Some(mesh) = node.mesh {
-                self.add_mesh(mesh, &X_WN, &place)?;
+                self.add_mesh(mesh, &X_WN, (&place, &node.name))?;
             }
             open.extend(node.children.iter().rev().map(|&child| (child, X_WN)));
         }
         Ok(())
     }
 
-    fn add_mesh(&mut self, index: usize, X_WN: &Matrix4<f64>, node: &str) -> Result<(), ModelError> {
+    fn add_mesh(
+        &mut self,
+        index: usize,
+        X_WN: &Matrix4<f64>,
+        (node, name): (&str, &Name),
+    ) -> Result<(), ModelError> {
         let meshes = &self.document.meshes;
         let mesh =
             meshes.get(index).ok_or_else(|| missing(&format!("{node}.mesh = {index}"), meshes.len()))?;
         for (number, primitive) in mesh.primitives.iter().enumerate() {
             let place = format!("meshes[{index}].primitives[{number}]");
+            let before = self.soup.faces.len();
             self.add_primitive(primitive, X_WN, &place, node)?;
+            let material = primitive.material.and_then(|index| self.document.materials.get(index));
+            let all = [Some(name), Some(&mesh.name), material.map(|material| &material.name)];
+            let set = self.names.set(all.into_iter().flatten().filter_map(|name| name.0.as_deref()));
+            self.names.add(set, self.soup.faces.len() - before);
         }
         Ok(())
     }

@@ -2,14 +2,15 @@
 //!
 //! Read: `v x y z` (with a weight or a colour behind it, ignored) and `f` with three or more corners `a`, `a/b`, `a//c`
 //! or `a/b/c`; negative indices count back from the last vertex; texture coordinates `vt`, if a picture is to lie on the
-//! model. Polygons are divided into triangles. Ignored: normals, groups, materials (their file need not be there), lines and points. Refused: free-form curves
+//! model. Polygons are divided into triangles. Objects, groups
+//! and materials give the faces names; the materials' file need not be there. Ignored: normals, lines and points. Refused: free-form curves
 //! and surfaces, which have no polygons.
 //!
 //! A face may name a vertex that comes later in the file, so polygons are divided when all vertices are known.
 
 use super::polygon::{Divider, indivisible};
 use super::words::BYTE_ORDER_MARK;
-use super::{ModelError, a_number, number, shown};
+use super::{FaceNames, ModelError, a_number, number, shown};
 use haptics::mesh::{CornerUv, TriangleSoup};
 use nalgebra::Vector3;
 use std::borrow::Cow;
@@ -47,6 +48,35 @@ pub fn read_obj_with_uv(bytes: &[u8]) -> Result<(TriangleSoup, Vec<CornerUv>), M
     })?;
     let soup = TriangleSoup { vertices: read.vertices, faces };
     if soup.faces.is_empty() { Err(ModelError::NoTriangle) } else { Ok((soup, uv)) }
+}
+
+/// What the triangles that [`read_obj`] returns are called: by their object (`o`), their groups (`g`) and their material
+/// (`usemtl`).
+///
+/// # Errors
+/// As [`read_obj`].
+pub(super) fn read_obj_names(bytes: &[u8]) -> Result<FaceNames, ModelError> {
+    let read = Polygons::read(bytes)?;
+    let mut names = FaceNames::default();
+    let mut called = Called::default();
+    let (mut set, mut begin) = (None, 0);
+    let mut polygons = read.polygons.iter();
+    for (_, statement) in Statements::new(bytes) {
+        match words(&statement).next() {
+            Some(b"f" | b"fo") => {
+                let Some(polygon) = polygons.next() else { break };
+                let set = *set.get_or_insert_with(|| names.set(called.all()));
+                names.add(set, (polygon.end - begin) as usize - 2);
+                begin = polygon.end;
+            }
+            Some(b"o" | b"g" | b"usemtl") => {
+                called.take(&statement);
+                set = None;
+            }
+            _ => {}
+        }
+    }
+    Ok(names)
 }
 
 /// The line on which the polygon begins that became triangle `face` (counted from 0) of what [`read_obj`] returns.
@@ -197,6 +227,34 @@ impl Polygons {
         index.ok_or_else(|| out_of_range(line, &number.to_string(), count))
     }
 }
+
+/// What a polygon is called that comes now.
+#[derive(Default)]
+struct Called {
+    object: String,
+    groups: Vec<String>,
+    material: String,
+}
+
+impl Called {
+    fn take(&mut self, statement: &[u8]) {
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        let mut words = words(statement);
+        match words.next() {
+            Some(b"g") => self.groups = words.take(MOST_GROUPS).map(text).collect(),
+            // Names with spaces are common.
+            Some(b"o") => self.object = text(&words.collect::<Vec<_>>().join(&b' ')),
+            _ => self.material = text(&words.collect::<Vec<_>>().join(&b' ')),
+        }
+    }
+
+    fn all(&self) -> impl Iterator<Item = &String> {
+        [&self.material, &self.object].into_iter().chain(&self.groups)
+    }
+}
+
+/// Of one polygon.
+const MOST_GROUPS: usize = 8;
 
 /// What the file says of texture coordinates. It is read apart from the polygons, so that files without cost nothing.
 #[derive(Default)]

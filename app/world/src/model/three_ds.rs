@@ -1,10 +1,11 @@
 //! 3DS, the chunks of 3D Studio.
 //!
 //! A chunk is a number of two bytes, its length of four with these six, and what is in it: data, then other chunks. Read: of
-//! the editor's objects (0x3D3D, 0x4000) each mesh (0x4100) with its vertices (0x4110) and faces (0x4120). Vertices
+//! the editor's objects (0x3D3D, 0x4000) each mesh (0x4100) with its vertices (0x4110) and faces (0x4120), and which of
+//! them are of which material (0x4130). Vertices
 //! are in the world already. Everything else is passed over. The z axis of such files points up; their unit is any.
 
-use super::ModelError;
+use super::{FaceNames, ModelError};
 use haptics::mesh::TriangleSoup;
 use nalgebra::Vector3;
 
@@ -13,16 +14,32 @@ use nalgebra::Vector3;
 /// # Errors
 /// The first thing found to be wrong, with its byte.
 pub fn read_three_ds(bytes: &[u8]) -> Result<TriangleSoup, ModelError> {
+    Ok(read(bytes)?.0)
+}
+
+/// What the triangles are called: by their object and their material.
+///
+/// # Errors
+/// As [`read_three_ds`].
+pub(super) fn read_three_ds_names(bytes: &[u8]) -> Result<FaceNames, ModelError> {
+    Ok(read(bytes)?.1)
+}
+
+fn read(bytes: &[u8]) -> Result<(TriangleSoup, FaceNames), ModelError> {
     let whole = Part { bytes, at: 0, end: bytes.len() };
     let mut soup = TriangleSoup { vertices: Vec::new(), faces: Vec::new() };
+    let mut names = FaceNames::default();
     match whole.chunks().next() {
         Some(Ok((MAIN, main))) => main.each(EDITOR, |editor| {
-            editor.each(OBJECT, |object| object.behind_name()?.each(MESH, |mesh| read_mesh(mesh, &mut soup)))
+            editor.each(OBJECT, |object| {
+                let (name, object) = object.name()?;
+                object.each(MESH, |mesh| read_mesh(mesh, &name, &mut soup, &mut names))
+            })
         })?,
         Some(Err(error)) => return Err(error),
         _ => return Err(whole.wrong(0, "no chunk 0x4D4D".into(), "one, as every 3DS file begins")),
     }
-    if soup.faces.is_empty() { Err(ModelError::NoTriangle) } else { Ok(soup) }
+    if soup.faces.is_empty() { Err(ModelError::NoTriangle) } else { Ok((soup, names)) }
 }
 
 /// Whether a file without a name would be taken for 3DS.
@@ -37,10 +54,16 @@ const OBJECT: u16 = 0x4000;
 const MESH: u16 = 0x4100;
 const VERTICES: u16 = 0x4110;
 const FACES: u16 = 0x4120;
+const FACES_OF_MATERIAL: u16 = 0x4130;
 const VERTEX_BYTES: usize = 12;
 const FACE_BYTES: usize = 8;
 
-fn read_mesh(mesh: Part<'_>, soup: &mut TriangleSoup) -> Result<(), ModelError> {
+fn read_mesh(
+    mesh: Part<'_>,
+    name: &str,
+    soup: &mut TriangleSoup,
+    names: &mut FaceNames,
+) -> Result<(), ModelError> {
     let begin = soup.vertices.len();
     mesh.each(VERTICES, |part| {
         for at in part.items(VERTEX_BYTES, "vertices")? {
@@ -54,7 +77,9 @@ fn read_mesh(mesh: Part<'_>, soup: &mut TriangleSoup) -> Result<(), ModelError> 
         Ok(())
     })?;
     let count = soup.vertices.len() - begin;
+    let own = names.set([name]);
     mesh.each(FACES, |part| {
+        let first = soup.faces.len();
         for at in part.items(FACE_BYTES, "faces")? {
             let corners = [0, 2, 4].map(|corner| usize::from(part.half(at + corner)));
             if let Some(beyond) = corners.iter().find(|corner| **corner >= count) {
@@ -63,7 +88,16 @@ fn read_mesh(mesh: Part<'_>, soup: &mut TriangleSoup) -> Result<(), ModelError> 
             }
             soup.faces.push(corners.map(|corner| (begin + corner) as u32));
         }
-        Ok(())
+        names.add(own, soup.faces.len() - first);
+        let behind = part.at + 2 + (soup.faces.len() - first) * FACE_BYTES;
+        Part { at: behind.min(part.end), ..part }.each(FACES_OF_MATERIAL, |part| {
+            let (material, part) = part.name()?;
+            let both = names.set([name, &material]);
+            for at in part.items(2, "faces")? {
+                names.rename(first + usize::from(part.half(at)), both);
+            }
+            Ok(())
+        })
     })
 }
 
@@ -110,13 +144,14 @@ impl<'b> Part<'b> {
         Ok(())
     }
 
-    /// The rest behind a name that ends in a zero.
-    fn behind_name(self) -> Result<Self, ModelError> {
+    /// A name that ends in a zero, and the rest behind it.
+    fn name(self) -> Result<(String, Self), ModelError> {
         let length = self.bytes[self.at..self.end].iter().position(|&byte| byte == 0);
         let length = length.ok_or_else(|| {
             self.wrong(self.at, "a name without end".into(), "one that ends in a zero byte")
         })?;
-        Ok(Self { at: self.at + length + 1, ..self })
+        let name = &self.bytes[self.at..self.at + length];
+        Ok((String::from_utf8_lossy(name).into_owned(), Self { at: self.at + length + 1, ..self }))
     }
 
     /// Beginnings of the items that it counts at its own beginning.

@@ -17,6 +17,7 @@ pub(super) struct Document {
     scenes: Vec<Scene>,
     pub(super) nodes: Vec<Node>,
     pub(super) meshes: Vec<Mesh>,
+    pub(super) materials: Vec<Material>,
     pub(super) accessors: Vec<Accessor>,
     pub(super) buffer_views: Vec<BufferView>,
     pub(super) buffers: Vec<Buffer>,
@@ -37,6 +38,7 @@ struct Scene {
 #[derive(Deserialize, Default)]
 #[serde(default)]
 pub(super) struct Node {
+    pub(super) name: Name,
     pub(super) children: Vec<usize>,
     pub(super) mesh: Option<usize>,
     pub(super) matrix: Option<Box<[f64; 16]>>,
@@ -48,15 +50,34 @@ pub(super) struct Node {
 #[derive(Deserialize, Default)]
 #[serde(default)]
 pub(super) struct Mesh {
+    pub(super) name: Name,
     pub(super) primitives: Vec<Primitive>,
 }
 
 #[derive(Deserialize, Default)]
 #[serde(default)]
 pub(super) struct Primitive {
+    pub(super) material: Option<usize>,
     pub(super) attributes: Attributes,
     pub(super) indices: Option<usize>,
     pub(super) mode: Option<u32>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default)]
+pub(super) struct Material {
+    pub(super) name: Name,
+}
+
+/// Of a node, a mesh or a material; whatever is no text is none.
+#[derive(Deserialize, Default)]
+#[serde(from = "serde_json::Value")]
+pub(super) struct Name(pub(super) Option<String>);
+
+impl From<serde_json::Value> for Name {
+    fn from(value: serde_json::Value) -> Self {
+        Self(if let serde_json::Value::String(text) = value { Some(text) } else { None })
+    }
 }
 
 #[derive(Deserialize, Default)]

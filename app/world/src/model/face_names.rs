@@ -1,0 +1,123 @@
+//! Names of a model's faces: the objects, groups and materials that its file says they are of.
+
+use std::collections::BTreeMap;
+
+/// What each face of a model is called.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct FaceNames {
+    /// All that faces are called alike by.
+    sets: Vec<Vec<String>>,
+    numbers: BTreeMap<Vec<String>, u32>,
+    /// Of each face, which set.
+    of_face: Vec<u32>,
+    /// There were more sets than are kept; the others have no names.
+    is_cut: bool,
+}
+
+/// More, and a name for each face is all that they are.
+const MOST_SETS: usize = 1 << 15;
+/// Names of one face.
+const MOST_NAMES: usize = 16;
+const LONGEST_NAME: usize = 200;
+
+impl FaceNames {
+    /// The number of a set of names, of which empty ones are none.
+    pub(super) fn set(&mut self, names: impl IntoIterator<Item = impl AsRef<str>>) -> u32 {
+        let kept = |name: &str| name.chars().take(LONGEST_NAME).collect::<String>();
+        let mut names: Vec<String> = names
+            .into_iter()
+            .map(|name| kept(name.as_ref().trim()))
+            .filter(|name| !name.is_empty())
+            .take(MOST_NAMES)
+            .collect();
+        if let Some(known) = self.numbers.get(&names) {
+            return *known;
+        }
+        if self.sets.len() >= MOST_SETS {
+            self.is_cut = true;
+            names.clear();
+            if let Some(known) = self.numbers.get(&names) {
+                return *known;
+            }
+        }
+        let number = self.sets.len() as u32;
+        self.sets.push(names.clone());
+        self.numbers.insert(names, number);
+        number
+    }
+
+    /// The next faces are called so.
+    pub(super) fn add(&mut self, set: u32, faces: usize) {
+        self.of_face.extend(std::iter::repeat_n(set, faces));
+    }
+
+    /// A face is called otherwise.
+    pub(super) fn rename(&mut self, face: usize, set: u32) {
+        if let Some(own) = self.of_face.get_mut(face) {
+            *own = set;
+        }
+    }
+
+    /// Whether there were too many names to keep them all.
+    pub fn is_cut(&self) -> bool {
+        self.is_cut
+    }
+
+    /// All names, in alphabetical order, each with the number of faces that are called so.
+    pub fn all(&self) -> BTreeMap<&str, usize> {
+        let mut faces = vec![0_usize; self.sets.len()];
+        self.of_face.iter().for_each(|set| faces[*set as usize] += 1);
+        let mut all = BTreeMap::new();
+        for (set, faces) in self.sets.iter().zip(faces) {
+            let once: std::collections::BTreeSet<&str> = set.iter().map(String::as_str).collect();
+            once.into_iter().for_each(|name| *all.entry(name).or_default() += faces);
+        }
+        all
+    }
+
+    /// Of each face the number of the first of these lists, from 1, that has one of its names; 0 if none has.
+    pub fn labels<'n>(&self, lists: impl Iterator<Item = &'n [String]> + Clone) -> Vec<u16> {
+        let label = |set: &Vec<String>| {
+            let found = lists.clone().position(|list| list.iter().any(|name| set.contains(name)));
+            found.map_or(0, |found| u16::try_from(found + 1).unwrap_or(0))
+        };
+        let of_sets: Vec<u16> = self.sets.iter().map(label).collect();
+        self.of_face.iter().map(|set| of_sets[*set as usize]).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_list_that_knows_a_name_of_a_face_labels_it() {
+        let mut names = FaceNames::default();
+        let sets = [
+            names.set(["tyre", "rubber"]),
+            names.set(["rim", " steel "]),
+            names.set([""; 1]),
+            names.set(["tyre", "rubber"]),
+        ];
+        assert_eq!(sets, [0, 1, 2, 0]);
+        sets.into_iter().for_each(|set| names.add(set, 2));
+        names.rename(7, 1);
+        let lists = [vec!["steel".to_owned(), "iron".into()], vec!["tyre".into()], vec!["rubber".into()]];
+        assert_eq!(names.labels(lists.iter().map(Vec::as_slice)), [2, 2, 1, 1, 0, 0, 2, 1]);
+        let all: Vec<_> = names.all().into_iter().collect();
+        assert_eq!(all, [("rim", 3), ("rubber", 3), ("steel", 3), ("tyre", 3)]);
+    }
+
+    #[test]
+    fn names_without_end_are_cut_and_said_to_be() {
+        let mut names = FaceNames::default();
+        for number in 0..2 * MOST_SETS {
+            let set = names.set([number.to_string()]);
+            names.add(set, 1);
+        }
+        assert!(names.is_cut() && names.all().len() == MOST_SETS);
+        let many: Vec<String> = (0..100_000).map(|_| "n".repeat(1000)).collect();
+        let set = FaceNames::default().set(many);
+        assert_eq!(set, 0);
+    }
+}
