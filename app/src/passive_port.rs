@@ -12,7 +12,7 @@
 use crate::fast_step::DeviceFinger;
 use crate::row::FingerRow;
 use haptics::FingerEffects;
-use haptics::passivity::{Passivity, Port, Pressing};
+use haptics::passivity::{Passivity, Port, Springs};
 use nalgebra::Vector3;
 use shm_abi::frame::DEVICE_POSITION_VALID;
 use shm_abi::{DeviceFrame, Frame};
@@ -39,10 +39,7 @@ impl Tick {
 #[derive(Debug)]
 pub struct PassivePort {
     controller: Passivity,
-    /// Entities that were touched in the last tick, in ascending order, and the normals there; and room for those of the
-    /// next.
-    normals: Vec<(usize, Vector3<f64>)>,
-    next: Vec<(usize, Vector3<f64>)>,
+    springs: Springs,
 }
 
 /// What a finger's force is made of in a tick.
@@ -58,14 +55,13 @@ pub struct Rendering<'a> {
 impl PassivePort {
     /// For a finger that touches so many entities at most.
     pub fn new(controller: Passivity, contacts: usize) -> Self {
-        let room = || Vec::with_capacity(contacts);
-        Self { controller, normals: room(), next: room() }
+        Self { controller, springs: Springs::new(contacts) }
     }
 
     /// Forgets where the finger was; debts stay.
     pub fn reset(&mut self) {
         self.controller.reset();
-        self.normals.clear();
+        self.springs.reset();
     }
 
     /// Changes the force of a row so that it keeps the bound, and notes what was done.
@@ -83,7 +79,7 @@ impl PassivePort {
             return;
         }
         self.controller.carry(carried_W);
-        let (springs_j, pressing) = self.springs(of, &row.hip);
+        let (springs_j, pressing) = self.springs.of(&of.finger.finger, of.strength, &row.hip);
         let rendered = self.controller.step(&Port {
             position_W: row.hip,
             force_on_user_W: row.force_on_user,
@@ -95,26 +91,5 @@ impl PassivePort {
         });
         row.force_on_user = rendered.force_on_user_W;
         (row.energy_j, row.controlled_n) = (rendered.energy_j, rendered.changed_n);
-    }
-
-    /// What the springs of all contacts hold under their present forces (J), and what of it presses along normals.
-    fn springs(&mut self, of: &Rendering<'_>, hip_W: &Vector3<f64>) -> (f64, Pressing) {
-        let (mut springs_j, mut all) = (0.0, Pressing::NOTHING);
-        self.next.clear();
-        for contact in of.finger.finger.contacts().take(self.next.capacity()) {
-            let spring_j = |force_squared: f64| 0.5 * force_squared / contact.stiffness_n_per_m;
-            springs_j += spring_j(contact.force_on_user_W.norm_squared());
-            let normal_n = contact.normal_force_n * of.strength;
-            all.force_on_user_W += contact.force_on_user_W * of.strength;
-            all.normal_on_user_W += contact.normal_W * normal_n;
-            all.stored_j += spring_j(contact.normal_force_n * contact.normal_force_n);
-            if let Ok(at) = self.normals.binary_search_by_key(&contact.entity, |(entity, _)| *entity) {
-                let turn_W = contact.normal_W - self.normals[at].1;
-                all.turned_j += normal_n * (contact.god_object_W - hip_W).dot(&turn_W);
-            }
-            self.next.push((contact.entity, contact.normal_W));
-        }
-        std::mem::swap(&mut self.normals, &mut self.next);
-        (springs_j, all)
     }
 }

@@ -29,6 +29,12 @@
 //! |e| <= r = a T^2 + 2 sqrt(3) q          (2 a T^2 + ... where the force acts a tick later)
 //! ```
 //!
+//! What presses along the normals of surfaces has a second balance of its own ([`Pressing`]), by the same rules: else what
+//! friction takes from a stroke pays for a wall that buzzes across it. It counts changes of depth, so that a god-object that
+//! follows a bend or lags behind on it is no source; the device's own friction pays on ways along the normal, on others
+//! only for walls that every hand keeps quiet, all of it up to `k T = 2 b` and none from twice that on (b = 1.5 N s/m). If it is
+//! overdrawn all of the surfaces' force, friction included, is rendered in a smaller share; then the whole is looked at.
+//!
 //! Guarantee, for every source of force and between any two ticks i < j: as long as the acceleration keeps to its
 //! bound,
 //!
@@ -60,9 +66,11 @@
 mod balance;
 mod limit;
 mod port;
+mod springs;
 
 use balance::{Balance, Interval};
 pub use port::{Port, Pressing, Rendered};
+pub use springs::Springs;
 
 use nalgebra::Vector3;
 
@@ -98,6 +106,8 @@ pub struct Passivity {
     /// Follow the position when it is a count away, all around and along the normal: what friction acts on.
     dragged_W: Vector3<f64>,
     dragged_along_W: Vector3<f64>,
+    /// How much of the device's friction on other ways than that along the normal pays for what presses, 0 to 1.
+    sliding_share: f64,
     /// The force that acts until the next tick, and the one after it where forces come late.
     acting: Held,
     pending: Held,
@@ -108,18 +118,23 @@ pub struct Passivity {
 struct Held {
     force_W: Vector3<f64>,
     normal_W: Vector3<f64>,
+    /// What part that is of the normal force that was wanted.
+    normal_share: f64,
 }
 
 impl Held {
-    const NOTHING: Self =
-        Self { force_W: Vector3::new(0.0, 0.0, 0.0), normal_W: Vector3::new(0.0, 0.0, 0.0) };
+    const NOTHING: Self = Self {
+        force_W: Vector3::new(0.0, 0.0, 0.0),
+        normal_W: Vector3::new(0.0, 0.0, 0.0),
+        normal_share: 0.0,
+    };
 
     /// The same where motors made another force of it: the normal force has the same share.
     fn applied(&self, applied_W: Option<Vector3<f64>>) -> Self {
         let Some(force_W) = applied_W.filter(is_finite) else { return *self };
         let share = force_W.dot(&self.force_W) / self.force_W.norm_squared();
         let share = if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) };
-        Self { force_W, normal_W: self.normal_W * share }
+        Self { force_W, normal_W: self.normal_W * share, normal_share: self.normal_share * share }
     }
 }
 
@@ -183,6 +198,7 @@ impl Passivity {
             position_W: None,
             dragged_W: Vector3::zeros(),
             dragged_along_W: Vector3::zeros(),
+            sliding_share: 1.0,
             acting: Held::NOTHING,
             pending: Held::NOTHING,
         })
@@ -228,7 +244,8 @@ impl Passivity {
         let wanted_W = limit::without(port.force_on_user_W, pressing.force_on_user_W * (1.0 - share));
         let whole_j = budget_j(&self.whole, &self.pending.force_W);
         let force_W = limit::nearest(wanted_W, moved_W, next_surprise_m, whole_j);
-        let chosen = Held { force_W: wanted_W, normal_W: pressing.normal_on_user_W * share };
+        let normal_W = pressing.normal_on_user_W * share;
+        let chosen = Held { force_W: wanted_W, normal_W, normal_share: share };
         let chosen = chosen.applied(Some(force_W));
         self.acting = if port.is_late { self.pending } else { chosen };
         self.pending = chosen;
@@ -265,28 +282,40 @@ impl Passivity {
         });
         let held = self.acting.applied(port.applied_on_user_W);
         let fed_j = held.force_W.dot(&moved_W).clamp(-MOST_J, MOST_J);
-        let pressed_j = (held.normal_W.dot(&moved_W) - pressing.turned_j).clamp(-MOST_J, MOST_J);
+        let followed_j = pressing.followed_j * held.normal_share;
+        let pressed_j = (held.normal_W.dot(&moved_W) - followed_j).clamp(-MOST_J, MOST_J);
         if !fed_j.is_nan() {
             self.energy_j += fed_j;
         }
         let (way_m, way_along_m) = self.drag(port.position_W, &held.normal_W);
-        let paid_j =
-            |way_m: f64| self.spec.recovery_w * (ticks * self.period_s) + self.spec.device_friction_n * way_m;
         let interval = |fed_j, way_m, stored_j| Interval {
             fed_j,
-            paid_j: paid_j(way_m),
+            paid_j: self.spec.recovery_w * (ticks * self.period_s) + self.spec.device_friction_n * way_m,
             stored_j,
             is_late: port.is_late,
         };
         let whole = interval(fed_j, way_m, port.stored_j());
-        let along = interval(pressed_j, way_along_m, pressing.stored_j);
+        let sliding_m = (way_m - way_along_m).max(0.0) * self.sliding_share;
+        let along = interval(pressed_j, way_along_m + sliding_m, pressing.stored_j);
+        if pressing.stored_j > 0.0 {
+            self.sliding_share = self.share_of_sliding(pressing);
+        }
         self.whole.take(&whole, self.spec.bound_j);
         self.pressing.take(&along, self.spec.bound_j);
         (moved_W / ticks, ticks)
     }
 
-    /// What way the device's friction acted on (m): all of it, and that along the normal force. A counter that flickers
-    /// moves nothing.
+    /// What share of the device's friction on the way along a surface pays for what presses: all on one that every hand
+    /// keeps quiet, nothing on one that can buzz.
+    fn share_of_sliding(&self, pressing: &Pressing) -> f64 {
+        let stiffness_n_per_m = pressing.normal_on_user_W.norm_squared() / (2.0 * pressing.stored_j);
+        // A spring that is looked at every T is passive beside a damper of k T / 2 (Colgate and Schenkel).
+        let share = 2.0 - 0.5 * stiffness_n_per_m * self.period_s / HAND_N_S_PER_M;
+        if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) }
+    }
+
+    /// What way the device's friction acted on (m): all of it, and that along a normal force, if there is one. A counter
+    /// that flickers moves nothing.
     fn drag(&mut self, position_W: Vector3<f64>, normal_W: &Vector3<f64>) -> (f64, f64) {
         let slack_m = 2.0 * self.spec.resolution_m;
         let behind_W = position_W - self.dragged_W;
@@ -294,13 +323,14 @@ impl Passivity {
         if way_m > 0.0 {
             self.dragged_W += behind_W * (way_m / behind_W.norm());
         }
+        let way_m = way_m.max(0.0);
         let Some(n_W) = normal_W.try_normalize(0.0) else {
             self.dragged_along_W = position_W;
-            return (way_m.max(0.0), 0.0);
+            return (way_m, 0.0);
         };
         let behind_m = (position_W - self.dragged_along_W).dot(&n_W);
         self.dragged_along_W = position_W - n_W * behind_m.clamp(-slack_m, slack_m);
-        (way_m.max(0.0), (behind_m.abs() - slack_m).max(0.0))
+        (way_m, (behind_m.abs() - slack_m).max(0.0))
     }
 
     fn rendered(&self, force_on_user_W: Vector3<f64>, port: &Port) -> Rendered {
@@ -319,6 +349,8 @@ const FULL_FORCE_N: f64 = 8.5;
 const ACCELERATION_M_PER_S2: f64 = 150.0;
 /// What moves a Premium's tip: pays for counts below 2 f / q = 2.7 N/mm, where rounding leaks k q / 2 for each metre (N).
 const DEVICE_FRICTION_N: f64 = 0.04;
+/// What the lightest grip takes of a motion (N s/m).
+const HAND_N_S_PER_M: f64 = 1.5;
 /// Counts of a Premium at its tip (m).
 const RESOLUTION_M: f64 = 3e-5;
 /// In this time a debt of the whole bound is paid (s): 0.2 mW, far below what keeps up a buzz that can be felt.

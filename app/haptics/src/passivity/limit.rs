@@ -64,7 +64,11 @@ pub(super) fn share(force_W: &Vector3<f64>, way_W: &Vector3<f64>, surprise_m: f6
 
 /// A force (N) without this part of it: not longer than with it, and not against it.
 pub(super) fn without(force_W: Vector3<f64>, part_W: Vector3<f64>) -> Vector3<f64> {
-    if part_W == Vector3::zeros() { force_W } else { within(force_W - part_W, &force_W, 0.0, 0.0) }
+    if part_W == Vector3::zeros() {
+        return force_W;
+    }
+    let left_W = force_W - part_W;
+    if left_W.iter().all(|x| x.is_finite()) { within(left_W, &force_W, 0.0, 0.0) } else { Vector3::zeros() }
 }
 
 /// What a multiplier makes of a force.

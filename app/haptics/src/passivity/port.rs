@@ -32,9 +32,10 @@ pub struct Pressing {
     pub normal_on_user_W: Vector3<f64>,
     /// The most that what renders the normal forces can have stored \[J\].
     pub stored_j: f64,
-    /// What normals that have turned since the last tick made of tangential forces: the sum of
-    /// `F_n (g - x) . (n - n_before)` over contacts, g the god-object \[J\].
-    pub turned_j: f64,
+    /// What of `F_n . d`, d being the way of the finger since the last tick, is no change of depth, as the god-object g has
+    /// followed and its normal has turned: the sum of `F_n ((g - x) . (n - n_before) + (g - g_before) . n_before)` over
+    /// contacts, with the normal forces of the last tick \[J\].
+    pub followed_j: f64,
 }
 
 impl Pressing {
@@ -43,7 +44,7 @@ impl Pressing {
         force_on_user_W: Vector3::new(0.0, 0.0, 0.0),
         normal_on_user_W: Vector3::new(0.0, 0.0, 0.0),
         stored_j: 0.0,
-        turned_j: 0.0,
+        followed_j: 0.0,
     };
 
     /// Nothing, where a number is none.
@@ -51,7 +52,7 @@ impl Pressing {
         let is_told = is_finite(&self.force_on_user_W)
             && is_finite(&self.normal_on_user_W)
             && self.stored_j.is_finite()
-            && self.turned_j.is_finite();
+            && self.followed_j.is_finite();
         if is_told { Self { stored_j: self.stored_j.max(0.0), ..*self } } else { Self::NOTHING }
     }
 }
