@@ -8,9 +8,11 @@
 //! of = "hub"
 //! friction = { model = "coulomb", mu = 0.1 }
 //! stiffness_n_per_m = 2000.0
+//! colour = [0.2, 0.2, 0.2]
 //! ```
 //! A face that several of them name is of the first. What one does not say is as the entity says it.
 
+use crate::colour::read_colour;
 use crate::error::{Location, SceneError};
 use crate::friction::FrictionSpec;
 use crate::material::read_material;
@@ -29,6 +31,8 @@ pub struct FacesSpec {
     pub stiffness_n_per_m: f64,
     /// Normal force per speed of approach.
     pub damping_n_s_per_m: f64,
+    /// Red, green, blue and opacity, 0 to 1, where what is felt is seen; default the entity's.
+    pub colour: Option<[f64; 4]>,
     /// Where `of` stands, for messages.
     pub at: Location,
 }
@@ -75,6 +79,7 @@ impl FacesSpec {
             friction,
             stiffness_n_per_m: table.number_or("stiffness_n_per_m", Bound::Positive, stiffness)?,
             damping_n_s_per_m: table.number_or("damping_n_s_per_m", Bound::NotNegative, damping)?,
+            colour: table.get("colour").map(|value| read_colour(&value)).transpose()?,
             at: *table.at("of"),
         })
     }
@@ -85,6 +90,6 @@ const MOST: usize = 1000;
 const NAMES: &str =
     "the name of a group, an object or a material in the model's file, or a list of such names";
 const KEYS: Vocabulary = Vocabulary {
-    available: &["of", "material", "friction", "stiffness_n_per_m", "damping_n_s_per_m"],
+    available: &["of", "material", "friction", "stiffness_n_per_m", "damping_n_s_per_m", "colour"],
     later: &[],
 };

@@ -71,7 +71,7 @@ impl Scene {
     pub fn seen(&self) -> Seen<'_> {
         let mut seen =
             Seen { parts: Vec::new(), lights: &self.lights, cameras: &self.cameras, unreadable: Vec::new() };
-        let mut files = BTreeMap::new();
+        let mut files = Files::default();
         for entity in &self.entities {
             for visual in &entity.visuals {
                 seen.add(entity, visual, &mut files);
@@ -81,23 +81,78 @@ impl Scene {
     }
 }
 
-/// `None`: it was told that it cannot be read.
-type Files<'s> = BTreeMap<&'s Path, Option<Arc<TriangleSoup>>>;
+/// What was read, and what cannot be.
+#[derive(Default)]
+struct Files<'s> {
+    /// `None`: it was told that it cannot be read.
+    whole: BTreeMap<&'s Path, Option<Arc<TriangleSoup>>>,
+    /// By the names of faces; the first part has those that have none of them.
+    parted: BTreeMap<(&'s Path, Vec<&'s [String]>), Vec<Arc<TriangleSoup>>>,
+}
 
 impl<'s> Seen<'s> {
     fn add(&mut self, entity: &'s SceneEntity, visual: &'s VisualSpec, files: &mut Files<'s>) {
-        let form = match visual.shape.as_ref().unwrap_or(&entity.shape) {
-            ShapeSpec::Mesh(mesh) => {
-                let soup = files.entry(&mesh.file).or_insert_with(|| {
-                    let read = model::read_file(&mesh.file).and_then(|bytes| model::read(&mesh.file, &bytes));
-                    read.map_err(|error| self.unreadable.push((&mesh.at, Arc::new(error)))).ok().map(Arc::new)
-                });
-                let Some(soup) = soup else { return };
-                SeenForm::Triangles { soup: soup.clone(), scale: mesh.scale }
-            }
-            shape => SeenForm::Shape(shape),
-        };
         let VisualSpec { pose, colour, casts_shadow, .. } = *visual;
-        self.parts.push(SeenPart { entity, form, X_BV: pose, colour, casts_shadow });
+        let mesh = match visual.shape.as_ref().unwrap_or(&entity.shape) {
+            ShapeSpec::Mesh(mesh) => mesh,
+            shape => {
+                let form = SeenForm::Shape(shape);
+                self.parts.push(SeenPart { entity, form, X_BV: pose, colour, casts_shadow });
+                return;
+            }
+        };
+        let is_parted = visual.shape.is_none() && entity.faces.iter().any(|faces| faces.colour.is_some());
+        let whole = files.whole.entry(&mesh.file).or_insert_with(|| {
+            let read = model::read_file(&mesh.file).and_then(|bytes| model::read(&mesh.file, &bytes));
+            read.map_err(|error| self.unreadable.push((&mesh.at, Arc::new(error)))).ok().map(Arc::new)
+        });
+        let Some(whole) = whole else { return };
+        let mut add = |soup: &Arc<TriangleSoup>, colour| {
+            let form = SeenForm::Triangles { soup: soup.clone(), scale: mesh.scale };
+            self.parts.push(SeenPart { entity, form, X_BV: pose, colour, casts_shadow });
+        };
+        if !is_parted {
+            return add(whole, colour);
+        }
+        let names: Vec<&[String]> = entity.faces.iter().map(|faces| faces.of.as_slice()).collect();
+        let parts = files
+            .parted
+            .entry((&mesh.file, names.clone()))
+            .or_insert_with(|| parts(&mesh.file, whole, names));
+        let own = entity.faces.iter().map(|faces| faces.colour.unwrap_or(colour));
+        let colours = std::iter::once(colour).chain(own);
+        for (part, colour) in parts.iter().zip(colours).filter(|(part, _)| !part.faces.is_empty()) {
+            add(part, colour);
+        }
     }
+}
+
+/// The faces that none of these names, and those that each of them does.
+fn parts(file: &Path, whole: &Arc<TriangleSoup>, names: Vec<&[String]>) -> Vec<Arc<TriangleSoup>> {
+    let of_file = model::read_file(file).and_then(|bytes| model::read_names(file, &bytes)).ok().flatten();
+    let labels = of_file.map_or_else(Vec::new, |of_file| of_file.labels(names.iter().copied()));
+    if labels.len() != whole.faces.len() {
+        return vec![whole.clone()];
+    }
+    let part = |label: usize| {
+        let own = whole.faces.iter().zip(&labels).filter(|(_, own)| usize::from(**own) == label);
+        Arc::new(used(whole, own.map(|(face, _)| *face)))
+    };
+    (0..=names.len()).map(part).collect()
+}
+
+/// These faces of a soup, with the vertices that they use.
+fn used(of: &TriangleSoup, faces: impl Iterator<Item = [u32; 3]>) -> TriangleSoup {
+    let mut numbers = vec![None; of.vertices.len()];
+    let mut vertices = Vec::new();
+    let faces = faces.map(|face| {
+        face.map(|vertex| {
+            *numbers[vertex as usize].get_or_insert_with(|| {
+                vertices.push(of.vertices[vertex as usize]);
+                vertices.len() as u32 - 1
+            })
+        })
+    });
+    let faces = faces.collect();
+    TriangleSoup { vertices, faces }
 }

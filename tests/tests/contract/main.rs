@@ -12,6 +12,7 @@ mod effects;
 mod emulate;
 mod ended;
 mod events;
+mod faces;
 mod first_run;
 mod frictions;
 mod gallery;

@@ -90,14 +90,17 @@ fn read_mesh(
         }
         names.add(own, soup.faces.len() - first);
         let behind = part.at + 2 + (soup.faces.len() - first) * FACE_BYTES;
-        Part { at: behind.min(part.end), ..part }.each(FACES_OF_MATERIAL, |part| {
+        let materials = Part { at: behind.min(part.end), ..part };
+        // A shape is worth more than the names of its faces.
+        let _ = materials.each(FACES_OF_MATERIAL, |part| {
             let (material, part) = part.name()?;
             let both = names.set([name, &material]);
             for at in part.items(2, "faces")? {
                 names.rename(first + usize::from(part.half(at)), both);
             }
             Ok(())
-        })
+        });
+        Ok(())
     })
 }
 

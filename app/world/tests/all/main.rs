@@ -15,6 +15,7 @@ mod any_text;
 mod default_hand;
 mod effects;
 mod events;
+mod face_names;
 mod formats;
 mod height_maps;
 mod kinds;

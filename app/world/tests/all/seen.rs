@@ -89,3 +89,30 @@ fn a_picture_that_is_not_there_is_told_once_with_its_place() {
         seen.unreadable.iter().map(|(at, _)| format!("{}:{}", at.file.display(), at.line)).collect();
     assert_eq!(told, ["s.toml:4"]);
 }
+
+#[test]
+fn faces_with_a_colour_of_their_own_are_parts_of_their_own() {
+    let place = tempfile::tempdir().expect("a directory");
+    let corners = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0\n";
+    let text = format!(
+        "{corners}usemtl red\nf 1 2 3\nusemtl blue\nf 1 3 4\nusemtl plain\nf 2 5 3\ng rest\nf 1 5 4\n"
+    );
+    std::fs::write(place.path().join("a.obj"), text).expect("written");
+    let text = "[[finger]]\n[[entity]]\nshape = { kind = \"mesh\", file = \"a.obj\" }\nvisual = { colour = [0, 1, 0] }\n\
+                [[entity.faces]]\nof = \"plain\"\nstiffness_n_per_m = 500\n\
+                [[entity.faces]]\nof = [\"red\", \"rest\"]\ncolour = [1, 0, 0]\n\
+                [[entity.faces]]\nof = \"blue\"\ncolour = [0, 0, 1, 0.5]\n\
+                [[entity]]\nname = \"other\"\nshape = { kind = \"mesh\", file = \"a.obj\" }\n";
+    let scene = Scene::parse(text, &place.path().join("s.toml")).unwrap_or_else(|error| panic!("{error}"));
+    let seen = scene.seen();
+    let told: Vec<_> = seen.parts.iter().map(|part| (part.colour, faces(part))).collect();
+    let [green, red, blue] = [[0.0, 1.0, 0.0, 1.0], [1.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.5]];
+    // What is plain comes first of those that name it, whatever else it is.
+    let grey = world::VisualSpec::DEFAULT_COLOUR;
+    assert_eq!(told, [(green, 2), (red, 1), (blue, 1), (grey, 4)]);
+    for part in &seen.parts {
+        let SeenForm::Triangles { soup, .. } = &part.form else { panic!("{:?}", part.form) };
+        assert!(soup.faces.iter().flatten().all(|corner| (*corner as usize) < soup.vertices.len()));
+        assert!(soup.vertices.len() <= 3 * soup.faces.len());
+    }
+}
