@@ -27,7 +27,7 @@ use crate::hip::Hip;
 use crate::mesh::{BallOnMesh, Beginning, Mesh, MeshCone};
 use crate::nurbs::NurbsCone;
 use crate::onset::Onset;
-use crate::shading::Shading;
+use crate::shading::{Following, Shading};
 use crate::shape::Shape;
 use crate::surface::{Feature, Surface};
 use crate::touch_points::TouchPoints;
@@ -105,6 +105,7 @@ pub(crate) struct Slot {
     /// Of the mesh's face that the god-object is on.
     label: u16,
     stiffness: ContactStiffness,
+    following: Following,
     /// The most that dampers made of the force in the last tick (N).
     damped_n: f64,
     /// Inside, but above a dent of the entity's height map: nothing is felt, and nothing begins anew.
@@ -160,6 +161,7 @@ impl Slot {
         self.contact = self.touch(index, entity, sweep);
         if !self.has_met() {
             self.let_go();
+            self.following.reset();
         }
         self.contact.as_ref()
     }
@@ -491,7 +493,8 @@ impl Slot {
             if is_plain { spring_n } else { self.explained_n(entity, material, &touch, input, spring_n) };
         // Apart, so that a touch that stays as it is stays in registers.
         if !matches!(entity.shading, Shading::None) || entity.height_map.is_some() {
-            touch = self.shade_and_raise(entity, touch, sweep, input.cone.stiffness_n_per_m)?;
+            touch =
+                self.shade_and_raise(entity, touch, sweep, (input.cone.stiffness_n_per_m, input.way_m()))?;
         }
         if share != 1.0 {
             touch.force_on_user_B *= share;
@@ -543,11 +546,11 @@ impl Slot {
         entity: &Entity,
         mut touch: Touch,
         sweep: &Sweep<'_>,
-        stiffness_n_per_m: f64,
+        (stiffness_n_per_m, way_m): (f64, f64),
     ) -> Option<Touch> {
         match self.balls.as_ref().filter(|balls| balls.is_touching()) {
             Some(balls) => entity.shading.turn_shares(&entity.shape, balls.shares(), &mut touch),
-            None => entity.shading.turn(&entity.shape, &mut touch),
+            None => self.following.turn(&entity.shading, &entity.shape, &mut touch, way_m),
         }
         if let Some(height_map) = &entity.height_map {
             let over = Over {

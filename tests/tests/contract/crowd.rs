@@ -46,7 +46,7 @@ fn felt_as_if_alone(things: &[Thing], radius_m: f64, places: &[[f64; 3]], reach_
     let [all, few] =
         [scene(radius_m, things.iter().enumerate()), scene(radius_m, reached.into_iter())].map(|scene| {
             let table = Workplace::new().play(&scene, &hand, &[]);
-            (table.vectors("f0_force"), table.vectors("f0_godobject"), table)
+            (table.vectors("f0_force"), table.vectors("f0_god"), table)
         });
     assert!(all.0 == few.0 && all.1 == few.1);
     assert_eq!(all.2.texts("f0_entity"), few.2.texts("f0_entity"));

@@ -1,6 +1,7 @@
 //! Faces of a mesh that are made of different things, through scene file, model file and recording.
 
 use nalgebra::Vector3;
+use system_tests::recording::Table;
 use system_tests::workplace::{Workplace, hand};
 
 /// A floor of four rectangles, 100 mm by 100 mm: of ice, of cork, of cork in another group, and without a name.
@@ -31,8 +32,14 @@ fn every_material_of_a_file_is_felt_where_its_faces_are() {
     for radius_m in [0.0, 5e-3] {
         let place = Workplace::new();
         place.write("floor.obj", FLOOR);
-        let table = place.play(&scene(radius_m, FACES), &stroke(radius_m), &[]);
-        let (forces, gods) = (table.vectors("f0_force"), table.vectors("f0_godobject"));
+        place.write("scene.toml", scene(radius_m, FACES));
+        place.write("hand.csv", stroke(radius_m));
+        let run = ["run", "scene.toml", "--hand", "hand.csv", "--clock", "virtual", "--headless"];
+        // It is told that the floor has rims.
+        let said = place.run(run.iter().chain(&["--record", "out.csv"]));
+        assert_eq!(said.status, Some(0), "{}", said.err);
+        let table = Table::read(&place.path("out.csv"));
+        let (forces, gods) = (table.vectors("f0_force"), table.vectors("f0_god"));
         let felt = |x: f64| {
             let at = gods.iter().position(|god: &Vector3<f64>| god.x > x).expect("it comes by");
             (forces[at].y, -forces[at].x / forces[at].y)
@@ -57,7 +64,7 @@ fn a_name_that_no_face_has_is_refused_with_those_that_there_are() {
     place.write("scene.toml", scene(0.0, "[[entity.faces]]\nof = \"crok\"\nmaterial = \"rubber\"\n"));
     let said = place.run(["run", "scene.toml", "--clock", "virtual", "--headless"]);
     assert_eq!(said.status, Some(2));
-    let words = "scene.toml:8: `entity[0].faces[0].of`: found \"crok\", which no face of";
+    let words = "scene.toml:9: entity[0].faces[0].of: found \"crok\", which no face of";
     assert!(said.err.contains(words), "{}", said.err);
     let allowed = "allowed: the names in the file (did you mean `cork`?): cork, end, ice\n";
     assert!(said.err.ends_with(allowed), "{}", said.err);
