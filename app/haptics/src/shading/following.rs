@@ -28,8 +28,8 @@ pub(crate) struct Following {
 /// A leap that has not been made up for.
 #[derive(Debug, Clone, Copy)]
 struct Leap {
-    /// Of the force, in the last tick.
-    direction_B: Vector3<f64>,
+    /// From the shaded normal to what is felt.
+    off_B: Vector3<f64>,
     /// What the size of the force is multiplied by.
     size: f64,
     /// Of the god-object's way (m).
@@ -45,21 +45,20 @@ impl Following {
         if self.leap.is_none() && gone_m <= LEAP * way_m + SLACK_M {
             return shading.turn(shape, touch);
         }
-        let to_B = shading.normal_at(shape, &at);
+        let normal_B = shading.normal_at(shape, &at);
         if let Some((last, last_size_n)) = last.filter(|_| gone_m > LEAP * way_m + SLACK_M) {
-            self.begin(shading, shape, (&last, last_size_n), (&at, size_n), to_B);
+            self.begin(shading, shape, (&last, last_size_n), (&at, size_n), normal_B);
         }
         let Some(leap) = &mut self.leap else { return shading.turn(shape, touch) };
-        let share = (MADE_UP * way_m / leap.left_m).min(1.0);
-        leap.direction_B += (to_B - leap.direction_B) * share;
-        leap.size += (1.0 - leap.size) * share;
-        leap.left_m -= MADE_UP * way_m;
-        let Leap { direction_B, size, left_m } = *leap;
+        let left_m = leap.left_m - MADE_UP * way_m;
         if left_m <= 0.0 {
             self.leap = None;
             return shading.turn(shape, touch);
         }
-        let turn = Turn { from_B: at.normal_B, to_B: direction_B };
+        let share = left_m / leap.left_m;
+        *leap = Leap { off_B: leap.off_B * share, size: 1.0 + (leap.size - 1.0) * share, left_m };
+        let Leap { off_B, size, .. } = *leap;
+        let turn = Turn { from_B: at.normal_B, to_B: normal_B + off_B };
         touch.force_on_user_B = shading.form().turned(&touch.force_on_user_B, &turn) * size;
         touch.normal_force_n *= size;
     }
@@ -76,20 +75,22 @@ impl Following {
         shape: &Shape,
         (last, last_size_n): (&SurfacePoint, f64),
         (at, size_n): (&SurfacePoint, f64),
-        to_B: Vector3<f64>,
+        normal_B: Vector3<f64>,
     ) {
-        let from_B = self.leap.map_or_else(|| shading.normal_at(shape, last), |leap| leap.direction_B);
-        let turned = (to_B - from_B).norm();
+        let last_normal_B = shading.normal_at(shape, last);
         // As far as the faces, or farther: an edge that is not shaded, or a place that is quite another one.
-        if turned >= SMOOTHED * (at.normal_B - last.normal_B).norm() {
+        if (normal_B - last_normal_B).norm() >= SMOOTHED * (at.normal_B - last.normal_B).norm() {
             self.leap = None;
             return;
         }
-        let before = self.leap.map_or(1.0, |leap| leap.size);
-        let size = before * last_size_n / size_n;
-        let left_m = self.leap.map_or(0.0, |leap| leap.left_m) + (at.point_B - last.point_B).norm();
+        let before = self.leap.unwrap_or(Leap { off_B: Vector3::zeros(), size: 1.0, left_m: 0.0 });
+        let size = before.size * last_size_n / size_n;
         let is_small = (1.0 / MOST_SIZE..=MOST_SIZE).contains(&size);
-        self.leap = is_small.then_some(Leap { direction_B: from_B, size, left_m });
+        self.leap = is_small.then(|| Leap {
+            off_B: last_normal_B + before.off_B - normal_B,
+            size,
+            left_m: before.left_m + (at.point_B - last.point_B).norm(),
+        });
     }
 }
 
