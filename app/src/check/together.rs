@@ -160,10 +160,10 @@ impl<'a> World<'a> {
         probe.step_near(self.entities, near, Hip { position_W: *place_W, velocity_W: None }, 1e-3);
         let contacts = probe.contacts().map(|contact| {
             let along: Matrix3<f64> = contact.normal_W * contact.normal_W.transpose();
-            let entity = &self.entities[contact.entity];
+            let material = self.entities[contact.entity].felt_material(contact.label);
             let gains = Gains {
-                stiffness_n_per_m: along * entity.felt_stiffness_n_per_m(),
-                damping_n_s_per_m: along * entity.felt_damping_n_s_per_m(),
+                stiffness_n_per_m: along * contact.stiffness_n_per_m,
+                damping_n_s_per_m: along * material.damping_n_s_per_m,
                 mass_kg: 0.0,
             };
             (contact.entity, gains)

@@ -29,14 +29,37 @@ pub(super) fn all(rig: &Rig, whole: &Scene, entities: &[Entity]) -> Vec<String> 
     warnings
 }
 
+/// What fingers feel: an entity, or faces of one that are made of something else.
+struct Surface {
+    name: String,
+    stiffness_n_per_m: f64,
+    damping_n_s_per_m: f64,
+}
+
+fn surfaces(rig: &Rig) -> impl Iterator<Item = Surface> {
+    let felt = rig.scene.entities.iter().filter(|entity| entity.is_haptic);
+    felt.flat_map(|entity| {
+        let whole = (entity.name.clone(), entity.stiffness_n_per_m, entity.damping_n_s_per_m);
+        let faces = entity.faces.iter().map(|faces| {
+            let name = format!("{} of {}", in_words(&faces.of), entity.name);
+            (name, faces.stiffness_n_per_m, faces.damping_n_s_per_m)
+        });
+        let all = std::iter::once(whole).chain(faces);
+        all.map(|(name, stiffness_n_per_m, damping_n_s_per_m)| Surface {
+            name,
+            stiffness_n_per_m,
+            damping_n_s_per_m,
+        })
+    })
+}
+
 /// Against what the sampled linear loop stands, with a Premium held lightly that is answered in the same tick.
 fn too_stiff(rig: &Rig, stands: &mut Stands) -> Vec<String> {
     let mut beyond: BTreeMap<u64, Vec<String>> = BTreeMap::new();
-    for entity in rig.scene.entities.iter().filter(|entity| entity.is_haptic) {
-        let damping = entity.damping_n_s_per_m;
-        if stands.limit(damping).is_some_and(|limit| entity.stiffness_n_per_m > limit) {
-            let named = format!("{} ({} N/m)", entity.name, entity.stiffness_n_per_m);
-            beyond.entry(damping.to_bits()).or_default().push(named);
+    for Surface { name, stiffness_n_per_m, damping_n_s_per_m } in surfaces(rig) {
+        if stands.limit(damping_n_s_per_m).is_some_and(|limit| stiffness_n_per_m > limit) {
+            let named = format!("{name} ({stiffness_n_per_m} N/m)");
+            beyond.entry(damping_n_s_per_m.to_bits()).or_default().push(named);
         }
     }
     let rate_hz = 1e9 / rig.period_ns as f64;
@@ -54,8 +77,8 @@ fn too_stiff(rig: &Rig, stands: &mut Stands) -> Vec<String> {
 /// By the limit that effects' damping is refused above.
 fn too_damped(rig: &Rig) -> Option<String> {
     let limit = rig.limits(Limits::DEFAULT_DEVICE_MASS_KG).ok()?.damping_n_s_per_m();
-    let beyond = rig.scene.entities.iter().filter(|it| it.is_haptic && it.damping_n_s_per_m > limit);
-    let named = |it: &world::SceneEntity| format!("{} ({} N s/m)", it.name, it.damping_n_s_per_m);
+    let beyond = surfaces(rig).filter(|surface| surface.damping_n_s_per_m > limit);
+    let named = |surface: Surface| format!("{} ({} N s/m)", surface.name, surface.damping_n_s_per_m);
     let names: Vec<String> = beyond.map(named).collect();
     let (rate_hz, mass_kg) = (1e9 / rig.period_ns as f64, Limits::DEFAULT_DEVICE_MASS_KG);
     (!names.is_empty()).then(|| {

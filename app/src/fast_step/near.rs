@@ -123,8 +123,9 @@ impl Near {
     fn keep_nearest(&mut self, entities: &[Entity], most: usize, hip_W: &Vector3<f64>) {
         let Self { entities: found, distances, .. } = self;
         let distance_m = |entity: u32| {
+            // What has no end comes first.
             let tight = entities.get(entity as usize).and_then(Aabb::of_entity);
-            tight.map_or(0.0, |tight| (tight.middle_W() - hip_W).norm())
+            tight.map_or(-1.0, |tight| (tight.middle_W() - hip_W).norm())
         };
         distances.clear();
         distances.extend(found.drain(..).map(|entity| (distance_m(entity), entity)));

@@ -100,3 +100,15 @@ fn check_lists_the_names_that_a_scene_may_use() {
     let json: serde_json::Value = serde_json::from_str(&said.out).expect("JSON");
     assert_eq!(json["mesh"]["names"], serde_json::json!({ "cork": 4, "end": 2, "ice": 2 }));
 }
+
+#[test]
+fn check_warns_of_faces_that_are_too_stiff_or_too_damped() {
+    let place = Workplace::new();
+    place.write("floor.obj", FLOOR);
+    let stiff = FACES.replace("stiffness_n_per_m = 2000.0", "stiffness_n_per_m = 60000.0");
+    let damped = format!("{stiff}[[entity.faces]]\nof = \"cork\"\ndamping_n_s_per_m = 90.0\n");
+    place.write("scene.toml", scene(0.0, &damped));
+    let said = place.run(["check", "scene.toml"]);
+    assert!(said.out.contains("warning: end of floor (60000 N/m) may buzz"), "{}", said.out);
+    assert!(said.out.contains("warning: cork of floor (90 N s/m) may swing"), "{}", said.out);
+}
