@@ -1,6 +1,7 @@
 //! What a scene or layout file can have wrong, and exactly what its author is told.
 
 mod effects;
+mod faces;
 mod values;
 mod words;
 
