@@ -4,7 +4,7 @@
 //! call, however many they are; what light goes through is drawn one by one, since it is sorted by how far away it is.
 
 use crate::painter::{bytes, mask, material, mesh_of};
-use crate::stage::{Stage, Thing};
+use crate::stage::Thing;
 use crate::triangles::Triangles;
 use std::sync::Arc;
 use three_d::{Context, Geometry, Gm, InstancedMesh, Instances, Mat4, Mesh, Object, PhysicalMaterial};
@@ -33,9 +33,9 @@ struct Clear {
 }
 
 impl Crowd {
-    pub(crate) fn new(context: &Context, stage: &Stage) -> Self {
+    pub(crate) fn new(context: &Context, things: &[Thing]) -> Self {
         let (mut alike, mut clear) = (Vec::<Alike>::new(), Vec::new());
-        for thing in &stage.things {
+        for thing in things {
             if thing.colour[3] < 1.0 {
                 clear.push(Clear::new(context, thing));
                 continue;

@@ -27,6 +27,7 @@ pub mod panel;
 pub mod pick;
 pub mod picture;
 pub mod playback;
+mod rims;
 pub mod shapes;
 mod solids;
 pub mod stage;

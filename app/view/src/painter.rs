@@ -32,13 +32,14 @@ const CHOSEN_SHARE: f64 = 0.6;
 pub struct Painter {
     context: Context,
     things: Crowd,
+    rims: Crowd,
     /// Whether the lights' shadows are those of where things are now.
     is_cast: bool,
     /// The sum of what all lights shed everywhere: shaders take one.
     everywhere: AmbientLight,
     lights: Vec<Shining>,
     overlay: Overlay,
-    /// Whether hands, forces and contacts are drawn.
+    /// Whether hands, forces, contacts and the rims of meshes are drawn.
     pub with_overlay: bool,
     /// Whether things change their colour while fingers touch them or they touch each other.
     pub with_highlight: bool,
@@ -62,7 +63,8 @@ impl Painter {
     pub fn new(context: &Context, stage: &Stage) -> Self {
         Self {
             context: context.clone(),
-            things: Crowd::new(context, stage),
+            things: Crowd::new(context, &stage.things),
+            rims: Crowd::new(context, &stage.rims),
             is_cast: false,
             everywhere: AmbientLight::new(context, 1.0, colour_of(everywhere(&stage.lights))),
             lights: stage.lights.iter().filter_map(|light| shining(context, light)).collect(),
@@ -106,6 +108,7 @@ impl Painter {
         let marks = Marks { contacts: self.with_overlay && self.with_highlight, chosen: self.chosen };
         let is_moved = self.things.place(|thing| look_of(thing, moment, space, &marks));
         self.is_cast &= !is_moved;
+        self.rims.place(|thing| look_of(thing, moment, space, &Marks { contacts: false, chosen: None }));
         self.overlay.place(moment);
     }
 
@@ -114,6 +117,10 @@ impl Painter {
         let own = self.lights.iter().map(Shining::light);
         let lights: Vec<&dyn Light> = [&self.everywhere as &dyn Light].into_iter().chain(own).collect();
         target.render_partially(part.into(), &look.eye, self.things.objects(), &lights);
+        if self.with_overlay {
+            self.rims.mask(look.channels);
+            target.render_partially(part.into(), &look.eye, self.rims.objects(), &lights);
+        }
         // What things hide first: what is not hidden would hide it.
         for is_hidden in [true, false].into_iter().filter(|_| self.with_overlay) {
             self.overlay.show(look.channels, is_hidden);

@@ -1,5 +1,6 @@
 //! What can be seen of a scene: who looks like what, what shines, and who looks on.
 
+use crate::rims;
 use crate::shapes;
 use crate::triangles::Triangles;
 use crate::usual;
@@ -15,6 +16,8 @@ use world::{FrictionSpec, MassSpec, Scene, SceneCamera, SceneEntity, SceneLight,
 pub struct Stage {
     /// Things, each of an entity.
     pub things: Vec<Thing>,
+    /// Rims of meshes that are felt, each of an entity.
+    pub rims: Vec<Thing>,
     /// Lights; never none.
     pub lights: Vec<SceneLight>,
     /// Cameras; never none.
@@ -104,6 +107,7 @@ impl Stage {
             }
         }
         usual::colour(scene, &mut stage.things);
+        stage.rims = rims::all(&scene.entities, entities);
         if stage.lights.is_empty() {
             stage.lights = usual::lights();
         }

@@ -12,10 +12,7 @@ fn of_a_mesh(faces: &str) -> String {
 fn faces_say_what_they_lack_and_what_they_know() {
     let names = "the name of a group, an object or a material in the model's file, or a list of such names";
     refused(&of_a_mesh(""), &format!("s.toml:4: entity[0].faces[0].of: missing; allowed: {names}"));
-    refused(
-        &of_a_mesh("of = 7"),
-        &format!("s.toml:5: entity[0].faces[0].of: found 7; allowed: {names}"),
-    );
+    refused(&of_a_mesh("of = 7"), &format!("s.toml:5: entity[0].faces[0].of: found 7; allowed: {names}"));
     refused(
         &of_a_mesh("of = \"a\"\nstifness_n_per_m = 1"),
         "s.toml:6: entity[0].faces[0].stifness_n_per_m: unknown key (did you mean `stiffness_n_per_m`?); \
