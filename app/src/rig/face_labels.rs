@@ -27,7 +27,10 @@ pub(super) fn labels(
             });
         }
     }
-    Ok(names.map_or_else(Vec::new, |names| names.labels(faces.iter().map(|spec| spec.of.as_slice()))))
+    Ok(names.map_or_else(Vec::new, |names| {
+        let lists: Vec<&[String]> = faces.iter().map(|spec| spec.of.as_slice()).collect();
+        names.labels(&lists)
+    }))
 }
 
 fn allowed(name: &str, all: &BTreeMap<&str, usize>) -> String {

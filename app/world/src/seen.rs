@@ -81,13 +81,16 @@ impl Scene {
     }
 }
 
+/// A file, and lists of names.
+type Parting<'s> = (&'s Path, Vec<&'s [String]>);
+
 /// What was read, and what cannot be.
 #[derive(Default)]
 struct Files<'s> {
     /// `None`: it was told that it cannot be read.
     whole: BTreeMap<&'s Path, Option<Arc<TriangleSoup>>>,
     /// By the names of faces; the first part has those that have none of them.
-    parted: BTreeMap<(&'s Path, Vec<&'s [String]>), Vec<Arc<TriangleSoup>>>,
+    parted: BTreeMap<Parting<'s>, Vec<Arc<TriangleSoup>>>,
 }
 
 impl<'s> Seen<'s> {
@@ -118,7 +121,7 @@ impl<'s> Seen<'s> {
         let parts = files
             .parted
             .entry((&mesh.file, names.clone()))
-            .or_insert_with(|| parts(&mesh.file, whole, names));
+            .or_insert_with(|| parts(&mesh.file, whole, &names));
         let own = entity.faces.iter().map(|faces| faces.colour.unwrap_or(colour));
         let colours = std::iter::once(colour).chain(own);
         for (part, colour) in parts.iter().zip(colours).filter(|(part, _)| !part.faces.is_empty()) {
@@ -128,9 +131,9 @@ impl<'s> Seen<'s> {
 }
 
 /// The faces that none of these names, and those that each of them does.
-fn parts(file: &Path, whole: &Arc<TriangleSoup>, names: Vec<&[String]>) -> Vec<Arc<TriangleSoup>> {
+fn parts(file: &Path, whole: &Arc<TriangleSoup>, names: &[&[String]]) -> Vec<Arc<TriangleSoup>> {
     let of_file = model::read_file(file).and_then(|bytes| model::read_names(file, &bytes)).ok().flatten();
-    let labels = of_file.map_or_else(Vec::new, |of_file| of_file.labels(names.iter().copied()));
+    let labels = of_file.map_or_else(Vec::new, |of_file| of_file.labels(names));
     if labels.len() != whole.faces.len() {
         return vec![whole.clone()];
     }

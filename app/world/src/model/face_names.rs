@@ -76,9 +76,10 @@ impl FaceNames {
     }
 
     /// Of each face the number of the first of these lists, from 1, that has one of its names; 0 if none has.
-    pub fn labels<'n>(&self, lists: impl Iterator<Item = &'n [String]> + Clone) -> Vec<u16> {
+    pub fn labels<S: AsRef<[String]>>(&self, lists: &[S]) -> Vec<u16> {
         let label = |set: &Vec<String>| {
-            let found = lists.clone().position(|list| list.iter().any(|name| set.contains(name)));
+            let names = |list: &S| list.as_ref().iter().any(|name| set.contains(name));
+            let found = lists.iter().position(names);
             found.map_or(0, |found| u16::try_from(found + 1).unwrap_or(0))
         };
         let of_sets: Vec<u16> = self.sets.iter().map(label).collect();
@@ -103,7 +104,7 @@ mod tests {
         sets.into_iter().for_each(|set| names.add(set, 2));
         names.rename(7, 1);
         let lists = [vec!["steel".to_owned(), "iron".into()], vec!["tyre".into()], vec!["rubber".into()]];
-        assert_eq!(names.labels(lists.iter().map(Vec::as_slice)), [2, 2, 1, 1, 0, 0, 2, 1]);
+        assert_eq!(names.labels(&lists), [2, 2, 1, 1, 0, 0, 2, 1]);
         let all: Vec<_> = names.all().into_iter().collect();
         assert_eq!(all, [("rim", 3), ("rubber", 3), ("steel", 3), ("tyre", 3)]);
     }

@@ -11,7 +11,7 @@ fn labels(file: &str, bytes: &[u8], wanted: &[&str]) -> (Vec<(String, usize)>, V
     let soup = model::read(Path::new(file), bytes).expect("a model");
     let names: FaceNames = model::read_names(Path::new(file), bytes).expect("a model").expect("names");
     let lists: Vec<Vec<String>> = wanted.iter().map(|name| vec![(*name).to_owned()]).collect();
-    let labels = names.labels(lists.iter().map(Vec::as_slice));
+    let labels = names.labels(&lists);
     assert_eq!(labels.len(), soup.faces.len());
     (names.all().into_iter().map(|(name, faces)| (name.to_owned(), faces)).collect(), labels)
 }
