@@ -1,6 +1,6 @@
 //! Answers of the laws where a question has no load, no time or no motion, and at the very limit between two answers.
 
-use crate::common::laws::{drift_free, drifting};
+use crate::common::laws::{drift_free, drifting, without_any};
 use crate::common::*;
 use haptics::{Friction, FrictionCurve, FrictionLaw, FrictionMemory, FrictionQuery, FrictionState, Stribeck};
 
@@ -42,6 +42,24 @@ fn without_load_every_law_draws_the_god_object_to_the_surface_point() {
 }
 
 #[test]
+fn a_load_that_is_not_a_number_is_none_for_laws_with_a_strain() {
+    let hayward = ("hayward-armstrong", Friction::hayward_armstrong(0.5, 0.5).unwrap());
+    for (name, law) in drifting().into_iter().chain([hayward]) {
+        let asked = FrictionQuery { hip_travel_m: 1e-5, ..slid(1e-3, f64::NAN) };
+        assert_eq!(slide(&law, asked), asked.gap_m, "{name}");
+    }
+}
+
+#[test]
+fn without_coefficients_nothing_holds_not_even_where_nothing_pulls() {
+    for (name, law) in without_any() {
+        for state in [FrictionState::Stick, FrictionState::Slip] {
+            assert!(!holds(&law, FrictionQuery { state, ..slid(0.0, DEPTH) }), "{name}, {state:?}");
+        }
+    }
+}
+
+#[test]
 fn without_load_what_sticks_and_slips_does_not_stick_again() {
     for law in [
         Friction::stiction(0.75, 0.25).unwrap(),
@@ -69,10 +87,13 @@ fn where_time_is_unknown_a_curve_is_its_value_at_rest() {
     let stribeck = Stribeck::new(mu_s, 0.25, 0.05, 0.125).unwrap();
     for dt_s in [0.0, -1e-3, f64::NAN, f64::INFINITY] {
         for (law, at_rest) in [(Friction::Curve(curve.clone()), 0.5), (Friction::Stribeck(stribeck), mu_s)] {
-            let asked = FrictionQuery { dt_s, ..slid(3e-3, load_m) };
-            assert_eq!(slide(&law, asked), 3e-3 - at_rest * load_m, "{law:?}, {dt_s} s");
+            // Also where it has got farther than to its rim.
+            for (gap_m, travel_m) in [(3e-3, 0.0), (1e-3, 1e-5)] {
+                let asked = FrictionQuery { dt_s, travel_m, ..slid(gap_m, load_m) };
+                assert_eq!(slide(&law, asked), gap_m - at_rest * load_m, "{law:?}, {dt_s} s");
+            }
             let rim_m = mu_s * load_m;
-            let asked = |gap_m| FrictionQuery { gap_m, ..asked };
+            let asked = |gap_m| FrictionQuery { dt_s, ..slid(gap_m, load_m) };
             assert!(holds(&law, asked(rim_m)) && !holds(&law, asked(above(rim_m))), "{law:?}, {dt_s} s");
         }
     }
@@ -138,6 +159,26 @@ fn having_slid(law: &Friction, speed_m_s: f64) -> FrictionMemory {
     let (asked, mut memory) = (slid(2.0 * LOAD_M, LOAD_M), FrictionMemory::default());
     law.holds(&FrictionQuery { last_travel_m: speed_m_s * asked.dt_s, ..asked }, &mut memory);
     memory
+}
+
+#[test]
+fn a_slide_that_has_got_part_of_its_way_goes_on_to_the_same_place() {
+    for (law, _, mu_s) in falling() {
+        for before_m_s in [0.0, 0.02, 0.3] {
+            for i in 1..100 {
+                let asked = slid((0.5 + 0.01 * f64::from(i)) * mu_s * LOAD_M, LOAD_M);
+                let (memory, start_m) = (having_slid(&law, before_m_s), before_m_s * asked.dt_s);
+                let x = law.slide(&asked, &memory);
+                // Up to the speed that it had the answer does not depend on where it is.
+                let travel_m = 0.875 * start_m.min(x);
+                let gap_m = asked.gap_m - travel_m;
+                let rest = law.slide(&FrictionQuery { gap_m, travel_m, ..asked }, &memory);
+                // Roundings of the gap, and a hundred of them where the curve is nearly as steep as the spring.
+                let is_same = (travel_m + rest - x).abs() <= 1e-14 * LOAD_M;
+                assert!(is_same, "{law:?}, from {before_m_s} m/s, gap {gap_m}: {x}, {travel_m} and {rest}");
+            }
+        }
+    }
 }
 
 #[test]
