@@ -136,6 +136,7 @@ fn mix(x: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::BTreeSet;
 
     const LOAD_M: f64 = 4e-3;
     /// A bond of `mu` 0.5 snaps beyond it.
@@ -178,6 +179,38 @@ mod tests {
         // Powers of two change no bit of a quotient.
         assert_eq!([number(2.0), number(0.125)], [number(1.0); 2]);
         assert!(number(1.0) >= 1.0 && number(1.0).fract() == 0.0);
+    }
+
+    #[test]
+    fn a_contacts_own_number_is_odd_exact_and_another_one_for_each_gap_load_and_path() {
+        let asked = FrictionQuery { gap_m: 1e-4, load_m: 3e-3, hip_travel_m: 2e-5, ..Default::default() };
+        let numbers: BTreeSet<u64> = (0..100)
+            .flat_map(|i| {
+                // A single-precision number tells a millionth from the next one.
+                let more = 1.0 + 1e-6 * f64::from(i);
+                let by = |length_m: f64| length_m * more;
+                [
+                    FrictionQuery { gap_m: by(asked.gap_m), ..asked },
+                    FrictionQuery { load_m: by(asked.load_m), ..asked },
+                    FrictionQuery { hip_travel_m: by(asked.hip_travel_m), ..asked },
+                ]
+            })
+            .map(|query| {
+                let number = own_number(&query);
+                assert!(number < (1u64 << 52) as f64 && number as u64 % 2 == 1, "{number}");
+                number as u64
+            })
+            .collect();
+        // Three times one hundred, which begin with the same; that two of 2^51 are equal has a chance of 2e-11.
+        assert_eq!(numbers.len(), 298);
+    }
+
+    #[test]
+    fn counters_are_mixed_as_splitmix64_publishes_it() {
+        const STEP: u64 = 0x9E37_79B9_7F4A_7C15;
+        let first = [0, 1, 2].map(|i: u64| mix(STEP.wrapping_mul(i)));
+        // The first numbers of the seed 0, as the reference implementation in C prints them.
+        assert_eq!(first, [0xE220_A839_7B1D_CDAF, 0x6E78_9E6A_A1B9_65F4, 0x06C4_5D18_8009_454F]);
     }
 
     #[test]

@@ -9,6 +9,7 @@ mod solids;
 mod curves;
 mod damping;
 mod differential;
+mod edges;
 mod energy;
 mod none;
 mod others;

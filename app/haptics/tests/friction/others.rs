@@ -267,6 +267,21 @@ fn a_curve_is_what_it_was_drawn_from() {
 }
 
 #[test]
+fn a_curve_that_begins_with_zero_draws_a_god_object_that_went_too_far_back_to_the_surface_point() {
+    let law = FrictionCurve::new(0.3, &[(0.0, 0.0), (1.0, 0.3)]).expect("in range");
+    // Round a needle a slide can pass S by more than all of its way; nothing holds it back there.
+    let asked = FrictionQuery {
+        state: FrictionState::Slip,
+        gap_m: -2e-4,
+        travel_m: 1e-4,
+        load_m: DEPTH,
+        dt_s: DT,
+        ..Default::default()
+    };
+    assert_eq!(law.slide(&asked, &FrictionMemory::default()), asked.gap_m);
+}
+
+#[test]
 fn a_curve_that_never_falls_sticks_again_at_once_and_one_that_falls_with_a_margin() {
     let holds_within_a_thousandth = |mu_s: f64, points: &[(f64, f64)]| {
         let law = FrictionCurve::new(mu_s, points).expect("in range");
