@@ -116,6 +116,14 @@ fn ply(text: &str) -> TriangleSoup {
 }
 
 #[test]
+fn a_ply_header_may_have_very_many_elements() {
+    // Compared each with each they would take minutes.
+    let many: String = (0..500_000).map(|i| format!("element e{i} 0\n")).collect();
+    let with_many = PLY.replace("element vertex", &(many + "element vertex"));
+    assert_eq!(corners(&ply(&with_many)), corners(&square()));
+}
+
+#[test]
 fn every_way_to_write_a_square_as_ply_is_the_same() {
     let expected = corners(&square());
     let faces_first = "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\nelement vertex 4\n\
