@@ -21,6 +21,7 @@ mod bezier;
 mod budget;
 mod crossing;
 mod descend;
+mod edge_boxes;
 mod error;
 mod foot;
 mod local;

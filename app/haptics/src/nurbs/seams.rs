@@ -10,6 +10,7 @@
 use nalgebra::Vector3;
 
 use super::Nurbs;
+use super::edge_boxes::{Box3, EdgeBoxes};
 use super::error::NurbsError;
 use super::foot::Foot;
 
@@ -171,10 +172,10 @@ pub(super) fn join(nurbs: &mut Nurbs) -> Result<Joined, NurbsError> {
         .collect();
     let boxes: Vec<_> = edges.iter().map(|&edge| box_of(nurbs, edge)).collect();
     // Edges that agree to rounding first: in a thin plate others may be nearly as near.
-    let row = Row::of(&boxes);
+    let boxes = EdgeBoxes::new(&boxes);
     for slack in [EXACT, EQUAL].map(|share| share * nurbs.extent_m) {
         for i in 0..edges.len() {
-            for j in row.later_near(i, slack) {
+            for j in boxes.later_near(i, slack) {
                 let is_new = |k: usize| slack < EQUAL * nurbs.extent_m || !is_covered(nurbs, edges[k]);
                 if is_new(i) && is_new(j) {
                     link(nurbs, edges[i], edges[j], slack)?;
@@ -183,46 +184,6 @@ pub(super) fn join(nurbs: &mut Nurbs) -> Result<Joined, NurbsError> {
         }
     }
     Ok(orient(nurbs))
-}
-
-type Box3 = [Vector3<f64>; 2];
-
-/// Boxes in the order of their beginnings along one axis: of a hundred thousand edges, each is compared with those beside it.
-struct Row<'b> {
-    boxes: &'b [Box3],
-    axis: usize,
-    order: Vec<usize>,
-    longest: f64,
-}
-
-impl<'b> Row<'b> {
-    /// Along the axis on which all together reach farthest.
-    fn of(boxes: &'b [Box3]) -> Self {
-        let nothing = [Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)];
-        let around = boxes.iter().fold(nothing, |[a, b], [low, high]| [a.inf(low), b.sup(high)]);
-        let axis = (around[1] - around[0]).imax();
-        let mut order: Vec<usize> = (0..boxes.len()).collect();
-        order.sort_by(|&i, &j| boxes[i][0][axis].total_cmp(&boxes[j][0][axis]));
-        let longest = boxes.iter().map(|[low, high]| high[axis] - low[axis]).fold(0.0, f64::max);
-        Self { boxes, axis, order, longest }
-    }
-
-    /// Boxes with a higher number that are no farther away than `slack` on any axis, ascending.
-    fn later_near(&self, i: usize, slack: f64) -> Vec<usize> {
-        let a = &self.boxes[i];
-        let low = |k: &usize| self.boxes[*k][0][self.axis];
-        // What ends within reach begins no earlier than this, but for rounding.
-        let first = a[0][self.axis] - self.longest - 2.0 * slack;
-        let begin = self.order.partition_point(|k| low(k) < first);
-        let ahead = self.order[begin..].iter().take_while(|k| low(k) <= a[1][self.axis] + slack);
-        let is_near = |j: usize| {
-            let b = &self.boxes[j];
-            (0..3).all(|c| a[0][c] <= b[1][c] + slack && b[0][c] <= a[1][c] + slack)
-        };
-        let mut near: Vec<usize> = ahead.copied().filter(|&j| j > i && is_near(j)).collect();
-        near.sort_unstable();
-        near
-    }
 }
 
 fn edge_of(nurbs: &Nurbs, (patch, edge): (u32, u8)) -> &Edge {
