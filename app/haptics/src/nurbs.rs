@@ -21,6 +21,7 @@ mod bezier;
 mod budget;
 mod crossing;
 mod descend;
+mod edge_boxes;
 mod error;
 mod foot;
 mod local;
@@ -177,7 +178,8 @@ impl Nurbs {
             nurbs.patches.clear();
             nurbs.elements.clear();
             nurbs.controls.clear();
-            let rest = patches.iter().enumerate().filter(|(source, _)| !without_area.contains(source));
+            let rest =
+                patches.iter().enumerate().filter(|(source, _)| without_area.binary_search(source).is_err());
             rest.for_each(|(source, patch)| nurbs.add(patch, source));
         }
         let joined = seams::join(&mut nurbs)?;

@@ -1,8 +1,11 @@
 //! Meshes, patches and pictures.
 
+#![allow(non_snake_case)] // Names carry their frame.
+
 use crate::check_message;
 use haptics::mesh::{Mesh, TriangleSoup};
-use haptics::{Nurbs, NurbsPatch};
+use haptics::{Nurbs, NurbsPatch, Surface};
+use nalgebra::Vector3;
 use std::path::Path;
 use world::model::{
     ModelError, line_of_face, read_ase, read_free_form, read_gltf, read_obj, read_obj_with_uv, read_patches,
@@ -82,11 +85,93 @@ fn build(read: Result<TriangleSoup, ModelError>) {
             let indices = mesh.faces().iter().flat_map(|face| face.vertices);
             assert!(indices.into_iter().all(|index| index < vertices), "a face without its vertex");
             let _ = report.to_string();
+            ask_mesh(&mesh);
         }
         Ok(Err(error)) => check_message(&error.to_string()),
         Err(error) => check_message(&error.to_string()),
     }
 }
+
+/// A few faces are asked for from in front of them, from behind and from their own plane.
+fn ask_mesh(mesh: &Mesh) {
+    let step = mesh.faces().len().div_ceil(MOST_ASKED);
+    for face in mesh.faces().iter().step_by(step) {
+        assert_unit(&face.normal_B);
+        let middle_B = face.vertices.iter().map(|&i| mesh.vertices()[i as usize]).sum::<Vector3<f64>>() / 3.0;
+        let [above_B, below_B] = [1.0, -1.0].map(|side| middle_B + face.normal_B * (side * mesh.extent_m()));
+        for p_B in [middle_B, above_B, below_B] {
+            let (nearest, _) = mesh.nearest_and_side(&p_B);
+            let ways = [Some(nearest), mesh.way_out(&p_B)];
+            for way in ways.into_iter().flatten() {
+                assert_finite(&way.point_B);
+                assert!(way.distance_m >= 0.0, "{} m away", way.distance_m);
+            }
+            let away_m = mesh.nearest_unbounded(&p_B).distance_m;
+            let slack_m = MESH_SLACK * mesh.extent_m() + SMALLEST_M;
+            assert!(
+                away_m <= (p_B - middle_B).norm() + slack_m,
+                "{away_m} m from {p_B} with a face at {middle_B}"
+            );
+            let clearance_m = mesh.clearance(&p_B, f64::MAX);
+            assert!(clearance_m <= away_m + slack_m, "clearance {clearance_m} m, {away_m} m away");
+        }
+        let hit = mesh.first_hit(&above_B, &below_B);
+        assert!(hit.is_none_or(|hit| hit.point_B.iter().all(|x| x.is_finite())), "a hit that is nowhere");
+        // A face as thin as roundings may be passed by.
+        let is_wide = height_m(&face.vertices.map(|i| mesh.vertices()[i as usize])) > WIDE * mesh.extent_m();
+        assert!(hit.is_some() || !is_wide, "no face between {above_B} and {below_B}");
+    }
+}
+
+/// Of a triangle over its longest edge.
+fn height_m([a, b, c]: &[Vector3<f64>; 3]) -> f64 {
+    let longest_m = (b - a).norm().max((c - b).norm()).max((a - c).norm());
+    (b - a).cross(&(c - a)).norm() / longest_m
+}
+
+/// The parts of a surface at their corners and in their middle, and what is nearest to places around these.
+fn ask_surface(nurbs: &Nurbs) {
+    let surfaces = [0.0, 0.1].map(|share| nurbs.surface(share * nurbs.extent_m()));
+    let step = nurbs.parts().div_ceil(MOST_ASKED);
+    for part in (0..nurbs.parts()).step_by(step) {
+        for [u, v] in [[0.0, 0.0], [0.0, 1.0], [0.5, 0.5], [1.0, 0.3], [1.0, 1.0]] {
+            let (point_B, normal_B) = nurbs.at(part, u, v);
+            assert_finite(&point_B);
+            assert_unit(&normal_B);
+            let [above_B, below_B] = [0.5, -0.5].map(|side| point_B + normal_B * (side * nurbs.extent_m()));
+            for surface in &surfaces {
+                assert!(!surface.signed_distance(&above_B).is_nan(), "no distance from {above_B}");
+                let entry = surface.entry(&above_B, &below_B);
+                for at in [surface.nearest(&above_B), surface.nearest(&point_B)].into_iter().chain(entry) {
+                    let on_plane_B = at.point_B + at.normal_B.yzx() * (0.01 * nurbs.extent_m());
+                    for at in [at, surface.settle(&at, &on_plane_B)] {
+                        assert_finite(&at.point_B);
+                        assert_unit(&at.normal_B);
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn assert_finite(point: &Vector3<f64>) {
+    assert!(point.iter().all(|x| x.is_finite()), "a point at {point}");
+}
+
+fn assert_unit(normal: &Vector3<f64>) {
+    assert!((normal.norm() - 1.0).abs() < UNIT, "a normal {normal} of length {}", normal.norm());
+}
+
+/// Roundings of a vector's squares and of its division by their root are a few of 1e-16.
+const UNIT: f64 = 1e-12;
+/// Of the largest coordinate: places on a face are rounded a few times, each by 1e-16 of it.
+const MESH_SLACK: f64 = 1e-12;
+/// Boxes are compared by squares in `f32`, which have no digits left where distances are smaller.
+const SMALLEST_M: f64 = 1e-18;
+/// Of the largest coordinate: far above the roundings of a place on a segment.
+const WIDE: f64 = 1e-9;
+/// So many faces and parts are asked for.
+const MOST_ASKED: usize = 8;
 
 /// More take more memory than a fuzzer allows.
 const MOST_BUILT: usize = 200_000;
@@ -97,7 +182,10 @@ fn join(read: Result<Vec<NurbsPatch>, ModelError>) {
         Err(error) => return check_message(&error.to_string()),
     };
     match Nurbs::build(&patches) {
-        Ok((_, report)) => check_message(&report.to_string()),
+        Ok((nurbs, report)) => {
+            check_message(&report.to_string());
+            ask_surface(&nurbs);
+        }
         Err(error) => check_message(&error.to_string()),
     }
     let again = read_patches(Path::new("fuzz.toml"), write_patches(&patches).as_bytes());

@@ -102,7 +102,8 @@ impl<const WIDTH: usize> Node<WIDTH> {
         children: [Child(0); WIDTH],
     };
 
-    /// Squared distances of a point from the boxes \[m^2\], too small rather than too large.
+    /// Squared distances of a point from the boxes \[m^2\], too small rather than too large, unless they are below the
+    /// normal numbers of `f32`.
     // Inlined, the compiler takes the lanes apart again where they are sorted.
     #[inline(never)]
     fn squared_distances(&self, p: &Rounded) -> [f32; WIDTH] {

@@ -10,6 +10,7 @@
 use nalgebra::Vector3;
 
 use super::Nurbs;
+use super::edge_boxes::{Box3, EdgeBoxes};
 use super::error::NurbsError;
 use super::foot::Foot;
 
@@ -171,13 +172,12 @@ pub(super) fn join(nurbs: &mut Nurbs) -> Result<Joined, NurbsError> {
         .collect();
     let boxes: Vec<_> = edges.iter().map(|&edge| box_of(nurbs, edge)).collect();
     // Edges that agree to rounding first: in a thin plate others may be nearly as near.
+    let boxes = EdgeBoxes::new(&boxes);
     for slack in [EXACT, EQUAL].map(|share| share * nurbs.extent_m) {
         for i in 0..edges.len() {
-            for j in i + 1..edges.len() {
-                let (a, b) = (&boxes[i], &boxes[j]);
-                let is_apart = (0..3).any(|c| a[0][c] > b[1][c] + slack || b[0][c] > a[1][c] + slack);
+            for j in boxes.later_near(i, slack) {
                 let is_new = |k: usize| slack < EQUAL * nurbs.extent_m || !is_covered(nurbs, edges[k]);
-                if !is_apart && is_new(i) && is_new(j) {
+                if is_new(i) && is_new(j) {
                     link(nurbs, edges[i], edges[j], slack)?;
                 }
             }
@@ -239,7 +239,7 @@ fn samples(nurbs: &Nurbs, (patch, edge): (u32, u8)) -> impl Iterator<Item = Vect
     (0..=16).map(move |k| nurbs.local(patch, on_edge(edge, f64::from(k) / 16.0)).point_B)
 }
 
-fn box_of(nurbs: &Nurbs, edge: (u32, u8)) -> [Vector3<f64>; 2] {
+fn box_of(nurbs: &Nurbs, edge: (u32, u8)) -> Box3 {
     let first = nurbs.local(edge.0, on_edge(edge.1, 0.0)).point_B;
     samples(nurbs, edge).fold([first; 2], |[low, high], p| [low.inf(&p), high.sup(&p)])
 }

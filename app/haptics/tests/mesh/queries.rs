@@ -192,6 +192,18 @@ fn the_clearance_is_never_more_than_the_distance() {
 }
 
 #[test]
+fn the_clearance_is_not_more_than_a_distance_whose_square_is_below_the_normal_numbers() {
+    let soup = make::cuboid([0.05, 0.05, 0.05]);
+    let lowest = soup.vertices.iter().fold(Vector3::zeros(), |low: Vector3<f64>, v| low.inf(v));
+    let mesh = mesh(TriangleSoup { vertices: soup.vertices.iter().map(|v| v - lowest).collect(), ..soup });
+    for k in 1..1000 {
+        let below = 3.7e-23 * f64::from(k);
+        let clearance = mesh.clearance(&Vector3::new(0.02, 0.02, -below), 1.0);
+        assert!((0.0..=below).contains(&clearance), "{clearance} {below}");
+    }
+}
+
+#[test]
 fn nothing_slips_into_a_closed_mesh() {
     let meshes = [
         ("cube", mesh(make::cuboid([0.05, 0.05, 0.05]))),

@@ -8,7 +8,7 @@
 //!
 //! Nothing is believed: every index, range and step is checked against what is there. A node may be reached in one way only, as
 //! the format has it, which bounds the walk. A small file can name the same megabyte a thousand times, or count
-//! what takes no bytes: what is put together may have as many vertices and indices as the files have bytes, or
+//! what takes no bytes: what is put together may have as many vertices, indices and primitives as the files have bytes, or
 //! [`ALWAYS_ALLOWED`], and no more. The text may have [`MOST_OBJECTS`] objects.
 //!
 //! A reader of our own: `gltf` 1.4 brings forty packages, believes counts, and names no place.
@@ -26,7 +26,7 @@ use haptics::mesh::TriangleSoup;
 use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
 use std::path::Path;
 
-/// Vertices and indices that every file may have.
+/// Vertices, indices and primitives that every file may have.
 const ALWAYS_ALLOWED: usize = 1 << 22;
 
 /// Reads a glTF file, text or binary; `beside` is the directory in which the files lie that it names.
@@ -82,23 +82,30 @@ impl Merged<'_> {
     fn add_nodes(&mut self) -> Result<(), ModelError> {
         let nodes = &self.document.nodes;
         let mut is_reached = vec![false; nodes.len()];
-        let mut open: Vec<(usize, Matrix4<f64>)> =
-            self.document.roots()?.into_iter().rev().map(|node| (node, Matrix4::identity())).collect();
+        // Before it waits: a list may name the same node a million times.
+        let mut reach = |index: usize, X_WP: Matrix4<f64>| {
+            let place = format!("nodes[{index}]");
+            let is_reached = is_reached.get_mut(index).ok_or_else(|| missing(&place, nodes.len()))?;
+            if std::mem::replace(is_reached, true) {
+                let found = "a node that is reached in two ways".into();
+                return Err(wrong(place, found, "a tree: one parent for each"));
+            }
+            Ok((index, X_WP))
+        };
+        let mut open = Vec::new();
+        for root in self.document.roots()?.into_iter().rev() {
+            open.push(reach(root, Matrix4::identity())?);
+        }
         while let Some((index, X_WP)) = open.pop() {
             let place = format!("nodes[{index}]");
-            let node = nodes.get(index).ok_or_else(|| missing(&place, nodes.len()))?;
-            if std::mem::replace(&mut is_reached[index], true) {
-                return Err(wrong(
-                    place,
-                    "a node that is reached in two ways".into(),
-                    "a tree: one parent for each",
-                ));
-            }
+            let node = &nodes[index];
             let X_WN = X_WP * transform(&place, node)?;
             if let Some(mesh) = node.mesh {
                 self.add_mesh(mesh, &X_WN, (&place, &node.name))?;
             }
-            open.extend(node.children.iter().rev().map(|&child| (child, X_WN)));
+            for &child in node.children.iter().rev() {
+                open.push(reach(child, X_WN)?);
+            }
         }
         Ok(())
     }
@@ -131,6 +138,7 @@ impl Merged<'_> {
         place: &str,
         node: &str,
     ) -> Result<(), ModelError> {
+        self.accessors.count_primitive(place)?;
         let mode = primitive.mode.unwrap_or(TRIANGLES);
         let Some(positions) = primitive.attributes.position else { return Ok(()) };
         if mode < TRIANGLES {

@@ -116,6 +116,14 @@ fn ply(text: &str) -> TriangleSoup {
 }
 
 #[test]
+fn a_ply_header_may_have_very_many_elements() {
+    // Compared each with each they would take minutes.
+    let many: String = (0..500_000).map(|i| format!("element e{i} 0\n")).collect();
+    let with_many = PLY.replace("element vertex", &(many + "element vertex"));
+    assert_eq!(corners(&ply(&with_many)), corners(&square()));
+}
+
+#[test]
 fn every_way_to_write_a_square_as_ply_is_the_same() {
     let expected = corners(&square());
     let faces_first = "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\nelement vertex 4\n\
@@ -610,13 +618,13 @@ fn what_is_wrong_with_a_gltf_is_told_with_its_place() {
         (
             "\"count\":4",
             "\"count\":4000000000",
-            "accessors[0]: found 4000000000 elements, which makes more than 4194304 vertices and indices in all; allowed: at \
+            "accessors[0]: found 4000000000 elements, which makes more than 4194304 vertices, indices and primitives in all; allowed: at \
              most so many in a file of this size; leave repeated parts out",
         ),
         (
             "\"bufferView\":0,\"componentType\":5126,\"count\":4",
             "\"componentType\":5126,\"count\":18446744073709551615",
-            "accessors[0]: found 18446744073709551615 elements, which makes more than 4194304 vertices and indices in all; \
+            "accessors[0]: found 18446744073709551615 elements, which makes more than 4194304 vertices, indices and primitives in all; \
              allowed: at most so many in a file of this size; leave repeated parts out",
         ),
         (
@@ -710,7 +718,15 @@ fn a_small_gltf_cannot_ask_for_much_time_or_memory() {
         "{\"bufferView\":0,\"componentType\":5120,\"count\":300000,\"type\":\"VEC3\"}".into();
     document.primitives = vec!["{\"attributes\":{\"POSITION\":0}}"; 1000].join(",");
     let said = document.read().expect_err("too much").to_string();
-    assert!(said.contains("more than 4194304 vertices and indices in all"), "{said}");
+    assert!(said.contains("more than 4194304 vertices, indices and primitives in all"), "{said}");
+    // Three thousand nodes with a mesh of three thousand primitives, none of which has a vertex.
+    let many = |one: &str| vec![one; 3000].join(",");
+    let [nodes, primitives] = [many("{\"mesh\":0}"), many("{}")];
+    let text = format!(
+        "{{\"asset\":{{\"version\":\"2.0\"}},\"nodes\":[{nodes}],\"meshes\":[{{\"primitives\":[{primitives}]}}]}}"
+    );
+    let said = gltf(text.as_bytes()).expect_err("too many").to_string();
+    assert!(said.contains("more than 4194304 vertices, indices and primitives in all"), "{said}");
     // Nothing but braces.
     let braces =
         format!("{{\"asset\":{{\"version\":\"2.0\"}},\"nodes\":[{}]}}", vec!["{}"; 300_000].join(","));

@@ -34,10 +34,12 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
                 }
             }
         }
-        match closed.nearest() {
+        match closed.nearest().map(|nearest| closed.entries[nearest].0) {
+            // Nothing is left there of what makes a square too small rather than too large.
+            Some(squared_distance) if squared_distance < f32::MIN_POSITIVE => 0.0,
             // The root was rounded to nearest.
-            Some(nearest) => {
-                (f64::from(closed.entries[nearest].0).sqrt() * (1.0 - f64::EPSILON)).min(at_most_m)
+            Some(squared_distance) => {
+                (f64::from(squared_distance).sqrt() * (1.0 - f64::EPSILON)).min(at_most_m)
             }
             None => at_most_m,
         }

@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 pub(super) struct Accessors<'d> {
     document: &'d Document,
     buffers: &'d Buffers<'d>,
-    /// Number of elements that may still be read.
+    /// Number of elements that may still be read, and of primitives that may still be asked for.
     left: usize,
     most: usize,
 }
@@ -89,6 +89,11 @@ impl<'d> Accessors<'d> {
         }
     }
 
+    /// Of each node, since a mesh of many primitives, which may have no vertex, may be that of many nodes.
+    pub(super) fn count_primitive(&mut self, place: &str) -> Result<(), ModelError> {
+        self.take(1, place).map(drop)
+    }
+
     fn accessor(&self, index: usize, user: &str) -> Result<(String, &'d Accessor), ModelError> {
         let all = &self.document.accessors;
         let accessor = all.get(index).ok_or_else(|| missing(&format!("{user} = {index}"), all.len()))?;
@@ -103,7 +108,7 @@ impl<'d> Accessors<'d> {
             }
             None => {
                 let found = format!(
-                    "{count} elements, which makes more than {} vertices and indices in all",
+                    "{count} elements, which makes more than {} vertices, indices and primitives in all",
                     self.most
                 );
                 Err(wrong(

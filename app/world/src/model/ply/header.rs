@@ -1,6 +1,7 @@
 //! Header of a PLY file.
 
 use crate::model::{ModelError, shown};
+use std::collections::HashSet;
 
 pub(super) struct Header {
     pub(super) encoding: Encoding,
@@ -85,8 +86,9 @@ impl Header {
             }
         }
         let encoding = encoding.ok_or_else(|| wrong(line, "a header without `format`".into(), FORMATS))?;
-        for (index, element) in elements.iter().enumerate() {
-            if elements[..index].iter().any(|other| other.name == element.name) {
+        let mut names = HashSet::new();
+        for element in &elements {
+            if !names.insert(&element.name) {
                 return Err(element.wrong(format!("a second element `{}`", element.name), "one of each name"));
             }
         }
