@@ -15,7 +15,7 @@ use world::SceneEntity;
 /// Orange.
 const COLOUR: [f64; 4] = [0.95, 0.45, 0.0, 1.0];
 /// Of a tube, as a part of the mesh's size.
-const RADIUS: f64 = 1.0 / 400.0;
+const RADIUS: f64 = 1.0 / 150.0;
 /// Sides of a tube.
 const SIDES: u32 = 5;
 /// A cloud of single triangles has as many edges as one likes.

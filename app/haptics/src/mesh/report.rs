@@ -44,13 +44,18 @@ impl fmt::Display for OpenHoles {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { count, largest } = self;
         write!(f, "{count} {} open, the largest: ", plural(*count, "hole stays", "holes stay"))?;
-        for (index, OpenHole { size_m, middle_B: [x, y, z] }) in largest.iter().flatten().enumerate() {
+        for (index, OpenHole { size_m, middle_B }) in largest.iter().flatten().enumerate() {
             let comma = if index == 0 { "" } else { ", " };
-            write!(f, "{comma}{} m at [{}, {}, {}]", short(*size_m), short(*x), short(*y), short(*z))?;
+            // What is far below the hole's size is rounding.
+            let [x, y, z] = middle_B.map(|x| if x.abs() < ROUNDING * size_m { 0.0 } else { short(x) });
+            write!(f, "{comma}{} m at [{x}, {y}, {z}]", short(*size_m))?;
         }
         Ok(())
     }
 }
+
+/// Of a hole's size.
+const ROUNDING: f64 = 1e-6;
 
 /// Three digits that say something.
 fn short(number: f64) -> f64 {
