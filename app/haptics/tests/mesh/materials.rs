@@ -169,3 +169,25 @@ fn a_closed_way_over_both_gives_no_energy_but_what_the_short_spring_regains() {
     // A tenth of 20 mm at 3 to 7 N.
     assert!(fed_j <= 0.1 * way_m * most_n && fed_j > -0.05, "{fed_j} {most_n}");
 }
+
+/// Found inside, at once over faces of another material: the ramp, and all else, as on a mesh of that material alone.
+#[test]
+fn a_finger_that_begins_inside_feels_the_ramp_of_the_material_there() {
+    for radius_m in [0.0, 5e-3] {
+        let both = [entity(MU, [500.0, 2000.0])];
+        let (mesh, _) = Mesh::build(halves().0).unwrap();
+        let alone = [Entity::new(Arc::new(mesh), Isometry3::identity(), 2000.0)
+            .unwrap()
+            .with_friction(Friction::coulomb(MU[1]).unwrap())
+            .unwrap()];
+        let mut fingers = [finger(radius_m), finger(radius_m)];
+        for tick in 0..300 {
+            let hip = at(0.02 + 2e-5 * f64::from(tick), 2e-3, radius_m);
+            let [a, b] =
+                [0, 1].map(|i| fingers[i].step([&both[..], &alone[..]][i], &hip, DT_S).force_on_user_W);
+            assert!((a - b).norm() < 1e-12, "{radius_m}, tick {tick}: {a} {b}");
+            assert!(tick > 50 || a.norm() < 0.6 * 2000.0 * 2e-3 * 1.5, "{tick}: {a}");
+        }
+        assert!(fingers[0].contact(0).unwrap().normal_force_n > 3.9);
+    }
+}
