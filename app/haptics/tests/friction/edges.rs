@@ -117,13 +117,19 @@ fn hayward_and_armstrongs_contact_sticks_up_to_its_stick_strain() {
     }
 }
 
-/// Laws with a curve that is worth a search, with that curve and their static coefficient.
-fn falling() -> [(Friction, Box<dyn Fn(f64) -> f64>, f64); 2] {
-    let stribeck = Stribeck::new(0.75, 0.25, 0.03, 1.0).unwrap();
-    let curve = FrictionCurve::new(0.75, &[(0.0, 0.75), (0.06, 0.3), (1.0, 1.5)]).unwrap();
+/// Static coefficient of [`falling`].
+const STATIC: f64 = 0.75;
+
+/// Friction force over normal force at a speed (m/s).
+type Ratio = Box<dyn Fn(f64) -> f64>;
+
+/// Laws with a curve that is worth a search, with that curve.
+fn falling() -> [(Friction, Ratio); 2] {
+    let stribeck = Stribeck::new(STATIC, 0.25, 0.03, 1.0).unwrap();
+    let curve = FrictionCurve::new(STATIC, &[(0.0, STATIC), (0.06, 0.3), (1.0, 1.5)]).unwrap();
     [
-        (Friction::Stribeck(stribeck), Box::new(move |v| stribeck.ratio_at(v)), 0.75),
-        (Friction::Curve(curve.clone()), Box::new(move |v| curve.ratio_at(v)), 0.75),
+        (Friction::Stribeck(stribeck), Box::new(move |v| stribeck.ratio_at(v))),
+        (Friction::Curve(curve.clone()), Box::new(move |v| curve.ratio_at(v))),
     ]
 }
 
@@ -132,7 +138,7 @@ const LOAD_M: f64 = 1.0 / 256.0;
 
 #[test]
 fn asked_again_where_it_has_got_to_a_slide_is_what_is_left_to_the_curve() {
-    for (law, ratio_at, _) in falling() {
+    for (law, ratio_at) in falling() {
         let excess = |query: &FrictionQuery| query.gap_m - LOAD_M * ratio_at(query.travel_m / query.dt_s);
         let mut left = 0;
         for i in 0..200 {
@@ -163,10 +169,10 @@ fn having_slid(law: &Friction, speed_m_s: f64) -> FrictionMemory {
 
 #[test]
 fn a_slide_that_has_got_part_of_its_way_goes_on_to_the_same_place() {
-    for (law, _, mu_s) in falling() {
+    for (law, _) in falling() {
         for before_m_s in [0.0, 0.02, 0.3] {
             for i in 1..100 {
-                let asked = slid((0.5 + 0.01 * f64::from(i)) * mu_s * LOAD_M, LOAD_M);
+                let asked = slid((0.5 + 0.01 * f64::from(i)) * STATIC * LOAD_M, LOAD_M);
                 let (memory, start_m) = (having_slid(&law, before_m_s), before_m_s * asked.dt_s);
                 let x = law.slide(&asked, &memory);
                 // Up to the speed that it had the answer does not depend on where it is.
@@ -182,9 +188,32 @@ fn a_slide_that_has_got_part_of_its_way_goes_on_to_the_same_place() {
 }
 
 #[test]
+fn a_contact_that_sticks_forgets_how_fast_it_slid_and_one_that_only_pauses_does_not() {
+    for (law, _) in falling() {
+        let before = having_slid(&law, 0.3);
+        let after = |query: FrictionQuery| {
+            let mut memory = before;
+            law.holds(&query, &mut memory);
+            memory
+        };
+        let asked = slid(2.0 * LOAD_M, LOAD_M);
+        assert_eq!(after(asked), before, "{law:?}: a tick without motion");
+        for dt_s in [0.0, f64::NAN] {
+            assert_eq!(
+                after(FrictionQuery { last_travel_m: 1e-5, dt_s, ..asked }),
+                before,
+                "{law:?}, {dt_s} s"
+            );
+        }
+        let stuck = FrictionQuery { state: FrictionState::Stick, last_travel_m: 1e-5, ..asked };
+        assert_eq!(after(stuck), FrictionMemory::default(), "{law:?}");
+    }
+}
+
+#[test]
 fn at_the_rim_of_the_static_circle_a_slide_goes_on() {
-    for (law, ratio_at, mu_s) in falling() {
-        let asked = slid(mu_s * LOAD_M, LOAD_M);
+    for (law, ratio_at) in falling() {
+        let asked = slid(STATIC * LOAD_M, LOAD_M);
         let x = law.slide(&asked, &having_slid(&law, 0.3));
         let is_fast = x / asked.dt_s > 0.1;
         let excess_m = asked.gap_m - x - LOAD_M * ratio_at(x / asked.dt_s);
@@ -195,17 +224,17 @@ fn at_the_rim_of_the_static_circle_a_slide_goes_on() {
 #[test]
 fn at_the_rim_of_the_static_circle_rest_is_the_smallest_solution_of_a_stribeck_curve() {
     // Which is level there; a curve that falls from rest on is not at rest there.
-    let [(law, _, mu_s), _] = falling();
-    assert_eq!(law.slide(&slid(mu_s * LOAD_M, LOAD_M), &having_slid(&law, 0.0)), 0.0);
+    let [(law, _), _] = falling();
+    assert_eq!(law.slide(&slid(STATIC * LOAD_M, LOAD_M), &having_slid(&law, 0.0)), 0.0);
 }
 
 #[test]
 fn where_no_slide_is_in_balance_the_god_object_goes_back_to_where_it_was_within_the_circle() {
-    for (law, _, mu_s) in falling() {
+    for (law, _) in falling() {
         let asked = |gap_m, travel_m| FrictionQuery { travel_m, ..slid(gap_m, LOAD_M) };
         assert_eq!(slide(&law, asked(0.125 * LOAD_M, 1e-5)), -1e-5, "{law:?}");
         // Round a needle it can be farther beyond S than the circle reaches.
-        let circle_m = mu_s * LOAD_M;
+        let circle_m = STATIC * LOAD_M;
         assert_eq!(slide(&law, asked(-2.0 * circle_m, 1e-5)), -circle_m, "{law:?}");
     }
 }
