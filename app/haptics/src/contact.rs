@@ -272,8 +272,8 @@ impl Slot {
             self.stiffness = ContactStiffness::new(own.stiffness_n_per_m);
         }
         let mut material = own;
-        let way_m = way.1.map_or(0.0, |previous_B| (way.0 - previous_B).norm());
-        material.stiffness_n_per_m = self.stiffness.step(own.stiffness_n_per_m, way_m, sweep.dt_s);
+        let along_m = self.way_along_m(entity, &way);
+        material.stiffness_n_per_m = self.stiffness.step(own.stiffness_n_per_m, along_m, sweep.dt_s);
         let contact = self.touch_again(index, entity, sweep, way, &material)?;
         if self.label == label {
             return Some(contact);
@@ -299,6 +299,14 @@ impl Slot {
         material: &FeltMaterial<'_>,
     ) -> Option<Contact> {
         self.touch_of(index, entity, sweep, way, material)
+    }
+
+    /// How far the finger has gone along the surface since the last tick (m).
+    fn way_along_m(&self, entity: &Entity, way: &(Vector3<f64>, Option<Vector3<f64>>)) -> f64 {
+        let (Some(previous_B), Some(contact)) = (way.1, &self.contact) else { return 0.0 };
+        let way_B = way.0 - previous_B;
+        let normal_B = vector_into_body(&entity.X_WB, &contact.normal_W);
+        (way_B - normal_B * normal_B.dot(&way_B)).norm()
     }
 
     fn forget_friction(&mut self) {
@@ -485,7 +493,8 @@ impl Slot {
     ) -> Option<Contact> {
         let label = self.label;
         let share = self.onset.share_of(&touch, input, [sweep.dt_s, sweep.ramp_in_s]);
-        let spring_n = input.cone.stiffness_n_per_m * input.way_m();
+        let regained_n = self.stiffness.regained_n(input.way_m());
+        let spring_n = input.cone.stiffness_n_per_m * input.way_m() + regained_n;
         let share =
             if entity.face_materials.is_some() { share * self.share_of_faces(&touch, input) } else { share };
         let is_plain = self.onset.came_on_n() == 0.0 && entity.is_plain(material);
@@ -516,7 +525,10 @@ impl Slot {
         let cone = &input.cone;
         let force_n = touch.force_on_user_B.norm();
         // A damper answers to both velocities, since it is silent where the spring is relaxed.
-        let dragged_n = if material.friction.drags() { force_n } else { 0.0 };
+        // What is dragged is along the surface, and only where friction is rendered.
+        let drags = material.friction.drags() && entity.algorithm == Algorithm::FrictionCone;
+        let across_n = (force_n * force_n - touch.normal_force_n * touch.normal_force_n).max(0.0).sqrt();
+        let dragged_n = if drags { across_n } else { 0.0 };
         let damped_n = cone.damping_n_s_per_m * cone.hip_velocity_B.norm() + dragged_n;
         let damped_n = damped_n + std::mem::replace(&mut self.damped_n, damped_n);
         // The force turns with the entity.
@@ -526,8 +538,7 @@ impl Slot {
             let [low_m, high_m] = map.range_m();
             cone.stiffness_n_per_m * (high_m - low_m)
         });
-        let regained_n = self.stiffness.regained_n(input.way_m());
-        spring_n + regained_n + damped_n + force_n * turn + self.onset.came_on_n() + heights_n
+        spring_n + damped_n + force_n * turn + self.onset.came_on_n() + heights_n
     }
 
     /// What stiffer faces leave of the spring, and where the next tick begins.
@@ -536,7 +547,9 @@ impl Slot {
         if let Shape::Mesh(mesh) = input.shape {
             self.label = mesh.label(touch.god_object.piece);
         }
-        self.stiffness.share((touch.god_object.point_B - input.cone.hip_B).norm())
+        // Along the normal: what friction holds back is no part of what is pressed in.
+        let god_object = &touch.god_object;
+        self.stiffness.share((god_object.point_B - input.cone.hip_B).dot(&god_object.normal_B).max(0.0))
     }
 
     /// The touch as the entity's facets and heights have it; `None` above a dent.

@@ -3,11 +3,11 @@
 //! Problem: a finger that is pressed in deep on soft faces slides onto stiff ones; with their stiffness at that depth the
 //! force would leap.
 //!
-//! Model: on stiffer faces the spring goes on with the force that it has, `k' (x - s) = k x`, x being how far the god-object
-//! is from the HIP: it is taken to be shorter by s. That is regained where the finger comes out, as it never is shorter than
-//! x, and at a tenth of the way that it goes. On softer faces the stiffness falls no faster than lets the force fall by
-//! 50 N/s. The force thus rises by no more than stiffness times way, and pressing, crossing and coming out gives no energy
-//! but that tenth of the way.
+//! Model: on stiffer faces the spring goes on with the normal force that it has, `k' (x - s) = k x`, x being the depth: it is
+//! taken to be shorter by s. That is regained as the finger comes out, since s is never more than x, and at a tenth of the
+//! way that it goes along the surface. On softer faces the stiffness falls no faster than lets the force fall by 50 N/s. The
+//! force thus rises by no more than stiffness times way, and pressing in, crossing and coming out gives no energy but that of
+//! the tenth of the way.
 //!
 //! Cost: two comparisons on an entity of one material.
 
@@ -18,7 +18,7 @@ pub(crate) struct ContactStiffness {
     in_effect_n_per_m: f64,
     /// How much shorter the spring is taken to be (m).
     short_m: f64,
-    /// How long it was in the last tick (m).
+    /// How deep the finger was in the last tick (m).
     length_m: f64,
 }
 
@@ -28,8 +28,8 @@ impl ContactStiffness {
         Self { in_effect_n_per_m: stiffness_n_per_m, short_m: 0.0, length_m: 0.0 }
     }
 
-    /// The stiffness (N/m) of a tick that begins on faces of such, in which the finger goes so far.
-    pub(crate) fn step(&mut self, of_faces_n_per_m: f64, way_m: f64, dt_s: f64) -> f64 {
+    /// The stiffness (N/m) of a tick that begins on faces of such, in which the finger goes so far along them.
+    pub(crate) fn step(&mut self, of_faces_n_per_m: f64, along_m: f64, dt_s: f64) -> f64 {
         let Self { in_effect_n_per_m: k, short_m, length_m: x } = *self;
         let sprung_m = (x - short_m).max(0.0);
         if of_faces_n_per_m > k {
@@ -39,11 +39,11 @@ impl ContactStiffness {
             let by = if dt_s > 0.0 { FALLS_N_PER_S * dt_s / sprung_m } else { f64::INFINITY };
             self.in_effect_n_per_m = of_faces_n_per_m.max(k - by);
         }
-        self.short_m = (self.short_m - REGAINED * way_m).max(0.0);
+        self.short_m = (self.short_m - REGAINED * along_m).max(0.0);
         self.in_effect_n_per_m
     }
 
-    /// What to multiply the force of a spring of this length (m) by.
+    /// What to multiply the force of a finger at this depth (m) by.
     pub(crate) fn share(&mut self, length_m: f64) -> f64 {
         self.length_m = length_m;
         self.short_m = self.short_m.min(length_m);

@@ -244,6 +244,9 @@ impl Passivity {
         let wanted_W = limit::without(port.force_on_user_W, pressing.force_on_user_W * (1.0 - share));
         let whole_j = budget_j(&self.whole, &self.pending.force_W);
         let force_W = limit::nearest(wanted_W, moved_W, next_surprise_m, whole_j);
+        // Each step alone is never against what it began with; both together are not either.
+        let is_against = force_W.dot(&port.force_on_user_W) < 0.0;
+        let force_W = if is_against { Vector3::zeros() } else { force_W };
         let normal_W = pressing.normal_on_user_W * share;
         let chosen = Held { force_W: wanted_W, normal_W, normal_share: share };
         let chosen = chosen.applied(Some(force_W));
