@@ -3,8 +3,8 @@
 #
 #   tests/guest/deterministic.sh VMLINUZ SCRIPT [PROGRAM]...
 #
-# One CPU, one nanosecond an instruction: what is measured inside depends on nothing outside, and the same programs give
-# the same figures to the last digit. RUNS=3 does so three times and tells the checksums, which are equal. The script
+# One CPU, one nanosecond an instruction: how busy the host is does not matter, and figures repeat, mostly to the byte.
+# RUNS=3 does so three times and tells the checksums of what was said. The script
 # finds busybox's tools, cyclictest, chrt, the programs named, and the project's configuration in /config.
 set -euo pipefail
 
