@@ -259,6 +259,23 @@ fn interference() {
             "managed, which cannot be moved: 1 (31 nvme0q4); isolcpus=managed_irq keeps them quiet",
             &format!("{OLD_KERNEL}{READ_BACK}\nkept /proc/irq/31/smp_affinity 8\n"),
         ),
+        // Root's own attempt tells of the movable ones, too.
+        (
+            "interference.irq_affinity",
+            Warn,
+            "1 (40 iwlwifi); managed, which cannot be moved: 1 (31 nvme0q4)",
+            &format!(
+                "{WIFI}{OLD_KERNEL}{READ_BACK}\nkept /proc/irq/31/smp_affinity 8\nset /proc/irq/40/smp_affinity 7\n"
+            ),
+        ),
+        // Sent elsewhere; it goes there when it next occurs.
+        (
+            "interference.irq_affinity",
+            Pass,
+            "none",
+            "=== /proc/irq/31 removed\n=== /proc/irq/40/iwlwifi/\n=== /proc/irq/40/smp_affinity_list\n0-2\n\
+             === /proc/irq/40/effective_affinity_list\n3\n",
+        ),
         // The debug file of older kernels, where the affinity file looks writable.
         (
             "interference.irq_affinity",

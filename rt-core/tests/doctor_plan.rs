@@ -368,7 +368,10 @@ fn each_setting_mends_its_own_finding() {
             "interference.watchdogs",
             "=== /proc/sys/kernel/watchdog\n1\n=== /proc/sys/kernel/watchdog_cpumask\n0-3\n",
         ),
-        ("interference.irq_affinity", "=== /proc/irq/9/effective_affinity_list\n3\n"),
+        (
+            "interference.irq_affinity",
+            "=== /proc/irq/9/smp_affinity_list\n0-3\n=== /proc/irq/9/effective_affinity_list\n3\n",
+        ),
         ("starvation.rt_throttling", "=== /proc/sys/kernel/sched_rt_runtime_us\n950000\n"),
         ("starvation.fair_server", "=== /sys/kernel/debug/sched/fair_server/cpu3/runtime\n50000000\n"),
         ("power.governor", "=== /sys/devices/system/cpu/cpu3/cpufreq/scaling_governor\npowersave\n"),

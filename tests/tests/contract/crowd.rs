@@ -111,7 +111,7 @@ fn a_floor_of_tiles_is_felt_tile_by_tile() {
         let across = [[0.0, 0.03, 0.001], [0.0, y_m, 0.001], [0.06, y_m, 0.014], [0.06, 0.03, 0.014]];
         let table = felt_as_if_alone(&tiles, radius_m, &across, 0.006 + radius_m);
         assert!(names(&table).len() > 8, "{:?}", names(&table));
-        assert!((0.39..2.0).contains(&largest(&table)), "{}", largest(&table));
+        assert!(largest(&table) > 0.39, "{}", largest(&table));
     }
 }
 
@@ -141,5 +141,6 @@ fn a_crowd_that_is_too_large_is_told_and_what_has_no_end_is_felt_in_it() {
     assert!((1..4).contains(&crowds.len()), "{}", crowds.len());
     let rows = Table::read(&place.path("rows.csv"));
     let last = *rows.vectors("f0_force").last().expect("rows");
-    assert!((last - V::new(0.0, 1.0, 0.0)).norm() < 1e-6, "{last:?}");
+    let depth_m = -rows.vectors("f0_hip").last().expect("rows").y;
+    assert!(depth_m > 0.5e-3 && (last - V::new(0.0, 1000.0 * depth_m, 0.0)).norm() < 1e-6, "{last:?}");
 }

@@ -127,7 +127,9 @@ fn interrupt_on(machine: &Machine<'_>, number: u32, told: &ReadBack) -> Result<O
     let Some(allowed) = if_any(machine.cpu_list(&allowed_file))? else { return Ok(None) };
     // Empty before the interrupt is started.
     let effective = if_any(machine.cpu_list(&effective_file))?.filter(|cpus| !cpus.is_empty());
-    if !effective.as_ref().unwrap_or(&allowed).contains(&machine.spec.cpu) {
+    // One that was sent elsewhere goes there when it next occurs; where it still would go says nothing until then.
+    let reaches = |cpus: &Vec<usize>| cpus.contains(&machine.spec.cpu);
+    if !reaches(&allowed) || !effective.as_ref().is_none_or(reaches) {
         return Ok(None);
     }
     let movable = movable(machine, number, told)?;
@@ -146,11 +148,14 @@ fn handler(machine: &Machine<'_>, directory: &str) -> Result<Option<String>, Obs
 fn movable(machine: &Machine<'_>, number: u32, told: &ReadBack) -> Result<Movable, Obstacle> {
     let directory = format!("/proc/irq/{number}");
     let is_read_only = machine.status(&format!("{directory}/smp_affinity_list"))?.mode & 0o200 == 0;
-    if is_read_only || told.was_refused(&format!("{directory}/smp_affinity")) {
+    let mask = format!("{directory}/smp_affinity");
+    if is_read_only || told.was_refused(&mask) {
         return Ok(Movable::No);
     }
     Ok(match is_marked_managed(machine, number) {
         Some(true) => Movable::No,
+        // Root has moved it.
+        _ if told.value(&mask).is_some() => Movable::Yes,
         None if !shows_managed_by_mode(machine)? => Movable::Unknown,
         _ => Movable::Yes,
     })
