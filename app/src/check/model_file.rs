@@ -38,6 +38,8 @@ struct Understood {
     mesh: Mesh,
     report: MeshReport,
     is_lid: Vec<bool>,
+    /// Of each of its faces, which of the file it is a part of, or beside.
+    origins: Vec<usize>,
     /// What its faces are called, if the format has names.
     names: Option<FaceNames>,
     low: Vector3<f64>,
@@ -63,8 +65,11 @@ fn understand(args: &CheckArgs) -> Result<Understood, String> {
     let names = model::read_names(&args.scene, &bytes).map_err(told)?;
     drop(bytes);
     let holes = args.close_holes.map_or(CloseHoles::Small, CloseHoles::UpTo);
-    let mut is_lid = Vec::new();
-    let built = Mesh::build_and_tell(soup, holes, |_, of_lid| is_lid.push(of_lid));
+    let (mut is_lid, mut origins) = (Vec::new(), Vec::new());
+    let built = Mesh::build_and_tell(soup, holes, |origin, of_lid| {
+        is_lid.push(of_lid);
+        origins.push(origin);
+    });
     let (mesh, report) = built.map_err(|error| error.to_string())?;
     let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
     for vertex in mesh.vertices() {
@@ -76,12 +81,16 @@ fn understand(args: &CheckArgs) -> Result<Understood, String> {
         area += 0.5 * (b - a).cross(&(c - a)).norm();
         volume += a.dot(&b.cross(&c)) / 6.0;
     }
-    Ok(Understood { mesh, report, is_lid, names, low, high, area, volume })
+    Ok(Understood { mesh, report, is_lid, origins, names, low, high, area, volume })
 }
 
 impl Understood {
     fn write(&self, out: &Path) -> Result<(), String> {
-        let text = model::write_obj(&self.mesh, &self.is_lid);
+        let names = |face: usize| match &self.names {
+            Some(names) if !self.is_lid[face] => names.of(self.origins[face]),
+            _ => &[],
+        };
+        let text = model::write_obj(&self.mesh, &self.is_lid, names);
         replacement::write(out, text).map_err(|error| format!("cannot write {}: {error}", out.display()))
     }
 
@@ -123,6 +132,9 @@ impl Understood {
             all.iter().take(MOST_NAMES).map(|(name, faces)| format!("{name} ({faces})")).collect();
         if all.len() > MOST_NAMES {
             shown.push(format!("and {} more", all.len() - MOST_NAMES));
+        }
+        if self.names.as_ref().is_some_and(FaceNames::is_cut) {
+            shown.push("and others: they are too many to be used".into());
         }
         (!shown.is_empty()).then(|| format!("{}: of faces, for `[[entity.faces]]`", shown.join(", ")))
     }
@@ -170,7 +182,7 @@ fn to_json(args: &CheckArgs, found: &Result<Understood, String>) -> Value {
         Ok(understood) => understood,
         Err(problem) => return json!({ "ok": false, "file": file, "problems": [{ "message": problem }] }),
     };
-    let Understood { mesh, report, is_lid, names, low, high, area, volume } = understood;
+    let Understood { mesh, report, is_lid, names, low, high, area, volume, .. } = understood;
     let holes: Vec<Value> = report
         .open_holes
         .largest

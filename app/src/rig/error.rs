@@ -149,7 +149,7 @@ pub enum RigError {
         source: Box<MeshError>,
     },
     /// A model file has no face of this name.
-    #[error("{at}: found {found:?}, which no face of {} is called; allowed: {allowed}", .file.display())]
+    #[error("{at}: found {found:?}, which no face of {} is known by; allowed: {allowed}", .file.display())]
     FaceName {
         /// Where the scene names it.
         at: Box<Location>,

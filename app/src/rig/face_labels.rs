@@ -17,6 +17,14 @@ pub(super) fn labels(
     faces: &[FacesSpec],
 ) -> Result<Vec<u16>, RigError> {
     let all = names.map(FaceNames::all).unwrap_or_default();
+    if let (Some(first), true) = (faces.first(), names.is_some_and(FaceNames::is_cut)) {
+        return Err(RigError::FaceName {
+            at: Box::new(first.at.clone()),
+            file: file.to_path_buf(),
+            found: first.of.join(", "),
+            allowed: "files whose names take 64 MB at most: join its parts, or shorten their names".into(),
+        });
+    }
     for spec in faces {
         if let Some(name) = spec.of.iter().find(|name| !all.contains_key(name.as_str())) {
             return Err(RigError::FaceName {

@@ -10,36 +10,37 @@ pub struct FaceNames {
     numbers: BTreeMap<Vec<String>, u32>,
     /// Of each face, which set.
     of_face: Vec<u32>,
-    /// There were more sets than are kept; the others have no names.
+    /// Of all sets.
+    bytes: usize,
+    /// There were more names than are kept; the faces of the others have none.
     is_cut: bool,
 }
 
-/// More, and a name for each face is all that they are.
-const MOST_SETS: usize = 1 << 15;
-/// Names of one face.
-const MOST_NAMES: usize = 16;
-const LONGEST_NAME: usize = 200;
+/// What all names of a model may take: a million of fifty letters. A small file can repeat a long one as often as it likes.
+const MOST_BYTES: usize = 1 << 26;
+/// What a set takes beside its letters.
+const OF_A_SET_BYTES: usize = 64;
 
 impl FaceNames {
     /// The number of a set of names, of which empty ones are none.
     pub(super) fn set(&mut self, names: impl IntoIterator<Item = impl AsRef<str>>) -> u32 {
-        let kept = |name: &str| name.chars().take(LONGEST_NAME).collect::<String>();
         let mut names: Vec<String> = names
             .into_iter()
-            .map(|name| kept(name.as_ref().trim()))
+            .map(|name| name.as_ref().trim().to_owned())
             .filter(|name| !name.is_empty())
-            .take(MOST_NAMES)
             .collect();
         if let Some(known) = self.numbers.get(&names) {
             return *known;
         }
-        if self.sets.len() >= MOST_SETS {
+        let bytes = OF_A_SET_BYTES + names.iter().map(|name| OF_A_SET_BYTES + name.len()).sum::<usize>();
+        if self.bytes + bytes > MOST_BYTES {
             self.is_cut = true;
             names.clear();
             if let Some(known) = self.numbers.get(&names) {
                 return *known;
             }
         }
+        self.bytes += bytes;
         let number = self.sets.len() as u32;
         self.sets.push(names.clone());
         self.numbers.insert(names, number);
@@ -56,6 +57,11 @@ impl FaceNames {
         if let Some(own) = self.of_face.get_mut(face) {
             *own = set;
         }
+    }
+
+    /// What a face is called.
+    pub fn of(&self, face: usize) -> &[String] {
+        self.of_face.get(face).and_then(|set| self.sets.get(*set as usize)).map_or(&[], Vec::as_slice)
     }
 
     /// Whether there were too many names to keep them all.
@@ -112,13 +118,15 @@ mod tests {
     #[test]
     fn names_without_end_are_cut_and_said_to_be() {
         let mut names = FaceNames::default();
-        for number in 0..2 * MOST_SETS {
-            let set = names.set([number.to_string()]);
+        for number in 0..100_000 {
+            let set = names.set([number.to_string(), "all".into()]);
             names.add(set, 1);
         }
-        assert!(names.is_cut() && names.all().len() == MOST_SETS);
-        let many: Vec<String> = (0..100_000).map(|_| "n".repeat(1000)).collect();
-        let set = FaceNames::default().set(many);
-        assert_eq!(set, 0);
+        assert!(!names.is_cut() && names.all().len() == 100_001 && names.all()["all"] == 100_000);
+        for number in 0..1000 {
+            let set = names.set(["n".repeat(100_000), number.to_string()]);
+            names.add(set, 1);
+        }
+        assert!(names.is_cut() && names.sets.len() < 101_000);
     }
 }

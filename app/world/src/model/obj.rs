@@ -241,7 +241,7 @@ impl Called {
         let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
         let mut words = words(statement);
         match words.next() {
-            Some(b"g") => self.groups = words.take(MOST_GROUPS).map(text).collect(),
+            Some(b"g") => self.groups = words.map(text).collect(),
             // Names with spaces are common.
             Some(b"o") => self.object = text(&words.collect::<Vec<_>>().join(&b' ')),
             _ => self.material = text(&words.collect::<Vec<_>>().join(&b' ')),
@@ -252,9 +252,6 @@ impl Called {
         [&self.material, &self.object].into_iter().chain(&self.groups)
     }
 }
-
-/// Of one polygon.
-const MOST_GROUPS: usize = 8;
 
 /// What the file says of texture coordinates. It is read apart from the polygons, so that files without cost nothing.
 #[derive(Default)]

@@ -8,7 +8,7 @@ fn written(soup: TriangleSoup) -> (Mesh, MeshReport, String) {
     let mut is_lid = Vec::new();
     let told = |_, of_lid| is_lid.push(of_lid);
     let (mesh, report) = Mesh::build_and_tell(soup, CloseHoles::Small, told).expect("a mesh");
-    let text = write_obj(&mesh, &is_lid);
+    let text = write_obj(&mesh, &is_lid, |_| &[]);
     (mesh, report, text)
 }
 
@@ -87,4 +87,23 @@ fn whatever_stays_open_or_touches_is_the_same_when_it_is_written_and_read() {
         assert_eq!(text_again, text);
         assert!(!report.is_clean() && report_again.flipped.count == 0, "{report_again}");
     }
+}
+
+/// Names in a word, with spaces, with what OBJ cannot say, and none.
+#[test]
+fn names_of_faces_are_written_so_that_they_are_read() {
+    let soup = make::cuboid([0.1; 3]);
+    let names: [&[&str]; 4] = [&["tyre", "soft rubber", "The Wheel"], &["hub"], &["a#b", "plain"], &[]];
+    let names: Vec<Vec<String>> =
+        names.iter().map(|set| set.iter().map(|name| (*name).to_owned()).collect()).collect();
+    let mut origins = Vec::new();
+    let (mesh, _) =
+        Mesh::build_and_tell(soup, CloseHoles::Small, |origin, _| origins.push(origin)).expect("a mesh");
+    let text = write_obj(&mesh, &[false; 12], |face| &names[origins[face] % 4]);
+    let file = std::path::Path::new("a.obj");
+    let read = world::model::read_names(file, text.as_bytes()).expect("what we wrote").expect("names");
+    let all: Vec<_> = read.all().into_iter().collect();
+    let expected =
+        [("The Wheel", 3), ("hub", 3), ("mesh", 12), ("plain", 3), ("soft rubber", 3), ("tyre", 3)];
+    assert_eq!(all, expected, "{text}");
 }
