@@ -513,7 +513,7 @@ fn a_run_suspects_a_hand_of_another_unit_as_check_does() {
     place.write("mm.csv", "t,f0_x,f0_y,f0_z\n0,0,80,0\n0.1,50,20,0\n");
     place.write("m.csv", "t,f0_x,f0_y,f0_z\n0,0,0.08,0\n0.1,0.05,0.02,0\n");
     for (hand, is_suspected) in [("mm.csv", true), ("m.csv", false)] {
-        let said = place.run(&["run", "scene.toml", "--hand", hand, "--clock", "virtual", "--headless"]);
+        let said = place.run(["run", "scene.toml", "--hand", hand, "--clock", "virtual", "--headless"]);
         assert_eq!(said.status, Some(0), "{}", said.err);
         let warning = "phantom3: warning: finger f0 goes along 60 m in";
         assert_eq!(said.err.contains(warning), is_suspected, "{}", said.err);
