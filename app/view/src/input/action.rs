@@ -115,7 +115,7 @@ pub(super) const KNOWN: [Known; 42] = [
     known(Damping(More), "damping-more", "damping times 1.1", Run, &["B"]),
     known(Damping(Less), "damping-less", "damping divided by 1.1", Run, &["Shift+B"]),
     known(Shadows, "shadows", "shadows on or off", Picture, &["F2"]),
-    known(Overlay, "overlay", "fingers, forces, contacts, rims on or off", Picture, &["F3"]),
+    known(Overlay, "overlay", "fingers, forces, rims on or off", Picture, &["F3"]),
     known(Highlight, "highlight", "colour of touched things on or off", Picture, &["F4"]),
     known(Stereo, "stereo", "next way to serve two eyes", Picture, &["F5"]),
     known(Separation(Less), "separation-less", "eyes nearer together", Picture, &["F6"]),
