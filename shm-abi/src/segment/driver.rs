@@ -227,3 +227,16 @@ const LAST_TICK: u64 = (u64::MAX >> 1) - 1;
 const fn frame_words(devices: usize) -> usize {
     (std::mem::offset_of!(Frame, devices) + devices * size_of::<DeviceFrame>()) / size_of::<u64>()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::LAST_TICK;
+    use crate::seqlock::stamp;
+
+    #[test]
+    fn the_last_tick_is_the_last_whose_stamp_no_other_has() {
+        assert_eq!(stamp(LAST_TICK), u64::MAX - 1);
+        // That of a place where nothing was ever written.
+        assert_eq!(stamp(LAST_TICK + 1), 0);
+    }
+}
