@@ -5,7 +5,8 @@ use std::slice::from_ref;
 
 use crate::common::*;
 use haptics::{
-    Algorithm, ContactAlgorithm, ContactMemory, Finger, Friction, SurfacePoint, Touch, TouchInput,
+    Algorithm, ContactAlgorithm, ContactMemory, Cuboid, Finger, Friction, LuGre, Stribeck, SurfacePoint,
+    Touch, TouchInput,
 };
 use nalgebra::Vector3;
 
@@ -53,4 +54,25 @@ fn the_force_of_a_god_object_that_leaps_follows_the_way_of_the_hand_and_the_leap
     // What the hand moved on the right: 0.02 m there and back. The leap itself would be 150 N.
     assert!(most_n > K * DEPTH_M && most_n <= K * (DEPTH_M + 0.0203), "{most_n} N");
     assert_eq!(leaps, 1);
+}
+
+/// Laws that drag explain what they drag, along the surface and where friction is rendered; no flip of a baseline.
+#[test]
+fn friction_that_drags_explains_no_leap_of_a_baseline_without_friction() {
+    let lugre = LuGre::new(Stribeck::new(0.7, 0.3, 0.01, 0.0).unwrap(), 1.0).unwrap();
+    let body = entity(Cuboid::new([0.1, 0.05, 0.1]).unwrap(), Friction::LuGre(lugre))
+        .with_algorithm(Algorithm::VectorField);
+    let mut finger = point_finger();
+    let mut flips = 0;
+    let mut last = Vector3::zeros();
+    for tick in 0..1400 {
+        let hip = Vector3::new(0.011, 0.03 - 5e-5 * f64::from(tick), 0.003);
+        let force = finger.step(from_ref(&body), &hip, DT).force_on_user_W;
+        if let Some(contact) = finger.contact(0).filter(|_| force.dot(&last) < 0.0) {
+            assert!(contact.explained_n < 1.0, "{contact:?}");
+            flips += 1;
+        }
+        last = force;
+    }
+    assert_eq!(flips, 1);
 }

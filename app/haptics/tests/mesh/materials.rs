@@ -191,3 +191,44 @@ fn a_finger_that_begins_inside_feels_the_ramp_of_the_material_there() {
         assert!(fingers[0].contact(0).unwrap().normal_force_n > 3.9);
     }
 }
+
+/// From soft and rough to stiff and slippery, the hand level: what friction held back is let go, what presses is not.
+#[test]
+fn onto_stiff_and_slippery_faces_the_normal_force_goes_on() {
+    for radius_m in [0.0, 5e-3] {
+        let entity = [entity([1.2, 0.05], [300.0, 1500.0])];
+        let mut finger = finger(radius_m);
+        finger.step(&entity, &at(-0.03, -1e-3, radius_m), DT_S);
+        let mut last_n = 0.0;
+        for tick in 0..1400 {
+            let hip = at(-0.03 + 5e-5 * f64::from(tick), 5e-3, radius_m);
+            let normal_n = finger.step(&entity, &hip, DT_S).force_on_user_W.y;
+            assert!(normal_n >= last_n - 1e-9, "{radius_m}, {}: {last_n} N, then {normal_n} N", hip.x);
+            last_n = normal_n;
+        }
+        assert!(last_n > 4.0, "{last_n}");
+    }
+}
+
+/// Pressed in on stiff faces after soft ones, the force grows as their spring does, and no faster.
+#[test]
+fn pressing_in_regains_nothing_of_a_short_spring() {
+    let entity = [entity([0.0; 2], [300.0, 3000.0])];
+    let mut finger = finger(0.0);
+    for tick in 0..400 {
+        finger.step(
+            &entity,
+            &at(-0.02 + 1e-4 * f64::from(tick), if tick == 0 { -1e-3 } else { 5e-3 }, 0.0),
+            DT_S,
+        );
+    }
+    let force = |finger: &mut Finger, depth: f64| {
+        finger.step(&entity, &at(0.0199, depth, 0.0), DT_S).force_on_user_W.y
+    };
+    let mut last_n = force(&mut finger, 5e-3);
+    for tick in 1..100 {
+        let now_n = force(&mut finger, 5e-3 + 1e-5 * f64::from(tick));
+        assert!((now_n - last_n - 0.03).abs() < 1e-9, "{tick}: {last_n} {now_n}");
+        last_n = now_n;
+    }
+}
