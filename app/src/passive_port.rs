@@ -42,13 +42,13 @@ pub struct PassivePort {
     springs: Springs,
 }
 
-/// What a finger's force is made of in a tick.
+/// Sources of a finger's force in a tick.
 pub struct Rendering<'a> {
     /// The finger, with its contacts.
     pub finger: &'a DeviceFinger,
-    /// What it feels beside contacts.
+    /// Effects that it feels beside contacts.
     pub felt: &'a FingerEffects,
-    /// What contacts' forces were multiplied by.
+    /// Factor of the contacts' forces.
     pub strength: f64,
 }
 

@@ -113,7 +113,7 @@ pub(crate) struct Slot {
     pub(crate) contact: Option<Contact>,
 }
 
-/// What a contact that begins changes of a slot.
+/// Parts of a slot that the beginning of a contact changes.
 struct Before {
     mesh: MeshCone,
     on_mesh: Option<BallOnMesh>,
@@ -301,7 +301,7 @@ impl Slot {
         self.touch_of(index, entity, sweep, way, material)
     }
 
-    /// How far the finger has gone along the surface since the last tick (m).
+    /// Way of the finger along the surface since the last tick (m).
     fn way_along_m(&self, entity: &Entity, way: &(Vector3<f64>, Option<Vector3<f64>>)) -> f64 {
         let (Some(previous_B), Some(contact)) = (way.1, &self.contact) else { return 0.0 };
         let way_B = way.0 - previous_B;
@@ -541,7 +541,7 @@ impl Slot {
         spring_n + damped_n + force_n * turn + self.onset.came_on_n() + heights_n
     }
 
-    /// What stiffer faces leave of the spring, and where the next tick begins.
+    /// Share of the spring that stiffer faces leave; notes the label for the next tick.
     #[inline(never)]
     fn share_of_faces(&mut self, touch: &Touch, input: &TouchInput<'_>) -> f64 {
         if let Shape::Mesh(mesh) = input.shape {

@@ -11,14 +11,14 @@
 //!
 //! Cost: two comparisons on an entity of one material.
 
-/// What is in effect.
+/// Stiffness in effect, and the spring's shortening.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct ContactStiffness {
     /// (N/m).
     in_effect_n_per_m: f64,
-    /// How much shorter the spring is taken to be (m).
+    /// Shortening of the spring (m).
     short_m: f64,
-    /// How deep the finger was in the last tick (m).
+    /// Depth of the finger in the last tick (m).
     length_m: f64,
 }
 
@@ -43,7 +43,7 @@ impl ContactStiffness {
         self.in_effect_n_per_m
     }
 
-    /// What to multiply the force of a finger at this depth (m) by.
+    /// Factor of the force of a finger at this depth (m).
     pub(crate) fn share(&mut self, length_m: f64) -> f64 {
         self.length_m = length_m;
         self.short_m = self.short_m.min(length_m);
@@ -56,9 +56,9 @@ impl ContactStiffness {
     }
 }
 
-/// How fast a force falls where it is softer.
+/// Rate at which a force falls on softer faces.
 const FALLS_N_PER_S: f64 = 50.0;
-/// What part of the finger's way a short spring regains.
+/// Part of the finger's way that a short spring regains.
 const REGAINED: f64 = 0.1;
 
 #[cfg(test)]

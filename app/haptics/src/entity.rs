@@ -51,7 +51,7 @@ pub struct Entity {
     pub felt: Felt,
     /// Friction of its surface.
     pub friction: Friction,
-    /// What faces of a mesh are made of that have labels.
+    /// Materials of a mesh's labelled faces.
     pub face_materials: Option<Shared<FaceMaterials>>,
     /// How much of an approaching velocity it gives back to what bounces off it, 0 to 1; no finger feels it. `None`: nobody
     /// says.

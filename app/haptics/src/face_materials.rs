@@ -14,7 +14,7 @@ use crate::friction::Friction;
 use crate::shared::Shared;
 use std::sync::Arc;
 
-/// What some of a mesh's faces are made of.
+/// Material of some of a mesh's faces.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FaceMaterial {
     friction: Friction,
@@ -26,7 +26,7 @@ pub struct FaceMaterial {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FaceMaterials(Vec<FaceMaterial>);
 
-/// What fingers feel where they touch an entity.
+/// Material of an entity as fingers feel it at a place.
 #[derive(Debug, Clone, Copy)]
 pub struct FeltMaterial<'e> {
     /// Friction there.
@@ -70,7 +70,7 @@ impl Entity {
         Self { face_materials: Some(Shared::from(materials.into())), ..self }
     }
 
-    /// What fingers feel on faces of this label.
+    /// Material that fingers feel on faces of this label.
     #[inline]
     pub fn felt_material(&self, label: u16) -> FeltMaterial<'_> {
         match self.face_materials.as_ref().and_then(|materials| materials.of(label)) {

@@ -106,7 +106,7 @@ pub struct Passivity {
     /// Follow the position when it is a count away, all around and along the normal: what friction acts on.
     dragged_W: Vector3<f64>,
     dragged_along_W: Vector3<f64>,
-    /// How much of the device's friction on other ways than that along the normal pays for what presses, 0 to 1.
+    /// Share of the device's friction across the normal that pays for pressing, 0 to 1.
     sliding_share: f64,
     /// The force that acts until the next tick, and the one after it where forces come late.
     acting: Held,
@@ -118,7 +118,7 @@ pub struct Passivity {
 struct Held {
     force_W: Vector3<f64>,
     normal_W: Vector3<f64>,
-    /// What part that is of the normal force that was wanted.
+    /// Share of the wanted normal force.
     normal_share: f64,
 }
 
@@ -308,7 +308,7 @@ impl Passivity {
         (moved_W / ticks, ticks)
     }
 
-    /// What share of the device's friction on the way along a surface pays for what presses: all on one that every hand
+    /// Share of the device's friction along a surface that pays for pressing: all on one that every hand
     /// keeps quiet, nothing on one that can buzz.
     fn share_of_sliding(&self, pressing: &Pressing) -> f64 {
         let stiffness_n_per_m = pressing.normal_on_user_W.norm_squared() / (2.0 * pressing.stored_j);
@@ -317,7 +317,7 @@ impl Passivity {
         if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) }
     }
 
-    /// What way the device's friction acted on (m): all of it, and that along a normal force, if there is one. A counter
+    /// Way that the device's friction acted on (m): all of it, and that along a normal force, if there is one. A counter
     /// that flickers moves nothing.
     fn drag(&mut self, position_W: Vector3<f64>, normal_W: &Vector3<f64>) -> (f64, f64) {
         let slack_m = 2.0 * self.spec.resolution_m;
@@ -352,7 +352,7 @@ const FULL_FORCE_N: f64 = 8.5;
 const ACCELERATION_M_PER_S2: f64 = 150.0;
 /// What moves a Premium's tip: pays for counts below 2 f / q = 2.7 N/mm, where rounding leaks k q / 2 for each metre (N).
 const DEVICE_FRICTION_N: f64 = 0.04;
-/// What the lightest grip takes of a motion (N s/m).
+/// Damping of the lightest grip (N s/m).
 const HAND_N_S_PER_M: f64 = 1.5;
 /// Counts of a Premium at its tip (m).
 const RESOLUTION_M: f64 = 3e-5;

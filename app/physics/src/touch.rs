@@ -56,7 +56,7 @@ impl Touch {
         Self { point_W, normal_W, force_on_user_W, ..Self::of(contact, finger) }
     }
 
-    /// What the entity is made of there.
+    /// Material of the entity there.
     pub(crate) fn material<'e>(&self, entity: &'e Entity) -> FeltMaterial<'e> {
         FeltMaterial { stiffness_n_per_m: self.stiffness_n_per_m, ..entity.felt_material(self.label) }
     }

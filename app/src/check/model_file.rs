@@ -40,7 +40,7 @@ struct Understood {
     is_lid: Vec<bool>,
     /// Of each of its faces, which of the file it is a part of, or beside.
     origins: Vec<usize>,
-    /// What its faces are called, if the format has names.
+    /// Names of its faces, if the format has any.
     names: Option<FaceNames>,
     low: Vector3<f64>,
     high: Vector3<f64>,
@@ -125,7 +125,7 @@ impl Understood {
         text
     }
 
-    /// What `[[entity.faces]]` can name.
+    /// Names for `[[entity.faces]]`.
     fn names(&self) -> Option<String> {
         let all = self.names.as_ref()?.all();
         let mut shown: Vec<String> =

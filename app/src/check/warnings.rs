@@ -29,7 +29,7 @@ pub(super) fn all(rig: &Rig, whole: &Scene, entities: &[Entity]) -> Vec<String> 
     warnings
 }
 
-/// What fingers feel: an entity, or faces of one that are made of something else.
+/// Surface that fingers feel: of an entity, or of faces of one with another material.
 struct Surface {
     name: String,
     stiffness_n_per_m: f64,

@@ -125,7 +125,7 @@ pub(super) fn form(spec: &ShapeSpec) -> Result<Form, Unfit> {
     })
 }
 
-/// What faces of a mesh are made of that are not made of what the entity is, in the order of their labels.
+/// Materials of labelled faces of a mesh, in the order of their labels.
 pub(super) fn face_materials(spec: &SceneEntity) -> Result<FaceMaterials, Unfit> {
     let made = spec.faces.iter().map(|faces| {
         let friction = friction(&faces.friction)?;

@@ -1,4 +1,4 @@
-//! What some of a mesh's faces are made of, by the names that its file gives them.
+//! Materials of a mesh's faces, by the names that its file gives them.
 //!
 //! ```toml
 //! [[entity.faces]]
@@ -37,7 +37,7 @@ pub struct FacesSpec {
     pub at: Location,
 }
 
-/// What the entity says of all of its faces.
+/// Values of the entity for all of its faces.
 pub(crate) struct Usual<'e> {
     pub(crate) friction: &'e FrictionSpec,
     pub(crate) stiffness_n_per_m: f64,

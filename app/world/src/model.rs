@@ -221,7 +221,7 @@ fn directory_of(file: &Path) -> Option<&Path> {
     Some(file.parent().unwrap_or(Path::new("")))
 }
 
-/// What the faces that [`read`] reads are called; `None`: the format has no names for them.
+/// Names of the faces that [`read`] reads; `None`: the format has no names for them.
 ///
 /// # Errors
 /// As [`read`].

@@ -84,7 +84,7 @@ impl Scene {
 /// A file, and lists of names.
 type Parting<'s> = (&'s Path, Vec<&'s [String]>);
 
-/// What was read, and what cannot be.
+/// Files that were read, and those that cannot be.
 #[derive(Default)]
 struct Files<'s> {
     /// `None`: it was told that it cannot be read.

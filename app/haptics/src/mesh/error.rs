@@ -47,9 +47,9 @@ pub enum MeshError {
     },
     /// Not as many labels as faces.
     LabelNumber {
-        /// How many labels there are.
+        /// Number of labels.
         found: usize,
-        /// How many faces there are.
+        /// Number of faces.
         faces: usize,
     },
     /// A texture coordinate that is not finite, or larger than any picture is repeated.

@@ -4,7 +4,7 @@
 
 use super::{CloseHoles, CornerUv, Mesh, MeshError, MeshReport, TriangleSoup};
 
-/// What is known of the faces of a soup beside their corners; each list is as long as there are faces.
+/// Data of a soup's faces beside their corners; each list is as long as there are faces.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct FaceData<'a> {
     /// Texture coordinates.

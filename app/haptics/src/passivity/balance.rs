@@ -1,22 +1,22 @@
-//! What a part of the force has fed into the hand and nobody has paid for.
+//! Energy balance of a part of the force: fed into the hand and not paid for.
 
 /// One account.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Balance {
-    /// What was fed and not paid for (J); negative: credit.
+    /// Energy fed and not paid for (J); negative: credit.
     unpaid_j: f64,
-    /// What springs held in the last tick (J).
+    /// Energy of the springs in the last tick (J).
     stored_j: f64,
 }
 
 /// An interval between two ticks, as an account sees it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Interval {
-    /// What was fed (J); negative: taken.
+    /// Energy fed (J); negative: taken.
     pub(super) fed_j: f64,
-    /// What of a debt was paid (J).
+    /// Payment of a debt (J).
     pub(super) paid_j: f64,
-    /// What springs hold now (J).
+    /// Energy of the springs now (J).
     pub(super) stored_j: f64,
     /// Whether forces act a tick after they were chosen.
     pub(super) is_late: bool,
@@ -43,7 +43,7 @@ impl Balance {
         self.unpaid_j = self.unpaid_j.max(-credit_j).min(bound_j);
     }
 
-    /// What may be fed from now on (J), where nothing is on its way.
+    /// Energy that may be fed from now on (J), with nothing on its way.
     pub(super) fn budget_j(&self, bound_j: f64) -> f64 {
         bound_j - self.unpaid_j
     }

@@ -19,7 +19,7 @@ pub struct Port {
     pub is_late: bool,
     /// Time since the last tick \[s\].
     pub dt_s: f64,
-    /// What of the wanted force comes of surfaces.
+    /// Part of the wanted force that comes of surfaces.
     pub pressing: Pressing,
 }
 

@@ -1,4 +1,4 @@
-//! What a finger's contacts tell a controller: what their springs hold, and what of it presses along normals.
+//! Springs of a finger's contacts: their energy, and the part of it that presses along normals.
 
 use nalgebra::Vector3;
 

@@ -17,10 +17,10 @@ use crate::algorithm::Touch;
 use crate::shape::Shape;
 use crate::surface::SurfacePoint;
 
-/// What is remembered of a shaded contact.
+/// Memory of a shaded contact.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Following {
-    /// Where the god-object was in the last tick, and the size of the force there (N).
+    /// Place of the god-object in the last tick, and the size of the force there (N).
     last: Option<(SurfacePoint, f64)>,
     leap: Option<Leap>,
 }
@@ -30,7 +30,7 @@ pub(crate) struct Following {
 struct Leap {
     /// From the shaded normal to what is felt.
     off_B: Vector3<f64>,
-    /// What the size of the force is multiplied by.
+    /// Factor of the size of the force.
     size: f64,
     /// Of the god-object's way (m).
     left_m: f64,
@@ -98,7 +98,7 @@ impl Following {
 const LEAP: f64 = 4.0;
 /// Roundings of places on a surface of a metre (m).
 const SLACK_M: f64 = 1e-9;
-/// How much of the leap's length is made up for in a way of the same length.
+/// Part of the leap that is made up for in a way of the same length.
 const MADE_UP: f64 = 2.0;
 /// A shaded edge turns the felt normal by less than this part of what it turns the faces' by.
 const SMOOTHED: f64 = 0.5;

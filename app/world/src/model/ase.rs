@@ -19,7 +19,7 @@ pub fn read_ase(bytes: &[u8]) -> Result<TriangleSoup, ModelError> {
     Ok(TriangleSoup { vertices: read.vertices, faces: read.faces })
 }
 
-/// What the triangles are called: by their node, its material and theirs within that.
+/// Names of the triangles: of their node, its material and theirs within that.
 ///
 /// # Errors
 /// As [`read_ase`].
@@ -50,7 +50,7 @@ struct Read<'t> {
     material: (u32, Option<u32>),
 }
 
-/// What is said of a node's name and material.
+/// Name and material of a node.
 #[derive(Default)]
 struct NodeNames<'t> {
     first_face: usize,
@@ -95,7 +95,7 @@ impl<'t> Read<'t> {
         names
     }
 
-    /// What else than shapes is read.
+    /// Reads names and materials.
     fn name(&mut self, keyword: &[u8], block: Option<&[u8]>) {
         match (keyword, block) {
             (b"*NODE_NAME", Some(b"*GEOMOBJECT")) => {

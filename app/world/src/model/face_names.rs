@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-/// What each face of a model is called.
+/// Names of each face of a model.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FaceNames {
     /// All that faces are called alike by.
@@ -16,9 +16,9 @@ pub struct FaceNames {
     is_cut: bool,
 }
 
-/// What all names of a model may take: a million of fifty letters. A small file can repeat a long one as often as it likes.
+/// Bytes that all names of a model may take: a million of fifty letters. A small file can repeat a long one as often as it likes.
 const MOST_BYTES: usize = 1 << 26;
-/// What a set takes beside its letters.
+/// Bytes of a set beside its letters.
 const OF_A_SET_BYTES: usize = 64;
 
 impl FaceNames {
@@ -59,7 +59,7 @@ impl FaceNames {
         }
     }
 
-    /// What a face is called.
+    /// Names of a face.
     pub fn of(&self, face: usize) -> &[String] {
         self.of_face.get(face).and_then(|set| self.sets.get(*set as usize)).map_or(&[], Vec::as_slice)
     }

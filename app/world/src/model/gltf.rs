@@ -37,7 +37,7 @@ pub fn read_gltf(bytes: &[u8], beside: Option<&Path>) -> Result<TriangleSoup, Mo
     Ok(read(bytes, beside)?.0)
 }
 
-/// What the triangles are called: by their node, its mesh and their material.
+/// Names of the triangles: of their node, its mesh and their material.
 ///
 /// # Errors
 /// As [`read_gltf`].

@@ -50,7 +50,7 @@ pub fn read_obj_with_uv(bytes: &[u8]) -> Result<(TriangleSoup, Vec<CornerUv>), M
     if soup.faces.is_empty() { Err(ModelError::NoTriangle) } else { Ok((soup, uv)) }
 }
 
-/// What the triangles that [`read_obj`] returns are called: by their object (`o`), their groups (`g`) and their material
+/// Names of the triangles that [`read_obj`] returns: their object (`o`), their groups (`g`) and their material
 /// (`usemtl`).
 ///
 /// # Errors
@@ -228,7 +228,7 @@ impl Polygons {
     }
 }
 
-/// What a polygon is called that comes now.
+/// Names of the polygons that follow.
 #[derive(Default)]
 struct Called {
     object: String,

@@ -17,7 +17,7 @@ pub fn read_three_ds(bytes: &[u8]) -> Result<TriangleSoup, ModelError> {
     Ok(read(bytes)?.0)
 }
 
-/// What the triangles are called: by their object and their material.
+/// Names of the triangles: of their object and their material.
 ///
 /// # Errors
 /// As [`read_three_ds`].

@@ -32,7 +32,7 @@ pub fn write_obj<'n>(mesh: &Mesh, is_lid: &[bool], names: impl Fn(usize) -> &'n 
     text
 }
 
-/// What the next faces are called; `spaced`: the material and the object of the last ones.
+/// Names of the next faces; `spaced`: the material and the object of the last ones.
 fn call<'n>(text: &mut String, group: &str, names: &'n [String], spaced: &mut [Option<&'n str>; 2]) {
     // A comment would begin there, and a line end.
     let can_be_written = |name: &&String| !name.contains(['#', '\\']) && !name.contains(char::is_control);
