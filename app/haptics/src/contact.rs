@@ -561,9 +561,13 @@ impl Slot {
         sweep: &Sweep<'_>,
         (stiffness_n_per_m, way_m): (f64, f64),
     ) -> Option<Touch> {
-        match self.balls.as_ref().filter(|balls| balls.is_touching()) {
-            Some(balls) => entity.shading.turn_shares(&entity.shape, balls.shares(), &mut touch),
-            None => self.following.turn(&entity.shading, &entity.shape, &mut touch, way_m),
+        if !matches!(entity.shading, Shading::None) {
+            let plain_B = touch.force_on_user_B;
+            match self.balls.as_ref().filter(|balls| balls.is_touching()) {
+                Some(balls) => entity.shading.turn_shares(&entity.shape, balls.shares(), &mut touch),
+                None => entity.shading.turn(&entity.shape, &mut touch),
+            }
+            self.following.follow(plain_B, &mut touch, stiffness_n_per_m * way_m);
         }
         if let Some(height_map) = &entity.height_map {
             let over = Over {

@@ -20,8 +20,7 @@
 //! Limits:
 //! - The god-object itself leaps over convex edges: at depth d over an edge of angle a by d sin(a), since there the HIP
 //!   has long been below the next face. Shading makes a leap of that way of what was a leap by the angle a: on a ball
-//!   of radius r, d / r of it. A point's force follows as the finger goes half of that way ([`following`](self)); a ball's
-//!   does not.
+//!   of radius r, d / r of it. The force follows as the finger goes ([`following`](self)).
 //! - A turned force is not the gradient of anything: a finger that is led around a closed way takes or gives energy.
 //!   Over a facet that is `s` lower than the round surface it stands for, `k d s` at the depth d; through a region of
 //!   activation of a right-angled edge, 0.31 `k d l` on the way there and 0.29 of what is stored less on the way up.

@@ -6,7 +6,7 @@
 use super::{Cut, FastStep};
 use crate::row::Row;
 use haptics::ContactState;
-use world::events::{EventSender, FastPairs, Kind, List, MOST_TOUCHED, PairForce, Touching, Watch};
+use world::events::{EventSender, FastPairs, Kind, List, PairForce, Touching, Watch};
 use world::lists::Handed;
 
 /// Pairs of entities that are watched at once.
@@ -40,12 +40,13 @@ impl EventTeller {
     pub fn new(step: &mut FastStep) -> Self {
         let slow = step.objects.watch_slow();
         let bodies = step.bodies().len();
+        let most_touched = step.fingers.iter().map(|finger| finger.finger.capacity()).max().unwrap_or(0);
         let pairs = bodies.saturating_mul(step.entities().len()).min(MOST_PAIRS);
         Self {
-            watch: Watch::new(step.fingers.len(), pairs, step.period_s),
+            watch: Watch::new(step.fingers.len(), most_touched, pairs, step.period_s),
             crowded_s: vec![0.0; step.fingers.len()],
             slow,
-            touching: Vec::with_capacity(MOST_TOUCHED),
+            touching: Vec::with_capacity(most_touched),
             elsewhere: (0..bodies).map(|body| step.objects.is_slow(body)).collect(),
             gone: Vec::with_capacity(MOST_GONE.min(bodies)),
             handed: Handed::default(),
@@ -83,7 +84,7 @@ impl EventTeller {
 
     fn find_touching(&mut self, step: &FastStep, finger: usize) {
         self.touching.clear();
-        for contact in step.fingers[finger].finger.contacts().take(MOST_TOUCHED) {
+        for contact in step.fingers[finger].finger.contacts() {
             let is_body = step.objects.manipulation().is_body(contact.entity);
             let moved_W = is_body.then(|| step.objects.touch_force_W(finger, contact.entity)).flatten();
             self.touching.push(Touching {

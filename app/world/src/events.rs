@@ -32,4 +32,4 @@ pub use bus::{EventReceiver, EventSender, Hub, Subscriber, event_queue};
 pub use event::{Change, Class, Event, Facts, Kind, Life, List, Why};
 pub use filter::Filter;
 pub use slow_pairs::{FastPairs, SlowPairs, pair_link};
-pub use watch::{MOST_TOLD, MOST_TOUCHED, PairForce, QUIET_S, Touching, Watch};
+pub use watch::{MOST_TOLD, PairForce, QUIET_S, Touching, Watch};

@@ -1,106 +1,77 @@
-//! A shaded force that is continuous in the HIP: after a leap of the god-object it follows with the finger's way.
+//! A shaded force that is continuous in the HIP: it changes no faster than the finger goes.
 //!
-//! Problem: over a convex edge the god-object leaps, since below it the HIP has long been under the next face; with it the
-//! shaded normal and the force leap, by the more the deeper the finger is.
+//! Problem: where the god-object comes to the next face, what its force is turned from leaps. Over a convex edge the
+//! god-object itself leaps, since below it the HIP has long been under the next face, and the shaded normal with it, by the
+//! more the deeper the finger is. Held or slowed by friction it goes over the edge step by step; its force then stays, and
+//! is turned as the next face's all of a sudden.
 //!
-//! Model: in the tick of a leap the force stays what it was, in direction and size; from there on it comes nearer to what
-//! shading makes of the god-object as the finger goes, and is there after half of the leap's length. What an edge that stays
-//! sharp does to the force is none of it: there the shaded normal turns as the faces do.
+//! Model: of a tick's change of the shaded force, one part is what the same force would have become by being turned at
+//! another place. Where that part is most of the change, the force goes towards what shading makes of the god-object by no
+//! more than `RATE` times the stiffness per way of the finger. What an edge that stays sharp does to the force is none of
+//! it: there the force is turned alike on both sides, if at all.
 //!
 //! Frames: object frame B.
-//! Invariant: without a leap the force is that of [`Shading::turn`], to the bit.
+//! Invariant: in ticks without such a change the force is that of [`Shading::turn`](super::Shading::turn), to the bit.
 
 use nalgebra::Vector3;
 
-use super::{Shading, Turn};
+use super::form::Turn;
 use crate::algorithm::Touch;
-use crate::shape::Shape;
-use crate::surface::SurfacePoint;
 
-/// Memory of a shaded contact.
+/// Memory of a shaded contact: the force of the last tick, as the facets have it and as it was felt (N).
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Following {
-    /// Place of the god-object in the last tick, and the size of the force there (N).
-    last: Option<(SurfacePoint, f64)>,
-    leap: Option<Leap>,
-}
-
-/// A leap that has not been made up for.
-#[derive(Debug, Clone, Copy)]
-struct Leap {
-    /// From the shaded normal to what is felt.
-    off_B: Vector3<f64>,
-    /// Factor of the size of the force.
-    size: f64,
-    /// Of the god-object's way (m).
-    left_m: f64,
+    last: Option<[Vector3<f64>; 2]>,
 }
 
 impl Following {
-    /// Turns the force of a contact with a point, in a tick in which the finger went so far (m).
-    pub(crate) fn turn(&mut self, shading: &Shading, shape: &Shape, touch: &mut Touch, way_m: f64) {
-        let (at, size_n) = (touch.god_object, touch.force_on_user_B.norm());
-        let last = self.last.replace((at, size_n));
-        let gone_m = last.map_or(0.0, |(last, _)| (at.point_B - last.point_B).norm());
-        if self.leap.is_none() && gone_m <= LEAP * way_m + SLACK_M {
-            return shading.turn(shape, touch);
+    /// Lets a force that was shaded go on from that of the last tick, in a tick in which the spring's end moved by so much
+    /// force (N).
+    pub(crate) fn follow(&mut self, plain_B: Vector3<f64>, touch: &mut Touch, spring_n: f64) {
+        let shaded_B = touch.force_on_user_B;
+        let felt_B = match self.last {
+            Some(last) => limited(last, [plain_B, shaded_B], RATE * spring_n),
+            None => shaded_B,
+        };
+        self.last = Some([plain_B, felt_B]);
+        if felt_B != shaded_B {
+            touch.normal_force_n *= felt_B.norm() / shaded_B.norm();
+            touch.force_on_user_B = felt_B;
         }
-        let normal_B = shading.normal_at(shape, &at);
-        if let Some((last, last_size_n)) = last.filter(|_| gone_m > LEAP * way_m + SLACK_M) {
-            self.begin(shading, shape, (&last, last_size_n), (&at, size_n), normal_B);
-        }
-        let Some(leap) = &mut self.leap else { return shading.turn(shape, touch) };
-        let left_m = leap.left_m - MADE_UP * way_m;
-        if left_m <= 0.0 {
-            self.leap = None;
-            return shading.turn(shape, touch);
-        }
-        let share = left_m / leap.left_m;
-        *leap = Leap { off_B: leap.off_B * share, size: 1.0 + (leap.size - 1.0) * share, left_m };
-        let Leap { off_B, size, .. } = *leap;
-        let turn = Turn { from_B: at.normal_B, to_B: normal_B + off_B };
-        touch.force_on_user_B = shading.form().turned(&touch.force_on_user_B, &turn) * size;
-        touch.normal_force_n *= size;
     }
 
     /// Nothing is known of the last tick.
     pub(crate) fn reset(&mut self) {
         *self = Self::default();
     }
-
-    /// The god-object leapt; what was felt is felt on.
-    fn begin(
-        &mut self,
-        shading: &Shading,
-        shape: &Shape,
-        (last, last_size_n): (&SurfacePoint, f64),
-        (at, size_n): (&SurfacePoint, f64),
-        normal_B: Vector3<f64>,
-    ) {
-        let last_normal_B = shading.normal_at(shape, last);
-        // As far as the faces, or farther: an edge that is not shaded, or a place that is quite another one.
-        if (normal_B - last_normal_B).norm() >= SMOOTHED * (at.normal_B - last.normal_B).norm() {
-            self.leap = None;
-            return;
-        }
-        let before = self.leap.unwrap_or(Leap { off_B: Vector3::zeros(), size: 1.0, left_m: 0.0 });
-        let size = before.size * last_size_n / size_n;
-        let is_small = (1.0 / MOST_SIZE..=MOST_SIZE).contains(&size);
-        self.leap = is_small.then(|| Leap {
-            off_B: last_normal_B + before.off_B - normal_B,
-            size,
-            left_m: before.left_m + (at.point_B - last.point_B).norm(),
-        });
-    }
 }
 
-/// As often as the finger's way the god-object's is no leap: deep below a hill it is some times as far.
-const LEAP: f64 = 4.0;
-/// Roundings of places on a surface of a metre (m).
-const SLACK_M: f64 = 1e-9;
-/// Part of the leap that is made up for in a way of the same length.
-const MADE_UP: f64 = 2.0;
-/// A shaded edge turns the felt normal by less than this part of what it turns the faces' by.
-const SMOOTHED: f64 = 0.5;
-/// A leap that changes the force by more is no shaded edge's.
+/// The shaded force; where it leaps because it is turned in another way, as near to it as `most_n` from the last allows.
+fn limited(
+    [last_plain_B, last_felt_B]: [Vector3<f64>; 2],
+    [plain_B, shaded_B]: [Vector3<f64>; 2],
+    most_n: f64,
+) -> Vector3<f64> {
+    let change_B = shaded_B - last_felt_B;
+    let change_n = change_B.norm();
+    let (size_n, last_n) = (shaded_B.norm(), last_felt_B.norm());
+    if change_n <= most_n + SLACK * size_n || size_n.max(last_n) > MOST_SIZE * size_n.min(last_n) {
+        return shaded_B;
+    }
+    let turn = Turn { from_B: plain_B / size_n, to_B: shaded_B };
+    let turned_n = (turn.rotated(&last_plain_B) - last_felt_B).norm();
+    if turned_n < MOSTLY * change_n {
+        return shaded_B;
+    }
+    last_felt_B + change_B * (most_n / change_n)
+}
+
+/// How fast the force goes towards the shaded one, in springs of the finger's way: twice what either the spring or the
+/// turn makes of it on a surface as round as the finger is deep.
+const RATE: f64 = 2.0;
+/// Roundings of a force are no leap.
+const SLACK: f64 = 1e-12;
+/// Part of a change from which on the turn has made it.
+const MOSTLY: f64 = 0.5;
+/// A leap that changes the size of the force by more is no shaded edge's.
 const MOST_SIZE: f64 = 1.25;

@@ -37,7 +37,7 @@ impl ShadingForm {
 impl Turn {
     /// Turned by the smallest rotation that takes one normal to the other, but by a right angle at most.
     #[inline(always)]
-    fn rotated(&self, v_B: &Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn rotated(&self, v_B: &Vector3<f64>) -> Vector3<f64> {
         let Self { from_B, mut to_B } = *self;
         let mut along = from_B.dot(&to_B);
         if along < 0.0 {

@@ -5,9 +5,9 @@
 //! which rendering says so. A pair's begins with its first force and ends after [`QUIET_S`] without any, so that a box that
 //! settles does not chatter; while both rest, asleep, it goes on. The same holds for grasps.
 //!
-//! Invariants: no allocation after `new`; in a tick at most [`MOST_TOLD`] events, more are counted as lost. What finds no
-//! room in a table is not watched.
-//! Cost: linear in what touches.
+//! Invariants: no allocation after `new`; in a tick at most [`MOST_TOLD`] events, more are counted as lost, and so is a
+//! finger's contact without room. A pair or a grasp that finds no room is not watched.
+//! Cost: linear in what touches, beside searches in what is sorted.
 
 mod fingers;
 mod grasps;
@@ -22,8 +22,6 @@ pub(super) use pairs::{PairLife, Pairs};
 
 /// The most events that a tick sends.
 pub const MOST_TOLD: usize = 256;
-/// A finger's contacts beyond these are not watched.
-pub const MOST_TOUCHED: usize = 16;
 /// A pair or a grasp that was not seen for so long has ended (s).
 pub const QUIET_S: f64 = 0.005;
 
@@ -71,11 +69,11 @@ pub(super) struct Now {
 }
 
 impl Watch {
-    /// Of so many fingers, which touch nothing yet, and so many pairs at once.
-    pub fn new(fingers: usize, pairs: usize, period_s: f64) -> Self {
+    /// Of so many fingers, which touch nothing yet and at most so many entities at once, and so many pairs.
+    pub fn new(fingers: usize, most_touched: usize, pairs: usize, period_s: f64) -> Self {
         Self {
             // Each made anew: a clone of a list without entries has no room.
-            fingers: (0..fingers).map(|_| FingerWatch::new()).collect(),
+            fingers: (0..fingers).map(|_| FingerWatch::new(most_touched)).collect(),
             pairs: Pairs::with_capacity(pairs),
             grasps: Grasps::new(),
             last_tick: None,
@@ -91,7 +89,7 @@ impl Watch {
         self.now = Now { run_tick, dt_s: ticks as f64 * period_s, period_s, left: MOST_TOLD };
     }
 
-    /// What a finger touches, which buttons of its device are pressed, and which entity is tied to it.
+    /// What a finger touches, in order of the entities, which buttons of its device are pressed, and which entity is tied to it.
     pub fn finger(
         &mut self,
         finger: usize,

@@ -27,7 +27,7 @@ fn words(events: &[Event]) -> Vec<String> {
 /// One finger, looked at as if it touched these in consecutive ticks.
 fn felt(ticks: &[&[Touching]]) -> Vec<Event> {
     let (mut out, mut events) = event_queue(1024);
-    let mut watch = Watch::new(1, 0, PERIOD_S);
+    let mut watch = Watch::new(1, 4, 0, PERIOD_S);
     for (run_tick, touching) in (0..).zip(ticks) {
         watch.begin(run_tick);
         watch.finger(0, touching, 0, None, &mut out);
@@ -67,10 +67,31 @@ fn a_contact_s_impulse_is_the_sum_of_its_forces_times_the_tick() {
     assert_eq!((life.peak_n, life.force_n, life.lasted_s), (3.0, 0.125, 4.0 * PERIOD_S));
 }
 
+#[test]
+fn all_of_a_crowd_is_told_and_what_finds_no_room_is_counted() {
+    let crowd: Vec<Touching> = (0..100).map(|entity| touching(3 * entity, 1.0, false)).collect();
+    for (most_touched, lost) in [(100, 0), (90, 10)] {
+        let (mut out, mut events) = event_queue(1024);
+        let mut watch = Watch::new(1, most_touched, 0, PERIOD_S);
+        for (run_tick, touching) in [(0, &crowd[..]), (1, &crowd[..1]), (2, &[])] {
+            watch.begin(run_tick);
+            watch.finger(0, touching, 0, None, &mut out);
+        }
+        let told = all(&mut events);
+        let in_tick = |tick, word| {
+            told.iter().filter(|event| event.run_tick == tick && event.kind.facts().word == word).count()
+        };
+        let begun = most_touched;
+        assert_eq!(in_tick(0, "contact-begin"), begun);
+        assert_eq!((in_tick(1, "contact-end"), in_tick(2, "contact-end")), (begun - 1, 1));
+        assert_eq!(events.lost(), lost);
+    }
+}
+
 /// What is told of a pair that presses with these forces (N) in consecutive ticks; asleep where there is none at all.
 fn pressed(forces_n: &[Option<f64>]) -> Vec<Event> {
     let (mut out, mut events) = event_queue(1024);
-    let mut watch = Watch::new(0, 4, PERIOD_S);
+    let mut watch = Watch::new(0, 0, 4, PERIOD_S);
     for (run_tick, force_n) in (0..).zip(forces_n) {
         let pair = force_n.map(|force_n| PairForce { entities: [2, 0], force_W: Vector3::y() * force_n });
         watch.begin(run_tick);
@@ -99,7 +120,7 @@ fn a_pair_that_sleeps_still_touches() {
 #[test]
 fn two_fingers_grasp_one_does_not_and_a_tie_does() {
     let (mut out, mut events) = event_queue(1024);
-    let mut watch = Watch::new(2, 0, PERIOD_S);
+    let mut watch = Watch::new(2, 4, 0, PERIOD_S);
     let (none, some) = ([].as_slice(), [touching(3, 1.0, false)]);
     for run_tick in 0..40 {
         watch.begin(run_tick);
@@ -130,7 +151,7 @@ fn a_full_queue_counts_and_tells_what_it_lost() {
 #[test]
 fn a_tick_sends_no_more_than_it_may_and_the_rest_is_counted() {
     let (mut out, mut events) = event_queue(4 * MOST_TOLD);
-    let mut watch = Watch::new(0, 0, PERIOD_S);
+    let mut watch = Watch::new(0, 0, 0, PERIOD_S);
     watch.begin(7);
     for number in 0..MOST_TOLD as u32 + 3 {
         watch.tell(Kind::Trial { change: Change::Begins, number }, &mut out);

@@ -1,11 +1,12 @@
 //! A finger's contacts, ties and buttons.
 
-use super::{Life, MOST_TOUCHED, Teller, Touching};
+use super::{Life, Teller, Touching};
 use crate::events::{Change, Kind};
 
 /// What a finger did in the tick before.
 #[derive(Debug)]
 pub(super) struct FingerWatch {
+    /// In order of their entities.
     touched: Vec<Touched>,
     pub(super) tied: Option<u32>,
     buttons: u64,
@@ -21,8 +22,9 @@ pub(super) struct Touched {
 }
 
 impl FingerWatch {
-    pub(super) fn new() -> Self {
-        Self { touched: Vec::with_capacity(MOST_TOUCHED), tied: None, buttons: 0 }
+    /// Of a finger that touches at most so many entities at once.
+    pub(super) fn new(most_touched: usize) -> Self {
+        Self { touched: Vec::with_capacity(most_touched), tied: None, buttons: 0 }
     }
 
     /// Its contacts.
@@ -43,25 +45,26 @@ impl FingerWatch {
     /// First what has ended, then what goes on or begins.
     pub(super) fn look(&mut self, finger: u32, touching: &[Touching], teller: &mut Teller<'_>) {
         self.touched.retain(|was| {
-            let stays = touching.iter().any(|is| is.entity == was.entity);
+            let stays = touching.binary_search_by_key(&was.entity, |is| is.entity).is_ok();
             if !stays {
                 was.tell(finger, Change::Ends, teller);
             }
             stays
         });
         for is in touching {
-            let place = self.touched.iter().position(|was| was.entity == is.entity);
-            let at = place.unwrap_or(self.touched.len());
-            if place.is_none() {
-                if at >= MOST_TOUCHED {
+            let place = self.touched.binary_search_by_key(&is.entity, |was| was.entity);
+            let at = place.unwrap_or_else(|at| at);
+            if place.is_err() {
+                if self.touched.len() == self.touched.capacity() {
+                    teller.out.lose();
                     continue;
                 }
                 let (entity, is_body) = (is.entity, is.is_body);
-                self.touched.push(Touched { entity, is_body, slips: false, life: Life::default() });
+                self.touched.insert(at, Touched { entity, is_body, slips: false, life: Life::default() });
             }
             let touched = &mut self.touched[at];
             touched.life.go_on(&is.force_on_user_W, teller.now.dt_s, teller.now.dt_s);
-            if place.is_none() {
+            if place.is_err() {
                 touched.tell(finger, Change::Begins, teller);
             }
             if std::mem::replace(&mut touched.slips, is.slips) != is.slips {
