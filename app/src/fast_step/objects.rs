@@ -49,7 +49,7 @@ pub struct Objects {
     /// The first so many of them are felt; the others make up for the tick before.
     felt_pulls: usize,
     /// What bodies are to get in the next tick, because their finger was made to feel something else than they got.
-    owed: Vec<Pull>,
+    owed: Vec<Debt>,
     pub(super) ticks: Vec<FingerTick>,
     /// The button with which each finger ties.
     buttons: Vec<Option<u32>>,
@@ -73,6 +73,14 @@ pub struct Objects {
     pub made: Made,
     /// By how much it moved them (s).
     pub(super) stepped_s: f64,
+}
+
+/// What a body gets in the next tick, because its finger was made to feel something else than it got.
+#[derive(Debug, Clone, Copy)]
+struct Debt {
+    pull: Pull,
+    /// How much of it undoes no more than how the body was moved in the tick in which it got the other force (N).
+    free_n: f64,
 }
 
 /// What the slow list has, as the fast side sees it.
@@ -294,6 +302,7 @@ impl Objects {
                 }
             }
         }
+        self.pay();
         let rendered = self.touches.iter().map(|touch| -touch.force_on_user_W);
         add_to_rows(rendered, &self.touches, fingers, rows);
         for ((tick, button), (row, finger)) in
@@ -335,7 +344,8 @@ impl Objects {
     }
 
     /// After all, the force on the user of a finger was changed by so much (N). The bodies that it touches have got the other
-    /// one: each gets its share of the difference in the next tick, so that over two ticks action is reaction.
+    /// one: each gets its share of the difference in the next tick, as far as it is then [still there to be
+    /// paid](Self::pay), so that over two ticks action is reaction.
     pub fn owe(&mut self, finger: usize, changed_W: Vector3<f64>, of: &DeviceFinger, felt: &FingerEffects) {
         if changed_W == Vector3::zeros() {
             return;
@@ -362,10 +372,57 @@ impl Objects {
         for (entity, point_W, force_W) in moved.chain(pulled) {
             let share = force_W.norm() / all_n;
             if share > 0.0 && self.owed.len() < self.owed.capacity() {
-                let force_on_user_W = changed_W * share;
-                self.owed.push(Pull { entity, finger, point_W, force_on_user_W, stiffness_n_per_m: 0.0 });
+                self.owed.push(self.debt(finger, entity, point_W, changed_W * share));
             }
         }
+    }
+
+    fn debt(
+        &self,
+        finger: usize,
+        entity: usize,
+        point_W: Vector3<f64>,
+        force_on_user_W: Vector3<f64>,
+    ) -> Debt {
+        let gained_m_s = {
+            let [before_W, after_W] = self.velocities_W(entity, &point_W);
+            (after_W - before_W).norm()
+        };
+        let repaid_m_s = self.manipulation.body_of(entity).map_or(0.0, |number| {
+            let body = &self.manipulation.bodies()[number];
+            body.velocity_change_W(&point_W, &(force_on_user_W * self.stepped_s)).norm()
+        });
+        let share = if repaid_m_s > gained_m_s { gained_m_s / repaid_m_s } else { 1.0 };
+        Debt {
+            free_n: share * force_on_user_W.norm(),
+            pull: Pull { entity, finger, point_W, force_on_user_W, stiffness_n_per_m: 0.0 },
+        }
+    }
+
+    /// Pays what bodies are owed: as less of what the finger presses or pulls with now, and no more than the body gained by it
+    /// where the finger has left. What bore a body against the finger bears it no more then, and a body on a floor would
+    /// be flung.
+    fn pay(&mut self) {
+        let room = MAX_PULLS - self.felt_pulls;
+        for at in 0..self.owed.len().min(room) {
+            let Debt { mut pull, .. } = self.owed[at];
+            let is_its = |(finger, entity)| (finger, entity) == (pull.finger, pull.entity);
+            let of_touches = self.touches.iter().map(|own| ((own.finger, own.entity), own.force_on_user_W));
+            let of_pulls = self.pulls[..self.felt_pulls]
+                .iter()
+                .map(|own| ((own.finger, own.entity), own.force_on_user_W));
+            let now_n: f64 =
+                of_touches.chain(of_pulls).filter(|own| is_its(own.0)).map(|own| own.1.norm()).sum();
+            let debts = self.owed.iter().filter(|debt| is_its((debt.pull.finger, debt.pull.entity)));
+            let (owed_n, free_n) = debts.fold((0.0, 0.0), |(owed_n, free_n), debt| {
+                (owed_n + debt.pull.force_on_user_W.norm(), free_n + debt.free_n)
+            });
+            if owed_n > now_n + free_n {
+                pull.force_on_user_W *= (now_n + free_n) / owed_n;
+            }
+            self.pulls.push(pull);
+        }
+        self.owed.clear();
     }
 
     /// The force on the user of a contact as it moved its body, or as it was rendered, and how much of it the body's own
@@ -423,8 +480,7 @@ impl Objects {
         for touch in self.touches.iter().filter(own) {
             let share = touch.force_on_user_W.norm() / all_n;
             if share > 0.0 && self.owed.len() < self.owed.capacity() {
-                let (point_W, force_on_user_W) = (touch.point_W, changed_W * share);
-                self.owed.push(Pull { entity, finger, point_W, force_on_user_W, stiffness_n_per_m: 0.0 });
+                self.owed.push(self.debt(finger, entity, touch.point_W, changed_W * share));
             }
         }
     }
@@ -456,8 +512,6 @@ impl Objects {
             }
         }
         self.felt_pulls = self.pulls.len();
-        let room = MAX_PULLS - self.felt_pulls;
-        self.pulls.extend(self.owed.drain(..).take(room));
     }
 }
 

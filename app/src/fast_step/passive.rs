@@ -133,3 +133,52 @@ fn what_a_finger_is_kept_from_feeling_no_ball_gets_either() {
     // Roundings of 0.01 N s in 400 sums.
     assert!((got_n_s + felt_n_s).norm() < 1e-14, "{got_n_s} {felt_n_s}");
 }
+
+/// A grain lies on a floor; a finger that presses it against that is kept from giving energy back, and leaves.
+#[test]
+fn what_a_floor_bore_flings_no_grain_when_the_finger_has_left() {
+    const GRAIN_KG: f64 = 1e-3;
+    const RADIUS_M: f64 = 0.02;
+    let pose = Isometry3::translation(0.0, RADIUS_M, 0.0);
+    let ball = Entity::new(haptics::Sphere::new(RADIUS_M).unwrap(), pose, K).unwrap();
+    let floor = Entity::new(Plane::new(Vector3::y(), 0.0).unwrap(), Isometry3::identity(), K).unwrap();
+    let mass = physics::MassProperties::of_shape(&ball.shape, GRAIN_KG).unwrap();
+    let body = Body::at_rest(mass, &pose).with_rotation_locked();
+    let finger = DeviceFinger {
+        finger: Finger::new(0.0, 2).unwrap().with_ramp_in(0.0).unwrap(),
+        device: 0,
+        mount: Mount::new(Isometry3::identity()),
+    };
+    let spec = PassivitySpec::for_motion(1e-3, 0.0, 0.0).with_bound(1e-6);
+    let spec = PassivitySpec { device_friction_n: 0.0, ..spec };
+    let settings = physics::Settings::default();
+    let mut step = FastStep::new(vec![finger], vec![ball, floor], PERIOD_NS)
+        .with_objects(&[(0, body)], settings, ListSettings::default(), &[HandFinger::default()], false)
+        .unwrap()
+        .with_passivities([Passivity::new(spec, 1e-3).ok()]);
+    let (mut cut_n, mut fastest_m_s) = (0.0_f64, 0.0_f64);
+    // It presses slowly, is held to have felt nothing on the way in and all on the way out, and leaves.
+    let depth_m = |tick: u64| match tick {
+        0..=100 => 2e-5 * tick as f64,
+        101..=110 => 2e-3 - 1e-4 * (tick - 100) as f64,
+        _ => -0.1,
+    };
+    for tick in 1..200_u64 {
+        let mut frame = Frame::zeroed();
+        (frame.tick, frame.device_count, frame.run_tick) = (tick, 1, tick as i64);
+        (frame.previous.authority, frame.previous.command_tick) = (1.0, tick - 1);
+        frame.devices[0].flags = DEVICE_POSITION_VALID;
+        frame.devices[0].position_m_measured[1] = 2.0 * RADIUS_M - depth_m(tick);
+        frame.devices[0].force_on_user_n_applied[1] = if tick > 100 { 0.5 } else { 0.0 };
+        let (mut command, mut row) = (Command::zero(tick, 1, 1), Row::empty());
+        step.step(&frame, &mut command, &mut row);
+        if tick == 110 {
+            cut_n = row.fingers[0].controlled_n;
+        }
+        fastest_m_s = fastest_m_s.max(step.bodies()[0].velocity.norm());
+    }
+    assert!(cut_n > 0.3, "{cut_n} N were cut in the last tick that touches");
+    // Springs of 1 N/mm between finger, grain and floor that are pressed by a millimetre give a gram back at most their
+    // energy: 2 * 0.5 * 1000 * (1e-3)^2 J are 1.4 m/s. What was cut would have given it another 0.3 to 1 m/s.
+    assert!(fastest_m_s < 0.25, "{fastest_m_s} m/s");
+}

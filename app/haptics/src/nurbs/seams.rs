@@ -7,6 +7,8 @@
 //! [`SMOOTH_RAD`] along an edge, it is a seam that nobody feels, else a crease.
 //! Edges of a patch: 0 is u = 0, 1 is u = 1, 2 is v = 0, 3 is v = 1; the other parameter runs along it.
 
+use std::collections::HashMap;
+
 use nalgebra::Vector3;
 
 use super::Nurbs;
@@ -246,18 +248,26 @@ fn box_of(nurbs: &Nurbs, edge: (u32, u8)) -> Box3 {
 
 fn find_poles(nurbs: &mut Nurbs) {
     let slack = EQUAL * 1e-3 * nurbs.extent_m;
+    let reach = EQUAL * nurbs.extent_m;
+    // Of cells as wide as poles may be apart, so that not each is compared with each.
+    let mut by_cell: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
+    let cell = |point_B: &Vector3<f64>| <[i64; 3]>::from(point_B.map(|x| (x / reach).floor() as i64));
     for patch in 0..nurbs.patches.len() as u32 {
         for edge in 0..4u8 {
             let [low, high] = box_of(nurbs, (patch, edge));
             if (high - low).amax() > slack {
                 continue;
             }
-            let known =
-                nurbs.poles.iter().position(|pole| (pole.point_B - low).amax() <= EQUAL * nurbs.extent_m);
+            let at = cell(&low);
+            let beside = |i: i64| [i / 9, i / 3 % 3, i % 3].map(|of_three| of_three - 1);
+            let cells = (0..27).map(|i| std::array::from_fn(|k| at[k].saturating_add(beside(i)[k])));
+            let near = cells.filter_map(|cell| by_cell.get(&cell)).flatten().copied();
+            let known = near.filter(|&pole| (nurbs.poles[pole].point_B - low).amax() <= reach).min();
             let pole = known.unwrap_or(nurbs.poles.len());
             if known.is_none() {
                 let (edges, normal_B) = (Vec::new(), Vector3::y());
                 nurbs.poles.push(Pole { edges, point_B: low, is_sharp: false, normal_B });
+                by_cell.entry(at).or_default().push(pole);
             }
             nurbs.poles[pole].edges.push((patch, edge));
             nurbs.patches[patch as usize].edges[usize::from(edge)].pole = Some(pole as u32);

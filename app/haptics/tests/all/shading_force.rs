@@ -3,6 +3,7 @@
 
 use crate::common;
 
+use common::laws;
 use common::meshes::*;
 use common::*;
 use haptics::mesh::{Mesh, make};
@@ -513,4 +514,34 @@ fn after_a_leap_the_force_is_the_shaded_one_again() {
 
 fn nearest_face(mesh: &Mesh, place: &Vector3<f64>) -> u32 {
     mesh.nearest(place).face
+}
+
+/// A god-object that friction holds or slows goes over an edge step by step: its force stays, and is turned as another
+/// face's.
+#[test]
+fn with_friction_a_shaded_force_changes_with_the_hand_or_with_what_it_is_made_of() {
+    let laws = laws::drift_free().into_iter().chain(laws::drifting());
+    let all: Vec<_> = laws.chain([("viscous", Friction::viscous(20.0).unwrap())]).collect();
+    let mesh = built(icosphere(2, R));
+    let shadings = [interpolated(&mesh), Shading::regions(&mesh, 5e-3, PI, ShadingForm::Rotate).unwrap()];
+    let rho = below_facets(&mesh, 5e-3);
+    for (law, friction) in all {
+        for shading in &shadings {
+            let facets = touchable(&mesh, friction.clone());
+            let turned = facets.clone().with_shading(shading.clone());
+            let pairs = side_by_side([&facets, &turned], around_ball(rho));
+            let (mut largest_n, mut beside_n) = (0.0_f64, 0.0_f64);
+            for two in pairs.windows(2) {
+                let [plain_n, shaded_n] =
+                    [0, 1].map(|i| (two[1][i].force_on_user_W - two[0][i].force_on_user_W).norm());
+                largest_n = largest_n.max(shaded_n);
+                // What friction itself lets go comes through, turned.
+                beside_n = beside_n.max(shaded_n - 2.0 * plain_n);
+            }
+            println!("{law}: {largest_n} N in a tick, {beside_n} N beside what the facets do");
+            // The way of a tick is 2 um, cos(0.3) of it around the ball; the spring's end goes no farther.
+            assert!(beside_n <= 2.0 * K * 2e-6, "{law}: {beside_n} N");
+            assert!(pairs.len() > 59_000, "{}", pairs.len());
+        }
+    }
 }
