@@ -567,7 +567,9 @@ impl Slot {
                 Some(balls) => entity.shading.turn_shares(&entity.shape, balls.shares(), &mut touch),
                 None => entity.shading.turn(&entity.shape, &mut touch),
             }
-            self.following.follow(plain_B, &mut touch, stiffness_n_per_m * way_m);
+            if entity.shading.is_continuous() {
+                self.following.follow(plain_B, &mut touch, way_m, stiffness_n_per_m);
+            }
         }
         if let Some(height_map) = &entity.height_map {
             let over = Over {

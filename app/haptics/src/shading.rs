@@ -45,7 +45,6 @@ pub use form::ShadingForm;
 pub use rectangular::BoxRegions;
 pub use regions::Regions;
 
-use form::Turn;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
@@ -167,6 +166,11 @@ impl Shading {
             }
             _ => *v_B,
         }
+    }
+
+    /// As printed it leaps.
+    pub(crate) fn is_continuous(&self) -> bool {
+        self.form() == ShadingForm::Rotate
     }
 
     fn form(&self) -> ShadingForm {

@@ -84,13 +84,6 @@ impl Body {
         self.inverse_inertia_W() * self.angular_momentum_W
     }
 
-    /// By how much an impulse (N s) at a point changes the point's velocity \[m/s\].
-    pub fn velocity_change_W(&self, point_W: &Vector3<f64>, impulse_W: &Vector3<f64>) -> Vector3<f64> {
-        let arm_W = point_W - self.centre_W;
-        let turned_W = self.inverse_inertia_W() * arm_W.cross(impulse_W);
-        impulse_W / self.mass.mass_kg + turned_W.cross(&arm_W)
-    }
-
     /// Kinetic energy \[J\].
     pub fn kinetic_energy_j(&self) -> f64 {
         0.5 * self.mass.mass_kg * self.velocity_W.norm_squared()

@@ -49,7 +49,7 @@ pub struct Objects {
     /// The first so many of them are felt; the others make up for the tick before.
     felt_pulls: usize,
     /// What bodies are to get in the next tick, because their finger was made to feel something else than they got.
-    owed: Vec<Debt>,
+    owed: Vec<Pull>,
     pub(super) ticks: Vec<FingerTick>,
     /// The button with which each finger ties.
     buttons: Vec<Option<u32>>,
@@ -73,14 +73,6 @@ pub struct Objects {
     pub made: Made,
     /// By how much it moved them (s).
     pub(super) stepped_s: f64,
-}
-
-/// What a body gets in the next tick, because its finger was made to feel something else than it got.
-#[derive(Debug, Clone, Copy)]
-struct Debt {
-    pull: Pull,
-    /// How much of it undoes no more than how the body was moved in the tick in which it got the other force (N).
-    free_n: f64,
 }
 
 /// What the slow list has, as the fast side sees it.
@@ -372,53 +364,29 @@ impl Objects {
         for (entity, point_W, force_W) in moved.chain(pulled) {
             let share = force_W.norm() / all_n;
             if share > 0.0 && self.owed.len() < self.owed.capacity() {
-                self.owed.push(self.debt(finger, entity, point_W, changed_W * share));
+                let force_on_user_W = changed_W * share;
+                self.owed.push(Pull { entity, finger, point_W, force_on_user_W, stiffness_n_per_m: 0.0 });
             }
         }
     }
 
-    fn debt(
-        &self,
-        finger: usize,
-        entity: usize,
-        point_W: Vector3<f64>,
-        force_on_user_W: Vector3<f64>,
-    ) -> Debt {
-        let gained_m_s = {
-            let [before_W, after_W] = self.velocities_W(entity, &point_W);
-            (after_W - before_W).norm()
-        };
-        let repaid_m_s = self.manipulation.body_of(entity).map_or(0.0, |number| {
-            let body = &self.manipulation.bodies()[number];
-            body.velocity_change_W(&point_W, &(force_on_user_W * self.stepped_s)).norm()
-        });
-        let share = if repaid_m_s > gained_m_s { gained_m_s / repaid_m_s } else { 1.0 };
-        Debt {
-            free_n: share * force_on_user_W.norm(),
-            pull: Pull { entity, finger, point_W, force_on_user_W, stiffness_n_per_m: 0.0 },
-        }
-    }
-
-    /// Pays what bodies are owed: as less of what the finger presses or pulls with now, and no more than the body gained by it
-    /// where the finger has left. What bore a body against the finger bears it no more then, and a body on a floor would
-    /// be flung.
+    /// Pays what bodies are owed, as less of what their finger presses or pulls with now. What is more than that is not paid:
+    /// what bore a body against the finger bears it no more once that has left, and a grain on a floor would be flung.
     fn pay(&mut self) {
         let room = MAX_PULLS - self.felt_pulls;
         for at in 0..self.owed.len().min(room) {
-            let Debt { mut pull, .. } = self.owed[at];
-            let is_its = |(finger, entity)| (finger, entity) == (pull.finger, pull.entity);
-            let of_touches = self.touches.iter().map(|own| ((own.finger, own.entity), own.force_on_user_W));
-            let of_pulls = self.pulls[..self.felt_pulls]
-                .iter()
-                .map(|own| ((own.finger, own.entity), own.force_on_user_W));
-            let now_n: f64 =
-                of_touches.chain(of_pulls).filter(|own| is_its(own.0)).map(|own| own.1.norm()).sum();
-            let debts = self.owed.iter().filter(|debt| is_its((debt.pull.finger, debt.pull.entity)));
-            let (owed_n, free_n) = debts.fold((0.0, 0.0), |(owed_n, free_n), debt| {
-                (owed_n + debt.pull.force_on_user_W.norm(), free_n + debt.free_n)
-            });
-            if owed_n > now_n + free_n {
-                pull.force_on_user_W *= (now_n + free_n) / owed_n;
+            let mut pull = self.owed[at];
+            let is_its = |finger, entity| (finger, entity) == (pull.finger, pull.entity);
+            let touches = self.touches.iter().filter(|own| is_its(own.finger, own.entity));
+            let pulls = self.pulls[..self.felt_pulls].iter().filter(|own| is_its(own.finger, own.entity));
+            let now_n: f64 = touches
+                .map(|own| own.force_on_user_W.norm())
+                .chain(pulls.map(|own| own.force_on_user_W.norm()))
+                .sum();
+            let owed = self.owed.iter().filter(|own| is_its(own.finger, own.entity));
+            let owed_n: f64 = owed.map(|own| own.force_on_user_W.norm()).sum();
+            if owed_n > now_n {
+                pull.force_on_user_W *= now_n / owed_n;
             }
             self.pulls.push(pull);
         }
@@ -480,7 +448,8 @@ impl Objects {
         for touch in self.touches.iter().filter(own) {
             let share = touch.force_on_user_W.norm() / all_n;
             if share > 0.0 && self.owed.len() < self.owed.capacity() {
-                self.owed.push(self.debt(finger, entity, touch.point_W, changed_W * share));
+                let (point_W, force_on_user_W) = (touch.point_W, changed_W * share);
+                self.owed.push(Pull { entity, finger, point_W, force_on_user_W, stiffness_n_per_m: 0.0 });
             }
         }
     }

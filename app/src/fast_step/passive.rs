@@ -110,7 +110,7 @@ fn with_a_ball() -> FastStep {
 fn what_a_finger_is_kept_from_feeling_no_ball_gets_either() {
     let mut step = with_a_ball();
     let (mut applied, mut felt_n_s, mut most_felt) = (Vector3::zeros(), Vector3::zeros(), 0.0_f64);
-    let mut cut = 0;
+    let (mut cut, mut last_cut_n) = (0, 0.0);
     for tick in 1..400_u64 {
         // It goes before the ball, slower than that: the ball pushes the hand along. Then it is gone.
         let height = if tick < 300 { 0.025 + 1e-4 * tick as f64 } else { 0.5 };
@@ -127,11 +127,15 @@ fn what_a_finger_is_kept_from_feeling_no_ball_gets_either() {
         felt_n_s += applied * 1e-3;
         most_felt = most_felt.max(applied.norm());
         cut += u64::from(row.fingers[0].controlled_n > 0.01);
+        if row.fingers[0].entity.is_some() {
+            last_cut_n = row.fingers[0].controlled_n;
+        }
     }
     let got_n_s = (step.bodies()[0].velocity - FLIES) * MASS_KG;
     assert!(cut > 5 && most_felt > 1e-3, "{cut} ticks cut, {most_felt} N");
-    // Roundings of 0.01 N s in 400 sums.
-    assert!((got_n_s + felt_n_s).norm() < 1e-14, "{got_n_s} {felt_n_s}");
+    // The last tick's is not paid back any more. Roundings of 0.01 N s in 400 sums.
+    let kept_n_s = Vector3::y() * last_cut_n * 1e-3;
+    assert!((got_n_s + felt_n_s + kept_n_s).norm() < 1e-14, "{got_n_s} {felt_n_s} {kept_n_s}");
 }
 
 /// A grain lies on a floor; a finger that presses it against that is kept from giving energy back, and leaves.
@@ -175,10 +179,11 @@ fn what_a_floor_bore_flings_no_grain_when_the_finger_has_left() {
         if tick == 110 {
             cut_n = row.fingers[0].controlled_n;
         }
-        fastest_m_s = fastest_m_s.max(step.bodies()[0].velocity.norm());
+        if tick > 110 {
+            fastest_m_s = fastest_m_s.max(step.bodies()[0].velocity.norm());
+        }
     }
     assert!(cut_n > 0.3, "{cut_n} N were cut in the last tick that touches");
-    // Springs of 1 N/mm between finger, grain and floor that are pressed by a millimetre give a gram back at most their
-    // energy: 2 * 0.5 * 1000 * (1e-3)^2 J are 1.4 m/s. What was cut would have given it another 0.3 to 1 m/s.
-    assert!(fastest_m_s < 0.25, "{fastest_m_s} m/s");
+    // It falls back on the floor from less than a millimetre, 0.14 m/s. A newton more for a tick gives a gram 1 m/s.
+    assert!(fastest_m_s < 0.15, "{fastest_m_s} m/s");
 }
