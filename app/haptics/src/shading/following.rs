@@ -13,7 +13,8 @@
 //! the force is turned alike on both sides, if at all.
 //!
 //! Frames: object frame B.
-//! Invariant: without such a change the force is that of [`Shading::turn`](super::Shading::turn), to the bit.
+//! Invariant: without such a change the force is that of [`Shading::turn`](super::Shading::turn), to the bit; the size of the felt
+//! one rises no faster than that of the facets'.
 
 use nalgebra::Vector3;
 
@@ -43,8 +44,10 @@ struct Forces {
 /// A leap that has not been made up for.
 #[derive(Debug, Clone, Copy)]
 struct Leap {
-    /// From the shaded force to what is felt (N).
+    /// From the shaded force to one in the direction of what is felt (N).
     off_B: Vector3<f64>,
+    /// Of what is felt, in sizes of the shaded force: one or more, so that making up for it is no rise.
+    size: f64,
     /// What the spring has to be moved by until it is made up for (N).
     left_n: f64,
 }
@@ -74,13 +77,19 @@ impl Following {
         if turns || moves {
             let (back_B, turned_n) = (last.shaded_B - now.shaded_B, now.turned_since(&last, size_n));
             if turned_n >= MOSTLY * back_B.norm() {
-                let Leap { off_B, left_n } = self.leap.unwrap_or(Leap::NONE);
-                self.leap = Some(Leap { off_B: off_B + back_B, left_n: left_n + turned_n });
+                let Leap { off_B, size, left_n } = self.leap.unwrap_or(Leap::NONE);
+                self.leap = Some(Leap {
+                    off_B: off_B + back_B,
+                    size: (size * last_n / size_n).clamp(1.0, MOST_SIZE),
+                    left_n: (left_n + turned_n).min(LONGEST * size_n),
+                });
             }
         }
-        if let Some(Leap { off_B, .. }) = self.leap {
-            touch.force_on_user_B += off_B;
-            touch.normal_force_n *= touch.force_on_user_B.norm() / size_n;
+        if let Some(Leap { off_B, size, .. }) = self.leap
+            && let Some(direction_B) = (now.shaded_B + off_B).try_normalize(0.0)
+        {
+            touch.force_on_user_B = direction_B * (size * size_n);
+            touch.normal_force_n *= size;
         }
     }
 
@@ -99,12 +108,13 @@ impl Forces {
 }
 
 impl Leap {
-    const NONE: Self = Self { off_B: Vector3::new(0.0, 0.0, 0.0), left_n: 0.0 };
+    const NONE: Self = Self { off_B: Vector3::new(0.0, 0.0, 0.0), size: 1.0, left_n: 0.0 };
 
     fn after(self, made_up_n: f64) -> Option<Self> {
         let left_n = self.left_n - made_up_n;
         let share = left_n / self.left_n;
-        (left_n > 0.0).then(|| Self { off_B: self.off_B * share, left_n })
+        let size = 1.0 + (self.size - 1.0) * share;
+        (left_n > 0.0).then(|| Self { off_B: self.off_B * share, size, left_n })
     }
 }
 
@@ -118,6 +128,9 @@ const SLACK: f64 = 1e-12;
 const SLACK_M: f64 = 1e-9;
 /// Part of a leap that is made up for in a way of the same length.
 const MADE_UP: f64 = 2.0;
+/// In forces: what turns all the way round is made up for in this way. Made up for more slowly, a size would rise with the
+/// spring.
+const LONGEST: f64 = 2.0;
 /// Part of a change from which on the turn has made it.
 const MOSTLY: f64 = 0.5;
 /// A leap that changes the size of the force by more is no shaded edge's.
