@@ -582,6 +582,7 @@ impl Slot {
             if self.hovers {
                 // Whoever comes down from here comes from outside.
                 self.onset.end();
+                self.following.reset();
                 return None;
             }
         }
