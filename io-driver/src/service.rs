@@ -36,6 +36,8 @@ const PATIENCE: Duration = Duration::from_secs(2);
 /// Who said that an arm is in its zeroing pose held it there, and who asked to leave a fault looked at the arms; what is
 /// heard later than this may be true no more.
 const IN_TIME_NS: u64 = 1_000_000_000;
+const UNHEARD: &str =
+    "the loop hung when an emergency stop came; the motors were switched off behind its back";
 const HUNG: &str = "the loop hangs; the motors were switched off behind its back";
 /// How often the socket's thread looks at signals when nothing else happens.
 const POLL: Duration = Duration::from_millis(20);
@@ -75,6 +77,10 @@ impl Service<'_> {
                 return Ok(reason);
             }
             polled.map_err(|error| format!("cannot wait at the socket: {error}"))?;
+            if self.sender.urgent.is_unheard() {
+                rt_core::last_act::perform();
+                return Err(UNHEARD.into());
+            }
             self.sender.clear_waste();
             self.count_what_the_log_dropped();
             self.supervisor.turn(TICK.load(Ordering::Relaxed), || status_line(&self.memory));
@@ -175,8 +181,9 @@ impl Recipient for Desk<'_> {
                     NotCleared::NotAllowed => Verdict::NotAllowed,
                 })?;
             }
-            ServerEvent::EmergencyStopRequested { pid, uid, asked_ns } => {
-                self.sender.urgent.stop(Some(uid), asked_ns);
+            ServerEvent::EmergencyStopRequested { pid, uid, .. } => {
+                // As of now: who asked before to leave a fault did not know of it, whatever the clock of who stops says.
+                self.sender.urgent.stop(Some(uid), monotonic_ns());
                 say(self.options, format_args!("emergency stop, asked for by process {pid} of user {uid}"));
             }
             ServerEvent::ZeroRequested { pid, devices, .. } => {

@@ -1,7 +1,7 @@
 //! The threads that stop the motors whatever the others are stuck in.
 //!
 //! Model: the first does two things only. It waits for emergency stops by datagram ([`StopSocket`]) and hands them to
-//! the loop's word ([`Urgent`]); and it is the thread to which the kernel hands SIGTERM, SIGINT and SIGHUP, whose flag
+//! the loop's word ([`Urgent`]), and where a loop that hangs does not take one, it performs the last act; and it is the thread to which the kernel hands SIGTERM, SIGINT and SIGHUP, whose flag
 //! the loop reads itself. It shares no lock and no descriptor with the thread that serves connections. The second takes
 //! what the first has heard, which may take long ([`Drain`]).
 //! Invariant: while the second is stuck the first goes on hearing, and hears the same stop again and again: the fault
@@ -11,6 +11,7 @@
 use crate::say::say;
 use crate::urgent::Urgent;
 use rt_core::clock::monotonic_ns;
+use rt_core::last_act;
 use rt_core::signals;
 use shm_abi::stop_socket::{Drain, StopSocket};
 use std::io;
@@ -58,6 +59,18 @@ fn run(mut socket: StopSocket, mut queue: Queue, urgent: &Urgent, is_quiet: bool
                 let user = user.map_or("an unknown user".into(), |user| format!("user {user}"));
                 say(format_args!("io-driver: emergency stop, asked for by {user} by datagram"));
             }
+            switch_off_if_unheard(urgent);
+        }
+        std::thread::sleep(REST);
+    }
+}
+
+/// Waits until the loop has taken the stop; if it hangs, the motors are switched off behind its back. The service then ends
+/// the process.
+fn switch_off_if_unheard(urgent: &Urgent) {
+    while urgent.is_waiting() {
+        if urgent.is_unheard() {
+            return last_act::perform();
         }
         std::thread::sleep(REST);
     }

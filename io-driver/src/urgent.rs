@@ -15,6 +15,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 const EMERGENCY_STOP: u64 = 1 << 63;
 const CLEAR_FAULT: u64 = 1 << 62;
 const ASKED: u64 = EMERGENCY_STOP | CLEAR_FAULT;
+/// A loop that has not taken an emergency stop for so long hangs (ns): many ticks of the slowest rate, a stall of the machine
+/// at its longest, and hardly longer than whoever pressed the button looks for what it did.
+const HANGS_NS: u64 = 200_000_000;
 /// Several users, or one whom the kernel does not name.
 const SEVERAL: u64 = 1 << 33;
 const COUNT_OF_ONE: u64 = SEVERAL << 1;
@@ -60,6 +63,8 @@ struct Words {
     state: AtomicU64,
     /// When the last emergency stop was asked for, or the last fault began (CLOCK_MONOTONIC, ns).
     stopped_ns: AtomicU64,
+    /// Since when an emergency stop has been waiting for the loop, if one does (CLOCK_MONOTONIC, ns).
+    waiting_ns: AtomicU64,
     ended_lease: AtomicU64,
 }
 
@@ -70,12 +75,27 @@ impl Urgent {
         // Before the stop itself: whoever sees that sees when it was.
         self.0.stopped_ns.fetch_max(asked_ns, Ordering::Release);
         let mut former = StoppedBy::Nobody;
+        let now_ns = monotonic_ns();
         self.update(|state| {
             former = by_of(state);
+            if state & EMERGENCY_STOP == 0 {
+                self.0.waiting_ns.store(now_ns, Ordering::Release);
+            }
             let by = merge(former, user.map_or(StoppedBy::Several, StoppedBy::User));
             Some(EMERGENCY_STOP | counted(state) | word_of(by))
         });
         former == StoppedBy::Nobody
+    }
+
+    /// Whether the loop has not taken the last emergency stop yet.
+    pub fn is_waiting(&self) -> bool {
+        self.0.state.load(Ordering::Acquire) & EMERGENCY_STOP != 0
+    }
+
+    /// Whether an emergency stop has been waiting for the loop for longer than a loop takes that does not hang.
+    pub fn is_unheard(&self) -> bool {
+        self.is_waiting()
+            && monotonic_ns().saturating_sub(self.0.waiting_ns.load(Ordering::Acquire)) > HANGS_NS
     }
 
     /// The loop is in a fault since now: who asked before to leave one did not know of it. Fit for the loop: it tries
@@ -175,6 +195,24 @@ mod tests {
     /// Asked after all that was done so far.
     fn now(urgent: &Urgent, may: impl Fn(StoppedBy) -> bool) -> Result<(), NotCleared> {
         urgent.clear_fault(monotonic_ns() + 1, may)
+    }
+
+    #[test]
+    fn a_stop_that_the_loop_does_not_take_is_unheard_after_a_while() {
+        let urgent = Urgent::default();
+        assert!(!urgent.is_unheard());
+        // However far back somebody says that he asked.
+        urgent.stop(Some(ANN), 0);
+        assert!(!urgent.is_unheard());
+        let begun_ns = monotonic_ns();
+        while monotonic_ns() - begun_ns <= HANGS_NS {
+            std::thread::sleep(std::time::Duration::from_millis(10));
+        }
+        urgent.stop(Some(BEN), monotonic_ns());
+        assert!(urgent.is_unheard(), "asking again is no news to a loop that hangs");
+        assert!(urgent.take().emergency_stop && !urgent.is_unheard());
+        urgent.stop(Some(ANN), monotonic_ns());
+        assert!(!urgent.is_unheard(), "and the next one has its own time");
     }
 
     /// The request lies in a socket while the service is stuck; the stop comes by datagram meanwhile.

@@ -8,7 +8,9 @@
 //! stores a value and again after: before, it stores nothing any more; after, it stores the safe values once
 //! more ([`store_unless_dying`]). Between its stores and that second look stands a full fence. Whichever way the
 //! two interleave, the safe values are stored last.
-//! Invariants: [`perform`] and [`has_begun`] are async-signal-safe; a guarded register stays guarded.
+//! A register that cannot be reached any more (its card is gone, its file was cut) would end the last act at its store:
+//! what a fault says of an address is [noted](give_up), and the others are stored.
+//! Invariants: [`perform`], [`give_up`] and [`has_begun`] are async-signal-safe; a guarded register stays guarded.
 //! Cost: two loads and a fence (some 10 ns) for the writer; as many stores as there are registers for the last act.
 
 use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicU32, AtomicUsize, Ordering, fence};
@@ -35,6 +37,11 @@ pub fn perform() {
     LAST_ACT.perform();
 }
 
+/// The memory about this address cannot be reached: registers in its page are stored no more.
+pub fn give_up(address: usize) {
+    LAST_ACT.give_up(address);
+}
+
 /// Whether the process is dying, so that nothing but safe values may be stored.
 #[inline]
 pub fn has_begun() -> bool {
@@ -56,7 +63,11 @@ struct LastAct {
     taken: AtomicUsize,
     registers: [AtomicPtr<AtomicU32>; MAX_REGISTERS],
     safe: [AtomicU32; MAX_REGISTERS],
+    gone: [AtomicBool; MAX_REGISTERS],
 }
+
+/// What a fault's address tells of: memory comes and goes by pages, of this size at least (bytes).
+const PAGE: usize = 4096;
 
 impl LastAct {
     const fn new() -> Self {
@@ -65,6 +76,7 @@ impl LastAct {
             taken: AtomicUsize::new(0),
             registers: [const { AtomicPtr::new(std::ptr::null_mut()) }; MAX_REGISTERS],
             safe: [const { AtomicU32::new(0) }; MAX_REGISTERS],
+            gone: [const { AtomicBool::new(false) }; MAX_REGISTERS],
         }
     }
 
@@ -82,9 +94,21 @@ impl LastAct {
 
     fn perform(&self) {
         self.begun.store(true, Ordering::SeqCst);
-        for (register, safe) in self.registers.iter().zip(&self.safe) {
+        for ((register, safe), gone) in self.registers.iter().zip(&self.safe).zip(&self.gone) {
+            if gone.load(Ordering::SeqCst) {
+                continue;
+            }
             if let Some(register) = crate::sys::static_register(register) {
                 register.store(safe.load(Ordering::SeqCst), Ordering::SeqCst);
+            }
+        }
+    }
+
+    fn give_up(&self, address: usize) {
+        for (register, gone) in self.registers.iter().zip(&self.gone) {
+            let register = register.load(Ordering::SeqCst);
+            if !register.is_null() && register.addr() / PAGE == address / PAGE {
+                gone.store(true, Ordering::SeqCst);
             }
         }
     }

@@ -164,6 +164,10 @@ impl Device for EmulatedDevice {
 
     fn write(&mut self, effort: Effort) -> Result<Written, FaultReason> {
         let (codes, written) = self.arm.render(effort)?;
+        if last_act::has_begun() {
+            // Nothing arrives any more.
+            return Err(FaultReason::DeviceWrite);
+        }
         self.store(codes, effort.gravity_share > 0.0);
         Ok(written)
     }

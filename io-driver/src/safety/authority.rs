@@ -9,7 +9,9 @@
 //! held.
 //!
 //! Time is that of [`Elapsed`]: what was skipped ends forces and lets none grow, and each tick ends them by a period at
-//! least.
+//! least. A gap between two ticks is silence, however fresh the reply that follows: beyond the age that a command may have
+//! it lowers the level, so that after a stop of the whole process the force begins anew. Amplifiers whose watchdogs let
+//! go meanwhile hold nothing, and a hand does not wait.
 //!
 //! `Zeroing` is left by positions that are valid, entered by ones that are not: when a driver starts whose devices
 //! have to be zeroed, and when a fault is cleared that cost them their zero.
@@ -144,11 +146,20 @@ impl Safety {
         }
         self.commanded = self.attended && matches!(reply, ReplyKind::Fresh | ReplyKind::Held);
         match reply {
-            _ if !self.attended => self.sink(elapsed),
-            ReplyKind::Fresh => self.rise(elapsed),
-            ReplyKind::Held => self.authority(),
-            ReplyKind::Expired | ReplyKind::NoLease => self.sink(elapsed),
+            _ if !self.attended => self.sink(elapsed.passed_ns()),
+            ReplyKind::Fresh => {
+                self.sink(self.silent_ns(elapsed));
+                self.rise(elapsed)
+            }
+            ReplyKind::Held => self.sink(self.silent_ns(elapsed)),
+            ReplyKind::Expired | ReplyKind::NoLease => self.sink(elapsed.passed_ns()),
         }
+    }
+
+    /// For how long the motors held what was older than a command may be, in a gap before this tick.
+    fn silent_ns(&self, elapsed: Elapsed) -> u64 {
+        let skipped_ns = elapsed.passed_ns() - elapsed.growth_ns().min(elapsed.passed_ns());
+        skipped_ns.saturating_sub(self.ramps.max_command_age_ns)
     }
 
     /// What it gains counts for the next tick, so that a ramp begins at nothing.
@@ -158,10 +169,10 @@ impl Safety {
         now
     }
 
-    fn sink(&mut self, elapsed: Elapsed) -> f64 {
+    fn sink(&mut self, passed_ns: u64) -> f64 {
         let Ramps { in_ns, out_ns, .. } = self.ramps;
         // No more than the whole ramp, and rounded towards its end.
-        let part = u128::from(elapsed.passed_ns().min(out_ns)) * u128::from(in_ns);
+        let part = u128::from(passed_ns.min(out_ns)) * u128::from(in_ns);
         let step = part.div_ceil(u128::from(out_ns)) as u64;
         self.level_ns = self.level_ns.saturating_sub(step);
         self.authority()
@@ -290,11 +301,27 @@ mod tests {
         let long = |ms: u64| Elapsed::new(ms * MS, MS);
         let mut safety = active(RAMPS);
         assert_eq!(safety.advance(ReplyKind::Expired, long(4)), 0.6, "four of ten milliseconds");
-        assert_eq!(safety.advance(ReplyKind::Fresh, long(100)), 0.6);
+        assert_eq!(safety.advance(ReplyKind::Fresh, long(6)), 0.6);
         assert_eq!(safety.authority(), 121.0 / 200.0, "one tick's part of the ramp, whatever was skipped");
-        assert_eq!(safety.advance(ReplyKind::Held, long(100)), 121.0 / 200.0);
+        assert_eq!(safety.advance(ReplyKind::Held, long(6)), 121.0 / 200.0);
         assert_eq!(safety.advance(ReplyKind::NoLease, long(u64::MAX / MS)), 0.0);
         assert!(safety.is_released());
+    }
+
+    /// The whole process was stopped, or its CPU taken away, and the first reply is in time again.
+    #[test]
+    fn a_gap_is_silence_however_fresh_the_reply_that_follows() {
+        let long = |ms: u64| Elapsed::new(ms * MS, MS);
+        for reply in [ReplyKind::Fresh, ReplyKind::Held] {
+            // A tick and the 5 ms that a command may be old are no silence; 10 ms more are all of the ramp.
+            for (gap_ms, left) in [(1, 1.0), (6, 1.0), (7, 0.9), (11, 0.5), (16, 0.0), (3000, 0.0)] {
+                let mut safety = active(RAMPS);
+                assert_eq!(safety.advance(reply, long(gap_ms)), left, "{gap_ms} ms");
+            }
+        }
+        let mut safety = active(RAMPS);
+        safety.advance(ReplyKind::Fresh, long(u64::MAX / MS));
+        assert_eq!(safety.advance(ReplyKind::Fresh, TICK), 1.0 / 200.0, "and it ramps in");
     }
 
     #[test]

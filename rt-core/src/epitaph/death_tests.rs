@@ -86,6 +86,20 @@ fn the_last_act_is_performed_too() {
     assert_eq!(words[REGISTER].load(Ordering::Relaxed), 0, "where nothing is guarded nothing is stored");
 }
 
+/// Two cards are gone, one of them before anybody knows, or one while something else kills: the other is switched off, and
+/// the last words say why.
+#[test]
+fn a_register_that_is_gone_keeps_no_other_from_its_safe_value() {
+    for role in ["gone cards 2, touched", "gone cards 1, aborted"] {
+        let (status, words) = words_after(role);
+        assert_eq!(status.signal(), Some(libc::SIGBUS), "{role}");
+        assert_eq!(words[REGISTER].load(Ordering::Relaxed), 2048, "{role}");
+        let epitaph = read(&words).unwrap();
+        assert_eq!(epitaph.kind, EpitaphKind::Signal(libc::SIGBUS), "{role}");
+        assert!(epitaph.text.starts_with("SIGBUS: memory that cannot be reached at address 0x"), "{epitaph}");
+    }
+}
+
 /// Whoever asks twice waits for no orderly end, so the motors have to be off by then.
 #[test]
 fn a_second_stop_signal_kills_and_performs_the_last_act() {
@@ -149,6 +163,22 @@ fn die(role: &str) -> ! {
     let cell = shared_words::map(&File::options().read(true).write(true).open(path).unwrap());
     match role {
         "panic" => die_by_panic(cell),
+        _ if role.starts_with("gone cards") => {
+            let cards = [(), ()].map(|()| File::from(memfd_create("card", MFdFlags::MFD_CLOEXEC).unwrap()));
+            let registers = cards.each_ref().map(|card| {
+                card.set_len(256).unwrap();
+                shared_words::low_half(&shared_words::map(card)[0])
+            });
+            for register in registers.into_iter().chain([shared_words::low_half(&cell[REGISTER])]) {
+                crate::last_act::guard(register, 2048).unwrap();
+            }
+            install_fatal_handlers(cell, &TICK).unwrap();
+            let gone = if role.contains('2') { &cards[..] } else { &cards[..1] };
+            gone.iter().for_each(|card| card.set_len(0).unwrap());
+            if role.ends_with("touched") {
+                registers[1].store(3000, Ordering::Relaxed);
+            }
+        }
         _ if role.starts_with("last act") => {
             crate::last_act::guard(shared_words::low_half(&cell[REGISTER]), 2048).unwrap();
             install_fatal_handlers(cell, &TICK).unwrap();

@@ -7,6 +7,8 @@
 //! that the CPU raised is repeated under the former action, so that action sees the true address; a
 //! signal that was sent (`abort`, `kill`, a terminal's Ctrl-\, a limit of CPU time) is raised again under the default
 //! action. Signals that do not tell of a fault are left to whoever ignores or handles them already.
+//! A register that faults within the last act brings the handler up once more: it gives that one up, performs the rest,
+//! writes the epitaph, and the fault repeated kills. Its stack has room for one such fault beside the first signal.
 //! Invariants: async-signal-safe: no allocation, no lock, no I/O. Runs on the alternate stack that
 //! the standard library gives every thread it starts, so that a stack overflow is handled too.
 //! Two threads that fault at once both come here; the first one's epitaph stays.
@@ -80,11 +82,15 @@ fn is_of_an_instruction(signal: libc::c_int) -> bool {
 
 extern "C" fn on_fatal(signal: libc::c_int, info: *mut libc::siginfo_t, _context: *mut libc::c_void) {
     let Some(fatal) = FATAL.get() else { return };
-    crate::last_act::perform();
     // SAFETY: with SA_SIGINFO the kernel passes a valid record that lives as long as the handler.
     let info = unsafe { &*info };
     // si_code is positive when the kernel raised the signal, sigaction(2): for what the thread did, a terminal or a limit.
     let raised_by_kernel = info.si_code > 0;
+    if raised_by_kernel && matches!(signal, libc::SIGBUS | libc::SIGSEGV) {
+        // SAFETY: a fault's record carries an address.
+        crate::last_act::give_up(unsafe { info.si_addr() }.addr());
+    }
+    crate::last_act::perform();
     let tells_more = is_of_an_instruction(signal) || signal == libc::SIGSYS;
     fatal.write_epitaph(signal, (raised_by_kernel && tells_more).then_some(info));
     // A fault happens again when the handler returns. A forbidden system call does not: the thread would go on
@@ -110,7 +116,7 @@ impl Fatal {
     }
 
     /// After this the handler returns: a fault happens again under the former action, a raised
-    /// signal waits (it is blocked in here) and then kills.
+    /// signal kills at once, or as soon as it is not blocked any more.
     fn step_aside(&self, signal: libc::c_int, raised_by_fault: bool) {
         let former = FATAL_SIGNALS.iter().position(|(number, _)| *number == signal).map(|i| self.former[i]);
         let next = if raised_by_fault { former } else { None };
@@ -143,13 +149,17 @@ fn forbidden_call(info: &libc::siginfo_t) -> ForbiddenCall {
     ForbiddenCall { number: call.number, architecture: call.architecture }
 }
 
-/// Every other signal waits: a stop request must not interrupt the last act.
+/// Other signals wait: a stop request must not interrupt the last act. Only a register that cannot be reached does.
 fn handler_action() -> libc::sigaction {
     let mut action = default_action();
     action.sa_sigaction = on_fatal as *const () as libc::sighandler_t;
-    action.sa_flags = libc::SA_SIGINFO | libc::SA_ONSTACK;
+    action.sa_flags = libc::SA_SIGINFO | libc::SA_ONSTACK | libc::SA_NODEFER;
     // SAFETY: the mask is ours and valid.
-    unsafe { libc::sigfillset(&mut action.sa_mask) };
+    unsafe {
+        libc::sigfillset(&mut action.sa_mask);
+        libc::sigdelset(&mut action.sa_mask, libc::SIGBUS);
+        libc::sigdelset(&mut action.sa_mask, libc::SIGSEGV);
+    }
     action
 }
 

@@ -2,7 +2,7 @@
 
 use rt_core::epitaph::{self, Epitaph, EpitaphKind};
 use rustix::process::Signal;
-use shm_abi::{DriverState, FaultReason, client};
+use shm_abi::{DriverState, FaultReason, client, stop_socket};
 use std::sync::atomic::Ordering;
 use system_tests::faults::amplifiers::{Seen, wait_for};
 use system_tests::faults::process::End;
@@ -274,6 +274,62 @@ fn a_driver_whose_loop_hangs_for_ever_is_stopped_all_the_same_with_the_motors_of
     drop(app);
     let seen = stand.finish_after_death();
     assert_eq!((seen.tally.watchdog_trips, seen.tally.switched_off), (0, 1));
+}
+
+/// By connection and by datagram: nobody has to know that `stop` would do more.
+#[test]
+fn an_emergency_stop_switches_the_motors_off_behind_a_loop_that_hangs() {
+    let ways: [fn(&Stand); 2] = [
+        |stand| client::emergency_stop_over_connection(&stand.socket(), "test").expect("it is told"),
+        |stand| stop_socket::send(&stand.socket()).expect("it is heard"),
+    ];
+    for ask in ways {
+        let mut setup = Setup::new("real").sabotaged("hang:600000@button20");
+        setup.limits.watchdog_ms = 600_000;
+        let mut stand = Stand::start(setup);
+        let app = stand.start_app();
+        stand.wait_for_force();
+        stand.amplifiers.press(1 << 20);
+        wait_for("a loop that stands", || {
+            let tick = stand.view().latest_tick();
+            std::thread::sleep(std::time::Duration::from_millis(100));
+            stand.view().latest_tick() == tick
+        });
+        assert!(stand.amplifiers.are_enabled(), "the force stays");
+        ask(&stand);
+        let end = stand.driver.end();
+        assert_eq!(end.status, Some(3), "{end:?}");
+        let words = epitaph::read(&stand.view().epitaph).expect("an epitaph");
+        assert_eq!(words.kind, EpitaphKind::Fault, "{words}");
+        stand.amplifiers.settle();
+        stand.amplifiers.check_off("a hung loop");
+        drop(app);
+        let seen = stand.finish_after_death();
+        assert_eq!((seen.tally.watchdog_trips, seen.tally.switched_off), (0, 1));
+    }
+}
+
+/// Amplifiers that let go by themselves, tell nobody and come back: what they held is not there any more.
+#[test]
+fn after_a_gap_the_force_begins_anew_however_soon_the_application_answers() {
+    let mut setup = Setup::new("real");
+    setup.limits.watchdog_ms = 600_000;
+    let stand = Stand::start(setup);
+    let app = stand.start_app();
+    stand.wait_for_force();
+    stand.driver.signal(Signal::STOP);
+    let before = stand.view().read_latest().expect("frames");
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    stand.driver.signal(Signal::CONT);
+    let mut after = before;
+    wait_for("ticks", || {
+        after = stand.view().read_latest().expect("frames");
+        after.tick > before.tick + 305
+    });
+    // It comes on in 200 ms, of which a busy machine may have let some pass.
+    assert!(before.authority > 0.99 && after.authority < 0.9, "{} {}", before.authority, after.authority);
+    drop(app);
+    stand.finish();
 }
 
 #[test]
