@@ -199,11 +199,15 @@ static inline PhantomRequest phantom_request(uint64_t kind, const char *name) {
     return request;
 }
 
-/* Receives the answer and at most two descriptors. Returns how many bytes of the answer came. */
+/* Receives the answer and at most two descriptors. Returns how many bytes of the answer came in time, however they drip. */
 static inline size_t phantom_receive(int connection, PhantomAnswer *answer, int fds[2]) {
     size_t filled = 0;
     int count = 0;
+    struct timespec begun, now;
+    clock_gettime(CLOCK_MONOTONIC, &begun);
     while (filled < sizeof *answer) {
+        clock_gettime(CLOCK_MONOTONIC, &now);
+        if (now.tv_sec - begun.tv_sec > PHANTOM_ANSWER_TIMEOUT_S) break;
         union {
             char bytes[CMSG_SPACE(2 * sizeof(int))];
             struct cmsghdr align;

@@ -311,3 +311,32 @@ fn the_headers_compile_on_their_own_and_as_cpp() {
         }
     }
 }
+
+/// A byte each half a second would be an answer after minutes.
+#[test]
+fn a_c_program_does_not_wait_for_an_answer_that_drips() {
+    let Some(program) = compiled() else { return };
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("driver.sock");
+    let server = std::os::unix::net::UnixListener::bind(&path).unwrap();
+    let begun = Instant::now();
+    let client = std::process::Command::new(program)
+        .args([path.as_os_str(), "observe".as_ref()])
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let drips = std::thread::spawn(move || {
+        let (mut connection, _) = server.accept().unwrap();
+        // Until whoever waits has hung up.
+        while std::io::Write::write_all(&mut connection, &[0]).is_ok() {
+            std::thread::sleep(Duration::from_millis(500));
+        }
+    });
+    let output = client.bounded_output();
+    patience::watched(limit(), "a server that drips", || drips.join().unwrap());
+    let words = String::from_utf8_lossy(&output.stderr);
+    assert!(words.contains("gives no answer"), "{words}");
+    assert_eq!(output.status.code(), Some(1));
+    // Two seconds, rounded up, and as long for the last byte; a busy machine may take as much again.
+    assert!(begun.elapsed() < Duration::from_secs(20), "{:?}", begun.elapsed());
+}
