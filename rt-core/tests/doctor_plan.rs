@@ -52,6 +52,18 @@ fn where_nothing_is_wrong_nothing_is_planned() {
     assert!(script.ends_with("# Nothing to do.\n") && !script.contains("\nput"), "{script}");
 }
 
+#[test]
+fn undoing_a_plan_leaves_no_group_that_it_made_and_takes_no_other() {
+    let plan = |changes: &str| plan_of(&load_with("debian-laptop", changes), 7);
+    let (whole, member) = ("; undo: groupdel phantom3\n", "; undo: gpasswd --delete NAME phantom3\n");
+    for none in ["", "=== /etc/group\nroot:x:0:\nphantom3x:x:997:\n"] {
+        let script = plan(none);
+        assert!(script.contains(whole) && !script.contains(member), "{none:?}: {script}");
+    }
+    let script = plan("=== /etc/group\nroot:x:0:\nphantom3:x:997:tester\n");
+    assert!(script.contains(member) && !script.contains(whole), "{script}");
+}
+
 /// What a plan may call; `put` and `add` are its own functions.
 const HARMLESS: [&str; 28] = [
     "#",

@@ -19,11 +19,12 @@ root=$scratch/root
 mkdir -p "$root"/{bin,proc,sys,dev,tmp,run,root,etc}
 
 cp /bin/busybox "$root/bin/"
-for tool in sh mount sleep cat echo grep sed awk head tail mkdir ls kill sysctl sync poweroff uname ps id; do
+for tool in sh mount sleep cat echo grep sed awk head tail mkdir ls kill sysctl sync poweroff uname ps id cp; do
     ln -s busybox "$root/bin/$tool"
 done
 for program in /usr/bin/cyclictest /usr/bin/chrt "$@"; do
-    cp "$program" "$root/bin/"
+    # Without what debuggers read, most of it, which the guest would have to unpack.
+    strip -g -o "$root/bin/$(basename "$program")" "$program"
     # The loader and the libraries, where this machine has them.
     ldd "$program" | grep -o '/[^ ]*' | while read -r library; do
         mkdir -p "$root$(dirname "$library")"
@@ -56,7 +57,7 @@ for run in $(seq "${RUNS:-1}"); do
     timeout "${LIMIT_S:-900}" qemu-system-x86_64 -accel tcg,thread=single -icount shift=0,sleep=off \
         -rtc clock=vm,base=2026-01-01 -cpu max,-rdrand,-rdseed -M q35 -smp 1 -m 768M -display none -nodefaults \
         -no-reboot -net none -serial stdio -kernel "$kernel" -initrd "$scratch/initrd" \
-        -append "console=ttyS0 quiet panic=-1 nokaslr" </dev/null | tr -d '\r' >"$scratch/said-$run"
+        -append "console=ttyS0 quiet panic=-1 nokaslr" </dev/null | sed -u 's/\r//g' >"$scratch/said-$run"
 done
 cat "$scratch/said-1"
 if [ "${RUNS:-1}" != 1 ]; then (cd "$scratch" && md5sum said-*); fi

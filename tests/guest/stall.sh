@@ -1,6 +1,6 @@
 # For deterministic.sh: a loop of the highest priority takes the CPU from the driver and from cyclictest.
 sysctl -w kernel.sched_rt_runtime_us=-1
-echo 0 >/sys/kernel/debug/sched/fair_server/cpu0/runtime
+[ ! -e /sys/kernel/debug/sched/fair_server ] || echo 0 >/sys/kernel/debug/sched/fair_server/cpu0/runtime
 printf '[[device]]\nname = "f0"\nbackend = "ideal"\n' >driver.toml
 io-driver run --config driver.toml --socket /tmp/driver.sock 2>driver.log &
 sleep 1

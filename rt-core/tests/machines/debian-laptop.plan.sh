@@ -112,7 +112,7 @@ systemctl enable phantom3-plan-settings.service
 modprobe msr || echo 'no module msr' >&2
 
 # == Group of those who may run the loop
-# makes the group unless it is there, and whoever called sudo a member; undo: gpasswd --delete NAME phantom3
+# makes the group, and whoever called sudo a member; undo: groupdel phantom3
 getent group phantom3 >/dev/null || groupadd --system phantom3
 [ -z "${SUDO_USER:-}" ] || usermod -aG phantom3 "$SUDO_USER"
 

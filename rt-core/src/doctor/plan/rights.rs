@@ -9,7 +9,7 @@ pub(super) fn write(script: &mut Script, machine: &Machine<'_>, steps: &[Step], 
     let needs_group =
         |step: &Step| matches!(step.action, Action::Limits | Action::Udev { .. } | Action::Directory { .. });
     if steps.iter().any(needs_group) {
-        group(script);
+        group(script, machine);
     }
     if steps.iter().any(|step| step.action == Action::Limits) {
         limits(script, machine, names);
@@ -19,14 +19,28 @@ pub(super) fn write(script: &mut Script, machine: &Machine<'_>, steps: &[Step], 
     directories(script, machine, steps, names);
 }
 
-fn group(script: &mut Script) {
+/// Undone in full only where the plan makes it: a group that was there before is somebody else's.
+fn group(script: &mut Script, machine: &Machine<'_>) {
     script.section("Group of those who may run the loop");
-    script.explain(
-        "makes the group unless it is there, and whoever called sudo a member",
-        &format!("gpasswd --delete NAME {GROUP}"),
-    );
+    if has_group(machine) {
+        script.explain(
+            "the group is there; makes whoever called sudo a member",
+            &format!("gpasswd --delete NAME {GROUP}"),
+        );
+    } else {
+        script.explain("makes the group, and whoever called sudo a member", &format!("groupdel {GROUP}"));
+    }
     script.line(&format!("getent group {GROUP} >/dev/null || groupadd --system {GROUP}"));
     script.line(&format!("[ -z \"${{SUDO_USER:-}}\" ] || usermod -aG {GROUP} \"$SUDO_USER\""));
+}
+
+/// One that cannot be read may have it.
+fn has_group(machine: &Machine<'_>) -> bool {
+    let is_it = |line: &str| line.split(':').next() == Some(GROUP);
+    match machine.text_if_any("/etc/group") {
+        Ok(text) => text.is_some_and(|text| text.lines().any(is_it)),
+        Err(_) => true,
+    }
 }
 
 fn limits(script: &mut Script, machine: &Machine<'_>, names: &PlanNames) {
