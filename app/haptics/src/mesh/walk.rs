@@ -8,6 +8,13 @@
 //! edge, S being the foot of the HIP's perpendicular on it. A HIP in front of the surface lifts the god-object off: it
 //! flies straight to the HIP, and touches again where that way meets the mesh.
 //!
+//! Friction on a concave edge: one cone, about the direction of what both faces bear (Melder ch. 4.2.5). This is Coulomb's law
+//! in a groove whose bottom is round, however little, which a point touches in one place. Cones of both faces together could
+//! always bear what is felt. Along the edge they could bear more, in a groove of the angle `a` up to `1 / sin(a / 2)` times as
+//! much; so they do of a ball, which touches both ([`crate::rolling`]). By squeezing, friction could also hold a finger in any
+//! groove of less than twice the friction angle against every pull; neither points nor balls are squeezed.
+//! `tests/mesh/grooves.rs` holds points to all of this.
+//!
 //! Frames and signs: object frame B; forces are springs on the user \[m\].
 //! Invariants: the god-object is on the mesh. A frictionless walk never lengthens the spring, hence ends at a local
 //! minimum of the distance to the HIP.

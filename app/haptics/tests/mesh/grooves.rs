@@ -26,6 +26,7 @@ struct Tick {
     ours: Vector3<f64>,
     is_held: bool,
     faces: usize,
+    faces_before: usize,
     /// What forces in the cones of all faces that it touches could not bear of its spring (m).
     unexplained: f64,
     one_cone: Option<Ended>,
@@ -51,6 +52,10 @@ impl Tick {
         other.is_some_and(|other| (other.god_object - self.from).norm() <= SAME_PLACE)
     }
 
+    fn is_moved(&self) -> bool {
+        (self.ours - self.from).norm() > SAME_PLACE
+    }
+
     fn is_more_than(&self, other: Option<Ended>) -> bool {
         self.spring() > self.spring_of(other) + SAME_PLACE
     }
@@ -73,17 +78,26 @@ fn follow(mesh: &Arc<Mesh>, mu: f64, hips: impl Iterator<Item = Vector3<f64>>, m
         let ours = out.god_object_W;
         last = Some(ours);
         let Some(from) = from.or_else(|| one_cone.hit(&was?, &hip)) else { continue };
+        let slid = one_cone.step(from, &hip);
+        if slid.is_some_and(|ended| ended.pieces > haptics::mesh::MAX_FEATURE_CHANGES as usize - 2) {
+            // Over decimetres in a tick, which takes it two.
+            continue;
+        }
         // Held or at the rim of its circle, what is felt is the whole spring, to the 1e-12 of the load that a slide leaves.
         let spring = ours - hip;
-        assert!((out.force_on_user_W - spring * K).norm() < K * (1e-11 * spring.norm() + SAME_PLACE), "{out:?}");
+        assert!(
+            (out.force_on_user_W - spring * K).norm() < K * (1e-11 * spring.norm() + SAME_PLACE),
+            "{out:?}"
+        );
         look(&Tick {
             from,
             hip,
             ours,
             is_held: out.friction == ContactState::Stick,
             faces: one_cone.touched(&ours).len(),
+            faces_before: one_cone.touched(&from).len(),
             unexplained: one_cone.unexplained(&ours, &hip),
-            one_cone: one_cone.step(from, &hip),
+            one_cone: slid,
             least: least.step(from, &hip),
             most: most.step(from, &hip),
         });
@@ -120,12 +134,25 @@ impl Seen {
         assert!(tick.unexplained <= SAME_PLACE, "{}: no forces in the cones bear {}", tick.ours, tick.hip);
         if is_parted {
             let one_cone = tick.one_cone.expect("it lets go of no finger that is held");
-            assert!(tick.faces > 2 || one_cone.pieces > 0, "{} {} {one_cone:?}", tick.ours, tick.hip);
+            assert!(tick.is_moved() || tick.holds(tick.most), "{} {}", tick.ours, tick.hip);
+            let is_at_corner = tick.faces > 2 || tick.faces_before > 2;
+            assert!(
+                is_at_corner || one_cone.pieces > 0,
+                "{} {} {} {one_cone:?}",
+                tick.from,
+                tick.ours,
+                tick.hip
+            );
             return;
         }
-        assert!(!tick.is_more_than(tick.least) && !tick.is_more_than(tick.most), "{} {}", tick.ours, tick.hip);
+        assert!(
+            !tick.is_more_than(tick.least) && !tick.is_more_than(tick.most),
+            "{} {}",
+            tick.ours,
+            tick.hip
+        );
         let is_less = [tick.least, tick.most].map(|other| tick.spring() < tick.spring_of(other) - SAME_PLACE);
-        if (tick.ours - tick.from).norm() <= SAME_PLACE {
+        if !tick.is_moved() {
             // What one cone holds, more friction holds.
             assert!(tick.holds(tick.least) && tick.holds(tick.most), "{} {}", tick.ours, tick.hip);
         }
@@ -200,13 +227,18 @@ fn the_oracle_slides_in_a_groove_as_can_be_worked_out_by_hand() {
         for mu in COEFFICIENTS {
             // From far along the groove, to a HIP below its bottom: both walls bear depth / (2 sine).
             let (depth, from) = (5e-3, Vector3::z() * 0.045);
-            let rests = |rule| Coulomb::new(&mesh, mu, rule).step(from, &(Vector3::y() * -depth)).unwrap().god_object.z;
+            let rests = |rule| {
+                Coulomb::new(&mesh, mu, rule).step(from, &(Vector3::y() * -depth)).unwrap().god_object.z
+            };
             assert!((rests(Rule::OneCone) - mu * depth).abs() < SAME_PLACE);
             assert!((rests(Rule::Least) - (mu * depth / sine).min(from.z)).abs() < SAME_PLACE);
             // Walls nearer to each other than both friction angles squeeze what they hold.
             let jams = 0.5 * degrees.to_radians() < mu.atan();
             let most = rests(Rule::Most);
-            assert_eq!(jams, (most - from.z).abs() < SAME_PLACE && mu * depth / sine < from.z || jams && most == from.z);
+            assert_eq!(
+                jams,
+                (most - from.z).abs() < SAME_PLACE && mu * depth / sine < from.z || jams && most == from.z
+            );
             assert!(most >= rests(Rule::Least) - SAME_PLACE);
         }
     }
@@ -226,13 +258,17 @@ fn wedges(seeds: std::ops::Range<u64>, ticks: usize) {
                     seen.note(tick);
                     let Some(least) = tick.least.filter(|least| least.along_groove) else { return };
                     let lags = [tick.ours, least.god_object].map(|god| (god.z - tick.hip.z).abs());
-                    let is_between = sine * lags[1] <= lags[0] + SAME_PLACE && lags[0] <= lags[1] + SAME_PLACE;
+                    let is_between =
+                        sine * lags[1] <= lags[0] + SAME_PLACE && lags[0] <= lags[1] + SAME_PLACE;
                     assert!(is_between, "{degrees} degrees, mu {mu}: {lags:?}");
                 });
             }
             println!("{degrees} degrees, mu {mu}: {seen:?}");
             assert!(seen.parted == 0 && seen.ticks > ticks / 4, "{seen:?}");
-            assert!(degrees > 100.0 || mu > 0.5 || seen.along_grooves > 10, "{degrees} degrees, mu {mu}: {seen:?}");
+            assert!(
+                degrees > 100.0 || mu > 0.5 || seen.along_grooves > 10,
+                "{degrees} degrees, mu {mu}: {seen:?}"
+            );
         }
     }
 }
@@ -271,7 +307,8 @@ fn whole(seeds: std::ops::Range<u64>, ticks: usize) {
                     let explained = MUCH * looks.distance(&tick.hip);
                     if tick.spring() > explained && tick.apart(tick.one_cone) <= SAME_PLACE {
                         much += 1;
-                        let others = [tick.one_cone, tick.least, tick.most].map(|other| tick.spring_of(other));
+                        let others =
+                            [tick.one_cone, tick.least, tick.most].map(|other| tick.spring_of(other));
                         assert!(others.iter().all(|spring| *spring > explained - SAME_PLACE));
                     }
                 });
@@ -301,8 +338,8 @@ fn on_rugged_meshes_no_more_is_felt_than_cones_of_all_touched_faces_explain() {
 
 /// `cargo test --release -p haptics --test mesh grooves:: -- --ignored --nocapture`
 #[test]
-#[ignore = "the long version"]
-fn in_a_million_ticks_of_grooves_no_more_is_felt_than_cones_explain() {
+#[ignore = "the long version, a minute"]
+fn in_four_million_ticks_of_grooves_no_more_is_felt_than_cones_explain() {
     wedges(1..6, 10_000);
     pits(1..6, 10_000);
     whole(10..15, 5000);
@@ -323,7 +360,8 @@ impl Rounded {
         let middle = Vector3::new(0.0, self.radius_m / sine, p.z);
         let way = p - middle;
         let side = way.x.signum();
-        let (flank, normal) = (Vector3::new(side * sine, cosine, 0.0), Vector3::new(-side * cosine, sine, 0.0));
+        let (flank, normal) =
+            (Vector3::new(side * sine, cosine, 0.0), Vector3::new(-side * cosine, sine, 0.0));
         let up = flank.dot(&way);
         if up >= 0.0 {
             return (middle + flank * up - normal * self.radius_m, normal);

@@ -313,7 +313,11 @@ pub(crate) fn distance_from_sum(normals: &[Vector3<f64>], mu: f64, force: &Vecto
 }
 
 /// The same by projections: one force after the other set to its best.
-pub(crate) fn distance_from_sum_by_projections(normals: &[Vector3<f64>], mu: f64, force: &Vector3<f64>) -> f64 {
+pub(crate) fn distance_from_sum_by_projections(
+    normals: &[Vector3<f64>],
+    mu: f64,
+    force: &Vector3<f64>,
+) -> f64 {
     let mut forces = vec![Vector3::<f64>::zeros(); normals.len()];
     let mut left = *force;
     for _ in 0..100_000 {
