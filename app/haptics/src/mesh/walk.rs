@@ -118,7 +118,7 @@ fn cross_face(mesh: &Mesh, side: Side, from_B: Vector3<f64>, target_B: Vector3<f
     let (edge, share) = if met[1] < met[0] { (1, met[1]) } else { (0, met[0]) };
     let (edge, share) = if met[2] < share { (2, met[2]) } else { (edge, share) };
     if share == f64::INFINITY {
-        return Reached::Target(Place { point_B: target_B, on: On::Face(side) });
+        return Reached::Target(Place::new(target_B, On::Face(side)));
     }
     let met_B = from_B + (target_B - from_B) * share;
     let (start_B, edge_B) = facet.edge_B(mesh, edge);
@@ -160,7 +160,7 @@ fn follow_edge(mesh: &Mesh, side: Side, edge: usize, target_B: Vector3<f64>) -> 
 #[inline(always)]
 fn on_edge(mesh: &Mesh, side: Side, edge: usize, share: f64) -> Place {
     let facet = Facet::of(mesh, side);
-    let at = |corner| Place { point_B: facet.corner_B(mesh, corner), on: On::Vertex(side, corner) };
+    let at = |corner| Place::new(facet.corner_B(mesh, corner), On::Vertex(side, corner));
     if share <= SNAP {
         return at(edge);
     }
@@ -168,7 +168,7 @@ fn on_edge(mesh: &Mesh, side: Side, edge: usize, share: f64) -> Place {
         return at(next(edge));
     }
     let (start_B, edge_B) = facet.edge_B(mesh, edge);
-    Place { point_B: start_B + edge_B * share, on: On::Edge(side, edge) }
+    Place::new(start_B + edge_B * share, On::Edge(side, edge))
 }
 
 /// The edge or vertex that a place on a face happens to lie on, where a neighbour may hold what the face lets go.
@@ -188,7 +188,7 @@ fn rim(mesh: &Mesh, place: Place) -> Option<Place> {
         Some(&corner) => On::Vertex(side, corner),
         None => On::Edge(side, edge),
     };
-    Some(Place { on, ..place })
+    Some(Place::new(place.point_B, on))
 }
 
 /// Straight from where it was to the HIP through free space; `None` if nothing is in the way.

@@ -26,7 +26,6 @@ struct Tick {
     ours: Vector3<f64>,
     is_held: bool,
     faces: usize,
-    faces_before: usize,
     /// What forces in the cones of all faces that it touches could not bear of its spring (m).
     unexplained: f64,
     one_cone: Option<Ended>,
@@ -95,7 +94,6 @@ fn follow(mesh: &Arc<Mesh>, mu: f64, hips: impl Iterator<Item = Vector3<f64>>, m
             ours,
             is_held: out.friction == ContactState::Stick,
             faces: one_cone.touched(&ours).len(),
-            faces_before: one_cone.touched(&from).len(),
             unexplained: one_cone.unexplained(&ours, &hip),
             one_cone: slid,
             least: least.step(from, &hip),
@@ -111,8 +109,6 @@ struct Seen {
     held: usize,
     on_several: usize,
     along_grooves: usize,
-    /// Another place than [`Rule::OneCone`] says: another way down from a corner of which several lead.
-    parted: usize,
     /// It slides where [`Rule::Least`] holds, and slides farther than that does.
     slides_for_held: usize,
     slides_farther: usize,
@@ -125,26 +121,13 @@ struct Seen {
 impl Seen {
     /// Takes note of a tick that must never be felt more than Coulomb's law explains.
     fn note(&mut self, tick: &Tick) {
-        let is_parted = tick.apart(tick.one_cone) > SAME_PLACE;
         self.ticks += 1;
         self.held += usize::from(tick.is_held);
         self.on_several += usize::from(tick.faces > 1);
         self.along_grooves += usize::from(tick.one_cone.is_some_and(|ended| ended.along_groove));
-        self.parted += usize::from(is_parted);
         assert!(tick.unexplained <= SAME_PLACE, "{}: no forces in the cones bear {}", tick.ours, tick.hip);
-        if is_parted {
-            let one_cone = tick.one_cone.expect("it lets go of no finger that is held");
-            assert!(tick.is_moved() || tick.holds(tick.most), "{} {}", tick.ours, tick.hip);
-            let is_at_corner = tick.faces > 2 || tick.faces_before > 2;
-            assert!(
-                is_at_corner || one_cone.pieces > 0,
-                "{} {} {} {one_cone:?}",
-                tick.from,
-                tick.ours,
-                tick.hip
-            );
-            return;
-        }
+        let apart = tick.apart(tick.one_cone);
+        assert!(apart <= SAME_PLACE, "{apart}: {} {} {:?}", tick.ours, tick.hip, tick.one_cone);
         assert!(
             !tick.is_more_than(tick.least) && !tick.is_more_than(tick.most),
             "{} {}",
@@ -197,7 +180,7 @@ fn whole_meshes(seed: u64) -> Vec<(String, TriangleSoup)> {
     }
     let few = ["noisy scan", "slotted block", "slivers"];
     let ugly = ugly::all(seed).into_iter().filter(|(name, _)| few.contains(name));
-    let flawed = flawed::flawed_solids().into_iter().filter(|(name, _)| ["noise", "cavity"].contains(name));
+    let flawed = flawed::flawed_solids().into_iter().filter(|(name, _)| *name == "cavity");
     meshes.extend(ugly.chain(flawed).map(|(name, soup)| (name.to_string(), soup)));
     meshes
 }
@@ -264,7 +247,7 @@ fn wedges(seeds: std::ops::Range<u64>, ticks: usize) {
                 });
             }
             println!("{degrees} degrees, mu {mu}: {seen:?}");
-            assert!(seen.parted == 0 && seen.ticks > ticks / 4, "{seen:?}");
+            assert!(seen.ticks > ticks / 4, "{seen:?}");
             assert!(
                 degrees > 100.0 || mu > 0.5 || seen.along_grooves > 10,
                 "{degrees} degrees, mu {mu}: {seen:?}"
@@ -285,7 +268,7 @@ fn pits(seeds: std::ops::Range<u64>, ticks: usize) {
                 follow(&mesh, mu, hips, |tick| seen.note(tick));
             }
             println!("tip {tip:?}, mu {mu}: {seen:?}");
-            assert!(seen.parted == 0 && seen.on_several > 100, "{seen:?}");
+            assert!(seen.on_several > 100, "{seen:?}");
         }
     }
 }
@@ -294,7 +277,6 @@ fn pits(seeds: std::ops::Range<u64>, ticks: usize) {
 const MUCH: f64 = 3.0;
 
 fn whole(seeds: std::ops::Range<u64>, ticks: usize) {
-    let (mut all, mut parted) = (0, 0);
     for seed in seeds {
         for (name, soup) in whole_meshes(seed) {
             let mesh = built(soup);
@@ -305,7 +287,7 @@ fn whole(seeds: std::ops::Range<u64>, ticks: usize) {
                 follow(&mesh, mu, (0..ticks).map(|_| roaming.next()), |tick| {
                     seen.note(tick);
                     let explained = MUCH * looks.distance(&tick.hip);
-                    if tick.spring() > explained && tick.apart(tick.one_cone) <= SAME_PLACE {
+                    if tick.spring() > explained {
                         much += 1;
                         let others =
                             [tick.one_cone, tick.least, tick.most].map(|other| tick.spring_of(other));
@@ -313,12 +295,9 @@ fn whole(seeds: std::ops::Range<u64>, ticks: usize) {
                     }
                 });
                 println!("{name}, mu {mu}: {much} above {MUCH} k d; {seen:?}");
-                all += seen.ticks;
-                parted += seen.parted;
             }
         }
     }
-    assert!(parted * 1000 <= all, "{parted} of {all}");
 }
 
 #[test]
@@ -334,6 +313,18 @@ fn in_pits_no_more_is_felt_than_cones_of_all_walls_explain() {
 #[test]
 fn on_rugged_meshes_no_more_is_felt_than_cones_of_all_touched_faces_explain() {
     whole(1..2, 700);
+}
+
+/// Held in a corner by a face that the HIP had since gone round, a god-object stayed there, with up to five times the force,
+/// though nothing was in its way.
+#[test]
+fn a_corner_holds_only_what_it_is_in_the_way_of() {
+    for (subdivisions, seed, mu) in [(2, 10, 0.8), (1, 11, 0.3), (1, 11, 0.8), (2, 12, 0.3)] {
+        let mesh = built(rugged(subdivisions, 0.3, seed));
+        let (mut roaming, mut seen) = (Roaming::new(seed, 0.055, 5e-4), Seen::default());
+        follow(&mesh, mu, (0..5000).map(|_| roaming.next()), |tick| seen.note(tick));
+        assert!(seen.held > 1000 && seen.on_several > 1000, "{seen:?}");
+    }
 }
 
 /// `cargo test --release -p haptics --test mesh grooves:: -- --ignored --nocapture`
