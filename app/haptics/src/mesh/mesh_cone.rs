@@ -179,16 +179,17 @@ impl Touching {
 
     #[inline(always)]
     fn update(&mut self, mesh: &Mesh, friction: &Friction, input: &ConeInput) -> Option<ConeForce> {
-        let here = stand(mesh, self.god_object, input);
         if matches!(friction, Friction::None) {
-            let walked = walk(mesh, here?, &Frictionless, input)?;
+            let here = stand(mesh, self.god_object, input)?;
+            let walked = walk(mesh, here, &Frictionless, input)?;
             self.shadow = walked.place;
             self.grip.state = FrictionState::Slip;
             return Some(self.answer(&walked, input));
         }
         let shadow = stand(mesh, self.shadow, input)?;
         self.shadow = walk(mesh, shadow, &Frictionless, input)?.place;
-        let (place, view) = here?;
+        // Held in a corner by a face that the HIP has left, it would be held by what is not in its way.
+        let (place, view) = stand(mesh, self.god_object.anew(), input)?;
         let pull = self.grip.begin_tick(&view, input);
         if let Some(tangential_B) = self.grip.hold(friction, &view, &pull, input) {
             return Some(self.answer(&Walked { place, view, tangential_B, changes: 0 }, input));

@@ -10,7 +10,10 @@ use crate::surface::Feature;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Place {
     pub(crate) point_B: Vector3<f64>,
+    /// What holds the HIP back there.
     pub(crate) on: On,
+    /// Where it is: of a corner or an edge, a face that meets there may hold the HIP back.
+    at: On,
 }
 
 /// A feature of a mesh, told by one of its faces.
@@ -41,9 +44,20 @@ pub(crate) struct Facet<'m> {
 }
 
 impl Place {
+    #[inline(always)]
+    pub(crate) fn new(point_B: Vector3<f64>, on: On) -> Self {
+        Self { point_B, on, at: on }
+    }
+
     #[inline]
     pub(crate) fn hit(hit: &Hit) -> Self {
-        Self { point_B: hit.point_B, on: On::Face(Side { face: hit.face, is_back: !hit.is_front }) }
+        Self::new(hit.point_B, On::Face(Side { face: hit.face, is_back: !hit.is_front }))
+    }
+
+    /// The same place, with nothing said of what holds the HIP back.
+    #[inline(always)]
+    pub(crate) fn anew(self) -> Self {
+        Self { on: self.at, ..self }
     }
 
     pub(crate) fn nearest(nearest: &Nearest) -> Self {
@@ -53,7 +67,7 @@ impl Place {
             Feature::Vertex => On::Vertex(side, nearest.corner),
             _ => On::Face(side),
         };
-        Self { point_B: nearest.point_B, on }
+        Self::new(nearest.point_B, on)
     }
 
     /// A face that it lies on.

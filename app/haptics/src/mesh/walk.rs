@@ -8,6 +8,13 @@
 //! edge, S being the foot of the HIP's perpendicular on it. A HIP in front of the surface lifts the god-object off: it
 //! flies straight to the HIP, and touches again where that way meets the mesh.
 //!
+//! Friction on a concave edge: one cone, about the direction of what both faces bear (Melder ch. 4.2.5). This is Coulomb's law
+//! in a groove whose bottom is round, however little, which a point touches in one place. Cones of both faces together could
+//! always bear what is felt. Along the edge they could bear more, in a groove of the angle `a` up to `1 / sin(a / 2)` times as
+//! much; so they do of a ball, which touches both ([`crate::rolling`]). By squeezing, friction could also hold a finger in any
+//! groove of less than twice the friction angle against every pull; neither points nor balls are squeezed.
+//! `tests/mesh/grooves.rs` holds points to all of this.
+//!
 //! Frames and signs: object frame B; forces are springs on the user \[m\].
 //! Invariants: the god-object is on the mesh. A frictionless walk never lengthens the spring, hence ends at a local
 //! minimum of the distance to the HIP.
@@ -111,7 +118,7 @@ fn cross_face(mesh: &Mesh, side: Side, from_B: Vector3<f64>, target_B: Vector3<f
     let (edge, share) = if met[1] < met[0] { (1, met[1]) } else { (0, met[0]) };
     let (edge, share) = if met[2] < share { (2, met[2]) } else { (edge, share) };
     if share == f64::INFINITY {
-        return Reached::Target(Place { point_B: target_B, on: On::Face(side) });
+        return Reached::Target(Place::new(target_B, On::Face(side)));
     }
     let met_B = from_B + (target_B - from_B) * share;
     let (start_B, edge_B) = facet.edge_B(mesh, edge);
@@ -153,7 +160,7 @@ fn follow_edge(mesh: &Mesh, side: Side, edge: usize, target_B: Vector3<f64>) -> 
 #[inline(always)]
 fn on_edge(mesh: &Mesh, side: Side, edge: usize, share: f64) -> Place {
     let facet = Facet::of(mesh, side);
-    let at = |corner| Place { point_B: facet.corner_B(mesh, corner), on: On::Vertex(side, corner) };
+    let at = |corner| Place::new(facet.corner_B(mesh, corner), On::Vertex(side, corner));
     if share <= SNAP {
         return at(edge);
     }
@@ -161,7 +168,7 @@ fn on_edge(mesh: &Mesh, side: Side, edge: usize, share: f64) -> Place {
         return at(next(edge));
     }
     let (start_B, edge_B) = facet.edge_B(mesh, edge);
-    Place { point_B: start_B + edge_B * share, on: On::Edge(side, edge) }
+    Place::new(start_B + edge_B * share, On::Edge(side, edge))
 }
 
 /// The edge or vertex that a place on a face happens to lie on, where a neighbour may hold what the face lets go.
@@ -181,7 +188,7 @@ fn rim(mesh: &Mesh, place: Place) -> Option<Place> {
         Some(&corner) => On::Vertex(side, corner),
         None => On::Edge(side, edge),
     };
-    Some(Place { on, ..place })
+    Some(Place::new(place.point_B, on))
 }
 
 /// Straight from where it was to the HIP through free space; `None` if nothing is in the way.

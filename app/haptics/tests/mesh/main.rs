@@ -12,6 +12,7 @@ mod crossing;
 mod energy;
 mod folds;
 mod friction;
+mod grooves;
 mod inside;
 mod joints;
 mod materials;

@@ -1,6 +1,7 @@
 //! Slow and obvious answers to what meshes are asked: every face is looked at, by other formulas.
 #![allow(dead_code)]
 
+pub(crate) mod coulomb;
 pub(crate) mod descent;
 
 use haptics::mesh::{Mesh, Sides};
