@@ -733,6 +733,7 @@ fn foreign_names_never_act_on_the_terminal() {
     place.write("broken.csv", good.replace(",none,", ",\u{1b}[2J,"));
     place.write("cell.csv", good.replace(",table,", ",\u{1b}[2J,"));
     place.write("object.csv", with_object(&good, "\u{1b}[2J"));
+    place.write("turned.ini", format!("{BALL}Glow=\u{202e}x\n"));
     let hand = format!("{EVIL}-hand.toml");
     place.write(&hand, include_str!("../../../config/hands/models/pen-grip.toml"));
     for arguments in [
@@ -753,6 +754,7 @@ fn foreign_names_never_act_on_the_terminal() {
         &["plot", &csv],
         &["plot", EVIL],
         &["convert", &csv],
+        &["convert", "turned.ini"],
         &["export", "cell.csv", "-"],
         &["export", "object.csv", "-"],
         &["study", "integrators", "--spins", "1", "--seconds", "0.01", "--masses", "1", "--out", EVIL],
