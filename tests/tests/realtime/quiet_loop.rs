@@ -15,6 +15,7 @@ use std::process::{Child, Command as Process, Stdio};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 use system_tests::driver::{Driver, HANG, wait_or_kill};
+use system_tests::faults::commander::Commander;
 use system_tests::programs;
 use system_tests::threads::{PageFaults, ThreadOf};
 
@@ -274,8 +275,12 @@ const SLEEPERS: usize = 200;
 #[test]
 fn a_crowd_asleep_on_the_shared_bell_is_never_woken_and_the_loop_faults_no_page() {
     let _turn = in_turn();
-    let (driver, mut phantom3) = both_programs_with("lock_memory = false\nwait = \"futex\"", IDEAL);
+    let driver = Driver::start(&format!(
+        "[real_time]\nlock_memory = false\nwait = \"futex\"\n[[device]]\n{IDEAL}\n[[device]]\n{IDEAL}\n"
+    ));
     let seen = driver.observe().driver;
+    // It sleeps for every frame, so that the loop has somebody to wake in each tick.
+    let commander = Commander::start(driver.command(), [0.0; 3]);
     wait_for(|| fresh(&seen), 1000);
     let (begun, woken) = (AtomicUsize::new(0), AtomicUsize::new(0));
     std::thread::scope(|scope| {
@@ -296,7 +301,7 @@ fn a_crowd_asleep_on_the_shared_bell_is_never_woken_and_the_loop_faults_no_page(
         assert_eq!(unheard.unwrap_or_else(|panic| std::panic::resume_unwind(panic)), 0, "were woken");
         assert_eq!(asleep, SLEEPERS, "slept to the end");
     });
-    phantom3.end();
+    drop(commander);
 }
 
 /// Sleeps there once, for as long as it takes somebody to wake it.
@@ -317,15 +322,10 @@ const SIMULATED: &str = "backend = \"simulated\"\ndescription = \"premium-1.5\"\
 
 /// The default scene and hand, with as much of the usual set-up as there are rights for.
 fn both_programs(lock: bool, backend: &str) -> (Driver, Child) {
-    both_programs_with(&format!("lock_memory = {lock}"), backend)
-}
-
-/// The same with these lines of `[real_time]`.
-fn both_programs_with(real_time: &str, backend: &str) -> (Driver, Child) {
     let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config");
     let hand = config.join("hands/default.csv");
     let device = format!("[[device]]\n{backend}\nhand = {:?}\n", hand.to_str().expect("UTF-8"));
-    let driver = Driver::start(&format!("[real_time]\n{real_time}\n{}", device.repeat(2)));
+    let driver = Driver::start(&format!("[real_time]\nlock_memory = {lock}\n{}", device.repeat(2)));
     let phantom3 = programs::phantom3()
         .args(["run", "--attach"])
         .arg(driver.socket())
