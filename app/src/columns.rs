@@ -35,6 +35,12 @@ pub struct Names {
 }
 
 impl Names {
+    /// Every name.
+    pub fn all(&self) -> impl Iterator<Item = &str> {
+        let spaces = self.spaces.iter().flatten();
+        self.fingers.iter().chain(&self.entities).chain(&self.bodies).chain(spaces).map(String::as_str)
+    }
+
     /// Whether a finger's torque is told.
     pub fn has_torque(&self, finger: usize) -> bool {
         self.torques.get(finger).copied().unwrap_or_default()

@@ -37,7 +37,7 @@ use nalgebra::{Isometry3, Vector3};
 use physics::{Aabb, Body, BroadPhase};
 use shm_abi::segment::ClockMode;
 use std::path::{Path, PathBuf};
-use world::{FrictionSpec, Layout, Scene, SceneEntity, SceneFinger, Settings, ShapeSpec};
+use world::{FacesSpec, FrictionSpec, Layout, Scene, SceneEntity, SceneFinger, Settings, ShapeSpec};
 
 /// A day (s): longer runs are asked for by repeating them.
 pub(crate) const LONGEST_RUN_S: f64 = 86_400.0;
@@ -256,6 +256,11 @@ impl Rig {
     /// The meshes, each with its file and what was found in it.
     pub fn mesh_reports(&self) -> &[(PathBuf, MeshReport)] {
         self.models.reports()
+    }
+
+    /// Tables of `[[entity.faces]]` that no face of their mesh is left for.
+    pub fn idle_faces(&self) -> impl Iterator<Item = &FacesSpec> {
+        self.scene.entities.iter().flat_map(|entity| self.models.idle_faces(entity))
     }
 
     /// The model and picture files that it is made of.

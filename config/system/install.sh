@@ -239,17 +239,36 @@ place() {
     fi
 }
 
-# Records the directories that were not there, the outer ones first; `/` is the --destdir itself.
+# Records the directories that were not there, the outer ones first; `/` is the --destdir itself, `/..` what it lies in.
 make_directory() {
     [ -d "$destdir$1" ] && return
     if [ "$1" = / ]; then
-        mkdir -p "$destdir" || fail "cannot make $destdir"
+        make_around "$(dirname "$destdir")" /..
+        [ -d "$destdir" ] || mkdir "$destdir" || fail "cannot make $destdir"
     else
         make_directory "$(dirname "$1")"
         mkdir "$destdir$1" || fail "cannot make $destdir$1"
     fi
     chmod 755 "$destdir$1" || fail "cannot open $destdir$1 to everybody"
     echo "directory - $1" >>"$scratch/directories"
+}
+
+# make_around DIRECTORY RECORDED_AS
+make_around() {
+    [ -d "$1" ] && return
+    make_around "$(dirname "$1")" "$2/.."
+    # One that ends in `..` is there now.
+    [ -d "$1" ] && return
+    mkdir "$1" || fail "cannot make $1"
+    echo "directory - $2" >>"$scratch/directories"
+}
+
+# Where a directory lies that was recorded so.
+directory_at() {
+    case $1 in
+    */..) dirname "$(directory_at "${1%/..}")" ;;
+    *) echo "$destdir$1" ;;
+    esac
 }
 
 remove_what_is_no_longer_shipped() {
@@ -324,7 +343,7 @@ uninstall_all() {
     remember_what_is_kept
     # The inner ones first. One that holds something else stays.
     sed -n '1!G;h;$p' "$scratch/former" | while read -r kind _ path; do
-        if [ "$kind" = directory ]; then rmdir "$destdir$path" 2>/dev/null; fi
+        if [ "$kind" = directory ]; then rmdir "$(directory_at "$path")" 2>/dev/null; fi
     done
     cat <<END
 

@@ -25,6 +25,7 @@ use commission::CommissionArgs;
 use emulate::EmulateArgs;
 use places::SocketArgs;
 pub use places::usual_socket;
+use rt_core::plain_text::PlainJson;
 use shm_abi::client::{self, AttachError};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -185,7 +186,7 @@ fn status(args: &StatusArgs) -> Result<(), AttachError> {
     loop {
         let status = Status::of(&attachment.driver, attachment.driver_pid);
         let text = match (args.json, args.watch) {
-            (true, _) => serde_json::to_string(&status).unwrap_or_default(),
+            (true, _) => PlainJson(serde_json::to_string(&status).unwrap_or_default()).to_string(),
             (false, true) => status.line(),
             (false, false) => status.to_string(),
         };

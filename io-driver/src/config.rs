@@ -215,6 +215,13 @@ mod tests {
     }
 
     #[test]
+    fn the_fastest_that_can_be_configured_is_the_fastest_that_is_believed() {
+        let fastest = format!("rate_hz = {}\n[[device]]\nbackend = \"ideal\"\n", RATE.max);
+        let config = parse(&fastest).expect("the fastest");
+        assert_eq!(config.period_ns, shm_abi::segment::SHORTEST_PERIOD_NS);
+    }
+
+    #[test]
     fn a_device_is_enough() {
         let config = parse("[[device]]\nbackend = \"ideal\"\n").expect("the defaults");
         assert_eq!(config.period_ns, 1_000_000);

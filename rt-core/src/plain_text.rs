@@ -78,7 +78,7 @@ fn escape_json(out: &mut fmt::Formatter<'_>, harmful: char) -> fmt::Result {
 }
 
 /// Control characters; format characters that are invisible, turn the direction of writing or break lines.
-fn is_harmful(c: char) -> bool {
+pub fn is_harmful(c: char) -> bool {
     c.is_control()
         || matches!(c,
             '\u{ad}' | '\u{61c}' | '\u{180e}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}'

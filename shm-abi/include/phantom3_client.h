@@ -387,7 +387,7 @@ static inline int phantom_is_possible(const PhantomDriverSegment *segment, char 
         {"layout hash", &header->layout_hash, PHANTOM_LAYOUT_HASH, PHANTOM_LAYOUT_HASH},
         {"ready word", &header->ready, 1, 1},
         {"segment of so many bytes", &header->segment_bytes, sizeof *segment, sizeof *segment},
-        {"period in nanoseconds", &header->period_ns, 1, UINT64_C(10000000000)},
+        {"period in nanoseconds", &header->period_ns, 50000, UINT64_C(10000000000)},
         {"reply budget in nanoseconds", &header->reply_budget_ns, 1, UINT64_MAX},
         {"age of a command in ticks", &header->max_command_age_ticks, 0, most_ticks},
         {"ramp out in ticks", &header->ramp_out_ticks, 1, most_ticks},

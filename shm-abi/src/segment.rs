@@ -14,6 +14,7 @@ mod mapping;
 mod offer;
 mod text;
 
+pub use bounds::SHORTEST_PERIOD_NS;
 pub use commander::{CommanderMemory, CommanderView};
 pub use description::{ClockMode, DeviceInfo, DriverInfo};
 pub use driver::{DriverMemory, DriverView, FrameUnavailable};

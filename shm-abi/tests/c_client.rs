@@ -264,15 +264,19 @@ fn a_c_program_is_told_what_a_driver_of_an_older_version_does_not_know_and_who_m
 
 #[test]
 fn a_c_program_refuses_a_driver_that_says_what_cannot_be() {
-    let mut driver = Driver::start();
-    driver.memory.header.period_ns.store(0, std::sync::atomic::Ordering::Relaxed);
-    let Some(client) = driver.client(&["observe", "1"]) else { return };
-    let output = driver.serve_until_it_ends(client);
-    assert_eq!(
-        String::from_utf8_lossy(&output.stderr),
-        "the driver says of itself: period in nanoseconds: 0, expected 1 to 10000000000; do not trust this driver, start \
-         the one that belongs to this program\n"
-    );
+    for period_ns in [0, 1, 49_999] {
+        let mut driver = Driver::start();
+        driver.memory.header.period_ns.store(period_ns, std::sync::atomic::Ordering::Relaxed);
+        let Some(client) = driver.client(&["observe", "1"]) else { return };
+        let output = driver.serve_until_it_ends(client);
+        assert_eq!(
+            String::from_utf8_lossy(&output.stderr),
+            format!(
+                "the driver says of itself: period in nanoseconds: {period_ns}, expected 50000 to 10000000000; do not \
+                 trust this driver, start the one that belongs to this program\n"
+            )
+        );
+    }
 }
 
 #[test]

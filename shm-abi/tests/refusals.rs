@@ -251,12 +251,14 @@ fn a_descriptor_that_is_no_segment_is_refused_before_it_is_touched() {
 #[test]
 fn a_driver_that_says_what_cannot_be_is_refused_with_found_and_expected() {
     type Word = fn(&shm_abi::layout::DriverHeader) -> &AtomicU64;
-    let lies: [(Word, u64, &str); 9] = [
-        (|h| &h.period_ns, 0, "period in nanoseconds: 0, expected 1 to 10000000000"),
+    let lies: [(Word, u64, &str); 11] = [
+        (|h| &h.period_ns, 0, "period in nanoseconds: 0, expected 50000 to 10000000000"),
+        (|h| &h.period_ns, 1, "period in nanoseconds: 1, expected 50000 to 10000000000"),
+        (|h| &h.period_ns, 49_999, "period in nanoseconds: 49999, expected 50000 to 10000000000"),
         (
             |h| &h.period_ns,
             u64::MAX,
-            "period in nanoseconds: 18446744073709551615, expected 1 to 10000000000",
+            "period in nanoseconds: 18446744073709551615, expected 50000 to 10000000000",
         ),
         (|h| &h.reply_budget_ns, 0, "reply budget in nanoseconds: 0, expected 1 to 18446744073709551615"),
         (|h| &h.ramp_in_ticks, 0, "ramp in in ticks: 0, expected 1 to 4294967296"),

@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 pub mod bare_loop;
+pub mod c_program;
 pub mod driver;
 pub mod everything;
 pub mod faults;

@@ -3,7 +3,7 @@
 use super::CalibrateArgs;
 use calibration::{Accuracy, Calibration, Fit, Transform};
 use nalgebra::{Isometry3, Vector3};
-use rt_core::plain_text::Plain;
+use rt_core::plain_text::{Plain, PlainJson};
 use serde_json::{Value, json};
 use std::fmt;
 use std::path::Path;
@@ -215,7 +215,7 @@ impl Report<'_> {
             })),
             "written_to": written.map(|file| file.display().to_string()),
         });
-        serde_json::to_string_pretty(&value).unwrap_or_default()
+        PlainJson(format_args!("{value:#}")).to_string()
     }
 }
 

@@ -23,10 +23,28 @@ pub(super) fn all(rig: &Rig, whole: &Scene, entities: &[Entity]) -> Vec<String> 
     warnings.extend(overlaps(rig, entities));
     warnings.extend(inside(rig, entities));
     warnings.extend(closed(rig, entities));
+    warnings.extend(idle_faces(rig));
     warnings.extend(unseen(whole));
     let unused = whole.templates.iter().filter(|template| template.entities == 0);
     warnings.extend(unused.map(|template| format!("no entity is made from template {}", template.name)));
     warnings
+}
+
+/// Tables of faces that change nothing.
+fn idle_faces(rig: &Rig) -> Vec<String> {
+    let mut told: Vec<String> = Vec::new();
+    for faces in rig.idle_faces() {
+        let line = format!(
+            "{}: no face is left for {}: tables before it have all that it names; put it before them, or leave it out",
+            faces.at,
+            in_words(&faces.of)
+        );
+        // Several entities may be made of one table.
+        if !told.contains(&line) {
+            told.push(line);
+        }
+    }
+    told
 }
 
 /// Surface that fingers feel: of an entity, or of faces of one with another material.

@@ -63,6 +63,8 @@ pub(super) enum RecordedError {
     NoNumber { file: PathBuf, line: u64, column: String, found: String },
     #[error("{file}:{line}: {why}")]
     BadTime { file: PathBuf, line: u64, why: String },
+    #[error("{file}:{line}: {why}")]
+    BadText { file: PathBuf, line: u64, why: String },
     #[error("{file}: it has no rows")]
     NoRows { file: PathBuf },
     #[error("{file}: no row between {from_s} s and {to_s} s; it lasts from {first_s} s to {last_s} s")]

@@ -5,7 +5,9 @@
 use super::recorded::RecordedError;
 use crate::bounded_lines::BoundedLines;
 use crate::columns::{Cell, columns, each_cell};
-use crate::record::read::{MOST_ROW_BYTES, RecordedRun, TimeOrder, check_begin, is_mcap, is_parquet};
+use crate::record::read::{
+    MOST_ROW_BYTES, RecordedRun, TimeOrder, check_begin, check_text, is_mcap, is_parquet,
+};
 use csv::StringRecord;
 use io_driver::say::say;
 use parquet::errors::ParquetError;
@@ -59,6 +61,10 @@ impl Table {
             let (columns, rows) = CsvTable::open(file).map_err(|source| unreadable(file, source))?;
             (columns, Rows::Csv(Box::new(rows)))
         };
+        for (index, column) in columns.iter().enumerate() {
+            check_text(column)
+                .map_err(|why| bad_text(file, 1, &format!("its column {}: {why}", index + 1)))?;
+        }
         Ok(Self { file: file.into(), columns, rows, read: 0, times: TimeOrder::default() })
     }
 
@@ -77,7 +83,15 @@ impl Table {
         match cells {
             Some(cells) => {
                 self.read += 1;
-                Ok(Some(TableRow { line: self.read + 1, cells }))
+                let line = self.read + 1;
+                for (index, cell) in cells.iter().enumerate() {
+                    let Value::Text(text) = cell else { continue };
+                    check_text(text).map_err(|why| {
+                        let name = self.columns.get(index).map_or("", String::as_str);
+                        bad_text(&self.file, line, &format!("column {} ({name}): {why}", index + 1))
+                    })?;
+                }
+                Ok(Some(TableRow { line, cells }))
             }
             None => {
                 self.tell_cut();
@@ -138,6 +152,10 @@ impl TableRow {
 
 fn unreadable(file: &Path, source: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> RecordedError {
     RecordedError::Read { file: file.into(), source: source.into() }
+}
+
+fn bad_text(file: &Path, line: u64, why: &str) -> RecordedError {
+    RecordedError::BadText { file: file.into(), line, why: why.into() }
 }
 
 /// Text, whose last line may be cut off.

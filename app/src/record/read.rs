@@ -18,6 +18,7 @@ pub(crate) use csv_rows::MOST_ROW_BYTES;
 use mcap_rows::McapRows;
 use rt_core::file_kind::{self, BEGIN_BYTES};
 use rt_core::input_file;
+use rt_core::plain_text::is_harmful;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -157,6 +158,14 @@ impl RecordedRun {
             Rows::Mcap(rows) => rows.cut.as_deref(),
         }
     }
+}
+
+/// Refuses a text that a terminal would act on: names go from recordings to people and into files of ours.
+pub(crate) fn check_text(text: &str) -> Result<(), String> {
+    if text.contains(is_harmful) {
+        return Err(format!("found {text:?}, allowed: no control characters"));
+    }
+    Ok(())
 }
 
 /// Refuses what can be told from the first bytes to be no recording in any format.

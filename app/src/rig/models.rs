@@ -3,7 +3,8 @@
 //! What was repaired is told once, what cannot be used is refused with the place in the scene and in the model.
 
 use super::entities::is_only_seen;
-use super::{Problems, RigError, face_labels, material};
+use super::face_labels::{self, Unknown};
+use super::{Problems, RigError, material};
 use haptics::mesh::{CloseHoles, CornerUv, FaceData, Finding, Mesh, MeshReport, TriangleSoup};
 use haptics::{Nurbs, Shading};
 use io_driver::say::say;
@@ -24,6 +25,8 @@ pub(super) struct Models {
     shadings: Vec<(Key, ShadingSpec, Shading)>,
     nurbs: BTreeMap<Key, Arc<Nurbs>>,
     reports: Vec<(PathBuf, MeshReport)>,
+    /// Tables of faces, by their places, that no face is left for.
+    idle: BTreeMap<Key, Vec<usize>>,
     /// Entities whose meshes nobody feels.
     only_seen: BTreeSet<String>,
 }
@@ -36,7 +39,7 @@ impl Models {
     /// Loads every mesh that the scene's entities use; those that cannot be had are noted.
     pub(super) fn load(scene: &Scene, problems: &mut Problems) -> Self {
         let mut models = Self::default();
-        let mut refused = BTreeSet::new();
+        let mut refused: BTreeMap<Key, Vec<Unknown>> = BTreeMap::new();
         for entity in &scene.entities {
             if is_drawn_from_its_file(scene, entity) {
                 models.only_seen.insert(entity.name.clone());
@@ -45,29 +48,37 @@ impl Models {
             let has_picture = entity.height_map.is_some();
             let (ShapeSpec::Nurbs(spec) | ShapeSpec::Mesh(spec)) = &entity.shape else { continue };
             let key = key_of(spec, has_picture && matches!(entity.shape, ShapeSpec::Mesh(_)), &entity.faces);
-            if refused.contains(&key) {
+            if let Some(unknown) = refused.get(&key) {
+                note_unknown(unknown, spec, entity, problems);
                 continue;
             }
-            if let Err(problem) = models.add(entity, &key) {
-                problems.note(problem);
-                refused.insert(key);
-            } else if matches!(entity.shape, ShapeSpec::Mesh(_)) {
-                models.shade(key, entity.shading);
+            match models.add(entity, &key) {
+                Err(Refusal::Model(problem)) => {
+                    problems.note(*problem);
+                    refused.insert(key, Vec::new());
+                }
+                Err(Refusal::Faces(unknown)) => {
+                    note_unknown(&unknown, spec, entity, problems);
+                    refused.insert(key, unknown);
+                }
+                Ok(()) if matches!(entity.shape, ShapeSpec::Mesh(_)) => models.shade(key, entity.shading),
+                Ok(()) => {}
             }
         }
         models
     }
 
     /// Loads what is not there yet.
-    fn add(&mut self, entity: &SceneEntity, key: &Key) -> Result<(), RigError> {
+    fn add(&mut self, entity: &SceneEntity, key: &Key) -> Result<(), Refusal> {
         match &entity.shape {
             ShapeSpec::Nurbs(spec) if !self.nurbs.contains_key(key) => {
                 self.nurbs.insert(key.clone(), Arc::new(join(spec)?));
             }
             ShapeSpec::Mesh(spec) if !self.meshes.contains_key(key) => {
-                let (mesh, report) = build(spec, key.2, &entity.faces)?;
+                let Built { mesh, report, idle } = build(spec, key.2, &entity.faces)?;
                 self.reports.push((spec.file.clone(), report));
                 self.meshes.insert(key.clone(), Arc::new(mesh));
+                self.idle.insert(key.clone(), idle);
             }
             _ => {}
         }
@@ -82,6 +93,15 @@ impl Models {
             ShapeSpec::Nurbs(spec) => self.nurbs(spec).is_some(),
             _ => true,
         }
+    }
+
+    /// The tables of an entity's faces that no face is left for.
+    pub(super) fn idle_faces<'a>(&'a self, entity: &'a SceneEntity) -> impl Iterator<Item = &'a FacesSpec> {
+        let tables = match &entity.shape {
+            ShapeSpec::Mesh(spec) => self.idle.get(&key_in(spec, entity)),
+            _ => None,
+        };
+        tables.into_iter().flatten().filter_map(|&table| entity.faces.get(table))
     }
 
     /// The meshes, each with its file and what was found in it, in the order in which they were loaded.
@@ -121,6 +141,35 @@ impl Models {
     }
 }
 
+/// Why a model cannot be had.
+enum Refusal {
+    Model(Box<RigError>),
+    /// No face has these names.
+    Faces(Vec<Unknown>),
+}
+
+impl From<RigError> for Refusal {
+    fn from(error: RigError) -> Self {
+        Self::Model(Box::new(error))
+    }
+}
+
+/// Several entities may be made of one table.
+fn note_unknown(unknown: &[Unknown], spec: &MeshSpec, entity: &SceneEntity, problems: &mut Problems) {
+    unknown
+        .iter()
+        .filter_map(|unknown| unknown.told(&spec.file, &entity.faces))
+        .for_each(|problem| problems.note_once(problem));
+}
+
+/// A mesh that was read.
+struct Built {
+    mesh: Mesh,
+    report: MeshReport,
+    /// Tables of faces that no face is left for.
+    idle: Vec<usize>,
+}
+
 /// A mesh that nobody feels is not built: its file need not hold one that can be felt.
 fn is_drawn_from_its_file(scene: &Scene, entity: &SceneEntity) -> bool {
     matches!(entity.shape, ShapeSpec::Mesh(_)) && is_only_seen(scene, entity)
@@ -141,7 +190,7 @@ fn key_of(spec: &MeshSpec, has_picture: bool, faces: &[FacesSpec]) -> Key {
     )
 }
 
-fn build(spec: &MeshSpec, has_picture: bool, faces: &[FacesSpec]) -> Result<(Mesh, MeshReport), RigError> {
+fn build(spec: &MeshSpec, has_picture: bool, faces: &[FacesSpec]) -> Result<Built, Refusal> {
     let file = &spec.file;
     let unreadable = |source| RigError::Model { at: Box::new(spec.at.clone()), file: file.clone(), source };
     let bytes = model::read_file(file).map_err(unreadable)?;
@@ -150,8 +199,9 @@ fn build(spec: &MeshSpec, has_picture: bool, faces: &[FacesSpec]) -> Result<(Mes
         None
     } else {
         let names = model::read_names(file, &bytes).map_err(unreadable)?;
-        Some(face_labels::labels(file, names.as_ref(), faces)?)
+        Some(face_labels::labels(names.as_ref(), faces).map_err(Refusal::Faces)?)
     };
+    let idle = labels.as_ref().map_or_else(Vec::new, |labels| face_labels::idle(labels, faces.len()));
     let soup = scaled(soup, &spec.scale);
     let holes = spec.close_holes_m.map_or(CloseHoles::Small, CloseHoles::UpTo);
     let of_faces = FaceData { uv: uv.as_deref(), labels: labels.as_deref() };
@@ -161,7 +211,7 @@ fn build(spec: &MeshSpec, has_picture: bool, faces: &[FacesSpec]) -> Result<(Mes
         source: Box::new(source),
     })?;
     tell(file, &report);
-    Ok((if spec.hollow { mesh.into_sheet() } else { mesh }, report))
+    Ok(Built { mesh: if spec.hollow { mesh.into_sheet() } else { mesh }, report, idle })
 }
 
 /// Reads and joins the patches of a file.

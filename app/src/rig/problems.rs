@@ -33,6 +33,14 @@ impl Problems {
         }
     }
 
+    /// Notes what may have been found already, in another entity that is made of the same.
+    pub(super) fn note_once(&mut self, problem: RigError) {
+        let words = problem.to_string();
+        if self.found.iter().all(|found| found.to_string() != words) {
+            self.note(problem);
+        }
+    }
+
     /// For whoever stops at the first problem. Without a value something was found.
     pub(super) fn first_or<T>(self, value: Option<T>) -> Result<T, RigError> {
         match (self.found.into_iter().next(), value) {

@@ -21,6 +21,7 @@ use crate::progress::StatusLine;
 use clap::Args;
 use io_driver::say::say;
 use physics::Integrator;
+use rt_core::plain_text::Plain;
 use rt_core::replacement;
 use rt_core::signals::StopSignals;
 use std::path::PathBuf;
@@ -156,11 +157,11 @@ fn write(args: &IntegratorsArgs, spun: &[Spun], leant: &[Leant], held: &[Held]) 
     table::figure(args, spun, held)
         .write(&args.out.join("integrators"))
         .map_err(|error| RunFailure::Results(format!("cannot write the picture: {error}")))?;
-    let place = args.out.display();
-    let said = format!(
-        "written      {place}/integrators-spin.csv, integrators-lean.csv, integrators-stiffness.csv, integrators.svg, .png\n"
+    let place = Plain(args.out.display());
+    let said = format_args!(
+        "written      {place}/integrators-spin.csv, integrators-lean.csv, integrators-stiffness.csv, integrators.svg, .png"
     );
-    outputs::print(&said);
+    outputs::tell(&said, false);
     Ok(())
 }
 

@@ -23,11 +23,12 @@ pub mod table;
 pub mod trial;
 
 use crate::outcome::{RunFailure, Stop};
-use crate::outputs::print;
+use crate::outputs::{print, tell};
 use crate::progress::StatusLine;
 use case::{Axis, Case};
 use clap::Args;
 use io_driver::say::say;
+use rt_core::plain_text::Plain;
 use rt_core::signals::StopSignals;
 use search::{Found, Search};
 use std::path::PathBuf;
@@ -123,7 +124,7 @@ pub fn execute(args: &StiffnessArgs, signals: &StopSignals) -> Result<Stop, RunF
     picture::figure(&bench, &answers)
         .write(&args.out.join("stiffness"))
         .map_err(|error| late(&format_args!("cannot write the picture: {error}")))?;
-    print(&format!("written      {}/stiffness.csv, .svg, .png\n", args.out.display()));
+    tell(&format_args!("written      {}/stiffness.csv, .svg, .png", Plain(args.out.display())), false);
     Ok(Stop::Finished)
 }
 

@@ -25,9 +25,7 @@ const BRIGHTEST_BYTE: f64 = 255.0;
 
 fn shares<const N: usize>(value: &Value<'_>) -> Result<[f64; N], SceneError> {
     let shares: [f64; N] = value.numbers_in(Bound::NotNegative)?;
-    if shares.iter().all(|share| *share <= 1.0) {
-        return Ok(shares);
-    }
+    let Some(first) = shares.iter().position(|share| *share > 1.0) else { return Ok(shares) };
     let allowed = format!("an array of {N} numbers from 0 to 1");
     if shares.iter().all(|share| *share <= BRIGHTEST_BYTE && share.fract() == 0.0) {
         // Rounded to what the eye can tell.
@@ -38,5 +36,5 @@ fn shares<const N: usize>(value: &Value<'_>) -> Result<[f64; N], SceneError> {
             allowed: format!("{allowed}: write {meant:?}"),
         });
     }
-    Err(value.out_of_range(allowed))
+    Err(value.nth(first).as_ref().unwrap_or(value).out_of_range("a number from 0 to 1"))
 }

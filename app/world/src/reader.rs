@@ -407,6 +407,12 @@ impl<'d> Value<'d> {
         Value { document: self.document, path: format!("{}[{i}]", self.path), value, beneath: None }
     }
 
+    /// One of an array.
+    pub(crate) fn nth(&self, i: usize) -> Option<Value<'d>> {
+        let DeValue::Array(items) = self.value.get_ref() else { return None };
+        Some(self.item(i, items.get(i)?))
+    }
+
     fn integer(&self) -> Option<i64> {
         let DeValue::Integer(integer) = self.value.get_ref() else { return None };
         i64::from_str_radix(integer.as_str(), integer.radix()).ok()

@@ -1,15 +1,17 @@
 //! Bounds of what a driver may say of itself.
 //!
-//! A driver that lies must not make a client divide by zero, wait for ever or reserve all memory. The bounds are far
-//! beyond what any driver is configured to; whoever exceeds them is not believed at all.
+//! A driver that lies must not make a client divide by zero, wait for ever or reserve all memory. The bounds are at
+//! or beyond what any driver can be configured to; whoever exceeds them is not believed at all.
 
 use super::{SegmentError, get};
 use crate::layout::{DriverHeader, DriverSegment, MAX_DEVICES};
 use std::ops::RangeInclusive;
 use std::sync::atomic::AtomicU64;
 
-/// Length of a tick: from a nanosecond, on a virtual clock, to ten seconds.
-pub(super) const PERIOD_NS: RangeInclusive<u64> = 1..=10_000_000_000;
+/// The shortest tick of a driver (ns): 20 kHz. A driver that told of a nanosecond would make hours of a run of seconds.
+pub const SHORTEST_PERIOD_NS: u64 = 50_000;
+/// Length of a tick: from the shortest that a driver can be configured to, to ten seconds.
+pub(super) const PERIOD_NS: RangeInclusive<u64> = SHORTEST_PERIOD_NS..=10_000_000_000;
 /// Ages and ramps: a day of ticks at 40 kHz.
 const TICKS: RangeInclusive<u64> = 1..=1 << 32;
 

@@ -7,12 +7,15 @@ mod mcap_bytes;
 mod outputs;
 mod pipes;
 
+use haptics::NurbsPatch;
+use haptics::nurbs::MAX_DEGREE;
 use std::ffi::{OsStr, OsString};
 use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::process::CommandExt;
 use std::path::Path;
 use system_tests::workplace::{Running, Said, Workplace};
+use world::model::write_patches;
 
 const SCENE: &str = "[[finger]]\n[[entity]]\nname = \"table\"\n\
     shape = { kind = \"plane\", normal = [0.0, 1.0, 0.0], offset_m = 0.0 }\n";
@@ -448,12 +451,45 @@ fn with_recordings(place: &Workplace) {
     }
 }
 
-/// With room for two gigabytes of addresses, which a recording of some kilobytes does not fill.
-fn run_in_little_memory(place: &Workplace, arguments: &[&str]) -> Said {
+/// With room for so many megabytes of addresses.
+fn run_in_little_memory(place: &Workplace, megabytes: u32, arguments: &[&str]) -> Said {
     let mut program = place.prepare(std::process::Command::new("sh"));
-    program.args(["-c", "ulimit -v 2000000; exec \"$0\" \"$@\""]);
+    program.args(["-c", &format!("ulimit -v {megabytes}000; exec \"$0\" \"$@\"")]);
     program.arg(place.phantom3().get_program()).args(arguments);
     Running::start(program).wait()
+}
+
+/// A sound patch of so many spans along each side, which falls into that many polynomials of the highest degree.
+fn patch(spans: usize, height: impl Fn(usize) -> f64) -> NurbsPatch {
+    let count = spans + MAX_DEGREE;
+    let knot = |knot: usize| (knot.clamp(MAX_DEGREE, count) - MAX_DEGREE) as f64;
+    let knots: Vec<f64> = (0..count + MAX_DEGREE + 1).map(knot).collect();
+    let point = |index: usize| [(index % count) as f64, height(index), (index / count) as f64, 1.0];
+    NurbsPatch {
+        degree: [MAX_DEGREE; 2],
+        knots: [knots.clone(), knots],
+        points: (0..count * count).map(point).collect(),
+    }
+}
+
+/// Its polynomials alone took 735 MB before they were refused, half of which does not fit here.
+#[test]
+fn a_file_of_patches_that_would_fill_the_memory_is_refused_in_little_of_it() {
+    let place = workplace();
+    let jagged = |index: usize| if index.is_multiple_of(2) { 50.0 } else { -50.0 };
+    place.write("scene.toml", "[[finger]]\n[[entity]]\nshape = { kind = \"nurbs\", file = \"p.toml\" }\n");
+    for patch in [patch(210, |_| 0.0), patch(100, jagged)] {
+        place.write("p.toml", write_patches(&[patch]));
+        let said = run_in_little_memory(&place, 512, &["check", "scene.toml"]);
+        assert_eq!((said.status, said.err.as_str()), (Some(2), ""), "{}", said.out);
+        let words =
+            ["scene.toml:3: entity[0].shape", "p.toml", "the patches would take more than", "MB of memory"];
+        assert_says(&said.out, &words);
+    }
+    // Room for what is no mistake.
+    place.write("p.toml", write_patches(&[patch(4, |_| 0.0)]));
+    let said = run_in_little_memory(&place, 512, &["check", "scene.toml"]);
+    assert_eq!(said.status, Some(0), "{}{}", said.out, said.err);
 }
 
 #[test]
@@ -474,7 +510,7 @@ fn a_recording_whose_lengths_are_lies_is_told_as_damaged_and_takes_no_memory_for
         bad[at..at + lie.len()].copy_from_slice(lie);
         place.write("bad.mcap", &bad);
         for command in [&["export", "bad.mcap", "--csv", "out2.csv"][..], &["replay", "bad.mcap"]] {
-            let said = run_in_little_memory(&place, command);
+            let said = run_in_little_memory(&place, 2000, command);
             assert!(!said.err.contains("panicked") && !said.err.contains("allocation"), "{at}: {}", said.err);
             assert!(
                 matches!(said.status, Some(0 | 2 | 3)),
@@ -496,7 +532,7 @@ fn a_line_without_an_end_takes_no_memory_for_it() {
         &["export", "holes.csv", "--csv", "out2.csv"],
         &["replay", "holes.csv", "--scene", "scene.toml"],
     ] {
-        let said = run_in_little_memory(&place, command);
+        let said = run_in_little_memory(&place, 2000, command);
         assert_eq!(said.status, Some(2), "{command:?}: {}", said.err);
         assert_says(&said.err, &["holes.csv", "a line has more than 67108864 bytes"]);
     }
@@ -616,9 +652,77 @@ fn is_plain(text: &str) -> bool {
     !text.contains(is_harmful)
 }
 
+/// Any format will do, and the words do not ask for a certain one.
+#[test]
+fn an_export_without_a_table_to_write_asks_for_one_of_any_format() {
+    let place = workplace();
+    with_recordings(&place);
+    for recording in ["good.mcap", "good.csv"] {
+        let said = refused(&place, &["export", recording]);
+        assert_says(&said, &["required", "not provided:\n  <OUT>...\n", "export <RECORDING> <OUT>..."]);
+        assert!(!said.contains("--parquet") && !said.contains("--csv"), "{said}");
+    }
+    let help = place.run(["export", "--help"]).out;
+    assert_says(&help, &["OUT.csv", "OUT.parquet", "lift.mcap - | head"]);
+}
+
+/// A recording with one more object, of this name.
+fn with_object(recording: &str, name: &str) -> String {
+    let columns: String = ["x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz"]
+        .map(|of| format!(",{name}_{of}"))
+        .concat();
+    let mut lines = recording.lines();
+    let header = lines.next().expect("a first line");
+    let rows: String = lines.map(|row| format!("{row},0,0,0,1{}\n", ",0".repeat(9))).collect();
+    format!("{header}{columns}\n{rows}")
+}
+
+#[test]
+fn a_recording_whose_names_hold_control_characters_is_refused_with_line_and_column() {
+    let place = workplace();
+    with_recordings(&place);
+    let good = std::fs::read_to_string(place.path("good.csv")).expect("a recording");
+    place.write("good2.csv", with_object(&good, "ball"));
+    assert_eq!(
+        place.run(["export", "good2.csv", "-"]).status,
+        Some(0),
+        "what is tested below is the name only"
+    );
+    let row = good.lines().nth(50).expect("a row");
+    for (evil, told) in
+        [("\u{1b}[2J", "\"\\u{1b}[2J\""), ("\u{9b}31m", "\"\\u{9b}31m\""), ("a\u{202e}b", "\"a\\u{202e}b\"")]
+    {
+        let damaged = row.replacen(",table,", &format!(",{evil},"), 1);
+        assert_ne!(damaged, row, "it touches the table");
+        place.write("cell.csv", good.replacen(row, &damaged, 1));
+        place.write("object.csv", with_object(&good, evil));
+        for command in [
+            &["export", "FILE", "-"][..],
+            &["export", "FILE", "--csv", "out2.csv"],
+            &["replay", "FILE", "--scene", "scene.toml"],
+            &["plot", "FILE", "--svg-only"],
+        ] {
+            let of = |file| {
+                command.iter().map(|&word| if word == "FILE" { file } else { word }).collect::<Vec<_>>()
+            };
+            let said = place.run(of("cell.csv"));
+            assert_eq!(said.status, Some(3), "{evil:?} {command:?}: {}{}", said.out, said.err);
+            let parts = ["cell.csv:51: column 11 (f0_entity): found", told, "no control characters"];
+            assert_says(&said.err, &parts);
+            assert!(is_plain(&said.out) && is_plain(&said.err), "{command:?}: {said:?}");
+            let said = place.run(of("object.csv"));
+            assert_eq!(said.status, Some(2), "{evil:?} {command:?}: {}{}", said.out, said.err);
+            let name = told.replace('"', "");
+            assert_says(&said.err, &["object.csv", "its column ", &name, "no control characters"]);
+        }
+    }
+}
+
 #[test]
 fn foreign_names_never_act_on_the_terminal() {
     const EVIL: &str = "\u{1b}[2J\u{1b}]0;mine\u{7}\u{9b}31m\u{202e}x";
+    /// Some seconds.
+    const ONE_CASE: [&str; 6] = ["--rates", "1000", "--modes", "same-tick", "--dampings", "0"];
     let place = workplace();
     with_recordings(&place);
     let (csv, scene) = (format!("{EVIL}\nphantom3: all is well.csv"), format!("{EVIL}.toml"));
@@ -627,6 +731,11 @@ fn foreign_names_never_act_on_the_terminal() {
     let good = std::fs::read_to_string(place.path("good.csv")).expect("a recording");
     place.write(&csv, good.replace("f0_", "\u{1b}[2Jf0_"));
     place.write("broken.csv", good.replace(",none,", ",\u{1b}[2J,"));
+    place.write("cell.csv", good.replace(",table,", ",\u{1b}[2J,"));
+    place.write("object.csv", with_object(&good, "\u{1b}[2J"));
+    place.write("turned.ini", format!("{BALL}Glow=\u{202e}x\n"));
+    let hand = format!("{EVIL}-hand.toml");
+    place.write(&hand, include_str!("../../../config/hands/models/pen-grip.toml"));
     for arguments in [
         &["check", "named.toml"][..],
         &["check", "named.toml", "--json"],
@@ -645,6 +754,12 @@ fn foreign_names_never_act_on_the_terminal() {
         &["plot", &csv],
         &["plot", EVIL],
         &["convert", &csv],
+        &["convert", "turned.ini"],
+        &["export", "cell.csv", "-"],
+        &["export", "object.csv", "-"],
+        &["study", "integrators", "--spins", "1", "--seconds", "0.01", "--masses", "1", "--out", EVIL],
+        &[&["study", "stiffness", "--hands", &hand, "--out", EVIL], &ONE_CASE[..]].concat(),
+        &["study", "stiffness", "--device", EVIL],
     ] {
         let said = place.run(arguments);
         assert!(is_plain(&said.out), "{arguments:?} prints {:?}", said.out);

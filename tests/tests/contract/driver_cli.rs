@@ -26,6 +26,19 @@ fn strict_refuses_to_start_without_a_guarantee_and_leaves_nothing_behind() {
     assert!(!socket.exists() && !socket.parent().expect("a directory").exists());
 }
 
+#[test]
+fn status_is_json_whatever_a_device_is_called() {
+    const NAME: &str = "a\u{202e}b";
+    let driver = Driver::start(&format!(
+        "[real_time]\npriority = 0\nlock_memory = false\n[[device]]\nname = \"{NAME}\"\nbackend = \"ideal\"\n"
+    ));
+    let End { status, out, err, .. } = process::io_driver(&["status", "--json"], driver.socket());
+    assert_eq!((status, err.as_str()), (Some(0), ""), "{out}");
+    let told: serde_json::Value = serde_json::from_str(&out).expect("JSON");
+    assert_eq!(told["devices"][0]["name"].as_str(), Some(NAME));
+    assert!(!out.contains('\u{202e}'), "{out:?}");
+}
+
 /// As its parent gives it: what is no configuration must not fill the memory.
 #[test]
 fn a_configuration_from_standard_input_that_never_ends_is_refused() {

@@ -87,6 +87,52 @@ fn a_name_that_no_face_has_is_refused_with_those_that_there_are() {
 }
 
 #[test]
+fn every_name_that_no_face_has_is_told_in_one_go() {
+    let place = Workplace::new();
+    place.write("floor.obj", FLOOR);
+    let tables = "[[entity.faces]]\nof = \"crok\"\nmaterial = \"rubber\"\n\
+        [[entity.faces]]\nof = \"ice\"\nmaterial = \"rubber\"\n\
+        [[entity.faces]]\nof = [\"eis\", \"cork\", \"steel\"]\nmaterial = \"rubber\"\n";
+    // The second floor, which is read no second time, has the same mistakes.
+    let second = format!(
+        "[[entity]]\nname = \"floor2\"\nshape = {{ kind = \"mesh\", file = \"floor.obj\" }}\n{tables}"
+    );
+    place.write("scene.toml", scene(0.0, &format!("{tables}{second}")));
+    let said = place.run(["check", "scene.toml"]);
+    assert_eq!(said.status, Some(2), "{}{}", said.out, said.err);
+    let told: Vec<&str> = said.out.lines().filter(|line| line.contains("which no face of")).collect();
+    let expected = [
+        "scene.toml:9: entity[0].faces[0].of: found \"crok\"",
+        "scene.toml:15: entity[0].faces[2].of: found \"eis\"",
+        "scene.toml:15: entity[0].faces[2].of: found \"steel\"",
+        "scene.toml:21: entity[1].faces[0].of: found \"crok\"",
+        "scene.toml:27: entity[1].faces[2].of: found \"eis\"",
+        "scene.toml:27: entity[1].faces[2].of: found \"steel\"",
+    ];
+    assert_eq!(told.len(), expected.len(), "{}", said.out);
+    told.iter().zip(expected).for_each(|(told, expected)| assert!(told.contains(expected), "{told}"));
+    assert!(said.out.contains("problems: 6, warnings: 0"), "{}", said.out);
+}
+
+#[test]
+fn check_warns_of_a_table_that_no_face_is_left_for() {
+    let place = Workplace::new();
+    place.write("floor.obj", FLOOR);
+    // Those of "end" are of cork, too.
+    let last = "[[entity.faces]]\nof = [\"end\", \"ice\"]\ndamping_n_s_per_m = 1.0\n";
+    place.write("scene.toml", scene(0.0, &format!("{FACES}{last}")));
+    let said = place.run(["check", "scene.toml"]);
+    assert_eq!(said.status, Some(0), "{}{}", said.out, said.err);
+    let warning = "scene.toml:18: entity[0].faces[3].of: no face is left for end, ice: tables before it have all that \
+        it names; put it before them, or leave it out";
+    assert!(said.out.contains(warning), "{}", said.out);
+    assert!(!said.out.contains("faces[2].of: no face"), "one of cork is left: {}", said.out);
+    place.write("scene.toml", scene(0.0, FACES));
+    let said = place.run(["check", "scene.toml"]);
+    assert!(!said.out.contains("no face is left"), "{}", said.out);
+}
+
+#[test]
 fn check_lists_the_names_that_a_scene_may_use() {
     let place = Workplace::new();
     place.write("floor.obj", FLOOR);

@@ -2,33 +2,14 @@
 //! of a real driver process of today.
 
 use patience::prelude::*;
-use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
+use system_tests::c_program::compiled;
 use system_tests::driver::Driver;
 use system_tests::faults::press;
 use system_tests::faults::ring::RingLog;
 
-/// The program, compiled with the headers of 1.0; `None` (and a line why) without a C compiler.
-fn pusher(directory: &Path) -> Option<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let program = directory.join("pusher");
-    let named = std::env::var("CC").unwrap_or_else(|_| "cc".into());
-    let mut words = named.split_whitespace();
-    let mut compiler = Command::new(words.next().expect("CC is empty"));
-    compiler.args(words).args(["-std=c11", "-O2"]);
-    compiler.arg("-I").arg(root.join("../shm-abi/tests/frozen/1.0"));
-    compiler.arg(root.join("tests/c/pusher.c")).arg("-o").arg(&program);
-    match compiler.bounded_output() {
-        Err(error) => {
-            println!("skipped: no C compiler: {named}: {error}");
-            None
-        }
-        Ok(output) => {
-            assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-            Some(program)
-        }
-    }
-}
+/// As they were released.
+const HEADERS_OF_1_0: &str = "shm-abi/tests/frozen/1.0";
 
 /// Killed when dropped.
 struct Running(Child);
@@ -42,7 +23,7 @@ impl Drop for Running {
 #[test]
 fn the_motors_obey_a_commander_built_with_the_headers_of_1_0_and_stop_when_it_dies() {
     let directory = tempfile::tempdir().expect("a directory");
-    let Some(program) = pusher(directory.path()) else { return };
+    let Some(program) = compiled("pusher", HEADERS_OF_1_0, directory.path()) else { return };
     let driver = Driver::start(&press::config("real"));
     let observer = driver.observe();
     let mut log = RingLog::begin(&observer.driver);

@@ -192,6 +192,14 @@ fn an_affine_calibration_finds_the_stretch_and_a_run_uses_it() {
     let said = place.run(arguments.iter().chain(&["--json"]));
     done(&said);
     let json: serde_json::Value = serde_json::from_str(&said.out).expect("JSON");
+    assert_eq!(json["written_to"].as_str(), Some("out.toml"));
+    // A name that a terminal would act on is the same in JSON, and does not reach it.
+    const EVIL: &str = "\u{9b}31m\u{202e}.toml";
+    let said = place.run(["calibrate", "--pairs", "pairs.csv", "--affine", "--json", "--write", EVIL]);
+    done(&said);
+    let written: serde_json::Value = serde_json::from_str(&said.out).expect("JSON");
+    assert_eq!(written["written_to"].as_str(), Some(EVIL));
+    assert!(!said.out.contains(['\u{9b}', '\u{202e}']), "{:?}", said.out);
     assert_eq!((json["model"].as_str(), json["pairs"].as_u64()), (Some("affine"), Some(300)));
     assert!(json["residual_rms_m"].as_f64().is_some_and(|rms| rms < ROUNDING), "{json}");
     let placed = Layout::load(place.path("out.toml")).expect("in order").placement(1);

@@ -2,6 +2,7 @@
 
 mod app_killed;
 mod app_stopped;
+mod c_program;
 mod campaign;
 mod crowds;
 mod descriptors;

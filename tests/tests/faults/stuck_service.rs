@@ -2,6 +2,7 @@
 //! the loop stops them by itself.
 
 use crate::service::{PATIENT, check_ended, check_stopped, push, put_away, setup};
+use Asking::{Nothing, TheEnd};
 use patience::prelude::*;
 use rt_core::epitaph::{self, EpitaphKind};
 use rustix::process::Signal;
@@ -10,6 +11,7 @@ use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 use system_tests::faults::amplifiers::wait_for;
 use system_tests::faults::commander::Commander;
+use system_tests::faults::process::io_driver;
 use system_tests::faults::stand::{Setup, Stand};
 use system_tests::faults::stuck::{Asking, Harm, Tracer, ask};
 
@@ -24,6 +26,8 @@ struct Harmed {
     _tracer: Tracer,
     _commander: Commander,
     stand: Stand,
+    /// What brought the call.
+    asking: Asking,
     /// It was harmed under the commander's force.
     is_pushed: bool,
 }
@@ -43,16 +47,16 @@ fn harmed(call: &str, harm: Harm, setup: Setup) -> Option<Harmed> {
         let asker = ask(&stand.socket(), asking);
         let begun = Instant::now();
         // Each takes some tenths of a second at most, the end of a driver a little more.
-        let wait = Duration::from_millis(if asking == Asking::TheEnd { 4000 } else { 500 });
+        let wait = Duration::from_millis(if asking == TheEnd { 4000 } else { 500 });
         while begun.elapsed() < wait {
             if tracer.calls().contains(call) {
                 let pushes = |frame: shm_abi::Frame| frame.devices[0].force_on_user_n_applied != [0.0; 3];
-                let is_pushed = asking == Asking::Nothing && stand.view().read_latest().is_some_and(pushes);
+                let is_pushed = asking == Nothing && stand.view().read_latest().is_some_and(pushes);
                 if matches!(harm, Harm::Failure(_)) {
                     // Nobody leaves the fault that the test brings about.
                     asker.bounded_join().expect("it asked");
                 }
-                return Some(Harmed { stand, is_pushed, _tracer: tracer, _commander: commander });
+                return Some(Harmed { stand, asking, is_pushed, _tracer: tracer, _commander: commander });
             }
             std::thread::sleep(Duration::from_millis(1));
         }
@@ -61,21 +65,46 @@ fn harmed(call: &str, harm: Harm, setup: Setup) -> Option<Harmed> {
     None
 }
 
-/// Every system call that the service thread makes in a whole life.
-fn calls_of_a_life() -> BTreeSet<String> {
-    let mut stand = Stand::start(Setup { talks: true, ..setup(PATIENT) });
-    let tracer = Tracer::listening(&stand);
-    let commander = push(&stand);
-    drop(commander);
-    for asking in Asking::LIFE {
-        ask(&stand.socket(), asking).bounded_join().expect("it asked");
+/// So that a tracer that sees half of them is found out.
+const SURELY_UNDER_FORCE: [&str; 6] = ["ppoll", "accept4", "recvfrom", "sendmsg", "close", "getsockopt"];
+
+/// System calls of the service thread.
+struct Calls {
+    /// Of a whole life.
+    all: BTreeSet<String>,
+    /// Of the time in which somebody asks while another commands.
+    under_force: BTreeSet<String>,
+}
+
+impl Calls {
+    fn of_a_life() -> Self {
+        let mut stand = Stand::start(Setup { talks: true, ..setup(PATIENT) });
+        let commander = push(&stand);
+        let tracer = Tracer::listening(&stand);
+        ask(&stand.socket(), Nothing).bounded_join().expect("it asked");
+        // The service puts the last connection away after its answer. If it takes longer, less is asked for below.
+        wait_for("all known calls in what the tracer wrote", || {
+            let calls = tracer.calls();
+            SURELY_UNDER_FORCE.iter().all(|call| calls.contains(*call))
+        });
+        std::thread::sleep(Duration::from_millis(200));
+        let under_force = tracer.calls();
+        drop(commander);
+        for asking in Asking::LIFE {
+            ask(&stand.socket(), asking).bounded_join().expect("it asked");
+        }
+        let end = stand.driver.end();
+        assert_eq!(end.status, Some(0), "{end:?}");
+        let mut all = tracer.calls();
+        // It returns to nobody who could be harmed.
+        all.remove("exit_group");
+        Self { all, under_force }
     }
-    let end = stand.driver.end();
-    assert_eq!(end.status, Some(0), "{end:?}");
-    let mut calls = tracer.calls();
-    // It returns to nobody who could be harmed.
-    calls.remove("exit_group");
-    calls
+
+    /// Those that another life brings under force, too.
+    fn surely_under_force(&self) -> Vec<&str> {
+        self.under_force.iter().map(String::as_str).filter(|call| !NOW_AND_THEN.contains(call)).collect()
+    }
 }
 
 fn may_trace() -> bool {
@@ -89,34 +118,24 @@ fn may_trace() -> bool {
     works
 }
 
-fn traced() -> Option<BTreeSet<String>> {
+fn traced() -> Option<Calls> {
     if !may_trace() {
         return None;
     }
-    let calls = calls_of_a_life();
-    println!("{} calls: {calls:?}", calls.len());
-    for known in UNDER_FORCE.iter().chain(&["memfd_create"]) {
-        assert!(calls.contains(*known), "{known} is not among {calls:?}");
-    }
+    let calls = Calls::of_a_life();
+    println!("{} calls: {:?}, under force {:?}", calls.all.len(), calls.all, calls.under_force);
+    assert!(calls.all.contains("memfd_create"), "no lease began: {:?}", calls.all);
     Some(calls)
 }
-
-/// Calls that somebody who asks brings while another commands.
-const UNDER_FORCE: [&str; 6] = ["ppoll", "accept4", "recvfrom", "sendmsg", "close", "getsockopt"];
 
 /// Calls that the C library makes when it likes, and a wait for a loop that has yet to end: no other life is sure to bring them.
 const NOW_AND_THEN: [&str; 8] =
     ["brk", "clock_nanosleep", "futex", "madvise", "mmap", "mprotect", "mremap", "munmap"];
 
 /// Harms the service in each of these calls, every time that of another driver.
-fn for_each_harmed(
-    calls: &BTreeSet<String>,
-    harm: Harm,
-    process: &str,
-    mut check: impl FnMut(&str, &mut Harmed),
-) {
+fn for_each_harmed(calls: &Calls, harm: Harm, process: &str, mut check: impl FnMut(&str, &mut Harmed)) {
     let mut pushed = BTreeSet::new();
-    for call in calls {
+    for call in &calls.all {
         let Some(mut harmed) = harmed(call, harm, setup(process)) else {
             assert!(NOW_AND_THEN.contains(&call.as_str()), "{call} was never made again");
             println!("{call}: not made again");
@@ -128,7 +147,8 @@ fn for_each_harmed(
         check(call, &mut harmed);
     }
     println!("harmed under force in {pushed:?}");
-    let missed: Vec<_> = UNDER_FORCE.iter().filter(|call| !pushed.contains(**call)).collect();
+    let missed: Vec<_> =
+        calls.surely_under_force().into_iter().filter(|call| !pushed.contains(call)).collect();
     assert!(missed.is_empty(), "{missed:?} were not harmed under force");
 }
 
@@ -197,15 +217,35 @@ fn a_service_that_fails_ends_the_loop_with_zero_last_words_and_status_3() {
 const FAULTS: [(&str, FaultReason); 2] =
     [("nan", FaultReason::PositionNotFinite), ("unreadable", FaultReason::DeviceRead)];
 
-/// The loop finds a fault of its own while the service is harmed in a call.
-fn check_own_fault(call: &str, harm: Harm, (act, reason): (&str, FaultReason)) {
+/// The loop finds a fault of its own while the service is harmed in a call: under force, or while a lease begins or ends.
+/// `None`: the call was not made again.
+fn check_own_fault(call: &str, harm: Harm, (act, reason): (&str, FaultReason)) -> Option<Found> {
     let when = format!("{act} under {call}, {harm:?}");
     let process = if harm == Harm::Stall { PATIENT } else { WITHOUT_SANDBOX };
     let sabotaged = setup(process).sabotaged(&format!("{act}@button20"));
-    let harmed = harmed(call, harm, sabotaged).unwrap_or_else(|| panic!("{call} was never made again"));
-    assert!(harmed.is_pushed, "{when}");
-    harmed.stand.amplifiers.press(1 << 20);
-    check_stopped(&harmed.stand, reason, &when);
+    let Some(mut harmed) = harmed(call, harm, sabotaged) else {
+        assert!(NOW_AND_THEN.contains(&call), "{call} was never made again");
+        return None;
+    };
+    let Harmed { stand, asking, is_pushed, .. } = &mut harmed;
+    if *asking == TheEnd {
+        // There may be no loop any more that could find anything.
+        stand.driver.signal(Signal::TERM);
+        check_ended(stand, &when);
+        return Some(Found::TheEnd);
+    }
+    stand.amplifiers.press(1 << 20);
+    check_stopped(stand, reason, &when);
+    Some(if *is_pushed { Found::UnderForce } else { Found::WithoutForce })
+}
+
+/// When a fault was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Found {
+    UnderForce,
+    WithoutForce,
+    /// None was, since the loop was ending.
+    TheEnd,
 }
 
 /// A wait that is made to fail ends the driver, but for the one that is interrupted.
@@ -214,49 +254,97 @@ fn failures_of(call: &str) -> Vec<Harm> {
     errors_of(call).iter().filter(|error| !ends(error)).map(|error| Harm::Failure(error)).collect()
 }
 
+/// Whatever is made under force is harmed there, and what a beginning lease makes while one begins.
+fn check_found(calls: &Calls, found: &[(&str, Option<Found>)]) {
+    println!("{found:?}");
+    for (call, found) in found {
+        if calls.surely_under_force().contains(call) {
+            assert_eq!(*found, Some(Found::UnderForce), "{call}");
+        }
+    }
+    let without_force = found.iter().filter(|(_, found)| *found == Some(Found::WithoutForce)).count();
+    assert!(without_force > 0, "no call of a beginning lease was harmed");
+}
+
 #[test]
 fn a_loop_whose_service_is_stuck_finds_its_own_faults() {
-    if !may_trace() {
-        return;
-    }
-    for (index, call) in UNDER_FORCE.into_iter().enumerate() {
-        check_own_fault(call, Harm::Stall, FAULTS[index % 2]);
-    }
+    let Some(calls) = traced() else { return };
+    let found: Vec<_> = calls
+        .all
+        .iter()
+        .zip(FAULTS.into_iter().cycle())
+        .map(|(call, fault)| (call.as_str(), check_own_fault(call, Harm::Stall, fault)))
+        .collect();
+    check_found(&calls, &found);
 }
 
 #[test]
 fn a_loop_whose_service_fails_in_a_call_finds_its_own_faults() {
-    if !may_trace() {
-        return;
-    }
+    let Some(calls) = traced() else { return };
+    let cases: Vec<_> = calls.all.iter().map(String::as_str).zip(FAULTS.into_iter().rev().cycle()).collect();
+    let mut found = Vec::new();
     // Two drivers at a time: most of it is clients that wait for an answer.
-    for pair in UNDER_FORCE.chunks(2) {
+    for pair in cases.chunks(2) {
+        let both = patience::watched(2 * patience::limit(), "two drivers", || {
+            std::thread::scope(|scope| {
+                let started: Vec<_> = pair
+                    .iter()
+                    .map(|&(call, fault)| {
+                        scope.spawn(move || (call, check_own_fault(call, failures_of(call)[0], fault)))
+                    })
+                    .collect();
+                started.into_iter().map(|one| one.join().expect("it is found")).collect::<Vec<_>>()
+            })
+        });
+        found.extend(both);
+    }
+    check_found(&calls, &found);
+}
+
+#[test]
+#[ignore = "minutes: cargo test -p system-tests --test faults every_fault -- --ignored --nocapture"]
+fn every_fault_of_the_loops_own_is_found_under_every_harm_of_the_service() {
+    let Some(calls) = traced() else { return };
+    let mut cases = 0;
+    for call in &calls.all {
+        for harm in failures_of(call).into_iter().chain([Harm::Stall]) {
+            for fault in FAULTS {
+                let found = check_own_fault(call, harm, fault);
+                cases += u32::from(found.is_some_and(|found| found != Found::TheEnd));
+            }
+        }
+    }
+    println!("{cases} faults were found");
+}
+
+/// The datagram stops the motors at once, and no frame can be looked at: the command does not claim what it has not seen.
+#[test]
+fn an_emergency_stop_of_a_driver_whose_service_is_stuck_stops_the_motors_and_says_that_it_cannot_see_it() {
+    let Some(calls) = traced() else { return };
+    // Two at a time: most of it is the command that waits for an answer.
+    for pair in calls.surely_under_force().chunks(2) {
         patience::watched(2 * patience::limit(), "two drivers", || {
             std::thread::scope(|scope| {
-                for (call, fault) in pair.iter().zip(FAULTS.into_iter().rev()) {
-                    scope.spawn(move || check_own_fault(call, failures_of(call)[0], fault));
+                for call in pair {
+                    scope.spawn(move || check_command(call));
                 }
             });
         });
     }
 }
 
-#[test]
-#[ignore = "a minute: cargo test -p system-tests --test faults every_fault -- --ignored --nocapture"]
-fn every_fault_of_the_loops_own_is_found_under_every_harm_of_the_service() {
-    if !may_trace() {
-        return;
+fn check_command(call: &str) {
+    let when = format!("emergency-stop, stuck in {call}");
+    let harmed = harmed(call, Harm::Stall, setup(PATIENT)).expect("it is made under force");
+    assert!(harmed.is_pushed, "{when}");
+    let end = io_driver(&["emergency-stop"], &harmed.stand.socket());
+    assert_eq!((end.status, end.out.as_str()), (Some(3), ""), "{when}: {end:?}");
+    for words in
+        ["not confirmed within 100 ms: the motors may still be on; cut their power", "no frame has shown it"]
+    {
+        assert!(end.err.contains(words), "{when}: {end:?}");
     }
-    let mut cases = 0;
-    for call in UNDER_FORCE {
-        for harm in failures_of(call).into_iter().chain([Harm::Stall]) {
-            for fault in FAULTS {
-                check_own_fault(call, harm, fault);
-                cases += 1;
-            }
-        }
-    }
-    println!("{cases} faults were found");
+    check_stopped(&harmed.stand, FaultReason::EmergencyStop, &when);
 }
 
 /// Errors of a call that is harmed in earnest; of others EIO, which none of them has.
@@ -275,7 +363,8 @@ fn errors_of(call: &str) -> &'static [&'static str] {
 #[test]
 fn whatever_call_of_the_service_fails_the_motors_can_be_stopped_or_are_off() {
     let Some(calls) = traced() else { return };
-    for (call, error) in calls.iter().flat_map(|call| errors_of(call).iter().map(move |error| (call, *error)))
+    for (call, error) in
+        calls.all.iter().flat_map(|call| errors_of(call).iter().map(move |error| (call, *error)))
     {
         let when = format!("{call} fails with {error}");
         let Some(mut harmed) = harmed(call, Harm::Failure(error), setup(WITHOUT_SANDBOX)) else {

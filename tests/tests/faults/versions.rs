@@ -94,8 +94,16 @@ fn end_with(liar: &Liar) -> End {
 #[test]
 fn an_app_that_meets_a_driver_whose_header_cannot_be_starts_nothing_and_says_what_it_found() {
     type Lie = (fn(&DriverHeader), &'static str);
-    let lies: [Lie; 4] = [
-        (|header| header.period_ns.store(0, Ordering::Relaxed), "period in nanoseconds: 0, expected 1 to"),
+    let lies: [Lie; 5] = [
+        (
+            |header| header.period_ns.store(0, Ordering::Relaxed),
+            "period in nanoseconds: 0, expected 50000 to",
+        ),
+        // No driver is as fast: a run of seconds would be one of hours.
+        (
+            |header| header.period_ns.store(1, Ordering::Relaxed),
+            "period in nanoseconds: 1, expected 50000 to",
+        ),
         (
             |header| header.reply_budget_ns.store(0, Ordering::Relaxed),
             "reply budget in nanoseconds: 0, expected 1 to",

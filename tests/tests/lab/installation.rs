@@ -246,7 +246,14 @@ fn a_destination_that_is_not_there_is_made_and_taken_away_again() {
     with_destination(&["--cpu", "1"]);
     assert!(destination.join("etc/phantom3/driver.toml").is_file());
     with_destination(&["--uninstall"]);
-    assert!(!destination.exists());
+    let left = || fs::read_dir(outside.path()).expect("it is ours").count();
+    assert_eq!(left(), 0, "what it was in is taken away, too");
+
+    // What others have put there stays.
+    with_destination(&["--cpu", "1"]);
+    fs::write(outside.path().join("not/yet/mine"), "").expect("written");
+    with_destination(&["--uninstall"]);
+    assert!(!destination.exists() && outside.path().join("not/yet/mine").exists());
 }
 
 #[test]
@@ -274,7 +281,7 @@ fn what_is_left_to_undo_by_hand_is_told_alike_by_the_installer_and_the_readme() 
 }
 
 #[test]
-fn every_kernel_has_what_sysctl_is_to_set() {
+fn the_kernel_that_runs_here_has_what_sysctl_is_to_set() {
     let text = fs::read_to_string(sources().join("sysctl.d/70-phantom3.conf")).expect("there");
     let settings = text.lines().filter(|line| !line.is_empty() && !line.starts_with('#'));
     for line in settings {

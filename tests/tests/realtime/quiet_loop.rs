@@ -8,13 +8,14 @@ use patience::Raised;
 use patience::prelude::*;
 use rustix::process::{Pid, Signal, kill_process};
 use shm_abi::client::Attachment;
-use shm_abi::{Command, DriverView};
+use shm_abi::{Command, DriverView, doorbell};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Child, Command as Process, Stdio};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 use system_tests::driver::{Driver, HANG, wait_or_kill};
+use system_tests::faults::commander::Commander;
 use system_tests::programs;
 use system_tests::threads::{PageFaults, ThreadOf};
 
@@ -265,6 +266,55 @@ fn the_loops_of_both_programs_fault_no_page_once_warm() {
         }
         phantom3.end();
     }
+}
+
+/// Observers that sleep on the bell that all share, as any process that looks on may.
+const SLEEPERS: usize = 200;
+
+/// Neither frames nor commands wake them: a wake of as many would take the loop, which rings, hundreds of microseconds.
+#[test]
+fn a_crowd_asleep_on_the_shared_bell_is_never_woken_and_the_loop_faults_no_page() {
+    let _turn = in_turn();
+    let driver = Driver::start(&format!(
+        "[real_time]\nlock_memory = false\nwait = \"futex\"\n[[device]]\n{IDEAL}\n[[device]]\n{IDEAL}\n"
+    ));
+    let seen = driver.observe().driver;
+    // It sleeps for every frame, so that the loop has somebody to wake in each tick.
+    let commander = Commander::start(driver.command(), [0.0; 3]);
+    wait_for(|| fresh(&seen), 1000);
+    let (begun, woken) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    std::thread::scope(|scope| {
+        for _ in 0..SLEEPERS {
+            scope.spawn(|| sleep_on(&seen.bell.doorbell, &begun, &woken));
+        }
+        patience::until("they sleep", || begun.load(Ordering::Relaxed) == SLEEPERS);
+        // From there to the kernel's queue. If this is too short, the last line fails.
+        std::thread::sleep(Duration::from_millis(500));
+        let unheard = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            let before = fresh(&seen);
+            check_that_nothing_faults(&ThreadOf::find(driver.child.id(), "driver-loop"), || fresh(&seen));
+            assert!(fresh(&seen) > before, "commands go on");
+            woken.load(Ordering::Relaxed)
+        }));
+        // All of them, still: nobody has woken any, and they end.
+        let asleep = doorbell::wake(&seen.bell);
+        assert_eq!(unheard.unwrap_or_else(|panic| std::panic::resume_unwind(panic)), 0, "were woken");
+        assert_eq!(asleep, SLEEPERS, "slept to the end");
+    });
+    drop(commander);
+}
+
+/// Sleeps there once, for as long as it takes somebody to wake it.
+fn sleep_on(word: &AtomicU32, begun: &AtomicUsize, woken: &AtomicUsize) {
+    use rustix::thread::{Timespec, futex};
+    // Longer than the test.
+    let timeout = Timespec { tv_sec: HANG.as_secs().cast_signed(), tv_nsec: 0 };
+    begun.fetch_add(1, Ordering::Relaxed);
+    // The word changes with every frame: whoever has read it before that one asks again.
+    while futex::wait(word, futex::Flags::empty(), word.load(Ordering::Relaxed), Some(&timeout))
+        == Err(rustix::io::Errno::AGAIN)
+    {}
+    woken.fetch_add(1, Ordering::Relaxed);
 }
 
 const IDEAL: &str = "backend = \"ideal\"";

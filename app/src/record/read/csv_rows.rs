@@ -4,8 +4,8 @@
 //! is the shortest time between two of the first rows. A last line without its end is left out: half a number is a number.
 //! Windows line ends and a byte order mark, which editors and spreadsheets add, do not count.
 
-use super::ReadError;
 use super::tick_order::{TickOrder, check_period};
+use super::{ReadError, check_text};
 use crate::columns::{Column, Names, columns, feature_named, friction_named};
 use crate::row::{BodyRow, FingerRow, Row};
 use io_driver::device::{Extras, run_time_s};
@@ -200,8 +200,15 @@ impl Cells<'_> {
         self.numbers().map(Vector3::from)
     }
 
+    fn name(&mut self) -> Result<String, String> {
+        let at = self.at;
+        let (cell, column) = self.take();
+        check_text(cell).map_err(|why| format!("column {} ({}): {why}", at + 1, column.name))?;
+        Ok(cell.to_owned())
+    }
+
     fn entity(&mut self) -> Result<Option<u32>, String> {
-        let name = self.take().0.to_owned();
+        let name = self.name()?;
         if name.is_empty() {
             return Ok(None);
         }
@@ -219,7 +226,7 @@ impl Cells<'_> {
         if self.spaces.is_none() {
             return Ok(0);
         }
-        let name = self.take().0.to_owned();
+        let name = self.name()?;
         let Some(spaces) = self.spaces.as_mut().filter(|_| !name.is_empty()) else { return Ok(0) };
         if let Some(index) = spaces.iter().position(|space| *space == name) {
             return Ok(index as u32 + 1);
@@ -297,6 +304,9 @@ fn check_header(header: &str, names: &Names, expected: &[Column]) -> Result<(), 
         return Err(format!(
             "its first line is {begin:?}, without a column such as f0_hip_x of a finger{hint}"
         ));
+    }
+    for (index, name) in header.split(',').enumerate() {
+        check_text(name).map_err(|why| format!("its column {}: {why}", index + 1))?;
     }
     let mut found = header.split(',');
     for (index, column) in expected.iter().enumerate() {

@@ -1,9 +1,9 @@
 //! Rows of an MCAP file, read from front to back: an index, which a killed process did not write, is not needed.
 
-use super::ReadError;
 use super::mcap_chunk::{self, ChunkError};
 use super::mcap_record::{self, McapRecord, RecordError};
 use super::tick_order::{TickOrder, check_period};
+use super::{ReadError, check_text};
 use crate::columns::Names;
 use crate::record::about::{About, InputFile, MOST_FILE_BYTES, names_of};
 use crate::record::mcap_file::{ABOUT, COLUMNS, ORDER_TOPIC, TICK_TOPIC};
@@ -219,6 +219,7 @@ impl McapRows {
         } else {
             let read = names_of(&facts);
             let read = read.ok_or_else(|| self.damaged("the names of the columns are not complete"))?;
+            read.all().try_for_each(check_text).map_err(|why| self.damaged(&format!("its names: {why}")))?;
             names = Some(read).filter(|names| *names != self.names);
         }
         if self.rows > 0 && (about.is_some() || names.is_some()) {

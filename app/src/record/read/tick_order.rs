@@ -4,6 +4,7 @@
 //! ever, or for some days.
 
 use io_driver::device::run_time_s;
+use shm_abi::segment::SHORTEST_PERIOD_NS;
 use std::ops::RangeInclusive;
 
 /// Ticks of rows, looked at one after the other.
@@ -23,7 +24,7 @@ pub(crate) const LONGEST_GAP_S: f64 = 3600.0;
 /// From the beginning of a run: a month.
 const LONGEST_RUN_S: f64 = 31.0 * 86_400.0;
 /// Rates from one tick in ten seconds, of a recording that somebody thinned out, to the driver's highest.
-const PERIODS_NS: RangeInclusive<u64> = 50_000..=10_000_000_000;
+const PERIODS_NS: RangeInclusive<u64> = SHORTEST_PERIOD_NS..=10_000_000_000;
 
 impl TickOrder {
     /// What is wrong with the next row's tick, if anything is.

@@ -4,6 +4,7 @@ use clap::ValueEnum;
 use io_driver::config::ReplyMode;
 use io_driver::sim::hand::model_file::Firmness;
 use nalgebra::{Unit, Vector3};
+use rt_core::plain_text::Plain;
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -61,8 +62,8 @@ impl Case {
 impl Hand {
     /// For people.
     pub fn name(&self) -> String {
-        let model = self.model.file_stem().unwrap_or_default().to_string_lossy();
-        if model == "nobody" { model.into_owned() } else { format!("{model} {}", self.firmness.name()) }
+        let model = Plain(self.model.file_stem().unwrap_or_default().display()).to_string();
+        if model == "nobody" { model } else { format!("{model} {}", self.firmness.name()) }
     }
 }
 

@@ -1,5 +1,6 @@
 //! TOML as it is written: numbers that read back as they were, strings, tables of one line.
 
+use rt_core::plain_text::is_harmful;
 use std::fmt::Write;
 
 /// Lines of TOML.
@@ -13,8 +14,8 @@ impl Toml {
     }
 
     pub(super) fn comment(&mut self, comment: &str) {
-        // What somebody wrote must not end the comment.
-        let comment: String = comment.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+        // What somebody wrote must neither end the comment nor act on a terminal.
+        let comment: String = comment.chars().map(|c| if is_harmful(c) { ' ' } else { c }).collect();
         self.line(&format!("# {comment}"));
     }
 
@@ -45,9 +46,9 @@ pub(super) fn string(text: &str) -> String {
     for c in text.chars() {
         match c {
             '"' | '\\' => quoted.extend(['\\', c]),
-            c if c.is_control() => {
+            c if is_harmful(c) => {
                 // Writing to a string cannot fail.
-                let _ = write!(quoted, "\\u{:04X}", c as u32);
+                let _ = write!(quoted, "\\U{:08X}", c as u32);
             }
             c => quoted.push(c),
         }

@@ -176,10 +176,16 @@ fn a_colour_in_bytes_is_refused_with_the_shares_that_it_would_be() {
         "s.toml:8: entity[0].visual.colour: found [255.0, 128.0, 0.0], which looks like numbers from 0 to 255; allowed: \
          an array of 3 numbers from 0 to 1: write [1.0, 0.502, 0.0]",
     );
-    refused(
-        &with_entity("visual = { colour = [0, 1.5, 0] }"),
-        "s.toml:8: entity[0].visual.colour: found an array of length 3; allowed: an array of 3 numbers from 0 to 1",
-    );
+    for (colour, place, number) in
+        [("[0, 1.5, 0]", 1, "1.5"), ("[0.5, 255, 0]", 1, "255"), ("[0.5, 0, 300.0, 256]", 2, "300.0")]
+    {
+        refused(
+            &with_entity(&format!("visual = {{ colour = {colour} }}")),
+            &format!(
+                "s.toml:8: entity[0].visual.colour[{place}]: found {number}; allowed: a number from 0 to 1"
+            ),
+        );
+    }
 }
 
 #[test]

@@ -56,7 +56,7 @@ fn assert_damaged(place: &Workplace, bad: &[u8], says: &[&str]) {
         &["replay", "bad.mcap"],
         &["plot", "bad.mcap", "--svg-only"],
     ] {
-        let Said { status, out, err } = run_in_little_memory(place, command);
+        let Said { status, out, err } = run_in_little_memory(place, 2000, command);
         assert!(matches!(status, Some(2 | 3)), "{says:?} {command:?}: {status:?} {out}{err}");
         assert_says(&err, &["bad.mcap: damaged behind "]);
         assert_says(&err, says);
@@ -83,6 +83,24 @@ fn what_a_recording_tells_of_its_run_does_not_change_behind_its_first_row() {
     place.write("same.mcap", with_behind_the_first_rows(&good, &same));
     let said = place.run(["export", "same.mcap", "same.csv"]);
     assert_eq!(said.status, Some(0), "{}", said.err);
+}
+
+#[test]
+fn names_with_control_characters_are_damage() {
+    let (place, good) = with_chunks();
+    // As JSON has it; the name is as long.
+    let columns = changed_metadata(
+        &good,
+        "phantom3.columns",
+        "[\"f0\",\"f1\",\"f2\",\"f3\"",
+        "[\"\\u001b[2J\"   ,\"f3\"",
+    );
+    let bad = records(&good).into_iter().map(|(opcode, body)| match opcode {
+        METADATA if body.starts_with(&text("phantom3.columns")) => columns.clone(),
+        DATA_END => record(opcode, &[0; 4]),
+        _ => record(opcode, body),
+    });
+    assert_damaged(&place, &file(bad), &["its names: found \"\\u{1b}[2J\"", "no control characters"]);
 }
 
 #[test]
