@@ -184,7 +184,7 @@ impl FastThread {
             step_ns,
             seen: None,
             due_ns: None,
-            plausibility: Plausibility::new(period_ns),
+            plausibility: Plausibility::new(period_ns, info.clock_mode),
         }
     }
 

@@ -1,10 +1,12 @@
 //! Plausibility of a driver's frames, from one to the next.
 //!
 //! Problem: what the driver writes is an allegation. A driver that is broken, or is none, must not make a run wait for
-//! ever or count wrongly: ticks that go back or jump ahead, deadlines in the future, a time of the run that does not go
-//! with the ticks, or never begins, frames that are never meant for us, positions that are no places.
+//! ever or count wrongly: ticks that go back, jump ahead or hardly go on, deadlines in the future, a time of the run that
+//! does not go with the ticks, or never begins, frames that are never meant for us, positions that are no places.
 //!
-//! Model: ticks go up, and not faster than the clock allows, with room for a ring of them; within one lease t = 0 comes
+//! Model: ticks go up, and not faster than the clock allows, with room for a ring of them; in real time not slower either:
+//! a driver that is late, or was stopped, skips what it missed, so that its next number is that of the clock again. Within
+//! one lease t = 0 comes
 //! when this program's answers have brought full authority, so not before its first frame and not after authority is
 //! full; from there on the time of the run goes with the ticks; a frame is due when it is published; what is measured is
 //! finite. Everything else that is rare, such as missed frames, overruns and stalls of the machine, keeps to these.
@@ -13,6 +15,7 @@
 
 use io_driver::table::MAX_MAGNITUDE;
 use shm_abi::frame::{DEVICE_ORIENTATION_MEASURED, DEVICE_POSITION_VALID};
+use shm_abi::segment::ClockMode;
 use shm_abi::{DeviceFrame, Frame, RING_FRAMES};
 use thiserror::Error;
 
@@ -38,6 +41,21 @@ pub enum Implausible {
         before: u64,
         /// The largest that can be.
         most: u64,
+    },
+    /// It stays behind what time asks for.
+    #[error(
+        "its ticks fall behind the clock: found {found} ticks in {seconds} s, expected {expected}, less those of {most_s} s \
+         at most"
+    )]
+    Slow {
+        /// Ticks that there were.
+        found: u64,
+        /// In so many seconds.
+        seconds: u64,
+        /// Ticks of that time.
+        expected: u64,
+        /// By how much it may be behind.
+        most_s: u64,
     },
     /// The frame tells another tick than its place.
     #[error("its frame of tick {expected} says that it is of tick {found}")]
@@ -121,6 +139,17 @@ const FUTURE_NS: u64 = 1_000_000_000;
 /// A lease is in force within a fraction of this, the former one's ramp included.
 const NONE_FOR_US_NS: u64 = 10_000_000_000;
 
+/// How far ticks may be behind the clock: twice the silence after which a run ends, and so twice the lateness that a single
+/// frame of a driver that is stopped again and again, or halts at a breakpoint in each tick, can have.
+const BEHIND_NS: u64 = 10_000_000_000;
+/// And a hundredth of the time that has passed: deadlines that step aside ([`rt_core::phase_keeper`]) stay behind by 0.382
+/// of a period in 256 at most, 0.15 %.
+const BEHIND_SHARE: u64 = 100;
+/// For so long, and in so many frames on end. A stall of driver and application together, of any length, makes one frame
+/// late, and as many more as the driver is set to catch up, which come in one go.
+const BEHIND_FOR_NS: u64 = 1_000_000_000;
+const BEHIND_FRAMES: u64 = 3;
+
 /// What the frames so far were like.
 #[derive(Debug, Clone, Copy)]
 pub struct Plausibility {
@@ -129,6 +158,11 @@ pub struct Plausibility {
     first: Option<u64>,
     /// The tick seen last, and when.
     last: Option<(u64, u64)>,
+    /// Whether ticks go with the clock, and which of them came soonest for its number, and when.
+    is_real: bool,
+    soonest: Option<(u64, u64)>,
+    /// Since when ticks are too far behind, and in how many frames.
+    behind: Option<(u64, u64)>,
     /// In which tick our lease's t = 0 was.
     run_began: Option<i64>,
     /// When a frame was answered last.
@@ -136,20 +170,30 @@ pub struct Plausibility {
 }
 
 impl Plausibility {
-    /// Of a driver with this period, which has told nothing yet.
-    pub fn new(period_ns: u64) -> Self {
-        Self { period_ns: period_ns.max(1), first: None, last: None, run_began: None, answered_ns: None }
+    /// Of a driver with this period and clock, which has told nothing yet.
+    pub fn new(period_ns: u64, clock: ClockMode) -> Self {
+        Self {
+            period_ns: period_ns.max(1),
+            first: None,
+            last: None,
+            is_real: clock == ClockMode::Real,
+            soonest: None,
+            behind: None,
+            run_began: None,
+            answered_ns: None,
+        }
     }
 
     /// Judges the number of the newest frame, before that is read.
     ///
     /// # Errors
-    /// If it goes back, or jumps ahead of the clock.
+    /// If it goes back, jumps ahead of the clock or stays behind it.
     pub fn judge_tick(&mut self, tick: u64, now_ns: u64) -> Result<(), Implausible> {
         if let Some((before, seen_ns)) = self.last {
             let passed = now_ns.saturating_sub(seen_ns) / self.period_ns;
             // A loop that catches up makes several ticks in the time of one.
-            let most = before.saturating_add(passed.saturating_mul(2)).saturating_add(RING_FRAMES as u64);
+            let most = before.saturating_add(passed.saturating_mul(2)).max(self.of_the_clock(now_ns));
+            let most = most.saturating_add(RING_FRAMES as u64);
             if tick < before {
                 return Err(Implausible::Backwards { found: tick, before });
             }
@@ -159,7 +203,39 @@ impl Plausibility {
         }
         self.first.get_or_insert(tick);
         self.last = Some((tick, now_ns));
-        Ok(())
+        if self.is_real { self.judge_pace(tick, now_ns) } else { Ok(()) }
+    }
+
+    /// The tick of now in real time, else none: a loop that was stopped in the middle of one tick is there with the next.
+    fn of_the_clock(&self, now_ns: u64) -> u64 {
+        self.soonest
+            .map_or(0, |(tick, seen_ns)| tick.saturating_add(now_ns.saturating_sub(seen_ns) / self.period_ns))
+    }
+
+    /// Ticks are late, each by another time; the one that was late least shows how clock and numbers go together.
+    fn judge_pace(&mut self, tick: u64, now_ns: u64) -> Result<(), Implausible> {
+        let (soonest, seen_ns) = *self.soonest.get_or_insert((tick, now_ns));
+        let passed_ns = now_ns.saturating_sub(seen_ns);
+        let ticks_ns = (tick - soonest).saturating_mul(self.period_ns);
+        if ticks_ns >= passed_ns {
+            self.soonest = Some((tick, now_ns));
+        }
+        let most_ns = BEHIND_NS + passed_ns / BEHIND_SHARE;
+        if passed_ns.saturating_sub(ticks_ns) <= most_ns {
+            self.behind = None;
+            return Ok(());
+        }
+        let (since_ns, frames) = self.behind.map_or((now_ns, 1), |(since_ns, frames)| (since_ns, frames + 1));
+        self.behind = Some((since_ns, frames));
+        if frames < BEHIND_FRAMES || now_ns.saturating_sub(since_ns) < BEHIND_FOR_NS {
+            return Ok(());
+        }
+        Err(Implausible::Slow {
+            found: tick - soonest,
+            seconds: passed_ns / 1_000_000_000,
+            expected: passed_ns / self.period_ns,
+            most_s: most_ns / 1_000_000_000,
+        })
     }
 
     /// Judges the frame of `tick`, which was read whole; `is_for_us`: it is under our lease.
@@ -267,7 +343,7 @@ mod tests {
 
     /// After a hundred sound frames, t = 0 in tick 10.
     fn settled() -> (Plausibility, u64) {
-        let mut sound = Plausibility::new(PERIOD_NS);
+        let mut sound = Plausibility::new(PERIOD_NS, ClockMode::Real);
         for tick in 0..100 {
             let now_ns = START_NS + tick * PERIOD_NS;
             sound.judge_tick(tick, now_ns).unwrap();
@@ -302,6 +378,64 @@ mod tests {
         assert!(liar.judge_tick(u64::MAX, now_ns).is_err());
     }
 
+    const S: u64 = 1_000_000_000;
+
+    /// When a driver whose ticks come `apart_ns` apart, and have the numbers of `number`, is told.
+    fn told_after(
+        clock: ClockMode,
+        apart_ns: u64,
+        number: impl Fn(u64) -> u64,
+    ) -> Option<(u64, Implausible)> {
+        let mut judge = Plausibility::new(PERIOD_NS, clock);
+        let mut frames = (0..1000 * S).step_by(apart_ns as usize).zip(0..100_000);
+        frames.find_map(|(later_ns, frame)| {
+            Some((later_ns, judge.judge_tick(number(frame), START_NS + later_ns).err()?))
+        })
+    }
+
+    #[test]
+    fn ticks_that_stay_behind_the_clock_are_told() {
+        // 1 ms is told, and each takes 4.5 s: the third that is 10 s late.
+        let (when_ns, told) = told_after(ClockMode::Real, 4_500_000_000, |frame| frame).expect("a lie");
+        assert_eq!(when_ns, 5 * 4_500_000_000);
+        assert_eq!(told, Implausible::Slow { found: 5, seconds: 22, expected: 22_500, most_s: 10 });
+        assert!(
+            told.to_string()
+                .starts_with("its ticks fall behind the clock: found 5 ticks in 22 s, expected 22500")
+        );
+        // Half as fast as told: 10 s and a hundredth behind after 20.4 s, and a second more.
+        let (when_ns, _) = told_after(ClockMode::Real, 2 * PERIOD_NS, |frame| frame).expect("a lie");
+        assert!((21 * S..22 * S).contains(&when_ns), "{when_ns}");
+        // Nobody's clock moves them there.
+        assert_eq!(told_after(ClockMode::Lockstep, 4_500_000_000, |frame| frame), None);
+    }
+
+    #[test]
+    fn ticks_that_are_late_and_go_with_the_clock_again_are_plausible() {
+        // Each frame 4 s late, as at a breakpoint; its number is that of its deadline.
+        assert_eq!(told_after(ClockMode::Real, 4 * S, |frame| (4000 * frame).saturating_sub(4000)), None);
+        // Deadlines that step aside as often as they may: 0.382 of 256.
+        assert_eq!(told_after(ClockMode::Real, 1_001_492, |frame| frame), None);
+        // Driver and application are stopped for an hour, ten times; then come the tick that was under way, the last
+        // thousand of the clock, made up for within half a second, and those that follow.
+        let mut sound = Plausibility::new(PERIOD_NS, ClockMode::Real);
+        let (mut tick, mut now_ns) = (0, START_NS);
+        assert_eq!(sound.judge_tick(tick, now_ns), Ok(()));
+        for _ in 0..10 {
+            now_ns += 3600 * S;
+            assert_eq!(sound.judge_tick(tick + 1, now_ns), Ok(()));
+            tick = (now_ns - START_NS) / PERIOD_NS;
+            for made_up in 0..1000 {
+                let number = tick + made_up - 999;
+                assert_eq!(sound.judge_tick(number, now_ns + made_up * 500_000), Ok(()), "{number}");
+            }
+            for later in 500..5000 {
+                assert_eq!(sound.judge_tick(tick + later, now_ns + later * PERIOD_NS), Ok(()));
+            }
+            (tick, now_ns) = (tick + 4999, now_ns + 4999 * PERIOD_NS);
+        }
+    }
+
     #[test]
     fn a_frame_that_lies_about_its_tick_its_deadline_or_the_runs_time_is_told() {
         let (mut liar, now_ns) = settled();
@@ -319,7 +453,7 @@ mod tests {
     fn a_run_that_is_older_than_its_driver_is_told_at_its_first_frame() {
         let told = |run_tick, is_for_us| {
             let first = frame(100, run_tick);
-            let mut liar = Plausibility::new(PERIOD_NS);
+            let mut liar = Plausibility::new(PERIOD_NS, ClockMode::Real);
             liar.judge_tick(90, first.deadline_ns).unwrap();
             liar.judge_frame(100, &first, is_for_us, first.deadline_ns)
         };
@@ -336,7 +470,7 @@ mod tests {
         let now_ns = START_NS + 100 * PERIOD_NS;
         let judge = |authority, is_for_us| {
             let told = Frame { authority, ..frame(100, -1) };
-            Plausibility::new(PERIOD_NS).judge_frame(100, &told, is_for_us, now_ns)
+            Plausibility::new(PERIOD_NS, ClockMode::Real).judge_frame(100, &told, is_for_us, now_ns)
         };
         assert_eq!([judge(0.999, true), judge(1.0, false)], [Ok(()), Ok(())]);
         assert_eq!(judge(1.0, true), Err(Implausible::NotBegun { tick: 100, found: -1 }));

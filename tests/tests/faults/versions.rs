@@ -143,3 +143,12 @@ fn a_run_ends_with_words_when_its_driver_tells_what_cannot_be() {
         );
     }
 }
+
+/// Each of its frames is sound; only their number is a tenth of what the clock asks for.
+#[test]
+fn a_run_ends_with_words_when_its_drivers_ticks_are_much_too_slow() {
+    let end = end_with(&Liar::about_itself(|header| header.period_ns.store(100_000, Ordering::Relaxed)));
+    assert_eq!(end.status, Some(3), "{end:?}");
+    let words = "the driver tells what cannot be: its ticks fall behind the clock: found";
+    assert!(end.err.contains(words), "{end:?}");
+}
