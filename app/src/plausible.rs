@@ -2,21 +2,22 @@
 //!
 //! Problem: what the driver writes is an allegation. A driver that is broken, or is none, must not make a run wait for
 //! ever or count wrongly: ticks that go back, jump ahead or hardly go on, deadlines in the future, a time of the run that
-//! does not go with the ticks, or never begins, frames that are never meant for us, positions that are no places.
+//! does not go with the ticks, or never begins, frames that are never meant for us, devices that are missing, positions
+//! that are no places, forces that are none.
 //!
 //! Model: ticks go up, and not faster than the clock allows, with room for a ring of them; in real time not slower either:
 //! a driver that is late, or was stopped, skips what it missed, so that its next number is that of the clock again. Within
 //! one lease t = 0 comes
 //! when this program's answers have brought full authority, so not before its first frame and not after authority is
 //! full; from there on the time of the run goes with the ticks; a frame is due when it is published; what is measured is
-//! finite. Everything else that is rare, such as missed frames, overruns and stalls of the machine, keeps to these.
+//! finite, and no velocity larger than a leap from one end of all places to the other. Everything else that is rare, such as missed frames, overruns and stalls of the machine, keeps to these.
 //!
 //! Cost: a dozen comparisons a frame; no allocation, no system call.
 
 use io_driver::table::MAX_MAGNITUDE;
 use shm_abi::frame::{DEVICE_ORIENTATION_MEASURED, DEVICE_POSITION_VALID};
 use shm_abi::segment::ClockMode;
-use shm_abi::{DeviceFrame, Frame, RING_FRAMES};
+use shm_abi::{DeviceFrame, DriverState, Frame, RING_FRAMES};
 use thiserror::Error;
 
 /// What no sound driver tells.
@@ -113,8 +114,8 @@ pub enum Implausible {
     },
     /// A value that is said to be measured is none.
     #[error(
-        "its {value} of device {device} is said to be valid in tick {tick} and is none: found {found}, expected finite \
-         numbers up to 1e15 in size"
+        "its {value} of device {device} is said to be valid in tick {tick} and is none: found {found:?}, expected finite \
+         numbers up to {most:e} in size"
     )]
     NoMeasurement {
         /// The tick.
@@ -125,6 +126,36 @@ pub enum Implausible {
         value: &'static str,
         /// The first component that is wrong.
         found: f64,
+        /// The largest that can be.
+        most: f64,
+    },
+    /// Devices that the run uses are not in the frame.
+    #[error("it tells of too few devices, expected {used} at least: found {found} in tick {tick}")]
+    TooFew {
+        /// The tick.
+        tick: u64,
+        /// Devices in the frame.
+        found: u64,
+        /// Devices that are used.
+        used: usize,
+    },
+    /// A part of the force that is none.
+    #[error("its authority is none: found {found:?} in tick {tick}, expected 0 to 1")]
+    NoAuthority {
+        /// The tick.
+        tick: u64,
+        /// What was found.
+        found: f64,
+    },
+    /// A state that nobody knows.
+    #[error("its state is none that there is: found {found} in tick {tick}, expected 0 to {most}")]
+    NoState {
+        /// The tick.
+        tick: u64,
+        /// The word found.
+        found: u64,
+        /// The last that is known.
+        most: u64,
     },
     /// Frames come, and none can be answered.
     #[error("it has told no frame under this program's lease for {seconds} s though its ticks go on")]
@@ -257,9 +288,11 @@ impl Plausibility {
             let (ahead_ms, most_ms) = (ahead_ns / 1_000_000, most_ns / 1_000_000);
             return Err(Implausible::Future { tick, ahead_ms, most_ms });
         }
+        judge_state(frame)?;
         self.judge_run(tick, frame, is_for_us)?;
+        judge_forces(frame)?;
         if is_for_us {
-            judge_measurements(frame)?;
+            self.judge_measurements(frame)?;
         }
         self.note_answer(is_for_us, now_ns)
     }
@@ -295,6 +328,23 @@ impl Plausibility {
         tick.saturating_sub(first).cast_signed()
     }
 
+    /// Of the devices that say that they know where they are.
+    fn judge_measurements(&self, frame: &Frame) -> Result<(), Implausible> {
+        let knows_its_place = |(_, told): &(usize, &DeviceFrame)| told.flags & DEVICE_POSITION_VALID != 0;
+        // A hand may leap from any place to any other within a tick: twice the largest number along each axis, which a
+        // base that is turned makes the square root of three times as much.
+        let leap_m_per_s = 4.0 * MAX_MAGNITUDE / (self.period_ns as f64 * 1e-9);
+        for (device, told) in frame.present_devices().iter().enumerate().filter(knows_its_place) {
+            let of = |value| (frame.tick, device, value);
+            judge_value(of("position"), MAX_MAGNITUDE, &told.position_m_measured)?;
+            judge_value(of("velocity"), leap_m_per_s, &told.velocity_m_per_s_estimated)?;
+            if told.flags & DEVICE_ORIENTATION_MEASURED != 0 {
+                judge_value(of("orientation"), MAX_MAGNITUDE, &told.orientation_wxyz_measured)?;
+            }
+        }
+        Ok(())
+    }
+
     /// A frame that cannot be read is for nobody, too.
     ///
     /// # Errors
@@ -310,23 +360,44 @@ impl Plausibility {
     }
 }
 
-/// Of the devices that say that they know where they are.
-fn judge_measurements(frame: &Frame) -> Result<(), Implausible> {
-    let knows_its_place = |(_, told): &(usize, &DeviceFrame)| told.flags & DEVICE_POSITION_VALID != 0;
-    for (device, told) in frame.present_devices().iter().enumerate().filter(knows_its_place) {
-        let judge = |value, most: f64, components: &[f64]| {
-            let is_none = |component: &&f64| component.is_nan() || component.abs() > most;
-            let lie = |&found| Err(Implausible::NoMeasurement { tick: frame.tick, device, value, found });
-            components.iter().find(is_none).map_or(Ok(()), lie)
-        };
-        judge("position", MAX_MAGNITUDE, &told.position_m_measured)?;
-        // A hand may leap from any place to any other within a tick.
-        judge("velocity", f64::MAX, &told.velocity_m_per_s_estimated)?;
-        if told.flags & DEVICE_ORIENTATION_MEASURED != 0 {
-            judge("orientation", MAX_MAGNITUDE, &told.orientation_wxyz_measured)?;
-        }
+/// Whether a frame tells of all devices that are used.
+///
+/// # Errors
+/// If not.
+pub fn judge_devices(frame: &Frame, used: usize) -> Result<(), Implausible> {
+    match frame.device_count {
+        found if found >= used as u64 => Ok(()),
+        found => Err(Implausible::TooFew { tick: frame.tick, found, used }),
+    }
+}
+
+fn judge_state(frame: &Frame) -> Result<(), Implausible> {
+    let (tick, state) = (frame.tick, frame.state);
+    if DriverState::from_word(state).is_none() {
+        return Err(Implausible::NoState { tick, found: state, most: DriverState::Fault as u64 });
+    }
+    if !(0.0..=1.0).contains(&frame.authority) {
+        return Err(Implausible::NoAuthority { tick, found: frame.authority });
     }
     Ok(())
+}
+
+/// Of all devices: recordings and reports tell what was applied, whoever commands.
+fn judge_forces(frame: &Frame) -> Result<(), Implausible> {
+    let mut told = frame.present_devices().iter().enumerate();
+    told.try_for_each(|(device, told)| {
+        judge_value((frame.tick, device, "applied force"), f64::MAX, &told.force_on_user_n_applied)
+    })
+}
+
+fn judge_value(
+    (tick, device, value): (u64, usize, &'static str),
+    most: f64,
+    components: &[f64],
+) -> Result<(), Implausible> {
+    let is_none = |component: &&f64| component.is_nan() || component.abs() > most;
+    let lie = |&found| Err(Implausible::NoMeasurement { tick, device, value, found, most });
+    components.iter().find(is_none).map_or(Ok(()), lie)
 }
 
 #[cfg(test)]
@@ -493,9 +564,36 @@ mod tests {
         assert!(judge(both, |device| device.position_m_measured[0] = -1e300).is_err());
         assert!(judge(both, |device| device.orientation_wxyz_measured[3] = f64::INFINITY).is_err());
         assert!(judge(both, |device| device.velocity_m_per_s_estimated[0] = f64::NAN).is_err());
+        // From one end to the other within a millisecond, and beyond.
+        assert_eq!(judge(both, |device| device.velocity_m_per_s_estimated[0] = -2e18), Ok(()));
+        let told = judge(both, |device| device.velocity_m_per_s_estimated[0] = 1e300).unwrap_err();
+        assert!(told.ends_with("found 1e300, expected finite numbers up to 4e18 in size"), "{told}");
+        assert!(judge(0, |device| device.force_on_user_n_applied[1] = f64::INFINITY).is_err());
         assert_eq!(judge(0, |device| device.position_m_measured[2] = f64::NAN), Ok(()));
         assert_eq!(judge(1, |device| device.orientation_wxyz_measured[2] = f64::NAN), Ok(()));
         assert_eq!(judge(both, |device| device.position_m_measured[2] = 1e15), Ok(()));
+    }
+
+    #[test]
+    fn a_state_an_authority_or_a_number_of_devices_that_cannot_be_is_told() {
+        let (sound, now_ns) = settled();
+        let judge = |lie: fn(&mut Frame)| {
+            let mut told = frame(100, 90);
+            lie(&mut told);
+            sound.clone().judge_frame(100, &told, true, now_ns)
+        };
+        assert_eq!(judge(|frame| (frame.state, frame.authority) = (4, 1.0)), Ok(()));
+        let state = judge(|frame| frame.state = 5);
+        assert_eq!(state, Err(Implausible::NoState { tick: 100, found: 5, most: 4 }));
+        for authority in [f64::NAN, -0.01, 1.01, f64::INFINITY] {
+            let mut told = frame(100, 90);
+            told.authority = authority;
+            let lie = sound.clone().judge_frame(100, &told, true, now_ns);
+            assert!(matches!(lie, Err(Implausible::NoAuthority { tick: 100, .. })), "{authority}: {lie:?}");
+        }
+        let two = Frame { device_count: 2, ..frame(100, 90) };
+        assert_eq!([judge_devices(&two, 0), judge_devices(&two, 2)], [Ok(()), Ok(())]);
+        assert_eq!(judge_devices(&two, 3), Err(Implausible::TooFew { tick: 100, found: 2, used: 3 }));
     }
 
     #[test]
