@@ -225,6 +225,11 @@ impl FastLoop {
         &mut self.step
     }
 
+    /// How many devices a frame must have for its fingers.
+    pub fn devices(&self) -> usize {
+        self.step.devices()
+    }
+
     /// The frame read last.
     pub fn frame(&self) -> &Frame {
         &self.frame

@@ -225,6 +225,11 @@ impl FastStep {
         self
     }
 
+    /// How many devices there must be for its fingers.
+    pub fn devices(&self) -> usize {
+        self.fingers.iter().map(|finger| finger.device + 1).max().unwrap_or(0)
+    }
+
     /// Which minor version of the contract the driver speaks, and over how many ticks it lets forces come on.
     ///
     /// Until that is told, nothing is expected of it that 1.0 did not have. A finger that is found inside an entity

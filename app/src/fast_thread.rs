@@ -10,7 +10,7 @@
 //! Cost: between frames one or two system calls; in the step none.
 
 use crate::fast_loop::{FastLoop, Turn};
-use crate::plausible::{Implausible, Plausibility};
+use crate::plausible::{Implausible, Plausibility, judge_devices};
 use rt_core::clock::{monotonic_ns, sleep_until_ns};
 use rt_core::histogram::Histogram;
 use rt_core::setup::{SetupReport, SetupRequest};
@@ -184,7 +184,7 @@ impl FastThread {
             step_ns,
             seen: None,
             due_ns: None,
-            plausibility: Plausibility::new(period_ns),
+            plausibility: Plausibility::new(period_ns, info.clock_mode),
         }
     }
 
@@ -249,7 +249,9 @@ impl FastThread {
         match is_read {
             true => {
                 let is_for_us = frame.lease == self.commander.lease();
-                self.plausibility.judge_frame(tick, frame, is_for_us, now_ns)
+                let used = if is_for_us { self.fast.devices() } else { 0 };
+                self.plausibility.judge_frame(tick, frame, is_for_us, now_ns)?;
+                judge_devices(frame, used)
             }
             false => self.plausibility.note_answer(false, now_ns),
         }

@@ -40,6 +40,7 @@ pub mod passive_port;
 pub mod picture;
 pub mod plausible;
 pub mod play;
+pub mod premises;
 pub mod progress;
 pub mod record;
 pub mod recording;

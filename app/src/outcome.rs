@@ -58,6 +58,11 @@ pub enum RunFailure {
     /// The driver is gone.
     #[error("the driver is gone: {0}")]
     DriverGone(String),
+    /// Another driver came in its place.
+    #[error(
+        "the driver that came back is not the one that this run began with: {0}; start that one again, and then a new run"
+    )]
+    OtherDriver(String),
     /// Somebody ended the lease of a run whose driver goes on.
     #[error(
         "somebody ended this run's lease (`io-driver end-lease`), and its force with it; the driver goes on for whoever \

@@ -1,19 +1,23 @@
 //! Plausibility of a driver's frames, from one to the next.
 //!
 //! Problem: what the driver writes is an allegation. A driver that is broken, or is none, must not make a run wait for
-//! ever or count wrongly: ticks that go back or jump ahead, deadlines in the future, a time of the run that does not go
-//! with the ticks, or never begins, frames that are never meant for us, positions that are no places.
+//! ever or count wrongly: ticks that go back, jump ahead or hardly go on, deadlines in the future, a time of the run that
+//! does not go with the ticks, or never begins, frames that are never meant for us, devices that are missing, positions
+//! that are no places, forces that are none.
 //!
-//! Model: ticks go up, and not faster than the clock allows, with room for a ring of them; within one lease t = 0 comes
+//! Model: ticks go up, and not faster than the clock allows, with room for a ring of them; in real time not slower either:
+//! a driver that is late, or was stopped, skips what it missed, so that its next number is that of the clock again. Within
+//! one lease t = 0 comes
 //! when this program's answers have brought full authority, so not before its first frame and not after authority is
 //! full; from there on the time of the run goes with the ticks; a frame is due when it is published; what is measured is
-//! finite. Everything else that is rare, such as missed frames, overruns and stalls of the machine, keeps to these.
+//! finite, and no velocity larger than a leap from one end of all places to the other. Everything else that is rare, such as missed frames, overruns and stalls of the machine, keeps to these.
 //!
 //! Cost: a dozen comparisons a frame; no allocation, no system call.
 
 use io_driver::table::MAX_MAGNITUDE;
 use shm_abi::frame::{DEVICE_ORIENTATION_MEASURED, DEVICE_POSITION_VALID};
-use shm_abi::{DeviceFrame, Frame, RING_FRAMES};
+use shm_abi::segment::ClockMode;
+use shm_abi::{DeviceFrame, DriverState, Frame, RING_FRAMES};
 use thiserror::Error;
 
 /// What no sound driver tells.
@@ -38,6 +42,21 @@ pub enum Implausible {
         before: u64,
         /// The largest that can be.
         most: u64,
+    },
+    /// It stays behind what time asks for.
+    #[error(
+        "its ticks fall behind the clock: found {found} ticks in {seconds} s, expected {expected}, less those of {most_s} s \
+         at most"
+    )]
+    Slow {
+        /// Ticks that there were.
+        found: u64,
+        /// In so many seconds.
+        seconds: u64,
+        /// Ticks of that time.
+        expected: u64,
+        /// By how much it may be behind.
+        most_s: u64,
     },
     /// The frame tells another tick than its place.
     #[error("its frame of tick {expected} says that it is of tick {found}")]
@@ -95,8 +114,8 @@ pub enum Implausible {
     },
     /// A value that is said to be measured is none.
     #[error(
-        "its {value} of device {device} is said to be valid in tick {tick} and is none: found {found}, expected finite \
-         numbers up to 1e15 in size"
+        "its {value} of device {device} is said to be valid in tick {tick} and is none: found {found:?}, expected finite \
+         numbers up to {most:e} in size"
     )]
     NoMeasurement {
         /// The tick.
@@ -107,6 +126,36 @@ pub enum Implausible {
         value: &'static str,
         /// The first component that is wrong.
         found: f64,
+        /// The largest that can be.
+        most: f64,
+    },
+    /// Devices that the run uses are not in the frame.
+    #[error("it tells of too few devices, expected {used} at least: found {found} in tick {tick}")]
+    TooFew {
+        /// The tick.
+        tick: u64,
+        /// Devices in the frame.
+        found: u64,
+        /// Devices that are used.
+        used: usize,
+    },
+    /// A part of the force that is none.
+    #[error("its authority is none: found {found:?} in tick {tick}, expected 0 to 1")]
+    NoAuthority {
+        /// The tick.
+        tick: u64,
+        /// What was found.
+        found: f64,
+    },
+    /// A state that nobody knows.
+    #[error("its state is none that there is: found {found} in tick {tick}, expected 0 to {most}")]
+    NoState {
+        /// The tick.
+        tick: u64,
+        /// The word found.
+        found: u64,
+        /// The last that is known.
+        most: u64,
     },
     /// Frames come, and none can be answered.
     #[error("it has told no frame under this program's lease for {seconds} s though its ticks go on")]
@@ -121,6 +170,17 @@ const FUTURE_NS: u64 = 1_000_000_000;
 /// A lease is in force within a fraction of this, the former one's ramp included.
 const NONE_FOR_US_NS: u64 = 10_000_000_000;
 
+/// How far ticks may be behind the clock: twice the silence after which a run ends, and so twice the lateness that a single
+/// frame of a driver that is stopped again and again, or halts at a breakpoint in each tick, can have.
+const BEHIND_NS: u64 = 10_000_000_000;
+/// And a hundredth of the time that has passed: deadlines that step aside ([`rt_core::phase_keeper`]) stay behind by 0.382
+/// of a period in 256 at most, 0.15 %.
+const BEHIND_SHARE: u64 = 100;
+/// For so long, and in so many frames on end. A stall of driver and application together, of any length, makes one frame
+/// late, and as many more as the driver is set to catch up, which come in one go.
+const BEHIND_FOR_NS: u64 = 1_000_000_000;
+const BEHIND_FRAMES: u64 = 3;
+
 /// What the frames so far were like.
 #[derive(Debug, Clone, Copy)]
 pub struct Plausibility {
@@ -129,6 +189,11 @@ pub struct Plausibility {
     first: Option<u64>,
     /// The tick seen last, and when.
     last: Option<(u64, u64)>,
+    /// Whether ticks go with the clock, and which of them came soonest for its number, and when.
+    is_real: bool,
+    soonest: Option<(u64, u64)>,
+    /// Since when ticks are too far behind, and in how many frames.
+    behind: Option<(u64, u64)>,
     /// In which tick our lease's t = 0 was.
     run_began: Option<i64>,
     /// When a frame was answered last.
@@ -136,20 +201,30 @@ pub struct Plausibility {
 }
 
 impl Plausibility {
-    /// Of a driver with this period, which has told nothing yet.
-    pub fn new(period_ns: u64) -> Self {
-        Self { period_ns: period_ns.max(1), first: None, last: None, run_began: None, answered_ns: None }
+    /// Of a driver with this period and clock, which has told nothing yet.
+    pub fn new(period_ns: u64, clock: ClockMode) -> Self {
+        Self {
+            period_ns: period_ns.max(1),
+            first: None,
+            last: None,
+            is_real: clock == ClockMode::Real,
+            soonest: None,
+            behind: None,
+            run_began: None,
+            answered_ns: None,
+        }
     }
 
     /// Judges the number of the newest frame, before that is read.
     ///
     /// # Errors
-    /// If it goes back, or jumps ahead of the clock.
+    /// If it goes back, jumps ahead of the clock or stays behind it.
     pub fn judge_tick(&mut self, tick: u64, now_ns: u64) -> Result<(), Implausible> {
         if let Some((before, seen_ns)) = self.last {
             let passed = now_ns.saturating_sub(seen_ns) / self.period_ns;
             // A loop that catches up makes several ticks in the time of one.
-            let most = before.saturating_add(passed.saturating_mul(2)).saturating_add(RING_FRAMES as u64);
+            let most = before.saturating_add(passed.saturating_mul(2)).max(self.of_the_clock(now_ns));
+            let most = most.saturating_add(RING_FRAMES as u64);
             if tick < before {
                 return Err(Implausible::Backwards { found: tick, before });
             }
@@ -159,7 +234,39 @@ impl Plausibility {
         }
         self.first.get_or_insert(tick);
         self.last = Some((tick, now_ns));
-        Ok(())
+        if self.is_real { self.judge_pace(tick, now_ns) } else { Ok(()) }
+    }
+
+    /// The tick of now in real time, else none: a loop that was stopped in the middle of one tick is there with the next.
+    fn of_the_clock(&self, now_ns: u64) -> u64 {
+        self.soonest
+            .map_or(0, |(tick, seen_ns)| tick.saturating_add(now_ns.saturating_sub(seen_ns) / self.period_ns))
+    }
+
+    /// Ticks are late, each by another time; the one that was late least shows how clock and numbers go together.
+    fn judge_pace(&mut self, tick: u64, now_ns: u64) -> Result<(), Implausible> {
+        let (soonest, seen_ns) = *self.soonest.get_or_insert((tick, now_ns));
+        let passed_ns = now_ns.saturating_sub(seen_ns);
+        let ticks_ns = (tick - soonest).saturating_mul(self.period_ns);
+        if ticks_ns >= passed_ns {
+            self.soonest = Some((tick, now_ns));
+        }
+        let most_ns = BEHIND_NS + passed_ns / BEHIND_SHARE;
+        if passed_ns.saturating_sub(ticks_ns) <= most_ns {
+            self.behind = None;
+            return Ok(());
+        }
+        let (since_ns, frames) = self.behind.map_or((now_ns, 1), |(since_ns, frames)| (since_ns, frames + 1));
+        self.behind = Some((since_ns, frames));
+        if frames < BEHIND_FRAMES || now_ns.saturating_sub(since_ns) < BEHIND_FOR_NS {
+            return Ok(());
+        }
+        Err(Implausible::Slow {
+            found: tick - soonest,
+            seconds: passed_ns / 1_000_000_000,
+            expected: passed_ns / self.period_ns,
+            most_s: most_ns / 1_000_000_000,
+        })
     }
 
     /// Judges the frame of `tick`, which was read whole; `is_for_us`: it is under our lease.
@@ -181,9 +288,11 @@ impl Plausibility {
             let (ahead_ms, most_ms) = (ahead_ns / 1_000_000, most_ns / 1_000_000);
             return Err(Implausible::Future { tick, ahead_ms, most_ms });
         }
+        judge_state(frame)?;
         self.judge_run(tick, frame, is_for_us)?;
+        judge_forces(frame)?;
         if is_for_us {
-            judge_measurements(frame)?;
+            self.judge_measurements(frame)?;
         }
         self.note_answer(is_for_us, now_ns)
     }
@@ -219,6 +328,23 @@ impl Plausibility {
         tick.saturating_sub(first).cast_signed()
     }
 
+    /// Of the devices that say that they know where they are.
+    fn judge_measurements(&self, frame: &Frame) -> Result<(), Implausible> {
+        let knows_its_place = |(_, told): &(usize, &DeviceFrame)| told.flags & DEVICE_POSITION_VALID != 0;
+        // A hand may leap from any place to any other within a tick: twice the largest number along each axis, which a
+        // base that is turned makes the square root of three times as much.
+        let leap_m_per_s = 4.0 * MAX_MAGNITUDE / (self.period_ns as f64 * 1e-9);
+        for (device, told) in frame.present_devices().iter().enumerate().filter(knows_its_place) {
+            let of = |value| (frame.tick, device, value);
+            judge_value(of("position"), MAX_MAGNITUDE, &told.position_m_measured)?;
+            judge_value(of("velocity"), leap_m_per_s, &told.velocity_m_per_s_estimated)?;
+            if told.flags & DEVICE_ORIENTATION_MEASURED != 0 {
+                judge_value(of("orientation"), MAX_MAGNITUDE, &told.orientation_wxyz_measured)?;
+            }
+        }
+        Ok(())
+    }
+
     /// A frame that cannot be read is for nobody, too.
     ///
     /// # Errors
@@ -234,23 +360,44 @@ impl Plausibility {
     }
 }
 
-/// Of the devices that say that they know where they are.
-fn judge_measurements(frame: &Frame) -> Result<(), Implausible> {
-    let knows_its_place = |(_, told): &(usize, &DeviceFrame)| told.flags & DEVICE_POSITION_VALID != 0;
-    for (device, told) in frame.present_devices().iter().enumerate().filter(knows_its_place) {
-        let judge = |value, most: f64, components: &[f64]| {
-            let is_none = |component: &&f64| component.is_nan() || component.abs() > most;
-            let lie = |&found| Err(Implausible::NoMeasurement { tick: frame.tick, device, value, found });
-            components.iter().find(is_none).map_or(Ok(()), lie)
-        };
-        judge("position", MAX_MAGNITUDE, &told.position_m_measured)?;
-        // A hand may leap from any place to any other within a tick.
-        judge("velocity", f64::MAX, &told.velocity_m_per_s_estimated)?;
-        if told.flags & DEVICE_ORIENTATION_MEASURED != 0 {
-            judge("orientation", MAX_MAGNITUDE, &told.orientation_wxyz_measured)?;
-        }
+/// Whether a frame tells of all devices that are used.
+///
+/// # Errors
+/// If not.
+pub fn judge_devices(frame: &Frame, used: usize) -> Result<(), Implausible> {
+    match frame.device_count {
+        found if found >= used as u64 => Ok(()),
+        found => Err(Implausible::TooFew { tick: frame.tick, found, used }),
+    }
+}
+
+fn judge_state(frame: &Frame) -> Result<(), Implausible> {
+    let (tick, state) = (frame.tick, frame.state);
+    if DriverState::from_word(state).is_none() {
+        return Err(Implausible::NoState { tick, found: state, most: DriverState::Fault as u64 });
+    }
+    if !(0.0..=1.0).contains(&frame.authority) {
+        return Err(Implausible::NoAuthority { tick, found: frame.authority });
     }
     Ok(())
+}
+
+/// Of all devices: recordings and reports tell what was applied, whoever commands.
+fn judge_forces(frame: &Frame) -> Result<(), Implausible> {
+    let mut told = frame.present_devices().iter().enumerate();
+    told.try_for_each(|(device, told)| {
+        judge_value((frame.tick, device, "applied force"), f64::MAX, &told.force_on_user_n_applied)
+    })
+}
+
+fn judge_value(
+    (tick, device, value): (u64, usize, &'static str),
+    most: f64,
+    components: &[f64],
+) -> Result<(), Implausible> {
+    let is_none = |component: &&f64| component.is_nan() || component.abs() > most;
+    let lie = |&found| Err(Implausible::NoMeasurement { tick, device, value, found, most });
+    components.iter().find(is_none).map_or(Ok(()), lie)
 }
 
 #[cfg(test)]
@@ -267,7 +414,7 @@ mod tests {
 
     /// After a hundred sound frames, t = 0 in tick 10.
     fn settled() -> (Plausibility, u64) {
-        let mut sound = Plausibility::new(PERIOD_NS);
+        let mut sound = Plausibility::new(PERIOD_NS, ClockMode::Real);
         for tick in 0..100 {
             let now_ns = START_NS + tick * PERIOD_NS;
             sound.judge_tick(tick, now_ns).unwrap();
@@ -302,6 +449,64 @@ mod tests {
         assert!(liar.judge_tick(u64::MAX, now_ns).is_err());
     }
 
+    const S: u64 = 1_000_000_000;
+
+    /// When a driver whose ticks come `apart_ns` apart, and have the numbers of `number`, is told.
+    fn told_after(
+        clock: ClockMode,
+        apart_ns: u64,
+        number: impl Fn(u64) -> u64,
+    ) -> Option<(u64, Implausible)> {
+        let mut judge = Plausibility::new(PERIOD_NS, clock);
+        let mut frames = (0..1000 * S).step_by(apart_ns as usize).zip(0..100_000);
+        frames.find_map(|(later_ns, frame)| {
+            Some((later_ns, judge.judge_tick(number(frame), START_NS + later_ns).err()?))
+        })
+    }
+
+    #[test]
+    fn ticks_that_stay_behind_the_clock_are_told() {
+        // 1 ms is told, and each takes 4.5 s: the third that is 10 s late.
+        let (when_ns, told) = told_after(ClockMode::Real, 4_500_000_000, |frame| frame).expect("a lie");
+        assert_eq!(when_ns, 5 * 4_500_000_000);
+        assert_eq!(told, Implausible::Slow { found: 5, seconds: 22, expected: 22_500, most_s: 10 });
+        assert!(
+            told.to_string()
+                .starts_with("its ticks fall behind the clock: found 5 ticks in 22 s, expected 22500")
+        );
+        // Half as fast as told: 10 s and a hundredth behind after 20.4 s, and a second more.
+        let (when_ns, _) = told_after(ClockMode::Real, 2 * PERIOD_NS, |frame| frame).expect("a lie");
+        assert!((21 * S..22 * S).contains(&when_ns), "{when_ns}");
+        // Nobody's clock moves them there.
+        assert_eq!(told_after(ClockMode::Lockstep, 4_500_000_000, |frame| frame), None);
+    }
+
+    #[test]
+    fn ticks_that_are_late_and_go_with_the_clock_again_are_plausible() {
+        // Each frame 4 s late, as at a breakpoint; its number is that of its deadline.
+        assert_eq!(told_after(ClockMode::Real, 4 * S, |frame| (4000 * frame).saturating_sub(4000)), None);
+        // Deadlines that step aside as often as they may: 0.382 of 256.
+        assert_eq!(told_after(ClockMode::Real, 1_001_492, |frame| frame), None);
+        // Driver and application are stopped for an hour, ten times; then come the tick that was under way, the last
+        // thousand of the clock, made up for within half a second, and those that follow.
+        let mut sound = Plausibility::new(PERIOD_NS, ClockMode::Real);
+        let (mut tick, mut now_ns) = (0, START_NS);
+        assert_eq!(sound.judge_tick(tick, now_ns), Ok(()));
+        for _ in 0..10 {
+            now_ns += 3600 * S;
+            assert_eq!(sound.judge_tick(tick + 1, now_ns), Ok(()));
+            tick = (now_ns - START_NS) / PERIOD_NS;
+            for made_up in 0..1000 {
+                let number = tick + made_up - 999;
+                assert_eq!(sound.judge_tick(number, now_ns + made_up * 500_000), Ok(()), "{number}");
+            }
+            for later in 500..5000 {
+                assert_eq!(sound.judge_tick(tick + later, now_ns + later * PERIOD_NS), Ok(()));
+            }
+            (tick, now_ns) = (tick + 4999, now_ns + 4999 * PERIOD_NS);
+        }
+    }
+
     #[test]
     fn a_frame_that_lies_about_its_tick_its_deadline_or_the_runs_time_is_told() {
         let (mut liar, now_ns) = settled();
@@ -319,7 +524,7 @@ mod tests {
     fn a_run_that_is_older_than_its_driver_is_told_at_its_first_frame() {
         let told = |run_tick, is_for_us| {
             let first = frame(100, run_tick);
-            let mut liar = Plausibility::new(PERIOD_NS);
+            let mut liar = Plausibility::new(PERIOD_NS, ClockMode::Real);
             liar.judge_tick(90, first.deadline_ns).unwrap();
             liar.judge_frame(100, &first, is_for_us, first.deadline_ns)
         };
@@ -336,7 +541,7 @@ mod tests {
         let now_ns = START_NS + 100 * PERIOD_NS;
         let judge = |authority, is_for_us| {
             let told = Frame { authority, ..frame(100, -1) };
-            Plausibility::new(PERIOD_NS).judge_frame(100, &told, is_for_us, now_ns)
+            Plausibility::new(PERIOD_NS, ClockMode::Real).judge_frame(100, &told, is_for_us, now_ns)
         };
         assert_eq!([judge(0.999, true), judge(1.0, false)], [Ok(()), Ok(())]);
         assert_eq!(judge(1.0, true), Err(Implausible::NotBegun { tick: 100, found: -1 }));
@@ -359,9 +564,36 @@ mod tests {
         assert!(judge(both, |device| device.position_m_measured[0] = -1e300).is_err());
         assert!(judge(both, |device| device.orientation_wxyz_measured[3] = f64::INFINITY).is_err());
         assert!(judge(both, |device| device.velocity_m_per_s_estimated[0] = f64::NAN).is_err());
+        // From one end to the other within a millisecond, and beyond.
+        assert_eq!(judge(both, |device| device.velocity_m_per_s_estimated[0] = -2e18), Ok(()));
+        let told = judge(both, |device| device.velocity_m_per_s_estimated[0] = 1e300).unwrap_err();
+        assert!(told.ends_with("found 1e300, expected finite numbers up to 4e18 in size"), "{told}");
+        assert!(judge(0, |device| device.force_on_user_n_applied[1] = f64::INFINITY).is_err());
         assert_eq!(judge(0, |device| device.position_m_measured[2] = f64::NAN), Ok(()));
         assert_eq!(judge(1, |device| device.orientation_wxyz_measured[2] = f64::NAN), Ok(()));
         assert_eq!(judge(both, |device| device.position_m_measured[2] = 1e15), Ok(()));
+    }
+
+    #[test]
+    fn a_state_an_authority_or_a_number_of_devices_that_cannot_be_is_told() {
+        let (sound, now_ns) = settled();
+        let judge = |lie: fn(&mut Frame)| {
+            let mut told = frame(100, 90);
+            lie(&mut told);
+            sound.clone().judge_frame(100, &told, true, now_ns)
+        };
+        assert_eq!(judge(|frame| (frame.state, frame.authority) = (4, 1.0)), Ok(()));
+        let state = judge(|frame| frame.state = 5);
+        assert_eq!(state, Err(Implausible::NoState { tick: 100, found: 5, most: 4 }));
+        for authority in [f64::NAN, -0.01, 1.01, f64::INFINITY] {
+            let mut told = frame(100, 90);
+            told.authority = authority;
+            let lie = sound.clone().judge_frame(100, &told, true, now_ns);
+            assert!(matches!(lie, Err(Implausible::NoAuthority { tick: 100, .. })), "{authority}: {lie:?}");
+        }
+        let two = Frame { device_count: 2, ..frame(100, 90) };
+        assert_eq!([judge_devices(&two, 0), judge_devices(&two, 2)], [Ok(()), Ok(())]);
+        assert_eq!(judge_devices(&two, 3), Err(Implausible::TooFew { tick: 100, found: 2, used: 3 }));
     }
 
     #[test]

@@ -39,6 +39,16 @@ pub enum RecordingError {
     /// Its name says no format.
     #[error("cannot tell the format of {0}")]
     Format(#[from] FormatError),
+    /// Nobody finds it.
+    #[error(
+        "the recording {file} was removed during the run, or another file put in its place: its {rows} rows are lost"
+    )]
+    Removed {
+        /// Where it was.
+        file: PathBuf,
+        /// Rows that were in it.
+        rows: u64,
+    },
     /// It cannot be written any further.
     #[error(
         "cannot write the recording {file}: {source}; the run goes on without it; it is complete up to t = {until_s} s ({rows} rows)"
@@ -120,10 +130,15 @@ impl Recording {
     /// Writes everything out to the disk itself. Returns the number of rows.
     ///
     /// # Errors
-    /// If that fails.
+    /// If that fails, or nobody would find it.
     pub fn finish(mut self) -> Result<u64, RecordingError> {
         self.lines.sync().map_err(|source| self.failed(source))?;
-        Ok(self.lines.rows())
+        let rows = self.lines.rows();
+        if self.lines.is_removed() {
+            Err(RecordingError::Removed { file: self.path, rows })
+        } else {
+            Ok(rows)
+        }
     }
 
     /// Writes the rows that are not on disk yet.

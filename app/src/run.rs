@@ -11,6 +11,7 @@ use crate::moments::Moments;
 use crate::not_zeroed;
 use crate::on_request::OnRequest;
 use crate::outcome::{RunFailure, Stop};
+use crate::premises::Premises;
 use crate::progress::Progress;
 use crate::record::{About, Files, Recorded, View};
 use crate::report::{Report, recording_line};
@@ -243,6 +244,10 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
     check_devices(rig, &info)?;
     check_zeroed(&source, &attachment.driver)?;
     check_clock(plan, &info)?;
+    // Other scenes may use all of them.
+    let may_change = plan.orders.is_some() || plan.window.is_some();
+    let used = if may_change { info.devices.len() } else { rig.device_count() };
+    let premises = Premises::of(&attachment.driver, used);
     let extras = extras_of(&attachment.driver);
     let driver_name = two_processes::describe(&source, &attachment);
     let mut totals = AttachmentTotals::begin(&attachment.driver, driver_name.clone());
@@ -257,7 +262,8 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
         Parts::new(&step_rig, plan, info.clock_mode, info.period_ns, &extras, &about, reins)?;
     slow.watch_driver(source.socket());
     let watched = (&mut slow, &mut progress, signals);
-    let result = two_processes::run(&mut source, attachment, (fast, slow_lists), &mut totals, watched);
+    let known = (&premises, &mut totals);
+    let result = two_processes::run(&mut source, attachment, (fast, slow_lists), known, watched);
     progress.end();
     let SlowEnd { recordings, events, pictures } = slow.finish();
     let end = result.inspect_err(|_| tell_kept(&recordings))?;

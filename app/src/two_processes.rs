@@ -2,8 +2,9 @@
 //!
 //! Model: the fast thread answers frames; this thread is the slow one: it feeds the recorders, shows the
 //! progress and watches the connection, which is how the end of the driver is noticed. A driver that was
-//! there before us may be restarted: the run goes on with it if it is back within the grace time. A driver that hangs up
-//! and goes on has ended our lease on somebody's request, and so the run.
+//! there before us may be restarted: the run goes on with it if it is back within the grace time, and is the same in all
+//! that the run is built on ([`Premises`]). A driver that hangs up and goes on has ended our lease on somebody's request,
+//! and so the run.
 
 use crate::attachment_totals::AttachmentTotals;
 use crate::child::DriverChild;
@@ -13,6 +14,7 @@ use crate::fast_thread::{self, FastEnd, FastRemains, FastShared};
 use crate::lists_end::ListsEnd;
 use crate::not_zeroed;
 use crate::outcome::{RunFailure, Stop};
+use crate::premises::{OtherDriver, Premises};
 use crate::progress::Progress;
 use crate::slow::SlowSide;
 use crate::slow_thread::SlowThread;
@@ -89,12 +91,12 @@ pub fn describe(source: &Source, attachment: &Attachment) -> String {
 /// Runs to the end.
 ///
 /// # Errors
-/// If the driver cannot be attached to, faults or goes away for good.
+/// If the driver cannot be attached to, faults, goes away for good or comes back as another one.
 pub fn run(
     source: &mut Source,
     attachment: Attachment,
     (fast, later): (FastLoop, Option<Receiver<SlowList>>),
-    totals: &mut AttachmentTotals,
+    (premises, totals): (&Premises, &mut AttachmentTotals),
     (slow, progress, signals): (&mut SlowSide, &mut Progress, &StopSignals),
 ) -> Result<TwoProcessEnd, RunFailure> {
     let mut attachment = attachment;
@@ -129,7 +131,7 @@ pub fn run(
                 let words = last_words(&remains.driver);
                 drop(connection);
                 progress.end();
-                attachment = reattach(source, &words, signals)?;
+                attachment = reattach(source, premises, &words, signals)?;
                 totals.go_on(&attachment.driver, describe(source, &attachment));
                 fast = remains.fast;
                 fast.reset();
@@ -243,7 +245,12 @@ fn last_words(driver: &DriverView) -> String {
         .map_or_else(|| "it was killed, or crashed without last words".into(), |words| words.to_string())
 }
 
-fn reattach(source: &mut Source, words: &str, signals: &StopSignals) -> Result<Attachment, RunFailure> {
+fn reattach(
+    source: &mut Source,
+    premises: &Premises,
+    words: &str,
+    signals: &StopSignals,
+) -> Result<Attachment, RunFailure> {
     let (socket, grace) = match source {
         Source::Child(child) => {
             let status = child.end().map_or_else(String::new, |status| format!(" ({status})"));
@@ -255,7 +262,7 @@ fn reattach(source: &mut Source, words: &str, signals: &StopSignals) -> Result<A
     let mut begun = Instant::now();
     let mut told = false;
     loop {
-        let error = match come_back(socket) {
+        let error = match come_back(socket, premises) {
             Ok(attachment) => {
                 say(format_args!(
                     "phantom3: the driver is back (process {}); the run goes on",
@@ -263,6 +270,7 @@ fn reattach(source: &mut Source, words: &str, signals: &StopSignals) -> Result<A
                 ));
                 return Ok(attachment);
             }
+            Err(error) if error.is_for_good() => return Err(RunFailure::OtherDriver(error.to_string())),
             Err(error) => error,
         };
         if signals.requested().is_some() {
@@ -287,14 +295,37 @@ enum Absence {
     Gone(#[from] client::AttachError),
     #[error("{0}")]
     NotZeroed(String),
+    #[error(transparent)]
+    Other(#[from] OtherDriver),
 }
 
-/// The lease of a driver whose devices know where they are. Looked at before the lease is asked for: who zeroes
-/// them should not find somebody in command.
-fn come_back(socket: &Path) -> Result<Attachment, Absence> {
-    let observer = client::observe(socket, "phantom3")?;
-    match not_zeroed::words(&observer.driver, socket) {
-        Some(words) => Err(Absence::NotZeroed(words)),
-        None => Ok(client::command(socket, "phantom3")?),
+impl Absence {
+    /// A driver is there, and it is none that the run could go on with.
+    fn is_for_good(&self) -> bool {
+        let is_of_another_contract = |error: &client::AttachError| {
+            matches!(
+                error,
+                client::AttachError::WrongVersion { .. } | client::AttachError::WrongLayout { .. }
+            )
+        };
+        match self {
+            Self::Other(_) => true,
+            Self::Gone(error) => is_of_another_contract(error),
+            Self::NotZeroed(_) => false,
+        }
     }
+}
+
+/// The lease of the driver that the run began with, whose devices know where they are. Looked at before the lease is asked
+/// for: who zeroes them should not find somebody in command. And once more after it: in between yet another one may have
+/// come.
+fn come_back(socket: &Path, premises: &Premises) -> Result<Attachment, Absence> {
+    let observer = client::observe(socket, "phantom3")?;
+    premises.judge(&observer.driver)?;
+    if let Some(words) = not_zeroed::words(&observer.driver, socket) {
+        return Err(Absence::NotZeroed(words));
+    }
+    let attachment = client::command(socket, "phantom3")?;
+    premises.judge(&attachment.driver)?;
+    Ok(attachment)
 }

@@ -119,8 +119,10 @@ pub(crate) static TICK: AtomicU64 = AtomicU64::new(0);
 /// # Errors
 /// Whatever kept it from starting, and a panic of its loop.
 pub fn run(config: &DriverConfig, options: &RunOptions) -> Result<(), RunError> {
-    let signals =
-        StopSignals::install().map_err(|source| RunError::System { what: "catch signals", source })?;
+    // A child hears of its parent's end so, and must not outlive it: that a terminal's end is ignored changes nothing there.
+    let install =
+        if options.parent.is_some() { StopSignals::install_with_hangup } else { StopSignals::install };
+    let signals = install().map_err(|source| RunError::System { what: "catch signals", source })?;
     let user = sandbox::user_to_become(&config.process)?;
     die_with_parent(options)?;
     // Its socket is made here, while sockets may be made.

@@ -5,11 +5,12 @@
 //! to do. Writing does wait, as everybody expects of a pipe. Who fills a regular file for long claims it ([`claim`]), so
 //! that two processes do not write over one another.
 
+use crate::sys::inherited;
 use nix::errno::Errno;
 use nix::fcntl::{FcntlArg, OFlag, fcntl};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io;
-use std::os::unix::fs::OpenOptionsExt;
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::Path;
 
 /// Makes the file, or empties it.
@@ -52,6 +53,18 @@ pub fn claim(file: &File) -> io::Result<()> {
 /// The error is that of a file that another process has claimed.
 pub fn is_claimed(error: &io::Error) -> bool {
     error.kind() == io::ErrorKind::ResourceBusy && error.raw_os_error().is_none()
+}
+
+/// Whether nobody finds this file by a name: it was removed, or another one was put in its place, or it never had one.
+/// Of a pipe or a device nothing is said.
+pub fn has_no_name(file: &File) -> bool {
+    file.metadata().is_ok_and(|found| found.is_file() && found.nlink() == 0)
+}
+
+/// Whether this process began without a standard output, as `>&-` of a shell has it. What is written there since is lost.
+#[must_use]
+pub fn standard_output_was_closed() -> bool {
+    inherited::output_was_closed()
 }
 
 fn in_words(error: io::Error) -> io::Error {

@@ -7,6 +7,9 @@
 //! not mean "now": timeout(1) sends its signal to its child and right after that to the child's group, a terminal sends
 //! SIGINT to parent and child alike, a parent then sends its child SIGTERM, and systemd may send SIGHUP right after
 //! SIGTERM.
+//! A SIGHUP that was ignored when the program began stays so: nohup(1) and shells that are left ask for that, of
+//! applications and drivers alike, so that they outlive the terminal. Whoever is told of its parent's end by SIGHUP takes it
+//! all the same ([`StopSignals::install_with_hangup`]).
 //! The kernel hands a signal to any thread that does not block it, by preference to the first one, and that thread may be
 //! stuck in a system call. A process that must hear them at once blocks them everywhere ([`block_in_this_thread`]) but in
 //! one thread that is never stuck ([`receive_in_this_thread`]).
@@ -16,6 +19,7 @@
 //! Cost: one relaxed load a tick.
 
 use crate::sys::at_once::end_when_repeated;
+use crate::sys::inherited::is_ignored;
 use nix::sys::signal::{SigSet, Signal};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
@@ -56,16 +60,30 @@ pub struct StopSignals {
 }
 
 impl StopSignals {
-    /// Installs the handlers. Clone the result for other threads; a second installation works too.
+    /// Installs the handlers, that of SIGHUP only if it is not ignored. Clone the result for other threads; a second
+    /// installation works too.
     ///
     /// # Errors
     /// What sigaction(2) reports.
     pub fn install() -> io::Result<Self> {
+        let hangup = (!is_ignored(SIGHUP)).then_some(SIGHUP);
+        Self::install_for([SIGTERM, SIGINT].into_iter().chain(hangup))
+    }
+
+    /// The same, and that of SIGHUP in any case.
+    ///
+    /// # Errors
+    /// What sigaction(2) reports.
+    pub fn install_with_hangup() -> io::Result<Self> {
+        Self::install_for([SIGTERM, SIGINT, SIGHUP])
+    }
+
+    fn install_for(numbers: impl IntoIterator<Item = i32>) -> io::Result<Self> {
         let signal = Arc::new(AtomicUsize::new(0));
         for number in [SIGTERM, SIGINT] {
             end_when_repeated(number, SAME_REQUEST)?;
         }
-        for number in [SIGTERM, SIGINT, SIGHUP] {
+        for number in numbers {
             flag::register_usize(number, Arc::clone(&signal), number as usize)?;
         }
         // Caught, so that a file that may not grow any more is a failed write, as a full disk is.
@@ -129,9 +147,35 @@ mod tests {
         assert_eq!(outcome("SIGTERM SIGHUP SIGHUP").code(), Some(SIGHUP), "still a request");
     }
 
+    const NOHUP: &str =
+        "signals::tests::a_hangup_that_was_ignored_at_the_beginning_stays_so_unless_it_is_asked_for";
+
+    #[test]
+    fn a_hangup_that_was_ignored_at_the_beginning_stays_so_unless_it_is_asked_for() {
+        if let Some(role) = test_child::role(NOHUP) {
+            play(&role);
+        }
+        let outcome = |role: &str| {
+            let child = test_child::command(NOHUP, role);
+            let mut shell = std::process::Command::new("sh");
+            shell
+                .args(["-c", "trap '' HUP; exec \"$0\" \"$@\""])
+                .arg(child.get_program())
+                .args(child.get_args());
+            shell.envs(child.get_envs().filter_map(|(name, value)| Some((name, value?))));
+            shell.bounded_status().unwrap().code()
+        };
+        assert_eq!(outcome("SIGHUP"), Some(0), "as nohup(1) asks for");
+        assert_eq!(outcome("SIGHUP SIGTERM SIGHUP"), Some(SIGTERM), "the others are heard");
+        assert_eq!(outcome("hangup SIGHUP"), Some(SIGHUP), "a parent's end is");
+    }
+
     /// Receives the signals and exits with the number of the one requested.
     fn play(signals: &str) -> ! {
-        let stop = StopSignals::install().unwrap();
+        let (stop, signals) = match signals.strip_prefix("hangup ") {
+            Some(signals) => (StopSignals::install_with_hangup().unwrap(), signals),
+            None => (StopSignals::install().unwrap(), signals),
+        };
         assert_eq!(stop.requested(), None);
         for name in signals.split_whitespace() {
             match name {

@@ -60,10 +60,15 @@ impl EventsFile {
     /// Writes the rest; says how many events there are.
     ///
     /// # Errors
-    /// If that fails.
+    /// If that fails, or nobody would find it.
     pub fn finish(mut self) -> Result<u64, RecordingError> {
         self.flush()?;
-        Ok(self.lines.rows())
+        let rows = self.lines.rows();
+        if self.lines.is_removed() {
+            Err(RecordingError::Removed { file: self.path, rows })
+        } else {
+            Ok(rows)
+        }
     }
 
     fn failed(&self, source: io::Error) -> RecordingError {

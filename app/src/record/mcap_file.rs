@@ -30,6 +30,7 @@ use io_driver::device::run_time_s;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
+use rt_core::output_file;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -120,9 +121,9 @@ impl McapFile {
     ) -> Result<Self, RecordingError> {
         let path = file.path().to_owned();
         let failed = |error| RecordingError::Create { file: path.clone(), source: into_io(error) };
-        let may_wait = file.may_wait();
+        let (may_wait, has_name) = (file.may_wait(), file.has_name());
         let file = file.empty().map_err(|error| failed(error.into()))?;
-        let mut writer = options().create(NoSeek::new(WholeWrites::new(file))).map_err(failed)?;
+        let mut writer = options().create(NoSeek::new(WholeWrites::new(file, has_name))).map_err(failed)?;
         let channels = begin(&mut writer, &names, about).map_err(failed)?;
         let mut file = Self {
             writer,
@@ -286,7 +287,7 @@ impl McapFile {
     /// Writes what is left, the index, and how the recording ended. Returns the number of rows.
     ///
     /// # Errors
-    /// If that fails.
+    /// If that fails, or nobody would find it.
     pub fn finish(mut self) -> Result<u64, RecordingError> {
         self.flush()?;
         let facts = BTreeMap::from([
@@ -298,7 +299,10 @@ impl McapFile {
         let closed = self.writer.write_metadata(&end).and_then(|()| self.writer.finish().map(drop));
         closed.map_err(|error| self.failed(error))?;
         let (path, rows, until_s) = (self.path.clone(), self.rows, self.until_s());
-        match self.writer.into_inner().into_inner().sync() {
+        let whole = self.writer.into_inner().into_inner();
+        let is_removed = whole.is_removed();
+        match whole.sync() {
+            Ok(()) if is_removed => Err(RecordingError::Removed { file: path, rows }),
             Ok(()) => Ok(rows),
             Err(source) => Err(RecordingError::Write { file: path, source, until_s, rows }),
         }
@@ -414,6 +418,7 @@ fn into_io(error: McapError) -> io::Error {
 #[derive(Debug)]
 struct WholeWrites {
     file: File,
+    has_name: bool,
     pending: Vec<u8>,
     written_bytes: u64,
     /// Something did not fit. The library still writes an end behind it, which would be that of a whole file.
@@ -421,8 +426,13 @@ struct WholeWrites {
 }
 
 impl WholeWrites {
-    fn new(file: File) -> Self {
-        Self { file, pending: Vec::new(), written_bytes: 0, has_ended: false }
+    fn new(file: File, has_name: bool) -> Self {
+        Self { file, has_name, pending: Vec::new(), written_bytes: 0, has_ended: false }
+    }
+
+    /// Whether the name is gone that the file had in the beginning.
+    fn is_removed(&self) -> bool {
+        self.has_name && output_file::has_no_name(&self.file)
     }
 
     /// Writes what is left out to the disk itself.
@@ -472,7 +482,8 @@ mod tests {
 
     #[test]
     fn nothing_is_written_behind_a_write_that_did_not_fit() {
-        let mut full = WholeWrites::new(File::options().write(true).open("/dev/full").expect("a device"));
+        let mut full =
+            WholeWrites::new(File::options().write(true).open("/dev/full").expect("a device"), true);
         full.write_all(b"chunk").and_then(|()| full.flush()).expect_err("full");
         let directory = tempfile::tempdir().expect("a directory");
         // Room is there again, as on a disk from which the cut piece has gone.

@@ -52,9 +52,12 @@ impl Opened {
     /// Opens the file, or makes it; or gives the standard output another descriptor.
     ///
     /// # Errors
-    /// If the system refuses, it is a pipe that nobody reads, or another process writes it.
+    /// If the system refuses, it is a pipe that nobody reads, another process writes it, or there is no standard output.
     pub fn open(path: &Path) -> io::Result<Self> {
         if is_standard_output(path) {
+            if output_file::standard_output_was_closed() {
+                return Err(io::Error::other("it was closed when this program started"));
+            }
             let file = io::stdout().as_fd().try_clone_to_owned().map(File::from)?;
             return Ok(Self { file, path: path.into(), made: Made(None) });
         }
@@ -94,6 +97,11 @@ impl Opened {
     pub fn may_wait(&self) -> bool {
         let Ok(kind) = self.file.metadata().map(|found| found.file_type()) else { return true };
         kind.is_fifo() || kind.is_socket() || kind.is_char_device() && isatty(&self.file)
+    }
+
+    /// Whether people will look for it by its name. The standard output is somebody else's, who may keep it open.
+    pub(super) fn has_name(&self) -> bool {
+        !is_standard_output(&self.path) && !output_file::has_no_name(&self.file)
     }
 
     /// What emptying it would cost: nothing for a stream, its place for a file that is empty, else its content.

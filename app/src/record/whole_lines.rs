@@ -6,6 +6,7 @@
 //! back to the last line that fits. Only lines that are in the file count.
 
 use super::opened::Opened;
+use rt_core::output_file;
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
 
@@ -16,6 +17,7 @@ const CHUNK_BYTES: usize = 256 * 1024;
 #[derive(Debug)]
 pub(crate) struct WholeLines {
     file: File,
+    has_name: bool,
     /// Whole lines that are not in the file yet.
     buffer: String,
     /// End of each of these in the buffer but the header's, and its tick.
@@ -31,7 +33,7 @@ impl WholeLines {
     /// # Errors
     /// If it cannot be emptied, or the line not be written.
     pub(crate) fn begin(file: Opened, header: &str) -> io::Result<Self> {
-        let may_wait = file.may_wait();
+        let (may_wait, has_name) = (file.may_wait(), file.has_name());
         let file = file.empty()?;
         // Behind what others have written to a standard output that is a file.
         let written_bytes = file.metadata()?.len();
@@ -40,7 +42,8 @@ impl WholeLines {
             buffer.push_str(header);
             buffer.push('\n');
         }
-        let mut lines = Self { file, buffer, ends: Vec::new(), written_bytes, rows: 0, last_tick: 0 };
+        let mut lines =
+            Self { file, has_name, buffer, ends: Vec::new(), written_bytes, rows: 0, last_tick: 0 };
         if !may_wait {
             lines.flush()?;
         }
@@ -103,6 +106,11 @@ impl WholeLines {
             Err(error) if error.kind() == io::ErrorKind::InvalidInput => Ok(()),
             synced => synced,
         }
+    }
+
+    /// Whether the name is gone that the file had in the beginning.
+    pub(crate) fn is_removed(&self) -> bool {
+        self.has_name && output_file::has_no_name(&self.file)
     }
 
     /// Counts what reached the file and cuts a line that did so only in part.

@@ -6,6 +6,7 @@ pub(crate) mod at_once;
 pub(crate) mod capability;
 pub(crate) mod counting_allocator;
 pub(crate) mod fatal;
+pub(crate) mod inherited;
 pub(crate) mod malloc;
 pub(crate) mod mapped_word;
 pub(crate) mod sched;

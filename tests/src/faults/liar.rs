@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 /// Ticks of the run before the first lie.
@@ -79,7 +79,7 @@ fn serve(
     let mut events = Vec::new();
     // And the tick of the first answer.
     let mut commander: Option<(CommanderView, Option<u64>)> = None;
-    let mut tick = 0;
+    let (begun, mut tick) = (Instant::now(), 0);
     while !stop.load(Ordering::Relaxed) {
         server.poll(memory, PERIOD, &mut events).expect("the socket works");
         for event in events.drain(..) {
@@ -99,7 +99,9 @@ fn serve(
         }
         memory.write_frame(&frame);
         memory.ring(frame.tick, view);
-        tick += 1;
+        // As a sound driver's, its ticks go with the clock on a busy machine, too.
+        let passed = begun.elapsed().as_nanos() / PERIOD.as_nanos();
+        tick = (tick + 1).max(u64::try_from(passed).expect("a test's time"));
     }
 }
 

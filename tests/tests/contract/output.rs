@@ -290,3 +290,45 @@ fn a_reader_who_has_seen_enough_ends_the_run_quietly_where_nothing_else_is_recor
     let said = place.shell(script, &both);
     assert!(said.err.contains("recording    out.csv (20000 rows)"), "{}", said.err);
 }
+
+/// The rows went into a file that nobody finds any more.
+#[test]
+fn a_recording_that_was_removed_meanwhile_is_not_told_as_if_it_were_there() {
+    let place = workplace();
+    let outputs = ["--record", "out.csv", "--record", "out.mcap", "--events", "out.jsonl"];
+    let mut program = place.phantom3();
+    program.args(["run", "scene.toml", "--clock", "real", "--seconds", "40000"]).args(outputs);
+    let running = Running::start(program);
+    let files = ["out.csv", "out.mcap", "out.jsonl"].map(|name| place.path(name));
+    patience::until("rows in the table", || {
+        files.iter().all(|file| file.exists()) && files[0].metadata().is_ok_and(|file| file.len() > 4096)
+    });
+    std::fs::remove_file(&files[0]).expect("it is there");
+    std::fs::remove_file(&files[1]).expect("it is there");
+    let pid = rustix::process::Pid::from_child(&running.child);
+    rustix::process::kill_process(pid, rustix::process::Signal::TERM).expect("our own child");
+    let said = running.wait();
+    assert_eq!(said.status, Some(3), "{}", said.err);
+    for name in ["out.csv", "out.mcap"] {
+        let told = format!("phantom3: the recording {name} was removed during the run");
+        assert!(said.err.contains(&told), "{}", said.err);
+        assert!(said.out.contains(&format!("recording    {name} (0 rows) NOT COMPLETE")), "{}", said.out);
+    }
+    assert!(said.out.contains("recording    out.jsonl (0 events)\n"), "that one is there: {}", said.out);
+}
+
+#[test]
+fn a_recording_on_a_closed_standard_output_is_refused_before_anything_runs() {
+    for output in ["--record", "--events"] {
+        for clock in ["virtual", "real"] {
+            let place = workplace();
+            let arguments = ["--clock", clock, "--seconds", "0.2", output, "-"];
+            let said = place.shell("exec \"$0\" \"$@\" >&-", &arguments);
+            assert_eq!(said.status, Some(2), "{}", said.err);
+            let told =
+                "cannot create the recording the standard output: it was closed when this program started";
+            assert!(said.err.contains(told), "{}", said.err);
+            assert_eq!(place.processes(), Vec::<u32>::new());
+        }
+    }
+}

@@ -177,6 +177,37 @@ fn a_killed_app_takes_its_own_driver_and_its_directory_with_it() {
     }
 }
 
+/// Its driver hears of its end by SIGHUP, which it therefore never ignores.
+#[test]
+fn an_app_under_nohup_outlives_its_terminal_and_its_driver_does_not_outlive_it() {
+    let table = Table::new();
+    let mut program = table.app("real");
+    program.args(["--seconds", "80000"]);
+    let mut shell = std::process::Command::new("sh");
+    shell.args(["-c", "trap '' HUP; exec \"$0\" \"$@\""]);
+    shell.arg(program.get_program()).args(program.get_args());
+    for (name, value) in program.get_envs() {
+        match value {
+            Some(value) => shell.env(name, value),
+            None => shell.env_remove(name),
+        };
+    }
+    let mut app = Running::start(shell.current_dir(table.path("")));
+    let observer = table.observe_child();
+    let mut log = RingLog::begin(&observer.driver);
+    log.follow_to_force(&observer.driver);
+    app.signal(Signal::HUP);
+    // A tenth of a second, in which it would have ended many times over.
+    log.follow_for(&observer.driver, 200);
+    app.must_run();
+    let child = children_of(app.id())[0];
+    app.kill();
+    wait_until_dead(child);
+    let words = rt_core::epitaph::read(&observer.driver.epitaph).map(|words| words.kind);
+    assert_eq!(words, Some(EpitaphKind::Stopped), "the driver did not stop in order");
+    assert_eq!(table.left_behind(), Vec::<PathBuf>::new());
+}
+
 /// Killed at any moment of its start, before or after there is a driver.
 #[test]
 fn an_app_killed_while_it_starts_leaves_no_driver_running() {

@@ -5,7 +5,10 @@ use bytemuck::Zeroable;
 use rt_core::epitaph::{self, EpitaphKind};
 use rustix::process::Signal;
 use shm_abi::client::{self, AttachError};
-use shm_abi::{DriverView, Frame};
+use shm_abi::handshake::{Answer, Request, Verdict};
+use shm_abi::{ABI_MAJOR, ABI_MINOR, DriverView, Frame};
+use std::io::{Read, Write};
+use std::os::unix::net::UnixListener;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use system_tests::faults::press::{self, FORCE_N, Press, Table, terminate};
@@ -133,6 +136,67 @@ fn a_driver_that_does_not_come_back_in_time_ends_the_run() {
     assert!(end.err.contains(&format!("{gone}; waiting up to 200ms for its return")), "{end:?}");
     assert!(end.err.contains(&format!("{gone}; after 200ms: the driver is gone:")), "{end:?}");
     assert!(!checked_times(&press.path("out.csv")).is_empty());
+}
+
+/// Nobody may go on with a driver whose ticks or devices are others: the run's time and its fingers are made of them.
+#[test]
+fn a_driver_that_comes_back_as_another_one_ends_the_run_and_both_are_told() {
+    let before = press::config("real");
+    let cases = [
+        (before.replace("rate_hz = 2000", "rate_hz = 1000"), ["1000000 ns", "500000 ns"]),
+        (press::config("lockstep"), ["its clock is lockstep", "began with real"]),
+        (before.clone() + "name = \"thumb\"\n", ["its device 0 is thumb (ideal)", "began with f0 (ideal)"]),
+    ];
+    for (after, expected) in cases {
+        let mut press = Press::start("real");
+        let mut app = Running::start(press.app().args([
+            "--seconds",
+            "80000",
+            "--record",
+            "out.csv",
+            "--grace",
+            "3600",
+        ]));
+        wait_for_some_run(&press.observer.driver);
+        press.driver.child.kill().expect("our own child");
+        press.driver.wait();
+        app.hear("waiting up to 3600s for its return");
+        press.driver.restart(&after);
+        check_that_it_is_refused(app, &press, &expected);
+        press.driver_must_live();
+    }
+}
+
+fn check_that_it_is_refused(mut app: Running, press: &Press, expected: &[&str]) {
+    let end = app.end();
+    assert_eq!(end.status, Some(3), "{end:?}");
+    assert!(end.err.contains("not the one that this run began with: "), "{end:?}");
+    assert!(expected.iter().all(|words| end.err.contains(words)), "{expected:?}: {end:?}");
+    assert!(!end.err.contains("the run goes on"), "{end:?}");
+    assert!(!checked_times(&press.path("out.csv")).is_empty());
+}
+
+#[test]
+fn a_driver_of_another_contract_that_comes_in_the_place_of_the_first_ends_the_run() {
+    let mut press = Press::start("real");
+    let mut app =
+        Running::start(press.app().args(["--seconds", "80000", "--record", "out.csv", "--grace", "3600"]));
+    wait_for_some_run(&press.observer.driver);
+    press.driver.child.kill().expect("our own child");
+    press.driver.wait();
+    app.hear("waiting up to 3600s for its return");
+    std::fs::remove_file(press.driver.socket()).expect("nobody took it away");
+    let listener = UnixListener::bind(press.driver.socket()).expect("a socket");
+    let answer = Answer {
+        abi_version: u64::from(ABI_MAJOR + 1) << 32,
+        verdict: Verdict::WrongVersion as u64,
+        ..Answer::new(Verdict::Granted)
+    };
+    let mut stream = patience::accepted(&listener);
+    stream.read_exact(bytemuck::bytes_of_mut(&mut Request::zeroed())).expect("a request");
+    stream.write_all(bytemuck::bytes_of(&answer)).expect("it is told");
+    let (theirs, ours) = (format!("version {}.0", ABI_MAJOR + 1), format!("{ABI_MAJOR}.{ABI_MINOR}"));
+    check_that_it_is_refused(app, &press, &[&theirs, &ours]);
 }
 
 /// While it waits for the driver's return, it still listens.

@@ -121,7 +121,7 @@ fn an_app_that_meets_a_driver_whose_header_cannot_be_starts_nothing_and_says_wha
 #[test]
 fn a_run_ends_with_words_when_its_driver_tells_what_cannot_be() {
     type Lie = (fn(&mut Frame), &'static str);
-    let later: [Lie; 8] = [
+    let later: [Lie; 15] = [
         (|frame| frame.tick = 5, "its ticks go back: found tick 5 after"),
         (|frame| frame.tick += 1 << 40, "its ticks jump: found tick"),
         (|frame| frame.deadline_ns = u64::MAX, "comes from the future"),
@@ -134,6 +134,22 @@ fn a_run_ends_with_words_when_its_driver_tells_what_cannot_be() {
             "its position of device 0 is said to be",
         ),
         (|frame| frame.devices[0].position_m_measured[1] = 1e300, "its position of device 0 is said to be"),
+        (
+            |frame| frame.devices[0].velocity_m_per_s_estimated[2] = -1e300,
+            "its velocity of device 0 is said to be",
+        ),
+        (
+            |frame| frame.devices[0].force_on_user_n_applied[0] = f64::NAN,
+            "its applied force of device 0 is said to be",
+        ),
+        (
+            |frame| frame.devices[0].force_on_user_n_applied[0] = f64::INFINITY,
+            "its applied force of device 0 is said to be",
+        ),
+        (|frame| frame.device_count = 0, "it tells of too few devices, expected 1 at least: found 0 in tick"),
+        (|frame| frame.authority = 1e300, "its authority is none: found 1e300 in tick"),
+        (|frame| frame.authority = -0.5, "its authority is none: found -0.5 in tick"),
+        (|frame| frame.state = 99, "its state is none that there is: found 99 in tick"),
     ];
     let at_once: [Lie; 2] = [
         (|frame| frame.run_tick = -1, "its time of the run does not begin: found -1 in tick"),
@@ -150,4 +166,13 @@ fn a_run_ends_with_words_when_its_driver_tells_what_cannot_be() {
             "{expected}: {end:?}"
         );
     }
+}
+
+/// Each of its frames is sound; only their number is a tenth of what the clock asks for.
+#[test]
+fn a_run_ends_with_words_when_its_drivers_ticks_are_much_too_slow() {
+    let end = end_with(&Liar::about_itself(|header| header.period_ns.store(100_000, Ordering::Relaxed)));
+    assert_eq!(end.status, Some(3), "{end:?}");
+    let words = "the driver tells what cannot be: its ticks fall behind the clock: found";
+    assert!(end.err.contains(words), "{end:?}");
 }
