@@ -155,10 +155,10 @@ fn handler_action() -> libc::sigaction {
     action.sa_sigaction = on_fatal as *const () as libc::sighandler_t;
     action.sa_flags = libc::SA_SIGINFO | libc::SA_ONSTACK | libc::SA_NODEFER;
     // SAFETY: the mask is ours and valid.
-    unsafe {
-        libc::sigfillset(&mut action.sa_mask);
-        libc::sigdelset(&mut action.sa_mask, libc::SIGBUS);
-        libc::sigdelset(&mut action.sa_mask, libc::SIGSEGV);
+    unsafe { libc::sigfillset(&mut action.sa_mask) };
+    for fault in [libc::SIGBUS, libc::SIGSEGV] {
+        // SAFETY: as above.
+        unsafe { libc::sigdelset(&mut action.sa_mask, fault) };
     }
     action
 }

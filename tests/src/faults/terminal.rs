@@ -1,8 +1,8 @@
 //! A terminal that somebody holds by Ctrl-S.
 
+use rustix::fs::{Mode, OFlags};
 use rustix::pty::{OpenptFlags, grantpt, openpt, unlockpt};
 use rustix::termios::{Action, tcflow};
-use std::fs::File;
 use std::os::fd::OwnedFd;
 use std::path::PathBuf;
 use std::process::Stdio;
@@ -21,7 +21,9 @@ impl Terminal {
         grantpt(&master).and_then(|()| unlockpt(&master)).expect("our own");
         let name = rustix::pty::ptsname(&master, Vec::new()).expect("it has a name");
         let name = PathBuf::from(name.into_string().expect("plain"));
-        let slave = File::options().read(true).write(true).open(name).expect("our own").into();
+        // Nobody's controlling terminal: where the tests lead a session, its end would be theirs.
+        let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
+        let slave = rustix::fs::open(name, flags, Mode::empty()).expect("our own");
         Self { _master: master, slave }
     }
 
