@@ -8,6 +8,7 @@ use rt_core::epitaph::{self, EpitaphKind};
 use rustix::process::Signal;
 use shm_abi::{FaultReason, stop_socket};
 use std::collections::BTreeSet;
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 use system_tests::faults::amplifiers::wait_for;
 use system_tests::faults::commander::Commander;
@@ -282,22 +283,22 @@ fn a_loop_whose_service_is_stuck_finds_its_own_faults() {
 fn a_loop_whose_service_fails_in_a_call_finds_its_own_faults() {
     let Some(calls) = traced() else { return };
     let cases: Vec<_> = calls.all.iter().map(String::as_str).zip(FAULTS.into_iter().rev().cycle()).collect();
-    let mut found = Vec::new();
+    let found = Mutex::new(Vec::new());
     // Two drivers at a time: most of it is clients that wait for an answer.
     for pair in cases.chunks(2) {
-        let both = patience::watched(2 * patience::limit(), "two drivers", || {
+        patience::watched(2 * patience::limit(), "two drivers", || {
             std::thread::scope(|scope| {
-                let started: Vec<_> = pair
-                    .iter()
-                    .map(|&(call, fault)| {
-                        scope.spawn(move || (call, check_own_fault(call, failures_of(call)[0], fault)))
-                    })
-                    .collect();
-                started.into_iter().map(|one| one.join().expect("it is found")).collect::<Vec<_>>()
-            })
+                for &(call, fault) in pair {
+                    let found = &found;
+                    scope.spawn(move || {
+                        let one = check_own_fault(call, failures_of(call)[0], fault);
+                        found.lock().expect("nobody panicked").push((call, one));
+                    });
+                }
+            });
         });
-        found.extend(both);
     }
+    let found = found.into_inner().expect("nobody panicked");
     check_found(&calls, &found);
 }
 
