@@ -330,14 +330,14 @@ fn a_c_program_does_not_wait_for_an_answer_that_drips() {
         .spawn()
         .unwrap();
     let drips = std::thread::spawn(move || {
-        let (mut connection, _) = server.accept().unwrap();
+        let mut connection = patience::accepted(&server);
         // Until whoever waits has hung up.
         while std::io::Write::write_all(&mut connection, &[0]).is_ok() {
             std::thread::sleep(Duration::from_millis(500));
         }
     });
     let output = client.bounded_output();
-    patience::watched(limit(), "a server that drips", || drips.join().unwrap());
+    drips.bounded_join().unwrap();
     let words = String::from_utf8_lossy(&output.stderr);
     assert!(words.contains("gives no answer"), "{words}");
     assert_eq!(output.status.code(), Some(1));
