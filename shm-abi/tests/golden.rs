@@ -213,8 +213,11 @@ fn todays_driver_writes_the_header_and_the_descriptions_of_every_version_and_rea
             file.read_exact_at(&mut found, offset).unwrap();
             assert_eq!(found, golden, "{structure} {version}");
         }
+        // No driver ticks as fast as the numbers of the golden header say.
+        const PERIOD_NS: u64 = 1_001_006;
+        memory.header.period_ns.store(PERIOD_NS, Ordering::Relaxed);
         let view = DriverView::map(memory.fd()).unwrap();
-        let mut expected = driver_info(minor);
+        let mut expected = DriverInfo { period_ns: PERIOD_NS, ..driver_info(minor) };
         if minor == 0 {
             // What a driver of 1.0 does not tell is no limit.
             for device in &mut expected.devices {

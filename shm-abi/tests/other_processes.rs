@@ -34,6 +34,12 @@ fn own_binary() -> PathBuf {
     std::env::current_exe().unwrap()
 }
 
+/// By a process of its own: a child of another test would hold what is written here, and it could not be run.
+fn copy_own_binary(to: &Path) {
+    let copied = std::process::Command::new("cp").arg(own_binary()).arg(to).bounded_status().unwrap();
+    assert!(copied.success());
+}
+
 #[test]
 fn body_of_another_process() {
     let Some(socket) = std::env::var_os(SOCKET).map(PathBuf::from) else { return };
@@ -158,7 +164,7 @@ fn a_user_without_permission_is_told_mode_owner_group_and_own_id() {
     }
     // Where the other user can run it.
     let binary = directory.path().join("test");
-    std::fs::copy(own_binary(), &binary).unwrap();
+    copy_own_binary(&binary);
     let refusal = |directory_mode: u32| {
         std::fs::set_permissions(directory.path(), Permissions::from_mode(directory_mode)).unwrap();
         let shared = tempfile::Builder::new().permissions(Permissions::from_mode(0o755)).tempdir().unwrap();
@@ -270,7 +276,7 @@ fn an_application_goes_for_the_place_that_is_hidden_from_it() {
     // Where another user can run it.
     let shared = tempfile::Builder::new().permissions(Permissions::from_mode(0o755)).tempdir().unwrap();
     let binary = shared.path().join("test");
-    std::fs::copy(own_binary(), &binary).unwrap();
+    copy_own_binary(&binary);
     std::fs::set_permissions(directory.path(), Permissions::from_mode(0o755)).unwrap();
     std::fs::set_permissions(&hidden, Permissions::from_mode(0o000)).unwrap();
     let user = rustix::process::geteuid().is_root().then_some(NOBODY);
