@@ -331,10 +331,10 @@ fn a_c_program_does_not_wait_for_an_answer_that_drips() {
         .unwrap();
     let drips = std::thread::spawn(move || {
         let mut connection = patience::accepted(&server);
-        // Until whoever waits has hung up.
-        while std::io::Write::write_all(&mut connection, &[0]).is_ok() {
+        patience::until("whoever waits has hung up", || {
             std::thread::sleep(Duration::from_millis(500));
-        }
+            std::io::Write::write_all(&mut connection, &[0]).is_err()
+        });
     });
     let output = client.bounded_output();
     drips.bounded_join().unwrap();
