@@ -336,8 +336,8 @@ impl Objects {
     }
 
     /// After all, the force on the user of a finger was changed by so much (N). The bodies that it touches have got the other
-    /// one: each gets its share of the difference in the next tick, as far as it is then [still there to be
-    /// paid](Self::pay), so that over two ticks action is reaction.
+    /// one: each gets its share of the difference in the next tick, as far as its finger then still presses or pulls by as
+    /// much, so that over two ticks action is reaction.
     pub fn owe(&mut self, finger: usize, changed_W: Vector3<f64>, of: &DeviceFinger, felt: &FingerEffects) {
         if changed_W == Vector3::zeros() {
             return;
