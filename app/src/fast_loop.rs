@@ -225,7 +225,7 @@ impl FastLoop {
         &mut self.step
     }
 
-    /// How many devices a frame must have for its fingers.
+    /// Number of devices that a frame must have for its fingers.
     pub fn devices(&self) -> usize {
         self.step.devices()
     }

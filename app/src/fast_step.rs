@@ -225,7 +225,7 @@ impl FastStep {
         self
     }
 
-    /// How many devices there must be for its fingers.
+    /// Number of devices that its fingers need.
     pub fn devices(&self) -> usize {
         self.fingers.iter().map(|finger| finger.device + 1).max().unwrap_or(0)
     }

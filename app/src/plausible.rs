@@ -7,10 +7,10 @@
 //!
 //! Model: ticks go up, and not faster than the clock allows, with room for a ring of them; in real time not slower either:
 //! a driver that is late, or was stopped, skips what it missed, so that its next number is that of the clock again. Within
-//! one lease t = 0 comes
-//! when this program's answers have brought full authority, so not before its first frame and not after authority is
-//! full; from there on the time of the run goes with the ticks; a frame is due when it is published; what is measured is
-//! finite, and no velocity larger than a leap from one end of all places to the other. Everything else that is rare, such as missed frames, overruns and stalls of the machine, keeps to these.
+//! one lease t = 0 comes when this program's answers have brought full authority, so not before its first frame and not
+//! after authority is full; from there on the time of the run goes with the ticks; a frame is due when it is published;
+//! what is measured is finite, and no velocity larger than a leap from one end of all places to the other. Everything else
+//! that is rare, such as missed frames, overruns and stalls of the machine, keeps to these.
 //!
 //! Cost: a dozen comparisons a frame; no allocation, no system call.
 
@@ -170,8 +170,8 @@ const FUTURE_NS: u64 = 1_000_000_000;
 /// A lease is in force within a fraction of this, the former one's ramp included.
 const NONE_FOR_US_NS: u64 = 10_000_000_000;
 
-/// How far ticks may be behind the clock: twice the silence after which a run ends, and so twice the lateness that a single
-/// frame of a driver that is stopped again and again, or halts at a breakpoint in each tick, can have.
+/// Lag of ticks behind the clock that is allowed (ns): twice the silence after which a run ends, and so twice the lateness
+/// that a single frame of a driver that is stopped again and again, or halts at a breakpoint in each tick, can have.
 const BEHIND_NS: u64 = 10_000_000_000;
 /// And a hundredth of the time that has passed: deadlines that step aside ([`rt_core::phase_keeper`]) stay behind by 0.382
 /// of a period in 256 at most, 0.15 %.
@@ -189,8 +189,9 @@ pub struct Plausibility {
     first: Option<u64>,
     /// The tick seen last, and when.
     last: Option<(u64, u64)>,
-    /// Whether ticks go with the clock, and which of them came soonest for its number, and when.
+    /// Ticks go with the clock.
     is_real: bool,
+    /// The tick that came soonest for its number, and its time.
     soonest: Option<(u64, u64)>,
     /// Since when ticks are too far behind, and in how many frames.
     behind: Option<(u64, u64)>,
@@ -360,7 +361,7 @@ impl Plausibility {
     }
 }
 
-/// Whether a frame tells of all devices that are used.
+/// Refuses a frame that does not tell of all devices that are used.
 ///
 /// # Errors
 /// If not.

@@ -10,7 +10,7 @@ use shm_abi::segment::{ClockMode, DriverInfo};
 use shm_abi::{ABI_MAJOR, DriverView};
 use thiserror::Error;
 
-/// What a run was begun with.
+/// Driver that a run was begun with, as far as the run depends on it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Premises {
     period_ns: u64,
@@ -60,7 +60,7 @@ pub enum OtherDriver {
     /// Another device is in its place.
     #[error("its device {place} is {} ({}), the run began with {} ({})", found[0], found[1], before[0], before[1])]
     Device {
-        /// Which one, from 0.
+        /// Its number, from 0.
         place: usize,
         /// Name and kind now.
         found: [String; 2],

@@ -44,7 +44,7 @@ pub enum RecordingError {
         "the recording {file} was removed during the run, or another file put in its place: its {rows} rows are lost"
     )]
     Removed {
-        /// Where it was.
+        /// Its name.
         file: PathBuf,
         /// Rows that were in it.
         rows: u64,

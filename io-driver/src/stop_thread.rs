@@ -1,9 +1,10 @@
 //! The threads that stop the motors whatever the others are stuck in.
 //!
 //! Model: the first does two things only. It waits for emergency stops by datagram ([`StopSocket`]) and hands them to
-//! the loop's word ([`Urgent`]), and where a loop that hangs does not take one, it performs the last act; and it is the thread to which the kernel hands SIGTERM, SIGINT and SIGHUP, whose flag
-//! the loop reads itself. It shares no lock and no descriptor with the thread that serves connections. The second takes
-//! what the first has heard, which may take long ([`Drain`]).
+//! the loop's word ([`Urgent`]), or performs the last act where a loop that hangs does not take one; and it is the thread
+//! to which the kernel hands SIGTERM, SIGINT and SIGHUP, whose flag the loop reads itself. It shares no lock and no
+//! descriptor with the thread that serves connections. The second takes what the first has heard, which may take long
+//! ([`Drain`]).
 //! Invariant: while the second is stuck the first goes on hearing, and hears the same stop again and again: the fault
 //! stays.
 //! Cost: both asleep until somebody stops; under a flood, a turn each [`REST`].

@@ -87,12 +87,12 @@ impl Urgent {
         former == StoppedBy::Nobody
     }
 
-    /// Whether the loop has not taken the last emergency stop yet.
+    /// The loop has not taken the last emergency stop yet.
     pub fn is_waiting(&self) -> bool {
         self.0.state.load(Ordering::Acquire) & EMERGENCY_STOP != 0
     }
 
-    /// Whether an emergency stop has been waiting for the loop for longer than a loop takes that does not hang.
+    /// An emergency stop has been waiting for longer than a loop takes that does not hang.
     pub fn is_unheard(&self) -> bool {
         self.is_waiting()
             && monotonic_ns().saturating_sub(self.0.waiting_ns.load(Ordering::Acquire)) > HANGS_NS

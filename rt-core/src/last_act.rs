@@ -66,7 +66,7 @@ struct LastAct {
     gone: [AtomicBool; MAX_REGISTERS],
 }
 
-/// What a fault's address tells of: memory comes and goes by pages, of this size at least (bytes).
+/// Size of the smallest page (bytes): memory comes and goes by pages, and a fault's address tells of one.
 const PAGE: usize = 4096;
 
 impl LastAct {

@@ -55,13 +55,13 @@ pub fn is_claimed(error: &io::Error) -> bool {
     error.kind() == io::ErrorKind::ResourceBusy && error.raw_os_error().is_none()
 }
 
-/// Whether nobody finds this file by a name: it was removed, or another one was put in its place, or it never had one.
+/// Nobody finds this file by a name: it was removed, or another one was put in its place, or it never had one.
 /// Of a pipe or a device nothing is said.
 pub fn has_no_name(file: &File) -> bool {
     file.metadata().is_ok_and(|found| found.is_file() && found.nlink() == 0)
 }
 
-/// Whether this process began without a standard output, as `>&-` of a shell has it. What is written there since is lost.
+/// This process began without a standard output, as `>&-` of a shell has it; all that is written there since is lost.
 #[must_use]
 pub fn standard_output_was_closed() -> bool {
     inherited::output_was_closed()

@@ -73,7 +73,7 @@ impl StopSignals {
     /// The same, and that of SIGHUP in any case.
     ///
     /// # Errors
-    /// What sigaction(2) reports.
+    /// Errors of sigaction(2).
     pub fn install_with_hangup() -> io::Result<Self> {
         Self::install_for([SIGTERM, SIGINT, SIGHUP])
     }

@@ -5,7 +5,7 @@ mod common;
 use bytemuck::Zeroable;
 use common::{command, info, info_of};
 use shm_abi::segment::LeaseOffer;
-use shm_abi::{Command, CommanderMemory, CommanderView, DriverMemory, DriverView};
+use shm_abi::{Command, CommanderMemory, CommanderView, DriverMemory, DriverSegment, DriverView};
 use std::fs::File;
 use std::os::fd::AsFd;
 use std::os::unix::fs::FileExt;
@@ -13,7 +13,7 @@ use std::os::unix::fs::FileExt;
 #[test]
 fn whoever_is_handed_the_drivers_segment_can_neither_write_nor_resize_it() {
     let memory = DriverMemory::create(&info()).unwrap();
-    let bytes = size_of::<shm_abi::DriverSegment>() as u64;
+    let bytes = size_of::<DriverSegment>() as u64;
     let file = File::from(memory.fd().try_clone_to_owned().unwrap());
     let denied = |what: &str, result: std::io::Result<()>| {
         let error = result.expect_err(what);
@@ -41,6 +41,41 @@ fn a_read_only_mapping_of_the_drivers_segment_cannot_be_made_writable() {
     let changed =
         unsafe { rustix::mm::mprotect(map.as_mut_ptr().cast(), 4096, rustix::mm::MprotectFlags::WRITE) };
     assert_eq!(changed, Err(rustix::io::Errno::ACCESS));
+}
+
+/// Merged pages would keep the loop waiting for milliseconds; a file of the same kind, without what holds them, is merged.
+#[test]
+fn an_observer_cannot_have_the_pages_of_the_drivers_segment_merged() {
+    let memory = DriverMemory::create(&info()).unwrap();
+    let other = rustix::fs::memfd_create("other", rustix::fs::MemfdFlags::CLOEXEC).unwrap();
+    rustix::fs::fallocate(&other, rustix::fs::FallocateFlags::empty(), 0, size_of::<DriverSegment>() as u64)
+        .unwrap();
+    if let Err(error) = merge_pages(&other) {
+        println!("skipped: this kernel merges no pages when asked: {error}");
+        return;
+    }
+    assert_eq!(merge_pages(&memory.fd()), Err(rustix::io::Errno::AGAIN));
+}
+
+/// Asks the kernel to put the pages of a memory file into a huge one, as whoever may map it can.
+fn merge_pages(fd: &impl AsFd) -> Result<(), rustix::io::Errno> {
+    use rustix::mm::{MapFlags, ProtFlags, mmap, mmap_anonymous};
+    const HUGE: usize = 2 << 20;
+    // SAFETY: addresses that nobody uses, reserved for the mapping below.
+    let room =
+        unsafe { mmap_anonymous(std::ptr::null_mut(), 2 * HUGE, ProtFlags::empty(), MapFlags::PRIVATE)? };
+    let at = room.map_addr(|address| address.next_multiple_of(HUGE));
+    // SAFETY: all of it lies in the room.
+    unsafe { mmap(at, HUGE, ProtFlags::READ, MapFlags::SHARED | MapFlags::FIXED, fd, 0)? };
+    // Large bases for page tables are only made where a page of the file is in place.
+    // SAFETY: the file is longer than a byte, and words that change meanwhile are not looked at.
+    std::hint::black_box(unsafe { at.cast::<u8>().read_volatile() });
+    // SAFETY: contents stay as they are.
+    let result = unsafe { libc::madvise(at, HUGE, libc::MADV_COLLAPSE) };
+    let error = rustix::io::Errno::from_io_error(&std::io::Error::last_os_error());
+    // SAFETY: nothing refers to it.
+    unsafe { rustix::mm::munmap(room, 2 * HUGE)? };
+    if result == 0 { Ok(()) } else { Err(error.expect("an error of the kernel")) }
 }
 
 /// A loop that waits for a command is woken, and does not look for it again and again.

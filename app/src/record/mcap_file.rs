@@ -430,7 +430,7 @@ impl WholeWrites {
         Self { file, has_name, pending: Vec::new(), written_bytes: 0, has_ended: false }
     }
 
-    /// Whether the name is gone that the file had in the beginning.
+    /// The name is gone that the file had in the beginning.
     fn is_removed(&self) -> bool {
         self.has_name && output_file::has_no_name(&self.file)
     }

@@ -99,7 +99,7 @@ impl Opened {
         kind.is_fifo() || kind.is_socket() || kind.is_char_device() && isatty(&self.file)
     }
 
-    /// Whether people will look for it by its name. The standard output is somebody else's, who may keep it open.
+    /// People will look for it by its name. The standard output is somebody else's, who may keep it open.
     pub(super) fn has_name(&self) -> bool {
         !is_standard_output(&self.path) && !output_file::has_no_name(&self.file)
     }

@@ -108,7 +108,7 @@ impl WholeLines {
         }
     }
 
-    /// Whether the name is gone that the file had in the beginning.
+    /// The name is gone that the file had in the beginning.
     pub(crate) fn is_removed(&self) -> bool {
         self.has_name && output_file::has_no_name(&self.file)
     }

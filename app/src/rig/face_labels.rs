@@ -10,7 +10,7 @@ use world::model::FaceNames;
 /// A name in a table that no face has.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Unknown {
-    /// Which table, from 0.
+    /// Number of the table, from 0.
     table: usize,
     found: String,
     allowed: String,

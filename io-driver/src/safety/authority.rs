@@ -158,7 +158,7 @@ impl Safety {
 
     /// For how long the motors held what was older than a command may be, in a gap before this tick.
     fn silent_ns(&self, elapsed: Elapsed) -> u64 {
-        let skipped_ns = elapsed.passed_ns() - elapsed.growth_ns().min(elapsed.passed_ns());
+        let skipped_ns = elapsed.passed_ns() - elapsed.growth_ns();
         skipped_ns.saturating_sub(self.ramps.max_command_age_ns)
     }
 

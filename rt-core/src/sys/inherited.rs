@@ -1,4 +1,4 @@
-//! What the process got from who started it, where the runtime or the program changes it soon.
+//! Inherited descriptors and signal actions, which the runtime or the program changes soon.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -16,12 +16,12 @@ extern "C" fn look() {
     OUTPUT_WAS_CLOSED.store(flags == -1, Ordering::Relaxed);
 }
 
-/// Whether there was no standard output when this process began.
+/// There was no standard output when this process began.
 pub(crate) fn output_was_closed() -> bool {
     OUTPUT_WAS_CLOSED.load(Ordering::Relaxed)
 }
 
-/// Whether the signal is ignored now, as nohup(1) arranges it for SIGHUP.
+/// The signal is ignored now, as nohup(1) arranges it for SIGHUP.
 pub(crate) fn is_ignored(signal: i32) -> bool {
     // SAFETY: all of its fields may be zero.
     let mut now: libc::sigaction = unsafe { std::mem::zeroed() };

@@ -1,7 +1,7 @@
 //! The driver's segment: written by the driver, read by everybody else.
 
 use super::description::{describe, device_count};
-use super::mapping::{Mapping, check, create_memfd, seal};
+use super::mapping::{Mapping, check, create_memfd, keep_apart, seal};
 use super::text::{lines_of, put_text};
 use super::{
     ClockMode, CommanderMemory, CommanderView, DeviceInfo, DriverInfo, SegmentError, bounds, expect,
@@ -40,6 +40,8 @@ pub enum FrameUnavailable {
 pub struct DriverMemory {
     pub(super) map: Mapping<DriverSegment>,
     fd: OwnedFd,
+    /// Keeps its pages from being merged.
+    _pages: OwnedFd,
     /// How much of a frame is written.
     frame_words: usize,
 }
@@ -55,7 +57,8 @@ impl DriverMemory {
         describe(&map, info);
         // After our own mapping stands, nobody gets another writable one.
         seal(&fd, SealFlags::SHRINK | SealFlags::GROW | SealFlags::FUTURE_WRITE | SealFlags::SEAL)?;
-        Ok(Self { map, fd, frame_words: frame_words(info.devices.len()) })
+        let pages = keep_apart(&fd)?;
+        Ok(Self { map, fd, _pages: pages, frame_words: frame_words(info.devices.len()) })
     }
 
     /// Replaces the set-up report. Only before the segment is handed over for the first time: a reader takes

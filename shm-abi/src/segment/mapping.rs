@@ -9,6 +9,7 @@ use crate::layout::{CommanderSegment, DriverSegment};
 use memmap2::{MmapOptions, MmapRaw};
 use rustix::fs::{FallocateFlags, MemfdFlags, SealFlags};
 use rustix::io::Errno;
+use rustix::pipe::{PipeFlags, SpliceFlags};
 use std::fs::File;
 use std::io;
 use std::marker::PhantomData;
@@ -34,6 +35,17 @@ pub(super) fn create_memfd(name: &std::ffi::CStr, bytes: usize) -> Result<OwnedF
 pub(super) fn seal(fd: &OwnedFd, seals: SealFlags) -> Result<(), SegmentError> {
     rustix::fs::fcntl_add_seals(fd, seals)
         .map_err(|errno| SegmentError::System { what: "seal", source: errno.into() })
+}
+
+/// Keeps the kernel from merging the pages of a segment into a huge one for as long as the descriptor is open, whoever
+/// asks for it (`MADV_COLLAPSE`): meanwhile whoever touches them would wait for milliseconds. What is merged must be
+/// referred to by mappings alone, and here a pipe refers to the first page.
+pub(super) fn keep_apart(fd: &OwnedFd) -> Result<OwnedFd, SegmentError> {
+    let system = |errno: Errno| SegmentError::System { what: "hold the pages of", source: errno.into() };
+    let (held, into) = rustix::pipe::pipe_with(PipeFlags::CLOEXEC).map_err(system)?;
+    let begin = &mut 0;
+    rustix::pipe::splice(fd, Some(begin), &into, None, 1, SpliceFlags::empty()).map_err(system)?;
+    Ok(held)
 }
 
 pub(super) fn check(fd: BorrowedFd<'_>, bytes: usize, needed: SealFlags) -> Result<(), SegmentError> {

@@ -1,8 +1,9 @@
 //! The application stands still for a while, or is asked to end: the force goes, and comes back if it may.
 
-use rustix::process::Signal;
+use rustix::process::{Pid, Signal, kill_process};
 use shm_abi::DriverState;
 use std::sync::atomic::Ordering;
+use std::time::Duration;
 use system_tests::faults::press::{FORCE_N, Press, Table, terminate};
 use system_tests::faults::process::{Running, io_driver};
 use system_tests::faults::ring::{RingLog, Told};
@@ -44,6 +45,30 @@ fn a_stopped_app_loses_its_force_in_time_and_gets_it_back_when_it_goes_on() {
     terminate(app);
 }
 
+/// A laptop that was closed, or a group of processes that was frozen: nobody was silent, though the clock went on.
+#[test]
+fn an_app_that_stood_still_with_its_driver_for_long_goes_on_with_it() {
+    let mut press = Press::start("real");
+    let mut app = press.start_app();
+    let driver = Pid::from_child(&press.driver.child);
+    let mut log = RingLog::begin(&press.observer.driver);
+    log.follow(&press.observer.driver, "the whole force", |told| told.iter().any(is_whole));
+    kill_process(driver, Signal::STOP).expect("our own child");
+    app.signal(Signal::STOP);
+    // Longer than a driver may be silent.
+    std::thread::sleep(Duration::from_millis(5500));
+    app.signal(Signal::CONT);
+    std::thread::sleep(Duration::from_millis(200));
+    app.must_run();
+    kill_process(driver, Signal::CONT).expect("our own child");
+    let observer = &press.observer.driver;
+    let mut log = RingLog::begin(observer);
+    log.follow(observer, "the whole force again", |told| told.iter().any(is_whole));
+    app.must_run();
+    press.driver_must_live();
+    terminate(app);
+}
+
 /// In lockstep a tick has no other end than the answer, so a stopped application stops time; but not the
 /// driver's obedience.
 #[test]
@@ -56,7 +81,7 @@ fn in_lockstep_a_stopped_app_stops_time_and_the_driver_can_still_be_stopped() {
     let stands = |press: &Press| {
         let before = press.observer.driver.latest_tick();
         // A tick takes some 10 us as long as both go on.
-        std::thread::sleep(std::time::Duration::from_millis(50));
+        std::thread::sleep(Duration::from_millis(50));
         press.observer.driver.latest_tick() == before
     };
     // The signal takes its time to reach all threads.

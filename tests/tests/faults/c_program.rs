@@ -14,7 +14,7 @@ use system_tests::faults::process::{End, Running};
 use system_tests::faults::ring::RingLog;
 use system_tests::faults::stand::{CODE_N, Setup, Stand};
 
-/// What it commands (N).
+/// Force that it commands (N).
 const FORCE_N: f64 = 2.0;
 
 /// The program and the driver that it meets.
@@ -28,7 +28,7 @@ impl Operator {
         Running::start(Command::new(&self.program).arg(self.stand.socket()).args(arguments))
     }
 
-    /// What the header answered to a request that it granted.
+    /// Asks for what is granted.
     fn ask(&self, what: &str) {
         let End { status, err, .. } = self.start(&[what]).end();
         assert_eq!((status, err.as_str()), (Some(0), ""), "{what}");

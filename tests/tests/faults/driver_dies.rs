@@ -248,9 +248,8 @@ fn a_loop_that_hangs_is_the_watchdogs_and_a_loop_that_goes_on_finds_the_amplifie
     assert_eq!(seen.tally.watchdog_trips, before.watchdog_trips + 1);
 }
 
-#[test]
-fn a_driver_whose_loop_hangs_for_ever_is_stopped_all_the_same_with_the_motors_off() {
-    // A watchdog that does not come: the driver has to do it.
+/// End of a driver whose loop hangs under force, before amplifiers without a watchdog: the driver has to do it.
+fn end_of_a_hung_loop(ask: impl FnOnce(&Stand)) -> End {
     let mut setup = Setup::new("real").sabotaged("hang:600000@button20");
     setup.limits.watchdog_ms = 600_000;
     let mut stand = Stand::start(setup);
@@ -263,10 +262,9 @@ fn a_driver_whose_loop_hangs_for_ever_is_stopped_all_the_same_with_the_motors_of
         stand.view().latest_tick() == tick
     });
     assert!(stand.amplifiers.are_enabled(), "the force stays");
-    client::stop(&stand.socket(), "test").expect("it is told");
+    ask(&stand);
     let end = stand.driver.end();
     assert_eq!(end.status, Some(3), "{end:?}");
-    assert!(end.err.contains("the driver's loop hangs"), "{end:?}");
     let words = epitaph::read(&stand.view().epitaph).expect("an epitaph");
     assert_eq!(words.kind, EpitaphKind::Fault, "{words}");
     stand.amplifiers.settle();
@@ -274,39 +272,24 @@ fn a_driver_whose_loop_hangs_for_ever_is_stopped_all_the_same_with_the_motors_of
     drop(app);
     let seen = stand.finish_after_death();
     assert_eq!((seen.tally.watchdog_trips, seen.tally.switched_off), (0, 1));
+    end
+}
+
+#[test]
+fn a_driver_whose_loop_hangs_for_ever_is_stopped_all_the_same_with_the_motors_off() {
+    let end = end_of_a_hung_loop(|stand| {
+        client::stop(&stand.socket(), "test").expect("it is told");
+    });
+    assert!(end.err.contains("the driver's loop hangs"), "{end:?}");
 }
 
 /// By connection and by datagram: nobody has to know that `stop` would do more.
 #[test]
 fn an_emergency_stop_switches_the_motors_off_behind_a_loop_that_hangs() {
-    let ways: [fn(&Stand); 2] = [
-        |stand| client::emergency_stop_over_connection(&stand.socket(), "test").expect("it is told"),
-        |stand| stop_socket::send(&stand.socket()).expect("it is heard"),
-    ];
-    for ask in ways {
-        let mut setup = Setup::new("real").sabotaged("hang:600000@button20");
-        setup.limits.watchdog_ms = 600_000;
-        let mut stand = Stand::start(setup);
-        let app = stand.start_app();
-        stand.wait_for_force();
-        stand.amplifiers.press(1 << 20);
-        wait_for("a loop that stands", || {
-            let tick = stand.view().latest_tick();
-            std::thread::sleep(std::time::Duration::from_millis(100));
-            stand.view().latest_tick() == tick
-        });
-        assert!(stand.amplifiers.are_enabled(), "the force stays");
-        ask(&stand);
-        let end = stand.driver.end();
-        assert_eq!(end.status, Some(3), "{end:?}");
-        let words = epitaph::read(&stand.view().epitaph).expect("an epitaph");
-        assert_eq!(words.kind, EpitaphKind::Fault, "{words}");
-        stand.amplifiers.settle();
-        stand.amplifiers.check_off("a hung loop");
-        drop(app);
-        let seen = stand.finish_after_death();
-        assert_eq!((seen.tally.watchdog_trips, seen.tally.switched_off), (0, 1));
-    }
+    end_of_a_hung_loop(|stand| {
+        client::emergency_stop_over_connection(&stand.socket(), "test").expect("it is told");
+    });
+    end_of_a_hung_loop(|stand| stop_socket::send(&stand.socket()).expect("it is heard"));
 }
 
 /// Amplifiers that let go by themselves, tell nobody and come back: what they held is not there any more.

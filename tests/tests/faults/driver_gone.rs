@@ -138,6 +138,18 @@ fn a_driver_that_does_not_come_back_in_time_ends_the_run() {
     assert!(!checked_times(&press.path("out.csv")).is_empty());
 }
 
+/// A run whose driver was killed, and which waits for its return.
+fn waiting_for_its_driver() -> (Press, Running) {
+    let mut press = Press::start("real");
+    let mut app =
+        Running::start(press.app().args(["--seconds", "80000", "--record", "out.csv", "--grace", "3600"]));
+    wait_for_some_run(&press.observer.driver);
+    press.driver.child.kill().expect("our own child");
+    press.driver.wait();
+    app.hear("waiting up to 3600s for its return");
+    (press, app)
+}
+
 /// Nobody may go on with a driver whose ticks or devices are others: the run's time and its fingers are made of them.
 #[test]
 fn a_driver_that_comes_back_as_another_one_ends_the_run_and_both_are_told() {
@@ -148,19 +160,7 @@ fn a_driver_that_comes_back_as_another_one_ends_the_run_and_both_are_told() {
         (before.clone() + "name = \"thumb\"\n", ["its device 0 is thumb (ideal)", "began with f0 (ideal)"]),
     ];
     for (after, expected) in cases {
-        let mut press = Press::start("real");
-        let mut app = Running::start(press.app().args([
-            "--seconds",
-            "80000",
-            "--record",
-            "out.csv",
-            "--grace",
-            "3600",
-        ]));
-        wait_for_some_run(&press.observer.driver);
-        press.driver.child.kill().expect("our own child");
-        press.driver.wait();
-        app.hear("waiting up to 3600s for its return");
+        let (mut press, app) = waiting_for_its_driver();
         press.driver.restart(&after);
         check_that_it_is_refused(app, &press, &expected);
         press.driver_must_live();
@@ -178,13 +178,7 @@ fn check_that_it_is_refused(mut app: Running, press: &Press, expected: &[&str]) 
 
 #[test]
 fn a_driver_of_another_contract_that_comes_in_the_place_of_the_first_ends_the_run() {
-    let mut press = Press::start("real");
-    let mut app =
-        Running::start(press.app().args(["--seconds", "80000", "--record", "out.csv", "--grace", "3600"]));
-    wait_for_some_run(&press.observer.driver);
-    press.driver.child.kill().expect("our own child");
-    press.driver.wait();
-    app.hear("waiting up to 3600s for its return");
+    let (press, app) = waiting_for_its_driver();
     std::fs::remove_file(press.driver.socket()).expect("nobody took it away");
     let listener = UnixListener::bind(press.driver.socket()).expect("a socket");
     let answer = Answer {
@@ -202,13 +196,7 @@ fn a_driver_of_another_contract_that_comes_in_the_place_of_the_first_ends_the_ru
 /// While it waits for the driver's return, it still listens.
 #[test]
 fn an_app_that_waits_for_its_driver_can_be_asked_to_end() {
-    let mut press = Press::start("real");
-    let mut app =
-        Running::start(press.app().args(["--seconds", "80000", "--record", "out.csv", "--grace", "3600"]));
-    wait_for_some_run(&press.observer.driver);
-    press.driver.child.kill().expect("our own child");
-    press.driver.wait();
-    app.hear("waiting up to 3600s for its return");
+    let (press, mut app) = waiting_for_its_driver();
     app.signal(Signal::TERM);
     let end = app.end();
     assert_eq!(end.status, Some(3), "{end:?}");

@@ -27,7 +27,7 @@ struct Harmed {
     _tracer: Tracer,
     _commander: Commander,
     stand: Stand,
-    /// What brought the call.
+    /// Request that brought the call.
     asking: Asking,
     /// It was harmed under the commander's force.
     is_pushed: bool,
@@ -255,7 +255,7 @@ fn failures_of(call: &str) -> Vec<Harm> {
     errors_of(call).iter().filter(|error| !ends(error)).map(|error| Harm::Failure(error)).collect()
 }
 
-/// Whatever is made under force is harmed there, and what a beginning lease makes while one begins.
+/// All calls made under force are harmed there, and those of a beginning lease while one begins.
 fn check_found(calls: &Calls, found: &[(&str, Option<Found>)]) {
     println!("{found:?}");
     for (call, found) in found {

@@ -10,9 +10,9 @@ use crate::surface::Feature;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Place {
     pub(crate) point_B: Vector3<f64>,
-    /// What holds the HIP back there.
+    /// Feature that holds the HIP back there.
     pub(crate) on: On,
-    /// Where it is: of a corner or an edge, a face that meets there may hold the HIP back.
+    /// Feature that it lies on: of a corner or an edge, a face that meets there may hold the HIP back.
     at: On,
 }
 

@@ -13,8 +13,8 @@
 //! the force is turned alike on both sides, if at all.
 //!
 //! Frames: object frame B.
-//! Invariant: without such a change the force is that of [`Shading::turn`](super::Shading::turn), to the bit; the size of the felt
-//! one rises no faster than that of the facets'.
+//! Invariants: without such a change the force is that of [`Shading::turn`](super::Shading::turn), to the bit; the size of
+//! the felt force rises no faster than that of the facets'.
 
 use nalgebra::Vector3;
 
@@ -32,7 +32,7 @@ pub(crate) struct Following {
 /// A tick's force.
 #[derive(Debug, Clone, Copy)]
 struct Forces {
-    /// Where the god-object is.
+    /// Place of the god-object.
     point_B: Vector3<f64>,
     /// Of the facets.
     normal_B: Vector3<f64>,
@@ -48,7 +48,7 @@ struct Leap {
     off_B: Vector3<f64>,
     /// Of what is felt, in sizes of the shaded force: one or more, so that making up for it is no rise.
     size: f64,
-    /// What the spring has to be moved by until it is made up for (N).
+    /// Way left until it is made up for, as a change of the spring (N).
     left_n: f64,
 }
 
@@ -100,7 +100,7 @@ impl Following {
 }
 
 impl Forces {
-    /// How far the last force would have been turned by being turned as this one is (N).
+    /// Difference between the last force as it was shaded, and as it would be where this one is (N).
     fn turned_since(&self, last: &Self, size_n: f64) -> f64 {
         let turn = Turn { from_B: self.plain_B / size_n, to_B: self.shaded_B };
         (turn.rotated(&last.plain_B) - last.shaded_B).norm()

@@ -1,6 +1,6 @@
 //! Points with Coulomb friction in grooves, pits and on rugged meshes, tick by tick against what Coulomb's law allows there.
 //!
-//! What is felt is what one friction cone about the direction of the force allows: the law on a groove whose bottom is
+//! The force is what one friction cone about the direction of the force allows: the law on a groove whose bottom is
 //! round, however little ([`Rounded`]). The faces of a sharp groove, each with its own cone, could always bear it, and along
 //! the groove they could bear more.
 
@@ -26,7 +26,7 @@ struct Tick {
     ours: Vector3<f64>,
     is_held: bool,
     faces: usize,
-    /// What forces in the cones of all faces that it touches could not bear of its spring (m).
+    /// Part of its spring that forces in the cones of all faces that it touches could not bear (m).
     unexplained: f64,
     one_cone: Option<Ended>,
     least: Option<Ended>,
@@ -46,7 +46,7 @@ impl Tick {
         other.map_or(f64::INFINITY, |other| (other.god_object - self.ours).norm())
     }
 
-    /// Whether a rule leaves the god-object where it was.
+    /// A rule leaves the god-object where it was.
     fn holds(&self, other: Option<Ended>) -> bool {
         other.is_some_and(|other| (other.god_object - self.from).norm() <= SAME_PLACE)
     }
@@ -102,7 +102,7 @@ fn follow(mesh: &Arc<Mesh>, mu: f64, hips: impl Iterator<Item = Vector3<f64>>, m
     }
 }
 
-/// What was seen of how much of it, to be printed.
+/// Counts and extremes of a run, to be printed.
 #[derive(Debug, Default)]
 struct Seen {
     ticks: usize,

@@ -6,7 +6,7 @@
 //! on the rim of its cone, against the motion: of one face, straight along its plane; of two, along the groove, with the
 //! loads that hold it there; of three, nowhere. Which of these a state allows is found by trying them all.
 //!
-//! Where several faces are touched this is not unique: friction alone may squeeze the finger between them and so raise its
+//! With several faces the answer is not unique: friction alone may squeeze the finger between them and so raise its
 //! own loads. [`Rule`] says what is made of it.
 
 use haptics::mesh::Mesh;
@@ -14,7 +14,7 @@ use nalgebra::Vector3;
 
 use super::{closest, corners, winding_number};
 
-/// Which of the forces that Coulomb's law allows.
+/// A choice among the forces that Coulomb's law allows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Rule {
     /// As much friction as can be: it holds wherever forces in the cones can be found that bear the spring, by squeezing
@@ -44,17 +44,17 @@ struct Slide {
     faces: usize,
 }
 
-/// Where a tick ends.
+/// End of a tick.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Ended {
     pub(crate) god_object: Vector3<f64>,
     /// Pieces of way that it went.
     pub(crate) pieces: usize,
-    /// Whether its last piece was along a groove.
+    /// Its last piece was along a groove.
     pub(crate) along_groove: bool,
 }
 
-/// What is asked of a mesh and a coefficient.
+/// Oracle for a mesh and a friction coefficient.
 pub(crate) struct Coulomb<'m> {
     mesh: &'m Mesh,
     triangles: Vec<Triangle>,
@@ -66,11 +66,11 @@ pub(crate) struct Coulomb<'m> {
 
 /// Touching, in terms of metres: a thousand roundings of positions.
 const TOUCHING: f64 = 1e-12;
-/// What a way ends on the rim of a face by (m): its direction is rounded where it is short.
+/// Distance from the rim of a face that counts as on it (m): the direction of a short way is rounded.
 const RIM: f64 = 1e-13;
 /// Of directions, which side is left to rounding.
 const ALONG: f64 = 1e-11;
-/// How far ahead of the god-object it is asked what is there (m): small against faces, large against rounding.
+/// Distance ahead of the god-object that is looked at (m): small against faces, large against rounding.
 const AHEAD: f64 = 1e-8;
 /// A slide by less is rest (m): ten thousand roundings.
 const REST: f64 = 1e-14;
@@ -83,7 +83,7 @@ impl<'m> Coulomb<'m> {
         Self { mesh, triangles, mu, rule, near: (Vector3::zeros(), 0.0, Vec::new()) }
     }
 
-    /// Where a god-object that is drawn by `hip` comes to; `None` if it is free and gone.
+    /// The end of a god-object's way that `hip` draws; `None` if it is free and gone.
     pub(crate) fn step(&mut self, from: Vector3<f64>, hip: &Vector3<f64>) -> Option<Ended> {
         let mut ended = Ended { god_object: from, pieces: 0, along_groove: false };
         for pieces in 0..MOST_PIECES {
@@ -127,17 +127,17 @@ impl<'m> Coulomb<'m> {
         panic!("it does not come to rest: {from} {hip}");
     }
 
-    /// Where a segment first enters the mesh.
+    /// First place at which a segment enters the mesh.
     pub(crate) fn hit(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> Option<Vector3<f64>> {
         super::first_fraction(self.mesh, from, to, -1e-12).map(|fraction| from + (to - from) * fraction)
     }
 
-    /// How far the nearest face is.
+    /// Distance of the nearest face (m).
     pub(crate) fn distance(&self, p: &Vector3<f64>) -> f64 {
         self.triangles.iter().map(|face| face.distance(p)).fold(f64::INFINITY, f64::min)
     }
 
-    /// How much of what `spring` (m, on the user) has to bear the friction cones of all faces touched here cannot (m).
+    /// Part of the spring (m) that the friction cones of all faces touched here cannot bear.
     pub(crate) fn unexplained(&mut self, at: &Vector3<f64>, hip: &Vector3<f64>) -> f64 {
         let normals: Vec<_> = self.touched(at).iter().map(|face| face.normal).collect();
         distance_from_sum(&normals, self.mu, &(at - hip))
@@ -165,7 +165,7 @@ impl<'m> Coulomb<'m> {
         distance_from_sum(&normals, self.mu, &spring) <= 1e-12 * spring.norm() + REST
     }
 
-    /// Whether the way to the HIP leads out of the material.
+    /// The way to the HIP leads out of the material.
     fn is_free(&self, at: &Vector3<f64>, hip: &Vector3<f64>, touched: &[Triangle]) -> bool {
         let way = hip - at;
         let length = way.norm();
@@ -229,7 +229,8 @@ impl Triangle {
         (closest(&self.corners, p) - p).norm()
     }
 
-    /// How far one can go from a place in it in a direction in its plane; 0 where that leads out at once, or leaves its plane.
+    /// Length of the way from a place in it in a direction in its plane (m); 0 where that leads out at once, or leaves the
+    /// plane.
     fn room(&self, at: &Vector3<f64>, direction: &Vector3<f64>) -> f64 {
         if self.normal.dot(direction).abs() > ALONG {
             return 0.0;
@@ -262,7 +263,7 @@ impl Triangle {
     }
 }
 
-/// Whether the faces on both sides of an edge are in front of each other.
+/// The faces on both sides of an edge are in front of each other.
 fn is_hollow(a: &Triangle, b: &Triangle, at: &Vector3<f64>, edge: &Vector3<f64>) -> bool {
     a.normal.dot(&b.inward(at, edge)) > 0.0 && b.normal.dot(&a.inward(at, edge)) > 0.0
 }

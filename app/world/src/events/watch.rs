@@ -89,7 +89,7 @@ impl Watch {
         self.now = Now { run_tick, dt_s: ticks as f64 * period_s, period_s, left: MOST_TOLD };
     }
 
-    /// What a finger touches, in order of the entities, which buttons of its device are pressed, and which entity is tied to it.
+    /// Takes a finger's contacts, in order of the entities, the pressed buttons of its device, and the entity tied to it.
     pub fn finger(
         &mut self,
         finger: usize,
