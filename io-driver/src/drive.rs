@@ -102,7 +102,7 @@ impl Drive {
     pub fn render(&mut self, joints: [f64; 3], effort: Effort) -> Result<([u16; 3], Written), FaultReason> {
         let whole_weight = self.holding_torque(joints, effort.gravity_share);
         let wanted = Vector3::from(self.kinematics.joint_torque(joints, effort.force_on_user_n));
-        if !(wanted + whole_weight).iter().all(|t| t.is_finite()) {
+        if !wanted.iter().chain(&whole_weight).all(|t| t.is_finite()) {
             return Err(FaultReason::MotorNotFinite);
         }
         let allowed = self.allowed_current_a();
@@ -303,6 +303,17 @@ mod tests {
     fn beyond_the_amplifiers_range_it_says_so() {
         let (_, written) = drive(false).render([0.0; 3], push(Vector3::y() * 50.0)).unwrap();
         assert_eq!(written.limits, LIMIT_SATURATION);
+    }
+
+    #[test]
+    fn a_force_far_beyond_the_motors_takes_nothing_of_what_holds_the_weight() {
+        let mut drive = drive(true);
+        let force = Vector3::new(30.0, 100.0, -70.0);
+        let (codes, _) = drive.render(JOINTS, push(force)).unwrap();
+        let left = Vector3::from(drive.motors.joint_torque(codes)) - drive.holding_torque(JOINTS, 1.0);
+        let direction = Vector3::from(drive.kinematics.joint_torque(JOINTS, force)).normalize();
+        let across = left - direction * left.dot(&direction);
+        assert!(left.dot(&direction) > 0.1 && across.amax() <= drive.motors.torque_per_step()[0], "{left}");
     }
 
     #[test]
