@@ -1,12 +1,13 @@
 //! What a check may know of a machine: a tree of files, probes, and the loop that is to run there.
 //!
-//! Invariant: every text that comes out of here is text: no control characters but tab and line end,
-//! so that it may go to a terminal and into a comment of a script. Whatever else lies in a file is an
-//! [`Obstacle`].
+//! Invariant: every text that comes out of here is text: no control characters but tab and line end, and none that is
+//! invisible or turns the direction of writing, so that it may go to a terminal and into a comment of a script. Whatever
+//! else lies in a file is an [`Obstacle`].
 
 use super::probe::Probes;
 use crate::cpu::parse_cpu_list;
 use crate::installed::READ_BACK;
+use crate::plain_text::is_harmful;
 use crate::read_back::{ReadBack, Writers};
 use std::fmt;
 use std::io;
@@ -151,7 +152,7 @@ impl Machine<'_> {
         let bytes = self.tree.read(path).map_err(|error| Obstacle::of(path, &error))?;
         let garbled = |bytes: &[u8]| Obstacle::garbled(path, &String::from_utf8_lossy(bytes));
         let text = String::from_utf8(bytes).map_err(|error| garbled(error.as_bytes()))?;
-        let odd = text.chars().any(|c| c.is_control() && !matches!(c, '\n' | '\t'));
+        let odd = text.chars().any(|c| is_harmful(c) && !matches!(c, '\n' | '\t'));
         if odd { Err(garbled(text.as_bytes())) } else { Ok(text) }
     }
 
@@ -327,7 +328,7 @@ pub(super) fn if_any<T>(result: Result<T, Obstacle>) -> Result<Option<T>, Obstac
 /// Foreign text as one harmless line of at most so many characters.
 #[must_use]
 pub fn one_line(text: &str, most: usize) -> String {
-    let clean = text.trim().chars().map(|c| if c.is_control() { '?' } else { c });
+    let clean = text.trim().chars().map(|c| if is_harmful(c) { '?' } else { c });
     let mut line: String = clean.take(most).collect();
     if text.trim().chars().count() > most {
         line.push_str("...");
