@@ -2,9 +2,9 @@
 //!
 //! Model: the driver creates both memfds and maps them. Sealing forbids shrinking and growing, so nobody can cause
 //! SIGBUS; every further writable mapping, and with it every hole, is forbidden for the driver's segment from the
-//! beginning, for the commander's once the commander has mapped it ([`LeaseOffer`]). Whoever receives a descriptor
-//! checks seals and size before touching a byte. The driver writes one word of the commander's segment, the one
-//! that the commander sleeps on.
+//! beginning, for the commander's once the commander has mapped it ([`LeaseOffer`]). A pipe holds a page of the driver's
+//! segment, so that no reader can have its pages merged. Whoever receives a descriptor checks seals and size before
+//! touching a byte. The driver writes one word of the commander's segment, the one that the commander sleeps on.
 
 mod bounds;
 mod commander;

@@ -39,6 +39,8 @@ pub(super) enum Crossing {
     All,
     /// None that can be felt: it ends there.
     Smooth,
+    /// None that can be felt: it goes along them.
+    Along,
 }
 
 /// Bound on the looks at the surface of one descent.
@@ -104,13 +106,13 @@ impl Nurbs {
                         if leads_down {
                             return Some(Step::Over(beyond));
                         }
-                    } else if crossing == Crossing::Smooth {
-                        *rest = Rest::Crease(edge as u8);
-                        return Some(Step::End);
-                    } else if leads_down {
+                    } else if crossing == Crossing::All && leads_down {
                         return Some(Step::Over(beyond));
                     } else {
                         *rest = Rest::Crease(edge as u8);
+                        if crossing == Crossing::Smooth {
+                            return Some(Step::End);
+                        }
                     }
                 }
                 Border::Pole(pole) => match self.over_pole(foot, pole, offset_B) {

@@ -20,7 +20,7 @@ use crate::friction::Friction;
 use crate::friction_cone::{ConeForce, ConeInput, FrictionCone, answer};
 use crate::friction_law::FrictionState;
 use crate::mesh::{Beginning, Sides};
-use crate::surface::{Feature, SurfacePoint};
+use crate::surface::SurfacePoint;
 use crate::tangent_view::TangentView;
 
 /// State of one finger towards one set of patches.
@@ -173,8 +173,8 @@ impl Touching {
             return Some(self.touch(&force));
         }
         let mut god_object = *self.cone.god_object();
-        if god_object.feature == Feature::Edge
-            && walker.is_of_a_point()
+        // Held in a groove by a side that the HIP has left, it would be held by what is not in its way.
+        if walker.is_of_a_point()
             && let Some((turned, foot)) = walker.turned(&self.god_foot)
         {
             self.cone.stand_at(turned);

@@ -41,6 +41,16 @@ pub(super) struct Stand {
     pub(super) height_m: f64,
 }
 
+/// A sharp edge between two patches.
+struct Crease {
+    /// Of the patch here.
+    edge: u8,
+    /// The same place in the other patch.
+    beyond: Foot,
+    into_beyond: Vector3<f64>,
+    is_convex: bool,
+}
+
 impl<'n> Walker<'n> {
     pub(crate) fn new(nurbs: &'n Nurbs, hip_B: Vector3<f64>, layer_m: f64) -> Self {
         let answers_B = [Cell::new(Vector3::zeros()), Cell::new(Vector3::zeros())];
@@ -145,34 +155,40 @@ impl<'n> Walker<'n> {
         }
     }
 
-    /// Where a point finger that came to a crease stands.
-    fn on_crease(&self, foot: &Foot, edge: u8) -> Option<(SurfacePoint, Foot)> {
-        let nurbs = self.nurbs;
-        let (beyond, edge_beyond) = &self.beyond(foot, edge)?;
-        let into_beyond = nurbs.inward(beyond, *edge_beyond);
-        let into_here = nurbs.inward(foot, edge);
+    /// The crease along an edge of the foot's patch.
+    fn crease(&self, foot: &Foot, edge: u8) -> Option<Crease> {
+        let (beyond, edge_beyond) = self.beyond(foot, edge)?;
+        let into_beyond = self.nurbs.inward(&beyond, edge_beyond);
         let is_convex = into_beyond.dot(&foot.normal_B) < 0.0;
+        Some(Crease { edge, beyond, into_beyond, is_convex })
+    }
+
+    /// Where a point finger that came to a crease stands.
+    fn on_crease(&self, foot: &Foot, crease: &Crease) -> (SurfacePoint, Foot) {
+        let Crease { edge, beyond, into_beyond, is_convex } = crease;
         let off_B = self.hip_B - foot.point_B();
-        if is_convex || off_B.dot(&into_beyond) > 0.0 {
-            return Some((self.on(beyond), *beyond));
+        if *is_convex || off_B.dot(into_beyond) > 0.0 {
+            return (self.on(beyond), *beyond);
         }
-        if off_B.dot(&into_here) > 0.0 {
-            return Some((self.on(foot), *foot));
+        if off_B.dot(&self.nurbs.inward(foot, *edge)) > 0.0 {
+            return (self.on(foot), *foot);
         }
-        let along = if running(edge) == 0 { foot.local.du } else { foot.local.dv };
+        let along = if running(*edge) == 0 { foot.local.du } else { foot.local.dv };
         let along = direction_or_up(&along);
         let press_B = along * off_B.dot(&along) - off_B;
         let mean_B = foot.normal_B + beyond.normal_B;
-        let is_far = press_B.norm() > 1e-12 * nurbs.extent_m;
+        let is_far = press_B.norm() > 1e-12 * self.nurbs.extent_m;
         let normal_B = direction_or_up(if is_far { &press_B } else { &mean_B });
-        Some((SurfacePoint { normal_B, feature: Feature::Edge, piece: ON_CREASE, ..self.on(foot) }, *foot))
+        (SurfacePoint { normal_B, feature: Feature::Edge, piece: ON_CREASE, ..self.on(foot) }, *foot)
     }
 
-    /// How a god-object that rests on a crease stands to where the HIP is now.
+    /// How a god-object that rests on a concave crease stands to where the HIP is now.
     pub(super) fn turned(&self, foot: &Foot) -> Option<(SurfacePoint, Foot)> {
         (0..4)
             .filter(|&edge| foot.at[usize::from(edge > 1)] == f64::from(edge % 2))
-            .find_map(|edge| self.on_crease(foot, edge))
+            .filter_map(|edge| self.crease(foot, edge))
+            .find(|crease| !crease.is_convex)
+            .map(|crease| self.on_crease(foot, &crease))
     }
 
     /// The nearest of all; far away a descent from the nearest cell.
@@ -223,14 +239,16 @@ impl Surface for Walker<'_> {
             foot = stand.foot;
             stand.at
         } else {
-            let rest = self.nurbs.descend(on_tangent_plane_B, &mut foot, Crossing::Smooth);
-            let crease = if let Rest::Crease(edge) = rest { self.on_crease(&foot, edge) } else { None };
-            if let Some((at, beyond)) = crease {
-                foot = beyond;
-                at
-            } else {
-                self.on(&foot)
-            }
+            // What is held on a crease goes along it.
+            let crossing = if from.feature == Feature::Edge { Crossing::Along } else { Crossing::Smooth };
+            let rest = self.nurbs.descend(on_tangent_plane_B, &mut foot, crossing);
+            let came_to = match rest {
+                Rest::Crease(edge) => self.crease(&foot, edge).map(|crease| self.on_crease(&foot, &crease)),
+                _ => self.turned(&foot),
+            };
+            let (at, there) = came_to.unwrap_or_else(|| (self.on(&foot), foot));
+            foot = there;
+            at
         };
         self.know(&at, &foot);
         at

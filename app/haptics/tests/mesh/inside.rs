@@ -2,7 +2,7 @@
 
 use crate::common::flawed::*;
 use crate::common::meshes::*;
-use crate::common::*;
+use crate::common::{ugly, *};
 use crate::mesh_oracle as oracle;
 use haptics::Friction;
 use haptics::mesh::{Mesh, Sides};
@@ -27,27 +27,47 @@ fn points(mesh: &Mesh, count: usize) -> impl Iterator<Item = Vector3<f64>> {
 /// thousand faces, over the least height of a face.
 const ROUNDING_M: f64 = 1e-12;
 
+/// Of so many points those inside and outside by the sum of solid angles, as all queries see it.
+fn check_sides(name: &str, mesh: &Mesh, count: usize) -> [usize; 2] {
+    assert_eq!(mesh.sides(), Sides::Solid, "{name}");
+    let mut found = [0, 0];
+    for p in points(mesh, count) {
+        if mesh.nearest_unbounded(&p).distance_m < ROUNDING_M {
+            continue;
+        }
+        let number = oracle::winding_number(mesh, &p);
+        assert!((number - number.round()).abs() < 1e-3, "{name}: {p:?} {number}");
+        let is_inside = number > 0.5;
+        found[usize::from(!is_inside)] += 1;
+        assert_eq!(mesh.is_inside(&p), is_inside, "{name}: {p:?} {number}");
+        assert_eq!(mesh.is_inside_unbounded(&p), is_inside, "{name}: {p:?} {number}");
+        assert_eq!(mesh.nearest_and_side(&p).1, is_inside, "{name}: {p:?} {number}");
+    }
+    found
+}
+
 #[test]
 fn inside_is_where_the_winding_number_is_positive_whatever_the_surface_does() {
     for (name, soup) in flawed_solids() {
-        let mesh = built(soup);
-        assert_eq!(mesh.sides(), Sides::Solid, "{name}");
-        let (mut inside, mut outside) = (0, 0);
-        for p in points(&mesh, 12_000) {
-            let number = oracle::winding_number(&mesh, &p);
-            let is_near = mesh.nearest_unbounded(&p).distance_m < ROUNDING_M;
-            if is_near {
-                continue;
-            }
-            assert!((number - number.round()).abs() < 1e-3, "{name}: {p:?} {number}");
-            let is_inside = number > 0.5;
-            *(if is_inside { &mut inside } else { &mut outside }) += 1;
-            assert_eq!(mesh.is_inside(&p), is_inside, "{name}: {p:?} {number}");
-            assert_eq!(mesh.is_inside_unbounded(&p), is_inside, "{name}: {p:?} {number}");
-            assert_eq!(mesh.nearest_and_side(&p).1, is_inside, "{name}: {p:?} {number}");
-        }
+        let [inside, outside] = check_sides(name, &built(soup), 12_000);
         assert!(inside > 500 && outside > 500, "{name}: {inside} {outside}");
     }
+}
+
+/// `cargo test --release -p haptics --test mesh inside -- --ignored --nocapture`
+#[test]
+#[ignore = "a quarter of an hour"]
+fn inside_is_where_the_winding_number_is_positive_at_ten_million_points() {
+    let ugly = (1..8).flat_map(ugly::all).map(|(name, soup)| (name, Mesh::build(soup).unwrap().0));
+    let flawed = flawed_solids().into_iter().map(|(name, soup)| (name, Mesh::build(soup).unwrap().0));
+    let mut all = [0, 0];
+    for (name, mesh) in flawed.chain(ugly).filter(|(_, mesh)| mesh.sides() == Sides::Solid) {
+        let [inside, outside] = check_sides(name, &mesh, 170_000);
+        println!("{name}, {} faces: {inside} points inside, {outside} outside", mesh.faces().len());
+        all = [all[0] + inside, all[1] + outside];
+    }
+    println!("{} points inside, {} outside", all[0], all[1]);
+    assert!(all[0] + all[1] > 10_000_000, "{all:?}");
 }
 
 #[test]
