@@ -75,6 +75,8 @@ struct Patch {
     /// Patches with seams between them have the same.
     group: u32,
     edges: [Edge; 4],
+    /// The poles at its corners that none of its own edges has shrunk to, in the order of [`seams::CORNERS`].
+    corner_poles: [Option<u32>; 4],
     /// About one element.
     longest_step: [f64; 2],
     /// Which of the patches it was given it is of.
@@ -262,6 +264,7 @@ impl Nurbs {
                     is_turned: false,
                     group: 0,
                     edges: Default::default(),
+                    corner_poles: Default::default(),
                     longest_step,
                     source,
                 });

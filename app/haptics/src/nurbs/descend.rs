@@ -87,6 +87,12 @@ impl Nurbs {
         is_free: &mut [bool; 2],
         rest: &mut Rest,
     ) -> Option<Step> {
+        let pole_at_corner = self.pole_at_corner(foot);
+        if let Some(pole) = pole_at_corner
+            && crossing == Crossing::All
+        {
+            return Some(self.at_pole(foot, pole, offset_B, rest));
+        }
         for (d, is_free) in is_free.iter_mut().enumerate() {
             let edge = match foot.at[d] {
                 0.0 => 2 * d,
@@ -115,18 +121,24 @@ impl Nurbs {
                         }
                     }
                 }
-                Border::Pole(pole) => match self.over_pole(foot, pole, offset_B) {
-                    Some(beyond) => return Some(Step::Over(beyond)),
-                    None => {
-                        if self.poles[pole as usize].is_sharp {
-                            *rest = Rest::Tip(pole);
-                        }
-                        return Some(Step::End);
-                    }
-                },
+                Border::Pole(pole) => return Some(self.at_pole(foot, pole, offset_B, rest)),
             }
         }
-        None
+        let pole = pole_at_corner.filter(|_| *is_free == [false; 2])?;
+        self.over_pole(foot, pole, offset_B).map(Step::Over)
+    }
+
+    /// From a pole on; or it ends there.
+    fn at_pole(&self, foot: &Foot, pole: u32, offset_B: &Vector3<f64>, rest: &mut Rest) -> Step {
+        match self.over_pole(foot, pole, offset_B) {
+            Some(beyond) => Step::Over(beyond),
+            None => {
+                if self.poles[pole as usize].is_sharp {
+                    *rest = Rest::Tip(pole);
+                }
+                Step::End
+            }
+        }
     }
 
     /// One safeguarded step within the patch.

@@ -181,11 +181,37 @@ impl Touching {
             (god_object, self.god_foot) = (turned, foot);
         }
         walker.know(&god_object, &self.god_foot);
+        let force = self.slide(walker, friction, input);
+        if force.depth_m < -nurbs.slack_m && walker.is_of_a_point() {
+            return self.fly(nurbs, walker, friction, input);
+        }
+        Some(self.touch(&force))
+    }
+
+    /// Nothing where it stands holds a god-object whose HIP is in front: it goes straight there, until it meets the surface.
+    #[cold]
+    fn fly(
+        &mut self,
+        nurbs: &Nurbs,
+        walker: &Walker<'_>,
+        friction: &Friction,
+        input: &ConeInput,
+    ) -> Option<Touch> {
+        let god_object = self.cone.god_object();
+        let from_B = god_object.point_B + god_object.normal_B * nurbs.slack_m;
+        let stand = nurbs.meet(walker, &from_B, &input.hip_B, None)?;
+        *self = Self::new(&stand);
+        walker.know(&stand.at, &stand.foot);
+        let force = self.slide(walker, friction, input);
+        Some(self.touch(&force))
+    }
+
+    fn slide(&mut self, walker: &Walker<'_>, friction: &Friction, input: &ConeInput) -> ConeForce {
         let force = self.cone.update(walker, friction, input);
         self.at = *self.cone.god_object();
         self.state = self.cone.state();
         self.god_foot = walker.foot_of(&self.at).unwrap_or(self.god_foot);
-        Some(self.touch(&force))
+        force
     }
 
     fn touch(&self, force: &ConeForce) -> Touch {
