@@ -56,7 +56,7 @@ fn inside_is_where_the_winding_number_is_positive_whatever_the_surface_does() {
 
 /// `cargo test --release -p haptics --test mesh inside -- --ignored --nocapture`
 #[test]
-#[ignore = "five minutes"]
+#[ignore = "six minutes"]
 fn inside_is_where_the_winding_number_is_positive_at_ten_million_points() {
     let ugly = (1..10).flat_map(ugly::all).map(|(name, soup)| (name, Mesh::build(soup).unwrap().0));
     let flawed = flawed_solids().into_iter().map(|(name, soup)| (name, Mesh::build(soup).unwrap().0));
