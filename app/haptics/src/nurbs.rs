@@ -28,6 +28,7 @@ mod local;
 pub mod make;
 mod nurbs_cone;
 mod patch;
+mod poles;
 mod seams;
 mod tree;
 mod walker;
@@ -44,7 +45,8 @@ pub(crate) use walker::Walker;
 
 use crate::mesh::Sides;
 use bezier::{Control, elements_of};
-use seams::{Edge, Pole};
+use poles::Pole;
+use seams::Edge;
 use tree::{Cell, Node};
 
 /// A surface of patches that can be touched.
@@ -75,7 +77,7 @@ struct Patch {
     /// Patches with seams between them have the same.
     group: u32,
     edges: [Edge; 4],
-    /// The poles at its corners that none of its own edges has shrunk to, in the order of [`seams::CORNERS`].
+    /// The poles at its corners that none of its own edges has shrunk to, in the order of [`poles::CORNERS`].
     corner_poles: [Option<u32>; 4],
     /// About one element.
     longest_step: [f64; 2],
@@ -190,7 +192,7 @@ impl Nurbs {
             nurbs.sides = Sides::Solid;
             turned = nurbs.turn_outward(&joined.component);
         }
-        seams::shape_poles(&mut nurbs);
+        poles::shape(&mut nurbs);
         nurbs.widen_slack();
         nurbs.group();
         tree::grow(&mut nurbs)?;

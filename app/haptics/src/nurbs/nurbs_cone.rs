@@ -181,29 +181,20 @@ impl Touching {
             (god_object, self.god_foot) = (turned, foot);
         }
         walker.know(&god_object, &self.god_foot);
-        let force = self.slide(walker, friction, input);
+        let mut force = self.slide(walker, friction, input);
         if force.depth_m < -nurbs.slack_m && walker.is_of_a_point() {
-            return self.fly(nurbs, walker, friction, input);
+            *self = Self::new(&self.fly(nurbs, walker, &input.hip_B)?);
+            walker.know(&self.at, &self.god_foot);
+            force = self.slide(walker, friction, input);
         }
         Some(self.touch(&force))
     }
 
     /// Nothing where it stands holds a god-object whose HIP is in front: it goes straight there, until it meets the surface.
     #[cold]
-    fn fly(
-        &mut self,
-        nurbs: &Nurbs,
-        walker: &Walker<'_>,
-        friction: &Friction,
-        input: &ConeInput,
-    ) -> Option<Touch> {
-        let god_object = self.cone.god_object();
-        let from_B = god_object.point_B + god_object.normal_B * nurbs.slack_m;
-        let stand = nurbs.meet(walker, &from_B, &input.hip_B, None)?;
-        *self = Self::new(&stand);
-        walker.know(&stand.at, &stand.foot);
-        let force = self.slide(walker, friction, input);
-        Some(self.touch(&force))
+    fn fly(&self, nurbs: &Nurbs, walker: &Walker<'_>, hip_B: &Vector3<f64>) -> Option<Stand> {
+        let from_B = self.at.point_B + self.at.normal_B * nurbs.slack_m;
+        nurbs.meet(walker, &from_B, hip_B, None)
     }
 
     fn slide(&mut self, walker: &Walker<'_>, friction: &Friction, input: &ConeInput) -> ConeForce {

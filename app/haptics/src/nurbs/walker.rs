@@ -163,7 +163,7 @@ impl<'n> Walker<'n> {
         Some(Crease { edge, beyond, into_beyond, is_convex })
     }
 
-    /// Where a point finger that came to a crease stands.
+    /// Stand of a point finger that came to a crease.
     fn on_crease(&self, foot: &Foot, crease: &Crease) -> (SurfacePoint, Foot) {
         let Crease { edge, beyond, into_beyond, is_convex } = crease;
         let off_B = self.hip_B - foot.point_B();
@@ -182,7 +182,7 @@ impl<'n> Walker<'n> {
         (SurfacePoint { normal_B, feature: Feature::Edge, piece: ON_CREASE, ..self.on(foot) }, *foot)
     }
 
-    /// How a god-object that rests on a concave crease stands to where the HIP is now.
+    /// Stand of a god-object on a concave crease, towards where the HIP is now.
     pub(super) fn turned(&self, foot: &Foot) -> Option<(SurfacePoint, Foot)> {
         (0..4)
             .filter(|&edge| foot.at[usize::from(edge > 1)] == f64::from(edge % 2))
