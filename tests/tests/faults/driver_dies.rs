@@ -300,17 +300,24 @@ fn after_a_gap_the_force_begins_anew_however_soon_the_application_answers() {
     let stand = Stand::start(setup);
     let app = stand.start_app();
     stand.wait_for_force();
-    stand.driver.signal(Signal::STOP);
-    let before = stand.view().read_latest().expect("frames");
-    std::thread::sleep(std::time::Duration::from_millis(300));
-    stand.driver.signal(Signal::CONT);
-    let mut after = before;
-    wait_for("ticks", || {
-        after = stand.view().read_latest().expect("frames");
-        after.tick > before.tick + 305
+    // It comes on in 200 ms, which a busy machine may let pass before anybody looks: then once more.
+    let begins_anew = (0..10).any(|_| {
+        let mut frame = stand.view().read_latest().expect("frames");
+        wait_for("all of the force", || {
+            frame = stand.view().read_latest().expect("frames");
+            frame.authority > 0.99
+        });
+        stand.driver.signal(Signal::STOP);
+        let stopped_at = stand.view().read_latest().expect("frames").tick;
+        std::thread::sleep(std::time::Duration::from_millis(300));
+        stand.driver.signal(Signal::CONT);
+        wait_for("ticks", || {
+            frame = stand.view().read_latest().expect("frames");
+            frame.tick > stopped_at + 305
+        });
+        frame.authority < 0.9
     });
-    // It comes on in 200 ms, of which a busy machine may have let some pass.
-    assert!(before.authority > 0.99 && after.authority < 0.9, "{} {}", before.authority, after.authority);
+    assert!(begins_anew, "all of the force was there after each of ten gaps");
     drop(app);
     stand.finish();
 }
