@@ -1,7 +1,8 @@
 //! The committed corpora, bytes that once failed, and ugly ones made of these, through every fuzz target.
 //!
 //! Each target has a process of its own: one whose memory grows beyond the bound ends by a failed allocation, which the test
-//! then tells. `INPUT_ROUNDS=100000 cargo test -p input-targets` spoils more inputs than the usual few.
+//! then tells. `INPUT_ROUNDS=100000 cargo test -p input-targets` spoils more inputs than the usual few, `INPUT_SECONDS=60`
+//! as many for each target as a minute allows, and `INPUT_FROM=7000000` others.
 
 mod spoil;
 
@@ -11,6 +12,7 @@ use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use spoil::{Random, spoilt};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 /// What a target may take, of address space beyond what the test itself has: twice what the fuzzer allows of memory
@@ -23,13 +25,32 @@ const ROUNDS: u64 = 100;
 /// Set in the process that runs one target.
 const TARGET: &str = "INPUT_TARGET";
 
-/// For all inputs of a target. One that hangs is killed, and the last name among its words is that of the input.
-fn longest_run() -> Duration {
-    Duration::from_secs(300) + Duration::from_millis(100) * rounds() as u32
+/// Which inputs are spoilt: those of these numbers, and no more than this time allows.
+struct Spoiling {
+    from: u64,
+    rounds: u64,
+    time: Option<Duration>,
 }
 
-fn rounds() -> u64 {
-    std::env::var("INPUT_ROUNDS").ok().and_then(|rounds| rounds.parse().ok()).unwrap_or(ROUNDS)
+impl Spoiling {
+    fn asked() -> Self {
+        let time = number("INPUT_SECONDS").map(Duration::from_secs);
+        let rounds = number("INPUT_ROUNDS").unwrap_or(if time.is_some() { u64::MAX } else { ROUNDS });
+        Self { from: number("INPUT_FROM").unwrap_or(0), rounds, time }
+    }
+
+    /// For all inputs of a target. One that hangs is killed, and the last name among its words is that of the input.
+    fn longest_run(&self) -> Duration {
+        let spoilt = self.time.unwrap_or_else(|| Duration::from_millis(100) * self.rounds as u32);
+        Duration::from_secs(300) + spoilt
+    }
+}
+
+/// # Panics
+/// If the variable is there and holds no number.
+fn number(variable: &str) -> Option<u64> {
+    let text = std::env::var(variable).ok()?;
+    Some(text.parse().unwrap_or_else(|_| panic!("{variable} is a whole number, not {text:?}")))
 }
 
 fn inputs(target: &str) -> Vec<PathBuf> {
@@ -63,14 +84,26 @@ fn inputs_that_once_failed_lie_under_the_name_of_a_target() {
 
 #[test]
 fn all_inputs_of_every_target_end_soon_and_within_their_memory() {
-    for (name, _) in TARGETS {
-        let mut child = Command::new(std::env::current_exe().expect("this test"));
-        child.args(["--exact", "--ignored", "--nocapture", "one_target"]).env(TARGET, name);
-        let child = child.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
-        let out = child.expect("this test once more").output_within(longest_run());
-        let said = String::from_utf8_lossy(&out.stderr);
-        assert!(out.status.success(), "{name}: {}\n{said}", out.status);
-    }
+    let next = AtomicUsize::new(0);
+    std::thread::scope(|threads| {
+        for _ in 0..std::thread::available_parallelism().map_or(1, |cores| cores.get()) {
+            threads.spawn(|| {
+                while let Some((name, _)) = TARGETS.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    run_in_a_process(name);
+                }
+            });
+        }
+    });
+}
+
+fn run_in_a_process(name: &str) {
+    let mut child = Command::new(std::env::current_exe().expect("this test"));
+    child.args(["--exact", "--ignored", "--nocapture", "one_target"]).env(TARGET, name);
+    let child = child.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+    let out = child.expect("this test once more").output_within(Spoiling::asked().longest_run());
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.success(), "{name}: {}\n{said}", out.status);
+    println!("{name}: {}", said.lines().last().unwrap_or_default());
 }
 
 #[test]
@@ -89,7 +122,12 @@ fn one_target() {
     // Kept until the next is tried, so that what failed is there.
     let kept = std::env::temp_dir().join(format!("phantom3-spoilt-{name}-{}", std::process::id()));
     eprintln!("spoilt inputs; the one that fails is left in {}", kept.display());
-    for round in 0..rounds() {
+    let Spoiling { from, rounds, time } = Spoiling::asked();
+    let began = Instant::now();
+    let mut count = 0;
+    while count < rounds && time.is_none_or(|time| began.elapsed() < time) {
+        let round = from.wrapping_add(count);
+        count += 1;
         let mut random = Random::of(&name, round);
         let [good, other] = [0; 2].map(|_| &corpus[random.below(corpus.len())]);
         let bytes = spoilt(good, other, &mut random);
@@ -97,6 +135,7 @@ fn one_target() {
         try_soon(*target, &bytes);
     }
     std::fs::remove_file(&kept).expect("our own file");
+    eprintln!("{count} spoilt inputs from number {from} on, in {:.1?}", began.elapsed());
 }
 
 fn try_soon(target: Target, bytes: &[u8]) {
