@@ -3,7 +3,8 @@
 //! Run `cargo bench -p haptics --bench nurbs`. One point finger on a bicubic sheet of 20 x 20 polynomials, on a ball and
 //! a vase: sliding (0.2 mm a tick, 2 mm deep) without friction and with Coulomb's, held, near the surface without
 //! touching it, coming into contact, and far away. `nearest` is one question for the nearest point, asked again near
-//! where it was asked last.
+//! where it was asked last. `tip` is a finger that is pressed into the tip of a pit in which so many patches meet, their
+//! edges shrunk to it.
 #![allow(non_snake_case, unused_crate_dependencies, missing_docs)]
 
 #[path = "../tests/common/mod.rs"]
@@ -111,5 +112,44 @@ fn nearest(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, ticks, nearest);
+/// A cone that opens upward, of as many flat triangles.
+fn pit(patches: u32) -> Vec<NurbsPatch> {
+    let rim = |k: u32| {
+        let angle = std::f64::consts::TAU * f64::from(k % patches) / f64::from(patches);
+        [0.05 * angle.cos(), 0.03, 0.05 * angle.sin(), 1.0]
+    };
+    let tip = [0.0, 0.0, 0.0, 1.0];
+    let patch = |k| NurbsPatch {
+        degree: [1, 1],
+        knots: [vec![0.0, 0.0, 1.0, 1.0], vec![0.0, 0.0, 1.0, 1.0]],
+        points: vec![rim(k + 1), rim(k), tip, tip],
+    };
+    (0..patches).map(patch).collect()
+}
+
+fn tip(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("tip");
+    for patches in [8, 64, 512] {
+        let entities = [entity(Arc::new(Nurbs::build(&pit(patches)).unwrap().0), Friction::None)];
+        let mut finger = point_finger();
+        finger.step(&entities, &(Vector3::y() * 0.01), DT);
+        let hip = |tick: usize| {
+            let angle = tick as f64 * 0.1;
+            Vector3::new(5e-4 * angle.cos(), -2e-3, 5e-4 * angle.sin())
+        };
+        let touched =
+            (0..ROUND).filter(|tick| finger.step(&entities, &hip(*tick), DT).entity.is_some()).count();
+        assert_eq!(touched, ROUND);
+        let mut tick = 0;
+        group.bench_function(patches.to_string(), |bencher| {
+            bencher.iter(|| {
+                tick = (tick + 1) % ROUND;
+                finger.step(black_box(&entities), black_box(&hip(tick)), DT)
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, ticks, nearest, tip);
 criterion_main!(benches);

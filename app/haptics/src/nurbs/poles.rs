@@ -3,7 +3,7 @@
 //! Model: an edge all of whose points agree is a pole; all poles at one place are one, and corners of patches that lie there
 //! belong to it. A descent goes on from a pole in the direction that does most, of five for each edge and three for each
 //! corner.
-//! Cost: of a way on, one look at the surface for each of these directions.
+//! Cost: of a way on, a scalar product for each of these directions.
 
 use std::collections::HashMap;
 
@@ -25,6 +25,7 @@ pub(super) struct Pole {
     pub(super) is_sharp: bool,
     /// Mean of the normals around it.
     pub(super) normal_B: Vector3<f64>,
+    ways: Vec<Way>,
 }
 
 impl Nurbs {
@@ -37,38 +38,18 @@ impl Nurbs {
     /// Away from a pole in the direction that leads nearest to the target; `None` if all lead away from it.
     #[cold]
     pub(super) fn over_pole(&self, foot: &Foot, pole: u32, offset_B: &Vector3<f64>) -> Option<Foot> {
-        let mut best: Option<Way> = None;
-        let mut consider = |way: Way| {
-            if way.gain > best.as_ref().map_or(0.0, |best| best.gain) {
-                best = Some(way);
-            }
-        };
-        let Pole { edges, corners, .. } = &self.poles[pole as usize];
-        for &(patch, edge) in edges {
-            for k in 0..=4 {
-                let there = self.foot(patch, on_edge(edge, f64::from(k) / 4.0), foot.side);
-                let into = inward_of([0.0, 1.0][usize::from(edge % 2)]);
-                let along = if running(edge) == 0 { [0.0, into] } else { [into, 0.0] };
-                consider(Way::new(&there, along, &self.inward(&there, edge), offset_B));
-            }
-        }
-        for &(patch, at) in corners {
-            let there = self.foot(patch, at, foot.side);
-            let into = at.map(inward_of);
-            let [u, v] = [there.local.du * into[0], there.local.dv * into[1]];
-            let share = u.norm() / v.norm();
-            for (a, b) in [(1.0, 0.0), (0.0, 1.0), (1.0, share)] {
-                consider(Way::new(&there, [into[0] * a, into[1] * b], &(u * a + v * b), offset_B));
-            }
-        }
-        let Way { gain, patch, from, along, mut step } = best?;
+        let ways = &self.poles[pole as usize].ways;
+        let gains = ways.iter().map(|way| (offset_B.dot(&way.per_step_B) / way.length_m, way));
+        let (gain, way) = gains.reduce(|best, next| if next.0 > best.0 { next } else { best })?;
         if gain <= 1e-15 * self.extent_m {
             return None;
         }
         let square = offset_B.norm_squared();
+        // To the place nearest to the target, were the patch flat.
+        let mut step = (gain / way.length_m).min(0.25);
         for _ in 0..30 {
-            let at = [0, 1].map(|d| (from[d] + along[d] * step).clamp(0.0, 1.0));
-            let next = self.foot(patch, at, foot.side);
+            let at = [0, 1].map(|d| (way.from[d] + way.along[d] * step).clamp(0.0, 1.0));
+            let next = self.foot(way.patch, at, foot.side);
             if (foot.point_B() + offset_B - next.point_B()).norm_squared() < square {
                 return Some(next);
             }
@@ -87,22 +68,46 @@ fn inward_of(x: f64) -> f64 {
 }
 
 /// A way that leads from a pole into a patch.
+#[derive(Debug, Clone, PartialEq)]
 struct Way {
-    /// Approach to the target for each metre of it.
-    gain: f64,
     patch: u32,
     from: [f64; 2],
     along: [f64; 2],
-    /// Length of it, in parameters: to the place nearest to the target, were the patch flat.
-    step: f64,
+    /// By which a step of 1 along it leads on, and its length.
+    per_step_B: Vector3<f64>,
+    length_m: f64,
 }
 
-impl Way {
-    fn new(from: &Foot, along: [f64; 2], per_step_B: &Vector3<f64>, offset_B: &Vector3<f64>) -> Self {
-        let length = per_step_B.norm();
-        let gain = offset_B.dot(per_step_B) / length;
-        Self { gain, patch: from.patch, from: from.at, along, step: (gain / length).min(0.25) }
+/// The ways from a pole into its patches.
+fn ways(nurbs: &Nurbs, pole: &Pole) -> Vec<Way> {
+    let way = |there: &Foot, along, per_step_B: Vector3<f64>| Way {
+        patch: there.patch,
+        from: there.at,
+        along,
+        per_step_B,
+        length_m: per_step_B.norm(),
+    };
+    let mut ways = Vec::with_capacity(5 * pole.edges.len() + 3 * pole.corners.len());
+    for &(patch, edge) in &pole.edges {
+        for k in 0..=4 {
+            let there = nurbs.foot(patch, on_edge(edge, f64::from(k) / 4.0), 1.0);
+            let into = inward_of([0.0, 1.0][usize::from(edge % 2)]);
+            let along = if running(edge) == 0 { [0.0, into] } else { [into, 0.0] };
+            ways.push(way(&there, along, nurbs.inward(&there, edge)));
+        }
     }
+    for &(patch, at) in &pole.corners {
+        let there = nurbs.foot(patch, at, 1.0);
+        let into = at.map(inward_of);
+        let [u, v] = [there.local.du * into[0], there.local.dv * into[1]];
+        let share = u.norm() / v.norm();
+        for (a, b) in [(1.0, 0.0), (0.0, 1.0), (1.0, share)] {
+            ways.push(way(&there, [into[0] * a, into[1] * b], u * a + v * b));
+        }
+    }
+    // What does not lead on, or nowhere.
+    ways.retain(|way| way.length_m > 0.0 && way.length_m.is_finite());
+    ways
 }
 
 /// Finds the poles, and which edges and corners of patches are there.
@@ -129,7 +134,8 @@ pub(super) fn find(nurbs: &mut Nurbs) {
             let pole = known.unwrap_or(nurbs.poles.len());
             if known.is_none() {
                 let (edges, corners, normal_B) = (Vec::new(), Vec::new(), Vector3::y());
-                nurbs.poles.push(Pole { edges, corners, point_B: low, is_sharp: false, normal_B });
+                let ways = Vec::new();
+                nurbs.poles.push(Pole { edges, corners, point_B: low, is_sharp: false, normal_B, ways });
                 by_cell.entry(cell(&low)).or_default().push(pole);
             }
             nurbs.poles[pole].edges.push((patch, edge));
@@ -153,7 +159,8 @@ pub(super) fn find(nurbs: &mut Nurbs) {
     }
 }
 
-/// Says of each pole whether it is sharp, by the normals around it; once patches are turned for good.
+/// Says of each pole whether it is sharp, by the normals around it, and where it leads on; once patches are turned for
+/// good.
 pub(super) fn shape(nurbs: &mut Nurbs) {
     for pole in 0..nurbs.poles.len() {
         let normals: Vec<Vector3<f64>> = nurbs.poles[pole]
@@ -166,5 +173,6 @@ pub(super) fn shape(nurbs: &mut Nurbs) {
         let mean = crate::surface::direction_or_up(&normals.iter().sum());
         nurbs.poles[pole].is_sharp = normals.iter().any(|normal| normal.dot(&mean) < SMOOTH_RAD.cos());
         nurbs.poles[pole].normal_B = mean;
+        nurbs.poles[pole].ways = ways(nurbs, &nurbs.poles[pole]);
     }
 }
