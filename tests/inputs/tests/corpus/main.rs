@@ -86,7 +86,7 @@ fn inputs_that_once_failed_lie_under_the_name_of_a_target() {
 fn all_inputs_of_every_target_end_soon_and_within_their_memory() {
     let next = AtomicUsize::new(0);
     std::thread::scope(|threads| {
-        for _ in 0..std::thread::available_parallelism().map_or(1, |cores| cores.get()) {
+        for _ in 0..std::thread::available_parallelism().map_or(1, std::num::NonZero::get) {
             threads.spawn(|| {
                 while let Some((name, _)) = TARGETS.get(next.fetch_add(1, Ordering::Relaxed)) {
                     run_in_a_process(name);
