@@ -57,7 +57,7 @@ impl DriverMemory {
         describe(&map, info);
         // After our own mapping stands, nobody gets another writable one.
         seal(&fd, SealFlags::SHRINK | SealFlags::GROW | SealFlags::FUTURE_WRITE | SealFlags::SEAL)?;
-        let pages = keep_apart(&fd)?;
+        let pages = keep_apart(&fd, size_of::<DriverSegment>())?;
         Ok(Self { map, fd, _pages: pages, frame_words: frame_words(info.devices.len()) })
     }
 

@@ -39,14 +39,20 @@ pub(super) fn seal(fd: &OwnedFd, seals: SealFlags) -> Result<(), SegmentError> {
 
 /// Keeps the kernel from merging the pages of a segment into a huge one for as long as the descriptor is open, whoever
 /// asks for it (`MADV_COLLAPSE`): meanwhile whoever touches them would wait for milliseconds. What is merged must be
-/// referred to by mappings alone, and here a pipe refers to the first page.
-pub(super) fn keep_apart(fd: &OwnedFd) -> Result<OwnedFd, SegmentError> {
+/// referred to by mappings alone, and here a pipe refers to a page of each part that could be merged.
+pub(super) fn keep_apart(fd: &OwnedFd, bytes: usize) -> Result<OwnedFd, SegmentError> {
     let system = |errno: Errno| SegmentError::System { what: "hold the pages of", source: errno.into() };
     let (held, into) = rustix::pipe::pipe_with(PipeFlags::CLOEXEC).map_err(system)?;
-    let begin = &mut 0;
-    rustix::pipe::splice(fd, Some(begin), &into, None, 1, SpliceFlags::empty()).map_err(system)?;
+    for part in (0..bytes as u64).step_by(SMALLEST_HUGE_PAGE) {
+        // A pipe that is too small is an error, and no wait.
+        rustix::pipe::splice(fd, Some(&mut { part }), &into, None, 1, SpliceFlags::NONBLOCK)
+            .map_err(system)?;
+    }
     Ok(held)
 }
+
+/// In bytes; where huge pages are larger (64 KiB pages of Arm), several of ours lie in each.
+const SMALLEST_HUGE_PAGE: usize = 2 << 20;
 
 pub(super) fn check(fd: BorrowedFd<'_>, bytes: usize, needed: SealFlags) -> Result<(), SegmentError> {
     let seals = rustix::fs::fcntl_get_seals(fd)
