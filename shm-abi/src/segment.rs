@@ -3,7 +3,7 @@
 //! Model: the driver creates both memfds and maps them. Sealing forbids shrinking and growing, so nobody can cause
 //! SIGBUS; every further writable mapping, and with it every hole, is forbidden for the driver's segment from the
 //! beginning, for the commander's once the commander has mapped it ([`LeaseOffer`]). A pipe holds a page of the driver's
-//! segment, so that no reader can have its pages merged. Whoever receives a descriptor checks seals and size before
+//! segment, so that no reader can have its pages merged, and another the commander's page. Whoever receives a descriptor checks seals and size before
 //! touching a byte. The driver writes one word of the commander's segment, the one that the commander sleeps on.
 
 mod bounds;
@@ -34,6 +34,15 @@ pub enum SegmentError {
     System {
         /// What was tried.
         what: &'static str,
+        /// What the kernel said.
+        source: io::Error,
+    },
+    /// There is no pipe to hold its pages, or it is too small.
+    #[error(
+        "cannot hold the pages of a shared segment in a pipe: {source}; raise the limit of open files (`ulimit -n`, \
+         LimitNOFILE=), or close what has many pipes open (fs.pipe-user-pages-soft)"
+    )]
+    Pipe {
         /// What the kernel said.
         source: io::Error,
     },

@@ -22,7 +22,7 @@ pub enum BindError {
         socket: PathBuf,
     },
     /// The file system refused.
-    #[error("cannot {what} {path}: {source}; choose another place with --socket or {variable}", variable = crate::endpoint::SOCKET_VARIABLE)]
+    #[error("cannot {what} {path}: {source}; {}", remedy(source))]
     System {
         /// What was tried.
         what: &'static str,
@@ -36,6 +36,13 @@ pub enum BindError {
 impl BindError {
     pub(crate) fn system(what: &'static str, path: &Path, source: io::Error) -> Self {
         Self::System { what, path: path.to_path_buf(), source }
+    }
+}
+
+fn remedy(source: &io::Error) -> String {
+    match Errno::from_io_error(source) {
+        Some(Errno::MFILE) => "raise the limit of open files (`ulimit -n`, LimitNOFILE=)".to_owned(),
+        _ => format!("choose another place with --socket or {}", crate::endpoint::SOCKET_VARIABLE),
     }
 }
 

@@ -59,6 +59,29 @@ fn an_observer_cannot_have_the_pages_of_the_drivers_segment_merged() {
     }
 }
 
+/// Not even when it took its page away before the seal, so that the driver's mapping began with another.
+#[test]
+fn a_commander_cannot_have_the_pages_of_its_own_segment_merged() {
+    let sealed = |takes_away: bool| {
+        let offer = LeaseOffer::create(1, shm_abi::ABI_VERSION).unwrap();
+        let fd = offer.fd().try_clone_to_owned().unwrap();
+        let commander = CommanderMemory::map(fd.as_fd()).unwrap();
+        if takes_away {
+            assert_eq!(punch(&fd, &commander), [Ok(()); 2]);
+        }
+        (offer.seal().unwrap(), fd)
+    };
+    let (_view, unsealed) = CommanderView::create(1).unwrap();
+    if let Err(error) = merge_pages(&unsealed, 0) {
+        println!("skipped: this kernel merges no pages when asked: {error}");
+        return;
+    }
+    for takes_away in [false, true] {
+        let (_view, fd) = sealed(takes_away);
+        assert_eq!(merge_pages(&fd, 0), Err(rustix::io::Errno::AGAIN), "taken away before: {takes_away}");
+    }
+}
+
 const HUGE: usize = 2 << 20;
 
 /// Asks the kernel to put the pages of a memory file from this byte on into a huge one, as whoever may map it can.

@@ -46,6 +46,8 @@ pub const ALLOWED_CALLS: &[AllowedCall] = &[
     // A fresh segment for each lease.
     call("memfd_create", libc::SYS_memfd_create, Any, "the segment"),
     call("fallocate", libc::SYS_fallocate, Any, "its pages, before they are needed"),
+    call("pipe2", libc::SYS_pipe2, Any, "a pipe, so that its page is not merged"),
+    call("splice", libc::SYS_splice, Any, "the page into the pipe"),
     call("fcntl", libc::SYS_fcntl, OneOf(1, FCNTL), "sealing it; a second descriptor while it is mapped"),
     call("mmap", libc::SYS_mmap, Without(2, PROT_EXEC), "mapping it; large allocations"),
     call(

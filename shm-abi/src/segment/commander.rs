@@ -1,6 +1,6 @@
 //! The commander's segment: written by the commander, read by the driver.
 
-use super::mapping::{Mapping, check, create_memfd, seal};
+use super::mapping::{Mapping, check, create_memfd, keep_apart, seal};
 use super::{
     DriverMemory, DriverView, SegmentError, expect, expect_compatible, get, put, slot_of, words_of,
     words_of_mut,
@@ -62,6 +62,8 @@ impl Deref for CommanderMemory {
 pub struct CommanderView {
     pub(super) map: Mapping<CommanderSegment>,
     lease: u64,
+    /// Keeps its page from being merged, once the commander can no longer take it away.
+    pages: Option<OwnedFd>,
 }
 
 impl CommanderView {
@@ -77,7 +79,7 @@ impl CommanderView {
         put(&header.segment_bytes, size_of::<CommanderSegment>() as u64);
         put(&header.lease, lease);
         seal(&fd, SealFlags::SHRINK | SealFlags::GROW)?;
-        Ok((Self { map, lease }, fd))
+        Ok((Self { map, lease, pages: None }, fd))
     }
 
     /// Number of the lease; the driver's own knowledge, not read from the segment.
@@ -104,8 +106,16 @@ impl CommanderView {
         doorbell::sleep(Place::bell(bell), bell, seen, &own.map.bell.owner_sleeps, timeout);
     }
 
+    /// Touches every page and has it stay where it is, for as long as this lives.
+    pub(super) fn hold_pages(&mut self, fd: &OwnedFd) -> Result<(), SegmentError> {
+        // First: a page that is not there could not be held.
+        self.prefault();
+        self.pages = Some(keep_apart(fd, size_of::<CommanderSegment>())?);
+        Ok(())
+    }
+
     /// Touches every page, so that the loop's first look at one is no page fault.
-    pub(super) fn prefault(&self) {
+    fn prefault(&self) {
         for slot in &self.map.commands {
             // A read of a page that is not there would map it for reading only; and an addition of zero is no access
             // at all to the optimiser. The first slot lies on the header's page.

@@ -41,12 +41,12 @@ pub(super) fn seal(fd: &OwnedFd, seals: SealFlags) -> Result<(), SegmentError> {
 /// asks for it (`MADV_COLLAPSE`): meanwhile whoever touches them would wait for milliseconds. What is merged must be
 /// referred to by mappings alone, and here a pipe refers to a page of each part that could be merged.
 pub(super) fn keep_apart(fd: &OwnedFd, bytes: usize) -> Result<OwnedFd, SegmentError> {
-    let system = |errno: Errno| SegmentError::System { what: "hold the pages of", source: errno.into() };
-    let (held, into) = rustix::pipe::pipe_with(PipeFlags::CLOEXEC).map_err(system)?;
+    let refused = |errno: Errno| SegmentError::Pipe { source: errno.into() };
+    let (held, into) = rustix::pipe::pipe_with(PipeFlags::CLOEXEC).map_err(refused)?;
     for part in (0..bytes as u64).step_by(SMALLEST_HUGE_PAGE) {
         // A pipe that is too small is an error, and no wait.
         rustix::pipe::splice(fd, Some(&mut { part }), &into, None, 1, SpliceFlags::NONBLOCK)
-            .map_err(system)?;
+            .map_err(refused)?;
     }
     Ok(held)
 }

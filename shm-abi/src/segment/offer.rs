@@ -9,7 +9,7 @@
 //! so by its first command, or not at all: some wait for a frame under their lease before they publish, and are
 //! given [`MAPPED_WITHIN`]. All of this happens in the thread of the socket, never in the loop.
 //!
-//! Invariant: after [`LeaseOffer::seal`] no page of the segment can be taken away.
+//! Invariant: after [`LeaseOffer::seal`] no page of the segment can be taken away or merged into a huge one.
 
 use super::mapping::seal;
 use super::{CommanderView, SegmentError};
@@ -67,13 +67,13 @@ impl LeaseOffer {
     }
 
     /// Forbids everybody to map the segment for writing, to punch holes into it and to change the seals, and makes
-    /// every page present in this process.
+    /// every page present in this process, where nobody has it merged.
     ///
     /// # Errors
-    /// If the commander has forbidden further seals itself.
-    pub fn seal(self) -> Result<CommanderView, SegmentError> {
+    /// If the commander has forbidden further seals itself, or the kernel refuses a descriptor.
+    pub fn seal(mut self) -> Result<CommanderView, SegmentError> {
         seal(&self.fd, SealFlags::FUTURE_WRITE | SealFlags::SEAL)?;
-        self.view.prefault();
+        self.view.hold_pages(&self.fd)?;
         Ok(self.view)
     }
 }

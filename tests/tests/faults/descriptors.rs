@@ -33,6 +33,7 @@ fn a_driver_starts_with_enough_descriptors_or_says_why_not() {
             // 127: not even the dynamic linker could open what it needs.
             assert!(matches!(end.status, Some(2 | 127)), "{descriptors}: {end:?}");
             assert!(!end.err.is_empty(), "{descriptors}: {end:?}");
+            assert!(!end.err.contains("choose another place"), "{descriptors}: {end:?}");
             refused += 1;
         } else {
             std::thread::sleep(Duration::from_millis(5));

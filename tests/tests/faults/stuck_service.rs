@@ -352,7 +352,8 @@ fn check_command(call: &str) {
 fn errors_of(call: &str) -> &'static [&'static str] {
     match call {
         "ppoll" => &["EIO", "EINTR"],
-        "accept4" | "memfd_create" => &["EIO", "EMFILE"],
+        "accept4" | "memfd_create" | "pipe2" => &["EIO", "EMFILE"],
+        "splice" => &["EIO", "EAGAIN"],
         "recvfrom" => &["EIO", "ECONNRESET", "EAGAIN"],
         "sendmsg" => &["EIO", "EPIPE"],
         "ftruncate" => &["EIO", "ENOSPC"],
