@@ -445,7 +445,7 @@ impl Server {
                 Ok(view) => to.take(ServerEvent::LeaseGranted { view, pid, name }).is_ok(),
                 Err(error) => {
                     let message =
-                        format!("process {pid} ({name}) gets no lease, it sealed its memory: {error}");
+                        format!("process {pid} ({name}) gets no lease: {error}");
                     let _ = to.take(ServerEvent::Trouble { message });
                     false
                 }

@@ -190,7 +190,7 @@ fn a_commander_that_seals_its_memory_is_hung_up_on_and_the_next_one_commands() {
         !desk.events.is_empty()
     });
     let Some(ServerEvent::Trouble { message }) = desk.events.pop() else { panic!("no trouble") };
-    assert!(message.contains("(raw) gets no lease, it sealed its memory"), "{message}");
+    assert!(message.contains("(raw) gets no lease: cannot seal a shared segment"), "{message}");
     desk.poll(SHORT);
     assert!(is_closed(&mut stream));
     desk.granted(RequestKind::Command);

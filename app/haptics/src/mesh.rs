@@ -51,6 +51,7 @@ mod topology;
 mod touching;
 mod uv;
 mod walk;
+mod weld;
 mod winding;
 
 #[cfg(test)]

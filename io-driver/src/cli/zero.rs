@@ -49,7 +49,7 @@ pose it is.\nA zero taken in another pose makes every position, force and limit 
 Exit status: 0 zeroed; 2 bad usage, or refused at once; 3 it did not stand still, or the driver refused, did not answer \
 or did not show the zero.";
 
-/// Why nothing was zeroed.
+/// Why nothing was zeroed, or is known to be.
 #[derive(Debug, Error)]
 pub(super) enum ZeroError {
     #[error(transparent)]
@@ -90,6 +90,10 @@ pub(super) enum ZeroError {
          another one the device stays not valid; end that process, or let it go on"
     )]
     Unseen,
+    #[error(
+        "{0}; it was asked to zero by then, and may have: look at its devices (`io-driver status`) before they are used"
+    )]
+    Unknown(String),
 }
 
 impl ZeroError {
@@ -103,6 +107,7 @@ impl ZeroError {
                 | Self::Moving { .. }
                 | Self::Refused(_)
                 | Self::Unseen
+                | Self::Unknown(_)
         )
     }
 }
@@ -289,9 +294,18 @@ impl<'a> Zeroing<'a> {
         }
     }
 
-    /// Asks, and looks at every frame after that. A zero that was refused changed nothing, so that it may be asked for
-    /// again.
+    /// Asks, and says of what kept it from looking that the driver may have zeroed by then.
     fn ask(&mut self, devices: &[usize]) -> Result<(), ZeroError> {
+        let mut was_asked = false;
+        self.ask_and_look(devices, &mut was_asked).map_err(|error| match error {
+            ZeroError::Interrupted if was_asked => ZeroError::Unknown("interrupted".into()),
+            ZeroError::Attach(_) | ZeroError::Silent(_) if was_asked => ZeroError::Unknown(error.to_string()),
+            other => other,
+        })
+    }
+
+    /// Looks at every frame after that. A zero that was refused changed nothing, so that it may be asked for again.
+    fn ask_and_look(&mut self, devices: &[usize], was_asked: &mut bool) -> Result<(), ZeroError> {
         let bits = devices.iter().fold(0, |bits, index| bits | 1 << index);
         let mut seen = self.driver().latest_tick().unwrap_or(0);
         let mut was_withheld = vec![false; devices.len()];
@@ -299,7 +313,10 @@ impl<'a> Zeroing<'a> {
         while began.elapsed() < ANSWER {
             let is_due = asked.is_none_or(|asked: Instant| asked.elapsed() > TURN);
             if is_due && !self.was_granted(devices, &was_withheld) {
-                client::zero(self.socket, NAME, bits)?;
+                let answer = client::zero(self.socket, NAME, bits);
+                // What was not answered may have been heard.
+                *was_asked |= matches!(answer, Ok(()) | Err(AttachError::NoAnswer { .. }));
+                answer?;
                 asked = Some(Instant::now());
             }
             self.next_frame(seen)?;

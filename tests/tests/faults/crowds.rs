@@ -121,7 +121,7 @@ const REST_SHARE: f64 = 0.1;
 
 /// Attempts to connect without an end, ten thousand a second where the machine has time for so many; whoever stops the motors
 /// meanwhile, over a connection or by datagram, is served.
-fn stops_under_a_flood(duration: Duration) {
+fn stops_under_a_flood(duration: Duration, least_per_s: f64) {
     let stand = Stand::start(Setup::new("real"));
     let (cpu, ticks) = (cpu_of_service(stand.driver.id()), stand.view().latest_tick().unwrap_or(0));
     let overruns = || stand.view().counters.overruns.load(std::sync::atomic::Ordering::Relaxed);
@@ -159,7 +159,7 @@ fn stops_under_a_flood(duration: Duration) {
         overruns() - overruns_before
     );
     println!("{told}");
-    assert!(attempts > LEAST_FLOOD_PER_S, "{told}");
+    assert!(attempts > least_per_s, "{told}");
     assert!(median < USUAL_STOP && slowest < SLOWEST_STOP, "{told}");
     // A service that did not sleep between attempts would take all of a CPU.
     assert!(share < REST_SHARE + attempts * MOST_ATTEMPT_S, "{told}");
@@ -168,11 +168,12 @@ fn stops_under_a_flood(duration: Duration) {
 
 #[test]
 fn stops_are_served_under_a_flood_of_connections() {
-    stops_under_a_flood(Duration::from_secs(3));
+    stops_under_a_flood(Duration::from_secs(3), LEAST_FLOOD_PER_S);
 }
 
 #[test]
 #[ignore = "a minute: cargo test -p system-tests --test faults flood -- --ignored --nocapture"]
 fn stops_are_served_under_a_flood_of_connections_for_a_minute() {
-    stops_under_a_flood(Duration::from_secs(60));
+    // Of ten thousand, on a machine that does nothing else; and a crowd of them waits while others are served.
+    stops_under_a_flood(Duration::from_secs(60), 9_500.0);
 }

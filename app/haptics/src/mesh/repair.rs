@@ -2,14 +2,15 @@
 //!
 //! Problem: STL repeats a vertex for each of its faces; modelling programs leave zero-area faces behind.
 //!
-//! Model: vertices merge only if they are equal to the bit (-0 equals 0): a tolerance would merge what a fine mesh
-//! tells apart. A face has no area if its height over its longest edge drowns in the rounding of its coordinates;
+//! Model: vertices merge if they are equal up to a few roundings of the mesh's largest coordinate. CAD programs write
+//! the same vertex as 0 for one face and as 3e-17 for the next; a larger tolerance would merge what a fine mesh tells
+//! apart. A face has no area if its height over its longest edge drowns in the rounding of its coordinates;
 //! this scales with the mesh and keeps the thinnest needle that can be told from a line.
 
 use super::order::{Curve, Triangle};
 use super::report::{Finding, MeshReport};
 use super::sliver::{Sliver, divide};
-use super::{MeshError, TriangleSoup};
+use super::{MeshError, TriangleSoup, weld};
 use nalgebra::Vector3;
 
 /// The faces that have an area, between vertices that are all different.
@@ -17,7 +18,7 @@ pub(super) fn proper_triangles(
     soup: &TriangleSoup,
     report: &mut MeshReport,
 ) -> Result<Vec<Triangle>, MeshError> {
-    let merged = weld(&soup.vertices, &mut report.welded_vertices);
+    let merged = weld::merge(&soup.vertices, &mut report.welded_vertices);
     report.unused_vertices = unused(soup);
     let curve = Curve::through(&soup.vertices);
     let mut triangles = Vec::with_capacity(soup.faces.len());
@@ -51,38 +52,6 @@ pub(super) fn proper_triangles(
 /// overlap.
 const BLOCK: usize = 64;
 
-/// For each vertex the first one equal to it.
-///
-/// Open addressing with linear probing. Whatever the hash, the answer depends on the input alone.
-fn weld(vertices: &[Vector3<f64>], welded: &mut Finding) -> Vec<u32> {
-    const FREE: u32 = u32::MAX;
-    let mask = (2 * vertices.len()).next_power_of_two() - 1;
-    let mut table = vec![FREE; mask + 1];
-    let mut first_equal = Vec::with_capacity(vertices.len());
-    for (index, vertex) in vertices.iter().enumerate() {
-        let mut slot = hash(vertex) as usize & mask;
-        while table[slot] != FREE && vertices[table[slot] as usize] != *vertex {
-            slot = (slot + 1) & mask;
-        }
-        if table[slot] == FREE {
-            table[slot] = index as u32;
-        } else {
-            welded.note(index);
-        }
-        first_equal.push(table[slot]);
-    }
-    first_equal
-}
-
-/// Equal vertices have equal hashes: adding 0 makes -0 a 0.
-fn hash(vertex: &Vector3<f64>) -> u64 {
-    let mix = |h: u64, x: &f64| {
-        let h = (h ^ (x + 0.0).to_bits()).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-        h ^ (h >> 29)
-    };
-    vertex.iter().fold(0, mix)
-}
-
 fn unused(soup: &TriangleSoup) -> Finding {
     let mut used = vec![false; soup.vertices.len()];
     for face in &soup.faces {
@@ -112,12 +81,12 @@ pub(super) fn has_area(corners: &[Vector3<f64>; 3]) -> bool {
     let height = area_vector(corners).norm() / longest;
     let size = a.amax().max(b.amax()).max(c.amax());
     // Not a number if all three corners are one: no area.
-    height > HEIGHT_ROUNDING * size
+    height > ROUNDING * size
 }
 
 /// Of the largest coordinate. Each corner is rounded by half an epsilon an axis, which moves a height by up to
 /// 2 sqrt(3) halves; ten times that, so that what is left has a normal good to a tenth or better.
-const HEIGHT_ROUNDING: f64 = 16.0 * f64::EPSILON;
+pub(super) const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
 #[cfg(test)]
 mod tests {

@@ -73,7 +73,7 @@ pub struct MeshReport {
     pub vertices: usize,
     /// Parts that do not share an edge with one another.
     pub components: usize,
-    /// Input vertices that were equal to an earlier one and were merged with it.
+    /// Input vertices that were equal to an earlier one up to rounding and were merged with it.
     pub welded_vertices: Finding,
     /// Input vertices that no face uses; left out.
     pub unused_vertices: Finding,
@@ -139,7 +139,7 @@ impl fmt::Display for MeshReport {
             plural(*components, "part", "parts")
         )?;
         let lines = [
-            (self.welded_vertices, "vertex", "vertices", "equal to an earlier one: merged"),
+            (self.welded_vertices, "vertex", "vertices", "equal to an earlier one up to rounding: merged"),
             (self.unused_vertices, "vertex", "vertices", "of no face: left out"),
             (self.degenerate, "face", "faces", "without an area: left out"),
             (self.divided, "face", "faces", "with a vertex on an edge: divided"),
@@ -196,7 +196,7 @@ mod tests {
         assert_eq!(
             report.to_string(),
             "12 faces, 8 vertices, 1 part\n\
-             1 vertex equal to an earlier one: merged (first: vertex 2)\n\
+             1 vertex equal to an earlier one up to rounding: merged (first: vertex 2)\n\
              2 faces without an area: left out (first: face 4)"
         );
     }

@@ -61,6 +61,11 @@ fn a_value_of_the_wrong_type_is_named_with_what_was_found() {
          [[finger]]: write it with two brackets, even if there is only one",
     );
     refused(
+        "[[finger]]\n[entity]\nname = \"ball\"\n",
+        "s.toml:2: entity: found a single table, as `[entity]` makes it; allowed: a list of tables, each under its own \
+         [[entity]]: write it with two brackets, even if there is only one",
+    );
+    refused(
         "finger = [1]\n",
         "s.toml:1: finger[0]: found 1; allowed: a list of tables, each under its own [[finger]]",
     );
