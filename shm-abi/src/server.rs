@@ -444,8 +444,7 @@ impl Server {
             let is_granted = match mapped.seal() {
                 Ok(view) => to.take(ServerEvent::LeaseGranted { view, pid, name }).is_ok(),
                 Err(error) => {
-                    let message =
-                        format!("process {pid} ({name}) gets no lease: {error}");
+                    let message = format!("process {pid} ({name}) gets no lease: {error}");
                     let _ = to.take(ServerEvent::Trouble { message });
                     false
                 }

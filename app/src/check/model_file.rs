@@ -104,7 +104,8 @@ impl Understood {
         row("mesh", told.lines().next().unwrap_or_default());
         told.lines().skip(1).for_each(|finding| row("", &format!("  {}", finding.trim())));
         row("felt", &self.felt());
-        let [size, low, high] = [self.high - self.low, self.low, self.high].map(|v| v.map(short));
+        let [size, low, high] = [self.high - self.low, self.low, self.high];
+        let [size, low, high] = [size, low, high].map(|v| v.map(|x| short(without_noise(x, size.amax()))));
         row("size", &format!("{} x {} x {}, from {} to {}", size.x, size.y, size.z, list(&low), list(&high)));
         row("surface", &format!("{} square", short(self.area)));
         if self.mesh.sides() == Sides::Solid {
@@ -215,6 +216,11 @@ const MOST_NAMES: usize = 20;
 /// Four digits.
 fn short(number: f64) -> f64 {
     format!("{number:.3e}").parse().unwrap_or(number)
+}
+
+/// Zero where a number drowns in what it is part of, as roundings of CAD programs do.
+fn without_noise(number: f64, size: f64) -> f64 {
+    if number.abs() < 1e-12 * size { 0.0 } else { number }
 }
 
 fn list(v: &Vector3<f64>) -> String {

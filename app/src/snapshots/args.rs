@@ -112,8 +112,9 @@ impl PictureArgs {
 }
 
 fn parse_shot(text: &str) -> Result<Shot, String> {
-    let wrong =
-        || format!("found {text}, allowed: a time in s from 0 on, a colon and a PNG file, as in 2.5:grasp.png");
+    let wrong = || {
+        format!("found {text}, allowed: a time in s from 0 on, a colon and a PNG file, as in 2.5:grasp.png")
+    };
     let (t_s, file) = text.split_once(':').ok_or_else(wrong)?;
     let t_s: f64 = t_s.parse().map_err(|_| wrong() + separators::hint_for_cell(t_s))?;
     let file = PathBuf::from(file);

@@ -69,13 +69,31 @@ impl<'d> Document<'d> {
         Box::new(Location { file: self.file.into(), line: self.line(offset), key })
     }
 
+    /// What the file is, if its name is of something else than TOML, and where that belongs.
+    fn other_kind(&self) -> Option<&'static str> {
+        let is_csv = self.file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
+        if is_csv {
+            Some("a table, such as a hand (`--hand`) or a recording (`phantom3 replay`)")
+        } else if crate::model::is_named(self.file) {
+            Some(
+                "a model, which a scene names: shape = { kind = \"mesh\", file = \"cup.obj\" }; `phantom3 check` says how a \
+                 model is understood",
+            )
+        } else {
+            None
+        }
+    }
+
     fn syntax_error(&self, span: Option<Range<usize>>, message: &str) -> SceneError {
         let offset = span.map_or(0, |span| span.start);
         SceneError::Syntax {
             file: self.file.into(),
             line: self.line(offset),
             column: column_of(self.text.as_bytes(), offset),
-            message: toml_slips::explain(self.text, offset, message),
+            message: self.other_kind().map_or_else(
+                || toml_slips::explain(self.text, offset, message),
+                |kind| format!("by its name it is {kind}"),
+            ),
         }
     }
 }

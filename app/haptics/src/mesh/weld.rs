@@ -17,7 +17,10 @@ pub(super) fn merge(vertices: &[Vector3<f64>], welded: &mut Finding) -> Vec<u32>
     if tolerance > 0.0 {
         merge_close(vertices, tolerance, &mut stands_for);
     }
-    (0..).zip(&stands_for).filter(|(index, other)| index != *other).for_each(|(i, _)| welded.note(i as usize));
+    (0..)
+        .zip(&stands_for)
+        .filter(|(index, other)| index != *other)
+        .for_each(|(i, _)| welded.note(i as usize));
     stands_for
 }
 

@@ -1,7 +1,8 @@
-//! Free-form surfaces in Wavefront OBJ: the part of them that is B-splines without holes.
+//! Free-form surfaces in Wavefront OBJ: the part of them that is B-splines and Bezier patches without holes.
 //!
-//! Read: `v x y z w`, `cstype bspline` and `cstype rat bspline`, `deg`, `surf`, `parm u`, `parm v`, `end`. Without `rat`
-//! weights do not count. Ignored: what an OBJ of polygons may have besides, curves (`curv`, `curv2` and what belongs to them), and hints
+//! Read: `v x y z w`, `cstype bspline` and `cstype bezier`, with `rat` before it or not, `deg`, `surf`, `parm u`, `parm v`,
+//! `end`. Without `rat` weights do not count. Of a Bezier surface `parm` tells where segments begin and end; it is the
+//! B-spline that has each of these knots as often as its degree, and the outer ones once more. Ignored: what an OBJ of polygons may have besides, curves (`curv`, `curv2` and what belongs to them), and hints
 //! on connection and tessellation. Refused: other kinds of surfaces, trimming, holes, a part of a surface, polygons.
 
 use super::obj::{FREE_FORM, IGNORED, Statements, integer, words};
@@ -29,8 +30,8 @@ pub fn read_free_form(bytes: &[u8]) -> Result<Vec<NurbsPatch>, ModelError> {
 #[derive(Default)]
 struct Reader {
     vertices: Vec<[f64; 4]>,
-    /// Whether weights count; `None` before the first `cstype`.
-    is_rational: Option<bool>,
+    /// `None` before the first `cstype`.
+    kind: Option<Kind>,
     degree: Option<[usize; 2]>,
     open: Option<Surf>,
     /// Inside a curve, whose `parm` and `end` are none of ours.
@@ -38,9 +39,18 @@ struct Reader {
     patches: Vec<NurbsPatch>,
 }
 
+/// What `cstype` says.
+#[derive(Clone, Copy)]
+struct Kind {
+    /// Whether weights count.
+    is_rational: bool,
+    is_bezier: bool,
+}
+
 /// A surface before its end.
 struct Surf {
     line: usize,
+    is_bezier: bool,
     /// First and last parameter along u and v.
     range: [f64; 4],
     points: Vec<[f64; 4]>,
@@ -52,7 +62,7 @@ impl Reader {
     fn statement(&mut self, line: usize, keyword: &[u8], rest: &[&[u8]]) -> Result<(), ModelError> {
         match keyword {
             b"v" => self.vertices.push(vertex(line, rest)?),
-            b"cstype" => self.is_rational = Some(cstype(line, rest)?),
+            b"cstype" => self.kind = Some(cstype(line, rest)?),
             b"deg" => self.degree = Some(degree(line, rest)?),
             b"surf" => self.open = Some(self.surf(line, rest)?),
             b"curv" | b"curv2" => self.is_in_curve = true,
@@ -80,7 +90,7 @@ impl Reader {
         if self.open.is_some() {
             return refused(line, "a surface within another", "`end` behind each surface");
         }
-        let Some(is_rational) = self.is_rational.filter(|_| self.degree.is_some()) else {
+        let Some(kind) = self.kind.filter(|_| self.degree.is_some()) else {
             return refused(line, "a surface of no kind", "`cstype` and `deg` before the first surface");
         };
         let Some((range, corners)) = rest.split_first_chunk::<4>() else {
@@ -92,10 +102,10 @@ impl Reader {
         }
         let point = |word: &&[u8]| {
             let [x, y, z, w] = self.vertices[self.index(line, word)?];
-            Ok([x, y, z, if is_rational { w } else { 1.0 }])
+            Ok([x, y, z, if kind.is_rational { w } else { 1.0 }])
         };
         let points = corners.iter().map(point).collect::<Result<_, ModelError>>()?;
-        Ok(Surf { line, range: numbers, points, knots: [None, None] })
+        Ok(Surf { line, is_bezier: kind.is_bezier, range: numbers, points, knots: [None, None] })
     }
 
     /// The vertex that a corner such as `7`, `-1` or `7/1/1` names.
@@ -134,7 +144,13 @@ impl Reader {
         let [Some((line_u, u)), Some((line_v, v))] = surf.knots else {
             return refused(line, "a surface without knots", "`parm u` and `parm v` before `end`");
         };
-        let patch = NurbsPatch { degree, knots: [u, v], points: surf.points };
+        let mut knots = [u, v];
+        if surf.is_bezier {
+            for ((knots, degree), line) in knots.iter_mut().zip(degree).zip([line_u, line_v]) {
+                *knots = knots_of_segments(line, knots, degree)?;
+            }
+        }
+        let patch = NurbsPatch { degree, knots, points: surf.points };
         patch.check(self.patches.len()).map_err(|error| {
             let NurbsError::Patch { part, found, allowed, .. } = error else {
                 return ModelError::Line { line, found: error.to_string(), allowed: "a surface".into() };
@@ -161,6 +177,17 @@ impl Reader {
     }
 }
 
+/// Of a B-spline that has these segments.
+fn knots_of_segments(line: usize, ends: &[f64], degree: usize) -> Result<Vec<f64>, ModelError> {
+    const MOST_DEGREE: usize = 64;
+    let ([first, .., last], 1..=MOST_DEGREE) = (ends, degree) else {
+        let found = format!("{} parameters of a Bezier surface of degree {degree}", ends.len());
+        return refused(line, found, "one for each end of a segment, two or more; and a degree of 1 or more");
+    };
+    let inner = ends.iter().flat_map(|&end| std::iter::repeat_n(end, degree));
+    Ok([*first].into_iter().chain(inner).chain([*last]).collect())
+}
+
 /// Three coordinates and perhaps a weight; a colour may follow.
 fn vertex(line: usize, rest: &[&[u8]]) -> Result<[f64; 4], ModelError> {
     let numbers = rest.iter().map(|word| finite(line, word)).collect::<Result<Vec<_>, _>>()?;
@@ -175,10 +202,15 @@ fn vertex(line: usize, rest: &[&[u8]]) -> Result<[f64; 4], ModelError> {
     }
 }
 
-fn cstype(line: usize, rest: &[&[u8]]) -> Result<bool, ModelError> {
-    match rest {
-        [b"rat", b"bspline"] => Ok(true),
-        [b"bspline"] => Ok(false),
+fn cstype(line: usize, rest: &[&[u8]]) -> Result<Kind, ModelError> {
+    let (is_rational, name) = match rest {
+        [b"rat", name] => (true, *name),
+        [name] => (false, *name),
+        _ => (false, &b""[..]),
+    };
+    match name {
+        b"bspline" => Ok(Kind { is_rational, is_bezier: false }),
+        b"bezier" => Ok(Kind { is_rational, is_bezier: true }),
         _ => refused(line, shown(&rest.join(&b' ')), CSTYPE),
     }
 }
@@ -202,4 +234,4 @@ fn refused<T>(line: usize, found: impl Into<String>, allowed: impl Into<String>)
     Err(ModelError::Line { line, found: found.into(), allowed: allowed.into() })
 }
 
-const CSTYPE: &str = "`cstype bspline` or `cstype rat bspline`";
+const CSTYPE: &str = "`cstype bspline` or `cstype bezier`, with `rat` before the name where weights count";

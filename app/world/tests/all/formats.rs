@@ -553,6 +553,11 @@ fn buffers_of_gltf_are_in_it_beside_it_or_below_and_nowhere_else() {
 #[test]
 fn what_is_wrong_with_a_gltf_is_told_with_its_place() {
     let document = Document::square();
+    let first_version = br#"{"accessors": {"a": {}}, "asset": {"version": "1.0"}, "meshes": {}}"#;
+    assert_eq!(
+        gltf(first_version).unwrap_err().to_string(),
+        "asset.version: found \"1.0\"; allowed: \"2.0\"; export the model as glTF 2.0 or GLB"
+    );
     let cases = [
         (
             "\"2.0\"",

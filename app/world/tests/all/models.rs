@@ -38,6 +38,7 @@ fn every_way_to_write_a_tetrahedron_as_obj_is_the_same() {
         PLAIN.replace("v 0 0 1", "\t v  0.0 0e5 +1  "),
         PLAIN.replace("v 1 0 0", "v 1 0 0 1.0"),
         PLAIN.replace("v 1 0 0", "v 1 0 0 0.5 0.25 1 # a colour"),
+        PLAIN.replace("v 1 0 0", "v 1 0 0 nan nan nan"),
         PLAIN.replace("f 1 2 4", "f 1/1 2/2 4/3"),
         PLAIN.replace("f 1 2 4", "f 1//1 2//-1 4//1"),
         PLAIN.replace("f 1 2 4", "f 1/1/1 2/2/2 4/3/3 # with all"),

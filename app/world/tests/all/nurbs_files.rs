@@ -153,6 +153,33 @@ fn obj_refused(text: &str, message: &str) {
 const PLANE: &str = "v 0 0 0\nv 1 0 0\nv 0 0 1\nv 1 0 1\ncstype bspline\ndeg 1 1\nsurf 0 1 0 1 1 2 3 4\n\
                      parm u 0 0 1 1\nparm v 0 0 1 1\nend\n";
 
+/// By the knots that the format's description gives a Bezier surface: a segment between any two of `parm`.
+#[test]
+fn a_bezier_surface_is_the_b_spline_of_its_segments() {
+    let plane = PLANE.replace("bspline", "bezier").replace("0 0 1 1\n", "0 1\n");
+    assert_eq!(read_free_form(plane.as_bytes()).unwrap(), read_free_form(PLANE.as_bytes()).unwrap());
+    let rows = (0..7).flat_map(|u| (0..2).map(move |v| format!("v {u} {} {v} 2\n", u * u)));
+    let corners: String = (1..=14).map(|corner| format!(" {corner}")).collect();
+    // The first direction runs first.
+    let of_two = format!(
+        "{}cstype rat bezier\ndeg 1 3\nsurf 5 6 0 4{corners}\nparm u 5 6\nparm v 0 1 4\nend\n",
+        rows.collect::<String>()
+    );
+    let [patch] = &read_free_form(of_two.as_bytes()).unwrap()[..] else { panic!("one patch") };
+    let knots = [vec![5.0, 5.0, 6.0, 6.0], vec![0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 4.0, 4.0, 4.0, 4.0]];
+    assert_eq!((patch.degree, &patch.knots), ([1, 3], &knots));
+    assert!(patch.points.iter().all(|point| point[3] == 2.0));
+    obj_refused(
+        &plane.replace("parm v 0 1", "parm v 0"),
+        "line 9: found 1 parameters of a Bezier surface of degree 1; allowed: one for each end of a segment, two or more; \
+         and a degree of 1 or more",
+    );
+    obj_refused(
+        &plane.replace("parm v 0 1", "parm v 0 1 2"),
+        "line 7: found points: 4 points; allowed: 6, which is 2 along u times 3 along v",
+    );
+}
+
 #[test]
 fn what_is_wrong_with_an_obj_file_is_told_with_its_line() {
     assert_eq!(read_free_form(PLANE.as_bytes()).unwrap().len(), 1);
@@ -170,8 +197,9 @@ fn what_is_wrong_with_an_obj_file_is_told_with_its_line() {
         "line 7: found a surface without an end; allowed: `end` behind its `parm` statements",
     );
     obj_refused(
-        &with("cstype bspline", "cstype rat bezier"),
-        "line 5: found `rat bezier`; allowed: `cstype bspline` or `cstype rat bspline`",
+        &with("cstype bspline", "cstype rat cardinal"),
+        "line 5: found `rat cardinal`; allowed: `cstype bspline` or `cstype bezier`, with `rat` before the name where \
+         weights count",
     );
     obj_refused(&with("1 2 3 4", "1 2 3 5"), "line 7: found vertex `5`; allowed: 1 to 4, or -4 to -1");
     obj_refused(

@@ -394,3 +394,19 @@ fn a_message_stays_one_short_line_whatever_the_file_holds() {
         assert!(!message.contains('\n') && message.len() < 400, "{message}");
     }
 }
+
+#[test]
+fn a_file_of_another_kind_is_told_by_its_name() {
+    let said = |name: &str| Scene::parse("v 0 0 0\n", Path::new(name)).unwrap_err().to_string();
+    assert_eq!(
+        said("cup.obj"),
+        "cup.obj:1:3: not valid TOML: by its name it is a model, which a scene names: shape = { kind = \"mesh\", file = \
+         \"cup.obj\" }; `phantom3 check` says how a model is understood"
+    );
+    assert_eq!(
+        said("run.csv"),
+        "run.csv:1:3: not valid TOML: by its name it is a table, such as a hand (`--hand`) or a recording (`phantom3 \
+         replay`)"
+    );
+    assert!(said("cup.txt").contains("expected `=`"));
+}

@@ -132,6 +132,23 @@ pub(super) struct Buffer {
     pub(super) byte_length: usize,
 }
 
+/// What every version has.
+#[derive(Deserialize)]
+struct VersionOnly {
+    asset: Asset,
+}
+
+impl Asset {
+    fn check_version(&self) -> Result<(), ModelError> {
+        let version: String = self.version.escape_default().take(20).collect();
+        if version.starts_with("2.") {
+            return Ok(());
+        }
+        let allowed = "\"2.0\"; export the model as glTF 2.0 or GLB";
+        Err(wrong("asset.version".into(), format!("\"{version}\""), allowed))
+    }
+}
+
 impl Document {
     pub(super) fn parse(text: &[u8]) -> Result<Self, ModelError> {
         let objects = text.iter().filter(|&&byte| byte == b'{').count();
@@ -147,16 +164,21 @@ impl Document {
             let said = error.to_string();
             let said = said.split(" at line ").next().unwrap_or_default();
             let found: String = said.escape_default().take(LONGEST_WORDS).collect();
-            ModelError::Line { line: error.line(), found, allowed: "a text of glTF 2.0 (JSON)".into() }
+            let other = || ModelError::Line {
+                line: error.line(),
+                found,
+                allowed: "a text of glTF 2.0 (JSON)".into(),
+            };
+            // Version 1 names its lists by keys.
+            serde_json::from_slice(text)
+                .ok()
+                .and_then(|VersionOnly { asset }| asset.check_version().err())
+                .unwrap_or_else(other)
         })
     }
 
     pub(super) fn check(&self) -> Result<(), ModelError> {
-        let version: String = self.asset.version.escape_default().take(20).collect();
-        if !version.starts_with("2.") {
-            let allowed = "\"2.0\"; export the model as glTF 2.0 or GLB";
-            return Err(wrong("asset.version".into(), format!("\"{version}\""), allowed));
-        }
+        self.asset.check_version()?;
         match self.extensions_required.iter().find(|name| COMPRESSED.contains(&name.as_str())) {
             Some(name) => {
                 let allowed = "geometry that is not compressed: export it without, or unpack it (`gltf-transform copy`)";
