@@ -351,10 +351,14 @@ fn vertex<'l>(line: usize, words: impl Iterator<Item = &'l [u8]>) -> Result<Vect
     let mut coordinates = [0.0; 3];
     let mut count = 0;
     for word in words {
-        // What is behind them is not read, but for whether it is a number at all: some write colours that are not set as nan.
-        let is_number = match coordinates.get_mut(count) {
-            Some(coordinate) => number(word).map(|number| *coordinate = number).is_some(),
-            None => std::str::from_utf8(word).is_ok_and(|word| word.parse::<f64>().is_ok()),
+        // Some write colours that are not set as nan.
+        let is_number = match (number(word), coordinates.get_mut(count)) {
+            (Some(number), Some(coordinate)) => {
+                *coordinate = number;
+                true
+            }
+            (None, None) => word.eq_ignore_ascii_case(b"nan"),
+            (number, _) => number.is_some(),
         };
         if !is_number {
             return Err(ModelError::Line { line, found: shown(word), allowed: a_number(Some(word)) });

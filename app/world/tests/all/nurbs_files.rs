@@ -176,7 +176,7 @@ fn a_bezier_surface_is_the_b_spline_of_its_segments() {
     );
     obj_refused(
         &plane.replace("parm v 0 1", "parm v 0 1 2"),
-        "line 7: found points: 4 points; allowed: 6, which is 2 along u times 3 along v",
+        "line 7: found points: 4 points; allowed: 2 x 3 = 6, since that many go with the knots and degrees",
     );
 }
 
