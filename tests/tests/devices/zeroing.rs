@@ -205,15 +205,14 @@ fn a_zero_is_refused_while_the_arm_moves_and_changes_nothing() {
     stand.finish();
 }
 
-/// A device that its commander has not seen without its place stays not valid.
-#[test]
-fn a_zero_that_a_stopped_commander_does_not_see_is_told_of_at_once_and_not_called_done() {
-    let stand = Stand::start(Setup::new("real"));
+/// An application that is stopped, and a zero that it does not see: asked for, and not confirmed yet. A device that its
+/// commander has not seen without its place stays not valid.
+fn unseen(stand: &Stand) -> [Running; 2] {
     let app = stand.start_app();
     stand.wait_for_force();
     app.signal(rustix::process::Signal::STOP);
     wait_for("the force to ramp out", || {
-        let frame = frame(&stand);
+        let frame = frame(stand);
         frame.authority == 0.0 && frame.state != DriverState::Active as u64
     });
     let begun = std::time::Instant::now();
@@ -225,9 +224,28 @@ fn a_zero_that_a_stopped_commander_does_not_see_is_told_of_at_once_and_not_calle
     );
     // Half a second of rest comes first; it is looked on for five seconds after that.
     assert!(begun.elapsed() < Duration::from_secs(4), "{:?}", begun.elapsed());
+    [app, zeroing]
+}
+
+#[test]
+fn a_zero_that_a_stopped_commander_does_not_see_is_told_of_at_once_and_not_called_done() {
+    let stand = Stand::start(Setup::new("real"));
+    let [app, zeroing] = unseen(&stand);
     let end = zeroing.end();
     assert_eq!(end.status, Some(3), "{end:?}");
     assert!(end.err.contains("the process that holds the lease has not answered since"), "{end:?}");
+    app.kill();
+    stand.finish();
+}
+
+#[test]
+fn whoever_interrupts_a_zero_that_was_asked_for_is_not_told_that_nothing_was_zeroed() {
+    let stand = Stand::start(Setup::new("real"));
+    let [app, zeroing] = unseen(&stand);
+    zeroing.signal(rustix::process::Signal::INT);
+    let end = zeroing.end();
+    assert_eq!(end.status, Some(3), "{end:?}");
+    assert!(end.err.contains("interrupted; it was asked to zero by then, and may have"), "{end:?}");
     app.kill();
     stand.finish();
 }
