@@ -133,7 +133,10 @@ pub fn ask(socket: &Path, what: Asking) -> JoinHandle<()> {
         Asking::Leases => {
             let _ = client::end_lease(&socket, "life");
             for _ in 0..3 {
-                drop(client::command(&socket, "life"));
+                // It is in force once the service has seen that its memory is mapped.
+                let lease = client::command(&socket, "life");
+                std::thread::sleep(Duration::from_millis(60));
+                drop(lease);
                 std::thread::sleep(Duration::from_millis(30));
             }
         }

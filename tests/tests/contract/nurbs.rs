@@ -92,8 +92,8 @@ fn files_that_are_no_patches_are_refused_with_both_places() {
         ),
         (
             "p.obj",
-            "v 0 0 0\ncstype bezier\n".into(),
-            vec!["p.obj", "line 2: found `bezier`", "cstype rat bspline"],
+            "v 0 0 0\ncstype cardinal\n".into(),
+            vec!["p.obj", "line 2: found `cardinal`", "`cstype bspline` or `cstype bezier`"],
         ),
         ("p.step", String::new(), vec!["p.step", "neither TOML nor OBJ"]),
         // One patch three times: nobody could say what lies beyond its edges.

@@ -230,7 +230,7 @@ fn unseen(stand: &Stand) -> [Running; 2] {
 #[test]
 fn a_zero_that_a_stopped_commander_does_not_see_is_told_of_at_once_and_not_called_done() {
     let stand = Stand::start(Setup::new("real"));
-    let [app, zeroing] = unseen(&stand);
+    let [app, mut zeroing] = unseen(&stand);
     let end = zeroing.end();
     assert_eq!(end.status, Some(3), "{end:?}");
     assert!(end.err.contains("the process that holds the lease has not answered since"), "{end:?}");
@@ -241,7 +241,7 @@ fn a_zero_that_a_stopped_commander_does_not_see_is_told_of_at_once_and_not_calle
 #[test]
 fn whoever_interrupts_a_zero_that_was_asked_for_is_not_told_that_nothing_was_zeroed() {
     let stand = Stand::start(Setup::new("real"));
-    let [app, zeroing] = unseen(&stand);
+    let [app, mut zeroing] = unseen(&stand);
     zeroing.signal(rustix::process::Signal::INT);
     let end = zeroing.end();
     assert_eq!(end.status, Some(3), "{end:?}");
