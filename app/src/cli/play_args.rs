@@ -24,7 +24,7 @@ pub(super) struct PlayArgs {
     #[arg(long, value_name = "FILE")]
     events: Vec<PathBuf>,
     /// How long; default: until the window is closed
-    #[arg(long, value_name = "S", value_parser = parse_seconds, allow_negative_numbers = true)]
+    #[arg(long, alias = "duration", value_name = "S", value_parser = parse_seconds, allow_negative_numbers = true)]
     seconds: Option<f64>,
 }
 

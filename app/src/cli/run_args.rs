@@ -60,7 +60,7 @@ pub(super) struct RunArgs {
     #[command(flatten)]
     pictures: PictureArgs,
     /// How long; default: as long as the hand file, at least 1 s
-    #[arg(long, value_name = "S", value_parser = parse_seconds, allow_negative_numbers = true)]
+    #[arg(long, alias = "duration", value_name = "S", value_parser = parse_seconds, allow_negative_numbers = true)]
     seconds: Option<f64>,
     /// Ticks per second [default: 1000]
     #[arg(long, value_name = "HZ", value_parser = parse_rate, allow_negative_numbers = true)]

@@ -283,6 +283,7 @@ fn a_command_line_that_is_wrong_is_refused_with_what_was_found_and_what_is_allow
         (&["--rate-hz", "nan"], &["--rate-hz", "found nan", "10 to 20000 Hz"]),
         (&["--rate-hz"], &["--rate-hz", "a value is required"]),
         (&["--seconds", "0"], &["--seconds", "found 0", "more than 0"]),
+        (&["--duration", "0"], &["--seconds", "found 0", "more than 0"]),
         (&["--seconds", "-1"], &["--seconds", "found -1", "more than 0"]),
         (&["--seconds", "nan"], &["--seconds", "found nan", "at most 86400"]),
         (&["--seconds", "inf"], &["--seconds", "found inf", "at most 86400"]),
