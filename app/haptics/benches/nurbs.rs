@@ -10,7 +10,7 @@
 #[path = "../tests/common/mod.rs"]
 mod common;
 
-use common::{DT, entity, point_finger};
+use common::{DT, entity, pit, point_finger};
 use criterion::{Criterion, criterion_group, criterion_main};
 use haptics::nurbs::make;
 use haptics::{Friction, Nurbs, NurbsPatch, Surface};
@@ -112,24 +112,9 @@ fn nearest(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// A cone that opens upward, of as many flat triangles.
-fn pit(patches: u32) -> Vec<NurbsPatch> {
-    let rim = |k: u32| {
-        let angle = std::f64::consts::TAU * f64::from(k % patches) / f64::from(patches);
-        [0.05 * angle.cos(), 0.03, 0.05 * angle.sin(), 1.0]
-    };
-    let tip = [0.0, 0.0, 0.0, 1.0];
-    let patch = |k| NurbsPatch {
-        degree: [1, 1],
-        knots: [vec![0.0, 0.0, 1.0, 1.0], vec![0.0, 0.0, 1.0, 1.0]],
-        points: vec![rim(k + 1), rim(k), tip, tip],
-    };
-    (0..patches).map(patch).collect()
-}
-
 fn tip(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("tip");
-    for patches in [8, 64, 512] {
+    for patches in [8, 64, 512, 4096] {
         let entities = [entity(Arc::new(Nurbs::build(&pit(patches)).unwrap().0), Friction::None)];
         let mut finger = point_finger();
         finger.step(&entities, &(Vector3::y() * 0.01), DT);

@@ -19,6 +19,7 @@
 
 mod bezier;
 mod budget;
+mod chord;
 mod crossing;
 mod descend;
 mod edge_boxes;

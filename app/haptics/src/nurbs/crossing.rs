@@ -9,7 +9,7 @@
 //! taken a little too large, so that neighbouring cells leave no gap between them.
 //!
 //! Invariant: a path that crosses is found to cross, whatever the surface; the earliest crossing wins.
-//! Cost: only cells whose boxes the path meets are looked at, at most [`MAX_WINDOWS`] windows of them, no allocation.
+//! Cost: only cells whose boxes the path meets are looked at, with at most [`MAX_HALVINGS`] halvings; no allocation.
 
 use nalgebra::Vector3;
 
@@ -38,8 +38,8 @@ struct Path {
     slack_m: f64,
 }
 
-/// Bound on the windows of all cells that one path is tried against.
-pub(super) const MAX_WINDOWS: u32 = 4096;
+/// Bound on the halvings of all cells that one path is tried against.
+pub(super) const MAX_HALVINGS: u32 = 2048;
 /// More than halvings of a window can leave waiting: 2 x 52 halvings, one sibling each.
 const WINDOWS: usize = 112;
 /// A net whose points are this close to even, as a share of its size, has one crossing at most.
@@ -61,7 +61,7 @@ impl Nurbs {
         let slack_m = self.slack_m;
         let ahead = path_B / length_m;
         let mut best: Option<Crossed> = None;
-        let mut windows = MAX_WINDOWS;
+        let mut halvings = MAX_HALVINGS;
         let mut waiting = Waiting::new();
         waiting.push(0.0, 0);
         while let Some((_, index)) = waiting.pop() {
@@ -75,7 +75,7 @@ impl Nurbs {
                     let cell = &self.cells[cell as usize];
                     let aside = frame(&ahead, &cell.axis_B);
                     let path = Path { from_B: *from_B, ahead, length_m, aside, slack_m };
-                    self.cross_cell(cell, &path, &mut best, &mut windows, &counts);
+                    self.cross_cell(cell, &path, &mut best, &mut halvings, &counts);
                 }
                 Of::Nodes(second) => {
                     let key = |k: u32| self.nodes[k as usize].bounds.distance_squared(from_B);
@@ -94,7 +94,7 @@ impl Nurbs {
         cell: &Cell,
         path: &Path,
         best: &mut Option<Crossed>,
-        windows: &mut u32,
+        halvings: &mut u32,
         counts: &impl Fn(&Crossed) -> bool,
     ) {
         let patch = &self.patches[cell.patch as usize];
@@ -108,10 +108,6 @@ impl Nurbs {
         while count > 0 {
             count -= 1;
             let window = waiting[count];
-            if *windows == 0 {
-                return;
-            }
-            *windows -= 1;
             let mut net = seen;
             let net = &mut net[..size];
             restrict(net, degree, &window);
@@ -134,11 +130,13 @@ impl Nurbs {
                     self.take(foot, path, best, counts);
                     continue;
                 }
+                Look::Uneven if path.is_beside(net, degree) => continue,
                 Look::Uneven => {}
             }
-            if count + 2 > WINDOWS {
+            if count + 2 > WINDOWS || *halvings == 0 {
                 continue;
             }
+            *halvings -= 1;
             let along = longer(net, degree);
             let [a, b] = halves(&window, along);
             let flip = starts_nearer(net, degree, along);
@@ -248,6 +246,21 @@ impl Path {
             reach[5] |= z >= -slack;
         }
         reach == [true; 6]
+    }
+
+    /// Whether a line along one of its edges as seen separates the net from the path: a box around a sliver is wide.
+    fn is_beside(&self, net: &[Control], [p, q]: [usize; 2]) -> bool {
+        let point = |c: &Control| [c[0] / c[3], c[1] / c[3]];
+        let [a, b, c, d] = [0, p, q * (p + 1), net.len() - 1].map(|k| point(&net[k]));
+        [[a, b], [c, d], [a, c], [b, d]].iter().any(|[from, to]| {
+            let across = [from[1] - to[1], to[0] - from[0]];
+            let slack = 2.0 * self.slack_m * across[0].hypot(across[1]);
+            let off = |[x, y]: [f64; 2]| across[0] * x + across[1] * y;
+            let sides = net.iter().map(|control| off(point(control)));
+            let (low, high) =
+                sides.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+            low > slack || high < -slack
+        })
     }
 
     fn look(&self, net: &[Control], [p, q]: [usize; 2]) -> Look {

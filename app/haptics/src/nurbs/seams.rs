@@ -10,6 +10,7 @@
 use nalgebra::Vector3;
 
 use super::Nurbs;
+use super::chord::Chord;
 use super::edge_boxes::{Box3, EdgeBoxes};
 use super::error::NurbsError;
 use super::foot::Foot;
@@ -129,11 +130,13 @@ pub(super) fn join(nurbs: &mut Nurbs) -> Result<Joined, NurbsError> {
     let boxes: Vec<_> = edges.iter().map(|&edge| box_of(nurbs, edge)).collect();
     // Edges that agree to rounding first: in a thin plate others may be nearly as near.
     let boxes = EdgeBoxes::new(&boxes);
+    let chords: Vec<_> = edges.iter().map(|&edge| Chord::of(nurbs, edge)).collect();
     for slack in [EXACT, EQUAL].map(|share| share * nurbs.extent_m) {
         for i in 0..edges.len() {
             for j in boxes.later_near(i, slack) {
                 let is_new = |k: usize| slack < EQUAL * nurbs.extent_m || !is_covered(nurbs, edges[k]);
-                if is_new(i) && is_new(j) {
+                let may_meet = chords[i].may_hold(&chords[j], slack) || chords[j].may_hold(&chords[i], slack);
+                if may_meet && is_new(i) && is_new(j) {
                     link(nurbs, edges[i], edges[j], slack)?;
                 }
             }

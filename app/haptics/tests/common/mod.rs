@@ -108,3 +108,18 @@ impl Noise {
         Vector3::new(self.gaussian(), self.gaussian(), self.gaussian()) * sigma
     }
 }
+
+/// A cone that opens upward, of as many flat triangles, the fourth edge of each of which has shrunk to its tip.
+pub(crate) fn pit(patches: u32) -> Vec<haptics::NurbsPatch> {
+    let rim = |k: u32| {
+        let angle = std::f64::consts::TAU * f64::from(k % patches) / f64::from(patches);
+        [0.05 * angle.cos(), 0.03, 0.05 * angle.sin(), 1.0]
+    };
+    let tip = [0.0, 0.0, 0.0, 1.0];
+    let patch = |k| haptics::NurbsPatch {
+        degree: [1, 1],
+        knots: [vec![0.0, 0.0, 1.0, 1.0], vec![0.0, 0.0, 1.0, 1.0]],
+        points: vec![rim(k + 1), rim(k), tip, tip],
+    };
+    (0..patches).map(patch).collect()
+}

@@ -192,3 +192,20 @@ fn a_sheet_is_felt_from_both_sides_and_left_over_its_rim() {
         assert!(finger.contact(0).is_none(), "{trial}");
     }
 }
+
+#[test]
+fn a_pit_is_felt_however_many_patches_meet_in_its_tip() {
+    for patches in [8, 512, 4096] {
+        let entities = [entity(built(&pit(patches)), Friction::None)];
+        let mut noise = Noise(31);
+        for trial in 0..200 {
+            let aside = 10f64.powf(noise.between(-12.0, -2.5));
+            let aside = Vector3::new(noise.between(-1.0, 1.0), 0.0, noise.between(-1.0, 1.0)) * aside;
+            let from = Vector3::new(noise.between(-0.01, 0.01), 0.02, noise.between(-0.01, 0.01));
+            let mut finger = point_finger();
+            finger.step(&entities, &from, DT);
+            finger.step(&entities, &(aside - Vector3::y() * 2e-3), DT);
+            assert!(finger.contact(0).is_some(), "{patches}, {trial}: {from:?} {aside:?}");
+        }
+    }
+}
