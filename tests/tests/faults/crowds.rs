@@ -110,18 +110,20 @@ fn wait_for_state(stand: &Stand, is_fault: bool) {
 
 /// Fewer attempts are no flood (1/s): a machine that is busy with other tests makes several thousand of the ten.
 const LEAST_FLOOD_PER_S: f64 = 1000.0;
-/// Of a CPU, for one attempt (s): 22 us were measured, where ten thousand are made a second.
+/// Of a CPU, for one attempt (s): 22 to 36 us were measured, where ten thousand are made a second.
 const MOST_ATTEMPT_S: f64 = 75e-6;
 /// From being asked for to the frame that shows it: 3 ms on a quiet machine, and a flood and other tests share two CPUs.
 const USUAL_STOP: Duration = Duration::from_millis(500);
 /// A machine that is busy for seconds is busy for this, too.
 const SLOWEST_STOP: Duration = Duration::from_secs(10);
+/// On one that does nothing else 25 ms were measured, on a busy one 0.23 s.
+const SLOWEST_STOP_IDLE: Duration = Duration::from_secs(1);
 /// Of a CPU, for what the stops ask.
 const REST_SHARE: f64 = 0.1;
 
 /// Attempts to connect without an end, ten thousand a second where the machine has time for so many; whoever stops the motors
 /// meanwhile, over a connection or by datagram, is served.
-fn stops_under_a_flood(duration: Duration, least_per_s: f64) {
+fn stops_under_a_flood(duration: Duration, least_per_s: f64, slowest_stop: Duration) {
     let stand = Stand::start(Setup::new("real"));
     let (cpu, ticks) = (cpu_of_service(stand.driver.id()), stand.view().latest_tick().unwrap_or(0));
     let overruns = || stand.view().counters.overruns.load(std::sync::atomic::Ordering::Relaxed);
@@ -160,7 +162,7 @@ fn stops_under_a_flood(duration: Duration, least_per_s: f64) {
     );
     println!("{told}");
     assert!(attempts > least_per_s, "{told}");
-    assert!(median < USUAL_STOP && slowest < SLOWEST_STOP, "{told}");
+    assert!(median < USUAL_STOP && slowest < slowest_stop, "{told}");
     // A service that did not sleep between attempts would take all of a CPU.
     assert!(share < REST_SHARE + attempts * MOST_ATTEMPT_S, "{told}");
     stand.finish();
@@ -168,12 +170,12 @@ fn stops_under_a_flood(duration: Duration, least_per_s: f64) {
 
 #[test]
 fn stops_are_served_under_a_flood_of_connections() {
-    stops_under_a_flood(Duration::from_secs(3), LEAST_FLOOD_PER_S);
+    stops_under_a_flood(Duration::from_secs(3), LEAST_FLOOD_PER_S, SLOWEST_STOP);
 }
 
 #[test]
 #[ignore = "a minute: cargo test -p system-tests --test faults flood -- --ignored --nocapture"]
 fn stops_are_served_under_a_flood_of_connections_for_a_minute() {
-    // Of ten thousand, on a machine that does nothing else; and a crowd of them waits while others are served.
-    stops_under_a_flood(Duration::from_secs(60), 9_500.0);
+    // Of ten thousand, on a machine that does nothing else.
+    stops_under_a_flood(Duration::from_secs(60), 9_500.0, SLOWEST_STOP_IDLE);
 }
