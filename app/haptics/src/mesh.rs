@@ -25,6 +25,8 @@
 mod build;
 mod bvh;
 mod cone;
+mod crossed;
+mod crossing;
 mod crowded;
 pub(crate) mod draw;
 mod error;
@@ -118,7 +120,9 @@ impl Mesh {
     /// The same, felt from both sides though it may be closed: a room, felt by whoever is in it.
     #[must_use]
     pub fn into_sheet(mut self) -> Self {
-        self.faces.iter_mut().for_each(|face| face.sides = Sides::Sheet);
+        for face in &mut self.faces {
+            (face.sides, face.is_crossed) = (Sides::Sheet, false);
+        }
         Self { sides: Sides::Sheet, has_inside: false, ..self }
     }
 

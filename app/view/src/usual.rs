@@ -3,7 +3,7 @@
 use crate::stage::Thing;
 use haptics::Entity;
 use nalgebra::{Isometry3, Point3, Vector3};
-use world::{LightKind, Scene, SceneCamera, SceneLight, ShapeSpec, VisualSpec};
+use world::{LightKind, Scene, SceneCamera, SceneEntity, SceneLight, ShapeSpec, VisualSpec};
 
 /// Not nearer than what is so large needs (m).
 const LEAST_REACH_M: f64 = 0.08;
@@ -37,7 +37,11 @@ pub(crate) fn lights() -> Vec<SceneLight> {
 
 /// Tells things apart where a scene says no colour at all: planes stay as they are.
 pub(crate) fn colour(scene: &Scene, things: &mut [Thing]) {
-    if things.iter().any(|thing| thing.colour != VisualSpec::DEFAULT_COLOUR) {
+    let says_one = |entity: &SceneEntity| {
+        let of_faces = entity.faces.iter().any(|faces| faces.colour.is_some());
+        of_faces || entity.visuals.iter().any(|visual| visual.colour.is_some())
+    };
+    if scene.entities.iter().any(says_one) {
         return;
     }
     for thing in things.iter_mut().filter(|thing| has_end(scene, thing)) {

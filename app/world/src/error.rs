@@ -303,6 +303,16 @@ pub enum SceneError {
         /// How many there may be.
         limit: usize,
     },
+    /// A file of another kind.
+    #[error("{at}: found a file of {found}, no scene; {advice}")]
+    NotAScene {
+        /// Where its first key stands that says so.
+        at: Box<Location>,
+        /// What it is a file of.
+        found: &'static str,
+        /// What it is for.
+        advice: &'static str,
+    },
     /// A scene nobody can touch.
     #[error("{}: no [[finger]]; allowed: 1 to {limit} of them", file.display())]
     NoFinger {
@@ -318,6 +328,7 @@ impl SceneError {
     pub fn location(&self) -> Option<&Location> {
         match self {
             Self::UnknownKey { at, .. }
+            | Self::NotAScene { at, .. }
             | Self::KeyNotAvailable { at, .. }
             | Self::UnknownKind { at, .. }
             | Self::KindNotAvailable { at, .. }

@@ -74,6 +74,18 @@ pub enum ModelError {
     /// Neither its name nor its content says what it is.
     #[error("of no kind that is read, by its name and by its beginning; allowed: {KINDS} files")]
     UnknownFormat,
+    /// What is in it is of another kind than its name says.
+    #[error(
+        "found {found} in a file whose name says {named}; allowed: a name that ends in .{ending} for that"
+    )]
+    Misnamed {
+        /// Kind by its content.
+        found: &'static str,
+        /// Kind by its name.
+        named: &'static str,
+        /// Of the names of what was found.
+        ending: &'static str,
+    },
     /// A kind of model file that is not read.
     #[error("found a file of {kind}, which is not read; {advice}")]
     Foreign {
@@ -159,6 +171,18 @@ impl Format {
         named.map(|(_, format)| *format).or_else(|| Self::by_content(bytes))
     }
 
+    /// And the ending of its files' names.
+    fn name(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Obj => ("OBJ", "obj"),
+            Self::Stl => ("STL", "stl"),
+            Self::Ply => ("PLY", "ply"),
+            Self::Gltf => ("glTF", "gltf or .glb"),
+            Self::Ase => ("ASE", "ase"),
+            Self::ThreeDs => ("3DS", "3ds"),
+        }
+    }
+
     fn by_content(bytes: &[u8]) -> Option<Self> {
         let found = LOOKS.iter().find(|(looks_like_it, _)| looks_like_it(bytes));
         found.map(|(_, format)| *format)
@@ -236,10 +260,22 @@ pub fn read_names(file: &Path, bytes: &[u8]) -> Result<Option<FaceNames>, ModelE
 }
 
 fn format(file: &Path, bytes: &[u8]) -> Result<Format, ModelError> {
-    Format::of(file, bytes).ok_or_else(|| match foreign::foreign(file, bytes) {
+    let format = Format::of(file, bytes).ok_or_else(|| match foreign::foreign(file, bytes) {
         Some((kind, advice)) => ModelError::Foreign { kind, advice },
         None => ModelError::UnknownFormat,
-    })
+    })?;
+    if input_file::is_utf16(bytes) && !matches!(format, Format::Stl | Format::ThreeDs) {
+        let cause = io::Error::new(io::ErrorKind::InvalidData, input_file::UTF16);
+        return Err(ModelError::Unreadable(cause));
+    }
+    let looks_like_it = LOOKS.iter().any(|(looks, of)| *of == format && looks(bytes));
+    match Format::by_content(bytes) {
+        Some(other) if !looks_like_it => {
+            let [(found, ending), (named, _)] = [other, format].map(Format::name);
+            Err(ModelError::Misnamed { found, named, ending })
+        }
+        _ => Ok(format),
+    }
 }
 
 /// The triangles in `bytes` and the texture coordinates of their corners.

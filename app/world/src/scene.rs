@@ -113,6 +113,10 @@ impl Scene {
     fn read<'d>(tables: &[Table<'d>], problems: &mut Problems) -> Option<Self> {
         let (table, included) = tables.split_first()?;
         let file = table.document().file();
+        if let Some(other) = of_another_kind(table) {
+            problems.note(other);
+            return None;
+        }
         problems.keys(table, &KEYS);
         included.iter().for_each(|table| refuse_what_is_the_scenes(table, problems));
         let name = problems.keep(read_name(table, file));
@@ -140,6 +144,27 @@ impl Scene {
             included: Vec::new(),
         })
     }
+}
+
+/// What a file of these keys, none of which a scene has, is of, and what it is for.
+const OTHER_KINDS: [(&str, &str, &str); 4] = [
+    ("patch", "rational patches", "a scene names it: `shape = { kind = \"nurbs\", file = \"...\" }`"),
+    (
+        "device",
+        "devices",
+        "a layout belongs to `phantom3 run SCENE --layout FILE`, a driver's configuration to `io-driver run --config FILE`",
+    ),
+    ("window", "settings", "it belongs to `phantom3 play SCENE --settings FILE`"),
+    ("keys", "keys", "the settings name it: `[input] bindings = \"FILE\"`"),
+];
+
+fn of_another_kind(table: &Table<'_>) -> Option<SceneError> {
+    if table.own_keys().any(|key| KEYS.available.contains(&key)) {
+        return None;
+    }
+    let of_another = |key: &str| OTHER_KINDS.iter().find(|(other, ..)| *other == key);
+    let (key, found, advice) = table.own_keys().find_map(of_another)?;
+    Some(SceneError::NotAScene { at: table.at(key), found, advice })
 }
 
 /// How a run goes is for one file to say.

@@ -95,7 +95,8 @@ struct Files<'s> {
 
 impl<'s> Seen<'s> {
     fn add(&mut self, entity: &'s SceneEntity, visual: &'s VisualSpec, files: &mut Files<'s>) {
-        let VisualSpec { pose, colour, casts_shadow, .. } = *visual;
+        let VisualSpec { pose, casts_shadow, .. } = *visual;
+        let colour = visual.colour.unwrap_or(VisualSpec::DEFAULT_COLOUR);
         let mesh = match visual.shape.as_ref().unwrap_or(&entity.shape) {
             ShapeSpec::Mesh(mesh) => mesh,
             shape => {

@@ -24,15 +24,16 @@ pub struct VisualSpec {
     pub shape: Option<ShapeSpec>,
     /// Its frame in the entity's; default the same.
     pub pose: Isometry3<f64>,
-    /// Red, green, blue and opacity, 0 to 1; default [`VisualSpec::DEFAULT_COLOUR`].
-    pub colour: [f64; 4],
+    /// Red, green, blue and opacity, 0 to 1; `None`: nothing was said, and it is as [`VisualSpec::DEFAULT_COLOUR`] unless
+    /// things are to be told apart.
+    pub colour: Option<[f64; 4]>,
     /// Default yes.
     pub casts_shadow: bool,
 }
 
 impl Default for VisualSpec {
     fn default() -> Self {
-        Self { shape: None, pose: Isometry3::identity(), colour: Self::DEFAULT_COLOUR, casts_shadow: true }
+        Self { shape: None, pose: Isometry3::identity(), colour: None, casts_shadow: true }
     }
 }
 
@@ -55,11 +56,10 @@ impl VisualSpec {
         let table = value.table(ALLOWED)?;
         table.check_keys(&KEYS)?;
         let shape = table.get("shape").map(|_| ShapeSpec::read(&table)).transpose()?;
-        let colour = table.get("colour").map(|value| read_colour(&value)).transpose()?;
         Ok(Self {
             shape,
             pose: read_pose(&table)?,
-            colour: colour.unwrap_or(Self::DEFAULT_COLOUR),
+            colour: table.get("colour").map(|value| read_colour(&value)).transpose()?,
             casts_shadow: table.get("casts_shadow").map_or(Ok(true), |value| value.truth())?,
         })
     }

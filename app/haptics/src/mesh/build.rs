@@ -4,7 +4,7 @@
 //! order; a walk over the mesh needs none of these.
 //!
 //! Model: validate, repair ([`repair`]), order in space ([`order`]), link ([`topology`]), close cracks ([`junction`]), wind
-//! ([`winding`]), close holes of what is nearly closed ([`hole`]). What was done is reported; what has no meaning is refused with
+//! ([`winding`]), close holes of what is nearly closed ([`hole`]), mark what passes through itself ([`crossed`](super::crossed)). What was done is reported; what has no meaning is refused with
 //! the first offender.
 //!
 //! Invariants of the result: every face has an area; links are mutual; the same geometry gives the same mesh,
@@ -89,10 +89,10 @@ impl Mesh {
         let vertices = vertices.into_boxed_slice();
         let bvh = Bvh::build(&faces, &vertices);
         let identity = BUILT.fetch_add(1, Ordering::Relaxed);
-        Ok((
-            Self { faces, vertices, bvh, sides, has_inside, extent_m, identity, uv: None, labels: None },
-            report,
-        ))
+        let mut mesh =
+            Self { faces, vertices, bvh, sides, has_inside, extent_m, identity, uv: None, labels: None };
+        report.crossed = mesh.mark_crossed();
+        Ok((mesh, report))
     }
 }
 
@@ -114,7 +114,7 @@ fn face(triangle: &Triangle, links: &[Link; 3], sides: Sides, vertices: &[Vector
     let normal_B = area_vector(&corners).normalize();
     let [a, b, c] = corners.map(|corner| normal_B.dot(&corner));
     let offset_m = 0.5 * (a.min(b).min(c) + a.max(b).max(c));
-    Face { normal_B, offset_m, vertices: triangle.corners, links: *links, sides }
+    Face { normal_B, offset_m, vertices: triangle.corners, links: *links, sides, is_crossed: false }
 }
 
 fn report_edges(triangles: &[Triangle], links: &[[Link; 3]], report: &mut MeshReport) {

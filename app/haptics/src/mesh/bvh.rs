@@ -23,6 +23,7 @@ mod closest;
 mod inside;
 mod nearest;
 mod outlying;
+mod pairs;
 mod ray;
 mod segment;
 mod stack;

@@ -20,6 +20,8 @@ pub struct Face {
     pub links: [Link; 3],
     /// From where its part of the mesh is felt.
     pub sides: Sides,
+    /// Whether other faces of closed parts pass through it, of which no link tells.
+    pub is_crossed: bool,
 }
 
 /// The neighbour across an edge: which face, which of its edges is the shared one, and how it is wound.

@@ -7,7 +7,8 @@
 //! Model: seen from an edge or a vertex the surface is a wedge or a cone without end. Its point nearest to the HIP
 //! tells where to go: on a face, onto that face; on an edge, along it; at the tip, nowhere. And it tells, by the side of
 //! the surface that the HIP has there, whether the HIP is outside. For a convex edge that is "the nearest face plane
-//! wins" and "free when in front of either", for a concave one "free when in front of both".
+//! wins" and "free when in front of either", for a concave one "free when in front of both". Two faces that pass through each
+//! other are a concave edge to whoever is outside of both.
 //!
 //! Frames and signs: object frame B; depths are positive behind a face.
 //! Invariant: free needs a HIP that is in front of a face; in doubt the god-object stays where it is.
@@ -26,6 +27,7 @@ pub(crate) fn facing(mesh: &Mesh, place: Place, hip_B: Vector3<f64>) -> Option<O
         On::Face(side) => (!is_in_front(mesh, Facet::of(mesh, side).depth_m(&hip_B))).then_some(place.on),
         On::Edge(side, edge) => on_edge(mesh, side, edge, place.point_B, hip_B),
         On::Vertex(side, corner) => at_vertex(mesh, side, corner, place.point_B, hip_B),
+        On::Crossing(side, other) => at_crossing(mesh, [side, other], place.point_B, hip_B),
     }
 }
 
@@ -62,6 +64,24 @@ fn on_edge(mesh: &Mesh, side: Side, edge: usize, point_B: Vector3<f64>, hip_B: V
         // The lower index among equals, so that the result does not depend on where one came from.
         (true, true) if (here_depth_m, side.face) <= (over_depth_m, over.side.face) => Some(On::Face(side)),
         (true, true) => Some(On::Face(over.side)),
+    }
+}
+
+/// Where two faces cross, seen from outside of both, they are as two at a concave edge: what is free is convex, and one of its
+/// points is nearest.
+#[inline(never)]
+fn at_crossing(mesh: &Mesh, sides: [Side; 2], point_B: Vector3<f64>, hip_B: Vector3<f64>) -> Option<On> {
+    let facets = sides.map(|side| Facet::of(mesh, side));
+    let is_held = facets.map(|facet| !is_in_front(mesh, facet.depth_m(&hip_B)));
+    let [a_B, b_B] = facets.map(|facet| facet.normal_B);
+    let cosine = a_B.dot(&b_B);
+    // Along each face away from the other.
+    let wants = [b_B - a_B * cosine, a_B - b_B * cosine].map(|away_B| away_B.dot(&(hip_B - point_B)) > 0.0);
+    match [0, 1].map(|i| wants[i] && is_held[i]) {
+        _ if is_held == [false; 2] => None,
+        [true, _] => Some(On::Face(sides[0])),
+        [false, true] => Some(On::Face(sides[1])),
+        [false, false] => Some(On::Crossing(sides[0], sides[1])),
     }
 }
 

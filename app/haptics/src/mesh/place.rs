@@ -24,6 +24,8 @@ pub(crate) enum On {
     Edge(Side, usize),
     /// The corner of this number of the face.
     Vertex(Side, usize),
+    /// Where two faces pass through each other.
+    Crossing(Side, Side),
 }
 
 /// One of the two sides of a face: the back of a sheet can be felt, too.
@@ -72,16 +74,24 @@ impl Place {
 
     /// A face that it lies on.
     pub(crate) fn face(&self) -> u32 {
-        let (On::Face(side) | On::Edge(side, _) | On::Vertex(side, _)) = self.on;
-        side.face
+        self.on.side().face
     }
 
     pub(crate) fn feature(&self) -> Feature {
         match self.on {
             On::Face(_) => Feature::Face,
-            On::Edge(..) => Feature::Edge,
+            On::Edge(..) | On::Crossing(..) => Feature::Edge,
             On::Vertex(..) => Feature::Vertex,
         }
+    }
+}
+
+impl On {
+    /// The face by which it is told, from the side of the finger.
+    #[inline(always)]
+    pub(crate) fn side(self) -> Side {
+        let (Self::Face(side) | Self::Edge(side, _) | Self::Vertex(side, _) | Self::Crossing(side, _)) = self;
+        side
     }
 }
 

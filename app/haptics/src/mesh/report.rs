@@ -103,6 +103,8 @@ pub struct MeshReport {
     pub boundary_edges: Finding,
     /// Edges across which inside and outside change places: the mesh cannot be oriented.
     pub turned_edges: Finding,
+    /// Faces of the mesh that others pass through.
+    pub crossed: usize,
     /// Rims of the mesh that are whole loops, with their sizes.
     pub open_holes: OpenHoles,
 }
@@ -168,6 +170,14 @@ impl fmt::Display for MeshReport {
             let Some(first) = first else { continue };
             let of = if one == "vertex" { "vertex" } else { "face" };
             write!(f, "\n{count} {} {what} (first: {of} {first})", plural(count, one, many))?;
+        }
+        if self.crossed > 0 {
+            let faces = plural(self.crossed, "face", "faces");
+            write!(
+                f,
+                "\n{} {faces} crossed by others: felt as far as they are outside of these",
+                self.crossed
+            )?;
         }
         if self.open_holes.count > 0 {
             write!(f, "\n{}", self.open_holes)?;

@@ -8,6 +8,9 @@
 //! edge, S being the foot of the HIP's perpendicular on it. A HIP in front of the surface lifts the god-object off: it
 //! flies straight to the HIP, and touches again where that way meets the mesh.
 //!
+//! Faces that pass through one another are no neighbours: on a face that others cross the way is tried against these
+//! ([`crossing`](super::crossing)).
+//!
 //! Friction on a concave edge: one cone, about the direction of what both faces bear (Melder ch. 4.2.5). This is Coulomb's law
 //! in a groove whose bottom is round, however little, which a point touches in one place. Cones of both faces together could
 //! always bear what is felt. Along the edge they could bear more, in a groove of the angle `a` up to `1 / sin(a / 2)` times as
@@ -19,13 +22,15 @@
 //! Invariants: the god-object is on the mesh. A frictionless walk never lengthens the spring, hence ends at a local
 //! minimum of the distance to the HIP.
 //! Cost: two to four face records a tick on small triangles; bounded by [`MAX_FEATURE_CHANGES`], at which the
-//! god-object waits where it is and goes on in the next tick. Dear are single ticks in which a god-object that was held in
+//! god-object waits where it is and goes on in the next tick. On a face that others cross, a question to the hierarchy of
+//! boxes for each piece, at most [`MAX_QUESTIONS`]. Dear are single ticks in which a god-object that was held in
 //! a dale comes over the saddle, and is drawn over centimetres to where the HIP has got to meanwhile: 3 to 10 us for 50 to
 //! 90 faces of a million and a flight; 20 us more for a vertex of 1000 faces, and 60 for a flight that starts at one.
 
 use nalgebra::Vector3;
 
 use super::Mesh;
+use super::crossing::{follow_crossing, meet_others, plane_at_crossing};
 use super::draw::{Draw, Drawn};
 use super::facing::facing;
 use super::place::{Facet, On, Place, Side, next};
@@ -39,6 +44,9 @@ pub const MAX_FEATURE_CHANGES: u32 = 256;
 
 /// Bound on the flights of a god-object within one tick: each asks the hierarchy of boxes.
 const MAX_FLIGHTS: u32 = 8;
+
+/// Bound on the pieces that others cross: each asks the hierarchy of boxes.
+const MAX_QUESTIONS: u32 = 64;
 
 /// Where a walk ended.
 #[derive(Debug, Clone, Copy)]
@@ -62,6 +70,7 @@ pub(crate) fn stand(mesh: &Mesh, mut place: Place, input: &ConeInput) -> Option<
                 On::Face(side) => plane_of_face(mesh, side),
                 On::Edge(side, edge) => plane_on_edge(mesh, side, edge, hip_B),
                 On::Vertex(..) => plane_at_vertex(place.point_B, hip_B),
+                On::Crossing(side, other) => plane_at_crossing(mesh, [side, other], &place.point_B, &hip_B),
             };
             place.on = on;
             return Some((place, TangentView::new(&place.point_B, normal_B, offset_m, input)));
@@ -83,17 +92,28 @@ pub(crate) fn walk(
     input: &ConeInput,
 ) -> Option<Walked> {
     let start_B = place.point_B;
-    let mut changes = 0;
+    let (mut changes, mut questions, mut turns) = (0, 0, 0);
     loop {
         let Drawn { target_B, is_at_rest, tangential_B } = draw.drawn(&view, &(start_B - place.point_B));
-        if is_at_rest || changes == MAX_FEATURE_CHANGES || matches!(place.on, On::Vertex(..)) {
+        let is_late = changes == MAX_FEATURE_CHANGES || questions == MAX_QUESTIONS;
+        if is_at_rest || is_late || matches!(place.on, On::Vertex(..)) {
             return Some(Walked { place, view, tangential_B, changes });
         }
         changes += 1;
-        let reached = match place.on {
+        let mut reached = match place.on {
             On::Face(side) => cross_face(mesh, side, place.point_B, target_B),
             On::Edge(side, edge) | On::Vertex(side, edge) => follow_edge(mesh, side, edge, target_B),
+            On::Crossing(side, other) => follow_crossing(mesh, [side, other], place.point_B, target_B),
         };
+        if mesh.faces[place.face() as usize].is_crossed {
+            questions += 1;
+            reached = meet_others(mesh, place, reached, &input.hip_B);
+            let way_m = (reached.place().point_B - place.point_B).amax();
+            turns = if way_m > RIM * mesh.extent_m { 0 } else { turns + 1 };
+            if turns == MAX_TURNS {
+                return Some(rest(place, &(start_B - place.point_B), changes, draw, input));
+            }
+        }
         match reached {
             Reached::Target(place) => return Some(Walked { place, view, tangential_B, changes }),
             Reached::Rim(place_there) => (place, view) = stand(mesh, place_there, input)?,
@@ -101,16 +121,32 @@ pub(crate) fn walk(
     }
 }
 
+/// Where it is held as at a vertex.
+#[cold]
+fn rest(place: Place, back_B: &Vector3<f64>, changes: u32, draw: &impl Draw, input: &ConeInput) -> Walked {
+    let (normal_B, offset_m) = plane_at_vertex(place.point_B, input.hip_B);
+    let view = TangentView::new(&place.point_B, normal_B, offset_m, input);
+    let Drawn { tangential_B, .. } = draw.drawn(&view, back_B);
+    Walked { place, view, tangential_B, changes }
+}
+
 /// How far a way led.
-enum Reached {
+pub(super) enum Reached {
     Target(Place),
-    /// Only to an edge or a vertex.
+    /// Only to an edge or a vertex, or to a face that crosses this one.
     Rim(Place),
+}
+
+impl Reached {
+    pub(super) fn place(&self) -> &Place {
+        let (Self::Target(place) | Self::Rim(place)) = self;
+        place
+    }
 }
 
 /// Goes straight through a face: to the target or to the first edge or vertex on the way.
 #[inline(always)]
-fn cross_face(mesh: &Mesh, side: Side, from_B: Vector3<f64>, target_B: Vector3<f64>) -> Reached {
+pub(super) fn cross_face(mesh: &Mesh, side: Side, from_B: Vector3<f64>, target_B: Vector3<f64>) -> Reached {
     let facet = Facet::of(mesh, side);
     let [a_B, b_B, c_B] = facet.corners_B(mesh);
     let met = |start_B, end_B| share_until_met(&facet, start_B, end_B, &from_B, &target_B);
@@ -173,7 +209,7 @@ fn on_edge(mesh: &Mesh, side: Side, edge: usize, share: f64) -> Place {
 
 /// The edge or vertex that a place on a face happens to lie on, where a neighbour may hold what the face lets go.
 #[cold]
-fn rim(mesh: &Mesh, place: Place) -> Option<Place> {
+pub(super) fn rim(mesh: &Mesh, place: Place) -> Option<Place> {
     let On::Face(side) = place.on else { return None };
     let facet = Facet::of(mesh, side);
     let near_m = |edge_m: f64| (SNAP * edge_m).max(RIM * mesh.extent_m());
@@ -197,7 +233,7 @@ fn rim(mesh: &Mesh, place: Place) -> Option<Place> {
 /// face, only that face is here: on its rim it would have been taken for one on the edge.
 #[cold]
 fn fly(mesh: &Mesh, place: Place, hip_B: Vector3<f64>) -> Option<Place> {
-    let (On::Face(side) | On::Edge(side, _) | On::Vertex(side, _)) = place.on;
+    let side = place.on.side();
     let facet = Facet::of(mesh, side);
     let vertices_of = |face: u32| mesh.faces[face as usize].vertices;
     let hit = match place.on {
@@ -210,6 +246,9 @@ fn fly(mesh: &Mesh, place: Place, hip_B: Vector3<f64>) -> Option<Place> {
         On::Vertex(_, corner) => {
             let tip = facet.face.vertices[corner];
             mesh.first_hit_of_others(&place.point_B, &hip_B, |face| vertices_of(face).contains(&tip))
+        }
+        On::Crossing(_, other) => {
+            mesh.first_hit_of_others(&place.point_B, &hip_B, |face| face == side.face || face == other.face)
         }
     };
     hit.map(|hit| Place::hit(&hit))
@@ -243,7 +282,7 @@ fn plane_at_vertex(vertex_B: Vector3<f64>, hip_B: Vector3<f64>) -> (Vector3<f64>
 }
 
 /// As seen from the point of an edge or vertex nearest to the HIP; `otherwise_B` is the normal where both coincide.
-fn plane_through(
+pub(super) fn plane_through(
     nearest_B: &Vector3<f64>,
     hip_B: &Vector3<f64>,
     otherwise_B: &Vector3<f64>,
@@ -254,6 +293,8 @@ fn plane_through(
     (normal_B, normal_B.dot(hip_B) + depth_m)
 }
 
+/// Steps without a way between faces that cross: three of them hold, in pairs, and each pair may be left over an edge of each.
+const MAX_TURNS: u32 = 12;
 /// A way that leaves an edge by less than this per length runs along it: its crossing would be rounding.
 const PARALLEL: f64 = 1e-10;
 /// Nearer to the end of an edge than this share of it is at the vertex.

@@ -52,16 +52,18 @@ fn begin_on_random_trees(seeds: std::ops::Range<u64>, starts: usize) {
             for radius_m in [0.0, 1e-3, 5e-3, 0.02] {
                 for start in 0..starts {
                     let mut hip = Vector3::from_fn(|_, _| noise.between(-0.03, 0.03));
-                    let mut explained_m = overlap_m(&*contains, &hip, &few, radius_m);
                     let start_at = hip;
                     let mut finger = finger(radius_m);
-                    let mut way_m = 0.0;
+                    let (mut explained_m, mut way_m) = (0.0, 0.0);
                     for tick in 0..12 {
                         let force_n = finger.step(from_ref(&entity), &hip, DT).force_on_user_W.norm();
                         // Rays miss the nearest place by a few hundredths of its distance.
                         let most_n = |explained_m| K * (1.05 * explained_m + 2e-4 + way_m);
-                        if force_n > most_n(explained_m) {
-                            explained_m = overlap_m(&*contains, &start_at, &many, radius_m);
+                        // Looked for where it has to explain something: with few rays, then with many.
+                        for rays in [&few, &many] {
+                            if force_n > most_n(explained_m) {
+                                explained_m = overlap_m(&*contains, &start_at, rays, radius_m);
+                            }
                         }
                         let most_n = most_n(explained_m);
                         assert!(
@@ -83,10 +85,11 @@ fn no_finger_that_begins_inside_a_tree_of_solids_is_flung() {
     begin_on_random_trees(1..13, 12);
 }
 
+/// Ten million starts.
 #[test]
-#[ignore = "half an hour"]
-fn no_finger_that_begins_anywhere_about_ten_thousand_trees_is_flung() {
-    begin_on_random_trees(13..10_013, 12);
+#[ignore = "HOURS"]
+fn no_finger_that_begins_anywhere_about_twenty_thousand_trees_is_flung() {
+    begin_on_random_trees(13..20_013, 63);
 }
 
 const STEP_M: f64 = 2e-4;

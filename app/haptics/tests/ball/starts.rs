@@ -24,12 +24,13 @@ fn overlap_m(mesh: &Mesh, hip: &Vector3<f64>, radius_m: f64) -> f64 {
     ways.iter().find(beyond).map_or(f64::INFINITY, Vector3::norm) + radius_m
 }
 
-/// A point near a face, most faces being small.
-fn near_a_face(mesh: &Mesh, noise: &mut Noise, within_m: f64) -> Vector3<f64> {
+/// A point of a face, most faces being small, and one near it.
+fn near_a_face(mesh: &Mesh, noise: &mut Noise, within_m: f64) -> [Vector3<f64>; 2] {
     let face = (noise.uniform() * mesh.faces().len() as f64) as usize;
     let [a, b, c] = corners(mesh, face);
     let (u, v) = (noise.uniform().sqrt(), noise.uniform());
-    a * (1.0 - u) + b * (u * (1.0 - v)) + c * (u * v) + unit_vector(noise) * (within_m * noise.uniform())
+    let on_it = a * (1.0 - u) + b * (u * (1.0 - v)) + c * (u * v);
+    [on_it, on_it + unit_vector(noise) * (within_m * noise.uniform())]
 }
 
 /// Starts all over a mesh, and a few steps of the hand after each.
@@ -37,16 +38,23 @@ fn begin_all_over(name: &str, mesh: &Arc<Mesh>, friction: Friction, radius_m: f6
     let entity = touchable(mesh, friction);
     let mut noise = Noise(seed);
     for start in 0..starts {
-        let mut hip = near_a_face(mesh, &mut noise, 0.8e-3);
-        let overlap_m = overlap_m(mesh, &hip, radius_m);
+        let [on_it, mut hip] = near_a_face(mesh, &mut noise, 0.8e-3);
+        let start_at = hip;
+        // At least; what it is in truth is looked for where it has to explain more.
+        let mut explained_m = (radius_m - (hip - on_it).norm()).max(0.0);
+        let mut is_looked_for = false;
         let mut finger = finger(radius_m);
         let mut way_m = 0.0;
         for tick in 0..12 {
             let force_n = finger.step(from_ref(&entity), &hip, DT).force_on_user_W.norm();
-            let most_n = K * (overlap_m + way_m);
             // What a ball takes for touching, many times over.
+            let most_n = |overlap_m| K * (overlap_m + way_m) * (1.0 + 1e-9) + 1e-6;
+            if force_n > most_n(explained_m) && !is_looked_for {
+                (explained_m, is_looked_for) = (overlap_m(mesh, &start_at, radius_m), true);
+            }
+            let most_n = most_n(explained_m);
             assert!(
-                force_n <= most_n * (1.0 + 1e-9) + 1e-6,
+                force_n <= most_n,
                 "{name}, {radius_m} m, start {start}, tick {tick} at {hip:?}: {force_n} N, explained {most_n} N"
             );
             let step = unit_vector(&mut noise) * (2e-4 * noise.uniform());
@@ -61,7 +69,7 @@ fn begin_on_ugly_meshes(seeds: std::ops::Range<u64>, starts: usize) {
         for (name, soup) in ugly::all(seed) {
             let mesh = Arc::new(Mesh::build(soup).unwrap().0);
             for friction in [Friction::None, stiction()] {
-                for radius_m in [2e-4, 1e-3, 5e-3, 0.02] {
+                for radius_m in [0.0, 2e-4, 1e-3, 5e-3, 0.02] {
                     begin_all_over(name, &mesh, friction.clone(), radius_m, starts, seed);
                 }
             }
@@ -74,9 +82,9 @@ fn no_ball_that_begins_overlapping_is_flung() {
     begin_on_ugly_meshes(1..3, 40);
 }
 
-/// A million starts; `cargo test --release -p haptics --test ball -- --ignored begins` takes half an hour.
+/// Ten million starts.
 #[test]
-#[ignore = "half an hour"]
-fn no_ball_that_begins_anywhere_of_a_million_is_flung() {
-    begin_on_ugly_meshes(3..40, 500);
+#[ignore = "HOURS"]
+fn no_ball_that_begins_anywhere_of_ten_million_is_flung() {
+    begin_on_ugly_meshes(3..40, 3400);
 }

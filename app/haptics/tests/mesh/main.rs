@@ -18,6 +18,7 @@ mod joints;
 mod materials;
 mod moving;
 mod outlying;
+mod overlaps;
 mod parts;
 mod queries;
 mod walk;

@@ -16,6 +16,13 @@ fn grid(nurbs: &Nurbs) -> Vec<Vector3<f64>> {
     (0..nurbs.parts()).flat_map(of_part).collect()
 }
 
+/// How far a finger would have to go to touch nothing, estimated from above.
+fn overlap_m(nurbs: &Nurbs, grid: &[Vector3<f64>], hip: &Vector3<f64>, radius_m: f64) -> f64 {
+    let away_m = grid.iter().map(|point| (point - hip).norm()).fold(f64::INFINITY, f64::min);
+    let is_inside = nurbs.sides() == Sides::Solid && nurbs.surface(0.0).signed_distance(hip) < 0.0;
+    if is_inside { radius_m + away_m } else { (radius_m - away_m + SPACING_M).max(0.0) }
+}
+
 fn begin_all_over(
     name: &str,
     nurbs: &Arc<Nurbs>,
@@ -28,14 +35,17 @@ fn begin_all_over(
     let mut noise = Noise(seed);
     for start in 0..starts {
         let mut hip = Vector3::from_fn(|_, _| noise.between(-0.07, 0.07));
-        let away_m = grid.iter().map(|point| (point - hip).norm()).fold(f64::INFINITY, f64::min);
-        let is_inside = nurbs.sides() == Sides::Solid && nurbs.surface(0.0).signed_distance(&hip) < 0.0;
-        let overlap_m = if is_inside { radius_m + away_m } else { (radius_m - away_m + SPACING_M).max(0.0) };
+        let start_at = hip;
         let mut finger = finger(radius_m);
-        let mut way_m = 0.0;
+        let (mut explained_m, mut way_m) = (0.0, 0.0);
         for tick in 0..12 {
             let force_n = finger.step(from_ref(&entity), &hip, DT).force_on_user_W.norm();
-            let most_n = K * (overlap_m + way_m) + 1e-6;
+            let most_n = |explained_m| K * (explained_m + way_m) + 1e-6;
+            // Looked for where it has to explain something.
+            if force_n > most_n(explained_m) {
+                explained_m = overlap_m(nurbs, &grid, &start_at, radius_m);
+            }
+            let most_n = most_n(explained_m);
             assert!(
                 force_n <= most_n,
                 "{name}, {radius_m} m, start {start}, tick {tick} at {hip:?}: {force_n} N, explained {most_n} N"
@@ -70,10 +80,11 @@ fn no_finger_that_begins_inside_patches_is_flung() {
     begin_on_all_patches(60, 1);
 }
 
+/// Ten million starts.
 #[test]
-#[ignore = "an hour"]
-fn no_finger_that_begins_anywhere_of_millions_is_flung_by_patches() {
-    begin_on_all_patches(100_000, 2);
+#[ignore = "HOURS"]
+fn no_finger_that_begins_anywhere_of_ten_million_is_flung_by_patches() {
+    begin_on_all_patches(250_000, 2);
 }
 
 const GRID: u32 = 40;

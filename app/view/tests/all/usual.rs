@@ -51,19 +51,23 @@ fn things_are_told_apart_unless_a_scene_says_a_colour() {
     let grey = |colour: &&[f64; 4]| **colour == VisualSpec::DEFAULT_COLOUR;
     assert_eq!(colours.iter().filter(grey).count(), 1, "the floor");
     assert!(colours.windows(2).all(|both| both[0] != both[1]));
-    let said = r#"
+    for colour in [[0.8, 0.1, 0.1], [0.8, 0.8, 0.8]] {
+        let said = r#"
 name = "said"
 [[finger]]
 start_m = [0.0, 0.1, 0.0]
 [[entity]]
 name = "red"
 shape = { kind = "sphere", radius_m = 0.01 }
-visual = { colour = [0.8, 0.1, 0.1] }
+visual = { colour = COLOUR }
 [[entity]]
 name = "grey"
 shape = { kind = "sphere", radius_m = 0.01 }
 "#;
-    let said = stage(&Scene::parse(said, Path::new("said.toml")).unwrap());
-    assert_eq!(said.things[0].colour, [0.8, 0.1, 0.1, 1.0]);
-    assert_eq!(said.things[1].colour, VisualSpec::DEFAULT_COLOUR);
+        let said = said.replace("COLOUR", &format!("{colour:?}"));
+        let said = stage(&Scene::parse(&said, Path::new("said.toml")).unwrap());
+        let [r, g, b] = colour;
+        assert_eq!(said.things[0].colour, [r, g, b, 1.0]);
+        assert_eq!(said.things[1].colour, VisualSpec::DEFAULT_COLOUR);
+    }
 }

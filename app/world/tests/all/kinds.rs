@@ -91,7 +91,7 @@ fn what_is_seen_need_not_be_what_is_felt() {
     let visuals = |keys: &str| parsed(&ball(keys)).entities.remove(0).visuals;
     assert_eq!(visuals(""), [VisualSpec::default()]);
     assert!(visuals("visual = false").is_empty());
-    let red = VisualSpec { colour: [0.7, 0.0, 0.0, 1.0], ..VisualSpec::default() };
+    let red = VisualSpec { colour: Some([0.7, 0.0, 0.0, 1.0]), ..VisualSpec::default() };
     assert_eq!(visuals("visual = { colour = [0.7, 0.0, 0.0] }"), [red]);
     let several = visuals(
         "visual = [{ shape = { kind = \"mesh\", file = \"fine.obj\" }, colour = [1, 1, 1, 0.25] }, \

@@ -294,6 +294,37 @@ fn decimal_commas_and_an_obj_under_the_name_of_an_stl_are_told_as_what_they_are(
 }
 
 #[test]
+fn a_file_whose_content_is_not_what_its_name_says_is_told_as_both() {
+    let ply = b"ply\nformat ascii 1.0\nelement vertex 0\nend_header\n";
+    for (name, bytes, said) in [
+        (
+            "a.obj",
+            &ply[..],
+            "found PLY in a file whose name says OBJ; allowed: a name that ends in .ply for that",
+        ),
+        (
+            "a.ply",
+            PLAIN.as_bytes(),
+            "found OBJ in a file whose name says PLY; allowed: a name that ends in .obj for that",
+        ),
+        (
+            "a.3ds",
+            PLAIN.as_bytes(),
+            "found OBJ in a file whose name says 3DS; allowed: a name that ends in .obj for that",
+        ),
+        (
+            "a.ase",
+            b"glTF\x02",
+            "found glTF in a file whose name says ASE; allowed: a name that ends in .gltf or .glb",
+        ),
+        ("a.obj", b"\xff\xfev\0 \0", "cannot be read: it is UTF-16 text; save the file as UTF-8"),
+    ] {
+        let found = model::read(Path::new(name), bytes).expect_err("refused").to_string();
+        assert!(found.contains(said), "{found}");
+    }
+}
+
+#[test]
 fn a_message_stays_short_whatever_the_file_holds() {
     let long = "x".repeat(1_000_000);
     for text in [format!("v 0 0 {long}"), format!("f 1 2 {long}"), long.clone()] {

@@ -1,5 +1,9 @@
 //! Wrong values: types, ranges, directions, numbers of fingers; and layouts.
 
+use std::path::Path;
+
+use world::Scene;
+
 use crate::{layout_refused, refused, with_entity, with_finger, with_shape, with_top};
 
 #[test]
@@ -225,6 +229,27 @@ fn a_quaternion_that_is_no_rotation_is_refused() {
         "s.toml:8: entity[0].orientation_wxyz: found an array of length 3; allowed: an array of \
          4 numbers",
     );
+}
+
+#[test]
+fn a_file_of_another_kind_is_told_as_what_it_is() {
+    for (text, said) in [
+        (
+            "[[patch]]\ndegree = [1, 1]\n",
+            "patch: found a file of rational patches, no scene; a scene names it",
+        ),
+        (
+            "rate_hz = 1000\n[[device]]\nname = \"f0\"\n",
+            "device: found a file of devices, no scene; a layout belongs",
+        ),
+        ("[window]\nfullscreen = true\n", "window: found a file of settings, no scene; it belongs"),
+        ("[keys]\nhelp = \"F1\"\n", "keys: found a file of keys, no scene; the settings name it"),
+    ] {
+        let found = Scene::parse(text, Path::new("s.toml")).expect_err("no scene").to_string();
+        assert!(found.contains(said), "{found}");
+    }
+    // With a scene's keys beside it, it is a key that a scene does not have.
+    refused("name = \"a\"\n[[device]]\n", "s.toml:2: device: unknown key; allowed: ");
 }
 
 #[test]
