@@ -3,7 +3,7 @@
 use crate::stage::Thing;
 use haptics::Entity;
 use nalgebra::{Isometry3, Point3, Vector3};
-use world::{LightKind, Scene, SceneCamera, SceneEntity, SceneLight, ShapeSpec, VisualSpec};
+use world::{LightKind, Scene, SceneCamera, SceneEntity, SceneLight, ShapeSpec};
 
 /// Not nearer than what is so large needs (m).
 const LEAST_REACH_M: f64 = 0.08;

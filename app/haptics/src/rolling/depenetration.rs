@@ -86,10 +86,14 @@ pub(super) fn grown<F: Foot>(
             larger.rests[i].walk(ground, &small.centre_B, most_m, is_alone);
         }
         larger.give_way(&{ small.centre_B });
-        if let Some(larger) = with_room(ground, larger)
-            && (larger.centre_B - hip_B).norm() <= at_most_m
-        {
-            return larger;
+        if let Some(mut larger) = with_room(ground, larger) {
+            if !larger.touches_all_that_holds_it() {
+                larger = larger.on_what_holds_it(ground);
+            }
+            // A foot that was left behind in the air would bear what is not there.
+            if larger.touches_all_that_holds_it() && (larger.centre_B - hip_B).norm() <= at_most_m {
+                return larger;
+            }
         }
         most_m = 0.5 * (small.radius_m + most_m);
     }

@@ -361,3 +361,23 @@ fn forces_that_overflow_in_their_sum_become_zero() {
     assert_eq!(point_finger().step(std::slice::from_ref(&wall), &hip, DT).force_on_user_W.y, 1.5e308);
     assert_eq!(point_finger().step(&[wall.clone(), wall], &hip, DT).force_on_user_W, Vector3::zeros());
 }
+
+/// Begun in a pip of a die, where it has no room, and drawn through the whole die in the next tick, it grows on its way.
+#[test]
+fn a_ball_that_grows_touches_nothing_that_is_farther_than_its_radius() {
+    let tree = trees::die();
+    let entity = trees::touchable(&tree.tree, Friction::stiction(2.0341792900945452, 0.0).unwrap());
+    let radius_m = 0.004990125675915328;
+    let mut finger = Finger::new(radius_m, 1).unwrap().with_ramp_in(0.0).unwrap();
+    for hip in [[0.5200594311765062, 0.5073963306613587, 0.8925603779487865], [0.0, -0.6856462348476833, 0.0]]
+    {
+        let at = Vector3::from(hip) * tree.size_m;
+        let out = finger.step(std::slice::from_ref(&entity), &at, DT);
+        let points = finger.touch_points(std::slice::from_ref(&entity), 0);
+        assert!(!points.as_slice().is_empty());
+        for point in points.as_slice() {
+            let away_m = (point.point_W - out.god_object_W).norm();
+            assert!(away_m <= radius_m * (1.0 + 1e-6), "{away_m} {out:?}");
+        }
+    }
+}

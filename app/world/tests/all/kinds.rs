@@ -100,7 +100,7 @@ fn what_is_seen_need_not_be_what_is_felt() {
     assert!(
         matches!(&several[0].shape, Some(ShapeSpec::Mesh(mesh)) if mesh.file == Path::new("dir/fine.obj"))
     );
-    assert_eq!(several[0].colour[3], 0.25);
+    assert_eq!(several[0].colour.map(|colour| colour[3]), Some(0.25));
     assert_eq!(several[1].pose, Isometry3::translation(0.0, 0.1, 0.0));
     assert!(!several[1].casts_shadow && several[1].shape.is_none());
 }

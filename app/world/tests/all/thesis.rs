@@ -66,7 +66,7 @@ fn figure_7_3_is_a_red_half_kilogram_cube_that_does_not_turn() {
     // InertiaY is not in the figure, and what is there fits no such cube.
     assert_eq!(motion.inertia_kg_m2, None);
     assert_eq!(cube.visuals.len(), 1);
-    assert_eq!((cube.visuals[0].colour, &cube.visuals[0].shape), ([0.7, 0.0, 0.0, 0.25], &None));
+    assert_eq!((cube.visuals[0].colour, &cube.visuals[0].shape), (Some([0.7, 0.0, 0.0, 0.25]), &None));
     assert_eq!(
         told,
         [
