@@ -87,7 +87,7 @@ fn no_finger_that_begins_inside_a_tree_of_solids_is_flung() {
 
 /// Ten million starts.
 #[test]
-#[ignore = "HOURS"]
+#[ignore = "hours"]
 fn no_finger_that_begins_anywhere_about_twenty_thousand_trees_is_flung() {
     begin_on_random_trees(13..20_013, 63);
 }

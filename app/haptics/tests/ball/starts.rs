@@ -84,7 +84,7 @@ fn no_ball_that_begins_overlapping_is_flung() {
 
 /// Ten million starts.
 #[test]
-#[ignore = "HOURS"]
+#[ignore = "hours"]
 fn no_ball_that_begins_anywhere_of_ten_million_is_flung() {
     begin_on_ugly_meshes(3..40, 3400);
 }
