@@ -570,6 +570,12 @@ fn what_is_wrong_with_a_gltf_is_told_with_its_place() {
             "extensionsRequired: found KHR_draco_mesh_compression; allowed: geometry that is not compressed: export it \
              without, or unpack it (`gltf-transform copy`)",
         ),
+        (
+            "\"accessors\":[{\"bufferView\":0,",
+            "\"extensionsUsed\":[\"KHR_draco_mesh_compression\"],\"accessors\":[{",
+            "extensionsUsed: found KHR_draco_mesh_compression; allowed: geometry that is not compressed: export it \
+             without, or unpack it (`gltf-transform copy`)",
+        ),
         ("\"nodes\":[0]", "\"nodes\":[3]", "nodes[3]: found a reference to nothing; allowed: 0 to 0"),
         ("\"mesh\":0", "\"mesh\":1", "nodes[0].mesh = 1: found a reference to nothing; allowed: 0 to 0"),
         (

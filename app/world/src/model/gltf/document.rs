@@ -13,6 +13,7 @@ const MOST_OBJECTS: usize = 1 << 18;
 pub(super) struct Document {
     asset: Asset,
     extensions_required: Vec<String>,
+    extensions_used: Vec<String>,
     scene: Option<usize>,
     scenes: Vec<Scene>,
     pub(super) nodes: Vec<Node>,
@@ -179,10 +180,15 @@ impl Document {
 
     pub(super) fn check(&self) -> Result<(), ModelError> {
         self.asset.check_version()?;
-        match self.extensions_required.iter().find(|name| COMPRESSED.contains(&name.as_str())) {
-            Some(name) => {
+        // What is used but not required may be there without compression as well.
+        let is_missing = |accessor: &Accessor| accessor.buffer_view.is_none() && accessor.sparse.is_none();
+        let used = if self.accessors.iter().any(is_missing) { &self.extensions_used[..] } else { &[] };
+        let named = [("extensionsRequired", &self.extensions_required[..]), ("extensionsUsed", used)];
+        let is_compressed = |name: &&String| COMPRESSED.contains(&name.as_str());
+        match named.iter().find_map(|(key, names)| Some((*key, names.iter().find(is_compressed)?))) {
+            Some((key, name)) => {
                 let allowed = "geometry that is not compressed: export it without, or unpack it (`gltf-transform copy`)";
-                Err(wrong("extensionsRequired".into(), name.clone(), allowed))
+                Err(wrong(key.into(), name.clone(), allowed))
             }
             None => Ok(()),
         }
