@@ -15,7 +15,8 @@
 //!
 //! A ball is shaded where it touches: at its foot on the mesh, not at its centre. Where it touches at several places, what
 //! each of them does to the user is turned on its own, so that one that comes or goes changes nothing at that moment:
-//! its load is zero then.
+//! its load is zero then. Turned towards each other they would add up to more than the facets' force: then all are
+//! made smaller by the same factor.
 //!
 //! Limits:
 //! - The god-object itself leaps over convex edges: at depth d over an edge of angle a by d sin(a), since there the HIP
@@ -57,6 +58,7 @@ use crate::rolling::Share;
 use crate::shape::{self, Shape};
 use crate::shared::Shared;
 use crate::surface::SurfacePoint;
+use crate::touch_points::MAX_TOUCH_POINTS;
 
 /// How the force of a contact is turned to make facets feel like a smooth surface.
 ///
@@ -132,14 +134,32 @@ impl Shading {
     /// As [`Self::turn`], of a ball that touches a mesh at these places.
     pub(crate) fn turn_shares(&self, shape: &Shape, shares: impl Iterator<Item = Share>, touch: &mut Touch) {
         if !matches!(self, Self::None) {
-            touch.force_on_user_B = shares.map(|share| self.turned_share(shape, &share)).sum();
+            touch.force_on_user_B =
+                self.turned_shares(shape, shares).map(|share| share.force_on_user_B).sum();
         }
     }
 
-    /// What one of the places that a ball touches does to the user, turned.
+    /// What the places that a ball touches do to the user, turned.
     #[inline(never)]
-    pub(crate) fn turned_share(&self, shape: &Shape, share: &Share) -> Vector3<f64> {
-        self.turned(shape, &share.at, &share.force_on_user_B, self.form())
+    pub(crate) fn turned_shares(
+        &self,
+        shape: &Shape,
+        shares: impl Iterator<Item = Share>,
+    ) -> impl Iterator<Item = Share> {
+        let mut turned = [const { None }; MAX_TOUCH_POINTS];
+        let (mut plain_B, mut sum_B) = (Vector3::zeros(), Vector3::zeros());
+        for (share, turned) in shares.zip(&mut turned) {
+            let force_on_user_B = self.turned(shape, &share.at, &share.force_on_user_B, self.form());
+            plain_B += share.force_on_user_B;
+            sum_B += force_on_user_B;
+            *turned = Some(Share { force_on_user_B, ..share });
+        }
+        let [plain_n, sum_n] = [plain_B, sum_B].map(|sum| sum.norm());
+        let size = if sum_n > plain_n { plain_n / sum_n } else { 1.0 };
+        turned
+            .into_iter()
+            .flatten()
+            .map(move |share| Share { force_on_user_B: share.force_on_user_B * size, ..share })
     }
 
     #[inline(never)]

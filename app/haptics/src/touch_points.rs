@@ -57,10 +57,9 @@ impl TouchPoints {
     ) -> Self {
         let mut all = Self::NONE;
         let (mut parts, mut left_W) = ([0.0; MAX_TOUCH_POINTS], contact.force_on_user_W);
-        for (share, part) in shares.zip(&mut parts) {
+        for (share, part) in entity.shading.turned_shares(&entity.shape, shares).zip(&mut parts) {
             *part = share.part;
-            let force_B = entity.shading.turned_share(&entity.shape, &share);
-            let force_on_user_W = vector_into_world(&entity.X_WB, &(force_B * strength));
+            let force_on_user_W = vector_into_world(&entity.X_WB, &(share.force_on_user_B * strength));
             left_W -= force_on_user_W;
             all.push(TouchPoint {
                 point_W: point_into_world(&entity.X_WB, &share.at.point_B),

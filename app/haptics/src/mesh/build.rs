@@ -4,8 +4,9 @@
 //! order; a walk over the mesh needs none of these.
 //!
 //! Model: validate, repair ([`repair`]), order in space ([`order`]), link ([`topology`]), close cracks ([`junction`]), wind
-//! ([`winding`]), close holes of what is nearly closed ([`hole`]), mark what passes through itself ([`crossed`](super::crossed)). What was done is reported; what has no meaning is refused with
-//! the first offender.
+//! ([`winding`]), close holes of what is nearly closed ([`hole`]), mark what passes through itself
+//! ([`crossed`](super::crossed)), turn closed parts outward ([`nesting`](super::nesting)). What was done is reported; what has no
+//! meaning is refused with the first offender.
 //!
 //! Invariants of the result: every face has an area; links are mutual; the same geometry gives the same mesh,
 //! whatever the order of its faces and vertices was in the input.
@@ -14,7 +15,7 @@
 
 use super::order::Triangle;
 use super::repair::area_vector;
-use super::{Bvh, CloseHoles, Face, Finding, Link, Mesh, MeshError, MeshReport, Sides, TriangleSoup};
+use super::{Bvh, CloseHoles, Face, Link, Mesh, MeshError, MeshReport, Sides, TriangleSoup};
 use super::{hole, junction, order, pinch, repair, topology, winding};
 use nalgebra::Vector3;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -66,23 +67,23 @@ impl Mesh {
             }
             links = link_again(&mut triangles, &mut vertices, &mut report)?;
         }
-        let mut sides = winding::orient(&mut triangles, &mut links, &vertices, &mut report);
+        let mut parts = winding::orient(&mut triangles, &mut links, &mut report);
         if hole::close(holes, &mut triangles, &links, &mut vertices, &mut report) {
             links = link_again(&mut triangles, &mut vertices, &mut report)?;
             let flipped = std::mem::take(&mut report.flipped);
-            report.cavities = Finding::default();
-            sides = winding::orient(&mut triangles, &mut links, &vertices, &mut report);
+            parts = winding::orient(&mut triangles, &mut links, &mut report);
             report.flipped = flipped;
         }
         report.open_holes = hole::largest(&triangles, &links, &vertices);
         pinch::part(&mut triangles, &links, &mut vertices);
         report_edges(&triangles, &links, &mut report);
         let faces: Box<[Face]> =
-            (0..triangles.len()).map(|i| face(&triangles[i], &links[i], sides[i], &vertices)).collect();
+            (0..triangles.len()).map(|i| face(&triangles[i], &links[i], parts.sides(i), &vertices)).collect();
         triangles.iter().for_each(|triangle| tell(triangle.origin() as usize, triangle.is_lid()));
         drop((triangles, links));
-        let has_inside = sides.contains(&Sides::Solid);
-        let sides = if sides.contains(&Sides::Sheet) { Sides::Sheet } else { Sides::Solid };
+        let has_inside = faces.iter().any(|face| face.sides == Sides::Solid);
+        let is_solid = faces.iter().all(|face| face.sides == Sides::Solid);
+        let sides = if is_solid { Sides::Solid } else { Sides::Sheet };
         report.faces = faces.len();
         report.vertices = vertices.len();
         let extent_m = vertices.iter().fold(0.0_f64, |extent, v| extent.max(v.amax()));
@@ -92,6 +93,7 @@ impl Mesh {
         let mut mesh =
             Self { faces, vertices, bvh, sides, has_inside, extent_m, identity, uv: None, labels: None };
         report.crossed = mesh.mark_crossed();
+        mesh.turn_outward(&parts, &mut report);
         Ok((mesh, report))
     }
 }

@@ -64,7 +64,7 @@ pub struct Triangles<'a> {
 
 impl<'a> Triangles<'a> {
     #[inline(always)]
-    fn corners(self, face: &Face) -> [Vector3<f64>; 3] {
+    pub(super) fn corners(self, face: &Face) -> [Vector3<f64>; 3] {
         let [a, b, c] = face.vertices;
         [self.vertices[a as usize], self.vertices[b as usize], self.vertices[c as usize]]
     }

@@ -22,25 +22,30 @@ impl Mesh {
     /// Marks the faces that others pass through, and says how many they are.
     pub(super) fn mark_crossed(&mut self) -> usize {
         let mut is_crossed = vec![false; self.faces.len()];
+        let is_done =
+            self.for_each_crossed_pair(|pair| pair.iter().for_each(|&face| is_crossed[face] = true));
+        for (face, is_crossed) in self.faces.iter_mut().zip(is_crossed) {
+            face.is_crossed = is_crossed || !is_done && face.sides == Sides::Solid;
+        }
+        self.faces.iter().filter(|face| face.is_crossed).count()
+    }
+
+    /// Visits each pair of faces that pass through each other once; says whether these are all.
+    pub(super) fn for_each_crossed_pair(&self, mut visit: impl FnMut([usize; 2])) -> bool {
         let slack_m = TOUCHING * self.extent_m;
         let mut left = MOST_PAIRS.saturating_mul(self.faces.len());
-        let is_done = self.bvh.for_each_pair(|i, j| {
+        self.bvh.for_each_pair(|i, j| {
             let pair = [i, j].map(|face| &self.faces[face as usize]);
             let corners = || pair.map(|face| face.vertices.map(|vertex| self.vertices[vertex as usize]));
             let are_solid = pair.iter().all(|face| face.sides == Sides::Solid);
             let are_neighbours = || pair[0].vertices.iter().any(|vertex| pair[1].vertices.contains(vertex));
             let normals = pair.map(|face| face.normal_B);
             if are_solid && !are_neighbours() && do_cross(&corners(), &normals, slack_m) {
-                is_crossed[i as usize] = true;
-                is_crossed[j as usize] = true;
+                visit([i, j].map(|face| face as usize));
             }
             left -= 1;
             left > 0
-        });
-        for (face, is_crossed) in self.faces.iter_mut().zip(is_crossed) {
-            face.is_crossed = is_crossed || !is_done && face.sides == Sides::Solid;
-        }
-        self.faces.iter().filter(|face| face.is_crossed).count()
+        })
     }
 }
 

@@ -17,6 +17,7 @@ mod inside;
 mod joints;
 mod materials;
 mod moving;
+mod nesting;
 mod outlying;
 mod overlaps;
 mod parts;

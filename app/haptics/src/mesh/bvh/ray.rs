@@ -68,6 +68,20 @@ impl<const WIDTH: usize> Bvh<WIDTH> {
         })
     }
 
+    /// Visits all faces of solids that a ray from a point crosses on the shortest way along an axis out of the box around the
+    /// mesh, and says whether it leaves the material there; whatever it costs.
+    pub(in crate::mesh) fn for_each_face_on_the_way_out(
+        &self,
+        triangles: Triangles<'_>,
+        p_B: &Vector3<f64>,
+        mut visit: impl FnMut(u32, bool),
+    ) {
+        let [ray, ..] = self.rays(p_B);
+        let visit = |crossing: Crossing| visit(crossing.face, crossing.is_leaving);
+        let all = self.for_each_crossing(triangles, &ray, usize::MAX, visit);
+        debug_assert!(all.is_ok());
+    }
+
     /// Along the three axes both ways: the axes with the shortest way out of the box first, and of each that way first.
     pub(super) fn rays(&self, p_B: &Vector3<f64>) -> [Ray; 6] {
         let room_m = |axis: usize, is_upward: bool| {
