@@ -104,8 +104,9 @@ impl Understood {
         row("mesh", told.lines().next().unwrap_or_default());
         told.lines().skip(1).for_each(|finding| row("", &format!("  {}", finding.trim())));
         row("felt", &self.felt());
-        let [size, low, high] = [self.high - self.low, self.low, self.high];
-        let [size, low, high] = [size, low, high].map(|v| v.map(|x| short(without_noise(x, size.amax()))));
+        let size = self.high - self.low;
+        let [low, high] = [self.low, self.high].map(|v| v.map(|x| rounded(x, size.amax())));
+        let size = size.map(|x| short(without_noise(x, size.amax())));
         row("size", &format!("{} x {} x {}, from {} to {}", size.x, size.y, size.z, list(&low), list(&high)));
         row("surface", &format!("{} square", short(self.area)));
         if self.mesh.sides() == Sides::Solid {
@@ -218,6 +219,14 @@ fn short(number: f64) -> f64 {
     format!("{number:.3e}").parse().unwrap_or(number)
 }
 
+/// To a thousandth of a size, or so: far away it shows where a thing begins and ends.
+fn rounded(number: f64, size: f64) -> f64 {
+    let digits = (3.0 - size.log10().floor()).clamp(0.0, 300.0);
+    let rounded = format!("{number:.*}", digits as usize).parse().unwrap_or(number);
+    // Not -0.
+    rounded + 0.0
+}
+
 /// Zero where a number drowns in what it is part of, as roundings of CAD programs do.
 fn without_noise(number: f64, size: f64) -> f64 {
     if number.abs() < 1e-12 * size { 0.0 } else { number }
@@ -225,4 +234,24 @@ fn without_noise(number: f64, size: f64) -> f64 {
 
 fn list(v: &Vector3<f64>) -> String {
     format!("[{}, {}, {}]", v.x, v.y, v.z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bounds_are_rounded_to_the_size_of_the_thing_however_far_away_it_is() {
+        for (number, size, expected) in [
+            (1e6, 1.0, 1e6),
+            (1_000_000.5, 1.0, 1_000_000.5),
+            (0.123_456_7, 0.1, 0.123_5),
+            (-1e-17, 0.1, 0.0),
+            (123_456.7, 123_456.7, 123_457.0),
+            (3e-9, 1e-8, 3e-9),
+            (7.0, 0.0, 7.0),
+        ] {
+            assert_eq!(rounded(number, size), expected, "{number} of {size}");
+        }
+    }
 }

@@ -76,7 +76,11 @@ fn read_camera_pose(table: &Table<'_>) -> Result<Isometry3<f64>, SceneError> {
         // A frame that looks along z has x to the left; ours looks along -z.
         return Ok(Isometry3::face_towards(&eye, &(eye - ahead), &up));
     }
-    Err(target.out_of_range("a place other than the camera's, and not straight along `up` from it"))
+    Err(target.out_of_range(if ahead == Vector3::zeros() {
+        "another place than the camera's own `position_m`"
+    } else {
+        "a place that is not straight along `up` from the camera, or another `up`"
+    }))
 }
 
 fn read_field_of_view(table: &Table<'_>) -> Result<f64, SceneError> {

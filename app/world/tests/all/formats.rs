@@ -553,11 +553,16 @@ fn buffers_of_gltf_are_in_it_beside_it_or_below_and_nowhere_else() {
 #[test]
 fn what_is_wrong_with_a_gltf_is_told_with_its_place() {
     let document = Document::square();
-    let first_version = br#"{"accessors": {"a": {}}, "asset": {"version": "1.0"}, "meshes": {}}"#;
-    assert_eq!(
-        gltf(first_version).unwrap_err().to_string(),
-        "asset.version: found \"1.0\"; allowed: \"2.0\"; export the model as glTF 2.0 or GLB"
-    );
+    for (version, found) in
+        [("\"1.0\"", "\"1.0\""), ("1.0", "1.0"), ("1", "1"), ("null", "none"), ("[]", "none")]
+    {
+        let text =
+            format!(r#"{{"accessors": {{"a": {{}}}}, "asset": {{"version": {version}}}, "meshes": {{}}}}"#);
+        assert_eq!(
+            gltf(text.as_bytes()).unwrap_err().to_string(),
+            format!("asset.version: found {found}; allowed: \"2.0\"; export the model as glTF 2.0 or GLB")
+        );
+    }
     let cases = [
         (
             "\"2.0\"",

@@ -208,7 +208,11 @@ fn what_is_wrong_with_them_is_told_with_line_and_key() {
         ),
         (
             "[[camera]]\nlook_at_m = [0, 1, 0]\n".to_owned(),
-            "s.toml:3: camera[0].look_at_m: found an array of length 3; allowed: a place other than the camera's, and not straight along `up` from it",
+            "s.toml:3: camera[0].look_at_m: found an array of length 3; allowed: a place that is not straight along `up` from the camera, or another `up`",
+        ),
+        (
+            "[[camera]]\nposition_m = [0, 1, 0]\nlook_at_m = [0, 1, 0]\n".to_owned(),
+            "s.toml:4: camera[0].look_at_m: found an array of length 3; allowed: another place than the camera's own `position_m`",
         ),
         (
             "[[light]]\nkind = \"point\"\nattenuation = [0, 1, 0]\n".to_owned(),

@@ -3,6 +3,7 @@
 use super::{missing, wrong};
 use crate::model::ModelError;
 use serde::Deserialize;
+use serde_json::Value;
 
 /// A text of nothing but `{}` must not become gigabytes.
 const MOST_OBJECTS: usize = 1 << 18;
@@ -27,7 +28,8 @@ pub(super) struct Document {
 #[derive(Deserialize, Default)]
 #[serde(default)]
 struct Asset {
-    version: String,
+    /// A text; in files of version 1 that some programs wrote, a number.
+    version: Value,
 }
 
 #[derive(Deserialize, Default)]
@@ -141,12 +143,16 @@ struct VersionOnly {
 
 impl Asset {
     fn check_version(&self) -> Result<(), ModelError> {
-        let version: String = self.version.escape_default().take(20).collect();
-        if version.starts_with("2.") {
+        if self.version.as_str().is_some_and(|version| version.starts_with("2.")) {
             return Ok(());
         }
+        let found = match &self.version {
+            Value::String(text) => format!("\"{}\"", text.escape_default().take(20).collect::<String>()),
+            Value::Number(number) => number.to_string(),
+            _ => "none".into(),
+        };
         let allowed = "\"2.0\"; export the model as glTF 2.0 or GLB";
-        Err(wrong("asset.version".into(), format!("\"{version}\""), allowed))
+        Err(wrong("asset.version".into(), found, allowed))
     }
 }
 
