@@ -56,7 +56,7 @@ fn a_cavity_of_one_part_stays_one_in_the_box_of_a_larger_part() {
 fn of_stones_about_a_rod_those_in_it_are_cavities_and_all_others_face_outward() {
     let (alone, _) = Mesh::build(rod()).unwrap();
     let mut told = 0;
-    for seed in 0..300 {
+    for seed in 0..40 {
         let mut noise = Noise(seed);
         let rod_is_inward = noise.uniform() < 0.5;
         let (mut parts, mut cavities) = (vec![inverted_if(rod_is_inward, rod())], 0);
@@ -74,7 +74,7 @@ fn of_stones_about_a_rod_those_in_it_are_cavities_and_all_others_face_outward() 
         assert_eq!(report.cavities.count, cavities, "{seed}: {report}");
         told += cavities;
     }
-    assert!(told > 300, "{told}");
+    assert!(told > 50, "{told}");
 }
 
 /// As models come that were given a skin of two layers.
