@@ -101,6 +101,8 @@ const LAST_WORDS: Duration = Duration::from_secs(5);
 
 /// Runs the program with the process's own arguments.
 pub fn main() -> ExitCode {
+    // A system that refuses this kills whoever writes too much, as it would anyway.
+    let _ = rt_core::signals::outlive_full_files();
     let ended = execute();
     // The lease is over: nobody is held up but whoever waits for this program.
     say::flush(LAST_WORDS);

@@ -113,7 +113,14 @@ impl Desk {
         let (mut desk, receiver) = Self::silent(rig, means)?;
         match source {
             OrderSource::File(file) => desk.play(file)?,
-            OrderSource::Input => desk.lines = Some(listen().map_err(|error| error.to_string())?),
+            OrderSource::Input => {
+                desk.lines = Some(listen().map_err(|error| {
+                    format!(
+                        "--orders -: cannot read the standard input: {}",
+                        rt_core::limits::no_thread(&error)
+                    )
+                })?)
+            }
         }
         Ok((desk, receiver))
     }
