@@ -192,6 +192,14 @@ pub enum CalibrateFailure {
         /// Why.
         source: io::Error,
     },
+    /// The layout is there, the figure is not.
+    #[error("{failure}; the layout is written to {}: only the figure is missing", layout.display())]
+    OnlyWritten {
+        /// The layout.
+        layout: PathBuf,
+        /// Of the figure.
+        failure: Box<CalibrateFailure>,
+    },
     /// Signals cannot be caught.
     #[error("cannot catch signals: {0}")]
     Signals(io::Error),
@@ -239,7 +247,11 @@ fn run_to_end(args: &CalibrateArgs) -> Result<(), CalibrateFailure> {
     } else if plan.write.is_none() {
         print(text.trim_end())?;
     }
-    args.plot.as_ref().map_or(Ok(()), |file| draw(file, &pairs, &found, used))
+    let drawn = args.plot.as_ref().map_or(Ok(()), |file| draw(file, &pairs, &found, used));
+    drawn.map_err(|failure| match plan.write {
+        Some(layout) => CalibrateFailure::OnlyWritten { layout, failure: Box::new(failure) },
+        None => failure,
+    })
 }
 
 /// What can be checked before anybody moves a device.
@@ -334,14 +346,9 @@ fn get_pairs(args: &CalibrateArgs) -> Result<(String, Vec<Pair>), CalibrateFailu
     Ok((wish.socket.display().to_string(), gathered.pairs))
 }
 
-/// Pipes are welcome; what never ends is not.
+/// Pipes that somebody writes are welcome; what never begins or never ends is not.
 fn read_pairs(file: &Path) -> io::Result<String> {
-    use std::io::Read;
-    let mut bytes = Vec::new();
-    std::fs::File::open(file)?.take(MAX_PAIRS_BYTES + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > MAX_PAIRS_BYTES {
-        return Err(io::Error::other(format!("it is larger than {MAX_PAIRS_BYTES} bytes; take fewer lines")));
-    }
+    let bytes = input_file::read_all(input_file::open_stream(file)?, MAX_PAIRS_BYTES)?;
     input_file::text(bytes)
 }
 
