@@ -199,8 +199,7 @@ fn play(args: &PlayArgs, settings: &Settings, is_headless: bool) -> Result<(Repo
     }
     let signals = install_signals()?;
     let rig = args.rig(settings)?;
-    args.check_outputs(&rig)?;
-    let mut plan = args.plan(&rig, settings);
+    let mut plan = args.plan(&rig, settings)?;
     plan.window = window_spec(&rig.scene.name, settings)?;
     if plan.window.is_none() {
         return Err(NoWindow::NoDisplay.into());

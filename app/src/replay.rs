@@ -120,8 +120,10 @@ fn refuse_late_beginning(args: &ReplayArgs, feed: &Feed, stage: &Stage) -> Resul
 }
 
 fn check_outputs(args: &ReplayArgs, rig: &Rig) -> Result<(), RunFailure> {
+    // The recording's own scene is in it, and what is called so here is not read.
+    let of_scene = if args.scene.is_some() { rig.input_files() } else { Vec::new() };
     let inputs: Vec<&PathBuf> =
-        [&args.recording].into_iter().chain(&args.scene).chain(rig.model_files()).collect();
+        [&args.recording].into_iter().chain(&of_scene).chain(rig.model_files()).collect();
     outputs::check(&args.record.iter().map(|file| Output::ticks(file)).collect::<Vec<_>>(), &inputs)
 }
 

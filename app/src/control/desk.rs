@@ -150,6 +150,11 @@ impl Desk {
         self.coming.pop_front()
     }
 
+    /// Files of the scenes that a script will bring.
+    pub fn scenes_to_come(&self) -> Vec<PathBuf> {
+        self.coming.iter().flat_map(|coming| coming.rig.input_files()).collect()
+    }
+
     /// The slow side's turn: what came in meanwhile. What is refused is told, and the run goes on.
     pub fn step(&mut self) {
         self.sender.free_spent();

@@ -84,7 +84,7 @@ impl Files {
         number: u32,
     ) -> Result<Recorder, RecordingError> {
         let about = self.about.followed_by(rig, first);
-        let inputs = [&rig.scene_file].into_iter().chain(rig.model_files());
+        let inputs = rig.input_files();
         let taken: Vec<&PathBuf> =
             self.taken.iter().chain(&self.record).chain(&self.events).chain(inputs).collect();
         let path = free_place(first, number, &taken);
