@@ -106,7 +106,10 @@ impl RunFailure {
             | Self::Segment(_)
             | Self::Device(_)
             | Self::Recording(
-                RecordingError::Create { .. } | RecordingError::Claimed { .. } | RecordingError::Format(_),
+                RecordingError::Create { .. }
+                | RecordingError::NoThread { .. }
+                | RecordingError::Claimed { .. }
+                | RecordingError::Format(_),
             ) => 2,
             _ => 3,
         }

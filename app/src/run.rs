@@ -193,7 +193,7 @@ impl Parts {
             .as_ref()
             .map(|wanted| Snapshots::start(wanted, shown(), period_ns, when_full == WhenFull::Wait));
         let snapshots = snapshots.transpose().map_err(RunFailure::Start)?;
-        // The last: it empties files, and nothing may refuse the run after that.
+        // The last: it makes files. Those with content are emptied by their first rows, once all threads are there.
         let recorders = files.first(rig, &view)?;
         let fast = FastLoop::new(step, producer, when_full, total_ticks, period_ns).with_events(events);
         Ok(Self {

@@ -264,7 +264,7 @@ impl SlowSide {
                 say(format_args!("phantom3: {error}"));
                 let path = files.record[0].clone();
                 let failure = Some(error.to_string());
-                self.failed.push(Recorded { path, rows: 0, unit: "rows", lost: 0, failure });
+                self.failed.push(Recorded { path, rows: 0, unit: "rows", lost: 0, failure, is_begun: true });
                 Vec::new()
             }
         }

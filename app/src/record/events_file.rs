@@ -23,7 +23,7 @@ pub struct EventsFile {
 }
 
 impl EventsFile {
-    /// Empties the file.
+    /// Begins the file, which keeps what it has until it is started.
     ///
     /// # Errors
     /// If that cannot be done, or its name says no format.
@@ -34,6 +34,14 @@ impl EventsFile {
         let lines = WholeLines::begin(file, &header)
             .map_err(|source| RecordingError::Create { file: path.clone(), source })?;
         Ok(Self { lines, path, names, book, period_ns, is_table })
+    }
+
+    /// The run goes: a file without events is a result, too.
+    ///
+    /// # Errors
+    /// If it cannot be emptied.
+    pub fn start(&mut self) -> Result<(), RecordingError> {
+        self.lines.start().map_err(|source| self.failed(source))
     }
 
     /// Appends an event.

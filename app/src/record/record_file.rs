@@ -1,4 +1,6 @@
-//! A recording in one of its formats, as its thread writes it.
+//! A recording in one of its formats, as its thread writes it. Its first row or event starts it ([`Opened::start`]).
+//!
+//! [`Opened::start`]: super::Opened
 
 use super::events_file::EventsFile;
 use super::mcap_file::McapFile;
@@ -30,7 +32,7 @@ impl RecordFile {
         match self {
             Self::Csv(file) => file.append(row, bodies),
             Self::Mcap(file) => file.append(row, bodies),
-            Self::Events(_) => Ok(()),
+            Self::Events(file) => file.start(),
         }
     }
 
