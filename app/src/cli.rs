@@ -213,6 +213,7 @@ fn run_demo(settings: &Settings, is_headless: bool) -> Result<(Report, Stop), Ru
     let record = demo::recording_place(settings.recording_directory.value.as_deref())?;
     let socket = settings.driver_socket.value.clone().unwrap_or_else(|| usual_socket("phantom3"));
     let mut plan = demo::plan(&demo.rig, socket, record);
+    plan.check_outputs(&settings.input_files().collect::<Vec<_>>())?;
     plan.window = if is_headless { None } else { window_spec(&demo.rig.scene.name, settings)? };
     if plan.attach.is_some() {
         demo.rig.layout = calibrated_layout()?;

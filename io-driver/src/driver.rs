@@ -266,8 +266,9 @@ fn refuse_without_descriptors() -> Result<(), RunError> {
     spare.map(drop).map_err(|source| RunError::System { what, source })
 }
 
-/// Its connection, its segment, two for the pipe that holds the segment's pages, and one to map it by.
-const SPARE_DESCRIPTORS: usize = 5;
+/// Its connection and its process, its segment, two for the pipe that holds the segment's pages, one to map it by; and two
+/// for somebody who looks on meanwhile.
+const SPARE_DESCRIPTORS: usize = 8;
 
 fn refuse_if_strict(report: &SetupReport, options: &RunOptions) -> Result<(), RunError> {
     if options.strict && !report.all_obtained() {

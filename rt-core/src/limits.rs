@@ -56,7 +56,7 @@ pub fn no_process(error: &io::Error) -> String {
 fn more_processes() -> String {
     limit(Resource::RLIMIT_NPROC).map_or_else(
         || "end other programs, or raise the limit of the control group (TasksMax=, `docker run --pids-limit`)".into(),
-        |most| format!("raise the limit of processes (`ulimit -u`, now {most})"),
+        |most| format!("raise the limit of processes (`ulimit -u`, now {most}; TasksMax= of a service)"),
     )
 }
 

@@ -26,8 +26,9 @@ use layout_file::LayoutFileError;
 use live::LiveError;
 use plot::PlotError;
 use report::Report;
+use rt_core::input_file;
+use rt_core::replacement::{self, Replacement};
 use rt_core::signals::StopSignals;
-use rt_core::{input_file, replacement};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -337,9 +338,10 @@ fn get_pairs(args: &CalibrateArgs) -> Result<(String, Vec<Pair>), CalibrateFailu
         seconds: args.seconds,
     };
     // Found out now, not after a minute of holding two arms together.
-    args.save_pairs.as_ref().map_or(Ok(()), |file| save_pairs(file, &[]))?;
+    args.save_pairs.as_ref().map_or(Ok(()), |file| refuse_unwritable(file))?;
     let gathered = live::gather(&wish, &signals);
-    if let Some(file) = &args.save_pairs {
+    let has_result = gathered.end.is_ok() || !gathered.pairs.is_empty();
+    if let Some(file) = args.save_pairs.as_ref().filter(|_| has_result) {
         save_pairs(file, &gathered.pairs)?;
     }
     gathered.end?;
@@ -354,6 +356,12 @@ fn read_pairs(file: &Path) -> io::Result<String> {
 
 /// Room for as many pairs as there may be, with all their digits.
 const MAX_PAIRS_BYTES: u64 = 256 << 20;
+
+/// Earlier pairs stay until there are others.
+fn refuse_unwritable(file: &Path) -> Result<(), CalibrateFailure> {
+    let begun = Replacement::begin(file).map(drop);
+    begun.map_err(|source| CalibrateFailure::Output { file: file.into(), source })
+}
 
 /// Numbers as short as they can be read back exactly.
 fn save_pairs(file: &Path, pairs: &[Pair]) -> Result<(), CalibrateFailure> {

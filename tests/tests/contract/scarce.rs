@@ -92,7 +92,7 @@ fn a_start_that_any_count_of_processes_refuses_is_told_with_its_limit_and_costs_
         let arguments = [&RUN[..], &["0.2", "--record", "o.csv"]].concat();
         let Some(said) = with_processes(&place, most, &arguments) else { return };
         assert_eq!(said.status, Some(2), "{most}: {}", said.err);
-        let limit = format!("raise the limit of processes (`ulimit -u`, now {most})");
+        let limit = format!("raise the limit of processes (`ulimit -u`, now {most};");
         assert!(said.err.contains(&limit), "{most}: {}", said.err);
         assert!(bytes(&place, "o.csv") == before, "{most}");
     }
@@ -248,6 +248,17 @@ fn a_calibration_whose_figure_does_not_fit_says_that_the_layout_is_written() {
     assert!(said.out.contains("p.svg: cannot be written: File too large"), "{}", said.out);
     assert!(said.out.contains("the layout is written to l.toml: only the figure is missing"), "{}", said.out);
     assert!(place.path("l.toml").exists() && !place.path("p.svg").exists());
+}
+
+#[test]
+fn a_live_calibration_that_cannot_begin_leaves_earlier_pairs() {
+    let place = workplace();
+    place.write("pairs.csv", "earlier");
+    let said = place.run(["calibrate", "--live", "none.sock", "--save-pairs", "pairs.csv"]);
+    assert_eq!(said.status, Some(2), "{}", said.err);
+    assert_eq!(bytes(&place, "pairs.csv"), b"earlier");
+    let said = place.run(["calibrate", "--live", "none.sock", "--save-pairs", "none/pairs.csv"]);
+    assert!(said.status == Some(2) && said.err.contains("none/pairs.csv"), "{}", said.err);
 }
 
 /// What a user waits for at most, with a machine that does something else besides.
