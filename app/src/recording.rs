@@ -113,6 +113,11 @@ impl Recording {
         Ok(Self { lines, path, names, period_ns })
     }
 
+    /// Whether the file has its earlier content still.
+    pub fn has_content(&self) -> bool {
+        self.lines.has_content()
+    }
+
     /// Where it lies.
     pub fn path(&self) -> &Path {
         &self.path
@@ -143,7 +148,7 @@ impl Recording {
     /// # Errors
     /// If that fails, or nobody would find it.
     pub fn finish(mut self) -> Result<u64, RecordingError> {
-        self.lines.sync().map_err(|source| self.failed(source))?;
+        self.lines.keep().and_then(|()| self.lines.sync()).map_err(|source| self.failed(source))?;
         let rows = self.lines.rows();
         if self.lines.is_removed() {
             Err(RecordingError::Removed { file: self.path, rows })

@@ -285,6 +285,12 @@ fn run_two_processes(rig: &Rig, plan: &RunPlan, signals: &StopSignals) -> Result
     let known = (&premises, &mut totals);
     let result = two_processes::run(&mut source, attachment, (fast, slow_lists), known, watched);
     progress.end();
+    if slow.newest.is_none()
+        && let Err(failure @ RunFailure::Start(_)) = result
+    {
+        slow.take_back();
+        return Err(failure);
+    }
     let SlowEnd { recordings, events, pictures } = slow.finish();
     let end = result.inspect_err(|_| tell_kept(&recordings))?;
     let is_real = info.clock_mode == ClockMode::Real;

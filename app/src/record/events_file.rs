@@ -44,6 +44,11 @@ impl EventsFile {
         self.lines.start().map_err(|source| self.failed(source))
     }
 
+    /// Whether the file has its earlier content still.
+    pub fn has_content(&self) -> bool {
+        self.lines.has_content()
+    }
+
     /// Appends an event.
     ///
     /// # Errors
@@ -70,6 +75,7 @@ impl EventsFile {
     /// # Errors
     /// If that fails, or nobody would find it.
     pub fn finish(mut self) -> Result<u64, RecordingError> {
+        self.lines.keep().map_err(|source| self.failed(source))?;
         self.flush()?;
         let rows = self.lines.rows();
         if self.lines.is_removed() {

@@ -58,6 +58,8 @@ pub(super) const ORDER_TOPIC: &str = "/orders";
 /// An MCAP file being written.
 pub struct McapFile {
     writer: Writer<NoSeek<WholeWrites>>,
+    /// The file had some, and has it until it is started.
+    has_content: bool,
     /// The first row is there.
     is_started: Arc<AtomicBool>,
     path: PathBuf,
@@ -124,13 +126,14 @@ impl McapFile {
     ) -> Result<Self, RecordingError> {
         let path = file.path().to_owned();
         let failed = |error| RecordingError::Create { file: path.clone(), source: into_io(error) };
-        let may_wait = file.may_wait();
+        let (may_wait, has_content) = (file.may_wait(), file.has_content());
         let is_started = Arc::new(AtomicBool::new(false));
         let writes = WholeWrites::new(file, Arc::clone(&is_started));
         let mut writer = options().create(NoSeek::new(writes)).map_err(failed)?;
         let channels = begin(&mut writer, &names, about).map_err(failed)?;
         let mut file = Self {
             writer,
+            has_content,
             is_started,
             path: path.clone(),
             names,
@@ -171,6 +174,11 @@ impl McapFile {
     #[must_use]
     pub fn under_way(self) -> Self {
         Self { is_current: true, ..self }
+    }
+
+    /// Whether the file has its earlier content still.
+    pub fn has_content(&self) -> bool {
+        self.has_content && !self.is_started.load(Ordering::Relaxed)
     }
 
     /// Appends a row and its bodies.
@@ -298,9 +306,10 @@ impl McapFile {
     /// # Errors
     /// If that fails, or nobody would find it.
     pub fn finish(mut self) -> Result<u64, RecordingError> {
-        if !self.is_started.load(Ordering::Relaxed) {
+        if self.has_content() {
             return Ok(0);
         }
+        self.is_started.store(true, Ordering::Relaxed);
         self.flush()?;
         let facts = BTreeMap::from([
             ("rows".to_owned(), self.rows.to_string()),

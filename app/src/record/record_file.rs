@@ -28,6 +28,15 @@ impl RecordFile {
         }
     }
 
+    /// Whether the file has its earlier content still.
+    pub(super) fn has_content(&self) -> bool {
+        match self {
+            Self::Csv(file) => file.has_content(),
+            Self::Mcap(file) => file.has_content(),
+            Self::Events(file) => file.has_content(),
+        }
+    }
+
     pub(super) fn append(&mut self, row: &Row, bodies: &[BodyRow]) -> Result<(), RecordingError> {
         match self {
             Self::Csv(file) => file.append(row, bodies),

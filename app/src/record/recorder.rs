@@ -50,8 +50,8 @@ pub struct Recorded {
     pub lost: u64,
     /// Why it is not complete, if it is not; has been told.
     pub failure: Option<String>,
-    /// A tick came; without one a file is as it was before.
-    pub is_begun: bool,
+    /// No tick came, and the file has its earlier content.
+    pub is_as_before: bool,
 }
 
 /// Hands events to a recording, as [`Recorder::send`] does rows.
@@ -117,6 +117,10 @@ struct Shared {
     has_failed: AtomicBool,
     /// Nobody reads the standard output any more.
     reader_has_gone: AtomicBool,
+    /// The file's earlier content is there until the end.
+    has_content: AtomicBool,
+    /// The run did not begin, and the file is to be as it was.
+    is_in_vain: AtomicBool,
 }
 
 impl Recorder {
@@ -177,7 +181,7 @@ impl Recorder {
             match start(path, file) {
                 Ok(recorder) => started.push(recorder),
                 Err(error) => {
-                    started.into_iter().map(Self::finish).for_each(drop);
+                    started.into_iter().for_each(Self::take_back);
                     return Err(error);
                 }
             }
@@ -294,6 +298,12 @@ impl Recorder {
         self.unit == EVENTS
     }
 
+    /// Of a run that did not begin: what was made is removed again.
+    pub fn take_back(self) {
+        self.shared.is_in_vain.store(true, Ordering::Relaxed);
+        drop(self.finish());
+    }
+
     /// Waits until everything is written.
     pub fn finish(mut self) -> Recorded {
         self.close();
@@ -314,8 +324,8 @@ impl Recorder {
             }
             Err(_) => (0, Some(panicked(&path))),
         };
-        let is_begun = rows > 0 || shared.progress.taken() > 0;
-        Recorded { path, rows, unit, lost, failure: failure.or(given_up), is_begun }
+        let is_as_before = shared.has_content.load(Ordering::Relaxed);
+        Recorded { path, rows, unit, lost, failure: failure.or(given_up), is_as_before }
     }
 
     /// The thread ends with the process.
@@ -336,7 +346,7 @@ impl Recorder {
             unit: self.unit,
             lost: self.lost,
             failure: Some(why),
-            is_begun: true,
+            is_as_before: false,
         }
     }
 }
@@ -400,6 +410,10 @@ impl RecorderThread {
             return self.abandon(error);
         }
         let Some(file) = self.file.take() else { return result };
+        self.shared.has_content.store(file.has_content(), Ordering::Relaxed);
+        if self.shared.is_in_vain.load(Ordering::Relaxed) && self.shared.progress.taken() == 0 {
+            return Ok(0);
+        }
         file.finish().or_else(|error| self.abandon(error))
     }
 

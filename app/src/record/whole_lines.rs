@@ -113,6 +113,19 @@ impl WholeLines {
         written
     }
 
+    /// It has what it had before, and nothing of what is gathered.
+    pub(crate) fn has_content(&self) -> bool {
+        self.file.has_content()
+    }
+
+    /// At an end in order a file without lines stays, unless that would cost its earlier content.
+    ///
+    /// # Errors
+    /// As [`Self::start`].
+    pub(crate) fn keep(&mut self) -> io::Result<()> {
+        if self.has_content() { Ok(()) } else { self.start() }
+    }
+
     /// Writes everything out to the disk itself.
     ///
     /// # Errors
@@ -177,8 +190,9 @@ mod tests {
         let [content, empty, new] = ["content", "empty", "new"].map(|name| directory.path().join(name));
         std::fs::write(&content, "earlier").expect("room");
         std::fs::write(&empty, "").expect("room");
-        let begin =
-            |path| Opened::open(path).and_then(|file| WholeLines::begin(file, "head")).expect("begun");
+        let begin = |path: &std::path::PathBuf| {
+            Opened::open(path).and_then(|file| WholeLines::begin(file, "head")).expect("begun")
+        };
         let all = [&content, &empty, &new];
         for mut lines in all.map(begin) {
             lines.sync().expect("nothing to write");
@@ -186,6 +200,11 @@ mod tests {
         assert_eq!(std::fs::read(&content).expect("there"), b"earlier");
         assert_eq!(std::fs::read(&empty).expect("there"), b"");
         assert!(!new.exists());
+        for path in [&content, &new] {
+            begin(path).keep().expect("room");
+        }
+        assert_eq!(std::fs::read(&content).expect("there"), b"earlier");
+        assert_eq!(std::fs::read(&new).expect("there"), b"head\n");
         for path in all {
             let mut lines = begin(path);
             lines.append(3, |line| line.push_str("one")).and_then(|()| lines.sync()).expect("room");
