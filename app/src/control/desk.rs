@@ -114,12 +114,11 @@ impl Desk {
         match source {
             OrderSource::File(file) => desk.play(file)?,
             OrderSource::Input => {
-                desk.lines = Some(listen().map_err(|error| {
-                    format!(
-                        "--orders -: cannot read the standard input: {}",
-                        rt_core::limits::no_thread(&error)
-                    )
-                })?)
+                let no_thread = |error| {
+                    let missing = rt_core::limits::no_thread(&error);
+                    format!("--orders -: cannot read the standard input: {missing}")
+                };
+                desk.lines = Some(listen().map_err(no_thread)?);
             }
         }
         Ok((desk, receiver))

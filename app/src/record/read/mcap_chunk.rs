@@ -29,7 +29,7 @@ impl From<String> for ChunkError {
 }
 
 /// The library tells its own lack of memory in words.
-fn wrong(error: std::io::Error) -> ChunkError {
+fn wrong(error: &std::io::Error) -> ChunkError {
     if error.kind() == ErrorKind::OutOfMemory || error.to_string().contains("allocation_failed") {
         return ChunkError::Memory;
     }
@@ -73,8 +73,8 @@ fn expand(chunk: &Chunk<'_>) -> Result<Vec<u8>, ChunkError> {
     }
     let mut content = Vec::new();
     content.try_reserve_exact(said as usize).map_err(|_| ChunkError::Memory)?;
-    let decoder = lz4::Decoder::new(chunk.records).map_err(wrong)?;
-    decoder.take(said + 1).read_to_end(&mut content).map_err(wrong)?;
+    let decoder = lz4::Decoder::new(chunk.records).map_err(|error| wrong(&error))?;
+    decoder.take(said + 1).read_to_end(&mut content).map_err(|error| wrong(&error))?;
     Ok(content)
 }
 
